@@ -1,0 +1,1 @@
+#include "shared/exit_codes.hpp"

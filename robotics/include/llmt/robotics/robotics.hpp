@@ -1,0 +1,6 @@
+#pragma once
+
+/// \file
+/// Umbrella header of llmt::robotics.
+
+#include "llmt/abi.hpp"

@@ -1,0 +1,1 @@
+#include "llmt/robotics/robotics.hpp"
