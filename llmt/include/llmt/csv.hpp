@@ -1,0 +1,76 @@
+/// \file
+/// Tables of numbers from CSV text, with errors that name file, line and column.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "llmt/abi.hpp"
+
+namespace llmt {
+
+/// A CSV text with a header row, kept as text: a column is turned into numbers when it is asked for, so columns of words do no harm
+/// as long as nobody asks for them.
+///
+/// Accepted: fields separated by commas (or by semicolons or tabs, if the header has no comma); fields in double quotes, which may
+/// hold separators, line breaks and doubled quotes (RFC 4180); LF or CRLF; a UTF-8 byte-order mark; blank lines, which are skipped.
+/// Numbers are written with a decimal point. Every row must have as many fields as the header.
+class Csv {
+ public:
+  /// Reads a file. Throws std::runtime_error, starting with `path` or `path:line`, if it cannot be read, is empty, has an unnamed or
+  /// repeated column, or a row with too few or too many fields.
+  static Csv read(const std::string& path);
+
+  /// As read(), from memory; `name` stands for the path in errors.
+  static Csv parse(std::string text, std::string name);
+
+  const std::string& name() const { return name_; }
+  const std::vector<std::string>& columns() const { return columns_; }
+  std::ptrdiff_t rows() const { return std::ssize(row_begins_); }
+
+  bool has(std::string_view column) const;
+
+  /// Position of a column. Throws std::runtime_error naming the file and the columns it has, if there is none of that name.
+  std::size_t index_of(std::string_view column) const;
+
+  /// The named columns as numbers, rows x columns, rows in file order. Throws std::runtime_error `path:line: column "c": ...` at the
+  /// first cell, in file order, that is empty, not a number, not finite or out of range; and as index_of().
+  Eigen::MatrixXd numbers(std::span<const std::string> columns) const;
+
+  /// One column as numbers; errors as above.
+  Eigen::VectorXd numbers(const std::string& column) const;
+
+  /// The text of a row as it stands in the file, without its line end.
+  std::string_view row_text(std::ptrdiff_t row) const;
+
+  /// The header as it stands in the file, without byte-order mark and line end.
+  std::string_view header_text() const;
+
+  /// Line of the file, counted from 1, on which a row begins.
+  std::ptrdiff_t line_of(std::ptrdiff_t row) const;
+
+  char separator() const { return separator_; }
+
+ private:
+  Csv() = default;
+
+  std::string name_;
+  std::string text_;
+  char separator_ = ',';
+  std::size_t header_begin_ = 0;
+  std::vector<std::string> columns_;
+  std::vector<std::size_t> row_begins_;  // offsets into text_
+
+  std::size_t record_end(std::size_t begin) const;
+  std::ptrdiff_t line_at(std::size_t offset) const;
+  void check_field_counts() const;
+};
+
+/// `text` as one CSV field: in double quotes, inner quotes doubled, if it holds the separator, a quote or a line break.
+std::string csv_field(std::string_view text, char separator = ',');
+
+}  // namespace llmt

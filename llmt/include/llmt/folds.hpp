@@ -1,0 +1,37 @@
+/// \file
+/// The one place that decides which rows are held out: for the choice of the leaf count, for calibration, for discovery.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace llmt {
+
+/// How rows are dealt to folds.
+enum class FoldKind {
+  random,     ///< shuffled, then dealt out evenly; flatters data measured along a path or a grid
+  contiguous  ///< consecutive blocks in row order: the honest choice when neighbouring rows resemble each other
+};
+
+struct FoldOptions {
+  int count = 5;                       ///< number of folds K, at least 2; as many as groups gives leave-one-out
+  FoldKind kind = FoldKind::random;    ///< how rows are dealt to folds
+  std::uint64_t seed = 1;              ///< for FoldKind::random
+  std::span<const double> groups = {}; ///< one label a row; rows with equal labels (repeats of a pose) share a fold; empty: each row alone
+};
+
+/// The rows of one fold, ascending.
+struct Fold {
+  std::vector<std::ptrdiff_t> train;     ///< rows outside the fold
+  std::vector<std::ptrdiff_t> held_out;  ///< rows inside the fold
+};
+
+/// Partitions the rows 0 ... rows-1 into K folds whose sizes, counted in groups, differ by at most one.
+///
+/// Every row is held out exactly once. A group keeps together; groups are taken in order of first appearance.
+/// Throws std::invalid_argument if there are fewer groups than folds, fewer than two folds, or a label count other than `rows`.
+std::vector<Fold> make_folds(std::ptrdiff_t rows, const FoldOptions& options);
+
+}  // namespace llmt

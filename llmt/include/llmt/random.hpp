@@ -1,0 +1,45 @@
+/// \file
+/// Random numbers that are the same on every platform.
+///
+/// The standard library fixes the engines but not the distributions, so a seed means different data with another vendor. Here both
+/// are ours: xoshiro256** (Blackman & Vigna 2018) seeded through splitmix64, and distributions written out.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace llmt {
+
+/// A stream of pseudo-random numbers. A value type: a copy continues the same sequence on its own.
+class Random {
+ public:
+  /// Every seed, 0 included, starts a well-mixed sequence.
+  explicit Random(std::uint64_t seed);
+
+  /// 64 uniformly distributed bits.
+  std::uint64_t bits();
+
+  /// Uniform on [0, 1), a multiple of 2^-53.
+  double uniform();
+
+  /// Uniform on [low, high).
+  double uniform(double low, double high);
+
+  /// Uniform on {0, ..., bound - 1}, without modulo bias. Throws std::invalid_argument if bound is 0.
+  std::uint64_t below(std::uint64_t bound);
+
+  /// Standard normal (Marsaglia's polar method).
+  double normal();
+
+  /// The numbers 0 ... size-1 in random order (Fisher-Yates).
+  std::vector<std::ptrdiff_t> permutation(std::ptrdiff_t size);
+
+ private:
+  std::array<std::uint64_t, 4> state_;
+  double spare_normal_ = 0.0;
+  bool has_spare_ = false;
+};
+
+}  // namespace llmt
