@@ -5,13 +5,10 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
-#include <cstring>
-#include <fstream>
-#include <limits>
-#include <sstream>
 #include <stdexcept>
+
+#include "llmt/files.hpp"
 
 namespace llmt {
 namespace {
@@ -88,14 +85,7 @@ double parse_number(std::string_view field, std::string& problem) {
 
 }  // namespace
 
-Csv Csv::read(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::ostringstream content;
-  if (!file || (file.peek() != std::ifstream::traits_type::eof() && !(content << file.rdbuf())) || file.bad()) {
-    throw std::runtime_error(fmt::format("{}: cannot be read: {}", path, std::strerror(errno)));
-  }
-  return parse(std::move(content).str(), path);
-}
+Csv Csv::read(const std::string& path) { return parse(read_file(path), path); }
 
 Csv Csv::parse(std::string text, std::string name) {
   Csv csv;

@@ -1,0 +1,73 @@
+#include "llmt/files.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <stdexcept>
+#include <system_error>
+
+namespace llmt {
+namespace {
+
+[[noreturn]] void fail(const std::string& path, const char* what, const std::string& reason) {
+  throw std::runtime_error(fmt::format("{}: cannot be {}: {}", path, what, reason));
+}
+
+/// Writes all of `content`; on failure returns the reason.
+std::string try_write(const std::string& path, std::string_view content) {
+  errno = 0;
+  std::ofstream file(path, std::ios::binary | std::ios::trunc);
+  file.write(content.data(), static_cast<std::streamsize>(content.size()));
+  file.close();
+  return file ? std::string{} : std::string(std::strerror(errno != 0 ? errno : EIO));
+}
+
+}  // namespace
+
+std::string read_file(const std::string& path) {
+  if (std::filesystem::is_directory(path)) {
+    fail(path, "read", "it is a folder");
+  }
+  errno = 0;
+  std::ifstream file(path, std::ios::binary);
+  std::ostringstream content;
+  if (file && file.peek() != std::ifstream::traits_type::eof()) {
+    content << file.rdbuf();
+  }
+  if (!file.is_open() || file.bad() || !content) {
+    fail(path, "read", std::strerror(errno != 0 ? errno : EIO));
+  }
+  return std::move(content).str();
+}
+
+void write_file(const std::string& path, std::string_view content) {
+  std::error_code ignored;
+  // A link stays a link: the file it points to is replaced.
+  const std::filesystem::path target =
+      std::filesystem::is_symlink(path, ignored) ? std::filesystem::weakly_canonical(path) : std::filesystem::path(path);
+  if (std::filesystem::exists(target, ignored) && !std::filesystem::is_regular_file(target, ignored)) {
+    const std::string reason = try_write(path, content);
+    if (!reason.empty()) {
+      fail(path, "written", reason);
+    }
+    return;
+  }
+  const std::string temporary = fmt::format("{}.{}.tmp", target.string(), ::getpid());
+  std::string reason = try_write(temporary, content);
+  if (reason.empty()) {
+    std::error_code error;
+    std::filesystem::rename(temporary, target, error);
+    reason = error ? error.message() : std::string{};
+  }
+  if (!reason.empty()) {
+    std::filesystem::remove(temporary, ignored);
+    fail(path, "written", reason);
+  }
+}
+
+}  // namespace llmt

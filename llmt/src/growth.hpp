@@ -1,0 +1,29 @@
+/// \file
+/// Best-first growth of one partition.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "llmt/fit.hpp"
+
+namespace llmt {
+
+/// The rows that a tree is grown from, and options without defaults left to fill in.
+struct GrowthProblem {
+  Eigen::MatrixXd split_values;  ///< rows x split inputs
+  Eigen::MatrixXd deviations;    ///< rows x regression inputs, as deviations from `centre` of the inputs
+  Eigen::MatrixXd outputs;       ///< rows x outputs of the partition
+  GrowthOptions options;         ///< split_inputs listed, min_leaf_samples set
+  std::vector<int> regressor_of_split;  ///< position of each split input among the regression inputs, -1 if it is none
+  int max_threads = 0;
+};
+
+struct GrownPartition {
+  std::vector<Node> nodes;  ///< split_input as in GrowthOptions::split_inputs; thresholds in the inputs' units
+  StopReason stop = StopReason::leaf_samples;
+};
+
+GrownPartition grow(const GrowthProblem& problem);
+
+}  // namespace llmt

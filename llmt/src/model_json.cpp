@@ -1,0 +1,209 @@
+#include <fmt/format.h>
+
+#include <cstdint>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <type_traits>
+#include <utility>
+
+#include "llmt/files.hpp"
+#include "llmt/model.hpp"
+
+namespace llmt {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr const char* format_name = "llmt-model";
+constexpr int format_version = 1;
+
+Json to_array(const Eigen::VectorXd& values) { return Json(std::vector<double>(values.begin(), values.end())); }
+
+Json node_to_json(const Node& node, const Model& model) {
+  Json json;
+  if (!node.is_leaf()) {
+    json["split"] = {{"input", model.inputs()[static_cast<std::size_t>(node.split_input)].name},
+                     {"column", node.split_input},
+                     {"threshold", node.threshold},
+                     {"left", node.left},
+                     {"right", node.right}};
+  }
+  json["samples"] = node.samples;
+  json["rank"] = node.rank;
+  json["rss"] = to_array(node.rss);
+  json["value"] = to_array(node.value);
+  json["slope"] = Json::array();
+  for (std::ptrdiff_t o = 0; o < node.slope.rows(); ++o) {
+    json["slope"].push_back(to_array(node.slope.row(o)));
+  }
+  return json;
+}
+
+/// A JSON value together with the way to it, so that an error can say where it is.
+class Reader {
+ public:
+  Reader(const Json& json, std::string where) : json_(json), where_(std::move(where)) {}
+
+  Reader member(const char* key) const {
+    if (!json_.is_object() || !json_.contains(key)) {
+      fail(fmt::format("member \"{}\" is missing", key));
+    }
+    return {json_.at(key), fmt::format("{}/{}", where_, key)};
+  }
+  bool has(const char* key) const { return json_.is_object() && json_.contains(key); }
+
+  std::vector<Reader> elements() const {
+    if (!json_.is_array()) {
+      fail("an array is needed");
+    }
+    std::vector<Reader> result;
+    for (std::size_t i = 0; i < json_.size(); ++i) {
+      result.emplace_back(json_[i], fmt::format("{}/{}", where_, i));
+    }
+    return result;
+  }
+
+  template <class Value>
+  Value as() const {
+    const bool fits = std::is_same_v<Value, std::string> ? json_.is_string()
+                      : std::is_integral_v<Value>        ? json_.is_number_integer()
+                                                         : json_.is_number();
+    if (!fits) {
+      fail(fmt::format("{} is needed, not {}",
+                       std::is_same_v<Value, std::string> ? "a text" : std::is_integral_v<Value> ? "a whole number" : "a number",
+                       json_.dump().substr(0, 40)));
+    }
+    if constexpr (std::is_integral_v<Value>) {
+      const std::int64_t value = json_.get<std::int64_t>();
+      if (!std::in_range<Value>(value)) {
+        fail(fmt::format("{} is out of range", value));
+      }
+      return static_cast<Value>(value);
+    } else {
+      return json_.get<Value>();
+    }
+  }
+
+  template <class Value>
+  std::vector<Value> list() const {
+    std::vector<Value> result;
+    for (const Reader& element : elements()) {
+      result.push_back(element.as<Value>());
+    }
+    return result;
+  }
+
+  Eigen::VectorXd vector(std::ptrdiff_t size) const {
+    const std::vector<double> values = list<double>();
+    if (std::ssize(values) != size) {
+      fail(fmt::format("{} numbers are needed, there are {}", size, values.size()));
+    }
+    return Eigen::Map<const Eigen::VectorXd>(values.data(), size);
+  }
+
+  [[noreturn]] void fail(const std::string& what) const {
+    throw std::runtime_error(fmt::format("{}: {}", where_, what));
+  }
+
+ private:
+  const Json& json_;
+  std::string where_;
+};
+
+Node node_from_json(const Reader& json, std::ptrdiff_t outputs, std::ptrdiff_t regressors) {
+  Node node;
+  if (json.has("split")) {
+    const Reader split = json.member("split");
+    node.split_input = split.member("column").as<int>();
+    node.threshold = split.member("threshold").as<double>();
+    node.left = split.member("left").as<int>();
+    node.right = split.member("right").as<int>();
+  }
+  node.samples = json.member("samples").as<std::ptrdiff_t>();
+  node.rank = json.member("rank").as<int>();
+  node.rss = json.member("rss").vector(outputs);
+  node.value = json.member("value").vector(outputs);
+  const std::vector<Reader> slopes = json.member("slope").elements();
+  if (std::ssize(slopes) != outputs) {
+    json.member("slope").fail(fmt::format("{} rows are needed, there are {}", outputs, slopes.size()));
+  }
+  node.slope.resize(outputs, regressors);
+  for (std::ptrdiff_t o = 0; o < outputs; ++o) {
+    node.slope.row(o) = slopes[static_cast<std::size_t>(o)].vector(regressors).transpose();
+  }
+  return node;
+}
+
+}  // namespace
+
+std::string to_json(const Model& model) {
+  Json json;
+  json["format"] = format_name;
+  json["version"] = format_version;
+  json["inputs"] = Json::array();
+  for (const InputColumn& input : model.inputs()) {
+    json["inputs"].push_back({{"name", input.name}, {"low", input.low}, {"high", input.high}, {"centre", input.centre}});
+  }
+  json["outputs"] = model.outputs();
+  json["regression_inputs"] = model.regression_inputs();
+  json["validity"] = "crisp";
+  json["partitions"] = Json::array();
+  for (const Partition& partition : model.partitions()) {
+    Json nodes = Json::array();
+    for (const Node& node : partition.nodes) {
+      nodes.push_back(node_to_json(node, model));
+    }
+    json["partitions"].push_back({{"outputs", partition.outputs}, {"nodes", std::move(nodes)}});
+  }
+  try {
+    return json.dump(1) + "\n";
+  } catch (const Json::type_error&) {
+    throw std::runtime_error("llmt::to_json: a column name is not valid UTF-8");
+  }
+}
+
+Model from_json(const std::string& text, const std::string& name) {
+  Json json;
+  try {
+    json = Json::parse(text);
+  } catch (const Json::parse_error& error) {
+    throw std::runtime_error(fmt::format("{}: not JSON, or cut off: {}", name, error.what()));
+  }
+  const Reader root(json, name + ": ");
+  if (!root.has("format") || root.member("format").as<std::string>() != format_name) {
+    root.fail(fmt::format("not a model file: \"format\" is not \"{}\"", format_name));
+  }
+  if (const int version = root.member("version").as<int>(); version != format_version) {
+    root.fail(fmt::format("version {} of the model format cannot be read, this program knows version {}", version, format_version));
+  }
+  if (const std::string validity = root.member("validity").as<std::string>(); validity != "crisp") {
+    root.member("validity").fail(fmt::format("\"{}\" is not known, only \"crisp\" is", validity));
+  }
+  std::vector<InputColumn> inputs;
+  for (const Reader& input : root.member("inputs").elements()) {
+    inputs.push_back({.name = input.member("name").as<std::string>(),
+                      .low = input.member("low").as<double>(),
+                      .high = input.member("high").as<double>(),
+                      .centre = input.member("centre").as<double>()});
+  }
+  std::vector<int> regression_inputs = root.member("regression_inputs").list<int>();
+  std::vector<Partition> partitions;
+  for (const Reader& entry : root.member("partitions").elements()) {
+    Partition partition{.outputs = entry.member("outputs").list<int>(), .nodes = {}};
+    for (const Reader& node : entry.member("nodes").elements()) {
+      partition.nodes.push_back(node_from_json(node, std::ssize(partition.outputs), std::ssize(regression_inputs)));
+    }
+    partitions.push_back(std::move(partition));
+  }
+  try {
+    return {std::move(inputs), root.member("outputs").list<std::string>(), std::move(regression_inputs), std::move(partitions)};
+  } catch (const std::invalid_argument& error) {
+    throw std::runtime_error(fmt::format("{}: {}", name, error.what()));
+  }
+}
+
+void save(const Model& model, const std::string& path) { write_file(path, to_json(model)); }
+
+Model load(const std::string& path) { return from_json(read_file(path), path); }
+
+}  // namespace llmt
