@@ -1,0 +1,38 @@
+# Installation. Two install components, so that a core-only install exists:
+#   llmt_core      llmt::llmt and llmt::discovery, their headers and the package files
+#   llmt_robotics  llmt::robotics and its headers
+include(CMakePackageConfigHelpers)
+
+set(LLMT_INSTALL_CMAKEDIR "${CMAKE_INSTALL_LIBDIR}/cmake/llmt")
+
+# llmt_install(COMPONENT EXPORT TARGET...)
+function(llmt_install component export)
+  install(
+    TARGETS ${ARGN}
+    EXPORT ${export}
+    RUNTIME COMPONENT ${component}
+    LIBRARY COMPONENT ${component} NAMELINK_COMPONENT ${component}
+    ARCHIVE COMPONENT ${component}
+    FILE_SET HEADERS COMPONENT ${component})
+  install(
+    EXPORT ${export}
+    NAMESPACE llmt::
+    DESTINATION "${LLMT_INSTALL_CMAKEDIR}"
+    COMPONENT ${component})
+endfunction()
+
+llmt_install(llmt_core llmtCoreTargets llmt llmt_discovery)
+if(TARGET llmt_robotics)
+  llmt_install(llmt_robotics llmtRoboticsTargets llmt_robotics)
+endif()
+
+# A static library hands its link dependencies on to whoever links it; a shared one does not.
+get_target_property(LLMT_LIBRARY_TYPE llmt TYPE)
+configure_package_config_file("${PROJECT_SOURCE_DIR}/cmake/llmtConfig.cmake.in" "${PROJECT_BINARY_DIR}/llmtConfig.cmake"
+                              INSTALL_DESTINATION "${LLMT_INSTALL_CMAKEDIR}" NO_SET_AND_CHECK_MACRO)
+# Below 1.0 a minor version may break its users.
+write_basic_package_version_file("${PROJECT_BINARY_DIR}/llmtConfigVersion.cmake" COMPATIBILITY SameMinorVersion)
+install(
+  FILES "${PROJECT_BINARY_DIR}/llmtConfig.cmake" "${PROJECT_BINARY_DIR}/llmtConfigVersion.cmake"
+  DESTINATION "${LLMT_INSTALL_CMAKEDIR}"
+  COMPONENT llmt_core)

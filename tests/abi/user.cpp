@@ -1,0 +1,3 @@
+#include "llmt/abi.hpp"
+
+int main() {}

@@ -1,0 +1,52 @@
+# cmake -D CASE=<case> -D ... -P check.cmake: one way of using llmt from another project, from a clean folder on.
+#   package   install all, then find_package(llmt COMPONENTS robotics), or the core where there is no robotics
+#   core      install the core only: it works, and asking it for robotics is refused in words
+#   sources   add_subdirectory
+# SOURCE_DIR, BUILD_DIR: llmt's. WORK_DIR: where to work. ROBOTICS: ON where llmt::robotics was built. OPTIONS: for configuring.
+cmake_minimum_required(VERSION 3.25)
+
+function(run)
+  execute_process(COMMAND ${ARGN} RESULT_VARIABLE result OUTPUT_VARIABLE output ERROR_VARIABLE output)
+  if(NOT result EQUAL 0)
+    list(JOIN ARGN " " command)
+    message(FATAL_ERROR "${command}\nexit code ${result}\n${output}")
+  endif()
+  set(output "${output}" PARENT_SCOPE)
+endfunction()
+
+set(consumer "${SOURCE_DIR}/tests/consumer")
+set(prefix "${WORK_DIR}/prefix")
+set(configure "${CMAKE_COMMAND}" -S "${consumer}" -B "${WORK_DIR}/build" "-DCMAKE_PREFIX_PATH=${prefix}" ${OPTIONS})
+file(REMOVE_RECURSE "${WORK_DIR}")
+
+if(CASE STREQUAL "package")
+  run("${CMAKE_COMMAND}" --install "${BUILD_DIR}" --prefix "${prefix}")
+elseif(CASE STREQUAL "core")
+  set(ROBOTICS OFF)
+  run("${CMAKE_COMMAND}" --install "${BUILD_DIR}" --prefix "${prefix}" --component llmt_core)
+  execute_process(COMMAND ${configure} -DWITH_ROBOTICS=ON RESULT_VARIABLE result OUTPUT_VARIABLE output ERROR_VARIABLE output)
+  string(REGEX REPLACE "[ \n]+" " " output "${output}")
+  if(result EQUAL 0 OR NOT output MATCHES "this installation of llmt has no component 'robotics'")
+    message(FATAL_ERROR "a core-only installation did not refuse COMPONENTS robotics:\n${output}")
+  endif()
+  file(REMOVE_RECURSE "${WORK_DIR}/build")
+elseif(CASE STREQUAL "sources")
+  list(APPEND configure "-DLLMT_SOURCE_DIR=${SOURCE_DIR}")
+else()
+  message(FATAL_ERROR "unknown CASE '${CASE}'")
+endif()
+
+run(${configure} "-DWITH_ROBOTICS=${ROBOTICS}")
+run("${CMAKE_COMMAND}" --build "${WORK_DIR}/build" --parallel 2)
+set(programs fit_and_predict)
+if(ROBOTICS)
+  list(APPEND programs use_robotics)
+endif()
+foreach(program IN LISTS programs)
+  run("${WORK_DIR}/build/${program}")
+  message(STATUS "${program}: ${output}")
+  if(NOT output MATCHES "consumer ok")
+    message(FATAL_ERROR "${program} printed:\n${output}")
+  endif()
+endforeach()
+file(REMOVE_RECURSE "${WORK_DIR}")

@@ -1,0 +1,8 @@
+#include <iostream>
+
+#include "llmt/abi.hpp"
+
+int main() {
+  std::cout << (llmt::abi::tag != nullptr ? "consumer ok\n" : "no tag\n");
+  return 0;
+}
