@@ -11,7 +11,8 @@ Eigen::MatrixXd difference_jacobian(const Problem& problem, const Eigen::VectorX
   Eigen::MatrixXd jacobian;
   Eigen::VectorXd moved = values;
   for (Eigen::Index k = 0; k < values.size(); ++k) {
-    const double step = relative_step * std::max(std::abs(values(k)), problem.parameters[static_cast<std::size_t>(k)].scale);
+    const double step =
+        relative_step * std::max(std::abs(values(k)), problem.parameters[static_cast<std::size_t>(k)].scale);
     moved(k) = values(k) + step;
     const double upper = moved(k);
     const Eigen::VectorXd above = problem.residual(moved);
@@ -38,14 +39,15 @@ JacobianCheck check_jacobian(const Problem& problem) {
   const Eigen::MatrixXd analytic = problem.jacobian(values);
   const Eigen::MatrixXd difference = difference_jacobian(problem, values);
   if (analytic.rows() != difference.rows() || analytic.cols() != difference.cols()) {
-    throw std::invalid_argument("llmt::discovery::check_jacobian: the Jacobian is " + std::to_string(analytic.rows()) + " x " +
-                                std::to_string(analytic.cols()) + ", expected " + std::to_string(difference.rows()) + " x " +
-                                std::to_string(difference.cols()));
+    throw std::invalid_argument("llmt::discovery::check_jacobian: the Jacobian is " + std::to_string(analytic.rows()) +
+                                " x " + std::to_string(analytic.cols()) + ", expected " +
+                                std::to_string(difference.rows()) + " x " + std::to_string(difference.cols()));
   }
   // A column that moves nothing is compared on the scale of the others, not on that of its own rounding.
   double largest = std::numeric_limits<double>::min();
   for (Eigen::Index k = 0; k < values.size(); ++k) {
-    largest = std::max(largest, difference.col(k).cwiseAbs().maxCoeff() * problem.parameters[static_cast<std::size_t>(k)].scale);
+    largest = std::max(largest,
+                       difference.col(k).cwiseAbs().maxCoeff() * problem.parameters[static_cast<std::size_t>(k)].scale);
   }
   JacobianCheck check;
   for (Eigen::Index k = 0; k < values.size(); ++k) {

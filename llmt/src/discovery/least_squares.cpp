@@ -136,7 +136,8 @@ Eigen::VectorXd Solver::residuals_at(const Eigen::VectorXd& values) const {
 Eigen::MatrixXd Solver::jacobian_at(const Eigen::VectorXd& values) const {
   const Eigen::MatrixXd all = evaluate_jacobian(problem_, values);
   if (all.rows() != residuals_.size() || all.cols() != start_.size()) {
-    refuse(fmt::format("the Jacobian is {} x {}, expected {} x {}", all.rows(), all.cols(), residuals_.size(), start_.size()));
+    refuse(fmt::format("the Jacobian is {} x {}, expected {} x {}", all.rows(), all.cols(), residuals_.size(),
+                       start_.size()));
   }
   Eigen::MatrixXd columns(all.rows(), static_cast<Eigen::Index>(free_.size()));
   for (std::size_t i = 0; i < free_.size(); ++i) columns.col(static_cast<Eigen::Index>(i)) = all.col(free_[i]);
@@ -162,7 +163,8 @@ void Solver::stop(Termination termination, std::string reason) {
   result_.reason = std::move(reason);
 }
 
-// The test is made with the undamped step, whatever the damping: a damped step is small for other reasons than a minimum.
+// The test is made with the undamped step, whatever the damping: a damped step is small for other reasons than a
+// minimum.
 bool Solver::finished_at(const Linearisation& linear) {
   if (linear.rank == 0) {
     stop(Termination::no_information, "no free parameter changes any residual");
@@ -221,14 +223,15 @@ bool Solver::advance(const Linearisation& linear) {
       stop(failure, met_non_finite_ ? "the step leads to residuals that are not finite"
                     : failure == Termination::diverged
                         ? fmt::format("the deviations grew at step {}, from {:.6g}", result_.iterations, norm)
-                        : fmt::format("no damping decreases the deviations, {:.6g}, of which {:.1e} looks removable", norm,
-                                      linear.removable_norm()));
+                        : fmt::format("no damping decreases the deviations, {:.6g}, of which {:.1e} looks removable",
+                                      norm, linear.removable_norm()));
       return false;
     }
     damping_ = std::max(10.0 * damping_, options_.damping);
   }
-  stop(Termination::max_iterations, fmt::format("{} iterations are used up; a further step would remove {:.1e} of {:.6g}",
-                                                result_.iterations, linear.removable_norm(), weighted_.norm()));
+  stop(Termination::max_iterations,
+       fmt::format("{} iterations are used up; a further step would remove {:.1e} of {:.6g}", result_.iterations,
+                   linear.removable_norm(), weighted_.norm()));
   return false;
 }
 
@@ -317,13 +320,20 @@ Result solve(const Problem& problem, const Options& options) { return Solver(pro
 
 std::string to_string(Termination termination) {
   switch (termination) {
-    case Termination::converged: return "converged";
-    case Termination::max_iterations: return "max_iterations";
-    case Termination::diverged: return "diverged";
-    case Termination::stalled: return "stalled";
-    case Termination::non_finite: return "non_finite";
-    case Termination::no_free_parameters: return "no_free_parameters";
-    case Termination::no_information: return "no_information";
+    case Termination::converged:
+      return "converged";
+    case Termination::max_iterations:
+      return "max_iterations";
+    case Termination::diverged:
+      return "diverged";
+    case Termination::stalled:
+      return "stalled";
+    case Termination::non_finite:
+      return "non_finite";
+    case Termination::no_free_parameters:
+      return "no_free_parameters";
+    case Termination::no_information:
+      return "no_information";
   }
   return "unknown";
 }

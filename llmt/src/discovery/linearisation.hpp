@@ -27,7 +27,8 @@ Linearisation linearise(const Eigen::MatrixXd& matrix, const Eigen::VectorXd& rh
 /// Singular values of an n x k matrix through its QR factorisation, falling.
 Eigen::VectorXd singular_values_of(const Eigen::MatrixXd& matrix);
 
-/// The null directions made sparse by Gauss-Jordan elimination with full pivoting; `names` and `scales` belong to the k columns.
+/// The null directions made sparse by Gauss-Jordan elimination with full pivoting; `names` and `scales` belong to the k
+/// columns.
 std::vector<Combination> null_combinations(const Linearisation& linear, const std::vector<std::string>& names,
                                            const Eigen::VectorXd& scales);
 

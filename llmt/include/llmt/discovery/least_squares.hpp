@@ -15,16 +15,16 @@ namespace llmt::discovery {
 
 /// One unknown d_k of the constraint equations f(d, s, w) = 0.
 struct Parameter {
-  std::string name;                   ///< unique, e.g. "joint2.a"
-  std::string unit;                   ///< of `value`, for messages and reports only
-  double value = 0.0;                 ///< where the iteration starts; in a result, where it ended
-  double scale = 1.0;                 ///< > 0: a change that is typical for this parameter; makes columns comparable
-  bool free = true;                   ///< false: kept at `value`
+  std::string name;    ///< unique, e.g. "joint2.a"
+  std::string unit;    ///< of `value`, for messages and reports only
+  double value = 0.0;  ///< where the iteration starts; in a result, where it ended
+  double scale = 1.0;  ///< > 0: a change that is typical for this parameter; makes columns comparable
+  bool free = true;    ///< false: kept at `value`
   std::optional<double> prior_sigma = {};  ///< > 0: the start value is an observation with this standard deviation
 };
 
-/// All constraint equations stacked, eq. (4) of Benes et al. 2022: values of all parameters (fixed ones included) -> n residuals.
-/// The number of residuals must not depend on the values.
+/// All constraint equations stacked, eq. (4) of Benes et al. 2022: values of all parameters (fixed ones included) -> n
+/// residuals. The number of residuals must not depend on the values.
 using Residual = std::function<Eigen::VectorXd(const Eigen::VectorXd& values)>;
 
 /// Derivatives of the residuals, n x (number of parameters), columns of fixed parameters included (they are not read).
@@ -39,23 +39,24 @@ struct Problem {
 };
 
 struct Options {
-  /// Levenberg-Marquardt damping to start with, relative to the largest singular value squared. 0 is the paper's modified Newton
-  /// method, eq. (6)-(9): full Gauss-Newton steps as long as the deviations decrease.
+  /// Levenberg-Marquardt damping to start with, relative to the largest singular value squared. 0 is the paper's
+  /// modified Newton method, eq. (6)-(9): full Gauss-Newton steps as long as the deviations decrease.
   double damping = 1e-4;
   int max_iterations = 100;          ///< steps tried and taken
   double gradient_tolerance = 1e-7;  ///< on the cosine of the angle between the residuals and the range of the Jacobian
   double step_tolerance = 1e-9;      ///< on the undamped step, counted in parameter scales
   double rank_tolerance = 1e-8;      ///< singular values below this share of the largest count as zero
-  bool sigma_is_known = false;       ///< weights are 1/sigma in earnest: the covariance is not rescaled by the residual variance
+  bool sigma_is_known =
+      false;  ///< weights are 1/sigma in earnest: the covariance is not rescaled by the residual variance
 };
 
 /// Why the iteration ended. Only `converged` means that the values are a minimum.
 enum class Termination {
-  converged,           ///< gradient or undamped step below tolerance: no further decrease is possible
-  max_iterations,      ///< the allowed steps are used up
-  diverged,            ///< an undamped step made the deviations grow
-  stalled,             ///< no damping gives a decrease although the gradient is not small: suspect the Jacobian or the scales
-  non_finite,          ///< residuals or derivatives became NaN or infinite; the values are the last finite ones
+  converged,       ///< gradient or undamped step below tolerance: no further decrease is possible
+  max_iterations,  ///< the allowed steps are used up
+  diverged,        ///< an undamped step made the deviations grow
+  stalled,     ///< no damping gives a decrease although the gradient is not small: suspect the Jacobian or the scales
+  non_finite,  ///< residuals or derivatives became NaN or infinite; the values are the last finite ones
   no_free_parameters,  ///< nothing to do
   no_information       ///< no free parameter changes any residual
 };
@@ -64,7 +65,8 @@ enum class Termination {
 struct Combination {
   struct Term {
     std::string name;
-    double coefficient;  ///< in units of the parameter; the largest term, counted in scales, has coefficient = its scale
+    double
+        coefficient;  ///< in units of the parameter; the largest term, counted in scales, has coefficient = its scale
   };
   std::vector<Term> terms;
 
@@ -76,18 +78,21 @@ struct Result {
   std::vector<Parameter> parameters;  ///< with final values
   Eigen::VectorXd values;             ///< P final values
   Eigen::VectorXd residuals;          ///< n final residuals, not weighted
-  Eigen::MatrixXd covariance;         ///< P x P; zero for fixed parameters, NaN for parameters in an unidentifiable combination
-  Eigen::VectorXd standard_errors;    ///< P; square roots of its diagonal
-  Eigen::VectorXd singular_values;    ///< k, of the Jacobian with weighted rows and columns times `scale`, priors included
-  double condition_number = 1.0;      ///< of that matrix, on its identifiable part
-  double calibrability = 1.0;         ///< cond2(J'J) = (s1/sL)^2, J in the parameters' own units without weights, identifiable part
-  Eigen::Index rank = 0;              ///< number of identifiable directions
-  Eigen::Index dof = 0;               ///< n + number of priors - rank
+  Eigen::MatrixXd
+      covariance;  ///< P x P; zero for fixed parameters, NaN for parameters in an unidentifiable combination
+  Eigen::VectorXd standard_errors;  ///< P; square roots of its diagonal
+  Eigen::VectorXd
+      singular_values;            ///< k, of the Jacobian with weighted rows and columns times `scale`, priors included
+  double condition_number = 1.0;  ///< of that matrix, on its identifiable part
+  double calibrability =
+      1.0;                ///< cond2(J'J) = (s1/sL)^2, J in the parameters' own units without weights, identifiable part
+  Eigen::Index rank = 0;  ///< number of identifiable directions
+  Eigen::Index dof = 0;   ///< n + number of priors - rank
   double sigma = std::numeric_limits<double>::quiet_NaN();  ///< sqrt(weighted sum of squares / dof)
   std::vector<double> residual_norms;  ///< weighted, with priors: at the start and after every accepted step
   int iterations = 0;                  ///< steps tried
   Termination termination = Termination::max_iterations;
-  std::string reason;                        ///< the termination in words and figures
+  std::string reason;                       ///< the termination in words and figures
   std::vector<Combination> unidentifiable;  ///< null directions, sparse; their parameters stay where they started
 
   bool converged() const { return termination == Termination::converged; }
@@ -98,12 +103,12 @@ struct Result {
 
 /// Solves a problem by damped, rank-revealing Gauss-Newton steps.
 ///
-/// Each step comes from the singular values of the scaled Jacobian (through its QR factorisation, so the cost is n k^2). Directions
-/// below the rank tolerance take no step: what the data cannot tell stays where it started and is reported by name. Outcomes,
-/// including failures, are fields of the result.
+/// Each step comes from the singular values of the scaled Jacobian (through its QR factorisation, so the cost is n
+/// k^2). Directions below the rank tolerance take no step: what the data cannot tell stays where it started and is
+/// reported by name. Outcomes, including failures, are fields of the result.
 ///
-/// Throws std::invalid_argument for wrong options or parameters (empty or repeated name, non-finite value, scale <= 0, prior <= 0),
-/// wrong shapes, and residuals or derivatives that are not finite at the start.
+/// Throws std::invalid_argument for wrong options or parameters (empty or repeated name, non-finite value, scale <= 0,
+/// prior <= 0), wrong shapes, and residuals or derivatives that are not finite at the start.
 Result solve(const Problem& problem, const Options& options = {});
 
 /// The Jacobian of the problem at `values`: analytic where given, else central differences; n x P.
