@@ -18,19 +18,22 @@ inline void check_finite(const char* function, const char* argument, const Eigen
   for (std::ptrdiff_t column = 0; column < values.cols(); ++column) {
     for (std::ptrdiff_t row = 0; row < values.rows(); ++row) {
       if (!std::isfinite(values(row, column))) {
-        throw std::invalid_argument(fmt::format("{}: {}({}, {}) is {}, it must be finite (rows and columns counted from 0)", function,
-                                                argument, row, column, values(row, column)));
+        throw std::invalid_argument(
+            fmt::format("{}: {}({}, {}) is {}, it must be finite (rows and columns counted from 0)", function, argument,
+                        row, column, values(row, column)));
       }
     }
   }
 }
 
 /// Every index in [0, count), none twice.
-inline void check_columns(const char* function, const char* argument, const std::vector<int>& columns, std::ptrdiff_t count) {
+inline void check_columns(const char* function, const char* argument, const std::vector<int>& columns,
+                          std::ptrdiff_t count) {
   std::vector<bool> seen(static_cast<std::size_t>(count), false);
   for (const int column : columns) {
     if (column < 0 || column >= count) {
-      throw std::invalid_argument(fmt::format("{}: {} names column {}, there are {}", function, argument, column, count));
+      throw std::invalid_argument(
+          fmt::format("{}: {} names column {}, there are {}", function, argument, column, count));
     }
     if (seen[static_cast<std::size_t>(column)]) {
       throw std::invalid_argument(fmt::format("{}: {} names column {} twice", function, argument, column));

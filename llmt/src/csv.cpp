@@ -17,7 +17,8 @@ constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
 
 std::string_view trimmed(std::string_view text) {
   const std::size_t first = text.find_first_not_of(" \t\r");
-  return first == std::string_view::npos ? std::string_view{} : text.substr(first, text.find_last_not_of(" \t\r") + 1 - first);
+  return first == std::string_view::npos ? std::string_view{}
+                                         : text.substr(first, text.find_last_not_of(" \t\r") + 1 - first);
 }
 
 /// Length of the field at the start of `record`.
@@ -74,8 +75,12 @@ double parse_number(std::string_view field, std::string& problem) {
   }
   const std::string_view digits = field.front() == '+' ? field.substr(1) : field;
   double value = 0.0;
-  const fast_float::from_chars_result result = fast_float::from_chars(digits.data(), digits.data() + digits.size(), value);
-  if (result.ec != std::errc() || result.ptr != digits.data() + digits.size()) {
+  const fast_float::from_chars_result result =
+      fast_float::from_chars(digits.data(), digits.data() + digits.size(), value);
+  // Out of range is no error here: too large reads as infinity, too small as zero, whatever the version of fast_float
+  // calls it.
+  if ((result.ec != std::errc() && result.ec != std::errc::result_out_of_range) ||
+      result.ptr != digits.data() + digits.size()) {
     problem = fmt::format("'{}' is not a number", field);
   } else if (!std::isfinite(value)) {
     problem = fmt::format("'{}' is not finite", field);
@@ -96,7 +101,8 @@ Csv Csv::parse(std::string text, std::string name) {
   const bool has_quotes = csv.text_.find('"') != std::string::npos;
   bool header_seen = false;
   for (std::size_t begin = csv.header_begin_; begin < csv.text_.size();) {
-    const std::size_t end = has_quotes ? csv.record_end(begin) : std::min(csv.text_.find('\n', begin), csv.text_.size());
+    const std::size_t end =
+        has_quotes ? csv.record_end(begin) : std::min(csv.text_.find('\n', begin), csv.text_.size());
     if (!trimmed(std::string_view(csv.text_).substr(begin, end - begin)).empty()) {
       if (header_seen) {
         csv.row_begins_.push_back(begin);
@@ -125,8 +131,8 @@ Csv Csv::parse(std::string text, std::string name) {
                                            csv.line_at(csv.header_begin_), index + 1));
     }
     if (csv.has(column)) {
-      throw std::runtime_error(fmt::format("{}:{}: the header has column \"{}\" twice", csv.name_,
-                                           csv.line_at(csv.header_begin_), column));
+      throw std::runtime_error(
+          fmt::format("{}:{}: the header has column \"{}\" twice", csv.name_, csv.line_at(csv.header_begin_), column));
     }
     csv.columns_.push_back(std::move(column));
   });
@@ -145,19 +151,22 @@ void Csv::check_field_counts() const {
       fields = 1 + static_cast<std::size_t>(std::count(record.begin(), record.end(), separator_));
     }
     if (fields != columns_.size()) {
-      throw std::runtime_error(fmt::format("{}:{}: the row has {} field{}, the header has {}{}", name_, line_of(row), fields,
-                                           fields == 1 ? "" : "s", columns_.size(),
-                                           row + 1 == rows() && fields < columns_.size() ? " (is the file cut off?)" : ""));
+      throw std::runtime_error(fmt::format(
+          "{}:{}: the row has {} field{}, the header has {}{}", name_, line_of(row), fields, fields == 1 ? "" : "s",
+          columns_.size(), row + 1 == rows() && fields < columns_.size() ? " (is the file cut off?)" : ""));
     }
   }
 }
 
-bool Csv::has(std::string_view column) const { return std::find(columns_.begin(), columns_.end(), column) != columns_.end(); }
+bool Csv::has(std::string_view column) const {
+  return std::find(columns_.begin(), columns_.end(), column) != columns_.end();
+}
 
 std::size_t Csv::index_of(std::string_view column) const {
   const auto found = std::find(columns_.begin(), columns_.end(), column);
   if (found == columns_.end()) {
-    throw std::runtime_error(fmt::format("{}: there is no column \"{}\"; the columns are {}", name_, column, fmt::join(columns_, ", ")));
+    throw std::runtime_error(
+        fmt::format("{}: there is no column \"{}\"; the columns are {}", name_, column, fmt::join(columns_, ", ")));
   }
   return static_cast<std::size_t>(found - columns_.begin());
 }
@@ -177,14 +186,17 @@ Eigen::MatrixXd Csv::numbers(std::span<const std::string> columns) const {
       }
       values(row, target[index]) = parse_number(field, problem);
       if (!problem.empty()) {
-        throw std::runtime_error(fmt::format("{}:{}: column \"{}\": {}", name_, line_of(row), columns_[index], problem));
+        throw std::runtime_error(
+            fmt::format("{}:{}: column \"{}\": {}", name_, line_of(row), columns_[index], problem));
       }
     });
   }
   return values;
 }
 
-Eigen::VectorXd Csv::numbers(const std::string& column) const { return numbers(std::span<const std::string>(&column, 1)).col(0); }
+Eigen::VectorXd Csv::numbers(const std::string& column) const {
+  return numbers(std::span<const std::string>(&column, 1)).col(0);
+}
 
 std::string_view Csv::row_text(std::ptrdiff_t row) const {
   const std::size_t begin = row_begins_[static_cast<std::size_t>(row)];
@@ -207,10 +219,12 @@ std::ptrdiff_t Csv::line_at(std::size_t offset) const {
 std::size_t Csv::record_end(std::size_t begin) const {
   std::size_t end = std::min(text_.find('\n', begin), text_.size());
   // A line with an odd number of quotes leaves one open: the record goes on.
-  std::ptrdiff_t quotes = std::count(text_.begin() + static_cast<std::ptrdiff_t>(begin), text_.begin() + static_cast<std::ptrdiff_t>(end), '"');
+  std::ptrdiff_t quotes = std::count(text_.begin() + static_cast<std::ptrdiff_t>(begin),
+                                     text_.begin() + static_cast<std::ptrdiff_t>(end), '"');
   while (quotes % 2 != 0 && end < text_.size()) {
     const std::size_t next = std::min(text_.find('\n', end + 1), text_.size());
-    quotes += std::count(text_.begin() + static_cast<std::ptrdiff_t>(end), text_.begin() + static_cast<std::ptrdiff_t>(next), '"');
+    quotes += std::count(text_.begin() + static_cast<std::ptrdiff_t>(end),
+                         text_.begin() + static_cast<std::ptrdiff_t>(next), '"');
     end = next;
   }
   return end;

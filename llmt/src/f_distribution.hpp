@@ -4,7 +4,8 @@
 
 namespace llmt {
 
-/// P(F >= f) for F distributed with d1 and d2 degrees of freedom, in this order; d1, d2 > 0. 1 for f <= 0, 0 for infinite f.
+/// P(F >= f) for F distributed with d1 and d2 degrees of freedom, in this order; d1, d2 > 0. 1 for f <= 0, 0 for
+/// infinite f.
 double f_survival(double f, double d1, double d2);
 
 }  // namespace llmt

@@ -48,8 +48,9 @@ std::string read_file(const std::string& path) {
 void write_file(const std::string& path, std::string_view content) {
   std::error_code ignored;
   // A link stays a link: the file it points to is replaced.
-  const std::filesystem::path target =
-      std::filesystem::is_symlink(path, ignored) ? std::filesystem::weakly_canonical(path) : std::filesystem::path(path);
+  const std::filesystem::path target = std::filesystem::is_symlink(path, ignored)
+                                           ? std::filesystem::weakly_canonical(path)
+                                           : std::filesystem::path(path);
   if (std::filesystem::exists(target, ignored) && !std::filesystem::is_regular_file(target, ignored)) {
     const std::string reason = try_write(path, content);
     if (!reason.empty()) {

@@ -25,8 +25,8 @@ void require(bool condition, const char* option, double value, const char* bound
 
 void check_data(const char* name, const Eigen::Ref<const Eigen::MatrixXd>& data) {
   if (data.rows() < 1 || data.cols() < 1) {
-    throw std::invalid_argument(fmt::format("llmt::fit: {} is {} x {}, at least one row and one column are needed", name, data.rows(),
-                                            data.cols()));
+    throw std::invalid_argument(fmt::format("llmt::fit: {} is {} x {}, at least one row and one column are needed",
+                                            name, data.rows(), data.cols()));
   }
   check_finite("llmt::fit", name, data);
   require(data.cwiseAbs().maxCoeff() <= largest_magnitude, fmt::format("a magnitude in {}", name).c_str(),
@@ -44,12 +44,14 @@ GrowthOptions resolve(GrowthOptions options, std::ptrdiff_t inputs) {
   require(options.significance >= 0.0, "growth.significance", options.significance, "at least 0");
   require(std::isfinite(options.min_variance_gain), "growth.min_variance_gain", options.min_variance_gain, "finite");
   require(options.pruning_m >= 0.0, "growth.pruning_m", options.pruning_m, "at least 0");
-  require(options.min_leaf_samples >= 0, "growth.min_leaf_samples", static_cast<double>(options.min_leaf_samples), "at least 0");
+  require(options.min_leaf_samples >= 0, "growth.min_leaf_samples", static_cast<double>(options.min_leaf_samples),
+          "at least 0");
   require(options.max_leaves >= 0, "growth.max_leaves", static_cast<double>(options.max_leaves), "at least 0");
-  require(options.min_improvement >= 0.0 && options.min_improvement < 1.0, "growth.min_improvement", options.min_improvement,
-          "in [0, 1)");
+  require(options.min_improvement >= 0.0 && options.min_improvement < 1.0, "growth.min_improvement",
+          options.min_improvement, "in [0, 1)");
   for (std::vector<int>* columns : {&options.split_inputs, &options.regression_inputs}) {
-    check_columns("llmt::fit", columns == &options.split_inputs ? "growth.split_inputs" : "growth.regression_inputs", *columns, inputs);
+    check_columns("llmt::fit", columns == &options.split_inputs ? "growth.split_inputs" : "growth.regression_inputs",
+                  *columns, inputs);
     if (columns->empty()) {
       *columns = all_columns(inputs);
     }
@@ -74,23 +76,19 @@ Grown grow_rows(const Eigen::MatrixXd& inputs, const Eigen::MatrixXd& outputs, c
   grown.centre = inputs.colwise().mean();
   GrowthProblem problem;
   problem.split_values = inputs(Eigen::all, options.split_inputs);
-  problem.deviations =
-      inputs(Eigen::all, options.regression_inputs).rowwise() - Eigen::RowVectorXd(grown.centre(options.regression_inputs));
+  problem.deviations = inputs(Eigen::all, options.regression_inputs).rowwise() -
+                       Eigen::RowVectorXd(grown.centre(options.regression_inputs));
   problem.outputs = outputs(Eigen::all, served);
   problem.options = options;
   problem.max_threads = max_threads;
-  for (const int input : options.split_inputs) {
-    const auto found = std::find(options.regression_inputs.begin(), options.regression_inputs.end(), input);
-    problem.regressor_of_split.push_back(
-        found == options.regression_inputs.end() ? -1 : static_cast<int>(found - options.regression_inputs.begin()));
-  }
   GrownPartition result = grow(problem);
   grown.partition = {.outputs = served, .nodes = std::move(result.nodes)};
   grown.stop = result.stop;
   return grown;
 }
 
-/// Weights of the outputs' squared errors: 1 for a single one; else 1 / variance, so that outputs of any scale count alike.
+/// Weights of the outputs' squared errors: 1 for a single one; else 1 / variance, so that outputs of any scale count
+/// alike.
 Eigen::VectorXd error_weights(const Eigen::MatrixXd& outputs) {
   if (outputs.cols() == 1) {
     return Eigen::VectorXd::Ones(1);
@@ -101,12 +99,14 @@ Eigen::VectorXd error_weights(const Eigen::MatrixXd& outputs) {
 }
 
 /// Held-out squared errors of the prefixes of the tree grown without the rows of `fold`.
-Eigen::VectorXd held_out_errors(const Eigen::MatrixXd& inputs, const Eigen::MatrixXd& outputs, const std::vector<int>& served,
-                                const GrowthOptions& options, const Fold& fold, int max_threads) {
-  const Grown grown = grow_rows(inputs(fold.train, Eigen::all), outputs(fold.train, Eigen::all), served, options, max_threads);
+Eigen::VectorXd held_out_errors(const Eigen::MatrixXd& inputs, const Eigen::MatrixXd& outputs,
+                                const std::vector<int>& served, const GrowthOptions& options, const Fold& fold,
+                                int max_threads) {
+  const Grown grown =
+      grow_rows(inputs(fold.train, Eigen::all), outputs(fold.train, Eigen::all), served, options, max_threads);
   const Eigen::MatrixXd held_out = inputs(fold.held_out, Eigen::all);
-  const Eigen::MatrixXd deviations =
-      held_out(Eigen::all, options.regression_inputs).rowwise() - Eigen::RowVectorXd(grown.centre(options.regression_inputs));
+  const Eigen::MatrixXd deviations = held_out(Eigen::all, options.regression_inputs).rowwise() -
+                                     Eigen::RowVectorXd(grown.centre(options.regression_inputs));
   return prefix_squared_errors(grown.partition, held_out, deviations, outputs(fold.held_out, served),
                                error_weights(outputs(Eigen::all, served)));
 }
@@ -179,9 +179,11 @@ FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<
   check_data("inputs", inputs);
   check_data("outputs", outputs);
   if (inputs.rows() != outputs.rows()) {
-    throw std::invalid_argument(fmt::format("llmt::fit: inputs has {} rows, outputs has {}", inputs.rows(), outputs.rows()));
+    throw std::invalid_argument(
+        fmt::format("llmt::fit: inputs has {} rows, outputs has {}", inputs.rows(), outputs.rows()));
   }
-  require(inputs.rows() <= std::numeric_limits<int>::max(), "the number of rows", static_cast<double>(inputs.rows()), "below 2^31");
+  require(inputs.rows() <= std::numeric_limits<int>::max(), "the number of rows", static_cast<double>(inputs.rows()),
+          "below 2^31");
   require(options.max_threads >= 0, "max_threads", options.max_threads, "at least 0");
   const GrowthOptions growth = resolve(options.growth, inputs.cols());
   const std::vector<Fold> folds = selection_folds(inputs.rows(), options.folds);
@@ -207,7 +209,8 @@ FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<
     if (step == 0) {
       grown[partition] = grow_rows(x, y, served[partition], growth, options.max_threads);
     } else {
-      errors[partition][step - 1] = held_out_errors(x, y, served[partition], growth, folds[step - 1], options.max_threads);
+      errors[partition][step - 1] =
+          held_out_errors(x, y, served[partition], growth, folds[step - 1], options.max_threads);
     }
   });
 
@@ -235,28 +238,41 @@ FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<
     summary.partitions.push_back(std::move(described));
     partitions.push_back(std::move(grown[i].partition));
   }
-  return {Model(describe_inputs(x, grown.front().centre), output_names(outputs.cols()), growth.regression_inputs, std::move(partitions)),
+  return {Model(describe_inputs(x, grown.front().centre), output_names(outputs.cols()), growth.regression_inputs,
+                std::move(partitions)),
           std::move(summary)};
 }
 
-Eigen::VectorXd rmse(const Eigen::Ref<const Eigen::MatrixXd>& predicted, const Eigen::Ref<const Eigen::MatrixXd>& measured) {
+Eigen::VectorXd rmse(const Eigen::Ref<const Eigen::MatrixXd>& predicted,
+                     const Eigen::Ref<const Eigen::MatrixXd>& measured) {
   if (predicted.rows() != measured.rows() || predicted.cols() != measured.cols() || predicted.rows() == 0) {
-    throw std::invalid_argument(fmt::format("llmt::rmse: predicted is {} x {}, measured is {} x {}; the shapes must agree and have rows",
-                                            predicted.rows(), predicted.cols(), measured.rows(), measured.cols()));
+    throw std::invalid_argument(
+        fmt::format("llmt::rmse: predicted is {} x {}, measured is {} x {}; the shapes must agree and have rows",
+                    predicted.rows(), predicted.cols(), measured.rows(), measured.cols()));
   }
-  return ((predicted - measured).colwise().squaredNorm() / static_cast<double>(predicted.rows())).cwiseSqrt().transpose();
+  return ((predicted - measured).colwise().squaredNorm() / static_cast<double>(predicted.rows()))
+      .cwiseSqrt()
+      .transpose();
 }
 
 std::string describe(StopReason reason) {
   switch (reason) {
-    case StopReason::max_leaves: return "the leaf limit";
-    case StopReason::significance: return "the significance test";
-    case StopReason::variance_gain: return "the variance gain";
-    case StopReason::leaf_samples: return "the smallest leaf size";
-    case StopReason::exact_fit: return "an exact fit";
-    case StopReason::improvement: return "too little improvement";
-    case StopReason::pruning: return "pruning";
-    case StopReason::cross_validation: return "cross-validation";
+    case StopReason::max_leaves:
+      return "the leaf limit";
+    case StopReason::significance:
+      return "the significance test";
+    case StopReason::variance_gain:
+      return "the variance gain";
+    case StopReason::leaf_samples:
+      return "the smallest leaf size";
+    case StopReason::exact_fit:
+      return "an exact fit";
+    case StopReason::improvement:
+      return "too little improvement";
+    case StopReason::pruning:
+      return "pruning";
+    case StopReason::cross_validation:
+      return "cross-validation";
   }
   return "";
 }

@@ -37,8 +37,9 @@ std::vector<Fold> make_folds(std::ptrdiff_t rows, const FoldOptions& options) {
     group_count = std::max(group_count, group + 1);
   }
   if (group_count < options.count) {
-    throw std::invalid_argument(fmt::format("llmt::make_folds: {} folds need at least {} rows (or groups), there are {}",
-                                            options.count, options.count, group_count));
+    throw std::invalid_argument(
+        fmt::format("llmt::make_folds: {} folds need at least {} rows (or groups), there are {}", options.count,
+                    options.count, group_count));
   }
 
   // Position of each group in the dealing order; consecutive positions go to the same fold, block by block.

@@ -29,8 +29,8 @@ struct OpenLeaf {
   SplitCandidate best;        // input: position among the split inputs
 };
 
-/// Which open leaf comes next: the largest gain, then the oldest node. The gain is compared in single precision, so that gains that are
-/// equal but for rounding count as equal.
+/// Which open leaf comes next: the largest gain, then the oldest node. The gain is compared in single precision, so
+/// that gains that are equal but for rounding count as equal.
 struct Priority {
   float gain;
   int node;
@@ -79,8 +79,8 @@ class Grower {
   }
 
  private:
-  /// Outputs about their mean, divided by a power of two near their largest deviation: a target of scale 1e-6 and one with offset 1e8 look
-  /// alike from here on, and dividing by a power of two rounds nothing.
+  /// Outputs about their mean, divided by a power of two near their largest deviation: a target of scale 1e-6 and one
+  /// with offset 1e8 look alike from here on, and dividing by a power of two rounds nothing.
   void scale_outputs() {
     const Eigen::MatrixXd& outputs = problem_.outputs;
     output_mean_ = outputs.colwise().sum().transpose() / static_cast<double>(outputs.rows());
@@ -94,7 +94,8 @@ class Grower {
       scaled_outputs_.col(o) /= output_scale_(o);
       const double sum_of_squares = scaled_outputs_.col(o).squaredNorm();
       weights_(o) = sum_of_squares > 0.0 ? 1.0 / sum_of_squares : 1.0;
-      rounding_(o) = 8.0 * std::numeric_limits<double>::epsilon() * outputs.col(o).cwiseAbs().maxCoeff() / output_scale_(o);
+      rounding_(o) =
+          8.0 * std::numeric_limits<double>::epsilon() * outputs.col(o).cwiseAbs().maxCoeff() / output_scale_(o);
     }
   }
 
@@ -176,7 +177,8 @@ class Grower {
     if (options_.rule == GrowthRule::retis) {
       return std::nullopt;
     }
-    // Several outputs count as that many independent observations of equal variance, which the weights make them at the root.
+    // Several outputs count as that many independent observations of equal variance, which the weights make them at the
+    // root.
     const double outputs = static_cast<double>(weights_.size());
     const double added = outputs * (leaf.best.rank_left + leaf.best.rank_right - node.rank);
     const double freedom = outputs * (samples - leaf.best.rank_left - leaf.best.rank_right);
@@ -190,7 +192,8 @@ class Grower {
       }
     }
     if (options_.min_variance_gain >= 0.0) {
-      // The weights make the outputs' sums of squares 1 each, so that (rows - 1) times a residual variance is a fraction of the variance.
+      // The weights make the outputs' sums of squares 1 each, so that (rows - 1) times a residual variance is a
+      // fraction of the variance.
       const double to_fraction = static_cast<double>(problem_.outputs.rows() - 1) / outputs;
       const double before = leaf.rss / (samples - node.rank);
       const double after = leaf.best.rss / (freedom / outputs);
@@ -280,18 +283,21 @@ class Grower {
     const double low = value_at(leaf.best.left - 1);
     const double high = value_at(leaf.best.left);
     double threshold = low + 0.5 * (high - low);
-    const int regressor = problem_.regressor_of_split[static_cast<std::size_t>(leaf.best.input)];
-    if (options_.threshold == ThresholdPlacement::closest && regressor >= 0) {
-      // The difference of the child models over the node's rows moved onto the plane x_j = t is a + b (t - low) for its mean, and its
-      // variance over the rows does not depend on t: its mean square is smallest at t = low - a / b, or at the end nearest to that.
+    if (options_.threshold == ThresholdPlacement::closest) {
+      // The regression of the child models' difference on the split input over the node's rows says how far apart they
+      // are, on average, on the plane x_j = t: a + b (t - low). Its square is smallest at t = low - a / b, or at the
+      // end of the gap nearest to that.
       const Node& node = nodes_[static_cast<std::size_t>(leaf.node)];
       const Node& left = nodes_[static_cast<std::size_t>(node.left)];
       const Node& right = nodes_[static_cast<std::size_t>(node.right)];
-      const Eigen::MatrixXd slope = right.slope - left.slope;
-      Eigen::VectorXd place = problem_.deviations(leaf.rows, Eigen::all).colwise().mean();
-      place(regressor) = problem_.deviations(order[static_cast<std::size_t>(leaf.best.left - 1)], regressor);
-      const Eigen::VectorXd a = right.value - left.value + slope * place;
-      const Eigen::VectorXd b = slope.col(regressor);
+      const Eigen::MatrixXd apart =
+          (problem_.deviations(leaf.rows, Eigen::all) * (right.slope - left.slope).transpose()).rowwise() +
+          Eigen::RowVectorXd((right.value - left.value).transpose());
+      const Eigen::VectorXd values = problem_.split_values(leaf.rows, leaf.best.input);
+      const double mean = values.mean();
+      const Eigen::VectorXd centred = values.array() - mean;
+      const Eigen::VectorXd b = apart.transpose() * centred / centred.squaredNorm();
+      const Eigen::VectorXd a = apart.colwise().mean().transpose() + b * (low - mean);
       const double curvature = weights_.dot(b.cwiseAbs2());
       if (curvature > 0.0) {
         threshold = low - weights_.dot(a.cwiseProduct(b)) / curvature;
@@ -305,8 +311,9 @@ class Grower {
   Eigen::MatrixXd scaled_outputs_;
   Eigen::VectorXd output_mean_;
   Eigen::VectorXd output_scale_;
-  Eigen::VectorXd weights_;   // of the scaled outputs' sums of squares: 1 / their total
-  Eigen::VectorXd rounding_;  // root mean square residual, in scaled outputs, that is rounding of the outputs themselves
+  Eigen::VectorXd weights_;  // of the scaled outputs' sums of squares: 1 / their total
+  Eigen::VectorXd
+      rounding_;  // root mean square residual, in scaled outputs, that is rounding of the outputs themselves
   std::vector<Node> nodes_;
   std::vector<std::optional<OpenLeaf>> leaves_;
   std::priority_queue<Priority> queue_;

@@ -15,7 +15,6 @@ struct GrowthProblem {
   Eigen::MatrixXd deviations;    ///< rows x regression inputs, as deviations from `centre` of the inputs
   Eigen::MatrixXd outputs;       ///< rows x outputs of the partition
   GrowthOptions options;         ///< split_inputs listed, min_leaf_samples set
-  std::vector<int> regressor_of_split;  ///< position of each split input among the regression inputs, -1 if it is none
   int max_threads = 0;
 };
 

@@ -23,7 +23,8 @@ void check_node(const Partition& partition, std::ptrdiff_t index, std::ptrdiff_t
   const std::ptrdiff_t outputs = std::ssize(partition.outputs);
   if (node.value.size() != outputs || node.rss.size() != outputs || node.slope.rows() != outputs ||
       node.slope.cols() != regressors) {
-    reject(fmt::format("{}: value, rss and slope must have {} outputs and slope {} regression inputs", where, outputs, regressors));
+    reject(fmt::format("{}: value, rss and slope must have {} outputs and slope {} regression inputs", where, outputs,
+                       regressors));
   }
   if (!node.value.allFinite() || !node.slope.allFinite() || !node.rss.allFinite() || !std::isfinite(node.threshold)) {
     reject(fmt::format("{}: a number is not finite", where));
@@ -38,7 +39,8 @@ void check_node(const Partition& partition, std::ptrdiff_t index, std::ptrdiff_t
     return;
   }
   // The k-th split makes nodes 2k-1 and 2k, after their parent.
-  if (node.left % 2 != 1 || node.right != node.left + 1 || node.left <= index || node.right >= std::ssize(partition.nodes)) {
+  if (node.left % 2 != 1 || node.right != node.left + 1 || node.left <= index ||
+      node.right >= std::ssize(partition.nodes)) {
     reject(fmt::format("{}: the children {} and {} are not in order of growth", where, node.left, node.right));
   }
   if (node.split_input < 0 || node.split_input >= inputs) {
@@ -46,7 +48,8 @@ void check_node(const Partition& partition, std::ptrdiff_t index, std::ptrdiff_t
   }
 }
 
-void check_partition(const Partition& partition, std::ptrdiff_t inputs, std::ptrdiff_t regressors, const std::string& where) {
+void check_partition(const Partition& partition, std::ptrdiff_t inputs, std::ptrdiff_t regressors,
+                     const std::string& where) {
   if (partition.outputs.empty() || partition.nodes.empty() || partition.nodes.size() % 2 == 0) {
     reject(fmt::format("{}: it needs an output and an odd number of nodes", where));
   }
@@ -104,7 +107,8 @@ void collect_leaves(const Partition& partition, int index, Leaf box, const std::
   box.slope = node.slope;
   box.intercept = node.value;
   for (std::size_t j = 0; j < regression_inputs.size(); ++j) {
-    box.intercept -= node.slope.col(static_cast<std::ptrdiff_t>(j)) * inputs[static_cast<std::size_t>(regression_inputs[j])].centre;
+    box.intercept -=
+        node.slope.col(static_cast<std::ptrdiff_t>(j)) * inputs[static_cast<std::size_t>(regression_inputs[j])].centre;
   }
   leaves.push_back(std::move(box));
 }
@@ -121,9 +125,10 @@ Model::Model(std::vector<InputColumn> inputs, std::vector<std::string> outputs, 
     reject(fmt::format("it has {} inputs and {} outputs, both must be at least 1", inputs_.size(), outputs_.size()));
   }
   for (const InputColumn& input : inputs_) {
-    if (!(std::isfinite(input.low) && std::isfinite(input.centre) && std::isfinite(input.high) && input.low <= input.high)) {
-      reject(fmt::format("input \"{}\": low {}, centre {} and high {} must be finite and low <= high", input.name, input.low,
-                         input.centre, input.high));
+    if (!(std::isfinite(input.low) && std::isfinite(input.centre) && std::isfinite(input.high) &&
+          input.low <= input.high)) {
+      reject(fmt::format("input \"{}\": low {}, centre {} and high {} must be finite and low <= high", input.name,
+                         input.low, input.centre, input.high));
     }
   }
   check_columns("llmt::Model", "regression_inputs", regression_inputs_, num_inputs());
@@ -237,8 +242,9 @@ Model Model::prefix(std::ptrdiff_t max_leaves) const {
 
 Model Model::named(const std::vector<std::string>& inputs, const std::vector<std::string>& outputs) const {
   if (std::ssize(inputs) != num_inputs() || std::ssize(outputs) != num_outputs()) {
-    throw std::invalid_argument(fmt::format("llmt::Model::named: {} input and {} output names for {} inputs and {} outputs",
-                                            inputs.size(), outputs.size(), num_inputs(), num_outputs()));
+    throw std::invalid_argument(
+        fmt::format("llmt::Model::named: {} input and {} output names for {} inputs and {} outputs", inputs.size(),
+                    outputs.size(), num_inputs(), num_outputs()));
   }
   Model result = *this;
   for (std::size_t i = 0; i < inputs.size(); ++i) {

@@ -48,7 +48,7 @@ class Reader {
     if (!json_.is_object() || !json_.contains(key)) {
       fail(fmt::format("member \"{}\" is missing", key));
     }
-    return {json_.at(key), fmt::format("{}/{}", where_, key)};
+    return {json_.at(key), child(key)};
   }
   bool has(const char* key) const { return json_.is_object() && json_.contains(key); }
 
@@ -58,7 +58,7 @@ class Reader {
     }
     std::vector<Reader> result;
     for (std::size_t i = 0; i < json_.size(); ++i) {
-      result.emplace_back(json_[i], fmt::format("{}/{}", where_, i));
+      result.emplace_back(json_[i], child(std::to_string(i)));
     }
     return result;
   }
@@ -70,7 +70,9 @@ class Reader {
                                                          : json_.is_number();
     if (!fits) {
       fail(fmt::format("{} is needed, not {}",
-                       std::is_same_v<Value, std::string> ? "a text" : std::is_integral_v<Value> ? "a whole number" : "a number",
+                       std::is_same_v<Value, std::string> ? "a text"
+                       : std::is_integral_v<Value>        ? "a whole number"
+                                                          : "a number",
                        json_.dump().substr(0, 40)));
     }
     if constexpr (std::is_integral_v<Value>) {
@@ -99,6 +101,11 @@ class Reader {
       fail(fmt::format("{} numbers are needed, there are {}", size, values.size()));
     }
     return Eigen::Map<const Eigen::VectorXd>(values.data(), size);
+  }
+
+  /// `path: /member/0`, a JSON pointer behind the name of the file.
+  std::string child(const std::string& key) const {
+    return fmt::format("{}{}{}", where_, where_.find(": /") == std::string::npos ? ": /" : "/", key);
   }
 
   [[noreturn]] void fail(const std::string& what) const {
@@ -142,7 +149,8 @@ std::string to_json(const Model& model) {
   json["version"] = format_version;
   json["inputs"] = Json::array();
   for (const InputColumn& input : model.inputs()) {
-    json["inputs"].push_back({{"name", input.name}, {"low", input.low}, {"high", input.high}, {"centre", input.centre}});
+    json["inputs"].push_back(
+        {{"name", input.name}, {"low", input.low}, {"high", input.high}, {"centre", input.centre}});
   }
   json["outputs"] = model.outputs();
   json["regression_inputs"] = model.regression_inputs();
@@ -169,12 +177,13 @@ Model from_json(const std::string& text, const std::string& name) {
   } catch (const Json::parse_error& error) {
     throw std::runtime_error(fmt::format("{}: not JSON, or cut off: {}", name, error.what()));
   }
-  const Reader root(json, name + ": ");
+  const Reader root(json, name);
   if (!root.has("format") || root.member("format").as<std::string>() != format_name) {
     root.fail(fmt::format("not a model file: \"format\" is not \"{}\"", format_name));
   }
   if (const int version = root.member("version").as<int>(); version != format_version) {
-    root.fail(fmt::format("version {} of the model format cannot be read, this program knows version {}", version, format_version));
+    root.fail(fmt::format("version {} of the model format cannot be read, this program knows version {}", version,
+                          format_version));
   }
   if (const std::string validity = root.member("validity").as<std::string>(); validity != "crisp") {
     root.member("validity").fail(fmt::format("\"{}\" is not known, only \"crisp\" is", validity));
@@ -196,7 +205,8 @@ Model from_json(const std::string& text, const std::string& name) {
     partitions.push_back(std::move(partition));
   }
   try {
-    return {std::move(inputs), root.member("outputs").list<std::string>(), std::move(regression_inputs), std::move(partitions)};
+    return {std::move(inputs), root.member("outputs").list<std::string>(), std::move(regression_inputs),
+            std::move(partitions)};
   } catch (const std::invalid_argument& error) {
     throw std::runtime_error(fmt::format("{}: {}", name, error.what()));
   }

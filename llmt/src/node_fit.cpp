@@ -70,8 +70,8 @@ NodeFit fit_node(const Eigen::MatrixXd& x, const Eigen::MatrixXd& residuals) {
       fit.slope_change.col(scaled.column[k]) = scaled_slopes.row(kept).transpose() / scaled.scale(kept);
       fit.centre_change -= fit.slope_change.col(scaled.column[k]) * scaled.mean(kept);
     }
-    // Twice: the second pass removes what rounding left of the first, so that the residuals are orthogonal to the basis to rounding
-    // relative to themselves, not relative to the outputs.
+    // Twice: the second pass removes what rounding left of the first, so that the residuals are orthogonal to the basis
+    // to rounding relative to themselves, not relative to the outputs.
     for (int pass = 0; pass < 2; ++pass) {
       const Eigen::MatrixXd projection = fit.basis.transpose() * fit.residuals / rows;
       fit.residuals -= fit.basis * projection;

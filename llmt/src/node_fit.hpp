@@ -8,19 +8,21 @@ namespace llmt {
 
 /// Least squares of residuals on [1, X] over the rows of a node.
 ///
-/// Columns of X are centred and scaled to unit variance in the node and orthogonalised (column-pivoted Householder QR), so that neither
-/// offsets, nor scales, nor collinearity of the inputs cost digits; see docs/algorithms.md.
+/// Columns of X are centred and scaled to unit variance in the node and orthogonalised (column-pivoted Householder QR),
+/// so that neither offsets, nor scales, nor collinearity of the inputs cost digits; see docs/algorithms.md.
 struct NodeFit {
-  Eigen::MatrixXd basis;          ///< rows x (rank - 1): orthogonal columns of mean square 1 that span X without its mean ("whitened" X)
+  Eigen::MatrixXd
+      basis;  ///< rows x (rank - 1): orthogonal columns of mean square 1 that span X without its mean ("whitened" X)
   Eigen::MatrixXd residuals;      ///< rows x outputs: what the fit leaves
   Eigen::VectorXd rss;            ///< sum of squares of each column of residuals
   Eigen::VectorXd centre_change;  ///< of the local models' value at `origin`, one per output
-  Eigen::MatrixXd slope_change;   ///< of the local models' slopes, outputs x columns of X; of minimum norm in scaled columns
-  int rank = 1;                   ///< of [1, X] over these rows, the constant included
+  Eigen::MatrixXd
+      slope_change;  ///< of the local models' slopes, outputs x columns of X; of minimum norm in scaled columns
+  int rank = 1;      ///< of [1, X] over these rows, the constant included
 };
 
-/// Fits `residuals` (rows x outputs) on [1, x] (x: rows x regressors, as deviations from the point `origin` of the caller).
-/// The change of value is that at deviation 0. At least one row.
+/// Fits `residuals` (rows x outputs) on [1, x] (x: rows x regressors, as deviations from the point `origin` of the
+/// caller). The change of value is that at deviation 0. At least one row.
 NodeFit fit_node(const Eigen::MatrixXd& x, const Eigen::MatrixXd& residuals);
 
 /// Pivots below this, relative to the largest one, count as zero: columns that agree to about ten digits are collinear.

@@ -11,8 +11,8 @@ namespace {
 
 constexpr double no_split = std::numeric_limits<double>::infinity();
 
-/// Pivots below this, relative to the sum of squares of their column, count as zero. The rounding of the sums is about 1e-15 of it; what a
-/// narrow child legitimately leaves of a direction is larger.
+/// Pivots below this, relative to the sum of squares of their column, count as zero. The rounding of the sums is about
+/// 1e-15 of it; what a narrow child legitimately leaves of a direction is larger.
 constexpr double pivot_tolerance = 1e-12;
 
 /// Normal equations of a growing set of rows, and the residual sum of squares of their least-squares fit.
@@ -95,8 +95,9 @@ class NormalEquations {
   }
 
  private:
-  using Storage = std::conditional_t<fixed >= 0, std::array<double, static_cast<std::size_t>(fixed < 0 ? 1 : fixed * fixed)>,
-                                     std::vector<double>>;
+  using Storage =
+      std::conditional_t<fixed >= 0, std::array<double, static_cast<std::size_t>(fixed < 0 ? 1 : fixed * fixed)>,
+                         std::vector<double>>;
 
   std::ptrdiff_t size() const { return fixed >= 0 ? fixed : size_; }
   double& gram(std::ptrdiff_t i, std::ptrdiff_t j) { return gram_[static_cast<std::size_t>(i * size() + j)]; }
@@ -118,7 +119,9 @@ SplitCandidate search(const SearchNode& node, std::span<const double> values, st
                       std::ptrdiff_t min_leaf_samples) {
   const std::ptrdiff_t rows = std::ssize(order);
   const std::ptrdiff_t outputs = node.weights.size();
-  const auto row_data = [&](std::ptrdiff_t k) { return node.features.data() + order[static_cast<std::size_t>(k)] * node.features.cols(); };
+  const auto row_data = [&](std::ptrdiff_t k) {
+    return node.features.data() + order[static_cast<std::size_t>(k)] * node.features.cols();
+  };
   // Splits are named by the number of rows on their left.
   const auto admissible = [&](std::ptrdiff_t left) {
     return left >= min_leaf_samples && rows - left >= min_leaf_samples &&
@@ -149,8 +152,8 @@ SplitCandidate search(const SearchNode& node, std::span<const double> values, st
   best.tested = std::count_if(rss.begin(), rss.end(), [](double value) { return value < no_split; });
   if (best.tested > 0) {
     const double smallest = *std::min_element(rss.begin(), rss.end());
-    const auto chosen =
-        std::find_if(rss.begin(), rss.end(), [&](double value) { return value <= smallest + tie_tolerance * node.rss; });
+    const auto chosen = std::find_if(rss.begin(), rss.end(),
+                                     [&](double value) { return value <= smallest + tie_tolerance * node.rss; });
     const std::size_t slot = static_cast<std::size_t>(chosen - rss.begin());
     best.input = 0;
     best.left = static_cast<std::ptrdiff_t>(slot);
@@ -178,15 +181,24 @@ SplitCandidate search_input(const SearchNode& node, std::span<const double> valu
                             std::ptrdiff_t min_leaf_samples) {
   // Sizes known at compile time let the small triangular loops be unrolled.
   switch (node.regressors) {
-    case 1: return search<1>(node, values, order, min_leaf_samples);
-    case 2: return search<2>(node, values, order, min_leaf_samples);
-    case 3: return search<3>(node, values, order, min_leaf_samples);
-    case 4: return search<4>(node, values, order, min_leaf_samples);
-    case 5: return search<5>(node, values, order, min_leaf_samples);
-    case 6: return search<6>(node, values, order, min_leaf_samples);
-    case 7: return search<7>(node, values, order, min_leaf_samples);
-    case 8: return search<8>(node, values, order, min_leaf_samples);
-    default: return search<-1>(node, values, order, min_leaf_samples);
+    case 1:
+      return search<1>(node, values, order, min_leaf_samples);
+    case 2:
+      return search<2>(node, values, order, min_leaf_samples);
+    case 3:
+      return search<3>(node, values, order, min_leaf_samples);
+    case 4:
+      return search<4>(node, values, order, min_leaf_samples);
+    case 5:
+      return search<5>(node, values, order, min_leaf_samples);
+    case 6:
+      return search<6>(node, values, order, min_leaf_samples);
+    case 7:
+      return search<7>(node, values, order, min_leaf_samples);
+    case 8:
+      return search<8>(node, values, order, min_leaf_samples);
+    default:
+      return search<-1>(node, values, order, min_leaf_samples);
   }
 }
 

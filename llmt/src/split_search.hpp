@@ -12,17 +12,18 @@ namespace llmt {
 
 /// The best split of a node found so far, or none.
 struct SplitCandidate {
-  int input = -1;             ///< column that is split; -1: there is no admissible split
-  std::ptrdiff_t left = 0;    ///< rows of the left child: the first `left` in the order of that input
-  double rss = 0.0;           ///< weighted residual sum of squares of the two child models
-  int rank_left = 0;          ///< ranks of the two children's least-squares problems
+  int input = -1;           ///< column that is split; -1: there is no admissible split
+  std::ptrdiff_t left = 0;  ///< rows of the left child: the first `left` in the order of that input
+  double rss = 0.0;         ///< weighted residual sum of squares of the two child models
+  int rank_left = 0;        ///< ranks of the two children's least-squares problems
   int rank_right = 0;
   std::ptrdiff_t tested = 0;  ///< number of admissible splits that were compared
 };
 
 /// What the search of a node needs to know of its rows.
 struct SearchNode {
-  /// rows x (rank - 1 + outputs), one row after the other in memory: the orthogonalised regressors and the residuals of the node's fit.
+  /// rows x (rank - 1 + outputs), one row after the other in memory: the orthogonalised regressors and the residuals of
+  /// the node's fit.
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> features;
   std::ptrdiff_t regressors = 0;  ///< rank - 1
   Eigen::VectorXd weights;        ///< of the outputs' residual sums of squares
@@ -31,11 +32,13 @@ struct SearchNode {
 
 SearchNode make_search_node(const NodeFit& fit, const Eigen::VectorXd& weights);
 
-/// The best split on one input: `values` are the input's values and `order` the rows of `node.features`, both ascending in the value.
+/// The best split on one input: `values` are the input's values and `order` the rows of `node.features`, both ascending
+/// in the value.
 ///
-/// Compares every split between two distinct values that leaves `min_leaf_samples` rows on either side. The sums of each side are
-/// only ever added to, from the left and from the right, never subtracted from: no digits are lost at the ends. Of splits that agree
-/// within `tie_tolerance` times node.rss, the one with the smallest threshold is taken. `input` stays -1 if nothing is admissible.
+/// Compares every split between two distinct values that leaves `min_leaf_samples` rows on either side. The sums of
+/// each side are only ever added to, from the left and from the right, never subtracted from: no digits are lost at the
+/// ends. Of splits that agree within `tie_tolerance` times node.rss, the one with the smallest threshold is taken.
+/// `input` stays -1 if nothing is admissible.
 SplitCandidate search_input(const SearchNode& node, std::span<const double> values, std::span<const int> order,
                             std::ptrdiff_t min_leaf_samples);
 

@@ -13,16 +13,17 @@
 
 namespace llmt {
 
-/// A CSV text with a header row, kept as text: a column is turned into numbers when it is asked for, so columns of words do no harm
-/// as long as nobody asks for them.
+/// A CSV text with a header row, kept as text: a column is turned into numbers when it is asked for, so columns of
+/// words do no harm as long as nobody asks for them.
 ///
-/// Accepted: fields separated by commas (or by semicolons or tabs, if the header has no comma); fields in double quotes, which may
-/// hold separators, line breaks and doubled quotes (RFC 4180); LF or CRLF; a UTF-8 byte-order mark; blank lines, which are skipped.
-/// Numbers are written with a decimal point. Every row must have as many fields as the header.
+/// Accepted: fields separated by commas (or by semicolons or tabs, if the header has no comma); fields in double
+/// quotes, which may hold separators, line breaks and doubled quotes (RFC 4180); LF or CRLF; a UTF-8 byte-order mark;
+/// blank lines, which are skipped. Numbers are written with a decimal point. Every row must have as many fields as the
+/// header.
 class Csv {
  public:
-  /// Reads a file. Throws std::runtime_error, starting with `path` or `path:line`, if it cannot be read, is empty, has an unnamed or
-  /// repeated column, or a row with too few or too many fields.
+  /// Reads a file. Throws std::runtime_error, starting with `path` or `path:line`, if it cannot be read, is empty, has
+  /// an unnamed or repeated column, or a row with too few or too many fields.
   static Csv read(const std::string& path);
 
   /// As read(), from memory; `name` stands for the path in errors.
@@ -34,11 +35,13 @@ class Csv {
 
   bool has(std::string_view column) const;
 
-  /// Position of a column. Throws std::runtime_error naming the file and the columns it has, if there is none of that name.
+  /// Position of a column. Throws std::runtime_error naming the file and the columns it has, if there is none of that
+  /// name.
   std::size_t index_of(std::string_view column) const;
 
-  /// The named columns as numbers, rows x columns, rows in file order. Throws std::runtime_error `path:line: column "c": ...` at the
-  /// first cell, in file order, that is empty, not a number, not finite or out of range; and as index_of().
+  /// The named columns as numbers, rows x columns, rows in file order. Throws std::runtime_error `path:line: column
+  /// "c": ...` at the first cell, in file order, that is empty, not a number, not finite or out of range; and as
+  /// index_of().
   Eigen::MatrixXd numbers(std::span<const std::string> columns) const;
 
   /// One column as numbers; errors as above.

@@ -14,43 +14,48 @@
 
 namespace llmt {
 
-/// When a leaf is split, and how the tree is pruned. Both rules look at every threshold of every split input and take the one with the
-/// smallest residual sum of squares of the two child models; both grow best-first: the split that lowers it most comes next.
+/// When a leaf is split, and how the tree is pruned. Both rules look at every threshold of every split input and take
+/// the one with the smallest residual sum of squares of the two child models; both grow best-first: the split that
+/// lowers it most comes next.
 enum class GrowthRule {
   /// Batch-RD (Potts & Sammut 2005): a split must pass the F test of Chow (1960),
   ///   F = [(RSS_0 - RSS_1 - RSS_2) / (p_1 + p_2 - p_0)] / [(RSS_1 + RSS_2) / (N - p_1 - p_2)]
   /// with p the ranks (p_1 + p_2 - p_0 = p for full rank), and lower the residual variance, RSS_0 / (N - p_0) -
   /// (RSS_1 + RSS_2) / (N - p_1 - p_2), by a given amount.
   rd,
-  /// RETIS (Karalic 1992): minimises the weighted mean squared error (n_1 MSE_1 + n_2 MSE_2) / N without a test, then prunes from the
+  /// RETIS (Karalic 1992): minimises the weighted mean squared error (n_1 MSE_1 + n_2 MSE_2) / N without a test, then
+  /// prunes from the
   /// leaves up with m-estimates of the error.
   retis
 };
 
-/// Where in the gap between two training values a threshold is put. The residual sum of squares is the same anywhere in the gap.
+/// Where in the gap between two training values a threshold is put. The residual sum of squares is the same anywhere in
+/// the gap.
 enum class ThresholdPlacement {
-  closest,  ///< where the two child models differ least, in the mean square over the node's rows
+  closest,  ///< where the regression of the child models' difference on the split input, over the node's rows, is
+            ///< nearest to zero
   midpoint  ///< halfway
 };
 
 /// Why growth ended.
 enum class StopReason {
-  max_leaves,      ///< GrowthOptions::max_leaves reached
-  significance,    ///< no leaf has a split that passes the F test
-  variance_gain,   ///< no leaf has a split that lowers the residual variance enough
-  leaf_samples,    ///< no leaf is large enough to be split, or all its split inputs are constant
-  exact_fit,       ///< the leaves reproduce the outputs to rounding
-  improvement,     ///< GrowthOptions::min_improvement: the next split would have improved the tree too little
-  pruning,         ///< RETIS pruning removed the last splits
-  cross_validation ///< fewer leaves than grown had the smallest held-out error
+  max_leaves,       ///< GrowthOptions::max_leaves reached
+  significance,     ///< no leaf has a split that passes the F test
+  variance_gain,    ///< no leaf has a split that lowers the residual variance enough
+  leaf_samples,     ///< no leaf is large enough to be split, or all its split inputs are constant
+  exact_fit,        ///< the leaves reproduce the outputs to rounding
+  improvement,      ///< GrowthOptions::min_improvement: the next split would have improved the tree too little
+  pruning,          ///< RETIS pruning removed the last splits
+  cross_validation  ///< fewer leaves than grown had the smallest held-out error
 };
 
 struct GrowthOptions {
   GrowthRule rule = GrowthRule::rd;
-  /// rd: a split is accepted if P(F >= observed), times the number of candidate splits it was chosen from (Bonferroni: the maximum over
-  /// many candidates does not follow the F distribution), is below this. 1 or more: no test.
+  /// rd: a split is accepted if P(F >= observed), times the number of candidate splits it was chosen from (Bonferroni:
+  /// the maximum over many candidates does not follow the F distribution), is below this. 1 or more: no test.
   double significance = 0.05;
-  /// rd: smallest decrease of the residual variance, as a fraction of the variance of the output. 0: any decrease; negative: no demand.
+  /// rd: smallest decrease of the residual variance, as a fraction of the variance of the output. 0: any decrease;
+  /// negative: no demand.
   double min_variance_gain = 0.0;
   /// retis: weight m of the prior (the error of one model for all data) in the m-estimates, in rows. 0: no pruning.
   double pruning_m = 2.0;
@@ -58,35 +63,40 @@ struct GrowthOptions {
   std::ptrdiff_t min_leaf_samples = 0;
   /// Largest number of leaves of a partition. 0: no limit.
   std::ptrdiff_t max_leaves = 0;
-  /// Growth ends when the next split of best-first growth would lower the root mean square of the training residuals of the whole tree by
-  /// less than this fraction. Benes et al. (2022) stop at "less than 2 %" without saying of what; this is our reading. 0: off.
+  /// Growth ends when the next split of best-first growth would lower the root mean square of the training residuals of
+  /// the whole tree by less than this fraction. Benes et al. (2022) stop at "less than 2 %" without saying of what;
+  /// this is our reading. 0: off.
   double min_improvement = 0.0;
-  /// One partition for all outputs (their residual sums of squares added after division by the output's variance) instead of one each.
+  /// One partition for all outputs (their residual sums of squares added after division by the output's variance)
+  /// instead of one each.
   bool shared_partition = false;
   /// Columns that may be split, and columns that local models use. Empty: all.
-  std::vector<int> split_inputs;
-  std::vector<int> regression_inputs;
+  std::vector<int> split_inputs = {};
+  std::vector<int> regression_inputs = {};
   ThresholdPlacement threshold = ThresholdPlacement::closest;
 };
 
 struct FitOptions {
-  GrowthOptions growth;
-  /// Folds over which the leaf count is chosen: the tree is grown anew in every fold, the prefix with the smallest held-out squared
-  /// error wins. folds.count = 0: no choice, the tree stays as grown. Fewer groups than folds: one fold per group.
-  FoldOptions folds;
+  GrowthOptions growth = {};
+  /// Folds over which the leaf count is chosen: the tree is grown anew in every fold, the prefix with the smallest
+  /// held-out squared error wins. folds.count = 0: no choice, the tree stays as grown. Fewer groups than folds: one
+  /// fold per group.
+  FoldOptions folds = {};
   int max_threads = 0;  ///< 0: all that the machine has. The result does not depend on it.
 };
 
 /// What happened to one partition.
 struct PartitionSummary {
   std::vector<int> outputs;
-  std::ptrdiff_t leaves = 0;                 ///< in the model
-  std::ptrdiff_t grown_leaves = 0;           ///< before the choice by cross-validation
+  std::ptrdiff_t leaves = 0;        ///< in the model
+  std::ptrdiff_t grown_leaves = 0;  ///< before the choice by cross-validation
   StopReason stop = StopReason::leaf_samples;
-  std::ptrdiff_t rank_deficient_leaves = 0;  ///< leaves whose rows do not determine all coefficients; those keep their parent's slopes
-  Eigen::VectorXd train_rmse;                ///< one per output of the partition
-  /// Held-out error of the prefixes with 1, 2, ... leaves; empty without cross-validation. Root mean square over all rows of the error, in
-  /// the output's unit; for a shared partition of the errors divided by the outputs' standard deviations.
+  std::ptrdiff_t rank_deficient_leaves =
+      0;  ///< leaves whose rows do not determine all coefficients; those keep their parent's slopes
+  Eigen::VectorXd train_rmse;  ///< one per output of the partition
+  /// Held-out error of the prefixes with 1, 2, ... leaves; empty without cross-validation. Root mean square over all
+  /// rows of the error, in the output's unit; for a shared partition of the errors divided by the outputs' standard
+  /// deviations.
   Eigen::VectorXd cv_rmse;
   std::ptrdiff_t cv_folds = 0;
 };
@@ -104,20 +114,24 @@ struct FitResult {
 
 /// Grows a local linear model tree for every output, or one for all.
 ///
-/// inputs: rows x inputs; outputs: rows x outputs. Columns are named x1, x2, ... and y1, y2, ... (a single output: y); see Model::named().
+/// inputs: rows x inputs; outputs: rows x outputs. Columns are named x1, x2, ... and y1, y2, ... (a single output: y);
+/// see Model::named().
 ///
-/// A leaf fits its rows by least squares, as a correction of its parent's local model of minimum norm (inputs scaled to unit variance in
-/// the leaf). Where the rows do not determine a direction - fewer rows than coefficients, constant or collinear columns - the parent's
-/// slope in that direction stays; at the root it is zero. Nothing in the result depends on the order of rows, on the number of threads,
-/// on scale and offset of inputs and outputs, beyond rounding. Equally good splits: the first input, then the smallest threshold.
+/// A leaf fits its rows by least squares, as a correction of its parent's local model of minimum norm (inputs scaled to
+/// unit variance in the leaf). Where the rows do not determine a direction - fewer rows than coefficients, constant or
+/// collinear columns - the parent's slope in that direction stays; at the root it is zero. Nothing in the result
+/// depends on the order of rows, on the number of threads, on scale and offset of inputs and outputs, beyond rounding.
+/// Equally good splits: the first input, then the smallest threshold.
 ///
-/// Throws std::invalid_argument naming argument, value and bound: no rows or columns, row counts that differ, a value that is not finite,
-/// an option out of range, a column index out of range or repeated.
+/// Throws std::invalid_argument naming argument, value and bound: no rows or columns, row counts that differ, a value
+/// that is not finite, an option out of range, a column index out of range or repeated.
 FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<const Eigen::MatrixXd>& outputs,
               const FitOptions& options = {});
 
-/// Root mean square error of each column, in its unit. Throws std::invalid_argument if the shapes differ or there is no row.
-Eigen::VectorXd rmse(const Eigen::Ref<const Eigen::MatrixXd>& predicted, const Eigen::Ref<const Eigen::MatrixXd>& measured);
+/// Root mean square error of each column, in its unit. Throws std::invalid_argument if the shapes differ or there is no
+/// row.
+Eigen::VectorXd rmse(const Eigen::Ref<const Eigen::MatrixXd>& predicted,
+                     const Eigen::Ref<const Eigen::MatrixXd>& measured);
 
 /// A few words for people: "the significance test".
 std::string describe(StopReason reason);

@@ -1,5 +1,6 @@
 /// \file
-/// The one place that decides which rows are held out: for the choice of the leaf count, for calibration, for discovery.
+/// The one place that decides which rows are held out: for the choice of the leaf count, for calibration, for
+/// discovery.
 #pragma once
 
 #include <cstddef>
@@ -16,10 +17,11 @@ enum class FoldKind {
 };
 
 struct FoldOptions {
-  int count = 5;                       ///< number of folds K, at least 2; as many as groups gives leave-one-out
-  FoldKind kind = FoldKind::random;    ///< how rows are dealt to folds
-  std::uint64_t seed = 1;              ///< for FoldKind::random
-  std::span<const double> groups = {}; ///< one label a row; rows with equal labels (repeats of a pose) share a fold; empty: each row alone
+  int count = 5;                     ///< number of folds K, at least 2; as many as groups gives leave-one-out
+  FoldKind kind = FoldKind::random;  ///< how rows are dealt to folds
+  std::uint64_t seed = 1;            ///< for FoldKind::random
+  std::span<const double> groups =
+      {};  ///< one label a row; rows with equal labels (repeats of a pose) share a fold; empty: each row alone
 };
 
 /// The rows of one fold, ascending.
@@ -31,7 +33,8 @@ struct Fold {
 /// Partitions the rows 0 ... rows-1 into K folds whose sizes, counted in groups, differ by at most one.
 ///
 /// Every row is held out exactly once. A group keeps together; groups are taken in order of first appearance.
-/// Throws std::invalid_argument if there are fewer groups than folds, fewer than two folds, or a label count other than `rows`.
+/// Throws std::invalid_argument if there are fewer groups than folds, fewer than two folds, or a label count other than
+/// `rows`.
 std::vector<Fold> make_folds(std::ptrdiff_t rows, const FoldOptions& options);
 
 }  // namespace llmt

@@ -19,18 +19,18 @@ struct Node {
   double threshold = 0.0;  ///< in the unit of that input
 
   std::ptrdiff_t samples = 0;  ///< training rows in the node's box
-  int rank = 0;                ///< of [1, regression inputs] over those rows: the coefficients that the rows could determine
-  Eigen::VectorXd rss;         ///< residual sum of squares of the local model over those rows, one per output of the partition
-  Eigen::VectorXd value;       ///< local model at the centre of the inputs, one per output of the partition
-  Eigen::MatrixXd slope;       ///< d output / d regression input, outputs of the partition x regression inputs
+  int rank = 0;         ///< of [1, regression inputs] over those rows: the coefficients that the rows could determine
+  Eigen::VectorXd rss;  ///< residual sum of squares of the local model over those rows, one per output of the partition
+  Eigen::VectorXd value;  ///< local model at the centre of the inputs, one per output of the partition
+  Eigen::MatrixXd slope;  ///< d output / d regression input, outputs of the partition x regression inputs
 
   bool is_leaf() const { return left < 0; }
 };
 
 /// A tree of axis-orthogonal splits that serves one or several outputs.
 ///
-/// Nodes stand in the order of growth: node 0 is the root and the k-th split (k = 1, 2, ...) made the nodes 2k-1 (left) and 2k (right).
-/// The first 2M-1 nodes are therefore the tree as it was with M leaves.
+/// Nodes stand in the order of growth: node 0 is the root and the k-th split (k = 1, 2, ...) made the nodes 2k-1 (left)
+/// and 2k (right). The first 2M-1 nodes are therefore the tree as it was with M leaves.
 struct Partition {
   std::vector<int> outputs;  ///< columns of the model's outputs that this partition predicts, ascending
   std::vector<Node> nodes;   ///< in order of growth
@@ -62,12 +62,13 @@ struct Leaf {
 ///
 /// For output o, served by partition P, at input x:
 ///   y_o(x) = value_o + slope_o . (x_r - centre_r)
-/// with the local model of the leaf of P whose box holds x, and x_r the regression inputs. The boxes cover the whole space: outside the
-/// training extent the nearest leaf's local model goes on, which is extrapolation; outside() tells when and how far.
+/// with the local model of the leaf of P whose box holds x, and x_r the regression inputs. The boxes cover the whole
+/// space: outside the training extent the nearest leaf's local model goes on, which is extrapolation; outside() tells
+/// when and how far.
 class Model {
  public:
-  /// Throws std::invalid_argument naming the part that does not fit: no partition or node, an output served twice or not at all,
-  /// children out of order, an index out of range, a shape, or a number that is not finite.
+  /// Throws std::invalid_argument naming the part that does not fit: no partition or node, an output served twice or
+  /// not at all, children out of order, an index out of range, a shape, or a number that is not finite.
   Model(std::vector<InputColumn> inputs, std::vector<std::string> outputs, std::vector<int> regression_inputs,
         std::vector<Partition> partitions);
 
@@ -75,24 +76,28 @@ class Model {
   std::ptrdiff_t num_outputs() const { return std::ssize(outputs_); }
   const std::vector<InputColumn>& inputs() const { return inputs_; }
   const std::vector<std::string>& outputs() const { return outputs_; }
-  const std::vector<int>& regression_inputs() const { return regression_inputs_; }  ///< columns that local models use, ascending
+  const std::vector<int>& regression_inputs() const {
+    return regression_inputs_;
+  }  ///< columns that local models use, ascending
   const std::vector<Partition>& partitions() const { return partitions_; }
 
-  /// Predictions, rows x outputs, for `inputs` (rows x inputs). Throws std::invalid_argument if the number of columns differs or a
-  /// value is not finite. Same bytes at any number of threads (0: all).
+  /// Predictions, rows x outputs, for `inputs` (rows x inputs). Throws std::invalid_argument if the number of columns
+  /// differs or a value is not finite. Same bytes at any number of threads (0: all).
   Eigen::MatrixXd predict(const Eigen::Ref<const Eigen::MatrixXd>& inputs, int max_threads = 0) const;
 
   /// Which leaf holds each row, rows x partitions: positions in leaves(partition). Throws as predict().
   Eigen::MatrixXi leaf_of(const Eigen::Ref<const Eigen::MatrixXd>& inputs) const;
 
-  /// How far each row lies outside the training extent: the largest excess over the inputs, as a multiple of that input's training
-  /// range; 0 inside, infinity where an input that never varied differs. Throws as predict().
+  /// How far each row lies outside the training extent: the largest excess over the inputs, as a multiple of that
+  /// input's training range; 0 inside, infinity where an input that never varied differs. Throws as predict().
   Eigen::VectorXd outside(const Eigen::Ref<const Eigen::MatrixXd>& inputs) const;
 
-  /// The leaves of a partition from left to right in the tree. Throws std::invalid_argument if there is no such partition.
+  /// The leaves of a partition from left to right in the tree. Throws std::invalid_argument if there is no such
+  /// partition.
   std::vector<Leaf> leaves(std::ptrdiff_t partition) const;
 
-  /// The model as it was when each partition had at most `max_leaves` leaves. Throws std::invalid_argument if max_leaves < 1.
+  /// The model as it was when each partition had at most `max_leaves` leaves. Throws std::invalid_argument if
+  /// max_leaves < 1.
   Model prefix(std::ptrdiff_t max_leaves) const;
 
   /// The same model with other column names. Throws std::invalid_argument if their numbers differ.
@@ -108,15 +113,16 @@ class Model {
 /// Partition `partition` as it was with at most `max_leaves` leaves.
 Partition prefix(const Partition& partition, std::ptrdiff_t max_leaves);
 
-/// The model as JSON text, format version 1; docs/file-formats.md describes it. Numbers are written so that they read back exactly.
+/// The model as JSON text, format version 1; docs/file-formats.md describes it. Numbers are written so that they read
+/// back exactly.
 std::string to_json(const Model& model);
 
-/// Reads what to_json() wrote. Throws std::runtime_error, starting with `name`, that says which member is missing, has the wrong type
-/// or shape, or holds a number that cannot be accepted, and for another format or version.
+/// Reads what to_json() wrote. Throws std::runtime_error, starting with `name`, that says which member is missing, has
+/// the wrong type or shape, or holds a number that cannot be accepted, and for another format or version.
 Model from_json(const std::string& text, const std::string& name = "model");
 
-/// Writes to_json() to a file, through a temporary file beside it that is renamed at the end: a failed write leaves the old file as it
-/// was. Throws std::runtime_error naming the path.
+/// Writes to_json() to a file, through a temporary file beside it that is renamed at the end: a failed write leaves the
+/// old file as it was. Throws std::runtime_error naming the path.
 void save(const Model& model, const std::string& path);
 
 /// Reads a file that save() wrote. Throws std::runtime_error naming the path.

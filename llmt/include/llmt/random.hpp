@@ -1,8 +1,9 @@
 /// \file
 /// Random numbers that are the same on every platform.
 ///
-/// The standard library fixes the engines but not the distributions, so a seed means different data with another vendor. Here both
-/// are ours: xoshiro256** (Blackman & Vigna 2018) seeded through splitmix64, and distributions written out.
+/// The standard library fixes the engines but not the distributions, so a seed means different data with another
+/// vendor. Here both are ours: xoshiro256** (Blackman & Vigna 2018) seeded through splitmix64, and distributions
+/// written out.
 #pragma once
 
 #include <array>
