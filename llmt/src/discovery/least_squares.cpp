@@ -45,6 +45,9 @@ void check_parameters(const std::vector<Parameter>& parameters) {
     if (p.prior_sigma && !(*p.prior_sigma > 0.0)) {
       refuse(fmt::format("parameter \"{}\": prior_sigma is {}, must be > 0", p.name, *p.prior_sigma));
     }
+    if (p.prior_value && !std::isfinite(*p.prior_value)) {
+      refuse(fmt::format("parameter \"{}\": prior_value is {}, must be finite", p.name, *p.prior_value));
+    }
   }
 }
 
@@ -119,8 +122,9 @@ Eigen::VectorXd Solver::weighted(const Eigen::VectorXd& residuals, const Eigen::
   if (problem_.weights.size() != 0) rows.head(n).array() *= problem_.weights.array();
   for (std::size_t i = 0; i < prior_.size(); ++i) {
     const Eigen::Index k = free_[static_cast<std::size_t>(prior_[i])];
+    const Parameter& parameter = problem_.parameters[static_cast<std::size_t>(k)];
     rows(n + static_cast<Eigen::Index>(i)) =
-        (values(k) - start_(k)) / *problem_.parameters[static_cast<std::size_t>(k)].prior_sigma;
+        (values(k) - parameter.prior_value.value_or(parameter.value)) / *parameter.prior_sigma;
   }
   return rows;
 }

@@ -20,7 +20,8 @@ struct Parameter {
   double value = 0.0;  ///< where the iteration starts; in a result, where it ended
   double scale = 1.0;  ///< > 0: a change that is typical for this parameter; makes columns comparable
   bool free = true;    ///< false: kept at `value`
-  std::optional<double> prior_sigma = {};  ///< > 0: the start value is an observation with this standard deviation
+  std::optional<double> prior_sigma = {};  ///< > 0: `prior_value` is an observation with this standard deviation
+  std::optional<double> prior_value = {};  ///< empty: the start value
 };
 
 /// All constraint equations stacked, eq. (4) of Benes et al. 2022: values of all parameters (fixed ones included) -> n
@@ -30,7 +31,7 @@ using Residual = std::function<Eigen::VectorXd(const Eigen::VectorXd& values)>;
 /// Derivatives of the residuals, n x (number of parameters), columns of fixed parameters included (they are not read).
 using Jacobian = std::function<Eigen::MatrixXd(const Eigen::VectorXd& values)>;
 
-/// minimise  sum_i (weight_i residual_i(d))^2 + sum_k ((d_k - start_k) / prior_sigma_k)^2  over the free parameters.
+/// minimise  sum_i (weight_i residual_i(d))^2 + sum_k ((d_k - prior_k) / prior_sigma_k)^2  over the free parameters.
 struct Problem {
   std::vector<Parameter> parameters;
   Residual residual;

@@ -1,0 +1,99 @@
+/// \file
+/// What a serial arm is: joints by Denavit-Hartenberg parameters between a base and a tool frame.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "llmt/abi.hpp"
+#include "llmt/discovery/least_squares.hpp"
+
+namespace llmt::robotics {
+
+/// Which Denavit-Hartenberg convention the joints follow. R and T are rotations about and translations along an axis of
+/// the moving frame, q is the joint value times `sign`; b and beta are extras, zero in both textbook conventions.
+///
+///   dh   (standard):        Rz(theta + q) Tz(d) Tx(a) Ty(b) Rx(alpha) Ry(beta)
+///   mdh  (modified, Craig): Rx(alpha) Tx(a) Ty(b) Ry(beta) Rz(theta + q) Tz(d)
+///
+/// A prismatic joint adds q to d instead of theta. beta is the extra angle of Hayati (1983) for consecutive axes that
+/// are nearly parallel, where a, alpha, d, theta alone change by metres for a tilt of microradians.
+enum class Convention { dh, mdh };
+
+enum class JointType { revolute, prismatic };
+
+/// A fixed frame: translation, then fixed-axis roll, pitch, yaw: R = Rz(yaw) Ry(pitch) Rx(roll).
+struct Frame {
+  Eigen::Vector3d xyz_mm = Eigen::Vector3d::Zero();
+  Eigen::Vector3d rpy_deg = Eigen::Vector3d::Zero();
+};
+
+/// One joint and the link it moves. Angles are kept in degrees, as in files, so that reading and writing lose nothing.
+struct Joint {
+  std::string name;
+  JointType type = JointType::revolute;
+  double alpha_deg = 0.0;
+  double a_mm = 0.0;
+  double d_mm = 0.0;
+  double theta_deg = 0.0;
+  double beta_deg = 0.0;                        ///< see Convention
+  double b_mm = 0.0;                            ///< see Convention; the paper's bent links, eq. (12)-(13), have b = -v
+  double sign = 1.0;                            ///< +1 or -1
+  std::optional<std::array<double, 2>> limits;  ///< lower, upper; degrees, or mm for a prismatic joint
+  std::optional<double> gear_ratio;             ///< motor turns per joint turn
+  double mass_kg = 0.0;                         ///< of the link that the joint moves
+  Eigen::Vector3d com_mm = Eigen::Vector3d::Zero();  ///< its centre of mass in the joint's moving frame
+};
+
+/// What the flange carries.
+struct Payload {
+  double mass_kg = 0.0;
+  Eigen::Vector3d com_mm = Eigen::Vector3d::Zero();  ///< in the tool frame
+};
+
+/// A serial arm. `base` is T_world_base, `tool` is T_flange_tool.
+struct Chain {
+  std::string name;
+  Convention convention = Convention::dh;
+  Eigen::Vector3d gravity_m_s2 = {0.0, 0.0, -9.81};  ///< in the base frame: a tracker's world need not be level
+  std::string orientation;  ///< convention of rx, ry, rz in measurement files, e.g. "intrinsic_xyz"
+  Frame base;
+  Frame tool;
+  std::vector<Joint> joints;
+  Payload payload;
+};
+
+/// Throws std::invalid_argument naming joint, field, value and bound: no joints, repeated or empty joint names, names
+/// that collide with "base" or "tool", non-finite numbers, sign other than +1 or -1, limits out of order, negative
+/// mass.
+void validate(const Chain& chain);
+
+/// The geometric parameters in their fixed order: base.{x,y,z,rx,ry,rz}, tool.{...}, then per joint
+/// {theta,d,a,b,alpha,beta}, named "joint2.a" after the joint. Units mm and deg; scales 1 mm and 0.1 deg. All are free;
+/// whoever calibrates decides.
+std::vector<discovery::Parameter> geometric_parameters(const Chain& chain);
+
+/// Number of geometric parameters: 12 + 6 per joint.
+Eigen::Index geometric_parameter_count(const Chain& chain);
+
+/// Their values in that order.
+Eigen::VectorXd geometric_values(const Chain& chain);
+
+/// The chain with those values. Throws std::invalid_argument on a wrong count.
+Chain with_geometric_values(Chain chain, const Eigen::VectorXd& values);
+
+/// Position of a joint by its name. Throws std::invalid_argument if there is none.
+std::size_t joint_index(const Chain& chain, std::string_view name);
+
+/// Position of a geometric parameter in the fixed order.
+enum class FrameParameter { x, y, z, rx, ry, rz };
+enum class JointParameter { theta, d, a, b, alpha, beta };
+Eigen::Index base_parameter(FrameParameter which);
+Eigen::Index tool_parameter(FrameParameter which);
+Eigen::Index joint_parameter(std::size_t joint, JointParameter which);
+
+}  // namespace llmt::robotics

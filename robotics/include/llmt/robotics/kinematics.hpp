@@ -1,0 +1,100 @@
+/// \file
+/// Forward kinematics of a chain as a product of elementary transforms, and all first derivatives.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "llmt/robotics/chain.hpp"
+
+namespace llmt::robotics {
+
+/// Position and orientation in the world frame.
+struct Pose {
+  Eigen::Vector3d position_mm = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+};
+
+/// What elasticity, gears or heat do to an arm in one pose: small changes on top of the rigid chain. Vectors are in the
+/// world frame.
+struct Deformation {
+  struct Twist {
+    Eigen::Vector3d translation_mm = Eigen::Vector3d::Zero();
+    Eigen::Vector3d rotation_rad = Eigen::Vector3d::Zero();  ///< rotation vector
+  };
+  explicit Deformation(std::size_t joints = 0)
+      : joint(Eigen::VectorXd::Zero(static_cast<Eigen::Index>(joints))), link(joints) {}
+
+  Eigen::VectorXd joint;                               ///< added to the joint values: rad, or mm for prismatic joints
+  std::vector<Twist> link;                             ///< of the far end of each link: everything beyond moves with it
+  Eigen::Vector3d world_mm = Eigen::Vector3d::Zero();  ///< added to the tool position
+};
+
+/// Points and axes of an arm in one pose, in the world frame, mm. Link i runs from the axis of joint i to that of joint
+/// i + 1, the last one to the tool point.
+struct Skeleton {
+  std::vector<Eigen::Vector3d> joint_origin;  ///< a point on each axis: where link i begins
+  std::vector<Eigen::Vector3d> joint_axis;    ///< unit vectors, times the joint's sign
+  std::vector<Eigen::Vector3d> link_end;      ///< where link i ends
+  std::vector<Eigen::Vector3d> body_centre;   ///< centre of mass of each link
+  Eigen::Vector3d payload_centre;
+  Eigen::Matrix3d base_rotation;
+  Pose tool;
+};
+
+/// The chain compiled into elementary transforms. Joint values q are in rad, mm for prismatic joints, in the order of
+/// the joints.
+///
+/// Each elementary transform moves along or about one axis of the moving frame, so the derivative of the tool position
+/// by its value is that axis (translation) or axis x (p - o) (rotation, o a point on the axis).
+class Kinematics {
+ public:
+  /// Validates the chain.
+  explicit Kinematics(const Chain& chain);
+
+  /// The same chain with other geometric values; cheaper than compiling anew.
+  void set_values(const Eigen::VectorXd& values);
+
+  std::size_t joints() const { return variable_.size(); }
+
+  Pose forward(const Eigen::VectorXd& q, const Deformation* deformation = nullptr) const;
+
+  Skeleton skeleton(const Eigen::VectorXd& q, const Deformation* deformation = nullptr) const;
+
+  /// 3 x P derivatives of the tool position by the geometric parameters in the order of geometric_parameters(): mm per
+  /// mm, mm per deg. A deformation is held constant in the frame it acts in.
+  Eigen::Matrix3Xd position_jacobian(const Eigen::VectorXd& q, const Deformation* deformation = nullptr) const;
+
+  /// 6 x J derivatives by the joint values: position in mm (upper rows), rotation vector in rad (lower rows), per rad
+  /// or mm.
+  Eigen::Matrix<double, 6, Eigen::Dynamic> joint_jacobian(const Eigen::VectorXd& q) const;
+
+ private:
+  struct Element {
+    int axis;                // 0, 1, 2 = x, y, z
+    bool rotation;           // else translation
+    Eigen::Index parameter;  // the geometric parameter that is its value
+    int joint = -1;          // the joint whose value is added, or -1
+    double value = 0.0;      // mm or rad
+    double sine = 0.0;
+    double cosine = 1.0;
+  };
+  std::vector<Element> elements_;
+  std::vector<std::size_t> variable_;    // element moved by each joint
+  std::vector<std::size_t> body_frame_;  // element after which each joint's moving frame is reached
+  std::vector<double> sign_;
+  std::vector<Eigen::Vector3d> body_centre_mm_;
+  Eigen::Vector3d payload_centre_mm_;
+  std::size_t base_end_ = 0;  // elements of the base frame
+
+  void add(int axis, bool rotation, Eigen::Index parameter);
+  void add_frame(Eigen::Index first_parameter);
+  void add_joint(const Chain& chain, std::size_t index);
+  template <typename Visit>
+  Pose walk(const Eigen::VectorXd& q, const Deformation* deformation, Visit visit) const;
+};
+
+/// Tool pose of a chain; compile a Kinematics where it is asked for often.
+Pose forward(const Chain& chain, const Eigen::VectorXd& q);
+
+}  // namespace llmt::robotics

@@ -1,0 +1,62 @@
+/// \file
+/// What an instrument saw of a robot, and the CSV files it comes in.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <string>
+#include <vector>
+
+#include "llmt/robotics/robot.hpp"
+
+namespace llmt::robotics {
+
+/// Orientation of the tool as it stands in the file; kept, not used for calibration yet.
+struct Orientation {
+  enum class Kind { angles_deg, quaternion };
+  Kind kind = Kind::angles_deg;
+  Eigen::MatrixXd values;  ///< n x 3: rx, ry, rz in degrees; or n x 4: w, x, y, z
+};
+
+/// n poses and where the tool was seen.
+struct Measurements {
+  Poses poses;
+  Eigen::MatrixXd positions_mm;                       ///< n x 3, world frame; columns that were not measured hold zeros
+  std::array<bool, 3> measured = {true, true, true};  ///< which of x, y, z were measured
+  Orientation orientation;                            ///< empty values if there is none
+  std::vector<std::string> unused_columns;            ///< columns of the file that mean nothing here
+  std::vector<std::string> warnings;                  ///< for people, e.g. rows left out because the point is missing
+
+  Eigen::Index count() const { return poses.count(); }
+};
+
+/// The given rows; warnings and unused columns are not carried over.
+Measurements select(const Measurements& measurements, const std::vector<std::ptrdiff_t>& rows);
+
+/// Throws std::invalid_argument if shapes differ, a number is not finite, no row or no coordinate was measured, or the
+/// number of joints is not that of the robot.
+void validate(const Measurements& measurements, const Robot& robot);
+
+/// Distances between model and measurement over the measured coordinates, n values, mm.
+Eigen::VectorXd distances(const Eigen::MatrixXd& model_mm, const Measurements& measurements);
+
+/// Reads measurements for a robot. Columns, with the unit as suffix:
+///
+///   q1_deg, q1_rad (revolute), q3_mm, q3_m (prismatic)   every joint, all from 1 on
+///   x_mm, y_mm, z_mm (also _m, _um)                      at least one
+///   rx_deg ry_deg rz_deg (also _rad), or qw qx qy qz     orientation, optional
+///   payload_kg temp_C time_s order pose dirN tauN_Nm qmeasN_deg sigma_x_um ...   covariates, optional
+///
+/// A joint, position or angle column without a unit is an error that says so. Rows whose measured coordinates are all
+/// exactly zero are missing points written as zeros: left out, with a warning naming the lines. Other columns are
+/// listed, not used. Throws std::runtime_error starting with `path` or `path:line`.
+Measurements read_measurements(const std::string& path, const Robot& robot);
+
+/// As read_measurements(), from memory; `name` stands for the path in messages.
+Measurements parse_measurements(std::string text, const std::string& name, const Robot& robot);
+
+/// The CSV text that reads back exactly: q in rad or mm, positions in mm, then the covariates. Orientation is written
+/// if there is one.
+std::string to_csv(const Measurements& measurements, const Robot& robot);
+
+}  // namespace llmt::robotics

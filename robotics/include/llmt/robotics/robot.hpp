@@ -1,0 +1,63 @@
+/// \file
+/// A robot model: a chain with its effects, evaluated over many poses.
+#pragma once
+
+#include <Eigen/Core>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "llmt/discovery/least_squares.hpp"
+#include "llmt/robotics/effects.hpp"
+
+namespace llmt::robotics {
+
+/// What calibration found out about one parameter; the value itself stands in the chain or the effect.
+struct IdentifiedParameter {
+  std::string name;
+  std::optional<double> standard_error;  ///< in the parameter's unit; empty if it was not identified
+  std::string state;                     ///< "free", or why it was fixed
+};
+
+/// A chain, the effects on top of it, and what is known about both.
+struct Robot {
+  Chain chain;
+  std::vector<Effect> effects;
+  std::vector<IdentifiedParameter> identified;  ///< empty before calibration
+  std::string correction_file;                  ///< model file of the residual correction, or empty
+};
+
+/// Where the arm stood and under which conditions: one row a pose.
+struct Poses {
+  Eigen::MatrixXd joints;                             ///< n x J: rad, mm for prismatic joints
+  std::map<std::string, Eigen::VectorXd> covariates;  ///< by column name, e.g. "payload_kg", n values each
+
+  Eigen::Index count() const { return joints.rows(); }
+};
+
+/// The poses of the given rows.
+Poses select(const Poses& poses, const std::vector<std::ptrdiff_t>& rows);
+
+/// Throws std::invalid_argument: see validate(Chain), unknown effects, non-finite effect values, an effect named twice
+/// at one place.
+void validate(const Robot& robot);
+
+/// All parameters: geometry (see geometric_parameters()), then the effects' in order, named as by
+/// effect_parameter_name().
+std::vector<discovery::Parameter> parameters(const Robot& robot);
+
+/// The robot with those values, in the order of parameters().
+Robot with_values(Robot robot, const Eigen::VectorXd& values);
+
+/// Tool positions in the world frame, n x 3, mm.
+/// Throws std::invalid_argument if the number of joints does not match or a column that an effect needs is missing.
+Eigen::MatrixXd positions(const Robot& robot, const Poses& poses);
+
+/// Derivatives of the tool positions by parameters(), 3n x P: rows x, y, z of pose 0, then of pose 1, ...
+/// Geometry columns are exact for a rigid robot; with effects they hold the deformation constant (a relative error of
+/// the size deflection / length). Effect columns are central differences of the effect through the exact joint and link
+/// derivatives.
+Eigen::MatrixXd position_jacobian(const Robot& robot, const Poses& poses);
+
+}  // namespace llmt::robotics

@@ -1,0 +1,134 @@
+#include "llmt/robotics/chain.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <set>
+#include <stdexcept>
+
+namespace llmt::robotics {
+namespace {
+
+constexpr double length_scale_mm = 1.0;
+constexpr double angle_scale_deg = 0.1;  // moves a point one metre away by about 2 mm
+constexpr int frame_parameters = 6;
+constexpr int joint_parameters = 6;
+
+[[noreturn]] void refuse(const std::string& message) {
+  throw std::invalid_argument("llmt::robotics::Chain: " + message);
+}
+
+// Every geometric value of a chain in the fixed order; one place decides the order for reading and writing.
+template <typename ChainType, typename Visit>
+void visit_values(ChainType& chain, Visit visit) {
+  for (auto* frame : {&chain.base, &chain.tool}) {
+    for (int i = 0; i < 3; ++i) visit(frame->xyz_mm(i));
+    for (int i = 0; i < 3; ++i) visit(frame->rpy_deg(i));
+  }
+  for (auto& joint : chain.joints) {
+    visit(joint.theta_deg);
+    visit(joint.d_mm);
+    visit(joint.a_mm);
+    visit(joint.b_mm);
+    visit(joint.alpha_deg);
+    visit(joint.beta_deg);
+  }
+}
+
+void validate_joint(const Joint& joint) {
+  if (joint.sign != 1.0 && joint.sign != -1.0)
+    refuse(fmt::format("{}: sign is {}, must be 1 or -1", joint.name, joint.sign));
+  if (!(joint.mass_kg >= 0.0) || !std::isfinite(joint.mass_kg)) {
+    refuse(fmt::format("{}: mass_kg is {}, must be >= 0", joint.name, joint.mass_kg));
+  }
+  if (!joint.com_mm.allFinite()) refuse(fmt::format("{}: com_mm is not finite", joint.name));
+  if (joint.limits && !((*joint.limits)[0] < (*joint.limits)[1])) {
+    refuse(fmt::format("{}: limits are [{}, {}], the first must be the smaller", joint.name, (*joint.limits)[0],
+                       (*joint.limits)[1]));
+  }
+  if (joint.gear_ratio && !(std::isfinite(*joint.gear_ratio) && *joint.gear_ratio != 0.0)) {
+    refuse(fmt::format("{}: gear_ratio is {}, must be finite and not 0", joint.name, *joint.gear_ratio));
+  }
+}
+
+}  // namespace
+
+void validate(const Chain& chain) {
+  if (chain.joints.empty()) refuse("there are no joints");
+  std::set<std::string> names = {"base", "tool", "payload"};
+  for (const Joint& joint : chain.joints) {
+    if (joint.name.empty()) refuse("a joint has no name");
+    if (joint.name.find('.') != std::string::npos) refuse(fmt::format("joint name \"{}\" has a dot", joint.name));
+    if (!names.insert(joint.name).second) refuse(fmt::format("joint name \"{}\" is taken", joint.name));
+    validate_joint(joint);
+  }
+  if (!chain.gravity_m_s2.allFinite()) refuse("gravity_m_s2 is not finite");
+  if (!(chain.payload.mass_kg >= 0.0))
+    refuse(fmt::format("payload mass_kg is {}, must be >= 0", chain.payload.mass_kg));
+  for (const discovery::Parameter& parameter : geometric_parameters(chain)) {
+    if (!std::isfinite(parameter.value))
+      refuse(fmt::format("{} is {}, must be finite", parameter.name, parameter.value));
+  }
+}
+
+std::vector<discovery::Parameter> geometric_parameters(const Chain& chain) {
+  std::vector<discovery::Parameter> parameters;
+  const auto add = [&](const std::string& owner, const char* field, bool is_angle) {
+    parameters.push_back({.name = owner + "." + field,
+                          .unit = is_angle ? "deg" : "mm",
+                          .scale = is_angle ? angle_scale_deg : length_scale_mm});
+  };
+  for (const char* frame : {"base", "tool"}) {
+    for (const char* field : {"x", "y", "z"}) add(frame, field, false);
+    for (const char* field : {"rx", "ry", "rz"}) add(frame, field, true);
+  }
+  for (const Joint& joint : chain.joints) {
+    add(joint.name, "theta", true);
+    add(joint.name, "d", false);
+    add(joint.name, "a", false);
+    add(joint.name, "b", false);
+    add(joint.name, "alpha", true);
+    add(joint.name, "beta", true);
+  }
+  std::size_t next = 0;
+  visit_values(chain, [&](const double& value) { parameters[next++].value = value; });
+  return parameters;
+}
+
+Eigen::Index geometric_parameter_count(const Chain& chain) {
+  return 2 * frame_parameters + joint_parameters * static_cast<Eigen::Index>(chain.joints.size());
+}
+
+Eigen::VectorXd geometric_values(const Chain& chain) {
+  Eigen::VectorXd values(geometric_parameter_count(chain));
+  Eigen::Index next = 0;
+  visit_values(chain, [&](const double& value) { values(next++) = value; });
+  return values;
+}
+
+Chain with_geometric_values(Chain chain, const Eigen::VectorXd& values) {
+  if (values.size() != geometric_parameter_count(chain)) {
+    throw std::invalid_argument(fmt::format("llmt::robotics::with_geometric_values: values has {} entries, must be {}",
+                                            values.size(), geometric_parameter_count(chain)));
+  }
+  Eigen::Index next = 0;
+  visit_values(chain, [&](double& value) { value = values(next++); });
+  return chain;
+}
+
+std::size_t joint_index(const Chain& chain, std::string_view name) {
+  for (std::size_t i = 0; i < chain.joints.size(); ++i) {
+    if (chain.joints[i].name == name) return i;
+  }
+  throw std::invalid_argument(fmt::format("llmt::robotics::joint_index: there is no joint \"{}\"", name));
+}
+
+Eigen::Index base_parameter(FrameParameter which) { return static_cast<Eigen::Index>(which); }
+
+Eigen::Index tool_parameter(FrameParameter which) { return frame_parameters + static_cast<Eigen::Index>(which); }
+
+Eigen::Index joint_parameter(std::size_t joint, JointParameter which) {
+  return 2 * frame_parameters + joint_parameters * static_cast<Eigen::Index>(joint) + static_cast<Eigen::Index>(which);
+}
+
+}  // namespace llmt::robotics

@@ -1,0 +1,195 @@
+#include "llmt/robotics/kinematics.hpp"
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <numbers>
+#include <stdexcept>
+#include <string>
+
+namespace llmt::robotics {
+namespace {
+
+constexpr double radians = std::numbers::pi / 180.0;
+
+// R := R * rotation about its own axis: only the other two columns change.
+void rotate(Eigen::Matrix3d& rotation, int axis, double sine, double cosine) {
+  const int u = (axis + 1) % 3;
+  const int v = (axis + 2) % 3;
+  const Eigen::Vector3d first = rotation.col(u);
+  rotation.col(u) = cosine * first + sine * rotation.col(v);
+  rotation.col(v) = cosine * rotation.col(v) - sine * first;
+}
+
+void apply(Pose& frame, const Deformation::Twist& twist) {
+  frame.position_mm += twist.translation_mm;
+  const double angle = twist.rotation_rad.norm();
+  if (angle > 0.0) {
+    frame.rotation = Eigen::AngleAxisd(angle, twist.rotation_rad / angle).toRotationMatrix() * frame.rotation;
+  }
+}
+
+}  // namespace
+
+void Kinematics::add(int axis, bool rotation, Eigen::Index parameter) {
+  elements_.push_back({axis, rotation, parameter, -1, 0.0, 0.0, 1.0});
+}
+
+void Kinematics::add_frame(Eigen::Index first) {
+  for (int axis = 0; axis < 3; ++axis) add(axis, false, first + axis);
+  for (int axis = 2; axis >= 0; --axis) add(axis, true, first + 3 + axis);  // Rz Ry Rx
+}
+
+void Kinematics::add_joint(const Chain& chain, std::size_t index) {
+  const auto parameter = [&](JointParameter which) { return joint_parameter(index, which); };
+  const auto along_and_about_z = [&] {
+    variable_.push_back(elements_.size() + (chain.joints[index].type == JointType::revolute ? 0 : 1));
+    add(2, true, parameter(JointParameter::theta));
+    add(2, false, parameter(JointParameter::d));
+    elements_[variable_.back()].joint = static_cast<int>(index);
+  };
+  const auto along_x_and_y = [&] {
+    add(0, false, parameter(JointParameter::a));
+    add(1, false, parameter(JointParameter::b));
+  };
+  if (chain.convention == Convention::dh) {
+    along_and_about_z();
+    along_x_and_y();
+    add(0, true, parameter(JointParameter::alpha));
+    add(1, true, parameter(JointParameter::beta));
+  } else {
+    add(0, true, parameter(JointParameter::alpha));
+    along_x_and_y();
+    add(1, true, parameter(JointParameter::beta));
+    along_and_about_z();
+  }
+  body_frame_.push_back(elements_.size());
+}
+
+Kinematics::Kinematics(const Chain& chain) : payload_centre_mm_(chain.payload.com_mm) {
+  validate(chain);
+  add_frame(base_parameter(FrameParameter::x));
+  base_end_ = elements_.size();
+  for (std::size_t j = 0; j < chain.joints.size(); ++j) {
+    add_joint(chain, j);
+    sign_.push_back(chain.joints[j].sign);
+    body_centre_mm_.push_back(chain.joints[j].com_mm);
+  }
+  add_frame(tool_parameter(FrameParameter::x));
+  set_values(geometric_values(chain));
+}
+
+void Kinematics::set_values(const Eigen::VectorXd& values) {
+  if (values.size() != static_cast<Eigen::Index>(elements_.size())) {
+    throw std::invalid_argument("llmt::robotics::Kinematics::set_values: values has " + std::to_string(values.size()) +
+                                " entries, must be " + std::to_string(elements_.size()));
+  }
+  for (Element& element : elements_) {
+    element.value = values(element.parameter) * (element.rotation ? radians : 1.0);
+    if (!element.rotation) continue;
+    element.sine = std::sin(element.value);
+    element.cosine = std::cos(element.value);
+  }
+}
+
+// Calls visit(element number, frame before the element) for every element, then returns the tool pose. The deformation
+// of a link acts just before the axis of the next joint, that of the last link at the tool point.
+template <typename Visit>
+Pose Kinematics::walk(const Eigen::VectorXd& q, const Deformation* deformation, Visit visit) const {
+  if (q.size() != static_cast<Eigen::Index>(joints())) {
+    throw std::invalid_argument("llmt::robotics::Kinematics: q has " + std::to_string(q.size()) +
+                                " entries, the chain has " + std::to_string(joints()) + " joints");
+  }
+  Pose frame;
+  for (std::size_t i = 0; i < elements_.size(); ++i) {
+    const Element& element = elements_[i];
+    double sine = element.sine;
+    double cosine = element.cosine;
+    double value = element.value;
+    if (element.joint >= 0) {
+      const auto joint = static_cast<std::size_t>(element.joint);
+      if (deformation != nullptr && joint > 0) apply(frame, deformation->link[joint - 1]);
+      double moved = q(element.joint);
+      if (deformation != nullptr) moved += deformation->joint(element.joint);
+      value += sign_[joint] * moved;
+      sine = std::sin(value);
+      cosine = std::cos(value);
+    }
+    visit(i, frame);
+    if (element.rotation) {
+      rotate(frame.rotation, element.axis, sine, cosine);
+    } else {
+      frame.position_mm += value * frame.rotation.col(element.axis);
+    }
+  }
+  if (deformation != nullptr) {
+    if (!deformation->link.empty()) apply(frame, deformation->link.back());
+    frame.position_mm += deformation->world_mm;
+  }
+  return frame;
+}
+
+Pose Kinematics::forward(const Eigen::VectorXd& q, const Deformation* deformation) const {
+  return walk(q, deformation, [](std::size_t, const Pose&) {});
+}
+
+Skeleton Kinematics::skeleton(const Eigen::VectorXd& q, const Deformation* deformation) const {
+  Skeleton skeleton;
+  const auto visit = [&](std::size_t i, const Pose& frame) {
+    if (i == base_end_) skeleton.base_rotation = frame.rotation;
+    const std::size_t bodies = skeleton.body_centre.size();
+    if (bodies < joints() && i == body_frame_[bodies]) {
+      skeleton.body_centre.push_back(frame.position_mm + frame.rotation * body_centre_mm_[bodies]);
+    }
+    if (elements_[i].joint < 0) return;
+    const double sign = sign_[static_cast<std::size_t>(elements_[i].joint)];
+    if (elements_[i].joint > 0) skeleton.link_end.push_back(frame.position_mm);
+    skeleton.joint_origin.push_back(frame.position_mm);
+    skeleton.joint_axis.push_back(sign * frame.rotation.col(2));
+  };
+  skeleton.tool = walk(q, deformation, visit);
+  skeleton.link_end.push_back(skeleton.tool.position_mm);
+  skeleton.payload_centre = skeleton.tool.position_mm + skeleton.tool.rotation * payload_centre_mm_;
+  return skeleton;
+}
+
+Eigen::Matrix3Xd Kinematics::position_jacobian(const Eigen::VectorXd& q, const Deformation* deformation) const {
+  Eigen::Matrix3Xd axes(3, elements_.size());
+  Eigen::Matrix3Xd origins(3, elements_.size());
+  const auto visit = [&](std::size_t i, const Pose& frame) {
+    axes.col(static_cast<Eigen::Index>(i)) = frame.rotation.col(elements_[i].axis);
+    origins.col(static_cast<Eigen::Index>(i)) = frame.position_mm;
+  };
+  Eigen::Vector3d tool = walk(q, deformation, visit).position_mm;
+  if (deformation != nullptr) tool -= deformation->world_mm;
+  Eigen::Matrix3Xd jacobian(3, elements_.size());
+  for (std::size_t i = 0; i < elements_.size(); ++i) {
+    const Eigen::Vector3d axis = axes.col(static_cast<Eigen::Index>(i));
+    const Eigen::Vector3d arm = tool - origins.col(static_cast<Eigen::Index>(i));
+    const Element& element = elements_[i];
+    if (element.rotation) {
+      jacobian.col(element.parameter) = radians * axis.cross(arm);
+    } else {
+      jacobian.col(element.parameter) = axis;
+    }
+  }
+  return jacobian;
+}
+
+Eigen::Matrix<double, 6, Eigen::Dynamic> Kinematics::joint_jacobian(const Eigen::VectorXd& q) const {
+  const Skeleton skeleton = this->skeleton(q);
+  Eigen::Matrix<double, 6, Eigen::Dynamic> jacobian(6, joints());
+  for (std::size_t j = 0; j < joints(); ++j) {
+    const auto column = static_cast<Eigen::Index>(j);
+    const Eigen::Vector3d& axis = skeleton.joint_axis[j];
+    if (elements_[variable_[j]].rotation) {
+      jacobian.col(column) << axis.cross(skeleton.tool.position_mm - skeleton.joint_origin[j]), axis;
+    } else {
+      jacobian.col(column) << axis, Eigen::Vector3d::Zero();
+    }
+  }
+  return jacobian;
+}
+
+Pose forward(const Chain& chain, const Eigen::VectorXd& q) { return Kinematics(chain).forward(q); }
+
+}  // namespace llmt::robotics

@@ -1,0 +1,56 @@
+#include "llmt/robotics/measurements.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+namespace llmt::robotics {
+
+Measurements select(const Measurements& measurements, const std::vector<std::ptrdiff_t>& rows) {
+  Measurements chosen;
+  chosen.poses = select(measurements.poses, rows);
+  chosen.positions_mm = measurements.positions_mm(rows, Eigen::all);
+  chosen.measured = measurements.measured;
+  chosen.orientation.kind = measurements.orientation.kind;
+  if (measurements.orientation.values.size() != 0) {
+    chosen.orientation.values = measurements.orientation.values(rows, Eigen::all);
+  }
+  return chosen;
+}
+
+void validate(const Measurements& measurements, const Robot& robot) {
+  const auto refuse = [](const std::string& message) {
+    throw std::invalid_argument("llmt::robotics::Measurements: " + message);
+  };
+  const Poses& poses = measurements.poses;
+  const std::ptrdiff_t joints = std::ssize(robot.chain.joints);
+  if (poses.joints.cols() != joints) {
+    refuse(fmt::format("there are {} joints, robot \"{}\" has {}", poses.joints.cols(), robot.chain.name, joints));
+  }
+  if (poses.count() == 0) refuse("there are no rows");
+  if (measurements.positions_mm.rows() != poses.count() || measurements.positions_mm.cols() != 3) {
+    refuse(fmt::format("positions_mm is {} x {}, must be {} x 3", measurements.positions_mm.rows(),
+                       measurements.positions_mm.cols(), poses.count()));
+  }
+  if (std::ranges::none_of(measurements.measured, [](bool seen) { return seen; })) refuse("no coordinate was measured");
+  if (!poses.joints.allFinite()) refuse("a joint value is not finite");
+  if (!measurements.positions_mm.allFinite()) refuse("a position is not finite");
+  for (const auto& [name, values] : poses.covariates) {
+    if (values.size() != poses.count())
+      refuse(fmt::format("column {} has {} values, must be {}", name, values.size(), poses.count()));
+    if (!values.allFinite()) refuse(fmt::format("column {} has a value that is not finite", name));
+  }
+}
+
+Eigen::VectorXd distances(const Eigen::MatrixXd& model_mm, const Measurements& measurements) {
+  Eigen::VectorXd squares = Eigen::VectorXd::Zero(measurements.count());
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    if (!measurements.measured[static_cast<std::size_t>(axis)]) continue;
+    squares += (model_mm.col(axis) - measurements.positions_mm.col(axis)).cwiseAbs2();
+  }
+  return squares.cwiseSqrt();
+}
+
+}  // namespace llmt::robotics
