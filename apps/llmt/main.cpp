@@ -1,14 +1,12 @@
-#include <CLI/CLI.hpp>
-
-#include "shared/exit_codes.hpp"
+#include "llmt/commands.hpp"
+#include "shared/cli.hpp"
 
 int main(int argc, char** argv) {
-  CLI::App app{"Local linear model trees: a table in, a model you can read out", "llmt"};
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? static_cast<int>(llmt::apps::ExitCode::done)
-                                : static_cast<int>(llmt::apps::ExitCode::usage);
-  }
-  return static_cast<int>(llmt::apps::ExitCode::done);
+  CLI::App app{"Local linear model trees: a table in, a model you can read out.", "llmt"};
+  app.require_subcommand(1);
+  app.set_help_all_flag("--help-all", "Help of all commands");
+  llmt::apps::add_fit(app);
+  llmt::apps::add_predict(app);
+  llmt::apps::add_inspect(app);
+  return llmt::apps::run(app, argc, argv);
 }

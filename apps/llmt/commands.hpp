@@ -1,0 +1,13 @@
+/// \file
+/// The subcommands of the program llmt. Each adds itself to the program and runs when it is called.
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+namespace llmt::apps {
+
+void add_fit(CLI::App& app);
+void add_predict(CLI::App& app);
+void add_inspect(CLI::App& app);
+
+}  // namespace llmt::apps

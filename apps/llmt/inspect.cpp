@@ -1,0 +1,134 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <cmath>
+#include <memory>
+
+#include "llmt/commands.hpp"
+#include "llmt/model.hpp"
+#include "shared/cli.hpp"
+
+namespace llmt::apps {
+namespace {
+
+struct InspectArguments {
+  std::string model;
+  bool json = false;
+};
+
+/// "x1 <= 3, -1 < x2 <= 4"; "everywhere" for a single leaf.
+std::string conditions(const Model& model, const Leaf& leaf) {
+  std::vector<std::string> parts;
+  for (std::ptrdiff_t j = 0; j < model.num_inputs(); ++j) {
+    const std::string& name = model.inputs()[static_cast<std::size_t>(j)].name;
+    const bool below = std::isfinite(leaf.high(j));
+    const bool above = std::isfinite(leaf.low(j));
+    if (below && above) {
+      parts.push_back(fmt::format("{} < {} <= {}", number(leaf.low(j)), name, number(leaf.high(j))));
+    } else if (below) {
+      parts.push_back(fmt::format("{} <= {}", name, number(leaf.high(j))));
+    } else if (above) {
+      parts.push_back(fmt::format("{} > {}", name, number(leaf.low(j))));
+    }
+  }
+  return parts.empty() ? "everywhere" : fmt::format("{}", fmt::join(parts, ", "));
+}
+
+/// "1.5 + 2 x1 - 0.3 x2".
+std::string formula(const Model& model, const Leaf& leaf, std::ptrdiff_t output) {
+  std::string text = number(leaf.intercept(output));
+  for (std::size_t j = 0; j < model.regression_inputs().size(); ++j) {
+    const double slope = leaf.slope(output, static_cast<std::ptrdiff_t>(j));
+    const std::string& name = model.inputs()[static_cast<std::size_t>(model.regression_inputs()[j])].name;
+    if (slope != 0.0) {
+      text += fmt::format(" {} {} {}", slope < 0.0 ? "-" : "+", number(std::abs(slope)), name);
+    }
+  }
+  return text;
+}
+
+void print_model(const Model& model, const std::string& path) {
+  print(fmt::format("{}: {} inputs, {} outputs\n\n", path, model.num_inputs(), model.num_outputs()));
+  Table inputs({"input", "smallest", "largest", "mean"});
+  for (const InputColumn& input : model.inputs()) {
+    inputs.add({input.name, number(input.low), number(input.high), number(input.centre)});
+  }
+  print(inputs.text());
+  for (std::ptrdiff_t p = 0; p < std::ssize(model.partitions()); ++p) {
+    const Partition& partition = model.partitions()[static_cast<std::size_t>(p)];
+    for (std::size_t o = 0; o < partition.outputs.size(); ++o) {
+      const std::string& name = model.outputs()[static_cast<std::size_t>(partition.outputs[o])];
+      print(fmt::format("\n{}: {} leaves\n", name, partition.num_leaves()));
+      Table table({"leaf", "rows", "RMSE", "where", name + " ="});
+      const std::vector<Leaf> leaves = model.leaves(p);
+      for (std::size_t k = 0; k < leaves.size(); ++k) {
+        const std::ptrdiff_t output = static_cast<std::ptrdiff_t>(o);
+        table.add({fmt::format("{}", k + 1), fmt::format("{}", leaves[k].samples), number(leaves[k].rmse(output), 3),
+                   conditions(model, leaves[k]), formula(model, leaves[k], output)});
+      }
+      print(table.text());
+    }
+  }
+}
+
+Json finite_or_null(const Eigen::VectorXd& values) {
+  Json json = Json::array();
+  for (const double value : values) {
+    json.push_back(std::isfinite(value) ? Json(value) : Json(nullptr));
+  }
+  return json;
+}
+
+Json leaf_table(const Model& model) {
+  Json json;
+  for (const InputColumn& input : model.inputs()) {
+    json["inputs"].push_back(
+        {{"name", input.name}, {"low", input.low}, {"high", input.high}, {"centre", input.centre}});
+  }
+  json["regression_inputs"] = Json::array();
+  for (const int input : model.regression_inputs()) {
+    json["regression_inputs"].push_back(model.inputs()[static_cast<std::size_t>(input)].name);
+  }
+  for (std::ptrdiff_t p = 0; p < std::ssize(model.partitions()); ++p) {
+    const Partition& partition = model.partitions()[static_cast<std::size_t>(p)];
+    Json entry;
+    for (const int output : partition.outputs) {
+      entry["targets"].push_back(model.outputs()[static_cast<std::size_t>(output)]);
+    }
+    for (const Leaf& leaf : model.leaves(p)) {
+      Json slopes = Json::array();
+      for (std::ptrdiff_t o = 0; o < leaf.slope.rows(); ++o) {
+        slopes.push_back(finite_or_null(leaf.slope.row(o)));
+      }
+      entry["leaves"].push_back({{"rows", leaf.samples},
+                                 {"rank", leaf.rank},
+                                 {"low", finite_or_null(leaf.low)},
+                                 {"high", finite_or_null(leaf.high)},
+                                 {"rmse", finite_or_null(leaf.rmse)},
+                                 {"intercept", finite_or_null(leaf.intercept)},
+                                 {"slope", std::move(slopes)}});
+    }
+    json["partitions"].push_back(std::move(entry));
+  }
+  return json;
+}
+
+}  // namespace
+
+void add_inspect(CLI::App& app) {
+  CLI::App* command = app.add_subcommand("inspect", "Print a model's leaves: where each holds and what it says");
+  command->footer("Example: llmt inspect concrete.json");
+  const auto arguments = std::make_shared<InspectArguments>();
+  command->add_option("model", arguments->model, "Model file of llmt fit")->required();
+  command->add_flag("--json", arguments->json, "Print JSON");
+  command->callback([arguments] {
+    const Model model = load(arguments->model);
+    if (arguments->json) {
+      print_json(leaf_table(model));
+    } else {
+      print_model(model, arguments->model);
+    }
+  });
+}
+
+}  // namespace llmt::apps

@@ -1,1 +1,0 @@
-#include "shared/exit_codes.hpp"
