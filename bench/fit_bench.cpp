@@ -1,0 +1,81 @@
+// Fit and predict, error beside time. Rival in the same run: least squares (Eigen, column-pivoted QR).
+//
+// Arguments: rows / inputs / threads. Counters: rmse = of the noise-free truth on 10000 fresh rows (noise of the data:
+// 1), leaves.
+#include <benchmark/benchmark.h>
+
+#include <Eigen/QR>
+#include <cmath>
+#include <optional>
+
+#include "llmt/fit.hpp"
+#include "synthetic.hpp"
+
+namespace {
+
+void report(benchmark::State& state, const Eigen::VectorXd& predicted, const bench::Sample& test, double leaves) {
+  state.counters["rmse"] = std::sqrt((predicted - test.truth).squaredNorm() / static_cast<double>(test.truth.size()));
+  state.counters["leaves"] = leaves;
+}
+
+void fit_tree(benchmark::State& state, int folds) {
+  const bench::Sample train = bench::sample(state.range(0), state.range(1), 1);
+  const bench::Sample test = bench::sample(10000, state.range(1), 2);
+  const llmt::FitOptions options{.folds = {.count = folds}, .max_threads = static_cast<int>(state.range(2))};
+  std::optional<llmt::FitResult> result;
+  for (auto _ : state) {
+    result.emplace(llmt::fit(train.x, train.y, options));
+  }
+  report(state, result->model.predict(test.x), test, static_cast<double>(result->summary.partitions[0].leaves));
+}
+
+void BM_Grow(benchmark::State& state) { fit_tree(state, 0); }
+void BM_FitWithCrossValidation(benchmark::State& state) { fit_tree(state, 5); }
+
+void BM_LeastSquares(benchmark::State& state) {
+  const bench::Sample train = bench::sample(state.range(0), state.range(1), 1);
+  const bench::Sample test = bench::sample(10000, state.range(1), 2);
+  const auto with_constant = [](const Eigen::MatrixXd& x) {
+    Eigen::MatrixXd regressors(x.rows(), x.cols() + 1);
+    regressors << Eigen::VectorXd::Ones(x.rows()), x;
+    return regressors;
+  };
+  Eigen::VectorXd coefficients;
+  for (auto _ : state) {
+    coefficients = with_constant(train.x).colPivHouseholderQr().solve(train.y);
+  }
+  report(state, with_constant(test.x) * coefficients, test, 1.0);
+}
+
+void BM_Predict(benchmark::State& state) {
+  const bench::Sample train = bench::sample(20000, state.range(1), 1);
+  const bench::Sample query = bench::sample(state.range(0), state.range(1), 2);
+  const llmt::FitResult result = llmt::fit(train.x, train.y, {.folds = {.count = 0}});
+  Eigen::VectorXd predicted;
+  for (auto _ : state) {
+    predicted = result.model.predict(query.x, static_cast<int>(state.range(2)));
+  }
+  report(state, predicted, query, static_cast<double>(result.summary.partitions[0].leaves));
+  state.SetItemsProcessed(state.iterations() * state.range(0));
+}
+
+void sizes(benchmark::internal::Benchmark* benchmark) {
+  for (const std::int64_t rows : {1000, 10000, 100000}) {
+    for (const std::int64_t inputs : {2, 5, 10}) {
+      benchmark->Args({rows, inputs, 1});
+    }
+  }
+  benchmark->Args({100000, 10, 2});
+  benchmark->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime()->UseRealTime();
+}
+
+BENCHMARK(BM_Grow)->Apply(sizes);
+BENCHMARK(BM_FitWithCrossValidation)
+    ->Args({10000, 10, 1})
+    ->Args({10000, 10, 2})
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime();
+BENCHMARK(BM_LeastSquares)->Apply(sizes);
+BENCHMARK(BM_Predict)->Args({100000, 10, 1})->Args({100000, 10, 2})->Unit(benchmark::kMillisecond)->UseRealTime();
+
+}  // namespace

@@ -1,0 +1,87 @@
+// Test error of one tree with default options on data sets with given splits, beside least squares.
+//
+// regression_sets FOLDER [NAME...]: for every NAME.csv in FOLDER with a NAME.splits.csv (the target is the last column
+// of NAME.csv; every column of NAME.splits.csv is a split, 1 = test, 0 = training), or for the names given. Prints mean
+// test RMSE over the splits.
+#include <fmt/format.h>
+
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <set>
+
+#include "llmt/csv.hpp"
+#include "llmt/fit.hpp"
+
+namespace {
+
+struct Errors {
+  double tree = 0.0;
+  double least_squares = 0.0;
+  double worst_ratio = 0.0;  // tree / least squares over the splits
+  double leaves = 0.0;
+  double seconds = 0.0;
+};
+
+Errors measure(const std::string& folder, const std::string& name) {
+  const llmt::Csv data = llmt::Csv::read(folder + "/" + name + ".csv");
+  const llmt::Csv splits = llmt::Csv::read(folder + "/" + name + ".splits.csv");
+  const Eigen::MatrixXd all = data.numbers(data.columns());
+  const Eigen::MatrixXd is_test = splits.numbers(splits.columns());
+  Errors sum;
+  for (Eigen::Index split = 0; split < is_test.cols(); ++split) {
+    std::vector<Eigen::Index> train;
+    std::vector<Eigen::Index> test;
+    for (Eigen::Index row = 0; row < all.rows(); ++row) {
+      (is_test(row, split) > 0.5 ? test : train).push_back(row);
+    }
+    const Eigen::MatrixXd train_rows = all(train, Eigen::all);
+    const Eigen::MatrixXd test_rows = all(test, Eigen::all);
+    const Eigen::Index inputs = all.cols() - 1;
+    const auto start = std::chrono::steady_clock::now();
+    const llmt::FitResult result = llmt::fit(train_rows.leftCols(inputs), train_rows.rightCols(1));
+    sum.seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    const double tree = llmt::rmse(result.model.predict(test_rows.leftCols(inputs)), test_rows.rightCols(1))(0);
+    // The tree with one leaf is least squares.
+    const double least_squares =
+        llmt::rmse(result.model.prefix(1).predict(test_rows.leftCols(inputs)), test_rows.rightCols(1))(0);
+    sum.tree += tree;
+    sum.least_squares += least_squares;
+    sum.worst_ratio = std::max(sum.worst_ratio, tree / least_squares);
+    sum.leaves += static_cast<double>(result.summary.partitions[0].leaves);
+  }
+  const double splits_count = static_cast<double>(is_test.cols());
+  return {sum.tree / splits_count, sum.least_squares / splits_count, sum.worst_ratio, sum.leaves / splits_count,
+          sum.seconds / splits_count};
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc < 2) {
+    fmt::print(stderr, "usage: regression_sets FOLDER [NAME...]\n");
+    return 2;
+  }
+  try {
+    std::set<std::string> names(argv + 2, argv + argc);
+    if (names.empty()) {
+      for (const auto& entry : std::filesystem::directory_iterator(argv[1])) {
+        const std::string file = entry.path().filename().string();
+        if (const std::size_t end = file.find(".splits.csv"); end != std::string::npos) {
+          names.insert(file.substr(0, end));
+        }
+      }
+    }
+    fmt::print("{:12} {:>14} {:>14} {:>18} {:>8} {:>10}\n", "data", "least squares", "crisp tree", "worst split, ratio",
+               "leaves", "s per fit");
+    for (const std::string& name : names) {
+      const Errors errors = measure(argv[1], name);
+      fmt::print("{:12} {:14.5g} {:14.5g} {:18.3f} {:8.1f} {:10.3f}\n", name, errors.least_squares, errors.tree,
+                 errors.worst_ratio, errors.leaves, errors.seconds);
+    }
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "regression_sets: {}\n", error.what());
+    return 1;
+  }
+  return 0;
+}
