@@ -92,7 +92,8 @@ double root_mean_square(const Eigen::VectorXd& residuals, Eigen::Index dof) {
 // overestimates: the passes, each starting where the last one ended, take it from the fit before until it settles.
 void identify(Calibration& calibration, const discovery::Problem& unweighted, const std::vector<std::string>& reasons,
               const CalibrationOptions& options) {
-  constexpr int largest_number_of_passes = 10;
+  const bool has_priors = options.prior_length_mm > 0.0 || options.prior_angle_deg > 0.0;
+  const int largest_number_of_passes = has_priors ? 10 : 1;
   constexpr double smallest_noise_mm = 1e-9;
   discovery::Problem problem = unweighted;
   set_priors(problem.parameters, options);

@@ -93,14 +93,14 @@ void apply_link_bending_no_carry_over(const PoseContext& pose, std::size_t link,
 
 std::vector<EffectType> make_effect_types() {
   // Bending stiffness of industrial arms 0.4-13 MN m^2, of a slender bar some 0.1 MN m^2.
-  const EffectParameter flexibility = {"flexibility", "1/(N m^2)", 1e-7, 0.0, 1e-4};
+  const EffectParameter flexibility = {"flexibility", "1/(N m^2)", "flexibility_per_Nm2", 1e-7, 0.0, 1e-4};
   return {
       {.name = "joint_compliance",
        .title = "joint compliance under gravity",
        .formula = "dq_j = c_j tau_j, tau_j = z_j . sum_{k >= j} (r_k - o_j) x m_k g, payload included",
        .source = "Khalil & Besnard 2002, geometric calibration of robots with flexible joints and links",
        .place = EffectPlace::joint,
-       .parameters = {{"compliance", "rad/(N m)", 1e-7, 0.0, 1e-4}},
+       .parameters = {{"compliance", "rad/(N m)", "compliance_rad_per_Nm", 1e-7, 0.0, 1e-4}},
        .columns = {},
        .apply = apply_joint_compliance},
       {.name = "link_bending",

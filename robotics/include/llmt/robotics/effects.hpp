@@ -27,6 +27,7 @@ struct PoseContext {
 struct EffectParameter {
   std::string name;    ///< e.g. "compliance"
   std::string unit;    ///< e.g. "rad/(N m)"
+  std::string key;     ///< in robot files, with the unit: "compliance_rad_per_Nm"
   double scale = 1.0;  ///< typical size, in that unit
   double lower = 0.0;  ///< plausible range on real arms, sign included
   double upper = 0.0;

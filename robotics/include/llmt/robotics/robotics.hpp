@@ -4,3 +4,13 @@
 /// Umbrella header of llmt::robotics.
 
 #include "llmt/abi.hpp"
+#include "llmt/robotics/calibration.hpp"
+#include "llmt/robotics/calibration_report.hpp"
+#include "llmt/robotics/chain.hpp"
+#include "llmt/robotics/correction.hpp"
+#include "llmt/robotics/effects.hpp"
+#include "llmt/robotics/kinematics.hpp"
+#include "llmt/robotics/measurements.hpp"
+#include "llmt/robotics/robot.hpp"
+#include "llmt/robotics/robot_file.hpp"
+#include "llmt/robotics/simulation.hpp"

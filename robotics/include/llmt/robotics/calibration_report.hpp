@@ -1,0 +1,66 @@
+/// \file
+/// How good a calibration is, on the poses it was made from and on poses that took no part.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "llmt/fit.hpp"
+#include "llmt/folds.hpp"
+#include "llmt/robotics/calibration.hpp"
+#include "llmt/robotics/correction.hpp"
+
+namespace llmt::robotics {
+
+/// Of the distances between model and measurement, mm.
+struct ErrorFigures {
+  double mean = 0.0;
+  double max = 0.0;
+  double p95 = 0.0;  ///< 95 % of the poses are at most this far off
+  double rms = 0.0;
+};
+
+/// Throws std::invalid_argument if there are none.
+ErrorFigures error_figures(const Eigen::VectorXd& distances_mm);
+
+struct ReportOptions {
+  CalibrationOptions calibration = {};
+  bool correct = false;       ///< grow a residual correction and judge it
+  GrowthOptions growth = {};  ///< of the correction
+  int folds = 5;              ///< 0: no held-out figures
+  FoldKind kind = FoldKind::random;
+  int correction_folds = 5;  ///< for the correction's leaf count, within every fold; 0: as grown
+  std::uint64_t seed = 1;
+  int max_threads = 0;
+};
+
+/// Distances of every pose under the three models. Held-out: base, tool, geometry, effects, tree and its size fitted
+/// without the pose.
+struct Stage {
+  Eigen::VectorXd in_sample_mm;  ///< n distances
+  Eigen::VectorXd held_out_mm;   ///< n distances, or empty
+};
+
+struct CalibrationReport {
+  Calibration calibration;              ///< from all poses
+  std::optional<FitResult> correction;  ///< grown on all poses; there even if it is not kept
+  Stage nominal;                        ///< base and tool registered, everything else as given
+  Stage geometric;                      ///< calibrated
+  std::optional<Stage> corrected;
+  bool correction_kept = false;  ///< held-out mean smaller by over two standard errors; no folds: kept unjudged
+  std::string decision;          ///< in a sentence, with the figures
+  int folds = 0;
+  bool grouped = false;  ///< repeats of a pose (column `pose`) were kept together
+  std::vector<discovery::Termination> fold_terminations;
+
+  /// The robot to be used: calibrated, corrected if the correction is kept.
+  CorrectedRobot best() const;
+};
+
+/// Calibrates a robot, with the correction if asked for, on all poses and in every fold. Throws as calibrate() and
+/// make_folds().
+CalibrationReport report_calibration(const Robot& robot, const Measurements& measurements,
+                                     const ReportOptions& options = {});
+
+}  // namespace llmt::robotics

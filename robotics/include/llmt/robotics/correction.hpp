@@ -1,0 +1,40 @@
+/// \file
+/// What calibration leaves over, learnt as a function of the joint values.
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <string>
+
+#include "llmt/fit.hpp"
+#include "llmt/model.hpp"
+#include "llmt/robotics/measurements.hpp"
+
+namespace llmt::robotics {
+
+/// measured - model in the base frame, n x 3, mm: it turns with the robot when base and instrument are set up anew.
+/// Coordinates that were not measured count as exact.
+Eigen::MatrixXd residuals(const Robot& robot, const Measurements& measurements);
+
+/// A calibrated robot and what is added to it, eq. (18)-(19) of Benes et al. 2022:
+///   p(q) = p_robot(q) + R_world_base e(q),
+/// e the predictions of a model with inputs q1, q2, ... (rad or mm) and outputs among dx_mm, dy_mm, dz_mm; a missing
+/// one is zero.
+struct CorrectedRobot {
+  Robot robot;
+  std::optional<Model> correction;  ///< empty: no correction
+};
+
+/// Grows one tree per axis on the residuals (or one for all: FitOptions::growth). Axes whose residuals are all zero get
+/// none. Throws std::invalid_argument as llmt::fit().
+FitResult fit_correction(const Robot& robot, const Measurements& measurements, const FitOptions& options = {});
+
+/// Tool positions in the world frame, n x 3, mm. Throws std::invalid_argument if the model's inputs are not the robot's
+/// joints or an output is none of the three.
+Eigen::MatrixXd positions(const CorrectedRobot& robot, const Poses& poses);
+
+/// Reads the robot and, if it names one, its correction model; a relative path is relative to the robot file. Throws
+/// std::runtime_error.
+CorrectedRobot read_corrected_robot(const std::string& path);
+
+}  // namespace llmt::robotics

@@ -1,0 +1,43 @@
+/// \file
+/// Robot descriptions in YAML.
+#pragma once
+
+#include <string>
+
+#include "llmt/robotics/robot.hpp"
+
+namespace llmt::robotics {
+
+/// Reads a robot description. Units stand in the keys:
+///
+///     name: arm
+///     convention: mdh                # dh | mdh, see llmt::robotics::Convention
+///     gravity_m_s2: [0, 0, -9.81]    # in the base frame; optional
+///     orientation: intrinsic_xyz     # of rx, ry, rz in measurement files; optional
+///     base: {xyz_mm: [0, 0, 0], rpy_deg: [0, 0, 0]}     # T_world_base, optional
+///     tool: {xyz_mm: [0, 0, 90], rpy_deg: [0, 0, 0]}    # T_flange_tool, optional
+///     payload: {mass_kg: 10, com_mm: [0, 0, 0]}         # in the tool frame, optional
+///     joints:                        # name, type, alpha_deg, a_mm, d_mm, theta_deg are required
+///       - {name: joint1, type: revolute, alpha_deg: 0, a_mm: 0, b_mm: 0, d_mm: 642, theta_deg: 0, beta_deg: 0, sign:
+///       1,
+///          limits_deg: [-180, 180], gear_ratio: 100, mass_kg: 250, com_mm: [100, 0, -100]}   # limits_mm if prismatic
+///     effects:                       # optional; parameters as in effect_types()
+///       - {type: joint_compliance, at: joint1, compliance_rad_per_Nm: 1e-7}
+///     identified:                    # optional; written by calibration, values stand above
+///       - {parameter: joint1.a, state: free, standard_error: 0.01, unit: mm}
+///     correction: {model: arm.correction.json}          # optional
+///
+/// Throws std::runtime_error `path:line: where: what` for a file that cannot be read or is no YAML, for unknown,
+/// repeated or missing keys, wrong types and numbers that are not finite, and for whatever validate(Robot) refuses.
+Robot read_robot(const std::string& path);
+
+/// As read_robot(), from memory; `name` stands for the path in messages.
+Robot parse_robot(const std::string& text, const std::string& name);
+
+/// The description as text. Reading it gives the same robot, every number to the last bit.
+std::string to_yaml(const Robot& robot);
+
+/// Writes to_yaml() to a file that appears whole or not at all. Throws std::runtime_error naming the path.
+void save(const Robot& robot, const std::string& path);
+
+}  // namespace llmt::robotics

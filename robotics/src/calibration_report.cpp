@@ -1,0 +1,131 @@
+#include "llmt/robotics/calibration_report.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+namespace llmt::robotics {
+namespace {
+
+struct Fitted {
+  Calibration calibration;
+  std::optional<FitResult> correction;
+};
+
+// Repeats of a pose must not sit on both sides of a fold.
+std::span<const double> pose_labels(const Measurements& measurements) {
+  const auto found = measurements.poses.covariates.find("pose");
+  if (found == measurements.poses.covariates.end()) return {};
+  return {found->second.data(), static_cast<std::size_t>(found->second.size())};
+}
+
+Fitted fit_all(const Robot& robot, const Measurements& measurements, const ReportOptions& options) {
+  Fitted fitted{.calibration = calibrate(robot, measurements, options.calibration), .correction = {}};
+  if (!options.correct) return fitted;
+  const FitOptions fit{.growth = options.growth,
+                       .folds = {.count = options.correction_folds,
+                                 .kind = options.kind,
+                                 .seed = options.seed,
+                                 .groups = pose_labels(measurements)},
+                       .max_threads = options.max_threads};
+  fitted.correction = fit_correction(fitted.calibration.robot, measurements, fit);
+  return fitted;
+}
+
+struct Distances {
+  Eigen::VectorXd nominal;
+  Eigen::VectorXd geometric;
+  Eigen::VectorXd corrected;  // empty without correction
+};
+
+Distances distances_of(const Fitted& fitted, const Measurements& measurements) {
+  Distances result;
+  result.nominal = distances(positions(fitted.calibration.registered, measurements.poses), measurements);
+  result.geometric = distances(positions(fitted.calibration.robot, measurements.poses), measurements);
+  if (fitted.correction) {
+    const CorrectedRobot corrected{fitted.calibration.robot, fitted.correction->model};
+    result.corrected = distances(positions(corrected, measurements.poses), measurements);
+  }
+  return result;
+}
+
+void hold_out(const Robot& robot, const Measurements& measurements, const ReportOptions& options,
+              CalibrationReport& report) {
+  const Eigen::Index n = measurements.count();
+  const std::span<const double> labels = pose_labels(measurements);
+  report.grouped = !labels.empty();
+  report.nominal.held_out_mm.resize(n);
+  report.geometric.held_out_mm.resize(n);
+  if (report.corrected) report.corrected->held_out_mm.resize(n);
+  for (const Fold& fold :
+       make_folds(n, {.count = options.folds, .kind = options.kind, .seed = options.seed, .groups = labels})) {
+    const Fitted fitted = fit_all(robot, select(measurements, fold.train), options);
+    const Distances held_out = distances_of(fitted, select(measurements, fold.held_out));
+    report.fold_terminations.push_back(fitted.calibration.result.termination);
+    report.nominal.held_out_mm(fold.held_out) = held_out.nominal;
+    report.geometric.held_out_mm(fold.held_out) = held_out.geometric;
+    if (report.corrected) report.corrected->held_out_mm(fold.held_out) = held_out.corrected;
+  }
+  report.folds = options.folds;
+}
+
+void decide(CalibrationReport& report) {
+  if (!report.corrected) {
+    report.decision = "no correction was asked for";
+  } else if (report.folds == 0) {
+    report.correction_kept = true;
+    report.decision = "the correction is kept without being judged: no poses were held out";
+  } else {
+    const Eigen::VectorXd gains = report.geometric.held_out_mm - report.corrected->held_out_mm;
+    const double gain = gains.mean();
+    const double n = static_cast<double>(gains.size());
+    const double error = std::sqrt((gains.array() - gain).square().sum() / (n * std::max(1.0, n - 1.0)));
+    report.correction_kept = gain > 2.0 * error;
+    const std::string figures = fmt::format("held-out mean {:.4f} mm with it, {:.4f} mm without",
+                                            report.corrected->held_out_mm.mean(), report.geometric.held_out_mm.mean());
+    report.decision = report.correction_kept ? fmt::format("the correction is kept: {}", figures)
+                      : gain <= 0.0
+                          ? fmt::format("the correction is left out, it makes unseen poses worse: {}", figures)
+                          : fmt::format("the correction is left out, its gain is within chance (+-{:.4f} mm): {}",
+                                        2.0 * error, figures);
+  }
+}
+
+}  // namespace
+
+ErrorFigures error_figures(const Eigen::VectorXd& distances_mm) {
+  if (distances_mm.size() == 0) throw std::invalid_argument("llmt::robotics::error_figures: there are no distances");
+  std::vector<double> sorted(distances_mm.data(), distances_mm.data() + distances_mm.size());
+  std::ranges::sort(sorted);
+  const auto count = static_cast<double>(sorted.size());
+  const auto rank = static_cast<std::size_t>(std::ceil(0.95 * count)) - 1;
+  return {.mean = distances_mm.mean(),
+          .max = sorted.back(),
+          .p95 = sorted[rank],
+          .rms = distances_mm.norm() / std::sqrt(count)};
+}
+
+CorrectedRobot CalibrationReport::best() const {
+  CorrectedRobot robot{.robot = calibration.robot, .correction = {}};
+  if (correction_kept) robot.correction = correction->model;
+  return robot;
+}
+
+CalibrationReport report_calibration(const Robot& robot, const Measurements& measurements,
+                                     const ReportOptions& options) {
+  CalibrationReport report;
+  Fitted fitted = fit_all(robot, measurements, options);
+  const Distances in_sample = distances_of(fitted, measurements);
+  report.calibration = std::move(fitted.calibration);
+  report.correction = std::move(fitted.correction);
+  report.nominal.in_sample_mm = in_sample.nominal;
+  report.geometric.in_sample_mm = in_sample.geometric;
+  if (options.correct) report.corrected = Stage{.in_sample_mm = in_sample.corrected, .held_out_mm = {}};
+  if (options.folds != 0) hold_out(robot, measurements, options, report);
+  decide(report);
+  return report;
+}
+
+}  // namespace llmt::robotics

@@ -1,0 +1,100 @@
+#include "llmt/robotics/correction.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <filesystem>
+#include <stdexcept>
+
+#include "llmt/robotics/robot_file.hpp"
+
+namespace llmt::robotics {
+namespace {
+
+const std::array<std::string, 3> output_names = {"dx_mm", "dy_mm", "dz_mm"};
+
+Eigen::Matrix3d base_rotation(const Chain& chain) {
+  const Eigen::VectorXd any = Eigen::VectorXd::Zero(std::ssize(chain.joints));
+  return Kinematics(chain).skeleton(any).base_rotation;
+}
+
+std::vector<std::string> joint_names(const Chain& chain) {
+  std::vector<std::string> names;
+  for (std::size_t j = 0; j < chain.joints.size(); ++j) {
+    names.push_back(fmt::format("q{}_{}", j + 1, chain.joints[j].type == JointType::revolute ? "rad" : "mm"));
+  }
+  return names;
+}
+
+std::vector<Eigen::Index> axes_of(const Model& model) {
+  std::vector<Eigen::Index> axes;
+  for (const std::string& name : model.outputs()) {
+    const auto found = std::ranges::find(output_names, name);
+    if (found == output_names.end()) {
+      throw std::invalid_argument(
+          fmt::format("llmt::robotics: output \"{}\" of the correction is none of dx_mm, dy_mm, dz_mm", name));
+    }
+    axes.push_back(found - output_names.begin());
+  }
+  return axes;
+}
+
+}  // namespace
+
+Eigen::MatrixXd residuals(const Robot& robot, const Measurements& measurements) {
+  validate(measurements, robot);
+  Eigen::MatrixXd world = measurements.positions_mm - positions(robot, measurements.poses);
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    if (!measurements.measured[static_cast<std::size_t>(axis)]) world.col(axis).setZero();
+  }
+  return world * base_rotation(robot.chain);  // rows: r' R = (R' r)'
+}
+
+FitResult fit_correction(const Robot& robot, const Measurements& measurements, const FitOptions& options) {
+  const Eigen::MatrixXd all = residuals(robot, measurements);
+  std::vector<Eigen::Index> axes;
+  std::vector<std::string> names;
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    if (all.col(axis).isZero(0.0)) continue;
+    axes.push_back(axis);
+    names.push_back(output_names[static_cast<std::size_t>(axis)]);
+  }
+  if (axes.empty()) throw std::invalid_argument("llmt::robotics::fit_correction: all residuals are zero");
+  const Eigen::MatrixXd outputs = all(Eigen::all, axes);
+  FitResult result = fit(measurements.poses.joints, outputs, options);
+  result.model = result.model.named(joint_names(robot.chain), names);
+  return result;
+}
+
+Eigen::MatrixXd positions(const CorrectedRobot& robot, const Poses& poses) {
+  Eigen::MatrixXd points = positions(robot.robot, poses);
+  if (!robot.correction) return points;
+  const Model& model = *robot.correction;
+  if (model.num_inputs() != std::ssize(robot.robot.chain.joints)) {
+    throw std::invalid_argument(fmt::format("llmt::robotics: the correction has {} inputs, robot \"{}\" has {} joints",
+                                            model.num_inputs(), robot.robot.chain.name,
+                                            robot.robot.chain.joints.size()));
+  }
+  const std::vector<Eigen::Index> axes = axes_of(model);
+  Eigen::MatrixXd error = Eigen::MatrixXd::Zero(poses.count(), 3);
+  const Eigen::MatrixXd predicted = model.predict(poses.joints);
+  for (std::size_t k = 0; k < axes.size(); ++k) error.col(axes[k]) = predicted.col(static_cast<Eigen::Index>(k));
+  points += error * base_rotation(robot.robot.chain).transpose();
+  return points;
+}
+
+CorrectedRobot read_corrected_robot(const std::string& path) {
+  CorrectedRobot robot{.robot = read_robot(path), .correction = {}};
+  if (robot.robot.correction_file.empty()) return robot;
+  const std::filesystem::path model = std::filesystem::path(path).parent_path() / robot.robot.correction_file;
+  robot.correction = load(model.string());
+  try {
+    axes_of(*robot.correction);
+  } catch (const std::invalid_argument& error) {
+    throw std::runtime_error(fmt::format("{}: {}", model.string(), error.what()));
+  }
+  return robot;
+}
+
+}  // namespace llmt::robotics

@@ -1,0 +1,121 @@
+#include <fmt/format.h>
+#include <yaml-cpp/yaml.h>
+
+#include <algorithm>
+
+#include "llmt/robotics/robot_file.hpp"
+
+namespace llmt::robotics {
+namespace {
+
+// The shortest decimal that reads back to the same bits.
+std::string exact(double value) { return fmt::format("{}", value); }
+
+class Writer {
+ public:
+  std::string finish() { return std::string(out_.c_str()) + "\n"; }
+
+  Writer& begin_map(YAML::EMITTER_MANIP style = YAML::Flow) { return put(style), put(YAML::BeginMap); }
+  Writer& end_map() { return put(YAML::EndMap); }
+  Writer& begin_list(YAML::EMITTER_MANIP style) { return put(style), put(YAML::BeginSeq); }
+  Writer& end_list() { return put(YAML::EndSeq); }
+  Writer& key(const std::string& name) { return put(YAML::Key), put(name), put(YAML::Value); }
+  Writer& word(const std::string& name, const std::string& value) { return key(name), put(value); }
+  Writer& number(const std::string& name, double value) { return key(name), put(exact(value)); }
+
+  // Where the value is the one that an absent key means, the key is left out.
+  Writer& optional(const std::string& name, double value, double absent) {
+    return value == absent ? *this : number(name, value);
+  }
+
+  template <typename Range>
+  Writer& numbers(const std::string& name, const Range& values) {
+    key(name).begin_list(YAML::Flow);
+    for (const double value : values) put(exact(value));
+    return end_list();
+  }
+
+ private:
+  YAML::Emitter out_;
+
+  template <typename Value>
+  Writer& put(const Value& value) {
+    out_ << value;
+    return *this;
+  }
+};
+
+void write_frame(Writer& out, const std::string& name, const Frame& frame) {
+  out.key(name).begin_map().numbers("xyz_mm", frame.xyz_mm).numbers("rpy_deg", frame.rpy_deg).end_map();
+}
+
+void write_joint(Writer& out, const Joint& joint) {
+  const bool turns = joint.type == JointType::revolute;
+  out.begin_map().word("name", joint.name).word("type", turns ? "revolute" : "prismatic");
+  out.number("alpha_deg", joint.alpha_deg).number("a_mm", joint.a_mm).optional("b_mm", joint.b_mm, 0.0);
+  out.number("d_mm", joint.d_mm).number("theta_deg", joint.theta_deg).optional("beta_deg", joint.beta_deg, 0.0);
+  out.optional("sign", joint.sign, 1.0);
+  if (joint.limits) out.numbers(turns ? "limits_deg" : "limits_mm", *joint.limits);
+  if (joint.gear_ratio) out.number("gear_ratio", *joint.gear_ratio);
+  out.optional("mass_kg", joint.mass_kg, 0.0);
+  if (!joint.com_mm.isZero(0.0)) out.numbers("com_mm", joint.com_mm);
+  out.end_map();
+}
+
+void write_effect(Writer& out, const Effect& effect) {
+  const EffectType& type = effect_type(effect.type);
+  out.begin_map().word("type", effect.type);
+  if (!effect.at.empty()) out.word("at", effect.at);
+  for (std::size_t k = 0; k < type.parameters.size(); ++k) out.number(type.parameters[k].key, effect.values[k]);
+  out.end_map();
+}
+
+void write_identified(Writer& out, const Robot& robot) {
+  const std::vector<discovery::Parameter> all = parameters(robot);
+  out.key("identified").begin_list(YAML::Block);
+  for (const IdentifiedParameter& entry : robot.identified) {
+    out.begin_map().word("parameter", entry.name).word("state", entry.state);
+    if (entry.standard_error) {
+      const auto named = std::ranges::find(all, entry.name, &discovery::Parameter::name);
+      out.number("standard_error", *entry.standard_error).word("unit", named == all.end() ? "" : named->unit);
+    }
+    out.end_map();
+  }
+  out.end_list();
+}
+
+}  // namespace
+
+std::string to_yaml(const Robot& robot) {
+  validate(robot);
+  const Chain& chain = robot.chain;
+  Writer out;
+  out.begin_map(YAML::Block)
+      .word("name", chain.name)
+      .word("convention", chain.convention == Convention::dh ? "dh" : "mdh");
+  out.numbers("gravity_m_s2", chain.gravity_m_s2);
+  if (!chain.orientation.empty()) out.word("orientation", chain.orientation);
+  write_frame(out, "base", chain.base);
+  write_frame(out, "tool", chain.tool);
+  if (chain.payload.mass_kg != 0.0 || !chain.payload.com_mm.isZero(0.0)) {
+    out.key("payload")
+        .begin_map()
+        .number("mass_kg", chain.payload.mass_kg)
+        .numbers("com_mm", chain.payload.com_mm)
+        .end_map();
+  }
+  out.key("joints").begin_list(YAML::Block);
+  for (const Joint& joint : chain.joints) write_joint(out, joint);
+  out.end_list();
+  if (!robot.effects.empty()) {
+    out.key("effects").begin_list(YAML::Block);
+    for (const Effect& effect : robot.effects) write_effect(out, effect);
+    out.end_list();
+  }
+  if (!robot.identified.empty()) write_identified(out, robot);
+  if (!robot.correction_file.empty()) out.key("correction").begin_map().word("model", robot.correction_file).end_map();
+  out.end_map();
+  return out.finish();
+}
+
+}  // namespace llmt::robotics

@@ -1,0 +1,103 @@
+#include "llmt/robotics/calibration_report.hpp"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "llmt/robotics/robot_file.hpp"
+#include "robotics/robots.hpp"
+
+namespace llmt::robotics {
+namespace {
+
+// An arm whose first joint angle errs by a step: nothing that geometry can take up, easy for a tree.
+Measurements with_step(const Robot& truth, Eigen::Index n, double step_rad, std::uint64_t seed) {
+  Measurements m = measure(truth, random_poses(truth.chain, n, seed), 0.02, seed + 1);
+  Poses moved = m.poses;
+  for (Eigen::Index i = 0; i < n; ++i) {
+    if (moved.joints(i, 0) > 0.3) moved.joints(i, 0) += step_rad;
+  }
+  m.positions_mm += positions(truth, moved) - positions(truth, m.poses);
+  return m;
+}
+
+TEST(ErrorFigures, AreThoseOfTheSortedDistances) {
+  const ErrorFigures figures = error_figures(Eigen::VectorXd::LinSpaced(100, 1.0, 100.0));
+  EXPECT_DOUBLE_EQ(figures.mean, 50.5);
+  EXPECT_DOUBLE_EQ(figures.max, 100.0);
+  EXPECT_DOUBLE_EQ(figures.p95, 95.0);
+  EXPECT_NEAR(figures.rms, std::sqrt(338350.0 / 100.0), 1e-12);
+  EXPECT_THROW(error_figures(Eigen::VectorXd()), std::invalid_argument);
+}
+
+TEST(CalibrationReport, StagesFallFromNominalOverGeometricToCorrected) {
+  const Robot truth = perturbed(mdh_like(), 0.5, 0.05, 1);
+  const CalibrationReport report = report_calibration(mdh_like(), with_step(truth, 500, 0.002, 2), {.correct = true});
+  const double nominal = report.nominal.held_out_mm.mean();
+  const double geometric = report.geometric.held_out_mm.mean();
+  const double corrected = report.corrected->held_out_mm.mean();
+  EXPECT_LT(geometric, nominal);
+  EXPECT_LT(corrected, 0.8 * geometric);
+  EXPECT_TRUE(report.correction_kept) << report.decision;
+  EXPECT_TRUE(report.best().correction.has_value());
+  EXPECT_EQ(report.fold_terminations.size(), 5u);
+}
+
+TEST(CalibrationReport, CorrectionOfPureNoiseIsLeftOut) {
+  const Robot truth = perturbed(ur_like(), 0.5, 0.05, 3);
+  const Measurements seen = measure(truth, random_poses(truth.chain, 60, 4), 0.05, 5);
+  ReportOptions options{.correct = true};
+  options.growth.significance = 1.0;  // a tree that follows every wiggle
+  options.correction_folds = 0;
+  options.growth.max_leaves = 5;
+  const CalibrationReport report = report_calibration(ur_like(), seen, options);
+  EXPECT_LT(report.corrected->in_sample_mm.mean(), report.geometric.in_sample_mm.mean());
+  EXPECT_FALSE(report.correction_kept) << report.decision;
+  EXPECT_NE(report.decision.find("left out"), std::string::npos);
+  EXPECT_FALSE(report.best().correction.has_value());
+}
+
+TEST(CalibrationReport, RepeatsOfAPoseShareAFold) {
+  const Robot truth = perturbed(ur_like(), 0.5, 0.05, 6);
+  Poses once = random_poses(truth.chain, 50, 7);
+  Poses poses{.joints = once.joints.replicate(2, 1), .covariates = {}};
+  poses.covariates["pose"] = Eigen::VectorXd::LinSpaced(50, 0.0, 49.0).replicate(2, 1);
+  EXPECT_TRUE(report_calibration(ur_like(), measure(truth, poses, 0.05, 8)).grouped);
+}
+
+TEST(CalibrationReport, WithoutFoldsThereAreNoHeldOutFigures) {
+  const Robot truth = perturbed(ur_like(), 0.5, 0.05, 9);
+  const CalibrationReport report =
+      report_calibration(ur_like(), measure(truth, random_poses(truth.chain, 50, 10), 0.05, 11), {.folds = 0});
+  EXPECT_EQ(report.geometric.held_out_mm.size(), 0);
+  EXPECT_EQ(report.nominal.in_sample_mm.size(), 50);
+}
+
+TEST(Correction, IsTheSameSeenFromAnotherBase) {
+  const Robot truth = perturbed(mdh_like(), 0.0, 0.0, 12);
+  const Measurements seen = with_step(truth, 300, 0.002, 13);
+  const CorrectedRobot here{truth, fit_correction(truth, seen).model};
+  CorrectedRobot there = here;
+  there.robot.chain.base = Frame{};
+  const Eigen::MatrixXd shift_here = positions(here, seen.poses) - positions(here.robot, seen.poses);
+  const Eigen::MatrixXd shift_there = positions(there, seen.poses) - positions(there.robot, seen.poses);
+  EXPECT_GT(shift_here.norm(), 1.0);
+  EXPECT_LT((shift_here.rowwise().norm() - shift_there.rowwise().norm()).norm(), 1e-9);
+}
+
+TEST(Correction, SavedRobotWithItsModelPredictsTheSame) {
+  const Robot truth = perturbed(mdh_like(), 0.0, 0.0, 14);
+  const Measurements seen = with_step(truth, 300, 0.002, 15);
+  CorrectedRobot corrected{truth, fit_correction(truth, seen).model};
+  const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / "correction_test";
+  std::filesystem::create_directories(folder);
+  corrected.robot.correction_file = "model.json";
+  save(*corrected.correction, (folder / "model.json").string());
+  save(corrected.robot, (folder / "arm.yaml").string());
+  const CorrectedRobot again = read_corrected_robot((folder / "arm.yaml").string());
+  EXPECT_EQ(positions(again, seen.poses), positions(corrected, seen.poses));
+  std::filesystem::remove_all(folder);
+}
+
+}  // namespace
+}  // namespace llmt::robotics

@@ -1,0 +1,141 @@
+#include "llmt/robotics/robot_file.hpp"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "robotics/robots.hpp"
+
+namespace llmt::robotics {
+namespace {
+
+const std::string good = R"(name: two
+convention: dh
+gravity_m_s2: [0, 0, -9.81]
+tool: {xyz_mm: [1, 2, 3], rpy_deg: [0, 0, 0]}
+joints:
+  - {name: joint1, type: revolute, alpha_deg: 90, a_mm: 0, d_mm: 100, theta_deg: 0, limits_deg: [-180, 180]}
+  - {name: joint2, type: prismatic, alpha_deg: 0, a_mm: 0, d_mm: 0, theta_deg: 0, limits_mm: [0, 300], mass_kg: 4}
+effects:
+  - {type: joint_compliance, at: joint1, compliance_rad_per_Nm: 1e-7}
+)";
+
+std::string with(const std::string& from, const std::string& to) {
+  std::string text = good;
+  const std::size_t at = text.find(from);
+  EXPECT_NE(at, std::string::npos) << from;
+  return text.replace(at, from.size(), to);
+}
+
+std::string message_of(const std::string& text) {
+  try {
+    parse_robot(text, "arm.yaml");
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+void expect_message(const std::string& text, const std::string& place, const std::string& part) {
+  const std::string message = message_of(text);
+  EXPECT_TRUE(message.starts_with(place)) << message;
+  EXPECT_NE(message.find(part), std::string::npos) << message;
+}
+
+void expect_same(const Robot& a, const Robot& b) {
+  EXPECT_EQ(geometric_values(a.chain), geometric_values(b.chain));
+  EXPECT_EQ(a.chain.gravity_m_s2, b.chain.gravity_m_s2);
+  EXPECT_EQ(a.chain.payload.mass_kg, b.chain.payload.mass_kg);
+  EXPECT_EQ(a.chain.payload.com_mm, b.chain.payload.com_mm);
+  EXPECT_EQ(a.chain.name, b.chain.name);
+  EXPECT_EQ(a.chain.orientation, b.chain.orientation);
+  ASSERT_EQ(a.chain.joints.size(), b.chain.joints.size());
+  for (std::size_t j = 0; j < a.chain.joints.size(); ++j) {
+    const Joint& p = a.chain.joints[j];
+    const Joint& q = b.chain.joints[j];
+    EXPECT_EQ(p.name, q.name);
+    EXPECT_EQ(p.type, q.type);
+    EXPECT_EQ(p.sign, q.sign);
+    EXPECT_EQ(p.limits, q.limits);
+    EXPECT_EQ(p.gear_ratio, q.gear_ratio);
+    EXPECT_EQ(p.mass_kg, q.mass_kg);
+    EXPECT_EQ(p.com_mm, q.com_mm);
+  }
+  ASSERT_EQ(a.effects.size(), b.effects.size());
+  for (std::size_t e = 0; e < a.effects.size(); ++e) {
+    EXPECT_EQ(a.effects[e].type, b.effects[e].type);
+    EXPECT_EQ(a.effects[e].at, b.effects[e].at);
+    EXPECT_EQ(a.effects[e].values, b.effects[e].values);
+  }
+  ASSERT_EQ(a.identified.size(), b.identified.size());
+  for (std::size_t k = 0; k < a.identified.size(); ++k) {
+    EXPECT_EQ(a.identified[k].name, b.identified[k].name);
+    EXPECT_EQ(a.identified[k].state, b.identified[k].state);
+    EXPECT_EQ(a.identified[k].standard_error, b.identified[k].standard_error);
+  }
+  EXPECT_EQ(a.correction_file, b.correction_file);
+}
+
+TEST(RobotFile, WritingAndReadingKeepsEveryBit) {
+  Robot robot = perturbed(scara(), 1.0, 1.0, 1);
+  robot.chain.name = "true: a #strange name";
+  robot.chain.orientation = "intrinsic_xyz";
+  robot.chain.gravity_m_s2 = {0.1, 1.0 / 3.0, -9.81};
+  robot.chain.payload = {.mass_kg = 3.3, .com_mm = {0.1, 0.2, 0.3}};
+  robot.chain.joints[0].limits = {-170.1, 1.0 / 7.0};
+  robot.chain.joints[0].gear_ratio = -100.5;
+  robot.chain.joints[1].b_mm = 1e-300;
+  robot.chain.joints[1].mass_kg = 12.0;
+  robot.chain.joints[1].com_mm = {1.0 / 3.0, 2e10, -0.1};
+  robot.effects = {{"joint_compliance", "joint2", {1.0 / 3e7}}, {"link_bending", "joint1", {7.4852412976787945e-06}}};
+  robot.identified = {{"joint1.a", 0.1 + 0.2, "free"},
+                      {"joint1.d", {}, "not distinguishable from parameters before it"}};
+  robot.correction_file = "arm correction.json";
+  expect_same(parse_robot(to_yaml(robot), "again"), robot);
+  EXPECT_EQ(to_yaml(parse_robot(to_yaml(robot), "again")), to_yaml(robot));
+}
+
+TEST(RobotFile, DescriptionsThatShipAreReadAndSurviveWriting) {
+  int count = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(LLMT_ROBOTS_DIR)) {
+    const Robot robot = read_robot(entry.path().string());
+    expect_same(parse_robot(to_yaml(robot), "again"), robot);
+    ++count;
+  }
+  EXPECT_EQ(count, 5);
+}
+
+TEST(RobotFile, OptionalPartsMayBeAbsent) {
+  const Robot robot = parse_robot(good, "arm.yaml");
+  EXPECT_EQ(robot.chain.base.xyz_mm, Eigen::Vector3d::Zero());
+  EXPECT_EQ(robot.chain.joints[1].type, JointType::prismatic);
+  EXPECT_EQ(robot.effects[0].values[0], 1e-7);
+  EXPECT_FALSE(robot.chain.joints[0].gear_ratio);
+}
+
+TEST(RobotFile, MistakesNameLineKeyAndWhatWouldBeRight) {
+  expect_message(with("a_mm: 0, d_mm: 100", "a_m: 0, d_mm: 100"), "arm.yaml:6: joints[0]", "\"a_mm\" is missing");
+  expect_message(with("limits_deg", "limit_deg"), "arm.yaml:6: joints[0]",
+                 "unknown key \"limit_deg\"; known: name, type");
+  expect_message(with("limits_mm: [0, 300]", "limits_deg: [0, 300]"), "arm.yaml:7",
+                 "\"limits_deg\" does not belong here");
+  expect_message(with("d_mm: 100", "d_mm: 100mm"), "arm.yaml:6", "\"d_mm\" must be a number, is \"100mm\"");
+  expect_message(with("d_mm: 100", "d_mm: .nan"), "arm.yaml:6", "\"d_mm\" must be a number");
+  expect_message(with("[1, 2, 3]", "[1, 2]"), "arm.yaml:4: tool", "list of 3 numbers");
+  expect_message(with("prismatic", "linear"), "arm.yaml:7", "must be revolute or prismatic");
+  expect_message(with("convention: dh", "convention: DH"), "arm.yaml:1", "must be dh or mdh");
+  expect_message(with("joint_compliance", "joint_complience"), "arm.yaml:9: effects[0]",
+                 "known: joint_compliance, link_bending");
+  expect_message(with("at: joint1", "at: joint7"), "arm.yaml:9: effects[0]", "no joint \"joint7\"");
+  expect_message(with("name: joint2", "name: joint1"), "arm.yaml:1", "\"joint1\" is taken");
+  expect_message(with("[-180, 180]", "[180, -180]"), "arm.yaml:1", "joint1: limits are [180, -180]");
+  expect_message(good + "name: again\n", "arm.yaml:10", "\"name\" is there twice");
+  expect_message(good + "jonts: []\n", "arm.yaml:10", "unknown key \"jonts\"");
+  expect_message(with("joints:", "joints: ["), "arm.yaml:", "");
+  expect_message("[1, 2]", "arm.yaml:1", "must be a map");
+  expect_message("", "arm.yaml", "must be a map");
+  EXPECT_THROW(read_robot("/does/not/exist.yaml"), std::runtime_error);
+}
+
+}  // namespace
+}  // namespace llmt::robotics
