@@ -100,7 +100,7 @@ Json summary_json(const FitArguments& arguments, const FitResult& result) {
   for (const PartitionSummary& partition : result.summary.partitions) {
     Json entry;
     for (std::size_t o = 0; o < partition.outputs.size(); ++o) {
-      entry["targets"].push_back(result.model.outputs()[static_cast<std::size_t>(partition.outputs[o])]);
+      entry["targets"].push_back(result.model.outputs()[static_cast<std::size_t>(partition.outputs[o])].name);
       entry["train_rmse"].push_back(partition.train_rmse(static_cast<std::ptrdiff_t>(o)));
     }
     entry["leaves"] = partition.leaves;
@@ -142,7 +142,7 @@ void print_summary(const FitArguments& arguments, const FitResult& result) {
       {"target", "leaves", "grown", "growth ended by", "RMSE held-out", "least squares held-out", "RMSE in-sample"});
   for (const PartitionSummary& partition : result.summary.partitions) {
     for (std::size_t o = 0; o < partition.outputs.size(); ++o) {
-      table.add({result.model.outputs()[static_cast<std::size_t>(partition.outputs[o])],
+      table.add({result.model.outputs()[static_cast<std::size_t>(partition.outputs[o])].name,
                  fmt::format("{}", partition.leaves), fmt::format("{}", partition.grown_leaves),
                  describe(partition.stop), number(held_out(partition, partition.leaves)),
                  number(held_out(partition, 1)), number(partition.train_rmse(static_cast<std::ptrdiff_t>(o)))});
@@ -221,7 +221,7 @@ void add_fit(CLI::App& app) {
       ->capture_default_str();
   command
       ->add_option("--min-improvement", growth.min_improvement,
-                   "Stop when the next split lowers the training RMSE by less than this fraction")
+                   "Stop when further splits lower the training sum of squares by less than this fraction each")
       ->capture_default_str();
   command->add_flag("--shared", growth.shared_partition, "One tree for all targets instead of one each");
   command

@@ -57,7 +57,7 @@ void print_model(const Model& model, const std::string& path) {
   for (std::ptrdiff_t p = 0; p < std::ssize(model.partitions()); ++p) {
     const Partition& partition = model.partitions()[static_cast<std::size_t>(p)];
     for (std::size_t o = 0; o < partition.outputs.size(); ++o) {
-      const std::string& name = model.outputs()[static_cast<std::size_t>(partition.outputs[o])];
+      const std::string& name = model.outputs()[static_cast<std::size_t>(partition.outputs[o])].name;
       print(fmt::format("\n{}: {} leaves\n", name, partition.num_leaves()));
       Table table({"leaf", "rows", "RMSE", "where", name + " ="});
       const std::vector<Leaf> leaves = model.leaves(p);
@@ -93,7 +93,7 @@ Json leaf_table(const Model& model) {
     const Partition& partition = model.partitions()[static_cast<std::size_t>(p)];
     Json entry;
     for (const int output : partition.outputs) {
-      entry["targets"].push_back(model.outputs()[static_cast<std::size_t>(output)]);
+      entry["targets"].push_back(model.outputs()[static_cast<std::size_t>(output)].name);
     }
     for (const Leaf& leaf : model.leaves(p)) {
       Json slopes = Json::array();

@@ -44,7 +44,11 @@ Predicted predict_table(const Model& model, const Csv& csv, int threads) {
     inputs.push_back(input.name);
   }
   const Eigen::MatrixXd values = csv.numbers(inputs);
-  Predicted predicted{model.outputs(), model.predict(values, threads), model.outside(values),
+  std::vector<std::string> targets;
+  for (const OutputColumn& output : model.outputs()) {
+    targets.push_back(output.name);
+  }
+  Predicted predicted{std::move(targets), model.predict(values, threads), model.outside(values),
                       Eigen::VectorXd::Constant(model.num_outputs(), std::nan(""))};
   for (std::size_t o = 0; o < predicted.targets.size(); ++o) {
     if (csv.has(predicted.targets[o]) && csv.rows() > 0) {

@@ -1,7 +1,12 @@
+#include "robot/commands.hpp"
 #include "shared/cli.hpp"
 
 int main(int argc, char** argv) {
-  CLI::App app{"Calibrate a robot, learn what its model misses, and remove it.", "llmt-robot"};
+  CLI::App app{"Calibrate a robot from measured positions, learn what its model misses, and remove it.", "llmt-robot"};
   app.require_subcommand(1);
+  app.set_help_all_flag("--help-all", "Help of all commands");
+  llmt::apps::add_paper(app);
+  llmt::apps::add_simulate(app);
+  llmt::apps::add_calibrate(app);
   return llmt::apps::run(app, argc, argv);
 }

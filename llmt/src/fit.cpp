@@ -149,12 +149,14 @@ std::vector<InputColumn> describe_inputs(const Eigen::MatrixXd& inputs, const Ei
   return columns;
 }
 
-std::vector<std::string> output_names(std::ptrdiff_t count) {
-  std::vector<std::string> names;
-  for (std::ptrdiff_t o = 0; o < count; ++o) {
-    names.push_back(count == 1 ? "y" : fmt::format("y{}", o + 1));
+std::vector<OutputColumn> describe_outputs(const Eigen::MatrixXd& outputs) {
+  std::vector<OutputColumn> columns;
+  for (std::ptrdiff_t o = 0; o < outputs.cols(); ++o) {
+    columns.push_back({.name = outputs.cols() == 1 ? "y" : fmt::format("y{}", o + 1),
+                       .low = outputs.col(o).minCoeff(),
+                       .high = outputs.col(o).maxCoeff()});
   }
-  return names;
+  return columns;
 }
 
 PartitionSummary summarise(const Partition& partition, std::ptrdiff_t regressors) {
@@ -238,7 +240,7 @@ FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<
     summary.partitions.push_back(std::move(described));
     partitions.push_back(std::move(grown[i].partition));
   }
-  return {Model(describe_inputs(x, grown.front().centre), output_names(outputs.cols()), growth.regression_inputs,
+  return {Model(describe_inputs(x, grown.front().centre), describe_outputs(y), growth.regression_inputs,
                 std::move(partitions)),
           std::move(summary)};
 }

@@ -56,7 +56,8 @@ class Grower {
         stopped = true;
         break;
       }
-      if (options_.min_improvement > 0.0 && improvement(*leaves_[next.leaf]) < options_.min_improvement) {
+      if (improves_too_little()) {
+        drop_lookahead();
         stop = StopReason::improvement;
         stopped = true;
         break;
@@ -114,7 +115,7 @@ class Grower {
     parentless.slope = Eigen::MatrixXd::Zero(problem_.outputs.cols(), problem_.deviations.cols());
     nodes_.resize(1);
     const NodeFit fit = fit_leaf(root, parentless, scaled_outputs_);
-    tree_rss_ = root.rss;
+    tree_rss_ = {root.rss};
     find_split(root, fit);
     enter(std::move(root));
   }
@@ -204,10 +205,19 @@ class Grower {
     return std::nullopt;
   }
 
-  /// Fraction by which splitting `leaf` lowers the root mean square residual of the whole tree.
-  double improvement(const OpenLeaf& leaf) const {
-    const double after = std::max(tree_rss_ - leaf.rss + leaf.best.rss, 0.0);
-    return tree_rss_ > 0.0 ? 1.0 - std::sqrt(after / tree_rss_) : 0.0;
+  bool improves_too_little() const {
+    const std::size_t lookahead = static_cast<std::size_t>(improvement_lookahead);
+    if (!(options_.min_improvement > 0.0) || tree_rss_.size() <= lookahead) {
+      return false;
+    }
+    const double before = tree_rss_[tree_rss_.size() - 1 - lookahead];
+    return tree_rss_.back() > std::pow(1.0 - options_.min_improvement, static_cast<double>(lookahead)) * before;
+  }
+
+  /// Undoes the last splits, those that showed that going on does not pay.
+  void drop_lookahead() {
+    const std::ptrdiff_t leaves = std::ssize(tree_rss_) - improvement_lookahead;
+    nodes_ = prefix(Partition{.outputs = {}, .nodes = std::move(nodes_)}, leaves).nodes;
   }
 
   void enter(OpenLeaf leaf) {
@@ -246,7 +256,7 @@ class Grower {
     node.right = children[1].node;
     node.split_input = options_.split_inputs[static_cast<std::size_t>(leaf.best.input)];
     node.threshold = place_threshold(leaf);
-    tree_rss_ += children[0].rss + children[1].rss - leaf.rss;
+    tree_rss_.push_back(tree_rss_.back() - (leaf.rss - children[0].rss - children[1].rss));
     for (OpenLeaf& child : children) {
       enter(std::move(child));
     }
@@ -319,7 +329,7 @@ class Grower {
   std::priority_queue<Priority> queue_;
   std::array<std::ptrdiff_t, 8> refusals_{};  // leaves that stay, by StopReason
   std::vector<int> local_row_;                // scratch, one slot per row; open leaves share no row
-  double tree_rss_ = 0.0;
+  std::vector<double> tree_rss_;              // weighted, with 1, 2, ... leaves
 };
 
 }  // namespace

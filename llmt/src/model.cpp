@@ -115,7 +115,7 @@ void collect_leaves(const Partition& partition, int index, Leaf box, const std::
 
 }  // namespace
 
-Model::Model(std::vector<InputColumn> inputs, std::vector<std::string> outputs, std::vector<int> regression_inputs,
+Model::Model(std::vector<InputColumn> inputs, std::vector<OutputColumn> outputs, std::vector<int> regression_inputs,
              std::vector<Partition> partitions)
     : inputs_(std::move(inputs)),
       outputs_(std::move(outputs)),
@@ -129,6 +129,12 @@ Model::Model(std::vector<InputColumn> inputs, std::vector<std::string> outputs, 
           input.low <= input.high)) {
       reject(fmt::format("input \"{}\": low {}, centre {} and high {} must be finite and low <= high", input.name,
                          input.low, input.centre, input.high));
+    }
+  }
+  for (const OutputColumn& output : outputs_) {
+    if (!(std::isfinite(output.low) && std::isfinite(output.high) && output.low <= output.high)) {
+      reject(fmt::format("output \"{}\": low {} and high {} must be finite and low <= high", output.name, output.low,
+                         output.high));
     }
   }
   check_columns("llmt::Model", "regression_inputs", regression_inputs_, num_inputs());
@@ -250,7 +256,9 @@ Model Model::named(const std::vector<std::string>& inputs, const std::vector<std
   for (std::size_t i = 0; i < inputs.size(); ++i) {
     result.inputs_[i].name = inputs[i];
   }
-  result.outputs_ = outputs;
+  for (std::size_t o = 0; o < outputs.size(); ++o) {
+    result.outputs_[o].name = outputs[o];
+  }
   return result;
 }
 

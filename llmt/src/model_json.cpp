@@ -152,7 +152,10 @@ std::string to_json(const Model& model) {
     json["inputs"].push_back(
         {{"name", input.name}, {"low", input.low}, {"high", input.high}, {"centre", input.centre}});
   }
-  json["outputs"] = model.outputs();
+  json["outputs"] = Json::array();
+  for (const OutputColumn& output : model.outputs()) {
+    json["outputs"].push_back({{"name", output.name}, {"low", output.low}, {"high", output.high}});
+  }
   json["regression_inputs"] = model.regression_inputs();
   json["validity"] = "crisp";
   json["partitions"] = Json::array();
@@ -195,6 +198,12 @@ Model from_json(const std::string& text, const std::string& name) {
                       .high = input.member("high").as<double>(),
                       .centre = input.member("centre").as<double>()});
   }
+  std::vector<OutputColumn> outputs;
+  for (const Reader& output : root.member("outputs").elements()) {
+    outputs.push_back({.name = output.member("name").as<std::string>(),
+                       .low = output.member("low").as<double>(),
+                       .high = output.member("high").as<double>()});
+  }
   std::vector<int> regression_inputs = root.member("regression_inputs").list<int>();
   std::vector<Partition> partitions;
   for (const Reader& entry : root.member("partitions").elements()) {
@@ -205,8 +214,7 @@ Model from_json(const std::string& text, const std::string& name) {
     partitions.push_back(std::move(partition));
   }
   try {
-    return {std::move(inputs), root.member("outputs").list<std::string>(), std::move(regression_inputs),
-            std::move(partitions)};
+    return {std::move(inputs), std::move(outputs), std::move(regression_inputs), std::move(partitions)};
   } catch (const std::invalid_argument& error) {
     throw std::runtime_error(fmt::format("{}: {}", name, error.what()));
   }

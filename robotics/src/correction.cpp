@@ -29,11 +29,11 @@ std::vector<std::string> joint_names(const Chain& chain) {
 
 std::vector<Eigen::Index> axes_of(const Model& model) {
   std::vector<Eigen::Index> axes;
-  for (const std::string& name : model.outputs()) {
-    const auto found = std::ranges::find(output_names, name);
+  for (const OutputColumn& output : model.outputs()) {
+    const auto found = std::ranges::find(output_names, output.name);
     if (found == output_names.end()) {
       throw std::invalid_argument(
-          fmt::format("llmt::robotics: output \"{}\" of the correction is none of dx_mm, dy_mm, dz_mm", name));
+          fmt::format("llmt::robotics: output \"{}\" of the correction is none of dx_mm, dy_mm, dz_mm", output.name));
     }
     axes.push_back(found - output_names.begin());
   }
@@ -79,7 +79,10 @@ Eigen::MatrixXd positions(const CorrectedRobot& robot, const Poses& poses) {
   const std::vector<Eigen::Index> axes = axes_of(model);
   Eigen::MatrixXd error = Eigen::MatrixXd::Zero(poses.count(), 3);
   const Eigen::MatrixXd predicted = model.predict(poses.joints);
-  for (std::size_t k = 0; k < axes.size(); ++k) error.col(axes[k]) = predicted.col(static_cast<Eigen::Index>(k));
+  for (std::size_t k = 0; k < axes.size(); ++k) {
+    const OutputColumn& seen = model.outputs()[k];
+    error.col(axes[k]) = predicted.col(static_cast<Eigen::Index>(k)).cwiseMax(seen.low).cwiseMin(seen.high);
+  }
   points += error * base_rotation(robot.robot.chain).transpose();
   return points;
 }

@@ -219,18 +219,20 @@ TEST(Fit, SharedPartitionOfCopiesIsThePartitionOfOne) {
   EXPECT_LT((shared.predict(x).col(2) + single.predict(x).col(0)).cwiseAbs().maxCoeff(), 1e-12);
 }
 
-TEST(Fit, ImprovementRuleStopsAtTheFirstSplitThatHelpsTooLittle) {
+TEST(Fit, ImprovementRuleStopsWhereTheNextTenSplitsHelpTooLittle) {
   const Eigen::MatrixXd x = oracle::uniform(600, 2, 11);
   const Eigen::MatrixXd y = oracle::curved(x);
   const llmt::Model full = llmt::fit(x, y, as_grown({.significance = 1.0})).model;
   const llmt::FitResult stopped = llmt::fit(x, y, as_grown({.significance = 1.0, .min_improvement = 0.05}));
   const std::ptrdiff_t leaves = stopped.summary.partitions[0].leaves;
   EXPECT_EQ(stopped.summary.partitions[0].stop, llmt::StopReason::improvement);
-  const auto error = [&](std::ptrdiff_t count) { return llmt::rmse(full.prefix(count).predict(x), y)(0); };
-  for (std::ptrdiff_t count = 2; count <= leaves; ++count) {
-    EXPECT_LE(error(count), 0.95 * error(count - 1));
+  EXPECT_EQ(llmt::to_json(stopped.model), llmt::to_json(full.prefix(leaves)));
+  const auto rss = [&](std::ptrdiff_t count) { return std::pow(llmt::rmse(full.prefix(count).predict(x), y)(0), 2); };
+  const double enough = std::pow(0.95, 10);
+  for (std::ptrdiff_t count = 1; count < leaves; ++count) {
+    EXPECT_LE(rss(count + 10), enough * rss(count)) << count;
   }
-  EXPECT_GT(error(leaves + 1), 0.95 * error(leaves));
+  EXPECT_GT(rss(leaves + 10), enough * rss(leaves));
 }
 
 TEST(Fit, VarianceGainBoundsTheTree) {

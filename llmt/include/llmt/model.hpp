@@ -46,6 +46,13 @@ struct InputColumn {
   double centre = 0.0;  ///< mean of the training values; local models are written about it
 };
 
+/// What a model knows of its outputs.
+struct OutputColumn {
+  std::string name;
+  double low = 0.0;   ///< smallest training value
+  double high = 0.0;  ///< largest training value
+};
+
 /// A leaf as a person reads it: where it holds and what it says there.
 struct Leaf {
   int node = 0;                ///< index into Partition::nodes
@@ -69,13 +76,13 @@ class Model {
  public:
   /// Throws std::invalid_argument naming the part that does not fit: no partition or node, an output served twice or
   /// not at all, children out of order, an index out of range, a shape, or a number that is not finite.
-  Model(std::vector<InputColumn> inputs, std::vector<std::string> outputs, std::vector<int> regression_inputs,
+  Model(std::vector<InputColumn> inputs, std::vector<OutputColumn> outputs, std::vector<int> regression_inputs,
         std::vector<Partition> partitions);
 
   std::ptrdiff_t num_inputs() const { return std::ssize(inputs_); }
   std::ptrdiff_t num_outputs() const { return std::ssize(outputs_); }
   const std::vector<InputColumn>& inputs() const { return inputs_; }
-  const std::vector<std::string>& outputs() const { return outputs_; }
+  const std::vector<OutputColumn>& outputs() const { return outputs_; }
   const std::vector<int>& regression_inputs() const {
     return regression_inputs_;
   }  ///< columns that local models use, ascending
@@ -105,7 +112,7 @@ class Model {
 
  private:
   std::vector<InputColumn> inputs_;
-  std::vector<std::string> outputs_;
+  std::vector<OutputColumn> outputs_;
   std::vector<int> regression_inputs_;
   std::vector<Partition> partitions_;
 };

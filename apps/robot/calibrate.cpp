@@ -1,0 +1,285 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <cmath>
+#include <filesystem>
+#include <memory>
+#include <stdexcept>
+
+#include "llmt/files.hpp"
+#include "llmt/robotics/calibration_report.hpp"
+#include "llmt/robotics/robot_file.hpp"
+#include "robot/commands.hpp"
+#include "shared/cli.hpp"
+
+namespace llmt::apps {
+namespace {
+
+using robotics::CalibrationReport;
+using robotics::error_figures;
+using robotics::ErrorFigures;
+
+struct CalibrateArguments {
+  std::string robot;
+  std::string data;
+  std::string output;
+  std::string test;
+  bool contiguous = false;
+  bool json = false;
+  robotics::ReportOptions options;
+};
+
+struct Row {
+  std::string name;
+  const robotics::Stage* stage;
+  std::optional<ErrorFigures> test;
+};
+
+/// Figures on measurements that took no part in anything.
+ErrorFigures test_figures(const robotics::CorrectedRobot& robot, const robotics::Measurements& test) {
+  return error_figures(robotics::distances(robotics::positions(robot, test.poses), test));
+}
+
+std::vector<Row> rows_of(const CalibrationReport& report, const std::optional<robotics::Measurements>& test) {
+  std::vector<Row> rows = {{"nominal", &report.nominal, std::nullopt}, {"geometric", &report.geometric, std::nullopt}};
+  if (report.corrected) {
+    rows.push_back({"corrected", &*report.corrected, std::nullopt});
+  }
+  if (test) {
+    rows[0].test = test_figures({report.calibration.registered, std::nullopt}, *test);
+    rows[1].test = test_figures({report.calibration.robot, std::nullopt}, *test);
+    if (report.corrected) {
+      rows[2].test = test_figures({report.calibration.robot, report.correction->model}, *test);
+    }
+  }
+  return rows;
+}
+
+Json figures_json(const ErrorFigures& figures) {
+  return {{"mean", figures.mean}, {"p95", figures.p95}, {"max", figures.max}, {"rms", figures.rms}};
+}
+
+Json report_json(const CalibrateArguments& arguments, const robotics::Measurements& measurements,
+                 const CalibrationReport& report, const std::vector<Row>& rows) {
+  const discovery::Result& result = report.calibration.result;
+  Json json;
+  json["robot"] = arguments.robot;
+  json["data"] = arguments.data;
+  json["poses"] = measurements.count();
+  json["folds"] = report.folds;
+  json["contiguous"] = arguments.contiguous;
+  json["grouped_by_pose"] = report.grouped;
+  for (const Row& row : rows) {
+    Json entry;
+    entry["in_sample_mm"] = figures_json(error_figures(row.stage->in_sample_mm));
+    entry["held_out_mm"] =
+        row.stage->held_out_mm.size() > 0 ? figures_json(error_figures(row.stage->held_out_mm)) : Json(nullptr);
+    if (row.test) {
+      entry["test_mm"] = figures_json(*row.test);
+    }
+    json["errors"][row.name] = std::move(entry);
+  }
+  json["correction_kept"] = report.corrected ? Json(report.correction_kept) : Json(nullptr);
+  json["decision"] = report.decision;
+  json["termination"] = discovery::to_string(result.termination);
+  json["iterations"] = result.iterations;
+  json["identified_parameters"] = result.rank;
+  json["condition_number"] = result.condition_number;
+  json["coordinate_noise_mm"] = report.calibration.noise_mm;
+  json["parameters"] = Json::array();
+  for (Eigen::Index k = 0; k < result.values.size(); ++k) {
+    const discovery::Parameter& parameter = result.parameters[static_cast<std::size_t>(k)];
+    if (parameter.free) {
+      json["parameters"].push_back(
+          {{"name", parameter.name},
+           {"unit", parameter.unit},
+           {"value", parameter.value},
+           {"standard_error",
+            std::isfinite(result.standard_errors(k)) ? Json(result.standard_errors(k)) : Json(nullptr)}});
+    }
+  }
+  json["fixed"] = Json::array();
+  for (const robotics::FixedParameter& fixed : report.calibration.fixed) {
+    json["fixed"].push_back({{"name", fixed.name}, {"why", fixed.why}});
+  }
+  json["weak"] = report.calibration.weak;
+  json["warnings"] = measurements.warnings;
+  json["unused_columns"] = measurements.unused_columns;
+  json["output"] = arguments.output.empty() ? Json(nullptr) : Json(arguments.output);
+  return json;
+}
+
+std::string error_table(const std::vector<Row>& rows, const CalibrationReport& report, bool contiguous) {
+  std::vector<std::string> header = {"position error, mm", "mean", "95 %", "max"};
+  std::string above = "in-sample";
+  if (report.folds > 0) {
+    above += fmt::format(", then held-out ({} {} folds)", report.folds, contiguous ? "contiguous" : "random");
+    header.insert(header.end(), {"| mean", "95 %", "max"});
+  }
+  if (rows.front().test) {
+    above += ", then on the test file";
+    header.insert(header.end(), {"| mean", "95 %", "max"});
+  }
+  Table table(header);
+  for (const Row& row : rows) {
+    std::vector<std::string> cells = {row.name};
+    const auto add = [&](const ErrorFigures& figures) {
+      for (const double value : {figures.mean, figures.p95, figures.max}) {
+        cells.push_back(fmt::format("{:.4f}", value));
+      }
+    };
+    add(error_figures(row.stage->in_sample_mm));
+    if (report.folds > 0) {
+      add(error_figures(row.stage->held_out_mm));
+    }
+    if (row.test) {
+      add(*row.test);
+    }
+    table.add(std::move(cells));
+  }
+  return above + ":\n" + table.text();
+}
+
+std::string parameter_table(const robotics::Robot& nominal, const CalibrationReport& report) {
+  const std::vector<discovery::Parameter> before = robotics::parameters(nominal);
+  const discovery::Result& result = report.calibration.result;
+  Table table({"parameter", "nominal", "identified", "change", "std error", "unit"});
+  for (std::size_t k = 0; k < before.size(); ++k) {
+    const discovery::Parameter& after = result.parameters[k];
+    if (after.free) {
+      const double error = result.standard_errors(static_cast<Eigen::Index>(k));
+      table.add({after.name, number(before[k].value, 7), number(after.value, 7),
+                 number(after.value - before[k].value, 4), std::isfinite(error) ? number(error, 2) : "-", after.unit});
+    }
+  }
+  return table.text();
+}
+
+void print_report(const CalibrateArguments& arguments, const robotics::Robot& nominal,
+                  const robotics::Measurements& measurements, const CalibrationReport& report,
+                  const std::vector<Row>& rows) {
+  const discovery::Result& result = report.calibration.result;
+  print(fmt::format("{}: {} poses of {}\n", arguments.data, measurements.count(), nominal.chain.name));
+  for (const std::string& warning : measurements.warnings) {
+    print("Note: " + warning + "\n");
+  }
+  if (!measurements.unused_columns.empty()) {
+    print(fmt::format("Columns not used: {}\n", fmt::join(measurements.unused_columns, ", ")));
+  }
+  if (measurements.orientation.values.size() > 0) {
+    print("Orientations are in the file; positions alone are fitted.\n");
+  }
+  print(fmt::format("\n{}\n", parameter_table(nominal, report)));
+  print(fmt::format("{} parameters identified, {} after {} iterations: {}\n", result.rank,
+                    discovery::to_string(result.termination), result.iterations, result.reason));
+  std::vector<std::string> dependent;
+  for (const robotics::FixedParameter& fixed : report.calibration.fixed) {
+    dependent.push_back(fixed.name);
+  }
+  print(fmt::format("Kept as given, most because earlier parameters do the same: {}\n", fmt::join(dependent, ", ")));
+  if (!report.calibration.weak.empty()) {
+    print(fmt::format("Hardly told by these poses, held near nominal by the prior: {}\n",
+                      fmt::join(report.calibration.weak, ", ")));
+  }
+  for (const discovery::Combination& combination : result.unidentifiable) {
+    print(fmt::format("Not told by these poses: {}\n", combination.names()));
+  }
+  print("\n" + error_table(rows, report, arguments.contiguous));
+  print("nominal: base and tool fitted to the poses, everything else as described.\n");
+  if (report.correction) {
+    std::vector<std::string> leaves;
+    for (const PartitionSummary& partition : report.correction->summary.partitions) {
+      for (const int output : partition.outputs) {
+        leaves.push_back(fmt::format("{} {}", report.correction->model.outputs()[static_cast<std::size_t>(output)].name,
+                                     partition.leaves));
+      }
+    }
+    print(fmt::format("Leaves of the correction: {}\n", fmt::join(leaves, ", ")));
+  }
+  if (!report.decision.empty()) {
+    print(report.decision + "\n");
+  }
+}
+
+/// CAL.yaml and, if the correction is kept, CAL.correction.json beside it.
+std::vector<std::string> write_result(const std::string& path, const CalibrationReport& report) {
+  robotics::CorrectedRobot best = report.best();
+  std::vector<std::string> written;
+  best.robot.correction_file.clear();
+  if (best.correction) {
+    const std::filesystem::path file = std::filesystem::path(path).replace_extension(".correction.json");
+    llmt::save(*best.correction, file.string());
+    best.robot.correction_file = file.filename().string();
+    written.push_back(file.string());
+  }
+  robotics::save(best.robot, path);
+  written.push_back(path);
+  return written;
+}
+
+void calibrate_command(CalibrateArguments arguments) {
+  const robotics::Robot nominal = robotics::read_robot(arguments.robot);
+  const robotics::Measurements measurements = robotics::read_measurements(arguments.data, nominal);
+  std::optional<robotics::Measurements> test;
+  if (!arguments.test.empty()) {
+    test = robotics::read_measurements(arguments.test, nominal);
+  }
+  arguments.options.kind = arguments.contiguous ? FoldKind::contiguous : FoldKind::random;
+  const CalibrationReport report = robotics::report_calibration(nominal, measurements, arguments.options);
+  const std::vector<Row> rows = rows_of(report, test);
+  std::vector<std::string> written;
+  if (!arguments.output.empty()) {
+    written = write_result(arguments.output, report);
+  }
+  if (arguments.json) {
+    print_json(report_json(arguments, measurements, report, rows));
+  } else {
+    print_report(arguments, nominal, measurements, report, rows);
+    if (!written.empty()) {
+      print(fmt::format("Written: {}\n", fmt::join(written, ", ")));
+    }
+  }
+  if (!report.calibration.result.converged()) {
+    throw std::runtime_error(fmt::format("the calibration did not converge: {}", report.calibration.result.reason));
+  }
+}
+
+}  // namespace
+
+void add_calibrate(CLI::App& app) {
+  CLI::App* command = app.add_subcommand("calibrate", "Identify a robot's parameters from measured positions");
+  command->description(
+      "Identify base, tool and geometry of a robot from measured tool positions; with --correct, learn what is left as "
+      "a function of the\n"
+      "joint values. Held-out figures: everything, the size of the correction included, is fitted without the poses it "
+      "is judged on.\n"
+      "The correction is kept if its held-out mean error is the smaller one.");
+  command->footer("Example: llmt-robot calibrate robotics/robots/ur10.yaml measured.csv --correct -o calibrated.yaml");
+  const auto arguments = std::make_shared<CalibrateArguments>();
+  robotics::ReportOptions& options = arguments->options;
+  command->add_option("robot", arguments->robot, "Robot description (YAML)")->required();
+  command->add_option("data", arguments->data, "Measurements (CSV with units in the column names)")->required();
+  command->add_flag("--correct", options.correct, "Learn the residual as a function of the joint values");
+  command->add_option("--folds", options.folds, "Folds of the held-out figures, 0: none")->capture_default_str();
+  command->add_flag("--contiguous", arguments->contiguous, "Folds are blocks of consecutive rows: for paths and grids");
+  command->add_option("--test", arguments->test, "Further measurements that take no part, judged at the end");
+  command->add_option("--fix", options.calibration.fixed, "Parameters to keep as given: joint2.a, joint3, base, tool")
+      ->delimiter(',');
+  command->add_option("--only", options.calibration.only, "Free these parameters and no others, base and tool included")
+      ->delimiter(',');
+  command->add_option("--max-leaves", options.growth.max_leaves, "Most leaves of a tree of the correction, 0: no limit")
+      ->capture_default_str();
+  command
+      ->add_option("--min-leaf", options.growth.min_leaf_samples,
+                   "Fewest poses in a leaf, 0: twice the coefficients of a leaf")
+      ->capture_default_str();
+  command->add_option("--seed", options.seed, "Of the random folds")->capture_default_str();
+  command->add_option("--threads", options.max_threads, "0: all; the result does not depend on it")
+      ->capture_default_str();
+  command->add_option("-o,--output", arguments->output,
+                      "Calibrated description to write (the correction goes beside it)");
+  command->add_flag("--json", arguments->json, "Print the report as JSON");
+  command->callback([arguments] { calibrate_command(*arguments); });
+}
+
+}  // namespace llmt::apps

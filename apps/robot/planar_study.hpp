@@ -1,0 +1,40 @@
+/// \file
+/// Table 1 of Benes et al. 2022, made anew: a flexible planar arm and the models of it.
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "llmt/discovery/least_squares.hpp"
+
+namespace llmt::apps {
+
+/// Total error e_t, eq. (20), over the test grid, mm.
+struct TotalError {
+  double mean = 0.0;
+  double max = 0.0;
+};
+
+/// One model of the arm.
+struct StudyRow {
+  std::string model;
+  std::ptrdiff_t training_poses = 0;
+  std::vector<std::ptrdiff_t> leaves;  ///< of the x and the y tree; empty without trees
+  TotalError error;
+  std::optional<TotalError> paper;  ///< as printed there
+};
+
+/// The paper's comparison on one reading of its flexible arm.
+struct PlanarStudy {
+  bool carry_over = true;           ///< link bending with the moment and slope that one link hands to the next
+  discovery::Result calibration;    ///< L2, v2, L3, v3, by the paper's modified Newton method
+  std::vector<StudyRow> arm;        ///< rigid, calibrated, corrected
+  std::vector<StudyRow> black_box;  ///< trees of the position itself
+};
+
+/// Leaf counts as in the paper. `large`: include the black box from 148 680 poses.
+PlanarStudy planar_study(bool carry_over, bool large);
+
+}  // namespace llmt::apps

@@ -1,0 +1,35 @@
+#include "robot/tx200_study.hpp"
+
+#include "llmt/robotics/calibration_report.hpp"
+#include "llmt/robotics/robot_file.hpp"
+#include "llmt/robotics/simulation.hpp"
+#include "robot/shipped_robots.hpp"
+
+namespace llmt::apps {
+
+std::vector<Tx200Trial> tx200_study(bool compliance, int seeds, const std::function<void(int done)>& progress) {
+  const robotics::Robot nominal = robotics::parse_robot(tx200_like_yaml, "tx200_like.yaml");
+  robotics::Robot truth = nominal;
+  if (compliance) {
+    truth.effects = {{"joint_compliance", "joint2", {3e-8}}, {"joint_compliance", "joint3", {5e-8}}};
+  }
+  robotics::ReportOptions options;
+  options.correct = true;
+  options.folds = 45;
+  // 45 poses do not fill five leaves of twice seven: eight a leaf leave each one more pose than coefficients.
+  options.growth = {.significance = 1.0, .min_variance_gain = -1.0, .min_leaf_samples = 8, .max_leaves = 5};
+  options.correction_folds = 0;
+
+  std::vector<Tx200Trial> trials;
+  for (int seed = 1; seed <= seeds; ++seed) {
+    const robotics::Measurements measurements =
+        robotics::simulate(truth, {.poses = 45, .noise_um = 10.0, .seed = static_cast<std::uint64_t>(seed)});
+    const robotics::CalibrationReport report = robotics::report_calibration(nominal, measurements, options);
+    trials.push_back({report.geometric.in_sample_mm.mean(), report.corrected->in_sample_mm.mean(),
+                      report.geometric.held_out_mm.mean(), report.corrected->held_out_mm.mean()});
+    progress(seed);
+  }
+  return trials;
+}
+
+}  // namespace llmt::apps

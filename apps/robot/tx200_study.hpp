@@ -1,0 +1,24 @@
+/// \file
+/// What 45 poses of a TX200-like arm can tell: the paper's section 10 in simulation, where the truth is known.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+namespace llmt::apps {
+
+/// Mean position errors over 45 poses, mm.
+struct Tx200Trial {
+  double geometric_in_sample = 0.0;
+  double corrected_in_sample = 0.0;
+  double geometric_held_out = 0.0;  ///< leave one pose out: geometry and trees fitted to the other 44
+  double corrected_held_out = 0.0;
+};
+
+/// 45 poses with 10 um noise; with `compliance`, the compliance of axes 2 and 3 bends the simulated arm and no model
+/// knows of it. Five linear models of seven coefficients per axis, as in the paper. One trial for each seed 1 ...
+/// `seeds`.
+std::vector<Tx200Trial> tx200_study(bool compliance, int seeds, const std::function<void(int done)>& progress);
+
+}  // namespace llmt::apps

@@ -1,0 +1,143 @@
+#include <fmt/format.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "apps/program.hpp"
+#include "llmt/csv.hpp"
+
+namespace {
+
+using nlohmann::json;
+using program::Folder;
+using program::Outcome;
+
+const std::string robot_program = LLMT_ROBOT_PROGRAM;
+const std::string robots = LLMT_ROBOTS;
+
+TEST(RobotProgram, PaperReproducesTheComparableRows) {
+  const Folder folder;
+  const Outcome outcome = folder.run(robot_program + " paper --json");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const json studies = json::parse(outcome.out);
+  ASSERT_EQ(studies.size(), 2U);
+  for (const json& study : studies) {
+    EXPECT_NEAR(study["calibrability_number"], 1.78, 0.005);
+    EXPECT_EQ(study["termination"], "converged");
+    // By the second iteration: the model is linear in L2, L3, v2, v3.
+    EXPECT_LE(study["deviation_norms_mm"].size(), 3U);
+    const double calibrated = study["arm"][1]["mean_mm"];
+    const double corrected = study["arm"][2]["mean_mm"];
+    EXPECT_LE(study["arm"][2]["leaves"][0], 93);
+    EXPECT_LE(study["arm"][2]["leaves"][1], 75);
+    EXPECT_LE(corrected / calibrated, study["carry_over"] ? 0.048 : 0.037);
+  }
+  const json& black_box = studies[0]["black_box"];
+  EXPECT_EQ(black_box[0]["training_poses"], 1536);
+  EXPECT_LE(black_box[0]["mean_mm"], 7.877);
+  EXPECT_LE(black_box[0]["max_mm"], 45.0);
+  EXPECT_EQ(black_box[1]["training_poses"], 148680);
+  EXPECT_LE(black_box[1]["mean_mm"], 0.380);
+  EXPECT_LE(black_box[1]["max_mm"], 1.8);
+}
+
+TEST(RobotProgram, InSampleGainOnFortyFivePosesIsNoGainOnUnseenOnes) {
+  const Folder folder;
+  const Outcome outcome = folder.run(robot_program + " paper --study tx200 --seeds 1 --json");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const json study = json::parse(outcome.out);
+  for (const char* which : {"hidden_compliance", "noise_alone"}) {
+    EXPECT_LT(study[which]["ratio_in_sample"]["mean"], 0.5) << which;
+    EXPECT_GT(study[which]["ratio_held_out"]["mean"], 1.0) << which;
+  }
+}
+
+TEST(RobotProgram, SimulatedArmIsCalibratedBackAndSimulatesAsIdentified) {
+  const Folder folder;
+  const std::string nominal = robots + "/tx200_like.yaml";
+  // The real arm: 1 mm more on link 2, 0.05 deg more on joint 3.
+  std::string text = llmt::read_file(nominal);
+  text.replace(text.find("a_mm: 950.007"), 13, "a_mm: 951.007");
+  text.replace(text.find("theta_deg: 89.9319"), 18, "theta_deg: 89.9819");
+  folder.write("real.yaml", text);
+  ASSERT_EQ(folder.run(robot_program + " simulate real.yaml --poses 150 --noise-um 10 -o d.csv").exit_code, 0);
+  const Outcome outcome =
+      folder.run(fmt::format("{} calibrate {} d.csv --folds 5 -o cal.yaml --json", robot_program, nominal));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const json report = json::parse(outcome.out);
+  EXPECT_EQ(report["termination"], "converged");
+  // Three coordinates of 10 um noise: a mean distance of 16 um.
+  EXPECT_LT(report["errors"]["geometric"]["held_out_mm"]["mean"], 0.020);
+  EXPECT_GT(report["errors"]["nominal"]["held_out_mm"]["mean"], 0.1);
+  for (const json& parameter : report["parameters"]) {
+    if (parameter["name"] == "joint3.a") {
+      EXPECT_NEAR(parameter["value"], 951.007, 5.0 * double(parameter["standard_error"]));
+    }
+  }
+  // Calibrating the calibrated robot changes nothing that matters, and its description reads back.
+  const Outcome again = folder.run(robot_program + " calibrate cal.yaml d.csv --folds 0 --json");
+  ASSERT_EQ(again.exit_code, 0) << again.err;
+  EXPECT_NEAR(json::parse(again.out)["errors"]["geometric"]["in_sample_mm"]["mean"],
+              report["errors"]["geometric"]["in_sample_mm"]["mean"], 1e-4);
+}
+
+TEST(RobotProgram, CorrectionIsKeptWhereItHelpsAndWrittenBesideTheRobot) {
+  const Folder folder;
+  const std::string flexible = robots + "/planar_two_link.yaml";
+  ASSERT_EQ(
+      folder.run(fmt::format("{} simulate {} --poses 800 --noise-um 5 -o d.csv", robot_program, flexible)).exit_code,
+      0);
+  std::string text = llmt::read_file(flexible);
+  folder.write("rigid.yaml", text.substr(0, text.find("effects:")));
+  const Outcome outcome = folder.run(robot_program +
+                                     " calibrate rigid.yaml d.csv --correct --only joint2.a,joint2.b,tool.x,tool.y "
+                                     "-o cal.yaml --json");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const json report = json::parse(outcome.out);
+  EXPECT_TRUE(report["correction_kept"]);
+  EXPECT_LT(report["errors"]["corrected"]["held_out_mm"]["mean"],
+            0.2 * double(report["errors"]["geometric"]["held_out_mm"]["mean"]));
+  EXPECT_TRUE(std::filesystem::exists(folder.file("cal.correction.json")));
+
+  // The written pair says what the report said: simulated from it, the calibrated arm is as far from the truth.
+  ASSERT_EQ(folder.run(robot_program + " simulate cal.yaml --poses 800 -o c.csv").exit_code, 0);
+  const std::vector<std::string> position = {"x_mm", "y_mm"};
+  const Eigen::MatrixXd difference =
+      llmt::Csv::read(folder.file("d.csv")).numbers(position) - llmt::Csv::read(folder.file("c.csv")).numbers(position);
+  EXPECT_NEAR(difference.rowwise().norm().mean(), report["errors"]["corrected"]["in_sample_mm"]["mean"], 1e-9);
+}
+
+TEST(RobotProgram, CorrectionThatHurtsIsLeftOut) {
+  const Folder folder;
+  const std::string arm = robots + "/tx200_like.yaml";
+  ASSERT_EQ(folder.run(fmt::format("{} simulate {} --poses 60 --noise-um 20 -o d.csv", robot_program, arm)).exit_code,
+            0);
+  const Outcome outcome =
+      folder.run(fmt::format("{} calibrate {} d.csv --correct --min-leaf 8 -o cal.yaml", robot_program, arm));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_NE(outcome.out.find("the correction is left out"), std::string::npos) << outcome.out;
+  EXPECT_FALSE(std::filesystem::exists(folder.file("cal.correction.json")));
+  EXPECT_TRUE(std::filesystem::exists(folder.file("cal.yaml")));
+}
+
+TEST(RobotProgram, MistakesHaveTheirExitCodeAndMessage) {
+  const Folder folder;
+  const std::string arm = robots + "/ur5.yaml";
+  folder.write("units.csv", "q1,q2,q3,q4,q5,q6,x_mm,y_mm,z_mm\n0,0,0,0,0,0,1,2,3\n");
+  folder.write("few.csv", "q1_deg,q2_deg,x_mm,y_mm,z_mm\n0,0,1,2,3\n");
+  folder.write("bad.yaml", "name: arm\nconvention: mdh\njoint:\n  - {}\n");
+  const auto expect = [&](const std::string& arguments, int code, const std::string& message) {
+    const Outcome outcome = folder.run(robot_program + " " + arguments);
+    EXPECT_EQ(outcome.exit_code, code) << arguments << ": " << outcome.err;
+    EXPECT_NE(outcome.err.find(message), std::string::npos) << arguments << ": " << outcome.err;
+  };
+  expect("calibrate", 2, "robot is required");
+  expect("calibrate " + arm + " units.csv", 1, "unit");
+  expect("calibrate " + arm + " few.csv", 1, "few.csv");
+  expect("calibrate bad.yaml few.csv", 1, "bad.yaml:3");
+  expect("calibrate " + arm + " none.csv", 1, "none.csv: cannot be read: No such file or directory");
+  expect("simulate " + arm + " --poses 0", 2, "poses");
+  expect("paper --study puma", 2, "puma");
+}
+
+}  // namespace
