@@ -182,6 +182,9 @@ discovery::Result register_frames(Robot& robot, const Measurements& measurements
 Calibration calibrate(const Robot& robot, const Measurements& measurements, const CalibrationOptions& options) {
   Calibration calibration;
   calibration.registered = robot;
+  calibration.registered.identified
+      .clear();  // what an earlier calibration said, and learnt from its residuals, holds no longer
+  calibration.registered.correction_file.clear();
   calibration.registration = register_frames(calibration.registered, measurements, options);
   calibration.robot = calibration.registered;
   const discovery::Problem problem = calibration_problem(calibration.robot, measurements);

@@ -11,8 +11,8 @@ namespace {
 
 constexpr double length_scale_mm = 1.0;
 constexpr double angle_scale_deg = 0.1;  // moves a point one metre away by about 2 mm
-constexpr int frame_parameters = 6;
-constexpr int joint_parameters = 6;
+constexpr Eigen::Index frame_parameters = 6;
+constexpr Eigen::Index joint_parameters = 6;
 
 [[noreturn]] void refuse(const std::string& message) {
   throw std::invalid_argument("llmt::robotics::Chain: " + message);

@@ -138,13 +138,13 @@ Skeleton Kinematics::skeleton(const Eigen::VectorXd& q, const Deformation* defor
     if (i == base_end_) skeleton.base_rotation = frame.rotation;
     const std::size_t bodies = skeleton.body_centre.size();
     if (bodies < joints() && i == body_frame_[bodies]) {
-      skeleton.body_centre.push_back(frame.position_mm + frame.rotation * body_centre_mm_[bodies]);
+      skeleton.body_centre.emplace_back(frame.position_mm + frame.rotation * body_centre_mm_[bodies]);
     }
     if (elements_[i].joint < 0) return;
     const double sign = sign_[static_cast<std::size_t>(elements_[i].joint)];
     if (elements_[i].joint > 0) skeleton.link_end.push_back(frame.position_mm);
     skeleton.joint_origin.push_back(frame.position_mm);
-    skeleton.joint_axis.push_back(sign * frame.rotation.col(2));
+    skeleton.joint_axis.emplace_back(sign * frame.rotation.col(2));
   };
   skeleton.tool = walk(q, deformation, visit);
   skeleton.link_end.push_back(skeleton.tool.position_mm);

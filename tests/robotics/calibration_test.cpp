@@ -158,6 +158,15 @@ TEST(Calibration, JointComplianceIsRecoveredTogetherWithGeometry) {
   }
 }
 
+TEST(Calibration, AnEarlierCalibrationsErrorsAndCorrectionAreForgotten) {
+  Robot before = ur_like();
+  before.identified = {{"joint1.a", 0.5, "free"}};
+  before.correction_file = "old.json";
+  const Calibration calibration = calibrate(before, measure(ur_like(), random_poses(before.chain, 60, 1), 0.01, 2));
+  EXPECT_TRUE(calibration.robot.correction_file.empty());
+  EXPECT_EQ(calibration.robot.identified.size(), parameters(before).size());
+}
+
 TEST(Calibration, MeasurementsThatDoNotSuitTheRobotAreRefused) {
   const Robot six = ur_like();
   const Measurements seven = measure(seven_axes(), random_poses(seven_axes().chain, 10, 1), 0.0, 1);
