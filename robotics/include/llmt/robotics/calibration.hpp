@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "llmt/abi.hpp"
 #include "llmt/discovery/least_squares.hpp"
 #include "llmt/robotics/measurements.hpp"
 #include "llmt/robotics/robot.hpp"

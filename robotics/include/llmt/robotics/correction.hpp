@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include "llmt/abi.hpp"
 #include "llmt/fit.hpp"
 #include "llmt/model.hpp"
 #include "llmt/robotics/measurements.hpp"

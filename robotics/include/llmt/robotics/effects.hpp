@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "llmt/abi.hpp"
 #include "llmt/robotics/kinematics.hpp"
 
 namespace llmt::robotics {

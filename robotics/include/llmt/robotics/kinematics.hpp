@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "llmt/abi.hpp"
 #include "llmt/robotics/chain.hpp"
 
 namespace llmt::robotics {

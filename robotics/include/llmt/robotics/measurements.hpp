@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "llmt/abi.hpp"
 #include "llmt/robotics/robot.hpp"
 
 namespace llmt::robotics {

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "llmt/abi.hpp"
 #include "llmt/discovery/least_squares.hpp"
 #include "llmt/robotics/effects.hpp"
 
