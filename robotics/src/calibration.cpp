@@ -182,8 +182,8 @@ discovery::Result register_frames(Robot& robot, const Measurements& measurements
 Calibration calibrate(const Robot& robot, const Measurements& measurements, const CalibrationOptions& options) {
   Calibration calibration;
   calibration.registered = robot;
-  calibration.registered.identified
-      .clear();  // what an earlier calibration said, and learnt from its residuals, holds no longer
+  // What an earlier calibration said, and a correction learnt from its residuals, hold no longer.
+  calibration.registered.identified.clear();
   calibration.registered.correction_file.clear();
   calibration.registration = register_frames(calibration.registered, measurements, options);
   calibration.robot = calibration.registered;
