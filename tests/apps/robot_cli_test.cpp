@@ -101,7 +101,7 @@ TEST(RobotProgram, CorrectionIsKeptWhereItHelpsAndWrittenBesideTheRobot) {
 
   // The written pair says what the report said: simulated from it, the calibrated arm is as far from the truth.
   ASSERT_EQ(folder.run(robot_program + " simulate cal.yaml --poses 800 -o c.csv").exit_code, 0);
-  const std::vector<std::string> position = {"x_mm", "y_mm"};
+  const std::vector<std::string> position = {"x_mm", "y_mm", "z_mm"};
   const Eigen::MatrixXd difference =
       llmt::Csv::read(folder.file("d.csv")).numbers(position) - llmt::Csv::read(folder.file("c.csv")).numbers(position);
   EXPECT_NEAR(difference.rowwise().norm().mean(), report["errors"]["corrected"]["in_sample_mm"]["mean"], 1e-9);
@@ -134,7 +134,7 @@ TEST(RobotProgram, MistakesHaveTheirExitCodeAndMessage) {
   expect("calibrate", 2, "robot is required");
   expect("calibrate " + arm + " units.csv", 1, "unit");
   expect("calibrate " + arm + " few.csv", 1, "few.csv");
-  expect("calibrate bad.yaml few.csv", 1, "bad.yaml:3");
+  expect("calibrate bad.yaml few.csv", 1, "bad.yaml:1: key \"joints\" is missing");
   expect("calibrate " + arm + " none.csv", 1, "none.csv: cannot be read: No such file or directory");
   expect("simulate " + arm + " --poses 0", 2, "poses");
   expect("paper --study puma", 2, "puma");
