@@ -178,7 +178,10 @@ void fit_command(FitArguments arguments) {
       positions("--regression-inputs", arguments.regression_inputs, input_names);
   arguments.options.folds.kind = arguments.contiguous ? FoldKind::contiguous : FoldKind::random;
 
+  Progress progress("growing trees");
+  arguments.options.progress = [&](std::ptrdiff_t done, std::ptrdiff_t total) { progress.show(done, total); };
   FitResult result = fit(inputs, outputs, arguments.options);
+  progress.clear();
   result.model = result.model.named(input_names, arguments.targets);
   if (!arguments.output.empty()) {
     save(result.model, arguments.output);
@@ -218,6 +221,7 @@ void add_fit(CLI::App& app) {
                    "Fewest rows in a leaf, 0: twice the coefficients of a local model")
       ->capture_default_str();
   command->add_option("--significance", growth.significance, "rd: of the F test, over all candidate splits; 1: no test")
+      ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   command
       ->add_option("--min-improvement", growth.min_improvement,

@@ -225,7 +225,10 @@ void calibrate_command(CalibrateArguments arguments) {
     test = robotics::read_measurements(arguments.test, nominal);
   }
   arguments.options.kind = arguments.contiguous ? FoldKind::contiguous : FoldKind::random;
+  Progress progress("calibrating");
+  arguments.options.progress = [&](std::ptrdiff_t done, std::ptrdiff_t total) { progress.show(done, total); };
   const CalibrationReport report = robotics::report_calibration(nominal, measurements, arguments.options);
+  progress.clear();
   const std::vector<Row> rows = rows_of(report, test);
   std::vector<std::string> written;
   if (!arguments.output.empty()) {

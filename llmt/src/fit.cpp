@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <mutex>
 #include <numeric>
 #include <stdexcept>
 
@@ -205,7 +206,10 @@ FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<
   const std::size_t tasks_each = folds.size() + 1;
   std::vector<Grown> grown(served.size());
   std::vector<std::vector<Eigen::VectorXd>> errors(served.size(), std::vector<Eigen::VectorXd>(folds.size()));
-  parallel_for(static_cast<std::ptrdiff_t>(served.size() * tasks_each), options.max_threads, [&](std::ptrdiff_t task) {
+  const std::ptrdiff_t tasks = static_cast<std::ptrdiff_t>(served.size() * tasks_each);
+  std::mutex progress_mutex;
+  std::ptrdiff_t done = 0;
+  parallel_for(tasks, options.max_threads, [&](std::ptrdiff_t task) {
     const std::size_t partition = static_cast<std::size_t>(task) / tasks_each;
     const std::size_t step = static_cast<std::size_t>(task) % tasks_each;
     if (step == 0) {
@@ -213,6 +217,10 @@ FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<
     } else {
       errors[partition][step - 1] =
           held_out_errors(x, y, served[partition], growth, folds[step - 1], options.max_threads);
+    }
+    if (options.progress) {
+      const std::lock_guard<std::mutex> lock(progress_mutex);
+      options.progress(++done, tasks);
     }
   });
 

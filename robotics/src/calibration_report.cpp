@@ -51,6 +51,10 @@ Distances distances_of(const Fitted& fitted, const Measurements& measurements) {
   return result;
 }
 
+void tell(const ReportOptions& options, std::ptrdiff_t folds_done) {
+  if (options.progress) options.progress(folds_done + 1, options.folds + 1);
+}
+
 void hold_out(const Robot& robot, const Measurements& measurements, const ReportOptions& options,
               CalibrationReport& report) {
   const Eigen::Index n = measurements.count();
@@ -67,6 +71,7 @@ void hold_out(const Robot& robot, const Measurements& measurements, const Report
     report.nominal.held_out_mm(fold.held_out) = held_out.nominal;
     report.geometric.held_out_mm(fold.held_out) = held_out.geometric;
     if (report.corrected) report.corrected->held_out_mm(fold.held_out) = held_out.corrected;
+    tell(options, std::ssize(report.fold_terminations));
   }
   report.folds = options.folds;
 }
@@ -123,6 +128,7 @@ CalibrationReport report_calibration(const Robot& robot, const Measurements& mea
   report.nominal.in_sample_mm = in_sample.nominal;
   report.geometric.in_sample_mm = in_sample.geometric;
   if (options.correct) report.corrected = Stage{.in_sample_mm = in_sample.corrected, .held_out_mm = {}};
+  tell(options, 0);
   if (options.folds != 0) hold_out(robot, measurements, options, report);
   decide(report);
   return report;

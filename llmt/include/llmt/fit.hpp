@@ -3,8 +3,8 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 #include <cstddef>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -87,6 +87,9 @@ struct FitOptions {
   /// fold per group.
   FoldOptions folds = {};
   int max_threads = 0;  ///< 0: all that the machine has. The result does not depend on it.
+  /// Called after each growth (a tree of a fold, or a final one) with how many of how many are done; one call at a
+  /// time, from any thread.
+  std::function<void(std::ptrdiff_t done, std::ptrdiff_t total)> progress = {};
 };
 
 /// What happened to one partition.

@@ -2,6 +2,7 @@
 /// How good a calibration is, on the poses it was made from and on poses that took no part.
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -33,6 +34,8 @@ struct ReportOptions {
   int correction_folds = 5;  ///< for the correction's leaf count, within every fold; 0: as grown
   std::uint64_t seed = 1;
   int max_threads = 0;
+  /// Called when everything is fitted to all poses, and after each fold, with how many of these are done.
+  std::function<void(std::ptrdiff_t done, std::ptrdiff_t total)> progress = {};
 };
 
 /// Distances of every pose under the three models. Held-out: base, tool, geometry, effects, tree and its size fitted
