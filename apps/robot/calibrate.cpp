@@ -219,7 +219,11 @@ std::vector<std::string> write_result(const std::string& path, const Calibration
 
 void calibrate_command(CalibrateArguments arguments) {
   const robotics::Robot nominal = robotics::read_robot(arguments.robot);
-  const robotics::Measurements measurements = robotics::read_measurements(arguments.data, nominal);
+  robotics::Measurements measurements = robotics::read_measurements(arguments.data, nominal);
+  if (measurements.count() < arguments.options.folds) {
+    throw std::runtime_error(fmt::format("{}: {} poses do not make {} folds", arguments.data, measurements.count(),
+                                         arguments.options.folds));
+  }
   std::optional<robotics::Measurements> test;
   if (!arguments.test.empty()) {
     test = robotics::read_measurements(arguments.test, nominal);
@@ -229,6 +233,9 @@ void calibrate_command(CalibrateArguments arguments) {
   arguments.options.progress = [&](std::ptrdiff_t done, std::ptrdiff_t total) { progress.show(done, total); };
   const CalibrationReport report = robotics::report_calibration(nominal, measurements, arguments.options);
   progress.clear();
+  for (std::string& suspicion : robotics::suspicions(nominal, measurements, report)) {
+    measurements.warnings.push_back(std::move(suspicion));
+  }
   const std::vector<Row> rows = rows_of(report, test);
   std::vector<std::string> written;
   if (!arguments.output.empty()) {

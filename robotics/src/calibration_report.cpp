@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <stdexcept>
 
 namespace llmt::robotics {
@@ -116,6 +117,36 @@ CorrectedRobot CalibrationReport::best() const {
   CorrectedRobot robot{.robot = calibration.robot, .correction = {}};
   if (correction_kept) robot.correction = correction->model;
   return robot;
+}
+
+std::vector<std::string> suspicions(const Robot& robot, const Measurements& measurements,
+                                    const CalibrationReport& report) {
+  std::vector<std::string> found;
+  double length_mm = 0.0;
+  for (std::size_t j = 0; j < robot.chain.joints.size(); ++j) {
+    const Joint& joint = robot.chain.joints[j];
+    length_mm += std::abs(joint.a_mm) + std::abs(joint.d_mm);
+    if (!joint.limits) continue;
+    const double to_file_unit = joint.type == JointType::revolute ? 180.0 / std::numbers::pi : 1.0;
+    const Eigen::ArrayXd values = measurements.poses.joints.col(static_cast<Eigen::Index>(j)) * to_file_unit;
+    constexpr double slack = 1.0;  // degree or mm
+    const Eigen::Index outside = (values < joint.limits->at(0) - slack || values > joint.limits->at(1) + slack).count();
+    if (outside > 0) {
+      found.push_back(
+          fmt::format("{} of {} values of {} lie outside its limits {} to {} ({:.4g} to {:.4g} measured): are the "
+                      "units right, is it this robot?",
+                      outside, measurements.count(), joint.name, joint.limits->at(0), joint.limits->at(1),
+                      values.minCoeff(), values.maxCoeff()));
+    }
+  }
+  const double nominal = report.nominal.in_sample_mm.mean();
+  if (nominal > length_mm / 50.0) {
+    found.push_back(
+        fmt::format("the described robot misses the measured points by {:.4g} mm on average, whatever its base and "
+                    "tool: check units, signs and zeros of the joints, their order, and the description",
+                    nominal));
+  }
+  return found;
 }
 
 CalibrationReport report_calibration(const Robot& robot, const Measurements& measurements,

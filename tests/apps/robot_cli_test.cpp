@@ -120,6 +120,22 @@ TEST(RobotProgram, CorrectionThatHurtsIsLeftOut) {
   EXPECT_TRUE(std::filesystem::exists(folder.file("cal.yaml")));
 }
 
+TEST(RobotProgram, WrongUnitsAreSuspected) {
+  const Folder folder;
+  const std::string arm = robots + "/ur5.yaml";
+  ASSERT_EQ(folder.run(fmt::format("{} simulate {} --poses 60 -o d.csv", robot_program, arm)).exit_code, 0);
+  std::string text = llmt::read_file(folder.file("d.csv"));
+  for (std::size_t at = text.find("_rad"); at != std::string::npos && at < text.find('\n'); at = text.find("_rad")) {
+    text.replace(at, 4, "_deg");
+  }
+  folder.write("wrong.csv", text);
+  const std::string calibrate = robot_program + " calibrate " + arm;
+  EXPECT_NE(folder.run(calibrate + " wrong.csv --folds 0").out.find("check units"), std::string::npos);
+  const Outcome right = folder.run(calibrate + " d.csv --folds 0 --json");
+  ASSERT_EQ(right.exit_code, 0) << right.err;
+  EXPECT_TRUE(json::parse(right.out)["warnings"].empty()) << right.out;
+}
+
 TEST(RobotProgram, MistakesHaveTheirExitCodeAndMessage) {
   const Folder folder;
   const std::string arm = robots + "/ur5.yaml";

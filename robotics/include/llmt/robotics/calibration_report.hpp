@@ -61,6 +61,12 @@ struct CalibrationReport {
   CorrectedRobot best() const;
 };
 
+/// What looks like a mistake rather than like an error of the robot, in sentences: poses beyond the joint limits of the
+/// description; a nominal error of more than a fiftieth of the arm's length, as wrong units, signs, zeros or another
+/// robot give. Empty: nothing.
+std::vector<std::string> suspicions(const Robot& robot, const Measurements& measurements,
+                                    const CalibrationReport& report);
+
 /// Calibrates a robot, with the correction if asked for, on all poses and in every fold. Throws as calibrate() and
 /// make_folds().
 CalibrationReport report_calibration(const Robot& robot, const Measurements& measurements,
