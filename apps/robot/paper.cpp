@@ -16,6 +16,7 @@ namespace {
 struct PaperArguments {
   std::string study = "planar";
   int seeds = 50;
+  std::uint64_t seed = 1;
   bool json = false;
 };
 
@@ -183,8 +184,8 @@ void tx200(const PaperArguments& arguments) {
   }
   for (const bool compliance : {true, false}) {
     Progress progress(compliance ? "hidden compliance" : "noise alone");
-    const std::vector<Tx200Trial> trials =
-        tx200_study(compliance, arguments.seeds, [&](int done) { progress.show(done, arguments.seeds); });
+    const std::vector<Tx200Trial> trials = tx200_study(compliance, arguments.seed, arguments.seeds,
+                                                       [&](int done) { progress.show(done, arguments.seeds); });
     progress.clear();
     Table table(
         {compliance ? "compliance of axes 2, 3 hidden in the data" : "noise alone", "mean", "smallest", "largest"});
@@ -209,7 +210,8 @@ void paper_command(const PaperArguments& arguments) {
     tx200(arguments);
     return;
   }
-  const std::vector<PlanarStudy> studies = {planar_study(true, true), planar_study(false, false)};
+  const std::vector<PlanarStudy> studies = {planar_study(true, true, arguments.seed),
+                                            planar_study(false, false, arguments.seed)};
   if (arguments.json) {
     print_json(planar_json(studies));
   } else {
@@ -232,6 +234,8 @@ void add_paper(CLI::App& app) {
       ->capture_default_str();
   command->add_option("--seeds", arguments->seeds, "tx200: number of simulated data sets")
       ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  command->add_option("--seed", arguments->seed, "planar: of the cross-validation's folds; tx200: the first seed")
       ->capture_default_str();
   command->add_flag("--json", arguments->json, "Print JSON");
   command->callback([arguments] { paper_command(*arguments); });

@@ -70,7 +70,7 @@ discovery::Result calibrate_plane(const Robot& rigid, const Poses& poses, const 
 
 }  // namespace
 
-PlanarStudy planar_study(bool carry_over, bool large) {
+PlanarStudy planar_study(bool carry_over, bool large, std::uint64_t seed) {
   Robot flexible = robotics::parse_robot(planar_two_link_yaml, "planar_two_link.yaml");
   for (robotics::Effect& effect : flexible.effects) {
     effect.type = carry_over ? "link_bending" : "link_bending_no_carry_over";
@@ -105,7 +105,7 @@ PlanarStudy planar_study(bool carry_over, bool large) {
   until_two_percent.growth.min_improvement = 0.02;
   correct("corrected, stopped at 2 %", {until_two_percent, until_two_percent}, std::nullopt);
   FitOptions cross_validated = grown_to(0);
-  cross_validated.folds.count = 5;
+  cross_validated.folds = {.count = 5, .seed = seed};
   correct("corrected, leaves by 5-fold CV", {cross_validated, cross_validated}, std::nullopt);
 
   const auto black_box = [&](const std::string& name, const Poses& poses, const Eigen::MatrixXd& truth,

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -34,7 +35,8 @@ struct PlanarStudy {
   std::vector<StudyRow> black_box;  ///< trees of the position itself
 };
 
-/// Leaf counts as in the paper. `large`: include the black box from 148 680 poses.
-PlanarStudy planar_study(bool carry_over, bool large);
+/// Leaf counts as in the paper. `large`: include the black box from 148 680 poses. `seed`: of the cross-validation's
+/// folds.
+PlanarStudy planar_study(bool carry_over, bool large, std::uint64_t seed);
 
 }  // namespace llmt::apps

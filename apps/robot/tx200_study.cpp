@@ -7,7 +7,8 @@
 
 namespace llmt::apps {
 
-std::vector<Tx200Trial> tx200_study(bool compliance, int seeds, const std::function<void(int done)>& progress) {
+std::vector<Tx200Trial> tx200_study(bool compliance, std::uint64_t first_seed, int seeds,
+                                    const std::function<void(int done)>& progress) {
   const robotics::Robot nominal = robotics::parse_robot(tx200_like_yaml, "tx200_like.yaml");
   robotics::Robot truth = nominal;
   if (compliance) {
@@ -21,13 +22,13 @@ std::vector<Tx200Trial> tx200_study(bool compliance, int seeds, const std::funct
   options.correction_folds = 0;
 
   std::vector<Tx200Trial> trials;
-  for (int seed = 1; seed <= seeds; ++seed) {
-    const robotics::Measurements measurements =
-        robotics::simulate(truth, {.poses = 45, .noise_um = 10.0, .seed = static_cast<std::uint64_t>(seed)});
+  for (int done = 0; done < seeds; ++done) {
+    const robotics::Measurements measurements = robotics::simulate(
+        truth, {.poses = 45, .noise_um = 10.0, .seed = first_seed + static_cast<std::uint64_t>(done)});
     const robotics::CalibrationReport report = robotics::report_calibration(nominal, measurements, options);
     trials.push_back({report.geometric.in_sample_mm.mean(), report.corrected->in_sample_mm.mean(),
                       report.geometric.held_out_mm.mean(), report.corrected->held_out_mm.mean()});
-    progress(seed);
+    progress(done + 1);
   }
   return trials;
 }

@@ -17,8 +17,9 @@ struct Tx200Trial {
 };
 
 /// 45 poses with 10 um noise; with `compliance`, the compliance of axes 2 and 3 bends the simulated arm and no model
-/// knows of it. Five linear models of seven coefficients per axis, as in the paper. One trial for each seed 1 ...
-/// `seeds`.
-std::vector<Tx200Trial> tx200_study(bool compliance, int seeds, const std::function<void(int done)>& progress);
+/// knows of it. Five linear models of seven coefficients per axis, as in the paper. One trial for each of `seeds` seeds
+/// from `first_seed` on.
+std::vector<Tx200Trial> tx200_study(bool compliance, std::uint64_t first_seed, int seeds,
+                                    const std::function<void(int done)>& progress);
 
 }  // namespace llmt::apps
