@@ -141,6 +141,7 @@ struct Spread {
 
 Spread spread(const std::vector<Tx200Trial>& trials, const std::function<double(const Tx200Trial&)>& figure) {
   std::vector<double> values;
+  values.reserve(trials.size());
   for (const Tx200Trial& trial : trials) {
     values.push_back(figure(trial));
   }
