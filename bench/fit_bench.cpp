@@ -29,10 +29,10 @@ void fit_tree(benchmark::State& state, int folds) {
   report(state, result->model.predict(test.x), test, static_cast<double>(result->summary.partitions[0].leaves));
 }
 
-void BM_Grow(benchmark::State& state) { fit_tree(state, 0); }
-void BM_FitWithCrossValidation(benchmark::State& state) { fit_tree(state, 5); }
+void grow(benchmark::State& state) { fit_tree(state, 0); }
+void fit_with_cross_validation(benchmark::State& state) { fit_tree(state, 5); }
 
-void BM_LeastSquares(benchmark::State& state) {
+void least_squares(benchmark::State& state) {
   const bench::Sample train = bench::sample(state.range(0), state.range(1), 1);
   const bench::Sample test = bench::sample(10000, state.range(1), 2);
   const auto with_constant = [](const Eigen::MatrixXd& x) {
@@ -47,7 +47,7 @@ void BM_LeastSquares(benchmark::State& state) {
   report(state, with_constant(test.x) * coefficients, test, 1.0);
 }
 
-void BM_Predict(benchmark::State& state) {
+void predict(benchmark::State& state) {
   const bench::Sample train = bench::sample(20000, state.range(1), 1);
   const bench::Sample query = bench::sample(state.range(0), state.range(1), 2);
   const llmt::FitResult result = llmt::fit(train.x, train.y, {.folds = {.count = 0}});
@@ -69,13 +69,13 @@ void sizes(benchmark::internal::Benchmark* benchmark) {
   benchmark->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime()->UseRealTime();
 }
 
-BENCHMARK(BM_Grow)->Apply(sizes);
-BENCHMARK(BM_FitWithCrossValidation)
+BENCHMARK(grow)->Apply(sizes);
+BENCHMARK(fit_with_cross_validation)
     ->Args({10000, 10, 1})
     ->Args({10000, 10, 2})
     ->Unit(benchmark::kMillisecond)
     ->UseRealTime();
-BENCHMARK(BM_LeastSquares)->Apply(sizes);
-BENCHMARK(BM_Predict)->Args({100000, 10, 1})->Args({100000, 10, 2})->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK(least_squares)->Apply(sizes);
+BENCHMARK(predict)->Args({100000, 10, 1})->Args({100000, 10, 2})->Unit(benchmark::kMillisecond)->UseRealTime();
 
 }  // namespace
