@@ -114,7 +114,9 @@ TEST(Fit, ThresholdLiesWhereTheChildModelsMeet) {
   Eigen::MatrixXd x(400, 2);
   Eigen::MatrixXd y(400, 1);
   for (int i = 0; i < 400; ++i) {
-    x.row(i) << 0.1 * (i % 20) - 1.0, 0.1 * (i / 20) - 1.0;
+    const int column = i % 20;
+    const int row = i / 20;
+    x.row(i) << 0.1 * column - 1.0, 0.1 * row - 1.0;
     y(i, 0) = std::abs(x(i, 0) - 0.37) + 0.5 * x(i, 1);
   }
   const llmt::Model closest = llmt::fit(x, y, as_grown({.max_leaves = 2})).model;

@@ -33,9 +33,9 @@ TEST(Folds, ContiguousFoldsAreBlocks) {
 }
 
 TEST(Folds, GroupsStayTogether) {
-  std::vector<double> pose;
-  for (int i = 0; i < 60; ++i) {
-    pose.push_back(i % 20);
+  std::vector<double> pose(60);
+  for (std::size_t i = 0; i < pose.size(); ++i) {
+    pose[i] = static_cast<double>(i % 20);
   }
   for (const llmt::Fold& fold : llmt::make_folds(60, {.count = 5, .groups = pose})) {
     EXPECT_EQ(fold.held_out.size(), 12U);
