@@ -175,7 +175,8 @@ Eigen::MatrixXd Csv::numbers(std::span<const std::string> columns) const {
   constexpr std::ptrdiff_t unused = -1;
   std::vector<std::ptrdiff_t> target(columns_.size(), unused);
   for (std::size_t i = 0; i < columns.size(); ++i) {
-    target[index_of(columns[i])] = static_cast<std::ptrdiff_t>(i);
+    std::ptrdiff_t& first = target[index_of(columns[i])];
+    first = first == unused ? static_cast<std::ptrdiff_t>(i) : first;
   }
   Eigen::MatrixXd values(rows(), std::ssize(columns));
   std::string problem;
@@ -190,6 +191,12 @@ Eigen::MatrixXd Csv::numbers(std::span<const std::string> columns) const {
             fmt::format("{}:{}: column \"{}\": {}", name_, line_of(row), columns_[index], problem));
       }
     });
+  }
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    const std::ptrdiff_t column = static_cast<std::ptrdiff_t>(i);
+    if (const std::ptrdiff_t first = target[index_of(columns[i])]; first != column) {
+      values.col(column) = values.col(first);  // asked for more than once
+    }
   }
   return values;
 }

@@ -76,6 +76,13 @@ TEST(Csv, ErrorsNameFileLineAndColumn) {
             "no/such/file.csv: cannot be read: No such file or directory");
 }
 
+TEST(Csv, AColumnMayBeAskedForTwice) {
+  const llmt::Csv csv = llmt::Csv::parse("a,b\n1,2\n3,4\n", "t.csv");
+  Eigen::MatrixXd expected(2, 3);
+  expected << 1.0, 2.0, 1.0, 3.0, 4.0, 3.0;
+  EXPECT_EQ(csv.numbers(std::vector<std::string>{"a", "b", "a"}), expected);
+}
+
 TEST(Csv, AHeaderAloneHasNoRows) { EXPECT_EQ(llmt::Csv::parse("a,b\n", "t.csv").rows(), 0); }
 
 }  // namespace
