@@ -26,6 +26,24 @@ inline void check_finite(const char* function, const char* argument, const Eigen
   }
 }
 
+/// As check_finite(), but NaN stands for a missing value.
+inline void check_finite_or_missing(const char* function, const char* argument,
+                                    const Eigen::Ref<const Eigen::MatrixXd>& values) {
+  if ((values.array().isNaN() || values.array().isFinite()).all()) {
+    return;
+  }
+  for (std::ptrdiff_t column = 0; column < values.cols(); ++column) {
+    for (std::ptrdiff_t row = 0; row < values.rows(); ++row) {
+      if (std::isinf(values(row, column))) {
+        throw std::invalid_argument(
+            fmt::format("{}: {}({}, {}) is {}, it must be finite, or NaN where it is missing (rows and columns counted "
+                        "from 0)",
+                        function, argument, row, column, values(row, column)));
+      }
+    }
+  }
+}
+
 /// Every index in [0, count), none twice.
 inline void check_columns(const char* function, const char* argument, const std::vector<int>& columns,
                           std::ptrdiff_t count) {

@@ -6,12 +6,15 @@
 #include <cmath>
 #include <mutex>
 #include <numeric>
+#include <optional>
 #include <stdexcept>
 
 #include "checks.hpp"
 #include "growth.hpp"
+#include "joint_fit.hpp"
 #include "parallel.hpp"
 #include "selection.hpp"
+#include "training.hpp"
 
 namespace llmt {
 namespace {
@@ -34,15 +37,30 @@ void check_data(const char* name, const Eigen::Ref<const Eigen::MatrixXd>& data)
           data.cwiseAbs().maxCoeff(), "at most 1e150");
 }
 
+void check_inputs(const Eigen::Ref<const Eigen::MatrixXd>& inputs) {
+  if (inputs.rows() < 1 || inputs.cols() < 1) {
+    throw std::invalid_argument(fmt::format("llmt::fit: inputs is {} x {}, at least one row and one column are needed",
+                                            inputs.rows(), inputs.cols()));
+  }
+  check_finite_or_missing("llmt::fit", "inputs", inputs);
+  const double largest = inputs.array().isNaN().select(0.0, inputs).cwiseAbs().maxCoeff();
+  require(largest <= largest_magnitude, "a magnitude in inputs", largest, "at most 1e150");
+}
+
 std::vector<int> all_columns(std::ptrdiff_t count) {
   std::vector<int> columns(static_cast<std::size_t>(count));
   std::iota(columns.begin(), columns.end(), 0);
   return columns;
 }
 
-/// Options without blanks, or a complaint.
-GrowthOptions resolve(GrowthOptions options, std::ptrdiff_t inputs) {
-  require(options.significance >= 0.0, "growth.significance", options.significance, "at least 0");
+std::vector<std::ptrdiff_t> all_rows(std::ptrdiff_t count) {
+  std::vector<std::ptrdiff_t> rows(static_cast<std::size_t>(count));
+  std::iota(rows.begin(), rows.end(), std::ptrdiff_t{0});
+  return rows;
+}
+
+void check_growth(const GrowthOptions& options, std::ptrdiff_t inputs) {
+  require(std::isfinite(options.significance), "growth.significance", options.significance, "finite");
   require(std::isfinite(options.min_variance_gain), "growth.min_variance_gain", options.min_variance_gain, "finite");
   require(options.pruning_m >= 0.0, "growth.pruning_m", options.pruning_m, "at least 0");
   require(options.min_leaf_samples >= 0, "growth.min_leaf_samples", static_cast<double>(options.min_leaf_samples),
@@ -50,42 +68,101 @@ GrowthOptions resolve(GrowthOptions options, std::ptrdiff_t inputs) {
   require(options.max_leaves >= 0, "growth.max_leaves", static_cast<double>(options.max_leaves), "at least 0");
   require(options.min_improvement >= 0.0 && options.min_improvement < 1.0, "growth.min_improvement",
           options.min_improvement, "in [0, 1)");
-  for (std::vector<int>* columns : {&options.split_inputs, &options.regression_inputs}) {
-    check_columns("llmt::fit", columns == &options.split_inputs ? "growth.split_inputs" : "growth.regression_inputs",
-                  *columns, inputs);
-    if (columns->empty()) {
-      *columns = all_columns(inputs);
-    }
-    std::sort(columns->begin(), columns->end());
-  }
-  if (options.min_leaf_samples == 0) {
-    options.min_leaf_samples = 2 * (std::ssize(options.regression_inputs) + 1);
-  }
-  return options;
+  check_columns("llmt::fit", "growth.split_inputs", options.split_inputs, inputs);
+  check_columns("llmt::fit", "growth.regression_inputs", options.regression_inputs, inputs);
 }
 
-/// A tree grown from some rows, about its own centre.
+void check_blend(const BlendOptions& options) {
+  for (const double width : options.widths) {
+    require(std::isfinite(width) && width > 0.0, "blend.widths", width, "finite and positive");
+  }
+  for (const double ridge : options.ridges) {
+    require(ridge >= 0.0 && std::isfinite(ridge), "blend.ridges", ridge, "finite and not negative");
+  }
+  require(options.smoothness == 1 || options.smoothness == 2, "blend.smoothness", options.smoothness, "1 or 2");
+}
+
+/// Number of levels of every input, 0 for numbers.
+std::vector<int> count_levels(const Eigen::MatrixXd& inputs, const std::vector<int>& categorical) {
+  check_columns("llmt::fit", "categorical_inputs", categorical, inputs.cols());
+  std::vector<int> num_levels(static_cast<std::size_t>(inputs.cols()), 0);
+  constexpr double most = 10000.0;
+  for (const int column : categorical) {
+    for (const double value : inputs.col(column)) {
+      if (std::isnan(value)) {
+        continue;
+      }
+      require(value >= 0.0 && value < most && value == std::floor(value),
+              fmt::format("a category of input {}", column).c_str(), value, "a whole number from 0 to 9999");
+      int& levels = num_levels[static_cast<std::size_t>(column)];
+      levels = std::max(levels, static_cast<int>(value) + 1);
+    }
+    // All missing: a category that never occurs.
+    num_levels[static_cast<std::size_t>(column)] = std::max(num_levels[static_cast<std::size_t>(column)], 1);
+  }
+  return num_levels;
+}
+
+/// What is compared, and growth options without blanks.
+struct Plan {
+  GrowthOptions growth;
+  Candidates candidates;
+};
+
+Plan make_plan(const FitOptions& options, const TrainingRows& all, bool has_folds) {
+  Plan plan{options.growth, {}};
+  const ValidityChoice choice = options.blend.validity;
+  const bool crisp_only = choice == ValidityChoice::crisp || (choice == ValidityChoice::automatic && !has_folds);
+  plan.candidates.crisp = choice == ValidityChoice::automatic || choice == ValidityChoice::crisp;
+  plan.candidates.kind = choice == ValidityChoice::gaussian ? ValidityKind::gaussian : ValidityKind::blend;
+  plan.candidates.estimation = options.blend.estimation;
+  plan.candidates.smoothness = options.blend.smoothness;
+  if (!crisp_only) {
+    plan.candidates.widths = options.blend.widths;
+    if (plan.candidates.widths.empty()) {
+      plan.candidates.widths = choice == ValidityChoice::gaussian ? std::vector<double>{1.0 / 3.0}
+                                                                  : std::vector<double>{0.5, 1.0, 2.0, 4.0};
+    }
+    if (options.blend.estimation == Estimation::joint) {
+      plan.candidates.ridges =
+          options.blend.ridges.empty() ? std::vector<double>{1e-6, 1e-4, 1e-3, 1e-2, 1e-1} : options.blend.ridges;
+    }
+  }
+  GrowthOptions& growth = plan.growth;
+  const std::ptrdiff_t regressors = std::ssize(all.regressors);
+  const bool many_leaves = !crisp_only && has_folds;
+  if (growth.significance < 0.0) {
+    growth.significance = many_leaves ? 1.0 : 0.05;
+  }
+  if (growth.min_leaf_samples == 0) {
+    growth.min_leaf_samples = many_leaves ? std::max<std::ptrdiff_t>(5, regressors) : 2 * (regressors + 1);
+  }
+  if (growth.max_leaves == 0 && many_leaves) {
+    growth.max_leaves = std::clamp<std::ptrdiff_t>(2000 / (regressors + 1), 20, 400);
+  }
+  return plan;
+}
+
 struct Grown {
   Partition partition;
-  Eigen::RowVectorXd centre;  // of the inputs
   StopReason stop = StopReason::leaf_samples;
 };
 
-Grown grow_rows(const Eigen::MatrixXd& inputs, const Eigen::MatrixXd& outputs, const std::vector<int>& served,
-                const GrowthOptions& options, int max_threads) {
-  Grown grown;
-  grown.centre = inputs.colwise().mean();
+Grown grow_rows(const TrainingRows& rows, const Table& table, const std::vector<int>& served, GrowthOptions options,
+                int max_threads) {
+  options.split_inputs = table.split_inputs;
   GrowthProblem problem;
-  problem.split_values = inputs(Eigen::all, options.split_inputs);
-  problem.deviations = inputs(Eigen::all, options.regression_inputs).rowwise() -
-                       Eigen::RowVectorXd(grown.centre(options.regression_inputs));
-  problem.outputs = outputs(Eigen::all, served);
-  problem.options = options;
+  problem.split_values = rows.inputs(Eigen::all, table.split_inputs);
+  for (const int input : table.split_inputs) {
+    problem.num_levels.push_back(table.num_levels[static_cast<std::size_t>(input)]);
+  }
+  problem.deviations = rows.deviations;
+  problem.outputs = rows.outputs(Eigen::all, served);
+  problem.weights = rows.weights;
+  problem.options = std::move(options);
   problem.max_threads = max_threads;
   GrownPartition result = grow(problem);
-  grown.partition = {.outputs = served, .nodes = std::move(result.nodes)};
-  grown.stop = result.stop;
-  return grown;
+  return {.partition = {.outputs = served, .validity = {}, .nodes = std::move(result.nodes)}, .stop = result.stop};
 }
 
 /// Weights of the outputs' squared errors: 1 for a single one; else 1 / variance, so that outputs of any scale count
@@ -99,55 +176,25 @@ Eigen::VectorXd error_weights(const Eigen::MatrixXd& outputs) {
   return variance.unaryExpr([](double value) { return value > 0.0 ? 1.0 / value : 1.0; });
 }
 
-/// Held-out squared errors of the prefixes of the tree grown without the rows of `fold`.
-Eigen::VectorXd held_out_errors(const Eigen::MatrixXd& inputs, const Eigen::MatrixXd& outputs,
-                                const std::vector<int>& served, const GrowthOptions& options, const Fold& fold,
-                                int max_threads) {
-  const Grown grown =
-      grow_rows(inputs(fold.train, Eigen::all), outputs(fold.train, Eigen::all), served, options, max_threads);
-  const Eigen::MatrixXd held_out = inputs(fold.held_out, Eigen::all);
-  const Eigen::MatrixXd deviations = held_out(Eigen::all, options.regression_inputs).rowwise() -
-                                     Eigen::RowVectorXd(grown.centre(options.regression_inputs));
-  return prefix_squared_errors(grown.partition, held_out, deviations, outputs(fold.held_out, served),
-                               error_weights(outputs(Eigen::all, served)));
-}
-
-/// Sums the folds' errors for 1, 2, ... leaves; a fold whose tree is smaller stays at its last one.
-Eigen::VectorXd combine_folds(const std::vector<Eigen::VectorXd>& folds) {
-  std::ptrdiff_t longest = 0;
-  for (const Eigen::VectorXd& errors : folds) {
-    longest = std::max(longest, errors.size());
-  }
-  Eigen::VectorXd total = Eigen::VectorXd::Zero(longest);
-  for (const Eigen::VectorXd& errors : folds) {
-    total.head(errors.size()) += errors;
-    total.tail(longest - errors.size()).array() += errors(errors.size() - 1);
-  }
-  return total;
-}
-
-std::vector<Fold> selection_folds(std::ptrdiff_t rows, FoldOptions options) {
+std::vector<Fold> selection_folds(std::ptrdiff_t rows, const SelectionOptions& selection) {
+  FoldOptions options = selection.folds;
   if (options.count == 0) {
     return {};
   }
-  require(options.count >= 2, "folds.count", options.count, "0 or at least 2");
+  require(options.count >= 2, "selection.folds.count", options.count, "0 or at least 2");
   std::vector<double> distinct(options.groups.begin(), options.groups.end());
   std::sort(distinct.begin(), distinct.end());
   distinct.erase(std::unique(distinct.begin(), distinct.end()), distinct.end());
   const std::ptrdiff_t groups = options.groups.empty() ? rows : std::ssize(distinct);
   options.count = static_cast<int>(std::min<std::ptrdiff_t>(options.count, groups));
-  return options.count < 2 ? std::vector<Fold>{} : make_folds(rows, options);
-}
-
-std::vector<InputColumn> describe_inputs(const Eigen::MatrixXd& inputs, const Eigen::RowVectorXd& centre) {
-  std::vector<InputColumn> columns;
-  for (std::ptrdiff_t j = 0; j < inputs.cols(); ++j) {
-    columns.push_back({.name = fmt::format("x{}", j + 1),
-                       .low = inputs.col(j).minCoeff(),
-                       .high = inputs.col(j).maxCoeff(),
-                       .centre = centre(j)});
+  if (options.count < 2) {
+    return {};
   }
-  return columns;
+  std::vector<Fold> folds = make_folds(rows, options);
+  if (rows >= selection.single_hold_out_rows) {
+    folds.resize(1);
+  }
+  return folds;
 }
 
 std::vector<OutputColumn> describe_outputs(const Eigen::MatrixXd& outputs) {
@@ -160,7 +207,7 @@ std::vector<OutputColumn> describe_outputs(const Eigen::MatrixXd& outputs) {
   return columns;
 }
 
-PartitionSummary summarise(const Partition& partition, std::ptrdiff_t regressors) {
+PartitionSummary summarise(const Partition& partition, const TrainingRows& rows) {
   PartitionSummary summary;
   summary.outputs = partition.outputs;
   summary.leaves = partition.num_leaves();
@@ -168,18 +215,17 @@ PartitionSummary summarise(const Partition& partition, std::ptrdiff_t regressors
   for (const Node& node : partition.nodes) {
     if (node.is_leaf()) {
       rss += node.rss;
-      summary.rank_deficient_leaves += node.rank < regressors + 1 ? 1 : 0;
+      summary.rank_deficient_leaves += node.rank < std::ssize(rows.regressors) + 1 ? 1 : 0;
     }
   }
-  summary.train_rmse = (rss / static_cast<double>(partition.nodes.front().samples)).cwiseSqrt();
+  summary.train_rmse = (rss / rows.weights.sum()).cwiseSqrt();
   return summary;
 }
 
-}  // namespace
-
-FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<const Eigen::MatrixXd>& outputs,
-              const FitOptions& options) {
-  check_data("inputs", inputs);
+/// The rows of positive weight, checked.
+Table make_table(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<const Eigen::MatrixXd>& outputs,
+                 const FitOptions& options) {
+  check_inputs(inputs);
   check_data("outputs", outputs);
   if (inputs.rows() != outputs.rows()) {
     throw std::invalid_argument(
@@ -187,70 +233,133 @@ FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<
   }
   require(inputs.rows() <= std::numeric_limits<int>::max(), "the number of rows", static_cast<double>(inputs.rows()),
           "below 2^31");
+  Table table{inputs, outputs, options.weights, count_levels(inputs, options.categorical_inputs),
+              options.growth.regression_inputs, options.growth.split_inputs};
+  if (table.weights.size() == 0) {
+    table.weights = Eigen::VectorXd::Ones(inputs.rows());
+  } else {
+    if (table.weights.size() != inputs.rows()) {
+      throw std::invalid_argument(
+          fmt::format("llmt::fit: weights has {} entries, inputs has {} rows", table.weights.size(), inputs.rows()));
+    }
+    check_finite("llmt::fit", "weights", table.weights);
+    require(table.weights.minCoeff() >= 0.0, "a weight", table.weights.minCoeff(), "at least 0");
+    require(table.weights.maxCoeff() > 0.0, "the largest weight", table.weights.maxCoeff(), "positive");
+    table.weights /= table.weights.maxCoeff();
+  }
+  for (std::vector<int>* columns : {&table.split_inputs, &table.regression_inputs}) {
+    if (columns->empty()) {
+      *columns = all_columns(inputs.cols());
+    }
+    std::sort(columns->begin(), columns->end());
+  }
+  return table;
+}
+
+std::vector<std::ptrdiff_t> rows_with_weight(const Table& table, const std::vector<std::ptrdiff_t>& rows) {
+  std::vector<std::ptrdiff_t> result;
+  // Far below the largest, a weight changes nothing but rounding.
+  std::copy_if(rows.begin(), rows.end(), std::back_inserter(result),
+               [&](std::ptrdiff_t row) { return table.weights(row) > 1e-12; });
+  return result;
+}
+
+}  // namespace
+
+FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<const Eigen::MatrixXd>& outputs,
+              const FitOptions& options) {
+  check_growth(options.growth, inputs.cols());
+  check_blend(options.blend);
   require(options.max_threads >= 0, "max_threads", options.max_threads, "at least 0");
-  const GrowthOptions growth = resolve(options.growth, inputs.cols());
-  const std::vector<Fold> folds = selection_folds(inputs.rows(), options.folds);
+  const Table table = make_table(inputs, outputs, options);
+  std::vector<Fold> folds = selection_folds(inputs.rows(), options.selection);
+  const TrainingRows all = training_rows(table, rows_with_weight(table, all_rows(inputs.rows())));
+  for (Fold& fold : folds) {
+    fold.train = rows_with_weight(table, fold.train);
+    fold.held_out = rows_with_weight(table, fold.held_out);
+  }
+  std::erase_if(folds, [](const Fold& fold) { return fold.train.empty() || fold.held_out.empty(); });
+  const Plan plan = make_plan(options, all, !folds.empty());
 
   std::vector<std::vector<int>> served;
   for (int o = 0; o < outputs.cols(); ++o) {
-    if (growth.shared_partition && o > 0) {
+    if (plan.growth.shared_partition && o > 0) {
       served.front().push_back(o);
     } else {
       served.push_back({o});
     }
   }
+  std::vector<FoldTree> fold_rows(folds.size());
+  for (std::size_t f = 0; f < folds.size(); ++f) {
+    fold_rows[f].training = training_rows(table, folds[f].train);
+    fold_rows[f].held_out = query_rows(table, folds[f].held_out, fold_rows[f].training);
+  }
 
-  // Every growth is a task of its own: the final tree of each partition, then those of its folds.
-  const Eigen::MatrixXd x = inputs;
-  const Eigen::MatrixXd y = outputs;
-  const std::size_t tasks_each = folds.size() + 1;
-  std::vector<Grown> grown(served.size());
-  std::vector<std::vector<Eigen::VectorXd>> errors(served.size(), std::vector<Eigen::VectorXd>(folds.size()));
-  const std::ptrdiff_t tasks = static_cast<std::ptrdiff_t>(served.size() * tasks_each);
+  const std::ptrdiff_t tasks = std::ssize(served) * (std::ssize(folds) + 1);
   std::mutex progress_mutex;
   std::ptrdiff_t done = 0;
-  parallel_for(tasks, options.max_threads, [&](std::ptrdiff_t task) {
-    const std::size_t partition = static_cast<std::size_t>(task) / tasks_each;
-    const std::size_t step = static_cast<std::size_t>(task) % tasks_each;
-    if (step == 0) {
-      grown[partition] = grow_rows(x, y, served[partition], growth, options.max_threads);
-    } else {
-      errors[partition][step - 1] =
-          held_out_errors(x, y, served[partition], growth, folds[step - 1], options.max_threads);
-    }
+  const auto report = [&] {
     if (options.progress) {
       const std::lock_guard<std::mutex> lock(progress_mutex);
       options.progress(++done, tasks);
     }
-  });
-
-  FitSummary summary{.samples = inputs.rows(), .min_leaf_samples = growth.min_leaf_samples, .partitions = {}};
-  std::vector<Partition> partitions;
-  for (std::size_t i = 0; i < served.size(); ++i) {
-    const std::ptrdiff_t grown_leaves = grown[i].partition.num_leaves();
-    StopReason stop = grown[i].stop;
-    Eigen::VectorXd cv_rmse;
-    if (!folds.empty()) {
-      const Eigen::VectorXd held_out = combine_folds(errors[i]);
-      cv_rmse = (held_out / static_cast<double>(inputs.rows() * std::ssize(served[i]))).cwiseSqrt();
-      std::ptrdiff_t best = 0;
-      held_out.minCoeff(&best);
-      if (best + 1 < grown_leaves) {
-        grown[i].partition = prefix(grown[i].partition, best + 1);
-        stop = StopReason::cross_validation;
-      }
+  };
+  std::vector<std::optional<Partition>> partitions(served.size());
+  FitSummary summary{.samples = all.count(),
+                     .missing_values = all.inputs.array().isNaN().count(),
+                     .min_leaf_samples = plan.growth.min_leaf_samples,
+                     .partitions = std::vector<PartitionSummary>(served.size())};
+  parallel_for(std::ssize(served), options.max_threads, [&](std::ptrdiff_t index) {
+    const std::size_t p = static_cast<std::size_t>(index);
+    const Eigen::VectorXd weights = error_weights(all.outputs(Eigen::all, served[p]));
+    std::vector<FoldTree> trees = fold_rows;
+    parallel_for(std::ssize(trees), options.max_threads, [&](std::ptrdiff_t f) {
+      FoldTree& tree = trees[static_cast<std::size_t>(f)];
+      tree.grown = grow_rows(tree.training, table, served[p], plan.growth, options.max_threads).partition;
+      report();
+    });
+    Selection selection;
+    Candidate candidate;
+    GrowthOptions growth = plan.growth;
+    if (!trees.empty()) {
+      selection = select(trees, plan.candidates, weights, options.max_threads);
+      candidate = selection.chosen.candidate;
     }
-    PartitionSummary described = summarise(grown[i].partition, std::ssize(growth.regression_inputs));
+    Grown grown = grow_rows(all, table, served[p], growth, options.max_threads);
+    const std::ptrdiff_t grown_leaves = grown.partition.num_leaves();
+    if (trees.empty()) {
+      candidate.leaves = grown_leaves;
+      if (!plan.candidates.widths.empty()) {
+        candidate.validity = {plan.candidates.kind, plan.candidates.widths.front(), plan.candidates.smoothness};
+        candidate.estimation = plan.candidates.estimation;
+        candidate.ridge = plan.candidates.ridges.empty() ? 0.0 : plan.candidates.ridges.front();
+      }
+    } else if (candidate.leaves < grown_leaves) {
+      grown.stop = StopReason::cross_validation;
+    }
+    candidate.leaves = std::min(candidate.leaves, grown_leaves);
+    Partition partition = estimate(all, grown.partition, candidate, options.max_threads);
+    describe_leaves(all, partition);
+    PartitionSummary described = summarise(partition, all);
     described.grown_leaves = grown_leaves;
-    described.stop = stop;
-    described.cv_rmse = std::move(cv_rmse);
-    described.cv_folds = std::ssize(folds);
-    summary.partitions.push_back(std::move(described));
-    partitions.push_back(std::move(grown[i].partition));
+    described.stop = grown.stop;
+    described.chosen = trees.empty() ? CandidateError{candidate, std::nan(""), std::nan("")} : selection.chosen;
+    described.chosen.candidate.leaves = candidate.leaves;
+    described.best_of_kind = std::move(selection.best_of_kind);
+    described.crisp_cv_rmse = std::move(selection.crisp_rmse);
+    described.cv_folds = std::ssize(trees);
+    for (const FoldTree& tree : trees) {
+      described.held_out_rows += tree.held_out.count();
+    }
+    summary.partitions[p] = std::move(described);
+    partitions[p] = std::move(partition);
+    report();
+  });
+  std::vector<Partition> finished;
+  for (std::optional<Partition>& partition : partitions) {
+    finished.push_back(std::move(*partition));
   }
-  return {Model(describe_inputs(x, grown.front().centre), describe_outputs(y), growth.regression_inputs,
-                std::move(partitions)),
-          std::move(summary)};
+  return {Model(all.columns, describe_outputs(all.outputs), all.regressors, std::move(finished)), std::move(summary)};
 }
 
 Eigen::VectorXd rmse(const Eigen::Ref<const Eigen::MatrixXd>& predicted,

@@ -19,15 +19,26 @@ namespace {
 
 using Rows = std::vector<int>;
 
+/// A row without a value for a split goes to both children with its weight divided; a smaller part than this is dropped.
+constexpr double smallest_share = 1e-3;
+
+/// The learned share of the left child in rows without a value starts from the share of the others, which counts as
+/// this many rows.
+constexpr double prior_rows = 10.0;
+
 /// A node that may still be split.
 struct OpenLeaf {
   int node = 0;
   Rows rows;                  // ascending
-  std::vector<Rows> orders;   // the rows sorted by each split input, ties by row
+  Eigen::VectorXd weights;    // of the rows here
+  std::vector<Rows> orders;   // positions in `rows` sorted by each split input that is a number, ties by row
   Eigen::MatrixXd residuals;  // of the node's local model, one row per entry of `rows`
   double rss = 0.0;           // weighted
   SplitCandidate best;        // input: position among the split inputs
 };
+
+/// Where a row of a node goes.
+enum class Side : signed char { left, right, both };
 
 /// Which open leaf comes next: the largest gain, then the oldest node. The gain is compared in single precision, so
 /// that gains that are equal but for rounding count as equal.
@@ -41,7 +52,7 @@ struct Priority {
 class Grower {
  public:
   explicit Grower(const GrowthProblem& problem)
-      : problem_(problem), options_(problem.options), local_row_(static_cast<std::size_t>(problem.outputs.rows())) {
+      : problem_(problem), options_(problem.options) {
     scale_outputs();
   }
 
@@ -75,6 +86,7 @@ class Grower {
       node.rss = node.rss.cwiseProduct(output_scale_).cwiseProduct(output_scale_);
       node.value = node.value.cwiseProduct(output_scale_) + output_mean_;
       node.slope = output_scale_.asDiagonal() * node.slope;
+      node.missing_left = std::clamp(node.missing_left, 0.0, 1.0);
     }
     return {std::move(nodes_), stop};
   }
@@ -84,7 +96,7 @@ class Grower {
   /// with offset 1e8 look alike from here on, and dividing by a power of two rounds nothing.
   void scale_outputs() {
     const Eigen::MatrixXd& outputs = problem_.outputs;
-    output_mean_ = outputs.colwise().sum().transpose() / static_cast<double>(outputs.rows());
+    output_mean_ = outputs.transpose() * problem_.weights / problem_.weights.sum();
     scaled_outputs_ = outputs.rowwise() - Eigen::RowVectorXd(output_mean_.transpose());
     output_scale_.resize(outputs.cols());
     weights_.resize(outputs.cols());
@@ -93,7 +105,7 @@ class Grower {
       const double largest = scaled_outputs_.col(o).cwiseAbs().maxCoeff();
       output_scale_(o) = largest > 0.0 ? std::exp2(std::ilogb(largest)) : 1.0;
       scaled_outputs_.col(o) /= output_scale_(o);
-      const double sum_of_squares = scaled_outputs_.col(o).squaredNorm();
+      const double sum_of_squares = problem_.weights.dot(scaled_outputs_.col(o).cwiseAbs2());
       weights_(o) = sum_of_squares > 0.0 ? 1.0 / sum_of_squares : 1.0;
       rounding_(o) =
           8.0 * std::numeric_limits<double>::epsilon() * outputs.col(o).cwiseAbs().maxCoeff() / output_scale_(o);
@@ -104,15 +116,22 @@ class Grower {
     OpenLeaf root;
     root.rows.resize(static_cast<std::size_t>(problem_.outputs.rows()));
     std::iota(root.rows.begin(), root.rows.end(), 0);
-    root.orders.assign(static_cast<std::size_t>(problem_.split_values.cols()), root.rows);
+    root.weights = problem_.weights;
+    root.orders.resize(static_cast<std::size_t>(problem_.split_values.cols()));
     parallel_for(std::ssize(root.orders), problem_.max_threads, [&](std::ptrdiff_t j) {
+      if (num_levels(j) > 0) {
+        return;
+      }
       const Eigen::MatrixXd& values = problem_.split_values;
-      std::stable_sort(root.orders[static_cast<std::size_t>(j)].begin(), root.orders[static_cast<std::size_t>(j)].end(),
-                       [&](int a, int b) { return values(a, j) < values(b, j); });
+      Rows& order = root.orders[static_cast<std::size_t>(j)];
+      std::copy_if(root.rows.begin(), root.rows.end(), std::back_inserter(order),
+                   [&](int row) { return !std::isnan(values(row, j)); });
+      std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return values(a, j) < values(b, j); });
     });
     Node parentless;
     parentless.value = Eigen::VectorXd::Zero(problem_.outputs.cols());
     parentless.slope = Eigen::MatrixXd::Zero(problem_.outputs.cols(), problem_.deviations.cols());
+    parentless.mean = Eigen::VectorXd::Zero(problem_.deviations.cols());
     nodes_.resize(1);
     const NodeFit fit = fit_leaf(root, parentless, scaled_outputs_);
     tree_rss_ = {root.rss};
@@ -120,18 +139,73 @@ class Grower {
     enter(std::move(root));
   }
 
+  int num_levels(std::ptrdiff_t split_input) const {
+    return problem_.num_levels[static_cast<std::size_t>(split_input)];
+  }
+
   /// Fits the local model of `leaf` as a correction of its parent's, whose residuals on the leaf's rows are given.
   NodeFit fit_leaf(OpenLeaf& leaf, const Node& parent, const Eigen::MatrixXd& parent_residuals) {
-    NodeFit fit = fit_node(problem_.deviations(leaf.rows, Eigen::all), parent_residuals);
+    const Eigen::MatrixXd deviations = problem_.deviations(leaf.rows, Eigen::all);
+    const bool missing = deviations.hasNaN();
+    NodeFit fit;
+    if (!missing) {
+      fit = fit_node(deviations, parent_residuals, leaf.weights);
+    } else {
+      fit = fit_node(deviations, about_own_mean(deviations, parent, parent_residuals, leaf.weights), leaf.weights);
+    }
     Node& node = nodes_[static_cast<std::size_t>(leaf.node)];
     node.samples = std::ssize(leaf.rows);
     node.rank = fit.rank;
     node.rss = fit.rss;
     node.value = parent.value + fit.centre_change;
     node.slope = parent.slope + fit.slope_change;
+    node.mean = fit.mean;
+    node.low = fit.mean;
+    node.high = fit.mean;
+    for (std::ptrdiff_t k = 0; k < deviations.cols(); ++k) {
+      for (std::ptrdiff_t i = 0; i < deviations.rows(); ++i) {
+        if (deviations(i, k) < node.low(k)) {
+          node.low(k) = deviations(i, k);
+        } else if (deviations(i, k) > node.high(k)) {
+          node.high(k) = deviations(i, k);
+        }
+      }
+    }
     leaf.residuals = fit.residuals;
     leaf.rss = weights_.dot(fit.rss);
     return fit;
+  }
+
+  /// Residuals of the parent's local model with missing values at the mean of these rows instead of the parent's.
+  static Eigen::MatrixXd about_own_mean(const Eigen::MatrixXd& deviations, const Node& parent,
+                                        Eigen::MatrixXd residuals, const Eigen::VectorXd& weights) {
+    for (std::ptrdiff_t k = 0; k < deviations.cols(); ++k) {
+      double sum = 0.0;
+      double present = 0.0;
+      for (std::ptrdiff_t i = 0; i < deviations.rows(); ++i) {
+        if (!std::isnan(deviations(i, k))) {
+          sum += weights(i) * deviations(i, k);
+          present += weights(i);
+        }
+      }
+      const double mean = present > 0.0 ? sum / present : 0.0;
+      for (std::ptrdiff_t i = 0; i < deviations.rows(); ++i) {
+        if (std::isnan(deviations(i, k))) {
+          residuals.row(i) += parent.slope.col(k).transpose() * (parent.mean(k) - mean);
+        }
+      }
+    }
+    return residuals;
+  }
+
+  /// Level of each row of the leaf in a categorical split input, -1 where it is missing.
+  std::vector<int> levels_of(const OpenLeaf& leaf, std::ptrdiff_t split_input) const {
+    std::vector<int> levels;
+    for (const int row : leaf.rows) {
+      const double value = problem_.split_values(row, split_input);
+      levels.push_back(std::isnan(value) ? -1 : static_cast<int>(value));
+    }
+    return levels;
   }
 
   /// Searches all split inputs; leaves in leaf.best the best split, acceptable or not.
@@ -140,19 +214,19 @@ class Grower {
       return;
     }
     const SearchNode node = make_search_node(fit, weights_);
-    for (std::size_t local = 0; local < leaf.rows.size(); ++local) {
-      local_row_[static_cast<std::size_t>(leaf.rows[local])] = static_cast<int>(local);
-    }
     std::vector<SplitCandidate> found(leaf.orders.size());
     parallel_for(std::ssize(found), problem_.max_threads, [&](std::ptrdiff_t j) {
+      SplitCandidate& slot = found[static_cast<std::size_t>(j)];
+      if (num_levels(j) > 0) {
+        slot = search_levels(node, levels_of(leaf, j), num_levels(j), options_.min_leaf_samples);
+        return;
+      }
       const Rows& order = leaf.orders[static_cast<std::size_t>(j)];
-      Rows local(order.size());
       std::vector<double> values(order.size());
       for (std::size_t k = 0; k < order.size(); ++k) {
-        local[k] = local_row_[static_cast<std::size_t>(order[k])];
-        values[k] = problem_.split_values(order[k], j);
+        values[k] = problem_.split_values(leaf.rows[static_cast<std::size_t>(order[k])], j);
       }
-      found[static_cast<std::size_t>(j)] = search_input(node, values, local, options_.min_leaf_samples);
+      slot = search_input(node, values, order, options_.min_leaf_samples);
     });
     std::ptrdiff_t tested = 0;
     for (std::size_t j = 0; j < found.size(); ++j) {
@@ -168,7 +242,7 @@ class Grower {
   /// Why the leaf's best split is not to be made, if so.
   std::optional<StopReason> refusal(const OpenLeaf& leaf) const {
     const Node& node = nodes_[static_cast<std::size_t>(leaf.node)];
-    const double samples = static_cast<double>(node.samples);
+    const double samples = leaf.weights.sum();
     if ((node.rss.array() <= samples * rounding_.array().square()).all()) {
       return StopReason::exact_fit;
     }
@@ -195,7 +269,7 @@ class Grower {
     if (options_.min_variance_gain >= 0.0) {
       // The weights make the outputs' sums of squares 1 each, so that (rows - 1) times a residual variance is a
       // fraction of the variance.
-      const double to_fraction = static_cast<double>(problem_.outputs.rows() - 1) / outputs;
+      const double to_fraction = (problem_.weights.sum() - 1.0) / outputs;
       const double before = leaf.rss / (samples - node.rank);
       const double after = leaf.best.rss / (freedom / outputs);
       if (freedom <= 0.0 || !((before - after) * to_fraction >= options_.min_variance_gain)) {
@@ -233,65 +307,140 @@ class Grower {
   void split(std::size_t position) {
     const OpenLeaf leaf = std::move(*leaves_[position]);
     leaves_[position].reset();
-    std::array<OpenLeaf, 2> children = divide(leaf);
     const Node parent = nodes_[static_cast<std::size_t>(leaf.node)];
+    const std::vector<Side> sides = sides_of(leaf);
+    const double missing_left = learn_missing_left(leaf, parent, sides);
+    std::array<OpenLeaf, 2> children;
+    std::array<Rows, 2> positions;  // of the children's rows among the leaf's
+    divide(leaf, sides, missing_left, children, positions);
     for (OpenLeaf& child : children) {
       child.node = static_cast<int>(nodes_.size());
       nodes_.emplace_back();
     }
     parallel_for(2, problem_.max_threads, [&](std::ptrdiff_t side) {
       OpenLeaf& child = children[static_cast<std::size_t>(side)];
-      std::vector<int> positions;  // of the child's rows among the parent's
-      for (std::size_t i = 0, k = 0; k < child.rows.size(); ++i) {
-        if (leaf.rows[i] == child.rows[k]) {
-          positions.push_back(static_cast<int>(i));
-          ++k;
-        }
-      }
-      const NodeFit fit = fit_leaf(child, parent, leaf.residuals(positions, Eigen::all));
+      const NodeFit fit =
+          fit_leaf(child, parent, leaf.residuals(positions[static_cast<std::size_t>(side)], Eigen::all));
       find_split(child, fit);
     });
     Node& node = nodes_[static_cast<std::size_t>(leaf.node)];
     node.left = children[0].node;
     node.right = children[1].node;
     node.split_input = options_.split_inputs[static_cast<std::size_t>(leaf.best.input)];
-    node.threshold = place_threshold(leaf);
+    node.level_side = leaf.best.level_side;
+    node.threshold = node.level_side.empty() ? place_threshold(leaf) : 0.0;
+    node.missing_left = missing_left;
     tree_rss_.push_back(tree_rss_.back() - (leaf.rss - children[0].rss - children[1].rss));
     for (OpenLeaf& child : children) {
       enter(std::move(child));
     }
   }
 
-  /// Rows and orders of the two children; all orders stay sorted.
-  std::array<OpenLeaf, 2> divide(const OpenLeaf& leaf) {
+  /// Where the best split of a leaf sends its rows.
+  std::vector<Side> sides_of(const OpenLeaf& leaf) const {
+    std::vector<Side> sides(leaf.rows.size(), Side::both);
+    if (num_levels(leaf.best.input) > 0) {
+      const std::vector<int> levels = levels_of(leaf, leaf.best.input);
+      for (std::size_t k = 0; k < sides.size(); ++k) {
+        if (levels[k] >= 0) {
+          sides[k] = leaf.best.level_side[static_cast<std::size_t>(levels[k])] < 0 ? Side::left : Side::right;
+        }
+      }
+      return sides;
+    }
     const Rows& order = leaf.orders[static_cast<std::size_t>(leaf.best.input)];
     for (std::size_t k = 0; k < order.size(); ++k) {
-      local_row_[static_cast<std::size_t>(order[k])] = static_cast<std::ptrdiff_t>(k) < leaf.best.left ? 0 : 1;
+      sides[static_cast<std::size_t>(order[k])] =
+          static_cast<std::ptrdiff_t>(k) < leaf.best.left ? Side::left : Side::right;
     }
-    const auto deal = [&](const Rows& from, Rows& left, Rows& right) {
-      for (const int row : from) {
-        (local_row_[static_cast<std::size_t>(row)] == 0 ? left : right).push_back(row);
+    return sides;
+  }
+
+  /// Share of the left child in rows that have no value for the split: the one that minimises their squared error
+  /// under the local models of the rows that have one, drawn towards the share of those; in [0, 1].
+  double learn_missing_left(const OpenLeaf& leaf, const Node& parent, const std::vector<Side>& sides) const {
+    std::array<Rows, 3> positions;
+    std::array<double, 3> weight{};
+    for (std::size_t k = 0; k < sides.size(); ++k) {
+      positions[static_cast<std::size_t>(sides[k])].push_back(static_cast<int>(k));
+      weight[static_cast<std::size_t>(sides[k])] += leaf.weights(static_cast<std::ptrdiff_t>(k));
+    }
+    const double known = weight[0] / (weight[0] + weight[1]);
+    const Rows& missing = positions[2];
+    if (missing.empty()) {
+      return known;
+    }
+    const Eigen::MatrixXd deviations = problem_.deviations(leaf.rows, Eigen::all);
+    const Eigen::MatrixXd queries = deviations(missing, Eigen::all);
+    std::array<Eigen::MatrixXd, 2> change;  // child's prediction minus the leaf's, rows x outputs
+    for (std::size_t side = 0; side < 2; ++side) {
+      const Eigen::MatrixXd of_child = deviations(positions[side], Eigen::all);
+      const Eigen::VectorXd weights = leaf.weights(positions[side]);
+      const Eigen::MatrixXd residuals =
+          about_own_mean(of_child, parent, leaf.residuals(positions[side], Eigen::all), weights);
+      const NodeFit fit = fit_node(of_child, residuals, weights);
+      change[side] = fit.centre_change.transpose().replicate(queries.rows(), 1);
+      for (std::ptrdiff_t i = 0; i < queries.rows(); ++i) {
+        for (std::ptrdiff_t k = 0; k < queries.cols(); ++k) {
+          if (std::isnan(queries(i, k))) {
+            change[side].row(i) += (fit.slope_change.col(k) * fit.mean(k) +
+                                    parent.slope.col(k) * (fit.mean(k) - parent.mean(k)))
+                                       .transpose();
+          } else {
+            change[side].row(i) += fit.slope_change.col(k).transpose() * queries(i, k);
+          }
+        }
       }
-    };
-    std::array<OpenLeaf, 2> children;
-    deal(leaf.rows, children[0].rows, children[1].rows);
-    for (OpenLeaf& child : children) {
+    }
+    const Eigen::MatrixXd apart = change[0] - change[1];
+    const Eigen::MatrixXd error = leaf.residuals(missing, Eigen::all) - change[1];
+    const Eigen::VectorXd weights = leaf.weights(missing);
+    const double squares = weights.dot(apart.cwiseAbs2() * weights_);
+    const double product = weights.dot(apart.cwiseProduct(error) * weights_);
+    const double prior = prior_rows * squares / weights.sum();
+    return squares > 0.0 ? std::clamp((product + prior * known) / (squares + prior), 0.0, 1.0) : known;
+  }
+
+  /// Rows, weights and orders of the two children; all orders stay sorted.
+  static void divide(const OpenLeaf& leaf, const std::vector<Side>& sides, double missing_left,
+                     std::array<OpenLeaf, 2>& children, std::array<Rows, 2>& positions) {
+    const std::array<double, 2> shares = {missing_left, 1.0 - missing_left};
+    for (std::size_t side = 0; side < 2; ++side) {
+      OpenLeaf& child = children[side];
+      const Side own = side == 0 ? Side::left : Side::right;
+      std::vector<int> position_in_child(leaf.rows.size(), -1);
+      std::vector<double> weights;
+      for (std::size_t k = 0; k < sides.size(); ++k) {
+        const double share = sides[k] == own ? 1.0 : sides[k] == Side::both ? shares[side] : 0.0;
+        if (share >= smallest_share) {
+          position_in_child[k] = static_cast<int>(child.rows.size());
+          child.rows.push_back(leaf.rows[k]);
+          positions[side].push_back(static_cast<int>(k));
+          weights.push_back(share * leaf.weights(static_cast<std::ptrdiff_t>(k)));
+        }
+      }
+      child.weights = Eigen::Map<const Eigen::VectorXd>(weights.data(), std::ssize(weights));
       child.orders.resize(leaf.orders.size());
+      for (std::size_t j = 0; j < leaf.orders.size(); ++j) {
+        for (const int k : leaf.orders[j]) {
+          if (const int position = position_in_child[static_cast<std::size_t>(k)]; position >= 0) {
+            child.orders[j].push_back(position);
+          }
+        }
+      }
     }
-    for (std::size_t j = 0; j < leaf.orders.size(); ++j) {
-      deal(leaf.orders[j], children[0].orders[j], children[1].orders[j]);
-    }
-    return children;
   }
 
   /// A threshold in the gap of the leaf's split, low <= threshold < high.
   double place_threshold(const OpenLeaf& leaf) const {
     const Rows& order = leaf.orders[static_cast<std::size_t>(leaf.best.input)];
-    const auto value_at = [&](std::ptrdiff_t k) {
-      return problem_.split_values(order[static_cast<std::size_t>(k)], leaf.best.input);
-    };
-    const double low = value_at(leaf.best.left - 1);
-    const double high = value_at(leaf.best.left);
+    Rows rows;  // with a value, in the order of it
+    for (const int k : order) {
+      rows.push_back(leaf.rows[static_cast<std::size_t>(k)]);
+    }
+    const Eigen::VectorXd values = problem_.split_values(rows, leaf.best.input);
+    const double low = values(leaf.best.left - 1);
+    const double high = values(leaf.best.left);
     double threshold = low + 0.5 * (high - low);
     if (options_.threshold == ThresholdPlacement::closest) {
       // The regression of the child models' difference on the split input over the node's rows says how far apart they
@@ -300,14 +449,17 @@ class Grower {
       const Node& node = nodes_[static_cast<std::size_t>(leaf.node)];
       const Node& left = nodes_[static_cast<std::size_t>(node.left)];
       const Node& right = nodes_[static_cast<std::size_t>(node.right)];
-      const Eigen::MatrixXd apart =
-          (problem_.deviations(leaf.rows, Eigen::all) * (right.slope - left.slope).transpose()).rowwise() +
-          Eigen::RowVectorXd((right.value - left.value).transpose());
-      const Eigen::VectorXd values = problem_.split_values(leaf.rows, leaf.best.input);
-      const double mean = values.mean();
+      const Eigen::VectorXd weights = leaf.weights(order);
+      Eigen::MatrixXd deviations = problem_.deviations(rows, Eigen::all);
+      deviations =
+          deviations.array().isNaN().select(node.mean.transpose().replicate(deviations.rows(), 1), deviations);
+      const Eigen::MatrixXd apart = (deviations * (right.slope - left.slope).transpose()).rowwise() +
+                                    Eigen::RowVectorXd((right.value - left.value).transpose());
+      const double mean = weights.dot(values) / weights.sum();
       const Eigen::VectorXd centred = values.array() - mean;
-      const Eigen::VectorXd b = apart.transpose() * centred / centred.squaredNorm();
-      const Eigen::VectorXd a = apart.colwise().mean().transpose() + b * (low - mean);
+      const Eigen::VectorXd weighted = centred.cwiseProduct(weights);
+      const Eigen::VectorXd b = apart.transpose() * weighted / weighted.dot(centred);
+      const Eigen::VectorXd a = apart.transpose() * weights / weights.sum() + b * (low - mean);
       const double curvature = weights_.dot(b.cwiseAbs2());
       if (curvature > 0.0) {
         threshold = low - weights_.dot(a.cwiseProduct(b)) / curvature;
@@ -328,7 +480,6 @@ class Grower {
   std::vector<std::optional<OpenLeaf>> leaves_;
   std::priority_queue<Priority> queue_;
   std::array<std::ptrdiff_t, 8> refusals_{};  // leaves that stay, by StopReason
-  std::vector<int> local_row_;                // scratch, one slot per row; open leaves share no row
   std::vector<double> tree_rss_;              // weighted, with 1, 2, ... leaves
 };
 

@@ -11,9 +11,11 @@ namespace llmt {
 
 /// The rows that a tree is grown from, and options without defaults left to fill in.
 struct GrowthProblem {
-  Eigen::MatrixXd split_values;  ///< rows x split inputs
-  Eigen::MatrixXd deviations;    ///< rows x regression inputs, as deviations from `centre` of the inputs
+  Eigen::MatrixXd split_values;  ///< rows x split inputs; NaN: missing
+  std::vector<int> num_levels;   ///< of each split input; 0: a number
+  Eigen::MatrixXd deviations;    ///< rows x regressors, as deviations from their centres; NaN: missing
   Eigen::MatrixXd outputs;       ///< rows x outputs of the partition
+  Eigen::VectorXd weights;       ///< of the rows, positive, with mean 1
   GrowthOptions options;         ///< split_inputs listed, min_leaf_samples set
   int max_threads = 0;
 };

@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "checks.hpp"
+#include "evaluator.hpp"
 #include "parallel.hpp"
 
 namespace llmt {
@@ -17,14 +18,31 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 
 [[noreturn]] void reject(const std::string& what) { throw std::invalid_argument("llmt::Model: " + what); }
 
-void check_node(const Partition& partition, std::ptrdiff_t index, std::ptrdiff_t inputs, std::ptrdiff_t regressors,
-                const std::string& where) {
+void check_node(const Partition& partition, std::ptrdiff_t index, const std::vector<InputColumn>& inputs,
+                std::ptrdiff_t regressors, const std::string& where) {
   const Node& node = partition.nodes[static_cast<std::size_t>(index)];
   const std::ptrdiff_t outputs = std::ssize(partition.outputs);
   if (node.value.size() != outputs || node.rss.size() != outputs || node.slope.rows() != outputs ||
       node.slope.cols() != regressors) {
     reject(fmt::format("{}: value, rss and slope must have {} outputs and slope {} regression inputs", where, outputs,
                        regressors));
+  }
+  if (node.mean.size() != regressors || node.low.size() != regressors || node.high.size() != regressors) {
+    reject(fmt::format("{}: mean, low and high must have {} regressors", where, regressors));
+  }
+  if (!(node.low.array() <= node.high.array()).all() || !node.mean.allFinite() || !node.low.allFinite() ||
+      !node.high.allFinite()) {
+    reject(fmt::format("{}: mean, low and high must be finite and low <= high", where));
+  }
+  if (!(node.half_width >= 0.0 && std::isfinite(node.half_width))) {
+    reject(fmt::format("{}: half_width {} must be finite and not negative", where, node.half_width));
+  }
+  if (!(node.missing_left >= 0.0 && node.missing_left <= 1.0)) {
+    reject(fmt::format("{}: missing_left {} must lie between 0 and 1", where, node.missing_left));
+  }
+  if (node.inverse_gram.size() > 0 && (node.inverse_gram.rows() != regressors + 1 ||
+                                       node.inverse_gram.cols() != regressors + 1 || !node.inverse_gram.allFinite())) {
+    reject(fmt::format("{}: inverse_gram must be finite, {} x {}", where, regressors + 1, regressors + 1));
   }
   if (!node.value.allFinite() || !node.slope.allFinite() || !node.rss.allFinite() || !std::isfinite(node.threshold)) {
     reject(fmt::format("{}: a number is not finite", where));
@@ -43,13 +61,27 @@ void check_node(const Partition& partition, std::ptrdiff_t index, std::ptrdiff_t
       node.right >= std::ssize(partition.nodes)) {
     reject(fmt::format("{}: the children {} and {} are not in order of growth", where, node.left, node.right));
   }
-  if (node.split_input < 0 || node.split_input >= inputs) {
-    reject(fmt::format("{}: split input {} does not exist, there are {} inputs", where, node.split_input, inputs));
+  if (node.split_input < 0 || node.split_input >= std::ssize(inputs)) {
+    reject(
+        fmt::format("{}: split input {} does not exist, there are {} inputs", where, node.split_input, inputs.size()));
+  }
+  const InputColumn& input = inputs[static_cast<std::size_t>(node.split_input)];
+  if (node.level_side.size() != input.levels.size()) {
+    reject(fmt::format("{}: {} sides for the {} levels of \"{}\"", where, node.level_side.size(), input.levels.size(),
+                       input.name));
+  }
+  if (std::any_of(node.level_side.begin(), node.level_side.end(), [](int side) { return side < -1 || side > 1; })) {
+    reject(fmt::format("{}: the side of a level must be -1, 0 or 1", where));
   }
 }
 
-void check_partition(const Partition& partition, std::ptrdiff_t inputs, std::ptrdiff_t regressors,
+void check_partition(const Partition& partition, const std::vector<InputColumn>& inputs, std::ptrdiff_t regressors,
                      const std::string& where) {
+  const Validity& validity = partition.validity;
+  if (!(validity.width >= 0.0 && std::isfinite(validity.width)) || (validity.smoothness != 1 && validity.smoothness != 2)) {
+    reject(fmt::format("{}: the width {} must be finite and not negative, the smoothness {} 1 or 2", where,
+                       validity.width, validity.smoothness));
+  }
   if (partition.outputs.empty() || partition.nodes.empty() || partition.nodes.size() % 2 == 0) {
     reject(fmt::format("{}: it needs an output and an odd number of nodes", where));
   }
@@ -70,34 +102,44 @@ void check_partition(const Partition& partition, std::ptrdiff_t inputs, std::ptr
   }
 }
 
-/// Node of the leaf that holds row `row` of `inputs`.
-std::size_t find_leaf(const Partition& partition, const Eigen::Ref<const Eigen::MatrixXd>& inputs, std::ptrdiff_t row) {
-  std::size_t index = 0;
-  while (!partition.nodes[index].is_leaf()) {
-    const Node& node = partition.nodes[index];
-    index = static_cast<std::size_t>(inputs(row, node.split_input) <= node.threshold ? node.left : node.right);
-  }
-  return index;
-}
+/// The inputs of a query, one row after the other in memory.
+using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 void check_query(const char* function, const Model& model, const Eigen::Ref<const Eigen::MatrixXd>& inputs) {
   if (inputs.cols() != model.num_inputs()) {
     throw std::invalid_argument(
         fmt::format("{}: inputs has {} columns, the model has {} inputs", function, inputs.cols(), model.num_inputs()));
   }
-  check_finite(function, "inputs", inputs);
+  check_finite_or_missing(function, "inputs", inputs);
 }
 
 /// Nodes of the leaves from left to right, with their boxes.
 void collect_leaves(const Partition& partition, int index, Leaf box, const std::vector<InputColumn>& inputs,
-                    const std::vector<int>& regression_inputs, std::vector<Leaf>& leaves) {
+                    const std::vector<Regressor>& regressors, std::vector<Leaf>& leaves) {
   const Node& node = partition.nodes[static_cast<std::size_t>(index)];
   if (!node.is_leaf()) {
     Leaf right = box;
-    box.high(node.split_input) = std::min(box.high(node.split_input), node.threshold);
-    right.low(node.split_input) = std::max(right.low(node.split_input), node.threshold);
-    collect_leaves(partition, node.left, std::move(box), inputs, regression_inputs, leaves);
-    collect_leaves(partition, node.right, std::move(right), inputs, regression_inputs, leaves);
+    if (node.level_side.empty()) {
+      box.high(node.split_input) = std::min(box.high(node.split_input), node.threshold);
+      right.low(node.split_input) = std::max(right.low(node.split_input), node.threshold);
+    } else {
+      const std::size_t input = static_cast<std::size_t>(node.split_input);
+      std::vector<int> all = box.levels[input];
+      if (all.empty()) {
+        for (int level = 0; level < std::ssize(node.level_side); ++level) {
+          all.push_back(level);
+        }
+      }
+      const auto keep = [&](std::vector<int>& kept, int side) {
+        kept.clear();
+        std::copy_if(all.begin(), all.end(), std::back_inserter(kept),
+                     [&](int level) { return node.level_side[static_cast<std::size_t>(level)] == side; });
+      };
+      keep(box.levels[input], -1);
+      keep(right.levels[input], 1);
+    }
+    collect_leaves(partition, node.left, std::move(box), inputs, regressors, leaves);
+    collect_leaves(partition, node.right, std::move(right), inputs, regressors, leaves);
     return;
   }
   box.node = index;
@@ -106,20 +148,28 @@ void collect_leaves(const Partition& partition, int index, Leaf box, const std::
   box.rmse = (node.rss / static_cast<double>(std::max<std::ptrdiff_t>(node.samples, 1))).cwiseSqrt();
   box.slope = node.slope;
   box.intercept = node.value;
-  for (std::size_t j = 0; j < regression_inputs.size(); ++j) {
-    box.intercept -=
-        node.slope.col(static_cast<std::ptrdiff_t>(j)) * inputs[static_cast<std::size_t>(regression_inputs[j])].centre;
+  for (std::size_t k = 0; k < regressors.size(); ++k) {
+    box.intercept -= node.slope.col(static_cast<std::ptrdiff_t>(k)) * regressors[k].centre;
   }
   leaves.push_back(std::move(box));
 }
 
+/// Position in leaves() of every leaf's node.
+std::vector<int> leaf_positions(const Partition& partition, const std::vector<Leaf>& leaves) {
+  std::vector<int> position(partition.nodes.size(), -1);
+  for (std::size_t k = 0; k < leaves.size(); ++k) {
+    position[static_cast<std::size_t>(leaves[k].node)] = static_cast<int>(k);
+  }
+  return position;
+}
+
 }  // namespace
 
-Model::Model(std::vector<InputColumn> inputs, std::vector<OutputColumn> outputs, std::vector<int> regression_inputs,
+Model::Model(std::vector<InputColumn> inputs, std::vector<OutputColumn> outputs, std::vector<Regressor> regressors,
              std::vector<Partition> partitions)
     : inputs_(std::move(inputs)),
       outputs_(std::move(outputs)),
-      regression_inputs_(std::move(regression_inputs)),
+      regressors_(std::move(regressors)),
       partitions_(std::move(partitions)) {
   if (inputs_.empty() || outputs_.empty()) {
     reject(fmt::format("it has {} inputs and {} outputs, both must be at least 1", inputs_.size(), outputs_.size()));
@@ -137,39 +187,50 @@ Model::Model(std::vector<InputColumn> inputs, std::vector<OutputColumn> outputs,
                          output.high));
     }
   }
-  check_columns("llmt::Model", "regression_inputs", regression_inputs_, num_inputs());
+  for (const Regressor& regressor : regressors_) {
+    const bool exists = regressor.input >= 0 && regressor.input < num_inputs();
+    const std::ptrdiff_t levels = exists ? std::ssize(inputs_[static_cast<std::size_t>(regressor.input)].levels) : 0;
+    if (!exists || regressor.level < -1 || regressor.level >= levels || (regressor.level < 0 && levels > 0) ||
+        !std::isfinite(regressor.centre)) {
+      reject(fmt::format("regressor of input {}, level {}, centre {}: no such input or level, or not finite",
+                         regressor.input, regressor.level, regressor.centre));
+    }
+  }
   std::vector<int> served;
   for (std::size_t i = 0; i < partitions_.size(); ++i) {
-    check_partition(partitions_[i], num_inputs(), std::ssize(regression_inputs_), fmt::format("partition {}", i));
+    check_partition(partitions_[i], inputs_, std::ssize(regressors_), fmt::format("partition {}", i));
     served.insert(served.end(), partitions_[i].outputs.begin(), partitions_[i].outputs.end());
   }
   check_columns("llmt::Model", "outputs of the partitions", served, num_outputs());
   if (std::ssize(served) != num_outputs()) {
     reject(fmt::format("{} of {} outputs have a partition", served.size(), num_outputs()));
   }
+  std::vector<Evaluator> evaluators;
+  for (const Partition& partition : partitions_) {
+    evaluators.emplace_back(partition, inputs_, std::ssize(regressors_));
+  }
+  evaluators_ = std::make_shared<const std::vector<Evaluator>>(std::move(evaluators));
 }
 
 Eigen::MatrixXd Model::predict(const Eigen::Ref<const Eigen::MatrixXd>& inputs, int max_threads) const {
   check_query("llmt::Model::predict", *this, inputs);
   Eigen::MatrixXd predicted(inputs.rows(), num_outputs());
-  const std::ptrdiff_t regressors = std::ssize(regression_inputs_);
   constexpr std::ptrdiff_t block = 4096;
   parallel_for((inputs.rows() + block - 1) / block, max_threads, [&](std::ptrdiff_t block_index) {
-    Eigen::VectorXd deviation(regressors);
-    const std::ptrdiff_t end = std::min(inputs.rows(), (block_index + 1) * block);
-    for (std::ptrdiff_t row = block_index * block; row < end; ++row) {
-      for (std::ptrdiff_t j = 0; j < regressors; ++j) {
-        const int column = regression_inputs_[static_cast<std::size_t>(j)];
-        deviation(j) = inputs(row, column) - inputs_[static_cast<std::size_t>(column)].centre;
-      }
-      for (const Partition& partition : partitions_) {
-        const Node& leaf = partition.nodes[find_leaf(partition, inputs, row)];
-        for (std::size_t o = 0; o < partition.outputs.size(); ++o) {
-          double value = leaf.value(static_cast<std::ptrdiff_t>(o));
-          for (std::ptrdiff_t j = 0; j < regressors; ++j) {
-            value += leaf.slope(static_cast<std::ptrdiff_t>(o), j) * deviation(j);
-          }
-          predicted(row, partition.outputs[o]) = value;
+    const std::ptrdiff_t begin = block_index * block;
+    const RowMajor rows = inputs.middleRows(begin, std::min(block, inputs.rows() - begin));
+    Eigen::VectorXd deviations(std::ssize(regressors_));
+    Eigen::VectorXd values(num_outputs());
+    std::vector<Activation> active;
+    for (std::ptrdiff_t row = 0; row < rows.rows(); ++row) {
+      const double* x = rows.row(row).data();
+      deviations_at(inputs_, regressors_, x, deviations.data());
+      for (std::size_t p = 0; p < partitions_.size(); ++p) {
+        const Evaluator& evaluator = (*evaluators_)[p];
+        evaluator.activate(x, active);
+        evaluator.combine(active, deviations.data(), values.data());
+        for (std::size_t o = 0; o < partitions_[p].outputs.size(); ++o) {
+          predicted(begin + row, partitions_[p].outputs[o]) = values(static_cast<std::ptrdiff_t>(o));
         }
       }
     }
@@ -177,37 +238,100 @@ Eigen::MatrixXd Model::predict(const Eigen::Ref<const Eigen::MatrixXd>& inputs, 
   return predicted;
 }
 
-Eigen::MatrixXi Model::leaf_of(const Eigen::Ref<const Eigen::MatrixXd>& inputs) const {
-  check_query("llmt::Model::leaf_of", *this, inputs);
-  Eigen::MatrixXi result(inputs.rows(), std::ssize(partitions_));
-  for (std::ptrdiff_t p = 0; p < result.cols(); ++p) {
-    const Partition& partition = partitions_[static_cast<std::size_t>(p)];
-    std::vector<int> position_of_node(partition.nodes.size(), -1);
-    const std::vector<Leaf> table = leaves(p);
-    for (std::size_t position = 0; position < table.size(); ++position) {
-      position_of_node[static_cast<std::size_t>(table[position].node)] = static_cast<int>(position);
+Eigen::MatrixXd Model::jacobian(const Eigen::Ref<const Eigen::VectorXd>& point) const {
+  check_query("llmt::Model::jacobian", *this, point.transpose());
+  check_finite("llmt::Model::jacobian", "point", point.transpose());
+  const Eigen::VectorXd x = point;
+  Eigen::VectorXd deviations(std::ssize(regressors_));
+  deviations_at(inputs_, regressors_, x.data(), deviations.data());
+  Eigen::MatrixXd result(num_outputs(), num_inputs());
+  Eigen::MatrixXd by_input;
+  Eigen::MatrixXd by_regressor;
+  for (std::size_t p = 0; p < partitions_.size(); ++p) {
+    (*evaluators_)[p].derivatives(x.data(), deviations.data(), by_input, by_regressor);
+    for (std::size_t k = 0; k < regressors_.size(); ++k) {
+      if (regressors_[k].level < 0) {
+        by_input.col(regressors_[k].input) += by_regressor.col(static_cast<std::ptrdiff_t>(k));
+      }
     }
-    for (std::ptrdiff_t row = 0; row < inputs.rows(); ++row) {
-      result(row, p) = position_of_node[find_leaf(partition, inputs, row)];
+    for (std::size_t o = 0; o < partitions_[p].outputs.size(); ++o) {
+      result.row(partitions_[p].outputs[o]) = by_input.row(static_cast<std::ptrdiff_t>(o));
     }
   }
   return result;
 }
 
-Eigen::VectorXd Model::outside(const Eigen::Ref<const Eigen::MatrixXd>& inputs) const {
-  check_query("llmt::Model::outside", *this, inputs);
-  Eigen::VectorXd distance = Eigen::VectorXd::Zero(inputs.rows());
+Eigen::MatrixXd Model::validities(const Eigen::Ref<const Eigen::MatrixXd>& inputs, std::ptrdiff_t partition) const {
+  check_query("llmt::Model::validities", *this, inputs);
+  const std::vector<Leaf> table = leaves(partition);
+  const std::vector<int> position = leaf_positions(partitions_[static_cast<std::size_t>(partition)], table);
+  const RowMajor rows = inputs;
+  Eigen::MatrixXd result = Eigen::MatrixXd::Zero(inputs.rows(), std::ssize(table));
+  std::vector<Activation> active;
+  for (std::ptrdiff_t row = 0; row < rows.rows(); ++row) {
+    (*evaluators_)[static_cast<std::size_t>(partition)].activate(rows.row(row).data(), active);
+    for (const Activation& entry : active) {
+      result(row, position[static_cast<std::size_t>(entry.node)]) = entry.validity;
+    }
+  }
+  return result;
+}
+
+Eigen::MatrixXi Model::leaf_of(const Eigen::Ref<const Eigen::MatrixXd>& inputs) const {
+  check_query("llmt::Model::leaf_of", *this, inputs);
+  const RowMajor rows = inputs;
+  Eigen::MatrixXi result(inputs.rows(), std::ssize(partitions_));
+  std::vector<Activation> active;
+  for (std::ptrdiff_t p = 0; p < result.cols(); ++p) {
+    const std::vector<int> position = leaf_positions(partitions_[static_cast<std::size_t>(p)], leaves(p));
+    for (std::ptrdiff_t row = 0; row < rows.rows(); ++row) {
+      (*evaluators_)[static_cast<std::size_t>(p)].activate(rows.row(row).data(), active);
+      const auto largest = std::max_element(
+          active.begin(), active.end(), [](const auto& a, const auto& b) { return a.validity < b.validity; });
+      result(row, p) = position[static_cast<std::size_t>(largest->node)];
+    }
+  }
+  return result;
+}
+
+std::vector<Extrapolation> Model::extrapolation(const Eigen::Ref<const Eigen::MatrixXd>& inputs) const {
+  check_query("llmt::Model::extrapolation", *this, inputs);
+  std::vector<Extrapolation> result(static_cast<std::size_t>(inputs.rows()));
   for (std::ptrdiff_t j = 0; j < num_inputs(); ++j) {
     const InputColumn& input = inputs_[static_cast<std::size_t>(j)];
     const double range = input.high - input.low;
     for (std::ptrdiff_t row = 0; row < inputs.rows(); ++row) {
       const double excess = std::max(input.low - inputs(row, j), inputs(row, j) - input.high);
       if (excess > 0.0) {
-        distance(row) = std::max(distance(row), range > 0.0 ? excess / range : infinity);
+        double& distance = result[static_cast<std::size_t>(row)].distance;
+        distance = std::max(distance, range > 0.0 ? excess / range : infinity);
       }
     }
   }
-  return distance;
+  const RowMajor rows = inputs;
+  const std::ptrdiff_t regressors = std::ssize(regressors_);
+  Eigen::VectorXd deviations(regressors);
+  Eigen::VectorXd a(regressors + 1);
+  std::vector<Activation> active;
+  for (std::size_t p = 0; p < partitions_.size(); ++p) {
+    for (std::ptrdiff_t row = 0; row < rows.rows(); ++row) {
+      const double* x = rows.row(row).data();
+      deviations_at(inputs_, regressors_, x, deviations.data());
+      (*evaluators_)[p].activate(x, active);
+      double leverage = 0.0;
+      for (const Activation& entry : active) {
+        const Node& leaf = partitions_[p].nodes[static_cast<std::size_t>(entry.node)];
+        if (leaf.inverse_gram.size() > 0) {
+          a(0) = 1.0;
+          a.tail(regressors) = deviations.array().isNaN().select(leaf.mean, deviations);
+          leverage += entry.validity * a.dot(leaf.inverse_gram * a);
+        }
+      }
+      double& largest = result[static_cast<std::size_t>(row)].leverage;
+      largest = std::max(largest, leverage);
+    }
+  }
+  return result;
 }
 
 std::vector<Leaf> Model::leaves(std::ptrdiff_t partition) const {
@@ -218,8 +342,9 @@ std::vector<Leaf> Model::leaves(std::ptrdiff_t partition) const {
   Leaf everywhere;
   everywhere.low = Eigen::VectorXd::Constant(num_inputs(), -infinity);
   everywhere.high = Eigen::VectorXd::Constant(num_inputs(), infinity);
+  everywhere.levels.resize(inputs_.size());
   std::vector<Leaf> result;
-  collect_leaves(partitions_[static_cast<std::size_t>(partition)], 0, everywhere, inputs_, regression_inputs_, result);
+  collect_leaves(partitions_[static_cast<std::size_t>(partition)], 0, everywhere, inputs_, regressors_, result);
   return result;
 }
 
@@ -228,22 +353,23 @@ Partition prefix(const Partition& partition, std::ptrdiff_t max_leaves) {
     throw std::invalid_argument(fmt::format("llmt::prefix: max_leaves is {}, it must be at least 1", max_leaves));
   }
   const std::ptrdiff_t kept = 2 * std::min(max_leaves, partition.num_leaves()) - 1;
-  Partition result{.outputs = partition.outputs, .nodes = {partition.nodes.begin(), partition.nodes.begin() + kept}};
+  Partition result{.outputs = partition.outputs,
+                   .validity = partition.validity,
+                   .nodes = {partition.nodes.begin(), partition.nodes.begin() + kept}};
   for (Node& node : result.nodes) {
     if (node.left >= kept) {
-      node.left = node.right = node.split_input = -1;
-      node.threshold = 0.0;
+      make_leaf(node);
     }
   }
   return result;
 }
 
 Model Model::prefix(std::ptrdiff_t max_leaves) const {
-  Model result = *this;
-  for (Partition& partition : result.partitions_) {
-    partition = llmt::prefix(partition, max_leaves);
+  std::vector<Partition> partitions;
+  for (const Partition& partition : partitions_) {
+    partitions.push_back(llmt::prefix(partition, max_leaves));
   }
-  return result;
+  return {inputs_, outputs_, regressors_, std::move(partitions)};
 }
 
 Model Model::named(const std::vector<std::string>& inputs, const std::vector<std::string>& outputs) const {

@@ -1,5 +1,7 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <cstdint>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
@@ -14,8 +16,10 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+constexpr std::array<const char*, 3> validity_names = {"crisp", "blend", "gaussian"};  // in the order of ValidityKind
+
 constexpr const char* format_name = "llmt-model";
-constexpr int format_version = 1;
+constexpr int format_version = 2;
 
 Json to_array(const Eigen::VectorXd& values) { return Json(std::vector<double>(values.begin(), values.end())); }
 
@@ -23,10 +27,16 @@ Json node_to_json(const Node& node, const Model& model) {
   Json json;
   if (!node.is_leaf()) {
     json["split"] = {{"input", model.inputs()[static_cast<std::size_t>(node.split_input)].name},
-                     {"column", node.split_input},
-                     {"threshold", node.threshold},
-                     {"left", node.left},
-                     {"right", node.right}};
+                     {"column", node.split_input}};
+    if (node.level_side.empty()) {
+      json["split"]["threshold"] = node.threshold;
+      json["split"]["half_width"] = node.half_width;
+    } else {
+      json["split"]["level_side"] = node.level_side;
+    }
+    json["split"]["missing_left"] = node.missing_left;
+    json["split"]["left"] = node.left;
+    json["split"]["right"] = node.right;
   }
   json["samples"] = node.samples;
   json["rank"] = node.rank;
@@ -35,6 +45,18 @@ Json node_to_json(const Node& node, const Model& model) {
   json["slope"] = Json::array();
   for (std::ptrdiff_t o = 0; o < node.slope.rows(); ++o) {
     json["slope"].push_back(to_array(node.slope.row(o)));
+  }
+  json["mean"] = to_array(node.mean);
+  json["low"] = to_array(node.low);
+  json["high"] = to_array(node.high);
+  if (node.inverse_gram.size() > 0) {
+    std::vector<double> lower;  // triangle, row by row
+    for (std::ptrdiff_t i = 0; i < node.inverse_gram.rows(); ++i) {
+      for (std::ptrdiff_t j = 0; j <= i; ++j) {
+        lower.push_back(node.inverse_gram(i, j));
+      }
+    }
+    json["inverse_gram"] = std::move(lower);
   }
   return json;
 }
@@ -122,7 +144,13 @@ Node node_from_json(const Reader& json, std::ptrdiff_t outputs, std::ptrdiff_t r
   if (json.has("split")) {
     const Reader split = json.member("split");
     node.split_input = split.member("column").as<int>();
-    node.threshold = split.member("threshold").as<double>();
+    if (split.has("level_side")) {
+      node.level_side = split.member("level_side").list<int>();
+    } else {
+      node.threshold = split.member("threshold").as<double>();
+      node.half_width = split.member("half_width").as<double>();
+    }
+    node.missing_left = split.member("missing_left").as<double>();
     node.left = split.member("left").as<int>();
     node.right = split.member("right").as<int>();
   }
@@ -138,7 +166,30 @@ Node node_from_json(const Reader& json, std::ptrdiff_t outputs, std::ptrdiff_t r
   for (std::ptrdiff_t o = 0; o < outputs; ++o) {
     node.slope.row(o) = slopes[static_cast<std::size_t>(o)].vector(regressors).transpose();
   }
+  node.mean = json.member("mean").vector(regressors);
+  node.low = json.member("low").vector(regressors);
+  node.high = json.member("high").vector(regressors);
+  if (json.has("inverse_gram")) {
+    const Eigen::VectorXd lower = json.member("inverse_gram").vector((regressors + 1) * (regressors + 2) / 2);
+    node.inverse_gram.resize(regressors + 1, regressors + 1);
+    for (std::ptrdiff_t i = 0, k = 0; i <= regressors; ++i) {
+      for (std::ptrdiff_t j = 0; j <= i; ++j, ++k) {
+        node.inverse_gram(i, j) = node.inverse_gram(j, i) = lower(k);
+      }
+    }
+  }
   return node;
+}
+
+Validity validity_from_json(const Reader& json) {
+  const std::string kind = json.member("kind").as<std::string>();
+  const auto found = std::find(validity_names.begin(), validity_names.end(), kind);
+  if (found == validity_names.end()) {
+    json.member("kind").fail(fmt::format("\"{}\" is not known: crisp, blend and gaussian are", kind));
+  }
+  return {.kind = static_cast<ValidityKind>(found - validity_names.begin()),
+          .width = json.member("width").as<double>(),
+          .smoothness = json.member("smoothness").as<int>()};
 }
 
 }  // namespace
@@ -151,20 +202,35 @@ std::string to_json(const Model& model) {
   for (const InputColumn& input : model.inputs()) {
     json["inputs"].push_back(
         {{"name", input.name}, {"low", input.low}, {"high", input.high}, {"centre", input.centre}});
+    if (input.is_categorical()) {
+      json["inputs"].back()["levels"] = input.levels;
+    }
   }
   json["outputs"] = Json::array();
   for (const OutputColumn& output : model.outputs()) {
     json["outputs"].push_back({{"name", output.name}, {"low", output.low}, {"high", output.high}});
   }
-  json["regression_inputs"] = model.regression_inputs();
-  json["validity"] = "crisp";
+  json["regressors"] = Json::array();
+  for (const Regressor& regressor : model.regressors()) {
+    Json entry = {{"column", regressor.input}};
+    if (regressor.level >= 0) {
+      entry["level"] = regressor.level;
+    }
+    entry["centre"] = regressor.centre;
+    json["regressors"].push_back(std::move(entry));
+  }
   json["partitions"] = Json::array();
   for (const Partition& partition : model.partitions()) {
     Json nodes = Json::array();
     for (const Node& node : partition.nodes) {
       nodes.push_back(node_to_json(node, model));
     }
-    json["partitions"].push_back({{"outputs", partition.outputs}, {"nodes", std::move(nodes)}});
+    json["partitions"].push_back({{"outputs", partition.outputs},
+                                  {"validity",
+                                   {{"kind", validity_names[static_cast<std::size_t>(partition.validity.kind)]},
+                                    {"width", partition.validity.width},
+                                    {"smoothness", partition.validity.smoothness}}},
+                                  {"nodes", std::move(nodes)}});
   }
   try {
     return json.dump(1) + "\n";
@@ -188,15 +254,14 @@ Model from_json(const std::string& text, const std::string& name) {
     root.fail(fmt::format("version {} of the model format cannot be read, this program knows version {}", version,
                           format_version));
   }
-  if (const std::string validity = root.member("validity").as<std::string>(); validity != "crisp") {
-    root.member("validity").fail(fmt::format("\"{}\" is not known, only \"crisp\" is", validity));
-  }
   std::vector<InputColumn> inputs;
   for (const Reader& input : root.member("inputs").elements()) {
     inputs.push_back({.name = input.member("name").as<std::string>(),
                       .low = input.member("low").as<double>(),
                       .high = input.member("high").as<double>(),
-                      .centre = input.member("centre").as<double>()});
+                      .centre = input.member("centre").as<double>(),
+                      .levels = input.has("levels") ? input.member("levels").list<std::string>()
+                                                    : std::vector<std::string>{}});
   }
   std::vector<OutputColumn> outputs;
   for (const Reader& output : root.member("outputs").elements()) {
@@ -204,17 +269,24 @@ Model from_json(const std::string& text, const std::string& name) {
                        .low = output.member("low").as<double>(),
                        .high = output.member("high").as<double>()});
   }
-  std::vector<int> regression_inputs = root.member("regression_inputs").list<int>();
+  std::vector<Regressor> regressors;
+  for (const Reader& entry : root.member("regressors").elements()) {
+    regressors.push_back({.input = entry.member("column").as<int>(),
+                          .level = entry.has("level") ? entry.member("level").as<int>() : -1,
+                          .centre = entry.member("centre").as<double>()});
+  }
   std::vector<Partition> partitions;
   for (const Reader& entry : root.member("partitions").elements()) {
-    Partition partition{.outputs = entry.member("outputs").list<int>(), .nodes = {}};
+    Partition partition{.outputs = entry.member("outputs").list<int>(),
+                        .validity = validity_from_json(entry.member("validity")),
+                        .nodes = {}};
     for (const Reader& node : entry.member("nodes").elements()) {
-      partition.nodes.push_back(node_from_json(node, std::ssize(partition.outputs), std::ssize(regression_inputs)));
+      partition.nodes.push_back(node_from_json(node, std::ssize(partition.outputs), std::ssize(regressors)));
     }
     partitions.push_back(std::move(partition));
   }
   try {
-    return {std::move(inputs), std::move(outputs), std::move(regression_inputs), std::move(partitions)};
+    return {std::move(inputs), std::move(outputs), std::move(regressors), std::move(partitions)};
   } catch (const std::invalid_argument& error) {
     throw std::runtime_error(fmt::format("{}: {}", name, error.what()));
   }

@@ -2,38 +2,59 @@
 
 #include <Eigen/QR>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 namespace llmt {
 namespace {
 
-/// Columns of `x` that vary, centred and scaled to mean square 1.
+/// Columns of `x` that vary, centred and scaled to weighted mean square 1, times the roots of the weights.
 struct ScaledColumns {
   Eigen::MatrixXd values;  // rows x varying columns
   std::vector<std::ptrdiff_t> column;
-  Eigen::RowVectorXd mean;   // of the varying columns
+  Eigen::VectorXd mean;      // of all columns
   Eigen::RowVectorXd scale;  // of the varying columns
 };
 
-ScaledColumns scale_columns(const Eigen::MatrixXd& x) {
+ScaledColumns scale_columns(const Eigen::MatrixXd& x, const Eigen::VectorXd& weights,
+                            const Eigen::VectorXd& root_weights) {
   ScaledColumns scaled;
-  const double rows = static_cast<double>(x.rows());
+  const double total = weights.sum();
   scaled.values.resize(x.rows(), x.cols());
-  scaled.mean.resize(x.cols());
+  scaled.mean = Eigen::VectorXd::Zero(x.cols());
   scaled.scale.resize(x.cols());
   std::ptrdiff_t kept = 0;
   for (std::ptrdiff_t j = 0; j < x.cols(); ++j) {
-    if (x.col(j).maxCoeff() == x.col(j).minCoeff()) {
-      continue;  // constant over these rows
+    double present = 0.0;
+    double sum = 0.0;
+    double low = std::numeric_limits<double>::infinity();
+    double high = -low;
+    bool missing = false;
+    for (std::ptrdiff_t i = 0; i < x.rows(); ++i) {
+      if (std::isnan(x(i, j))) {
+        missing = true;
+        continue;
+      }
+      present += weights(i);
+      sum += weights(i) * x(i, j);
+      low = std::min(low, x(i, j));
+      high = std::max(high, x(i, j));
     }
-    const double mean = x.col(j).sum() / rows;
+    if (!(low < high)) {
+      scaled.mean(j) = low == high ? low : 0.0;  // constant over these rows, or all missing
+      continue;
+    }
+    const double mean = sum / present;
+    scaled.mean(j) = mean;
     Eigen::VectorXd deviation = x.col(j).array() - mean;
+    if (missing) {
+      deviation = deviation.array().isNaN().select(0.0, deviation);
+    }
     // Dividing by the largest deviation first keeps the squares of very small and very large columns in range.
     const double largest = deviation.cwiseAbs().maxCoeff();
-    deviation /= largest;
-    const double root_mean_square = std::sqrt(deviation.squaredNorm() / rows);
+    deviation = (deviation / largest).cwiseProduct(root_weights);
+    const double root_mean_square = std::sqrt(deviation.squaredNorm() / total);
     scaled.values.col(kept) = deviation / root_mean_square;
-    scaled.mean(kept) = mean;
     scaled.scale(kept) = largest * root_mean_square;
     scaled.column.push_back(j);
     ++kept;
@@ -44,12 +65,14 @@ ScaledColumns scale_columns(const Eigen::MatrixXd& x) {
 
 }  // namespace
 
-NodeFit fit_node(const Eigen::MatrixXd& x, const Eigen::MatrixXd& residuals) {
-  const double rows = static_cast<double>(x.rows());
-  const ScaledColumns scaled = scale_columns(x);
-
+NodeFit fit_node(const Eigen::MatrixXd& x, const Eigen::MatrixXd& residuals, const Eigen::VectorXd& weights) {
+  const double total = weights.sum();
   NodeFit fit;
-  const Eigen::RowVectorXd mean = residuals.colwise().sum() / rows;
+  fit.root_weights = weights.cwiseSqrt();
+  ScaledColumns scaled = scale_columns(x, weights, fit.root_weights);
+  fit.mean = std::move(scaled.mean);
+
+  const Eigen::RowVectorXd mean = weights.transpose() * residuals / total;
   fit.residuals = residuals.rowwise() - mean;
   fit.centre_change = mean.transpose();
   fit.slope_change = Eigen::MatrixXd::Zero(residuals.cols(), x.cols());
@@ -62,25 +85,28 @@ NodeFit fit_node(const Eigen::MatrixXd& x, const Eigen::MatrixXd& residuals) {
     fit.rank = 1 + static_cast<int>(rank);
     fit.basis = Eigen::MatrixXd::Identity(x.rows(), rank);
     fit.basis.applyOnTheLeft(decomposition.householderQ());
-    fit.basis *= std::sqrt(rows);
+    fit.basis *= std::sqrt(total);
 
-    const Eigen::MatrixXd scaled_slopes = decomposition.solve(fit.residuals);  // varying columns x outputs
+    Eigen::MatrixXd weighted = fit.root_weights.asDiagonal() * fit.residuals;
+    const Eigen::MatrixXd scaled_slopes = decomposition.solve(weighted);  // varying columns x outputs
     for (std::size_t k = 0; k < scaled.column.size(); ++k) {
       const std::ptrdiff_t kept = static_cast<std::ptrdiff_t>(k);
       fit.slope_change.col(scaled.column[k]) = scaled_slopes.row(kept).transpose() / scaled.scale(kept);
-      fit.centre_change -= fit.slope_change.col(scaled.column[k]) * scaled.mean(kept);
+      fit.centre_change -= fit.slope_change.col(scaled.column[k]) * fit.mean(scaled.column[k]);
     }
     // Twice: the second pass removes what rounding left of the first, so that the residuals are orthogonal to the basis
     // to rounding relative to themselves, not relative to the outputs.
     for (int pass = 0; pass < 2; ++pass) {
-      const Eigen::MatrixXd projection = fit.basis.transpose() * fit.residuals / rows;
-      fit.residuals -= fit.basis * projection;
-      fit.residuals.rowwise() -= Eigen::RowVectorXd(fit.residuals.colwise().sum() / rows);
+      const Eigen::MatrixXd projection = fit.basis.transpose() * weighted / total;
+      weighted -= fit.basis * projection;
+      const Eigen::RowVectorXd left = fit.root_weights.transpose() * weighted / total;
+      weighted -= fit.root_weights * left;
     }
+    fit.residuals = fit.root_weights.cwiseInverse().asDiagonal() * weighted;
   } else {
     fit.basis.resize(x.rows(), 0);
   }
-  fit.rss = fit.residuals.colwise().squaredNorm().transpose();
+  fit.rss = (fit.root_weights.asDiagonal() * fit.residuals).colwise().squaredNorm().transpose();
   return fit;
 }
 

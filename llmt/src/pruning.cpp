@@ -1,5 +1,7 @@
 #include "pruning.hpp"
 
+#include "evaluator.hpp"
+
 namespace llmt {
 
 bool prune(std::vector<Node>& nodes, const Eigen::VectorXd& weights, double m) {
@@ -19,8 +21,7 @@ bool prune(std::vector<Node>& nodes, const Eigen::VectorXd& weights, double m) {
       backed += (static_cast<double>(nodes[c].samples) + 0.5 * m) / (samples + m) * error[c];
     }
     if (error[i] <= backed) {
-      node.left = node.right = node.split_input = -1;
-      node.threshold = 0.0;
+      make_leaf(node);
     } else {
       error[i] = backed;
     }

@@ -1,28 +1,319 @@
 #include "selection.hpp"
 
-namespace llmt {
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <optional>
 
-Eigen::VectorXd prefix_squared_errors(const Partition& partition, const Eigen::MatrixXd& inputs,
-                                      const Eigen::MatrixXd& deviations, const Eigen::MatrixXd& outputs,
+#include "evaluator.hpp"
+#include "joint_fit.hpp"
+#include "parallel.hpp"
+
+namespace llmt {
+namespace {
+
+/// Held-out rows that are enough to tell good candidates from bad ones.
+constexpr std::ptrdiff_t screening_rows = 1000;
+
+/// Widths that go on to all folds.
+constexpr std::size_t finalists = 2;
+
+/// Up to this many unknowns every ridge is tried with every leaf count; beyond, in screening, the middle one.
+constexpr std::ptrdiff_t cheap_unknowns = 300;
+
+/// 1, 2, 3, 4, 6, 9, ...: each half as large again, and the largest.
+std::vector<std::ptrdiff_t> leaf_counts(std::ptrdiff_t largest) {
+  std::vector<std::ptrdiff_t> counts;
+  for (std::ptrdiff_t count = 2; count < largest; count = std::max(count + 1, count * 3 / 2)) {
+    counts.push_back(count);
+  }
+  if (largest > 1) {
+    counts.push_back(largest);
+  }
+  return counts;
+}
+
+/// Position of a candidate among widths, leaf counts and ridges.
+struct Key {
+  std::size_t width;
+  std::size_t leaves;
+  std::size_t ridge;
+  auto operator<=>(const Key&) const = default;
+};
+
+using Errors = std::map<Key, double>;  // sum of squares over the held-out rows of a fold
+
+double ridge_at(const Candidates& candidates, std::size_t index) {
+  return candidates.ridges.empty() ? 0.0 : candidates.ridges[index];
+}
+
+/// Errors of one fold and width, for the leaf counts and ridges that `wanted` accepts.
+template <class Wanted>
+Errors evaluate(const FoldTree& fold, const Candidates& candidates, std::size_t width,
+                const std::vector<std::ptrdiff_t>& counts, const Eigen::VectorXd& weights, bool stop_early,
+                const Wanted& wanted, int max_threads) {
+  Partition partition = fold.grown;
+  partition.validity = {candidates.kind, candidates.widths[width], candidates.smoothness};
+  set_half_widths(partition, fold.training.low(), fold.training.high());
+  const JointFit fit(fold.training, std::move(partition), max_threads);
+  const std::size_t ridges = std::max<std::size_t>(candidates.ridges.size(), 1);
+  Errors errors;
+  double best = std::numeric_limits<double>::infinity();
+  int without_gain = 0;
+  for (std::size_t k = 0; k < counts.size() && without_gain < 2; ++k) {
+    std::vector<std::size_t> tried;
+    for (std::size_t r = 0; r < ridges; ++r) {
+      if (wanted(Key{width, k, r})) {
+        tried.push_back(r);
+      }
+    }
+    if (tried.empty()) {
+      continue;
+    }
+    const std::ptrdiff_t leaves = std::min(counts[k], fold.grown.num_leaves());
+    std::vector<Partition> models;
+    if (candidates.estimation == Estimation::joint) {
+      std::vector<double> values;
+      for (const std::size_t r : tried) {
+        values.push_back(ridge_at(candidates, r));
+      }
+      models = fit.joint(leaves, values);
+    } else {
+      models.push_back(candidates.estimation == Estimation::local ? fit.local(leaves) : fit.as_grown(leaves));
+    }
+    double here = std::numeric_limits<double>::infinity();
+    for (std::size_t i = 0; i < models.size(); ++i) {
+      const double error = squared_error(models[i], fold.held_out, weights);
+      errors[{width, k, tried[i]}] = error;
+      here = std::min(here, error);
+    }
+    without_gain = stop_early && here >= best ? without_gain + 1 : 0;
+    best = std::min(best, here);
+  }
+  return errors;
+}
+
+/// A sum over folds of errors that all of them have.
+std::map<Key, std::vector<double>> common(const std::vector<Errors>& folds) {
+  std::map<Key, std::vector<double>> result;
+  for (const auto& [key, error] : folds.front()) {
+    std::vector<double> all;
+    for (const Errors& fold : folds) {
+      if (const auto found = fold.find(key); found != fold.end()) {
+        all.push_back(found->second);
+      }
+    }
+    if (all.size() == folds.size()) {
+      result[key] = std::move(all);
+    }
+  }
+  return result;
+}
+
+double sum(const std::vector<double>& values) {
+  double total = 0.0;
+  for (const double value : values) {
+    total += value;
+  }
+  return total;
+}
+
+}  // namespace
+
+Eigen::VectorXd prefix_squared_errors(const Partition& partition, const TrainingRows& rows,
                                       const Eigen::VectorXd& weights) {
+  const Evaluator evaluator(partition, rows.columns, std::ssize(rows.regressors));
+  const Eigen::MatrixXd outputs = rows.outputs(Eigen::all, partition.outputs);
   Eigen::VectorXd change = Eigen::VectorXd::Zero(partition.num_leaves());  // of the sum, from M - 1 to M leaves
-  for (std::ptrdiff_t row = 0; row < inputs.rows(); ++row) {
+  Eigen::VectorXd values(outputs.cols());
+  for (std::ptrdiff_t row = 0; row < rows.count(); ++row) {
     double previous = 0.0;
-    for (std::ptrdiff_t index = 0; index >= 0;) {
-      const Node& node = partition.nodes[static_cast<std::size_t>(index)];
-      const Eigen::VectorXd error =
-          outputs.row(row).transpose() - node.value - node.slope * deviations.row(row).transpose();
-      const double squared = weights.dot(error.cwiseAbs2());
+    for (int index = 0; index >= 0;) {
+      evaluator.local(index, rows.deviations.row(row).data(), values.data());
+      const double squared =
+          rows.weights(row) * weights.dot((outputs.row(row).transpose() - values).cwiseAbs2());
       // Nodes 2k-1 and 2k come with the k-th split, that is with k + 1 leaves.
       change((index + 1) / 2) += squared - previous;
       previous = squared;
-      index = node.is_leaf() ? -1 : inputs(row, node.split_input) <= node.threshold ? node.left : node.right;
+      index = partition.nodes[static_cast<std::size_t>(index)].is_leaf()
+                  ? -1
+                  : evaluator.child_of(index, rows.inputs.row(row).data());
     }
   }
   for (std::ptrdiff_t leaves = 1; leaves < change.size(); ++leaves) {
     change(leaves) += change(leaves - 1);
   }
   return change.cwiseMax(0.0);
+}
+
+double squared_error(const Partition& partition, const TrainingRows& rows, const Eigen::VectorXd& weights) {
+  const Evaluator evaluator(partition, rows.columns, std::ssize(rows.regressors));
+  std::vector<Activation> active;
+  Eigen::VectorXd values(std::ssize(partition.outputs));
+  double total = 0.0;
+  for (std::ptrdiff_t row = 0; row < rows.count(); ++row) {
+    evaluator.activate(rows.inputs.row(row).data(), active);
+    evaluator.combine(active, rows.deviations.row(row).data(), values.data());
+    for (std::size_t o = 0; o < partition.outputs.size(); ++o) {
+      const double error = rows.outputs(row, partition.outputs[o]) - values(static_cast<std::ptrdiff_t>(o));
+      total += rows.weights(row) * weights(static_cast<std::ptrdiff_t>(o)) * error * error;
+    }
+  }
+  return total;
+}
+
+Partition estimate(const TrainingRows& training, const Partition& grown, const Candidate& candidate, int max_threads) {
+  Partition partition = prefix(grown, candidate.leaves);
+  partition.validity = candidate.validity;
+  if (candidate.validity.kind == ValidityKind::crisp) {
+    return partition;
+  }
+  set_half_widths(partition, training.low(), training.high());
+  const JointFit fit(training, std::move(partition), max_threads);
+  switch (candidate.estimation) {
+    case Estimation::as_grown:
+      return fit.as_grown(candidate.leaves);
+    case Estimation::local:
+      return fit.local(candidate.leaves);
+    case Estimation::joint:
+      break;
+  }
+  return std::move(fit.joint(candidate.leaves, {candidate.ridge}).front());
+}
+
+Selection select(const std::vector<FoldTree>& folds, const Candidates& candidates, const Eigen::VectorXd& weights,
+                 int max_threads) {
+  const std::size_t num_folds = folds.size();
+  std::vector<Eigen::VectorXd> crisp(num_folds);
+  parallel_for(std::ssize(folds), max_threads, [&](std::ptrdiff_t f) {
+    const std::size_t fold = static_cast<std::size_t>(f);
+    crisp[fold] = prefix_squared_errors(folds[fold].grown, folds[fold].held_out, weights);
+  });
+  std::ptrdiff_t largest = 0;
+  double held_out_weight = 0.0;
+  std::vector<double> fold_weight;
+  for (std::size_t f = 0; f < num_folds; ++f) {
+    largest = std::max(largest, crisp[f].size());
+    fold_weight.push_back(folds[f].held_out.weights.sum() * static_cast<double>(weights.size()));
+    held_out_weight += fold_weight.back();
+  }
+  const auto described = [&](const Candidate& candidate, const std::vector<double>& errors) {
+    CandidateError result{candidate, std::sqrt(sum(errors) / held_out_weight), 0.0};
+    double mean = 0.0;
+    std::vector<double> rmse;
+    for (std::size_t f = 0; f < errors.size(); ++f) {
+      rmse.push_back(std::sqrt(errors[f] / fold_weight[f]));
+      mean += rmse.back() / static_cast<double>(errors.size());
+    }
+    for (const double value : rmse) {
+      result.spread += (value - mean) * (value - mean);
+    }
+    result.spread = rmse.size() > 1 ? std::sqrt(result.spread / static_cast<double>(rmse.size() - 1)) : 0.0;
+    return result;
+  };
+  // A fold whose tree is smaller stays at its last one.
+  const auto crisp_errors = [&](std::ptrdiff_t leaves) {
+    std::vector<double> errors;
+    for (const Eigen::VectorXd& fold : crisp) {
+      errors.push_back(fold(std::min(leaves, fold.size()) - 1));
+    }
+    return errors;
+  };
+
+  Selection selection;
+  selection.crisp_rmse.resize(largest);
+  std::ptrdiff_t best_crisp = 1;
+  for (std::ptrdiff_t leaves = 1; leaves <= largest; ++leaves) {
+    selection.crisp_rmse(leaves - 1) = std::sqrt(sum(crisp_errors(leaves)) / held_out_weight);
+    if (selection.crisp_rmse(leaves - 1) < selection.crisp_rmse(best_crisp - 1)) {
+      best_crisp = leaves;
+    }
+  }
+  selection.best_of_kind.push_back(described({}, crisp_errors(1)));
+  selection.chosen = selection.best_of_kind.front();
+  if (candidates.crisp) {
+    selection.best_of_kind.push_back(described({.leaves = best_crisp}, crisp_errors(best_crisp)));
+    selection.chosen = selection.best_of_kind.back();
+  }
+  if (candidates.widths.empty() || largest < 2) {
+    return selection;
+  }
+
+  // Screening.
+  const std::vector<std::ptrdiff_t> counts = leaf_counts(largest);
+  const std::ptrdiff_t coefficients = std::ssize(folds.front().training.regressors) + 1;
+  std::size_t screening = 0;
+  for (std::ptrdiff_t rows = 0; screening < num_folds && rows < screening_rows; ++screening) {
+    rows += folds[screening].held_out.count();
+  }
+  const std::size_t widths = candidates.widths.size();
+  const std::size_t middle = candidates.ridges.size() / 2;
+  std::vector<Errors> screened(screening * widths);
+  parallel_for(std::ssize(screened), max_threads, [&](std::ptrdiff_t task) {
+    const std::size_t fold = static_cast<std::size_t>(task) / widths;
+    const std::size_t width = static_cast<std::size_t>(task) % widths;
+    screened[static_cast<std::size_t>(task)] = evaluate(
+        folds[fold], candidates, width, counts, weights, true,
+        [&](const Key& key) {
+          return counts[key.leaves] * coefficients <= cheap_unknowns || key.ridge == middle;
+        },
+        max_threads);
+  });
+  std::vector<std::pair<double, Key>> best_of_width;
+  for (std::size_t width = 0; width < widths; ++width) {
+    std::vector<Errors> of_width;
+    for (std::size_t fold = 0; fold < screening; ++fold) {
+      of_width.push_back(screened[fold * widths + width]);
+    }
+    std::optional<std::pair<double, Key>> best;
+    for (const auto& [key, errors] : common(of_width)) {
+      if (!best || sum(errors) < best->first) {
+        best = {sum(errors), key};
+      }
+    }
+    if (best) {
+      best_of_width.push_back(*best);
+    }
+  }
+  std::stable_sort(best_of_width.begin(), best_of_width.end(),
+                   [](const auto& a, const auto& b) { return a.first < b.first; });
+  best_of_width.resize(std::min(best_of_width.size(), finalists));
+
+  // The finalists on all folds, near their best leaf count, with all ridges.
+  std::vector<Errors> final_errors(num_folds * best_of_width.size());
+  parallel_for(std::ssize(final_errors), max_threads, [&](std::ptrdiff_t task) {
+    const std::size_t fold = static_cast<std::size_t>(task) / best_of_width.size();
+    const Key& best = best_of_width[static_cast<std::size_t>(task) % best_of_width.size()].second;
+    final_errors[static_cast<std::size_t>(task)] = evaluate(
+        folds[fold], candidates, best.width, counts, weights, false,
+        [&](const Key& key) { return key.leaves + 1 >= best.leaves && key.leaves <= best.leaves + 1; }, max_threads);
+  });
+  for (std::size_t k = 0; k < best_of_width.size(); ++k) {
+    std::vector<Errors> of_width;
+    for (std::size_t fold = 0; fold < num_folds; ++fold) {
+      of_width.push_back(final_errors[fold * best_of_width.size() + k]);
+    }
+    std::optional<CandidateError> best;
+    for (const auto& [key, errors] : common(of_width)) {
+      const Candidate candidate{
+          .validity = {candidates.kind, candidates.widths[key.width], candidates.smoothness},
+          .estimation = candidates.estimation,
+          .ridge = ridge_at(candidates, key.ridge),
+          .leaves = counts[key.leaves]};
+      const CandidateError error = described(candidate, errors);
+      if (!best || error.rmse < best->rmse) {
+        best = error;
+      }
+    }
+    if (best) {
+      selection.best_of_kind.push_back(*best);
+      if (best->rmse < selection.chosen.rmse || (!candidates.crisp && k == 0)) {
+        selection.chosen = *best;
+      }
+    }
+  }
+  return selection;
 }
 
 }  // namespace llmt

@@ -1,19 +1,52 @@
 /// \file
-/// How many leaves: held-out error of the nested prefixes of a growth.
+/// Which candidate predicts held-out rows best.
 #pragma once
 
 #include <Eigen/Core>
+#include <vector>
 
-#include "llmt/model.hpp"
+#include "training.hpp"
 
 namespace llmt {
 
-/// Sum of squared errors of the prefixes of `partition` with 1, 2, ..., num_leaves leaves over some rows.
-///
-/// split_values: rows x model inputs; deviations: rows x regression inputs, from the partition's centre; outputs: rows
-/// x outputs of the partition; weights: of the outputs' squared errors.
-Eigen::VectorXd prefix_squared_errors(const Partition& partition, const Eigen::MatrixXd& inputs,
-                                      const Eigen::MatrixXd& deviations, const Eigen::MatrixXd& outputs,
+/// A tree grown without the rows of a fold.
+struct FoldTree {
+  TrainingRows training;
+  TrainingRows held_out;
+  Partition grown;
+};
+
+/// What the candidates are.
+struct Candidates {
+  bool crisp = true;
+  ValidityKind kind = ValidityKind::blend;  ///< of the others
+  Estimation estimation = Estimation::joint;
+  int smoothness = 1;
+  std::vector<double> widths;  ///< empty: crisp alone
+  std::vector<double> ridges;
+};
+
+struct Selection {
+  CandidateError chosen;
+  std::vector<CandidateError> best_of_kind;
+  Eigen::VectorXd crisp_rmse;
+};
+
+/// Sum of weighted squared errors of the prefixes of `partition` with 1, 2, ..., num_leaves leaves, as grown and crisp,
+/// over some rows. `weights`: of the outputs' squared errors.
+Eigen::VectorXd prefix_squared_errors(const Partition& partition, const TrainingRows& rows,
                                       const Eigen::VectorXd& weights);
+
+/// Sum of weighted squared errors over some rows.
+double squared_error(const Partition& partition, const TrainingRows& rows, const Eigen::VectorXd& weights);
+
+/// The partition with `candidate`'s leaves, validity and estimates.
+Partition estimate(const TrainingRows& training, const Partition& grown, const Candidate& candidate, int max_threads);
+
+/// Compares on the held-out rows of all folds. First every width on as many folds as hold enough rows, leaf counts in
+/// steps of a half until two steps brought nothing; then the best two widths near their best leaf counts and ridges on
+/// the other folds.
+Selection select(const std::vector<FoldTree>& folds, const Candidates& candidates, const Eigen::VectorXd& weights,
+                 int max_threads);
 
 }  // namespace llmt

@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <span>
+#include <vector>
 
 #include "node_fit.hpp"
 
@@ -18,12 +19,13 @@ struct SplitCandidate {
   int rank_left = 0;        ///< ranks of the two children's least-squares problems
   int rank_right = 0;
   std::ptrdiff_t tested = 0;  ///< number of admissible splits that were compared
+  std::vector<int> level_side;  ///< categorical input: -1 left, 1 right, 0 not seen, one per level
 };
 
 /// What the search of a node needs to know of its rows.
 struct SearchNode {
-  /// rows x (rank - 1 + outputs), one row after the other in memory: the orthogonalised regressors and the residuals of
-  /// the node's fit.
+  /// rows x (rank + outputs), one row after the other in memory: the constant, the orthogonalised regressors and the
+  /// residuals of the node's fit, all times the square root of the row's weight.
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> features;
   std::ptrdiff_t regressors = 0;  ///< rank - 1
   Eigen::VectorXd weights;        ///< of the outputs' residual sums of squares
@@ -37,10 +39,17 @@ SearchNode make_search_node(const NodeFit& fit, const Eigen::VectorXd& weights);
 ///
 /// Compares every split between two distinct values that leaves `min_leaf_samples` rows on either side. The sums of
 /// each side are only ever added to, from the left and from the right, never subtracted from: no digits are lost at the
-/// ends. Of splits that agree within `tie_tolerance` times node.rss, the one with the smallest threshold is taken.
+/// ends. Rows without a value take part in neither side; the gain of the others is what counts. Of splits that agree within `tie_tolerance` times node.rss, the one with the smallest threshold is taken.
 /// `input` stays -1 if nothing is admissible.
 SplitCandidate search_input(const SearchNode& node, std::span<const double> values, std::span<const int> order,
                             std::ptrdiff_t min_leaf_samples);
+
+/// The best split on a categorical input: `levels` has the level of each row of `node.features`, or -1.
+///
+/// Tries the levels in ascending order of the mean of the residuals, and of the residuals times each regressor, split
+/// between any two: all splits for two levels, all that matter for one-dimensional scores (Fisher 1958) for more.
+SplitCandidate search_levels(const SearchNode& node, std::span<const int> levels, int num_levels,
+                             std::ptrdiff_t min_leaf_samples);
 
 /// Rounding differs with the order of rows and with columns that carry no information; ties must not depend on it.
 inline constexpr double tie_tolerance = 1e-10;

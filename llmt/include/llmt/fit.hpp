@@ -53,15 +53,19 @@ struct GrowthOptions {
   GrowthRule rule = GrowthRule::rd;
   /// rd: a split is accepted if P(F >= observed), times the number of candidate splits it was chosen from (Bonferroni:
   /// the maximum over many candidates does not follow the F distribution), is below this. 1 or more: no test.
-  double significance = 0.05;
+  /// Negative: 0.05 for a crisp tree, no test where blends are among the candidates, for the held-out error decides
+  /// then and the joint estimate bears far more leaves than a crisp one.
+  double significance = -1.0;
   /// rd: smallest decrease of the residual variance, as a fraction of the variance of the output. 0: any decrease;
   /// negative: no demand.
   double min_variance_gain = 0.0;
   /// retis: weight m of the prior (the error of one model for all data) in the m-estimates, in rows. 0: no pruning.
   double pruning_m = 2.0;
-  /// Smallest number of rows in a leaf. 0: twice the number of coefficients of a local model.
+  /// Smallest number of rows in a leaf. 0: twice the number of coefficients of a local model for a crisp tree; where
+  /// blends are among the candidates as many as regressors, at least 5.
   std::ptrdiff_t min_leaf_samples = 0;
-  /// Largest number of leaves of a partition. 0: no limit.
+  /// Largest number of leaves of a partition. 0: no limit for a crisp tree; where blends are among the candidates as
+  /// many as make 2000 coefficients, within 20 ... 400.
   std::ptrdiff_t max_leaves = 0;
   /// Growth ends when further splits lower the residual sum of squares of the whole tree by less than this fraction
   /// each, in the geometric mean over the next `improvement_lookahead` splits of best-first growth; those are not kept.
@@ -80,16 +84,70 @@ struct GrowthOptions {
 /// See GrowthOptions::min_improvement. One split alone may help little before the next one helps much.
 inline constexpr std::ptrdiff_t improvement_lookahead = 10;
 
+/// What the local models of a partition are fitted to.
+enum class Estimation {
+  as_grown,  ///< least squares of the rows in the leaf's box, whatever the validities
+  local,     ///< each leaf for itself, rows weighted by its validity
+  joint      ///< all leaves at once, see BlendOptions::ridges
+};
+
+/// Which validities are candidates.
+enum class ValidityChoice {
+  automatic,  ///< crisp and blends: the one with the smallest held-out error
+  crisp,
+  blend,
+  gaussian
+};
+
+/// How leaves share the input space. Lists are candidates, of which the smallest held-out error decides; without
+/// folds their first entries are taken.
+struct BlendOptions {
+  ValidityChoice validity = ValidityChoice::automatic;
+  Estimation estimation = Estimation::joint;
+  std::vector<double> widths = {};  ///< Validity::width. Empty: 0.5, 1, 2, 4 for blends; 1/3 for Gaussians
+  /// Joint estimation: ridge, see docs/algorithms.md; 0 is global least squares, infinity local estimation. Empty:
+  /// 1e-6, 1e-4, 1e-3, 1e-2, 1e-1.
+  std::vector<double> ridges = {};
+  int smoothness = 1;  ///< continuous derivatives of blends, 1 or 2
+};
+
+/// How leaf count, validity, width and ridge are chosen: the tree is grown anew in every fold, and what predicts the
+/// held-out rows best is taken.
+struct SelectionOptions {
+  FoldOptions folds = {};  ///< folds.count = 0: no choice, the tree stays as grown. Fewer groups than folds: one fold
+                           ///< per group.
+  /// From this many rows on, one fold is held out once instead of every fold in turn.
+  std::ptrdiff_t single_hold_out_rows = 50000;
+};
+
 struct FitOptions {
   GrowthOptions growth = {};
-  /// Folds over which the leaf count is chosen: the tree is grown anew in every fold, the prefix with the smallest
-  /// held-out squared error wins. folds.count = 0: no choice, the tree stays as grown. Fewer groups than folds: one
-  /// fold per group.
-  FoldOptions folds = {};
+  BlendOptions blend = {};
+  SelectionOptions selection = {};
+  /// Columns of `inputs` whose values are categories 0, 1, 2, ...: split into sets of categories, and offsets in the
+  /// local models.
+  std::vector<int> categorical_inputs = {};
+  Eigen::VectorXd weights = {};  ///< of the rows, not negative; a row of weight 0 takes no part. Empty: all alike.
   int max_threads = 0;  ///< 0: all that the machine has. The result does not depend on it.
   /// Called after each growth (a tree of a fold, or a final one) with how many of how many are done; one call at a
   /// time, from any thread.
   std::function<void(std::ptrdiff_t done, std::ptrdiff_t total)> progress = {};
+};
+
+/// A way to make a model from a grown tree.
+struct Candidate {
+  Validity validity = {};
+  Estimation estimation = Estimation::as_grown;
+  double ridge = 0.0;         ///< of joint estimation
+  std::ptrdiff_t leaves = 1;
+};
+
+/// A candidate and what it left on rows that took no part.
+struct CandidateError {
+  Candidate candidate;
+  double rmse = 0.0;    ///< over all held-out rows, in the output's unit; for a shared partition of the errors divided
+                        ///< by the outputs' standard deviations
+  double spread = 0.0;  ///< standard deviation of the folds' RMSE; 0 for one fold
 };
 
 /// What happened to one partition.
@@ -101,15 +159,18 @@ struct PartitionSummary {
   std::ptrdiff_t rank_deficient_leaves =
       0;  ///< leaves whose rows do not determine all coefficients; those keep their parent's slopes
   Eigen::VectorXd train_rmse;  ///< one per output of the partition
-  /// Held-out error of the prefixes with 1, 2, ... leaves; empty without cross-validation. Root mean square over all
-  /// rows of the error, in the output's unit; for a shared partition of the errors divided by the outputs' standard
-  /// deviations.
-  Eigen::VectorXd cv_rmse;
+  CandidateError chosen;       ///< errors NaN without folds
+  /// What it was chosen against: least squares first, then the best of each validity and width. Empty without folds.
+  std::vector<CandidateError> best_of_kind;
+  /// Held-out RMSE of the crisp prefixes with 1, 2, ... leaves; empty without folds.
+  Eigen::VectorXd crisp_cv_rmse;
   std::ptrdiff_t cv_folds = 0;
+  std::ptrdiff_t held_out_rows = 0;  ///< over all folds
 };
 
 struct FitSummary {
-  std::ptrdiff_t samples = 0;
+  std::ptrdiff_t samples = 0;           ///< of positive weight
+  std::ptrdiff_t missing_values = 0;    ///< in the inputs
   std::ptrdiff_t min_leaf_samples = 0;  ///< as used
   std::vector<PartitionSummary> partitions;
 };
@@ -130,8 +191,11 @@ struct FitResult {
 /// depends on the order of rows, on the number of threads, on scale and offset of inputs and outputs, beyond rounding.
 /// Equally good splits: the first input, then the smallest threshold.
 ///
-/// Throws std::invalid_argument naming argument, value and bound: no rows or columns, row counts that differ, a value
-/// that is not finite, an option out of range, a column index out of range or repeated.
+/// Inputs may be missing (NaN), see Model; outputs may not.
+///
+/// Throws std::invalid_argument naming argument, value and bound: no rows or columns, row counts that differ, an
+/// infinite input or an output that is not finite, an option out of range, a column index out of range or repeated, a
+/// category that is not a whole number from 0 on.
 FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<const Eigen::MatrixXd>& outputs,
               const FitOptions& options = {});
 

@@ -1,9 +1,11 @@
 /// \file
-/// The fitted model: a partition of the input space into boxes, and an affine local model in every box.
+/// The fitted model: a partition of the input space into boxes, an affine local model in every box, and validity
+/// functions that say how much each counts at a point.
 #pragma once
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -11,18 +13,50 @@
 
 namespace llmt {
 
-/// One node of a partition's tree, inner or leaf. Inner nodes keep the local model they had when they were leaves.
+/// How the local models of a partition share the input space. Validities are >= 0 and sum to 1 everywhere.
+enum class ValidityKind {
+  crisp,  ///< 1 in the leaf's own box, 0 elsewhere: the prediction jumps at the splits
+  /// The hierarchical blend: at every split a transition g of compact support hands over from the left to the right
+  /// child, and a leaf's validity is the product of g or 1 - g along its path. With u = (x_j - threshold) / h and
+  /// v = (clamp(u, -1, 1) + 1) / 2:  g = 1 - v^2 (3 - 2 v), or with two continuous derivatives
+  /// g = 1 - v^3 (10 - 15 v + 6 v^2).
+  blend,
+  /// Normalised Gaussians, Phi_i = mu_i / sum mu, mu_i = exp(-1/2 sum_j ((x_j - c_ij) / sigma_ij)^2): c_ij the middle
+  /// of the leaf's box, closed by the training extent, sigma_ij = width times its side (Nelles 2001; width = k_sigma).
+  gaussian
+};
+
+struct Validity {
+  ValidityKind kind = ValidityKind::crisp;
+  /// blend: h as a multiple of the distance from the threshold to the nearer side of the node's box (the extent of the
+  /// smaller child), for splits on numbers; gaussian: k_sigma. 0 for crisp.
+  double width = 0.0;
+  int smoothness = 1;  ///< blend: continuous derivatives of the prediction, 1 or 2
+};
+
+/// One node of a partition's tree, inner or leaf. Inner nodes keep a local model of their own.
 struct Node {
   int left = -1;           ///< child for x[split_input] <= threshold; -1 in a leaf
   int right = -1;          ///< child for x[split_input] > threshold; -1 in a leaf
   int split_input = -1;    ///< column of the input that is compared; -1 in a leaf
   double threshold = 0.0;  ///< in the unit of that input
+  /// Split on a categorical input: for each of its levels -1 left, 1 right, 0 not seen here. Empty for numbers.
+  std::vector<int> level_side = {};
+  double half_width = 0.0;    ///< h of the transition of a blend, in the unit of the split input; 0: a jump
+  double missing_left = 0.5;  ///< validity of the left child where the split input is missing or its level was not seen
 
   std::ptrdiff_t samples = 0;  ///< training rows in the node's box
-  int rank = 0;         ///< of [1, regression inputs] over those rows: the coefficients that the rows could determine
-  Eigen::VectorXd rss;  ///< residual sum of squares of the local model over those rows, one per output of the partition
-  Eigen::VectorXd value;  ///< local model at the centre of the inputs, one per output of the partition
-  Eigen::MatrixXd slope;  ///< d output / d regression input, outputs of the partition x regression inputs
+  int rank = 0;         ///< of [1, regressors] over those rows: the coefficients that the rows could determine
+  Eigen::VectorXd rss;  ///< weighted residual sum of squares over those rows, one per output of the partition
+  Eigen::VectorXd value;  ///< local model at the centre of the regressors, one per output of the partition
+  Eigen::MatrixXd slope;  ///< d output / d regressor, outputs of the partition x regressors
+  /// Of each regressor, as a deviation from its centre: the mean over the node's rows, which stands in for a missing
+  /// value, and the range over the rows that its validity reaches, beyond which the ancestors' slopes take over.
+  Eigen::VectorXd mean;
+  Eigen::VectorXd low;
+  Eigen::VectorXd high;
+  /// Leaves: inverse of the sum of validity * weight * a a', a = [1, deviations]; for leverages. May be empty.
+  Eigen::MatrixXd inverse_gram;
 
   bool is_leaf() const { return left < 0; }
 };
@@ -33,6 +67,7 @@ struct Node {
 /// and 2k (right). The first 2M-1 nodes are therefore the tree as it was with M leaves.
 struct Partition {
   std::vector<int> outputs;  ///< columns of the model's outputs that this partition predicts, ascending
+  Validity validity = {};
   std::vector<Node> nodes;   ///< in order of growth
 
   std::ptrdiff_t num_leaves() const { return (std::ssize(nodes) + 1) / 2; }
@@ -44,6 +79,10 @@ struct InputColumn {
   double low = 0.0;     ///< smallest training value
   double high = 0.0;    ///< largest training value
   double centre = 0.0;  ///< mean of the training values; local models are written about it
+  /// Categorical input: the names of its values 0, 1, 2, ... Empty for numbers.
+  std::vector<std::string> levels = {};
+
+  bool is_categorical() const { return !levels.empty(); }
 };
 
 /// What a model knows of its outputs.
@@ -53,6 +92,13 @@ struct OutputColumn {
   double high = 0.0;  ///< largest training value
 };
 
+/// A column of the local models: a numeric input, or the indicator (0 or 1) of one level of a categorical input.
+struct Regressor {
+  int input = 0;
+  int level = -1;       ///< -1 for a number
+  double centre = 0.0;  ///< mean over the training rows; local models use the deviation from it
+};
+
 /// A leaf as a person reads it: where it holds and what it says there.
 struct Leaf {
   int node = 0;                ///< index into Partition::nodes
@@ -60,51 +106,80 @@ struct Leaf {
   int rank = 0;                ///< as Node::rank
   Eigen::VectorXd low;         ///< box, one per model input: low < x <= high; -infinity where open
   Eigen::VectorXd high;        ///< +infinity where open
-  Eigen::VectorXd rmse;        ///< sqrt(rss / samples) over the training rows, one per output of the partition
-  Eigen::VectorXd intercept;   ///< local model at x = 0, one per output of the partition
-  Eigen::MatrixXd slope;       ///< outputs of the partition x regression inputs
+  std::vector<std::vector<int>> levels;  ///< one per model input: levels that belong to the leaf; empty: all, or numeric
+  Eigen::VectorXd rmse;                  ///< sqrt(rss / samples) over the training rows, one per output of the partition
+  Eigen::VectorXd intercept;             ///< local model where all regressors are 0, one per output of the partition
+  Eigen::MatrixXd slope;                 ///< outputs of the partition x regressors
 };
+
+/// How far a query lies from what the model has seen.
+struct Extrapolation {
+  /// The largest excess over the training extent, as a multiple of that input's training range; 0 inside, infinity
+  /// where an input that never varied differs.
+  double distance = 0.0;
+  /// Validity-weighted mean of a' (sum validity a a')^-1 a over the leaves that reach the point, a = [1, deviations]:
+  /// the leverage of the point on its own local models. Training rows have about (coefficients / rows of the leaf); 1
+  /// and more means that the local model is carried beyond its rows. The largest over the partitions.
+  double leverage = 0.0;
+};
+
+class Evaluator;
 
 /// A fitted local linear model tree: immutable, always complete, safe to use from many threads.
 ///
 /// For output o, served by partition P, at input x:
-///   y_o(x) = value_o + slope_o . (x_r - centre_r)
-/// with the local model of the leaf of P whose box holds x, and x_r the regression inputs. The boxes cover the whole
-/// space: outside the training extent the nearest leaf's local model goes on, which is extrapolation; outside() tells
-/// when and how far.
+///   y_o(x) = sum_i Phi_i(x) f_i(x),  f_i(x) = value_o + slope_o . d(x)
+/// over the leaves of P, with Phi their validities (see ValidityKind) and d the deviations of the regressors from their
+/// centres. The boxes cover the whole space.
+///
+/// Where x leaves the range of a regressor that the leaf's rows covered, the slope of the leaf gives way to that of its
+/// parent, beyond the parent's range to that of its parent, and so on; the root's goes on for ever:
+///   f_i(x) = value_i + slope_i . c_i + sum over ancestors a of slope_a . (c_a - c_below a) + slope_root . (d - c_root)
+/// with c the deviations held to the node's range. The hold is rounded off over a tenth of the range, so that the
+/// derivative stays continuous. Training rows are never touched by it.
+///
+/// A missing value (NaN) takes the share that was learned at each split on its input, and in a local model the mean of
+/// the leaf's rows.
 class Model {
  public:
   /// Throws std::invalid_argument naming the part that does not fit: no partition or node, an output served twice or
   /// not at all, children out of order, an index out of range, a shape, or a number that is not finite.
-  Model(std::vector<InputColumn> inputs, std::vector<OutputColumn> outputs, std::vector<int> regression_inputs,
+  Model(std::vector<InputColumn> inputs, std::vector<OutputColumn> outputs, std::vector<Regressor> regressors,
         std::vector<Partition> partitions);
 
   std::ptrdiff_t num_inputs() const { return std::ssize(inputs_); }
   std::ptrdiff_t num_outputs() const { return std::ssize(outputs_); }
   const std::vector<InputColumn>& inputs() const { return inputs_; }
   const std::vector<OutputColumn>& outputs() const { return outputs_; }
-  const std::vector<int>& regression_inputs() const {
-    return regression_inputs_;
-  }  ///< columns that local models use, ascending
+  const std::vector<Regressor>& regressors() const { return regressors_; }  ///< columns of the local models
   const std::vector<Partition>& partitions() const { return partitions_; }
 
-  /// Predictions, rows x outputs, for `inputs` (rows x inputs). Throws std::invalid_argument if the number of columns
-  /// differs or a value is not finite. Same bytes at any number of threads (0: all).
+  /// Predictions, rows x outputs, for `inputs` (rows x inputs; NaN: missing; categorical inputs as positions in
+  /// InputColumn::levels, others than those count as missing). Throws std::invalid_argument if the number of columns
+  /// differs or a value is infinite. Same bytes at any number of threads (0: all).
   Eigen::MatrixXd predict(const Eigen::Ref<const Eigen::MatrixXd>& inputs, int max_threads = 0) const;
 
-  /// Which leaf holds each row, rows x partitions: positions in leaves(partition). Throws as predict().
+  /// Derivatives of the prediction at one point, outputs x inputs, in closed form. Zero for categorical inputs; at a
+  /// jump of a crisp model that of the side the point belongs to. Throws as predict(), and if a value is missing.
+  Eigen::MatrixXd jacobian(const Eigen::Ref<const Eigen::VectorXd>& point) const;
+
+  /// Which leaf holds each row, rows x partitions: positions in leaves(partition); where validities overlap, the leaf
+  /// of the largest. Throws as predict().
   Eigen::MatrixXi leaf_of(const Eigen::Ref<const Eigen::MatrixXd>& inputs) const;
 
-  /// How far each row lies outside the training extent: the largest excess over the inputs, as a multiple of that
-  /// input's training range; 0 inside, infinity where an input that never varied differs. Throws as predict().
-  Eigen::VectorXd outside(const Eigen::Ref<const Eigen::MatrixXd>& inputs) const;
+  /// The validities of the leaves of a partition at each row, rows x leaves as in leaves(partition). Throws as
+  /// predict(), and if there is no such partition.
+  Eigen::MatrixXd validities(const Eigen::Ref<const Eigen::MatrixXd>& inputs, std::ptrdiff_t partition) const;
+
+  /// How far each row lies from what the model has seen. Missing values do not count. Throws as predict().
+  std::vector<Extrapolation> extrapolation(const Eigen::Ref<const Eigen::MatrixXd>& inputs) const;
 
   /// The leaves of a partition from left to right in the tree. Throws std::invalid_argument if there is no such
   /// partition.
   std::vector<Leaf> leaves(std::ptrdiff_t partition) const;
 
-  /// The model as it was when each partition had at most `max_leaves` leaves. Throws std::invalid_argument if
-  /// max_leaves < 1.
+  /// The model as it was when each partition had at most `max_leaves` leaves: inner nodes' local models, not fitted
+  /// anew. Throws std::invalid_argument if max_leaves < 1.
   Model prefix(std::ptrdiff_t max_leaves) const;
 
   /// The same model with other column names. Throws std::invalid_argument if their numbers differ.
@@ -113,14 +188,15 @@ class Model {
  private:
   std::vector<InputColumn> inputs_;
   std::vector<OutputColumn> outputs_;
-  std::vector<int> regression_inputs_;
+  std::vector<Regressor> regressors_;
   std::vector<Partition> partitions_;
+  std::shared_ptr<const std::vector<Evaluator>> evaluators_;  // one per partition
 };
 
 /// Partition `partition` as it was with at most `max_leaves` leaves.
 Partition prefix(const Partition& partition, std::ptrdiff_t max_leaves);
 
-/// The model as JSON text, format version 1; docs/file-formats.md describes it. Numbers are written so that they read
+/// The model as JSON text, format version 2; docs/file-formats.md describes it. Numbers are written so that they read
 /// back exactly.
 std::string to_json(const Model& model);
 

@@ -1,0 +1,371 @@
+#include "joint_fit.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+#include "parallel.hpp"
+
+namespace llmt {
+namespace {
+
+/// Weight, in rows of unit mean square, with which a direction that rows do not determine is held at its anchor.
+constexpr double tiny_ridge = 1e-6;
+
+/// Rows whose outer products are kept at a time.
+constexpr std::ptrdiff_t chunk_rows = 2048;
+
+/// a += factor * b: the innermost loop of the assembly.
+inline void add_scaled(double* a, const double* b, double factor, std::ptrdiff_t size) {
+  for (std::ptrdiff_t k = 0; k < size; ++k) {
+    a[k] += factor * b[k];
+  }
+}
+
+/// Regressors with missing values at the mean of a node's rows.
+Eigen::VectorXd imputed(const Eigen::VectorXd& deviations, const Node& node) {
+  return deviations.array().isNaN().select(node.mean, deviations);
+}
+
+}  // namespace
+
+JointFit::JointFit(const TrainingRows& training, Partition partition, int max_threads)
+    : training_(training),
+      partition_(std::move(partition)),
+      size_(std::ssize(training.regressors) + 1),
+      missing_(training.deviations.hasNaN()) {
+  packed_ = missing_ ? size_ * size_ : size_ * (size_ + 1) / 2;
+  scale_.resize(size_ - 1);
+  for (std::ptrdiff_t k = 0; k < scale_.size(); ++k) {
+    double squares = 0.0;
+    double largest = 0.0;
+    for (const double value : training.deviations.col(k)) {
+      largest = std::isnan(value) ? largest : std::max(largest, std::abs(value));
+    }
+    for (std::ptrdiff_t i = 0; i < training.count() && largest > 0.0; ++i) {
+      const double value = training.deviations(i, k) / largest;
+      squares += std::isnan(value) ? 0.0 : training.weights(i) * value * value;
+    }
+    scale_(k) = largest > 0.0 ? largest * std::sqrt(squares / static_cast<double>(training.count())) : 1.0;
+  }
+  const Node& root = partition_.nodes.front();
+  root_.resize(size_, root.value.size());
+  root_.row(0) = root.value.transpose();
+  root_.bottomRows(size_ - 1) = scale_.asDiagonal() * root.slope.transpose();
+  assemble(max_threads);
+  solve_locally();
+}
+
+void JointFit::assemble(int max_threads) {
+  const std::size_t nodes = partition_.nodes.size();
+  const std::ptrdiff_t outputs = root_.cols();
+  std::vector<int> leaf_of_node(nodes, -1);
+  for (std::size_t i = 0; i < nodes; ++i) {
+    if (partition_.nodes[i].is_leaf()) {
+      leaf_of_node[i] = static_cast<int>(leaves_.size());
+      leaves_.push_back(static_cast<int>(i));
+    }
+  }
+  const std::ptrdiff_t num_leaves = std::ssize(leaves_);
+  gram_.assign(nodes, Eigen::MatrixXd::Zero(size_, size_));
+  products_.assign(nodes, Eigen::MatrixXd::Zero(size_, outputs));
+  blocks_.resize(leaves_.size());
+  for (std::size_t i = 0; i < leaves_.size(); ++i) {
+    blocks_[i].assign((i + 1) * static_cast<std::size_t>(packed_), 0.0);
+  }
+  std::vector<Eigen::VectorXd> low(nodes, Eigen::VectorXd::Constant(size_ - 1, INFINITY));
+  std::vector<Eigen::VectorXd> high(nodes, Eigen::VectorXd::Constant(size_ - 1, -INFINITY));
+  const Evaluator evaluator(partition_, training_.columns, size_ - 1);
+  const Eigen::MatrixXd outputs_served = training_.outputs(Eigen::all, partition_.outputs);
+
+  struct Entry {
+    int leaf;
+    double validity;
+  };
+  struct Use {
+    std::ptrdiff_t row;     // in the chunk
+    std::ptrdiff_t before;  // first entry of the row
+    std::ptrdiff_t entry;   // that of the leaf
+  };
+  std::vector<Activation> active;
+  Eigen::VectorXd unit(size_);
+  for (std::ptrdiff_t begin = 0; begin < training_.count(); begin += chunk_rows) {
+    const std::ptrdiff_t rows = std::min(chunk_rows, training_.count() - begin);
+    // One after the other: which leaves reach which rows, and the rows' outer products.
+    std::vector<Entry> entries;
+    std::vector<std::vector<Use>> uses(leaves_.size());
+    RowMajor outer(missing_ ? 0 : rows, packed_);
+    RowMajor regressors(rows, size_);
+    RowMajor residuals(rows, outputs);
+    Eigen::VectorXd weights = training_.weights.segment(begin, rows);
+    for (std::ptrdiff_t r = 0; r < rows; ++r) {
+      const std::ptrdiff_t row = begin + r;
+      const double* deviations = training_.deviations.row(row).data();
+      evaluator.activate(training_.inputs.row(row).data(), active);
+      std::sort(active.begin(), active.end(), [](const auto& a, const auto& b) { return a.node < b.node; });
+      const std::ptrdiff_t before = std::ssize(entries);
+      for (const Activation& entry : active) {
+        const int leaf = leaf_of_node[static_cast<std::size_t>(entry.node)];
+        uses[static_cast<std::size_t>(leaf)].push_back({r, before, std::ssize(entries)});
+        entries.push_back({leaf, entry.validity});
+      }
+      regressors(r, 0) = 1.0;
+      for (std::ptrdiff_t k = 1; k < size_; ++k) {
+        regressors(r, k) = deviations[k - 1] / scale_(k - 1);
+      }
+      residuals.row(r) = outputs_served.row(row);
+      if (!missing_) {
+        residuals.row(r) -= regressors.row(r) * root_;
+        double* out = outer.row(r).data();
+        for (std::ptrdiff_t i = 0; i < size_; ++i) {
+          for (std::ptrdiff_t j = 0; j <= i; ++j) {
+            *out++ = regressors(r, i) * regressors(r, j);
+          }
+        }
+      } else {
+        for (const Activation& entry : active) {
+          const Node& node = partition_.nodes[static_cast<std::size_t>(entry.node)];
+          for (std::ptrdiff_t k = 0; k < size_; ++k) {
+            const double x = std::isnan(regressors(r, k)) ? node.mean(k - 1) / scale_(k - 1) : regressors(r, k);
+            residuals.row(r) -= entry.validity * x * root_.row(k);
+          }
+        }
+      }
+    }
+    // Every leaf for itself: its own sums and its blocks with the leaves before it.
+    parallel_for(num_leaves, max_threads, [&](std::ptrdiff_t position) {
+      const std::size_t leaf = static_cast<std::size_t>(position);
+      const std::size_t node = static_cast<std::size_t>(leaves_[leaf]);
+      std::vector<double>& own = blocks_[leaf];
+      Eigen::VectorXd base(packed_);
+      Eigen::VectorXd sum = Eigen::VectorXd::Zero(packed_);
+      Eigen::VectorXd x(size_);
+      Eigen::VectorXd other(size_);
+      const auto regressors_at = [&](std::ptrdiff_t r, const Node& at, Eigen::VectorXd& to) {
+        to(0) = 1.0;
+        for (std::ptrdiff_t k = 1; k < size_; ++k) {
+          to(k) = std::isnan(regressors(r, k)) ? at.mean(k - 1) / scale_(k - 1) : regressors(r, k);
+        }
+      };
+      for (const Use& use : uses[leaf]) {
+        const double validity = entries[static_cast<std::size_t>(use.entry)].validity;
+        const double weight = weights(use.row) * validity;
+        const double* deviations = training_.deviations.row(begin + use.row).data();
+        for (std::ptrdiff_t k = 0; k < size_ - 1; ++k) {
+          low[node](k) = deviations[k] < low[node](k) ? deviations[k] : low[node](k);
+          high[node](k) = deviations[k] > high[node](k) ? deviations[k] : high[node](k);
+        }
+        if (!missing_) {
+          const double* outer_product = outer.row(use.row).data();
+          for (std::ptrdiff_t k = 0; k < packed_; ++k) {
+            base(k) = weight * outer_product[k];
+          }
+          sum += base;
+          for (std::ptrdiff_t e = use.before; e <= use.entry; ++e) {
+            const Entry& entry = entries[static_cast<std::size_t>(e)];
+            add_scaled(own.data() + entry.leaf * packed_, base.data(), entry.validity, packed_);
+          }
+          products_[node] += weight * regressors.row(use.row).transpose() * residuals.row(use.row);
+        } else {
+          regressors_at(use.row, partition_.nodes[node], x);
+          for (std::ptrdiff_t i = 0; i < size_; ++i) {
+            add_scaled(sum.data() + i * size_, x.data(), weight * x(i), size_);
+          }
+          for (std::ptrdiff_t e = use.before; e <= use.entry; ++e) {
+            const Entry& entry = entries[static_cast<std::size_t>(e)];
+            regressors_at(use.row, partition_.nodes[static_cast<std::size_t>(leaves_[static_cast<std::size_t>(entry.leaf)])],
+                          other);
+            for (std::ptrdiff_t i = 0; i < size_; ++i) {
+              add_scaled(own.data() + entry.leaf * packed_ + i * size_, other.data(), weight * entry.validity * x(i),
+                         size_);
+            }
+          }
+          products_[node] += weight * x * residuals.row(use.row);
+        }
+      }
+      std::ptrdiff_t k = 0;
+      for (std::ptrdiff_t i = 0; i < size_; ++i) {
+        for (std::ptrdiff_t j = 0; j < (missing_ ? size_ : i + 1); ++j, ++k) {
+          gram_[node](i, j) += sum(k);
+          if (!missing_ && i != j) {
+            gram_[node](j, i) += sum(k);
+          }
+        }
+      }
+    });
+  }
+  const std::vector<int> parents = parents_of(partition_);
+  for (std::size_t i = nodes; i-- > 0;) {
+    Node& node = partition_.nodes[i];
+    for (std::ptrdiff_t k = 0; k < size_ - 1; ++k) {
+      if (low[i](k) <= high[i](k)) {
+        node.low(k) = low[i](k);
+        node.high(k) = high[i](k);
+      }
+    }
+    if (i > 0) {
+      const std::size_t parent = static_cast<std::size_t>(parents[i]);
+      gram_[parent] += gram_[i];
+      products_[parent] += products_[i];
+      low[parent] = low[parent].cwiseMin(low[i]);
+      high[parent] = high[parent].cwiseMax(high[i]);
+    }
+  }
+}
+
+void JointFit::solve_locally() {
+  const std::vector<int> parents = parents_of(partition_);
+  local_.resize(partition_.nodes.size());
+  local_[0] = Eigen::MatrixXd::Zero(size_, root_.cols());  // the root's model itself
+  for (std::size_t i = 1; i < local_.size(); ++i) {
+    const Eigen::MatrixXd& parent = local_[static_cast<std::size_t>(parents[i])];
+    const Eigen::MatrixXd matrix = gram_[i] + tiny_ridge * Eigen::MatrixXd::Identity(size_, size_);
+    local_[i] = parent + matrix.llt().solve(products_[i] - gram_[i] * parent);
+  }
+}
+
+Eigen::MatrixXd JointFit::block(std::size_t row_leaf, std::size_t column_leaf) const {
+  const double* values = blocks_[row_leaf].data() + static_cast<std::ptrdiff_t>(column_leaf) * packed_;
+  Eigen::MatrixXd result(size_, size_);
+  for (std::ptrdiff_t i = 0; i < size_; ++i) {
+    for (std::ptrdiff_t j = 0; j < (missing_ ? size_ : i + 1); ++j) {
+      result(i, j) = *values++;
+      if (!missing_) {
+        result(j, i) = result(i, j);
+      }
+    }
+  }
+  return result;
+}
+
+void JointFit::set_model(Node& node, const Eigen::MatrixXd& coefficients) const {
+  const Eigen::MatrixXd total = coefficients + root_;
+  node.value = total.row(0).transpose();
+  node.slope = total.bottomRows(size_ - 1).transpose() * scale_.cwiseInverse().asDiagonal();
+}
+
+Partition JointFit::local(std::ptrdiff_t leaves) const {
+  Partition result = prefix(partition_, leaves);
+  for (std::size_t i = 0; i < result.nodes.size(); ++i) {
+    set_model(result.nodes[i], local_[i]);
+  }
+  return result;
+}
+
+std::vector<Partition> JointFit::joint(std::ptrdiff_t leaves, const std::vector<double>& ridges) const {
+  const Partition base = local(leaves);
+  const std::vector<int> parents = parents_of(partition_);
+  // Leaves of the prefix, and for every node of the whole tree the one it lies in.
+  std::vector<int> position(partition_.nodes.size(), -1);
+  std::vector<int> nodes;
+  for (std::size_t i = 0; i < partition_.nodes.size(); ++i) {
+    if (i < base.nodes.size() && base.nodes[i].is_leaf()) {
+      position[i] = static_cast<int>(nodes.size());
+      nodes.push_back(static_cast<int>(i));
+    } else if (i >= base.nodes.size()) {
+      position[i] = position[static_cast<std::size_t>(parents[i])];
+    }
+  }
+  const std::ptrdiff_t unknowns = std::ssize(nodes) * size_;
+  Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(unknowns, unknowns);  // lower triangle
+  for (std::size_t i = 0; i < leaves_.size(); ++i) {
+    const std::ptrdiff_t row = position[static_cast<std::size_t>(leaves_[i])];
+    for (std::size_t j = 0; j <= i; ++j) {
+      const std::ptrdiff_t column = position[static_cast<std::size_t>(leaves_[j])];
+      const Eigen::MatrixXd values = block(i, j);
+      if (row >= column) {
+        matrix.block(row * size_, column * size_, size_, size_) += values;
+      }
+      if ((row <= column && i != j)) {
+        matrix.block(column * size_, row * size_, size_, size_) += values.transpose();
+      }
+    }
+  }
+  // Unknown: the change from the local estimates.
+  Eigen::MatrixXd anchors(unknowns, root_.cols());
+  Eigen::MatrixXd right(unknowns, root_.cols());
+  for (std::size_t k = 0; k < nodes.size(); ++k) {
+    const std::size_t node = static_cast<std::size_t>(nodes[k]);
+    anchors.middleRows(static_cast<std::ptrdiff_t>(k) * size_, size_) = local_[node];
+    right.middleRows(static_cast<std::ptrdiff_t>(k) * size_, size_) = products_[node];
+  }
+  right -= matrix.selfadjointView<Eigen::Lower>() * anchors;
+
+  std::vector<Partition> results;
+  for (const double ridge : ridges) {
+    Eigen::LLT<Eigen::MatrixXd, Eigen::Lower> factor;
+    // Rounding can leave the matrix indefinite when the overlap is large and the ridge small.
+    for (double hold = tiny_ridge; hold < 1e6; hold *= 100.0) {
+      Eigen::MatrixXd regular = matrix;
+      for (std::size_t k = 0; k < nodes.size(); ++k) {
+        const std::ptrdiff_t at = static_cast<std::ptrdiff_t>(k) * size_;
+        regular.block(at, at, size_, size_) += ridge * gram_[static_cast<std::size_t>(nodes[k])];
+      }
+      regular.diagonal().array() += hold;
+      factor.compute(regular);
+      if (factor.info() == Eigen::Success) {
+        break;
+      }
+    }
+    const Eigen::MatrixXd solution = anchors + factor.solve(right);
+    Partition result = base;
+    for (std::size_t k = 0; k < nodes.size(); ++k) {
+      set_model(result.nodes[static_cast<std::size_t>(nodes[k])],
+                solution.middleRows(static_cast<std::ptrdiff_t>(k) * size_, size_));
+    }
+    results.push_back(std::move(result));
+  }
+  return results;
+}
+
+void describe_leaves(const TrainingRows& training, Partition& partition) {
+  const std::ptrdiff_t regressors = std::ssize(training.regressors);
+  const std::ptrdiff_t outputs = std::ssize(partition.outputs);
+  const Evaluator evaluator(partition, training.columns, regressors);
+  for (Node& node : partition.nodes) {
+    node.rss.setZero(outputs);
+    node.inverse_gram = node.is_leaf() ? Eigen::MatrixXd::Zero(regressors + 1, regressors + 1) : Eigen::MatrixXd();
+  }
+  std::vector<Activation> active;
+  Eigen::VectorXd values(outputs);
+  Eigen::VectorXd a(regressors + 1);
+  for (std::ptrdiff_t row = 0; row < training.count(); ++row) {
+    const double* inputs = training.inputs.row(row).data();
+    const double* deviations = training.deviations.row(row).data();
+    evaluator.activate(inputs, active);
+    evaluator.combine(active, deviations, values.data());
+    const Eigen::VectorXd residual = training.outputs(row, partition.outputs).transpose() - values;
+    for (int node = 0; node >= 0;) {
+      partition.nodes[static_cast<std::size_t>(node)].rss += training.weights(row) * residual.cwiseAbs2();
+      node = partition.nodes[static_cast<std::size_t>(node)].is_leaf() ? -1 : evaluator.child_of(node, inputs);
+    }
+    for (const Activation& entry : active) {
+      Node& leaf = partition.nodes[static_cast<std::size_t>(entry.node)];
+      a(0) = 1.0;
+      a.tail(regressors) = imputed(Eigen::Map<const Eigen::VectorXd>(deviations, regressors), leaf);
+      leaf.inverse_gram.selfadjointView<Eigen::Lower>().rankUpdate(a, training.weights(row) * entry.validity);
+    }
+  }
+  // Pseudo-inverse in scaled columns, with a floor: a direction without rows has a large leverage, not an infinite one.
+  for (Node& node : partition.nodes) {
+    if (!node.is_leaf()) {
+      continue;
+    }
+    const Eigen::MatrixXd gram = node.inverse_gram.selfadjointView<Eigen::Lower>();
+    Eigen::VectorXd scale(regressors + 1);
+    for (std::ptrdiff_t k = 0; k <= regressors; ++k) {
+      const double range = k == 0 ? 1.0 : std::max(std::abs(partition.nodes[0].low(k - 1)), std::abs(partition.nodes[0].high(k - 1)));
+      scale(k) = range > 0.0 ? range : 1.0;
+    }
+    const Eigen::MatrixXd scaled = scale.cwiseInverse().asDiagonal() * gram * scale.cwiseInverse().asDiagonal();
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scaled);
+    const double floor = std::max(tiny_ridge, 1e-12 * eigen.eigenvalues().maxCoeff());
+    const Eigen::MatrixXd inverse = eigen.eigenvectors() *
+                                    eigen.eigenvalues().cwiseMax(floor).cwiseInverse().asDiagonal() *
+                                    eigen.eigenvectors().transpose();
+    node.inverse_gram = scale.cwiseInverse().asDiagonal() * inverse * scale.cwiseInverse().asDiagonal();
+  }
+}
+
+}  // namespace llmt

@@ -1,0 +1,62 @@
+/// \file
+/// Estimation of the local models of a partition under its validities: locally weighted, or all at once.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "evaluator.hpp"
+#include "training.hpp"
+
+namespace llmt {
+
+/// Weighted least squares of the outputs on Phi_i [1, x] over all leaves i of a partition, and of all its prefixes.
+///
+/// The joint estimate minimises
+///   sum_n q_n (y_n - sum_i Phi_i(x_n) a_n' w_i)^2 + ridge * sum_i (w_i - w_i^local)' G_i (w_i - w_i^local)
+/// with a = [1, x], q the weights of the rows, G_i = sum_n q_n Phi_i a a', and w_i^local the locally weighted estimate
+/// (X' Q_i X)^-1 X' Q_i y, Q_i = diag(q_n Phi_i(x_n)): ridge 0 is global estimation, a large ridge local estimation
+/// (Nelles 2001, 13.2). Where rows do not determine a direction of a local estimate, the parent's stays. Without
+/// overlap both estimates are those of the crisp tree.
+///
+/// The validity of an inner node is the sum of the validities below it, so one pass over the rows serves every prefix
+/// of the tree. Normal equations in columns scaled over all rows, for the residuals of the root's model.
+class JointFit {
+ public:
+  /// `partition`: half widths set, local models as grown. `training` must live as long as this.
+  JointFit(const TrainingRows& training, Partition partition, int max_threads);
+
+  /// The prefix with `leaves` leaves and the joint estimates for each ridge, in order.
+  std::vector<Partition> joint(std::ptrdiff_t leaves, const std::vector<double>& ridges) const;
+
+  /// The prefix with `leaves` leaves and locally weighted estimates.
+  Partition local(std::ptrdiff_t leaves) const;
+
+  /// The prefix as grown, with the ranges of the validities.
+  Partition as_grown(std::ptrdiff_t leaves) const { return prefix(partition_, leaves); }
+
+ private:
+  void assemble(int max_threads);
+  void solve_locally();
+  Eigen::MatrixXd block(std::size_t row_leaf, std::size_t column_leaf) const;
+  void set_model(Node& node, const Eigen::MatrixXd& coefficients) const;
+
+  const TrainingRows& training_;
+  Partition partition_;
+  std::ptrdiff_t size_;     // coefficients of a local model
+  std::ptrdiff_t packed_;   // doubles of a block
+  bool missing_;            // blocks of rows with missing values are not symmetric, so all are stored in full
+  Eigen::VectorXd scale_;   // of the regressors
+  Eigen::VectorXd output_scale_;
+  std::vector<int> leaves_;                     // nodes, ascending
+  std::vector<std::vector<double>> blocks_;     // of leaf i: with leaves 0 ... i
+  std::vector<Eigen::MatrixXd> gram_;           // of every node, size x size
+  std::vector<Eigen::MatrixXd> products_;       // of every node, size x outputs: sum Phi a r
+  std::vector<Eigen::MatrixXd> local_;          // of every node, size x outputs: about the root's model
+  Eigen::MatrixXd root_;                        // coefficients of the root's model
+};
+
+/// Fills in what a finished partition tells of its leaves: residual sums of squares and inverse Gram matrices.
+void describe_leaves(const TrainingRows& training, Partition& partition);
+
+}  // namespace llmt
