@@ -11,6 +11,9 @@ namespace {
 /// Over this fraction of a node's range the hold of a regressor sets in.
 constexpr double rounding_of_hold = 0.1;
 
+/// Predictions may leave the range of the outputs in training by this fraction of it.
+constexpr double output_margin = 0.1;
+
 /// Validities below this share of the largest are left out of Gaussians.
 constexpr double negligible_log = -40.0;
 
@@ -128,13 +131,20 @@ void set_half_widths(Partition& partition, const Eigen::VectorXd& low, const Eig
   }
 }
 
-Evaluator::Evaluator(const Partition& partition, const std::vector<InputColumn>& inputs, std::ptrdiff_t regressors)
+Evaluator::Evaluator(const Partition& partition, const std::vector<InputColumn>& inputs,
+                     const std::vector<OutputColumn>& outputs, std::ptrdiff_t regressors)
     : kind_(partition.validity.kind),
       smoothness_(partition.validity.smoothness),
       outputs_(std::ssize(partition.outputs)),
       regressors_(regressors),
       inputs_(std::ssize(inputs)),
-      parents_(parents_of(partition)) {
+      parents_(parents_of(partition)),
+      outer_slope_(partition.outer_slope.size() > 0 ? partition.outer_slope : partition.nodes.front().slope) {
+  for (const int output : partition.outputs) {
+    const OutputColumn& column = outputs[static_cast<std::size_t>(output)];
+    const double margin = output_margin * (column.high - column.low);
+    output_ranges_.insert(output_ranges_.end(), {column.low - margin, column.high + margin});
+  }
   for (const Node& node : partition.nodes) {
     Branch branch{.left = node.left,
                   .right = node.right,
@@ -306,16 +316,16 @@ void Evaluator::guarded(int node, const double* deviations, double* values) cons
       below[static_cast<std::size_t>(k - begin)] = held;
       outside = outside || (!missing && held != deviations[k]);
     }
-    for (int at = parents_[static_cast<std::size_t>(node)]; outside && at >= -1;
-         at = at < 0 ? -2 : parents_[static_cast<std::size_t>(at)]) {
+    for (int at = parents_[static_cast<std::size_t>(node)]; outside && at >= 0;
+         at = parents_[static_cast<std::size_t>(at)]) {
       outside = false;
       for (std::ptrdiff_t k = begin; k < end; ++k) {
         double& reached = below[static_cast<std::size_t>(k - begin)];
         if (std::isnan(deviations[k]) || reached == deviations[k]) {
           continue;
         }
-        const double held = at < 0 ? deviations[k] : hold(deviations[k], low(at)[k], high(at)[k]).value;
-        add(std::max(at, 0), k, held - reached);
+        const double held = hold(deviations[k], low(at)[k], high(at)[k]).value;
+        add(at, k, held - reached);
         reached = held;
         outside = outside || held != deviations[k];
       }
@@ -344,7 +354,23 @@ void Evaluator::local(int node, const double* deviations, double* values) const 
   }
 }
 
-void Evaluator::combine(const std::vector<Activation>& active, const double* deviations, double* values) const {
+void Evaluator::finish(const double* deviations, double* values) const {
+  for (std::ptrdiff_t o = 0; o < outputs_; ++o) {
+    const double lowest = output_ranges_[static_cast<std::size_t>(2 * o)];
+    const double highest = output_ranges_[static_cast<std::size_t>(2 * o + 1)];
+    values[o] = hold(values[o], lowest, highest).value;
+  }
+  for (std::ptrdiff_t k = 0; k < regressors_; ++k) {
+    if (deviations[k] < low(0)[k] || deviations[k] > high(0)[k]) {
+      const double beyond = deviations[k] - hold(deviations[k], low(0)[k], high(0)[k]).value;
+      for (std::ptrdiff_t o = 0; o < outputs_; ++o) {
+        values[o] += outer_slope_(o, k) * beyond;
+      }
+    }
+  }
+}
+
+void Evaluator::blend(const std::vector<Activation>& active, const double* deviations, double* values) const {
   if (active.size() == 1) {
     local(active.front().node, deviations, values);
     return;
@@ -366,6 +392,11 @@ void Evaluator::combine(const std::vector<Activation>& active, const double* dev
   }
 }
 
+void Evaluator::combine(const std::vector<Activation>& active, const double* deviations, double* values) const {
+  blend(active, deviations, values);
+  finish(deviations, values);
+}
+
 void Evaluator::local_slopes(int node, const double* deviations, double validity, Eigen::MatrixXd& by_regressor) const {
   for (std::ptrdiff_t k = 0; k < regressors_; ++k) {
     double below = 0.0;  // derivative of the held deviation of the node below
@@ -379,11 +410,6 @@ void Evaluator::local_slopes(int node, const double* deviations, double validity
         break;
       }
     }
-    if (below != 1.0) {
-      for (std::ptrdiff_t o = 0; o < outputs_; ++o) {
-        by_regressor(o, k) += validity * slopes(0, o)[k] * (1.0 - below);
-      }
-    }
   }
 }
 
@@ -393,49 +419,69 @@ void Evaluator::derivatives(const double* row, const double* deviations, Eigen::
   by_regressor.setZero(outputs_, regressors_);
   std::vector<Activation> active;
   activate(row, active);
-  Eigen::VectorXd values(outputs_);
   for (const Activation& entry : active) {
     local_slopes(entry.node, deviations, entry.validity, by_regressor);
   }
   if (kind_ == ValidityKind::gaussian) {
-    // d Phi_i = Phi_i (d l_i - sum_k Phi_k d l_k), l_i the exponent.
-    std::vector<const Gaussian*> of_node(branches_.size(), nullptr);
-    for (const Gaussian& gaussian : gaussians_) {
-      of_node[static_cast<std::size_t>(gaussian.node)] = &gaussian;
-    }
-    const Eigen::Map<const Eigen::VectorXd> x(row, inputs_);
-    Eigen::VectorXd mean = Eigen::VectorXd::Zero(inputs_);
-    std::vector<Eigen::VectorXd> exponents;
-    for (const Activation& entry : active) {
-      const Gaussian& gaussian = *of_node[static_cast<std::size_t>(entry.node)];
-      exponents.push_back(-((x - gaussian.centre).array() * gaussian.per_sigma.array().square()).matrix());
-      mean += entry.validity * exponents.back();
-    }
-    for (std::size_t i = 0; i < active.size(); ++i) {
-      local(active[i].node, deviations, values.data());
-      by_input += active[i].validity * values * (exponents[i] - mean).transpose();
-    }
-    return;
+    add_gaussian_derivatives(active, row, deviations, by_input);
+  } else {
+    add_blend_derivatives(0, 1.0, row, deviations, by_input);
   }
-  // The value of a subtree is g V_left + (1 - g) V_right: its derivative by g is V_left - V_right. `weight` is the
-  // validity of the subtree.
-  const auto subtree = [&](const auto& self, int node, double weight) -> Eigen::VectorXd {
-    const Branch& branch = branches_[static_cast<std::size_t>(node)];
-    if (branch.left < 0) {
-      Eigen::VectorXd leaf(outputs_);
-      local(node, deviations, leaf.data());
-      return leaf;
-    }
-    const double left = left_share(node, row);
-    if (left >= 1.0 || left <= 0.0) {
-      return self(self, left >= 1.0 ? branch.left : branch.right, weight);
-    }
-    const Eigen::VectorXd of_left = self(self, branch.left, weight * left);
-    const Eigen::VectorXd of_right = self(self, branch.right, weight * (1.0 - left));
-    by_input.col(branch.input) += weight * left_share_derivative(node, row) * (of_left - of_right);
-    return left * of_left + (1.0 - left) * of_right;
-  };
-  subtree(subtree, 0, 1.0);
+  // The holds of finish().
+  Eigen::VectorXd values(outputs_);
+  blend(active, deviations, values.data());
+  for (std::ptrdiff_t o = 0; o < outputs_; ++o) {
+    const double derivative = hold(values(o), output_ranges_[static_cast<std::size_t>(2 * o)],
+                                   output_ranges_[static_cast<std::size_t>(2 * o + 1)])
+                                  .derivative;
+    by_input.row(o) *= derivative;
+    by_regressor.row(o) *= derivative;
+  }
+  for (std::ptrdiff_t k = 0; k < regressors_; ++k) {
+    by_regressor.col(k) += outer_slope_.col(k) * (1.0 - hold(deviations[k], low(0)[k], high(0)[k]).derivative);
+  }
+}
+
+// d Phi_i = Phi_i (d l_i - sum_k Phi_k d l_k), l_i the exponent.
+void Evaluator::add_gaussian_derivatives(const std::vector<Activation>& active, const double* row,
+                                         const double* deviations, Eigen::MatrixXd& by_input) const {
+  std::vector<const Gaussian*> of_node(branches_.size(), nullptr);
+  for (const Gaussian& gaussian : gaussians_) {
+    of_node[static_cast<std::size_t>(gaussian.node)] = &gaussian;
+  }
+  const Eigen::Map<const Eigen::VectorXd> x(row, inputs_);
+  Eigen::VectorXd mean = Eigen::VectorXd::Zero(inputs_);
+  std::vector<Eigen::VectorXd> exponents;
+  for (const Activation& entry : active) {
+    const Gaussian& gaussian = *of_node[static_cast<std::size_t>(entry.node)];
+    exponents.push_back(-((x - gaussian.centre).array() * gaussian.per_sigma.array().square()).matrix());
+    mean += entry.validity * exponents.back();
+  }
+  Eigen::VectorXd values(outputs_);
+  for (std::size_t i = 0; i < active.size(); ++i) {
+    local(active[i].node, deviations, values.data());
+    by_input += active[i].validity * values * (exponents[i] - mean).transpose();
+  }
+}
+
+// The value of a subtree is g V_left + (1 - g) V_right: its derivative by g is V_left - V_right.
+Eigen::VectorXd Evaluator::add_blend_derivatives(int node, double validity, const double* row,
+                                                 const double* deviations, Eigen::MatrixXd& by_input) const {
+  const Branch& branch = branches_[static_cast<std::size_t>(node)];
+  if (branch.left < 0) {
+    Eigen::VectorXd leaf(outputs_);
+    local(node, deviations, leaf.data());
+    return leaf;
+  }
+  const double left = left_share(node, row);
+  if (left >= 1.0 || left <= 0.0) {
+    return add_blend_derivatives(left >= 1.0 ? branch.left : branch.right, validity, row, deviations, by_input);
+  }
+  const Eigen::VectorXd of_left = add_blend_derivatives(branch.left, validity * left, row, deviations, by_input);
+  const Eigen::VectorXd of_right =
+      add_blend_derivatives(branch.right, validity * (1.0 - left), row, deviations, by_input);
+  by_input.col(branch.input) += validity * left_share_derivative(node, row) * (of_left - of_right);
+  return left * of_left + (1.0 - left) * of_right;
 }
 
 }  // namespace llmt

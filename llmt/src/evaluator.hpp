@@ -26,16 +26,21 @@ void set_half_widths(Partition& partition, const Eigen::VectorXd& low, const Eig
 /// See Model for what it computes. Immutable after construction.
 class Evaluator {
  public:
-  /// `low` and `high`: training extent of the inputs, which closes the boxes.
-  Evaluator(const Partition& partition, const std::vector<InputColumn>& inputs, std::ptrdiff_t regressors);
+  /// `inputs` and `outputs`: columns of the model, whose extents close the boxes and hold the predictions.
+  Evaluator(const Partition& partition, const std::vector<InputColumn>& inputs,
+            const std::vector<OutputColumn>& outputs, std::ptrdiff_t regressors);
 
   /// The leaves whose validity at the inputs `row` is positive; validities sum to 1.
   void activate(const double* row, std::vector<Activation>& active) const;
 
-  /// Local model of a node, one value per output, with the guard beyond the node's range.
+  /// Local model of a node, one value per output, with its ancestors' slopes beyond the node's range and none beyond
+  /// the root's.
   void local(int node, const double* deviations, double* values) const;
 
-  /// Sum of validity times local model.
+  /// Holds values to the range of the outputs and goes on beyond the root's range.
+  void finish(const double* deviations, double* values) const;
+
+  /// The prediction: sum of validity times local model, finished.
   void combine(const std::vector<Activation>& active, const double* deviations, double* values) const;
 
   /// Derivatives of all outputs at a point without missing values: with respect to the inputs at fixed local models
@@ -80,6 +85,11 @@ class Evaluator {
   double value(int node, std::ptrdiff_t output) const { return slopes(node, output)[-1]; }
   void guarded(int node, const double* deviations, double* values) const;
   void local_slopes(int node, const double* deviations, double validity, Eigen::MatrixXd& by_regressor) const;
+  void add_gaussian_derivatives(const std::vector<Activation>& active, const double* row, const double* deviations,
+                                Eigen::MatrixXd& by_input) const;
+  Eigen::VectorXd add_blend_derivatives(int node, double validity, const double* row, const double* deviations,
+                                        Eigen::MatrixXd& by_input) const;
+  void blend(const std::vector<Activation>& active, const double* deviations, double* values) const;
 
   ValidityKind kind_;
   int smoothness_;
@@ -91,6 +101,8 @@ class Evaluator {
   std::vector<int> level_side_;
   std::vector<double> coefficients_;  // per node and output: value, slopes
   std::vector<double> ranges_;        // per node: low, high, mean
+  std::vector<double> output_ranges_;  // per output: low, high, widened
+  Eigen::MatrixXd outer_slope_;
   std::vector<Gaussian> gaussians_;
 };
 

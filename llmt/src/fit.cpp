@@ -79,6 +79,9 @@ void check_blend(const BlendOptions& options) {
   for (const double ridge : options.ridges) {
     require(ridge >= 0.0 && std::isfinite(ridge), "blend.ridges", ridge, "finite and not negative");
   }
+  for (const double shrinkage : options.shrinkages) {
+    require(shrinkage >= 0.0 && std::isfinite(shrinkage), "blend.shrinkages", shrinkage, "finite and not negative");
+  }
   require(options.smoothness == 1 || options.smoothness == 2, "blend.smoothness", options.smoothness, "1 or 2");
 }
 
@@ -128,6 +131,10 @@ Plan make_plan(const FitOptions& options, const TrainingRows& all, bool has_fold
           options.blend.ridges.empty() ? std::vector<double>{1e-6, 1e-4, 1e-3, 1e-2, 1e-1} : options.blend.ridges;
     }
   }
+  plan.candidates.shrinkages = options.blend.shrinkages;
+  if (plan.candidates.shrinkages.empty()) {
+    plan.candidates.shrinkages = has_folds ? std::vector<double>{0.0, 0.1, 1.0} : std::vector<double>{0.0};
+  }
   GrowthOptions& growth = plan.growth;
   const std::ptrdiff_t regressors = std::ssize(all.regressors);
   const bool many_leaves = !crisp_only && has_folds;
@@ -138,7 +145,7 @@ Plan make_plan(const FitOptions& options, const TrainingRows& all, bool has_fold
     growth.min_leaf_samples = many_leaves ? std::max<std::ptrdiff_t>(5, regressors) : 2 * (regressors + 1);
   }
   if (growth.max_leaves == 0 && many_leaves) {
-    growth.max_leaves = std::clamp<std::ptrdiff_t>(2000 / (regressors + 1), 20, 400);
+    growth.max_leaves = std::clamp<std::ptrdiff_t>(1500 / (regressors + 1), 20, 400);
   }
   return plan;
 }
@@ -162,7 +169,10 @@ Grown grow_rows(const TrainingRows& rows, const Table& table, const std::vector<
   problem.options = std::move(options);
   problem.max_threads = max_threads;
   GrownPartition result = grow(problem);
-  return {.partition = {.outputs = served, .validity = {}, .nodes = std::move(result.nodes)}, .stop = result.stop};
+  Grown grown{.partition = {.outputs = served, .validity = {}, .nodes = std::move(result.nodes), .outer_slope = {}},
+              .stop = result.stop};
+  grown.partition.outer_slope = agreed_slope(grown.partition);
+  return grown;
 }
 
 /// Weights of the outputs' squared errors: 1 for a single one; else 1 / variance, so that outputs of any scale count
@@ -195,16 +205,6 @@ std::vector<Fold> selection_folds(std::ptrdiff_t rows, const SelectionOptions& s
     folds.resize(1);
   }
   return folds;
-}
-
-std::vector<OutputColumn> describe_outputs(const Eigen::MatrixXd& outputs) {
-  std::vector<OutputColumn> columns;
-  for (std::ptrdiff_t o = 0; o < outputs.cols(); ++o) {
-    columns.push_back({.name = outputs.cols() == 1 ? "y" : fmt::format("y{}", o + 1),
-                       .low = outputs.col(o).minCoeff(),
-                       .high = outputs.col(o).maxCoeff()});
-  }
-  return columns;
 }
 
 PartitionSummary summarise(const Partition& partition, const TrainingRows& rows) {
@@ -332,6 +332,7 @@ FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<
       if (!plan.candidates.widths.empty()) {
         candidate.validity = {plan.candidates.kind, plan.candidates.widths.front(), plan.candidates.smoothness};
         candidate.estimation = plan.candidates.estimation;
+        candidate.shrinkage = plan.candidates.shrinkages.front();
         candidate.ridge = plan.candidates.ridges.empty() ? 0.0 : plan.candidates.ridges.front();
       }
     } else if (candidate.leaves < grown_leaves) {
@@ -359,7 +360,7 @@ FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<
   for (std::optional<Partition>& partition : partitions) {
     finished.push_back(std::move(*partition));
   }
-  return {Model(all.columns, describe_outputs(all.outputs), all.regressors, std::move(finished)), std::move(summary)};
+  return {Model(all.columns, all.output_columns, all.regressors, std::move(finished)), std::move(summary)};
 }
 
 Eigen::VectorXd rmse(const Eigen::Ref<const Eigen::MatrixXd>& predicted,

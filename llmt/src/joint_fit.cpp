@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dense.hpp"
 #include "parallel.hpp"
 
 namespace llmt {
@@ -54,7 +55,6 @@ JointFit::JointFit(const TrainingRows& training, Partition partition, int max_th
   root_.row(0) = root.value.transpose();
   root_.bottomRows(size_ - 1) = scale_.asDiagonal() * root.slope.transpose();
   assemble(max_threads);
-  solve_locally();
 }
 
 void JointFit::assemble(int max_threads) {
@@ -76,7 +76,7 @@ void JointFit::assemble(int max_threads) {
   }
   std::vector<Eigen::VectorXd> low(nodes, Eigen::VectorXd::Constant(size_ - 1, INFINITY));
   std::vector<Eigen::VectorXd> high(nodes, Eigen::VectorXd::Constant(size_ - 1, -INFINITY));
-  const Evaluator evaluator(partition_, training_.columns, size_ - 1);
+  const Evaluator evaluator(partition_, training_.columns, training_.output_columns, size_ - 1);
   const Eigen::MatrixXd outputs_served = training_.outputs(Eigen::all, partition_.outputs);
 
   struct Entry {
@@ -138,8 +138,43 @@ void JointFit::assemble(int max_threads) {
       const std::size_t leaf = static_cast<std::size_t>(position);
       const std::size_t node = static_cast<std::size_t>(leaves_[leaf]);
       std::vector<double>& own = blocks_[leaf];
-      Eigen::VectorXd base(packed_);
       Eigen::VectorXd sum = Eigen::VectorXd::Zero(packed_);
+      if (!missing_) {
+        // Of the leaves before: validities of those that share rows with this one, rows x leaves; last column: 1.
+        std::vector<int> column_of(leaf + 1, -1);
+        std::vector<int> others;
+        for (const Use& use : uses[leaf]) {
+          for (std::ptrdiff_t e = use.before; e <= use.entry; ++e) {
+            const std::size_t other = static_cast<std::size_t>(entries[static_cast<std::size_t>(e)].leaf);
+            if (column_of[other] < 0) {
+              column_of[other] = static_cast<int>(others.size());
+              others.push_back(static_cast<int>(other));
+            }
+          }
+        }
+        const std::ptrdiff_t columns = std::ssize(others) + 1;
+        RowMajor validities = RowMajor::Zero(std::ssize(uses[leaf]), columns);
+        RowMajor products(std::ssize(uses[leaf]), packed_);
+        for (std::size_t u = 0; u < uses[leaf].size(); ++u) {
+          const Use& use = uses[leaf][u];
+          const std::ptrdiff_t row = static_cast<std::ptrdiff_t>(u);
+          products.row(row) = outer.row(use.row) *
+                              (weights(use.row) * entries[static_cast<std::size_t>(use.entry)].validity);
+          for (std::ptrdiff_t e = use.before; e <= use.entry; ++e) {
+            const Entry& entry = entries[static_cast<std::size_t>(e)];
+            validities(row, column_of[static_cast<std::size_t>(entry.leaf)]) = entry.validity;
+          }
+          validities(row, columns - 1) = 1.0;
+        }
+        RowMajor sums = RowMajor::Zero(columns, packed_);
+        add_transposed_product(columns, packed_, validities.rows(), 1.0, validities.data(), columns, products.data(),
+                               packed_, sums.data(), packed_);
+        for (std::size_t k = 0; k < others.size(); ++k) {
+          Eigen::Map<Eigen::VectorXd>(own.data() + others[k] * packed_, packed_) +=
+              sums.row(static_cast<std::ptrdiff_t>(k)).transpose();
+        }
+        sum = sums.row(columns - 1).transpose();
+      }
       Eigen::VectorXd x(size_);
       Eigen::VectorXd other(size_);
       const auto regressors_at = [&](std::ptrdiff_t r, const Node& at, Eigen::VectorXd& to) {
@@ -157,15 +192,6 @@ void JointFit::assemble(int max_threads) {
           high[node](k) = deviations[k] > high[node](k) ? deviations[k] : high[node](k);
         }
         if (!missing_) {
-          const double* outer_product = outer.row(use.row).data();
-          for (std::ptrdiff_t k = 0; k < packed_; ++k) {
-            base(k) = weight * outer_product[k];
-          }
-          sum += base;
-          for (std::ptrdiff_t e = use.before; e <= use.entry; ++e) {
-            const Entry& entry = entries[static_cast<std::size_t>(e)];
-            add_scaled(own.data() + entry.leaf * packed_, base.data(), entry.validity, packed_);
-          }
           products_[node] += weight * regressors.row(use.row).transpose() * residuals.row(use.row);
         } else {
           regressors_at(use.row, partition_.nodes[node], x);
@@ -214,15 +240,27 @@ void JointFit::assemble(int max_threads) {
   }
 }
 
-void JointFit::solve_locally() {
-  const std::vector<int> parents = parents_of(partition_);
-  local_.resize(partition_.nodes.size());
-  local_[0] = Eigen::MatrixXd::Zero(size_, root_.cols());  // the root's model itself
-  for (std::size_t i = 1; i < local_.size(); ++i) {
-    const Eigen::MatrixXd& parent = local_[static_cast<std::size_t>(parents[i])];
-    const Eigen::MatrixXd matrix = gram_[i] + tiny_ridge * Eigen::MatrixXd::Identity(size_, size_);
-    local_[i] = parent + matrix.llt().solve(products_[i] - gram_[i] * parent);
+Eigen::VectorXd JointFit::hold(std::size_t node, double shrinkage) const {
+  const Eigen::MatrixXd& gram = gram_[node];
+  const double total = gram(0, 0);
+  Eigen::VectorXd result = Eigen::VectorXd::Constant(size_, tiny_ridge);
+  for (std::ptrdiff_t k = 1; k < size_ && total > 0.0; ++k) {
+    result(k) += shrinkage * std::max(0.0, (gram(k, k) - gram(0, k) * gram(0, k) / total) / total);
   }
+  return result;
+}
+
+std::vector<Eigen::MatrixXd> JointFit::local_models(std::size_t nodes, double shrinkage) const {
+  const std::vector<int> parents = parents_of(partition_);
+  std::vector<Eigen::MatrixXd> models(nodes);
+  models[0] = Eigen::MatrixXd::Zero(size_, root_.cols());  // the root's model itself
+  for (std::size_t i = 1; i < nodes; ++i) {
+    const Eigen::MatrixXd& parent = models[static_cast<std::size_t>(parents[i])];
+    Eigen::MatrixXd matrix = gram_[i];
+    matrix.diagonal() += hold(i, shrinkage);
+    models[i] = parent + matrix.llt().solve(products_[i] - gram_[i] * parent);
+  }
+  return models;
 }
 
 Eigen::MatrixXd JointFit::block(std::size_t row_leaf, std::size_t column_leaf) const {
@@ -245,16 +283,21 @@ void JointFit::set_model(Node& node, const Eigen::MatrixXd& coefficients) const 
   node.slope = total.bottomRows(size_ - 1).transpose() * scale_.cwiseInverse().asDiagonal();
 }
 
-Partition JointFit::local(std::ptrdiff_t leaves) const {
+Partition JointFit::with_models(std::ptrdiff_t leaves, const std::vector<Eigen::MatrixXd>& models) const {
   Partition result = prefix(partition_, leaves);
   for (std::size_t i = 0; i < result.nodes.size(); ++i) {
-    set_model(result.nodes[i], local_[i]);
+    set_model(result.nodes[i], models[i]);
   }
   return result;
 }
 
-std::vector<Partition> JointFit::joint(std::ptrdiff_t leaves, const std::vector<double>& ridges) const {
-  const Partition base = local(leaves);
+Partition JointFit::local(std::ptrdiff_t leaves, double shrinkage) const {
+  return with_models(leaves, local_models(static_cast<std::size_t>(2 * leaves - 1), shrinkage));
+}
+
+std::vector<Partition> JointFit::joint(std::ptrdiff_t leaves,
+                                       const std::vector<Regularisation>& regularisations) const {
+  const Partition base = prefix(partition_, leaves);
   const std::vector<int> parents = parents_of(partition_);
   // Leaves of the prefix, and for every node of the whole tree the one it lies in.
   std::vector<int> position(partition_.nodes.size(), -1);
@@ -268,48 +311,50 @@ std::vector<Partition> JointFit::joint(std::ptrdiff_t leaves, const std::vector<
     }
   }
   const std::ptrdiff_t unknowns = std::ssize(nodes) * size_;
-  Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(unknowns, unknowns);  // lower triangle
+  RowMajor matrix = RowMajor::Zero(unknowns, unknowns);  // upper triangle
   for (std::size_t i = 0; i < leaves_.size(); ++i) {
     const std::ptrdiff_t row = position[static_cast<std::size_t>(leaves_[i])];
     for (std::size_t j = 0; j <= i; ++j) {
       const std::ptrdiff_t column = position[static_cast<std::size_t>(leaves_[j])];
       const Eigen::MatrixXd values = block(i, j);
-      if (row >= column) {
+      if (row <= column) {
         matrix.block(row * size_, column * size_, size_, size_) += values;
       }
-      if ((row <= column && i != j)) {
+      if (row >= column && i != j) {
         matrix.block(column * size_, row * size_, size_, size_) += values.transpose();
       }
     }
   }
-  // Unknown: the change from the local estimates.
-  Eigen::MatrixXd anchors(unknowns, root_.cols());
-  Eigen::MatrixXd right(unknowns, root_.cols());
-  for (std::size_t k = 0; k < nodes.size(); ++k) {
-    const std::size_t node = static_cast<std::size_t>(nodes[k]);
-    anchors.middleRows(static_cast<std::ptrdiff_t>(k) * size_, size_) = local_[node];
-    right.middleRows(static_cast<std::ptrdiff_t>(k) * size_, size_) = products_[node];
-  }
-  right -= matrix.selfadjointView<Eigen::Lower>() * anchors;
-
   std::vector<Partition> results;
-  for (const double ridge : ridges) {
-    Eigen::LLT<Eigen::MatrixXd, Eigen::Lower> factor;
+  for (const Regularisation& regularisation : regularisations) {
+    const std::vector<Eigen::MatrixXd> models = local_models(base.nodes.size(), regularisation.shrinkage);
+    // Unknown: the change from the local estimates.
+    Eigen::MatrixXd anchors(unknowns, root_.cols());
+    Eigen::MatrixXd right(unknowns, root_.cols());
+    for (std::size_t k = 0; k < nodes.size(); ++k) {
+      const std::size_t node = static_cast<std::size_t>(nodes[k]);
+      anchors.middleRows(static_cast<std::ptrdiff_t>(k) * size_, size_) = models[node];
+      right.middleRows(static_cast<std::ptrdiff_t>(k) * size_, size_) = products_[node];
+    }
+    right -= matrix.selfadjointView<Eigen::Upper>() * anchors;
+    RowMajor regular;
     // Rounding can leave the matrix indefinite when the overlap is large and the ridge small.
-    for (double hold = tiny_ridge; hold < 1e6; hold *= 100.0) {
-      Eigen::MatrixXd regular = matrix;
+    for (double more = 0.0; more < 1e6; more = 100.0 * std::max(more, tiny_ridge)) {
+      regular = matrix;
       for (std::size_t k = 0; k < nodes.size(); ++k) {
+        const std::size_t node = static_cast<std::size_t>(nodes[k]);
         const std::ptrdiff_t at = static_cast<std::ptrdiff_t>(k) * size_;
-        regular.block(at, at, size_, size_) += ridge * gram_[static_cast<std::size_t>(nodes[k])];
+        regular.block(at, at, size_, size_) += regularisation.ridge * gram_[node];
+        regular.diagonal().segment(at, size_) += hold(node, regularisation.shrinkage);
       }
-      regular.diagonal().array() += hold;
-      factor.compute(regular);
-      if (factor.info() == Eigen::Success) {
+      regular.diagonal().array() += more;
+      if (factor_cholesky(regular)) {
         break;
       }
     }
-    const Eigen::MatrixXd solution = anchors + factor.solve(right);
-    Partition result = base;
+    solve_cholesky(regular, right);
+    const Eigen::MatrixXd solution = anchors + right;
+    Partition result = with_models(leaves, models);
     for (std::size_t k = 0; k < nodes.size(); ++k) {
       set_model(result.nodes[static_cast<std::size_t>(nodes[k])],
                 solution.middleRows(static_cast<std::ptrdiff_t>(k) * size_, size_));
@@ -322,7 +367,7 @@ std::vector<Partition> JointFit::joint(std::ptrdiff_t leaves, const std::vector<
 void describe_leaves(const TrainingRows& training, Partition& partition) {
   const std::ptrdiff_t regressors = std::ssize(training.regressors);
   const std::ptrdiff_t outputs = std::ssize(partition.outputs);
-  const Evaluator evaluator(partition, training.columns, regressors);
+  const Evaluator evaluator(partition, training.columns, training.output_columns, regressors);
   for (Node& node : partition.nodes) {
     node.rss.setZero(outputs);
     node.inverse_gram = node.is_leaf() ? Eigen::MatrixXd::Zero(regressors + 1, regressors + 1) : Eigen::MatrixXd();

@@ -10,14 +10,21 @@
 
 namespace llmt {
 
+/// How strongly estimates are held.
+struct Regularisation {
+  double ridge = 0.0;      ///< joint estimates at the local ones
+  double shrinkage = 0.0;  ///< local estimates at the parent's, see Candidate::shrinkage
+};
+
 /// Weighted least squares of the outputs on Phi_i [1, x] over all leaves i of a partition, and of all its prefixes.
 ///
 /// The joint estimate minimises
 ///   sum_n q_n (y_n - sum_i Phi_i(x_n) a_n' w_i)^2 + ridge * sum_i (w_i - w_i^local)' G_i (w_i - w_i^local)
 /// with a = [1, x], q the weights of the rows, G_i = sum_n q_n Phi_i a a', and w_i^local the locally weighted estimate
-/// (X' Q_i X)^-1 X' Q_i y, Q_i = diag(q_n Phi_i(x_n)): ridge 0 is global estimation, a large ridge local estimation
-/// (Nelles 2001, 13.2). Where rows do not determine a direction of a local estimate, the parent's stays. Without
-/// overlap both estimates are those of the crisp tree.
+/// w_parent + (X' Q_i X + H_i)^-1 X' Q_i (y - X w_parent), Q_i = diag(q_n Phi_i(x_n)): ridge 0 is global estimation, a
+/// large ridge local estimation (Nelles 2001, 13.2). H_i shrinks towards the parent: `shrinkage` rows of the variance
+/// that each column has in the leaf, uncorrelated. Where rows do not determine a direction, the parent's stays. Without
+/// overlap and shrinkage both estimates are those of the crisp tree.
 ///
 /// The validity of an inner node is the sum of the validities below it, so one pass over the rows serves every prefix
 /// of the tree. Normal equations in columns scaled over all rows, for the residuals of the root's model.
@@ -26,18 +33,21 @@ class JointFit {
   /// `partition`: half widths set, local models as grown. `training` must live as long as this.
   JointFit(const TrainingRows& training, Partition partition, int max_threads);
 
-  /// The prefix with `leaves` leaves and the joint estimates for each ridge, in order.
-  std::vector<Partition> joint(std::ptrdiff_t leaves, const std::vector<double>& ridges) const;
+  /// The prefix with `leaves` leaves and the joint estimates for each ridge and shrinkage, in order.
+  std::vector<Partition> joint(std::ptrdiff_t leaves, const std::vector<Regularisation>& regularisations) const;
 
   /// The prefix with `leaves` leaves and locally weighted estimates.
-  Partition local(std::ptrdiff_t leaves) const;
+  Partition local(std::ptrdiff_t leaves, double shrinkage) const;
 
   /// The prefix as grown, with the ranges of the validities.
   Partition as_grown(std::ptrdiff_t leaves) const { return prefix(partition_, leaves); }
 
  private:
   void assemble(int max_threads);
-  void solve_locally();
+  /// Of all nodes, size x outputs, about the root's model.
+  std::vector<Eigen::MatrixXd> local_models(std::size_t nodes, double shrinkage) const;
+  Partition with_models(std::ptrdiff_t leaves, const std::vector<Eigen::MatrixXd>& models) const;
+  Eigen::VectorXd hold(std::size_t node, double shrinkage) const;
   Eigen::MatrixXd block(std::size_t row_leaf, std::size_t column_leaf) const;
   void set_model(Node& node, const Eigen::MatrixXd& coefficients) const;
 
@@ -52,7 +62,6 @@ class JointFit {
   std::vector<std::vector<double>> blocks_;     // of leaf i: with leaves 0 ... i
   std::vector<Eigen::MatrixXd> gram_;           // of every node, size x size
   std::vector<Eigen::MatrixXd> products_;       // of every node, size x outputs: sum Phi a r
-  std::vector<Eigen::MatrixXd> local_;          // of every node, size x outputs: about the root's model
   Eigen::MatrixXd root_;                        // coefficients of the root's model
 };
 

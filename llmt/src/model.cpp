@@ -85,6 +85,11 @@ void check_partition(const Partition& partition, const std::vector<InputColumn>&
   if (partition.outputs.empty() || partition.nodes.empty() || partition.nodes.size() % 2 == 0) {
     reject(fmt::format("{}: it needs an output and an odd number of nodes", where));
   }
+  if (partition.outer_slope.size() > 0 && (partition.outer_slope.rows() != std::ssize(partition.outputs) ||
+                                           partition.outer_slope.cols() != regressors ||
+                                           !partition.outer_slope.allFinite())) {
+    reject(fmt::format("{}: outer_slope must be finite, {} x {}", where, partition.outputs.size(), regressors));
+  }
   std::vector<bool> has_parent(partition.nodes.size(), false);
   for (std::size_t i = 0; i < partition.nodes.size(); ++i) {
     check_node(partition, static_cast<std::ptrdiff_t>(i), inputs, regressors, fmt::format("{} node {}", where, i));
@@ -207,7 +212,7 @@ Model::Model(std::vector<InputColumn> inputs, std::vector<OutputColumn> outputs,
   }
   std::vector<Evaluator> evaluators;
   for (const Partition& partition : partitions_) {
-    evaluators.emplace_back(partition, inputs_, std::ssize(regressors_));
+    evaluators.emplace_back(partition, inputs_, outputs_, std::ssize(regressors_));
   }
   evaluators_ = std::make_shared<const std::vector<Evaluator>>(std::move(evaluators));
 }
@@ -355,7 +360,8 @@ Partition prefix(const Partition& partition, std::ptrdiff_t max_leaves) {
   const std::ptrdiff_t kept = 2 * std::min(max_leaves, partition.num_leaves()) - 1;
   Partition result{.outputs = partition.outputs,
                    .validity = partition.validity,
-                   .nodes = {partition.nodes.begin(), partition.nodes.begin() + kept}};
+                   .nodes = {partition.nodes.begin(), partition.nodes.begin() + kept},
+                   .outer_slope = partition.outer_slope};
   for (Node& node : result.nodes) {
     if (node.left >= kept) {
       make_leaf(node);

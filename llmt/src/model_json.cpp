@@ -23,6 +23,14 @@ constexpr int format_version = 2;
 
 Json to_array(const Eigen::VectorXd& values) { return Json(std::vector<double>(values.begin(), values.end())); }
 
+Json rows_to_json(const Eigen::MatrixXd& matrix) {
+  Json rows = Json::array();
+  for (std::ptrdiff_t i = 0; i < matrix.rows(); ++i) {
+    rows.push_back(to_array(matrix.row(i)));
+  }
+  return rows;
+}
+
 Json node_to_json(const Node& node, const Model& model) {
   Json json;
   if (!node.is_leaf()) {
@@ -42,10 +50,7 @@ Json node_to_json(const Node& node, const Model& model) {
   json["rank"] = node.rank;
   json["rss"] = to_array(node.rss);
   json["value"] = to_array(node.value);
-  json["slope"] = Json::array();
-  for (std::ptrdiff_t o = 0; o < node.slope.rows(); ++o) {
-    json["slope"].push_back(to_array(node.slope.row(o)));
-  }
+  json["slope"] = rows_to_json(node.slope);
   json["mean"] = to_array(node.mean);
   json["low"] = to_array(node.low);
   json["high"] = to_array(node.high);
@@ -139,6 +144,18 @@ class Reader {
   std::string where_;
 };
 
+Eigen::MatrixXd rows_from_json(const Reader& json, std::ptrdiff_t rows, std::ptrdiff_t columns) {
+  const std::vector<Reader> elements = json.elements();
+  if (std::ssize(elements) != rows) {
+    json.fail(fmt::format("{} rows are needed, there are {}", rows, elements.size()));
+  }
+  Eigen::MatrixXd matrix(rows, columns);
+  for (std::ptrdiff_t i = 0; i < rows; ++i) {
+    matrix.row(i) = elements[static_cast<std::size_t>(i)].vector(columns).transpose();
+  }
+  return matrix;
+}
+
 Node node_from_json(const Reader& json, std::ptrdiff_t outputs, std::ptrdiff_t regressors) {
   Node node;
   if (json.has("split")) {
@@ -158,14 +175,7 @@ Node node_from_json(const Reader& json, std::ptrdiff_t outputs, std::ptrdiff_t r
   node.rank = json.member("rank").as<int>();
   node.rss = json.member("rss").vector(outputs);
   node.value = json.member("value").vector(outputs);
-  const std::vector<Reader> slopes = json.member("slope").elements();
-  if (std::ssize(slopes) != outputs) {
-    json.member("slope").fail(fmt::format("{} rows are needed, there are {}", outputs, slopes.size()));
-  }
-  node.slope.resize(outputs, regressors);
-  for (std::ptrdiff_t o = 0; o < outputs; ++o) {
-    node.slope.row(o) = slopes[static_cast<std::size_t>(o)].vector(regressors).transpose();
-  }
+  node.slope = rows_from_json(json.member("slope"), outputs, regressors);
   node.mean = json.member("mean").vector(regressors);
   node.low = json.member("low").vector(regressors);
   node.high = json.member("high").vector(regressors);
@@ -230,6 +240,7 @@ std::string to_json(const Model& model) {
                                    {{"kind", validity_names[static_cast<std::size_t>(partition.validity.kind)]},
                                     {"width", partition.validity.width},
                                     {"smoothness", partition.validity.smoothness}}},
+                                  {"outer_slope", rows_to_json(partition.outer_slope.size() > 0 ? partition.outer_slope : partition.nodes.front().slope)},
                                   {"nodes", std::move(nodes)}});
   }
   try {
@@ -279,7 +290,10 @@ Model from_json(const std::string& text, const std::string& name) {
   for (const Reader& entry : root.member("partitions").elements()) {
     Partition partition{.outputs = entry.member("outputs").list<int>(),
                         .validity = validity_from_json(entry.member("validity")),
-                        .nodes = {}};
+                        .nodes = {},
+                        .outer_slope = {}};
+    partition.outer_slope = rows_from_json(entry.member("outer_slope"), std::ssize(partition.outputs),
+                                           std::ssize(regressors));
     for (const Reader& node : entry.member("nodes").elements()) {
       partition.nodes.push_back(node_from_json(node, std::ssize(partition.outputs), std::ssize(regressors)));
     }

@@ -5,6 +5,7 @@
 #include <limits>
 #include <map>
 #include <optional>
+#include <set>
 
 #include "evaluator.hpp"
 #include "joint_fit.hpp"
@@ -19,18 +20,22 @@ constexpr std::ptrdiff_t screening_rows = 1000;
 /// Widths that go on to all folds.
 constexpr std::size_t finalists = 2;
 
+/// Candidates of the finalists that are compared on all folds.
+constexpr std::size_t candidates_on_all_folds = 6;
+
+/// Leaves of the tree that are asked whether they agree on a slope beyond the training extent.
+constexpr std::ptrdiff_t leaves_that_agree = 32;
+
 /// Up to this many unknowns every ridge is tried with every leaf count; beyond, in screening, the middle one.
 constexpr std::ptrdiff_t cheap_unknowns = 300;
 
-/// 1, 2, 3, 4, 6, 9, ...: each half as large again, and the largest.
+/// 2, 3, 4, 6, 9, ..., `largest`: each half as large again as the one before, counted from the largest down.
 std::vector<std::ptrdiff_t> leaf_counts(std::ptrdiff_t largest) {
   std::vector<std::ptrdiff_t> counts;
-  for (std::ptrdiff_t count = 2; count < largest; count = std::max(count + 1, count * 3 / 2)) {
+  for (std::ptrdiff_t count = largest; count > 1; count = std::min(count - 1, (count * 2 + 1) / 3)) {
     counts.push_back(count);
   }
-  if (largest > 1) {
-    counts.push_back(largest);
-  }
+  std::reverse(counts.begin(), counts.end());
   return counts;
 }
 
@@ -39,6 +44,7 @@ struct Key {
   std::size_t width;
   std::size_t leaves;
   std::size_t ridge;
+  std::size_t shrinkage;
   auto operator<=>(const Key&) const = default;
 };
 
@@ -62,10 +68,12 @@ Errors evaluate(const FoldTree& fold, const Candidates& candidates, std::size_t 
   double best = std::numeric_limits<double>::infinity();
   int without_gain = 0;
   for (std::size_t k = 0; k < counts.size() && without_gain < 2; ++k) {
-    std::vector<std::size_t> tried;
+    std::vector<Key> tried;
     for (std::size_t r = 0; r < ridges; ++r) {
-      if (wanted(Key{width, k, r})) {
-        tried.push_back(r);
+      for (std::size_t s = 0; s < candidates.shrinkages.size(); ++s) {
+        if (wanted(Key{width, k, r, s})) {
+          tried.push_back({width, k, r, s});
+        }
       }
     }
     if (tried.empty()) {
@@ -74,18 +82,22 @@ Errors evaluate(const FoldTree& fold, const Candidates& candidates, std::size_t 
     const std::ptrdiff_t leaves = std::min(counts[k], fold.grown.num_leaves());
     std::vector<Partition> models;
     if (candidates.estimation == Estimation::joint) {
-      std::vector<double> values;
-      for (const std::size_t r : tried) {
-        values.push_back(ridge_at(candidates, r));
+      std::vector<Regularisation> values;
+      for (const Key& key : tried) {
+        values.push_back({ridge_at(candidates, key.ridge), candidates.shrinkages[key.shrinkage]});
       }
       models = fit.joint(leaves, values);
     } else {
-      models.push_back(candidates.estimation == Estimation::local ? fit.local(leaves) : fit.as_grown(leaves));
+      for (const Key& key : tried) {
+        models.push_back(candidates.estimation == Estimation::local
+                             ? fit.local(leaves, candidates.shrinkages[key.shrinkage])
+                             : fit.as_grown(leaves));
+      }
     }
     double here = std::numeric_limits<double>::infinity();
     for (std::size_t i = 0; i < models.size(); ++i) {
       const double error = squared_error(models[i], fold.held_out, weights);
-      errors[{width, k, tried[i]}] = error;
+      errors[tried[i]] = error;
       here = std::min(here, error);
     }
     without_gain = stop_early && here >= best ? without_gain + 1 : 0;
@@ -121,9 +133,29 @@ double sum(const std::vector<double>& values) {
 
 }  // namespace
 
+Eigen::MatrixXd agreed_slope(const Partition& grown) {
+  const Partition first = prefix(grown, leaves_that_agree);
+  const Node& root = first.nodes.front();
+  Eigen::MatrixXd spread = Eigen::MatrixXd::Zero(root.slope.rows(), root.slope.cols());
+  for (const Node& node : first.nodes) {
+    if (node.is_leaf()) {
+      spread += static_cast<double>(node.samples) / static_cast<double>(root.samples) *
+                (node.slope - root.slope).cwiseAbs2();
+    }
+  }
+  Eigen::MatrixXd slope = root.slope;
+  for (std::ptrdiff_t o = 0; o < spread.rows(); ++o) {
+    for (std::ptrdiff_t k = 0; k < spread.cols(); ++k) {
+      const double squared = root.slope(o, k) * root.slope(o, k);
+      slope(o, k) *= squared > spread(o, k) ? 1.0 - spread(o, k) / squared : 0.0;
+    }
+  }
+  return slope;
+}
+
 Eigen::VectorXd prefix_squared_errors(const Partition& partition, const TrainingRows& rows,
                                       const Eigen::VectorXd& weights) {
-  const Evaluator evaluator(partition, rows.columns, std::ssize(rows.regressors));
+  const Evaluator evaluator(partition, rows.columns, rows.output_columns, std::ssize(rows.regressors));
   const Eigen::MatrixXd outputs = rows.outputs(Eigen::all, partition.outputs);
   Eigen::VectorXd change = Eigen::VectorXd::Zero(partition.num_leaves());  // of the sum, from M - 1 to M leaves
   Eigen::VectorXd values(outputs.cols());
@@ -131,6 +163,7 @@ Eigen::VectorXd prefix_squared_errors(const Partition& partition, const Training
     double previous = 0.0;
     for (int index = 0; index >= 0;) {
       evaluator.local(index, rows.deviations.row(row).data(), values.data());
+      evaluator.finish(rows.deviations.row(row).data(), values.data());
       const double squared =
           rows.weights(row) * weights.dot((outputs.row(row).transpose() - values).cwiseAbs2());
       // Nodes 2k-1 and 2k come with the k-th split, that is with k + 1 leaves.
@@ -148,7 +181,7 @@ Eigen::VectorXd prefix_squared_errors(const Partition& partition, const Training
 }
 
 double squared_error(const Partition& partition, const TrainingRows& rows, const Eigen::VectorXd& weights) {
-  const Evaluator evaluator(partition, rows.columns, std::ssize(rows.regressors));
+  const Evaluator evaluator(partition, rows.columns, rows.output_columns, std::ssize(rows.regressors));
   std::vector<Activation> active;
   Eigen::VectorXd values(std::ssize(partition.outputs));
   double total = 0.0;
@@ -165,9 +198,12 @@ double squared_error(const Partition& partition, const TrainingRows& rows, const
 
 Partition estimate(const TrainingRows& training, const Partition& grown, const Candidate& candidate, int max_threads) {
   Partition partition = prefix(grown, candidate.leaves);
+  if (candidate.leaves == 1) {
+    partition.outer_slope.resize(0, 0);  // one linear model goes on as it is
+  }
   partition.validity = candidate.validity;
   if (candidate.validity.kind == ValidityKind::crisp) {
-    return partition;
+    return JointFit(training, std::move(partition), max_threads).local(candidate.leaves, candidate.shrinkage);
   }
   set_half_widths(partition, training.low(), training.high());
   const JointFit fit(training, std::move(partition), max_threads);
@@ -175,26 +211,31 @@ Partition estimate(const TrainingRows& training, const Partition& grown, const C
     case Estimation::as_grown:
       return fit.as_grown(candidate.leaves);
     case Estimation::local:
-      return fit.local(candidate.leaves);
+      return fit.local(candidate.leaves, candidate.shrinkage);
     case Estimation::joint:
       break;
   }
-  return std::move(fit.joint(candidate.leaves, {candidate.ridge}).front());
+  return std::move(fit.joint(candidate.leaves, {{candidate.ridge, candidate.shrinkage}}).front());
 }
 
 Selection select(const std::vector<FoldTree>& folds, const Candidates& candidates, const Eigen::VectorXd& weights,
                  int max_threads) {
   const std::size_t num_folds = folds.size();
-  std::vector<Eigen::VectorXd> crisp(num_folds);
+  const std::size_t shrinkages = candidates.shrinkages.size();
+  std::vector<std::vector<Eigen::VectorXd>> crisp(shrinkages, std::vector<Eigen::VectorXd>(num_folds));
   parallel_for(std::ssize(folds), max_threads, [&](std::ptrdiff_t f) {
-    const std::size_t fold = static_cast<std::size_t>(f);
-    crisp[fold] = prefix_squared_errors(folds[fold].grown, folds[fold].held_out, weights);
+    const FoldTree& fold = folds[static_cast<std::size_t>(f)];
+    const JointFit fit(fold.training, fold.grown, max_threads);
+    for (std::size_t s = 0; s < shrinkages; ++s) {
+      const Partition models = fit.local(fold.grown.num_leaves(), candidates.shrinkages[s]);
+      crisp[s][static_cast<std::size_t>(f)] = prefix_squared_errors(models, fold.held_out, weights);
+    }
   });
   std::ptrdiff_t largest = 0;
   double held_out_weight = 0.0;
   std::vector<double> fold_weight;
   for (std::size_t f = 0; f < num_folds; ++f) {
-    largest = std::max(largest, crisp[f].size());
+    largest = std::max(largest, crisp[0][f].size());
     fold_weight.push_back(folds[f].held_out.weights.sum() * static_cast<double>(weights.size()));
     held_out_weight += fold_weight.back();
   }
@@ -213,28 +254,31 @@ Selection select(const std::vector<FoldTree>& folds, const Candidates& candidate
     return result;
   };
   // A fold whose tree is smaller stays at its last one.
-  const auto crisp_errors = [&](std::ptrdiff_t leaves) {
+  const auto crisp_errors = [&](const Candidate& candidate, std::size_t shrinkage) {
     std::vector<double> errors;
-    for (const Eigen::VectorXd& fold : crisp) {
-      errors.push_back(fold(std::min(leaves, fold.size()) - 1));
+    for (const Eigen::VectorXd& fold : crisp[shrinkage]) {
+      errors.push_back(fold(std::min(candidate.leaves, fold.size()) - 1));
     }
     return errors;
   };
-
   Selection selection;
-  selection.crisp_rmse.resize(largest);
-  std::ptrdiff_t best_crisp = 1;
-  for (std::ptrdiff_t leaves = 1; leaves <= largest; ++leaves) {
-    selection.crisp_rmse(leaves - 1) = std::sqrt(sum(crisp_errors(leaves)) / held_out_weight);
-    if (selection.crisp_rmse(leaves - 1) < selection.crisp_rmse(best_crisp - 1)) {
-      best_crisp = leaves;
+  selection.crisp_rmse = Eigen::VectorXd::Constant(largest, std::numeric_limits<double>::infinity());
+  selection.best_of_kind.push_back(described({}, crisp_errors({}, 0)));
+  CandidateError best_crisp = selection.best_of_kind.front();
+  for (std::size_t s = 0; s < shrinkages; ++s) {
+    for (std::ptrdiff_t leaves = 1; leaves <= largest; ++leaves) {
+      const Candidate candidate{.shrinkage = candidates.shrinkages[s], .leaves = leaves};
+      const CandidateError error = described(candidate, crisp_errors(candidate, s));
+      selection.crisp_rmse(leaves - 1) = std::min(selection.crisp_rmse(leaves - 1), error.rmse);
+      if (error.rmse < best_crisp.rmse) {
+        best_crisp = error;
+      }
     }
   }
-  selection.best_of_kind.push_back(described({}, crisp_errors(1)));
   selection.chosen = selection.best_of_kind.front();
   if (candidates.crisp) {
-    selection.best_of_kind.push_back(described({.leaves = best_crisp}, crisp_errors(best_crisp)));
-    selection.chosen = selection.best_of_kind.back();
+    selection.best_of_kind.push_back(best_crisp);
+    selection.chosen = best_crisp;
   }
   if (candidates.widths.empty() || largest < 2) {
     return selection;
@@ -249,6 +293,7 @@ Selection select(const std::vector<FoldTree>& folds, const Candidates& candidate
   }
   const std::size_t widths = candidates.widths.size();
   const std::size_t middle = candidates.ridges.size() / 2;
+  const std::size_t usual = shrinkages / 2;
   std::vector<Errors> screened(screening * widths);
   parallel_for(std::ssize(screened), max_threads, [&](std::ptrdiff_t task) {
     const std::size_t fold = static_cast<std::size_t>(task) / widths;
@@ -256,38 +301,101 @@ Selection select(const std::vector<FoldTree>& folds, const Candidates& candidate
     screened[static_cast<std::size_t>(task)] = evaluate(
         folds[fold], candidates, width, counts, weights, true,
         [&](const Key& key) {
-          return counts[key.leaves] * coefficients <= cheap_unknowns || key.ridge == middle;
+          return key.shrinkage == usual &&
+                 (counts[key.leaves] * coefficients <= cheap_unknowns || key.ridge == middle);
         },
         max_threads);
   });
-  std::vector<std::pair<double, Key>> best_of_width;
-  for (std::size_t width = 0; width < widths; ++width) {
-    std::vector<Errors> of_width;
-    for (std::size_t fold = 0; fold < screening; ++fold) {
-      of_width.push_back(screened[fold * widths + width]);
-    }
-    std::optional<std::pair<double, Key>> best;
-    for (const auto& [key, errors] : common(of_width)) {
-      if (!best || sum(errors) < best->first) {
-        best = {sum(errors), key};
+  // Sum over the screening folds of every candidate that all of them have.
+  const auto totals = [&](const std::vector<Errors>& all) {
+    std::map<Key, double> result;
+    for (std::size_t width = 0; width < widths; ++width) {
+      std::vector<Errors> of_width;
+      for (std::size_t fold = 0; fold < screening; ++fold) {
+        of_width.push_back(all[fold * widths + width]);
+      }
+      for (const auto& [key, errors] : common(of_width)) {
+        result[key] = sum(errors);
       }
     }
-    if (best) {
-      best_of_width.push_back(*best);
+    return result;
+  };
+  // The best of each width, best width first.
+  const auto ranked = [&](const std::map<Key, double>& errors) {
+    std::map<std::size_t, std::pair<double, Key>> best;
+    for (const auto& [key, error] : errors) {
+      const auto [entry, is_new] = best.try_emplace(key.width, error, key);
+      if (!is_new && error < entry->second.first) {
+        entry->second = {error, key};
+      }
     }
-  }
-  std::stable_sort(best_of_width.begin(), best_of_width.end(),
-                   [](const auto& a, const auto& b) { return a.first < b.first; });
+    std::vector<std::pair<double, Key>> result;
+    for (const auto& [width, entry] : best) {
+      result.push_back(entry);
+    }
+    std::stable_sort(result.begin(), result.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+    return result;
+  };
+  std::map<Key, double> screened_totals = totals(screened);
+  std::vector<std::pair<double, Key>> best_of_width = ranked(screened_totals);
   best_of_width.resize(std::min(best_of_width.size(), finalists));
 
-  // The finalists on all folds, near their best leaf count, with all ridges.
+  // Other ridges and shrinkages at the finalists' best leaf counts.
+  std::vector<Errors> refined(screening * widths);
+  parallel_for(std::ssize(refined), max_threads, [&](std::ptrdiff_t task) {
+    const std::size_t fold = static_cast<std::size_t>(task) / widths;
+    const std::size_t width = static_cast<std::size_t>(task) % widths;
+    for (const auto& [error, best] : best_of_width) {
+      if (best.width == width) {
+        refined[static_cast<std::size_t>(task)] = evaluate(
+            folds[fold], candidates, width, counts, weights, false,
+            [&](const Key& key) {
+              // At the best leaf count; where that is cheap, at its neighbours too.
+              const std::size_t reach = counts[best.leaves] * coefficients <= 3 * cheap_unknowns ? 1 : 0;
+              return key.leaves + reach >= best.leaves && key.leaves <= best.leaves + reach &&
+                     (reach > 0 || key.ridge == best.ridge || key.shrinkage == best.shrinkage) &&
+                     !screened_totals.contains(key);
+            },
+            max_threads);
+      }
+    }
+  });
+  screened_totals.merge(totals(refined));
+  best_of_width = ranked(screened_totals);
+  best_of_width.resize(std::min(best_of_width.size(), finalists));
+
+  // The best few of the finalists on all folds.
+  std::vector<std::pair<double, Key>> order;
+  for (const auto& [key, error] : screened_totals) {
+    for (const auto& [unused, best] : best_of_width) {
+      if (best.width == key.width) {
+        order.emplace_back(error, key);
+      }
+    }
+  }
+  std::sort(order.begin(), order.end());
+  std::set<Key> kept;
+  for (const auto& [error, key] : order) {
+    if (kept.size() < candidates_on_all_folds) {
+      kept.insert(key);
+    }
+  }
+  for (const auto& [error, best] : best_of_width) {
+    kept.insert(best);
+  }
   std::vector<Errors> final_errors(num_folds * best_of_width.size());
   parallel_for(std::ssize(final_errors), max_threads, [&](std::ptrdiff_t task) {
     const std::size_t fold = static_cast<std::size_t>(task) / best_of_width.size();
     const Key& best = best_of_width[static_cast<std::size_t>(task) % best_of_width.size()].second;
-    final_errors[static_cast<std::size_t>(task)] = evaluate(
-        folds[fold], candidates, best.width, counts, weights, false,
-        [&](const Key& key) { return key.leaves + 1 >= best.leaves && key.leaves <= best.leaves + 1; }, max_threads);
+    Errors& errors = final_errors[static_cast<std::size_t>(task)];
+    if (fold < screening) {
+      const std::size_t slot = fold * widths + best.width;
+      errors = screened[slot];
+      errors.insert(refined[slot].begin(), refined[slot].end());
+    } else {
+      errors = evaluate(folds[fold], candidates, best.width, counts, weights, false,
+                        [&](const Key& key) { return kept.contains(key); }, max_threads);
+    }
   });
   for (std::size_t k = 0; k < best_of_width.size(); ++k) {
     std::vector<Errors> of_width;
@@ -296,10 +404,14 @@ Selection select(const std::vector<FoldTree>& folds, const Candidates& candidate
     }
     std::optional<CandidateError> best;
     for (const auto& [key, errors] : common(of_width)) {
+      if (!kept.contains(key)) {
+        continue;
+      }
       const Candidate candidate{
           .validity = {candidates.kind, candidates.widths[key.width], candidates.smoothness},
           .estimation = candidates.estimation,
           .ridge = ridge_at(candidates, key.ridge),
+          .shrinkage = candidates.shrinkages[key.shrinkage],
           .leaves = counts[key.leaves]};
       const CandidateError error = described(candidate, errors);
       if (!best || error.rmse < best->rmse) {

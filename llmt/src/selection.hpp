@@ -24,6 +24,7 @@ struct Candidates {
   int smoothness = 1;
   std::vector<double> widths;  ///< empty: crisp alone
   std::vector<double> ridges;
+  std::vector<double> shrinkages;
 };
 
 struct Selection {
@@ -31,6 +32,10 @@ struct Selection {
   std::vector<CandidateError> best_of_kind;
   Eigen::VectorXd crisp_rmse;
 };
+
+/// Partition::outer_slope of a grown tree: the root's slope, as far as the first leaves agree on it. Shrunk by their
+/// mean square spread about it, like a James-Stein estimate.
+Eigen::MatrixXd agreed_slope(const Partition& grown);
 
 /// Sum of weighted squared errors of the prefixes of `partition` with 1, 2, ..., num_leaves leaves, as grown and crisp,
 /// over some rows. `weights`: of the outputs' squared errors.

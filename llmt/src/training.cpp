@@ -97,6 +97,11 @@ TrainingRows training_rows(const Table& table, const std::vector<std::ptrdiff_t>
     training.columns.push_back(describe_input(training.inputs.col(j), training.weights, j,
                                               table.num_levels[static_cast<std::size_t>(j)]));
   }
+  for (std::ptrdiff_t o = 0; o < training.outputs.cols(); ++o) {
+    training.output_columns.push_back({.name = training.outputs.cols() == 1 ? "y" : fmt::format("y{}", o + 1),
+                                       .low = training.outputs.col(o).minCoeff(),
+                                       .high = training.outputs.col(o).maxCoeff()});
+  }
   for (const int input : table.regression_inputs) {
     const int num_levels = table.num_levels[static_cast<std::size_t>(input)];
     if (num_levels == 0) {
@@ -118,6 +123,7 @@ TrainingRows training_rows(const Table& table, const std::vector<std::ptrdiff_t>
 TrainingRows query_rows(const Table& table, const std::vector<std::ptrdiff_t>& rows, const TrainingRows& training) {
   TrainingRows query = take(table, rows);
   query.columns = training.columns;
+  query.output_columns = training.output_columns;
   query.regressors = training.regressors;
   fill_deviations(query);
   return query;

@@ -15,6 +15,7 @@ using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::Ro
 /// training rows.
 struct TrainingRows {
   std::vector<InputColumn> columns;
+  std::vector<OutputColumn> output_columns;
   std::vector<Regressor> regressors;
   RowMajor inputs;          ///< NaN: missing
   RowMajor deviations;      ///< of the regressors from their centres; NaN: missing

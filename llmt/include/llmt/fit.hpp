@@ -65,7 +65,7 @@ struct GrowthOptions {
   /// blends are among the candidates as many as regressors, at least 5.
   std::ptrdiff_t min_leaf_samples = 0;
   /// Largest number of leaves of a partition. 0: no limit for a crisp tree; where blends are among the candidates as
-  /// many as make 2000 coefficients, within 20 ... 400.
+  /// many as make 1500 coefficients, within 20 ... 400.
   std::ptrdiff_t max_leaves = 0;
   /// Growth ends when further splits lower the residual sum of squares of the whole tree by less than this fraction
   /// each, in the geometric mean over the next `improvement_lookahead` splits of best-first growth; those are not kept.
@@ -108,6 +108,10 @@ struct BlendOptions {
   /// Joint estimation: ridge, see docs/algorithms.md; 0 is global least squares, infinity local estimation. Empty:
   /// 1e-6, 1e-4, 1e-3, 1e-2, 1e-1.
   std::vector<double> ridges = {};
+  /// Local models are drawn towards their parents' as if this many further rows said so, with the variance that each
+  /// column has in the leaf and without correlation: a guard against near-collinear columns and few rows. Empty: 0, 0.1
+  /// and 1; 0 without folds.
+  std::vector<double> shrinkages = {};
   int smoothness = 1;  ///< continuous derivatives of blends, 1 or 2
 };
 
@@ -138,7 +142,8 @@ struct FitOptions {
 struct Candidate {
   Validity validity = {};
   Estimation estimation = Estimation::as_grown;
-  double ridge = 0.0;         ///< of joint estimation
+  double ridge = 0.0;      ///< of joint estimation
+  double shrinkage = 0.0;  ///< see BlendOptions::shrinkages
   std::ptrdiff_t leaves = 1;
 };
 

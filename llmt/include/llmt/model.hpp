@@ -68,7 +68,9 @@ struct Node {
 struct Partition {
   std::vector<int> outputs;  ///< columns of the model's outputs that this partition predicts, ascending
   Validity validity = {};
-  std::vector<Node> nodes;   ///< in order of growth
+  std::vector<Node> nodes;  ///< in order of growth
+  /// Slopes beyond the training extent, outputs x regressors. Empty: the root's.
+  Eigen::MatrixXd outer_slope = {};
 
   std::ptrdiff_t num_leaves() const { return (std::ssize(nodes) + 1) / 2; }
 };
@@ -132,11 +134,14 @@ class Evaluator;
 /// over the leaves of P, with Phi their validities (see ValidityKind) and d the deviations of the regressors from their
 /// centres. The boxes cover the whole space.
 ///
-/// Where x leaves the range of a regressor that the leaf's rows covered, the slope of the leaf gives way to that of its
-/// parent, beyond the parent's range to that of its parent, and so on; the root's goes on for ever:
-///   f_i(x) = value_i + slope_i . c_i + sum over ancestors a of slope_a . (c_a - c_below a) + slope_root . (d - c_root)
-/// with c the deviations held to the node's range. The hold is rounded off over a tenth of the range, so that the
-/// derivative stays continuous. Training rows are never touched by it.
+/// Three guards keep local models where their rows were. Where x leaves the range of a regressor that the leaf's rows
+/// covered, the slope of the leaf gives way to that of its parent, beyond the parent's range to that of its parent, up
+/// to the root:
+///   f_i(x) = value_i + slope_i . c_i + sum over ancestors a of slope_a . (c_a - c_below a)
+/// with c the deviations held to the node's range. The prediction is then held to the range of the outputs in training,
+/// widened by a tenth of it on both sides, and at last, beyond the training extent, outer_slope . (d - c_root) is
+/// added: the root's slopes as far as the first leaves agree on them. Every hold is rounded off over a tenth of its
+/// range, so that derivatives stay continuous. Affine data are reproduced everywhere.
 ///
 /// A missing value (NaN) takes the share that was learned at each split on its input, and in a local model the mean of
 /// the leaf's rows.
