@@ -444,8 +444,8 @@ class Grower {
     double threshold = low + 0.5 * (high - low);
     if (options_.threshold == ThresholdPlacement::closest) {
       // The regression of the child models' difference on the split input over the node's rows says how far apart they
-      // are, on average, on the plane x_j = t: a + b (t - low). Its square is smallest at t = low - a / b, or at the
-      // end of the gap nearest to that.
+      // are, on average, on the plane x_j = t: a + b (t - low). Its square is smallest at t = low - a / b. If that lies
+      // outside the gap the models do not meet here: a jump, and the middle keeps away from the rows of both sides.
       const Node& node = nodes_[static_cast<std::size_t>(leaf.node)];
       const Node& left = nodes_[static_cast<std::size_t>(node.left)];
       const Node& right = nodes_[static_cast<std::size_t>(node.right)];
@@ -461,8 +461,9 @@ class Grower {
       const Eigen::VectorXd b = apart.transpose() * weighted / weighted.dot(centred);
       const Eigen::VectorXd a = apart.transpose() * weights / weights.sum() + b * (low - mean);
       const double curvature = weights_.dot(b.cwiseAbs2());
-      if (curvature > 0.0) {
-        threshold = low - weights_.dot(a.cwiseProduct(b)) / curvature;
+      const double meeting = curvature > 0.0 ? low - weights_.dot(a.cwiseProduct(b)) / curvature : low;
+      if (meeting > low && meeting < high) {
+        threshold = meeting;
       }
     }
     return std::min(std::max(threshold, low), std::nextafter(high, low));

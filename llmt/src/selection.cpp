@@ -20,8 +20,8 @@ constexpr std::ptrdiff_t screening_rows = 1000;
 /// Widths that go on to all folds.
 constexpr std::size_t finalists = 2;
 
-/// Candidates of the finalists that are compared on all folds.
-constexpr std::size_t candidates_on_all_folds = 6;
+/// Candidates of each finalist that are compared on all folds, whatever their leaf count.
+constexpr std::size_t candidates_on_all_folds = 3;
 
 /// Leaves of the tree that are asked whether they agree on a slope beyond the training extent.
 constexpr std::ptrdiff_t leaves_that_agree = 32;
@@ -364,24 +364,32 @@ Selection select(const std::vector<FoldTree>& folds, const Candidates& candidate
   best_of_width = ranked(screened_totals);
   best_of_width.resize(std::min(best_of_width.size(), finalists));
 
-  // The best few of the finalists on all folds.
-  std::vector<std::pair<double, Key>> order;
-  for (const auto& [key, error] : screened_totals) {
-    for (const auto& [unused, best] : best_of_width) {
-      if (best.width == key.width) {
-        order.emplace_back(error, key);
+  // On all folds: of each finalist the best few, and the best of each leaf count near its best.
+  std::set<Key> kept;
+  for (const auto& [least, best] : best_of_width) {
+    const std::size_t reach = counts[best.leaves] * coefficients <= cheap_unknowns ? 2 : 1;
+    std::map<std::size_t, std::pair<double, Key>> best_of_count;
+    std::vector<std::pair<double, Key>> order;
+    for (const auto& [key, error] : screened_totals) {
+      if (key.width != best.width) {
+        continue;
+      }
+      order.emplace_back(error, key);
+      if (key.leaves + reach >= best.leaves && key.leaves <= best.leaves + reach) {
+        const auto [entry, is_new] = best_of_count.try_emplace(key.leaves, error, key);
+        if (!is_new && error < entry->second.first) {
+          entry->second = {error, key};
+        }
       }
     }
-  }
-  std::sort(order.begin(), order.end());
-  std::set<Key> kept;
-  for (const auto& [error, key] : order) {
-    if (kept.size() < candidates_on_all_folds) {
+    std::sort(order.begin(), order.end());
+    order.resize(std::min(order.size(), candidates_on_all_folds));
+    for (const auto& [error, key] : order) {
       kept.insert(key);
     }
-  }
-  for (const auto& [error, best] : best_of_width) {
-    kept.insert(best);
+    for (const auto& [count, entry] : best_of_count) {
+      kept.insert(entry.second);
+    }
   }
   std::vector<Errors> final_errors(num_folds * best_of_width.size());
   parallel_for(std::ssize(final_errors), max_threads, [&](std::ptrdiff_t task) {

@@ -33,7 +33,7 @@ enum class GrowthRule {
 /// the gap.
 enum class ThresholdPlacement {
   closest,  ///< where the regression of the child models' difference on the split input, over the node's rows, is
-            ///< nearest to zero
+            ///< zero; halfway if that is not in the gap
   midpoint  ///< halfway
 };
 
