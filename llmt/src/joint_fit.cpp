@@ -29,6 +29,31 @@ Eigen::VectorXd imputed(const Eigen::VectorXd& deviations, const Node& node) {
   return deviations.array().isNaN().select(node.mean, deviations);
 }
 
+/// Smallest and largest value of each regressor without the one row at either end: a slope that a single far row
+/// decides is not one to follow to it.
+Eigen::MatrixXd second_extremes(const TrainingRows& training) {
+  Eigen::MatrixXd result(2, training.deviations.cols());
+  for (std::ptrdiff_t k = 0; k < training.deviations.cols(); ++k) {
+    std::vector<double> values;
+    for (const double value : training.deviations.col(k)) {
+      if (!std::isnan(value)) {
+        values.push_back(value);
+      }
+    }
+    if (values.empty()) {
+      result.col(k).setZero();
+      continue;
+    }
+    const auto last = values.end() - 1;
+    const std::ptrdiff_t skipped = training.regressors[static_cast<std::size_t>(k)].level < 0 && values.size() > 4 ? 1 : 0;
+    std::nth_element(values.begin(), values.begin() + skipped, values.end());
+    result(0, k) = values[static_cast<std::size_t>(skipped)];
+    std::nth_element(values.begin(), last - skipped, values.end());
+    result(1, k) = *(last - skipped);
+  }
+  return result;
+}
+
 }  // namespace
 
 JointFit::JointFit(const TrainingRows& training, Partition partition, int max_threads)
@@ -222,12 +247,13 @@ void JointFit::assemble(int max_threads) {
     });
   }
   const std::vector<int> parents = parents_of(partition_);
+  const Eigen::MatrixXd trusted = second_extremes(training_);
   for (std::size_t i = nodes; i-- > 0;) {
     Node& node = partition_.nodes[i];
     for (std::ptrdiff_t k = 0; k < size_ - 1; ++k) {
       if (low[i](k) <= high[i](k)) {
-        node.low(k) = low[i](k);
-        node.high(k) = high[i](k);
+        node.low(k) = std::clamp(low[i](k), trusted(0, k), trusted(1, k));
+        node.high(k) = std::clamp(high[i](k), trusted(0, k), trusted(1, k));
       }
     }
     if (i > 0) {
