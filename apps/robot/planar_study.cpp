@@ -24,8 +24,29 @@ TotalError total_error(const Eigen::MatrixXd& model, const Eigen::MatrixXd& trut
 
 /// Grown to a given size without a test, from three samples a leaf on: the paper's trees.
 FitOptions grown_to(std::ptrdiff_t leaves) {
-  return {.growth = {.significance = 1.0, .min_variance_gain = -1.0, .min_leaf_samples = 3, .max_leaves = leaves},
-          .folds = {.count = 0}};
+  FitOptions options;
+  options.growth = {.significance = 1.0, .min_variance_gain = -1.0, .min_leaf_samples = 3, .max_leaves = leaves};
+  options.blend.validity = ValidityChoice::crisp;
+  options.selection.folds.count = 0;
+  return options;
+}
+
+/// The same trees with at most as many leaves, smoothed: width, ridge and leaf count by cross-validation on the
+/// training poses.
+FitOptions blended(std::ptrdiff_t leaves, std::uint64_t seed) {
+  FitOptions options = grown_to(leaves);
+  options.blend.validity = ValidityChoice::automatic;
+  options.selection.folds = {.count = 5, .seed = seed};
+  return options;
+}
+
+/// The paper's smoothing: Gaussians of the given width over the leaves as they were grown.
+FitOptions gaussian_as_grown(std::ptrdiff_t leaves, double width) {
+  FitOptions options = grown_to(leaves);
+  options.blend.validity = ValidityChoice::gaussian;
+  options.blend.estimation = Estimation::as_grown;
+  options.blend.widths = {width};
+  return options;
 }
 
 /// One tree per axis, each with its own options.
@@ -47,6 +68,8 @@ AxisTrees fit_axes(const Eigen::MatrixXd& joints, const Eigen::MatrixXd& outputs
   AxisTrees trees;
   for (std::size_t axis = 0; axis < options.size(); ++axis) {
     FitResult result = fit(joints, outputs.col(static_cast<Eigen::Index>(axis)), options[axis]);
+    if (getenv("DBG")) for (auto& k : result.summary.partitions[0].best_of_kind) fprintf(stderr, "[%d w%g r%g s%g M%d %.4g] ", (int)k.candidate.validity.kind, k.candidate.validity.width, k.candidate.ridge, k.candidate.shrinkage, (int)k.candidate.leaves, k.rmse);
+    if (getenv("DBG")) fprintf(stderr, "\n");
     trees.leaves.push_back(result.summary.partitions[0].leaves);
     trees.models.push_back(std::move(result.model));
   }
@@ -105,8 +128,13 @@ PlanarStudy planar_study(bool carry_over, bool large, std::uint64_t seed) {
   until_two_percent.growth.min_improvement = 0.02;
   correct("corrected, stopped at 2 %", {until_two_percent, until_two_percent}, std::nullopt);
   FitOptions cross_validated = grown_to(0);
-  cross_validated.folds = {.count = 5, .seed = seed};
+  cross_validated.selection.folds = {.count = 5, .seed = seed};
   correct("corrected, leaves by 5-fold CV", {cross_validated, cross_validated}, std::nullopt);
+  correct("Gaussians, narrow, as grown", {gaussian_as_grown(93, 1.0 / 3.0), gaussian_as_grown(75, 1.0 / 3.0)},
+          std::nullopt);
+  correct("Gaussians, wide, as grown", {gaussian_as_grown(93, 0.7), gaussian_as_grown(75, 0.7)}, std::nullopt);
+  correct("blend, the paper's leaf counts", {blended(93, seed), blended(75, seed)}, std::nullopt);
+  correct("blend, a third of the leaves", {blended(25, seed), blended(25, seed)}, std::nullopt);
 
   const auto black_box = [&](const std::string& name, const Poses& poses, const Eigen::MatrixXd& truth,
                              std::ptrdiff_t x_leaves, std::ptrdiff_t y_leaves, TotalError paper) {
@@ -115,6 +143,9 @@ PlanarStudy planar_study(bool carry_over, bool large, std::uint64_t seed) {
         {name, poses.count(), trees.leaves, total_error(trees.predict(test.joints), test_truth), paper});
   };
   black_box("black box", train, train_truth, 211, 209, {7.877, 42.815});
+  const AxisTrees smooth = fit_axes(train.joints, train_truth, {blended(211, seed), blended(209, seed)});
+  study.black_box.push_back({"black box, blend", train.count(), smooth.leaves,
+                             total_error(smooth.predict(test.joints), test_truth), std::nullopt});
   if (large) {
     const Poses fine = robotics::grid(flexible.chain, 0.01);
     black_box("black box", fine, plane_positions(flexible, fine), 3283, 3331, {0.406, 3.299});

@@ -12,6 +12,7 @@
 #include "checks.hpp"
 #include "growth.hpp"
 #include "joint_fit.hpp"
+#include "lolimot.hpp"
 #include "parallel.hpp"
 #include "selection.hpp"
 #include "training.hpp"
@@ -112,9 +113,11 @@ struct Plan {
   Candidates candidates;
 };
 
+bool is_lolimot(GrowthRule rule) { return rule == GrowthRule::lolimot || rule == GrowthRule::lolimot_data_driven; }
+
 Plan make_plan(const FitOptions& options, const TrainingRows& all, bool has_folds) {
   Plan plan{options.growth, {}};
-  const ValidityChoice choice = options.blend.validity;
+  const ValidityChoice choice = is_lolimot(options.growth.rule) ? ValidityChoice::gaussian : options.blend.validity;
   const bool crisp_only = choice == ValidityChoice::crisp || (choice == ValidityChoice::automatic && !has_folds);
   plan.candidates.crisp = choice == ValidityChoice::automatic || choice == ValidityChoice::crisp;
   plan.candidates.kind = choice == ValidityChoice::gaussian ? ValidityKind::gaussian : ValidityKind::blend;
@@ -128,7 +131,7 @@ Plan make_plan(const FitOptions& options, const TrainingRows& all, bool has_fold
     }
     if (options.blend.estimation == Estimation::joint) {
       plan.candidates.ridges =
-          options.blend.ridges.empty() ? std::vector<double>{1e-6, 1e-4, 1e-3, 1e-2, 1e-1} : options.blend.ridges;
+          options.blend.ridges.empty() ? std::vector<double>{1e-8, 1e-6, 1e-4, 1e-3, 1e-2, 1e-1} : options.blend.ridges;
     }
   }
   plan.candidates.shrinkages = options.blend.shrinkages;
@@ -147,6 +150,9 @@ Plan make_plan(const FitOptions& options, const TrainingRows& all, bool has_fold
   if (growth.max_leaves == 0 && many_leaves) {
     growth.max_leaves = std::clamp<std::ptrdiff_t>(1500 / (regressors + 1), 20, 400);
   }
+  if (growth.max_leaves == 0 && is_lolimot(growth.rule)) {
+    growth.max_leaves = 100;
+  }
   return plan;
 }
 
@@ -155,8 +161,10 @@ struct Grown {
   StopReason stop = StopReason::leaf_samples;
 };
 
-Grown grow_rows(const TrainingRows& rows, const Table& table, const std::vector<int>& served, GrowthOptions options,
-                int max_threads) {
+Grown grow_rows(const TrainingRows& rows, const Table& table, const std::vector<int>& served, const Plan& plan,
+                bool stop_by_aicc, int max_threads) {
+  GrowthOptions options = plan.growth;
+  const double width = plan.candidates.widths.empty() ? 0.0 : plan.candidates.widths.front();
   options.split_inputs = table.split_inputs;
   GrowthProblem problem;
   problem.split_values = rows.inputs(Eigen::all, table.split_inputs);
@@ -168,7 +176,16 @@ Grown grow_rows(const TrainingRows& rows, const Table& table, const std::vector<
   problem.weights = rows.weights;
   problem.options = std::move(options);
   problem.max_threads = max_threads;
-  GrownPartition result = grow(problem);
+  GrownPartition result;
+  if (is_lolimot(problem.options.rule)) {
+    result = grow_lolimot(problem, {.width = width,
+                                    .low = rows.low()(table.split_inputs),
+                                    .high = rows.high()(table.split_inputs),
+                                    .data_driven = problem.options.rule == GrowthRule::lolimot_data_driven,
+                                    .stop_by_aicc = stop_by_aicc});
+  } else {
+    result = grow(problem);
+  }
   Grown grown{.partition = {.outputs = served, .validity = {}, .nodes = std::move(result.nodes), .outer_slope = {}},
               .stop = result.stop};
   grown.partition.outer_slope = agreed_slope(grown.partition);
@@ -315,17 +332,16 @@ FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<
     std::vector<FoldTree> trees = fold_rows;
     parallel_for(std::ssize(trees), options.max_threads, [&](std::ptrdiff_t f) {
       FoldTree& tree = trees[static_cast<std::size_t>(f)];
-      tree.grown = grow_rows(tree.training, table, served[p], plan.growth, options.max_threads).partition;
+      tree.grown = grow_rows(tree.training, table, served[p], plan, false, options.max_threads).partition;
       report();
     });
     Selection selection;
     Candidate candidate;
-    GrowthOptions growth = plan.growth;
     if (!trees.empty()) {
       selection = select(trees, plan.candidates, weights, options.max_threads);
       candidate = selection.chosen.candidate;
     }
-    Grown grown = grow_rows(all, table, served[p], growth, options.max_threads);
+    Grown grown = grow_rows(all, table, served[p], plan, trees.empty(), options.max_threads);
     const std::ptrdiff_t grown_leaves = grown.partition.num_leaves();
     if (trees.empty()) {
       candidate.leaves = grown_leaves;
@@ -389,6 +405,8 @@ std::string describe(StopReason reason) {
       return "an exact fit";
     case StopReason::improvement:
       return "too little improvement";
+    case StopReason::aicc:
+      return "AICc";
     case StopReason::pruning:
       return "pruning";
     case StopReason::cross_validation:

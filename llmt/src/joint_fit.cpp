@@ -11,8 +11,16 @@
 namespace llmt {
 namespace {
 
-/// Weight, in rows of unit mean square, with which a direction that rows do not determine is held at its anchor.
-constexpr double tiny_ridge = 1e-6;
+/// Shrinkage that is always there, in rows: nothing to what rows determine, all to what they do not.
+constexpr double least_shrinkage = 1e-6;
+
+/// The same for columns that are constant in a leaf, whose variance there is rounding: relative to the leaf's weight,
+/// in columns of unit variance over all rows.
+constexpr double least_hold = 1e-12;
+
+/// Beyond the outermost rows of a leaf its slopes go on for this part of its range: thresholds lie between rows, and on
+/// a grid the nearest queries half a step from them.
+constexpr double range_margin = 0.25;
 
 /// Rows whose outer products are kept at a time.
 constexpr std::ptrdiff_t chunk_rows = 2048;
@@ -252,8 +260,9 @@ void JointFit::assemble(int max_threads) {
     Node& node = partition_.nodes[i];
     for (std::ptrdiff_t k = 0; k < size_ - 1; ++k) {
       if (low[i](k) <= high[i](k)) {
-        node.low(k) = std::clamp(low[i](k), trusted(0, k), trusted(1, k));
-        node.high(k) = std::clamp(high[i](k), trusted(0, k), trusted(1, k));
+        const double margin = range_margin * (high[i](k) - low[i](k));
+        node.low(k) = std::clamp(low[i](k) - margin, trusted(0, k), trusted(1, k));
+        node.high(k) = std::clamp(high[i](k) + margin, trusted(0, k), trusted(1, k));
       }
     }
     if (i > 0) {
@@ -269,9 +278,11 @@ void JointFit::assemble(int max_threads) {
 Eigen::VectorXd JointFit::hold(std::size_t node, double shrinkage) const {
   const Eigen::MatrixXd& gram = gram_[node];
   const double total = gram(0, 0);
-  Eigen::VectorXd result = Eigen::VectorXd::Constant(size_, tiny_ridge);
+  const double floor = least_hold * (total + 1.0);
+  Eigen::VectorXd result = Eigen::VectorXd::Constant(size_, floor);
   for (std::ptrdiff_t k = 1; k < size_ && total > 0.0; ++k) {
-    result(k) += shrinkage * std::max(0.0, (gram(k, k) - gram(0, k) * gram(0, k) / total) / total);
+    const double variance = std::max(0.0, (gram(k, k) - gram(0, k) * gram(0, k) / total) / total);
+    result(k) += (shrinkage + least_shrinkage) * variance;
   }
   return result;
 }
@@ -365,7 +376,7 @@ std::vector<Partition> JointFit::joint(std::ptrdiff_t leaves,
     right -= matrix.selfadjointView<Eigen::Upper>() * anchors;
     RowMajor regular;
     // Rounding can leave the matrix indefinite when the overlap is large and the ridge small.
-    for (double more = 0.0; more < 1e6; more = 100.0 * std::max(more, tiny_ridge)) {
+    for (double more = 0.0; more < 1e6; more = 100.0 * std::max(more, 1e-10)) {
       regular = matrix;
       for (std::size_t k = 0; k < nodes.size(); ++k) {
         const std::size_t node = static_cast<std::size_t>(nodes[k]);
@@ -431,7 +442,7 @@ void describe_leaves(const TrainingRows& training, Partition& partition) {
     }
     const Eigen::MatrixXd scaled = scale.cwiseInverse().asDiagonal() * gram * scale.cwiseInverse().asDiagonal();
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scaled);
-    const double floor = std::max(tiny_ridge, 1e-12 * eigen.eigenvalues().maxCoeff());
+    const double floor = std::max(1e-6, 1e-12 * eigen.eigenvalues().maxCoeff());
     const Eigen::MatrixXd inverse = eigen.eigenvectors() *
                                     eigen.eigenvalues().cwiseMax(floor).cwiseInverse().asDiagonal() *
                                     eigen.eigenvectors().transpose();

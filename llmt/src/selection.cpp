@@ -62,7 +62,12 @@ Errors evaluate(const FoldTree& fold, const Candidates& candidates, std::size_t 
   Partition partition = fold.grown;
   partition.validity = {candidates.kind, candidates.widths[width], candidates.smoothness};
   set_half_widths(partition, fold.training.low(), fold.training.high());
-  const JointFit fit(fold.training, std::move(partition), max_threads);
+  // Sums over a subtree are the validities of its root for blends, so that one fit serves all leaf counts; Gaussians
+  // are different ones for every leaf count.
+  std::optional<JointFit> shared;
+  if (candidates.kind == ValidityKind::blend) {
+    shared.emplace(fold.training, partition, max_threads);
+  }
   const std::size_t ridges = std::max<std::size_t>(candidates.ridges.size(), 1);
   Errors errors;
   double best = std::numeric_limits<double>::infinity();
@@ -81,6 +86,11 @@ Errors evaluate(const FoldTree& fold, const Candidates& candidates, std::size_t 
     }
     const std::ptrdiff_t leaves = std::min(counts[k], fold.grown.num_leaves());
     std::vector<Partition> models;
+    std::optional<JointFit> own;
+    if (!shared) {
+      own.emplace(fold.training, prefix(partition, leaves), max_threads);
+    }
+    const JointFit& fit = shared ? *shared : *own;
     if (candidates.estimation == Estimation::joint) {
       std::vector<Regularisation> values;
       for (const Key& key : tried) {

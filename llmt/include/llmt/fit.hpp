@@ -26,7 +26,13 @@ enum class GrowthRule {
   /// RETIS (Karalic 1992): minimises the weighted mean squared error (n_1 MSE_1 + n_2 MSE_2) / N without a test, then
   /// prunes from the
   /// leaves up with m-estimates of the error.
-  retis
+  retis,
+  /// LOLIMOT (Nelles 2001, ch. 13): the worst local model is halved along the input that leaves the smallest error of
+  /// the whole model with Gaussian validities; the two new models are estimated locally. Takes
+  /// BlendOptions::widths (k_sigma, 1/3) and Estimation: as_grown and local are Nelles' local estimation, joint his
+  /// global one. Without folds AICc decides how many leaves stay.
+  lolimot,
+  lolimot_data_driven  ///< LOLIMOT with thresholds where two crisp models of the box's rows leave the smallest error
 };
 
 /// Where in the gap between two training values a threshold is put. The residual sum of squares is the same anywhere in
@@ -45,6 +51,7 @@ enum class StopReason {
   leaf_samples,     ///< no leaf is large enough to be split, or all its split inputs are constant
   exact_fit,        ///< the leaves reproduce the outputs to rounding
   improvement,      ///< GrowthOptions::min_improvement: further splits improved the tree too little
+  aicc,             ///< LOLIMOT without folds: the corrected Akaike criterion rose
   pruning,          ///< RETIS pruning removed the last splits
   cross_validation  ///< fewer leaves than grown had the smallest held-out error
 };
@@ -106,7 +113,7 @@ struct BlendOptions {
   Estimation estimation = Estimation::joint;
   std::vector<double> widths = {};  ///< Validity::width. Empty: 0.5, 1, 2, 4 for blends; 1/3 for Gaussians
   /// Joint estimation: ridge, see docs/algorithms.md; 0 is global least squares, infinity local estimation. Empty:
-  /// 1e-6, 1e-4, 1e-3, 1e-2, 1e-1.
+  /// 1e-8, 1e-6, 1e-4, 1e-3, 1e-2, 1e-1.
   std::vector<double> ridges = {};
   /// Local models are drawn towards their parents' as if this many further rows said so, with the variance that each
   /// column has in the leaf and without correlation: a guard against near-collinear columns and few rows. Empty: 0, 0.1
