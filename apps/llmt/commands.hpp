@@ -9,5 +9,7 @@ namespace llmt::apps {
 void add_fit(CLI::App& app);
 void add_predict(CLI::App& app);
 void add_inspect(CLI::App& app);
+void add_explain(CLI::App& app);
+void add_compare(CLI::App& app);
 
 }  // namespace llmt::apps

@@ -1,96 +1,76 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <algorithm>
+#include <array>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <memory>
-#include <stdexcept>
 
 #include "llmt/commands.hpp"
-#include "llmt/csv.hpp"
 #include "llmt/fit.hpp"
+#include "llmt/learning.hpp"
 #include "shared/cli.hpp"
 
 namespace llmt::apps {
 namespace {
 
 struct FitArguments {
-  std::string data;
-  std::vector<std::string> targets;
-  std::vector<std::string> inputs;
-  std::vector<std::string> ignored;
-  std::vector<std::string> split_inputs;
-  std::vector<std::string> regression_inputs;
-  bool contiguous = false;
+  LearningArguments learning;
   std::string output;
   bool json = false;
-  FitOptions options;
+  bool no_intervals = false;
 };
 
-bool contains(const std::vector<std::string>& names, const std::string& name) {
-  return std::find(names.begin(), names.end(), name) != names.end();
+constexpr std::array<const char*, 4> rule_names = {"rd", "retis", "lolimot", "lolimot-data"};  // as GrowthRule
+constexpr std::array<const char*, 4> validity_names = {"auto", "crisp", "blend", "gaussian"};  // as ValidityChoice
+constexpr std::array<const char*, 3> estimation_names = {"as-grown", "local", "joint"};        // as Estimation
+
+template <class Enum, std::size_t Count>
+CLI::CheckedTransformer choice_of(const std::array<const char*, Count>& names) {
+  std::map<std::string, Enum> values;
+  for (std::size_t i = 0; i < Count; ++i) {
+    values[names[i]] = static_cast<Enum>(i);
+  }
+  return CLI::CheckedTransformer(values);
 }
 
-/// The columns to learn from: those asked for, or all but the targets and what is ignored.
-std::vector<std::string> choose_inputs(const Csv& csv, const FitArguments& arguments) {
-  for (const std::vector<std::string>* names : {&arguments.targets, &arguments.inputs, &arguments.ignored}) {
-    for (const std::string& name : *names) {
-      csv.index_of(name);
-      if (std::count(names->begin(), names->end(), name) > 1) {
-        throw std::invalid_argument(fmt::format("column \"{}\" is named twice", name));
-      }
-    }
+/// "blend, width 2, ridge 0.001, shrinkage 0.1".
+std::string describe(const Candidate& candidate) {
+  if (candidate.validity.kind == ValidityKind::crisp) {
+    const std::string name = candidate.leaves == 1 ? "least squares" : "crisp";
+    return candidate.shrinkage > 0.0 ? fmt::format("{}, shrinkage {}", name, candidate.shrinkage) : name;
   }
-  std::vector<std::string> inputs;
-  for (const std::string& column : arguments.inputs.empty() ? csv.columns() : arguments.inputs) {
-    if (!contains(arguments.targets, column) && !contains(arguments.ignored, column)) {
-      inputs.push_back(column);
-    } else if (!arguments.inputs.empty()) {
-      throw std::invalid_argument(fmt::format("--inputs has \"{}\", which is a target or ignored", column));
-    }
-  }
-  if (inputs.empty()) {
-    throw std::invalid_argument("no column is left to learn from");
-  }
-  return inputs;
+  std::string text = fmt::format("{}, width {}", candidate.validity.kind == ValidityKind::blend ? "blend" : "Gaussians",
+                                 number(candidate.validity.width, 3));
+  text += candidate.estimation == Estimation::as_grown ? ", as grown"
+          : candidate.estimation == Estimation::local  ? ", local"
+                                                       : fmt::format(", ridge {}", candidate.ridge);
+  return candidate.shrinkage > 0.0 ? text + fmt::format(", shrinkage {}", candidate.shrinkage) : text;
 }
 
-std::vector<int> positions(const char* option, const std::vector<std::string>& names,
-                           const std::vector<std::string>& inputs) {
-  std::vector<int> result;
-  for (const std::string& name : names) {
-    const auto found = std::find(inputs.begin(), inputs.end(), name);
-    if (found == inputs.end()) {
-      throw std::invalid_argument(
-          fmt::format("{} has \"{}\", which is not among the inputs {}", option, name, fmt::join(inputs, ", ")));
-    }
-    result.push_back(static_cast<int>(found - inputs.begin()));
-  }
-  return result;
+Json candidate_json(const CandidateError& entry) {
+  const auto or_null = [](double value) { return std::isnan(value) ? Json(nullptr) : Json(value); };
+  constexpr std::array<const char*, 3> kinds = {"crisp", "blend", "gaussian"};
+  return {{"validity", kinds[static_cast<std::size_t>(entry.candidate.validity.kind)]},
+          {"width", entry.candidate.validity.width},
+          {"estimation", estimation_names[static_cast<std::size_t>(entry.candidate.estimation)]},
+          {"ridge", entry.candidate.ridge},
+          {"shrinkage", entry.candidate.shrinkage},
+          {"leaves", entry.candidate.leaves},
+          {"cv_rmse", or_null(entry.rmse)},
+          {"spread", or_null(entry.spread)}};
 }
 
-Eigen::MatrixXd read_inputs(const Csv& csv, const std::vector<std::string>& columns, bool chosen_by_user) {
-  try {
-    return csv.numbers(columns);
-  } catch (const std::runtime_error& error) {
-    throw std::runtime_error(chosen_by_user ? error.what()
-                                            : fmt::format("{} (--ignore COLUMN leaves a column out)", error.what()));
-  }
-}
-
-double held_out(const PartitionSummary& partition, std::ptrdiff_t leaves) {
-  return partition.cv_rmse.size() == 0
-             ? std::numeric_limits<double>::quiet_NaN()
-             : partition.cv_rmse(std::min<std::ptrdiff_t>(leaves, partition.cv_rmse.size()) - 1);
+double least_squares_rmse(const PartitionSummary& partition) {
+  return partition.best_of_kind.empty() ? std::nan("") : partition.best_of_kind.front().rmse;
 }
 
 Json summary_json(const FitArguments& arguments, const FitResult& result) {
   Json json;
-  json["data"] = arguments.data;
+  json["data"] = arguments.learning.data;
   json["rows"] = result.summary.samples;
-  json["rule"] = arguments.options.growth.rule == GrowthRule::rd ? "rd" : "retis";
+  json["missing_values"] = result.summary.missing_values;
+  json["rule"] = rule_names[static_cast<std::size_t>(arguments.learning.options.growth.rule)];
   json["min_leaf_samples"] = result.summary.min_leaf_samples;
   json["inputs"] = Json::array();
   for (const InputColumn& input : result.model.inputs()) {
@@ -108,44 +88,74 @@ Json summary_json(const FitArguments& arguments, const FitResult& result) {
     entry["rank_deficient_leaves"] = partition.rank_deficient_leaves;
     entry["growth_ended_by"] = describe(partition.stop);
     entry["cv_folds"] = partition.cv_folds;
-    entry["cv_rmse"] = partition.cv_folds > 0 ? Json(held_out(partition, partition.leaves)) : Json(nullptr);
-    entry["cv_rmse_least_squares"] = partition.cv_folds > 0 ? Json(held_out(partition, 1)) : Json(nullptr);
-    entry["cv_rmse_by_leaves"] = std::vector<double>(partition.cv_rmse.begin(), partition.cv_rmse.end());
+    const bool judged = partition.cv_folds > 0;
+    entry["chosen"] = candidate_json(partition.chosen);
+    entry["compared"] = Json::array();
+    for (const CandidateError& other : partition.best_of_kind) {
+      entry["compared"].push_back(candidate_json(other));
+    }
+    entry["cv_rmse"] = judged ? Json(partition.chosen.rmse) : Json(nullptr);
+    entry["cv_rmse_least_squares"] = judged ? Json(least_squares_rmse(partition)) : Json(nullptr);
+    entry["crisp_cv_rmse_by_leaves"] =
+        std::vector<double>(partition.crisp_cv_rmse.begin(), partition.crisp_cv_rmse.end());
     json["partitions"].push_back(std::move(entry));
   }
   json["model"] = arguments.output.empty() ? Json(nullptr) : Json(arguments.output);
   return json;
 }
 
+/// How the held-out rows came to be.
+std::string selection_text(const FitArguments& arguments, const PartitionSummary& partition) {
+  if (partition.cv_folds == 0) {
+    return "no held-out rows: the tree stays as grown";
+  }
+  if (partition.cv_folds == 1) {
+    return fmt::format("chosen on {} rows held out once", partition.held_out_rows);
+  }
+  return fmt::format("chosen by {}-fold cross-validation{}, the tree grown anew in every fold", partition.cv_folds,
+                     arguments.learning.contiguous ? " over contiguous blocks of rows" : "");
+}
+
 void print_summary(const FitArguments& arguments, const FitResult& result) {
   std::vector<std::string> inputs;
   std::vector<std::string> constant;
   for (const InputColumn& input : result.model.inputs()) {
-    inputs.push_back(input.name);
+    inputs.push_back(input.is_categorical() ? fmt::format("{} ({} categories)", input.name, input.levels.size())
+                                            : input.name);
     if (input.low == input.high) {
       constant.push_back(input.name);
     }
   }
-  print(fmt::format("{}: {} rows, {} inputs: {}\n", arguments.data, result.summary.samples, inputs.size(),
+  print(fmt::format("{}: {} rows, {} inputs: {}\n", arguments.learning.data, result.summary.samples, inputs.size(),
                     fmt::join(inputs, ", ")));
+  if (result.summary.missing_values > 0) {
+    print(fmt::format("Missing values in the inputs: {}\n", result.summary.missing_values));
+  }
   if (!constant.empty()) {
     print(fmt::format("Constant, so without influence: {}\n", fmt::join(constant, ", ")));
   }
-  const std::ptrdiff_t folds = result.summary.partitions.front().cv_folds;
   print(fmt::format("Rule {}, at least {} rows in a leaf; {}\n\n",
-                    arguments.options.growth.rule == GrowthRule::rd ? "rd" : "retis", result.summary.min_leaf_samples,
-                    folds > 0
-                        ? fmt::format("leaf count by {}-fold cross-validation{}, the tree grown anew in every fold",
-                                      folds, arguments.contiguous ? " over contiguous blocks of rows" : "")
-                        : "leaf count as grown"));
-  Table table(
-      {"target", "leaves", "grown", "growth ended by", "RMSE held-out", "least squares held-out", "RMSE in-sample"});
+                    rule_names[static_cast<std::size_t>(arguments.learning.options.growth.rule)],
+                    result.summary.min_leaf_samples, selection_text(arguments, result.summary.partitions.front())));
+  Table table({"target", "model", "leaves", "RMSE held-out", "+-", "RMSE in-sample"});
   for (const PartitionSummary& partition : result.summary.partitions) {
     for (std::size_t o = 0; o < partition.outputs.size(); ++o) {
-      table.add({result.model.outputs()[static_cast<std::size_t>(partition.outputs[o])].name,
-                 fmt::format("{}", partition.leaves), fmt::format("{}", partition.grown_leaves),
-                 describe(partition.stop), number(held_out(partition, partition.leaves)),
-                 number(held_out(partition, 1)), number(partition.train_rmse(static_cast<std::ptrdiff_t>(o)))});
+      const std::string& target = result.model.outputs()[static_cast<std::size_t>(partition.outputs[o])].name;
+      table.add({target, describe(partition.chosen.candidate), fmt::format("{}", partition.leaves),
+                 number(partition.chosen.rmse), number(partition.chosen.spread, 2),
+                 number(partition.train_rmse(static_cast<std::ptrdiff_t>(o)))});
+      if (o > 0) {
+        continue;
+      }
+      const Candidate& chosen = partition.chosen.candidate;
+      for (const CandidateError& other : partition.best_of_kind) {
+        const Candidate& candidate = other.candidate;
+        if (candidate.validity.kind != chosen.validity.kind || candidate.validity.width != chosen.validity.width ||
+            candidate.leaves != chosen.leaves) {
+          table.add({"  against", describe(candidate), fmt::format("{}", candidate.leaves), number(other.rmse),
+                     number(other.spread, 2), ""});
+        }
+      }
     }
   }
   print(table.text());
@@ -166,25 +176,15 @@ void print_summary(const FitArguments& arguments, const FitResult& result) {
 }
 
 void fit_command(FitArguments arguments) {
-  const Csv csv = Csv::read(arguments.data);
-  if (csv.rows() == 0) {
-    throw std::runtime_error(fmt::format("{}: there is a header and no rows", arguments.data));
-  }
-  const std::vector<std::string> input_names = choose_inputs(csv, arguments);
-  const Eigen::MatrixXd outputs = csv.numbers(arguments.targets);
-  const Eigen::MatrixXd inputs = read_inputs(csv, input_names, !arguments.inputs.empty());
-  arguments.options.growth.split_inputs = positions("--split-inputs", arguments.split_inputs, input_names);
-  arguments.options.growth.regression_inputs =
-      positions("--regression-inputs", arguments.regression_inputs, input_names);
-  arguments.options.folds.kind = arguments.contiguous ? FoldKind::contiguous : FoldKind::random;
-
+  LearningTable table = read_learning_table(arguments.learning);
   Progress progress("growing trees");
-  arguments.options.progress = [&](std::ptrdiff_t done, std::ptrdiff_t total) { progress.show(done, total); };
-  FitResult result = fit(inputs, outputs, arguments.options);
+  table.options.intervals = !arguments.no_intervals && !arguments.output.empty();
+  table.options.progress = [&](std::ptrdiff_t done, std::ptrdiff_t total) { progress.show(done, total); };
+  FitResult result = fit(table.inputs.values, table.outputs, table.options);
   progress.clear();
-  result.model = result.model.named(input_names, arguments.targets);
+  result.model = result.model.named(table.names, arguments.learning.targets, table.inputs.levels);
   if (!arguments.output.empty()) {
-    save(result.model, arguments.output);
+    save(result.model, result.intervals, arguments.output);
   }
   if (arguments.json) {
     print_json(summary_json(arguments, result));
@@ -199,45 +199,43 @@ void add_fit(CLI::App& app) {
   CLI::App* command = app.add_subcommand("fit", "Learn a model from a table");
   command->footer("Example: llmt fit concrete.csv --target strength -o concrete.json");
   const auto arguments = std::make_shared<FitArguments>();
-  GrowthOptions& growth = arguments->options.growth;
-  command->add_option("data", arguments->data, "CSV file with a header row")->required();
-  command->add_option("-t,--target", arguments->targets, "Column to predict; repeat for several")
-      ->required()
-      ->delimiter(',');
-  command->add_option("--inputs", arguments->inputs, "Columns to learn from (default: all but targets and ignored)")
-      ->delimiter(',');
-  command->add_option("--ignore", arguments->ignored, "Columns to leave out")->delimiter(',');
-  command->add_option("--split-inputs", arguments->split_inputs, "Inputs that may be split (default: all)")
-      ->delimiter(',');
-  command->add_option("--regression-inputs", arguments->regression_inputs, "Inputs of the local models (default: all)")
-      ->delimiter(',');
-  command->add_option("--rule", growth.rule, "Growth rule: rd (F test) or retis (m-estimate pruning)")
-      ->transform(CLI::CheckedTransformer(
-          std::map<std::string, GrowthRule>{{"rd", GrowthRule::rd}, {"retis", GrowthRule::retis}}))
-      ->option_text("rd|retis [rd]");
-  command->add_option("--max-leaves", growth.max_leaves, "Most leaves of a tree, 0: no limit")->capture_default_str();
+  add_learning_options(*command, arguments->learning);
+  GrowthOptions& growth = arguments->learning.options.growth;
+  BlendOptions& blend = arguments->learning.options.blend;
   command
-      ->add_option("--min-leaf", growth.min_leaf_samples,
-                   "Fewest rows in a leaf, 0: twice the coefficients of a local model")
-      ->capture_default_str();
+      ->add_option("--rule", growth.rule,
+                   "Growth rule: rd, retis (m-estimate pruning), lolimot (halves boxes), lolimot-data (data-driven "
+                   "thresholds)")
+      ->transform(choice_of<GrowthRule>(rule_names))
+      ->option_text("rd|retis|lolimot|lolimot-data [rd]");
   command->add_option("--significance", growth.significance, "rd: of the F test, over all candidate splits; 1: no test")
       ->check(CLI::NonNegativeNumber)
-      ->capture_default_str();
+      ->option_text("FLOAT [see docs/commands.md]");
   command
       ->add_option("--min-improvement", growth.min_improvement,
                    "Stop when further splits lower the training sum of squares by less than this fraction each")
       ->capture_default_str();
   command->add_flag("--shared", growth.shared_partition, "One tree for all targets instead of one each");
-  command
-      ->add_option("--cv", arguments->options.folds.count,
-                   "Folds to choose the leaf count by, 0: keep the tree as grown")
-      ->capture_default_str();
-  command->add_flag("--contiguous", arguments->contiguous,
-                    "Folds are blocks of consecutive rows (measured paths, grids, time series)");
-  command->add_option("--seed", arguments->options.folds.seed, "Of the random folds")->capture_default_str();
-  command->add_option("--threads", arguments->options.max_threads, "0: all; the result does not depend on it")
+  command->add_option("--validity", blend.validity, "Crisp leaves, blends over the splits, Gaussians, or the best of the first two")
+      ->transform(choice_of<ValidityChoice>(validity_names))
+      ->option_text("auto|crisp|blend|gaussian [auto]");
+  command->add_option("--estimation", blend.estimation, "Local models as grown, weighted by validity, or all at once")
+      ->transform(choice_of<Estimation>(estimation_names))
+      ->option_text("as-grown|local|joint [joint]");
+  command->add_option("--width", blend.widths, "Widths to choose from: of a transition by the smaller child's extent; k_sigma")
+      ->delimiter(',')
+      ->option_text("FLOAT,... [0.5,1,2,4; Gaussians 0.333]");
+  command->add_option("--ridge", blend.ridges, "Ridges to choose from: hold of the joint estimate at the local one")
+      ->delimiter(',')
+      ->option_text("FLOAT,... [1e-8 ... 0.1]");
+  command->add_option("--shrinkage", blend.shrinkages, "Shrinkages to choose from: towards the parent's model, in rows")
+      ->delimiter(',')
+      ->option_text("FLOAT,... [0,0.1,1]");
+  command->add_option("--smoothness", blend.smoothness, "Continuous derivatives of a blend, 1 or 2")
       ->capture_default_str();
   command->add_option("-o,--output", arguments->output, "Model file to write");
+  command->add_flag("--no-intervals", arguments->no_intervals,
+                    "Leave the folds' models out of the file; it is smaller and has no prediction intervals");
   command->add_flag("--json", arguments->json, "Print the summary as JSON");
   command->callback([arguments] { fit_command(*arguments); });
 }

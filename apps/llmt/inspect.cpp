@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <array>
 #include <cmath>
 #include <memory>
 
@@ -20,7 +21,15 @@ struct InspectArguments {
 std::string conditions(const Model& model, const Leaf& leaf) {
   std::vector<std::string> parts;
   for (std::ptrdiff_t j = 0; j < model.num_inputs(); ++j) {
-    const std::string& name = model.inputs()[static_cast<std::size_t>(j)].name;
+    const InputColumn& input = model.inputs()[static_cast<std::size_t>(j)];
+    const std::string& name = input.name;
+    if (const std::vector<int>& levels = leaf.levels[static_cast<std::size_t>(j)]; !levels.empty()) {
+      std::vector<std::string> names;
+      for (const int level : levels) {
+        names.push_back(input.levels[static_cast<std::size_t>(level)]);
+      }
+      parts.push_back(fmt::format("{} in {{{}}}", name, fmt::join(names, ", ")));
+    }
     const bool below = std::isfinite(leaf.high(j));
     const bool above = std::isfinite(leaf.low(j));
     if (below && above) {
@@ -34,23 +43,51 @@ std::string conditions(const Model& model, const Leaf& leaf) {
   return parts.empty() ? "everywhere" : fmt::format("{}", fmt::join(parts, ", "));
 }
 
+/// "x1", or "[colour = red]" for the indicator of a category.
+std::string regressor_name(const Model& model, std::size_t k) {
+  const Regressor& regressor = model.regressors()[k];
+  const InputColumn& input = model.inputs()[static_cast<std::size_t>(regressor.input)];
+  return regressor.level < 0
+             ? input.name
+             : fmt::format("[{} = {}]", input.name, input.levels[static_cast<std::size_t>(regressor.level)]);
+}
+
 /// "1.5 + 2 x1 - 0.3 x2".
 std::string formula(const Model& model, const Leaf& leaf, std::ptrdiff_t output) {
   std::string text = number(leaf.intercept(output));
-  for (std::size_t j = 0; j < model.regression_inputs().size(); ++j) {
-    const double slope = leaf.slope(output, static_cast<std::ptrdiff_t>(j));
-    const std::string& name = model.inputs()[static_cast<std::size_t>(model.regression_inputs()[j])].name;
+  for (std::size_t k = 0; k < model.regressors().size(); ++k) {
+    const double slope = leaf.slope(output, static_cast<std::ptrdiff_t>(k));
     if (slope != 0.0) {
-      text += fmt::format(" {} {} {}", slope < 0.0 ? "-" : "+", number(std::abs(slope)), name);
+      text += fmt::format(" {} {} {}", slope < 0.0 ? "-" : "+", number(std::abs(slope)), regressor_name(model, k));
     }
   }
   return text;
+}
+
+/// How the leaves share the input space, in words.
+std::string validity_text(const Validity& validity) {
+  switch (validity.kind) {
+    case ValidityKind::crisp:
+      return "each holds in its box alone";
+    case ValidityKind::blend:
+      return fmt::format("blended over the splits, width {}: between boxes the formulas are averaged, and a leaf's "
+                         "formula alone says little where others reach it",
+                         number(validity.width, 3));
+    case ValidityKind::gaussian:
+      return fmt::format("blended by Gaussians, k_sigma {}", number(validity.width, 3));
+  }
+  return "";
 }
 
 void print_model(const Model& model, const std::string& path) {
   print(fmt::format("{}: {} inputs, {} outputs\n\n", path, model.num_inputs(), model.num_outputs()));
   Table inputs({"input", "smallest", "largest", "mean"});
   for (const InputColumn& input : model.inputs()) {
+    if (input.is_categorical()) {
+      inputs.add({input.name, fmt::format("{} categories: {}", input.levels.size(), fmt::join(input.levels, ", ")), "",
+                  ""});
+      continue;
+    }
     inputs.add({input.name, number(input.low), number(input.high), number(input.centre)});
   }
   print(inputs.text());
@@ -58,7 +95,7 @@ void print_model(const Model& model, const std::string& path) {
     const Partition& partition = model.partitions()[static_cast<std::size_t>(p)];
     for (std::size_t o = 0; o < partition.outputs.size(); ++o) {
       const std::string& name = model.outputs()[static_cast<std::size_t>(partition.outputs[o])].name;
-      print(fmt::format("\n{}: {} leaves\n", name, partition.num_leaves()));
+      print(fmt::format("\n{}: {} leaves, {}\n", name, partition.num_leaves(), validity_text(partition.validity)));
       Table table({"leaf", "rows", "RMSE", "where", name + " ="});
       const std::vector<Leaf> leaves = model.leaves(p);
       for (std::size_t k = 0; k < leaves.size(); ++k) {
@@ -84,14 +121,21 @@ Json leaf_table(const Model& model) {
   for (const InputColumn& input : model.inputs()) {
     json["inputs"].push_back(
         {{"name", input.name}, {"low", input.low}, {"high", input.high}, {"centre", input.centre}});
+    if (input.is_categorical()) {
+      json["inputs"].back()["levels"] = input.levels;
+    }
   }
-  json["regression_inputs"] = Json::array();
-  for (const int input : model.regression_inputs()) {
-    json["regression_inputs"].push_back(model.inputs()[static_cast<std::size_t>(input)].name);
+  json["regressors"] = Json::array();
+  for (std::size_t k = 0; k < model.regressors().size(); ++k) {
+    json["regressors"].push_back(regressor_name(model, k));
   }
   for (std::ptrdiff_t p = 0; p < std::ssize(model.partitions()); ++p) {
     const Partition& partition = model.partitions()[static_cast<std::size_t>(p)];
+    constexpr std::array<const char*, 3> kinds = {"crisp", "blend", "gaussian"};
     Json entry;
+    entry["validity"] = {{"kind", kinds[static_cast<std::size_t>(partition.validity.kind)]},
+                         {"width", partition.validity.width},
+                         {"smoothness", partition.validity.smoothness}};
     for (const int output : partition.outputs) {
       entry["targets"].push_back(model.outputs()[static_cast<std::size_t>(output)].name);
     }
@@ -104,6 +148,7 @@ Json leaf_table(const Model& model) {
                                  {"rank", leaf.rank},
                                  {"low", finite_or_null(leaf.low)},
                                  {"high", finite_or_null(leaf.high)},
+                                 {"levels", leaf.levels},
                                  {"rmse", finite_or_null(leaf.rmse)},
                                  {"intercept", finite_or_null(leaf.intercept)},
                                  {"slope", std::move(slopes)}});

@@ -8,5 +8,7 @@ int main(int argc, char** argv) {
   llmt::apps::add_fit(app);
   llmt::apps::add_predict(app);
   llmt::apps::add_inspect(app);
+  llmt::apps::add_explain(app);
+  llmt::apps::add_compare(app);
   return llmt::apps::run(app, argc, argv);
 }

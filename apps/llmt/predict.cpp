@@ -4,13 +4,16 @@
 #include <charconv>
 #include <cmath>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 
 #include "llmt/commands.hpp"
 #include "llmt/csv.hpp"
 #include "llmt/files.hpp"
 #include "llmt/fit.hpp"
+#include "llmt/intervals.hpp"
 #include "shared/cli.hpp"
+#include "shared/columns.hpp"
 
 namespace llmt::apps {
 namespace {
@@ -20,13 +23,17 @@ struct PredictArguments {
   std::string data;
   std::string output;
   bool json = false;
+  double interval = 0.0;  // level; 0: none
   int threads = 0;
 };
 
 struct Predicted {
   std::vector<std::string> targets;
   Eigen::MatrixXd values;
-  Eigen::VectorXd outside;
+  std::vector<Extrapolation> extrapolation;
+  std::optional<Bounds> bounds;
+  std::ptrdiff_t missing = 0;
+  std::ptrdiff_t unknown = 0;
   /// RMSE of the targets that the table also holds, in the order of targets; NaN for the others.
   Eigen::VectorXd rmse;
 };
@@ -38,18 +45,36 @@ void append_number(std::string& text, double value) {
   text.append(buffer, end.ptr);
 }
 
-Predicted predict_table(const Model& model, const Csv& csv, int threads) {
-  std::vector<std::string> inputs;
-  for (const InputColumn& input : model.inputs()) {
-    inputs.push_back(input.name);
-  }
-  const Eigen::MatrixXd values = csv.numbers(inputs);
-  std::vector<std::string> targets;
+std::ptrdiff_t count_outside(const Predicted& predicted) {
+  return std::count_if(predicted.extrapolation.begin(), predicted.extrapolation.end(),
+                       [](const Extrapolation& row) { return row.distance > 0.0; });
+}
+
+/// Local models that are carried beyond their rows although every input lies in its range.
+std::ptrdiff_t count_high_leverage(const Predicted& predicted) {
+  return std::count_if(predicted.extrapolation.begin(), predicted.extrapolation.end(),
+                       [](const Extrapolation& row) { return row.distance == 0.0 && row.leverage >= 1.0; });
+}
+
+Predicted predict_table(const PredictArguments& arguments, const Model& model, const Csv& csv) {
+  const ModelInputs inputs = read_inputs(csv, model);
+  Predicted predicted;
   for (const OutputColumn& output : model.outputs()) {
-    targets.push_back(output.name);
+    predicted.targets.push_back(output.name);
   }
-  Predicted predicted{std::move(targets), model.predict(values, threads), model.outside(values),
-                      Eigen::VectorXd::Constant(model.num_outputs(), std::nan(""))};
+  predicted.values = model.predict(inputs.values, arguments.threads);
+  predicted.extrapolation = model.extrapolation(inputs.values);
+  predicted.missing = inputs.missing;
+  predicted.unknown = inputs.unknown;
+  if (arguments.interval > 0.0) {
+    const Intervals intervals = load_intervals(arguments.model);
+    if (intervals.empty()) {
+      throw std::runtime_error(fmt::format(
+          "{}: the file has no held-out residuals; fit without --no-intervals and with folds", arguments.model));
+    }
+    predicted.bounds = intervals.predict(inputs.values, arguments.interval, arguments.threads);
+  }
+  predicted.rmse = Eigen::VectorXd::Constant(model.num_outputs(), std::nan(""));
   for (std::size_t o = 0; o < predicted.targets.size(); ++o) {
     if (csv.has(predicted.targets[o]) && csv.rows() > 0) {
       const std::ptrdiff_t column = static_cast<std::ptrdiff_t>(o);
@@ -68,8 +93,11 @@ std::string to_csv(const Csv& csv, const Predicted& predicted) {
   std::vector<std::string> added;
   for (const std::string& target : predicted.targets) {
     added.push_back(target + "_pred");
+    if (predicted.bounds) {
+      added.insert(added.end(), {target + "_low", target + "_high"});
+    }
   }
-  added.insert(added.end(), {"outside", "outside_by"});
+  added.insert(added.end(), {"outside", "outside_by", "leverage"});
   std::string text(csv.header_text());
   for (const std::string& column : added) {
     if (csv.has(column)) {
@@ -84,11 +112,20 @@ std::string to_csv(const Csv& csv, const Predicted& predicted) {
     for (std::ptrdiff_t o = 0; o < predicted.values.cols(); ++o) {
       text += csv.separator();
       append_number(text, predicted.values(row, o));
+      if (predicted.bounds) {
+        text += csv.separator();
+        append_number(text, predicted.bounds->lower(row, o));
+        text += csv.separator();
+        append_number(text, predicted.bounds->upper(row, o));
+      }
     }
+    const Extrapolation& extrapolation = predicted.extrapolation[static_cast<std::size_t>(row)];
     text += csv.separator();
-    text += predicted.outside(row) > 0.0 ? '1' : '0';
+    text += extrapolation.distance > 0.0 ? '1' : '0';
     text += csv.separator();
-    append_number(text, predicted.outside(row));
+    append_number(text, extrapolation.distance);
+    text += csv.separator();
+    append_number(text, extrapolation.leverage);
     text += '\n';
   }
   return text;
@@ -97,7 +134,9 @@ std::string to_csv(const Csv& csv, const Predicted& predicted) {
 Json summary_json(const Predicted& predicted, bool with_values) {
   Json json;
   json["rows"] = predicted.values.rows();
-  json["outside_rows"] = (predicted.outside.array() > 0.0).count();
+  json["outside_rows"] = count_outside(predicted);
+  json["missing_values"] = predicted.missing;
+  json["unknown_categories"] = predicted.unknown;
   json["targets"] = Json::array();
   for (std::size_t o = 0; o < predicted.targets.size(); ++o) {
     const std::ptrdiff_t column = static_cast<std::ptrdiff_t>(o);
@@ -106,28 +145,50 @@ Json summary_json(const Predicted& predicted, bool with_values) {
     if (with_values) {
       target["predicted"] =
           std::vector<double>(predicted.values.col(column).begin(), predicted.values.col(column).end());
+      if (predicted.bounds) {
+        const Eigen::VectorXd lower = predicted.bounds->lower.col(column);
+        const Eigen::VectorXd upper = predicted.bounds->upper.col(column);
+        target["low"] = std::vector<double>(lower.begin(), lower.end());
+        target["high"] = std::vector<double>(upper.begin(), upper.end());
+      }
     }
     json["targets"].push_back(std::move(target));
   }
   if (with_values) {
     json["outside_by"] = Json::array();
-    for (const double distance : predicted.outside) {
-      json["outside_by"].push_back(std::isfinite(distance) ? Json(distance) : Json("infinity"));
+    json["leverage"] = Json::array();
+    for (const Extrapolation& row : predicted.extrapolation) {
+      json["outside_by"].push_back(std::isfinite(row.distance) ? Json(row.distance) : Json("infinity"));
+      json["leverage"].push_back(row.leverage);
     }
   }
   return json;
 }
 
 void summarise(const PredictArguments& arguments, const Predicted& predicted) {
-  const std::ptrdiff_t outside = (predicted.outside.array() > 0.0).count();
+  const std::ptrdiff_t outside = count_outside(predicted);
   std::string text = fmt::format("{}: {} rows predicted", arguments.data, predicted.values.rows());
   for (std::size_t o = 0; o < predicted.targets.size(); ++o) {
     const double error = predicted.rmse(static_cast<std::ptrdiff_t>(o));
     text += std::isnan(error) ? "" : fmt::format("; RMSE of {} {}", predicted.targets[o], number(error));
   }
   if (outside > 0) {
+    double farthest = 0.0;
+    for (const Extrapolation& row : predicted.extrapolation) {
+      farthest = std::max(farthest, row.distance);
+    }
     text += fmt::format("; {} rows lie outside the training extent, by up to {} of an input's range", outside,
-                        number(predicted.outside.maxCoeff(), 2));
+                        number(farthest, 2));
+  }
+  if (const std::ptrdiff_t rows = count_high_leverage(predicted); rows > 0) {
+    text += fmt::format("; {} rows inside it combine inputs as no training row near them does (leverage 1 or more)",
+                        rows);
+  }
+  if (predicted.missing > 0) {
+    text += fmt::format("; {} missing values", predicted.missing);
+  }
+  if (predicted.unknown > 0) {
+    text += fmt::format("; {} values of categories that were not in training, taken as missing", predicted.unknown);
   }
   warn(text);
 }
@@ -135,7 +196,7 @@ void summarise(const PredictArguments& arguments, const Predicted& predicted) {
 void predict_command(const PredictArguments& arguments) {
   const Model model = load(arguments.model);
   const Csv csv = Csv::read(arguments.data);
-  const Predicted predicted = predict_table(model, csv, arguments.threads);
+  const Predicted predicted = predict_table(arguments, model, csv);
   if (!arguments.output.empty()) {
     write_file(arguments.output, to_csv(csv, predicted));
   }
@@ -157,13 +218,17 @@ void add_predict(CLI::App& app) {
       "Apply a model to a table: the table's rows, in order, with a column TARGET_pred for every target; outside: 1 "
       "where an input lies\n"
       "outside its range in training; outside_by: how far, as a multiple of that range. If the table holds a target, "
-      "its RMSE is reported.");
+      "its RMSE is reported. leverage: of the row on its local models; 1 and more is extrapolation.");
   command->footer("Example: llmt predict concrete.json new.csv -o predicted.csv");
   const auto arguments = std::make_shared<PredictArguments>();
   command->add_option("model", arguments->model, "Model file of llmt fit")->required();
   command->add_option("data", arguments->data, "CSV file with the model's inputs; other columns are passed through")
       ->required();
   command->add_option("-o,--output", arguments->output, "CSV file to write (default: standard output)");
+  command
+      ->add_option("--interval", arguments->interval,
+                   "Level of prediction intervals, such as 0.9: adds TARGET_low and TARGET_high")
+      ->check(CLI::Range(0.0, 1.0));
   command->add_option("--threads", arguments->threads, "0: all; the result does not depend on it")
       ->capture_default_str();
   command->add_flag("--json", arguments->json, "Print JSON; it holds the predictions unless -o is given");

@@ -68,8 +68,6 @@ AxisTrees fit_axes(const Eigen::MatrixXd& joints, const Eigen::MatrixXd& outputs
   AxisTrees trees;
   for (std::size_t axis = 0; axis < options.size(); ++axis) {
     FitResult result = fit(joints, outputs.col(static_cast<Eigen::Index>(axis)), options[axis]);
-    if (getenv("DBG")) for (auto& k : result.summary.partitions[0].best_of_kind) fprintf(stderr, "[%d w%g r%g s%g M%d %.4g] ", (int)k.candidate.validity.kind, k.candidate.validity.width, k.candidate.ridge, k.candidate.shrinkage, (int)k.candidate.leaves, k.rmse);
-    if (getenv("DBG")) fprintf(stderr, "\n");
     trees.leaves.push_back(result.summary.partitions[0].leaves);
     trees.models.push_back(std::move(result.model));
   }

@@ -5,7 +5,9 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 #include "llmt/files.hpp"
@@ -86,6 +88,15 @@ double parse_number(std::string_view field, std::string& problem) {
     problem = fmt::format("'{}' is not finite", field);
   }
   return value;
+}
+
+/// Whether a cell says that there is no value.
+bool is_missing(std::string_view field) {
+  const std::string text = unquoted(trimmed(field));
+  std::string lower(trimmed(text));
+  std::transform(lower.begin(), lower.end(), lower.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return lower.empty() || lower == "na" || lower == "n/a" || lower == "nan" || lower == "null" || lower == "?";
 }
 
 }  // namespace
@@ -171,7 +182,26 @@ std::size_t Csv::index_of(std::string_view column) const {
   return static_cast<std::size_t>(found - columns_.begin());
 }
 
-Eigen::MatrixXd Csv::numbers(std::span<const std::string> columns) const {
+Eigen::MatrixXd Csv::numbers(std::span<const std::string> columns) const { return read_numbers(columns, false); }
+
+Eigen::MatrixXd Csv::numbers_or_missing(std::span<const std::string> columns) const {
+  return read_numbers(columns, true);
+}
+
+std::vector<std::string> Csv::texts(const std::string& column) const {
+  const std::size_t wanted = index_of(column);
+  std::vector<std::string> result;
+  for (std::ptrdiff_t row = 0; row < rows(); ++row) {
+    for_each_field(row_text(row), separator_, [&](std::size_t index, std::string_view field) {
+      if (index == wanted) {
+        result.push_back(is_missing(field) ? std::string() : std::string(trimmed(unquoted(trimmed(field)))));
+      }
+    });
+  }
+  return result;
+}
+
+Eigen::MatrixXd Csv::read_numbers(std::span<const std::string> columns, bool allow_missing) const {
   constexpr std::ptrdiff_t unused = -1;
   std::vector<std::ptrdiff_t> target(columns_.size(), unused);
   for (std::size_t i = 0; i < columns.size(); ++i) {
@@ -183,6 +213,10 @@ Eigen::MatrixXd Csv::numbers(std::span<const std::string> columns) const {
   for (std::ptrdiff_t row = 0; row < rows(); ++row) {
     for_each_field(row_text(row), separator_, [&](std::size_t index, std::string_view field) {
       if (target[index] == unused) {
+        return;
+      }
+      if (allow_missing && is_missing(field)) {
+        values(row, target[index]) = std::numeric_limits<double>::quiet_NaN();
         return;
       }
       values(row, target[index]) = parse_number(field, problem);

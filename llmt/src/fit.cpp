@@ -326,6 +326,9 @@ FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<
                      .missing_values = all.inputs.array().isNaN().count(),
                      .min_leaf_samples = plan.growth.min_leaf_samples,
                      .partitions = std::vector<PartitionSummary>(served.size())};
+  // Of every fold: one partition for each group of outputs.
+  std::vector<std::vector<std::optional<Partition>>> fold_partitions(
+      options.intervals ? folds.size() : 0, std::vector<std::optional<Partition>>(served.size()));
   parallel_for(std::ssize(served), options.max_threads, [&](std::ptrdiff_t index) {
     const std::size_t p = static_cast<std::size_t>(index);
     const Eigen::VectorXd weights = error_weights(all.outputs(Eigen::all, served[p]));
@@ -354,6 +357,13 @@ FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<
     } else if (candidate.leaves < grown_leaves) {
       grown.stop = StopReason::cross_validation;
     }
+    parallel_for(std::ssize(fold_partitions), options.max_threads, [&](std::ptrdiff_t f) {
+      const FoldTree& tree = trees[static_cast<std::size_t>(f)];
+      Candidate of_fold = candidate;
+      of_fold.leaves = std::min(of_fold.leaves, tree.grown.num_leaves());
+      fold_partitions[static_cast<std::size_t>(f)][p] =
+          estimate(tree.training, tree.grown, of_fold, options.max_threads);
+    });
     candidate.leaves = std::min(candidate.leaves, grown_leaves);
     Partition partition = estimate(all, grown.partition, candidate, options.max_threads);
     describe_leaves(all, partition);
@@ -376,7 +386,21 @@ FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<
   for (std::optional<Partition>& partition : partitions) {
     finished.push_back(std::move(*partition));
   }
-  return {Model(all.columns, all.output_columns, all.regressors, std::move(finished)), std::move(summary)};
+  std::vector<Model> fold_models;
+  std::vector<Eigen::MatrixXd> residuals;
+  for (std::size_t f = 0; f < fold_partitions.size(); ++f) {
+    const FoldTree& rows = fold_rows[f];
+    std::vector<Partition> of_fold;
+    for (std::optional<Partition>& partition : fold_partitions[f]) {
+      of_fold.push_back(std::move(*partition));
+    }
+    fold_models.emplace_back(rows.training.columns, rows.training.output_columns, rows.training.regressors,
+                             std::move(of_fold));
+    residuals.push_back(
+        (rows.held_out.outputs - fold_models.back().predict(rows.held_out.inputs, options.max_threads)).cwiseAbs());
+  }
+  return {Model(all.columns, all.output_columns, all.regressors, std::move(finished)), std::move(summary),
+          Intervals(std::move(fold_models), std::move(residuals))};
 }
 
 Eigen::VectorXd rmse(const Eigen::Ref<const Eigen::MatrixXd>& predicted,

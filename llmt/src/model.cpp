@@ -339,6 +339,46 @@ std::vector<Extrapolation> Model::extrapolation(const Eigen::Ref<const Eigen::Ma
   return result;
 }
 
+Eigen::MatrixXd Model::standard_errors(const Eigen::Ref<const Eigen::MatrixXd>& inputs) const {
+  check_query("llmt::Model::standard_errors", *this, inputs);
+  constexpr double pooled_rows = 10.0;
+  const RowMajor rows = inputs;
+  const std::ptrdiff_t regressors = std::ssize(regressors_);
+  Eigen::MatrixXd result(inputs.rows(), num_outputs());
+  Eigen::VectorXd deviations(regressors);
+  Eigen::VectorXd a(regressors + 1);
+  std::vector<Activation> active;
+  for (std::size_t p = 0; p < partitions_.size(); ++p) {
+    const Partition& partition = partitions_[p];
+    const Node& root = partition.nodes.front();
+    double coefficients = 0.0;
+    for (const Node& node : partition.nodes) {
+      coefficients += node.is_leaf() ? node.rank : 0;
+    }
+    const Eigen::VectorXd overall = root.rss / std::max(1.0, static_cast<double>(root.samples) - coefficients);
+    for (std::ptrdiff_t row = 0; row < rows.rows(); ++row) {
+      const double* x = rows.row(row).data();
+      deviations_at(inputs_, regressors_, x, deviations.data());
+      (*evaluators_)[p].activate(x, active);
+      Eigen::VectorXd variance = Eigen::VectorXd::Zero(root.rss.size());
+      for (const Activation& entry : active) {
+        const Node& leaf = partition.nodes[static_cast<std::size_t>(entry.node)];
+        if (leaf.inverse_gram.size() > 0) {
+          a(0) = 1.0;
+          a.tail(regressors) = deviations.array().isNaN().select(leaf.mean, deviations);
+          const double freedom = std::max(0.0, static_cast<double>(leaf.samples - leaf.rank)) + pooled_rows;
+          variance +=
+              entry.validity * a.dot(leaf.inverse_gram * a) * (leaf.rss + pooled_rows * overall) / freedom;
+        }
+      }
+      for (std::size_t o = 0; o < partition.outputs.size(); ++o) {
+        result(row, partition.outputs[o]) = std::sqrt(variance(static_cast<std::ptrdiff_t>(o)));
+      }
+    }
+  }
+  return result;
+}
+
 std::vector<Leaf> Model::leaves(std::ptrdiff_t partition) const {
   if (partition < 0 || partition >= std::ssize(partitions_)) {
     throw std::invalid_argument(
@@ -378,7 +418,8 @@ Model Model::prefix(std::ptrdiff_t max_leaves) const {
   return {inputs_, outputs_, regressors_, std::move(partitions)};
 }
 
-Model Model::named(const std::vector<std::string>& inputs, const std::vector<std::string>& outputs) const {
+Model Model::named(const std::vector<std::string>& inputs, const std::vector<std::string>& outputs,
+                   const std::vector<std::vector<std::string>>& levels) const {
   if (std::ssize(inputs) != num_inputs() || std::ssize(outputs) != num_outputs()) {
     throw std::invalid_argument(
         fmt::format("llmt::Model::named: {} input and {} output names for {} inputs and {} outputs", inputs.size(),
@@ -387,6 +428,14 @@ Model Model::named(const std::vector<std::string>& inputs, const std::vector<std
   Model result = *this;
   for (std::size_t i = 0; i < inputs.size(); ++i) {
     result.inputs_[i].name = inputs[i];
+  }
+  for (std::size_t i = 0; i < levels.size(); ++i) {
+    if (i >= inputs.size() || levels[i].size() != inputs_[i].levels.size()) {
+      throw std::invalid_argument(fmt::format("llmt::Model::named: {} level names for input {}, which has {} levels",
+                                              levels[i].size(), i,
+                                              i < inputs_.size() ? inputs_[i].levels.size() : 0));
+    }
+    result.inputs_[i].levels = levels[i];
   }
   for (std::size_t o = 0; o < outputs.size(); ++o) {
     result.outputs_[o].name = outputs[o];

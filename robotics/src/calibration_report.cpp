@@ -32,6 +32,7 @@ Fitted fit_all(const Robot& robot, const Measurements& measurements, const Repor
                          .kind = options.kind,
                          .seed = options.seed,
                          .groups = pose_labels(measurements)};
+  fit.intervals = false;
   fit.max_threads = options.max_threads;
   fitted.correction = fit_correction(fitted.calibration.robot, measurements, fit);
   return fitted;

@@ -47,6 +47,13 @@ class Csv {
   /// One column as numbers; errors as above.
   Eigen::VectorXd numbers(const std::string& column) const;
 
+  /// As numbers(), but a cell that is empty or says NA, N/A, NaN, null or ? (in any case) is missing, NaN.
+  Eigen::MatrixXd numbers_or_missing(std::span<const std::string> columns) const;
+
+  /// One column as text, quotes and outer blanks taken off; cells that numbers_or_missing() takes for missing are
+  /// empty. Errors as index_of().
+  std::vector<std::string> texts(const std::string& column) const;
+
   /// The text of a row as it stands in the file, without its line end.
   std::string_view row_text(std::ptrdiff_t row) const;
 
@@ -60,6 +67,7 @@ class Csv {
 
  private:
   Csv() = default;
+  Eigen::MatrixXd read_numbers(std::span<const std::string> columns, bool allow_missing) const;
 
   std::string name_;
   std::string text_;

@@ -179,6 +179,12 @@ class Model {
   /// How far each row lies from what the model has seen. Missing values do not count. Throws as predict().
   std::vector<Extrapolation> extrapolation(const Eigen::Ref<const Eigen::MatrixXd>& inputs) const;
 
+  /// Standard errors of the local models' means, rows x outputs: the square root of the validity-weighted mean of
+  /// s_i^2 a' (sum validity a a')^-1 a, s_i^2 = (rss_i + 10 s^2) / (samples_i - rank_i + 10) drawn towards the residual
+  /// variance s^2 of all rows. They take the tree as given and the noise as equal within a leaf, say nothing of bias and
+  /// are too small; for intervals that hold what they promise see Intervals. Throws as predict().
+  Eigen::MatrixXd standard_errors(const Eigen::Ref<const Eigen::MatrixXd>& inputs) const;
+
   /// The leaves of a partition from left to right in the tree. Throws std::invalid_argument if there is no such
   /// partition.
   std::vector<Leaf> leaves(std::ptrdiff_t partition) const;
@@ -187,8 +193,10 @@ class Model {
   /// anew. Throws std::invalid_argument if max_leaves < 1.
   Model prefix(std::ptrdiff_t max_leaves) const;
 
-  /// The same model with other column names. Throws std::invalid_argument if their numbers differ.
-  Model named(const std::vector<std::string>& inputs, const std::vector<std::string>& outputs) const;
+  /// The same model with other names of columns and, if there are any, of the levels of each input (empty for numbers).
+  /// Throws std::invalid_argument if their numbers differ.
+  Model named(const std::vector<std::string>& inputs, const std::vector<std::string>& outputs,
+              const std::vector<std::vector<std::string>>& levels = {}) const;
 
  private:
   std::vector<InputColumn> inputs_;

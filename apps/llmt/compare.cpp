@@ -1,0 +1,85 @@
+#include "llmt/compare.hpp"
+
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "llmt/commands.hpp"
+#include "llmt/csv.hpp"
+#include "llmt/learning.hpp"
+#include "shared/cli.hpp"
+
+namespace llmt::apps {
+namespace {
+
+struct CompareArguments {
+  LearningArguments learning;
+  bool json = false;
+};
+
+Json comparison_json(const CompareArguments& arguments, const LearningTable& table, const ComparisonResult& result) {
+  Json json;
+  json["data"] = arguments.learning.data;
+  json["rows"] = table.inputs.values.rows();
+  json["target"] = arguments.learning.targets.front();
+  json["folds"] = result.methods.front().fold_rmse.size();
+  json["methods"] = Json::array();
+  for (const Comparison& method : result.methods) {
+    json["methods"].push_back({{"method", method.method},
+                               {"leaves", method.leaves},
+                               {"parameters", method.parameters},
+                               {"cv_rmse", method.cv_rmse},
+                               {"spread", method.spread},
+                               {"fold_rmse", std::vector<double>(method.fold_rmse.begin(), method.fold_rmse.end())},
+                               {"largest_jump", method.largest_jump},
+                               {"fit_seconds", method.fit_seconds},
+                               {"predict_seconds_per_million_rows", method.predict_seconds}});
+  }
+  json["recommended"] = result.methods[result.recommended].method;
+  json["recommendation"] = result.recommendation;
+  return json;
+}
+
+void compare_command(CompareArguments arguments) {
+  if (arguments.learning.targets.size() != 1) {
+    throw std::invalid_argument("compare takes one --target");
+  }
+  const LearningTable table = read_learning_table(arguments.learning);
+  CompareOptions options;
+  options.folds = arguments.learning.options.selection.folds;
+  Progress progress("fitting");
+  options.progress = [&](const std::string&, std::ptrdiff_t done, std::ptrdiff_t total) { progress.show(done, total); };
+  const ComparisonResult result =
+      compare(table.inputs.values, table.outputs, usual_methods(table.options), options);
+  progress.clear();
+  if (arguments.json) {
+    print_json(comparison_json(arguments, table, result));
+    return;
+  }
+  print(fmt::format("{}: {} rows, {} inputs; {}, {} folds{}, every choice made inside the fold\n\n",
+                    arguments.learning.data, table.inputs.values.rows(), table.names.size(),
+                    arguments.learning.targets.front(), result.methods.front().fold_rmse.size(),
+                    arguments.learning.contiguous ? " of contiguous rows" : ""));
+  Table text({"method", "leaves", "parameters", "RMSE held-out", "+-", "largest jump", "fit, s",
+              "predict 1e6 rows, s"});
+  for (const Comparison& method : result.methods) {
+    text.add({method.method, fmt::format("{}", method.leaves), fmt::format("{}", method.parameters),
+              number(method.cv_rmse), number(method.spread, 2), number(method.largest_jump, 3),
+              number(method.fit_seconds, 2), number(method.predict_seconds, 2)});
+  }
+  print(text.text());
+  print("\n" + result.recommendation + "\n");
+}
+
+}  // namespace
+
+void add_compare(CLI::App& app) {
+  CLI::App* command = app.add_subcommand("compare", "Compare smooth and discontinuous trees on held-out rows");
+  command->footer("Example: llmt compare concrete.csv --target strength");
+  const auto arguments = std::make_shared<CompareArguments>();
+  add_learning_options(*command, arguments->learning);
+  command->add_flag("--json", arguments->json, "Print JSON");
+  command->callback([arguments] { compare_command(*arguments); });
+}
+
+}  // namespace llmt::apps

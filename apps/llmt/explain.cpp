@@ -1,0 +1,214 @@
+#include "llmt/explain.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <numeric>
+#include <stdexcept>
+
+#include "llmt/commands.hpp"
+#include "llmt/csv.hpp"
+#include "llmt/model.hpp"
+#include "shared/cli.hpp"
+
+namespace llmt::apps {
+namespace {
+
+struct ExplainArguments {
+  std::string model;
+  std::string data;
+  std::ptrdiff_t row = 0;  // counted from 1; 0: the whole table
+  bool json = false;
+  int threads = 0;
+};
+
+/// The fields of a row as text, without their quotes.
+std::vector<std::string> explained_fields(std::string_view row, char separator) {
+  std::vector<std::string> fields(1);
+  bool quoted = false;
+  for (std::size_t k = 0; k < row.size(); ++k) {
+    if (row[k] == '"' && quoted && k + 1 < row.size() && row[k + 1] == '"') {
+      fields.back() += row[++k];
+    } else if (row[k] == '"') {
+      quoted = !quoted;
+    } else if (row[k] == separator && !quoted) {
+      fields.emplace_back();
+    } else {
+      fields.back() += row[k];
+    }
+  }
+  return fields;
+}
+
+/// One cell as the model sees it: NaN where it is missing or its level unknown.
+double explained_value(const InputColumn& input, const std::string& text, const std::string& where) {
+  constexpr double missing = std::numeric_limits<double>::quiet_NaN();
+  if (input.is_categorical()) {
+    const auto found = std::find(input.levels.begin(), input.levels.end(), text);
+    return found == input.levels.end() ? missing : static_cast<double>(found - input.levels.begin());
+  }
+  const std::size_t begin = text.find_first_not_of(" +");
+  if (begin == std::string::npos || text == "NA" || text == "nan" || text == "NaN" || text == "?") {
+    return missing;
+  }
+  const std::string number_text = text.substr(begin, text.find_last_not_of(' ') + 1 - begin);
+  double value = 0.0;
+  const auto [end, error] = std::from_chars(number_text.data(), number_text.data() + number_text.size(), value);
+  if (error != std::errc() || end != number_text.data() + number_text.size() || !std::isfinite(value)) {
+    throw std::runtime_error(fmt::format("{}: column \"{}\": \"{}\" is not a number", where, input.name, text));
+  }
+  return value;
+}
+
+/// The model's inputs at every row of a table, and as text for people.
+struct ExplainedTable {
+  Eigen::MatrixXd values;
+  std::vector<std::vector<std::string>> text;
+};
+
+ExplainedTable read_explained(const Model& model, const Csv& csv) {
+  std::vector<std::size_t> columns;
+  for (const InputColumn& input : model.inputs()) {
+    columns.push_back(csv.index_of(input.name));
+  }
+  ExplainedTable table{Eigen::MatrixXd(csv.rows(), model.num_inputs()), {}};
+  for (std::ptrdiff_t row = 0; row < csv.rows(); ++row) {
+    const std::vector<std::string> fields = explained_fields(csv.row_text(row), csv.separator());
+    table.text.emplace_back();
+    for (std::size_t j = 0; j < columns.size(); ++j) {
+      const std::string& field = fields[columns[j]];
+      table.values(row, static_cast<std::ptrdiff_t>(j)) =
+          explained_value(model.inputs()[j], field, fmt::format("{}:{}", csv.name(), csv.line_of(row)));
+      table.text.back().push_back(field);
+    }
+  }
+  return table;
+}
+
+/// Inputs, the largest magnitude first; equal ones in the order of the columns.
+std::vector<std::size_t> by_size(const Eigen::VectorXd& values) {
+  std::vector<std::size_t> order(static_cast<std::size_t>(values.size()));
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return std::abs(values(static_cast<std::ptrdiff_t>(a))) > std::abs(values(static_cast<std::ptrdiff_t>(b)));
+  });
+  return order;
+}
+
+void explain_table(const ExplainArguments& arguments, const Model& model, const ExplainedTable& table) {
+  const Eigen::MatrixXd shares = importance(model, table.values, arguments.threads);
+  const std::ptrdiff_t used = std::min(table.values.rows(), importance_rows);
+  Json json = {
+      {"model", arguments.model}, {"data", arguments.data}, {"rows", table.values.rows()}, {"rows_used", used}};
+  json["targets"] = Json::array();
+  if (!arguments.json) {
+    print(fmt::format("{}: importance over {} of {} rows\n", arguments.data, used, table.values.rows()));
+  }
+  for (std::ptrdiff_t o = 0; o < model.num_outputs(); ++o) {
+    const std::string& target = model.outputs()[static_cast<std::size_t>(o)].name;
+    Table printed({"input", "importance"});
+    Json entries = Json::array();
+    for (const std::size_t j : by_size(shares.row(o))) {
+      const double share = shares(o, static_cast<std::ptrdiff_t>(j));
+      printed.add({model.inputs()[j].name, fmt::format("{:.3f}", share)});
+      entries.push_back({{"input", model.inputs()[j].name}, {"importance", share}});
+    }
+    json["targets"].push_back({{"name", target}, {"importance", std::move(entries)}});
+    if (!arguments.json) {
+      print(fmt::format("\n{}\n{}", target, printed.text()));
+    }
+  }
+  if (arguments.json) {
+    print_json(json);
+  } else {
+    print("\nMean share of each input in how far predictions lie from the one at the means of the inputs.\n");
+  }
+}
+
+void explain_row(const ExplainArguments& arguments, const Model& model, const ExplainedTable& table) {
+  if (arguments.row > table.values.rows()) {
+    throw std::invalid_argument(
+        fmt::format("--row is {}, {} has {} rows", arguments.row, arguments.data, table.values.rows()));
+  }
+  const Eigen::VectorXd point = table.values.row(arguments.row - 1);
+  const std::vector<std::string>& text = table.text[static_cast<std::size_t>(arguments.row - 1)];
+  const Attribution attribution = attribute(model, point);
+  Json json = {{"model", arguments.model}, {"data", arguments.data}, {"row", arguments.row}};
+  json["targets"] = Json::array();
+  if (!arguments.json) {
+    print(fmt::format("{}: row {}\n", arguments.data, arguments.row));
+  }
+  for (std::ptrdiff_t o = 0; o < model.num_outputs(); ++o) {
+    const std::string& target = model.outputs()[static_cast<std::size_t>(o)].name;
+    Table printed({"input", "value", "contribution"});
+    Json entries = Json::array();
+    for (const std::size_t j : by_size(attribution.contributions.row(o))) {
+      const double value = point(static_cast<std::ptrdiff_t>(j));
+      const double contribution = attribution.contributions(o, static_cast<std::ptrdiff_t>(j));
+      const InputColumn& input = model.inputs()[j];
+      const bool known = !std::isnan(value) && (!input.is_categorical() || !text[j].empty());
+      const std::string shown = !known ? "missing" : input.is_categorical() ? text[j] : number(value);
+      printed.add({input.name, shown, number(contribution)});
+      entries.push_back({{"input", input.name},
+                         {"value", !known                   ? Json(nullptr)
+                                   : input.is_categorical() ? Json(text[j])
+                                                            : Json(value)},
+                         {"contribution", contribution}});
+    }
+    json["targets"].push_back({{"name", target},
+                               {"prediction", attribution.prediction(o)},
+                               {"reference", attribution.reference(o)},
+                               {"contributions", std::move(entries)}});
+    if (!arguments.json) {
+      print(fmt::format("\n{}: {} here, {} at the means of the inputs\n{}", target,
+                        number(attribution.prediction(o), 6), number(attribution.reference(o), 6), printed.text()));
+      const double sum = attribution.contributions.row(o).sum();
+      print(fmt::format("The contributions add up: {} {} {} = {}\n", number(attribution.reference(o), 6),
+                        sum < 0.0 ? "-" : "+", number(std::abs(sum), 6), number(attribution.prediction(o), 6)));
+    }
+  }
+  if (arguments.json) {
+    print_json(json);
+  }
+}
+
+void explain_command(const ExplainArguments& arguments) {
+  const Model model = load(arguments.model);
+  const Csv csv = Csv::read(arguments.data);
+  if (csv.rows() == 0) {
+    throw std::runtime_error(fmt::format("{}: there is a header and no rows", arguments.data));
+  }
+  const ExplainedTable table = read_explained(model, csv);
+  if (arguments.row > 0) {
+    explain_row(arguments, model, table);
+  } else {
+    explain_table(arguments, model, table);
+  }
+}
+
+}  // namespace
+
+void add_explain(CLI::App& app) {
+  CLI::App* command = app.add_subcommand("explain", "Say which inputs a model's predictions come from");
+  command->description(
+      "Say which inputs a model's predictions come from: over a table, the importance of each input; for one row of "
+      "it, "
+      "how far each\n"
+      "input moves the prediction away from the one at the means of the inputs.");
+  command->footer("Example: llmt explain concrete.json concrete.csv --row 3");
+  const auto arguments = std::make_shared<ExplainArguments>();
+  command->add_option("model", arguments->model, "Model file of llmt fit")->required();
+  command->add_option("data", arguments->data, "CSV file with the model's inputs")->required();
+  command->add_option("--row", arguments->row, "Row to explain, the first one below the header is 1")
+      ->check(CLI::PositiveNumber);
+  command->add_option("--threads", arguments->threads, "0: all; the result does not depend on it")
+      ->capture_default_str();
+  command->add_flag("--json", arguments->json, "Print JSON");
+  command->callback([arguments] { explain_command(*arguments); });
+}
+
+}  // namespace llmt::apps

@@ -1,0 +1,120 @@
+#include "llmt/learning.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <map>
+#include <stdexcept>
+
+#include "llmt/csv.hpp"
+
+namespace llmt::apps {
+namespace {
+
+bool contains(const std::vector<std::string>& names, const std::string& name) {
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
+
+/// The columns to learn from: those asked for, or all but the targets, the weight and what is ignored.
+std::vector<std::string> choose_inputs(const Csv& csv, const LearningArguments& arguments) {
+  for (const std::vector<std::string>* names : {&arguments.targets, &arguments.inputs, &arguments.ignored}) {
+    for (const std::string& name : *names) {
+      csv.index_of(name);
+      if (std::count(names->begin(), names->end(), name) > 1) {
+        throw std::invalid_argument(fmt::format("column \"{}\" is named twice", name));
+      }
+    }
+  }
+  std::vector<std::string> inputs;
+  for (const std::string& column : arguments.inputs.empty() ? csv.columns() : arguments.inputs) {
+    if (!contains(arguments.targets, column) && !contains(arguments.ignored, column) && column != arguments.weight) {
+      inputs.push_back(column);
+    } else if (!arguments.inputs.empty()) {
+      throw std::invalid_argument(fmt::format("--inputs has \"{}\", which is a target, the weight or ignored", column));
+    }
+  }
+  if (inputs.empty()) {
+    throw std::invalid_argument("no column is left to learn from");
+  }
+  return inputs;
+}
+
+std::vector<int> positions(const char* option, const std::vector<std::string>& names,
+                           const std::vector<std::string>& inputs) {
+  std::vector<int> result;
+  for (const std::string& name : names) {
+    const auto found = std::find(inputs.begin(), inputs.end(), name);
+    if (found == inputs.end()) {
+      throw std::invalid_argument(
+          fmt::format("{} has \"{}\", which is not among the inputs {}", option, name, fmt::join(inputs, ", ")));
+    }
+    result.push_back(static_cast<int>(found - inputs.begin()));
+  }
+  return result;
+}
+
+InputColumns read_chosen(const Csv& csv, const std::vector<std::string>& columns, const LearningArguments& arguments) {
+  try {
+    return read_inputs(csv, columns, arguments.categorical);
+  } catch (const std::runtime_error& error) {
+    throw std::runtime_error(arguments.inputs.empty()
+                                 ? fmt::format("{} (--ignore COLUMN leaves a column out)", error.what())
+                                 : error.what());
+  }
+}
+
+}  // namespace
+
+LearningTable read_learning_table(const LearningArguments& arguments) {
+  const Csv csv = Csv::read(arguments.data);
+  if (csv.rows() == 0) {
+    throw std::runtime_error(fmt::format("{}: there is a header and no rows", arguments.data));
+  }
+  LearningTable table{choose_inputs(csv, arguments), {}, csv.numbers(arguments.targets), arguments.options};
+  table.inputs = read_chosen(csv, table.names, arguments);
+  FitOptions& options = table.options;
+  options.growth.split_inputs = positions("--split-inputs", arguments.split_inputs, table.names);
+  options.growth.regression_inputs = positions("--regression-inputs", arguments.regression_inputs, table.names);
+  options.categorical_inputs = table.inputs.categorical;
+  if (!arguments.weight.empty()) {
+    options.weights = csv.numbers(arguments.weight);
+  }
+  options.selection.folds.kind = arguments.contiguous ? FoldKind::contiguous : FoldKind::random;
+  return table;
+}
+
+void add_learning_options(CLI::App& command, LearningArguments& arguments) {
+  GrowthOptions& growth = arguments.options.growth;
+  FoldOptions& folds = arguments.options.selection.folds;
+  command.add_option("data", arguments.data, "CSV file with a header row")->required();
+  command.add_option("-t,--target", arguments.targets, "Column to predict; repeat for several")
+      ->required()
+      ->delimiter(',');
+  command.add_option("--inputs", arguments.inputs, "Columns to learn from (default: all but targets and ignored)")
+      ->delimiter(',');
+  command.add_option("--ignore", arguments.ignored, "Columns to leave out")->delimiter(',');
+  command
+      .add_option("--categorical", arguments.categorical,
+                  "Inputs that are categories although they are written as numbers; columns of words are anyway")
+      ->delimiter(',');
+  command.add_option("--weight", arguments.weight, "Column with the weights of the rows");
+  command.add_option("--split-inputs", arguments.split_inputs, "Inputs that may be split (default: all)")
+      ->delimiter(',');
+  command.add_option("--regression-inputs", arguments.regression_inputs, "Inputs of the local models (default: all)")
+      ->delimiter(',');
+  command.add_option("--max-leaves", growth.max_leaves, "Most leaves of a tree, 0: see docs/commands.md")
+      ->capture_default_str();
+  command.add_option("--min-leaf", growth.min_leaf_samples, "Fewest rows in a leaf, 0: see docs/commands.md")
+      ->capture_default_str();
+  command
+      .add_option("--cv", folds.count, "Folds of the held-out error by which everything is chosen, 0: keep the tree as grown")
+      ->capture_default_str();
+  command.add_flag("--contiguous", arguments.contiguous,
+                   "Folds are blocks of consecutive rows (measured paths, grids, time series)");
+  command.add_option("--seed", folds.seed, "Of the random folds")->capture_default_str();
+  command.add_option("--threads", arguments.options.max_threads, "0: all; the result does not depend on it")
+      ->capture_default_str();
+}
+
+}  // namespace llmt::apps

@@ -1,0 +1,40 @@
+/// \file
+/// What `llmt fit` and `llmt compare` both ask: the table, its columns, growth and folds.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <string>
+#include <vector>
+
+#include "llmt/fit.hpp"
+#include "shared/columns.hpp"
+
+namespace llmt::apps {
+
+struct LearningArguments {
+  std::string data;
+  std::vector<std::string> targets;
+  std::vector<std::string> inputs;
+  std::vector<std::string> ignored;
+  std::vector<std::string> categorical;
+  std::vector<std::string> split_inputs;
+  std::vector<std::string> regression_inputs;
+  std::string weight;
+  bool contiguous = false;
+  FitOptions options;
+};
+
+void add_learning_options(CLI::App& command, LearningArguments& arguments);
+
+/// The table as the learner takes it, and the options with its columns filled in.
+struct LearningTable {
+  std::vector<std::string> names;  ///< of the inputs
+  InputColumns inputs;
+  Eigen::MatrixXd outputs;
+  FitOptions options;
+};
+
+/// Throws std::runtime_error and std::invalid_argument that name file, line, column or option.
+LearningTable read_learning_table(const LearningArguments& arguments);
+
+}  // namespace llmt::apps

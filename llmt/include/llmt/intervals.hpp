@@ -1,0 +1,56 @@
+/// \file
+/// Prediction intervals from held-out residuals.
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "llmt/abi.hpp"
+#include "llmt/model.hpp"
+
+namespace llmt {
+
+/// Lower and upper ends, rows x outputs.
+struct Bounds {
+  Eigen::MatrixXd lower;
+  Eigen::MatrixXd upper;
+};
+
+/// CV+ prediction intervals (Barber, Candes, Ramdas & Tibshirani 2021): with R_i the absolute residual of row i under the
+/// model f_k(i) that was fitted without the row's fold, and n rows,
+///   lower = floor(a (n + 1))-th smallest of f_k(i)(x) - R_i,   upper = ceil((1 - a) (n + 1))-th smallest of f_k(i)(x) + R_i.
+/// The guarantee is a coverage of 1 - 2 a for exchangeable rows; in practice it is near 1 - a, the level that is asked
+/// for. With a single fold this is split conformal prediction, whose guarantee is 1 - a. Weights of rows are not used.
+///
+/// The width follows the residuals of all rows, not those near x: where the noise differs between regions the coverage
+/// holds on average, not in each of them.
+class Intervals {
+ public:
+  /// No folds: nothing to say.
+  Intervals() = default;
+
+  /// One model and one matrix of absolute residuals (rows x outputs) for each fold. Throws std::invalid_argument if the
+  /// numbers of folds, inputs or outputs differ, or a residual is negative or not finite.
+  Intervals(std::vector<Model> models, std::vector<Eigen::MatrixXd> residuals);
+
+  bool empty() const { return models_.empty(); }
+  const std::vector<Model>& models() const { return models_; }
+  const std::vector<Eigen::MatrixXd>& residuals() const { return residuals_; }  ///< each column ascending
+
+  /// Intervals that hold `level` (such as 0.9) of the outputs. Throws std::invalid_argument if there are no folds, the
+  /// level is not between 0 and 1, or there are too few rows for it, and as Model::predict().
+  Bounds predict(const Eigen::Ref<const Eigen::MatrixXd>& inputs, double level, int max_threads = 0) const;
+
+ private:
+  std::vector<Model> models_;
+  std::vector<Eigen::MatrixXd> residuals_;
+};
+
+/// Writes a model as save() does, with the intervals beside it in the file (nothing if they are empty).
+void save(const Model& model, const Intervals& intervals, const std::string& path);
+
+/// The intervals in a file that save() wrote; empty if there are none. Throws as load().
+Intervals load_intervals(const std::string& path);
+
+}  // namespace llmt
