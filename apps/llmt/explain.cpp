@@ -3,9 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
-#include <limits>
 #include <memory>
 #include <numeric>
 #include <stdexcept>
@@ -14,6 +12,7 @@
 #include "llmt/csv.hpp"
 #include "llmt/model.hpp"
 #include "shared/cli.hpp"
+#include "shared/columns.hpp"
 
 namespace llmt::apps {
 namespace {
@@ -26,44 +25,6 @@ struct ExplainArguments {
   int threads = 0;
 };
 
-/// The fields of a row as text, without their quotes.
-std::vector<std::string> explained_fields(std::string_view row, char separator) {
-  std::vector<std::string> fields(1);
-  bool quoted = false;
-  for (std::size_t k = 0; k < row.size(); ++k) {
-    if (row[k] == '"' && quoted && k + 1 < row.size() && row[k + 1] == '"') {
-      fields.back() += row[++k];
-    } else if (row[k] == '"') {
-      quoted = !quoted;
-    } else if (row[k] == separator && !quoted) {
-      fields.emplace_back();
-    } else {
-      fields.back() += row[k];
-    }
-  }
-  return fields;
-}
-
-/// One cell as the model sees it: NaN where it is missing or its level unknown.
-double explained_value(const InputColumn& input, const std::string& text, const std::string& where) {
-  constexpr double missing = std::numeric_limits<double>::quiet_NaN();
-  if (input.is_categorical()) {
-    const auto found = std::find(input.levels.begin(), input.levels.end(), text);
-    return found == input.levels.end() ? missing : static_cast<double>(found - input.levels.begin());
-  }
-  const std::size_t begin = text.find_first_not_of(" +");
-  if (begin == std::string::npos || text == "NA" || text == "nan" || text == "NaN" || text == "?") {
-    return missing;
-  }
-  const std::string number_text = text.substr(begin, text.find_last_not_of(' ') + 1 - begin);
-  double value = 0.0;
-  const auto [end, error] = std::from_chars(number_text.data(), number_text.data() + number_text.size(), value);
-  if (error != std::errc() || end != number_text.data() + number_text.size() || !std::isfinite(value)) {
-    throw std::runtime_error(fmt::format("{}: column \"{}\": \"{}\" is not a number", where, input.name, text));
-  }
-  return value;
-}
-
 /// The model's inputs at every row of a table, and as text for people.
 struct ExplainedTable {
   Eigen::MatrixXd values;
@@ -71,19 +32,12 @@ struct ExplainedTable {
 };
 
 ExplainedTable read_explained(const Model& model, const Csv& csv) {
-  std::vector<std::size_t> columns;
+  ExplainedTable table{read_inputs(csv, model).values,
+                       std::vector<std::vector<std::string>>(static_cast<std::size_t>(csv.rows()))};
   for (const InputColumn& input : model.inputs()) {
-    columns.push_back(csv.index_of(input.name));
-  }
-  ExplainedTable table{Eigen::MatrixXd(csv.rows(), model.num_inputs()), {}};
-  for (std::ptrdiff_t row = 0; row < csv.rows(); ++row) {
-    const std::vector<std::string> fields = explained_fields(csv.row_text(row), csv.separator());
-    table.text.emplace_back();
-    for (std::size_t j = 0; j < columns.size(); ++j) {
-      const std::string& field = fields[columns[j]];
-      table.values(row, static_cast<std::ptrdiff_t>(j)) =
-          explained_value(model.inputs()[j], field, fmt::format("{}:{}", csv.name(), csv.line_of(row)));
-      table.text.back().push_back(field);
+    const std::vector<std::string> column = csv.texts(input.name);
+    for (std::size_t row = 0; row < column.size(); ++row) {
+      table.text[row].push_back(column[row].empty() ? "missing" : column[row]);
     }
   }
   return table;

@@ -8,9 +8,6 @@
 namespace llmt {
 namespace {
 
-/// Over this fraction of a node's range the hold of a regressor sets in.
-constexpr double rounding_of_hold = 0.1;
-
 /// Predictions may leave the range of the outputs in training by this fraction of it.
 constexpr double output_margin = 0.1;
 
@@ -251,25 +248,42 @@ int Evaluator::find_leaf(const double* row) const {
 void Evaluator::activate(const double* row, std::vector<Activation>& active) const {
   active.clear();
   if (kind_ != ValidityKind::gaussian) {
-    // `active` holds nodes still to be opened behind position `next`, leaves before it.
-    active.push_back({0, 1.0});
-    for (std::size_t next = 0; next < active.size();) {
-      const Activation at = active[next];
-      const Branch& branch = branches_[static_cast<std::size_t>(at.node)];
-      if (branch.left < 0) {
-        ++next;
-        continue;
+    // Leaves stand before position `next`, nodes still to be opened behind it; never more than there are leaves.
+    active.resize(branches_.size() / 2 + 1);
+    Activation* const entries = active.data();
+    const Branch* const branches = branches_.data();
+    entries[0] = {0, 1.0};
+    std::size_t next = 0;
+    std::size_t count = 1;
+    while (next < count) {
+      Activation at = entries[next];
+      for (const Branch* branch = branches + at.node; branch->left >= 0; branch = branches + at.node) {
+        const double x = row[branch->input];
+        double left = 0.0;
+        if (branch->first_level < 0 && x == x) {
+          const double u = (x - branch->threshold) * branch->per_half_width;
+          if (branch->per_half_width == 0.0) {
+            left = x <= branch->threshold ? 1.0 : 0.0;
+          } else if (u <= -1.0 || u >= 1.0) {
+            left = u < 0.0 ? 1.0 : 0.0;
+          } else {
+            left = transition(u, smoothness_);
+          }
+        } else {
+          left = left_share(at.node, row);
+        }
+        if (left >= 1.0) {
+          at.node = branch->left;
+        } else if (left <= 0.0) {
+          at.node = branch->right;
+        } else {
+          entries[count++] = {branch->right, at.validity * (1.0 - left)};
+          at = {branch->left, at.validity * left};
+        }
       }
-      const double left = left_share(at.node, row);
-      if (left >= 1.0) {
-        active[next].node = branch.left;
-      } else if (left <= 0.0) {
-        active[next].node = branch.right;
-      } else {
-        active[next] = {branch.left, at.validity * left};
-        active.push_back({branch.right, at.validity * (1.0 - left)});
-      }
+      entries[next++] = at;
     }
+    active.resize(count);
     return;
   }
   double largest = -std::numeric_limits<double>::infinity();

@@ -9,6 +9,9 @@
 
 namespace llmt {
 
+/// Over this fraction of a range the hold at its ends sets in.
+inline constexpr double rounding_of_hold = 0.1;
+
 /// A leaf that reaches a point.
 struct Activation {
   int node = 0;

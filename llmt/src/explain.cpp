@@ -17,9 +17,6 @@ namespace {
 /// Positions on the line that differ by less count as one.
 constexpr double same_position = 1e-12;
 
-/// Over this part of a node's range its guard sets in, as in evaluator.cpp: another value would cost time, not digits.
-constexpr double rounding_of_hold = 0.1;
-
 /// Transitions shorter than this part of the line count as jumps.
 constexpr double short_transition = 1e-9;
 

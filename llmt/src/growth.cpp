@@ -444,9 +444,8 @@ class Grower {
     double threshold = low + 0.5 * (high - low);
     if (options_.threshold == ThresholdPlacement::closest) {
       // The regression of the child models' difference on the split input over the node's rows says how far apart they
-      // are, on average, on the plane x_j = t: a + b (t - low). Its square is smallest at t = low - a / b, or at the
-      // end of the gap nearest to that. If that lies outside the node's rows the models do not meet: a jump, and the
-      // middle keeps away from the rows of both sides.
+      // are, on average, on the plane x_j = t: a + b (t - low). They meet at t = low - a / b. If that is not in the gap
+      // they do not meet here: a jump, and the middle keeps away from the rows of both sides.
       const Node& node = nodes_[static_cast<std::size_t>(leaf.node)];
       const Node& left = nodes_[static_cast<std::size_t>(node.left)];
       const Node& right = nodes_[static_cast<std::size_t>(node.right)];

@@ -2,14 +2,39 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
+#include <limits>
 
 #include "oracles.hpp"
 
 namespace {
 
+/// The crisp tree as it was grown.
 llmt::FitOptions as_grown(llmt::GrowthOptions growth = {}) {
-  return {.growth = std::move(growth), .folds = {.count = 0}};
+  return {.growth = std::move(growth),
+          .blend = {.validity = llmt::ValidityChoice::crisp},
+          .selection = {.folds = {.count = 0}}};
+}
+
+/// The crisp tree of plain least-squares leaves with the leaf count that cross-validation chooses.
+llmt::FitOptions crisp() { return {.blend = {.validity = llmt::ValidityChoice::crisp, .shrinkages = {0.0}}}; }
+
+/// Same splits, same rows, same local models to rounding of their normal equations; what only whole trees have - errors
+/// and the slopes beyond the training extent - aside.
+void expect_same_tree(const llmt::Model& model, const llmt::Model& expected) {
+  const std::vector<llmt::Node>& nodes = model.partitions()[0].nodes;
+  const std::vector<llmt::Node>& expected_nodes = expected.partitions()[0].nodes;
+  ASSERT_EQ(nodes.size(), expected_nodes.size());
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    EXPECT_EQ(nodes[i].left, expected_nodes[i].left);
+    EXPECT_EQ(nodes[i].split_input, expected_nodes[i].split_input);
+    EXPECT_EQ(nodes[i].threshold, expected_nodes[i].threshold);
+    EXPECT_EQ(nodes[i].samples, expected_nodes[i].samples);
+    EXPECT_EQ(nodes[i].rank, expected_nodes[i].rank);
+    EXPECT_LT((nodes[i].value - expected_nodes[i].value).cwiseAbs().maxCoeff(), 1e-9);
+    EXPECT_LT((nodes[i].slope - expected_nodes[i].slope).cwiseAbs().maxCoeff(), 1e-9);
+  }
 }
 
 std::string message_of(const std::function<void()>& call) {
@@ -37,7 +62,7 @@ TEST(Fit, OneLeafIsLeastSquares) {
 }
 
 TEST(Fit, EveryLeafIsLeastSquaresOfItsRows) {
-  const Eigen::MatrixXd x = oracle::uniform(500, 3, 2);
+  const Eigen::MatrixXd x = oracle::firm(oracle::uniform(500, 3, 2));
   const Eigen::MatrixXd y = oracle::curved(x, 0.02);
   const llmt::Model model = llmt::fit(x, y, as_grown()).model;
   const Eigen::MatrixXi leaf_of = model.leaf_of(x);
@@ -75,14 +100,15 @@ TEST(Fit, AffineDataGiveOneLeafWithoutAnyTest) {
 }
 
 TEST(Fit, PiecewiseAffineDataAreFoundExactly) {
-  const Eigen::MatrixXd x = oracle::uniform(300, 2, 4);
+  const Eigen::MatrixXd x = oracle::firm(oracle::uniform(300, 2, 4));
   Eigen::MatrixXd y(300, 1);
   for (int i = 0; i < 300; ++i) {
     y(i, 0) = x(i, 0) <= 0.1 ? 100.0 + x(i, 1) : x(i, 1) <= -0.3 ? 4.0 * x(i, 0) : 7.0 - x(i, 0) + 2.0 * x(i, 1);
   }
-  const llmt::FitResult result = llmt::fit(x, y);
+  const llmt::FitResult result = llmt::fit(x, y, crisp());
   EXPECT_EQ(result.summary.partitions[0].leaves, 3);
-  EXPECT_LT(result.summary.partitions[0].train_rmse(0), 1e-14);
+  // The outputs reach 101, where neighbouring numbers are 1.4e-14 apart.
+  EXPECT_LT(result.summary.partitions[0].train_rmse(0), 1e-13);
 }
 
 TEST(Fit, PureNoiseGivesOneLeafAtTheStatedRate) {
@@ -104,9 +130,16 @@ TEST(Fit, EveryPrefixIsTheTreeGrownToThatManyLeaves) {
   const Eigen::MatrixXd y = oracle::curved(x, 0.05);
   const llmt::Model full = llmt::fit(x, y, as_grown()).model;
   for (std::ptrdiff_t leaves = 1; leaves <= full.partitions()[0].num_leaves(); ++leaves) {
-    EXPECT_EQ(llmt::to_json(full.prefix(leaves)),
-              llmt::to_json(llmt::fit(x, y, as_grown({.max_leaves = leaves})).model));
+    expect_same_tree(full.prefix(leaves), llmt::fit(x, y, as_grown({.max_leaves = leaves})).model);
   }
+}
+
+TEST(Fit, LeavesOfAPrefixTellTheirOwnErrors) {
+  const Eigen::MatrixXd x = oracle::firm(oracle::uniform(400, 3, 5));
+  const Eigen::MatrixXd y = oracle::curved(x, 0.05);
+  const llmt::Model full = llmt::fit(x, y, as_grown()).model;
+  ASSERT_GT(full.partitions()[0].num_leaves(), 2);
+  EXPECT_NEAR(full.prefix(1).leaves(0)[0].rmse(0), llmt::rmse(full.prefix(1).predict(x), y)(0), 1e-12);
 }
 
 TEST(Fit, ThresholdLiesWhereTheChildModelsMeet) {
@@ -126,15 +159,15 @@ TEST(Fit, ThresholdLiesWhereTheChildModelsMeet) {
   EXPECT_NEAR(midpoint.partitions()[0].nodes[0].threshold, 0.35, 1e-12);
 }
 
-TEST(Fit, ThresholdStaysInItsGapWhereTheChildModelsMeetElsewhere) {
-  Eigen::MatrixXd x(20, 1);
-  Eigen::MatrixXd y(20, 1);
-  for (int i = 0; i < 20; ++i) {
-    x(i, 0) = i;
-    y(i, 0) = i < 10 ? i : 30.0 + 2.0 * i;  // meet at -30
+TEST(Fit, ThresholdOfAJumpIsInTheMiddleOfItsGap) {
+  Eigen::MatrixXd x(40, 1);
+  Eigen::MatrixXd y(40, 1);
+  for (int i = 0; i < 40; ++i) {
+    x(i, 0) = i / 2;
+    y(i, 0) = x(i, 0) < 10.0 ? x(i, 0) : 30.0 + 2.0 * x(i, 0);  // meet at -30
   }
   const llmt::Model model = llmt::fit(x, y, as_grown({.max_leaves = 2})).model;
-  EXPECT_EQ(model.partitions()[0].nodes[0].threshold, 9.0);
+  EXPECT_EQ(model.partitions()[0].nodes[0].threshold, 9.5);
   EXPECT_LT((model.predict(x) - y).cwiseAbs().maxCoeff(), 1e-12);
 }
 
@@ -145,6 +178,9 @@ TEST(Fit, DirectionsTheRowsDoNotDetermineKeepTheParentsSlope) {
   for (int i = 0; i < 200; ++i) {
     x(i, 0) = i % 2;
     x(i, 1) = i % 2 == 1 ? 0.5 : x(i, 1);
+  }
+  x = oracle::firm(x);
+  for (int i = 0; i < 200; ++i) {
     y(i, 0) = i % 2 == 1 ? 5.0 - x(i, 2) : x(i, 2) + 3.0 * x(i, 1);
   }
   const llmt::FitResult result = llmt::fit(x, y, as_grown({.split_inputs = {0}}));
@@ -198,9 +234,11 @@ TEST(Fit, OnePartitionPerOutputIsTheSameAsSeparateFits) {
   const Eigen::MatrixXd x = oracle::uniform(300, 2, 9);
   Eigen::MatrixXd y(300, 2);
   y << oracle::curved(x, 0.02), x.col(0).cwiseAbs2();
-  const Eigen::MatrixXd together = llmt::fit(x, y).model.predict(x);
-  for (int o = 0; o < 2; ++o) {
-    EXPECT_EQ(together.col(o), llmt::fit(x, y.col(o)).model.predict(x).col(0));
+  for (const llmt::FitOptions& options : {crisp(), llmt::FitOptions{}}) {
+    const Eigen::MatrixXd together = llmt::fit(x, y, options).model.predict(x);
+    for (int o = 0; o < 2; ++o) {
+      EXPECT_EQ(together.col(o), llmt::fit(x, y.col(o), options).model.predict(x).col(0));
+    }
   }
 }
 
@@ -222,13 +260,13 @@ TEST(Fit, SharedPartitionOfCopiesIsThePartitionOfOne) {
 }
 
 TEST(Fit, ImprovementRuleStopsWhereTheNextTenSplitsHelpTooLittle) {
-  const Eigen::MatrixXd x = oracle::uniform(600, 2, 11);
+  const Eigen::MatrixXd x = oracle::firm(oracle::uniform(600, 2, 11));
   const Eigen::MatrixXd y = oracle::curved(x);
   const llmt::Model full = llmt::fit(x, y, as_grown({.significance = 1.0})).model;
   const llmt::FitResult stopped = llmt::fit(x, y, as_grown({.significance = 1.0, .min_improvement = 0.05}));
   const std::ptrdiff_t leaves = stopped.summary.partitions[0].leaves;
   EXPECT_EQ(stopped.summary.partitions[0].stop, llmt::StopReason::improvement);
-  EXPECT_EQ(llmt::to_json(stopped.model), llmt::to_json(full.prefix(leaves)));
+  expect_same_tree(stopped.model, full.prefix(leaves));
   const auto rss = [&](std::ptrdiff_t count) { return std::pow(llmt::rmse(full.prefix(count).predict(x), y)(0), 2); };
   const double enough = std::pow(0.95, 10);
   for (std::ptrdiff_t count = 1; count < leaves; ++count) {
@@ -252,21 +290,23 @@ TEST(Fit, VarianceGainBoundsTheTree) {
 TEST(Fit, CrossValidationIsTheHeldOutErrorOfRegrownTrees) {
   const Eigen::MatrixXd x = oracle::uniform(150, 2, 13);
   const Eigen::MatrixXd y = oracle::curved(x, 0.2);
-  llmt::FitOptions options = {.growth = {.significance = 1.0, .max_leaves = 12},
-                              .folds = {.count = 4, .kind = llmt::FoldKind::contiguous}};
+  llmt::FitOptions options = crisp();
+  options.growth = {.significance = 1.0, .max_leaves = 12};
+  options.selection.folds = {.count = 4, .kind = llmt::FoldKind::contiguous};
   const llmt::PartitionSummary summary = llmt::fit(x, y, options).summary.partitions[0];
-  for (std::ptrdiff_t leaves = 1; leaves <= summary.cv_rmse.size(); ++leaves) {
+  ASSERT_EQ(summary.crisp_cv_rmse.size(), 12);
+  for (std::ptrdiff_t leaves = 1; leaves <= 12; ++leaves) {
     double squared = 0.0;
-    for (const llmt::Fold& fold : llmt::make_folds(150, options.folds)) {
+    for (const llmt::Fold& fold : llmt::make_folds(150, options.selection.folds)) {
       const llmt::Model model = llmt::fit(x(fold.train, Eigen::all), y(fold.train, Eigen::all),
-                                          as_grown({.significance = 1.0, .max_leaves = leaves}))
-                                    .model;
+                                          as_grown({.significance = 1.0, .max_leaves = 12}))
+                                    .model.prefix(leaves);
       squared += (model.predict(x(fold.held_out, Eigen::all)) - y(fold.held_out, Eigen::all)).squaredNorm();
     }
-    EXPECT_NEAR(summary.cv_rmse(leaves - 1), std::sqrt(squared / 150.0), 1e-12);
+    EXPECT_NEAR(summary.crisp_cv_rmse(leaves - 1), std::sqrt(squared / 150.0), 1e-12);
   }
   std::ptrdiff_t best = 0;
-  summary.cv_rmse.minCoeff(&best);
+  summary.crisp_cv_rmse.minCoeff(&best);
   EXPECT_EQ(summary.leaves, best + 1);
 }
 
@@ -282,15 +322,19 @@ TEST(Fit, RetisPruningFollowsTheMEstimates) {
   EXPECT_GE(leaves(2.0), leaves(50.0));
 
   // One split, by hand: kept exactly if the m-estimate of the parent exceeds that of the children.
-  const llmt::Partition two =
-      llmt::fit(x, y, as_grown({.rule = llmt::GrowthRule::retis, .pruning_m = 0.0, .max_leaves = 2}))
-          .model.partitions()[0];
-  const double prior = two.nodes[0].rss(0) / 300.0;
+  const llmt::Model two =
+      llmt::fit(x, y, as_grown({.rule = llmt::GrowthRule::retis, .pruning_m = 0.0, .max_leaves = 2})).model;
+  std::array<std::vector<int>, 2> rows;
+  for (int i = 0; i < 300; ++i) {
+    rows[static_cast<std::size_t>(two.leaf_of(x.row(i))(0, 0))].push_back(i);
+  }
+  const double prior = static_cast<double>(oracle::rss(x, y)) / 300.0;
   for (const double m : {0.5, 2.0, 10.0, 100.0, 1000.0}) {
     double children = 0.0;
-    for (const int c : {1, 2}) {
-      const double n = static_cast<double>(two.nodes[c].samples);
-      children += (n + m / 2.0) / (300.0 + m) * (two.nodes[c].rss(0) + m * prior) / (n + m);
+    for (const std::vector<int>& of_leaf : rows) {
+      const double n = static_cast<double>(of_leaf.size());
+      const double rss = static_cast<double>(oracle::rss(x(of_leaf, Eigen::all), y(of_leaf, Eigen::all)));
+      children += (n + m / 2.0) / (300.0 + m) * (rss + m * prior) / (n + m);
     }
     const std::ptrdiff_t expected = prior <= children ? 1 : 2;
     const auto pruned = llmt::fit(x, y, as_grown({.rule = llmt::GrowthRule::retis, .pruning_m = m, .max_leaves = 2}));
@@ -305,9 +349,13 @@ TEST(Fit, CallersMistakesAreNamed) {
   EXPECT_EQ(message_of([&] { llmt::fit(Eigen::MatrixXd(0, 2), Eigen::MatrixXd(0, 1)); }),
             "llmt::fit: inputs is 0 x 2, at least one row and one column are needed");
   Eigen::MatrixXd bad = x;
-  bad(3, 1) = std::nan("");
+  bad(3, 1) = std::numeric_limits<double>::infinity();
   EXPECT_EQ(message_of([&] { llmt::fit(bad, y); }),
-            "llmt::fit: inputs(3, 1) is nan, it must be finite (rows and columns counted from 0)");
+            "llmt::fit: inputs(3, 1) is inf, it must be finite, or NaN where it is missing (rows and columns counted "
+            "from 0)");
+  bad(3, 1) = std::nan("");
+  EXPECT_EQ(message_of([&] { llmt::fit(x, bad); }),
+            "llmt::fit: outputs(3, 1) is nan, it must be finite (rows and columns counted from 0)");
   EXPECT_EQ(message_of([&] { llmt::fit(x, y, as_grown({.split_inputs = {2}})); }),
             "llmt::fit: growth.split_inputs names column 2, there are 2");
   EXPECT_EQ(message_of([&] {
@@ -316,8 +364,8 @@ TEST(Fit, CallersMistakesAreNamed) {
             "llmt::fit: growth.regression_inputs names column 1 twice");
   EXPECT_EQ(message_of([&] { llmt::fit(x, y, as_grown({.min_improvement = 1.5})); }),
             "llmt::fit: growth.min_improvement is 1.5, it must be in [0, 1)");
-  EXPECT_EQ(message_of([&] { llmt::fit(x, y, {.growth = {}, .folds = {.count = 1}}); }),
-            "llmt::fit: folds.count is 1, it must be 0 or at least 2");
+  EXPECT_EQ(message_of([&] { llmt::fit(x, y, {.selection = {.folds = {.count = 1}}}); }),
+            "llmt::fit: selection.folds.count is 1, it must be 0 or at least 2");
 }
 
 }  // namespace

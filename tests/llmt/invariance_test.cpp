@@ -16,8 +16,14 @@ Data data() {
   return {x, oracle::coarse(oracle::curved(x, 0.02))};
 }
 
+llmt::FitOptions as_grown(std::ptrdiff_t min_leaf_samples = 0) {
+  return {.growth = {.min_leaf_samples = min_leaf_samples},
+          .blend = {.validity = llmt::ValidityChoice::crisp},
+          .selection = {.folds = {.count = 0}}};
+}
+
 llmt::Partition grow(const Eigen::MatrixXd& x, const Eigen::MatrixXd& y) {
-  return llmt::fit(x, y, {.growth = {}, .folds = {.count = 0}}).model.partitions()[0];
+  return llmt::fit(x, y, as_grown()).model.partitions()[0];
 }
 
 /// Same splits; thresholds map as t -> scale t + shift of their input, within `tolerance` of the input's unit before.
@@ -80,13 +86,9 @@ TEST(Invariance, DuplicatedAndConstantColumns) {
   const Data d = data();
   Eigen::MatrixXd wider(400, 6);
   wider << d.x, Eigen::VectorXd::Constant(400, 1e6), d.x.col(0), d.x.col(1) * 3.0;
-  expect_same_tree(
-      grow(wider, d.y),
-      [&] {
-        // The default leaf size depends on the number of inputs: ask for the one that the wider table gets.
-        return llmt::fit(d.x, d.y, {.growth = {.min_leaf_samples = 14}, .folds = {.count = 0}}).model.partitions()[0];
-      }(),
-      1e-9);
+  expect_same_tree(grow(wider, d.y),
+                   // The default leaf size depends on the number of inputs: ask for the one that the wider table gets.
+                   llmt::fit(d.x, d.y, as_grown(14)).model.partitions()[0], 1e-9);
 }
 
 TEST(Invariance, AffineFunctionAddedToTheOutput) {

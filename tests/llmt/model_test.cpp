@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/LU>
 #include <filesystem>
 #include <limits>
 
@@ -39,15 +40,53 @@ TEST(Model, TellsHowFarAQueryLiesOutside) {
   const llmt::Model model = llmt::fit(x, x.col(0)).model;
   Eigen::MatrixXd query(5, 2);
   query << 0.0, 5.0, 4.0, 5.0, 6.0, 5.0, -1.0, 5.0, 1.0, 5.1;
-  const Eigen::VectorXd outside = model.outside(query);
-  EXPECT_EQ(outside.head(4), Eigen::Vector4d(0.0, 0.0, 0.5, 0.25));
-  EXPECT_EQ(outside(4), std::numeric_limits<double>::infinity());  // that input never varied
+  const std::vector<llmt::Extrapolation> outside = model.extrapolation(query);
+  ASSERT_EQ(outside.size(), 5U);
+  EXPECT_EQ(outside[0].distance, 0.0);
+  EXPECT_EQ(outside[1].distance, 0.0);
+  EXPECT_EQ(outside[2].distance, 0.5);
+  EXPECT_EQ(outside[3].distance, 0.25);
+  EXPECT_EQ(outside[4].distance, std::numeric_limits<double>::infinity());  // that input never varied
+}
+
+TEST(Model, LeverageOfALeafIsThatOfItsLeastSquares) {
+  const Eigen::MatrixXd x = oracle::uniform(200, 2, 34);
+  const llmt::Model model = llmt::fit(x, oracle::curved(x, 0.02),
+                                      {.growth = {.max_leaves = 3},
+                                       .blend = {.validity = llmt::ValidityChoice::crisp},
+                                       .selection = {.folds = {.count = 0}}})
+                                .model;
+  const Eigen::MatrixXi leaf_of = model.leaf_of(x);
+  Eigen::MatrixXd a(200, 3);
+  a << Eigen::VectorXd::Ones(200), x;
+  const Eigen::MatrixXd query = 2.0 * oracle::uniform(100, 2, 35);
+  const std::vector<llmt::Extrapolation> found = model.extrapolation(query);
+  const Eigen::MatrixXi leaf_of_query = model.leaf_of(query);
+  for (int k = 0; k < model.partitions()[0].num_leaves(); ++k) {
+    Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(3, 3);
+    for (int i = 0; i < 200; ++i) {
+      if (leaf_of(i, 0) == k) {
+        gram += a.row(i).transpose() * a.row(i);
+      }
+    }
+    for (int i = 0; i < 100; ++i) {
+      if (leaf_of_query(i, 0) == k) {
+        const Eigen::Vector3d at(1.0, query(i, 0), query(i, 1));
+        const double expected = at.dot(gram.inverse() * at);
+        EXPECT_NEAR(found[static_cast<std::size_t>(i)].leverage / expected, 1.0, 1e-9);
+      }
+    }
+  }
 }
 
 TEST(Model, RejectsQueriesThatDoNotFit) {
   const llmt::Model model = example();
   EXPECT_THROW(model.predict(Eigen::MatrixXd::Zero(3, 1)), std::invalid_argument);
-  EXPECT_THROW(model.predict(Eigen::MatrixXd::Constant(3, 2, std::nan(""))), std::invalid_argument);
+  EXPECT_THROW(model.predict(Eigen::MatrixXd::Constant(3, 2, std::numeric_limits<double>::infinity())),
+               std::invalid_argument);
+  EXPECT_THROW(model.jacobian(Eigen::Vector3d::Zero()), std::invalid_argument);
+  EXPECT_THROW(model.jacobian(Eigen::Vector2d(0.0, std::nan(""))), std::invalid_argument);
+  EXPECT_THROW(model.validities(Eigen::MatrixXd::Zero(3, 2), 2), std::invalid_argument);
   EXPECT_THROW(model.leaves(2), std::invalid_argument);
   EXPECT_THROW(model.prefix(0), std::invalid_argument);
   EXPECT_EQ(model.predict(Eigen::MatrixXd(0, 2)).rows(), 0);
@@ -72,6 +111,7 @@ TEST(Model, LeavesCoverTheSpaceOnce) {
 
 TEST(ModelFile, RoundTripIsExact) {
   const llmt::Model model = example();
+  ASSERT_EQ(model.partitions()[0].validity.kind, llmt::ValidityKind::blend);
   const std::string json = llmt::to_json(model);
   const llmt::Model back = llmt::from_json(json);
   EXPECT_EQ(llmt::to_json(back), json);
@@ -82,8 +122,8 @@ TEST(ModelFile, RoundTripIsExact) {
 
 TEST(ModelFile, SaysWhatItCannotAccept) {
   const std::string json = llmt::to_json(example());
-  EXPECT_EQ(error_of(replaced(json, "\"version\": 1", "\"version\": 2")),
-            "m.json: version 2 of the model format cannot be read, this program knows version 1");
+  EXPECT_EQ(error_of(replaced(json, "\"version\": 2", "\"version\": 1")),
+            "m.json: version 1 of the model format cannot be read, this program knows version 2");
   EXPECT_EQ(error_of(replaced(json, "llmt-model", "other")),
             "m.json: not a model file: \"format\" is not \"llmt-model\"");
   EXPECT_EQ(error_of(replaced(json, "\"low\": ", "\"lo\": ")), "m.json: /inputs/0: member \"low\" is missing");
@@ -93,7 +133,9 @@ TEST(ModelFile, SaysWhatItCannotAccept) {
   EXPECT_NE(
       error_of(replaced(json, "\"left\": 1", "\"left\": 3")).find("the children 3 and 2 are not in order of growth"),
       std::string::npos);
-  EXPECT_NE(error_of(replaced(json, "\"column\": ", "\"column\": 7, \"x\": ")).find("split input 7 does not exist"),
+  const std::size_t nodes = json.find("\"nodes\"");
+  EXPECT_NE(error_of(json.substr(0, nodes) + replaced(json.substr(nodes), "\"column\": ", "\"column\": 7, \"x\": "))
+                .find("split input 7 does not exist"),
             std::string::npos);
   EXPECT_NE(error_of(replaced(json, "\"left\": 1", "\"left\": 4294967297")).find("out of range"), std::string::npos);
   EXPECT_EQ(error_of("[]"), "m.json: not a model file: \"format\" is not \"llmt-model\"");

@@ -37,6 +37,24 @@ inline Eigen::MatrixXd uniform(std::ptrdiff_t rows, std::ptrdiff_t columns, std:
   return values;
 }
 
+/// `x` with the largest and the smallest value of every column twice: the guard that does not follow a slope to a
+/// single outermost row has nothing to hold then on these rows.
+inline Eigen::MatrixXd firm(Eigen::MatrixXd x) {
+  for (auto column : x.colwise()) {
+    for (const double sign : {1.0, -1.0}) {
+      std::ptrdiff_t first = 0;
+      const double outermost = (sign * column).maxCoeff(&first);
+      const double kept = column(first);
+      column(first) = -sign * std::numeric_limits<double>::infinity();
+      std::ptrdiff_t second = 0;
+      (sign * column).maxCoeff(&second);
+      column(first) = kept;
+      column(second) = sign * outermost;
+    }
+  }
+  return x;
+}
+
 /// Values on a grid of 2^-20: adding 1e6 to inputs or 1e8 to outputs, or scaling by powers of two, rounds nothing.
 inline Eigen::MatrixXd coarse(const Eigen::MatrixXd& values) {
   return (values * 0x1p20).array().round().matrix() * 0x1p-20;

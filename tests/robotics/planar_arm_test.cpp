@@ -160,7 +160,7 @@ TEST(PlanarArm, CorrectionRemovesMostOfTheRest) {
   FitOptions options;
   options.growth.significance = 1.0;
   options.growth.max_leaves = 40;
-  options.folds.count = 0;
+  options.selection.folds.count = 0;
   const CorrectedRobot corrected{calibration.robot, fit_correction(calibration.robot, training, options).model};
   const double before = distances(positions(calibration.robot, test.poses), test).mean();
   const double after = distances(positions(corrected, test.poses), test).mean();
