@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cmath>
+#include <limits>
 #include <memory>
 
 #include "llmt/commands.hpp"
@@ -30,7 +31,15 @@ std::string conditions(const Model& model, const Leaf& leaf) {
       }
       parts.push_back(fmt::format("{} in {{{}}}", name, fmt::join(names, ", ")));
     }
-    const bool below = std::isfinite(leaf.high(j));
+    constexpr double any_value = std::numeric_limits<double>::max();  // a split into rows with and without a value
+    if (leaf.low(j) == any_value) {
+      parts.push_back(fmt::format("{} missing", name));
+      continue;
+    }
+    if (leaf.high(j) == any_value) {
+      parts.push_back(fmt::format("{} there", name));
+    }
+    const bool below = leaf.high(j) < any_value;
     const bool above = std::isfinite(leaf.low(j));
     if (below && above) {
       parts.push_back(fmt::format("{} < {} <= {}", number(leaf.low(j)), name, number(leaf.high(j))));

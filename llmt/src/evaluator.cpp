@@ -8,7 +8,7 @@
 namespace llmt {
 namespace {
 
-/// Predictions may leave the range of the outputs in training by this fraction of it.
+/// Predictions may differ from the root's model by more than its residuals did, by this fraction of their range.
 constexpr double output_margin = 0.1;
 
 /// Validities below this share of the largest are left out of Gaussians.
@@ -105,7 +105,7 @@ Boxes boxes_of(const Partition& partition, const Eigen::VectorXd& low, const Eig
       boxes.low.col(child) = boxes.low.col(i);
       boxes.high.col(child) = boxes.high.col(i);
     }
-    if (node.level_side.empty()) {
+    if (node.level_side.empty() && node.threshold < std::numeric_limits<double>::max()) {
       boxes.high(node.split_input, node.left) = std::min(boxes.high(node.split_input, i), node.threshold);
       boxes.low(node.split_input, node.right) = std::max(boxes.low(node.split_input, i), node.threshold);
     }
@@ -119,7 +119,7 @@ void set_half_widths(Partition& partition, const Eigen::VectorXd& low, const Eig
   for (std::size_t i = 0; i < partition.nodes.size(); ++i) {
     Node& node = partition.nodes[i];
     node.half_width = 0.0;
-    if (!node.is_leaf() && node.level_side.empty()) {
+    if (!node.is_leaf() && node.level_side.empty() && node.threshold < std::numeric_limits<double>::max()) {
       const std::ptrdiff_t box = static_cast<std::ptrdiff_t>(i);
       const double extent = std::min(node.threshold - boxes.low(node.split_input, box),
                                      boxes.high(node.split_input, box) - node.threshold);
@@ -128,8 +128,7 @@ void set_half_widths(Partition& partition, const Eigen::VectorXd& low, const Eig
   }
 }
 
-Evaluator::Evaluator(const Partition& partition, const std::vector<InputColumn>& inputs,
-                     const std::vector<OutputColumn>& outputs, std::ptrdiff_t regressors)
+Evaluator::Evaluator(const Partition& partition, const std::vector<InputColumn>& inputs, std::ptrdiff_t regressors)
     : kind_(partition.validity.kind),
       smoothness_(partition.validity.smoothness),
       outputs_(std::ssize(partition.outputs)),
@@ -137,10 +136,12 @@ Evaluator::Evaluator(const Partition& partition, const std::vector<InputColumn>&
       inputs_(std::ssize(inputs)),
       parents_(parents_of(partition)),
       outer_slope_(partition.outer_slope.size() > 0 ? partition.outer_slope : partition.nodes.front().slope) {
-  for (const int output : partition.outputs) {
-    const OutputColumn& column = outputs[static_cast<std::size_t>(output)];
-    const double margin = output_margin * (column.high - column.low);
-    output_ranges_.insert(output_ranges_.end(), {column.low - margin, column.high + margin});
+  if (partition.residual_range.size() > 0) {
+    const Eigen::VectorXd margin =
+        output_margin * (partition.residual_range.col(1) - partition.residual_range.col(0));
+    residual_range_ = partition.residual_range;
+    residual_range_.col(0) -= margin;
+    residual_range_.col(1) += margin;
   }
   for (const Node& node : partition.nodes) {
     Branch branch{.left = node.left,
@@ -178,7 +179,7 @@ Evaluator::Evaluator(const Partition& partition, const std::vector<InputColumn>&
     const Boxes boxes = boxes_of(partition, low, high);
     std::vector<bool> is_split(inputs.size(), false);
     for (const Node& node : partition.nodes) {
-      if (!node.is_leaf() && node.level_side.empty()) {
+      if (!node.is_leaf() && node.level_side.empty() && node.threshold < std::numeric_limits<double>::max()) {
         is_split[static_cast<std::size_t>(node.split_input)] = true;
       }
     }
@@ -235,6 +236,29 @@ int Evaluator::child_of(int node, const double* row) const {
     return row[branch.input] <= branch.threshold ? branch.left : branch.right;
   }
   return left_share(node, row) >= 0.5 ? branch.left : branch.right;
+}
+
+bool Evaluator::is_ambiguous(const double* row) const {
+  std::vector<int> open = {0};
+  while (!open.empty()) {
+    const int node = open.back();
+    open.pop_back();
+    const Branch& branch = branches_[static_cast<std::size_t>(node)];
+    if (branch.left < 0) {
+      continue;
+    }
+    const double left = left_share(node, row);
+    if (std::isnan(row[branch.input]) && left > 1.0 - clear_share && left < clear_share) {
+      return true;
+    }
+    if (left > 0.0) {
+      open.push_back(branch.left);
+    }
+    if (left < 1.0) {
+      open.push_back(branch.right);
+    }
+  }
+  return false;
 }
 
 int Evaluator::find_leaf(const double* row) const {
@@ -368,11 +392,20 @@ void Evaluator::local(int node, const double* deviations, double* values) const 
   }
 }
 
+double Evaluator::root_value(std::ptrdiff_t output, const double* deviations) const {
+  double sum = value(0, output);
+  for (std::ptrdiff_t k = 0; k < regressors_; ++k) {
+    const double held =
+        std::isnan(deviations[k]) ? mean(0)[k] : hold(deviations[k], low(0)[k], high(0)[k]).value;
+    sum += slopes(0, output)[k] * held;
+  }
+  return sum;
+}
+
 void Evaluator::finish(const double* deviations, double* values) const {
-  for (std::ptrdiff_t o = 0; o < outputs_; ++o) {
-    const double lowest = output_ranges_[static_cast<std::size_t>(2 * o)];
-    const double highest = output_ranges_[static_cast<std::size_t>(2 * o + 1)];
-    values[o] = hold(values[o], lowest, highest).value;
+  for (std::ptrdiff_t o = 0; o < residual_range_.rows(); ++o) {
+    const double root = root_value(o, deviations);
+    values[o] = root + hold(values[o] - root, residual_range_(o, 0), residual_range_(o, 1)).value;
   }
   for (std::ptrdiff_t k = 0; k < regressors_; ++k) {
     if (deviations[k] < low(0)[k] || deviations[k] > high(0)[k]) {
@@ -444,12 +477,15 @@ void Evaluator::derivatives(const double* row, const double* deviations, Eigen::
   // The holds of finish().
   Eigen::VectorXd values(outputs_);
   blend(active, deviations, values.data());
-  for (std::ptrdiff_t o = 0; o < outputs_; ++o) {
-    const double derivative = hold(values(o), output_ranges_[static_cast<std::size_t>(2 * o)],
-                                   output_ranges_[static_cast<std::size_t>(2 * o + 1)])
-                                  .derivative;
+  for (std::ptrdiff_t o = 0; o < residual_range_.rows(); ++o) {
+    const double derivative =
+        hold(values(o) - root_value(o, deviations), residual_range_(o, 0), residual_range_(o, 1)).derivative;
     by_input.row(o) *= derivative;
     by_regressor.row(o) *= derivative;
+    for (std::ptrdiff_t k = 0; k < regressors_; ++k) {
+      by_regressor(o, k) +=
+          (1.0 - derivative) * slopes(0, o)[k] * hold(deviations[k], low(0)[k], high(0)[k]).derivative;
+    }
   }
   for (std::ptrdiff_t k = 0; k < regressors_; ++k) {
     by_regressor.col(k) += outer_slope_.col(k) * (1.0 - hold(deviations[k], low(0)[k], high(0)[k]).derivative);

@@ -12,6 +12,9 @@ namespace llmt {
 /// Over this fraction of a range the hold at its ends sets in.
 inline constexpr double rounding_of_hold = 0.1;
 
+/// A row without a value for a split teaches a child if that has at least this share of it.
+inline constexpr double clear_share = 0.9;
+
 /// A leaf that reaches a point.
 struct Activation {
   int node = 0;
@@ -29,9 +32,8 @@ void set_half_widths(Partition& partition, const Eigen::VectorXd& low, const Eig
 /// See Model for what it computes. Immutable after construction.
 class Evaluator {
  public:
-  /// `inputs` and `outputs`: columns of the model, whose extents close the boxes and hold the predictions.
-  Evaluator(const Partition& partition, const std::vector<InputColumn>& inputs,
-            const std::vector<OutputColumn>& outputs, std::ptrdiff_t regressors);
+  /// `inputs`: columns of the model, whose extents close the boxes.
+  Evaluator(const Partition& partition, const std::vector<InputColumn>& inputs, std::ptrdiff_t regressors);
 
   /// The leaves whose validity at the inputs `row` is positive; validities sum to 1.
   void activate(const double* row, std::vector<Activation>& active) const;
@@ -40,7 +42,7 @@ class Evaluator {
   /// the root's.
   void local(int node, const double* deviations, double* values) const;
 
-  /// Holds values to the range of the outputs and goes on beyond the root's range.
+  /// Holds values near the root's model and goes on beyond the root's range.
   void finish(const double* deviations, double* values) const;
 
   /// The prediction: sum of validity times local model, finished.
@@ -57,6 +59,9 @@ class Evaluator {
 
   /// Node of the leaf whose box holds the row; missing values go where the larger share goes.
   int find_leaf(const double* row) const;
+
+  /// Whether a missing value sends the row to both sides of some split in earnest.
+  bool is_ambiguous(const double* row) const;
   int child_of(int node, const double* row) const;
 
   std::ptrdiff_t num_outputs() const { return outputs_; }
@@ -86,6 +91,7 @@ class Evaluator {
     return coefficients_.data() + (node * outputs_ + output) * (regressors_ + 1) + 1;
   }
   double value(int node, std::ptrdiff_t output) const { return slopes(node, output)[-1]; }
+  double root_value(std::ptrdiff_t output, const double* deviations) const;
   void guarded(int node, const double* deviations, double* values) const;
   void local_slopes(int node, const double* deviations, double validity, Eigen::MatrixXd& by_regressor) const;
   void add_gaussian_derivatives(const std::vector<Activation>& active, const double* row, const double* deviations,
@@ -104,7 +110,7 @@ class Evaluator {
   std::vector<int> level_side_;
   std::vector<double> coefficients_;  // per node and output: value, slopes
   std::vector<double> ranges_;        // per node: low, high, mean
-  std::vector<double> output_ranges_;  // per output: low, high, widened
+  Eigen::MatrixXd residual_range_;  // outputs x 2, widened; empty: no hold
   Eigen::MatrixXd outer_slope_;
   std::vector<Gaussian> gaussians_;
 };

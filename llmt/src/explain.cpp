@@ -423,7 +423,7 @@ class Line {
 std::vector<Evaluator> evaluators_of(const Model& model) {
   std::vector<Evaluator> evaluators;
   for (const Partition& partition : model.partitions()) {
-    evaluators.emplace_back(partition, model.inputs(), model.outputs(), std::ssize(model.regressors()));
+    evaluators.emplace_back(partition, model.inputs(), std::ssize(model.regressors()));
   }
   return evaluators;
 }

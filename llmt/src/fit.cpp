@@ -186,7 +186,7 @@ Grown grow_rows(const TrainingRows& rows, const Table& table, const std::vector<
   } else {
     result = grow(problem);
   }
-  Grown grown{.partition = {.outputs = served, .validity = {}, .nodes = std::move(result.nodes), .outer_slope = {}},
+  Grown grown{.partition = {.outputs = served, .validity = {}, .nodes = std::move(result.nodes), .outer_slope = {}, .residual_range = {}},
               .stop = result.stop};
   grown.partition.outer_slope = agreed_slope(grown.partition);
   return grown;
@@ -273,11 +273,14 @@ Table make_table(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::R
   return table;
 }
 
-std::vector<std::ptrdiff_t> rows_with_weight(const Table& table, const std::vector<std::ptrdiff_t>& rows) {
+std::vector<std::ptrdiff_t> rows_with_weight(const Table& table) {
   std::vector<std::ptrdiff_t> result;
-  // Far below the largest, a weight changes nothing but rounding.
-  std::copy_if(rows.begin(), rows.end(), std::back_inserter(result),
-               [&](std::ptrdiff_t row) { return table.weights(row) > 1e-12; });
+  for (std::ptrdiff_t row = 0; row < table.weights.size(); ++row) {
+    // Far below the largest, a weight changes nothing but rounding.
+    if (table.weights(row) > 1e-12) {
+      result.push_back(row);
+    }
+  }
   return result;
 }
 
@@ -289,13 +292,20 @@ FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<
   check_blend(options.blend);
   require(options.max_threads >= 0, "max_threads", options.max_threads, "at least 0");
   const Table table = make_table(inputs, outputs, options);
-  std::vector<Fold> folds = selection_folds(inputs.rows(), options.selection);
-  const TrainingRows all = training_rows(table, rows_with_weight(table, all_rows(inputs.rows())));
-  for (Fold& fold : folds) {
-    fold.train = rows_with_weight(table, fold.train);
-    fold.held_out = rows_with_weight(table, fold.held_out);
+  if (const std::vector<std::ptrdiff_t> kept = rows_with_weight(table); std::ssize(kept) < inputs.rows()) {
+    FitOptions of_kept = options;
+    of_kept.weights = table.weights(kept);
+    std::vector<double> groups;
+    for (const std::ptrdiff_t row : kept) {
+      if (!options.selection.folds.groups.empty()) {
+        groups.push_back(options.selection.folds.groups[static_cast<std::size_t>(row)]);
+      }
+    }
+    of_kept.selection.folds.groups = groups;
+    return fit(inputs(kept, Eigen::all), outputs(kept, Eigen::all), of_kept);
   }
-  std::erase_if(folds, [](const Fold& fold) { return fold.train.empty() || fold.held_out.empty(); });
+  std::vector<Fold> folds = selection_folds(inputs.rows(), options.selection);
+  const TrainingRows all = training_rows(table, all_rows(inputs.rows()));
   const Plan plan = make_plan(options, all, !folds.empty());
 
   std::vector<std::vector<int>> served;

@@ -8,6 +8,7 @@
 #include <optional>
 #include <queue>
 
+#include "evaluator.hpp"
 #include "f_distribution.hpp"
 #include "node_fit.hpp"
 #include "parallel.hpp"
@@ -18,9 +19,6 @@ namespace llmt {
 namespace {
 
 using Rows = std::vector<int>;
-
-/// A row without a value for a split goes to both children with its weight divided; a smaller part than this is dropped.
-constexpr double smallest_share = 1e-3;
 
 /// The learned share of the left child in rows without a value starts from the share of the others, which counts as
 /// this many rows.
@@ -227,6 +225,9 @@ class Grower {
         values[k] = problem_.split_values(leaf.rows[static_cast<std::size_t>(order[k])], j);
       }
       slot = search_input(node, values, order, options_.min_leaf_samples);
+      if (order.size() < leaf.rows.size()) {
+        consider_missing(node, leaf, j, slot);
+      }
     });
     std::ptrdiff_t tested = 0;
     for (std::size_t j = 0; j < found.size(); ++j) {
@@ -237,6 +238,22 @@ class Grower {
       }
     }
     leaf.best.tested = tested;
+  }
+
+  /// Takes the split into rows with and without a value if it is better: that a value is missing can say something.
+  void consider_missing(const SearchNode& node, const OpenLeaf& leaf, std::ptrdiff_t j, SplitCandidate& best) const {
+    std::vector<int> is_missing;
+    for (const int row : leaf.rows) {
+      is_missing.push_back(std::isnan(problem_.split_values(row, j)) ? 1 : 0);
+    }
+    SplitCandidate candidate = search_levels(node, is_missing, 2, options_.min_leaf_samples);
+    const std::ptrdiff_t tested = best.tested + candidate.tested;
+    if (candidate.input >= 0 && (best.input < 0 || candidate.rss < best.rss - tie_tolerance * leaf.rss)) {
+      best = std::move(candidate);
+      best.level_side.clear();
+      best.by_missing = true;
+    }
+    best.tested = tested;
   }
 
   /// Why the leaf's best split is not to be made, if so.
@@ -309,7 +326,7 @@ class Grower {
     leaves_[position].reset();
     const Node parent = nodes_[static_cast<std::size_t>(leaf.node)];
     const std::vector<Side> sides = sides_of(leaf);
-    const double missing_left = learn_missing_left(leaf, parent, sides);
+    const double missing_left = leaf.best.by_missing ? 0.0 : learn_missing_left(leaf, parent, sides);
     std::array<OpenLeaf, 2> children;
     std::array<Rows, 2> positions;  // of the children's rows among the leaf's
     divide(leaf, sides, missing_left, children, positions);
@@ -328,7 +345,9 @@ class Grower {
     node.right = children[1].node;
     node.split_input = options_.split_inputs[static_cast<std::size_t>(leaf.best.input)];
     node.level_side = leaf.best.level_side;
-    node.threshold = node.level_side.empty() ? place_threshold(leaf) : 0.0;
+    node.threshold = leaf.best.by_missing      ? std::numeric_limits<double>::max()
+                     : node.level_side.empty() ? place_threshold(leaf)
+                                               : 0.0;
     node.missing_left = missing_left;
     tree_rss_.push_back(tree_rss_.back() - (leaf.rss - children[0].rss - children[1].rss));
     for (OpenLeaf& child : children) {
@@ -339,6 +358,12 @@ class Grower {
   /// Where the best split of a leaf sends its rows.
   std::vector<Side> sides_of(const OpenLeaf& leaf) const {
     std::vector<Side> sides(leaf.rows.size(), Side::both);
+    if (leaf.best.by_missing) {
+      for (std::size_t k = 0; k < sides.size(); ++k) {
+        sides[k] = std::isnan(problem_.split_values(leaf.rows[k], leaf.best.input)) ? Side::right : Side::left;
+      }
+      return sides;
+    }
     if (num_levels(leaf.best.input) > 0) {
       const std::vector<int> levels = levels_of(leaf, leaf.best.input);
       for (std::size_t k = 0; k < sides.size(); ++k) {
@@ -412,7 +437,8 @@ class Grower {
       std::vector<double> weights;
       for (std::size_t k = 0; k < sides.size(); ++k) {
         const double share = sides[k] == own ? 1.0 : sides[k] == Side::both ? shares[side] : 0.0;
-        if (share >= smallest_share) {
+        // A row that may as well belong to the other side would teach the child wrong.
+        if (share >= clear_share) {
           position_in_child[k] = static_cast<int>(child.rows.size());
           child.rows.push_back(leaf.rows[k]);
           positions[side].push_back(static_cast<int>(k));

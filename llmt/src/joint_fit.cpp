@@ -84,10 +84,42 @@ JointFit::JointFit(const TrainingRows& training, Partition partition, int max_th
     scale_(k) = largest > 0.0 ? largest * std::sqrt(squares / static_cast<double>(training.count())) : 1.0;
   }
   const Node& root = partition_.nodes.front();
+  set_residual_range();
   root_.resize(size_, root.value.size());
   root_.row(0) = root.value.transpose();
   root_.bottomRows(size_ - 1) = scale_.asDiagonal() * root.slope.transpose();
   assemble(max_threads);
+}
+
+std::vector<bool> JointFit::ambiguous_rows(const Evaluator& evaluator) const {
+  std::vector<bool> ambiguous(static_cast<std::size_t>(training_.count()), false);
+  double weight = 0.0;
+  for (std::ptrdiff_t row = 0; missing_ && row < training_.count(); ++row) {
+    if (evaluator.is_ambiguous(training_.inputs.row(row).data())) {
+      ambiguous[static_cast<std::size_t>(row)] = true;
+      weight += training_.weights(row);
+    }
+  }
+  // Where they are most of what there is, they are better than nothing.
+  if (weight > 0.5 * training_.weights.sum()) {
+    ambiguous.assign(ambiguous.size(), false);
+  }
+  return ambiguous;
+}
+
+void JointFit::set_residual_range() {
+  const Node& root = partition_.nodes.front();
+  Eigen::MatrixXd& range = partition_.residual_range;
+  range.resize(root.value.size(), 2);
+  range.col(0).setConstant(INFINITY);
+  range.col(1).setConstant(-INFINITY);
+  for (std::ptrdiff_t row = 0; row < training_.count(); ++row) {
+    const Eigen::VectorXd residual =
+        training_.outputs(row, partition_.outputs).transpose() - root.value -
+        root.slope * imputed(training_.deviations.row(row).transpose(), root);
+    range.col(0) = range.col(0).cwiseMin(residual);
+    range.col(1) = range.col(1).cwiseMax(residual);
+  }
 }
 
 void JointFit::assemble(int max_threads) {
@@ -109,7 +141,7 @@ void JointFit::assemble(int max_threads) {
   }
   std::vector<Eigen::VectorXd> low(nodes, Eigen::VectorXd::Constant(size_ - 1, INFINITY));
   std::vector<Eigen::VectorXd> high(nodes, Eigen::VectorXd::Constant(size_ - 1, -INFINITY));
-  const Evaluator evaluator(partition_, training_.columns, training_.output_columns, size_ - 1);
+  const Evaluator evaluator(partition_, training_.columns, size_ - 1);
   const Eigen::MatrixXd outputs_served = training_.outputs(Eigen::all, partition_.outputs);
 
   struct Entry {
@@ -121,8 +153,8 @@ void JointFit::assemble(int max_threads) {
     std::ptrdiff_t before;  // first entry of the row
     std::ptrdiff_t entry;   // that of the leaf
   };
+  const std::vector<bool> left_out = ambiguous_rows(evaluator);
   std::vector<Activation> active;
-  Eigen::VectorXd unit(size_);
   for (std::ptrdiff_t begin = 0; begin < training_.count(); begin += chunk_rows) {
     const std::ptrdiff_t rows = std::min(chunk_rows, training_.count() - begin);
     // One after the other: which leaves reach which rows, and the rows' outer products.
@@ -135,6 +167,11 @@ void JointFit::assemble(int max_threads) {
     for (std::ptrdiff_t r = 0; r < rows; ++r) {
       const std::ptrdiff_t row = begin + r;
       const double* deviations = training_.deviations.row(row).data();
+      if (left_out[static_cast<std::size_t>(row)]) {
+        regressors.row(r).setZero();
+        residuals.row(r).setZero();
+        continue;
+      }
       evaluator.activate(training_.inputs.row(row).data(), active);
       std::sort(active.begin(), active.end(), [](const auto& a, const auto& b) { return a.node < b.node; });
       const std::ptrdiff_t before = std::ssize(entries);
@@ -280,6 +317,7 @@ Eigen::VectorXd JointFit::hold(std::size_t node, double shrinkage) const {
   const double total = gram(0, 0);
   const double floor = least_hold * (total + 1.0);
   Eigen::VectorXd result = Eigen::VectorXd::Constant(size_, floor);
+  result(0) = total > 0.0 ? 0.0 : floor;  // rows always determine the constant
   for (std::ptrdiff_t k = 1; k < size_ && total > 0.0; ++k) {
     const double variance = std::max(0.0, (gram(k, k) - gram(0, k) * gram(0, k) / total) / total);
     result(k) += (shrinkage + least_shrinkage) * variance;
@@ -404,7 +442,7 @@ std::vector<Partition> JointFit::joint(std::ptrdiff_t leaves,
 void describe_leaves(const TrainingRows& training, Partition& partition) {
   const std::ptrdiff_t regressors = std::ssize(training.regressors);
   const std::ptrdiff_t outputs = std::ssize(partition.outputs);
-  const Evaluator evaluator(partition, training.columns, training.output_columns, regressors);
+  const Evaluator evaluator(partition, training.columns, regressors);
   for (Node& node : partition.nodes) {
     node.rss.setZero(outputs);
     node.inverse_gram = node.is_leaf() ? Eigen::MatrixXd::Zero(regressors + 1, regressors + 1) : Eigen::MatrixXd();
@@ -418,9 +456,17 @@ void describe_leaves(const TrainingRows& training, Partition& partition) {
     evaluator.activate(inputs, active);
     evaluator.combine(active, deviations, values.data());
     const Eigen::VectorXd residual = training.outputs(row, partition.outputs).transpose() - values;
-    for (int node = 0; node >= 0;) {
-      partition.nodes[static_cast<std::size_t>(node)].rss += training.weights(row) * residual.cwiseAbs2();
-      node = partition.nodes[static_cast<std::size_t>(node)].is_leaf() ? -1 : evaluator.child_of(node, inputs);
+    for (int index = 0; index >= 0;) {
+      Node& node = partition.nodes[static_cast<std::size_t>(index)];
+      if (node.is_leaf()) {
+        node.rss += training.weights(row) * residual.cwiseAbs2();
+        break;
+      }
+      // An inner node for its own local model, as if it were a leaf.
+      evaluator.local(index, deviations, values.data());
+      evaluator.finish(deviations, values.data());
+      node.rss += training.weights(row) * (training.outputs(row, partition.outputs).transpose() - values).cwiseAbs2();
+      index = evaluator.child_of(index, inputs);
     }
     for (const Activation& entry : active) {
       Node& leaf = partition.nodes[static_cast<std::size_t>(entry.node)];

@@ -90,6 +90,12 @@ void check_partition(const Partition& partition, const std::vector<InputColumn>&
                                            !partition.outer_slope.allFinite())) {
     reject(fmt::format("{}: outer_slope must be finite, {} x {}", where, partition.outputs.size(), regressors));
   }
+  if (partition.residual_range.size() > 0 &&
+      (partition.residual_range.rows() != std::ssize(partition.outputs) || partition.residual_range.cols() != 2 ||
+       !partition.residual_range.allFinite() ||
+       (partition.residual_range.col(0).array() > partition.residual_range.col(1).array()).any())) {
+    reject(fmt::format("{}: residual_range must be finite, {} x 2, low <= high", where, partition.outputs.size()));
+  }
   std::vector<bool> has_parent(partition.nodes.size(), false);
   for (std::size_t i = 0; i < partition.nodes.size(); ++i) {
     check_node(partition, static_cast<std::ptrdiff_t>(i), inputs, regressors, fmt::format("{} node {}", where, i));
@@ -212,7 +218,7 @@ Model::Model(std::vector<InputColumn> inputs, std::vector<OutputColumn> outputs,
   }
   std::vector<Evaluator> evaluators;
   for (const Partition& partition : partitions_) {
-    evaluators.emplace_back(partition, inputs_, outputs_, std::ssize(regressors_));
+    evaluators.emplace_back(partition, inputs_, std::ssize(regressors_));
   }
   evaluators_ = std::make_shared<const std::vector<Evaluator>>(std::move(evaluators));
 }
@@ -401,7 +407,8 @@ Partition prefix(const Partition& partition, std::ptrdiff_t max_leaves) {
   Partition result{.outputs = partition.outputs,
                    .validity = partition.validity,
                    .nodes = {partition.nodes.begin(), partition.nodes.begin() + kept},
-                   .outer_slope = partition.outer_slope};
+                   .outer_slope = partition.outer_slope,
+                   .residual_range = partition.residual_range};
   for (Node& node : result.nodes) {
     if (node.left >= kept) {
       make_leaf(node);

@@ -241,6 +241,7 @@ std::string to_json(const Model& model) {
                                     {"width", partition.validity.width},
                                     {"smoothness", partition.validity.smoothness}}},
                                   {"outer_slope", rows_to_json(partition.outer_slope.size() > 0 ? partition.outer_slope : partition.nodes.front().slope)},
+                                  {"residual_range", rows_to_json(partition.residual_range)},
                                   {"nodes", std::move(nodes)}});
   }
   try {
@@ -291,9 +292,13 @@ Model from_json(const std::string& text, const std::string& name) {
     Partition partition{.outputs = entry.member("outputs").list<int>(),
                         .validity = validity_from_json(entry.member("validity")),
                         .nodes = {},
-                        .outer_slope = {}};
+                        .outer_slope = {},
+                        .residual_range = {}};
     partition.outer_slope = rows_from_json(entry.member("outer_slope"), std::ssize(partition.outputs),
                                            std::ssize(regressors));
+    if (const Reader range = entry.member("residual_range"); !range.elements().empty()) {
+      partition.residual_range = rows_from_json(range, std::ssize(partition.outputs), 2);
+    }
     for (const Reader& node : entry.member("nodes").elements()) {
       partition.nodes.push_back(node_from_json(node, std::ssize(partition.outputs), std::ssize(regressors)));
     }

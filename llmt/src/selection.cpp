@@ -165,7 +165,7 @@ Eigen::MatrixXd agreed_slope(const Partition& grown) {
 
 Eigen::VectorXd prefix_squared_errors(const Partition& partition, const TrainingRows& rows,
                                       const Eigen::VectorXd& weights) {
-  const Evaluator evaluator(partition, rows.columns, rows.output_columns, std::ssize(rows.regressors));
+  const Evaluator evaluator(partition, rows.columns, std::ssize(rows.regressors));
   const Eigen::MatrixXd outputs = rows.outputs(Eigen::all, partition.outputs);
   Eigen::VectorXd change = Eigen::VectorXd::Zero(partition.num_leaves());  // of the sum, from M - 1 to M leaves
   Eigen::VectorXd values(outputs.cols());
@@ -191,7 +191,7 @@ Eigen::VectorXd prefix_squared_errors(const Partition& partition, const Training
 }
 
 double squared_error(const Partition& partition, const TrainingRows& rows, const Eigen::VectorXd& weights) {
-  const Evaluator evaluator(partition, rows.columns, rows.output_columns, std::ssize(rows.regressors));
+  const Evaluator evaluator(partition, rows.columns, std::ssize(rows.regressors));
   std::vector<Activation> active;
   Eigen::VectorXd values(std::ssize(partition.outputs));
   double total = 0.0;
@@ -213,7 +213,9 @@ Partition estimate(const TrainingRows& training, const Partition& grown, const C
   }
   partition.validity = candidate.validity;
   if (candidate.validity.kind == ValidityKind::crisp) {
-    return JointFit(training, std::move(partition), max_threads).local(candidate.leaves, candidate.shrinkage);
+    const JointFit fit(training, std::move(partition), max_threads);
+    return candidate.shrinkage > 0.0 ? fit.local(candidate.leaves, candidate.shrinkage)
+                                     : fit.as_grown(candidate.leaves);
   }
   set_half_widths(partition, training.low(), training.high());
   const JointFit fit(training, std::move(partition), max_threads);
@@ -237,7 +239,9 @@ Selection select(const std::vector<FoldTree>& folds, const Candidates& candidate
     const FoldTree& fold = folds[static_cast<std::size_t>(f)];
     const JointFit fit(fold.training, fold.grown, max_threads);
     for (std::size_t s = 0; s < shrinkages; ++s) {
-      const Partition models = fit.local(fold.grown.num_leaves(), candidates.shrinkages[s]);
+      const std::ptrdiff_t leaves = fold.grown.num_leaves();
+      const Partition models =
+          candidates.shrinkages[s] > 0.0 ? fit.local(leaves, candidates.shrinkages[s]) : fit.as_grown(leaves);
       crisp[s][static_cast<std::size_t>(f)] = prefix_squared_errors(models, fold.held_out, weights);
     }
   });

@@ -19,6 +19,7 @@ struct SplitCandidate {
   int rank_left = 0;        ///< ranks of the two children's least-squares problems
   int rank_right = 0;
   std::ptrdiff_t tested = 0;  ///< number of admissible splits that were compared
+  bool by_missing = false;    ///< rows with a value go left, rows without one right
   std::vector<int> level_side;  ///< categorical input: -1 left, 1 right, 0 not seen, one per level
 };
 

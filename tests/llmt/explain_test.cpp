@@ -248,18 +248,18 @@ TEST(Explain, ImportanceIsTheShareOfTheMovedOutput) {
   for (const Kind& kind : kinds) {
     const llmt::Model model = fitted(data, kind);
     // More rows than it looks at for the kind that is cheap.
-    const Eigen::MatrixXd x = data.x.topRows(kind.validity == llmt::ValidityChoice::crisp ? 700 : 60);
-    const std::ptrdiff_t looked_at = std::min(x.rows(), llmt::importance_rows);
+    const Eigen::MatrixXd rows = data.x.topRows(kind.validity == llmt::ValidityChoice::crisp ? 700 : 60);
+    const std::ptrdiff_t looked_at = std::min(rows.rows(), llmt::importance_rows);
     Eigen::MatrixXd mean = Eigen::MatrixXd::Zero(2, 4);
     for (std::ptrdiff_t k = 0; k < looked_at; ++k) {
-      mean += llmt::attribute(model, x.row(k * x.rows() / looked_at).transpose()).contributions.cwiseAbs();
+      mean += llmt::attribute(model, rows.row(k * rows.rows() / looked_at).transpose()).contributions.cwiseAbs();
     }
     for (std::ptrdiff_t o = 0; o < 2; ++o) {
       mean.row(o) /= mean.row(o).sum();
     }
-    const Eigen::MatrixXd found = llmt::importance(model, x, 1);
+    const Eigen::MatrixXd found = llmt::importance(model, rows, 1);
     EXPECT_LT((found - mean).cwiseAbs().maxCoeff(), 1e-3);
-    EXPECT_EQ(llmt::importance(model, x, 4), found);
+    EXPECT_EQ(llmt::importance(model, rows, 4), found);
   }
 }
 

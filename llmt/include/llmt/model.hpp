@@ -39,7 +39,8 @@ struct Node {
   int left = -1;           ///< child for x[split_input] <= threshold; -1 in a leaf
   int right = -1;          ///< child for x[split_input] > threshold; -1 in a leaf
   int split_input = -1;    ///< column of the input that is compared; -1 in a leaf
-  double threshold = 0.0;  ///< in the unit of that input
+  /// In the unit of that input. The largest double: rows that have a value go left, rows without one right.
+  double threshold = 0.0;
   /// Split on a categorical input: for each of its levels -1 left, 1 right, 0 not seen here. Empty for numbers.
   std::vector<int> level_side = {};
   double half_width = 0.0;    ///< h of the transition of a blend, in the unit of the split input; 0: a jump
@@ -71,6 +72,9 @@ struct Partition {
   std::vector<Node> nodes;  ///< in order of growth
   /// Slopes beyond the training extent, outputs x regressors. Empty: the root's.
   Eigen::MatrixXd outer_slope = {};
+  /// Smallest and largest residual of the root's model over the training rows, outputs x 2. Empty: predictions are not
+  /// held.
+  Eigen::MatrixXd residual_range = {};
 
   std::ptrdiff_t num_leaves() const { return (std::ssize(nodes) + 1) / 2; }
 };
@@ -138,10 +142,10 @@ class Evaluator;
 /// covered, the slope of the leaf gives way to that of its parent, beyond the parent's range to that of its parent, up
 /// to the root:
 ///   f_i(x) = value_i + slope_i . c_i + sum over ancestors a of slope_a . (c_a - c_below a)
-/// with c the deviations held to the node's range. The prediction is then held to the range of the outputs in training,
-/// widened by a tenth of it on both sides, and at last, beyond the training extent, outer_slope . (d - c_root) is
-/// added: the root's slopes as far as the first leaves agree on them. Every hold is rounded off over a tenth of its
-/// range, so that derivatives stay continuous. Affine data are reproduced everywhere.
+/// with c the deviations held to the node's range. What the prediction adds to the root's model is then held to the
+/// range of the root's residuals in training, widened by a tenth of it on both sides, and at last, beyond the training
+/// extent, outer_slope . (d - c_root) is added: the root's slopes as far as the first leaves agree on them. Every hold is
+/// rounded off over a tenth of its range, so that derivatives stay continuous. Affine data are reproduced everywhere.
 ///
 /// A missing value (NaN) takes the share that was learned at each split on its input, and in a local model the mean of
 /// the leaf's rows.
