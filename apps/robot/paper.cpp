@@ -76,16 +76,20 @@ void print_planar(const std::vector<PlanarStudy>& studies) {
                                        : "without carry-over (each link's own tip deflection)"));
     print_arm(study);
     print_calibration(study.calibration);
+    print(fmt::format("learned from residuals with {} mm of noise, x against the noise-free residual, RMSE: crisp {} mm, "
+                      "blend {} mm\n",
+                      noise_mm, millimetres(study.noisy_crisp), millimetres(study.noisy_blend)));
   }
   print(
       "paper: L2 1000, L3 999.998, v2 0.41, v3 0.36 mm; calibrability number 1.78; converged in the second "
       "iteration\n");
 
   print("\nBlack box: trees of the position itself (arm with carry-over)\n");
-  Table table({"training poses", "leaves x + y", "mean", "max", "| paper mean", "max"});
+  Table table({"model", "training poses", "leaves x + y", "mean", "max", "| paper mean", "max"});
   for (const StudyRow& row : studies.front().black_box) {
-    table.add({fmt::format("{}", row.training_poses), leaves_text(row), millimetres(row.error.mean),
-               millimetres(row.error.max), number(row.paper->mean, 4), number(row.paper->max, 5)});
+    table.add({row.model, fmt::format("{}", row.training_poses), leaves_text(row), millimetres(row.error.mean),
+               millimetres(row.error.max), row.paper ? number(row.paper->mean, 4) : "-",
+               row.paper ? number(row.paper->max, 5) : "-"});
   }
   print(table.text());
   print(R"(
@@ -127,6 +131,9 @@ Json planar_json(const std::vector<PlanarStudy>& studies) {
     for (const StudyRow& row : study.black_box) {
       entry["black_box"].push_back(row_json(row));
     }
+    entry["noise_mm"] = noise_mm;
+    entry["noisy_crisp_rmse_mm"] = study.noisy_crisp;
+    entry["noisy_blend_rmse_mm"] = study.noisy_blend;
     json.push_back(std::move(entry));
   }
   return json;

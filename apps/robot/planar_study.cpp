@@ -1,6 +1,7 @@
 #include "robot/planar_study.hpp"
 
 #include "llmt/fit.hpp"
+#include "llmt/random.hpp"
 #include "llmt/robotics/calibration.hpp"
 #include "llmt/robotics/robot_file.hpp"
 #include "llmt/robotics/simulation.hpp"
@@ -133,6 +134,21 @@ PlanarStudy planar_study(bool carry_over, bool large, std::uint64_t seed) {
   correct("Gaussians, wide, as grown", {gaussian_as_grown(93, 0.7), gaussian_as_grown(75, 0.7)}, std::nullopt);
   correct("blend, the paper's leaf counts", {blended(93, seed), blended(75, seed)}, std::nullopt);
   correct("blend, a third of the leaves", {blended(25, seed), blended(25, seed)}, std::nullopt);
+
+  Random random(seed);
+  Eigen::VectorXd noisy = residual.col(0);
+  for (double& value : noisy) {
+    value += noise_mm * random.normal();
+  }
+  const Eigen::VectorXd truth = (test_truth - calibrated_test).col(0);
+  const auto noisy_error = [&](FitOptions options) {
+    options.growth.min_leaf_samples = 0;
+    return rmse(fit(train.joints, noisy, options).model.predict(test.joints), truth)(0);
+  };
+  FitOptions crisp = blended(93, seed);
+  crisp.blend.validity = ValidityChoice::crisp;
+  study.noisy_crisp = noisy_error(crisp);
+  study.noisy_blend = noisy_error(blended(93, seed));
 
   const auto black_box = [&](const std::string& name, const Poses& poses, const Eigen::MatrixXd& truth,
                              std::ptrdiff_t x_leaves, std::ptrdiff_t y_leaves, TotalError paper) {

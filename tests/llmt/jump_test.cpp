@@ -1,0 +1,47 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "llmt/fit.hpp"
+#include "oracles.hpp"
+
+namespace {
+
+struct Truth {
+  const char* name;
+  double (*value)(double, double);
+};
+
+// Where the truth jumps, smoothing across the jump costs; the crisp tree is a candidate for that.
+const Truth truths[] = {
+    {"piecewise linear with a jump", [](double a, double b) { return a > 0.1 ? 2.0 + a - b : -a + 0.5 * b; }},
+    {"steps", [](double a, double b) { return (a > -0.3 ? 1.0 : 0.0) + (b > 0.2 ? 0.7 : 0.0); }},
+    {"jump and curve",
+     [](double a, double b) { return std::sin(2.0 * a) + 0.5 * b * b + (a + 0.0 * b > 0.25 ? 0.8 : 0.0); }},
+};
+
+TEST(JumpingTruth, DefaultIsNeverMuchWorseThanTheCrispTree) {
+  for (const Truth& truth : truths) {
+    for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+      const Eigen::MatrixXd x = oracle::uniform(800, 2, seed);
+      const Eigen::MatrixXd test = oracle::uniform(4000, 2, 1000 + seed);
+      llmt::Random random(seed);
+      Eigen::VectorXd y(x.rows());
+      for (std::ptrdiff_t i = 0; i < x.rows(); ++i) {
+        y(i) = truth.value(x(i, 0), x(i, 1)) + 0.1 * random.normal();
+      }
+      Eigen::VectorXd expected(test.rows());
+      for (std::ptrdiff_t i = 0; i < test.rows(); ++i) {
+        expected(i) = truth.value(test(i, 0), test(i, 1));
+      }
+      llmt::FitOptions crisp;
+      crisp.blend.validity = llmt::ValidityChoice::crisp;
+      const double of_default = llmt::rmse(llmt::fit(x, y).model.predict(test), expected)(0);
+      const double of_crisp = llmt::rmse(llmt::fit(x, y, crisp).model.predict(test), expected)(0);
+      EXPECT_LE(of_default, 1.02 * of_crisp) << truth.name << ", seed " << seed;
+      RecordProperty(std::string(truth.name) + std::to_string(seed), std::to_string(of_default / of_crisp));
+    }
+  }
+}
+
+}  // namespace
