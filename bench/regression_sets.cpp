@@ -72,8 +72,8 @@ int main(int argc, char** argv) {
         }
       }
     }
-    fmt::print("{:12} {:>14} {:>14} {:>18} {:>8} {:>10}\n", "data", "least squares", "crisp tree", "worst split, ratio",
-               "leaves", "s per fit");
+    fmt::print("{:12} {:>14} {:>14} {:>18} {:>8} {:>10}\n", "data", "least squares", "llmt, defaults",
+               "worst split, ratio", "leaves", "s per fit");
     for (const std::string& name : names) {
       const Errors errors = measure(argv[1], name);
       fmt::print("{:12} {:14.5g} {:14.5g} {:18.3f} {:8.1f} {:10.3f}\n", name, errors.least_squares, errors.tree,

@@ -49,8 +49,7 @@ void compare_command(CompareArguments arguments) {
   options.folds = arguments.learning.options.selection.folds;
   Progress progress("fitting");
   options.progress = [&](const std::string&, std::ptrdiff_t done, std::ptrdiff_t total) { progress.show(done, total); };
-  const ComparisonResult result =
-      compare(table.inputs.values, table.outputs, usual_methods(table.options), options);
+  const ComparisonResult result = compare(table.inputs.values, table.outputs, usual_methods(table.options), options);
   progress.clear();
   if (arguments.json) {
     print_json(comparison_json(arguments, table, result));
@@ -60,8 +59,8 @@ void compare_command(CompareArguments arguments) {
                     arguments.learning.data, table.inputs.values.rows(), table.names.size(),
                     arguments.learning.targets.front(), result.methods.front().fold_rmse.size(),
                     arguments.learning.contiguous ? " of contiguous rows" : ""));
-  Table text({"method", "leaves", "parameters", "RMSE held-out", "+-", "largest jump", "fit, s",
-              "predict 1e6 rows, s"});
+  Table text(
+      {"method", "leaves", "parameters", "RMSE held-out", "+-", "largest jump", "fit, s", "predict 1e6 rows, s"});
   for (const Comparison& method : result.methods) {
     text.add({method.method, fmt::format("{}", method.leaves), fmt::format("{}", method.parameters),
               number(method.cv_rmse), number(method.spread, 2), number(method.largest_jump, 3),

@@ -216,13 +216,17 @@ void add_fit(CLI::App& app) {
                    "Stop when further splits lower the training sum of squares by less than this fraction each")
       ->capture_default_str();
   command->add_flag("--shared", growth.shared_partition, "One tree for all targets instead of one each");
-  command->add_option("--validity", blend.validity, "Crisp leaves, blends over the splits, Gaussians, or the best of the first two")
+  command
+      ->add_option("--validity", blend.validity,
+                   "Crisp leaves, blends over the splits, Gaussians, or the best of the first two")
       ->transform(choice_of<ValidityChoice>(validity_names))
       ->option_text("auto|crisp|blend|gaussian [auto]");
   command->add_option("--estimation", blend.estimation, "Local models as grown, weighted by validity, or all at once")
       ->transform(choice_of<Estimation>(estimation_names))
       ->option_text("as-grown|local|joint [joint]");
-  command->add_option("--width", blend.widths, "Widths to choose from: of a transition by the smaller child's extent; k_sigma")
+  command
+      ->add_option("--width", blend.widths,
+                   "Widths to choose from: of a transition by the smaller child's extent; k_sigma")
       ->delimiter(',')
       ->option_text("FLOAT,... [0.5,1,2,4; Gaussians 0.333]");
   command->add_option("--ridge", blend.ridges, "Ridges to choose from: hold of the joint estimate at the local one")

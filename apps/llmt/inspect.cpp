@@ -79,9 +79,10 @@ std::string validity_text(const Validity& validity) {
     case ValidityKind::crisp:
       return "each holds in its box alone";
     case ValidityKind::blend:
-      return fmt::format("blended over the splits, width {}: between boxes the formulas are averaged, and a leaf's "
-                         "formula alone says little where others reach it",
-                         number(validity.width, 3));
+      return fmt::format(
+          "blended over the splits, width {}: between boxes the formulas are averaged, and a leaf's "
+          "formula alone says little where others reach it",
+          number(validity.width, 3));
     case ValidityKind::gaussian:
       return fmt::format("blended by Gaussians, k_sigma {}", number(validity.width, 3));
   }
@@ -93,8 +94,8 @@ void print_model(const Model& model, const std::string& path) {
   Table inputs({"input", "smallest", "largest", "mean"});
   for (const InputColumn& input : model.inputs()) {
     if (input.is_categorical()) {
-      inputs.add({input.name, fmt::format("{} categories: {}", input.levels.size(), fmt::join(input.levels, ", ")), "",
-                  ""});
+      inputs.add(
+          {input.name, fmt::format("{} categories: {}", input.levels.size(), fmt::join(input.levels, ", ")), "", ""});
       continue;
     }
     inputs.add({input.name, number(input.low), number(input.high), number(input.centre)});

@@ -108,7 +108,8 @@ void add_learning_options(CLI::App& command, LearningArguments& arguments) {
   command.add_option("--min-leaf", growth.min_leaf_samples, "Fewest rows in a leaf, 0: see docs/commands.md")
       ->capture_default_str();
   command
-      .add_option("--cv", folds.count, "Folds of the held-out error by which everything is chosen, 0: keep the tree as grown")
+      .add_option("--cv", folds.count,
+                  "Folds of the held-out error by which everything is chosen, 0: keep the tree as grown")
       ->capture_default_str();
   command.add_flag("--contiguous", arguments.contiguous,
                    "Folds are blocks of consecutive rows (measured paths, grids, time series)");

@@ -181,8 +181,8 @@ void summarise(const PredictArguments& arguments, const Predicted& predicted) {
                         number(farthest, 2));
   }
   if (const std::ptrdiff_t rows = count_high_leverage(predicted); rows > 0) {
-    text += fmt::format("; {} rows inside it combine inputs as no training row near them does (leverage 1 or more)",
-                        rows);
+    text +=
+        fmt::format("; {} rows inside it combine inputs as no training row near them does (leverage 1 or more)", rows);
   }
   if (predicted.missing > 0) {
     text += fmt::format("; {} missing values", predicted.missing);

@@ -76,9 +76,10 @@ void print_planar(const std::vector<PlanarStudy>& studies) {
                                        : "without carry-over (each link's own tip deflection)"));
     print_arm(study);
     print_calibration(study.calibration);
-    print(fmt::format("learned from residuals with {} mm of noise, x against the noise-free residual, RMSE: crisp {} mm, "
-                      "blend {} mm\n",
-                      noise_mm, millimetres(study.noisy_crisp), millimetres(study.noisy_blend)));
+    print(
+        fmt::format("learned from residuals with {} mm of noise, x against the noise-free residual, RMSE: crisp {} mm, "
+                    "blend {} mm\n",
+                    noise_mm, millimetres(study.noisy_crisp), millimetres(study.noisy_blend)));
   }
   print(
       "paper: L2 1000, L3 999.998, v2 0.41, v3 0.36 mm; calibrability number 1.78; converged in the second "

@@ -26,9 +26,9 @@ InputColumns read_inputs(const Csv& csv, const std::vector<std::string>& columns
 
 /// Inputs of a model.
 struct ModelInputs {
-  Eigen::MatrixXd values;         ///< as Model::predict() takes them
-  std::ptrdiff_t missing = 0;     ///< cells without a value
-  std::ptrdiff_t unknown = 0;     ///< cells with a category that training had not
+  Eigen::MatrixXd values;      ///< as Model::predict() takes them
+  std::ptrdiff_t missing = 0;  ///< cells without a value
+  std::ptrdiff_t unknown = 0;  ///< cells with a category that training had not
 };
 ModelInputs read_inputs(const Csv& csv, const Model& model);
 

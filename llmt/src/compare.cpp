@@ -80,9 +80,9 @@ void recommend(const std::vector<Method>& methods, ComparisonResult& result) {
   }
   const Comparison& taken = result.methods[result.recommended];
   if (result.recommended != best) {
-    result.recommendation = fmt::format(
-        "Take {}: its held-out error is within one standard error of the best ({}), and it is simpler.", taken.method,
-        result.methods[best].method);
+    result.recommendation =
+        fmt::format("Take {}: its held-out error is within one standard error of the best ({}), and it is simpler.",
+                    taken.method, result.methods[best].method);
     return;
   }
   // The best of the others says how much the choice matters.
@@ -155,7 +155,8 @@ double largest_jump(const Model& model, const Eigen::Ref<const Eigen::MatrixXd>&
     // Rows just left and right of each split that may jump. Splits with a transition do not; Gaussians never do.
     std::vector<Eigen::VectorXd> left;
     std::vector<Eigen::VectorXd> right;
-    for (std::ptrdiff_t row = 0; row < inputs.rows() && partition.validity.kind != ValidityKind::gaussian; row += step) {
+    for (std::ptrdiff_t row = 0; row < inputs.rows() && partition.validity.kind != ValidityKind::gaussian;
+         row += step) {
       const Eigen::VectorXd x = inputs.row(row).transpose();
       for (std::ptrdiff_t index = 0; index >= 0;) {
         const Node& node = partition.nodes[static_cast<std::size_t>(index)];
@@ -218,10 +219,10 @@ ComparisonResult compare(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
     double squares = 0.0;
     for (std::size_t f = 0; f < folds.size(); ++f) {
       const Fold& fold = folds[f];
-      const FitResult fitted = fit(inputs(fold.train, Eigen::all), output(fold.train, Eigen::all),
-                                   for_rows(method.options, fold.train));
-      const Eigen::VectorXd error = fitted.model.predict(inputs(fold.held_out, Eigen::all)) -
-                                    Eigen::MatrixXd(output(fold.held_out, Eigen::all));
+      const FitResult fitted =
+          fit(inputs(fold.train, Eigen::all), output(fold.train, Eigen::all), for_rows(method.options, fold.train));
+      const Eigen::VectorXd error =
+          fitted.model.predict(inputs(fold.held_out, Eigen::all)) - Eigen::MatrixXd(output(fold.held_out, Eigen::all));
       squares += error.squaredNorm();
       entry.fold_rmse(static_cast<std::ptrdiff_t>(f)) =
           std::sqrt(error.squaredNorm() / static_cast<double>(error.size()));
@@ -229,15 +230,14 @@ ComparisonResult compare(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
     }
     entry.cv_rmse = std::sqrt(squares / static_cast<double>(inputs.rows()));
     const double mean = entry.fold_rmse.mean();
-    entry.spread = entry.fold_rmse.size() > 1
-                       ? std::sqrt((entry.fold_rmse.array() - mean).square().sum() /
-                                   static_cast<double>(entry.fold_rmse.size() - 1))
-                       : 0.0;
+    entry.spread = entry.fold_rmse.size() > 1 ? std::sqrt((entry.fold_rmse.array() - mean).square().sum() /
+                                                          static_cast<double>(entry.fold_rmse.size() - 1))
+                                              : 0.0;
     std::vector<FitResult> all;
     entry.fit_seconds = seconds_of([&] { all.push_back(fit(inputs, output, method.options)); });
     const Model& model = all.front().model;
-    entry.predict_seconds =
-        seconds_of([&] { model.predict(inputs, method.options.max_threads); }) * 1e6 / static_cast<double>(inputs.rows());
+    entry.predict_seconds = seconds_of([&] { model.predict(inputs, method.options.max_threads); }) * 1e6 /
+                            static_cast<double>(inputs.rows());
     entry.leaves = model.partitions().front().num_leaves();
     entry.parameters = count_parameters(model);
     entry.largest_jump = largest_jump(model, inputs);

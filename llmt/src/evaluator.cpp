@@ -137,8 +137,7 @@ Evaluator::Evaluator(const Partition& partition, const std::vector<InputColumn>&
       parents_(parents_of(partition)),
       outer_slope_(partition.outer_slope.size() > 0 ? partition.outer_slope : partition.nodes.front().slope) {
   if (partition.residual_range.size() > 0) {
-    const Eigen::VectorXd margin =
-        output_margin * (partition.residual_range.col(1) - partition.residual_range.col(0));
+    const Eigen::VectorXd margin = output_margin * (partition.residual_range.col(1) - partition.residual_range.col(0));
     residual_range_ = partition.residual_range;
     residual_range_.col(0) -= margin;
     residual_range_.col(1) += margin;
@@ -376,7 +375,8 @@ void Evaluator::local(int node, const double* deviations, double* values) const 
   const double* highs = high(node);
   std::ptrdiff_t inside = 0;
   for (std::ptrdiff_t k = 0; k < regressors_; ++k) {
-    inside += static_cast<std::ptrdiff_t>(deviations[k] >= lows[k]) & static_cast<std::ptrdiff_t>(deviations[k] <= highs[k]);
+    inside +=
+        static_cast<std::ptrdiff_t>(deviations[k] >= lows[k]) & static_cast<std::ptrdiff_t>(deviations[k] <= highs[k]);
   }
   if (inside != regressors_) {
     guarded(node, deviations, values);
@@ -395,8 +395,7 @@ void Evaluator::local(int node, const double* deviations, double* values) const 
 double Evaluator::root_value(std::ptrdiff_t output, const double* deviations) const {
   double sum = value(0, output);
   for (std::ptrdiff_t k = 0; k < regressors_; ++k) {
-    const double held =
-        std::isnan(deviations[k]) ? mean(0)[k] : hold(deviations[k], low(0)[k], high(0)[k]).value;
+    const double held = std::isnan(deviations[k]) ? mean(0)[k] : hold(deviations[k], low(0)[k], high(0)[k]).value;
     sum += slopes(0, output)[k] * held;
   }
   return sum;
@@ -515,8 +514,8 @@ void Evaluator::add_gaussian_derivatives(const std::vector<Activation>& active, 
 }
 
 // The value of a subtree is g V_left + (1 - g) V_right: its derivative by g is V_left - V_right.
-Eigen::VectorXd Evaluator::add_blend_derivatives(int node, double validity, const double* row,
-                                                 const double* deviations, Eigen::MatrixXd& by_input) const {
+Eigen::VectorXd Evaluator::add_blend_derivatives(int node, double validity, const double* row, const double* deviations,
+                                                 Eigen::MatrixXd& by_input) const {
   const Branch& branch = branches_[static_cast<std::size_t>(node)];
   if (branch.left < 0) {
     Eigen::VectorXd leaf(outputs_);

@@ -110,7 +110,7 @@ class Evaluator {
   std::vector<int> level_side_;
   std::vector<double> coefficients_;  // per node and output: value, slopes
   std::vector<double> ranges_;        // per node: low, high, mean
-  Eigen::MatrixXd residual_range_;  // outputs x 2, widened; empty: no hold
+  Eigen::MatrixXd residual_range_;    // outputs x 2, widened; empty: no hold
   Eigen::MatrixXd outer_slope_;
   std::vector<Gaussian> gaussians_;
 };

@@ -126,8 +126,8 @@ Plan make_plan(const FitOptions& options, const TrainingRows& all, bool has_fold
   if (!crisp_only) {
     plan.candidates.widths = options.blend.widths;
     if (plan.candidates.widths.empty()) {
-      plan.candidates.widths = choice == ValidityChoice::gaussian ? std::vector<double>{1.0 / 3.0}
-                                                                  : std::vector<double>{0.5, 1.0, 2.0, 4.0};
+      plan.candidates.widths =
+          choice == ValidityChoice::gaussian ? std::vector<double>{1.0 / 3.0} : std::vector<double>{0.5, 1.0, 2.0, 4.0};
     }
     if (options.blend.estimation == Estimation::joint) {
       plan.candidates.ridges =
@@ -186,7 +186,11 @@ Grown grow_rows(const TrainingRows& rows, const Table& table, const std::vector<
   } else {
     result = grow(problem);
   }
-  Grown grown{.partition = {.outputs = served, .validity = {}, .nodes = std::move(result.nodes), .outer_slope = {}, .residual_range = {}},
+  Grown grown{.partition = {.outputs = served,
+                            .validity = {},
+                            .nodes = std::move(result.nodes),
+                            .outer_slope = {},
+                            .residual_range = {}},
               .stop = result.stop};
   grown.partition.outer_slope = agreed_slope(grown.partition);
   return grown;
@@ -250,8 +254,12 @@ Table make_table(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::R
   }
   require(inputs.rows() <= std::numeric_limits<int>::max(), "the number of rows", static_cast<double>(inputs.rows()),
           "below 2^31");
-  Table table{inputs, outputs, options.weights, count_levels(inputs, options.categorical_inputs),
-              options.growth.regression_inputs, options.growth.split_inputs};
+  Table table{inputs,
+              outputs,
+              options.weights,
+              count_levels(inputs, options.categorical_inputs),
+              options.growth.regression_inputs,
+              options.growth.split_inputs};
   if (table.weights.size() == 0) {
     table.weights = Eigen::VectorXd::Ones(inputs.rows());
   } else {

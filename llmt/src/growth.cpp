@@ -49,10 +49,7 @@ struct Priority {
 
 class Grower {
  public:
-  explicit Grower(const GrowthProblem& problem)
-      : problem_(problem), options_(problem.options) {
-    scale_outputs();
-  }
+  explicit Grower(const GrowthProblem& problem) : problem_(problem), options_(problem.options) { scale_outputs(); }
 
   GrownPartition run() {
     open_root();
@@ -408,9 +405,9 @@ class Grower {
       for (std::ptrdiff_t i = 0; i < queries.rows(); ++i) {
         for (std::ptrdiff_t k = 0; k < queries.cols(); ++k) {
           if (std::isnan(queries(i, k))) {
-            change[side].row(i) += (fit.slope_change.col(k) * fit.mean(k) +
-                                    parent.slope.col(k) * (fit.mean(k) - parent.mean(k)))
-                                       .transpose();
+            change[side].row(i) +=
+                (fit.slope_change.col(k) * fit.mean(k) + parent.slope.col(k) * (fit.mean(k) - parent.mean(k)))
+                    .transpose();
           } else {
             change[side].row(i) += fit.slope_change.col(k).transpose() * queries(i, k);
           }
@@ -477,8 +474,7 @@ class Grower {
       const Node& right = nodes_[static_cast<std::size_t>(node.right)];
       const Eigen::VectorXd weights = leaf.weights(order);
       Eigen::MatrixXd deviations = problem_.deviations(rows, Eigen::all);
-      deviations =
-          deviations.array().isNaN().select(node.mean.transpose().replicate(deviations.rows(), 1), deviations);
+      deviations = deviations.array().isNaN().select(node.mean.transpose().replicate(deviations.rows(), 1), deviations);
       const Eigen::MatrixXd apart = (deviations * (right.slope - left.slope).transpose()).rowwise() +
                                     Eigen::RowVectorXd((right.value - left.value).transpose());
       const double mean = weights.dot(values) / weights.sum();

@@ -20,8 +20,8 @@ using Json = nlohmann::ordered_json;
 Intervals::Intervals(std::vector<Model> models, std::vector<Eigen::MatrixXd> residuals)
     : models_(std::move(models)), residuals_(std::move(residuals)) {
   if (models_.size() != residuals_.size()) {
-    throw std::invalid_argument(fmt::format("llmt::Intervals: {} models and {} matrices of residuals", models_.size(),
-                                            residuals_.size()));
+    throw std::invalid_argument(
+        fmt::format("llmt::Intervals: {} models and {} matrices of residuals", models_.size(), residuals_.size()));
   }
   for (std::size_t k = 0; k < models_.size(); ++k) {
     if (models_[k].num_inputs() != models_[0].num_inputs() || models_[k].num_outputs() != models_[0].num_outputs() ||
@@ -33,8 +33,7 @@ Intervals::Intervals(std::vector<Model> models, std::vector<Eigen::MatrixXd> res
                       models_[0].num_inputs(), models_[0].num_outputs()));
     }
     if (!residuals_[k].allFinite() || (residuals_[k].array() < 0.0).any()) {
-      throw std::invalid_argument(
-          fmt::format("llmt::Intervals: a residual of fold {} is negative or not finite", k));
+      throw std::invalid_argument(fmt::format("llmt::Intervals: a residual of fold {} is negative or not finite", k));
     }
     for (std::ptrdiff_t o = 0; o < residuals_[k].cols(); ++o) {
       std::sort(residuals_[k].col(o).begin(), residuals_[k].col(o).end());
@@ -65,7 +64,8 @@ Bounds Intervals::predict(const Eigen::Ref<const Eigen::MatrixXd>& inputs, doubl
   for (const Model& model : models_) {
     predicted.push_back(model.predict(inputs, max_threads));
   }
-  Bounds bounds{Eigen::MatrixXd(inputs.rows(), predicted[0].cols()), Eigen::MatrixXd(inputs.rows(), predicted[0].cols())};
+  Bounds bounds{Eigen::MatrixXd(inputs.rows(), predicted[0].cols()),
+                Eigen::MatrixXd(inputs.rows(), predicted[0].cols())};
   constexpr std::ptrdiff_t block = 256;
   parallel_for((inputs.rows() + block - 1) / block, max_threads, [&](std::ptrdiff_t index) {
     std::vector<double> lower;
@@ -105,7 +105,8 @@ void save(const Model& model, const Intervals& intervals, const std::string& pat
       const Eigen::VectorXd column = intervals.residuals()[k].col(o);
       residuals.push_back(std::vector<double>(column.begin(), column.end()));
     }
-    json["intervals"].push_back({{"residuals", std::move(residuals)}, {"model", Json::parse(to_json(intervals.models()[k]))}});
+    json["intervals"].push_back(
+        {{"residuals", std::move(residuals)}, {"model", Json::parse(to_json(intervals.models()[k]))}});
   }
   write_file(path, json.dump(1) + "\n");
 }

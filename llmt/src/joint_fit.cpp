@@ -53,7 +53,8 @@ Eigen::MatrixXd second_extremes(const TrainingRows& training) {
       continue;
     }
     const auto last = values.end() - 1;
-    const std::ptrdiff_t skipped = training.regressors[static_cast<std::size_t>(k)].level < 0 && values.size() > 4 ? 1 : 0;
+    const std::ptrdiff_t skipped =
+        training.regressors[static_cast<std::size_t>(k)].level < 0 && values.size() > 4 ? 1 : 0;
     std::nth_element(values.begin(), values.begin() + skipped, values.end());
     result(0, k) = values[static_cast<std::size_t>(skipped)];
     std::nth_element(values.begin(), last - skipped, values.end());
@@ -114,9 +115,8 @@ void JointFit::set_residual_range() {
   range.col(0).setConstant(INFINITY);
   range.col(1).setConstant(-INFINITY);
   for (std::ptrdiff_t row = 0; row < training_.count(); ++row) {
-    const Eigen::VectorXd residual =
-        training_.outputs(row, partition_.outputs).transpose() - root.value -
-        root.slope * imputed(training_.deviations.row(row).transpose(), root);
+    const Eigen::VectorXd residual = training_.outputs(row, partition_.outputs).transpose() - root.value -
+                                     root.slope * imputed(training_.deviations.row(row).transpose(), root);
     range.col(0) = range.col(0).cwiseMin(residual);
     range.col(1) = range.col(1).cwiseMax(residual);
   }
@@ -228,8 +228,8 @@ void JointFit::assemble(int max_threads) {
         for (std::size_t u = 0; u < uses[leaf].size(); ++u) {
           const Use& use = uses[leaf][u];
           const std::ptrdiff_t row = static_cast<std::ptrdiff_t>(u);
-          products.row(row) = outer.row(use.row) *
-                              (weights(use.row) * entries[static_cast<std::size_t>(use.entry)].validity);
+          products.row(row) =
+              outer.row(use.row) * (weights(use.row) * entries[static_cast<std::size_t>(use.entry)].validity);
           for (std::ptrdiff_t e = use.before; e <= use.entry; ++e) {
             const Entry& entry = entries[static_cast<std::size_t>(e)];
             validities(row, column_of[static_cast<std::size_t>(entry.leaf)]) = entry.validity;
@@ -270,7 +270,8 @@ void JointFit::assemble(int max_threads) {
           }
           for (std::ptrdiff_t e = use.before; e <= use.entry; ++e) {
             const Entry& entry = entries[static_cast<std::size_t>(e)];
-            regressors_at(use.row, partition_.nodes[static_cast<std::size_t>(leaves_[static_cast<std::size_t>(entry.leaf)])],
+            regressors_at(use.row,
+                          partition_.nodes[static_cast<std::size_t>(leaves_[static_cast<std::size_t>(entry.leaf)])],
                           other);
             for (std::ptrdiff_t i = 0; i < size_; ++i) {
               add_scaled(own.data() + entry.leaf * packed_ + i * size_, other.data(), weight * entry.validity * x(i),
@@ -483,7 +484,8 @@ void describe_leaves(const TrainingRows& training, Partition& partition) {
     const Eigen::MatrixXd gram = node.inverse_gram.selfadjointView<Eigen::Lower>();
     Eigen::VectorXd scale(regressors + 1);
     for (std::ptrdiff_t k = 0; k <= regressors; ++k) {
-      const double range = k == 0 ? 1.0 : std::max(std::abs(partition.nodes[0].low(k - 1)), std::abs(partition.nodes[0].high(k - 1)));
+      const double range =
+          k == 0 ? 1.0 : std::max(std::abs(partition.nodes[0].low(k - 1)), std::abs(partition.nodes[0].high(k - 1)));
       scale(k) = range > 0.0 ? range : 1.0;
     }
     const Eigen::MatrixXd scaled = scale.cwiseInverse().asDiagonal() * gram * scale.cwiseInverse().asDiagonal();

@@ -56,16 +56,16 @@ class JointFit {
 
   const TrainingRows& training_;
   Partition partition_;
-  std::ptrdiff_t size_;     // coefficients of a local model
-  std::ptrdiff_t packed_;   // doubles of a block
-  bool missing_;            // blocks of rows with missing values are not symmetric, so all are stored in full
-  Eigen::VectorXd scale_;   // of the regressors
+  std::ptrdiff_t size_;    // coefficients of a local model
+  std::ptrdiff_t packed_;  // doubles of a block
+  bool missing_;           // blocks of rows with missing values are not symmetric, so all are stored in full
+  Eigen::VectorXd scale_;  // of the regressors
   Eigen::VectorXd output_scale_;
-  std::vector<int> leaves_;                     // nodes, ascending
-  std::vector<std::vector<double>> blocks_;     // of leaf i: with leaves 0 ... i
-  std::vector<Eigen::MatrixXd> gram_;           // of every node, size x size
-  std::vector<Eigen::MatrixXd> products_;       // of every node, size x outputs: sum Phi a r
-  Eigen::MatrixXd root_;                        // coefficients of the root's model
+  std::vector<int> leaves_;                  // nodes, ascending
+  std::vector<std::vector<double>> blocks_;  // of leaf i: with leaves 0 ... i
+  std::vector<Eigen::MatrixXd> gram_;        // of every node, size x size
+  std::vector<Eigen::MatrixXd> products_;    // of every node, size x outputs: sum Phi a r
+  Eigen::MatrixXd root_;                     // coefficients of the root's model
 };
 
 /// Fills in what a finished partition tells of its leaves: residual sums of squares and inverse Gram matrices.

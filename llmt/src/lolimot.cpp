@@ -24,7 +24,7 @@ constexpr double negligible = 1e-9;
 /// A local model with its validity function.
 struct LocalModel {
   int node = 0;
-  Eigen::VectorXd low;          // box, of the split inputs
+  Eigen::VectorXd low;  // box, of the split inputs
   Eigen::VectorXd high;
   Eigen::VectorXd mu;           // validity function before normalisation, one per row
   Eigen::MatrixXd predictions;  // rows x outputs
@@ -131,8 +131,7 @@ class Lolimot {
     node.mean = Eigen::VectorXd::Zero(deviations_.cols());
     node.low = deviations_.colwise().minCoeff().transpose();
     node.high = deviations_.colwise().maxCoeff().transpose();
-    model.predictions =
-        (deviations_ * node.slope.transpose()).rowwise() + Eigen::RowVectorXd(node.value.transpose());
+    model.predictions = (deviations_ * node.slope.transpose()).rowwise() + Eigen::RowVectorXd(node.value.transpose());
   }
 
   Eigen::VectorXd sum_of_mu() const {
@@ -201,8 +200,8 @@ class Lolimot {
     if (std::ssize(order) < 2 * smallest) {
       return std::nullopt;
     }
-    const NodeFit crisp = fit_node(deviations_(rows, Eigen::all), problem_.outputs(rows, Eigen::all),
-                                   problem_.weights(rows));
+    const NodeFit crisp =
+        fit_node(deviations_(rows, Eigen::all), problem_.outputs(rows, Eigen::all), problem_.weights(rows));
     std::vector<double> values;
     for (const int k : order) {
       values.push_back(value(k));

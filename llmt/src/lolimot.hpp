@@ -8,8 +8,8 @@ namespace llmt {
 
 /// What LOLIMOT is told besides the growth options, of which it uses max_leaves, the inputs and min_leaf_samples.
 struct LolimotOptions {
-  double width = 1.0 / 3.0;   ///< k_sigma: standard deviations of the validity functions by the sides of their boxes
-  Eigen::VectorXd low;        ///< of the split inputs over the training rows: closes the boxes
+  double width = 1.0 / 3.0;  ///< k_sigma: standard deviations of the validity functions by the sides of their boxes
+  Eigen::VectorXd low;       ///< of the split inputs over the training rows: closes the boxes
   Eigen::VectorXd high;
   bool data_driven = false;   ///< thresholds where two crisp models of the box's rows leave least, not in its middle
   bool stop_by_aicc = false;  ///< keep the number of leaves with the smallest corrected Akaike criterion

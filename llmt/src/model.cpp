@@ -78,16 +78,17 @@ void check_node(const Partition& partition, std::ptrdiff_t index, const std::vec
 void check_partition(const Partition& partition, const std::vector<InputColumn>& inputs, std::ptrdiff_t regressors,
                      const std::string& where) {
   const Validity& validity = partition.validity;
-  if (!(validity.width >= 0.0 && std::isfinite(validity.width)) || (validity.smoothness != 1 && validity.smoothness != 2)) {
+  if (!(validity.width >= 0.0 && std::isfinite(validity.width)) ||
+      (validity.smoothness != 1 && validity.smoothness != 2)) {
     reject(fmt::format("{}: the width {} must be finite and not negative, the smoothness {} 1 or 2", where,
                        validity.width, validity.smoothness));
   }
   if (partition.outputs.empty() || partition.nodes.empty() || partition.nodes.size() % 2 == 0) {
     reject(fmt::format("{}: it needs an output and an odd number of nodes", where));
   }
-  if (partition.outer_slope.size() > 0 && (partition.outer_slope.rows() != std::ssize(partition.outputs) ||
-                                           partition.outer_slope.cols() != regressors ||
-                                           !partition.outer_slope.allFinite())) {
+  if (partition.outer_slope.size() > 0 &&
+      (partition.outer_slope.rows() != std::ssize(partition.outputs) || partition.outer_slope.cols() != regressors ||
+       !partition.outer_slope.allFinite())) {
     reject(fmt::format("{}: outer_slope must be finite, {} x {}", where, partition.outputs.size(), regressors));
   }
   if (partition.residual_range.size() > 0 &&
@@ -297,8 +298,8 @@ Eigen::MatrixXi Model::leaf_of(const Eigen::Ref<const Eigen::MatrixXd>& inputs) 
     const std::vector<int> position = leaf_positions(partitions_[static_cast<std::size_t>(p)], leaves(p));
     for (std::ptrdiff_t row = 0; row < rows.rows(); ++row) {
       (*evaluators_)[static_cast<std::size_t>(p)].activate(rows.row(row).data(), active);
-      const auto largest = std::max_element(
-          active.begin(), active.end(), [](const auto& a, const auto& b) { return a.validity < b.validity; });
+      const auto largest = std::max_element(active.begin(), active.end(),
+                                            [](const auto& a, const auto& b) { return a.validity < b.validity; });
       result(row, p) = position[static_cast<std::size_t>(largest->node)];
     }
   }
@@ -373,8 +374,7 @@ Eigen::MatrixXd Model::standard_errors(const Eigen::Ref<const Eigen::MatrixXd>& 
           a(0) = 1.0;
           a.tail(regressors) = deviations.array().isNaN().select(leaf.mean, deviations);
           const double freedom = std::max(0.0, static_cast<double>(leaf.samples - leaf.rank)) + pooled_rows;
-          variance +=
-              entry.validity * a.dot(leaf.inverse_gram * a) * (leaf.rss + pooled_rows * overall) / freedom;
+          variance += entry.validity * a.dot(leaf.inverse_gram * a) * (leaf.rss + pooled_rows * overall) / freedom;
         }
       }
       for (std::size_t o = 0; o < partition.outputs.size(); ++o) {
@@ -439,8 +439,7 @@ Model Model::named(const std::vector<std::string>& inputs, const std::vector<std
   for (std::size_t i = 0; i < levels.size(); ++i) {
     if (i >= inputs.size() || levels[i].size() != inputs_[i].levels.size()) {
       throw std::invalid_argument(fmt::format("llmt::Model::named: {} level names for input {}, which has {} levels",
-                                              levels[i].size(), i,
-                                              i < inputs_.size() ? inputs_[i].levels.size() : 0));
+                                              levels[i].size(), i, i < inputs_.size() ? inputs_[i].levels.size() : 0));
     }
     result.inputs_[i].levels = levels[i];
   }

@@ -235,14 +235,16 @@ std::string to_json(const Model& model) {
     for (const Node& node : partition.nodes) {
       nodes.push_back(node_to_json(node, model));
     }
-    json["partitions"].push_back({{"outputs", partition.outputs},
-                                  {"validity",
-                                   {{"kind", validity_names[static_cast<std::size_t>(partition.validity.kind)]},
-                                    {"width", partition.validity.width},
-                                    {"smoothness", partition.validity.smoothness}}},
-                                  {"outer_slope", rows_to_json(partition.outer_slope.size() > 0 ? partition.outer_slope : partition.nodes.front().slope)},
-                                  {"residual_range", rows_to_json(partition.residual_range)},
-                                  {"nodes", std::move(nodes)}});
+    json["partitions"].push_back(
+        {{"outputs", partition.outputs},
+         {"validity",
+          {{"kind", validity_names[static_cast<std::size_t>(partition.validity.kind)]},
+           {"width", partition.validity.width},
+           {"smoothness", partition.validity.smoothness}}},
+         {"outer_slope",
+          rows_to_json(partition.outer_slope.size() > 0 ? partition.outer_slope : partition.nodes.front().slope)},
+         {"residual_range", rows_to_json(partition.residual_range)},
+         {"nodes", std::move(nodes)}});
   }
   try {
     return json.dump(1) + "\n";
@@ -268,12 +270,12 @@ Model from_json(const std::string& text, const std::string& name) {
   }
   std::vector<InputColumn> inputs;
   for (const Reader& input : root.member("inputs").elements()) {
-    inputs.push_back({.name = input.member("name").as<std::string>(),
-                      .low = input.member("low").as<double>(),
-                      .high = input.member("high").as<double>(),
-                      .centre = input.member("centre").as<double>(),
-                      .levels = input.has("levels") ? input.member("levels").list<std::string>()
-                                                    : std::vector<std::string>{}});
+    inputs.push_back(
+        {.name = input.member("name").as<std::string>(),
+         .low = input.member("low").as<double>(),
+         .high = input.member("high").as<double>(),
+         .centre = input.member("centre").as<double>(),
+         .levels = input.has("levels") ? input.member("levels").list<std::string>() : std::vector<std::string>{}});
   }
   std::vector<OutputColumn> outputs;
   for (const Reader& output : root.member("outputs").elements()) {
@@ -294,8 +296,8 @@ Model from_json(const std::string& text, const std::string& name) {
                         .nodes = {},
                         .outer_slope = {},
                         .residual_range = {}};
-    partition.outer_slope = rows_from_json(entry.member("outer_slope"), std::ssize(partition.outputs),
-                                           std::ssize(regressors));
+    partition.outer_slope =
+        rows_from_json(entry.member("outer_slope"), std::ssize(partition.outputs), std::ssize(regressors));
     if (const Reader range = entry.member("residual_range"); !range.elements().empty()) {
       partition.residual_range = rows_from_json(range, std::ssize(partition.outputs), 2);
     }

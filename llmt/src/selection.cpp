@@ -149,8 +149,8 @@ Eigen::MatrixXd agreed_slope(const Partition& grown) {
   Eigen::MatrixXd spread = Eigen::MatrixXd::Zero(root.slope.rows(), root.slope.cols());
   for (const Node& node : first.nodes) {
     if (node.is_leaf()) {
-      spread += static_cast<double>(node.samples) / static_cast<double>(root.samples) *
-                (node.slope - root.slope).cwiseAbs2();
+      spread +=
+          static_cast<double>(node.samples) / static_cast<double>(root.samples) * (node.slope - root.slope).cwiseAbs2();
     }
   }
   Eigen::MatrixXd slope = root.slope;
@@ -174,8 +174,7 @@ Eigen::VectorXd prefix_squared_errors(const Partition& partition, const Training
     for (int index = 0; index >= 0;) {
       evaluator.local(index, rows.deviations.row(row).data(), values.data());
       evaluator.finish(rows.deviations.row(row).data(), values.data());
-      const double squared =
-          rows.weights(row) * weights.dot((outputs.row(row).transpose() - values).cwiseAbs2());
+      const double squared = rows.weights(row) * weights.dot((outputs.row(row).transpose() - values).cwiseAbs2());
       // Nodes 2k-1 and 2k come with the k-th split, that is with k + 1 leaves.
       change((index + 1) / 2) += squared - previous;
       previous = squared;
@@ -315,8 +314,7 @@ Selection select(const std::vector<FoldTree>& folds, const Candidates& candidate
     screened[static_cast<std::size_t>(task)] = evaluate(
         folds[fold], candidates, width, counts, weights, true,
         [&](const Key& key) {
-          return key.shrinkage == usual &&
-                 (counts[key.leaves] * coefficients <= cheap_unknowns || key.ridge == middle);
+          return key.shrinkage == usual && (counts[key.leaves] * coefficients <= cheap_unknowns || key.ridge == middle);
         },
         max_threads);
   });
@@ -415,8 +413,9 @@ Selection select(const std::vector<FoldTree>& folds, const Candidates& candidate
       errors = screened[slot];
       errors.insert(refined[slot].begin(), refined[slot].end());
     } else {
-      errors = evaluate(folds[fold], candidates, best.width, counts, weights, false,
-                        [&](const Key& key) { return kept.contains(key); }, max_threads);
+      errors = evaluate(
+          folds[fold], candidates, best.width, counts, weights, false,
+          [&](const Key& key) { return kept.contains(key); }, max_threads);
     }
   });
   for (std::size_t k = 0; k < best_of_width.size(); ++k) {
@@ -429,12 +428,11 @@ Selection select(const std::vector<FoldTree>& folds, const Candidates& candidate
       if (!kept.contains(key)) {
         continue;
       }
-      const Candidate candidate{
-          .validity = {candidates.kind, candidates.widths[key.width], candidates.smoothness},
-          .estimation = candidates.estimation,
-          .ridge = ridge_at(candidates, key.ridge),
-          .shrinkage = candidates.shrinkages[key.shrinkage],
-          .leaves = counts[key.leaves]};
+      const Candidate candidate{.validity = {candidates.kind, candidates.widths[key.width], candidates.smoothness},
+                                .estimation = candidates.estimation,
+                                .ridge = ridge_at(candidates, key.ridge),
+                                .shrinkage = candidates.shrinkages[key.shrinkage],
+                                .leaves = counts[key.leaves]};
       const CandidateError error = described(candidate, errors);
       if (!best || error.rmse < best->rmse) {
         best = error;

@@ -18,8 +18,8 @@ struct SplitCandidate {
   double rss = 0.0;         ///< weighted residual sum of squares of the two child models
   int rank_left = 0;        ///< ranks of the two children's least-squares problems
   int rank_right = 0;
-  std::ptrdiff_t tested = 0;  ///< number of admissible splits that were compared
-  bool by_missing = false;    ///< rows with a value go left, rows without one right
+  std::ptrdiff_t tested = 0;    ///< number of admissible splits that were compared
+  bool by_missing = false;      ///< rows with a value go left, rows without one right
   std::vector<int> level_side;  ///< categorical input: -1 left, 1 right, 0 not seen, one per level
 };
 
@@ -40,8 +40,9 @@ SearchNode make_search_node(const NodeFit& fit, const Eigen::VectorXd& weights);
 ///
 /// Compares every split between two distinct values that leaves `min_leaf_samples` rows on either side. The sums of
 /// each side are only ever added to, from the left and from the right, never subtracted from: no digits are lost at the
-/// ends. Rows without a value take part in neither side; the gain of the others is what counts. Of splits that agree within `tie_tolerance` times node.rss, the one with the smallest threshold is taken.
-/// `input` stays -1 if nothing is admissible.
+/// ends. Rows without a value take part in neither side; the gain of the others is what counts. Of splits that agree
+/// within `tie_tolerance` times node.rss, the one with the smallest threshold is taken. `input` stays -1 if nothing is
+/// admissible.
 SplitCandidate search_input(const SearchNode& node, std::span<const double> values, std::span<const int> order,
                             std::ptrdiff_t min_leaf_samples);
 

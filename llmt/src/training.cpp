@@ -94,8 +94,8 @@ TrainingRows training_rows(const Table& table, const std::vector<std::ptrdiff_t>
   TrainingRows training = take(table, rows);
   training.weights *= static_cast<double>(training.weights.size()) / training.weights.sum();
   for (std::ptrdiff_t j = 0; j < training.inputs.cols(); ++j) {
-    training.columns.push_back(describe_input(training.inputs.col(j), training.weights, j,
-                                              table.num_levels[static_cast<std::size_t>(j)]));
+    training.columns.push_back(
+        describe_input(training.inputs.col(j), training.weights, j, table.num_levels[static_cast<std::size_t>(j)]));
   }
   for (std::ptrdiff_t o = 0; o < training.outputs.cols(); ++o) {
     training.output_columns.push_back({.name = training.outputs.cols() == 1 ? "y" : fmt::format("y{}", o + 1),

@@ -23,7 +23,7 @@ struct TrainingRows {
   Eigen::VectorXd weights;  ///< positive, with mean 1
 
   std::ptrdiff_t count() const { return inputs.rows(); }
-  Eigen::VectorXd low() const;   ///< extent of the inputs
+  Eigen::VectorXd low() const;  ///< extent of the inputs
   Eigen::VectorXd high() const;
 };
 
@@ -31,10 +31,10 @@ struct TrainingRows {
 struct Table {
   Eigen::MatrixXd inputs;
   Eigen::MatrixXd outputs;
-  Eigen::VectorXd weights;               ///< positive
-  std::vector<int> num_levels;           ///< of each input; 0: a number
-  std::vector<int> regression_inputs;    ///< ascending
-  std::vector<int> split_inputs;         ///< ascending
+  Eigen::VectorXd weights;             ///< positive
+  std::vector<int> num_levels;         ///< of each input; 0: a number
+  std::vector<int> regression_inputs;  ///< ascending
+  std::vector<int> split_inputs;       ///< ascending
 };
 
 /// The given rows, columns described from them.

@@ -140,8 +140,8 @@ struct FitOptions {
   /// local models.
   std::vector<int> categorical_inputs = {};
   Eigen::VectorXd weights = {};  ///< of the rows, not negative; a row of weight 0 takes no part. Empty: all alike.
-  bool intervals = true;  ///< keep the folds' models and residuals for prediction intervals
-  int max_threads = 0;    ///< 0: all that the machine has. The result does not depend on it.
+  bool intervals = true;         ///< keep the folds' models and residuals for prediction intervals
+  int max_threads = 0;           ///< 0: all that the machine has. The result does not depend on it.
   /// Called after each growth (a tree of a fold, or a final one) with how many of how many are done; one call at a
   /// time, from any thread.
   std::function<void(std::ptrdiff_t done, std::ptrdiff_t total)> progress = {};

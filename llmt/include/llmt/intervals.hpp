@@ -17,9 +17,10 @@ struct Bounds {
   Eigen::MatrixXd upper;
 };
 
-/// CV+ prediction intervals (Barber, Candes, Ramdas & Tibshirani 2021): with R_i the absolute residual of row i under the
-/// model f_k(i) that was fitted without the row's fold, and n rows,
-///   lower = floor(a (n + 1))-th smallest of f_k(i)(x) - R_i,   upper = ceil((1 - a) (n + 1))-th smallest of f_k(i)(x) + R_i.
+/// CV+ prediction intervals (Barber, Candes, Ramdas & Tibshirani 2021): with R_i the absolute residual of row i under
+/// the model f_k(i) that was fitted without the row's fold, and n rows,
+///   lower = floor(a (n + 1))-th smallest of f_k(i)(x) - R_i,   upper = ceil((1 - a) (n + 1))-th smallest of f_k(i)(x)
+///   + R_i.
 /// The guarantee is a coverage of 1 - 2 a for exchangeable rows; in practice it is near 1 - a, the level that is asked
 /// for. With a single fold this is split conformal prediction, whose guarantee is 1 - a. Weights of rows are not used.
 ///

@@ -36,9 +36,9 @@ struct Validity {
 
 /// One node of a partition's tree, inner or leaf. Inner nodes keep a local model of their own.
 struct Node {
-  int left = -1;           ///< child for x[split_input] <= threshold; -1 in a leaf
-  int right = -1;          ///< child for x[split_input] > threshold; -1 in a leaf
-  int split_input = -1;    ///< column of the input that is compared; -1 in a leaf
+  int left = -1;         ///< child for x[split_input] <= threshold; -1 in a leaf
+  int right = -1;        ///< child for x[split_input] > threshold; -1 in a leaf
+  int split_input = -1;  ///< column of the input that is compared; -1 in a leaf
   /// In the unit of that input. The largest double: rows that have a value go left, rows without one right.
   double threshold = 0.0;
   /// Split on a categorical input: for each of its levels -1 left, 1 right, 0 not seen here. Empty for numbers.
@@ -47,10 +47,10 @@ struct Node {
   double missing_left = 0.5;  ///< validity of the left child where the split input is missing or its level was not seen
 
   std::ptrdiff_t samples = 0;  ///< training rows in the node's box
-  int rank = 0;         ///< of [1, regressors] over those rows: the coefficients that the rows could determine
-  Eigen::VectorXd rss;  ///< weighted residual sum of squares over those rows, one per output of the partition
-  Eigen::VectorXd value;  ///< local model at the centre of the regressors, one per output of the partition
-  Eigen::MatrixXd slope;  ///< d output / d regressor, outputs of the partition x regressors
+  int rank = 0;                ///< of [1, regressors] over those rows: the coefficients that the rows could determine
+  Eigen::VectorXd rss;         ///< weighted residual sum of squares over those rows, one per output of the partition
+  Eigen::VectorXd value;       ///< local model at the centre of the regressors, one per output of the partition
+  Eigen::MatrixXd slope;       ///< d output / d regressor, outputs of the partition x regressors
   /// Of each regressor, as a deviation from its centre: the mean over the node's rows, which stands in for a missing
   /// value, and the range over the rows that its validity reaches, beyond which the ancestors' slopes take over.
   Eigen::VectorXd mean;
@@ -112,10 +112,11 @@ struct Leaf {
   int rank = 0;                ///< as Node::rank
   Eigen::VectorXd low;         ///< box, one per model input: low < x <= high; -infinity where open
   Eigen::VectorXd high;        ///< +infinity where open
-  std::vector<std::vector<int>> levels;  ///< one per model input: levels that belong to the leaf; empty: all, or numeric
-  Eigen::VectorXd rmse;                  ///< sqrt(rss / samples) over the training rows, one per output of the partition
-  Eigen::VectorXd intercept;             ///< local model where all regressors are 0, one per output of the partition
-  Eigen::MatrixXd slope;                 ///< outputs of the partition x regressors
+  std::vector<std::vector<int>>
+      levels;                 ///< one per model input: levels that belong to the leaf; empty: all, or numeric
+  Eigen::VectorXd rmse;       ///< sqrt(rss / samples) over the training rows, one per output of the partition
+  Eigen::VectorXd intercept;  ///< local model where all regressors are 0, one per output of the partition
+  Eigen::MatrixXd slope;      ///< outputs of the partition x regressors
 };
 
 /// How far a query lies from what the model has seen.
@@ -144,8 +145,9 @@ class Evaluator;
 ///   f_i(x) = value_i + slope_i . c_i + sum over ancestors a of slope_a . (c_a - c_below a)
 /// with c the deviations held to the node's range. What the prediction adds to the root's model is then held to the
 /// range of the root's residuals in training, widened by a tenth of it on both sides, and at last, beyond the training
-/// extent, outer_slope . (d - c_root) is added: the root's slopes as far as the first leaves agree on them. Every hold is
-/// rounded off over a tenth of its range, so that derivatives stay continuous. Affine data are reproduced everywhere.
+/// extent, outer_slope . (d - c_root) is added: the root's slopes as far as the first leaves agree on them. Every hold
+/// is rounded off over a tenth of its range, so that derivatives stay continuous. Affine data are reproduced
+/// everywhere.
 ///
 /// A missing value (NaN) takes the share that was learned at each split on its input, and in a local model the mean of
 /// the leaf's rows.
@@ -185,8 +187,8 @@ class Model {
 
   /// Standard errors of the local models' means, rows x outputs: the square root of the validity-weighted mean of
   /// s_i^2 a' (sum validity a a')^-1 a, s_i^2 = (rss_i + 10 s^2) / (samples_i - rank_i + 10) drawn towards the residual
-  /// variance s^2 of all rows. They take the tree as given and the noise as equal within a leaf, say nothing of bias and
-  /// are too small; for intervals that hold what they promise see Intervals. Throws as predict().
+  /// variance s^2 of all rows. They take the tree as given and the noise as equal within a leaf, say nothing of bias
+  /// and are too small; for intervals that hold what they promise see Intervals. Throws as predict().
   Eigen::MatrixXd standard_errors(const Eigen::Ref<const Eigen::MatrixXd>& inputs) const;
 
   /// The leaves of a partition from left to right in the tree. Throws std::invalid_argument if there is no such
