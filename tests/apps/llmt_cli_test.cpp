@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "apps/program.hpp"
@@ -28,6 +29,32 @@ std::string table() {
   return text;
 }
 
+/// `rows` rows: y = |a| + b / 2 + normal noise of 0.05.
+std::string kinked(int rows, int seed) {
+  llmt::Random random(seed);
+  std::string text = "a,b,y\n";
+  for (int i = 0; i < rows; ++i) {
+    const double a = random.uniform(-1.0, 1.0);
+    const double b = random.uniform(-1.0, 1.0);
+    text += fmt::format("{},{},{}\n", a, b, std::abs(a) + 0.5 * b + 0.05 * random.normal());
+  }
+  return text;
+}
+
+/// 240 rows: y = x, but 3 - x for blue; every 20th colour and every 12th x is missing.
+std::string coloured() {
+  llmt::Random random(3);
+  const std::vector<std::string> colours = {"red", "green", "blue"};
+  std::string text = "colour,x,y\n";
+  for (int i = 0; i < 240; ++i) {
+    const std::string& colour = colours[static_cast<std::size_t>(i % 3)];
+    const double x = random.uniform(-1.0, 1.0);
+    const double y = (colour == "blue" ? 3.0 - x : x) + 0.05 * random.normal();
+    text += fmt::format("{},{},{}\n", i % 20 == 7 ? "" : colour, i % 12 == 5 ? "NA" : fmt::format("{}", x), y);
+  }
+  return text;
+}
+
 TEST(LlmtProgram, FitPredictInspectAgreeWithTheLibrary) {
   const Folder folder;
   const llmt::Csv csv = llmt::Csv::read(folder.write("d.csv", table()));
@@ -39,6 +66,20 @@ TEST(LlmtProgram, FitPredictInspectAgreeWithTheLibrary) {
   EXPECT_LT(summary["partitions"][0]["cv_rmse"], 0.02);
   EXPECT_GT(summary["partitions"][0]["cv_rmse_least_squares"], 0.2);
   EXPECT_EQ(summary["partitions"][1]["leaves"], 1);
+  EXPECT_EQ(summary["missing_values"], 0);
+  EXPECT_EQ(summary["inputs"], (std::vector<std::string>{"a", "b"}));
+  EXPECT_EQ(summary["model"], "m.json");
+  for (const json& partition : summary["partitions"]) {
+    EXPECT_EQ(partition["cv_folds"], 5);
+    EXPECT_EQ(partition["chosen"]["leaves"], partition["leaves"]);
+    EXPECT_EQ(partition["chosen"]["cv_rmse"], partition["cv_rmse"]);
+    EXPECT_EQ(partition["compared"][0]["leaves"], 1);
+    EXPECT_EQ(partition["compared"][0]["cv_rmse"], partition["cv_rmse_least_squares"]);
+    EXPECT_NEAR(partition["crisp_cv_rmse_by_leaves"][0], partition["cv_rmse_least_squares"], 1e-12);
+    for (const json& other : partition["compared"]) {
+      EXPECT_GE(other["cv_rmse"], partition["cv_rmse"]);
+    }
+  }
 
   const Eigen::MatrixXd inputs = csv.numbers(std::vector<std::string>{"a", "b"});
   const Eigen::MatrixXd expected =
@@ -46,10 +87,12 @@ TEST(LlmtProgram, FitPredictInspectAgreeWithTheLibrary) {
   const Outcome predicted = folder.run(llmt_program + " predict m.json d.csv -o p.csv");
   ASSERT_EQ(predicted.exit_code, 0) << predicted.err;
   const llmt::Csv result = llmt::Csv::read(folder.file("p.csv"));
-  EXPECT_EQ(result.columns(),
-            (std::vector<std::string>{"label", "a", "b", "y", "z", "y_pred", "z_pred", "outside", "outside_by"}));
+  EXPECT_EQ(result.columns(), (std::vector<std::string>{"label", "a", "b", "y", "z", "y_pred", "z_pred", "outside",
+                                                        "outside_by", "leverage"}));
   EXPECT_EQ(result.numbers(std::vector<std::string>{"y_pred", "z_pred"}), expected);
   EXPECT_EQ(result.numbers("outside").sum(), 0.0);
+  EXPECT_GT(result.numbers("leverage").minCoeff(), 0.0);
+  EXPECT_LT(result.numbers("leverage").maxCoeff(), 1.0);
   EXPECT_TRUE(result.row_text(7).starts_with("row 7,"));
 
   const Outcome inspected = folder.run(llmt_program + " inspect m.json --json");
@@ -64,7 +107,12 @@ TEST(LlmtProgram, QueriesOutsideTheTrainingExtentAreFlagged) {
   folder.write("q.csv", "other,x\nfar,6\nin,2\n");
   ASSERT_EQ(folder.run(llmt_program + " fit d.csv -t y -o m.json").exit_code, 0);
   const Outcome predicted = folder.run(llmt_program + " predict m.json q.csv");
-  EXPECT_EQ(predicted.out, "other,x,y_pred,outside,outside_by\nfar,6,6,1,0.5\nin,2,2,0,0\n");
+  const llmt::Csv result = llmt::Csv::parse(predicted.out, "out");
+  EXPECT_EQ(result.columns(), (std::vector<std::string>{"other", "x", "y_pred", "outside", "outside_by", "leverage"}));
+  EXPECT_TRUE(result.row_text(0).starts_with("far,6,6,1,0.5,"));
+  EXPECT_TRUE(result.row_text(1).starts_with("in,2,2,0,0,"));
+  EXPECT_NEAR(result.numbers("leverage")(0), 1.0 / 5.0 + 16.0 / 10.0, 1e-6);  // one leaf: 1/n + (x - mean)^2 / sum
+  EXPECT_NEAR(result.numbers("leverage")(1), 1.0 / 5.0, 1e-6);
   EXPECT_NE(predicted.err.find("1 rows lie outside"), std::string::npos);
 }
 
@@ -73,6 +121,8 @@ TEST(LlmtProgram, MistakesHaveTheirExitCodeAndMessage) {
   folder.write("d.csv", table());
   folder.write("h.csv", "a,y\n");
   folder.write("cut.csv", "a,y\n1,2\n3");
+  folder.write("word.csv", "a,b,y\n1,2,3\n4,x,6\n7,8,9\n");
+  folder.write("gap.csv", "a,y\n1,2\n3,\n");
   const auto expect = [&](const std::string& arguments, int code, const std::string& message) {
     const Outcome outcome = folder.run(llmt_program + " " + arguments);
     EXPECT_EQ(outcome.exit_code, code) << arguments;
@@ -83,15 +133,151 @@ TEST(LlmtProgram, MistakesHaveTheirExitCodeAndMessage) {
   expect("fit d.csv", 2, "--target is required");
   expect("fit d.csv -t y --rule m5", 2, "m5");
   expect("fit d.csv -t y --ignore label --cv 1", 2, "folds.count is 1");
-  expect("fit d.csv -t y", 1,
-         "d.csv:2: column \"label\": 'row 0' is not a number (--ignore COLUMN leaves a column out)");
+  expect("fit d.csv -t y --ignore label --width -1", 2, "blend.widths is -1, it must be finite and positive");
+  expect("fit d.csv -t y --ignore label --categorical nope", 1, "\"nope\" is categorical, but not an input");
+  expect("fit d.csv -t y --ignore label --split-inputs nope", 2, "\"nope\", which is not among the inputs a, b, z");
+  expect("fit word.csv -t y", 1, "word.csv:3: column \"b\": 'x' is not a number (--ignore COLUMN leaves a column out)");
+  expect("fit gap.csv -t y", 1, "gap.csv:3: column \"y\": the cell is empty, a number is needed");
   expect("fit d.csv -t w", 1, "there is no column \"w\"; the columns are label, a, b, y, z");
   expect("fit h.csv -t y", 1, "h.csv: there is a header and no rows");
   expect("fit cut.csv -t y", 1, "cut.csv:3: the row has 1 field, the header has 2 (is the file cut off?)");
   expect("fit missing.csv -t y", 1, "missing.csv: cannot be read: No such file or directory");
   expect("fit d.csv -t y --ignore label -o no/m.json", 1, "no/m.json: cannot be written");
   expect("predict d.csv d.csv", 1, "d.csv: not JSON");
+  expect("compare d.csv -t y -t z --ignore label", 2, "compare takes one --target");
   EXPECT_EQ(folder.run(llmt_program + " fit --help").exit_code, 0);
+}
+
+TEST(LlmtProgram, WordsAreCategoriesAndCellsMayBeMissing) {
+  const Folder folder;
+  folder.write("d.csv", coloured());
+  folder.write("q.csv", "colour,x\nred,0.5\nviolet,0.5\n,0.5\nblue,\nblue,0.5\n");
+  const Outcome fitted = folder.run(llmt_program + " fit d.csv -t y --validity crisp --cv 3 -o m.json --json");
+  ASSERT_EQ(fitted.exit_code, 0) << fitted.err;
+  const json summary = json::parse(fitted.out);
+  EXPECT_EQ(summary["missing_values"], 12 + 20);
+  // What is missing leaves an error of 0.36 whatever the model.
+  EXPECT_LT(summary["partitions"][0]["cv_rmse"], 0.8 * summary["partitions"][0]["cv_rmse_least_squares"].get<double>());
+
+  const Outcome predicted = folder.run(llmt_program + " predict m.json q.csv --json");
+  ASSERT_EQ(predicted.exit_code, 0) << predicted.err;
+  const json values = json::parse(predicted.out);
+  EXPECT_EQ(values["missing_values"], 2);
+  EXPECT_EQ(values["unknown_categories"], 1);
+  const std::vector<double> y = values["targets"][0]["predicted"];
+  EXPECT_NEAR(y[0], 0.5, 0.15);
+  EXPECT_EQ(y[1], y[2]);  // a category that was not there is a missing one
+  EXPECT_NEAR(y[4], 2.5, 0.15);
+  EXPECT_NE(folder.run(llmt_program + " predict m.json q.csv")
+                .err.find("1 values of categories that were not in training, taken as missing"),
+            std::string::npos);
+
+  const Outcome inspected = folder.run(llmt_program + " inspect m.json");
+  ASSERT_EQ(inspected.exit_code, 0) << inspected.err;
+  EXPECT_NE(inspected.out.find("3 categories: blue, green, red"), std::string::npos);
+  EXPECT_NE(inspected.out.find("colour in {blue}"), std::string::npos) << inspected.out;
+  EXPECT_NE(inspected.out.find("colour in {green, red}"), std::string::npos) << inspected.out;
+  const json leaves = json::parse(folder.run(llmt_program + " inspect m.json --json").out);
+  EXPECT_EQ(leaves["inputs"][0]["levels"], (std::vector<std::string>{"blue", "green", "red"}));
+  EXPECT_EQ(leaves["regressors"].back(), "x");
+}
+
+TEST(LlmtProgram, ExplanationsAddUp) {
+  const Folder folder;
+  folder.write("d.csv", coloured());
+  ASSERT_EQ(folder.run(llmt_program + " fit d.csv -t y --cv 3 -o m.json").exit_code, 0);
+  const json predicted = json::parse(folder.run(llmt_program + " predict m.json d.csv --json").out);
+  for (const int row : {1, 6, 8}) {  // complete; without x; without a colour
+    const Outcome explained = folder.run(fmt::format("{} explain m.json d.csv --row {} --json", llmt_program, row));
+    ASSERT_EQ(explained.exit_code, 0) << explained.err;
+    const json target = json::parse(explained.out)["targets"][0];
+    EXPECT_EQ(target["name"], "y");
+    double sum = target["reference"];
+    for (const json& entry : target["contributions"]) {
+      sum += entry["contribution"].get<double>();
+      EXPECT_EQ(entry["value"].is_null(),
+                (row == 6 && entry["input"] == "x") || (row == 8 && entry["input"] == "colour"));
+    }
+    EXPECT_NEAR(sum, target["prediction"], 1e-12);
+    EXPECT_NEAR(target["prediction"], predicted["targets"][0]["predicted"][static_cast<std::size_t>(row - 1)], 1e-12);
+  }
+  EXPECT_NE(folder.run(llmt_program + " explain m.json d.csv --row 6").out.find("The contributions add up:"),
+            std::string::npos);
+  const json table = json::parse(folder.run(llmt_program + " explain m.json d.csv --json").out);
+  EXPECT_EQ(table["rows_used"], 240);
+  EXPECT_EQ(table["targets"][0]["importance"][0]["input"], "colour");
+  EXPECT_NEAR(table["targets"][0]["importance"][0]["importance"].get<double>() +
+                  table["targets"][0]["importance"][1]["importance"].get<double>(),
+              1.0, 1e-12);
+}
+
+TEST(LlmtProgram, IntervalsHoldTheirLevelOnFreshRows) {
+  const Folder folder;
+  folder.write("d.csv", kinked(200, 1));
+  folder.write("fresh.csv", kinked(1000, 2));
+  ASSERT_EQ(folder.run(llmt_program + " fit d.csv -t y --cv 3 -o m.json").exit_code, 0);
+  const Outcome predicted = folder.run(llmt_program + " predict m.json fresh.csv --interval 0.9 -o p.csv");
+  ASSERT_EQ(predicted.exit_code, 0) << predicted.err;
+  const llmt::Csv result = llmt::Csv::read(folder.file("p.csv"));
+  EXPECT_EQ(result.columns(), (std::vector<std::string>{"a", "b", "y", "y_pred", "y_low", "y_high", "outside",
+                                                        "outside_by", "leverage"}));
+  const Eigen::ArrayXd y = result.numbers("y");
+  const Eigen::ArrayXd low = result.numbers("y_low");
+  const Eigen::ArrayXd high = result.numbers("y_high");
+  const double inside = static_cast<double>((low <= y && y <= high).count()) / 1000.0;
+  EXPECT_GT(inside, 0.85);
+  EXPECT_LT(inside, 0.97);
+  EXPECT_LT((high - low).mean(), 0.25);  // 3.3 standard deviations of the noise are 0.16
+
+  const json values = json::parse(folder.run(llmt_program + " predict m.json fresh.csv --interval 0.9 --json").out);
+  EXPECT_EQ(values["targets"][0]["low"][0], low(0));
+  EXPECT_EQ(values["targets"][0]["high"][0], high(0));
+  const Outcome narrow = folder.run(llmt_program + " predict m.json fresh.csv --interval 0.999");
+  EXPECT_NE(narrow.exit_code, 0);
+  EXPECT_NE(narrow.err.find("level 0.999 needs at least 999 held-out rows, there are 200"), std::string::npos);
+}
+
+TEST(LlmtProgram, NoIntervalsWithoutHeldOutResiduals) {
+  const Folder folder;
+  folder.write("d.csv", kinked(100, 1));
+  for (const char* without : {"--cv 3 --no-intervals", "--cv 0"}) {
+    ASSERT_EQ(folder.run(fmt::format("{} fit d.csv -t y {} -o m.json", llmt_program, without)).exit_code, 0);
+    const Outcome predicted = folder.run(llmt_program + " predict m.json d.csv --interval 0.9");
+    EXPECT_EQ(predicted.exit_code, 1) << without;
+    EXPECT_EQ(predicted.out, "");
+    EXPECT_NE(predicted.err.find("m.json: the file has no held-out residuals"), std::string::npos) << predicted.err;
+    EXPECT_NE(predicted.err.find("fit without --no-intervals and with folds"), std::string::npos);
+  }
+}
+
+TEST(LlmtProgram, CompareListsTheMethodsAndRecommendsOne) {
+  const Folder folder;
+  folder.write("d.csv", kinked(200, 1));
+  const Outcome compared = folder.run(llmt_program + " compare d.csv -t y --cv 3 --json");
+  ASSERT_EQ(compared.exit_code, 0) << compared.err;
+  const json result = json::parse(compared.out);
+  EXPECT_EQ(result["rows"], 200);
+  EXPECT_EQ(result["folds"], 3);
+  std::vector<std::string> names;
+  std::map<std::string, double> errors;
+  for (const json& method : result["methods"]) {
+    names.push_back(method["method"]);
+    errors[names.back()] = method["cv_rmse"];
+    EXPECT_EQ(method["fold_rmse"].size(), 3U) << names.back();
+    EXPECT_GE(method["parameters"], 3 * method["leaves"].get<int>()) << names.back();
+    EXPECT_GE(method["largest_jump"], 0.0) << names.back();
+  }
+  EXPECT_EQ(names,
+            (std::vector<std::string>{"least squares", "crisp tree, RD", "crisp tree, RETIS", "Gaussians, as grown",
+                                      "Gaussians, re-estimated", "blend, joint", "LOLIMOT"}));
+  ASSERT_TRUE(errors.contains(result["recommended"])) << result["recommended"];
+  EXPECT_LT(errors[result["recommended"]], 0.5 * errors["least squares"]);
+  const std::string why = result["recommendation"];
+  EXPECT_TRUE(why.starts_with("Take " + result["recommended"].get<std::string>() + ":")) << why;
+
+  const Outcome text = folder.run(llmt_program + " compare d.csv -t y --cv 3");
+  ASSERT_EQ(text.exit_code, 0);
+  EXPECT_NE(text.out.find(why), std::string::npos);
 }
 
 TEST(LlmtProgram, AFailedWriteKeepsTheOldModel) {
