@@ -42,9 +42,11 @@ Errors measure(const std::string& folder, const std::string& name) {
     const llmt::FitResult result = llmt::fit(train_rows.leftCols(inputs), train_rows.rightCols(1));
     sum.seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     const double tree = llmt::rmse(result.model.predict(test_rows.leftCols(inputs)), test_rows.rightCols(1))(0);
-    // The tree with one leaf is least squares.
-    const double least_squares =
-        llmt::rmse(result.model.prefix(1).predict(test_rows.leftCols(inputs)), test_rows.rightCols(1))(0);
+    llmt::FitOptions one_leaf;
+    one_leaf.growth.max_leaves = 1;
+    one_leaf.selection.folds.count = 0;
+    const llmt::Model linear = llmt::fit(train_rows.leftCols(inputs), train_rows.rightCols(1), one_leaf).model;
+    const double least_squares = llmt::rmse(linear.predict(test_rows.leftCols(inputs)), test_rows.rightCols(1))(0);
     sum.tree += tree;
     sum.least_squares += least_squares;
     sum.worst_ratio = std::max(sum.worst_ratio, tree / least_squares);

@@ -44,6 +44,9 @@ void compare_command(CompareArguments arguments) {
   if (arguments.learning.targets.size() != 1) {
     throw std::invalid_argument("compare takes one --target");
   }
+  if (arguments.learning.options.selection.folds.count < 2) {
+    throw std::invalid_argument("compare needs --cv 2 or more");
+  }
   const LearningTable table = read_learning_table(arguments.learning);
   CompareOptions options;
   options.folds = arguments.learning.options.selection.folds;

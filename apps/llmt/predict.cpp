@@ -53,7 +53,7 @@ std::ptrdiff_t count_outside(const Predicted& predicted) {
 /// Local models that are carried beyond their rows although every input lies in its range.
 std::ptrdiff_t count_high_leverage(const Predicted& predicted) {
   return std::count_if(predicted.extrapolation.begin(), predicted.extrapolation.end(),
-                       [](const Extrapolation& row) { return row.distance == 0.0 && row.leverage >= 1.0; });
+                       [](const Extrapolation& row) { return row.distance == 0.0 && row.leverage > 1.0 + 1e-9; });
 }
 
 Predicted predict_table(const PredictArguments& arguments, const Model& model, const Csv& csv) {
@@ -72,7 +72,11 @@ Predicted predict_table(const PredictArguments& arguments, const Model& model, c
       throw std::runtime_error(fmt::format(
           "{}: the file has no held-out residuals; fit without --no-intervals and with folds", arguments.model));
     }
-    predicted.bounds = intervals.predict(inputs.values, arguments.interval, arguments.threads);
+    try {
+      predicted.bounds = intervals.predict(inputs.values, arguments.interval, arguments.threads);
+    } catch (const std::invalid_argument& error) {  // too few rows for the level: the model's fault, not the caller's
+      throw std::runtime_error(fmt::format("{}: {}", arguments.model, error.what()));
+    }
   }
   predicted.rmse = Eigen::VectorXd::Constant(model.num_outputs(), std::nan(""));
   for (std::size_t o = 0; o < predicted.targets.size(); ++o) {
@@ -182,7 +186,7 @@ void summarise(const PredictArguments& arguments, const Predicted& predicted) {
   }
   if (const std::ptrdiff_t rows = count_high_leverage(predicted); rows > 0) {
     text +=
-        fmt::format("; {} rows inside it combine inputs as no training row near them does (leverage 1 or more)", rows);
+        fmt::format("; {} rows inside it combine inputs as no training row near them does (leverage above 1)", rows);
   }
   if (predicted.missing > 0) {
     text += fmt::format("; {} missing values", predicted.missing);
@@ -228,7 +232,7 @@ void add_predict(CLI::App& app) {
   command
       ->add_option("--interval", arguments->interval,
                    "Level of prediction intervals, such as 0.9: adds TARGET_low and TARGET_high")
-      ->check(CLI::Range(0.0, 1.0));
+      ->check(CLI::Range(0.01, 0.9999));
   command->add_option("--threads", arguments->threads, "0: all; the result does not depend on it")
       ->capture_default_str();
   command->add_flag("--json", arguments->json, "Print JSON; it holds the predictions unless -o is given");

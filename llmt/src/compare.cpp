@@ -72,7 +72,7 @@ void recommend(const std::vector<Method>& methods, ComparisonResult& result) {
     return difference.mean <= difference.error;
   };
   for (const auto& simple : {is_readable, is_least_squares}) {
-    for (std::size_t m = 0; m < methods.size(); ++m) {
+    for (std::size_t m = 0; m < methods.size() && !is_least_squares(methods[best]); ++m) {
       if (m != best && simple(methods[m]) && ties(m)) {
         result.recommended = m;
       }
@@ -122,19 +122,20 @@ std::vector<Method> usual_methods(const FitOptions& base) {
   add("crisp tree, RD", [](FitOptions&) {});
   add("crisp tree, RETIS", [](FitOptions& options) { options.growth.rule = GrowthRule::retis; });
   // Gaussians overlap everywhere: their joint estimates cost the square of the number of leaves.
-  constexpr std::ptrdiff_t gaussian_leaves = 50;
-  add("Gaussians, as grown", [](FitOptions& options) {
+  const std::ptrdiff_t gaussian_leaves =
+      base.growth.max_leaves > 0 ? std::min<std::ptrdiff_t>(base.growth.max_leaves, 50) : 50;
+  add("Gaussians, as grown", [=](FitOptions& options) {
     options.blend.validity = ValidityChoice::gaussian;
     options.blend.estimation = Estimation::as_grown;
     options.growth.max_leaves = gaussian_leaves;
   });
-  add("Gaussians, re-estimated", [](FitOptions& options) {
+  add("Gaussians, re-estimated", [=](FitOptions& options) {
     options.blend.validity = ValidityChoice::gaussian;
     options.blend.widths = {1.0 / 3.0, 2.0 / 3.0};
     options.growth.max_leaves = gaussian_leaves;
   });
   add("blend, joint", [](FitOptions& options) { options.blend.validity = ValidityChoice::blend; });
-  add("LOLIMOT", [](FitOptions& options) {
+  add("LOLIMOT", [=](FitOptions& options) {
     options.growth.rule = GrowthRule::lolimot;
     options.blend.estimation = Estimation::as_grown;
     options.growth.max_leaves = gaussian_leaves;
@@ -217,18 +218,24 @@ ComparisonResult compare(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
   for (const Method& method : methods) {
     Comparison entry{.method = method.name, .fold_rmse = Eigen::VectorXd(std::ssize(folds))};
     double squares = 0.0;
+    double weight = 0.0;
     for (std::size_t f = 0; f < folds.size(); ++f) {
       const Fold& fold = folds[f];
       const FitResult fitted =
           fit(inputs(fold.train, Eigen::all), output(fold.train, Eigen::all), for_rows(method.options, fold.train));
       const Eigen::VectorXd error =
           fitted.model.predict(inputs(fold.held_out, Eigen::all)) - Eigen::MatrixXd(output(fold.held_out, Eigen::all));
-      squares += error.squaredNorm();
-      entry.fold_rmse(static_cast<std::ptrdiff_t>(f)) =
-          std::sqrt(error.squaredNorm() / static_cast<double>(error.size()));
+      Eigen::VectorXd weights = Eigen::VectorXd::Ones(error.size());
+      if (method.options.weights.size() > 0) {
+        weights = method.options.weights(fold.held_out);
+      }
+      const double of_fold = weights.dot(error.cwiseAbs2());
+      squares += of_fold;
+      weight += weights.sum();
+      entry.fold_rmse(static_cast<std::ptrdiff_t>(f)) = weights.sum() > 0.0 ? std::sqrt(of_fold / weights.sum()) : 0.0;
       report(method);
     }
-    entry.cv_rmse = std::sqrt(squares / static_cast<double>(inputs.rows()));
+    entry.cv_rmse = std::sqrt(squares / weight);
     const double mean = entry.fold_rmse.mean();
     entry.spread = entry.fold_rmse.size() > 1 ? std::sqrt((entry.fold_rmse.array() - mean).square().sum() /
                                                           static_cast<double>(entry.fold_rmse.size() - 1))

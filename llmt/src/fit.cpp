@@ -366,10 +366,10 @@ FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<
     const std::ptrdiff_t grown_leaves = grown.partition.num_leaves();
     if (trees.empty()) {
       candidate.leaves = grown_leaves;
+      candidate.shrinkage = plan.candidates.shrinkages.front();
       if (!plan.candidates.widths.empty()) {
         candidate.validity = {plan.candidates.kind, plan.candidates.widths.front(), plan.candidates.smoothness};
         candidate.estimation = plan.candidates.estimation;
-        candidate.shrinkage = plan.candidates.shrinkages.front();
         candidate.ridge = plan.candidates.ridges.empty() ? 0.0 : plan.candidates.ridges.front();
       }
     } else if (candidate.leaves < grown_leaves) {

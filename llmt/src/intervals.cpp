@@ -86,6 +86,9 @@ Bounds Intervals::predict(const Eigen::Ref<const Eigen::MatrixXd>& inputs, doubl
         std::nth_element(upper.begin(), upper.begin() + (rank - 1), upper.end(), std::greater<>());
         bounds.lower(row, o) = lower[static_cast<std::size_t>(rank - 1)];
         bounds.upper(row, o) = upper[static_cast<std::size_t>(rank - 1)];
+        if (bounds.lower(row, o) > bounds.upper(row, o)) {  // the folds' models disagree by more than their residuals
+          bounds.lower(row, o) = bounds.upper(row, o) = 0.5 * (bounds.lower(row, o) + bounds.upper(row, o));
+        }
       }
     }
   });

@@ -160,15 +160,16 @@ class Lolimot {
 
   /// AICc with the effective number of parameters of local estimation, sum of tr[(X'QX)^-1 X'Q^2 X].
   double criterion() const {
-    const double rows = problem_.weights.sum();
+    const double rows = problem_.weights.sum() * static_cast<double>(problem_.outputs.cols());
     const Eigen::VectorXd total = sum_of_mu();
     double effective = 0.0;
     for (const LocalModel& model : models_) {
       const Eigen::VectorXd validity = model.mu.cwiseQuotient(total);
       Eigen::MatrixXd a(deviations_.rows(), deviations_.cols() + 1);
       a << Eigen::VectorXd::Ones(deviations_.rows()), deviations_;
-      const Eigen::MatrixXd first = a.transpose() * validity.asDiagonal() * a;
-      const Eigen::MatrixXd second = a.transpose() * validity.cwiseAbs2().asDiagonal() * a;
+      const Eigen::VectorXd weights = problem_.weights.cwiseProduct(validity);
+      const Eigen::MatrixXd first = a.transpose() * weights.asDiagonal() * a;
+      const Eigen::MatrixXd second = a.transpose() * weights.cwiseProduct(validity).asDiagonal() * a;
       effective += first.completeOrthogonalDecomposition().solve(second).trace();
     }
     effective *= static_cast<double>(problem_.outputs.cols());
@@ -215,14 +216,15 @@ class Lolimot {
     return std::min(low + 0.5 * (high - low), std::nextafter(high, low));
   }
 
-  /// Rows whose values lie in the box.
+  /// Rows whose values lie in the box; rows without a value only in boxes that are not cut there.
   std::vector<int> rows_in(const LocalModel& model) const {
     std::vector<int> rows;
     for (std::ptrdiff_t i = 0; i < problem_.split_values.rows(); ++i) {
       bool inside = true;
       for (std::ptrdiff_t j = 0; j < problem_.split_values.cols() && inside; ++j) {
         const double x = problem_.split_values(i, j);
-        inside = std::isnan(x) || ((x > model.low(j) || model.low(j) == options_.low(j)) && x <= model.high(j));
+        inside = std::isnan(x) ? model.low(j) == options_.low(j) && model.high(j) == options_.high(j)
+                               : (x > model.low(j) || model.low(j) == options_.low(j)) && x <= model.high(j);
       }
       if (inside) {
         rows.push_back(static_cast<int>(i));

@@ -359,10 +359,14 @@ Eigen::MatrixXd Model::standard_errors(const Eigen::Ref<const Eigen::MatrixXd>& 
     const Partition& partition = partitions_[p];
     const Node& root = partition.nodes.front();
     double coefficients = 0.0;
+    Eigen::VectorXd rss = Eigen::VectorXd::Zero(root.rss.size());
     for (const Node& node : partition.nodes) {
-      coefficients += node.is_leaf() ? node.rank : 0;
+      if (node.is_leaf()) {
+        coefficients += node.rank;
+        rss += node.rss;
+      }
     }
-    const Eigen::VectorXd overall = root.rss / std::max(1.0, static_cast<double>(root.samples) - coefficients);
+    const Eigen::VectorXd overall = rss / std::max(1.0, static_cast<double>(root.samples) - coefficients);
     for (std::ptrdiff_t row = 0; row < rows.rows(); ++row) {
       const double* x = rows.row(row).data();
       deviations_at(inputs_, regressors_, x, deviations.data());
