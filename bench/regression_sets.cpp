@@ -2,7 +2,8 @@
 //
 // regression_sets FOLDER [NAME...]: for every NAME.csv in FOLDER with a NAME.splits.csv (the target is the last column
 // of NAME.csv; every column of NAME.splits.csv is a split, 1 = test, 0 = training), or for the names given. Prints mean
-// test RMSE over the splits.
+// test RMSE over the splits, and how many test rows lie in the intervals of nominal 90 %: CV+, and split conformal from
+// the first fold alone.
 #include <fmt/format.h>
 
 #include <chrono>
@@ -21,7 +22,23 @@ struct Errors {
   double worst_ratio = 0.0;  // tree / least squares over the splits
   double leaves = 0.0;
   double seconds = 0.0;
+  double coverage = 0.0;  // of CV+ intervals
+  double width = 0.0;
+  double split_coverage = 0.0;  // of split conformal intervals
+  double split_width = 0.0;
 };
+
+struct Held {
+  double share = 0.0;
+  double width = 0.0;
+};
+
+Held held(const llmt::Intervals& intervals, const Eigen::MatrixXd& inputs, const Eigen::MatrixXd& outputs) {
+  const llmt::Bounds bounds = intervals.predict(inputs, 0.9);
+  const auto inside = outputs.array() >= bounds.lower.array() && outputs.array() <= bounds.upper.array();
+  return {static_cast<double>(inside.count()) / static_cast<double>(outputs.rows()),
+          (bounds.upper - bounds.lower).mean()};
+}
 
 Errors measure(const std::string& folder, const std::string& name) {
   const llmt::Csv data = llmt::Csv::read(folder + "/" + name + ".csv");
@@ -47,14 +64,23 @@ Errors measure(const std::string& folder, const std::string& name) {
     one_leaf.selection.folds.count = 0;
     const llmt::Model linear = llmt::fit(train_rows.leftCols(inputs), train_rows.rightCols(1), one_leaf).model;
     const double least_squares = llmt::rmse(linear.predict(test_rows.leftCols(inputs)), test_rows.rightCols(1))(0);
+    const Held cv_plus = held(result.intervals, test_rows.leftCols(inputs), test_rows.rightCols(1));
+    const llmt::Intervals first_fold({result.intervals.models()[0]}, {result.intervals.residuals()[0]});
+    const Held split_conformal = held(first_fold, test_rows.leftCols(inputs), test_rows.rightCols(1));
+    const double part = 1.0 / static_cast<double>(is_test.cols());
+    sum.coverage += part * cv_plus.share;
+    sum.width += part * cv_plus.width;
+    sum.split_coverage += part * split_conformal.share;
+    sum.split_width += part * split_conformal.width;
     sum.tree += tree;
     sum.least_squares += least_squares;
     sum.worst_ratio = std::max(sum.worst_ratio, tree / least_squares);
     sum.leaves += static_cast<double>(result.summary.partitions[0].leaves);
   }
-  const double splits_count = static_cast<double>(is_test.cols());
-  return {sum.tree / splits_count, sum.least_squares / splits_count, sum.worst_ratio, sum.leaves / splits_count,
-          sum.seconds / splits_count};
+  for (double* value : {&sum.tree, &sum.least_squares, &sum.leaves, &sum.seconds}) {
+    *value /= static_cast<double>(is_test.cols());
+  }
+  return sum;
 }
 
 }  // namespace
@@ -74,12 +100,14 @@ int main(int argc, char** argv) {
         }
       }
     }
-    fmt::print("{:12} {:>14} {:>14} {:>18} {:>8} {:>10}\n", "data", "least squares", "llmt, defaults",
-               "worst split, ratio", "leaves", "s per fit");
+    fmt::print("{:12} {:>14} {:>14} {:>18} {:>8} {:>10} {:>10} {:>10} {:>12} {:>10}\n", "data", "least squares",
+               "llmt, defaults", "worst split, ratio", "leaves", "s per fit", "CV+ 90 %", "width", "split conf.",
+               "width");
     for (const std::string& name : names) {
       const Errors errors = measure(argv[1], name);
-      fmt::print("{:12} {:14.5g} {:14.5g} {:18.3f} {:8.1f} {:10.3f}\n", name, errors.least_squares, errors.tree,
-                 errors.worst_ratio, errors.leaves, errors.seconds);
+      fmt::print("{:12} {:14.5g} {:14.5g} {:18.3f} {:8.1f} {:10.3f} {:10.4f} {:10.4g} {:12.4f} {:10.4g}\n", name,
+                 errors.least_squares, errors.tree, errors.worst_ratio, errors.leaves, errors.seconds, errors.coverage,
+                 errors.width, errors.split_coverage, errors.split_width);
     }
   } catch (const std::exception& error) {
     fmt::print(stderr, "regression_sets: {}\n", error.what());

@@ -24,17 +24,22 @@ constexpr std::ptrdiff_t depth_block = 256;
 constexpr std::ptrdiff_t panel = 256;  // rows of a Cholesky factor
 constexpr std::ptrdiff_t narrow_panel = 32;
 
-/// `columns` columns of a row-wise matrix as strips of `width` columns, one strip after the other, row by row, filled
+/// `columns` columns of a row-wise matrix as strips of `Width` columns, one strip after the other, row by row, filled
 /// up with zeros: what a tile reads lies in a row.
-void pack(const double* from, std::ptrdiff_t stride, std::ptrdiff_t depth, std::ptrdiff_t columns, std::ptrdiff_t width,
+template <std::ptrdiff_t Width>
+void pack(const double* from, std::ptrdiff_t stride, std::ptrdiff_t depth, std::ptrdiff_t columns,
           std::vector<double>& to) {
-  const std::ptrdiff_t strips = (columns + width - 1) / width;
-  to.assign(static_cast<std::size_t>(strips * width * depth), 0.0);
+  const std::ptrdiff_t strips = (columns + Width - 1) / Width;
+  to.resize(static_cast<std::size_t>(strips * Width * depth));
   for (std::ptrdiff_t strip = 0; strip < strips; ++strip) {
-    const std::ptrdiff_t used = std::min(width, columns - strip * width);
-    double* out = to.data() + strip * width * depth;
-    for (std::ptrdiff_t k = 0; k < depth; ++k) {
-      std::copy_n(from + k * stride + strip * width, used, out + k * width);
+    const std::ptrdiff_t used = std::min(Width, columns - strip * Width);
+    const double* in = from + strip * Width;
+    double* out = to.data() + strip * Width * depth;
+    for (std::ptrdiff_t k = 0; k < depth; ++k, in += stride, out += Width) {
+      // Constant trip counts: a call for eight numbers would cost more than they do.
+      for (std::ptrdiff_t l = 0; l < Width; ++l) {
+        out[l] = l < used ? in[l] : 0.0;
+      }
     }
   }
 }
@@ -85,10 +90,10 @@ void add_transposed_product(std::ptrdiff_t rows, std::ptrdiff_t columns, std::pt
   std::vector<double> packed_b;
   for (std::ptrdiff_t k = 0; k < depth; k += depth_block) {
     const std::ptrdiff_t deep = std::min(depth_block, depth - k);
-    pack(b + k * b_stride, b_stride, deep, columns, lanes, packed_b);
+    pack<lanes>(b + k * b_stride, b_stride, deep, columns, packed_b);
     for (std::ptrdiff_t i = 0; i < rows; i += block) {
       const std::ptrdiff_t high = std::min(block, rows - i);
-      pack(a + k * a_stride + i, a_stride, deep, high, tile_rows, packed_a);
+      pack<tile_rows>(a + k * a_stride + i, a_stride, deep, high, packed_a);
       multiply_strips(high, columns, deep, sign, packed_a.data(), packed_b.data(), c + i * c_stride, c_stride);
     }
   }
