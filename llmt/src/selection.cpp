@@ -26,6 +26,9 @@ constexpr std::size_t candidates_on_all_folds = 3;
 /// Leaves of the tree that are asked whether they agree on a slope beyond the training extent.
 constexpr std::ptrdiff_t leaves_that_agree = 32;
 
+/// A tree has to be better than one leaf by more than this many standard errors of the gain.
+constexpr double standard_errors_of_a_gain = 2.0;
+
 /// Up to this many unknowns every ridge is tried with every leaf count; beyond, in screening, the middle one.
 constexpr std::ptrdiff_t cheap_unknowns = 300;
 
@@ -139,6 +142,21 @@ double sum(const std::vector<double>& values) {
     total += value;
   }
   return total;
+}
+
+/// Goes back to one leaf if the gain on it is within chance: not more than two standard errors of the paired
+/// differences of the folds. A single hold-out has no such measure.
+Selection prefer_least_squares(Selection selection, const Candidates& candidates) {
+  const Eigen::VectorXd gain = selection.best_of_kind.front().fold_rmse - selection.chosen.fold_rmse;
+  if (!candidates.crisp || gain.size() < 2) {
+    return selection;
+  }
+  const double folds = static_cast<double>(gain.size());
+  const double error = std::sqrt((gain.array() - gain.mean()).square().sum() / (folds - 1.0) / folds);
+  if (!(gain.mean() > standard_errors_of_a_gain * error)) {
+    selection.chosen = selection.best_of_kind.front();
+  }
+  return selection;
 }
 
 }  // namespace
@@ -264,6 +282,7 @@ Selection select(const std::vector<FoldTree>& folds, const Candidates& candidate
       result.spread += (value - mean) * (value - mean);
     }
     result.spread = rmse.size() > 1 ? std::sqrt(result.spread / static_cast<double>(rmse.size() - 1)) : 0.0;
+    result.fold_rmse = Eigen::Map<const Eigen::VectorXd>(rmse.data(), std::ssize(rmse));
     return result;
   };
   // A fold whose tree is smaller stays at its last one.
@@ -294,7 +313,7 @@ Selection select(const std::vector<FoldTree>& folds, const Candidates& candidate
     selection.chosen = best_crisp;
   }
   if (candidates.widths.empty() || largest < 2) {
-    return selection;
+    return prefer_least_squares(std::move(selection), candidates);
   }
 
   // Screening.
@@ -445,7 +464,7 @@ Selection select(const std::vector<FoldTree>& folds, const Candidates& candidate
       }
     }
   }
-  return selection;
+  return prefer_least_squares(std::move(selection), candidates);
 }
 
 }  // namespace llmt

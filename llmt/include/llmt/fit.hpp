@@ -124,7 +124,8 @@ struct BlendOptions {
 };
 
 /// How leaf count, validity, width and ridge are chosen: the tree is grown anew in every fold, and what predicts the
-/// held-out rows best is taken.
+/// held-out rows best is taken; but least squares stays if the gain on it is not more than two standard errors of the
+/// folds' paired differences, for the best of many candidates gains a little on noise too.
 struct SelectionOptions {
   FoldOptions folds = {};  ///< folds.count = 0: no choice, the tree stays as grown. Fewer groups than folds: one fold
                            ///< per group.
@@ -162,6 +163,7 @@ struct CandidateError {
   double rmse = 0.0;    ///< over all held-out rows, in the output's unit; for a shared partition of the errors divided
                         ///< by the outputs' standard deviations
   double spread = 0.0;  ///< standard deviation of the folds' RMSE; 0 for one fold
+  Eigen::VectorXd fold_rmse = {};  ///< one per fold
 };
 
 /// What happened to one partition.
