@@ -11,5 +11,6 @@ void add_predict(CLI::App& app);
 void add_inspect(CLI::App& app);
 void add_explain(CLI::App& app);
 void add_compare(CLI::App& app);
+void add_discover(CLI::App& app);
 
 }  // namespace llmt::apps

@@ -10,5 +10,6 @@ int main(int argc, char** argv) {
   llmt::apps::add_inspect(app);
   llmt::apps::add_explain(app);
   llmt::apps::add_compare(app);
+  llmt::apps::add_discover(app);
   return llmt::apps::run(app, argc, argv);
 }

@@ -9,5 +9,6 @@ namespace llmt::apps {
 void add_paper(CLI::App& app);
 void add_simulate(CLI::App& app);
 void add_calibrate(CLI::App& app);
+void add_discover(CLI::App& app);
 
 }  // namespace llmt::apps

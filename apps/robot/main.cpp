@@ -8,5 +8,6 @@ int main(int argc, char** argv) {
   llmt::apps::add_paper(app);
   llmt::apps::add_simulate(app);
   llmt::apps::add_calibrate(app);
+  llmt::apps::add_discover(app);
   return llmt::apps::run(app, argc, argv);
 }

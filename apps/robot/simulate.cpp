@@ -16,13 +16,17 @@ namespace {
 struct SimulateArguments {
   std::string robot;
   std::string output;
+  std::string poses_from;
   bool json = false;
   robotics::SimulationOptions options;
 };
 
 void simulate_command(const SimulateArguments& arguments) {
   const robotics::CorrectedRobot robot = robotics::read_corrected_robot(arguments.robot);
-  robotics::Measurements measurements = robotics::simulate(robot.robot, arguments.options);
+  robotics::Measurements measurements =
+      arguments.poses_from.empty()
+          ? robotics::simulate(robot.robot, arguments.options)
+          : robotics::simulate(robot.robot, robotics::read_poses(arguments.poses_from, robot.robot), arguments.options);
   if (robot.correction) {
     // The correction is part of what the description says of the robot.
     measurements.positions_mm +=
@@ -54,12 +58,18 @@ void add_simulate(CLI::App& app) {
   command->description(
       "Make measurements of a robot that is not there: poses uniform within the joint limits, tool positions with the "
       "effects of the\n"
-      "description and normal noise.");
+      "description and normal noise. Columns that effects need are made up: order, temp_C at the reference, directions "
+      "at random.");
   command->footer(
       "Example: llmt-robot simulate robotics/robots/tx200_like.yaml --poses 200 --noise-um 10 -o measured.csv");
   const auto arguments = std::make_shared<SimulateArguments>();
   command->add_option("robot", arguments->robot, "Robot description (YAML)")->required();
-  command->add_option("--poses", arguments->options.poses, "Number of poses")->capture_default_str();
+  CLI::Option* poses =
+      command->add_option("--poses", arguments->options.poses, "Number of poses")->capture_default_str();
+  command
+      ->add_option("--poses-from", arguments->poses_from,
+                   "CSV file whose joint values and covariates to take instead; measured positions in it do not matter")
+      ->excludes(poses);
   command
       ->add_option("--noise-um", arguments->options.noise_um, "Standard deviation of each coordinate, in micrometres")
       ->capture_default_str();

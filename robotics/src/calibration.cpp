@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <span>
 
 #include "free_parameters.hpp"
+#include "joint_maps.hpp"
 #include "registration.hpp"
 
 namespace llmt::robotics {
@@ -71,9 +73,9 @@ Robot best_start(const Robot& robot, const Measurements& measurements, const std
   return best;
 }
 
-void set_priors(std::vector<discovery::Parameter>& parameters, const CalibrationOptions& options) {
+void set_priors(std::vector<discovery::Parameter>& parameters, Eigen::Index geometric, const CalibrationOptions& options) {
   constexpr double frame_factor = 10.0;
-  for (discovery::Parameter& parameter : parameters) {
+  for (discovery::Parameter& parameter : std::span(parameters).first(static_cast<std::size_t>(geometric))) {
     const double factor = is_frame_parameter(parameter.name) ? frame_factor : 1.0;
     double sigma = 0.0;
     if (parameter.unit == "mm") sigma = factor * options.prior_length_mm;
@@ -96,7 +98,7 @@ void identify(Calibration& calibration, const discovery::Problem& unweighted, co
   const int largest_number_of_passes = has_priors ? 10 : 1;
   constexpr double smallest_noise_mm = 1e-9;
   discovery::Problem problem = unweighted;
-  set_priors(problem.parameters, options);
+  set_priors(problem.parameters, geometric_parameter_count(calibration.robot.chain), options);
   calibration.noise_mm =
       root_mean_square(calibration.registration.residuals, calibration.registration.residuals.size());
   for (int pass = 0; pass < largest_number_of_passes; ++pass) {
@@ -133,6 +135,14 @@ std::vector<IdentifiedParameter> identified_parameters(const discovery::Result& 
     identified.push_back(std::move(entry));
   }
   return identified;
+}
+
+Eigen::VectorXd start_values(const discovery::Problem& problem) {
+  Eigen::VectorXd values(std::ssize(problem.parameters));
+  for (std::size_t k = 0; k < problem.parameters.size(); ++k) {
+    values(static_cast<Eigen::Index>(k)) = problem.parameters[k].value;
+  }
+  return values;
 }
 
 }  // namespace
@@ -179,15 +189,24 @@ discovery::Result register_frames(Robot& robot, const Measurements& measurements
   return solve_for(robot, calibration_problem(robot, measurements), reasons, options.solver);
 }
 
-Calibration calibrate(const Robot& robot, const Measurements& measurements, const CalibrationOptions& options) {
+namespace {
+
+Calibration calibrate_without_maps(const Robot& robot, const Measurements& measurements,
+                                   const CalibrationOptions& options) {
   Calibration calibration;
   calibration.registered = robot;
   // What an earlier calibration said, and a correction learnt from its residuals, hold no longer.
   calibration.registered.identified.clear();
   calibration.registered.correction_file.clear();
-  calibration.registration = register_frames(calibration.registered, measurements, options);
+  if (!options.start_as_given) {
+    calibration.registration = register_frames(calibration.registered, measurements, options);
+  }
   calibration.robot = calibration.registered;
   const discovery::Problem problem = calibration_problem(calibration.robot, measurements);
+  if (options.start_as_given) {
+    calibration.registration.values = start_values(problem);
+    calibration.registration.residuals = problem.residual(calibration.registration.values);
+  }
   std::vector<std::string> reasons = reasons_to_fix(robot, options);
   const Eigen::MatrixXd jacobian = discovery::evaluate_jacobian(problem, calibration.registration.values);
   fix_dependent(problem.parameters, jacobian, options.dependence_tolerance, reasons);
@@ -195,6 +214,17 @@ Calibration calibrate(const Robot& robot, const Measurements& measurements, cons
   calibration.robot.identified = identified_parameters(calibration.result, reasons);
   for (std::size_t k = 0; k < reasons.size(); ++k) {
     if (!reasons[k].empty()) calibration.fixed.push_back({problem.parameters[k].name, reasons[k]});
+  }
+  return calibration;
+}
+
+}  // namespace
+
+Calibration calibrate(const Robot& robot, const Measurements& measurements, const CalibrationOptions& options) {
+  const Unmapped plain = unmapped(robot, measurements);
+  Calibration calibration = calibrate_without_maps(plain.robot, plain.measurements, options);
+  for (Robot* fitted : {&calibration.robot, &calibration.registered}) {
+    fitted->effects.insert(fitted->effects.end(), plain.maps.begin(), plain.maps.end());
   }
   return calibration;
 }

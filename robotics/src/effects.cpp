@@ -1,132 +1,62 @@
 #include "llmt/robotics/effects.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
-#include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <stdexcept>
 
+#include "effect_entries.hpp"
+
 namespace llmt::robotics {
 namespace {
 
-constexpr double metres = 1e-3;
+[[noreturn]] void refuse(const std::string& message) { throw std::invalid_argument("llmt::robotics: " + message); }
 
-// Weight of everything from body `first` on and the payload: force in N, moment about `point` in N m.
-struct Load {
-  Eigen::Vector3d force = Eigen::Vector3d::Zero();
-  Eigen::Vector3d moment = Eigen::Vector3d::Zero();
-};
-
-Load weight_from(const PoseContext& pose, std::size_t first, const Eigen::Vector3d& point) {
-  Load load;
-  const auto add = [&](double mass, const Eigen::Vector3d& centre) {
-    const Eigen::Vector3d weight = mass * pose.gravity_m_s2;
-    load.force += weight;
-    load.moment += metres * (centre - point).cross(weight);
-  };
-  for (std::size_t k = first; k < pose.chain.joints.size(); ++k)
-    add(pose.chain.joints[k].mass_kg, pose.skeleton.body_centre[k]);
-  add(pose.payload_kg, pose.skeleton.payload_centre);
-  return load;
+std::string count_refusal(const EffectType& type, const Chain& chain, const Effect& effect, std::size_t index) {
+  std::size_t wanted = type.parameters.size();
+  const bool is_list = wanted == 1 && type.parameters[0].list;
+  if (is_list) wanted = type.count ? type.count(chain, index) : std::max<std::size_t>(1, effect.values.size());
+  if (type.name == "formula") wanted = effect.formula.terms.size();
+  if (effect.values.size() != wanted) return fmt::format("has {} values, must be {}", effect.values.size(), wanted);
+  if (effect.constants.size() == type.constants.size()) return "";
+  return fmt::format("has {} constants, must be {}", effect.constants.size(), type.constants.size());
 }
 
-void apply_joint_compliance(const PoseContext& pose, std::size_t j, std::span<const double> values,
-                            Deformation& deformation) {
-  const Load load = weight_from(pose, j, pose.skeleton.joint_origin[j]);
-  const Eigen::Vector3d& axis = pose.skeleton.joint_axis[j];
-  // A prismatic joint yields along its axis to the force; its compliance is then in m/N.
-  if (pose.chain.joints[j].type == JointType::prismatic) {
-    deformation.joint(static_cast<Eigen::Index>(j)) += values[0] * axis.dot(load.force) / metres;
-  } else {
-    deformation.joint(static_cast<Eigen::Index>(j)) += values[0] * axis.dot(load.moment);
+std::string place_refusal(const EffectType& type, const Chain& chain, std::size_t index,
+                          std::span<const double> constants) {
+  if (type.place == EffectPlace::joint && !type.prismatic && is_prismatic(chain, index)) {
+    return fmt::format("{} is prismatic", chain.joints[index].name);
   }
+  return type.refusal ? type.refusal(chain, index, constants) : "";
 }
 
-// A cantilever: unit chord, length in m, loads normal to the chord.
-struct Beam {
-  Eigen::Vector3d chord;
-  double length;
-  Eigen::Vector3d force;       // at the end, N
-  Eigen::Vector3d own_weight;  // N/m
-  Eigen::Vector3d moment;      // at the end, N m
-};
-
-Beam beam_of(const PoseContext& pose, std::size_t link) {
-  const Eigen::Vector3d& end = pose.skeleton.link_end[link];
-  const Eigen::Vector3d span = end - pose.skeleton.joint_origin[link];
-  Beam beam{
-      .chord = Eigen::Vector3d::UnitX(), .length = metres * span.norm(), .force = {}, .own_weight = {}, .moment = {}};
-  if (beam.length > 0.0) beam.chord = span.normalized();
-  const auto normal_part = [&](const Eigen::Vector3d& v) -> Eigen::Vector3d {
-    return v - beam.chord.dot(v) * beam.chord;
-  };
-  const Load load = weight_from(pose, link + 1, end);
-  beam.force = normal_part(load.force);
-  beam.moment = normal_part(load.moment);
-  beam.own_weight = Eigen::Vector3d::Zero();
-  if (beam.length > 0.0) {
-    beam.own_weight = normal_part(pose.chain.joints[link].mass_kg / beam.length * pose.gravity_m_s2);
+// What a term is multiplied with has the unit of what it acts on, as if the expression had none.
+std::vector<EffectParameter> formula_parameters(const EffectParameter& usual, const Formula& formula, bool slides) {
+  std::vector<EffectParameter> all;
+  for (const FormulaTerm& term : formula.terms) {
+    all.push_back(usual);
+    all.back().name = term.name.empty() ? fmt::format("{}_{}", usual.name, all.size()) : term.name;
+    all.back().unit = term.acts_on == "joint" && !slides ? "rad" : "mm";
+    if (!term.unit.empty()) all.back().unit = term.unit;
+    all.back().scale = scale_of(term, slides);
   }
-  return beam;
-}
-
-void apply_link_bending(const PoseContext& pose, std::size_t link, std::span<const double> values,
-                        Deformation& deformation) {
-  const Beam beam = beam_of(pose, link);
-  const double l = beam.length;
-  const Eigen::Vector3d deflection = std::pow(l, 3) / 3.0 * beam.force + std::pow(l, 4) / 8.0 * beam.own_weight +
-                                     l * l / 2.0 * beam.moment.cross(beam.chord);
-  const Eigen::Vector3d slope = l * l / 2.0 * beam.chord.cross(beam.force) +
-                                std::pow(l, 3) / 6.0 * beam.chord.cross(beam.own_weight) + l * beam.moment;
-  deformation.link[link].translation_mm += values[0] * deflection / metres;
-  deformation.link[link].rotation_rad += values[0] * slope;
-}
-
-void apply_link_bending_no_carry_over(const PoseContext& pose, std::size_t link, std::span<const double> values,
-                                      Deformation& deformation) {
-  const Beam beam = beam_of(pose, link);
-  const Eigen::Vector3d deflection =
-      std::pow(beam.length, 3) / 3.0 * beam.force + std::pow(beam.length, 4) / 8.0 * beam.own_weight;
-  deformation.link[link].translation_mm += values[0] * deflection / metres;
-}
-
-std::vector<EffectType> make_effect_types() {
-  // Bending stiffness of industrial arms 0.4-13 MN m^2, of a slender bar some 0.1 MN m^2.
-  const EffectParameter flexibility = {"flexibility", "1/(N m^2)", "flexibility_per_Nm2", 1e-7, 0.0, 1e-4};
-  return {
-      {.name = "joint_compliance",
-       .title = "joint compliance under gravity",
-       .formula = "dq_j = c_j tau_j, tau_j = z_j . sum_{k >= j} (r_k - o_j) x m_k g, payload included",
-       .source = "Khalil & Besnard 2002, geometric calibration of robots with flexible joints and links",
-       .place = EffectPlace::joint,
-       .parameters = {{"compliance", "rad/(N m)", "compliance_rad_per_Nm", 1e-7, 0.0, 1e-4}},
-       .columns = {},
-       .apply = apply_joint_compliance},
-      {.name = "link_bending",
-       .title = "link bending with moment and slope carried over",
-       .formula = "d = (L^3/3 F + L^4/8 w + L^2/2 M x e) / EI, th = (L^2/2 e x F + L^3/6 e x w + L M) / EI",
-       .source = "Euler-Bernoulli cantilever, any textbook on strength of materials",
-       .place = EffectPlace::link,
-       .parameters = {flexibility},
-       .columns = {},
-       .apply = apply_link_bending},
-      {.name = "link_bending_no_carry_over",
-       .title = "link bending, tip deflections only",
-       .formula = "d = (L^3/3 F + L^4/8 w) / EI, no slope, no end moment",
-       .source = "a documented reduction of link_bending",
-       .place = EffectPlace::link,
-       .parameters = {flexibility},
-       .columns = {},
-       .apply = apply_link_bending_no_carry_over},
-  };
+  return all;
 }
 
 }  // namespace
 
-const std::vector<EffectType>& effect_types() {
-  static const std::vector<EffectType> types = make_effect_types();
-  return types;
+std::string with_joint_number(std::string pattern, std::size_t joint) {
+  for (std::size_t at = pattern.find("{}"); at != std::string::npos; at = pattern.find("{}", at)) {
+    pattern.replace(at, 2, std::to_string(joint + 1));
+  }
+  return pattern;
+}
+
+bool is_of_whole_robot(const EffectType& type, const Effect& effect) {
+  return type.place == EffectPlace::robot || (type.name == "formula" && effect.at.empty());
 }
 
 const EffectType& effect_type(std::string_view name) {
@@ -135,20 +65,96 @@ const EffectType& effect_type(std::string_view name) {
     if (type.name == name) return type;
     known += (known.empty() ? "" : ", ") + type.name;
   }
-  throw std::invalid_argument(fmt::format("llmt::robotics: there is no effect \"{}\"; known: {}", name, known));
+  refuse(fmt::format("there is no effect \"{}\"; known: {}", name, known));
+}
+
+bool suits(const EffectType& type, const Chain& chain, std::size_t index, std::string* why) {
+  std::vector<double> usual;
+  for (const EffectConstant& constant : type.constants) usual.push_back(constant.usual);
+  const std::string reason = place_refusal(type, chain, index, usual);
+  if (why != nullptr) *why = reason;
+  return reason.empty();
 }
 
 std::size_t effect_index(const Chain& chain, const Effect& effect) {
   const EffectType& type = effect_type(effect.type);
-  if (effect.values.size() != type.parameters.size()) {
-    throw std::invalid_argument(fmt::format("llmt::robotics: effect {} has {} values, must be {}", effect.type,
-                                            effect.values.size(), type.parameters.size()));
+  const std::size_t index = is_of_whole_robot(type, effect) ? 0 : joint_index(chain, effect.at);
+  std::string reason = count_refusal(type, chain, effect, index);
+  if (reason.empty()) reason = place_refusal(type, chain, index, effect.constants);
+  if (reason.empty() && type.name == "formula") reason = formula_refusal(chain, effect);
+  if (!reason.empty()) refuse(fmt::format("effect {}: {}", effect_label(effect), reason));
+  return index;
+}
+
+Effect make_effect(const EffectType& type, const Chain& chain, std::size_t index, std::vector<double> constants,
+                   std::size_t count) {
+  Effect effect{.type = type.terms.empty() ? type.name : "formula", .at = {}, .values = {}};
+  if (type.place != EffectPlace::robot) effect.at = chain.joints.at(index).name;
+  effect.constants = std::move(constants);
+  if (effect.constants.empty()) {
+    for (const EffectConstant& constant : type.constants) effect.constants.push_back(constant.usual);
   }
-  return type.place == EffectPlace::robot ? 0 : joint_index(chain, effect.at);
+  if (!type.terms.empty()) effect.formula.name = type.name;
+  effect.formula.terms = type.terms;
+  for (FormulaTerm& term : effect.formula.terms) term.text = with_joint_number(term.text, index);
+  std::size_t values = type.parameters.size();
+  if (type.parameters.size() == 1 && type.parameters[0].list) {
+    const std::size_t own = type.count ? type.count(chain, index) : 0;
+    values = own > 0 ? own : count;
+  }
+  effect.values.assign(values, 0.0);
+  effect_index(chain, effect);
+  return effect;
+}
+
+std::vector<EffectParameter> effect_parameters(const Chain& chain, const Effect& effect) {
+  return effect_parameters(effect_type(effect.type), chain, effect);
+}
+
+std::vector<EffectParameter> effect_parameters(const EffectType& type, const Chain& chain, const Effect& effect) {
+  if (!type.terms.empty()) return type.parameters;
+  std::vector<EffectParameter> all;
+  const bool slides = type.place == EffectPlace::joint && !is_of_whole_robot(type, effect) &&
+                      is_prismatic(chain, joint_index(chain, effect.at));
+  if (type.name == "formula") return formula_parameters(type.parameters[0], effect.formula, slides);
+  for (EffectParameter parameter : type.parameters) {
+    if (slides && !parameter.prismatic_key.empty()) {
+      parameter.unit = parameter.prismatic_unit;
+      parameter.key = parameter.prismatic_key;
+      const double factor = parameter.unit == "mm" ? 1000.0 : 1.0;
+      for (double* size : {&parameter.scale, &parameter.lower, &parameter.upper}) *size *= factor;
+    }
+    if (!parameter.list) {
+      all.push_back(parameter);
+      continue;
+    }
+    for (std::size_t k = 1; k <= effect.values.size(); ++k) {
+      all.push_back(parameter);
+      all.back().name += fmt::format("_{}", k);
+    }
+  }
+  return all;
+}
+
+std::vector<std::string> effect_columns(const Chain& chain, const Effect& effect) {
+  const EffectType& type = effect_type(effect.type);
+  if (type.name == "formula") return formula_columns(effect.formula.terms);
+  const std::size_t index = type.place == EffectPlace::robot ? 0 : joint_index(chain, effect.at);
+  std::vector<std::string> columns;
+  for (const std::string& pattern : type.columns) columns.push_back(with_joint_number(pattern, index));
+  return columns;
+}
+
+std::string effect_label(const Effect& effect) {
+  std::string label = effect.type;
+  if (!effect.at.empty()) label += "@" + effect.at;
+  if (!effect.formula.name.empty()) label += "[" + effect.formula.name + "]";
+  if (!effect.constants.empty()) label += fmt::format("[{}]", fmt::join(effect.constants, ","));
+  return label;
 }
 
 std::string effect_parameter_name(const Effect& effect, const EffectParameter& parameter) {
-  return effect.type + (effect.at.empty() ? "" : "@" + effect.at) + "." + parameter.name;
+  return effect_label(effect) + "." + parameter.name;
 }
 
 double round_bar_flexibility(double diameter_mm, double youngs_modulus_gpa) {

@@ -1,6 +1,7 @@
 #include "llmt/robotics/kinematics.hpp"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <stdexcept>
@@ -29,6 +30,13 @@ void apply(Pose& frame, const Deformation::Twist& twist) {
 }
 
 }  // namespace
+
+void Deformation::clear() {
+  base = {};
+  joint.setZero();
+  std::ranges::fill(link, Twist{});
+  world_mm.setZero();
+}
 
 void Kinematics::add(int axis, bool rotation, Eigen::Index parameter) {
   elements_.push_back({axis, rotation, parameter, -1, 0.0, 0.0, 1.0});
@@ -92,7 +100,8 @@ void Kinematics::set_values(const Eigen::VectorXd& values) {
 }
 
 // Calls visit(element number, frame before the element) for every element, then returns the tool pose. The deformation
-// of a link acts just before the axis of the next joint, that of the last link at the tool point.
+// of a link acts just before the axis of the next joint, that of the last link at the tool point, that of the base just
+// before the first axis.
 template <typename Visit>
 Pose Kinematics::walk(const Eigen::VectorXd& q, const Deformation* deformation, Visit visit) const {
   if (q.size() != static_cast<Eigen::Index>(joints())) {
@@ -107,7 +116,7 @@ Pose Kinematics::walk(const Eigen::VectorXd& q, const Deformation* deformation, 
     double value = element.value;
     if (element.joint >= 0) {
       const auto joint = static_cast<std::size_t>(element.joint);
-      if (deformation != nullptr && joint > 0) apply(frame, deformation->link[joint - 1]);
+      if (deformation != nullptr) apply(frame, joint > 0 ? deformation->link[joint - 1] : deformation->base);
       double moved = q(element.joint);
       if (deformation != nullptr) moved += deformation->joint(element.joint);
       value += sign_[joint] * moved;
@@ -134,22 +143,34 @@ Pose Kinematics::forward(const Eigen::VectorXd& q, const Deformation* deformatio
 
 Skeleton Kinematics::skeleton(const Eigen::VectorXd& q, const Deformation* deformation) const {
   Skeleton skeleton;
+  skeleton_into(skeleton, q, deformation);
+  return skeleton;
+}
+
+void Kinematics::skeleton_into(Skeleton& skeleton, const Eigen::VectorXd& q, const Deformation* deformation) const {
+  for (auto* points : {&skeleton.joint_origin, &skeleton.joint_axis, &skeleton.link_end, &skeleton.body_centre}) {
+    points->resize(joints());
+  }
+  skeleton.joint_frame.resize(joints());
+  skeleton.body_rotation.resize(joints());
+  std::size_t body = 0;
   const auto visit = [&](std::size_t i, const Pose& frame) {
     if (i == base_end_) skeleton.base_rotation = frame.rotation;
-    const std::size_t bodies = skeleton.body_centre.size();
-    if (bodies < joints() && i == body_frame_[bodies]) {
-      skeleton.body_centre.emplace_back(frame.position_mm + frame.rotation * body_centre_mm_[bodies]);
+    if (body < joints() && i == body_frame_[body]) {
+      skeleton.body_centre[body] = frame.position_mm + frame.rotation * body_centre_mm_[body];
+      skeleton.body_rotation[body] = frame.rotation;
+      ++body;
     }
     if (elements_[i].joint < 0) return;
-    const double sign = sign_[static_cast<std::size_t>(elements_[i].joint)];
-    if (elements_[i].joint > 0) skeleton.link_end.push_back(frame.position_mm);
-    skeleton.joint_origin.push_back(frame.position_mm);
-    skeleton.joint_axis.emplace_back(sign * frame.rotation.col(2));
+    const auto joint = static_cast<std::size_t>(elements_[i].joint);
+    if (joint > 0) skeleton.link_end[joint - 1] = frame.position_mm;
+    skeleton.joint_origin[joint] = frame.position_mm;
+    skeleton.joint_frame[joint] = frame.rotation;
+    skeleton.joint_axis[joint] = sign_[joint] * frame.rotation.col(2);
   };
   skeleton.tool = walk(q, deformation, visit);
-  skeleton.link_end.push_back(skeleton.tool.position_mm);
+  skeleton.link_end.back() = skeleton.tool.position_mm;
   skeleton.payload_centre = skeleton.tool.position_mm + skeleton.tool.rotation * payload_centre_mm_;
-  return skeleton;
 }
 
 Eigen::Matrix3Xd Kinematics::position_jacobian(const Eigen::VectorXd& q, const Deformation* deformation) const {

@@ -6,8 +6,10 @@
 #include <numbers>
 #include <optional>
 #include <regex>
+#include <set>
 #include <stdexcept>
 
+#include "effect_entries.hpp"
 #include "llmt/csv.hpp"
 #include "llmt/robotics/measurements.hpp"
 
@@ -22,7 +24,11 @@ const std::map<std::string, double> angles_in_rad = {{"rad", 1.0}, {"deg", radia
 // A header, sorted into what it means.
 class Header {
  public:
-  Header(const Csv& csv, const Robot& robot) : csv_(csv), robot_(robot) {
+  Header(const Csv& csv, const Robot& robot, const std::vector<std::string>& also)
+      : csv_(csv), robot_(robot), also_(also.begin(), also.end()) {
+    for (const Effect& effect : robot.effects) {
+      for (const FormulaTerm& term : effect.formula.terms) also_.merge(names_in_formula(term.text));
+    }
     for (const std::string& column : csv.columns()) take(column);
   }
 
@@ -40,6 +46,7 @@ class Header {
 
   const Csv& csv_;
   const Robot& robot_;
+  std::set<std::string> also_;
   std::map<std::string, Quantity> quantities_;  // "q1", "x", "rx", "qw" -> column and unit
   std::vector<std::string> covariates_;
   std::vector<std::string> unused_;
@@ -64,7 +71,7 @@ void Header::take(const std::string& column) {
     take_quantity(parts[1], column, parts[3]);
   } else if (std::regex_match(column, quaternion)) {
     quantities_[column] = {column, ""};
-  } else if (std::regex_match(column, covariate)) {
+  } else if (std::regex_match(column, covariate) || also_.contains(column)) {
     covariates_.push_back(column);
   } else {
     unused_.push_back(column);
@@ -168,9 +175,16 @@ Orientation Header::orientation() const {
   return orientation;
 }
 
+// Angles that the controller read back are kept in rad like the joint values.
 std::map<std::string, Eigen::VectorXd> Header::covariates() const {
   std::map<std::string, Eigen::VectorXd> values;
-  for (const std::string& column : covariates_) values[column] = csv_.numbers(column);
+  for (const std::string& column : covariates_) {
+    const bool in_degrees = column.starts_with("qmeas") && column.ends_with("_deg");
+    const std::string name = in_degrees ? column.substr(0, column.size() - 4) + "_rad" : column;
+    if (!values.try_emplace(name, (in_degrees ? radians : 1.0) * csv_.numbers(column)).second) {
+      refuse(fmt::format("column \"{}\" is the same quantity as another one in rad", column));
+    }
+  }
   return values;
 }
 
@@ -193,11 +207,13 @@ std::vector<std::ptrdiff_t> seen_rows(const Csv& csv, Measurements& measurements
   return seen;
 }
 
-Measurements from_csv(const Csv& csv, const Robot& robot) {
-  const Header header(csv, robot);
+Measurements from_csv(const Csv& csv, const Robot& robot, const std::vector<std::string>& also) {
+  const Header header(csv, robot, also);
   Measurements measurements;
   measurements.poses.joints = header.joints();
   measurements.poses.covariates = header.covariates();
+  // Before rows are left out: the arm was there although the point was not seen.
+  add_moves(measurements.poses, robot.chain);
   header.positions(measurements);
   measurements.orientation = header.orientation();
   const std::vector<std::ptrdiff_t> seen = seen_rows(csv, measurements);
@@ -211,10 +227,22 @@ Measurements from_csv(const Csv& csv, const Robot& robot) {
 
 }  // namespace
 
-Measurements read_measurements(const std::string& path, const Robot& robot) { return from_csv(Csv::read(path), robot); }
+Measurements read_measurements(const std::string& path, const Robot& robot, const std::vector<std::string>& also) {
+  return from_csv(Csv::read(path), robot, also);
+}
 
-Measurements parse_measurements(std::string text, const std::string& name, const Robot& robot) {
-  return from_csv(Csv::parse(std::move(text), name), robot);
+Measurements parse_measurements(std::string text, const std::string& name, const Robot& robot,
+                                const std::vector<std::string>& also) {
+  return from_csv(Csv::parse(std::move(text), name), robot, also);
+}
+
+Poses read_poses(const std::string& path, const Robot& robot) {
+  const Csv csv = Csv::read(path);
+  const Header header(csv, robot, {});
+  Poses poses{.joints = header.joints(), .covariates = header.covariates()};
+  if (poses.count() == 0) throw std::runtime_error(fmt::format("{}: there are no poses", csv.name()));
+  add_moves(poses, robot.chain);
+  return poses;
 }
 
 std::string to_csv(const Measurements& measurements, const Robot& robot) {
@@ -238,7 +266,9 @@ std::string to_csv(const Measurements& measurements, const Robot& robot) {
     add(angles ? fmt::format("r{}_deg", "xyz"[k]) : fmt::format("q{}", "wxyz"[k]),
         measurements.orientation.values.col(k));
   }
-  for (const auto& [name, values] : measurements.poses.covariates) add(name, values);
+  for (const auto& [name, values] : measurements.poses.covariates) {
+    if (!is_move(name)) add(name, values);
+  }
   std::string text = fmt::format("{}\n", fmt::join(names, ","));
   for (Eigen::Index i = 0; i < measurements.count(); ++i) {
     for (std::size_t c = 0; c < columns.size(); ++c) text += fmt::format("{}{}", c == 0 ? "" : ",", columns[c](i));

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <stdexcept>
 
 namespace llmt::robotics {
@@ -43,6 +44,25 @@ void validate(const Measurements& measurements, const Robot& robot) {
     if (!values.allFinite()) refuse(fmt::format("column {} has a value that is not finite", name));
   }
 }
+
+void add_moves(Poses& poses, const Chain& chain) {
+  auto column = poses.covariates.find("order");
+  if (column == poses.covariates.end()) column = poses.covariates.find("time_s");
+  if (column == poses.covariates.end()) return;
+  std::vector<Eigen::Index> sequence(static_cast<std::size_t>(poses.count()));
+  std::iota(sequence.begin(), sequence.end(), Eigen::Index{0});
+  std::ranges::stable_sort(sequence, {}, [&](Eigen::Index row) { return column->second(row); });
+  Eigen::MatrixXd moves = Eigen::MatrixXd::Zero(poses.count(), poses.joints.cols());
+  for (std::size_t k = 1; k < sequence.size(); ++k) {
+    moves.row(sequence[k]) = poses.joints.row(sequence[k]) - poses.joints.row(sequence[k - 1]);
+  }
+  for (std::size_t j = 0; j < chain.joints.size(); ++j) {
+    const char* unit = chain.joints[j].type == JointType::revolute ? "rad" : "mm";
+    poses.covariates[fmt::format("move{}_{}", j + 1, unit)] = moves.col(static_cast<Eigen::Index>(j));
+  }
+}
+
+bool is_move(std::string_view column) { return column.starts_with("move"); }
 
 Eigen::VectorXd distances(const Eigen::MatrixXd& model_mm, const Measurements& measurements) {
   Eigen::VectorXd squares = Eigen::VectorXd::Zero(measurements.count());

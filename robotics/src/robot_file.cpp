@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <stdexcept>
 
 #include "llmt/files.hpp"
@@ -64,17 +65,40 @@ const EffectType& read_effect_type(YamlMap& map) {
   map.refuse(fmt::format("\"type\" is \"{}\", which is no effect; known: {}", name, known));
 }
 
-Effect read_effect(YamlMap map) {
+void read_formula(YamlMap& map, Formula& formula) {
+  formula.name = map.text("name");
+  for (YamlMap term : map.maps("terms")) {
+    formula.terms.push_back(read_formula_term(term));
+    term.finish({"name", "joint", "x", "y", "z", "unit", "scale"});
+  }
+}
+
+Effect read_effect(YamlMap map, const Chain& chain) {
   const EffectType& type = read_effect_type(map);
   Effect effect{.type = type.name, .at = {}, .values = {}};
   std::vector<std::string> known = {"type"};
-  if (type.place != EffectPlace::robot) {
+  bool slides = false;
+  if (type.name == "formula") {
+    read_formula(map, effect.formula);
+    known.insert(known.end(), {"name", "terms", "at"});
+    effect.at = map.text_or("at", "");
+  } else if (type.place != EffectPlace::robot) {
     effect.at = map.text("at");
     known.emplace_back("at");
+    const auto joint = std::ranges::find(chain.joints, effect.at, &Joint::name);
+    slides = type.place == EffectPlace::joint && joint != chain.joints.end() && joint->type == JointType::prismatic;
   }
+  const auto key_of = [&](const auto& entry) {
+    known.push_back(slides && !entry.prismatic_key.empty() ? entry.prismatic_key : entry.key);
+    return known.back();
+  };
+  for (const EffectConstant& constant : type.constants) effect.constants.push_back(map.number(key_of(constant)));
   for (const EffectParameter& parameter : type.parameters) {
-    effect.values.push_back(map.number(parameter.key));
-    known.push_back(parameter.key);
+    if (parameter.list) {
+      effect.values = map.all_numbers(key_of(parameter));
+    } else {
+      effect.values.push_back(map.number(key_of(parameter)));
+    }
   }
   map.finish(known);
   return effect;
@@ -134,7 +158,7 @@ Robot parse_robot(const std::string& text, const std::string& name) {
   check_in_file(map, [&] { validate(robot); });
   if (map.has("effects")) {
     for (const YamlMap& effect : map.maps("effects")) {
-      robot.effects.push_back(read_effect(effect));
+      robot.effects.push_back(read_effect(effect, robot.chain));
       check_in_file(effect, [&] { validate(robot); });
     }
   }

@@ -62,11 +62,34 @@ void write_joint(Writer& out, const Joint& joint) {
   out.end_map();
 }
 
-void write_effect(Writer& out, const Effect& effect) {
+void write_formula(Writer& out, const Formula& formula) {
+  out.word("name", formula.name).key("terms").begin_list(YAML::Flow);
+  for (const FormulaTerm& term : formula.terms) {
+    out.begin_map().word(term.acts_on, term.text);
+    if (!term.name.empty()) out.word("name", term.name);
+    if (!term.unit.empty()) out.word("unit", term.unit);
+    out.optional("scale", term.scale, 0.0).end_map();
+  }
+  out.end_list();
+}
+
+void write_effect(Writer& out, const Chain& chain, const Effect& effect) {
   const EffectType& type = effect_type(effect.type);
+  const std::vector<EffectParameter> parameters = effect_parameters(chain, effect);
   out.begin_map().word("type", effect.type);
   if (!effect.at.empty()) out.word("at", effect.at);
-  for (std::size_t k = 0; k < type.parameters.size(); ++k) out.number(type.parameters[k].key, effect.values[k]);
+  if (type.name == "formula") write_formula(out, effect.formula);
+  const bool slides = !effect.at.empty() && type.place == EffectPlace::joint &&
+                      chain.joints[joint_index(chain, effect.at)].type == JointType::prismatic;
+  for (std::size_t k = 0; k < type.constants.size(); ++k) {
+    const EffectConstant& constant = type.constants[k];
+    out.number(slides && !constant.prismatic_key.empty() ? constant.prismatic_key : constant.key, effect.constants[k]);
+  }
+  if (!type.parameters.empty() && type.parameters[0].list) {
+    out.numbers(parameters.empty() ? type.parameters[0].key : parameters[0].key, effect.values);
+  } else {
+    for (std::size_t k = 0; k < parameters.size(); ++k) out.number(parameters[k].key, effect.values[k]);
+  }
   out.end_map();
 }
 
@@ -109,7 +132,7 @@ std::string to_yaml(const Robot& robot) {
   out.end_list();
   if (!robot.effects.empty()) {
     out.key("effects").begin_list(YAML::Block);
-    for (const Effect& effect : robot.effects) write_effect(out, effect);
+    for (const Effect& effect : robot.effects) write_effect(out, chain, effect);
     out.end_list();
   }
   if (!robot.identified.empty()) write_identified(out, robot);

@@ -68,6 +68,12 @@ std::vector<double> YamlMap::numbers(const std::string& key, std::size_t count) 
   const YAML::Node value = at(key);
   if (!value.IsSequence() || value.size() != count)
     refuse_at(value, fmt::format("\"{}\" must be a list of {} numbers", key, count));
+  return all_numbers(key);
+}
+
+std::vector<double> YamlMap::all_numbers(const std::string& key) {
+  const YAML::Node value = at(key);
+  if (!value.IsSequence()) refuse_at(value, fmt::format("\"{}\" must be a list of numbers", key));
   std::vector<double> result;
   for (const YAML::Node& entry : value) result.push_back(to_number(entry, key));
   return result;
@@ -85,7 +91,8 @@ std::vector<YamlMap> YamlMap::maps(const std::string& key) {
   std::vector<YamlMap> result;
   if (value.IsNull()) return result;
   if (!value.IsSequence()) refuse_at(value, fmt::format("\"{}\" must be a list", key));
-  for (const YAML::Node& entry : value) result.emplace_back(entry, file_, fmt::format("{}[{}]", key, result.size()));
+  const std::string where = where_.empty() ? key : where_ + "." + key;
+  for (const YAML::Node& entry : value) result.emplace_back(entry, file_, fmt::format("{}[{}]", where, result.size()));
   return result;
 }
 
@@ -97,6 +104,22 @@ void YamlMap::finish(const std::vector<std::string>& known) const {
       refuse_at(entry.first, fmt::format("key \"{}\" does not belong here", key));
     refuse_at(entry.first, fmt::format("unknown key \"{}\"; known: {}", key, fmt::join(known, ", ")));
   }
+}
+
+FormulaTerm read_formula_term(YamlMap& map) {
+  FormulaTerm term{.acts_on = {}, .text = {}};
+  for (const char* target : {"joint", "x", "y", "z"}) {
+    if (!map.has(target)) continue;
+    if (!term.acts_on.empty()) map.refuse("a term acts on one of joint, x, y, z, not on two");
+    term.acts_on = target;
+    term.text = map.text(target);
+  }
+  if (term.acts_on.empty()) map.refuse("a term needs one of the keys joint, x, y, z with an expression");
+  term.name = map.text_or("name", "");
+  term.unit = map.text_or("unit", "");
+  term.scale = map.number_or("scale", term.scale);
+  if (map.has("scale") && !(term.scale > 0.0)) map.refuse(fmt::format("\"scale\" is {}, must be > 0", term.scale));
+  return term;
 }
 
 }  // namespace llmt::robotics

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "llmt/robotics/chain.hpp"
+#include "llmt/robotics/effects.hpp"
 
 namespace llmt::robotics {
 
@@ -23,6 +23,7 @@ class YamlMap {
   double number(const std::string& key);
   Eigen::Vector3d vector(const std::string& key);
   std::vector<double> numbers(const std::string& key, std::size_t count);
+  std::vector<double> all_numbers(const std::string& key);
   YamlMap map(const std::string& key);
   std::vector<YamlMap> maps(const std::string& key);
 
@@ -47,6 +48,9 @@ class YamlMap {
   double to_number(const YAML::Node& node, const std::string& key) const;
   [[noreturn]] void refuse_at(const YAML::Node& node, const std::string& message) const;
 };
+
+/// A term of a formula: what it acts on, its expression, and what is said of its value.
+FormulaTerm read_formula_term(YamlMap& map);
 
 /// Parses a text. Throws std::runtime_error `file:line: ...` if it is no YAML.
 YAML::Node parse_yaml(const std::string& text, const std::string& file);

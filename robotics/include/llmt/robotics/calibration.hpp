@@ -31,6 +31,8 @@ struct CalibrationOptions {
   /// near nominal. 0: nothing is known.
   double prior_length_mm = 5.0;
   double prior_angle_deg = 1.0;
+  /// Base and tool start where the robot has them, instead of where register_frames() puts them.
+  bool start_as_given = false;
   discovery::Options solver = {};
 };
 
@@ -67,6 +69,8 @@ discovery::Result register_frames(Robot& robot, const Measurements& measurements
 /// (from a first pass),
 ///    with the weak priors of the options.
 ///
+/// Maps of joints (effect `joint_map`) stay as they are and come last in the result: their values were smoothed, which
+/// least squares would undo.
 /// Only positions are fitted; measured orientations are not used yet.
 /// Throws std::invalid_argument for wrong options, names that match no parameter, and measurements that do not suit the
 /// robot.

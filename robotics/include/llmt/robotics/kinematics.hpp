@@ -26,6 +26,10 @@ struct Deformation {
   explicit Deformation(std::size_t joints = 0)
       : joint(Eigen::VectorXd::Zero(static_cast<Eigen::Index>(joints))), link(joints) {}
 
+  /// Everything is zero again; no memory is given back or asked for.
+  void clear();
+
+  Twist base;                                          ///< at the first joint's origin: everything moves with it
   Eigen::VectorXd joint;                               ///< added to the joint values: rad, or mm for prismatic joints
   std::vector<Twist> link;                             ///< of the far end of each link: everything beyond moves with it
   Eigen::Vector3d world_mm = Eigen::Vector3d::Zero();  ///< added to the tool position
@@ -34,10 +38,12 @@ struct Deformation {
 /// Points and axes of an arm in one pose, in the world frame, mm. Link i runs from the axis of joint i to that of joint
 /// i + 1, the last one to the tool point.
 struct Skeleton {
-  std::vector<Eigen::Vector3d> joint_origin;  ///< a point on each axis: where link i begins
-  std::vector<Eigen::Vector3d> joint_axis;    ///< unit vectors, times the joint's sign
-  std::vector<Eigen::Vector3d> link_end;      ///< where link i ends
-  std::vector<Eigen::Vector3d> body_centre;   ///< centre of mass of each link
+  std::vector<Eigen::Vector3d> joint_origin;   ///< a point on each axis: where link i begins
+  std::vector<Eigen::Vector3d> joint_axis;     ///< unit vectors, times the joint's sign
+  std::vector<Eigen::Vector3d> link_end;       ///< where link i ends
+  std::vector<Eigen::Matrix3d> joint_frame;    ///< axes of the side of each joint that stands still; z is the joint's
+  std::vector<Eigen::Vector3d> body_centre;    ///< centre of mass of each link
+  std::vector<Eigen::Matrix3d> body_rotation;  ///< of each joint's moving frame, in which com_mm is given
   Eigen::Vector3d payload_centre;
   Eigen::Matrix3d base_rotation;
   Pose tool;
@@ -61,6 +67,9 @@ class Kinematics {
   Pose forward(const Eigen::VectorXd& q, const Deformation* deformation = nullptr) const;
 
   Skeleton skeleton(const Eigen::VectorXd& q, const Deformation* deformation = nullptr) const;
+
+  /// The same into memory that is there already.
+  void skeleton_into(Skeleton& skeleton, const Eigen::VectorXd& q, const Deformation* deformation = nullptr) const;
 
   /// 3 x P derivatives of the tool position by the geometric parameters in the order of geometric_parameters(): mm per
   /// mm, mm per deg. A deformation is held constant in the frame it acts in.

@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "llmt/abi.hpp"
@@ -48,16 +49,30 @@ Eigen::VectorXd distances(const Eigen::MatrixXd& model_mm, const Measurements& m
 ///   rx_deg ry_deg rz_deg (also _rad), or qw qx qy qz     orientation, optional
 ///   payload_kg temp_C time_s order pose dirN tauN_Nm qmeasN_deg sigma_x_um ...   covariates, optional
 ///
+/// Covariates keep their names, but qmeasN_deg becomes qmeasN_rad. Columns named in `also`, or in a formula among the
+/// robot's effects, are covariates too. With order or time_s, add_moves() is called.
 /// A joint, position or angle column without a unit is an error that says so. Rows whose measured coordinates are all
 /// exactly zero are missing points written as zeros: left out, with a warning naming the lines. Other columns are
 /// listed, not used. Throws std::runtime_error starting with `path` or `path:line`.
-Measurements read_measurements(const std::string& path, const Robot& robot);
+Measurements read_measurements(const std::string& path, const Robot& robot, const std::vector<std::string>& also = {});
 
 /// As read_measurements(), from memory; `name` stands for the path in messages.
-Measurements parse_measurements(std::string text, const std::string& name, const Robot& robot);
+Measurements parse_measurements(std::string text, const std::string& name, const Robot& robot,
+                                const std::vector<std::string>& also = {});
 
-/// The CSV text that reads back exactly: q in rad or mm, positions in mm, then the covariates. Orientation is written
-/// if there is one.
+/// The joint values and covariates of such a file, which may have no measured positions.
+Poses read_poses(const std::string& path, const Robot& robot);
+
+/// Adds how far each joint moved to reach a pose: columns move1_rad (_mm if prismatic), ..., differences of joint
+/// values to the row before in the sequence of the column order, or else time_s; 0 in the first row. Nothing without
+/// either.
+void add_moves(Poses& poses, const Chain& chain);
+
+/// Whether a column is one that add_moves() adds.
+bool is_move(std::string_view column);
+
+/// The CSV text that reads back exactly: q in rad or mm, positions in mm, then the covariates, but not what
+/// add_moves() added. Orientation is written if there is one.
 std::string to_csv(const Measurements& measurements, const Robot& robot);
 
 }  // namespace llmt::robotics

@@ -61,4 +61,19 @@ Eigen::MatrixXd positions(const Robot& robot, const Poses& poses);
 /// derivatives.
 Eigen::MatrixXd position_jacobian(const Robot& robot, const Poses& poses);
 
+/// What the weight of arm and payload does to each joint in the rigid pose, effects that change payload or gravity
+/// included: n x J, z_j . moment in N m, or z_j . force in N for a prismatic joint.
+Eigen::MatrixXd gravity_loads(const Robot& robot, const Poses& poses);
+
+/// First-order displacements of the tool by candidates that are not in the robot: 3n x (sum of their numbers of
+/// values), derivatives by each candidate's values at 0 (whatever its values are), rows as in position_jacobian(). The
+/// robot's own effects act on top of the rigid chain, and feel a candidate that changes payload or gravity. Throws
+/// std::invalid_argument as positions() and effect_index().
+Eigen::MatrixXd effect_signatures(const Robot& baseline, const std::vector<Effect>& candidates, const Poses& poses);
+
+/// Whether the poses have the columns that an effect of that type at that place needs; if not, `missing` names the
+/// first that is not there.
+bool has_columns(const EffectType& type, const Chain& chain, std::size_t index, const Poses& poses,
+                 std::string* missing = nullptr);
+
 }  // namespace llmt::robotics

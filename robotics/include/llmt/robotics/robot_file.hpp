@@ -21,8 +21,11 @@ namespace llmt::robotics {
 ///       - {name: joint1, type: revolute, alpha_deg: 0, a_mm: 0, b_mm: 0, d_mm: 642, theta_deg: 0, beta_deg: 0, sign:
 ///       1,
 ///          limits_deg: [-180, 180], gear_ratio: 100, mass_kg: 250, com_mm: [100, 0, -100]}   # limits_mm if prismatic
-///     effects:                       # optional; parameters as in effect_types()
+///     effects:                       # optional; parameters and constants of effect_types() under their keys
 ///       - {type: joint_compliance, at: joint1, compliance_rad_per_Nm: 1e-7}
+///       - {type: joint_map, at: joint2, first_rad: -1, step_rad: 0.5, values_rad: [0, 1e-4, 0]}
+///       - {type: formula, at: joint2, name: belt, terms: [{joint: "cos(37 * q2)"}],
+///          coefficients: [1e-4]}      # see FormulaTerm
 ///     identified:                    # optional; written by calibration, values stand above
 ///       - {parameter: joint1.a, state: free, standard_error: 0.01, unit: mm}
 ///     correction: {model: arm.correction.json}          # optional

@@ -6,6 +6,7 @@
 #include "llmt/abi.hpp"
 #include "llmt/robotics/calibration.hpp"
 #include "llmt/robotics/calibration_report.hpp"
+#include "llmt/robotics/catalogue.hpp"
 #include "llmt/robotics/chain.hpp"
 #include "llmt/robotics/correction.hpp"
 #include "llmt/robotics/effects.hpp"

@@ -1,0 +1,219 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <memory>
+#include <stdexcept>
+
+#include "llmt/commands.hpp"
+#include "llmt/csv.hpp"
+#include "llmt/discovery_report.hpp"
+#include "llmt/files.hpp"
+#include "llmt/term_file.hpp"
+#include "shared/cli.hpp"
+
+namespace llmt::apps {
+namespace {
+
+struct DiscoverArguments {
+  std::string simulated;
+  std::string measured;
+  std::vector<std::string> inputs;
+  std::vector<std::string> outputs;
+  std::vector<std::string> adjusted;
+  std::string terms;
+  std::string order;
+  std::string corrected;
+  bool own_terms_only = false;
+  bool json = false;
+  discovery::MissingOptions options;
+};
+
+/// Both tables, row by row.
+struct Comparison {
+  discovery::Inputs inputs;  // with the order, if that is a column of its own
+  Eigen::MatrixXd simulated;
+  discovery::MeasuredOutputs measured;
+};
+
+void check_same_inputs(const Csv& simulated, const Csv& measured, const std::vector<std::string>& names) {
+  const Eigen::MatrixXd one = simulated.numbers(names);
+  const Eigen::MatrixXd other = measured.numbers(names);
+  for (Eigen::Index i = 0; i < one.rows(); ++i) {
+    for (Eigen::Index j = 0; j < one.cols(); ++j) {
+      // Files are written with a limited number of digits.
+      constexpr double rounding = 1e-6;
+      const double range = one.col(j).maxCoeff() - one.col(j).minCoeff();
+      if (std::abs(one(i, j) - other(i, j)) <= rounding * std::max(range, 1e-3 * std::abs(one(i, j)))) continue;
+      throw std::runtime_error(
+          fmt::format("{}:{}: column \"{}\" is {}, but {} at {}:{}; rows must stand in the same order in both files",
+                      measured.name(), measured.line_of(i), names[static_cast<std::size_t>(j)], other(i, j), one(i, j),
+                      simulated.name(), simulated.line_of(i)));
+    }
+  }
+}
+
+void check_names(const DiscoverArguments& arguments) {
+  for (const std::vector<std::string>* names : {&arguments.inputs, &arguments.outputs}) {
+    for (std::size_t k = 0; k < names->size(); ++k) {
+      const auto rest = names->begin() + static_cast<std::ptrdiff_t>(k) + 1;
+      if (std::find(rest, names->end(), (*names)[k]) != names->end()) {
+        throw std::invalid_argument(fmt::format("\"{}\" is given twice", (*names)[k]));
+      }
+    }
+  }
+  for (const std::string& output : arguments.outputs) {
+    if (std::ranges::find(arguments.inputs, output) != arguments.inputs.end() || output == arguments.order) {
+      throw std::invalid_argument(fmt::format("\"{}\" is an output and cannot be an input or the order", output));
+    }
+  }
+}
+
+Comparison read_comparison(const DiscoverArguments& arguments) {
+  const Csv simulated = Csv::read(arguments.simulated);
+  const Csv measured = Csv::read(arguments.measured);
+  for (const Csv* csv : {&simulated, &measured}) {
+    if (csv->rows() == 0) throw std::runtime_error(fmt::format("{}: no rows", csv->name()));
+  }
+  Comparison comparison;
+  comparison.simulated = simulated.numbers(arguments.outputs);
+  comparison.measured = {arguments.outputs, measured.numbers(arguments.outputs)};
+  comparison.inputs.names = arguments.inputs;
+  if (simulated.rows() != measured.rows()) {
+    throw std::runtime_error(
+        fmt::format("{} has {} rows, {} has {}", simulated.name(), simulated.rows(), measured.name(), measured.rows()));
+  }
+  check_same_inputs(simulated, measured, arguments.inputs);
+  comparison.inputs.values = measured.numbers(arguments.inputs);
+  comparison.inputs.order = arguments.order;
+  if (!arguments.order.empty() && std::ranges::find(arguments.inputs, arguments.order) == arguments.inputs.end()) {
+    const Csv& holder = measured.has(arguments.order) ? measured : simulated;
+    Eigen::MatrixXd with_order(comparison.inputs.values.rows(), comparison.inputs.values.cols() + 1);
+    with_order << comparison.inputs.values, holder.numbers(arguments.order);
+    comparison.inputs.values = with_order;
+    comparison.inputs.names.push_back(arguments.order);
+  }
+  return comparison;
+}
+
+std::vector<discovery::ModelTerm> terms_to_try(const DiscoverArguments& arguments, const Comparison& comparison,
+                                               std::vector<discovery::Untestable>& untestable) {
+  std::vector<discovery::ModelTerm> library = discovery::standard_terms(comparison.inputs, &untestable);
+  if (arguments.terms.empty()) return library;
+  std::vector<std::string> taken;
+  for (const discovery::ModelTerm& term : library) taken.push_back(term.family);
+  const std::string output = arguments.outputs.size() == 1 ? arguments.outputs.front() : "";
+  const discovery::Rows rows = discovery::rows_of(comparison.inputs, comparison.simulated.col(0));
+  std::vector<discovery::ModelTerm> terms = read_terms(arguments.terms, comparison.inputs, output, rows, taken);
+  library = discovery::without_duplicates(std::move(library), terms, rows);
+  for (discovery::ModelTerm& term : library) {
+    if (!arguments.own_terms_only || term.generic) terms.push_back(std::move(term));
+  }
+  return terms;
+}
+
+void write_corrected(const std::string& path, const Comparison& comparison, const discovery::Missing& missing) {
+  std::vector<std::string> header;
+  for (const std::string& name : comparison.inputs.names) header.push_back(csv_field(name));
+  for (const std::string& name : comparison.measured.names) {
+    for (const char* kind : {"_simulated", "_corrected", "_measured"}) header.push_back(csv_field(name + kind));
+  }
+  std::string text = fmt::format("{}\n", fmt::join(header, ","));
+  for (Eigen::Index i = 0; i < comparison.inputs.values.rows(); ++i) {
+    std::vector<double> cells(comparison.inputs.values.row(i).begin(), comparison.inputs.values.row(i).end());
+    for (Eigen::Index o = 0; o < comparison.simulated.cols(); ++o) {
+      for (const double cell :
+           {comparison.simulated(i, o), missing.corrected(i, o), comparison.measured.values(i, o)}) {
+        cells.push_back(cell);
+      }
+    }
+    text += fmt::format("{}\n", fmt::join(cells, ","));
+  }
+  write_file(path, text);
+}
+
+DiscoveryReport discovered(const DiscoverArguments& arguments, const Comparison& comparison) {
+  const auto adjusts = [&](const char* what) {
+    return std::ranges::find(arguments.adjusted, what) != arguments.adjusted.end();
+  };
+  DiscoveryReport report{.simulated = arguments.simulated,
+                         .measured = arguments.measured,
+                         .corrected = arguments.corrected,
+                         .inputs = comparison.inputs.names,
+                         .seed = arguments.options.seed,
+                         .rows = comparison.simulated.rows(),
+                         .missing = {},
+                         .regions = {}};
+  std::vector<discovery::Untestable> untestable;
+  try {
+    const std::vector<discovery::ModelTerm> terms = terms_to_try(arguments, comparison, untestable);
+    const discovery::Simulation simulation =
+        discovery::tabulated(comparison.simulated, arguments.outputs, adjusts("offset"), adjusts("scale"));
+    report.missing =
+        discovery::find_missing(simulation, comparison.inputs, comparison.measured, terms, arguments.options);
+  } catch (const std::invalid_argument& error) {
+    // What the library refuses after the options were checked is in the data.
+    throw std::runtime_error(fmt::format("{}: {}", arguments.measured, error.what()));
+  }
+  for (discovery::Untestable& entry : untestable) report.missing.not_testable.push_back(std::move(entry));
+  report.regions = gap_regions(comparison.inputs, comparison.measured, report.missing);
+  return report;
+}
+
+void discover_command(DiscoverArguments arguments) {
+  if (arguments.inputs.empty()) {
+    const Csv simulated = Csv::read(arguments.simulated);
+    for (const std::string& name : simulated.columns()) {
+      const bool is_output = std::ranges::find(arguments.outputs, name) != arguments.outputs.end();
+      if (!is_output && name != arguments.order) arguments.inputs.push_back(name);
+    }
+  }
+  check_names(arguments);
+  const Comparison comparison = read_comparison(arguments);
+  const DiscoveryReport report = discovered(arguments, comparison);
+  if (!arguments.corrected.empty()) write_corrected(arguments.corrected, comparison, report.missing);
+  if (arguments.json) {
+    print_json(report_json(report));
+  } else {
+    print_report(report);
+  }
+}
+
+}  // namespace
+
+void add_discover(CLI::App& app) {
+  CLI::App* command =
+      app.add_subcommand("discover", "Find and name what a simulation lacks, from measurements beside it");
+  command->footer("Example: llmt discover simulated.csv measured.csv --inputs a,b,t --output y -o corrected.csv");
+  const auto arguments = std::make_shared<DiscoverArguments>();
+  command->add_option("simulated", arguments->simulated, "Inputs and simulated outputs (CSV)")->required();
+  command->add_option("measured", arguments->measured, "The same inputs, row by row, and measured outputs (CSV)")
+      ->required();
+  command
+      ->add_option("--inputs", arguments->inputs,
+                   "Columns that the gap may depend on [all of SIMULATED but the outputs]")
+      ->delimiter(',');
+  command->add_option("-t,--output-column,--output", arguments->outputs, "Columns to explain, in both files")
+      ->delimiter(',')
+      ->required();
+  command->add_option("--order", arguments->order,
+                      "Column that says in which order rows were measured; it is an input too [rows as they stand]");
+  command->add_option("--terms", arguments->terms,
+                      "File of your own terms, a line each: name = expression of the inputs");
+  command
+      ->add_flag("--own-terms-only", arguments->own_terms_only, "Leave the built-in terms out, but for unknown shapes")
+      ->needs("--terms");
+  command
+      ->add_option("--allow", arguments->adjusted, "What the simulation may adjust before anything counts as missing")
+      ->delimiter(',')
+      ->check(CLI::IsMember({"offset", "scale"}));
+  command->add_option("--held-out", arguments->options.held_out_share, "Share of the rows set aside for verification")
+      ->check(CLI::Range(0.0, 0.9))
+      ->capture_default_str();
+  command->add_option("--seed", arguments->options.seed, "Of the rows set aside")->capture_default_str();
+  command->add_option("-o,--corrected", arguments->corrected, "Corrected simulation to write (CSV)");
+  command->add_flag("--json", arguments->json, "Print one JSON object");
+  command->callback([arguments] { discover_command(*arguments); });
+}
+
+}  // namespace llmt::apps

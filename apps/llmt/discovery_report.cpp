@@ -1,0 +1,301 @@
+#include "llmt/discovery_report.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <set>
+
+#include "llmt/fit.hpp"
+
+namespace llmt::apps {
+namespace {
+
+using discovery::Answer;
+using discovery::FoundTerm;
+using discovery::Missing;
+
+Json number_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
+std::string region_conditions(const std::vector<std::string>& names, const Leaf& leaf) {
+  std::vector<std::string> parts;
+  for (std::size_t j = 0; j < names.size(); ++j) {
+    const auto column = static_cast<Eigen::Index>(j);
+    if (std::isfinite(leaf.low(column))) parts.push_back(fmt::format("{} > {}", names[j], number(leaf.low(column), 3)));
+    if (std::isfinite(leaf.high(column))) {
+      parts.push_back(fmt::format("{} <= {}", names[j], number(leaf.high(column), 3)));
+    }
+  }
+  return parts.empty() ? "everywhere" : fmt::format("{}", fmt::join(parts, " and "));
+}
+
+std::string title_of(const FoundTerm& found, bool several_outputs) {
+  std::string text = found.generic ? "unknown: " + found.formula : found.family;
+  if (!found.generic && !found.location.empty()) text += " of " + found.location;
+  if (several_outputs) text += ", on " + found.output;
+  return text;
+}
+
+std::string value_text(const discovery::TermValue& value) {
+  std::string text = fmt::format("{} = {}", value.name, number(value.value));
+  if (std::isfinite(value.standard_error)) text += fmt::format(" +- {}", number(value.standard_error, 2));
+  return text + " " + value.unit;
+}
+
+void print_found(const Missing& missing) {
+  int place = 0;
+  for (const FoundTerm& found : missing.found) {
+    print(fmt::format("\n{}. {}: {:.0f} % of what is explained rests on it alone{}\n", ++place,
+                      title_of(found, missing.gaps.size() > 1), 100.0 * found.share,
+                      found.generic     ? ""
+                      : found.confirmed ? ", confirmed"
+                                        : ", tentative"));
+    if (found.generic) {
+      print("   no term that was tried has this shape; the corrected simulation follows it as measured\n");
+      continue;
+    }
+    print(fmt::format("   add to {}: {}\n", found.output, found.formula));
+    for (const discovery::TermValue& value : found.values) print("   " + value_text(value) + "\n");
+    for (const discovery::RivalTerms& rival : found.rivals) {
+      print(fmt::format("   or instead {}: {}\n", rival.what,
+                        rival.exact ? "the same at every row, these rows cannot tell" : "explains as well"));
+    }
+  }
+}
+
+std::string headline(const Missing& missing) {
+  const auto causes = std::ranges::count_if(missing.found, [](const FoundTerm& f) { return !f.generic; });
+  switch (missing.verdict.answer) {
+    case Answer::nothing_missing:
+      return "nothing is missing that these rows could show";
+    case Answer::named:
+      return causes == 1 ? "one term is missing" : fmt::format("{} terms are missing", causes);
+    case Answer::indistinguishable:
+      return fmt::format("{} missing, but other terms explain it as well",
+                         causes == 1 ? "one term is" : fmt::format("{} terms are", causes));
+    case Answer::unknown:
+      return "something is missing that no term tried explains";
+  }
+  return "";
+}
+
+void print_gaps(const DiscoveryReport& report) {
+  const Missing& missing = report.missing;
+  if (missing.held_out.empty()) {
+    print("\nNo rows were set aside: the gap cannot be verified.\n");
+  } else {
+    print(fmt::format("\nGap on the {} rows set aside, root mean square:\n", missing.held_out.size()));
+  }
+  Table table({"output", "before", "after", "noise floor"});
+  for (const discovery::Gap& gap : missing.gaps) {
+    table.add({gap.output, number(gap.before), number(gap.after), number(gap.noise_floor)});
+  }
+  print(table.text());
+  print(missing.floor_from_repeats ? "The noise floor comes from rows of equal inputs.\n"
+                                   : "The noise floor is what the terms leave over.\n");
+}
+
+void print_regions(const DiscoveryReport& report) {
+  print("\nWhere the gap is, before anything is added:\n");
+  Table table({"output", "mean |gap|", "rows", "where"});
+  for (const GapRegion& region : report.regions) {
+    table.add({region.output, number(region.mean_gap, 3), fmt::format("{}", region.rows), region.conditions});
+  }
+  print(table.text());
+}
+
+void print_visible(const Missing& missing) {
+  constexpr std::size_t shown = 12;
+  print("\nSmallest terms that would have been found (9 times of 10):\n");
+  Table table({"term", "coefficient", "rms on the output"});
+  std::set<std::string> families;
+  for (const discovery::VisibleTerm& term : missing.visible) {
+    // The most visible of each family says enough.
+    if (!families.insert(term.what.substr(0, term.what.find(' '))).second || families.size() > shown) continue;
+    table.add({term.what, number(term.coefficient, 2), number(term.rms, 2)});
+  }
+  print(table.text());
+}
+
+Json json_of_found(const FoundTerm& found) {
+  Json parameters = Json::array();
+  for (const discovery::TermValue& value : found.values) {
+    parameters.push_back({{"name", value.name},
+                          {"value", value.value},
+                          {"unit", value.unit},
+                          {"std_error", number_or_null(value.standard_error)}});
+  }
+  Json rivals = Json::array();
+  bool exact = false;
+  for (const discovery::RivalTerms& rival : found.rivals) {
+    rivals.push_back(rival.what);
+    exact = exact || rival.exact;
+  }
+  return {{"name", found.family},     {"location", found.location}, {"output", found.output},
+          {"formula", found.formula}, {"parameters", parameters},   {"rivals", rivals},
+          {"exact_alias", exact},     {"share", found.share},       {"confirmed", found.confirmed}};
+}
+
+}  // namespace
+
+std::vector<GapRegion> gap_regions(const discovery::Inputs& inputs, const discovery::MeasuredOutputs& measured,
+                                   const Missing& missing) {
+  const Eigen::Index p = inputs.values.cols();
+  const std::vector<Eigen::Index>& rows = missing.searched;
+  // Leaves with a mean and no slopes: the only regressor is constant.
+  Eigen::MatrixXd table = Eigen::MatrixXd::Zero(std::ssize(rows), p + 1);
+  table.leftCols(p) = inputs.values(rows, Eigen::all);
+  FitOptions options;
+  options.selection.folds.count = 0;
+  options.intervals = false;
+  options.blend.validity = ValidityChoice::crisp;
+  options.growth.max_leaves = 5;
+  options.growth.significance = 0.01;
+  options.growth.min_leaf_samples = std::max<std::ptrdiff_t>(5, std::ssize(rows) / 20);
+  for (int j = 0; j < p; ++j) options.growth.split_inputs.push_back(j);
+  options.growth.regression_inputs = {static_cast<int>(p)};
+  std::vector<GapRegion> regions;
+  for (std::size_t o = 0; o < measured.names.size(); ++o) {
+    const auto column = static_cast<Eigen::Index>(o);
+    const Eigen::MatrixXd gap = (measured.values.col(column) - missing.before.col(column)).cwiseAbs()(rows);
+    const Model model = fit(table, gap, options).model;
+    const Eigen::MatrixXi leaf_of = model.leaf_of(table);
+    const std::vector<Leaf> leaves = model.leaves(0);
+    std::vector<GapRegion> own;
+    for (std::size_t k = 0; k < leaves.size(); ++k) {
+      GapRegion region{measured.names[o], region_conditions(inputs.names, leaves[k]), 0, 0.0};
+      for (Eigen::Index i = 0; i < gap.rows(); ++i) {
+        if (leaf_of(i, 0) != static_cast<int>(k)) continue;
+        ++region.rows;
+        region.mean_gap += gap(i, 0);
+      }
+      region.mean_gap /= static_cast<double>(std::max<Eigen::Index>(1, region.rows));
+      own.push_back(region);
+    }
+    std::ranges::stable_sort(own, std::greater<>{}, &GapRegion::mean_gap);
+    regions.insert(regions.end(), own.begin(), own.end());
+  }
+  return regions;
+}
+
+void print_report(const DiscoveryReport& report) {
+  const Missing& missing = report.missing;
+  print(fmt::format("{} against {}: {} rows, inputs {}\n", report.simulated, report.measured, report.rows,
+                    fmt::join(report.inputs, ", ")));
+  print(fmt::format("{} rows set aside (seed {}), {} searched, {} candidates, {} {}\n", missing.held_out.size(),
+                    report.seed, missing.searched.size(), missing.candidates.size(), missing.rounds,
+                    missing.rounds == 1 ? "round" : "rounds"));
+  print(fmt::format("\nVERDICT: {}\n", headline(missing)));
+  print(fmt::format("Evidence {} where chance reaches {}.\n", number(missing.verdict.score_gain, 3),
+                    number(missing.verdict.threshold, 3)));
+  print_found(missing);
+  for (std::size_t k = 0; k < missing.parameters.size(); ++k) {
+    const discovery::Parameter& parameter = missing.parameters[k];
+    if (!parameter.free) continue;
+    print(fmt::format("\n{} of the simulation adjusted to {} +- {}\n", parameter.name, number(parameter.value),
+                      number(missing.standard_errors(static_cast<Eigen::Index>(k)), 2)));
+  }
+  print_gaps(report);
+  print_regions(report);
+  if (!missing.outliers.empty()) {
+    std::vector<Eigen::Index> rows;
+    for (const Eigen::Index row : missing.outliers) rows.push_back(row + 1);
+    print(fmt::format("\nOutliers, left out of the fit: data rows {}\n", fmt::join(rows, ", ")));
+  }
+  const discovery::LackOfFit& lack = missing.verdict.lack_of_fit;
+  constexpr double surprising = 0.01;
+  if (lack.dof > 0 && lack.p_value < surprising) {
+    print(fmt::format("\nThe scatter that is left exceeds that of rows of equal inputs (p = {:.2g}).\n", lack.p_value));
+  }
+  if (missing.verdict.answer == Answer::nothing_missing) print_visible(missing);
+  if (!missing.not_testable.empty()) {
+    print("\nNot testable with these rows:\n");
+    for (const discovery::Untestable& entry : missing.not_testable)
+      print(fmt::format("  {}: {}\n", entry.what, entry.why));
+  }
+  if (!report.corrected.empty()) print(fmt::format("\nCorrected simulation written to {}\n", report.corrected));
+}
+
+Json report_json(const DiscoveryReport& report) {
+  const Missing& missing = report.missing;
+  Json effects = Json::array();
+  Json shapes = Json::array();
+  for (const FoundTerm& found : missing.found) {
+    if (!found.generic) {
+      effects.push_back(json_of_found(found));
+      continue;
+    }
+    Json depends_on = Json::array();
+    std::string name;
+    for (const char c : found.location.substr(0, found.location.find('/')) + ",") {
+      if (c != ',') {
+        name += c;
+        continue;
+      }
+      depends_on.push_back(name);
+      name.clear();
+    }
+    shapes.push_back({{"acts_on", found.output},
+                      {"depends_on", depends_on},
+                      {"per_turn", nullptr},
+                      {"kind", found.formula},
+                      {"share", found.share}});
+  }
+  Json gaps = Json::array();
+  for (const discovery::Gap& gap : missing.gaps) {
+    gaps.push_back({{"output", gap.output},
+                    {"before", number_or_null(gap.before)},
+                    {"after", number_or_null(gap.after)},
+                    {"noise_floor", number_or_null(gap.noise_floor)}});
+  }
+  // Errors of outputs in different units do not add up.
+  const bool single = gaps.size() == 1;
+  Json regions = Json::array();
+  for (const GapRegion& region : report.regions) {
+    regions.push_back({{"output", region.output},
+                       {"where", region.conditions},
+                       {"rows", region.rows},
+                       {"mean_gap", region.mean_gap}});
+  }
+  Json untestable = Json::array();
+  for (const discovery::Untestable& entry : missing.not_testable) {
+    untestable.push_back({{"effect", entry.what}, {"why", entry.why}});
+  }
+  Json visible = Json::array();
+  for (const discovery::VisibleTerm& term : missing.visible) {
+    visible.push_back(
+        {{"effect", term.what}, {"amplitude", number_or_null(term.coefficient)}, {"rms", number_or_null(term.rms)}});
+  }
+  Json baseline = Json::array();
+  for (std::size_t k = 0; k < missing.parameters.size(); ++k) {
+    const discovery::Parameter& parameter = missing.parameters[k];
+    if (!parameter.free) continue;
+    baseline.push_back({{"name", parameter.name},
+                        {"value", parameter.value},
+                        {"unit", parameter.unit},
+                        {"std_error", number_or_null(missing.standard_errors(static_cast<Eigen::Index>(k)))}});
+  }
+  return {{"verdict", discovery::to_string(missing.verdict.answer)},
+          {"effects", effects},
+          {"unknown", shapes.empty() ? Json(nullptr) : shapes[0]},
+          {"unknown_all", shapes},
+          {"simulation", baseline},
+          {"gap",
+           {{"before", single ? gaps[0]["before"] : Json(nullptr)},
+            {"after", single ? gaps[0]["after"] : Json(nullptr)},
+            {"noise_floor", single ? gaps[0]["noise_floor"] : Json(nullptr)},
+            {"heldout_samples", missing.held_out.size()},
+            {"outputs", gaps}}},
+          {"regions", regions},
+          {"outliers", missing.outliers},
+          {"not_testable", untestable},
+          {"smallest_visible", visible},
+          {"score_gain", missing.verdict.score_gain},
+          {"chance_threshold", missing.verdict.threshold},
+          {"hypotheses", missing.candidates.size()},
+          {"rounds", missing.rounds}};
+}
+
+}  // namespace llmt::apps

@@ -1,0 +1,35 @@
+// How the library's terms are put together.
+#pragma once
+
+#include "llmt/discovery/terms.hpp"
+
+namespace llmt::discovery {
+
+/// One input as terms see it.
+struct InputView {
+  Eigen::Index column = 0;
+  std::string name;
+  double low = 0.0;
+  double high = 0.0;
+  std::vector<double> distinct;  // ascending
+
+  double range() const { return high - low; }
+};
+
+/// Coefficient times function(value of one input).
+ModelTerm function_term(const InputView& input, std::string family, std::string formula, std::string per,
+                        double (*function)(double));
+
+/// Shapes that carry "unknown".
+std::vector<ModelTerm> shapes_of(const std::vector<InputView>& inputs);
+
+/// Terms with a constant that is searched, of one input.
+std::vector<ModelTerm> searched_terms(const InputView& input);
+
+/// Terms of the row before.
+std::vector<ModelTerm> sequence_terms(const InputView& input, const std::string& order);
+
+/// Midpoints between neighbouring values with at least `beyond` values on both sides, at most `count`.
+std::vector<double> thresholds(const std::vector<double>& distinct, std::size_t beyond, std::size_t count);
+
+}  // namespace llmt::discovery

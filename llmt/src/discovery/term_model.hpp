@@ -1,0 +1,98 @@
+// A simulation with terms added: prediction, refit, trial of constants.
+#pragma once
+
+#include <vector>
+
+#include "llmt/discovery/simulation.hpp"
+
+namespace llmt::discovery {
+
+/// A term on one output with its constants and coefficients.
+struct PlacedTerm {
+  std::size_t term = 0;
+  Eigen::Index output = 0;
+  Eigen::VectorXd constants;
+  Eigen::VectorXd coefficients;
+  double prior_cost = 0.0;
+};
+
+/// Everything stays on all rows, rows set aside included: terms may look at the inputs of the row before.
+class TermModel {
+ public:
+  TermModel(const Simulation& simulation, const Inputs& inputs, std::vector<std::string> outputs,
+            const std::vector<ModelTerm>& terms);
+
+  const std::vector<ModelTerm>& terms() const { return *terms_; }
+  const std::vector<Parameter>& parameters() const { return simulation_->parameters; }
+  const std::vector<std::string>& outputs() const { return outputs_; }
+
+  /// n x d, without terms. Throws std::invalid_argument if it has another shape or is not finite.
+  const Eigen::MatrixXd& simulated(const Eigen::VectorXd& values) const;
+  /// n x k of the term at the simulated outputs. Throws std::invalid_argument naming the term.
+  Eigen::MatrixXd columns(const PlacedTerm& placed, const Eigen::MatrixXd& simulated) const;
+  /// n x d.
+  Eigen::MatrixXd predict(const Eigen::VectorXd& values, const std::vector<PlacedTerm>& placed) const;
+
+  /// Values of an input. Throws std::invalid_argument if there is none of that name.
+  Eigen::VectorXd input(const std::string& name) const;
+
+  /// "square a", with "on y2" where there are several outputs.
+  std::string label(const PlacedTerm& placed) const;
+
+ private:
+  const Simulation* simulation_;
+  const Inputs* inputs_;
+  std::vector<std::string> outputs_;
+  const std::vector<ModelTerm>* terms_;
+  mutable Rows rows_;
+  mutable Eigen::VectorXd last_values_;
+  mutable Eigen::MatrixXd last_;
+  Eigen::MatrixXd evaluate(const Eigen::VectorXd& values) const;
+};
+
+/// Rows that are fitted, measured outputs there, and how much an output's deviation counts.
+struct FitData {
+  std::vector<Eigen::Index> rows;
+  Eigen::MatrixXd measured;  // rows x d
+  Eigen::VectorXd sigma;     // d
+};
+
+/// Parameters and placed terms fitted together.
+struct TermFit {
+  Eigen::VectorXd parameters;
+  Eigen::VectorXd parameter_errors;
+  std::vector<PlacedTerm> placed;
+  std::vector<Eigen::VectorXd> errors;  // of the coefficients, then the constants, of each placed term
+};
+
+TermFit fit_terms(const TermModel& model, const FitData& data, const Eigen::VectorXd& start,
+                  const std::vector<PlacedTerm>& placed);
+
+/// (measured - predicted) / sigma, stacked row by row.
+Eigen::VectorXd scaled_residuals(const TermModel& model, const FitData& data, const Eigen::VectorXd& parameters,
+                                 const std::vector<PlacedTerm>& placed);
+
+/// Derivatives of -scaled_residuals() by the free parameters.
+Eigen::MatrixXd baseline_jacobian(const TermModel& model, const FitData& data, const Eigen::VectorXd& parameters,
+                                  const std::vector<PlacedTerm>& placed);
+
+/// Columns of a placed term, stacked like the residuals.
+Eigen::MatrixXd stacked_signature(const TermModel& model, const FitData& data, const PlacedTerm& placed,
+                                  const Eigen::MatrixXd& simulated);
+
+/// What constants of terms are tried on.
+struct TrialGround {
+  Eigen::VectorXd residuals;  // stacked
+  Eigen::MatrixXd nuisance;   // stacked; what may explain residuals besides the term
+};
+
+/// The best constants of a term on one output, each with the prior cost of its choice; constants within two steps of
+/// those in `taken` do not count.
+std::vector<PlacedTerm> best_constants(const TermModel& model, const FitData& data, const TrialGround& ground,
+                                       std::size_t term, Eigen::Index output, const Eigen::MatrixXd& simulated,
+                                       const std::vector<PlacedTerm>& taken);
+
+/// The distance between the values tried around `value`.
+double spacing(const std::vector<double>& tried, double value);
+
+}  // namespace llmt::discovery

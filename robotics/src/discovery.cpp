@@ -1,0 +1,268 @@
+#include "llmt/robotics/discovery.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+#include <stdexcept>
+
+#include "discovery_report.hpp"
+#include "discovery_steps.hpp"
+#include "hypotheses.hpp"
+#include "joint_maps.hpp"
+#include "llmt/random.hpp"
+
+namespace llmt::robotics {
+namespace {
+
+void say(const DiscoveryOptions& options, const std::string& stage) {
+  if (options.progress) options.progress(stage);
+}
+
+// What the search is to explain at the current estimates: the robot's found effects compete anew, with what they explain
+// added back to the residuals.
+struct Question {
+  discovery::Evidence evidence;
+  std::vector<Hypothesis> hypotheses;
+  std::vector<Untestable> untestable;
+};
+
+Eigen::VectorXd stacked_residuals(const Robot& robot, const Measurements& measurements) {
+  const Eigen::MatrixXd model = positions(robot, measurements.poses);
+  Eigen::VectorXd residuals = Eigen::VectorXd::Zero(3 * measurements.count());
+  for (Eigen::Index i = 0; i < measurements.count(); ++i) {
+    for (Eigen::Index axis = 0; axis < 3; ++axis) {
+      if (measurements.measured[static_cast<std::size_t>(axis)])
+        residuals(3 * i + axis) = measurements.positions_mm(i, axis) - model(i, axis);
+    }
+  }
+  return residuals;
+}
+
+std::vector<Eigen::Index> measured_rows(const Measurements& measurements) {
+  std::vector<Eigen::Index> rows;
+  for (Eigen::Index i = 0; i < measurements.count(); ++i) {
+    for (Eigen::Index axis = 0; axis < 3; ++axis) {
+      if (measurements.measured[static_cast<std::size_t>(axis)]) rows.push_back(3 * i + axis);
+    }
+  }
+  return rows;
+}
+
+// The last effects of the robot are those that were found.
+Question question(const Robot& robot, const std::vector<Hypothesis>& found, const Measurements& measurements,
+                  const DiscoveryOptions& options) {
+  const std::size_t own = robot.effects.size() - found.size();
+  Question result;
+  const Eigen::VectorXd residuals = stacked_residuals(robot, measurements);
+  const Scene scene = make_scene(robot, measurements.poses, residuals, measurements.measured);
+  result.hypotheses = catalogue_hypotheses(scene, options.catalogue, result.untestable);
+  if (options.scans) {
+    for (Hypothesis& scanned : scanned_effects(scene, options.catalogue)) result.hypotheses.push_back(std::move(scanned));
+  }
+  add_signatures(scene, result.hypotheses);
+  const Eigen::MatrixXd jacobian = position_jacobian(robot, measurements.poses);
+  Eigen::VectorXd explained = residuals;
+  Eigen::Index column = geometric_parameter_count(robot.chain);
+  for (std::size_t e = 0; e < robot.effects.size(); ++e) {
+    const Effect& effect = robot.effects[e];
+    const Eigen::Index k = std::ssize(effect.values);
+    if (e >= own) {
+      const Eigen::Map<const Eigen::VectorXd> values(effect.values.data(), k);
+      explained += jacobian.middleCols(column, k) * values;
+      result.hypotheses.push_back(found_before(found[e - own], effect, jacobian.middleCols(column, k)));
+    }
+    column += k;
+  }
+  if (options.shapes) {
+    for (Hypothesis& shape : shape_hypotheses(scene)) result.hypotheses.push_back(std::move(shape));
+  }
+  const std::vector<Eigen::Index> rows = measured_rows(measurements);
+  Eigen::Index baseline = geometric_parameter_count(robot.chain);
+  for (std::size_t e = 0; e < own; ++e) baseline += std::ssize(robot.effects[e].values);
+  result.evidence.residuals = explained(rows);
+  result.evidence.jacobian = jacobian(rows, Eigen::seqN(0, baseline));
+  result.evidence.components = std::ranges::count(measurements.measured, true);
+  result.evidence.repeats = repeats_of(measurements.poses);
+  for (Hypothesis& hypothesis : result.hypotheses) {
+    hypothesis.candidate.signature = Eigen::MatrixXd(hypothesis.candidate.signature(rows, Eigen::all));
+  }
+  return result;
+}
+
+std::vector<discovery::Candidate> candidates_of(Question& question) {
+  std::vector<discovery::Candidate> candidates;
+  for (Hypothesis& hypothesis : question.hypotheses) candidates.push_back(hypothesis.candidate);
+  return candidates;
+}
+
+std::set<std::string> labels_of(const std::vector<Hypothesis>& found) {
+  std::set<std::string> labels;
+  for (const Hypothesis& hypothesis : found) labels.insert(effect_label(*hypothesis.effect));
+  return labels;
+}
+
+// The hypotheses of the verdict that are effects, with their values.
+std::vector<Hypothesis> effects_of(const Question& question, const discovery::Verdict& verdict) {
+  std::vector<Hypothesis> found;
+  for (const discovery::Finding& finding : verdict.findings) {
+    for (const discovery::Term& term : finding.terms) {
+      const Hypothesis& hypothesis = question.hypotheses[term.candidate];
+      if (!hypothesis.effect) continue;
+      found.push_back(hypothesis);
+      found.back().candidate.signature.resize(0, 0);
+      found.back().effect->values.assign(term.values.begin(), term.values.end());
+    }
+  }
+  return found;
+}
+
+Measurements without_rows(const Measurements& measurements, const std::vector<std::size_t>& left_out) {
+  std::vector<std::ptrdiff_t> rows;
+  for (Eigen::Index i = 0; i < measurements.count(); ++i) {
+    if (std::ranges::find(left_out, static_cast<std::size_t>(i)) == left_out.end()) rows.push_back(i);
+  }
+  return select(measurements, rows);
+}
+
+Calibration refit(const Robot& registered, const std::vector<Hypothesis>& found, const Measurements& measurements,
+                  const std::vector<std::size_t>& outliers, const DiscoveryOptions& options) {
+  Robot start = registered;
+  for (const Hypothesis& hypothesis : found) start.effects.push_back(*hypothesis.effect);
+  CalibrationOptions calibration = options.calibration;
+  calibration.start_as_given = true;
+  return calibrate(start, without_rows(measurements, outliers), calibration);
+}
+
+// Search and refit, round after round, on one set of poses.
+struct Investigation {
+  Measurements searched;  // joint values moved by the maps there are
+  Calibration baseline;   // without what was found
+  Calibration fitted;     // with it
+  std::vector<Hypothesis> found;
+  discovery::Verdict verdict;
+  Question asked;
+  int rounds = 0;
+
+  void search(const DiscoveryOptions& options) {
+    if (found.empty()) fitted = baseline;
+    for (int round = 0; round < options.rounds; ++round) {
+      say(options, fmt::format("searching, round {}", ++rounds));
+      asked = question(fitted.robot, found, searched, options);
+      verdict = discovery::search(asked.evidence, candidates_of(asked), options.search);
+      const std::set<std::string> before = labels_of(found);
+      found = effects_of(asked, verdict);
+      const bool as_before = found.empty() && verdict.outliers.empty();
+      fitted = as_before ? baseline : refit(baseline.registered, found, searched, verdict.outliers, options);
+      if (labels_of(found) == before) break;
+    }
+  }
+
+  void apply(const std::vector<Effect>& maps) {
+    Robot mapped = baseline.registered;
+    mapped.effects.insert(mapped.effects.end(), maps.begin(), maps.end());
+    searched = unmapped(mapped, searched).measurements;
+  }
+};
+
+// Free maps on top of what was found, then the search once more beside them: what they cannot be may show only now.
+void add_maps(Investigation& investigation, const DiscoveryOptions& options, Discovery& result) {
+  say(options, "mapping the joints");
+  const Measurements kept = without_rows(investigation.searched, investigation.verdict.outliers);
+  const std::optional<JointMaps> maps = fit_joint_maps(investigation.fitted.robot, kept);
+  constexpr double convincing = 2.0;
+  if (!maps || maps->gain_in_errors < convincing) {
+    result.notes.emplace_back("Free maps of the joints do not lower the error on poses left out.");
+    return;
+  }
+  result.maps = maps->effects;
+  result.notes.push_back(
+      fmt::format("Free maps of {} joints, angle error against angle, lower the leave-one-out error from {:.4f} to {:.4f} mm.",
+                  maps->effects.size(), maps->before.mean(), maps->after.mean()));
+  investigation.apply(maps->effects);
+  CalibrationOptions calibration = options.calibration;
+  calibration.start_as_given = true;
+  investigation.baseline.robot =
+      calibrate(investigation.baseline.registered, without_rows(investigation.searched, investigation.verdict.outliers), calibration).robot;
+  investigation.fitted = refit(investigation.baseline.registered, investigation.found, investigation.searched,
+                               investigation.verdict.outliers, options);
+  investigation.search(options);
+}
+
+ErrorFigures figures(const CorrectedRobot& robot, const Measurements& measurements) {
+  return error_figures(distances(positions(robot, measurements.poses), measurements));
+}
+
+// Mean length of a vector of d independent normal components.
+double mean_distance(double sigma, Eigen::Index components) {
+  const auto d = static_cast<double>(components);
+  return sigma * std::sqrt(2.0) * std::exp(std::lgamma(0.5 * (d + 1.0)) - std::lgamma(0.5 * d));
+}
+
+void verify(const Measurements& searched, const Measurements& test, Eigen::Index components,
+            const discovery::Verdict& verdict, Discovery& result) {
+  result.fitted_before = figures({result.before, {}}, searched);
+  result.fitted_after = figures(result.improved, searched);
+  if (test.count() > 0) {
+    result.held_out.before = figures({result.before, {}}, test);
+    result.held_out.after = figures(result.improved, test);
+    result.held_out.poses = test.count();
+  }
+  constexpr Eigen::Index enough = 12;
+  const bool repeats_speak = verdict.lack_of_fit.dof >= enough;
+  result.held_out.floor_from_repeats = repeats_speak;
+  result.held_out.floor_mm = mean_distance(repeats_speak ? verdict.lack_of_fit.noise : verdict.noise, components);
+}
+
+}  // namespace
+
+Discovery discover(const Robot& robot, const Measurements& measurements, const std::optional<Measurements>& test,
+                   const DiscoveryOptions& options) {
+  validate(robot);
+  validate(measurements, robot);
+  const Split split = set_aside(measurements, test, options);
+  // Maps that the robot has already move its joints; what is sought is sought beside them.
+  Unmapped plain = unmapped(robot, without_dwelling(split.searched));
+  const Eigen::Index components = std::ranges::count(plain.measurements.measured, true);
+  const Eigen::Index count = plain.measurements.count();
+  if (count * components < 10) {
+    throw std::invalid_argument(fmt::format("llmt::robotics::discover: {} poses to search are too few", count));
+  }
+  Discovery result;
+  say(options, "calibrating");
+  Investigation investigation{.searched = std::move(plain.measurements)};
+  investigation.baseline = calibrate(plain.robot, investigation.searched, options.calibration);
+  result.before = investigation.baseline.robot;
+  investigation.search(options);
+  const discovery::Verdict& verdict = investigation.verdict;
+  result.answer = verdict.answer;
+  describe_shapes(investigation.asked.hypotheses, verdict, result);
+  if (options.maps && verdict.answer == discovery::Answer::unknown) add_maps(investigation, options, result);
+  describe_effects(investigation.asked.hypotheses, verdict, investigation.fitted, result);
+  describe_limits(investigation.asked.hypotheses, investigation.asked.untestable, verdict, robot, result);
+  for (const std::size_t sample : verdict.outliers) {
+    for (const Eigen::Index row : searched_rows(split, sample)) result.outliers.push_back(row);
+  }
+  if (!verdict.outliers.empty()) {
+    result.before = calibrate(robot, without_rows(without_dwelling(split.searched), verdict.outliers), options.calibration).robot;
+  }
+  result.rounds = investigation.rounds;
+  result.improved.robot = investigation.fitted.robot;
+  for (const std::vector<Effect>* maps : {&plain.maps, &result.maps}) {
+    result.improved.robot.effects.insert(result.improved.robot.effects.end(), maps->begin(), maps->end());
+  }
+  if (verdict.outliers.empty()) {
+    result.before.effects.insert(result.before.effects.end(), plain.maps.begin(), plain.maps.end());
+  }
+  if (options.correct && result.answer == discovery::Answer::unknown) {
+    say(options, "trying a correction");
+    correct_rest(without_rows(without_dwelling(split.searched), verdict.outliers), options, result);
+  }
+  locate(without_rows(without_dwelling(split.searched), verdict.outliers), result);
+  verify(split.searched, split.test, components, verdict, result);
+  return result;
+}
+
+}  // namespace llmt::robotics

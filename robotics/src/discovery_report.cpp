@@ -1,0 +1,125 @@
+#include "discovery_report.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "llmt/folds.hpp"
+
+namespace llmt::robotics {
+namespace {
+
+std::string label_of(const Hypothesis& hypothesis) {
+  return hypothesis.effect ? effect_label(*hypothesis.effect)
+                           : hypothesis.candidate.family + "@" + hypothesis.candidate.location;
+}
+
+std::vector<FoundParameter> parameters_of(const Effect& effect, const Calibration& fitted) {
+  const std::vector<discovery::Parameter> all = parameters(fitted.robot);
+  std::vector<FoundParameter> found;
+  for (const EffectParameter& parameter : effect_parameters(fitted.robot.chain, effect)) {
+    const std::string name = effect_parameter_name(effect, parameter);
+    const auto index = std::ranges::find(all, name, &discovery::Parameter::name) - all.begin();
+    found.push_back({parameter.name, all[static_cast<std::size_t>(index)].value, parameter.unit,
+                     fitted.result.standard_errors(index)});
+  }
+  return found;
+}
+
+}  // namespace
+
+void describe_shapes(const std::vector<Hypothesis>& hypotheses, const discovery::Verdict& verdict, Discovery& result) {
+  for (const discovery::Finding& finding : verdict.findings) {
+    for (const discovery::Term& term : finding.terms) {
+      if (finding.generic) result.unknown.push_back({hypotheses[term.candidate].shape, term.share});
+    }
+  }
+  std::ranges::stable_sort(result.unknown, std::greater<>{}, &FoundShape::share);
+}
+
+void describe_effects(const std::vector<Hypothesis>& hypotheses, const discovery::Verdict& verdict,
+                      const Calibration& fitted, Discovery& result) {
+  const double explained = verdict.sum_of_squares - verdict.left;
+  const auto samples = static_cast<double>(std::max<Eigen::Index>(1, fitted.result.residuals.size() / 3));
+  for (const discovery::Finding& finding : verdict.findings) {
+    for (const discovery::Term& term : finding.terms) {
+      const Hypothesis& hypothesis = hypotheses[term.candidate];
+      if (finding.generic || !hypothesis.effect) continue;
+      const std::string label = effect_label(*hypothesis.effect);
+      const auto fitted_effect = std::ranges::find(fitted.robot.effects, label, effect_label);
+      if (fitted_effect == fitted.robot.effects.end()) continue;
+      FoundEffect found;
+      found.effect = *fitted_effect;
+      found.title = effect_type(found.effect.type).title;
+      // Beside something unknown a name is a guess.
+      found.confirmed = finding.confirmed && result.answer != discovery::Answer::unknown;
+      found.share = finding.terms.size() == 1 ? finding.share : term.share;
+      found.rms_mm = std::sqrt(std::max(0.0, found.share * explained) / samples);
+      found.parameters = parameters_of(found.effect, fitted);
+      for (const discovery::Rival& rival : finding.rivals) {
+        std::string labels;
+        for (const std::size_t a : rival.candidates) labels += (labels.empty() ? "" : " + ") + label_of(hypotheses[a]);
+        found.rivals.push_back(labels);
+        found.exact_alias = found.exact_alias || rival.exact;
+      }
+      result.effects.push_back(std::move(found));
+    }
+  }
+}
+
+void describe_limits(const std::vector<Hypothesis>& hypotheses, const std::vector<Untestable>& untestable,
+                     const discovery::Verdict& verdict, const Robot& robot, Discovery& result) {
+  result.hypotheses = static_cast<int>(hypotheses.size());
+  result.score_gain = verdict.score_gain;
+  result.threshold = verdict.threshold;
+  result.noise_mm = verdict.noise;
+  result.lack_of_fit = verdict.lack_of_fit;
+  result.not_testable = untestable;
+  for (std::size_t a = 0; a < hypotheses.size(); ++a) {
+    if (!hypotheses[a].effect) continue;
+    const discovery::Sensitivity& own = verdict.sensitivity[a];
+    if (own.absorbed) {
+      result.not_testable.push_back(
+          {label_of(hypotheses[a]), "geometry, or what is in the model already, imitates it at these poses"});
+      continue;
+    }
+    result.visible.push_back({label_of(hypotheses[a]), own.visible.size() != 0 ? own.visible.maxCoeff() : 0.0,
+                              effect_parameters(robot.chain, *hypotheses[a].effect).front().unit});
+  }
+}
+
+void correct_rest(const Measurements& searched, const DiscoveryOptions& options, Discovery& result) {
+  constexpr Eigen::Index fewest = 100;
+  constexpr int folds = 5;
+  if (searched.count() < fewest) return;
+  FitOptions fitting;
+  fitting.blend.validity = ValidityChoice::crisp;
+  fitting.intervals = false;
+  fitting.selection.folds.seed = options.seed;
+  const Robot& robot = result.improved.robot;
+  const Eigen::VectorXd without = distances(positions(robot, searched.poses), searched);
+  Eigen::VectorXd with = without;
+  FoldOptions dealing;
+  dealing.count = folds;
+  dealing.seed = options.seed;
+  for (const Fold& fold : make_folds(searched.count(), dealing)) {
+    const CorrectedRobot trained{robot, fit_correction(robot, select(searched, fold.train), fitting).model};
+    const Measurements held_out = select(searched, fold.held_out);
+    with(fold.held_out) = distances(positions(trained, held_out.poses), held_out);
+  }
+  const Eigen::ArrayXd gain = (without - with).array();
+  const auto n = static_cast<double>(gain.size());
+  const double error = std::sqrt((gain - gain.mean()).square().sum() / (n - 1.0) / n);
+  constexpr double convincing = 2.0;
+  if (!(gain.mean() > convincing * error)) {
+    result.notes.push_back(fmt::format("A tree of the rest does not help: {:.4f} mm without, {:.4f} with it on poses left out.",
+                                       without.mean(), with.mean()));
+    return;
+  }
+  result.improved.correction = fit_correction(robot, searched, fitting).model;
+  result.notes.push_back(fmt::format("A tree of the rest lowers the error on poses left out from {:.4f} to {:.4f} mm.",
+                                     without.mean(), with.mean()));
+}
+
+}  // namespace llmt::robotics

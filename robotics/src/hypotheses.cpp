@@ -1,0 +1,139 @@
+#include "hypotheses.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+namespace llmt::robotics {
+namespace {
+
+std::string place_name(const Chain& chain, EffectPlace place, std::size_t index) {
+  return place == EffectPlace::robot ? "" : chain.joints[index].name;
+}
+
+double mean_of(const Poses& poses, const std::string& column) { return poses.covariates.at(column).mean(); }
+
+const Eigen::VectorXd* time_column(const Poses& poses) {
+  for (const char* name : {"time_s", "order"}) {
+    const auto found = poses.covariates.find(name);
+    if (found != poses.covariates.end()) return &found->second;
+  }
+  return nullptr;
+}
+
+// The variants of a type at a place that are worth a hypothesis of their own.
+std::vector<std::vector<double>> constants_for(const EffectType& type, const Scene& scene, std::size_t index) {
+  if (type.constants.empty()) return {{}};
+  if (type.name == "transmission_error") {
+    const std::optional<double>& ratio = scene.robot.chain.joints[index].gear_ratio;
+    if (!ratio) return {};
+    return {{*ratio}, {2.0 * *ratio}, {4.0 * *ratio}};
+  }
+  if (type.name == "hysteresis") return {{0.02}, {0.1}, {0.4}};
+  if (type.name == "thermal_growth" || type.name == "link_thermal_growth") return {{mean_of(scene.poses, "temp_C")}};
+  if (type.name == "drift" || type.name == "drift_curved") {
+    const Eigen::VectorXd& time = *time_column(scene.poses);
+    if (!(time.maxCoeff() > time.minCoeff())) return {};
+    return {{time.minCoeff(), time.maxCoeff()}};
+  }
+  if (type.name == "tracker_knock" || type.name == "joint_map") return {};
+  std::vector<double> usual;
+  for (const EffectConstant& constant : type.constants) usual.push_back(constant.usual);
+  return {usual};
+}
+
+std::set<std::string> labels_of(const Robot& robot) {
+  std::set<std::string> labels;
+  for (const Effect& effect : robot.effects) labels.insert(effect_label(effect));
+  return labels;
+}
+
+}  // namespace
+
+void set_limits(const EffectType& type, Eigen::Index values, discovery::Candidate& candidate) {
+  candidate.lower.resize(values);
+  candidate.upper.resize(values);
+  for (Eigen::Index k = 0; k < values; ++k) {
+    const EffectParameter& parameter = type.parameters[type.parameters[0].list ? 0 : static_cast<std::size_t>(k)];
+    candidate.lower(k) = parameter.lower;
+    candidate.upper(k) = parameter.upper;
+  }
+}
+
+Scene make_scene(const Robot& robot, const Poses& poses, const Eigen::VectorXd& residuals,
+                 const std::array<bool, 3>& measured) {
+  Scene scene{robot, poses, residuals, measured, {}, residuals};
+  const Kinematics kinematics(robot.chain);
+  scene.lever.assign(robot.chain.joints.size(), Eigen::MatrixXd::Zero(3 * poses.count(), 1));
+  Eigen::VectorXd size(poses.count());
+  for (Eigen::Index i = 0; i < poses.count(); ++i) {
+    const auto jacobian = kinematics.joint_jacobian(poses.joints.row(i).transpose());
+    for (std::size_t j = 0; j < scene.lever.size(); ++j) {
+      for (Eigen::Index axis = 0; axis < 3; ++axis) {
+        if (measured[static_cast<std::size_t>(axis)])
+          scene.lever[j](3 * i + axis, 0) = jacobian(axis, static_cast<Eigen::Index>(j));
+      }
+    }
+    size(i) = residuals.segment(3 * i, 3).norm();
+  }
+  // A lost beam would draw every scan to itself; whether it is an outlier is for the search to say.
+  std::vector<double> sorted(size.begin(), size.end());
+  std::ranges::nth_element(sorted, sorted.begin() + std::ssize(sorted) / 2);
+  constexpr double far_beyond = 6.0;
+  const double limit = far_beyond * sorted[sorted.size() / 2];
+  for (Eigen::Index i = 0; i < size.size(); ++i) {
+    if (size(i) > limit) scene.clipped.segment(3 * i, 3) *= limit / size(i);
+  }
+  return scene;
+}
+
+std::vector<Hypothesis> catalogue_hypotheses(const Scene& scene, const std::vector<EffectType>& catalogue,
+                                             std::vector<Untestable>& untestable) {
+  const Chain& chain = scene.robot.chain;
+  const std::set<std::string> present = labels_of(scene.robot);
+  std::vector<Hypothesis> hypotheses;
+  for (const EffectType& type : catalogue) {
+    if (!type.searched) continue;
+    const std::size_t places = type.place == EffectPlace::robot ? 1 : chain.joints.size();
+    for (std::size_t index = 0; index < places; ++index) {
+      std::string why;
+      const std::string place = place_name(chain, type.place, index);
+      if (!suits(type, chain, index, &why)) continue;
+      if (!has_columns(type, chain, index, scene.poses, &why)) {
+        untestable.push_back({place.empty() ? type.name : type.name + "@" + place, "there is no column " + why});
+        continue;
+      }
+      for (const std::vector<double>& constants : constants_for(type, scene, index)) {
+        Effect effect = make_effect(type, chain, index, constants);
+        if (present.contains(effect_label(effect))) continue;
+        Hypothesis hypothesis;
+        hypothesis.candidate.family = type.family;
+        hypothesis.candidate.location = place;
+        if (type.name == "transmission_error") hypothesis.candidate.location += fmt::format("[{}]", constants[0]);
+        set_limits(type, std::ssize(effect.values), hypothesis.candidate);
+        hypothesis.effect = std::move(effect);
+        hypotheses.push_back(std::move(hypothesis));
+      }
+    }
+  }
+  return hypotheses;
+}
+
+void add_signatures(const Scene& scene, std::vector<Hypothesis>& hypotheses) {
+  std::vector<Effect> effects;
+  for (const Hypothesis& hypothesis : hypotheses) {
+    if (hypothesis.effect) effects.push_back(*hypothesis.effect);
+  }
+  const Eigen::MatrixXd all = effect_signatures(scene.robot, effects, scene.poses);
+  Eigen::Index next = 0;
+  for (Hypothesis& hypothesis : hypotheses) {
+    if (!hypothesis.effect) continue;
+    const Eigen::Index k = std::ssize(hypothesis.effect->values);
+    hypothesis.candidate.signature = all.middleCols(next, k);
+    next += k;
+  }
+}
+
+}  // namespace llmt::robotics
