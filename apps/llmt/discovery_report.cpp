@@ -67,14 +67,15 @@ void print_found(const Missing& missing) {
 
 std::string headline(const Missing& missing) {
   const auto causes = std::ranges::count_if(missing.found, [](const FoundTerm& f) { return !f.generic; });
-  switch (missing.verdict.answer) {
+  const auto sure = std::ranges::count_if(missing.found, &FoundTerm::confirmed);
+  const std::string terms = causes == 1 ? "one term is" : fmt::format("{} terms are", causes);
+  switch (missing.answer) {
     case Answer::nothing_missing:
       return "nothing is missing that these rows could show";
     case Answer::named:
-      return causes == 1 ? "one term is missing" : fmt::format("{} terms are missing", causes);
+      return terms + (sure < causes ? " missing, but not all of this is certain" : " missing");
     case Answer::indistinguishable:
-      return fmt::format("{} missing, but other terms explain it as well",
-                         causes == 1 ? "one term is" : fmt::format("{} terms are", causes));
+      return terms + " missing, but other terms explain it as well";
     case Answer::unknown:
       return "something is missing that no term tried explains";
   }
@@ -191,6 +192,13 @@ void print_report(const DiscoveryReport& report) {
   print(fmt::format("Evidence {} where chance reaches {}.\n", number(missing.verdict.score_gain, 3),
                     number(missing.verdict.threshold, 3)));
   print_found(missing);
+  for (const discovery::Structure& left : missing.structure) {
+    print(fmt::format(
+        "\nNot explained: rows that are close in {} deviate alike in {}, {:.0f} % of what can be explained (p = "
+        "{:.1g} in noise).\n",
+        fmt::join(left.inputs, ", "), left.output, 100.0 * left.share, left.p_value));
+  }
+  for (const std::string& note : missing.notes) print(fmt::format("\nNote: {}.\n", note));
   for (std::size_t k = 0; k < missing.parameters.size(); ++k) {
     const discovery::Parameter& parameter = missing.parameters[k];
     if (!parameter.free) continue;
@@ -209,7 +217,7 @@ void print_report(const DiscoveryReport& report) {
   if (lack.dof > 0 && lack.p_value < surprising) {
     print(fmt::format("\nThe scatter that is left exceeds that of rows of equal inputs (p = {:.2g}).\n", lack.p_value));
   }
-  if (missing.verdict.answer == Answer::nothing_missing) print_visible(missing);
+  if (missing.answer == Answer::nothing_missing) print_visible(missing);
   if (!missing.not_testable.empty()) {
     print("\nNot testable with these rows:\n");
     for (const discovery::Untestable& entry : missing.not_testable)
@@ -242,6 +250,13 @@ Json report_json(const DiscoveryReport& report) {
                       {"per_turn", nullptr},
                       {"kind", found.formula},
                       {"share", found.share}});
+  }
+  for (const discovery::Structure& left : missing.structure) {
+    shapes.push_back({{"acts_on", left.output},
+                      {"depends_on", left.inputs},
+                      {"per_turn", nullptr},
+                      {"kind", "not explained"},
+                      {"share", left.share}});
   }
   Json gaps = Json::array();
   for (const discovery::Gap& gap : missing.gaps) {
@@ -277,7 +292,7 @@ Json report_json(const DiscoveryReport& report) {
                         {"unit", parameter.unit},
                         {"std_error", number_or_null(missing.standard_errors(static_cast<Eigen::Index>(k)))}});
   }
-  return {{"verdict", discovery::to_string(missing.verdict.answer)},
+  return {{"verdict", discovery::to_string(missing.answer)},
           {"effects", effects},
           {"unknown", shapes.empty() ? Json(nullptr) : shapes[0]},
           {"unknown_all", shapes},
@@ -290,6 +305,7 @@ Json report_json(const DiscoveryReport& report) {
             {"outputs", gaps}}},
           {"regions", regions},
           {"outliers", missing.outliers},
+          {"notes", missing.notes},
           {"not_testable", untestable},
           {"smallest_visible", visible},
           {"score_gain", missing.verdict.score_gain},

@@ -116,7 +116,7 @@ std::vector<discovery::ModelTerm> read_terms(const std::string& path, const disc
     const Eigen::MatrixXd values = terms.back().columns(rows, {});
     for (Eigen::Index i = 0; i < values.rows(); ++i) {
       if (!std::isfinite(values(i, 0))) {
-        refuse(fmt::format("{}: \"{}\" is {} at data row {}", name, expression, values(i, 0), i + 1));
+        refuse(fmt::format("{}: \"{}\" is not a finite number at data row {}", name, expression, i + 1));
       }
     }
   }

@@ -201,8 +201,7 @@ double mean_distance(double sigma, Eigen::Index components) {
   return sigma * std::sqrt(2.0) * std::exp(std::lgamma(0.5 * (d + 1.0)) - std::lgamma(0.5 * d));
 }
 
-void verify(const Measurements& searched, const Measurements& test, Eigen::Index components,
-            const discovery::Verdict& verdict, Discovery& result) {
+void verify(const Measurements& searched, const Measurements& test, Eigen::Index components, Discovery& result) {
   result.fitted_before = figures({result.before, {}}, searched);
   result.fitted_after = figures(result.improved, searched);
   if (test.count() > 0) {
@@ -211,9 +210,41 @@ void verify(const Measurements& searched, const Measurements& test, Eigen::Index
     result.held_out.poses = test.count();
   }
   constexpr Eigen::Index enough = 12;
-  const bool repeats_speak = verdict.lack_of_fit.dof >= enough;
+  const bool repeats_speak = result.lack_of_fit.dof >= enough;
   result.held_out.floor_from_repeats = repeats_speak;
-  result.held_out.floor_mm = mean_distance(repeats_speak ? verdict.lack_of_fit.noise : verdict.noise, components);
+  result.held_out.floor_mm = mean_distance(repeats_speak ? result.lack_of_fit.noise : result.noise_mm, components);
+}
+
+Discovery discover_in(const Robot& robot, const Split& split, const DiscoveryOptions& options) {
+  // Maps that the robot has already move its joints; what is sought is sought beside them.
+  const Unmapped plain = unmapped(robot, split.samples);
+  Discovery result;
+  say(options, "calibrating");
+  Investigation investigation{.searched = plain.measurements};
+  investigation.baseline = calibrate(plain.robot, investigation.searched, options.calibration);
+  investigation.search(options);
+  const discovery::Verdict& verdict = investigation.verdict;
+  result.answer = verdict.answer;
+  describe_shapes(investigation.asked.hypotheses, verdict, result);
+  if (options.maps && verdict.answer == discovery::Answer::unknown) add_maps(investigation, options, result);
+  describe_effects(investigation.asked.hypotheses, verdict, investigation.fitted, options.mass_uncertainty, result);
+  describe_limits(investigation.asked.hypotheses, investigation.asked.untestable, verdict, robot, result);
+  for (const std::size_t sample : verdict.outliers) {
+    for (const Eigen::Index row : searched_rows(split, sample)) result.outliers.push_back(row);
+  }
+  const Measurements kept = without_rows(split.samples, verdict.outliers);
+  result.before = calibrate(robot, kept, options.calibration).robot;
+  result.rounds = investigation.rounds;
+  result.improved.robot = investigation.fitted.robot;
+  for (const std::vector<Effect>* maps : {&plain.maps, static_cast<const std::vector<Effect>*>(&result.maps)}) {
+    result.improved.robot.effects.insert(result.improved.robot.effects.end(), maps->begin(), maps->end());
+  }
+  if (options.correct && result.answer == discovery::Answer::unknown) {
+    say(options, "trying a correction");
+    correct_rest(kept, options, result);
+  }
+  locate(kept, result);
+  return result;
 }
 
 }  // namespace
@@ -222,46 +253,25 @@ Discovery discover(const Robot& robot, const Measurements& measurements, const s
                    const DiscoveryOptions& options) {
   validate(robot);
   validate(measurements, robot);
-  const Split split = set_aside(measurements, test, options);
-  // Maps that the robot has already move its joints; what is sought is sought beside them.
-  Unmapped plain = unmapped(robot, without_dwelling(split.searched));
-  const Eigen::Index components = std::ranges::count(plain.measurements.measured, true);
-  const Eigen::Index count = plain.measurements.count();
-  if (count * components < 10) {
-    throw std::invalid_argument(fmt::format("llmt::robotics::discover: {} poses to search are too few", count));
+  const Split split = set_aside(measurements, test, options, Repeats::as_marked);
+  const Eigen::Index components = std::ranges::count(measurements.measured, true);
+  if (split.samples.count() * components < 10) {
+    throw std::invalid_argument(
+        fmt::format("llmt::robotics::discover: {} poses to search are too few", split.samples.count()));
   }
-  Discovery result;
-  say(options, "calibrating");
-  Investigation investigation{.searched = std::move(plain.measurements)};
-  investigation.baseline = calibrate(plain.robot, investigation.searched, options.calibration);
-  result.before = investigation.baseline.robot;
-  investigation.search(options);
-  const discovery::Verdict& verdict = investigation.verdict;
-  result.answer = verdict.answer;
-  describe_shapes(investigation.asked.hypotheses, verdict, result);
-  if (options.maps && verdict.answer == discovery::Answer::unknown) add_maps(investigation, options, result);
-  describe_effects(investigation.asked.hypotheses, verdict, investigation.fitted, result);
-  describe_limits(investigation.asked.hypotheses, investigation.asked.untestable, verdict, robot, result);
-  for (const std::size_t sample : verdict.outliers) {
-    for (const Eigen::Index row : searched_rows(split, sample)) result.outliers.push_back(row);
+  Discovery result = discover_in(robot, split, options);
+  // Repeats that scatter less than everything else do not show all of the noise, whatever the file says: then what was
+  // found must stand without counting them as independent.
+  constexpr Eigen::Index enough = 12;
+  const bool doubtful = result.answer != discovery::Answer::nothing_missing && result.lack_of_fit.dof >= enough &&
+                        result.lack_of_fit.p_value < 0.05;
+  if (doubtful) {
+    const discovery::LackOfFit repeats = result.lack_of_fit;
+    result = discover_in(robot, set_aside(measurements, test, options, Repeats::averaged), options);
+    result.lack_of_fit = repeats;
+    result.notes.emplace_back("Repeats of a pose scatter less than the rest: each pose was counted once.");
   }
-  if (!verdict.outliers.empty()) {
-    result.before = calibrate(robot, without_rows(without_dwelling(split.searched), verdict.outliers), options.calibration).robot;
-  }
-  result.rounds = investigation.rounds;
-  result.improved.robot = investigation.fitted.robot;
-  for (const std::vector<Effect>* maps : {&plain.maps, &result.maps}) {
-    result.improved.robot.effects.insert(result.improved.robot.effects.end(), maps->begin(), maps->end());
-  }
-  if (verdict.outliers.empty()) {
-    result.before.effects.insert(result.before.effects.end(), plain.maps.begin(), plain.maps.end());
-  }
-  if (options.correct && result.answer == discovery::Answer::unknown) {
-    say(options, "trying a correction");
-    correct_rest(without_rows(without_dwelling(split.searched), verdict.outliers), options, result);
-  }
-  locate(without_rows(without_dwelling(split.searched), verdict.outliers), result);
-  verify(split.searched, split.test, components, verdict, result);
+  verify(split.searched, split.test, components, result);
   return result;
 }
 

@@ -15,14 +15,15 @@ std::string label_of(const Hypothesis& hypothesis) {
                            : hypothesis.candidate.family + "@" + hypothesis.candidate.location;
 }
 
-std::vector<FoundParameter> parameters_of(const Effect& effect, const Calibration& fitted) {
+std::vector<FoundParameter> parameters_of(const Effect& effect, const Calibration& fitted, double mass_uncertainty) {
   const std::vector<discovery::Parameter> all = parameters(fitted.robot);
   std::vector<FoundParameter> found;
   for (const EffectParameter& parameter : effect_parameters(fitted.robot.chain, effect)) {
     const std::string name = effect_parameter_name(effect, parameter);
     const auto index = std::ranges::find(all, name, &discovery::Parameter::name) - all.begin();
-    found.push_back({parameter.name, all[static_cast<std::size_t>(index)].value, parameter.unit,
-                     fitted.result.standard_errors(index)});
+    const double value = all[static_cast<std::size_t>(index)].value;
+    const double known = effect_type(effect.type).weighted ? mass_uncertainty * value : 0.0;
+    found.push_back({parameter.name, value, parameter.unit, std::hypot(fitted.result.standard_errors(index), known)});
   }
   return found;
 }
@@ -39,7 +40,7 @@ void describe_shapes(const std::vector<Hypothesis>& hypotheses, const discovery:
 }
 
 void describe_effects(const std::vector<Hypothesis>& hypotheses, const discovery::Verdict& verdict,
-                      const Calibration& fitted, Discovery& result) {
+                      const Calibration& fitted, double mass_uncertainty, Discovery& result) {
   const double explained = verdict.sum_of_squares - verdict.left;
   const auto samples = static_cast<double>(std::max<Eigen::Index>(1, fitted.result.residuals.size() / 3));
   for (const discovery::Finding& finding : verdict.findings) {
@@ -56,7 +57,7 @@ void describe_effects(const std::vector<Hypothesis>& hypotheses, const discovery
       found.confirmed = finding.confirmed && result.answer != discovery::Answer::unknown;
       found.share = finding.terms.size() == 1 ? finding.share : term.share;
       found.rms_mm = std::sqrt(std::max(0.0, found.share * explained) / samples);
-      found.parameters = parameters_of(found.effect, fitted);
+      found.parameters = parameters_of(found.effect, fitted, mass_uncertainty);
       for (const discovery::Rival& rival : finding.rivals) {
         std::string labels;
         for (const std::size_t a : rival.candidates) labels += (labels.empty() ? "" : " + ") + label_of(hypotheses[a]);

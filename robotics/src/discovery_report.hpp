@@ -6,7 +6,7 @@
 namespace llmt::robotics {
 
 void describe_effects(const std::vector<Hypothesis>& hypotheses, const discovery::Verdict& verdict,
-                      const Calibration& fitted, Discovery& result);
+                      const Calibration& fitted, double mass_uncertainty, Discovery& result);
 void describe_shapes(const std::vector<Hypothesis>& hypotheses, const discovery::Verdict& verdict, Discovery& result);
 
 /// What could not be told, and from what size on it would have been.

@@ -24,10 +24,43 @@ const Eigen::VectorXd* column(const Poses& poses, const char* name) {
   return found == poses.covariates.end() ? nullptr : &found->second;
 }
 
+Measurements averaged(const Measurements& measurements, Repeats repeats,
+                      std::vector<std::vector<Eigen::Index>>& samples) {
+  const Eigen::VectorXd* pose = column(measurements.poses, "pose");
+  const Eigen::VectorXd* dwelled = column(measurements.poses, "dwelled");
+  const Eigen::VectorXd* returned = column(measurements.poses, "returned");
+  std::map<double, std::size_t> groups;
+  samples.clear();
+  for (Eigen::Index i = 0; i < measurements.count(); ++i) {
+    const bool stood_still = (dwelled != nullptr && (*dwelled)(i) != 0.0) || (returned != nullptr && (*returned)(i) == 0.0);
+    if (pose != nullptr && (stood_still || repeats == Repeats::averaged)) {
+      const auto [group, is_new] = groups.try_emplace((*pose)(i), samples.size());
+      if (!is_new) {
+        samples[group->second].push_back(i);
+        continue;
+      }
+    }
+    samples.push_back({i});
+  }
+  if (std::ssize(samples) == measurements.count()) return measurements;
+  std::vector<std::ptrdiff_t> first;
+  for (const auto& sample : samples) first.push_back(sample.front());
+  Measurements result = select(measurements, first);
+  for (std::size_t s = 0; s < samples.size(); ++s) {
+    const auto row = static_cast<Eigen::Index>(s);
+    result.positions_mm.row(row) = measurements.positions_mm(samples[s], Eigen::all).colwise().mean();
+    result.poses.joints.row(row) = measurements.poses.joints(samples[s], Eigen::all).colwise().mean();
+    for (auto& [name, values] : result.poses.covariates) {
+      values(row) = measurements.poses.covariates.at(name)(samples[s]).mean();
+    }
+  }
+  return result;
+}
+
 }  // namespace
 
 Split set_aside(const Measurements& measurements, const std::optional<Measurements>& test,
-                const DiscoveryOptions& options) {
+                const DiscoveryOptions& options, Repeats repeats) {
   Split split;
   std::vector<std::ptrdiff_t> searched = all_rows(measurements.count());
   if (test) {
@@ -53,50 +86,14 @@ Split set_aside(const Measurements& measurements, const std::optional<Measuremen
     split.test = select(measurements, tested);
   }
   split.searched = select(measurements, searched);
-  split.rows.assign(searched.begin(), searched.end());
-  without_dwelling(split.searched, &split.merged);
+  split.samples = averaged(split.searched, repeats, split.rows);
+  for (std::vector<Eigen::Index>& sample : split.rows) {
+    for (Eigen::Index& row : sample) row = searched[static_cast<std::size_t>(row)];
+  }
   return split;
 }
 
-Measurements without_dwelling(const Measurements& measurements, std::vector<std::vector<Eigen::Index>>* merged) {
-  const Eigen::VectorXd* pose = column(measurements.poses, "pose");
-  const Eigen::VectorXd* dwelled = column(measurements.poses, "dwelled");
-  const Eigen::VectorXd* returned = column(measurements.poses, "returned");
-  std::vector<std::vector<Eigen::Index>> samples;
-  std::map<double, std::size_t> groups;
-  for (Eigen::Index i = 0; i < measurements.count(); ++i) {
-    const bool stood_still = pose != nullptr && ((dwelled != nullptr && (*dwelled)(i) != 0.0) ||
-                                                 (returned != nullptr && (*returned)(i) == 0.0));
-    if (stood_still) {
-      const auto [group, is_new] = groups.try_emplace((*pose)(i), samples.size());
-      if (!is_new) {
-        samples[group->second].push_back(i);
-        continue;
-      }
-    }
-    samples.push_back({i});
-  }
-  if (merged != nullptr) *merged = samples;
-  if (std::ssize(samples) == measurements.count()) return measurements;
-  std::vector<std::ptrdiff_t> first;
-  for (const auto& sample : samples) first.push_back(sample.front());
-  Measurements result = select(measurements, first);
-  for (std::size_t s = 0; s < samples.size(); ++s) {
-    const auto row = static_cast<Eigen::Index>(s);
-    result.positions_mm.row(row) = measurements.positions_mm(samples[s], Eigen::all).colwise().mean();
-    result.poses.joints.row(row) = measurements.poses.joints(samples[s], Eigen::all).colwise().mean();
-    for (auto& [name, values] : result.poses.covariates) {
-      values(row) = measurements.poses.covariates.at(name)(samples[s]).mean();
-    }
-  }
-  return result;
-}
-
-std::vector<Eigen::Index> searched_rows(const Split& split, std::size_t sample) {
-  std::vector<Eigen::Index> rows;
-  for (const Eigen::Index i : split.merged[sample]) rows.push_back(split.rows[static_cast<std::size_t>(i)]);
-  return rows;
-}
+std::vector<Eigen::Index> searched_rows(const Split& split, std::size_t sample) { return split.rows[sample]; }
 
 std::vector<Eigen::Index> repeats_of(const Poses& poses) {
   const Eigen::VectorXd* pose = column(poses, "pose");

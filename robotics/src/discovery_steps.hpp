@@ -8,20 +8,22 @@
 
 namespace llmt::robotics {
 
+/// How repeats of a pose are taken: as independent measurements unless the file says that the arm stood still, or each
+/// pose as one.
+enum class Repeats { as_marked, averaged };
+
 struct Split {
   Measurements searched;
-  Measurements test;                    ///< no poses: nothing was set aside
-  std::vector<Eigen::Index> rows;       ///< of the file, of every searched pose
-  std::vector<std::vector<Eigen::Index>> merged;  ///< searched poses behind each sample of without_dwelling()
+  Measurements test;     ///< no poses: nothing was set aside
+  Measurements samples;  ///< what is searched: `searched` with readings of an arm that stood still averaged
+  std::vector<std::vector<Eigen::Index>> rows;  ///< of the file, behind every sample
 };
 
-/// Sets a share aside, repeats of a pose together; or takes the test measurements as given.
+/// Sets a share aside, repeats of a pose together; or takes the test measurements as given. Readings taken while the arm
+/// stood still are one measurement of that pose (`pose` with `dwelled` = 1 or `returned` = 0): their scatter is the
+/// instrument's, not the arm's.
 Split set_aside(const Measurements& measurements, const std::optional<Measurements>& test,
-                const DiscoveryOptions& options);
-
-/// Readings taken while the arm stood still are one measurement of that pose: their scatter is the instrument's, not the
-/// arm's. Groups of `pose` with `dwelled` = 1 or `returned` = 0 are replaced by their means.
-Measurements without_dwelling(const Measurements& measurements, std::vector<std::vector<Eigen::Index>>* merged = nullptr);
+                const DiscoveryOptions& options, Repeats repeats);
 
 std::vector<Eigen::Index> searched_rows(const Split& split, std::size_t sample);
 

@@ -44,6 +44,11 @@ std::vector<std::vector<double>> constants_for(const EffectType& type, const Sce
   return {usual};
 }
 
+bool masses_known(const Chain& chain, std::size_t index) {
+  return std::any_of(chain.joints.begin() + static_cast<std::ptrdiff_t>(index), chain.joints.end(),
+                     [](const Joint& joint) { return joint.mass_kg > 0.0; });
+}
+
 std::set<std::string> labels_of(const Robot& robot) {
   std::set<std::string> labels;
   for (const Effect& effect : robot.effects) labels.insert(effect_label(effect));
@@ -101,6 +106,8 @@ std::vector<Hypothesis> catalogue_hypotheses(const Scene& scene, const std::vect
       std::string why;
       const std::string place = place_name(chain, type.place, index);
       if (!suits(type, chain, index, &why)) continue;
+      // A function of all joints beyond with three unknowns a body imitates much: only where nothing better is known.
+      if (type.name == "joint_compliance_free_masses" && masses_known(chain, index)) continue;
       if (!has_columns(type, chain, index, scene.poses, &why)) {
         untestable.push_back({place.empty() ? type.name : type.name + "@" + place, "there is no column " + why});
         continue;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -61,6 +62,7 @@ Evaluator::Evaluator(const Robot& robot, const Poses& poses)
   }
   payload_ = find_column(poses, "payload_kg");
   for (const Effect& effect : robot.effects) effects_.push_back(prepare(robot.chain, effect, poses));
+  bears_loads_ = std::ranges::any_of(effects_, [](const PreparedEffect& effect) { return effect.type->elastic; });
   levers_.joint.resize(robot.chain.joints.size());
   levers_.link.resize(robot.chain.joints.size());
 }
@@ -118,12 +120,18 @@ void Evaluator::deform(PoseContext& pose, Eigen::Index row, const PreparedEffect
   }
 }
 
+// Equilibrium: loads are those of the deformed arm, which the first pass finds to first order. Deflections are some
+// thousandths of the levers, so every pass gains three digits.
 Eigen::Vector3d Evaluator::position(Eigen::Index row) {
+  constexpr int passes = 3;
   q_ = poses_.joints.row(row).transpose();
   if (effects_.empty()) return kinematics_.forward(q_).position_mm;
   kinematics_.skeleton_into(rigid_, q_);
-  PoseContext pose = context(row);
-  deform(pose, row, nullptr, deformation_);
+  for (int pass = 0; pass < (bears_loads_ ? passes : 1); ++pass) {
+    if (pass > 0) kinematics_.skeleton_into(rigid_, q_, &deformation_);
+    PoseContext pose = context(row);
+    deform(pose, row, nullptr, deformation_);
+  }
   return kinematics_.forward(q_, &deformation_).position_mm;
 }
 

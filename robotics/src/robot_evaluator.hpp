@@ -58,6 +58,7 @@ class Evaluator {
   Kinematics kinematics_;
   std::vector<PreparedEffect> effects_;
   const Eigen::VectorXd* payload_ = nullptr;
+  bool bears_loads_ = false;
 
   Eigen::VectorXd q_;
   Skeleton rigid_;

@@ -93,12 +93,18 @@ Arm build(Arm& described, llmt::Random& random, bool true_masses) {
 
   Arm arm = described;
   for (Joint& joint : arm.joints) {
-    joint.theta += off(random, 2e-4, 2e-3);
+    // An arm whose first axis is not where the description has it to gravity is tilted; geometry takes that into the base
+    // frame unseen, but a soft arm shows it. Where softness is described, tilt is an effect of its own.
+    const bool plumb = true_masses && &joint == &arm.joints.front();
+    const double theta = off(random, 2e-4, 2e-3);
+    joint.theta += plumb && arm.planar ? 0.0 : theta;
     joint.a += off(random, 2e-4, 1e-3);
     if (!arm.planar) {
       joint.d += off(random, 2e-4, 1e-3);
-      joint.alpha += off(random, 2e-4, 2e-3);
-      joint.beta += off(random, 2e-4, 2e-3);
+      const double alpha = off(random, 2e-4, 2e-3);
+      const double beta = off(random, 2e-4, 2e-3);
+      joint.alpha += plumb && arm.mdh ? 0.0 : alpha;
+      joint.beta += plumb && arm.mdh ? 0.0 : beta;
     }
     if (!true_masses) {
       joint.mass *= 1.0 + random.uniform(-0.06, 0.06);

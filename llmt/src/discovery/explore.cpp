@@ -119,6 +119,12 @@ std::vector<std::size_t> competing_outliers(const Workspace& workspace, const st
   while (current.dropped().size() < largest) {
     const Scoring scoring(current, candidates);
     const double score = scoring.score(set);
+    if (score == impossible) {
+      // Without the dropped samples its candidates depend on each other.
+      if (set.empty()) break;
+      set.clear();
+      continue;
+    }
     const Suspect suspect = worst_sample(scoring, scoring.fit(set), set);
     const Explained grown =
         std::ssize(set) < largest_set ? best_addition(scoring, set, all, std::min(score, suspect.score)) : Explained{};
@@ -139,8 +145,9 @@ std::vector<std::size_t> outliers_given(const Workspace& workspace, const std::v
   while (current.dropped().size() < largest) {
     const Scoring scoring(current, candidates);
     const SetFit fit = scoring.fit(set);
+    if (!fit.solvable) break;
     const Suspect suspect = worst_sample(scoring, fit, set);
-    if (!fit.solvable || suspect.score >= scoring.misfit(fit.left, std::ssize(fit.columns)) + scoring.cost(set)) break;
+    if (suspect.score >= scoring.misfit(fit.left, std::ssize(fit.columns)) + scoring.cost(set)) break;
     current.drop({suspect.sample});
   }
   return current.dropped();

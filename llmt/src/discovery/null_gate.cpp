@@ -63,11 +63,11 @@ Draws sign_draws(const Workspace& workspace, int count, Random& random) {
   return draws;
 }
 
-double best_gain(const Scoring& scoring, const Draws& draws, Eigen::Index draw) {
+double best_gain(const Scoring& scoring, const Draws& draws, Eigen::Index draw, bool scanned) {
   const double n = scoring.workspace().degrees();
   double best = -impossible;
   for (std::size_t a = 0; a < scoring.candidates().size(); ++a) {
-    if (!scoring.usable(a)) continue;
+    if (!scoring.usable(a) || (!scanned && scoring.candidates()[a].prior_cost > 0.0)) continue;
     const Block& block = scoring.workspace().blocks()[a];
     const double share = draws.moments.col(draw).segment(block.begin, block.size).squaredNorm() / draws.squares(draw);
     const double outlier_free_cost = scoring.single_cost(a) - scoring.cost({});
@@ -77,10 +77,10 @@ double best_gain(const Scoring& scoring, const Draws& draws, Eigen::Index draw) 
   return best;
 }
 
-double quantile_beyond(const Scoring& scoring, const Draws& draws, double rate) {
+double quantile_beyond(const Scoring& scoring, const Draws& draws, double rate, bool scanned) {
   constexpr double seen = 0.1;
   std::vector<double> gains;
-  for (Eigen::Index i = 0; i < draws.moments.cols(); ++i) gains.push_back(best_gain(scoring, draws, i));
+  for (Eigen::Index i = 0; i < draws.moments.cols(); ++i) gains.push_back(best_gain(scoring, draws, i, scanned));
   const auto place = gains.begin() + static_cast<std::ptrdiff_t>((1.0 - seen) * static_cast<double>(gains.size()));
   std::ranges::nth_element(gains, place);
   return *place + 2.0 * std::log(seen / rate);
@@ -92,9 +92,10 @@ double chance_gain(const Scoring& scoring, const SearchOptions& options) {
   if (scoring.workspace().basis().cols() == 0) return 0.0;
   Random random(options.seed);
   const double normal = quantile_beyond(scoring, normal_draws(scoring.workspace(), options.null_draws, random),
-                                        options.false_alarm_rate);
+                                        options.false_alarm_rate, true);
+  // A candidate that was placed where the largest residuals are stays near them whatever their signs.
   const double flipped =
-      quantile_beyond(scoring, sign_draws(scoring.workspace(), options.null_draws, random), options.false_alarm_rate);
+      quantile_beyond(scoring, sign_draws(scoring.workspace(), options.null_draws, random), options.false_alarm_rate, false);
   return std::max({0.0, normal, flipped});
 }
 

@@ -56,7 +56,8 @@ double Scoring::misfit(double left, Eigen::Index directions) const {
   if (used > largest_share * n) return impossible;
   // Exact data: below rounding nothing can be told apart.
   constexpr double rounding = 1e-20;
-  return n * std::log(std::max(left, rounding * (1.0 + workspace_->sum_of_squares())) / (n - used));
+  const double least = std::max(rounding * workspace_->given_sum_of_squares(), std::numeric_limits<double>::min());
+  return n * std::log(std::max(left, least) / (n - used));
 }
 
 double Scoring::outlier_cost() const {

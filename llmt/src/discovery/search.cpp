@@ -145,8 +145,10 @@ std::vector<Rival> rivals_of(const Scoring& scoring, const Set& set, const std::
       if (next.score >= current.score) break;
       current = next;
     }
-    if (current.set.size() == rest.size() || current.score > score + options.rival_margin) continue;
+    if (current.set.size() == rest.size()) continue;
     const double difference = scoring.fit(current.set).left - left;
+    const bool as_good = current.score <= score + options.rival_margin || difference < options.model_error * explained;
+    if (!as_good) continue;
     rivals.push_back({other, filtered(current.set, [&](std::size_t a) { return !contains(rest, a); }),
                       current.score - score, std::abs(difference) < same * explained});
   }
@@ -212,7 +214,11 @@ std::vector<Sensitivity> sensitivities(const Scoring& scoring, double threshold,
     Sensitivity own{block.size == 0, block.outside, Eigen::VectorXd::Constant(k, impossible)};
     if (block.size > 0) {
       const double needed = std::max(0.0, threshold) + scoring.single_cost(a) - scoring.cost({});
-      const double energy = std::pow(std::sqrt(std::max(0.0, needed)) + power_quantile, 2.0);
+      // The gain of an energy E, in units of the noise: n ln(1 + E / (n - k)) - n ln(n / (n - k)).
+      const double n = scoring.workspace().degrees();
+      const double left = std::max(1.0, n - static_cast<double>(block.size));
+      const double least = left * std::expm1(std::max(0.0, needed) / n + std::log(std::max(1.0, n / left)));
+      const double energy = std::pow(std::sqrt(least) + power_quantile, 2.0);
       // |U' S_i v|: how much a unit of value i alone contributes outside the baseline.
       const Eigen::MatrixXd to_coefficients = block.to_values.completeOrthogonalDecomposition().pseudoInverse();
       for (Eigen::Index i = 0; i < k; ++i) {
@@ -263,6 +269,10 @@ Verdict search(const Evidence& evidence, const std::vector<Candidate>& candidate
   verdict.dof = static_cast<Eigen::Index>(scoring.dof(fit));
   verdict.noise = std::sqrt(fit.left / scoring.dof(fit));
   verdict.remaining = scoring.remaining(fit);
+  for (const std::size_t sample : verdict.outliers) {
+    const Eigen::Index d = workspace.components();
+    verdict.remaining.segment(static_cast<Eigen::Index>(sample) * d, d).setZero();
+  }
   verdict.lack_of_fit = lack_of_fit(scoring, fit, evidence.repeats, verdict.remaining);
   verdict.sensitivity = sensitivities(scoring, verdict.threshold, verdict.noise);
   for (const std::string& family : families_of(scoring, set)) {

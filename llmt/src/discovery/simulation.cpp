@@ -7,6 +7,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "missing_findings.hpp"
 #include "term_question.hpp"
 
 namespace llmt::discovery {
@@ -43,16 +44,6 @@ void check(const Simulation& simulation, const Inputs& inputs, const MeasuredOut
   }
 }
 
-FitData without_samples(const FitData& data, const std::vector<std::size_t>& left_out) {
-  std::vector<Eigen::Index> kept;
-  for (std::size_t i = 0; i < data.rows.size(); ++i) {
-    if (std::ranges::find(left_out, i) == left_out.end()) kept.push_back(static_cast<Eigen::Index>(i));
-  }
-  FitData result{{}, data.measured(kept, Eigen::all), data.sigma};
-  for (const Eigen::Index i : kept) result.rows.push_back(data.rows[static_cast<std::size_t>(i)]);
-  return result;
-}
-
 // Root mean square of what is left of each output, in its own unit.
 Eigen::VectorXd scatter(const TermModel& model, const FitData& data, const TermFit& fit) {
   const Eigen::MatrixXd predicted = model.predict(fit.parameters, fit.placed);
@@ -87,13 +78,6 @@ Key key_of(const std::vector<PlacedTerm>& placed, const std::vector<std::size_t>
 }
 
 // One search after the other until nothing changes.
-struct Progress {
-  TermFit fit;
-  Verdict verdict;
-  Question question;
-  int rounds = 0;
-};
-
 Progress search_until_settled(const TermModel& model, FitData& data, const std::vector<Eigen::Index>& repeats,
                               const TermFit& baseline, const MissingOptions& options) {
   Progress progress;
@@ -111,90 +95,8 @@ Progress search_until_settled(const TermModel& model, FitData& data, const std::
     if (key_of(progress.fit.placed, progress.verdict.outliers) == before) break;
     if (data.sigma.size() > 1 && progress.rounds < options.rounds) data.sigma = scatter(model, kept, progress.fit);
   }
+  tell_trial_errors(model, without_samples(data, progress.verdict.outliers), progress.fit);
   return progress;
-}
-
-std::string unit_of(const std::string& output, const std::string& per) {
-  if (per.empty()) return output;
-  if (per.starts_with("simulated")) return output + "/" + output + per.substr(std::string("simulated").size());
-  return output + "/" + per;
-}
-
-std::string label_of(const TermModel& model, const PlacedTerm& option) {
-  std::string text = model.label(option);
-  const std::vector<TermConstant>& constants = model.terms()[option.term].constants;
-  if (!constants.empty()) text += fmt::format(" ({} = {:.4g})", constants.front().name, option.constants(0));
-  return text;
-}
-
-FoundTerm described(const TermModel& model, const PlacedTerm& placed, const Eigen::VectorXd& errors) {
-  const ModelTerm& term = model.terms()[placed.term];
-  FoundTerm found;
-  found.term = placed.term;
-  found.family = term.family;
-  found.location = term.location;
-  found.output = model.outputs()[static_cast<std::size_t>(placed.output)];
-  found.output_index = placed.output;
-  found.formula = term.formula;
-  found.generic = term.generic;
-  found.coefficients = placed.coefficients;
-  found.constants = placed.constants;
-  for (std::size_t k = 0; k < term.coefficients.size(); ++k) {
-    const auto place = static_cast<Eigen::Index>(k);
-    found.values.push_back(
-        {term.coefficients[k], unit_of(found.output, term.per), placed.coefficients(place), errors(place)});
-  }
-  for (std::size_t c = 0; c < term.constants.size(); ++c) {
-    const auto place = static_cast<Eigen::Index>(c);
-    found.values.push_back({term.constants[c].name, term.constants[c].unit, placed.constants(place),
-                            errors(placed.coefficients.size() + place)});
-  }
-  return found;
-}
-
-void describe_findings(const TermModel& model, const Progress& progress, Missing& missing) {
-  std::size_t next = 0;
-  for (const Finding& finding : progress.verdict.findings) {
-    for (const Term& term : finding.terms) {
-      FoundTerm found = described(model, progress.fit.placed[next], progress.fit.errors[next]);
-      ++next;
-      found.confirmed = finding.confirmed;
-      found.share = term.share;
-      for (const Rival& rival : finding.rivals) {
-        std::string what;
-        for (const std::size_t a : rival.candidates) what += (what.empty() ? "" : " + ") + missing.candidates[a];
-        found.rivals.push_back({what, rival.exact});
-      }
-      missing.found.push_back(std::move(found));
-    }
-  }
-  std::ranges::stable_sort(missing.found, [](const FoundTerm& a, const FoundTerm& b) {
-    return a.generic != b.generic ? b.generic : a.share > b.share;
-  });
-}
-
-void describe_limits(const Progress& progress, const FitData& data, Missing& missing) {
-  const double n = static_cast<double>(data.rows.size());
-  for (std::size_t a = 0; a < progress.question.options.size(); ++a) {
-    const Candidate& candidate = progress.question.candidates[a];
-    const Sensitivity& own = progress.verdict.sensitivity[a];
-    const bool found = std::ranges::any_of(progress.verdict.findings, [&](const Finding& finding) {
-      return std::ranges::any_of(finding.terms, [&](const Term& term) { return term.candidate == a; });
-    });
-    if (candidate.generic || found) continue;
-    if (own.absorbed) {
-      missing.not_testable.push_back({missing.candidates[a], candidate.signature.norm() > 0.0
-                                                                 ? "the simulation's own parameters imitate it"
-                                                                 : "it is zero at every row"});
-      continue;
-    }
-    Eigen::Index k = 0;
-    const double visible = own.visible.maxCoeff(&k);
-    const double sigma = data.sigma(progress.question.options[a].output);
-    missing.visible.push_back(
-        {missing.candidates[a], visible, visible * candidate.signature.col(k).norm() / std::sqrt(n) * sigma});
-  }
-  std::ranges::stable_sort(missing.visible, {}, &VisibleTerm::rms);
 }
 
 double rms_at(const Eigen::VectorXd& errors, const std::vector<Eigen::Index>& rows) {
@@ -260,9 +162,10 @@ Missing find_missing(const Simulation& simulation, const Inputs& inputs, const M
   Missing missing;
   missing.verdict = progress.verdict;
   missing.rounds = progress.rounds;
-  for (const PlacedTerm& option : progress.question.options) missing.candidates.push_back(label_of(model, option));
+  for (const PlacedTerm& option : progress.question.options) missing.candidates.push_back(option_label(model, option));
   describe_findings(model, progress, missing);
   describe_limits(progress, data, missing);
+  doubt_approximations(terms, missing);
   missing.parameters = simulation.parameters;
   for (std::size_t k = 0; k < missing.parameters.size(); ++k) {
     missing.parameters[k].value = progress.fit.parameters(static_cast<Eigen::Index>(k));
@@ -276,6 +179,7 @@ Missing find_missing(const Simulation& simulation, const Inputs& inputs, const M
   }
   missing.before = model.predict(baseline.parameters, {});
   missing.corrected = model.predict(progress.fit.parameters, progress.fit.placed);
+  look_for_structure(model, without_samples(data, progress.verdict.outliers), inputs, missing);
   constexpr Eigen::Index enough_repeats = 12;
   missing.floor_from_repeats = progress.verdict.lack_of_fit.dof >= enough_repeats;
   const double noise = missing.floor_from_repeats ? progress.verdict.lack_of_fit.noise : progress.verdict.noise;

@@ -209,10 +209,7 @@ TermFit fit_terms(const TermModel& model, const FitData& data, const Eigen::Vect
       const std::vector<TermConstant>& constants = model.terms()[term.term].constants;
       for (std::size_t c = 0; c < constants.size(); ++c) {
         const Eigen::Index place = term.coefficients.size() + static_cast<Eigen::Index>(c);
-        if (!constants[c].smooth)
-          errors(place) = 0.5 * spacing(constants[c].tried, term.constants(static_cast<Eigen::Index>(c)));
-        else if (!constants_are_free)
-          errors(place) = std::numeric_limits<double>::quiet_NaN();
+        if (!constants_are_free || !constants[c].smooth) errors(place) = std::numeric_limits<double>::quiet_NaN();
       }
       fit.errors.push_back(errors);
       next += k;

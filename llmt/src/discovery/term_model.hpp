@@ -92,6 +92,11 @@ std::vector<PlacedTerm> best_constants(const TermModel& model, const FitData& da
                                        std::size_t term, Eigen::Index output, const Eigen::MatrixXd& simulated,
                                        const std::vector<PlacedTerm>& taken);
 
+/// How far a constant can be moved, to the next value tried beyond, before the sum of squares rises by more than the
+/// variance of what is left.
+double trial_error(const TermModel& model, const FitData& data, const TrialGround& ground, const PlacedTerm& placed,
+                   const Eigen::MatrixXd& simulated);
+
 /// The distance between the values tried around `value`.
 double spacing(const std::vector<double>& tried, double value);
 

@@ -30,13 +30,14 @@ bool placed_already(const std::vector<PlacedTerm>& placed, std::size_t term, Eig
   return std::ranges::any_of(placed, [&](const PlacedTerm& p) { return p.term == term && p.output == output; });
 }
 
+// `slot`: of equal terms with different constants, those in the same slot exclude each other.
 Candidate candidate_of(const TermModel& model, const FitData& data, const PlacedTerm& option,
-                       const Eigen::MatrixXd& simulated) {
+                       const Eigen::MatrixXd& simulated, std::size_t slot) {
   const ModelTerm& term = model.terms()[option.term];
   Candidate candidate;
   candidate.family = term.family;
   candidate.location = term.location;
-  if (option.constants.size() > 0) candidate.location += fmt::format("[{:.6g}]", option.constants(0));
+  if (slot > 0) candidate.location += fmt::format("#{}", slot + 1);
   if (model.outputs().size() > 1)
     candidate.location += " on " + model.outputs()[static_cast<std::size_t>(option.output)];
   candidate.signature = stacked_signature(model, data, option, simulated);
@@ -47,10 +48,35 @@ Candidate candidate_of(const TermModel& model, const FitData& data, const Placed
   return candidate;
 }
 
+class Slots {
+ public:
+  std::size_t next(const TermModel& model, const PlacedTerm& option) {
+    const std::vector<TermConstant>& constants = model.terms()[option.term].constants;
+    if (constants.empty()) return 0;
+    return used_[{option.term, option.output}]++ % static_cast<std::size_t>(std::max(1, constants.front().most));
+  }
+
+ private:
+  std::map<std::pair<std::size_t, Eigen::Index>, std::size_t> used_;
+};
+
 Eigen::MatrixXd beside(const Eigen::MatrixXd& left, const Eigen::MatrixXd& right) {
   Eigen::MatrixXd both(left.rows(), left.cols() + right.cols());
   both << left, right;
   return both;
+}
+
+// What is left if term t of the fit is taken away, and everything else that may explain it.
+TrialGround ground_without(const TermModel& model, const FitData& data, const TermFit& fit, std::size_t t) {
+  const Eigen::MatrixXd simulated = model.simulated(fit.parameters);
+  const PlacedTerm& placed = fit.placed[t];
+  TrialGround ground{scaled_residuals(model, data, fit.parameters, fit.placed),
+                     baseline_jacobian(model, data, fit.parameters, fit.placed)};
+  ground.residuals += stacked_signature(model, data, placed, simulated) * placed.coefficients;
+  for (std::size_t k = 0; k < fit.placed.size(); ++k) {
+    if (k != t) ground.nuisance = beside(ground.nuisance, stacked_signature(model, data, fit.placed[k], simulated));
+  }
+  return ground;
 }
 
 }  // namespace
@@ -81,6 +107,16 @@ RowSplit split_rows(const Inputs& inputs, const MissingOptions& options) {
   return split;
 }
 
+FitData without_samples(const FitData& data, const std::vector<std::size_t>& left_out) {
+  std::vector<Eigen::Index> kept;
+  for (std::size_t i = 0; i < data.rows.size(); ++i) {
+    if (std::ranges::find(left_out, i) == left_out.end()) kept.push_back(static_cast<Eigen::Index>(i));
+  }
+  FitData result{{}, data.measured(kept, Eigen::all), data.sigma};
+  for (const Eigen::Index i : kept) result.rows.push_back(data.rows[static_cast<std::size_t>(i)]);
+  return result;
+}
+
 Question ask(const TermModel& model, const FitData& data, const TermFit& fit, const std::vector<Eigen::Index>& repeats,
              const std::vector<std::size_t>& outliers) {
   Question question;
@@ -92,9 +128,10 @@ Question ask(const TermModel& model, const FitData& data, const TermFit& fit, co
   question.evidence.residuals = ground.residuals;
   question.evidence.components = d;
   question.evidence.repeats = repeats;
+  Slots slots;
   for (const PlacedTerm& placed : fit.placed) {
     question.options.push_back(placed);
-    question.candidates.push_back(candidate_of(model, data, placed, simulated));
+    question.candidates.push_back(candidate_of(model, data, placed, simulated, slots.next(model, placed)));
     question.evidence.residuals += question.candidates.back().signature * placed.coefficients;
     ground.nuisance = beside(ground.nuisance, question.candidates.back().signature);
   }
@@ -111,7 +148,7 @@ Question ask(const TermModel& model, const FitData& data, const TermFit& fit, co
         options.push_back({t, o, {}, Eigen::VectorXd::Zero(std::ssize(term.coefficients)), 0.0});
       }
       for (PlacedTerm& option : options) {
-        question.candidates.push_back(candidate_of(model, data, option, simulated));
+        question.candidates.push_back(candidate_of(model, data, option, simulated, slots.next(model, option)));
         question.options.push_back(std::move(option));
       }
     }
@@ -126,13 +163,8 @@ bool retry_constants(const TermModel& model, const FitData& data, TermFit& fit) 
     if (placed.constants.size() == 0) continue;
     const TermConstant& constant = model.terms()[placed.term].constants.front();
     const Eigen::MatrixXd simulated = model.simulated(fit.parameters);
-    TrialGround ground{scaled_residuals(model, data, fit.parameters, fit.placed),
-                       baseline_jacobian(model, data, fit.parameters, fit.placed)};
-    ground.residuals += stacked_signature(model, data, placed, simulated) * placed.coefficients;
-    for (std::size_t k = 0; k < fit.placed.size(); ++k) {
-      if (k != t) ground.nuisance = beside(ground.nuisance, stacked_signature(model, data, fit.placed[k], simulated));
-    }
-    const std::vector<PlacedTerm> best = best_constants(model, data, ground, placed.term, placed.output, simulated, {});
+    const std::vector<PlacedTerm> best =
+        best_constants(model, data, ground_without(model, data, fit, t), placed.term, placed.output, simulated, {});
     if (best.empty()) continue;
     const double moved = std::abs(best.front().constants(0) - placed.constants(0));
     const double step = spacing(constant.tried, placed.constants(0));
@@ -142,6 +174,15 @@ bool retry_constants(const TermModel& model, const FitData& data, TermFit& fit) 
     }
   }
   return changed;
+}
+
+void tell_trial_errors(const TermModel& model, const FitData& data, TermFit& fit) {
+  for (std::size_t t = 0; t < fit.placed.size(); ++t) {
+    const PlacedTerm& placed = fit.placed[t];
+    if (placed.constants.size() == 0 || model.terms()[placed.term].constants.front().smooth) continue;
+    fit.errors[t](placed.coefficients.size()) =
+        trial_error(model, data, ground_without(model, data, fit, t), placed, model.simulated(fit.parameters));
+  }
 }
 
 }  // namespace llmt::discovery

@@ -18,6 +18,8 @@ struct RowSplit {
 /// Rows of equal inputs, the order aside, keep together.
 RowSplit split_rows(const Inputs& inputs, const MissingOptions& options);
 
+FitData without_samples(const FitData& data, const std::vector<std::size_t>& left_out);
+
 struct Question {
   Evidence evidence;
   std::vector<PlacedTerm> options;  // one for each candidate
@@ -31,5 +33,8 @@ Question ask(const TermModel& model, const FitData& data, const TermFit& fit, co
 
 /// Terms whose constants have a better value elsewhere now that everything else is fitted get it; true if there is one.
 bool retry_constants(const TermModel& model, const FitData& data, TermFit& fit);
+
+/// Errors of constants that are not smooth, see trial_error().
+void tell_trial_errors(const TermModel& model, const FitData& data, TermFit& fit);
 
 }  // namespace llmt::discovery

@@ -111,13 +111,13 @@ ModelTerm bump_shape(const InputView& input, int parts) {
     if (end - begin >= 3) centres.push_back(c);
   }
   if (centres.empty()) return {};
-  ModelTerm term =
-      searched(input, "?bump", fmt::format("a bump in {}, {:.3g} wide", input.name, 2.0 * width), {"height"}, "",
-               {.name = "centre", .unit = input.name, .tried = centres, .smooth = true, .kept = 1, .beyond = 0},
-               [width](const Eigen::ArrayXd& x, double centre) -> Eigen::MatrixXd {
-                 const Eigen::ArrayXd u = ((x - centre) / width).abs().min(1.0);
-                 return (0.5 + 0.5 * (pi * u).cos()).matrix();
-               });
+  ModelTerm term = searched(
+      input, "?bump", fmt::format("a bump in {}, {:.3g} wide", input.name, 2.0 * width), {"height"}, "",
+      {.name = "centre", .unit = input.name, .tried = centres, .smooth = true, .kept = 1, .most = 1, .beyond = 0},
+      [width](const Eigen::ArrayXd& x, double centre) -> Eigen::MatrixXd {
+        const Eigen::ArrayXd u = ((x - centre) / width).abs().min(1.0);
+        return (0.5 + 0.5 * (pi * u).cos()).matrix();
+      });
   term.location = fmt::format("{}/{}", input.name, parts);
   term.generic = true;
   return term;
@@ -164,31 +164,38 @@ std::vector<ModelTerm> searched_terms(const InputView& input) {
   std::vector<ModelTerm> terms;
   if (input.distinct.size() < fewest) return terms;
   const std::string& x = input.name;
-  terms.push_back(searched(input, "wave", fmt::format("cos(2 pi {0}/P), sin(2 pi {0}/P)", x), {"cos", "sin"}, "",
-                           {.name = "P", .unit = x, .tried = periods(input), .smooth = true, .kept = 2, .beyond = 1},
-                           [](const Eigen::ArrayXd& values, double period) {
-                             Eigen::MatrixXd waves(values.size(), 2);
-                             waves.col(0) = (2.0 * pi / period * values).cos();
-                             waves.col(1) = (2.0 * pi / period * values).sin();
-                             return waves;
-                           }));
+  terms.push_back(
+      searched(input, "wave", fmt::format("cos(2 pi {0}/P), sin(2 pi {0}/P)", x), {"cos", "sin"}, "",
+               {.name = "P", .unit = x, .tried = periods(input), .smooth = true, .kept = 2, .most = 2, .beyond = 1},
+               [](const Eigen::ArrayXd& values, double period) {
+                 Eigen::MatrixXd waves(values.size(), 2);
+                 waves.col(0) = (2.0 * pi / period * values).cos();
+                 waves.col(1) = (2.0 * pi / period * values).sin();
+                 return waves;
+               }));
   constexpr std::size_t most = 200;
   const std::vector<double> cuts = thresholds(input.distinct, 3, most);
   terms.push_back(searched(input, "step", fmt::format("1 where {} > c", x), {"height"}, "",
-                           {.name = "c", .unit = x, .tried = cuts, .smooth = false, .kept = 1, .beyond = 0},
+                           {.name = "c", .unit = x, .tried = cuts, .smooth = false, .kept = 1, .most = 3, .beyond = 0},
                            [](const Eigen::ArrayXd& values, double cut) -> Eigen::MatrixXd {
                              return (values > cut).cast<double>().matrix();
                            }));
   terms.push_back(searched(
       input, "hinge", fmt::format("max(0, {} - c)", x), {"slope"}, x,
-      {.name = "c", .unit = x, .tried = thresholds(input.distinct, 3, 60), .smooth = true, .kept = 1, .beyond = 1},
+      {.name = "c",
+       .unit = x,
+       .tried = thresholds(input.distinct, 3, 60),
+       .smooth = true,
+       .kept = 1,
+       .most = 1,
+       .beyond = 1},
       [](const Eigen::ArrayXd& values, double cut) -> Eigen::MatrixXd { return (values - cut).max(0.0).matrix(); }));
-  terms.push_back(
-      searched(input, "settling", fmt::format("exp(-({} - {:.6g})/tau)", x, input.low), {"at start"}, "",
-               {.name = "tau", .unit = x, .tried = time_constants(input), .smooth = true, .kept = 1, .beyond = 0},
-               [low = input.low](const Eigen::ArrayXd& values, double tau) -> Eigen::MatrixXd {
-                 return (-(values - low).max(0.0) / std::max(tau, 1e-300)).exp().matrix();
-               }));
+  terms.push_back(searched(
+      input, "settling", fmt::format("exp(-({} - {:.6g})/tau)", x, input.low), {"at start"}, "",
+      {.name = "tau", .unit = x, .tried = time_constants(input), .smooth = true, .kept = 1, .most = 1, .beyond = 0},
+      [low = input.low](const Eigen::ArrayXd& values, double tau) -> Eigen::MatrixXd {
+        return (-(values - low).max(0.0) / std::max(tau, 1e-300)).exp().matrix();
+      }));
   return terms;
 }
 

@@ -46,6 +46,8 @@ class Trials {
     return factor.matrixL().solve(columns.transpose() * residuals_).squaredNorm();
   }
 
+  double sum_of_squares() const { return residuals_.squaredNorm(); }
+
   const PlacedTerm& at(double constant) {
     placed_.constants = Eigen::VectorXd::Constant(1, constant);
     return placed_;
@@ -95,6 +97,25 @@ double spacing(const std::vector<double>& tried, double value) {
   const auto above = std::ranges::lower_bound(tried, value);
   const auto k = std::clamp<std::ptrdiff_t>(above - tried.begin(), 1, std::ssize(tried) - 1);
   return std::max(1e-300, tried[static_cast<std::size_t>(k)] - tried[static_cast<std::size_t>(k - 1)]);
+}
+
+double trial_error(const TermModel& model, const FitData& data, const TrialGround& ground, const PlacedTerm& placed,
+                   const Eigen::MatrixXd& simulated) {
+  const std::vector<double>& tried = model.terms()[placed.term].constants.front().tried;
+  Trials trials(model, data, ground, placed, simulated);
+  const double value = placed.constants(0);
+  const double best = trials.gain(value);
+  const double variance = std::max(0.0, trials.sum_of_squares() - best) / static_cast<double>(data.rows.size());
+  const auto place = static_cast<std::ptrdiff_t>(std::ranges::lower_bound(tried, value) - tried.begin());
+  double error = spacing(tried, value);
+  for (const std::ptrdiff_t direction : {-1, 1}) {
+    for (std::ptrdiff_t k = place; k >= 0 && k < std::ssize(tried); k += direction) {
+      const double other = tried[static_cast<std::size_t>(k)];
+      error = std::max(error, std::abs(other - value));
+      if (best - trials.gain(other) > variance) break;
+    }
+  }
+  return error;
 }
 
 std::vector<PlacedTerm> best_constants(const TermModel& model, const FitData& data, const TrialGround& ground,

@@ -9,9 +9,12 @@
 namespace llmt::discovery {
 
 Eigen::MatrixXd range_basis(const Eigen::MatrixXd& matrix, double tolerance) {
+  // What hardly moves anything next to the others is rounding, and scaled up it would be a direction of noise.
+  constexpr double nothing = 1e-7;
+  const double largest = matrix.cols() > 0 ? matrix.colwise().norm().maxCoeff() : 0.0;
   std::vector<Eigen::Index> moving;
   for (Eigen::Index k = 0; k < matrix.cols(); ++k) {
-    if (matrix.col(k).norm() > 0.0) moving.push_back(k);
+    if (matrix.col(k).norm() > nothing * largest) moving.push_back(k);
   }
   if (moving.empty()) return {matrix.rows(), 0};
   Eigen::MatrixXd scaled = matrix(Eigen::all, moving);
@@ -24,7 +27,9 @@ Eigen::MatrixXd range_basis(const Eigen::MatrixXd& matrix, double tolerance) {
 }
 
 Workspace::Workspace(const Evidence& evidence, const std::vector<Candidate>& candidates, double absorbed_tolerance)
-    : components_(evidence.components), residuals_(evidence.residuals) {
+    : components_(evidence.components),
+      given_sum_of_squares_(evidence.residuals.squaredNorm()),
+      residuals_(evidence.residuals) {
   constexpr double rank_tolerance = 1e-9;
   baseline_ = range_basis(evidence.jacobian, rank_tolerance);
   degrees_ = static_cast<double>(residuals_.size() - baseline_.cols());

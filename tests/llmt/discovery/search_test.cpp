@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/LU>
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
@@ -46,7 +47,7 @@ Case random_case(std::uint64_t seed, Eigen::Index samples, Eigen::Index componen
     candidate.family = "family" + std::to_string(a % families);
     candidate.location = "place" + std::to_string(a / families);
     candidate.signature = normal_matrix(random, n, 1 + a % 3);
-    candidate.signature.col(0) += 1.5 * last;
+    candidate.signature.col(0) = 0.6 * candidate.signature.col(0) + 0.8 * last;
     last = candidate.signature.col(0);
     data.candidates.push_back(std::move(candidate));
   }
@@ -220,6 +221,21 @@ TEST(SearchDeletion, DroppedSamplesCountAsIfTheyHadNotBeenMeasured) {
   }
 }
 
+TEST(SearchDeletion, ASetThatCollapsesWithADroppedSampleEndsTheSearchForOutliers) {
+  Case data = random_case(12, 40, 1, 3, 2, 2);
+  data.candidates[1].signature = data.candidates[0].signature;
+  data.candidates[1].signature(7, 0) += 30.0;
+  data.evidence.residuals(7) += 100.0;
+  data.evidence.residuals(20) += 100.0;
+  const Workspace workspace(data.evidence, data.candidates, 1e-3);
+  for (const std::size_t sample : outliers_given(workspace, data.candidates, {0, 1}, 6)) {
+    EXPECT_TRUE(sample == 7 || sample == 20);
+  }
+  for (const std::size_t sample : competing_outliers(workspace, data.candidates, 16, 6)) {
+    EXPECT_TRUE(sample == 7 || sample == 20);
+  }
+}
+
 /// What sine and polynomial causes and cosine shapes of one input make of `hidden`.
 Case curve_case(std::uint64_t seed, Eigen::Index samples, double noise, const std::function<double(double)>& hidden) {
   llmt::Random random(seed);
@@ -331,7 +347,7 @@ TEST(SearchVerdict, WhatIsNotInTheCatalogueIsNotNamed) {
       [](double x) { return std::exp(-std::pow((x - 0.3) / 0.2, 2)); },
       [](double x) { return std::tanh(6.0 * (x + 0.4)); },
       [](double x) { return 1.0 / (1.2 + x); },
-      [](double x) { return std::max(0.0, x - 0.35); },
+      [](double x) { return x > 0.37 ? 0.5 : 0.0; },
   };
   for (std::size_t k = 0; k < hidden.size(); ++k) {
     int named = 0;
@@ -350,14 +366,18 @@ TEST(SearchVerdict, WhatIsNotInTheCatalogueIsNotNamed) {
 }
 
 TEST(SearchVerdict, WhatIsInTheCatalogueIsNamedAlthoughShapesFitIt) {
-  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+  int exact = 0;
+  constexpr int seeds = 60;
+  for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
     const Case data = curve_case(seed, 150, 0.05, [](double x) { return 0.4 * x * x; });
     const Verdict verdict = search(data.evidence, data.candidates);
-    ASSERT_EQ(verdict.findings.size(), 1U);
+    ASSERT_FALSE(verdict.findings.empty());
     EXPECT_EQ(verdict.findings[0].family, "square");
     EXPECT_TRUE(verdict.findings[0].confirmed);
     EXPECT_NEAR(verdict.noise, 0.05, 0.02);
+    exact += verdict.findings.size() == 1 ? 1 : 0;
   }
+  EXPECT_GE(exact, seeds * 95 / 100);
 }
 
 TEST(SearchVerdict, AnExactAliasIsAnExactRival) {
@@ -401,8 +421,8 @@ TEST(SearchVerdict, TheVisibleAmplitudeIsFoundNineTimesOfTen) {
     const Verdict verdict = search(data.evidence, data.candidates);
     found += verdict.answer != Answer::nothing_missing ? 1 : 0;
   }
-  // Four standard deviations of a binomial proportion of 300, and what the estimate of the noise adds.
-  EXPECT_NEAR(static_cast<double>(found) / seeds, 0.9, 0.08);
+  // Four standard deviations of a binomial proportion of 300.
+  EXPECT_NEAR(static_cast<double>(found) / seeds, 0.9, 0.07);
 }
 
 TEST(SearchVerdict, IsTheSameTwiceAndAtAnyScale) {

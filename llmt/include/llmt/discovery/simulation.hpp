@@ -43,7 +43,8 @@ struct TermValue {
   std::string name;
   std::string unit;
   double value = 0.0;
-  /// NaN where the samples do not tell; half the distance of the values tried for a constant that is not smooth.
+  /// NaN where the samples do not tell. Of a constant that is not smooth, such as a threshold: how far it can be moved,
+  /// to the next value tried beyond, before the sum of squares rises by more than the variance of the noise.
   double standard_error = 0.0;
 };
 
@@ -60,7 +61,7 @@ struct FoundTerm {
   std::string output;
   std::string formula;
   bool generic = false;    ///< a shape, not a cause
-  bool confirmed = false;  ///< see Finding::confirmed
+  bool confirmed = false;  ///< see Finding::confirmed; and no structure is left, and it is not one of many of an input
   Eigen::Index output_index = 0;
   Eigen::VectorXd coefficients;
   Eigen::VectorXd constants;
@@ -77,6 +78,14 @@ struct Gap {
   double noise_floor = 0.0;  ///< of the noise, from repeats where there are enough, else from what is left
 };
 
+/// What the terms found do not explain, although it is not noise: rows that are neighbours in some inputs deviate alike.
+struct Structure {
+  std::string output;
+  std::vector<std::string> inputs;  ///< that the most significant neighbourhood was taken in
+  double p_value = 1.0;             ///< of that in noise, corrected for the neighbourhoods tried
+  double share = 0.0;  ///< of the gap that can be explained (by the terms found, or as common to neighbours)
+};
+
 /// The smallest amplitude of a term that would have been found, 90 % of the time.
 struct VisibleTerm {
   std::string what;
@@ -86,6 +95,8 @@ struct VisibleTerm {
 
 /// Outcome of find_missing().
 struct Missing {
+  /// As Verdict::answer; but unknown if material structure is left although nothing was found.
+  Answer answer = Answer::nothing_missing;
   Verdict verdict;  ///< of the last search; candidates in it are numbers of `candidates`, samples those of `searched`
   std::vector<std::string> candidates;
   std::vector<FoundTerm> found;        ///< by falling share; shapes last
@@ -100,6 +111,8 @@ struct Missing {
   std::vector<Untestable> not_testable;
   std::vector<VisibleTerm> visible;  ///< of the causes that were tried, most visible first
   bool floor_from_repeats = false;
+  std::vector<Structure> structure;  ///< material; terms found beside it are not confirmed
+  std::vector<std::string> notes;  ///< in sentences
   int rounds = 0;
 };
 

@@ -25,6 +25,9 @@ struct DiscoveryOptions {
   bool shapes = true;  ///< hypotheses that carry "unknown"
   bool maps = true;    ///< free maps of the joints for what stays unknown, if they help on poses left out
   bool correct = true; ///< a tree of what is left, if something unknown is and the tree helps on poses left out
+  /// Standard deviation of the masses in the description, as a share: part of the standard errors of compliances and
+  /// flexibilities, which the data know only as products with the masses.
+  double mass_uncertainty = 0.05;
   int rounds = 4;      ///< of search and nonlinear refit
   std::uint64_t seed = 1;
   std::function<void(const std::string& stage)> progress = {};

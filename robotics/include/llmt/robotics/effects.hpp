@@ -24,7 +24,7 @@ struct Load {
 struct PoseContext {
   const Chain& chain;
   const Eigen::VectorXd& q;      ///< joint values: rad, mm for prismatic joints
-  const Skeleton& skeleton;      ///< of the rigid chain: loads are those of the undeformed arm
+  const Skeleton& skeleton;      ///< of the chain in equilibrium, where the loads act; of the rigid one in derivatives
   Eigen::Vector3d gravity_m_s2;  ///< in the world frame
   double payload_kg = 0.0;       ///< column payload_kg if measured, else the chain's payload
   Eigen::Vector3d payload_centre_mm = Eigen::Vector3d::Zero();  ///< in the world frame
@@ -90,6 +90,8 @@ struct EffectType {
       apply = {};
   /// Changes what the effects are evaluated with (payload, gravity) before loads are summed and anything is applied.
   std::function<void(PoseContext&, std::span<const double> values)> adjust = {};
+  bool weighted = false;  ///< its values are in inverse proportion to the masses: as uncertain as they are
+  bool elastic = false;   ///< deforms under the arm's weight: the loads are those of the deformed arm
   bool linear = true;     ///< `apply` is linear in the values; if not, derivatives are taken by differences
   bool prismatic = true;  ///< may sit at a prismatic joint
   bool searched = true;   ///< discovery looks for it; false for reductions that are kept for comparison
