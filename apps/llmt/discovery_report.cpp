@@ -56,8 +56,13 @@ void print_found(const Missing& missing) {
       print("   no term that was tried has this shape; the corrected simulation follows it as measured\n");
       continue;
     }
-    print(fmt::format("   add to {}: {}\n", found.output, found.formula));
+    // Formulas of several coefficients name them.
+    const std::string factor = found.coefficients.size() == 1 ? found.values.front().name + " * " : "";
+    print(fmt::format("   add to {}: {}{}\n", found.output, factor, found.formula));
     for (const discovery::TermValue& value : found.values) print("   " + value_text(value) + "\n");
+    if (found.coefficients.size() == 2) {
+      print(fmt::format("   amplitude sqrt(C^2 + S^2) = {} {}\n", number(found.coefficients.norm()), found.output));
+    }
     for (const discovery::RivalTerms& rival : found.rivals) {
       print(fmt::format("   or instead {}: {}\n", rival.what,
                         rival.exact ? "the same at every row, these rows cannot tell" : "explains as well"));

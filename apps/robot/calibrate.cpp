@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <memory>
@@ -144,12 +145,13 @@ std::string parameter_table(const robotics::Robot& nominal, const CalibrationRep
   const std::vector<discovery::Parameter> before = robotics::parameters(nominal);
   const discovery::Result& result = report.calibration.result;
   Table table({"parameter", "nominal", "identified", "change", "std error", "unit"});
-  for (std::size_t k = 0; k < before.size(); ++k) {
+  for (std::size_t k = 0; k < result.parameters.size(); ++k) {
     const discovery::Parameter& after = result.parameters[k];
-    if (after.free) {
+    const auto nominal_value = std::ranges::find(before, after.name, &discovery::Parameter::name);
+    if (after.free && nominal_value != before.end()) {
       const double error = result.standard_errors(static_cast<Eigen::Index>(k));
-      table.add({after.name, number(before[k].value, 7), number(after.value, 7),
-                 number(after.value - before[k].value, 4), std::isfinite(error) ? number(error, 2) : "-", after.unit});
+      table.add({after.name, number(nominal_value->value, 7), number(after.value, 7),
+                 number(after.value - nominal_value->value, 4), std::isfinite(error) ? number(error, 2) : "-", after.unit});
     }
   }
   return table.text();

@@ -1,12 +1,14 @@
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
+#include <filesystem>
 #include <memory>
 
+#include "llmt/folds.hpp"
 #include "llmt/robotics/catalogue.hpp"
 #include "llmt/robotics/discovery.hpp"
 #include "llmt/robotics/robot_file.hpp"
 #include "robot/commands.hpp"
+#include "robot/discovery_page.hpp"
 #include "shared/cli.hpp"
 
 namespace llmt::apps {
@@ -20,92 +22,126 @@ struct DiscoverArguments {
   std::string test;
   std::string catalogue;
   std::string output;
+  int folds = 0;
+  bool contiguous = false;
   bool json = false;
   robotics::DiscoveryOptions options;
 };
 
-Json json_of(const Discovery& found) {
-  Json effects = Json::array();
-  for (const robotics::FoundEffect& effect : found.effects) {
-    Json parameters = Json::array();
-    for (const robotics::FoundParameter& parameter : effect.parameters) {
-      parameters.push_back({{"name", parameter.name},
-                            {"value", parameter.value},
-                            {"unit", parameter.unit},
-                            {"std_error", parameter.standard_error}});
+// Columns that the catalogue's effects, a user's own among them, look at.
+std::vector<std::string> columns_of(const std::vector<robotics::EffectType>& catalogue, const robotics::Robot& robot) {
+  std::vector<std::string> columns;
+  for (const robotics::EffectType& type : catalogue) {
+    for (std::size_t j = 0; j < robot.chain.joints.size(); ++j) {
+      if (!type.searched || !robotics::suits(type, robot.chain, j)) continue;
+      if (type.place == robotics::EffectPlace::robot && j > 0) continue;
+      for (const std::string& names : robotics::effect_columns(robot.chain, robotics::make_effect(type, robot.chain, j))) {
+        for (std::size_t begin = 0; begin < names.size();) {
+          const std::size_t end = std::min(names.find('|', begin), names.size());
+          columns.push_back(names.substr(begin, end - begin));
+          begin = end + 1;
+        }
+      }
     }
-    Json constants = Json::object();
-    const robotics::EffectType& type = robotics::effect_type(effect.effect.type);
-    for (std::size_t k = 0; k < type.constants.size(); ++k) constants[type.constants[k].key] = effect.effect.constants[k];
-    effects.push_back({{"name", effect.effect.type},
-                       {"family", type.family},
-                       {"location", effect.effect.at},
-                       {"confirmed", effect.confirmed},
-                       {"parameters", parameters},
-                       {"constants", constants},
-                       {"rivals", effect.rivals},
-                       {"exact_alias", effect.exact_alias},
-                       {"share", effect.share},
-                       {"rms_mm", effect.rms_mm}});
   }
-  Json shapes = Json::array();
-  for (const robotics::FoundShape& shape : found.unknown) {
-    shapes.push_back({{"acts_on", shape.shape.acts_on},
-                      {"depends_on", shape.shape.depends_on},
-                      {"per_turn", shape.shape.per_turn ? Json(*shape.shape.per_turn) : Json(nullptr)},
-                      {"kind", shape.shape.kind},
-                      {"share", shape.share}});
+  return columns;
+}
+
+// IMPROVED.yaml and, where it helps, IMPROVED.correction.json beside it.
+void save_improved(const robotics::CorrectedRobot& improved, const std::string& path) {
+  robotics::Robot robot = improved.robot;
+  robot.correction_file.clear();
+  if (improved.correction) {
+    const std::filesystem::path file = std::filesystem::path(path).replace_extension(".correction.json");
+    llmt::save(*improved.correction, file.string());
+    robot.correction_file = file.filename().string();
   }
-  Json untestable = Json::array();
-  for (const robotics::Untestable& entry : found.not_testable) untestable.push_back({{"effect", entry.what}, {"why", entry.why}});
-  Json visible = Json::array();
-  for (const robotics::Visible& entry : found.visible) {
-    visible.push_back({{"effect", entry.what}, {"amplitude", entry.value}, {"unit", entry.unit}});
+  robotics::save(robot, path);
+}
+
+// Everything found anew without each fold, judged on it.
+Json folds_json(const robotics::Robot& robot, const robotics::Measurements& data, const DiscoverArguments& arguments) {
+  FoldOptions dealing;
+  dealing.count = arguments.folds;
+  dealing.kind = arguments.contiguous ? FoldKind::contiguous : FoldKind::random;
+  dealing.seed = arguments.options.seed;
+  const auto pose = data.poses.covariates.find("pose");
+  std::vector<double> groups;
+  if (pose != data.poses.covariates.end()) groups.assign(pose->second.begin(), pose->second.end());
+  dealing.groups = groups;
+  double before = 0.0;
+  double after = 0.0;
+  Progress progress("fold");
+  std::ptrdiff_t done = 0;
+  for (const Fold& fold : make_folds(data.count(), dealing)) {
+    progress.show(done++, arguments.folds);
+    const robotics::Measurements held_out = robotics::select(data, fold.held_out);
+    const Discovery found = robotics::discover(robot, robotics::select(data, fold.train), held_out, arguments.options);
+    const auto n = static_cast<double>(held_out.count());
+    before += n * found.held_out.before.mean / static_cast<double>(data.count());
+    after += n * found.held_out.after.mean / static_cast<double>(data.count());
   }
-  return {{"verdict", discovery::to_string(found.answer)},
-          {"effects", effects},
-          {"unknown", shapes.empty() ? Json(nullptr) : shapes[0]},
-          {"unknown_all", shapes},
-          {"gap",
-           {{"before_mm", found.held_out.poses > 0 ? found.held_out.before.mean : found.fitted_before.mean},
-            {"after_mm", found.held_out.poses > 0 ? found.held_out.after.mean : found.fitted_after.mean},
-            {"noise_floor_mm", found.held_out.floor_mm},
-            {"heldout_poses", found.held_out.poses}}},
-          {"outliers", found.outliers},
-          {"not_testable", untestable},
-          {"smallest_visible", visible},
-          {"noise_mm", found.noise_mm},
-          {"score_gain", found.score_gain},
-          {"chance_threshold", found.threshold},
-          {"hypotheses", found.hypotheses},
-          {"notes", found.notes},
-          {"rounds", found.rounds}};
+  return {{"folds", arguments.folds}, {"contiguous", arguments.contiguous}, {"before_mm", before}, {"after_mm", after}};
 }
 
 void discover_command(DiscoverArguments arguments) {
   const robotics::Robot robot = robotics::read_robot(arguments.robot);
-  const robotics::Measurements data = robotics::read_measurements(arguments.data, robot);
-  std::optional<robotics::Measurements> test;
-  if (!arguments.test.empty()) test = robotics::read_measurements(arguments.test, robot);
   if (!arguments.catalogue.empty()) arguments.options.catalogue = robotics::read_catalogue(arguments.catalogue);
+  const std::vector<std::string> also = columns_of(arguments.options.catalogue, robot);
+  const robotics::Measurements data = robotics::read_measurements(arguments.data, robot, also);
+  std::optional<robotics::Measurements> test;
+  if (!arguments.test.empty()) test = robotics::read_measurements(arguments.test, robot, also);
+  for (const std::string& warning : data.warnings) warn(warning);
+  Progress progress("discover");
+  std::ptrdiff_t step = 0;
+  arguments.options.progress = [&](const std::string&) { progress.show(step++, 0); };
   const Discovery found = robotics::discover(robot, data, test, arguments.options);
-  if (!arguments.output.empty()) robotics::save(found.improved.robot, arguments.output);
+  progress.clear();
+  arguments.options.progress = {};
+  const Json folds = arguments.folds > 0 ? folds_json(robot, data, arguments) : Json(nullptr);
+  if (!arguments.output.empty()) save_improved(found.improved, arguments.output);
   if (arguments.json) {
-    print_json(json_of(found));
+    Json json = discovery_json(found);
+    json["cross_validation"] = folds;
+    print_json(json);
     return;
   }
-  print(json_of(found).dump(1) + "\n");
+  print(fmt::format("{}: {} poses of {}, {} of them set aside\n\n", arguments.data, data.count(), robot.chain.name,
+                    test ? 0 : found.held_out.poses));
+  print(discovery_page(found));
+  if (!folds.is_null()) {
+    print(fmt::format("{} {} folds, everything found anew in each: {:.4f} -> {:.4f} mm mean on the poses left out\n", arguments.folds,
+                      arguments.contiguous ? "contiguous" : "random", folds["before_mm"].get<double>(),
+                      folds["after_mm"].get<double>()));
+  }
+  if (!arguments.output.empty()) print(fmt::format("Improved description: {}\n", arguments.output));
 }
 
 }  // namespace
 
 void add_discover(CLI::App& app) {
   CLI::App* command = app.add_subcommand("discover", "Find, name and add the physical effect that a model lacks");
+  command->description(
+      "Find where a robot description and measurements disagree, name the physical effect that is missing, add it, and show\n"
+      "the error on poses that took no part. Or say that nothing is missing, that causes cannot be told apart, or that the\n"
+      "catalogue does not know what is there.");
+  command->footer("Example: llmt-robot discover robot.yaml measured.csv -o improved.yaml");
   const auto arguments = std::make_shared<DiscoverArguments>();
   command->add_option("robot", arguments->robot, "Robot description (YAML)")->required();
   command->add_option("measured", arguments->data, "Measurements (CSV)")->required();
-  command->add_option("--test", arguments->test, "Measurements that take no part until the end (CSV); else a share is set aside");
+  command->add_option("--test", arguments->test,
+                      "Measurements that take no part until the end (CSV); without it a share is set aside");
+  command->add_option("--held-out", arguments->options.held_out_share, "Share of the poses that is set aside")
+      ->check(CLI::Range(0.0, 0.9))
+      ->capture_default_str();
+  command->add_option("--folds", arguments->folds, "Besides, cross-validate the whole discovery with that many folds")
+      ->check(CLI::Range(2, 100));
+  command->add_flag("--contiguous", arguments->contiguous, "Folds are blocks of consecutive rows");
   command->add_option("--catalogue", arguments->catalogue, "Effects to look for, and their plausible sizes (YAML)");
+  command->add_option("--mass-uncertainty", arguments->options.mass_uncertainty,
+                      "Standard deviation of the described masses, as a share: part of the errors of compliances")
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str();
   command->add_option("-o,--output", arguments->output, "Improved robot description to write (YAML)");
   command->add_option("--seed", arguments->options.seed, "Of the poses set aside")->capture_default_str();
   command->add_flag("--json", arguments->json, "Print one JSON object");

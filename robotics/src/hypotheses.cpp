@@ -31,7 +31,7 @@ std::vector<std::vector<double>> constants_for(const EffectType& type, const Sce
     if (!ratio) return {};
     return {{*ratio}, {2.0 * *ratio}, {4.0 * *ratio}};
   }
-  if (type.name == "hysteresis") return {{0.02}, {0.1}, {0.4}};
+  if (type.name == "hysteresis") return {{0.005}, {0.015}, {0.04}, {0.1}, {0.3}};
   if (type.name == "thermal_growth" || type.name == "link_thermal_growth") return {{mean_of(scene.poses, "temp_C")}};
   if (type.name == "drift" || type.name == "drift_curved") {
     const Eigen::VectorXd& time = *time_column(scene.poses);

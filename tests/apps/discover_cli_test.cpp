@@ -65,7 +65,7 @@ TEST(LlmtDiscover, NamesWhatIsMissingAndCorrectsIt) {
   EXPECT_NEAR(parameter(step, "height"), 0.3, 4.0 * parameter(step, "height", "std_error"));
   EXPECT_NEAR(parameter(step, "c"), 3.2, 2.0 * parameter(step, "c", "std_error"));
   EXPECT_NEAR(parameter(settling, "tau"), 12.0, 4.0 * parameter(settling, "tau", "std_error"));
-  EXPECT_NEAR(parameter(settling, "at start"), 0.5, 4.0 * parameter(settling, "at start", "std_error"));
+  EXPECT_NEAR(parameter(settling, "A"), 0.5, 4.0 * parameter(settling, "A", "std_error"));
   for (const json& effect : report["effects"]) {
     EXPECT_EQ(effect["confirmed"], true);
     EXPECT_EQ(effect["rivals"], json::array());
@@ -221,6 +221,23 @@ TEST(LlmtDiscover, OddDataHaveASaneVerdict) {
   EXPECT_EQ(report["gap"]["before"], nullptr);
   EXPECT_EQ(report["not_testable"].back()["effect"], "c");
   EXPECT_EQ(report["not_testable"].back()["why"], "the input is constant");
+}
+
+/// What stands between ```language and ``` for the k-th time.
+std::string block(const std::string& page, const std::string& language, int k) {
+  std::size_t begin = 0;
+  for (; k > 0; --k) begin = page.find("```" + language + "\n", begin) + language.size() + 4;
+  return page.substr(begin, page.find("```\n", begin) - begin);
+}
+
+TEST(LlmtDiscover, PrintsWhatThePageSays) {
+  const Folder folder;
+  const std::string page = llmt::read_file(LLMT_DOCS "/discovery-generic.md");
+  ASSERT_EQ(folder.run(block(page, "sh", 1)).exit_code, 0);
+  std::string command = block(page, "sh", 2);
+  ASSERT_TRUE(command.starts_with("llmt discover "));
+  command.replace(0, std::string("llmt discover ").size(), discover);
+  EXPECT_EQ(folder.run(command).out, block(page, "text", 1));
 }
 
 TEST(LlmtDiscover, MistakesHaveTheirExitCodeAndMessage) {

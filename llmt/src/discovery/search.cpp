@@ -67,7 +67,7 @@ Explained choose(const Scoring& scoring, const Set& start, const SearchOptions& 
   const Explained mixed = best_set(scoring, all, start, options.largest_set);
   if (std::ranges::none_of(mixed.set, [&](std::size_t a) { return candidates[a].generic; })) return mixed;
   const Explained named = best_set(scoring, causes, mixed.set, options.largest_set);
-  if (named.score <= mixed.score + options.rival_margin) return named;
+  if (named.score <= mixed.score + options.shape_margin) return named;
   const Explained shaped = best_set(scoring, shapes, mixed.set, options.largest_set);
   if (shaped.score <= mixed.score + options.rival_margin) return shaped;
   return mixed;

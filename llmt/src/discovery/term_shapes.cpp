@@ -44,7 +44,7 @@ std::vector<double> periods(const InputView& input) {
 std::vector<double> time_constants(const InputView& input) {
   constexpr int count = 40;
   constexpr double longest = 2.0;  // of the range: longer ones are straight lines
-  const double first = std::max(0.005, 1.0 / static_cast<double>(input.distinct.size()));
+  const double first = std::max(0.005, 3.0 / static_cast<double>(input.distinct.size()));
   std::vector<double> values;
   for (int k = 0; k < count; ++k) {
     values.push_back(input.range() * first * std::pow(longest / first, k / static_cast<double>(count - 1)));
@@ -104,11 +104,13 @@ ModelTerm pair_shape(const InputView& a, const InputView& b) {
 // 0.5 + 0.5 cos(pi (x - c) / w) for |x - c| < w.
 ModelTerm bump_shape(const InputView& input, int parts) {
   const double width = input.range() / parts;
+  // Fewer are rather outliers than a bump.
+  constexpr std::ptrdiff_t fewest = 5;
   std::vector<double> centres;
   for (double c = input.low; c <= input.high; c += 0.25 * width) {
     const auto begin = std::ranges::upper_bound(input.distinct, c - 0.7 * width);
     const auto end = std::ranges::lower_bound(input.distinct, c + 0.7 * width);
-    if (end - begin >= 3) centres.push_back(c);
+    if (end - begin >= fewest) centres.push_back(c);
   }
   if (centres.empty()) return {};
   ModelTerm term = searched(
@@ -165,7 +167,7 @@ std::vector<ModelTerm> searched_terms(const InputView& input) {
   if (input.distinct.size() < fewest) return terms;
   const std::string& x = input.name;
   terms.push_back(
-      searched(input, "wave", fmt::format("cos(2 pi {0}/P), sin(2 pi {0}/P)", x), {"cos", "sin"}, "",
+      searched(input, "wave", fmt::format("C cos(2 pi {0}/P) + S sin(2 pi {0}/P)", x), {"C", "S"}, "",
                {.name = "P", .unit = x, .tried = periods(input), .smooth = true, .kept = 2, .most = 2, .beyond = 1},
                [](const Eigen::ArrayXd& values, double period) {
                  Eigen::MatrixXd waves(values.size(), 2);
@@ -173,9 +175,10 @@ std::vector<ModelTerm> searched_terms(const InputView& input) {
                  waves.col(1) = (2.0 * pi / period * values).sin();
                  return waves;
                }));
+  const std::string since = input.low == 0.0 ? x : fmt::format("({} - {:.6g})", x, input.low);
   constexpr std::size_t most = 200;
-  const std::vector<double> cuts = thresholds(input.distinct, 3, most);
-  terms.push_back(searched(input, "step", fmt::format("1 where {} > c", x), {"height"}, "",
+  const std::vector<double> cuts = thresholds(input.distinct, 4, most);
+  terms.push_back(searched(input, "step", fmt::format("[{} > c]", x), {"height"}, "",
                            {.name = "c", .unit = x, .tried = cuts, .smooth = false, .kept = 1, .most = 3, .beyond = 0},
                            [](const Eigen::ArrayXd& values, double cut) -> Eigen::MatrixXd {
                              return (values > cut).cast<double>().matrix();
@@ -184,14 +187,14 @@ std::vector<ModelTerm> searched_terms(const InputView& input) {
       input, "hinge", fmt::format("max(0, {} - c)", x), {"slope"}, x,
       {.name = "c",
        .unit = x,
-       .tried = thresholds(input.distinct, 3, 60),
+       .tried = thresholds(input.distinct, 4, 60),
        .smooth = true,
        .kept = 1,
        .most = 1,
        .beyond = 1},
       [](const Eigen::ArrayXd& values, double cut) -> Eigen::MatrixXd { return (values - cut).max(0.0).matrix(); }));
   terms.push_back(searched(
-      input, "settling", fmt::format("exp(-({} - {:.6g})/tau)", x, input.low), {"at start"}, "",
+      input, "settling", fmt::format("exp(-{}/tau)", since), {"A"}, "",
       {.name = "tau", .unit = x, .tried = time_constants(input), .smooth = true, .kept = 1, .most = 1, .beyond = 0},
       [low = input.low](const Eigen::ArrayXd& values, double tau) -> Eigen::MatrixXd {
         return (-(values - low).max(0.0) / std::max(tau, 1e-300)).exp().matrix();

@@ -63,9 +63,9 @@ ModelTerm harmonic(const InputView& input, int order) {
   const std::string h = order == 1 ? "" : fmt::format("{} ", order);
   return {.family = fmt::format("harmonic{}", order),
           .location = input.name,
-          .formula = fmt::format("cos({0}{1}), sin({0}{1})", h, input.name),
+          .formula = fmt::format("C cos({0}{1}) + S sin({0}{1})", h, input.name),
           .inputs = {input.name},
-          .coefficients = {"cos", "sin"},
+          .coefficients = {"C", "S"},
           .columns = [column = input.column, factor = radians * order](const Rows& rows, const Eigen::VectorXd&) {
             Eigen::MatrixXd waves(rows.inputs.rows(), 2);
             waves.col(0) = (factor * rows.inputs.col(column).array()).cos();

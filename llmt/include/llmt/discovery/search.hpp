@@ -41,7 +41,8 @@ struct SearchOptions {
   double rival_margin = 6.0;        ///< score difference within which an alternative explains as well
   /// A family that explains all but this share of what the explanation explains is a rival too, whatever the score: masses,
   /// lengths and formulas are not known more closely.
-  double model_error = 0.002;
+  double model_error = 0.008;
+  double shape_margin = 0.0;        ///< score by which causes may be worse than shapes and still be named
   double materiality = 0.01;        ///< unique share of the explained sum of squares below which a family is left out
   double tentative_share = 0.1;     ///< share of the explained sum of squares in generic candidates that casts doubt
   double largest_outlier_share = 0.15;

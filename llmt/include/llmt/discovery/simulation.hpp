@@ -36,7 +36,7 @@ struct MissingOptions {
   std::uint64_t seed = 1;       ///< of the rows set aside
   int rounds = 4;               ///< of search and nonlinear refit
   Eigen::Index largest_sample = 4000;  ///< rows that are searched and fitted; of more a random part
-  SearchOptions search = {};
+  SearchOptions search = {.model_error = 0.0};  ///< formulas of terms are meant as they stand
 };
 
 struct TermValue {
