@@ -193,7 +193,7 @@ void add_discover(CLI::App& app) {
       ->add_option("--inputs", arguments->inputs,
                    "Columns that the gap may depend on [all of SIMULATED but the outputs]")
       ->delimiter(',');
-  command->add_option("-t,--output-column,--output", arguments->outputs, "Columns to explain, in both files")
+  command->add_option("-t,--output", arguments->outputs, "Columns to explain, in both files")
       ->delimiter(',')
       ->required();
   command->add_option("--order", arguments->order,

@@ -5,10 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <set>
-
-#include "llmt/fit.hpp"
 
 namespace llmt::apps {
 namespace {
@@ -16,20 +13,6 @@ namespace {
 using discovery::Answer;
 using discovery::FoundTerm;
 using discovery::Missing;
-
-Json number_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
-
-std::string region_conditions(const std::vector<std::string>& names, const Leaf& leaf) {
-  std::vector<std::string> parts;
-  for (std::size_t j = 0; j < names.size(); ++j) {
-    const auto column = static_cast<Eigen::Index>(j);
-    if (std::isfinite(leaf.low(column))) parts.push_back(fmt::format("{} > {}", names[j], number(leaf.low(column), 3)));
-    if (std::isfinite(leaf.high(column))) {
-      parts.push_back(fmt::format("{} <= {}", names[j], number(leaf.high(column), 3)));
-    }
-  }
-  return parts.empty() ? "everywhere" : fmt::format("{}", fmt::join(parts, " and "));
-}
 
 std::string title_of(const FoundTerm& found, bool several_outputs) {
   std::string text = found.generic ? "unknown: " + found.formula : found.family;
@@ -125,66 +108,7 @@ void print_visible(const Missing& missing) {
   print(table.text());
 }
 
-Json json_of_found(const FoundTerm& found) {
-  Json parameters = Json::array();
-  for (const discovery::TermValue& value : found.values) {
-    parameters.push_back({{"name", value.name},
-                          {"value", value.value},
-                          {"unit", value.unit},
-                          {"std_error", number_or_null(value.standard_error)}});
-  }
-  Json rivals = Json::array();
-  bool exact = false;
-  for (const discovery::RivalTerms& rival : found.rivals) {
-    rivals.push_back(rival.what);
-    exact = exact || rival.exact;
-  }
-  return {{"name", found.family},     {"location", found.location}, {"output", found.output},
-          {"formula", found.formula}, {"parameters", parameters},   {"rivals", rivals},
-          {"exact_alias", exact},     {"share", found.share},       {"confirmed", found.confirmed}};
-}
-
 }  // namespace
-
-std::vector<GapRegion> gap_regions(const discovery::Inputs& inputs, const discovery::MeasuredOutputs& measured,
-                                   const Missing& missing) {
-  const Eigen::Index p = inputs.values.cols();
-  const std::vector<Eigen::Index>& rows = missing.searched;
-  // Leaves with a mean and no slopes: the only regressor is constant.
-  Eigen::MatrixXd table = Eigen::MatrixXd::Zero(std::ssize(rows), p + 1);
-  table.leftCols(p) = inputs.values(rows, Eigen::all);
-  FitOptions options;
-  options.selection.folds.count = 0;
-  options.intervals = false;
-  options.blend.validity = ValidityChoice::crisp;
-  options.growth.max_leaves = 5;
-  options.growth.significance = 0.01;
-  options.growth.min_leaf_samples = std::max<std::ptrdiff_t>(5, std::ssize(rows) / 20);
-  for (int j = 0; j < p; ++j) options.growth.split_inputs.push_back(j);
-  options.growth.regression_inputs = {static_cast<int>(p)};
-  std::vector<GapRegion> regions;
-  for (std::size_t o = 0; o < measured.names.size(); ++o) {
-    const auto column = static_cast<Eigen::Index>(o);
-    const Eigen::MatrixXd gap = (measured.values.col(column) - missing.before.col(column)).cwiseAbs()(rows);
-    const Model model = fit(table, gap, options).model;
-    const Eigen::MatrixXi leaf_of = model.leaf_of(table);
-    const std::vector<Leaf> leaves = model.leaves(0);
-    std::vector<GapRegion> own;
-    for (std::size_t k = 0; k < leaves.size(); ++k) {
-      GapRegion region{measured.names[o], region_conditions(inputs.names, leaves[k]), 0, 0.0};
-      for (Eigen::Index i = 0; i < gap.rows(); ++i) {
-        if (leaf_of(i, 0) != static_cast<int>(k)) continue;
-        ++region.rows;
-        region.mean_gap += gap(i, 0);
-      }
-      region.mean_gap /= static_cast<double>(std::max<Eigen::Index>(1, region.rows));
-      own.push_back(region);
-    }
-    std::ranges::stable_sort(own, std::greater<>{}, &GapRegion::mean_gap);
-    regions.insert(regions.end(), own.begin(), own.end());
-  }
-  return regions;
-}
 
 void print_report(const DiscoveryReport& report) {
   const Missing& missing = report.missing;
@@ -229,94 +153,6 @@ void print_report(const DiscoveryReport& report) {
       print(fmt::format("  {}: {}\n", entry.what, entry.why));
   }
   if (!report.corrected.empty()) print(fmt::format("\nCorrected simulation written to {}\n", report.corrected));
-}
-
-Json report_json(const DiscoveryReport& report) {
-  const Missing& missing = report.missing;
-  Json effects = Json::array();
-  Json shapes = Json::array();
-  for (const FoundTerm& found : missing.found) {
-    if (!found.generic) {
-      effects.push_back(json_of_found(found));
-      continue;
-    }
-    Json depends_on = Json::array();
-    std::string name;
-    for (const char c : found.location.substr(0, found.location.find('/')) + ",") {
-      if (c != ',') {
-        name += c;
-        continue;
-      }
-      depends_on.push_back(name);
-      name.clear();
-    }
-    shapes.push_back({{"acts_on", found.output},
-                      {"depends_on", depends_on},
-                      {"per_turn", nullptr},
-                      {"kind", found.formula},
-                      {"share", found.share}});
-  }
-  for (const discovery::Structure& left : missing.structure) {
-    shapes.push_back({{"acts_on", left.output},
-                      {"depends_on", left.inputs},
-                      {"per_turn", nullptr},
-                      {"kind", "not explained"},
-                      {"share", left.share}});
-  }
-  Json gaps = Json::array();
-  for (const discovery::Gap& gap : missing.gaps) {
-    gaps.push_back({{"output", gap.output},
-                    {"before", number_or_null(gap.before)},
-                    {"after", number_or_null(gap.after)},
-                    {"noise_floor", number_or_null(gap.noise_floor)}});
-  }
-  // Errors of outputs in different units do not add up.
-  const bool single = gaps.size() == 1;
-  Json regions = Json::array();
-  for (const GapRegion& region : report.regions) {
-    regions.push_back({{"output", region.output},
-                       {"where", region.conditions},
-                       {"rows", region.rows},
-                       {"mean_gap", region.mean_gap}});
-  }
-  Json untestable = Json::array();
-  for (const discovery::Untestable& entry : missing.not_testable) {
-    untestable.push_back({{"effect", entry.what}, {"why", entry.why}});
-  }
-  Json visible = Json::array();
-  for (const discovery::VisibleTerm& term : missing.visible) {
-    visible.push_back(
-        {{"effect", term.what}, {"amplitude", number_or_null(term.coefficient)}, {"rms", number_or_null(term.rms)}});
-  }
-  Json baseline = Json::array();
-  for (std::size_t k = 0; k < missing.parameters.size(); ++k) {
-    const discovery::Parameter& parameter = missing.parameters[k];
-    if (!parameter.free) continue;
-    baseline.push_back({{"name", parameter.name},
-                        {"value", parameter.value},
-                        {"unit", parameter.unit},
-                        {"std_error", number_or_null(missing.standard_errors(static_cast<Eigen::Index>(k)))}});
-  }
-  return {{"verdict", discovery::to_string(missing.answer)},
-          {"effects", effects},
-          {"unknown", shapes.empty() ? Json(nullptr) : shapes[0]},
-          {"unknown_all", shapes},
-          {"simulation", baseline},
-          {"gap",
-           {{"before", single ? gaps[0]["before"] : Json(nullptr)},
-            {"after", single ? gaps[0]["after"] : Json(nullptr)},
-            {"noise_floor", single ? gaps[0]["noise_floor"] : Json(nullptr)},
-            {"heldout_samples", missing.held_out.size()},
-            {"outputs", gaps}}},
-          {"regions", regions},
-          {"outliers", missing.outliers},
-          {"notes", missing.notes},
-          {"not_testable", untestable},
-          {"smallest_visible", visible},
-          {"score_gain", missing.verdict.score_gain},
-          {"chance_threshold", missing.verdict.threshold},
-          {"hypotheses", missing.candidates.size()},
-          {"rounds", missing.rounds}};
 }
 
 }  // namespace llmt::apps

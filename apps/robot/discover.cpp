@@ -35,7 +35,8 @@ std::vector<std::string> columns_of(const std::vector<robotics::EffectType>& cat
     for (std::size_t j = 0; j < robot.chain.joints.size(); ++j) {
       if (!type.searched || !robotics::suits(type, robot.chain, j)) continue;
       if (type.place == robotics::EffectPlace::robot && j > 0) continue;
-      for (const std::string& names : robotics::effect_columns(robot.chain, robotics::make_effect(type, robot.chain, j))) {
+      for (const std::string& names :
+           robotics::effect_columns(robot.chain, robotics::make_effect(type, robot.chain, j))) {
         for (std::size_t begin = 0; begin < names.size();) {
           const std::size_t end = std::min(names.find('|', begin), names.size());
           columns.push_back(names.substr(begin, end - begin));
@@ -84,7 +85,25 @@ Json folds_json(const robotics::Robot& robot, const robotics::Measurements& data
   return {{"folds", arguments.folds}, {"contiguous", arguments.contiguous}, {"before_mm", before}, {"after_mm", after}};
 }
 
+// The output may not be one of the files that are read, and its folder must be there: said before the work, not after.
+void check_output(const DiscoverArguments& arguments) {
+  if (arguments.output.empty()) return;
+  const std::filesystem::path output = arguments.output;
+  for (const std::string& input : {arguments.robot, arguments.data, arguments.test, arguments.catalogue}) {
+    std::error_code unknown;
+    if (!input.empty() && std::filesystem::equivalent(input, output, unknown)) {
+      throw std::runtime_error(arguments.output + ": is an input; the improved description needs a file of its own");
+    }
+  }
+  const std::filesystem::path folder = output.has_parent_path() ? output.parent_path() : ".";
+  if (std::filesystem::is_directory(output) || !std::filesystem::is_directory(folder)) {
+    throw std::runtime_error(arguments.output + ": cannot be written: " +
+                             (std::filesystem::is_directory(output) ? "it is a folder" : "its folder does not exist"));
+  }
+}
+
 void discover_command(DiscoverArguments arguments) {
+  check_output(arguments);
   const robotics::Robot robot = robotics::read_robot(arguments.robot);
   if (!arguments.catalogue.empty()) arguments.options.catalogue = robotics::read_catalogue(arguments.catalogue);
   const std::vector<std::string> also = columns_of(arguments.options.catalogue, robot);
@@ -110,8 +129,8 @@ void discover_command(DiscoverArguments arguments) {
                     test ? 0 : found.held_out.poses));
   print(discovery_page(found));
   if (!folds.is_null()) {
-    print(fmt::format("{} {} folds, everything found anew in each: {:.4f} -> {:.4f} mm mean on the poses left out\n", arguments.folds,
-                      arguments.contiguous ? "contiguous" : "random", folds["before_mm"].get<double>(),
+    print(fmt::format("{} {} folds, everything found anew in each: {:.4f} -> {:.4f} mm mean on the poses left out\n",
+                      arguments.folds, arguments.contiguous ? "contiguous" : "random", folds["before_mm"].get<double>(),
                       folds["after_mm"].get<double>()));
   }
   if (!arguments.output.empty()) print(fmt::format("Improved description: {}\n", arguments.output));
@@ -122,8 +141,10 @@ void discover_command(DiscoverArguments arguments) {
 void add_discover(CLI::App& app) {
   CLI::App* command = app.add_subcommand("discover", "Find, name and add the physical effect that a model lacks");
   command->description(
-      "Find where a robot description and measurements disagree, name the physical effect that is missing, add it, and show\n"
-      "the error on poses that took no part. Or say that nothing is missing, that causes cannot be told apart, or that the\n"
+      "Find where a robot description and measurements disagree, name the physical effect that is missing, add it, and "
+      "show\n"
+      "the error on poses that took no part. Or say that nothing is missing, that causes cannot be told apart, or that "
+      "the\n"
       "catalogue does not know what is there.");
   command->footer("Example: llmt-robot discover robot.yaml measured.csv -o improved.yaml");
   const auto arguments = std::make_shared<DiscoverArguments>();
@@ -138,8 +159,9 @@ void add_discover(CLI::App& app) {
       ->check(CLI::Range(2, 100));
   command->add_flag("--contiguous", arguments->contiguous, "Folds are blocks of consecutive rows");
   command->add_option("--catalogue", arguments->catalogue, "Effects to look for, and their plausible sizes (YAML)");
-  command->add_option("--mass-uncertainty", arguments->options.mass_uncertainty,
-                      "Standard deviation of the described masses, as a share: part of the errors of compliances")
+  command
+      ->add_option("--mass-uncertainty", arguments->options.mass_uncertainty,
+                   "Standard deviation of the described masses, as a share: part of the errors of compliances")
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
   command->add_option("-o,--output", arguments->output, "Improved robot description to write (YAML)");

@@ -28,14 +28,17 @@ std::string with_unit(double value, double error, const std::string& unit) {
       if (std::abs(value) * best.factor < 0.1) best = prefix;
     }
   }
-  const std::string name = unit.starts_with("1/") ? (best.factor == 1.0 ? unit : fmt::format("1e-{:.0f} {}", std::log10(best.factor), unit))
-                                                  : best.name + unit;
+  const std::string name =
+      unit.starts_with("1/") ? (best.factor == 1.0 ? unit : fmt::format("1e-{:.0f} {}", std::log10(best.factor), unit))
+                             : best.name + unit;
   if (!std::isfinite(error)) return fmt::format("{} {} (not determined)", number(value * best.factor, 3), name);
   if (unit == "1") return fmt::format("{} +- {}", number(value, 3), number(error, 2));
   return fmt::format("{} +- {} {}", number(value * best.factor, 3), number(error * best.factor, 2), name);
 }
 
-std::string place_of(const FoundEffect& effect) { return effect.effect.at.empty() ? "the whole arm" : effect.effect.at; }
+std::string place_of(const FoundEffect& effect) {
+  return effect.effect.at.empty() ? "the whole arm" : effect.effect.at;
+}
 
 std::string constants_of(const FoundEffect& effect) {
   const robotics::EffectType& type = robotics::effect_type(effect.effect.type);
@@ -50,8 +53,10 @@ std::string headline(const Discovery& found) {
   switch (found.answer) {
     case discovery::Answer::nothing_missing:
       return "NOTHING MISSING. What the calibrated model leaves is noise as far as these poses can tell.";
-    case discovery::Answer::named: return "NAMED. The model lacks:";
-    case discovery::Answer::indistinguishable: return "NAMED, BUT NOT ALONE. The model lacks one of these:";
+    case discovery::Answer::named:
+      return "NAMED. The model lacks:";
+    case discovery::Answer::indistinguishable:
+      return "NAMED, BUT NOT ALONE. The model lacks one of these:";
     case discovery::Answer::unknown:
       return "UNKNOWN EFFECT. Something real is missing that the catalogue does not explain. It looks like this:";
   }
@@ -63,7 +68,8 @@ std::string effect_lines(const Discovery& found) {
   for (const FoundEffect& effect : found.effects) {
     std::vector<std::string> values;
     for (const robotics::FoundParameter& parameter : effect.parameters) {
-      values.push_back(fmt::format("{} {}", parameter.name, with_unit(parameter.value, parameter.standard_error, parameter.unit)));
+      values.push_back(
+          fmt::format("{} {}", parameter.name, with_unit(parameter.value, parameter.standard_error, parameter.unit)));
     }
     text += fmt::format("  {}{}, {}{}\n    {}\n    moves the tool by {:.4f} mm (rms) in ways that geometry cannot\n",
                         effect.confirmed ? "" : "perhaps ", effect.title, place_of(effect), constants_of(effect),
@@ -98,8 +104,10 @@ std::string error_line(const Discovery& found) {
                        found.fitted_before.mean, found.fitted_after.mean, floor);
   }
   return fmt::format(
-      "Error on {} poses that took no part: {:.4f} -> {:.4f} mm mean, 95 % {:.4f} -> {:.4f}, largest {:.4f} -> {:.4f}; {}.\n",
-      held.poses, held.before.mean, held.after.mean, held.before.p95, held.after.p95, held.before.max, held.after.max, floor);
+      "Error on {} poses that took no part: {:.4f} -> {:.4f} mm mean, 95 % {:.4f} -> {:.4f}, largest {:.4f} -> {:.4f}; "
+      "{}.\n",
+      held.poses, held.before.mean, held.after.mean, held.before.p95, held.after.p95, held.before.max, held.after.max,
+      floor);
 }
 
 std::string gap_lines(const Discovery& found) {
@@ -178,8 +186,8 @@ std::string discovery_page(const Discovery& found) {
   }
   text += untestable_lines(found);
   if (found.answer == discovery::Answer::nothing_missing) text += visible_lines(found);
-  text += fmt::format("{} hypotheses in {} rounds; evidence {:.0f}, chance reaches {:.0f}.\n", found.hypotheses, found.rounds,
-                      found.score_gain, found.threshold);
+  text += fmt::format("{} hypotheses in {} rounds; evidence {:.0f}, chance reaches {:.0f}.\n", found.hypotheses,
+                      found.rounds, found.score_gain, found.threshold);
   return text;
 }
 

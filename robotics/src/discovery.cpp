@@ -21,8 +21,8 @@ void say(const DiscoveryOptions& options, const std::string& stage) {
   if (options.progress) options.progress(stage);
 }
 
-// What the search is to explain at the current estimates: the robot's found effects compete anew, with what they explain
-// added back to the residuals.
+// What the search is to explain at the current estimates: the robot's found effects compete anew, with what they
+// explain added back to the residuals.
 struct Question {
   discovery::Evidence evidence;
   std::vector<Hypothesis> hypotheses;
@@ -60,7 +60,8 @@ Question question(const Robot& robot, const std::vector<Hypothesis>& found, cons
   const Scene scene = make_scene(robot, measurements.poses, residuals, measurements.measured);
   result.hypotheses = catalogue_hypotheses(scene, options.catalogue, result.untestable);
   if (options.scans) {
-    for (Hypothesis& scanned : scanned_effects(scene, options.catalogue)) result.hypotheses.push_back(std::move(scanned));
+    for (Hypothesis& scanned : scanned_effects(scene, options.catalogue))
+      result.hypotheses.push_back(std::move(scanned));
   }
   add_signatures(scene, result.hypotheses);
   const Eigen::MatrixXd jacobian = position_jacobian(robot, measurements.poses);
@@ -178,14 +179,16 @@ void add_maps(Investigation& investigation, const DiscoveryOptions& options, Dis
     return;
   }
   result.maps = maps->effects;
-  result.notes.push_back(
-      fmt::format("Free maps of {} joints, angle error against angle, lower the leave-one-out error from {:.4f} to {:.4f} mm.",
-                  maps->effects.size(), maps->before.mean(), maps->after.mean()));
+  result.notes.push_back(fmt::format(
+      "Free maps of {} joints, angle error against angle, lower the leave-one-out error from {:.4f} to {:.4f} mm.",
+      maps->effects.size(), maps->before.mean(), maps->after.mean()));
   investigation.apply(maps->effects);
   CalibrationOptions calibration = options.calibration;
   calibration.start_as_given = true;
   investigation.baseline.robot =
-      calibrate(investigation.baseline.registered, without_rows(investigation.searched, investigation.verdict.outliers), calibration).robot;
+      calibrate(investigation.baseline.registered, without_rows(investigation.searched, investigation.verdict.outliers),
+                calibration)
+          .robot;
   investigation.fitted = refit(investigation.baseline.registered, investigation.found, investigation.searched,
                                investigation.verdict.outliers, options);
   investigation.search(options);
@@ -215,13 +218,55 @@ void verify(const Measurements& searched, const Measurements& test, Eigen::Index
   result.held_out.floor_mm = mean_distance(repeats_speak ? result.lack_of_fit.noise : result.noise_mm, components);
 }
 
+// Calibration must leave enough freedom for anything else to be told.
+void check_freedom(const Measurements& samples, const Calibration& baseline) {
+  const Eigen::Index coordinates = samples.count() * std::ranges::count(samples.measured, true);
+  const Eigen::Index needed = baseline.result.rank + std::max<Eigen::Index>(10, baseline.result.rank / 2);
+  if (coordinates < needed) {
+    throw std::runtime_error(fmt::format(
+        "{} poses to search give {} coordinates, of which calibration takes {}: at least {} are needed to tell anything",
+        samples.count(), coordinates, baseline.result.rank, needed));
+  }
+}
+
+// What no effect does: wrong units, order or sign of joints, another robot, too many lost beams.
+void check_plausible(const Robot& robot, const Measurements& samples) {
+  double reach = robot.chain.tool.xyz_mm.norm();
+  for (const Joint& joint : robot.chain.joints) reach += std::abs(joint.a_mm) + std::abs(joint.d_mm);
+  Eigen::VectorXd errors = distances(positions(robot, samples.poses), samples);
+  std::ranges::nth_element(errors, errors.begin() + errors.size() / 2);
+  const double median = errors(errors.size() / 2);
+  constexpr double implausible = 0.02;
+  if (reach > 0.0 && median > implausible * reach) {
+    throw std::runtime_error(fmt::format(
+        "the calibrated model misses the measurements by {:.4g} mm, {:.0f} % of the arm's reach: no effect does that. Check "
+        "units, order, signs and zeros of the joints, the axes of the instrument, and the description",
+        median, 100.0 * median / reach));
+  }
+}
+
+bool is_exact(const Robot& robot, const Measurements& samples) {
+  constexpr double rounding = 1e-10;
+  const double largest = distances(positions(robot, samples.poses), samples).maxCoeff();
+  return largest < rounding * std::max(1.0, samples.positions_mm.cwiseAbs().maxCoeff());
+}
+
 Discovery discover_in(const Robot& robot, const Split& split, const DiscoveryOptions& options) {
   // Maps that the robot has already move its joints; what is sought is sought beside them.
   const Unmapped plain = unmapped(robot, split.samples);
   Discovery result;
   say(options, "calibrating");
-  Investigation investigation{.searched = plain.measurements};
+  Investigation investigation;
+  investigation.searched = plain.measurements;
   investigation.baseline = calibrate(plain.robot, investigation.searched, options.calibration);
+  check_freedom(investigation.searched, investigation.baseline);
+  check_plausible(investigation.baseline.robot, investigation.searched);
+  if (is_exact(investigation.baseline.robot, investigation.searched)) {
+    result.before = calibrate(robot, split.samples, options.calibration).robot;
+    result.improved.robot = result.before;
+    result.notes.emplace_back("The calibrated model reproduces the measurements to rounding: there is no gap to explain.");
+    return result;
+  }
   investigation.search(options);
   const discovery::Verdict& verdict = investigation.verdict;
   result.answer = verdict.answer;

@@ -114,8 +114,9 @@ void correct_rest(const Measurements& searched, const DiscoveryOptions& options,
   const double error = std::sqrt((gain - gain.mean()).square().sum() / (n - 1.0) / n);
   constexpr double convincing = 2.0;
   if (!(gain.mean() > convincing * error)) {
-    result.notes.push_back(fmt::format("A tree of the rest does not help: {:.4f} mm without, {:.4f} with it on poses left out.",
-                                       without.mean(), with.mean()));
+    result.notes.push_back(
+        fmt::format("A tree of the rest does not help: {:.4f} mm without, {:.4f} with it on poses left out.",
+                    without.mean(), with.mean()));
     return;
   }
   result.improved.correction = fit_correction(robot, searched, fitting).model;

@@ -32,7 +32,8 @@ Measurements averaged(const Measurements& measurements, Repeats repeats,
   std::map<double, std::size_t> groups;
   samples.clear();
   for (Eigen::Index i = 0; i < measurements.count(); ++i) {
-    const bool stood_still = (dwelled != nullptr && (*dwelled)(i) != 0.0) || (returned != nullptr && (*returned)(i) == 0.0);
+    const bool stood_still =
+        (dwelled != nullptr && (*dwelled)(i) != 0.0) || (returned != nullptr && (*returned)(i) == 0.0);
     if (pose != nullptr && (stood_still || repeats == Repeats::averaged)) {
       const auto [group, is_new] = groups.try_emplace((*pose)(i), samples.size());
       if (!is_new) {
@@ -73,7 +74,8 @@ Split set_aside(const Measurements& measurements, const std::optional<Measuremen
     for (auto& [number, rows] : groups) units.push_back(rows);
     Random random(options.seed);
     const std::vector<std::ptrdiff_t> order = random.permutation(std::ssize(units));
-    const auto aside = static_cast<std::ptrdiff_t>(std::lround(options.held_out_share * static_cast<double>(units.size())));
+    const auto aside =
+        static_cast<std::ptrdiff_t>(std::lround(options.held_out_share * static_cast<double>(units.size())));
     std::vector<std::ptrdiff_t> tested;
     searched.clear();
     for (std::ptrdiff_t k = 0; k < std::ssize(order); ++k) {

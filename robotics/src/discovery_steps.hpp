@@ -19,8 +19,8 @@ struct Split {
   std::vector<std::vector<Eigen::Index>> rows;  ///< of the file, behind every sample
 };
 
-/// Sets a share aside, repeats of a pose together; or takes the test measurements as given. Readings taken while the arm
-/// stood still are one measurement of that pose (`pose` with `dwelled` = 1 or `returned` = 0): their scatter is the
+/// Sets a share aside, repeats of a pose together; or takes the test measurements as given. Readings taken while the
+/// arm stood still are one measurement of that pose (`pose` with `dwelled` = 1 or `returned` = 0): their scatter is the
 /// instrument's, not the arm's.
 Split set_aside(const Measurements& measurements, const std::optional<Measurements>& test,
                 const DiscoveryOptions& options, Repeats repeats);

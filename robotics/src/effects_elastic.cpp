@@ -36,9 +36,10 @@ void apply_joint_compliance_free_masses(const PoseContext& pose, std::size_t j, 
   deformation.joint(static_cast<Eigen::Index>(j)) += sum;
 }
 
-// The straight bar that stands for a link, mm. DH parameters only tell where axes are: between (nearly) parallel axes the
-// offset d along them is arbitrary, so the bar runs along the common normal a in the plane of the link's centre of mass;
-// where d is the longer way, as in a forearm, it runs along the axis. The last link runs straight to the tool point.
+// The straight bar that stands for a link, mm. DH parameters only tell where axes are: between (nearly) parallel axes
+// the offset d along them is arbitrary, so the bar runs along the common normal a in the plane of the link's centre of
+// mass; where d is the longer way, as in a forearm, it runs along the axis. The last link runs straight to the tool
+// point.
 struct Bar {
   Eigen::Vector3d start;
   Eigen::Vector3d end;
@@ -82,8 +83,13 @@ struct Beam {
 Beam beam_of(const PoseContext& pose, std::size_t link) {
   const Bar bar = bar_of(pose, link);
   const Eigen::Vector3d span = bar.end - bar.start;
-  Beam beam{.chord = Eigen::Vector3d::UnitX(), .length = metres * span.norm(), .end = bar.end, .force = {},
-            .weight = Eigen::Vector3d::Zero(), .moment = {}, .centre = 0.5};
+  Beam beam{.chord = Eigen::Vector3d::UnitX(),
+            .length = metres * span.norm(),
+            .end = bar.end,
+            .force = {},
+            .weight = Eigen::Vector3d::Zero(),
+            .moment = {},
+            .centre = 0.5};
   if (beam.length > 0.0) beam.chord = span.normalized();
   const auto normal_part = [&](const Eigen::Vector3d& v) -> Eigen::Vector3d {
     return v - beam.chord.dot(v) * beam.chord;

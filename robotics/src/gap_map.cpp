@@ -30,7 +30,8 @@ Inputs inputs_of(const Measurements& measurements, const Chain& chain) {
     inputs.units.emplace_back(turns ? " deg" : " mm");
   }
   for (const auto& [name, values] : measurements.poses.covariates) {
-    const bool wanted = name == "payload_kg" || name == "temp_C" || name == "order" || name == "time_s" || name.starts_with("dir");
+    const bool wanted =
+        name == "payload_kg" || name == "temp_C" || name == "order" || name == "time_s" || name.starts_with("dir");
     if (!wanted || !(values.maxCoeff() > values.minCoeff())) continue;
     columns.push_back(values);
     inputs.names.push_back(name);

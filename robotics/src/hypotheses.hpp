@@ -19,12 +19,13 @@ struct Hypothesis {
 
 /// What hypotheses are made for.
 struct Scene {
-  const Robot& robot;             ///< at the current estimates
+  const Robot& robot;  ///< at the current estimates
   const Poses& poses;
   const Eigen::VectorXd& residuals;  ///< 3n: measured - model, zero where not measured
   std::array<bool, 3> measured;
-  std::vector<Eigen::MatrixXd> lever;  ///< for each joint 3n x 1: motion of the tool by the joint, zero where not measured
-  Eigen::VectorXd clipped;             ///< residuals for scans: no sample is longer than some times the median
+  std::vector<Eigen::MatrixXd>
+      lever;                ///< for each joint 3n x 1: motion of the tool by the joint, zero where not measured
+  Eigen::VectorXd clipped;  ///< residuals for scans: no sample is longer than some times the median
 };
 
 Scene make_scene(const Robot& robot, const Poses& poses, const Eigen::VectorXd& residuals,
@@ -41,7 +42,8 @@ std::vector<Hypothesis> catalogue_hypotheses(const Scene& scene, const std::vect
 /// each with how many it was chosen from.
 std::vector<Hypothesis> scanned_effects(const Scene& scene, const std::vector<EffectType>& catalogue);
 
-/// Shapes: smooth in one joint, local in one joint, of two joints, of the load, of the tool's orientation, of covariates.
+/// Shapes: smooth in one joint, local in one joint, of two joints, of the load, of the tool's orientation, of
+/// covariates.
 std::vector<Hypothesis> shape_hypotheses(const Scene& scene);
 
 /// Signatures of all hypotheses that have an effect.

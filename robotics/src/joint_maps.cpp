@@ -68,7 +68,11 @@ Eigen::MatrixXd second_differences(Eigen::Index count) {
 class Smoother {
  public:
   Smoother(Eigen::MatrixXd gram, Eigen::VectorXd moments, double squares, double freedom, std::vector<Knots> knots)
-      : gram_(std::move(gram)), moments_(std::move(moments)), squares_(squares), freedom_(freedom), knots_(std::move(knots)) {
+      : gram_(std::move(gram)),
+        moments_(std::move(moments)),
+        squares_(squares),
+        freedom_(freedom),
+        knots_(std::move(knots)) {
     information_ = gram_.trace() / static_cast<double>(gram_.cols());
     for (const Knots& own : knots_) penalties_.push_back(second_differences(own.count));
   }

@@ -1,5 +1,5 @@
-// Hypotheses with an inner unknown that is found by looking: orders, rows, angles. What the choice costs stands in their
-// prior cost.
+// Hypotheses with an inner unknown that is found by looking: orders, rows, angles. What the choice costs stands in
+// their prior cost.
 #include <fmt/format.h>
 
 #include <Eigen/Cholesky>
@@ -68,7 +68,8 @@ std::vector<Peak> order_spectrum(const JointSignal& signal, double first, double
     const double c = (along * cosine).sum();
     const double s = (along * sine).sum();
     const double determinant = cc * ss - cs * cs;
-    const double gain = determinant > 1e-6 * (cc + ss) * (cc + ss) ? (ss * c * c - 2.0 * cs * c * s + cc * s * s) / determinant : 0.0;
+    const double gain =
+        determinant > 1e-6 * (cc + ss) * (cc + ss) ? (ss * c * c - 2.0 * cs * c * s + cc * s * s) / determinant : 0.0;
     spectrum.push_back({order, gain});
     next = cosine * turn_cosine - sine * turn_sine;
     sine = sine * turn_cosine + cosine * turn_sine;
@@ -98,7 +99,8 @@ const EffectType* type_of(const std::vector<EffectType>& catalogue, const std::s
   return found != catalogue.end() && found->searched ? &*found : nullptr;
 }
 
-Hypothesis hypothesis_of(const EffectType& type, const Chain& chain, std::size_t index, double constant, double choices) {
+Hypothesis hypothesis_of(const EffectType& type, const Chain& chain, std::size_t index, double constant,
+                         double choices) {
   Hypothesis hypothesis;
   hypothesis.effect = make_effect(type, chain, index, {constant});
   hypothesis.candidate.family = type.family;
@@ -177,7 +179,8 @@ std::vector<Hypothesis> scanned_effects(const Scene& scene, const std::vector<Ef
   std::vector<Hypothesis> fresh;
   for (Hypothesis& hypothesis : hypotheses) {
     const std::string label = effect_label(*hypothesis.effect);
-    const bool present = std::ranges::any_of(scene.robot.effects, [&](const Effect& e) { return effect_label(e) == label; });
+    const bool present =
+        std::ranges::any_of(scene.robot.effects, [&](const Effect& e) { return effect_label(e) == label; });
     if (!present) fresh.push_back(std::move(hypothesis));
   }
   return fresh;

@@ -23,7 +23,8 @@ Eigen::MatrixXd acting_on(const Scene& scene, std::size_t joint, const Eigen::Ma
   return signature;
 }
 
-Hypothesis shape_of(std::string family, std::string location, Eigen::MatrixXd signature, Shape shape, double choices = 1.0) {
+Hypothesis shape_of(std::string family, std::string location, Eigen::MatrixXd signature, Shape shape,
+                    double choices = 1.0) {
   Hypothesis hypothesis;
   hypothesis.candidate.family = std::move(family);
   hypothesis.candidate.location = std::move(location);
@@ -120,9 +121,9 @@ void add_local(const Scene& scene, std::vector<Hypothesis>& shapes) {
       const Eigen::VectorXd function = scene.poses.joints.col(static_cast<Eigen::Index>(j)).unaryExpr([&](double q) {
         return local_value(best, q);
       });
-      const std::string kind = is_step ? fmt::format("a step at {:.0f} deg", degrees * best.centre)
-                                       : fmt::format("a bump at {:.0f} deg, {:.0f} deg wide", degrees * best.centre,
-                                                     degrees * best.width);
+      const std::string kind =
+          is_step ? fmt::format("a step at {:.0f} deg", degrees * best.centre)
+                  : fmt::format("a bump at {:.0f} deg, {:.0f} deg wide", degrees * best.centre, degrees * best.width);
       shapes.push_back(shape_of(is_step ? "?step" : "?bump", joints[j].name, acting_on(scene, j, function),
                                 {joints[j].name, {fmt::format("q{}", j + 1)}, std::nullopt, kind},
                                 tried * static_cast<double>(joints.size())));
@@ -192,8 +193,9 @@ void add_loads(const Scene& scene, std::vector<Hypothesis>& shapes) {
       functions.row(i) << std::copysign(std::sqrt(std::abs(u)), u), u * std::abs(u), u * u;
     }
     const std::string& name = scene.robot.chain.joints[j].name;
-    shapes.push_back(shape_of("?load", name, acting_on(scene, j, functions),
-                              {name, {fmt::format("gravity torque of {}", name)}, std::nullopt, "nonlinear in the torque"}));
+    shapes.push_back(
+        shape_of("?load", name, acting_on(scene, j, functions),
+                 {name, {fmt::format("gravity torque of {}", name)}, std::nullopt, "nonlinear in the torque"}));
   }
 }
 

@@ -2,20 +2,47 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
 #include <exception>
 #include <nlohmann/json.hpp>
 
 #include "blind/score_tables.hpp"
 
+namespace {
+
+// A hidden effect that should be seen and was neither named in its class nor, if there is no name for it, noticed.
+// Below a lambda of 40 that is no fault.
+bool overlooked(const blind::Judged& c) {
+  if (c.hidden.empty() || c.lambda < 40.0) return false;
+  const bool has_name = std::ranges::all_of(c.hidden, &blind::Truth::in_catalogue);
+  return has_name ? !c.in_class : c.missed;
+}
+
+// 0 if the answers are good enough for a build to pass.
+int gate(const std::vector<blind::Judged>& all, int without_result, int most_missed) {
+  const auto false_alarms = std::ranges::count_if(all, &blind::Judged::false_alarm);
+  const auto wrong = std::ranges::count_if(all, &blind::Judged::confidently_wrong);
+  const auto missed = std::ranges::count_if(all, overlooked);
+  const bool passed = without_result == 0 && !all.empty() && false_alarms == 0 && wrong == 0 && missed <= most_missed;
+  fmt::print(stderr, "gate {}: {} false alarms, {} confidently wrong, {} missed with lambda >= 40 (at most {})\n",
+             passed ? "passed" : "failed", false_alarms, wrong, missed, most_missed);
+  return passed ? 0 : 1;
+}
+
+}  // namespace
+
 int main(int argc, char** argv) {
   std::string folder, results;
+  int most_missed = -1;
   bool as_json = false, without_gap = false;
   CLI::App app("Scores the answers of a tool that names missing effects");
   app.add_option("cases", folder, "folder that blind_generate wrote")->required();
   app.add_option("results", results, "folder with <case>.json and <case>.yaml of the tool")->required();
   app.add_flag("--json", as_json, "one JSON object instead of tables");
   app.add_flag("--no-gap", without_gap, "do not evaluate the robots (fast)");
+  app.add_option("--most-missed", most_missed,
+                 "fail on false alarms, confidently wrong names, cases without a result and more misses than this");
   CLI11_PARSE(app, argc, argv);
   try {
     std::vector<blind::Judged> all;
@@ -51,7 +78,7 @@ int main(int argc, char** argv) {
     } else {
       fmt::print("{} cases judged, {} without a result\n{}", all.size(), missing, text);
     }
-    return 0;
+    return most_missed < 0 ? 0 : gate(all, missing, most_missed);
   } catch (const std::exception& error) {
     fmt::print(stderr, "blind_score: {}\n", error.what());
     return 1;

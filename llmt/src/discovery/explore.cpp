@@ -104,8 +104,7 @@ Suspect worst_sample(const Scoring& scoring, const SetFit& fit, const Set& set) 
   Eigen::Index sample = 0;
   const double gain = deletion.gains.maxCoeff(&sample);
   return {static_cast<std::size_t>(sample),
-          scoring.misfit(std::max(0.0, fit.left - gain),
-                         std::ssize(fit.columns) + scoring.workspace().components()) +
+          scoring.misfit(std::max(0.0, fit.left - gain), std::ssize(fit.columns) + scoring.workspace().components()) +
               scoring.cost(set) + scoring.outlier_cost()};
 }
 

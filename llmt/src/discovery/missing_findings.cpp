@@ -27,6 +27,7 @@ FoundTerm described(const TermModel& model, const PlacedTerm& placed, const Eige
   found.output = model.outputs()[static_cast<std::size_t>(placed.output)];
   found.output_index = placed.output;
   found.formula = term.formula;
+  found.inputs = term.inputs;
   found.generic = term.generic;
   found.coefficients = placed.coefficients;
   found.constants = placed.constants;
@@ -97,23 +98,21 @@ void describe_limits(const Progress& progress, const FitData& data, Missing& mis
   std::ranges::stable_sort(missing.visible, {}, &VisibleTerm::rms);
 }
 
-void doubt_approximations(const std::vector<ModelTerm>& terms, Missing& missing) {
+void doubt_approximations(Missing& missing) {
   constexpr std::size_t too_many = 3;
   std::map<std::pair<std::string, Eigen::Index>, std::set<std::string>> families;
-  const auto single = [&](const FoundTerm& found) -> const std::vector<std::string>& {
-    return terms[found.term].inputs;
-  };
   for (const FoundTerm& found : missing.found) {
-    if (single(found).size() == 1) families[{single(found).front(), found.output_index}].insert(found.family);
+    if (found.inputs.size() == 1) families[{found.inputs.front(), found.output_index}].insert(found.family);
   }
+  std::set<std::string> doubted;
   for (FoundTerm& found : missing.found) {
-    if (single(found).size() != 1) continue;
-    const std::string& input = single(found).front();
+    if (found.inputs.size() != 1) continue;
+    const std::string& input = found.inputs.front();
     if (families[{input, found.output_index}].size() < too_many) continue;
     found.confirmed = false;
-    const std::string note =
-        fmt::format("so many terms of {} may be an approximation of one that was not tried", input);
-    if (std::ranges::find(missing.notes, note) == missing.notes.end()) missing.notes.push_back(note);
+    if (!doubted.insert(input).second) continue;
+    missing.notes.push_back(
+        fmt::format("so many terms of {} may be an approximation of one that was not tried", input));
   }
 }
 

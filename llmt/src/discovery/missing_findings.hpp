@@ -23,7 +23,7 @@ void describe_findings(const TermModel& model, const Progress& progress, Missing
 void describe_limits(const Progress& progress, const FitData& data, Missing& missing);
 
 /// Many terms of one input approximate something else, however well they fit: they are not confirmed.
-void doubt_approximations(const std::vector<ModelTerm>& terms, Missing& missing);
+void doubt_approximations(Missing& missing);
 
 /// Missing::structure and answer. What neighbours have in common is not noise.
 void look_for_structure(const TermModel& model, const FitData& data, const Inputs& inputs, Missing& missing);

@@ -58,8 +58,7 @@ Draws sign_draws(const Workspace& workspace, int count, Random& random) {
   Eigen::MatrixXd inside = Eigen::MatrixXd::Zero(n, flipped.cols());
   for (Eigen::Index i = 0; i < n; ++i) inside.row(i) = flipped.middleRows(i * d, d).colwise().sum();
   const Eigen::MatrixXd absorbed = inside.transpose() * signs;
-  draws.squares =
-      (workspace.sum_of_squares() - absorbed.colwise().squaredNorm().transpose().array()).max(0.0).matrix();
+  draws.squares = (workspace.sum_of_squares() - absorbed.colwise().squaredNorm().transpose().array()).max(0.0).matrix();
   return draws;
 }
 
@@ -94,8 +93,8 @@ double chance_gain(const Scoring& scoring, const SearchOptions& options) {
   const double normal = quantile_beyond(scoring, normal_draws(scoring.workspace(), options.null_draws, random),
                                         options.false_alarm_rate, true);
   // A candidate that was placed where the largest residuals are stays near them whatever their signs.
-  const double flipped =
-      quantile_beyond(scoring, sign_draws(scoring.workspace(), options.null_draws, random), options.false_alarm_rate, false);
+  const double flipped = quantile_beyond(scoring, sign_draws(scoring.workspace(), options.null_draws, random),
+                                         options.false_alarm_rate, false);
   return std::max({0.0, normal, flipped});
 }
 

@@ -100,8 +100,8 @@ SetFit Scoring::fit(const Set& set) const {
 }
 
 double Scoring::dof(const SetFit& fit) const {
-  const double taken = static_cast<double>(fit.columns.size()) +
-                       static_cast<double>(workspace_->dropped().size()) * static_cast<double>(workspace_->components());
+  const double taken = static_cast<double>(fit.columns.size()) + static_cast<double>(workspace_->dropped().size()) *
+                                                                     static_cast<double>(workspace_->components());
   return std::max(1.0, workspace_->degrees() - taken);
 }
 
@@ -181,7 +181,8 @@ std::vector<Scoring::Move> Scoring::additions(const Set& set, const std::vector<
     const Eigen::MatrixXd lower = factor.matrixL();
     if (lower.diagonal().minCoeff() <= smallest_pivot) continue;
     const double gain = factor.matrixL().solve(moments.segment(block.begin, block.size)).squaredNorm();
-    moves.push_back({a, misfit(std::max(0.0, base.left - gain), std::ssize(base.columns) + block.size) + cost(with(set, a))});
+    moves.push_back(
+        {a, misfit(std::max(0.0, base.left - gain), std::ssize(base.columns) + block.size) + cost(with(set, a))});
   }
   std::ranges::sort(moves, [](const Move& a, const Move& b) {
     return a.score != b.score ? a.score < b.score : a.candidate < b.candidate;

@@ -43,11 +43,12 @@ void check(const Evidence& evidence, const std::vector<Candidate>& candidates, c
     const std::string name = fmt::format("candidate {}@{}", candidate.family, candidate.location);
     const Eigen::Index k = candidate.signature.cols();
     if (candidate.signature.rows() != rows || k == 0) {
-      refuse(fmt::format("signature of {} is {} x {}, must have {} rows and a column", name,
-                         candidate.signature.rows(), k, rows));
+      refuse(fmt::format("signature of {} is {} x {}, must have {} rows and a column", name, candidate.signature.rows(),
+                         k, rows));
     }
     if (!candidate.signature.allFinite()) refuse("signature of " + name + " is not finite");
-    if (candidate.lower.size() != candidate.upper.size() || (candidate.lower.size() != 0 && candidate.lower.size() != k)) {
+    if (candidate.lower.size() != candidate.upper.size() ||
+        (candidate.lower.size() != 0 && candidate.lower.size() != k)) {
       refuse("limits of " + name + " must be empty or as many as its signature has columns");
     }
     if (!std::isfinite(candidate.prior_cost)) refuse("prior_cost of " + name + " is not finite");
@@ -161,7 +162,8 @@ Finding finding_of(const Scoring& scoring, const Set& set, const Set& whole, con
                    const SearchOptions& options) {
   const SetFit fit = scoring.fit(set);
   const Set rest = without_family(scoring, set, family);
-  Finding finding{.family = family, .generic = false, .confirmed = true, .terms = {}, .rivals = {}, .share = 0, .score_gain = 0};
+  Finding finding{
+      .family = family, .generic = false, .confirmed = true, .terms = {}, .rivals = {}, .share = 0, .score_gain = 0};
   for (const std::size_t a : set) {
     if (scoring.candidates()[a].family != family) continue;
     finding.generic = scoring.candidates()[a].generic;
@@ -200,7 +202,8 @@ LackOfFit lack_of_fit(const Scoring& scoring, const SetFit& fit, const std::vect
   result.noise = std::sqrt(variance);
   const double ratio = std::max(0.0, fit.left - squares) / (dof - own) / variance;
   result.p_value = boost::math::cdf(boost::math::complement(boost::math::fisher_f(dof - own, own), ratio));
-  const double before = scoring.workspace().sum_of_squares() - (dof + static_cast<double>(fit.columns.size())) * variance;
+  const double before =
+      scoring.workspace().sum_of_squares() - (dof + static_cast<double>(fit.columns.size())) * variance;
   if (before > 0.0) result.excess_share = std::max(0.0, fit.left - dof * variance) / before;
   return result;
 }
@@ -294,10 +297,14 @@ Verdict search(const Evidence& evidence, const std::vector<Candidate>& candidate
 
 std::string to_string(Answer answer) {
   switch (answer) {
-    case Answer::nothing_missing: return "nothing missing";
-    case Answer::named: return "named";
-    case Answer::indistinguishable: return "named, indistinguishable";
-    case Answer::unknown: return "unknown effect";
+    case Answer::nothing_missing:
+      return "nothing missing";
+    case Answer::named:
+      return "named";
+    case Answer::indistinguishable:
+      return "named, indistinguishable";
+    case Answer::unknown:
+      return "unknown effect";
   }
   return "";
 }

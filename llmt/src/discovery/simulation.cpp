@@ -165,7 +165,7 @@ Missing find_missing(const Simulation& simulation, const Inputs& inputs, const M
   for (const PlacedTerm& option : progress.question.options) missing.candidates.push_back(option_label(model, option));
   describe_findings(model, progress, missing);
   describe_limits(progress, data, missing);
-  doubt_approximations(terms, missing);
+  doubt_approximations(missing);
   missing.parameters = simulation.parameters;
   for (std::size_t k = 0; k < missing.parameters.size(); ++k) {
     missing.parameters[k].value = progress.fit.parameters(static_cast<Eigen::Index>(k));

@@ -66,7 +66,8 @@ void Workspace::add(const Candidate& candidate, Eigen::MatrixXd projected, doubl
   // A parameter that does nothing next to the others, at its largest plausible value, is rounding.
   constexpr double nothing = 1e-7;
   Eigen::VectorXd reach = norms;
-  if (candidate.lower.size() != 0) reach.array() *= candidate.lower.cwiseAbs().cwiseMax(candidate.upper.cwiseAbs()).array();
+  if (candidate.lower.size() != 0)
+    reach.array() *= candidate.lower.cwiseAbs().cwiseMax(candidate.upper.cwiseAbs()).array();
   const double largest = reach.maxCoeff();
   for (Eigen::Index i = 0; i < k; ++i) {
     if (!(reach(i) > nothing * largest)) norms(i) = 0.0;
@@ -76,7 +77,8 @@ void Workspace::add(const Candidate& candidate, Eigen::MatrixXd projected, doubl
   projected = projected * scale.asDiagonal();
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> outside(projected.transpose() * projected);
   const Eigen::Index moving = (norms.array() > 0.0).count();
-  block.outside = moving > 0 ? std::sqrt(std::max(0.0, outside.eigenvalues().sum() / static_cast<double>(moving))) : 0.0;
+  block.outside =
+      moving > 0 ? std::sqrt(std::max(0.0, outside.eigenvalues().sum() / static_cast<double>(moving))) : 0.0;
   const double smallest = absorbed_tolerance * absorbed_tolerance;
   for (Eigen::Index i = k - 1; i >= 0 && outside.eigenvalues()(i) > smallest; --i) ++block.size;
   // Rounding of the projection is all that is left of what is absorbed exactly.

@@ -39,14 +39,14 @@ struct SearchOptions {
   double false_alarm_rate = 0.003;  ///< of the whole search when nothing is missing
   int null_draws = 300;             ///< of each kind, see search()
   double rival_margin = 6.0;        ///< score difference within which an alternative explains as well
-  /// A family that explains all but this share of what the explanation explains is a rival too, whatever the score: masses,
-  /// lengths and formulas are not known more closely.
+  /// A family that explains all but this share of what the explanation explains is a rival too, whatever the score:
+  /// masses, lengths and formulas are not known more closely.
   double model_error = 0.008;
-  double shape_margin = 0.0;        ///< score by which causes may be worse than shapes and still be named
-  double materiality = 0.01;        ///< unique share of the explained sum of squares below which a family is left out
-  double tentative_share = 0.1;     ///< share of the explained sum of squares in generic candidates that casts doubt
+  double shape_margin = 0.0;     ///< score by which causes may be worse than shapes and still be named
+  double materiality = 0.01;     ///< unique share of the explained sum of squares below which a family is left out
+  double tentative_share = 0.1;  ///< share of the explained sum of squares in generic candidates that casts doubt
   double largest_outlier_share = 0.15;
-  int largest_set = 16;  ///< candidates at once
+  int largest_set = 16;              ///< candidates at once
   double absorbed_tolerance = 1e-3;  ///< a direction with less of its norm outside the baseline's range is absorbed
   std::uint64_t seed = 1;
 };
@@ -74,8 +74,8 @@ struct Finding {
   bool confirmed = false;  ///< passed the gate, and nothing material is left that it does not explain
   std::vector<Term> terms;
   std::vector<Rival> rivals;
-  double share = 0.0;           ///< of the explained sum of squares that goes with the family alone
-  double score_gain = 0.0;      ///< score lost without it
+  double share = 0.0;       ///< of the explained sum of squares that goes with the family alone
+  double score_gain = 0.0;  ///< score lost without it
 };
 
 /// What a candidate could have shown.
@@ -89,10 +89,10 @@ struct Sensitivity {
 
 /// The test of residual scatter against the scatter of repeats.
 struct LackOfFit {
-  Eigen::Index dof = 0;        ///< of the repeats; 0: there are none
-  double noise = 0.0;          ///< standard deviation of one component from the repeats
-  double p_value = 1.0;        ///< of scatter beyond the repeats when the explanation is right
-  double excess_share = 0.0;   ///< of the sum of squares beyond noise that is still there
+  Eigen::Index dof = 0;       ///< of the repeats; 0: there are none
+  double noise = 0.0;         ///< standard deviation of one component from the repeats
+  double p_value = 1.0;       ///< of scatter beyond the repeats when the explanation is right
+  double excess_share = 0.0;  ///< of the sum of squares beyond noise that is still there
 };
 
 enum class Answer { nothing_missing, named, indistinguishable, unknown };
@@ -100,14 +100,14 @@ enum class Answer { nothing_missing, named, indistinguishable, unknown };
 /// Outcome of search().
 struct Verdict {
   Answer answer = Answer::nothing_missing;
-  std::vector<Finding> findings;  ///< by falling share
+  std::vector<Finding> findings;      ///< by falling share
   std::vector<std::size_t> outliers;  ///< samples that fit nothing, in the order of falling evidence
-  double score_gain = 0.0;        ///< of the explanation over none
-  double threshold = 0.0;         ///< that chance alone exceeds at the false alarm rate
-  double sum_of_squares = 0.0;    ///< of the residuals, adjusted baseline, no effects, outliers left out
-  double left = 0.0;              ///< with the explanation
-  Eigen::Index dof = 0;           ///< of `left`
-  double noise = 0.0;             ///< standard deviation of one component: sqrt(left / dof)
+  double score_gain = 0.0;            ///< of the explanation over none
+  double threshold = 0.0;             ///< that chance alone exceeds at the false alarm rate
+  double sum_of_squares = 0.0;        ///< of the residuals, adjusted baseline, no effects, outliers left out
+  double left = 0.0;                  ///< with the explanation
+  Eigen::Index dof = 0;               ///< of `left`
+  double noise = 0.0;                 ///< standard deviation of one component: sqrt(left / dof)
   LackOfFit lack_of_fit;
   std::vector<Sensitivity> sensitivity;  ///< one for each candidate
   Eigen::VectorXd remaining;             ///< n d: residuals that the explanation leaves, zero at outliers
@@ -117,12 +117,14 @@ struct Verdict {
 ///
 /// 1. What the baseline can imitate, the range of its Jacobian, is projected out of residuals and signatures.
 /// 2. Sets A of candidates are scored by
-///      N ln(RSS_A / (N - k_A)) + k_A ln N + 2 sum over families f in A of (ln n_fam + ln binomial(n_loc(f), n_used(f))),
+///      N ln(RSS_A / (N - k_A)) + k_A ln N + 2 sum over families f in A of (ln n_fam + ln binomial(n_loc(f),
+///      n_used(f))),
 ///    N = n d - rank: Schwarz's criterion plus the logarithm of how many sets of that kind there were to choose from.
 ///    Values must lie within their limits, up to two standard errors. Moves are add, drop, swap; starts are the empty
 ///    set, the best single candidates of different families, and whole families.
 /// 3. A sample whose removal gains more than its own cost, as a shift of its mean, is an outlier.
-/// 4. Gate: the gain must exceed what the best single candidate gains in noise drawn from the normal distribution and in
+/// 4. Gate: the gain must exceed what the best single candidate gains in noise drawn from the normal distribution and
+/// in
 ///    the residuals with random signs, pushed through the same projection (max-T).
 /// 5. Generic candidates stay only where no set of causes comes within `rival_margin`.
 /// 6. A family is dropped if the exact leave-one-sample-out error is smaller without it, or its share is immaterial.

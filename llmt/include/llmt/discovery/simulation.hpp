@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "llmt/abi.hpp"
 #include "llmt/discovery/least_squares.hpp"
 #include "llmt/discovery/search.hpp"
 #include "llmt/discovery/terms.hpp"
@@ -35,7 +36,7 @@ struct MissingOptions {
   double held_out_share = 0.2;  ///< of the rows, set aside before anything is looked at; equal inputs keep together
   std::uint64_t seed = 1;       ///< of the rows set aside
   int rounds = 4;               ///< of search and nonlinear refit
-  Eigen::Index largest_sample = 4000;  ///< rows that are searched and fitted; of more a random part
+  Eigen::Index largest_sample = 4000;           ///< rows that are searched and fitted; of more a random part
   SearchOptions search = {.model_error = 0.0};  ///< formulas of terms are meant as they stand
 };
 
@@ -60,7 +61,8 @@ struct FoundTerm {
   std::string location;
   std::string output;
   std::string formula;
-  bool generic = false;    ///< a shape, not a cause
+  std::vector<std::string> inputs;  ///< ModelTerm::inputs
+  bool generic = false;             ///< a shape, not a cause
   bool confirmed = false;  ///< see Finding::confirmed; and no structure is left, and it is not one of many of an input
   Eigen::Index output_index = 0;
   Eigen::VectorXd coefficients;
@@ -78,7 +80,8 @@ struct Gap {
   double noise_floor = 0.0;  ///< of the noise, from repeats where there are enough, else from what is left
 };
 
-/// What the terms found do not explain, although it is not noise: rows that are neighbours in some inputs deviate alike.
+/// What the terms found do not explain, although it is not noise: rows that are neighbours in some inputs deviate
+/// alike.
 struct Structure {
   std::string output;
   std::vector<std::string> inputs;  ///< that the most significant neighbourhood was taken in
@@ -112,7 +115,7 @@ struct Missing {
   std::vector<VisibleTerm> visible;  ///< of the causes that were tried, most visible first
   bool floor_from_repeats = false;
   std::vector<Structure> structure;  ///< material; terms found beside it are not confirmed
-  std::vector<std::string> notes;  ///< in sentences
+  std::vector<std::string> notes;    ///< in sentences
   int rounds = 0;
 };
 

@@ -25,8 +25,8 @@ struct TermConstant {
   std::string unit;
   std::vector<double> tried;  ///< ascending, at least one
   bool smooth = true;         ///< the term is differentiable by it: it is fitted with everything else afterwards
-  int kept = 1;  ///< how many of the best values compete
-  int most = 1;  ///< how many values may be used at once: more would be an approximation of something else
+  int kept = 1;               ///< how many of the best values compete
+  int most = 1;               ///< how many values may be used at once: more would be an approximation of something else
   /// Powers 0 ... `beyond` of the first input of ModelTerm::inputs are set apart before values are compared, so that a
   /// value does not win for what simpler terms explain.
   int beyond = 0;

@@ -20,15 +20,16 @@ struct DiscoveryOptions {
   std::vector<EffectType> catalogue = effect_types();
   CalibrationOptions calibration = {};
   discovery::SearchOptions search = {};
-  double held_out_share = 0.2;  ///< of the poses, set aside before anything is looked at, if no measurements for the test are given
-  bool scans = true;   ///< orders of transmission errors, rows of knocks
-  bool shapes = true;  ///< hypotheses that carry "unknown"
-  bool maps = true;    ///< free maps of the joints for what stays unknown, if they help on poses left out
-  bool correct = true; ///< a tree of what is left, if something unknown is and the tree helps on poses left out
+  double held_out_share =
+      0.2;  ///< of the poses, set aside before anything is looked at, if no measurements for the test are given
+  bool scans = true;    ///< orders of transmission errors, rows of knocks
+  bool shapes = true;   ///< hypotheses that carry "unknown"
+  bool maps = true;     ///< free maps of the joints for what stays unknown, if they help on poses left out
+  bool correct = true;  ///< a tree of what is left, if something unknown is and the tree helps on poses left out
   /// Standard deviation of the masses in the description, as a share: part of the standard errors of compliances and
   /// flexibilities, which the data know only as products with the masses.
   double mass_uncertainty = 0.05;
-  int rounds = 4;      ///< of search and nonlinear refit
+  int rounds = 4;  ///< of search and nonlinear refit
   std::uint64_t seed = 1;
   std::function<void(const std::string& stage)> progress = {};
 };
@@ -94,8 +95,8 @@ struct Visible {
 };
 
 struct HeldOut {
-  ErrorFigures before;   ///< calibrated as given
-  ErrorFigures after;    ///< with what was found
+  ErrorFigures before;    ///< calibrated as given
+  ErrorFigures after;     ///< with what was found
   double floor_mm = 0.0;  ///< mean distance that the noise alone makes
   bool floor_from_repeats = false;
   Eigen::Index poses = 0;
@@ -105,13 +106,13 @@ struct Discovery {
   discovery::Answer answer = discovery::Answer::nothing_missing;
   std::vector<FoundEffect> effects;
   std::vector<FoundShape> unknown;
-  std::vector<Effect> maps;  ///< free maps of the joints that were added for the unknown
-  Robot before;           ///< calibrated without what was found
-  CorrectedRobot improved;  ///< with it, and with a correction of the rest where that helps
+  std::vector<Effect> maps;    ///< free maps of the joints that were added for the unknown
+  Robot before;                ///< calibrated without what was found
+  CorrectedRobot improved;     ///< with it, and with a correction of the rest where that helps
   ErrorFigures fitted_before;  ///< of the poses that were searched
   ErrorFigures fitted_after;
   HeldOut held_out;
-  GapMap gap;             ///< of `before`
+  GapMap gap;                          ///< of `before`
   std::vector<Eigen::Index> outliers;  ///< rows of the measurements, from 0
   std::vector<Untestable> not_testable;
   std::vector<Visible> visible;
