@@ -151,7 +151,8 @@ std::string parameter_table(const robotics::Robot& nominal, const CalibrationRep
     if (after.free && nominal_value != before.end()) {
       const double error = result.standard_errors(static_cast<Eigen::Index>(k));
       table.add({after.name, number(nominal_value->value, 7), number(after.value, 7),
-                 number(after.value - nominal_value->value, 4), std::isfinite(error) ? number(error, 2) : "-", after.unit});
+                 number(after.value - nominal_value->value, 4), std::isfinite(error) ? number(error, 2) : "-",
+                 after.unit});
     }
   }
   return table.text();

@@ -1,5 +1,7 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <memory>
 
@@ -7,6 +9,7 @@
 #include "llmt/robotics/catalogue.hpp"
 #include "llmt/robotics/discovery.hpp"
 #include "llmt/robotics/robot_file.hpp"
+#include "llmt/robotics/telling_poses.hpp"
 #include "robot/commands.hpp"
 #include "robot/discovery_page.hpp"
 #include "shared/cli.hpp"
@@ -46,6 +49,37 @@ std::vector<std::string> columns_of(const std::vector<robotics::EffectType>& cat
     }
   }
   return columns;
+}
+
+std::string telling_line(const robotics::TellingPose& pose) {
+  std::vector<std::string> joints;
+  for (Eigen::Index j = 0; j < pose.joints.size(); ++j) joints.push_back(number(pose.joints(j), 3));
+  return fmt::format("    q = ({}) rad, payload {} kg: the explanations differ by {:.4f} mm\n", fmt::join(joints, ", "),
+                     number(pose.payload_kg, 3), pose.disagreement_mm);
+}
+
+// Which poses would tell a finding from its first rival.
+std::string telling_lines(const Discovery& found, const robotics::Measurements& data) {
+  std::string text;
+  const std::vector<robotics::Effect>& all = found.improved.robot.effects;
+  for (const robotics::FoundEffect& effect : found.effects) {
+    if (!effect.confirmed || effect.exact_alias || effect.rival_effects.empty()) continue;
+    const std::string label = robotics::effect_label(effect.effect);
+    const auto place = std::ranges::find(all, label, robotics::effect_label);
+    if (place == all.end() || effect.rival_effects.front().empty()) continue;
+    constexpr int proposed = 3;
+    const robotics::Telling telling =
+        robotics::telling_poses(found.improved.robot, static_cast<std::size_t>(place - all.begin()),
+                                effect.rival_effects.front(), data.poses, found.noise_mm, proposed, 1, data.measured);
+    text += fmt::format("To tell {} from {}: ", label, effect.rivals.front());
+    if (telling.none_can) {
+      text += "no pose can, they differ by less than the noise everywhere.\n";
+      continue;
+    }
+    text += telling.payload_helps ? "measure these, another payload helps\n" : "measure these\n";
+    for (const robotics::TellingPose& pose : telling.poses) text += telling_line(pose);
+  }
+  return text;
 }
 
 // IMPROVED.yaml and, where it helps, IMPROVED.correction.json beside it.
@@ -128,6 +162,7 @@ void discover_command(DiscoverArguments arguments) {
   print(fmt::format("{}: {} poses of {}, {} of them set aside\n\n", arguments.data, data.count(), robot.chain.name,
                     test ? 0 : found.held_out.poses));
   print(discovery_page(found));
+  print(telling_lines(found, data));
   if (!folds.is_null()) {
     print(fmt::format("{} {} folds, everything found anew in each: {:.4f} -> {:.4f} mm mean on the poses left out\n",
                       arguments.folds, arguments.contiguous ? "contiguous" : "random", folds["before_mm"].get<double>(),

@@ -128,13 +128,24 @@ Measurements without_rows(const Measurements& measurements, const std::vector<st
   return select(measurements, rows);
 }
 
-Calibration refit(const Robot& registered, const std::vector<Hypothesis>& found, const Measurements& measurements,
+double rms(const Robot& robot, const Measurements& measurements) {
+  return distances(positions(robot, measurements.poses), measurements).norm();
+}
+
+// From the registered frames; where that ends in a worse minimum than geometry alone, from the calibrated geometry.
+Calibration refit(const Calibration& baseline, const std::vector<Hypothesis>& found, const Measurements& measurements,
                   const std::vector<std::size_t>& outliers, const DiscoveryOptions& options) {
-  Robot start = registered;
-  for (const Hypothesis& hypothesis : found) start.effects.push_back(*hypothesis.effect);
+  const Measurements kept = without_rows(measurements, outliers);
   CalibrationOptions calibration = options.calibration;
   calibration.start_as_given = true;
-  return calibrate(start, without_rows(measurements, outliers), calibration);
+  const auto from = [&](Robot start) {
+    for (const Hypothesis& hypothesis : found) start.effects.push_back(*hypothesis.effect);
+    return calibrate(start, kept, calibration);
+  };
+  Calibration fitted = from(baseline.registered);
+  if (rms(fitted.robot, kept) <= rms(baseline.robot, kept)) return fitted;
+  Calibration other = from(baseline.robot);
+  return rms(other.robot, kept) < rms(fitted.robot, kept) ? other : fitted;
 }
 
 // Search and refit, round after round, on one set of poses.
@@ -156,7 +167,7 @@ struct Investigation {
       const std::set<std::string> before = labels_of(found);
       found = effects_of(asked, verdict);
       const bool as_before = found.empty() && verdict.outliers.empty();
-      fitted = as_before ? baseline : refit(baseline.registered, found, searched, verdict.outliers, options);
+      fitted = as_before ? baseline : refit(baseline, found, searched, verdict.outliers, options);
       if (labels_of(found) == before) break;
     }
   }
@@ -189,7 +200,7 @@ void add_maps(Investigation& investigation, const DiscoveryOptions& options, Dis
       calibrate(investigation.baseline.registered, without_rows(investigation.searched, investigation.verdict.outliers),
                 calibration)
           .robot;
-  investigation.fitted = refit(investigation.baseline.registered, investigation.found, investigation.searched,
+  investigation.fitted = refit(investigation.baseline, investigation.found, investigation.searched,
                                investigation.verdict.outliers, options);
   investigation.search(options);
 }
@@ -223,9 +234,10 @@ void check_freedom(const Measurements& samples, const Calibration& baseline) {
   const Eigen::Index coordinates = samples.count() * std::ranges::count(samples.measured, true);
   const Eigen::Index needed = baseline.result.rank + std::max<Eigen::Index>(10, baseline.result.rank / 2);
   if (coordinates < needed) {
-    throw std::runtime_error(fmt::format(
-        "{} poses to search give {} coordinates, of which calibration takes {}: at least {} are needed to tell anything",
-        samples.count(), coordinates, baseline.result.rank, needed));
+    throw std::runtime_error(
+        fmt::format("{} poses to search give {} coordinates, of which calibration takes {}: at least {} are needed to "
+                    "tell anything",
+                    samples.count(), coordinates, baseline.result.rank, needed));
   }
 }
 
@@ -238,10 +250,11 @@ void check_plausible(const Robot& robot, const Measurements& samples) {
   const double median = errors(errors.size() / 2);
   constexpr double implausible = 0.02;
   if (reach > 0.0 && median > implausible * reach) {
-    throw std::runtime_error(fmt::format(
-        "the calibrated model misses the measurements by {:.4g} mm, {:.0f} % of the arm's reach: no effect does that. Check "
-        "units, order, signs and zeros of the joints, the axes of the instrument, and the description",
-        median, 100.0 * median / reach));
+    throw std::runtime_error(
+        fmt::format("the calibrated model misses the measurements by {:.4g} mm, {:.0f} % of the arm's reach: no effect "
+                    "does that. Check "
+                    "units, order, signs and zeros of the joints, the axes of the instrument, and the description",
+                    median, 100.0 * median / reach));
   }
 }
 
@@ -264,7 +277,8 @@ Discovery discover_in(const Robot& robot, const Split& split, const DiscoveryOpt
   if (is_exact(investigation.baseline.robot, investigation.searched)) {
     result.before = calibrate(robot, split.samples, options.calibration).robot;
     result.improved.robot = result.before;
-    result.notes.emplace_back("The calibrated model reproduces the measurements to rounding: there is no gap to explain.");
+    result.notes.emplace_back(
+        "The calibrated model reproduces the measurements to rounding: there is no gap to explain.");
     return result;
   }
   investigation.search(options);
@@ -283,6 +297,13 @@ Discovery discover_in(const Robot& robot, const Split& split, const DiscoveryOpt
   result.improved.robot = investigation.fitted.robot;
   for (const std::vector<Effect>* maps : {&plain.maps, static_cast<const std::vector<Effect>*>(&result.maps)}) {
     result.improved.robot.effects.insert(result.improved.robot.effects.end(), maps->begin(), maps->end());
+  }
+  // A fit that went astray may not leave the user worse off than before.
+  if (rms(result.improved.robot, kept) > rms(result.before, kept)) {
+    result.improved.robot = result.before;
+    result.maps.clear();
+    result.notes.emplace_back(
+        "The refit with what was found did not converge to anything better: the model is as calibrated.");
   }
   if (options.correct && result.answer == discovery::Answer::unknown) {
     say(options, "trying a correction");

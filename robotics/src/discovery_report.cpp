@@ -60,8 +60,13 @@ void describe_effects(const std::vector<Hypothesis>& hypotheses, const discovery
       found.parameters = parameters_of(found.effect, fitted, mass_uncertainty);
       for (const discovery::Rival& rival : finding.rivals) {
         std::string labels;
-        for (const std::size_t a : rival.candidates) labels += (labels.empty() ? "" : " + ") + label_of(hypotheses[a]);
+        std::vector<Effect> effects;
+        for (const std::size_t a : rival.candidates) {
+          labels += (labels.empty() ? "" : " + ") + label_of(hypotheses[a]);
+          if (hypotheses[a].effect) effects.push_back(*hypotheses[a].effect);
+        }
         found.rivals.push_back(labels);
+        found.rival_effects.push_back(std::move(effects));
         found.exact_alias = found.exact_alias || rival.exact;
       }
       result.effects.push_back(std::move(found));

@@ -61,9 +61,10 @@ struct FoundEffect {
   bool confirmed = false;
   std::vector<FoundParameter> parameters;
   std::vector<std::string> rivals;  ///< labels: "link_bending@joint2", joined by " + " where it takes several
-  bool exact_alias = false;         ///< a rival predicts the same at every pose: no pose can tell
-  double share = 0.0;               ///< of the explained sum of squares
-  double rms_mm = 0.0;              ///< of the displacement that it causes beyond what geometry absorbs
+  std::vector<std::vector<Effect>> rival_effects;  ///< the same, as effects that could stand in the robot
+  bool exact_alias = false;                        ///< a rival predicts the same at every pose: no pose can tell
+  double share = 0.0;                              ///< of the explained sum of squares
+  double rms_mm = 0.0;                             ///< of the displacement that it causes beyond what geometry absorbs
 };
 
 struct FoundShape {

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "llmt/abi.hpp"
 #include "llmt/robotics/robot.hpp"
 
 namespace llmt::robotics {
