@@ -73,7 +73,8 @@ Robot best_start(const Robot& robot, const Measurements& measurements, const std
   return best;
 }
 
-void set_priors(std::vector<discovery::Parameter>& parameters, Eigen::Index geometric, const CalibrationOptions& options) {
+void set_priors(std::vector<discovery::Parameter>& parameters, Eigen::Index geometric,
+                const CalibrationOptions& options) {
   constexpr double frame_factor = 10.0;
   for (discovery::Parameter& parameter : std::span(parameters).first(static_cast<std::size_t>(geometric))) {
     const double factor = is_frame_parameter(parameter.name) ? frame_factor : 1.0;

@@ -133,7 +133,8 @@ EffectType formula_effect() {
           .family = "formula",
           .formula = "sum of coefficients times the user's expressions",
           .source = "the user",
-          .parameters = {{.name = "coefficient", .key = "coefficients", .list = true}}};
+          .parameters = {{.name = "coefficient", .key = "coefficients", .list = true}},
+          .elastic = true};
 }
 
 }  // namespace llmt::robotics

@@ -63,7 +63,14 @@ double counterbalance_spring(const PoseContext& pose, std::size_t j, Values valu
 }
 
 double backlash_gravity(const PoseContext& pose, std::size_t j, Values values, Values) {
-  return values[0] * sign(gravity_load(pose, j));
+  // About a plumb axis gravity has no torque but rounding, or what the deflection of the arm makes of it: friction
+  // holds.
+  constexpr double held = 1e-3;
+  const double torque = gravity_load(pose, j);
+  const Load& load = pose.load[j];
+  const bool slides = is_prismatic(pose.chain, j);
+  const double whole = slides ? load.force_N.norm() : load.moment_Nm.norm();
+  return std::abs(torque) > held * whole ? values[0] * sign(torque) : 0.0;
 }
 
 double backlash_approach(const PoseContext& pose, std::size_t, Values values, Values) {
@@ -153,7 +160,8 @@ std::vector<EffectType> friction_effects() {
   return {
       {.name = "backlash_gravity",
        .family = "backlash_gravity",
-       .formula = "dq_j = h sign(tau_j): the gap h on either side is taken up by the gravity torque",
+       .formula = "dq_j = h sign(tau_j): the gap h on either side is taken up by the gravity torque; 0 "
+                  "where that is less than a thousandth of the moment",
        .source = "Caenen & Angue 1990; Slamani & Bonev 2012",
        .parameters = {angle("half_gap")},
        .apply = joint_error(backlash_gravity)},

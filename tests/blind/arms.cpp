@@ -93,8 +93,8 @@ Arm build(Arm& described, llmt::Random& random, bool true_masses) {
 
   Arm arm = described;
   for (Joint& joint : arm.joints) {
-    // An arm whose first axis is not where the description has it to gravity is tilted; geometry takes that into the base
-    // frame unseen, but a soft arm shows it. Where softness is described, tilt is an effect of its own.
+    // An arm whose first axis is not where the description has it to gravity is tilted; geometry takes that into the
+    // base frame unseen, but a soft arm shows it. Where softness is described, tilt is an effect of its own.
     const bool plumb = true_masses && &joint == &arm.joints.front();
     const double theta = off(random, 2e-4, 2e-3);
     joint.theta += plumb && arm.planar ? 0.0 : theta;

@@ -1,6 +1,9 @@
 // Effects of weight against statics by other means: energies, beams in many pieces, robots described otherwise.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "llmt/robotics/robot_file.hpp"
 #include "robotics/effects.hpp"
 
@@ -49,8 +52,14 @@ TEST(ElasticEffects, ComplianceTurnsAJointInProportionToTheSlopeOfTheEnergy) {
       expect_positions(
           robot, {"joint_compliance", robot.chain.joints[j].name, {compliance}}, poses,
           [&](const Eigen::VectorXd& q, double payload, Eigen::Index) {
-            const double load = gravity_by_energy(robot, q, payload, j);
-            return moved_tool(robot, q, j, compliance * load * (turns ? 1.0 : 1000.0));
+            // Equilibrium: the load is that of the arm as it has given way.
+            double yielded = 0.0;
+            Eigen::VectorXd bent = q;
+            for (int pass = 0; pass < 20; ++pass) {
+              yielded = compliance * gravity_by_energy(robot, bent, payload, j) * (turns ? 1.0 : 1000.0);
+              bent(static_cast<Eigen::Index>(j)) = q(static_cast<Eigen::Index>(j)) + yielded;
+            }
+            return moved_tool(robot, q, j, yielded);
           },
           1e-6);
     }
@@ -95,7 +104,28 @@ TEST(ElasticEffects, FreeMassesWithTheMomentsOfTheTrueMassesAreJointCompliance) 
   }
 }
 
-// End displacement and slope of a link in 2000 pieces: each piece turns by (moment of all beyond it) ds / EI.
+// A link as a straight bar: along the common normal, in the plane of the link's centre of mass; or along the axis,
+// where that is the longer way; the last link straight to the tool.
+struct StraightBar {
+  Vector3d begin;
+  Vector3d end;
+};
+
+StraightBar straight_bar(const Robot& robot, const Skeleton& skeleton, std::size_t link) {
+  const Vector3d& from = skeleton.joint_origin[link];
+  const Vector3d& to = skeleton.link_end[link];
+  if (link + 1 == robot.chain.joints.size()) return {from, to};
+  const Vector3d z = skeleton.joint_axis[link];
+  const double d = (to - from).dot(z);
+  const Vector3d normal = (to - from) - d * z;
+  if (normal.norm() < std::abs(d)) return {from, from + d * z};
+  const Vector3d begin = from + (skeleton.body_centre[link] - from).dot(z) * z;
+  return {begin, begin + normal};
+}
+
+// End displacement and slope of a link in 2000 pieces: each piece turns by (moment of all beyond it) ds / EI. The
+// link's own weight is spread so that its centre is where it should be, as far as a density that changes in proportion
+// allows.
 TEST(ElasticEffects, BendingIsThatOfABeamInManyPieces) {
   const Robot robot = weighted(mdh_like());
   const Poses poses = furnished_poses(robot.chain, 3, 5);
@@ -105,23 +135,32 @@ TEST(ElasticEffects, BendingIsThatOfABeamInManyPieces) {
         robot, {"link_bending", robot.chain.joints[link].name, {flexibility}}, poses,
         [&](const Eigen::VectorXd& q, double payload, Eigen::Index) -> Vector3d {
           const Skeleton skeleton = Kinematics(robot.chain).skeleton(q);
-          const Vector3d begin = skeleton.joint_origin[link];
-          const Vector3d end = skeleton.link_end[link];
+          const auto [begin, end] = straight_bar(robot, skeleton, link);
           const Vector3d span = 1e-3 * (end - begin);
           if (span.norm() < 1e-9) return skeleton.tool.position_mm;
           const Vector3d chord = span.normalized();
           const Load tip = weight_beyond(robot, q, payload, link + 1, end);
           const Vector3d own = robot.chain.joints[link].mass_kg * (skeleton.base_rotation * robot.chain.gravity_m_s2);
+          const double centre = 1e-3 * chord.dot(skeleton.body_centre[link] - begin) / span.norm();
+          const double slant = std::clamp(6.0 * (centre - 0.5), -1.0, 1.0);
           constexpr int pieces = 2000;
           Vector3d turn = Vector3d::Zero();
           Vector3d shift = Vector3d::Zero();
-          for (int k = 0; k < pieces; ++k) {
-            const double left = 1.0 - (k + 0.5) / pieces;  // share of the link beyond the middle of the piece
-            const Vector3d moment =
-                tip.moment_Nm + (left * span).cross(tip.force_N) + (0.5 * left * span).cross(left * own);
+          double weight_beyond_piece = 0.0;  // shares of the own weight, and their first moment from the begin
+          double moment_beyond_piece = 0.0;
+          for (int k = pieces - 1; k >= 0; --k) {
+            const double at = (k + 0.5) / pieces;
+            const double piece = (1.0 + slant * (2.0 * at - 1.0)) / pieces;
+            weight_beyond_piece += 0.5 * piece;
+            moment_beyond_piece += 0.5 * piece * at;
+            const double left = 1.0 - at;  // share of the link beyond the middle of the piece
+            const double arm = moment_beyond_piece - at * weight_beyond_piece;
+            const Vector3d moment = tip.moment_Nm + (left * span).cross(tip.force_N) + (arm * span).cross(own);
             const Vector3d bent = flexibility * span.norm() / pieces * (moment - chord.dot(moment) * chord);
             turn += bent;
             shift += bent.cross(left * span);
+            weight_beyond_piece += 0.5 * piece;
+            moment_beyond_piece += 0.5 * piece * at;
           }
           const Vector3d& tool = skeleton.tool.position_mm;
           return tool + 1e3 * shift + turn.cross(tool - end);
@@ -139,20 +178,25 @@ TEST(ElasticEffects, TorsionTurnsWhatIsBeyondAboutTheChord) {
         robot, {"link_torsion", robot.chain.joints[link].name, {flexibility}}, poses,
         [&](const Eigen::VectorXd& q, double payload, Eigen::Index) -> Vector3d {
           const Skeleton skeleton = Kinematics(robot.chain).skeleton(q);
-          const Vector3d end = skeleton.link_end[link];
-          const Vector3d span = end - skeleton.joint_origin[link];
-          const double torque = weight_beyond(robot, q, payload, link + 1, end).moment_Nm.dot(span.normalized());
+          const auto [begin, end] = straight_bar(robot, skeleton, link);
+          const Vector3d span = end - begin;
+          double torque = weight_beyond(robot, q, payload, link + 1, end).moment_Nm.dot(span.normalized());
+          // The link's own weight twists the bar as far as its centre of mass.
+          const Vector3d arm = skeleton.body_centre[link] - begin;
+          const Vector3d own = robot.chain.joints[link].mass_kg * (skeleton.base_rotation * robot.chain.gravity_m_s2);
+          const double reached = std::clamp(arm.dot(span) / span.squaredNorm(), 0.0, 1.0);
+          torque += reached * 1e-3 * arm.cross(own).dot(span.normalized());
           const Eigen::AngleAxisd twist(flexibility * 1e-3 * span.norm() * torque, span.normalized());
           return end + twist * (skeleton.tool.position_mm - end);
         },
-        1e-9);
+        1e-6);  // the way from the bar's end to the link's is turned to first order
   }
 }
 
 TEST(ElasticEffects, BaseTurnsByTheMomentOfTheWholeWeight) {
   for (const Robot& robot : arms()) {
     const Poses poses = furnished_poses(robot.chain, 4, 7);
-    const double compliance = 1e-6;
+    const double compliance = 1e-9;  // so small that the loads are those of the undeformed arm
     expect_positions(
         robot, {"elastic_base", "", {compliance}}, poses,
         [&](const Eigen::VectorXd& q, double payload, Eigen::Index) -> Vector3d {
@@ -161,7 +205,7 @@ TEST(ElasticEffects, BaseTurnsByTheMomentOfTheWholeWeight) {
           const Vector3d turn = compliance * weight_beyond(robot, q, payload, 0, origin).moment_Nm;
           return origin + Eigen::AngleAxisd(turn.norm(), turn.normalized()) * (skeleton.tool.position_mm - origin);
         },
-        1e-9);
+        1e-8);
     const Robot one = with_effect(robot, {"elastic_base", "", {compliance}});
     const Robot two = with_effect(robot, {"elastic_base_two", "", {compliance, compliance}});
     EXPECT_LT((positions(one, poses) - positions(two, poses)).norm(), 1e-9);

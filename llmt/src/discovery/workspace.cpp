@@ -52,7 +52,7 @@ Workspace::Workspace(const Evidence& evidence, const std::vector<Candidate>& can
   }
   basis_.conservativeResize(Eigen::NoChange, next);
   gram_ = Eigen::MatrixXd::Zero(next, next);
-  gram_.selfadjointView<Eigen::Lower>().rankUpdate(basis_.transpose());
+  if (next > 0) gram_.selfadjointView<Eigen::Lower>().rankUpdate(basis_.transpose());
   gram_.triangularView<Eigen::StrictlyUpper>() = gram_.transpose();
   moments_ = basis_.transpose() * residuals_;
 }
