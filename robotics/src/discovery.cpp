@@ -87,6 +87,9 @@ Question question(const Robot& robot, const std::vector<Hypothesis>& found, cons
   result.evidence.jacobian = jacobian(rows, Eigen::seqN(0, baseline));
   result.evidence.components = std::ranges::count(measurements.measured, true);
   result.evidence.repeats = repeats_of(measurements.poses);
+  // Deflections over levers are a hundredth at most, and first order is wrong by a share of that.
+  constexpr double first_order = 1e-5;
+  result.evidence.resolution = first_order;
   for (Hypothesis& hypothesis : result.hypotheses) {
     hypothesis.candidate.signature = Eigen::MatrixXd(hypothesis.candidate.signature(rows, Eigen::all));
   }
@@ -105,6 +108,13 @@ std::set<std::string> labels_of(const std::vector<Hypothesis>& found) {
   return labels;
 }
 
+// Where the fit starts. A value that hardly moves anything can come out anywhere; plausible sizes bound it.
+std::vector<double> within_limits(const discovery::Candidate& candidate, const Eigen::VectorXd& values) {
+  Eigen::VectorXd bounded = values;
+  if (candidate.lower.size() == values.size()) bounded = values.cwiseMax(candidate.lower).cwiseMin(candidate.upper);
+  return {bounded.begin(), bounded.end()};
+}
+
 // The hypotheses of the verdict that are effects, with their values.
 std::vector<Hypothesis> effects_of(const Question& question, const discovery::Verdict& verdict) {
   std::vector<Hypothesis> found;
@@ -114,7 +124,7 @@ std::vector<Hypothesis> effects_of(const Question& question, const discovery::Ve
       if (!hypothesis.effect) continue;
       found.push_back(hypothesis);
       found.back().candidate.signature.resize(0, 0);
-      found.back().effect->values.assign(term.values.begin(), term.values.end());
+      found.back().effect->values = within_limits(hypothesis.candidate, term.values);
     }
   }
   return found;
@@ -215,13 +225,36 @@ double mean_distance(double sigma, Eigen::Index components) {
   return sigma * std::sqrt(2.0) * std::exp(std::lgamma(0.5 * (d + 1.0)) - std::lgamma(0.5 * d));
 }
 
+// Lost beams among the poses set aside are told, not removed: nothing is chosen by these poses.
+void tell_far_poses(const CorrectedRobot& improved, const Measurements& test, Discovery& result) {
+  const Eigen::VectorXd errors = distances(positions(improved, test.poses), test);
+  std::vector<double> sorted(errors.begin(), errors.end());
+  std::ranges::nth_element(sorted, sorted.begin() + std::ssize(sorted) / 2);
+  const double median = sorted[sorted.size() / 2];
+  constexpr double far = 10.0;
+  const auto count = (errors.array() > far * median).count();
+  if (count > 0 && median > 0.0) {
+    result.notes.push_back(
+        fmt::format("{} of the {} poses set aside are more than ten times as far off as the median ({:.4f} mm): lost "
+                    "beams, or poses unlike the others.",
+                    count, errors.size(), median));
+  }
+}
+
 void verify(const Measurements& searched, const Measurements& test, Eigen::Index components, Discovery& result) {
   result.fitted_before = figures({result.before, {}}, searched);
   result.fitted_after = figures(result.improved, searched);
   if (test.count() > 0) {
-    result.held_out.before = figures({result.before, {}}, test);
-    result.held_out.after = figures(result.improved, test);
+    // Along the axes that were fitted: what was never seen is not promised.
+    Measurements common = test;
+    for (std::size_t axis = 0; axis < 3; ++axis) common.measured[axis] = test.measured[axis] && searched.measured[axis];
+    if (std::ranges::none_of(common.measured, [](bool seen) { return seen; })) {
+      throw std::runtime_error("the test measurements share no coordinate with those that were searched");
+    }
+    result.held_out.before = figures({result.before, {}}, common);
+    result.held_out.after = figures(result.improved, common);
     result.held_out.poses = test.count();
+    tell_far_poses(result.improved, common, result);
   }
   constexpr Eigen::Index enough = 12;
   const bool repeats_speak = result.lack_of_fit.dof >= enough;

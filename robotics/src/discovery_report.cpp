@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "llmt/folds.hpp"
 
@@ -22,8 +23,11 @@ std::vector<FoundParameter> parameters_of(const Effect& effect, const Calibratio
     const std::string name = effect_parameter_name(effect, parameter);
     const auto index = std::ranges::find(all, name, &discovery::Parameter::name) - all.begin();
     const double value = all[static_cast<std::size_t>(index)].value;
+    // Calibration holds what does not move the tool: its value is not determined.
+    const double error = fitted.result.standard_errors(index);
     const double known = effect_type(effect.type).weighted ? mass_uncertainty * value : 0.0;
-    found.push_back({parameter.name, value, parameter.unit, std::hypot(fitted.result.standard_errors(index), known)});
+    found.push_back({parameter.name, value, parameter.unit,
+                     error > 0.0 ? std::hypot(error, known) : std::numeric_limits<double>::quiet_NaN()});
   }
   return found;
 }

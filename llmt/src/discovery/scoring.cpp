@@ -55,8 +55,8 @@ double Scoring::misfit(double left, Eigen::Index directions) const {
   constexpr double largest_share = 0.4;
   if (used > largest_share * n) return impossible;
   // Exact data: below rounding nothing can be told apart.
-  constexpr double rounding = 1e-20;
-  const double least = std::max(rounding * workspace_->given_sum_of_squares(), std::numeric_limits<double>::min());
+  const double least =
+      std::max(workspace_->resolution() * workspace_->given_sum_of_squares(), std::numeric_limits<double>::min());
   return n * std::log(std::max(left, least) / (n - used));
 }
 

@@ -33,6 +33,9 @@ void check(const Evidence& evidence, const std::vector<Candidate>& candidates, c
   if (!evidence.repeats.empty() && std::ssize(evidence.repeats) != evidence.samples()) {
     refuse(fmt::format("repeats has {} entries, must be {}", evidence.repeats.size(), evidence.samples()));
   }
+  if (!(evidence.resolution >= 0.0 && evidence.resolution < 1.0)) {
+    refuse(fmt::format("resolution is {}, must be in [0, 1)", evidence.resolution));
+  }
   if (!evidence.residuals.allFinite()) refuse("a residual is not finite");
   if (!evidence.jacobian.allFinite()) refuse("an entry of the jacobian is not finite");
   if (!(options.false_alarm_rate > 0.0 && options.false_alarm_rate < 0.1)) {

@@ -30,6 +30,8 @@ Workspace::Workspace(const Evidence& evidence, const std::vector<Candidate>& can
     : components_(evidence.components),
       given_sum_of_squares_(evidence.residuals.squaredNorm()),
       residuals_(evidence.residuals) {
+  constexpr double rounding = 1e-20;
+  resolution_ = std::max(rounding, evidence.resolution);
   constexpr double rank_tolerance = 1e-9;
   baseline_ = range_basis(evidence.jacobian, rank_tolerance);
   degrees_ = static_cast<double>(residuals_.size() - baseline_.cols());

@@ -37,6 +37,8 @@ class Workspace {
   double degrees() const { return degrees_; }
   double sum_of_squares() const { return residuals_.squaredNorm(); }
   /// Of the residuals as given, the baseline not adjusted: what rounding is relative to.
+  /// Evidence::resolution, or what rounding leaves of it.
+  double resolution() const { return resolution_; }
   double given_sum_of_squares() const { return given_sum_of_squares_; }
   /// v without its part in the baseline's range, for every column.
   void project(Eigen::Ref<Eigen::MatrixXd> columns) const;
@@ -44,6 +46,7 @@ class Workspace {
  private:
   Eigen::Index components_;
   double degrees_ = 0.0;
+  double resolution_ = 0.0;
   double given_sum_of_squares_ = 0.0;
   Eigen::MatrixXd baseline_;  // N x m, orthonormal; dropped samples included
   Eigen::VectorXd residuals_;
