@@ -89,7 +89,8 @@ Comparison read_comparison(const DiscoverArguments& arguments) {
   if (!arguments.order.empty() && std::ranges::find(arguments.inputs, arguments.order) == arguments.inputs.end()) {
     const Csv& holder = measured.has(arguments.order) ? measured : simulated;
     Eigen::MatrixXd with_order(comparison.inputs.values.rows(), comparison.inputs.values.cols() + 1);
-    with_order << comparison.inputs.values, holder.numbers(arguments.order);
+    with_order.leftCols(comparison.inputs.values.cols()) = comparison.inputs.values;
+    with_order.rightCols(1) = holder.numbers(arguments.order);
     comparison.inputs.values = with_order;
     comparison.inputs.names.push_back(arguments.order);
   }

@@ -19,8 +19,8 @@ struct Evidence {
   Eigen::Index components = 1;  ///< d
   /// n numbers, or empty: samples of equal number are repeats of one setting, independent draws of the noise.
   std::vector<Eigen::Index> repeats;
-  /// Share of the sum of squares that signatures, being of first order, cannot be trusted with: no explanation is better
-  /// than that, so data without noise do not call for ever more candidates. 0: they are exact.
+  /// Share of the sum of squares that signatures, being of first order, cannot be trusted with: no explanation is
+  /// better than that, so data without noise do not call for ever more candidates. 0: they are exact.
   double resolution = 0.0;
 
   Eigen::Index samples() const { return components > 0 ? residuals.size() / components : 0; }
