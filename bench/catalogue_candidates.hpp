@@ -18,17 +18,6 @@ using namespace llmt::robotics;
 using llmt::discovery::Candidate;
 using llmt::discovery::Evidence;
 
-/// Rows of the 3n coordinates that were measured.
-inline std::vector<Eigen::Index> measured_rows(const Measurements& measurements) {
-  std::vector<Eigen::Index> rows;
-  for (Eigen::Index i = 0; i < measurements.count(); ++i) {
-    for (Eigen::Index axis = 0; axis < 3; ++axis) {
-      if (measurements.measured[static_cast<std::size_t>(axis)]) rows.push_back(3 * i + axis);
-    }
-  }
-  return rows;
-}
-
 /// What distinguishes the variants of a type at a place; nothing if it cannot be there.
 inline std::vector<std::vector<double>> variants(const EffectType& type, const Chain& chain, std::size_t index,
                                                  const Poses& poses) {

@@ -12,17 +12,6 @@
 namespace llmt::robotics {
 namespace {
 
-// Rows of the stacked coordinates x, y, z, x, y, z, ... that were measured.
-std::vector<Eigen::Index> measured_rows(const Measurements& measurements) {
-  std::vector<Eigen::Index> rows;
-  for (Eigen::Index i = 0; i < measurements.count(); ++i) {
-    for (Eigen::Index axis = 0; axis < 3; ++axis) {
-      if (measurements.measured[static_cast<std::size_t>(axis)]) rows.push_back(3 * i + axis);
-    }
-  }
-  return rows;
-}
-
 bool is_frame_parameter(const std::string& name) { return name.starts_with("base.") || name.starts_with("tool."); }
 
 discovery::Result solve_for(Robot& robot, discovery::Problem problem, const std::vector<std::string>& reasons,

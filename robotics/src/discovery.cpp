@@ -41,16 +41,6 @@ Eigen::VectorXd stacked_residuals(const Robot& robot, const Measurements& measur
   return residuals;
 }
 
-std::vector<Eigen::Index> measured_rows(const Measurements& measurements) {
-  std::vector<Eigen::Index> rows;
-  for (Eigen::Index i = 0; i < measurements.count(); ++i) {
-    for (Eigen::Index axis = 0; axis < 3; ++axis) {
-      if (measurements.measured[static_cast<std::size_t>(axis)]) rows.push_back(3 * i + axis);
-    }
-  }
-  return rows;
-}
-
 // The last effects of the robot are those that were found.
 Question question(const Robot& robot, const std::vector<Hypothesis>& found, const Measurements& measurements,
                   const DiscoveryOptions& options) {

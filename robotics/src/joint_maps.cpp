@@ -42,16 +42,6 @@ std::vector<Knots> choose_knots(const Chain& chain, const Poses& poses) {
   return all;
 }
 
-std::vector<Eigen::Index> measured_rows(const Measurements& measurements) {
-  std::vector<Eigen::Index> rows;
-  for (Eigen::Index i = 0; i < measurements.count(); ++i) {
-    for (Eigen::Index axis = 0; axis < 3; ++axis) {
-      if (measurements.measured[static_cast<std::size_t>(axis)]) rows.push_back(3 * i + axis);
-    }
-  }
-  return rows;
-}
-
 Eigen::MatrixXd second_differences(Eigen::Index count) {
   Eigen::MatrixXd penalty = Eigen::MatrixXd::Zero(count, count);
   for (Eigen::Index k = 1; k + 1 < count; ++k) {

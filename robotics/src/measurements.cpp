@@ -42,6 +42,9 @@ void validate(const Measurements& measurements, const Robot& robot) {
     if (values.size() != poses.count())
       refuse(fmt::format("column {} has {} values, must be {}", name, values.size(), poses.count()));
     if (!values.allFinite()) refuse(fmt::format("column {} has a value that is not finite", name));
+    if (name == "payload_kg" && values.minCoeff() < 0.0) {
+      refuse(fmt::format("column payload_kg has {}, must not be negative", values.minCoeff()));
+    }
   }
 }
 
@@ -63,6 +66,16 @@ void add_moves(Poses& poses, const Chain& chain) {
 }
 
 bool is_move(std::string_view column) { return column.starts_with("move"); }
+
+std::vector<Eigen::Index> measured_rows(const Measurements& measurements) {
+  std::vector<Eigen::Index> rows;
+  for (Eigen::Index i = 0; i < measurements.count(); ++i) {
+    for (Eigen::Index axis = 0; axis < 3; ++axis) {
+      if (measurements.measured[static_cast<std::size_t>(axis)]) rows.push_back(3 * i + axis);
+    }
+  }
+  return rows;
+}
 
 Eigen::VectorXd distances(const Eigen::MatrixXd& model_mm, const Measurements& measurements) {
   Eigen::VectorXd squares = Eigen::VectorXd::Zero(measurements.count());

@@ -39,6 +39,10 @@ Measurements select(const Measurements& measurements, const std::vector<std::ptr
 /// number of joints is not that of the robot.
 void validate(const Measurements& measurements, const Robot& robot);
 
+/// Which of the 3n stacked coordinates x, y, z of pose 0, x, y, z of pose 1, ... were measured: their numbers,
+/// ascending.
+std::vector<Eigen::Index> measured_rows(const Measurements& measurements);
+
 /// Distances between model and measurement over the measured coordinates, n values, mm.
 Eigen::VectorXd distances(const Eigen::MatrixXd& model_mm, const Measurements& measurements);
 
