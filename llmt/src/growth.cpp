@@ -49,7 +49,10 @@ struct Priority {
 
 class Grower {
  public:
-  explicit Grower(const GrowthProblem& problem) : problem_(problem), options_(problem.options) { scale_outputs(); }
+  explicit Grower(const GrowthProblem& problem)
+      : problem_(problem), options_(problem.options), missing_(problem.deviations.hasNaN()) {
+    scale_outputs();
+  }
 
   GrownPartition run() {
     open_root();
@@ -128,9 +131,9 @@ class Grower {
     parentless.slope = Eigen::MatrixXd::Zero(problem_.outputs.cols(), problem_.deviations.cols());
     parentless.mean = Eigen::VectorXd::Zero(problem_.deviations.cols());
     nodes_.resize(1);
-    const NodeFit fit = fit_leaf(root, parentless, scaled_outputs_);
+    NodeFit fit = fit_leaf(root, parentless, scaled_outputs_);
     tree_rss_ = {root.rss};
-    find_split(root, fit);
+    find_split(root, std::move(fit));
     enter(std::move(root));
   }
 
@@ -140,14 +143,10 @@ class Grower {
 
   /// Fits the local model of `leaf` as a correction of its parent's, whose residuals on the leaf's rows are given.
   NodeFit fit_leaf(OpenLeaf& leaf, const Node& parent, const Eigen::MatrixXd& parent_residuals) {
-    const Eigen::MatrixXd deviations = problem_.deviations(leaf.rows, Eigen::all);
-    const bool missing = deviations.hasNaN();
-    NodeFit fit;
-    if (!missing) {
-      fit = fit_node(deviations, parent_residuals, leaf.weights);
-    } else {
-      fit = fit_node(deviations, about_own_mean(deviations, parent, parent_residuals, leaf.weights), leaf.weights);
-    }
+    const RowMajor deviations = problem_.deviations(leaf.rows, Eigen::all);
+    NodeFit fit = missing_ ? fit_node(deviations, about_own_mean(deviations, parent, parent_residuals, leaf.weights),
+                                      leaf.weights)
+                           : fit_node(deviations, parent_residuals, leaf.weights);
     Node& node = nodes_[static_cast<std::size_t>(leaf.node)];
     node.samples = std::ssize(leaf.rows);
     node.rank = fit.rank;
@@ -155,25 +154,16 @@ class Grower {
     node.value = parent.value + fit.centre_change;
     node.slope = parent.slope + fit.slope_change;
     node.mean = fit.mean;
-    node.low = fit.mean;
-    node.high = fit.mean;
-    for (std::ptrdiff_t k = 0; k < deviations.cols(); ++k) {
-      for (std::ptrdiff_t i = 0; i < deviations.rows(); ++i) {
-        if (deviations(i, k) < node.low(k)) {
-          node.low(k) = deviations(i, k);
-        } else if (deviations(i, k) > node.high(k)) {
-          node.high(k) = deviations(i, k);
-        }
-      }
-    }
-    leaf.residuals = fit.residuals;
+    node.low = fit.low;
+    node.high = fit.high;
+    leaf.residuals = fit.residuals();
     leaf.rss = weights_.dot(fit.rss);
     return fit;
   }
 
   /// Residuals of the parent's local model with missing values at the mean of these rows instead of the parent's.
-  static Eigen::MatrixXd about_own_mean(const Eigen::MatrixXd& deviations, const Node& parent,
-                                        Eigen::MatrixXd residuals, const Eigen::VectorXd& weights) {
+  static Eigen::MatrixXd about_own_mean(const RowMajor& deviations, const Node& parent, Eigen::MatrixXd residuals,
+                                        const Eigen::VectorXd& weights) {
     for (std::ptrdiff_t k = 0; k < deviations.cols(); ++k) {
       double sum = 0.0;
       double present = 0.0;
@@ -204,32 +194,52 @@ class Grower {
   }
 
   /// Searches all split inputs; leaves in leaf.best the best split, acceptable or not.
-  void find_split(OpenLeaf& leaf, const NodeFit& fit) {
+  void find_split(OpenLeaf& leaf, NodeFit fit) {
     if (std::ssize(leaf.rows) < 2 * options_.min_leaf_samples) {
       return;
     }
-    const SearchNode node = make_search_node(fit, weights_);
-    std::vector<SplitCandidate> found(leaf.orders.size());
+    const SearchNode node{std::move(fit.features), weights_, leaf.rss};
+    const std::size_t inputs = leaf.orders.size();
+    std::vector<std::optional<InputSearch>> searches(inputs);
+    std::vector<SplitCandidate> found(inputs);
     parallel_for(std::ssize(found), problem_.max_threads, [&](std::ptrdiff_t j) {
-      SplitCandidate& slot = found[static_cast<std::size_t>(j)];
+      const std::size_t slot = static_cast<std::size_t>(j);
       if (num_levels(j) > 0) {
-        slot = search_levels(node, levels_of(leaf, j), num_levels(j), options_.min_leaf_samples);
+        found[slot] = search_levels(node, levels_of(leaf, j), num_levels(j), options_.min_leaf_samples);
         return;
       }
-      const Rows& order = leaf.orders[static_cast<std::size_t>(j)];
+      const Rows& order = leaf.orders[slot];
       std::vector<double> values(order.size());
       for (std::size_t k = 0; k < order.size(); ++k) {
         values[k] = problem_.split_values(leaf.rows[static_cast<std::size_t>(order[k])], j);
       }
-      slot = search_input(node, values, order, options_.min_leaf_samples);
-      if (order.size() < leaf.rows.size()) {
-        consider_missing(node, leaf, j, slot);
+      searches[slot].emplace(node, std::move(values), order, options_.min_leaf_samples);
+      searches[slot]->search_edges();
+    });
+    // What one input has found spares the others work, in a way that does not depend on who was first.
+    double limit = std::numeric_limits<double>::infinity();
+    for (std::size_t j = 0; j < inputs; ++j) {
+      limit = std::min(limit, searches[j] ? searches[j]->smallest() : limit);
+    }
+    parallel_for(std::ssize(found), problem_.max_threads, [&](std::ptrdiff_t j) {
+      const std::size_t slot = static_cast<std::size_t>(j);
+      if (searches[slot]) {
+        searches[slot]->refine(limit);
+        found[slot] = searches[slot]->best();
+        if (leaf.orders[slot].size() < leaf.rows.size()) {
+          consider_missing(node, leaf, j, found[slot]);
+        }
+        searches[slot].reset();
       }
     });
+    double smallest = std::numeric_limits<double>::infinity();
     std::ptrdiff_t tested = 0;
-    for (std::size_t j = 0; j < found.size(); ++j) {
-      tested += found[j].tested;
-      if (found[j].input >= 0 && (leaf.best.input < 0 || found[j].rss < leaf.best.rss - tie_tolerance * leaf.rss)) {
+    for (const SplitCandidate& candidate : found) {
+      tested += candidate.tested;
+      smallest = candidate.input >= 0 ? std::min(smallest, candidate.rss) : smallest;
+    }
+    for (std::size_t j = 0; j < inputs && leaf.best.input < 0; ++j) {
+      if (found[j].input >= 0 && found[j].rss <= smallest + tie_tolerance * leaf.rss) {
         leaf.best = found[j];
         leaf.best.input = static_cast<int>(j);
       }
@@ -333,9 +343,8 @@ class Grower {
     }
     parallel_for(2, problem_.max_threads, [&](std::ptrdiff_t side) {
       OpenLeaf& child = children[static_cast<std::size_t>(side)];
-      const NodeFit fit =
-          fit_leaf(child, parent, leaf.residuals(positions[static_cast<std::size_t>(side)], Eigen::all));
-      find_split(child, fit);
+      NodeFit fit = fit_leaf(child, parent, leaf.residuals(positions[static_cast<std::size_t>(side)], Eigen::all));
+      find_split(child, std::move(fit));
     });
     Node& node = nodes_[static_cast<std::size_t>(leaf.node)];
     node.left = children[0].node;
@@ -392,11 +401,11 @@ class Grower {
     if (missing.empty()) {
       return known;
     }
-    const Eigen::MatrixXd deviations = problem_.deviations(leaf.rows, Eigen::all);
-    const Eigen::MatrixXd queries = deviations(missing, Eigen::all);
+    const RowMajor deviations = problem_.deviations(leaf.rows, Eigen::all);
+    const RowMajor queries = deviations(missing, Eigen::all);
     std::array<Eigen::MatrixXd, 2> change;  // child's prediction minus the leaf's, rows x outputs
     for (std::size_t side = 0; side < 2; ++side) {
-      const Eigen::MatrixXd of_child = deviations(positions[side], Eigen::all);
+      const RowMajor of_child = deviations(positions[side], Eigen::all);
       const Eigen::VectorXd weights = leaf.weights(positions[side]);
       const Eigen::MatrixXd residuals =
           about_own_mean(of_child, parent, leaf.residuals(positions[side], Eigen::all), weights);
@@ -499,6 +508,7 @@ class Grower {
   Eigen::VectorXd weights_;  // of the scaled outputs' sums of squares: 1 / their total
   Eigen::VectorXd
       rounding_;  // root mean square residual, in scaled outputs, that is rounding of the outputs themselves
+  bool missing_;  // whether a regressor has missing values
   std::vector<Node> nodes_;
   std::vector<std::optional<OpenLeaf>> leaves_;
   std::priority_queue<Priority> queue_;

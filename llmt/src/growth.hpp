@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "llmt/fit.hpp"
+#include "node_fit.hpp"
 
 namespace llmt {
 
@@ -13,7 +14,7 @@ namespace llmt {
 struct GrowthProblem {
   Eigen::MatrixXd split_values;  ///< rows x split inputs; NaN: missing
   std::vector<int> num_levels;   ///< of each split input; 0: a number
-  Eigen::MatrixXd deviations;    ///< rows x regressors, as deviations from their centres; NaN: missing
+  RowMajor deviations;           ///< rows x regressors, as deviations from their centres; NaN: missing
   Eigen::MatrixXd outputs;       ///< rows x outputs of the partition
   Eigen::VectorXd weights;       ///< of the rows, positive, with mean 1
   GrowthOptions options;         ///< split_inputs listed, min_leaf_samples set

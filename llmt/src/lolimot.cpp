@@ -201,13 +201,17 @@ class Lolimot {
     if (std::ssize(order) < 2 * smallest) {
       return std::nullopt;
     }
-    const NodeFit crisp =
-        fit_node(deviations_(rows, Eigen::all), problem_.outputs(rows, Eigen::all), problem_.weights(rows));
+    NodeFit crisp = fit_node(deviations_(rows, Eigen::all), problem_.outputs(rows, Eigen::all), problem_.weights(rows));
     std::vector<double> values;
     for (const int k : order) {
       values.push_back(value(k));
     }
-    const SplitCandidate found = search_input(make_search_node(crisp, output_weights_), values, order, smallest);
+    const double rss = output_weights_.dot(crisp.rss);
+    const SearchNode node{std::move(crisp.features), output_weights_, rss};
+    InputSearch search(node, values, order, smallest);
+    search.search_edges();
+    search.refine(std::numeric_limits<double>::infinity());
+    const SplitCandidate found = search.best();
     if (found.input < 0) {
       return std::nullopt;
     }

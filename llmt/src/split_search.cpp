@@ -1,317 +1,210 @@
 #include "split_search.hpp"
 
 #include <algorithm>
-#include <array>
 #include <limits>
-#include <type_traits>
-#include <vector>
 
 namespace llmt {
 namespace {
 
 constexpr double no_split = std::numeric_limits<double>::infinity();
 
-/// Pivots below this, relative to the sum of squares of their column, count as zero. The rounding of the sums is about
-/// 1e-15 of it; what a narrow child legitimately leaves of a direction is larger.
-constexpr double pivot_tolerance = 1e-12;
+/// Rows of a block, within these bounds such that there are at most `most_blocks`.
+constexpr std::ptrdiff_t smallest_block = 64;
+constexpr std::ptrdiff_t most_blocks = 400;
 
-/// Normal equations of a growing set of rows, and the residual sum of squares of their least-squares fit.
-///
-/// `Regressors` is the number of columns besides the constant if it is known at compile time, or -1.
-template <int Regressors>
-class NormalEquations {
-  static constexpr int fixed = Regressors >= 0 ? Regressors + 1 : -1;
+/// Rows of the parts that a block is cut into. On pure noise a part is passed over if the rows it holds, which its
+/// bound does not count, are fewer than what the best split gains beyond a chance one, in units of the noise; that is
+/// some twenty.
+constexpr std::ptrdiff_t part_rows = 12;
+constexpr std::ptrdiff_t most_parts = 33;
 
- public:
-  NormalEquations(std::ptrdiff_t regressors, std::ptrdiff_t outputs) : size_(regressors + 1), outputs_(outputs) {
-    if constexpr (fixed < 0) {
-      gram_.resize(static_cast<std::size_t>(size_ * size_));
-      factor_.resize(gram_.size());
-    } else {
-      gram_.fill(0.0);
-    }
-    products_.resize(static_cast<std::size_t>(size_ * outputs_));
-    solution_.resize(products_.size());
-    squares_.resize(static_cast<std::size_t>(outputs_));
-  }
-
-  /// Adds a row: the constant and the regressors, then residuals.
-  void add(const double* row) {
-    const std::ptrdiff_t p = size();
-    const double* residual = row + p;
-    for (std::ptrdiff_t i = 0; i < p; ++i) {
-      for (std::ptrdiff_t j = 0; j <= i; ++j) {
-        gram(i, j) += row[i] * row[j];
-      }
-    }
-    for (std::ptrdiff_t o = 0; o < outputs_; ++o) {
-      double* product = products_.data() + o * p;
-      for (std::ptrdiff_t i = 0; i < p; ++i) {
-        product[i] += row[i] * residual[o];
-      }
-      squares_[static_cast<std::size_t>(o)] += residual[o] * residual[o];
-    }
-  }
-
-  void add(const NormalEquations& other) {
-    const auto sum = [](auto& to, const auto& from) {
-      for (std::size_t i = 0; i < to.size(); ++i) {
-        to[i] += from[i];
-      }
-    };
-    sum(gram_, other.gram_);
-    sum(products_, other.products_);
-    sum(squares_, other.squares_);
-  }
-
-  /// Weighted residual sum of squares, by an LDL' factorisation in which dependent columns are left out; sets `rank`.
-  double rss(const Eigen::VectorXd& weights, int& rank) {
-    const std::ptrdiff_t p = size();
-    std::copy(products_.begin(), products_.end(), solution_.begin());
-    double total = 0.0;
-    for (std::ptrdiff_t o = 0; o < outputs_; ++o) {
-      total += weights(o) * squares_[static_cast<std::size_t>(o)];
-    }
-    rank = 0;
-    for (std::ptrdiff_t k = 0; k < p; ++k) {
-      double pivot = gram(k, k);
-      for (std::ptrdiff_t j = 0; j < k; ++j) {
-        pivot -= factor(k, j) * factor(k, j) * pivot_inverse(j);
-      }
-      const bool dependent = !(pivot > pivot_tolerance * gram(k, k));
-      const double inverse = dependent ? 0.0 : 1.0 / pivot;
-      factor(k, k) = inverse;
-      rank += dependent ? 0 : 1;
-      for (std::ptrdiff_t i = k + 1; i < p; ++i) {
-        double sum = gram(i, k);
-        for (std::ptrdiff_t j = 0; j < k; ++j) {
-          sum -= factor(i, j) * factor(k, j) * pivot_inverse(j);
-        }
-        factor(i, k) = sum;
-      }
-      for (std::ptrdiff_t o = 0; o < outputs_; ++o) {
-        double* solution = solution_.data() + o * p;
-        double sum = solution[k];
-        for (std::ptrdiff_t j = 0; j < k; ++j) {
-          sum -= factor(k, j) * pivot_inverse(j) * solution[j];
-        }
-        solution[k] = sum;
-        total -= weights(o) * sum * sum * inverse;
-      }
-    }
-    return std::max(total, 0.0);
-  }
-
- private:
-  using Storage =
-      std::conditional_t<fixed >= 0, std::array<double, static_cast<std::size_t>(fixed < 0 ? 1 : fixed * fixed)>,
-                         std::vector<double>>;
-
-  std::ptrdiff_t size() const { return fixed >= 0 ? fixed : size_; }
-  double& gram(std::ptrdiff_t i, std::ptrdiff_t j) { return gram_[static_cast<std::size_t>(i * size() + j)]; }
-  double& factor(std::ptrdiff_t i, std::ptrdiff_t j) { return factor_[static_cast<std::size_t>(i * size() + j)]; }
-  double pivot_inverse(std::ptrdiff_t j) { return factor(j, j); }
-
-  std::ptrdiff_t size_;
-  std::ptrdiff_t outputs_;
-  Storage gram_{};    // lower triangle of [1, x]'[1, x]
-  Storage factor_{};  // below the diagonal L D, on it 1 / D (0 for a dependent column)
-  std::vector<double> products_;
-  std::vector<double> solution_;
-  std::vector<double> squares_;
-};
-
-/// Best split of one input, see search_input().
-template <int Regressors>
-SplitCandidate search(const SearchNode& node, std::span<const double> values, std::span<const int> order,
-                      std::ptrdiff_t min_leaf_samples) {
-  const std::ptrdiff_t rows = std::ssize(order);
-  const std::ptrdiff_t outputs = node.weights.size();
-  const auto row_data = [&](std::ptrdiff_t k) {
-    return node.features.data() + order[static_cast<std::size_t>(k)] * node.features.cols();
-  };
-  // Splits are named by the number of rows on their left.
-  const auto admissible = [&](std::ptrdiff_t left) {
-    return left >= min_leaf_samples && rows - left >= min_leaf_samples &&
-           values[static_cast<std::size_t>(left - 1)] < values[static_cast<std::size_t>(left)];
-  };
-
-  std::vector<double> rss(static_cast<std::size_t>(rows), no_split);
-  std::vector<int> rank_left(rss.size());
-  std::vector<int> rank_right(rss.size());
-  NormalEquations<Regressors> from_left(node.regressors, outputs);
-  for (std::ptrdiff_t left = 1; left <= rows - min_leaf_samples; ++left) {
-    from_left.add(row_data(left - 1));
-    if (left < rows && admissible(left)) {
-      const std::size_t slot = static_cast<std::size_t>(left);
-      rss[slot] = from_left.rss(node.weights, rank_left[slot]);
-    }
-  }
-  double without_split = node.rss;
-  if (rows < node.features.rows()) {  // some rows have no value: the rest is compared with its own single model
-    NormalEquations<Regressors> all = from_left;
-    for (std::ptrdiff_t k = std::max<std::ptrdiff_t>(rows - min_leaf_samples, 0); k < rows; ++k) {
-      all.add(row_data(k));
-    }
-    int rank = 0;
-    without_split = all.rss(node.weights, rank);
-  }
-  NormalEquations<Regressors> from_right(node.regressors, outputs);
-  for (std::ptrdiff_t left = rows - 1; left >= min_leaf_samples; --left) {
-    from_right.add(row_data(left));
-    const std::size_t slot = static_cast<std::size_t>(left);
-    if (rss[slot] < no_split) {
-      rss[slot] += from_right.rss(node.weights, rank_right[slot]);
-    }
-  }
-
-  SplitCandidate best;
-  best.tested = std::count_if(rss.begin(), rss.end(), [](double value) { return value < no_split; });
-  if (best.tested > 0) {
-    const double smallest = *std::min_element(rss.begin(), rss.end());
-    const auto chosen = std::find_if(rss.begin(), rss.end(),
-                                     [&](double value) { return value <= smallest + tie_tolerance * node.rss; });
-    const std::size_t slot = static_cast<std::size_t>(chosen - rss.begin());
-    best.input = 0;
-    best.left = static_cast<std::ptrdiff_t>(slot);
-    best.rss = std::max(0.0, rss[slot] + (node.rss - without_split));
-    best.rank_left = rank_left[slot];
-    best.rank_right = rank_right[slot];
-  }
-  return best;
-}
-
-/// Orders of the levels that are seen, by the mean of each residual and of each residual times each regressor.
-std::vector<std::vector<int>> level_orders(const SearchNode& node, std::span<const int> levels, int num_levels) {
-  const std::ptrdiff_t p = node.regressors + 1;
-  const std::ptrdiff_t outputs = node.weights.size();
-  Eigen::MatrixXd sums = Eigen::MatrixXd::Zero(p * outputs, num_levels);
-  Eigen::VectorXd weights = Eigen::VectorXd::Zero(num_levels);
-  for (std::ptrdiff_t row = 0; row < node.features.rows(); ++row) {
-    const int level = levels[static_cast<std::size_t>(row)];
-    if (level < 0) {
-      continue;
-    }
-    weights(level) += node.features(row, 0) * node.features(row, 0);
-    for (std::ptrdiff_t o = 0; o < outputs; ++o) {
-      sums.col(level).segment(o * p, p) += node.features(row, p + o) * node.features.row(row).head(p).transpose();
-    }
-  }
-  std::vector<int> seen;
-  for (int level = 0; level < num_levels; ++level) {
-    if (weights(level) > 0.0) {
-      seen.push_back(level);
-    }
-  }
-  std::vector<std::vector<int>> orders;
-  if (seen.size() < 2) {
-    return orders;
-  }
-  for (std::ptrdiff_t score = 0; score < (seen.size() > 2 ? sums.rows() : 1); ++score) {
-    orders.push_back(seen);
-    std::stable_sort(orders.back().begin(), orders.back().end(),
-                     [&](int a, int b) { return sums(score, a) / weights(a) < sums(score, b) / weights(b); });
-  }
-  return orders;
-}
+/// Up to this many rows all splits of a block are compared.
+constexpr std::ptrdiff_t few_rows = 16;
 
 }  // namespace
 
-SplitCandidate search_levels(const SearchNode& node, std::span<const int> levels, int num_levels,
-                             std::ptrdiff_t min_leaf_samples) {
-  using Sums = NormalEquations<-1>;
-  const std::ptrdiff_t outputs = node.weights.size();
-  std::vector<Sums> of_level(static_cast<std::size_t>(num_levels), Sums(node.regressors, outputs));
-  std::vector<std::ptrdiff_t> count(of_level.size(), 0);
-  Sums all(node.regressors, outputs);
-  std::ptrdiff_t present = 0;
-  for (std::ptrdiff_t row = 0; row < node.features.rows(); ++row) {
-    const int level = levels[static_cast<std::size_t>(row)];
-    if (level >= 0) {
-      of_level[static_cast<std::size_t>(level)].add(node.features.row(row).data());
-      ++count[static_cast<std::size_t>(level)];
-      ++present;
-    }
+InputSearch::InputSearch(const SearchNode& node, std::vector<double> values, std::span<const int> order,
+                         std::ptrdiff_t min_leaf_samples)
+    : node_(node),
+      values_(std::move(values)),
+      order_(order),
+      min_leaf_samples_(min_leaf_samples),
+      shape_(node.features),
+      sums_(shape_, node.weights),
+      limit_(no_split),
+      smallest_(no_split),
+      none_(static_cast<std::size_t>(shape_.size()), 0.0) {
+  for (std::ptrdiff_t left = min_leaf_samples; left <= std::ssize(order) - min_leaf_samples; ++left) {
+    tested_ += admissible(left) ? 1 : 0;
   }
-  for (const Sums& sums : of_level) {
-    all.add(sums);
-  }
-  int rank = 0;
-  const double without_split = present < node.features.rows() ? all.rss(node.weights, rank) : node.rss;
+}
 
-  SplitCandidate best;
-  for (const std::vector<int>& order : level_orders(node, levels, num_levels)) {
-    std::vector<Sums> from_right(order.size(), Sums(node.regressors, outputs));  // levels from a position on
-    for (std::size_t k = order.size(); k-- > 0;) {
-      if (k + 1 < order.size()) {
-        from_right[k] = from_right[k + 1];
-      }
-      from_right[k].add(of_level[static_cast<std::size_t>(order[k])]);
+/// Splits are named by the number of rows on their left.
+bool InputSearch::admissible(std::ptrdiff_t left) const {
+  return left >= min_leaf_samples_ && std::ssize(order_) - left >= min_leaf_samples_ && left > 0 &&
+         left < std::ssize(order_) &&
+         values_[static_cast<std::size_t>(left - 1)] < values_[static_cast<std::size_t>(left)];
+}
+
+bool InputSearch::holds_candidates(const Segment& segment) const {
+  const std::ptrdiff_t first = std::max(segment.begin + 1, min_leaf_samples_);
+  const std::ptrdiff_t last = std::min(segment.end - 1, std::ssize(order_) - min_leaf_samples_);
+  return first <= last && values_[static_cast<std::size_t>(first - 1)] < values_[static_cast<std::size_t>(last)];
+}
+
+/// Gram matrices and residual sums of squares on either side of the inner edges, that is of all but the first and last.
+void InputSearch::take_sides(const std::vector<std::ptrdiff_t>& edges, const double* before, const double* behind,
+                             Sides& sides) {
+  const std::ptrdiff_t size = shape_.size();
+  const std::ptrdiff_t inner = std::ssize(edges) - 2;
+  const std::size_t count = static_cast<std::size_t>(inner);
+  sides.left.resize(static_cast<std::size_t>(inner * size));
+  sides.right.resize(sides.left.size());
+  for (std::vector<double>* rss : {&sides.rss_left, &sides.rss_right}) {
+    rss->resize(count);
+  }
+  for (std::vector<int>* rank : {&sides.rank_left, &sides.rank_right}) {
+    rank->resize(count);
+  }
+  sides.parts.assign(static_cast<std::size_t>((inner + 1) * size), 0.0);
+  for (std::ptrdiff_t i = 0; i <= inner; ++i) {
+    const std::ptrdiff_t begin = edges[static_cast<std::size_t>(i)];
+    add_rows(node_.features, order_.data() + begin, edges[static_cast<std::size_t>(i + 1)] - begin,
+             sides.parts.data() + i * size);
+  }
+  const auto sum = [&](const double* so_far, std::ptrdiff_t part, double* gram) {
+    std::copy(so_far, so_far + size, gram);
+    add(shape_, sides.parts.data() + part * size, gram);
+    return gram;
+  };
+  std::vector<const double*> grams(count);
+  const double* last = before;
+  for (std::ptrdiff_t i = 0; i < inner; ++i) {
+    last = grams[static_cast<std::size_t>(i)] = sum(last, i, sides.left.data() + i * size);
+  }
+  sums_.evaluate(grams.data(), inner, sides.rss_left.data(), sides.rank_left.data());
+  last = behind;
+  for (std::ptrdiff_t i = inner; i-- > 0;) {
+    last = grams[static_cast<std::size_t>(i)] = sum(last, i + 1, sides.right.data() + i * size);
+  }
+  sums_.evaluate(grams.data(), inner, sides.rss_right.data(), sides.rank_right.data());
+  evaluations_ += inner;
+}
+
+void InputSearch::offer(const std::vector<std::ptrdiff_t>& edges, const Sides& sides) {
+  const double tolerance = tie_tolerance * node_.rss;
+  for (std::size_t i = 0; i + 2 < edges.size(); ++i) {
+    const double rss = sides.rss_left[i] + sides.rss_right[i];
+    if (rss <= smallest_ + tolerance && admissible(edges[i + 1])) {
+      smallest_ = std::min(smallest_, rss);
+      found_.push_back({edges[i + 1], rss, sides.rank_left[i], sides.rank_right[i]});
     }
-    Sums from_left(node.regressors, outputs);
-    std::ptrdiff_t left = 0;
-    for (std::size_t k = 0; k + 1 < order.size(); ++k) {
-      from_left.add(of_level[static_cast<std::size_t>(order[k])]);
-      left += count[static_cast<std::size_t>(order[k])];
-      if (left < min_leaf_samples || present - left < min_leaf_samples) {
-        continue;
-      }
-      int rank_left = 0;
-      int rank_right = 0;
-      const double rss = from_left.rss(node.weights, rank_left) + from_right[k + 1].rss(node.weights, rank_right) +
-                         (node.rss - without_split);
-      ++best.tested;
-      if (best.input < 0 || rss < best.rss - tie_tolerance * node.rss) {
-        best.input = 0;
-        best.left = left;
-        best.rss = std::max(0.0, rss);
-        best.rank_left = rank_left;
-        best.rank_right = rank_right;
-        best.level_side.assign(static_cast<std::size_t>(num_levels), 0);
-        for (std::size_t i = 0; i < order.size(); ++i) {
-          best.level_side[static_cast<std::size_t>(order[i])] = i <= k ? -1 : 1;
-        }
-      }
+  }
+}
+
+std::vector<InputSearch::Segment> InputSearch::cut(const Segment& segment, const std::vector<std::ptrdiff_t>& edges,
+                                                   const Sides& sides) const {
+  const std::ptrdiff_t size = shape_.size();
+  const std::size_t inner = edges.size() - 2;
+  std::vector<Segment> result;
+  for (std::size_t i = 0; i <= inner; ++i) {
+    result.push_back(
+        {edges[i], edges[i + 1], i == 0 ? segment.left : sides.left.data() + static_cast<std::ptrdiff_t>(i - 1) * size,
+         i == inner ? segment.right : sides.right.data() + static_cast<std::ptrdiff_t>(i) * size,
+         i == 0 ? segment.rss_left : sides.rss_left[i - 1], i == inner ? segment.rss_right : sides.rss_right[i]});
+  }
+  std::stable_sort(result.begin(), result.end(),
+                   [](const Segment& a, const Segment& b) { return a.bound() < b.bound(); });
+  return result;
+}
+
+void InputSearch::search_edges() {
+  const std::ptrdiff_t rows = std::ssize(order_);
+  if (tested_ == 0) {
+    return;
+  }
+  const std::ptrdiff_t block = std::max(smallest_block, (rows + most_blocks - 1) / most_blocks);
+  for (std::ptrdiff_t begin = 0; begin < rows; begin += block) {
+    edges_.push_back(begin);
+  }
+  edges_.push_back(rows);
+  take_sides(edges_, none_.data(), none_.data(), sides_);
+  if (rows < node_.features.rows()) {  // the rest is compared with its own single model
+    std::vector<double> all = none_;
+    for (std::ptrdiff_t i = 0; i + 1 < std::ssize(edges_); ++i) {
+      add(shape_, sides_.parts.data() + i * shape_.size(), all.data());
+    }
+    const double* gram = all.data();
+    double rss = 0.0;
+    int rank = 0;
+    sums_.evaluate(&gram, 1, &rss, &rank);
+    without_value_ = node_.rss - rss;
+    for (double& left : sides_.rss_left) {
+      left += without_value_;
+    }
+  }
+  offer(edges_, sides_);
+}
+
+void InputSearch::refine(double limit) {
+  if (tested_ == 0) {
+    return;
+  }
+  limit_ = limit;
+  const Segment all{0, std::ssize(order_), none_.data(), none_.data(), without_value_, 0.0};
+  for (const Segment& segment : cut(all, edges_, sides_)) {
+    look_into(segment, 0);
+  }
+}
+
+void InputSearch::look_into(const Segment& segment, std::size_t depth) {
+  // Twice the tolerance: a split within the tolerance of the best one counts as equal to it.
+  if (segment.bound() > std::min(limit_, smallest_) + 2.0 * tie_tolerance * node_.rss || !holds_candidates(segment)) {
+    return;
+  }
+  if (deeper_.size() <= depth) {
+    deeper_.resize(depth + 1);
+  }
+  const std::ptrdiff_t length = segment.end - segment.begin;
+  std::vector<std::ptrdiff_t> edges{segment.begin};
+  const bool all = length <= few_rows;
+  const std::ptrdiff_t parts = std::min(most_parts, length / part_rows + 1);
+  for (std::ptrdiff_t i = 1; i < (all ? length : parts); ++i) {
+    const std::ptrdiff_t edge = segment.begin + (all ? i : i * length / parts);
+    if (!all || admissible(edge)) {
+      edges.push_back(edge);
+    }
+  }
+  edges.push_back(segment.end);
+  Sides sides = std::move(deeper_[depth]);
+  take_sides(edges, segment.left, segment.right, sides);
+  for (double& left : sides.rss_left) {
+    left += without_value_;
+  }
+  offer(edges, sides);
+  if (!all) {
+    for (const Segment& part : cut(segment, edges, sides)) {
+      look_into(part, depth + 1);
+    }
+  }
+  deeper_[depth] = std::move(sides);
+}
+
+SplitCandidate InputSearch::best() const {
+  SplitCandidate best;
+  best.tested = tested_;
+  best.evaluations = evaluations_;
+  const double largest = smallest_ + tie_tolerance * node_.rss;
+  for (const Found& found : found_) {
+    if (found.rss <= largest && (best.input < 0 || found.left < best.left)) {
+      best.input = 0;
+      best.left = found.left;
+      best.rss = std::max(0.0, found.rss);
+      best.rank_left = found.rank_left;
+      best.rank_right = found.rank_right;
     }
   }
   return best;
-}
-
-SearchNode make_search_node(const NodeFit& fit, const Eigen::VectorXd& weights) {
-  SearchNode node;
-  node.regressors = fit.basis.cols();
-  node.features.resize(fit.basis.rows(), 1 + fit.basis.cols() + fit.residuals.cols());
-  node.features.col(0) = fit.root_weights;
-  node.features.middleCols(1, fit.basis.cols()) = fit.basis;
-  node.features.rightCols(fit.residuals.cols()) = fit.root_weights.asDiagonal() * fit.residuals;
-  node.weights = weights;
-  node.rss = weights.dot(fit.rss);
-  return node;
-}
-
-SplitCandidate search_input(const SearchNode& node, std::span<const double> values, std::span<const int> order,
-                            std::ptrdiff_t min_leaf_samples) {
-  // Sizes known at compile time let the small triangular loops be unrolled.
-  switch (node.regressors) {
-    case 1:
-      return search<1>(node, values, order, min_leaf_samples);
-    case 2:
-      return search<2>(node, values, order, min_leaf_samples);
-    case 3:
-      return search<3>(node, values, order, min_leaf_samples);
-    case 4:
-      return search<4>(node, values, order, min_leaf_samples);
-    case 5:
-      return search<5>(node, values, order, min_leaf_samples);
-    case 6:
-      return search<6>(node, values, order, min_leaf_samples);
-    case 7:
-      return search<7>(node, values, order, min_leaf_samples);
-    case 8:
-      return search<8>(node, values, order, min_leaf_samples);
-    default:
-      return search<-1>(node, values, order, min_leaf_samples);
-  }
 }
 
 }  // namespace llmt

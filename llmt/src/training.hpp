@@ -6,10 +6,9 @@
 #include <vector>
 
 #include "llmt/fit.hpp"
+#include "node_fit.hpp"
 
 namespace llmt {
-
-using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 /// Rows with what a model says of their columns. Also used for rows that are held out, then with the columns of the
 /// training rows.
