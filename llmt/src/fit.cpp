@@ -54,9 +54,9 @@ std::vector<int> all_columns(std::ptrdiff_t count) {
   return columns;
 }
 
-std::vector<std::ptrdiff_t> all_rows(std::ptrdiff_t count) {
-  std::vector<std::ptrdiff_t> rows(static_cast<std::size_t>(count));
-  std::iota(rows.begin(), rows.end(), std::ptrdiff_t{0});
+std::vector<int> all_rows(std::ptrdiff_t count) {
+  std::vector<int> rows(static_cast<std::size_t>(count));
+  std::iota(rows.begin(), rows.end(), 0);
   return rows;
 }
 
@@ -87,7 +87,7 @@ void check_blend(const BlendOptions& options) {
 }
 
 /// Number of levels of every input, 0 for numbers.
-std::vector<int> count_levels(const Eigen::MatrixXd& inputs, const std::vector<int>& categorical) {
+std::vector<int> count_levels(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const std::vector<int>& categorical) {
   check_columns("llmt::fit", "categorical_inputs", categorical, inputs.cols());
   std::vector<int> num_levels(static_cast<std::size_t>(inputs.cols()), 0);
   constexpr double most = 10000.0;
@@ -161,19 +161,24 @@ struct Grown {
   StopReason stop = StopReason::leaf_samples;
 };
 
-Grown grow_rows(const TrainingRows& rows, const Table& table, const std::vector<int>& served, const Plan& plan,
-                bool stop_by_aicc, int max_threads) {
+Grown grow_rows(const TrainingRows& rows, const std::vector<int>& served, const Plan& plan, bool stop_by_aicc,
+                int max_threads) {
+  const Table& table = *rows.table;
   GrowthOptions options = plan.growth;
   const double width = plan.candidates.widths.empty() ? 0.0 : plan.candidates.widths.front();
   options.split_inputs = table.split_inputs;
   GrowthProblem problem;
-  problem.split_values = rows.inputs(Eigen::all, table.split_inputs);
+  problem.split_values = table.inputs(rows.rows, table.split_inputs);
   for (const int input : table.split_inputs) {
     problem.num_levels.push_back(table.num_levels[static_cast<std::size_t>(input)]);
   }
-  problem.deviations = rows.deviations;
-  problem.outputs = rows.outputs(Eigen::all, served);
-  problem.weights = rows.weights;
+  problem.outputs = table.outputs(rows.rows, served);
+  problem.weights = rows.weight_unit * table.weights(rows.rows);
+  problem.deviations.resize(rows.count(), std::ssize(rows.regressors));
+  for (std::ptrdiff_t index = 0; index < num_chunks(rows); ++index) {
+    const Chunk chunk = fetch(rows, index, {});
+    problem.deviations.middleRows(chunk.begin, chunk.count()) = chunk.deviations;
+  }
   problem.options = std::move(options);
   problem.max_threads = max_threads;
   GrownPartition result;
@@ -198,13 +203,14 @@ Grown grow_rows(const TrainingRows& rows, const Table& table, const std::vector<
 
 /// Weights of the outputs' squared errors: 1 for a single one; else 1 / variance, so that outputs of any scale count
 /// alike.
-Eigen::VectorXd error_weights(const Eigen::MatrixXd& outputs) {
-  if (outputs.cols() == 1) {
-    return Eigen::VectorXd::Ones(1);
+Eigen::VectorXd error_weights(const Table& table, const std::vector<int>& served) {
+  Eigen::VectorXd weights = Eigen::VectorXd::Ones(std::ssize(served));
+  for (std::size_t o = 0; o < served.size() && served.size() > 1; ++o) {
+    const auto output = table.outputs.col(served[o]).array();
+    const double variance = (output - output.mean()).square().mean();
+    weights(static_cast<std::ptrdiff_t>(o)) = variance > 0.0 ? 1.0 / variance : 1.0;
   }
-  const Eigen::MatrixXd centred = outputs.rowwise() - outputs.colwise().mean();
-  const Eigen::VectorXd variance = centred.colwise().squaredNorm().transpose() / static_cast<double>(outputs.rows());
-  return variance.unaryExpr([](double value) { return value > 0.0 ? 1.0 / value : 1.0; });
+  return weights;
 }
 
 std::vector<Fold> selection_folds(std::ptrdiff_t rows, const SelectionOptions& selection) {
@@ -239,7 +245,7 @@ PartitionSummary summarise(const Partition& partition, const TrainingRows& rows)
       summary.rank_deficient_leaves += node.rank < std::ssize(rows.regressors) + 1 ? 1 : 0;
     }
   }
-  summary.train_rmse = (rss / rows.weights.sum()).cwiseSqrt();
+  summary.train_rmse = (rss / total_weight(rows)).cwiseSqrt();
   return summary;
 }
 
@@ -312,8 +318,13 @@ FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<
     of_kept.selection.folds.groups = groups;
     return fit(inputs(kept, Eigen::all), outputs(kept, Eigen::all), of_kept);
   }
-  std::vector<Fold> folds = selection_folds(inputs.rows(), options.selection);
   const TrainingRows all = training_rows(table, all_rows(inputs.rows()));
+  std::vector<FoldRows> folds;
+  for (const Fold& fold : selection_folds(inputs.rows(), options.selection)) {
+    TrainingRows training = training_rows(table, {fold.train.begin(), fold.train.end()});
+    TrainingRows held_out = query_rows(table, {fold.held_out.begin(), fold.held_out.end()}, training);
+    folds.push_back({std::move(training), std::move(held_out)});
+  }
   const Plan plan = make_plan(options, all, !folds.empty());
 
   std::vector<std::vector<int>> served;
@@ -324,12 +335,6 @@ FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<
       served.push_back({o});
     }
   }
-  std::vector<FoldTree> fold_rows(folds.size());
-  for (std::size_t f = 0; f < folds.size(); ++f) {
-    fold_rows[f].training = training_rows(table, folds[f].train);
-    fold_rows[f].held_out = query_rows(table, folds[f].held_out, fold_rows[f].training);
-  }
-
   const std::ptrdiff_t tasks = std::ssize(served) * (std::ssize(folds) + 1);
   std::mutex progress_mutex;
   std::ptrdiff_t done = 0;
@@ -341,28 +346,32 @@ FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<
   };
   std::vector<std::optional<Partition>> partitions(served.size());
   FitSummary summary{.samples = all.count(),
-                     .missing_values = all.inputs.array().isNaN().count(),
+                     .missing_values = inputs.array().isNaN().count(),
                      .min_leaf_samples = plan.growth.min_leaf_samples,
                      .partitions = std::vector<PartitionSummary>(served.size())};
   // Of every fold: one partition for each group of outputs.
   std::vector<std::vector<std::optional<Partition>>> fold_partitions(
       options.intervals ? folds.size() : 0, std::vector<std::optional<Partition>>(served.size()));
-  parallel_for(std::ssize(served), options.max_threads, [&](std::ptrdiff_t index) {
+  // Where rows are many enough for one hold-out, a tree has work for all threads; several at a time would only hold
+  // their rows in memory together.
+  const int trees_at_once = folds.size() == 1 ? 1 : options.max_threads;
+  parallel_for(std::ssize(served), trees_at_once, [&](std::ptrdiff_t index) {
     const std::size_t p = static_cast<std::size_t>(index);
-    const Eigen::VectorXd weights = error_weights(all.outputs(Eigen::all, served[p]));
-    std::vector<FoldTree> trees = fold_rows;
+    const Eigen::VectorXd weights = error_weights(table, served[p]);
+    std::vector<Partition> trees(folds.size());  // of the folds
     parallel_for(std::ssize(trees), options.max_threads, [&](std::ptrdiff_t f) {
-      FoldTree& tree = trees[static_cast<std::size_t>(f)];
-      tree.grown = grow_rows(tree.training, table, served[p], plan, false, options.max_threads).partition;
+      const FoldRows& fold = folds[static_cast<std::size_t>(f)];
+      trees[static_cast<std::size_t>(f)] =
+          grow_rows(fold.training, served[p], plan, false, options.max_threads).partition;
       report();
     });
     Selection selection;
     Candidate candidate;
     if (!trees.empty()) {
-      selection = select(trees, plan.candidates, weights, options.max_threads);
+      selection = select(folds, trees, plan.candidates, weights, options.max_threads);
       candidate = selection.chosen.candidate;
     }
-    Grown grown = grow_rows(all, table, served[p], plan, trees.empty(), options.max_threads);
+    Grown grown = grow_rows(all, served[p], plan, trees.empty(), options.max_threads);
     const std::ptrdiff_t grown_leaves = grown.partition.num_leaves();
     if (trees.empty()) {
       candidate.leaves = grown_leaves;
@@ -376,11 +385,11 @@ FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<
       grown.stop = StopReason::cross_validation;
     }
     parallel_for(std::ssize(fold_partitions), options.max_threads, [&](std::ptrdiff_t f) {
-      const FoldTree& tree = trees[static_cast<std::size_t>(f)];
+      const Partition& tree = trees[static_cast<std::size_t>(f)];
       Candidate of_fold = candidate;
-      of_fold.leaves = std::min(of_fold.leaves, tree.grown.num_leaves());
+      of_fold.leaves = std::min(of_fold.leaves, tree.num_leaves());
       fold_partitions[static_cast<std::size_t>(f)][p] =
-          estimate(tree.training, tree.grown, of_fold, options.max_threads);
+          estimate(folds[static_cast<std::size_t>(f)].training, tree, of_fold, options.max_threads);
     });
     candidate.leaves = std::min(candidate.leaves, grown_leaves);
     Partition partition = estimate(all, grown.partition, candidate, options.max_threads);
@@ -393,8 +402,8 @@ FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<
     described.best_of_kind = std::move(selection.best_of_kind);
     described.crisp_cv_rmse = std::move(selection.crisp_rmse);
     described.cv_folds = std::ssize(trees);
-    for (const FoldTree& tree : trees) {
-      described.held_out_rows += tree.held_out.count();
+    for (const FoldRows& fold : folds) {
+      described.held_out_rows += fold.held_out.count();
     }
     summary.partitions[p] = std::move(described);
     partitions[p] = std::move(partition);
@@ -407,15 +416,16 @@ FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<
   std::vector<Model> fold_models;
   std::vector<Eigen::MatrixXd> residuals;
   for (std::size_t f = 0; f < fold_partitions.size(); ++f) {
-    const FoldTree& rows = fold_rows[f];
+    const FoldRows& rows = folds[f];
     std::vector<Partition> of_fold;
     for (std::optional<Partition>& partition : fold_partitions[f]) {
       of_fold.push_back(std::move(*partition));
     }
     fold_models.emplace_back(rows.training.columns, rows.training.output_columns, rows.training.regressors,
                              std::move(of_fold));
-    residuals.push_back(
-        (rows.held_out.outputs - fold_models.back().predict(rows.held_out.inputs, options.max_threads)).cwiseAbs());
+    const std::vector<int>& held_out = rows.held_out.rows;
+    const Eigen::MatrixXd predicted = fold_models.back().predict(inputs(held_out, Eigen::all), options.max_threads);
+    residuals.push_back((outputs(held_out, Eigen::all) - predicted).cwiseAbs());
   }
   return {Model(all.columns, all.output_columns, all.regressors, std::move(finished)), std::move(summary),
           Intervals(std::move(fold_models), std::move(residuals))};

@@ -22,9 +22,6 @@ constexpr double least_hold = 1e-12;
 /// a grid the nearest queries half a step from them.
 constexpr double range_margin = 0.25;
 
-/// Rows whose outer products are kept at a time.
-constexpr std::ptrdiff_t chunk_rows = 2048;
-
 /// a += factor * b: the innermost loop of the assembly.
 inline void add_scaled(double* a, const double* b, double factor, std::ptrdiff_t size) {
   for (std::ptrdiff_t k = 0; k < size; ++k) {
@@ -33,34 +30,8 @@ inline void add_scaled(double* a, const double* b, double factor, std::ptrdiff_t
 }
 
 /// Regressors with missing values at the mean of a node's rows.
-Eigen::VectorXd imputed(const Eigen::VectorXd& deviations, const Node& node) {
-  return deviations.array().isNaN().select(node.mean, deviations);
-}
-
-/// Smallest and largest value of each regressor without the one row at either end: a slope that a single far row
-/// decides is not one to follow to it.
-Eigen::MatrixXd second_extremes(const TrainingRows& training) {
-  Eigen::MatrixXd result(2, training.deviations.cols());
-  for (std::ptrdiff_t k = 0; k < training.deviations.cols(); ++k) {
-    std::vector<double> values;
-    for (const double value : training.deviations.col(k)) {
-      if (!std::isnan(value)) {
-        values.push_back(value);
-      }
-    }
-    if (values.empty()) {
-      result.col(k).setZero();
-      continue;
-    }
-    const auto last = values.end() - 1;
-    const std::ptrdiff_t skipped =
-        training.regressors[static_cast<std::size_t>(k)].level < 0 && values.size() > 4 ? 1 : 0;
-    std::nth_element(values.begin(), values.begin() + skipped, values.end());
-    result(0, k) = values[static_cast<std::size_t>(skipped)];
-    std::nth_element(values.begin(), last - skipped, values.end());
-    result(1, k) = *(last - skipped);
-  }
-  return result;
+Eigen::VectorXd imputed(const Eigen::Ref<const Eigen::RowVectorXd>& deviations, const Node& node) {
+  return deviations.transpose().array().isNaN().select(node.mean, deviations.transpose());
 }
 
 }  // namespace
@@ -69,21 +40,9 @@ JointFit::JointFit(const TrainingRows& training, Partition partition, int max_th
     : training_(training),
       partition_(std::move(partition)),
       size_(std::ssize(training.regressors) + 1),
-      missing_(training.deviations.hasNaN()) {
+      missing_(training.has_missing),
+      scale_(training.scale) {
   packed_ = missing_ ? size_ * size_ : size_ * (size_ + 1) / 2;
-  scale_.resize(size_ - 1);
-  for (std::ptrdiff_t k = 0; k < scale_.size(); ++k) {
-    double squares = 0.0;
-    double largest = 0.0;
-    for (const double value : training.deviations.col(k)) {
-      largest = std::isnan(value) ? largest : std::max(largest, std::abs(value));
-    }
-    for (std::ptrdiff_t i = 0; i < training.count() && largest > 0.0; ++i) {
-      const double value = training.deviations(i, k) / largest;
-      squares += std::isnan(value) ? 0.0 : training.weights(i) * value * value;
-    }
-    scale_(k) = largest > 0.0 ? largest * std::sqrt(squares / static_cast<double>(training.count())) : 1.0;
-  }
   const Node& root = partition_.nodes.front();
   set_residual_range();
   root_.resize(size_, root.value.size());
@@ -92,20 +51,18 @@ JointFit::JointFit(const TrainingRows& training, Partition partition, int max_th
   assemble(max_threads);
 }
 
-std::vector<bool> JointFit::ambiguous_rows(const Evaluator& evaluator) const {
-  std::vector<bool> ambiguous(static_cast<std::size_t>(training_.count()), false);
-  double weight = 0.0;
-  for (std::ptrdiff_t row = 0; missing_ && row < training_.count(); ++row) {
-    if (evaluator.is_ambiguous(training_.inputs.row(row).data())) {
-      ambiguous[static_cast<std::size_t>(row)] = true;
-      weight += training_.weights(row);
+bool JointFit::leaves_out_ambiguous(const Evaluator& evaluator) const {
+  double ambiguous = 0.0;
+  double all = 0.0;
+  for (std::ptrdiff_t index = 0; missing_ && index < num_chunks(training_); ++index) {
+    const Chunk chunk = fetch(training_, index, {});
+    for (std::ptrdiff_t r = 0; r < chunk.count(); ++r) {
+      all += chunk.weights(r);
+      ambiguous += evaluator.is_ambiguous(chunk.inputs.row(r).data()) ? chunk.weights(r) : 0.0;
     }
   }
   // Where they are most of what there is, they are better than nothing.
-  if (weight > 0.5 * training_.weights.sum()) {
-    ambiguous.assign(ambiguous.size(), false);
-  }
-  return ambiguous;
+  return ambiguous > 0.0 && ambiguous <= 0.5 * all;
 }
 
 void JointFit::set_residual_range() {
@@ -114,11 +71,14 @@ void JointFit::set_residual_range() {
   range.resize(root.value.size(), 2);
   range.col(0).setConstant(INFINITY);
   range.col(1).setConstant(-INFINITY);
-  for (std::ptrdiff_t row = 0; row < training_.count(); ++row) {
-    const Eigen::VectorXd residual = training_.outputs(row, partition_.outputs).transpose() - root.value -
-                                     root.slope * imputed(training_.deviations.row(row).transpose(), root);
-    range.col(0) = range.col(0).cwiseMin(residual);
-    range.col(1) = range.col(1).cwiseMax(residual);
+  for (std::ptrdiff_t index = 0; index < num_chunks(training_); ++index) {
+    const Chunk chunk = fetch(training_, index, partition_.outputs);
+    for (std::ptrdiff_t r = 0; r < chunk.count(); ++r) {
+      const Eigen::VectorXd residual =
+          chunk.outputs.row(r).transpose() - root.value - root.slope * imputed(chunk.deviations.row(r), root);
+      range.col(0) = range.col(0).cwiseMin(residual);
+      range.col(1) = range.col(1).cwiseMax(residual);
+    }
   }
 }
 
@@ -142,8 +102,6 @@ void JointFit::assemble(int max_threads) {
   std::vector<Eigen::VectorXd> low(nodes, Eigen::VectorXd::Constant(size_ - 1, INFINITY));
   std::vector<Eigen::VectorXd> high(nodes, Eigen::VectorXd::Constant(size_ - 1, -INFINITY));
   const Evaluator evaluator(partition_, training_.columns, size_ - 1);
-  const Eigen::MatrixXd outputs_served = training_.outputs(Eigen::all, partition_.outputs);
-
   struct Entry {
     int leaf;
     double validity;
@@ -153,26 +111,27 @@ void JointFit::assemble(int max_threads) {
     std::ptrdiff_t before;  // first entry of the row
     std::ptrdiff_t entry;   // that of the leaf
   };
-  const std::vector<bool> left_out = ambiguous_rows(evaluator);
+  const bool leave_out = leaves_out_ambiguous(evaluator);
   std::vector<Activation> active;
-  for (std::ptrdiff_t begin = 0; begin < training_.count(); begin += chunk_rows) {
-    const std::ptrdiff_t rows = std::min(chunk_rows, training_.count() - begin);
+  for (std::ptrdiff_t index = 0; index < num_chunks(training_); ++index) {
+    const Chunk chunk = fetch(training_, index, partition_.outputs);
+    const std::ptrdiff_t rows = chunk.count();
     // One after the other: which leaves reach which rows, and the rows' outer products.
     std::vector<Entry> entries;
     std::vector<std::vector<Use>> uses(leaves_.size());
     RowMajor outer(missing_ ? 0 : rows, packed_);
     RowMajor regressors(rows, size_);
     RowMajor residuals(rows, outputs);
-    Eigen::VectorXd weights = training_.weights.segment(begin, rows);
+    const Eigen::VectorXd& weights = chunk.weights;
     for (std::ptrdiff_t r = 0; r < rows; ++r) {
-      const std::ptrdiff_t row = begin + r;
-      const double* deviations = training_.deviations.row(row).data();
-      if (left_out[static_cast<std::size_t>(row)]) {
+      const double* inputs = chunk.inputs.row(r).data();
+      const double* deviations = chunk.deviations.row(r).data();
+      if (leave_out && evaluator.is_ambiguous(inputs)) {
         regressors.row(r).setZero();
         residuals.row(r).setZero();
         continue;
       }
-      evaluator.activate(training_.inputs.row(row).data(), active);
+      evaluator.activate(inputs, active);
       std::sort(active.begin(), active.end(), [](const auto& a, const auto& b) { return a.node < b.node; });
       const std::ptrdiff_t before = std::ssize(entries);
       for (const Activation& entry : active) {
@@ -184,7 +143,7 @@ void JointFit::assemble(int max_threads) {
       for (std::ptrdiff_t k = 1; k < size_; ++k) {
         regressors(r, k) = deviations[k - 1] / scale_(k - 1);
       }
-      residuals.row(r) = outputs_served.row(row);
+      residuals.row(r) = chunk.outputs.row(r);
       if (!missing_) {
         residuals.row(r) -= regressors.row(r) * root_;
         double* out = outer.row(r).data();
@@ -256,7 +215,7 @@ void JointFit::assemble(int max_threads) {
       for (const Use& use : uses[leaf]) {
         const double validity = entries[static_cast<std::size_t>(use.entry)].validity;
         const double weight = weights(use.row) * validity;
-        const double* deviations = training_.deviations.row(begin + use.row).data();
+        const double* deviations = chunk.deviations.row(use.row).data();
         for (std::ptrdiff_t k = 0; k < size_ - 1; ++k) {
           low[node](k) = deviations[k] < low[node](k) ? deviations[k] : low[node](k);
           high[node](k) = deviations[k] > high[node](k) ? deviations[k] : high[node](k);
@@ -293,14 +252,13 @@ void JointFit::assemble(int max_threads) {
     });
   }
   const std::vector<int> parents = parents_of(partition_);
-  const Eigen::MatrixXd trusted = second_extremes(training_);
   for (std::size_t i = nodes; i-- > 0;) {
     Node& node = partition_.nodes[i];
     for (std::ptrdiff_t k = 0; k < size_ - 1; ++k) {
       if (low[i](k) <= high[i](k)) {
         const double margin = range_margin * (high[i](k) - low[i](k));
-        node.low(k) = std::clamp(low[i](k) - margin, trusted(0, k), trusted(1, k));
-        node.high(k) = std::clamp(high[i](k) + margin, trusted(0, k), trusted(1, k));
+        node.low(k) = std::clamp(low[i](k) - margin, training_.spread(0, k), training_.spread(1, k));
+        node.high(k) = std::clamp(high[i](k) + margin, training_.spread(0, k), training_.spread(1, k));
       }
     }
     if (i > 0) {
@@ -451,29 +409,33 @@ void describe_leaves(const TrainingRows& training, Partition& partition) {
   std::vector<Activation> active;
   Eigen::VectorXd values(outputs);
   Eigen::VectorXd a(regressors + 1);
-  for (std::ptrdiff_t row = 0; row < training.count(); ++row) {
-    const double* inputs = training.inputs.row(row).data();
-    const double* deviations = training.deviations.row(row).data();
-    evaluator.activate(inputs, active);
-    evaluator.combine(active, deviations, values.data());
-    const Eigen::VectorXd residual = training.outputs(row, partition.outputs).transpose() - values;
-    for (int index = 0; index >= 0;) {
-      Node& node = partition.nodes[static_cast<std::size_t>(index)];
-      if (node.is_leaf()) {
-        node.rss += training.weights(row) * residual.cwiseAbs2();
-        break;
+  for (std::ptrdiff_t index = 0; index < num_chunks(training); ++index) {
+    const Chunk chunk = fetch(training, index, partition.outputs);
+    for (std::ptrdiff_t row = 0; row < chunk.count(); ++row) {
+      const double* inputs = chunk.inputs.row(row).data();
+      const double* deviations = chunk.deviations.row(row).data();
+      const double weight = chunk.weights(row);
+      evaluator.activate(inputs, active);
+      evaluator.combine(active, deviations, values.data());
+      const Eigen::VectorXd residual = chunk.outputs.row(row).transpose() - values;
+      for (int at = 0; at >= 0;) {
+        Node& node = partition.nodes[static_cast<std::size_t>(at)];
+        if (node.is_leaf()) {
+          node.rss += weight * residual.cwiseAbs2();
+          break;
+        }
+        // An inner node for its own local model, as if it were a leaf.
+        evaluator.local(at, deviations, values.data());
+        evaluator.finish(deviations, values.data());
+        node.rss += weight * (chunk.outputs.row(row).transpose() - values).cwiseAbs2();
+        at = evaluator.child_of(at, inputs);
       }
-      // An inner node for its own local model, as if it were a leaf.
-      evaluator.local(index, deviations, values.data());
-      evaluator.finish(deviations, values.data());
-      node.rss += training.weights(row) * (training.outputs(row, partition.outputs).transpose() - values).cwiseAbs2();
-      index = evaluator.child_of(index, inputs);
-    }
-    for (const Activation& entry : active) {
-      Node& leaf = partition.nodes[static_cast<std::size_t>(entry.node)];
-      a(0) = 1.0;
-      a.tail(regressors) = imputed(Eigen::Map<const Eigen::VectorXd>(deviations, regressors), leaf);
-      leaf.inverse_gram.selfadjointView<Eigen::Lower>().rankUpdate(a, training.weights(row) * entry.validity);
+      for (const Activation& entry : active) {
+        Node& leaf = partition.nodes[static_cast<std::size_t>(entry.node)];
+        a(0) = 1.0;
+        a.tail(regressors) = imputed(chunk.deviations.row(row), leaf);
+        leaf.inverse_gram.selfadjointView<Eigen::Lower>().rankUpdate(a, weight * entry.validity);
+      }
     }
   }
   // Pseudo-inverse in scaled columns, with a floor: a direction without rows has a large leverage, not an infinite one.

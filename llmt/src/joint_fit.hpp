@@ -44,8 +44,9 @@ class JointFit {
 
  private:
   void set_residual_range();
-  /// Rows whose missing values leave open which leaves they belong to: they would teach all of them wrong.
-  std::vector<bool> ambiguous_rows(const Evaluator& evaluator) const;
+  /// Whether rows whose missing values leave open which leaves they belong to take no part: they would teach all of
+  /// them wrong.
+  bool leaves_out_ambiguous(const Evaluator& evaluator) const;
   void assemble(int max_threads);
   /// Of all nodes, size x outputs, about the root's model.
   std::vector<Eigen::MatrixXd> local_models(std::size_t nodes, double shrinkage) const;

@@ -59,10 +59,10 @@ double ridge_at(const Candidates& candidates, std::size_t index) {
 
 /// Errors of one fold and width, for the leaf counts and ridges that `wanted` accepts.
 template <class Wanted>
-Errors evaluate(const FoldTree& fold, const Candidates& candidates, std::size_t width,
+Errors evaluate(const FoldRows& fold, const Partition& grown, const Candidates& candidates, std::size_t width,
                 const std::vector<std::ptrdiff_t>& counts, const Eigen::VectorXd& weights, bool stop_early,
                 const Wanted& wanted, int max_threads) {
-  Partition partition = fold.grown;
+  Partition partition = grown;
   partition.validity = {candidates.kind, candidates.widths[width], candidates.smoothness};
   set_half_widths(partition, fold.training.low(), fold.training.high());
   // Sums over a subtree are the validities of its root for blends, so that one fit serves all leaf counts; Gaussians
@@ -87,7 +87,7 @@ Errors evaluate(const FoldTree& fold, const Candidates& candidates, std::size_t 
     if (tried.empty()) {
       continue;
     }
-    const std::ptrdiff_t leaves = std::min(counts[k], fold.grown.num_leaves());
+    const std::ptrdiff_t leaves = std::min(counts[k], grown.num_leaves());
     std::vector<Partition> models;
     std::optional<JointFit> own;
     if (!shared) {
@@ -184,21 +184,25 @@ Eigen::MatrixXd agreed_slope(const Partition& grown) {
 Eigen::VectorXd prefix_squared_errors(const Partition& partition, const TrainingRows& rows,
                                       const Eigen::VectorXd& weights) {
   const Evaluator evaluator(partition, rows.columns, std::ssize(rows.regressors));
-  const Eigen::MatrixXd outputs = rows.outputs(Eigen::all, partition.outputs);
   Eigen::VectorXd change = Eigen::VectorXd::Zero(partition.num_leaves());  // of the sum, from M - 1 to M leaves
-  Eigen::VectorXd values(outputs.cols());
-  for (std::ptrdiff_t row = 0; row < rows.count(); ++row) {
-    double previous = 0.0;
-    for (int index = 0; index >= 0;) {
-      evaluator.local(index, rows.deviations.row(row).data(), values.data());
-      evaluator.finish(rows.deviations.row(row).data(), values.data());
-      const double squared = rows.weights(row) * weights.dot((outputs.row(row).transpose() - values).cwiseAbs2());
-      // Nodes 2k-1 and 2k come with the k-th split, that is with k + 1 leaves.
-      change((index + 1) / 2) += squared - previous;
-      previous = squared;
-      index = partition.nodes[static_cast<std::size_t>(index)].is_leaf()
-                  ? -1
-                  : evaluator.child_of(index, rows.inputs.row(row).data());
+  Eigen::VectorXd values(std::ssize(partition.outputs));
+  for (std::ptrdiff_t index = 0; index < num_chunks(rows); ++index) {
+    const Chunk chunk = fetch(rows, index, partition.outputs);
+    for (std::ptrdiff_t row = 0; row < chunk.count(); ++row) {
+      const double* deviations = chunk.deviations.row(row).data();
+      double previous = 0.0;
+      for (int node = 0; node >= 0;) {
+        evaluator.local(node, deviations, values.data());
+        evaluator.finish(deviations, values.data());
+        const double squared =
+            chunk.weights(row) * weights.dot((chunk.outputs.row(row).transpose() - values).cwiseAbs2());
+        // Nodes 2k-1 and 2k come with the k-th split, that is with k + 1 leaves.
+        change((node + 1) / 2) += squared - previous;
+        previous = squared;
+        node = partition.nodes[static_cast<std::size_t>(node)].is_leaf()
+                   ? -1
+                   : evaluator.child_of(node, chunk.inputs.row(row).data());
+      }
     }
   }
   for (std::ptrdiff_t leaves = 1; leaves < change.size(); ++leaves) {
@@ -212,12 +216,12 @@ double squared_error(const Partition& partition, const TrainingRows& rows, const
   std::vector<Activation> active;
   Eigen::VectorXd values(std::ssize(partition.outputs));
   double total = 0.0;
-  for (std::ptrdiff_t row = 0; row < rows.count(); ++row) {
-    evaluator.activate(rows.inputs.row(row).data(), active);
-    evaluator.combine(active, rows.deviations.row(row).data(), values.data());
-    for (std::size_t o = 0; o < partition.outputs.size(); ++o) {
-      const double error = rows.outputs(row, partition.outputs[o]) - values(static_cast<std::ptrdiff_t>(o));
-      total += rows.weights(row) * weights(static_cast<std::ptrdiff_t>(o)) * error * error;
+  for (std::ptrdiff_t index = 0; index < num_chunks(rows); ++index) {
+    const Chunk chunk = fetch(rows, index, partition.outputs);
+    for (std::ptrdiff_t row = 0; row < chunk.count(); ++row) {
+      evaluator.activate(chunk.inputs.row(row).data(), active);
+      evaluator.combine(active, chunk.deviations.row(row).data(), values.data());
+      total += chunk.weights(row) * weights.dot((chunk.outputs.row(row).transpose() - values).cwiseAbs2());
     }
   }
   return total;
@@ -247,16 +251,17 @@ Partition estimate(const TrainingRows& training, const Partition& grown, const C
   return std::move(fit.joint(candidate.leaves, {{candidate.ridge, candidate.shrinkage}}).front());
 }
 
-Selection select(const std::vector<FoldTree>& folds, const Candidates& candidates, const Eigen::VectorXd& weights,
-                 int max_threads) {
+Selection select(const std::vector<FoldRows>& folds, const std::vector<Partition>& grown, const Candidates& candidates,
+                 const Eigen::VectorXd& weights, int max_threads) {
   const std::size_t num_folds = folds.size();
   const std::size_t shrinkages = candidates.shrinkages.size();
   std::vector<std::vector<Eigen::VectorXd>> crisp(shrinkages, std::vector<Eigen::VectorXd>(num_folds));
   parallel_for(std::ssize(folds), max_threads, [&](std::ptrdiff_t f) {
-    const FoldTree& fold = folds[static_cast<std::size_t>(f)];
-    const JointFit fit(fold.training, fold.grown, max_threads);
+    const FoldRows& fold = folds[static_cast<std::size_t>(f)];
+    const Partition& tree = grown[static_cast<std::size_t>(f)];
+    const JointFit fit(fold.training, tree, max_threads);
     for (std::size_t s = 0; s < shrinkages; ++s) {
-      const std::ptrdiff_t leaves = fold.grown.num_leaves();
+      const std::ptrdiff_t leaves = tree.num_leaves();
       const Partition models =
           candidates.shrinkages[s] > 0.0 ? fit.local(leaves, candidates.shrinkages[s]) : fit.as_grown(leaves);
       crisp[s][static_cast<std::size_t>(f)] = prefix_squared_errors(models, fold.held_out, weights);
@@ -267,7 +272,7 @@ Selection select(const std::vector<FoldTree>& folds, const Candidates& candidate
   std::vector<double> fold_weight;
   for (std::size_t f = 0; f < num_folds; ++f) {
     largest = std::max(largest, crisp[0][f].size());
-    fold_weight.push_back(folds[f].held_out.weights.sum() * static_cast<double>(weights.size()));
+    fold_weight.push_back(total_weight(folds[f].held_out) * static_cast<double>(weights.size()));
     held_out_weight += fold_weight.back();
   }
   const auto described = [&](const Candidate& candidate, const std::vector<double>& errors) {
@@ -331,7 +336,7 @@ Selection select(const std::vector<FoldTree>& folds, const Candidates& candidate
     const std::size_t fold = static_cast<std::size_t>(task) / widths;
     const std::size_t width = static_cast<std::size_t>(task) % widths;
     screened[static_cast<std::size_t>(task)] = evaluate(
-        folds[fold], candidates, width, counts, weights, true,
+        folds[fold], grown[fold], candidates, width, counts, weights, true,
         [&](const Key& key) {
           return key.shrinkage == usual && (counts[key.leaves] * coefficients <= cheap_unknowns || key.ridge == middle);
         },
@@ -379,7 +384,7 @@ Selection select(const std::vector<FoldTree>& folds, const Candidates& candidate
     for (const auto& [error, best] : best_of_width) {
       if (best.width == width) {
         refined[static_cast<std::size_t>(task)] = evaluate(
-            folds[fold], candidates, width, counts, weights, false,
+            folds[fold], grown[fold], candidates, width, counts, weights, false,
             [&](const Key& key) {
               // At the best leaf count; where that is cheap, at its neighbours too.
               const std::size_t reach = counts[best.leaves] * coefficients <= 3 * cheap_unknowns ? 1 : 0;
@@ -433,7 +438,7 @@ Selection select(const std::vector<FoldTree>& folds, const Candidates& candidate
       errors.insert(refined[slot].begin(), refined[slot].end());
     } else {
       errors = evaluate(
-          folds[fold], candidates, best.width, counts, weights, false,
+          folds[fold], grown[fold], candidates, best.width, counts, weights, false,
           [&](const Key& key) { return kept.contains(key); }, max_threads);
     }
   });

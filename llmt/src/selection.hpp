@@ -9,11 +9,10 @@
 
 namespace llmt {
 
-/// A tree grown without the rows of a fold.
-struct FoldTree {
+/// What a fold trains on, and what it holds out.
+struct FoldRows {
   TrainingRows training;
   TrainingRows held_out;
-  Partition grown;
 };
 
 /// What the candidates are.
@@ -51,7 +50,8 @@ Partition estimate(const TrainingRows& training, const Partition& grown, const C
 /// Compares on the held-out rows of all folds. First every width on as many folds as hold enough rows, leaf counts in
 /// steps of a half until two steps brought nothing; then the best two widths near their best leaf counts and ridges on
 /// the other folds.
-Selection select(const std::vector<FoldTree>& folds, const Candidates& candidates, const Eigen::VectorXd& weights,
-                 int max_threads);
+/// `grown`: of each fold the tree grown without its held-out rows.
+Selection select(const std::vector<FoldRows>& folds, const std::vector<Partition>& grown, const Candidates& candidates,
+                 const Eigen::VectorXd& weights, int max_threads);
 
 }  // namespace llmt

@@ -13,7 +13,7 @@ namespace llmt {
 namespace {
 
 /// Levels that get a regressor: all that occur but the most frequent one, which is the reference; ascending.
-std::vector<int> level_regressors(const Eigen::VectorXd& values, int num_levels) {
+std::vector<int> level_regressors(const Eigen::Ref<const Eigen::VectorXd>& values, int num_levels) {
   std::vector<std::ptrdiff_t> count(static_cast<std::size_t>(num_levels), 0);
   for (const double value : values) {
     if (!std::isnan(value)) {
@@ -34,23 +34,23 @@ std::vector<int> level_regressors(const Eigen::VectorXd& values, int num_levels)
   return levels;
 }
 
-InputColumn describe_input(const Eigen::VectorXd& values, const Eigen::VectorXd& weights, std::ptrdiff_t position,
-                           int num_levels) {
+InputColumn describe_input(const TrainingRows& training, std::ptrdiff_t position) {
   InputColumn column;
   column.name = fmt::format("x{}", position + 1);
-  for (int level = 0; level < num_levels; ++level) {
+  for (int level = 0; level < training.table->num_levels[static_cast<std::size_t>(position)]; ++level) {
     column.levels.push_back(fmt::format("{}", level));
   }
   double low = std::numeric_limits<double>::infinity();
   double high = -low;
   double sum = 0.0;
   double present = 0.0;
-  for (std::ptrdiff_t i = 0; i < values.size(); ++i) {
-    if (!std::isnan(values(i))) {
-      low = std::min(low, values(i));
-      high = std::max(high, values(i));
-      sum += weights(i) * values(i);
-      present += weights(i);
+  for (const int row : training.rows) {
+    const double value = training.table->inputs(row, position);
+    if (!std::isnan(value)) {
+      low = std::min(low, value);
+      high = std::max(high, value);
+      sum += training.table->weights(row) * value;
+      present += training.table->weights(row);
     }
   }
   if (present > 0.0) {
@@ -61,19 +61,89 @@ InputColumn describe_input(const Eigen::VectorXd& values, const Eigen::VectorXd&
   return column;
 }
 
-void fill_deviations(TrainingRows& rows) {
-  rows.deviations.resize(rows.inputs.rows(), std::ssize(rows.regressors));
-  for (std::ptrdiff_t i = 0; i < rows.inputs.rows(); ++i) {
-    deviations_at(rows.columns, rows.regressors, rows.inputs.row(i).data(), rows.deviations.row(i).data());
+OutputColumn describe_output(const TrainingRows& training, std::ptrdiff_t position) {
+  OutputColumn column{.name = training.table->outputs.cols() == 1 ? "y" : fmt::format("y{}", position + 1),
+                      .low = std::numeric_limits<double>::infinity(),
+                      .high = -std::numeric_limits<double>::infinity()};
+  for (const int row : training.rows) {
+    column.low = std::min(column.low, training.table->outputs(row, position));
+    column.high = std::max(column.high, training.table->outputs(row, position));
   }
+  return column;
 }
 
-TrainingRows take(const Table& table, const std::vector<std::ptrdiff_t>& rows) {
-  TrainingRows taken;
-  taken.inputs = table.inputs(rows, Eigen::all);
-  taken.outputs = table.outputs(rows, Eigen::all);
-  taken.weights = table.weights(rows);
-  return taken;
+/// The part of the rows with a value of `input` that have this level.
+double share_of_level(const TrainingRows& training, int input, int level) {
+  double present = 0.0;
+  double here = 0.0;
+  for (const int row : training.rows) {
+    const double value = training.table->inputs(row, input);
+    present += std::isnan(value) ? 0.0 : training.table->weights(row);
+    here += value == static_cast<double>(level) ? training.table->weights(row) : 0.0;
+  }
+  return present > 0.0 ? here / present : 0.0;
+}
+
+/// The two smallest, or with `sign` -1 largest, of the values seen.
+struct Extremes {
+  double sign = 1.0;
+  double first = std::numeric_limits<double>::infinity();  // sign * value
+  double second = std::numeric_limits<double>::infinity();
+
+  void add(double value) {
+    const double signed_value = sign * value;
+    second = std::min(second, std::max(first, signed_value));
+    first = std::min(first, signed_value);
+  }
+};
+
+void describe_regressors(TrainingRows& training) {
+  const std::size_t regressors = training.regressors.size();
+  // Squares are taken of parts of the largest deviation: those of the deviations may be too large, or too small.
+  Eigen::VectorXd largest = Eigen::VectorXd::Ones(std::ssize(training.regressors));
+  for (std::size_t k = 0; k < regressors; ++k) {
+    const Regressor& regressor = training.regressors[k];
+    const InputColumn& column = training.columns[static_cast<std::size_t>(regressor.input)];
+    if (regressor.level < 0) {
+      largest(static_cast<std::ptrdiff_t>(k)) =
+          std::max({column.high - regressor.centre, regressor.centre - column.low, 0.0});
+    }
+  }
+  Eigen::VectorXd squares = Eigen::VectorXd::Zero(largest.size());
+  std::vector<Extremes> low(regressors, Extremes{1.0});
+  std::vector<Extremes> high(regressors, Extremes{-1.0});
+  std::vector<std::ptrdiff_t> present(regressors, 0);
+  for (std::ptrdiff_t index = 0; index < num_chunks(training); ++index) {
+    const Chunk chunk = fetch(training, index, {});
+    for (std::ptrdiff_t row = 0; row < chunk.count(); ++row) {
+      for (std::size_t k = 0; k < regressors; ++k) {
+        const std::ptrdiff_t column = static_cast<std::ptrdiff_t>(k);
+        const double value = chunk.deviations(row, column);
+        if (std::isnan(value)) {
+          training.has_missing = true;
+          continue;
+        }
+        const double part = largest(column) > 0.0 ? value / largest(column) : 0.0;
+        squares(column) += chunk.weights(row) * part * part;
+        low[k].add(value);
+        high[k].add(value);
+        ++present[k];
+      }
+    }
+  }
+  training.scale.setOnes(largest.size());
+  training.spread.setZero(2, largest.size());
+  for (std::size_t k = 0; k < regressors; ++k) {
+    const std::ptrdiff_t column = static_cast<std::ptrdiff_t>(k);
+    if (squares(column) > 0.0) {
+      training.scale(column) = largest(column) * std::sqrt(squares(column) / static_cast<double>(training.count()));
+    }
+    if (present[k] > 0) {
+      const bool skip = training.regressors[k].level < 0 && present[k] > 4;
+      training.spread(0, column) = skip ? low[k].second : low[k].first;
+      training.spread(1, column) = -(skip ? high[k].second : high[k].first);
+    }
+  }
 }
 
 }  // namespace
@@ -90,17 +160,16 @@ Eigen::VectorXd TrainingRows::high() const {
   return result;
 }
 
-TrainingRows training_rows(const Table& table, const std::vector<std::ptrdiff_t>& rows) {
-  TrainingRows training = take(table, rows);
-  training.weights *= static_cast<double>(training.weights.size()) / training.weights.sum();
-  for (std::ptrdiff_t j = 0; j < training.inputs.cols(); ++j) {
-    training.columns.push_back(
-        describe_input(training.inputs.col(j), training.weights, j, table.num_levels[static_cast<std::size_t>(j)]));
+TrainingRows training_rows(const Table& table, std::vector<int> rows) {
+  TrainingRows training;
+  training.table = &table;
+  training.rows = std::move(rows);
+  training.weight_unit = static_cast<double>(training.count()) / total_weight(training);
+  for (std::ptrdiff_t j = 0; j < table.inputs.cols(); ++j) {
+    training.columns.push_back(describe_input(training, j));
   }
-  for (std::ptrdiff_t o = 0; o < training.outputs.cols(); ++o) {
-    training.output_columns.push_back({.name = training.outputs.cols() == 1 ? "y" : fmt::format("y{}", o + 1),
-                                       .low = training.outputs.col(o).minCoeff(),
-                                       .high = training.outputs.col(o).maxCoeff()});
+  for (std::ptrdiff_t o = 0; o < table.outputs.cols(); ++o) {
+    training.output_columns.push_back(describe_output(training, o));
   }
   for (const int input : table.regression_inputs) {
     const int num_levels = table.num_levels[static_cast<std::size_t>(input)];
@@ -108,25 +177,58 @@ TrainingRows training_rows(const Table& table, const std::vector<std::ptrdiff_t>
       training.regressors.push_back({input, -1, training.columns[static_cast<std::size_t>(input)].centre});
       continue;
     }
-    const Eigen::VectorXd values = training.inputs.col(input);
     // From all rows of the table, so that the folds agree.
     for (const int level : level_regressors(table.inputs.col(input), num_levels)) {
-      const double present = values.array().isNaN().select(0.0, training.weights).sum();
-      const double here = (values.array() == static_cast<double>(level)).select(training.weights, 0.0).sum();
-      training.regressors.push_back({input, level, present > 0.0 ? here / present : 0.0});
+      training.regressors.push_back({input, level, share_of_level(training, input, level)});
     }
   }
-  fill_deviations(training);
+  describe_regressors(training);
   return training;
 }
 
-TrainingRows query_rows(const Table& table, const std::vector<std::ptrdiff_t>& rows, const TrainingRows& training) {
-  TrainingRows query = take(table, rows);
+TrainingRows query_rows(const Table& table, std::vector<int> rows, const TrainingRows& training) {
+  TrainingRows query;
+  query.table = &table;
+  query.rows = std::move(rows);
   query.columns = training.columns;
   query.output_columns = training.output_columns;
   query.regressors = training.regressors;
-  fill_deviations(query);
   return query;
+}
+
+double total_weight(const TrainingRows& rows) {
+  double sum = 0.0;
+  for (const int row : rows.rows) {
+    sum += rows.table->weights(row);
+  }
+  return rows.weight_unit * sum;
+}
+
+Chunk fetch(const TrainingRows& rows, std::ptrdiff_t index, const std::vector<int>& outputs) {
+  Chunk chunk;
+  chunk.begin = index * chunk_rows;
+  const std::ptrdiff_t count = std::min(chunk_rows, rows.count() - chunk.begin);
+  const int* const taken = rows.rows.data() + chunk.begin;
+  const Table& table = *rows.table;
+  chunk.inputs.resize(count, table.inputs.cols());
+  chunk.outputs.resize(count, std::ssize(outputs));
+  chunk.deviations.resize(count, std::ssize(rows.regressors));
+  chunk.weights.resize(count);
+  for (std::ptrdiff_t j = 0; j < table.inputs.cols(); ++j) {
+    for (std::ptrdiff_t i = 0; i < count; ++i) {
+      chunk.inputs(i, j) = table.inputs(taken[i], j);
+    }
+  }
+  for (std::ptrdiff_t o = 0; o < std::ssize(outputs); ++o) {
+    for (std::ptrdiff_t i = 0; i < count; ++i) {
+      chunk.outputs(i, o) = table.outputs(taken[i], outputs[static_cast<std::size_t>(o)]);
+    }
+  }
+  for (std::ptrdiff_t i = 0; i < count; ++i) {
+    chunk.weights(i) = rows.weight_unit * table.weights(taken[i]);
+    deviations_at(rows.columns, rows.regressors, chunk.inputs.row(i).data(), chunk.deviations.row(i).data());
+  }
+  return chunk;
 }
 
 }  // namespace llmt

@@ -10,37 +10,60 @@
 
 namespace llmt {
 
-/// Rows with what a model says of their columns. Also used for rows that are held out, then with the columns of the
-/// training rows.
-struct TrainingRows {
-  std::vector<InputColumn> columns;
-  std::vector<OutputColumn> output_columns;
-  std::vector<Regressor> regressors;
-  RowMajor inputs;          ///< NaN: missing
-  RowMajor deviations;      ///< of the regressors from their centres; NaN: missing
-  Eigen::MatrixXd outputs;  ///< all outputs
-  Eigen::VectorXd weights;  ///< positive, with mean 1
-
-  std::ptrdiff_t count() const { return inputs.rows(); }
-  Eigen::VectorXd low() const;  ///< extent of the inputs
-  Eigen::VectorXd high() const;
-};
-
-/// What all rows of a fit have in common, whatever the fold.
+/// The data of a fit: the caller's own, nothing is copied.
 struct Table {
-  Eigen::MatrixXd inputs;
-  Eigen::MatrixXd outputs;
+  Eigen::Ref<const Eigen::MatrixXd> inputs;  ///< NaN: missing
+  Eigen::Ref<const Eigen::MatrixXd> outputs;
   Eigen::VectorXd weights;             ///< positive
   std::vector<int> num_levels;         ///< of each input; 0: a number
   std::vector<int> regression_inputs;  ///< ascending
   std::vector<int> split_inputs;       ///< ascending
 };
 
-/// The given rows, columns described from them.
-TrainingRows training_rows(const Table& table, const std::vector<std::ptrdiff_t>& rows);
+/// Some rows of a table with what a model says of the columns. Also used for rows that are held out, then with the
+/// columns of the training rows.
+struct TrainingRows {
+  const Table* table = nullptr;
+  std::vector<int> rows;  ///< of the table, ascending
+  std::vector<InputColumn> columns;
+  std::vector<OutputColumn> output_columns;
+  std::vector<Regressor> regressors;
+  double weight_unit = 1.0;  ///< times the table's weight is a row's weight; in training these have mean 1
+  bool has_missing = false;  ///< whether a regressor is missing in some row
+  Eigen::VectorXd scale;     ///< root mean square of each regressor's deviations; 1 where it is 0
+  Eigen::MatrixXd spread;    ///< 2 x regressors: smallest and largest deviation but for the one row at either end
+
+  std::ptrdiff_t count() const { return std::ssize(rows); }
+  Eigen::VectorXd low() const;  ///< extent of the inputs
+  Eigen::VectorXd high() const;
+};
+
+/// The given rows, columns described from them. `table` must live as long as the result.
+TrainingRows training_rows(const Table& table, std::vector<int> rows);
 
 /// The given rows under the columns of `training`.
-TrainingRows query_rows(const Table& table, const std::vector<std::ptrdiff_t>& rows, const TrainingRows& training);
+TrainingRows query_rows(const Table& table, std::vector<int> rows, const TrainingRows& training);
+
+/// A few rows laid out one after the other, for passes over all of them.
+struct Chunk {
+  std::ptrdiff_t begin = 0;  ///< position of the first among the rows
+  RowMajor inputs;           ///< NaN: missing
+  RowMajor deviations;       ///< of the regressors from their centres; NaN: missing
+  RowMajor outputs;          ///< the ones asked for
+  Eigen::VectorXd weights;
+
+  std::ptrdiff_t count() const { return weights.size(); }
+};
+
+inline constexpr std::ptrdiff_t chunk_rows = 2048;
+
+inline std::ptrdiff_t num_chunks(const TrainingRows& rows) { return (rows.count() + chunk_rows - 1) / chunk_rows; }
+
+/// Sum of the rows' weights.
+double total_weight(const TrainingRows& rows);
+
+/// The rows index * chunk_rows ... of `rows`.
+Chunk fetch(const TrainingRows& rows, std::ptrdiff_t index, const std::vector<int>& outputs);
 
 /// Levels beyond this many, the rarest, share the reference level's place in the local models.
 inline constexpr std::ptrdiff_t max_level_regressors = 30;
