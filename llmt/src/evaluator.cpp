@@ -58,19 +58,20 @@ Held hold(double x, double low, double high) {
 
 }  // namespace
 
+double deviation_at(const std::vector<InputColumn>& inputs, const Regressor& regressor, double x) {
+  if (regressor.level < 0) {
+    return x - regressor.centre;
+  }
+  const double levels = static_cast<double>(inputs[static_cast<std::size_t>(regressor.input)].levels.size());
+  const bool known = x >= 0.0 && x < levels;
+  return known ? (x == static_cast<double>(regressor.level) ? 1.0 : 0.0) - regressor.centre
+               : std::numeric_limits<double>::quiet_NaN();
+}
+
 void deviations_at(const std::vector<InputColumn>& inputs, const std::vector<Regressor>& regressors, const double* row,
                    double* deviations) {
   for (std::size_t k = 0; k < regressors.size(); ++k) {
-    const Regressor& regressor = regressors[k];
-    const double x = row[regressor.input];
-    if (regressor.level < 0) {
-      deviations[k] = x - regressor.centre;
-    } else {
-      const double levels = static_cast<double>(inputs[static_cast<std::size_t>(regressor.input)].levels.size());
-      const bool known = x >= 0.0 && x < levels;
-      deviations[k] = known ? (x == static_cast<double>(regressor.level) ? 1.0 : 0.0) - regressor.centre
-                            : std::numeric_limits<double>::quiet_NaN();
-    }
+    deviations[k] = deviation_at(inputs, regressors[k], row[regressors[k].input]);
   }
 }
 

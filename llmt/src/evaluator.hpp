@@ -26,6 +26,9 @@ struct Activation {
 void deviations_at(const std::vector<InputColumn>& inputs, const std::vector<Regressor>& regressors, const double* row,
                    double* deviations);
 
+/// Deviation of one regressor where its input is x.
+double deviation_at(const std::vector<InputColumn>& inputs, const Regressor& regressor, double x);
+
 /// Sets Node::half_width of a partition for its validity: the boxes are closed by `low` and `high`, one per input.
 void set_half_widths(Partition& partition, const Eigen::VectorXd& low, const Eigen::VectorXd& high);
 

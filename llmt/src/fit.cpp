@@ -159,28 +159,15 @@ Plan make_plan(const FitOptions& options, const TrainingRows& all, bool has_fold
 struct Grown {
   Partition partition;
   StopReason stop = StopReason::leaf_samples;
+  SearchSummary search;
 };
 
 Grown grow_rows(const TrainingRows& rows, const std::vector<int>& served, const Plan& plan, bool stop_by_aicc,
                 int max_threads) {
   const Table& table = *rows.table;
-  GrowthOptions options = plan.growth;
   const double width = plan.candidates.widths.empty() ? 0.0 : plan.candidates.widths.front();
-  options.split_inputs = table.split_inputs;
-  GrowthProblem problem;
-  problem.split_values = table.inputs(rows.rows, table.split_inputs);
-  for (const int input : table.split_inputs) {
-    problem.num_levels.push_back(table.num_levels[static_cast<std::size_t>(input)]);
-  }
-  problem.outputs = table.outputs(rows.rows, served);
-  problem.weights = rows.weight_unit * table.weights(rows.rows);
-  problem.deviations.resize(rows.count(), std::ssize(rows.regressors));
-  for (std::ptrdiff_t index = 0; index < num_chunks(rows); ++index) {
-    const Chunk chunk = fetch(rows, index, {});
-    problem.deviations.middleRows(chunk.begin, chunk.count()) = chunk.deviations;
-  }
-  problem.options = std::move(options);
-  problem.max_threads = max_threads;
+  GrowthProblem problem{&rows, served, plan.growth, max_threads};
+  problem.options.split_inputs = table.split_inputs;
   GrownPartition result;
   if (is_lolimot(problem.options.rule)) {
     result = grow_lolimot(problem, {.width = width,
@@ -196,7 +183,8 @@ Grown grow_rows(const TrainingRows& rows, const std::vector<int>& served, const 
                             .nodes = std::move(result.nodes),
                             .outer_slope = {},
                             .residual_range = {}},
-              .stop = result.stop};
+              .stop = result.stop,
+              .search = result.search};
   grown.partition.outer_slope = agreed_slope(grown.partition);
   return grown;
 }
@@ -397,6 +385,7 @@ FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<
     PartitionSummary described = summarise(partition, all);
     described.grown_leaves = grown_leaves;
     described.stop = grown.stop;
+    described.search = grown.search;
     described.chosen = trees.empty() ? CandidateError{candidate, std::nan(""), std::nan("")} : selection.chosen;
     described.chosen.candidate.leaves = candidate.leaves;
     described.best_of_kind = std::move(selection.best_of_kind);

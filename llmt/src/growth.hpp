@@ -6,24 +6,22 @@
 #include <vector>
 
 #include "llmt/fit.hpp"
-#include "node_fit.hpp"
+#include "training.hpp"
 
 namespace llmt {
 
-/// The rows that a tree is grown from, and options without defaults left to fill in.
+/// What a tree is grown from.
 struct GrowthProblem {
-  Eigen::MatrixXd split_values;  ///< rows x split inputs; NaN: missing
-  std::vector<int> num_levels;   ///< of each split input; 0: a number
-  RowMajor deviations;           ///< rows x regressors, as deviations from their centres; NaN: missing
-  Eigen::MatrixXd outputs;       ///< rows x outputs of the partition
-  Eigen::VectorXd weights;       ///< of the rows, positive, with mean 1
-  GrowthOptions options;         ///< split_inputs listed, min_leaf_samples set
+  const TrainingRows* training = nullptr;
+  std::vector<int> outputs;  ///< that the partition serves
+  GrowthOptions options;     ///< split_inputs listed, min_leaf_samples set
   int max_threads = 0;
 };
 
 struct GrownPartition {
-  std::vector<Node> nodes;  ///< split_input as in GrowthOptions::split_inputs; thresholds in the inputs' units
+  std::vector<Node> nodes;  ///< thresholds in the inputs' units; ranges (low, high) as far as they are known
   StopReason stop = StopReason::leaf_samples;
+  SearchSummary search = {};
 };
 
 GrownPartition grow(const GrowthProblem& problem);

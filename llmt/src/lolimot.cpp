@@ -35,25 +35,33 @@ struct LocalModel {
 class Lolimot {
  public:
   Lolimot(const GrowthProblem& problem, const LolimotOptions& options) : problem_(problem), options_(options) {
-    deviations_ = problem.deviations.array().isNaN().select(0.0, problem.deviations);
-    const Eigen::RowVectorXd mean = problem.weights.transpose() * problem.outputs / problem.weights.sum();
-    output_weights_ = (problem.weights.asDiagonal() * (problem.outputs.rowwise() - mean).cwiseAbs2())
+    const TrainingRows& training = *problem.training;
+    const Table& table = *training.table;
+    std::vector<int> all(static_cast<std::size_t>(training.count()));
+    std::iota(all.begin(), all.end(), 0);
+    deviations_ = deviations_of(training, all);
+    deviations_ = deviations_.array().isNaN().select(0.0, deviations_).eval();
+    split_values_ = table.inputs(training.rows, problem.options.split_inputs);
+    outputs_ = table.outputs(training.rows, problem.outputs);
+    weights_ = training.weight_unit * table.weights(training.rows);
+    const Eigen::RowVectorXd mean = weights_.transpose() * outputs_ / weights_.sum();
+    output_weights_ = (weights_.asDiagonal() * (outputs_.rowwise() - mean).cwiseAbs2())
                           .colwise()
                           .sum()
                           .transpose()
                           .unaryExpr([](double squares) { return squares > 0.0 ? 1.0 / squares : 1.0; });
-    floor_ = 1e-24 * static_cast<double>(problem.outputs.cols());
+    floor_ = 1e-24 * static_cast<double>(outputs_.cols());
   }
 
   GrownPartition run() {
     LocalModel root;
     root.low = options_.low;
     root.high = options_.high;
-    root.mu = Eigen::VectorXd::Ones(problem_.outputs.rows());
-    root.model.samples = problem_.outputs.rows();
+    root.mu = Eigen::VectorXd::Ones(outputs_.rows());
+    root.model.samples = outputs_.rows();
     Node parentless;
-    parentless.value = Eigen::VectorXd::Zero(problem_.outputs.cols());
-    parentless.slope = Eigen::MatrixXd::Zero(problem_.outputs.cols(), problem_.deviations.cols());
+    parentless.value = Eigen::VectorXd::Zero(outputs_.cols());
+    parentless.slope = Eigen::MatrixXd::Zero(outputs_.cols(), deviations_.cols());
     fit(root, parentless, root.mu);
     nodes_ = {root.model};
     models_ = {std::move(root)};
@@ -92,11 +100,11 @@ class Lolimot {
 
  private:
   Eigen::VectorXd validity_function(const Eigen::VectorXd& low, const Eigen::VectorXd& high) const {
-    const Eigen::MatrixXd& values = problem_.split_values;
+    const Eigen::MatrixXd& values = split_values_;
     Eigen::VectorXd exponent = Eigen::VectorXd::Zero(values.rows());
     for (std::ptrdiff_t j = 0; j < values.cols(); ++j) {
       const double sigma = options_.width * (high(j) - low(j));
-      if (!(sigma > 0.0) || problem_.num_levels[static_cast<std::size_t>(j)] > 0) {
+      if (!(sigma > 0.0) || is_categorical(j)) {
         continue;
       }
       const double centre = 0.5 * (low(j) + high(j));
@@ -119,9 +127,9 @@ class Lolimot {
       }
     }
     const Eigen::MatrixXd x = deviations_(rows, Eigen::all);
-    const Eigen::MatrixXd residuals = (problem_.outputs(rows, Eigen::all) - x * parent.slope.transpose()).rowwise() -
+    const Eigen::MatrixXd residuals = (outputs_(rows, Eigen::all) - x * parent.slope.transpose()).rowwise() -
                                       Eigen::RowVectorXd(parent.value.transpose());
-    const Eigen::VectorXd weights = validity(rows).cwiseProduct(problem_.weights(rows));
+    const Eigen::VectorXd weights = validity(rows).cwiseProduct(weights_(rows));
     const NodeFit fitted = fit_node(x, residuals, weights);
     Node& node = model.model;
     node.rank = fitted.rank;
@@ -135,7 +143,7 @@ class Lolimot {
   }
 
   Eigen::VectorXd sum_of_mu() const {
-    Eigen::VectorXd sum = Eigen::VectorXd::Zero(problem_.outputs.rows());
+    Eigen::VectorXd sum = Eigen::VectorXd::Zero(outputs_.rows());
     for (const LocalModel& model : models_) {
       sum += model.mu;
     }
@@ -143,7 +151,7 @@ class Lolimot {
   }
 
   Eigen::MatrixXd numerator() const {
-    Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(problem_.outputs.rows(), problem_.outputs.cols());
+    Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(outputs_.rows(), outputs_.cols());
     for (const LocalModel& model : models_) {
       sum += model.mu.asDiagonal() * model.predictions;
     }
@@ -152,27 +160,27 @@ class Lolimot {
 
   /// Weighted squared error of every row under sums of mu times prediction, and of mu.
   Eigen::VectorXd squared_errors(const Eigen::MatrixXd& numerator, const Eigen::VectorXd& mu) const {
-    const Eigen::MatrixXd error = problem_.outputs - mu.cwiseInverse().asDiagonal() * numerator;
-    return problem_.weights.cwiseProduct(error.cwiseAbs2() * output_weights_);
+    const Eigen::MatrixXd error = outputs_ - mu.cwiseInverse().asDiagonal() * numerator;
+    return weights_.cwiseProduct(error.cwiseAbs2() * output_weights_);
   }
 
   double loss() const { return squared_errors(numerator(), sum_of_mu()).sum(); }
 
   /// AICc with the effective number of parameters of local estimation, sum of tr[(X'QX)^-1 X'Q^2 X].
   double criterion() const {
-    const double rows = problem_.weights.sum() * static_cast<double>(problem_.outputs.cols());
+    const double rows = weights_.sum() * static_cast<double>(outputs_.cols());
     const Eigen::VectorXd total = sum_of_mu();
     double effective = 0.0;
     for (const LocalModel& model : models_) {
       const Eigen::VectorXd validity = model.mu.cwiseQuotient(total);
       Eigen::MatrixXd a(deviations_.rows(), deviations_.cols() + 1);
       a << Eigen::VectorXd::Ones(deviations_.rows()), deviations_;
-      const Eigen::VectorXd weights = problem_.weights.cwiseProduct(validity);
+      const Eigen::VectorXd weights = weights_.cwiseProduct(validity);
       const Eigen::MatrixXd first = a.transpose() * weights.asDiagonal() * a;
       const Eigen::MatrixXd second = a.transpose() * weights.cwiseProduct(validity).asDiagonal() * a;
       effective += first.completeOrthogonalDecomposition().solve(second).trace();
     }
-    effective *= static_cast<double>(problem_.outputs.cols());
+    effective *= static_cast<double>(outputs_.cols());
     if (rows - effective - 1.0 <= 0.0) {
       return std::numeric_limits<double>::infinity();
     }
@@ -182,7 +190,7 @@ class Lolimot {
 
   /// Where input j of a box is split, if anywhere.
   std::optional<double> threshold(const LocalModel& model, std::ptrdiff_t j) const {
-    if (problem_.num_levels[static_cast<std::size_t>(j)] > 0 || !(model.low(j) < model.high(j))) {
+    if (is_categorical(j) || !(model.low(j) < model.high(j))) {
       return std::nullopt;
     }
     if (!options_.data_driven) {
@@ -191,17 +199,17 @@ class Lolimot {
     const std::vector<int> rows = rows_in(model);
     std::vector<int> order;
     for (std::size_t k = 0; k < rows.size(); ++k) {
-      if (!std::isnan(problem_.split_values(rows[k], j))) {
+      if (!std::isnan(split_values_(rows[k], j))) {
         order.push_back(static_cast<int>(k));
       }
     }
-    const auto value = [&](int k) { return problem_.split_values(rows[static_cast<std::size_t>(k)], j); };
+    const auto value = [&](int k) { return split_values_(rows[static_cast<std::size_t>(k)], j); };
     std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return value(a) < value(b); });
     const std::ptrdiff_t smallest = problem_.options.min_leaf_samples;
     if (std::ssize(order) < 2 * smallest) {
       return std::nullopt;
     }
-    NodeFit crisp = fit_node(deviations_(rows, Eigen::all), problem_.outputs(rows, Eigen::all), problem_.weights(rows));
+    NodeFit crisp = fit_node(deviations_(rows, Eigen::all), outputs_(rows, Eigen::all), weights_(rows));
     std::vector<double> values;
     for (const int k : order) {
       values.push_back(value(k));
@@ -223,10 +231,10 @@ class Lolimot {
   /// Rows whose values lie in the box; rows without a value only in boxes that are not cut there.
   std::vector<int> rows_in(const LocalModel& model) const {
     std::vector<int> rows;
-    for (std::ptrdiff_t i = 0; i < problem_.split_values.rows(); ++i) {
+    for (std::ptrdiff_t i = 0; i < split_values_.rows(); ++i) {
       bool inside = true;
-      for (std::ptrdiff_t j = 0; j < problem_.split_values.cols() && inside; ++j) {
-        const double x = problem_.split_values(i, j);
+      for (std::ptrdiff_t j = 0; j < split_values_.cols() && inside; ++j) {
+        const double x = split_values_(i, j);
         inside = std::isnan(x) ? model.low(j) == options_.low(j) && model.high(j) == options_.high(j)
                                : (x > model.low(j) || model.low(j) == options_.low(j)) && x <= model.high(j);
       }
@@ -264,7 +272,7 @@ class Lolimot {
         return false;
       }
       LocalModel& model = models_[static_cast<std::size_t>(worst)];
-      std::vector<Split> splits(static_cast<std::size_t>(problem_.split_values.cols()));
+      std::vector<Split> splits(static_cast<std::size_t>(split_values_.cols()));
       parallel_for(std::ssize(splits), problem_.max_threads, [&](std::ptrdiff_t j) {
         if (const std::optional<double> at = threshold(model, j)) {
           splits[static_cast<std::size_t>(j)] = try_split(model, j, *at, numerators, total);
@@ -312,7 +320,7 @@ class Lolimot {
     const Eigen::VectorXd safe_sum = sum.cwiseMax(split.left.mu + split.right.mu);
     for (LocalModel* half : {&split.left, &split.right}) {
       const Eigen::VectorXd validity = half->mu.cwiseQuotient(safe_sum);
-      if (validity.dot(problem_.weights) < static_cast<double>(deviations_.cols() + 1)) {
+      if (validity.dot(weights_) < static_cast<double>(deviations_.cols() + 1)) {
         return split;
       }
       fit(*half, model.model, validity);
@@ -324,9 +332,17 @@ class Lolimot {
     return split;
   }
 
+  bool is_categorical(std::ptrdiff_t split_input) const {
+    const int input = problem_.options.split_inputs[static_cast<std::size_t>(split_input)];
+    return problem_.training->table->num_levels[static_cast<std::size_t>(input)] > 0;
+  }
+
   const GrowthProblem& problem_;
   const LolimotOptions& options_;
-  Eigen::MatrixXd deviations_;
+  Eigen::MatrixXd deviations_;    // rows x regressors; a missing value is 0
+  Eigen::MatrixXd split_values_;  // rows x split inputs
+  Eigen::MatrixXd outputs_;
+  Eigen::VectorXd weights_;
   Eigen::VectorXd output_weights_;
   double floor_ = 0.0;
   std::vector<Node> nodes_;

@@ -20,6 +20,7 @@ struct SplitCandidate {
   int rank_right = 0;
   std::ptrdiff_t tested = 0;       ///< number of admissible splits among which it is the best
   std::ptrdiff_t evaluations = 0;  ///< number of splits whose residual sum of squares was computed
+  int bin = -1;                    ///< search by bins: the last bin of the left child
   bool by_missing = false;         ///< rows with a value go left, rows without one right
   std::vector<int> level_side;     ///< categorical input: -1 left, 1 right, 0 not seen, one per level
 };

@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <numeric>
+
 #include "f_distribution.hpp"
 #include "growth.hpp"
 #include "llmt/fit.hpp"
@@ -10,16 +12,15 @@ namespace {
 
 /// Two leaves, no test of whether the split is worth it, as grown.
 std::vector<llmt::Node> one_split(const Eigen::MatrixXd& x, const Eigen::MatrixXd& y, std::ptrdiff_t min_leaf) {
-  llmt::GrowthProblem problem;
-  problem.split_values = x;
-  problem.num_levels.assign(static_cast<std::size_t>(x.cols()), 0);
-  problem.deviations = x.rowwise() - x.colwise().mean();
-  problem.outputs = y;
-  problem.weights = Eigen::VectorXd::Ones(x.rows());
+  std::vector<int> inputs(static_cast<std::size_t>(x.cols()));
+  std::iota(inputs.begin(), inputs.end(), 0);
+  const llmt::Table table{x, y, Eigen::VectorXd::Ones(x.rows()), std::vector<int>(inputs.size(), 0), inputs, inputs};
+  std::vector<int> rows(static_cast<std::size_t>(x.rows()));
+  std::iota(rows.begin(), rows.end(), 0);
+  const llmt::TrainingRows training = llmt::training_rows(table, rows);
+  llmt::GrowthProblem problem{&training, {0}, {}, 0};
   problem.options = {.significance = 1.0, .min_variance_gain = -1.0, .min_leaf_samples = min_leaf, .max_leaves = 2};
-  for (int input = 0; input < x.cols(); ++input) {
-    problem.options.split_inputs.push_back(input);
-  }
+  problem.options.split_inputs = inputs;
   return llmt::grow(problem).nodes;
 }
 

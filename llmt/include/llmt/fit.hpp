@@ -44,6 +44,16 @@ enum class ThresholdPlacement {
   midpoint  ///< halfway
 };
 
+/// How the best split of a node is searched.
+enum class SplitSearch {
+  automatic,  ///< exact, by bins for many rows
+  exact,      ///< every threshold counts; those that cannot be the best are passed over, see docs/algorithms.md
+  /// Inputs are cut into at most 256 bins, once for the tree, and only the edges between bins are compared;
+  /// SearchSummary::largest_excess says how far from the best split that can be at most. Nodes of few rows are searched
+  /// exactly. Data with missing values, or with inputs of more than 256 levels, are searched exactly too.
+  binned
+};
+
 /// Why growth ended.
 enum class StopReason {
   max_leaves,       ///< GrowthOptions::max_leaves reached
@@ -87,6 +97,7 @@ struct GrowthOptions {
   std::vector<int> split_inputs = {};
   std::vector<int> regression_inputs = {};
   ThresholdPlacement threshold = ThresholdPlacement::closest;
+  SplitSearch search = SplitSearch::automatic;
 };
 
 /// See GrowthOptions::min_improvement. One split alone may help little before the next one helps much.
@@ -166,6 +177,17 @@ struct CandidateError {
   Eigen::VectorXd fold_rmse = {};  ///< one per fold
 };
 
+/// How the splits of a tree were searched.
+struct SearchSummary {
+  std::ptrdiff_t exact_nodes = 0;
+  std::ptrdiff_t binned_nodes = 0;
+  /// Splits whose residual sum of squares was computed.
+  std::ptrdiff_t evaluations = 0;
+  /// Of the nodes searched by bins: the most by which the residual sum of squares of the split that was found can
+  /// exceed that of the best one, as a fraction of the node's own. The true excess is far smaller as a rule.
+  double largest_excess = 0.0;
+};
+
 /// What happened to one partition.
 struct PartitionSummary {
   std::vector<int> outputs;
@@ -182,6 +204,7 @@ struct PartitionSummary {
   Eigen::VectorXd crisp_cv_rmse;
   std::ptrdiff_t cv_folds = 0;
   std::ptrdiff_t held_out_rows = 0;  ///< over all folds
+  SearchSummary search;              ///< of the tree grown on all rows
 };
 
 struct FitSummary {

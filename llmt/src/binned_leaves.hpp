@@ -1,0 +1,83 @@
+/// \file
+/// Leaves of a growing tree whose inputs are cut into bins: the search compares the edges between bins only, and says
+/// how much better a split inside a bin could be.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <vector>
+
+#include "bins.hpp"
+#include "exact_leaves.hpp"
+
+namespace llmt {
+
+/// Gram matrices and row counts of the bins of all split inputs.
+struct Histogram {
+  std::vector<double> grams;
+  std::vector<std::ptrdiff_t> counts;
+};
+
+struct BinnedLeaf {
+  std::vector<int> rows;               ///< of the training rows, ascending
+  std::optional<Histogram> histogram;  ///< if there is memory to keep it
+  Eigen::VectorXd value;               ///< the local model whose residuals the features of these rows hold
+  Eigen::MatrixXd slope;
+  Eigen::VectorXd mean;        ///< of the scaled regressors over the rows
+  Eigen::MatrixXd covariance;  ///< of the scaled regressors
+};
+
+/// The features of all rows stay in the basis of the root, so that the histogram of one child is that of its parent
+/// less that of the other child. Digits that this costs are watched: where a node's residual sum of squares is small
+/// against that of the model whose residuals the features hold, its own residuals take their place and its histogram is
+/// formed anew.
+class BinnedLeaves {
+ public:
+  /// Whether the data can be binned: no missing values, no more than `most_bins` levels of an input.
+  static bool possible(const GrowthData& data);
+
+  explicit BinnedLeaves(const GrowthData& data);
+
+  BinnedLeaf root() const;
+
+  /// As ExactLeaves::examine(). `excess`: what a split inside a bin could gain on the best one at an edge, at most.
+  SplitCandidate examine(BinnedLeaf& leaf, const Node& parent, Node& node, double& excess);
+
+  /// Lets a leaf wait for its turn: its histogram is kept if there is memory for it.
+  void wait(BinnedLeaf& leaf);
+
+  /// Splits a leaf, whose histogram goes to its children.
+  std::array<BinnedLeaf, 2> divide(BinnedLeaf& leaf, const SplitCandidate& split);
+
+  double threshold(const BinnedLeaf& leaf, const SplitCandidate& split, const Node& node, const Node& left,
+                   const Node& right) const;
+
+  /// The same rows for exact search; `parent`: the local model whose residuals the result holds.
+  ExactLeaf sorted(const BinnedLeaf& leaf, const Node& parent, const ExactLeaves& exact) const;
+
+ private:
+  struct Found {
+    SplitCandidate best;
+    double bound;  // no split leaves less
+  };
+
+  std::span<const double> grams(const Histogram& histogram, std::size_t input) const;
+  std::span<const std::ptrdiff_t> counts(const Histogram& histogram, std::size_t input) const;
+  void fill_features();
+  Histogram accumulate(const std::vector<int>& rows) const;
+  std::vector<double> total(const Histogram& histogram) const;
+  void fit(BinnedLeaf& leaf, const std::vector<double>& gram, const Node& parent, Node& node) const;
+  void rebase(BinnedLeaf& leaf, const Node& node);
+  Found search(const Histogram& histogram, std::size_t input, double node_rss) const;
+
+  const GrowthData& data_;
+  std::vector<Bins> bins_;
+  std::vector<std::ptrdiff_t> first_bin_;  // of each input among all bins
+  Features features_;
+  GramShape shape_;
+  Eigen::MatrixXd whitening_;   // scaled regressors times this are the features' regressors
+  Eigen::MatrixXd colouring_;   // and back: scaled regressors = colouring_ * regressors
+  std::ptrdiff_t memory_left_;  // for histograms of leaves that wait, in doubles
+};
+
+}  // namespace llmt
