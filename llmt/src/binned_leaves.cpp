@@ -473,11 +473,4 @@ double BinnedLeaves::threshold(const BinnedLeaf& leaf, const SplitCandidate& spl
   return data_.place_threshold(low, high, regressor->centre + node.mean(k), apart, slope);
 }
 
-ExactLeaf BinnedLeaves::sorted(const BinnedLeaf& leaf, const Node& parent, const ExactLeaves& exact) const {
-  const RowMajor deviations = deviations_of(data_.training, leaf.rows);
-  Eigen::MatrixXd residuals = data_.outputs(leaf.rows, Eigen::all) - deviations * parent.slope.transpose();
-  residuals.rowwise() -= parent.value.transpose();
-  return exact.open(leaf.rows, data_.weights(leaf.rows), std::move(residuals));
-}
-
 }  // namespace llmt

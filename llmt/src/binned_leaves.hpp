@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "bins.hpp"
-#include "exact_leaves.hpp"
+#include "split_search.hpp"
 
 namespace llmt {
 
@@ -51,9 +51,6 @@ class BinnedLeaves {
 
   double threshold(const BinnedLeaf& leaf, const SplitCandidate& split, const Node& node, const Node& left,
                    const Node& right) const;
-
-  /// The same rows for exact search; `parent`: the local model whose residuals the result holds.
-  ExactLeaf sorted(const BinnedLeaf& leaf, const Node& parent, const ExactLeaves& exact) const;
 
  private:
   struct Found {

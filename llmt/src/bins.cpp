@@ -1,6 +1,7 @@
 #include "bins.hpp"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 
@@ -90,16 +91,27 @@ std::vector<Bins> make_bins(const GrowthData& data, int bins) {
     }
     result.edges = quantile_edges(std::move(values), bins);
     result.count = static_cast<int>(std::ssize(result.edges)) + 1;
-    // The number of edges below the value: steps of powers of two, without branches.
+    // The number of edges below the value: steps of powers of two, without branches, for some values at a time.
     std::vector<double> padded(most_bins, std::numeric_limits<double>::infinity());
     std::copy(result.edges.begin(), result.edges.end(), padded.begin());
-    for (int row = 0; row < rows; ++row) {
-      const double value = data.split_value(row, j);
-      std::size_t below = 0;
-      for (std::size_t step = most_bins / 2; step > 0; step /= 2) {
-        below += padded[below + step - 1] < value ? step : 0;
+    constexpr int at_once = 16;
+    std::array<double, at_once> value{};
+    std::array<std::uint32_t, at_once> below{};
+    for (int begin = 0; begin < rows; begin += at_once) {
+      const int count = std::min(at_once, rows - begin);
+      for (int k = 0; k < count; ++k) {
+        value[static_cast<std::size_t>(k)] = data.split_value(begin + k, j);
       }
-      result.codes[static_cast<std::size_t>(row)] = static_cast<std::uint8_t>(below);
+      below.fill(0);
+      for (std::uint32_t step = most_bins / 2; step > 0; step /= 2) {
+        for (std::size_t k = 0; k < at_once; ++k) {
+          below[k] += padded[below[k] + step - 1] < value[k] ? step : 0;
+        }
+      }
+      for (int k = 0; k < count; ++k) {
+        result.codes[static_cast<std::size_t>(begin + k)] =
+            static_cast<std::uint8_t>(below[static_cast<std::size_t>(k)]);
+      }
     }
   });
   return all;

@@ -26,17 +26,39 @@ struct ValueOfRow {
 
 }  // namespace
 
-ExactLeaf ExactLeaves::open(Rows rows, Eigen::VectorXd weights, Eigen::MatrixXd residuals) const {
-  ExactLeaf leaf{std::move(rows), std::move(weights), {}, std::move(residuals)};
+double ExactLeaves::split_value(const ExactLeaf& leaf, std::ptrdiff_t row, std::ptrdiff_t split_input) const {
+  return leaf.inputs(row, data_.problem.options.split_inputs[static_cast<std::size_t>(split_input)]);
+}
+
+RowMajor ExactLeaves::deviations(const ExactLeaf& leaf) const {
+  const std::vector<Regressor>& regressors = data_.training.regressors;
+  RowMajor result(leaf.inputs.rows(), std::ssize(regressors));
+  for (std::ptrdiff_t row = 0; row < result.rows(); ++row) {
+    deviations_at(data_.training.columns, regressors, leaf.inputs.row(row).data(), result.row(row).data());
+  }
+  return result;
+}
+
+ExactLeaf ExactLeaves::open(const Rows& rows, const Node& parent) const {
+  ExactLeaf leaf;
+  leaf.inputs = inputs_of(data_.training, rows);
+  leaf.weights = data_.weights(rows);
+  // Missing values are taken at the mean of the parent's rows, as they were in its fit.
+  RowMajor x = deviations(leaf);
+  if (data_.training.has_missing) {
+    x = x.array().isNaN().select(parent.mean.transpose().replicate(x.rows(), 1), x).eval();
+  }
+  leaf.residuals = data_.outputs(rows, Eigen::all) - x * parent.slope.transpose();
+  leaf.residuals.rowwise() -= parent.value.transpose();
   leaf.orders.resize(static_cast<std::size_t>(data_.split_inputs()));
-  parallel_for(data_.split_inputs(), data_.threads_for(std::ssize(leaf.rows)), [&](std::ptrdiff_t j) {
+  parallel_for(data_.split_inputs(), data_.threads_for(std::ssize(rows)), [&](std::ptrdiff_t j) {
     if (data_.num_levels[static_cast<std::size_t>(j)] > 0) {
       return;
     }
     std::vector<ValueOfRow> values;
-    values.reserve(leaf.rows.size());
-    for (std::size_t k = 0; k < leaf.rows.size(); ++k) {
-      if (const double value = data_.split_value(leaf.rows[k], j); !std::isnan(value)) {
+    values.reserve(rows.size());
+    for (std::ptrdiff_t k = 0; k < leaf.inputs.rows(); ++k) {
+      if (const double value = split_value(leaf, k, j); !std::isnan(value)) {
         values.push_back({value, static_cast<int>(k)});
       }
     }
@@ -49,12 +71,11 @@ ExactLeaf ExactLeaves::open(Rows rows, Eigen::VectorXd weights, Eigen::MatrixXd 
 }
 
 SplitCandidate ExactLeaves::examine(ExactLeaf& leaf, const Node& parent, Node& node) const {
-  const RowMajor deviations = deviations_of(data_.training, leaf.rows);
-  NodeFit fit =
-      data_.training.has_missing
-          ? fit_node(deviations, about_own_mean(deviations, parent, leaf.residuals, leaf.weights), leaf.weights)
-          : fit_node(deviations, leaf.residuals, leaf.weights);
-  node.samples = std::ssize(leaf.rows);
+  const RowMajor x = deviations(leaf);
+  NodeFit fit = data_.training.has_missing
+                    ? fit_node(x, about_own_mean(x, parent, leaf.residuals, leaf.weights), leaf.weights)
+                    : fit_node(x, leaf.residuals, leaf.weights);
+  node.samples = leaf.inputs.rows();
   node.rank = fit.rank;
   node.rss = fit.rss;
   node.value = parent.value + fit.centre_change;
@@ -91,8 +112,8 @@ Eigen::MatrixXd ExactLeaves::about_own_mean(const RowMajor& deviations, const No
 /// Level of each row of the leaf in a categorical split input, -1 where it is missing.
 std::vector<int> ExactLeaves::levels_of(const ExactLeaf& leaf, std::ptrdiff_t split_input) const {
   std::vector<int> levels;
-  for (const int row : leaf.rows) {
-    const double value = data_.split_value(row, split_input);
+  for (std::ptrdiff_t row = 0; row < leaf.inputs.rows(); ++row) {
+    const double value = split_value(leaf, row, split_input);
     levels.push_back(std::isnan(value) ? -1 : static_cast<int>(value));
   }
   return levels;
@@ -101,12 +122,12 @@ std::vector<int> ExactLeaves::levels_of(const ExactLeaf& leaf, std::ptrdiff_t sp
 SplitCandidate ExactLeaves::find_split(const ExactLeaf& leaf, NodeFit fit, double rss) const {
   SplitCandidate best;
   const std::ptrdiff_t smallest_leaf = data_.problem.options.min_leaf_samples;
-  if (std::ssize(leaf.rows) < 2 * smallest_leaf) {
+  if (leaf.inputs.rows() < 2 * smallest_leaf) {
     return best;
   }
   const SearchNode node{std::move(fit.features), data_.output_weights, rss};
   const std::size_t inputs = leaf.orders.size();
-  const int threads = data_.threads_for(std::ssize(leaf.rows) * data_.split_inputs());
+  const int threads = data_.threads_for(leaf.inputs.rows() * data_.split_inputs());
   std::vector<std::optional<InputSearch>> searches(inputs);
   std::vector<SplitCandidate> found(inputs);
   parallel_for(std::ssize(found), threads, [&](std::ptrdiff_t j) {
@@ -118,7 +139,7 @@ SplitCandidate ExactLeaves::find_split(const ExactLeaf& leaf, NodeFit fit, doubl
     const Rows& order = leaf.orders[slot];
     std::vector<double> values(order.size());
     for (std::size_t k = 0; k < order.size(); ++k) {
-      values[k] = data_.split_value(leaf.rows[static_cast<std::size_t>(order[k])], j);
+      values[k] = split_value(leaf, order[k], j);
     }
     searches[slot].emplace(node, std::move(values), order, smallest_leaf);
     searches[slot]->search_edges();
@@ -133,7 +154,7 @@ SplitCandidate ExactLeaves::find_split(const ExactLeaf& leaf, NodeFit fit, doubl
     if (searches[slot]) {
       searches[slot]->refine(limit);
       found[slot] = searches[slot]->best();
-      if (leaf.orders[slot].size() < leaf.rows.size()) {
+      if (std::ssize(leaf.orders[slot]) < leaf.inputs.rows()) {
         consider_missing(node, leaf, j, found[slot]);
       }
       searches[slot].reset();
@@ -162,8 +183,8 @@ SplitCandidate ExactLeaves::find_split(const ExactLeaf& leaf, NodeFit fit, doubl
 void ExactLeaves::consider_missing(const SearchNode& node, const ExactLeaf& leaf, std::ptrdiff_t j,
                                    SplitCandidate& best) const {
   std::vector<int> is_missing;
-  for (const int row : leaf.rows) {
-    is_missing.push_back(std::isnan(data_.split_value(row, j)) ? 1 : 0);
+  for (std::ptrdiff_t row = 0; row < leaf.inputs.rows(); ++row) {
+    is_missing.push_back(std::isnan(split_value(leaf, row, j)) ? 1 : 0);
   }
   SplitCandidate candidate = search_levels(node, is_missing, 2, data_.problem.options.min_leaf_samples);
   const std::ptrdiff_t tested = best.tested + candidate.tested;
@@ -177,10 +198,10 @@ void ExactLeaves::consider_missing(const SearchNode& node, const ExactLeaf& leaf
 
 /// Where the best split of a leaf sends its rows.
 std::vector<ExactLeaves::Side> ExactLeaves::sides_of(const ExactLeaf& leaf, const SplitCandidate& split) const {
-  std::vector<Side> sides(leaf.rows.size(), Side::both);
+  std::vector<Side> sides(static_cast<std::size_t>(leaf.inputs.rows()), Side::both);
   if (split.by_missing) {
     for (std::size_t k = 0; k < sides.size(); ++k) {
-      sides[k] = std::isnan(data_.split_value(leaf.rows[k], split.input)) ? Side::right : Side::left;
+      sides[k] = std::isnan(split_value(leaf, static_cast<std::ptrdiff_t>(k), split.input)) ? Side::right : Side::left;
     }
     return sides;
   }
@@ -215,11 +236,11 @@ double ExactLeaves::learn_missing_left(const ExactLeaf& leaf, const Node& parent
   if (missing.empty()) {
     return known;
   }
-  const RowMajor deviations = deviations_of(data_.training, leaf.rows);
-  const RowMajor queries = deviations(missing, Eigen::all);
+  const RowMajor all = deviations(leaf);
+  const RowMajor queries = all(missing, Eigen::all);
   std::array<Eigen::MatrixXd, 2> change;  // child's prediction minus the leaf's, rows x outputs
   for (std::size_t side = 0; side < 2; ++side) {
-    const RowMajor of_child = deviations(positions[side], Eigen::all);
+    const RowMajor of_child = all(positions[side], Eigen::all);
     const Eigen::VectorXd weights = leaf.weights(positions[side]);
     const Eigen::MatrixXd residuals =
         about_own_mean(of_child, parent, leaf.residuals(positions[side], Eigen::all), weights);
@@ -255,24 +276,24 @@ ExactLeaves::Children ExactLeaves::divide(const ExactLeaf& leaf, const Node& nod
   for (std::size_t side = 0; side < 2; ++side) {
     ExactLeaf& child = children.leaves[side];
     const Side own = side == 0 ? Side::left : Side::right;
-    Rows position_in_child(leaf.rows.size(), -1);
+    Rows position_in_child(sides.size(), -1);
     Rows positions;  // of the child's rows among the leaf's
     std::vector<double> weights;
     for (std::size_t k = 0; k < sides.size(); ++k) {
       const double share = sides[k] == own ? 1.0 : sides[k] == Side::both ? shares[side] : 0.0;
       // A row that may as well belong to the other side would teach the child wrong.
       if (share >= clear_share) {
-        position_in_child[k] = static_cast<int>(child.rows.size());
-        child.rows.push_back(leaf.rows[k]);
+        position_in_child[k] = static_cast<int>(positions.size());
         positions.push_back(static_cast<int>(k));
         weights.push_back(share * leaf.weights(static_cast<std::ptrdiff_t>(k)));
       }
     }
     child.weights = Eigen::Map<const Eigen::VectorXd>(weights.data(), std::ssize(weights));
+    child.inputs = leaf.inputs(positions, Eigen::all);
     child.residuals = leaf.residuals(positions, Eigen::all);
     child.orders.resize(leaf.orders.size());
     for (std::size_t j = 0; j < leaf.orders.size(); ++j) {
-      child.orders[j].reserve(child.rows.size());
+      child.orders[j].reserve(positions.size());
       for (const int k : leaf.orders[j]) {
         if (const int position = position_in_child[static_cast<std::size_t>(k)]; position >= 0) {
           child.orders[j].push_back(position);
@@ -286,20 +307,18 @@ ExactLeaves::Children ExactLeaves::divide(const ExactLeaf& leaf, const Node& nod
 double ExactLeaves::threshold(const ExactLeaf& leaf, const SplitCandidate& split, const Node& node, const Node& left,
                               const Node& right) const {
   const Rows& order = leaf.orders[static_cast<std::size_t>(split.input)];
-  Rows rows;  // with a value, in the order of it
-  for (const int k : order) {
-    rows.push_back(leaf.rows[static_cast<std::size_t>(k)]);
-  }
-  Eigen::VectorXd values(std::ssize(rows));
-  for (std::size_t k = 0; k < rows.size(); ++k) {
-    values(static_cast<std::ptrdiff_t>(k)) = data_.split_value(rows[k], split.input);
+  Eigen::VectorXd values(std::ssize(order));
+  for (std::size_t k = 0; k < order.size(); ++k) {
+    values(static_cast<std::ptrdiff_t>(k)) = split_value(leaf, order[k], split.input);
   }
   // The regression of the child models' difference on the split input over the node's rows says how far apart they are,
   // on average, on the plane x_j = t: a + b (t - mean).
   const Eigen::VectorXd weights = leaf.weights(order);
-  RowMajor deviations = deviations_of(data_.training, rows);
-  deviations = deviations.array().isNaN().select(node.mean.transpose().replicate(deviations.rows(), 1), deviations);
-  const Eigen::MatrixXd apart = (deviations * (right.slope - left.slope).transpose()).rowwise() +
+  RowMajor x = deviations(leaf)(order, Eigen::all);
+  if (data_.training.has_missing) {
+    x = x.array().isNaN().select(node.mean.transpose().replicate(x.rows(), 1), x).eval();
+  }
+  const Eigen::MatrixXd apart = (x * (right.slope - left.slope).transpose()).rowwise() +
                                 Eigen::RowVectorXd((right.value - left.value).transpose());
   const double mean = weights.dot(values) / weights.sum();
   const Eigen::VectorXd centred = values.array() - mean;

@@ -13,10 +13,9 @@
 namespace llmt {
 
 struct ExactLeaf {
-  std::vector<int> rows;    ///< of the training rows, ascending
-  Eigen::VectorXd weights;  ///< of the rows here
-  std::vector<std::vector<int>>
-      orders;                 ///< positions in `rows` by each numeric split input that has a value, ascending
+  RowMajor inputs;                       ///< of the rows, all columns
+  Eigen::VectorXd weights;               ///< of the rows here
+  std::vector<std::vector<int>> orders;  ///< rows by each numeric split input that has a value, ascending
   Eigen::MatrixXd residuals;  ///< of a local model, rows x outputs: the parent's until examined, then its own
 };
 
@@ -24,8 +23,8 @@ class ExactLeaves {
  public:
   explicit ExactLeaves(const GrowthData& data) : data_(data) {}
 
-  /// A leaf of the given rows, with the residuals of the parent's model there.
-  ExactLeaf open(std::vector<int> rows, Eigen::VectorXd weights, Eigen::MatrixXd residuals) const;
+  /// A leaf of the given training rows, with the residuals of the parent's model there.
+  ExactLeaf open(const std::vector<int>& rows, const Node& parent) const;
 
   /// Fits the leaf's local model as a correction of its parent's, which fills in `node`, and searches all split inputs:
   /// the best split, acceptable or not.
@@ -47,6 +46,8 @@ class ExactLeaves {
   /// Where a row of a leaf goes.
   enum class Side : signed char { left, right, both };
 
+  double split_value(const ExactLeaf& leaf, std::ptrdiff_t row, std::ptrdiff_t split_input) const;
+  RowMajor deviations(const ExactLeaf& leaf) const;
   Eigen::MatrixXd about_own_mean(const RowMajor& deviations, const Node& parent, Eigen::MatrixXd residuals,
                                  const Eigen::VectorXd& weights) const;
   std::vector<int> levels_of(const ExactLeaf& leaf, std::ptrdiff_t split_input) const;

@@ -22,7 +22,7 @@ namespace {
 /// From this many rows on, inputs are cut into bins; nodes below the other number of rows are searched exactly even
 /// then. bench/search_modes prints where these pay.
 constexpr std::ptrdiff_t binned_rows = 200000;
-constexpr std::ptrdiff_t exact_rows = 6000;
+constexpr std::ptrdiff_t exact_rows = 2000;
 
 /// A node that may still be split.
 struct OpenLeaf {
@@ -113,7 +113,7 @@ class Grower {
     } else {
       std::vector<int> rows(static_cast<std::size_t>(data_.training.count()));
       std::iota(rows.begin(), rows.end(), 0);
-      root.data = exact_.open(std::move(rows), data_.weights, data_.outputs);
+      root.data = exact_.open(rows, parentless);
     }
     examine(root, parentless);
     tree_rss_ = {root.rss};
@@ -242,7 +242,7 @@ class Grower {
       missing_left = static_cast<double>(parts[0].rows.size()) / static_cast<double>(binned->rows.size());
       for (std::size_t side = 0; side < 2; ++side) {
         if (std::ssize(parts[side].rows) < exact_rows) {
-          children[side].data = binned_->sorted(parts[side], parent, exact_);
+          children[side].data = exact_.open(parts[side].rows, parent);
         } else {
           children[side].data = std::move(parts[side]);
         }

@@ -37,10 +37,12 @@ class Lolimot {
   Lolimot(const GrowthProblem& problem, const LolimotOptions& options) : problem_(problem), options_(options) {
     const TrainingRows& training = *problem.training;
     const Table& table = *training.table;
-    std::vector<int> all(static_cast<std::size_t>(training.count()));
-    std::iota(all.begin(), all.end(), 0);
-    deviations_ = deviations_of(training, all);
-    deviations_ = deviations_.array().isNaN().select(0.0, deviations_).eval();
+    deviations_.resize(training.count(), std::ssize(training.regressors));
+    for (std::ptrdiff_t index = 0; index < num_chunks(training); ++index) {
+      const Chunk chunk = fetch(training, index, {});
+      deviations_.middleRows(chunk.begin, chunk.count()) =
+          chunk.deviations.array().isNaN().select(0.0, chunk.deviations);
+    }
     split_values_ = table.inputs(training.rows, problem.options.split_inputs);
     outputs_ = table.outputs(training.rows, problem.outputs);
     weights_ = training.weight_unit * table.weights(training.rows);

@@ -231,15 +231,13 @@ Chunk fetch(const TrainingRows& rows, std::ptrdiff_t index, const std::vector<in
   return chunk;
 }
 
-RowMajor deviations_of(const TrainingRows& rows, std::span<const int> positions) {
+RowMajor inputs_of(const TrainingRows& rows, std::span<const int> positions) {
   const Eigen::Ref<const Eigen::MatrixXd>& inputs = rows.table->inputs;
-  RowMajor result(std::ssize(positions), std::ssize(rows.regressors));
-  for (std::ptrdiff_t k = 0; k < result.cols(); ++k) {
-    const Regressor& regressor = rows.regressors[static_cast<std::size_t>(k)];
-    const double* const column = inputs.data() + regressor.input * inputs.outerStride();
-    for (std::ptrdiff_t i = 0; i < result.rows(); ++i) {
-      const double x = column[rows.rows[static_cast<std::size_t>(positions[static_cast<std::size_t>(i)])]];
-      result(i, k) = deviation_at(rows.columns, regressor, x);
+  RowMajor result(std::ssize(positions), inputs.cols());
+  for (std::ptrdiff_t i = 0; i < result.rows(); ++i) {
+    const int row = rows.rows[static_cast<std::size_t>(positions[static_cast<std::size_t>(i)])];
+    for (std::ptrdiff_t j = 0; j < result.cols(); ++j) {
+      result(i, j) = inputs(row, j);
     }
   }
   return result;

@@ -66,8 +66,8 @@ double total_weight(const TrainingRows& rows);
 /// The rows index * chunk_rows ... of `rows`.
 Chunk fetch(const TrainingRows& rows, std::ptrdiff_t index, const std::vector<int>& outputs);
 
-/// Deviations of the regressors of some rows, given by their positions among `rows`; NaN: missing.
-RowMajor deviations_of(const TrainingRows& rows, std::span<const int> positions);
+/// Inputs of some rows, given by their positions among `rows`; NaN: missing.
+RowMajor inputs_of(const TrainingRows& rows, std::span<const int> positions);
 
 /// Levels beyond this many, the rarest, share the reference level's place in the local models.
 inline constexpr std::ptrdiff_t max_level_regressors = 30;
