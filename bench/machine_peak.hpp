@@ -1,5 +1,5 @@
 /// \file
-/// What this machine can do at most, for figures such as "fraction of peak". Every measurement takes some 0.1 s.
+/// What this machine can do at most, for figures such as "fraction of peak". Every measurement takes some 0.3 s.
 ///
 /// With GCC on x86 each kernel exists for several instruction sets and the loader takes the widest, as in the library's
 /// own kernels.

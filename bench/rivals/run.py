@@ -37,14 +37,14 @@ def arguments():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--bin", default=os.path.join(ROOT, "build/release/bin"), help="where llmt's benchmarks are")
     parser.add_argument("--methods", default=",".join(PACKAGES), help="comma-separated; default: %(default)s")
-    parser.add_argument("--rows", default="1e4,1e5", help="comma-separated numbers of training rows; default: %(default)s")
+    parser.add_argument("--rows", default="1e4,1e5", help="numbers of training rows; default: %(default)s")
     parser.add_argument("--inputs", type=int, default=10)
     parser.add_argument("--seeds", type=int, default=1, help="samples: mean errors, median times; default: %(default)s")
     parser.add_argument("--sets", metavar="FOLDER", help="data sets instead of the synthetic function")
     parser.add_argument("--names", help="comma-separated data sets; default: all")
     parser.add_argument("--threads", type=int, default=1)
-    parser.add_argument("--seconds", type=int, default=300, help="CPU seconds that a process may take; default: %(default)s")
-    parser.add_argument("--gigabytes", type=int, default=8, help="memory that a process may take; default: %(default)s")
+    parser.add_argument("--seconds", type=int, default=300, help="CPU time a process may take; default: %(default)s")
+    parser.add_argument("--gigabytes", type=int, default=8, help="memory a process may take; default: %(default)s")
     parser.add_argument("--json", default="rivals.json", help="file for all results; default: %(default)s")
     return parser.parse_args()
 
@@ -100,8 +100,6 @@ class Bench:
         """All methods on each of `samples`, which write the files and return the number of columns. Sample by sample,
         so that the machine's moods hit all methods alike."""
         results = collections.defaultdict(list)
-        # Not installed stays so; a method that was too slow gets another chance with the next data set.
-        skipped = set(self.left_out)
         for sample in samples:
             columns = sample()
             for method in self.options.methods.split(","):
@@ -111,9 +109,9 @@ class Bench:
                     print(" " * 60, file=sys.stderr, end="\r")
                     if result:
                         results[method].append(result)
-                        self.records.append({"data": data, "method": method, "threads": self.options.threads} | result)
+                    self.records.append({"data": data, "method": method} | (result or {"left_out": self.left_out[method]}))
         summary = {method: summarise(runs) for method, runs in results.items()}
-        print_table(data, summary, {method: why for method, why in self.left_out.items() if method not in skipped})
+        print_table(data, summary, self.left_out)
         return summary
 
 
@@ -126,8 +124,8 @@ def summarise(runs):
 def print_table(data, summary, left_out):
     print(f"\n{data}")
     own = summary.get("llmt")
-    head = ("fit wall s", "x llmt", "fit CPU s", "x llmt", "CPU s/1e6", "x llmt", "error", "x llmt", "leaves", "extra MiB",
-            "runs")
+    head = ("fit wall s", "x llmt", "fit CPU s", "x llmt", "CPU s/1e6", "x llmt", "error", "x llmt", "leaves",
+            "extra MiB", "runs")
     print(f"{'':14}" + "".join(f"{word:>11}" for word in head))
     for method, row in summary.items():
         line = f"{method:14}"
@@ -179,12 +177,15 @@ def sets(bench):
                 write(path, zip(*(row for row, part in zip(rows, splits) if (part[split] > 0.5) == test)))
             return len(rows[0])
 
-        summary = bench.run_all(f"{name}, {len(rows)} rows x {len(rows[0]) - 1} inputs, {bench.options.threads} thread(s)",
-                                [lambda split=split: sample(split) for split in range(len(splits[0]))])
+        data = f"{name}, {len(rows)} rows x {len(rows[0]) - 1} inputs, {bench.options.threads} thread(s)"
+        summary = bench.run_all(data, [lambda split=split: sample(split) for split in range(len(splits[0]))])
+        # A method that was too slow gets another chance with the next data set.
         bench.left_out = {method: why for method, why in bench.left_out.items() if why == "not installed"}
         for method, row in summary.items():
             if "llmt" in summary and row["runs"] == summary["llmt"]["runs"]:
-                ratios[method].append([row[key] / summary["llmt"][key] for key in ("rmse", "fit_cpu", "predict_cpu")])
+                own = summary["llmt"]
+                ratios[method].append([row["rmse"] / own["rmse"]] + [
+                    max(row[key], 1e-4) / max(own[key], 1e-4) for key in ("fit_cpu", "predict_cpu")])  # as clocks tell
     print("\nGeometric means of the ratios to llmt, over the sets where all splits were done")
     print(f"{'':14}{'error':>11}{'fit CPU s':>11}{'CPU s/1e6':>11}{'sets':>11}")
     for method, values in ratios.items():
@@ -208,8 +209,8 @@ def main():
         bench = Bench(options, folder)
         (sets if options.sets else synthetic)(bench)
     with open(options.json, "w") as file:
-        json.dump({"machine": machine(), "options": vars(options), "left_out": bench.left_out, "runs": bench.records}, file,
-                  indent=1)
+        content = {"machine": machine(), "options": vars(options), "runs": bench.records}
+        json.dump(content, file, indent=1)
 
 
 main()
