@@ -6,8 +6,8 @@
 #include <optional>
 #include <string_view>
 
-#include "../resources.hpp"
 #include "llmt/fit.hpp"
+#include "resources.hpp"
 
 namespace {
 

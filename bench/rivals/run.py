@@ -93,7 +93,7 @@ class Bench:
         elif done.returncode in (-24, -9, 152, 137):
             self.left_out[method] = f"not finished within {self.options.seconds} CPU s"
         else:
-            self.left_out[method] = f"failed: {(done.stderr.strip().splitlines() or ['no message'])[-1]}"
+            self.left_out[method] = f"failed: {(done.stderr.strip().splitlines() or [f'exit {done.returncode}'])[-1]}"
         return None
 
     def run_all(self, data, samples):

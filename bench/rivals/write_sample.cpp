@@ -3,7 +3,7 @@
 #include <fstream>
 #include <iostream>
 
-#include "../synthetic.hpp"
+#include "synthetic.hpp"
 
 namespace {
 
