@@ -11,7 +11,6 @@
 #include <initializer_list>
 #include <numeric>
 #include <thread>
-#include <utility>
 #include <vector>
 
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__)
@@ -25,7 +24,7 @@
 namespace bench::peak {
 
 using Lanes = double __attribute__((vector_size(64), aligned(8)));
-inline constexpr int lanes = 8;
+inline constexpr std::ptrdiff_t lanes = 8;
 
 struct Product {
   [[gnu::always_inline]] static void update(Lanes& x, const Lanes& a, const Lanes& b) { x = x * a + b; }
@@ -33,7 +32,7 @@ struct Product {
 
 struct FusedProduct {
   [[gnu::always_inline]] static void update(Lanes& x, const Lanes& a, const Lanes& b) {
-    for (int l = 0; l < lanes; ++l) {
+    for (std::ptrdiff_t l = 0; l < lanes; ++l) {
       x[l] = __builtin_fma(x[l], a[l], b[l]);
     }
   }
@@ -57,7 +56,7 @@ template <class Update, int Chains>
   }
   double sum = 0.0;
   for (const Lanes& chain : x) {
-    for (int l = 0; l < lanes; ++l) {
+    for (std::ptrdiff_t l = 0; l < lanes; ++l) {
       sum += chain[l];
     }
   }
@@ -81,7 +80,7 @@ BENCH_FOR_EACH_INSTRUCTION_SET
 inline double sum(const double* data, std::ptrdiff_t size) {
   Lanes parts[4] = {};
   for (std::ptrdiff_t i = 0; i + 4 * lanes <= size; i += 4 * lanes) {
-    for (int k = 0; k < 4; ++k) {
+    for (std::ptrdiff_t k = 0; k < 4; ++k) {
       parts[k] += *reinterpret_cast<const Lanes*>(data + i + k * lanes);
     }
   }
@@ -91,12 +90,12 @@ inline double sum(const double* data, std::ptrdiff_t size) {
 /// Where results go that nobody wants, so that the compiler does not leave out the work.
 inline volatile double sink = 0.0;
 
-/// How much `threads` threads get done in a second: work(thread) does a little and returns how much. The best of five
-/// rounds, since other programs may disturb some.
+/// How much `threads` threads get done in a second: work(thread) does a little and returns how much. The best of twenty
+/// short rounds, since other programs may disturb some.
 template <class Work>
-double rate(int threads, const Work& work, double seconds_per_round = 0.02) {
+double rate(int threads, const Work& work, double seconds_per_round = 0.005) {
   double best = 0.0;
-  for (int round = 0; round < 5; ++round) {
+  for (int round = 0; round < 20; ++round) {
     using Clock = std::chrono::steady_clock;
     const auto start = Clock::now();
     const auto passed = [&] { return std::chrono::duration<double>(Clock::now() - start).count(); };
@@ -104,7 +103,7 @@ double rate(int threads, const Work& work, double seconds_per_round = 0.02) {
     const auto run = [&](int thread) {
       double done = 0.0;
       const double begin = passed();
-      while (passed() < seconds_per_round) {
+      while (passed() < begin + seconds_per_round) {
         done += work(thread);
       }
       rates[static_cast<std::size_t>(thread)] = done / (passed() - begin);
@@ -122,17 +121,20 @@ double rate(int threads, const Work& work, double seconds_per_round = 0.02) {
   return best;
 }
 
-using Kernel = double (*)(std::ptrdiff_t, double, double);
+struct Kernel {
+  std::ptrdiff_t chains;
+  double (*run)(std::ptrdiff_t steps, double factor, double term);
+};
 
-inline double flops(int threads, std::initializer_list<std::pair<int, Kernel>> kernels) {
+inline double flops(int threads, std::initializer_list<Kernel> kernels) {
+  constexpr std::ptrdiff_t steps = 10000;
   volatile double factor = 0.999;
   volatile double term = 0.001;
   double best = 0.0;
-  for (const auto& [count, kernel] : kernels) {
-    constexpr std::ptrdiff_t steps = 10000;
+  for (const Kernel& kernel : kernels) {
     best = std::max(best, rate(threads, [&](int) {
-                      sink = kernel(steps, factor, term);
-                      return static_cast<double>(2 * lanes * count * steps);
+                      sink = kernel.run(steps, factor, term);
+                      return static_cast<double>(2 * lanes * kernel.chains * steps);
                     }));
   }
   return best;
