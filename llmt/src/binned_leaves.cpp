@@ -330,7 +330,7 @@ BinnedLeaves::Found BinnedLeaves::search(const Histogram& histogram, std::size_t
   if (data_.num_levels[input] > 0) {
     const SplitCandidate best =
         search_level_grams(shape_, data_.output_weights, node_rss, 0.0, of_bin, rows, smallest_leaf);
-    return {best, best.rss};
+    return {best, std::numeric_limits<double>::infinity()};
   }
   std::vector<std::ptrdiff_t> held;  // bins with rows
   std::ptrdiff_t all = 0;
@@ -371,7 +371,8 @@ BinnedLeaves::Found BinnedLeaves::search(const Histogram& histogram, std::size_t
   for (std::size_t k = 0; k < held.size(); ++k) {
     const std::ptrdiff_t here = rows[static_cast<std::size_t>(held[k])];
     // A split inside this bin.
-    if (std::max(left + 1, smallest_leaf) <= std::min(left + here - 1, all - smallest_leaf)) {
+    if (bins_[input].splittable[static_cast<std::size_t>(held[k])] &&
+        std::max(left + 1, smallest_leaf) <= std::min(left + here - 1, all - smallest_leaf)) {
       found.bound = std::min(
           found.bound, (k > 0 ? rss_left[k - 1] : 0.0) + (static_cast<std::ptrdiff_t>(k) < edges ? rss_right[k] : 0.0));
     }

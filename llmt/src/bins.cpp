@@ -97,6 +97,8 @@ std::vector<Bins> make_bins(const GrowthData& data, int bins) {
     constexpr int at_once = 16;
     std::array<double, at_once> value{};
     std::array<std::uint32_t, at_once> below{};
+    std::vector<double> low(static_cast<std::size_t>(result.count), std::numeric_limits<double>::infinity());
+    std::vector<double> high(low.size(), -std::numeric_limits<double>::infinity());
     for (int begin = 0; begin < rows; begin += at_once) {
       const int count = std::min(at_once, rows - begin);
       for (int k = 0; k < count; ++k) {
@@ -108,10 +110,15 @@ std::vector<Bins> make_bins(const GrowthData& data, int bins) {
           below[k] += padded[below[k] + step - 1] < value[k] ? step : 0;
         }
       }
-      for (int k = 0; k < count; ++k) {
-        result.codes[static_cast<std::size_t>(begin + k)] =
-            static_cast<std::uint8_t>(below[static_cast<std::size_t>(k)]);
+      for (std::size_t k = 0; k < static_cast<std::size_t>(count); ++k) {
+        const std::uint32_t bin = below[k];
+        result.codes[static_cast<std::size_t>(begin) + k] = static_cast<std::uint8_t>(bin);
+        low[bin] = std::min(low[bin], value[k]);
+        high[bin] = std::max(high[bin], value[k]);
       }
+    }
+    for (std::size_t bin = 0; bin < low.size(); ++bin) {
+      result.splittable.push_back(low[bin] < high[bin]);
     }
   });
   return all;

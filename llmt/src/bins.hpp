@@ -14,6 +14,7 @@ struct Bins {
   std::vector<double> edges;        ///< of a number: bin b holds edges[b - 1] < x <= edges[b]; empty for categories
   std::vector<std::uint8_t> codes;  ///< bin, or level, of each training row
   int count = 1;                    ///< number of bins, or levels
+  std::vector<bool> splittable;     ///< whether a bin of a number holds different values
 };
 
 inline constexpr int most_bins = 256;
