@@ -16,16 +16,20 @@
 namespace {
 
 struct Node {
-  llmt::SearchNode search;
+  llmt::Features features;
+  Eigen::VectorXd weights = Eigen::VectorXd::Ones(1);
+  double rss = 0.0;
   std::vector<std::vector<int>> orders;
   std::vector<std::vector<double>> values;
+
+  llmt::SearchNode search() const { return {features, weights, rss}; }
 };
 
 Node make_node(const Eigen::MatrixXd& x, const Eigen::VectorXd& y) {
   Node node;
   llmt::NodeFit fit = llmt::fit_node(x, y, Eigen::VectorXd::Ones(x.rows()));
-  const double rss = fit.rss(0);
-  node.search = {std::move(fit.features), Eigen::VectorXd::Ones(1), rss};
+  node.rss = fit.rss(0);
+  node.features = std::move(fit.features);
   for (Eigen::Index j = 0; j < x.cols(); ++j) {
     std::vector<int> order(static_cast<std::size_t>(x.rows()));
     std::iota(order.begin(), order.end(), 0);
@@ -62,7 +66,7 @@ Found search(const Node& node, std::ptrdiff_t min_leaf_samples) {
   inputs.reserve(node.orders.size());
   double limit = std::numeric_limits<double>::infinity();
   for (std::size_t j = 0; j < node.orders.size(); ++j) {
-    inputs.emplace_back(node.search, node.values[j], node.orders[j], min_leaf_samples).search_edges();
+    inputs.emplace_back(node.search(), node.values[j], node.orders[j], min_leaf_samples).search_edges();
     limit = std::min(limit, inputs.back().smallest());
   }
   Found best;
@@ -87,12 +91,12 @@ void compare(Eigen::Index rows, bool signal) {
   oracle::BruteForceSplit brute;
   Found found;
   const double slow =
-      least_time(2, [&] { brute = oracle::search<Inputs + 1>(node.search, node.orders, node.values, Inputs + 1); });
+      least_time(2, [&] { brute = oracle::search<Inputs + 1>(node.search(), node.orders, node.values, Inputs + 1); });
   const double fast = least_time(5, [&] { found = search(node, Inputs + 1); });
   const bool same = brute.input == found.input && brute.left == found.left;
   fmt::print("{:8} {:3} {:>7} {:12.2f} {:12.2f} {:8.1f} {:12} {:12} {:>6} {:10.1e}\n", rows, Inputs,
              signal ? "signal" : "noise", slow, fast, slow / fast, brute.evaluations, found.evaluations,
-             same ? "yes" : "NO", (found.rss - brute.rss) / node.search.rss);
+             same ? "yes" : "NO", (found.rss - brute.rss) / node.rss);
 }
 
 }  // namespace

@@ -72,9 +72,9 @@ ExactLeaf ExactLeaves::open(const Rows& rows, const Node& parent) const {
 
 SplitCandidate ExactLeaves::examine(ExactLeaf& leaf, const Node& parent, Node& node) const {
   const RowMajor x = deviations(leaf);
-  NodeFit fit = data_.training.has_missing
-                    ? fit_node(x, about_own_mean(x, parent, leaf.residuals, leaf.weights), leaf.weights)
-                    : fit_node(x, leaf.residuals, leaf.weights);
+  const NodeFit fit = data_.training.has_missing
+                          ? fit_node(x, about_own_mean(x, parent, leaf.residuals, leaf.weights), leaf.weights)
+                          : fit_node(x, leaf.residuals, leaf.weights);
   node.samples = leaf.inputs.rows();
   node.rank = fit.rank;
   node.rss = fit.rss;
@@ -84,7 +84,7 @@ SplitCandidate ExactLeaves::examine(ExactLeaf& leaf, const Node& parent, Node& n
   node.low = fit.low;
   node.high = fit.high;
   leaf.residuals = fit.residuals();
-  return find_split(leaf, std::move(fit), data_.output_weights.dot(node.rss));
+  return find_split(leaf, fit, data_.output_weights.dot(node.rss));
 }
 
 /// Residuals of the parent's local model with missing values at the mean of these rows instead of the parent's.
@@ -119,13 +119,13 @@ std::vector<int> ExactLeaves::levels_of(const ExactLeaf& leaf, std::ptrdiff_t sp
   return levels;
 }
 
-SplitCandidate ExactLeaves::find_split(const ExactLeaf& leaf, NodeFit fit, double rss) const {
+SplitCandidate ExactLeaves::find_split(const ExactLeaf& leaf, const NodeFit& fit, double rss) const {
   SplitCandidate best;
   const std::ptrdiff_t smallest_leaf = data_.problem.options.min_leaf_samples;
   if (leaf.inputs.rows() < 2 * smallest_leaf) {
     return best;
   }
-  const SearchNode node{std::move(fit.features), data_.output_weights, rss};
+  const SearchNode node{fit.features, data_.output_weights, rss};
   const std::size_t inputs = leaf.orders.size();
   const int threads = data_.threads_for(leaf.inputs.rows() * data_.split_inputs());
   std::vector<std::optional<InputSearch>> searches(inputs);

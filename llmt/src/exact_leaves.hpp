@@ -51,7 +51,7 @@ class ExactLeaves {
   Eigen::MatrixXd about_own_mean(const RowMajor& deviations, const Node& parent, Eigen::MatrixXd residuals,
                                  const Eigen::VectorXd& weights) const;
   std::vector<int> levels_of(const ExactLeaf& leaf, std::ptrdiff_t split_input) const;
-  SplitCandidate find_split(const ExactLeaf& leaf, NodeFit fit, double rss) const;
+  SplitCandidate find_split(const ExactLeaf& leaf, const NodeFit& fit, double rss) const;
   void consider_missing(const SearchNode& node, const ExactLeaf& leaf, std::ptrdiff_t split_input,
                         SplitCandidate& best) const;
   std::vector<Side> sides_of(const ExactLeaf& leaf, const SplitCandidate& split) const;

@@ -211,13 +211,13 @@ class Lolimot {
     if (std::ssize(order) < 2 * smallest) {
       return std::nullopt;
     }
-    NodeFit crisp = fit_node(deviations_(rows, Eigen::all), outputs_(rows, Eigen::all), weights_(rows));
+    const NodeFit crisp = fit_node(deviations_(rows, Eigen::all), outputs_(rows, Eigen::all), weights_(rows));
     std::vector<double> values;
     for (const int k : order) {
       values.push_back(value(k));
     }
     const double rss = output_weights_.dot(crisp.rss);
-    const SearchNode node{std::move(crisp.features), output_weights_, rss};
+    const SearchNode node{crisp.features, output_weights_, rss};
     InputSearch search(node, values, order, smallest);
     search.search_edges();
     search.refine(std::numeric_limits<double>::infinity());

@@ -33,22 +33,31 @@ InputSearch::InputSearch(const SearchNode& node, std::vector<double> values, std
       sums_(shape_, node.weights),
       limit_(no_split),
       smallest_(no_split),
-      none_(static_cast<std::size_t>(shape_.size()), 0.0) {
-  for (std::ptrdiff_t left = min_leaf_samples; left <= std::ssize(order) - min_leaf_samples; ++left) {
+      none_(static_cast<std::size_t>(shape_.size()), 0.0),
+      all_{0, std::ssize(order), none_.data(), none_.data(), 0.0, 0.0} {
+  for (std::ptrdiff_t left = 1; left < std::ssize(order); ++left) {
     tested_ += admissible(left) ? 1 : 0;
   }
 }
 
-/// Splits are named by the number of rows on their left.
+InputSearch::InputSearch(const SearchNode& node, std::vector<double> values, std::span<const int> order,
+                         std::ptrdiff_t min_leaf_samples, const Beyond& front, const Beyond& behind)
+    : InputSearch(node, std::move(values), order, min_leaf_samples) {
+  rows_in_front_ = front.rows;
+  rows_behind_ = behind.rows;
+  all_ = {0, std::ssize(order), front.gram, behind.gram, front.rss, behind.rss};
+}
+
+/// Here splits are named by the number of rows of the stretch on their left.
 bool InputSearch::admissible(std::ptrdiff_t left) const {
-  return left >= min_leaf_samples_ && std::ssize(order_) - left >= min_leaf_samples_ && left > 0 &&
-         left < std::ssize(order_) &&
+  return left > 0 && left < std::ssize(order_) && rows_in_front_ + left >= min_leaf_samples_ &&
+         std::ssize(order_) - left + rows_behind_ >= min_leaf_samples_ &&
          values_[static_cast<std::size_t>(left - 1)] < values_[static_cast<std::size_t>(left)];
 }
 
 bool InputSearch::holds_candidates(const Segment& segment) const {
-  const std::ptrdiff_t first = std::max(segment.begin + 1, min_leaf_samples_);
-  const std::ptrdiff_t last = std::min(segment.end - 1, std::ssize(order_) - min_leaf_samples_);
+  const std::ptrdiff_t first = std::max(segment.begin + 1, min_leaf_samples_ - rows_in_front_);
+  const std::ptrdiff_t last = std::min(segment.end - 1, std::ssize(order_) + rows_behind_ - min_leaf_samples_);
   return first <= last && values_[static_cast<std::size_t>(first - 1)] < values_[static_cast<std::size_t>(last)];
 }
 
@@ -147,12 +156,13 @@ void InputSearch::search_edges() {
 }
 
 void InputSearch::refine(double limit) {
-  if (tested_ == 0) {
+  limit_ = limit;
+  if (edges_.empty()) {
+    look_into(all_, 0);
     return;
   }
-  limit_ = limit;
-  const Segment all{0, std::ssize(order_), none_.data(), none_.data(), without_value_, 0.0};
-  for (const Segment& segment : cut(all, edges_, sides_)) {
+  all_.rss_left = without_value_;
+  for (const Segment& segment : cut(all_, edges_, sides_)) {
     look_into(segment, 0);
   }
 }
@@ -204,6 +214,7 @@ SplitCandidate InputSearch::best() const {
       best.rank_right = found.rank_right;
     }
   }
+  best.left += best.input >= 0 ? rows_in_front_ : 0;
   return best;
 }
 

@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -20,16 +21,18 @@ struct SplitCandidate {
   int rank_right = 0;
   std::ptrdiff_t tested = 0;       ///< number of admissible splits among which it is the best
   std::ptrdiff_t evaluations = 0;  ///< number of splits whose residual sum of squares was computed
-  int bin = -1;                    ///< search by bins: the last bin of the left child
-  bool by_missing = false;         ///< rows with a value go left, rows without one right
-  std::vector<int> level_side;     ///< categorical input: -1 left, 1 right, 0 not seen, one per level
+  /// Search by bins: the last bin of the left child, and the largest of its values that go left.
+  int bin = -1;
+  double last_left = std::numeric_limits<double>::infinity();
+  bool by_missing = false;      ///< rows with a value go left, rows without one right
+  std::vector<int> level_side;  ///< categorical input: -1 left, 1 right, 0 not seen, one per level
 };
 
 /// What the search of a node needs to know of its rows.
 struct SearchNode {
-  Features features;        ///< regressors orthogonal in the node, residuals of the node's own fit
-  Eigen::VectorXd weights;  ///< of the outputs' residual sums of squares
-  double rss = 0.0;         ///< weighted, of the node's own model
+  const Features& features;        ///< regressors about orthogonal in the node
+  const Eigen::VectorXd& weights;  ///< of the outputs' residual sums of squares
+  double rss;                      ///< weighted, of the node's own model
 };
 
 /// Exact search along one numeric input, in two steps so that all inputs of a node can share what they have found.
@@ -46,10 +49,22 @@ struct SearchNode {
 /// times node.rss, the one with the smallest threshold is taken.
 class InputSearch {
  public:
-  /// `values` are the input's values and `order` the rows of `node.features`, both ascending in the value. `node` and
-  /// `order` must live as long as this.
+  /// `values` are the input's values and `order` the rows of the features, both ascending in the value. What is
+  /// referred to must live as long as this.
   InputSearch(const SearchNode& node, std::vector<double> values, std::span<const int> order,
               std::ptrdiff_t min_leaf_samples);
+
+  /// Rows on one side of a stretch, whose Gram matrix and residual sum of squares are known.
+  struct Beyond {
+    std::ptrdiff_t rows;
+    const double* gram;
+    double rss;
+  };
+
+  /// The same for a stretch of an input whose other rows lie in front of it or behind: only refine() is of use, and
+  /// splits are named by the number of all rows on their left.
+  InputSearch(const SearchNode& node, std::vector<double> values, std::span<const int> order,
+              std::ptrdiff_t min_leaf_samples, const Beyond& front, const Beyond& behind);
 
   /// Looks at the edges of the blocks.
   void search_edges();
@@ -102,10 +117,12 @@ class InputSearch {
   void look_into(const Segment& segment, std::size_t depth);
   std::vector<Segment> cut(const Segment& segment, const std::vector<std::ptrdiff_t>& edges, const Sides& sides) const;
 
-  const SearchNode& node_;
+  SearchNode node_;
   std::vector<double> values_;
   std::span<const int> order_;
   std::ptrdiff_t min_leaf_samples_;
+  std::ptrdiff_t rows_in_front_ = 0;
+  std::ptrdiff_t rows_behind_ = 0;
   GramShape shape_;
   ResidualSums sums_;
   std::ptrdiff_t tested_ = 0;
@@ -115,6 +132,7 @@ class InputSearch {
   double smallest_;
   std::vector<Found> found_;  // within the tolerance of the smallest
   std::vector<double> none_;  // Gram matrix of no rows
+  Segment all_;
   std::vector<std::ptrdiff_t> edges_;
   Sides sides_;
   std::vector<Sides> deeper_;

@@ -11,9 +11,13 @@ namespace {
 
 /// A node with a sorted list of rows for every input; NaN: no value.
 struct Problem {
-  llmt::SearchNode node;
+  llmt::Features features;
+  Eigen::VectorXd weights;
+  double rss = 0.0;
   std::vector<std::vector<int>> orders;
   std::vector<std::vector<double>> values;
+
+  llmt::SearchNode node() const { return {features, weights, rss}; }
 };
 
 Problem make_problem(const Eigen::MatrixXd& x, const Eigen::MatrixXd& y, const Eigen::VectorXd& weights,
@@ -21,8 +25,9 @@ Problem make_problem(const Eigen::MatrixXd& x, const Eigen::MatrixXd& y, const E
   Problem problem;
   const Eigen::MatrixXd known = x.array().isNaN().select(0.0, x);
   llmt::NodeFit fit = llmt::fit_node(known.leftCols(regressors), y, weights);
-  const Eigen::VectorXd output_weights = Eigen::VectorXd::Constant(y.cols(), 2.0);
-  problem.node = {std::move(fit.features), output_weights, output_weights.dot(fit.rss)};
+  problem.weights = Eigen::VectorXd::Constant(y.cols(), 2.0);
+  problem.rss = problem.weights.dot(fit.rss);
+  problem.features = std::move(fit.features);
   for (std::ptrdiff_t j = 0; j < x.cols(); ++j) {
     std::vector<int> order;
     for (int row = 0; row < x.rows(); ++row) {
@@ -50,7 +55,7 @@ Result search(const Problem& problem, std::ptrdiff_t min_leaf_samples) {
   searches.reserve(problem.orders.size());
   double limit = std::numeric_limits<double>::infinity();
   for (std::size_t j = 0; j < problem.orders.size(); ++j) {
-    searches.emplace_back(problem.node, problem.values[j], problem.orders[j], min_leaf_samples).search_edges();
+    searches.emplace_back(problem.node(), problem.values[j], problem.orders[j], min_leaf_samples).search_edges();
     limit = std::min(limit, searches.back().smallest());
   }
   double smallest = limit;
@@ -62,7 +67,7 @@ Result search(const Problem& problem, std::ptrdiff_t min_leaf_samples) {
   for (std::size_t j = 0; j < searches.size(); ++j) {
     const llmt::SplitCandidate split = searches[j].best();
     result.evaluations += split.evaluations;
-    if (result.input < 0 && split.input >= 0 && split.rss <= smallest + llmt::tie_tolerance * problem.node.rss) {
+    if (result.input < 0 && split.input >= 0 && split.rss <= smallest + llmt::tie_tolerance * problem.rss) {
       result.input = static_cast<int>(j);
       result.split = split;
     }
@@ -72,14 +77,14 @@ Result search(const Problem& problem, std::ptrdiff_t min_leaf_samples) {
 
 template <int Coefficients>
 void expect_brute_force(const Problem& problem, std::ptrdiff_t min_leaf_samples) {
-  ASSERT_EQ(problem.node.features.coefficients(), Coefficients);
+  ASSERT_EQ(problem.features.coefficients(), Coefficients);
   const oracle::BruteForceSplit expected =
-      oracle::search<Coefficients>(problem.node, problem.orders, problem.values, min_leaf_samples);
+      oracle::search<Coefficients>(problem.node(), problem.orders, problem.values, min_leaf_samples);
   const Result found = search(problem, min_leaf_samples);
   ASSERT_EQ(found.input, expected.input);
   if (expected.input >= 0) {
     EXPECT_EQ(found.split.left, expected.left);
-    EXPECT_NEAR(found.split.rss, expected.rss, 1e-11 * problem.node.rss);
+    EXPECT_NEAR(found.split.rss, expected.rss, 1e-11 * problem.rss);
   }
 }
 
