@@ -7,7 +7,7 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
-#include <sstream>
+#include <memory>
 #include <stdexcept>
 #include <system_error>
 
@@ -33,16 +33,23 @@ std::string read_file(const std::string& path) {
   if (std::filesystem::is_directory(path)) {
     fail(path, "read", "it is a folder");
   }
+  std::error_code ignored;
+  const std::uintmax_t size = std::filesystem::file_size(path, ignored);
   errno = 0;
   std::ifstream file(path, std::ios::binary);
-  std::ostringstream content;
-  if (file && file.peek() != std::ifstream::traits_type::eof()) {
-    content << file.rdbuf();
+  std::string content;
+  if (const bool known = std::filesystem::is_regular_file(path, ignored); file && known) {
+    content.reserve(size);  // a table may take half of the memory: no second copy while it grows
   }
-  if (!file.is_open() || file.bad() || !content) {
+  constexpr std::streamsize piece = 1 << 18;
+  const auto buffer = std::make_unique_for_overwrite<char[]>(piece);
+  while (file.read(buffer.get(), piece) || file.gcount() > 0) {
+    content.append(buffer.get(), static_cast<std::size_t>(file.gcount()));
+  }
+  if (!file.is_open() || file.bad()) {
     fail(path, "read", std::strerror(errno != 0 ? errno : EIO));
   }
-  return std::move(content).str();
+  return content;
 }
 
 void write_file(const std::string& path, std::string_view content) {
