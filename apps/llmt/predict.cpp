@@ -57,7 +57,7 @@ std::ptrdiff_t count_high_leverage(const Predicted& predicted) {
 }
 
 Predicted predict_table(const PredictArguments& arguments, const Model& model, const Csv& csv) {
-  const ModelInputs inputs = read_inputs(csv, model);
+  const ModelInputs inputs = read_inputs(csv, model, arguments.threads);
   Predicted predicted;
   for (const OutputColumn& output : model.outputs()) {
     predicted.targets.push_back(output.name);
@@ -83,7 +83,8 @@ Predicted predict_table(const PredictArguments& arguments, const Model& model, c
     if (csv.has(predicted.targets[o]) && csv.rows() > 0) {
       const std::ptrdiff_t column = static_cast<std::ptrdiff_t>(o);
       try {
-        predicted.rmse(column) = rmse(predicted.values.col(column), csv.numbers(predicted.targets[o]))(0);
+        predicted.rmse(column) =
+            rmse(predicted.values.col(column), csv.numbers(predicted.targets[o], arguments.threads))(0);
       } catch (const std::runtime_error& error) {
         warn(fmt::format("llmt: no RMSE of \"{}\": {}", predicted.targets[o], error.what()));
       }
