@@ -58,7 +58,7 @@ void Csv::read_header() {
       throw std::runtime_error(fmt::format("{}:{}: column {} of the header has no name", name_, line_at(header_begin_),
                                            columns_.size() + 1));
     }
-    if (has(column)) {
+    if (!fields_.emplace(column, columns_.size()).second) {
       throw std::runtime_error(
           fmt::format("{}:{}: the header has column \"{}\" twice", name_, line_at(header_begin_), column));
     }
@@ -90,17 +90,13 @@ void Csv::find_rows() {
   }
 }
 
-bool Csv::has(std::string_view column) const {
-  return std::find(columns_.begin(), columns_.end(), column) != columns_.end();
-}
-
 std::size_t Csv::index_of(std::string_view column) const {
-  const auto found = std::find(columns_.begin(), columns_.end(), column);
-  if (found == columns_.end()) {
+  const auto found = fields_.find(column);
+  if (found == fields_.end()) {
     throw std::runtime_error(
         fmt::format("{}: there is no column \"{}\"; the columns are {}", name_, column, fmt::join(columns_, ", ")));
   }
-  return static_cast<std::size_t>(found - columns_.begin());
+  return found->second;
 }
 
 std::string_view Csv::row_text(std::ptrdiff_t row) const {
@@ -110,6 +106,19 @@ std::string_view Csv::row_text(std::ptrdiff_t row) const {
 std::string_view Csv::header_text() const { return record_text(header_begin_); }
 
 std::ptrdiff_t Csv::line_of(std::ptrdiff_t row) const { return line_at(row_begins_[static_cast<std::size_t>(row)]); }
+
+std::vector<std::ptrdiff_t> Csv::lines_of(std::span<const std::ptrdiff_t> rows) const {
+  std::vector<std::ptrdiff_t> lines;
+  std::ptrdiff_t line = 1;
+  auto counted = text_.begin();
+  for (const std::ptrdiff_t row : rows) {
+    const auto begin = text_.begin() + static_cast<std::ptrdiff_t>(row_begins_[static_cast<std::size_t>(row)]);
+    line += std::count(counted, begin, '\n');
+    lines.push_back(line);
+    counted = begin;
+  }
+  return lines;
+}
 
 std::ptrdiff_t Csv::line_at(std::size_t offset) const {
   return 1 + std::count(text_.begin(), text_.begin() + static_cast<std::ptrdiff_t>(offset), '\n');

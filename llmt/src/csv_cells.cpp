@@ -38,8 +38,9 @@ bool is_missing(std::string_view text) {
   });
 }
 
-/// As fast_float::from_chars, whose versions differ in what they do to leading white space and numbers out of range. A
-/// plus is taken. Out of range is no error: too large reads as infinity, too small as zero. Null if there is no number.
+/// End of the number at `begin`, null if there is none. A plus is taken. Out of range is no error: too large reads as
+/// infinity, too small as zero. These and leading white space, line breaks too, are what versions and options of
+/// fast_float differ in.
 const char* number_end(const char* begin, const char* end, double& value) {
   const bool has_sign = begin != end && (*begin == '+' || *begin == '-');
   const char* const first = begin + (has_sign ? 1 : 0);
@@ -56,6 +57,19 @@ const char* after_blanks(const char* begin, const char* end, char separator) {
     ++begin;
   }
   return begin;
+}
+
+/// The beginning of what would fill a screen.
+std::string shortened(std::string_view text) {
+  constexpr std::size_t most = 60;
+  if (text.size() <= most) {
+    return std::string(text);
+  }
+  std::size_t end = most;
+  while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0U) == 0x80U) {
+    --end;  // not within a character of UTF-8
+  }
+  return std::string(text.substr(0, end)) + "...";
 }
 
 std::size_t count(const char* begin, const char* end, char wanted) {
@@ -156,7 +170,7 @@ std::string problem_of(std::string_view field) {
   double value = 0.0;
   const bool is_infinite_or_nan =
       number_end(text.data(), text.data() + text.size(), value) == text.data() + text.size();
-  return fmt::format("'{}' is not {}", text, is_infinite_or_nan ? "finite" : "a number");
+  return fmt::format("'{}' is not {}", shortened(text), is_infinite_or_nan ? "finite" : "a number");
 }
 
 }  // namespace llmt::csv

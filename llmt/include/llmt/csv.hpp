@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <functional>
 #include <limits>
+#include <map>
 #include <span>
 #include <string>
 #include <string_view>
@@ -54,7 +55,7 @@ class Csv {
   const std::vector<std::string>& columns() const { return columns_; }
   std::ptrdiff_t rows() const { return std::ssize(row_begins_); }
 
-  bool has(std::string_view column) const;
+  bool has(std::string_view column) const { return fields_.contains(column); }
 
   /// Position of a column. Throws std::runtime_error naming the file and the columns it has, if there is none of that
   /// name.
@@ -96,6 +97,9 @@ class Csv {
   /// Line of the file, counted from 1, on which a row begins. Counts the lines before it.
   std::ptrdiff_t line_of(std::ptrdiff_t row) const;
 
+  /// Lines of ascending rows, counted in one go.
+  std::vector<std::ptrdiff_t> lines_of(std::span<const std::ptrdiff_t> rows) const;
+
   char separator() const { return separator_; }
 
  private:
@@ -106,7 +110,8 @@ class Csv {
   char separator_ = ',';
   std::size_t header_begin_ = 0;
   std::vector<std::string> columns_;
-  std::vector<std::size_t> row_begins_;  // offsets into text_
+  std::map<std::string, std::size_t, std::less<>> fields_;  // position of a column
+  std::vector<std::size_t> row_begins_;                     // offsets into text_
 
   void read_header();
   void find_rows();
