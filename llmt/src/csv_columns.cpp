@@ -126,7 +126,8 @@ void Csv::refuse_first(std::span<const std::string> columns, std::span<const std
   for (std::size_t i = 0; i < columns.size(); ++i) {
     first = std::min(first, {rows[i], index_of(columns[i])});
   }
-  const auto [row, wanted] = first;
+  const std::ptrdiff_t row = first.first;
+  const std::size_t wanted = first.second;
   if (row == ColumnCells::no_row) {
     return;
   }
