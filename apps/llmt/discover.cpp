@@ -36,9 +36,10 @@ struct Comparison {
   discovery::MeasuredOutputs measured;
 };
 
-void check_same_inputs(const Csv& simulated, const Csv& measured, const std::vector<std::string>& names) {
+/// The inputs, which both files must have alike.
+Eigen::MatrixXd read_same_inputs(const Csv& simulated, const Csv& measured, const std::vector<std::string>& names) {
   const Eigen::MatrixXd one = simulated.numbers(names);
-  const Eigen::MatrixXd other = measured.numbers(names);
+  Eigen::MatrixXd other = measured.numbers(names);
   for (Eigen::Index i = 0; i < one.rows(); ++i) {
     for (Eigen::Index j = 0; j < one.cols(); ++j) {
       // Files are written with a limited number of digits.
@@ -51,6 +52,7 @@ void check_same_inputs(const Csv& simulated, const Csv& measured, const std::vec
                       simulated.name(), simulated.line_of(i)));
     }
   }
+  return other;
 }
 
 void check_names(const DiscoverArguments& arguments) {
@@ -83,8 +85,7 @@ Comparison read_comparison(const DiscoverArguments& arguments) {
     throw std::runtime_error(
         fmt::format("{} has {} rows, {} has {}", simulated.name(), simulated.rows(), measured.name(), measured.rows()));
   }
-  check_same_inputs(simulated, measured, arguments.inputs);
-  comparison.inputs.values = measured.numbers(arguments.inputs);
+  comparison.inputs.values = read_same_inputs(simulated, measured, arguments.inputs);
   comparison.inputs.order = arguments.order;
   if (!arguments.order.empty() && std::ranges::find(arguments.inputs, arguments.order) == arguments.inputs.end()) {
     const Csv& holder = measured.has(arguments.order) ? measured : simulated;

@@ -25,24 +25,6 @@ struct ExplainArguments {
   int threads = 0;
 };
 
-/// The model's inputs at every row of a table, and as text for people.
-struct ExplainedTable {
-  Eigen::MatrixXd values;
-  std::vector<std::vector<std::string>> text;
-};
-
-ExplainedTable read_explained(const Model& model, const Csv& csv) {
-  ExplainedTable table{read_inputs(csv, model).values,
-                       std::vector<std::vector<std::string>>(static_cast<std::size_t>(csv.rows()))};
-  for (const InputColumn& input : model.inputs()) {
-    const std::vector<std::string> column = csv.texts(input.name);
-    for (std::size_t row = 0; row < column.size(); ++row) {
-      table.text[row].push_back(column[row].empty() ? "missing" : column[row]);
-    }
-  }
-  return table;
-}
-
 /// Inputs, the largest magnitude first; equal ones in the order of the columns.
 std::vector<std::size_t> by_size(const Eigen::VectorXd& values) {
   std::vector<std::size_t> order(static_cast<std::size_t>(values.size()));
@@ -53,14 +35,13 @@ std::vector<std::size_t> by_size(const Eigen::VectorXd& values) {
   return order;
 }
 
-void explain_table(const ExplainArguments& arguments, const Model& model, const ExplainedTable& table) {
-  const Eigen::MatrixXd shares = importance(model, table.values, arguments.threads);
-  const std::ptrdiff_t used = std::min(table.values.rows(), importance_rows);
-  Json json = {
-      {"model", arguments.model}, {"data", arguments.data}, {"rows", table.values.rows()}, {"rows_used", used}};
+void explain_table(const ExplainArguments& arguments, const Model& model, const Eigen::MatrixXd& inputs) {
+  const Eigen::MatrixXd shares = importance(model, inputs, arguments.threads);
+  const std::ptrdiff_t used = std::min(inputs.rows(), importance_rows);
+  Json json = {{"model", arguments.model}, {"data", arguments.data}, {"rows", inputs.rows()}, {"rows_used", used}};
   json["targets"] = Json::array();
   if (!arguments.json) {
-    print(fmt::format("{}: importance over {} of {} rows\n", arguments.data, used, table.values.rows()));
+    print(fmt::format("{}: importance over {} of {} rows\n", arguments.data, used, inputs.rows()));
   }
   for (std::ptrdiff_t o = 0; o < model.num_outputs(); ++o) {
     const std::string& target = model.outputs()[static_cast<std::size_t>(o)].name;
@@ -83,13 +64,12 @@ void explain_table(const ExplainArguments& arguments, const Model& model, const 
   }
 }
 
-void explain_row(const ExplainArguments& arguments, const Model& model, const ExplainedTable& table) {
-  if (arguments.row > table.values.rows()) {
+void explain_row(const ExplainArguments& arguments, const Model& model, const Eigen::MatrixXd& inputs) {
+  if (arguments.row > inputs.rows()) {
     throw std::invalid_argument(
-        fmt::format("--row is {}, {} has {} rows", arguments.row, arguments.data, table.values.rows()));
+        fmt::format("--row is {}, {} has {} rows", arguments.row, arguments.data, inputs.rows()));
   }
-  const Eigen::VectorXd point = table.values.row(arguments.row - 1);
-  const std::vector<std::string>& text = table.text[static_cast<std::size_t>(arguments.row - 1)];
+  const Eigen::VectorXd point = inputs.row(arguments.row - 1);
   const Attribution attribution = attribute(model, point);
   Json json = {{"model", arguments.model}, {"data", arguments.data}, {"row", arguments.row}};
   json["targets"] = Json::array();
@@ -104,12 +84,13 @@ void explain_row(const ExplainArguments& arguments, const Model& model, const Ex
       const double value = point(static_cast<std::ptrdiff_t>(j));
       const double contribution = attribution.contributions(o, static_cast<std::ptrdiff_t>(j));
       const InputColumn& input = model.inputs()[j];
-      const bool known = !std::isnan(value) && (!input.is_categorical() || !text[j].empty());
-      const std::string shown = !known ? "missing" : input.is_categorical() ? text[j] : number(value);
+      const bool known = !std::isnan(value);
+      const std::string level = known && input.is_categorical() ? input.levels[static_cast<std::size_t>(value)] : "";
+      const std::string shown = !known ? "missing" : input.is_categorical() ? level : number(value);
       printed.add({input.name, shown, number(contribution)});
       entries.push_back({{"input", input.name},
                          {"value", !known                   ? Json(nullptr)
-                                   : input.is_categorical() ? Json(text[j])
+                                   : input.is_categorical() ? Json(level)
                                                             : Json(value)},
                          {"contribution", contribution}});
     }
@@ -136,11 +117,11 @@ void explain_command(const ExplainArguments& arguments) {
   if (csv.rows() == 0) {
     throw std::runtime_error(fmt::format("{}: there is a header and no rows", arguments.data));
   }
-  const ExplainedTable table = read_explained(model, csv);
+  const Eigen::MatrixXd inputs = read_inputs(csv, model, arguments.threads).values;
   if (arguments.row > 0) {
-    explain_row(arguments, model, table);
+    explain_row(arguments, model, inputs);
   } else {
-    explain_table(arguments, model, table);
+    explain_table(arguments, model, inputs);
   }
 }
 

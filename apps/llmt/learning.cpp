@@ -4,8 +4,8 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <map>
 #include <stdexcept>
+#include <utility>
 
 #include "llmt/csv.hpp"
 
@@ -54,16 +54,6 @@ std::vector<int> positions(const char* option, const std::vector<std::string>& n
   return result;
 }
 
-InputColumns read_chosen(const Csv& csv, const std::vector<std::string>& columns, const LearningArguments& arguments) {
-  try {
-    return read_inputs(csv, columns, arguments.categorical);
-  } catch (const std::runtime_error& error) {
-    throw std::runtime_error(arguments.inputs.empty()
-                                 ? fmt::format("{} (--ignore COLUMN leaves a column out)", error.what())
-                                 : error.what());
-  }
-}
-
 }  // namespace
 
 LearningTable read_learning_table(const LearningArguments& arguments) {
@@ -71,15 +61,16 @@ LearningTable read_learning_table(const LearningArguments& arguments) {
   if (csv.rows() == 0) {
     throw std::runtime_error(fmt::format("{}: there is a header and no rows", arguments.data));
   }
-  LearningTable table{choose_inputs(csv, arguments), {}, csv.numbers(arguments.targets), arguments.options};
-  table.inputs = read_chosen(csv, table.names, arguments);
+  const std::vector<std::string> inputs = choose_inputs(csv, arguments);
+  const std::string hint = arguments.inputs.empty() ? " (--ignore COLUMN leaves a column out)" : "";
+  LearningColumns columns = read_learning_columns(
+      csv, {inputs, arguments.categorical, arguments.targets, arguments.weight}, hint, arguments.options.max_threads);
+  LearningTable table{inputs, std::move(columns.inputs), std::move(columns.targets), arguments.options};
   FitOptions& options = table.options;
   options.growth.split_inputs = positions("--split-inputs", arguments.split_inputs, table.names);
   options.growth.regression_inputs = positions("--regression-inputs", arguments.regression_inputs, table.names);
   options.categorical_inputs = table.inputs.categorical;
-  if (!arguments.weight.empty()) {
-    options.weights = csv.numbers(arguments.weight);
-  }
+  options.weights = std::move(columns.weights);
   options.selection.folds.kind = arguments.contiguous ? FoldKind::contiguous : FoldKind::random;
   return table;
 }

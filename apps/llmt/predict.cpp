@@ -57,7 +57,7 @@ std::ptrdiff_t count_high_leverage(const Predicted& predicted) {
 }
 
 Predicted predict_table(const PredictArguments& arguments, const Model& model, const Csv& csv) {
-  const ModelInputs inputs = read_inputs(csv, model);
+  const ModelInputs inputs = read_inputs(csv, model, arguments.threads);
   Predicted predicted;
   for (const OutputColumn& output : model.outputs()) {
     predicted.targets.push_back(output.name);
@@ -83,7 +83,8 @@ Predicted predict_table(const PredictArguments& arguments, const Model& model, c
     if (csv.has(predicted.targets[o]) && csv.rows() > 0) {
       const std::ptrdiff_t column = static_cast<std::ptrdiff_t>(o);
       try {
-        predicted.rmse(column) = rmse(predicted.values.col(column), csv.numbers(predicted.targets[o]))(0);
+        predicted.rmse(column) =
+            rmse(predicted.values.col(column), csv.numbers(predicted.targets[o], arguments.threads))(0);
       } catch (const std::runtime_error& error) {
         warn(fmt::format("llmt: no RMSE of \"{}\": {}", predicted.targets[o], error.what()));
       }
@@ -92,8 +93,8 @@ Predicted predict_table(const PredictArguments& arguments, const Model& model, c
   return predicted;
 }
 
-/// The table as it came, with columns added.
-std::string to_csv(const Csv& csv, const Predicted& predicted) {
+/// The table as it came, with columns added; piece by piece, because the table is in memory already.
+void write_csv(const Csv& csv, const Predicted& predicted, const TextSink& sink) {
   std::vector<std::string> added;
   for (const std::string& target : predicted.targets) {
     added.push_back(target + "_pred");
@@ -131,8 +132,12 @@ std::string to_csv(const Csv& csv, const Predicted& predicted) {
     text += csv.separator();
     append_number(text, extrapolation.leverage);
     text += '\n';
+    if (constexpr std::size_t piece = 1 << 16; text.size() >= piece) {
+      sink(text);
+      text.clear();
+    }
   }
-  return text;
+  sink(text);
 }
 
 Json summary_json(const Predicted& predicted, bool with_values) {
@@ -202,14 +207,14 @@ void predict_command(const PredictArguments& arguments) {
   const Csv csv = Csv::read(arguments.data);
   const Predicted predicted = predict_table(arguments, model, csv);
   if (!arguments.output.empty()) {
-    write_file(arguments.output, to_csv(csv, predicted));
+    write_file(arguments.output, [&](const TextSink& sink) { write_csv(csv, predicted, sink); });
   }
   if (arguments.json) {
     print_json(summary_json(predicted, arguments.output.empty()));
     return;
   }
   if (arguments.output.empty()) {
-    print(to_csv(csv, predicted));
+    write_csv(csv, predicted, [](std::string_view text) { print(text); });
   }
   summarise(arguments, predicted);
 }

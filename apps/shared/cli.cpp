@@ -78,7 +78,7 @@ std::string number(double value, int digits) {
   return fmt::format("{:.{}f}", value, std::max(0, digits - before_point));
 }
 
-void print(const std::string& text) {
+void print(std::string_view text) {
   if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size() || std::fflush(stdout) != 0) {
     throw std::runtime_error("standard output: cannot be written");
   }

@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace llmt::apps {
@@ -36,7 +37,7 @@ class Table {
 std::string number(double value, int digits = 4);
 
 /// Prints to stdout and reports a stdout that cannot take it (a full disk, a closed pipe) as std::runtime_error.
-void print(const std::string& text);
+void print(std::string_view text);
 void print_json(const Json& json);
 
 /// A line on stderr.

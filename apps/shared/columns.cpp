@@ -5,102 +5,143 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <stdexcept>
+#include <utility>
 
 namespace llmt::apps {
 namespace {
 
 constexpr double missing = std::numeric_limits<double>::quiet_NaN();
 
-bool is_number(const std::string& text) {
-  try {
-    return Csv::parse("x\n" + csv_field(text) + "\n", "").numbers("x").size() == 1;
-  } catch (const std::runtime_error&) {
-    return false;
+/// Names and their numbers, looked up without a copy.
+using Numbering = std::map<std::string, std::ptrdiff_t, std::less<>>;
+
+/// Writes the categories of a column into `values`; returns their sorted names.
+std::vector<std::string> take_levels(const Numbering& in_order_of_appearance, Eigen::Ref<Eigen::VectorXd> values) {
+  std::vector<std::string> levels;
+  std::vector<double> positions(in_order_of_appearance.size());
+  for (const auto& [name, appearance] : in_order_of_appearance) {
+    positions[static_cast<std::size_t>(appearance)] = static_cast<double>(levels.size());
+    levels.push_back(name);
   }
+  for (double& value : values) {
+    value = std::isnan(value) ? missing : positions[static_cast<std::size_t>(value)];
+  }
+  if (levels.empty()) {
+    levels.emplace_back("(none)");  // a declared category that is missing in every row
+  }
+  return levels;
 }
 
-/// No cell is a number, some cell is a word.
-bool all_words(const std::vector<std::string>& texts) {
-  bool has_word = false;
-  for (const std::string& text : texts) {
-    if (!text.empty()) {
-      if (is_number(text)) {
-        return false;
-      }
-      has_word = true;
+/// Replaces the listed columns of `inputs` by categories.
+void read_categories(const Csv& csv, const std::vector<std::string>& names, InputColumns& inputs) {
+  std::vector<std::string> wanted;
+  for (const int column : inputs.categorical) {
+    wanted.push_back(names[static_cast<std::size_t>(column)]);
+  }
+  std::vector<Numbering> seen(wanted.size());
+  csv.visit_texts(wanted, [&](std::ptrdiff_t row, std::size_t i, std::string_view text) {
+    double& value = inputs.values(row, inputs.categorical[i]);
+    if (text.empty()) {
+      value = missing;
+      return;
     }
+    auto found = seen[i].find(text);
+    if (found == seen[i].end()) {
+      found = seen[i].emplace(text, std::ssize(seen[i])).first;
+    }
+    value = static_cast<double>(found->second);
+  });
+  for (std::size_t i = 0; i < wanted.size(); ++i) {
+    const int column = inputs.categorical[i];
+    inputs.levels[static_cast<std::size_t>(column)] = take_levels(seen[i], inputs.values.col(column));
   }
-  return has_word;
 }
 
-double position(const std::vector<std::string>& levels, const std::string& text) {
-  const auto found = std::find(levels.begin(), levels.end(), text);
-  return found == levels.end() ? missing : static_cast<double>(found - levels.begin());
+bool contains(const std::vector<std::string>& names, const std::string& name) {
+  return std::find(names.begin(), names.end(), name) != names.end();
 }
 
 }  // namespace
 
-InputColumns read_inputs(const Csv& csv, const std::vector<std::string>& columns,
-                         const std::vector<std::string>& categorical) {
-  for (const std::string& name : categorical) {
-    if (std::find(columns.begin(), columns.end(), name) == columns.end()) {
+LearningColumns read_learning_columns(const Csv& csv, const ColumnRoles& roles, const std::string& input_hint,
+                                      int max_threads) {
+  for (const std::string& name : roles.categorical) {
+    if (!contains(roles.inputs, name)) {
       throw std::runtime_error(fmt::format("{}: column \"{}\" is categorical, but not an input", csv.name(), name));
     }
   }
-  InputColumns inputs{Eigen::MatrixXd(csv.rows(), std::ssize(columns)), {}, {}};
-  for (std::size_t c = 0; c < columns.size(); ++c) {
-    const std::ptrdiff_t column = static_cast<std::ptrdiff_t>(c);
-    std::vector<std::string> levels;
-    const bool declared = std::find(categorical.begin(), categorical.end(), columns[c]) != categorical.end();
-    try {
-      if (!declared) {
-        inputs.values.col(column) = csv.numbers_or_missing(std::span<const std::string>(&columns[c], 1)).col(0);
-      }
-    } catch (const std::runtime_error&) {
-      if (!all_words(csv.texts(columns[c]))) {
-        throw;
-      }
-      levels = csv.texts(columns[c]);
-    }
-    if (declared) {
-      levels = csv.texts(columns[c]);
-    }
-    if (!levels.empty()) {
-      const std::vector<std::string> texts = levels;
-      std::sort(levels.begin(), levels.end());
-      levels.erase(std::unique(levels.begin(), levels.end()), levels.end());
-      std::erase(levels, "");
-      if (levels.empty()) {
-        levels.emplace_back("(none)");  // a declared category that is missing in every row
-      }
-      for (std::size_t row = 0; row < texts.size(); ++row) {
-        inputs.values(static_cast<std::ptrdiff_t>(row), column) = position(levels, texts[row]);
-      }
-      inputs.categorical.push_back(static_cast<int>(c));
-    }
-    inputs.levels.push_back(std::move(levels));
+  // All in one go over the text; what remains of `values` then is the inputs.
+  const std::size_t num_inputs = roles.inputs.size();
+  std::vector<std::string> columns = roles.inputs;
+  columns.insert(columns.end(), roles.targets.begin(), roles.targets.end());
+  if (!roles.weight.empty()) {
+    columns.push_back(roles.weight);
   }
-  return inputs;
+  auto [values, cells] = csv.read_numbers(columns, max_threads);
+
+  LearningColumns result;
+  std::vector<std::ptrdiff_t> bad(columns.size(), ColumnCells::no_row);
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    const bool is_input = i < num_inputs;
+    const bool only_words = cells[i].other > 0 && cells[i].other + cells[i].missing == csv.rows();
+    if (is_input && (only_words || contains(roles.categorical, columns[i]))) {
+      result.inputs.categorical.push_back(static_cast<int>(i));
+    } else {
+      bad[i] = is_input ? cells[i].first_other : std::min(cells[i].first_other, cells[i].first_missing);
+    }
+  }
+  const std::span<const std::string> names(columns);
+  const std::span<const std::ptrdiff_t> bad_rows(bad);
+  csv.refuse_first(names.subspan(num_inputs), bad_rows.subspan(num_inputs));
+  try {
+    csv.refuse_first(names.first(num_inputs), bad_rows.first(num_inputs));
+  } catch (const std::runtime_error& error) {
+    throw std::runtime_error(error.what() + input_hint);
+  }
+
+  result.targets = values.middleCols(std::ssize(roles.inputs), std::ssize(roles.targets));
+  if (!roles.weight.empty()) {
+    result.weights = values.rightCols(1);
+  }
+  values.conservativeResize(Eigen::NoChange, std::ssize(roles.inputs));
+  result.inputs.values = std::move(values);
+  result.inputs.levels.resize(num_inputs);
+  read_categories(csv, roles.inputs, result.inputs);
+  return result;
 }
 
-ModelInputs read_inputs(const Csv& csv, const Model& model) {
-  ModelInputs inputs{Eigen::MatrixXd(csv.rows(), model.num_inputs())};
-  for (std::ptrdiff_t column = 0; column < model.num_inputs(); ++column) {
-    const InputColumn& input = model.inputs()[static_cast<std::size_t>(column)];
-    if (!input.is_categorical()) {
-      inputs.values.col(column) = csv.numbers_or_missing(std::span<const std::string>(&input.name, 1)).col(0);
-      inputs.missing += inputs.values.col(column).array().isNaN().count();
-      continue;
+ModelInputs read_inputs(const Csv& csv, const Model& model, int max_threads) {
+  std::vector<std::string> columns;
+  std::vector<std::string> categorical;
+  std::vector<std::ptrdiff_t> column_of;  // per categorical column
+  std::vector<Numbering> levels;
+  for (const InputColumn& input : model.inputs()) {
+    if (input.is_categorical()) {
+      column_of.push_back(std::ssize(columns));
+      categorical.push_back(input.name);
+      Numbering& numbering = levels.emplace_back();
+      for (std::size_t k = 0; k < input.levels.size(); ++k) {
+        numbering.emplace(input.levels[k], static_cast<std::ptrdiff_t>(k));
+      }
     }
-    const std::vector<std::string> texts = csv.texts(input.name);
-    for (std::ptrdiff_t row = 0; row < csv.rows(); ++row) {
-      const std::string& text = texts[static_cast<std::size_t>(row)];
-      inputs.values(row, column) = position(input.levels, text);
-      inputs.missing += text.empty() ? 1 : 0;
-      inputs.unknown += !text.empty() && std::isnan(inputs.values(row, column)) ? 1 : 0;
-    }
+    columns.push_back(input.name);
   }
+  auto [values, cells] = csv.read_numbers(columns, max_threads);
+  ModelInputs inputs{std::move(values)};
+  std::vector<std::ptrdiff_t> bad;
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    const bool is_number = !model.inputs()[i].is_categorical();
+    bad.push_back(is_number ? cells[i].first_other : ColumnCells::no_row);
+    inputs.missing += cells[i].missing;  // no category is a text that says that there is none
+  }
+  csv.refuse_first(columns, bad);
+  csv.visit_texts(categorical, [&](std::ptrdiff_t row, std::size_t i, std::string_view text) {
+    const auto found = levels[i].find(text);
+    inputs.values(row, column_of[i]) = found == levels[i].end() ? missing : static_cast<double>(found->second);
+    inputs.unknown += !text.empty() && found == levels[i].end() ? 1 : 0;
+  });
   return inputs;
 }
 

@@ -11,6 +11,14 @@
 
 namespace llmt::apps {
 
+/// Which column of a table is what.
+struct ColumnRoles {
+  std::vector<std::string> inputs;
+  std::vector<std::string> categorical;  ///< inputs that are categories although they are written as numbers
+  std::vector<std::string> targets;
+  std::string weight;  ///< empty: none
+};
+
 /// Inputs to learn from.
 struct InputColumns {
   Eigen::MatrixXd values;                        ///< rows x columns; NaN: missing; categories as positions in `levels`
@@ -18,11 +26,17 @@ struct InputColumns {
   std::vector<int> categorical;                  ///< columns with levels
 };
 
-/// Reads the named columns. One is categorical if it is listed in `categorical`, or if none of its cells is a number. A
-/// word among numbers is an error, `path:line: column "c": ...`. Throws std::runtime_error, also for a categorical
-/// column that is not among `columns`.
-InputColumns read_inputs(const Csv& csv, const std::vector<std::string>& columns,
-                         const std::vector<std::string>& categorical);
+struct LearningColumns {
+  InputColumns inputs;
+  Eigen::MatrixXd targets;
+  Eigen::VectorXd weights;  ///< empty if there is no such column
+};
+
+/// Reads the columns. An input is categorical if it is listed as such, or if none of its cells is a number. A cell that
+/// is needed as a number and is none, a word among numbers, is an error, `path:line: column "c": ...`; for an input it
+/// ends in `input_hint`. Throws std::runtime_error, also for a categorical column that is not among the inputs.
+LearningColumns read_learning_columns(const Csv& csv, const ColumnRoles& roles, const std::string& input_hint,
+                                      int max_threads);
 
 /// Inputs of a model.
 struct ModelInputs {
@@ -30,6 +44,6 @@ struct ModelInputs {
   std::ptrdiff_t missing = 0;  ///< cells without a value
   std::ptrdiff_t unknown = 0;  ///< cells with a category that training had not
 };
-ModelInputs read_inputs(const Csv& csv, const Model& model);
+ModelInputs read_inputs(const Csv& csv, const Model& model, int max_threads);
 
 }  // namespace llmt::apps

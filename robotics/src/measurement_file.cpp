@@ -191,18 +191,18 @@ std::map<std::string, Eigen::VectorXd> Header::covariates() const {
 // Instruments that lose the target often write zeros: such rows are no measurements.
 std::vector<std::ptrdiff_t> seen_rows(const Csv& csv, Measurements& measurements) {
   std::vector<std::ptrdiff_t> seen;
-  std::vector<std::ptrdiff_t> missing_lines;
+  std::vector<std::ptrdiff_t> missing;
   for (Eigen::Index i = 0; i < measurements.count(); ++i) {
     if (measurements.positions_mm.row(i).isZero(0.0)) {
-      missing_lines.push_back(csv.line_of(i));
+      missing.push_back(i);
     } else {
       seen.push_back(i);
     }
   }
-  if (!missing_lines.empty()) {
+  if (!missing.empty()) {
     measurements.warnings.push_back(fmt::format(
-        "{}: {} of {} points are exactly zero, taken as missing and left out: line{} {}", csv.name(),
-        missing_lines.size(), csv.rows(), missing_lines.size() == 1 ? "" : "s", fmt::join(missing_lines, ", ")));
+        "{}: {} of {} points are exactly zero, taken as missing and left out: line{} {}", csv.name(), missing.size(),
+        csv.rows(), missing.size() == 1 ? "" : "s", fmt::join(csv.lines_of(missing), ", ")));
   }
   return seen;
 }

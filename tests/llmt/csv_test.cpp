@@ -68,6 +68,10 @@ TEST(Csv, ErrorsNameFileLineAndColumn) {
   EXPECT_EQ(error_in("a,b\n1,2\n\n1,inf\n"), "t.csv:4: column \"b\": 'inf' is not finite");
   EXPECT_EQ(error_in("a,b\n1,1e999\n"), "t.csv:2: column \"b\": '1e999' is not finite");
   EXPECT_EQ(error_in("a,b\n1,2 mm\n"), "t.csv:2: column \"b\": '2 mm' is not a number");
+  EXPECT_EQ(error_in("a,b\n1,+-2\n"), "t.csv:2: column \"b\": '+-2' is not a number");
+  EXPECT_EQ(error_in("a,b\n1,\n3,4\n"), "t.csv:2: column \"b\": the cell is empty, a number is needed");
+  EXPECT_EQ(error_in("a,b\n1," + std::string(59, 'x') + "\u00E9 and more\n"),
+            "t.csv:2: column \"b\": '" + std::string(59, 'x') + "...' is not a number");
   EXPECT_EQ(error_in("a,a\n1,2\n"), "t.csv:1: the header has column \"a\" twice");
   EXPECT_EQ(error_in(",a\n1,2\n"), "t.csv:1: column 1 of the header has no name");
   EXPECT_EQ(error_of([] { llmt::Csv::parse("a,b\n", "t.csv").numbers("c"); }),
@@ -81,6 +85,22 @@ TEST(Csv, AColumnMayBeAskedForTwice) {
   Eigen::MatrixXd expected(2, 3);
   expected << 1.0, 2.0, 1.0, 3.0, 4.0, 3.0;
   EXPECT_EQ(csv.numbers(std::vector<std::string>{"a", "b", "a"}), expected);
+}
+
+TEST(Csv, CellsThatAreNoNumbersAreCounted) {
+  const llmt::Csv csv = llmt::Csv::parse("a,b,c\n1,left,NA\n,right,\n3,?,inf\n", "t.csv");
+  const llmt::CsvNumbers read = csv.read_numbers(csv.columns());
+  EXPECT_EQ(read.cells[0].missing, 1);
+  EXPECT_EQ(read.cells[0].first_missing, 1);
+  EXPECT_EQ(read.cells[0].other, 0);
+  EXPECT_EQ(read.cells[0].first_other, llmt::ColumnCells::no_row);
+  EXPECT_EQ(read.cells[1].other, 2);
+  EXPECT_EQ(read.cells[1].first_other, 0);
+  EXPECT_EQ(read.cells[2].first_missing, 0);
+  EXPECT_EQ(read.cells[2].first_other, 2);
+  EXPECT_EQ(read.values.array().isNaN().count(), 7);
+  const std::vector<std::ptrdiff_t> rows = {llmt::ColumnCells::no_row, 1, 1};
+  EXPECT_EQ(error_of([&] { csv.refuse_first(csv.columns(), rows); }), "t.csv:3: column \"b\": 'right' is not a number");
 }
 
 TEST(Csv, AHeaderAloneHasNoRows) { EXPECT_EQ(llmt::Csv::parse("a,b\n", "t.csv").rows(), 0); }

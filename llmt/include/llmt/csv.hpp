@@ -4,6 +4,9 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <functional>
+#include <limits>
+#include <map>
 #include <span>
 #include <string>
 #include <string_view>
@@ -13,13 +16,32 @@
 
 namespace llmt {
 
+/// What the cells of a column are when they are read as numbers.
+struct ColumnCells {
+  /// "There is no such row."
+  static constexpr std::ptrdiff_t no_row = std::numeric_limits<std::ptrdiff_t>::max();
+
+  std::ptrdiff_t missing = 0;             ///< cells that are empty or say NA, N/A, NaN, null or ? (in any case)
+  std::ptrdiff_t other = 0;               ///< cells that are neither missing nor a finite number
+  std::ptrdiff_t first_missing = no_row;  ///< row
+  std::ptrdiff_t first_other = no_row;    ///< row
+};
+
+/// Columns read as numbers, whatever their cells say.
+struct CsvNumbers {
+  Eigen::MatrixXd values;          ///< rows x columns; NaN where the cell is not a number
+  std::vector<ColumnCells> cells;  ///< per column
+};
+
 /// A CSV text with a header row, kept as text: a column is turned into numbers when it is asked for, so columns of
-/// words do no harm as long as nobody asks for them.
+/// words do no harm as long as nobody asks for them. What asks for several columns walks over the text once.
 ///
 /// Accepted: fields separated by commas (or by semicolons or tabs, if the header has no comma); fields in double
 /// quotes, which may hold separators, line breaks and doubled quotes (RFC 4180); LF or CRLF; a UTF-8 byte-order mark;
 /// blank lines, which are skipped. Numbers are written with a decimal point. Every row must have as many fields as the
 /// header.
+///
+/// `max_threads` is 0 for all that the machine has; results and errors do not depend on it.
 class Csv {
  public:
   /// Reads a file. Throws std::runtime_error, starting with `path` or `path:line`, if it cannot be read, is empty, has
@@ -33,7 +55,7 @@ class Csv {
   const std::vector<std::string>& columns() const { return columns_; }
   std::ptrdiff_t rows() const { return std::ssize(row_begins_); }
 
-  bool has(std::string_view column) const;
+  bool has(std::string_view column) const { return fields_.contains(column); }
 
   /// Position of a column. Throws std::runtime_error naming the file and the columns it has, if there is none of that
   /// name.
@@ -42,16 +64,28 @@ class Csv {
   /// The named columns as numbers, rows x columns, rows in file order. Throws std::runtime_error `path:line: column
   /// "c": ...` at the first cell, in file order, that is empty, not a number, not finite or out of range; and as
   /// index_of().
-  Eigen::MatrixXd numbers(std::span<const std::string> columns) const;
+  Eigen::MatrixXd numbers(std::span<const std::string> columns, int max_threads = 0) const;
 
   /// One column as numbers; errors as above.
-  Eigen::VectorXd numbers(const std::string& column) const;
+  Eigen::VectorXd numbers(const std::string& column, int max_threads = 0) const;
 
   /// As numbers(), but a cell that is empty or says NA, N/A, NaN, null or ? (in any case) is missing, NaN.
-  Eigen::MatrixXd numbers_or_missing(std::span<const std::string> columns) const;
+  Eigen::MatrixXd numbers_or_missing(std::span<const std::string> columns, int max_threads = 0) const;
 
-  /// One column as text, quotes and outer blanks taken off; cells that numbers_or_missing() takes for missing are
-  /// empty. Errors as index_of().
+  /// As numbers(), but leaves it to the caller what cells that are no numbers mean. Errors as index_of() alone.
+  CsvNumbers read_numbers(std::span<const std::string> columns, int max_threads = 0) const;
+
+  /// Throws the error of numbers() at the first cell, in file order, of those in rows[i] of columns[i]; does nothing if
+  /// all rows are ColumnCells::no_row.
+  void refuse_first(std::span<const std::string> columns, std::span<const std::ptrdiff_t> rows) const;
+
+  /// Calls visit(row, i, text) for the cell of columns[i] in every row, in file order, with its text: quotes and outer
+  /// blanks taken off, cells that numbers_or_missing() takes for missing are empty. The text lives as long as the call.
+  /// A column may be named once. Errors as index_of().
+  void visit_texts(std::span<const std::string> columns,
+                   const std::function<void(std::ptrdiff_t, std::size_t, std::string_view)>& visit) const;
+
+  /// One column as text, as visit_texts() has it. Errors as index_of().
   std::vector<std::string> texts(const std::string& column) const;
 
   /// The text of a row as it stands in the file, without its line end.
@@ -60,25 +94,29 @@ class Csv {
   /// The header as it stands in the file, without byte-order mark and line end.
   std::string_view header_text() const;
 
-  /// Line of the file, counted from 1, on which a row begins.
+  /// Line of the file, counted from 1, on which a row begins. Counts the lines before it.
   std::ptrdiff_t line_of(std::ptrdiff_t row) const;
+
+  /// Lines of ascending rows, counted in one go.
+  std::vector<std::ptrdiff_t> lines_of(std::span<const std::ptrdiff_t> rows) const;
 
   char separator() const { return separator_; }
 
  private:
   Csv() = default;
-  Eigen::MatrixXd read_numbers(std::span<const std::string> columns, bool allow_missing) const;
 
   std::string name_;
   std::string text_;
   char separator_ = ',';
   std::size_t header_begin_ = 0;
   std::vector<std::string> columns_;
-  std::vector<std::size_t> row_begins_;  // offsets into text_
+  std::map<std::string, std::size_t, std::less<>> fields_;  // position of a column
+  std::vector<std::size_t> row_begins_;                     // offsets into text_
 
-  std::size_t record_end(std::size_t begin) const;
+  void read_header();
+  void find_rows();
+  std::string_view record_text(std::size_t begin) const;
   std::ptrdiff_t line_at(std::size_t offset) const;
-  void check_field_counts() const;
 };
 
 /// `text` as one CSV field: in double quotes, inner quotes doubled, if it holds the separator, a quote or a line break.

@@ -2,6 +2,7 @@
 /// Whole files in, whole files out.
 #pragma once
 
+#include <functional>
 #include <string>
 #include <string_view>
 
@@ -15,5 +16,12 @@ std::string read_file(const std::string& path);
 /// std::runtime_error `path: cannot be written: reason` is thrown. What is there and is not a regular file
 /// (/dev/stdout, a pipe) is written to directly.
 void write_file(const std::string& path, std::string_view content);
+
+/// Takes the next piece of a text.
+using TextSink = std::function<void(std::string_view)>;
+
+/// As above, for content that need not be in memory as a whole: `produce` passes it on piece by piece. What `produce`
+/// throws is thrown, and the old file stays.
+void write_file(const std::string& path, const std::function<void(const TextSink&)>& produce);
 
 }  // namespace llmt
