@@ -4,12 +4,7 @@
 #include <cmath>
 #include <vector>
 
-// One function per instruction set, chosen by the loader; sanitizers do not get along with that.
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__)
-#define LLMT_FOR_EACH_INSTRUCTION_SET __attribute__((target_clones("avx512f", "avx2", "default")))
-#else
-#define LLMT_FOR_EACH_INSTRUCTION_SET
-#endif
+#include "lanes.hpp"
 
 namespace llmt {
 namespace {

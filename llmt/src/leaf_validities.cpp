@@ -1,0 +1,169 @@
+#include "leaf_validities.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "boxes.hpp"
+#include "transition.hpp"
+
+namespace llmt {
+namespace {
+
+/// Validities below this share of the largest are left out of Gaussians.
+constexpr double negligible_log = -40.0;
+
+}  // namespace
+
+LeafValidities::LeafValidities(const Partition& partition, const std::vector<InputColumn>& inputs)
+    : kind_(partition.validity.kind), smoothness_(partition.validity.smoothness) {
+  for (const Node& node : partition.nodes) {
+    Branch branch{.left = node.left,
+                  .right = node.right,
+                  .input = node.split_input,
+                  .first_level = -1,
+                  .levels = 0,
+                  .threshold = node.threshold,
+                  .per_half_width = std::isfinite(1.0 / node.half_width) ? 1.0 / node.half_width : 0.0,
+                  .missing_left = node.missing_left};
+    if (!node.level_side.empty()) {
+      branch.first_level = static_cast<int>(level_side_.size());
+      branch.levels = static_cast<int>(node.level_side.size());
+      level_side_.insert(level_side_.end(), node.level_side.begin(), node.level_side.end());
+    }
+    branches_.push_back(branch);
+  }
+  if (are_gaussian()) {
+    add_gaussians(partition, inputs);
+  }
+}
+
+void LeafValidities::add_gaussians(const Partition& partition, const std::vector<InputColumn>& inputs) {
+  const std::ptrdiff_t count = std::ssize(inputs);
+  Eigen::VectorXd low(count);
+  Eigen::VectorXd high(count);
+  for (std::ptrdiff_t j = 0; j < count; ++j) {
+    low(j) = inputs[static_cast<std::size_t>(j)].low;
+    high(j) = inputs[static_cast<std::size_t>(j)].high;
+  }
+  const Boxes boxes = boxes_of(partition, low, high);
+  std::vector<bool> is_split(inputs.size(), false);
+  for (const Node& node : partition.nodes) {
+    if (!node.is_leaf() && node.level_side.empty() && node.threshold < std::numeric_limits<double>::max()) {
+      is_split[static_cast<std::size_t>(node.split_input)] = true;
+    }
+  }
+  for (std::size_t i = 0; i < partition.nodes.size(); ++i) {
+    if (!partition.nodes[i].is_leaf()) {
+      continue;
+    }
+    const std::ptrdiff_t box = static_cast<std::ptrdiff_t>(i);
+    Gaussian gaussian{static_cast<int>(i), 0.5 * (boxes.low.col(box) + boxes.high.col(box)),
+                      Eigen::VectorXd::Zero(count)};
+    for (std::ptrdiff_t j = 0; j < count; ++j) {
+      const double sigma = partition.validity.width * (boxes.high(j, box) - boxes.low(j, box));
+      // Where no leaf was cut, all Gaussians are alike and cancel.
+      if (is_split[static_cast<std::size_t>(j)] && sigma > 0.0) {
+        gaussian.per_sigma(j) = 1.0 / sigma;
+      }
+    }
+    gaussians_.push_back(std::move(gaussian));
+  }
+}
+
+double LeafValidities::left_share(const Branch& branch, double x) const {
+  if (branch.first_level >= 0) {
+    const int side = x >= 0.0 && x < branch.levels
+                         ? level_side_[static_cast<std::size_t>(branch.first_level + static_cast<int>(x))]
+                         : 0;
+    return side < 0 ? 1.0 : side > 0 ? 0.0 : branch.missing_left;
+  }
+  if (std::isnan(x)) {
+    return branch.missing_left;
+  }
+  if (branch.per_half_width == 0.0) {
+    return x <= branch.threshold ? 1.0 : 0.0;
+  }
+  return transition((x - branch.threshold) * branch.per_half_width, smoothness_);
+}
+
+int LeafValidities::child_of(int node, const double* row) const {
+  const Branch& branch = branches_[static_cast<std::size_t>(node)];
+  if (branch.first_level < 0 && !std::isnan(row[branch.input])) {
+    return row[branch.input] <= branch.threshold ? branch.left : branch.right;
+  }
+  return left_share(node, row) >= 0.5 ? branch.left : branch.right;
+}
+
+bool LeafValidities::is_ambiguous(const double* row) const {
+  std::vector<int> open = {0};
+  while (!open.empty()) {
+    const int node = open.back();
+    open.pop_back();
+    const Branch& branch = branches_[static_cast<std::size_t>(node)];
+    if (branch.left < 0) {
+      continue;
+    }
+    const double left = left_share(node, row);
+    if (std::isnan(row[branch.input]) && left > 1.0 - clear_share && left < clear_share) {
+      return true;
+    }
+    if (left > 0.0) {
+      open.push_back(branch.left);
+    }
+    if (left < 1.0) {
+      open.push_back(branch.right);
+    }
+  }
+  return false;
+}
+
+void LeafValidities::activate(const double* row, std::vector<Activation>& active) const {
+  active.clear();
+  if (are_gaussian()) {
+    activate_gaussians(row, active);
+  } else {
+    descend(0, 1.0, row, active);
+  }
+}
+
+void LeafValidities::descend(int node, double validity, const double* row, std::vector<Activation>& active) const {
+  const Branch* branch = &branches_[static_cast<std::size_t>(node)];
+  while (branch->left >= 0) {
+    const double left = left_share(*branch, row[branch->input]);
+    if (left > 0.0 && left < 1.0) {
+      descend(branch->left, validity * left, row, active);
+      validity *= 1.0 - left;
+    }
+    node = left < 1.0 ? branch->right : branch->left;
+    branch = &branches_[static_cast<std::size_t>(node)];
+  }
+  active.push_back({node, validity});
+}
+
+void LeafValidities::activate_gaussians(const double* row, std::vector<Activation>& active) const {
+  active.clear();
+  double largest = -std::numeric_limits<double>::infinity();
+  for (const Gaussian& gaussian : gaussians_) {
+    double exponent = 0.0;
+    for (std::ptrdiff_t j = 0; j < gaussian.centre.size(); ++j) {
+      const double z = gaussian.per_sigma(j) > 0.0 && !std::isnan(row[j])
+                           ? (row[j] - gaussian.centre(j)) * gaussian.per_sigma(j)
+                           : 0.0;
+      exponent -= 0.5 * z * z;
+    }
+    active.push_back({gaussian.node, exponent});
+    largest = std::max(largest, exponent);
+  }
+  std::erase_if(active, [&](const Activation& entry) { return !(entry.validity - largest >= negligible_log); });
+  double sum = 0.0;
+  for (Activation& entry : active) {
+    entry.validity = std::exp(entry.validity - largest);
+    sum += entry.validity;
+  }
+  for (Activation& entry : active) {
+    entry.validity /= sum;
+  }
+}
+
+}  // namespace llmt
