@@ -33,8 +33,9 @@ void LocalModels::add_slopes(int node, double validity, const double* deviations
     double below = 0.0;  // derivative of the held deviation of the node below
     for (int at = node; at >= 0 && below < 1.0; at = parents_[static_cast<std::size_t>(at)]) {
       const double derivative = hold_derivative(deviations[k], low(at)[k], high(at)[k]);
-      for (std::ptrdiff_t o = 0; o < outputs_; ++o) {
-        by_regressor(o, k) += validity * slopes(at, o)[k] * (derivative - below);
+      const double weight = validity * (derivative - below);
+      for (std::ptrdiff_t o = 0; weight != 0.0 && o < outputs_; ++o) {
+        by_regressor(o, k) += weight * slopes(at, o)[k];
       }
       below = derivative;
     }

@@ -86,8 +86,9 @@ void LeafValidities::for_each_leaf(const RowBlock& block,
   if (are_gaussian()) {
     std::vector<Waiting> of_node(branches_.size());
     std::vector<Activation> active;
+    Eigen::VectorXd x(block.inputs.cols());
     for (std::size_t row = 0; row < rows; ++row) {
-      const Eigen::VectorXd x = block.inputs.row(static_cast<std::ptrdiff_t>(row));
+      x = block.inputs.row(static_cast<std::ptrdiff_t>(row));
       activate_gaussians(x.data(), active);
       for (const Activation& entry : active) {
         of_node[static_cast<std::size_t>(entry.node)].rows.push_back(static_cast<int>(row));

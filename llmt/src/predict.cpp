@@ -61,6 +61,7 @@ Eigen::MatrixXd Model::predict(const Inputs& inputs, int max_threads) const {
     Eigen::VectorXd deviations(std::ssize(regressors_));
     Eigen::VectorXd values(num_outputs());
     std::vector<Activation> active;
+    active.reserve(32);
     for (std::ptrdiff_t row = 0; row < inputs.rows(); ++row) {
       x = inputs.row(row).transpose();
       deviations_at(inputs_, regressors_, x.data(), deviations.data());

@@ -170,6 +170,51 @@ bool same_bytes(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
 
 void PrintTo(const Kind& kind, std::ostream* out) { *out << kind.name; }
 
+/// As LocalModels documents it.
+double sum_in_quads(double value, const Eigen::MatrixXd& slope, const Eigen::VectorXd& deviations) {
+  double partial[4] = {};
+  for (std::ptrdiff_t k = 0; k < deviations.size(); ++k) {
+    partial[k % 4] += slope(0, k) * deviations(k);
+  }
+  return value + ((partial[0] + partial[2]) + (partial[1] + partial[3]));
+}
+
+double blended(const llmt::Partition& partition, int index, double validity, const Eigen::VectorXd& row,
+               const Eigen::VectorXd& deviations, double sum) {
+  const llmt::Node& node = partition.nodes[static_cast<std::size_t>(index)];
+  if (node.is_leaf()) {
+    return sum + validity * sum_in_quads(node.value(0), node.slope, deviations);
+  }
+  const double x = row(node.split_input);
+  double left = x <= node.threshold ? 1.0 : 0.0;
+  if (node.half_width > 0.0) {
+    const double v = 0.5 * (std::clamp((x - node.threshold) * (1.0 / node.half_width), -1.0, 1.0) + 1.0);
+    left = std::clamp(1.0 - v * v * v * (10.0 - v * (15.0 - 6.0 * v)), 0.0, 1.0);
+  }
+  sum = left > 0.0 ? blended(partition, node.left, validity * left, row, deviations, sum) : sum;
+  return left < 1.0 ? blended(partition, node.right, validity * (1.0 - left), row, deviations, sum) : sum;
+}
+
+// Plain code of one number at a time, so the instruction set of the machine is not in the result.
+TEST(PredictionInQuads, IsTheSameBytesAsOneNumberAtATime) {
+  const Kind kind{.name = "", .validity = ValidityKind::blend, .smoothness = 2, .inputs = 13, .leaves = 50};
+  const llmt::Model held = random_model(kind, 21);
+  llmt::Partition partition = held.partitions()[0];
+  for (llmt::Node& node : partition.nodes) {
+    node.low.setConstant(-10.0);
+    node.high.setConstant(10.0);
+  }
+  partition.residual_range = {};
+  const llmt::Model model(held.inputs(), held.outputs(), held.regressors(), {partition});
+  const Eigen::MatrixXd x = oracle::uniform(5000, kind.inputs, 22);
+  Eigen::VectorXd expected(x.rows());
+  for (std::ptrdiff_t i = 0; i < x.rows(); ++i) {
+    const Eigen::VectorXd row = x.row(i).transpose();
+    expected(i) = blended(partition, 0, 1.0, row, oracle::deviations(model, row), 0.0);
+  }
+  EXPECT_TRUE(same_bytes(model.predict(x), expected));
+}
+
 class Prediction : public testing::TestWithParam<Kind> {};
 
 TEST_P(Prediction, IsWhatTheEquationsSay) {
