@@ -15,7 +15,7 @@ namespace {
 using Inputs = Eigen::Ref<const Eigen::MatrixXd>;
 
 /// With fewer rows the way through the tree costs less one by one.
-constexpr std::ptrdiff_t few_rows = 4;
+constexpr std::ptrdiff_t few_rows = 16;
 
 void check_columns_of_query(const char* function, const Model& model, const Inputs& inputs) {
   if (inputs.cols() != model.num_inputs()) {
