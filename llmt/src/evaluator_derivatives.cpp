@@ -16,14 +16,17 @@ double LeafValidities::left_share_derivative(int node, const double* row) const 
 }
 
 Eigen::MatrixXd LeafValidities::exponent_derivatives(const std::vector<Activation>& active, const double* row) const {
-  const Eigen::Map<const Eigen::VectorXd> x(row, gaussians_.front().centre.size());
-  Eigen::MatrixXd result(x.size(), std::ssize(active));
-  std::size_t next = 0;  // both are in order of growth
-  for (std::ptrdiff_t i = 0; i < result.cols(); ++i, ++next) {
-    while (gaussians_[next].node != active[static_cast<std::size_t>(i)].node) {
-      ++next;
+  Eigen::MatrixXd result(gaussians_.inputs, std::ssize(active));
+  std::ptrdiff_t at = 0;  // both are in order of growth
+  for (std::ptrdiff_t i = 0; i < result.cols(); ++i) {
+    while (gaussians_.nodes[static_cast<std::size_t>(at)] != active[static_cast<std::size_t>(i)].node) {
+      ++at;
     }
-    result.col(i) = -(x - gaussians_[next].centre).cwiseProduct(gaussians_[next].per_sigma.cwiseAbs2());
+    const double* centre = gaussians_.centres.data() + at * gaussians_.stride;
+    const double* per_sigma = gaussians_.per_sigma.data() + at * gaussians_.stride;
+    for (std::ptrdiff_t j = 0; j < gaussians_.inputs; ++j) {
+      result(j, i) = -(row[j] - centre[j]) * per_sigma[j] * per_sigma[j];
+    }
   }
   return result;
 }

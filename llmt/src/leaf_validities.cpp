@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "boxes.hpp"
+#include "lanes.hpp"
 #include "transition.hpp"
 
 namespace llmt {
@@ -46,6 +47,8 @@ void LeafValidities::add_gaussians(const Partition& partition, const std::vector
     low(j) = inputs[static_cast<std::size_t>(j)].low;
     high(j) = inputs[static_cast<std::size_t>(j)].high;
   }
+  gaussians_.inputs = count;
+  gaussians_.stride = padded_to_quads(count);
   const Boxes boxes = boxes_of(partition, low, high);
   std::vector<bool> is_split(inputs.size(), false);
   for (const Node& node : partition.nodes) {
@@ -58,16 +61,14 @@ void LeafValidities::add_gaussians(const Partition& partition, const std::vector
       continue;
     }
     const std::ptrdiff_t box = static_cast<std::ptrdiff_t>(i);
-    Gaussian gaussian{static_cast<int>(i), 0.5 * (boxes.low.col(box) + boxes.high.col(box)),
-                      Eigen::VectorXd::Zero(count)};
-    for (std::ptrdiff_t j = 0; j < count; ++j) {
-      const double sigma = partition.validity.width * (boxes.high(j, box) - boxes.low(j, box));
+    gaussians_.nodes.push_back(static_cast<int>(i));
+    for (std::ptrdiff_t j = 0; j < gaussians_.stride; ++j) {
+      const bool used = j < count && is_split[static_cast<std::size_t>(j)];
+      const double sigma = used ? partition.validity.width * (boxes.high(j, box) - boxes.low(j, box)) : 0.0;
       // Where no leaf was cut, all Gaussians are alike and cancel.
-      if (is_split[static_cast<std::size_t>(j)] && sigma > 0.0) {
-        gaussian.per_sigma(j) = 1.0 / sigma;
-      }
+      gaussians_.per_sigma.push_back(sigma > 0.0 ? 1.0 / sigma : 0.0);
+      gaussians_.centres.push_back(used ? 0.5 * (boxes.low(j, box) + boxes.high(j, box)) : 0.0);
     }
-    gaussians_.push_back(std::move(gaussian));
   }
 }
 
@@ -141,20 +142,30 @@ void LeafValidities::descend(int node, double validity, const double* row, std::
   active.push_back({node, validity});
 }
 
+LLMT_FOR_EACH_INSTRUCTION_SET
+double LeafValidities::set_exponents(const double* row, Activation* active) const {
+  double largest = -std::numeric_limits<double>::infinity();
+  const double* centre = gaussians_.centres.data();
+  const double* per_sigma = gaussians_.per_sigma.data();
+  for (std::size_t i = 0; i < gaussians_.nodes.size(); ++i) {
+    Quad sum = {};
+    for (std::ptrdiff_t j = 0; j < gaussians_.inputs; j += quad, centre += quad, per_sigma += quad) {
+      const Quad x = load_quad(row + j, gaussians_.inputs - j);
+      const Quad z = x != x ? Quad{} : (x - load_quad(centre)) * load_quad(per_sigma);
+      sum += z * z;
+    }
+    active[i].validity = -0.5 * sum_of(sum);
+    largest = std::max(largest, active[i].validity);
+  }
+  return largest;
+}
+
 void LeafValidities::activate_gaussians(const double* row, std::vector<Activation>& active) const {
   active.clear();
-  double largest = -std::numeric_limits<double>::infinity();
-  for (const Gaussian& gaussian : gaussians_) {
-    double exponent = 0.0;
-    for (std::ptrdiff_t j = 0; j < gaussian.centre.size(); ++j) {
-      const double z = gaussian.per_sigma(j) > 0.0 && !std::isnan(row[j])
-                           ? (row[j] - gaussian.centre(j)) * gaussian.per_sigma(j)
-                           : 0.0;
-      exponent -= 0.5 * z * z;
-    }
-    active.push_back({gaussian.node, exponent});
-    largest = std::max(largest, exponent);
+  for (const int node : gaussians_.nodes) {
+    active.push_back({node, 0.0});
   }
+  const double largest = set_exponents(row, active.data());
   std::erase_if(active, [&](const Activation& entry) { return !(entry.validity - largest >= negligible_log); });
   double sum = 0.0;
   for (Activation& entry : active) {

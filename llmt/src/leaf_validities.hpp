@@ -68,10 +68,13 @@ class LeafValidities {
     double per_half_width = 0.0;  // 1 / h; 0: a jump
     double missing_left = 0.5;
   };
-  struct Gaussian {
-    int node = 0;
-    Eigen::VectorXd centre;
-    Eigen::VectorXd per_sigma;  // 1 / sigma; 0 for an input without extent, or categorical
+  /// Of the leaves, in order of growth; rows of `stride` entries, padded with zeros to whole quads.
+  struct Gaussians {
+    std::vector<int> nodes = {};
+    std::ptrdiff_t inputs = 0;
+    std::ptrdiff_t stride = 0;
+    std::vector<double> centres = {};
+    std::vector<double> per_sigma = {};  // 1 / sigma; 0 for an input without extent, or categorical
   };
   /// Rows on their way down: those of a node stand behind those that wait for a right child above it.
   struct Waiting {
@@ -84,13 +87,15 @@ class LeafValidities {
   void descend(int node, std::ptrdiff_t begin, std::ptrdiff_t count, const RowBlock& block, Waiting& waiting,
                const std::function<void(int node, const RowList& list)>& visit) const;
   void add_gaussians(const Partition& partition, const std::vector<InputColumn>& inputs);
+  /// Exponents of the Gaussians as validities, one of `active` each; returns the largest.
+  double set_exponents(const double* row, Activation* active) const;
   void activate_gaussians(const double* row, std::vector<Activation>& active) const;
 
   ValidityKind kind_;
   int smoothness_;
   std::vector<Branch> branches_;
   std::vector<int> level_side_;
-  std::vector<Gaussian> gaussians_;
+  Gaussians gaussians_;
 };
 
 }  // namespace llmt

@@ -28,8 +28,12 @@ struct BareRow {
 void deviations_at(const std::vector<InputColumn>& inputs, const std::vector<Regressor>& regressors, const double* row,
                    double* deviations) {
   for (std::size_t k = 0; k < regressors.size(); ++k) {
-    const std::size_t input = static_cast<std::size_t>(regressors[k].input);
-    deviations[k] = deviation_of(inputs[input], regressors[k], row[input]);
+    const Regressor& regressor = regressors[k];
+    const std::size_t input = static_cast<std::size_t>(regressor.input);
+    deviations[k] = regressor.level < 0
+                        ? row[input] - regressor.centre
+                        : indicator_deviation(row[input], regressor.level,
+                                              static_cast<double>(inputs[input].levels.size()), regressor.centre);
   }
 }
 

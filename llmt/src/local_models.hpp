@@ -14,17 +14,15 @@ namespace llmt {
 /// Over this fraction of a range the hold at its ends sets in.
 inline constexpr double rounding_of_hold = 0.1;
 
-/// Deviation of a regressor from its centre at a value of its input; NaN where that is missing or its level unknown.
-inline double deviation_of(const InputColumn& column, const Regressor& regressor, double x) {
-  if (regressor.level < 0) {
-    return x - regressor.centre;
-  }
-  const bool known = x >= 0.0 && x < static_cast<double>(column.levels.size());
-  return known ? (x == static_cast<double>(regressor.level) ? 1.0 : 0.0) - regressor.centre
-               : std::numeric_limits<double>::quiet_NaN();
+/// Deviation of the indicator of a level from its centre where the input is `x`; NaN where that is missing or unknown.
+inline double indicator_deviation(double x, int level, double levels, double centre) {
+  const double there = x == static_cast<double>(level) ? 1.0 - centre : 0.0 - centre;
+  // Without a branch, for levels come in no order.
+  return static_cast<int>(x >= 0.0) & static_cast<int>(x < levels) ? there : std::numeric_limits<double>::quiet_NaN();
 }
 
-/// Deviations of the regressors from their centres at one row of inputs.
+/// Deviations of the regressors from their centres at one row of inputs; NaN where the input is missing or its level
+/// unknown.
 void deviations_at(const std::vector<InputColumn>& inputs, const std::vector<Regressor>& regressors, const double* row,
                    double* deviations);
 

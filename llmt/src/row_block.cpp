@@ -27,20 +27,25 @@ Oddities oddities_of(const double* values, std::ptrdiff_t size) {
   return {missing > 0, infinite > 0};
 }
 
-/// A regressor that is a number.
-struct Number {
-  const double* values;
-  double centre;
-  std::ptrdiff_t position;
-};
-
-void subtract_centres(const std::vector<Number>& numbers, std::ptrdiff_t rows, std::ptrdiff_t stride, double* out) {
+void set_deviations(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const std::vector<InputColumn>& columns,
+                    const std::vector<Regressor>& regressors, std::ptrdiff_t stride, double* deviations) {
   constexpr std::ptrdiff_t tile = 16;  // rows that stay in the first cache while their columns come in
-  for (std::ptrdiff_t begin = 0; begin < rows; begin += tile) {
-    const std::ptrdiff_t end = std::min(rows, begin + tile);
-    for (const Number& number : numbers) {
-      for (std::ptrdiff_t row = begin; row < end; ++row) {
-        out[row * stride + number.position] = number.values[row] - number.centre;
+  for (std::ptrdiff_t begin = 0; begin < inputs.rows(); begin += tile) {
+    const std::ptrdiff_t end = std::min(inputs.rows(), begin + tile);
+    for (std::size_t k = 0; k < regressors.size(); ++k) {
+      const Regressor& regressor = regressors[k];
+      const double* x = inputs.col(regressor.input).data();
+      const double centre = regressor.centre;
+      double* out = deviations + k;
+      if (regressor.level < 0) {
+        for (std::ptrdiff_t row = begin; row < end; ++row) {
+          out[row * stride] = x[row] - centre;
+        }
+      } else {
+        const std::size_t levels = columns[static_cast<std::size_t>(regressor.input)].levels.size();
+        for (std::ptrdiff_t row = begin; row < end; ++row) {
+          out[row * stride] = indicator_deviation(x[row], regressor.level, static_cast<double>(levels), centre);
+        }
       }
     }
   }
@@ -63,20 +68,7 @@ RowBlock make_row_block(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const s
     block.has_infinite = block.has_infinite || oddities.infinite;
   }
   block.deviations.resize(static_cast<std::size_t>(rows * block.stride));
-  std::vector<Number> numbers;
-  for (std::size_t k = 0; k < regressors.size(); ++k) {
-    const Regressor& regressor = regressors[k];
-    const double* values = inputs.col(regressor.input).data();
-    if (regressor.level < 0) {
-      numbers.push_back({values, regressor.centre, static_cast<std::ptrdiff_t>(k)});
-      continue;
-    }
-    const InputColumn& column = columns[static_cast<std::size_t>(regressor.input)];
-    for (std::ptrdiff_t row = 0; row < rows; ++row) {
-      block.deviations[static_cast<std::size_t>(row * block.stride) + k] = deviation_of(column, regressor, values[row]);
-    }
-  }
-  subtract_centres(numbers, rows, block.stride, block.deviations.data());
+  set_deviations(inputs, columns, regressors, block.stride, block.deviations.data());
   return block;
 }
 
