@@ -28,9 +28,11 @@ LeafValidities::LeafValidities(const Partition& partition, const std::vector<Inp
                   .per_half_width = std::isfinite(1.0 / node.half_width) ? 1.0 / node.half_width : 0.0,
                   .missing_left = node.missing_left};
     if (!node.level_side.empty()) {
-      branch.first_level = static_cast<int>(level_side_.size());
+      branch.first_level = static_cast<int>(level_share_.size());
       branch.levels = static_cast<int>(node.level_side.size());
-      level_side_.insert(level_side_.end(), node.level_side.begin(), node.level_side.end());
+      for (const int side : node.level_side) {
+        level_share_.push_back(side < 0 ? 1.0 : side > 0 ? 0.0 : node.missing_left);
+      }
     }
     branches_.push_back(branch);
   }
@@ -74,10 +76,9 @@ void LeafValidities::add_gaussians(const Partition& partition, const std::vector
 
 double LeafValidities::left_share(const Branch& branch, double x) const {
   if (branch.first_level >= 0) {
-    const int side = x >= 0.0 && x < branch.levels
-                         ? level_side_[static_cast<std::size_t>(branch.first_level + static_cast<int>(x))]
-                         : 0;
-    return side < 0 ? 1.0 : side > 0 ? 0.0 : branch.missing_left;
+    return x >= 0.0 && x < branch.levels
+               ? level_share_[static_cast<std::size_t>(branch.first_level + static_cast<int>(x))]
+               : branch.missing_left;
   }
   if (std::isnan(x)) {
     return branch.missing_left;

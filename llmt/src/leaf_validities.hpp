@@ -62,7 +62,7 @@ class LeafValidities {
     int left = -1;
     int right = -1;
     int input = -1;
-    int first_level = -1;  // of this split's entries in level_side_; -1: a number
+    int first_level = -1;  // of this split's entries in level_share_; -1: a number
     int levels = 0;
     double threshold = 0.0;
     double per_half_width = 0.0;  // 1 / h; 0: a jump
@@ -94,7 +94,7 @@ class LeafValidities {
   ValidityKind kind_;
   int smoothness_;
   std::vector<Branch> branches_;
-  std::vector<int> level_side_;
+  std::vector<double> level_share_;  // of the left child
   Gaussians gaussians_;
 };
 
