@@ -76,9 +76,9 @@ void LeafValidities::add_gaussians(const Partition& partition, const std::vector
 
 double LeafValidities::left_share(const Branch& branch, double x) const {
   if (branch.first_level >= 0) {
-    return x >= 0.0 && x < branch.levels
-               ? level_share_[static_cast<std::size_t>(branch.first_level + static_cast<int>(x))]
-               : branch.missing_left;
+    const bool known = x >= 0.0 && x < branch.levels;
+    return known ? level_share_[static_cast<std::size_t>(branch.first_level) + static_cast<std::size_t>(x)]
+                 : branch.missing_left;
   }
   if (std::isnan(x)) {
     return branch.missing_left;

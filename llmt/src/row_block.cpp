@@ -54,7 +54,7 @@ void set_deviations(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const std::
 }  // namespace
 
 std::ptrdiff_t rows_of_block(std::ptrdiff_t inputs, std::ptrdiff_t regressors) {
-  constexpr std::ptrdiff_t cached = 48 * 1024;  // doubles
+  constexpr std::ptrdiff_t cached = 49152;  // doubles
   return std::clamp<std::ptrdiff_t>(cached / (inputs + padded_to_quads(regressors)), 256, 4096);
 }
 
