@@ -1,4 +1,4 @@
-// Fit and predict, error beside time. Rival in the same run: least squares (Eigen, column-pivoted QR).
+// Fit, error beside time. Rival in the same run: least squares (Eigen, column-pivoted QR).
 //
 // Arguments: rows / inputs / threads. Counters: rmse = of the noise-free truth on 10000 fresh rows (noise of the data:
 // 1), leaves.
@@ -48,26 +48,6 @@ void least_squares(benchmark::State& state) {
   report(state, with_constant(test.x) * coefficients, test, 1.0);
 }
 
-/// A partition of 60 leaves.
-void predict(benchmark::State& state, llmt::ValidityChoice validity) {
-  const bench::Sample train = bench::sample(20000, state.range(1), 1);
-  const bench::Sample query = bench::sample(state.range(0), state.range(1), 2);
-  llmt::FitOptions options;
-  options.growth = {.significance = 1.0, .min_variance_gain = -1.0, .max_leaves = 60};
-  options.blend = {.validity = validity, .widths = {1.0}, .ridges = {1e-3}};
-  options.selection.folds.count = 0;
-  const llmt::FitResult result = llmt::fit(train.x, train.y, options);
-  Eigen::VectorXd predicted;
-  for (auto _ : state) {
-    predicted = result.model.predict(query.x, static_cast<int>(state.range(2)));
-  }
-  report(state, predicted, query, static_cast<double>(result.summary.partitions[0].leaves));
-  state.SetItemsProcessed(state.iterations() * state.range(0));  // rows
-}
-
-void predict_crisp(benchmark::State& state) { predict(state, llmt::ValidityChoice::crisp); }
-void predict_blend(benchmark::State& state) { predict(state, llmt::ValidityChoice::blend); }
-
 void sizes(benchmark::internal::Benchmark* benchmark) {
   for (const std::int64_t rows : {1000, 10000, 100000}) {
     for (const std::int64_t inputs : {2, 5, 10}) {
@@ -85,7 +65,5 @@ BENCHMARK(fit_with_cross_validation)
     ->Unit(benchmark::kMillisecond)
     ->UseRealTime();
 BENCHMARK(least_squares)->Apply(sizes);
-BENCHMARK(predict_crisp)->Args({100000, 8, 1})->Args({100000, 8, 2})->Unit(benchmark::kMillisecond)->UseRealTime();
-BENCHMARK(predict_blend)->Args({100000, 8, 1})->Args({100000, 8, 2})->Unit(benchmark::kMillisecond)->UseRealTime();
 
 }  // namespace

@@ -63,7 +63,7 @@ Predicted predict_table(const PredictArguments& arguments, const Model& model, c
     predicted.targets.push_back(output.name);
   }
   predicted.values = model.predict(inputs.values, arguments.threads);
-  predicted.extrapolation = model.extrapolation(inputs.values);
+  predicted.extrapolation = model.extrapolation(inputs.values, arguments.threads);
   predicted.missing = inputs.missing;
   predicted.unknown = inputs.unknown;
   if (arguments.interval > 0.0) {

@@ -4,20 +4,11 @@
 #include <cmath>
 #include <vector>
 
-// One function per instruction set, chosen by the loader; sanitizers do not get along with that.
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__)
-#define LLMT_FOR_EACH_INSTRUCTION_SET __attribute__((target_clones("avx512f", "avx2", "default")))
-#else
-#define LLMT_FOR_EACH_INSTRUCTION_SET
-#endif
+#include "lanes.hpp"
 
 namespace llmt {
 namespace {
 
-/// Eight doubles; the compiler makes of it what the machine has. Aligned like a double, so that any address will do.
-using Lanes = double __attribute__((vector_size(64), aligned(8)));
-
-constexpr std::ptrdiff_t lanes = 8;
 constexpr std::ptrdiff_t tile_rows = 4;
 constexpr std::ptrdiff_t block = 64;  // rows of C at a time
 constexpr std::ptrdiff_t depth_block = 256;

@@ -40,7 +40,7 @@ struct Packed {
 /// Sums f_i f_j over `count` rows, for `Rows` columns i from `first_row` and `Columns` vectors of columns j from
 /// `first_column`, in registers.
 template <int Rows, int Columns, class Source>
-LLMT_ALWAYS_INLINE void add_tile(const Source& source, std::ptrdiff_t count, std::ptrdiff_t first_row,
+LLMT_INLINE void add_tile(const Source& source, std::ptrdiff_t count, std::ptrdiff_t first_row,
                                  std::ptrdiff_t first_column, double* gram) {
   Lanes sums[Rows][Columns] = {};
   for (std::ptrdiff_t k = 0; k < count; ++k) {
@@ -64,7 +64,7 @@ LLMT_ALWAYS_INLINE void add_tile(const Source& source, std::ptrdiff_t count, std
 }
 
 template <int Rows, class Source>
-LLMT_ALWAYS_INLINE void add_tile_row(const Source& source, std::ptrdiff_t count, std::ptrdiff_t first_row,
+LLMT_INLINE void add_tile_row(const Source& source, std::ptrdiff_t count, std::ptrdiff_t first_row,
                                      double* gram) {
   std::ptrdiff_t column = 0;
   for (; column + lanes <= first_row; column += 2 * lanes) {
@@ -76,7 +76,7 @@ LLMT_ALWAYS_INLINE void add_tile_row(const Source& source, std::ptrdiff_t count,
 }
 
 template <class Source>
-LLMT_ALWAYS_INLINE void add_tiles(const Source& source, std::ptrdiff_t columns, std::ptrdiff_t count, double* gram) {
+LLMT_INLINE void add_tiles(const Source& source, std::ptrdiff_t columns, std::ptrdiff_t count, double* gram) {
   for (std::ptrdiff_t row = 0; row < columns; row += lanes) {
     if (columns - row > 4) {
       add_tile_row<8>(source, count, row, gram);
@@ -117,7 +117,7 @@ void add_vectors(const double* from, double* to, std::ptrdiff_t size) {
   }
 }
 
-LLMT_ALWAYS_INLINE void gather(const double* const* from, std::ptrdiff_t at, Lanes& to) {
+LLMT_INLINE void gather(const double* const* from, std::ptrdiff_t at, Lanes& to) {
   to = Lanes{from[0][at], from[1][at], from[2][at], from[3][at], from[4][at], from[5][at], from[6][at], from[7][at]};
 }
 

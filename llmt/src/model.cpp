@@ -9,7 +9,6 @@
 
 #include "checks.hpp"
 #include "evaluator.hpp"
-#include "parallel.hpp"
 
 namespace llmt {
 namespace {
@@ -114,17 +113,6 @@ void check_partition(const Partition& partition, const std::vector<InputColumn>&
   }
 }
 
-/// The inputs of a query, one row after the other in memory.
-using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-
-void check_query(const char* function, const Model& model, const Eigen::Ref<const Eigen::MatrixXd>& inputs) {
-  if (inputs.cols() != model.num_inputs()) {
-    throw std::invalid_argument(
-        fmt::format("{}: inputs has {} columns, the model has {} inputs", function, inputs.cols(), model.num_inputs()));
-  }
-  check_finite_or_missing(function, "inputs", inputs);
-}
-
 /// Nodes of the leaves from left to right, with their boxes.
 void collect_leaves(const Partition& partition, int index, Leaf box, const std::vector<InputColumn>& inputs,
                     const std::vector<Regressor>& regressors, std::vector<Leaf>& leaves) {
@@ -164,15 +152,6 @@ void collect_leaves(const Partition& partition, int index, Leaf box, const std::
     box.intercept -= node.slope.col(static_cast<std::ptrdiff_t>(k)) * regressors[k].centre;
   }
   leaves.push_back(std::move(box));
-}
-
-/// Position in leaves() of every leaf's node.
-std::vector<int> leaf_positions(const Partition& partition, const std::vector<Leaf>& leaves) {
-  std::vector<int> position(partition.nodes.size(), -1);
-  for (std::size_t k = 0; k < leaves.size(); ++k) {
-    position[static_cast<std::size_t>(leaves[k].node)] = static_cast<int>(k);
-  }
-  return position;
 }
 
 }  // namespace
@@ -222,171 +201,6 @@ Model::Model(std::vector<InputColumn> inputs, std::vector<OutputColumn> outputs,
     evaluators.emplace_back(partition, inputs_, std::ssize(regressors_));
   }
   evaluators_ = std::make_shared<const std::vector<Evaluator>>(std::move(evaluators));
-}
-
-Eigen::MatrixXd Model::predict(const Eigen::Ref<const Eigen::MatrixXd>& inputs, int max_threads) const {
-  check_query("llmt::Model::predict", *this, inputs);
-  Eigen::MatrixXd predicted(inputs.rows(), num_outputs());
-  constexpr std::ptrdiff_t block = 4096;
-  parallel_for((inputs.rows() + block - 1) / block, max_threads, [&](std::ptrdiff_t block_index) {
-    const std::ptrdiff_t begin = block_index * block;
-    const RowMajor rows = inputs.middleRows(begin, std::min(block, inputs.rows() - begin));
-    Eigen::VectorXd deviations(std::ssize(regressors_));
-    Eigen::VectorXd values(num_outputs());
-    std::vector<Activation> active;
-    for (std::ptrdiff_t row = 0; row < rows.rows(); ++row) {
-      const double* x = rows.row(row).data();
-      deviations_at(inputs_, regressors_, x, deviations.data());
-      for (std::size_t p = 0; p < partitions_.size(); ++p) {
-        const Evaluator& evaluator = (*evaluators_)[p];
-        evaluator.activate(x, active);
-        evaluator.combine(active, deviations.data(), values.data());
-        for (std::size_t o = 0; o < partitions_[p].outputs.size(); ++o) {
-          predicted(begin + row, partitions_[p].outputs[o]) = values(static_cast<std::ptrdiff_t>(o));
-        }
-      }
-    }
-  });
-  return predicted;
-}
-
-Eigen::MatrixXd Model::jacobian(const Eigen::Ref<const Eigen::VectorXd>& point) const {
-  check_query("llmt::Model::jacobian", *this, point.transpose());
-  check_finite("llmt::Model::jacobian", "point", point.transpose());
-  const Eigen::VectorXd x = point;
-  Eigen::VectorXd deviations(std::ssize(regressors_));
-  deviations_at(inputs_, regressors_, x.data(), deviations.data());
-  Eigen::MatrixXd result(num_outputs(), num_inputs());
-  Eigen::MatrixXd by_input;
-  Eigen::MatrixXd by_regressor;
-  for (std::size_t p = 0; p < partitions_.size(); ++p) {
-    (*evaluators_)[p].derivatives(x.data(), deviations.data(), by_input, by_regressor);
-    for (std::size_t k = 0; k < regressors_.size(); ++k) {
-      if (regressors_[k].level < 0) {
-        by_input.col(regressors_[k].input) += by_regressor.col(static_cast<std::ptrdiff_t>(k));
-      }
-    }
-    for (std::size_t o = 0; o < partitions_[p].outputs.size(); ++o) {
-      result.row(partitions_[p].outputs[o]) = by_input.row(static_cast<std::ptrdiff_t>(o));
-    }
-  }
-  return result;
-}
-
-Eigen::MatrixXd Model::validities(const Eigen::Ref<const Eigen::MatrixXd>& inputs, std::ptrdiff_t partition) const {
-  check_query("llmt::Model::validities", *this, inputs);
-  const std::vector<Leaf> table = leaves(partition);
-  const std::vector<int> position = leaf_positions(partitions_[static_cast<std::size_t>(partition)], table);
-  const RowMajor rows = inputs;
-  Eigen::MatrixXd result = Eigen::MatrixXd::Zero(inputs.rows(), std::ssize(table));
-  std::vector<Activation> active;
-  for (std::ptrdiff_t row = 0; row < rows.rows(); ++row) {
-    (*evaluators_)[static_cast<std::size_t>(partition)].activate(rows.row(row).data(), active);
-    for (const Activation& entry : active) {
-      result(row, position[static_cast<std::size_t>(entry.node)]) = entry.validity;
-    }
-  }
-  return result;
-}
-
-Eigen::MatrixXi Model::leaf_of(const Eigen::Ref<const Eigen::MatrixXd>& inputs) const {
-  check_query("llmt::Model::leaf_of", *this, inputs);
-  const RowMajor rows = inputs;
-  Eigen::MatrixXi result(inputs.rows(), std::ssize(partitions_));
-  std::vector<Activation> active;
-  for (std::ptrdiff_t p = 0; p < result.cols(); ++p) {
-    const std::vector<int> position = leaf_positions(partitions_[static_cast<std::size_t>(p)], leaves(p));
-    for (std::ptrdiff_t row = 0; row < rows.rows(); ++row) {
-      (*evaluators_)[static_cast<std::size_t>(p)].activate(rows.row(row).data(), active);
-      const auto largest = std::max_element(active.begin(), active.end(),
-                                            [](const auto& a, const auto& b) { return a.validity < b.validity; });
-      result(row, p) = position[static_cast<std::size_t>(largest->node)];
-    }
-  }
-  return result;
-}
-
-std::vector<Extrapolation> Model::extrapolation(const Eigen::Ref<const Eigen::MatrixXd>& inputs) const {
-  check_query("llmt::Model::extrapolation", *this, inputs);
-  std::vector<Extrapolation> result(static_cast<std::size_t>(inputs.rows()));
-  for (std::ptrdiff_t j = 0; j < num_inputs(); ++j) {
-    const InputColumn& input = inputs_[static_cast<std::size_t>(j)];
-    const double range = input.high - input.low;
-    for (std::ptrdiff_t row = 0; row < inputs.rows(); ++row) {
-      const double excess = std::max(input.low - inputs(row, j), inputs(row, j) - input.high);
-      if (excess > 0.0) {
-        double& distance = result[static_cast<std::size_t>(row)].distance;
-        distance = std::max(distance, range > 0.0 ? excess / range : infinity);
-      }
-    }
-  }
-  const RowMajor rows = inputs;
-  const std::ptrdiff_t regressors = std::ssize(regressors_);
-  Eigen::VectorXd deviations(regressors);
-  Eigen::VectorXd a(regressors + 1);
-  std::vector<Activation> active;
-  for (std::size_t p = 0; p < partitions_.size(); ++p) {
-    for (std::ptrdiff_t row = 0; row < rows.rows(); ++row) {
-      const double* x = rows.row(row).data();
-      deviations_at(inputs_, regressors_, x, deviations.data());
-      (*evaluators_)[p].activate(x, active);
-      double leverage = 0.0;
-      for (const Activation& entry : active) {
-        const Node& leaf = partitions_[p].nodes[static_cast<std::size_t>(entry.node)];
-        if (leaf.inverse_gram.size() > 0) {
-          a(0) = 1.0;
-          a.tail(regressors) = deviations.array().isNaN().select(leaf.mean, deviations);
-          leverage += entry.validity * a.dot(leaf.inverse_gram * a);
-        }
-      }
-      double& largest = result[static_cast<std::size_t>(row)].leverage;
-      largest = std::max(largest, leverage);
-    }
-  }
-  return result;
-}
-
-Eigen::MatrixXd Model::standard_errors(const Eigen::Ref<const Eigen::MatrixXd>& inputs) const {
-  check_query("llmt::Model::standard_errors", *this, inputs);
-  constexpr double pooled_rows = 10.0;
-  const RowMajor rows = inputs;
-  const std::ptrdiff_t regressors = std::ssize(regressors_);
-  Eigen::MatrixXd result(inputs.rows(), num_outputs());
-  Eigen::VectorXd deviations(regressors);
-  Eigen::VectorXd a(regressors + 1);
-  std::vector<Activation> active;
-  for (std::size_t p = 0; p < partitions_.size(); ++p) {
-    const Partition& partition = partitions_[p];
-    const Node& root = partition.nodes.front();
-    double coefficients = 0.0;
-    Eigen::VectorXd rss = Eigen::VectorXd::Zero(root.rss.size());
-    for (const Node& node : partition.nodes) {
-      if (node.is_leaf()) {
-        coefficients += node.rank;
-        rss += node.rss;
-      }
-    }
-    const Eigen::VectorXd overall = rss / std::max(1.0, static_cast<double>(root.samples) - coefficients);
-    for (std::ptrdiff_t row = 0; row < rows.rows(); ++row) {
-      const double* x = rows.row(row).data();
-      deviations_at(inputs_, regressors_, x, deviations.data());
-      (*evaluators_)[p].activate(x, active);
-      Eigen::VectorXd variance = Eigen::VectorXd::Zero(root.rss.size());
-      for (const Activation& entry : active) {
-        const Node& leaf = partition.nodes[static_cast<std::size_t>(entry.node)];
-        if (leaf.inverse_gram.size() > 0) {
-          a(0) = 1.0;
-          a.tail(regressors) = deviations.array().isNaN().select(leaf.mean, deviations);
-          const double freedom = std::max(0.0, static_cast<double>(leaf.samples - leaf.rank)) + pooled_rows;
-          variance += entry.validity * a.dot(leaf.inverse_gram * a) * (leaf.rss + pooled_rows * overall) / freedom;
-        }
-      }
-      for (std::size_t o = 0; o < partition.outputs.size(); ++o) {
-        result(row, partition.outputs[o]) = std::sqrt(variance(static_cast<std::ptrdiff_t>(o)));
-      }
-    }
-  }
-  return result;
 }
 
 std::vector<Leaf> Model::leaves(std::ptrdiff_t partition) const {

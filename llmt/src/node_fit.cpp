@@ -6,7 +6,6 @@
 #include <numeric>
 #include <vector>
 
-#include "lanes.hpp"
 #include "whitening.hpp"
 
 namespace llmt {
@@ -180,7 +179,7 @@ NodeFit fit_node(const RowMajor& x, const Eigen::MatrixXd& residuals, const Eige
     to_slopes = whitening_matrix(shape, gram, total);
     if (to_slopes.size() > 0) {
       fit.rank = 1 + static_cast<int>(kept);
-      const std::ptrdiff_t width = (kept + lanes - 1) / lanes * lanes;
+      const std::ptrdiff_t width = (kept + GramShape::lanes - 1) / GramShape::lanes * GramShape::lanes;
       std::vector<double> matrix(static_cast<std::size_t>(kept * width), 0.0);
       for (std::ptrdiff_t i = 0; i < kept; ++i) {
         for (std::ptrdiff_t j = i; j < kept; ++j) {

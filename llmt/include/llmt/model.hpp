@@ -167,7 +167,7 @@ class Model {
 
   /// Predictions, rows x outputs, for `inputs` (rows x inputs; NaN: missing; categorical inputs as positions in
   /// InputColumn::levels, others than those count as missing). Throws std::invalid_argument if the number of columns
-  /// differs or a value is infinite. Same bytes at any number of threads (0: all).
+  /// differs or a value is infinite. Same bytes at any number of threads (0: all), and for a row alone or among others.
   Eigen::MatrixXd predict(const Eigen::Ref<const Eigen::MatrixXd>& inputs, int max_threads = 0) const;
 
   /// Derivatives of the prediction at one point, outputs x inputs, in closed form. Zero for categorical inputs; at a
@@ -176,20 +176,21 @@ class Model {
 
   /// Which leaf holds each row, rows x partitions: positions in leaves(partition); where validities overlap, the leaf
   /// of the largest. Throws as predict().
-  Eigen::MatrixXi leaf_of(const Eigen::Ref<const Eigen::MatrixXd>& inputs) const;
+  Eigen::MatrixXi leaf_of(const Eigen::Ref<const Eigen::MatrixXd>& inputs, int max_threads = 0) const;
 
   /// The validities of the leaves of a partition at each row, rows x leaves as in leaves(partition). Throws as
   /// predict(), and if there is no such partition.
-  Eigen::MatrixXd validities(const Eigen::Ref<const Eigen::MatrixXd>& inputs, std::ptrdiff_t partition) const;
+  Eigen::MatrixXd validities(const Eigen::Ref<const Eigen::MatrixXd>& inputs, std::ptrdiff_t partition,
+                             int max_threads = 0) const;
 
   /// How far each row lies from what the model has seen. Missing values do not count. Throws as predict().
-  std::vector<Extrapolation> extrapolation(const Eigen::Ref<const Eigen::MatrixXd>& inputs) const;
+  std::vector<Extrapolation> extrapolation(const Eigen::Ref<const Eigen::MatrixXd>& inputs, int max_threads = 0) const;
 
   /// Standard errors of the local models' means, rows x outputs: the square root of the validity-weighted mean of
   /// s_i^2 a' (sum validity a a')^-1 a, s_i^2 = (rss_i + 10 s^2) / (samples_i - rank_i + 10) drawn towards the residual
   /// variance s^2 of all rows. They take the tree as given and the noise as equal within a leaf, say nothing of bias
   /// and are too small; for intervals that hold what they promise see Intervals. Throws as predict().
-  Eigen::MatrixXd standard_errors(const Eigen::Ref<const Eigen::MatrixXd>& inputs) const;
+  Eigen::MatrixXd standard_errors(const Eigen::Ref<const Eigen::MatrixXd>& inputs, int max_threads = 0) const;
 
   /// The leaves of a partition from left to right in the tree. Throws std::invalid_argument if there is no such
   /// partition.

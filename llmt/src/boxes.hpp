@@ -1,0 +1,28 @@
+/// \file
+/// The tree of a partition and the boxes that it cuts.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "llmt/model.hpp"
+
+namespace llmt {
+
+/// Undoes the split of a node.
+void make_leaf(Node& node);
+
+/// Parent of every node, -1 for the root.
+std::vector<int> parents_of(const Partition& partition);
+
+/// Boxes of all nodes, inputs x nodes each, cut out of low ... high by the splits on numbers.
+struct Boxes {
+  Eigen::MatrixXd low;
+  Eigen::MatrixXd high;
+};
+Boxes boxes_of(const Partition& partition, const Eigen::VectorXd& low, const Eigen::VectorXd& high);
+
+/// Sets Node::half_width of a partition for its validity: the boxes are closed by `low` and `high`, one per input.
+void set_half_widths(Partition& partition, const Eigen::VectorXd& low, const Eigen::VectorXd& high);
+
+}  // namespace llmt
