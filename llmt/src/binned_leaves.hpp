@@ -1,22 +1,14 @@
 /// \file
-/// Leaves of a growing tree whose inputs are cut into bins: the search compares the edges between bins only, and says
-/// how much better a split inside a bin could be.
+/// Leaves of a growing tree whose inputs are cut into bins.
 #pragma once
 
 #include <array>
 #include <optional>
 #include <vector>
 
-#include "bins.hpp"
-#include "split_search.hpp"
+#include "histogram.hpp"
 
 namespace llmt {
-
-/// Gram matrices and row counts of the bins of all split inputs.
-struct Histogram {
-  std::vector<double> grams;
-  std::vector<std::ptrdiff_t> counts;
-};
 
 struct BinnedLeaf {
   std::vector<int> rows;               ///< of the training rows, ascending
@@ -53,27 +45,10 @@ class BinnedLeaves {
                    const Node& right) const;
 
  private:
-  struct Found {
-    SplitCandidate best;
-    double bound;  // no split leaves less
-  };
-
-  std::span<const double> grams(const Histogram& histogram, std::size_t input) const;
-  std::span<const std::ptrdiff_t> counts(const Histogram& histogram, std::size_t input) const;
-  void fill_features();
-  Histogram accumulate(const std::vector<int>& rows) const;
-  std::vector<double> total(const Histogram& histogram) const;
   void fit(BinnedLeaf& leaf, const std::vector<double>& gram, const Node& parent, Node& node) const;
-  void rebase(BinnedLeaf& leaf, const Node& node);
-  Found search(const Histogram& histogram, std::size_t input, double node_rss) const;
 
   const GrowthData& data_;
-  std::vector<Bins> bins_;
-  std::vector<std::ptrdiff_t> first_bin_;  // of each input among all bins
-  Features features_;
-  GramShape shape_;
-  Eigen::MatrixXd whitening_;   // scaled regressors times this are the features' regressors
-  Eigen::MatrixXd colouring_;   // and back: scaled regressors = colouring_ * regressors
+  BinnedRows rows_;
   std::ptrdiff_t memory_left_;  // for histograms of leaves that wait, in doubles
 };
 

@@ -41,7 +41,7 @@ struct Packed {
 /// `first_column`, in registers.
 template <int Rows, int Columns, class Source>
 LLMT_INLINE void add_tile(const Source& source, std::ptrdiff_t count, std::ptrdiff_t first_row,
-                                 std::ptrdiff_t first_column, double* gram) {
+                          std::ptrdiff_t first_column, double* gram) {
   Lanes sums[Rows][Columns] = {};
   for (std::ptrdiff_t k = 0; k < count; ++k) {
     const double* row = source.at(k);
@@ -64,8 +64,7 @@ LLMT_INLINE void add_tile(const Source& source, std::ptrdiff_t count, std::ptrdi
 }
 
 template <int Rows, class Source>
-LLMT_INLINE void add_tile_row(const Source& source, std::ptrdiff_t count, std::ptrdiff_t first_row,
-                                     double* gram) {
+LLMT_INLINE void add_tile_row(const Source& source, std::ptrdiff_t count, std::ptrdiff_t first_row, double* gram) {
   std::ptrdiff_t column = 0;
   for (; column + lanes <= first_row; column += 2 * lanes) {
     add_tile<Rows, 2>(source, count, first_row, column, gram);

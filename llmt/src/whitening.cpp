@@ -1,6 +1,8 @@
 #include "whitening.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <cmath>
 
 #include "lanes.hpp"
 
@@ -63,6 +65,24 @@ Remainder subtract_fit(Features& features, std::ptrdiff_t output, const std::vec
            remainder.products.data(), &remainder.squares);
   remainder.products.resize(static_cast<std::size_t>(features.coefficients()));
   return remainder;
+}
+
+Whitening whiten(const Eigen::MatrixXd& covariance) {
+  const std::ptrdiff_t size = covariance.rows();
+  Whitening result{Eigen::MatrixXd::Zero(size, size), Eigen::MatrixXd::Zero(size, size), 0};
+  if (size == 0) {
+    return result;
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(covariance);
+  const double smallest = covariance_tolerance * std::max(eigen.eigenvalues().maxCoeff(), 0.0);
+  for (std::ptrdiff_t k = size; k-- > 0;) {
+    if (const double value = eigen.eigenvalues()(k); value > smallest && value > 0.0) {
+      result.forward.col(result.rank) = eigen.eigenvectors().col(k) / std::sqrt(value);
+      result.back.col(result.rank) = eigen.eigenvectors().col(k) * std::sqrt(value);
+      ++result.rank;
+    }
+  }
+  return result;
 }
 
 }  // namespace llmt

@@ -2,6 +2,7 @@
 /// Passes over rows of features: changing the basis of the regressors, and taking a fit off the residuals.
 #pragma once
 
+#include <Eigen/Core>
 #include <vector>
 
 #include "gram.hpp"
@@ -20,5 +21,18 @@ struct Remainder {
 
 /// Takes [1, z] . coefficients off the residuals of an output.
 Remainder subtract_fit(Features& features, std::ptrdiff_t output, const std::vector<double>& coefficients);
+
+/// A pseudo-inverse square root: columns that make a covariance the identity on the directions that there are.
+struct Whitening {
+  Eigen::MatrixXd forward;
+  Eigen::MatrixXd back;
+  std::ptrdiff_t rank = 0;
+};
+
+/// Of a covariance matrix; directions whose variance is below `covariance_tolerance` of the largest count as none.
+Whitening whiten(const Eigen::MatrixXd& covariance);
+
+/// The digits that a sum of squares has.
+inline constexpr double covariance_tolerance = 1e-10;
 
 }  // namespace llmt

@@ -91,6 +91,7 @@ TEST(BinnedGrowth, ConstantAndCollinearColumnsKeepTheRankAndTheModelOfTheExactSe
 }
 
 TEST(BinnedGrowth, ExcessIsAtMostWhatTheCertificateSays) {
+  int exact_searches = 0;
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     SCOPED_TRACE(seed);
     const Eigen::MatrixXd x = oracle::uniform(5000, 3, seed);
@@ -103,8 +104,11 @@ TEST(BinnedGrowth, ExcessIsAtMostWhatTheCertificateSays) {
     const double excess = (rss(nodes(binned)) - rss(nodes(exact))) / root;
     EXPECT_GE(excess, -1e-12);
     EXPECT_LE(excess, binned.summary.partitions[0].search.largest_excess + 1e-12);
-    EXPECT_GT(binned.summary.partitions[0].search.largest_excess, 0.0);
+    exact_searches += binned.summary.partitions[0].search.largest_excess == 0.0 ? 1 : 0;
   }
+  // Bins that may hold a better split are searched exactly, unless they are too many, as with noise.
+  EXPECT_GT(exact_searches, 5);
+  EXPECT_LT(exact_searches, 20);
 }
 
 TEST(BinnedGrowth, SmallResidualsKeepTheirDigits) {
