@@ -167,21 +167,11 @@ std::array<BinnedLeaf, 2> BinnedLeaves::divide(BinnedLeaf& leaf, const SplitCand
 
 double BinnedLeaves::threshold(const BinnedLeaf& leaf, const SplitCandidate& split, const Node& node, const Node& left,
                                const Node& right) const {
-  const std::size_t input = static_cast<std::size_t>(split.input);
-  double low = -std::numeric_limits<double>::infinity();
-  double high = -low;
-  for (const int row : leaf.rows) {
-    const double value = data_.split_value(row, split.input);
-    if (rows_.goes_left(row, split)) {
-      low = std::max(low, value);
-    } else {
-      high = std::min(high, value);
-    }
-  }
+  const auto [low, high] = rows_.gap(leaf.rows, split);
   // The regression of the children's difference on the split input over the node's rows follows from the regressors'
   // covariance if the input is one of them.
   const TrainingRows& training = data_.training;
-  const int column = data_.problem.options.split_inputs[input];
+  const int column = data_.problem.options.split_inputs[static_cast<std::size_t>(split.input)];
   const auto regressor = std::find_if(training.regressors.begin(), training.regressors.end(),
                                       [&](const Regressor& each) { return each.input == column && each.level < 0; });
   const std::ptrdiff_t outputs = left.value.size();

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "parallel.hpp"
 
@@ -157,6 +158,28 @@ void BinnedRows::subtract(const std::vector<int>& rows, const Eigen::VectorXd& v
       at[1 + regressors + o] -= value(o) * at[0] + of_features.row(o).dot(x);
     }
   }
+}
+
+std::pair<double, double> BinnedRows::gap(const std::vector<int>& rows, const SplitCandidate& split) const {
+  const std::vector<std::uint8_t>& codes = bins_[static_cast<std::size_t>(split.input)].codes;
+  double low = -std::numeric_limits<double>::infinity();
+  double high = -low;
+  int bin_of_high = most_bins;
+  for (const int row : rows) {
+    // Values are looked at in the split's bin and the next one that has rows.
+    const int code = codes[static_cast<std::size_t>(row)];
+    if (code < split.bin || code > bin_of_high) {
+      continue;
+    }
+    const double value = data_.split_value(row, split.input);
+    if (code == split.bin && value <= split.last_left) {
+      low = std::max(low, value);
+    } else {
+      high = std::min(high, value);
+      bin_of_high = code;
+    }
+  }
+  return {low, high};
 }
 
 bool BinnedRows::goes_left(int row, const SplitCandidate& split) const {

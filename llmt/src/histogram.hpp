@@ -3,6 +3,7 @@
 #pragma once
 
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "bins.hpp"
@@ -42,6 +43,9 @@ class BinnedRows {
 
   /// Takes the linear function value + slope . (scaled regressors) off the residuals of some rows.
   void subtract(const std::vector<int>& rows, const Eigen::VectorXd& value, const Eigen::MatrixXd& slope);
+
+  /// The largest value on the left of a split on a number, and the smallest on its right.
+  std::pair<double, double> gap(const std::vector<int>& rows, const SplitCandidate& split) const;
 
   /// The side of a split on which a row lies.
   bool goes_left(int row, const SplitCandidate& split) const;
