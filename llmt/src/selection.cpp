@@ -32,6 +32,19 @@ constexpr double standard_errors_of_a_gain = 2.0;
 /// Up to this many unknowns every ridge is tried with every leaf count; beyond, in screening, the middle one.
 constexpr std::ptrdiff_t cheap_unknowns = 300;
 
+/// The tree with half widths for a validity; splits with a jump of at least `jump` stay crisp.
+Partition blended(const TrainingRows& training, const GrownTree& grown, const Validity& validity, double jump) {
+  Partition partition = grown.partition;
+  partition.validity = validity;
+  set_half_widths(partition, training.low(), training.high());
+  for (std::size_t i = 0; i < partition.nodes.size(); ++i) {
+    if (grown.jumps(static_cast<std::ptrdiff_t>(i)) >= jump) {
+      partition.nodes[i].half_width = 0.0;
+    }
+  }
+  return partition;
+}
+
 /// 2, 3, 4, 6, 9, ..., `largest`: each half as large again as the one before, counted from the largest down.
 std::vector<std::ptrdiff_t> leaf_counts(std::ptrdiff_t largest) {
   std::vector<std::ptrdiff_t> counts;
@@ -42,9 +55,15 @@ std::vector<std::ptrdiff_t> leaf_counts(std::ptrdiff_t largest) {
   return counts;
 }
 
-/// Position of a candidate among widths, leaf counts and ridges.
+/// How leaves share the space: what the half widths of the transitions come from.
+struct Shape {
+  double width;
+  double jump;
+};
+
+/// Position of a candidate among shapes, leaf counts and ridges.
 struct Key {
-  std::size_t width;
+  std::size_t shape;
   std::size_t leaves;
   std::size_t ridge;
   std::size_t shrinkage;
@@ -57,14 +76,31 @@ double ridge_at(const Candidates& candidates, std::size_t index) {
   return candidates.ridges.empty() ? 0.0 : candidates.ridges[index];
 }
 
+/// All widths with all jumps, but for those that keep the same splits crisp as one before.
+std::vector<Shape> distinct_shapes(const Candidates& candidates, const std::vector<GrownTree>& grown) {
+  std::vector<Shape> shapes;
+  std::set<std::ptrdiff_t> seen;
+  for (const double jump : candidates.jumps) {
+    std::ptrdiff_t kept = 0;
+    for (const GrownTree& tree : grown) {
+      kept += (tree.jumps.array() >= jump).count();
+    }
+    if (seen.insert(kept).second) {
+      for (const double width : candidates.widths) {
+        shapes.push_back({width, jump});
+      }
+    }
+  }
+  return shapes;
+}
+
 /// Errors of one fold and width, for the leaf counts and ridges that `wanted` accepts.
 template <class Wanted>
-Errors evaluate(const FoldRows& fold, const Partition& grown, const Candidates& candidates, std::size_t width,
-                const std::vector<std::ptrdiff_t>& counts, const Eigen::VectorXd& weights, bool stop_early,
-                const Wanted& wanted, int max_threads) {
-  Partition partition = grown;
-  partition.validity = {candidates.kind, candidates.widths[width], candidates.smoothness};
-  set_half_widths(partition, fold.training.low(), fold.training.high());
+Errors evaluate(const FoldRows& fold, const GrownTree& grown, const Candidates& candidates,
+                const std::vector<Shape>& shapes, std::size_t shape, const std::vector<std::ptrdiff_t>& counts,
+                const Eigen::VectorXd& weights, bool stop_early, const Wanted& wanted, int max_threads) {
+  const Partition partition =
+      blended(fold.training, grown, {candidates.kind, shapes[shape].width, candidates.smoothness}, shapes[shape].jump);
   // Sums over a subtree are the validities of its root for blends, so that one fit serves all leaf counts; Gaussians
   // are different ones for every leaf count.
   std::optional<JointFit> shared;
@@ -79,15 +115,15 @@ Errors evaluate(const FoldRows& fold, const Partition& grown, const Candidates& 
     std::vector<Key> tried;
     for (std::size_t r = 0; r < ridges; ++r) {
       for (std::size_t s = 0; s < candidates.shrinkages.size(); ++s) {
-        if (wanted(Key{width, k, r, s})) {
-          tried.push_back({width, k, r, s});
+        if (wanted(Key{shape, k, r, s})) {
+          tried.push_back({shape, k, r, s});
         }
       }
     }
     if (tried.empty()) {
       continue;
     }
-    const std::ptrdiff_t leaves = std::min(counts[k], grown.num_leaves());
+    const std::ptrdiff_t leaves = std::min(counts[k], grown.partition.num_leaves());
     std::vector<Partition> models;
     std::optional<JointFit> own;
     if (!shared) {
@@ -227,18 +263,16 @@ double squared_error(const Partition& partition, const TrainingRows& rows, const
   return total;
 }
 
-Partition estimate(const TrainingRows& training, const Partition& grown, const Candidate& candidate, int max_threads) {
-  Partition partition = prefix(grown, candidate.leaves);
+Partition estimate(const TrainingRows& training, const GrownTree& grown, const Candidate& candidate, int max_threads) {
+  Partition partition = prefix(blended(training, grown, candidate.validity, candidate.jump), candidate.leaves);
   if (candidate.leaves == 1) {
     partition.outer_slope.resize(0, 0);  // one linear model goes on as it is
   }
-  partition.validity = candidate.validity;
   if (candidate.validity.kind == ValidityKind::crisp) {
     const JointFit fit(training, std::move(partition), max_threads);
     return candidate.shrinkage > 0.0 ? fit.local(candidate.leaves, candidate.shrinkage)
                                      : fit.as_grown(candidate.leaves);
   }
-  set_half_widths(partition, training.low(), training.high());
   const JointFit fit(training, std::move(partition), max_threads);
   switch (candidate.estimation) {
     case Estimation::as_grown:
@@ -251,17 +285,17 @@ Partition estimate(const TrainingRows& training, const Partition& grown, const C
   return std::move(fit.joint(candidate.leaves, {{candidate.ridge, candidate.shrinkage}}).front());
 }
 
-Selection select(const std::vector<FoldRows>& folds, const std::vector<Partition>& grown, const Candidates& candidates,
+Selection select(const std::vector<FoldRows>& folds, const std::vector<GrownTree>& grown, const Candidates& candidates,
                  const Eigen::VectorXd& weights, int max_threads) {
   const std::size_t num_folds = folds.size();
   const std::size_t shrinkages = candidates.shrinkages.size();
   std::vector<std::vector<Eigen::VectorXd>> crisp(shrinkages, std::vector<Eigen::VectorXd>(num_folds));
   parallel_for(std::ssize(folds), max_threads, [&](std::ptrdiff_t f) {
     const FoldRows& fold = folds[static_cast<std::size_t>(f)];
-    const Partition& tree = grown[static_cast<std::size_t>(f)];
-    const JointFit fit(fold.training, tree, max_threads);
+    const GrownTree& tree = grown[static_cast<std::size_t>(f)];
+    const JointFit fit(fold.training, tree.partition, max_threads);
     for (std::size_t s = 0; s < shrinkages; ++s) {
-      const std::ptrdiff_t leaves = tree.num_leaves();
+      const std::ptrdiff_t leaves = tree.partition.num_leaves();
       const Partition models =
           candidates.shrinkages[s] > 0.0 ? fit.local(leaves, candidates.shrinkages[s]) : fit.as_grown(leaves);
       crisp[s][static_cast<std::size_t>(f)] = prefix_squared_errors(models, fold.held_out, weights);
@@ -322,21 +356,22 @@ Selection select(const std::vector<FoldRows>& folds, const std::vector<Partition
   }
 
   // Screening.
+  const std::vector<Shape> shapes = distinct_shapes(candidates, grown);
   const std::vector<std::ptrdiff_t> counts = leaf_counts(largest);
   const std::ptrdiff_t coefficients = std::ssize(folds.front().training.regressors) + 1;
   std::size_t screening = 0;
   for (std::ptrdiff_t rows = 0; screening < num_folds && rows < screening_rows; ++screening) {
     rows += folds[screening].held_out.count();
   }
-  const std::size_t widths = candidates.widths.size();
+  const std::size_t num_shapes = shapes.size();
   const std::size_t middle = candidates.ridges.size() / 2;
   const std::size_t usual = shrinkages / 2;
-  std::vector<Errors> screened(screening * widths);
+  std::vector<Errors> screened(screening * num_shapes);
   parallel_for(std::ssize(screened), max_threads, [&](std::ptrdiff_t task) {
-    const std::size_t fold = static_cast<std::size_t>(task) / widths;
-    const std::size_t width = static_cast<std::size_t>(task) % widths;
+    const std::size_t fold = static_cast<std::size_t>(task) / num_shapes;
+    const std::size_t shape = static_cast<std::size_t>(task) % num_shapes;
     screened[static_cast<std::size_t>(task)] = evaluate(
-        folds[fold], grown[fold], candidates, width, counts, weights, true,
+        folds[fold], grown[fold], candidates, shapes, shape, counts, weights, true,
         [&](const Key& key) {
           return key.shrinkage == usual && (counts[key.leaves] * coefficients <= cheap_unknowns || key.ridge == middle);
         },
@@ -345,12 +380,12 @@ Selection select(const std::vector<FoldRows>& folds, const std::vector<Partition
   // Sum over the screening folds of every candidate that all of them have.
   const auto totals = [&](const std::vector<Errors>& all) {
     std::map<Key, double> result;
-    for (std::size_t width = 0; width < widths; ++width) {
-      std::vector<Errors> of_width;
+    for (std::size_t shape = 0; shape < num_shapes; ++shape) {
+      std::vector<Errors> of_shape;
       for (std::size_t fold = 0; fold < screening; ++fold) {
-        of_width.push_back(all[fold * widths + width]);
+        of_shape.push_back(all[fold * num_shapes + shape]);
       }
-      for (const auto& [key, errors] : common(of_width)) {
+      for (const auto& [key, errors] : common(of_shape)) {
         result[key] = sum(errors);
       }
     }
@@ -358,33 +393,28 @@ Selection select(const std::vector<FoldRows>& folds, const std::vector<Partition
   };
   // The best of each width, best width first.
   const auto ranked = [&](const std::map<Key, double>& errors) {
-    std::map<std::size_t, std::pair<double, Key>> best;
+    std::vector<std::pair<double, Key>> order;
     for (const auto& [key, error] : errors) {
-      const auto [entry, is_new] = best.try_emplace(key.width, error, key);
-      if (!is_new && error < entry->second.first) {
-        entry->second = {error, key};
-      }
+      order.emplace_back(error, key);
     }
-    std::vector<std::pair<double, Key>> result;
-    for (const auto& [width, entry] : best) {
-      result.push_back(entry);
-    }
-    std::stable_sort(result.begin(), result.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
-    return result;
+    std::sort(order.begin(), order.end());
+    std::set<double> seen;
+    std::erase_if(order, [&](const auto& entry) { return !seen.insert(shapes[entry.second.shape].width).second; });
+    return order;
   };
   std::map<Key, double> screened_totals = totals(screened);
   std::vector<std::pair<double, Key>> best_of_width = ranked(screened_totals);
   best_of_width.resize(std::min(best_of_width.size(), finalists));
 
   // Other ridges and shrinkages at the finalists' best leaf counts.
-  std::vector<Errors> refined(screening * widths);
+  std::vector<Errors> refined(screening * num_shapes);
   parallel_for(std::ssize(refined), max_threads, [&](std::ptrdiff_t task) {
-    const std::size_t fold = static_cast<std::size_t>(task) / widths;
-    const std::size_t width = static_cast<std::size_t>(task) % widths;
+    const std::size_t fold = static_cast<std::size_t>(task) / num_shapes;
+    const std::size_t shape = static_cast<std::size_t>(task) % num_shapes;
     for (const auto& [error, best] : best_of_width) {
-      if (best.width == width) {
+      if (best.shape == shape) {
         refined[static_cast<std::size_t>(task)] = evaluate(
-            folds[fold], grown[fold], candidates, width, counts, weights, false,
+            folds[fold], grown[fold], candidates, shapes, shape, counts, weights, false,
             [&](const Key& key) {
               // At the best leaf count; where that is cheap, at its neighbours too.
               const std::size_t reach = counts[best.leaves] * coefficients <= 3 * cheap_unknowns ? 1 : 0;
@@ -407,7 +437,7 @@ Selection select(const std::vector<FoldRows>& folds, const std::vector<Partition
     std::map<std::size_t, std::pair<double, Key>> best_of_count;
     std::vector<std::pair<double, Key>> order;
     for (const auto& [key, error] : screened_totals) {
-      if (key.width != best.width) {
+      if (key.shape != best.shape) {
         continue;
       }
       order.emplace_back(error, key);
@@ -433,26 +463,27 @@ Selection select(const std::vector<FoldRows>& folds, const std::vector<Partition
     const Key& best = best_of_width[static_cast<std::size_t>(task) % best_of_width.size()].second;
     Errors& errors = final_errors[static_cast<std::size_t>(task)];
     if (fold < screening) {
-      const std::size_t slot = fold * widths + best.width;
+      const std::size_t slot = fold * num_shapes + best.shape;
       errors = screened[slot];
       errors.insert(refined[slot].begin(), refined[slot].end());
     } else {
       errors = evaluate(
-          folds[fold], grown[fold], candidates, best.width, counts, weights, false,
+          folds[fold], grown[fold], candidates, shapes, best.shape, counts, weights, false,
           [&](const Key& key) { return kept.contains(key); }, max_threads);
     }
   });
   for (std::size_t k = 0; k < best_of_width.size(); ++k) {
-    std::vector<Errors> of_width;
+    std::vector<Errors> of_shape;
     for (std::size_t fold = 0; fold < num_folds; ++fold) {
-      of_width.push_back(final_errors[fold * best_of_width.size() + k]);
+      of_shape.push_back(final_errors[fold * best_of_width.size() + k]);
     }
     std::optional<CandidateError> best;
-    for (const auto& [key, errors] : common(of_width)) {
+    for (const auto& [key, errors] : common(of_shape)) {
       if (!kept.contains(key)) {
         continue;
       }
-      const Candidate candidate{.validity = {candidates.kind, candidates.widths[key.width], candidates.smoothness},
+      const Candidate candidate{.validity = {candidates.kind, shapes[key.shape].width, candidates.smoothness},
+                                .jump = shapes[key.shape].jump,
                                 .estimation = candidates.estimation,
                                 .ridge = ridge_at(candidates, key.ridge),
                                 .shrinkage = candidates.shrinkages[key.shrinkage],

@@ -15,6 +15,12 @@ struct FoldRows {
   TrainingRows held_out;
 };
 
+/// A grown tree, and how far the outputs jump at its splits.
+struct GrownTree {
+  Partition partition;
+  Eigen::VectorXd jumps;  ///< of every node, see jump_sizes()
+};
+
 /// What the candidates are.
 struct Candidates {
   bool crisp = true;
@@ -22,6 +28,7 @@ struct Candidates {
   Estimation estimation = Estimation::joint;
   int smoothness = 1;
   std::vector<double> widths;  ///< empty: crisp alone
+  std::vector<double> jumps;   ///< see Candidate::jump
   std::vector<double> ridges;
   std::vector<double> shrinkages;
 };
@@ -45,13 +52,13 @@ Eigen::VectorXd prefix_squared_errors(const Partition& partition, const Training
 double squared_error(const Partition& partition, const TrainingRows& rows, const Eigen::VectorXd& weights);
 
 /// The partition with `candidate`'s leaves, validity and estimates.
-Partition estimate(const TrainingRows& training, const Partition& grown, const Candidate& candidate, int max_threads);
+Partition estimate(const TrainingRows& training, const GrownTree& grown, const Candidate& candidate, int max_threads);
 
 /// Compares on the held-out rows of all folds. First every width on as many folds as hold enough rows, leaf counts in
 /// steps of a half until two steps brought nothing; then the best two widths near their best leaf counts and ridges on
 /// the other folds.
 /// `grown`: of each fold the tree grown without its held-out rows.
-Selection select(const std::vector<FoldRows>& folds, const std::vector<Partition>& grown, const Candidates& candidates,
+Selection select(const std::vector<FoldRows>& folds, const std::vector<GrownTree>& grown, const Candidates& candidates,
                  const Eigen::VectorXd& weights, int max_threads);
 
 }  // namespace llmt

@@ -204,31 +204,35 @@ double total_weight(const TrainingRows& rows) {
   return rows.weight_unit * sum;
 }
 
-Chunk fetch(const TrainingRows& rows, std::ptrdiff_t index, const std::vector<int>& outputs) {
-  Chunk chunk;
-  chunk.begin = index * chunk_rows;
-  const std::ptrdiff_t count = std::min(chunk_rows, rows.count() - chunk.begin);
-  const int* const taken = rows.rows.data() + chunk.begin;
+Chunk fetch(const TrainingRows& rows, const std::vector<int>& positions, const std::vector<int>& outputs) {
+  const std::ptrdiff_t count = std::ssize(positions);
   const Table& table = *rows.table;
-  chunk.inputs.resize(count, table.inputs.cols());
-  chunk.outputs.resize(count, std::ssize(outputs));
-  chunk.deviations.resize(count, std::ssize(rows.regressors));
-  chunk.weights.resize(count);
+  const auto row_at = [&](std::ptrdiff_t i) {
+    return rows.rows[static_cast<std::size_t>(positions[static_cast<std::size_t>(i)])];
+  };
+  Chunk chunk{RowMajor(count, table.inputs.cols()), RowMajor(count, std::ssize(rows.regressors)),
+              RowMajor(count, std::ssize(outputs)), Eigen::VectorXd(count)};
   for (std::ptrdiff_t j = 0; j < table.inputs.cols(); ++j) {
     for (std::ptrdiff_t i = 0; i < count; ++i) {
-      chunk.inputs(i, j) = table.inputs(taken[i], j);
+      chunk.inputs(i, j) = table.inputs(row_at(i), j);
     }
   }
   for (std::ptrdiff_t o = 0; o < std::ssize(outputs); ++o) {
     for (std::ptrdiff_t i = 0; i < count; ++i) {
-      chunk.outputs(i, o) = table.outputs(taken[i], outputs[static_cast<std::size_t>(o)]);
+      chunk.outputs(i, o) = table.outputs(row_at(i), outputs[static_cast<std::size_t>(o)]);
     }
   }
   for (std::ptrdiff_t i = 0; i < count; ++i) {
-    chunk.weights(i) = rows.weight_unit * table.weights(taken[i]);
+    chunk.weights(i) = rows.weight_unit * table.weights(row_at(i));
     deviations_at(rows.columns, rows.regressors, chunk.inputs.row(i).data(), chunk.deviations.row(i).data());
   }
   return chunk;
+}
+
+Chunk fetch(const TrainingRows& rows, std::ptrdiff_t index, const std::vector<int>& outputs) {
+  std::vector<int> positions(static_cast<std::size_t>(std::min(chunk_rows, rows.count() - index * chunk_rows)));
+  std::iota(positions.begin(), positions.end(), static_cast<int>(index * chunk_rows));
+  return fetch(rows, positions, outputs);
 }
 
 }  // namespace llmt

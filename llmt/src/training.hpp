@@ -47,10 +47,9 @@ TrainingRows query_rows(const Table& table, std::vector<int> rows, const Trainin
 
 /// A few rows laid out one after the other, for passes over all of them.
 struct Chunk {
-  std::ptrdiff_t begin = 0;  ///< position of the first among the rows
-  RowMajor inputs;           ///< NaN: missing
-  RowMajor deviations;       ///< of the regressors from their centres; NaN: missing
-  RowMajor outputs;          ///< the ones asked for
+  RowMajor inputs;      ///< NaN: missing
+  RowMajor deviations;  ///< of the regressors from their centres; NaN: missing
+  RowMajor outputs;     ///< the ones asked for
   Eigen::VectorXd weights;
 
   std::ptrdiff_t count() const { return weights.size(); }
@@ -63,8 +62,11 @@ inline std::ptrdiff_t num_chunks(const TrainingRows& rows) { return (rows.count(
 /// Sum of the rows' weights.
 double total_weight(const TrainingRows& rows);
 
-/// The rows index * chunk_rows ... of `rows`.
+/// The rows at positions index * chunk_rows ... of `rows`.
 Chunk fetch(const TrainingRows& rows, std::ptrdiff_t index, const std::vector<int>& outputs);
+
+/// The rows at the given positions of `rows`.
+Chunk fetch(const TrainingRows& rows, const std::vector<int>& positions, const std::vector<int>& outputs);
 
 /// Levels beyond this many, the rarest, share the reference level's place in the local models.
 inline constexpr std::ptrdiff_t max_level_regressors = 30;

@@ -44,6 +44,65 @@ TEST(JumpingTruth, DefaultIsNeverMuchWorseThanTheCrispTree) {
   }
 }
 
+// Blends on both sides of a jump, which all splits blended or none would lose. The bound: half of the better of the
+// two.
+TEST(JumpingTruth, BlendKeepsTheJump) {
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    const Eigen::MatrixXd x = oracle::uniform(1500, 3, seed);
+    const Eigen::MatrixXd test = oracle::uniform(4000, 3, 1000 + seed);
+    const auto truth = [](const Eigen::MatrixXd& at) {
+      return ((at.col(0).array() > 0.2).select(2.0, Eigen::ArrayXd::Zero(at.rows())) +
+              (2.0 * at.col(1).array()).sin() * at.col(2).array())
+          .matrix()
+          .eval();
+    };
+    llmt::Random random(seed);
+    Eigen::VectorXd y = truth(x);
+    for (double& value : y) {
+      value += 0.1 * random.normal();
+    }
+    llmt::FitOptions all_blended;
+    all_blended.blend.jumps = {llmt::no_jump};
+    const llmt::FitResult result = llmt::fit(x, y);
+    const double without = llmt::rmse(llmt::fit(x, y, all_blended).model.predict(test), truth(test))(0);
+    EXPECT_LE(llmt::rmse(result.model.predict(test), truth(test))(0), 0.5 * without) << "seed " << seed;
+    // Found at the right place, and nowhere else.
+    const llmt::Partition& partition = result.model.partitions()[0];
+    ASSERT_EQ(partition.validity.kind, llmt::ValidityKind::blend);
+    for (const llmt::Node& node : partition.nodes) {
+      if (!node.is_leaf() && node.half_width == 0.0) {
+        EXPECT_EQ(node.split_input, 0);
+        EXPECT_NEAR(node.threshold, 0.2, 0.01);
+      }
+    }
+  }
+}
+
+// Curvature, kinks and noise are no jumps: 5 % of tests at most may call them so, with Bonferroni far fewer.
+TEST(JumpingTruth, SmoothAndKinkedTruthsHaveNoJumps) {
+  double crisp_splits = 0.0;
+  double splits = 0.0;
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    const Eigen::MatrixXd x = oracle::uniform(1000, 3, seed);
+    llmt::Random random(seed);
+    Eigen::VectorXd y = (3.0 * x.col(0).array()).sin() * x.col(1).array() + (x.col(2).array() - 0.1).abs();
+    for (double& value : y) {
+      value += 0.1 * random.normal();
+    }
+    llmt::FitOptions options;
+    options.blend.validity = llmt::ValidityChoice::blend;
+    options.blend.jumps = {1e-9};
+    options.growth.max_leaves = 20;
+    options.growth.significance = 1.0;
+    options.selection.folds.count = 0;
+    for (const llmt::Node& node : llmt::fit(x, y, options).model.partitions()[0].nodes) {
+      splits += node.is_leaf() ? 0.0 : 1.0;
+      crisp_splits += !node.is_leaf() && node.half_width == 0.0 ? 1.0 : 0.0;
+    }
+  }
+  EXPECT_LE(crisp_splits, 0.05 * splits);
+}
+
 // Among many candidates some is a little better on noise; that is not worth leaving the linear model for.
 TEST(NoisyTruth, NothingToFindGivesLeastSquares) {
   int trees = 0;
