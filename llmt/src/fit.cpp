@@ -404,7 +404,7 @@ FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<
     });
     candidate.leaves = std::min(candidate.leaves, grown_leaves);
     Partition partition = estimate(all, grown.tree, candidate, options.max_threads);
-    describe_leaves(all, partition);
+    describe_leaves(all, partition, options.max_threads);
     PartitionSummary described = summarise(partition, all);
     described.grown_leaves = grown_leaves;
     described.stop = grown.stop;
@@ -413,9 +413,7 @@ FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<
     described.best_of_kind = std::move(selection.best_of_kind);
     described.crisp_cv_rmse = std::move(selection.crisp_rmse);
     described.cv_folds = std::ssize(trees);
-    for (const FoldRows& fold : folds) {
-      described.held_out_rows += fold.held_out.count();
-    }
+    described.held_out_rows = selection.held_out_rows;
     summary.partitions[p] = std::move(described);
     partitions[p] = std::move(partition);
     report();

@@ -13,10 +13,12 @@
 namespace llmt {
 namespace {
 
-/// Rows of a band: this part of the smaller side, but so many per coefficient of a local model.
-constexpr double band_share = 0.1;
+/// Rows of a band: this part of the smaller side, but so many per coefficient of a local model, and at most half a
+/// side: what is not narrow tells nothing.
+constexpr double band_share = 0.2;
 constexpr std::ptrdiff_t least_rows_per_coefficient = 5;
-constexpr std::ptrdiff_t most_rows_per_coefficient = 30;
+constexpr std::ptrdiff_t most_rows_per_coefficient = 100;
+constexpr std::ptrdiff_t least_rows = 10;
 
 /// Where one side has fewer rows per coefficient, the gap is a constant.
 constexpr std::ptrdiff_t rows_per_coefficient_of_gap = 3;
@@ -53,11 +55,12 @@ double reach(std::vector<std::pair<double, int>>& side, std::ptrdiff_t count) {
 /// The rows of the bands on both sides; empty if there are not enough different values.
 std::vector<std::pair<double, int>> band(Sides& sides, std::ptrdiff_t coefficients) {
   const std::ptrdiff_t smaller = std::min(std::ssize(sides.left), std::ssize(sides.right));
-  const std::ptrdiff_t wanted = std::min(
-      smaller, std::clamp(static_cast<std::ptrdiff_t>(band_share * static_cast<double>(smaller)),
-                          least_rows_per_coefficient * coefficients, most_rows_per_coefficient * coefficients));
-  const double left = wanted > 0 ? reach(sides.left, wanted) : -1.0;
-  const double right = wanted > 0 ? reach(sides.right, wanted) : -1.0;
+  const std::ptrdiff_t share = static_cast<std::ptrdiff_t>(band_share * static_cast<double>(smaller));
+  const std::ptrdiff_t wanted =
+      std::min(std::max(share, std::min(least_rows_per_coefficient * coefficients, smaller / 2)),
+               most_rows_per_coefficient * coefficients);
+  const double left = wanted >= least_rows ? reach(sides.left, wanted) : -1.0;
+  const double right = wanted >= least_rows ? reach(sides.right, wanted) : -1.0;
   std::vector<std::pair<double, int>> rows;
   if (left < 0.0 || right < 0.0) {
     return rows;

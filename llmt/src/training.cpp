@@ -3,11 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <numeric>
 
 #include "evaluator.hpp"
+#include "parallel.hpp"
 
 namespace llmt {
 namespace {
@@ -233,6 +236,52 @@ Chunk fetch(const TrainingRows& rows, std::ptrdiff_t index, const std::vector<in
   std::vector<int> positions(static_cast<std::size_t>(std::min(chunk_rows, rows.count() - index * chunk_rows)));
   std::iota(positions.begin(), positions.end(), static_cast<int>(index * chunk_rows));
   return fetch(rows, positions, outputs);
+}
+
+void for_each_chunk(const TrainingRows& rows, const std::vector<int>& outputs, int max_threads,
+                    const std::function<void(std::size_t, const Chunk&)>& body) {
+  parallel_for(std::min(num_slots, num_chunks(rows)), max_threads, [&](std::ptrdiff_t slot) {
+    for (std::ptrdiff_t index = slot; index < num_chunks(rows); index += num_slots) {
+      body(static_cast<std::size_t>(slot), fetch(rows, index, outputs));
+    }
+  });
+}
+
+TrainingRows thinned(const TrainingRows& rows, std::ptrdiff_t count) {
+  TrainingRows result = rows;
+  if (rows.count() <= count + count / 4) {
+    return result;
+  }
+  // The rows with the smallest hashes of their values. Steps of splitmix64 (Steele, Lea & Flood 2014).
+  const auto mixed = [](std::uint64_t state, double value) {
+    std::uint64_t z = state + std::bit_cast<std::uint64_t>(value + 0.0) + 0x9e3779b97f4a7c15ULL;  // -0 as 0
+    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ULL;
+    z = (z ^ (z >> 27)) * 0x94d049bb133111ebULL;
+    return z ^ (z >> 31);
+  };
+  std::vector<std::uint64_t> hashes;
+  for (const int row : rows.rows) {
+    std::uint64_t hash = 0;
+    for (std::ptrdiff_t j = 0; j < rows.table->inputs.cols(); ++j) {
+      const double value = rows.table->inputs(row, j);
+      hash = mixed(hash, std::isnan(value) ? std::numeric_limits<double>::infinity() : value);
+    }
+    for (std::ptrdiff_t o = 0; o < rows.table->outputs.cols(); ++o) {
+      hash = mixed(hash, rows.table->outputs(row, o));
+    }
+    hashes.push_back(hash);
+  }
+  std::vector<std::uint64_t> order = hashes;
+  std::nth_element(order.begin(), order.begin() + (count - 1), order.end());
+  const std::uint64_t last = order[static_cast<std::size_t>(count - 1)];
+  result.rows.clear();
+  for (std::size_t i = 0; i < hashes.size(); ++i) {
+    if (hashes[i] <= last) {
+      result.rows.push_back(rows.rows[i]);
+    }
+  }
+  result.weight_unit *= total_weight(rows) / total_weight(result);
+  return result;
 }
 
 }  // namespace llmt

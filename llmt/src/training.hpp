@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <functional>
 #include <vector>
 
 #include "llmt/fit.hpp"
@@ -67,6 +68,16 @@ Chunk fetch(const TrainingRows& rows, std::ptrdiff_t index, const std::vector<in
 
 /// The rows at the given positions of `rows`.
 Chunk fetch(const TrainingRows& rows, const std::vector<int>& positions, const std::vector<int>& outputs);
+
+/// Passes over the rows in parallel: the chunks index, index + num_slots, ... of a slot come one after the other. What
+/// is summed up is summed per slot, and the slots in order.
+inline constexpr std::ptrdiff_t num_slots = 16;
+void for_each_chunk(const TrainingRows& rows, const std::vector<int>& outputs, int max_threads,
+                    const std::function<void(std::size_t slot, const Chunk& chunk)>& body);
+
+/// About `count` of the rows, or all if they are few more, with weights that make them stand for all. Which ones
+/// depends on the rows' values, not on their order; fewer are among more.
+TrainingRows thinned(const TrainingRows& rows, std::ptrdiff_t count);
 
 /// Levels beyond this many, the rarest, share the reference level's place in the local models.
 inline constexpr std::ptrdiff_t max_level_regressors = 30;

@@ -189,7 +189,7 @@ struct PartitionSummary {
   /// Held-out RMSE of the crisp prefixes with 1, 2, ... leaves; empty without folds.
   Eigen::VectorXd crisp_cv_rmse;
   std::ptrdiff_t cv_folds = 0;
-  std::ptrdiff_t held_out_rows = 0;  ///< over all folds
+  std::ptrdiff_t held_out_rows = 0;  ///< that errors are from, over all folds; at most 10000 of each
 };
 
 struct FitSummary {
