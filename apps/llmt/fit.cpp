@@ -34,7 +34,7 @@ CLI::CheckedTransformer choice_of(const std::array<const char*, Count>& names) {
   return CLI::CheckedTransformer(values);
 }
 
-/// "blend, width 2, ridge 0.001, shrinkage 0.1".
+/// "blend, width 2, jumps from 4, ridge 0.001, shrinkage 0.1".
 std::string describe(const Candidate& candidate) {
   if (candidate.validity.kind == ValidityKind::crisp) {
     const std::string name = candidate.leaves == 1 ? "least squares" : "crisp";
@@ -42,6 +42,7 @@ std::string describe(const Candidate& candidate) {
   }
   std::string text = fmt::format("{}, width {}", candidate.validity.kind == ValidityKind::blend ? "blend" : "Gaussians",
                                  number(candidate.validity.width, 3));
+  text += candidate.jump < no_jump ? fmt::format(", jumps from {}", number(candidate.jump, 3)) : "";
   text += candidate.estimation == Estimation::as_grown ? ", as grown"
           : candidate.estimation == Estimation::local  ? ", local"
                                                        : fmt::format(", ridge {}", candidate.ridge);
@@ -53,6 +54,7 @@ Json candidate_json(const CandidateError& entry) {
   constexpr std::array<const char*, 3> kinds = {"crisp", "blend", "gaussian"};
   return {{"validity", kinds[static_cast<std::size_t>(entry.candidate.validity.kind)]},
           {"width", entry.candidate.validity.width},
+          {"jump", entry.candidate.jump < no_jump ? Json(entry.candidate.jump) : Json(nullptr)},
           {"estimation", estimation_names[static_cast<std::size_t>(entry.candidate.estimation)]},
           {"ridge", entry.candidate.ridge},
           {"shrinkage", entry.candidate.shrinkage},
@@ -151,7 +153,7 @@ void print_summary(const FitArguments& arguments, const FitResult& result) {
       for (const CandidateError& other : partition.best_of_kind) {
         const Candidate& candidate = other.candidate;
         if (candidate.validity.kind != chosen.validity.kind || candidate.validity.width != chosen.validity.width ||
-            candidate.leaves != chosen.leaves) {
+            candidate.jump != chosen.jump || candidate.leaves != chosen.leaves) {
           table.add({"  against", describe(candidate), fmt::format("{}", candidate.leaves), number(other.rmse),
                      number(other.spread, 2), ""});
         }
@@ -229,6 +231,11 @@ void add_fit(CLI::App& app) {
                    "Widths to choose from: of a transition by the smaller child's extent; k_sigma")
       ->delimiter(',')
       ->option_text("FLOAT,... [0.5,1,2,4; Gaussians 0.333]");
+  command
+      ->add_option("--jump", blend.jumps,
+                   "Jumps to choose from: where the output jumps by so many standard deviations there is no transition")
+      ->delimiter(',')
+      ->option_text("FLOAT,... [inf,4,2,1,0.5]");
   command->add_option("--ridge", blend.ridges, "Ridges to choose from: hold of the joint estimate at the local one")
       ->delimiter(',')
       ->option_text("FLOAT,... [1e-8 ... 0.1]");

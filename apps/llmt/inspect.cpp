@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
@@ -89,6 +90,23 @@ std::string validity_text(const Validity& validity) {
   return "";
 }
 
+/// Where a blend jumps all the same: "x1 = 0.4, x3 = 7".
+std::string jumps_text(const Model& model, const Partition& partition) {
+  std::vector<std::string> places;
+  for (const Node& node : partition.nodes) {
+    const bool on_number =
+        !node.is_leaf() && node.level_side.empty() && node.threshold < std::numeric_limits<double>::max();
+    if (partition.validity.kind == ValidityKind::blend && on_number && node.half_width == 0.0) {
+      const std::string place = fmt::format("{} = {}", model.inputs()[static_cast<std::size_t>(node.split_input)].name,
+                                            number(node.threshold));
+      if (std::find(places.begin(), places.end(), place) == places.end()) {
+        places.push_back(place);
+      }
+    }
+  }
+  return fmt::format("{}", fmt::join(places, ", "));
+}
+
 void print_model(const Model& model, const std::string& path) {
   print(fmt::format("{}: {} inputs, {} outputs\n\n", path, model.num_inputs(), model.num_outputs()));
   Table inputs({"input", "smallest", "largest", "mean"});
@@ -114,6 +132,9 @@ void print_model(const Model& model, const std::string& path) {
                    conditions(model, leaves[k]), formula(model, leaves[k], output)});
       }
       print(table.text());
+    }
+    if (const std::string jumps = jumps_text(model, partition); !jumps.empty()) {
+      print(fmt::format("Jumps, not blended: {}\n", jumps));
     }
   }
 }

@@ -12,6 +12,7 @@
 #include "checks.hpp"
 #include "growth.hpp"
 #include "joint_fit.hpp"
+#include "jumps.hpp"
 #include "lolimot.hpp"
 #include "parallel.hpp"
 #include "selection.hpp"
@@ -83,6 +84,9 @@ void check_blend(const BlendOptions& options) {
   for (const double shrinkage : options.shrinkages) {
     require(shrinkage >= 0.0 && std::isfinite(shrinkage), "blend.shrinkages", shrinkage, "finite and not negative");
   }
+  for (const double jump : options.jumps) {
+    require(jump >= 0.0, "blend.jumps", jump, "not negative");
+  }
   require(options.smoothness == 1 || options.smoothness == 2, "blend.smoothness", options.smoothness, "1 or 2");
 }
 
@@ -129,6 +133,13 @@ Plan make_plan(const FitOptions& options, const TrainingRows& all, bool has_fold
       plan.candidates.widths =
           choice == ValidityChoice::gaussian ? std::vector<double>{1.0 / 3.0} : std::vector<double>{0.5, 1.0, 2.0, 4.0};
     }
+    plan.candidates.jumps = options.blend.jumps;
+    if (plan.candidates.jumps.empty()) {
+      plan.candidates.jumps = {no_jump};
+      if (has_folds && plan.candidates.kind == ValidityKind::blend) {
+        plan.candidates.jumps.insert(plan.candidates.jumps.end(), {4.0, 2.0, 1.0, 0.5});
+      }
+    }
     if (options.blend.estimation == Estimation::joint) {
       plan.candidates.ridges =
           options.blend.ridges.empty() ? std::vector<double>{1e-8, 1e-6, 1e-4, 1e-3, 1e-2, 1e-1} : options.blend.ridges;
@@ -157,7 +168,7 @@ Plan make_plan(const FitOptions& options, const TrainingRows& all, bool has_fold
 }
 
 struct Grown {
-  Partition partition;
+  GrownTree tree;
   StopReason stop = StopReason::leaf_samples;
   SearchSummary search;
 };
@@ -178,15 +189,14 @@ Grown grow_rows(const TrainingRows& rows, const std::vector<int>& served, const 
   } else {
     result = grow(problem);
   }
-  Grown grown{.partition = {.outputs = served,
-                            .validity = {},
-                            .nodes = std::move(result.nodes),
-                            .outer_slope = {},
-                            .residual_range = {}},
-              .stop = result.stop,
-              .search = result.search};
-  grown.partition.outer_slope = agreed_slope(grown.partition);
-  return grown;
+  Partition partition{
+      .outputs = served, .validity = {}, .nodes = std::move(result.nodes), .outer_slope = {}, .residual_range = {}};
+  partition.outer_slope = agreed_slope(partition);
+  Eigen::VectorXd jumps = Eigen::VectorXd::Zero(std::ssize(partition.nodes));
+  if (!plan.candidates.widths.empty() && plan.candidates.kind == ValidityKind::blend) {
+    jumps = jump_sizes(rows, partition, max_threads);
+  }
+  return {{std::move(partition), std::move(jumps)}, result.stop, result.search};
 }
 
 /// Weights of the outputs' squared errors: 1 for a single one; else 1 / variance, so that outputs of any scale count
@@ -346,11 +356,10 @@ FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<
   parallel_for(std::ssize(served), trees_at_once, [&](std::ptrdiff_t index) {
     const std::size_t p = static_cast<std::size_t>(index);
     const Eigen::VectorXd weights = error_weights(table, served[p]);
-    std::vector<Partition> trees(folds.size());  // of the folds
+    std::vector<GrownTree> trees(folds.size());  // of the folds
     parallel_for(std::ssize(trees), options.max_threads, [&](std::ptrdiff_t f) {
       const FoldRows& fold = folds[static_cast<std::size_t>(f)];
-      trees[static_cast<std::size_t>(f)] =
-          grow_rows(fold.training, served[p], plan, false, options.max_threads).partition;
+      trees[static_cast<std::size_t>(f)] = grow_rows(fold.training, served[p], plan, false, options.max_threads).tree;
       report();
     });
     Selection selection;
@@ -360,12 +369,13 @@ FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<
       candidate = selection.chosen.candidate;
     }
     Grown grown = grow_rows(all, served[p], plan, trees.empty(), options.max_threads);
-    const std::ptrdiff_t grown_leaves = grown.partition.num_leaves();
+    const std::ptrdiff_t grown_leaves = grown.tree.partition.num_leaves();
     if (trees.empty()) {
       candidate.leaves = grown_leaves;
       candidate.shrinkage = plan.candidates.shrinkages.front();
       if (!plan.candidates.widths.empty()) {
         candidate.validity = {plan.candidates.kind, plan.candidates.widths.front(), plan.candidates.smoothness};
+        candidate.jump = plan.candidates.jumps.front();
         candidate.estimation = plan.candidates.estimation;
         candidate.ridge = plan.candidates.ridges.empty() ? 0.0 : plan.candidates.ridges.front();
       }
@@ -373,15 +383,15 @@ FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<
       grown.stop = StopReason::cross_validation;
     }
     parallel_for(std::ssize(fold_partitions), options.max_threads, [&](std::ptrdiff_t f) {
-      const Partition& tree = trees[static_cast<std::size_t>(f)];
+      const GrownTree& tree = trees[static_cast<std::size_t>(f)];
       Candidate of_fold = candidate;
-      of_fold.leaves = std::min(of_fold.leaves, tree.num_leaves());
+      of_fold.leaves = std::min(of_fold.leaves, tree.partition.num_leaves());
       fold_partitions[static_cast<std::size_t>(f)][p] =
           estimate(folds[static_cast<std::size_t>(f)].training, tree, of_fold, options.max_threads);
     });
     candidate.leaves = std::min(candidate.leaves, grown_leaves);
-    Partition partition = estimate(all, grown.partition, candidate, options.max_threads);
-    describe_leaves(all, partition);
+    Partition partition = estimate(all, grown.tree, candidate, options.max_threads);
+    describe_leaves(all, partition, options.max_threads);
     PartitionSummary described = summarise(partition, all);
     described.grown_leaves = grown_leaves;
     described.stop = grown.stop;
@@ -391,9 +401,7 @@ FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<
     described.best_of_kind = std::move(selection.best_of_kind);
     described.crisp_cv_rmse = std::move(selection.crisp_rmse);
     described.cv_folds = std::ssize(trees);
-    for (const FoldRows& fold : folds) {
-      described.held_out_rows += fold.held_out.count();
-    }
+    described.held_out_rows = selection.held_out_rows;
     summary.partitions[p] = std::move(described);
     partitions[p] = std::move(partition);
     report();

@@ -48,7 +48,7 @@ void BinnedRows::fill_features() {
     for (std::ptrdiff_t index = chunks * block / blocks; index < chunks * (block + 1) / blocks; ++index) {
       const Chunk chunk = fetch(training, index, {});
       for (std::ptrdiff_t i = 0; i < chunk.count(); ++i) {
-        const std::ptrdiff_t at = chunk.begin + i;
+        const std::ptrdiff_t at = index * chunk_rows + i;
         const double root = std::sqrt(chunk.weights(i));
         double* row = features_.row(at);
         row[0] = root;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "evaluator.hpp"
+#include "normal_equations.hpp"
 #include "training.hpp"
 
 namespace llmt {
@@ -36,6 +37,10 @@ class JointFit {
   /// The prefix with `leaves` leaves and the joint estimates for each ridge and shrinkage, in order.
   std::vector<Partition> joint(std::ptrdiff_t leaves, const std::vector<Regularisation>& regularisations) const;
 
+  /// One joint estimate on the rows `all`, of which this fit's are a sample that stands for them: from the estimate on
+  /// the sample by conjugate gradients, preconditioned with it. Local estimates and hold are those of the sample.
+  Partition joint_on(const TrainingRows& all, std::ptrdiff_t leaves, const Regularisation& regularisation) const;
+
   /// The prefix with `leaves` leaves and locally weighted estimates.
   Partition local(std::ptrdiff_t leaves, double shrinkage) const;
 
@@ -43,33 +48,39 @@ class JointFit {
   Partition as_grown(std::ptrdiff_t leaves) const { return prefix(partition_, leaves); }
 
  private:
-  void set_residual_range();
-  /// Whether rows whose missing values leave open which leaves they belong to take no part: they would teach all of
-  /// them wrong.
-  bool leaves_out_ambiguous(const Evaluator& evaluator) const;
-  void assemble(int max_threads);
+  /// The normal equations of a prefix.
+  struct System {
+    std::vector<int> nodes;     // its leaves
+    std::vector<int> position;  // of every node at or below one of them: that leaf's among `nodes`; else -1
+    RowMajor matrix;            // upper triangle
+  };
+  struct Solution {
+    std::vector<Eigen::MatrixXd> local;  // of every node
+    Eigen::MatrixXd anchors;             // of the leaves, one below the other
+    Eigen::MatrixXd coefficients;
+    RowMajor factor;
+  };
+
+  System system(std::ptrdiff_t leaves) const;
+  Solution solve(const System& system, const Regularisation& regularisation) const;
+  Partition with_solution(const System& system, const Solution& solution) const;
+  /// What holds the leaves' coefficients, times a change of them.
+  Eigen::MatrixXd held(const System& system, const Regularisation& regularisation, const Eigen::MatrixXd& change) const;
+  /// sum_n q_n Phi_i a r over `rows`, r what the coefficients leave of the outputs, or of zero.
+  Eigen::MatrixXd gradient(const TrainingRows& rows, const System& system, const Eigen::MatrixXd& coefficients,
+                           bool of_outputs) const;
   /// Of all nodes, size x outputs, about the root's model.
   std::vector<Eigen::MatrixXd> local_models(std::size_t nodes, double shrinkage) const;
   Partition with_models(std::ptrdiff_t leaves, const std::vector<Eigen::MatrixXd>& models) const;
   Eigen::VectorXd hold(std::size_t node, double shrinkage) const;
-  Eigen::MatrixXd block(std::size_t row_leaf, std::size_t column_leaf) const;
   void set_model(Node& node, const Eigen::MatrixXd& coefficients) const;
 
   const TrainingRows& training_;
   Partition partition_;
-  std::ptrdiff_t size_;    // coefficients of a local model
-  std::ptrdiff_t packed_;  // doubles of a block
-  bool missing_;           // blocks of rows with missing values are not symmetric, so all are stored in full
-  Eigen::VectorXd scale_;  // of the regressors
-  Eigen::VectorXd output_scale_;
-  std::vector<int> leaves_;                  // nodes, ascending
-  std::vector<std::vector<double>> blocks_;  // of leaf i: with leaves 0 ... i
-  std::vector<Eigen::MatrixXd> gram_;        // of every node, size x size
-  std::vector<Eigen::MatrixXd> products_;    // of every node, size x outputs: sum Phi a r
-  Eigen::MatrixXd root_;                     // coefficients of the root's model
+  int max_threads_;
+  std::ptrdiff_t size_;   // coefficients of a local model
+  Eigen::MatrixXd root_;  // coefficients of the root's model
+  NormalEquations sums_;
 };
-
-/// Fills in what a finished partition tells of its leaves: residual sums of squares and inverse Gram matrices.
-void describe_leaves(const TrainingRows& training, Partition& partition);
 
 }  // namespace llmt

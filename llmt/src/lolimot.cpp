@@ -40,7 +40,7 @@ class Lolimot {
     deviations_.resize(training.count(), std::ssize(training.regressors));
     for (std::ptrdiff_t index = 0; index < num_chunks(training); ++index) {
       const Chunk chunk = fetch(training, index, {});
-      deviations_.middleRows(chunk.begin, chunk.count()) =
+      deviations_.middleRows(index * chunk_rows, chunk.count()) =
           chunk.deviations.array().isNaN().select(0.0, chunk.deviations);
     }
     split_values_ = table.inputs(training.rows, problem.options.split_inputs);

@@ -3,19 +3,19 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <map>
+#include <numeric>
 #include <optional>
-#include <set>
 
-#include "evaluator.hpp"
+#include "comparison.hpp"
 #include "joint_fit.hpp"
 #include "parallel.hpp"
 
 namespace llmt {
 namespace {
 
-/// Held-out rows that are enough to tell good candidates from bad ones.
+/// Held-out rows that are enough to tell good candidates from bad ones, and how many of a fold are looked at.
 constexpr std::ptrdiff_t screening_rows = 1000;
+constexpr std::ptrdiff_t most_held_out_rows = 10000;
 
 /// Widths that go on to all folds.
 constexpr std::size_t finalists = 2;
@@ -23,453 +23,324 @@ constexpr std::size_t finalists = 2;
 /// Candidates of each finalist that are compared on all folds, whatever their leaf count.
 constexpr std::size_t candidates_on_all_folds = 3;
 
-/// Leaves of the tree that are asked whether they agree on a slope beyond the training extent.
-constexpr std::ptrdiff_t leaves_that_agree = 32;
-
-/// A tree has to be better than one leaf by more than this many standard errors of the gain.
+/// What is less simple has to be better by more than this many standard errors of the gain.
 constexpr double standard_errors_of_a_gain = 2.0;
 
-/// Up to this many unknowns every ridge is tried with every leaf count; beyond, in screening, the middle one.
+/// Up to this many unknowns every ridge is tried with every leaf count; beyond, in screening, the best one so far.
 constexpr std::ptrdiff_t cheap_unknowns = 300;
 
-/// 2, 3, 4, 6, 9, ..., `largest`: each half as large again as the one before, counted from the largest down.
-std::vector<std::ptrdiff_t> leaf_counts(std::ptrdiff_t largest) {
-  std::vector<std::ptrdiff_t> counts;
-  for (std::ptrdiff_t count = largest; count > 1; count = std::min(count - 1, (count * 2 + 1) / 3)) {
-    counts.push_back(count);
-  }
-  std::reverse(counts.begin(), counts.end());
-  return counts;
-}
+/// A shape is at its end when so many leaf counts brought nothing.
+constexpr std::size_t steps_without_gain = 2;
 
-/// Position of a candidate among widths, leaf counts and ridges.
-struct Key {
-  std::size_t width;
-  std::size_t leaves;
-  std::size_t ridge;
-  std::size_t shrinkage;
-  auto operator<=>(const Key&) const = default;
-};
+/// Screening goes on to three times as many unknowns with the better half of the shapes, but at least so many.
+constexpr std::ptrdiff_t next_unknowns = 3;
+constexpr std::size_t fewest_shapes = 3;
 
-using Errors = std::map<Key, double>;  // sum of squares over the held-out rows of a fold
+double sum(const std::vector<double>& values) { return std::accumulate(values.begin(), values.end(), 0.0); }
 
-double ridge_at(const Candidates& candidates, std::size_t index) {
-  return candidates.ridges.empty() ? 0.0 : candidates.ridges[index];
-}
-
-/// Errors of one fold and width, for the leaf counts and ridges that `wanted` accepts.
-template <class Wanted>
-Errors evaluate(const FoldRows& fold, const Partition& grown, const Candidates& candidates, std::size_t width,
-                const std::vector<std::ptrdiff_t>& counts, const Eigen::VectorXd& weights, bool stop_early,
-                const Wanted& wanted, int max_threads) {
-  Partition partition = grown;
-  partition.validity = {candidates.kind, candidates.widths[width], candidates.smoothness};
-  set_half_widths(partition, fold.training.low(), fold.training.high());
-  // Sums over a subtree are the validities of its root for blends, so that one fit serves all leaf counts; Gaussians
-  // are different ones for every leaf count.
-  std::optional<JointFit> shared;
-  if (candidates.kind == ValidityKind::blend) {
-    shared.emplace(fold.training, partition, max_threads);
-  }
-  const std::size_t ridges = std::max<std::size_t>(candidates.ridges.size(), 1);
-  Errors errors;
-  double best = std::numeric_limits<double>::infinity();
-  int without_gain = 0;
-  for (std::size_t k = 0; k < counts.size() && without_gain < 2; ++k) {
-    std::vector<Key> tried;
-    for (std::size_t r = 0; r < ridges; ++r) {
-      for (std::size_t s = 0; s < candidates.shrinkages.size(); ++s) {
-        if (wanted(Key{width, k, r, s})) {
-          tried.push_back({width, k, r, s});
-        }
-      }
-    }
-    if (tried.empty()) {
-      continue;
-    }
-    const std::ptrdiff_t leaves = std::min(counts[k], grown.num_leaves());
-    std::vector<Partition> models;
-    std::optional<JointFit> own;
-    if (!shared) {
-      own.emplace(fold.training, prefix(partition, leaves), max_threads);
-    }
-    const JointFit& fit = shared ? *shared : *own;
-    if (candidates.estimation == Estimation::joint) {
-      std::vector<Regularisation> values;
-      for (const Key& key : tried) {
-        values.push_back({ridge_at(candidates, key.ridge), candidates.shrinkages[key.shrinkage]});
-      }
-      models = fit.joint(leaves, values);
-    } else {
-      for (const Key& key : tried) {
-        models.push_back(candidates.estimation == Estimation::local
-                             ? fit.local(leaves, candidates.shrinkages[key.shrinkage])
-                             : fit.as_grown(leaves));
-      }
-    }
-    double here = std::numeric_limits<double>::infinity();
-    for (std::size_t i = 0; i < models.size(); ++i) {
-      const double error = squared_error(models[i], fold.held_out, weights);
-      errors[tried[i]] = error;
-      here = std::min(here, error);
-    }
-    without_gain = stop_early && here >= best ? without_gain + 1 : 0;
-    best = std::min(best, here);
-  }
-  return errors;
-}
-
-/// A sum over folds of errors that all of them have.
-std::map<Key, std::vector<double>> common(const std::vector<Errors>& folds) {
-  std::map<Key, std::vector<double>> result;
-  for (const auto& [key, error] : folds.front()) {
-    std::vector<double> all;
-    for (const Errors& fold : folds) {
-      if (const auto found = fold.find(key); found != fold.end()) {
-        all.push_back(found->second);
-      }
-    }
-    if (all.size() == folds.size()) {
-      result[key] = std::move(all);
-    }
-  }
-  return result;
-}
-
-double sum(const std::vector<double>& values) {
-  double total = 0.0;
-  for (const double value : values) {
-    total += value;
-  }
-  return total;
-}
-
-/// Goes back to one leaf if the gain on it is within chance: not more than two standard errors of the paired
-/// differences of the folds. A single hold-out has no such measure.
-Selection prefer_least_squares(Selection selection, const Candidates& candidates) {
-  const Eigen::VectorXd gain = selection.best_of_kind.front().fold_rmse - selection.chosen.fold_rmse;
-  if (!candidates.crisp || gain.size() < 2) {
-    return selection;
+/// Whether the gain of `other` on `simple` is beyond chance: more than two standard errors of the paired differences of
+/// the folds. A single hold-out has no such measure.
+bool is_beyond_chance(const CandidateError& simple, const CandidateError& other) {
+  const Eigen::VectorXd gain = simple.fold_rmse - other.fold_rmse;
+  if (gain.size() < 2) {
+    return other.rmse < simple.rmse;
   }
   const double folds = static_cast<double>(gain.size());
   const double error = std::sqrt((gain.array() - gain.mean()).square().sum() / (folds - 1.0) / folds);
-  if (!(gain.mean() > standard_errors_of_a_gain * error)) {
-    selection.chosen = selection.best_of_kind.front();
-  }
-  return selection;
+  return gain.mean() > standard_errors_of_a_gain * error;
 }
 
-}  // namespace
-
-Eigen::MatrixXd agreed_slope(const Partition& grown) {
-  const Partition first = prefix(grown, leaves_that_agree);
-  const Node& root = first.nodes.front();
-  Eigen::MatrixXd spread = Eigen::MatrixXd::Zero(root.slope.rows(), root.slope.cols());
-  for (const Node& node : first.nodes) {
-    if (node.is_leaf()) {
-      spread +=
-          static_cast<double>(node.samples) / static_cast<double>(root.samples) * (node.slope - root.slope).cwiseAbs2();
+/// Errors of candidates with the measures that the user sees.
+class Judge {
+ public:
+  Judge(const std::vector<FoldRows>& folds, std::ptrdiff_t outputs) {
+    for (const FoldRows& fold : folds) {
+      weights_.push_back(total_weight(fold.held_out) * static_cast<double>(outputs));
     }
   }
-  Eigen::MatrixXd slope = root.slope;
-  for (std::ptrdiff_t o = 0; o < spread.rows(); ++o) {
-    for (std::ptrdiff_t k = 0; k < spread.cols(); ++k) {
-      const double squared = root.slope(o, k) * root.slope(o, k);
-      slope(o, k) *= squared > spread(o, k) ? 1.0 - spread(o, k) / squared : 0.0;
+
+  CandidateError operator()(const Candidate& candidate, const std::vector<double>& errors) const {
+    CandidateError result{candidate, std::sqrt(sum(errors) / sum(weights_)), 0.0};
+    result.fold_rmse.resize(std::ssize(errors));
+    for (std::size_t f = 0; f < errors.size(); ++f) {
+      result.fold_rmse(static_cast<std::ptrdiff_t>(f)) = std::sqrt(errors[f] / weights_[f]);
     }
-  }
-  return slope;
-}
-
-Eigen::VectorXd prefix_squared_errors(const Partition& partition, const TrainingRows& rows,
-                                      const Eigen::VectorXd& weights) {
-  const Evaluator evaluator(partition, rows.columns, std::ssize(rows.regressors));
-  Eigen::VectorXd change = Eigen::VectorXd::Zero(partition.num_leaves());  // of the sum, from M - 1 to M leaves
-  Eigen::VectorXd values(std::ssize(partition.outputs));
-  for (std::ptrdiff_t index = 0; index < num_chunks(rows); ++index) {
-    const Chunk chunk = fetch(rows, index, partition.outputs);
-    for (std::ptrdiff_t row = 0; row < chunk.count(); ++row) {
-      const double* deviations = chunk.deviations.row(row).data();
-      double previous = 0.0;
-      for (int node = 0; node >= 0;) {
-        evaluator.local(node, deviations, values.data());
-        evaluator.finish(deviations, values.data());
-        const double squared =
-            chunk.weights(row) * weights.dot((chunk.outputs.row(row).transpose() - values).cwiseAbs2());
-        // Nodes 2k-1 and 2k come with the k-th split, that is with k + 1 leaves.
-        change((node + 1) / 2) += squared - previous;
-        previous = squared;
-        node = partition.nodes[static_cast<std::size_t>(node)].is_leaf()
-                   ? -1
-                   : evaluator.child_of(node, chunk.inputs.row(row).data());
-      }
+    if (errors.size() > 1) {
+      result.spread = std::sqrt((result.fold_rmse.array() - result.fold_rmse.mean()).square().sum() /
+                                static_cast<double>(errors.size() - 1));
     }
+    return result;
   }
-  for (std::ptrdiff_t leaves = 1; leaves < change.size(); ++leaves) {
-    change(leaves) += change(leaves - 1);
-  }
-  return change.cwiseMax(0.0);
-}
 
-double squared_error(const Partition& partition, const TrainingRows& rows, const Eigen::VectorXd& weights) {
-  const Evaluator evaluator(partition, rows.columns, std::ssize(rows.regressors));
-  std::vector<Activation> active;
-  Eigen::VectorXd values(std::ssize(partition.outputs));
-  double total = 0.0;
-  for (std::ptrdiff_t index = 0; index < num_chunks(rows); ++index) {
-    const Chunk chunk = fetch(rows, index, partition.outputs);
-    for (std::ptrdiff_t row = 0; row < chunk.count(); ++row) {
-      evaluator.activate(chunk.inputs.row(row).data(), active);
-      evaluator.combine(active, chunk.deviations.row(row).data(), values.data());
-      total += chunk.weights(row) * weights.dot((chunk.outputs.row(row).transpose() - values).cwiseAbs2());
-    }
-  }
-  return total;
-}
+ private:
+  std::vector<double> weights_;
+};
 
-Partition estimate(const TrainingRows& training, const Partition& grown, const Candidate& candidate, int max_threads) {
-  Partition partition = prefix(grown, candidate.leaves);
-  if (candidate.leaves == 1) {
-    partition.outer_slope.resize(0, 0);  // one linear model goes on as it is
-  }
-  partition.validity = candidate.validity;
-  if (candidate.validity.kind == ValidityKind::crisp) {
-    const JointFit fit(training, std::move(partition), max_threads);
-    return candidate.shrinkage > 0.0 ? fit.local(candidate.leaves, candidate.shrinkage)
-                                     : fit.as_grown(candidate.leaves);
-  }
-  set_half_widths(partition, training.low(), training.high());
-  const JointFit fit(training, std::move(partition), max_threads);
-  switch (candidate.estimation) {
-    case Estimation::as_grown:
-      return fit.as_grown(candidate.leaves);
-    case Estimation::local:
-      return fit.local(candidate.leaves, candidate.shrinkage);
-    case Estimation::joint:
-      break;
-  }
-  return std::move(fit.joint(candidate.leaves, {{candidate.ridge, candidate.shrinkage}}).front());
-}
-
-Selection select(const std::vector<FoldRows>& folds, const std::vector<Partition>& grown, const Candidates& candidates,
-                 const Eigen::VectorXd& weights, int max_threads) {
-  const std::size_t num_folds = folds.size();
+/// Fills in least squares, the crisp trees and the best of them.
+void compare_crisp(const std::vector<FoldRows>& folds, const std::vector<GrownTree>& grown,
+                   const Candidates& candidates, const Eigen::VectorXd& weights, int max_threads, const Judge& judge,
+                   Selection& selection) {
   const std::size_t shrinkages = candidates.shrinkages.size();
-  std::vector<std::vector<Eigen::VectorXd>> crisp(shrinkages, std::vector<Eigen::VectorXd>(num_folds));
-  parallel_for(std::ssize(folds), max_threads, [&](std::ptrdiff_t f) {
-    const FoldRows& fold = folds[static_cast<std::size_t>(f)];
-    const Partition& tree = grown[static_cast<std::size_t>(f)];
-    const JointFit fit(fold.training, tree, max_threads);
+  std::vector<std::vector<Eigen::VectorXd>> errors(shrinkages, std::vector<Eigen::VectorXd>(folds.size()));
+  parallel_for(std::ssize(folds), max_threads, [&](std::ptrdiff_t index) {
+    const std::size_t f = static_cast<std::size_t>(index);
+    const JointFit fit(folds[f].training, grown[f].partition, max_threads);
+    const std::ptrdiff_t leaves = grown[f].partition.num_leaves();
     for (std::size_t s = 0; s < shrinkages; ++s) {
-      const std::ptrdiff_t leaves = tree.num_leaves();
-      const Partition models =
-          candidates.shrinkages[s] > 0.0 ? fit.local(leaves, candidates.shrinkages[s]) : fit.as_grown(leaves);
-      crisp[s][static_cast<std::size_t>(f)] = prefix_squared_errors(models, fold.held_out, weights);
+      const double shrinkage = candidates.shrinkages[s];
+      const Partition models = shrinkage > 0.0 ? fit.local(leaves, shrinkage) : fit.as_grown(leaves);
+      errors[s][f] = prefix_squared_errors(models, folds[f].held_out, weights, max_threads);
     }
   });
   std::ptrdiff_t largest = 0;
-  double held_out_weight = 0.0;
-  std::vector<double> fold_weight;
-  for (std::size_t f = 0; f < num_folds; ++f) {
-    largest = std::max(largest, crisp[0][f].size());
-    fold_weight.push_back(total_weight(folds[f].held_out) * static_cast<double>(weights.size()));
-    held_out_weight += fold_weight.back();
+  for (const Eigen::VectorXd& fold : errors.front()) {
+    largest = std::max(largest, fold.size());
   }
-  const auto described = [&](const Candidate& candidate, const std::vector<double>& errors) {
-    CandidateError result{candidate, std::sqrt(sum(errors) / held_out_weight), 0.0};
-    double mean = 0.0;
-    std::vector<double> rmse;
-    for (std::size_t f = 0; f < errors.size(); ++f) {
-      rmse.push_back(std::sqrt(errors[f] / fold_weight[f]));
-      mean += rmse.back() / static_cast<double>(errors.size());
+  const auto error_of = [&](std::size_t shrinkage, std::ptrdiff_t leaves) {
+    std::vector<double> of_folds;
+    for (const Eigen::VectorXd& fold : errors[shrinkage]) {
+      of_folds.push_back(fold(std::min(leaves, fold.size()) - 1));  // a smaller tree stays at its last one
     }
-    for (const double value : rmse) {
-      result.spread += (value - mean) * (value - mean);
-    }
-    result.spread = rmse.size() > 1 ? std::sqrt(result.spread / static_cast<double>(rmse.size() - 1)) : 0.0;
-    result.fold_rmse = Eigen::Map<const Eigen::VectorXd>(rmse.data(), std::ssize(rmse));
-    return result;
+    return judge({.shrinkage = candidates.shrinkages[shrinkage], .leaves = leaves}, of_folds);
   };
-  // A fold whose tree is smaller stays at its last one.
-  const auto crisp_errors = [&](const Candidate& candidate, std::size_t shrinkage) {
-    std::vector<double> errors;
-    for (const Eigen::VectorXd& fold : crisp[shrinkage]) {
-      errors.push_back(fold(std::min(candidate.leaves, fold.size()) - 1));
-    }
-    return errors;
-  };
-  Selection selection;
   selection.crisp_rmse = Eigen::VectorXd::Constant(largest, std::numeric_limits<double>::infinity());
-  selection.best_of_kind.push_back(described({}, crisp_errors({}, 0)));
-  CandidateError best_crisp = selection.best_of_kind.front();
+  CandidateError best = error_of(0, 1);
+  best.candidate.shrinkage = 0.0;
+  selection.best_of_kind.push_back(best);
   for (std::size_t s = 0; s < shrinkages; ++s) {
     for (std::ptrdiff_t leaves = 1; leaves <= largest; ++leaves) {
-      const Candidate candidate{.shrinkage = candidates.shrinkages[s], .leaves = leaves};
-      const CandidateError error = described(candidate, crisp_errors(candidate, s));
+      const CandidateError error = error_of(s, leaves);
       selection.crisp_rmse(leaves - 1) = std::min(selection.crisp_rmse(leaves - 1), error.rmse);
-      if (error.rmse < best_crisp.rmse) {
-        best_crisp = error;
+      if (error.rmse < best.rmse) {
+        best = error;
       }
     }
   }
   selection.chosen = selection.best_of_kind.front();
   if (candidates.crisp) {
-    selection.best_of_kind.push_back(best_crisp);
-    selection.chosen = best_crisp;
+    selection.best_of_kind.push_back(best);
+    selection.chosen = best;
   }
-  if (candidates.widths.empty() || largest < 2) {
-    return prefer_least_squares(std::move(selection), candidates);
+}
+
+using Ranked = std::vector<std::pair<double, Key>>;
+
+/// Largest leaf count of each shape: where in some fold two steps brought nothing. The best of ever more leaves would
+/// often be best by chance.
+std::map<std::size_t, std::size_t> last_counts(const std::map<Key, std::vector<double>>& all, std::size_t folds) {
+  std::map<std::size_t, std::size_t> last;
+  for (std::size_t fold = 0; fold < folds; ++fold) {
+    std::map<std::size_t, std::pair<double, std::size_t>> best;  // of each shape: error, leaf count
+    for (const auto& [key, errors] : all) {
+      const auto [entry, is_new] = best.try_emplace(key.shape, errors[fold], key.leaves);
+      if (errors[fold] < entry->second.first && key.leaves <= entry->second.second + steps_without_gain) {
+        entry->second = {errors[fold], key.leaves};
+      }
+    }
+    for (const auto& [shape, entry] : best) {
+      const auto [count, is_new] = last.try_emplace(shape, entry.second + steps_without_gain);
+      count->second = std::min(count->second, entry.second + steps_without_gain);
+    }
   }
+  return last;
+}
 
-  // Screening.
-  const std::vector<std::ptrdiff_t> counts = leaf_counts(largest);
-  const std::ptrdiff_t coefficients = std::ssize(folds.front().training.regressors) + 1;
-  std::size_t screening = 0;
-  for (std::ptrdiff_t rows = 0; screening < num_folds && rows < screening_rows; ++screening) {
-    rows += folds[screening].held_out.count();
+/// Best first; ties: the smaller key.
+Ranked ranked(const Comparison& comparison, std::size_t folds) {
+  const std::map<Key, std::vector<double>> all = comparison.errors(folds);
+  std::map<std::size_t, std::size_t> last = last_counts(all, folds);
+  Ranked order;
+  for (const auto& [key, errors] : all) {
+    if (key.leaves <= last[key.shape]) {
+      order.emplace_back(sum(errors), key);
+    }
   }
-  const std::size_t widths = candidates.widths.size();
-  const std::size_t middle = candidates.ridges.size() / 2;
-  const std::size_t usual = shrinkages / 2;
-  std::vector<Errors> screened(screening * widths);
-  parallel_for(std::ssize(screened), max_threads, [&](std::ptrdiff_t task) {
-    const std::size_t fold = static_cast<std::size_t>(task) / widths;
-    const std::size_t width = static_cast<std::size_t>(task) % widths;
-    screened[static_cast<std::size_t>(task)] = evaluate(
-        folds[fold], grown[fold], candidates, width, counts, weights, true,
-        [&](const Key& key) {
-          return key.shrinkage == usual && (counts[key.leaves] * coefficients <= cheap_unknowns || key.ridge == middle);
-        },
-        max_threads);
-  });
-  // Sum over the screening folds of every candidate that all of them have.
-  const auto totals = [&](const std::vector<Errors>& all) {
-    std::map<Key, double> result;
-    for (std::size_t width = 0; width < widths; ++width) {
-      std::vector<Errors> of_width;
-      for (std::size_t fold = 0; fold < screening; ++fold) {
-        of_width.push_back(all[fold * widths + width]);
-      }
-      for (const auto& [key, errors] : common(of_width)) {
-        result[key] = sum(errors);
-      }
-    }
-    return result;
-  };
-  // The best of each width, best width first.
-  const auto ranked = [&](const std::map<Key, double>& errors) {
-    std::map<std::size_t, std::pair<double, Key>> best;
-    for (const auto& [key, error] : errors) {
-      const auto [entry, is_new] = best.try_emplace(key.width, error, key);
-      if (!is_new && error < entry->second.first) {
-        entry->second = {error, key};
-      }
-    }
-    std::vector<std::pair<double, Key>> result;
-    for (const auto& [width, entry] : best) {
-      result.push_back(entry);
-    }
-    std::stable_sort(result.begin(), result.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
-    return result;
-  };
-  std::map<Key, double> screened_totals = totals(screened);
-  std::vector<std::pair<double, Key>> best_of_width = ranked(screened_totals);
-  best_of_width.resize(std::min(best_of_width.size(), finalists));
+  std::sort(order.begin(), order.end());
+  return order;
+}
 
-  // Other ridges and shrinkages at the finalists' best leaf counts.
-  std::vector<Errors> refined(screening * widths);
-  parallel_for(std::ssize(refined), max_threads, [&](std::ptrdiff_t task) {
-    const std::size_t fold = static_cast<std::size_t>(task) / widths;
-    const std::size_t width = static_cast<std::size_t>(task) % widths;
-    for (const auto& [error, best] : best_of_width) {
-      if (best.width == width) {
-        refined[static_cast<std::size_t>(task)] = evaluate(
-            folds[fold], grown[fold], candidates, width, counts, weights, false,
-            [&](const Key& key) {
-              // At the best leaf count; where that is cheap, at its neighbours too.
-              const std::size_t reach = counts[best.leaves] * coefficients <= 3 * cheap_unknowns ? 1 : 0;
-              return key.leaves + reach >= best.leaves && key.leaves <= best.leaves + reach &&
-                     (reach > 0 || key.ridge == best.ridge || key.shrinkage == best.shrinkage) &&
-                     !screened_totals.contains(key);
-            },
-            max_threads);
-      }
+/// The first of each kind, a kind being what `kind_of` makes of a key.
+template <class KindOf>
+Ranked first_of_each(Ranked order, const KindOf& kind_of) {
+  std::set<decltype(kind_of(order.front().second))> seen;
+  Ranked firsts;
+  for (const auto& entry : order) {
+    if (seen.insert(kind_of(entry.second)).second) {
+      firsts.push_back(entry);
     }
-  });
-  screened_totals.merge(totals(refined));
-  best_of_width = ranked(screened_totals);
-  best_of_width.resize(std::min(best_of_width.size(), finalists));
+  }
+  return firsts;
+}
 
-  // On all folds: of each finalist the best few, and the best of each leaf count near its best.
-  std::set<Key> kept;
-  for (const auto& [least, best] : best_of_width) {
-    const std::size_t reach = counts[best.leaves] * coefficients <= cheap_unknowns ? 2 : 1;
-    std::map<std::size_t, std::pair<double, Key>> best_of_count;
-    std::vector<std::pair<double, Key>> order;
-    for (const auto& [key, error] : screened_totals) {
-      if (key.width != best.width) {
-        continue;
-      }
-      order.emplace_back(error, key);
-      if (key.leaves + reach >= best.leaves && key.leaves <= best.leaves + reach) {
-        const auto [entry, is_new] = best_of_count.try_emplace(key.leaves, error, key);
-        if (!is_new && error < entry->second.first) {
-          entry->second = {error, key};
+/// Every shape with few leaves; then the better half with three times as many, and so on, while that helps.
+void screen(Comparison& comparison, const Candidates& candidates, std::ptrdiff_t coefficients, std::size_t folds) {
+  const std::vector<std::ptrdiff_t>& counts = comparison.leaf_counts();
+  const std::size_t usual = candidates.shrinkages.size() / 2;
+  const std::size_t ridges = std::max<std::size_t>(candidates.ridges.size(), 1);
+  std::map<std::size_t, std::size_t> ridge_of_shape;  // of those still in the race
+  for (std::size_t shape = 0; shape < comparison.shapes().size(); ++shape) {
+    ridge_of_shape[shape] = ridges / 2;
+  }
+  std::size_t next = 0;
+  for (std::ptrdiff_t unknowns = cheap_unknowns; next < counts.size() && !ridge_of_shape.empty();
+       unknowns *= next_unknowns) {
+    std::set<Key> keys;
+    std::size_t end = next;
+    for (; end < counts.size() && (counts[end] * coefficients <= unknowns); ++end) {
+      for (const auto& [shape, ridge] : ridge_of_shape) {
+        for (std::size_t r = 0; r < ridges; ++r) {
+          if (r == ridge || unknowns == cheap_unknowns) {
+            keys.insert({shape, end, r, usual});
+          }
         }
       }
     }
-    std::sort(order.begin(), order.end());
-    order.resize(std::min(order.size(), candidates_on_all_folds));
-    for (const auto& [error, key] : order) {
-      kept.insert(key);
+    if (end == next) {
+      continue;
     }
-    for (const auto& [count, entry] : best_of_count) {
-      kept.insert(entry.second);
-    }
-  }
-  std::vector<Errors> final_errors(num_folds * best_of_width.size());
-  parallel_for(std::ssize(final_errors), max_threads, [&](std::ptrdiff_t task) {
-    const std::size_t fold = static_cast<std::size_t>(task) / best_of_width.size();
-    const Key& best = best_of_width[static_cast<std::size_t>(task) % best_of_width.size()].second;
-    Errors& errors = final_errors[static_cast<std::size_t>(task)];
-    if (fold < screening) {
-      const std::size_t slot = fold * widths + best.width;
-      errors = screened[slot];
-      errors.insert(refined[slot].begin(), refined[slot].end());
-    } else {
-      errors = evaluate(
-          folds[fold], grown[fold], candidates, best.width, counts, weights, false,
-          [&](const Key& key) { return kept.contains(key); }, max_threads);
-    }
-  });
-  for (std::size_t k = 0; k < best_of_width.size(); ++k) {
-    std::vector<Errors> of_width;
-    for (std::size_t fold = 0; fold < num_folds; ++fold) {
-      of_width.push_back(final_errors[fold * best_of_width.size() + k]);
-    }
-    std::optional<CandidateError> best;
-    for (const auto& [key, errors] : common(of_width)) {
-      if (!kept.contains(key)) {
-        continue;
-      }
-      const Candidate candidate{.validity = {candidates.kind, candidates.widths[key.width], candidates.smoothness},
-                                .estimation = candidates.estimation,
-                                .ridge = ridge_at(candidates, key.ridge),
-                                .shrinkage = candidates.shrinkages[key.shrinkage],
-                                .leaves = counts[key.leaves]};
-      const CandidateError error = described(candidate, errors);
-      if (!best || error.rmse < best->rmse) {
-        best = error;
-      }
-    }
-    if (best) {
-      selection.best_of_kind.push_back(*best);
-      if (best->rmse < selection.chosen.rmse || (!candidates.crisp && k == 0)) {
-        selection.chosen = *best;
+    next = end;
+    comparison.evaluate(keys, folds);
+    // The better half of those in the race. One at its end goes no further.
+    const std::map<std::size_t, std::size_t> racing = std::move(ridge_of_shape);
+    ridge_of_shape.clear();
+    Ranked best = first_of_each(ranked(comparison, folds), [](const Key& key) { return key.shape; });
+    std::erase_if(best, [&](const auto& entry) { return !racing.contains(entry.second.shape); });
+    best.resize(std::min(best.size(), std::max(fewest_shapes, (best.size() + 1) / 2)));
+    for (const auto& [error, key] : best) {
+      if (key.leaves + steps_without_gain >= next) {
+        ridge_of_shape[key.shape] = key.ridge;
       }
     }
   }
-  return prefer_least_squares(std::move(selection), candidates);
+}
+
+/// The best two widths, each with its best jump and with none.
+Ranked finalists_of(const Comparison& comparison, std::size_t folds) {
+  const std::vector<Shape>& shapes = comparison.shapes();
+  const Ranked of_shape = first_of_each(ranked(comparison, folds), [](const Key& key) { return key.shape; });
+  Ranked result = first_of_each(of_shape, [&](const Key& key) { return shapes[key.shape].width; });
+  result.resize(std::min(result.size(), finalists));
+  for (std::size_t k = result.size(); k-- > 0;) {
+    for (const auto& entry : of_shape) {
+      const Shape& shape = shapes[entry.second.shape];
+      if (shape.width == shapes[result[k].second.shape].width && shape.jump == shapes.front().jump &&
+          entry.second.shape != result[k].second.shape) {
+        result.push_back(entry);
+      }
+    }
+  }
+  return result;
+}
+
+/// Other ridges and shrinkages at the finalists' best leaf counts; where that is cheap, at its neighbours too.
+void refine(Comparison& comparison, const Candidates& candidates, std::ptrdiff_t coefficients, std::size_t folds) {
+  const std::vector<std::ptrdiff_t>& counts = comparison.leaf_counts();
+  std::set<Key> keys;
+  for (const auto& [error, best] : finalists_of(comparison, folds)) {
+    const bool cheap = counts[best.leaves] * coefficients <= next_unknowns * cheap_unknowns;
+    const std::size_t reach = cheap ? 1 : 0;
+    for (std::size_t leaves = best.leaves - std::min(reach, best.leaves);
+         leaves < std::min(counts.size(), best.leaves + reach + 1); ++leaves) {
+      for (std::size_t ridge = 0; ridge < std::max<std::size_t>(candidates.ridges.size(), 1); ++ridge) {
+        for (std::size_t shrinkage = 0; shrinkage < candidates.shrinkages.size(); ++shrinkage) {
+          const bool next_ridge = ridge + 1 >= best.ridge && ridge <= best.ridge + 1;
+          if (cheap || (next_ridge && shrinkage == best.shrinkage) || ridge == best.ridge) {
+            keys.insert({best.shape, leaves, ridge, shrinkage});
+          }
+        }
+      }
+    }
+  }
+  comparison.evaluate(keys, folds);
+}
+
+/// On all folds: of each finalist the best few, and the best of each leaf count near its best.
+std::set<Key> compare_on_all_folds(Comparison& comparison, std::ptrdiff_t coefficients, std::size_t screening,
+                                   std::size_t folds) {
+  std::set<Key> kept;
+  for (const auto& [least, best] : finalists_of(comparison, screening)) {
+    const std::size_t reach = comparison.leaf_counts()[best.leaves] * coefficients <= cheap_unknowns ? 2 : 1;
+    Ranked order = ranked(comparison, screening);
+    std::erase_if(order, [&](const auto& entry) { return entry.second.shape != best.shape; });
+    for (const auto& [error, key] : first_of_each(order, [](const Key& each) { return each.leaves; })) {
+      if (key.leaves + reach >= best.leaves && key.leaves <= best.leaves + reach) {
+        kept.insert(key);
+      }
+    }
+    for (std::size_t k = 0; k < std::min(order.size(), candidates_on_all_folds); ++k) {
+      kept.insert(order[k].second);
+    }
+  }
+  comparison.evaluate(kept, folds);
+  return kept;
+}
+
+/// The best of each width: with jumps only if their gain on none is beyond chance.
+std::vector<CandidateError> best_of_widths(const Comparison& comparison, const std::set<Key>& kept,
+                                           const std::vector<FoldRows>& folds, const Judge& judge) {
+  const std::map<Key, std::vector<double>> errors = comparison.errors(folds.size());
+  Ranked order = ranked(comparison, folds.size());
+  std::erase_if(order, [&](const auto& entry) { return !kept.contains(entry.second); });
+  std::vector<CandidateError> result;
+  for (const auto& [error, key] : first_of_each(order, [](const Key& each) { return each.shape; })) {
+    const CandidateError entry = judge(comparison.candidate(key), errors.at(key));
+    const auto same = std::find_if(result.begin(), result.end(), [&](const CandidateError& other) {
+      return other.candidate.validity.width == entry.candidate.validity.width;
+    });
+    if (same == result.end()) {
+      result.push_back(entry);
+    } else if (entry.candidate.jump == no_jump && !is_beyond_chance(entry, *same)) {
+      *same = entry;
+    }
+  }
+  std::stable_sort(result.begin(), result.end(), [](const auto& a, const auto& b) { return a.rmse < b.rmse; });
+  return result;
+}
+
+}  // namespace
+
+Selection select(const std::vector<FoldRows>& folds, const std::vector<GrownTree>& grown, const Candidates& candidates,
+                 const Eigen::VectorXd& weights, int max_threads) {
+  std::vector<FoldRows> compared;
+  Selection selection;
+  for (const FoldRows& fold : folds) {
+    compared.push_back({fold.training, thinned(fold.held_out, most_held_out_rows)});
+    selection.held_out_rows += compared.back().held_out.count();
+  }
+  const Judge judge(compared, weights.size());
+  compare_crisp(compared, grown, candidates, weights, max_threads, judge, selection);
+  if (!candidates.widths.empty() && selection.crisp_rmse.size() > 1) {
+    std::size_t screening = 0;
+    for (std::ptrdiff_t rows = 0; screening < compared.size() && rows < screening_rows; ++screening) {
+      rows += compared[screening].held_out.count();
+    }
+    const std::ptrdiff_t coefficients = std::ssize(compared.front().training.regressors) + 1;
+    Comparison comparison(compared, grown, candidates, weights, max_threads);
+    screen(comparison, candidates, coefficients, screening);
+    refine(comparison, candidates, coefficients, screening);
+    const std::set<Key> kept = compare_on_all_folds(comparison, coefficients, screening, compared.size());
+    const std::vector<CandidateError> best = best_of_widths(comparison, kept, compared, judge);
+    selection.best_of_kind.insert(selection.best_of_kind.end(), best.begin(), best.end());
+    if (!candidates.crisp) {
+      selection.chosen.rmse = std::numeric_limits<double>::infinity();  // least squares is no candidate
+    }
+    for (const CandidateError& other : best) {
+      selection.chosen =
+          other.candidate.jump == no_jump && other.rmse < selection.chosen.rmse ? other : selection.chosen;
+    }
+    for (const CandidateError& other : best) {
+      const bool is_only_one = !std::isfinite(selection.chosen.rmse);
+      if (other.candidate.jump < no_jump && (is_only_one || is_beyond_chance(selection.chosen, other))) {
+        selection.chosen = other;
+      }
+    }
+  }
+  // The best of many candidates gains a little on noise too.
+  const CandidateError& least_squares = selection.best_of_kind.front();
+  if (candidates.crisp && compared.size() > 1 && !is_beyond_chance(least_squares, selection.chosen)) {
+    selection.chosen = least_squares;
+  }
+  return selection;
 }
 
 }  // namespace llmt

@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "estimate.hpp"
 #include "training.hpp"
 
 namespace llmt {
@@ -22,6 +23,7 @@ struct Candidates {
   Estimation estimation = Estimation::joint;
   int smoothness = 1;
   std::vector<double> widths;  ///< empty: crisp alone
+  std::vector<double> jumps;   ///< see Candidate::jump; none first
   std::vector<double> ridges;
   std::vector<double> shrinkages;
 };
@@ -30,28 +32,12 @@ struct Selection {
   CandidateError chosen;
   std::vector<CandidateError> best_of_kind;
   Eigen::VectorXd crisp_rmse;
+  std::ptrdiff_t held_out_rows = 0;  ///< that errors are from
 };
 
-/// Partition::outer_slope of a grown tree: the root's slope, as far as the first leaves agree on it. Shrunk by their
-/// mean square spread about it, like a James-Stein estimate.
-Eigen::MatrixXd agreed_slope(const Partition& grown);
-
-/// Sum of weighted squared errors of the prefixes of `partition` with 1, 2, ..., num_leaves leaves, as grown and crisp,
-/// over some rows. `weights`: of the outputs' squared errors.
-Eigen::VectorXd prefix_squared_errors(const Partition& partition, const TrainingRows& rows,
-                                      const Eigen::VectorXd& weights);
-
-/// Sum of weighted squared errors over some rows.
-double squared_error(const Partition& partition, const TrainingRows& rows, const Eigen::VectorXd& weights);
-
-/// The partition with `candidate`'s leaves, validity and estimates.
-Partition estimate(const TrainingRows& training, const Partition& grown, const Candidate& candidate, int max_threads);
-
-/// Compares on the held-out rows of all folds. First every width on as many folds as hold enough rows, leaf counts in
-/// steps of a half until two steps brought nothing; then the best two widths near their best leaf counts and ridges on
-/// the other folds.
-/// `grown`: of each fold the tree grown without its held-out rows.
-Selection select(const std::vector<FoldRows>& folds, const std::vector<Partition>& grown, const Candidates& candidates,
+/// Compares on the held-out rows of all folds, see docs/algorithms.md, section 7. `grown`: of each fold the tree grown
+/// without its held-out rows.
+Selection select(const std::vector<FoldRows>& folds, const std::vector<GrownTree>& grown, const Candidates& candidates,
                  const Eigen::VectorXd& weights, int max_threads);
 
 }  // namespace llmt

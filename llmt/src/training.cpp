@@ -3,11 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <numeric>
 
 #include "evaluator.hpp"
+#include "parallel.hpp"
 
 namespace llmt {
 namespace {
@@ -204,28 +207,26 @@ double total_weight(const TrainingRows& rows) {
   return rows.weight_unit * sum;
 }
 
-Chunk fetch(const TrainingRows& rows, std::ptrdiff_t index, const std::vector<int>& outputs) {
-  Chunk chunk;
-  chunk.begin = index * chunk_rows;
-  const std::ptrdiff_t count = std::min(chunk_rows, rows.count() - chunk.begin);
-  const int* const taken = rows.rows.data() + chunk.begin;
+Chunk fetch(const TrainingRows& rows, const std::vector<int>& positions, const std::vector<int>& outputs) {
+  const std::ptrdiff_t count = std::ssize(positions);
   const Table& table = *rows.table;
-  chunk.inputs.resize(count, table.inputs.cols());
-  chunk.outputs.resize(count, std::ssize(outputs));
-  chunk.deviations.resize(count, std::ssize(rows.regressors));
-  chunk.weights.resize(count);
+  const auto row_at = [&](std::ptrdiff_t i) {
+    return rows.rows[static_cast<std::size_t>(positions[static_cast<std::size_t>(i)])];
+  };
+  Chunk chunk{RowMajor(count, table.inputs.cols()), RowMajor(count, std::ssize(rows.regressors)),
+              RowMajor(count, std::ssize(outputs)), Eigen::VectorXd(count)};
   for (std::ptrdiff_t j = 0; j < table.inputs.cols(); ++j) {
     for (std::ptrdiff_t i = 0; i < count; ++i) {
-      chunk.inputs(i, j) = table.inputs(taken[i], j);
+      chunk.inputs(i, j) = table.inputs(row_at(i), j);
     }
   }
   for (std::ptrdiff_t o = 0; o < std::ssize(outputs); ++o) {
     for (std::ptrdiff_t i = 0; i < count; ++i) {
-      chunk.outputs(i, o) = table.outputs(taken[i], outputs[static_cast<std::size_t>(o)]);
+      chunk.outputs(i, o) = table.outputs(row_at(i), outputs[static_cast<std::size_t>(o)]);
     }
   }
   for (std::ptrdiff_t i = 0; i < count; ++i) {
-    chunk.weights(i) = rows.weight_unit * table.weights(taken[i]);
+    chunk.weights(i) = rows.weight_unit * table.weights(row_at(i));
     deviations_at(rows.columns, rows.regressors, chunk.inputs.row(i).data(), chunk.deviations.row(i).data());
   }
   return chunk;
@@ -240,6 +241,58 @@ RowMajor inputs_of(const TrainingRows& rows, std::span<const int> positions) {
       result(i, j) = inputs(row, j);
     }
   }
+  return result;
+}
+
+Chunk fetch(const TrainingRows& rows, std::ptrdiff_t index, const std::vector<int>& outputs) {
+  std::vector<int> positions(static_cast<std::size_t>(std::min(chunk_rows, rows.count() - index * chunk_rows)));
+  std::iota(positions.begin(), positions.end(), static_cast<int>(index * chunk_rows));
+  return fetch(rows, positions, outputs);
+}
+
+void for_each_chunk(const TrainingRows& rows, const std::vector<int>& outputs, int max_threads,
+                    const std::function<void(std::size_t, const Chunk&)>& body) {
+  parallel_for(std::min(num_slots, num_chunks(rows)), max_threads, [&](std::ptrdiff_t slot) {
+    for (std::ptrdiff_t index = slot; index < num_chunks(rows); index += num_slots) {
+      body(static_cast<std::size_t>(slot), fetch(rows, index, outputs));
+    }
+  });
+}
+
+TrainingRows thinned(const TrainingRows& rows, std::ptrdiff_t count) {
+  TrainingRows result = rows;
+  if (rows.count() <= count + count / 4) {
+    return result;
+  }
+  // The rows with the smallest hashes of their values. Steps of splitmix64 (Steele, Lea & Flood 2014).
+  const auto mixed = [](std::uint64_t state, double value) {
+    std::uint64_t z = state + std::bit_cast<std::uint64_t>(value + 0.0) + 0x9e3779b97f4a7c15ULL;  // -0 as 0
+    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ULL;
+    z = (z ^ (z >> 27)) * 0x94d049bb133111ebULL;
+    return z ^ (z >> 31);
+  };
+  std::vector<std::uint64_t> hashes;
+  for (const int row : rows.rows) {
+    std::uint64_t hash = 0;
+    for (std::ptrdiff_t j = 0; j < rows.table->inputs.cols(); ++j) {
+      const double value = rows.table->inputs(row, j);
+      hash = mixed(hash, std::isnan(value) ? std::numeric_limits<double>::infinity() : value);
+    }
+    for (std::ptrdiff_t o = 0; o < rows.table->outputs.cols(); ++o) {
+      hash = mixed(hash, rows.table->outputs(row, o));
+    }
+    hashes.push_back(hash);
+  }
+  std::vector<std::uint64_t> order = hashes;
+  std::nth_element(order.begin(), order.begin() + (count - 1), order.end());
+  const std::uint64_t last = order[static_cast<std::size_t>(count - 1)];
+  result.rows.clear();
+  for (std::size_t i = 0; i < hashes.size(); ++i) {
+    if (hashes[i] <= last) {
+      result.rows.push_back(rows.rows[i]);
+    }
+  }
+  result.weight_unit *= total_weight(rows) / total_weight(result);
   return result;
 }
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -47,10 +48,9 @@ TrainingRows query_rows(const Table& table, std::vector<int> rows, const Trainin
 
 /// A few rows laid out one after the other, for passes over all of them.
 struct Chunk {
-  std::ptrdiff_t begin = 0;  ///< position of the first among the rows
-  RowMajor inputs;           ///< NaN: missing
-  RowMajor deviations;       ///< of the regressors from their centres; NaN: missing
-  RowMajor outputs;          ///< the ones asked for
+  RowMajor inputs;      ///< NaN: missing
+  RowMajor deviations;  ///< of the regressors from their centres; NaN: missing
+  RowMajor outputs;     ///< the ones asked for
   Eigen::VectorXd weights;
 
   std::ptrdiff_t count() const { return weights.size(); }
@@ -63,11 +63,24 @@ inline std::ptrdiff_t num_chunks(const TrainingRows& rows) { return (rows.count(
 /// Sum of the rows' weights.
 double total_weight(const TrainingRows& rows);
 
-/// The rows index * chunk_rows ... of `rows`.
+/// The rows at positions index * chunk_rows ... of `rows`.
 Chunk fetch(const TrainingRows& rows, std::ptrdiff_t index, const std::vector<int>& outputs);
 
 /// Inputs of some rows, given by their positions among `rows`; NaN: missing.
 RowMajor inputs_of(const TrainingRows& rows, std::span<const int> positions);
+
+/// The rows at the given positions of `rows`.
+Chunk fetch(const TrainingRows& rows, const std::vector<int>& positions, const std::vector<int>& outputs);
+
+/// Passes over the rows in parallel: the chunks index, index + num_slots, ... of a slot come one after the other. What
+/// is summed up is summed per slot, and the slots in order.
+inline constexpr std::ptrdiff_t num_slots = 16;
+void for_each_chunk(const TrainingRows& rows, const std::vector<int>& outputs, int max_threads,
+                    const std::function<void(std::size_t slot, const Chunk& chunk)>& body);
+
+/// About `count` of the rows, or all if they are few more, with weights that make them stand for all. Which ones
+/// depends on the rows' values, not on their order; fewer are among more.
+TrainingRows thinned(const TrainingRows& rows, std::ptrdiff_t count);
 
 /// Levels beyond this many, the rarest, share the reference level's place in the local models.
 inline constexpr std::ptrdiff_t max_level_regressors = 30;

@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <functional>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -118,12 +119,18 @@ enum class ValidityChoice {
   gaussian
 };
 
+/// See BlendOptions::jumps.
+inline constexpr double no_jump = std::numeric_limits<double>::infinity();
+
 /// How leaves share the input space. Lists are candidates, of which the smallest held-out error decides; without
 /// folds their first entries are taken.
 struct BlendOptions {
   ValidityChoice validity = ValidityChoice::automatic;
   Estimation estimation = Estimation::joint;
   std::vector<double> widths = {};  ///< Validity::width. Empty: 0.5, 1, 2, 4 for blends; 1/3 for Gaussians
+  /// Splits where the outputs jump by at least this multiple of the scatter of the rows there have no transition, see
+  /// docs/algorithms.md; no_jump: all have one. Empty: no_jump, 4, 2, 1, 0.5.
+  std::vector<double> jumps = {};
   /// Joint estimation: ridge, see docs/algorithms.md; 0 is global least squares, the larger the nearer to local
   /// estimation. Empty: 1e-8, 1e-6, 1e-4, 1e-3, 1e-2, 1e-1.
   std::vector<double> ridges = {};
@@ -162,6 +169,7 @@ struct FitOptions {
 /// A way to make a model from a grown tree.
 struct Candidate {
   Validity validity = {};
+  double jump = no_jump;  ///< of a blend, see BlendOptions::jumps
   Estimation estimation = Estimation::as_grown;
   double ridge = 0.0;      ///< of joint estimation
   double shrinkage = 0.0;  ///< see BlendOptions::shrinkages
@@ -203,7 +211,7 @@ struct PartitionSummary {
   /// Held-out RMSE of the crisp prefixes with 1, 2, ... leaves; empty without folds.
   Eigen::VectorXd crisp_cv_rmse;
   std::ptrdiff_t cv_folds = 0;
-  std::ptrdiff_t held_out_rows = 0;  ///< over all folds
+  std::ptrdiff_t held_out_rows = 0;  ///< that errors are from, over all folds; at most 10000 of each
   SearchSummary search;              ///< of the tree grown on all rows
 };
 
