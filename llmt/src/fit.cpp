@@ -167,13 +167,9 @@ Plan make_plan(const FitOptions& options, const TrainingRows& all, bool has_fold
   return plan;
 }
 
-struct Grown {
-  GrownTree tree;
-  StopReason stop = StopReason::leaf_samples;
-};
-
-Grown grow_rows(const TrainingRows& rows, const std::vector<int>& served, const Plan& plan, bool stop_by_aicc,
-                int max_threads) {
+/// What growth needs of the rows lives no longer than this.
+GrownPartition grow_nodes(const TrainingRows& rows, const std::vector<int>& served, const Plan& plan, bool stop_by_aicc,
+                          int max_threads) {
   const Table& table = *rows.table;
   GrowthOptions options = plan.growth;
   const double width = plan.candidates.widths.empty() ? 0.0 : plan.candidates.widths.front();
@@ -192,16 +188,24 @@ Grown grow_rows(const TrainingRows& rows, const std::vector<int>& served, const 
   }
   problem.options = std::move(options);
   problem.max_threads = max_threads;
-  GrownPartition result;
-  if (is_lolimot(problem.options.rule)) {
-    result = grow_lolimot(problem, {.width = width,
-                                    .low = rows.low()(table.split_inputs),
-                                    .high = rows.high()(table.split_inputs),
-                                    .data_driven = problem.options.rule == GrowthRule::lolimot_data_driven,
-                                    .stop_by_aicc = stop_by_aicc});
-  } else {
-    result = grow(problem);
+  if (!is_lolimot(problem.options.rule)) {
+    return grow(problem);
   }
+  return grow_lolimot(problem, {.width = width,
+                                .low = rows.low()(table.split_inputs),
+                                .high = rows.high()(table.split_inputs),
+                                .data_driven = problem.options.rule == GrowthRule::lolimot_data_driven,
+                                .stop_by_aicc = stop_by_aicc});
+}
+
+struct Grown {
+  GrownTree tree;
+  StopReason stop = StopReason::leaf_samples;
+};
+
+Grown grow_rows(const TrainingRows& rows, const std::vector<int>& served, const Plan& plan, bool stop_by_aicc,
+                int max_threads) {
+  GrownPartition result = grow_nodes(rows, served, plan, stop_by_aicc, max_threads);
   Partition partition{
       .outputs = served, .validity = {}, .nodes = std::move(result.nodes), .outer_slope = {}, .residual_range = {}};
   partition.outer_slope = agreed_slope(partition);
