@@ -167,6 +167,23 @@ Plan make_plan(const FitOptions& options, const TrainingRows& all, bool has_fold
   return plan;
 }
 
+/// What growth needs of the rows lives no longer than this.
+GrownPartition grow_nodes(const TrainingRows& rows, const std::vector<int>& served, const Plan& plan, bool stop_by_aicc,
+                          int max_threads) {
+  const Table& table = *rows.table;
+  GrowthProblem problem{&rows, served, plan.growth, max_threads};
+  problem.options.split_inputs = table.split_inputs;
+  if (!is_lolimot(problem.options.rule)) {
+    return grow(problem);
+  }
+  const double width = plan.candidates.widths.empty() ? 0.0 : plan.candidates.widths.front();
+  return grow_lolimot(problem, {.width = width,
+                                .low = rows.low()(table.split_inputs),
+                                .high = rows.high()(table.split_inputs),
+                                .data_driven = problem.options.rule == GrowthRule::lolimot_data_driven,
+                                .stop_by_aicc = stop_by_aicc});
+}
+
 struct Grown {
   GrownTree tree;
   StopReason stop = StopReason::leaf_samples;
@@ -175,20 +192,7 @@ struct Grown {
 
 Grown grow_rows(const TrainingRows& rows, const std::vector<int>& served, const Plan& plan, bool stop_by_aicc,
                 int max_threads) {
-  const Table& table = *rows.table;
-  const double width = plan.candidates.widths.empty() ? 0.0 : plan.candidates.widths.front();
-  GrowthProblem problem{&rows, served, plan.growth, max_threads};
-  problem.options.split_inputs = table.split_inputs;
-  GrownPartition result;
-  if (is_lolimot(problem.options.rule)) {
-    result = grow_lolimot(problem, {.width = width,
-                                    .low = rows.low()(table.split_inputs),
-                                    .high = rows.high()(table.split_inputs),
-                                    .data_driven = problem.options.rule == GrowthRule::lolimot_data_driven,
-                                    .stop_by_aicc = stop_by_aicc});
-  } else {
-    result = grow(problem);
-  }
+  GrownPartition result = grow_nodes(rows, served, plan, stop_by_aicc, max_threads);
   Partition partition{
       .outputs = served, .validity = {}, .nodes = std::move(result.nodes), .outer_slope = {}, .residual_range = {}};
   partition.outer_slope = agreed_slope(partition);
@@ -384,6 +388,10 @@ FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<
     }
     parallel_for(std::ssize(fold_partitions), options.max_threads, [&](std::ptrdiff_t f) {
       const GrownTree& tree = trees[static_cast<std::size_t>(f)];
+      if (!selection.made.empty()) {
+        fold_partitions[static_cast<std::size_t>(f)][p] = std::move(selection.made[static_cast<std::size_t>(f)]);
+        return;
+      }
       Candidate of_fold = candidate;
       of_fold.leaves = std::min(of_fold.leaves, tree.partition.num_leaves());
       fold_partitions[static_cast<std::size_t>(f)][p] =

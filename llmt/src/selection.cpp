@@ -297,6 +297,20 @@ std::vector<CandidateError> best_of_widths(const Comparison& comparison, const s
   return result;
 }
 
+/// Candidates are told apart on samples of the training rows. Against a crisp tree, whose models all rows have made, the
+/// best blend is at a disadvantage then: it is made from all rows too, where one hold-out says that there are many.
+Partition make_from_all_rows(const FoldRows& fold, const GrownTree& grown, const Eigen::VectorXd& weights,
+                             int max_threads, const Judge& judge, CandidateError& best) {
+  Candidate candidate = best.candidate;
+  candidate.leaves = std::min(candidate.leaves, grown.partition.num_leaves());
+  Partition partition = estimate(fold.training, grown, candidate, max_threads);
+  std::vector<int> all(static_cast<std::size_t>(fold.held_out.count()));
+  std::iota(all.begin(), all.end(), 0);
+  const std::vector<Chunk> held_out = {fetch(fold.held_out, all, partition.outputs)};
+  best = judge(best.candidate, {squared_error(partition, fold.training, held_out, weights)});
+  return partition;
+}
+
 }  // namespace
 
 Selection select(const std::vector<FoldRows>& folds, const std::vector<GrownTree>& grown, const Candidates& candidates,
@@ -319,7 +333,11 @@ Selection select(const std::vector<FoldRows>& folds, const std::vector<GrownTree
     screen(comparison, candidates, coefficients, screening);
     refine(comparison, candidates, coefficients, screening);
     const std::set<Key> kept = compare_on_all_folds(comparison, coefficients, screening, compared.size());
-    const std::vector<CandidateError> best = best_of_widths(comparison, kept, compared, judge);
+    std::vector<CandidateError> best = best_of_widths(comparison, kept, compared, judge);
+    std::optional<Partition> made;
+    if (compared.size() == 1 && !best.empty()) {
+      made = make_from_all_rows(compared.front(), grown.front(), weights, max_threads, judge, best.front());
+    }
     selection.best_of_kind.insert(selection.best_of_kind.end(), best.begin(), best.end());
     if (!candidates.crisp) {
       selection.chosen.rmse = std::numeric_limits<double>::infinity();  // least squares is no candidate
@@ -333,6 +351,9 @@ Selection select(const std::vector<FoldRows>& folds, const std::vector<GrownTree
       if (other.candidate.jump < no_jump && (is_only_one || is_beyond_chance(selection.chosen, other))) {
         selection.chosen = other;
       }
+    }
+    if (made && !best.empty() && selection.chosen.rmse == best.front().rmse) {
+      selection.made.push_back(std::move(*made));
     }
   }
   // The best of many candidates gains a little on noise too.
