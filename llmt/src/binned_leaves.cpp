@@ -51,6 +51,7 @@ void BinnedLeaves::fit(BinnedLeaf& leaf, const std::vector<double>& gram, const 
     return gram[static_cast<std::size_t>(i >= j ? shape.at(i, j) : shape.at(j, i))];
   };
   const double weight = entry(0, 0);
+  leaf.weight = weight;
   Eigen::VectorXd mean(regressors);
   Eigen::MatrixXd covariance(regressors, regressors);
   for (std::ptrdiff_t i = 0; i < regressors; ++i) {

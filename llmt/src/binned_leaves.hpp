@@ -13,6 +13,7 @@ namespace llmt {
 struct BinnedLeaf {
   std::vector<int> rows;               ///< of the training rows, ascending
   std::optional<Histogram> histogram;  ///< if there is memory to keep it
+  double weight = 0.0;                 ///< of the rows
   Eigen::VectorXd value;               ///< the local model whose residuals the features of these rows hold
   Eigen::MatrixXd slope;
   Eigen::VectorXd mean;        ///< of the scaled regressors over the rows

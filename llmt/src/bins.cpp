@@ -17,15 +17,16 @@ constexpr std::ptrdiff_t sample_rows = 65536;
 std::vector<int> sample(const GrowthData& data) {
   const std::ptrdiff_t rows = data.training.count();
   const std::uint64_t ratio = static_cast<std::uint64_t>(std::max<std::ptrdiff_t>(1, rows / sample_rows));
-  std::vector<int> taken;
-  std::vector<std::uint64_t> hashes;
   constexpr std::ptrdiff_t block = 4096;
-  for (std::ptrdiff_t begin = 0; begin < rows; begin += block) {
-    hashes.assign(static_cast<std::size_t>(std::min(block, rows - begin)), 0);
+  const std::ptrdiff_t blocks = (rows + block - 1) / block;
+  std::vector<std::vector<int>> taken(static_cast<std::size_t>(blocks));
+  parallel_for(blocks, data.problem.max_threads, [&](std::ptrdiff_t index) {
+    const int begin = static_cast<int>(index * block);
+    std::vector<std::uint64_t> hashes(static_cast<std::size_t>(std::min(block, rows - begin)), 0);
     for (std::ptrdiff_t j = 0; j < data.split_inputs(); ++j) {
       for (std::size_t k = 0; k < hashes.size(); ++k) {
         // Adding zero makes one of the two zeros.
-        const double value = data.split_value(static_cast<int>(begin) + static_cast<int>(k), j) + 0.0;
+        const double value = data.split_value(begin + static_cast<int>(k), j) + 0.0;
         std::uint64_t hash = hashes[k] ^ std::bit_cast<std::uint64_t>(value);
         hash = (hash ^ (hash >> 32)) * 0x9E3779B97F4A7C15U;
         hashes[k] = hash ^ (hash >> 29);
@@ -33,11 +34,15 @@ std::vector<int> sample(const GrowthData& data) {
     }
     for (std::size_t k = 0; k < hashes.size(); ++k) {
       if (hashes[k] % ratio == 0) {
-        taken.push_back(static_cast<int>(begin) + static_cast<int>(k));
+        taken[static_cast<std::size_t>(index)].push_back(begin + static_cast<int>(k));
       }
     }
+  });
+  std::vector<int> all;
+  for (const std::vector<int>& of_block : taken) {
+    all.insert(all.end(), of_block.begin(), of_block.end());
   }
-  return taken;
+  return all;
 }
 
 /// At most bins - 1 edges, each between two neighbouring values of the sample.
@@ -68,60 +73,100 @@ std::vector<double> quantile_edges(std::vector<double> values, int bins) {
   return edges;
 }
 
+/// Smallest and largest value in each bin.
+struct Extent {
+  std::array<double, most_bins> low;
+  std::array<double, most_bins> high;
+};
+
+/// Codes of some rows of a number: how many edges are below the value, in steps of powers of two, without branches, for
+/// some values at a time.
+void encode(const GrowthData& data, std::ptrdiff_t split_input, const std::vector<double>& edges, int begin, int end,
+            std::uint8_t* codes, Extent& extent) {
+  std::array<double, most_bins> padded;
+  padded.fill(std::numeric_limits<double>::infinity());
+  std::copy(edges.begin(), edges.end(), padded.begin());
+  const std::size_t stride = static_cast<std::size_t>(data.split_inputs());
+  constexpr int at_once = 16;
+  std::array<double, at_once> value{};
+  std::array<std::uint32_t, at_once> below{};
+  for (; begin < end; begin += at_once) {
+    const std::size_t count = static_cast<std::size_t>(std::min(at_once, end - begin));
+    for (std::size_t k = 0; k < count; ++k) {
+      value[k] = data.split_value(begin + static_cast<int>(k), split_input);
+    }
+    below.fill(0);
+    for (std::uint32_t step = most_bins / 2; step > 0; step /= 2) {
+      for (std::size_t k = 0; k < at_once; ++k) {
+        below[k] += padded[below[k] + step - 1] < value[k] ? step : 0;
+      }
+    }
+    for (std::size_t k = 0; k < count; ++k) {
+      const std::uint32_t bin = below[k];
+      codes[(static_cast<std::size_t>(begin) + k) * stride] = static_cast<std::uint8_t>(bin);
+      extent.low[bin] = std::min(extent.low[bin], value[k]);
+      extent.high[bin] = std::max(extent.high[bin], value[k]);
+    }
+  }
+}
+
 }  // namespace
 
-std::vector<Bins> make_bins(const GrowthData& data, int bins) {
+BinnedInputs make_bins(const GrowthData& data, int bins) {
+  const std::size_t inputs = static_cast<std::size_t>(data.split_inputs());
+  const int rows = static_cast<int>(data.training.count());
+  BinnedInputs result{std::vector<Bins>(inputs), std::vector<std::uint8_t>(static_cast<std::size_t>(rows) * inputs)};
   const std::vector<int> sampled = sample(data);
-  std::vector<Bins> all(static_cast<std::size_t>(data.split_inputs()));
   parallel_for(data.split_inputs(), data.problem.max_threads, [&](std::ptrdiff_t j) {
-    Bins& result = all[static_cast<std::size_t>(j)];
-    const int levels = data.num_levels[static_cast<std::size_t>(j)];
-    const int rows = static_cast<int>(data.training.count());
-    result.codes.resize(static_cast<std::size_t>(rows));
-    if (levels > 0) {
-      result.count = levels;
-      for (int row = 0; row < rows; ++row) {
-        result.codes[static_cast<std::size_t>(row)] = static_cast<std::uint8_t>(data.split_value(row, j));
+    Bins& input = result.bins[static_cast<std::size_t>(j)];
+    input.count = data.num_levels[static_cast<std::size_t>(j)];
+    if (input.count == 0) {
+      std::vector<double> values;
+      for (const int row : sampled) {
+        values.push_back(data.split_value(row, j));
       }
-      return;
-    }
-    std::vector<double> values;
-    for (const int row : sampled) {
-      values.push_back(data.split_value(row, j));
-    }
-    result.edges = quantile_edges(std::move(values), bins);
-    result.count = static_cast<int>(std::ssize(result.edges)) + 1;
-    // The number of edges below the value: steps of powers of two, without branches, for some values at a time.
-    std::vector<double> padded(most_bins, std::numeric_limits<double>::infinity());
-    std::copy(result.edges.begin(), result.edges.end(), padded.begin());
-    constexpr int at_once = 16;
-    std::array<double, at_once> value{};
-    std::array<std::uint32_t, at_once> below{};
-    std::vector<double> low(static_cast<std::size_t>(result.count), std::numeric_limits<double>::infinity());
-    std::vector<double> high(low.size(), -std::numeric_limits<double>::infinity());
-    for (int begin = 0; begin < rows; begin += at_once) {
-      const int count = std::min(at_once, rows - begin);
-      for (int k = 0; k < count; ++k) {
-        value[static_cast<std::size_t>(k)] = data.split_value(begin + k, j);
-      }
-      below.fill(0);
-      for (std::uint32_t step = most_bins / 2; step > 0; step /= 2) {
-        for (std::size_t k = 0; k < at_once; ++k) {
-          below[k] += padded[below[k] + step - 1] < value[k] ? step : 0;
-        }
-      }
-      for (std::size_t k = 0; k < static_cast<std::size_t>(count); ++k) {
-        const std::uint32_t bin = below[k];
-        result.codes[static_cast<std::size_t>(begin) + k] = static_cast<std::uint8_t>(bin);
-        low[bin] = std::min(low[bin], value[k]);
-        high[bin] = std::max(high[bin], value[k]);
-      }
-    }
-    for (std::size_t bin = 0; bin < low.size(); ++bin) {
-      result.splittable.push_back(low[bin] < high[bin]);
+      input.edges = quantile_edges(std::move(values), bins);
+      input.count = static_cast<int>(std::ssize(input.edges)) + 1;
     }
   });
-  return all;
+  constexpr int block = 16384;
+  const int blocks = (rows + block - 1) / block;
+  constexpr double infinity = std::numeric_limits<double>::infinity();
+  constexpr int slots = 16;
+  std::vector<std::vector<Extent>> extents(slots, std::vector<Extent>(inputs));
+  parallel_for(slots, data.problem.max_threads, [&](std::ptrdiff_t slot) {
+    std::vector<Extent>& own = extents[static_cast<std::size_t>(slot)];
+    for (Extent& extent : own) {
+      extent.low.fill(infinity);
+      extent.high.fill(-infinity);
+    }
+    for (int index = static_cast<int>(slot); index < blocks; index += slots) {
+      const int end = std::min(rows, (index + 1) * block);
+      for (std::size_t j = 0; j < inputs; ++j) {
+        if (data.num_levels[j] == 0) {
+          encode(data, static_cast<std::ptrdiff_t>(j), result.bins[j].edges, index * block, end,
+                 result.codes.data() + j, own[j]);
+          continue;
+        }
+        for (int row = index * block; row < end; ++row) {
+          result.codes[static_cast<std::size_t>(row) * inputs + j] =
+              static_cast<std::uint8_t>(data.split_value(row, static_cast<std::ptrdiff_t>(j)));
+        }
+      }
+    }
+  });
+  for (std::size_t j = 0; j < inputs; ++j) {
+    for (std::size_t bin = 0; bin < static_cast<std::size_t>(result.bins[j].count); ++bin) {
+      double low = infinity;
+      double high = -infinity;
+      for (const std::vector<Extent>& extent : extents) {
+        low = std::min(low, extent[j].low[bin]);
+        high = std::max(high, extent[j].high[bin]);
+      }
+      result.bins[j].splittable.push_back(low < high);
+    }
+  }
+  return result;
 }
 
 }  // namespace llmt

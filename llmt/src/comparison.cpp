@@ -1,6 +1,7 @@
 #include "comparison.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 
 #include "joint_fit.hpp"
@@ -15,6 +16,24 @@ std::ptrdiff_t enough_rows(std::ptrdiff_t leaves, std::ptrdiff_t coefficients) {
   constexpr std::ptrdiff_t rows_per_unknown = 25;
   constexpr std::ptrdiff_t smallest_sample = 10000;
   return std::max(smallest_sample, rows_per_unknown * leaves * coefficients);
+}
+
+/// A threshold that keeps the same jumps of these trees as `jump`, in the middle of the gap between those kept and the
+/// others: the scores of the tree grown on all rows are a little different.
+double middle_of_gap(const std::vector<GrownTree>& grown, double jump) {
+  double kept = no_jump;
+  double left_out = 0.0;
+  for (const GrownTree& tree : grown) {
+    for (const double score : tree.jumps) {
+      if (score >= jump) {
+        kept = std::min(kept, score);
+      } else {
+        left_out = std::max(left_out, score);
+      }
+    }
+  }
+  // Far below a jump lies its quarter at least: no score is as good as one of nearly nothing.
+  return kept < no_jump ? std::sqrt(kept * std::max(left_out, kept / 16.0)) : no_jump;
 }
 
 }  // namespace
@@ -35,7 +54,7 @@ Comparison::Comparison(const std::vector<FoldRows>& folds, const std::vector<Gro
     }
     if (seen.insert(kept).second) {
       for (const double width : candidates.widths) {
-        shapes_.push_back({width, jump});
+        shapes_.push_back({width, middle_of_gap(grown, jump)});
       }
     }
   }

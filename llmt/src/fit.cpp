@@ -119,7 +119,10 @@ struct Plan {
 
 bool is_lolimot(GrowthRule rule) { return rule == GrowthRule::lolimot || rule == GrowthRule::lolimot_data_driven; }
 
-Plan make_plan(const FitOptions& options, const TrainingRows& all, bool has_folds) {
+Plan make_plan(const FitOptions& options, const TrainingRows& all, std::ptrdiff_t folds) {
+  const bool has_folds = folds > 0;
+  // Many rows: the widest transitions and the larger ridges, which are for few, take most of the time.
+  const bool many_rows = folds == 1;
   Plan plan{options.growth, {}};
   const ValidityChoice choice = is_lolimot(options.growth.rule) ? ValidityChoice::gaussian : options.blend.validity;
   const bool crisp_only = choice == ValidityChoice::crisp || (choice == ValidityChoice::automatic && !has_folds);
@@ -130,8 +133,9 @@ Plan make_plan(const FitOptions& options, const TrainingRows& all, bool has_fold
   if (!crisp_only) {
     plan.candidates.widths = options.blend.widths;
     if (plan.candidates.widths.empty()) {
-      plan.candidates.widths =
-          choice == ValidityChoice::gaussian ? std::vector<double>{1.0 / 3.0} : std::vector<double>{0.5, 1.0, 2.0, 4.0};
+      plan.candidates.widths = choice == ValidityChoice::gaussian ? std::vector<double>{1.0 / 3.0}
+                               : many_rows                        ? std::vector<double>{0.5, 1.0, 2.0}
+                                                                  : std::vector<double>{0.5, 1.0, 2.0, 4.0};
     }
     plan.candidates.jumps = options.blend.jumps;
     if (plan.candidates.jumps.empty()) {
@@ -141,8 +145,11 @@ Plan make_plan(const FitOptions& options, const TrainingRows& all, bool has_fold
       }
     }
     if (options.blend.estimation == Estimation::joint) {
-      plan.candidates.ridges =
-          options.blend.ridges.empty() ? std::vector<double>{1e-8, 1e-6, 1e-4, 1e-3, 1e-2, 1e-1} : options.blend.ridges;
+      plan.candidates.ridges = options.blend.ridges;
+      if (plan.candidates.ridges.empty()) {
+        plan.candidates.ridges = many_rows ? std::vector<double>{1e-8, 1e-6, 1e-4, 1e-2}
+                                           : std::vector<double>{1e-8, 1e-6, 1e-4, 1e-3, 1e-2, 1e-1};
+      }
     }
   }
   plan.candidates.shrinkages = options.blend.shrinkages;
@@ -327,7 +334,7 @@ FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<
     TrainingRows held_out = query_rows(table, {fold.held_out.begin(), fold.held_out.end()}, training);
     folds.push_back({std::move(training), std::move(held_out)});
   }
-  const Plan plan = make_plan(options, all, !folds.empty());
+  const Plan plan = make_plan(options, all, std::ssize(folds));
 
   std::vector<std::vector<int>> served;
   for (int o = 0; o < outputs.cols(); ++o) {

@@ -125,7 +125,7 @@ class Grower {
     Node& node = nodes_[static_cast<std::size_t>(leaf.node)];
     if (BinnedLeaf* const binned = std::get_if<BinnedLeaf>(&leaf.data)) {
       leaf.best = binned_->examine(*binned, parent, node, leaf.excess);
-      leaf.weight = data_.weights(binned->rows).sum();
+      leaf.weight = binned->weight;
     } else {
       ExactLeaf& exact = std::get<ExactLeaf>(leaf.data);
       leaf.best = exact_.examine(exact, parent, node);

@@ -24,9 +24,9 @@ BinnedRows::BinnedRows(const GrowthData& data)
       features_(data.training.count(), std::ssize(data.training.regressors) + 1, data.outputs.cols()),
       shape_(features_) {
   const std::ptrdiff_t bins = histogram_size / (shape_.size() * data.split_inputs());
-  bins_ = make_bins(data, static_cast<int>(std::clamp<std::ptrdiff_t>(bins, fewest_bins, most_bins)));
+  inputs_ = make_bins(data, static_cast<int>(std::clamp<std::ptrdiff_t>(bins, fewest_bins, most_bins)));
   std::ptrdiff_t sum = 0;
-  for (const Bins& input : bins_) {
+  for (const Bins& input : inputs_.bins) {
     first_bin_.push_back(sum);
     sum += input.count;
   }
@@ -90,7 +90,7 @@ std::span<const double> BinnedRows::grams(const Histogram& histogram, std::size_
 
 std::span<const std::ptrdiff_t> BinnedRows::counts(const Histogram& histogram, std::size_t input) const {
   return std::span(histogram.counts)
-      .subspan(static_cast<std::size_t>(first_bin_[input]), static_cast<std::size_t>(bins_[input].count));
+      .subspan(static_cast<std::size_t>(first_bin_[input]), static_cast<std::size_t>(inputs_.bins[input].count));
 }
 
 /// Rows are taken in blocks that stay in the cache while they are sorted into the bins of one input after the other.
@@ -105,24 +105,28 @@ Histogram BinnedRows::accumulate(const std::vector<int>& rows) const {
     std::vector<int> sorted(block_rows);
     for (std::ptrdiff_t begin = 0; begin < std::ssize(rows); begin += block_rows) {
       const std::ptrdiff_t end = std::min(std::ssize(rows), begin + block_rows);
+      for (std::ptrdiff_t k = begin; k < end; ++k) {
+        features_.prefetch(rows[static_cast<std::size_t>(k)]);
+      }
       for (std::ptrdiff_t j = inputs * group / groups; j < inputs * (group + 1) / groups; ++j) {
-        const Bins& bins = bins_[static_cast<std::size_t>(j)];
+        const std::size_t input = static_cast<std::size_t>(j);
+        const int bins = inputs_.bins[input].count;
         std::array<int, most_bins + 1> place{};
         for (std::ptrdiff_t k = begin; k < end; ++k) {
-          ++place[1U + bins.codes[static_cast<std::size_t>(rows[static_cast<std::size_t>(k)])]];
+          ++place[1U + static_cast<std::size_t>(inputs_.code(rows[static_cast<std::size_t>(k)], input))];
         }
-        const std::ptrdiff_t first = first_bin_[static_cast<std::size_t>(j)];
-        for (int bin = 0; bin < bins.count; ++bin) {
+        const std::ptrdiff_t first = first_bin_[input];
+        for (int bin = 0; bin < bins; ++bin) {
           const std::size_t at = static_cast<std::size_t>(bin);
           histogram.counts[static_cast<std::size_t>(first) + at] += place[at + 1];
           place[at + 1] += place[at];
         }
         for (std::ptrdiff_t k = begin; k < end; ++k) {
           const int row = rows[static_cast<std::size_t>(k)];
-          sorted[static_cast<std::size_t>(place[bins.codes[static_cast<std::size_t>(row)]]++)] = row;
+          sorted[static_cast<std::size_t>(place[static_cast<std::size_t>(inputs_.code(row, input))]++)] = row;
         }
         int at = 0;
-        for (int bin = 0; bin < bins.count; ++bin) {
+        for (int bin = 0; bin < bins; ++bin) {
           const int after = place[static_cast<std::size_t>(bin)];
           if (after > at) {
             add_rows(features_, sorted.data() + at, after - at, histogram.grams.data() + (first + bin) * shape_.size());
@@ -161,13 +165,12 @@ void BinnedRows::subtract(const std::vector<int>& rows, const Eigen::VectorXd& v
 }
 
 std::pair<double, double> BinnedRows::gap(const std::vector<int>& rows, const SplitCandidate& split) const {
-  const std::vector<std::uint8_t>& codes = bins_[static_cast<std::size_t>(split.input)].codes;
   double low = -std::numeric_limits<double>::infinity();
   double high = -low;
   int bin_of_high = most_bins;
   for (const int row : rows) {
     // Values are looked at in the split's bin and the next one that has rows.
-    const int code = codes[static_cast<std::size_t>(row)];
+    const int code = inputs_.code(row, static_cast<std::size_t>(split.input));
     if (code < split.bin || code > bin_of_high) {
       continue;
     }
@@ -184,7 +187,7 @@ std::pair<double, double> BinnedRows::gap(const std::vector<int>& rows, const Sp
 
 bool BinnedRows::goes_left(int row, const SplitCandidate& split) const {
   const std::size_t input = static_cast<std::size_t>(split.input);
-  const int code = bins_[input].codes[static_cast<std::size_t>(row)];
+  const int code = inputs_.code(row, input);
   if (data_.num_levels[input] > 0) {
     return split.level_side[static_cast<std::size_t>(code)] < 0;
   }

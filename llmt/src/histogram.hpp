@@ -71,7 +71,7 @@ class BinnedRows {
                            const std::vector<int>& rows, double node_rss, double limit) const;
 
   const GrowthData& data_;
-  std::vector<Bins> bins_;
+  BinnedInputs inputs_;
   std::vector<std::ptrdiff_t> first_bin_;  // of each input among all bins
   Features features_;
   GramShape shape_;

@@ -62,7 +62,7 @@ BinnedRows::Edges BinnedRows::search_edges(const Histogram& histogram, std::size
     const std::ptrdiff_t before = edges.rows_before[k];
     const std::ptrdiff_t left = before + rows[bin];
     const bool last = static_cast<std::ptrdiff_t>(k) == count;
-    if (bins_[input].splittable[bin] &&
+    if (inputs_.bins[input].splittable[bin] &&
         std::max(before + 1, smallest_leaf) <= std::min(left - 1, all - smallest_leaf)) {
       edges.bounds[k] = (k > 0 ? edges.rss_left[k - 1] : 0.0) + (last ? 0.0 : edges.rss_right[k]);
     }
@@ -88,16 +88,14 @@ BinnedRows::Edges BinnedRows::search_edges(const Histogram& histogram, std::size
 /// Exact search in the chosen bins of an input, given by their positions among those with rows.
 SplitCandidate BinnedRows::look_into(const Edges& edges, const std::vector<std::size_t>& chosen, std::size_t input,
                                      const std::vector<int>& rows, double node_rss, double limit) const {
-  const std::vector<std::uint8_t>& codes = bins_[input].codes;
   std::vector<int> slot_of_bin(most_bins, -1);
   for (std::size_t k = 0; k < chosen.size(); ++k) {
     slot_of_bin[static_cast<std::size_t>(edges.bins[chosen[k]])] = static_cast<int>(k);
   }
-  std::vector<std::vector<std::pair<double, int>>> held(chosen.size());
+  std::vector<std::vector<int>> held(chosen.size());
   for (const int row : rows) {
-    if (const int slot = slot_of_bin[codes[static_cast<std::size_t>(row)]]; slot >= 0) {
-      held[static_cast<std::size_t>(slot)].emplace_back(data_.split_value(row, static_cast<std::ptrdiff_t>(input)),
-                                                        row);
+    if (const int slot = slot_of_bin[static_cast<std::size_t>(inputs_.code(row, input))]; slot >= 0) {
+      held[static_cast<std::size_t>(slot)].push_back(row);
     }
   }
   const std::vector<double> nothing(static_cast<std::size_t>(shape_.size()), 0.0);
@@ -105,10 +103,14 @@ SplitCandidate BinnedRows::look_into(const Edges& edges, const std::vector<std::
   for (std::size_t k = 0; k < chosen.size(); ++k) {
     const std::size_t at = chosen[k];
     const bool last = at + 1 == edges.bins.size();
-    std::sort(held[k].begin(), held[k].end());
+    std::vector<std::pair<double, int>> sorted;
+    for (const int row : held[k]) {
+      sorted.emplace_back(data_.split_value(row, static_cast<std::ptrdiff_t>(input)), row);
+    }
+    std::sort(sorted.begin(), sorted.end());
     std::vector<double> values;
     std::vector<int> order;
-    for (const auto& [value, row] : held[k]) {
+    for (const auto& [value, row] : sorted) {
       values.push_back(value);
       order.push_back(row);
     }
@@ -140,7 +142,7 @@ SplitCandidate BinnedRows::look_into(const Edges& edges, const std::vector<std::
 
 SplitCandidate BinnedRows::search(const Histogram& histogram, const std::vector<int>& rows, double node_rss,
                                   double& excess) const {
-  const std::size_t inputs = bins_.size();
+  const std::size_t inputs = inputs_.bins.size();
   const int threads = data_.threads_for(num_bins() * shape_.size() / 4);
   std::vector<Edges> edges(inputs);
   parallel_for(std::ssize(edges), threads, [&](std::ptrdiff_t j) {

@@ -159,9 +159,13 @@ double jump_size(const TrainingRows& training, const Partition& grown, const Nod
   return std::sqrt(size / static_cast<double>(residuals.cols()));
 }
 
+/// A jump that so many rows do not show is not worth keeping.
+constexpr std::ptrdiff_t enough_rows = 200000;
+
 }  // namespace
 
-Eigen::VectorXd jump_sizes(const TrainingRows& training, const Partition& grown, int max_threads) {
+Eigen::VectorXd jump_sizes(const TrainingRows& all, const Partition& grown, int max_threads) {
+  const TrainingRows training = thinned(all, enough_rows);
   const Evaluator evaluator(grown, training.columns, std::ssize(training.regressors));
   std::vector<std::vector<int>> of_node(grown.nodes.size());  // positions of the rows in its box
   for (std::ptrdiff_t index = 0; index < num_chunks(training); ++index) {

@@ -297,8 +297,8 @@ std::vector<CandidateError> best_of_widths(const Comparison& comparison, const s
   return result;
 }
 
-/// Candidates are told apart on samples of the training rows. Against a crisp tree, whose models all rows have made, the
-/// best blend is at a disadvantage then: it is made from all rows too, where one hold-out says that there are many.
+/// Candidates are told apart on samples of the training rows. Against a crisp tree, whose models all rows have made,
+/// the best blend is at a disadvantage then: it is made from all rows too, where one hold-out says that there are many.
 Partition make_from_all_rows(const FoldRows& fold, const GrownTree& grown, const Eigen::VectorXd& weights,
                              int max_threads, const Judge& judge, CandidateError& best) {
   Candidate candidate = best.candidate;

@@ -33,7 +33,7 @@ struct Selection {
   std::vector<CandidateError> best_of_kind;
   Eigen::VectorXd crisp_rmse;
   std::ptrdiff_t held_out_rows = 0;  ///< that errors are from
-  std::vector<Partition> made;  ///< the chosen candidate in every fold, if it had to be made; else empty
+  std::vector<Partition> made;       ///< the chosen candidate in every fold, if it had to be made; else empty
 };
 
 /// Compares on the held-out rows of all folds, see docs/algorithms.md, section 7. `grown`: of each fold the tree grown

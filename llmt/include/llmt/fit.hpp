@@ -127,12 +127,13 @@ inline constexpr double no_jump = std::numeric_limits<double>::infinity();
 struct BlendOptions {
   ValidityChoice validity = ValidityChoice::automatic;
   Estimation estimation = Estimation::joint;
-  std::vector<double> widths = {};  ///< Validity::width. Empty: 0.5, 1, 2, 4 for blends; 1/3 for Gaussians
+  std::vector<double> widths = {};  ///< Validity::width. Empty: 0.5, 1, 2 and, but for a single
+                                    ///< hold-out, 4 for blends; 1/3 for Gaussians
   /// Splits where the outputs jump by at least this multiple of the scatter of the rows there have no transition, see
   /// docs/algorithms.md; no_jump: all have one. Empty: no_jump, 4, 2, 1, 0.5.
   std::vector<double> jumps = {};
   /// Joint estimation: ridge, see docs/algorithms.md; 0 is global least squares, the larger the nearer to local
-  /// estimation. Empty: 1e-8, 1e-6, 1e-4, 1e-3, 1e-2, 1e-1.
+  /// estimation. Empty: 1e-8, 1e-6, 1e-4, 1e-2 and, but for a single hold-out, 1e-3, 1e-1.
   std::vector<double> ridges = {};
   /// Local models are drawn towards their parents' as if this many further rows said so, with the variance that each
   /// column has in the leaf and without correlation: a guard against near-collinear columns and few rows. Empty: 0, 0.1
