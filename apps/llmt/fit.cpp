@@ -23,6 +23,7 @@ struct FitArguments {
 
 constexpr std::array<const char*, 4> rule_names = {"rd", "retis", "lolimot", "lolimot-data"};  // as GrowthRule
 constexpr std::array<const char*, 4> validity_names = {"auto", "crisp", "blend", "gaussian"};  // as ValidityChoice
+constexpr std::array<const char*, 3> search_names = {"auto", "exact", "binned"};  // as SplitSearch
 constexpr std::array<const char*, 3> estimation_names = {"as-grown", "local", "joint"};        // as Estimation
 
 template <class Enum, std::size_t Count>
@@ -89,6 +90,10 @@ Json summary_json(const FitArguments& arguments, const FitResult& result) {
     entry["grown_leaves"] = partition.grown_leaves;
     entry["rank_deficient_leaves"] = partition.rank_deficient_leaves;
     entry["growth_ended_by"] = describe(partition.stop);
+    entry["search"] = {{"exact_nodes", partition.search.exact_nodes},
+                       {"binned_nodes", partition.search.binned_nodes},
+                       {"evaluations", partition.search.evaluations},
+                       {"largest_excess", partition.search.largest_excess}};
     entry["cv_folds"] = partition.cv_folds;
     const bool judged = partition.cv_folds > 0;
     entry["chosen"] = candidate_json(partition.chosen);
@@ -116,6 +121,20 @@ std::string selection_text(const FitArguments& arguments, const PartitionSummary
   }
   return fmt::format("chosen by {}-fold cross-validation{}, the tree grown anew in every fold", partition.cv_folds,
                      arguments.learning.contiguous ? " over contiguous blocks of rows" : "");
+}
+
+/// How the splits of the final tree were searched; nothing if there were none to search.
+std::string search_text(const SearchSummary& search) {
+  if (search.binned_nodes == 0) {
+    return search.evaluations == 0 ? "" : "Splits searched exactly.\n";
+  }
+  return fmt::format(
+      "Splits searched by bins in {} nodes, exactly in {} small ones. {}\n", search.binned_nodes, search.exact_nodes,
+      search.largest_excess > 0.0
+          ? fmt::format("A better split may exist by at most {} % of a node's residual sum of squares; --search exact "
+                        "looks for it.",
+                        number(100.0 * search.largest_excess, 2))
+          : "There are no better ones.");
 }
 
 void print_summary(const FitArguments& arguments, const FitResult& result) {
@@ -165,6 +184,7 @@ void print_summary(const FitArguments& arguments, const FitResult& result) {
     print("Held-out errors of the shared tree are over all targets, each divided by its standard deviation.\n");
   }
   for (const PartitionSummary& partition : result.summary.partitions) {
+    print(search_text(partition.search));
     if (partition.rank_deficient_leaves > 0) {
       print(fmt::format(
           "Leaves whose rows do not determine all slopes (constant or collinear inputs, few rows) and keep their "
@@ -217,6 +237,12 @@ void add_fit(CLI::App& app) {
       ->add_option("--min-improvement", growth.min_improvement,
                    "Stop when further splits lower the training sum of squares by less than this fraction each")
       ->capture_default_str();
+  command
+      ->add_option("--search", growth.search,
+                   "Search for splits: exact; by bins, exact in small nodes and where bins may hold a better split; or "
+                   "bins for many rows")
+      ->transform(choice_of<SplitSearch>(search_names))
+      ->option_text("auto|exact|binned [auto]");
   command->add_flag("--shared", growth.shared_partition, "One tree for all targets instead of one each");
   command
       ->add_option("--validity", blend.validity,

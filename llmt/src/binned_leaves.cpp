@@ -123,7 +123,7 @@ SplitCandidate BinnedLeaves::examine(BinnedLeaf& leaf, const Node& parent, Node&
     leaf.slope = node.slope;
     leaf.histogram = rows_.accumulate(leaf.rows);
   }
-  return rows_.search(*leaf.histogram, leaf.rows, data_.output_weights.dot(node.rss), excess);
+  return rows_.search(*leaf.histogram, leaf.rows, data_.output_weights.dot(node.rss), node.rank, excess);
 }
 
 void BinnedLeaves::wait(BinnedLeaf& leaf) {

@@ -146,9 +146,12 @@ SplitCandidate ExactLeaves::find_split(const ExactLeaf& leaf, const NodeFit& fit
   });
   // What one input has found spares the others work, in a way that does not depend on who was first.
   double limit = std::numeric_limits<double>::infinity();
+  std::ptrdiff_t numeric = 0;  // candidate splits on numbers
   for (std::size_t j = 0; j < inputs; ++j) {
     limit = std::min(limit, searches[j] ? searches[j]->smallest() : limit);
+    numeric += searches[j] ? searches[j]->tested() : 0;
   }
+  limit = std::min(limit, data_.significant_rss(leaf.weights.sum(), fit.rank, rss, numeric));
   parallel_for(std::ssize(found), threads, [&](std::ptrdiff_t j) {
     const std::size_t slot = static_cast<std::size_t>(j);
     if (searches[slot]) {

@@ -8,4 +8,7 @@ namespace llmt {
 /// infinite f.
 double f_survival(double f, double d1, double d2);
 
+/// The f with f_survival(f, d1, d2) = probability, which lies in (0, 1).
+double f_quantile(double probability, double d1, double d2);
+
 }  // namespace llmt

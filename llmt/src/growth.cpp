@@ -142,7 +142,7 @@ class Grower {
       return StopReason::exact_fit;
     }
     if (leaf.best.input < 0) {
-      return StopReason::leaf_samples;
+      return leaf.best.tested > 0 ? StopReason::significance : StopReason::leaf_samples;
     }
     if (options_.rule == GrowthRule::retis) {
       return std::nullopt;

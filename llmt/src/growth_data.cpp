@@ -3,6 +3,8 @@
 #include <cmath>
 #include <limits>
 
+#include "f_distribution.hpp"
+
 namespace llmt {
 
 GrowthData::GrowthData(const GrowthProblem& growth) : problem(growth), training(*growth.training) {
@@ -29,6 +31,22 @@ GrowthData::GrowthData(const GrowthProblem& growth) : problem(growth), training(
     output_weights(o) = squares > 0.0 ? 1.0 / squares : 1.0;
     rounding(o) = 8.0 * std::numeric_limits<double>::epsilon() * magnitude / output_scale(o);
   }
+}
+
+double GrowthData::significant_rss(double weight, int rank, double rss, std::ptrdiff_t tested) const {
+  const GrowthOptions& options = problem.options;
+  if (options.rule != GrowthRule::rd || options.significance >= 1.0 || tested == 0) {
+    return std::numeric_limits<double>::infinity();
+  }
+  // One more coefficient is the least that two models can have; the more there are, the more they must gain.
+  const double added = static_cast<double>(output_weights.size());
+  const double freedom = added * (weight - rank) - added;
+  if (freedom <= 0.0) {
+    return std::numeric_limits<double>::infinity();
+  }
+  // A little less, so that rounding excludes nothing.
+  const double f = 0.999 * f_quantile(options.significance / static_cast<double>(tested), added, freedom);
+  return rss / (1.0 + f * added / freedom);
 }
 
 double GrowthData::place_threshold(double low, double high, double mean, const Eigen::VectorXd& apart,

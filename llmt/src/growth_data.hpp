@@ -40,6 +40,11 @@ struct GrowthData {
   double place_threshold(double low, double high, double mean, const Eigen::VectorXd& apart,
                          const Eigen::VectorXd& slope) const;
 
+  /// The largest residual sum of squares of two child models with which a split may pass the significance test,
+  /// whatever the children's ranks; infinity without a test. `weight`, `rank`, `rss`: of the node; `tested`: candidate
+  /// splits, or fewer.
+  double significant_rss(double weight, int rank, double rss, std::ptrdiff_t tested) const;
+
   /// Threads for work on so many numbers: one where starting another costs more than it saves.
   int threads_for(std::ptrdiff_t work) const { return work < 30000 ? 1 : problem.max_threads; }
 };

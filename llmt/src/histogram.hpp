@@ -36,9 +36,9 @@ class BinnedRows {
   std::vector<double> total(const Histogram& histogram) const;
 
   /// The best split of the rows of a histogram. Compares the edges between bins, then searches those bins exactly whose
-  /// bounds allow a better split, the most promising first, while they hold at most half of the rows. `excess`: what a
-  /// split in one of the other bins could gain on the result, at most.
-  SplitCandidate search(const Histogram& histogram, const std::vector<int>& rows, double node_rss,
+  /// bounds allow a better split, of at most `limit`, the most promising first, while they hold at most half of the
+  /// rows. `excess`: what a split in one of the other bins could gain on the result, at most.
+  SplitCandidate search(const Histogram& histogram, const std::vector<int>& rows, double node_rss, int rank,
                         double& excess) const;
 
   /// Takes the linear function value + slope . (scaled regressors) off the residuals of some rows.

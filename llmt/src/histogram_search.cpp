@@ -140,7 +140,7 @@ SplitCandidate BinnedRows::look_into(const Edges& edges, const std::vector<std::
   return best;
 }
 
-SplitCandidate BinnedRows::search(const Histogram& histogram, const std::vector<int>& rows, double node_rss,
+SplitCandidate BinnedRows::search(const Histogram& histogram, const std::vector<int>& rows, double node_rss, int rank,
                                   double& excess) const {
   const std::size_t inputs = inputs_.bins.size();
   const int threads = data_.threads_for(num_bins() * shape_.size() / 4);
@@ -152,6 +152,12 @@ SplitCandidate BinnedRows::search(const Histogram& histogram, const std::vector<
   for (const Edges& input : edges) {
     smallest = input.best.input >= 0 || !input.best.level_side.empty() ? std::min(smallest, input.best.rss) : smallest;
   }
+  std::ptrdiff_t compared = 0;
+  for (const Edges& input : edges) {
+    compared += input.best.tested;
+  }
+  const double limit = data_.significant_rss(total(histogram)[0], rank, node_rss, compared);
+  smallest = std::min(smallest, limit);
   // Bins that may hold a better split, the lowest bound first.
   struct Bin {
     double bound;
@@ -208,7 +214,9 @@ SplitCandidate BinnedRows::search(const Histogram& histogram, const std::vector<
   }
   best.tested = tested;
   best.evaluations = evaluations;
-  excess = best.input >= 0 && next < promising.size() ? std::max(0.0, best.rss - promising[next].bound) : 0.0;
+  excess = best.input >= 0 && best.rss <= limit && next < promising.size()
+               ? std::max(0.0, best.rss - promising[next].bound)
+               : 0.0;
   return best;
 }
 

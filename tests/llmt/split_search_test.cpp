@@ -102,6 +102,16 @@ TEST(FDistribution, SurvivalMatchesTabulatedQuantiles) {
   EXPECT_NEAR(llmt::f_survival(8.7855, 10, 3), 0.05, 2e-6);
 }
 
+TEST(FDistribution, QuantileIsTheInverseOfSurvival) {
+  for (const double d1 : {1.0, 3.0, 11.0}) {
+    for (const double d2 : {4.0, 30.0, 1e3, 1e7}) {
+      for (const double f : {0.3, 1.0, 4.0, 9.0}) {
+        EXPECT_NEAR(llmt::f_quantile(llmt::f_survival(f, d1, d2), d1, d2) / f, 1.0, 1e-8);
+      }
+    }
+  }
+}
+
 TEST(FDistribution, SurvivalHasItsLimits) {
   EXPECT_EQ(llmt::f_survival(0.0, 3, 10), 1.0);
   EXPECT_EQ(llmt::f_survival(std::numeric_limits<double>::infinity(), 3, 10), 0.0);
