@@ -23,7 +23,7 @@ struct FitArguments {
 
 constexpr std::array<const char*, 4> rule_names = {"rd", "retis", "lolimot", "lolimot-data"};  // as GrowthRule
 constexpr std::array<const char*, 4> validity_names = {"auto", "crisp", "blend", "gaussian"};  // as ValidityChoice
-constexpr std::array<const char*, 3> search_names = {"auto", "exact", "binned"};  // as SplitSearch
+constexpr std::array<const char*, 3> search_names = {"auto", "exact", "binned"};               // as SplitSearch
 constexpr std::array<const char*, 3> estimation_names = {"as-grown", "local", "joint"};        // as Estimation
 
 template <class Enum, std::size_t Count>

@@ -150,9 +150,9 @@ PlanarStudy planar_study(bool carry_over, bool large, std::uint64_t seed) {
   study.noisy_crisp = noisy_error(crisp);
   study.noisy_blend = noisy_error(blended(93, seed));
 
-  const auto black_box = [&](const std::string& name, const Poses& poses, const Eigen::MatrixXd& truth,
+  const auto black_box = [&](const std::string& name, const Poses& poses, const Eigen::MatrixXd& positions,
                              std::ptrdiff_t x_leaves, std::ptrdiff_t y_leaves, TotalError paper) {
-    const AxisTrees trees = fit_axes(poses.joints, truth, {grown_to(x_leaves), grown_to(y_leaves)});
+    const AxisTrees trees = fit_axes(poses.joints, positions, {grown_to(x_leaves), grown_to(y_leaves)});
     study.black_box.push_back(
         {name, poses.count(), trees.leaves, total_error(trees.predict(test.joints), test_truth), paper});
   };

@@ -327,10 +327,10 @@ FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<
     of_kept.selection.folds.groups = groups;
     return fit(inputs(kept, Eigen::all), outputs(kept, Eigen::all), of_kept);
   }
-  const TrainingRows all = training_rows(table, all_rows(inputs.rows()));
+  const TrainingRows all = training_rows(table, all_rows(inputs.rows()), options.max_threads);
   std::vector<FoldRows> folds;
   for (const Fold& fold : selection_folds(inputs.rows(), options.selection)) {
-    TrainingRows training = training_rows(table, {fold.train.begin(), fold.train.end()});
+    TrainingRows training = training_rows(table, {fold.train.begin(), fold.train.end()}, options.max_threads);
     TrainingRows held_out = query_rows(table, {fold.held_out.begin(), fold.held_out.end()}, training);
     folds.push_back({std::move(training), std::move(held_out)});
   }

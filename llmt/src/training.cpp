@@ -100,53 +100,49 @@ struct Extremes {
   }
 };
 
-void describe_regressors(TrainingRows& training) {
-  const std::size_t regressors = training.regressors.size();
+/// What the rows tell of a regressor.
+struct RegressorRange {
+  bool has_missing = false;
+  double scale = 1.0;
+  double low = 0.0;  // without the one row at either end
+  double high = 0.0;
+};
+
+RegressorRange describe_regressor(const TrainingRows& training, const Regressor& regressor) {
+  const Table& table = *training.table;
+  const InputColumn& column = training.columns[static_cast<std::size_t>(regressor.input)];
+  const bool is_level = regressor.level >= 0;
   // Squares are taken of parts of the largest deviation: those of the deviations may be too large, or too small.
-  Eigen::VectorXd largest = Eigen::VectorXd::Ones(std::ssize(training.regressors));
-  for (std::size_t k = 0; k < regressors; ++k) {
-    const Regressor& regressor = training.regressors[k];
-    const InputColumn& column = training.columns[static_cast<std::size_t>(regressor.input)];
-    if (regressor.level < 0) {
-      largest(static_cast<std::ptrdiff_t>(k)) =
-          std::max({column.high - regressor.centre, regressor.centre - column.low, 0.0});
+  const double largest =
+      is_level ? 1.0 : std::max({column.high - regressor.centre, regressor.centre - column.low, 0.0});
+  double squares = 0.0;
+  Extremes low{1.0};
+  Extremes high{-1.0};
+  std::ptrdiff_t present = 0;
+  RegressorRange range;
+  for (const int row : training.rows) {
+    const double x = table.inputs(row, regressor.input);
+    if (std::isnan(x)) {
+      range.has_missing = true;
+      continue;
     }
+    const double deviation =
+        (is_level ? (x == static_cast<double>(regressor.level) ? 1.0 : 0.0) : x) - regressor.centre;
+    const double part = largest > 0.0 ? deviation / largest : 0.0;
+    squares += training.weight_unit * table.weights(row) * part * part;
+    low.add(deviation);
+    high.add(deviation);
+    ++present;
   }
-  Eigen::VectorXd squares = Eigen::VectorXd::Zero(largest.size());
-  std::vector<Extremes> low(regressors, Extremes{1.0});
-  std::vector<Extremes> high(regressors, Extremes{-1.0});
-  std::vector<std::ptrdiff_t> present(regressors, 0);
-  for (std::ptrdiff_t index = 0; index < num_chunks(training); ++index) {
-    const Chunk chunk = fetch(training, index, {});
-    for (std::ptrdiff_t row = 0; row < chunk.count(); ++row) {
-      for (std::size_t k = 0; k < regressors; ++k) {
-        const std::ptrdiff_t column = static_cast<std::ptrdiff_t>(k);
-        const double value = chunk.deviations(row, column);
-        if (std::isnan(value)) {
-          training.has_missing = true;
-          continue;
-        }
-        const double part = largest(column) > 0.0 ? value / largest(column) : 0.0;
-        squares(column) += chunk.weights(row) * part * part;
-        low[k].add(value);
-        high[k].add(value);
-        ++present[k];
-      }
-    }
+  if (squares > 0.0) {
+    range.scale = largest * std::sqrt(squares / static_cast<double>(training.count()));
   }
-  training.scale.setOnes(largest.size());
-  training.spread.setZero(2, largest.size());
-  for (std::size_t k = 0; k < regressors; ++k) {
-    const std::ptrdiff_t column = static_cast<std::ptrdiff_t>(k);
-    if (squares(column) > 0.0) {
-      training.scale(column) = largest(column) * std::sqrt(squares(column) / static_cast<double>(training.count()));
-    }
-    if (present[k] > 0) {
-      const bool skip = training.regressors[k].level < 0 && present[k] > 4;
-      training.spread(0, column) = skip ? low[k].second : low[k].first;
-      training.spread(1, column) = -(skip ? high[k].second : high[k].first);
-    }
+  if (present > 0) {
+    const bool skip = !is_level && present > 4;
+    range.low = skip ? low.second : low.first;
+    range.high = -(skip ? high.second : high.first);
   }
+  return range;
 }
 
 }  // namespace
@@ -163,14 +159,14 @@ Eigen::VectorXd TrainingRows::high() const {
   return result;
 }
 
-TrainingRows training_rows(const Table& table, std::vector<int> rows) {
+TrainingRows training_rows(const Table& table, std::vector<int> rows, int max_threads) {
   TrainingRows training;
   training.table = &table;
   training.rows = std::move(rows);
   training.weight_unit = static_cast<double>(training.count()) / total_weight(training);
-  for (std::ptrdiff_t j = 0; j < table.inputs.cols(); ++j) {
-    training.columns.push_back(describe_input(training, j));
-  }
+  training.columns.resize(static_cast<std::size_t>(table.inputs.cols()));
+  parallel_for(table.inputs.cols(), max_threads,
+               [&](std::ptrdiff_t j) { training.columns[static_cast<std::size_t>(j)] = describe_input(training, j); });
   for (std::ptrdiff_t o = 0; o < table.outputs.cols(); ++o) {
     training.output_columns.push_back(describe_output(training, o));
   }
@@ -185,7 +181,20 @@ TrainingRows training_rows(const Table& table, std::vector<int> rows) {
       training.regressors.push_back({input, level, share_of_level(training, input, level)});
     }
   }
-  describe_regressors(training);
+  const std::ptrdiff_t regressors = std::ssize(training.regressors);
+  std::vector<RegressorRange> ranges(training.regressors.size());
+  parallel_for(regressors, max_threads, [&](std::ptrdiff_t k) {
+    const std::size_t slot = static_cast<std::size_t>(k);
+    ranges[slot] = describe_regressor(training, training.regressors[slot]);
+  });
+  training.scale.resize(regressors);
+  training.spread.resize(2, regressors);
+  for (std::ptrdiff_t k = 0; k < regressors; ++k) {
+    const RegressorRange& range = ranges[static_cast<std::size_t>(k)];
+    training.has_missing = training.has_missing || range.has_missing;
+    training.scale(k) = range.scale;
+    training.spread.col(k) << range.low, range.high;
+  }
   return training;
 }
 

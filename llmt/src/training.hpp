@@ -41,7 +41,7 @@ struct TrainingRows {
 };
 
 /// The given rows, columns described from them. `table` must live as long as the result.
-TrainingRows training_rows(const Table& table, std::vector<int> rows);
+TrainingRows training_rows(const Table& table, std::vector<int> rows, int max_threads = 1);
 
 /// The given rows under the columns of `training`.
 TrainingRows query_rows(const Table& table, std::vector<int> rows, const TrainingRows& training);
