@@ -9,169 +9,23 @@
 #include <optional>
 #include <stdexcept>
 
-#include "checks.hpp"
+#include "fit_checks.hpp"
 #include "growth.hpp"
 #include "joint_fit.hpp"
 #include "jumps.hpp"
 #include "lolimot.hpp"
 #include "parallel.hpp"
+#include "plan.hpp"
 #include "selection.hpp"
 #include "training.hpp"
 
 namespace llmt {
 namespace {
 
-constexpr double largest_magnitude = 1e150;  // squares stay finite
-
-void require(bool condition, const char* option, double value, const char* bound) {
-  if (!condition) {
-    throw std::invalid_argument(fmt::format("llmt::fit: {} is {}, it must be {}", option, value, bound));
-  }
-}
-
-void check_data(const char* name, const Eigen::Ref<const Eigen::MatrixXd>& data) {
-  if (data.rows() < 1 || data.cols() < 1) {
-    throw std::invalid_argument(fmt::format("llmt::fit: {} is {} x {}, at least one row and one column are needed",
-                                            name, data.rows(), data.cols()));
-  }
-  check_finite("llmt::fit", name, data);
-  require(data.cwiseAbs().maxCoeff() <= largest_magnitude, fmt::format("a magnitude in {}", name).c_str(),
-          data.cwiseAbs().maxCoeff(), "at most 1e150");
-}
-
-void check_inputs(const Eigen::Ref<const Eigen::MatrixXd>& inputs) {
-  if (inputs.rows() < 1 || inputs.cols() < 1) {
-    throw std::invalid_argument(fmt::format("llmt::fit: inputs is {} x {}, at least one row and one column are needed",
-                                            inputs.rows(), inputs.cols()));
-  }
-  check_finite_or_missing("llmt::fit", "inputs", inputs);
-  const double largest = inputs.array().isNaN().select(0.0, inputs).cwiseAbs().maxCoeff();
-  require(largest <= largest_magnitude, "a magnitude in inputs", largest, "at most 1e150");
-}
-
-std::vector<int> all_columns(std::ptrdiff_t count) {
-  std::vector<int> columns(static_cast<std::size_t>(count));
-  std::iota(columns.begin(), columns.end(), 0);
-  return columns;
-}
-
 std::vector<int> all_rows(std::ptrdiff_t count) {
   std::vector<int> rows(static_cast<std::size_t>(count));
   std::iota(rows.begin(), rows.end(), 0);
   return rows;
-}
-
-void check_growth(const GrowthOptions& options, std::ptrdiff_t inputs) {
-  require(std::isfinite(options.significance), "growth.significance", options.significance, "finite");
-  require(std::isfinite(options.min_variance_gain), "growth.min_variance_gain", options.min_variance_gain, "finite");
-  require(options.pruning_m >= 0.0, "growth.pruning_m", options.pruning_m, "at least 0");
-  require(options.min_leaf_samples >= 0, "growth.min_leaf_samples", static_cast<double>(options.min_leaf_samples),
-          "at least 0");
-  require(options.max_leaves >= 0, "growth.max_leaves", static_cast<double>(options.max_leaves), "at least 0");
-  require(options.min_improvement >= 0.0 && options.min_improvement < 1.0, "growth.min_improvement",
-          options.min_improvement, "in [0, 1)");
-  check_columns("llmt::fit", "growth.split_inputs", options.split_inputs, inputs);
-  check_columns("llmt::fit", "growth.regression_inputs", options.regression_inputs, inputs);
-}
-
-void check_blend(const BlendOptions& options) {
-  for (const double width : options.widths) {
-    require(std::isfinite(width) && width > 0.0, "blend.widths", width, "finite and positive");
-  }
-  for (const double ridge : options.ridges) {
-    require(ridge >= 0.0 && std::isfinite(ridge), "blend.ridges", ridge, "finite and not negative");
-  }
-  for (const double shrinkage : options.shrinkages) {
-    require(shrinkage >= 0.0 && std::isfinite(shrinkage), "blend.shrinkages", shrinkage, "finite and not negative");
-  }
-  for (const double jump : options.jumps) {
-    require(jump >= 0.0, "blend.jumps", jump, "not negative");
-  }
-  require(options.smoothness == 1 || options.smoothness == 2, "blend.smoothness", options.smoothness, "1 or 2");
-}
-
-/// Number of levels of every input, 0 for numbers.
-std::vector<int> count_levels(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const std::vector<int>& categorical) {
-  check_columns("llmt::fit", "categorical_inputs", categorical, inputs.cols());
-  std::vector<int> num_levels(static_cast<std::size_t>(inputs.cols()), 0);
-  constexpr double most = 10000.0;
-  for (const int column : categorical) {
-    for (const double value : inputs.col(column)) {
-      if (std::isnan(value)) {
-        continue;
-      }
-      require(value >= 0.0 && value < most && value == std::floor(value),
-              fmt::format("a category of input {}", column).c_str(), value, "a whole number from 0 to 9999");
-      int& levels = num_levels[static_cast<std::size_t>(column)];
-      levels = std::max(levels, static_cast<int>(value) + 1);
-    }
-    // All missing: a category that never occurs.
-    num_levels[static_cast<std::size_t>(column)] = std::max(num_levels[static_cast<std::size_t>(column)], 1);
-  }
-  return num_levels;
-}
-
-/// What is compared, and growth options without blanks.
-struct Plan {
-  GrowthOptions growth;
-  Candidates candidates;
-};
-
-bool is_lolimot(GrowthRule rule) { return rule == GrowthRule::lolimot || rule == GrowthRule::lolimot_data_driven; }
-
-Plan make_plan(const FitOptions& options, const TrainingRows& all, std::ptrdiff_t folds) {
-  const bool has_folds = folds > 0;
-  // Many rows: the widest transitions and the larger ridges, which are for few, take most of the time.
-  const bool many_rows = folds == 1;
-  Plan plan{options.growth, {}};
-  const ValidityChoice choice = is_lolimot(options.growth.rule) ? ValidityChoice::gaussian : options.blend.validity;
-  const bool crisp_only = choice == ValidityChoice::crisp || (choice == ValidityChoice::automatic && !has_folds);
-  plan.candidates.crisp = choice == ValidityChoice::automatic || choice == ValidityChoice::crisp;
-  plan.candidates.kind = choice == ValidityChoice::gaussian ? ValidityKind::gaussian : ValidityKind::blend;
-  plan.candidates.estimation = options.blend.estimation;
-  plan.candidates.smoothness = options.blend.smoothness;
-  if (!crisp_only) {
-    plan.candidates.widths = options.blend.widths;
-    if (plan.candidates.widths.empty()) {
-      plan.candidates.widths = choice == ValidityChoice::gaussian ? std::vector<double>{1.0 / 3.0}
-                               : many_rows                        ? std::vector<double>{0.5, 1.0, 2.0}
-                                                                  : std::vector<double>{0.5, 1.0, 2.0, 4.0};
-    }
-    plan.candidates.jumps = options.blend.jumps;
-    if (plan.candidates.jumps.empty()) {
-      plan.candidates.jumps = {no_jump};
-      if (has_folds && plan.candidates.kind == ValidityKind::blend) {
-        plan.candidates.jumps.insert(plan.candidates.jumps.end(), {4.0, 2.0, 1.0, 0.5});
-      }
-    }
-    if (options.blend.estimation == Estimation::joint) {
-      plan.candidates.ridges = options.blend.ridges;
-      if (plan.candidates.ridges.empty()) {
-        plan.candidates.ridges = many_rows ? std::vector<double>{1e-8, 1e-6, 1e-4, 1e-2}
-                                           : std::vector<double>{1e-8, 1e-6, 1e-4, 1e-3, 1e-2, 1e-1};
-      }
-    }
-  }
-  plan.candidates.shrinkages = options.blend.shrinkages;
-  if (plan.candidates.shrinkages.empty()) {
-    plan.candidates.shrinkages = has_folds ? std::vector<double>{0.0, 0.1, 1.0} : std::vector<double>{0.0};
-  }
-  GrowthOptions& growth = plan.growth;
-  const std::ptrdiff_t regressors = std::ssize(all.regressors);
-  const bool many_leaves = !crisp_only && has_folds;
-  if (growth.significance < 0.0) {
-    growth.significance = many_leaves ? 1.0 : 0.05;
-  }
-  if (growth.min_leaf_samples == 0) {
-    growth.min_leaf_samples = many_leaves ? std::max<std::ptrdiff_t>(5, regressors) : 2 * (regressors + 1);
-  }
-  if (growth.max_leaves == 0 && many_leaves) {
-    growth.max_leaves = std::clamp<std::ptrdiff_t>(1500 / (regressors + 1), 20, 400);
-  }
-  if (growth.max_leaves == 0 && is_lolimot(growth.rule)) {
-    growth.max_leaves = 100;
-  }
-  return plan;
 }
 
 /// What growth needs of the rows lives no longer than this.
@@ -222,27 +76,6 @@ Eigen::VectorXd error_weights(const Table& table, const std::vector<int>& served
   return weights;
 }
 
-std::vector<Fold> selection_folds(std::ptrdiff_t rows, const SelectionOptions& selection) {
-  FoldOptions options = selection.folds;
-  if (options.count == 0) {
-    return {};
-  }
-  require(options.count >= 2, "selection.folds.count", options.count, "0 or at least 2");
-  std::vector<double> distinct(options.groups.begin(), options.groups.end());
-  std::sort(distinct.begin(), distinct.end());
-  distinct.erase(std::unique(distinct.begin(), distinct.end()), distinct.end());
-  const std::ptrdiff_t groups = options.groups.empty() ? rows : std::ssize(distinct);
-  options.count = static_cast<int>(std::min<std::ptrdiff_t>(options.count, groups));
-  if (options.count < 2) {
-    return {};
-  }
-  std::vector<Fold> folds = make_folds(rows, options);
-  if (rows >= selection.single_hold_out_rows) {
-    folds.resize(1);
-  }
-  return folds;
-}
-
 PartitionSummary summarise(const Partition& partition, const TrainingRows& rows) {
   PartitionSummary summary;
   summary.outputs = partition.outputs;
@@ -258,62 +91,11 @@ PartitionSummary summarise(const Partition& partition, const TrainingRows& rows)
   return summary;
 }
 
-/// The rows of positive weight, checked.
-Table make_table(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<const Eigen::MatrixXd>& outputs,
-                 const FitOptions& options) {
-  check_inputs(inputs);
-  check_data("outputs", outputs);
-  if (inputs.rows() != outputs.rows()) {
-    throw std::invalid_argument(
-        fmt::format("llmt::fit: inputs has {} rows, outputs has {}", inputs.rows(), outputs.rows()));
-  }
-  require(inputs.rows() <= std::numeric_limits<int>::max(), "the number of rows", static_cast<double>(inputs.rows()),
-          "below 2^31");
-  Table table{inputs,
-              outputs,
-              options.weights,
-              count_levels(inputs, options.categorical_inputs),
-              options.growth.regression_inputs,
-              options.growth.split_inputs};
-  if (table.weights.size() == 0) {
-    table.weights = Eigen::VectorXd::Ones(inputs.rows());
-  } else {
-    if (table.weights.size() != inputs.rows()) {
-      throw std::invalid_argument(
-          fmt::format("llmt::fit: weights has {} entries, inputs has {} rows", table.weights.size(), inputs.rows()));
-    }
-    check_finite("llmt::fit", "weights", table.weights);
-    require(table.weights.minCoeff() >= 0.0, "a weight", table.weights.minCoeff(), "at least 0");
-    require(table.weights.maxCoeff() > 0.0, "the largest weight", table.weights.maxCoeff(), "positive");
-    table.weights /= table.weights.maxCoeff();
-  }
-  for (std::vector<int>* columns : {&table.split_inputs, &table.regression_inputs}) {
-    if (columns->empty()) {
-      *columns = all_columns(inputs.cols());
-    }
-    std::sort(columns->begin(), columns->end());
-  }
-  return table;
-}
-
-std::vector<std::ptrdiff_t> rows_with_weight(const Table& table) {
-  std::vector<std::ptrdiff_t> result;
-  for (std::ptrdiff_t row = 0; row < table.weights.size(); ++row) {
-    // Far below the largest, a weight changes nothing but rounding.
-    if (table.weights(row) > 1e-12) {
-      result.push_back(row);
-    }
-  }
-  return result;
-}
-
 }  // namespace
 
 FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<const Eigen::MatrixXd>& outputs,
               const FitOptions& options) {
-  check_growth(options.growth, inputs.cols());
-  check_blend(options.blend);
-  require(options.max_threads >= 0, "max_threads", options.max_threads, "at least 0");
+  check_options(options, inputs.cols());
   const Table table = make_table(inputs, outputs, options);
   if (const std::vector<std::ptrdiff_t> kept = rows_with_weight(table); std::ssize(kept) < inputs.rows()) {
     FitOptions of_kept = options;

@@ -237,7 +237,8 @@ struct FitResult {
 /// A leaf fits its rows by least squares, as a correction of its parent's local model of minimum norm (inputs scaled to
 /// unit variance in the leaf). Where the rows do not determine a direction - fewer rows than coefficients, constant or
 /// collinear columns - the parent's slope in that direction stays; at the root it is zero. Nothing in the result
-/// depends on the order of rows, on the number of threads, on scale and offset of inputs and outputs, beyond rounding.
+/// depends on the order of rows or on the number of threads, nor on scale and offset of inputs and outputs, beyond
+/// rounding; but for many rows the samples that candidates are compared on, and bins, depend on the values.
 /// Equally good splits: the first input, then the smallest threshold.
 ///
 /// Inputs may be missing (NaN), see Model; outputs may not.

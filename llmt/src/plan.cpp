@@ -1,0 +1,64 @@
+#include "plan.hpp"
+
+#include <algorithm>
+
+namespace llmt {
+
+bool is_lolimot(GrowthRule rule) { return rule == GrowthRule::lolimot || rule == GrowthRule::lolimot_data_driven; }
+
+Plan make_plan(const FitOptions& options, const TrainingRows& all, std::ptrdiff_t folds) {
+  const bool has_folds = folds > 0;
+  // Many rows: the widest transitions and the larger ridges, which are for few, take most of the time.
+  const bool many_rows = folds == 1;
+  Plan plan{options.growth, {}};
+  const ValidityChoice choice = is_lolimot(options.growth.rule) ? ValidityChoice::gaussian : options.blend.validity;
+  const bool crisp_only = choice == ValidityChoice::crisp || (choice == ValidityChoice::automatic && !has_folds);
+  plan.candidates.crisp = choice == ValidityChoice::automatic || choice == ValidityChoice::crisp;
+  plan.candidates.kind = choice == ValidityChoice::gaussian ? ValidityKind::gaussian : ValidityKind::blend;
+  plan.candidates.estimation = options.blend.estimation;
+  plan.candidates.smoothness = options.blend.smoothness;
+  if (!crisp_only) {
+    plan.candidates.widths = options.blend.widths;
+    if (plan.candidates.widths.empty()) {
+      plan.candidates.widths = choice == ValidityChoice::gaussian ? std::vector<double>{1.0 / 3.0}
+                               : many_rows                        ? std::vector<double>{0.5, 1.0, 2.0}
+                                                                  : std::vector<double>{0.5, 1.0, 2.0, 4.0};
+    }
+    plan.candidates.jumps = options.blend.jumps;
+    if (plan.candidates.jumps.empty()) {
+      plan.candidates.jumps = {no_jump};
+      if (has_folds && plan.candidates.kind == ValidityKind::blend) {
+        plan.candidates.jumps.insert(plan.candidates.jumps.end(), {4.0, 2.0, 1.0, 0.5});
+      }
+    }
+    if (options.blend.estimation == Estimation::joint) {
+      plan.candidates.ridges = options.blend.ridges;
+      if (plan.candidates.ridges.empty()) {
+        plan.candidates.ridges = many_rows ? std::vector<double>{1e-8, 1e-6, 1e-4, 1e-2}
+                                           : std::vector<double>{1e-8, 1e-6, 1e-4, 1e-3, 1e-2, 1e-1};
+      }
+    }
+  }
+  plan.candidates.shrinkages = options.blend.shrinkages;
+  if (plan.candidates.shrinkages.empty()) {
+    plan.candidates.shrinkages = has_folds ? std::vector<double>{0.0, 0.1, 1.0} : std::vector<double>{0.0};
+  }
+  GrowthOptions& growth = plan.growth;
+  const std::ptrdiff_t regressors = std::ssize(all.regressors);
+  const bool many_leaves = !crisp_only && has_folds;
+  if (growth.significance < 0.0) {
+    growth.significance = many_leaves ? 1.0 : 0.05;
+  }
+  if (growth.min_leaf_samples == 0) {
+    growth.min_leaf_samples = many_leaves ? std::max<std::ptrdiff_t>(5, regressors) : 2 * (regressors + 1);
+  }
+  if (growth.max_leaves == 0 && many_leaves) {
+    growth.max_leaves = std::clamp<std::ptrdiff_t>(1500 / (regressors + 1), 20, 400);
+  }
+  if (growth.max_leaves == 0 && is_lolimot(growth.rule)) {
+    growth.max_leaves = 100;
+  }
+  return plan;
+}
+
+}  // namespace llmt
