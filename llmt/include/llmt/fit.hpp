@@ -208,6 +208,7 @@ struct PartitionSummary {
   Eigen::VectorXd train_rmse;  ///< one per output of the partition
   CandidateError chosen;       ///< errors NaN without folds
   /// What it was chosen against: least squares first, then the best of each validity and width. Empty without folds.
+  /// For many rows the errors of all blends but the best one are of models made from samples of the training rows.
   std::vector<CandidateError> best_of_kind;
   /// Held-out RMSE of the crisp prefixes with 1, 2, ... leaves; empty without folds.
   Eigen::VectorXd crisp_cv_rmse;
