@@ -158,6 +158,15 @@ TEST(Calibration, JointComplianceIsRecoveredTogetherWithGeometry) {
   }
 }
 
+TEST(Calibration, APayloadBelowZeroIsRefused) {
+  const Robot robot = ur_like();
+  Measurements seen = measure(robot, random_poses(robot.chain, 60, 1), 0.01, 2);
+  seen.poses.covariates["payload_kg"] = Eigen::VectorXd::Constant(60, 5.0);
+  EXPECT_NO_THROW(validate(seen, robot));
+  seen.poses.covariates["payload_kg"](7) = -5.0;
+  EXPECT_THROW(validate(seen, robot), std::invalid_argument);
+}
+
 TEST(Calibration, AnEarlierCalibrationsErrorsAndCorrectionAreForgotten) {
   Robot before = ur_like();
   before.identified = {{"joint1.a", 0.5, "free"}};
