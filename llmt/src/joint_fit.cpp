@@ -17,7 +17,8 @@ constexpr double least_shrinkage = 1e-6;
 constexpr double least_hold = 1e-12;
 
 /// From an estimate on a sample, so many steps of conjugate gradients towards that on all rows. The sample's factor
-/// makes each of them gain about one digit; the last one needs no pass over the rows, for its length is one.
+/// makes each of them gain about one digit. The length of each is measured on all rows: where a leaf has next to no rows
+/// in the sample, a step of length one would go far astray.
 constexpr int steps_on_all_rows = 2;
 
 /// Regressors with missing values at the mean of a node's rows.
@@ -274,11 +275,6 @@ Partition JointFit::joint_on(const TrainingRows& all, std::ptrdiff_t leaves,
   for (int step = 0; step < steps_on_all_rows; ++step) {
     Eigen::MatrixXd conditioned = residual;
     solve_cholesky(solution.factor, conditioned);
-    if (step + 1 == steps_on_all_rows) {
-      // The sample stands for all rows, so a step of length one is nearly the best and spares a pass over them.
-      coefficients += conditioned;
-      break;
-    }
     const Eigen::RowVectorXd now = residual.cwiseProduct(conditioned).colwise().sum();
     direction = conditioned + direction * now.cwiseQuotient(before).asDiagonal();
     before = now;
