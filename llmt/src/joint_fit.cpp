@@ -17,8 +17,8 @@ constexpr double least_shrinkage = 1e-6;
 constexpr double least_hold = 1e-12;
 
 /// From an estimate on a sample, so many steps of conjugate gradients towards that on all rows. The sample's factor
-/// makes each of them gain about one digit. The length of each is measured on all rows: where a leaf has next to no rows
-/// in the sample, a step of length one would go far astray.
+/// makes each of them gain about one digit. The length of each is measured on all rows: where a leaf has next to no
+/// rows in the sample, a step of length one would go far astray.
 constexpr int steps_on_all_rows = 2;
 
 /// Regressors with missing values at the mean of a node's rows.
