@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <numeric>
 
+#include "boxes.hpp"
+#include "estimate.hpp"
 #include "growth.hpp"
 #include "joint_fit.hpp"
 #include "oracles.hpp"
@@ -73,6 +75,33 @@ TEST(Sample, JointEstimateOnAllRowsIsReachedFromIt) {
   EXPECT_LE(distance(fit.joint_on(training, 8, regularisation), exact), 0.1 * before);
   EXPECT_EQ(fit.joint_on(training, 8, regularisation).residual_range,
             llmt::JointFit(training, tree, 1).as_grown(8).residual_range);
+}
+
+/// Weighted sum of squared errors over all rows.
+double loss(const Partition& partition, const llmt::TrainingRows& training) {
+  const Eigen::VectorXd weights = Eigen::VectorXd::Ones(2);
+  const std::vector<llmt::Chunk> chunks = {llmt::fetch(training, all(training.count()), partition.outputs)};
+  return llmt::squared_error(partition, training, chunks, weights);
+}
+
+// A few rows far out have a leaf, and next to none of them is in the sample: the sample says nothing of the leaf's
+// slopes, and a step made on its word must not go astray.
+TEST(Sample, LeafThatItHardlyHoldsDoesNotSpoilTheEstimateOnAllRows) {
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    Rows data = rows(20000, seed);
+    for (std::ptrdiff_t row = 0; row < 15; ++row) {
+      data.inputs(row, 0) += 40.0;
+      data.outputs.row(row).array() += 30.0;
+    }
+    const Rows far{data.inputs, data.outputs};
+    const llmt::TrainingRows training = llmt::training_rows(far.table, all(20000));
+    const Partition tree = blended_tree(training);
+    const llmt::TrainingRows sample = llmt::thinned(training, 60 * 4 * 8);
+    const llmt::Regularisation regularisation{1e-6, 0.0};
+    const double exact = loss(llmt::JointFit(training, tree, 1).joint(8, {regularisation}).front(), training);
+    EXPECT_LE(loss(llmt::JointFit(sample, tree, 1).joint_on(training, 8, regularisation), training), 1.05 * exact)
+        << "seed " << seed;
+  }
 }
 
 TEST(Sample, DependsOnTheRowsAndNotOnTheirOrder) {
