@@ -52,7 +52,8 @@ void compare_command(CompareArguments arguments) {
   options.folds = arguments.learning.options.selection.folds;
   Progress progress("fitting");
   options.progress = [&](const std::string&, std::ptrdiff_t done, std::ptrdiff_t total) { progress.show(done, total); };
-  const ComparisonResult result = compare(table.inputs.values, table.outputs, usual_methods(table.options), options);
+  const ComparisonResult result =
+      compare(table.inputs.values, table.outputs, usual_methods(table.options, table.inputs.values.cols()), options);
   progress.clear();
   if (arguments.json) {
     print_json(comparison_json(arguments, table, result));

@@ -25,6 +25,8 @@ constexpr std::array<const char*, 4> rule_names = {"rd", "retis", "lolimot", "lo
 constexpr std::array<const char*, 4> validity_names = {"auto", "crisp", "blend", "gaussian"};  // as ValidityChoice
 constexpr std::array<const char*, 3> search_names = {"auto", "exact", "binned"};               // as SplitSearch
 constexpr std::array<const char*, 3> estimation_names = {"as-grown", "local", "joint"};        // as Estimation
+constexpr std::array<const char*, 3> terms_names = {"linear", "quadratic", "auto"};            // as LocalTerms
+constexpr std::array<const char*, 3> sparse_names = {"never", "auto", "always"};               // as SparseChoice
 
 template <class Enum, std::size_t Count>
 CLI::CheckedTransformer choice_of(const std::array<const char*, Count>& names) {
@@ -35,14 +37,16 @@ CLI::CheckedTransformer choice_of(const std::array<const char*, Count>& names) {
   return CLI::CheckedTransformer(values);
 }
 
-/// "blend, width 2, jumps from 4, ridge 0.001, shrinkage 0.1".
+/// "blend, sparse, width 2, jumps from 4, ridge 0.001, shrinkage 0.1".
 std::string describe(const Candidate& candidate) {
+  const char* const sparse = candidate.sparse ? ", sparse" : "";
   if (candidate.validity.kind == ValidityKind::crisp) {
-    const std::string name = candidate.leaves == 1 ? "least squares" : "crisp";
+    const std::string name = fmt::format("{}{}", candidate.leaves == 1 ? "least squares" : "crisp", sparse);
     return candidate.shrinkage > 0.0 ? fmt::format("{}, shrinkage {}", name, candidate.shrinkage) : name;
   }
-  std::string text = fmt::format("{}, width {}", candidate.validity.kind == ValidityKind::blend ? "blend" : "Gaussians",
-                                 number(candidate.validity.width, 3));
+  std::string text =
+      fmt::format("{}{}, width {}", candidate.validity.kind == ValidityKind::blend ? "blend" : "Gaussians", sparse,
+                  number(candidate.validity.width, 3));
   text += candidate.jump < no_jump ? fmt::format(", jumps from {}", number(candidate.jump, 3)) : "";
   text += candidate.estimation == Estimation::as_grown ? ", as grown"
           : candidate.estimation == Estimation::local  ? ", local"
@@ -59,6 +63,7 @@ Json candidate_json(const CandidateError& entry) {
           {"estimation", estimation_names[static_cast<std::size_t>(entry.candidate.estimation)]},
           {"ridge", entry.candidate.ridge},
           {"shrinkage", entry.candidate.shrinkage},
+          {"sparse", entry.candidate.sparse},
           {"leaves", entry.candidate.leaves},
           {"cv_rmse", or_null(entry.rmse)},
           {"spread", or_null(entry.spread)}};
@@ -79,6 +84,7 @@ Json summary_json(const FitArguments& arguments, const FitResult& result) {
   for (const InputColumn& input : result.model.inputs()) {
     json["inputs"].push_back(input.name);
   }
+  json["local_models"] = result.summary.quadratic ? "quadratic" : "linear";
   json["partitions"] = Json::array();
   for (const PartitionSummary& partition : result.summary.partitions) {
     Json entry;
@@ -88,6 +94,7 @@ Json summary_json(const FitArguments& arguments, const FitResult& result) {
     }
     entry["leaves"] = partition.leaves;
     entry["grown_leaves"] = partition.grown_leaves;
+    entry["coefficients"] = partition.coefficients;
     entry["rank_deficient_leaves"] = partition.rank_deficient_leaves;
     entry["growth_ended_by"] = describe(partition.stop);
     entry["search"] = {{"exact_nodes", partition.search.exact_nodes},
@@ -105,6 +112,9 @@ Json summary_json(const FitArguments& arguments, const FitResult& result) {
     entry["cv_rmse_least_squares"] = judged ? Json(least_squares_rmse(partition)) : Json(nullptr);
     entry["crisp_cv_rmse_by_leaves"] =
         std::vector<double>(partition.crisp_cv_rmse.begin(), partition.crisp_cv_rmse.end());
+    if (!result.summary.other_terms.empty()) {
+      entry["other_terms"] = candidate_json(result.summary.other_terms[json["partitions"].size()]);
+    }
     json["partitions"].push_back(std::move(entry));
   }
   json["model"] = arguments.output.empty() ? Json(nullptr) : Json(arguments.output);
@@ -121,6 +131,30 @@ std::string selection_text(const FitArguments& arguments, const PartitionSummary
   }
   return fmt::format("chosen by {}-fold cross-validation{}, the tree grown anew in every fold", partition.cv_folds,
                      arguments.learning.contiguous ? " over contiguous blocks of rows" : "");
+}
+
+/// What the local models are made of, and what spoke for it; nothing for what was not asked.
+std::string local_models_text(const FitArguments& arguments, const FitSummary& summary) {
+  const LocalModelOptions& asked = arguments.learning.options.local_models;
+  std::string text;
+  if (asked.terms != LocalTerms::linear) {
+    text += fmt::format("Local models are {}", summary.quadratic ? "quadratic" : "linear");
+    for (std::size_t p = 0; p < summary.other_terms.size(); ++p) {
+      text += fmt::format("{} RMSE held-out {}",
+                          p == 0 ? fmt::format("; {} ones:", summary.quadratic ? "linear" : "quadratic") : ",",
+                          number(summary.other_terms[p].rmse));
+    }
+    text += asked.terms == LocalTerms::automatic && summary.other_terms.empty()
+                ? ", without a comparison: it needs folds and 1 to 13 numeric regression inputs.\n"
+                : ".\n";
+  }
+  for (const PartitionSummary& partition : summary.partitions) {
+    if (partition.chosen.candidate.sparse) {
+      text +=
+          fmt::format("Sparse local models: {} coefficients in {} leaves.\n", partition.coefficients, partition.leaves);
+    }
+  }
+  return text;
 }
 
 /// How the splits of the final tree were searched; nothing if there were none to search.
@@ -183,6 +217,7 @@ void print_summary(const FitArguments& arguments, const FitResult& result) {
   if (result.summary.partitions.front().outputs.size() > 1) {
     print("Held-out errors of the shared tree are over all targets, each divided by its standard deviation.\n");
   }
+  print(local_models_text(arguments, result.summary));
   for (const PartitionSummary& partition : result.summary.partitions) {
     print(search_text(partition.search));
     if (partition.rank_deficient_leaves > 0) {
@@ -244,6 +279,19 @@ void add_fit(CLI::App& app) {
       ->transform(choice_of<SplitSearch>(search_names))
       ->option_text("auto|exact|binned [auto]");
   command->add_flag("--shared", growth.shared_partition, "One tree for all targets instead of one each");
+  LocalModelOptions& local_models = arguments->learning.options.local_models;
+  command
+      ->add_option("--local-models", local_models.terms,
+                   "Local models linear, with products and squares of the inputs, or the better of the two")
+      ->transform(choice_of<LocalTerms>(terms_names))
+      ->option_text("linear|quadratic|auto [linear]");
+  command
+      ->add_option(
+          "--sparse", local_models.sparse,
+          "Local models keep only the slopes that forward selection takes: never, always, or where the held-out "
+          "error says so")
+      ->transform(choice_of<SparseChoice>(sparse_names))
+      ->option_text("never|auto|always [never]");
   command
       ->add_option("--validity", blend.validity,
                    "Crisp leaves, blends over the splits, Gaussians, or the best of the first two")

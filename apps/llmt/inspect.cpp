@@ -53,10 +53,19 @@ std::string conditions(const Model& model, const Leaf& leaf) {
   return parts.empty() ? "everywhere" : fmt::format("{}", fmt::join(parts, ", "));
 }
 
-/// "x1", or "[colour = red]" for the indicator of a category.
+/// "x1", "[colour = red]" for the indicator of a category, or "(x1 - 0.5)*(x2 + 3)", "(x1 - 0.5)^2" for a product.
 std::string regressor_name(const Model& model, std::size_t k) {
   const Regressor& regressor = model.regressors()[k];
   const InputColumn& input = model.inputs()[static_cast<std::size_t>(regressor.input)];
+  if (regressor.second_input >= 0) {
+    const auto factor = [](const InputColumn& of) {
+      return of.centre == 0.0
+                 ? of.name
+                 : fmt::format("({} {} {})", of.name, of.centre < 0.0 ? "+" : "-", number(std::abs(of.centre), 6));
+    };
+    const InputColumn& second = model.inputs()[static_cast<std::size_t>(regressor.second_input)];
+    return regressor.second_input == regressor.input ? factor(input) + "^2" : factor(input) + "*" + factor(second);
+  }
   return regressor.level < 0
              ? input.name
              : fmt::format("[{} = {}]", input.name, input.levels[static_cast<std::size_t>(regressor.level)]);

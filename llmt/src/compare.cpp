@@ -9,6 +9,8 @@
 #include <stdexcept>
 
 #include "evaluator.hpp"
+#include "local_terms.hpp"
+#include "regressors.hpp"
 
 namespace llmt {
 namespace {
@@ -33,8 +35,10 @@ FitOptions for_rows(FitOptions options, const std::vector<std::ptrdiff_t>& rows)
 std::ptrdiff_t count_parameters(const Model& model) {
   std::ptrdiff_t count = 0;
   for (const Partition& partition : model.partitions()) {
-    const std::ptrdiff_t leaves = partition.num_leaves();
-    count += leaves * (std::ssize(model.regressors()) + 1) * std::ssize(partition.outputs) + leaves - 1;
+    count += partition.num_leaves() - 1;
+    for (const Node& node : partition.nodes) {
+      count += node.is_leaf() ? node.value.size() + (node.slope.array() != 0.0).count() : 0;
+    }
   }
   return count;
 }
@@ -56,7 +60,8 @@ Paired paired(const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
 bool is_least_squares(const Method& method) { return method.options.growth.max_leaves == 1; }
 
 bool is_readable(const Method& method) {
-  return method.options.growth.rule == GrowthRule::rd && method.options.blend.validity == ValidityChoice::crisp;
+  return method.options.growth.rule == GrowthRule::rd && method.options.blend.validity == ValidityChoice::crisp &&
+         method.options.local_models.terms == LocalTerms::linear;
 }
 
 void recommend(const std::vector<Method>& methods, ComparisonResult& result) {
@@ -105,11 +110,12 @@ void recommend(const std::vector<Method>& methods, ComparisonResult& result) {
 
 }  // namespace
 
-std::vector<Method> usual_methods(const FitOptions& base) {
+std::vector<Method> usual_methods(const FitOptions& base, std::ptrdiff_t inputs) {
   FitOptions plain = base;
   plain.intervals = false;
   plain.progress = {};
   plain.blend.validity = ValidityChoice::crisp;
+  plain.local_models = {};
   std::vector<Method> methods;
   const auto add = [&](const std::string& name, const auto& change) {
     methods.push_back({name, plain});
@@ -140,6 +146,10 @@ std::vector<Method> usual_methods(const FitOptions& base) {
     options.blend.estimation = Estimation::as_grown;
     options.growth.max_leaves = gaussian_leaves;
   });
+  if (const std::ptrdiff_t numbers = count_numbers(inputs, base); numbers > 0 && numbers <= most_inputs_of_products) {
+    add("crisp tree, quadratic leaves",
+        [](FitOptions& options) { options.local_models.terms = LocalTerms::quadratic; });
+  }
   return methods;
 }
 

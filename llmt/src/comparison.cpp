@@ -81,6 +81,7 @@ Candidate Comparison::candidate(const Key& key) const {
           .estimation = candidates_.estimation,
           .ridge = candidates_.ridges.empty() ? 0.0 : candidates_.ridges[key.ridge],
           .shrinkage = candidates_.shrinkages[key.shrinkage],
+          .sparse = candidates_.sparse[key.sparse],
           .leaves = leaf_counts_[key.leaves]};
 }
 
@@ -98,21 +99,21 @@ std::map<Key, double> Comparison::evaluate_shape(std::size_t fold, const std::ve
     const std::ptrdiff_t leaves = std::min(leaf_counts_[count], partition.num_leaves());
     if (!fit || candidates_.kind == ValidityKind::gaussian) {
       rows = thinned(sample, enough_rows(leaves, std::ssize(sample.regressors) + 1));
-      fit.emplace(*rows, prefix(partition, leaves), max_threads_);
+      fit.emplace(*rows, prefix(partition, leaves), max_threads_, candidates_.sparse.back());
     }
     std::vector<Key> same;
     std::vector<Regularisation> regularisations;
     for (; last != keys.rend() && last->leaves == count; ++last) {
       const Candidate each = candidate(*last);
       same.push_back(*last);
-      regularisations.push_back({each.ridge, each.shrinkage});
+      regularisations.push_back({each.ridge, each.shrinkage, each.sparse});
     }
     std::vector<Partition> models;
     if (candidates_.estimation == Estimation::joint) {
       models = fit->joint(leaves, regularisations);
     } else {
       for (const Regularisation& each : regularisations) {
-        models.push_back(candidates_.estimation == Estimation::local ? fit->local(leaves, each.shrinkage)
+        models.push_back(candidates_.estimation == Estimation::local ? fit->local(leaves, each.shrinkage, each.sparse)
                                                                      : fit->as_grown(leaves));
       }
     }

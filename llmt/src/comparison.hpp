@@ -17,12 +17,13 @@ struct Shape {
   double jump = no_jump;
 };
 
-/// Position of a candidate among shapes, leaf counts, ridges and shrinkages.
+/// Position of a candidate among shapes, leaf counts, ridges, shrinkages and what is sparse.
 struct Key {
   std::size_t shape = 0;
   std::size_t leaves = 0;
   std::size_t ridge = 0;
   std::size_t shrinkage = 0;
+  std::size_t sparse = 0;
   auto operator<=>(const Key&) const = default;
 };
 

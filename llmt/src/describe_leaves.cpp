@@ -92,9 +92,20 @@ Eigen::MatrixXd inverse(const Eigen::MatrixXd& gram, const Eigen::VectorXd& scal
   return scale.cwiseInverse().asDiagonal() * result * scale.cwiseInverse().asDiagonal();
 }
 
+/// The constant and the regressors with a slope for some output.
+std::vector<std::ptrdiff_t> used_coefficients(const Node& node) {
+  std::vector<std::ptrdiff_t> used = {0};
+  for (std::ptrdiff_t k = 0; k < node.slope.cols(); ++k) {
+    if (!node.slope.col(k).isZero(0.0)) {
+      used.push_back(k + 1);
+    }
+  }
+  return used;
+}
+
 }  // namespace
 
-void describe_leaves(const TrainingRows& training, Partition& partition, int max_threads) {
+void describe_leaves(const TrainingRows& training, Partition& partition, bool sparse, int max_threads) {
   const std::ptrdiff_t regressors = std::ssize(training.regressors);
   const Evaluator evaluator(partition, training.columns, regressors);
   const Eigen::MatrixXd rss = residual_sums(training, partition, evaluator, max_threads);
@@ -110,7 +121,14 @@ void describe_leaves(const TrainingRows& training, Partition& partition, int max
     node.rss = rss.col(index);
     node.inverse_gram = Eigen::MatrixXd();
     if (node.is_leaf()) {
-      node.inverse_gram = inverse(gram[static_cast<std::size_t>(index)].selfadjointView<Eigen::Lower>(), scale);
+      const Eigen::MatrixXd full = gram[static_cast<std::size_t>(index)].selfadjointView<Eigen::Lower>();
+      if (!sparse) {
+        node.inverse_gram = inverse(full, scale);
+        return;
+      }
+      const std::vector<std::ptrdiff_t> used = used_coefficients(node);
+      node.inverse_gram = Eigen::MatrixXd::Zero(full.rows(), full.cols());
+      node.inverse_gram(used, used) = inverse(full(used, used), scale(used));
     }
   });
 }

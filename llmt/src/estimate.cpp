@@ -55,22 +55,24 @@ Partition estimate(const TrainingRows& training, const GrownTree& grown, const C
     partition.outer_slope.resize(0, 0);  // one linear model goes on as it is
   }
   if (candidate.validity.kind == ValidityKind::crisp) {
-    const JointFit fit(training, std::move(partition), max_threads);
-    return candidate.shrinkage > 0.0 ? fit.local(candidate.leaves, candidate.shrinkage)
-                                     : fit.as_grown(candidate.leaves);
+    const JointFit fit(training, std::move(partition), max_threads, candidate.sparse);
+    return candidate.sparse || candidate.shrinkage > 0.0
+               ? fit.local(candidate.leaves, candidate.shrinkage, candidate.sparse)
+               : fit.as_grown(candidate.leaves);
   }
-  const Regularisation regularisation{candidate.ridge, candidate.shrinkage};
+  const Regularisation regularisation{candidate.ridge, candidate.shrinkage, candidate.sparse};
   const std::ptrdiff_t enough = rows_per_unknown * candidate.leaves * (std::ssize(training.regressors) + 1);
   if (candidate.estimation == Estimation::joint && training.count() > 2 * enough) {
     const TrainingRows sample = thinned(training, enough);
-    return JointFit(sample, std::move(partition), max_threads).joint_on(training, candidate.leaves, regularisation);
+    return JointFit(sample, std::move(partition), max_threads, candidate.sparse)
+        .joint_on(training, candidate.leaves, regularisation);
   }
-  const JointFit fit(training, std::move(partition), max_threads);
+  const JointFit fit(training, std::move(partition), max_threads, candidate.sparse);
   switch (candidate.estimation) {
     case Estimation::as_grown:
       return fit.as_grown(candidate.leaves);
     case Estimation::local:
-      return fit.local(candidate.leaves, candidate.shrinkage);
+      return fit.local(candidate.leaves, candidate.shrinkage, candidate.sparse);
     case Estimation::joint:
       break;
   }

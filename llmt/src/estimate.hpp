@@ -35,6 +35,7 @@ double squared_error(const Partition& partition, const TrainingRows& columns, co
                      const Eigen::VectorXd& weights);
 
 /// Fills in what a finished partition tells of its leaves: residual sums of squares and inverse Gram matrices.
-void describe_leaves(const TrainingRows& training, Partition& partition, int max_threads);
+/// `sparse`: these are of the regressors with slopes alone.
+void describe_leaves(const TrainingRows& training, Partition& partition, bool sparse, int max_threads);
 
 }  // namespace llmt

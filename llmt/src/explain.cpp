@@ -10,6 +10,7 @@
 #include "checks.hpp"
 #include "evaluator.hpp"
 #include "parallel.hpp"
+#include "regressors.hpp"
 
 namespace llmt {
 namespace {
@@ -92,6 +93,7 @@ class Line {
         partition_(partition),
         evaluator_(evaluator),
         precision_(precision),
+        has_products_(std::any_of(model.regressors().begin(), model.regressors().end(), is_product)),
         point_(point),
         reference_(reference),
         way_(Eigen::VectorXd::Zero(point.size())),
@@ -204,6 +206,9 @@ class Line {
         cuts_.push_back(static_cast<double>(k) / coarse_pieces);
       }
     }
+    if (precision_.exact && has_products_) {
+      cut_at_extent();
+    }
     if (partition_.validity.kind == ValidityKind::gaussian) {
       for (const Node& node : partition_.nodes) {
         cut_at_ranges(node, 0.0, 1.0);
@@ -250,17 +255,51 @@ class Line {
     }
   }
 
+  /// Where on the line the product of two deviations has a value, both within the training extent.
+  std::vector<double> positions_of_product(const Regressor& regressor, double value) const {
+    const std::ptrdiff_t i = regressor.input;
+    const std::ptrdiff_t j = regressor.second_input;
+    const double first = reference_(i) - model_.inputs()[static_cast<std::size_t>(i)].centre;
+    const double second = reference_(j) - model_.inputs()[static_cast<std::size_t>(j)].centre;
+    const double square = way_(i) * way_(j);
+    const double half = 0.5 * (first * way_(j) + second * way_(i));
+    const double constant = first * second - value;
+    if (square == 0.0) {
+      return half == 0.0 ? std::vector<double>{} : std::vector<double>{-0.5 * constant / half};
+    }
+    // No solution, or a missing factor: NaN, and no cut.
+    const double larger = -(half + std::copysign(std::sqrt(half * half - square * constant), half));
+    return {larger / square, constant / larger};
+  }
+
+  /// Where factors of products leave the training extent, and where their holds end.
+  void cut_at_extent() {
+    for (const std::ptrdiff_t j : moving_) {
+      const InputColumn& input = model_.inputs()[static_cast<std::size_t>(j)];
+      const double round = rounding_of_hold * (input.high - input.low);
+      for (const double bound : {input.low - round, input.low, input.high, input.high + round}) {
+        cut_at((bound - reference_(j)) / way_(j), 0.0, 1.0);
+      }
+    }
+  }
+
   /// Where a node's guard sets in or ends.
   void cut_at_ranges(const Node& node, double from, double to) {
     for (std::size_t k = 0; precision_.exact && k < model_.regressors().size(); ++k) {
       const Regressor& regressor = model_.regressors()[k];
-      if (regressor.level >= 0 || way_(regressor.input) == 0.0) {
-        continue;
-      }
       const std::ptrdiff_t column = static_cast<std::ptrdiff_t>(k);
       const double round = rounding_of_hold * (node.high(column) - node.low(column));
       for (const double bound :
            {node.low(column) - round, node.low(column), node.high(column), node.high(column) + round}) {
+        if (is_product(regressor)) {
+          for (const double position : positions_of_product(regressor, bound + regressor.centre)) {
+            cut_at(position, from, to);
+          }
+          continue;
+        }
+        if (regressor.level >= 0 || way_(regressor.input) == 0.0) {
+          break;
+        }
         cut_at((bound + regressor.centre - reference_(regressor.input)) / way_(regressor.input), from, to);
       }
     }
@@ -325,7 +364,7 @@ class Line {
   int degree(int index, const Eigen::VectorXd& row) const {
     const Node& node = partition_.nodes[static_cast<std::size_t>(index)];
     if (node.is_leaf()) {
-      return 2;  // where a guard sets in
+      return has_products_ ? 8 : 2;  // where a guard sets in, and the holds of both factors
     }
     const double left = evaluator_.left_share(index, row.data());
     if (left >= 1.0 || left <= 0.0) {
@@ -343,12 +382,7 @@ class Line {
       const Eigen::VectorXd x = at(from + rule.nodes[i] * (to - from), row);
       deviations_at(model_.inputs(), model_.regressors(), x.data(), deviations_.data());
       evaluator_.derivatives(x.data(), deviations_.data(), by_input_, by_regressor_);
-      for (std::size_t k = 0; k < model_.regressors().size(); ++k) {
-        const int input = model_.regressors()[k].input;
-        if (way_(input) != 0.0) {
-          by_input_.col(input) += by_regressor_.col(static_cast<std::ptrdiff_t>(k));
-        }
-      }
+      add_through_regressors(model_.inputs(), model_.regressors(), x.data(), by_regressor_, by_input_);
       for (const std::ptrdiff_t j : moving_) {
         mean.col(j) += rule.weights[i] * way_(j) * by_input_.col(j);
       }
@@ -404,6 +438,7 @@ class Line {
   const Partition& partition_;
   const Evaluator& evaluator_;
   Precision precision_;
+  bool has_products_;
   Eigen::VectorXd point_;
   Eigen::VectorXd reference_;
   Eigen::VectorXd way_;                   // point - reference where an input moves, else 0

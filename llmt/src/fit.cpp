@@ -13,6 +13,7 @@
 #include "growth.hpp"
 #include "joint_fit.hpp"
 #include "jumps.hpp"
+#include "local_terms.hpp"
 #include "lolimot.hpp"
 #include "parallel.hpp"
 #include "plan.hpp"
@@ -76,7 +77,7 @@ Eigen::VectorXd error_weights(const Table& table, const std::vector<int>& served
   return weights;
 }
 
-PartitionSummary summarise(const Partition& partition, const TrainingRows& rows) {
+PartitionSummary summarise(const Partition& partition, const TrainingRows& rows, bool sparse) {
   PartitionSummary summary;
   summary.outputs = partition.outputs;
   summary.leaves = partition.num_leaves();
@@ -84,7 +85,8 @@ PartitionSummary summarise(const Partition& partition, const TrainingRows& rows)
   for (const Node& node : partition.nodes) {
     if (node.is_leaf()) {
       rss += node.rss;
-      summary.rank_deficient_leaves += node.rank < std::ssize(rows.regressors) + 1 ? 1 : 0;
+      summary.rank_deficient_leaves += !sparse && node.rank < std::ssize(rows.regressors) + 1 ? 1 : 0;
+      summary.coefficients += 1 + (node.slope.row(0).array() != 0.0).count();
     }
   }
   summary.train_rmse = (rss / total_weight(rows)).cwiseSqrt();
@@ -96,6 +98,9 @@ PartitionSummary summarise(const Partition& partition, const TrainingRows& rows)
 FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<const Eigen::MatrixXd>& outputs,
               const FitOptions& options) {
   check_options(options, inputs.cols());
+  if (options.local_models.terms == LocalTerms::automatic) {
+    return fit_best_terms(inputs, outputs, options);
+  }
   const Table table = make_table(inputs, outputs, options);
   if (const std::vector<std::ptrdiff_t> kept = rows_with_weight(table); std::ssize(kept) < inputs.rows()) {
     FitOptions of_kept = options;
@@ -139,7 +144,8 @@ FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<
   FitSummary summary{.samples = all.count(),
                      .missing_values = inputs.array().isNaN().count(),
                      .min_leaf_samples = plan.growth.min_leaf_samples,
-                     .partitions = std::vector<PartitionSummary>(served.size())};
+                     .partitions = std::vector<PartitionSummary>(served.size()),
+                     .quadratic = !table.products.empty()};
   // Of every fold: one partition for each group of outputs.
   std::vector<std::vector<std::optional<Partition>>> fold_partitions(
       options.intervals ? folds.size() : 0, std::vector<std::optional<Partition>>(served.size()));
@@ -166,6 +172,7 @@ FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<
     if (trees.empty()) {
       candidate.leaves = grown_leaves;
       candidate.shrinkage = plan.candidates.shrinkages.front();
+      candidate.sparse = plan.candidates.sparse.front();
       if (!plan.candidates.widths.empty()) {
         candidate.validity = {plan.candidates.kind, plan.candidates.widths.front(), plan.candidates.smoothness};
         candidate.jump = plan.candidates.jumps.front();
@@ -188,8 +195,8 @@ FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<
     });
     candidate.leaves = std::min(candidate.leaves, grown_leaves);
     Partition partition = estimate(all, grown.tree, candidate, options.max_threads);
-    describe_leaves(all, partition, options.max_threads);
-    PartitionSummary described = summarise(partition, all);
+    describe_leaves(all, partition, candidate.sparse, options.max_threads);
+    PartitionSummary described = summarise(partition, all, candidate.sparse);
     described.grown_leaves = grown_leaves;
     described.stop = grown.stop;
     described.search = grown.search;

@@ -9,6 +9,8 @@
 #include <stdexcept>
 
 #include "checks.hpp"
+#include "plan.hpp"
+#include "regressors.hpp"
 
 namespace llmt {
 namespace {
@@ -102,6 +104,10 @@ std::vector<int> count_levels(const Eigen::Ref<const Eigen::MatrixXd>& inputs, c
 void check_options(const FitOptions& options, std::ptrdiff_t inputs) {
   check_growth(options.growth, inputs);
   check_blend(options.blend);
+  require(options.local_models.sparse == SparseChoice::never || options.blend.estimation != Estimation::as_grown ||
+              (options.blend.validity == ValidityChoice::crisp && !is_lolimot(options.growth.rule)),
+          "local_models.sparse", static_cast<double>(options.local_models.sparse),
+          "never where blend.estimation is as_grown, for those models are full");
   require(options.max_threads >= 0, "max_threads", options.max_threads, "at least 0");
 }
 
@@ -138,6 +144,13 @@ Table make_table(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::R
       *columns = all_columns(inputs.cols());
     }
     std::sort(columns->begin(), columns->end());
+  }
+  if (options.local_models.terms == LocalTerms::quadratic) {
+    const std::ptrdiff_t numbers = std::ssize(numeric_regression_inputs(table));
+    require(numbers <= most_inputs_of_products,
+            "the number of numeric regression inputs of quadratic local models (local_models.terms)",
+            static_cast<double>(numbers), "at most 13; growth.regression_inputs chooses them");
+    table.products = products_of(table);
   }
   return table;
 }

@@ -5,6 +5,8 @@
 #include <cmath>
 
 #include "dense.hpp"
+#include "forward_selection.hpp"
+#include "parallel.hpp"
 
 namespace llmt {
 namespace {
@@ -50,7 +52,7 @@ Eigen::MatrixXd residual_range(const TrainingRows& training, const Node& root, c
 
 }  // namespace
 
-JointFit::JointFit(const TrainingRows& training, Partition partition, int max_threads)
+JointFit::JointFit(const TrainingRows& training, Partition partition, int max_threads, bool sparse)
     : training_(training),
       partition_(std::move(partition)),
       max_threads_(max_threads),
@@ -61,6 +63,22 @@ JointFit::JointFit(const TrainingRows& training, Partition partition, int max_th
   root_.row(0) = root.value.transpose();
   root_.bottomRows(size_ - 1) = training.scale.asDiagonal() * root.slope.transpose();
   sums_ = assemble(training, partition_, root_, max_threads);
+  if (sparse) {
+    select(max_threads);
+  }
+}
+
+void JointFit::select(int max_threads) {
+  // Of a sample, weights make it stand for all rows; it knows no more for that.
+  const double rows_per_weight = static_cast<double>(training_.count()) / total_weight(training_);
+  selected_.resize(partition_.nodes.size());
+  parallel_for(std::ssize(selected_), max_threads, [&](std::ptrdiff_t index) {
+    const std::size_t node = static_cast<std::size_t>(index);
+    // Sums of the outputs, from those of the residuals of the root's model.
+    LocalSums sums{sums_.gram[node], sums_.products[node] + sums_.gram[node] * root_, sums_.squares[node]};
+    sums.squares += root_.cwiseProduct(sums.products + sums_.products[node]).colwise().sum().transpose();
+    selected_[node] = select_regressors(sums, rows_per_weight);
+  });
 }
 
 Eigen::VectorXd JointFit::hold(std::size_t node, double shrinkage) const {
@@ -76,12 +94,30 @@ Eigen::VectorXd JointFit::hold(std::size_t node, double shrinkage) const {
   return result;
 }
 
-std::vector<Eigen::MatrixXd> JointFit::local_models(std::size_t nodes, double shrinkage) const {
+Eigen::MatrixXd JointFit::sparse_model(std::size_t node, const Eigen::MatrixXd& parent, double shrinkage) const {
+  const std::vector<std::ptrdiff_t>& selected = selected_[node];
+  Eigen::MatrixXd start = -root_;  // so that what is not selected is 0 in all
+  start(selected, Eigen::all) = parent(selected, Eigen::all);
+  Eigen::MatrixXd matrix = sums_.gram[node](selected, selected);
+  matrix.diagonal() += hold(node, shrinkage)(selected);
+  const Eigen::MatrixXd right = (sums_.products[node] - sums_.gram[node] * start)(selected, Eigen::all);
+  start(selected, Eigen::all) += matrix.llt().solve(right);
+  return start;
+}
+
+std::vector<Eigen::MatrixXd> JointFit::local_models(std::size_t nodes, double shrinkage, bool sparse) const {
   const std::vector<int> parents = parents_of(partition_);
   std::vector<Eigen::MatrixXd> models(nodes);
   models[0] = Eigen::MatrixXd::Zero(size_, root_.cols());  // the root's model itself
+  if (sparse && nodes == 1) {
+    models[0] = sparse_model(0, models[0], 0.0);
+  }
   for (std::size_t i = 1; i < nodes; ++i) {
     const Eigen::MatrixXd& parent = models[static_cast<std::size_t>(parents[i])];
+    if (sparse) {
+      models[i] = sparse_model(i, parent, shrinkage);
+      continue;
+    }
     Eigen::MatrixXd matrix = sums_.gram[i];
     matrix.diagonal() += hold(i, shrinkage);
     models[i] = parent + matrix.llt().solve(sums_.products[i] - sums_.gram[i] * parent);
@@ -95,16 +131,19 @@ void JointFit::set_model(Node& node, const Eigen::MatrixXd& coefficients) const 
   node.slope = total.bottomRows(size_ - 1).transpose() * training_.scale.cwiseInverse().asDiagonal();
 }
 
-Partition JointFit::with_models(std::ptrdiff_t leaves, const std::vector<Eigen::MatrixXd>& models) const {
+Partition JointFit::with_models(std::ptrdiff_t leaves, const std::vector<Eigen::MatrixXd>& models, bool sparse) const {
   Partition result = prefix(partition_, leaves);
   for (std::size_t i = 0; i < result.nodes.size(); ++i) {
     set_model(result.nodes[i], models[i]);
+    if (sparse && (i > 0 || leaves == 1)) {
+      result.nodes[i].rank = static_cast<int>(selected_[i].size());
+    }
   }
   return result;
 }
 
-Partition JointFit::local(std::ptrdiff_t leaves, double shrinkage) const {
-  return with_models(leaves, local_models(static_cast<std::size_t>(2 * leaves - 1), shrinkage));
+Partition JointFit::local(std::ptrdiff_t leaves, double shrinkage, bool sparse) const {
+  return with_models(leaves, local_models(static_cast<std::size_t>(2 * leaves - 1), shrinkage, sparse), sparse);
 }
 
 JointFit::System JointFit::system(std::ptrdiff_t leaves) const {
@@ -156,10 +195,36 @@ Eigen::MatrixXd JointFit::held(const System& system, const Regularisation& regul
   return result;
 }
 
+std::vector<std::ptrdiff_t> JointFit::kept_unknowns(const System& system) const {
+  std::vector<std::ptrdiff_t> kept;
+  for (std::size_t k = 0; k < system.nodes.size(); ++k) {
+    for (const std::ptrdiff_t coefficient : selected_[static_cast<std::size_t>(system.nodes[k])]) {
+      kept.push_back(static_cast<std::ptrdiff_t>(k) * size_ + coefficient);
+    }
+  }
+  return kept;
+}
+
+void JointFit::divide(const Solution& solution, Eigen::MatrixXd& right) {
+  if (!solution.sparse) {
+    solve_cholesky(solution.factor, right);
+    return;
+  }
+  Eigen::MatrixXd of_kept = right(solution.kept, Eigen::all);
+  solve_cholesky(solution.factor, of_kept);
+  right.setZero();
+  right(solution.kept, Eigen::all) = of_kept;
+}
+
 JointFit::Solution JointFit::solve(const System& system, const Regularisation& regularisation) const {
   const std::ptrdiff_t unknowns = system.matrix.rows();
   Solution result;
-  result.local = local_models(static_cast<std::size_t>(2 * std::ssize(system.nodes) - 1), regularisation.shrinkage);
+  result.sparse = regularisation.sparse;
+  result.local = local_models(static_cast<std::size_t>(2 * std::ssize(system.nodes) - 1), regularisation.shrinkage,
+                              regularisation.sparse);
+  if (result.sparse) {
+    result.kept = kept_unknowns(system);
+  }
   result.anchors.resize(unknowns, root_.cols());
   Eigen::MatrixXd right(unknowns, root_.cols());  // unknown: the change from the local estimates
   for (std::size_t k = 0; k < system.nodes.size(); ++k) {
@@ -178,17 +243,20 @@ JointFit::Solution JointFit::solve(const System& system, const Regularisation& r
       result.factor.diagonal().segment(at, size_) += hold(node, regularisation.shrinkage);
     }
     result.factor.diagonal().array() += more;
+    if (result.sparse) {
+      result.factor = RowMajor(result.factor(result.kept, result.kept));
+    }
     if (factor_cholesky(result.factor)) {
       break;
     }
   }
-  solve_cholesky(result.factor, right);
+  divide(result, right);
   result.coefficients = result.anchors + right;
   return result;
 }
 
 Partition JointFit::with_solution(const System& system, const Solution& solution) const {
-  Partition result = with_models(std::ssize(system.nodes), solution.local);
+  Partition result = with_models(std::ssize(system.nodes), solution.local, solution.sparse);
   for (std::size_t k = 0; k < system.nodes.size(); ++k) {
     set_model(result.nodes[static_cast<std::size_t>(system.nodes[k])],
               solution.coefficients.middleRows(static_cast<std::ptrdiff_t>(k) * size_, size_));
@@ -274,7 +342,7 @@ Partition JointFit::joint_on(const TrainingRows& all, std::ptrdiff_t leaves,
   Eigen::RowVectorXd before = Eigen::RowVectorXd::Ones(residual.cols());
   for (int step = 0; step < steps_on_all_rows; ++step) {
     Eigen::MatrixXd conditioned = residual;
-    solve_cholesky(solution.factor, conditioned);
+    divide(solution, conditioned);
     const Eigen::RowVectorXd now = residual.cwiseProduct(conditioned).colwise().sum();
     direction = conditioned + direction * now.cwiseQuotient(before).asDiagonal();
     before = now;

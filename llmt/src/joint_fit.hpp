@@ -15,6 +15,7 @@ namespace llmt {
 struct Regularisation {
   double ridge = 0.0;      ///< joint estimates at the local ones
   double shrinkage = 0.0;  ///< local estimates at the parent's, see Candidate::shrinkage
+  bool sparse = false;     ///< slopes that forward selection leaves out are 0
 };
 
 /// Weighted least squares of the outputs on Phi_i [1, x] over all leaves i of a partition, and of all its prefixes.
@@ -29,10 +30,14 @@ struct Regularisation {
 ///
 /// The validity of an inner node is the sum of the validities below it, so one pass over the rows serves every prefix
 /// of the tree. Normal equations in columns scaled over all rows, for the residuals of the root's model.
+///
+/// Sparse estimates have the coefficients that select_regressors() takes from G_i and b_i; nothing is selected anew in
+/// joint estimation. The root keeps its full model where there are more leaves, for guards refer to it.
 class JointFit {
  public:
-  /// `partition`: half widths set, local models as grown. `training` must live as long as this.
-  JointFit(const TrainingRows& training, Partition partition, int max_threads);
+  /// `partition`: half widths set, local models as grown. `training` must live as long as this. `sparse`: whether
+  /// sparse estimates will be asked for.
+  JointFit(const TrainingRows& training, Partition partition, int max_threads, bool sparse = false);
 
   /// The prefix with `leaves` leaves and the joint estimates for each ridge and shrinkage, in order.
   std::vector<Partition> joint(std::ptrdiff_t leaves, const std::vector<Regularisation>& regularisations) const;
@@ -42,7 +47,7 @@ class JointFit {
   Partition joint_on(const TrainingRows& all, std::ptrdiff_t leaves, const Regularisation& regularisation) const;
 
   /// The prefix with `leaves` leaves and locally weighted estimates.
-  Partition local(std::ptrdiff_t leaves, double shrinkage) const;
+  Partition local(std::ptrdiff_t leaves, double shrinkage, bool sparse = false) const;
 
   /// The prefix as grown, with the ranges of the validities.
   Partition as_grown(std::ptrdiff_t leaves) const { return prefix(partition_, leaves); }
@@ -55,14 +60,20 @@ class JointFit {
     RowMajor matrix;            // upper triangle
   };
   struct Solution {
+    bool sparse = false;
     std::vector<Eigen::MatrixXd> local;  // of every node
     Eigen::MatrixXd anchors;             // of the leaves, one below the other
     Eigen::MatrixXd coefficients;
-    RowMajor factor;
+    std::vector<std::ptrdiff_t> kept;  // unknowns of a sparse estimate
+    RowMajor factor;                   // of the matrix of the unknowns
   };
 
   System system(std::ptrdiff_t leaves) const;
   Solution solve(const System& system, const Regularisation& regularisation) const;
+  /// Coefficients of the unknowns of a sparse estimate.
+  std::vector<std::ptrdiff_t> kept_unknowns(const System& system) const;
+  /// Replaces `right` by the factored matrix' inverse times it; 0 where a sparse estimate has no unknown.
+  static void divide(const Solution& solution, Eigen::MatrixXd& right);
   Partition with_solution(const System& system, const Solution& solution) const;
   /// What holds the leaves' coefficients, times a change of them.
   Eigen::MatrixXd held(const System& system, const Regularisation& regularisation, const Eigen::MatrixXd& change) const;
@@ -70,8 +81,11 @@ class JointFit {
   Eigen::MatrixXd gradient(const TrainingRows& rows, const System& system, const Eigen::MatrixXd& coefficients,
                            bool of_outputs) const;
   /// Of all nodes, size x outputs, about the root's model.
-  std::vector<Eigen::MatrixXd> local_models(std::size_t nodes, double shrinkage) const;
-  Partition with_models(std::ptrdiff_t leaves, const std::vector<Eigen::MatrixXd>& models) const;
+  std::vector<Eigen::MatrixXd> local_models(std::size_t nodes, double shrinkage, bool sparse) const;
+  /// Of one node, with the selected coefficients alone. `parent`: its parent's model, for the root its own full one.
+  Eigen::MatrixXd sparse_model(std::size_t node, const Eigen::MatrixXd& parent, double shrinkage) const;
+  Partition with_models(std::ptrdiff_t leaves, const std::vector<Eigen::MatrixXd>& models, bool sparse) const;
+  void select(int max_threads);
   Eigen::VectorXd hold(std::size_t node, double shrinkage) const;
   void set_model(Node& node, const Eigen::MatrixXd& coefficients) const;
 
@@ -81,6 +95,7 @@ class JointFit {
   std::ptrdiff_t size_;   // coefficients of a local model
   Eigen::MatrixXd root_;  // coefficients of the root's model
   NormalEquations sums_;
+  std::vector<std::vector<std::ptrdiff_t>> selected_;  // coefficients of every node's sparse model
 };
 
 }  // namespace llmt

@@ -79,7 +79,8 @@ std::vector<std::pair<double, int>> band(Sides& sides, std::ptrdiff_t coefficien
 }
 
 double jump_size(const TrainingRows& training, const Partition& grown, const Node& node, Sides& sides) {
-  const std::ptrdiff_t regressors = std::ssize(training.regressors);
+  // Products, which come last, matter little in a narrow band.
+  const std::ptrdiff_t regressors = std::ssize(training.regressors) - std::ssize(training.table->products);
   const std::vector<std::pair<double, int>> rows = band(sides, regressors + 1);
   std::ptrdiff_t on_left = 0;
   std::vector<int> positions;

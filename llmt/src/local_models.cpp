@@ -1,6 +1,7 @@
 #include "local_models.hpp"
 
 #include "boxes.hpp"
+#include "held_product.hpp"
 #include "hold.hpp"
 #include "lanes.hpp"
 
@@ -30,6 +31,11 @@ void deviations_at(const std::vector<InputColumn>& inputs, const std::vector<Reg
   for (std::size_t k = 0; k < regressors.size(); ++k) {
     const Regressor& regressor = regressors[k];
     const std::size_t input = static_cast<std::size_t>(regressor.input);
+    if (regressor.second_input >= 0) {
+      const std::size_t second = static_cast<std::size_t>(regressor.second_input);
+      deviations[k] = factor_at(inputs[input], row[input]) * factor_at(inputs[second], row[second]) - regressor.centre;
+      continue;
+    }
     deviations[k] = regressor.level < 0
                         ? row[input] - regressor.centre
                         : indicator_deviation(row[input], regressor.level,

@@ -21,8 +21,8 @@ inline double indicator_deviation(double x, int level, double levels, double cen
   return static_cast<int>(x >= 0.0) & static_cast<int>(x < levels) ? there : std::numeric_limits<double>::quiet_NaN();
 }
 
-/// Deviations of the regressors from their centres at one row of inputs; NaN where the input is missing or its level
-/// unknown.
+/// Deviations of the regressors from their centres at one row of inputs; NaN where the input, or a factor of a product,
+/// is missing or its level unknown.
 void deviations_at(const std::vector<InputColumn>& inputs, const std::vector<Regressor>& regressors, const double* row,
                    double* deviations);
 

@@ -186,6 +186,14 @@ Model::Model(std::vector<InputColumn> inputs, std::vector<OutputColumn> outputs,
       reject(fmt::format("regressor of input {}, level {}, centre {}: no such input or level, or not finite",
                          regressor.input, regressor.level, regressor.centre));
     }
+    const int second = regressor.second_input;
+    if (second != -1 && (second < regressor.input || second >= num_inputs() || regressor.level >= 0 ||
+                         inputs_[static_cast<std::size_t>(second)].is_categorical())) {
+      reject(
+          fmt::format("regressor of inputs {} and {}: a product is of two numeric inputs, the second not below the "
+                      "first",
+                      regressor.input, second));
+    }
   }
   std::vector<int> served;
   for (std::size_t i = 0; i < partitions_.size(); ++i) {

@@ -226,6 +226,9 @@ std::string to_json(const Model& model) {
     if (regressor.level >= 0) {
       entry["level"] = regressor.level;
     }
+    if (regressor.second_input >= 0) {
+      entry["second_column"] = regressor.second_input;
+    }
     entry["centre"] = regressor.centre;
     json["regressors"].push_back(std::move(entry));
   }
@@ -287,7 +290,8 @@ Model from_json(const std::string& text, const std::string& name) {
   for (const Reader& entry : root.member("regressors").elements()) {
     regressors.push_back({.input = entry.member("column").as<int>(),
                           .level = entry.has("level") ? entry.member("level").as<int>() : -1,
-                          .centre = entry.member("centre").as<double>()});
+                          .centre = entry.member("centre").as<double>(),
+                          .second_input = entry.has("second_column") ? entry.member("second_column").as<int>() : -1});
   }
   std::vector<Partition> partitions;
   for (const Reader& entry : root.member("partitions").elements()) {

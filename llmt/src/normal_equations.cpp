@@ -65,6 +65,7 @@ class Assembly {
     }
     sums_.gram.assign(nodes, Eigen::MatrixXd::Zero(size_, size_));
     sums_.products.assign(nodes, Eigen::MatrixXd::Zero(size_, root.cols()));
+    sums_.squares.assign(nodes, Eigen::VectorXd::Zero(root.cols()));
     low_.assign(nodes, Eigen::VectorXd::Constant(size_ - 1, INFINITY));
     high_.assign(nodes, Eigen::VectorXd::Constant(size_ - 1, -INFINITY));
   }
@@ -199,6 +200,7 @@ class Assembly {
       }
       validities(row, columns - 1) = 1.0;
       for (std::ptrdiff_t o = 0; o < root_.cols(); ++o) {
+        sums_.squares[node](o) += weight * reached.residuals(use.row, o) * reached.residuals(use.row, o);
         add_scaled(sums_.products[node].col(o).data(), reached.regressors.row(use.row).data(),
                    weight * reached.residuals(use.row, o), size_);
       }
@@ -236,6 +238,7 @@ class Assembly {
       }
       sums_.gram[static_cast<std::size_t>(node)] += weight * x * x.transpose();
       sums_.products[static_cast<std::size_t>(node)] += weight * x * reached.residuals.row(use.row);
+      sums_.squares[static_cast<std::size_t>(node)] += weight * reached.residuals.row(use.row).cwiseAbs2().transpose();
     }
   }
 
@@ -255,6 +258,7 @@ class Assembly {
         const std::size_t parent = static_cast<std::size_t>(parents[i]);
         sums_.gram[parent] += sums_.gram[i];
         sums_.products[parent] += sums_.products[i];
+        sums_.squares[parent] += sums_.squares[i];
         low_[parent] = low_[parent].cwiseMin(low_[i]);
         high_[parent] = high_[parent].cwiseMax(high_[i]);
       }

@@ -11,7 +11,7 @@
 namespace llmt {
 
 /// With a = [1, x], Phi_i the validity of leaf i, q the weights and r the residuals of the root's model, sums over rows
-///   S_ij = q Phi_i Phi_j a a',  G_i = q Phi_i a a',  b_i = q Phi_i a r
+///   S_ij = q Phi_i Phi_j a a',  G_i = q Phi_i a a',  b_i = q Phi_i a r,  q Phi_i r^2
 /// in columns scaled over all rows. Where values are missing, a depends on the leaf.
 struct NormalEquations {
   std::ptrdiff_t size = 0;  ///< coefficients of a local model
@@ -21,6 +21,7 @@ struct NormalEquations {
   std::vector<std::vector<std::vector<double>>> blocks;
   std::vector<Eigen::MatrixXd> gram;      ///< G of every node, size x size
   std::vector<Eigen::MatrixXd> products;  ///< b of every node, size x outputs
+  std::vector<Eigen::VectorXd> squares;   ///< of the residuals, of every node, one per output
 
   bool has_block(std::size_t i, std::size_t j) const { return !blocks[i][j].empty(); }
   Eigen::MatrixXd block(std::size_t i, std::size_t j) const;

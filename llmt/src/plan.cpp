@@ -43,6 +43,10 @@ Plan make_plan(const FitOptions& options, const TrainingRows& all, std::ptrdiff_
   if (plan.candidates.shrinkages.empty()) {
     plan.candidates.shrinkages = has_folds ? std::vector<double>{0.0, 0.1, 1.0} : std::vector<double>{0.0};
   }
+  const SparseChoice sparse = options.local_models.sparse;
+  plan.candidates.sparse = sparse == SparseChoice::always                   ? std::vector<bool>{true}
+                           : sparse == SparseChoice::automatic && has_folds ? std::vector<bool>{false, true}
+                                                                            : std::vector<bool>{false};
   GrowthOptions& growth = plan.growth;
   const std::ptrdiff_t regressors = std::ssize(all.regressors);
   const bool many_leaves = !crisp_only && has_folds;

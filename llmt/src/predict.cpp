@@ -8,6 +8,7 @@
 #include "leverage.hpp"
 #include "llmt/model.hpp"
 #include "parallel.hpp"
+#include "regressors.hpp"
 
 namespace llmt {
 namespace {
@@ -101,11 +102,7 @@ Eigen::MatrixXd Model::jacobian(const Eigen::Ref<const Eigen::VectorXd>& point) 
   Eigen::MatrixXd by_regressor;
   for (std::size_t p = 0; p < partitions_.size(); ++p) {
     (*evaluators_)[p].derivatives(point.data(), deviations.data(), by_input, by_regressor);
-    for (std::size_t k = 0; k < regressors_.size(); ++k) {
-      if (regressors_[k].level < 0) {
-        by_input.col(regressors_[k].input) += by_regressor.col(static_cast<std::ptrdiff_t>(k));
-      }
-    }
+    add_through_regressors(inputs_, regressors_, point.data(), by_regressor, by_input);
     for (std::size_t o = 0; o < partitions_[p].outputs.size(); ++o) {
       result.row(partitions_[p].outputs[o]) = by_input.row(static_cast<std::ptrdiff_t>(o));
     }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "held_product.hpp"
 #include "lanes.hpp"
 #include "local_models.hpp"
 
@@ -37,7 +38,14 @@ void set_deviations(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const std::
       const double* x = inputs.col(regressor.input).data();
       const double centre = regressor.centre;
       double* out = deviations + k;
-      if (regressor.level < 0) {
+      if (regressor.second_input >= 0) {
+        const InputColumn& first = columns[static_cast<std::size_t>(regressor.input)];
+        const InputColumn& second = columns[static_cast<std::size_t>(regressor.second_input)];
+        const double* z = inputs.col(regressor.second_input).data();
+        for (std::ptrdiff_t row = begin; row < end; ++row) {
+          out[row * stride] = factor_at(first, x[row]) * factor_at(second, z[row]) - centre;
+        }
+      } else if (regressor.level < 0) {
         for (std::ptrdiff_t row = begin; row < end; ++row) {
           out[row * stride] = x[row] - centre;
         }

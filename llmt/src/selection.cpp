@@ -38,18 +38,6 @@ constexpr std::size_t fewest_shapes = 3;
 
 double sum(const std::vector<double>& values) { return std::accumulate(values.begin(), values.end(), 0.0); }
 
-/// Whether the gain of `other` on `simple` is beyond chance: more than two standard errors of the paired differences of
-/// the folds. A single hold-out has no such measure.
-bool is_beyond_chance(const CandidateError& simple, const CandidateError& other) {
-  const Eigen::VectorXd gain = simple.fold_rmse - other.fold_rmse;
-  if (gain.size() < 2) {
-    return other.rmse < simple.rmse;
-  }
-  const double folds = static_cast<double>(gain.size());
-  const double error = std::sqrt((gain.array() - gain.mean()).square().sum() / (folds - 1.0) / folds);
-  return gain.mean() > standard_errors_of_a_gain * error;
-}
-
 /// Errors of candidates with the measures that the user sees.
 class Judge {
  public:
@@ -80,36 +68,50 @@ class Judge {
 void compare_crisp(const std::vector<FoldRows>& folds, const std::vector<GrownTree>& grown,
                    const Candidates& candidates, const Eigen::VectorXd& weights, int max_threads, const Judge& judge,
                    Selection& selection) {
-  const std::size_t shrinkages = candidates.shrinkages.size();
-  std::vector<std::vector<Eigen::VectorXd>> errors(shrinkages, std::vector<Eigen::VectorXd>(folds.size()));
+  struct Variant {
+    bool sparse;
+    double shrinkage;
+  };
+  std::vector<Variant> variants;
+  for (const bool sparse : candidates.sparse) {
+    for (const double shrinkage : candidates.shrinkages) {
+      variants.push_back({sparse, shrinkage});
+    }
+  }
+  std::vector<std::vector<Eigen::VectorXd>> errors(variants.size(), std::vector<Eigen::VectorXd>(folds.size()));
   parallel_for(std::ssize(folds), max_threads, [&](std::ptrdiff_t index) {
     const std::size_t f = static_cast<std::size_t>(index);
-    const JointFit fit(folds[f].training, grown[f].partition, max_threads);
+    const JointFit fit(folds[f].training, grown[f].partition, max_threads, candidates.sparse.back());
     const std::ptrdiff_t leaves = grown[f].partition.num_leaves();
-    for (std::size_t s = 0; s < shrinkages; ++s) {
-      const double shrinkage = candidates.shrinkages[s];
-      const Partition models = shrinkage > 0.0 ? fit.local(leaves, shrinkage) : fit.as_grown(leaves);
-      errors[s][f] = prefix_squared_errors(models, folds[f].held_out, weights, max_threads);
+    for (std::size_t v = 0; v < variants.size(); ++v) {
+      const auto [sparse, shrinkage] = variants[v];
+      const Partition models = sparse || shrinkage > 0.0 ? fit.local(leaves, shrinkage, sparse) : fit.as_grown(leaves);
+      errors[v][f] = prefix_squared_errors(models, folds[f].held_out, weights, max_threads);
+      if (sparse && leaves > 1) {  // the root of a larger tree is full
+        errors[v][f](0) =
+            prefix_squared_errors(fit.local(1, shrinkage, true), folds[f].held_out, weights, max_threads)(0);
+      }
     }
   });
   std::ptrdiff_t largest = 0;
   for (const Eigen::VectorXd& fold : errors.front()) {
     largest = std::max(largest, fold.size());
   }
-  const auto error_of = [&](std::size_t shrinkage, std::ptrdiff_t leaves) {
+  const auto error_of = [&](std::size_t variant, std::ptrdiff_t leaves) {
     std::vector<double> of_folds;
-    for (const Eigen::VectorXd& fold : errors[shrinkage]) {
+    for (const Eigen::VectorXd& fold : errors[variant]) {
       of_folds.push_back(fold(std::min(leaves, fold.size()) - 1));  // a smaller tree stays at its last one
     }
-    return judge({.shrinkage = candidates.shrinkages[shrinkage], .leaves = leaves}, of_folds);
+    return judge({.shrinkage = variants[variant].shrinkage, .sparse = variants[variant].sparse, .leaves = leaves},
+                 of_folds);
   };
   selection.crisp_rmse = Eigen::VectorXd::Constant(largest, std::numeric_limits<double>::infinity());
   CandidateError best = error_of(0, 1);
   best.candidate.shrinkage = 0.0;
   selection.best_of_kind.push_back(best);
-  for (std::size_t s = 0; s < shrinkages; ++s) {
+  for (std::size_t v = 0; v < variants.size(); ++v) {
     for (std::ptrdiff_t leaves = 1; leaves <= largest; ++leaves) {
-      const CandidateError error = error_of(s, leaves);
+      const CandidateError error = error_of(v, leaves);
       selection.crisp_rmse(leaves - 1) = std::min(selection.crisp_rmse(leaves - 1), error.rmse);
       if (error.rmse < best.rmse) {
         best = error;
@@ -177,20 +179,23 @@ void screen(Comparison& comparison, const Candidates& candidates, std::ptrdiff_t
   const std::vector<std::ptrdiff_t>& counts = comparison.leaf_counts();
   const std::size_t usual = candidates.shrinkages.size() / 2;
   const std::size_t ridges = std::max<std::size_t>(candidates.ridges.size(), 1);
-  std::map<std::size_t, std::size_t> ridge_of_shape;  // of those still in the race
+  // Ridge and sparseness of those still in the race.
+  std::map<std::size_t, std::pair<std::size_t, std::size_t>> best_of_shape;
   for (std::size_t shape = 0; shape < comparison.shapes().size(); ++shape) {
-    ridge_of_shape[shape] = ridges / 2;
+    best_of_shape[shape] = {ridges / 2, 0};
   }
   std::size_t next = 0;
-  for (std::ptrdiff_t unknowns = cheap_unknowns; next < counts.size() && !ridge_of_shape.empty();
+  for (std::ptrdiff_t unknowns = cheap_unknowns; next < counts.size() && !best_of_shape.empty();
        unknowns *= next_unknowns) {
     std::set<Key> keys;
     std::size_t end = next;
     for (; end < counts.size() && (counts[end] * coefficients <= unknowns); ++end) {
-      for (const auto& [shape, ridge] : ridge_of_shape) {
+      for (const auto& [shape, best] : best_of_shape) {
         for (std::size_t r = 0; r < ridges; ++r) {
-          if (r == ridge || unknowns == cheap_unknowns) {
-            keys.insert({shape, end, r, usual});
+          for (std::size_t s = 0; s < candidates.sparse.size(); ++s) {
+            if (std::pair(r, s) == best || unknowns == cheap_unknowns) {
+              keys.insert({shape, end, r, usual, s});
+            }
           }
         }
       }
@@ -201,14 +206,14 @@ void screen(Comparison& comparison, const Candidates& candidates, std::ptrdiff_t
     next = end;
     comparison.evaluate(keys, folds);
     // The better half of those in the race. One at its end goes no further.
-    const std::map<std::size_t, std::size_t> racing = std::move(ridge_of_shape);
-    ridge_of_shape.clear();
+    const auto racing = std::move(best_of_shape);
+    best_of_shape.clear();
     Ranked best = first_of_each(ranked(comparison, folds), [](const Key& key) { return key.shape; });
     std::erase_if(best, [&](const auto& entry) { return !racing.contains(entry.second.shape); });
     best.resize(std::min(best.size(), std::max(fewest_shapes, (best.size() + 1) / 2)));
     for (const auto& [error, key] : best) {
       if (key.leaves + steps_without_gain >= next) {
-        ridge_of_shape[key.shape] = key.ridge;
+        best_of_shape[key.shape] = {key.ridge, key.sparse};
       }
     }
   }
@@ -245,7 +250,9 @@ void refine(Comparison& comparison, const Candidates& candidates, std::ptrdiff_t
         for (std::size_t shrinkage = 0; shrinkage < candidates.shrinkages.size(); ++shrinkage) {
           const bool next_ridge = ridge + 1 >= best.ridge && ridge <= best.ridge + 1;
           if (cheap || (next_ridge && shrinkage == best.shrinkage) || ridge == best.ridge) {
-            keys.insert({best.shape, leaves, ridge, shrinkage});
+            for (std::size_t sparse = 0; sparse < candidates.sparse.size(); ++sparse) {
+              keys.insert({best.shape, leaves, ridge, shrinkage, sparse});
+            }
           }
         }
       }
@@ -312,6 +319,16 @@ Partition make_from_all_rows(const FoldRows& fold, const GrownTree& grown, const
 }
 
 }  // namespace
+
+bool is_beyond_chance(const CandidateError& simple, const CandidateError& other) {
+  const Eigen::VectorXd gain = simple.fold_rmse - other.fold_rmse;
+  if (gain.size() < 2) {
+    return other.rmse < simple.rmse;
+  }
+  const double folds = static_cast<double>(gain.size());
+  const double error = std::sqrt((gain.array() - gain.mean()).square().sum() / (folds - 1.0) / folds);
+  return gain.mean() > standard_errors_of_a_gain * error;
+}
 
 Selection select(const std::vector<FoldRows>& folds, const std::vector<GrownTree>& grown, const Candidates& candidates,
                  const Eigen::VectorXd& weights, int max_threads) {

@@ -26,6 +26,7 @@ struct Candidates {
   std::vector<double> jumps;   ///< see Candidate::jump; none first
   std::vector<double> ridges;
   std::vector<double> shrinkages;
+  std::vector<bool> sparse = {false};  ///< see Candidate::sparse
 };
 
 struct Selection {
@@ -35,6 +36,10 @@ struct Selection {
   std::ptrdiff_t held_out_rows = 0;  ///< that errors are from
   std::vector<Partition> made;       ///< the chosen candidate in every fold, if it had to be made; else empty
 };
+
+/// Whether the gain of `other` on `simple` is beyond chance: more than two standard errors of the paired differences of
+/// the folds. A single hold-out has no such measure.
+bool is_beyond_chance(const CandidateError& simple, const CandidateError& other);
 
 /// Compares on the held-out rows of all folds, see docs/algorithms.md, section 7. `grown`: of each fold the tree grown
 /// without its held-out rows.

@@ -11,6 +11,7 @@
 
 #include "evaluator.hpp"
 #include "parallel.hpp"
+#include "regressors.hpp"
 
 namespace llmt {
 namespace {
@@ -112,16 +113,26 @@ RegressorRange describe_regressor(const TrainingRows& training, const Regressor&
   const Table& table = *training.table;
   const InputColumn& column = training.columns[static_cast<std::size_t>(regressor.input)];
   const bool is_level = regressor.level >= 0;
+  const InputColumn* second =
+      is_product(regressor) ? &training.columns[static_cast<std::size_t>(regressor.second_input)] : nullptr;
   // Squares are taken of parts of the largest deviation: those of the deviations may be too large, or too small.
-  const double largest =
-      is_level ? 1.0 : std::max({column.high - regressor.centre, regressor.centre - column.low, 0.0});
+  const auto farthest = [](const InputColumn& input, double centre) {
+    return std::max({input.high - centre, centre - input.low, 0.0});
+  };
+  const double largest = is_level            ? 1.0
+                         : second != nullptr ? farthest(column, column.centre) * farthest(*second, second->centre) +
+                                                   std::abs(regressor.centre)
+                                             : farthest(column, regressor.centre);
   double squares = 0.0;
   Extremes low{1.0};
   Extremes high{-1.0};
   std::ptrdiff_t present = 0;
   RegressorRange range;
   for (const int row : training.rows) {
-    const double x = table.inputs(row, regressor.input);
+    double x = table.inputs(row, regressor.input);
+    if (second != nullptr) {
+      x = (x - column.centre) * (table.inputs(row, regressor.second_input) - second->centre);
+    }
     if (std::isnan(x)) {
       range.has_missing = true;
       continue;
@@ -181,6 +192,12 @@ TrainingRows training_rows(const Table& table, std::vector<int> rows, int max_th
       training.regressors.push_back({input, level, share_of_level(training, input, level)});
     }
   }
+  const std::size_t first_product = training.regressors.size();
+  training.regressors.resize(first_product + table.products.size());
+  parallel_for(std::ssize(table.products), max_threads, [&](std::ptrdiff_t k) {
+    const std::size_t slot = static_cast<std::size_t>(k);
+    training.regressors[first_product + slot] = product_regressor(training, table.products[slot]);
+  });
   const std::ptrdiff_t regressors = std::ssize(training.regressors);
   std::vector<RegressorRange> ranges(training.regressors.size());
   parallel_for(regressors, max_threads, [&](std::ptrdiff_t k) {

@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <functional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "llmt/fit.hpp"
@@ -20,6 +21,8 @@ struct Table {
   std::vector<int> num_levels;         ///< of each input; 0: a number
   std::vector<int> regression_inputs;  ///< ascending
   std::vector<int> split_inputs;       ///< ascending
+  /// Pairs of regression inputs whose products the local models use.
+  std::vector<std::pair<int, int>> products = {};
 };
 
 /// Some rows of a table with what a model says of the columns. Also used for rows that are held out, then with the

@@ -19,9 +19,10 @@ struct Method {
 };
 
 /// Least squares; crisp trees grown by RD and by RETIS; Gaussians over a crisp tree as in Benes et al. (2022), without
-/// re-estimation, and with joint re-estimation; the blend with joint estimation; LOLIMOT. `base` gives the columns,
-/// weights, seeds and threads.
-std::vector<Method> usual_methods(const FitOptions& base = {});
+/// re-estimation, and with joint re-estimation; the blend with joint estimation; LOLIMOT; where the number of `inputs`
+/// is given and of their local models quadratic ones can be made (LocalTerms), the crisp tree by RD with these. `base`
+/// gives the columns, weights, seeds and threads.
+std::vector<Method> usual_methods(const FitOptions& base = {}, std::ptrdiff_t inputs = 0);
 
 /// What one method made of the data.
 struct Comparison {

@@ -142,6 +142,31 @@ struct BlendOptions {
   int smoothness = 1;  ///< continuous derivatives of blends, 1 or 2
 };
 
+/// What local models are made of.
+enum class LocalTerms {
+  linear,  ///< a constant and the regressors
+  /// Also the products and squares of the numeric regression inputs (see Regressor): (d + 1) (d + 2) / 2 coefficients
+  /// for d inputs, at most 13. None of an input that never varies, no square of one with two values.
+  quadratic,
+  /// The whole selection runs for both on the same folds. Quadratic ones are taken if their gain is beyond chance, as
+  /// in SelectionOptions. Linear without folds, and with more numeric regression inputs than quadratic ones allow.
+  automatic
+};
+
+/// Whether each local model keeps only the regressors that its own rows ask for: forward selection by orthogonal least
+/// squares, the one that lowers the weighted sum of squares most first, stopped where AICc is smallest. The slopes of
+/// the others are exactly 0, in joint estimation too.
+enum class SparseChoice {
+  never,
+  automatic,  ///< full and sparse ones are candidates, and the held-out error decides; without folds full ones
+  always
+};
+
+struct LocalModelOptions {
+  LocalTerms terms = LocalTerms::linear;
+  SparseChoice sparse = SparseChoice::never;
+};
+
 /// How leaf count, validity, width and ridge are chosen: the tree is grown anew in every fold, and what predicts the
 /// held-out rows best is taken; but least squares stays if the gain on it is not more than two standard errors of the
 /// folds' paired differences, for the best of many candidates gains a little on noise too.
@@ -154,6 +179,7 @@ struct SelectionOptions {
 
 struct FitOptions {
   GrowthOptions growth = {};
+  LocalModelOptions local_models = {};
   BlendOptions blend = {};
   SelectionOptions selection = {};
   /// Columns of `inputs` whose values are categories 0, 1, 2, ...: split into sets of categories, and offsets in the
@@ -174,6 +200,7 @@ struct Candidate {
   Estimation estimation = Estimation::as_grown;
   double ridge = 0.0;      ///< of joint estimation
   double shrinkage = 0.0;  ///< see BlendOptions::shrinkages
+  bool sparse = false;     ///< see SparseChoice
   std::ptrdiff_t leaves = 1;
 };
 
@@ -204,9 +231,10 @@ struct PartitionSummary {
   std::ptrdiff_t grown_leaves = 0;  ///< before the choice by cross-validation
   StopReason stop = StopReason::leaf_samples;
   std::ptrdiff_t rank_deficient_leaves =
-      0;  ///< leaves whose rows do not determine all coefficients; those keep their parent's slopes
-  Eigen::VectorXd train_rmse;  ///< one per output of the partition
-  CandidateError chosen;       ///< errors NaN without folds
+      0;  ///< leaves whose rows do not determine all coefficients; those keep their parent's slopes. Sparse models: 0
+  std::ptrdiff_t coefficients = 0;  ///< of all leaves, for one output: constants and slopes that are not 0
+  Eigen::VectorXd train_rmse;       ///< one per output of the partition
+  CandidateError chosen;            ///< errors NaN without folds
   /// What it was chosen against: least squares first, then the best of each validity and width. Empty without folds.
   /// For many rows the errors of all blends but the best one are of models made from samples of the training rows.
   std::vector<CandidateError> best_of_kind;
@@ -222,6 +250,10 @@ struct FitSummary {
   std::ptrdiff_t missing_values = 0;    ///< in the inputs
   std::ptrdiff_t min_leaf_samples = 0;  ///< as used
   std::vector<PartitionSummary> partitions;
+  bool quadratic = false;  ///< whether the local models have products
+  /// LocalTerms::automatic: what the terms that were not taken left on the held-out rows, one per partition. Else
+  /// empty.
+  std::vector<CandidateError> other_terms = {};
 };
 
 struct FitResult {
@@ -246,7 +278,8 @@ struct FitResult {
 ///
 /// Throws std::invalid_argument naming argument, value and bound: no rows or columns, row counts that differ, an
 /// infinite input or an output that is not finite, an option out of range, a column index out of range or repeated, a
-/// category that is not a whole number from 0 on.
+/// category that is not a whole number from 0 on, more than 13 numeric regression inputs for quadratic local models,
+/// sparse ones with Estimation::as_grown where leaves overlap.
 FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<const Eigen::MatrixXd>& outputs,
               const FitOptions& options = {});
 

@@ -47,10 +47,12 @@ struct Node {
   double missing_left = 0.5;  ///< validity of the left child where the split input is missing or its level was not seen
 
   std::ptrdiff_t samples = 0;  ///< training rows in the node's box
-  int rank = 0;                ///< of [1, regressors] over those rows: the coefficients that the rows could determine
-  Eigen::VectorXd rss;         ///< weighted residual sum of squares over those rows, one per output of the partition
-  Eigen::VectorXd value;       ///< local model at the centre of the regressors, one per output of the partition
-  Eigen::MatrixXd slope;       ///< d output / d regressor, outputs of the partition x regressors
+  /// Of [1, regressors] over those rows: the coefficients that the rows could determine. Where regressors were selected
+  /// (FitOptions::local_models) the number of coefficients; the slopes of the others are 0.
+  int rank = 0;
+  Eigen::VectorXd rss;    ///< weighted residual sum of squares over those rows, one per output of the partition
+  Eigen::VectorXd value;  ///< local model at the centre of the regressors, one per output of the partition
+  Eigen::MatrixXd slope;  ///< d output / d regressor, outputs of the partition x regressors
   /// Of each regressor, as a deviation from its centre: the mean over the node's rows, which stands in for a missing
   /// value, and the range over the rows that its validity reaches, beyond which the ancestors' slopes take over.
   Eigen::VectorXd mean;
@@ -98,11 +100,14 @@ struct OutputColumn {
   double high = 0.0;  ///< largest training value
 };
 
-/// A column of the local models: a numeric input, or the indicator (0 or 1) of one level of a categorical input.
+/// A column of the local models: a numeric input, the indicator (0 or 1) of one level of a categorical input, or the
+/// product of two numeric inputs' deviations, d_i d_j with d = x - InputColumn::centre. Beyond the training extent the
+/// factors of a product are held to it, rounded off as in the guards of Model, so that nothing quadratic goes on there.
 struct Regressor {
   int input = 0;
-  int level = -1;       ///< -1 for a number
-  double centre = 0.0;  ///< mean over the training rows; local models use the deviation from it
+  int level = -1;         ///< -1 for a number
+  double centre = 0.0;    ///< mean over the training rows; local models use the deviation from it
+  int second_input = -1;  ///< of a product, not below `input`; else -1
 };
 
 /// A leaf as a person reads it: where it holds and what it says there.
@@ -113,10 +118,12 @@ struct Leaf {
   Eigen::VectorXd low;         ///< box, one per model input: low < x <= high; -infinity where open
   Eigen::VectorXd high;        ///< +infinity where open
   std::vector<std::vector<int>>
-      levels;                 ///< one per model input: levels that belong to the leaf; empty: all, or numeric
-  Eigen::VectorXd rmse;       ///< sqrt(rss / samples) over the training rows, one per output of the partition
-  Eigen::VectorXd intercept;  ///< local model where all regressors are 0, one per output of the partition
-  Eigen::MatrixXd slope;      ///< outputs of the partition x regressors
+      levels;            ///< one per model input: levels that belong to the leaf; empty: all, or numeric
+  Eigen::VectorXd rmse;  ///< sqrt(rss / samples) over the training rows, one per output of the partition
+  /// Local model where all regressors are 0, one per output of the partition: f = intercept + slope . regressors. That
+  /// is where the inputs are 0; but a product is 0 where one of its factors is at its mean.
+  Eigen::VectorXd intercept;
+  Eigen::MatrixXd slope;  ///< outputs of the partition x regressors
 };
 
 /// How far a query lies from what the model has seen.
@@ -147,7 +154,8 @@ class Evaluator;
 /// range of the root's residuals in training, widened by a tenth of it on both sides, and at last, beyond the training
 /// extent, outer_slope . (d - c_root) is added: the root's slopes as far as the first leaves agree on them. Every hold
 /// is rounded off over a tenth of its range, so that derivatives stay continuous. Affine data are reproduced
-/// everywhere.
+/// everywhere; data that are quadratic in the inputs, by a model with products, within the training extent. Beyond it
+/// products stay where their factors leave it, and the linear parts go on.
 ///
 /// A missing value (NaN) takes the share that was learned at each split on its input, and in a local model the mean of
 /// the leaf's rows.
