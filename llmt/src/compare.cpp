@@ -34,7 +34,8 @@ std::ptrdiff_t count_parameters(const Model& model) {
   std::ptrdiff_t count = 0;
   for (const Partition& partition : model.partitions()) {
     const std::ptrdiff_t leaves = partition.num_leaves();
-    count += leaves * (std::ssize(model.regressors()) + 1) * std::ssize(partition.outputs) + leaves - 1;
+    count += partition.num_local_models() * (std::ssize(model.regressors()) + 1) * std::ssize(partition.outputs) +
+             leaves - 1;
   }
   return count;
 }
@@ -109,6 +110,8 @@ std::vector<Method> usual_methods(const FitOptions& base) {
   FitOptions plain = base;
   plain.intervals = false;
   plain.progress = {};
+  plain.growth.pruning = Pruning::last_splits;
+  plain.growth.merge_leaves = false;
   plain.blend.validity = ValidityChoice::crisp;
   std::vector<Method> methods;
   const auto add = [&](const std::string& name, const auto& change) {
@@ -140,6 +143,17 @@ std::vector<Method> usual_methods(const FitOptions& base) {
     options.blend.estimation = Estimation::as_grown;
     options.growth.max_leaves = gaussian_leaves;
   });
+  if (base.growth.pruning != Pruning::last_splits || base.growth.merge_leaves) {
+    std::string how = base.growth.pruning == Pruning::weakest_link ? ", pruned" : "";
+    how += base.growth.merge_leaves ? ", merged" : "";
+    const auto with_them = [&](FitOptions& options, ValidityChoice validity) {
+      options.growth.pruning = base.growth.pruning;
+      options.growth.merge_leaves = base.growth.merge_leaves;
+      options.blend.validity = validity;
+    };
+    add("crisp tree, RD" + how, [&](FitOptions& options) { with_them(options, ValidityChoice::crisp); });
+    add("blend, joint" + how, [&](FitOptions& options) { with_them(options, ValidityChoice::blend); });
+  }
   return methods;
 }
 

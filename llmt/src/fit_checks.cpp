@@ -102,6 +102,8 @@ std::vector<int> count_levels(const Eigen::Ref<const Eigen::MatrixXd>& inputs, c
 void check_options(const FitOptions& options, std::ptrdiff_t inputs) {
   check_growth(options.growth, inputs);
   check_blend(options.blend);
+  require(!options.growth.merge_leaves || options.selection.folds.count > 0, "selection.folds.count",
+          options.selection.folds.count, "at least 2 for growth.merge_leaves");
   require(options.max_threads >= 0, "max_threads", options.max_threads, "at least 0");
 }
 

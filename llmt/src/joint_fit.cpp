@@ -77,7 +77,7 @@ Eigen::VectorXd JointFit::hold(std::size_t node, double shrinkage) const {
 }
 
 std::vector<Eigen::MatrixXd> JointFit::local_models(std::size_t nodes, double shrinkage) const {
-  const std::vector<int> parents = parents_of(partition_);
+  const std::vector<int> parents = model_parents_of(partition_);
   std::vector<Eigen::MatrixXd> models(nodes);
   models[0] = Eigen::MatrixXd::Zero(size_, root_.cols());  // the root's model itself
   for (std::size_t i = 1; i < nodes; ++i) {
@@ -107,16 +107,96 @@ Partition JointFit::local(std::ptrdiff_t leaves, double shrinkage) const {
   return with_models(leaves, local_models(static_cast<std::size_t>(2 * leaves - 1), shrinkage));
 }
 
+void JointFit::copy_shared_models(Partition& partition) {
+  for (Node& node : partition.nodes) {
+    if (node.shared_with >= 0) {
+      const Node& first = partition.nodes[static_cast<std::size_t>(node.shared_with)];
+      node.value = first.value;
+      node.slope = first.slope;
+    }
+  }
+}
+
+Partition JointFit::as_grown(std::ptrdiff_t leaves) const {
+  Partition result = prefix(partition_, leaves);
+  if (result.num_local_models() < result.num_leaves()) {
+    const std::vector<Eigen::MatrixXd> models = local_models(result.nodes.size(), 0.0);
+    for (const Node& node : result.nodes) {
+      if (node.shared_with >= 0) {
+        const std::size_t first = static_cast<std::size_t>(node.shared_with);
+        set_model(result.nodes[first], models[first]);
+      }
+    }
+    copy_shared_models(result);
+  }
+  return result;
+}
+
+std::vector<Merge> JointFit::merges() const {
+  // Outputs are compared by what least squares leaves of them.
+  const Eigen::VectorXd weights =
+      partition_.nodes.front().rss.unaryExpr([](double rss) { return rss > 0.0 ? 1.0 / rss : 0.0; });
+  return merge_sequence(partition_, sums_, weights);
+}
+
+void JointFit::share(const Merge& merge) {
+  const auto in_group = [&](std::size_t node, int first) {
+    return static_cast<int>(node) == first || partition_.nodes[node].shared_with == first;
+  };
+  std::vector<std::size_t> members;
+  std::ptrdiff_t samples = 0;
+  for (std::size_t i = 0; i < partition_.nodes.size(); ++i) {
+    if (in_group(i, merge.kept) || in_group(i, merge.merged)) {
+      members.push_back(i);
+      samples += partition_.nodes[i].samples;
+    }
+  }
+  const std::size_t kept = static_cast<std::size_t>(merge.kept);
+  const std::size_t merged = static_cast<std::size_t>(merge.merged);
+  const Node& a = partition_.nodes[kept];
+  const Node& b = partition_.nodes[merged];
+  const Eigen::MatrixXd gram = sums_.gram[kept] + sums_.gram[merged];
+  const Eigen::MatrixXd products = sums_.products[kept] + sums_.products[merged];
+  const Eigen::VectorXd low = a.low.cwiseMin(b.low);
+  const Eigen::VectorXd high = a.high.cwiseMax(b.high);
+  const int most = static_cast<int>(std::min<std::ptrdiff_t>({size_, samples, a.rank + b.rank}));
+  const int rank = std::clamp(rank_of(gram), std::min(most, std::max(a.rank, b.rank)), most);
+  for (const std::size_t member : members) {
+    Node& node = partition_.nodes[member];
+    node.shared_with = member == kept ? -1 : merge.kept;
+    node.low = low;
+    node.high = high;
+    node.rank = rank;
+    sums_.gram[member] = gram;
+    sums_.products[member] = products;
+  }
+}
+
+void JointFit::merge_to(std::ptrdiff_t local_models) {
+  if (partition_.num_local_models() <= local_models) {
+    return;
+  }
+  for (const Merge& merge : merges()) {
+    if (partition_.num_local_models() <= local_models) {
+      return;
+    }
+    share(merge);
+  }
+}
+
 JointFit::System JointFit::system(std::ptrdiff_t leaves) const {
   const std::vector<int> parents = parents_of(partition_);
   const std::ptrdiff_t nodes = 2 * leaves - 1;
   // Leaves of the prefix, and for every node of the whole tree the one it lies in.
   System result;
+  result.leaves = leaves;
   result.position.assign(partition_.nodes.size(), -1);
   for (std::size_t i = 0; i < partition_.nodes.size(); ++i) {
     const Node& node = partition_.nodes[i];
     if (static_cast<std::ptrdiff_t>(i) >= nodes) {
       result.position[i] = result.position[static_cast<std::size_t>(parents[i])];
+    } else if (node.shared_with >= 0) {
+      result.position[i] = result.position[static_cast<std::size_t>(node.shared_with)];
     } else if (node.is_leaf() || node.left >= nodes) {
       result.position[i] = static_cast<int>(result.nodes.size());
       result.nodes.push_back(static_cast<int>(i));
@@ -159,7 +239,7 @@ Eigen::MatrixXd JointFit::held(const System& system, const Regularisation& regul
 JointFit::Solution JointFit::solve(const System& system, const Regularisation& regularisation) const {
   const std::ptrdiff_t unknowns = system.matrix.rows();
   Solution result;
-  result.local = local_models(static_cast<std::size_t>(2 * std::ssize(system.nodes) - 1), regularisation.shrinkage);
+  result.local = local_models(static_cast<std::size_t>(2 * system.leaves - 1), regularisation.shrinkage);
   result.anchors.resize(unknowns, root_.cols());
   Eigen::MatrixXd right(unknowns, root_.cols());  // unknown: the change from the local estimates
   for (std::size_t k = 0; k < system.nodes.size(); ++k) {
@@ -188,11 +268,12 @@ JointFit::Solution JointFit::solve(const System& system, const Regularisation& r
 }
 
 Partition JointFit::with_solution(const System& system, const Solution& solution) const {
-  Partition result = with_models(std::ssize(system.nodes), solution.local);
+  Partition result = with_models(system.leaves, solution.local);
   for (std::size_t k = 0; k < system.nodes.size(); ++k) {
     set_model(result.nodes[static_cast<std::size_t>(system.nodes[k])],
               solution.coefficients.middleRows(static_cast<std::ptrdiff_t>(k) * size_, size_));
   }
+  copy_shared_models(result);
   return result;
 }
 
@@ -208,7 +289,7 @@ std::vector<Partition> JointFit::joint(std::ptrdiff_t leaves,
 
 Eigen::MatrixXd JointFit::gradient(const TrainingRows& rows, const System& system, const Eigen::MatrixXd& coefficients,
                                    bool of_outputs) const {
-  const Partition cut = prefix(partition_, std::ssize(system.nodes));
+  const Partition cut = prefix(partition_, system.leaves);
   const Evaluator evaluator(cut, rows.columns, size_ - 1);
   const bool leave_out = leaves_out_ambiguous(rows, evaluator);
   const std::ptrdiff_t outputs = coefficients.cols();

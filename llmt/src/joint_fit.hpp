@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "evaluator.hpp"
+#include "merging.hpp"
 #include "normal_equations.hpp"
 #include "training.hpp"
 
@@ -44,13 +45,24 @@ class JointFit {
   /// The prefix with `leaves` leaves and locally weighted estimates.
   Partition local(std::ptrdiff_t leaves, double shrinkage) const;
 
-  /// The prefix as grown, with the ranges of the validities.
-  Partition as_grown(std::ptrdiff_t leaves) const { return prefix(partition_, leaves); }
+  /// The prefix as grown, with the ranges of the validities. Local models that are shared are locally weighted.
+  Partition as_grown(std::ptrdiff_t leaves) const;
+
+  /// The merges of the partition's leaves, see merge_sequence().
+  std::vector<Merge> merges() const;
+
+  /// From now on the leaves of both groups share one local model: one block of unknowns. With shared local models
+  /// estimates are of the whole partition, not of a smaller prefix.
+  void share(const Merge& merge);
+
+  /// Shares until so many local models are left.
+  void merge_to(std::ptrdiff_t local_models);
 
  private:
   /// The normal equations of a prefix.
   struct System {
-    std::vector<int> nodes;     // its leaves
+    std::ptrdiff_t leaves = 0;
+    std::vector<int> nodes;     // its leaves, of those that share a local model the first
     std::vector<int> position;  // of every node at or below one of them: that leaf's among `nodes`; else -1
     RowMajor matrix;            // upper triangle
   };
@@ -74,6 +86,7 @@ class JointFit {
   Partition with_models(std::ptrdiff_t leaves, const std::vector<Eigen::MatrixXd>& models) const;
   Eigen::VectorXd hold(std::size_t node, double shrinkage) const;
   void set_model(Node& node, const Eigen::MatrixXd& coefficients) const;
+  static void copy_shared_models(Partition& partition);
 
   const TrainingRows& training_;
   Partition partition_;

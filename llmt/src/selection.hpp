@@ -26,6 +26,7 @@ struct Candidates {
   std::vector<double> jumps;   ///< see Candidate::jump; none first
   std::vector<double> ridges;
   std::vector<double> shrinkages;
+  bool merge_leaves = false;  ///< see GrowthOptions::merge_leaves
 };
 
 struct Selection {
