@@ -65,6 +65,7 @@ Json candidate_json(const CandidateError& entry) {
           {"shrinkage", entry.candidate.shrinkage},
           {"sparse", entry.candidate.sparse},
           {"leaves", entry.candidate.leaves},
+          {"local_models", entry.candidate.local_models > 0 ? entry.candidate.local_models : entry.candidate.leaves},
           {"cv_rmse", or_null(entry.rmse)},
           {"spread", or_null(entry.spread)}};
 }
@@ -93,6 +94,7 @@ Json summary_json(const FitArguments& arguments, const FitResult& result) {
       entry["train_rmse"].push_back(partition.train_rmse(static_cast<std::ptrdiff_t>(o)));
     }
     entry["leaves"] = partition.leaves;
+    entry["local_models"] = partition.local_models;
     entry["grown_leaves"] = partition.grown_leaves;
     entry["coefficients"] = partition.coefficients;
     entry["rank_deficient_leaves"] = partition.rank_deficient_leaves;
@@ -196,7 +198,10 @@ void print_summary(const FitArguments& arguments, const FitResult& result) {
   for (const PartitionSummary& partition : result.summary.partitions) {
     for (std::size_t o = 0; o < partition.outputs.size(); ++o) {
       const std::string& target = result.model.outputs()[static_cast<std::size_t>(partition.outputs[o])].name;
-      table.add({target, describe(partition.chosen.candidate), fmt::format("{}", partition.leaves),
+      table.add({target, describe(partition.chosen.candidate),
+                 partition.local_models < partition.leaves
+                     ? fmt::format("{} in {} models", partition.leaves, partition.local_models)
+                     : fmt::format("{}", partition.leaves),
                  number(partition.chosen.rmse), number(partition.chosen.spread, 2),
                  number(partition.train_rmse(static_cast<std::ptrdiff_t>(o)))});
       if (o > 0) {

@@ -98,6 +98,11 @@ void add_learning_options(CLI::App& command, LearningArguments& arguments) {
       ->capture_default_str();
   command.add_option("--min-leaf", growth.min_leaf_samples, "Fewest rows in a leaf, 0: see docs/commands.md")
       ->capture_default_str();
+  command.add_flag_callback(
+      "--prune", [&growth] { growth.pruning = Pruning::weakest_link; },
+      "Undo the splits of the weakest branches first, not the last ones, where fewer leaves predict better");
+  command.add_flag("--merge", growth.merge_leaves,
+                   "Let leaves that touch share one local model where that predicts better");
   command
       .add_option("--cv", folds.count,
                   "Folds of the held-out error by which everything is chosen, 0: keep the tree as grown")

@@ -24,6 +24,30 @@ std::vector<int> parents_of(const Partition& partition) {
   return parents;
 }
 
+std::vector<int> model_parents_of(const Partition& partition) {
+  const std::vector<int> parents = parents_of(partition);
+  std::vector<int> result = parents;
+  for (std::size_t i = 0; i < partition.nodes.size(); ++i) {
+    const int first = partition.nodes[i].shared_with;
+    if (first < 0) {
+      continue;
+    }
+    int a = static_cast<int>(i);
+    int b = result[static_cast<std::size_t>(first)];
+    while (a != b) {  // parents stand before their children
+      int& lower = a > b ? a : b;
+      lower = parents[static_cast<std::size_t>(lower)];
+    }
+    result[static_cast<std::size_t>(first)] = a;
+  }
+  for (std::size_t i = 0; i < partition.nodes.size(); ++i) {
+    if (const int first = partition.nodes[i].shared_with; first >= 0) {
+      result[i] = result[static_cast<std::size_t>(first)];
+    }
+  }
+  return result;
+}
+
 Boxes boxes_of(const Partition& partition, const Eigen::VectorXd& low, const Eigen::VectorXd& high) {
   const std::ptrdiff_t nodes = std::ssize(partition.nodes);
   Boxes boxes{low.replicate(1, nodes), high.replicate(1, nodes)};

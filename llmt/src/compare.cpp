@@ -37,7 +37,8 @@ std::ptrdiff_t count_parameters(const Model& model) {
   for (const Partition& partition : model.partitions()) {
     count += partition.num_leaves() - 1;
     for (const Node& node : partition.nodes) {
-      count += node.is_leaf() ? node.value.size() + (node.slope.array() != 0.0).count() : 0;
+      const bool counts = node.is_leaf() && node.shared_with < 0;
+      count += counts ? node.value.size() + (node.slope.array() != 0.0).count() : 0;
     }
   }
   return count;
@@ -114,6 +115,8 @@ std::vector<Method> usual_methods(const FitOptions& base, std::ptrdiff_t inputs)
   FitOptions plain = base;
   plain.intervals = false;
   plain.progress = {};
+  plain.growth.pruning = Pruning::last_splits;
+  plain.growth.merge_leaves = false;
   plain.blend.validity = ValidityChoice::crisp;
   plain.local_models = {};
   std::vector<Method> methods;
@@ -149,6 +152,17 @@ std::vector<Method> usual_methods(const FitOptions& base, std::ptrdiff_t inputs)
   if (const std::ptrdiff_t numbers = count_numbers(inputs, base); numbers > 0 && numbers <= most_inputs_of_products) {
     add("crisp tree, quadratic leaves",
         [](FitOptions& options) { options.local_models.terms = LocalTerms::quadratic; });
+  }
+  if (base.growth.pruning != Pruning::last_splits || base.growth.merge_leaves) {
+    std::string how = base.growth.pruning == Pruning::weakest_link ? ", pruned" : "";
+    how += base.growth.merge_leaves ? ", merged" : "";
+    const auto with_them = [&](FitOptions& options, ValidityChoice validity) {
+      options.growth.pruning = base.growth.pruning;
+      options.growth.merge_leaves = base.growth.merge_leaves;
+      options.blend.validity = validity;
+    };
+    add("crisp tree, RD" + how, [&](FitOptions& options) { with_them(options, ValidityChoice::crisp); });
+    add("blend, joint" + how, [&](FitOptions& options) { with_them(options, ValidityChoice::blend); });
   }
   return methods;
 }

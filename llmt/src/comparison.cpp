@@ -10,14 +10,6 @@
 namespace llmt {
 namespace {
 
-/// Training rows that show which of several candidates is best. All of them have as many for each unknown, so that none
-/// looks better for having more: 25, with which a joint estimate adds 4 % to the variance of the noise.
-std::ptrdiff_t enough_rows(std::ptrdiff_t leaves, std::ptrdiff_t coefficients) {
-  constexpr std::ptrdiff_t rows_per_unknown = 25;
-  constexpr std::ptrdiff_t smallest_sample = 10000;
-  return std::max(smallest_sample, rows_per_unknown * leaves * coefficients);
-}
-
 /// A threshold that keeps the same jumps of these trees as `jump`, in the middle of the gap between those kept and the
 /// others: the scores of the tree grown on all rows are a little different.
 double middle_of_gap(const std::vector<GrownTree>& grown, double jump) {
@@ -37,6 +29,12 @@ double middle_of_gap(const std::vector<GrownTree>& grown, double jump) {
 }
 
 }  // namespace
+
+std::ptrdiff_t enough_rows(std::ptrdiff_t leaves, std::ptrdiff_t coefficients) {
+  constexpr std::ptrdiff_t rows_per_unknown = 25;
+  constexpr std::ptrdiff_t smallest_sample = 10000;
+  return std::max(smallest_sample, rows_per_unknown * leaves * coefficients);
+}
 
 Comparison::Comparison(const std::vector<FoldRows>& folds, const std::vector<GrownTree>& grown,
                        const Candidates& candidates, const Eigen::VectorXd& weights, int max_threads)

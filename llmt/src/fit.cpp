@@ -17,6 +17,7 @@
 #include "lolimot.hpp"
 #include "parallel.hpp"
 #include "plan.hpp"
+#include "pruning.hpp"
 #include "selection.hpp"
 #include "training.hpp"
 
@@ -30,8 +31,8 @@ std::vector<int> all_rows(std::ptrdiff_t count) {
 }
 
 /// What growth needs of the rows lives no longer than this.
-GrownPartition grow_nodes(const TrainingRows& rows, const std::vector<int>& served, const Plan& plan, bool stop_by_aicc,
-                          int max_threads) {
+GrownPartition grow_in_order(const TrainingRows& rows, const std::vector<int>& served, const Plan& plan,
+                             bool stop_by_aicc, int max_threads) {
   const Table& table = *rows.table;
   GrowthProblem problem{&rows, served, plan.growth, max_threads};
   problem.options.split_inputs = table.split_inputs;
@@ -44,6 +45,15 @@ GrownPartition grow_nodes(const TrainingRows& rows, const std::vector<int>& serv
                                 .high = rows.high()(table.split_inputs),
                                 .data_driven = problem.options.rule == GrowthRule::lolimot_data_driven,
                                 .stop_by_aicc = stop_by_aicc});
+}
+
+GrownPartition grow_nodes(const TrainingRows& rows, const std::vector<int>& served, const Plan& plan, bool stop_by_aicc,
+                          int max_threads) {
+  GrownPartition result = grow_in_order(rows, served, plan, stop_by_aicc, max_threads);
+  if (plan.growth.pruning == Pruning::weakest_link) {
+    result.nodes = in_pruning_order(result.nodes, std::move(result.gains));
+  }
+  return result;
 }
 
 struct Grown {
@@ -81,6 +91,7 @@ PartitionSummary summarise(const Partition& partition, const TrainingRows& rows,
   PartitionSummary summary;
   summary.outputs = partition.outputs;
   summary.leaves = partition.num_leaves();
+  summary.local_models = partition.num_local_models();
   Eigen::VectorXd rss = Eigen::VectorXd::Zero(std::ssize(partition.outputs));
   for (const Node& node : partition.nodes) {
     if (node.is_leaf()) {

@@ -108,6 +108,8 @@ void check_options(const FitOptions& options, std::ptrdiff_t inputs) {
               (options.blend.validity == ValidityChoice::crisp && !is_lolimot(options.growth.rule)),
           "local_models.sparse", static_cast<double>(options.local_models.sparse),
           "never where blend.estimation is as_grown, for those models are full");
+  require(!options.growth.merge_leaves || options.selection.folds.count > 0, "selection.folds.count",
+          options.selection.folds.count, "at least 2 for growth.merge_leaves");
   require(options.max_threads >= 0, "max_threads", options.max_threads, "at least 0");
 }
 

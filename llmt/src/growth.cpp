@@ -86,9 +86,14 @@ class Grower {
     if (!stopped) {
       stop = static_cast<StopReason>(std::max_element(refusals_.begin(), refusals_.end()) - refusals_.begin());
     }
-    if (options_.rule == GrowthRule::retis && options_.pruning_m > 0.0 &&
-        prune(nodes_, data_.output_weights, options_.pruning_m)) {
-      stop = StopReason::pruning;
+    gains_.resize(nodes_.size(), 0.0);
+    if (options_.rule == GrowthRule::retis && options_.pruning_m > 0.0) {
+      const std::vector<std::size_t> kept = prune(nodes_, data_.output_weights, options_.pruning_m);
+      stop = kept.size() < gains_.size() ? StopReason::pruning : stop;
+      for (std::size_t i = 0; i < kept.size(); ++i) {
+        gains_[i] = nodes_[i].is_leaf() ? 0.0 : gains_[kept[i]];
+      }
+      gains_.resize(kept.size());
     }
     for (Node& node : nodes_) {
       node.rss = node.rss.cwiseProduct(data_.output_scale).cwiseProduct(data_.output_scale);
@@ -96,7 +101,7 @@ class Grower {
       node.slope = data_.output_scale.asDiagonal() * node.slope;
       node.missing_left = std::clamp(node.missing_left, 0.0, 1.0);
     }
-    return {std::move(nodes_), stop, search_};
+    return {std::move(nodes_), stop, search_, std::move(gains_)};
   }
 
  private:
@@ -187,6 +192,9 @@ class Grower {
   void drop_lookahead() {
     const std::ptrdiff_t leaves = std::ssize(tree_rss_) - improvement_lookahead;
     nodes_ = prefix(Partition{.outputs = {}, .nodes = std::move(nodes_)}, leaves).nodes;
+    for (std::size_t i = 0; i < nodes_.size(); ++i) {
+      gains_[i] = nodes_[i].is_leaf() ? 0.0 : gains_[i];
+    }
   }
 
   void enter(OpenLeaf leaf) {
@@ -221,6 +229,8 @@ class Grower {
     parallel_for(2, data_.threads_for(parent.samples * data_.split_inputs()),
                  [&](std::ptrdiff_t side) { examine(children[static_cast<std::size_t>(side)], parent); });
     Node& node = nodes_[static_cast<std::size_t>(leaf.node)];
+    gains_.resize(nodes_.size(), 0.0);
+    gains_[static_cast<std::size_t>(leaf.node)] = leaf.rss - leaf.best.rss;
     node.left = children[0].node;
     node.right = children[1].node;
     node.split_input = options_.split_inputs[static_cast<std::size_t>(leaf.best.input)];
@@ -275,6 +285,7 @@ class Grower {
   std::priority_queue<Priority> queue_;
   std::array<std::ptrdiff_t, 9> refusals_{};  // leaves that stay, by StopReason
   std::vector<double> tree_rss_;              // weighted, with 1, 2, ... leaves
+  std::vector<double> gains_;                 // of the nodes' splits
   SearchSummary search_;
 };
 

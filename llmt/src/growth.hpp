@@ -22,6 +22,8 @@ struct GrownPartition {
   std::vector<Node> nodes;  ///< thresholds in the inputs' units; ranges (low, high) as far as they are known
   StopReason stop = StopReason::leaf_samples;
   SearchSummary search = {};
+  /// By how much the split of every node lowered the weighted sum of squares that the rule looks at, 0 for leaves.
+  std::vector<double> gains = {};
 };
 
 GrownPartition grow(const GrowthProblem& problem);

@@ -64,21 +64,21 @@ JointFit::JointFit(const TrainingRows& training, Partition partition, int max_th
   root_.bottomRows(size_ - 1) = training.scale.asDiagonal() * root.slope.transpose();
   sums_ = assemble(training, partition_, root_, max_threads);
   if (sparse) {
-    select(max_threads);
+    selected_.resize(partition_.nodes.size());
+    parallel_for(std::ssize(selected_), max_threads, [&](std::ptrdiff_t index) {
+      const std::size_t node = static_cast<std::size_t>(index);
+      selected_[node] = select(node);
+    });
   }
 }
 
-void JointFit::select(int max_threads) {
+std::vector<std::ptrdiff_t> JointFit::select(std::size_t node) const {
   // Of a sample, weights make it stand for all rows; it knows no more for that.
   const double rows_per_weight = static_cast<double>(training_.count()) / total_weight(training_);
-  selected_.resize(partition_.nodes.size());
-  parallel_for(std::ssize(selected_), max_threads, [&](std::ptrdiff_t index) {
-    const std::size_t node = static_cast<std::size_t>(index);
-    // Sums of the outputs, from those of the residuals of the root's model.
-    LocalSums sums{sums_.gram[node], sums_.products[node] + sums_.gram[node] * root_, sums_.squares[node]};
-    sums.squares += root_.cwiseProduct(sums.products + sums_.products[node]).colwise().sum().transpose();
-    selected_[node] = select_regressors(sums, rows_per_weight);
-  });
+  // Sums of the outputs, from those of the residuals of the root's model.
+  LocalSums sums{sums_.gram[node], sums_.products[node] + sums_.gram[node] * root_, sums_.squares[node]};
+  sums.squares += root_.cwiseProduct(sums.products + sums_.products[node]).colwise().sum().transpose();
+  return select_regressors(sums, rows_per_weight);
 }
 
 Eigen::VectorXd JointFit::hold(std::size_t node, double shrinkage) const {
@@ -106,7 +106,7 @@ Eigen::MatrixXd JointFit::sparse_model(std::size_t node, const Eigen::MatrixXd& 
 }
 
 std::vector<Eigen::MatrixXd> JointFit::local_models(std::size_t nodes, double shrinkage, bool sparse) const {
-  const std::vector<int> parents = parents_of(partition_);
+  const std::vector<int> parents = model_parents_of(partition_);
   std::vector<Eigen::MatrixXd> models(nodes);
   models[0] = Eigen::MatrixXd::Zero(size_, root_.cols());  // the root's model itself
   if (sparse && nodes == 1) {
@@ -146,16 +146,103 @@ Partition JointFit::local(std::ptrdiff_t leaves, double shrinkage, bool sparse) 
   return with_models(leaves, local_models(static_cast<std::size_t>(2 * leaves - 1), shrinkage, sparse), sparse);
 }
 
+void JointFit::copy_shared_models(Partition& partition) {
+  for (Node& node : partition.nodes) {
+    if (node.shared_with >= 0) {
+      const Node& first = partition.nodes[static_cast<std::size_t>(node.shared_with)];
+      node.value = first.value;
+      node.slope = first.slope;
+    }
+  }
+}
+
+Partition JointFit::as_grown(std::ptrdiff_t leaves) const {
+  Partition result = prefix(partition_, leaves);
+  if (result.num_local_models() < result.num_leaves()) {
+    const std::vector<Eigen::MatrixXd> models = local_models(result.nodes.size(), 0.0, false);
+    for (const Node& node : result.nodes) {
+      if (node.shared_with >= 0) {
+        const std::size_t first = static_cast<std::size_t>(node.shared_with);
+        set_model(result.nodes[first], models[first]);
+      }
+    }
+    copy_shared_models(result);
+  }
+  return result;
+}
+
+std::vector<Merge> JointFit::merges() const {
+  // Outputs are compared by what least squares leaves of them.
+  const Eigen::VectorXd weights =
+      partition_.nodes.front().rss.unaryExpr([](double rss) { return rss > 0.0 ? 1.0 / rss : 0.0; });
+  return merge_sequence(partition_, sums_, weights);
+}
+
+void JointFit::share(const Merge& merge) {
+  const auto in_group = [&](std::size_t node, int first) {
+    return static_cast<int>(node) == first || partition_.nodes[node].shared_with == first;
+  };
+  std::vector<std::size_t> members;
+  std::ptrdiff_t samples = 0;
+  for (std::size_t i = 0; i < partition_.nodes.size(); ++i) {
+    if (in_group(i, merge.kept) || in_group(i, merge.merged)) {
+      members.push_back(i);
+      samples += partition_.nodes[i].samples;
+    }
+  }
+  const std::size_t kept = static_cast<std::size_t>(merge.kept);
+  const std::size_t merged = static_cast<std::size_t>(merge.merged);
+  const Node& a = partition_.nodes[kept];
+  const Node& b = partition_.nodes[merged];
+  const Eigen::MatrixXd gram = sums_.gram[kept] + sums_.gram[merged];
+  const Eigen::MatrixXd products = sums_.products[kept] + sums_.products[merged];
+  const Eigen::VectorXd squares = sums_.squares[kept] + sums_.squares[merged];
+  const Eigen::VectorXd low = a.low.cwiseMin(b.low);
+  const Eigen::VectorXd high = a.high.cwiseMax(b.high);
+  const int most = static_cast<int>(std::min<std::ptrdiff_t>({size_, samples, a.rank + b.rank}));
+  const int rank = std::clamp(rank_of(gram), std::min(most, std::max(a.rank, b.rank)), most);
+  for (const std::size_t member : members) {
+    Node& node = partition_.nodes[member];
+    node.shared_with = member == kept ? -1 : merge.kept;
+    node.low = low;
+    node.high = high;
+    node.rank = rank;
+    sums_.gram[member] = gram;
+    sums_.products[member] = products;
+    sums_.squares[member] = squares;
+  }
+  for (const std::size_t member : members) {
+    if (!selected_.empty()) {
+      selected_[member] = select(member);
+    }
+  }
+}
+
+void JointFit::merge_to(std::ptrdiff_t local_models) {
+  if (partition_.num_local_models() <= local_models) {
+    return;
+  }
+  for (const Merge& merge : merges()) {
+    if (partition_.num_local_models() <= local_models) {
+      return;
+    }
+    share(merge);
+  }
+}
+
 JointFit::System JointFit::system(std::ptrdiff_t leaves) const {
   const std::vector<int> parents = parents_of(partition_);
   const std::ptrdiff_t nodes = 2 * leaves - 1;
   // Leaves of the prefix, and for every node of the whole tree the one it lies in.
   System result;
+  result.leaves = leaves;
   result.position.assign(partition_.nodes.size(), -1);
   for (std::size_t i = 0; i < partition_.nodes.size(); ++i) {
     const Node& node = partition_.nodes[i];
     if (static_cast<std::ptrdiff_t>(i) >= nodes) {
       result.position[i] = result.position[static_cast<std::size_t>(parents[i])];
+    } else if (node.shared_with >= 0) {
+      result.position[i] = result.position[static_cast<std::size_t>(node.shared_with)];
     } else if (node.is_leaf() || node.left >= nodes) {
       result.position[i] = static_cast<int>(result.nodes.size());
       result.nodes.push_back(static_cast<int>(i));
@@ -220,8 +307,8 @@ JointFit::Solution JointFit::solve(const System& system, const Regularisation& r
   const std::ptrdiff_t unknowns = system.matrix.rows();
   Solution result;
   result.sparse = regularisation.sparse;
-  result.local = local_models(static_cast<std::size_t>(2 * std::ssize(system.nodes) - 1), regularisation.shrinkage,
-                              regularisation.sparse);
+  result.local =
+      local_models(static_cast<std::size_t>(2 * system.leaves - 1), regularisation.shrinkage, regularisation.sparse);
   if (result.sparse) {
     result.kept = kept_unknowns(system);
   }
@@ -256,11 +343,12 @@ JointFit::Solution JointFit::solve(const System& system, const Regularisation& r
 }
 
 Partition JointFit::with_solution(const System& system, const Solution& solution) const {
-  Partition result = with_models(std::ssize(system.nodes), solution.local, solution.sparse);
+  Partition result = with_models(system.leaves, solution.local, solution.sparse);
   for (std::size_t k = 0; k < system.nodes.size(); ++k) {
     set_model(result.nodes[static_cast<std::size_t>(system.nodes[k])],
               solution.coefficients.middleRows(static_cast<std::ptrdiff_t>(k) * size_, size_));
   }
+  copy_shared_models(result);
   return result;
 }
 
@@ -276,7 +364,7 @@ std::vector<Partition> JointFit::joint(std::ptrdiff_t leaves,
 
 Eigen::MatrixXd JointFit::gradient(const TrainingRows& rows, const System& system, const Eigen::MatrixXd& coefficients,
                                    bool of_outputs) const {
-  const Partition cut = prefix(partition_, std::ssize(system.nodes));
+  const Partition cut = prefix(partition_, system.leaves);
   const Evaluator evaluator(cut, rows.columns, size_ - 1);
   const bool leave_out = leaves_out_ambiguous(rows, evaluator);
   const std::ptrdiff_t outputs = coefficients.cols();

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "evaluator.hpp"
+#include "merging.hpp"
 #include "normal_equations.hpp"
 #include "training.hpp"
 
@@ -49,13 +50,24 @@ class JointFit {
   /// The prefix with `leaves` leaves and locally weighted estimates.
   Partition local(std::ptrdiff_t leaves, double shrinkage, bool sparse = false) const;
 
-  /// The prefix as grown, with the ranges of the validities.
-  Partition as_grown(std::ptrdiff_t leaves) const { return prefix(partition_, leaves); }
+  /// The prefix as grown, with the ranges of the validities. Local models that are shared are locally weighted.
+  Partition as_grown(std::ptrdiff_t leaves) const;
+
+  /// The merges of the partition's leaves, see merge_sequence().
+  std::vector<Merge> merges() const;
+
+  /// From now on the leaves of both groups share one local model: one block of unknowns. With shared local models
+  /// estimates are of the whole partition, not of a smaller prefix.
+  void share(const Merge& merge);
+
+  /// Shares until so many local models are left.
+  void merge_to(std::ptrdiff_t local_models);
 
  private:
   /// The normal equations of a prefix.
   struct System {
-    std::vector<int> nodes;     // its leaves
+    std::ptrdiff_t leaves = 0;
+    std::vector<int> nodes;     // its leaves, of those that share a local model the first
     std::vector<int> position;  // of every node at or below one of them: that leaf's among `nodes`; else -1
     RowMajor matrix;            // upper triangle
   };
@@ -85,9 +97,11 @@ class JointFit {
   /// Of one node, with the selected coefficients alone. `parent`: its parent's model, for the root its own full one.
   Eigen::MatrixXd sparse_model(std::size_t node, const Eigen::MatrixXd& parent, double shrinkage) const;
   Partition with_models(std::ptrdiff_t leaves, const std::vector<Eigen::MatrixXd>& models, bool sparse) const;
-  void select(int max_threads);
+  /// The coefficients that the rows of a node ask for.
+  std::vector<std::ptrdiff_t> select(std::size_t node) const;
   Eigen::VectorXd hold(std::size_t node, double shrinkage) const;
   void set_model(Node& node, const Eigen::MatrixXd& coefficients) const;
+  static void copy_shared_models(Partition& partition);
 
   const TrainingRows& training_;
   Partition partition_;

@@ -97,7 +97,11 @@ class Lolimot {
       nodes_ = prefix(Partition{.outputs = {}, .nodes = std::move(nodes_)}, best_leaves).nodes;
       stop = StopReason::aicc;
     }
-    return {std::move(nodes_), stop};
+    gains_.resize(nodes_.size());
+    for (std::size_t i = 0; i < nodes_.size(); ++i) {
+      gains_[i] = nodes_[i].is_leaf() ? 0.0 : gains_[i];
+    }
+    return {.nodes = std::move(nodes_), .stop = stop, .gains = std::move(gains_)};
   }
 
  private:
@@ -296,6 +300,8 @@ class Lolimot {
       best->right.node = parent.right;
       const double samples = static_cast<double>(best->left.model.samples + best->right.model.samples);
       parent.missing_left = samples > 0.0 ? static_cast<double>(best->left.model.samples) / samples : 0.5;
+      gains_.resize(nodes_.size() + 2, 0.0);
+      gains_[static_cast<std::size_t>(model.node)] = errors.sum() - best->loss;
       nodes_.push_back(best->left.model);
       nodes_.push_back(best->right.model);
       model = std::move(best->left);
@@ -348,6 +354,7 @@ class Lolimot {
   Eigen::VectorXd output_weights_;
   double floor_ = 0.0;
   std::vector<Node> nodes_;
+  std::vector<double> gains_;  // of the nodes' splits
   std::vector<LocalModel> models_;
 };
 

@@ -54,6 +54,9 @@ Json node_to_json(const Node& node, const Model& model) {
   json["mean"] = to_array(node.mean);
   json["low"] = to_array(node.low);
   json["high"] = to_array(node.high);
+  if (node.shared_with >= 0) {
+    json["shared_with"] = node.shared_with;
+  }
   if (node.inverse_gram.size() > 0) {
     std::vector<double> lower;  // triangle, row by row
     for (std::ptrdiff_t i = 0; i < node.inverse_gram.rows(); ++i) {
@@ -179,6 +182,12 @@ Node node_from_json(const Reader& json, std::ptrdiff_t outputs, std::ptrdiff_t r
   node.mean = json.member("mean").vector(regressors);
   node.low = json.member("low").vector(regressors);
   node.high = json.member("high").vector(regressors);
+  if (json.has("shared_with")) {
+    node.shared_with = json.member("shared_with").as<int>();
+    if (node.shared_with < 0) {
+      json.member("shared_with").fail(fmt::format("{} is no node", node.shared_with));
+    }
+  }
   if (json.has("inverse_gram")) {
     const Eigen::VectorXd lower = json.member("inverse_gram").vector((regressors + 1) * (regressors + 2) / 2);
     node.inverse_gram.resize(regressors + 1, regressors + 1);

@@ -3,6 +3,12 @@
 #include <algorithm>
 
 namespace llmt {
+namespace {
+
+/// Of a crisp tree that is grown without a test, to be pruned: of many rows it would have leaves without number.
+constexpr std::ptrdiff_t most_leaves_to_prune = 2000;
+
+}  // namespace
 
 bool is_lolimot(GrowthRule rule) { return rule == GrowthRule::lolimot || rule == GrowthRule::lolimot_data_driven; }
 
@@ -17,6 +23,7 @@ Plan make_plan(const FitOptions& options, const TrainingRows& all, std::ptrdiff_
   plan.candidates.kind = choice == ValidityChoice::gaussian ? ValidityKind::gaussian : ValidityKind::blend;
   plan.candidates.estimation = options.blend.estimation;
   plan.candidates.smoothness = options.blend.smoothness;
+  plan.candidates.merge_leaves = options.growth.merge_leaves;
   if (!crisp_only) {
     plan.candidates.widths = options.blend.widths;
     if (plan.candidates.widths.empty()) {
@@ -51,13 +58,17 @@ Plan make_plan(const FitOptions& options, const TrainingRows& all, std::ptrdiff_
   const std::ptrdiff_t regressors = std::ssize(all.regressors);
   const bool many_leaves = !crisp_only && has_folds;
   if (growth.significance < 0.0) {
-    growth.significance = many_leaves ? 1.0 : 0.05;
+    // What prunes best-first trees is what splits gain further down, and the held-out error says how far.
+    growth.significance = many_leaves || (has_folds && growth.pruning == Pruning::weakest_link) ? 1.0 : 0.05;
   }
   if (growth.min_leaf_samples == 0) {
     growth.min_leaf_samples = many_leaves ? std::max<std::ptrdiff_t>(5, regressors) : 2 * (regressors + 1);
   }
   if (growth.max_leaves == 0 && many_leaves) {
     growth.max_leaves = std::clamp<std::ptrdiff_t>(1500 / (regressors + 1), 20, 400);
+  }
+  if (growth.max_leaves == 0 && growth.pruning == Pruning::weakest_link && !is_lolimot(growth.rule)) {
+    growth.max_leaves = most_leaves_to_prune;
   }
   if (growth.max_leaves == 0 && is_lolimot(growth.rule)) {
     growth.max_leaves = 100;

@@ -4,7 +4,7 @@
 
 namespace llmt {
 
-bool prune(std::vector<Node>& nodes, const Eigen::VectorXd& weights, double m) {
+std::vector<std::size_t> prune(std::vector<Node>& nodes, const Eigen::VectorXd& weights, double m) {
   const double prior = weights.dot(nodes.front().rss) / static_cast<double>(nodes.front().samples);
   std::vector<double> error(nodes.size());  // E'
   // Children stand after their parents: backwards is from the leaves up.
@@ -28,6 +28,7 @@ bool prune(std::vector<Node>& nodes, const Eigen::VectorXd& weights, double m) {
   }
 
   std::vector<Node> kept;
+  std::vector<std::size_t> places;
   std::vector<int> new_index(nodes.size(), -1);
   std::vector<bool> reachable(nodes.size(), false);
   reachable[0] = true;
@@ -41,6 +42,7 @@ bool prune(std::vector<Node>& nodes, const Eigen::VectorXd& weights, double m) {
     }
     new_index[i] = static_cast<int>(kept.size());
     kept.push_back(nodes[i]);
+    places.push_back(i);
   }
   for (Node& node : kept) {
     if (!node.is_leaf()) {
@@ -48,9 +50,8 @@ bool prune(std::vector<Node>& nodes, const Eigen::VectorXd& weights, double m) {
       node.right = new_index[static_cast<std::size_t>(node.right)];
     }
   }
-  const bool changed = kept.size() != nodes.size();
   nodes = std::move(kept);
-  return changed;
+  return places;
 }
 
 }  // namespace llmt

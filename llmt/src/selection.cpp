@@ -8,6 +8,8 @@
 
 #include "comparison.hpp"
 #include "joint_fit.hpp"
+#include "judge.hpp"
+#include "merge_selection.hpp"
 #include "parallel.hpp"
 
 namespace llmt {
@@ -35,34 +37,6 @@ constexpr std::size_t steps_without_gain = 2;
 /// Screening goes on to three times as many unknowns with the better half of the shapes, but at least so many.
 constexpr std::ptrdiff_t next_unknowns = 3;
 constexpr std::size_t fewest_shapes = 3;
-
-double sum(const std::vector<double>& values) { return std::accumulate(values.begin(), values.end(), 0.0); }
-
-/// Errors of candidates with the measures that the user sees.
-class Judge {
- public:
-  Judge(const std::vector<FoldRows>& folds, std::ptrdiff_t outputs) {
-    for (const FoldRows& fold : folds) {
-      weights_.push_back(total_weight(fold.held_out) * static_cast<double>(outputs));
-    }
-  }
-
-  CandidateError operator()(const Candidate& candidate, const std::vector<double>& errors) const {
-    CandidateError result{candidate, std::sqrt(sum(errors) / sum(weights_)), 0.0};
-    result.fold_rmse.resize(std::ssize(errors));
-    for (std::size_t f = 0; f < errors.size(); ++f) {
-      result.fold_rmse(static_cast<std::ptrdiff_t>(f)) = std::sqrt(errors[f] / weights_[f]);
-    }
-    if (errors.size() > 1) {
-      result.spread = std::sqrt((result.fold_rmse.array() - result.fold_rmse.mean()).square().sum() /
-                                static_cast<double>(errors.size() - 1));
-    }
-    return result;
-  }
-
- private:
-  std::vector<double> weights_;
-};
 
 /// Fills in least squares, the crisp trees and the best of them.
 void compare_crisp(const std::vector<FoldRows>& folds, const std::vector<GrownTree>& grown,
@@ -154,7 +128,7 @@ Ranked ranked(const Comparison& comparison, std::size_t folds) {
   Ranked order;
   for (const auto& [key, errors] : all) {
     if (key.leaves <= last[key.shape]) {
-      order.emplace_back(sum(errors), key);
+      order.emplace_back(sum_of(errors), key);
     }
   }
   std::sort(order.begin(), order.end());
@@ -377,6 +351,9 @@ Selection select(const std::vector<FoldRows>& folds, const std::vector<GrownTree
   const CandidateError& least_squares = selection.best_of_kind.front();
   if (candidates.crisp && compared.size() > 1 && !is_beyond_chance(least_squares, selection.chosen)) {
     selection.chosen = least_squares;
+  }
+  if (candidates.merge_leaves) {
+    choose_local_models(compared, grown, weights, max_threads, selection);
   }
   return selection;
 }

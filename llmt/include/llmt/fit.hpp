@@ -55,6 +55,16 @@ enum class SplitSearch {
   binned
 };
 
+/// In which order the splits of a grown tree are undone where fewer leaves predict held-out rows better.
+enum class Pruning {
+  last_splits,  ///< the last that best-first growth made come first
+  /// Weakest-link (cost-complexity) pruning of Breiman et al. (1984, ch. 3): the branch whose splits lower the residual
+  /// sum of squares least, in the mean over its splits. So a split stays for what the splits below it gain, which
+  /// best-first growth cannot know when it makes it. Within a branch in the order that makes the sum of the residual
+  /// sums of squares of all pruned trees smallest, see docs/algorithms.md.
+  weakest_link
+};
+
 /// Why growth ended.
 enum class StopReason {
   max_leaves,       ///< GrowthOptions::max_leaves reached
@@ -99,6 +109,14 @@ struct GrowthOptions {
   std::vector<int> regression_inputs = {};
   ThresholdPlacement threshold = ThresholdPlacement::closest;
   SplitSearch search = SplitSearch::automatic;
+  /// Order in which splits are undone; with folds their held-out error says how many. RETIS undoes those that its
+  /// m-estimates reject before. With weakest_link and folds the default of `significance` is no test: splits that
+  /// only help later ones stay then.
+  Pruning pruning = Pruning::last_splits;
+  /// Leaves whose boxes touch, siblings or not, may share one local model: of every such pair the one whose shared
+  /// model raises the sum of squares least is merged, and so on; how often is chosen by the held-out error, in every
+  /// fold on the tree grown there. Needs folds.
+  bool merge_leaves = false;
 };
 
 /// See GrowthOptions::min_improvement. One split alone may help little before the next one helps much.
@@ -202,6 +220,7 @@ struct Candidate {
   double shrinkage = 0.0;  ///< see BlendOptions::shrinkages
   bool sparse = false;     ///< see SparseChoice
   std::ptrdiff_t leaves = 1;
+  std::ptrdiff_t local_models = 0;  ///< after merging; 0: as many as leaves
 };
 
 /// A candidate and what it left on rows that took no part.
@@ -235,7 +254,9 @@ struct PartitionSummary {
   std::ptrdiff_t coefficients = 0;  ///< of all leaves, for one output: constants and slopes that are not 0
   Eigen::VectorXd train_rmse;       ///< one per output of the partition
   CandidateError chosen;            ///< errors NaN without folds
-  /// What it was chosen against: least squares first, then the best of each validity and width. Empty without folds.
+  std::ptrdiff_t local_models = 0;  ///< of these leaves, fewer if some share one
+  /// What it was chosen against: least squares first, then the best of each validity and width, all without shared
+  /// local models. Empty without folds.
   /// For many rows the errors of all blends but the best one are of models made from samples of the training rows.
   std::vector<CandidateError> best_of_kind;
   /// Held-out RMSE of the crisp prefixes with 1, 2, ... leaves; empty without folds.

@@ -60,6 +60,10 @@ struct Node {
   Eigen::VectorXd high;
   /// Leaves: inverse of the sum of validity * weight * a a', a = [1, deviations]; for leverages. May be empty.
   Eigen::MatrixXd inverse_gram;
+  /// Leaves that share a local model: the first of them in order of growth; -1 in that one and in all others. What
+  /// belongs to the model - rank, value, slope, low, high, inverse_gram - is that of the rows of all of them and the
+  /// same in all; samples, rss and mean are the box's own.
+  int shared_with = -1;
 
   bool is_leaf() const { return left < 0; }
 };
@@ -67,7 +71,8 @@ struct Node {
 /// A tree of axis-orthogonal splits that serves one or several outputs.
 ///
 /// Nodes stand in the order of growth: node 0 is the root and the k-th split (k = 1, 2, ...) made the nodes 2k-1 (left)
-/// and 2k (right). The first 2M-1 nodes are therefore the tree as it was with M leaves.
+/// and 2k (right). The first 2M-1 nodes are therefore the tree as it was with M leaves; with Pruning::weakest_link the
+/// order is the reverse of that in which splits are undone, and they are the tree pruned to M leaves.
 struct Partition {
   std::vector<int> outputs;  ///< columns of the model's outputs that this partition predicts, ascending
   Validity validity = {};
@@ -79,6 +84,7 @@ struct Partition {
   Eigen::MatrixXd residual_range = {};
 
   std::ptrdiff_t num_leaves() const { return (std::ssize(nodes) + 1) / 2; }
+  std::ptrdiff_t num_local_models() const;  ///< of the leaves, shared ones counted once
 };
 
 /// What a model knows of its inputs.
@@ -124,6 +130,7 @@ struct Leaf {
   /// is where the inputs are 0; but a product is 0 where one of its factors is at its mean.
   Eigen::VectorXd intercept;
   Eigen::MatrixXd slope;  ///< outputs of the partition x regressors
+  int local_model = 0;    ///< leaves of equal number share one; numbered from left to right
 };
 
 /// How far a query lies from what the model has seen.
@@ -152,7 +159,8 @@ class Evaluator;
 ///   f_i(x) = value_i + slope_i . c_i + sum over ancestors a of slope_a . (c_a - c_below a)
 /// with c the deviations held to the node's range. What the prediction adds to the root's model is then held to the
 /// range of the root's residuals in training, widened by a tenth of it on both sides, and at last, beyond the training
-/// extent, outer_slope . (d - c_root) is added: the root's slopes as far as the first leaves agree on them. Every hold
+/// extent, outer_slope . (d - c_root) is added: the root's slopes as far as the first leaves agree on them. For leaves
+/// that share a local model the ancestors are those of the smallest subtree that holds them all. Every hold
 /// is rounded off over a tenth of its range, so that derivatives stay continuous. Affine data are reproduced
 /// everywhere; data that are quadratic in the inputs, by a model with products, within the training extent. Beyond it
 /// products stay where their factors leave it, and the linear parts go on.
@@ -205,7 +213,7 @@ class Model {
   std::vector<Leaf> leaves(std::ptrdiff_t partition) const;
 
   /// The model as it was when each partition had at most `max_leaves` leaves: inner nodes' local models, not fitted
-  /// anew. Throws std::invalid_argument if max_leaves < 1.
+  /// anew; leaves that stay keep the local models that they share. Throws std::invalid_argument if max_leaves < 1.
   Model prefix(std::ptrdiff_t max_leaves) const;
 
   /// The same model with other names of columns and, if there are any, of the levels of each input (empty for numbers).
