@@ -21,7 +21,7 @@ struct FitArguments {
   bool no_intervals = false;
 };
 
-constexpr std::array<const char*, 4> rule_names = {"rd", "retis", "lolimot", "lolimot-data"};  // as GrowthRule
+constexpr std::array<const char*, 6> rule_names = {"rd", "retis", "lolimot", "lolimot-data", "ra", "m5"};  // as GrowthRule
 constexpr std::array<const char*, 4> validity_names = {"auto", "crisp", "blend", "gaussian"};  // as ValidityChoice
 constexpr std::array<const char*, 3> search_names = {"auto", "exact", "binned"};               // as SplitSearch
 constexpr std::array<const char*, 3> estimation_names = {"as-grown", "local", "joint"};        // as Estimation
@@ -162,7 +162,7 @@ std::string local_models_text(const FitArguments& arguments, const FitSummary& s
 /// How the splits of the final tree were searched; nothing if there were none to search.
 std::string search_text(const SearchSummary& search) {
   if (search.binned_nodes == 0) {
-    return search.evaluations == 0 ? "" : "Splits searched exactly.\n";
+    return search.exact_nodes == 0 || search.evaluations == 0 ? "" : "Splits searched exactly.\n";
   }
   return fmt::format(
       "Splits searched by bins in {} nodes, exactly in {} small ones. {}\n", search.binned_nodes, search.exact_nodes,
@@ -267,10 +267,10 @@ void add_fit(CLI::App& app) {
   command
       ->add_option("--rule", growth.rule,
                    "Growth rule: rd, retis (m-estimate pruning), lolimot (halves boxes), lolimot-data (data-driven "
-                   "thresholds)")
+                   "thresholds), ra (by the signs of residuals, no search), m5 (M5', smoothed)")
       ->transform(choice_of<GrowthRule>(rule_names))
-      ->option_text("rd|retis|lolimot|lolimot-data [rd]");
-  command->add_option("--significance", growth.significance, "rd: of the F test, over all candidate splits; 1: no test")
+      ->option_text("rd|retis|lolimot|lolimot-data|ra|m5 [rd]");
+  command->add_option("--significance", growth.significance, "rd, ra: of the F test, over all candidate splits; 1: no test")
       ->check(CLI::NonNegativeNumber)
       ->option_text("FLOAT [see docs/commands.md]");
   command

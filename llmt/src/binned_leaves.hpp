@@ -10,14 +10,8 @@
 
 namespace llmt {
 
-struct BinnedLeaf {
-  std::vector<int> rows;               ///< of the training rows, ascending
+struct BinnedLeaf : WhitenedLeaf {
   std::optional<Histogram> histogram;  ///< if there is memory to keep it
-  double weight = 0.0;                 ///< of the rows
-  Eigen::VectorXd value;               ///< the local model whose residuals the features of these rows hold
-  Eigen::MatrixXd slope;
-  Eigen::VectorXd mean;        ///< of the scaled regressors over the rows
-  Eigen::MatrixXd covariance;  ///< of the scaled regressors
 };
 
 /// The features of all rows stay in the basis of the root, so that the histogram of one child is that of its parent
@@ -46,8 +40,6 @@ class BinnedLeaves {
                    const Node& right) const;
 
  private:
-  void fit(BinnedLeaf& leaf, const std::vector<double>& gram, const Node& parent, Node& node) const;
-
   const GrowthData& data_;
   BinnedRows rows_;
   std::ptrdiff_t memory_left_;  // for histograms of leaves that wait, in doubles

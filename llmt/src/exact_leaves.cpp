@@ -1,11 +1,14 @@
 #include "exact_leaves.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
+#include <numeric>
 #include <optional>
 
 #include "evaluator.hpp"
 #include "parallel.hpp"
+#include "sign_search.hpp"
 
 namespace llmt {
 namespace {
@@ -52,7 +55,7 @@ ExactLeaf ExactLeaves::open(const Rows& rows, const Node& parent) const {
   leaf.residuals.rowwise() -= parent.value.transpose();
   leaf.orders.resize(static_cast<std::size_t>(data_.split_inputs()));
   parallel_for(data_.split_inputs(), data_.threads_for(std::ssize(rows)), [&](std::ptrdiff_t j) {
-    if (data_.num_levels[static_cast<std::size_t>(j)] > 0) {
+    if (data_.num_levels[static_cast<std::size_t>(j)] > 0 || by_signs()) {
       return;
     }
     std::vector<ValueOfRow> values;
@@ -126,6 +129,9 @@ SplitCandidate ExactLeaves::find_split(const ExactLeaf& leaf, const NodeFit& fit
     return best;
   }
   const SearchNode node{fit.features, data_.output_weights, rss};
+  if (by_signs()) {
+    return find_split_by_signs(leaf, node);
+  }
   const std::size_t inputs = leaf.orders.size();
   const int threads = data_.threads_for(leaf.inputs.rows() * data_.split_inputs());
   std::vector<std::optional<InputSearch>> searches(inputs);
@@ -163,23 +169,30 @@ SplitCandidate ExactLeaves::find_split(const ExactLeaf& leaf, const NodeFit& fit
       searches[slot].reset();
     }
   });
-  double smallest = std::numeric_limits<double>::infinity();
-  std::ptrdiff_t tested = 0;
-  std::ptrdiff_t evaluations = 0;
-  for (const SplitCandidate& candidate : found) {
-    tested += candidate.tested;
-    evaluations += candidate.evaluations;
-    smallest = candidate.input >= 0 ? std::min(smallest, candidate.rss) : smallest;
-  }
-  for (std::size_t j = 0; j < inputs && best.input < 0; ++j) {
-    if (found[j].input >= 0 && found[j].rss <= smallest + tie_tolerance * rss) {
-      best = found[j];
-      best.input = static_cast<int>(j);
+  return first_of_best(found, rss);
+}
+
+/// The inputs' thresholds by the signs of the residuals; categories, and that a value is missing, as in the exact search.
+SplitCandidate ExactLeaves::find_split_by_signs(const ExactLeaf& leaf, const SearchNode& node) const {
+  Rows rows(static_cast<std::size_t>(leaf.inputs.rows()));
+  std::iota(rows.begin(), rows.end(), 0);
+  const int threads = data_.threads_for(leaf.inputs.rows() * data_.split_inputs());
+  const Eigen::MatrixXd values = leaf.inputs(Eigen::all, data_.problem.options.split_inputs);
+  SignSplit numeric = search_by_signs(data_, {node, rows, values, leaf.residuals, leaf.weights, {}, threads});
+  std::vector<SplitCandidate> found(leaf.orders.size());
+  parallel_for(std::ssize(found), threads, [&](std::ptrdiff_t j) {
+    const std::size_t slot = static_cast<std::size_t>(j);
+    if (numeric.best.input == j) {
+      found[slot] = std::move(numeric.best);
     }
-  }
-  best.tested = tested;
-  best.evaluations = evaluations;
-  return best;
+    if (data_.num_levels[slot] > 0) {
+      found[slot] =
+          search_levels(node, levels_of(leaf, j), data_.num_levels[slot], data_.problem.options.min_leaf_samples);
+    } else if (values.col(j).hasNaN()) {
+      consider_missing(node, leaf, j, found[slot]);
+    }
+  });
+  return first_of_best(found, node.rss);
 }
 
 /// Takes the split into rows with and without a value if it is better: that a value is missing can say something.
@@ -214,6 +227,13 @@ std::vector<ExactLeaves::Side> ExactLeaves::sides_of(const ExactLeaf& leaf, cons
       if (levels[k] >= 0) {
         sides[k] = split.level_side[static_cast<std::size_t>(levels[k])] < 0 ? Side::left : Side::right;
       }
+    }
+    return sides;
+  }
+  if (by_signs()) {
+    for (std::size_t k = 0; k < sides.size(); ++k) {
+      const double value = split_value(leaf, static_cast<std::ptrdiff_t>(k), split.input);
+      sides[k] = value <= split.last_left ? Side::left : std::isnan(value) ? Side::both : Side::right;
     }
     return sides;
   }
@@ -309,7 +329,18 @@ ExactLeaves::Children ExactLeaves::divide(const ExactLeaf& leaf, const Node& nod
 
 double ExactLeaves::threshold(const ExactLeaf& leaf, const SplitCandidate& split, const Node& node, const Node& left,
                               const Node& right) const {
-  const Rows& order = leaf.orders[static_cast<std::size_t>(split.input)];
+  Rows order = leaf.orders[static_cast<std::size_t>(split.input)];
+  if (by_signs()) {
+    // Those that go left first, as in a sorted order.
+    const std::vector<Side> sides = sides_of(leaf, split);
+    for (const Side side : {Side::left, Side::right}) {
+      for (std::size_t k = 0; k < sides.size(); ++k) {
+        if (sides[k] == side) {
+          order.push_back(static_cast<int>(k));
+        }
+      }
+    }
+  }
   Eigen::VectorXd values(std::ssize(order));
   for (std::size_t k = 0; k < order.size(); ++k) {
     values(static_cast<std::ptrdiff_t>(k)) = split_value(leaf, order[k], split.input);
@@ -328,7 +359,8 @@ double ExactLeaves::threshold(const ExactLeaf& leaf, const SplitCandidate& split
   const Eigen::VectorXd weighted = centred.cwiseProduct(weights);
   const Eigen::VectorXd b = apart.transpose() * weighted / weighted.dot(centred);
   const Eigen::VectorXd a = apart.transpose() * weights / weights.sum();
-  return data_.place_threshold(values(split.left - 1), values(split.left), mean, a, b);
+  const std::ptrdiff_t right_rows = values.size() - split.left;
+  return data_.place_threshold(values.head(split.left).maxCoeff(), values.tail(right_rows).minCoeff(), mean, a, b);
 }
 
 }  // namespace llmt

@@ -1,5 +1,6 @@
 /// \file
-/// Leaves of a growing tree whose rows are sorted by every input: exact search for their best split.
+/// Leaves of a growing tree whose rows are sorted by every input: exact search for their best split. By the rule RA they
+/// are not sorted, and split by the signs of their residuals.
 #pragma once
 
 #include <array>
@@ -15,7 +16,7 @@ namespace llmt {
 struct ExactLeaf {
   RowMajor inputs;                       ///< of the rows, all columns
   Eigen::VectorXd weights;               ///< of the rows here
-  std::vector<std::vector<int>> orders;  ///< rows by each numeric split input that has a value, ascending
+  std::vector<std::vector<int>> orders;  ///< rows by each numeric split input that has a value, ascending; RA: empty
   Eigen::MatrixXd residuals;  ///< of a local model, rows x outputs: the parent's until examined, then its own
 };
 
@@ -51,7 +52,9 @@ class ExactLeaves {
   Eigen::MatrixXd about_own_mean(const RowMajor& deviations, const Node& parent, Eigen::MatrixXd residuals,
                                  const Eigen::VectorXd& weights) const;
   std::vector<int> levels_of(const ExactLeaf& leaf, std::ptrdiff_t split_input) const;
+  bool by_signs() const { return data_.problem.options.rule == GrowthRule::ra; }
   SplitCandidate find_split(const ExactLeaf& leaf, const NodeFit& fit, double rss) const;
+  SplitCandidate find_split_by_signs(const ExactLeaf& leaf, const SearchNode& node) const;
   void consider_missing(const SearchNode& node, const ExactLeaf& leaf, std::ptrdiff_t split_input,
                         SplitCandidate& best) const;
   std::vector<Side> sides_of(const ExactLeaf& leaf, const SplitCandidate& split) const;

@@ -15,19 +15,20 @@
 #include "f_distribution.hpp"
 #include "parallel.hpp"
 #include "pruning.hpp"
+#include "sign_leaves.hpp"
 
 namespace llmt {
 namespace {
 
 /// From this many rows on, inputs are cut into bins; nodes below the other number of rows are searched exactly even
-/// then. bench/search_modes prints where these pay.
+/// then, and by RA have features of their own. bench/search_modes prints where these pay.
 constexpr std::ptrdiff_t binned_rows = 200000;
 constexpr std::ptrdiff_t exact_rows = 2000;
 
 /// A node that may still be split.
 struct OpenLeaf {
   int node = 0;
-  std::variant<ExactLeaf, BinnedLeaf> data;
+  std::variant<ExactLeaf, BinnedLeaf, SignLeaf> data;
   double weight = 0.0;  // of its rows
   double rss = 0.0;     // weighted
   SplitCandidate best;  // input: position among the split inputs
@@ -44,6 +45,9 @@ struct Priority {
 };
 
 bool by_bins(const GrowthData& data) {
+  if (data.problem.options.rule == GrowthRule::ra) {
+    return false;
+  }
   switch (data.problem.options.search) {
     case SplitSearch::exact:
       return false;
@@ -60,6 +64,8 @@ class Grower {
   explicit Grower(const GrowthProblem& problem) : options_(problem.options), data_(problem), exact_(data_) {
     if (by_bins(data_)) {
       binned_.emplace(data_);
+    } else if (options_.rule == GrowthRule::ra && data_.training.count() >= exact_rows && is_complete(data_)) {
+      signs_.emplace(data_);
     }
   }
 
@@ -115,6 +121,8 @@ class Grower {
     OpenLeaf root;
     if (binned_) {
       root.data = binned_->root();
+    } else if (signs_) {
+      root.data = signs_->root();
     } else {
       std::vector<int> rows(static_cast<std::size_t>(data_.training.count()));
       std::iota(rows.begin(), rows.end(), 0);
@@ -131,6 +139,9 @@ class Grower {
     if (BinnedLeaf* const binned = std::get_if<BinnedLeaf>(&leaf.data)) {
       leaf.best = binned_->examine(*binned, parent, node, leaf.excess);
       leaf.weight = binned->weight;
+    } else if (SignLeaf* const signs = std::get_if<SignLeaf>(&leaf.data)) {
+      leaf.best = signs_->examine(*signs, parent, node);
+      leaf.weight = signs->weight;
     } else {
       ExactLeaf& exact = std::get<ExactLeaf>(leaf.data);
       leaf.best = exact_.examine(exact, parent, node);
@@ -203,7 +214,7 @@ class Grower {
       ++search_.binned_nodes;
       search_.largest_excess = std::max(search_.largest_excess, leaf.rss > 0.0 ? leaf.excess / leaf.rss : 0.0);
       binned_->wait(*binned);
-    } else {
+    } else if (options_.rule != GrowthRule::ra) {
       ++search_.exact_nodes;
     }
     if (const std::optional<StopReason> reason = refusal(leaf)) {
@@ -248,15 +259,11 @@ class Grower {
 
   void divide(OpenLeaf& leaf, const Node& parent, std::array<OpenLeaf, 2>& children, double& missing_left) {
     if (BinnedLeaf* const binned = std::get_if<BinnedLeaf>(&leaf.data)) {
-      std::array<BinnedLeaf, 2> parts = binned_->divide(*binned, leaf.best);
-      missing_left = static_cast<double>(parts[0].rows.size()) / static_cast<double>(binned->rows.size());
-      for (std::size_t side = 0; side < 2; ++side) {
-        if (std::ssize(parts[side].rows) < exact_rows) {
-          children[side].data = exact_.open(parts[side].rows, parent);
-        } else {
-          children[side].data = std::move(parts[side]);
-        }
-      }
+      missing_left = open_parts(*binned, binned_->divide(*binned, leaf.best), parent, children);
+      return;
+    }
+    if (SignLeaf* const signs = std::get_if<SignLeaf>(&leaf.data)) {
+      missing_left = open_parts(*signs, signs_->divide(*signs, leaf.best), parent, children);
       return;
     }
     ExactLeaves::Children parts = exact_.divide(std::get<ExactLeaf>(leaf.data), parent, leaf.best);
@@ -266,12 +273,30 @@ class Grower {
     }
   }
 
+  /// Small parts go on as exact leaves. Returns the left one's share of the rows.
+  template <class Leaf>
+  double open_parts(const Leaf& leaf, std::array<Leaf, 2> parts, const Node& parent,
+                    std::array<OpenLeaf, 2>& children) const {
+    const double share = static_cast<double>(parts[0].rows.size()) / static_cast<double>(leaf.rows.size());
+    for (std::size_t side = 0; side < 2; ++side) {
+      if (std::ssize(parts[side].rows) < exact_rows) {
+        children[side].data = exact_.open(parts[side].rows, parent);
+      } else {
+        children[side].data = std::move(parts[side]);
+      }
+    }
+    return share;
+  }
+
   double threshold(const OpenLeaf& leaf) const {
     const Node& node = nodes_[static_cast<std::size_t>(leaf.node)];
     const Node& left = nodes_[static_cast<std::size_t>(node.left)];
     const Node& right = nodes_[static_cast<std::size_t>(node.right)];
     if (const BinnedLeaf* const binned = std::get_if<BinnedLeaf>(&leaf.data)) {
       return binned_->threshold(*binned, leaf.best, node, left, right);
+    }
+    if (const SignLeaf* const signs = std::get_if<SignLeaf>(&leaf.data)) {
+      return signs_->threshold(*signs, leaf.best, node, left, right);
     }
     return exact_.threshold(std::get<ExactLeaf>(leaf.data), leaf.best, node, left, right);
   }
@@ -280,6 +305,7 @@ class Grower {
   GrowthData data_;
   ExactLeaves exact_;
   std::optional<BinnedLeaves> binned_;
+  std::optional<SignLeaves> signs_;
   std::vector<Node> nodes_;
   std::vector<std::optional<OpenLeaf>> leaves_;
   std::priority_queue<Priority> queue_;

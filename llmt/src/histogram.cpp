@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <limits>
 
 #include "parallel.hpp"
@@ -20,9 +19,7 @@ constexpr std::ptrdiff_t block_rows = 4096;
 }  // namespace
 
 BinnedRows::BinnedRows(const GrowthData& data)
-    : data_(data),
-      features_(data.training.count(), std::ssize(data.training.regressors) + 1, data.outputs.cols()),
-      shape_(features_) {
+    : data_(data), whitened_(data), shape_(whitened_.features()) {
   const std::ptrdiff_t bins = histogram_size / (shape_.size() * data.split_inputs());
   inputs_ = make_bins(data, static_cast<int>(std::clamp<std::ptrdiff_t>(bins, fewest_bins, most_bins)));
   std::ptrdiff_t sum = 0;
@@ -31,54 +28,6 @@ BinnedRows::BinnedRows(const GrowthData& data)
     sum += input.count;
   }
   first_bin_.push_back(sum);
-  fill_features();
-}
-
-/// Regressors are whitened over all rows; residuals are those of the mean.
-void BinnedRows::fill_features() {
-  const TrainingRows& training = data_.training;
-  const std::ptrdiff_t regressors = std::ssize(training.regressors);
-  const std::ptrdiff_t chunks = num_chunks(training);
-  const int threads = data_.problem.max_threads;
-  const Eigen::RowVectorXd per_scale = training.scale.cwiseInverse().transpose();
-  constexpr std::ptrdiff_t blocks = 64;  // partial sums, added up in order
-  std::vector<std::vector<double>> grams(blocks, std::vector<double>(static_cast<std::size_t>(shape_.size()), 0.0));
-  parallel_for(blocks, threads, [&](std::ptrdiff_t block) {
-    std::vector<int> rows;
-    for (std::ptrdiff_t index = chunks * block / blocks; index < chunks * (block + 1) / blocks; ++index) {
-      const Chunk chunk = fetch(training, index, {});
-      for (std::ptrdiff_t i = 0; i < chunk.count(); ++i) {
-        const std::ptrdiff_t at = index * chunk_rows + i;
-        const double root = std::sqrt(chunk.weights(i));
-        double* row = features_.row(at);
-        row[0] = root;
-        Eigen::Map<Eigen::RowVectorXd>(row + 1, regressors) = root * chunk.deviations.row(i).cwiseProduct(per_scale);
-        Eigen::Map<Eigen::RowVectorXd>(row + 1 + regressors, data_.outputs.cols()) = root * data_.outputs.row(at);
-        rows.push_back(static_cast<int>(at));
-      }
-    }
-    add_rows(features_, rows.data(), std::ssize(rows), grams[static_cast<std::size_t>(block)].data());
-  });
-  for (std::size_t block = 1; block < grams.size(); ++block) {
-    add(shape_, grams[block].data(), grams[0].data());
-  }
-  Eigen::MatrixXd covariance(regressors, regressors);
-  for (std::ptrdiff_t i = 0; i < regressors; ++i) {
-    for (std::ptrdiff_t j = 0; j <= i; ++j) {
-      covariance(i, j) = covariance(j, i) = grams[0][static_cast<std::size_t>(shape_.at(i + 1, j + 1))] / grams[0][0];
-    }
-  }
-  const Whitening whitening = whiten(covariance);
-  const Eigen::MatrixXd& forward = whitening.forward;
-  colouring_ = whitening.back;
-  parallel_for(chunks, threads, [&](std::ptrdiff_t index) {
-    const std::ptrdiff_t begin = index * chunk_rows;
-    const std::ptrdiff_t count = std::min(chunk_rows, training.count() - begin);
-    using Stride = Eigen::OuterStride<>;
-    Eigen::Map<RowMajor, 0, Stride> block(features_.row(begin) + 1, count, regressors, Stride(features_.columns()));
-    const RowMajor whitened = block * forward;
-    block = whitened;
-  });
 }
 
 std::span<const double> BinnedRows::grams(const Histogram& histogram, std::size_t input) const {
@@ -106,7 +55,7 @@ Histogram BinnedRows::accumulate(const std::vector<int>& rows) const {
     for (std::ptrdiff_t begin = 0; begin < std::ssize(rows); begin += block_rows) {
       const std::ptrdiff_t end = std::min(std::ssize(rows), begin + block_rows);
       for (std::ptrdiff_t k = begin; k < end; ++k) {
-        features_.prefetch(rows[static_cast<std::size_t>(k)]);
+        features().prefetch(rows[static_cast<std::size_t>(k)]);
       }
       for (std::ptrdiff_t j = inputs * group / groups; j < inputs * (group + 1) / groups; ++j) {
         const std::size_t input = static_cast<std::size_t>(j);
@@ -129,7 +78,7 @@ Histogram BinnedRows::accumulate(const std::vector<int>& rows) const {
         for (int bin = 0; bin < bins; ++bin) {
           const int after = place[static_cast<std::size_t>(bin)];
           if (after > at) {
-            add_rows(features_, sorted.data() + at, after - at, histogram.grams.data() + (first + bin) * shape_.size());
+            add_rows(features(), sorted.data() + at, after - at, histogram.grams.data() + (first + bin) * shape_.size());
           }
           at = after;
         }
@@ -149,19 +98,6 @@ std::vector<double> BinnedRows::total(const Histogram& histogram) const {
     }
   }
   return sum;
-}
-
-void BinnedRows::subtract(const std::vector<int>& rows, const Eigen::VectorXd& value, const Eigen::MatrixXd& slope) {
-  const std::ptrdiff_t regressors = slope.cols();
-  // slope . x = (colouring' slope) . regressors
-  const Eigen::MatrixXd of_features = slope * colouring_;
-  for (const int row : rows) {
-    double* const at = features_.row(row);
-    const Eigen::Map<const Eigen::VectorXd> x(at + 1, regressors);
-    for (std::ptrdiff_t o = 0; o < value.size(); ++o) {
-      at[1 + regressors + o] -= value(o) * at[0] + of_features.row(o).dot(x);
-    }
-  }
 }
 
 std::pair<double, double> BinnedRows::gap(const std::vector<int>& rows, const SplitCandidate& split) const {

@@ -8,7 +8,7 @@
 
 #include "bins.hpp"
 #include "split_search.hpp"
-#include "whitening.hpp"
+#include "whitened_rows.hpp"
 
 namespace llmt {
 
@@ -18,17 +18,14 @@ struct Histogram {
   std::vector<std::ptrdiff_t> counts;
 };
 
-/// Features of all training rows, whose regressors are whitened once for the tree, and the bins of their inputs.
+/// The features of all training rows and the bins of their inputs.
 class BinnedRows {
  public:
   explicit BinnedRows(const GrowthData& data);
 
-  const GramShape& shape() const { return shape_; }
-  const Features& features() const { return features_; }
+  WhitenedRows& whitened() { return whitened_; }
+  const WhitenedRows& whitened() const { return whitened_; }
   std::ptrdiff_t num_bins() const { return first_bin_.back(); }  ///< of all inputs
-
-  /// Scaled regressors (TrainingRows::scale) = colouring * regressors of the features.
-  const Eigen::MatrixXd& colouring() const { return colouring_; }
 
   Histogram accumulate(const std::vector<int>& rows) const;
 
@@ -40,9 +37,6 @@ class BinnedRows {
   /// rows. `excess`: what a split in one of the other bins could gain on the result, at most.
   SplitCandidate search(const Histogram& histogram, const std::vector<int>& rows, double node_rss, int rank,
                         double& excess) const;
-
-  /// Takes the linear function value + slope . (scaled regressors) off the residuals of some rows.
-  void subtract(const std::vector<int>& rows, const Eigen::VectorXd& value, const Eigen::MatrixXd& slope);
 
   /// The largest value on the left of a split on a number, and the smallest on its right.
   std::pair<double, double> gap(const std::vector<int>& rows, const SplitCandidate& split) const;
@@ -63,9 +57,9 @@ class BinnedRows {
     std::vector<double> bounds;  // of splits inside each bin; infinity if there are none
   };
 
+  const Features& features() const { return whitened_.features(); }
   std::span<const double> grams(const Histogram& histogram, std::size_t input) const;
   std::span<const std::ptrdiff_t> counts(const Histogram& histogram, std::size_t input) const;
-  void fill_features();
   Edges search_edges(const Histogram& histogram, std::size_t input, double node_rss) const;
   SplitCandidate look_into(const Edges& edges, const std::vector<std::size_t>& chosen, std::size_t input,
                            const std::vector<int>& rows, double node_rss, double limit) const;
@@ -73,9 +67,8 @@ class BinnedRows {
   const GrowthData& data_;
   BinnedInputs inputs_;
   std::vector<std::ptrdiff_t> first_bin_;  // of each input among all bins
-  Features features_;
+  WhitenedRows whitened_;
   GramShape shape_;
-  Eigen::MatrixXd colouring_;
 };
 
 }  // namespace llmt

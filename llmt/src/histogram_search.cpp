@@ -122,7 +122,7 @@ SplitCandidate BinnedRows::look_into(const Edges& edges, const std::vector<std::
         std::ssize(rows) - front.rows - std::ssize(order),
         last ? nothing.data() : edges.grams_right.data() + static_cast<std::ptrdiff_t>(at) * shape_.size(),
         last ? 0.0 : edges.rss_right[at]};
-    InputSearch search({features_, data_.output_weights, node_rss}, values, order,
+    InputSearch search({features(), data_.output_weights, node_rss}, values, order,
                        data_.problem.options.min_leaf_samples, front, behind);
     search.refine(limit);
     SplitCandidate found = search.best();

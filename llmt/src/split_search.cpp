@@ -218,4 +218,25 @@ SplitCandidate InputSearch::best() const {
   return best;
 }
 
+SplitCandidate first_of_best(std::span<const SplitCandidate> found, double rss) {
+  SplitCandidate best;
+  double smallest = std::numeric_limits<double>::infinity();
+  std::ptrdiff_t tested = 0;
+  std::ptrdiff_t evaluations = 0;
+  for (const SplitCandidate& candidate : found) {
+    tested += candidate.tested;
+    evaluations += candidate.evaluations;
+    smallest = candidate.input >= 0 ? std::min(smallest, candidate.rss) : smallest;
+  }
+  for (std::size_t j = 0; j < found.size() && best.input < 0; ++j) {
+    if (found[j].input >= 0 && found[j].rss <= smallest + tie_tolerance * rss) {
+      best = found[j];
+      best.input = static_cast<int>(j);
+    }
+  }
+  best.tested = tested;
+  best.evaluations = evaluations;
+  return best;
+}
+
 }  // namespace llmt

@@ -21,7 +21,7 @@ struct SplitCandidate {
   int rank_right = 0;
   std::ptrdiff_t tested = 0;       ///< number of admissible splits among which it is the best
   std::ptrdiff_t evaluations = 0;  ///< number of splits whose residual sum of squares was computed
-  /// Search by bins: the last bin of the left child, and the largest of its values that go left.
+  /// Search by bins: the last bin of the left child, and the largest of its values that go left. RA: the threshold.
   int bin = -1;
   double last_left = std::numeric_limits<double>::infinity();
   bool by_missing = false;      ///< rows with a value go left, rows without one right
@@ -149,6 +149,10 @@ SplitCandidate search_levels(const SearchNode& node, std::span<const int> levels
 SplitCandidate search_level_grams(const GramShape& shape, const Eigen::VectorXd& weights, double node_rss,
                                   double without_value, std::span<const double> grams,
                                   std::span<const std::ptrdiff_t> counts, std::ptrdiff_t min_leaf_samples);
+
+/// Of the best splits of the inputs, in order, the best one, its `input` the position; equally good: the first. Tested
+/// and evaluated are those of all. `node_rss`: of the node's own model.
+SplitCandidate first_of_best(std::span<const SplitCandidate> found, double node_rss);
 
 /// Rounding differs with the order of rows and with columns that carry no information; ties must not depend on it.
 inline constexpr double tie_tolerance = 1e-10;

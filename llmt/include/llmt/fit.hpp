@@ -16,9 +16,9 @@
 
 namespace llmt {
 
-/// When a leaf is split, and how the tree is pruned. Both rules look at every threshold of every split input and take
-/// the one with the smallest residual sum of squares of the two child models; both grow best-first: the split that
-/// lowers it most comes next.
+/// When a leaf is split, and how the tree is pruned. RD and RETIS look at every threshold of every split input and take
+/// the one with the smallest residual sum of squares of the two child models; with RA they grow best-first: the split
+/// that lowers it most comes next.
 enum class GrowthRule {
   /// Batch-RD (Potts & Sammut 2005): a split must pass the F test of Chow (1960),
   ///   F = [(RSS_0 - RSS_1 - RSS_2) / (p_1 + p_2 - p_0)] / [(RSS_1 + RSS_2) / (N - p_1 - p_2)]
@@ -34,18 +34,28 @@ enum class GrowthRule {
   /// BlendOptions::widths (k_sigma, 1/3) and Estimation: as_grown and local are Nelles' local estimation, joint his
   /// global one. Without folds AICc decides how many leaves stay.
   lolimot,
-  lolimot_data_driven  ///< LOLIMOT with thresholds where two crisp models of the box's rows leave the smallest error
+  lolimot_data_driven,  ///< LOLIMOT with thresholds where two crisp models of the box's rows leave the smallest error
+  /// Residual analysis (SUPPORT, Chaudhuri et al. 1994; Potts & Sammut 2005): the rows of a node fall into two classes
+  /// by the sign of their residual, the input whose class means m+, m-, or whose scatter about them, differ most
+  /// significantly is split at (m+ + m-) / 2. The split must pass the tests of RD. Nothing is sorted and no threshold
+  /// searched: a level of the tree costs O(rows x coefficients^2).
+  ra,
+  /// M5' (Quinlan 1992, Wang & Witten 1997): splits by the decrease of the standard deviation of the output, down to a
+  /// few rows; a node's model has the inputs tested below it, less those that do not pay; pruned from the leaves up by
+  /// the adjusted error err (n + 2 v) / (n - v), v coefficients; models smoothed along the path to the root,
+  /// (n p + 15 q) / (n + 15). Crisp, with models of its own: blends, Gaussians and shrinkages are refused.
+  m5
 };
 
 /// Where in the gap between two training values a threshold is put. The residual sum of squares is the same anywhere in
-/// the gap.
+/// the gap. LOLIMOT and M5' take the middle.
 enum class ThresholdPlacement {
   closest,  ///< where the regression of the child models' difference on the split input, over the node's rows, is
             ///< zero; halfway if that is not in the gap
   midpoint  ///< halfway
 };
 
-/// How the best split of a node is searched.
+/// How RD and RETIS search the best split of a node.
 enum class SplitSearch {
   automatic,  ///< exact, by bins for many rows
   exact,      ///< every threshold counts; those that cannot be the best are passed over, see docs/algorithms.md
@@ -70,28 +80,28 @@ enum class StopReason {
   max_leaves,       ///< GrowthOptions::max_leaves reached
   significance,     ///< no leaf has a split that passes the F test
   variance_gain,    ///< no leaf has a split that lowers the residual variance enough
-  leaf_samples,     ///< no leaf is large enough to be split, or all its split inputs are constant
+  leaf_samples,     ///< no leaf is large enough to be split, or all its split inputs, or by M5' its outputs, are constant
   exact_fit,        ///< the leaves reproduce the outputs to rounding
   improvement,      ///< GrowthOptions::min_improvement: further splits improved the tree too little
   aicc,             ///< LOLIMOT without folds: the corrected Akaike criterion rose
-  pruning,          ///< RETIS pruning removed the last splits
+  pruning,          ///< pruning by RETIS or M5' removed the last splits
   cross_validation  ///< fewer leaves than grown had the smallest held-out error
 };
 
 struct GrowthOptions {
   GrowthRule rule = GrowthRule::rd;
-  /// rd: a split is accepted if P(F >= observed), times the number of candidate splits it was chosen from (Bonferroni:
+  /// rd, ra: a split is accepted if P(F >= observed), times the number of candidate splits it was chosen from (Bonferroni:
   /// the maximum over many candidates does not follow the F distribution), is below this. 1 or more: no test.
   /// Negative: 0.05 for a crisp tree, no test where blends are among the candidates, for the held-out error decides
   /// then and the joint estimate bears far more leaves than a crisp one.
   double significance = -1.0;
-  /// rd: smallest decrease of the residual variance, as a fraction of the variance of the output. 0: any decrease;
+  /// rd, ra: smallest decrease of the residual variance, as a fraction of the variance of the output. 0: any decrease;
   /// negative: no demand.
   double min_variance_gain = 0.0;
   /// retis: weight m of the prior (the error of one model for all data) in the m-estimates, in rows. 0: no pruning.
   double pruning_m = 2.0;
-  /// Smallest number of rows in a leaf. 0: twice the number of coefficients of a local model for a crisp tree; where
-  /// blends are among the candidates as many as regressors, at least 5.
+  /// Smallest number of rows in a leaf. 0: twice the number of coefficients of a local model for a crisp tree, 2 for M5';
+  /// where blends are among the candidates as many as regressors, at least 5.
   std::ptrdiff_t min_leaf_samples = 0;
   /// Largest number of leaves of a partition. 0: no limit for a crisp tree; where blends are among the candidates as
   /// many as make 1500 coefficients, within 20 ... 400.
@@ -99,7 +109,7 @@ struct GrowthOptions {
   /// Growth ends when further splits lower the residual sum of squares of the whole tree by less than this fraction
   /// each, in the geometric mean over the next `improvement_lookahead` splits of best-first growth; those are not kept.
   /// Benes et al. (2022) stop at "less than 2 %" without saying of what; this is our reading, docs/algorithms.md gives
-  /// the reason. 0: off.
+  /// the reason. 0: off. Not for M5', which prunes.
   double min_improvement = 0.0;
   /// One partition for all outputs (their residual sums of squares added after division by the output's variance)
   /// instead of one each.
@@ -232,7 +242,7 @@ struct CandidateError {
   Eigen::VectorXd fold_rmse = {};  ///< one per fold
 };
 
-/// How the splits of a tree were searched.
+/// How the splits of a tree were searched; RA, LOLIMOT and M5' do not search among two models' sums of squares.
 struct SearchSummary {
   std::ptrdiff_t exact_nodes = 0;
   std::ptrdiff_t binned_nodes = 0;
