@@ -15,7 +15,7 @@ void make_leaf(Node& node);
 /// Parent of every node, -1 for the root.
 std::vector<int> parents_of(const Partition& partition);
 
-/// Boxes of all nodes, inputs x nodes each, cut out of low ... high by the splits on numbers.
+/// Boxes of all nodes, inputs x nodes each, cut out of low ... high by the axis-orthogonal splits on numbers.
 struct Boxes {
   Eigen::MatrixXd low;
   Eigen::MatrixXd high;
@@ -23,6 +23,7 @@ struct Boxes {
 Boxes boxes_of(const Partition& partition, const Eigen::VectorXd& low, const Eigen::VectorXd& high);
 
 /// Sets Node::half_width of a partition for its validity: the boxes are closed by `low` and `high`, one per input.
+/// Logistic gates: what the nodes have is what growth left there.
 void set_half_widths(Partition& partition, const Eigen::VectorXd& low, const Eigen::VectorXd& high);
 
 }  // namespace llmt

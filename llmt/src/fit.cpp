@@ -11,6 +11,7 @@
 
 #include "fit_checks.hpp"
 #include "growth.hpp"
+#include "hilomot.hpp"
 #include "joint_fit.hpp"
 #include "jumps.hpp"
 #include "lolimot.hpp"
@@ -34,6 +35,10 @@ GrownPartition grow_nodes(const TrainingRows& rows, const std::vector<int>& serv
   const Table& table = *rows.table;
   GrowthProblem problem{&rows, served, plan.growth, max_threads};
   problem.options.split_inputs = table.split_inputs;
+  if (is_hilomot(problem.options.rule)) {
+    const bool joint = !plan.candidates.widths.empty() && plan.candidates.estimation == Estimation::joint;
+    return grow_hilomot(problem, {joint ? GateModels::joint : GateModels::local, stop_by_aicc});
+  }
   if (!is_lolimot(problem.options.rule)) {
     return grow(problem);
   }

@@ -103,6 +103,11 @@ void check_options(const FitOptions& options, std::ptrdiff_t inputs) {
   check_growth(options.growth, inputs);
   check_blend(options.blend);
   require(options.max_threads >= 0, "max_threads", options.max_threads, "at least 0");
+  if (options.growth.rule == GrowthRule::hilomot && options.blend.validity != ValidityChoice::automatic &&
+      options.blend.validity != ValidityChoice::crisp) {
+    throw std::invalid_argument(
+        "llmt::fit: blend.validity must be automatic or crisp for growth.rule hilomot, whose gates are logistic");
+  }
 }
 
 Table make_table(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<const Eigen::MatrixXd>& outputs,

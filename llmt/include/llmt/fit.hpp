@@ -34,7 +34,12 @@ enum class GrowthRule {
   /// BlendOptions::widths (k_sigma, 1/3) and Estimation: as_grown and local are Nelles' local estimation, joint his
   /// global one. Without folds AICc decides how many leaves stay.
   lolimot,
-  lolimot_data_driven  ///< LOLIMOT with thresholds where two crisp models of the box's rows leave the smallest error
+  lolimot_data_driven,  ///< LOLIMOT with thresholds where two crisp models of the box's rows leave the smallest error
+  /// HILOMOT (Nelles 2006): the worst local model is split by a plane of any direction with a logistic gate, found by
+  /// nonlinear optimisation with the two local models nested inside; validities are products of gates. Takes
+  /// BlendOptions::widths (of the gates, 1: as grown) and Estimation as lolimot does; ValidityChoice automatic or crisp.
+  /// Without folds AICc decides how many leaves stay.
+  hilomot
 };
 
 /// Where in the gap between two training values a threshold is put. The residual sum of squares is the same anywhere in
@@ -63,7 +68,7 @@ enum class StopReason {
   leaf_samples,     ///< no leaf is large enough to be split, or all its split inputs are constant
   exact_fit,        ///< the leaves reproduce the outputs to rounding
   improvement,      ///< GrowthOptions::min_improvement: further splits improved the tree too little
-  aicc,             ///< LOLIMOT without folds: the corrected Akaike criterion rose
+  aicc,             ///< LOLIMOT and HILOMOT without folds: the corrected Akaike criterion rose
   pruning,          ///< RETIS pruning removed the last splits
   cross_validation  ///< fewer leaves than grown had the smallest held-out error
 };
@@ -128,7 +133,7 @@ struct BlendOptions {
   ValidityChoice validity = ValidityChoice::automatic;
   Estimation estimation = Estimation::joint;
   std::vector<double> widths = {};  ///< Validity::width. Empty: 0.5, 1, 2 and, but for a single
-                                    ///< hold-out, 4 for blends; 1/3 for Gaussians
+                                    ///< hold-out, 4 for blends; 1/3 for Gaussians; 1, 2, 4 for logistic gates
   /// Splits where the outputs jump by at least this multiple of the scatter of the rows there have no transition, see
   /// docs/algorithms.md; no_jump: all have one. Empty: no_jump, 4, 2, 1, 0.5.
   std::vector<double> jumps = {};
