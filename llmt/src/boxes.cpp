@@ -8,6 +8,7 @@ namespace llmt {
 void make_leaf(Node& node) {
   node.left = node.right = node.split_input = -1;
   node.threshold = 0.0;
+  node.direction.resize(0);
   node.half_width = 0.0;
   node.level_side.clear();
 }
@@ -60,7 +61,7 @@ Boxes boxes_of(const Partition& partition, const Eigen::VectorXd& low, const Eig
       boxes.low.col(child) = boxes.low.col(i);
       boxes.high.col(child) = boxes.high.col(i);
     }
-    if (node.level_side.empty() && node.threshold < std::numeric_limits<double>::max()) {
+    if (node.level_side.empty() && !node.is_oblique() && node.threshold < std::numeric_limits<double>::max()) {
       boxes.high(node.split_input, node.left) = std::min(boxes.high(node.split_input, i), node.threshold);
       boxes.low(node.split_input, node.right) = std::max(boxes.low(node.split_input, i), node.threshold);
     }
@@ -69,12 +70,19 @@ Boxes boxes_of(const Partition& partition, const Eigen::VectorXd& low, const Eig
 }
 
 void set_half_widths(Partition& partition, const Eigen::VectorXd& low, const Eigen::VectorXd& high) {
+  if (partition.validity.kind == ValidityKind::logistic) {
+    for (Node& node : partition.nodes) {
+      node.half_width *= partition.validity.width;
+    }
+    return;
+  }
   const Boxes boxes = boxes_of(partition, low, high);
   const double width = partition.validity.kind == ValidityKind::blend ? partition.validity.width : 0.0;
   for (std::size_t i = 0; i < partition.nodes.size(); ++i) {
     Node& node = partition.nodes[i];
     node.half_width = 0.0;
-    if (!node.is_leaf() && node.level_side.empty() && node.threshold < std::numeric_limits<double>::max()) {
+    if (!node.is_leaf() && node.level_side.empty() && !node.is_oblique() &&
+        node.threshold < std::numeric_limits<double>::max()) {
       const std::ptrdiff_t box = static_cast<std::ptrdiff_t>(i);
       const double extent = std::min(node.threshold - boxes.low(node.split_input, box),
                                      boxes.high(node.split_input, box) - node.threshold);

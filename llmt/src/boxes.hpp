@@ -19,7 +19,7 @@ std::vector<int> parents_of(const Partition& partition);
 /// model the root of the smallest subtree that holds them all.
 std::vector<int> model_parents_of(const Partition& partition);
 
-/// Boxes of all nodes, inputs x nodes each, cut out of low ... high by the splits on numbers.
+/// Boxes of all nodes, inputs x nodes each, cut out of low ... high by the axis-orthogonal splits on numbers.
 struct Boxes {
   Eigen::MatrixXd low;
   Eigen::MatrixXd high;
@@ -27,6 +27,7 @@ struct Boxes {
 Boxes boxes_of(const Partition& partition, const Eigen::VectorXd& low, const Eigen::VectorXd& high);
 
 /// Sets Node::half_width of a partition for its validity: the boxes are closed by `low` and `high`, one per input.
+/// Logistic gates: what the nodes have is what growth left there.
 void set_half_widths(Partition& partition, const Eigen::VectorXd& low, const Eigen::VectorXd& high);
 
 }  // namespace llmt

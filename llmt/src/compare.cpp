@@ -39,6 +39,8 @@ std::ptrdiff_t count_parameters(const Model& model) {
     for (const Node& node : partition.nodes) {
       const bool counts = node.is_leaf() && node.shared_with < 0;
       count += counts ? node.value.size() + (node.slope.array() != 0.0).count() : 0;
+      // A direction, the length of which says nothing, and the half width of the gate.
+      count += node.is_oblique() ? (node.direction.array() != 0.0).count() : 0;
     }
   }
   return count;
@@ -149,6 +151,12 @@ std::vector<Method> usual_methods(const FitOptions& base, std::ptrdiff_t inputs)
     options.blend.estimation = Estimation::as_grown;
     options.growth.max_leaves = gaussian_leaves;
   });
+  // So do logistic gates.
+  add("HILOMOT", [=](FitOptions& options) {
+    options.growth.rule = GrowthRule::hilomot;
+    options.blend.validity = ValidityChoice::automatic;
+    options.growth.max_leaves = gaussian_leaves;
+  });
   if (const std::ptrdiff_t numbers = count_numbers(inputs, base); numbers > 0 && numbers <= most_inputs_of_products) {
     add("crisp tree, quadratic leaves",
         [](FitOptions& options) { options.local_models.terms = LocalTerms::quadratic; });
@@ -167,16 +175,47 @@ std::vector<Method> usual_methods(const FitOptions& base, std::ptrdiff_t inputs)
   return methods;
 }
 
+namespace {
+
+/// Moves a row to either side of the plane of a node's split: along the split input, or in an oblique split
+/// orthogonally to the plane, every input measured by its training range. Inputs without a value stay.
+std::pair<Eigen::VectorXd, Eigen::VectorXd> sides_of_plane(const Model& model, const Node& node,
+                                                           const Eigen::VectorXd& row) {
+  std::pair<Eigen::VectorXd, Eigen::VectorXd> sides{row, row};
+  if (!node.is_oblique()) {
+    sides.first(node.split_input) = node.threshold;
+    sides.second(node.split_input) = std::nextafter(node.threshold, std::numeric_limits<double>::infinity());
+    return sides;
+  }
+  Eigen::VectorXd way = Eigen::VectorXd::Zero(row.size());  // by which s grows by 1
+  double side = 0.0;
+  double scale = 0.0;
+  for (std::ptrdiff_t j = 0; j < row.size(); ++j) {
+    const InputColumn& input = model.inputs()[static_cast<std::size_t>(j)];
+    if (node.direction(j) != 0.0 && !std::isnan(row(j))) {
+      const double range = input.high - input.low;
+      side += node.direction(j) * (row(j) - input.centre);
+      scale += std::abs(node.direction(j)) * (range + std::abs(row(j)) + std::abs(input.centre));
+      way(j) = node.direction(j) * range * range;
+    }
+  }
+  const double square = node.direction.dot(way);
+  if (square > 0.0) {
+    // Far enough from the plane for rounding, too near for the local models to differ by it.
+    const double step = 1e-12 * scale;
+    sides.first += (node.threshold - step - side) / square * way;
+    sides.second += (node.threshold + step - side) / square * way;
+  }
+  return sides;
+}
+
+}  // namespace
+
 double largest_jump(const Model& model, const Eigen::Ref<const Eigen::MatrixXd>& inputs) {
   const std::ptrdiff_t step = std::max<std::ptrdiff_t>(1, (inputs.rows() + most_rows - 1) / most_rows);
-  Eigen::VectorXd low(model.num_inputs());
-  Eigen::VectorXd high(model.num_inputs());
-  for (std::ptrdiff_t j = 0; j < model.num_inputs(); ++j) {
-    low(j) = model.inputs()[static_cast<std::size_t>(j)].low;
-    high(j) = model.inputs()[static_cast<std::size_t>(j)].high;
-  }
   double largest = 0.0;
   for (const Partition& partition : model.partitions()) {
+    const Evaluator evaluator(partition, model.inputs(), std::ssize(model.regressors()));
     // Rows just left and right of each split that may jump. Splits with a transition do not; Gaussians never do.
     std::vector<Eigen::VectorXd> left;
     std::vector<Eigen::VectorXd> right;
@@ -189,15 +228,14 @@ double largest_jump(const Model& model, const Eigen::Ref<const Eigen::MatrixXd>&
           break;
         }
         if (node.level_side.empty() && node.half_width == 0.0) {
-          left.push_back(x);
-          right.push_back(x);
-          left.back()(node.split_input) = node.threshold;
-          right.back()(node.split_input) = std::nextafter(node.threshold, std::numeric_limits<double>::infinity());
+          auto [first, second] = sides_of_plane(model, node, x);
+          left.push_back(std::move(first));
+          right.push_back(std::move(second));
         }
-        if (!node.level_side.empty() || std::isnan(x(node.split_input))) {
+        if (!node.level_side.empty() || (!node.is_oblique() && std::isnan(x(node.split_input)))) {
           break;  // what lies below a set of levels has no plane of its own here
         }
-        index = x(node.split_input) <= node.threshold ? node.left : node.right;
+        index = evaluator.child_of(static_cast<int>(index), x.data());
       }
     }
     if (left.empty()) {

@@ -2,6 +2,7 @@
 
 #include "evaluator.hpp"
 #include "hold.hpp"
+#include "logistic.hpp"
 #include "transition.hpp"
 
 namespace llmt {
@@ -11,8 +12,20 @@ double LeafValidities::left_share_derivative(int node, const double* row) const 
   if (branch.first_level >= 0 || branch.per_half_width == 0.0) {
     return 0.0;
   }
-  return transition_derivative((row[branch.input] - branch.threshold) * branch.per_half_width, smoothness_) *
-         branch.per_half_width;
+  const double u = (side(branch, row) - branch.threshold) * branch.per_half_width;
+  return branch.per_half_width *
+         (kind_ == ValidityKind::logistic ? logistic_derivative(logistic(u)) : transition_derivative(u, smoothness_));
+}
+
+void LeafValidities::add_side_derivatives(int node, const Eigen::VectorXd& factor, Eigen::MatrixXd& by_input) const {
+  const Branch& branch = branches_[static_cast<std::size_t>(node)];
+  if (branch.first_term < 0) {
+    by_input.col(branch.input) += factor;
+  }
+  for (int k = 0; k < branch.terms; ++k) {
+    const Term& term = terms_[static_cast<std::size_t>(branch.first_term + k)];
+    by_input.col(term.input) += term.weight * factor;
+  }
 }
 
 Eigen::MatrixXd LeafValidities::exponent_derivatives(const std::vector<Activation>& active, const double* row) const {
@@ -120,11 +133,13 @@ void Evaluator::add_blend_derivatives(int node, double validity, const double* r
   add_blend_derivatives(validities_.left(node), validity * left, row, deviations, values, by_input, by_regressor);
   add_blend_derivatives(validities_.right(node), validity * (1.0 - left), row, deviations, of_right, by_input,
                         by_regressor);
+  Eigen::VectorXd by_side(num_outputs());
   const double by_share = validity * validities_.left_share_derivative(node, row);
   for (std::ptrdiff_t o = 0; o < num_outputs(); ++o) {
-    by_input(o, validities_.input(node)) += by_share * (values[o] - of_right[o]);
+    by_side(o) = by_share * (values[o] - of_right[o]);
     values[o] = left * values[o] + (1.0 - left) * of_right[o];
   }
+  validities_.add_side_derivatives(node, by_side, by_input);
 }
 
 }  // namespace llmt

@@ -172,7 +172,8 @@ SplitCandidate ExactLeaves::find_split(const ExactLeaf& leaf, const NodeFit& fit
   return first_of_best(found, rss);
 }
 
-/// The inputs' thresholds by the signs of the residuals; categories, and that a value is missing, as in the exact search.
+/// The inputs' thresholds by the signs of the residuals; categories, and that a value is missing, as in the exact
+/// search.
 SplitCandidate ExactLeaves::find_split_by_signs(const ExactLeaf& leaf, const SearchNode& node) const {
   Rows rows(static_cast<std::size_t>(leaf.inputs.rows()));
   std::iota(rows.begin(), rows.end(), 0);

@@ -1,6 +1,6 @@
 /// \file
-/// Leaves of a growing tree whose rows are sorted by every input: exact search for their best split. By the rule RA they
-/// are not sorted, and split by the signs of their residuals.
+/// Leaves of a growing tree whose rows are sorted by every input: exact search for their best split. By the rule RA
+/// they are not sorted, and split by the signs of their residuals.
 #pragma once
 
 #include <array>

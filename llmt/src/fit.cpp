@@ -11,6 +11,7 @@
 
 #include "fit_checks.hpp"
 #include "growth.hpp"
+#include "hilomot.hpp"
 #include "joint_fit.hpp"
 #include "jumps.hpp"
 #include "local_terms.hpp"
@@ -36,6 +37,10 @@ GrownPartition grow_in_order(const TrainingRows& rows, const std::vector<int>& s
   const Table& table = *rows.table;
   GrowthProblem problem{&rows, served, plan.growth, max_threads};
   problem.options.split_inputs = table.split_inputs;
+  if (is_hilomot(problem.options.rule)) {
+    const bool joint = !plan.candidates.widths.empty() && plan.candidates.estimation == Estimation::joint;
+    return grow_hilomot(problem, {joint ? GateModels::joint : GateModels::local, stop_by_aicc});
+  }
   if (!is_lolimot(problem.options.rule)) {
     return grow(problem);
   }

@@ -111,6 +111,11 @@ void check_options(const FitOptions& options, std::ptrdiff_t inputs) {
   require(!options.growth.merge_leaves || options.selection.folds.count > 0, "selection.folds.count",
           options.selection.folds.count, "at least 2 for growth.merge_leaves");
   require(options.max_threads >= 0, "max_threads", options.max_threads, "at least 0");
+  if (options.growth.rule == GrowthRule::hilomot && options.blend.validity != ValidityChoice::automatic &&
+      options.blend.validity != ValidityChoice::crisp) {
+    throw std::invalid_argument(
+        "llmt::fit: blend.validity must be automatic or crisp for growth.rule hilomot, whose gates are logistic");
+  }
 }
 
 Table make_table(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<const Eigen::MatrixXd>& outputs,

@@ -9,7 +9,7 @@
 namespace llmt {
 
 /// For every node of a grown tree: how far the outputs jump at its threshold, as a multiple of the scatter of the rows
-/// there; 0 in leaves, at splits on categories and where rows do not tell.
+/// there; 0 in leaves, at splits on categories, at oblique ones and where rows do not tell.
 ///
 /// Two linear models are fitted to a narrow band of the node's rows on either side of the threshold, and the root mean
 /// square of the gap between them on the plane x_j = threshold, its sampling variance taken off, is divided by the

@@ -6,6 +6,7 @@
 
 #include "boxes.hpp"
 #include "lanes.hpp"
+#include "logistic.hpp"
 #include "transition.hpp"
 
 namespace llmt {
@@ -24,6 +25,8 @@ LeafValidities::LeafValidities(const Partition& partition, const std::vector<Inp
                   .input = node.split_input,
                   .first_level = -1,
                   .levels = 0,
+                  .first_term = -1,
+                  .terms = 0,
                   .threshold = node.threshold,
                   .per_half_width = std::isfinite(1.0 / node.half_width) ? 1.0 / node.half_width : 0.0,
                   .missing_left = node.missing_left};
@@ -32,6 +35,15 @@ LeafValidities::LeafValidities(const Partition& partition, const std::vector<Inp
       branch.levels = static_cast<int>(node.level_side.size());
       for (const int side : node.level_side) {
         level_share_.push_back(side < 0 ? 1.0 : side > 0 ? 0.0 : node.missing_left);
+      }
+    }
+    if (node.is_oblique()) {
+      branch.first_term = static_cast<int>(terms_.size());
+      for (std::ptrdiff_t j = 0; j < node.direction.size(); ++j) {
+        if (node.direction(j) != 0.0) {
+          terms_.push_back({static_cast<int>(j), node.direction(j), inputs[static_cast<std::size_t>(j)].centre});
+          ++branch.terms;
+        }
       }
     }
     branches_.push_back(branch);
@@ -86,13 +98,14 @@ double LeafValidities::left_share(const Branch& branch, double x) const {
   if (branch.per_half_width == 0.0) {
     return x <= branch.threshold ? 1.0 : 0.0;
   }
-  return transition((x - branch.threshold) * branch.per_half_width, smoothness_);
+  const double u = (x - branch.threshold) * branch.per_half_width;
+  return kind_ == ValidityKind::logistic ? logistic(u) : transition(u, smoothness_);
 }
 
 int LeafValidities::child_of(int node, const double* row) const {
   const Branch& branch = branches_[static_cast<std::size_t>(node)];
-  if (branch.first_level < 0 && !std::isnan(row[branch.input])) {
-    return row[branch.input] <= branch.threshold ? branch.left : branch.right;
+  if (const double x = side(branch, row); branch.first_level < 0 && !std::isnan(x)) {
+    return x <= branch.threshold ? branch.left : branch.right;
   }
   return left_share(node, row) >= 0.5 ? branch.left : branch.right;
 }
@@ -107,7 +120,7 @@ bool LeafValidities::is_ambiguous(const double* row) const {
       continue;
     }
     const double left = left_share(node, row);
-    if (std::isnan(row[branch.input]) && left > 1.0 - clear_share && left < clear_share) {
+    if (branch.first_term < 0 && std::isnan(row[branch.input]) && left > 1.0 - clear_share && left < clear_share) {
       return true;
     }
     if (left > 0.0) {
@@ -132,7 +145,7 @@ void LeafValidities::activate(const double* row, std::vector<Activation>& active
 void LeafValidities::descend(int node, double validity, const double* row, std::vector<Activation>& active) const {
   const Branch* branch = &branches_[static_cast<std::size_t>(node)];
   while (branch->left >= 0) {
-    const double left = left_share(*branch, row[branch->input]);
+    const double left = left_share(*branch, side(*branch, row));
     if (left > 0.0 && left < 1.0) {
       descend(branch->left, validity * left, row, active);
       validity *= 1.0 - left;

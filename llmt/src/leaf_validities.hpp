@@ -35,22 +35,25 @@ class LeafValidities {
   /// The same for a block: each leaf that some row reaches, in that order, with its rows, ascending.
   void for_each_leaf(const RowBlock& block, const std::function<void(int node, const RowList& list)>& visit) const;
 
-  /// Validity of the left child at a split, and its derivative with respect to the split input.
+  /// Validity of the left child at a split, and its derivative with respect to what the split compares.
   double left_share(int node, const double* row) const {
     const Branch& branch = branches_[static_cast<std::size_t>(node)];
-    return left_share(branch, row[branch.input]);
+    return left_share(branch, side(branch, row));
   }
   double left_share_derivative(int node, const double* row) const;
+  /// by_input += factor * derivatives, by the inputs, of what the split compares.
+  void add_side_derivatives(int node, const Eigen::VectorXd& factor, Eigen::MatrixXd& by_input) const;
+  /// What the split compares with its threshold.
+  double side(int node, const double* row) const { return side(branches_[static_cast<std::size_t>(node)], row); }
 
   /// Whether a missing value sends the row to both sides of some split in earnest.
   bool is_ambiguous(const double* row) const;
   /// Where the larger share of a row goes.
   int child_of(int node, const double* row) const;
 
-  /// Left child, right child (-1 in a leaf) and split input of a node.
+  /// Left and right child of a node, -1 in a leaf.
   int left(int node) const { return branches_[static_cast<std::size_t>(node)].left; }
   int right(int node) const { return branches_[static_cast<std::size_t>(node)].right; }
-  int input(int node) const { return branches_[static_cast<std::size_t>(node)].input; }
 
   std::ptrdiff_t num_leaves() const { return std::ssize(branches_) / 2 + 1; }
   bool are_gaussian() const { return kind_ == ValidityKind::gaussian; }
@@ -64,9 +67,17 @@ class LeafValidities {
     int input = -1;
     int first_level = -1;  // of this split's entries in level_share_; -1: a number
     int levels = 0;
+    int first_term = -1;  // of this split's entries in terms_; -1: axis-orthogonal
+    int terms = 0;
     double threshold = 0.0;
     double per_half_width = 0.0;  // 1 / h; 0: a jump
     double missing_left = 0.5;
+  };
+  /// Of an oblique split, one for each input that counts.
+  struct Term {
+    int input;
+    double weight;
+    double centre;
   };
   /// Of the leaves, in order of growth; rows of `stride` entries, padded with zeros to whole quads.
   struct Gaussians {
@@ -82,6 +93,19 @@ class LeafValidities {
     std::vector<double> validities;
   };
 
+  double side(const Branch& branch, const double* row) const {
+    return branch.first_term < 0 ? row[branch.input] : oblique_side(branch, row, 1);
+  }
+  /// Inputs that are `stride` apart. A missing one counts as its centre.
+  double oblique_side(const Branch& branch, const double* row, std::ptrdiff_t stride) const {
+    double sum = 0.0;
+    for (int k = 0; k < branch.terms; ++k) {
+      const Term& term = terms_[static_cast<std::size_t>(branch.first_term + k)];
+      const double x = row[term.input * stride];
+      sum += x == x ? term.weight * (x - term.centre) : 0.0;
+    }
+    return sum;
+  }
   double left_share(const Branch& branch, double x) const;
   void descend(int node, double validity, const double* row, std::vector<Activation>& active) const;
   void descend(int node, std::ptrdiff_t begin, std::ptrdiff_t count, const RowBlock& block, Waiting& waiting,
@@ -95,6 +119,7 @@ class LeafValidities {
   int smoothness_;
   std::vector<Branch> branches_;
   std::vector<double> level_share_;  // of the left child
+  std::vector<Term> terms_;
   Gaussians gaussians_;
 };
 

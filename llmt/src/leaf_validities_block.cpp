@@ -2,6 +2,7 @@
 #include <algorithm>
 
 #include "leaf_validities.hpp"
+#include "logistic.hpp"
 #include "transition.hpp"
 
 namespace llmt {
@@ -78,6 +79,23 @@ Counts blend(const Fork& fork, const double* column, double threshold, double pe
   return counts;
 }
 
+/// Logistic gates; `side`: of the i-th row.
+LLMT_FOR_EACH_INSTRUCTION_SET
+Counts gate(const Fork& fork, const double* side, double threshold, double per_half_width) {
+  constexpr std::ptrdiff_t at_once = 64;
+  double left[at_once] = {};
+  Counts counts;
+  for (std::ptrdiff_t begin = 0; begin < fork.count; begin += at_once) {
+    const std::ptrdiff_t size = std::min(at_once, fork.count - begin);
+    for (std::ptrdiff_t i = 0; i < size; ++i) {
+      left[i] = logistic((side[begin + i] - threshold) * per_half_width);
+    }
+    hand_over(
+        fork, begin, begin + size, [&](std::ptrdiff_t i) { return left[i - begin]; }, counts);
+  }
+  return counts;
+}
+
 }  // namespace
 
 void LeafValidities::for_each_leaf(const RowBlock& block,
@@ -124,11 +142,28 @@ void LeafValidities::descend(int node, std::ptrdiff_t begin, std::ptrdiff_t coun
     const Fork fork{rows, validities, count, rows + count, validities + count, rows, validities};
     const double* column = block.inputs.col(branch.input).data();
     Counts counts;
-    if (branch.first_level >= 0 || block.has_missing[static_cast<std::size_t>(branch.input)]) {
+    if (branch.first_term >= 0) {
+      const double* first = block.inputs.data();
+      const std::ptrdiff_t stride = block.inputs.outerStride();
+      std::vector<double> sides(static_cast<std::size_t>(count));
+      for (std::ptrdiff_t i = 0; i < count; ++i) {
+        sides[static_cast<std::size_t>(i)] = oblique_side(branch, first + rows[i], stride);
+      }
+      if (kind_ == ValidityKind::logistic && branch.per_half_width != 0.0) {
+        counts = gate(fork, sides.data(), branch.threshold, branch.per_half_width);
+      } else {
+        hand_over(
+            fork, 0, count, [&](std::ptrdiff_t i) { return left_share(branch, sides[static_cast<std::size_t>(i)]); },
+            counts);
+      }
+    } else if (branch.first_level >= 0 || block.has_missing[static_cast<std::size_t>(branch.input)]) {
       hand_over(
           fork, 0, count, [&](std::ptrdiff_t i) { return left_share(branch, column[fork.rows[i]]); }, counts);
     } else if (branch.per_half_width == 0.0) {
       counts = jump(fork, column, branch.threshold);
+    } else if (kind_ == ValidityKind::logistic) {
+      hand_over(
+          fork, 0, count, [&](std::ptrdiff_t i) { return left_share(branch, column[fork.rows[i]]); }, counts);
     } else {
       counts = blend(fork, column, branch.threshold, branch.per_half_width, smoothness_);
     }

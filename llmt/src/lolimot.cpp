@@ -1,12 +1,12 @@
 #include "lolimot.hpp"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numeric>
 #include <optional>
 
+#include "aicc.hpp"
 #include "evaluator.hpp"
 #include "node_fit.hpp"
 #include "parallel.hpp"
@@ -172,26 +172,15 @@ class Lolimot {
 
   double loss() const { return squared_errors(numerator(), sum_of_mu()).sum(); }
 
-  /// AICc with the effective number of parameters of local estimation, sum of tr[(X'QX)^-1 X'Q^2 X].
+  /// AICc with the effective number of parameters of local estimation.
   double criterion() const {
     const double rows = weights_.sum() * static_cast<double>(outputs_.cols());
     const Eigen::VectorXd total = sum_of_mu();
     double effective = 0.0;
     for (const LocalModel& model : models_) {
-      const Eigen::VectorXd validity = model.mu.cwiseQuotient(total);
-      Eigen::MatrixXd a(deviations_.rows(), deviations_.cols() + 1);
-      a << Eigen::VectorXd::Ones(deviations_.rows()), deviations_;
-      const Eigen::VectorXd weights = weights_.cwiseProduct(validity);
-      const Eigen::MatrixXd first = a.transpose() * weights.asDiagonal() * a;
-      const Eigen::MatrixXd second = a.transpose() * weights.cwiseProduct(validity).asDiagonal() * a;
-      effective += first.completeOrthogonalDecomposition().solve(second).trace();
+      effective += effective_parameters(deviations_, weights_, model.mu.cwiseQuotient(total));
     }
-    effective *= static_cast<double>(outputs_.cols());
-    if (rows - effective - 1.0 <= 0.0) {
-      return std::numeric_limits<double>::infinity();
-    }
-    return rows * std::log(std::max(loss(), floor_) / rows) + 2.0 * effective +
-           2.0 * effective * (effective + 1.0) / (rows - effective - 1.0);
+    return aicc(rows, std::max(loss(), floor_), effective * static_cast<double>(outputs_.cols()));
   }
 
   /// Where input j of a box is split, if anywhere.

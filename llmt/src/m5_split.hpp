@@ -10,9 +10,9 @@ namespace llmt {
 
 /// A split of some rows.
 struct DeviationSplit {
-  int input = -1;           ///< position among the split inputs; -1: there is no admissible split
-  double threshold = 0.0;   ///< of a number: the middle of the gap
-  bool by_missing = false;  ///< rows with a value go left, rows without one right
+  int input = -1;                    ///< position among the split inputs; -1: there is no admissible split
+  double threshold = 0.0;            ///< of a number: the middle of the gap
+  bool by_missing = false;           ///< rows with a value go left, rows without one right
   std::vector<int> level_side = {};  ///< of a categorical input: -1 left, 1 right, 0 not seen
   /// n sd - n_1 sd_1 - n_2 sd_2 over the rows that have a value, the outputs' deviations as parts of those of all
   /// training rows, added up; n are sums of weights.
@@ -21,9 +21,9 @@ struct DeviationSplit {
 
 /// Rows of a node.
 struct DeviationNode {
-  const std::vector<int>& rows;              ///< of the training rows
+  const std::vector<int>& rows;                 ///< of the training rows
   const std::vector<std::vector<int>>& orders;  ///< of each numeric split input, those that have a value, ascending
-  const Eigen::VectorXd& weights;            ///< of all training rows, as they count in this node
+  const Eigen::VectorXd& weights;               ///< of all training rows, as they count in this node
 };
 
 /// Sum over the outputs of their standard deviations (division by n), as parts of those of all training rows.

@@ -36,6 +36,26 @@ void check_shared(const Partition& partition, std::ptrdiff_t index, const std::s
   }
 }
 
+void check_direction(const Node& node, const std::vector<InputColumn>& inputs, const std::string& where) {
+  if (!node.is_oblique()) {
+    return;
+  }
+  if (node.direction.size() != std::ssize(inputs) || !node.direction.allFinite()) {
+    reject(fmt::format("{}: direction has {} entries, it must have {} finite ones", where, node.direction.size(),
+                       inputs.size()));
+  }
+  // So it is not zero either, and its split input is a number.
+  if (node.direction(node.split_input) == 0.0) {
+    reject(fmt::format("{}: direction has weight 0 for the split input {}", where, node.split_input));
+  }
+  for (std::size_t j = 0; j < inputs.size(); ++j) {
+    if (inputs[j].is_categorical() && node.direction(static_cast<std::ptrdiff_t>(j)) != 0.0) {
+      reject(fmt::format("{}: direction has weight {} for the categorical input \"{}\", it must be 0", where,
+                         node.direction(static_cast<std::ptrdiff_t>(j)), inputs[j].name));
+    }
+  }
+}
+
 void check_node(const Partition& partition, std::ptrdiff_t index, const std::vector<InputColumn>& inputs,
                 std::ptrdiff_t regressors, const std::string& where) {
   const Node& node = partition.nodes[static_cast<std::size_t>(index)];
@@ -94,6 +114,7 @@ void check_node(const Partition& partition, std::ptrdiff_t index, const std::vec
     reject(fmt::format("{}: {} sides for the {} levels of \"{}\"", where, node.level_side.size(), input.levels.size(),
                        input.name));
   }
+  check_direction(node, inputs, where);
   if (std::any_of(node.level_side.begin(), node.level_side.end(), [](int side) { return side < -1 || side > 1; })) {
     reject(fmt::format("{}: the side of a level must be -1, 0 or 1", where));
   }
@@ -109,6 +130,10 @@ void check_partition(const Partition& partition, const std::vector<InputColumn>&
   }
   if (partition.outputs.empty() || partition.nodes.empty() || partition.nodes.size() % 2 == 0) {
     reject(fmt::format("{}: it needs an output and an odd number of nodes", where));
+  }
+  if (validity.kind == ValidityKind::gaussian &&
+      std::any_of(partition.nodes.begin(), partition.nodes.end(), [](const Node& node) { return node.is_oblique(); })) {
+    reject(fmt::format("{}: Gaussians need boxes, and a node has a direction", where));
   }
   if (partition.outer_slope.size() > 0 &&
       (partition.outer_slope.rows() != std::ssize(partition.outputs) || partition.outer_slope.cols() != regressors ||
@@ -144,7 +169,10 @@ void collect_leaves(const Partition& partition, int index, Leaf box, const std::
   const Node& node = partition.nodes[static_cast<std::size_t>(index)];
   if (!node.is_leaf()) {
     Leaf right = box;
-    if (node.level_side.empty()) {
+    if (node.is_oblique()) {
+      box.sides.push_back({index, true});
+      right.sides.push_back({index, false});
+    } else if (node.level_side.empty()) {
       box.high(node.split_input) = std::min(box.high(node.split_input), node.threshold);
       right.low(node.split_input) = std::max(right.low(node.split_input), node.threshold);
     } else {

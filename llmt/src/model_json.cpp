@@ -16,7 +16,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr std::array<const char*, 3> validity_names = {"crisp", "blend", "gaussian"};  // in the order of ValidityKind
+// In the order of ValidityKind.
+constexpr std::array<const char*, 4> validity_names = {"crisp", "blend", "gaussian", "logistic"};
 
 constexpr const char* format_name = "llmt-model";
 constexpr int format_version = 2;
@@ -36,6 +37,9 @@ Json node_to_json(const Node& node, const Model& model) {
   if (!node.is_leaf()) {
     json["split"] = {{"input", model.inputs()[static_cast<std::size_t>(node.split_input)].name},
                      {"column", node.split_input}};
+    if (node.is_oblique()) {
+      json["split"]["direction"] = to_array(node.direction);
+    }
     if (node.level_side.empty()) {
       json["split"]["threshold"] = node.threshold;
       json["split"]["half_width"] = node.half_width;
@@ -159,11 +163,14 @@ Eigen::MatrixXd rows_from_json(const Reader& json, std::ptrdiff_t rows, std::ptr
   return matrix;
 }
 
-Node node_from_json(const Reader& json, std::ptrdiff_t outputs, std::ptrdiff_t regressors) {
+Node node_from_json(const Reader& json, std::ptrdiff_t inputs, std::ptrdiff_t outputs, std::ptrdiff_t regressors) {
   Node node;
   if (json.has("split")) {
     const Reader split = json.member("split");
     node.split_input = split.member("column").as<int>();
+    if (split.has("direction")) {
+      node.direction = split.member("direction").vector(inputs);
+    }
     if (split.has("level_side")) {
       node.level_side = split.member("level_side").list<int>();
     } else {
@@ -204,7 +211,7 @@ Validity validity_from_json(const Reader& json) {
   const std::string kind = json.member("kind").as<std::string>();
   const auto found = std::find(validity_names.begin(), validity_names.end(), kind);
   if (found == validity_names.end()) {
-    json.member("kind").fail(fmt::format("\"{}\" is not known: crisp, blend and gaussian are", kind));
+    json.member("kind").fail(fmt::format("\"{}\" is not known: crisp, blend, gaussian and logistic are", kind));
   }
   return {.kind = static_cast<ValidityKind>(found - validity_names.begin()),
           .width = json.member("width").as<double>(),
@@ -315,7 +322,8 @@ Model from_json(const std::string& text, const std::string& name) {
       partition.residual_range = rows_from_json(range, std::ssize(partition.outputs), 2);
     }
     for (const Reader& node : entry.member("nodes").elements()) {
-      partition.nodes.push_back(node_from_json(node, std::ssize(partition.outputs), std::ssize(regressors)));
+      partition.nodes.push_back(
+          node_from_json(node, std::ssize(inputs), std::ssize(partition.outputs), std::ssize(regressors)));
     }
     partitions.push_back(std::move(partition));
   }

@@ -14,6 +14,9 @@ namespace {
 /// a grid the nearest queries half a step from them.
 constexpr double range_margin = 0.25;
 
+/// Logistic gates reach every row a little: a leaf's range is that of the rows where it has more validity than this.
+constexpr double reach_of_logistic = 1e-3;
+
 /// a += factor * b.
 inline void add_scaled(double* a, const double* b, double factor, std::ptrdiff_t size) {
   for (std::ptrdiff_t k = 0; k < size; ++k) {
@@ -151,7 +154,11 @@ class Assembly {
 
   void widen_range(const Reached& reached, std::size_t leaf) {
     const std::size_t node = static_cast<std::size_t>(sums_.leaves[leaf]);
+    const double least = partition_.validity.kind == ValidityKind::logistic ? reach_of_logistic : 0.0;
     for (const Use& use : reached.uses[leaf]) {
+      if (!(reached.entries[static_cast<std::size_t>(use.entry)].validity > least)) {
+        continue;
+      }
       const double* deviations = reached.chunk.deviations.row(use.row).data();
       for (std::ptrdiff_t k = 0; k < size_ - 1; ++k) {
         low_[node](k) = deviations[k] < low_[node](k) ? deviations[k] : low_[node](k);

@@ -12,15 +12,21 @@ constexpr std::ptrdiff_t most_leaves_to_prune = 2000;
 
 bool is_lolimot(GrowthRule rule) { return rule == GrowthRule::lolimot || rule == GrowthRule::lolimot_data_driven; }
 
+bool is_hilomot(GrowthRule rule) { return rule == GrowthRule::hilomot; }
+
 Plan make_plan(const FitOptions& options, const TrainingRows& all, std::ptrdiff_t folds) {
   const bool has_folds = folds > 0;
   // Many rows: the widest transitions and the larger ridges, which are for few, take most of the time.
   const bool many_rows = folds == 1;
   Plan plan{options.growth, {}};
   const ValidityChoice choice = is_lolimot(options.growth.rule) ? ValidityChoice::gaussian : options.blend.validity;
-  const bool crisp_only = choice == ValidityChoice::crisp || (choice == ValidityChoice::automatic && !has_folds);
+  const bool logistic = is_hilomot(options.growth.rule);
+  const bool crisp_only =
+      choice == ValidityChoice::crisp || (choice == ValidityChoice::automatic && !has_folds && !logistic);
   plan.candidates.crisp = choice == ValidityChoice::automatic || choice == ValidityChoice::crisp;
-  plan.candidates.kind = choice == ValidityChoice::gaussian ? ValidityKind::gaussian : ValidityKind::blend;
+  plan.candidates.kind = choice == ValidityChoice::gaussian ? ValidityKind::gaussian
+                         : logistic                         ? ValidityKind::logistic
+                                                            : ValidityKind::blend;
   plan.candidates.estimation = options.blend.estimation;
   plan.candidates.smoothness = options.blend.smoothness;
   plan.candidates.merge_leaves = options.growth.merge_leaves;
@@ -28,11 +34,12 @@ Plan make_plan(const FitOptions& options, const TrainingRows& all, std::ptrdiff_
     plan.candidates.widths = options.blend.widths;
     if (plan.candidates.widths.empty()) {
       plan.candidates.widths = choice == ValidityChoice::gaussian ? std::vector<double>{1.0 / 3.0}
+                               : logistic                         ? std::vector<double>{1.0, 2.0, 4.0}
                                : many_rows                        ? std::vector<double>{0.5, 1.0, 2.0}
                                                                   : std::vector<double>{0.5, 1.0, 2.0, 4.0};
     }
     plan.candidates.jumps = options.blend.jumps;
-    if (plan.candidates.jumps.empty()) {
+    if (plan.candidates.jumps.empty() || logistic) {
       plan.candidates.jumps = {no_jump};
       if (has_folds && plan.candidates.kind == ValidityKind::blend) {
         plan.candidates.jumps.insert(plan.candidates.jumps.end(), {4.0, 2.0, 1.0, 0.5});
@@ -63,6 +70,9 @@ Plan make_plan(const FitOptions& options, const TrainingRows& all, std::ptrdiff_
   }
   if (growth.min_leaf_samples == 0) {
     growth.min_leaf_samples = many_leaves ? std::max<std::ptrdiff_t>(5, regressors) : 2 * (regressors + 1);
+  }
+  if (growth.max_leaves == 0 && logistic) {
+    growth.max_leaves = 50;
   }
   if (growth.max_leaves == 0 && many_leaves) {
     growth.max_leaves = std::clamp<std::ptrdiff_t>(1500 / (regressors + 1), 20, 400);

@@ -55,7 +55,8 @@ void compare_crisp(const std::vector<FoldRows>& folds, const std::vector<GrownTr
   std::vector<std::vector<Eigen::VectorXd>> errors(variants.size(), std::vector<Eigen::VectorXd>(folds.size()));
   parallel_for(std::ssize(folds), max_threads, [&](std::ptrdiff_t index) {
     const std::size_t f = static_cast<std::size_t>(index);
-    const JointFit fit(folds[f].training, grown[f].partition, max_threads, candidates.sparse.back());
+    const JointFit fit(folds[f].training, blended(folds[f].training, grown[f], {}, no_jump), max_threads,
+                       candidates.sparse.back());
     const std::ptrdiff_t leaves = grown[f].partition.num_leaves();
     for (std::size_t v = 0; v < variants.size(); ++v) {
       const auto [sparse, shrinkage] = variants[v];

@@ -55,11 +55,10 @@ std::size_t next_candidate(const std::vector<Cut>& candidates) {
   for (const Cut& candidate : candidates) {
     largest = std::max(largest, candidate.deviate);
   }
-  return static_cast<std::size_t>(std::find_if(candidates.begin(), candidates.end(),
-                                               [&](const Cut& candidate) {
-                                                 return candidate.deviate >= (1.0 - tie_of_deviates) * largest;
-                                               }) -
-                                  candidates.begin());
+  return static_cast<std::size_t>(
+      std::find_if(candidates.begin(), candidates.end(),
+                   [&](const Cut& candidate) { return candidate.deviate >= (1.0 - tie_of_deviates) * largest; }) -
+      candidates.begin());
 }
 
 /// Fills in the sums of squares of the two child models.
@@ -98,8 +97,9 @@ void evaluate(const SignNode& node, SignSplit& split) {
 
 double SignStatistics::deviate() const {
   const double t = std::max(std::abs(means), std::abs(variances));
-  return freedom > 0.0 ? (8.0 * freedom + 1.0) / (8.0 * freedom + 3.0) * std::sqrt(freedom * std::log1p(t * t / freedom))
-                       : 0.0;
+  return freedom > 0.0
+             ? (8.0 * freedom + 1.0) / (8.0 * freedom + 3.0) * std::sqrt(freedom * std::log1p(t * t / freedom))
+             : 0.0;
 }
 
 SignStatistics sign_statistics(std::span<const double> values, std::span<const double> residuals,
@@ -152,8 +152,7 @@ SignStatistics sign_statistics(std::span<const double> values, std::span<const d
     squares[1] += negative * distance;
   }
   const double within = squares[0] + squares[1];
-  const double of_distances =
-      within - distances[0] * distances[0] / count[0] - distances[1] * distances[1] / count[1];
+  const double of_distances = within - distances[0] * distances[0] / count[0] - distances[1] * distances[1] / count[1];
   result.positive_mean = origin + mean[0];
   result.negative_mean = origin + mean[1];
   result.means = student(mean[0] - mean[1], within, all_squares, count);
@@ -218,7 +217,8 @@ SignSplit search_by_signs(const GrowthData& data, const SignNode& node) {
         split.sides[values[i] <= candidate.threshold ? 0 : 1].push_back(static_cast<int>(i));
       }
     }
-    if (std::min(std::ssize(split.sides[0]), std::ssize(split.sides[1])) >= std::max<std::ptrdiff_t>(smallest_leaf, 1)) {
+    if (std::min(std::ssize(split.sides[0]), std::ssize(split.sides[1])) >=
+        std::max<std::ptrdiff_t>(smallest_leaf, 1)) {
       split.best.input = static_cast<int>(candidate.input);
       split.best.left = std::ssize(split.sides[0]);
       split.best.last_left = candidate.threshold;

@@ -19,16 +19,16 @@ struct Method {
 };
 
 /// Least squares; crisp trees grown by RD and by RETIS; Gaussians over a crisp tree as in Benes et al. (2022), without
-/// re-estimation, and with joint re-estimation; the blend with joint estimation; LOLIMOT; where the number of `inputs`
-/// is given and of their local models quadratic ones can be made (LocalTerms), the crisp tree by RD with these. `base`
-/// gives the columns, weights, seeds and threads.
+/// re-estimation, and with joint re-estimation; the blend with joint estimation; LOLIMOT; HILOMOT; where the number of
+/// `inputs` is given and of their local models quadratic ones can be made (LocalTerms), the crisp tree by RD with
+/// these. `base` gives the columns, weights, seeds and threads.
 std::vector<Method> usual_methods(const FitOptions& base = {}, std::ptrdiff_t inputs = 0);
 
 /// What one method made of the data.
 struct Comparison {
   std::string method;
   std::ptrdiff_t leaves = 0;      ///< of the model of all rows
-  std::ptrdiff_t parameters = 0;  ///< coefficients of the leaves and thresholds of the splits
+  std::ptrdiff_t parameters = 0;  ///< coefficients of the leaves, thresholds of the splits, directions and gates
   Eigen::VectorXd fold_rmse;      ///< held-out, one per fold
   double cv_rmse = 0.0;           ///< over all held-out rows
   double spread = 0.0;            ///< standard deviation of fold_rmse

@@ -44,7 +44,12 @@ enum class GrowthRule {
   /// few rows; a node's model has the inputs tested below it, less those that do not pay; pruned from the leaves up by
   /// the adjusted error err (n + 2 v) / (n - v), v coefficients; models smoothed along the path to the root,
   /// (n p + 15 q) / (n + 15). Crisp, with models of its own: blends, Gaussians and shrinkages are refused.
-  m5
+  m5,
+  /// HILOMOT (Nelles 2006): the worst local model is split by a plane of any direction with a logistic gate, found by
+  /// nonlinear optimisation with the two local models nested inside; validities are products of gates. Takes
+  /// BlendOptions::widths (of the gates, 1: as grown) and Estimation as lolimot does; ValidityChoice automatic or crisp.
+  /// Without folds AICc decides how many leaves stay.
+  hilomot
 };
 
 /// Where in the gap between two training values a threshold is put. The residual sum of squares is the same anywhere in
@@ -77,31 +82,31 @@ enum class Pruning {
 
 /// Why growth ended.
 enum class StopReason {
-  max_leaves,       ///< GrowthOptions::max_leaves reached
-  significance,     ///< no leaf has a split that passes the F test
-  variance_gain,    ///< no leaf has a split that lowers the residual variance enough
-  leaf_samples,     ///< no leaf is large enough to be split, or all its split inputs, or by M5' its outputs, are constant
-  exact_fit,        ///< the leaves reproduce the outputs to rounding
-  improvement,      ///< GrowthOptions::min_improvement: further splits improved the tree too little
-  aicc,             ///< LOLIMOT without folds: the corrected Akaike criterion rose
-  pruning,          ///< pruning by RETIS or M5' removed the last splits
+  max_leaves,     ///< GrowthOptions::max_leaves reached
+  significance,   ///< no leaf has a split that passes the F test
+  variance_gain,  ///< no leaf has a split that lowers the residual variance enough
+  leaf_samples,   ///< no leaf is large enough to be split, or all its split inputs, or by M5' its outputs, are constant
+  exact_fit,      ///< the leaves reproduce the outputs to rounding
+  improvement,    ///< GrowthOptions::min_improvement: further splits improved the tree too little
+  aicc,           ///< LOLIMOT and HILOMOT without folds: the corrected Akaike criterion rose
+  pruning,        ///< pruning by RETIS or M5' removed the last splits
   cross_validation  ///< fewer leaves than grown had the smallest held-out error
 };
 
 struct GrowthOptions {
   GrowthRule rule = GrowthRule::rd;
-  /// rd, ra: a split is accepted if P(F >= observed), times the number of candidate splits it was chosen from (Bonferroni:
-  /// the maximum over many candidates does not follow the F distribution), is below this. 1 or more: no test.
-  /// Negative: 0.05 for a crisp tree, no test where blends are among the candidates, for the held-out error decides
-  /// then and the joint estimate bears far more leaves than a crisp one.
+  /// rd, ra: a split is accepted if P(F >= observed), times the number of candidate splits it was chosen from
+  /// (Bonferroni: the maximum over many candidates does not follow the F distribution), is below this. 1 or more: no
+  /// test. Negative: 0.05 for a crisp tree, no test where blends are among the candidates, for the held-out error
+  /// decides then and the joint estimate bears far more leaves than a crisp one.
   double significance = -1.0;
   /// rd, ra: smallest decrease of the residual variance, as a fraction of the variance of the output. 0: any decrease;
   /// negative: no demand.
   double min_variance_gain = 0.0;
   /// retis: weight m of the prior (the error of one model for all data) in the m-estimates, in rows. 0: no pruning.
   double pruning_m = 2.0;
-  /// Smallest number of rows in a leaf. 0: twice the number of coefficients of a local model for a crisp tree, 2 for M5';
-  /// where blends are among the candidates as many as regressors, at least 5.
+  /// Smallest number of rows in a leaf. 0: twice the number of coefficients of a local model for a crisp tree, 2 for
+  /// M5'; where blends are among the candidates as many as regressors, at least 5.
   std::ptrdiff_t min_leaf_samples = 0;
   /// Largest number of leaves of a partition. 0: no limit for a crisp tree; where blends are among the candidates as
   /// many as make 1500 coefficients, within 20 ... 400.
@@ -156,7 +161,7 @@ struct BlendOptions {
   ValidityChoice validity = ValidityChoice::automatic;
   Estimation estimation = Estimation::joint;
   std::vector<double> widths = {};  ///< Validity::width. Empty: 0.5, 1, 2 and, but for a single
-                                    ///< hold-out, 4 for blends; 1/3 for Gaussians
+                                    ///< hold-out, 4 for blends; 1/3 for Gaussians; 1, 2, 4 for logistic gates
   /// Splits where the outputs jump by at least this multiple of the scatter of the rows there have no transition, see
   /// docs/algorithms.md; no_jump: all have one. Empty: no_jump, 4, 2, 1, 0.5.
   std::vector<double> jumps = {};

@@ -23,27 +23,38 @@ enum class ValidityKind {
   blend,
   /// Normalised Gaussians, Phi_i = mu_i / sum mu, mu_i = exp(-1/2 sum_j ((x_j - c_ij) / sigma_ij)^2): c_ij the middle
   /// of the leaf's box, closed by the training extent, sigma_ij = width times its side (Nelles 2001; width = k_sigma).
-  gaussian
+  gaussian,
+  /// Products of logistic gates along the path, as in HILOMOT (Nelles 2006): with u = (s - threshold) / h and s the
+  /// side of the split, see Node, the left child has the share g = 1 / (1 + exp(u)) and the right one 1 - g.
+  logistic
 };
 
 struct Validity {
   ValidityKind kind = ValidityKind::crisp;
   /// blend: h as a multiple of the distance from the threshold to the nearer side of the node's box (the extent of the
-  /// smaller child), for splits on numbers; gaussian: k_sigma. 0 for crisp.
+  /// smaller child), for splits on numbers; gaussian: k_sigma; logistic: h as a multiple of that of growth. 0 for
+  /// crisp.
   double width = 0.0;
   int smoothness = 1;  ///< blend: continuous derivatives of the prediction, 1 or 2
 };
 
 /// One node of a partition's tree, inner or leaf. Inner nodes keep a local model of their own.
+///
+/// A split compares s(x) with its threshold: s = x[split_input], or in an oblique one
+///   s = sum_j direction_j (x_j - c_j),  c: InputColumn::centre
+/// where a missing value counts as its centre.
 struct Node {
-  int left = -1;         ///< child for x[split_input] <= threshold; -1 in a leaf
-  int right = -1;        ///< child for x[split_input] > threshold; -1 in a leaf
-  int split_input = -1;  ///< column of the input that is compared; -1 in a leaf
-  /// In the unit of that input. The largest double: rows that have a value go left, rows without one right.
+  int left = -1;         ///< child for s <= threshold; -1 in a leaf
+  int right = -1;        ///< child for s > threshold; -1 in a leaf
+  int split_input = -1;  ///< column of the input that is compared, or counts most in an oblique split; -1 in a leaf
+  /// In the unit of s. The largest double: rows that have a value go left, rows without one right.
   double threshold = 0.0;
+  /// Oblique split: weight of every input of the model, 0 for categorical ones, in units of 1 / the input's; as grown,
+  /// s has steps of one standard deviation. Empty: axis-orthogonal.
+  Eigen::VectorXd direction = {};
   /// Split on a categorical input: for each of its levels -1 left, 1 right, 0 not seen here. Empty for numbers.
   std::vector<int> level_side = {};
-  double half_width = 0.0;    ///< h of the transition of a blend, in the unit of the split input; 0: a jump
+  double half_width = 0.0;    ///< h of the transition of a blend or a logistic gate, in the unit of s; 0: a jump
   double missing_left = 0.5;  ///< validity of the left child where the split input is missing or its level was not seen
 
   std::ptrdiff_t samples = 0;  ///< training rows in the node's box
@@ -66,9 +77,10 @@ struct Node {
   int shared_with = -1;
 
   bool is_leaf() const { return left < 0; }
+  bool is_oblique() const { return direction.size() > 0; }
 };
 
-/// A tree of axis-orthogonal splits that serves one or several outputs.
+/// A tree of splits, axis-orthogonal unless the growth rule says otherwise, that serves one or several outputs.
 ///
 /// Nodes stand in the order of growth: node 0 is the root and the k-th split (k = 1, 2, ...) made the nodes 2k-1 (left)
 /// and 2k (right). The first 2M-1 nodes are therefore the tree as it was with M leaves; with Pruning::weakest_link the
@@ -116,13 +128,20 @@ struct Regressor {
   int second_input = -1;  ///< of a product, not below `input`; else -1
 };
 
+/// On which side of an oblique split a leaf lies.
+struct ObliqueSide {
+  int node = 0;  ///< index into Partition::nodes
+  bool left = true;
+};
+
 /// A leaf as a person reads it: where it holds and what it says there.
 struct Leaf {
-  int node = 0;                ///< index into Partition::nodes
-  std::ptrdiff_t samples = 0;  ///< training rows
-  int rank = 0;                ///< as Node::rank
-  Eigen::VectorXd low;         ///< box, one per model input: low < x <= high; -infinity where open
-  Eigen::VectorXd high;        ///< +infinity where open
+  int node = 0;                         ///< index into Partition::nodes
+  std::ptrdiff_t samples = 0;           ///< training rows
+  int rank = 0;                         ///< as Node::rank
+  Eigen::VectorXd low;                  ///< box, one per model input: low < x <= high; -infinity where open
+  Eigen::VectorXd high;                 ///< +infinity where open
+  std::vector<ObliqueSide> sides = {};  ///< what oblique splits cut off the box, from the root down
   std::vector<std::vector<int>>
       levels;            ///< one per model input: levels that belong to the leaf; empty: all, or numeric
   Eigen::VectorXd rmse;  ///< sqrt(rss / samples) over the training rows, one per output of the partition
