@@ -1,0 +1,86 @@
+#include "stream_snapshot.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <queue>
+
+#include "estimate.hpp"
+
+namespace llmt {
+namespace {
+
+/// `node` as a leaf of a Partition.
+Node leaf_of(const StreamTree& tree, const StreamNode& node, const std::vector<ColumnRange>& columns) {
+  const StreamSetting& setting = tree.setting();
+  const std::ptrdiff_t inputs = setting.inputs;
+  const Sums sums = all_sums(setting, node);
+  int rank = 0;
+  const Eigen::VectorXd change = solve(setting.shape, sums.gram.data(), setting.options.shrinkage, rank);
+  // A leaf with too few rows says what it says to predict().
+  const Eigen::VectorXd model = node.is_leaf() ? node.model : node.basis.base + change;
+  Node result;
+  result.samples = sums.rows;
+  result.rank = std::max(1, rank);
+  result.rss = Eigen::VectorXd::Constant(1, remaining(setting.shape, sums.gram.data(), model - node.basis.base));
+  result.slope.resize(1, inputs);
+  result.mean.resize(inputs);
+  result.low.resize(inputs);
+  result.high.resize(inputs);
+  result.value = Eigen::VectorXd::Constant(1, model(0));
+  for (std::ptrdiff_t k = 0; k < inputs; ++k) {
+    const ColumnRange& column = columns[static_cast<std::size_t>(k)];
+    const double origin = setting.unscaled(k, node.basis.origin(k));
+    result.slope(0, k) = model(k + 1) / setting.scale(k);
+    result.value(0) += result.slope(0, k) * (column.mean - origin);
+    const bool has_values = node.low(k) <= node.high(k);
+    result.low(k) = (has_values ? node.low(k) : origin) - column.mean;
+    result.high(k) = (has_values ? node.high(k) : origin) - column.mean;
+    // A missing value counts as the origin.
+    result.mean(k) = std::clamp(origin - column.mean, result.low(k), result.high(k));
+  }
+  return result;
+}
+
+struct Waiting {
+  double gain;
+  std::size_t position;
+  const StreamNode* node;
+  bool operator<(const Waiting& other) const {
+    return gain != other.gain ? gain < other.gain : position > other.position;
+  }
+};
+
+}  // namespace
+
+Partition crisp_partition(const StreamTree& tree, const std::vector<ColumnRange>& columns, int output) {
+  Partition partition{.outputs = {output}, .validity = {}, .nodes = {}, .outer_slope = {}, .residual_range = {}};
+  std::priority_queue<Waiting> queue;
+  const auto enter = [&](const StreamNode& node) {
+    if (!node.is_leaf()) {
+      queue.push({node.gain * static_cast<double>(node.rows()), partition.nodes.size(), &node});
+    }
+    partition.nodes.push_back(leaf_of(tree, node, columns));
+  };
+  enter(tree.root());
+  while (!queue.empty()) {
+    const Waiting next = queue.top();
+    queue.pop();
+    const StreamNode& from = *next.node;
+    const int left = static_cast<int>(partition.nodes.size());
+    Node& node = partition.nodes[next.position];
+    node.left = left;
+    node.right = left + 1;
+    node.split_input = from.input;
+    node.threshold = from.threshold;
+    const double rows_left = static_cast<double>(from.children[0]->rows());
+    const double rows_right = static_cast<double>(from.children[1]->rows());
+    node.missing_left = rows_left >= rows_right ? 1.0 : 0.0;
+    enter(*from.children[0]);
+    enter(*from.children[1]);
+  }
+  partition.outer_slope = agreed_slope(partition);
+  return partition;
+}
+
+}  // namespace llmt
