@@ -32,17 +32,26 @@ bool Reservoir::add(const double* values) {
     return false;
   }
   const bool held_out = mixed(hash, 0) % 8 == 0;
-  if (const auto [at, added] = rows_.try_emplace(hash, Row{{}, held_out}); added) {
+  const auto [at, added] = rows_.try_emplace(hash, Row{{}, held_out, 0});
+  ++at->second.times;
+  ++times_;
+  if (added) {
     at->second.values.assign(values, values + width_);
     if (full) {
-      rows_.erase(std::prev(rows_.end()));
+      const auto last = std::prev(rows_.end());
+      times_ -= last->second.times;
+      rows_.erase(last);
     }
   }
   return held_out;
 }
 
 void Reservoir::remove_if(const std::function<bool(const double* values)>& drop) {
-  std::erase_if(rows_, [&](const auto& entry) { return drop(entry.second.values.data()); });
+  std::erase_if(rows_, [&](const auto& entry) {
+    const bool dropped = drop(entry.second.values.data());
+    times_ -= dropped ? entry.second.times : 0;
+    return dropped;
+  });
 }
 
 std::ptrdiff_t Reservoir::bytes() const {

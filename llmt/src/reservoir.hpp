@@ -20,10 +20,17 @@ class Reservoir {
   struct Row {
     std::vector<double> values;
     bool held_out;
+    std::ptrdiff_t times;  ///< that it has come
   };
 
   /// Offers a row; true if it is now in the sample and held out.
   bool add(const double* values);
+
+  /// Different rows / rows of the stream: 1 if none has come twice. Of the rows in the sample, which have been counted
+  /// since their first time.
+  double share_of_different() const {
+    return rows_.empty() ? 1.0 : static_cast<double>(rows_.size()) / static_cast<double>(times_);
+  }
 
   /// Drops rows.
   void remove_if(const std::function<bool(const double* values)>& drop);
@@ -37,6 +44,7 @@ class Reservoir {
   std::ptrdiff_t capacity_;
   std::ptrdiff_t width_;
   std::map<std::uint64_t, Row> rows_;
+  std::ptrdiff_t times_ = 0;  // sum over the rows
 };
 
 }  // namespace llmt

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <stdexcept>
 
 #include "checks.hpp"
@@ -103,7 +104,7 @@ class StreamState {
         }
         const StreamTree& tree = *trees_[static_cast<std::size_t>(o)];
         scale(tree.setting(), x.data(), z);
-        result(i, o) = tree.predict({x.data(), z.data(), 0.0, 1.0});
+        result(i, o) = tree.predict({x.data(), z.data(), 0.0, 1.0, 1.0});
       }
     }
     return result;
@@ -204,7 +205,8 @@ class StreamState {
     ++tested_;
     for (std::ptrdiff_t o = 0; o < outputs_; ++o) {
       const double error =
-          trees_[static_cast<std::size_t>(o)]->learn({row, z.data(), row[inputs_ + o], row[inputs_ + outputs_]});
+          trees_[static_cast<std::size_t>(o)]->learn(
+              {row, z.data(), row[inputs_ + o], row[inputs_ + outputs_], reservoir_.share_of_different()});
       squares_(o) += error * error;
       const double rate = 1.0 / std::min(static_cast<double>(tested_), recent_rows);
       recent_(o) = tested_ == 1 ? error * error : recent_(o) + rate * (error * error - recent_(o));
@@ -320,6 +322,30 @@ Model StreamState::snapshot(ValidityChoice validity) const {
   for (std::ptrdiff_t o = 0; o < outputs_; ++o) {
     partitions.push_back(crisp_partition(*trees_[static_cast<std::size_t>(o)],
                                          {columns_.begin(), columns_.begin() + inputs_}, static_cast<int>(o)));
+  }
+  if (std::ssize(reservoir_.rows()) > 0) {
+    const std::ptrdiff_t count = std::ssize(reservoir_.rows());
+    Eigen::MatrixXd values(count, inputs_ + outputs_ + 1);
+    std::vector<int> others;
+    std::vector<int> held_out;
+    std::ptrdiff_t at = 0;
+    for (const auto& [hash, row] : reservoir_.rows()) {
+      (row.held_out ? held_out : others).push_back(static_cast<int>(at));
+      values.row(at++) = Eigen::Map<const Eigen::RowVectorXd>(row.values.data(), values.cols());
+    }
+    std::vector<int> all_inputs(static_cast<std::size_t>(inputs_));
+    std::iota(all_inputs.begin(), all_inputs.end(), 0);
+    const Table table{values.leftCols(inputs_), values.middleCols(inputs_, outputs_), values.rightCols(1),
+                      std::vector<int>(static_cast<std::size_t>(inputs_), 0), all_inputs, all_inputs};
+    if (!others.empty()) {
+      TrainingRows training = training_rows(table, std::move(others));
+      training.columns = inputs;
+      training.regressors = regressors;
+      const TrainingRows queries = query_rows(table, std::move(held_out), training);
+      for (Partition& partition : partitions) {
+        partition = choose(training, queries, std::move(partition), validity);
+      }
+    }
   }
   return Model(std::move(inputs), std::move(outputs), std::move(regressors), std::move(partitions));
 }

@@ -79,7 +79,7 @@ void LeafSearch::lay_out(const Basis& basis) {
     for (std::ptrdiff_t j = 0; j < setting_.inputs; ++j) {
       z(j) = setting_.scaled(j, row[j]);
     }
-    const StreamRow first{row, z.data(), row[setting_.inputs], row[setting_.inputs + 1]};
+    const StreamRow first{row, z.data(), row[setting_.inputs], row[setting_.inputs + 1], 1.0};
     products.set(basis, first.z, first.y, first.weight);
     put(first, products);
   }
@@ -191,7 +191,8 @@ void LeafSearch::look_at(int input, Found& found) {
     return;  // one model fits exactly
   }
   for (std::size_t e = 0; e < edges; ++e) {
-    if (std::min(left[e], rows - left[e]) < setting_.options.min_leaf_samples) {
+    if (different_ * static_cast<double>(std::min(left[e], rows - left[e])) <
+        static_cast<double>(setting_.options.min_leaf_samples)) {
       continue;
     }
     ++found.tested;
@@ -205,7 +206,7 @@ void LeafSearch::look_at(int input, Found& found) {
 
 bool LeafSearch::passes(const Found& found) const {
   const double added = found.rank_left + found.rank_right - found.rank;
-  const double freedom = static_cast<double>(found.rows) - found.rank_left - found.rank_right;
+  const double freedom = different_ * static_cast<double>(found.rows) - found.rank_left - found.rank_right;
   if (added <= 0.0 || freedom <= 0.0) {
     return false;
   }
@@ -215,12 +216,14 @@ bool LeafSearch::passes(const Found& found) const {
   if (!(f_survival(f, added, freedom) * static_cast<double>(found.tested) * tests < setting_.options.significance)) {
     return false;
   }
-  const double before = found.rss / (static_cast<double>(found.rows) - found.rank);
-  const double after = found.rss * found.ratio / freedom;
+  const double before = different_ * found.rss / (different_ * static_cast<double>(found.rows) - found.rank);
+  const double after = different_ * found.rss * found.ratio / freedom;
   return before - after >= setting_.options.min_variance_gain * setting_.output_variance;
 }
 
-std::optional<StreamSplit> LeafSearch::test(const Eigen::VectorXd& low, const Eigen::VectorXd& high) {
+std::optional<StreamSplit> LeafSearch::test(const Eigen::VectorXd& low, const Eigen::VectorXd& high,
+                                            double different) {
+  different_ = different;
   if (rows_ < next_test_) {
     return std::nullopt;
   }
@@ -325,7 +328,10 @@ bool LeafSearch::propose() {
     if (std::min(n0, n1) < 2.0) {
       continue;
     }
-    const double freedom = n0 + n1 - 2.0;
+    const double freedom = different_ * (n0 + n1) - 2.0;
+    if (freedom <= 0.0) {
+      continue;
+    }
     const auto p_value = [&](double difference, double squares) {
       const double variance = squares / freedom * (1.0 / n0 + 1.0 / n1);
       return variance > 0.0 ? student_p_value(difference / std::sqrt(variance), freedom) : 1.0;

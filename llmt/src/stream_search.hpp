@@ -18,6 +18,8 @@ struct StreamRow {
   const double* z;  ///< the same in scaled units
   double y;
   double weight;
+  /// Different rows / rows of the stream. Rows that come again tell nothing new: tests count so many of them.
+  double different;
 };
 
 /// What all nodes of a tree share. Options as used: no zeros that stand for defaults.
@@ -59,7 +61,7 @@ class LeafSearch {
   void add(const StreamRow& row, const Basis& basis, const RowProducts& products, double error);
 
   /// The split to make, if a test is due and shows one. `low`, `high`: range of the inputs in the leaf.
-  std::optional<StreamSplit> test(const Eigen::VectorXd& low, const Eigen::VectorXd& high);
+  std::optional<StreamSplit> test(const Eigen::VectorXd& low, const Eigen::VectorXd& high, double different);
 
   std::ptrdiff_t bytes() const;
 
@@ -116,6 +118,7 @@ class LeafSearch {
   std::ptrdiff_t next_test_ = 0;
   int tests_ = 0;
   int narrowings_ = 0;
+  double different_ = 1.0;  // see StreamRow
 };
 
 }  // namespace llmt

@@ -1,11 +1,14 @@
 #include "stream_snapshot.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <queue>
 
+#include "blend_correction.hpp"
 #include "estimate.hpp"
+#include "jumps.hpp"
 
 namespace llmt {
 namespace {
@@ -81,6 +84,84 @@ Partition crisp_partition(const StreamTree& tree, const std::vector<ColumnRange>
   }
   partition.outer_slope = agreed_slope(partition);
   return partition;
+}
+
+namespace {
+
+/// Held-out rows that choose, at least.
+constexpr std::ptrdiff_t enough_rows = 20;
+
+/// Candidates.
+constexpr std::array<double, 3> widths = {0.5, 1.0, 2.0};
+constexpr std::array<double, 4> ridges = {0.01, 0.1, 1.0, 10.0};
+constexpr std::array<double, 2> jumps = {no_jump, 1.0};
+
+Eigen::MatrixXd range_of_residuals(const std::array<const TrainingRows*, 2>& parts, const Partition& partition) {
+  const Node& root = partition.nodes.front();
+  Eigen::MatrixXd range(1, 2);
+  range << std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity();
+  for (const TrainingRows* rows : parts) {
+    for (std::ptrdiff_t index = 0; index < num_chunks(*rows); ++index) {
+      const Chunk chunk = fetch(*rows, index, partition.outputs);
+      for (std::ptrdiff_t r = 0; r < chunk.count(); ++r) {
+        const Eigen::VectorXd deviations = chunk.deviations.row(r).transpose();
+        const double residual = chunk.outputs(r, 0) - root.value(0) -
+                                root.slope.row(0).dot(deviations.array().isNaN().select(root.mean, deviations));
+        range(0, 0) = std::min(range(0, 0), residual);
+        range(0, 1) = std::max(range(0, 1), residual);
+      }
+    }
+  }
+  return range;
+}
+
+}  // namespace
+
+Partition choose(const TrainingRows& others, const TrainingRows& held_out, Partition crisp, ValidityChoice validity) {
+  const Eigen::VectorXd one = Eigen::VectorXd::Ones(1);
+  if (held_out.count() < enough_rows || others.count() < enough_rows) {
+    return crisp;
+  }
+  crisp.residual_range = range_of_residuals({&others, &held_out}, crisp);
+  const Eigen::VectorXd of_prefixes = prefix_squared_errors(crisp, held_out, one, 1);
+  std::ptrdiff_t best_prefix = 0;
+  double smallest = of_prefixes.minCoeff(&best_prefix);
+  Partition chosen = prefix(crisp, best_prefix + 1);
+  if (validity == ValidityChoice::crisp || crisp.num_leaves() == 1) {
+    return chosen;
+  }
+  if (validity == ValidityChoice::blend) {
+    smallest = std::numeric_limits<double>::infinity();
+  }
+  std::vector<Chunk> rows;
+  for (std::ptrdiff_t index = 0; index < num_chunks(held_out); ++index) {
+    rows.push_back(fetch(held_out, index, crisp.outputs));
+  }
+  std::vector<std::ptrdiff_t> leaf_counts = {crisp.num_leaves()};
+  if (best_prefix > 0 && best_prefix + 1 < crisp.num_leaves()) {
+    leaf_counts.push_back(best_prefix + 1);
+  }
+  const GrownTree grown{crisp, jump_sizes(others, crisp, 1)};
+  for (const std::ptrdiff_t leaves : leaf_counts) {
+    for (const double jump : jumps) {
+      for (const double width : widths) {
+        const BlendCorrection correction(
+            others, prefix(blended(others, grown, {ValidityKind::blend, width, 1}, jump), leaves));
+        const auto offer = [&](Partition candidate) {
+          const double error = squared_error(candidate, held_out, rows, one);
+          if (error < smallest) {
+            smallest = error;
+            chosen = std::move(candidate);
+          }
+        };
+        offer(correction.uncorrected());
+        for (const double ridge : ridges) {
+          offer(correction.corrected(ridge));
+        }
+      }
+    }
+  }
+  return chosen;
 }
 
 }  // namespace llmt

@@ -141,7 +141,7 @@ double StreamTree::learn(std::unique_ptr<StreamNode>& slot, const StreamRow& row
     products_.add_to(node.sides[side]);
     error = learn(node.children[side], row, watched_here);
     if (node.sides[0].rows + node.sides[1].rows >= node.epoch) {
-      end_epoch(node);
+      end_epoch(node, row.different);
     }
   }
   if (alarms_ != alarms) {
@@ -179,7 +179,7 @@ void StreamTree::learn_leaf(StreamNode& leaf, const StreamRow& row, double error
   products_.add_to(leaf.sums);
   if (static_cast<double>(leaf.sums.rows) >= solve_growth * static_cast<double>(leaf.solved_at)) {
     leaf.solved_at = leaf.sums.rows;
-    if (leaf.sums.rows >= 2 * setting_.coefficients()) {
+    if (row.different * static_cast<double>(leaf.sums.rows) >= static_cast<double>(2 * setting_.coefficients())) {
       int rank = 0;
       leaf.model = leaf.basis.base + solve(setting_.shape, leaf.sums.gram.data(), setting_.options.shrinkage, rank);
     }
@@ -192,7 +192,7 @@ void StreamTree::learn_leaf(StreamNode& leaf, const StreamRow& row, double error
     leaf.search = std::make_unique<LeafSearch>(setting_);
   }
   leaf.search->add(row, leaf.basis, products_, error);
-  if (const std::optional<StreamSplit> found = leaf.search->test(leaf.low, leaf.high)) {
+  if (const std::optional<StreamSplit> found = leaf.search->test(leaf.low, leaf.high, row.different)) {
     split(leaf, *found);
   }
 }
@@ -230,7 +230,7 @@ void StreamTree::split(StreamNode& leaf, const StreamSplit& found) {
 }
 
 /// The split of a node above two leaves is tested on the rows of the epoch: one model against two.
-void StreamTree::end_epoch(StreamNode& node) {
+void StreamTree::end_epoch(StreamNode& node, double different) {
   Sums both = node.sides[0];
   both.add(setting_.shape, node.sides[1]);
   const bool last = node.children[0]->is_leaf() && node.children[1]->is_leaf() && !node.children[0]->alternate &&
@@ -242,7 +242,7 @@ void StreamTree::end_epoch(StreamNode& node) {
     std::array<int, 3> rank{};
     residuals_.evaluate(grams.data(), 3, rss.data(), rank.data());
     const double added = rank[1] + rank[2] - rank[0];
-    const double freedom = static_cast<double>(both.rows) - rank[1] - rank[2];
+    const double freedom = different * static_cast<double>(both.rows) - rank[1] - rank[2];
     const double two = rss[1] + rss[2];
     const double f = ((rss[0] - two) / std::max(1.0, added)) / (two / std::max(1.0, freedom));
     if (freedom > 0.0 && !(f_survival(f, std::max(1.0, added), freedom) < pruning_level)) {

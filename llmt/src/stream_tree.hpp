@@ -97,7 +97,7 @@ class StreamTree {
   double learn(std::unique_ptr<StreamNode>& slot, const StreamRow& row, bool watched);
   void learn_leaf(StreamNode& leaf, const StreamRow& row, double error);
   void split(StreamNode& leaf, const StreamSplit& split);
-  void end_epoch(StreamNode& node);
+  void end_epoch(StreamNode& node, double different);
   void settle(std::unique_ptr<StreamNode>& slot);
   void restart(StreamNode& node) const;
   void recount();
