@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <numeric>
@@ -86,6 +87,108 @@ void rules(Eigen::Index rows) {
   fmt::print(", {:.1f} CPU s\n", cost.cpu);
 }
 
+/// Ways in which the function changes.
+enum class Change { permuted, negated, half, shifted };
+constexpr std::array<const char*, 4> change_names = {"permuted", "negated", "half", "shifted"};
+
+double changed_truth(const Eigen::VectorXd& x, Change change) {
+  switch (change) {
+    case Change::permuted:
+      return bench::truth(x.reverse());
+    case Change::negated:
+      return -bench::truth(x);
+    case Change::half:
+      return x(0) < 0.4 ? bench::truth(x) : 4.0 - bench::truth(x);
+    case Change::shifted:
+      return bench::truth(x) + 5.0;
+  }
+  return 0.0;
+}
+
+void change_outputs(bench::Sample& sample, Change change) {
+  for (Eigen::Index i = 0; i < sample.y.size(); ++i) {
+    const double truth = changed_truth(sample.x.row(i).transpose(), change);
+    sample.y(i) += truth - sample.truth(i);
+    sample.truth(i) = truth;
+  }
+}
+
+double error_of(const llmt::Stream& stream, const bench::Sample& test) {
+  return std::sqrt((stream.predict(test.x) - test.truth).squaredNorm() / static_cast<double>(test.truth.size()));
+}
+
+/// How many rows after the change until the error to the truth is within 5 % of what a fresh stream has after N rows,
+/// as a multiple of N.
+void drift(int seeds) {
+  const std::vector<Eigen::Index> levels = {1000, 5000, 20000, 100000};
+  const std::vector<Eigen::Index> changes_at = {20000, 200000};
+  const Eigen::Index horizon = 2 * levels.back();
+  fmt::print("{:9} {:>8} {:>5} {:>7} {:>8} |", "change", "at row", "seed", "alarms", "replaced");
+  for (const Eigen::Index level : levels) {
+    fmt::print(" {:>8} {:>8} {:>6} |", fmt::format("N={}", level), "stream", "rows/N");
+  }
+  fmt::print("   (errors: fresh after N rows, stream after N rows; rows until within 5 % / N)\n");
+  for (const Change change : {Change::permuted, Change::negated, Change::half, Change::shifted}) {
+    bench::Sample test = bench::sample(10000, num_inputs, 999);
+    change_outputs(test, change);
+    for (const Eigen::Index at : changes_at) {
+      for (int seed = 1; seed <= seeds; ++seed) {
+        llmt::Stream stream(num_inputs, 1);
+        llmt::Stream fresh(num_inputs, 1);
+        Pass pass;
+        pass.run(stream, at, static_cast<std::uint64_t>(seed));
+        const std::ptrdiff_t before = stream.counts().drifts;
+        std::vector<Eigen::Index> rows;
+        std::vector<double> of_stream;
+        std::vector<double> of_fresh;
+        Eigen::Index done = 0;
+        for (Eigen::Index next = 500; done < horizon; next = std::max(next + 500, next * 11 / 10)) {
+          // Every level is a point of the curve.
+          for (const Eigen::Index level : levels) {
+            next = done < level && next > level ? level : next;
+          }
+          next = std::min(next, horizon);
+          bench::Sample sample = bench::sample(next - done, num_inputs, static_cast<std::uint64_t>(7777 * seed + next));
+          change_outputs(sample, change);
+          stream.add(sample.x, sample.y);
+          fresh.add(sample.x, sample.y);
+          done = next;
+          rows.push_back(done);
+          of_stream.push_back(error_of(stream, test));
+          of_fresh.push_back(error_of(fresh, test));
+        }
+        const llmt::StreamCounts counts = stream.counts();
+        fmt::print("{:9} {:>8} {:>5} {:>7} {:>8} |", change_names[static_cast<std::size_t>(change)], at, seed,
+                   counts.drifts - before, counts.replacements);
+        for (const Eigen::Index level : levels) {
+          const std::size_t k = static_cast<std::size_t>(std::find(rows.begin(), rows.end(), level) - rows.begin());
+          const auto reached = std::find_if(of_stream.begin(), of_stream.end(),
+                                            [&](double error) { return error <= 1.05 * of_fresh[k]; });
+          fmt::print(" {:8.4f} {:8.4f} {:>6} |", of_fresh[k], of_stream[k],
+                     reached == of_stream.end()
+                         ? fmt::format(">{:.0f}", static_cast<double>(horizon) / static_cast<double>(level))
+                         : fmt::format("{:.2f}", static_cast<double>(rows[static_cast<std::size_t>(reached - of_stream.begin())]) /
+                                                     static_cast<double>(level)));
+        }
+        fmt::print("\n");
+      }
+    }
+  }
+}
+
+void alarms(int seeds, Eigen::Index rows) {
+  std::ptrdiff_t drifts = 0;
+  std::ptrdiff_t streams = 0;
+  for (int seed = 1; seed <= seeds; ++seed) {
+    llmt::Stream stream(num_inputs, 1);
+    Pass pass;
+    pass.run(stream, rows, static_cast<std::uint64_t>(100 + seed));
+    drifts += stream.counts().drifts;
+    streams += stream.counts().drifts > 0 ? 1 : 0;
+  }
+  fmt::print("{} alarms in {} of {} streams of {} rows without a change\n", drifts, streams, seeds, rows);
+}
+
 void sets(const std::string& folder, int passes, int most_splits) {
   std::set<std::string> names;
   for (const auto& entry : std::filesystem::directory_iterator(folder)) {
@@ -118,8 +221,6 @@ void sets(const std::string& folder, int passes, int most_splits) {
       const Eigen::MatrixXd test_rows = all(test, Eigen::all);
       llmt::Random random(static_cast<std::uint64_t>(split) + 1);
       llmt::Stream stream(inputs, 1);
-      llmt::Model* unused = nullptr;
-      static_cast<void>(unused);
       const double part = 1.0 / static_cast<double>(count);
       const auto r2_of = [&](const Eigen::VectorXd& predicted) {
         const Eigen::VectorXd y = test_rows.rightCols(1);
@@ -169,6 +270,10 @@ int main(int argc, char** argv) {
     scaling(sizes.empty() ? std::vector<Eigen::Index>{100000, 1000000} : sizes);
   } else if (what == "rules") {
     rules(number(2, 1000000));
+  } else if (what == "drift") {
+    drift(static_cast<int>(number(2, 3)));
+  } else if (what == "alarms") {
+    alarms(static_cast<int>(number(2, 20)), number(3, 100000));
   } else if (what == "sets" && argc > 2) {
     sets(argv[2], static_cast<int>(number(3, 1)), static_cast<int>(number(4, 5)));
   } else {

@@ -8,8 +8,8 @@
 namespace llmt {
 namespace {
 
-constexpr int most_steps = 30;
-constexpr double enough = 1e-8;  // of the squared gradient
+constexpr int most_steps = 15;
+constexpr double enough = 1e-5;  // of the squared gradient
 
 }  // namespace
 
@@ -29,40 +29,39 @@ BlendCorrection::BlendCorrection(const TrainingRows& rows, Partition blended)
   const Evaluator evaluator(partition_, rows.columns, size_ - 1);
   const std::vector<int> parents = parents_of(partition_);
   std::vector<Activation> active;
-  Eigen::VectorXd a(size_);
   std::ptrdiff_t at = 0;
   begins_.push_back(0);
+  regressors_.resize(size_, rows.count());
   for (std::ptrdiff_t index = 0; index < num_chunks(rows); ++index) {
     const Chunk chunk = fetch(rows, index, partition_.outputs);
     for (std::ptrdiff_t r = 0; r < chunk.count(); ++r, ++at) {
       const double root = std::sqrt(chunk.weights(r));
       evaluator.activate(chunk.inputs.row(r).data(), active);
+      const Activation& largest = *std::max_element(
+          active.begin(), active.end(), [](const auto& l, const auto& m) { return l.validity < m.validity; });
+      const Eigen::VectorXd& mean = partition_.nodes[static_cast<std::size_t>(largest.node)].mean;
+      const Eigen::VectorXd given = chunk.deviations.row(r).transpose();
+      const Eigen::VectorXd deviations = given.array().isNaN().select(mean, given);
+      auto a = regressors_.col(at);
+      a(0) = root;
+      a.tail(size_ - 1) = root * deviations.cwiseQuotient(scale_);
       double value = chunk.outputs(r, 0);
       for (const Activation& entry : active) {
         Node& node = partition_.nodes[static_cast<std::size_t>(entry.node)];
-        a(0) = 1.0;
-        double model = node.value(0);
-        for (std::ptrdiff_t k = 0; k + 1 < size_; ++k) {
-          const double deviation = chunk.deviations(r, k);
-          if (!std::isnan(deviation)) {
-            node.low(k) = std::min(node.low(k), deviation);
-            node.high(k) = std::max(node.high(k), deviation);
-          }
-          const double held = std::isnan(deviation) ? node.mean(k) : deviation;
-          model += node.slope(0, k) * held;
-          a(k + 1) = held / scale_(k);
-        }
-        value -= entry.validity * model;
+        node.low = node.low.cwiseMin(deviations);
+        node.high = node.high.cwiseMax(deviations);
+        value -= entry.validity * (node.value(0) + node.slope.row(0).dot(deviations));
         const int leaf = position[static_cast<std::size_t>(entry.node)];
         positions_.push_back(leaf);
         validities_.push_back(entry.validity);
-        a *= root;
-        regressors_.insert(regressors_.end(), a.begin(), a.end());
-        grams_[static_cast<std::size_t>(leaf)].noalias() += entry.validity * a * a.transpose();
+        grams_[static_cast<std::size_t>(leaf)].selfadjointView<Eigen::Lower>().rankUpdate(a, entry.validity);
       }
       residuals_(at) = root * value;
       begins_.push_back(static_cast<int>(positions_.size()));
     }
+  }
+  for (Eigen::MatrixXd& gram : grams_) {
+    gram.triangularView<Eigen::StrictlyUpper>() = gram.transpose();
   }
   for (std::size_t i = partition_.nodes.size(); i-- > 1;) {
     Node& parent = partition_.nodes[static_cast<std::size_t>(parents[i])];
@@ -75,14 +74,13 @@ BlendCorrection::BlendCorrection(const TrainingRows& rows, Partition blended)
 Eigen::VectorXd BlendCorrection::apply(const Eigen::VectorXd& change) const {
   Eigen::VectorXd result = Eigen::VectorXd::Zero(change.size());
   for (std::size_t row = 0; row + 1 < begins_.size(); ++row) {
+    const auto a = regressors_.col(static_cast<std::ptrdiff_t>(row));
     double value = 0.0;
     for (int e = begins_[row]; e < begins_[row + 1]; ++e) {
-      const Eigen::Map<const Eigen::VectorXd> a(regressors_.data() + e * size_, size_);
       value += validities_[static_cast<std::size_t>(e)] *
                a.dot(change.segment(positions_[static_cast<std::size_t>(e)] * size_, size_));
     }
     for (int e = begins_[row]; e < begins_[row + 1]; ++e) {
-      const Eigen::Map<const Eigen::VectorXd> a(regressors_.data() + e * size_, size_);
       result.segment(positions_[static_cast<std::size_t>(e)] * size_, size_) +=
           validities_[static_cast<std::size_t>(e)] * value * a;
     }
@@ -111,7 +109,7 @@ Partition BlendCorrection::corrected(double ridge) const {
     for (int e = begins_[row]; e < begins_[row + 1]; ++e) {
       residual.segment(positions_[static_cast<std::size_t>(e)] * size_, size_) +=
           validities_[static_cast<std::size_t>(e)] * residuals_(static_cast<std::ptrdiff_t>(row)) *
-          Eigen::Map<const Eigen::VectorXd>(regressors_.data() + e * size_, size_);
+          regressors_.col(static_cast<std::ptrdiff_t>(row));
     }
   }
   Eigen::VectorXd change = Eigen::VectorXd::Zero(leaves * size_);

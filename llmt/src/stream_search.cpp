@@ -89,6 +89,8 @@ void LeafSearch::put(const StreamRow& row, const RowProducts& products) {
   const std::ptrdiff_t size = setting_.shape.size();
   const std::ptrdiff_t begin = setting_.options.rule == StreamRule::ra ? std::max(0, narrowed_) : 0;
   const std::ptrdiff_t end = setting_.options.rule == StreamRule::ra ? narrowed_ + 1 : setting_.inputs;
+  // The sums of all leaves do not fit into a cache: they are asked for before they are needed.
+  sums_of_row_.clear();
   for (std::ptrdiff_t j = begin; j < end; ++j) {
     Bins& bins = bins_[static_cast<std::size_t>(j)];
     if (std::isnan(row.x[j]) || bins.edges.empty()) {
@@ -96,8 +98,15 @@ void LeafSearch::put(const StreamRow& row, const RowProducts& products) {
     }
     const auto edge = std::lower_bound(bins.edges.begin(), bins.edges.end(), row.x[j]);
     const std::ptrdiff_t bin = edge - bins.edges.begin();
-    products.add_to(bins.grams.data() + bin * size);
+    double* const sums = bins.grams.data() + bin * size;
+    for (std::ptrdiff_t k = 0; k < size; k += 8) {
+      __builtin_prefetch(sums + k, 1);
+    }
+    sums_of_row_.push_back(sums);
     ++bins.rows[static_cast<std::size_t>(bin)];
+  }
+  for (double* const sums : sums_of_row_) {
+    products.add_to(sums);
   }
   narrowed_rows_ += narrowed_ >= 0 ? 1 : 0;
 }

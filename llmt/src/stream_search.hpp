@@ -112,6 +112,7 @@ class LeafSearch {
   std::vector<std::vector<double>> wide_edges_;      // as laid out at first
   std::array<SignSums, 2> signs_;                    // ra
   int narrowed_ = -1;                                // input whose bins are narrowed, or that ra proposes
+  std::vector<double*> sums_of_row_;  // of put()
   std::ptrdiff_t narrowed_rows_ = 0;                 // in its bins
   std::ptrdiff_t patience_ = 0;                      // rows after which that is given up
   std::ptrdiff_t rows_ = 0;

@@ -4,7 +4,9 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <queue>
+#include <set>
 
 #include "blend_correction.hpp"
 #include "estimate.hpp"
@@ -91,9 +93,13 @@ namespace {
 /// Held-out rows that choose, at least.
 constexpr std::ptrdiff_t enough_rows = 20;
 
+/// Rows of a correction for each of its unknowns, at least.
+constexpr std::ptrdiff_t rows_per_unknown = 10;
+
 /// Candidates.
 constexpr std::array<double, 3> widths = {0.5, 1.0, 2.0};
-constexpr std::array<double, 4> ridges = {0.01, 0.1, 1.0, 10.0};
+constexpr double first_ridge = 0.1;
+const std::vector<double> further_ridges = {1e-3, 0.01, 1.0, 10.0};  // of the best with the first
 constexpr std::array<double, 2> jumps = {no_jump, 1.0};
 
 Eigen::MatrixXd range_of_residuals(const std::array<const TrainingRows*, 2>& parts, const Partition& partition) {
@@ -137,29 +143,37 @@ Partition choose(const TrainingRows& others, const TrainingRows& held_out, Parti
   for (std::ptrdiff_t index = 0; index < num_chunks(held_out); ++index) {
     rows.push_back(fetch(held_out, index, crisp.outputs));
   }
-  std::vector<std::ptrdiff_t> leaf_counts = {crisp.num_leaves()};
-  if (best_prefix > 0 && best_prefix + 1 < crisp.num_leaves()) {
-    leaf_counts.push_back(best_prefix + 1);
+  // A correction has rows for so many leaves.
+  const std::ptrdiff_t most =
+      std::max<std::ptrdiff_t>(2, others.count() / (rows_per_unknown * (std::ssize(others.regressors) + 1)));
+  std::set<std::ptrdiff_t> leaf_counts;
+  for (const std::ptrdiff_t leaves : {best_prefix + 1, crisp.num_leaves(), std::min(crisp.num_leaves(), most) / 2}) {
+    leaf_counts.insert(std::clamp<std::ptrdiff_t>(leaves, 2, std::min(crisp.num_leaves(), most)));
   }
   const GrownTree grown{crisp, jump_sizes(others, crisp, 1)};
+  std::optional<BlendCorrection> best;
+  const auto offer = [&](Partition candidate) {
+    const double error = squared_error(candidate, held_out, rows, one);
+    if (error < smallest) {
+      smallest = error;
+      chosen = std::move(candidate);
+      return true;
+    }
+    return false;
+  };
   for (const std::ptrdiff_t leaves : leaf_counts) {
     for (const double jump : jumps) {
       for (const double width : widths) {
-        const BlendCorrection correction(
-            others, prefix(blended(others, grown, {ValidityKind::blend, width, 1}, jump), leaves));
-        const auto offer = [&](Partition candidate) {
-          const double error = squared_error(candidate, held_out, rows, one);
-          if (error < smallest) {
-            smallest = error;
-            chosen = std::move(candidate);
-          }
-        };
-        offer(correction.uncorrected());
-        for (const double ridge : ridges) {
-          offer(correction.corrected(ridge));
+        BlendCorrection correction(others,
+                                   prefix(blended(others, grown, {ValidityKind::blend, width, 1}, jump), leaves));
+        if (offer(correction.corrected(first_ridge))) {
+          best = std::move(correction);
         }
       }
     }
+  }
+  for (const double ridge : best ? further_ridges : std::vector<double>{}) {
+    offer(best->corrected(ridge));
   }
   return chosen;
 }
