@@ -3,6 +3,7 @@
 // stream_bench scaling [ROWS...]       error to the truth on 100000 fresh rows, time and memory after one pass
 // stream_bench rules [ROWS]            rd beside ra, and beside the batch fit of the reservoir's number of rows
 // stream_bench drift [SEEDS]           recovery after the function has changed, beside a fresh stream
+// stream_bench spread [ROWS] [SEEDS]   mean and spread of that error over streams, no snapshot
 // stream_bench alarms [SEEDS] [ROWS]   alarms where nothing changes
 // stream_bench sets FOLDER [PASSES] [SPLITS]  test R2 on data sets with given splits, see regression_sets.cpp
 #include <fmt/format.h>
@@ -176,6 +177,23 @@ void drift(int seeds) {
   }
 }
 
+/// Error of the live tree to the truth over several streams.
+void spread(Eigen::Index rows, int seeds) {
+  const bench::Sample test = bench::sample(20000, num_inputs, 999);
+  Eigen::VectorXd errors(seeds);
+  for (int seed = 1; seed <= seeds; ++seed) {
+    llmt::Stream stream(num_inputs, 1);
+    Pass pass;
+    pass.run(stream, rows, static_cast<std::uint64_t>(seed));
+    errors(seed - 1) = error_of(stream, test);
+    const Eigen::VectorXd e = stream.predict(test.x) - test.truth; double near=0; int c=0;
+    for (int i=0;i<e.size();++i) if (std::abs(test.x(i,0)-0.4)<0.02) {near+=e(i)*e(i); ++c;}
+    fmt::print("seed {} err {:.4f} share near jump {:.3f} rows {}; leaves {}\n", seed, errors(seed-1), near/e.squaredNorm(), c, stream.counts().leaves);
+  }
+  fmt::print("{} rows, {} streams: error to the truth {:.4f} +- {:.4f}, {:.4f} ... {:.4f}\n", rows, seeds, errors.mean(),
+             std::sqrt((errors.array() - errors.mean()).square().mean()), errors.minCoeff(), errors.maxCoeff());
+}
+
 void alarms(int seeds, Eigen::Index rows) {
   std::ptrdiff_t drifts = 0;
   std::ptrdiff_t streams = 0;
@@ -272,6 +290,8 @@ int main(int argc, char** argv) {
     rules(number(2, 1000000));
   } else if (what == "drift") {
     drift(static_cast<int>(number(2, 3)));
+  } else if (what == "spread") {
+    spread(number(2, 100000), static_cast<int>(number(3, 10)));
   } else if (what == "alarms") {
     alarms(static_cast<int>(number(2, 20)), number(3, 100000));
   } else if (what == "sets" && argc > 2) {

@@ -20,6 +20,11 @@ constexpr double test_growth = 1.25;
 constexpr double misfit = 1.5;
 constexpr int most_narrowings = 4;
 
+/// A split that passes still waits until it beats the best one on another input by a standard error of the difference,
+/// or rows have grown by this factor since it passed first: the first split that is better than none is often not the
+/// right one, and what is below it depends on it.
+constexpr double patience_with_rivals = 2.0;
+
 double student_p_value(double t, double freedom) { return freedom > 0.0 ? f_survival(t * t, 1.0, freedom) : 1.0; }
 
 }  // namespace
@@ -245,13 +250,29 @@ std::optional<StreamSplit> LeafSearch::test(const Eigen::VectorXd& low, const Ei
     return std::nullopt;
   }
   Found found;
+  double rival = 1.0;  // ratio of the best split on another input
   for (int j = 0; j < setting_.inputs; ++j) {
     if (narrowed_ < 0 || narrowed_ == j) {
-      look_at(j, found);
+      Found of_input;
+      look_at(j, of_input);
+      const std::ptrdiff_t tested = found.tested + of_input.tested;
+      if (of_input.input >= 0 && (found.input < 0 || of_input.ratio < found.ratio)) {
+        rival = found.input < 0 ? 1.0 : found.ratio;
+        found = of_input;
+      } else if (of_input.input >= 0) {
+        rival = std::min(rival, of_input.ratio);
+      }
+      found.tested = tested;
     }
   }
   if (found.input >= 0 && passes(found)) {
-    return decide(found, low, high);
+    first_passed_ = first_passed_ > 0 ? first_passed_ : rows_;
+    const double n = different_ * static_cast<double>(found.rows);
+    const double scatter = 2.0 * std::sqrt(found.ratio * (2.0 - found.ratio - rival) / n);
+    if (narrowed_ >= 0 || static_cast<double>(rows_) >= patience_with_rivals * static_cast<double>(first_passed_) ||
+        rival - found.ratio > scatter) {
+      return decide(found, low, high);
+    }
   }
   if (narrowed_ >= 0 && narrowed_rows_ >= patience_) {
     if (setting_.options.rule == StreamRule::rd) {
@@ -266,7 +287,10 @@ std::optional<StreamSplit> LeafSearch::test(const Eigen::VectorXd& low, const Ei
 std::optional<StreamSplit> LeafSearch::decide(const Found& found, const Eigen::VectorXd& low,
                                               const Eigen::VectorXd& high) {
   const Bins& bins = bins_[static_cast<std::size_t>(found.input)];
-  StreamSplit split{found.input, bins.edges[found.edge], side(bins, 0, found.edge + 1),
+  const double edge = bins.edges[found.edge];
+  const double before = found.edge > 0 ? bins.edges[found.edge - 1] : low(found.input);
+  const double behind = found.edge + 1 < bins.edges.size() ? bins.edges[found.edge + 1] : high(found.input);
+  StreamSplit split{found.input, edge, std::max(edge - before, behind - edge), side(bins, 0, found.edge + 1),
                     side(bins, found.edge + 1, bins.edges.size() + 1),
                     found.rss * (1.0 - found.ratio) / static_cast<double>(found.rows)};
   if (narrow(found, split, low, high)) {

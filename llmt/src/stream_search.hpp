@@ -40,6 +40,7 @@ struct StreamSetting {
 struct StreamSplit {
   int input = -1;
   double threshold = 0.0;
+  double reach = 0.0;  ///< distance to the edges beside the threshold
   Sums left;  ///< of the rows that decided it, in the leaf's basis
   Sums right;
   double gain = 0.0;  ///< decrease of the mean squared residual
@@ -117,6 +118,7 @@ class LeafSearch {
   std::ptrdiff_t patience_ = 0;                      // rows after which that is given up
   std::ptrdiff_t rows_ = 0;
   std::ptrdiff_t next_test_ = 0;
+  std::ptrdiff_t first_passed_ = 0;
   int tests_ = 0;
   int narrowings_ = 0;
   double different_ = 1.0;  // see StreamRow

@@ -27,6 +27,10 @@ constexpr std::ptrdiff_t duel_interval = 25;
 /// A split is taken back if as many new rows as decided it, and again, tell no difference at this level.
 constexpr double pruning_level = 0.01;
 
+/// So many rows beside a threshold tell whether it should move: by how many standard errors of what that gains.
+constexpr std::ptrdiff_t watch_rows = 200;
+constexpr double watch_t = 4.0;
+
 /// Models are solved for anew when their rows have grown by this factor.
 constexpr double solve_growth = 1.05;
 
@@ -83,6 +87,37 @@ double Duel::t() const {
   return variance > 0.0 ? mean_ / std::sqrt(variance / weight_) : 0.0;
 }
 
+double ThresholdWatch::add(double x, double squared_left, double squared_right) {
+  const double width = reach_ / static_cast<double>(half);
+  const double position = (x - threshold_) / width + static_cast<double>(half);
+  const std::size_t bin = std::min(2 * half - 1, static_cast<std::size_t>(std::max(0.0, position)));
+  const double difference = squared_left - squared_right;
+  sums_[bin] += difference;
+  squares_[bin] += difference * difference;
+  if (++rows_ < watch_rows) {
+    return threshold_;
+  }
+  // Rows between the threshold and a better one are on the wrong side: of all edges the one that gains most.
+  double most = 0.0;
+  double to = threshold_;
+  for (const int sign : {1, -1}) {
+    double gain = 0.0;
+    double square = 0.0;
+    for (std::size_t k = 0; k < half; ++k) {
+      const std::size_t at = sign > 0 ? half + k : half - 1 - k;
+      gain -= sign * sums_[at];
+      square += squares_[at];
+      if (gain > most && gain > watch_t * std::sqrt(square)) {
+        most = gain;
+        to = threshold_ + sign * static_cast<double>(k + 1) * width;
+      }
+    }
+  }
+  // Where it stays, it is looked at more closely.
+  *this = ThresholdWatch(to, to == threshold_ ? 0.5 * reach_ : reach_);
+  return to;
+}
+
 Sums all_sums(const StreamSetting& setting, const StreamNode& node) {
   Sums sums = node.sums;
   if (!node.is_leaf()) {
@@ -112,8 +147,10 @@ std::unique_ptr<StreamNode> StreamTree::make_node(Basis basis) const {
   return node;
 }
 
-double StreamTree::predict(const StreamRow& row) const {
-  const StreamNode* node = root_.get();
+double StreamTree::predict(const StreamRow& row) const { return predict(*root_, row); }
+
+double StreamTree::predict(const StreamNode& top, const StreamRow& row) {
+  const StreamNode* node = &top;
   while (!node->is_leaf()) {
     node = node->children[side_of(*node, row.x[node->input])].get();
   }
@@ -139,7 +176,14 @@ double StreamTree::learn(std::unique_ptr<StreamNode>& slot, const StreamRow& row
     const std::size_t side = side_of(node, row.x[node.input]);
     products_.set(node.basis, row.z, row.y, row.weight);
     products_.add_to(node.sides[side]);
+    const bool beside = node.watch.concerns(row.x[node.input]);
+    const double other = beside ? row.y - predict(*node.children[1 - side], row) : 0.0;
     error = learn(node.children[side], row, watched_here);
+    if (beside) {
+      const double squared = error * error;
+      node.threshold = side == 0 ? node.watch.add(row.x[node.input], squared, other * other)
+                                 : node.watch.add(row.x[node.input], other * other, squared);
+    }
     if (node.sides[0].rows + node.sides[1].rows >= node.epoch) {
       end_epoch(node, row.different);
     }
@@ -204,6 +248,7 @@ void StreamTree::split(StreamNode& leaf, const StreamSplit& found) {
   leaf.model = leaf.basis.base + change;
   leaf.input = found.input;
   leaf.threshold = found.threshold;
+  leaf.watch = {found.threshold, found.reach};
   leaf.gain = found.gain;
   leaf.epoch = 2 * (found.left.rows + found.right.rows);
   for (std::size_t side = 0; side < 2; ++side) {

@@ -3,6 +3,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
+#include <cmath>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -43,6 +45,27 @@ class Duel {
   std::ptrdiff_t rows_ = 0;
 };
 
+/// Whether a threshold should move: of the rows beside it, how much larger the squared error of what is left of it is
+/// than of what is right of it, in bins.
+class ThresholdWatch {
+ public:
+  ThresholdWatch() = default;
+  ThresholdWatch(double threshold, double reach) : threshold_(threshold), reach_(reach) {}
+
+  bool concerns(double x) const { return std::abs(x - threshold_) < reach_; }
+
+  /// Squared errors of both sides on a row beside the threshold, before it is learned; the threshold from now on.
+  double add(double x, double squared_left, double squared_right);
+
+ private:
+  static constexpr std::size_t half = 16;  // bins on either side
+  double threshold_ = 0.0;
+  double reach_ = 0.0;
+  std::ptrdiff_t rows_ = 0;
+  std::array<double, 2 * half> sums_{};
+  std::array<double, 2 * half> squares_{};
+};
+
 /// A node, leaf or inner; inner nodes keep their own sums.
 struct StreamNode {
   Basis basis;
@@ -55,6 +78,7 @@ struct StreamNode {
 
   int input = -1;
   double threshold = 0.0;
+  ThresholdWatch watch;
   double gain = 0.0;                 ///< of the split, see StreamSplit
   std::array<Sums, 2> sides;         ///< inner: rows of the epoch that went left and right
   std::ptrdiff_t epoch = 0;          ///< its length: rows until the split is tested again
@@ -94,6 +118,7 @@ class StreamTree {
   std::function<void(const std::function<bool(const double* x)>&)> on_drift;
 
  private:
+  static double predict(const StreamNode& top, const StreamRow& row);
   double learn(std::unique_ptr<StreamNode>& slot, const StreamRow& row, bool watched);
   void learn_leaf(StreamNode& leaf, const StreamRow& row, double error);
   void split(StreamNode& leaf, const StreamSplit& split);
