@@ -186,9 +186,6 @@ void spread(Eigen::Index rows, int seeds) {
     Pass pass;
     pass.run(stream, rows, static_cast<std::uint64_t>(seed));
     errors(seed - 1) = error_of(stream, test);
-    const Eigen::VectorXd e = stream.predict(test.x) - test.truth; double near=0; int c=0;
-    for (int i=0;i<e.size();++i) if (std::abs(test.x(i,0)-0.4)<0.02) {near+=e(i)*e(i); ++c;}
-    fmt::print("seed {} err {:.4f} share near jump {:.3f} rows {}; leaves {}\n", seed, errors(seed-1), near/e.squaredNorm(), c, stream.counts().leaves);
   }
   fmt::print("{} rows, {} streams: error to the truth {:.4f} +- {:.4f}, {:.4f} ... {:.4f}\n", rows, seeds, errors.mean(),
              std::sqrt((errors.array() - errors.mean()).square().mean()), errors.minCoeff(), errors.maxCoeff());

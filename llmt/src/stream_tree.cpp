@@ -29,6 +29,7 @@ constexpr double pruning_level = 0.01;
 
 /// So many rows beside a threshold tell whether it should move: by how many standard errors of what that gains.
 constexpr std::ptrdiff_t watch_rows = 200;
+constexpr std::ptrdiff_t watch_interval = 50;
 constexpr double watch_t = 4.0;
 
 /// Models are solved for anew when their rows have grown by this factor.
@@ -94,7 +95,8 @@ double ThresholdWatch::add(double x, double squared_left, double squared_right) 
   const double difference = squared_left - squared_right;
   sums_[bin] += difference;
   squares_[bin] += difference * difference;
-  if (++rows_ < watch_rows) {
+  ++rows_;
+  if (rows_ < watch_rows && rows_ % watch_interval != 0) {
     return threshold_;
   }
   // Rows between the threshold and a better one are on the wrong side: of all edges the one that gains most.
@@ -113,8 +115,11 @@ double ThresholdWatch::add(double x, double squared_left, double squared_right) 
       }
     }
   }
-  // Where it stays, it is looked at more closely.
-  *this = ThresholdWatch(to, to == threshold_ ? 0.5 * reach_ : reach_);
+  if (to != threshold_) {
+    *this = ThresholdWatch(to, reach_);
+  } else if (rows_ >= watch_rows) {
+    *this = ThresholdWatch(to, 0.5 * reach_);  // it stays, and is looked at more closely
+  }
   return to;
 }
 
