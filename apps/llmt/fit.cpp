@@ -9,6 +9,7 @@
 #include "llmt/commands.hpp"
 #include "llmt/fit.hpp"
 #include "llmt/learning.hpp"
+#include "llmt/stream_command.hpp"
 #include "shared/cli.hpp"
 
 namespace llmt::apps {
@@ -19,11 +20,14 @@ struct FitArguments {
   std::string output;
   bool json = false;
   bool no_intervals = false;
+  bool stream = false;
+  StreamRule stream_rule = StreamRule::rd;
 };
 
 constexpr std::array<const char*, 6> rule_names = {"rd", "retis", "lolimot", "lolimot-data", "ra", "m5"};  // as GrowthRule
 constexpr std::array<const char*, 4> validity_names = {"auto", "crisp", "blend", "gaussian"};  // as ValidityChoice
 constexpr std::array<const char*, 3> search_names = {"auto", "exact", "binned"};               // as SplitSearch
+constexpr std::array<const char*, 2> stream_rule_names = {"rd", "ra"};                         // as StreamRule
 constexpr std::array<const char*, 3> estimation_names = {"as-grown", "local", "joint"};        // as Estimation
 constexpr std::array<const char*, 3> terms_names = {"linear", "quadratic", "auto"};            // as LocalTerms
 constexpr std::array<const char*, 3> sparse_names = {"never", "auto", "always"};               // as SparseChoice
@@ -327,7 +331,25 @@ void add_fit(CLI::App& app) {
   command->add_flag("--no-intervals", arguments->no_intervals,
                     "Leave the folds' models out of the file; it is smaller and has no prediction intervals");
   command->add_flag("--json", arguments->json, "Print the summary as JSON");
-  command->callback([arguments] { fit_command(*arguments); });
+  command->add_flag("--stream", arguments->stream,
+                    "Learn row by row in constant memory; DATA may be - or left out for standard input");
+  command->add_option("--stream-rule", arguments->stream_rule, "How leaves of a stream find splits")
+      ->transform(choice_of<StreamRule>(stream_rule_names))
+      ->option_text("rd|ra [rd]");
+  command->get_option("data")->required(false);
+  command->callback([command, arguments] {
+    if (arguments->stream) {
+      stream_command(*command, {arguments->learning, arguments->stream_rule, arguments->output, arguments->json});
+      return;
+    }
+    if (arguments->learning.data.empty()) {
+      throw CLI::RequiredError("data");
+    }
+    if (command->count("--stream-rule") > 0) {
+      throw std::invalid_argument("--stream-rule needs --stream");
+    }
+    fit_command(*arguments);
+  });
 }
 
 }  // namespace llmt::apps

@@ -16,7 +16,22 @@ bool contains(const std::vector<std::string>& names, const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
 }
 
-/// The columns to learn from: those asked for, or all but the targets, the weight and what is ignored.
+std::vector<int> positions(const char* option, const std::vector<std::string>& names,
+                           const std::vector<std::string>& inputs) {
+  std::vector<int> result;
+  for (const std::string& name : names) {
+    const auto found = std::find(inputs.begin(), inputs.end(), name);
+    if (found == inputs.end()) {
+      throw std::invalid_argument(
+          fmt::format("{} has \"{}\", which is not among the inputs {}", option, name, fmt::join(inputs, ", ")));
+    }
+    result.push_back(static_cast<int>(found - inputs.begin()));
+  }
+  return result;
+}
+
+}  // namespace
+
 std::vector<std::string> choose_inputs(const Csv& csv, const LearningArguments& arguments) {
   for (const std::vector<std::string>* names : {&arguments.targets, &arguments.inputs, &arguments.ignored}) {
     for (const std::string& name : *names) {
@@ -39,22 +54,6 @@ std::vector<std::string> choose_inputs(const Csv& csv, const LearningArguments& 
   }
   return inputs;
 }
-
-std::vector<int> positions(const char* option, const std::vector<std::string>& names,
-                           const std::vector<std::string>& inputs) {
-  std::vector<int> result;
-  for (const std::string& name : names) {
-    const auto found = std::find(inputs.begin(), inputs.end(), name);
-    if (found == inputs.end()) {
-      throw std::invalid_argument(
-          fmt::format("{} has \"{}\", which is not among the inputs {}", option, name, fmt::join(inputs, ", ")));
-    }
-    result.push_back(static_cast<int>(found - inputs.begin()));
-  }
-  return result;
-}
-
-}  // namespace
 
 LearningTable read_learning_table(const LearningArguments& arguments) {
   const Csv csv = Csv::read(arguments.data);

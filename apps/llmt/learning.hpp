@@ -26,6 +26,10 @@ struct LearningArguments {
 
 void add_learning_options(CLI::App& command, LearningArguments& arguments);
 
+/// The columns to learn from: those asked for, or all but the targets, the weight and what is ignored. Throws as
+/// read_learning_table().
+std::vector<std::string> choose_inputs(const Csv& csv, const LearningArguments& arguments);
+
 /// The table as the learner takes it, and the options with its columns filled in.
 struct LearningTable {
   std::vector<std::string> names;  ///< of the inputs

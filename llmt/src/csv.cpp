@@ -79,7 +79,7 @@ void Csv::find_rows() {
     if (!csv::is_blank(between(begin, record.end))) {
       row_begins_.push_back(static_cast<std::size_t>(begin - text));
       if (record.fields != columns_.size()) {
-        const bool is_last = between(record.end, end).find_first_not_of(" \t\r\n") == std::string_view::npos;
+        const bool is_last = !more_follows_ && between(record.end, end).find_first_not_of(" \t\r\n") == std::string_view::npos;
         throw std::runtime_error(
             fmt::format("{}:{}: the row has {} field{}, the header has {}{}", name_, line_at(row_begins_.back()),
                         record.fields, record.fields == 1 ? "" : "s", columns_.size(),
@@ -109,7 +109,7 @@ std::ptrdiff_t Csv::line_of(std::ptrdiff_t row) const { return line_at(row_begin
 
 std::vector<std::ptrdiff_t> Csv::lines_of(std::span<const std::ptrdiff_t> rows) const {
   std::vector<std::ptrdiff_t> lines;
-  std::ptrdiff_t line = 1;
+  std::ptrdiff_t line = 1 + lines_left_out_;
   auto counted = text_.begin();
   for (const std::ptrdiff_t row : rows) {
     const auto begin = text_.begin() + static_cast<std::ptrdiff_t>(row_begins_[static_cast<std::size_t>(row)]);
@@ -121,7 +121,7 @@ std::vector<std::ptrdiff_t> Csv::lines_of(std::span<const std::ptrdiff_t> rows) 
 }
 
 std::ptrdiff_t Csv::line_at(std::size_t offset) const {
-  return 1 + std::count(text_.begin(), text_.begin() + static_cast<std::ptrdiff_t>(offset), '\n');
+  return 1 + lines_left_out_ + std::count(text_.begin(), text_.begin() + static_cast<std::ptrdiff_t>(offset), '\n');
 }
 
 /// The record at `begin` without its line end.

@@ -5,8 +5,10 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <functional>
+#include <iosfwd>
 #include <limits>
 #include <map>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -112,11 +114,34 @@ class Csv {
   std::vector<std::string> columns_;
   std::map<std::string, std::size_t, std::less<>> fields_;  // position of a column
   std::vector<std::size_t> row_begins_;                     // offsets into text_
+  std::ptrdiff_t lines_left_out_ = 0;                       // between the header and the first row, see CsvPieces
+  bool more_follows_ = false;
 
+  friend class CsvPieces;
   void read_header();
   void find_rows();
   std::string_view record_text(std::size_t begin) const;
   std::ptrdiff_t line_at(std::size_t offset) const;
+};
+
+/// A CSV text that need not fit into memory: its rows a piece at a time, each with the header, and with the lines of the
+/// whole text in what it says.
+class CsvPieces {
+ public:
+  /// `name` stands for the path in errors. A piece is about `bytes` long, longer if a row is.
+  CsvPieces(std::istream& input, std::string name, std::size_t bytes = 1 << 20);
+
+  /// The next rows, at least one; nothing at the end. Throws as Csv::read(), also if no header comes, the stream cannot
+  /// be read, or a quoted field has no end within 16 MiB.
+  std::optional<Csv> next();
+
+ private:
+  std::istream& input_;
+  std::string name_;
+  std::size_t bytes_;
+  std::string pending_;       // what has been read and not yet handed out
+  std::string header_;        // once it is known, with a line break
+  std::ptrdiff_t lines_ = 0;  // handed out, those of the header included
 };
 
 /// `text` as one CSV field: in double quotes, inner quotes doubled, if it holds the separator, a quote or a line break.

@@ -1,0 +1,191 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <iostream>
+#include <memory>
+#include <stdexcept>
+
+#include "llmt/csv.hpp"
+#include "llmt/stream_command.hpp"
+#include "shared/cli.hpp"
+
+namespace llmt::apps {
+namespace {
+
+/// What was learned, and from what.
+struct Learned {
+  std::string name;
+  std::vector<std::string> inputs;
+  std::unique_ptr<Stream> stream;
+};
+
+void refuse_other_options(const CLI::App& command) {
+  for (const char* option :
+       {"--categorical", "--split-inputs", "--regression-inputs", "--cv", "--contiguous", "--seed", "--threads", "--rule",
+        "--min-improvement", "--search", "--shared", "--estimation", "--width", "--jump", "--ridge", "--smoothness",
+        "--no-intervals"}) {
+    if (command.count(option) > 0) {
+      throw std::invalid_argument(fmt::format("{} is not for --stream", option));
+    }
+  }
+}
+
+StreamOptions options_of(const CLI::App& command, const StreamArguments& arguments) {
+  const FitOptions& fit = arguments.learning.options;
+  StreamOptions options{.rule = arguments.rule,
+                        .min_leaf_samples = fit.growth.min_leaf_samples,
+                        .max_leaves = fit.growth.max_leaves};
+  if (command.count("--significance") > 0) {
+    options.significance = fit.growth.significance;
+  }
+  if (fit.blend.shrinkages.size() > 1) {
+    throw std::invalid_argument("--shrinkage takes one number with --stream");
+  }
+  if (fit.blend.shrinkages.size() == 1) {
+    options.shrinkage = fit.blend.shrinkages.front();
+  }
+  return options;
+}
+
+/// Rows so far and the running errors, on one line that is rewritten, where stderr is a terminal.
+void show_progress(const Stream& stream) {
+  if (::isatty(STDERR_FILENO) != 0) {
+    fmt::print(stderr, "\r\033[K{} rows, RMSE before learning {:.5g}, of the last 1000 {:.5g}", stream.counts().rows,
+               fmt::join(stream.prequential_rmse(), ", "), fmt::join(stream.recent_rmse(), ", "));
+    std::fflush(stderr);
+  }
+}
+
+void clear_progress() {
+  if (::isatty(STDERR_FILENO) != 0) {
+    fmt::print(stderr, "\r\033[K");
+  }
+}
+
+void add(const Csv& piece, const StreamArguments& arguments, Learned& learned) {
+  const LearningArguments& learning = arguments.learning;
+  const Eigen::MatrixXd targets = piece.numbers(learning.targets, 1);
+  const Eigen::VectorXd weights = learning.weight.empty() ? Eigen::VectorXd() : piece.numbers(learning.weight, 1);
+  Eigen::MatrixXd inputs;
+  try {
+    inputs = piece.numbers_or_missing(learned.inputs, 1);
+  } catch (const std::runtime_error& error) {
+    throw std::runtime_error(std::string(error.what()) +
+                             " (--stream takes no categories; --ignore COLUMN leaves a column out)");
+  }
+  learned.stream->add(inputs, targets, weights);
+}
+
+Learned learn(const CLI::App& command, const StreamArguments& arguments) {
+  const StreamOptions options = options_of(command, arguments);
+  const LearningArguments& learning = arguments.learning;
+  const bool standard_input = learning.data.empty() || learning.data == "-";
+  Learned learned{standard_input ? "standard input" : learning.data, {}, nullptr};
+  std::ifstream file;
+  if (!standard_input) {
+    file.open(learning.data, std::ios::binary);
+    if (!file) {
+      throw std::runtime_error(fmt::format("{}: cannot be read", learned.name));
+    }
+  } else {
+    std::ios::sync_with_stdio(false);
+  }
+  CsvPieces pieces(standard_input ? std::cin : file, learned.name);
+  while (const std::optional<Csv> piece = pieces.next()) {
+    if (!learned.stream) {
+      learned.inputs = choose_inputs(*piece, learning);
+      learned.stream = std::make_unique<Stream>(std::ssize(learned.inputs), std::ssize(learning.targets), options);
+    }
+    add(*piece, arguments, learned);
+    show_progress(*learned.stream);
+  }
+  clear_progress();
+  if (!learned.stream || learned.stream->counts().rows == 0) {
+    throw std::runtime_error(fmt::format("{}: there is a header and no rows{}", learned.name,
+                                         learned.stream ? " of positive weight" : ""));
+  }
+  return learned;
+}
+
+Json finite_or_null(double value) { return std::isnan(value) ? Json(nullptr) : Json(value); }
+
+Json summary_json(const StreamArguments& arguments, const Learned& learned, const Model& model) {
+  const StreamCounts counts = learned.stream->counts();
+  Json json = {{"data", learned.name},
+               {"rows", counts.rows},
+               {"missing_values", counts.missing_values},
+               {"rule", arguments.rule == StreamRule::rd ? "rd" : "ra"},
+               {"inputs", learned.inputs},
+               {"held_out", counts.held_out},
+               {"grown_leaves", counts.leaves},
+               {"splits", counts.splits},
+               {"prunes", counts.prunes},
+               {"drifts", counts.drifts},
+               {"replacements", counts.replacements},
+               {"bytes", counts.bytes},
+               {"partitions", Json::array()}};
+  const Eigen::VectorXd all = learned.stream->prequential_rmse();
+  const Eigen::VectorXd recent = learned.stream->recent_rmse();
+  for (const Partition& partition : model.partitions()) {
+    const std::ptrdiff_t output = partition.outputs.front();
+    json["partitions"].push_back({{"targets", {arguments.learning.targets[static_cast<std::size_t>(output)]}},
+                                  {"validity", partition.validity.kind == ValidityKind::crisp ? "crisp" : "blend"},
+                                  {"width", partition.validity.width},
+                                  {"leaves", partition.num_leaves()},
+                                  {"prequential_rmse", finite_or_null(all(output))},
+                                  {"recent_rmse", finite_or_null(recent(output))}});
+  }
+  json["model"] = arguments.output.empty() ? Json(nullptr) : Json(arguments.output);
+  return json;
+}
+
+void print_summary(const StreamArguments& arguments, const Learned& learned, const Model& model) {
+  const StreamCounts counts = learned.stream->counts();
+  print(fmt::format("{}: {} rows, {} inputs: {}\n", learned.name, counts.rows, learned.inputs.size(),
+                    fmt::join(learned.inputs, ", ")));
+  if (counts.missing_values > 0) {
+    print(fmt::format("Missing values in the inputs: {}\n", counts.missing_values));
+  }
+  print(fmt::format("Learned row by row, rule {}: {} splits, {} taken back, {} alarms for changes, {} branches replaced; "
+                    "{} MiB\n\n",
+                    arguments.rule == StreamRule::rd ? "rd" : "ra", counts.splits, counts.prunes, counts.drifts,
+                    counts.replacements, number(static_cast<double>(counts.bytes) / 1048576.0, 3)));
+  Table table({"target", "model", "leaves", "RMSE before learning", "of the last 1000"});
+  const Eigen::VectorXd all = learned.stream->prequential_rmse();
+  const Eigen::VectorXd recent = learned.stream->recent_rmse();
+  for (const Partition& partition : model.partitions()) {
+    const std::ptrdiff_t output = partition.outputs.front();
+    table.add({arguments.learning.targets[static_cast<std::size_t>(output)],
+               partition.validity.kind == ValidityKind::crisp
+                   ? "crisp"
+                   : fmt::format("blend, width {}", number(partition.validity.width, 3)),
+               fmt::format("{}", partition.num_leaves()), number(all(output)), number(recent(output))});
+  }
+  print(table.text());
+  if (!arguments.output.empty()) {
+    print(fmt::format("Model written to {}\n", arguments.output));
+  }
+}
+
+}  // namespace
+
+void stream_command(const CLI::App& command, const StreamArguments& arguments) {
+  refuse_other_options(command);
+  const ValidityChoice validity = arguments.learning.options.blend.validity;
+  const Learned learned = learn(command, arguments);
+  const Model model = learned.stream->snapshot(validity).named(learned.inputs, arguments.learning.targets);
+  if (!arguments.output.empty()) {
+    save(model, arguments.output);
+  }
+  if (arguments.json) {
+    print_json(summary_json(arguments, learned, model));
+  } else {
+    print_summary(arguments, learned, model);
+  }
+}
+
+}  // namespace llmt::apps

@@ -1,0 +1,24 @@
+/// \file
+/// `llmt fit --stream`.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <string>
+
+#include "llmt/learning.hpp"
+#include "llmt/stream.hpp"
+
+namespace llmt::apps {
+
+struct StreamArguments {
+  LearningArguments learning;
+  StreamRule rule = StreamRule::rd;
+  std::string output;
+  bool json = false;
+};
+
+/// Learns from a file, or from standard input if the data are "-" or not named, in memory that does not depend on its
+/// length. `command`: to refuse options of `llmt fit` that are not for streams.
+void stream_command(const CLI::App& command, const StreamArguments& arguments);
+
+}  // namespace llmt::apps

@@ -1,0 +1,106 @@
+/// \file
+/// Local linear model trees from a stream of rows, in memory that does not depend on how many there are.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+
+#include "llmt/abi.hpp"
+#include "llmt/fit.hpp"
+#include "llmt/model.hpp"
+
+namespace llmt {
+
+/// How a leaf of a growing stream finds its split (Potts & Sammut 2005; docs/algorithms.md).
+enum class StreamRule {
+  /// Residual differences: every leaf keeps the sums of squares and products of its rows in bins of every input, so
+  /// that the residual sums of squares of both sides of every edge between bins are known exactly; the best edge must
+  /// pass the F test of Chow (1960).
+  rd,
+  /// Residual analysis: the means and the scatter of every input over the rows above and below the leaf's model are
+  /// compared by t tests; where the most significant input says, two models are tried, which must pass the F test. Costs
+  /// less per row, learns more slowly.
+  ra
+};
+
+struct StreamOptions {
+  StreamRule rule = StreamRule::rd;
+  /// Probability, at most, that a leaf whose rows follow one linear model with normal noise is ever split: divided by
+  /// the number of candidates and shared out over the repeated tests.
+  double significance = 0.05;
+  /// Smallest decrease of the residual variance by a split, as a fraction of the variance of the output.
+  double min_variance_gain = 0.0;
+  std::ptrdiff_t min_leaf_samples = 0;  ///< on either side of a split. 0: twice the coefficients of a local model
+  /// Largest number of leaves of each tree, which bounds memory. 0: as many as have about 64 MiB of sums, within
+  /// 16 ... 500.
+  std::ptrdiff_t max_leaves = 0;
+  int bins = 16;  ///< of an input in a leaf, 4 ... 256
+  /// Leaf models are drawn towards the model that their parent had when it was split, see BlendOptions::shrinkages.
+  double shrinkage = 0.1;
+  /// Whether models give up what they know where the errors rise abruptly.
+  bool detect_drift = true;
+  /// Rows that are kept: a quarter of them is held out and chooses what a snapshot is, at most; the others estimate
+  /// blends. 0: a snapshot is the crisp tree as it stands.
+  std::ptrdiff_t reservoir_rows = 20000;
+};
+
+/// What a stream has gone through.
+struct StreamCounts {
+  std::ptrdiff_t rows = 0;            ///< of positive weight
+  std::ptrdiff_t missing_values = 0;  ///< in the inputs
+  std::ptrdiff_t held_out = 0;        ///< rows in the reservoir that no tree has learned from
+  std::ptrdiff_t leaves = 0;          ///< of all trees
+  std::ptrdiff_t splits = 0;
+  std::ptrdiff_t prunes = 0;        ///< splits taken back because recent rows do not need them
+  std::ptrdiff_t drifts = 0;        ///< alarms: branches whose errors rose abruptly and whose models restarted
+  std::ptrdiff_t replacements = 0;  ///< branches that a new one, grown from the alarm on, has replaced
+  std::ptrdiff_t bytes = 0;         ///< that sums, models and reservoir take
+};
+
+class StreamState;
+
+/// A tree for every output that learns from rows as they come: each row is seen once and forgotten.
+///
+/// A leaf's model is the least-squares fit of all rows that reached it since its branch began, those included that its
+/// parent counted on its side of the split; a leaf is split, and a split taken back, when rows tell. The same rows give
+/// the same bytes, one at a time or in blocks; their order matters. To go over data several times, add them again.
+///
+/// Inputs may be missing (NaN): such a row follows the side with more rows and counts in a local model with the leaf's
+/// mean. Inputs are numbers; categories are not supported.
+class Stream {
+ public:
+  /// Throws std::invalid_argument naming field, value and bound if there is no input or output, or an option is out of
+  /// range.
+  Stream(std::ptrdiff_t num_inputs, std::ptrdiff_t num_outputs, const StreamOptions& options = {});
+  ~Stream();
+  Stream(Stream&&) noexcept;
+  Stream& operator=(Stream&&) noexcept;
+
+  /// Learns from rows in their order. inputs: rows x inputs; outputs: rows x outputs; weights: one per row, not
+  /// negative, or empty. Throws std::invalid_argument, and learns nothing, if a shape differs, an input is infinite, an
+  /// output or weight is not finite or a weight is negative, naming the row of this call and of the stream.
+  void add(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<const Eigen::MatrixXd>& outputs,
+           const Eigen::Ref<const Eigen::VectorXd>& weights = Eigen::VectorXd());
+
+  /// What the crisp trees say now, rows x outputs; the means of the outputs during the first rows, NaN before any.
+  Eigen::MatrixXd predict(const Eigen::Ref<const Eigen::MatrixXd>& inputs) const;
+
+  /// Root mean square of the errors on every row before it was learned from (test then train), one per output: over all
+  /// rows but the first few, and over about the last 1000. NaN before.
+  Eigen::VectorXd prequential_rmse() const;
+  Eigen::VectorXd recent_rmse() const;
+
+  StreamCounts counts() const;
+
+  /// The model as it stands. Throws std::invalid_argument if there is no row yet. `automatic`: crisp or a blend, and
+  /// how many leaves of the tree, is what predicts the held-out rows best; `crisp`: the same among crisp trees; `blend`
+  /// likewise. `gaussian` throws.
+  Model snapshot(ValidityChoice validity = ValidityChoice::automatic) const;
+
+ private:
+  std::unique_ptr<StreamState> state_;
+};
+
+}  // namespace llmt
