@@ -27,10 +27,10 @@ struct Key {
   auto operator<=>(const Key&) const = default;
 };
 
-class Comparison {
+class HeldOutErrors {
  public:
-  Comparison(const std::vector<FoldRows>& folds, const std::vector<GrownTree>& grown, const Candidates& candidates,
-             const Eigen::VectorXd& weights, int max_threads);
+  HeldOutErrors(const std::vector<FoldRows>& folds, const std::vector<GrownTree>& grown, const Candidates& candidates,
+                const Eigen::VectorXd& weights, int max_threads);
 
   /// All widths with all jumps, but for those that keep the same splits crisp as one before.
   const std::vector<Shape>& shapes() const { return shapes_; }
