@@ -1,15 +1,19 @@
 // Test error of one tree with default options on data sets with given splits, beside least squares.
 //
-// regression_sets FOLDER [NAME...]: for every NAME.csv in FOLDER with a NAME.splits.csv (the target is the last column
+// regression_sets [--local-models linear|quadratic|auto] [--sparse never|auto|always] [--validity auto|crisp]
+// [--splits N] FOLDER [NAME...]: for every NAME.csv in FOLDER with a NAME.splits.csv (the target is the last column
 // of NAME.csv; every column of NAME.splits.csv is a split, 1 = test, 0 = training), or for the names given. Prints mean
 // test RMSE over the splits, and how many test rows lie in the intervals of nominal 90 %: CV+, and split conformal from
-// the first fold alone.
+// the first fold alone. The options are those of llmt fit; --splits takes the first N splits only.
 #include <fmt/format.h>
 
 #include <chrono>
 #include <cmath>
 #include <filesystem>
+#include <limits>
+#include <map>
 #include <set>
+#include <stdexcept>
 
 #include "llmt/csv.hpp"
 #include "llmt/fit.hpp"
@@ -21,6 +25,9 @@ struct Errors {
   double least_squares = 0.0;
   double worst_ratio = 0.0;  // tree / least squares over the splits
   double leaves = 0.0;
+  double coefficients = 0.0;
+  int quadratic = 0;  // splits that took quadratic local models
+  int sparse = 0;
   double seconds = 0.0;
   double coverage = 0.0;  // of CV+ intervals
   double width = 0.0;
@@ -40,11 +47,51 @@ Held held(const llmt::Intervals& intervals, const Eigen::MatrixXd& inputs, const
           (bounds.upper - bounds.lower).mean()};
 }
 
-Errors measure(const std::string& folder, const std::string& name) {
+struct Arguments {
+  llmt::FitOptions options;
+  Eigen::Index splits = std::numeric_limits<Eigen::Index>::max();
+  std::vector<std::string> rest;  // folder and names
+};
+
+Arguments read_arguments(int argc, char** argv) {
+  using llmt::LocalTerms;
+  using llmt::SparseChoice;
+  const std::map<std::string, LocalTerms> terms = {
+      {"linear", LocalTerms::linear}, {"quadratic", LocalTerms::quadratic}, {"auto", LocalTerms::automatic}};
+  const std::map<std::string, SparseChoice> sparse = {
+      {"never", SparseChoice::never}, {"auto", SparseChoice::automatic}, {"always", SparseChoice::always}};
+  const std::map<std::string, llmt::ValidityChoice> validity = {{"auto", llmt::ValidityChoice::automatic},
+                                                                {"crisp", llmt::ValidityChoice::crisp}};
+  Arguments result;
+  for (int i = 1; i < argc; ++i) {
+    const std::string argument = argv[i];
+    const std::string value = i + 1 < argc ? argv[i + 1] : "";
+    if (!argument.starts_with("--")) {
+      result.rest.push_back(argument);
+      continue;
+    }
+    ++i;
+    if (argument == "--local-models" && terms.contains(value)) {
+      result.options.local_models.terms = terms.at(value);
+    } else if (argument == "--sparse" && sparse.contains(value)) {
+      result.options.local_models.sparse = sparse.at(value);
+    } else if (argument == "--validity" && validity.contains(value)) {
+      result.options.blend.validity = validity.at(value);
+    } else if (argument == "--splits") {
+      result.splits = std::stol(value);
+    } else {
+      throw std::invalid_argument(fmt::format("{} {} is not known", argument, value));
+    }
+  }
+  return result;
+}
+
+Errors measure(const std::string& folder, const std::string& name, const Arguments& arguments) {
   const llmt::Csv data = llmt::Csv::read(folder + "/" + name + ".csv");
   const llmt::Csv splits = llmt::Csv::read(folder + "/" + name + ".splits.csv");
   const Eigen::MatrixXd all = data.numbers(data.columns());
-  const Eigen::MatrixXd is_test = splits.numbers(splits.columns());
+  const Eigen::MatrixXd all_splits = splits.numbers(splits.columns());
+  const Eigen::MatrixXd is_test = all_splits.leftCols(std::min(all_splits.cols(), arguments.splits));
   Errors sum;
   for (Eigen::Index split = 0; split < is_test.cols(); ++split) {
     std::vector<Eigen::Index> train;
@@ -56,7 +103,7 @@ Errors measure(const std::string& folder, const std::string& name) {
     const Eigen::MatrixXd test_rows = all(test, Eigen::all);
     const Eigen::Index inputs = all.cols() - 1;
     const auto start = std::chrono::steady_clock::now();
-    const llmt::FitResult result = llmt::fit(train_rows.leftCols(inputs), train_rows.rightCols(1));
+    const llmt::FitResult result = llmt::fit(train_rows.leftCols(inputs), train_rows.rightCols(1), arguments.options);
     sum.seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     const double tree = llmt::rmse(result.model.predict(test_rows.leftCols(inputs)), test_rows.rightCols(1))(0);
     llmt::FitOptions one_leaf;
@@ -76,8 +123,11 @@ Errors measure(const std::string& folder, const std::string& name) {
     sum.least_squares += least_squares;
     sum.worst_ratio = std::max(sum.worst_ratio, tree / least_squares);
     sum.leaves += static_cast<double>(result.summary.partitions[0].leaves);
+    sum.coefficients += static_cast<double>(result.summary.partitions[0].coefficients);
+    sum.quadratic += result.summary.quadratic ? 1 : 0;
+    sum.sparse += result.summary.partitions[0].chosen.candidate.sparse ? 1 : 0;
   }
-  for (double* value : {&sum.tree, &sum.least_squares, &sum.leaves, &sum.seconds}) {
+  for (double* value : {&sum.tree, &sum.least_squares, &sum.leaves, &sum.coefficients, &sum.seconds}) {
     *value /= static_cast<double>(is_test.cols());
   }
   return sum;
@@ -86,28 +136,32 @@ Errors measure(const std::string& folder, const std::string& name) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc < 2) {
-    fmt::print(stderr, "usage: regression_sets FOLDER [NAME...]\n");
-    return 2;
-  }
   try {
-    std::set<std::string> names(argv + 2, argv + argc);
+    const Arguments arguments = read_arguments(argc, argv);
+    if (arguments.rest.empty()) {
+      fmt::print(stderr, "usage: regression_sets [OPTION VALUE...] FOLDER [NAME...]\n");
+      return 2;
+    }
+    const std::string& folder = arguments.rest.front();
+    std::set<std::string> names(arguments.rest.begin() + 1, arguments.rest.end());
     if (names.empty()) {
-      for (const auto& entry : std::filesystem::directory_iterator(argv[1])) {
+      for (const auto& entry : std::filesystem::directory_iterator(folder)) {
         const std::string file = entry.path().filename().string();
         if (const std::size_t end = file.find(".splits.csv"); end != std::string::npos) {
           names.insert(file.substr(0, end));
         }
       }
     }
-    fmt::print("{:12} {:>14} {:>14} {:>18} {:>8} {:>10} {:>10} {:>10} {:>12} {:>10}\n", "data", "least squares",
-               "llmt, defaults", "worst split, ratio", "leaves", "s per fit", "CV+ 90 %", "width", "split conf.",
-               "width");
+    fmt::print("{:12} {:>14} {:>14} {:>18} {:>8} {:>12} {:>16} {:>10} {:>10} {:>10} {:>12} {:>10}\n", "data",
+               "least squares", "llmt", "worst split, ratio", "leaves", "coefficients", "quadratic/sparse", "s per fit",
+               "CV+ 90 %", "width", "split conf.", "width");
     for (const std::string& name : names) {
-      const Errors errors = measure(argv[1], name);
-      fmt::print("{:12} {:14.5g} {:14.5g} {:18.3f} {:8.1f} {:10.3f} {:10.4f} {:10.4g} {:12.4f} {:10.4g}\n", name,
-                 errors.least_squares, errors.tree, errors.worst_ratio, errors.leaves, errors.seconds, errors.coverage,
-                 errors.width, errors.split_coverage, errors.split_width);
+      const Errors errors = measure(folder, name, arguments);
+      fmt::print(
+          "{:12} {:14.5g} {:14.5g} {:18.3f} {:8.1f} {:12.1f} {:>16} {:10.3f} {:10.4f} {:10.4g} {:12.4f} {:10.4g}\n",
+          name, errors.least_squares, errors.tree, errors.worst_ratio, errors.leaves, errors.coefficients,
+          fmt::format("{}/{}", errors.quadratic, errors.sparse), errors.seconds, errors.coverage, errors.width,
+          errors.split_coverage, errors.split_width);
     }
   } catch (const std::exception& error) {
     fmt::print(stderr, "regression_sets: {}\n", error.what());

@@ -41,6 +41,14 @@ FitOptions blended(std::ptrdiff_t leaves, std::uint64_t seed) {
   return options;
 }
 
+/// The same with products of the joints in the local models, six coefficients instead of three, so from six samples a
+/// leaf on.
+FitOptions quadratic(FitOptions options) {
+  options.local_models.terms = LocalTerms::quadratic;
+  options.growth.min_leaf_samples = 6;
+  return options;
+}
+
 /// The paper's smoothing: Gaussians of the given width over the leaves as they were grown.
 FitOptions gaussian_as_grown(std::ptrdiff_t leaves, double width) {
   FitOptions options = grown_to(leaves);
@@ -134,6 +142,10 @@ PlanarStudy planar_study(bool carry_over, bool large, std::uint64_t seed) {
   correct("Gaussians, wide, as grown", {gaussian_as_grown(93, 0.7), gaussian_as_grown(75, 0.7)}, std::nullopt);
   correct("blend, the paper's leaf counts", {blended(93, seed), blended(75, seed)}, std::nullopt);
   correct("blend, a third of the leaves", {blended(25, seed), blended(25, seed)}, std::nullopt);
+  correct("quadratic, half the leaves", {quadratic(grown_to(46)), quadratic(grown_to(37))}, std::nullopt);
+  correct("blend, quadratic, half the leaves", {quadratic(blended(46, seed)), quadratic(blended(37, seed))},
+          std::nullopt);
+  correct("blend, quadratic, 25 leaves", {quadratic(blended(25, seed)), quadratic(blended(25, seed))}, std::nullopt);
 
   Random random(seed);
   Eigen::VectorXd noisy = residual.col(0);

@@ -36,8 +36,8 @@ std::ptrdiff_t enough_rows(std::ptrdiff_t leaves, std::ptrdiff_t coefficients) {
   return std::max(smallest_sample, rows_per_unknown * leaves * coefficients);
 }
 
-Comparison::Comparison(const std::vector<FoldRows>& folds, const std::vector<GrownTree>& grown,
-                       const Candidates& candidates, const Eigen::VectorXd& weights, int max_threads)
+HeldOutErrors::HeldOutErrors(const std::vector<FoldRows>& folds, const std::vector<GrownTree>& grown,
+                             const Candidates& candidates, const Eigen::VectorXd& weights, int max_threads)
     : folds_(folds),
       grown_(grown),
       candidates_(candidates),
@@ -73,7 +73,7 @@ Comparison::Comparison(const std::vector<FoldRows>& folds, const std::vector<Gro
   }
 }
 
-Candidate Comparison::candidate(const Key& key) const {
+Candidate HeldOutErrors::candidate(const Key& key) const {
   return {.validity = {candidates_.kind, shapes_[key.shape].width, candidates_.smoothness},
           .jump = shapes_[key.shape].jump,
           .estimation = candidates_.estimation,
@@ -84,7 +84,7 @@ Candidate Comparison::candidate(const Key& key) const {
 }
 
 /// Errors of one shape; `keys` ascending.
-std::map<Key, double> Comparison::evaluate_shape(std::size_t fold, const std::vector<Key>& keys) const {
+std::map<Key, double> HeldOutErrors::evaluate_shape(std::size_t fold, const std::vector<Key>& keys) const {
   const Candidate first = candidate(keys.front());
   const TrainingRows& sample = samples_[fold];
   const Partition partition = blended(sample, grown_[fold], first.validity, first.jump);
@@ -122,7 +122,7 @@ std::map<Key, double> Comparison::evaluate_shape(std::size_t fold, const std::ve
   return errors;
 }
 
-void Comparison::evaluate(const std::set<Key>& keys, std::size_t folds) {
+void HeldOutErrors::evaluate(const std::set<Key>& keys, std::size_t folds) {
   struct Task {
     std::size_t fold;
     std::vector<Key> keys;
@@ -149,7 +149,7 @@ void Comparison::evaluate(const std::set<Key>& keys, std::size_t folds) {
   }
 }
 
-std::map<Key, std::vector<double>> Comparison::errors(std::size_t folds) const {
+std::map<Key, std::vector<double>> HeldOutErrors::errors(std::size_t folds) const {
   std::map<Key, std::vector<double>> result;
   for (const auto& [key, error] : of_folds_.front()) {
     std::vector<double> all;

@@ -31,10 +31,10 @@ struct Key {
 /// looks better for having more: 25, with which a joint estimate adds 4 % to the variance of the noise.
 std::ptrdiff_t enough_rows(std::ptrdiff_t leaves, std::ptrdiff_t coefficients);
 
-class Comparison {
+class HeldOutErrors {
  public:
-  Comparison(const std::vector<FoldRows>& folds, const std::vector<GrownTree>& grown, const Candidates& candidates,
-             const Eigen::VectorXd& weights, int max_threads);
+  HeldOutErrors(const std::vector<FoldRows>& folds, const std::vector<GrownTree>& grown, const Candidates& candidates,
+                const Eigen::VectorXd& weights, int max_threads);
 
   /// All widths with all jumps, but for those that keep the same splits crisp as one before.
   const std::vector<Shape>& shapes() const { return shapes_; }

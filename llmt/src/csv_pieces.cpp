@@ -36,8 +36,8 @@ std::optional<Csv> CsvPieces::next() {
     while (whole == 0 && input_) {
       const std::size_t old = pending_.size();
       if (old > longest_record) {
-        throw std::runtime_error(fmt::format("{}:{}: no row ends within 16 MiB (is a quote left open?)", name_,
-                                             lines_ + 1));
+        throw std::runtime_error(
+            fmt::format("{}:{}: no row ends within 16 MiB (is a quote left open?)", name_, lines_ + 1));
       }
       const std::size_t more = std::max(bytes_, old);
       pending_.resize(old + more);

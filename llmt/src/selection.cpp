@@ -123,7 +123,7 @@ std::map<std::size_t, std::size_t> last_counts(const std::map<Key, std::vector<d
 }
 
 /// Best first; ties: the smaller key.
-Ranked ranked(const Comparison& comparison, std::size_t folds) {
+Ranked ranked(const HeldOutErrors& comparison, std::size_t folds) {
   const std::map<Key, std::vector<double>> all = comparison.errors(folds);
   std::map<std::size_t, std::size_t> last = last_counts(all, folds);
   Ranked order;
@@ -150,7 +150,7 @@ Ranked first_of_each(Ranked order, const KindOf& kind_of) {
 }
 
 /// Every shape with few leaves; then the better half with three times as many, and so on, while that helps.
-void screen(Comparison& comparison, const Candidates& candidates, std::ptrdiff_t coefficients, std::size_t folds) {
+void screen(HeldOutErrors& comparison, const Candidates& candidates, std::ptrdiff_t coefficients, std::size_t folds) {
   const std::vector<std::ptrdiff_t>& counts = comparison.leaf_counts();
   const std::size_t usual = candidates.shrinkages.size() / 2;
   const std::size_t ridges = std::max<std::size_t>(candidates.ridges.size(), 1);
@@ -195,7 +195,7 @@ void screen(Comparison& comparison, const Candidates& candidates, std::ptrdiff_t
 }
 
 /// The best two widths, each with its best jump and with none.
-Ranked finalists_of(const Comparison& comparison, std::size_t folds) {
+Ranked finalists_of(const HeldOutErrors& comparison, std::size_t folds) {
   const std::vector<Shape>& shapes = comparison.shapes();
   const Ranked of_shape = first_of_each(ranked(comparison, folds), [](const Key& key) { return key.shape; });
   Ranked result = first_of_each(of_shape, [&](const Key& key) { return shapes[key.shape].width; });
@@ -213,7 +213,7 @@ Ranked finalists_of(const Comparison& comparison, std::size_t folds) {
 }
 
 /// Other ridges and shrinkages at the finalists' best leaf counts; where that is cheap, at its neighbours too.
-void refine(Comparison& comparison, const Candidates& candidates, std::ptrdiff_t coefficients, std::size_t folds) {
+void refine(HeldOutErrors& comparison, const Candidates& candidates, std::ptrdiff_t coefficients, std::size_t folds) {
   const std::vector<std::ptrdiff_t>& counts = comparison.leaf_counts();
   std::set<Key> keys;
   for (const auto& [error, best] : finalists_of(comparison, folds)) {
@@ -237,7 +237,7 @@ void refine(Comparison& comparison, const Candidates& candidates, std::ptrdiff_t
 }
 
 /// On all folds: of each finalist the best few, and the best of each leaf count near its best.
-std::set<Key> compare_on_all_folds(Comparison& comparison, std::ptrdiff_t coefficients, std::size_t screening,
+std::set<Key> compare_on_all_folds(HeldOutErrors& comparison, std::ptrdiff_t coefficients, std::size_t screening,
                                    std::size_t folds) {
   std::set<Key> kept;
   for (const auto& [least, best] : finalists_of(comparison, screening)) {
@@ -258,7 +258,7 @@ std::set<Key> compare_on_all_folds(Comparison& comparison, std::ptrdiff_t coeffi
 }
 
 /// The best of each width: with jumps only if their gain on none is beyond chance.
-std::vector<CandidateError> best_of_widths(const Comparison& comparison, const std::set<Key>& kept,
+std::vector<CandidateError> best_of_widths(const HeldOutErrors& comparison, const std::set<Key>& kept,
                                            const std::vector<FoldRows>& folds, const Judge& judge) {
   const std::map<Key, std::vector<double>> errors = comparison.errors(folds.size());
   Ranked order = ranked(comparison, folds.size());
@@ -321,7 +321,7 @@ Selection select(const std::vector<FoldRows>& folds, const std::vector<GrownTree
       rows += compared[screening].held_out.count();
     }
     const std::ptrdiff_t coefficients = std::ssize(compared.front().training.regressors) + 1;
-    Comparison comparison(compared, grown, candidates, weights, max_threads);
+    HeldOutErrors comparison(compared, grown, candidates, weights, max_threads);
     screen(comparison, candidates, coefficients, screening);
     refine(comparison, candidates, coefficients, screening);
     const std::set<Key> kept = compare_on_all_folds(comparison, coefficients, screening, compared.size());

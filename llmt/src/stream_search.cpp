@@ -62,7 +62,8 @@ void LeafSearch::lay_out(const Basis& basis) {
     std::sort(values.begin(), values.end());
     std::vector<double> edges;
     for (int b = 1; b < setting_.options.bins && !values.empty(); ++b) {
-      const std::size_t at = static_cast<std::size_t>(b) * values.size() / static_cast<std::size_t>(setting_.options.bins);
+      const std::size_t at =
+          static_cast<std::size_t>(b) * values.size() / static_cast<std::size_t>(setting_.options.bins);
       const auto above = std::upper_bound(values.begin(), values.end(), values[at > 0 ? at - 1 : 0]);
       if (above != values.end()) {
         const double edge = *(above - 1) + 0.5 * (*above - *(above - 1));
@@ -235,15 +236,15 @@ bool LeafSearch::passes(const Found& found) const {
   return before - after >= setting_.options.min_variance_gain * setting_.output_variance;
 }
 
-std::optional<StreamSplit> LeafSearch::test(const Eigen::VectorXd& low, const Eigen::VectorXd& high,
-                                            double different) {
+std::optional<StreamSplit> LeafSearch::test(const Eigen::VectorXd& low, const Eigen::VectorXd& high, double different) {
   different_ = different;
   if (rows_ < next_test_) {
     return std::nullopt;
   }
-  next_test_ = rows_ + std::max(setting_.coefficients(),
-                                static_cast<std::ptrdiff_t>((test_growth - 1.0) * static_cast<double>(
-                                                                narrowed_ >= 0 ? narrowed_rows_ : rows_)));
+  next_test_ =
+      rows_ + std::max(setting_.coefficients(),
+                       static_cast<std::ptrdiff_t>((test_growth - 1.0) *
+                                                   static_cast<double>(narrowed_ >= 0 ? narrowed_rows_ : rows_)));
   ++tests_;
   if (setting_.options.rule == StreamRule::ra && narrowed_ < 0) {
     propose();
@@ -290,7 +291,10 @@ std::optional<StreamSplit> LeafSearch::decide(const Found& found, const Eigen::V
   const double edge = bins.edges[found.edge];
   const double before = found.edge > 0 ? bins.edges[found.edge - 1] : low(found.input);
   const double behind = found.edge + 1 < bins.edges.size() ? bins.edges[found.edge + 1] : high(found.input);
-  StreamSplit split{found.input, edge, std::max(edge - before, behind - edge), side(bins, 0, found.edge + 1),
+  StreamSplit split{found.input,
+                    edge,
+                    std::max(edge - before, behind - edge),
+                    side(bins, 0, found.edge + 1),
                     side(bins, found.edge + 1, bins.edges.size() + 1),
                     found.rss * (1.0 - found.ratio) / static_cast<double>(found.rows)};
   if (narrow(found, split, low, high)) {
@@ -321,8 +325,7 @@ bool LeafSearch::narrow(const Found& found, const StreamSplit& split, const Eige
     beside = remaining(shape, bins.grams.data() + bin * size, change) / rows;
     worst = std::max(worst, beside / (1.0 + 4.0 * std::sqrt(2.0 / rows)));
   }
-  const double usual = found.rss * found.ratio /
-                       (static_cast<double>(found.rows) - found.rank_left - found.rank_right);
+  const double usual = found.rss * found.ratio / (static_cast<double>(found.rows) - found.rank_left - found.rank_right);
   if (!(worst > misfit * usual)) {
     return false;
   }
@@ -369,13 +372,11 @@ bool LeafSearch::propose() {
       const double variance = squares / freedom * (1.0 / n0 + 1.0 / n1);
       return variance > 0.0 ? student_p_value(difference / std::sqrt(variance), freedom) : 1.0;
     };
-    const double of_means =
-        p_value(signs_[1].mean(j) - signs_[0].mean(j), signs_[0].squares(j) + signs_[1].squares(j));
+    const double of_means = p_value(signs_[1].mean(j) - signs_[0].mean(j), signs_[0].squares(j) + signs_[1].squares(j));
     const double spread0 = signs_[0].spread(j) / n0;
     const double spread1 = signs_[1].spread(j) / n1;
-    const double of_spreads =
-        p_value(spread1 - spread0, signs_[0].spread_squares(j) - n0 * spread0 * spread0 +
-                                       signs_[1].spread_squares(j) - n1 * spread1 * spread1);
+    const double of_spreads = p_value(spread1 - spread0, signs_[0].spread_squares(j) - n0 * spread0 * spread0 +
+                                                             signs_[1].spread_squares(j) - n1 * spread1 * spread1);
     if (const double p = std::min(of_means, of_spreads); p < smallest) {
       smallest = p;
       input = j;

@@ -41,7 +41,7 @@ struct StreamSplit {
   int input = -1;
   double threshold = 0.0;
   double reach = 0.0;  ///< distance to the edges beside the threshold
-  Sums left;  ///< of the rows that decided it, in the leaf's basis
+  Sums left;           ///< of the rows that decided it, in the leaf's basis
   Sums right;
   double gain = 0.0;  ///< decrease of the mean squared residual
 };
@@ -109,13 +109,13 @@ class LeafSearch {
   ResidualSums residuals_;
   std::vector<double> first_rows_;  // inputs, output, weight
   bool laid_out_ = false;
-  std::vector<Bins> bins_;                           // per input
-  std::vector<std::vector<double>> wide_edges_;      // as laid out at first
-  std::array<SignSums, 2> signs_;                    // ra
-  int narrowed_ = -1;                                // input whose bins are narrowed, or that ra proposes
-  std::vector<double*> sums_of_row_;  // of put()
-  std::ptrdiff_t narrowed_rows_ = 0;                 // in its bins
-  std::ptrdiff_t patience_ = 0;                      // rows after which that is given up
+  std::vector<Bins> bins_;                       // per input
+  std::vector<std::vector<double>> wide_edges_;  // as laid out at first
+  std::array<SignSums, 2> signs_;                // ra
+  int narrowed_ = -1;                            // input whose bins are narrowed, or that ra proposes
+  std::vector<double*> sums_of_row_;             // of put()
+  std::ptrdiff_t narrowed_rows_ = 0;             // in its bins
+  std::ptrdiff_t patience_ = 0;                  // rows after which that is given up
   std::ptrdiff_t rows_ = 0;
   std::ptrdiff_t next_test_ = 0;
   std::ptrdiff_t first_passed_ = 0;

@@ -127,12 +127,18 @@ Eigen::VectorXd local(const llmt::Partition& partition, int leaf, const Eigen::V
 }  // namespace
 
 Eigen::VectorXd deviations(const llmt::Model& model, const Eigen::VectorXd& row) {
+  const auto factor = [&](int j) {
+    const llmt::InputColumn& input = model.inputs()[static_cast<std::size_t>(j)];
+    return hold(row(j) - input.centre, input.low - input.centre, input.high - input.centre);
+  };
   Eigen::VectorXd result(std::ssize(model.regressors()));
   for (std::size_t k = 0; k < model.regressors().size(); ++k) {
     const llmt::Regressor& regressor = model.regressors()[k];
     const double x = row(regressor.input);
     double& deviation = result(static_cast<std::ptrdiff_t>(k));
-    if (regressor.level < 0) {
+    if (regressor.second_input >= 0) {
+      deviation = factor(regressor.input) * factor(regressor.second_input) - regressor.centre;
+    } else if (regressor.level < 0) {
       deviation = x - regressor.centre;
     } else {
       const std::size_t levels = model.inputs()[static_cast<std::size_t>(regressor.input)].levels.size();
