@@ -28,7 +28,7 @@ std::vector<Method> usual_methods(const FitOptions& base = {}, std::ptrdiff_t in
 struct Comparison {
   std::string method;
   std::ptrdiff_t leaves = 0;      ///< of the model of all rows
-  std::ptrdiff_t parameters = 0;  ///< coefficients of the leaves and thresholds of the splits
+  std::ptrdiff_t parameters = 0;  ///< constants and slopes other than 0 of the leaves, and thresholds of the splits
   Eigen::VectorXd fold_rmse;      ///< held-out, one per fold
   double cv_rmse = 0.0;           ///< over all held-out rows
   double spread = 0.0;            ///< standard deviation of fold_rmse
