@@ -16,6 +16,7 @@ namespace llmt {
 namespace {
 
 constexpr double largest_magnitude = 1e150;  // squares stay finite
+constexpr double largest_factor = 1e70;      // squares of products too
 
 void require(bool condition, const char* option, double value, const char* bound) {
   if (!condition) {
@@ -157,6 +158,8 @@ Table make_table(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::R
     require(numbers <= most_inputs_of_products,
             "the number of numeric regression inputs of quadratic local models (local_models.terms)",
             static_cast<double>(numbers), "at most 13; growth.regression_inputs chooses them");
+    const double largest = inputs.array().isNaN().select(0.0, inputs).cwiseAbs().maxCoeff();
+    require(largest <= largest_factor, "a magnitude in inputs, with quadratic local models,", largest, "at most 1e70");
     table.products = products_of(table);
   }
   return table;

@@ -55,6 +55,44 @@ std::string coloured() {
   return text;
 }
 
+/// 200 rows: y = (a - b)^2 + c with normal noise of 0.05.
+std::string bent() {
+  llmt::Random random(4);
+  std::string text = "a,b,c,y\n";
+  for (int i = 0; i < 200; ++i) {
+    const double a = random.uniform(-1.0, 1.0);
+    const double b = random.uniform(1.0, 3.0);
+    const double c = random.uniform(-1.0, 1.0);
+    text += fmt::format("{},{},{},{}\n", a, b, c, (a - b) * (a - b) + c + 0.05 * random.normal());
+  }
+  return text;
+}
+
+TEST(LlmtProgram, LocalModelsAreQuadraticAndSparseWhereAsked) {
+  const Folder folder;
+  folder.write("d.csv", bent());
+  const std::string fit = llmt_program + " fit d.csv --target y --validity crisp -o m.json ";
+  const Outcome chosen = folder.run(fit + "--local-models auto --sparse always --json");
+  ASSERT_EQ(chosen.exit_code, 0) << chosen.err;
+  const json summary = json::parse(chosen.out);
+  EXPECT_EQ(summary["local_models"], "quadratic");
+  const json& partition = summary["partitions"][0];
+  EXPECT_EQ(partition["leaves"], 1);
+  EXPECT_EQ(partition["chosen"]["sparse"], true);
+  EXPECT_LT(partition["coefficients"], 10);
+  EXPECT_GT(partition["other_terms"]["cv_rmse"], partition["cv_rmse"]);
+  const std::string leaves = folder.run(llmt_program + " inspect m.json").out;
+  EXPECT_NE(leaves.find("^2"), std::string::npos) << leaves;
+  EXPECT_NE(leaves.find(")*(b - "), std::string::npos) << leaves;
+  EXPECT_EQ(folder.run(llmt_program + " explain m.json d.csv --row 3").exit_code, 0);
+  const std::string text = folder.run(fit + "--local-models auto --sparse always").out;
+  EXPECT_NE(text.find("Local models are quadratic; linear ones: RMSE held-out"), std::string::npos) << text;
+  EXPECT_NE(text.find("Sparse local models:"), std::string::npos) << text;
+  const std::string usual = folder.run(fit).out;
+  EXPECT_EQ(usual.find("ocal models"), std::string::npos) << usual;
+  EXPECT_EQ(folder.run(fit + "--local-models cubic").exit_code, 2);
+}
+
 TEST(LlmtProgram, FitPredictInspectAgreeWithTheLibrary) {
   const Folder folder;
   const llmt::Csv csv = llmt::Csv::read(folder.write("d.csv", table()));

@@ -453,6 +453,10 @@ TEST(LocalModels, MistakesAreNamed) {
   EXPECT_EQ(message_of([&] { llmt::fit(x, y, only(ValidityChoice::crisp, 2, LocalTerms::quadratic)); }),
             "llmt::fit: the number of numeric regression inputs of quadratic local models (local_models.terms) is 14, "
             "it must be at most 13; growth.regression_inputs chooses them");
+  Eigen::MatrixXd large = x.leftCols(2);
+  large(7, 1) = 1e80;
+  EXPECT_EQ(message_of([&] { llmt::fit(large, y, only(ValidityChoice::crisp, 2, LocalTerms::quadratic)); }),
+            "llmt::fit: a magnitude in inputs, with quadratic local models, is 1e+80, it must be at most 1e70");
   llmt::FitOptions options = only(ValidityChoice::blend, 2, LocalTerms::linear, SparseChoice::always);
   options.blend.estimation = llmt::Estimation::as_grown;
   EXPECT_EQ(

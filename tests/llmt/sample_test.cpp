@@ -1,11 +1,14 @@
 // Estimates that start from a sample of the rows.
 #include <gtest/gtest.h>
 
+#include <Eigen/QR>
 #include <algorithm>
 #include <numeric>
+#include <utility>
 
 #include "boxes.hpp"
 #include "estimate.hpp"
+#include "evaluator.hpp"
 #include "growth.hpp"
 #include "joint_fit.hpp"
 #include "oracles.hpp"
@@ -102,6 +105,56 @@ TEST(Sample, LeafThatItHardlyHoldsDoesNotSpoilTheEstimateOnAllRows) {
     EXPECT_LE(loss(llmt::JointFit(sample, tree, 1).joint_on(training, 8, regularisation), training), 1.05 * exact)
         << "seed " << seed;
   }
+}
+
+/// Sum of squared errors of the best coefficients that leave the slopes of `partition` which are 0 at 0, and its own.
+std::pair<double, double> best_and_own_error(const Rows& data, const llmt::TrainingRows& training,
+                                             const Partition& partition) {
+  const llmt::Evaluator evaluator(partition, training.columns, 3);
+  const std::ptrdiff_t count = training.count();
+  Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(count, 4 * std::ssize(partition.nodes));
+  Eigen::MatrixXd predicted(count, 2);
+  std::vector<llmt::Activation> active;
+  Eigen::Vector3d deviations;
+  Eigen::Vector2d values;
+  for (std::ptrdiff_t i = 0; i < count; ++i) {
+    const Eigen::Vector3d row = data.inputs.row(i);
+    llmt::deviations_at(training.columns, training.regressors, row.data(), deviations.data());
+    evaluator.activate(row.data(), active);
+    predicted.row(i).setZero();
+    for (const llmt::Activation& entry : active) {  // without guards, as estimates are made
+      const llmt::Node& node = partition.nodes[static_cast<std::size_t>(entry.node)];
+      predicted.row(i) += entry.validity * (node.value + node.slope * deviations).transpose();
+      columns(i, 4 * entry.node) = entry.validity;
+      for (std::ptrdiff_t k = 0; k < 3; ++k) {
+        columns(i, 4 * entry.node + 1 + k) = node.slope.col(k).isZero(0.0) ? 0.0 : entry.validity * deviations(k);
+      }
+    }
+  }
+  const Eigen::MatrixXd best = columns * columns.colPivHouseholderQr().solve(data.outputs);
+  return {(data.outputs - best).squaredNorm(), (data.outputs - predicted).squaredNorm()};
+}
+
+TEST(Sample, SparseEstimateOnAllRowsIsReachedFromItWithItsZeros) {
+  const Rows data = rows(4000, 3);
+  const llmt::TrainingRows training = llmt::training_rows(data.table, all(4000));
+  const llmt::TrainingRows sample = llmt::thinned(training, 30 * 4 * 8);
+  const llmt::Regularisation regularisation{1e-8, 0.0, true};
+  const llmt::JointFit fit(sample, blended_tree(training), 1, true);
+  const Partition before = fit.joint(8, {regularisation}).front();
+  const Partition after = fit.joint_on(training, 8, regularisation);
+  std::ptrdiff_t zeros = 0;
+  for (std::size_t i = 0; i < after.nodes.size(); ++i) {
+    if (after.nodes[i].is_leaf()) {
+      EXPECT_TRUE(((after.nodes[i].slope.array() == 0.0) == (before.nodes[i].slope.array() == 0.0)).all());
+      zeros += (after.nodes[i].slope.array() == 0.0).count();
+    }
+  }
+  EXPECT_GT(zeros, 8);
+  const auto [best, error_before] = best_and_own_error(data, training, before);
+  const auto [same_best, error_after] = best_and_own_error(data, training, after);
+  EXPECT_GT(error_after, best * (1.0 - 1e-9));
+  EXPECT_LT(error_after - best, 0.02 * (error_before - best));  // two steps, each about a digit of the coefficients
 }
 
 TEST(Sample, DependsOnTheRowsAndNotOnTheirOrder) {

@@ -180,7 +180,8 @@ struct BlendOptions {
 enum class LocalTerms {
   linear,  ///< a constant and the regressors
   /// Also the products and squares of the numeric regression inputs (see Regressor): (d + 1) (d + 2) / 2 coefficients
-  /// for d inputs, at most 13. None of an input that never varies, no square of one with two values.
+  /// for d inputs, at most 13, of magnitudes up to 1e70. None of an input that never varies, no square of one with two
+  /// values.
   quadratic,
   /// The whole selection runs for both on the same folds. Quadratic ones are taken if their gain is beyond chance, as
   /// in SelectionOptions. Linear without folds, and with more numeric regression inputs than quadratic ones allow.
@@ -189,7 +190,8 @@ enum class LocalTerms {
 
 /// Whether each local model keeps only the regressors that its own rows ask for: forward selection by orthogonal least
 /// squares, the one that lowers the weighted sum of squares most first, stopped where AICc is smallest. The slopes of
-/// the others are exactly 0, in joint estimation too.
+/// the others are exactly 0, in joint estimation too. Trees are grown with full models. Not with Estimation::as_grown
+/// where leaves overlap.
 enum class SparseChoice {
   never,
   automatic,  ///< full and sparse ones are candidates, and the held-out error decides; without folds full ones
