@@ -435,6 +435,7 @@ TEST(Merging, SameBytesAtAnyNumberOfThreadsWithCategoriesAndMissingValues) {
   for (const llmt::ValidityChoice choice :
        {llmt::ValidityChoice::crisp, llmt::ValidityChoice::blend, llmt::ValidityChoice::gaussian}) {
     std::vector<std::string> models;
+    std::vector<std::string> of_one_hold_out;
     for (const int threads : {1, 8}) {
       llmt::FitOptions options;
       options.blend.validity = choice;
@@ -449,11 +450,13 @@ TEST(Merging, SameBytesAtAnyNumberOfThreadsWithCategoriesAndMissingValues) {
       EXPECT_TRUE(result.model.predict(x).allFinite());
       EXPECT_EQ(result.summary.partitions[0].local_models, result.model.partitions()[0].num_local_models());
       EXPECT_LE(result.summary.partitions[0].local_models, result.summary.partitions[0].leaves);
-      for (const llmt::Bounds& bounds : {result.intervals.predict(x, 0.9)}) {
-        EXPECT_TRUE((bounds.lower.array() <= bounds.upper.array()).all());
-      }
+      const llmt::Bounds bounds = result.intervals.predict(x, 0.9);
+      EXPECT_TRUE((bounds.lower.array() <= bounds.upper.array()).all());
+      options.selection.single_hold_out_rows = 400;
+      of_one_hold_out.push_back(llmt::to_json(llmt::fit(x, y, options).model));
     }
     EXPECT_EQ(models[0], models[1]);
+    EXPECT_EQ(of_one_hold_out[0], of_one_hold_out[1]);
   }
 }
 
