@@ -1,9 +1,10 @@
 // What pruning by the weakest link and merging of leaves do to held-out errors, leaves, local models and time.
 //
-// pruning_and_merging FOLDER [NAME...]: on NAME.csv of FOLDER with its splits (see regression_sets; the first one), and
-// on generated data: cross (Schaal & Atkeson 1998, 500 rows, noise 0.1), friedman (Friedman 1991, 10 inputs, 2000 rows,
-// noise 1) and synthetic (bench/synthetic.hpp, 10 inputs, 10000 rows, noise 1), whose errors are those from the truth
-// on new points, means over 3 samples. Names may be those of generated data too; without names generated data alone.
+// pruning_and_merging FOLDER [NAME...]: on NAME.csv of FOLDER with its splits (see regression_sets; of tables with 2000
+// rows and more the first one), and on generated data: cross (Schaal & Atkeson 1998, 500 rows, noise 0.1), friedman
+// (Friedman 1991, 10 inputs, 2000 rows, noise 1) and synthetic (bench/synthetic.hpp, 10 inputs, 10000 rows, noise 1),
+// whose errors are those from the truth on new points, means over 3 samples. Names may be those of generated data too;
+// without names generated data alone.
 #include <fmt/format.h>
 
 #include <chrono>
@@ -17,6 +18,8 @@
 #include "synthetic.hpp"
 
 namespace {
+
+constexpr Eigen::Index small_table = 2000;
 
 struct Task {
   Eigen::MatrixXd x;
@@ -69,20 +72,25 @@ Task synthetic(std::uint64_t seed) {
   return {std::move(train.x), std::move(train.y), std::move(test.x), std::move(test.truth)};
 }
 
-Task of_file(const std::string& folder, const std::string& name) {
+std::vector<Task> of_file(const std::string& folder, const std::string& name) {
   const llmt::Csv data = llmt::Csv::read(folder + "/" + name + ".csv");
   const llmt::Csv splits = llmt::Csv::read(folder + "/" + name + ".splits.csv");
   const Eigen::MatrixXd all = data.numbers(data.columns());
   const Eigen::MatrixXd is_test = splits.numbers(splits.columns());
-  std::vector<Eigen::Index> train;
-  std::vector<Eigen::Index> test;
-  for (Eigen::Index row = 0; row < all.rows(); ++row) {
-    (is_test(row, 0) > 0.5 ? test : train).push_back(row);
+  std::vector<Task> tasks;
+  for (Eigen::Index split = 0; split < (all.rows() < small_table ? is_test.cols() : 1); ++split) {
+    std::vector<Eigen::Index> train;
+    std::vector<Eigen::Index> test;
+    for (Eigen::Index row = 0; row < all.rows(); ++row) {
+      (is_test(row, split) > 0.5 ? test : train).push_back(row);
+    }
+    const Eigen::MatrixXd train_rows = all(train, Eigen::all);
+    const Eigen::MatrixXd test_rows = all(test, Eigen::all);
+    const Eigen::Index inputs = all.cols() - 1;
+    tasks.push_back(
+        {train_rows.leftCols(inputs), train_rows.rightCols(1), test_rows.leftCols(inputs), test_rows.rightCols(1)});
   }
-  const Eigen::MatrixXd train_rows = all(train, Eigen::all);
-  const Eigen::MatrixXd test_rows = all(test, Eigen::all);
-  const Eigen::Index inputs = all.cols() - 1;
-  return {train_rows.leftCols(inputs), train_rows.rightCols(1), test_rows.leftCols(inputs), test_rows.rightCols(1)};
+  return tasks;
 }
 
 std::vector<Task> tasks_of(const std::string& folder, const std::string& name) {
@@ -97,7 +105,7 @@ std::vector<Task> tasks_of(const std::string& folder, const std::string& name) {
     }
   }
   if (tasks.empty()) {
-    tasks.push_back(of_file(folder, name));
+    return of_file(folder, name);
   }
   return tasks;
 }

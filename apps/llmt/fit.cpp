@@ -215,7 +215,8 @@ void print_summary(const FitArguments& arguments, const FitResult& result) {
       for (const CandidateError& other : partition.best_of_kind) {
         const Candidate& candidate = other.candidate;
         if (candidate.validity.kind != chosen.validity.kind || candidate.validity.width != chosen.validity.width ||
-            candidate.jump != chosen.jump || candidate.leaves != chosen.leaves) {
+            candidate.jump != chosen.jump || candidate.leaves != chosen.leaves ||
+            candidate.local_models != chosen.local_models) {
           table.add({"  against", describe(candidate), fmt::format("{}", candidate.leaves), number(other.rmse),
                      number(other.spread, 2), ""});
         }

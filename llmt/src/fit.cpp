@@ -25,6 +25,10 @@
 namespace llmt {
 namespace {
 
+/// A tree that is pruned by the weakest link has so many times the leaves that are asked for before: what a split gains
+/// shows when those below it are made. Not with LOLIMOT, of which a split costs as much as there are leaves.
+constexpr std::ptrdiff_t grown_to_be_pruned = 3;
+
 std::vector<int> all_rows(std::ptrdiff_t count) {
   std::vector<int> rows(static_cast<std::size_t>(count));
   std::iota(rows.begin(), rows.end(), 0);
@@ -54,10 +58,18 @@ GrownPartition grow_in_order(const TrainingRows& rows, const std::vector<int>& s
 
 GrownPartition grow_nodes(const TrainingRows& rows, const std::vector<int>& served, const Plan& plan, bool stop_by_aicc,
                           int max_threads) {
-  GrownPartition result = grow_in_order(rows, served, plan, stop_by_aicc, max_threads);
-  if (plan.growth.pruning == Pruning::weakest_link) {
-    result.nodes = in_pruning_order(result.nodes, std::move(result.gains));
+  if (plan.growth.pruning == Pruning::last_splits) {
+    return grow_in_order(rows, served, plan, stop_by_aicc, max_threads);
   }
+  Plan larger = plan;
+  larger.growth.max_leaves *= is_lolimot(plan.growth.rule) ? 1 : grown_to_be_pruned;
+  GrownPartition result = grow_in_order(rows, served, larger, stop_by_aicc, max_threads);
+  Partition ordered{.outputs = {}, .nodes = in_pruning_order(result.nodes, std::move(result.gains))};
+  if (plan.growth.max_leaves > 0 && ordered.num_leaves() > plan.growth.max_leaves) {
+    ordered = prefix(ordered, plan.growth.max_leaves);
+    result.stop = StopReason::max_leaves;
+  }
+  result.nodes = std::move(ordered.nodes);
   return result;
 }
 
@@ -218,6 +230,7 @@ FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<
     described.search = grown.search;
     described.chosen = trees.empty() ? CandidateError{candidate, std::nan(""), std::nan("")} : selection.chosen;
     described.chosen.candidate.leaves = candidate.leaves;
+    described.chosen.candidate.local_models = candidate.local_models > 0 ? described.local_models : 0;
     described.best_of_kind = std::move(selection.best_of_kind);
     described.crisp_cv_rmse = std::move(selection.crisp_rmse);
     described.cv_folds = std::ssize(trees);

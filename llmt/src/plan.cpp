@@ -6,7 +6,7 @@ namespace llmt {
 namespace {
 
 /// Of a crisp tree that is grown without a test, to be pruned: of many rows it would have leaves without number.
-constexpr std::ptrdiff_t most_leaves_to_prune = 2000;
+constexpr std::ptrdiff_t most_pruned_leaves = 1000;
 
 }  // namespace
 
@@ -77,8 +77,8 @@ Plan make_plan(const FitOptions& options, const TrainingRows& all, std::ptrdiff_
   if (growth.max_leaves == 0 && many_leaves) {
     growth.max_leaves = std::clamp<std::ptrdiff_t>(1500 / (regressors + 1), 20, 400);
   }
-  if (growth.max_leaves == 0 && growth.pruning == Pruning::weakest_link && !is_lolimot(growth.rule)) {
-    growth.max_leaves = most_leaves_to_prune;
+  if (has_folds && growth.max_leaves == 0 && growth.pruning == Pruning::weakest_link && !is_lolimot(growth.rule)) {
+    growth.max_leaves = most_pruned_leaves;
   }
   if (growth.max_leaves == 0 && is_lolimot(growth.rule)) {
     growth.max_leaves = 100;

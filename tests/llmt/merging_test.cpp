@@ -16,6 +16,7 @@
 #include "estimate.hpp"
 #include "joint_fit.hpp"
 #include "llmt/compare.hpp"
+#include "llmt/explain.hpp"
 #include "llmt/random.hpp"
 #include "predict_oracle.hpp"
 #include "random_trees.hpp"
@@ -321,6 +322,36 @@ TEST(Merging, PredictionsPrefixesAndFilesHoldTheEquations) {
   }
 }
 
+TEST(Merging, DerivativesAndSharesOfTheInputsAreThoseOfThePrediction) {
+  const double step = 1e-6;
+  for (const std::size_t k : {0, 1, 2}) {
+    const Grown g = grown(2, kinds[k]);
+    llmt::JointFit fit(g.training, g.tree, 1);
+    fit.merge_to(4);
+    const llmt::Model model = g.model(fit.joint(9, {{1e-3, 0.0}}).front());
+    const Eigen::MatrixXd points = 1.6 * oracle::uniform(60, 3, 77);
+    for (std::ptrdiff_t i = 0; i < points.rows(); ++i) {
+      const Eigen::VectorXd point = points.row(i).transpose();
+      const Eigen::MatrixXd jacobian = model.jacobian(point);
+      for (int j = 0; j < 3; ++j) {
+        Eigen::MatrixXd sides(2, 3);
+        sides << point.transpose(), point.transpose();
+        sides(0, j) += step;
+        sides(1, j) -= step;
+        const Eigen::MatrixXi leaves = model.leaf_of(sides);
+        if (k == 0 && leaves(0, 0) != leaves(1, 0)) {
+          continue;  // a jump
+        }
+        const Eigen::MatrixXd values = model.predict(sides);
+        const double quotient = (values(0, 0) - values(1, 0)) / (2.0 * step);
+        EXPECT_NEAR(jacobian(0, j), quotient, 1e-5 * (1.0 + std::abs(quotient)));
+      }
+      const llmt::Attribution shares = llmt::attribute(model, point);
+      EXPECT_NEAR(shares.contributions.sum(), shares.prediction(0) - shares.reference(0), 1e-9);
+    }
+  }
+}
+
 TEST(Merging, MistakesInASharedModelAreNamed) {
   const Grown g = grown(1, kinds[0]);
   llmt::JointFit fit(g.training, g.tree, 1);
@@ -404,6 +435,7 @@ TEST(Merging, SameBytesAtAnyNumberOfThreadsWithCategoriesAndMissingValues) {
   for (const llmt::ValidityChoice choice :
        {llmt::ValidityChoice::crisp, llmt::ValidityChoice::blend, llmt::ValidityChoice::gaussian}) {
     std::vector<std::string> models;
+    std::vector<std::string> of_one_hold_out;
     for (const int threads : {1, 8}) {
       llmt::FitOptions options;
       options.blend.validity = choice;
@@ -418,11 +450,13 @@ TEST(Merging, SameBytesAtAnyNumberOfThreadsWithCategoriesAndMissingValues) {
       EXPECT_TRUE(result.model.predict(x).allFinite());
       EXPECT_EQ(result.summary.partitions[0].local_models, result.model.partitions()[0].num_local_models());
       EXPECT_LE(result.summary.partitions[0].local_models, result.summary.partitions[0].leaves);
-      for (const llmt::Bounds& bounds : {result.intervals.predict(x, 0.9)}) {
-        EXPECT_TRUE((bounds.lower.array() <= bounds.upper.array()).all());
-      }
+      const llmt::Bounds bounds = result.intervals.predict(x, 0.9);
+      EXPECT_TRUE((bounds.lower.array() <= bounds.upper.array()).all());
+      options.selection.single_hold_out_rows = 400;
+      of_one_hold_out.push_back(llmt::to_json(llmt::fit(x, y, options).model));
     }
     EXPECT_EQ(models[0], models[1]);
+    EXPECT_EQ(of_one_hold_out[0], of_one_hold_out[1]);
   }
 }
 

@@ -136,11 +136,13 @@ TEST(WeakestLink, TheWholeTreeStaysTheSameUnderEveryRuleAndValidity) {
       const Data d = data(5);
       llmt::FitOptions options = only(kinds[kind], llmt::Estimation::local, 12);
       options.growth.rule = rule;
+      options.growth.max_leaves = 0;
+      options.growth.min_leaf_samples = 25;
       options.growth.shared_partition = kind == 1;
       const llmt::Model grown = llmt::fit(d.x, d.y, options).model;
       options.growth.pruning = llmt::Pruning::weakest_link;
       const llmt::Model ordered = llmt::fit(d.x, d.y, options).model;
-      const Eigen::MatrixXd query = 1.5 * oracle::uniform(200, 3, 6);
+      const Eigen::MatrixXd query = 0.9 * oracle::uniform(200, 3, 6);  // beyond the rows the first 32 leaves count
       ASSERT_GT(grown.partitions()[0].num_leaves(), 4);
       EXPECT_LT((ordered.predict(query) - grown.predict(query)).cwiseAbs().maxCoeff(), 1e-9);
     }
@@ -151,7 +153,8 @@ TEST(WeakestLink, PrunedTreesOfAFitLeaveLessThanThoseOfTheOrderOfGrowth) {
   double less = 0.0;
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
     const Data d = data(seed);
-    llmt::FitOptions options = only(kinds[0], llmt::Estimation::as_grown, 30);
+    llmt::FitOptions options = only(kinds[0], llmt::Estimation::as_grown, 0);
+    options.growth.min_leaf_samples = 10;
     const auto left = [&] {
       const llmt::Model model = llmt::fit(d.x, d.y.col(0), options).model;
       double sum = 0.0;

@@ -125,9 +125,9 @@ struct GrowthOptions {
   std::vector<int> regression_inputs = {};
   ThresholdPlacement threshold = ThresholdPlacement::closest;
   SplitSearch search = SplitSearch::automatic;
-  /// Order in which splits are undone; with folds their held-out error says how many. RETIS undoes those that its
-  /// m-estimates reject before. With weakest_link and folds the default of `significance` is no test: splits that
-  /// only help later ones stay then.
+  /// Order in which splits are undone: down to max_leaves from three times as many (not LOLIMOT), then by held-out
+  /// error. RETIS undoes those that its m-estimates reject before. With weakest_link and folds a crisp tree has other
+  /// defaults: `significance` no test, so that splits that only help later ones stay, `max_leaves` 1000.
   Pruning pruning = Pruning::last_splits;
   /// Leaves whose boxes touch, siblings or not, may share one local model: of every such pair the one whose shared
   /// model raises the sum of squares least is merged, and so on; how often is chosen by the held-out error, in every
