@@ -21,7 +21,8 @@ struct FitArguments {
   bool no_intervals = false;
 };
 
-constexpr std::array<const char*, 6> rule_names = {"rd", "retis", "lolimot", "lolimot-data", "ra", "m5"};  // as GrowthRule
+constexpr std::array<const char*, 6> rule_names = {"rd",           "retis", "lolimot",
+                                                   "lolimot-data", "ra",    "m5"};             // as GrowthRule
 constexpr std::array<const char*, 4> validity_names = {"auto", "crisp", "blend", "gaussian"};  // as ValidityChoice
 constexpr std::array<const char*, 3> search_names = {"auto", "exact", "binned"};               // as SplitSearch
 constexpr std::array<const char*, 3> estimation_names = {"as-grown", "local", "joint"};        // as Estimation
@@ -230,7 +231,9 @@ void add_fit(CLI::App& app) {
                    "thresholds), ra (by the signs of residuals, no search), m5 (M5', smoothed)")
       ->transform(choice_of<GrowthRule>(rule_names))
       ->option_text("rd|retis|lolimot|lolimot-data|ra|m5 [rd]");
-  command->add_option("--significance", growth.significance, "rd, ra: of the F test, over all candidate splits; 1: no test")
+  command
+      ->add_option("--significance", growth.significance,
+                   "rd, ra: of the F test, over all candidate splits; 1: no test")
       ->check(CLI::NonNegativeNumber)
       ->option_text("FLOAT [see docs/commands.md]");
   command

@@ -21,9 +21,8 @@ bool BinnedLeaves::possible(const GrowthData& data) {
 BinnedLeaves::BinnedLeaves(const GrowthData& data)
     : data_(data),
       rows_(data),
-      memory_left_(std::max(
-          rows_.whitened().features().rows() * rows_.whitened().features().columns() / kept_part,
-          kept_nodes * rows_.num_bins() * GramShape(rows_.whitened().features()).size())) {}
+      memory_left_(std::max(rows_.whitened().features().rows() * rows_.whitened().features().columns() / kept_part,
+                            kept_nodes * rows_.num_bins() * GramShape(rows_.whitened().features()).size())) {}
 
 BinnedLeaf BinnedLeaves::root() const {
   BinnedLeaf leaf{whitened_root(data_), {}};

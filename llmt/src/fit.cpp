@@ -14,6 +14,7 @@
 #include "joint_fit.hpp"
 #include "jumps.hpp"
 #include "lolimot.hpp"
+#include "m5_growth.hpp"
 #include "parallel.hpp"
 #include "plan.hpp"
 #include "selection.hpp"
@@ -34,6 +35,9 @@ GrownPartition grow_nodes(const TrainingRows& rows, const std::vector<int>& serv
   const Table& table = *rows.table;
   GrowthProblem problem{&rows, served, plan.growth, max_threads};
   problem.options.split_inputs = table.split_inputs;
+  if (problem.options.rule == GrowthRule::m5) {
+    return grow_m5(problem);
+  }
   if (!is_lolimot(problem.options.rule)) {
     return grow(problem);
   }

@@ -76,6 +76,20 @@ void check_blend(const BlendOptions& options) {
   require(options.smoothness == 1 || options.smoothness == 2, "blend.smoothness", options.smoothness, "1 or 2");
 }
 
+/// M5' has models of its own: dropped inputs, smoothing along the path. Estimating them anew would undo it.
+void check_m5(const FitOptions& options) {
+  if (options.blend.validity == ValidityChoice::blend || options.blend.validity == ValidityChoice::gaussian) {
+    throw std::invalid_argument(
+        fmt::format("llmt::fit: blend.validity is {}, with growth.rule m5 it must be automatic or crisp",
+                    options.blend.validity == ValidityChoice::blend ? "blend" : "gaussian"));
+  }
+  for (const double shrinkage : options.blend.shrinkages) {
+    require(shrinkage == 0.0, "blend.shrinkages", shrinkage, "0 with growth.rule m5, which smooths along the path");
+  }
+  require(options.growth.min_improvement == 0.0, "growth.min_improvement", options.growth.min_improvement,
+          "0 with growth.rule m5, which prunes");
+}
+
 /// Number of levels of every input, 0 for numbers.
 std::vector<int> count_levels(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const std::vector<int>& categorical) {
   check_columns("llmt::fit", "categorical_inputs", categorical, inputs.cols());
@@ -102,6 +116,9 @@ std::vector<int> count_levels(const Eigen::Ref<const Eigen::MatrixXd>& inputs, c
 void check_options(const FitOptions& options, std::ptrdiff_t inputs) {
   check_growth(options.growth, inputs);
   check_blend(options.blend);
+  if (options.growth.rule == GrowthRule::m5) {
+    check_m5(options);
+  }
   require(options.max_threads >= 0, "max_threads", options.max_threads, "at least 0");
 }
 

@@ -18,8 +18,7 @@ constexpr std::ptrdiff_t block_rows = 4096;
 
 }  // namespace
 
-BinnedRows::BinnedRows(const GrowthData& data)
-    : data_(data), whitened_(data), shape_(whitened_.features()) {
+BinnedRows::BinnedRows(const GrowthData& data) : data_(data), whitened_(data), shape_(whitened_.features()) {
   const std::ptrdiff_t bins = histogram_size / (shape_.size() * data.split_inputs());
   inputs_ = make_bins(data, static_cast<int>(std::clamp<std::ptrdiff_t>(bins, fewest_bins, most_bins)));
   std::ptrdiff_t sum = 0;
@@ -78,7 +77,8 @@ Histogram BinnedRows::accumulate(const std::vector<int>& rows) const {
         for (int bin = 0; bin < bins; ++bin) {
           const int after = place[static_cast<std::size_t>(bin)];
           if (after > at) {
-            add_rows(features(), sorted.data() + at, after - at, histogram.grams.data() + (first + bin) * shape_.size());
+            add_rows(features(), sorted.data() + at, after - at,
+                     histogram.grams.data() + (first + bin) * shape_.size());
           }
           at = after;
         }

@@ -23,8 +23,8 @@ struct FewInputsModel {
 };
 
 /// Weighted least squares of y on [1, x] without the columns that do not pay: starting from all, the one whose loss
-/// raises the sum of squares least is dropped as long as the adjusted error does not rise. Constant and collinear columns
-/// go first, and there are always more rows than coefficients. No value is missing; weights are positive.
+/// raises the sum of squares least is dropped as long as the adjusted error does not rise. Constant and collinear
+/// columns go first, and there are always more rows than coefficients. No value is missing; weights are positive.
 FewInputsModel fit_few_inputs(const RowMajor& x, const Eigen::VectorXd& y, const Eigen::VectorXd& weights);
 
 }  // namespace llmt

@@ -27,8 +27,7 @@ Eigen::MatrixXd SignLeaves::residuals(const SignLeaf& leaf, const Node& node, in
   // In the features' own regressors, about the model whose residuals they hold.
   Eigen::MatrixXd model(features.outputs(), coefficients);
   model.col(0) = node.value - leaf.value;
-  model.rightCols(coefficients - 1) =
-      (node.slope - leaf.slope) * data_.training.scale.asDiagonal() * rows_.colouring();
+  model.rightCols(coefficients - 1) = (node.slope - leaf.slope) * data_.training.scale.asDiagonal() * rows_.colouring();
   Eigen::MatrixXd result(count, features.outputs());
   parallel_for((count + block_rows - 1) / block_rows, threads, [&](std::ptrdiff_t block) {
     for (std::ptrdiff_t k = block * block_rows; k < std::min(count, (block + 1) * block_rows); ++k) {
@@ -77,7 +76,7 @@ SplitCandidate SignLeaves::examine(SignLeaf& leaf, const Node& parent, Node& nod
   const Eigen::VectorXd weights = data_.weights(leaf.rows);
   const SearchNode search{rows_.features(), data_.output_weights, rss};
   SignSplit numeric =
-      search_by_signs(data_, {search, leaf.rows, leaf.values, left_over, weights, leaf.gram, threads});
+      search_by_signs(data_, {search, node.rank, leaf.rows, leaf.values, left_over, weights, leaf.gram, threads});
   std::vector<SplitCandidate> found(data_.num_levels.size());
   parallel_for(std::ssize(found), threads, [&](std::ptrdiff_t j) {
     if (data_.num_levels[static_cast<std::size_t>(j)] > 0) {
@@ -99,8 +98,8 @@ std::array<SignLeaf, 2> SignLeaves::divide(SignLeaf& leaf, const SplitCandidate&
   std::array<std::vector<int>, 2> positions;
   for (std::size_t k = 0; k < leaf.rows.size(); ++k) {
     const double value = leaf.values(static_cast<std::ptrdiff_t>(k), split.input);
-    const bool left = split.level_side.empty() ? value <= split.last_left
-                                               : split.level_side[static_cast<std::size_t>(value)] < 0;
+    const bool left =
+        split.level_side.empty() ? value <= split.last_left : split.level_side[static_cast<std::size_t>(value)] < 0;
     positions[left ? 0 : 1].push_back(static_cast<int>(k));
     children[left ? 0 : 1].rows.push_back(leaf.rows[k]);
   }
@@ -120,8 +119,7 @@ double SignLeaves::threshold(const SignLeaf& leaf, const SplitCandidate& split, 
   double low = -std::numeric_limits<double>::infinity();
   double high = -low;
   for (const double value : leaf.values.col(split.input)) {
-    (value <= split.last_left ? low : high) =
-        value <= split.last_left ? std::max(low, value) : std::min(high, value);
+    (value <= split.last_left ? low : high) = value <= split.last_left ? std::max(low, value) : std::min(high, value);
   }
   return place_threshold(data_, leaf, split.input, low, high, node, left, right);
 }

@@ -18,9 +18,9 @@ struct Method {
   FitOptions options;
 };
 
-/// Least squares; crisp trees grown by RD and by RETIS; Gaussians over a crisp tree as in Benes et al. (2022), without
-/// re-estimation, and with joint re-estimation; the blend with joint estimation; LOLIMOT. `base` gives the columns,
-/// weights, seeds and threads.
+/// Least squares; crisp trees grown by RD, by RETIS and by RA; M5' with its own pruning and smoothing; Gaussians over a
+/// crisp tree as in Benes et al. (2022), without re-estimation, and with joint re-estimation; the blend with joint
+/// estimation; LOLIMOT. `base` gives the columns, weights, seeds and threads.
 std::vector<Method> usual_methods(const FitOptions& base = {});
 
 /// What one method made of the data.

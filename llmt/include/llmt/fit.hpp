@@ -40,8 +40,8 @@ enum class GrowthRule {
   /// significantly is split at (m+ + m-) / 2. The split must pass the tests of RD. Nothing is sorted and no threshold
   /// searched: a level of the tree costs O(rows x coefficients^2).
   ra,
-  /// M5' (Quinlan 1992, Wang & Witten 1997): splits by the decrease of the standard deviation of the output, down to a
-  /// few rows; a node's model has the inputs tested below it, less those that do not pay; pruned from the leaves up by
+  /// M5' (Quinlan 1992, Wang & Witten 1997): splits by the decrease of the outputs' scatter, down to a few rows; a
+  /// node's model has the inputs tested below it, less those that do not pay; pruned from the leaves up by
   /// the adjusted error err (n + 2 v) / (n - v), v coefficients; models smoothed along the path to the root,
   /// (n p + 15 q) / (n + 15). Crisp, with models of its own: blends, Gaussians and shrinkages are refused.
   m5
@@ -70,7 +70,7 @@ enum class StopReason {
   max_leaves,       ///< GrowthOptions::max_leaves reached
   significance,     ///< no leaf has a split that passes the F test
   variance_gain,    ///< no leaf has a split that lowers the residual variance enough
-  leaf_samples,     ///< no leaf is large enough to be split, or all its split inputs, or by M5' its outputs, are constant
+  leaf_samples,     ///< no leaf is large enough to be split, or all its split inputs are constant; M5': or its outputs
   exact_fit,        ///< the leaves reproduce the outputs to rounding
   improvement,      ///< GrowthOptions::min_improvement: further splits improved the tree too little
   aicc,             ///< LOLIMOT without folds: the corrected Akaike criterion rose
@@ -80,18 +80,18 @@ enum class StopReason {
 
 struct GrowthOptions {
   GrowthRule rule = GrowthRule::rd;
-  /// rd, ra: a split is accepted if P(F >= observed), times the number of candidate splits it was chosen from (Bonferroni:
-  /// the maximum over many candidates does not follow the F distribution), is below this. 1 or more: no test.
-  /// Negative: 0.05 for a crisp tree, no test where blends are among the candidates, for the held-out error decides
-  /// then and the joint estimate bears far more leaves than a crisp one.
+  /// rd, ra: a split is accepted if P(F >= observed), times the number of candidate splits it was chosen from
+  /// (Bonferroni: the maximum over many candidates does not follow the F distribution), is below this. 1 or more: no
+  /// test. Negative: 0.05 for a crisp tree, no test where blends are among the candidates, for the held-out error
+  /// decides then and the joint estimate bears far more leaves than a crisp one.
   double significance = -1.0;
   /// rd, ra: smallest decrease of the residual variance, as a fraction of the variance of the output. 0: any decrease;
   /// negative: no demand.
   double min_variance_gain = 0.0;
   /// retis: weight m of the prior (the error of one model for all data) in the m-estimates, in rows. 0: no pruning.
   double pruning_m = 2.0;
-  /// Smallest number of rows in a leaf. 0: twice the number of coefficients of a local model for a crisp tree, 2 for M5';
-  /// where blends are among the candidates as many as regressors, at least 5.
+  /// Smallest number of rows in a leaf. 0: twice the number of coefficients of a local model for a crisp tree, 2 for
+  /// M5'; where blends are among the candidates as many as regressors, at least 5.
   std::ptrdiff_t min_leaf_samples = 0;
   /// Largest number of leaves of a partition. 0: no limit for a crisp tree; where blends are among the candidates as
   /// many as make 1500 coefficients, within 20 ... 400.
