@@ -186,7 +186,8 @@ void print_summary(const FitArguments& arguments, const FitResult& result) {
   }
   for (const PartitionSummary& partition : result.summary.partitions) {
     print(search_text(partition.search));
-    if (partition.rank_deficient_leaves > 0) {
+    // M5' drops inputs on its own; its leaves keep nothing of their parent's but what smoothing gives them.
+    if (partition.rank_deficient_leaves > 0 && arguments.learning.options.growth.rule != GrowthRule::m5) {
       print(fmt::format(
           "Leaves whose rows do not determine all slopes (constant or collinear inputs, few rows) and keep their "
           "parent's there: {}.\n",

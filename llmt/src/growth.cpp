@@ -157,8 +157,8 @@ class Grower {
     if (options_.rule == GrowthRule::retis) {
       return std::nullopt;
     }
-    if (!data_.is_significant(samples, node.rank, leaf.rss, {leaf.best.rank_left, leaf.best.rank_right}, leaf.best.rss,
-                              leaf.best.tested)) {
+    if (!data_.is_significant(options_.significance, samples, node.rank, leaf.rss,
+                              {leaf.best.rank_left, leaf.best.rank_right}, leaf.best.rss, leaf.best.tested)) {
       return StopReason::significance;
     }
     if (options_.min_variance_gain >= 0.0) {

@@ -49,9 +49,9 @@ double GrowthData::significant_rss(double weight, int rank, double rss, std::ptr
   return rss / (1.0 + f * added / freedom);
 }
 
-bool GrowthData::is_significant(double weight, int rank, double rss, const SplitRanks& split, double split_rss,
-                                std::ptrdiff_t tested) const {
-  if (problem.options.significance >= 1.0) {
+bool GrowthData::is_significant(double level, double weight, int rank, double rss, const SplitRanks& split,
+                                double split_rss, std::ptrdiff_t tested) const {
+  if (level >= 1.0) {
     return true;
   }
   // Several outputs count as that many independent observations of equal variance, which the weights make them at the
@@ -63,7 +63,7 @@ bool GrowthData::is_significant(double weight, int rank, double rss, const Split
     return false;
   }
   const double f = ((rss - split_rss) / added) / (split_rss / freedom);
-  return f_survival(f, added, freedom) * static_cast<double>(tested) < problem.options.significance;
+  return f_survival(f, added, freedom) * static_cast<double>(tested) < level;
 }
 
 double GrowthData::place_threshold(double low, double high, double mean, const Eigen::VectorXd& apart,

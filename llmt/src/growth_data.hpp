@@ -51,8 +51,9 @@ struct GrowthData {
   /// splits, or fewer.
   double significant_rss(double weight, int rank, double rss, std::ptrdiff_t tested) const;
 
-  /// Whether a split passes the F test (eq. 2). `weight`, `rank`, `rss`: of the node; `tested`: candidate splits.
-  bool is_significant(double weight, int rank, double rss, const SplitRanks& split, double split_rss,
+  /// Whether a split passes the F test (eq. 2) at a level; 1 and more: any does. `weight`, `rank`, `rss`: of the node;
+  /// `tested`: candidate splits.
+  bool is_significant(double level, double weight, int rank, double rss, const SplitRanks& split, double split_rss,
                       std::ptrdiff_t tested) const;
 
   /// Threads for work on so many numbers: one where starting another costs more than it saves.

@@ -17,6 +17,9 @@ constexpr double tie_of_deviates = 1e-9;
 /// on grids, does not send its rows left or right by rounding.
 constexpr double grid = 0x1p-32;
 
+/// A split that does not pass the F test at this level, or at that asked for, makes the next input worth a try.
+constexpr double usual_significance = 0.05;
+
 constexpr std::ptrdiff_t partial_sums = 16;
 constexpr std::ptrdiff_t rows_of_a_sum = 4096;
 
@@ -122,8 +125,9 @@ SignSplit search_by_signs(const GrowthData& data, const SignNode& node) {
     }
   }
   const std::ptrdiff_t tested = std::ssize(candidates);
+  const double level = std::min(data.problem.options.significance, usual_significance);
   const auto passes = [&](const SplitCandidate& split) {
-    return split.input >= 0 && data.is_significant(node.weights.sum(), node.rank, node.search.rss,
+    return split.input >= 0 && data.is_significant(level, node.weights.sum(), node.rank, node.search.rss,
                                                    {split.rank_left, split.rank_right}, split.rss, tested);
   };
   SignSplit best;

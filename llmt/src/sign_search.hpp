@@ -53,8 +53,8 @@ struct SignSplit {
 };
 
 /// Of the numeric split inputs that whose classes differ most significantly, over all outputs, split at (m+ + m-) / 2.
-/// If that leaves too few rows on a side, or if it does not pass the F test - a product of two inputs leaves signs
-/// that depend on neither of them alone - the next one; if none passes, that with the smallest sum of squares.
+/// If that leaves too few rows on a side, or if it does not pass the F test at 5 % - a product of two inputs leaves
+/// signs that depend on neither of them alone - the next one; if none passes, that with the smallest sum of squares.
 /// Equally significant to nine digits: the first input. `best.tested` counts the inputs and outputs that could be
 /// tested. One pass over the values of each input, another one and one over the features for each split that is tried.
 SignSplit search_by_signs(const GrowthData& data, const SignNode& node);
