@@ -24,7 +24,8 @@ struct FitArguments {
   StreamRule stream_rule = StreamRule::rd;
 };
 
-constexpr std::array<const char*, 6> rule_names = {"rd", "retis", "lolimot", "lolimot-data", "ra", "m5"};  // as GrowthRule
+constexpr std::array<const char*, 6> rule_names = {"rd",           "retis", "lolimot",
+                                                   "lolimot-data", "ra",    "m5"};             // as GrowthRule
 constexpr std::array<const char*, 4> validity_names = {"auto", "crisp", "blend", "gaussian"};  // as ValidityChoice
 constexpr std::array<const char*, 3> search_names = {"auto", "exact", "binned"};               // as SplitSearch
 constexpr std::array<const char*, 2> stream_rule_names = {"rd", "ra"};                         // as StreamRule
@@ -230,7 +231,8 @@ void print_summary(const FitArguments& arguments, const FitResult& result) {
   print(local_models_text(arguments, result.summary));
   for (const PartitionSummary& partition : result.summary.partitions) {
     print(search_text(partition.search));
-    if (partition.rank_deficient_leaves > 0) {
+    // M5' drops inputs on its own; its leaves keep nothing of their parent's but what smoothing gives them.
+    if (partition.rank_deficient_leaves > 0 && arguments.learning.options.growth.rule != GrowthRule::m5) {
       print(fmt::format(
           "Leaves whose rows do not determine all slopes (constant or collinear inputs, few rows) and keep their "
           "parent's there: {}.\n",
@@ -275,7 +277,9 @@ void add_fit(CLI::App& app) {
                    "thresholds), ra (by the signs of residuals, no search), m5 (M5', smoothed)")
       ->transform(choice_of<GrowthRule>(rule_names))
       ->option_text("rd|retis|lolimot|lolimot-data|ra|m5 [rd]");
-  command->add_option("--significance", growth.significance, "rd, ra: of the F test, over all candidate splits; 1: no test")
+  command
+      ->add_option("--significance", growth.significance,
+                   "rd, ra: of the F test, over all candidate splits; 1: no test")
       ->check(CLI::NonNegativeNumber)
       ->option_text("FLOAT [see docs/commands.md]");
   command

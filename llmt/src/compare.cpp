@@ -132,6 +132,13 @@ std::vector<Method> usual_methods(const FitOptions& base, std::ptrdiff_t inputs)
   });
   add("crisp tree, RD", [](FitOptions&) {});
   add("crisp tree, RETIS", [](FitOptions& options) { options.growth.rule = GrowthRule::retis; });
+  add("crisp tree, RA", [](FitOptions& options) { options.growth.rule = GrowthRule::ra; });
+  add("M5', smoothed", [](FitOptions& options) {
+    options.growth.rule = GrowthRule::m5;
+    options.selection.folds.count = 0;  // its pruning decides
+    options.blend.shrinkages = {};
+    options.growth.min_improvement = 0.0;
+  });
   // Gaussians overlap everywhere: their joint estimates cost the square of the number of leaves.
   const std::ptrdiff_t gaussian_leaves =
       base.growth.max_leaves > 0 ? std::min<std::ptrdiff_t>(base.growth.max_leaves, 50) : 50;

@@ -130,7 +130,7 @@ SplitCandidate ExactLeaves::find_split(const ExactLeaf& leaf, const NodeFit& fit
   }
   const SearchNode node{fit.features, data_.output_weights, rss};
   if (by_signs()) {
-    return find_split_by_signs(leaf, node);
+    return find_split_by_signs(leaf, node, fit.rank);
   }
   const std::size_t inputs = leaf.orders.size();
   const int threads = data_.threads_for(leaf.inputs.rows() * data_.split_inputs());
@@ -174,12 +174,12 @@ SplitCandidate ExactLeaves::find_split(const ExactLeaf& leaf, const NodeFit& fit
 
 /// The inputs' thresholds by the signs of the residuals; categories, and that a value is missing, as in the exact
 /// search.
-SplitCandidate ExactLeaves::find_split_by_signs(const ExactLeaf& leaf, const SearchNode& node) const {
+SplitCandidate ExactLeaves::find_split_by_signs(const ExactLeaf& leaf, const SearchNode& node, int rank) const {
   Rows rows(static_cast<std::size_t>(leaf.inputs.rows()));
   std::iota(rows.begin(), rows.end(), 0);
   const int threads = data_.threads_for(leaf.inputs.rows() * data_.split_inputs());
   const Eigen::MatrixXd values = leaf.inputs(Eigen::all, data_.problem.options.split_inputs);
-  SignSplit numeric = search_by_signs(data_, {node, rows, values, leaf.residuals, leaf.weights, {}, threads});
+  SignSplit numeric = search_by_signs(data_, {node, rank, rows, values, leaf.residuals, leaf.weights, {}, threads});
   std::vector<SplitCandidate> found(leaf.orders.size());
   parallel_for(std::ssize(found), threads, [&](std::ptrdiff_t j) {
     const std::size_t slot = static_cast<std::size_t>(j);

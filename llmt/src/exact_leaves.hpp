@@ -54,7 +54,7 @@ class ExactLeaves {
   std::vector<int> levels_of(const ExactLeaf& leaf, std::ptrdiff_t split_input) const;
   bool by_signs() const { return data_.problem.options.rule == GrowthRule::ra; }
   SplitCandidate find_split(const ExactLeaf& leaf, const NodeFit& fit, double rss) const;
-  SplitCandidate find_split_by_signs(const ExactLeaf& leaf, const SearchNode& node) const;
+  SplitCandidate find_split_by_signs(const ExactLeaf& leaf, const SearchNode& node, int rank) const;
   void consider_missing(const SearchNode& node, const ExactLeaf& leaf, std::ptrdiff_t split_input,
                         SplitCandidate& best) const;
   std::vector<Side> sides_of(const ExactLeaf& leaf, const SplitCandidate& split) const;

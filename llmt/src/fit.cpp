@@ -16,6 +16,7 @@
 #include "jumps.hpp"
 #include "local_terms.hpp"
 #include "lolimot.hpp"
+#include "m5_growth.hpp"
 #include "parallel.hpp"
 #include "plan.hpp"
 #include "pruning.hpp"
@@ -44,6 +45,9 @@ GrownPartition grow_in_order(const TrainingRows& rows, const std::vector<int>& s
   if (is_hilomot(problem.options.rule)) {
     const bool joint = !plan.candidates.widths.empty() && plan.candidates.estimation == Estimation::joint;
     return grow_hilomot(problem, {joint ? GateModels::joint : GateModels::local, stop_by_aicc});
+  }
+  if (problem.options.rule == GrowthRule::m5) {
+    return grow_m5(problem);
   }
   if (!is_lolimot(problem.options.rule)) {
     return grow(problem);

@@ -79,6 +79,27 @@ void check_blend(const BlendOptions& options) {
   require(options.smoothness == 1 || options.smoothness == 2, "blend.smoothness", options.smoothness, "1 or 2");
 }
 
+/// M5' has models of its own: dropped inputs, smoothing along the path. Estimating them anew would undo it.
+void check_m5(const FitOptions& options) {
+  if (options.blend.validity == ValidityChoice::blend || options.blend.validity == ValidityChoice::gaussian) {
+    throw std::invalid_argument(
+        fmt::format("llmt::fit: blend.validity is {}, with growth.rule m5 it must be automatic or crisp",
+                    options.blend.validity == ValidityChoice::blend ? "blend" : "gaussian"));
+  }
+  for (const double shrinkage : options.blend.shrinkages) {
+    require(shrinkage == 0.0, "blend.shrinkages", shrinkage, "0 with growth.rule m5, which smooths along the path");
+  }
+  require(options.growth.min_improvement == 0.0, "growth.min_improvement", options.growth.min_improvement,
+          "0 with growth.rule m5, which prunes");
+  if (options.growth.pruning != Pruning::last_splits || options.growth.merge_leaves ||
+      options.local_models.terms != LocalTerms::linear || options.local_models.sparse != SparseChoice::never) {
+    throw std::invalid_argument(
+        "llmt::fit: growth.pruning, growth.merge_leaves, local_models.terms and local_models.sparse must be as they "
+        "are "
+        "by default with growth.rule m5, which has its own local models and pruning");
+  }
+}
+
 /// Number of levels of every input, 0 for numbers.
 std::vector<int> count_levels(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const std::vector<int>& categorical) {
   check_columns("llmt::fit", "categorical_inputs", categorical, inputs.cols());
@@ -111,6 +132,9 @@ void check_options(const FitOptions& options, std::ptrdiff_t inputs) {
           "never where blend.estimation is as_grown, for those models are full");
   require(!options.growth.merge_leaves || options.selection.folds.count > 0, "selection.folds.count",
           options.selection.folds.count, "at least 2 for growth.merge_leaves");
+  if (options.growth.rule == GrowthRule::m5) {
+    check_m5(options);
+  }
   require(options.max_threads >= 0, "max_threads", options.max_threads, "at least 0");
   if (options.growth.rule == GrowthRule::hilomot && options.blend.validity != ValidityChoice::automatic &&
       options.blend.validity != ValidityChoice::crisp) {

@@ -12,7 +12,6 @@
 #include "binned_leaves.hpp"
 #include "evaluator.hpp"
 #include "exact_leaves.hpp"
-#include "f_distribution.hpp"
 #include "parallel.hpp"
 #include "pruning.hpp"
 #include "sign_leaves.hpp"
@@ -163,26 +162,17 @@ class Grower {
     if (options_.rule == GrowthRule::retis) {
       return std::nullopt;
     }
-    // Several outputs count as that many independent observations of equal variance, which the weights make them at the
-    // root.
-    const double outputs = static_cast<double>(data_.output_weights.size());
-    const double added = outputs * (leaf.best.rank_left + leaf.best.rank_right - node.rank);
-    const double freedom = outputs * (samples - leaf.best.rank_left - leaf.best.rank_right);
-    if (options_.significance < 1.0) {
-      if (added <= 0.0 || freedom <= 0.0) {
-        return StopReason::significance;
-      }
-      const double f = ((leaf.rss - leaf.best.rss) / added) / (leaf.best.rss / freedom);
-      if (f_survival(f, added, freedom) * static_cast<double>(leaf.best.tested) >= options_.significance) {
-        return StopReason::significance;
-      }
+    if (!data_.is_significant(options_.significance, samples, node.rank, leaf.rss,
+                              {leaf.best.rank_left, leaf.best.rank_right}, leaf.best.rss, leaf.best.tested)) {
+      return StopReason::significance;
     }
     if (options_.min_variance_gain >= 0.0) {
       // The weights make the outputs' sums of squares 1 each, so that (rows - 1) times a residual variance is a
       // fraction of the variance.
-      const double to_fraction = (data_.weights.sum() - 1.0) / outputs;
+      const double to_fraction = (data_.weights.sum() - 1.0) / static_cast<double>(data_.output_weights.size());
+      const double freedom = samples - leaf.best.rank_left - leaf.best.rank_right;
       const double before = leaf.rss / (samples - node.rank);
-      const double after = leaf.best.rss / (freedom / outputs);
+      const double after = leaf.best.rss / freedom;
       if (freedom <= 0.0 || !((before - after) * to_fraction >= options_.min_variance_gain)) {
         return StopReason::variance_gain;
       }

@@ -49,6 +49,23 @@ double GrowthData::significant_rss(double weight, int rank, double rss, std::ptr
   return rss / (1.0 + f * added / freedom);
 }
 
+bool GrowthData::is_significant(double level, double weight, int rank, double rss, const SplitRanks& split,
+                                double split_rss, std::ptrdiff_t tested) const {
+  if (level >= 1.0) {
+    return true;
+  }
+  // Several outputs count as that many independent observations of equal variance, which the weights make them at the
+  // root.
+  const double outputs = static_cast<double>(output_weights.size());
+  const double added = outputs * (split.left + split.right - rank);
+  const double freedom = outputs * (weight - split.left - split.right);
+  if (added <= 0.0 || freedom <= 0.0) {
+    return false;
+  }
+  const double f = ((rss - split_rss) / added) / (split_rss / freedom);
+  return f_survival(f, added, freedom) * static_cast<double>(tested) < level;
+}
+
 double GrowthData::place_threshold(double low, double high, double mean, const Eigen::VectorXd& apart,
                                    const Eigen::VectorXd& slope) const {
   double threshold = low + 0.5 * (high - low);

@@ -9,6 +9,12 @@
 
 namespace llmt {
 
+/// Ranks of the two children of a split.
+struct SplitRanks {
+  int left;
+  int right;
+};
+
 /// The outputs of a growth problem in the form that growth works with, and the weights.
 struct GrowthData {
   explicit GrowthData(const GrowthProblem& problem);
@@ -44,6 +50,11 @@ struct GrowthData {
   /// whatever the children's ranks; infinity without a test. `weight`, `rank`, `rss`: of the node; `tested`: candidate
   /// splits, or fewer.
   double significant_rss(double weight, int rank, double rss, std::ptrdiff_t tested) const;
+
+  /// Whether a split passes the F test (eq. 2) at a level; 1 and more: any does. `weight`, `rank`, `rss`: of the node;
+  /// `tested`: candidate splits.
+  bool is_significant(double level, double weight, int rank, double rss, const SplitRanks& split, double split_rss,
+                      std::ptrdiff_t tested) const;
 
   /// Threads for work on so many numbers: one where starting another costs more than it saves.
   int threads_for(std::ptrdiff_t work) const { return work < 30000 ? 1 : problem.max_threads; }

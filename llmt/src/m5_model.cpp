@@ -76,18 +76,19 @@ FewInputsModel fit_few_inputs(const RowMajor& x, const Eigen::VectorXd& y, const
   const double rows = static_cast<double>(x.rows());
   const Eigen::RowVectorXd mean = weights.transpose() * x / total;
   const double y_mean = weights.dot(y) / total;
-  RowMajor centred = x.rowwise() - mean;
+  const RowMajor centred = x.rowwise() - mean;
   const Eigen::VectorXd y_centred = y.array() - y_mean;
-  const Eigen::RowVectorXd largest =
-      x.rows() > 0 && x.cols() > 0 ? centred.cwiseAbs().colwise().maxCoeff() : Eigen::RowVectorXd::Zero(x.cols());
   std::vector<std::ptrdiff_t> varying;
+  std::vector<double> largest;  // deviation of each
   for (std::ptrdiff_t k = 0; k < x.cols(); ++k) {
     if (x.col(k).minCoeff() < x.col(k).maxCoeff()) {
       varying.push_back(k);
+      largest.push_back(centred.col(k).cwiseAbs().maxCoeff());
     }
   }
   // Dividing by the largest deviation keeps the squares of very small and very large columns in range.
-  RowMajor scaled = centred(Eigen::all, varying) * largest(varying).cwiseInverse().asDiagonal();
+  const Eigen::Map<const Eigen::VectorXd> magnitude(largest.data(), std::ssize(largest));
+  RowMajor scaled = centred(Eigen::all, varying) * magnitude.cwiseInverse().asDiagonal();
   const Eigen::RowVectorXd deviation = (weights.transpose() * scaled.cwiseAbs2() / total).cwiseSqrt();
   scaled *= deviation.cwiseInverse().asDiagonal();
   const Eigen::MatrixXd correlations = scaled.transpose() * weights.asDiagonal() * scaled / total;
@@ -96,8 +97,10 @@ FewInputsModel fit_few_inputs(const RowMajor& x, const Eigen::VectorXd& y, const
 
   Solution solution;
   solution.columns = independent_columns(correlations);
-  const Eigen::MatrixXd chosen = correlations(solution.columns, solution.columns);
-  solution.inverse = chosen.llt().solve(Eigen::MatrixXd::Identity(chosen.rows(), chosen.cols()));
+  if (!solution.columns.empty()) {
+    const Eigen::MatrixXd chosen = correlations(solution.columns, solution.columns);
+    solution.inverse = chosen.llt().solve(Eigen::MatrixXd::Identity(chosen.rows(), chosen.cols()));
+  }
   solution.coefficients = solution.inverse * products(solution.columns);
   const double floor = rounding_of_squares * variance;
   solution.squares = std::max(floor, variance - solution.coefficients.dot(products(solution.columns)));
@@ -130,7 +133,7 @@ FewInputsModel fit_few_inputs(const RowMajor& x, const Eigen::VectorXd& y, const
   for (std::size_t k = 0; k < solution.columns.size(); ++k) {
     const std::ptrdiff_t at = solution.columns[k];
     const std::ptrdiff_t column = varying[static_cast<std::size_t>(at)];
-    model.slope(column) = coefficients(static_cast<std::ptrdiff_t>(k)) / (deviation(at) * largest(column));
+    model.slope(column) = coefficients(static_cast<std::ptrdiff_t>(k)) / (deviation(at) * magnitude(at));
     model.value -= model.slope(column) * mean(column);
   }
   model.rms = std::sqrt(weights.dot(model.residuals.cwiseAbs2()) / total);

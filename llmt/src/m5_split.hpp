@@ -1,5 +1,5 @@
 /// \file
-/// The split of M5': the largest decrease of the standard deviation of the outputs.
+/// The split of M5': the largest decrease of the scatter of the outputs.
 #pragma once
 
 #include <vector>
@@ -14,8 +14,8 @@ struct DeviationSplit {
   double threshold = 0.0;            ///< of a number: the middle of the gap
   bool by_missing = false;           ///< rows with a value go left, rows without one right
   std::vector<int> level_side = {};  ///< of a categorical input: -1 left, 1 right, 0 not seen
-  /// n sd - n_1 sd_1 - n_2 sd_2 over the rows that have a value, the outputs' deviations as parts of those of all
-  /// training rows, added up; n are sums of weights.
+  /// n I - n_1 I_1 - n_2 I_2 over the rows that have a value, with I the fifth root of an output's variance, as a part
+  /// of that of all training rows, added up over the outputs; n are sums of weights.
   double decrease = 0.0;
 };
 
@@ -29,9 +29,9 @@ struct DeviationNode {
 /// Sum over the outputs of their standard deviations (division by n), as parts of those of all training rows.
 double relative_deviation(const GrowthData& data, const DeviationNode& node);
 
-/// Compares every threshold between two distinct values that leaves `min_leaf_samples` rows on either side; levels in
-/// the order of their means of each output; and rows with against rows without a value. Equally good: the first input,
-/// then the smallest threshold.
+/// Compares every threshold between two distinct values that leaves `min_leaf_samples` and a fifth of the rows with a
+/// value on either side; levels alike, in the order of their means of each output; and rows with against rows without a
+/// value. Equally good: the first input, then the smallest threshold.
 DeviationSplit largest_decrease(const GrowthData& data, const DeviationNode& node);
 
 }  // namespace llmt

@@ -19,7 +19,10 @@ Plan make_plan(const FitOptions& options, const TrainingRows& all, std::ptrdiff_
   // Many rows: the widest transitions and the larger ridges, which are for few, take most of the time.
   const bool many_rows = folds == 1;
   Plan plan{options.growth, {}};
-  const ValidityChoice choice = is_lolimot(options.growth.rule) ? ValidityChoice::gaussian : options.blend.validity;
+  const bool is_m5 = options.growth.rule == GrowthRule::m5;
+  const ValidityChoice choice = is_lolimot(options.growth.rule) ? ValidityChoice::gaussian
+                                : is_m5                         ? ValidityChoice::crisp
+                                                                : options.blend.validity;
   const bool logistic = is_hilomot(options.growth.rule);
   const bool crisp_only =
       choice == ValidityChoice::crisp || (choice == ValidityChoice::automatic && !has_folds && !logistic);
@@ -55,7 +58,7 @@ Plan make_plan(const FitOptions& options, const TrainingRows& all, std::ptrdiff_
   }
   plan.candidates.shrinkages = options.blend.shrinkages;
   if (plan.candidates.shrinkages.empty()) {
-    plan.candidates.shrinkages = has_folds ? std::vector<double>{0.0, 0.1, 1.0} : std::vector<double>{0.0};
+    plan.candidates.shrinkages = has_folds && !is_m5 ? std::vector<double>{0.0, 0.1, 1.0} : std::vector<double>{0.0};
   }
   const SparseChoice sparse = options.local_models.sparse;
   plan.candidates.sparse = sparse == SparseChoice::always                   ? std::vector<bool>{true}
@@ -67,6 +70,9 @@ Plan make_plan(const FitOptions& options, const TrainingRows& all, std::ptrdiff_
   if (growth.significance < 0.0) {
     // What prunes best-first trees is what splits gain further down, and the held-out error says how far.
     growth.significance = many_leaves || (has_folds && growth.pruning == Pruning::weakest_link) ? 1.0 : 0.05;
+  }
+  if (growth.min_leaf_samples == 0 && is_m5) {
+    growth.min_leaf_samples = 2;  // fewer than four rows are not split (Quinlan 1992)
   }
   if (growth.min_leaf_samples == 0) {
     growth.min_leaf_samples = many_leaves ? std::max<std::ptrdiff_t>(5, regressors) : 2 * (regressors + 1);

@@ -10,6 +10,9 @@ namespace {
 
 constexpr std::ptrdiff_t block_rows = 4096;
 
+/// Rows are asked for this many before they are needed: those of a node lie all over the features.
+constexpr std::ptrdiff_t ahead = 12;
+
 }  // namespace
 
 SignLeaf SignLeaves::root() const {
@@ -31,6 +34,7 @@ Eigen::MatrixXd SignLeaves::residuals(const SignLeaf& leaf, const Node& node, in
   Eigen::MatrixXd result(count, features.outputs());
   parallel_for((count + block_rows - 1) / block_rows, threads, [&](std::ptrdiff_t block) {
     for (std::ptrdiff_t k = block * block_rows; k < std::min(count, (block + 1) * block_rows); ++k) {
+      features.prefetch(leaf.rows[static_cast<std::size_t>(std::min(count - 1, k + ahead))]);
       const double* const row = features.row(leaf.rows[static_cast<std::size_t>(k)]);
       for (std::ptrdiff_t o = 0; o < features.outputs(); ++o) {
         double predicted = 0.0;
@@ -75,7 +79,8 @@ SplitCandidate SignLeaves::examine(SignLeaf& leaf, const Node& parent, Node& nod
   const Eigen::MatrixXd left_over = residuals(leaf, node, threads);
   const Eigen::VectorXd weights = data_.weights(leaf.rows);
   const SearchNode search{rows_.features(), data_.output_weights, rss};
-  SignSplit numeric = search_by_signs(data_, {search, leaf.rows, leaf.values, left_over, weights, leaf.gram, threads});
+  SignSplit numeric =
+      search_by_signs(data_, {search, node.rank, leaf.rows, leaf.values, left_over, weights, leaf.gram, threads});
   std::vector<SplitCandidate> found(data_.num_levels.size());
   parallel_for(std::ssize(found), threads, [&](std::ptrdiff_t j) {
     if (data_.num_levels[static_cast<std::size_t>(j)] > 0) {

@@ -13,27 +13,15 @@ namespace {
 /// Deviates that agree to this part are equal: rounding does not choose between inputs.
 constexpr double tie_of_deviates = 1e-9;
 
-/// What the pooled variance may be of the mean square and still be rounding.
-constexpr double no_scatter = 1e-14;
-
 /// Thresholds are rounded to this part of the input's range in the node, so that a threshold on a value of the data, as
 /// on grids, does not send its rows left or right by rounding.
 constexpr double grid = 0x1p-32;
 
+/// A split that does not pass the F test at this level, or at that asked for, makes the next input worth a try.
+constexpr double usual_significance = 0.05;
+
 constexpr std::ptrdiff_t partial_sums = 16;
 constexpr std::ptrdiff_t rows_of_a_sum = 4096;
-
-/// Student's statistic of two classes' means with the pooled variance. `squares`: sums about the class means;
-/// `largest_squares`: what they and the difference are rounding against.
-double student(double difference, double squares, double largest_squares, const std::array<double, 2>& counts) {
-  const double freedom = counts[0] + counts[1] - 2.0;
-  const double tiny = no_scatter * largest_squares;
-  if (!(freedom > 0.0) || difference * difference * (counts[0] + counts[1]) <= tiny) {
-    return 0.0;
-  }
-  const double error = std::sqrt(std::max(squares, 0.0) / freedom * (1.0 / counts[0] + 1.0 / counts[1]));
-  return squares <= tiny ? std::copysign(std::numeric_limits<double>::infinity(), difference) : difference / error;
-}
 
 struct Cut {
   std::ptrdiff_t input;
@@ -90,75 +78,9 @@ void evaluate(const SignNode& node, SignSplit& split) {
   split.best.rss = rss[0] + rss[1] + (has_missing ? node.search.rss - rss[2] : 0.0);
   split.best.rank_left = rank[0];
   split.best.rank_right = rank[1];
-  split.best.evaluations = 1;
 }
 
 }  // namespace
-
-double SignStatistics::deviate() const {
-  const double t = std::max(std::abs(means), std::abs(variances));
-  return freedom > 0.0
-             ? (8.0 * freedom + 1.0) / (8.0 * freedom + 3.0) * std::sqrt(freedom * std::log1p(t * t / freedom))
-             : 0.0;
-}
-
-SignStatistics sign_statistics(std::span<const double> values, std::span<const double> residuals,
-                               std::span<const double> weights) {
-  SignStatistics result;
-  result.low = std::numeric_limits<double>::infinity();
-  result.high = -result.low;
-  for (const double value : values) {
-    result.low = value < result.low ? value : result.low;
-    result.high = value > result.high ? value : result.high;
-  }
-  if (!(result.low < result.high)) {
-    return result;
-  }
-  // Which digits are lost does not depend on the offset of the input, nor on the order of the rows.
-  const double origin = result.low + 0.5 * (result.high - result.low);
-  // Classes: positive, negative. Without branches, for signs come in no order.
-  std::array<double, 2> count{};
-  std::array<double, 2> sum{};
-  double all_squares = 0.0;
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    const bool known = values[i] == values[i];
-    const double deviation = known ? values[i] - origin : 0.0;
-    const double weight = known ? weights[i] : 0.0;
-    const double positive = residuals[i] < 0.0 ? 0.0 : weight;
-    const double negative = weight - positive;
-    count[0] += positive;
-    count[1] += negative;
-    sum[0] += positive * deviation;
-    sum[1] += negative * deviation;
-    all_squares += weight * deviation * deviation;
-  }
-  result.freedom = count[0] + count[1] - 2.0;
-  if (!(count[0] > 0.0 && count[1] > 0.0)) {
-    return result;
-  }
-  const std::array<double, 2> mean = {sum[0] / count[0], sum[1] / count[1]};
-  std::array<double, 2> distances{};
-  std::array<double, 2> squares{};
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    const bool known = values[i] == values[i];
-    const bool is_negative = residuals[i] < 0.0;
-    const double distance = known ? std::abs(values[i] - origin - (is_negative ? mean[1] : mean[0])) : 0.0;
-    const double weighted = known ? weights[i] * distance : 0.0;
-    const double positive = is_negative ? 0.0 : weighted;
-    const double negative = weighted - positive;
-    distances[0] += positive;
-    distances[1] += negative;
-    squares[0] += positive * distance;
-    squares[1] += negative * distance;
-  }
-  const double within = squares[0] + squares[1];
-  const double of_distances = within - distances[0] * distances[0] / count[0] - distances[1] * distances[1] / count[1];
-  result.positive_mean = origin + mean[0];
-  result.negative_mean = origin + mean[1];
-  result.means = student(mean[0] - mean[1], within, all_squares, count);
-  result.variances = student(distances[0] / count[0] - distances[1] / count[1], of_distances, within, count);
-  return result;
-}
 
 std::vector<double> sum_gram(const Features& features, std::span<const int> rows, int threads) {
   const GramShape shape(features);
@@ -193,7 +115,6 @@ SignSplit search_by_signs(const GrowthData& data, const SignNode& node) {
           std::span(node.weights.data(), static_cast<std::size_t>(count)));
     }
   });
-  SignSplit split;
   std::vector<Cut> candidates;
   for (std::ptrdiff_t j = 0; j < inputs; ++j) {
     for (std::ptrdiff_t o = 0; o < outputs; ++o) {
@@ -204,33 +125,41 @@ SignSplit search_by_signs(const GrowthData& data, const SignNode& node) {
     }
   }
   const std::ptrdiff_t tested = std::ssize(candidates);
-  while (!candidates.empty()) {
+  const double level = std::min(data.problem.options.significance, usual_significance);
+  const auto passes = [&](const SplitCandidate& split) {
+    return split.input >= 0 && data.is_significant(level, node.weights.sum(), node.rank, node.search.rss,
+                                                   {split.rank_left, split.rank_right}, split.rss, tested);
+  };
+  SignSplit best;
+  std::ptrdiff_t evaluations = 0;
+  while (!candidates.empty() && !passes(best.best)) {
     const std::size_t next = next_candidate(candidates);
     const Cut candidate = candidates[next];
     candidates.erase(candidates.begin() + static_cast<std::ptrdiff_t>(next));
+    SignSplit split;
     const std::span<const double> values = values_of(candidate.input);
-    for (std::vector<int>& side : split.sides) {
-      side.clear();
-    }
     for (std::size_t i = 0; i < values.size(); ++i) {
       if (!std::isnan(values[i])) {
         split.sides[values[i] <= candidate.threshold ? 0 : 1].push_back(static_cast<int>(i));
       }
     }
-    if (std::min(std::ssize(split.sides[0]), std::ssize(split.sides[1])) >=
-        std::max<std::ptrdiff_t>(smallest_leaf, 1)) {
-      split.best.input = static_cast<int>(candidate.input);
-      split.best.left = std::ssize(split.sides[0]);
-      split.best.last_left = candidate.threshold;
-      split.best.tested = tested;
-      evaluate(node, split);
-      return split;
+    if (std::min(std::ssize(split.sides[0]), std::ssize(split.sides[1])) < std::max<std::ptrdiff_t>(smallest_leaf, 1)) {
+      continue;
+    }
+    split.best.input = static_cast<int>(candidate.input);
+    split.best.left = std::ssize(split.sides[0]);
+    split.best.last_left = candidate.threshold;
+    evaluate(node, split);
+    ++evaluations;
+    if (best.best.input < 0 || split.best.rss < best.best.rss - tie_tolerance * node.search.rss) {
+      best = std::move(split);
     }
   }
-  for (std::vector<int>& side : split.sides) {
-    side.clear();
+  if (best.best.input >= 0) {
+    best.best.tested = tested;
+    best.best.evaluations = evaluations;
   }
-  return split;
+  return best;
 }
 
 }  // namespace llmt

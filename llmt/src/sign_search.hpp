@@ -36,6 +36,7 @@ SignStatistics sign_statistics(std::span<const double> values, std::span<const d
 /// Rows of a node, in features whose residuals are those of a model that need not be the node's own.
 struct SignNode {
   SearchNode search;                 ///< features and the node's residual sum of squares
+  int rank;                          ///< of the node's model
   std::span<const int> rows;         ///< of the features
   const Eigen::MatrixXd& values;     ///< of the split inputs in these rows, rows x split inputs; NaN: missing
   const Eigen::MatrixXd& residuals;  ///< of the node's own model, rows x outputs; only their signs count
@@ -51,9 +52,11 @@ struct SignSplit {
   std::array<std::vector<double>, 2> grams;  ///< and their Gram matrices
 };
 
-/// Of the numeric split inputs that whose classes differ most significantly, over all outputs, split at (m+ + m-) / 2;
-/// if that leaves too few rows on a side, the next one. Equal to nine digits: the first input. `best.tested` counts the
-/// inputs and outputs that could be tested.
+/// Of the numeric split inputs that whose classes differ most significantly, over all outputs, split at (m+ + m-) / 2.
+/// If that leaves too few rows on a side, or if it does not pass the F test at 5 % - a product of two inputs leaves
+/// signs that depend on neither of them alone - the next one; if none passes, that with the smallest sum of squares.
+/// Equally significant to nine digits: the first input. `best.tested` counts the inputs and outputs that could be
+/// tested. One pass over the values of each input, another one and one over the features for each split that is tried.
 SignSplit search_by_signs(const GrowthData& data, const SignNode& node);
 
 /// Gram matrix of some rows of features, in partial sums whose number does not depend on that of threads.

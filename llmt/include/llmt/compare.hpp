@@ -18,10 +18,10 @@ struct Method {
   FitOptions options;
 };
 
-/// Least squares; crisp trees grown by RD and by RETIS; Gaussians over a crisp tree as in Benes et al. (2022), without
-/// re-estimation, and with joint re-estimation; the blend with joint estimation; LOLIMOT; HILOMOT; where the number of
-/// `inputs` is given and of their local models quadratic ones can be made (LocalTerms), the crisp tree by RD with
-/// these. `base` gives the columns, weights, seeds and threads.
+/// Least squares; crisp trees grown by RD, by RETIS and by RA; M5' with its own pruning and smoothing; Gaussians over a
+/// crisp tree as in Benes et al. (2022), without re-estimation, and with joint re-estimation; the blend with joint
+/// estimation; LOLIMOT; HILOMOT; where the number of `inputs` is given and of their local models quadratic ones can be
+/// made (LocalTerms), the crisp tree by RD with these. `base` gives the columns, weights, seeds and threads.
 std::vector<Method> usual_methods(const FitOptions& base = {}, std::ptrdiff_t inputs = 0);
 
 /// What one method made of the data.

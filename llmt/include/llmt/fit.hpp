@@ -40,8 +40,8 @@ enum class GrowthRule {
   /// significantly is split at (m+ + m-) / 2. The split must pass the tests of RD. Nothing is sorted and no threshold
   /// searched: a level of the tree costs O(rows x coefficients^2).
   ra,
-  /// M5' (Quinlan 1992, Wang & Witten 1997): splits by the decrease of the standard deviation of the output, down to a
-  /// few rows; a node's model has the inputs tested below it, less those that do not pay; pruned from the leaves up by
+  /// M5' (Quinlan 1992, Wang & Witten 1997): splits by the decrease of the outputs' scatter, down to a few rows; a
+  /// node's model has the inputs tested below it, less those that do not pay; pruned from the leaves up by
   /// the adjusted error err (n + 2 v) / (n - v), v coefficients; models smoothed along the path to the root,
   /// (n p + 15 q) / (n + 15). Crisp, with models of its own: blends, Gaussians and shrinkages are refused.
   m5,
@@ -83,14 +83,14 @@ enum class Pruning {
 
 /// Why growth ended.
 enum class StopReason {
-  max_leaves,     ///< GrowthOptions::max_leaves reached
-  significance,   ///< no leaf has a split that passes the F test
-  variance_gain,  ///< no leaf has a split that lowers the residual variance enough
-  leaf_samples,   ///< no leaf is large enough to be split, or all its split inputs, or by M5' its outputs, are constant
-  exact_fit,      ///< the leaves reproduce the outputs to rounding
-  improvement,    ///< GrowthOptions::min_improvement: further splits improved the tree too little
-  aicc,           ///< LOLIMOT and HILOMOT without folds: the corrected Akaike criterion rose
-  pruning,        ///< pruning by RETIS or M5' removed the last splits
+  max_leaves,       ///< GrowthOptions::max_leaves reached
+  significance,     ///< no leaf has a split that passes the F test
+  variance_gain,    ///< no leaf has a split that lowers the residual variance enough
+  leaf_samples,     ///< no leaf is large enough to be split, or all its split inputs are constant; M5': or its outputs
+  exact_fit,        ///< the leaves reproduce the outputs to rounding
+  improvement,      ///< GrowthOptions::min_improvement: further splits improved the tree too little
+  aicc,             ///< LOLIMOT and HILOMOT without folds: the corrected Akaike criterion rose
+  pruning,          ///< pruning by RETIS or M5' removed the last splits
   cross_validation  ///< fewer leaves than grown had the smallest held-out error
 };
 
