@@ -21,7 +21,7 @@ struct FitArguments {
   bool no_intervals = false;
 };
 
-constexpr std::array<const char*, 4> rule_names = {"rd", "retis", "lolimot", "lolimot-data"};  // as GrowthRule
+constexpr std::array<const char*, 5> rule_names = {"rd", "retis", "lolimot", "lolimot-data", "hilomot"};  // GrowthRule
 constexpr std::array<const char*, 4> validity_names = {"auto", "crisp", "blend", "gaussian"};  // as ValidityChoice
 constexpr std::array<const char*, 3> search_names = {"auto", "exact", "binned"};               // as SplitSearch
 constexpr std::array<const char*, 3> estimation_names = {"as-grown", "local", "joint"};        // as Estimation
@@ -41,7 +41,8 @@ std::string describe(const Candidate& candidate) {
     const std::string name = candidate.leaves == 1 ? "least squares" : "crisp";
     return candidate.shrinkage > 0.0 ? fmt::format("{}, shrinkage {}", name, candidate.shrinkage) : name;
   }
-  std::string text = fmt::format("{}, width {}", candidate.validity.kind == ValidityKind::blend ? "blend" : "Gaussians",
+  constexpr std::array<const char*, 4> kinds = {"crisp", "blend", "Gaussians", "gates"};
+  std::string text = fmt::format("{}, width {}", kinds[static_cast<std::size_t>(candidate.validity.kind)],
                                  number(candidate.validity.width, 3));
   text += candidate.jump < no_jump ? fmt::format(", jumps from {}", number(candidate.jump, 3)) : "";
   text += candidate.estimation == Estimation::as_grown ? ", as grown"
@@ -52,7 +53,7 @@ std::string describe(const Candidate& candidate) {
 
 Json candidate_json(const CandidateError& entry) {
   const auto or_null = [](double value) { return std::isnan(value) ? Json(nullptr) : Json(value); };
-  constexpr std::array<const char*, 3> kinds = {"crisp", "blend", "gaussian"};
+  constexpr std::array<const char*, 4> kinds = {"crisp", "blend", "gaussian", "logistic"};
   return {{"validity", kinds[static_cast<std::size_t>(entry.candidate.validity.kind)]},
           {"width", entry.candidate.validity.width},
           {"jump", entry.candidate.jump < no_jump ? Json(entry.candidate.jump) : Json(nullptr)},
@@ -126,7 +127,7 @@ std::string selection_text(const FitArguments& arguments, const PartitionSummary
 /// How the splits of the final tree were searched; nothing if there were none to search.
 std::string search_text(const SearchSummary& search) {
   if (search.binned_nodes == 0) {
-    return search.evaluations == 0 ? "" : "Splits searched exactly.\n";
+    return search.evaluations == 0 || search.exact_nodes == 0 ? "" : "Splits searched exactly.\n";
   }
   return fmt::format(
       "Splits searched by bins in {} nodes, exactly in {} small ones. {}\n", search.binned_nodes, search.exact_nodes,
@@ -227,9 +228,9 @@ void add_fit(CLI::App& app) {
   command
       ->add_option("--rule", growth.rule,
                    "Growth rule: rd, retis (m-estimate pruning), lolimot (halves boxes), lolimot-data (data-driven "
-                   "thresholds)")
+                   "thresholds), hilomot (oblique splits)")
       ->transform(choice_of<GrowthRule>(rule_names))
-      ->option_text("rd|retis|lolimot|lolimot-data [rd]");
+      ->option_text("rd|retis|lolimot|lolimot-data|hilomot [rd]");
   command->add_option("--significance", growth.significance, "rd: of the F test, over all candidate splits; 1: no test")
       ->check(CLI::NonNegativeNumber)
       ->option_text("FLOAT [see docs/commands.md]");
@@ -253,10 +254,11 @@ void add_fit(CLI::App& app) {
       ->transform(choice_of<Estimation>(estimation_names))
       ->option_text("as-grown|local|joint [joint]");
   command
-      ->add_option("--width", blend.widths,
-                   "Widths to choose from: of a transition by the smaller child's extent; k_sigma")
+      ->add_option(
+          "--width", blend.widths,
+          "Widths to choose from: of a transition by the smaller child's extent; k_sigma; of the gates of hilomot")
       ->delimiter(',')
-      ->option_text("FLOAT,... [0.5,1,2,4; Gaussians 0.333]");
+      ->option_text("FLOAT,... [0.5,1,2,4; Gaussians 0.333; hilomot 1,2,4]");
   command
       ->add_option("--jump", blend.jumps,
                    "Jumps to choose from: where the output jumps by so many standard deviations there is no transition")

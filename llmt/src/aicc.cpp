@@ -20,7 +20,8 @@ double aicc(double rows, double loss, double effective) {
   if (rows - effective - 1.0 <= 0.0) {
     return std::numeric_limits<double>::infinity();
   }
-  return rows * std::log(loss / rows) + 2.0 * effective + 2.0 * effective * (effective + 1.0) / (rows - effective - 1.0);
+  return rows * std::log(loss / rows) + 2.0 * effective +
+         2.0 * effective * (effective + 1.0) / (rows - effective - 1.0);
 }
 
 }  // namespace llmt

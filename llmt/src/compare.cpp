@@ -155,8 +155,8 @@ std::vector<Method> usual_methods(const FitOptions& base) {
 
 namespace {
 
-/// Moves a row to either side of the plane of a node's split: along the split input, or in an oblique split orthogonally
-/// to the plane, every input measured by its training range. Inputs without a value stay.
+/// Moves a row to either side of the plane of a node's split: along the split input, or in an oblique split
+/// orthogonally to the plane, every input measured by its training range. Inputs without a value stay.
 std::pair<Eigen::VectorXd, Eigen::VectorXd> sides_of_plane(const Model& model, const Node& node,
                                                            const Eigen::VectorXd& row) {
   std::pair<Eigen::VectorXd, Eigen::VectorXd> sides{row, row};

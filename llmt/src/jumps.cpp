@@ -181,7 +181,8 @@ Eigen::VectorXd jump_sizes(const TrainingRows& all, const Partition& grown, int 
   Eigen::VectorXd sizes = Eigen::VectorXd::Zero(std::ssize(grown.nodes));
   parallel_for(std::ssize(grown.nodes), max_threads, [&](std::ptrdiff_t index) {
     const Node& node = grown.nodes[static_cast<std::size_t>(index)];
-    if (node.is_leaf() || !node.level_side.empty() || node.is_oblique() || node.threshold == std::numeric_limits<double>::max()) {
+    if (node.is_leaf() || !node.level_side.empty() || node.is_oblique() ||
+        node.threshold == std::numeric_limits<double>::max()) {
       return;
     }
     Sides sides;

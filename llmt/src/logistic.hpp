@@ -18,7 +18,8 @@ inline constexpr double logistic_reach = 37.0;
 /// promise, and several at a time.
 LLMT_INLINE double logistic(double u) {
   const double held = u < -logistic_reach ? -logistic_reach : u > logistic_reach ? logistic_reach : u;
-  // exp(u) = 2^k exp(r), k the nearest whole number to u / ln 2: adding 1.5 * 2^52 rounds, and leaves k in the last bits.
+  // exp(u) = 2^k exp(r), k the nearest whole number to u / ln 2: adding 1.5 * 2^52 rounds, and leaves k in the last
+  // bits.
   constexpr double shift = 0x1.8p52;
   const double shifted = held * 1.4426950408889634 + shift;
   const double k = shifted - shift;

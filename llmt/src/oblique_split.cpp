@@ -161,9 +161,8 @@ void add_output(const GateProblem& problem, const Eigen::VectorXd& shares, const
     follow = -normal.llt().solve(cross);
   } else {
     const Eigen::MatrixXd of_left = (fitted.once + hold * total * identity).llt().solve(pull.transpose());
-    const Eigen::MatrixXd of_right = ((1.0 + hold) * total * identity - fitted.once)
-                                         .llt()
-                                         .solve(pull.transpose() - cross.topRows(size));
+    const Eigen::MatrixXd of_right =
+        ((1.0 + hold) * total * identity - fitted.once).llt().solve(pull.transpose() - cross.topRows(size));
     follow << of_right, -of_left - of_right;
     left_over << -total * second - fitted.once * difference,
         fitted.products.col(output) - fitted.once * second - fitted.twice * difference;

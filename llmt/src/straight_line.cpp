@@ -175,7 +175,8 @@ class Cutter {
   Crossing crossing_of(const Node& node, const Comparison& along, double reach) const {
     const std::ptrdiff_t j = node.split_input;
     const auto on_line = [&](double value) {
-      return std::clamp(value, std::min(line_.reference(j), line_.point(j)), std::max(line_.reference(j), line_.point(j)));
+      return std::clamp(value, std::min(line_.reference(j), line_.point(j)),
+                        std::max(line_.reference(j), line_.point(j)));
     };
     const double left = on_line(node.threshold - reach);
     const double right = on_line(std::nextafter(node.threshold + reach, std::numeric_limits<double>::infinity()));

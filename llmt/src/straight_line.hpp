@@ -14,8 +14,8 @@ namespace llmt {
 /// Positions on a line that differ by less count as one.
 inline constexpr double same_position = 1e-12;
 
-/// From a reference at position 0 to a point at position 1. Inputs that cannot move, being categorical or missing at one
-/// end, are switched in the middle.
+/// From a reference at position 0 to a point at position 1. Inputs that cannot move, being categorical or missing at
+/// one end, are switched in the middle.
 struct StraightLine {
   StraightLine(const Model& model, const Eigen::Ref<const Eigen::VectorXd>& reference,
                const Eigen::Ref<const Eigen::VectorXd>& point);
@@ -41,7 +41,7 @@ struct Crossing {
 };
 
 struct Pieces {
-  std::vector<double> cuts;          ///< ends of pieces, ascending, the last one 1
+  std::vector<double> cuts;         ///< ends of pieces, ascending, the last one 1
   std::vector<Crossing> crossings;  ///< ascending
 };
 

@@ -19,8 +19,8 @@ struct Method {
 };
 
 /// Least squares; crisp trees grown by RD and by RETIS; Gaussians over a crisp tree as in Benes et al. (2022), without
-/// re-estimation, and with joint re-estimation; the blend with joint estimation; LOLIMOT; HILOMOT. `base` gives the columns,
-/// weights, seeds and threads.
+/// re-estimation, and with joint re-estimation; the blend with joint estimation; LOLIMOT; HILOMOT. `base` gives the
+/// columns, weights, seeds and threads.
 std::vector<Method> usual_methods(const FitOptions& base = {});
 
 /// What one method made of the data.

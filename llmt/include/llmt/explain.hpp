@@ -29,16 +29,16 @@ Eigen::VectorXd reference_point(const Model& model);
 /// gives slope_j (point_j - reference_j).
 ///
 /// The theory asks for a differentiable F; what jumps is shared out by rules of ours: where the line crosses the
-/// threshold of a split without transition, the jump belongs to the split input, and at an oblique split to the inputs as
-/// they move what it compares, which is the limit of ever steeper gates. An input that cannot move along a line
+/// threshold of a split without transition, the jump belongs to the split input, and at an oblique split to the inputs
+/// as they move what it compares, which is the limit of ever steeper gates. An input that cannot move along a line
 /// - categorical, or missing (NaN) at one end - keeps the value of the reference up to t = 1/2 and has that of the
 /// point from there on; the jump belongs to it. Jumps at the same t are taken one after the other in the order of the
 /// columns, at t = 1/2 those of thresholds before switched inputs.
 ///
 /// Computed to about 1e-10 of the output's range in training: the line is cut where it leaves a transition or the range
 /// of a node, in between the integrands of crisp models and blends are polynomials, which Gauss-Legendre integrates
-/// exactly; pieces whose shares do not add up (held outputs, Gaussians, logistic gates) are halved. What is left of the sum is divided
-/// over the piece's inputs in proportion, so that contributions add up to rounding.
+/// exactly; pieces whose shares do not add up (held outputs, Gaussians, logistic gates) are halved. What is left of the
+/// sum is divided over the piece's inputs in proportion, so that contributions add up to rounding.
 ///
 /// Throws std::invalid_argument if a vector does not have the model's number of inputs or holds an infinite value.
 Attribution attribute(const Model& model, const Eigen::Ref<const Eigen::VectorXd>& point,

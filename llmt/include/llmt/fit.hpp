@@ -37,8 +37,8 @@ enum class GrowthRule {
   lolimot_data_driven,  ///< LOLIMOT with thresholds where two crisp models of the box's rows leave the smallest error
   /// HILOMOT (Nelles 2006): the worst local model is split by a plane of any direction with a logistic gate, found by
   /// nonlinear optimisation with the two local models nested inside; validities are products of gates. Takes
-  /// BlendOptions::widths (of the gates, 1: as grown) and Estimation as lolimot does; ValidityChoice automatic or crisp.
-  /// Without folds AICc decides how many leaves stay.
+  /// BlendOptions::widths (of the gates, 1: as grown) and Estimation as lolimot does; ValidityChoice automatic or
+  /// crisp. Without folds AICc decides how many leaves stay.
   hilomot
 };
 

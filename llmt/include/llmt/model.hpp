@@ -24,15 +24,16 @@ enum class ValidityKind {
   /// Normalised Gaussians, Phi_i = mu_i / sum mu, mu_i = exp(-1/2 sum_j ((x_j - c_ij) / sigma_ij)^2): c_ij the middle
   /// of the leaf's box, closed by the training extent, sigma_ij = width times its side (Nelles 2001; width = k_sigma).
   gaussian,
-  /// Products of logistic gates along the path, as in HILOMOT (Nelles 2006): with u = (s - threshold) / h and s the side
-  /// of the split, see Node, the left child has the share g = 1 / (1 + exp(u)) and the right one 1 - g.
+  /// Products of logistic gates along the path, as in HILOMOT (Nelles 2006): with u = (s - threshold) / h and s the
+  /// side of the split, see Node, the left child has the share g = 1 / (1 + exp(u)) and the right one 1 - g.
   logistic
 };
 
 struct Validity {
   ValidityKind kind = ValidityKind::crisp;
   /// blend: h as a multiple of the distance from the threshold to the nearer side of the node's box (the extent of the
-  /// smaller child), for splits on numbers; gaussian: k_sigma; logistic: h as a multiple of that of growth. 0 for crisp.
+  /// smaller child), for splits on numbers; gaussian: k_sigma; logistic: h as a multiple of that of growth. 0 for
+  /// crisp.
   double width = 0.0;
   int smoothness = 1;  ///< blend: continuous derivatives of the prediction, 1 or 2
 };
@@ -49,7 +50,7 @@ struct Node {
   /// In the unit of s. The largest double: rows that have a value go left, rows without one right.
   double threshold = 0.0;
   /// Oblique split: weight of every input of the model, 0 for categorical ones, in units of 1 / the input's; as grown,
-  /// s has steps of one standard deviation. Empty: axis-orthogonal.
+  /// of length 1 where every input is measured by its standard deviation. Empty: axis-orthogonal.
   Eigen::VectorXd direction = {};
   /// Split on a categorical input: for each of its levels -1 left, 1 right, 0 not seen here. Empty for numbers.
   std::vector<int> level_side = {};
@@ -129,7 +130,8 @@ struct Leaf {
   int rank = 0;                ///< as Node::rank
   Eigen::VectorXd low;         ///< box, one per model input: low < x <= high; -infinity where open
   Eigen::VectorXd high;        ///< +infinity where open
-  std::vector<ObliqueSide> sides = {};  ///< what oblique splits cut off the box, from the root down
+  /// On which sides of oblique splits it lies as well, from the root down.
+  std::vector<ObliqueSide> sides = {};
   std::vector<std::vector<int>>
       levels;                 ///< one per model input: levels that belong to the leaf; empty: all, or numeric
   Eigen::VectorXd rmse;       ///< sqrt(rss / samples) over the training rows, one per output of the partition
