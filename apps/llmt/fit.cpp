@@ -24,8 +24,8 @@ struct FitArguments {
   StreamRule stream_rule = StreamRule::rd;
 };
 
-constexpr std::array<const char*, 6> rule_names = {"rd",           "retis", "lolimot",
-                                                   "lolimot-data", "ra",    "m5"};             // as GrowthRule
+constexpr std::array<const char*, 7> rule_names = {"rd", "retis", "lolimot", "lolimot-data",
+                                                   "ra", "m5",    "hilomot"};                  // as GrowthRule
 constexpr std::array<const char*, 4> validity_names = {"auto", "crisp", "blend", "gaussian"};  // as ValidityChoice
 constexpr std::array<const char*, 3> search_names = {"auto", "exact", "binned"};               // as SplitSearch
 constexpr std::array<const char*, 2> stream_rule_names = {"rd", "ra"};                         // as StreamRule
@@ -49,9 +49,9 @@ std::string describe(const Candidate& candidate) {
     const std::string name = fmt::format("{}{}", candidate.leaves == 1 ? "least squares" : "crisp", sparse);
     return candidate.shrinkage > 0.0 ? fmt::format("{}, shrinkage {}", name, candidate.shrinkage) : name;
   }
-  std::string text =
-      fmt::format("{}{}, width {}", candidate.validity.kind == ValidityKind::blend ? "blend" : "Gaussians", sparse,
-                  number(candidate.validity.width, 3));
+  constexpr std::array<const char*, 4> kinds = {"crisp", "blend", "Gaussians", "gates"};
+  std::string text = fmt::format("{}{}, width {}", kinds[static_cast<std::size_t>(candidate.validity.kind)], sparse,
+                                 number(candidate.validity.width, 3));
   text += candidate.jump < no_jump ? fmt::format(", jumps from {}", number(candidate.jump, 3)) : "";
   text += candidate.estimation == Estimation::as_grown ? ", as grown"
           : candidate.estimation == Estimation::local  ? ", local"
@@ -61,7 +61,7 @@ std::string describe(const Candidate& candidate) {
 
 Json candidate_json(const CandidateError& entry) {
   const auto or_null = [](double value) { return std::isnan(value) ? Json(nullptr) : Json(value); };
-  constexpr std::array<const char*, 3> kinds = {"crisp", "blend", "gaussian"};
+  constexpr std::array<const char*, 4> kinds = {"crisp", "blend", "gaussian", "logistic"};
   return {{"validity", kinds[static_cast<std::size_t>(entry.candidate.validity.kind)]},
           {"width", entry.candidate.validity.width},
           {"jump", entry.candidate.jump < no_jump ? Json(entry.candidate.jump) : Json(nullptr)},
@@ -274,9 +274,10 @@ void add_fit(CLI::App& app) {
   command
       ->add_option("--rule", growth.rule,
                    "Growth rule: rd, retis (m-estimate pruning), lolimot (halves boxes), lolimot-data (data-driven "
-                   "thresholds), ra (by the signs of residuals, no search), m5 (M5', smoothed)")
+                   "thresholds), ra (by the signs of residuals, no search), m5 (M5', smoothed), hilomot (oblique "
+                   "splits)")
       ->transform(choice_of<GrowthRule>(rule_names))
-      ->option_text("rd|retis|lolimot|lolimot-data|ra|m5 [rd]");
+      ->option_text("rd|retis|lolimot|lolimot-data|ra|m5|hilomot [rd]");
   command
       ->add_option("--significance", growth.significance,
                    "rd, ra: of the F test, over all candidate splits; 1: no test")
@@ -315,10 +316,11 @@ void add_fit(CLI::App& app) {
       ->transform(choice_of<Estimation>(estimation_names))
       ->option_text("as-grown|local|joint [joint]");
   command
-      ->add_option("--width", blend.widths,
-                   "Widths to choose from: of a transition by the smaller child's extent; k_sigma")
+      ->add_option(
+          "--width", blend.widths,
+          "Widths to choose from: of a transition by the smaller child's extent; k_sigma; of the gates of hilomot")
       ->delimiter(',')
-      ->option_text("FLOAT,... [0.5,1,2,4; Gaussians 0.333]");
+      ->option_text("FLOAT,... [0.5,1,2,4; Gaussians 0.333; hilomot 1,2,4]");
   command
       ->add_option("--jump", blend.jumps,
                    "Jumps to choose from: where the output jumps by so many standard deviations there is no transition")

@@ -19,9 +19,35 @@ struct InspectArguments {
   bool json = false;
 };
 
-/// "x1 <= 3, -1 < x2 <= 4"; "everywhere" for a single leaf.
-std::string conditions(const Model& model, const Leaf& leaf) {
+/// What the oblique split of a node compares, without its constant: "0.8 x1 - 0.3 x2".
+std::string direction(const Model& model, const Node& node) {
+  std::string text;
+  for (std::ptrdiff_t j = 0; j < node.direction.size(); ++j) {
+    if (const double weight = node.direction(j); weight != 0.0) {
+      const char* sign = weight < 0.0 ? "-" : text.empty() ? "" : "+";
+      text += fmt::format("{}{}{}{} {}", text.empty() ? "" : " ", sign, text.empty() ? "" : " ",
+                          number(std::abs(weight)), model.inputs()[static_cast<std::size_t>(j)].name);
+    }
+  }
+  return text;
+}
+
+/// The threshold of that.
+double threshold(const Model& model, const Node& node) {
+  double value = node.threshold;
+  for (std::ptrdiff_t j = 0; j < node.direction.size(); ++j) {
+    value += node.direction(j) * model.inputs()[static_cast<std::size_t>(j)].centre;
+  }
+  return value;
+}
+
+/// "x1 <= 3, -1 < x2 <= 4"; "everywhere" for a single leaf; "s2 > 0.5" for the side of the second split of growth.
+std::string conditions(const Model& model, const Partition& partition, const Leaf& leaf) {
   std::vector<std::string> parts;
+  for (const ObliqueSide& side : leaf.sides) {
+    const Node& node = partition.nodes[static_cast<std::size_t>(side.node)];
+    parts.push_back(fmt::format("s{} {} {}", node.right / 2, side.left ? "<=" : ">", number(threshold(model, node))));
+  }
   for (std::ptrdiff_t j = 0; j < model.num_inputs(); ++j) {
     const InputColumn& input = model.inputs()[static_cast<std::size_t>(j)];
     const std::string& name = input.name;
@@ -95,6 +121,10 @@ std::string validity_text(const Validity& validity) {
           number(validity.width, 3));
     case ValidityKind::gaussian:
       return fmt::format("blended by Gaussians, k_sigma {}", number(validity.width, 3));
+    case ValidityKind::logistic:
+      return fmt::format(
+          "blended by logistic gates, width {}: at a half width from a threshold the other side has 27 %",
+          number(validity.width, 3));
   }
   return "";
 }
@@ -103,8 +133,8 @@ std::string validity_text(const Validity& validity) {
 std::string jumps_text(const Model& model, const Partition& partition) {
   std::vector<std::string> places;
   for (const Node& node : partition.nodes) {
-    const bool on_number =
-        !node.is_leaf() && node.level_side.empty() && node.threshold < std::numeric_limits<double>::max();
+    const bool on_number = !node.is_leaf() && !node.is_oblique() && node.level_side.empty() &&
+                           node.threshold < std::numeric_limits<double>::max();
     if (partition.validity.kind == ValidityKind::blend && on_number && node.half_width == 0.0) {
       const std::string place = fmt::format("{} = {}", model.inputs()[static_cast<std::size_t>(node.split_input)].name,
                                             number(node.threshold));
@@ -114,6 +144,20 @@ std::string jumps_text(const Model& model, const Partition& partition) {
     }
   }
   return fmt::format("{}", fmt::join(places, ", "));
+}
+
+void print_directions(const Model& model, const Partition& partition) {
+  Table table({"oblique split", "compares", "half width"});
+  bool any = false;
+  for (const Node& node : partition.nodes) {
+    if (node.is_oblique()) {
+      any = true;
+      table.add({fmt::format("s{}", node.right / 2), direction(model, node), number(node.half_width, 3)});
+    }
+  }
+  if (any) {
+    print("\n" + table.text());
+  }
 }
 
 void print_model(const Model& model, const std::string& path) {
@@ -145,12 +189,13 @@ void print_model(const Model& model, const std::string& path) {
                                         [&](const Leaf& other) { return other.local_model == leaves[k].local_model; });
         const std::ptrdiff_t shown = first - leaves.begin();
         table.add({fmt::format("{}", k + 1), fmt::format("{}", leaves[k].samples), number(leaves[k].rmse(output), 3),
-                   conditions(model, leaves[k]),
+                   conditions(model, partition, leaves[k]),
                    shown < static_cast<std::ptrdiff_t>(k) ? fmt::format("as in leaf {}", shown + 1)
                                                           : formula(model, leaves[k], output)});
       }
       print(table.text());
     }
+    print_directions(model, partition);
     if (const std::string jumps = jumps_text(model, partition); !jumps.empty()) {
       print(fmt::format("Jumps, not blended: {}\n", jumps));
     }
@@ -180,7 +225,7 @@ Json leaf_table(const Model& model) {
   }
   for (std::ptrdiff_t p = 0; p < std::ssize(model.partitions()); ++p) {
     const Partition& partition = model.partitions()[static_cast<std::size_t>(p)];
-    constexpr std::array<const char*, 3> kinds = {"crisp", "blend", "gaussian"};
+    constexpr std::array<const char*, 4> kinds = {"crisp", "blend", "gaussian", "logistic"};
     Json entry;
     entry["validity"] = {{"kind", kinds[static_cast<std::size_t>(partition.validity.kind)]},
                          {"width", partition.validity.width},
@@ -188,7 +233,19 @@ Json leaf_table(const Model& model) {
     for (const int output : partition.outputs) {
       entry["targets"].push_back(model.outputs()[static_cast<std::size_t>(output)].name);
     }
+    for (std::size_t i = 0; i < partition.nodes.size(); ++i) {
+      if (const Node& node = partition.nodes[i]; node.is_oblique()) {
+        entry["oblique_splits"].push_back({{"node", i},
+                                           {"direction", finite_or_null(node.direction)},
+                                           {"threshold", threshold(model, node)},
+                                           {"half_width", node.half_width}});
+      }
+    }
     for (const Leaf& leaf : model.leaves(p)) {
+      Json sides = Json::array();
+      for (const ObliqueSide& side : leaf.sides) {
+        sides.push_back({{"node", side.node}, {"side", side.left ? "left" : "right"}});
+      }
       Json slopes = Json::array();
       for (std::ptrdiff_t o = 0; o < leaf.slope.rows(); ++o) {
         slopes.push_back(finite_or_null(leaf.slope.row(o)));
@@ -199,6 +256,7 @@ Json leaf_table(const Model& model) {
                                  {"low", finite_or_null(leaf.low)},
                                  {"high", finite_or_null(leaf.high)},
                                  {"levels", leaf.levels},
+                                 {"sides", std::move(sides)},
                                  {"rmse", finite_or_null(leaf.rmse)},
                                  {"intercept", finite_or_null(leaf.intercept)},
                                  {"slope", std::move(slopes)}});

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <optional>
 
 #include "aicc.hpp"
@@ -38,7 +39,8 @@ constexpr double least_direction = 1e-6;
 /// Of the axis-orthogonal splits so many are starts of the optimisation.
 constexpr std::ptrdiff_t axes_to_start_from = 2;
 
-/// A categorical input is cut in at most so many places of the order of its levels.
+/// The levels of a categorical input are put in so many orders, and each is cut in at most so many places.
+constexpr std::size_t orders_of_levels = 3;
 constexpr std::size_t most_level_cuts = 32;
 
 /// A local model that no other stands below.
@@ -55,7 +57,7 @@ struct OpenLeaf {
 struct Cut {
   double loss = std::numeric_limits<double>::infinity();
   Eigen::VectorXd normal;  // of length 1 in standardised inputs; empty: by levels
-  double threshold = 0.0;
+  double threshold = 0.0;  // by levels: share of rows without one
   double half_width = 0.0;
   int input = -1;  // by levels
   std::vector<int> level_side;
@@ -205,6 +207,10 @@ class Hilomot {
     for (const OpenLeaf& leaf : leaves_) {
       effective += outputs * leaf.effective;
     }
+    // Planes are fitted too.
+    for (const Node& node : nodes_) {
+      effective += static_cast<double>((node.direction.array() != 0.0).count());
+    }
     const double loss = data_.weights.dot((data_.outputs - predicted_).cwiseAbs2() * data_.output_weights);
     return aicc(data_.weights.sum() * outputs, std::max(loss, 1e-24 * outputs), effective);
   }
@@ -340,67 +346,92 @@ class Hilomot {
     return eigen.eigenvectors().col(largest);
   }
 
-  /// Levels in the order of their mean residual, cut where that leaves least. Rows without a level belong to both
-  /// sides.
-  Cut best_levels(const OpenLeaf& leaf, const GateProblem& problem, int input) {
-    Cut best;
-    const std::size_t levels =
-        static_cast<std::size_t>(data_.training.table->num_levels[static_cast<std::size_t>(input)]);
-    std::vector<int> level_of(leaf.rows.size(), -1);
-    std::vector<double> weight(levels, 0.0);
-    std::vector<double> sum(levels, 0.0);
-    const Eigen::VectorXd residual = problem.y * problem.output_weights.cwiseSqrt();
-    double known = 0.0;
+  /// Of a leaf's rows: their level, -1 where there is none, and the weight of every level.
+  struct Levels {
+    int input = -1;
+    std::vector<int> of_row;
+    Eigen::VectorXd weight;
+  };
+
+  Levels levels_of(const OpenLeaf& leaf, const GateProblem& problem, int input) const {
+    const Table& table = *data_.training.table;
+    Levels levels{input, std::vector<int>(leaf.rows.size(), -1),
+                  Eigen::VectorXd::Zero(table.num_levels[static_cast<std::size_t>(input)])};
     for (std::size_t i = 0; i < leaf.rows.size(); ++i) {
-      const std::ptrdiff_t row = data_.training.rows[static_cast<std::size_t>(leaf.rows[i])];
-      const double value = data_.training.table->inputs(row, input);
+      const double value = table.inputs(data_.training.rows[static_cast<std::size_t>(leaf.rows[i])], input);
       if (!std::isnan(value)) {
-        const std::size_t level = static_cast<std::size_t>(value);
-        level_of[i] = static_cast<int>(level);
-        weight[level] += problem.weights(static_cast<std::ptrdiff_t>(i));
-        sum[level] += problem.weights(static_cast<std::ptrdiff_t>(i)) * residual(static_cast<std::ptrdiff_t>(i));
-        known += problem.weights(static_cast<std::ptrdiff_t>(i));
+        levels.of_row[i] = static_cast<int>(value);
+        levels.weight(levels.of_row[i]) += problem.weights(static_cast<std::ptrdiff_t>(i));
       }
     }
-    std::vector<int> order;
-    for (std::size_t level = 0; level < levels; ++level) {
-      if (weight[level] > 0.0) {
-        order.push_back(static_cast<int>(level));
+    return levels;
+  }
+
+  /// The levels that occur are put in order by the mean, over their rows, of the residual times a regressor: levels of
+  /// which the slopes differ. Of these orders those in which levels differ most are cut where that leaves least.
+  Cut best_levels(const OpenLeaf& leaf, const GateProblem& problem, int input) {
+    const Levels levels = levels_of(leaf, problem, input);
+    const std::ptrdiff_t columns = problem.a.cols();
+    const Eigen::VectorXd residual = problem.weights.cwiseProduct(problem.y * problem.output_weights.cwiseSqrt());
+    Eigen::MatrixXd means = Eigen::MatrixXd::Zero(columns, levels.weight.size());
+    for (std::size_t i = 0; i < levels.of_row.size(); ++i) {
+      if (levels.of_row[i] >= 0) {
+        const std::ptrdiff_t row = static_cast<std::ptrdiff_t>(i);
+        means.col(levels.of_row[i]) += residual(row) * problem.a.row(row).transpose();
       }
     }
-    std::stable_sort(order.begin(), order.end(), [&](int a, int b) {
-      return sum[static_cast<std::size_t>(a)] * weight[static_cast<std::size_t>(b)] <
-             sum[static_cast<std::size_t>(b)] * weight[static_cast<std::size_t>(a)];
-    });
+    std::vector<int> present;
+    for (int level = 0; level < levels.weight.size(); ++level) {
+      if (levels.weight(level) > 0.0) {
+        means.col(level) /= levels.weight(level);
+        present.push_back(level);
+      }
+    }
+    const Eigen::VectorXd spread = means.cwiseAbs2() * levels.weight;
+    std::vector<std::ptrdiff_t> keys(static_cast<std::size_t>(columns));
+    std::iota(keys.begin(), keys.end(), std::ptrdiff_t{0});
+    std::stable_sort(keys.begin(), keys.end(), [&](auto a, auto b) { return spread(a) > spread(b); });
+    keys.resize(std::min(keys.size(), orders_of_levels));
+    Cut best;
+    for (const std::ptrdiff_t key : keys) {
+      std::stable_sort(present.begin(), present.end(), [&](int a, int b) { return means(key, a) < means(key, b); });
+      cut_order(problem, levels, present, best);
+    }
+    return best;
+  }
+
+  /// Rows without a level belong to both sides.
+  void cut_order(const GateProblem& problem, const Levels& levels, const std::vector<int>& order, Cut& best) {
     const std::size_t step = std::max<std::size_t>(1, order.size() / most_level_cuts);
-    std::vector<int> side(levels, 0);
+    std::vector<int> side(static_cast<std::size_t>(levels.weight.size()), 0);
     for (const int level : order) {
       side[static_cast<std::size_t>(level)] = 1;
     }
+    const double known = levels.weight.sum();
     double on_left = 0.0;
     for (std::size_t k = 0; k + 1 < order.size(); ++k) {
       side[static_cast<std::size_t>(order[k])] = -1;
-      on_left += weight[static_cast<std::size_t>(order[k])];
+      on_left += levels.weight(order[k]);
       if ((k + 1) % step != 0) {
         continue;
       }
-      Eigen::VectorXd share(std::ssize(leaf.rows));
-      for (std::size_t i = 0; i < leaf.rows.size(); ++i) {
-        share(static_cast<std::ptrdiff_t>(i)) = level_of[i] < 0                                   ? on_left / known
-                                                : side[static_cast<std::size_t>(level_of[i])] < 0 ? 1.0
-                                                                                                  : 0.0;
+      Eigen::VectorXd share(std::ssize(levels.of_row));
+      for (std::size_t i = 0; i < levels.of_row.size(); ++i) {
+        const int level = levels.of_row[i];
+        share(static_cast<std::ptrdiff_t>(i)) = level < 0                                   ? on_left / known
+                                                : side[static_cast<std::size_t>(level)] < 0 ? 1.0
+                                                                                            : 0.0;
       }
       const double loss = share_loss(problem, share);
       ++evaluations_;
       if (loss < best.loss) {
         best.loss = loss;
-        best.input = input;
+        best.input = levels.input;
         best.level_side = side;
         best.threshold = on_left / known;
         best.share = std::move(share);
       }
     }
-    return best;
   }
 
   void split(OpenLeaf& leaf, const Cut& cut) {

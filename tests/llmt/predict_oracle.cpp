@@ -9,8 +9,22 @@ namespace {
 
 bool is_number_split(const llmt::Node& node) { return node.level_side.empty(); }
 
-double share_of_left(const llmt::Partition& partition, const llmt::Node& node, const Eigen::VectorXd& row) {
-  const double x = row(node.split_input);
+/// What a split compares.
+double side(const llmt::Model& model, const llmt::Node& node, const Eigen::VectorXd& row) {
+  if (node.direction.size() == 0) {
+    return row(node.split_input);
+  }
+  double sum = 0.0;
+  for (std::ptrdiff_t j = 0; j < row.size(); ++j) {
+    const double centre = model.inputs()[static_cast<std::size_t>(j)].centre;
+    sum += node.direction(j) == 0.0 || std::isnan(row(j)) ? 0.0 : node.direction(j) * (row(j) - centre);
+  }
+  return sum;
+}
+
+double share_of_left(const llmt::Model& model, const llmt::Partition& partition, const llmt::Node& node,
+                     const Eigen::VectorXd& row) {
+  const double x = side(model, node, row);
   if (!is_number_split(node)) {
     const bool known = x >= 0.0 && x < static_cast<double>(node.level_side.size());
     const int side = known ? node.level_side[static_cast<std::size_t>(x)] : 0;
@@ -23,21 +37,24 @@ double share_of_left(const llmt::Partition& partition, const llmt::Node& node, c
     return x <= node.threshold ? 1.0 : 0.0;
   }
   const double u = (x - node.threshold) / node.half_width;
+  if (partition.validity.kind == llmt::ValidityKind::logistic) {
+    return 1.0 / (1.0 + std::exp(u));
+  }
   const double v = (std::clamp(u, -1.0, 1.0) + 1.0) / 2.0;
   return partition.validity.smoothness == 1 ? 1.0 - v * v * (3.0 - 2.0 * v)
                                             : 1.0 - v * v * v * (10.0 - 15.0 * v + 6.0 * v * v);
 }
 
-void share(const llmt::Partition& partition, int index, double validity, const Eigen::VectorXd& row,
-           std::vector<double>& result) {
+void share(const llmt::Model& model, const llmt::Partition& partition, int index, double validity,
+           const Eigen::VectorXd& row, std::vector<double>& result) {
   const llmt::Node& node = partition.nodes[static_cast<std::size_t>(index)];
   if (node.is_leaf()) {
     result[static_cast<std::size_t>(index)] = validity;
     return;
   }
-  const double left = share_of_left(partition, node, row);
-  share(partition, node.left, validity * left, row, result);
-  share(partition, node.right, validity * (1.0 - left), row, result);
+  const double left = share_of_left(model, partition, node, row);
+  share(model, partition, node.left, validity * left, row, result);
+  share(model, partition, node.right, validity * (1.0 - left), row, result);
 }
 
 void share_gaussians(const llmt::Model& model, std::ptrdiff_t index, const Eigen::VectorXd& row,
@@ -154,7 +171,7 @@ std::vector<double> validities(const llmt::Model& model, const llmt::Partition& 
   if (partition.validity.kind == llmt::ValidityKind::gaussian) {
     share_gaussians(model, &partition - model.partitions().data(), row, result);
   } else {
-    share(partition, 0, 1.0, row, result);
+    share(model, partition, 0, 1.0, row, result);
   }
   return result;
 }

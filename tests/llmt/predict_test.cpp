@@ -28,6 +28,7 @@ struct Kind {
   int outputs = 1;
   bool shared = false;  // one partition for all outputs
   int leaves = 20;
+  bool oblique = false;  // splits on numbers
 };
 
 Eigen::VectorXd normal(std::ptrdiff_t size, llmt::Random& random) {
@@ -97,6 +98,17 @@ llmt::Partition random_partition(const Kind& kind, std::vector<int> outputs,
       if (kind.validity == ValidityKind::blend && random.uniform() < 0.9) {
         node.half_width = std::min(node.threshold - from, to - node.threshold);
       }
+      if (kind.validity == ValidityKind::logistic && random.uniform() < 0.9) {
+        node.half_width = random.uniform() < 0.2 ? 0.001 : 0.2;
+      }
+      if (kind.oblique) {
+        node.direction = Eigen::VectorXd::Zero(kind.inputs);
+        for (int j = 0; j < kind.inputs - kind.categories; ++j) {
+          node.direction(j) = random.uniform() < 0.8 ? random.normal() : 0.0;
+        }
+        node.direction(node.split_input) += 1.5;
+        node.threshold = random.uniform(-0.5, 0.5);
+      }
     }
     for (int child = 0; child < 2; ++child) {
       const llmt::Node& parent = partition.nodes[index];
@@ -114,7 +126,7 @@ llmt::Model random_model(const Kind& kind, std::uint64_t seed) {
   std::vector<llmt::InputColumn> inputs;
   std::vector<llmt::Regressor> regressors;
   for (int j = 0; j < kind.inputs; ++j) {
-    inputs.push_back({.name = std::to_string(j), .low = -1.0, .high = 1.0, .centre = 0.0});
+    inputs.push_back({.name = std::to_string(j), .low = -1.0, .high = 1.0, .centre = kind.oblique ? 0.1 : 0.0});
     if (j < kind.inputs - kind.categories) {
       regressors.push_back({.input = j, .level = -1, .centre = 0.1 * random.normal()});
       continue;
@@ -318,7 +330,17 @@ INSTANTIATE_TEST_SUITE_P(
                          .outputs = 10,
                          .shared = true},
                     Kind{.name = "BlendApart", .validity = ValidityKind::blend, .categories = 1, .outputs = 3},
-                    Kind{.name = "Gaussian", .validity = ValidityKind::gaussian, .inputs = 4, .outputs = 2}),
+                    Kind{.name = "Gaussian", .validity = ValidityKind::gaussian, .inputs = 4, .outputs = 2},
+                    Kind{.name = "Logistic", .validity = ValidityKind::logistic, .inputs = 4, .outputs = 2},
+                    Kind{.name = "ObliqueCrisp", .inputs = 4, .categories = 1, .oblique = true},
+                    Kind{.name = "ObliqueBlend", .validity = ValidityKind::blend, .inputs = 4, .oblique = true},
+                    Kind{.name = "ObliqueLogistic",
+                         .validity = ValidityKind::logistic,
+                         .inputs = 6,
+                         .categories = 2,
+                         .outputs = 2,
+                         .shared = true,
+                         .oblique = true}),
     [](const auto& param) { return param.param.name; });
 
 }  // namespace

@@ -50,7 +50,7 @@ struct Node {
   /// In the unit of s. The largest double: rows that have a value go left, rows without one right.
   double threshold = 0.0;
   /// Oblique split: weight of every input of the model, 0 for categorical ones, in units of 1 / the input's; as grown,
-  /// s has steps of one standard deviation. Empty: axis-orthogonal.
+  /// of length 1 where every input is measured by its standard deviation. Empty: axis-orthogonal.
   Eigen::VectorXd direction = {};
   /// Split on a categorical input: for each of its levels -1 left, 1 right, 0 not seen here. Empty for numbers.
   std::vector<int> level_side = {};
@@ -136,12 +136,13 @@ struct ObliqueSide {
 
 /// A leaf as a person reads it: where it holds and what it says there.
 struct Leaf {
-  int node = 0;                         ///< index into Partition::nodes
-  std::ptrdiff_t samples = 0;           ///< training rows
-  int rank = 0;                         ///< as Node::rank
-  Eigen::VectorXd low;                  ///< box, one per model input: low < x <= high; -infinity where open
-  Eigen::VectorXd high;                 ///< +infinity where open
-  std::vector<ObliqueSide> sides = {};  ///< what oblique splits cut off the box, from the root down
+  int node = 0;                ///< index into Partition::nodes
+  std::ptrdiff_t samples = 0;  ///< training rows
+  int rank = 0;                ///< as Node::rank
+  Eigen::VectorXd low;         ///< box, one per model input: low < x <= high; -infinity where open
+  Eigen::VectorXd high;        ///< +infinity where open
+  /// On which sides of oblique splits it lies as well, from the root down.
+  std::vector<ObliqueSide> sides = {};
   std::vector<std::vector<int>>
       levels;            ///< one per model input: levels that belong to the leaf; empty: all, or numeric
   Eigen::VectorXd rmse;  ///< sqrt(rss / samples) over the training rows, one per output of the partition
