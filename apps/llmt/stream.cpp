@@ -24,10 +24,9 @@ struct Learned {
 };
 
 void refuse_other_options(const CLI::App& command) {
-  for (const char* option :
-       {"--categorical", "--split-inputs", "--regression-inputs", "--cv", "--contiguous", "--seed", "--threads", "--rule",
-        "--min-improvement", "--search", "--shared", "--estimation", "--width", "--jump", "--ridge", "--smoothness",
-        "--no-intervals"}) {
+  for (const char* option : {"--categorical", "--split-inputs", "--regression-inputs", "--cv", "--contiguous", "--seed",
+                             "--threads", "--rule", "--min-improvement", "--search", "--shared", "--estimation",
+                             "--width", "--jump", "--ridge", "--smoothness", "--no-intervals"}) {
     if (command.count(option) > 0) {
       throw std::invalid_argument(fmt::format("{} is not for --stream", option));
     }
@@ -36,9 +35,8 @@ void refuse_other_options(const CLI::App& command) {
 
 StreamOptions options_of(const CLI::App& command, const StreamArguments& arguments) {
   const FitOptions& fit = arguments.learning.options;
-  StreamOptions options{.rule = arguments.rule,
-                        .min_leaf_samples = fit.growth.min_leaf_samples,
-                        .max_leaves = fit.growth.max_leaves};
+  StreamOptions options{
+      .rule = arguments.rule, .min_leaf_samples = fit.growth.min_leaf_samples, .max_leaves = fit.growth.max_leaves};
   if (command.count("--significance") > 0) {
     options.significance = fit.growth.significance;
   }
@@ -83,7 +81,7 @@ void add(const Csv& piece, const StreamArguments& arguments, Learned& learned) {
 Learned learn(const CLI::App& command, const StreamArguments& arguments) {
   const StreamOptions options = options_of(command, arguments);
   const LearningArguments& learning = arguments.learning;
-  const bool standard_input = learning.data.empty() || learning.data == "-";
+  const bool standard_input = learning.data == "-";
   Learned learned{standard_input ? "standard input" : learning.data, {}, nullptr};
   std::ifstream file;
   if (!standard_input) {
@@ -105,8 +103,8 @@ Learned learn(const CLI::App& command, const StreamArguments& arguments) {
   }
   clear_progress();
   if (!learned.stream || learned.stream->counts().rows == 0) {
-    throw std::runtime_error(fmt::format("{}: there is a header and no rows{}", learned.name,
-                                         learned.stream ? " of positive weight" : ""));
+    throw std::runtime_error(
+        fmt::format("{}: there is a header and no rows{}", learned.name, learned.stream ? " of positive weight" : ""));
   }
   return learned;
 }
@@ -150,10 +148,11 @@ void print_summary(const StreamArguments& arguments, const Learned& learned, con
   if (counts.missing_values > 0) {
     print(fmt::format("Missing values in the inputs: {}\n", counts.missing_values));
   }
-  print(fmt::format("Learned row by row, rule {}: {} splits, {} taken back, {} alarms for changes, {} branches replaced; "
-                    "{} MiB\n\n",
-                    arguments.rule == StreamRule::rd ? "rd" : "ra", counts.splits, counts.prunes, counts.drifts,
-                    counts.replacements, number(static_cast<double>(counts.bytes) / 1048576.0, 3)));
+  print(
+      fmt::format("Learned row by row, rule {}: {} splits, {} taken back, {} alarms for changes, {} branches replaced; "
+                  "{} MiB\n\n",
+                  arguments.rule == StreamRule::rd ? "rd" : "ra", counts.splits, counts.prunes, counts.drifts,
+                  counts.replacements, number(static_cast<double>(counts.bytes) / 1048576.0, 3)));
   Table table({"target", "model", "leaves", "RMSE before learning", "of the last 1000"});
   const Eigen::VectorXd all = learned.stream->prequential_rmse();
   const Eigen::VectorXd recent = learned.stream->recent_rmse();

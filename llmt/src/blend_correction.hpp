@@ -36,7 +36,7 @@ class BlendCorrection {
   std::vector<int> positions_;  // among the leaves
   std::vector<double> validities_;
   Eigen::MatrixXd regressors_;  // size x rows: root of the weight times [1, scaled deviations]
-  Eigen::VectorXd residuals_;       // times root of the weight
+  Eigen::VectorXd residuals_;   // times root of the weight
   std::vector<Eigen::MatrixXd> grams_;
 };
 

@@ -79,7 +79,8 @@ void Csv::find_rows() {
     if (!csv::is_blank(between(begin, record.end))) {
       row_begins_.push_back(static_cast<std::size_t>(begin - text));
       if (record.fields != columns_.size()) {
-        const bool is_last = !more_follows_ && between(record.end, end).find_first_not_of(" \t\r\n") == std::string_view::npos;
+        const bool is_last =
+            !more_follows_ && between(record.end, end).find_first_not_of(" \t\r\n") == std::string_view::npos;
         throw std::runtime_error(
             fmt::format("{}:{}: the row has {} field{}, the header has {}{}", name_, line_at(row_begins_.back()),
                         record.fields, record.fields == 1 ? "" : "s", columns_.size(),

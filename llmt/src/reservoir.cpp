@@ -57,8 +57,7 @@ void Reservoir::remove_if(const std::function<bool(const double* values)>& drop)
 std::ptrdiff_t Reservoir::bytes() const {
   // A node of the map: three pointers and a colour beside key and value.
   const std::size_t node = 4 * sizeof(void*) + sizeof(std::pair<std::uint64_t, Row>);
-  return std::ssize(rows_) *
-         static_cast<std::ptrdiff_t>(node + static_cast<std::size_t>(width_) * sizeof(double));
+  return std::ssize(rows_) * static_cast<std::ptrdiff_t>(node + static_cast<std::size_t>(width_) * sizeof(double));
 }
 
 }  // namespace llmt

@@ -49,7 +49,8 @@ StreamOptions checked(std::ptrdiff_t inputs, std::ptrdiff_t outputs, StreamOptio
   if (options.max_leaves == 0) {
     const double bytes_per_leaf =
         static_cast<double>(inputs * options.bins * GramShape(inputs + 1, 1).size()) * sizeof(double);
-    options.max_leaves = std::clamp<std::ptrdiff_t>(static_cast<std::ptrdiff_t>(default_bytes / bytes_per_leaf), 16, 500);
+    options.max_leaves =
+        std::clamp<std::ptrdiff_t>(static_cast<std::ptrdiff_t>(default_bytes / bytes_per_leaf), 16, 500);
   }
   return options;
 }
@@ -141,10 +142,10 @@ class StreamState {
              const Eigen::Ref<const Eigen::VectorXd>& weights) const {
     if (inputs.cols() != inputs_ || outputs.cols() != outputs_ || inputs.rows() != outputs.rows() ||
         (weights.size() > 0 && weights.size() != inputs.rows())) {
-      reject(fmt::format("add(): inputs is {} x {}, outputs is {} x {} and there are {} weights; the stream has {} "
-                         "inputs and {} outputs",
-                         inputs.rows(), inputs.cols(), outputs.rows(), outputs.cols(), weights.size(), inputs_,
-                         outputs_));
+      reject(
+          fmt::format("add(): inputs is {} x {}, outputs is {} x {} and there are {} weights; the stream has {} "
+                      "inputs and {} outputs",
+                      inputs.rows(), inputs.cols(), outputs.rows(), outputs.cols(), weights.size(), inputs_, outputs_));
     }
     for (std::ptrdiff_t i = 0; i < inputs.rows(); ++i) {
       const auto refuse = [&](const char* what, std::ptrdiff_t column, double value, const char* bound) {
@@ -204,9 +205,8 @@ class StreamState {
     scale(trees_.front()->setting(), row, z);
     ++tested_;
     for (std::ptrdiff_t o = 0; o < outputs_; ++o) {
-      const double error =
-          trees_[static_cast<std::size_t>(o)]->learn(
-              {row, z.data(), row[inputs_ + o], row[inputs_ + outputs_], reservoir_.share_of_different()});
+      const double error = trees_[static_cast<std::size_t>(o)]->learn(
+          {row, z.data(), row[inputs_ + o], row[inputs_ + outputs_], reservoir_.share_of_different()});
       squares_(o) += error * error;
       const double rate = 1.0 / std::min(static_cast<double>(tested_), recent_rows);
       recent_(o) = tested_ == 1 ? error * error : recent_(o) + rate * (error * error - recent_(o));
@@ -310,8 +310,8 @@ Model StreamState::snapshot(ValidityChoice validity) const {
   std::vector<Regressor> regressors;
   for (std::ptrdiff_t j = 0; j < inputs_; ++j) {
     const ColumnRange& column = columns_[static_cast<std::size_t>(j)];
-    inputs.push_back({.name = fmt::format("x{}", j + 1), .low = column.low, .high = column.high,
-                      .centre = column.mean});
+    inputs.push_back(
+        {.name = fmt::format("x{}", j + 1), .low = column.low, .high = column.high, .centre = column.mean});
     regressors.push_back({static_cast<int>(j), -1, column.mean});
   }
   for (std::ptrdiff_t o = 0; o < outputs_; ++o) {
@@ -335,8 +335,12 @@ Model StreamState::snapshot(ValidityChoice validity) const {
     }
     std::vector<int> all_inputs(static_cast<std::size_t>(inputs_));
     std::iota(all_inputs.begin(), all_inputs.end(), 0);
-    const Table table{values.leftCols(inputs_), values.middleCols(inputs_, outputs_), values.rightCols(1),
-                      std::vector<int>(static_cast<std::size_t>(inputs_), 0), all_inputs, all_inputs};
+    const Table table{values.leftCols(inputs_),
+                      values.middleCols(inputs_, outputs_),
+                      values.rightCols(1),
+                      std::vector<int>(static_cast<std::size_t>(inputs_), 0),
+                      all_inputs,
+                      all_inputs};
     if (!others.empty()) {
       TrainingRows training = training_rows(table, std::move(others));
       training.columns = inputs;

@@ -45,8 +45,8 @@ class RowProducts {
 };
 
 /// The model [constant, slopes] in the basis of `gram`, as a change of the basis' base: least squares of the residuals,
-/// plus `shrinkage` rows of the variance that each regressor has, uncorrelated, that say "no change". Regressors that do
-/// not vary, or follow from those before, change nothing. `rank`: of [1, z].
+/// plus `shrinkage` rows of the variance that each regressor has, uncorrelated, that say "no change". Regressors that
+/// do not vary, or follow from those before, change nothing. `rank`: of [1, z].
 Eigen::VectorXd solve(const GramShape& shape, const double* gram, double shrinkage, int& rank);
 
 /// Sum of squared residuals that a change of the base leaves of the rows in `gram`.

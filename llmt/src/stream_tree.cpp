@@ -10,8 +10,8 @@ namespace llmt {
 namespace {
 
 /// RiseDetector: rows that the usual error is a mean of, rows before it counts, the rise that is put up with, and the
-/// alarm: the sum of the errors' excesses over usual * (1 + tolerated). Errors count as at most `largest` usual ones, so
-/// that outliers raise no alarm.
+/// alarm: the sum of the errors' excesses over usual * (1 + tolerated). Errors count as at most `largest` usual ones,
+/// so that outliers raise no alarm.
 constexpr double memory = 5000.0;
 constexpr std::ptrdiff_t settling = 300;
 constexpr double tolerated = 0.1;
@@ -133,8 +133,7 @@ Sums all_sums(const StreamSetting& setting, const StreamNode& node) {
 }
 
 Eigen::VectorXd own_model(const StreamSetting& setting, const StreamNode& node, int& rank) {
-  return node.basis.base +
-         solve(setting.shape, all_sums(setting, node).gram.data(), setting.options.shrinkage, rank);
+  return node.basis.base + solve(setting.shape, all_sums(setting, node).gram.data(), setting.options.shrinkage, rank);
 }
 
 StreamTree::StreamTree(const StreamSetting& setting, const Eigen::VectorXd& first_model)
@@ -268,8 +267,7 @@ void StreamTree::split(StreamNode& leaf, const StreamSplit& found) {
     child->sums = sums;
     rebase(setting_.shape, shift, change, child->sums.gram);
     child->solved_at = sums.rows;
-    child->model =
-        child->basis.base + solve(setting_.shape, child->sums.gram.data(), setting_.options.shrinkage, rank);
+    child->model = child->basis.base + solve(setting_.shape, child->sums.gram.data(), setting_.options.shrinkage, rank);
     child->low = leaf.low;
     child->high = leaf.high;
     (side == 0 ? child->high : child->low)(found.input) = found.threshold;
@@ -286,8 +284,7 @@ void StreamTree::end_epoch(StreamNode& node, double different) {
   const bool last = node.children[0]->is_leaf() && node.children[1]->is_leaf() && !node.children[0]->alternate &&
                     !node.children[1]->alternate;
   if (last) {
-    const std::array<const double*, 3> grams = {both.gram.data(), node.sides[0].gram.data(),
-                                                node.sides[1].gram.data()};
+    const std::array<const double*, 3> grams = {both.gram.data(), node.sides[0].gram.data(), node.sides[1].gram.data()};
     std::array<double, 3> rss{};
     std::array<int, 3> rank{};
     residuals_.evaluate(grams.data(), 3, rss.data(), rank.data());

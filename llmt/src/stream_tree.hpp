@@ -79,9 +79,9 @@ struct StreamNode {
   int input = -1;
   double threshold = 0.0;
   ThresholdWatch watch;
-  double gain = 0.0;                 ///< of the split, see StreamSplit
-  std::array<Sums, 2> sides;         ///< inner: rows of the epoch that went left and right
-  std::ptrdiff_t epoch = 0;          ///< its length: rows until the split is tested again
+  double gain = 0.0;          ///< of the split, see StreamSplit
+  std::array<Sums, 2> sides;  ///< inner: rows of the epoch that went left and right
+  std::ptrdiff_t epoch = 0;   ///< its length: rows until the split is tested again
   std::array<std::unique_ptr<StreamNode>, 2> children;
 
   RiseDetector rise;

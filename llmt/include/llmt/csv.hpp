@@ -124,8 +124,8 @@ class Csv {
   std::ptrdiff_t line_at(std::size_t offset) const;
 };
 
-/// A CSV text that need not fit into memory: its rows a piece at a time, each with the header, and with the lines of the
-/// whole text in what it says.
+/// A CSV text that need not fit into memory: its rows a piece at a time, each with the header, and with the lines of
+/// the whole text in what it says.
 class CsvPieces {
  public:
   /// `name` stands for the path in errors. A piece is about `bytes` long, longer if a row is.

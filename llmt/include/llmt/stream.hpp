@@ -20,7 +20,8 @@ enum class StreamRule {
   /// pass the F test of Chow (1960).
   rd,
   /// Residual analysis: the means and the scatter of every input over the rows above and below the leaf's model are
-  /// compared by t tests; where the most significant input says, two models are tried, which must pass the F test. Costs
+  /// compared by t tests; where the most significant input says, two models are tried, which must pass the F test.
+  /// Costs
   /// less per row, learns more slowly.
   ra
 };
