@@ -35,7 +35,8 @@ struct Pass {
   double seconds = 0.0;
   void run(llmt::Stream& stream, Eigen::Index rows, std::uint64_t seed) {
     for (Eigen::Index done = 0; done < rows; done += block) {
-      const bench::Sample sample = bench::sample(std::min(block, rows - done), num_inputs, seed + 1000003ULL * static_cast<std::uint64_t>(done / block));
+      const bench::Sample sample = bench::sample(std::min(block, rows - done), num_inputs,
+                                                 seed + 1000003ULL * static_cast<std::uint64_t>(done / block));
       seconds += bench::measure([&] { stream.add(sample.x, sample.y); }).cpu;
     }
   }
@@ -55,15 +56,16 @@ void report(const std::string& name, Eigen::Index rows, const llmt::StreamOption
     chosen = rmse_to_truth(model, test);
   });
   crisp = rmse_to_truth(stream.snapshot(llmt::ValidityChoice::crisp), test);
-  fmt::print("{:8} {:>9} {:10.4f} {:10.4f} {:12.4f} {:7} {:7} {:7} {:7} {:7} {:9.0f} {:9.2f} {:10.1f} {:10.1f}\n", name, rows, chosen,
-             crisp, stream.prequential_rmse()(0), leaves, counts.leaves, counts.splits, counts.prunes, counts.drifts,
-             1e9 * pass.seconds / static_cast<double>(rows), cost.cpu, static_cast<double>(counts.bytes) / 1048576.0,
-             bench::peak_memory() / 1048576.0);
+  fmt::print("{:8} {:>9} {:10.4f} {:10.4f} {:12.4f} {:7} {:7} {:7} {:7} {:7} {:9.0f} {:9.2f} {:10.1f} {:10.1f}\n", name,
+             rows, chosen, crisp, stream.prequential_rmse()(0), leaves, counts.leaves, counts.splits, counts.prunes,
+             counts.drifts, 1e9 * pass.seconds / static_cast<double>(rows), cost.cpu,
+             static_cast<double>(counts.bytes) / 1048576.0, bench::peak_memory() / 1048576.0);
 }
 
 void header() {
-  fmt::print("{:8} {:>9} {:>10} {:>10} {:>12} {:>7} {:>7} {:>7} {:>7} {:>7} {:>9} {:>9} {:>10} {:>10}\n", "rule", "rows", "snapshot",
-             "crisp", "prequential", "leaves", "grown", "splits", "prunes", "drifts", "ns/row", "snap. s", "own MiB", "peak MiB");
+  fmt::print("{:8} {:>9} {:>10} {:>10} {:>12} {:>7} {:>7} {:>7} {:>7} {:>7} {:>9} {:>9} {:>10} {:>10}\n", "rule",
+             "rows", "snapshot", "crisp", "prequential", "leaves", "grown", "splits", "prunes", "drifts", "ns/row",
+             "snap. s", "own MiB", "peak MiB");
 }
 
 void scaling(const std::vector<Eigen::Index>& sizes) {
@@ -82,9 +84,8 @@ void rules(Eigen::Index rows) {
     report("ra", n, {.rule = llmt::StreamRule::ra}, test);
   }
   const bench::Sample train = bench::sample(20000, num_inputs, 1);
-  const bench::Cost cost = bench::measure([&] {
-    fmt::print("fit() on 20000 rows: {:.4f}", rmse_to_truth(llmt::fit(train.x, train.y).model, test));
-  });
+  const bench::Cost cost = bench::measure(
+      [&] { fmt::print("fit() on 20000 rows: {:.4f}", rmse_to_truth(llmt::fit(train.x, train.y).model, test)); });
   fmt::print(", {:.1f} CPU s\n", cost.cpu);
 }
 
@@ -133,13 +134,16 @@ void drift(int seeds) {
     bench::Sample test = bench::sample(10000, num_inputs, 999);
     change_outputs(test, change);
     for (const Eigen::Index at : changes_at) {
+      Eigen::VectorXd mean_stream;
+      Eigen::VectorXd mean_fresh;
+      std::vector<Eigen::Index> rows;
       for (int seed = 1; seed <= seeds; ++seed) {
         llmt::Stream stream(num_inputs, 1);
         llmt::Stream fresh(num_inputs, 1);
         Pass pass;
         pass.run(stream, at, static_cast<std::uint64_t>(seed));
         const std::ptrdiff_t before = stream.counts().drifts;
-        std::vector<Eigen::Index> rows;
+        rows.clear();
         std::vector<double> of_stream;
         std::vector<double> of_fresh;
         Eigen::Index done = 0;
@@ -161,6 +165,13 @@ void drift(int seeds) {
         const llmt::StreamCounts counts = stream.counts();
         fmt::print("{:9} {:>8} {:>5} {:>7} {:>8} |", change_names[static_cast<std::size_t>(change)], at, seed,
                    counts.drifts - before, counts.replacements);
+        const Eigen::Map<const Eigen::VectorXd> stream_curve(of_stream.data(), std::ssize(of_stream));
+        const Eigen::Map<const Eigen::VectorXd> fresh_curve(of_fresh.data(), std::ssize(of_fresh));
+        if (seed == 1) {
+          mean_stream = mean_fresh = Eigen::VectorXd::Zero(std::ssize(of_stream));
+        }
+        mean_stream += stream_curve / seeds;
+        mean_fresh += fresh_curve / seeds;
         for (const Eigen::Index level : levels) {
           const std::size_t k = static_cast<std::size_t>(std::find(rows.begin(), rows.end(), level) - rows.begin());
           const auto reached = std::find_if(of_stream.begin(), of_stream.end(),
@@ -168,11 +179,26 @@ void drift(int seeds) {
           fmt::print(" {:8.4f} {:8.4f} {:>6} |", of_fresh[k], of_stream[k],
                      reached == of_stream.end()
                          ? fmt::format(">{:.0f}", static_cast<double>(horizon) / static_cast<double>(level))
-                         : fmt::format("{:.2f}", static_cast<double>(rows[static_cast<std::size_t>(reached - of_stream.begin())]) /
+                         : fmt::format("{:.2f}", static_cast<double>(
+                                                     rows[static_cast<std::size_t>(reached - of_stream.begin())]) /
                                                      static_cast<double>(level)));
         }
         fmt::print("\n");
       }
+      fmt::print("{:9} {:>8} {:>5} {:>16} |", change_names[static_cast<std::size_t>(change)], at, "mean", "");
+      for (const Eigen::Index level : levels) {
+        const Eigen::Index k = std::find(rows.begin(), rows.end(), level) - rows.begin();
+        Eigen::Index reached = 0;
+        while (reached < mean_stream.size() && mean_stream(reached) > 1.05 * mean_fresh(k)) {
+          ++reached;
+        }
+        fmt::print(" {:8.4f} {:8.4f} {:>6} |", mean_fresh(k), mean_stream(k),
+                   reached == mean_stream.size()
+                       ? fmt::format(">{:.0f}", static_cast<double>(horizon) / static_cast<double>(level))
+                       : fmt::format("{:.2f}", static_cast<double>(rows[static_cast<std::size_t>(reached)]) /
+                                                   static_cast<double>(level)));
+      }
+      fmt::print("\n");
     }
   }
 }
@@ -187,8 +213,9 @@ void spread(Eigen::Index rows, int seeds) {
     pass.run(stream, rows, static_cast<std::uint64_t>(seed));
     errors(seed - 1) = error_of(stream, test);
   }
-  fmt::print("{} rows, {} streams: error to the truth {:.4f} +- {:.4f}, {:.4f} ... {:.4f}\n", rows, seeds, errors.mean(),
-             std::sqrt((errors.array() - errors.mean()).square().mean()), errors.minCoeff(), errors.maxCoeff());
+  fmt::print("{} rows, {} streams: error to the truth {:.4f} +- {:.4f}, {:.4f} ... {:.4f}\n", rows, seeds,
+             errors.mean(), std::sqrt((errors.array() - errors.mean()).square().mean()), errors.minCoeff(),
+             errors.maxCoeff());
 }
 
 void alarms(int seeds, Eigen::Index rows) {
@@ -242,20 +269,21 @@ void sets(const std::string& folder, int passes, int most_splits) {
         return 1.0 - (predicted - y).squaredNorm() / (y.array() - y.mean()).square().sum();
       };
       seconds += part * bench::measure([&] {
-        for (int pass = 0; pass < passes; ++pass) {
-          const std::vector<std::ptrdiff_t> order = random.permutation(std::ssize(train));
-          Eigen::MatrixXd rows(std::ssize(train), all.cols());
-          for (std::size_t i = 0; i < train.size(); ++i) {
-            rows.row(static_cast<Eigen::Index>(i)) = all.row(train[static_cast<std::size_t>(order[i])]);
-          }
-          stream.add(rows.leftCols(inputs), rows.rightCols(1));
-        }
-        const llmt::Model model = stream.snapshot();
-        leaves += part * static_cast<double>(model.partitions().front().num_leaves());
-        const Eigen::VectorXd predicted = model.predict(test_rows.leftCols(inputs));
-        r2 += part * r2_of(predicted);
-        error += part * llmt::rmse(predicted, test_rows.rightCols(1))(0);
-      }).cpu;
+                          for (int pass = 0; pass < passes; ++pass) {
+                            const std::vector<std::ptrdiff_t> order = random.permutation(std::ssize(train));
+                            Eigen::MatrixXd rows(std::ssize(train), all.cols());
+                            for (std::size_t i = 0; i < train.size(); ++i) {
+                              rows.row(static_cast<Eigen::Index>(i)) =
+                                  all.row(train[static_cast<std::size_t>(order[i])]);
+                            }
+                            stream.add(rows.leftCols(inputs), rows.rightCols(1));
+                          }
+                          const llmt::Model model = stream.snapshot();
+                          leaves += part * static_cast<double>(model.partitions().front().num_leaves());
+                          const Eigen::VectorXd predicted = model.predict(test_rows.leftCols(inputs));
+                          r2 += part * r2_of(predicted);
+                          error += part * llmt::rmse(predicted, test_rows.rightCols(1))(0);
+                        }).cpu;
       r2_crisp += part * r2_of(stream.snapshot(llmt::ValidityChoice::crisp).predict(test_rows.leftCols(inputs)));
       llmt::FitOptions one_leaf;
       one_leaf.growth.max_leaves = 1;
@@ -265,7 +293,8 @@ void sets(const std::string& folder, int passes, int most_splits) {
                                     .model.predict(test_rows.leftCols(inputs)));
     }
     all_r2.push_back(r2);
-    fmt::print("{:12} {:9.4f} {:9.4f} {:9.4f} {:7.1f} {:9.4g} {:8.3f}\n", name, r2, r2_crisp, r2_linear, leaves, error, seconds);
+    fmt::print("{:12} {:9.4f} {:9.4f} {:9.4f} {:7.1f} {:9.4g} {:8.3f}\n", name, r2, r2_crisp, r2_linear, leaves, error,
+               seconds);
   }
   std::sort(all_r2.begin(), all_r2.end());
   fmt::print("median of {} sets: {:.4f}\n", all_r2.size(),

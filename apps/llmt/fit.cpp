@@ -338,19 +338,14 @@ void add_fit(CLI::App& app) {
   command->add_flag("--no-intervals", arguments->no_intervals,
                     "Leave the folds' models out of the file; it is smaller and has no prediction intervals");
   command->add_flag("--json", arguments->json, "Print the summary as JSON");
-  command->add_flag("--stream", arguments->stream,
-                    "Learn row by row in constant memory; DATA may be - or left out for standard input");
+  command->add_flag("--stream", arguments->stream, "Learn row by row in constant memory; DATA - is standard input");
   command->add_option("--stream-rule", arguments->stream_rule, "How leaves of a stream find splits")
       ->transform(choice_of<StreamRule>(stream_rule_names))
       ->option_text("rd|ra [rd]");
-  command->get_option("data")->required(false);
   command->callback([command, arguments] {
     if (arguments->stream) {
       stream_command(*command, {arguments->learning, arguments->stream_rule, arguments->output, arguments->json});
       return;
-    }
-    if (arguments->learning.data.empty()) {
-      throw CLI::RequiredError("data");
     }
     if (command->count("--stream-rule") > 0) {
       throw std::invalid_argument("--stream-rule needs --stream");

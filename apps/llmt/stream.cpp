@@ -81,7 +81,7 @@ void add(const Csv& piece, const StreamArguments& arguments, Learned& learned) {
 Learned learn(const CLI::App& command, const StreamArguments& arguments) {
   const StreamOptions options = options_of(command, arguments);
   const LearningArguments& learning = arguments.learning;
-  const bool standard_input = learning.data.empty() || learning.data == "-";
+  const bool standard_input = learning.data == "-";
   Learned learned{standard_input ? "standard input" : learning.data, {}, nullptr};
   std::ifstream file;
   if (!standard_input) {
@@ -175,6 +175,9 @@ void print_summary(const StreamArguments& arguments, const Learned& learned, con
 void stream_command(const CLI::App& command, const StreamArguments& arguments) {
   refuse_other_options(command);
   const ValidityChoice validity = arguments.learning.options.blend.validity;
+  if (validity == ValidityChoice::gaussian) {
+    throw std::invalid_argument("--validity gaussian is not for --stream");
+  }
   const Learned learned = learn(command, arguments);
   const Model model = learned.stream->snapshot(validity).named(learned.inputs, arguments.learning.targets);
   if (!arguments.output.empty()) {

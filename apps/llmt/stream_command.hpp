@@ -17,8 +17,8 @@ struct StreamArguments {
   bool json = false;
 };
 
-/// Learns from a file, or from standard input if the data are "-" or not named, in memory that does not depend on its
-/// length. `command`: to refuse options of `llmt fit` that are not for streams.
+/// Learns from a file, or from standard input if that is "-", in memory that does not depend on its length. `command`:
+/// to refuse options of `llmt fit` that are not for streams.
 void stream_command(const CLI::App& command, const StreamArguments& arguments);
 
 }  // namespace llmt::apps

@@ -54,7 +54,7 @@ std::optional<Csv> CsvPieces::next() {
     if (rows.empty() && !header_.empty()) {
       return std::nullopt;
     }
-    if (header_.empty() && !last && csv::is_blank(std::string_view(rows).substr(0, rows.find_last_not_of('\n') + 1))) {
+    if (header_.empty() && !last && rows.find_first_not_of(" \t\r\n") == std::string::npos) {
       lines_ += std::count(rows.begin(), rows.end(), '\n');
       continue;  // blank lines before the header
     }

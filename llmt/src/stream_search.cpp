@@ -15,11 +15,6 @@ constexpr std::ptrdiff_t first_rows = 64;
 /// Tests come when rows have grown by this factor.
 constexpr double test_growth = 1.25;
 
-/// A jump inside a bin: rows beside the edge leave this many times what the others do, beyond what few rows leave by
-/// chance. The bins are then narrowed, at most so often.
-constexpr double misfit = 1.5;
-constexpr int most_narrowings = 4;
-
 /// A split that passes still waits until it beats the best one on another input by a standard error of the difference,
 /// or rows have grown by this factor since it passed first: the first split that is better than none is often not the
 /// right one, and what is below it depends on it.
@@ -72,7 +67,6 @@ void LeafSearch::lay_out(const Basis& basis) {
         }
       }
     }
-    wide_edges_.push_back(edges);
     set_edges(bins_[static_cast<std::size_t>(j)], std::move(edges));
   }
   RowProducts products(setting_.shape);
@@ -93,8 +87,8 @@ void LeafSearch::lay_out(const Basis& basis) {
 
 void LeafSearch::put(const StreamRow& row, const RowProducts& products) {
   const std::ptrdiff_t size = setting_.shape.size();
-  const std::ptrdiff_t begin = setting_.options.rule == StreamRule::ra ? std::max(0, narrowed_) : 0;
-  const std::ptrdiff_t end = setting_.options.rule == StreamRule::ra ? narrowed_ + 1 : setting_.inputs;
+  const std::ptrdiff_t begin = setting_.options.rule == StreamRule::ra ? std::max(0, proposed_) : 0;
+  const std::ptrdiff_t end = setting_.options.rule == StreamRule::ra ? proposed_ + 1 : setting_.inputs;
   // The sums of all leaves do not fit into a cache: they are asked for before they are needed.
   sums_of_row_.clear();
   for (std::ptrdiff_t j = begin; j < end; ++j) {
@@ -114,7 +108,7 @@ void LeafSearch::put(const StreamRow& row, const RowProducts& products) {
   for (double* const sums : sums_of_row_) {
     products.add_to(sums);
   }
-  narrowed_rows_ += narrowed_ >= 0 ? 1 : 0;
+  proposed_rows_ += proposed_ >= 0 ? 1 : 0;
 }
 
 void LeafSearch::add_signs(const StreamRow& row, double error) {
@@ -138,7 +132,7 @@ void LeafSearch::add_signs(const StreamRow& row, double error) {
 void LeafSearch::add(const StreamRow& row, const Basis& basis, const RowProducts& products, double error) {
   ++rows_;
   if (setting_.options.rule == StreamRule::ra) {
-    if (narrowed_ < 0) {
+    if (proposed_ < 0) {
       add_signs(row, error);
     } else {
       put(row, products);
@@ -167,56 +161,68 @@ Sums LeafSearch::side(const Bins& bins, std::size_t begin, std::size_t end) cons
   return sums;
 }
 
-/// Every edge of an input: both sides' residual sums of squares beside that of one model.
-void LeafSearch::look_at(int input, Found& found) {
+LeafSearch::Edges LeafSearch::edges(int input) {
   const Bins& bins = bins_[static_cast<std::size_t>(input)];
-  const std::size_t edges = bins.edges.size();
-  if (edges == 0) {
-    return;
+  Edges result;
+  result.thresholds = bins.edges;
+  const std::size_t count = bins.edges.size();
+  if (count == 0) {
+    return result;
   }
   const std::size_t size = static_cast<std::size_t>(setting_.shape.size());
   // Left of each edge, then right of it, then all.
-  std::vector<double> grams((2 * edges + 1) * size, 0.0);
-  std::vector<std::ptrdiff_t> left(edges, 0);
-  std::ptrdiff_t rows = 0;
-  for (std::size_t e = 0; e < edges; ++e) {
+  std::vector<double> grams((2 * count + 1) * size, 0.0);
+  for (std::size_t e = 0; e < count; ++e) {
     double* const sum = grams.data() + e * size;
     std::copy_n(e > 0 ? sum - size : sum, size, sum);
     llmt::add(setting_.shape, bins.grams.data() + e * size, sum);
-    rows += bins.rows[e];
-    left[e] = rows;
+    result.rows += bins.rows[e];
+    result.rows_left.push_back(result.rows);
   }
-  rows += bins.rows[edges];
-  for (std::size_t e = edges; e-- > 0;) {
-    double* const sum = grams.data() + (edges + e) * size;
-    std::copy_n(e + 1 < edges ? sum + size : sum, size, sum);
+  result.rows += bins.rows[count];
+  for (std::size_t e = count; e-- > 0;) {
+    double* const sum = grams.data() + (count + e) * size;
+    std::copy_n(e + 1 < count ? sum + size : sum, size, sum);
     llmt::add(setting_.shape, bins.grams.data() + (e + 1) * size, sum);
   }
-  std::copy_n(grams.data() + (edges - 1) * size, size, grams.data() + 2 * edges * size);
-  llmt::add(setting_.shape, bins.grams.data() + edges * size, grams.data() + 2 * edges * size);
+  std::copy_n(grams.data() + (count - 1) * size, size, grams.data() + 2 * count * size);
+  llmt::add(setting_.shape, bins.grams.data() + count * size, grams.data() + 2 * count * size);
   std::vector<const double*> pointers;
-  for (std::size_t k = 0; k <= 2 * edges; ++k) {
+  for (std::size_t k = 0; k <= 2 * count; ++k) {
     pointers.push_back(grams.data() + k * size);
   }
   std::vector<double> rss(pointers.size());
   std::vector<int> rank(pointers.size());
   residuals_.evaluate(pointers.data(), std::ssize(pointers), rss.data(), rank.data());
-  const double all = rss.back();
-  if (!(all > static_cast<double>(rows) * setting_.rounding * setting_.rounding)) {
-    return;  // one model fits exactly
+  const std::ptrdiff_t edge_count = std::ssize(bins.edges);
+  result.rss_left.assign(rss.begin(), rss.begin() + edge_count);
+  result.rss_right.assign(rss.begin() + edge_count, rss.end() - 1);
+  result.rank_left.assign(rank.begin(), rank.begin() + edge_count);
+  result.rank_right.assign(rank.begin() + edge_count, rank.end() - 1);
+  result.rss = rss.back();
+  result.rank = rank.back();
+  return result;
+}
+
+/// The best edge of an input, if it has an admissible one.
+LeafSearch::Found LeafSearch::look_at(int input) {
+  const Edges all = edges(input);
+  Found found;
+  if (!(all.rss > static_cast<double>(all.rows) * setting_.rounding * setting_.rounding)) {
+    return found;  // one model fits exactly
   }
-  for (std::size_t e = 0; e < edges; ++e) {
-    if (different_ * static_cast<double>(std::min(left[e], rows - left[e])) <
+  for (std::size_t e = 0; e < all.thresholds.size(); ++e) {
+    if (different_ * static_cast<double>(std::min(all.rows_left[e], all.rows - all.rows_left[e])) <
         static_cast<double>(setting_.options.min_leaf_samples)) {
       continue;
     }
     ++found.tested;
-    const double ratio = (rss[e] + rss[edges + e]) / all;
+    const double ratio = (all.rss_left[e] + all.rss_right[e]) / all.rss;
     if (found.input < 0 || ratio < found.ratio) {
-      const std::ptrdiff_t tested = found.tested;
-      found = {input, e, ratio, all, rank.back(), rank[e], rank[edges + e], rows, tested};
+      found = {input, e, ratio, all.rss, all.rank, all.rank_left[e], all.rank_right[e], all.rows, found.tested};
     }
   }
+  return found;
 }
 
 bool LeafSearch::passes(const Found& found) const {
@@ -244,18 +250,17 @@ std::optional<StreamSplit> LeafSearch::test(const Eigen::VectorXd& low, const Ei
   next_test_ =
       rows_ + std::max(setting_.coefficients(),
                        static_cast<std::ptrdiff_t>((test_growth - 1.0) *
-                                                   static_cast<double>(narrowed_ >= 0 ? narrowed_rows_ : rows_)));
+                                                   static_cast<double>(proposed_ >= 0 ? proposed_rows_ : rows_)));
   ++tests_;
-  if (setting_.options.rule == StreamRule::ra && narrowed_ < 0) {
+  if (setting_.options.rule == StreamRule::ra && proposed_ < 0) {
     propose();
     return std::nullopt;
   }
   Found found;
   double rival = 1.0;  // ratio of the best split on another input
   for (int j = 0; j < setting_.inputs; ++j) {
-    if (narrowed_ < 0 || narrowed_ == j) {
-      Found of_input;
-      look_at(j, of_input);
+    if (proposed_ < 0 || proposed_ == j) {
+      const Found of_input = look_at(j);
       const std::ptrdiff_t tested = found.tested + of_input.tested;
       if (of_input.input >= 0 && (found.input < 0 || of_input.ratio < found.ratio)) {
         rival = found.input < 0 ? 1.0 : found.ratio;
@@ -269,86 +274,30 @@ std::optional<StreamSplit> LeafSearch::test(const Eigen::VectorXd& low, const Ei
   if (found.input >= 0 && passes(found)) {
     first_passed_ = first_passed_ > 0 ? first_passed_ : rows_;
     const double n = different_ * static_cast<double>(found.rows);
+    // Squared residuals of two fits differ by 2 e (f_1 - f_2), about, and the fits by what both gain.
     const double scatter = 2.0 * std::sqrt(found.ratio * (2.0 - found.ratio - rival) / n);
-    if (narrowed_ >= 0 || static_cast<double>(rows_) >= patience_with_rivals * static_cast<double>(first_passed_) ||
-        rival - found.ratio > scatter) {
-      return decide(found, low, high);
+    if (proposed_ >= 0 || rival - found.ratio > scatter ||
+        static_cast<double>(rows_) >= patience_with_rivals * static_cast<double>(first_passed_)) {
+      return split_at(found, low, high);
     }
   }
-  if (narrowed_ >= 0 && narrowed_rows_ >= patience_) {
-    if (setting_.options.rule == StreamRule::rd) {
-      const std::size_t input = static_cast<std::size_t>(narrowed_);
-      set_edges(bins_[input], wide_edges_[input]);
-    }
-    narrowed_ = -1;
+  if (proposed_ >= 0 && proposed_rows_ >= patience_) {
+    proposed_ = -1;
   }
   return std::nullopt;
 }
 
-std::optional<StreamSplit> LeafSearch::decide(const Found& found, const Eigen::VectorXd& low,
-                                              const Eigen::VectorXd& high) {
+StreamSplit LeafSearch::split_at(const Found& found, const Eigen::VectorXd& low, const Eigen::VectorXd& high) const {
   const Bins& bins = bins_[static_cast<std::size_t>(found.input)];
   const double edge = bins.edges[found.edge];
   const double before = found.edge > 0 ? bins.edges[found.edge - 1] : low(found.input);
   const double behind = found.edge + 1 < bins.edges.size() ? bins.edges[found.edge + 1] : high(found.input);
-  StreamSplit split{found.input,
-                    edge,
-                    std::max(edge - before, behind - edge),
-                    side(bins, 0, found.edge + 1),
-                    side(bins, found.edge + 1, bins.edges.size() + 1),
-                    found.rss * (1.0 - found.ratio) / static_cast<double>(found.rows)};
-  if (narrow(found, split, low, high)) {
-    return std::nullopt;
-  }
-  return split;
-}
-
-/// Lays the bins of the input out anew between the edges beside the one found, if the output seems to jump there.
-bool LeafSearch::narrow(const Found& found, const StreamSplit& split, const Eigen::VectorXd& low,
-                        const Eigen::VectorXd& high) {
-  Bins& bins = bins_[static_cast<std::size_t>(found.input)];
-  if (narrowings_ >= most_narrowings || setting_.options.rule == StreamRule::ra) {
-    return false;
-  }
-  const GramShape& shape = setting_.shape;
-  int rank = 0;
-  double beside = 0.0;
-  const std::size_t size = static_cast<std::size_t>(shape.size());
-  double worst = 0.0;
-  for (const std::size_t bin : {found.edge, found.edge + 1}) {
-    const Sums& sums = bin == found.edge ? split.left : split.right;
-    const double rows = static_cast<double>(bins.rows[bin]);
-    if (rows < 4.0) {
-      continue;
-    }
-    const Eigen::VectorXd change = solve(shape, sums.gram.data(), 0.0, rank);
-    beside = remaining(shape, bins.grams.data() + bin * size, change) / rows;
-    worst = std::max(worst, beside / (1.0 + 4.0 * std::sqrt(2.0 / rows)));
-  }
-  const double usual = found.rss * found.ratio / (static_cast<double>(found.rows) - found.rank_left - found.rank_right);
-  if (!(worst > misfit * usual)) {
-    return false;
-  }
-  const double begin = found.edge > 0 ? bins.edges[found.edge - 1] : low(found.input);
-  const double end = found.edge + 1 < bins.edges.size() ? bins.edges[found.edge + 1] : high(found.input);
-  std::vector<double> edges;
-  const int count = setting_.options.bins - 1;
-  for (int e = 0; e < count; ++e) {
-    const double edge = begin + (end - begin) * e / (count - 1);
-    if (edges.empty() || edge > edges.back()) {
-      edges.push_back(edge);
-    }
-  }
-  if (std::ssize(edges) < count) {
-    return false;  // no numbers in between
-  }
-  set_edges(bins, std::move(edges));
-  ++narrowings_;
-  narrowed_ = found.input;
-  narrowed_rows_ = 0;
-  patience_ = 2 * found.rows;
-  next_test_ = rows_ + 2 * setting_.options.min_leaf_samples;
-  return true;
+  return {found.input,
+          edge,
+          std::max(edge - before, behind - edge),
+          side(bins, 0, found.edge + 1),
+          side(bins, found.edge + 1, bins.edges.size() + 1),
+          found.rss * (1.0 - found.ratio) / static_cast<double>(found.rows)};
 }
 
 /// Residual analysis: the input whose mean or scatter differs most between the rows above and below the model, if
@@ -387,8 +336,8 @@ bool LeafSearch::propose() {
   }
   const double z = 0.5 * (signs_[0].mean(input) + signs_[1].mean(input));
   set_edges(bins_[static_cast<std::size_t>(input)], {setting_.unscaled(input, z)});
-  narrowed_ = static_cast<int>(input);
-  narrowed_rows_ = 0;
+  proposed_ = static_cast<int>(input);
+  proposed_rows_ = 0;
   patience_ = std::max(rows_, 4 * setting_.options.min_leaf_samples);
   next_test_ = rows_ + 2 * setting_.options.min_leaf_samples;
   return true;
@@ -398,9 +347,6 @@ std::ptrdiff_t LeafSearch::bytes() const {
   std::size_t doubles = first_rows_.capacity() + static_cast<std::size_t>(2 * 5 * signs_[0].count.size());
   for (const Bins& bins : bins_) {
     doubles += bins.grams.capacity() + bins.edges.capacity() + bins.rows.capacity();
-  }
-  for (const std::vector<double>& edges : wide_edges_) {
-    doubles += edges.capacity();
   }
   return static_cast<std::ptrdiff_t>(sizeof(LeafSearch) + doubles * sizeof(double));
 }

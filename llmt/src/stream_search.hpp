@@ -51,9 +51,6 @@ struct StreamSplit {
 /// The first rows are kept: their quantiles are the edges between the bins of each input. Then only sums are, for each
 /// bin of each input (rd), or of the inputs over the rows of either sign (ra). Tests come whenever the number of rows
 /// has grown by a quarter; the k-th is made at significance / (k (k + 1)).
-///
-/// An edge is not final while rows next to it fit much worse than the others: the output jumps there and the jump is
-/// inside a bin. Then that input's bins are laid out anew between the neighbouring edges, as often as needed.
 class LeafSearch {
  public:
   explicit LeafSearch(const StreamSetting& setting);
@@ -63,6 +60,20 @@ class LeafSearch {
 
   /// The split to make, if a test is due and shows one. `low`, `high`: range of the inputs in the leaf.
   std::optional<StreamSplit> test(const Eigen::VectorXd& low, const Eigen::VectorXd& high, double different);
+
+  /// What the edges between the bins of an input leave; empty before bins are laid out.
+  struct Edges {
+    std::vector<double> thresholds;
+    std::vector<std::ptrdiff_t> rows_left;
+    std::vector<double> rss_left;
+    std::vector<double> rss_right;
+    std::vector<int> rank_left;
+    std::vector<int> rank_right;
+    std::ptrdiff_t rows = 0;  ///< in all bins
+    double rss = 0.0;         ///< of one model
+    int rank = 0;
+  };
+  Edges edges(int input);
 
   std::ptrdiff_t bytes() const;
 
@@ -100,27 +111,24 @@ class LeafSearch {
   void add_signs(const StreamRow& row, double error);
   bool propose();
   Sums side(const Bins& bins, std::size_t begin, std::size_t end) const;
-  void look_at(int input, Found& found);
+  Found look_at(int input);
   bool passes(const Found& found) const;
-  std::optional<StreamSplit> decide(const Found& found, const Eigen::VectorXd& low, const Eigen::VectorXd& high);
-  bool narrow(const Found& found, const StreamSplit& split, const Eigen::VectorXd& low, const Eigen::VectorXd& high);
+  StreamSplit split_at(const Found& found, const Eigen::VectorXd& low, const Eigen::VectorXd& high) const;
 
   const StreamSetting& setting_;
   ResidualSums residuals_;
   std::vector<double> first_rows_;  // inputs, output, weight
   bool laid_out_ = false;
-  std::vector<Bins> bins_;                       // per input
-  std::vector<std::vector<double>> wide_edges_;  // as laid out at first
-  std::array<SignSums, 2> signs_;                // ra
-  int narrowed_ = -1;                            // input whose bins are narrowed, or that ra proposes
-  std::vector<double*> sums_of_row_;             // of put()
-  std::ptrdiff_t narrowed_rows_ = 0;             // in its bins
-  std::ptrdiff_t patience_ = 0;                  // rows after which that is given up
+  std::vector<Bins> bins_;            // per input
+  std::array<SignSums, 2> signs_;     // ra
+  int proposed_ = -1;                 // ra: input that is tried; its threshold is the edge between two bins
+  std::ptrdiff_t proposed_rows_ = 0;  // in these bins
+  std::ptrdiff_t patience_ = 0;       // rows after which that is given up
+  std::vector<double*> sums_of_row_;  // of put()
   std::ptrdiff_t rows_ = 0;
   std::ptrdiff_t next_test_ = 0;
   std::ptrdiff_t first_passed_ = 0;
   int tests_ = 0;
-  int narrowings_ = 0;
   double different_ = 1.0;  // see StreamRow
 };
 

@@ -99,7 +99,7 @@ constexpr std::ptrdiff_t rows_per_unknown = 10;
 /// Candidates.
 constexpr std::array<double, 3> widths = {0.5, 1.0, 2.0};
 constexpr double first_ridge = 0.1;
-const std::vector<double> further_ridges = {1e-3, 0.01, 1.0, 10.0};  // of the best with the first
+constexpr std::array<double, 4> further_ridges = {1e-3, 0.01, 1.0, 10.0};  // of the best with the first
 constexpr std::array<double, 2> jumps = {no_jump, 1.0};
 
 Eigen::MatrixXd range_of_residuals(const std::array<const TrainingRows*, 2>& parts, const Partition& partition) {
@@ -172,8 +172,10 @@ Partition choose(const TrainingRows& others, const TrainingRows& held_out, Parti
       }
     }
   }
-  for (const double ridge : best ? further_ridges : std::vector<double>{}) {
-    offer(best->corrected(ridge));
+  for (const double ridge : further_ridges) {
+    if (best) {
+      offer(best->corrected(ridge));
+    }
   }
   return chosen;
 }

@@ -1,0 +1,556 @@
+#include "llmt/stream.hpp"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/QR>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <optional>
+
+#include "blend_correction.hpp"
+#include "boxes.hpp"
+#include "llmt/random.hpp"
+#include "oracles.hpp"
+#include "reservoir.hpp"
+#include "stream_search.hpp"
+#include "stream_sums.hpp"
+#include "stream_tree.hpp"
+
+namespace {
+
+using llmt::GramShape;
+using llmt::Stream;
+using llmt::StreamOptions;
+using llmt::StreamRule;
+
+Eigen::MatrixXd noise(std::ptrdiff_t rows, std::uint64_t seed) {
+  llmt::Random random(seed);
+  Eigen::MatrixXd values(rows, 1);
+  for (double& value : values.reshaped()) {
+    value = random.normal();
+  }
+  return values;
+}
+
+Eigen::MatrixXd affine(const Eigen::MatrixXd& x) {
+  return (1.5 + (x * Eigen::VectorXd::LinSpaced(x.cols(), -1.0, 2.0)).array()).matrix();
+}
+
+/// A kink in the first input.
+Eigen::MatrixXd kink(const Eigen::MatrixXd& x) { return 2.0 * x.col(0).cwiseAbs() + 0.5 * x.col(1); }
+
+Eigen::MatrixXd with_one(const Eigen::MatrixXd& x) {
+  Eigen::MatrixXd result(x.rows(), x.cols() + 1);
+  result << Eigen::VectorXd::Ones(x.rows()), x;
+  return result;
+}
+
+llmt::StreamSetting setting_for(std::ptrdiff_t inputs, StreamOptions options = {}) {
+  options.min_leaf_samples = 2 * (inputs + 1);
+  options.max_leaves = 100;
+  return {.options = options,
+          .inputs = inputs,
+          .shape = GramShape(inputs + 1, 1),
+          .output_variance = 1.0,
+          .rounding = 1e-10,
+          .centre = Eigen::VectorXd::Zero(inputs),
+          .scale = Eigen::VectorXd::Ones(inputs)};
+}
+
+llmt::Basis origin_basis(std::ptrdiff_t inputs) {
+  return {Eigen::VectorXd::Zero(inputs), Eigen::VectorXd::Zero(inputs + 1)};
+}
+
+std::vector<double> sums_of(const GramShape& shape, const llmt::Basis& basis, const Eigen::MatrixXd& x,
+                            const Eigen::MatrixXd& y, const Eigen::VectorXd& weights) {
+  llmt::RowProducts products(shape);
+  std::vector<double> gram(static_cast<std::size_t>(shape.size()), 0.0);
+  for (std::ptrdiff_t i = 0; i < x.rows(); ++i) {
+    const Eigen::VectorXd row = x.row(i).transpose();
+    products.set(basis, row.data(), y(i, 0), weights(i));
+    products.add_to(gram.data());
+  }
+  return gram;
+}
+
+TEST(StreamSums, SolveIsWeightedRidgeAboutTheBase) {
+  const Eigen::MatrixXd x = oracle::uniform(60, 3, 1);
+  const Eigen::MatrixXd y = oracle::curved(x);
+  const Eigen::VectorXd weights = (oracle::uniform(60, 1, 2).array() + 1.5).matrix();
+  const GramShape shape(4, 1);
+  const llmt::Basis basis{Eigen::Vector3d(0.1, -0.2, 0.3), Eigen::Vector4d(1.0, 0.5, -0.5, 2.0)};
+  const std::vector<double> gram = sums_of(shape, basis, x, y, weights);
+  const Eigen::MatrixXd a = with_one(x.rowwise() - basis.origin.transpose());
+  for (const double shrinkage : {0.0, 5.0}) {
+    int rank = 0;
+    const Eigen::VectorXd model = basis.base + llmt::solve(shape, gram.data(), shrinkage, rank);
+    EXPECT_EQ(rank, 4);
+    // `shrinkage` rows of each regressor's variance say that the base holds.
+    Eigen::MatrixXd normal = a.transpose() * weights.asDiagonal() * a;
+    Eigen::VectorXd right = a.transpose() * weights.asDiagonal() * y;
+    for (int k = 1; k < 4; ++k) {
+      const double mean = weights.dot(a.col(k)) / weights.sum();
+      const double variance = weights.dot((a.col(k).array() - mean).square().matrix()) / weights.sum();
+      normal(k, k) += shrinkage * variance;
+      right(k) += shrinkage * variance * basis.base(k);
+    }
+    EXPECT_LT((model - normal.colPivHouseholderQr().solve(right)).norm(), 1e-10) << shrinkage;
+  }
+}
+
+TEST(StreamSums, CollinearAndConstantColumnsChangeNothing) {
+  Eigen::MatrixXd x = oracle::uniform(50, 4, 1);
+  x.col(2) = 2.0 * x.col(0) - x.col(1);
+  x.col(3).setConstant(0.7);
+  const GramShape shape(5, 1);
+  const std::vector<double> gram = sums_of(shape, origin_basis(4), x, affine(x), Eigen::VectorXd::Ones(50));
+  int rank = 0;
+  const Eigen::VectorXd model = llmt::solve(shape, gram.data(), 0.0, rank);
+  EXPECT_EQ(rank, 3);
+  EXPECT_EQ(model(3), 0.0);
+  EXPECT_EQ(model(4), 0.0);
+  EXPECT_LT((with_one(x) * model - affine(x)).norm(), 1e-9);
+}
+
+TEST(StreamSums, RebaseIsSummingInTheOtherBasis) {
+  const Eigen::MatrixXd x = oracle::uniform(40, 3, 3);
+  const Eigen::MatrixXd y = oracle::curved(x);
+  const Eigen::VectorXd ones = Eigen::VectorXd::Ones(40);
+  const GramShape shape(4, 1);
+  const llmt::Basis from{Eigen::Vector3d(0.1, 0.0, -0.1), Eigen::Vector4d(0.3, 1.0, 0.0, -1.0)};
+  const Eigen::Vector3d shift(0.4, -0.3, 0.2);
+  const Eigen::Vector4d change(0.2, -0.1, 0.6, 0.5);
+  const llmt::Basis to{from.origin + shift, llmt::shifted_model(from.base + change, shift)};
+  std::vector<double> gram = sums_of(shape, from, x, y, ones);
+  llmt::rebase(shape, shift, change, gram);
+  EXPECT_LT(
+      (llmt::matrix_of(shape, gram.data()) - llmt::matrix_of(shape, sums_of(shape, to, x, y, ones).data())).norm(),
+      1e-11);
+}
+
+TEST(StreamSearch, EveryEdgeLeavesWhatBruteForceRefitsLeave) {
+  Eigen::MatrixXd x = oracle::uniform(300, 3, 5);
+  x.col(1) = (4.0 * x.col(1)).array().round();  // ties
+  x(17, 0) = x(200, 2) = std::numeric_limits<double>::quiet_NaN();
+  const Eigen::MatrixXd known = x.array().isNaN().select(0.0, x);
+  const Eigen::MatrixXd y = oracle::curved(known, 0.1);
+  const llmt::StreamSetting setting = setting_for(3);
+  llmt::LeafSearch search(setting);
+  const llmt::Basis basis = origin_basis(3);
+  llmt::RowProducts products(setting.shape);
+  for (std::ptrdiff_t i = 0; i < x.rows(); ++i) {
+    const Eigen::VectorXd row = x.row(i).transpose();
+    products.set(basis, row.data(), y(i, 0), 1.0);
+    search.add({row.data(), row.data(), y(i, 0), 1.0, 1.0}, basis, products, 0.0);
+  }
+  for (int input = 0; input < 3; ++input) {
+    const llmt::LeafSearch::Edges edges = search.edges(input);
+    ASSERT_GE(edges.thresholds.size(), input == 1 ? 5U : 13U);
+    for (std::size_t e = 0; e < edges.thresholds.size(); ++e) {
+      std::vector<std::ptrdiff_t> left;
+      std::vector<std::ptrdiff_t> right;
+      for (std::ptrdiff_t i = 0; i < x.rows(); ++i) {
+        if (!std::isnan(x(i, input))) {
+          (x(i, input) <= edges.thresholds[e] ? left : right).push_back(i);
+        }
+      }
+      EXPECT_EQ(edges.rows_left[e], std::ssize(left));
+      EXPECT_NEAR(edges.rss_left[e], static_cast<double>(oracle::rss(known(left, Eigen::all), y(left, Eigen::all))),
+                  1e-9);
+      EXPECT_NEAR(edges.rss_right[e], static_cast<double>(oracle::rss(known(right, Eigen::all), y(right, Eigen::all))),
+                  1e-9);
+    }
+  }
+}
+
+TEST(StreamTree, AThresholdMovesToWhereTheErrorsChangeSides) {
+  llmt::ThresholdWatch watch(0.5, 0.1);
+  llmt::Random random(1);
+  double threshold = 0.5;
+  for (int i = 0; i < 20000; ++i) {
+    const double x = random.uniform();
+    if (watch.concerns(x)) {
+      const double e = random.normal();
+      const double wrong = (e + 4.0) * (e + 4.0);
+      threshold = watch.add(x, x <= 0.53 ? e * e : wrong, x <= 0.53 ? wrong : e * e);
+    }
+  }
+  EXPECT_NEAR(threshold, 0.53, 0.005);
+}
+
+TEST(StreamTree, AThresholdStaysWhereItIsRight) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    llmt::ThresholdWatch watch(0.5, 0.1);
+    llmt::Random random(seed);
+    for (int i = 0; i < 5000; ++i) {
+      const double x = random.uniform();
+      if (watch.concerns(x)) {
+        const double e = random.normal();
+        const double wrong = (e + 2.0) * (e + 2.0);
+        EXPECT_EQ(watch.add(x, x <= 0.5 ? e * e : wrong, x <= 0.5 ? wrong : e * e), 0.5) << seed;
+      }
+    }
+  }
+}
+
+TEST(StreamTree, RisesAreSeenAndSteadyErrorsRaiseNoAlarm) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    llmt::Random random(seed);
+    llmt::RiseDetector detector;
+    for (int i = 0; i < 20000; ++i) {
+      const double heavy = random.normal() / std::max(0.3, std::abs(random.normal()));
+      EXPECT_FALSE(detector.add(std::abs(heavy))) << seed << " at " << i;
+    }
+    int rows = 0;
+    while (!detector.add(2.0 * std::abs(random.normal() / std::max(0.3, std::abs(random.normal()))))) {
+      ++rows;
+      ASSERT_LT(rows, 1000) << seed;
+    }
+  }
+}
+
+TEST(Reservoir, IsTheSameWhateverTheOrderAndKnowsRowsAgain) {
+  const Eigen::MatrixXd x = oracle::uniform(500, 2, 1);
+  llmt::Random random(1);
+  llmt::Reservoir forward(50, 2);
+  llmt::Reservoir shuffled(50, 2);
+  const std::vector<std::ptrdiff_t> order = random.permutation(500);
+  for (std::ptrdiff_t i = 0; i < 500; ++i) {
+    const Eigen::VectorXd first = x.row(i).transpose();
+    const Eigen::VectorXd second = x.row(order[static_cast<std::size_t>(i)]).transpose();
+    forward.add(first.data());
+    shuffled.add(second.data());
+  }
+  ASSERT_EQ(forward.rows().size(), 50U);
+  EXPECT_EQ(forward.share_of_different(), 1.0);
+  for (auto left = forward.rows().begin(), right = shuffled.rows().begin(); left != forward.rows().end();
+       ++left, ++right) {
+    EXPECT_EQ(left->second.values, right->second.values);
+  }
+  for (int pass = 0; pass < 3; ++pass) {
+    for (std::ptrdiff_t i = 0; i < 500; ++i) {
+      const Eigen::VectorXd row = x.row(i).transpose();
+      forward.add(row.data());
+    }
+  }
+  EXPECT_EQ(forward.rows().size(), 50U);
+  EXPECT_EQ(forward.share_of_different(), 0.25);
+}
+
+TEST(BlendCorrection, IsTheAnchoredLeastSquaresFit) {
+  const Eigen::MatrixXd x = oracle::uniform(200, 2, 1);
+  const Eigen::MatrixXd y = oracle::curved(x, 0.05);
+  llmt::FitOptions options;
+  options.growth.max_leaves = 4;
+  options.selection.folds.count = 0;
+  llmt::Partition partition = llmt::fit(x, y, options).model.partitions().front();
+  ASSERT_EQ(partition.num_leaves(), 4);
+  const llmt::Table table{x, y, Eigen::VectorXd::Ones(200), {0, 0}, {0, 1}, {0, 1}};
+  std::vector<int> all(200);
+  std::iota(all.begin(), all.end(), 0);
+  const llmt::TrainingRows rows = llmt::training_rows(table, all);
+  partition.validity = {llmt::ValidityKind::blend, 1.0, 1};
+  llmt::set_half_widths(partition, rows.low(), rows.high());
+  const double ridge = 0.1;
+  const llmt::BlendCorrection correction(rows, partition);
+  const llmt::Partition corrected = correction.corrected(ridge);
+
+  // The same by dense normal equations.
+  const llmt::Model model(rows.columns, rows.output_columns, rows.regressors, {partition});
+  const Eigen::MatrixXd phi = model.validities(x, 0);
+  std::vector<int> leaves;
+  for (const llmt::Leaf& leaf : model.leaves(0)) {
+    leaves.push_back(leaf.node);
+  }
+  Eigen::MatrixXd a(200, 12);
+  Eigen::VectorXd residual = y.col(0);
+  Eigen::MatrixXd hold = Eigen::MatrixXd::Zero(12, 12);
+  const Eigen::MatrixXd one =
+      with_one(x.rowwise() - Eigen::RowVector2d(rows.regressors[0].centre, rows.regressors[1].centre));
+  for (int i = 0; i < 4; ++i) {
+    const llmt::Node& node = partition.nodes[static_cast<std::size_t>(leaves[static_cast<std::size_t>(i)])];
+    a.middleCols(3 * i, 3) = phi.col(i).asDiagonal() * one;
+    residual -= phi.col(i).cwiseProduct(one * (Eigen::VectorXd(3) << node.value, node.slope.transpose()).finished());
+    hold.block(3 * i, 3 * i, 3, 3) = ridge * one.transpose() * phi.col(i).asDiagonal() * one;
+  }
+  const Eigen::VectorXd change = (a.transpose() * a + hold).llt().solve(a.transpose() * residual);
+  for (int i = 0; i < 4; ++i) {
+    const std::size_t node = static_cast<std::size_t>(leaves[static_cast<std::size_t>(i)]);
+    const Eigen::Vector3d found(corrected.nodes[node].value(0) - partition.nodes[node].value(0),
+                                corrected.nodes[node].slope(0, 0) - partition.nodes[node].slope(0, 0),
+                                corrected.nodes[node].slope(0, 1) - partition.nodes[node].slope(0, 1));
+    EXPECT_LT((found - change.segment(3 * i, 3)).norm(), 0.01 * change.norm()) << i;
+  }
+}
+
+TEST(Stream, ALeafModelIsLeastSquaresOfAllItsRows) {
+  const Eigen::MatrixXd x = oracle::uniform(700, 3, 1);
+  const Eigen::MatrixXd y = affine(x) + 0.3 * noise(700, 2);
+  Stream stream(3, 1, {.shrinkage = 0.0, .reservoir_rows = 0});
+  stream.add(x, y);
+  const llmt::Model model = stream.snapshot();
+  const std::vector<llmt::Leaf> leaves = model.leaves(0);
+  ASSERT_EQ(leaves.size(), 1U);
+  const Eigen::VectorXd expected = oracle::least_squares(with_one(x), y.col(0));
+  // Solved for anew when rows have grown by a twentieth; the snapshot of a leaf says what predict() says.
+  EXPECT_LT((model.predict(x) - stream.predict(x)).norm(), 1e-10);
+  EXPECT_LT((leaves[0].slope.transpose() - expected.tail(3)).norm(), 0.02);
+  EXPECT_EQ(leaves[0].samples, 700);
+  EXPECT_NEAR(std::pow(leaves[0].rmse(0), 2) * 700.0, static_cast<double>(oracle::rss(x, y)), 0.1);
+}
+
+TEST(Stream, OneRowAtATimeOrInBlocksGivesTheSameBytes) {
+  const Eigen::MatrixXd x = oracle::uniform(3000, 3, 1);
+  const Eigen::MatrixXd y = oracle::curved(x, 0.1);
+  for (const StreamRule rule : {StreamRule::rd, StreamRule::ra}) {
+    Stream whole(3, 1, {.rule = rule});
+    Stream rows(3, 1, {.rule = rule});
+    whole.add(x, y);
+    for (std::ptrdiff_t i = 0; i < x.rows(); ++i) {
+      rows.add(x.row(i), y.row(i));
+    }
+    EXPECT_GT(whole.counts().leaves, 1);
+    EXPECT_EQ(llmt::to_json(whole.snapshot()), llmt::to_json(rows.snapshot()));
+  }
+}
+
+TEST(Stream, LearnsASmoothFunctionFarBetterThanOneModel) {
+  const Eigen::MatrixXd x = oracle::uniform(20000, 3, 1);
+  const Eigen::MatrixXd y = oracle::curved(x, 0.1);
+  const Eigen::MatrixXd fresh = oracle::uniform(2000, 3, 9);
+  const Eigen::MatrixXd truth = oracle::curved(fresh);
+  llmt::FitOptions one_leaf;
+  one_leaf.growth.max_leaves = 1;
+  one_leaf.selection.folds.count = 0;
+  const double linear = llmt::rmse(llmt::fit(x, y, one_leaf).model.predict(fresh), truth)(0);
+  for (const StreamRule rule : {StreamRule::rd, StreamRule::ra}) {
+    Stream stream(3, 1, {.rule = rule});
+    stream.add(x, y);
+    const double live = llmt::rmse(stream.predict(fresh), truth)(0);
+    EXPECT_LT(live, (rule == StreamRule::rd ? 0.15 : 0.3) * linear);
+    EXPECT_LT(llmt::rmse(stream.snapshot().predict(fresh), truth)(0), 1.05 * live);
+    // Test then train: noise and what was not yet learned.
+    EXPECT_GT(stream.prequential_rmse()(0), 0.1);
+    EXPECT_LT(stream.recent_rmse()(0), 0.13);
+  }
+}
+
+TEST(Stream, AJumpIsFoundFarMoreCloselyThanABinIsWide) {
+  const Eigen::MatrixXd x = oracle::uniform(5000, 2, 1);
+  const Eigen::MatrixXd y = (x.col(0).array() > 0.3713).select(4.0, x.col(1)).matrix() + noise(5000, 2);
+  Stream stream(2, 1);
+  stream.add(x, y);
+  // Rows on the wrong side of the jump, as a width: a bin is 0.13 wide.
+  const Eigen::MatrixXd fresh = oracle::uniform(20000, 2, 3);
+  const Eigen::ArrayXd truth = (fresh.col(0).array() > 0.3713).select(4.0, fresh.col(1)).array();
+  const std::ptrdiff_t wrong = ((stream.predict(fresh).col(0).array() - truth).abs() > 1.5).count();
+  EXPECT_LT(2.0 * static_cast<double>(wrong) / 20000.0, 0.01);
+}
+
+TEST(Stream, AffineDataAreNeverSplit) {
+  for (const StreamRule rule : {StreamRule::rd, StreamRule::ra}) {
+    for (const double offset : {0.0, 1e6}) {
+      const Eigen::MatrixXd x = oracle::uniform(3000, 3, 1).array() + offset;
+      const Eigen::MatrixXd y = affine(x);
+      Stream stream(3, 1, {.rule = rule});
+      stream.add(x, y);
+      EXPECT_EQ(stream.counts().splits, 0) << offset;
+      EXPECT_LT((stream.snapshot().predict(x) - y).norm() / y.norm(), 1e-7);
+    }
+  }
+}
+
+TEST(Stream, NoiseIsSplitNoMoreOftenThanTheSignificanceAllows) {
+  // Each stream is split with a probability of at most 0.05, whenever it is looked at: among 100, more than 14 have
+  // one with a probability of 1e-4.
+  for (const StreamRule rule : {StreamRule::rd, StreamRule::ra}) {
+    int split = 0;
+    for (std::uint64_t seed = 1; seed <= 100; ++seed) {
+      Stream stream(2, 1, {.rule = rule, .reservoir_rows = 0});
+      stream.add(oracle::uniform(1500, 2, seed), noise(1500, 1000 + seed));
+      split += stream.counts().splits > 0 ? 1 : 0;
+    }
+    EXPECT_LE(split, 14);
+  }
+}
+
+TEST(Stream, RowsThatComeAgainAreNoNewEvidence) {
+  int split = 0;
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    Stream stream(2, 1);
+    const Eigen::MatrixXd x = oracle::uniform(150, 2, seed);
+    const Eigen::MatrixXd y = noise(150, 1000 + seed);
+    for (int pass = 0; pass < 20; ++pass) {
+      stream.add(x, y);
+    }
+    split += stream.counts().splits > 0 ? 1 : 0;
+  }
+  // As above: more than 6 of 20 have a probability of 3e-5.
+  EXPECT_LE(split, 6);
+}
+
+TEST(Stream, ASplitThatIsNoLongerNeededIsTakenBack) {
+  const Eigen::MatrixXd x = oracle::uniform(30000, 2, 1);
+  const Eigen::MatrixXd curved = kink(x.topRows(3000)) + 0.1 * noise(3000, 2);
+  const Eigen::MatrixXd straight = affine(x.bottomRows(27000)) + 0.1 * noise(27000, 3);
+  for (const bool detect : {true, false}) {
+    Stream stream(2, 1, {.detect_drift = detect});
+    stream.add(x.topRows(3000), curved);
+    EXPECT_GT(stream.counts().leaves, 1);
+    stream.add(x.bottomRows(27000), straight);
+    if (detect) {
+      EXPECT_EQ(stream.counts().leaves, 1);
+      EXPECT_GE(stream.counts().drifts, 1);
+    } else {
+      EXPECT_GE(stream.counts().prunes, 1);
+    }
+  }
+}
+
+TEST(Stream, AChangeIsSeenAndLearned) {
+  const Eigen::MatrixXd x = oracle::uniform(12000, 2, 1);
+  const Eigen::MatrixXd before = kink(x.topRows(6000)) + 0.1 * noise(6000, 2);
+  const Eigen::MatrixXd after = -kink(x.bottomRows(6000)) + 0.1 * noise(6000, 3);
+  Stream stream(2, 1);
+  stream.add(x.topRows(6000), before);
+  EXPECT_EQ(stream.counts().drifts, 0);
+  stream.add(x.bottomRows(6000), after);
+  Stream fresh(2, 1);
+  fresh.add(x.bottomRows(6000), after);
+  const Eigen::MatrixXd query = oracle::uniform(1000, 2, 7);
+  const double error = llmt::rmse(stream.predict(query), -kink(query))(0);
+  EXPECT_GE(stream.counts().drifts, 1);
+  EXPECT_LT(error, 1.5 * llmt::rmse(fresh.predict(query), -kink(query))(0));
+  EXPECT_LT(llmt::rmse(stream.snapshot().predict(query), -kink(query))(0), 0.05);
+
+  Stream blind(2, 1, {.detect_drift = false});
+  blind.add(x.topRows(6000), before);
+  blind.add(x.bottomRows(6000), after);
+  EXPECT_GT(llmt::rmse(blind.predict(query), -kink(query))(0), 4.0 * error);
+}
+
+TEST(Stream, NoAlarmWithoutAChange) {
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    Stream stream(3, 1);
+    const Eigen::MatrixXd x = oracle::uniform(10000, 3, seed);
+    stream.add(x, oracle::curved(x, 0.2, seed));
+    EXPECT_EQ(stream.counts().drifts, 0) << seed;
+  }
+}
+
+TEST(Stream, MemoryHasABound) {
+  Stream stream(3, 1, {.max_leaves = 6, .reservoir_rows = 1000});
+  std::ptrdiff_t most = 0;
+  for (std::uint64_t block = 1; block <= 40; ++block) {
+    const Eigen::MatrixXd x = oracle::uniform(1000, 3, block);
+    stream.add(x, oracle::curved(x, 0.01, block));
+    EXPECT_LE(stream.counts().leaves, 6);
+    most = std::max(most, stream.counts().bytes);
+  }
+  // Of a leaf: bins of every input; of the reservoir: what a row holds and its place in the map.
+  const std::ptrdiff_t gram = GramShape(4, 1).size() * 8;
+  EXPECT_LE(most, 6 * (3 * 16 * gram + 20 * gram) + 1000 * (5 * 8 + 96) + 10000);
+}
+
+TEST(Stream, MissingValuesAreLearnedWith) {
+  Eigen::MatrixXd x = oracle::uniform(20000, 2, 1);
+  const Eigen::MatrixXd y = kink(x) + 0.1 * noise(20000, 2);
+  llmt::Random random(5);
+  for (double& value : x.reshaped()) {
+    value = random.uniform() < 0.1 ? std::numeric_limits<double>::quiet_NaN() : value;
+  }
+  Stream stream(2, 1);
+  stream.add(x, y);
+  EXPECT_GT(stream.counts().missing_values, 3000);
+  EXPECT_TRUE(stream.predict(x).allFinite());
+  const Eigen::MatrixXd query = oracle::uniform(1000, 2, 7);
+  EXPECT_LT(llmt::rmse(stream.snapshot().predict(query), kink(query))(0), 0.1);
+  EXPECT_TRUE(stream.snapshot().predict(x).allFinite());
+}
+
+TEST(Stream, RowsOfWeightZeroTakeNoPart) {
+  const Eigen::MatrixXd x = oracle::uniform(2000, 2, 1);
+  Eigen::MatrixXd y = kink(x) + 0.1 * noise(2000, 2);
+  Eigen::VectorXd weights = Eigen::VectorXd::Ones(2000);
+  Stream kept(2, 1);
+  for (std::ptrdiff_t i = 0; i < 2000; ++i) {
+    if (i % 3 == 0) {
+      weights(i) = 0.0;
+    } else {
+      kept.add(x.row(i), y.row(i));
+    }
+  }
+  Stream weighted(2, 1);
+  weighted.add(x, y, weights);
+  EXPECT_EQ(llmt::to_json(weighted.snapshot()), llmt::to_json(kept.snapshot()));
+}
+
+TEST(Stream, ASnapshotIsAnOrdinaryModel) {
+  const Eigen::MatrixXd x = oracle::uniform(8000, 3, 1);
+  Eigen::MatrixXd y(8000, 2);
+  y << oracle::curved(x, 0.1), affine(x);
+  Stream stream(3, 2);
+  stream.add(x, y);
+  for (const llmt::ValidityChoice validity :
+       {llmt::ValidityChoice::automatic, llmt::ValidityChoice::crisp, llmt::ValidityChoice::blend}) {
+    const llmt::Model model = stream.snapshot(validity);
+    EXPECT_EQ(model.num_outputs(), 2);
+    const llmt::Model read = llmt::from_json(llmt::to_json(model));
+    EXPECT_EQ(read.predict(x), model.predict(x));
+    EXPECT_EQ(model.jacobian(x.row(0).transpose()).rows(), 2);
+    EXPECT_TRUE(model.standard_errors(x.topRows(10)).allFinite());
+    EXPECT_GT(model.extrapolation(Eigen::RowVector3d(3.0, 0.0, 0.0))[0].distance, 0.9);
+    EXPECT_EQ(model.partitions()[0].validity.kind == llmt::ValidityKind::crisp,
+              validity == llmt::ValidityChoice::crisp || model.partitions()[0].num_leaves() == 1 ||
+                  model.partitions()[0].validity.width == 0.0);
+  }
+  // A linear output stays one leaf and is continued linearly.
+  const Eigen::MatrixXd far = 3.0 * oracle::uniform(50, 3, 8);
+  EXPECT_LT((stream.snapshot().predict(far).col(1) - affine(far)).norm(), 1e-6);
+}
+
+TEST(Stream, AFewRowsGiveALinearModel) {
+  const Eigen::MatrixXd x = oracle::uniform(10, 2, 1);
+  Stream stream(2, 1);
+  EXPECT_THROW(stream.snapshot(), std::invalid_argument);
+  EXPECT_TRUE(stream.predict(x).array().isNaN().all());
+  stream.add(x, affine(x));
+  EXPECT_LT((stream.snapshot().predict(x) - affine(x)).norm(), 1e-9);
+  EXPECT_TRUE(std::isnan(stream.prequential_rmse()(0)));
+}
+
+TEST(Stream, RefusalsNameTheRow) {
+  const auto message = [](const auto& call) -> std::string {
+    try {
+      call();
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
+    return "";
+  };
+  Stream stream(2, 1);
+  Eigen::MatrixXd x = oracle::uniform(4, 2, 1);
+  Eigen::MatrixXd y = affine(x);
+  stream.add(x, y);
+  y(3, 0) = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(message([&] { stream.add(x, y); }),
+            "llmt::Stream: add(): outputs(3, 0) is nan, it must be finite (row 7 of the stream; counted from 0)");
+  EXPECT_EQ(stream.counts().rows, 4);
+  y(3, 0) = 0.0;
+  x(1, 1) = std::numeric_limits<double>::infinity();
+  EXPECT_NE(message([&] { stream.add(x, y); }).find("inputs(1, 1) is inf"), std::string::npos);
+  x(1, 1) = 0.0;
+  EXPECT_NE(message([&] { stream.add(x, y, Eigen::Vector4d(1.0, 1.0, -1.0, 1.0)); }).find("weights(2, 0) is -1"),
+            std::string::npos);
+  EXPECT_NE(message([&] { stream.add(x.leftCols(1), y); }).find("inputs is 4 x 1"), std::string::npos);
+  EXPECT_NE(message([&] { stream.snapshot(llmt::ValidityChoice::gaussian); }).find("gaussian"), std::string::npos);
+  EXPECT_NE(message([] { Stream(0, 1); }).find("0 inputs"), std::string::npos);
+  EXPECT_NE(message([] { Stream(1, 1, {.significance = 0.0}); }).find("significance is 0"), std::string::npos);
+  EXPECT_NE(message([] { Stream(1, 1, {.bins = 3}); }).find("bins is 3, it must be within 4 ... 256"),
+            std::string::npos);
+  EXPECT_NE(message([] { Stream(1, 1, {.max_leaves = -1}); }).find("max_leaves is -1"), std::string::npos);
+}
+
+}  // namespace
