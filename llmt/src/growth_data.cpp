@@ -56,9 +56,9 @@ bool GrowthData::is_significant(double level, double weight, int rank, double rs
   }
   // Several outputs count as that many independent observations of equal variance, which the weights make them at the
   // root.
-  const double outputs = static_cast<double>(output_weights.size());
-  const double added = outputs * (split.left + split.right - rank);
-  const double freedom = outputs * (weight - split.left - split.right);
+  const double num_outputs = static_cast<double>(output_weights.size());
+  const double added = num_outputs * (split.left + split.right - rank);
+  const double freedom = num_outputs * (weight - split.left - split.right);
   if (added <= 0.0 || freedom <= 0.0) {
     return false;
   }
