@@ -269,7 +269,7 @@ TEST(LlmtProgram, CompareListsTheMethodsAndRecommendsOne) {
   }
   EXPECT_EQ(names,
             (std::vector<std::string>{"least squares", "crisp tree, RD", "crisp tree, RETIS", "Gaussians, as grown",
-                                      "Gaussians, re-estimated", "blend, joint", "LOLIMOT"}));
+                                      "Gaussians, re-estimated", "blend, joint", "LOLIMOT", "HILOMOT"}));
   ASSERT_TRUE(errors.contains(result["recommended"])) << result["recommended"];
   EXPECT_LT(errors[result["recommended"]], 0.5 * errors["least squares"]);
   const std::string why = result["recommendation"];
