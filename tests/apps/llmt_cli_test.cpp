@@ -337,7 +337,7 @@ TEST(LlmtProgram, CompareListsTheMethodsAndRecommendsOne) {
   }
   EXPECT_EQ(names, (std::vector<std::string>{"least squares", "crisp tree, RD", "crisp tree, RETIS", "crisp tree, RA",
                                              "M5', smoothed", "Gaussians, as grown", "Gaussians, re-estimated",
-                                             "blend, joint", "LOLIMOT"}));
+                                             "blend, joint", "LOLIMOT", "HILOMOT", "crisp tree, quadratic leaves"}));
   ASSERT_TRUE(errors.contains(result["recommended"])) << result["recommended"];
   EXPECT_LT(errors[result["recommended"]], 0.5 * errors["least squares"]);
   const std::string why = result["recommendation"];
