@@ -97,6 +97,43 @@ std::vector<int> count_levels(const Eigen::Ref<const Eigen::MatrixXd>& inputs, c
   return num_levels;
 }
 
+void check_signs(const char* option, const std::vector<int>& signs, const std::vector<int>& num_levels) {
+  if (!signs.empty() && signs.size() != num_levels.size()) {
+    throw std::invalid_argument(
+        fmt::format("llmt::fit: {} has {} entries, there are {} inputs", option, signs.size(), num_levels.size()));
+  }
+  for (std::size_t j = 0; j < signs.size(); ++j) {
+    require(signs[j] >= -1 && signs[j] <= 1, fmt::format("{}[{}]", option, j).c_str(), signs[j], "-1, 0 or 1");
+    require(signs[j] == 0 || num_levels[j] == 0, fmt::format("{}[{}]", option, j).c_str(), signs[j],
+            "0: the input is categorical, its values have no order");
+  }
+}
+
+/// Signs of slopes and of the prediction, which includes the former.
+void set_signs(const FitOptions& options, Table& table) {
+  check_signs("slope_signs", options.slope_signs, table.num_levels);
+  check_signs("monotone", options.monotone, table.num_levels);
+  table.slope_signs = options.slope_signs;
+  if (std::all_of(options.monotone.begin(), options.monotone.end(), [](int sign) { return sign == 0; })) {
+    return;
+  }
+  table.monotone = options.monotone;
+  table.slope_signs.resize(table.monotone.size(), 0);
+  for (std::size_t j = 0; j < table.monotone.size(); ++j) {
+    require(table.monotone[j] == 0 || table.slope_signs[j] != -table.monotone[j],
+            fmt::format("slope_signs[{}]", j).c_str(), table.slope_signs[j], "not the opposite of monotone");
+    table.slope_signs[j] = table.monotone[j] != 0 ? table.monotone[j] : table.slope_signs[j];
+  }
+}
+
+/// Whether splits may be made on inputs in which the prediction is to be monotone: where gates are products of one
+/// input each and no missing value sends a row to both sides, see docs/algorithms.md.
+bool may_order_splits(const FitOptions& options, const Eigen::Ref<const Eigen::MatrixXd>& inputs) {
+  const GrowthRule rule = options.growth.rule;
+  return (rule == GrowthRule::rd || rule == GrowthRule::retis) &&
+         options.blend.validity != ValidityChoice::gaussian && !inputs.hasNaN();
+}
+
 }  // namespace
 
 void check_options(const FitOptions& options, std::ptrdiff_t inputs) {
@@ -138,6 +175,10 @@ Table make_table(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::R
       *columns = all_columns(inputs.cols());
     }
     std::sort(columns->begin(), columns->end());
+  }
+  set_signs(options, table);
+  if (!table.monotone.empty() && !may_order_splits(options, inputs)) {
+    std::erase_if(table.split_inputs, [&](int j) { return table.monotone[static_cast<std::size_t>(j)] != 0; });
   }
   return table;
 }

@@ -3,8 +3,12 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <map>
 
+#include "bounded_least_squares.hpp"
 #include "dense.hpp"
+#include "ordered_splits.hpp"
+#include "slope_signs.hpp"
 
 namespace llmt {
 namespace {
@@ -61,6 +65,10 @@ JointFit::JointFit(const TrainingRows& training, Partition partition, int max_th
   root_.row(0) = root.value.transpose();
   root_.bottomRows(size_ - 1) = training.scale.asDiagonal() * root.slope.transpose();
   sums_ = assemble(training, partition_, root_, max_threads);
+  signs_ = coefficient_signs(training);
+  if (has_ordered_leaves()) {
+    prepare_ordered_splits(partition_, training);
+  }
 }
 
 Eigen::VectorXd JointFit::hold(std::size_t node, double shrinkage) const {
@@ -84,7 +92,11 @@ std::vector<Eigen::MatrixXd> JointFit::local_models(std::size_t nodes, double sh
     const Eigen::MatrixXd& parent = models[static_cast<std::size_t>(parents[i])];
     Eigen::MatrixXd matrix = sums_.gram[i];
     matrix.diagonal() += hold(i, shrinkage);
-    models[i] = parent + matrix.llt().solve(sums_.products[i] - sums_.gram[i] * parent);
+    const Eigen::LLT<Eigen::MatrixXd> factor(matrix);
+    models[i] = parent + factor.solve(sums_.products[i] - sums_.gram[i] * parent);
+    for (std::ptrdiff_t o = 0; o < root_.cols() && !signs_.empty(); ++o) {
+      models[i].col(o) = nearest_with_signs(factor, models[i].col(o) + root_.col(o), signs_) - root_.col(o);
+    }
   }
   return models;
 }
@@ -104,7 +116,52 @@ Partition JointFit::with_models(std::ptrdiff_t leaves, const std::vector<Eigen::
 }
 
 Partition JointFit::local(std::ptrdiff_t leaves, double shrinkage) const {
-  return with_models(leaves, local_models(static_cast<std::size_t>(2 * leaves - 1), shrinkage));
+  std::vector<Eigen::MatrixXd> models = local_models(static_cast<std::size_t>(2 * leaves - 1), shrinkage);
+  return signs_.empty() ? with_models(leaves, models) : constrained(leaves, std::move(models), shrinkage);
+}
+
+Partition JointFit::as_grown(std::ptrdiff_t leaves) const {
+  if (!has_ordered_leaves()) {
+    return prefix(partition_, leaves);
+  }
+  std::vector<Eigen::MatrixXd> models;
+  for (const Node& node : prefix(partition_, leaves).nodes) {
+    Eigen::MatrixXd& model = models.emplace_back(size_, root_.cols());
+    model.row(0) = node.value.transpose();
+    model.bottomRows(size_ - 1) = training_.scale.asDiagonal() * node.slope.transpose();
+    model -= root_;
+  }
+  return constrained(leaves, std::move(models), 0.0);
+}
+
+bool JointFit::has_ordered_leaves() const { return has_ordered_splits(partition_, training_); }
+
+Partition JointFit::constrained(std::ptrdiff_t leaves, std::vector<Eigen::MatrixXd> models, double shrinkage) const {
+  Partition result = with_models(leaves, models);
+  if (!has_ordered_splits(result, training_)) {
+    finish_constrained(result, training_);
+    return result;
+  }
+  System blocks;  // of the leaves alone
+  for (std::size_t i = 0; i < result.nodes.size(); ++i) {
+    if (result.nodes[i].is_leaf()) {
+      blocks.nodes.push_back(static_cast<int>(i));
+    }
+  }
+  Solution solution;
+  solution.coefficients.resize(leaves * size_, root_.cols());
+  solution.factor.setZero(leaves * size_, leaves * size_);
+  for (std::size_t k = 0; k < blocks.nodes.size(); ++k) {
+    const std::size_t node = static_cast<std::size_t>(blocks.nodes[k]);
+    const std::ptrdiff_t at = static_cast<std::ptrdiff_t>(k) * size_;
+    solution.coefficients.middleRows(at, size_) = models[node];
+    Eigen::MatrixXd matrix = sums_.gram[node];
+    matrix.diagonal() += hold(node, shrinkage);
+    solution.factor.block(at, at, size_, size_) = matrix.llt().matrixU();
+  }
+  solution.local = std::move(models);
+  ActiveInequalities none;
+  return with_solution(blocks, solution, none);
 }
 
 JointFit::System JointFit::system(std::ptrdiff_t leaves) const {
@@ -187,12 +244,17 @@ JointFit::Solution JointFit::solve(const System& system, const Regularisation& r
   return result;
 }
 
-Partition JointFit::with_solution(const System& system, const Solution& solution) const {
+Partition JointFit::with_solution(const System& system, const Solution& solution, ActiveInequalities& active) const {
   Partition result = with_models(std::ssize(system.nodes), solution.local);
+  Eigen::MatrixXd coefficients = solution.coefficients;
+  if (!signs_.empty()) {
+    constrain_leaves(result, training_, system.nodes, solution.factor, root_, coefficients, active);
+  }
   for (std::size_t k = 0; k < system.nodes.size(); ++k) {
     set_model(result.nodes[static_cast<std::size_t>(system.nodes[k])],
-              solution.coefficients.middleRows(static_cast<std::ptrdiff_t>(k) * size_, size_));
+              coefficients.middleRows(static_cast<std::ptrdiff_t>(k) * size_, size_));
   }
+  finish_constrained(result, training_);
   return result;
 }
 
@@ -200,8 +262,10 @@ std::vector<Partition> JointFit::joint(std::ptrdiff_t leaves,
                                        const std::vector<Regularisation>& regularisations) const {
   const System equations = system(leaves);
   std::vector<Partition> results;
+  std::map<double, ActiveInequalities> active;  // of each shrinkage: with it inner nodes change
   for (const Regularisation& regularisation : regularisations) {
-    results.push_back(with_solution(equations, solve(equations, regularisation)));
+    results.push_back(
+        with_solution(equations, solve(equations, regularisation), active[regularisation.shrinkage]));
   }
   return results;
 }
@@ -288,7 +352,8 @@ Partition JointFit::joint_on(const TrainingRows& all, std::ptrdiff_t leaves,
     coefficients += direction * length.asDiagonal();
     residual -= product * length.asDiagonal();
   }
-  Partition result = with_solution(equations, solution);
+  ActiveInequalities none;
+  Partition result = with_solution(equations, solution, none);
   result.residual_range = residual_range(all, result.nodes.front(), partition_.outputs, max_threads_);
   return result;
 }

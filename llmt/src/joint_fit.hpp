@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "constrained_leaves.hpp"
 #include "evaluator.hpp"
 #include "normal_equations.hpp"
 #include "training.hpp"
@@ -45,7 +46,10 @@ class JointFit {
   Partition local(std::ptrdiff_t leaves, double shrinkage) const;
 
   /// The prefix as grown, with the ranges of the validities.
-  Partition as_grown(std::ptrdiff_t leaves) const { return prefix(partition_, leaves); }
+  Partition as_grown(std::ptrdiff_t leaves) const;
+
+  /// Whether leaves have to be in order across some split, so that only estimates of the same prefix keep it.
+  bool has_ordered_leaves() const;
 
  private:
   /// The normal equations of a prefix.
@@ -63,7 +67,9 @@ class JointFit {
 
   System system(std::ptrdiff_t leaves) const;
   Solution solve(const System& system, const Regularisation& regularisation) const;
-  Partition with_solution(const System& system, const Solution& solution) const;
+  Partition with_solution(const System& system, const Solution& solution, ActiveInequalities& active) const;
+  /// The models of a prefix's nodes, leaves each estimated for itself, under the constraints.
+  Partition constrained(std::ptrdiff_t leaves, std::vector<Eigen::MatrixXd> models, double shrinkage) const;
   /// What holds the leaves' coefficients, times a change of them.
   Eigen::MatrixXd held(const System& system, const Regularisation& regularisation, const Eigen::MatrixXd& change) const;
   /// sum_n q_n Phi_i a r over `rows`, r what the coefficients leave of the outputs, or of zero.
@@ -81,6 +87,7 @@ class JointFit {
   std::ptrdiff_t size_;   // coefficients of a local model
   Eigen::MatrixXd root_;  // coefficients of the root's model
   NormalEquations sums_;
+  std::vector<int> signs_;  // of the coefficients; empty: none
 };
 
 }  // namespace llmt

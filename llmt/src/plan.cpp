@@ -52,7 +52,8 @@ Plan make_plan(const FitOptions& options, const TrainingRows& all, std::ptrdiff_
   if (growth.min_leaf_samples == 0) {
     growth.min_leaf_samples = many_leaves ? std::max<std::ptrdiff_t>(5, regressors) : 2 * (regressors + 1);
   }
-  if (growth.max_leaves == 0 && many_leaves) {
+  const bool has_ordered = !all.table->monotone.empty() && !is_lolimot(growth.rule);  // estimated jointly
+  if (growth.max_leaves == 0 && (many_leaves || has_ordered)) {
     growth.max_leaves = std::clamp<std::ptrdiff_t>(1500 / (regressors + 1), 20, 400);
   }
   if (growth.max_leaves == 0 && is_lolimot(growth.rule)) {

@@ -20,6 +20,8 @@ struct Table {
   std::vector<int> num_levels;         ///< of each input; 0: a number
   std::vector<int> regression_inputs;  ///< ascending
   std::vector<int> split_inputs;       ///< ascending
+  std::vector<int> slope_signs = {};   ///< of each input, those of `monotone` included; empty: none
+  std::vector<int> monotone = {};      ///< see FitOptions; empty: none
 };
 
 /// Some rows of a table with what a model says of the columns. Also used for rows that are held out, then with the
