@@ -1,14 +1,16 @@
 // What monotone constraints cost in error and time on data sets with given splits.
 //
-// monotone_sets FOLDER SET:COLUMN,-COLUMN,...: of every SET.csv in FOLDER (the target is the last column; every column of
-// SET.splits.csv is a split, 1 = test, 0 = training) the mean test RMSE over the splits and the seconds of a fit with
-// default options: without constraints, with the signs of slopes alone, with monotone predictions, and with monotone
-// predictions by not splitting those inputs. A minus stands for a prediction that falls. Last the largest step against
-// the constraint that lines through test rows, along each such input and beyond its extent, show with and without it.
+// monotone_sets FOLDER SPLITS SET:COLUMN,-COLUMN,...: of every SET.csv in FOLDER (the target is the last column; every
+// column of SET.splits.csv is a split, 1 = test, 0 = training) the mean test RMSE over the first SPLITS splits and the
+// processor seconds of a fit with default options: without constraints, with the signs of slopes alone, with monotone
+// predictions, and with monotone predictions by not splitting those inputs. A minus stands for a prediction that falls.
+// Last the largest step against the constraint that lines through test rows, along each such input and beyond its
+// extent, show with and without it.
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
+#include <cstdlib>
+#include <ctime>
 #include <sstream>
 
 #include "llmt/csv.hpp"
@@ -62,7 +64,7 @@ double largest_fall(const llmt::Model& model, const Eigen::MatrixXd& rows, const
   return largest;
 }
 
-void measure(const Task& task) {
+void measure(const Task& task, Eigen::Index splits) {
   std::vector<llmt::FitOptions> methods(4);
   methods[1].slope_signs = methods[2].monotone = methods[3].monotone = task.signs;
   for (std::size_t j = 0; j < task.signs.size(); ++j) {
@@ -76,7 +78,7 @@ void measure(const Task& task) {
     double seconds = 0.0;
     double leaves = 0.0;
     double fall = 0.0;
-    for (Eigen::Index split = 0; split < task.is_test.cols(); ++split) {
+    for (Eigen::Index split = 0; split < splits; ++split) {
       std::vector<Eigen::Index> train;
       std::vector<Eigen::Index> test;
       for (Eigen::Index row = 0; row < task.all.rows(); ++row) {
@@ -85,15 +87,15 @@ void measure(const Task& task) {
       const Eigen::Index inputs = task.all.cols() - 1;
       const Eigen::MatrixXd train_rows = task.all(train, Eigen::all);
       const Eigen::MatrixXd test_rows = task.all(test, Eigen::all);
-      const auto start = std::chrono::steady_clock::now();
+      const std::clock_t start = std::clock();
       const llmt::FitResult fit = llmt::fit(train_rows.leftCols(inputs), train_rows.rightCols(1), methods[m]);
-      seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+      seconds += static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
       rmse += llmt::rmse(fit.model.predict(test_rows.leftCols(inputs)), test_rows.rightCols(1))(0);
       leaves += static_cast<double>(fit.summary.partitions[0].leaves);
       fall = std::max(fall, largest_fall(fit.model, test_rows.leftCols(inputs), task.signs));
     }
-    const double count = static_cast<double>(task.is_test.cols());
-    fmt::print("{:12} {:18} {:12.5g} {:8.1f} {:10.3f} {:14.3g}\n", task.name, names[m], rmse / count, leaves / count,
+    const double count = static_cast<double>(splits);
+    fmt::print("{:12} {:18} {:12.5g} {:8.1f} {:12.3f} {:14.3g}\n", task.name, names[m], rmse / count, leaves / count,
                seconds / count, fall);
     std::fflush(stdout);
   }
@@ -102,15 +104,16 @@ void measure(const Task& task) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc < 3) {
-    fmt::print(stderr, "usage: monotone_sets FOLDER SET:COLUMN,-COLUMN...\n");
+  if (argc < 4) {
+    fmt::print(stderr, "usage: monotone_sets FOLDER SPLITS SET:COLUMN,-COLUMN...\n");
     return 2;
   }
   try {
-    fmt::print("{:12} {:18} {:>12} {:>8} {:>10} {:>14}\n", "data", "constraint", "test RMSE", "leaves", "s per fit",
+    fmt::print("{:12} {:18} {:>12} {:>8} {:>12} {:>14}\n", "data", "constraint", "test RMSE", "leaves", "CPU s a fit",
                "largest fall");
-    for (int a = 2; a < argc; ++a) {
-      measure(read_task(argv[1], argv[a]));
+    for (int a = 3; a < argc; ++a) {
+      const Task task = read_task(argv[1], argv[a]);
+      measure(task, std::clamp<Eigen::Index>(std::atoi(argv[2]), 1, task.is_test.cols()));
     }
   } catch (const std::exception& error) {
     fmt::print(stderr, "monotone_sets: {}\n", error.what());

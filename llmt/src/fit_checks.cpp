@@ -130,8 +130,8 @@ void set_signs(const FitOptions& options, Table& table) {
 /// input each and no missing value sends a row to both sides, see docs/algorithms.md.
 bool may_order_splits(const FitOptions& options, const Eigen::Ref<const Eigen::MatrixXd>& inputs) {
   const GrowthRule rule = options.growth.rule;
-  return (rule == GrowthRule::rd || rule == GrowthRule::retis) &&
-         options.blend.validity != ValidityChoice::gaussian && !inputs.hasNaN();
+  return (rule == GrowthRule::rd || rule == GrowthRule::retis) && options.blend.validity != ValidityChoice::gaussian &&
+         !inputs.hasNaN();
 }
 
 }  // namespace

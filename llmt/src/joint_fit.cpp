@@ -95,7 +95,11 @@ std::vector<Eigen::MatrixXd> JointFit::local_models(std::size_t nodes, double sh
     const Eigen::LLT<Eigen::MatrixXd> factor(matrix);
     models[i] = parent + factor.solve(sums_.products[i] - sums_.gram[i] * parent);
     for (std::ptrdiff_t o = 0; o < root_.cols() && !signs_.empty(); ++o) {
-      models[i].col(o) = nearest_with_signs(factor, models[i].col(o) + root_.col(o), signs_) - root_.col(o);
+      const Eigen::VectorXd free = models[i].col(o) + root_.col(o);
+      const Eigen::VectorXd kept = nearest_with_signs(factor, free, signs_);
+      if (kept != free) {
+        models[i].col(o) = kept - root_.col(o);
+      }
     }
   }
   return models;
@@ -264,8 +268,7 @@ std::vector<Partition> JointFit::joint(std::ptrdiff_t leaves,
   std::vector<Partition> results;
   std::map<double, ActiveInequalities> active;  // of each shrinkage: with it inner nodes change
   for (const Regularisation& regularisation : regularisations) {
-    results.push_back(
-        with_solution(equations, solve(equations, regularisation), active[regularisation.shrinkage]));
+    results.push_back(with_solution(equations, solve(equations, regularisation), active[regularisation.shrinkage]));
   }
   return results;
 }

@@ -90,7 +90,7 @@ void OrderedSplits::add_pair(const Geometry& geometry, int split, int left, int 
     const double share_right = geometry.share(right, input, from, to);
     const bool once = geometry.smoothness() == 1;
     using Bernstein = std::vector<double>;
-    const Bernstein slope = once ? Bernstein{0, 1, 1, 0} : Bernstein{0, 0, 1.5, 1.5, 0, 0};    // |g'|
+    const Bernstein slope = once ? Bernstein{0, 1, 1, 0} : Bernstein{0, 0, 1.5, 1.5, 0, 0};     // |g'|
     const Bernstein moment = once ? Bernstein{0, -1, 1, 0} : Bernstein{0, 0, -1.5, 1.5, 0, 0};  // u |g'|
     const Bernstein gate = once ? Bernstein{1, 1, 0, 0} : Bernstein{1, 1, 1, 0, 0, 0};
     Bernstein of_left;
@@ -227,8 +227,8 @@ void OrderedSplits::add_pieces(const Geometry& geometry, std::ptrdiff_t regresso
       bool bent = false;
       for (std::size_t c = 0; c < 3; ++c) {
         between[c] = 2.0 * middle[c] - 0.5 * (before[c] + now[c]);
-        bent = bent || std::abs(middle[c] - 0.5 * (before[c] + now[c])) >
-                           straight * (std::abs(before[c]) + std::abs(now[c]));
+        bent = bent ||
+               std::abs(middle[c] - 0.5 * (before[c] + now[c])) > straight * (std::abs(before[c]) + std::abs(now[c]));
       }
       if (bent) {
         add(between);
@@ -250,7 +250,8 @@ OrderedSplits::Worst OrderedSplits::worst(const Pair& pair, const Eigen::MatrixX
       double value = option.constant;
       for (std::ptrdiff_t t = option.first; t < option.first + option.count; ++t) {
         const Term& term = terms_[static_cast<std::size_t>(t)];
-        value += models(1 + term.regressor, pair.right) * term.right - models(1 + term.regressor, pair.left) * term.left;
+        value +=
+            models(1 + term.regressor, pair.right) * term.right - models(1 + term.regressor, pair.left) * term.left;
       }
       if (pair.sign * value < smallest) {
         smallest = pair.sign * value;
@@ -275,8 +276,7 @@ OrderedSplits::Worst OrderedSplits::worst(const Pair& pair, const Eigen::MatrixX
   return result;
 }
 
-LeafInequality OrderedSplits::inequality(const Pair& pair, const Worst& worst, std::ptrdiff_t size,
-                                         double room) const {
+LeafInequality OrderedSplits::inequality(const Pair& pair, const Worst& worst, std::ptrdiff_t size, double room) const {
   LeafInequality result{pair.left, pair.right, Eigen::VectorXd::Zero(size), Eigen::VectorXd::Zero(size), room};
   result.of_left(0) = -pair.sign;
   result.of_right(0) = pair.sign;

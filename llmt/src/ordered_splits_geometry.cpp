@@ -82,8 +82,8 @@ void limit_half_widths(Partition& partition, const TrainingRows& training) {
     }
     if (const std::ptrdiff_t k = numeric_regressor(training, node.split_input); k >= 0) {
       const double centre = training.regressors[static_cast<std::size_t>(k)].centre;
-      const double room = std::min(node.threshold - centre - training.spread(0, k),
-                                   centre + training.spread(1, k) - node.threshold);
+      const double room =
+          std::min(node.threshold - centre - training.spread(0, k), centre + training.spread(1, k) - node.threshold);
       node.half_width = std::clamp(node.half_width, 0.0, std::max(room, 0.0));
     }
   }

@@ -23,6 +23,10 @@ Plan make_plan(const FitOptions& options, const TrainingRows& all, std::ptrdiff_
       plan.candidates.widths = choice == ValidityChoice::gaussian ? std::vector<double>{1.0 / 3.0}
                                : many_rows                        ? std::vector<double>{0.5, 1.0, 2.0}
                                                                   : std::vector<double>{0.5, 1.0, 2.0, 4.0};
+      // Transitions on monotone inputs that overlap share the room that slopes leave them.
+      if (choice != ValidityChoice::gaussian && !all.table->monotone.empty()) {
+        plan.candidates.widths = {0.25, 0.5, 1.0, 2.0};
+      }
     }
     plan.candidates.jumps = options.blend.jumps;
     if (plan.candidates.jumps.empty()) {

@@ -56,10 +56,10 @@ void keep_signs(const std::vector<int>& signs, const Eigen::MatrixXd& deviations
     return;
   }
   const std::ptrdiff_t regressors = deviations.cols();
-  const Eigen::VectorXd scale = (weights.transpose() * deviations.cwiseAbs2() / weights.sum())
-                                    .cwiseSqrt()
-                                    .transpose()
-                                    .unaryExpr([](double size) { return size > 0.0 ? size : 1.0; });
+  const Eigen::VectorXd scale =
+      (weights.transpose() * deviations.cwiseAbs2() / weights.sum()).cwiseSqrt().transpose().unaryExpr([](double size) {
+        return size > 0.0 ? size : 1.0;
+      });
   Eigen::MatrixXd a(deviations.rows(), regressors + 1);
   a << Eigen::VectorXd::Ones(deviations.rows()), deviations * scale.cwiseInverse().asDiagonal();
   move(signs, a.transpose() * weights.asDiagonal() * a, scale, node);
@@ -67,8 +67,8 @@ void keep_signs(const std::vector<int>& signs, const Eigen::MatrixXd& deviations
 
 void keep_signs(const TrainingRows& training, Partition& grown, int max_threads) {
   const std::vector<int> signs = coefficient_signs(training);
-  if (signs.empty() || std::all_of(grown.nodes.begin(), grown.nodes.end(),
-                                   [&](const Node& node) { return has_signs(signs, node); })) {
+  if (signs.empty() ||
+      std::all_of(grown.nodes.begin(), grown.nodes.end(), [&](const Node& node) { return has_signs(signs, node); })) {
     return;
   }
   Partition crisp = grown;  // ranges are set with the sums

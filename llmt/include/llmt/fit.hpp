@@ -128,7 +128,7 @@ struct BlendOptions {
   ValidityChoice validity = ValidityChoice::automatic;
   Estimation estimation = Estimation::joint;
   std::vector<double> widths = {};  ///< Validity::width. Empty: 0.5, 1, 2 and, but for a single
-                                    ///< hold-out, 4 for blends; 1/3 for Gaussians
+                                    ///< hold-out, 4 for blends, with monotone inputs 0.25, 0.5, 1, 2; 1/3 for Gaussians
   /// Splits where the outputs jump by at least this multiple of the scatter of the rows there have no transition, see
   /// docs/algorithms.md; no_jump: all have one. Empty: no_jump, 4, 2, 1, 0.5.
   std::vector<double> jumps = {};
