@@ -326,6 +326,18 @@ TEST(Monotone, HoldsWhenFoldsChooseAndInTheModelsOfTheFolds) {
   EXPECT_EQ(llmt::to_json(llmt::fit(x, y, options).model), llmt::to_json(result.model));
 }
 
+TEST(Monotone, HoldsForEstimatesThatStartFromASampleAndForBins) {
+  const MatrixXd x = oracle::uniform(5000, 3, 4);
+  const MatrixXd y = nearly_monotone(x, 0.5, 4);
+  llmt::FitOptions options = cases()[3].options;
+  options.growth.max_leaves = 6;
+  options.growth.search = llmt::SplitSearch::binned;
+  options.monotone = {1, -1, 0};
+  const llmt::Model model = llmt::fit(x, y, options).model;
+  EXPECT_LE(largest_fall(model, 0, 1, 4, true), rounding);
+  EXPECT_LE(largest_fall(model, 1, -1, 4, true), rounding);
+}
+
 /// A table and the rows of it that a fit would train on.
 struct Rows {
   llmt::Table table;
