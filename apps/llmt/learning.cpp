@@ -55,6 +55,23 @@ std::vector<std::string> choose_inputs(const Csv& csv, const LearningArguments& 
   return inputs;
 }
 
+/// Of each input 1, or -1 where its name has a leading minus; 0 where it is not named. Empty if none is.
+std::vector<int> signs_of(const char* option, const std::vector<std::string>& names,
+                          const std::vector<std::string>& inputs) {
+  if (names.empty()) {
+    return {};
+  }
+  std::vector<int> result(inputs.size(), 0);
+  for (const std::string& name : names) {
+    const bool falls = !contains(inputs, name) && name.starts_with('-');
+    const int position = positions(option, {falls ? name.substr(1) : name}, inputs).front();
+    result[static_cast<std::size_t>(position)] = falls ? -1 : 1;
+  }
+  return result;
+}
+
+}  // namespace
+
 LearningTable read_learning_table(const LearningArguments& arguments) {
   const Csv csv = Csv::read(arguments.data);
   if (csv.rows() == 0) {
@@ -68,6 +85,8 @@ LearningTable read_learning_table(const LearningArguments& arguments) {
   FitOptions& options = table.options;
   options.growth.split_inputs = positions("--split-inputs", arguments.split_inputs, table.names);
   options.growth.regression_inputs = positions("--regression-inputs", arguments.regression_inputs, table.names);
+  options.monotone = signs_of("--monotone", arguments.monotone, table.names);
+  options.slope_signs = signs_of("--slope-sign", arguments.slope_signs, table.names);
   options.categorical_inputs = table.inputs.categorical;
   options.weights = std::move(columns.weights);
   options.selection.folds.kind = arguments.contiguous ? FoldKind::contiguous : FoldKind::random;
@@ -92,6 +111,14 @@ void add_learning_options(CLI::App& command, LearningArguments& arguments) {
   command.add_option("--split-inputs", arguments.split_inputs, "Inputs that may be split (default: all)")
       ->delimiter(',');
   command.add_option("--regression-inputs", arguments.regression_inputs, "Inputs of the local models (default: all)")
+      ->delimiter(',');
+  command
+      .add_option("--monotone", arguments.monotone,
+                  "Inputs with which the prediction never falls, or with a leading minus never rises (--monotone=-x)")
+      ->delimiter(',');
+  command
+      .add_option("--slope-sign", arguments.slope_signs,
+                  "Inputs with slopes >= 0, or with a leading minus <= 0, in every local model; not across leaves")
       ->delimiter(',');
   command.add_option("--max-leaves", growth.max_leaves, "Most leaves of a tree, 0: see docs/commands.md")
       ->capture_default_str();

@@ -19,6 +19,8 @@ struct LearningArguments {
   std::vector<std::string> categorical;
   std::vector<std::string> split_inputs;
   std::vector<std::string> regression_inputs;
+  std::vector<std::string> monotone;  ///< a leading minus: falling
+  std::vector<std::string> slope_signs;
   std::string weight;
   bool contiguous = false;
   FitOptions options;

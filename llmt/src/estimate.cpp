@@ -5,6 +5,7 @@
 
 #include "evaluator.hpp"
 #include "joint_fit.hpp"
+#include "ordered_splits.hpp"
 
 namespace llmt {
 namespace {
@@ -41,6 +42,7 @@ Partition blended(const TrainingRows& training, const GrownTree& grown, const Va
   Partition partition = grown.partition;
   partition.validity = validity;
   set_half_widths(partition, training.low(), training.high());
+  limit_half_widths(partition, training);
   for (std::size_t i = 0; i < partition.nodes.size(); ++i) {
     if (grown.jumps(static_cast<std::ptrdiff_t>(i)) >= jump) {
       partition.nodes[i].half_width = 0.0;

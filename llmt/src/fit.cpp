@@ -21,6 +21,7 @@
 #include "plan.hpp"
 #include "pruning.hpp"
 #include "selection.hpp"
+#include "slope_signs.hpp"
 #include "training.hpp"
 
 namespace llmt {
@@ -88,6 +89,9 @@ Grown grow_rows(const TrainingRows& rows, const std::vector<int>& served, const 
   GrownPartition result = grow_nodes(rows, served, plan, stop_by_aicc, max_threads);
   Partition partition{
       .outputs = served, .validity = {}, .nodes = std::move(result.nodes), .outer_slope = {}, .residual_range = {}};
+  if (!is_lolimot(plan.growth.rule)) {
+    keep_signs(rows, partition, max_threads);
+  }
   partition.outer_slope = agreed_slope(partition);
   Eigen::VectorXd jumps = Eigen::VectorXd::Zero(std::ssize(partition.nodes));
   if (!plan.candidates.widths.empty() && plan.candidates.kind == ValidityKind::blend) {

@@ -121,6 +121,44 @@ std::vector<int> count_levels(const Eigen::Ref<const Eigen::MatrixXd>& inputs, c
   return num_levels;
 }
 
+void check_signs(const char* option, const std::vector<int>& signs, const std::vector<int>& num_levels) {
+  if (!signs.empty() && signs.size() != num_levels.size()) {
+    throw std::invalid_argument(
+        fmt::format("llmt::fit: {} has {} entries, there are {} inputs", option, signs.size(), num_levels.size()));
+  }
+  for (std::size_t j = 0; j < signs.size(); ++j) {
+    require(signs[j] >= -1 && signs[j] <= 1, fmt::format("{}[{}]", option, j).c_str(), signs[j], "-1, 0 or 1");
+    require(signs[j] == 0 || num_levels[j] == 0, fmt::format("{}[{}]", option, j).c_str(), signs[j],
+            "0: the input is categorical, its values have no order");
+  }
+}
+
+/// Signs of slopes and of the prediction, which includes the former.
+void set_signs(const FitOptions& options, Table& table) {
+  check_signs("slope_signs", options.slope_signs, table.num_levels);
+  check_signs("monotone", options.monotone, table.num_levels);
+  table.slope_signs = options.slope_signs;
+  if (std::all_of(options.monotone.begin(), options.monotone.end(), [](int sign) { return sign == 0; })) {
+    return;
+  }
+  table.monotone = options.monotone;
+  table.slope_signs.resize(table.monotone.size(), 0);
+  for (std::size_t j = 0; j < table.monotone.size(); ++j) {
+    require(table.monotone[j] == 0 || table.slope_signs[j] != -table.monotone[j],
+            fmt::format("slope_signs[{}]", j).c_str(), table.slope_signs[j], "not the opposite of monotone");
+    table.slope_signs[j] = table.monotone[j] != 0 ? table.monotone[j] : table.slope_signs[j];
+  }
+}
+
+/// Whether splits may be made on inputs in which the prediction is to be monotone: where gates and local models are
+/// made of functions of one input each and no missing value sends a row to both sides, see docs/algorithms.md.
+bool may_order_splits(const FitOptions& options, const Eigen::Ref<const Eigen::MatrixXd>& inputs) {
+  const GrowthRule rule = options.growth.rule;
+  return (rule == GrowthRule::rd || rule == GrowthRule::retis || rule == GrowthRule::ra) &&
+         options.blend.validity != ValidityChoice::gaussian && options.local_models.terms == LocalTerms::linear &&
+         !inputs.hasNaN();
+}
+
 }  // namespace
 
 void check_options(const FitOptions& options, std::ptrdiff_t inputs) {
@@ -130,6 +168,15 @@ void check_options(const FitOptions& options, std::ptrdiff_t inputs) {
               (options.blend.validity == ValidityChoice::crisp && !is_lolimot(options.growth.rule)),
           "local_models.sparse", static_cast<double>(options.local_models.sparse),
           "never where blend.estimation is as_grown, for those models are full");
+  if ((!options.monotone.empty() || !options.slope_signs.empty()) &&
+      (options.local_models.sparse != SparseChoice::never || options.growth.merge_leaves)) {
+    throw std::invalid_argument(
+        "llmt::fit: monotone and slope_signs need local_models.sparse never and no growth.merge_leaves");
+  }
+  if (options.growth.merge_leaves && is_hilomot(options.growth.rule)) {
+    throw std::invalid_argument(
+        "llmt::fit: growth.merge_leaves needs leaves that are boxes, those of rule hilomot are not");
+  }
   require(!options.growth.merge_leaves || options.selection.folds.count > 0, "selection.folds.count",
           options.selection.folds.count, "at least 2 for growth.merge_leaves");
   if (options.growth.rule == GrowthRule::m5) {
@@ -177,6 +224,7 @@ Table make_table(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::R
     }
     std::sort(columns->begin(), columns->end());
   }
+  set_signs(options, table);
   if (options.local_models.terms == LocalTerms::quadratic) {
     const std::ptrdiff_t numbers = std::ssize(numeric_regression_inputs(table));
     require(numbers <= most_inputs_of_products,
@@ -185,6 +233,9 @@ Table make_table(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::R
     const double largest = inputs.array().isNaN().select(0.0, inputs).cwiseAbs().maxCoeff();
     require(largest <= largest_factor, "a magnitude in inputs, with quadratic local models,", largest, "at most 1e70");
     table.products = products_of(table);
+  }
+  if (!table.monotone.empty() && !may_order_splits(options, inputs)) {
+    std::erase_if(table.split_inputs, [&](int j) { return table.monotone[static_cast<std::size_t>(j)] != 0; });
   }
   return table;
 }

@@ -3,10 +3,14 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <map>
 
+#include "bounded_least_squares.hpp"
 #include "dense.hpp"
 #include "forward_selection.hpp"
+#include "ordered_splits.hpp"
 #include "parallel.hpp"
+#include "slope_signs.hpp"
 
 namespace llmt {
 namespace {
@@ -63,6 +67,10 @@ JointFit::JointFit(const TrainingRows& training, Partition partition, int max_th
   root_.row(0) = root.value.transpose();
   root_.bottomRows(size_ - 1) = training.scale.asDiagonal() * root.slope.transpose();
   sums_ = assemble(training, partition_, root_, max_threads);
+  signs_ = coefficient_signs(training);
+  if (has_ordered_leaves()) {
+    prepare_ordered_splits(partition_, training);
+  }
   if (sparse) {
     selected_.resize(partition_.nodes.size());
     parallel_for(std::ssize(selected_), max_threads, [&](std::ptrdiff_t index) {
@@ -120,7 +128,15 @@ std::vector<Eigen::MatrixXd> JointFit::local_models(std::size_t nodes, double sh
     }
     Eigen::MatrixXd matrix = sums_.gram[i];
     matrix.diagonal() += hold(i, shrinkage);
-    models[i] = parent + matrix.llt().solve(sums_.products[i] - sums_.gram[i] * parent);
+    const Eigen::LLT<Eigen::MatrixXd> factor(matrix);
+    models[i] = parent + factor.solve(sums_.products[i] - sums_.gram[i] * parent);
+    for (std::ptrdiff_t o = 0; o < root_.cols() && !signs_.empty(); ++o) {
+      const Eigen::VectorXd free = models[i].col(o) + root_.col(o);
+      const Eigen::VectorXd kept = nearest_with_signs(factor, free, signs_);
+      if (kept != free) {
+        models[i].col(o) = kept - root_.col(o);
+      }
+    }
   }
   return models;
 }
@@ -143,21 +159,22 @@ Partition JointFit::with_models(std::ptrdiff_t leaves, const std::vector<Eigen::
 }
 
 Partition JointFit::local(std::ptrdiff_t leaves, double shrinkage, bool sparse) const {
-  return with_models(leaves, local_models(static_cast<std::size_t>(2 * leaves - 1), shrinkage, sparse), sparse);
-}
-
-void JointFit::copy_shared_models(Partition& partition) {
-  for (Node& node : partition.nodes) {
-    if (node.shared_with >= 0) {
-      const Node& first = partition.nodes[static_cast<std::size_t>(node.shared_with)];
-      node.value = first.value;
-      node.slope = first.slope;
-    }
-  }
+  std::vector<Eigen::MatrixXd> models = local_models(static_cast<std::size_t>(2 * leaves - 1), shrinkage, sparse);
+  return signs_.empty() ? with_models(leaves, models, sparse) : constrained(leaves, std::move(models), shrinkage);
 }
 
 Partition JointFit::as_grown(std::ptrdiff_t leaves) const {
   Partition result = prefix(partition_, leaves);
+  if (has_ordered_leaves()) {
+    std::vector<Eigen::MatrixXd> models;
+    for (const Node& node : result.nodes) {
+      Eigen::MatrixXd& model = models.emplace_back(size_, root_.cols());
+      model.row(0) = node.value.transpose();
+      model.bottomRows(size_ - 1) = training_.scale.asDiagonal() * node.slope.transpose();
+      model -= root_;
+    }
+    return constrained(leaves, std::move(models), 0.0);
+  }
   if (result.num_local_models() < result.num_leaves()) {
     const std::vector<Eigen::MatrixXd> models = local_models(result.nodes.size(), 0.0, false);
     for (const Node& node : result.nodes) {
@@ -169,65 +186,6 @@ Partition JointFit::as_grown(std::ptrdiff_t leaves) const {
     copy_shared_models(result);
   }
   return result;
-}
-
-std::vector<Merge> JointFit::merges() const {
-  // Outputs are compared by what least squares leaves of them.
-  const Eigen::VectorXd weights =
-      partition_.nodes.front().rss.unaryExpr([](double rss) { return rss > 0.0 ? 1.0 / rss : 0.0; });
-  return merge_sequence(partition_, sums_, weights);
-}
-
-void JointFit::share(const Merge& merge) {
-  const auto in_group = [&](std::size_t node, int first) {
-    return static_cast<int>(node) == first || partition_.nodes[node].shared_with == first;
-  };
-  std::vector<std::size_t> members;
-  std::ptrdiff_t samples = 0;
-  for (std::size_t i = 0; i < partition_.nodes.size(); ++i) {
-    if (in_group(i, merge.kept) || in_group(i, merge.merged)) {
-      members.push_back(i);
-      samples += partition_.nodes[i].samples;
-    }
-  }
-  const std::size_t kept = static_cast<std::size_t>(merge.kept);
-  const std::size_t merged = static_cast<std::size_t>(merge.merged);
-  const Node& a = partition_.nodes[kept];
-  const Node& b = partition_.nodes[merged];
-  const Eigen::MatrixXd gram = sums_.gram[kept] + sums_.gram[merged];
-  const Eigen::MatrixXd products = sums_.products[kept] + sums_.products[merged];
-  const Eigen::VectorXd squares = sums_.squares[kept] + sums_.squares[merged];
-  const Eigen::VectorXd low = a.low.cwiseMin(b.low);
-  const Eigen::VectorXd high = a.high.cwiseMax(b.high);
-  const int most = static_cast<int>(std::min<std::ptrdiff_t>({size_, samples, a.rank + b.rank}));
-  const int rank = std::clamp(rank_of(gram), std::min(most, std::max(a.rank, b.rank)), most);
-  for (const std::size_t member : members) {
-    Node& node = partition_.nodes[member];
-    node.shared_with = member == kept ? -1 : merge.kept;
-    node.low = low;
-    node.high = high;
-    node.rank = rank;
-    sums_.gram[member] = gram;
-    sums_.products[member] = products;
-    sums_.squares[member] = squares;
-  }
-  for (const std::size_t member : members) {
-    if (!selected_.empty()) {
-      selected_[member] = select(member);
-    }
-  }
-}
-
-void JointFit::merge_to(std::ptrdiff_t local_models) {
-  if (partition_.num_local_models() <= local_models) {
-    return;
-  }
-  for (const Merge& merge : merges()) {
-    if (partition_.num_local_models() <= local_models) {
-      return;
-    }
-    share(merge);
-  }
 }
 
 JointFit::System JointFit::system(std::ptrdiff_t leaves) const {
@@ -342,13 +300,18 @@ JointFit::Solution JointFit::solve(const System& system, const Regularisation& r
   return result;
 }
 
-Partition JointFit::with_solution(const System& system, const Solution& solution) const {
+Partition JointFit::with_solution(const System& system, const Solution& solution, ActiveInequalities& active) const {
   Partition result = with_models(system.leaves, solution.local, solution.sparse);
+  Eigen::MatrixXd coefficients = solution.coefficients;
+  if (!signs_.empty()) {
+    constrain_leaves(result, training_, system.nodes, solution.factor, root_, coefficients, active);
+  }
   for (std::size_t k = 0; k < system.nodes.size(); ++k) {
     set_model(result.nodes[static_cast<std::size_t>(system.nodes[k])],
-              solution.coefficients.middleRows(static_cast<std::ptrdiff_t>(k) * size_, size_));
+              coefficients.middleRows(static_cast<std::ptrdiff_t>(k) * size_, size_));
   }
   copy_shared_models(result);
+  finish_constrained(result, training_);
   return result;
 }
 
@@ -356,8 +319,9 @@ std::vector<Partition> JointFit::joint(std::ptrdiff_t leaves,
                                        const std::vector<Regularisation>& regularisations) const {
   const System equations = system(leaves);
   std::vector<Partition> results;
+  std::map<double, ActiveInequalities> active;  // of each shrinkage: with it inner nodes change
   for (const Regularisation& regularisation : regularisations) {
-    results.push_back(with_solution(equations, solve(equations, regularisation)));
+    results.push_back(with_solution(equations, solve(equations, regularisation), active[regularisation.shrinkage]));
   }
   return results;
 }
@@ -444,7 +408,8 @@ Partition JointFit::joint_on(const TrainingRows& all, std::ptrdiff_t leaves,
     coefficients += direction * length.asDiagonal();
     residual -= product * length.asDiagonal();
   }
-  Partition result = with_solution(equations, solution);
+  ActiveInequalities none;
+  Partition result = with_solution(equations, solution, none);
   result.residual_range = residual_range(all, result.nodes.front(), partition_.outputs, max_threads_);
   return result;
 }

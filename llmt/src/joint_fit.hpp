@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "constrained_leaves.hpp"
 #include "evaluator.hpp"
 #include "merging.hpp"
 #include "normal_equations.hpp"
@@ -53,6 +54,9 @@ class JointFit {
   /// The prefix as grown, with the ranges of the validities. Local models that are shared are locally weighted.
   Partition as_grown(std::ptrdiff_t leaves) const;
 
+  /// Whether leaves have to be in order across some split, so that only estimates of the same prefix keep it.
+  bool has_ordered_leaves() const;
+
   /// The merges of the partition's leaves, see merge_sequence().
   std::vector<Merge> merges() const;
 
@@ -86,7 +90,9 @@ class JointFit {
   std::vector<std::ptrdiff_t> kept_unknowns(const System& system) const;
   /// Replaces `right` by the factored matrix' inverse times it; 0 where a sparse estimate has no unknown.
   static void divide(const Solution& solution, Eigen::MatrixXd& right);
-  Partition with_solution(const System& system, const Solution& solution) const;
+  Partition with_solution(const System& system, const Solution& solution, ActiveInequalities& active) const;
+  /// The models of a prefix's nodes, leaves each estimated for itself, under the constraints.
+  Partition constrained(std::ptrdiff_t leaves, std::vector<Eigen::MatrixXd> models, double shrinkage) const;
   /// What holds the leaves' coefficients, times a change of them.
   Eigen::MatrixXd held(const System& system, const Regularisation& regularisation, const Eigen::MatrixXd& change) const;
   /// sum_n q_n Phi_i a r over `rows`, r what the coefficients leave of the outputs, or of zero.
@@ -110,6 +116,7 @@ class JointFit {
   Eigen::MatrixXd root_;  // coefficients of the root's model
   NormalEquations sums_;
   std::vector<std::vector<std::ptrdiff_t>> selected_;  // coefficients of every node's sparse model
+  std::vector<int> signs_;                             // of the coefficients; empty: none
 };
 
 }  // namespace llmt

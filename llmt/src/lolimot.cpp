@@ -10,6 +10,7 @@
 #include "evaluator.hpp"
 #include "node_fit.hpp"
 #include "parallel.hpp"
+#include "slope_signs.hpp"
 #include "split_search.hpp"
 
 namespace llmt {
@@ -53,6 +54,7 @@ class Lolimot {
                           .transpose()
                           .unaryExpr([](double squares) { return squares > 0.0 ? 1.0 / squares : 1.0; });
     floor_ = 1e-24 * static_cast<double>(outputs_.cols());
+    signs_ = coefficient_signs(training);
   }
 
   GrownPartition run() {
@@ -142,6 +144,9 @@ class Lolimot {
     node.rss = fitted.rss;
     node.value = parent.value + fitted.centre_change;
     node.slope = parent.slope + fitted.slope_change;
+    if (!signs_.empty()) {
+      keep_signs(signs_, x, weights, node);
+    }
     node.mean = Eigen::VectorXd::Zero(deviations_.cols());
     node.low = deviations_.colwise().minCoeff().transpose();
     node.high = deviations_.colwise().maxCoeff().transpose();
@@ -342,6 +347,7 @@ class Lolimot {
   Eigen::VectorXd weights_;
   Eigen::VectorXd output_weights_;
   double floor_ = 0.0;
+  std::vector<int> signs_;  // of the coefficients
   std::vector<Node> nodes_;
   std::vector<double> gains_;  // of the nodes' splits
   std::vector<LocalModel> models_;

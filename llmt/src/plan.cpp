@@ -40,6 +40,10 @@ Plan make_plan(const FitOptions& options, const TrainingRows& all, std::ptrdiff_
                                : logistic                         ? std::vector<double>{1.0, 2.0, 4.0}
                                : many_rows                        ? std::vector<double>{0.5, 1.0, 2.0}
                                                                   : std::vector<double>{0.5, 1.0, 2.0, 4.0};
+      // Transitions on monotone inputs that overlap share the room that slopes leave them.
+      if (choice != ValidityChoice::gaussian && !all.table->monotone.empty()) {
+        plan.candidates.widths = {0.25, 0.5, 1.0, 2.0};
+      }
     }
     plan.candidates.jumps = options.blend.jumps;
     if (plan.candidates.jumps.empty() || logistic) {
@@ -80,7 +84,9 @@ Plan make_plan(const FitOptions& options, const TrainingRows& all, std::ptrdiff_
   if (growth.max_leaves == 0 && logistic) {
     growth.max_leaves = 50;
   }
-  if (growth.max_leaves == 0 && many_leaves) {
+  // Crisp trees are estimated jointly where leaves have to be in order.
+  const bool has_ordered = !all.table->monotone.empty() && !is_lolimot(growth.rule) && growth.rule != GrowthRule::m5;
+  if (growth.max_leaves == 0 && (many_leaves || has_ordered)) {
     growth.max_leaves = std::clamp<std::ptrdiff_t>(1500 / (regressors + 1), 20, 400);
   }
   if (has_folds && growth.max_leaves == 0 && growth.pruning == Pruning::weakest_link && !is_lolimot(growth.rule)) {

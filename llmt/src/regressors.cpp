@@ -38,7 +38,11 @@ std::vector<int> numeric_regression_inputs(const Table& table) {
 }
 
 std::vector<std::pair<int, int>> products_of(const Table& table) {
-  const std::vector<int> inputs = numeric_regression_inputs(table);
+  std::vector<int> inputs = numeric_regression_inputs(table);
+  // The slope in an input that products change has no sign.
+  std::erase_if(inputs, [&](int input) {
+    return !table.slope_signs.empty() && table.slope_signs[static_cast<std::size_t>(input)] != 0;
+  });
   std::vector<int> distinct;
   for (const int input : inputs) {
     distinct.push_back(distinct_values(table.inputs.col(input)));

@@ -38,6 +38,24 @@ constexpr std::size_t steps_without_gain = 2;
 constexpr std::ptrdiff_t next_unknowns = 3;
 constexpr std::size_t fewest_shapes = 3;
 
+/// Errors of crisp trees whose leaves have to be in order: each number of leaves has models of its own, so only some
+/// are tried, each half as large again as the one before; the others are infinite.
+Eigen::VectorXd ordered_prefix_errors(const JointFit& fit, std::ptrdiff_t largest, double shrinkage,
+                                      const FoldRows& fold, const Eigen::VectorXd& weights) {
+  Eigen::VectorXd errors = Eigen::VectorXd::Constant(largest, std::numeric_limits<double>::infinity());
+  for (std::ptrdiff_t leaves = 1;; leaves = std::min(largest, leaves + (leaves + 1) / 2)) {
+    const Partition models = shrinkage > 0.0 ? fit.local(leaves, shrinkage) : fit.as_grown(leaves);
+    std::vector<Chunk> held_out;
+    for (std::ptrdiff_t index = 0; index < num_chunks(fold.held_out); ++index) {
+      held_out.push_back(fetch(fold.held_out, index, models.outputs));
+    }
+    errors(leaves - 1) = squared_error(models, fold.training, held_out, weights);
+    if (leaves == largest) {
+      return errors;
+    }
+  }
+}
+
 /// Fills in least squares, the crisp trees and the best of them.
 void compare_crisp(const std::vector<FoldRows>& folds, const std::vector<GrownTree>& grown,
                    const Candidates& candidates, const Eigen::VectorXd& weights, int max_threads, const Judge& judge,
@@ -60,6 +78,10 @@ void compare_crisp(const std::vector<FoldRows>& folds, const std::vector<GrownTr
     const std::ptrdiff_t leaves = grown[f].partition.num_leaves();
     for (std::size_t v = 0; v < variants.size(); ++v) {
       const auto [sparse, shrinkage] = variants[v];
+      if (fit.has_ordered_leaves()) {
+        errors[v][f] = ordered_prefix_errors(fit, leaves, shrinkage, folds[f], weights);
+        continue;
+      }
       const Partition models = sparse || shrinkage > 0.0 ? fit.local(leaves, shrinkage, sparse) : fit.as_grown(leaves);
       errors[v][f] = prefix_squared_errors(models, folds[f].held_out, weights, max_threads);
       if (sparse && leaves > 1) {  // the root of a larger tree is full

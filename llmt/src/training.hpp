@@ -23,6 +23,8 @@ struct Table {
   std::vector<int> split_inputs;       ///< ascending
   /// Pairs of regression inputs whose products the local models use.
   std::vector<std::pair<int, int>> products = {};
+  std::vector<int> slope_signs = {};  ///< of each input, those of `monotone` included; empty: none
+  std::vector<int> monotone = {};     ///< see FitOptions; empty: none
 };
 
 /// Some rows of a table with what a model says of the columns. Also used for rows that are held out, then with the

@@ -161,7 +161,8 @@ struct BlendOptions {
   ValidityChoice validity = ValidityChoice::automatic;
   Estimation estimation = Estimation::joint;
   std::vector<double> widths = {};  ///< Validity::width. Empty: 0.5, 1, 2 and, but for a single
-                                    ///< hold-out, 4 for blends; 1/3 for Gaussians; 1, 2, 4 for logistic gates
+                                    ///< hold-out, 4 for blends, with monotone inputs 0.25, 0.5, 1, 2; 1/3 for
+                                    ///< Gaussians; 1, 2, 4 for logistic gates
   /// Splits where the outputs jump by at least this multiple of the scatter of the rows there have no transition, see
   /// docs/algorithms.md; no_jump: all have one. Empty: no_jump, 4, 2, 1, 0.5.
   std::vector<double> jumps = {};
@@ -220,6 +221,15 @@ struct FitOptions {
   /// Columns of `inputs` whose values are categories 0, 1, 2, ...: split into sets of categories, and offsets in the
   /// local models.
   std::vector<int> categorical_inputs = {};
+  /// Of each input, -1, 0 or 1: the sign that its slope has in every local model, or zero slope; 0: any. Says nothing
+  /// of what happens from one leaf to the next. Empty: none.
+  std::vector<int> slope_signs = {};
+  /// Of each input, 1: no output falls when this input rises and the others stay, whatever they are (-1: none rises):
+  /// within leaves, at jumps, in blends, where guards act and beyond the training extent. Includes the sign of the
+  /// slopes. Exact but for the rounding of evaluation; docs/algorithms.md says how, and what it costs. Splits on such
+  /// inputs are not made with Gaussian validities, nor where inputs have missing values. Model::prefix() does not keep
+  /// it. Empty: none.
+  std::vector<int> monotone = {};
   Eigen::VectorXd weights = {};  ///< of the rows, not negative; a row of weight 0 takes no part. Empty: all alike.
   bool intervals = true;         ///< keep the folds' models and residuals for prediction intervals
   int max_threads = 0;           ///< 0: all that the machine has. The result does not depend on it.
@@ -317,7 +327,8 @@ struct FitResult {
 /// Throws std::invalid_argument naming argument, value and bound: no rows or columns, row counts that differ, an
 /// infinite input or an output that is not finite, an option out of range, a column index out of range or repeated, a
 /// category that is not a whole number from 0 on, more than 13 numeric regression inputs for quadratic local models,
-/// sparse ones with Estimation::as_grown where leaves overlap.
+/// sparse ones with Estimation::as_grown where leaves overlap, a sign other than -1, 0, 1 or of a categorical input,
+/// signs with sparse or shared local models.
 FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<const Eigen::MatrixXd>& outputs,
               const FitOptions& options = {});
 

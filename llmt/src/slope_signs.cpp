@@ -1,0 +1,85 @@
+#include "slope_signs.hpp"
+
+#include <algorithm>
+
+#include "bounded_least_squares.hpp"
+#include "normal_equations.hpp"
+
+namespace llmt {
+namespace {
+
+/// On the diagonal of a node's Gram matrix, in rows: where rows say nothing a model stays.
+constexpr double least_hold = 1e-9;
+
+bool has_signs(const std::vector<int>& signs, const Node& node) {
+  for (std::size_t k = 1; k < signs.size(); ++k) {
+    if (signs[k] != 0 && (signs[k] * node.slope.col(static_cast<std::ptrdiff_t>(k) - 1).array() < 0.0).any()) {
+      return false;
+    }
+  }
+  return true;
+}
+
+/// `gram`: of [1, deviations / scale].
+void move(const std::vector<int>& signs, const Eigen::MatrixXd& gram, const Eigen::VectorXd& scale, Node& node) {
+  Eigen::MatrixXd matrix = gram;
+  matrix.diagonal().array() += least_hold * (1.0 + gram(0, 0));
+  const Eigen::LLT<Eigen::MatrixXd> factor(matrix);
+  const std::ptrdiff_t regressors = scale.size();
+  for (std::ptrdiff_t o = 0; o < node.value.size(); ++o) {
+    Eigen::VectorXd model(regressors + 1);
+    model << node.value(o), node.slope.row(o).transpose().cwiseProduct(scale);
+    const Eigen::VectorXd moved = nearest_with_signs(factor, model, signs);
+    node.rss(o) += std::max(0.0, (moved - model).dot(gram * (moved - model)));
+    node.value(o) = moved(0);
+    node.slope.row(o) = moved.tail(regressors).cwiseQuotient(scale).transpose();
+  }
+}
+
+}  // namespace
+
+std::vector<int> coefficient_signs(const TrainingRows& training) {
+  const std::vector<int>& of_inputs = training.table->slope_signs;
+  if (std::all_of(of_inputs.begin(), of_inputs.end(), [](int sign) { return sign == 0; })) {
+    return {};
+  }
+  std::vector<int> signs = {0};
+  for (const Regressor& regressor : training.regressors) {
+    signs.push_back(regressor.level < 0 ? of_inputs[static_cast<std::size_t>(regressor.input)] : 0);
+  }
+  return signs;
+}
+
+void keep_signs(const std::vector<int>& signs, const Eigen::MatrixXd& deviations, const Eigen::VectorXd& weights,
+                Node& node) {
+  if (has_signs(signs, node)) {
+    return;
+  }
+  const std::ptrdiff_t regressors = deviations.cols();
+  const Eigen::VectorXd scale =
+      (weights.transpose() * deviations.cwiseAbs2() / weights.sum()).cwiseSqrt().transpose().unaryExpr([](double size) {
+        return size > 0.0 ? size : 1.0;
+      });
+  Eigen::MatrixXd a(deviations.rows(), regressors + 1);
+  a << Eigen::VectorXd::Ones(deviations.rows()), deviations * scale.cwiseInverse().asDiagonal();
+  move(signs, a.transpose() * weights.asDiagonal() * a, scale, node);
+}
+
+void keep_signs(const TrainingRows& training, Partition& grown, int max_threads) {
+  const std::vector<int> signs = coefficient_signs(training);
+  if (signs.empty() ||
+      std::all_of(grown.nodes.begin(), grown.nodes.end(), [&](const Node& node) { return has_signs(signs, node); })) {
+    return;
+  }
+  Partition crisp = grown;  // ranges are set with the sums
+  const std::ptrdiff_t outputs = std::ssize(grown.outputs);
+  const Eigen::MatrixXd none = Eigen::MatrixXd::Zero(std::ssize(training.regressors) + 1, outputs);
+  const NormalEquations sums = assemble(training, crisp, none, max_threads);
+  for (std::size_t i = 0; i < grown.nodes.size(); ++i) {
+    if (!has_signs(signs, grown.nodes[i])) {
+      move(signs, sums.gram[i], training.scale, grown.nodes[i]);
+    }
+  }
+}
+
+}  // namespace llmt
