@@ -53,8 +53,12 @@ FitResult fit_best_terms(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
     return linear;
   }
   FitResult quadratic = fit_with(LocalTerms::quadratic, 1);
-  const bool is_better =
-      is_beyond_chance(mean_error(linear.summary, linear.summary), mean_error(quadratic.summary, linear.summary));
+  const CandidateError of_linear = mean_error(linear.summary, linear.summary);
+  const CandidateError of_quadratic = mean_error(quadratic.summary, linear.summary);
+  const std::vector<PartitionSummary>& trees = linear.summary.partitions;
+  const bool least_squares =
+      std::all_of(trees.begin(), trees.end(), [](const PartitionSummary& tree) { return tree.leaves == 1; });
+  const bool is_better = least_squares ? is_beyond_chance(of_linear, of_quadratic) : of_quadratic.rmse < of_linear.rmse;
   FitResult& taken = is_better ? quadratic : linear;
   for (const PartitionSummary& partition : (is_better ? linear : quadratic).summary.partitions) {
     taken.summary.other_terms.push_back(partition.chosen);

@@ -225,7 +225,7 @@ TEST(Quadratic, ProductsAreOfNumbersThatVary) {
   EXPECT_EQ(products, (std::vector<std::pair<int, int>>{{0, 0}, {0, 1}, {0, 3}, {1, 3}, {3, 3}}));
 }
 
-TEST(LocalTerms, AutomaticTakesProductsWhereTheyHelpBeyondChanceAndWhereTheyCan) {
+TEST(LocalTerms, AutomaticTakesProductsWhereTheyHelpAndLeavesLeastSquaresBeyondChanceOnly) {
   int quadratic = 0;
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
     const Eigen::MatrixXd x = oracle::uniform(300, 3, seed);

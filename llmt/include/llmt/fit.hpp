@@ -183,8 +183,9 @@ enum class LocalTerms {
   /// for d inputs, at most 13, of magnitudes up to 1e70. None of an input that never varies, no square of one with two
   /// values.
   quadratic,
-  /// The whole selection runs for both on the same folds. Quadratic ones are taken if their gain is beyond chance, as
-  /// in SelectionOptions. Linear without folds, and with more numeric regression inputs than quadratic ones allow.
+  /// The whole selection runs for both on the same folds, and the smaller held-out error decides; but linear least
+  /// squares stays as in SelectionOptions. Linear without folds, and with more numeric regression inputs than quadratic
+  /// ones allow.
   automatic
 };
 
