@@ -199,7 +199,9 @@ TEST(LlmtProgram, MistakesHaveTheirExitCodeAndMessage) {
   };
   expect("", 2, "subcommand");
   expect("fit d.csv", 2, "--target is required");
-  expect("fit d.csv -t y --rule m5", 2, "m5");
+  expect("fit d.csv -t y --rule cart", 2, "cart");
+  expect("fit d.csv -t y --ignore label --rule m5 --validity blend", 2,
+         "with growth.rule m5 it must be automatic or crisp");
   expect("fit d.csv -t y --ignore label --cv 1", 2, "folds.count is 1");
   expect("fit d.csv -t y --ignore label --width -1", 2, "blend.widths is -1, it must be finite and positive");
   expect("fit d.csv -t y --ignore label --categorical nope", 1, "\"nope\" is categorical, but not an input");

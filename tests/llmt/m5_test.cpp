@@ -367,6 +367,25 @@ TEST(M5, MissingValuesMayTellSomethingAndRowsOfNoWeightDoNot) {
   EXPECT_LT(error, 1.0);  // all of it where the value is missing: 2.5 x sqrt(0.1) = 0.8
 }
 
+TEST(M5, RowsWithoutAValueTeachTheChildThatTheyClearlyBelongTo) {
+  Eigen::MatrixXd x = oracle::uniform(900, 1, 13);
+  Eigen::VectorXd y = (x.col(0).array() > 0.1).cast<double>() * 5.0 + 0.1 * oracle::uniform(900, 1, 14).col(0).array();
+  std::ptrdiff_t left = 0;
+  for (std::ptrdiff_t i = 0; i < 900; ++i) {
+    if (i % 10 == 0) {
+      x(i, 0) = std::nan("");
+      y(i) -= y(i) > 2.5 ? 5.0 : 0.0;  // all as on the left
+    }
+    left += !(x(i, 0) > 0.1) ? 1 : 0;
+  }
+  const llmt::FitResult result = grow(x, y);
+  ASSERT_EQ(nodes(result)[0].split_input, 0);
+  EXPECT_LT(nodes(result)[0].threshold, 0.2);
+  EXPECT_GT(nodes(result)[0].missing_left, 0.9);
+  EXPECT_EQ(nodes(result)[1].samples, left);
+  EXPECT_EQ(nodes(result)[1].samples + nodes(result)[2].samples, 900);
+}
+
 TEST(M5, WeightsMultiplySquaredErrors) {
   // Rows given twice, and given once with the weight 2: the same relative weights, the same sums.
   const Eigen::MatrixXd x = oracle::uniform(200, 2, 14);

@@ -37,8 +37,8 @@ enum class GrowthRule {
   lolimot_data_driven,  ///< LOLIMOT with thresholds where two crisp models of the box's rows leave the smallest error
   /// Residual analysis (SUPPORT, Chaudhuri et al. 1994; Potts & Sammut 2005): the rows of a node fall into two classes
   /// by the sign of their residual, the input whose class means m+, m-, or whose scatter about them, differ most
-  /// significantly is split at (m+ + m-) / 2. The split must pass the tests of RD. Nothing is sorted and no threshold
-  /// searched: a level of the tree costs O(rows x coefficients^2).
+  /// significantly is split at (m+ + m-) / 2. The split must pass the tests of RD; if it does not, the next input is
+  /// tried. Nothing is sorted and no threshold searched: a split that is tried costs O(rows x coefficients^2).
   ra,
   /// M5' (Quinlan 1992, Wang & Witten 1997): splits by the decrease of the outputs' scatter, down to a few rows; a
   /// node's model has the inputs tested below it, less those that do not pay; pruned from the leaves up by
