@@ -94,7 +94,7 @@ Partition BlendCorrection::corrected(double ridge) const {
   std::vector<Eigen::VectorXd> holds;
   for (const Eigen::MatrixXd& gram : grams_) {
     // Directions without rows stay as they are.
-    holds.push_back((1e-6 * gram.diagonal()).array() + 1e-9);
+    holds.emplace_back((1e-6 * gram.diagonal()).array() + 1e-9);
     blocks.emplace_back((1.0 + ridge) * gram + Eigen::MatrixXd(holds.back().asDiagonal()));
   }
   const auto precondition = [&](const Eigen::VectorXd& from) {

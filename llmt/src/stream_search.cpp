@@ -344,7 +344,7 @@ bool LeafSearch::propose() {
 }
 
 std::ptrdiff_t LeafSearch::bytes() const {
-  std::size_t doubles = first_rows_.capacity() + static_cast<std::size_t>(2 * 5 * signs_[0].count.size());
+  std::size_t doubles = first_rows_.capacity() + 10 * static_cast<std::size_t>(signs_[0].count.size());
   for (const Bins& bins : bins_) {
     doubles += bins.grams.capacity() + bins.edges.capacity() + bins.rows.capacity();
   }

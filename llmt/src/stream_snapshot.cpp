@@ -23,7 +23,8 @@ Node leaf_of(const StreamTree& tree, const StreamNode& node, const std::vector<C
   int rank = 0;
   const Eigen::VectorXd change = solve(setting.shape, sums.gram.data(), setting.options.shrinkage, rank);
   // A leaf with too few rows says what it says to predict().
-  const Eigen::VectorXd model = node.is_leaf() ? node.model : node.basis.base + change;
+  const bool few = node.is_leaf() && sums.rows < 2 * setting.coefficients();
+  const Eigen::VectorXd model = few ? node.model : node.basis.base + change;
   Node result;
   result.samples = sums.rows;
   result.rank = std::max(1, rank);

@@ -18,7 +18,7 @@ struct ColumnRange {
 };
 
 /// The tree as it stands, crisp, in the units of inputs and output. Splits in the order of what they gain.
-Partition crisp_partition(const StreamTree& tree, const std::vector<ColumnRange>& inputs, int output);
+Partition crisp_partition(const StreamTree& tree, const std::vector<ColumnRange>& columns, int output);
 
 /// What predicts the rows `held_out` best, among the prefixes of the crisp tree and blends of it that are corrected on
 /// the rows `others`. Too few rows: the tree as it is. Also sets the range that predictions are held to.
