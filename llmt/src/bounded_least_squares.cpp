@@ -34,6 +34,18 @@ void LeastDistance::add(const Eigen::MatrixXd& normals, const Eigen::VectorXd& b
   gram_.bottomLeftCorner(added, before) = gram_.topRightCorner(before, added).transpose();
 }
 
+std::vector<std::ptrdiff_t> LeastDistance::keep_active() {
+  const std::vector<std::ptrdiff_t> kept = active_;
+  normals_ = Eigen::MatrixXd(normals_(Eigen::all, kept));
+  gram_ = Eigen::MatrixXd(gram_(kept, kept));
+  bounds_ = Eigen::VectorXd(bounds_(kept));
+  multipliers_ = Eigen::VectorXd(multipliers_(kept));
+  for (std::size_t k = 0; k < kept.size(); ++k) {
+    active_[k] = static_cast<std::ptrdiff_t>(k);
+  }
+  return kept;
+}
+
 void LeastDistance::enter(std::ptrdiff_t c) {
   const std::ptrdiff_t size = std::ssize(active_);
   if (factor_.rows() <= size) {
@@ -105,7 +117,7 @@ Eigen::VectorXd LeastDistance::solve() {
   if (exchange(tolerance)) {
     return normals_ * multipliers_;
   }
-  for (std::ptrdiff_t step = 0; step < 10 * (count + normals_.rows()) + 100; ++step) {
+  for (std::ptrdiff_t step = 0; step < 3 * count + 50; ++step) {
     Eigen::VectorXd missing = bounds_;
     for (const std::ptrdiff_t c : active_) {
       missing -= multipliers_(c) * gram_.col(c);

@@ -14,13 +14,16 @@ namespace llmt {
 /// Solved in the multipliers, min 1/2 l'Gl - b'l over l >= 0 with G the Gram matrix of the normals, by an active set
 /// like that of Lawson & Hanson (1974, ch. 23): the inequality that is violated most enters, those whose multipliers
 /// would become negative leave. Every step gains, and it goes on from the active set that it had. Before that all wrong
-/// inequalities are exchanged at once a few times, which mostly is enough (Judice & Pires 1994).
+/// inequalities are exchanged at once a few times, which mostly is enough.
 class LeastDistance {
  public:
   explicit LeastDistance(std::ptrdiff_t dimensions) : normals_(dimensions, 0) {}
 
   /// One column, not zero, per inequality. Columns are scaled to length 1.
   void add(const Eigen::MatrixXd& normals, const Eigen::VectorXd& bounds);
+
+  /// Forgets all inequalities but the active ones; returns where these stood. The next solution is no shorter.
+  std::vector<std::ptrdiff_t> keep_active();
 
   /// The solution. If no vector meets all inequalities, one that comes near.
   Eigen::VectorXd solve();

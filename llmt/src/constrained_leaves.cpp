@@ -18,7 +18,7 @@ constexpr double least_room = 1e-6;
 constexpr double rounding = 1e-11;
 
 /// Times that violated inequalities are added. What is left then is mended at last.
-constexpr int most_rounds = 30;
+constexpr int most_rounds = 20;
 
 double room_of(const Partition& partition, std::ptrdiff_t output) {
   return least_room * (partition.residual_range(output, 1) - partition.residual_range(output, 0));
@@ -130,16 +130,17 @@ void constrain_leaves(const Partition& partition, const TrainingRows& training, 
       distance.add(normals, bounds);
       all.insert(all.end(), found.begin(), found.end());
       Eigen::VectorXd change = distance.solve();
+      // What is not active any more is found again if need be: no round makes the change smaller.
+      std::vector<LeafInequality> kept;
+      for (const std::ptrdiff_t c : distance.keep_active()) {
+        kept.push_back(std::move(all[static_cast<std::size_t>(c)]));
+      }
+      all = std::move(kept);
       factor.triangularView<Eigen::Upper>().solveInPlace(change);
       coefficients.col(o) = free + change;
       found = problem.violated(coefficients.col(o));
     }
-    start.clear();
-    for (std::size_t c = 0; c < all.size(); ++c) {
-      if (distance.multipliers()(static_cast<std::ptrdiff_t>(c)) > 0.0) {
-        start.push_back(all[c]);
-      }
-    }
+    start = std::move(all);
   }
 }
 
