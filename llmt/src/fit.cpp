@@ -37,7 +37,7 @@ GrownPartition grow_nodes(const TrainingRows& rows, const std::vector<int>& serv
   problem.options.split_inputs = table.split_inputs;
   if (is_hilomot(problem.options.rule)) {
     const bool joint = !plan.candidates.widths.empty() && plan.candidates.estimation == Estimation::joint;
-    return grow_hilomot(problem, {joint ? GateModels::joint : GateModels::local, stop_by_aicc});
+    return grow_hilomot(problem, {joint ? GateModels::joint : GateModels::local, stop_by_aicc && !plan.leaves_given});
   }
   if (!is_lolimot(problem.options.rule)) {
     return grow(problem);

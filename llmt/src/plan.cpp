@@ -12,7 +12,7 @@ Plan make_plan(const FitOptions& options, const TrainingRows& all, std::ptrdiff_
   const bool has_folds = folds > 0;
   // Many rows: the widest transitions and the larger ridges, which are for few, take most of the time.
   const bool many_rows = folds == 1;
-  Plan plan{options.growth, {}};
+  Plan plan{options.growth, {}, options.growth.max_leaves > 0};
   const ValidityChoice choice = is_lolimot(options.growth.rule) ? ValidityChoice::gaussian : options.blend.validity;
   const bool logistic = is_hilomot(options.growth.rule);
   const bool crisp_only =
