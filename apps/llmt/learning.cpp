@@ -30,6 +30,21 @@ std::vector<int> positions(const char* option, const std::vector<std::string>& n
   return result;
 }
 
+/// Of each input 1, or -1 where its name has a leading minus; 0 where it is not named. Empty if none is.
+std::vector<int> signs_of(const char* option, const std::vector<std::string>& names,
+                          const std::vector<std::string>& inputs) {
+  if (names.empty()) {
+    return {};
+  }
+  std::vector<int> result(inputs.size(), 0);
+  for (const std::string& name : names) {
+    const bool falls = !contains(inputs, name) && name.starts_with('-');
+    const int position = positions(option, {falls ? name.substr(1) : name}, inputs).front();
+    result[static_cast<std::size_t>(position)] = falls ? -1 : 1;
+  }
+  return result;
+}
+
 }  // namespace
 
 std::vector<std::string> choose_inputs(const Csv& csv, const LearningArguments& arguments) {
@@ -54,23 +69,6 @@ std::vector<std::string> choose_inputs(const Csv& csv, const LearningArguments& 
   }
   return inputs;
 }
-
-/// Of each input 1, or -1 where its name has a leading minus; 0 where it is not named. Empty if none is.
-std::vector<int> signs_of(const char* option, const std::vector<std::string>& names,
-                          const std::vector<std::string>& inputs) {
-  if (names.empty()) {
-    return {};
-  }
-  std::vector<int> result(inputs.size(), 0);
-  for (const std::string& name : names) {
-    const bool falls = !contains(inputs, name) && name.starts_with('-');
-    const int position = positions(option, {falls ? name.substr(1) : name}, inputs).front();
-    result[static_cast<std::size_t>(position)] = falls ? -1 : 1;
-  }
-  return result;
-}
-
-}  // namespace
 
 LearningTable read_learning_table(const LearningArguments& arguments) {
   const Csv csv = Csv::read(arguments.data);

@@ -45,7 +45,7 @@ GrownPartition grow_in_order(const TrainingRows& rows, const std::vector<int>& s
   problem.options.split_inputs = table.split_inputs;
   if (is_hilomot(problem.options.rule)) {
     const bool joint = !plan.candidates.widths.empty() && plan.candidates.estimation == Estimation::joint;
-    return grow_hilomot(problem, {joint ? GateModels::joint : GateModels::local, stop_by_aicc});
+    return grow_hilomot(problem, {joint ? GateModels::joint : GateModels::local, stop_by_aicc && !plan.leaves_given});
   }
   if (problem.options.rule == GrowthRule::m5) {
     return grow_m5(problem);

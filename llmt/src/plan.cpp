@@ -18,7 +18,7 @@ Plan make_plan(const FitOptions& options, const TrainingRows& all, std::ptrdiff_
   const bool has_folds = folds > 0;
   // Many rows: the widest transitions and the larger ridges, which are for few, take most of the time.
   const bool many_rows = folds == 1;
-  Plan plan{options.growth, {}};
+  Plan plan{options.growth, {}, options.growth.max_leaves > 0};
   const bool is_m5 = options.growth.rule == GrowthRule::m5;
   const ValidityChoice choice = is_lolimot(options.growth.rule) ? ValidityChoice::gaussian
                                 : is_m5                         ? ValidityChoice::crisp

@@ -10,6 +10,7 @@ namespace llmt {
 struct Plan {
   GrowthOptions growth;
   Candidates candidates;
+  bool leaves_given = false;  ///< by GrowthOptions::max_leaves: what growth.max_leaves says is not a default
 };
 
 bool is_lolimot(GrowthRule rule);

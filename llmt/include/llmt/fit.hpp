@@ -48,7 +48,7 @@ enum class GrowthRule {
   /// HILOMOT (Nelles 2006): the worst local model is split by a plane of any direction with a logistic gate, found by
   /// nonlinear optimisation with the two local models nested inside; validities are products of gates. Takes
   /// BlendOptions::widths (of the gates, 1: as grown) and Estimation as lolimot does; ValidityChoice automatic or
-  /// crisp. Without folds AICc decides how many leaves stay.
+  /// crisp. Without folds and GrowthOptions::max_leaves AICc decides how many leaves stay.
   hilomot
 };
 
