@@ -56,15 +56,63 @@ std::vector<Member> members(std::ptrdiff_t leaves) {
     options.selection.folds.count = 0;
   });
   add("crisp RD", crisp);
+  add("crisp RA", [&](Options& options) {
+    crisp(options);
+    options.growth.rule = llmt::GrowthRule::ra;
+  });
+  add("crisp RD, pruned", [&](Options& options) {
+    crisp(options);
+    options.growth.pruning = llmt::Pruning::weakest_link;
+  });
+  if (leaves == 0) {
+    add("crisp RD, pruned, merged", [&](Options& options) {
+      crisp(options);
+      options.growth.pruning = llmt::Pruning::weakest_link;
+      options.growth.merge_leaves = true;
+    });
+    add("crisp RD, sparse", [&](Options& options) {
+      crisp(options);
+      options.local_models.sparse = llmt::SparseChoice::automatic;
+    });
+    add("M5'", [&](Options& options) {
+      options.growth.rule = llmt::GrowthRule::m5;
+      options.selection.folds.count = 0;
+    });
+  }
+  // Fewer, for a quadratic one stands for several linear ones.
+  const auto quadratic = [&](Options& options) {
+    options.local_models.terms = llmt::LocalTerms::quadratic;
+    options.growth.max_leaves = (leaves + 1) / 2;
+  };
+  add("crisp RD, quadratic", [&](Options& options) {
+    crisp(options);
+    quadratic(options);
+  });
   add("blend", blend);
-  add("default", [](Options&) {});
+  if (leaves == 0) {
+    add("default", [](Options&) {});
+  }
+  add("blend, quadratic", [&](Options& options) {
+    blend(options);
+    quadratic(options);
+  });
   add("LOLIMOT local", [&](Options& options) {
     options.growth.rule = llmt::GrowthRule::lolimot;
-    options.blend.estimation = llmt::Estimation::local;
+    options.blend.estimation = llmt::Estimation::as_grown;
     few_leaves(options);
   });
   add("LOLIMOT joint", [&](Options& options) {
     options.growth.rule = llmt::GrowthRule::lolimot;
+    options.blend.ridges = leaves > 0 ? std::vector<double>{1e-4} : std::vector<double>{};
+    few_leaves(options);
+  });
+  add("HILOMOT local", [&](Options& options) {
+    options.growth.rule = llmt::GrowthRule::hilomot;
+    options.blend.estimation = llmt::Estimation::as_grown;
+    few_leaves(options);
+  });
+  add("HILOMOT joint", [&](Options& options) {
+    options.growth.rule = llmt::GrowthRule::hilomot;
     options.blend.ridges = leaves > 0 ? std::vector<double>{1e-4} : std::vector<double>{};
     few_leaves(options);
   });

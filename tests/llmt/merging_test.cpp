@@ -47,7 +47,7 @@ struct Grown {
     return llmt::fit(x, y, options).model.partitions()[0];
   }
   llmt::Model model(llmt::Partition partition) const {
-    llmt::describe_leaves(training, partition, 1);
+    llmt::describe_leaves(training, partition, false, 1);
     return {training.columns, training.output_columns, training.regressors, {std::move(partition)}};
   }
 };
