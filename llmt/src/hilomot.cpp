@@ -5,11 +5,12 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <optional>
 
 #include "aicc.hpp"
+#include "gate_search.hpp"
 #include "growth_data.hpp"
+#include "level_cut.hpp"
 #include "node_fit.hpp"
 #include "parallel.hpp"
 
@@ -19,29 +20,11 @@ namespace {
 /// AICc has to improve within this many further leaves.
 constexpr std::ptrdiff_t patience = 10;
 
-/// Half widths in standard deviations of the node's rows along the direction. Of local models that of the source, a
-/// twentieth of the distance of the two centres, which are sqrt(3) standard deviations apart where evenly spread rows
-/// are halved; of joint models bounds, and where the optimisation starts.
-constexpr double local_width = 0.087;
-constexpr double joint_width = 0.4;
-constexpr double least_joint_width = 0.05;
-constexpr double most_joint_width = 1.0;
-
 /// Rows with less validity than this take no part in growth below.
 constexpr double negligible = 1e-5;
 
 /// Directions of this part of the largest variance, in standardised inputs, are collinear with others.
 constexpr double collinear = 1e-8;
-
-/// Directions shorter than this, of a unit vector's parts that vary in a node, are no start.
-constexpr double least_direction = 1e-6;
-
-/// Of the axis-orthogonal splits so many are starts of the optimisation.
-constexpr std::ptrdiff_t axes_to_start_from = 2;
-
-/// The levels of a categorical input are put in so many orders, and each is cut in at most so many places.
-constexpr std::size_t orders_of_levels = 3;
-constexpr std::size_t most_level_cuts = 32;
 
 /// A local model that no other stands below.
 struct OpenLeaf {
@@ -259,8 +242,21 @@ class Hilomot {
     problem.y = whole.residuals();
     Cut best = best_plane(leaf, problem);
     for (const int input : categorical_) {
-      if (Cut cut = best_levels(leaf, problem, input); cut.loss < best.loss) {
-        best = std::move(cut);
+      const Table& table = *data_.training.table;
+      Eigen::VectorXd values(std::ssize(leaf.rows));
+      for (std::ptrdiff_t i = 0; i < values.size(); ++i) {
+        const int row = leaf.rows[static_cast<std::size_t>(i)];
+        values(i) = table.inputs(data_.training.rows[static_cast<std::size_t>(row)], input);
+      }
+      LevelCut cut = best_level_cut(problem, values, table.num_levels[static_cast<std::size_t>(input)]);
+      evaluations_ += cut.evaluations;
+      if (cut.loss < best.loss) {
+        best = {.loss = cut.loss,
+                .normal = {},
+                .threshold = cut.left_share,
+                .input = input,
+                .level_side = std::move(cut.side),
+                .share = std::move(cut.share)};
       }
     }
     const double before = data_.output_weights.dot(whole.rss);
@@ -293,7 +289,8 @@ class Hilomot {
     Eigen::MatrixXd directions(kept, inputs + 2);  // the axes, the most curved one, that of the split above
     directions << colour.transpose(), most_curved(problem),
         leaf.normal.size() > 0 ? Eigen::VectorXd(colour.transpose() * leaf.normal) : Eigen::VectorXd::Zero(kept);
-    const GateFit best = best_gate(problem, directions, inputs);
+    const GateFit best = best_gate(problem, directions, inputs, data_.problem.max_threads);
+    evaluations_ += best.evaluations;
     if (!std::isfinite(best.loss)) {
       return cut;
     }
@@ -305,133 +302,6 @@ class Hilomot {
     cut.threshold = mean * cut.normal - best.gate(kept) * cut.half_width;
     cut.share = gate_shares(problem, best.gate);
     return cut;
-  }
-
-  /// From the best of the first `axes` directions and from all others; those that are zero do not count.
-  GateFit best_gate(const GateProblem& problem, const Eigen::MatrixXd& directions, std::ptrdiff_t axes) {
-    const int threads = data_.problem.max_threads;
-    const bool joint = problem.models == GateModels::joint;
-    std::vector<GateFit> fits(static_cast<std::size_t>(directions.cols()));
-    parallel_for(std::ssize(fits), threads, [&](std::ptrdiff_t k) {
-      GateFit& fit = fits[static_cast<std::size_t>(k)];
-      fit.loss = std::numeric_limits<double>::infinity();
-      if (directions.col(k).norm() > least_direction) {
-        fit = best_threshold(problem, directions.col(k), joint ? joint_width : local_width);
-      }
-    });
-    const auto less = [](const GateFit& a, const GateFit& b) { return a.loss < b.loss; };
-    std::stable_sort(fits.begin(), fits.begin() + axes, less);
-    fits.erase(fits.begin() + std::min(axes, axes_to_start_from), fits.begin() + axes);
-    std::erase_if(fits, [](const GateFit& fit) { return !std::isfinite(fit.loss); });
-    parallel_for(std::ssize(fits), threads, [&](std::ptrdiff_t k) {
-      GateFit& fit = fits[static_cast<std::size_t>(k)];
-      fit =
-          optimise_gate(problem, fit, joint ? least_joint_width : local_width, joint ? most_joint_width : local_width);
-    });
-    for (const GateFit& fit : fits) {
-      evaluations_ += fit.evaluations;
-    }
-    const auto best = std::min_element(fits.begin(), fits.end(), less);
-    return best == fits.end() ? GateFit{{}, std::numeric_limits<double>::infinity()} : *best;
-  }
-
-  /// The direction in which the residuals are most curved: principal Hessian direction (Li 1992).
-  static Eigen::VectorXd most_curved(const GateProblem& problem) {
-    const Eigen::VectorXd residual = problem.y * problem.output_weights.cwiseSqrt();
-    const auto z = problem.z.leftCols(problem.z.cols() - 1);
-    const Eigen::MatrixXd hessian = z.transpose() * (problem.weights.cwiseProduct(residual).asDiagonal() * z);
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(hessian);
-    std::ptrdiff_t largest = 0;
-    eigen.eigenvalues().cwiseAbs().maxCoeff(&largest);
-    return eigen.eigenvectors().col(largest);
-  }
-
-  /// Of a leaf's rows: their level, -1 where there is none, and the weight of every level.
-  struct Levels {
-    int input = -1;
-    std::vector<int> of_row;
-    Eigen::VectorXd weight;
-  };
-
-  Levels levels_of(const OpenLeaf& leaf, const GateProblem& problem, int input) const {
-    const Table& table = *data_.training.table;
-    Levels levels{input, std::vector<int>(leaf.rows.size(), -1),
-                  Eigen::VectorXd::Zero(table.num_levels[static_cast<std::size_t>(input)])};
-    for (std::size_t i = 0; i < leaf.rows.size(); ++i) {
-      const double value = table.inputs(data_.training.rows[static_cast<std::size_t>(leaf.rows[i])], input);
-      if (!std::isnan(value)) {
-        levels.of_row[i] = static_cast<int>(value);
-        levels.weight(levels.of_row[i]) += problem.weights(static_cast<std::ptrdiff_t>(i));
-      }
-    }
-    return levels;
-  }
-
-  /// The levels that occur are put in order by the mean, over their rows, of the residual times a regressor: levels of
-  /// which the slopes differ. Of these orders those in which levels differ most are cut where that leaves least.
-  Cut best_levels(const OpenLeaf& leaf, const GateProblem& problem, int input) {
-    const Levels levels = levels_of(leaf, problem, input);
-    const std::ptrdiff_t columns = problem.a.cols();
-    const Eigen::VectorXd residual = problem.weights.cwiseProduct(problem.y * problem.output_weights.cwiseSqrt());
-    Eigen::MatrixXd means = Eigen::MatrixXd::Zero(columns, levels.weight.size());
-    for (std::size_t i = 0; i < levels.of_row.size(); ++i) {
-      if (levels.of_row[i] >= 0) {
-        const std::ptrdiff_t row = static_cast<std::ptrdiff_t>(i);
-        means.col(levels.of_row[i]) += residual(row) * problem.a.row(row).transpose();
-      }
-    }
-    std::vector<int> present;
-    for (int level = 0; level < levels.weight.size(); ++level) {
-      if (levels.weight(level) > 0.0) {
-        means.col(level) /= levels.weight(level);
-        present.push_back(level);
-      }
-    }
-    const Eigen::VectorXd spread = means.cwiseAbs2() * levels.weight;
-    std::vector<std::ptrdiff_t> keys(static_cast<std::size_t>(columns));
-    std::iota(keys.begin(), keys.end(), std::ptrdiff_t{0});
-    std::stable_sort(keys.begin(), keys.end(), [&](auto a, auto b) { return spread(a) > spread(b); });
-    keys.resize(std::min(keys.size(), orders_of_levels));
-    Cut best;
-    for (const std::ptrdiff_t key : keys) {
-      std::stable_sort(present.begin(), present.end(), [&](int a, int b) { return means(key, a) < means(key, b); });
-      cut_order(problem, levels, present, best);
-    }
-    return best;
-  }
-
-  /// Rows without a level belong to both sides.
-  void cut_order(const GateProblem& problem, const Levels& levels, const std::vector<int>& order, Cut& best) {
-    const std::size_t step = std::max<std::size_t>(1, order.size() / most_level_cuts);
-    std::vector<int> side(static_cast<std::size_t>(levels.weight.size()), 0);
-    for (const int level : order) {
-      side[static_cast<std::size_t>(level)] = 1;
-    }
-    const double known = levels.weight.sum();
-    double on_left = 0.0;
-    for (std::size_t k = 0; k + 1 < order.size(); ++k) {
-      side[static_cast<std::size_t>(order[k])] = -1;
-      on_left += levels.weight(order[k]);
-      if ((k + 1) % step != 0) {
-        continue;
-      }
-      Eigen::VectorXd share(std::ssize(levels.of_row));
-      for (std::size_t i = 0; i < levels.of_row.size(); ++i) {
-        const int level = levels.of_row[i];
-        share(static_cast<std::ptrdiff_t>(i)) = level < 0                                   ? on_left / known
-                                                : side[static_cast<std::size_t>(level)] < 0 ? 1.0
-                                                                                            : 0.0;
-      }
-      const double loss = share_loss(problem, share);
-      ++evaluations_;
-      if (loss < best.loss) {
-        best.loss = loss;
-        best.input = levels.input;
-        best.level_side = side;
-        best.threshold = on_left / known;
-        best.share = std::move(share);
-      }
-    }
   }
 
   void split(OpenLeaf& leaf, const Cut& cut) {
