@@ -60,17 +60,17 @@ std::vector<Member> members(std::ptrdiff_t leaves) {
     crisp(options);
     options.growth.rule = llmt::GrowthRule::ra;
   });
-  add("crisp RD, pruned", [&](Options& options) {
+  add("crisp RD pruned", [&](Options& options) {
     crisp(options);
     options.growth.pruning = llmt::Pruning::weakest_link;
   });
   if (leaves == 0) {
-    add("crisp RD, pruned, merged", [&](Options& options) {
+    add("crisp RD pruned merged", [&](Options& options) {
       crisp(options);
       options.growth.pruning = llmt::Pruning::weakest_link;
       options.growth.merge_leaves = true;
     });
-    add("crisp RD, sparse", [&](Options& options) {
+    add("crisp RD sparse", [&](Options& options) {
       crisp(options);
       options.local_models.sparse = llmt::SparseChoice::automatic;
     });
@@ -84,7 +84,7 @@ std::vector<Member> members(std::ptrdiff_t leaves) {
     options.local_models.terms = llmt::LocalTerms::quadratic;
     options.growth.max_leaves = (leaves + 1) / 2;
   };
-  add("crisp RD, quadratic", [&](Options& options) {
+  add("crisp RD quadratic", [&](Options& options) {
     crisp(options);
     quadratic(options);
   });
@@ -92,7 +92,7 @@ std::vector<Member> members(std::ptrdiff_t leaves) {
   if (leaves == 0) {
     add("default", [](Options&) {});
   }
-  add("blend, quadratic", [&](Options& options) {
+  add("blend quadratic", [&](Options& options) {
     blend(options);
     quadratic(options);
   });

@@ -40,7 +40,12 @@ std::vector<int> signs_of(const char* option, const std::vector<std::string>& na
   for (const std::string& name : names) {
     const bool falls = !contains(inputs, name) && name.starts_with('-');
     const int position = positions(option, {falls ? name.substr(1) : name}, inputs).front();
-    result[static_cast<std::size_t>(position)] = falls ? -1 : 1;
+    int& sign = result[static_cast<std::size_t>(position)];
+    if (sign == (falls ? 1 : -1)) {
+      throw std::invalid_argument(
+          fmt::format("{} names \"{}\" with both signs", option, inputs[static_cast<std::size_t>(position)]));
+    }
+    sign = falls ? -1 : 1;
   }
   return result;
 }
@@ -86,6 +91,20 @@ LearningTable read_learning_table(const LearningArguments& arguments) {
   options.monotone = signs_of("--monotone", arguments.monotone, table.names);
   options.slope_signs = signs_of("--slope-sign", arguments.slope_signs, table.names);
   options.categorical_inputs = table.inputs.categorical;
+  for (std::size_t j = 0; j < table.names.size(); ++j) {
+    const int monotone = options.monotone.empty() ? 0 : options.monotone[j];
+    const int sign = options.slope_signs.empty() ? 0 : options.slope_signs[j];
+    const std::vector<int>& categorical = table.inputs.categorical;
+    if ((monotone != 0 || sign != 0) &&
+        std::find(categorical.begin(), categorical.end(), static_cast<int>(j)) != categorical.end()) {
+      throw std::invalid_argument(fmt::format("{} names \"{}\", which is categorical",
+                                              monotone != 0 ? "--monotone" : "--slope-sign", table.names[j]));
+    }
+    if (monotone * sign < 0) {
+      throw std::invalid_argument(
+          fmt::format("--monotone and --slope-sign name \"{}\" with opposite signs", table.names[j]));
+    }
+  }
   options.weights = std::move(columns.weights);
   options.selection.folds.kind = arguments.contiguous ? FoldKind::contiguous : FoldKind::random;
   return table;

@@ -2,12 +2,15 @@
 #include <fmt/ranges.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <fstream>
 #include <iostream>
 #include <memory>
 #include <stdexcept>
+#include <string_view>
 
 #include "llmt/csv.hpp"
 #include "llmt/stream_command.hpp"
@@ -24,11 +27,13 @@ struct Learned {
 };
 
 void refuse_other_options(const CLI::App& command) {
-  for (const char* option : {"--categorical", "--split-inputs", "--regression-inputs", "--cv", "--contiguous", "--seed",
-                             "--threads", "--rule", "--min-improvement", "--search", "--shared", "--estimation",
-                             "--width", "--jump", "--ridge", "--smoothness", "--no-intervals"}) {
-    if (command.count(option) > 0) {
-      throw std::invalid_argument(fmt::format("{} is not for --stream", option));
+  constexpr std::array<std::string_view, 14> taken = {"data",      "target",       "inputs", "ignore",   "weight",
+                                                      "min-leaf",  "max-leaves",   "stream", "validity", "stream-rule",
+                                                      "shrinkage", "significance", "output", "json"};
+  for (const CLI::Option* option : command.get_options()) {
+    const std::string name = option->get_single_name();
+    if (option->count() > 0 && std::find(taken.begin(), taken.end(), name) == taken.end()) {
+      throw std::invalid_argument(fmt::format("--{} is not for --stream", name));
     }
   }
 }
@@ -68,6 +73,12 @@ void add(const Csv& piece, const StreamArguments& arguments, Learned& learned) {
   const LearningArguments& learning = arguments.learning;
   const Eigen::MatrixXd targets = piece.numbers(learning.targets, 1);
   const Eigen::VectorXd weights = learning.weight.empty() ? Eigen::VectorXd() : piece.numbers(learning.weight, 1);
+  for (std::ptrdiff_t row = 0; row < weights.size(); ++row) {
+    if (weights(row) < 0.0) {
+      throw std::runtime_error(fmt::format("{}:{}: column \"{}\": a weight must not be negative, it is {}",
+                                           learned.name, piece.line_of(row), learning.weight, weights(row)));
+    }
+  }
   Eigen::MatrixXd inputs;
   try {
     inputs = piece.numbers_or_missing(learned.inputs, 1);

@@ -81,17 +81,6 @@ std::vector<Eigen::MatrixXd> gram_matrices(const TrainingRows& training, const P
   return std::move(of_slot[0]);
 }
 
-/// Pseudo-inverse in scaled columns, with a floor: a direction without rows has a large leverage, not an infinite one.
-Eigen::MatrixXd inverse(const Eigen::MatrixXd& gram, const Eigen::VectorXd& scale) {
-  const Eigen::MatrixXd scaled = scale.cwiseInverse().asDiagonal() * gram * scale.cwiseInverse().asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scaled);
-  const double floor = std::max(1e-6, 1e-12 * eigen.eigenvalues().maxCoeff());
-  const Eigen::MatrixXd result = eigen.eigenvectors() *
-                                 eigen.eigenvalues().cwiseMax(floor).cwiseInverse().asDiagonal() *
-                                 eigen.eigenvectors().transpose();
-  return scale.cwiseInverse().asDiagonal() * result * scale.cwiseInverse().asDiagonal();
-}
-
 /// The constant and the regressors with a slope for some output.
 std::vector<std::ptrdiff_t> used_coefficients(const Node& node) {
   std::vector<std::ptrdiff_t> used = {0};
@@ -104,6 +93,16 @@ std::vector<std::ptrdiff_t> used_coefficients(const Node& node) {
 }
 
 }  // namespace
+
+Eigen::MatrixXd inverse_gram(const Eigen::MatrixXd& gram, const Eigen::VectorXd& scale) {
+  const Eigen::MatrixXd scaled = scale.cwiseInverse().asDiagonal() * gram * scale.cwiseInverse().asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scaled);
+  const double floor = std::max(1e-6, 1e-12 * eigen.eigenvalues().maxCoeff());
+  const Eigen::MatrixXd result = eigen.eigenvectors() *
+                                 eigen.eigenvalues().cwiseMax(floor).cwiseInverse().asDiagonal() *
+                                 eigen.eigenvectors().transpose();
+  return scale.cwiseInverse().asDiagonal() * result * scale.cwiseInverse().asDiagonal();
+}
 
 void describe_leaves(const TrainingRows& training, Partition& partition, bool sparse, int max_threads) {
   const std::ptrdiff_t regressors = std::ssize(training.regressors);
@@ -129,12 +128,12 @@ void describe_leaves(const TrainingRows& training, Partition& partition, bool sp
       const std::ptrdiff_t first = node.shared_with >= 0 ? node.shared_with : index;
       const Eigen::MatrixXd full = gram[static_cast<std::size_t>(first)].selfadjointView<Eigen::Lower>();
       if (!sparse) {
-        node.inverse_gram = inverse(full, scale);
+        node.inverse_gram = inverse_gram(full, scale);
         return;
       }
       const std::vector<std::ptrdiff_t> used = used_coefficients(node);
       node.inverse_gram = Eigen::MatrixXd::Zero(full.rows(), full.cols());
-      node.inverse_gram(used, used) = inverse(full(used, used), scale(used));
+      node.inverse_gram(used, used) = inverse_gram(full(used, used), scale(used));
     }
   });
 }

@@ -34,6 +34,10 @@ Eigen::VectorXd prefix_squared_errors(const Partition& partition, const Training
 double squared_error(const Partition& partition, const TrainingRows& columns, const std::vector<Chunk>& rows,
                      const Eigen::VectorXd& weights);
 
+/// Pseudo-inverse of a Gram matrix whose columns are about as large as `scale`, with a floor: a direction without rows
+/// has a large leverage, not an infinite one.
+Eigen::MatrixXd inverse_gram(const Eigen::MatrixXd& gram, const Eigen::VectorXd& scale);
+
 /// Fills in what a finished partition tells of its leaves: residual sums of squares and inverse Gram matrices.
 /// `sparse`: these are of the regressors with slopes alone.
 void describe_leaves(const TrainingRows& training, Partition& partition, bool sparse, int max_threads);

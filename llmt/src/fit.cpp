@@ -28,7 +28,7 @@ namespace llmt {
 namespace {
 
 /// A tree that is pruned by the weakest link has so many times the leaves that are asked for before: what a split gains
-/// shows when those below it are made. Not with LOLIMOT, of which a split costs as much as there are leaves.
+/// shows when those below it are made. Not with LOLIMOT and HILOMOT, whose splits cost too much for that.
 constexpr std::ptrdiff_t grown_to_be_pruned = 3;
 
 std::vector<int> all_rows(std::ptrdiff_t count) {
@@ -67,7 +67,9 @@ GrownPartition grow_nodes(const TrainingRows& rows, const std::vector<int>& serv
     return grow_in_order(rows, served, plan, stop_by_aicc, max_threads);
   }
   Plan larger = plan;
-  larger.growth.max_leaves *= is_lolimot(plan.growth.rule) ? 1 : grown_to_be_pruned;
+  if (!is_lolimot(plan.growth.rule) && !is_hilomot(plan.growth.rule)) {
+    larger.growth.max_leaves = grown_to_be_pruned * std::min(plan.growth.max_leaves, rows.count());
+  }
   GrownPartition result = grow_in_order(rows, served, larger, stop_by_aicc, max_threads);
   Partition ordered{.outputs = {}, .nodes = in_pruning_order(result.nodes, std::move(result.gains))};
   if (plan.growth.max_leaves > 0 && ordered.num_leaves() > plan.growth.max_leaves) {

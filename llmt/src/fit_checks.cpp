@@ -15,9 +15,6 @@
 namespace llmt {
 namespace {
 
-constexpr double largest_magnitude = 1e150;  // squares stay finite
-constexpr double largest_factor = 1e70;      // squares of products too
-
 void require(bool condition, const char* option, double value, const char* bound) {
   if (!condition) {
     throw std::invalid_argument(fmt::format("llmt::fit: {} is {}, it must be {}", option, value, bound));

@@ -8,6 +8,10 @@
 
 namespace llmt {
 
+/// Inputs and outputs may not be larger: squares stay finite; with quadratic local models squares of products too.
+inline constexpr double largest_magnitude = 1e150;
+inline constexpr double largest_factor = 1e70;
+
 void check_options(const FitOptions& options, std::ptrdiff_t inputs);
 
 /// The caller's data, checked; no columns named means all of them.

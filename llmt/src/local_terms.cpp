@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "fit_checks.hpp"
 #include "regressors.hpp"
 #include "selection.hpp"
 
@@ -37,7 +38,8 @@ CandidateError mean_error(const FitSummary& of, const FitSummary& linear) {
 FitResult fit_best_terms(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
                          const Eigen::Ref<const Eigen::MatrixXd>& outputs, const FitOptions& options) {
   const std::ptrdiff_t numbers = count_numbers(inputs.cols(), options);
-  const bool both = numbers > 0 && numbers <= most_inputs_of_products && options.selection.folds.count != 0;
+  const bool both = numbers > 0 && numbers <= most_inputs_of_products && options.selection.folds.count != 0 &&
+                    !(inputs.array().abs() > largest_factor).any();
   FitOptions with_terms = options;
   const auto fit_with = [&](LocalTerms terms, std::ptrdiff_t half) {
     with_terms.local_models.terms = terms;

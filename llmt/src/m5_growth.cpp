@@ -45,10 +45,16 @@ class M5 {
   }
 
  private:
-  /// Regressors of the inputs that are tested at or below a node.
+  /// Regressors of the inputs that are tested at or below a node; of a tree that tests none all, for one model is all
+  /// that is left then.
   std::vector<int> regressors_of(const M5Branch& branch) const {
     std::vector<int> result;
     const std::vector<Regressor>& regressors = data_.training.regressors;
+    if (tree_.branches.size() == 1) {
+      result.resize(regressors.size());
+      std::iota(result.begin(), result.end(), 0);
+      return result;
+    }
     for (std::size_t k = 0; k < regressors.size(); ++k) {
       for (std::size_t j = 0; j < branch.tested.size(); ++j) {
         if (branch.tested[j] && data_.problem.options.split_inputs[j] == regressors[k].input) {

@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "checks.hpp"
+#include "fit_checks.hpp"
 #include "reservoir.hpp"
 #include "stream_snapshot.hpp"
 #include "stream_tree.hpp"
@@ -153,13 +154,13 @@ class StreamState {
                            column, value, bound, offered_ + i));
       };
       for (std::ptrdiff_t j = 0; j < inputs_; ++j) {
-        if (std::isinf(inputs(i, j))) {
-          refuse("inputs", j, inputs(i, j), "finite, or NaN where it is missing");
+        if (std::abs(inputs(i, j)) > largest_magnitude) {
+          refuse("inputs", j, inputs(i, j), "at most 1e150 in magnitude, or NaN where it is missing");
         }
       }
       for (std::ptrdiff_t o = 0; o < outputs_; ++o) {
-        if (!std::isfinite(outputs(i, o))) {
-          refuse("outputs", o, outputs(i, o), "finite");
+        if (!(std::abs(outputs(i, o)) <= largest_magnitude)) {
+          refuse("outputs", o, outputs(i, o), "finite and at most 1e150 in magnitude");
         }
       }
       if (weights.size() > 0 && !(weights(i) >= 0.0 && std::isfinite(weights(i)))) {
@@ -348,6 +349,13 @@ Model StreamState::snapshot(ValidityChoice validity) const {
       const TrainingRows queries = query_rows(table, std::move(held_out), training);
       for (Partition& partition : partitions) {
         partition = choose(training, queries, std::move(partition), validity);
+      }
+    }
+  }
+  for (Partition& partition : partitions) {
+    for (Node& node : partition.nodes) {
+      if (!node.is_leaf()) {
+        node.inverse_gram.resize(0, 0);
       }
     }
   }

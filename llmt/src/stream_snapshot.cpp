@@ -45,6 +45,14 @@ Node leaf_of(const StreamTree& tree, const StreamNode& node, const std::vector<C
     // A missing value counts as the origin.
     result.mean(k) = std::clamp(origin - column.mean, result.low(k), result.high(k));
   }
+  // [1, deviations] of the model = turn * [1, z - origin] of the sums.
+  Eigen::MatrixXd turn = Eigen::MatrixXd::Identity(inputs + 1, inputs + 1);
+  for (std::ptrdiff_t k = 0; k < inputs; ++k) {
+    turn(k + 1, 0) = setting.unscaled(k, node.basis.origin(k)) - columns[static_cast<std::size_t>(k)].mean;
+    turn(k + 1, k + 1) = setting.scale(k);
+  }
+  const Eigen::MatrixXd gram = matrix_of(setting.shape, sums.gram.data()).topLeftCorner(inputs + 1, inputs + 1);
+  result.inverse_gram = inverse_gram(turn * gram * turn.transpose(), turn.diagonal());
   return result;
 }
 

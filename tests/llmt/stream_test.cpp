@@ -537,7 +537,7 @@ TEST(Stream, RefusalsNameTheRow) {
   stream.add(x, y);
   y(3, 0) = std::numeric_limits<double>::quiet_NaN();
   EXPECT_EQ(message([&] { stream.add(x, y); }),
-            "llmt::Stream: add(): outputs(3, 0) is nan, it must be finite (row 7 of the stream; counted from 0)");
+            "llmt::Stream: add(): outputs(3, 0) is nan, it must be finite and at most 1e150 in magnitude (row 7 of the stream; counted from 0)");
   EXPECT_EQ(stream.counts().rows, 4);
   y(3, 0) = 0.0;
   x(1, 1) = std::numeric_limits<double>::infinity();
