@@ -314,6 +314,17 @@ TEST(M5, AffineDataGiveOneLeaf) {
   }
 }
 
+TEST(M5, RootThatCannotBeSplitHasAllInputs) {
+  const Eigen::MatrixXd x = oracle::uniform(20, 3, 9);
+  const Eigen::MatrixXd y = 3.0 * x.col(0) - 2.0 * x.col(1) + x.col(2);
+  llmt::FitOptions options;
+  options.growth = {.rule = llmt::GrowthRule::m5, .min_leaf_samples = 15};
+  options.selection.folds.count = 0;
+  const llmt::Model model = llmt::fit(x, y, options).model;
+  ASSERT_EQ(model.partitions()[0].nodes.size(), 1U);
+  EXPECT_LT((model.partitions()[0].nodes[0].slope - Eigen::RowVector3d(3.0, -2.0, 1.0)).norm(), 1e-10);
+}
+
 TEST(M5, ConstantOutputsAndFewRowsAreOneLeaf) {
   EXPECT_EQ(nodes(grow(oracle::uniform(50, 2, 6), Eigen::MatrixXd::Constant(50, 1, 3.5))).size(), 1U);
   EXPECT_EQ(nodes(grow(oracle::uniform(3, 2, 7), oracle::uniform(3, 1, 8))).size(), 1U);

@@ -522,6 +522,26 @@ TEST(Stream, AFewRowsGiveALinearModel) {
   EXPECT_TRUE(std::isnan(stream.prequential_rmse()(0)));
 }
 
+TEST(Stream, LeveragesAreThoseOfAllRowsThatALeafHasSeen) {
+  Eigen::MatrixXd x = oracle::uniform(400, 2, 3);
+  x.col(1) = 50.0 * x.col(1).array() + 1000.0;
+  Stream stream(2, 1);
+  stream.add(x, affine(x));
+  const llmt::Model model = stream.snapshot();
+  ASSERT_EQ(model.partitions()[0].nodes.size(), 1U);
+  const Eigen::MatrixXd a = with_one(x);
+  Eigen::MatrixXd query = x.topRows(3);
+  query.row(2) << 4.0, 900.0;
+  const std::vector<llmt::Extrapolation> told = model.extrapolation(query);
+  for (std::ptrdiff_t i = 0; i < 3; ++i) {
+    const Eigen::Vector3d row(1.0, query(i, 0), query(i, 1));
+    const double leverage = row.dot((a.transpose() * a).colPivHouseholderQr().solve(row));
+    // One row in eight is held out.
+    const double rows = static_cast<double>(model.partitions()[0].nodes[0].samples) / 400.0;
+    EXPECT_NEAR(told[static_cast<std::size_t>(i)].leverage * rows, leverage, 0.1 * leverage) << i;
+  }
+}
+
 TEST(Stream, RefusalsNameTheRow) {
   const auto message = [](const auto& call) -> std::string {
     try {
@@ -537,7 +557,8 @@ TEST(Stream, RefusalsNameTheRow) {
   stream.add(x, y);
   y(3, 0) = std::numeric_limits<double>::quiet_NaN();
   EXPECT_EQ(message([&] { stream.add(x, y); }),
-            "llmt::Stream: add(): outputs(3, 0) is nan, it must be finite and at most 1e150 in magnitude (row 7 of the stream; counted from 0)");
+            "llmt::Stream: add(): outputs(3, 0) is nan, it must be finite and at most 1e150 in magnitude (row 7 of the "
+            "stream; counted from 0)");
   EXPECT_EQ(stream.counts().rows, 4);
   y(3, 0) = 0.0;
   x(1, 1) = std::numeric_limits<double>::infinity();
@@ -545,6 +566,9 @@ TEST(Stream, RefusalsNameTheRow) {
   x(1, 1) = 0.0;
   EXPECT_NE(message([&] { stream.add(x, y, Eigen::Vector4d(1.0, 1.0, -1.0, 1.0)); }).find("weights(2, 0) is -1"),
             std::string::npos);
+  x(2, 0) = 1e160;
+  EXPECT_NE(message([&] { stream.add(x, y); }).find("inputs(2, 0) is 1e+160"), std::string::npos);
+  x(2, 0) = 0.0;
   EXPECT_NE(message([&] { stream.add(x.leftCols(1), y); }).find("inputs is 4 x 1"), std::string::npos);
   EXPECT_NE(message([&] { stream.snapshot(llmt::ValidityChoice::gaussian); }).find("gaussian"), std::string::npos);
   EXPECT_NE(message([] { Stream(0, 1); }).find("0 inputs"), std::string::npos);
