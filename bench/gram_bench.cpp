@@ -10,9 +10,9 @@
 #include <numeric>
 #include <vector>
 
-#include "gram.hpp"
 #include "llmt/random.hpp"
 #include "machine_peak.hpp"
+#include "numerics/gram.hpp"
 
 namespace {
 

@@ -12,7 +12,7 @@
 #include <tuple>
 
 #include "llmt/fit.hpp"
-#include "predict_oracle.hpp"
+#include "oracles/predict_oracle.hpp"
 #include "synthetic.hpp"
 
 namespace {

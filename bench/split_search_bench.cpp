@@ -9,8 +9,8 @@
 #include <ctime>
 #include <numeric>
 
-#include "brute_force_search.hpp"
-#include "node_fit.hpp"
+#include "numerics/node_fit.hpp"
+#include "oracles/brute_force_search.hpp"
 #include "synthetic.hpp"
 
 namespace {

@@ -1,0 +1,28 @@
+/// \file
+/// What a caller of fit() may have got wrong: std::invalid_argument naming argument, value and bound.
+#pragma once
+
+#include <vector>
+
+#include "data/dataset.hpp"
+#include "llmt/options.hpp"
+
+namespace llmt {
+
+/// Inputs and outputs may not be larger: squares stay finite; with quadratic local models squares of products too.
+inline constexpr double largest_magnitude = 1e150;
+inline constexpr double largest_factor = 1e70;
+
+void check_options(const FitOptions& options, std::ptrdiff_t inputs);
+
+/// The caller's data, checked; no columns named means all of them.
+Table make_table(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<const Eigen::MatrixXd>& outputs,
+                 const FitOptions& options);
+
+/// Rows that count.
+std::vector<std::ptrdiff_t> rows_with_weight(const Table& table);
+
+/// The folds that the choice is made on: all, the first one for many rows, or none.
+std::vector<Fold> selection_folds(std::ptrdiff_t rows, const SelectionOptions& selection);
+
+}  // namespace llmt

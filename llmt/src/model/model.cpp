@@ -1,0 +1,354 @@
+#include "llmt/model.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "base/checks.hpp"
+#include "model/evaluator.hpp"
+
+namespace llmt {
+namespace {
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+[[noreturn]] void reject(const std::string& what) { throw std::invalid_argument("llmt::Model: " + what); }
+
+/// A local model that is shared is the same in all its leaves.
+void check_shared(const Partition& partition, std::ptrdiff_t index, const std::string& where) {
+  const Node& node = partition.nodes[static_cast<std::size_t>(index)];
+  if (node.shared_with >= index) {
+    reject(
+        fmt::format("{}: it shares the local model of node {}, which must be an earlier one", where, node.shared_with));
+  }
+  const Node& first = partition.nodes[static_cast<std::size_t>(node.shared_with)];
+  if (!first.is_leaf() || first.shared_with >= 0) {
+    reject(fmt::format("{}: it shares the local model of node {}, which must be a leaf with its own", where,
+                       node.shared_with));
+  }
+  if (node.rank != first.rank || node.value != first.value || node.slope != first.slope || node.low != first.low ||
+      node.high != first.high) {
+    reject(fmt::format("{}: rank, value, slope, low and high must be those of node {}, whose local model it shares",
+                       where, node.shared_with));
+  }
+}
+
+void check_direction(const Node& node, const std::vector<InputColumn>& inputs, const std::string& where) {
+  if (!node.is_oblique()) {
+    return;
+  }
+  if (node.direction.size() != std::ssize(inputs) || !node.direction.allFinite()) {
+    reject(fmt::format("{}: direction has {} entries, it must have {} finite ones", where, node.direction.size(),
+                       inputs.size()));
+  }
+  // So it is not zero either, and its split input is a number.
+  if (node.direction(node.split_input) == 0.0) {
+    reject(fmt::format("{}: direction has weight 0 for the split input {}", where, node.split_input));
+  }
+  for (std::size_t j = 0; j < inputs.size(); ++j) {
+    if (inputs[j].is_categorical() && node.direction(static_cast<std::ptrdiff_t>(j)) != 0.0) {
+      reject(fmt::format("{}: direction has weight {} for the categorical input \"{}\", it must be 0", where,
+                         node.direction(static_cast<std::ptrdiff_t>(j)), inputs[j].name));
+    }
+  }
+}
+
+void check_node(const Partition& partition, std::ptrdiff_t index, const std::vector<InputColumn>& inputs,
+                std::ptrdiff_t regressors, const std::string& where) {
+  const Node& node = partition.nodes[static_cast<std::size_t>(index)];
+  const std::ptrdiff_t outputs = std::ssize(partition.outputs);
+  if (node.value.size() != outputs || node.rss.size() != outputs || node.slope.rows() != outputs ||
+      node.slope.cols() != regressors) {
+    reject(fmt::format("{}: value, rss and slope must have {} outputs and slope {} regression inputs", where, outputs,
+                       regressors));
+  }
+  if (node.mean.size() != regressors || node.low.size() != regressors || node.high.size() != regressors) {
+    reject(fmt::format("{}: mean, low and high must have {} regressors", where, regressors));
+  }
+  if (!(node.low.array() <= node.high.array()).all() || !node.mean.allFinite() || !node.low.allFinite() ||
+      !node.high.allFinite()) {
+    reject(fmt::format("{}: mean, low and high must be finite and low <= high", where));
+  }
+  if (!(node.half_width >= 0.0 && std::isfinite(node.half_width))) {
+    reject(fmt::format("{}: half_width {} must be finite and not negative", where, node.half_width));
+  }
+  if (!(node.missing_left >= 0.0 && node.missing_left <= 1.0)) {
+    reject(fmt::format("{}: missing_left {} must lie between 0 and 1", where, node.missing_left));
+  }
+  if (node.inverse_gram.size() > 0 && (node.inverse_gram.rows() != regressors + 1 ||
+                                       node.inverse_gram.cols() != regressors + 1 || !node.inverse_gram.allFinite())) {
+    reject(fmt::format("{}: inverse_gram must be finite, {} x {}", where, regressors + 1, regressors + 1));
+  }
+  if (!node.value.allFinite() || !node.slope.allFinite() || !node.rss.allFinite() || !std::isfinite(node.threshold)) {
+    reject(fmt::format("{}: a number is not finite", where));
+  }
+  if (node.samples < 0 || node.rank < 0 || (node.rss.array() < 0.0).any()) {
+    reject(fmt::format("{}: samples, rank and rss cannot be negative", where));
+  }
+  if (node.is_leaf()) {
+    if (node.shared_with >= 0) {
+      check_shared(partition, index, where);
+    }
+    if (node.right >= 0) {
+      reject(fmt::format("{}: it has a right child and no left one", where));
+    }
+    return;
+  }
+  if (node.shared_with >= 0) {
+    reject(fmt::format("{}: it is no leaf and shares the local model of node {}", where, node.shared_with));
+  }
+  // The k-th split makes nodes 2k-1 and 2k, after their parent.
+  if (node.left % 2 != 1 || node.right != node.left + 1 || node.left <= index ||
+      node.right >= std::ssize(partition.nodes)) {
+    reject(fmt::format("{}: the children {} and {} are not in order of growth", where, node.left, node.right));
+  }
+  if (node.split_input < 0 || node.split_input >= std::ssize(inputs)) {
+    reject(
+        fmt::format("{}: split input {} does not exist, there are {} inputs", where, node.split_input, inputs.size()));
+  }
+  const InputColumn& input = inputs[static_cast<std::size_t>(node.split_input)];
+  if (node.level_side.size() != input.levels.size()) {
+    reject(fmt::format("{}: {} sides for the {} levels of \"{}\"", where, node.level_side.size(), input.levels.size(),
+                       input.name));
+  }
+  check_direction(node, inputs, where);
+  if (std::any_of(node.level_side.begin(), node.level_side.end(), [](int side) { return side < -1 || side > 1; })) {
+    reject(fmt::format("{}: the side of a level must be -1, 0 or 1", where));
+  }
+}
+
+void check_partition(const Partition& partition, const std::vector<InputColumn>& inputs, std::ptrdiff_t regressors,
+                     const std::string& where) {
+  const Validity& validity = partition.validity;
+  if (!(validity.width >= 0.0 && std::isfinite(validity.width)) ||
+      (validity.smoothness != 1 && validity.smoothness != 2)) {
+    reject(fmt::format("{}: the width {} must be finite and not negative, the smoothness {} 1 or 2", where,
+                       validity.width, validity.smoothness));
+  }
+  if (partition.outputs.empty() || partition.nodes.empty() || partition.nodes.size() % 2 == 0) {
+    reject(fmt::format("{}: it needs an output and an odd number of nodes", where));
+  }
+  if (validity.kind == ValidityKind::gaussian &&
+      std::any_of(partition.nodes.begin(), partition.nodes.end(), [](const Node& node) { return node.is_oblique(); })) {
+    reject(fmt::format("{}: Gaussians need boxes, and a node has a direction", where));
+  }
+  if (partition.outer_slope.size() > 0 &&
+      (partition.outer_slope.rows() != std::ssize(partition.outputs) || partition.outer_slope.cols() != regressors ||
+       !partition.outer_slope.allFinite())) {
+    reject(fmt::format("{}: outer_slope must be finite, {} x {}", where, partition.outputs.size(), regressors));
+  }
+  if (partition.residual_range.size() > 0 &&
+      (partition.residual_range.rows() != std::ssize(partition.outputs) || partition.residual_range.cols() != 2 ||
+       !partition.residual_range.allFinite() ||
+       (partition.residual_range.col(0).array() > partition.residual_range.col(1).array()).any())) {
+    reject(fmt::format("{}: residual_range must be finite, {} x 2, low <= high", where, partition.outputs.size()));
+  }
+  std::vector<bool> has_parent(partition.nodes.size(), false);
+  for (std::size_t i = 0; i < partition.nodes.size(); ++i) {
+    check_node(partition, static_cast<std::ptrdiff_t>(i), inputs, regressors, fmt::format("{} node {}", where, i));
+    const Node& node = partition.nodes[i];
+    if (!node.is_leaf()) {
+      if (has_parent[static_cast<std::size_t>(node.left)]) {
+        reject(fmt::format("{} node {}: it has two parents", where, node.left));
+      }
+      has_parent[static_cast<std::size_t>(node.left)] = true;
+      has_parent[static_cast<std::size_t>(node.right)] = true;
+    }
+  }
+  if (std::find(has_parent.begin() + 1, has_parent.end(), false) != has_parent.end()) {
+    reject(fmt::format("{}: a node has no parent", where));
+  }
+}
+
+/// Nodes of the leaves from left to right, with their boxes.
+void collect_leaves(const Partition& partition, int index, Leaf box, const std::vector<InputColumn>& inputs,
+                    const std::vector<Regressor>& regressors, std::vector<Leaf>& leaves) {
+  const Node& node = partition.nodes[static_cast<std::size_t>(index)];
+  if (!node.is_leaf()) {
+    Leaf right = box;
+    if (node.is_oblique()) {
+      box.sides.push_back({index, true});
+      right.sides.push_back({index, false});
+    } else if (node.level_side.empty()) {
+      box.high(node.split_input) = std::min(box.high(node.split_input), node.threshold);
+      right.low(node.split_input) = std::max(right.low(node.split_input), node.threshold);
+    } else {
+      const std::size_t input = static_cast<std::size_t>(node.split_input);
+      std::vector<int> all = box.levels[input];
+      if (all.empty()) {
+        for (int level = 0; level < std::ssize(node.level_side); ++level) {
+          all.push_back(level);
+        }
+      }
+      const auto keep = [&](std::vector<int>& kept, int side) {
+        kept.clear();
+        std::copy_if(all.begin(), all.end(), std::back_inserter(kept),
+                     [&](int level) { return node.level_side[static_cast<std::size_t>(level)] == side; });
+      };
+      keep(box.levels[input], -1);
+      keep(right.levels[input], 1);
+    }
+    collect_leaves(partition, node.left, std::move(box), inputs, regressors, leaves);
+    collect_leaves(partition, node.right, std::move(right), inputs, regressors, leaves);
+    return;
+  }
+  box.node = index;
+  box.samples = node.samples;
+  box.rank = node.rank;
+  box.rmse = (node.rss / static_cast<double>(std::max<std::ptrdiff_t>(node.samples, 1))).cwiseSqrt();
+  box.slope = node.slope;
+  box.intercept = node.value;
+  for (std::size_t k = 0; k < regressors.size(); ++k) {
+    box.intercept -= node.slope.col(static_cast<std::ptrdiff_t>(k)) * regressors[k].centre;
+  }
+  leaves.push_back(std::move(box));
+}
+
+}  // namespace
+
+Model::Model(std::vector<InputColumn> inputs, std::vector<OutputColumn> outputs, std::vector<Regressor> regressors,
+             std::vector<Partition> partitions)
+    : inputs_(std::move(inputs)),
+      outputs_(std::move(outputs)),
+      regressors_(std::move(regressors)),
+      partitions_(std::move(partitions)) {
+  if (inputs_.empty() || outputs_.empty()) {
+    reject(fmt::format("it has {} inputs and {} outputs, both must be at least 1", inputs_.size(), outputs_.size()));
+  }
+  for (const InputColumn& input : inputs_) {
+    if (!(std::isfinite(input.low) && std::isfinite(input.centre) && std::isfinite(input.high) &&
+          input.low <= input.high)) {
+      reject(fmt::format("input \"{}\": low {}, centre {} and high {} must be finite and low <= high", input.name,
+                         input.low, input.centre, input.high));
+    }
+  }
+  for (const OutputColumn& output : outputs_) {
+    if (!(std::isfinite(output.low) && std::isfinite(output.high) && output.low <= output.high)) {
+      reject(fmt::format("output \"{}\": low {} and high {} must be finite and low <= high", output.name, output.low,
+                         output.high));
+    }
+  }
+  for (const Regressor& regressor : regressors_) {
+    const bool exists = regressor.input >= 0 && regressor.input < num_inputs();
+    const std::ptrdiff_t levels = exists ? std::ssize(inputs_[static_cast<std::size_t>(regressor.input)].levels) : 0;
+    if (!exists || regressor.level < -1 || regressor.level >= levels || (regressor.level < 0 && levels > 0) ||
+        !std::isfinite(regressor.centre)) {
+      reject(fmt::format("regressor of input {}, level {}, centre {}: no such input or level, or not finite",
+                         regressor.input, regressor.level, regressor.centre));
+    }
+    const int second = regressor.second_input;
+    if (second != -1 && (second < regressor.input || second >= num_inputs() || regressor.level >= 0 ||
+                         inputs_[static_cast<std::size_t>(second)].is_categorical())) {
+      reject(
+          fmt::format("regressor of inputs {} and {}: a product is of two numeric inputs, the second not below the "
+                      "first",
+                      regressor.input, second));
+    }
+  }
+  std::vector<int> served;
+  for (std::size_t i = 0; i < partitions_.size(); ++i) {
+    check_partition(partitions_[i], inputs_, std::ssize(regressors_), fmt::format("partition {}", i));
+    served.insert(served.end(), partitions_[i].outputs.begin(), partitions_[i].outputs.end());
+  }
+  check_columns("llmt::Model", "outputs of the partitions", served, num_outputs());
+  if (std::ssize(served) != num_outputs()) {
+    reject(fmt::format("{} of {} outputs have a partition", served.size(), num_outputs()));
+  }
+  std::vector<Evaluator> evaluators;
+  for (const Partition& partition : partitions_) {
+    evaluators.emplace_back(partition, inputs_, std::ssize(regressors_));
+  }
+  evaluators_ = std::make_shared<const std::vector<Evaluator>>(std::move(evaluators));
+}
+
+std::vector<Leaf> Model::leaves(std::ptrdiff_t partition) const {
+  if (partition < 0 || partition >= std::ssize(partitions_)) {
+    throw std::invalid_argument(
+        fmt::format("llmt::Model::leaves: partition is {}, the model has {}", partition, partitions_.size()));
+  }
+  Leaf everywhere;
+  everywhere.low = Eigen::VectorXd::Constant(num_inputs(), -infinity);
+  everywhere.high = Eigen::VectorXd::Constant(num_inputs(), infinity);
+  everywhere.levels.resize(inputs_.size());
+  std::vector<Leaf> result;
+  const std::vector<Node>& nodes = partitions_[static_cast<std::size_t>(partition)].nodes;
+  collect_leaves(partitions_[static_cast<std::size_t>(partition)], 0, everywhere, inputs_, regressors_, result);
+  std::vector<int> number(nodes.size(), -1);
+  int next = 0;
+  for (Leaf& leaf : result) {
+    const int shared = nodes[static_cast<std::size_t>(leaf.node)].shared_with;
+    int& own = number[static_cast<std::size_t>(shared >= 0 ? shared : leaf.node)];
+    own = own < 0 ? next++ : own;
+    leaf.local_model = own;
+  }
+  return result;
+}
+
+std::ptrdiff_t Partition::num_local_models() const {
+  return num_leaves() -
+         std::count_if(nodes.begin(), nodes.end(), [](const Node& node) { return node.shared_with >= 0; });
+}
+
+Partition prefix(const Partition& partition, std::ptrdiff_t max_leaves) {
+  if (max_leaves < 1) {
+    throw std::invalid_argument(fmt::format("llmt::prefix: max_leaves is {}, it must be at least 1", max_leaves));
+  }
+  const std::ptrdiff_t kept = 2 * std::min(max_leaves, partition.num_leaves()) - 1;
+  Partition result{.outputs = partition.outputs,
+                   .validity = partition.validity,
+                   .nodes = {partition.nodes.begin(), partition.nodes.begin() + kept},
+                   .outer_slope = partition.outer_slope,
+                   .residual_range = partition.residual_range};
+  for (Node& node : result.nodes) {
+    if (node.left >= kept) {
+      make_leaf(node);
+    }
+  }
+  if (result.nodes.size() < partition.nodes.size() && partition.num_local_models() < partition.num_leaves()) {
+    // Fewer leaves may share a local model, in a smaller subtree, and its range must not be wider than that's.
+    const std::vector<int> parents = model_parents_of(result);
+    for (std::size_t i = 1; i < result.nodes.size(); ++i) {
+      const Node& above = result.nodes[static_cast<std::size_t>(parents[i])];
+      result.nodes[i].low = result.nodes[i].low.cwiseMax(above.low);
+      result.nodes[i].high = result.nodes[i].high.cwiseMin(above.high);
+    }
+  }
+  return result;
+}
+
+Model Model::prefix(std::ptrdiff_t max_leaves) const {
+  std::vector<Partition> partitions;
+  for (const Partition& partition : partitions_) {
+    partitions.push_back(llmt::prefix(partition, max_leaves));
+  }
+  return {inputs_, outputs_, regressors_, std::move(partitions)};
+}
+
+Model Model::named(const std::vector<std::string>& inputs, const std::vector<std::string>& outputs,
+                   const std::vector<std::vector<std::string>>& levels) const {
+  if (std::ssize(inputs) != num_inputs() || std::ssize(outputs) != num_outputs()) {
+    throw std::invalid_argument(
+        fmt::format("llmt::Model::named: {} input and {} output names for {} inputs and {} outputs", inputs.size(),
+                    outputs.size(), num_inputs(), num_outputs()));
+  }
+  Model result = *this;
+  for (std::size_t i = 0; i < inputs.size(); ++i) {
+    result.inputs_[i].name = inputs[i];
+  }
+  for (std::size_t i = 0; i < levels.size(); ++i) {
+    if (i >= inputs.size() || levels[i].size() != inputs_[i].levels.size()) {
+      throw std::invalid_argument(fmt::format("llmt::Model::named: {} level names for input {}, which has {} levels",
+                                              levels[i].size(), i, i < inputs_.size() ? inputs_[i].levels.size() : 0));
+    }
+    result.inputs_[i].levels = levels[i];
+  }
+  for (std::size_t o = 0; o < outputs.size(); ++o) {
+    result.outputs_[o].name = outputs[o];
+  }
+  return result;
+}
+
+}  // namespace llmt

@@ -1,0 +1,41 @@
+/// \file
+/// What a selection compares, and what it returns.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "data/dataset.hpp"
+#include "estimation/estimate.hpp"
+
+namespace llmt {
+
+/// What a fold trains on, and what it holds out.
+struct FoldRows {
+  TrainingRows training;
+  TrainingRows held_out;
+};
+
+/// What the candidates are.
+struct Candidates {
+  bool crisp = true;
+  ValidityKind kind = ValidityKind::blend;  ///< of the others
+  Estimation estimation = Estimation::joint;
+  int smoothness = 1;
+  std::vector<double> widths;  ///< empty: crisp alone
+  std::vector<double> jumps;   ///< see Candidate::jump; none first
+  std::vector<double> ridges;
+  std::vector<double> shrinkages;
+  std::vector<bool> sparse = {false};  ///< see Candidate::sparse
+  bool merge_leaves = false;           ///< see GrowthOptions::merge_leaves
+};
+
+struct Selection {
+  CandidateError chosen;
+  std::vector<CandidateError> best_of_kind;
+  Eigen::VectorXd crisp_rmse;
+  std::ptrdiff_t held_out_rows = 0;  ///< that errors are from
+  std::vector<Partition> made;       ///< the chosen candidate in every fold, if it had to be made; else empty
+};
+
+}  // namespace llmt
