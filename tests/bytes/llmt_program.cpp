@@ -37,7 +37,7 @@ void write_tables(const std::string& folder) {
   }
   llmt::write_file(folder + "/s.csv", to_csv({"a", "b", "t", "y"}, simulated));
   llmt::write_file(folder + "/m.csv", to_csv({"a", "b", "t", "y"}, measured));
-  llmt::write_file(folder + "/own.txt", "product = a * b\n");
+  llmt::write_file(folder + "/own.txt", "a_times_b = a * b\n");
 }
 
 }  // namespace
@@ -60,7 +60,7 @@ void witness_llmt(const std::string& folder, Results& results) {
               {"mixed.json"});
   add("fit_hilomot", "fit plain.csv -t y --ignore z --cv 3 --rule hilomot -o gates.json --json", {"gates.json"});
   add("fit_m5", "fit plain.csv -t y --ignore z --cv 3 --rule m5 -o m5.json --json", {"m5.json"});
-  add("fit_monotone", "fit plain.csv -t y --ignore z --cv 3 --monotone +a --json");
+  add("fit_monotone", "fit plain.csv -t y --ignore z --cv 3 --monotone a --slope-sign=-c --json");
   add("fit_stream", "fit plain.csv -t y --ignore z --stream -o stream.json --json", {"stream.json"});
   add_threads("predict", "predict plain.json queries.csv --json", {});
   add_threads("predict_to_file", "predict two.json queries.csv --interval 0.8 -o predicted.csv --json",

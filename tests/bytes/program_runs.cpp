@@ -45,8 +45,8 @@ std::string run_and_hash(const std::string& folder, const std::string& command, 
       std::system(("cd '" + folder + "' && " + command + " >stdout.txt 2>stderr.txt </dev/null").c_str());
   const int exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
   std::string text = "exit:" + std::to_string(exit_code);
-  if (exit_code != 0) return text;
   const std::string json = without_times(llmt::read_file((path / "stdout.txt").string()));
+  if (json.empty()) return text;
   text += " json:" + hash_of(json) + " numbers:" + hash_of(without_words(json));
   for (const std::string& file : files) {
     const bool written = std::filesystem::exists(path / file);

@@ -6,7 +6,7 @@
 
 namespace bytes {
 
-/// Runs `command` with a shell in `folder`. The result has its exit code, and unless the program refused:
+/// Runs `command` with a shell in `folder`. The result has its exit code, and where the program printed something:
 /// - json: standard output, without the members whose names end with "seconds" or "seconds_per_million_rows";
 /// - numbers: the same without the text of strings that are values, so that a message put in other words changes json
 ///   alone;
