@@ -70,7 +70,7 @@ Json candidate_json(const CandidateError& entry) {
           {"shrinkage", entry.candidate.shrinkage},
           {"sparse", entry.candidate.sparse},
           {"leaves", entry.candidate.leaves},
-          {"local_models", entry.candidate.local_models > 0 ? entry.candidate.local_models : entry.candidate.leaves},
+          {"local_models", entry.candidate.leaves},
           {"cv_rmse", or_null(entry.rmse)},
           {"spread", or_null(entry.spread)}};
 }
@@ -99,7 +99,7 @@ Json summary_json(const FitArguments& arguments, const FitResult& result) {
       entry["train_rmse"].push_back(partition.train_rmse(static_cast<std::ptrdiff_t>(o)));
     }
     entry["leaves"] = partition.leaves;
-    entry["local_models"] = partition.local_models;
+    entry["local_models"] = partition.leaves;  // one each
     entry["grown_leaves"] = partition.grown_leaves;
     entry["coefficients"] = partition.coefficients;
     entry["rank_deficient_leaves"] = partition.rank_deficient_leaves;
@@ -203,10 +203,7 @@ void print_summary(const FitArguments& arguments, const FitResult& result) {
   for (const PartitionSummary& partition : result.summary.partitions) {
     for (std::size_t o = 0; o < partition.outputs.size(); ++o) {
       const std::string& target = result.model.outputs()[static_cast<std::size_t>(partition.outputs[o])].name;
-      table.add({target, describe(partition.chosen.candidate),
-                 partition.local_models < partition.leaves
-                     ? fmt::format("{} in {} models", partition.leaves, partition.local_models)
-                     : fmt::format("{}", partition.leaves),
+      table.add({target, describe(partition.chosen.candidate), fmt::format("{}", partition.leaves),
                  number(partition.chosen.rmse), number(partition.chosen.spread, 2),
                  number(partition.train_rmse(static_cast<std::ptrdiff_t>(o)))});
       if (o > 0) {
@@ -216,8 +213,7 @@ void print_summary(const FitArguments& arguments, const FitResult& result) {
       for (const CandidateError& other : partition.best_of_kind) {
         const Candidate& candidate = other.candidate;
         if (candidate.validity.kind != chosen.validity.kind || candidate.validity.width != chosen.validity.width ||
-            candidate.jump != chosen.jump || candidate.leaves != chosen.leaves ||
-            candidate.local_models != chosen.local_models) {
+            candidate.jump != chosen.jump || candidate.leaves != chosen.leaves) {
           table.add({"  against", describe(candidate), fmt::format("{}", candidate.leaves), number(other.rmse),
                      number(other.spread, 2), ""});
         }

@@ -88,12 +88,11 @@ void check_m5(const FitOptions& options) {
   }
   require(options.growth.min_improvement == 0.0, "growth.min_improvement", options.growth.min_improvement,
           "0 with growth.rule m5, which prunes");
-  if (options.growth.pruning != Pruning::last_splits || options.growth.merge_leaves ||
-      options.local_models.terms != LocalTerms::linear || options.local_models.sparse != SparseChoice::never) {
+  if (options.growth.pruning != Pruning::last_splits || options.local_models.terms != LocalTerms::linear ||
+      options.local_models.sparse != SparseChoice::never) {
     throw std::invalid_argument(
-        "llmt::fit: growth.pruning, growth.merge_leaves, local_models.terms and local_models.sparse must be as they "
-        "are "
-        "by default with growth.rule m5, which has its own local models and pruning");
+        "llmt::fit: growth.pruning, local_models.terms and local_models.sparse must be as they are by default with "
+        "growth.rule m5, which has its own local models and pruning");
   }
 }
 
@@ -166,16 +165,9 @@ void check_options(const FitOptions& options, std::ptrdiff_t inputs) {
           "local_models.sparse", static_cast<double>(options.local_models.sparse),
           "never where blend.estimation is as_grown, for those models are full");
   if ((!options.monotone.empty() || !options.slope_signs.empty()) &&
-      (options.local_models.sparse != SparseChoice::never || options.growth.merge_leaves)) {
-    throw std::invalid_argument(
-        "llmt::fit: monotone and slope_signs need local_models.sparse never and no growth.merge_leaves");
+      options.local_models.sparse != SparseChoice::never) {
+    throw std::invalid_argument("llmt::fit: monotone and slope_signs need local_models.sparse never");
   }
-  if (options.growth.merge_leaves && is_hilomot(options.growth.rule)) {
-    throw std::invalid_argument(
-        "llmt::fit: growth.merge_leaves needs leaves that are boxes, those of rule hilomot are not");
-  }
-  require(!options.growth.merge_leaves || options.selection.folds.count > 0, "selection.folds.count",
-          options.selection.folds.count, "at least 2 for growth.merge_leaves");
   if (options.growth.rule == GrowthRule::m5) {
     check_m5(options);
   }

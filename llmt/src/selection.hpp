@@ -27,7 +27,6 @@ struct Candidates {
   std::vector<double> ridges;
   std::vector<double> shrinkages;
   std::vector<bool> sparse = {false};  ///< see Candidate::sparse
-  bool merge_leaves = false;           ///< see GrowthOptions::merge_leaves
 };
 
 struct Selection {

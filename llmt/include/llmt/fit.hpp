@@ -128,10 +128,6 @@ struct GrowthOptions {
   /// error. RETIS undoes those that its m-estimates reject before. With weakest_link and folds a crisp tree has other
   /// defaults: `significance` no test, so that splits that only help later ones stay, `max_leaves` 1000.
   Pruning pruning = Pruning::last_splits;
-  /// Leaves whose boxes touch, siblings or not, may share one local model: of every such pair the one whose shared
-  /// model raises the sum of squares least is merged, and so on; how often is chosen by the held-out error, in every
-  /// fold on the tree grown there. Needs folds.
-  bool merge_leaves = false;
 };
 
 /// See GrowthOptions::min_improvement. One split alone may help little before the next one helps much.
@@ -248,7 +244,6 @@ struct Candidate {
   double shrinkage = 0.0;  ///< see BlendOptions::shrinkages
   bool sparse = false;     ///< see SparseChoice
   std::ptrdiff_t leaves = 1;
-  std::ptrdiff_t local_models = 0;  ///< after merging; 0: as many as leaves
 };
 
 /// A candidate and what it left on rows that took no part.
@@ -282,9 +277,7 @@ struct PartitionSummary {
   std::ptrdiff_t coefficients = 0;  ///< of all leaves, for one output: constants and slopes that are not 0
   Eigen::VectorXd train_rmse;       ///< one per output of the partition
   CandidateError chosen;            ///< errors NaN without folds
-  std::ptrdiff_t local_models = 0;  ///< of these leaves, fewer if some share one
-  /// What it was chosen against: least squares first, then the best of each validity and width, all without shared
-  /// local models. Empty without folds.
+  /// What it was chosen against: least squares first, then the best of each validity and width. Empty without folds.
   /// For many rows the errors of all blends but the best one are of models made from samples of the training rows.
   std::vector<CandidateError> best_of_kind;
   /// Held-out RMSE of the crisp prefixes with 1, 2, ... leaves; empty without folds.
@@ -329,7 +322,7 @@ struct FitResult {
 /// infinite input or an output that is not finite, an option out of range, a column index out of range or repeated, a
 /// category that is not a whole number from 0 on, more than 13 numeric regression inputs for quadratic local models,
 /// sparse ones with Estimation::as_grown where leaves overlap, a sign other than -1, 0, 1 or of a categorical input,
-/// signs with sparse or shared local models.
+/// signs with sparse local models.
 FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<const Eigen::MatrixXd>& outputs,
               const FitOptions& options = {});
 
