@@ -21,14 +21,12 @@ struct FitArguments {
   bool json = false;
   bool no_intervals = false;
   bool stream = false;
-  StreamRule stream_rule = StreamRule::rd;
 };
 
 constexpr std::array<const char*, 7> rule_names = {"rd", "retis", "lolimot", "lolimot-data",
                                                    "ra", "m5",    "hilomot"};                  // as GrowthRule
 constexpr std::array<const char*, 4> validity_names = {"auto", "crisp", "blend", "gaussian"};  // as ValidityChoice
 constexpr std::array<const char*, 3> search_names = {"auto", "exact", "binned"};               // as SplitSearch
-constexpr std::array<const char*, 2> stream_rule_names = {"rd", "ra"};                         // as StreamRule
 constexpr std::array<const char*, 3> estimation_names = {"as-grown", "local", "joint"};        // as Estimation
 constexpr std::array<const char*, 3> terms_names = {"linear", "quadratic", "auto"};            // as LocalTerms
 constexpr std::array<const char*, 3> sparse_names = {"never", "auto", "always"};               // as SparseChoice
@@ -335,16 +333,10 @@ void add_fit(CLI::App& app) {
                     "Leave the folds' models out of the file; it is smaller and has no prediction intervals");
   command->add_flag("--json", arguments->json, "Print the summary as JSON");
   command->add_flag("--stream", arguments->stream, "Learn row by row in constant memory; DATA - is standard input");
-  command->add_option("--stream-rule", arguments->stream_rule, "How leaves of a stream find splits")
-      ->transform(choice_of<StreamRule>(stream_rule_names))
-      ->option_text("rd|ra [rd]");
   command->callback([command, arguments] {
     if (arguments->stream) {
-      stream_command(*command, {arguments->learning, arguments->stream_rule, arguments->output, arguments->json});
+      stream_command(*command, {arguments->learning, arguments->output, arguments->json});
       return;
-    }
-    if (command->count("--stream-rule") > 0) {
-      throw std::invalid_argument("--stream-rule needs --stream");
     }
     fit_command(*arguments);
   });

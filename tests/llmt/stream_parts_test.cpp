@@ -20,7 +20,6 @@ namespace {
 
 using llmt::GramShape;
 using llmt::StreamOptions;
-using llmt::StreamRule;
 using namespace stream_data;
 
 llmt::StreamSetting setting_for(std::ptrdiff_t inputs, StreamOptions options = {}) {
