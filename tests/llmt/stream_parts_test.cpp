@@ -118,7 +118,7 @@ TEST(StreamSearch, EveryEdgeLeavesWhatBruteForceRefitsLeave) {
   for (std::ptrdiff_t i = 0; i < x.rows(); ++i) {
     const Eigen::VectorXd row = x.row(i).transpose();
     products.set(basis, row.data(), y(i, 0), 1.0);
-    search.add({row.data(), row.data(), y(i, 0), 1.0, 1.0}, basis, products, 0.0);
+    search.add({row.data(), row.data(), y(i, 0), 1.0, 1.0}, basis, products);
   }
   for (int input = 0; input < 3; ++input) {
     const llmt::LeafSearch::Edges edges = search.edges(input);
