@@ -154,9 +154,6 @@ TEST(Fit, ThresholdLiesWhereTheChildModelsMeet) {
   }
   const llmt::Model closest = llmt::fit(x, y, as_grown({.max_leaves = 2})).model;
   EXPECT_NEAR(closest.partitions()[0].nodes[0].threshold, 0.37, 1e-12);
-  const llmt::Model midpoint =
-      llmt::fit(x, y, as_grown({.max_leaves = 2, .threshold = llmt::ThresholdPlacement::midpoint})).model;
-  EXPECT_NEAR(midpoint.partitions()[0].nodes[0].threshold, 0.35, 1e-12);
 }
 
 TEST(Fit, ThresholdOfAJumpIsInTheMiddleOfItsGap) {

@@ -17,8 +17,9 @@
 namespace llmt {
 
 /// When a leaf is split, and how the tree is pruned. RD and RETIS look at every threshold of every split input and take
-/// the one with the smallest residual sum of squares of the two child models; with RA they grow best-first: the split
-/// that lowers it most comes next.
+/// the one with the smallest residual sum of squares of the two child models. That sum is the same anywhere in the gap
+/// between two training values; the threshold goes where the child models meet, or in the middle if they do not meet in
+/// the gap. RD, RETIS and RA grow best-first: the split that lowers the sum most comes next.
 enum class GrowthRule {
   /// Batch-RD (Potts & Sammut 2005): a split must pass the F test of Chow (1960),
   ///   F = [(RSS_0 - RSS_1 - RSS_2) / (p_1 + p_2 - p_0)] / [(RSS_1 + RSS_2) / (N - p_1 - p_2)]
@@ -50,14 +51,6 @@ enum class GrowthRule {
   /// BlendOptions::widths (of the gates, 1: as grown) and Estimation as lolimot does; ValidityChoice automatic or
   /// crisp. Without folds and GrowthOptions::max_leaves AICc decides how many leaves stay.
   hilomot
-};
-
-/// Where in the gap between two training values a threshold is put. The residual sum of squares is the same anywhere in
-/// the gap. LOLIMOT and M5' take the middle.
-enum class ThresholdPlacement {
-  closest,  ///< where the regression of the child models' difference on the split input, over the node's rows, is
-            ///< zero; halfway if that is not in the gap
-  midpoint  ///< halfway
 };
 
 /// How RD and RETIS search the best split of a node.
@@ -122,7 +115,6 @@ struct GrowthOptions {
   /// Columns that may be split, and columns that local models use. Empty: all.
   std::vector<int> split_inputs = {};
   std::vector<int> regression_inputs = {};
-  ThresholdPlacement threshold = ThresholdPlacement::closest;
   SplitSearch search = SplitSearch::automatic;
   /// Order in which splits are undone: down to max_leaves from three times as many (not LOLIMOT), then by held-out
   /// error. RETIS undoes those that its m-estimates reject before. With weakest_link and folds a crisp tree has other
