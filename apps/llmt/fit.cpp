@@ -326,8 +326,6 @@ void add_fit(CLI::App& app) {
   command->add_option("--shrinkage", blend.shrinkages, "Shrinkages to choose from: towards the parent's model, in rows")
       ->delimiter(',')
       ->option_text("FLOAT,... [0,0.1,1]");
-  command->add_option("--smoothness", blend.smoothness, "Continuous derivatives of a blend, 1 or 2")
-      ->capture_default_str();
   command->add_option("-o,--output", arguments->output, "Model file to write");
   command->add_flag("--no-intervals", arguments->no_intervals,
                     "Leave the folds' models out of the file; it is smaller and has no prediction intervals");

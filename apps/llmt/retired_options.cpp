@@ -15,10 +15,11 @@ struct RetiredOption {
   const char* advice;  // why it was retired, and what to use
 };
 
-constexpr std::array<RetiredOption, 2> retired_options = {{
+constexpr std::array<RetiredOption, 3> retired_options = {{
     {"--merge",
      "leaves that shared a local model predicted at most 3 % better; --prune makes trees smaller, and files with "
      "shared local models can still be read"},
+    {"--smoothness", "blends have one continuous derivative; files of blends with two can still be read"},
     {"--stream-rule",
      "residual analysis in streams left an error of 0.84 where residual differences leave 0.39; streams always take "
      "the latter"},

@@ -211,7 +211,7 @@ FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<
       candidate.shrinkage = plan.candidates.shrinkages.front();
       candidate.sparse = plan.candidates.sparse.front();
       if (!plan.candidates.widths.empty()) {
-        candidate.validity = {plan.candidates.kind, plan.candidates.widths.front(), plan.candidates.smoothness};
+        candidate.validity = {plan.candidates.kind, plan.candidates.widths.front()};
         candidate.jump = plan.candidates.jumps.front();
         candidate.estimation = plan.candidates.estimation;
         candidate.ridge = plan.candidates.ridges.empty() ? 0.0 : plan.candidates.ridges.front();

@@ -73,7 +73,6 @@ void check_blend(const BlendOptions& options) {
   for (const double jump : options.jumps) {
     require(jump >= 0.0, "blend.jumps", jump, "not negative");
   }
-  require(options.smoothness == 1 || options.smoothness == 2, "blend.smoothness", options.smoothness, "1 or 2");
 }
 
 /// M5' has models of its own: dropped inputs, smoothing along the path. Estimating them anew would undo it.

@@ -21,7 +21,6 @@ struct Candidates {
   bool crisp = true;
   ValidityKind kind = ValidityKind::blend;  ///< of the others
   Estimation estimation = Estimation::joint;
-  int smoothness = 1;
   std::vector<double> widths;  ///< empty: crisp alone
   std::vector<double> jumps;   ///< see Candidate::jump; none first
   std::vector<double> ridges;

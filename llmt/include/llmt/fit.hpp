@@ -161,7 +161,6 @@ struct BlendOptions {
   /// column has in the leaf and without correlation: a guard against near-collinear columns and few rows. Empty: 0, 0.1
   /// and 1; 0 without folds.
   std::vector<double> shrinkages = {};
-  int smoothness = 1;  ///< continuous derivatives of blends, 1 or 2
 };
 
 /// What local models are made of.

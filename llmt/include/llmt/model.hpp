@@ -35,7 +35,7 @@ struct Validity {
   /// smaller child), for splits on numbers; gaussian: k_sigma; logistic: h as a multiple of that of growth. 0 for
   /// crisp.
   double width = 0.0;
-  int smoothness = 1;  ///< blend: continuous derivatives of the prediction, 1 or 2
+  int smoothness = 1;  ///< blend: continuous derivatives of the prediction; 2 is in files of earlier versions alone
 };
 
 /// One node of a partition's tree, inner or leaf. Inner nodes keep a local model of their own.
