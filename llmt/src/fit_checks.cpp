@@ -50,7 +50,6 @@ std::vector<int> all_columns(std::ptrdiff_t count) {
 void check_growth(const GrowthOptions& options, std::ptrdiff_t inputs) {
   require(std::isfinite(options.significance), "growth.significance", options.significance, "finite");
   require(std::isfinite(options.min_variance_gain), "growth.min_variance_gain", options.min_variance_gain, "finite");
-  require(options.pruning_m >= 0.0, "growth.pruning_m", options.pruning_m, "at least 0");
   require(options.min_leaf_samples >= 0, "growth.min_leaf_samples", static_cast<double>(options.min_leaf_samples),
           "at least 0");
   require(options.max_leaves >= 0, "growth.max_leaves", static_cast<double>(options.max_leaves), "at least 0");
@@ -254,7 +253,7 @@ std::vector<Fold> selection_folds(std::ptrdiff_t rows, const SelectionOptions& s
     return {};
   }
   std::vector<Fold> folds = make_folds(rows, options);
-  if (rows >= selection.single_hold_out_rows) {
+  if (rows >= single_hold_out_rows) {
     folds.resize(1);
   }
   return folds;

@@ -30,6 +30,7 @@ struct StreamSetting {
   double rounding = 0.0;         ///< residuals below this are rounding
   Eigen::VectorXd centre;        ///< of the inputs: z = (x - centre) / scale
   Eigen::VectorXd scale;
+  bool detect_drift = true;  ///< off in tests of what streams do without it
 
   std::ptrdiff_t coefficients() const { return inputs + 1; }
   double scaled(std::ptrdiff_t input, double x) const { return (x - centre(input)) / scale(input); }

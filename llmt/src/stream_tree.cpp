@@ -161,7 +161,7 @@ double StreamTree::predict(const StreamNode& top, const StreamRow& row) {
   return value_of(*node, row.z);
 }
 
-double StreamTree::learn(const StreamRow& row) { return learn(root_, row, !setting_.options.detect_drift); }
+double StreamTree::learn(const StreamRow& row) { return learn(root_, row, !setting_.detect_drift); }
 
 /// `watched`: an alternate grows at or above the node already, no alarm is needed.
 double StreamTree::learn(std::unique_ptr<StreamNode>& slot, const StreamRow& row, bool watched) {

@@ -96,8 +96,6 @@ struct GrowthOptions {
   /// rd, ra: smallest decrease of the residual variance, as a fraction of the variance of the output. 0: any decrease;
   /// negative: no demand.
   double min_variance_gain = 0.0;
-  /// retis: weight m of the prior (the error of one model for all data) in the m-estimates, in rows. 0: no pruning.
-  double pruning_m = 2.0;
   /// Smallest number of rows in a leaf. 0: twice the number of coefficients of a local model for a crisp tree, 2 for
   /// M5'; where blends are among the candidates as many as regressors, at least 5.
   std::ptrdiff_t min_leaf_samples = 0;
@@ -105,7 +103,7 @@ struct GrowthOptions {
   /// many as make 1500 coefficients, within 20 ... 400.
   std::ptrdiff_t max_leaves = 0;
   /// Growth ends when further splits lower the residual sum of squares of the whole tree by less than this fraction
-  /// each, in the geometric mean over the next `improvement_lookahead` splits of best-first growth; those are not kept.
+  /// each, in the geometric mean over the next ten splits of best-first growth; those are not kept.
   /// Benes et al. (2022) stop at "less than 2 %" without saying of what; this is our reading, docs/algorithms.md gives
   /// the reason. 0: off. Not for M5', which prunes.
   double min_improvement = 0.0;
@@ -121,9 +119,6 @@ struct GrowthOptions {
   /// defaults: `significance` no test, so that splits that only help later ones stay, `max_leaves` 1000.
   Pruning pruning = Pruning::last_splits;
 };
-
-/// See GrowthOptions::min_improvement. One split alone may help little before the next one helps much.
-inline constexpr std::ptrdiff_t improvement_lookahead = 10;
 
 /// What the local models of a partition are fitted to.
 enum class Estimation {
@@ -195,10 +190,9 @@ struct LocalModelOptions {
 /// held-out rows best is taken; but least squares stays if the gain on it is not more than two standard errors of the
 /// folds' paired differences, for the best of many candidates gains a little on noise too.
 struct SelectionOptions {
-  FoldOptions folds = {};  ///< folds.count = 0: no choice, the tree stays as grown. Fewer groups than folds: one fold
-                           ///< per group.
-  /// From this many rows on, one fold is held out once instead of every fold in turn.
-  std::ptrdiff_t single_hold_out_rows = 50000;
+  /// count = 0: no choice, the tree stays as grown. Fewer groups than folds: one fold per group. From 50000 rows on,
+  /// one fold is held out once instead of every fold in turn.
+  FoldOptions folds = {};
 };
 
 struct FitOptions {

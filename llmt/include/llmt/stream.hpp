@@ -26,8 +26,6 @@ struct StreamOptions {
   int bins = 16;  ///< of an input in a leaf, 4 ... 256
   /// Leaf models are drawn towards the model that their parent had when it was split, see BlendOptions::shrinkages.
   double shrinkage = 0.1;
-  /// Whether models give up what they know where the errors rise abruptly.
-  bool detect_drift = true;
   /// Rows that are kept: a quarter of them is held out and chooses what a snapshot is, at most; the others estimate
   /// blends. 0: a snapshot is the crisp tree as it stands.
   std::ptrdiff_t reservoir_rows = 20000;
@@ -55,7 +53,8 @@ class StreamState;
 /// edge between bins are known exactly; the best edge must pass the F test of Chow (1960).
 ///
 /// A leaf's model is the least-squares fit of all rows that reached it since its branch began, those included that its
-/// parent counted on its side of the split; a leaf is split, and a split taken back, when rows tell. The same rows give
+/// parent counted on its side of the split; a leaf is split, and a split taken back, when rows tell. Where the errors
+/// of a branch rise abruptly, its models give up what they have learned and a new branch grows. The same rows give
 /// the same bytes, one at a time or in blocks; their order matters. To go over data several times, add them again.
 ///
 /// Inputs may be missing (NaN): such a row follows the side with more rows and counts in a local model with the leaf's
