@@ -69,7 +69,7 @@ void check_node(const Partition& partition, std::ptrdiff_t index, const std::vec
   if (node.samples < 0 || node.rank < 0 || (node.rss.array() < 0.0).any()) {
     reject(fmt::format("{}: samples, rank and rss cannot be negative", where));
   }
-  if (node.guard_parent >= index || (node.guard_parent >= 0 && !node.is_leaf())) {
+  if (node.guard_parent < -1 || node.guard_parent >= index || (node.guard_parent >= 0 && !node.is_leaf())) {
     reject(fmt::format("{}: guard_parent {} must be an earlier node, and only a leaf may have one", where,
                        node.guard_parent));
   }

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <stdexcept>
 #include <type_traits>
 #include <utility>
@@ -190,12 +191,7 @@ Node node_from_json(const Reader& json, std::ptrdiff_t inputs, std::ptrdiff_t ou
   node.mean = json.member("mean").vector(regressors);
   node.low = json.member("low").vector(regressors);
   node.high = json.member("high").vector(regressors);
-  if (json.has("guard_parent")) {
-    node.guard_parent = json.member("guard_parent").as<int>();
-    if (node.guard_parent < 0) {
-      json.member("guard_parent").fail(fmt::format("{} is no node", node.guard_parent));
-    }
-  }
+  if (json.has("guard_parent")) node.guard_parent = json.member("guard_parent").as<int>();
   if (json.has("inverse_gram")) {
     const Eigen::VectorXd lower = json.member("inverse_gram").vector((regressors + 1) * (regressors + 2) / 2);
     node.inverse_gram.resize(regressors + 1, regressors + 1);
@@ -322,11 +318,12 @@ Model from_json(const std::string& text, const std::string& name) {
     if (const Reader range = entry.member("residual_range"); !range.elements().empty()) {
       partition.residual_range = rows_from_json(range, std::ssize(partition.outputs), 2);
     }
-    std::vector<int> shared_with;
+    std::vector<std::optional<int>> shared_with;
     for (const Reader& node : entry.member("nodes").elements()) {
       partition.nodes.push_back(
           node_from_json(node, std::ssize(inputs), std::ssize(partition.outputs), std::ssize(regressors)));
-      shared_with.push_back(node.has("shared_with") ? node.member("shared_with").as<int>() : -1);
+      shared_with.push_back(node.has("shared_with") ? std::optional(node.member("shared_with").as<int>())
+                                                    : std::nullopt);
     }
     try {
       set_guard_parents(partition, shared_with);

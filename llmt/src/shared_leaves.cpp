@@ -27,14 +27,14 @@ bool is_tree(const std::vector<Node>& nodes) {
 
 }  // namespace
 
-void set_guard_parents(Partition& partition, const std::vector<int>& shared_with) {
+void set_guard_parents(Partition& partition, const std::vector<std::optional<int>>& shared_with) {
   std::vector<Node>& nodes = partition.nodes;
   if (!is_tree(nodes)) return;
   const std::vector<int> parents = parents_of(partition);
   for (int i = 0; i < std::ssize(nodes); ++i) {
-    const int first = shared_with[i];
-    if (first < 0) continue;
-    if (first >= i || !nodes[i].is_leaf() || !nodes[first].is_leaf() || shared_with[first] >= 0) {
+    if (!shared_with[i]) continue;
+    const int first = *shared_with[i];
+    if (first < 0 || first >= i || !nodes[i].is_leaf() || !nodes[first].is_leaf() || shared_with[first]) {
       throw std::invalid_argument(fmt::format(
           "node {}: shared_with is {}, it must be an earlier leaf that does not share another's local model", i,
           first));
@@ -48,7 +48,7 @@ void set_guard_parents(Partition& partition, const std::vector<int>& shared_with
     nodes[first].guard_parent = a;
   }
   for (std::size_t i = 0; i < nodes.size(); ++i) {
-    if (shared_with[i] >= 0) nodes[i].guard_parent = nodes[shared_with[i]].guard_parent;
+    if (shared_with[i]) nodes[i].guard_parent = nodes[*shared_with[i]].guard_parent;
   }
 }
 

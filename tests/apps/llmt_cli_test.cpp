@@ -152,6 +152,8 @@ TEST(LlmtProgram, RetiredOptionsSayWhyAndWhatToUse) {
   EXPECT_TRUE(refusal("fit d.csv -t y --merge").starts_with(merge));
   EXPECT_TRUE(refusal("compare d.csv -t y --merge").starts_with(merge));
   EXPECT_TRUE(refusal("fit --merge d.csv -t y").starts_with(merge));
+  EXPECT_NE(refusal("fit d.csv -t y --smoothness 2").find("--smoothness was retired"), std::string::npos);
+  EXPECT_NE(refusal("fit d.csv -t y --stream --stream-rule rd").find("--stream-rule was retired"), std::string::npos);
   EXPECT_EQ(folder.run(llmt_program + " fit --help").out.find("--merge"), std::string::npos);
 }
 
