@@ -65,11 +65,6 @@ std::vector<Member> members(std::ptrdiff_t leaves) {
     options.growth.pruning = llmt::Pruning::weakest_link;
   });
   if (leaves == 0) {
-    add("crisp RD pruned merged", [&](Options& options) {
-      crisp(options);
-      options.growth.pruning = llmt::Pruning::weakest_link;
-      options.growth.merge_leaves = true;
-    });
     add("crisp RD sparse", [&](Options& options) {
       crisp(options);
       options.local_models.sparse = llmt::SparseChoice::automatic;

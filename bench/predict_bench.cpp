@@ -32,8 +32,7 @@ const llmt::Model& model_of(llmt::ValidityChoice validity, std::int64_t leaves, 
                     .min_variance_gain = -1.0,
                     .min_leaf_samples = 20,
                     .max_leaves = leaves,
-                    .split_inputs = {0, 1},
-                    .threshold = llmt::ThresholdPlacement::midpoint};
+                    .split_inputs = {0, 1}};
   for (int j = 2; j < std::min<std::int64_t>(inputs, 8); ++j) {
     options.growth.split_inputs.push_back(j);
   }

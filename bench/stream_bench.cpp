@@ -1,7 +1,7 @@
 // What llmt::Stream learns from the synthetic function of bench/synthetic.hpp, and what it costs.
 //
 // stream_bench scaling [ROWS...]       error to the truth on 100000 fresh rows, time and memory after one pass
-// stream_bench rules [ROWS]            rd beside ra, and beside the batch fit of the reservoir's number of rows
+// stream_bench rules [ROWS]            streams beside the batch fit of the reservoir's number of rows
 // stream_bench drift [SEEDS]           recovery after the function has changed, beside a fresh stream
 // stream_bench spread [ROWS] [SEEDS]   mean and spread of that error over streams, no snapshot
 // stream_bench alarms [SEEDS] [ROWS]   alarms where nothing changes
@@ -81,7 +81,6 @@ void rules(Eigen::Index rows) {
   header();
   for (const Eigen::Index n : {rows / 100, rows / 10, rows}) {
     report("rd", n, {}, test);
-    report("ra", n, {.rule = llmt::StreamRule::ra}, test);
   }
   const bench::Sample train = bench::sample(20000, num_inputs, 1);
   const bench::Cost cost = bench::measure(

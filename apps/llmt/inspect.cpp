@@ -176,22 +176,13 @@ void print_model(const Model& model, const std::string& path) {
     const Partition& partition = model.partitions()[static_cast<std::size_t>(p)];
     for (std::size_t o = 0; o < partition.outputs.size(); ++o) {
       const std::string& name = model.outputs()[static_cast<std::size_t>(partition.outputs[o])].name;
-      const std::string sharing = partition.num_local_models() < partition.num_leaves()
-                                      ? fmt::format(" that share {} formulas", partition.num_local_models())
-                                      : "";
-      print(fmt::format("\n{}: {} leaves{}, {}\n", name, partition.num_leaves(), sharing,
-                        validity_text(partition.validity)));
+      print(fmt::format("\n{}: {} leaves, {}\n", name, partition.num_leaves(), validity_text(partition.validity)));
       Table table({"leaf", "rows", "RMSE", "where", name + " ="});
       const std::vector<Leaf> leaves = model.leaves(p);
       for (std::size_t k = 0; k < leaves.size(); ++k) {
         const std::ptrdiff_t output = static_cast<std::ptrdiff_t>(o);
-        const auto first = std::find_if(leaves.begin(), leaves.end(),
-                                        [&](const Leaf& other) { return other.local_model == leaves[k].local_model; });
-        const std::ptrdiff_t shown = first - leaves.begin();
         table.add({fmt::format("{}", k + 1), fmt::format("{}", leaves[k].samples), number(leaves[k].rmse(output), 3),
-                   conditions(model, partition, leaves[k]),
-                   shown < static_cast<std::ptrdiff_t>(k) ? fmt::format("as in leaf {}", shown + 1)
-                                                          : formula(model, leaves[k], output)});
+                   conditions(model, partition, leaves[k]), formula(model, leaves[k], output)});
       }
       print(table.text());
     }
@@ -252,7 +243,7 @@ Json leaf_table(const Model& model) {
       }
       entry["leaves"].push_back({{"rows", leaf.samples},
                                  {"rank", leaf.rank},
-                                 {"local_model", leaf.local_model},
+                                 {"local_model", entry["leaves"].size()},  // one each, counted from left to right
                                  {"low", finite_or_null(leaf.low)},
                                  {"high", finite_or_null(leaf.high)},
                                  {"levels", leaf.levels},

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "llmt/csv.hpp"
+#include "llmt/retired_options.hpp"
 
 namespace llmt::apps {
 namespace {
@@ -144,8 +145,6 @@ void add_learning_options(CLI::App& command, LearningArguments& arguments) {
   command.add_flag_callback(
       "--prune", [&growth] { growth.pruning = Pruning::weakest_link; },
       "Undo the splits of the weakest branches first, not the last ones, where fewer leaves predict better");
-  command.add_flag("--merge", growth.merge_leaves,
-                   "Let leaves that touch share one local model where that predicts better");
   command
       .add_option("--cv", folds.count,
                   "Folds of the held-out error by which everything is chosen, 0: keep the tree as grown")
@@ -155,6 +154,7 @@ void add_learning_options(CLI::App& command, LearningArguments& arguments) {
   command.add_option("--seed", folds.seed, "Of the random folds")->capture_default_str();
   command.add_option("--threads", arguments.options.max_threads, "0: all; the result does not depend on it")
       ->capture_default_str();
+  refuse_retired_options(command);
 }
 
 }  // namespace llmt::apps

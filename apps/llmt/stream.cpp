@@ -27,9 +27,9 @@ struct Learned {
 };
 
 void refuse_other_options(const CLI::App& command) {
-  constexpr std::array<std::string_view, 14> taken = {"data",      "target",       "inputs", "ignore",   "weight",
-                                                      "min-leaf",  "max-leaves",   "stream", "validity", "stream-rule",
-                                                      "shrinkage", "significance", "output", "json"};
+  constexpr std::array<std::string_view, 13> taken = {"data",         "target",     "inputs", "ignore",   "weight",
+                                                      "min-leaf",     "max-leaves", "stream", "validity", "shrinkage",
+                                                      "significance", "output",     "json"};
   for (const CLI::Option* option : command.get_options()) {
     const std::string name = option->get_single_name();
     if (option->count() > 0 && std::find(taken.begin(), taken.end(), name) == taken.end()) {
@@ -40,8 +40,7 @@ void refuse_other_options(const CLI::App& command) {
 
 StreamOptions options_of(const CLI::App& command, const StreamArguments& arguments) {
   const FitOptions& fit = arguments.learning.options;
-  StreamOptions options{
-      .rule = arguments.rule, .min_leaf_samples = fit.growth.min_leaf_samples, .max_leaves = fit.growth.max_leaves};
+  StreamOptions options{.min_leaf_samples = fit.growth.min_leaf_samples, .max_leaves = fit.growth.max_leaves};
   if (command.count("--significance") > 0) {
     options.significance = fit.growth.significance;
   }
@@ -127,7 +126,7 @@ Json summary_json(const StreamArguments& arguments, const Learned& learned, cons
   Json json = {{"data", learned.name},
                {"rows", counts.rows},
                {"missing_values", counts.missing_values},
-               {"rule", arguments.rule == StreamRule::rd ? "rd" : "ra"},
+               {"rule", "rd"},
                {"inputs", learned.inputs},
                {"held_out", counts.held_out},
                {"grown_leaves", counts.leaves},
@@ -160,10 +159,10 @@ void print_summary(const StreamArguments& arguments, const Learned& learned, con
     print(fmt::format("Missing values in the inputs: {}\n", counts.missing_values));
   }
   print(
-      fmt::format("Learned row by row, rule {}: {} splits, {} taken back, {} alarms for changes, {} branches replaced; "
+      fmt::format("Learned row by row, rule rd: {} splits, {} taken back, {} alarms for changes, {} branches replaced; "
                   "{} MiB\n\n",
-                  arguments.rule == StreamRule::rd ? "rd" : "ra", counts.splits, counts.prunes, counts.drifts,
-                  counts.replacements, number(static_cast<double>(counts.bytes) / 1048576.0, 3)));
+                  counts.splits, counts.prunes, counts.drifts, counts.replacements,
+                  number(static_cast<double>(counts.bytes) / 1048576.0, 3)));
   Table table({"target", "model", "leaves", "RMSE before learning", "of the last 1000"});
   const Eigen::VectorXd all = learned.stream->prequential_rmse();
   const Eigen::VectorXd recent = learned.stream->recent_rmse();

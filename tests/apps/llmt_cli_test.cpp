@@ -139,34 +139,22 @@ TEST(LlmtProgram, FitPredictInspectAgreeWithTheLibrary) {
   EXPECT_NE(folder.run(llmt_program + " inspect m.json").out.find("everywhere"), std::string::npos);
 }
 
-TEST(LlmtProgram, MergedLeavesShareAFormula) {
-  // One model where both inputs are positive, another elsewhere: three boxes.
-  llmt::Random random(3);
-  std::string text = "a,b,y\n";
-  for (int i = 0; i < 400; ++i) {
-    const double a = random.uniform(-1.0, 1.0);
-    const double b = random.uniform(-1.0, 1.0);
-    text += fmt::format("{},{},{}\n", a, b, (a > 0.0 && b > 0.0 ? 2.0 - a : a + 0.5 * b) + 0.1 * random.normal());
-  }
+TEST(LlmtProgram, RetiredOptionsSayWhyAndWhatToUse) {
   const Folder folder;
-  folder.write("d.csv", text);
-  const std::string fit = llmt_program + " fit d.csv -t y --validity crisp --prune --merge";
-  const Outcome fitted = folder.run(fit + " -o m.json --json");
-  ASSERT_EQ(fitted.exit_code, 0) << fitted.err;
-  const json summary = json::parse(fitted.out)["partitions"][0];
-  const int leaves = summary["leaves"];
-  const int local_models = summary["local_models"];
-  EXPECT_GE(leaves, 3);
-  EXPECT_LT(local_models, leaves);
-  EXPECT_EQ(summary["chosen"]["local_models"], local_models);
-  const std::string inspected = folder.run(llmt_program + " inspect m.json").out;
-  EXPECT_NE(inspected.find(fmt::format("{} leaves that share {} formulas", leaves, local_models)), std::string::npos)
-      << inspected;
-  EXPECT_NE(inspected.find("as in leaf 1"), std::string::npos) << inspected;
-  EXPECT_EQ(folder.run(llmt_program + " predict m.json d.csv --interval 0.9").exit_code, 0);
-  const Outcome without_folds = folder.run(fit + " --cv 0");
-  EXPECT_EQ(without_folds.exit_code, 2);
-  EXPECT_NE(without_folds.err.find("growth.merge_leaves"), std::string::npos);
+  folder.write("d.csv", table());
+  const auto refusal = [&](const std::string& arguments) {
+    const Outcome outcome = folder.run(llmt_program + " " + arguments);
+    EXPECT_EQ(outcome.exit_code, 2) << arguments;
+    EXPECT_EQ(outcome.out, "") << arguments;
+    return outcome.err;
+  };
+  const std::string merge = "llmt: --merge was retired in this version: leaves that shared a local model";
+  EXPECT_TRUE(refusal("fit d.csv -t y --merge").starts_with(merge));
+  EXPECT_TRUE(refusal("compare d.csv -t y --merge").starts_with(merge));
+  EXPECT_TRUE(refusal("fit --merge d.csv -t y").starts_with(merge));
+  EXPECT_NE(refusal("fit d.csv -t y --smoothness 2").find("--smoothness was retired"), std::string::npos);
+  EXPECT_NE(refusal("fit d.csv -t y --stream --stream-rule rd").find("--stream-rule was retired"), std::string::npos);
+  EXPECT_EQ(folder.run(llmt_program + " fit --help").out.find("--merge"), std::string::npos);
 }
 
 TEST(LlmtProgram, QueriesOutsideTheTrainingExtentAreFlagged) {

@@ -111,27 +111,12 @@ int parent_of(const llmt::Partition& partition, int index) {
                    [&](const llmt::Node& other) { return other.left == index || other.right == index; })));
 }
 
-bool is_below(const llmt::Partition& partition, int index, int ancestor) {
-  while (index > ancestor) {
-    index = parent_of(partition, index);
-  }
-  return index == ancestor;
-}
-
 Eigen::VectorXd local(const llmt::Partition& partition, int leaf, const Eigen::VectorXd& deviations) {
   const llmt::Node& node = partition.nodes[static_cast<std::size_t>(leaf)];
   Eigen::VectorXd below = held(node, deviations);
   Eigen::VectorXd value = node.value + node.slope * below;
   for (int index = leaf; index > 0;) {
-    int parent = parent_of(partition, index);
-    // Those of leaves that share a local model begin where all of them are below.
-    const int first = node.shared_with >= 0 ? node.shared_with : leaf;
-    for (int other = 0; index == leaf && other < std::ssize(partition.nodes); ++other) {
-      const bool shares = other == first || partition.nodes[static_cast<std::size_t>(other)].shared_with == first;
-      while (shares && !is_below(partition, other, parent)) {
-        parent = parent_of(partition, parent);
-      }
-    }
+    const int parent = index == leaf && node.guard_parent >= 0 ? node.guard_parent : parent_of(partition, index);
     const llmt::Node& ancestor = partition.nodes[static_cast<std::size_t>(parent)];
     const Eigen::VectorXd reached = deviations.array().isNaN().select(below, held(ancestor, deviations));
     value += ancestor.slope * (reached - below);

@@ -15,15 +15,23 @@ namespace random_trees {
 
 struct Kind {
   llmt::ValidityChoice validity;
-  int smoothness;
   double width;
 };
 
-inline const std::vector<Kind> kinds = {{llmt::ValidityChoice::crisp, 1, 1.0},
-                                        {llmt::ValidityChoice::blend, 1, 0.5},
-                                        {llmt::ValidityChoice::blend, 1, 2.0},
-                                        {llmt::ValidityChoice::blend, 2, 1.0},
-                                        {llmt::ValidityChoice::gaussian, 1, 1.0 / 3.0}};
+inline const std::vector<Kind> kinds = {{llmt::ValidityChoice::crisp, 1.0},
+                                        {llmt::ValidityChoice::blend, 0.5},
+                                        {llmt::ValidityChoice::blend, 2.0},
+                                        {llmt::ValidityChoice::blend, 1.0},
+                                        {llmt::ValidityChoice::gaussian, 1.0 / 3.0}};
+
+/// The model as a file of an earlier version may hold it: blends with `smoothness` continuous derivatives.
+inline llmt::Model with_smoothness(const llmt::Model& model, int smoothness) {
+  std::vector<llmt::Partition> partitions = model.partitions();
+  for (llmt::Partition& partition : partitions) {
+    partition.validity.smoothness = smoothness;
+  }
+  return {model.inputs(), model.outputs(), model.regressors(), std::move(partitions)};
+}
 
 /// One candidate, no choice.
 inline llmt::FitOptions only(const Kind& kind, llmt::Estimation estimation, std::ptrdiff_t max_leaves,
@@ -34,8 +42,7 @@ inline llmt::FitOptions only(const Kind& kind, llmt::Estimation estimation, std:
                    .estimation = estimation,
                    .widths = {kind.width},
                    .ridges = {ridge},
-                   .shrinkages = {0.0},
-                   .smoothness = kind.smoothness};
+                   .shrinkages = {0.0}};
   options.selection.folds.count = 0;
   return options;
 }

@@ -36,7 +36,7 @@ struct FitResult {
 /// infinite input or an output that is not finite, an option out of range, a column index out of range or repeated, a
 /// category that is not a whole number from 0 on, more than 13 numeric regression inputs for quadratic local models,
 /// sparse ones with Estimation::as_grown where leaves overlap, a sign other than -1, 0, 1 or of a categorical input,
-/// signs with sparse or shared local models.
+/// signs with sparse local models.
 FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<const Eigen::MatrixXd>& outputs,
               const FitOptions& options = {});
 

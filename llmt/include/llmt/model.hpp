@@ -35,7 +35,7 @@ struct Validity {
   /// smaller child), for splits on numbers; gaussian: k_sigma; logistic: h as a multiple of that of growth. 0 for
   /// crisp.
   double width = 0.0;
-  int smoothness = 1;  ///< blend: continuous derivatives of the prediction, 1 or 2
+  int smoothness = 1;  ///< blend: continuous derivatives of the prediction; 2 is in files of earlier versions alone
 };
 
 /// One node of a partition's tree, inner or leaf. Inner nodes keep a local model of their own.
@@ -71,10 +71,9 @@ struct Node {
   Eigen::VectorXd high;
   /// Leaves: inverse of the sum of validity * weight * a a', a = [1, deviations]; for leverages. May be empty.
   Eigen::MatrixXd inverse_gram;
-  /// Leaves that share a local model: the first of them in order of growth; -1 in that one and in all others. What
-  /// belongs to the model - rank, value, slope, low, high, inverse_gram - is that of the rows of all of them and the
-  /// same in all; samples, rss and mean are the box's own.
-  int shared_with = -1;
+  /// The node whose slopes take over beyond low ... high; -1: the parent. Another node than the parent is in leaves of
+  /// older files alone, where several leaves shared one local model: the root of the smallest subtree that holds them.
+  int guard_parent = -1;
 
   bool is_leaf() const { return left < 0; }
   bool is_oblique() const { return direction.size() > 0; }
@@ -96,7 +95,6 @@ struct Partition {
   Eigen::MatrixXd residual_range = {};
 
   std::ptrdiff_t num_leaves() const { return (std::ssize(nodes) + 1) / 2; }
-  std::ptrdiff_t num_local_models() const;  ///< of the leaves, shared ones counted once
 };
 
 /// What a model knows of its inputs.
@@ -150,7 +148,6 @@ struct Leaf {
   /// is where the inputs are 0; but a product is 0 where one of its factors is at its mean.
   Eigen::VectorXd intercept;
   Eigen::MatrixXd slope;  ///< outputs of the partition x regressors
-  int local_model = 0;    ///< leaves of equal number share one; numbered from left to right
 };
 
 /// How far a query lies from what the model has seen.
@@ -179,8 +176,7 @@ class Evaluator;
 ///   f_i(x) = value_i + slope_i . c_i + sum over ancestors a of slope_a . (c_a - c_below a)
 /// with c the deviations held to the node's range. What the prediction adds to the root's model is then held to the
 /// range of the root's residuals in training, widened by a tenth of it on both sides, and at last, beyond the training
-/// extent, outer_slope . (d - c_root) is added: the root's slopes as far as the first leaves agree on them. For leaves
-/// that share a local model the ancestors are those of the smallest subtree that holds them all. Every hold
+/// extent, outer_slope . (d - c_root) is added: the root's slopes as far as the first leaves agree on them. Every hold
 /// is rounded off over a tenth of its range, so that derivatives stay continuous. Affine data are reproduced
 /// everywhere; data that are quadratic in the inputs, by a model with products, within the training extent. Beyond it
 /// products stay where their factors leave it, and the linear parts go on.
@@ -233,7 +229,7 @@ class Model {
   std::vector<Leaf> leaves(std::ptrdiff_t partition) const;
 
   /// The model as it was when each partition had at most `max_leaves` leaves: inner nodes' local models, not fitted
-  /// anew; leaves that stay keep the local models that they share. Throws std::invalid_argument if max_leaves < 1.
+  /// anew. Throws std::invalid_argument if max_leaves < 1.
   Model prefix(std::ptrdiff_t max_leaves) const;
 
   /// The same model with other names of columns and, if there are any, of the levels of each input (empty for numbers).

@@ -14,8 +14,9 @@
 namespace llmt {
 
 /// When a leaf is split, and how the tree is pruned. RD and RETIS look at every threshold of every split input and take
-/// the one with the smallest residual sum of squares of the two child models; with RA they grow best-first: the split
-/// that lowers it most comes next.
+/// the one with the smallest residual sum of squares of the two child models. That sum is the same anywhere in the gap
+/// between two training values; the threshold goes where the child models meet, or in the middle if they do not meet in
+/// the gap. RD, RETIS and RA grow best-first: the split that lowers the sum most comes next.
 enum class GrowthRule {
   /// Batch-RD (Potts & Sammut 2005): a split must pass the F test of Chow (1960),
   ///   F = [(RSS_0 - RSS_1 - RSS_2) / (p_1 + p_2 - p_0)] / [(RSS_1 + RSS_2) / (N - p_1 - p_2)]
@@ -49,14 +50,6 @@ enum class GrowthRule {
   hilomot
 };
 
-/// Where in the gap between two training values a threshold is put. The residual sum of squares is the same anywhere in
-/// the gap. LOLIMOT and M5' take the middle.
-enum class ThresholdPlacement {
-  closest,  ///< where the regression of the child models' difference on the split input, over the node's rows, is
-            ///< zero; halfway if that is not in the gap
-  midpoint  ///< halfway
-};
-
 /// How RD and RETIS search the best split of a node.
 enum class SplitSearch {
   automatic,  ///< exact, by bins for many rows
@@ -87,8 +80,6 @@ struct GrowthOptions {
   /// rd, ra: smallest decrease of the residual variance, as a fraction of the variance of the output. 0: any decrease;
   /// negative: no demand.
   double min_variance_gain = 0.0;
-  /// retis: weight m of the prior (the error of one model for all data) in the m-estimates, in rows. 0: no pruning.
-  double pruning_m = 2.0;
   /// Smallest number of rows in a leaf. 0: twice the number of coefficients of a local model for a crisp tree, 2 for
   /// M5'; where blends are among the candidates as many as regressors, at least 5.
   std::ptrdiff_t min_leaf_samples = 0;
@@ -96,7 +87,7 @@ struct GrowthOptions {
   /// many as make 1500 coefficients, within 20 ... 400.
   std::ptrdiff_t max_leaves = 0;
   /// Growth ends when further splits lower the residual sum of squares of the whole tree by less than this fraction
-  /// each, in the geometric mean over the next `improvement_lookahead` splits of best-first growth; those are not kept.
+  /// each, in the geometric mean over the next ten splits of best-first growth; those are not kept.
   /// Benes et al. (2022) stop at "less than 2 %" without saying of what; this is our reading, docs/algorithms.md gives
   /// the reason. 0: off. Not for M5', which prunes.
   double min_improvement = 0.0;
@@ -106,20 +97,12 @@ struct GrowthOptions {
   /// Columns that may be split, and columns that local models use. Empty: all.
   std::vector<int> split_inputs = {};
   std::vector<int> regression_inputs = {};
-  ThresholdPlacement threshold = ThresholdPlacement::closest;
   SplitSearch search = SplitSearch::automatic;
   /// Order in which splits are undone: down to max_leaves from three times as many (not LOLIMOT), then by held-out
   /// error. RETIS undoes those that its m-estimates reject before. With weakest_link and folds a crisp tree has other
   /// defaults: `significance` no test, so that splits that only help later ones stay, `max_leaves` 1000.
   Pruning pruning = Pruning::last_splits;
-  /// Leaves whose boxes touch, siblings or not, may share one local model: of every such pair the one whose shared
-  /// model raises the sum of squares least is merged, and so on; how often is chosen by the held-out error, in every
-  /// fold on the tree grown there. Needs folds.
-  bool merge_leaves = false;
 };
-
-/// See GrowthOptions::min_improvement. One split alone may help little before the next one helps much.
-inline constexpr std::ptrdiff_t improvement_lookahead = 10;
 
 /// What the local models of a partition are fitted to.
 enum class Estimation {
@@ -157,7 +140,6 @@ struct BlendOptions {
   /// column has in the leaf and without correlation: a guard against near-collinear columns and few rows. Empty: 0, 0.1
   /// and 1; 0 without folds.
   std::vector<double> shrinkages = {};
-  int smoothness = 1;  ///< continuous derivatives of blends, 1 or 2
 };
 
 /// What local models are made of.
@@ -192,10 +174,9 @@ struct LocalModelOptions {
 /// held-out rows best is taken; but least squares stays if the gain on it is not more than two standard errors of the
 /// folds' paired differences, for the best of many candidates gains a little on noise too.
 struct SelectionOptions {
-  FoldOptions folds = {};  ///< folds.count = 0: no choice, the tree stays as grown. Fewer groups than folds: one fold
-                           ///< per group.
-  /// From this many rows on, one fold is held out once instead of every fold in turn.
-  std::ptrdiff_t single_hold_out_rows = 50000;
+  /// count = 0: no choice, the tree stays as grown. Fewer groups than folds: one fold per group. From 50000 rows on,
+  /// one fold is held out once instead of every fold in turn.
+  FoldOptions folds = {};
 };
 
 struct FitOptions {

@@ -13,21 +13,7 @@
 
 namespace llmt {
 
-/// How a leaf of a growing stream finds its split (Potts & Sammut 2005; docs/algorithms.md).
-enum class StreamRule {
-  /// Residual differences: every leaf keeps the sums of squares and products of its rows in bins of every input, so
-  /// that the residual sums of squares of both sides of every edge between bins are known exactly; the best edge must
-  /// pass the F test of Chow (1960).
-  rd,
-  /// Residual analysis: the means and the scatter of every input over the rows above and below the leaf's model are
-  /// compared by t tests; where the most significant input says, two models are tried, which must pass the F test.
-  /// Costs
-  /// less per row, learns more slowly.
-  ra
-};
-
 struct StreamOptions {
-  StreamRule rule = StreamRule::rd;
   /// Probability, at most, that a leaf whose rows follow one linear model with normal noise is ever split: divided by
   /// the number of candidates and shared out over the repeated tests.
   double significance = 0.05;
@@ -40,8 +26,6 @@ struct StreamOptions {
   int bins = 16;  ///< of an input in a leaf, 4 ... 256
   /// Leaf models are drawn towards the model that their parent had when it was split, see BlendOptions::shrinkages.
   double shrinkage = 0.1;
-  /// Whether models give up what they know where the errors rise abruptly.
-  bool detect_drift = true;
   /// Rows that are kept: a quarter of them is held out and chooses what a snapshot is, at most; the others estimate
   /// blends. 0: a snapshot is the crisp tree as it stands.
   std::ptrdiff_t reservoir_rows = 20000;
@@ -64,8 +48,13 @@ class StreamState;
 
 /// A tree for every output that learns from rows as they come: each row is seen once and forgotten.
 ///
+/// Splits are found by residual differences (Potts & Sammut 2005; docs/algorithms.md): every leaf keeps the sums of
+/// squares and products of its rows in bins of every input, so that the residual sums of squares of both sides of every
+/// edge between bins are known exactly; the best edge must pass the F test of Chow (1960).
+///
 /// A leaf's model is the least-squares fit of all rows that reached it since its branch began, those included that its
-/// parent counted on its side of the split; a leaf is split, and a split taken back, when rows tell. The same rows give
+/// parent counted on its side of the split; a leaf is split, and a split taken back, when rows tell. Where the errors
+/// of a branch rise abruptly, its models give up what they have learned and a new branch grows. The same rows give
 /// the same bytes, one at a time or in blocks; their order matters. To go over data several times, add them again.
 ///
 /// Inputs may be missing (NaN): such a row follows the side with more rows and counts in a local model with the leaf's

@@ -35,7 +35,6 @@ struct Candidate {
   double shrinkage = 0.0;  ///< see BlendOptions::shrinkages
   bool sparse = false;     ///< see SparseChoice
   std::ptrdiff_t leaves = 1;
-  std::ptrdiff_t local_models = 0;  ///< after merging; 0: as many as leaves
 };
 
 /// A candidate and what it left on rows that took no part.
@@ -69,9 +68,7 @@ struct PartitionSummary {
   std::ptrdiff_t coefficients = 0;  ///< of all leaves, for one output: constants and slopes that are not 0
   Eigen::VectorXd train_rmse;       ///< one per output of the partition
   CandidateError chosen;            ///< errors NaN without folds
-  std::ptrdiff_t local_models = 0;  ///< of these leaves, fewer if some share one
-  /// What it was chosen against: least squares first, then the best of each validity and width, all without shared
-  /// local models. Empty without folds.
+  /// What it was chosen against: least squares first, then the best of each validity and width. Empty without folds.
   /// For many rows the errors of all blends but the best one are of models made from samples of the training rows.
   std::vector<CandidateError> best_of_kind;
   /// Held-out RMSE of the crisp prefixes with 1, 2, ... leaves; empty without folds.

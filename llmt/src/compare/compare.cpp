@@ -37,8 +37,7 @@ std::ptrdiff_t count_parameters(const Model& model) {
   for (const Partition& partition : model.partitions()) {
     count += partition.num_leaves() - 1;
     for (const Node& node : partition.nodes) {
-      const bool counts = node.is_leaf() && node.shared_with < 0;
-      count += counts ? node.value.size() + (node.slope.array() != 0.0).count() : 0;
+      count += node.is_leaf() ? node.value.size() + (node.slope.array() != 0.0).count() : 0;
       // A direction, the length of which says nothing, and the half width of the gate.
       count += node.is_oblique() ? (node.direction.array() != 0.0).count() : 0;
     }
@@ -118,7 +117,6 @@ std::vector<Method> usual_methods(const FitOptions& base, std::ptrdiff_t inputs)
   plain.intervals = false;
   plain.progress = {};
   plain.growth.pruning = Pruning::last_splits;
-  plain.growth.merge_leaves = false;
   plain.blend.validity = ValidityChoice::crisp;
   plain.local_models = {};
   std::vector<Method> methods;
@@ -168,16 +166,15 @@ std::vector<Method> usual_methods(const FitOptions& base, std::ptrdiff_t inputs)
     add("crisp tree, quadratic leaves",
         [](FitOptions& options) { options.local_models.terms = LocalTerms::quadratic; });
   }
-  if (base.growth.pruning != Pruning::last_splits || base.growth.merge_leaves) {
-    std::string how = base.growth.pruning == Pruning::weakest_link ? ", pruned" : "";
-    how += base.growth.merge_leaves ? ", merged" : "";
-    const auto with_them = [&](FitOptions& options, ValidityChoice validity) {
-      options.growth.pruning = base.growth.pruning;
-      options.growth.merge_leaves = base.growth.merge_leaves;
-      options.blend.validity = validity;
+  if (base.growth.pruning == Pruning::weakest_link) {
+    const auto pruned = [](ValidityChoice validity) {
+      return [validity](FitOptions& options) {
+        options.growth.pruning = Pruning::weakest_link;
+        options.blend.validity = validity;
+      };
     };
-    add("crisp tree, RD" + how, [&](FitOptions& options) { with_them(options, ValidityChoice::crisp); });
-    add("blend, joint" + how, [&](FitOptions& options) { with_them(options, ValidityChoice::blend); });
+    add("crisp tree, RD, pruned", pruned(ValidityChoice::crisp));
+    add("blend, joint, pruned", pruned(ValidityChoice::blend));
   }
   return methods;
 }

@@ -88,11 +88,10 @@ void OrderedSplits::add_pair(const Geometry& geometry, int split, int left, int 
     // The derivative times h / |g'| is f_r - f_l at the threshold + of_left f_l' + of_right f_r'.
     const double share_left = geometry.share(left, input, from, to);
     const double share_right = geometry.share(right, input, from, to);
-    const bool once = geometry.smoothness() == 1;
     using Bernstein = std::vector<double>;
-    const Bernstein slope = once ? Bernstein{0, 1, 1, 0} : Bernstein{0, 0, 1.5, 1.5, 0, 0};     // |g'|
-    const Bernstein moment = once ? Bernstein{0, -1, 1, 0} : Bernstein{0, 0, -1.5, 1.5, 0, 0};  // u |g'|
-    const Bernstein gate = once ? Bernstein{1, 1, 0, 0} : Bernstein{1, 1, 1, 0, 0, 0};
+    const Bernstein slope = {0, 1, 1, 0};    // |g'|
+    const Bernstein moment = {0, -1, 1, 0};  // u |g'|
+    const Bernstein gate = {1, 1, 0, 0};
     Bernstein of_left;
     Bernstein of_right;
     for (std::size_t i = 0; i < gate.size(); ++i) {

@@ -14,7 +14,6 @@ class OrderedSplits::Geometry {
 
   const Node& node(int index) const { return partition_.nodes[static_cast<std::size_t>(index)]; }
   int inputs() const { return static_cast<int>(std::ssize(training_.columns)); }
-  int smoothness() const { return partition_.validity.smoothness; }
 
   /// Of the monotone input that a node splits; 0: none.
   int sign(int node) const { return signs_[static_cast<std::size_t>(node)]; }

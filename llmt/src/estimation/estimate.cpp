@@ -56,11 +56,8 @@ Partition estimate(const TrainingRows& training, const GrownTree& grown, const C
   if (candidate.leaves == 1) {
     partition.outer_slope.resize(0, 0);  // one linear model goes on as it is
   }
-  // Merges nothing where no local models are to be shared.
-  const std::ptrdiff_t local_models = candidate.local_models > 0 ? candidate.local_models : candidate.leaves;
   if (candidate.validity.kind == ValidityKind::crisp) {
-    JointFit fit(training, std::move(partition), max_threads, candidate.sparse);
-    fit.merge_to(local_models);
+    const JointFit fit(training, std::move(partition), max_threads, candidate.sparse);
     return candidate.sparse || candidate.shrinkage > 0.0
                ? fit.local(candidate.leaves, candidate.shrinkage, candidate.sparse)
                : fit.as_grown(candidate.leaves);
@@ -69,12 +66,10 @@ Partition estimate(const TrainingRows& training, const GrownTree& grown, const C
   const std::ptrdiff_t enough = rows_per_unknown * candidate.leaves * (std::ssize(training.regressors) + 1);
   if (candidate.estimation == Estimation::joint && training.count() > 2 * enough) {
     const TrainingRows sample = thinned(training, enough);
-    JointFit fit(sample, std::move(partition), max_threads, candidate.sparse);
-    fit.merge_to(local_models);
+    const JointFit fit(sample, std::move(partition), max_threads, candidate.sparse);
     return fit.joint_on(training, candidate.leaves, regularisation);
   }
-  JointFit fit(training, std::move(partition), max_threads, candidate.sparse);
-  fit.merge_to(local_models);
+  const JointFit fit(training, std::move(partition), max_threads, candidate.sparse);
   switch (candidate.estimation) {
     case Estimation::as_grown:
       return fit.as_grown(candidate.leaves);

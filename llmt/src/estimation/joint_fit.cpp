@@ -114,7 +114,7 @@ Eigen::MatrixXd JointFit::sparse_model(std::size_t node, const Eigen::MatrixXd& 
 }
 
 std::vector<Eigen::MatrixXd> JointFit::local_models(std::size_t nodes, double shrinkage, bool sparse) const {
-  const std::vector<int> parents = model_parents_of(partition_);
+  const std::vector<int> parents = parents_of(partition_);
   std::vector<Eigen::MatrixXd> models(nodes);
   models[0] = Eigen::MatrixXd::Zero(size_, root_.cols());  // the root's model itself
   if (sparse && nodes == 1) {
@@ -175,16 +175,6 @@ Partition JointFit::as_grown(std::ptrdiff_t leaves) const {
     }
     return constrained(leaves, std::move(models), 0.0);
   }
-  if (result.num_local_models() < result.num_leaves()) {
-    const std::vector<Eigen::MatrixXd> models = local_models(result.nodes.size(), 0.0, false);
-    for (const Node& node : result.nodes) {
-      if (node.shared_with >= 0) {
-        const std::size_t first = static_cast<std::size_t>(node.shared_with);
-        set_model(result.nodes[first], models[first]);
-      }
-    }
-    copy_shared_models(result);
-  }
   return result;
 }
 
@@ -199,8 +189,6 @@ JointFit::System JointFit::system(std::ptrdiff_t leaves) const {
     const Node& node = partition_.nodes[i];
     if (static_cast<std::ptrdiff_t>(i) >= nodes) {
       result.position[i] = result.position[static_cast<std::size_t>(parents[i])];
-    } else if (node.shared_with >= 0) {
-      result.position[i] = result.position[static_cast<std::size_t>(node.shared_with)];
     } else if (node.is_leaf() || node.left >= nodes) {
       result.position[i] = static_cast<int>(result.nodes.size());
       result.nodes.push_back(static_cast<int>(i));
@@ -310,7 +298,6 @@ Partition JointFit::with_solution(const System& system, const Solution& solution
     set_model(result.nodes[static_cast<std::size_t>(system.nodes[k])],
               coefficients.middleRows(static_cast<std::ptrdiff_t>(k) * size_, size_));
   }
-  copy_shared_models(result);
   finish_constrained(result, training_);
   return result;
 }

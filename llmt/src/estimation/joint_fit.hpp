@@ -7,7 +7,6 @@
 
 #include "constraints/constrained_leaves.hpp"
 #include "data/dataset.hpp"
-#include "estimation/merging.hpp"
 #include "estimation/normal_equations.hpp"
 #include "model/evaluator.hpp"
 
@@ -51,27 +50,17 @@ class JointFit {
   /// The prefix with `leaves` leaves and locally weighted estimates.
   Partition local(std::ptrdiff_t leaves, double shrinkage, bool sparse = false) const;
 
-  /// The prefix as grown, with the ranges of the validities. Local models that are shared are locally weighted.
+  /// The prefix as grown, with the ranges of the validities.
   Partition as_grown(std::ptrdiff_t leaves) const;
 
   /// Whether leaves have to be in order across some split, so that only estimates of the same prefix keep it.
   bool has_ordered_leaves() const;
 
-  /// The merges of the partition's leaves, see merge_sequence().
-  std::vector<Merge> merges() const;
-
-  /// From now on the leaves of both groups share one local model: one block of unknowns. With shared local models
-  /// estimates are of the whole partition, not of a smaller prefix.
-  void share(const Merge& merge);
-
-  /// Shares until so many local models are left.
-  void merge_to(std::ptrdiff_t local_models);
-
  private:
   /// The normal equations of a prefix.
   struct System {
     std::ptrdiff_t leaves = 0;
-    std::vector<int> nodes;     // its leaves, of those that share a local model the first
+    std::vector<int> nodes;     // its leaves
     std::vector<int> position;  // of every node at or below one of them: that leaf's among `nodes`; else -1
     RowMajor matrix;            // upper triangle
   };
@@ -107,7 +96,6 @@ class JointFit {
   std::vector<std::ptrdiff_t> select(std::size_t node) const;
   Eigen::VectorXd hold(std::size_t node, double shrinkage) const;
   void set_model(Node& node, const Eigen::MatrixXd& coefficients) const;
-  static void copy_shared_models(Partition& partition);
 
   const TrainingRows& training_;
   Partition partition_;

@@ -109,12 +109,7 @@ void describe_leaves(const TrainingRows& training, Partition& partition, bool sp
   const Evaluator evaluator(partition, training.columns, regressors);
   const Eigen::MatrixXd rss = residual_sums(training, partition, evaluator, max_threads);
   const TrainingRows sample = thinned(training, rows_per_unknown * partition.num_leaves() * (regressors + 1));
-  std::vector<Eigen::MatrixXd> gram = gram_matrices(sample, partition, evaluator, max_threads);
-  for (std::size_t i = 0; i < gram.size(); ++i) {
-    if (const int first = partition.nodes[i].shared_with; first >= 0) {
-      gram[static_cast<std::size_t>(first)] += gram[i];
-    }
-  }
+  const std::vector<Eigen::MatrixXd> gram = gram_matrices(sample, partition, evaluator, max_threads);
   Eigen::VectorXd scale = Eigen::VectorXd::Ones(regressors + 1);
   for (std::ptrdiff_t k = 0; k < regressors; ++k) {
     const double range = std::max(std::abs(partition.nodes[0].low(k)), std::abs(partition.nodes[0].high(k)));
@@ -125,8 +120,7 @@ void describe_leaves(const TrainingRows& training, Partition& partition, bool sp
     node.rss = rss.col(index);
     node.inverse_gram = Eigen::MatrixXd();
     if (node.is_leaf()) {
-      const std::ptrdiff_t first = node.shared_with >= 0 ? node.shared_with : index;
-      const Eigen::MatrixXd full = gram[static_cast<std::size_t>(first)].selfadjointView<Eigen::Lower>();
+      const Eigen::MatrixXd full = gram[static_cast<std::size_t>(index)].selfadjointView<Eigen::Lower>();
       if (!sparse) {
         node.inverse_gram = inverse_gram(full, scale);
         return;

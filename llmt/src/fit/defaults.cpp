@@ -43,8 +43,6 @@ Plan make_plan(const FitOptions& options, const TrainingRows& all, std::ptrdiff_
                          : logistic                         ? ValidityKind::logistic
                                                             : ValidityKind::blend;
   plan.candidates.estimation = options.blend.estimation;
-  plan.candidates.smoothness = options.blend.smoothness;
-  plan.candidates.merge_leaves = options.growth.merge_leaves;
   if (!crisp_only) {
     plan.candidates.widths = options.blend.widths;
     if (plan.candidates.widths.empty()) {

@@ -118,7 +118,6 @@ PartitionSummary summarise(const Partition& partition, const TrainingRows& rows,
   PartitionSummary summary;
   summary.outputs = partition.outputs;
   summary.leaves = partition.num_leaves();
-  summary.local_models = partition.num_local_models();
   Eigen::VectorXd rss = Eigen::VectorXd::Zero(std::ssize(partition.outputs));
   for (const Node& node : partition.nodes) {
     if (node.is_leaf()) {
@@ -212,7 +211,7 @@ FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<
       candidate.shrinkage = plan.candidates.shrinkages.front();
       candidate.sparse = plan.candidates.sparse.front();
       if (!plan.candidates.widths.empty()) {
-        candidate.validity = {plan.candidates.kind, plan.candidates.widths.front(), plan.candidates.smoothness};
+        candidate.validity = {plan.candidates.kind, plan.candidates.widths.front()};
         candidate.jump = plan.candidates.jumps.front();
         candidate.estimation = plan.candidates.estimation;
         candidate.ridge = plan.candidates.ridges.empty() ? 0.0 : plan.candidates.ridges.front();
@@ -240,7 +239,6 @@ FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<
     described.search = grown.search;
     described.chosen = trees.empty() ? CandidateError{candidate, std::nan(""), std::nan("")} : selection.chosen;
     described.chosen.candidate.leaves = candidate.leaves;
-    described.chosen.candidate.local_models = candidate.local_models > 0 ? described.local_models : 0;
     described.best_of_kind = std::move(selection.best_of_kind);
     described.crisp_cv_rmse = std::move(selection.crisp_rmse);
     described.cv_folds = std::ssize(trees);

@@ -50,7 +50,6 @@ std::vector<int> all_columns(std::ptrdiff_t count) {
 void check_growth(const GrowthOptions& options, std::ptrdiff_t inputs) {
   require(std::isfinite(options.significance), "growth.significance", options.significance, "finite");
   require(std::isfinite(options.min_variance_gain), "growth.min_variance_gain", options.min_variance_gain, "finite");
-  require(options.pruning_m >= 0.0, "growth.pruning_m", options.pruning_m, "at least 0");
   require(options.min_leaf_samples >= 0, "growth.min_leaf_samples", static_cast<double>(options.min_leaf_samples),
           "at least 0");
   require(options.max_leaves >= 0, "growth.max_leaves", static_cast<double>(options.max_leaves), "at least 0");
@@ -73,7 +72,6 @@ void check_blend(const BlendOptions& options) {
   for (const double jump : options.jumps) {
     require(jump >= 0.0, "blend.jumps", jump, "not negative");
   }
-  require(options.smoothness == 1 || options.smoothness == 2, "blend.smoothness", options.smoothness, "1 or 2");
 }
 
 /// M5' has models of its own: dropped inputs, smoothing along the path. Estimating them anew would undo it.
@@ -88,12 +86,11 @@ void check_m5(const FitOptions& options) {
   }
   require(options.growth.min_improvement == 0.0, "growth.min_improvement", options.growth.min_improvement,
           "0 with growth.rule m5, which prunes");
-  if (options.growth.pruning != Pruning::last_splits || options.growth.merge_leaves ||
-      options.local_models.terms != LocalTerms::linear || options.local_models.sparse != SparseChoice::never) {
+  if (options.growth.pruning != Pruning::last_splits || options.local_models.terms != LocalTerms::linear ||
+      options.local_models.sparse != SparseChoice::never) {
     throw std::invalid_argument(
-        "llmt::fit: growth.pruning, growth.merge_leaves, local_models.terms and local_models.sparse must be as they "
-        "are "
-        "by default with growth.rule m5, which has its own local models and pruning");
+        "llmt::fit: growth.pruning, local_models.terms and local_models.sparse must be as they are by default with "
+        "growth.rule m5, which has its own local models and pruning");
   }
 }
 
@@ -166,16 +163,9 @@ void check_options(const FitOptions& options, std::ptrdiff_t inputs) {
           "local_models.sparse", static_cast<double>(options.local_models.sparse),
           "never where blend.estimation is as_grown, for those models are full");
   if ((!options.monotone.empty() || !options.slope_signs.empty()) &&
-      (options.local_models.sparse != SparseChoice::never || options.growth.merge_leaves)) {
-    throw std::invalid_argument(
-        "llmt::fit: monotone and slope_signs need local_models.sparse never and no growth.merge_leaves");
+      options.local_models.sparse != SparseChoice::never) {
+    throw std::invalid_argument("llmt::fit: monotone and slope_signs need local_models.sparse never");
   }
-  if (options.growth.merge_leaves && is_hilomot(options.growth.rule)) {
-    throw std::invalid_argument(
-        "llmt::fit: growth.merge_leaves needs leaves that are boxes, those of rule hilomot are not");
-  }
-  require(!options.growth.merge_leaves || options.selection.folds.count > 0, "selection.folds.count",
-          options.selection.folds.count, "at least 2 for growth.merge_leaves");
   if (options.growth.rule == GrowthRule::m5) {
     check_m5(options);
   }
@@ -263,7 +253,7 @@ std::vector<Fold> selection_folds(std::ptrdiff_t rows, const SelectionOptions& s
     return {};
   }
   std::vector<Fold> folds = make_folds(rows, options);
-  if (rows >= selection.single_hold_out_rows) {
+  if (rows >= single_hold_out_rows) {
     folds.resize(1);
   }
   return folds;

@@ -22,6 +22,9 @@ Table make_table(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::R
 /// Rows that count.
 std::vector<std::ptrdiff_t> rows_with_weight(const Table& table);
 
+/// From this many rows on, one fold is held out once instead of every fold in turn.
+inline constexpr std::ptrdiff_t single_hold_out_rows = 50000;
+
 /// The folds that the choice is made on: all, the first one for many rows, or none.
 std::vector<Fold> selection_folds(std::ptrdiff_t rows, const SelectionOptions& selection);
 

@@ -84,7 +84,7 @@ class LocalModels {
   std::ptrdiff_t outputs_;
   std::ptrdiff_t regressors_;
   std::ptrdiff_t stride_;       // regressors, padded with zeros to whole quads
-  std::vector<int> parents_;    // see model_parents_of()
+  std::vector<int> parents_;    // see guard_parents_of()
   std::vector<double> data_;    // per node: low, high, mean, slopes of each output
   std::vector<double> values_;  // per node and output
   std::vector<double> outer_slopes_;

@@ -17,25 +17,6 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 
 [[noreturn]] void reject(const std::string& what) { throw std::invalid_argument("llmt::Model: " + what); }
 
-/// A local model that is shared is the same in all its leaves.
-void check_shared(const Partition& partition, std::ptrdiff_t index, const std::string& where) {
-  const Node& node = partition.nodes[static_cast<std::size_t>(index)];
-  if (node.shared_with >= index) {
-    reject(
-        fmt::format("{}: it shares the local model of node {}, which must be an earlier one", where, node.shared_with));
-  }
-  const Node& first = partition.nodes[static_cast<std::size_t>(node.shared_with)];
-  if (!first.is_leaf() || first.shared_with >= 0) {
-    reject(fmt::format("{}: it shares the local model of node {}, which must be a leaf with its own", where,
-                       node.shared_with));
-  }
-  if (node.rank != first.rank || node.value != first.value || node.slope != first.slope || node.low != first.low ||
-      node.high != first.high) {
-    reject(fmt::format("{}: rank, value, slope, low and high must be those of node {}, whose local model it shares",
-                       where, node.shared_with));
-  }
-}
-
 void check_direction(const Node& node, const std::vector<InputColumn>& inputs, const std::string& where) {
   if (!node.is_oblique()) {
     return;
@@ -88,17 +69,15 @@ void check_node(const Partition& partition, std::ptrdiff_t index, const std::vec
   if (node.samples < 0 || node.rank < 0 || (node.rss.array() < 0.0).any()) {
     reject(fmt::format("{}: samples, rank and rss cannot be negative", where));
   }
+  if (node.guard_parent < -1 || node.guard_parent >= index || (node.guard_parent >= 0 && !node.is_leaf())) {
+    reject(fmt::format("{}: guard_parent {} must be an earlier node, and only a leaf may have one", where,
+                       node.guard_parent));
+  }
   if (node.is_leaf()) {
-    if (node.shared_with >= 0) {
-      check_shared(partition, index, where);
-    }
     if (node.right >= 0) {
       reject(fmt::format("{}: it has a right child and no left one", where));
     }
     return;
-  }
-  if (node.shared_with >= 0) {
-    reject(fmt::format("{}: it is no leaf and shares the local model of node {}", where, node.shared_with));
   }
   // The k-th split makes nodes 2k-1 and 2k, after their parent.
   if (node.left % 2 != 1 || node.right != node.left + 1 || node.left <= index ||
@@ -274,22 +253,8 @@ std::vector<Leaf> Model::leaves(std::ptrdiff_t partition) const {
   everywhere.high = Eigen::VectorXd::Constant(num_inputs(), infinity);
   everywhere.levels.resize(inputs_.size());
   std::vector<Leaf> result;
-  const std::vector<Node>& nodes = partitions_[static_cast<std::size_t>(partition)].nodes;
   collect_leaves(partitions_[static_cast<std::size_t>(partition)], 0, everywhere, inputs_, regressors_, result);
-  std::vector<int> number(nodes.size(), -1);
-  int next = 0;
-  for (Leaf& leaf : result) {
-    const int shared = nodes[static_cast<std::size_t>(leaf.node)].shared_with;
-    int& own = number[static_cast<std::size_t>(shared >= 0 ? shared : leaf.node)];
-    own = own < 0 ? next++ : own;
-    leaf.local_model = own;
-  }
   return result;
-}
-
-std::ptrdiff_t Partition::num_local_models() const {
-  return num_leaves() -
-         std::count_if(nodes.begin(), nodes.end(), [](const Node& node) { return node.shared_with >= 0; });
 }
 
 Partition prefix(const Partition& partition, std::ptrdiff_t max_leaves) {
@@ -305,15 +270,6 @@ Partition prefix(const Partition& partition, std::ptrdiff_t max_leaves) {
   for (Node& node : result.nodes) {
     if (node.left >= kept) {
       make_leaf(node);
-    }
-  }
-  if (result.nodes.size() < partition.nodes.size() && partition.num_local_models() < partition.num_leaves()) {
-    // Fewer leaves may share a local model, in a smaller subtree, and its range must not be wider than that's.
-    const std::vector<int> parents = model_parents_of(result);
-    for (std::size_t i = 1; i < result.nodes.size(); ++i) {
-      const Node& above = result.nodes[static_cast<std::size_t>(parents[i])];
-      result.nodes[i].low = result.nodes[i].low.cwiseMax(above.low);
-      result.nodes[i].high = result.nodes[i].high.cwiseMin(above.high);
     }
   }
   return result;

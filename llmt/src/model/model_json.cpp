@@ -4,12 +4,14 @@
 #include <array>
 #include <cstdint>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <stdexcept>
 #include <type_traits>
 #include <utility>
 
 #include "llmt/files.hpp"
 #include "llmt/model.hpp"
+#include "model/shared_leaves.hpp"
 
 namespace llmt {
 namespace {
@@ -58,8 +60,8 @@ Json node_to_json(const Node& node, const Model& model) {
   json["mean"] = to_array(node.mean);
   json["low"] = to_array(node.low);
   json["high"] = to_array(node.high);
-  if (node.shared_with >= 0) {
-    json["shared_with"] = node.shared_with;
+  if (node.guard_parent >= 0) {
+    json["guard_parent"] = node.guard_parent;
   }
   if (node.inverse_gram.size() > 0) {
     std::vector<double> lower;  // triangle, row by row
@@ -189,12 +191,7 @@ Node node_from_json(const Reader& json, std::ptrdiff_t inputs, std::ptrdiff_t ou
   node.mean = json.member("mean").vector(regressors);
   node.low = json.member("low").vector(regressors);
   node.high = json.member("high").vector(regressors);
-  if (json.has("shared_with")) {
-    node.shared_with = json.member("shared_with").as<int>();
-    if (node.shared_with < 0) {
-      json.member("shared_with").fail(fmt::format("{} is no node", node.shared_with));
-    }
-  }
+  if (json.has("guard_parent")) node.guard_parent = json.member("guard_parent").as<int>();
   if (json.has("inverse_gram")) {
     const Eigen::VectorXd lower = json.member("inverse_gram").vector((regressors + 1) * (regressors + 2) / 2);
     node.inverse_gram.resize(regressors + 1, regressors + 1);
@@ -321,9 +318,17 @@ Model from_json(const std::string& text, const std::string& name) {
     if (const Reader range = entry.member("residual_range"); !range.elements().empty()) {
       partition.residual_range = rows_from_json(range, std::ssize(partition.outputs), 2);
     }
+    std::vector<std::optional<int>> shared_with;
     for (const Reader& node : entry.member("nodes").elements()) {
       partition.nodes.push_back(
           node_from_json(node, std::ssize(inputs), std::ssize(partition.outputs), std::ssize(regressors)));
+      shared_with.push_back(node.has("shared_with") ? std::optional(node.member("shared_with").as<int>())
+                                                    : std::nullopt);
+    }
+    try {
+      set_guard_parents(partition, shared_with);
+    } catch (const std::invalid_argument& error) {
+      entry.fail(error.what());
     }
     partitions.push_back(std::move(partition));
   }

@@ -50,26 +50,6 @@ std::vector<int> leaf_positions(const Partition& partition, const std::vector<Le
   return position;
 }
 
-/// Training rows of the leaves that share a local model.
-struct OfModel {
-  std::ptrdiff_t samples = 0;
-  Eigen::VectorXd rss;
-};
-
-/// At the first of these leaves.
-std::vector<OfModel> rows_of_models(const Partition& partition) {
-  std::vector<OfModel> result;
-  for (const Node& node : partition.nodes) {
-    result.push_back({node.samples, node.rss});
-    if (node.shared_with >= 0) {
-      OfModel& first = result[static_cast<std::size_t>(node.shared_with)];
-      first.samples += node.samples;
-      first.rss += node.rss;
-    }
-  }
-  return result;
-}
-
 }  // namespace
 
 Eigen::MatrixXd Model::predict(const Inputs& inputs, int max_threads) const {
@@ -203,19 +183,17 @@ std::vector<Extrapolation> Model::extrapolation(const Inputs& inputs, int max_th
 
 Eigen::MatrixXd Model::standard_errors(const Inputs& inputs, int max_threads) const {
   constexpr double pooled_rows = 10.0;
-  std::vector<Eigen::VectorXd> overall;         // residual variances of the partitions
-  std::vector<std::vector<OfModel>> of_models;  // of every node of the partitions
+  std::vector<Eigen::VectorXd> overall;  // residual variances of the partitions
   for (const Partition& partition : partitions_) {
     const Node& root = partition.nodes.front();
     double coefficients = 0.0;
     Eigen::VectorXd rss = Eigen::VectorXd::Zero(root.rss.size());
     for (const Node& node : partition.nodes) {
       if (node.is_leaf()) {
-        coefficients += node.shared_with < 0 ? node.rank : 0;
+        coefficients += node.rank;
         rss += node.rss;
       }
     }
-    of_models.push_back(rows_of_models(partition));
     overall.emplace_back(rss / std::max(1.0, static_cast<double>(root.samples) - coefficients));
   }
   Eigen::MatrixXd variance = Eigen::MatrixXd::Zero(inputs.rows(), num_outputs());
@@ -225,9 +203,8 @@ Eigen::MatrixXd Model::standard_errors(const Inputs& inputs, int max_threads) co
       const std::vector<int>& outputs = partitions_[p].outputs;
       (*evaluators_)[p].validities().for_each_leaf(block, [&](int node, const RowList& list) {
         const Node& leaf = partitions_[p].nodes[static_cast<std::size_t>(node)];
-        const OfModel& model = of_models[p][static_cast<std::size_t>(leaf.shared_with >= 0 ? leaf.shared_with : node)];
-        const double freedom = std::max(0.0, static_cast<double>(model.samples - leaf.rank)) + pooled_rows;
-        const Eigen::VectorXd of_noise = (model.rss + pooled_rows * overall[p]) / freedom;
+        const double freedom = std::max(0.0, static_cast<double>(leaf.samples - leaf.rank)) + pooled_rows;
+        const Eigen::VectorXd of_noise = (leaf.rss + pooled_rows * overall[p]) / freedom;
         leverages(leaf, list, block, of_leaf);
         for (std::ptrdiff_t i = 0; i < list.count; ++i) {
           const double factor = list.validities[i] * of_leaf[static_cast<std::size_t>(i)];

@@ -8,7 +8,9 @@
 
 namespace llmt {
 
-/// 1 left of -1, 0 right of 1, and one or two continuous derivatives.
+/// 1 left of -1, 0 right of 1, and `smoothness` continuous derivatives: 1, or 2 in models that an earlier version
+/// wrote. Fits make no such models any more; predictions, derivatives and attributions of these files stay what they
+/// were.
 LLMT_INLINE double transition(double u, int smoothness) {
   const double held = u < -1.0 ? -1.0 : u > 1.0 ? 1.0 : u;
   const double v = 0.5 * (held + 1.0);

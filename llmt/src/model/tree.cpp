@@ -25,26 +25,10 @@ std::vector<int> parents_of(const Partition& partition) {
   return parents;
 }
 
-std::vector<int> model_parents_of(const Partition& partition) {
-  const std::vector<int> parents = parents_of(partition);
-  std::vector<int> result = parents;
+std::vector<int> guard_parents_of(const Partition& partition) {
+  std::vector<int> result = parents_of(partition);
   for (std::size_t i = 0; i < partition.nodes.size(); ++i) {
-    const int first = partition.nodes[i].shared_with;
-    if (first < 0) {
-      continue;
-    }
-    int a = static_cast<int>(i);
-    int b = result[static_cast<std::size_t>(first)];
-    while (a != b) {  // parents stand before their children
-      int& lower = a > b ? a : b;
-      lower = parents[static_cast<std::size_t>(lower)];
-    }
-    result[static_cast<std::size_t>(first)] = a;
-  }
-  for (std::size_t i = 0; i < partition.nodes.size(); ++i) {
-    if (const int first = partition.nodes[i].shared_with; first >= 0) {
-      result[i] = result[static_cast<std::size_t>(first)];
-    }
+    if (const int given = partition.nodes[i].guard_parent; given >= 0) result[i] = given;
   }
   return result;
 }

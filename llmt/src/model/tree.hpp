@@ -15,9 +15,8 @@ void make_leaf(Node& node);
 /// Parent of every node, -1 for the root.
 std::vector<int> parents_of(const Partition& partition);
 
-/// The node whose local model that of each node corrects, -1 for the root: its parent; for leaves that share a local
-/// model the root of the smallest subtree that holds them all.
-std::vector<int> model_parents_of(const Partition& partition);
+/// The node whose slopes take over beyond the range of each node, -1 for the root: see Node::guard_parent.
+std::vector<int> guard_parents_of(const Partition& partition);
 
 /// Boxes of all nodes, inputs x nodes each, cut out of low ... high by the axis-orthogonal splits on numbers.
 struct Boxes {

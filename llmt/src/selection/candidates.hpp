@@ -21,13 +21,11 @@ struct Candidates {
   bool crisp = true;
   ValidityKind kind = ValidityKind::blend;  ///< of the others
   Estimation estimation = Estimation::joint;
-  int smoothness = 1;
   std::vector<double> widths;  ///< empty: crisp alone
   std::vector<double> jumps;   ///< see Candidate::jump; none first
   std::vector<double> ridges;
   std::vector<double> shrinkages;
   std::vector<bool> sparse = {false};  ///< see Candidate::sparse
-  bool merge_leaves = false;           ///< see GrowthOptions::merge_leaves
 };
 
 struct Selection {

@@ -74,7 +74,7 @@ HeldOutErrors::HeldOutErrors(const std::vector<FoldRows>& folds, const std::vect
 }
 
 Candidate HeldOutErrors::candidate(const Key& key) const {
-  return {.validity = {candidates_.kind, shapes_[key.shape].width, candidates_.smoothness},
+  return {.validity = {candidates_.kind, shapes_[key.shape].width},
           .jump = shapes_[key.shape].jump,
           .estimation = candidates_.estimation,
           .ridge = candidates_.ridges.empty() ? 0.0 : candidates_.ridges[key.ridge],

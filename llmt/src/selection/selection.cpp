@@ -10,7 +10,6 @@
 #include "estimation/joint_fit.hpp"
 #include "selection/held_out_errors.hpp"
 #include "selection/judge.hpp"
-#include "selection/merge_selection.hpp"
 
 namespace llmt {
 namespace {
@@ -374,9 +373,6 @@ Selection select(const std::vector<FoldRows>& folds, const std::vector<GrownTree
   const CandidateError& least_squares = selection.best_of_kind.front();
   if (candidates.crisp && compared.size() > 1 && !is_beyond_chance(least_squares, selection.chosen)) {
     selection.chosen = least_squares;
-  }
-  if (candidates.merge_leaves) {
-    choose_local_models(compared, grown, weights, max_threads, selection);
   }
   return selection;
 }

@@ -20,22 +20,13 @@ constexpr double test_growth = 1.25;
 /// right one, and what is below it depends on it.
 constexpr double patience_with_rivals = 2.0;
 
-double student_p_value(double t, double freedom) { return freedom > 0.0 ? f_survival(t * t, 1.0, freedom) : 1.0; }
-
 }  // namespace
 
 LeafSearch::LeafSearch(const StreamSetting& setting)
     : setting_(setting),
       residuals_(setting.shape, Eigen::VectorXd::Ones(1)),
       bins_(static_cast<std::size_t>(setting.inputs)),
-      next_test_(std::max(first_rows, 2 * setting.options.min_leaf_samples)) {
-  if (setting.options.rule == StreamRule::ra) {
-    for (SignSums& sums : signs_) {
-      const Eigen::ArrayXd zero = Eigen::ArrayXd::Zero(setting.inputs);
-      sums = {zero, zero, zero, zero, zero};
-    }
-  }
-}
+      next_test_(std::max(first_rows, 2 * setting.options.min_leaf_samples)) {}
 
 void LeafSearch::set_edges(Bins& bins, std::vector<double> edges) const {
   bins.edges = std::move(edges);
@@ -87,11 +78,9 @@ void LeafSearch::lay_out(const Basis& basis) {
 
 void LeafSearch::put(const StreamRow& row, const RowProducts& products) {
   const std::ptrdiff_t size = setting_.shape.size();
-  const std::ptrdiff_t begin = setting_.options.rule == StreamRule::ra ? std::max(0, proposed_) : 0;
-  const std::ptrdiff_t end = setting_.options.rule == StreamRule::ra ? proposed_ + 1 : setting_.inputs;
   // The sums of all leaves do not fit into a cache: they are asked for before they are needed.
   sums_of_row_.clear();
-  for (std::ptrdiff_t j = begin; j < end; ++j) {
+  for (std::ptrdiff_t j = 0; j < setting_.inputs; ++j) {
     Bins& bins = bins_[static_cast<std::size_t>(j)];
     if (std::isnan(row.x[j]) || bins.edges.empty()) {
       continue;
@@ -108,37 +97,10 @@ void LeafSearch::put(const StreamRow& row, const RowProducts& products) {
   for (double* const sums : sums_of_row_) {
     products.add_to(sums);
   }
-  proposed_rows_ += proposed_ >= 0 ? 1 : 0;
 }
 
-void LeafSearch::add_signs(const StreamRow& row, double error) {
-  SignSums& sums = signs_[error >= 0.0 ? 1 : 0];
-  for (std::ptrdiff_t j = 0; j < setting_.inputs; ++j) {
-    const double value = row.z[j];
-    if (std::isnan(value)) {
-      continue;
-    }
-    sums.count(j) += 1.0;
-    const double before = value - sums.mean(j);
-    sums.mean(j) += before / sums.count(j);
-    sums.squares(j) += before * (value - sums.mean(j));
-    // About the mean as it is now: for rows of an unchanging leaf that is soon as good as the final one.
-    const double spread = std::abs(value - sums.mean(j));
-    sums.spread(j) += spread;
-    sums.spread_squares(j) += spread * spread;
-  }
-}
-
-void LeafSearch::add(const StreamRow& row, const Basis& basis, const RowProducts& products, double error) {
+void LeafSearch::add(const StreamRow& row, const Basis& basis, const RowProducts& products) {
   ++rows_;
-  if (setting_.options.rule == StreamRule::ra) {
-    if (proposed_ < 0) {
-      add_signs(row, error);
-    } else {
-      put(row, products);
-    }
-    return;
-  }
   if (laid_out_) {
     put(row, products);
     return;
@@ -247,42 +209,31 @@ std::optional<StreamSplit> LeafSearch::test(const Eigen::VectorXd& low, const Ei
   if (rows_ < next_test_) {
     return std::nullopt;
   }
-  next_test_ =
-      rows_ + std::max(setting_.coefficients(),
-                       static_cast<std::ptrdiff_t>((test_growth - 1.0) *
-                                                   static_cast<double>(proposed_ >= 0 ? proposed_rows_ : rows_)));
+  next_test_ = rows_ + std::max(setting_.coefficients(),
+                                static_cast<std::ptrdiff_t>((test_growth - 1.0) * static_cast<double>(rows_)));
   ++tests_;
-  if (setting_.options.rule == StreamRule::ra && proposed_ < 0) {
-    propose();
-    return std::nullopt;
-  }
   Found found;
   double rival = 1.0;  // ratio of the best split on another input
   for (int j = 0; j < setting_.inputs; ++j) {
-    if (proposed_ < 0 || proposed_ == j) {
-      const Found of_input = look_at(j);
-      const std::ptrdiff_t tested = found.tested + of_input.tested;
-      if (of_input.input >= 0 && (found.input < 0 || of_input.ratio < found.ratio)) {
-        rival = found.input < 0 ? 1.0 : found.ratio;
-        found = of_input;
-      } else if (of_input.input >= 0) {
-        rival = std::min(rival, of_input.ratio);
-      }
-      found.tested = tested;
+    const Found of_input = look_at(j);
+    const std::ptrdiff_t tested = found.tested + of_input.tested;
+    if (of_input.input >= 0 && (found.input < 0 || of_input.ratio < found.ratio)) {
+      rival = found.input < 0 ? 1.0 : found.ratio;
+      found = of_input;
+    } else if (of_input.input >= 0) {
+      rival = std::min(rival, of_input.ratio);
     }
+    found.tested = tested;
   }
   if (found.input >= 0 && passes(found)) {
     first_passed_ = first_passed_ > 0 ? first_passed_ : rows_;
     const double n = different_ * static_cast<double>(found.rows);
     // Squared residuals of two fits differ by 2 e (f_1 - f_2), about, and the fits by what both gain.
     const double scatter = 2.0 * std::sqrt(found.ratio * (2.0 - found.ratio - rival) / n);
-    if (proposed_ >= 0 || rival - found.ratio > scatter ||
+    if (rival - found.ratio > scatter ||
         static_cast<double>(rows_) >= patience_with_rivals * static_cast<double>(first_passed_)) {
       return split_at(found, low, high);
     }
-  }
-  if (proposed_ >= 0 && proposed_rows_ >= patience_) {
-    proposed_ = -1;
   }
   return std::nullopt;
 }
@@ -300,51 +251,8 @@ StreamSplit LeafSearch::split_at(const Found& found, const Eigen::VectorXd& low,
           found.rss * (1.0 - found.ratio) / static_cast<double>(found.rows)};
 }
 
-/// Residual analysis: the input whose mean or scatter differs most between the rows above and below the model, if
-/// significantly, is tried, halfway between the means.
-bool LeafSearch::propose() {
-  const double tests = static_cast<double>(tests_) * static_cast<double>(tests_ + 1);
-  const double allowed = setting_.options.significance / (2.0 * static_cast<double>(setting_.inputs) * tests);
-  double smallest = 1.0;
-  std::ptrdiff_t input = -1;
-  for (std::ptrdiff_t j = 0; j < setting_.inputs; ++j) {
-    const double n0 = signs_[0].count(j);
-    const double n1 = signs_[1].count(j);
-    if (std::min(n0, n1) < 2.0) {
-      continue;
-    }
-    const double freedom = different_ * (n0 + n1) - 2.0;
-    if (freedom <= 0.0) {
-      continue;
-    }
-    const auto p_value = [&](double difference, double squares) {
-      const double variance = squares / freedom * (1.0 / n0 + 1.0 / n1);
-      return variance > 0.0 ? student_p_value(difference / std::sqrt(variance), freedom) : 1.0;
-    };
-    const double of_means = p_value(signs_[1].mean(j) - signs_[0].mean(j), signs_[0].squares(j) + signs_[1].squares(j));
-    const double spread0 = signs_[0].spread(j) / n0;
-    const double spread1 = signs_[1].spread(j) / n1;
-    const double of_spreads = p_value(spread1 - spread0, signs_[0].spread_squares(j) - n0 * spread0 * spread0 +
-                                                             signs_[1].spread_squares(j) - n1 * spread1 * spread1);
-    if (const double p = std::min(of_means, of_spreads); p < smallest) {
-      smallest = p;
-      input = j;
-    }
-  }
-  if (input < 0 || !(smallest < allowed)) {
-    return false;
-  }
-  const double z = 0.5 * (signs_[0].mean(input) + signs_[1].mean(input));
-  set_edges(bins_[static_cast<std::size_t>(input)], {setting_.unscaled(input, z)});
-  proposed_ = static_cast<int>(input);
-  proposed_rows_ = 0;
-  patience_ = std::max(rows_, 4 * setting_.options.min_leaf_samples);
-  next_test_ = rows_ + 2 * setting_.options.min_leaf_samples;
-  return true;
-}
-
 std::ptrdiff_t LeafSearch::bytes() const {
-  std::size_t doubles = first_rows_.capacity() + 10 * static_cast<std::size_t>(signs_[0].count.size());
+  std::size_t doubles = first_rows_.capacity();
   for (const Bins& bins : bins_) {
     doubles += bins.grams.capacity() + bins.edges.capacity() + bins.rows.capacity();
   }

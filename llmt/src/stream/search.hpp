@@ -3,7 +3,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 #include <optional>
 #include <vector>
 
@@ -31,6 +30,7 @@ struct StreamSetting {
   double rounding = 0.0;         ///< residuals below this are rounding
   Eigen::VectorXd centre;        ///< of the inputs: z = (x - centre) / scale
   Eigen::VectorXd scale;
+  bool detect_drift = true;  ///< off in tests of what streams do without it
 
   std::ptrdiff_t coefficients() const { return inputs + 1; }
   double scaled(std::ptrdiff_t input, double x) const { return (x - centre(input)) / scale(input); }
@@ -46,17 +46,17 @@ struct StreamSplit {
   double gain = 0.0;  ///< decrease of the mean squared residual
 };
 
-/// Candidates of one leaf, by the rule of the options.
+/// Candidates of one leaf, by residual differences: every edge between bins, see docs/algorithms.md.
 ///
-/// The first rows are kept: their quantiles are the edges between the bins of each input. Then only sums are, for each
-/// bin of each input (rd), or of the inputs over the rows of either sign (ra). Tests come whenever the number of rows
-/// has grown by a quarter; the k-th is made at significance / (k (k + 1)).
+/// The first rows are kept: their quantiles are the edges between the bins of each input. Then only sums are kept, for
+/// each bin of each input. Tests come whenever the number of rows has grown by a quarter; the k-th is made at
+/// significance / (k (k + 1)).
 class LeafSearch {
  public:
   explicit LeafSearch(const StreamSetting& setting);
 
-  /// `products`: of the row in the leaf's basis; `error`: of its prediction before it was learned.
-  void add(const StreamRow& row, const Basis& basis, const RowProducts& products, double error);
+  /// `products`: of the row in the leaf's basis.
+  void add(const StreamRow& row, const Basis& basis, const RowProducts& products);
 
   /// The split to make, if a test is due and shows one. `low`, `high`: range of the inputs in the leaf.
   std::optional<StreamSplit> test(const Eigen::VectorXd& low, const Eigen::VectorXd& high, double different);
@@ -95,21 +95,10 @@ class LeafSearch {
     std::ptrdiff_t rows = 0;
     std::ptrdiff_t tested = 0;
   };
-  /// Of the rows of one sign of the residual: number, and per input count, mean, sum of squared deviations, sum and sum
-  /// of squares of absolute deviations.
-  struct SignSums {
-    Eigen::ArrayXd count;
-    Eigen::ArrayXd mean;
-    Eigen::ArrayXd squares;
-    Eigen::ArrayXd spread;
-    Eigen::ArrayXd spread_squares;
-  };
 
   void lay_out(const Basis& basis);
   void set_edges(Bins& bins, std::vector<double> edges) const;
   void put(const StreamRow& row, const RowProducts& products);
-  void add_signs(const StreamRow& row, double error);
-  bool propose();
   Sums side(const Bins& bins, std::size_t begin, std::size_t end) const;
   Found look_at(int input);
   bool passes(const Found& found) const;
@@ -120,10 +109,6 @@ class LeafSearch {
   std::vector<double> first_rows_;  // inputs, output, weight
   bool laid_out_ = false;
   std::vector<Bins> bins_;            // per input
-  std::array<SignSums, 2> signs_;     // ra
-  int proposed_ = -1;                 // ra: input that is tried; its threshold is the edge between two bins
-  std::ptrdiff_t proposed_rows_ = 0;  // in these bins
-  std::ptrdiff_t patience_ = 0;       // rows after which that is given up
   std::vector<double*> sums_of_row_;  // of put()
   std::ptrdiff_t rows_ = 0;
   std::ptrdiff_t next_test_ = 0;

@@ -161,7 +161,7 @@ double StreamTree::predict(const StreamNode& top, const StreamRow& row) {
   return value_of(*node, row.z);
 }
 
-double StreamTree::learn(const StreamRow& row) { return learn(root_, row, !setting_.options.detect_drift); }
+double StreamTree::learn(const StreamRow& row) { return learn(root_, row, !setting_.detect_drift); }
 
 /// `watched`: an alternate grows at or above the node already, no alarm is needed.
 double StreamTree::learn(std::unique_ptr<StreamNode>& slot, const StreamRow& row, bool watched) {
@@ -175,7 +175,7 @@ double StreamTree::learn(std::unique_ptr<StreamNode>& slot, const StreamRow& row
   double error = 0.0;
   if (node.is_leaf()) {
     error = row.y - value_of(node, row.z);
-    learn_leaf(node, row, error);
+    learn_leaf(node, row);
   } else {
     const std::size_t side = side_of(node, row.x[node.input]);
     products_.set(node.basis, row.z, row.y, row.weight);
@@ -222,7 +222,7 @@ double StreamTree::learn(std::unique_ptr<StreamNode>& slot, const StreamRow& row
   return error;
 }
 
-void StreamTree::learn_leaf(StreamNode& leaf, const StreamRow& row, double error) {
+void StreamTree::learn_leaf(StreamNode& leaf, const StreamRow& row) {
   products_.set(leaf.basis, row.z, row.y, row.weight);
   products_.add_to(leaf.sums);
   if (static_cast<double>(leaf.sums.rows) >= solve_growth * static_cast<double>(leaf.solved_at)) {
@@ -239,7 +239,7 @@ void StreamTree::learn_leaf(StreamNode& leaf, const StreamRow& row, double error
   if (!leaf.search) {
     leaf.search = std::make_unique<LeafSearch>(setting_);
   }
-  leaf.search->add(row, leaf.basis, products_, error);
+  leaf.search->add(row, leaf.basis, products_);
   if (const std::optional<StreamSplit> found = leaf.search->test(leaf.low, leaf.high, row.different)) {
     split(leaf, *found);
   }

@@ -120,7 +120,7 @@ class StreamTree {
  private:
   static double predict(const StreamNode& top, const StreamRow& row);
   double learn(std::unique_ptr<StreamNode>& slot, const StreamRow& row, bool watched);
-  void learn_leaf(StreamNode& leaf, const StreamRow& row, double error);
+  void learn_leaf(StreamNode& leaf, const StreamRow& row);
   void split(StreamNode& leaf, const StreamSplit& found);
   void end_epoch(StreamNode& node, double different);
   void settle(std::unique_ptr<StreamNode>& slot);

@@ -213,12 +213,11 @@ std::vector<Case> cases() {
   base.selection.folds.count = 0;
   std::vector<Case> result = {{"crisp", base}};
   for (const double width : {0.5, 1.0, 4.0}) {
-    for (const int smoothness : {1, 2}) {
+    for (const double ridge : {1e-6, 1e-2}) {
       llmt::FitOptions blend = base;
       blend.blend.validity = llmt::ValidityChoice::blend;
       blend.blend.widths = {width};
-      blend.blend.smoothness = smoothness;
-      blend.blend.ridges = {smoothness == 1 ? 1e-6 : 1e-2};
+      blend.blend.ridges = {ridge};
       result.push_back({"blend", blend});
     }
   }

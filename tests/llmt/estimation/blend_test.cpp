@@ -146,12 +146,14 @@ double largest_jump_of_curvature(const llmt::Model& model, double step) {
   return largest;
 }
 
-TEST(Blend, SecondDerivativeIsContinuousForSmoothnessTwoOnly) {
+TEST(Blend, SecondDerivativeIsContinuousInFilesOfSmoothnessTwoOnly) {
   const Eigen::MatrixXd x = oracle::uniform(400, 1, 41);
   const Eigen::MatrixXd y = (6.0 * x).array().sin();
   for (const int smoothness : {1, 2}) {
-    const Kind kind{llmt::ValidityChoice::blend, smoothness, 1.0};
-    const llmt::Model model = llmt::fit(x, y, only(kind, llmt::Estimation::joint, 6)).model;
+    const Kind kind{llmt::ValidityChoice::blend, 1.0};
+    const llmt::Model fitted = llmt::fit(x, y, only(kind, llmt::Estimation::joint, 6)).model;
+    const llmt::Model model = llmt::from_json(llmt::to_json(with_smoothness(fitted, smoothness)));
+    EXPECT_EQ(model.partitions()[0].validity.smoothness, smoothness);
     // The change goes to zero with the step where the second derivative is continuous, and stays where it jumps.
     const double ratio = largest_jump_of_curvature(model, 2e-5) / largest_jump_of_curvature(model, 2e-4);
     if (smoothness == 1) {

@@ -157,25 +157,6 @@ TEST(Sample, SparseEstimateOnAllRowsIsReachedFromItWithItsZeros) {
   EXPECT_LT(error_after - best, 0.02 * (error_before - best));  // two steps, each about a digit of the coefficients
 }
 
-TEST(Sample, JointEstimateOfSharedLocalModelsIsReachedFromItToo) {
-  const Rows data = rows(20000, 3);
-  const llmt::TrainingRows training = llmt::training_rows(data.table, all(20000));
-  const Partition tree = blended_tree(training);
-  const llmt::TrainingRows sample = llmt::thinned(training, 60 * 4 * 8);
-  const llmt::Regularisation regularisation{1e-6, 0.0};
-  llmt::JointFit of_all(training, tree, 1);
-  llmt::JointFit fit(sample, tree, 1);
-  const std::vector<llmt::Merge> merges = of_all.merges();
-  for (std::size_t k = 0; k < 3; ++k) {
-    of_all.share(merges[k]);
-    fit.share(merges[k]);
-  }
-  const Partition exact = of_all.joint(8, {regularisation}).front();
-  const Partition reached = fit.joint_on(training, 8, regularisation);
-  EXPECT_EQ(reached.num_local_models(), 5);
-  EXPECT_LE(distance(reached, exact), 0.1 * distance(fit.joint(8, {regularisation}).front(), exact));
-}
-
 TEST(Sample, DependsOnTheRowsAndNotOnTheirOrder) {
   const Rows data = rows(5000, 2);
   std::vector<int> order = all(5000);

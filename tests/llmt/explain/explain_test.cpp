@@ -9,6 +9,7 @@
 
 #include "llmt/fit.hpp"
 #include "oracles/oracles.hpp"
+#include "oracles/random_trees.hpp"
 
 namespace {
 
@@ -49,10 +50,10 @@ llmt::Model fitted(const Data& data, const Kind& kind, std::vector<int> categori
   options.growth.max_leaves = 12;
   options.growth.significance = 1.0;
   options.growth.min_leaf_samples = 8;
-  options.blend = {.validity = kind.validity, .widths = {1.5}, .smoothness = kind.smoothness};
+  options.blend = {.validity = kind.validity, .widths = {1.5}};
   options.selection.folds.count = 0;
   options.categorical_inputs = std::move(categorical);
-  return llmt::fit(data.x, data.y, options).model;
+  return random_trees::with_smoothness(llmt::fit(data.x, data.y, options).model, kind.smoothness);
 }
 
 /// Steps along the line, in each of which one input after the other is moved, in both orders: from predictions alone.
@@ -199,10 +200,10 @@ TEST(Explain, AnInputThatIsNotUsedGetsNothing) {
                       .max_leaves = 12,
                       .split_inputs = {0, 2, 3},
                       .regression_inputs = {0, 2, 3}};
-    options.blend = {.validity = kind.validity, .widths = {1.5}, .smoothness = kind.smoothness};
+    options.blend = {.validity = kind.validity, .widths = {1.5}};
     options.selection.folds.count = 0;
     options.categorical_inputs = {3};
-    const llmt::Model model = llmt::fit(data.x, data.y, options).model;
+    const llmt::Model model = random_trees::with_smoothness(llmt::fit(data.x, data.y, options).model, kind.smoothness);
     for (int row = 0; row < 20; ++row) {
       EXPECT_EQ(llmt::attribute(model, data.x.row(row).transpose()).contributions.col(1), Eigen::Vector2d::Zero());
     }

@@ -45,8 +45,6 @@ TEST(Fit, MistakesInWeightsCategoriesAndBlendsAreNamed) {
               options.blend.widths = {1.0, -2.0};
             }),
             "llmt::fit: blend.widths is -2, it must be finite and positive");
-  EXPECT_EQ(error([](auto& options) { options.blend.smoothness = 3; }),
-            "llmt::fit: blend.smoothness is 3, it must be 1 or 2");
   EXPECT_EQ(error([](auto& options) { options.blend.ridges = {-1.0}; }),
             "llmt::fit: blend.ridges is -1, it must be finite and not negative");
   EXPECT_EQ(error([](auto& options) { options.blend.shrinkages = {nan}; }),

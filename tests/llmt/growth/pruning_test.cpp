@@ -224,7 +224,6 @@ TEST(WeakestLink, NoiseIsLeftToLeastSquares) {
     }
     llmt::FitOptions options;
     options.growth.pruning = llmt::Pruning::weakest_link;
-    options.growth.merge_leaves = true;
     options.blend.validity = llmt::ValidityChoice::crisp;
     split += llmt::fit(x, y, options).summary.partitions[0].leaves > 1 ? 1 : 0;
   }

@@ -20,7 +20,6 @@ namespace {
 
 using llmt::GramShape;
 using llmt::StreamOptions;
-using llmt::StreamRule;
 using namespace stream_data;
 
 llmt::StreamSetting setting_for(std::ptrdiff_t inputs, StreamOptions options = {}) {
@@ -119,7 +118,7 @@ TEST(StreamSearch, EveryEdgeLeavesWhatBruteForceRefitsLeave) {
   for (std::ptrdiff_t i = 0; i < x.rows(); ++i) {
     const Eigen::VectorXd row = x.row(i).transpose();
     products.set(basis, row.data(), y(i, 0), 1.0);
-    search.add({row.data(), row.data(), y(i, 0), 1.0, 1.0}, basis, products, 0.0);
+    search.add({row.data(), row.data(), y(i, 0), 1.0, 1.0}, basis, products);
   }
   for (int input = 0; input < 3; ++input) {
     const llmt::LeafSearch::Edges edges = search.edges(input);
@@ -169,6 +168,46 @@ TEST(StreamTree, AThresholdStaysWhereItIsRight) {
       }
     }
   }
+}
+
+/// Learns rows of weight 1 that come once.
+void learn(llmt::StreamTree& tree, const Eigen::MatrixXd& x, const Eigen::MatrixXd& y) {
+  for (std::ptrdiff_t i = 0; i < x.rows(); ++i) {
+    const Eigen::VectorXd row = x.row(i).transpose();
+    tree.learn({row.data(), row.data(), y(i, 0), 1.0, 1.0});
+  }
+}
+
+TEST(StreamTree, WithoutAlarmsASplitThatIsNoLongerNeededIsTakenBackToo) {
+  llmt::StreamSetting setting = setting_for(2);
+  setting.detect_drift = false;
+  llmt::StreamTree tree(setting, Eigen::VectorXd::Zero(3));
+  const Eigen::MatrixXd x = oracle::uniform(30000, 2, 1);
+  learn(tree, x.topRows(3000), kink(x.topRows(3000)) + 0.1 * noise(3000, 2));
+  EXPECT_GT(tree.counts().leaves, 1);
+  learn(tree, x.bottomRows(27000), affine(x.bottomRows(27000)) + 0.1 * noise(27000, 3));
+  EXPECT_GE(tree.counts().prunes, 1);
+  EXPECT_EQ(tree.counts().drifts, 0);
+}
+
+TEST(StreamTree, WithoutAlarmsAChangeIsLearnedFarMoreSlowly) {
+  const Eigen::MatrixXd x = oracle::uniform(12000, 2, 1);
+  const Eigen::MatrixXd query = oracle::uniform(1000, 2, 7);
+  std::array<double, 2> errors{};
+  for (const bool detect : {true, false}) {
+    llmt::StreamSetting setting = setting_for(2);
+    setting.detect_drift = detect;
+    llmt::StreamTree tree(setting, Eigen::VectorXd::Zero(3));
+    learn(tree, x.topRows(6000), kink(x.topRows(6000)) + 0.1 * noise(6000, 2));
+    learn(tree, x.bottomRows(6000), -kink(x.bottomRows(6000)) + 0.1 * noise(6000, 3));
+    for (std::ptrdiff_t i = 0; i < query.rows(); ++i) {
+      const Eigen::VectorXd row = query.row(i).transpose();
+      const double error = tree.predict({row.data(), row.data(), 0.0, 1.0, 1.0}) + kink(query.row(i))(0, 0);
+      errors[detect ? 0 : 1] += error * error;
+    }
+    EXPECT_EQ(tree.counts().drifts > 0, detect);
+  }
+  EXPECT_GT(std::sqrt(errors[1]), 4.0 * std::sqrt(errors[0]));
 }
 
 TEST(StreamTree, RisesAreSeenAndSteadyErrorsRaiseNoAlarm) {

@@ -24,6 +24,13 @@ namespace {
 constexpr std::ptrdiff_t binned_rows = 200000;
 constexpr std::ptrdiff_t exact_rows = 2000;
 
+/// Weight of the prior in the m-estimates of RETIS, in rows: the error of one model for all data.
+constexpr double prior_rows = 2.0;
+
+/// Splits over which GrowthOptions::min_improvement takes the mean: one split alone may help little before the next one
+/// helps much.
+constexpr std::ptrdiff_t improvement_lookahead = 10;
+
 /// A node that may still be split.
 struct OpenLeaf {
   int node = 0;
@@ -92,8 +99,8 @@ class Grower {
       stop = static_cast<StopReason>(std::max_element(refusals_.begin(), refusals_.end()) - refusals_.begin());
     }
     gains_.resize(nodes_.size(), 0.0);
-    if (options_.rule == GrowthRule::retis && options_.pruning_m > 0.0) {
-      const std::vector<std::size_t> kept = prune(nodes_, data_.output_weights, options_.pruning_m);
+    if (options_.rule == GrowthRule::retis) {
+      const std::vector<std::size_t> kept = prune(nodes_, data_.output_weights, prior_rows);
       stop = kept.size() < gains_.size() ? StopReason::pruning : stop;
       for (std::size_t i = 0; i < kept.size(); ++i) {
         gains_[i] = nodes_[i].is_leaf() ? 0.0 : gains_[kept[i]];
