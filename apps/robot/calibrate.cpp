@@ -62,7 +62,7 @@ Json figures_json(const ErrorFigures& figures) {
 
 Json report_json(const CalibrateArguments& arguments, const robotics::Measurements& measurements,
                  const CalibrationReport& report, const std::vector<Row>& rows) {
-  const discovery::Result& result = report.calibration.result;
+  const discovery::SolverResult& result = report.calibration.result;
   Json json;
   json["robot"] = arguments.robot;
   json["data"] = arguments.data;
@@ -143,7 +143,7 @@ std::string error_table(const std::vector<Row>& rows, const CalibrationReport& r
 
 std::string parameter_table(const robotics::Robot& nominal, const CalibrationReport& report) {
   const std::vector<discovery::Parameter> before = robotics::parameters(nominal);
-  const discovery::Result& result = report.calibration.result;
+  const discovery::SolverResult& result = report.calibration.result;
   Table table({"parameter", "nominal", "identified", "change", "std error", "unit"});
   for (std::size_t k = 0; k < result.parameters.size(); ++k) {
     const discovery::Parameter& after = result.parameters[k];
@@ -161,7 +161,7 @@ std::string parameter_table(const robotics::Robot& nominal, const CalibrationRep
 void print_report(const CalibrateArguments& arguments, const robotics::Robot& nominal,
                   const robotics::Measurements& measurements, const CalibrationReport& report,
                   const std::vector<Row>& rows) {
-  const discovery::Result& result = report.calibration.result;
+  const discovery::SolverResult& result = report.calibration.result;
   print(fmt::format("{}: {} poses of {}\n", arguments.data, measurements.count(), nominal.chain.name));
   for (const std::string& warning : measurements.warnings) {
     print("Note: " + warning + "\n");
@@ -262,10 +262,9 @@ void calibrate_command(CalibrateArguments arguments) {
 void add_calibrate(CLI::App& app) {
   CLI::App* command = app.add_subcommand("calibrate", "Identify a robot's parameters from measured positions");
   command->description(
-      "Identify base, tool and geometry of a robot from measured tool positions; with --correct, learn what is left as "
-      "a function of the\n"
-      "joint values. Held-out figures: everything, the size of the correction included, is fitted without the poses it "
-      "is judged on.\n"
+      "Identify base, tool and geometry of a robot from measured tool positions; with --correct, learn what is left\n"
+      "as a function of the joint values. Held-out figures: everything, the size of the correction included, is\n"
+      "fitted without the poses it is judged on.\n"
       "The correction is kept if its held-out mean error is the smaller one.");
   command->footer("Example: llmt-robot calibrate robotics/robots/ur10.yaml measured.csv --correct -o calibrated.yaml");
   const auto arguments = std::make_shared<CalibrateArguments>();
