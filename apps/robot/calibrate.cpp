@@ -160,7 +160,7 @@ std::string parameter_table(const robotics::Robot& nominal, const CalibrationRep
 
 void print_report(const CalibrateArguments& arguments, const robotics::Robot& nominal,
                   const robotics::Measurements& measurements, const CalibrationReport& report,
-                  const std::vector<Row>& rows) {
+                  const std::vector<Row>& rows, const std::vector<std::string>& suspicions) {
   const discovery::SolverResult& result = report.calibration.result;
   print(fmt::format("{}: {} poses of {}\n", arguments.data, measurements.count(), nominal.chain.name));
   for (const std::string& warning : measurements.warnings) {
@@ -202,6 +202,9 @@ void print_report(const CalibrateArguments& arguments, const robotics::Robot& no
   if (!report.decision.empty()) {
     print(report.decision + "\n");
   }
+  for (const std::string& suspicion : suspicions) {
+    print("WARNING: " + suspicion + "\n");
+  }
 }
 
 /// CAL.yaml and, if the correction is kept, CAL.correction.json beside it.
@@ -236,18 +239,17 @@ void calibrate_command(CalibrateArguments arguments) {
   arguments.options.progress = [&](std::ptrdiff_t done, std::ptrdiff_t total) { progress.show(done, total); };
   const CalibrationReport report = robotics::report_calibration(nominal, measurements, arguments.options);
   progress.clear();
-  for (std::string& suspicion : robotics::suspicions(nominal, measurements, report)) {
-    measurements.warnings.push_back(std::move(suspicion));
-  }
+  const std::vector<std::string> suspicions = robotics::suspicions(nominal, measurements, report);
   const std::vector<Row> rows = rows_of(report, test);
   std::vector<std::string> written;
   if (!arguments.output.empty()) {
     written = write_result(arguments.output, report);
   }
   if (arguments.json) {
+    measurements.warnings.insert(measurements.warnings.end(), suspicions.begin(), suspicions.end());
     print_json(report_json(arguments, measurements, report, rows));
   } else {
-    print_report(arguments, nominal, measurements, report, rows);
+    print_report(arguments, nominal, measurements, report, rows, suspicions);
     if (!written.empty()) {
       print(fmt::format("Written: {}\n", fmt::join(written, ", ")));
     }

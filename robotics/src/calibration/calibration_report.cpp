@@ -142,8 +142,17 @@ std::vector<std::string> suspicions(const Robot& robot, const Measurements& meas
                       values.minCoeff(), values.maxCoeff()));
     }
   }
+  const double implausible_mm = length_mm / 50.0;
+  const bool is_held_out = report.geometric.held_out_mm.size() > 0;
   const double nominal = report.nominal.in_sample_mm.mean();
-  if (nominal > length_mm / 50.0) {
+  const double calibrated = (is_held_out ? report.geometric.held_out_mm : report.geometric.in_sample_mm).mean();
+  if (calibrated > implausible_mm) {
+    found.push_back(
+        fmt::format("the calibrated robot still misses the {} by {:.4g} mm on average, {:.0f} % of the arm's length: "
+                    "this description does not belong to these measurements, and the identified values mean nothing; "
+                    "check units, signs and zeros of the joints, their order, and whether it is this robot",
+                    is_held_out ? "held-out points" : "measured points", calibrated, 100.0 * calibrated / length_mm));
+  } else if (nominal > implausible_mm) {
     found.push_back(
         fmt::format("the described robot misses the measured points by {:.4g} mm on average, whatever its base and "
                     "tool: check units, signs and zeros of the joints, their order, and the description",
