@@ -15,7 +15,7 @@
 namespace bench {
 
 using namespace llmt::robotics;
-using llmt::discovery::Candidate;
+using Candidate = llmt::discovery::EffectCandidate;
 using llmt::discovery::Evidence;
 
 /// What distinguishes the variants of a type at a place; nothing if it cannot be there.

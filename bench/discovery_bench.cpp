@@ -70,14 +70,14 @@ void search(benchmark::State& state) {
   const std::vector<Effect> effects = hypotheses(calibrated, measured.poses, static_cast<std::size_t>(state.range(1)));
   const discovery::Evidence evidence = bench::evidence_of(calibrated, measured);
   discovery::Verdict verdict;
-  std::vector<discovery::Candidate> candidates;
+  std::vector<discovery::EffectCandidate> candidates;
   for (auto _ : state) {
     candidates = bench::candidates_of(calibrated, effects, measured);
     verdict = discovery::search(evidence, candidates);
   }
   bool right = verdict.findings.size() == 1 && verdict.findings[0].family == "joint_compliance";
   for (const discovery::Finding& finding : verdict.findings) {
-    for (const discovery::Term& term : finding.terms) {
+    for (const discovery::FindingTerm& term : finding.terms) {
       right = right && candidates[term.candidate].location == hidden_place;
     }
   }

@@ -94,7 +94,7 @@ Trial arm(bool residual) {
     measurements.poses = train;
     measurements.positions_mm = robotics::positions(flexible, train);
     measurements.measured = {true, true, false};
-    llmt::discovery::Problem problem = robotics::calibration_problem(rigid, measurements);
+    llmt::discovery::LeastSquaresProblem problem = robotics::calibration_problem(rigid, measurements);
     for (llmt::discovery::Parameter& parameter : problem.parameters) {
       parameter.free = parameter.name == "joint2.a" || parameter.name == "joint2.b" || parameter.name == "tool.x" ||
                        parameter.name == "tool.y";

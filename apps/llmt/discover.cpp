@@ -99,7 +99,7 @@ Comparison read_comparison(const DiscoverArguments& arguments) {
 }
 
 std::vector<discovery::ModelTerm> terms_to_try(const DiscoverArguments& arguments, const Comparison& comparison,
-                                               std::vector<discovery::Untestable>& untestable) {
+                                               std::vector<discovery::UntestableTerm>& untestable) {
   std::vector<discovery::ModelTerm> library = discovery::standard_terms(comparison.inputs, &untestable);
   if (arguments.terms.empty()) return library;
   std::vector<std::string> taken;
@@ -146,7 +146,7 @@ DiscoveryReport discovered(const DiscoverArguments& arguments, const Comparison&
                          .rows = comparison.simulated.rows(),
                          .missing = {},
                          .regions = {}};
-  std::vector<discovery::Untestable> untestable;
+  std::vector<discovery::UntestableTerm> untestable;
   try {
     const std::vector<discovery::ModelTerm> terms = terms_to_try(arguments, comparison, untestable);
     const discovery::Simulation simulation =
@@ -157,7 +157,7 @@ DiscoveryReport discovered(const DiscoverArguments& arguments, const Comparison&
     // What the library refuses after the options were checked is in the data.
     throw std::runtime_error(fmt::format("{}: {}", arguments.measured, error.what()));
   }
-  for (discovery::Untestable& entry : untestable) report.missing.not_testable.push_back(std::move(entry));
+  for (discovery::UntestableTerm& entry : untestable) report.missing.not_testable.push_back(std::move(entry));
   report.regions = gap_regions(comparison.inputs, comparison.measured, report.missing);
   return report;
 }

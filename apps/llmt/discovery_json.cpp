@@ -92,7 +92,7 @@ Json report_json(const DiscoveryReport& report) {
                        {"mean_gap", region.mean_gap}});
   }
   Json untestable = Json::array();
-  for (const discovery::Untestable& entry : missing.not_testable) {
+  for (const discovery::UntestableTerm& entry : missing.not_testable) {
     untestable.push_back({{"effect", entry.what}, {"why", entry.why}});
   }
   Json visible = Json::array();

@@ -62,7 +62,7 @@ Json figures_json(const ErrorFigures& figures) {
 
 Json report_json(const CalibrateArguments& arguments, const robotics::Measurements& measurements,
                  const CalibrationReport& report, const std::vector<Row>& rows) {
-  const discovery::Result& result = report.calibration.result;
+  const discovery::SolverResult& result = report.calibration.result;
   Json json;
   json["robot"] = arguments.robot;
   json["data"] = arguments.data;
@@ -143,7 +143,7 @@ std::string error_table(const std::vector<Row>& rows, const CalibrationReport& r
 
 std::string parameter_table(const robotics::Robot& nominal, const CalibrationReport& report) {
   const std::vector<discovery::Parameter> before = robotics::parameters(nominal);
-  const discovery::Result& result = report.calibration.result;
+  const discovery::SolverResult& result = report.calibration.result;
   Table table({"parameter", "nominal", "identified", "change", "std error", "unit"});
   for (std::size_t k = 0; k < result.parameters.size(); ++k) {
     const discovery::Parameter& after = result.parameters[k];
@@ -160,8 +160,8 @@ std::string parameter_table(const robotics::Robot& nominal, const CalibrationRep
 
 void print_report(const CalibrateArguments& arguments, const robotics::Robot& nominal,
                   const robotics::Measurements& measurements, const CalibrationReport& report,
-                  const std::vector<Row>& rows) {
-  const discovery::Result& result = report.calibration.result;
+                  const std::vector<Row>& rows, const std::vector<std::string>& suspicions) {
+  const discovery::SolverResult& result = report.calibration.result;
   print(fmt::format("{}: {} poses of {}\n", arguments.data, measurements.count(), nominal.chain.name));
   for (const std::string& warning : measurements.warnings) {
     print("Note: " + warning + "\n");
@@ -202,6 +202,9 @@ void print_report(const CalibrateArguments& arguments, const robotics::Robot& no
   if (!report.decision.empty()) {
     print(report.decision + "\n");
   }
+  for (const std::string& suspicion : suspicions) {
+    print("WARNING: " + suspicion + "\n");
+  }
 }
 
 /// CAL.yaml and, if the correction is kept, CAL.correction.json beside it.
@@ -236,18 +239,17 @@ void calibrate_command(CalibrateArguments arguments) {
   arguments.options.progress = [&](std::ptrdiff_t done, std::ptrdiff_t total) { progress.show(done, total); };
   const CalibrationReport report = robotics::report_calibration(nominal, measurements, arguments.options);
   progress.clear();
-  for (std::string& suspicion : robotics::suspicions(nominal, measurements, report)) {
-    measurements.warnings.push_back(std::move(suspicion));
-  }
+  const std::vector<std::string> suspicions = robotics::suspicions(nominal, measurements, report);
   const std::vector<Row> rows = rows_of(report, test);
   std::vector<std::string> written;
   if (!arguments.output.empty()) {
     written = write_result(arguments.output, report);
   }
   if (arguments.json) {
+    measurements.warnings.insert(measurements.warnings.end(), suspicions.begin(), suspicions.end());
     print_json(report_json(arguments, measurements, report, rows));
   } else {
-    print_report(arguments, nominal, measurements, report, rows);
+    print_report(arguments, nominal, measurements, report, rows, suspicions);
     if (!written.empty()) {
       print(fmt::format("Written: {}\n", fmt::join(written, ", ")));
     }
@@ -262,10 +264,9 @@ void calibrate_command(CalibrateArguments arguments) {
 void add_calibrate(CLI::App& app) {
   CLI::App* command = app.add_subcommand("calibrate", "Identify a robot's parameters from measured positions");
   command->description(
-      "Identify base, tool and geometry of a robot from measured tool positions; with --correct, learn what is left as "
-      "a function of the\n"
-      "joint values. Held-out figures: everything, the size of the correction included, is fitted without the poses it "
-      "is judged on.\n"
+      "Identify base, tool and geometry of a robot from measured tool positions; with --correct, learn what is left\n"
+      "as a function of the joint values. Held-out figures: everything, the size of the correction included, is\n"
+      "fitted without the poses it is judged on.\n"
       "The correction is kept if its held-out mean error is the smaller one.");
   command->footer("Example: llmt-robot calibrate robotics/robots/ur10.yaml measured.csv --correct -o calibrated.yaml");
   const auto arguments = std::make_shared<CalibrateArguments>();

@@ -133,7 +133,7 @@ std::string gap_lines(const Discovery& found) {
 
 std::string untestable_lines(const Discovery& found) {
   std::map<std::string, std::vector<std::string>> by_reason;
-  for (const robotics::Untestable& entry : found.not_testable) {
+  for (const robotics::UntestableEffect& entry : found.not_testable) {
     // Columns of the single joints are one matter: dir1, dir2, ... are dirN.
     static const std::regex numbered("([a-z])[0-9]+(_|$|\\|)");
     by_reason[std::regex_replace(entry.why, numbered, "$1N$2")].push_back(entry.what);

@@ -51,7 +51,7 @@ void print_arm(const PlanarStudy& study) {
   print(table.text());
 }
 
-void print_calibration(const discovery::Result& result) {
+void print_calibration(const discovery::SolverResult& result) {
   print(fmt::format(
       "L2 {:.3f}, L3 {:.3f}, v2 {:.3f}, v3 {:.3f} mm; calibrability number cond2(J'J) {:.2f}, cond2(J) {:.2f}\n",
       result.parameter("joint2.a").value, result.parameter("tool.x").value, -result.parameter("joint2.b").value,

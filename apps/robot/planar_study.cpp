@@ -84,13 +84,13 @@ AxisTrees fit_axes(const Eigen::MatrixXd& joints, const Eigen::MatrixXd& outputs
 }
 
 /// The calibrated arm, d = [L2, v2, L3, v3], eq. (12)-(15), by the undamped method of eq. (6)-(9).
-discovery::Result calibrate_plane(const Robot& rigid, const Poses& poses, const Eigen::MatrixXd& truth) {
+discovery::SolverResult calibrate_plane(const Robot& rigid, const Poses& poses, const Eigen::MatrixXd& truth) {
   robotics::Measurements measurements;
   measurements.poses = poses;
   measurements.positions_mm = Eigen::MatrixXd::Zero(truth.rows(), 3);
   measurements.positions_mm.leftCols(2) = truth;
   measurements.measured = {true, true, false};
-  discovery::Problem problem = robotics::calibration_problem(rigid, measurements);
+  discovery::LeastSquaresProblem problem = robotics::calibration_problem(rigid, measurements);
   for (discovery::Parameter& parameter : problem.parameters) {
     parameter.free = parameter.name == "joint2.a" || parameter.name == "joint2.b" || parameter.name == "tool.x" ||
                      parameter.name == "tool.y";

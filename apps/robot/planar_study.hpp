@@ -29,10 +29,10 @@ struct StudyRow {
 
 /// The paper's comparison on one reading of its flexible arm.
 struct PlanarStudy {
-  bool carry_over = true;           ///< link bending with the moment and slope that one link hands to the next
-  discovery::Result calibration;    ///< L2, v2, L3, v3, by the paper's modified Newton method
-  std::vector<StudyRow> arm;        ///< rigid, calibrated, corrected
-  std::vector<StudyRow> black_box;  ///< trees of the position itself
+  bool carry_over = true;               ///< link bending with the moment and slope that one link hands to the next
+  discovery::SolverResult calibration;  ///< L2, v2, L3, v3, by the paper's modified Newton method
+  std::vector<StudyRow> arm;            ///< rigid, calibrated, corrected
+  std::vector<StudyRow> black_box;      ///< trees of the position itself
   /// Root mean square error in x against the noise-free residual, of a crisp tree and of a blend learned from residuals
   /// with noise of `noise_mm` (standard deviation) and at most the paper's leaves, in mm.
   double noisy_crisp = 0.0;

@@ -29,8 +29,8 @@ class Noise {
   std::uint64_t state_;
 };
 
-Problem linear_problem(const Eigen::MatrixXd& matrix, const Eigen::VectorXd& target) {
-  Problem problem;
+LeastSquaresProblem linear_problem(const Eigen::MatrixXd& matrix, const Eigen::VectorXd& target) {
+  LeastSquaresProblem problem;
   for (Eigen::Index k = 0; k < matrix.cols(); ++k) {
     problem.parameters.push_back({.name = {'p', static_cast<char>('0' + k)}, .unit = "mm"});
   }
@@ -49,12 +49,12 @@ Eigen::MatrixXd random_matrix(Eigen::Index rows, Eigen::Index columns, std::uint
 }
 
 // y = a exp(-b t), a textbook nonlinear fit.
-Problem decay_problem(double a, double b, double noise_sigma, std::uint64_t seed) {
+LeastSquaresProblem decay_problem(double a, double b, double noise_sigma, std::uint64_t seed) {
   Noise noise(seed);
   const Eigen::VectorXd t = Eigen::VectorXd::LinSpaced(60, 0.0, 3.0);
   Eigen::VectorXd y = a * (-b * t.array()).exp();
   for (double& value : y) value += noise_sigma * noise.normal();
-  Problem problem;
+  LeastSquaresProblem problem;
   problem.parameters = {{.name = "a", .unit = "", .value = 1.0}, {.name = "b", .unit = "1/s", .value = 0.2}};
   problem.residual = [=](const Eigen::VectorXd& d) -> Eigen::VectorXd {
     return d(0) * (-d(1) * t.array()).exp() - y.array();
@@ -71,7 +71,7 @@ Problem decay_problem(double a, double b, double noise_sigma, std::uint64_t seed
 TEST(LeastSquares, LinearProblemEqualsNormalEquationsInOneStep) {
   const Eigen::MatrixXd matrix = random_matrix(40, 5, 1);
   const Eigen::VectorXd target = random_matrix(40, 1, 2);
-  const Result result = solve(linear_problem(matrix, target), {.damping = 0.0});
+  const SolverResult result = solve(linear_problem(matrix, target), {.damping = 0.0});
   const Eigen::VectorXd expected = (matrix.transpose() * matrix).ldlt().solve(matrix.transpose() * target);
   EXPECT_LT((result.values - expected).norm(), 1e-12);
   EXPECT_EQ(result.iterations, 1);
@@ -84,35 +84,35 @@ TEST(LeastSquares, LinearProblemEqualsNormalEquationsInOneStep) {
 
 TEST(LeastSquares, ConditionFiguresEqualThoseOfTheSingularValues) {
   const Eigen::MatrixXd matrix = random_matrix(30, 4, 3);
-  const Result result = solve(linear_problem(matrix, Eigen::VectorXd::Ones(30)));
+  const SolverResult result = solve(linear_problem(matrix, Eigen::VectorXd::Ones(30)));
   const Eigen::VectorXd s = Eigen::JacobiSVD<Eigen::MatrixXd>(matrix).singularValues();
   EXPECT_NEAR(result.condition_number, s(0) / s(3), 1e-12);
   EXPECT_NEAR(result.calibrability, std::pow(s(0) / s(3), 2), 1e-11);
 }
 
 TEST(LeastSquares, ParameterScalesDoNotMoveTheMinimum) {
-  Problem problem = decay_problem(2.0, 1.5, 0.01, 4);
-  const Result reference = solve(problem);
+  LeastSquaresProblem problem = decay_problem(2.0, 1.5, 0.01, 4);
+  const SolverResult reference = solve(problem);
   problem.parameters[0].scale = 1e4;
   problem.parameters[1].scale = 1e-3;
-  const Result scaled = solve(problem);
+  const SolverResult scaled = solve(problem);
   EXPECT_TRUE(scaled.converged()) << scaled.reason;
   EXPECT_LT((scaled.values - reference.values).norm(), 1e-7);
   EXPECT_LT((scaled.standard_errors - reference.standard_errors).norm(), 1e-6 * reference.standard_errors.norm());
 }
 
 TEST(LeastSquares, DifferencesServeWhereNoJacobianIsGiven) {
-  Problem problem = decay_problem(2.0, 1.5, 0.01, 5);
+  LeastSquaresProblem problem = decay_problem(2.0, 1.5, 0.01, 5);
   EXPECT_LT(check_jacobian(problem).error, 1e-8);
-  const Result analytic = solve(problem);
+  const SolverResult analytic = solve(problem);
   problem.jacobian = nullptr;
-  const Result differences = solve(problem);
+  const SolverResult differences = solve(problem);
   EXPECT_TRUE(differences.converged()) << differences.reason;
   EXPECT_LT((analytic.values - differences.values).norm(), 1e-6);
 }
 
 TEST(LeastSquares, WrongJacobianIsNamed) {
-  Problem problem = decay_problem(2.0, 1.5, 0.0, 6);
+  LeastSquaresProblem problem = decay_problem(2.0, 1.5, 0.0, 6);
   const Jacobian good = problem.jacobian;
   problem.jacobian = [good](const Eigen::VectorXd& d) {
     Eigen::MatrixXd jacobian = good(d);
@@ -128,10 +128,10 @@ TEST(LeastSquares, WrongJacobianIsNamed) {
 TEST(LeastSquares, UnidentifiableCombinationIsNamedAndStaysAtItsStart) {
   Eigen::MatrixXd matrix = random_matrix(30, 4, 7);
   matrix.col(3) = 2.0 * matrix.col(1);  // only p1 + 2 p3 matters
-  Problem problem = linear_problem(matrix, matrix * Eigen::Vector4d(1.0, 2.0, 3.0, 0.0));
+  LeastSquaresProblem problem = linear_problem(matrix, matrix * Eigen::Vector4d(1.0, 2.0, 3.0, 0.0));
   problem.parameters[1].value = 5.0;
   problem.parameters[3].value = -1.5;  // p1 + 2 p3 = 2 already
-  const Result result = solve(problem);
+  const SolverResult result = solve(problem);
   ASSERT_EQ(result.unidentifiable.size(), 1u);
   EXPECT_EQ(result.unidentifiable[0].names(), "p1, p3");
   EXPECT_NEAR(result.unidentifiable[0].terms[0].coefficient, -2.0 * result.unidentifiable[0].terms[1].coefficient,
@@ -149,7 +149,7 @@ TEST(LeastSquares, SeveralNullDirectionsComeApart) {
   Eigen::MatrixXd matrix = random_matrix(30, 5, 8);
   matrix.col(1) = matrix.col(0);
   matrix.col(4) = -matrix.col(2);
-  const Result result = solve(linear_problem(matrix, Eigen::VectorXd::Ones(30)));
+  const SolverResult result = solve(linear_problem(matrix, Eigen::VectorXd::Ones(30)));
   ASSERT_EQ(result.unidentifiable.size(), 2u);
   std::vector<std::string> names = {result.unidentifiable[0].names(), result.unidentifiable[1].names()};
   std::ranges::sort(names);
@@ -160,7 +160,7 @@ TEST(LeastSquares, SeveralNullDirectionsComeApart) {
 TEST(LeastSquares, FewerRowsThanParametersGiveTheNearestSolution) {
   const Eigen::MatrixXd matrix = random_matrix(3, 5, 9);
   const Eigen::VectorXd target = Eigen::VectorXd::Ones(3);
-  const Result result = solve(linear_problem(matrix, target), {.damping = 0.0});
+  const SolverResult result = solve(linear_problem(matrix, target), {.damping = 0.0});
   const Eigen::VectorXd expected = matrix.transpose() * (matrix * matrix.transpose()).ldlt().solve(target);
   EXPECT_LT((result.values - expected).norm(), 1e-10);
   EXPECT_EQ(result.unidentifiable.size(), 2u);
@@ -169,20 +169,20 @@ TEST(LeastSquares, FewerRowsThanParametersGiveTheNearestSolution) {
 TEST(LeastSquares, PriorMakesAFlatDirectionIdentifiable) {
   Eigen::MatrixXd matrix = random_matrix(30, 2, 10);
   matrix.col(1) = matrix.col(0);
-  Problem problem = linear_problem(matrix, matrix.col(0) * 2.0);
+  LeastSquaresProblem problem = linear_problem(matrix, matrix.col(0) * 2.0);
   problem.parameters[0].prior_sigma = 1e-3;
   problem.parameters[1].prior_sigma = 1e3;
-  const Result result = solve(problem);
+  const SolverResult result = solve(problem);
   EXPECT_TRUE(result.unidentifiable.empty());
   EXPECT_NEAR(result.values(0), 0.0, 1e-5);
   EXPECT_NEAR(result.values(1), 2.0, 1e-4);
 }
 
 TEST(LeastSquares, FixedParametersStayAndHaveNoError) {
-  Problem problem = decay_problem(2.0, 1.5, 0.01, 11);
+  LeastSquaresProblem problem = decay_problem(2.0, 1.5, 0.01, 11);
   problem.parameters[1].free = false;
   problem.parameters[1].value = 1.5;
-  const Result result = solve(problem);
+  const SolverResult result = solve(problem);
   EXPECT_EQ(result.values(1), 1.5);
   EXPECT_EQ(result.standard_errors(1), 0.0);
   EXPECT_NEAR(result.values(0), 2.0, 0.02);
@@ -191,7 +191,7 @@ TEST(LeastSquares, FixedParametersStayAndHaveNoError) {
 TEST(LeastSquares, WeightsCountRowsAsOftenAsTheirSquares) {
   const Eigen::MatrixXd matrix = random_matrix(20, 2, 12);
   const Eigen::VectorXd target = random_matrix(20, 1, 13);
-  Problem weighted = linear_problem(matrix, target);
+  LeastSquaresProblem weighted = linear_problem(matrix, target);
   weighted.weights = Eigen::VectorXd::Ones(20);
   weighted.weights.head(5).setConstant(2.0);
   Eigen::MatrixXd repeated(35, 2);
@@ -208,7 +208,7 @@ TEST(LeastSquares, StandardErrorsEqualTheMonteCarloSpread) {
   Eigen::MatrixXd estimates(repetitions, 2);
   Eigen::Vector2d claimed = Eigen::Vector2d::Zero();
   for (int i = 0; i < repetitions; ++i) {
-    const Result result = solve(decay_problem(2.0, 1.5, 0.02, 1000 + static_cast<std::uint64_t>(i)));
+    const SolverResult result = solve(decay_problem(2.0, 1.5, 0.02, 1000 + static_cast<std::uint64_t>(i)));
     ASSERT_TRUE(result.converged());
     estimates.row(i) = result.values.transpose();
     claimed += result.standard_errors / repetitions;
@@ -220,26 +220,26 @@ TEST(LeastSquares, StandardErrorsEqualTheMonteCarloSpread) {
 }
 
 TEST(LeastSquares, DampingSucceedsWhereFullStepsDiverge) {
-  Problem problem;  // atan: full Newton steps diverge from |x| > 1.39
+  LeastSquaresProblem problem;  // atan: full Newton steps diverge from |x| > 1.39
   problem.parameters = {{.name = "x", .unit = "", .value = 3.0}};
   problem.residual = [](const Eigen::VectorXd& d) { return Eigen::VectorXd::Constant(1, std::atan(d(0))); };
-  const Result undamped = solve(problem, {.damping = 0.0});
+  const SolverResult undamped = solve(problem, {.damping = 0.0});
   EXPECT_EQ(undamped.termination, Termination::diverged);
   EXPECT_EQ(undamped.values(0), 3.0);
-  const Result damped = solve(problem);
+  const SolverResult damped = solve(problem);
   EXPECT_TRUE(damped.converged()) << damped.reason;
   EXPECT_NEAR(damped.values(0), 0.0, 1e-9);
 }
 
 TEST(LeastSquares, OneIterationIsNotConvergence) {
-  const Result result = solve(decay_problem(2.0, 1.5, 0.01, 14), {.max_iterations = 1});
+  const SolverResult result = solve(decay_problem(2.0, 1.5, 0.01, 14), {.max_iterations = 1});
   EXPECT_EQ(result.termination, Termination::max_iterations);
   EXPECT_FALSE(result.converged());
   EXPECT_EQ(result.iterations, 1);
 }
 
 TEST(LeastSquares, WrongSignOfTheJacobianIsNotConvergence) {
-  Problem problem = decay_problem(2.0, 1.5, 0.01, 15);
+  LeastSquaresProblem problem = decay_problem(2.0, 1.5, 0.01, 15);
   const Jacobian good = problem.jacobian;
   problem.jacobian = [good](const Eigen::VectorXd& d) -> Eigen::MatrixXd { return -good(d); };
   EXPECT_EQ(solve(problem).termination, Termination::stalled);
@@ -247,7 +247,7 @@ TEST(LeastSquares, WrongSignOfTheJacobianIsNotConvergence) {
 }
 
 TEST(LeastSquares, ResidualsThatLeaveTheFiniteAreReported) {
-  Problem problem;
+  LeastSquaresProblem problem;
   problem.parameters = {{.name = "x", .unit = "", .value = 1.0}};
   problem.residual = [](const Eigen::VectorXd& d) {
     return Eigen::VectorXd::Constant(1, d(0) < 1.0 ? std::numeric_limits<double>::quiet_NaN() : d(0));
@@ -259,23 +259,23 @@ TEST(LeastSquares, ResidualsThatLeaveTheFiniteAreReported) {
 }
 
 TEST(LeastSquares, NothingFreeAndNothingMovingAreSaid) {
-  Problem problem = decay_problem(2.0, 1.5, 0.01, 16);
+  LeastSquaresProblem problem = decay_problem(2.0, 1.5, 0.01, 16);
   for (Parameter& p : problem.parameters) p.free = false;
   EXPECT_EQ(solve(problem).termination, Termination::no_free_parameters);
-  const Result still = solve(linear_problem(Eigen::MatrixXd::Zero(5, 2), Eigen::VectorXd::Ones(5)));
+  const SolverResult still = solve(linear_problem(Eigen::MatrixXd::Zero(5, 2), Eigen::VectorXd::Ones(5)));
   EXPECT_EQ(still.termination, Termination::no_information);
   EXPECT_EQ(still.unidentifiable.size(), 2u);
 }
 
 TEST(LeastSquares, ExactDataConverge) {
-  const Result result = solve(decay_problem(2.0, 1.5, 0.0, 17));
+  const SolverResult result = solve(decay_problem(2.0, 1.5, 0.0, 17));
   EXPECT_TRUE(result.converged()) << result.reason;
   EXPECT_NEAR(result.values(1), 1.5, 1e-10);
   EXPECT_TRUE(std::ranges::is_sorted(result.residual_norms, std::greater<>()));
 }
 
 TEST(LeastSquares, CallersMistakesNameTheField) {
-  const auto message_of = [](const Problem& problem, const Options& options) -> std::string {
+  const auto message_of = [](const LeastSquaresProblem& problem, const SolverOptions& options) -> std::string {
     try {
       solve(problem, options);
     } catch (const std::invalid_argument& error) {
@@ -283,9 +283,9 @@ TEST(LeastSquares, CallersMistakesNameTheField) {
     }
     return "no error";
   };
-  const Problem good = decay_problem(2.0, 1.5, 0.01, 18);
+  const LeastSquaresProblem good = decay_problem(2.0, 1.5, 0.01, 18);
   EXPECT_NE(message_of(good, {.damping = -1.0}).find("damping is -1"), std::string::npos);
-  Problem bad = good;
+  LeastSquaresProblem bad = good;
   bad.parameters[1].name = "a";
   EXPECT_NE(message_of(bad, {}).find("\"a\" is there twice"), std::string::npos);
   bad = good;
@@ -341,14 +341,14 @@ TEST(LeastSquares, FiveBarLoopIsRecoveredFromItsClosureEquations) {
     tool.row(i) =
         (c + along * e + std::sqrt(truth.l3 * truth.l3 - along * along) * Eigen::Vector2d(-e(1), e(0))).transpose();
   }
-  Problem problem;
+  LeastSquaresProblem problem;
   problem.parameters = {{"w", "mm", 300.0, 1.0},      {"l1", "mm", 200.0, 1.0}, {"l2", "mm", 200.0, 1.0},
                         {"l3", "mm", 350.0, 1.0},     {"l4", "mm", 350.0, 1.0}, {"offset1", "rad", 0.0, 1e-3},
                         {"offset2", "rad", 0.0, 1e-3}};
   problem.residual = [=](const Eigen::VectorXd& d) {
     return closure({d(0), d(1), d(2), d(3), d(4), d(5), d(6)}, joints, tool);
   };
-  const Result result = solve(problem);
+  const SolverResult result = solve(problem);
   EXPECT_TRUE(result.converged()) << result.reason;
   EXPECT_TRUE(result.unidentifiable.empty());
   const Eigen::VectorXd expected{{truth.w, truth.l1, truth.l2, truth.l3, truth.l4, truth.offset1, truth.offset2}};

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "discovery/scoring.hpp"
+#include "discovery/search/scoring.hpp"
 #include "llmt/discovery/search.hpp"
 #include "llmt/random.hpp"
 
@@ -24,7 +24,7 @@ inline Eigen::MatrixXd normal_matrix(llmt::Random& random, Eigen::Index rows, Ei
 
 struct Case {
   Evidence evidence;
-  std::vector<Candidate> candidates;
+  std::vector<EffectCandidate> candidates;
 };
 
 /// Noise of one unit, a random baseline of `parameters` columns, `count` candidates of one to three columns each in
@@ -39,7 +39,7 @@ inline Case random_case(std::uint64_t seed, Eigen::Index samples, Eigen::Index c
   data.evidence.residuals = normal_matrix(random, n, 1);
   Eigen::VectorXd last = normal_matrix(random, n, 1);
   for (int a = 0; a < count; ++a) {
-    Candidate candidate;
+    EffectCandidate candidate;
     candidate.family = "family" + std::to_string(a % families);
     candidate.location = "place" + std::to_string(a / families);
     candidate.signature = normal_matrix(random, n, 1 + a % 3);

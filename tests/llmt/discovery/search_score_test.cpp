@@ -8,8 +8,8 @@
 #include <map>
 #include <string>
 
-#include "discovery/explore.hpp"
-#include "discovery/null_gate.hpp"
+#include "discovery/search/explore.hpp"
+#include "discovery/search/null_gate.hpp"
 #include "search_cases.hpp"
 
 namespace {
@@ -26,7 +26,7 @@ double brute_force_score(const Case& data, const Set& set) {
   std::map<std::string, double> used;
   double k = 0.0;
   double sum = 0.0;
-  for (const Candidate& candidate : data.candidates) places[candidate.family] += 1.0;
+  for (const EffectCandidate& candidate : data.candidates) places[candidate.family] += 1.0;
   for (const std::size_t a : set) {
     k += static_cast<double>(data.candidates[a].signature.cols());
     used[data.candidates[a].family] += 1.0;
@@ -146,7 +146,7 @@ TEST(SearchDeletion, DroppedSamplesCountAsIfTheyHadNotBeenMeasured) {
   }
   rest.evidence.residuals = data.evidence.residuals(kept).eval();
   rest.evidence.jacobian = data.evidence.jacobian(kept, Eigen::all).eval();
-  for (Candidate& candidate : rest.candidates) candidate.signature = candidate.signature(kept, Eigen::all).eval();
+  for (EffectCandidate& candidate : rest.candidates) candidate.signature = candidate.signature(kept, Eigen::all).eval();
   const Workspace expected(rest.evidence, rest.candidates, 1e-3);
   const Scoring scoring(workspace, data.candidates);
   const Scoring other(expected, rest.candidates);

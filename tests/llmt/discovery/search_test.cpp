@@ -27,7 +27,7 @@ Case curve_case(std::uint64_t seed, Eigen::Index samples, double noise, const st
   data.evidence.residuals.resize(samples);
   for (Eigen::Index i = 0; i < samples; ++i) data.evidence.residuals(i) = hidden(x(i)) + noise * random.normal();
   const auto add = [&](const std::string& family, Eigen::MatrixXd signature, bool generic) {
-    Candidate candidate;
+    EffectCandidate candidate;
     candidate.family = family;
     candidate.location = "x";
     candidate.signature = std::move(signature);
@@ -86,7 +86,7 @@ TEST(SearchVerdict, PlantedEffectsAreFoundWithTheirValues) {
     const Verdict verdict = search(data.evidence, data.candidates);
     std::set<std::size_t> found;
     for (const Finding& finding : verdict.findings) {
-      for (const Term& term : finding.terms) {
+      for (const FindingTerm& term : finding.terms) {
         found.insert(term.candidate);
         if (term.candidate != 7 && term.candidate != 14) continue;
         for (Eigen::Index k = 0; k < term.values.size(); ++k) {
@@ -162,7 +162,7 @@ TEST(SearchVerdict, WhatIsInTheCatalogueIsNamedAlthoughShapesFitIt) {
 
 TEST(SearchVerdict, AnExactAliasIsAnExactRival) {
   Case data = random_case(3, 50, 2, 4, 8, 4);
-  Candidate alias = data.candidates[1];
+  EffectCandidate alias = data.candidates[1];
   alias.family = "another cause";
   alias.signature *= -3.0;
   // The baseline does not see the difference either.

@@ -32,14 +32,14 @@ using Residual = std::function<Eigen::VectorXd(const Eigen::VectorXd& values)>;
 using Jacobian = std::function<Eigen::MatrixXd(const Eigen::VectorXd& values)>;
 
 /// minimise  sum_i (weight_i residual_i(d))^2 + sum_k ((d_k - prior_k) / prior_sigma_k)^2  over the free parameters.
-struct Problem {
+struct LeastSquaresProblem {
   std::vector<Parameter> parameters;
   Residual residual;
   Jacobian jacobian;        ///< empty: central differences
   Eigen::VectorXd weights;  ///< 1/sigma of each residual row, or empty for ones; priors count residuals in these units
 };
 
-struct Options {
+struct SolverOptions {
   /// Levenberg-Marquardt damping to start with, relative to the largest singular value squared. 0 is the paper's
   /// modified Newton method, eq. (6)-(9): full Gauss-Newton steps as long as the deviations decrease.
   double damping = 1e-4;
@@ -47,8 +47,8 @@ struct Options {
   double gradient_tolerance = 1e-7;  ///< on the cosine of the angle between the residuals and the range of the Jacobian
   double step_tolerance = 1e-9;      ///< on the undamped step, counted in parameter scales
   double rank_tolerance = 1e-8;      ///< singular values below this share of the largest count as zero
-  bool sigma_is_known =
-      false;  ///< weights are 1/sigma in earnest: the covariance is not rescaled by the residual variance
+  /// True: the weights are 1/sigma of known noise, and the covariance is not rescaled by the residual variance.
+  bool sigma_is_known = false;
 };
 
 /// Why the iteration ended. Only `converged` means that the values are a minimum.
@@ -66,8 +66,7 @@ enum class Termination {
 struct Combination {
   struct Term {
     std::string name;
-    double
-        coefficient;  ///< in units of the parameter; the largest term, counted in scales, has coefficient = its scale
+    double coefficient;  ///< in units of the parameter; the largest term, counted in scales, has its scale
   };
   std::vector<Term> terms;
 
@@ -75,20 +74,20 @@ struct Combination {
 };
 
 /// Outcome of solve(). P = number of parameters, n = number of residuals, k = number of free parameters.
-struct Result {
+struct SolverResult {
   std::vector<Parameter> parameters;  ///< with final values
   Eigen::VectorXd values;             ///< P final values
   Eigen::VectorXd residuals;          ///< n final residuals, not weighted
-  Eigen::MatrixXd
-      covariance;  ///< P x P; zero for fixed parameters, NaN for parameters in an unidentifiable combination
-  Eigen::VectorXd standard_errors;  ///< P; square roots of its diagonal
-  Eigen::VectorXd
-      singular_values;            ///< k, of the Jacobian with weighted rows and columns times `scale`, priors included
+  /// P x P; zero for fixed parameters, NaN for parameters in an unidentifiable combination.
+  Eigen::MatrixXd covariance;
+  Eigen::VectorXd standard_errors;  ///< P; square roots of the diagonal of `covariance`
+  /// k, falling: of the Jacobian with weighted rows and columns times `scale`, priors included.
+  Eigen::VectorXd singular_values;
   double condition_number = 1.0;  ///< of that matrix, on its identifiable part
-  double calibrability =
-      1.0;                ///< cond2(J'J) = (s1/sL)^2, J in the parameters' own units without weights, identifiable part
-  Eigen::Index rank = 0;  ///< number of identifiable directions
-  Eigen::Index dof = 0;   ///< n + number of priors - rank
+  /// cond2(J'J) = (s1/sL)^2 on the identifiable part; J in the parameters' own units, without weights.
+  double calibrability = 1.0;
+  Eigen::Index rank = 0;                                    ///< number of identifiable directions
+  Eigen::Index dof = 0;                                     ///< n + number of priors - rank
   double sigma = std::numeric_limits<double>::quiet_NaN();  ///< sqrt(weighted sum of squares / dof)
   std::vector<double> residual_norms;  ///< weighted, with priors: at the start and after every accepted step
   int iterations = 0;                  ///< steps tried
@@ -110,13 +109,13 @@ struct Result {
 ///
 /// Throws std::invalid_argument for wrong options or parameters (empty or repeated name, non-finite value, scale <= 0,
 /// prior <= 0), wrong shapes, and residuals or derivatives that are not finite at the start.
-Result solve(const Problem& problem, const Options& options = {});
+SolverResult solve(const LeastSquaresProblem& problem, const SolverOptions& options = {});
 
 /// The Jacobian of the problem at `values`: analytic where given, else central differences; n x P.
-Eigen::MatrixXd evaluate_jacobian(const Problem& problem, const Eigen::VectorXd& values);
+Eigen::MatrixXd evaluate_jacobian(const LeastSquaresProblem& problem, const Eigen::VectorXd& values);
 
 /// Central differences at `values`, n x P; the step of a column is cbrt(machine epsilon) * max(|value|, scale).
-Eigen::MatrixXd difference_jacobian(const Problem& problem, const Eigen::VectorXd& values);
+Eigen::MatrixXd difference_jacobian(const LeastSquaresProblem& problem, const Eigen::VectorXd& values);
 
 /// Largest disagreement between the analytic Jacobian and central differences.
 struct JacobianCheck {
@@ -126,7 +125,7 @@ struct JacobianCheck {
 };
 
 /// Compares at the start values. Throws std::invalid_argument if the problem has no analytic Jacobian.
-JacobianCheck check_jacobian(const Problem& problem);
+JacobianCheck check_jacobian(const LeastSquaresProblem& problem);
 
 /// The name of an enumerator, e.g. "max_iterations".
 std::string to_string(Termination termination);

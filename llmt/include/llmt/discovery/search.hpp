@@ -27,7 +27,7 @@ struct Evidence {
 };
 
 /// One effect at one place: the prediction changes by signature * values to first order.
-struct Candidate {
+struct EffectCandidate {
   std::string family;         ///< the cause, e.g. "joint_compliance"; variants of one cause share it
   std::string location;       ///< where, e.g. "joint2"; a family is used at most once at a location
   Eigen::MatrixXd signature;  ///< n d x k
@@ -55,7 +55,7 @@ struct SearchOptions {
 };
 
 /// A candidate that is part of an explanation.
-struct Term {
+struct FindingTerm {
   std::size_t candidate = 0;
   Eigen::VectorXd values;           ///< k; directions that the baseline absorbs are zero
   Eigen::VectorXd standard_errors;  ///< k, at the estimated noise
@@ -75,7 +75,7 @@ struct Finding {
   std::string family;
   bool generic = false;
   bool confirmed = false;  ///< passed the gate, and nothing material is left that it does not explain
-  std::vector<Term> terms;
+  std::vector<FindingTerm> terms;
   std::vector<Rival> rivals;
   double share = 0.0;       ///< of the explained sum of squares that goes with the family alone
   double score_gain = 0.0;  ///< score lost without it
@@ -120,23 +120,22 @@ struct Verdict {
 ///
 /// 1. What the baseline can imitate, the range of its Jacobian, is projected out of residuals and signatures.
 /// 2. Sets A of candidates are scored by
-///      N ln(RSS_A / (N - k_A)) + k_A ln N + 2 sum over families f in A of (ln n_fam + ln binomial(n_loc(f),
-///      n_used(f))),
-///    N = n d - rank: Schwarz's criterion plus the logarithm of how many sets of that kind there were to choose from.
-///    Values must lie within their limits, up to two standard errors. Moves are add, drop, swap; starts are the empty
-///    set, the best single candidates of different families, and whole families.
-/// 3. A sample whose removal gains more than its own cost, as a shift of its mean, is an outlier.
-/// 4. Gate: the gain must exceed what the best single candidate gains in noise drawn from the normal distribution and
-/// in
-///    the residuals with random signs, pushed through the same projection (max-T).
+///      N ln(RSS_A / (N - k_A)) + k_A ln N + 2 sum_f (ln n_fam + ln binomial(n_loc(f), n_used(f))),
+///    N = n d - rank, the sum over the families f in A. This is Schwarz's criterion plus the logarithm of the number of
+///    sets of the same kind. Values must lie within their limits, up to two standard errors. The search adds, drops and
+///    swaps candidates; it starts from the empty set, from the best single candidates of different families, and from
+///    whole families.
+/// 3. A sample is an outlier if leaving it out lowers the score by more than a free shift of its mean costs.
+/// 4. The gain over no explanation must exceed what the best single candidate gains by chance (max-T): in normally
+///    distributed noise, and in the residuals with random signs, both projected in the same way.
 /// 5. Generic candidates stay only where no set of causes comes within `rival_margin`.
 /// 6. A family is dropped if the exact leave-one-sample-out error is smaller without it, or its share is immaterial.
-/// 7. For each family: which other families explain as well in its place?
-/// 8. Findings are confirmed unless generic candidates hold a material share, or the repeats are exceeded with
-///    structure.
+/// 7. For each family, the other families that explain as well in its place are listed.
+/// 8. Findings are confirmed unless generic candidates explain a material share, or more is left than repeats scatter.
 ///
 /// Deterministic. Throws std::invalid_argument for wrong shapes, values that are not finite, and no samples.
-Verdict search(const Evidence& evidence, const std::vector<Candidate>& candidates, const SearchOptions& options = {});
+Verdict search(const Evidence& evidence, const std::vector<EffectCandidate>& candidates,
+               const SearchOptions& options = {});
 
 /// "nothing missing", "named", "named, indistinguishable", "unknown effect".
 std::string to_string(Answer answer);

@@ -58,7 +58,7 @@ struct Inputs {
   std::string order = {};          ///< the input that says in which order rows were taken; empty: as they stand
 };
 
-struct Untestable {
+struct UntestableTerm {
   std::string what;
   std::string why;
 };
@@ -77,7 +77,7 @@ struct Untestable {
 /// Terms that the values cannot tell from simpler ones are left out: x^2 for an input of two values, |x| for one sign.
 /// Constant inputs go to `untestable` if that is given. Throws std::invalid_argument for wrong shapes, empty or
 /// repeated names, values that are not finite, and an order that is not an input or holds equal values.
-std::vector<ModelTerm> standard_terms(const Inputs& inputs, std::vector<Untestable>* untestable = nullptr);
+std::vector<ModelTerm> standard_terms(const Inputs& inputs, std::vector<UntestableTerm>* untestable = nullptr);
 
 /// `library` without the terms of one column that are proportional to one of `own`: the user's name for it wins.
 std::vector<ModelTerm> without_duplicates(std::vector<ModelTerm> library, const std::vector<ModelTerm>& own,

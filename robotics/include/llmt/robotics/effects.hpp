@@ -2,126 +2,22 @@
 /// Physical effects that rigid geometry leaves out, each one an entry of a catalogue.
 #pragma once
 
-#include <Eigen/Core>
-#include <functional>
-#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "llmt/abi.hpp"
-#include "llmt/robotics/kinematics.hpp"
+#include "llmt/robotics/effect_type.hpp"
 
 namespace llmt::robotics {
-
-/// Weight of a part of the arm, in the world frame.
-struct Load {
-  Eigen::Vector3d force_N = Eigen::Vector3d::Zero();
-  Eigen::Vector3d moment_Nm = Eigen::Vector3d::Zero();
-};
-
-/// Everything an effect may look at in one pose.
-struct PoseContext {
-  const Chain& chain;
-  const Eigen::VectorXd& q;      ///< joint values: rad, mm for prismatic joints
-  const Skeleton& skeleton;      ///< of the chain in equilibrium, where the loads act; of the rigid one in derivatives
-  Eigen::Vector3d gravity_m_s2;  ///< in the world frame
-  double payload_kg = 0.0;       ///< column payload_kg if measured, else the chain's payload
-  Eigen::Vector3d payload_centre_mm = Eigen::Vector3d::Zero();  ///< in the world frame
-  std::span<const Load> load;  ///< J: weight of link j, everything beyond it and the payload; about joint j's origin
-  std::span<const double> columns;  ///< this pose's values of EffectType::columns
-};
-
-/// One unknown of an effect, or a list of unknowns of one kind.
-struct EffectParameter {
-  std::string name;       ///< e.g. "compliance"
-  std::string unit = {};  ///< e.g. "rad/(N m)"
-  std::string key = {};   ///< in robot files, with the unit: "compliance_rad_per_Nm"
-  double scale = 1.0;     ///< typical size, in that unit
-  double lower = 0.0;     ///< plausible range on real arms, sign included
-  double upper = 0.0;
-  bool list = false;                ///< as many values as the effect has; then it is the only parameter of its type
-  std::string prismatic_unit = {};  ///< at a prismatic joint, where it differs; in mm the sizes count 1000 times
-  std::string prismatic_key = {};
-};
-
-/// What an effect of a type is given and calibration leaves alone: harmonic order, reference temperature, knots.
-struct EffectConstant {
-  std::string name;
-  std::string key;                 ///< in robot files, with the unit
-  double usual = 0.0;              ///< what make_effect() gives it
-  std::string prismatic_key = {};  ///< at a prismatic joint, where it differs
-};
-
-/// One term of a user's own effect: an expression that is multiplied by one value of the effect.
-struct FormulaTerm {
-  std::string acts_on;    ///< "joint": error of its value in rad (mm if prismatic); "x", "y", "z": world position in mm
-  std::string text;       ///< of q1 ... (rad, mm if prismatic), tau1 ... (gravity, N m, N) and covariates
-  std::string name = {};  ///< of its value, or empty: "coefficient_1"
-  std::string unit = {};  ///< of its value, or empty: that of what it acts on
-  double scale = 0.0;     ///< typical size of its value, or 0: 1e-4 rad, 0.1 mm, as if the expression were of order 1
-};
-
-/// What a user's own effect computes: sum of values times terms.
-struct Formula {
-  std::string name;
-  std::vector<FormulaTerm> terms;
-};
-
-/// What an effect is attached to.
-enum class EffectPlace { joint, link, robot };
-
-/// A kind of effect. Values of 0 mean "not there" for every parameter that is estimated.
-struct EffectType {
-  std::string name;                        ///< as in files, e.g. "joint_compliance"
-  std::string family = {};                 ///< effects of one family are variants of one cause, e.g. "joint_compliance"
-  std::string title = {};                  ///< as an engineer says it
-  std::string formula = {};                ///< full forward formula
-  std::string source = {};                 ///< where the formula is from
-  EffectPlace place = EffectPlace::joint;  ///< joint, link or the whole robot
-  std::vector<EffectParameter> parameters = {};  ///< in the order of Effect::values
-  std::vector<EffectConstant> constants = {};    ///< in the order of Effect::constants
-  /// Covariates without which it cannot be evaluated, e.g. "temp_C"; "{}" stands for the number of the joint
-  /// ("dir{}" is dir2 at the second joint), "time_s|order" for the first of these that is there.
-  std::vector<std::string> columns = {};
-  /// Adds the effect to the deformation; `index` is the joint or link. May be empty if `adjust` is there.
-  std::function<void(const PoseContext&, std::size_t index, std::span<const double> values,
-                     std::span<const double> constants, Deformation&)>
-      apply = {};
-  /// Changes what the effects are evaluated with (payload, gravity) before loads are summed and anything is applied.
-  std::function<void(PoseContext&, std::span<const double> values)> adjust = {};
-  bool weighted = false;  ///< its values are in inverse proportion to the masses: as uncertain as they are
-  bool elastic = false;   ///< deforms under the arm's weight: the loads are those of the deformed arm
-  bool linear = true;     ///< `apply` is linear in the values; if not, derivatives are taken by differences
-  bool prismatic = true;  ///< may sit at a prismatic joint
-  bool searched = true;   ///< discovery looks for it; false for reductions that are kept for comparison
-  std::string note = {};  ///< where the plausible range is from
-  /// Of a list: how many values an effect at `index` has; empty or 0: any number.
-  std::function<std::size_t(const Chain&, std::size_t index)> count = {};
-  /// Why an effect is refused that has the right numbers of values and constants, or nothing.
-  std::function<std::string(const Chain&, std::size_t index, std::span<const double> constants)> refusal = {};
-  /// Of a user's own effect: one for each parameter; "{}" stands for the number of the joint. Such a type has no
-  /// `apply`, make_effect() makes an effect of type "formula" of it.
-  std::vector<FormulaTerm> terms = {};
-};
-
-/// An effect of a given arm.
-struct Effect {
-  std::string type;            ///< EffectType::name
-  std::string at;              ///< name of the joint, or of the joint that moves the link; empty for the whole robot
-  std::vector<double> values;  ///< of the type's parameters
-  std::vector<double> constants = {};  ///< of the type's constants
-  Formula formula = {};                ///< of type "formula" only
-};
 
 /// The catalogue, in a fixed order; docs/effects.md prints it. Formulas, units and sources stand in the entries, what
 /// is plausible comes from the table robotics/catalogue.yaml; see catalogue.hpp for tables and effects of one's own.
 ///
 /// Angles in rad, lengths of the arm in m where forces are in N; L length, e unit chord of a link from its axis to the
 /// next; F weight of everything beyond its end b, M the moment of that weight about b, w the link's own weight per
-/// length; o_j, z_j origin and axis of joint j; p tool point. Loads are those of the undeformed arm. In one pose,
-/// effects that adjust payload or gravity come first, then loads are summed, then every effect is applied;
-/// displacements add up.
+/// length; o_j, z_j origin and axis of joint j; p tool point. Loads act on the arm in
+/// equilibrium where an effect is elastic (EffectType::elastic), else on the undeformed arm. In one pose, effects that
+/// adjust payload or gravity come first, then loads are summed, then every effect is applied; displacements add up.
 const std::vector<EffectType>& effect_types();
 
 /// Throws std::invalid_argument listing the known names if there is none of that name.

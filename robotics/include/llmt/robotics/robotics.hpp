@@ -1,17 +1,23 @@
-#pragma once
-
 /// \file
 /// Umbrella header of llmt::robotics.
+#pragma once
 
 #include "llmt/abi.hpp"
 #include "llmt/robotics/calibration.hpp"
+#include "llmt/robotics/calibration_options.hpp"
 #include "llmt/robotics/calibration_report.hpp"
 #include "llmt/robotics/catalogue.hpp"
 #include "llmt/robotics/chain.hpp"
 #include "llmt/robotics/correction.hpp"
+#include "llmt/robotics/discovery.hpp"
+#include "llmt/robotics/discovery_options.hpp"
+#include "llmt/robotics/discovery_result.hpp"
+#include "llmt/robotics/effect_type.hpp"
 #include "llmt/robotics/effects.hpp"
 #include "llmt/robotics/kinematics.hpp"
 #include "llmt/robotics/measurements.hpp"
 #include "llmt/robotics/robot.hpp"
 #include "llmt/robotics/robot_file.hpp"
+#include "llmt/robotics/robot_types.hpp"
 #include "llmt/robotics/simulation.hpp"
+#include "llmt/robotics/telling_poses.hpp"

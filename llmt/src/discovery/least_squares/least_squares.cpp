@@ -1,0 +1,347 @@
+#include "llmt/discovery/least_squares.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <stdexcept>
+
+#include "discovery/least_squares/linearisation.hpp"
+
+namespace llmt::discovery {
+namespace {
+
+constexpr double largest_damping = 1e12;
+constexpr double negligible_damping = 1e-14;
+// A relative decrease of the sum of squares below this is lost in its own rounding.
+constexpr double resolvable_decrease = 1e-12;
+
+[[noreturn]] void refuse(const std::string& message) {
+  throw std::invalid_argument("llmt::discovery::solve: " + message);
+}
+
+void check_options(const SolverOptions& options) {
+  const auto check = [](const char* field, double value, bool good, const char* bound) {
+    if (!good) refuse(fmt::format("SolverOptions::{} is {}, must be {}", field, value, bound));
+  };
+  check("damping", options.damping, options.damping >= 0.0 && std::isfinite(options.damping), ">= 0 and finite");
+  check("max_iterations", options.max_iterations, options.max_iterations >= 0, ">= 0");
+  check("gradient_tolerance", options.gradient_tolerance, options.gradient_tolerance >= 0.0, ">= 0");
+  check("step_tolerance", options.step_tolerance, options.step_tolerance >= 0.0, ">= 0");
+  check("rank_tolerance", options.rank_tolerance, options.rank_tolerance > 0.0 && options.rank_tolerance < 1.0,
+        "between 0 and 1");
+}
+
+void check_parameters(const std::vector<Parameter>& parameters) {
+  std::set<std::string> names;
+  for (const Parameter& p : parameters) {
+    if (p.name.empty()) refuse("a parameter has no name");
+    if (!names.insert(p.name).second) refuse(fmt::format("parameter \"{}\" is there twice", p.name));
+    if (!std::isfinite(p.value)) refuse(fmt::format("parameter \"{}\": value is {}, must be finite", p.name, p.value));
+    if (!(p.scale > 0.0) || !std::isfinite(p.scale)) {
+      refuse(fmt::format("parameter \"{}\": scale is {}, must be > 0 and finite", p.name, p.scale));
+    }
+    if (p.prior_sigma && !(*p.prior_sigma > 0.0)) {
+      refuse(fmt::format("parameter \"{}\": prior_sigma is {}, must be > 0", p.name, *p.prior_sigma));
+    }
+    if (p.prior_value && !std::isfinite(*p.prior_value)) {
+      refuse(fmt::format("parameter \"{}\": prior_value is {}, must be finite", p.name, *p.prior_value));
+    }
+  }
+}
+
+// The problem as the iteration sees it: free columns, scaled, weighted, priors as extra rows.
+class Solver {
+ public:
+  Solver(const LeastSquaresProblem& problem, const SolverOptions& options);
+  SolverResult run();
+
+ private:
+  Eigen::VectorXd weighted(const Eigen::VectorXd& residuals, const Eigen::VectorXd& values) const;
+  Eigen::VectorXd residuals_at(const Eigen::VectorXd& values) const;
+  Eigen::MatrixXd jacobian_at(const Eigen::VectorXd& values) const;
+  Linearisation linearise_here();
+  bool finished_at(const Linearisation& linear);
+  bool advance(const Linearisation& linear);
+  bool try_step(const Eigen::VectorXd& scaled_step);
+  void stop(Termination termination, std::string reason);
+  void describe_uncertainty(const Linearisation& linear);
+
+  const LeastSquaresProblem& problem_;
+  const SolverOptions& options_;
+  std::vector<Eigen::Index> free_;
+  std::vector<Eigen::Index> prior_;  // positions within free_
+  Eigen::VectorXd start_;
+  Eigen::VectorXd scales_;  // of the free parameters
+  Eigen::VectorXd values_;
+  Eigen::VectorXd residuals_;
+  Eigen::VectorXd weighted_;
+  Eigen::MatrixXd jacobian_;  // free columns, own units, not weighted
+  double damping_;
+  bool met_non_finite_ = false;
+  SolverResult result_;
+};
+
+Solver::Solver(const LeastSquaresProblem& problem, const SolverOptions& options)
+    : problem_(problem), options_(options), damping_(options.damping) {
+  check_options(options);
+  check_parameters(problem.parameters);
+  if (!problem.residual) refuse("the problem has no residual function");
+  const auto count = static_cast<Eigen::Index>(problem.parameters.size());
+  start_.resize(count);
+  std::vector<double> scales;
+  for (Eigen::Index k = 0; k < count; ++k) {
+    const Parameter& p = problem.parameters[static_cast<std::size_t>(k)];
+    start_(k) = p.value;
+    if (!p.free) continue;
+    if (p.prior_sigma) prior_.push_back(static_cast<Eigen::Index>(free_.size()));
+    free_.push_back(k);
+    scales.push_back(p.scale);
+  }
+  scales_ = Eigen::Map<const Eigen::VectorXd>(scales.data(), static_cast<Eigen::Index>(scales.size()));
+  values_ = start_;
+  residuals_ = problem.residual(values_);
+  const Eigen::Index weights = problem.weights.size();
+  if (weights != 0 && weights != residuals_.size()) {
+    refuse(fmt::format("weights has {} entries but there are {} residuals", weights, residuals_.size()));
+  }
+  if (weights != 0 && !(problem.weights.allFinite() && problem.weights.minCoeff() >= 0.0)) {
+    refuse("weights must be finite and >= 0");
+  }
+  for (Eigen::Index i = 0; i < residuals_.size(); ++i) {
+    if (!std::isfinite(residuals_(i))) refuse(fmt::format("residual {} is {} at the start values", i, residuals_(i)));
+  }
+  weighted_ = weighted(residuals_, values_);
+}
+
+Eigen::VectorXd Solver::weighted(const Eigen::VectorXd& residuals, const Eigen::VectorXd& values) const {
+  const Eigen::Index n = residuals.size();
+  Eigen::VectorXd rows(n + static_cast<Eigen::Index>(prior_.size()));
+  rows.head(n) = residuals;
+  if (problem_.weights.size() != 0) rows.head(n).array() *= problem_.weights.array();
+  for (std::size_t i = 0; i < prior_.size(); ++i) {
+    const Eigen::Index k = free_[static_cast<std::size_t>(prior_[i])];
+    const Parameter& parameter = problem_.parameters[static_cast<std::size_t>(k)];
+    rows(n + static_cast<Eigen::Index>(i)) =
+        (values(k) - parameter.prior_value.value_or(parameter.value)) / *parameter.prior_sigma;
+  }
+  return rows;
+}
+
+Eigen::VectorXd Solver::residuals_at(const Eigen::VectorXd& values) const {
+  Eigen::VectorXd residuals = problem_.residual(values);
+  if (residuals.size() != residuals_.size()) {
+    refuse(fmt::format("the residual function returned {} rows, then {}", residuals_.size(), residuals.size()));
+  }
+  return residuals;
+}
+
+Eigen::MatrixXd Solver::jacobian_at(const Eigen::VectorXd& values) const {
+  const Eigen::MatrixXd all = evaluate_jacobian(problem_, values);
+  if (all.rows() != residuals_.size() || all.cols() != start_.size()) {
+    refuse(fmt::format("the Jacobian is {} x {}, expected {} x {}", all.rows(), all.cols(), residuals_.size(),
+                       start_.size()));
+  }
+  Eigen::MatrixXd columns(all.rows(), static_cast<Eigen::Index>(free_.size()));
+  for (std::size_t i = 0; i < free_.size(); ++i) columns.col(static_cast<Eigen::Index>(i)) = all.col(free_[i]);
+  return columns;
+}
+
+Linearisation Solver::linearise_here() {
+  const Eigen::Index n = residuals_.size();
+  Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(weighted_.size(), scales_.size());
+  matrix.topRows(n) = jacobian_ * scales_.asDiagonal();
+  if (problem_.weights.size() != 0) matrix.topRows(n).array().colwise() *= problem_.weights.array();
+  for (std::size_t i = 0; i < prior_.size(); ++i) {
+    const Eigen::Index column = prior_[i];
+    const Eigen::Index k = free_[static_cast<std::size_t>(column)];
+    matrix(n + static_cast<Eigen::Index>(i), column) =
+        scales_(column) / *problem_.parameters[static_cast<std::size_t>(k)].prior_sigma;
+  }
+  return linearise(matrix, weighted_, options_.rank_tolerance);
+}
+
+void Solver::stop(Termination termination, std::string reason) {
+  result_.termination = termination;
+  result_.reason = std::move(reason);
+}
+
+// The test is made with the undamped step, whatever the damping: a damped step is small for other reasons than a
+// minimum.
+bool Solver::finished_at(const Linearisation& linear) {
+  if (linear.rank == 0) {
+    stop(Termination::no_information, "no free parameter changes any residual");
+    return true;
+  }
+  const double norm = weighted_.norm();
+  const double removable = linear.removable_norm();
+  if (removable <= options_.gradient_tolerance * norm) {
+    stop(Termination::converged, fmt::format("a further step would remove {:.1e} of {:.6g}", removable, norm));
+    return true;
+  }
+  const double step = linear.step(0.0).cwiseAbs().maxCoeff();
+  if (step <= options_.step_tolerance) {
+    stop(Termination::converged, fmt::format("the next step is {:.1e} parameter scales", step));
+    return true;
+  }
+  return false;
+}
+
+// Takes the step if the deviations decrease.
+bool Solver::try_step(const Eigen::VectorXd& scaled_step) {
+  Eigen::VectorXd values = values_;
+  for (std::size_t i = 0; i < free_.size(); ++i) {
+    const auto column = static_cast<Eigen::Index>(i);
+    values(free_[i]) += scales_(column) * scaled_step(column);
+  }
+  ++result_.iterations;
+  Eigen::VectorXd residuals = residuals_at(values);
+  Eigen::VectorXd rows = weighted(residuals, values);
+  met_non_finite_ = !rows.allFinite();
+  if (met_non_finite_ || !(rows.squaredNorm() < weighted_.squaredNorm())) return false;
+  values_ = std::move(values);
+  residuals_ = std::move(residuals);
+  weighted_ = std::move(rows);
+  result_.residual_norms.push_back(weighted_.norm());
+  return true;
+}
+
+// One accepted step, or false with the reason to stop.
+bool Solver::advance(const Linearisation& linear) {
+  const double norm = weighted_.norm();
+  while (result_.iterations < options_.max_iterations) {
+    if (try_step(linear.step(damping_))) {
+      damping_ = damping_ < negligible_damping ? 0.0 : 0.1 * damping_;
+      return true;
+    }
+    const double removable = linear.removable_norm() / norm;
+    if (!met_non_finite_ && removable * removable <= resolvable_decrease) {
+      stop(Termination::converged, "no step decreases the deviations further, within rounding");
+      return false;
+    }
+    if (options_.damping == 0.0 || damping_ > largest_damping) {
+      const Termination failure = met_non_finite_           ? Termination::non_finite
+                                  : options_.damping == 0.0 ? Termination::diverged
+                                                            : Termination::stalled;
+      stop(failure, met_non_finite_ ? "the step leads to residuals that are not finite"
+                    : failure == Termination::diverged
+                        ? fmt::format("the deviations grew at step {}, from {:.6g}", result_.iterations, norm)
+                        : fmt::format("no damping decreases the deviations, {:.6g}, of which {:.1e} looks removable",
+                                      norm, linear.removable_norm()));
+      return false;
+    }
+    damping_ = std::max(10.0 * damping_, options_.damping);
+  }
+  stop(Termination::max_iterations,
+       fmt::format("{} iterations are used up; a further step would remove {:.1e} of {:.6g}", result_.iterations,
+                   linear.removable_norm(), weighted_.norm()));
+  return false;
+}
+
+void Solver::describe_uncertainty(const Linearisation& linear) {
+  const Eigen::Index rank = linear.rank;
+  std::vector<std::string> names;
+  for (const Eigen::Index k : free_) names.push_back(problem_.parameters[static_cast<std::size_t>(k)].name);
+  result_.unidentifiable = null_combinations(linear, names, scales_);
+  result_.singular_values = linear.singular_values;
+  result_.rank = rank;
+  result_.dof = weighted_.size() - rank;
+  if (result_.dof > 0) result_.sigma = weighted_.norm() / std::sqrt(static_cast<double>(result_.dof));
+  if (rank == 0) return;
+  result_.condition_number = linear.singular_values(0) / linear.singular_values(rank - 1);
+  const Eigen::VectorXd plain = singular_values_of(jacobian_);
+  const Eigen::Index plain_rank = std::min(rank, (plain.array() > options_.rank_tolerance * plain(0)).count());
+  if (plain_rank > 0) result_.calibrability = std::pow(plain(0) / plain(plain_rank - 1), 2);
+
+  const double variance = options_.sigma_is_known ? 1.0 : result_.sigma * result_.sigma;
+  const Eigen::MatrixXd half = scales_.asDiagonal() * linear.directions.leftCols(rank) *
+                               linear.singular_values.head(rank).cwiseInverse().asDiagonal();
+  const Eigen::MatrixXd covariance = variance * half * half.transpose();
+  const Eigen::VectorXd null_share = linear.directions.rightCols(scales_.size() - rank).rowwise().norm();
+  for (std::size_t i = 0; i < free_.size(); ++i) {
+    for (std::size_t j = 0; j < free_.size(); ++j) {
+      const auto a = static_cast<Eigen::Index>(i);
+      const auto b = static_cast<Eigen::Index>(j);
+      const bool known = null_share(a) < null_entry_tolerance && null_share(b) < null_entry_tolerance;
+      result_.covariance(free_[i], free_[j]) = known ? covariance(a, b) : std::numeric_limits<double>::quiet_NaN();
+    }
+  }
+}
+
+SolverResult Solver::run() {
+  result_.covariance = Eigen::MatrixXd::Zero(start_.size(), start_.size());
+  result_.residual_norms.push_back(weighted_.norm());
+  result_.dof = residuals_.size();
+  if (free_.empty()) {
+    stop(Termination::no_free_parameters, "every parameter is fixed");
+    if (result_.dof > 0) result_.sigma = weighted_.norm() / std::sqrt(static_cast<double>(result_.dof));
+  } else {
+    jacobian_ = jacobian_at(values_);
+    if (!jacobian_.allFinite()) refuse("the Jacobian is not finite at the start values");
+    Linearisation linear = linearise_here();
+    while (!finished_at(linear) && advance(linear)) {
+      Eigen::MatrixXd jacobian = jacobian_at(values_);
+      if (!jacobian.allFinite()) {
+        stop(Termination::non_finite, "the Jacobian is not finite");
+        break;
+      }
+      jacobian_ = std::move(jacobian);
+      linear = linearise_here();
+    }
+    describe_uncertainty(linear);
+  }
+  result_.values = values_;
+  result_.residuals = residuals_;
+  result_.standard_errors = result_.covariance.diagonal().cwiseSqrt();
+  result_.parameters = problem_.parameters;
+  for (Eigen::Index k = 0; k < values_.size(); ++k) result_.parameters[static_cast<std::size_t>(k)].value = values_(k);
+  return std::move(result_);
+}
+
+std::size_t index_of(const SolverResult& result, const std::string& name) {
+  for (std::size_t k = 0; k < result.parameters.size(); ++k) {
+    if (result.parameters[k].name == name) return k;
+  }
+  throw std::invalid_argument(fmt::format("llmt::discovery::SolverResult: no parameter is named \"{}\"", name));
+}
+
+}  // namespace
+
+std::string Combination::names() const {
+  std::string text;
+  for (const Term& term : terms) text += (text.empty() ? "" : ", ") + term.name;
+  return text;
+}
+
+const Parameter& SolverResult::parameter(const std::string& name) const { return parameters[index_of(*this, name)]; }
+
+double SolverResult::standard_error(const std::string& name) const {
+  return standard_errors(static_cast<Eigen::Index>(index_of(*this, name)));
+}
+
+SolverResult solve(const LeastSquaresProblem& problem, const SolverOptions& options) {
+  return Solver(problem, options).run();
+}
+
+std::string to_string(Termination termination) {
+  switch (termination) {
+    case Termination::converged:
+      return "converged";
+    case Termination::max_iterations:
+      return "max_iterations";
+    case Termination::diverged:
+      return "diverged";
+    case Termination::stalled:
+      return "stalled";
+    case Termination::non_finite:
+      return "non_finite";
+    case Termination::no_free_parameters:
+      return "no_free_parameters";
+    case Termination::no_information:
+      return "no_information";
+  }
+  return "unknown";
+}
+
+}  // namespace llmt::discovery

@@ -1,0 +1,315 @@
+#include "llmt/discovery/search.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <boost/math/distributions/fisher_f.hpp>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <set>
+#include <stdexcept>
+
+#include "discovery/search/explore.hpp"
+#include "discovery/search/null_gate.hpp"
+
+namespace llmt::discovery {
+namespace {
+
+[[noreturn]] void refuse(const std::string& message) {
+  throw std::invalid_argument("llmt::discovery::search: " + message);
+}
+
+void check(const Evidence& evidence, const std::vector<EffectCandidate>& candidates, const SearchOptions& options) {
+  const Eigen::Index rows = evidence.residuals.size();
+  if (evidence.components < 1) refuse(fmt::format("components is {}, must be at least 1", evidence.components));
+  if (rows == 0 || rows % evidence.components != 0) {
+    refuse(fmt::format("residuals has {} entries, must be a multiple of {} and not 0", rows, evidence.components));
+  }
+  if (evidence.jacobian.rows() != rows && evidence.jacobian.cols() > 0) {
+    refuse(fmt::format("jacobian has {} rows, must be {}", evidence.jacobian.rows(), rows));
+  }
+  if (!evidence.repeats.empty() && std::ssize(evidence.repeats) != evidence.samples()) {
+    refuse(fmt::format("repeats has {} entries, must be {}", evidence.repeats.size(), evidence.samples()));
+  }
+  if (!(evidence.resolution >= 0.0 && evidence.resolution < 1.0)) {
+    refuse(fmt::format("resolution is {}, must be in [0, 1)", evidence.resolution));
+  }
+  if (!evidence.residuals.allFinite()) refuse("a residual is not finite");
+  if (!evidence.jacobian.allFinite()) refuse("an entry of the jacobian is not finite");
+  if (!(options.false_alarm_rate > 0.0 && options.false_alarm_rate < 0.1)) {
+    refuse(fmt::format("false_alarm_rate is {}, must be in (0, 0.1)", options.false_alarm_rate));
+  }
+  if (options.null_draws < 50) refuse(fmt::format("null_draws is {}, must be at least 50", options.null_draws));
+  for (const EffectCandidate& candidate : candidates) {
+    const std::string name = fmt::format("candidate {}@{}", candidate.family, candidate.location);
+    const Eigen::Index k = candidate.signature.cols();
+    if (candidate.signature.rows() != rows || k == 0) {
+      refuse(fmt::format("signature of {} is {} x {}, must have {} rows and a column", name, candidate.signature.rows(),
+                         k, rows));
+    }
+    if (!candidate.signature.allFinite()) refuse("signature of " + name + " is not finite");
+    if (candidate.lower.size() != candidate.upper.size() ||
+        (candidate.lower.size() != 0 && candidate.lower.size() != k)) {
+      refuse("limits of " + name + " must be empty or as many as its signature has columns");
+    }
+    if (!std::isfinite(candidate.prior_cost)) refuse("prior_cost of " + name + " is not finite");
+  }
+}
+
+// Names of causes, shapes where causes do not do (step 5).
+Explained choose(const Scoring& scoring, const Set& start, const SearchOptions& options) {
+  const std::vector<EffectCandidate>& candidates = scoring.candidates();
+  const std::vector<bool> all(candidates.size(), true);
+  std::vector<bool> causes;
+  std::vector<bool> shapes;
+  for (const EffectCandidate& candidate : candidates) {
+    causes.push_back(!candidate.generic);
+    shapes.push_back(candidate.generic);
+  }
+  const Explained mixed = best_set(scoring, all, start, options.largest_set);
+  if (std::ranges::none_of(mixed.set, [&](std::size_t a) { return candidates[a].generic; })) return mixed;
+  const Explained named = best_set(scoring, causes, mixed.set, options.largest_set);
+  if (named.score <= mixed.score + options.shape_margin) return named;
+  const Explained shaped = best_set(scoring, shapes, mixed.set, options.largest_set);
+  if (shaped.score <= mixed.score + options.rival_margin) return shaped;
+  return mixed;
+}
+
+std::set<std::string> families_of(const Scoring& scoring, const Set& set) {
+  std::set<std::string> families;
+  for (const std::size_t a : set) families.insert(scoring.candidates()[a].family);
+  return families;
+}
+
+Set without_family(const Scoring& scoring, const Set& set, const std::string& family) {
+  return filtered(set, [&](std::size_t a) { return scoring.candidates()[a].family != family; });
+}
+
+double share_of(const Scoring& scoring, const Set& set, const Set& rest) {
+  const double total = scoring.workspace().sum_of_squares();
+  const double left = scoring.fit(set).left;
+  return total > left ? (scoring.fit(rest).left - left) / (total - left) : 0.0;
+}
+
+// Step 6.
+Set prune(const Scoring& scoring, Set set, const SearchOptions& options) {
+  const auto press = [&](const Set& s) { return scoring.deletion(scoring.fit(s)).errors.squaredNorm(); };
+  while (!set.empty()) {
+    const double error = press(set);
+    double smallest = impossible;
+    Set best;
+    for (const std::string& family : families_of(scoring, set)) {
+      const Set rest = without_family(scoring, set, family);
+      const double share = share_of(scoring, set, rest);
+      const bool useless = press(rest) <= error;
+      // A family that only helps together with others has a small share of its own, but none of them may go alone.
+      if ((useless || share < options.materiality) && share < smallest) {
+        smallest = share;
+        best = rest;
+      }
+    }
+    if (smallest == impossible) break;
+    set = best;
+  }
+  return set;
+}
+
+// Step 7. Members of the family are replaced by the best few of another one, or by the same family elsewhere.
+std::vector<Rival> rivals_of(const Scoring& scoring, const Set& set, const std::string& family,
+                             const SearchOptions& options) {
+  const std::vector<EffectCandidate>& candidates = scoring.candidates();
+  const double score = scoring.score(set);
+  const Set rest = without_family(scoring, set, family);
+  const double left = scoring.fit(set).left;
+  const double explained = scoring.workspace().sum_of_squares() - left;
+  constexpr double same = 1e-8;
+  std::set<std::string> others;
+  for (std::size_t a = 0; a < candidates.size(); ++a) {
+    if (scoring.usable(a) && !candidates[a].generic) others.insert(candidates[a].family);
+  }
+  std::vector<Rival> rivals;
+  for (const std::string& other : others) {
+    std::vector<bool> allowed(candidates.size());
+    for (std::size_t a = 0; a < candidates.size(); ++a) {
+      allowed[a] = candidates[a].family == other && !(other == family && contains(set, a));
+    }
+    Explained current{rest, scoring.score(rest)};
+    while (std::ssize(current.set) < options.largest_set) {
+      Explained next;
+      for (const Scoring::Move& move : scoring.additions(current.set, allowed)) {
+        if (move.score >= current.score) break;
+        const Set grown = with(current.set, move.candidate);
+        const double grown_score = scoring.score(grown);
+        if (grown_score >= current.score) continue;
+        next = {grown, grown_score};
+        break;
+      }
+      if (next.score >= current.score) break;
+      current = next;
+    }
+    if (current.set.size() == rest.size()) continue;
+    const double difference = scoring.fit(current.set).left - left;
+    const bool as_good = current.score <= score + options.rival_margin || difference < options.model_error * explained;
+    if (!as_good) continue;
+    rivals.push_back({other, filtered(current.set, [&](std::size_t a) { return !contains(rest, a); }),
+                      current.score - score, std::abs(difference) < same * explained});
+  }
+  std::ranges::stable_sort(rivals, {}, &Rival::score_difference);
+  return rivals;
+}
+
+// `whole` is the best explanation with everything small that is not told: rivals are judged beside it.
+Finding finding_of(const Scoring& scoring, const Set& set, const Set& whole, const std::string& family,
+                   const SearchOptions& options) {
+  const SetFit fit = scoring.fit(set);
+  const Set rest = without_family(scoring, set, family);
+  Finding finding{
+      .family = family, .generic = false, .confirmed = true, .terms = {}, .rivals = {}, .share = 0, .score_gain = 0};
+  for (const std::size_t a : set) {
+    if (scoring.candidates()[a].family != family) continue;
+    finding.generic = scoring.candidates()[a].generic;
+    finding.terms.push_back({a, scoring.values(fit, set, a), scoring.standard_errors(fit, set, a),
+                             share_of(scoring, set, without(set, a))});
+  }
+  finding.share = share_of(scoring, set, rest);
+  finding.score_gain = scoring.score(rest) - scoring.score(set);
+  if (!finding.generic) finding.rivals = rivals_of(scoring, whole, family, options);
+  return finding;
+}
+
+// Scatter of repeats about their means, of samples that are in use.
+LackOfFit lack_of_fit(const Scoring& scoring, const SetFit& fit, const std::vector<Eigen::Index>& repeats,
+                      const Eigen::VectorXd& remaining) {
+  LackOfFit result;
+  const Eigen::Index d = scoring.workspace().components();
+  std::map<Eigen::Index, std::vector<Eigen::Index>> groups;
+  for (std::size_t i = 0; i < repeats.size(); ++i) {
+    if (std::ranges::find(scoring.workspace().dropped(), i) == scoring.workspace().dropped().end()) {
+      groups[repeats[i]].push_back(static_cast<Eigen::Index>(i));
+    }
+  }
+  double squares = 0.0;
+  for (const auto& [group, members] : groups) {
+    if (members.size() < 2) continue;
+    Eigen::VectorXd mean = Eigen::VectorXd::Zero(d);
+    for (const Eigen::Index i : members) mean += remaining.segment(i * d, d) / static_cast<double>(members.size());
+    for (const Eigen::Index i : members) squares += (remaining.segment(i * d, d) - mean).squaredNorm();
+    result.dof += d * (std::ssize(members) - 1);
+  }
+  const double dof = scoring.dof(fit);
+  const auto own = static_cast<double>(result.dof);
+  if (result.dof < 4 || dof <= own || !(squares > 0.0)) return {};
+  const double variance = squares / own;
+  result.noise = std::sqrt(variance);
+  const double ratio = std::max(0.0, fit.left - squares) / (dof - own) / variance;
+  result.p_value = boost::math::cdf(boost::math::complement(boost::math::fisher_f(dof - own, own), ratio));
+  const double before =
+      scoring.workspace().sum_of_squares() - (dof + static_cast<double>(fit.columns.size())) * variance;
+  if (before > 0.0) result.excess_share = std::max(0.0, fit.left - dof * variance) / before;
+  return result;
+}
+
+std::vector<Sensitivity> sensitivities(const Scoring& scoring, double threshold, double noise) {
+  constexpr double power_quantile = 1.2816;  // of the standard normal at 0.9
+  std::vector<Sensitivity> all;
+  for (std::size_t a = 0; a < scoring.candidates().size(); ++a) {
+    const Block& block = scoring.workspace().blocks()[a];
+    const Eigen::Index k = scoring.candidates()[a].signature.cols();
+    Sensitivity own{block.size == 0, block.outside, Eigen::VectorXd::Constant(k, impossible)};
+    if (block.size > 0) {
+      const double needed = std::max(0.0, threshold) + scoring.single_cost(a) - scoring.cost({});
+      // The gain of an energy E, in units of the noise: n ln(1 + E / (n - k)) - n ln(n / (n - k)).
+      const double n = scoring.workspace().degrees();
+      const double left = std::max(1.0, n - static_cast<double>(block.size));
+      const double least = left * std::expm1(std::max(0.0, needed) / n + std::log(std::max(1.0, n / left)));
+      const double energy = std::pow(std::sqrt(least) + power_quantile, 2.0);
+      // |U' S_i v|: how much a unit of value i alone contributes outside the baseline.
+      const Eigen::MatrixXd to_coefficients = block.to_values.completeOrthogonalDecomposition().pseudoInverse();
+      for (Eigen::Index i = 0; i < k; ++i) {
+        const double seen = to_coefficients.col(i).norm();
+        if (seen > 0.0) own.visible(i) = std::sqrt(energy) * noise / seen;
+      }
+    }
+    all.push_back(std::move(own));
+  }
+  return all;
+}
+
+}  // namespace
+
+Verdict search(const Evidence& evidence, const std::vector<EffectCandidate>& candidates, const SearchOptions& options) {
+  check(evidence, candidates, options);
+  const Workspace full(evidence, candidates, options.absorbed_tolerance);
+  const auto largest = static_cast<std::size_t>(options.largest_outlier_share * static_cast<double>(full.samples()));
+  Workspace workspace = full;
+  workspace.drop(competing_outliers(full, candidates, options.largest_set, largest));
+  Explained found = choose(Scoring(workspace, candidates), {}, options);
+  // Whether a sample fits depends on the explanation, and the other way round.
+  for (int round = 0; round < 3; ++round) {
+    std::vector<std::size_t> outliers = outliers_given(full, candidates, found.set, largest);
+    if (std::set(outliers.begin(), outliers.end()) ==
+        std::set(workspace.dropped().begin(), workspace.dropped().end())) {
+      break;
+    }
+    workspace = full;
+    workspace.drop(outliers);
+    found = choose(Scoring(workspace, candidates), found.set, options);
+  }
+  const Scoring scoring(workspace, candidates);
+  Verdict verdict;
+  verdict.outliers = workspace.dropped();
+  // Evidence that would not decide between two rivals is none.
+  verdict.threshold = std::max(options.rival_margin, chance_gain(scoring, options));
+  verdict.score_gain = scoring.score({}) - scoring.score(found.set);
+  Set set = verdict.score_gain > verdict.threshold ? prune(scoring, found.set, options) : Set{};
+  const auto generic = [&](std::size_t a) { return candidates[a].generic; };
+  const Set causes = filtered(set, [&](std::size_t a) { return !generic(a); });
+  const bool shapes_are_material =
+      causes.size() < set.size() && share_of(scoring, set, causes) > options.tentative_share;
+  if (!shapes_are_material) set = causes;
+  const SetFit fit = scoring.fit(set);
+  verdict.sum_of_squares = workspace.sum_of_squares();
+  verdict.left = fit.left;
+  verdict.dof = static_cast<Eigen::Index>(scoring.dof(fit));
+  verdict.noise = std::sqrt(fit.left / scoring.dof(fit));
+  verdict.remaining = scoring.remaining(fit);
+  for (const std::size_t sample : verdict.outliers) {
+    const Eigen::Index d = workspace.components();
+    verdict.remaining.segment(static_cast<Eigen::Index>(sample) * d, d).setZero();
+  }
+  verdict.lack_of_fit = lack_of_fit(scoring, fit, evidence.repeats, verdict.remaining);
+  verdict.sensitivity = sensitivities(scoring, verdict.threshold, verdict.noise);
+  for (const std::string& family : families_of(scoring, set)) {
+    verdict.findings.push_back(finding_of(scoring, set, found.set, family, options));
+    verdict.findings.back().confirmed = !shapes_are_material && !verdict.findings.back().generic;
+  }
+  std::ranges::stable_sort(verdict.findings, std::greater<>{}, &Finding::share);
+  if (set.empty()) {
+    verdict.answer = Answer::nothing_missing;
+  } else if (shapes_are_material) {
+    verdict.answer = Answer::unknown;
+  } else {
+    const bool ambiguous =
+        std::ranges::any_of(verdict.findings, [](const Finding& finding) { return !finding.rivals.empty(); });
+    verdict.answer = ambiguous ? Answer::indistinguishable : Answer::named;
+  }
+  return verdict;
+}
+
+std::string to_string(Answer answer) {
+  switch (answer) {
+    case Answer::nothing_missing:
+      return "nothing missing";
+    case Answer::named:
+      return "named";
+    case Answer::indistinguishable:
+      return "named, indistinguishable";
+    case Answer::unknown:
+      return "unknown effect";
+  }
+  return "";
+}
+
+}  // namespace llmt::discovery

@@ -1,0 +1,140 @@
+#include "discovery/terms/missing_findings.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+
+#include "discovery/terms/structure.hpp"
+
+namespace llmt::discovery {
+namespace {
+
+std::string unit_of(const std::string& output, const std::string& per) {
+  if (per.empty()) return output;
+  if (per.starts_with("simulated")) return output + "/" + output + per.substr(std::string("simulated").size());
+  return output + "/" + per;
+}
+
+FoundTerm described(const TermModel& model, const PlacedTerm& placed, const Eigen::VectorXd& errors) {
+  const ModelTerm& term = model.terms()[placed.term];
+  FoundTerm found;
+  found.term = placed.term;
+  found.family = term.family;
+  found.location = term.location;
+  found.output = model.outputs()[static_cast<std::size_t>(placed.output)];
+  found.output_index = placed.output;
+  found.formula = term.formula;
+  found.inputs = term.inputs;
+  found.generic = term.generic;
+  found.coefficients = placed.coefficients;
+  found.constants = placed.constants;
+  for (std::size_t k = 0; k < term.coefficients.size(); ++k) {
+    const auto place = static_cast<Eigen::Index>(k);
+    found.values.push_back(
+        {term.coefficients[k], unit_of(found.output, term.per), placed.coefficients(place), errors(place)});
+  }
+  for (std::size_t c = 0; c < term.constants.size(); ++c) {
+    const auto place = static_cast<Eigen::Index>(c);
+    found.values.push_back({term.constants[c].name, term.constants[c].unit, placed.constants(place),
+                            errors(placed.coefficients.size() + place)});
+  }
+  return found;
+}
+
+}  // namespace
+
+std::string option_label(const TermModel& model, const PlacedTerm& option) {
+  std::string text = model.label(option);
+  const std::vector<TermConstant>& constants = model.terms()[option.term].constants;
+  if (!constants.empty()) text += fmt::format(" ({} = {:.4g})", constants.front().name, option.constants(0));
+  return text;
+}
+
+void describe_findings(const TermModel& model, const Progress& progress, Missing& missing) {
+  std::size_t next = 0;
+  for (const Finding& finding : progress.verdict.findings) {
+    for (const FindingTerm& term : finding.terms) {
+      FoundTerm found = described(model, progress.fit.placed[next], progress.fit.errors[next]);
+      ++next;
+      found.confirmed = finding.confirmed;
+      found.share = term.share;
+      for (const Rival& rival : finding.rivals) {
+        std::string what;
+        for (const std::size_t a : rival.candidates) what += (what.empty() ? "" : " + ") + missing.candidates[a];
+        found.rivals.push_back({what, rival.exact});
+      }
+      missing.found.push_back(std::move(found));
+    }
+  }
+  std::ranges::stable_sort(missing.found, [](const FoundTerm& a, const FoundTerm& b) {
+    return a.generic != b.generic ? b.generic : a.share > b.share;
+  });
+}
+
+void describe_limits(const Progress& progress, const FitData& data, Missing& missing) {
+  const double n = static_cast<double>(data.rows.size());
+  for (std::size_t a = 0; a < progress.question.options.size(); ++a) {
+    const EffectCandidate& candidate = progress.question.candidates[a];
+    const Sensitivity& own = progress.verdict.sensitivity[a];
+    const bool found = std::ranges::any_of(progress.verdict.findings, [&](const Finding& finding) {
+      return std::ranges::any_of(finding.terms, [&](const FindingTerm& term) { return term.candidate == a; });
+    });
+    if (candidate.generic || found) continue;
+    if (own.absorbed) {
+      missing.not_testable.push_back({missing.candidates[a], candidate.signature.norm() > 0.0
+                                                                 ? "the simulation's own parameters imitate it"
+                                                                 : "it is zero at every row"});
+      continue;
+    }
+    Eigen::Index k = 0;
+    const double visible = own.visible.maxCoeff(&k);
+    const double sigma = data.sigma(progress.question.options[a].output);
+    missing.visible.push_back(
+        {missing.candidates[a], visible, visible * candidate.signature.col(k).norm() / std::sqrt(n) * sigma});
+  }
+  std::ranges::stable_sort(missing.visible, {}, &VisibleTerm::rms);
+}
+
+void doubt_approximations(Missing& missing) {
+  constexpr std::size_t too_many = 3;
+  std::map<std::pair<std::string, Eigen::Index>, std::set<std::string>> families;
+  for (const FoundTerm& found : missing.found) {
+    if (found.inputs.size() == 1) families[{found.inputs.front(), found.output_index}].insert(found.family);
+  }
+  std::set<std::string> doubted;
+  for (FoundTerm& found : missing.found) {
+    if (found.inputs.size() != 1) continue;
+    const std::string& input = found.inputs.front();
+    if (families[{input, found.output_index}].size() < too_many) continue;
+    found.confirmed = false;
+    if (!doubted.insert(input).second) continue;
+    missing.notes.push_back(
+        fmt::format("so many terms of {} may be an approximation of one that was not tried", input));
+  }
+}
+
+void look_for_structure(const TermModel& model, const FitData& data, const Inputs& inputs, Missing& missing) {
+  constexpr double surprising = 5e-4;
+  constexpr double material = 0.05;
+  const Eigen::MatrixXd rows = inputs.values(data.rows, Eigen::all);
+  for (Eigen::Index o = 0; o < data.measured.cols(); ++o) {
+    const Eigen::VectorXd left = data.measured.col(o) - missing.corrected.col(o)(data.rows);
+    const Eigen::VectorXd gap = data.measured.col(o) - missing.before.col(o)(data.rows);
+    const StructureLeft found = structure_left(rows, left);
+    const double common = found.share * left.squaredNorm();
+    const double explained = std::max(0.0, gap.squaredNorm() - left.squaredNorm());
+    const double p_value = found.p_value * static_cast<double>(data.measured.cols());
+    if (p_value > surprising || common < material * (common + explained)) continue;
+    Structure structure{model.outputs()[static_cast<std::size_t>(o)], {}, p_value, common / (common + explained)};
+    for (const Eigen::Index j : found.columns) structure.inputs.push_back(inputs.names[static_cast<std::size_t>(j)]);
+    missing.structure.push_back(structure);
+    for (FoundTerm& term : missing.found) term.confirmed = term.confirmed && term.output_index != o;
+  }
+  missing.answer = missing.verdict.answer;
+  if (missing.answer == Answer::nothing_missing && !missing.structure.empty()) missing.answer = Answer::unknown;
+}
+
+}  // namespace llmt::discovery

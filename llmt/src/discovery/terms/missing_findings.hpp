@@ -1,0 +1,31 @@
+// What a search found, in the words of find_missing().
+#pragma once
+
+#include "discovery/terms/term_question.hpp"
+
+namespace llmt::discovery {
+
+/// Where the rounds of search and fit ended.
+struct Progress {
+  TermFit fit;
+  Verdict verdict;
+  TermQuestion question;
+  int rounds = 0;
+};
+
+/// "wave t (P = 2.3)".
+std::string option_label(const TermModel& model, const PlacedTerm& option);
+
+/// Missing::found.
+void describe_findings(const TermModel& model, const Progress& progress, Missing& missing);
+
+/// Missing::visible and not_testable.
+void describe_limits(const Progress& progress, const FitData& data, Missing& missing);
+
+/// Many terms of one input approximate something else, however well they fit: they are not confirmed.
+void doubt_approximations(Missing& missing);
+
+/// Missing::structure and answer. What neighbours have in common is not noise.
+void look_for_structure(const TermModel& model, const FitData& data, const Inputs& inputs, Missing& missing);
+
+}  // namespace llmt::discovery

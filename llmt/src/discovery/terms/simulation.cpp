@@ -1,0 +1,210 @@
+#include "llmt/discovery/simulation.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "discovery/terms/missing_findings.hpp"
+#include "discovery/terms/term_question.hpp"
+
+namespace llmt::discovery {
+namespace {
+
+constexpr double unknown_number = std::numeric_limits<double>::quiet_NaN();
+
+[[noreturn]] void refuse(const std::string& message) {
+  throw std::invalid_argument("llmt::discovery::find_missing: " + message);
+}
+
+void check(const Simulation& simulation, const Inputs& inputs, const MeasuredOutputs& measured,
+           const MissingOptions& options) {
+  const Eigen::Index n = inputs.values.rows();
+  if (!simulation.predict) refuse("the simulation has no function predict");
+  if (measured.values.rows() != n) {
+    refuse(fmt::format("{} rows of measured outputs for {} rows of inputs", measured.values.rows(), n));
+  }
+  if (measured.names.empty() || std::ssize(measured.names) != measured.values.cols()) {
+    refuse(fmt::format("{} names for {} measured outputs", measured.names.size(), measured.values.cols()));
+  }
+  for (Eigen::Index o = 0; o < measured.values.cols(); ++o) {
+    if (!measured.values.col(o).allFinite()) {
+      refuse(fmt::format("a measured value of \"{}\" is not finite", measured.names[static_cast<std::size_t>(o)]));
+    }
+  }
+  if (!(options.held_out_share >= 0.0 && options.held_out_share <= 0.9)) {
+    refuse(fmt::format("held_out_share is {}, must be within 0 ... 0.9", options.held_out_share));
+  }
+  if (options.rounds < 1) refuse(fmt::format("rounds is {}, must be at least 1", options.rounds));
+  constexpr Eigen::Index fewest = 50;
+  if (options.largest_sample < fewest) {
+    refuse(fmt::format("largest_sample is {}, must be at least {}", options.largest_sample, fewest));
+  }
+}
+
+// Root mean square of what is left of each output, in its own unit.
+Eigen::VectorXd scatter(const TermModel& model, const FitData& data, const TermFit& fit) {
+  const Eigen::MatrixXd predicted = model.predict(fit.parameters, fit.placed);
+  Eigen::VectorXd sigma(data.measured.cols());
+  for (Eigen::Index o = 0; o < sigma.size(); ++o) {
+    const Eigen::VectorXd left = data.measured.col(o) - predicted.col(o)(data.rows);
+    sigma(o) = std::sqrt(left.squaredNorm() / static_cast<double>(left.size()));
+    if (!(sigma(o) > 0.0)) sigma(o) = 1.0;
+  }
+  return sigma;
+}
+
+std::vector<PlacedTerm> found_terms(const TermQuestion& question, const Verdict& verdict) {
+  std::vector<PlacedTerm> found;
+  for (const Finding& finding : verdict.findings) {
+    for (const FindingTerm& term : finding.terms) {
+      found.push_back(question.options[term.candidate]);
+      found.back().coefficients = term.values;
+    }
+  }
+  return found;
+}
+
+using Key = std::vector<std::pair<std::size_t, Eigen::Index>>;
+
+Key key_of(const std::vector<PlacedTerm>& placed, const std::vector<std::size_t>& outliers) {
+  Key key;
+  for (const PlacedTerm& term : placed) key.emplace_back(term.term, term.output);
+  for (const std::size_t sample : outliers) key.emplace_back(sample, -1);
+  std::ranges::sort(key);
+  return key;
+}
+
+// One search after the other until nothing changes.
+Progress search_until_settled(const TermModel& model, FitData& data, const std::vector<Eigen::Index>& repeats,
+                              const TermFit& baseline, const MissingOptions& options) {
+  Progress progress;
+  progress.fit = baseline;
+  while (progress.rounds < options.rounds) {
+    const Key before = key_of(progress.fit.placed, progress.verdict.outliers);
+    progress.question = ask(model, data, progress.fit, repeats, progress.verdict.outliers);
+    progress.verdict = search(progress.question.evidence, progress.question.candidates, options.search);
+    ++progress.rounds;
+    const FitData kept = without_samples(data, progress.verdict.outliers);
+    progress.fit = fit_terms(model, kept, progress.fit.parameters, found_terms(progress.question, progress.verdict));
+    if (retry_constants(model, kept, progress.fit)) {
+      progress.fit = fit_terms(model, kept, progress.fit.parameters, progress.fit.placed);
+    }
+    if (key_of(progress.fit.placed, progress.verdict.outliers) == before) break;
+    if (data.sigma.size() > 1 && progress.rounds < options.rounds) data.sigma = scatter(model, kept, progress.fit);
+  }
+  tell_trial_errors(model, without_samples(data, progress.verdict.outliers), progress.fit);
+  return progress;
+}
+
+double rms_at(const Eigen::VectorXd& errors, const std::vector<Eigen::Index>& rows) {
+  if (rows.empty()) return unknown_number;
+  return std::sqrt(errors(rows).squaredNorm() / static_cast<double>(rows.size()));
+}
+
+}  // namespace
+
+Simulation tabulated(const Eigen::MatrixXd& simulated, const std::vector<std::string>& outputs, bool offset,
+                     bool scale) {
+  if (std::ssize(outputs) != simulated.cols()) {
+    throw std::invalid_argument(
+        fmt::format("llmt::discovery::tabulated: {} names for {} columns", outputs.size(), simulated.cols()));
+  }
+  Simulation simulation;
+  for (std::size_t o = 0; o < outputs.size(); ++o) {
+    const auto column = simulated.col(static_cast<Eigen::Index>(o));
+    const double spread = column.size() > 0 ? column.maxCoeff() - column.minCoeff() : 0.0;
+    simulation.parameters.push_back({.name = outputs[o] + ".offset",
+                                     .unit = outputs[o],
+                                     .value = 0.0,
+                                     .scale = spread > 0.0 ? 0.01 * spread : 1.0,
+                                     .free = offset});
+    simulation.parameters.push_back(
+        {.name = outputs[o] + ".scale", .unit = "1", .value = 1.0, .scale = 0.01, .free = scale});
+  }
+  simulation.predict = [simulated](const Eigen::MatrixXd& inputs, const Eigen::VectorXd& values) {
+    if (inputs.rows() != simulated.rows()) {
+      throw std::invalid_argument(
+          fmt::format("a tabulated simulation has {} rows, not {}", simulated.rows(), inputs.rows()));
+    }
+    Eigen::MatrixXd predicted = simulated;
+    for (Eigen::Index o = 0; o < simulated.cols(); ++o) {
+      predicted.col(o) = (values(2 * o) + values(2 * o + 1) * simulated.col(o).array()).matrix();
+    }
+    return predicted;
+  };
+  return simulation;
+}
+
+Missing find_missing(const Simulation& simulation, const Inputs& inputs, const MeasuredOutputs& measured,
+                     const std::vector<ModelTerm>& terms, const MissingOptions& options) {
+  check(simulation, inputs, measured, options);
+  const TermModel model(simulation, inputs, measured.names, terms);
+  const RowSplit split = split_rows(inputs, options);
+  const Eigen::Index d = measured.values.cols();
+  FitData data{split.searched, measured.values(split.searched, Eigen::all), Eigen::VectorXd::Ones(d)};
+  const auto free = std::ranges::count_if(simulation.parameters, &Parameter::free);
+  constexpr std::ptrdiff_t fewest = 10;
+  if (std::ssize(data.rows) * d < fewest + 2 * free) {
+    refuse(fmt::format("{} rows to search beside {} set aside are too few: {} free parameters need {} measured values",
+                       data.rows.size(), split.held_out.size(), free, fewest + 2 * free));
+  }
+  Eigen::VectorXd start(std::ssize(simulation.parameters));
+  for (std::size_t k = 0; k < simulation.parameters.size(); ++k)
+    start(static_cast<Eigen::Index>(k)) = simulation.parameters[k].value;
+  TermFit baseline = fit_terms(model, data, start, {});
+  data.sigma = scatter(model, data, baseline);
+  if (d > 1) baseline = fit_terms(model, data, start, {});
+  const Progress progress = search_until_settled(model, data, split.repeats, baseline, options);
+
+  Missing missing;
+  missing.verdict = progress.verdict;
+  missing.rounds = progress.rounds;
+  for (const PlacedTerm& option : progress.question.options) missing.candidates.push_back(option_label(model, option));
+  describe_findings(model, progress, missing);
+  describe_limits(progress, data, missing);
+  doubt_approximations(missing);
+  missing.parameters = simulation.parameters;
+  for (std::size_t k = 0; k < missing.parameters.size(); ++k) {
+    missing.parameters[k].value = progress.fit.parameters(static_cast<Eigen::Index>(k));
+  }
+  missing.standard_errors = progress.fit.parameter_errors;
+  missing.searched = split.searched;
+  missing.held_out = split.held_out;
+  for (const std::size_t sample : progress.verdict.outliers) missing.outliers.push_back(split.searched[sample]);
+  if (!progress.verdict.outliers.empty()) {
+    baseline = fit_terms(model, without_samples(data, progress.verdict.outliers), start, {});
+  }
+  missing.before = model.predict(baseline.parameters, {});
+  missing.corrected = model.predict(progress.fit.parameters, progress.fit.placed);
+  look_for_structure(model, without_samples(data, progress.verdict.outliers), inputs, missing);
+  constexpr Eigen::Index enough_repeats = 12;
+  missing.floor_from_repeats = progress.verdict.lack_of_fit.dof >= enough_repeats;
+  const double noise = missing.floor_from_repeats ? progress.verdict.lack_of_fit.noise : progress.verdict.noise;
+  for (Eigen::Index o = 0; o < d; ++o) {
+    missing.gaps.push_back({measured.names[static_cast<std::size_t>(o)],
+                            rms_at(measured.values.col(o) - missing.before.col(o), split.held_out),
+                            rms_at(measured.values.col(o) - missing.corrected.col(o), split.held_out),
+                            noise * data.sigma(o)});
+  }
+  return missing;
+}
+
+Eigen::MatrixXd corrected(const Simulation& simulation, const Missing& missing, const std::vector<ModelTerm>& terms,
+                          const Inputs& inputs) {
+  std::vector<std::string> outputs;
+  for (const Gap& gap : missing.gaps) outputs.push_back(gap.output);
+  const TermModel model(simulation, inputs, outputs, terms);
+  Eigen::VectorXd values(std::ssize(missing.parameters));
+  for (std::size_t k = 0; k < missing.parameters.size(); ++k)
+    values(static_cast<Eigen::Index>(k)) = missing.parameters[k].value;
+  std::vector<PlacedTerm> placed;
+  for (const FoundTerm& found : missing.found) {
+    placed.push_back({found.term, found.output_index, found.constants, found.coefficients, 0.0});
+  }
+  return model.predict(values, placed);
+}
+
+}  // namespace llmt::discovery

@@ -1,0 +1,94 @@
+#include "discovery/terms/structure.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+namespace llmt::discovery {
+namespace {
+
+struct Pairing {
+  double sum = 0.0;
+  double variance = 0.0;
+  double pairs = 0.0;
+
+  void add(double a, double b, double weight) {
+    sum += weight * a * b;
+    variance += weight * weight * a * a * b * b;
+    pairs += weight;
+  }
+  double p_value() const { return variance > 0.0 ? 0.5 * std::erfc(sum / std::sqrt(2.0 * variance)) : 1.0; }
+};
+
+Pairing along(const Eigen::VectorXd& input, const Eigen::VectorXd& errors) {
+  std::vector<Eigen::Index> order(static_cast<std::size_t>(input.size()));
+  std::iota(order.begin(), order.end(), 0);
+  std::ranges::stable_sort(order, {}, [&](Eigen::Index i) { return input(i); });
+  Pairing pairing;
+  for (std::size_t k = 1; k < order.size(); ++k) pairing.add(errors(order[k - 1]), errors(order[k]), 1.0);
+  return pairing;
+}
+
+// Nearest neighbours; `inputs` scaled to equal spread.
+Pairing nearest(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& errors) {
+  const Eigen::Index n = inputs.rows();
+  std::vector<Eigen::Index> neighbour(static_cast<std::size_t>(n), 0);
+  const Eigen::MatrixXd points = inputs.transpose();
+  for (Eigen::Index i = 0; i < n; ++i) {
+    double least = std::numeric_limits<double>::infinity();
+    for (Eigen::Index k = 0; k < n; ++k) {
+      const double distance = (points.col(i) - points.col(k)).squaredNorm();
+      if (k == i || distance >= least) continue;
+      least = distance;
+      neighbour[static_cast<std::size_t>(i)] = k;
+    }
+  }
+  Pairing pairing;
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const Eigen::Index k = neighbour[static_cast<std::size_t>(i)];
+    const bool mutual = neighbour[static_cast<std::size_t>(k)] == i;
+    if (!mutual || i < k) pairing.add(errors(i), errors(k), 1.0);
+  }
+  return pairing;
+}
+
+}  // namespace
+
+StructureLeft structure_left(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& errors) {
+  constexpr Eigen::Index fewest = 20;
+  constexpr double most_work = 2e8;  // distances
+  StructureLeft best;
+  if (errors.size() < fewest || !(errors.squaredNorm() > 0.0)) return best;
+  std::vector<Eigen::Index> moving;
+  Eigen::MatrixXd scaled = inputs;
+  for (Eigen::Index j = 0; j < inputs.cols(); ++j) {
+    const double range = inputs.col(j).maxCoeff() - inputs.col(j).minCoeff();
+    if (!(range > 0.0)) continue;
+    scaled.col(j) /= range;
+    moving.push_back(j);
+  }
+  double tests = 0.0;
+  const auto consider = [&](const std::vector<Eigen::Index>& columns, const Pairing& pairing) {
+    tests += 1.0;
+    const double p = pairing.p_value();
+    if (p >= best.p_value) return;
+    const double common = pairing.sum / std::max(1.0, pairing.pairs);
+    best = {columns, p, std::clamp(common * static_cast<double>(errors.size()) / errors.squaredNorm(), 0.0, 1.0)};
+  };
+  for (const Eigen::Index j : moving) consider({j}, along(scaled.col(j), errors));
+  const double work = static_cast<double>(errors.size()) * static_cast<double>(errors.size());
+  const double pairs = 0.5 * static_cast<double>(moving.size()) * static_cast<double>(moving.size() - 1);
+  if (moving.size() > 1 && work * pairs <= most_work) {
+    for (std::size_t a = 0; a < moving.size(); ++a) {
+      for (std::size_t b = a + 1; b < moving.size(); ++b) {
+        consider({moving[a], moving[b]}, nearest(scaled(Eigen::all, std::vector{moving[a], moving[b]}), errors));
+      }
+    }
+  }
+  if (moving.size() > 2) consider(moving, nearest(scaled(Eigen::all, moving), errors));
+  best.p_value = std::min(1.0, best.p_value * tests);
+  return best;
+}
+
+}  // namespace llmt::discovery

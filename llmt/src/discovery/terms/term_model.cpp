@@ -1,0 +1,222 @@
+#include "discovery/terms/term_model.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+namespace llmt::discovery {
+namespace {
+
+[[noreturn]] void refuse(const std::string& message) {
+  throw std::invalid_argument("llmt::discovery::find_missing: " + message);
+}
+
+Eigen::Index first_bad_row(const Eigen::MatrixXd& values) {
+  Eigen::Index row = 0;
+  while (row < values.rows() && values.row(row).allFinite()) ++row;
+  return row;
+}
+
+// Where the parameters of the joint fit belong.
+struct Layout {
+  std::vector<Parameter> parameters;
+  std::size_t own = 0;
+};
+
+bool constant_is_fitted(const ModelTerm& term) { return !term.constants.empty() && term.constants.front().smooth; }
+
+Layout layout_of(const TermModel& model, const FitData& data, const Eigen::VectorXd& start,
+                 const std::vector<PlacedTerm>& placed, bool constants_are_free) {
+  Layout layout{model.parameters(), model.parameters().size()};
+  for (std::size_t k = 0; k < layout.own; ++k) layout.parameters[k].value = start(static_cast<Eigen::Index>(k));
+  const Eigen::MatrixXd& simulated = model.simulated(start);
+  for (std::size_t t = 0; t < placed.size(); ++t) {
+    const ModelTerm& term = model.terms()[placed[t].term];
+    const Eigen::MatrixXd columns = model.columns(placed[t], simulated);
+    const double sigma = data.sigma(placed[t].output);
+    for (Eigen::Index k = 0; k < columns.cols(); ++k) {
+      const double rms = columns.col(k).norm() / std::sqrt(static_cast<double>(columns.rows()));
+      Parameter parameter;
+      parameter.name = fmt::format("term{}.coefficient{}", t, k);
+      parameter.value = placed[t].coefficients(k);
+      parameter.scale = rms > 0.0 ? sigma / rms : 1.0;
+      layout.parameters.push_back(std::move(parameter));
+    }
+    for (std::size_t c = 0; c < term.constants.size(); ++c) {
+      Parameter parameter;
+      parameter.name = fmt::format("term{}.constant{}", t, c);
+      parameter.value = placed[t].constants(static_cast<Eigen::Index>(c));
+      parameter.scale = 0.1 * spacing(term.constants[c].tried, parameter.value);
+      parameter.free = constants_are_free && constant_is_fitted(term);
+      layout.parameters.push_back(std::move(parameter));
+    }
+  }
+  return layout;
+}
+
+std::vector<PlacedTerm> unpack(const std::vector<PlacedTerm>& placed, const Eigen::VectorXd& values, std::size_t own) {
+  std::vector<PlacedTerm> result = placed;
+  Eigen::Index next = static_cast<Eigen::Index>(own);
+  for (PlacedTerm& term : result) {
+    term.coefficients = values.segment(next, term.coefficients.size());
+    next += term.coefficients.size();
+    term.constants = values.segment(next, term.constants.size());
+    next += term.constants.size();
+  }
+  return result;
+}
+
+// A constant that left the values tried is no longer what was found.
+bool within_tried(const TermModel& model, const std::vector<PlacedTerm>& before, const std::vector<PlacedTerm>& after) {
+  for (std::size_t t = 0; t < after.size(); ++t) {
+    const ModelTerm& term = model.terms()[after[t].term];
+    for (std::size_t c = 0; c < term.constants.size(); ++c) {
+      const std::vector<double>& tried = term.constants[c].tried;
+      const double start = before[t].constants(static_cast<Eigen::Index>(c));
+      const double value = after[t].constants(static_cast<Eigen::Index>(c));
+      constexpr double far = 5.0;  // steps
+      const double step = spacing(tried, start);
+      if (value < tried.front() - step || value > tried.back() + step || std::abs(value - start) > far * step)
+        return false;
+    }
+  }
+  return true;
+}
+
+}  // namespace
+
+TermModel::TermModel(const Simulation& simulation, const Inputs& inputs, std::vector<std::string> outputs,
+                     const std::vector<ModelTerm>& terms)
+    : simulation_(&simulation),
+      inputs_(&inputs),
+      outputs_(std::move(outputs)),
+      terms_(&terms),
+      rows_(rows_of(inputs, Eigen::VectorXd::Zero(inputs.values.rows()))) {}
+
+Eigen::MatrixXd TermModel::evaluate(const Eigen::VectorXd& values) const {
+  Eigen::MatrixXd simulated = simulation_->predict(inputs_->values, values);
+  if (simulated.rows() != inputs_->values.rows() || simulated.cols() != std::ssize(outputs_)) {
+    refuse(fmt::format("the simulation gave {} x {} outputs, must be {} x {}", simulated.rows(), simulated.cols(),
+                       inputs_->values.rows(), outputs_.size()));
+  }
+  return simulated;
+}
+
+const Eigen::MatrixXd& TermModel::simulated(const Eigen::VectorXd& values) const {
+  // Differences by coefficients leave the simulation's own parameters alone.
+  if (last_.size() == 0 || last_values_ != values) {
+    last_ = evaluate(values);
+    last_values_ = values;
+  }
+  return last_;
+}
+
+Eigen::MatrixXd TermModel::columns(const PlacedTerm& placed, const Eigen::MatrixXd& simulated) const {
+  const ModelTerm& term = (*terms_)[placed.term];
+  rows_.simulated = simulated.col(placed.output);
+  Eigen::MatrixXd columns = term.columns(rows_, placed.constants);
+  if (columns.rows() != simulated.rows() || columns.cols() != std::ssize(term.coefficients)) {
+    refuse(fmt::format("the term {} gave {} x {} values, must be {} x {}", label(placed), columns.rows(),
+                       columns.cols(), simulated.rows(), term.coefficients.size()));
+  }
+  return columns;
+}
+
+Eigen::MatrixXd TermModel::predict(const Eigen::VectorXd& values, const std::vector<PlacedTerm>& placed) const {
+  const Eigen::MatrixXd& base = simulated(values);
+  Eigen::MatrixXd predicted = base;
+  for (const PlacedTerm& term : placed) predicted.col(term.output) += columns(term, base) * term.coefficients;
+  return predicted;
+}
+
+Eigen::VectorXd TermModel::input(const std::string& name) const {
+  const auto found = std::ranges::find(inputs_->names, name);
+  if (found == inputs_->names.end()) refuse(fmt::format("a term depends on \"{}\", which is not an input", name));
+  return inputs_->values.col(found - inputs_->names.begin());
+}
+
+std::string TermModel::label(const PlacedTerm& placed) const {
+  const ModelTerm& term = (*terms_)[placed.term];
+  std::string text = term.family;
+  if (!term.location.empty()) text += " " + term.location;
+  if (outputs_.size() > 1) text += " on " + outputs_[static_cast<std::size_t>(placed.output)];
+  return text;
+}
+
+Eigen::VectorXd scaled_residuals(const TermModel& model, const FitData& data, const Eigen::VectorXd& parameters,
+                                 const std::vector<PlacedTerm>& placed) {
+  const Eigen::MatrixXd predicted = model.predict(parameters, placed);
+  const Eigen::Index d = data.measured.cols();
+  Eigen::VectorXd residuals(data.measured.size());
+  for (Eigen::Index i = 0; i < data.measured.rows(); ++i) {
+    const Eigen::Index row = data.rows[static_cast<std::size_t>(i)];
+    residuals.segment(i * d, d) = (data.measured.row(i) - predicted.row(row)).transpose().cwiseQuotient(data.sigma);
+  }
+  return residuals;
+}
+
+Eigen::MatrixXd baseline_jacobian(const TermModel& model, const FitData& data, const Eigen::VectorXd& parameters,
+                                  const std::vector<PlacedTerm>& placed) {
+  LeastSquaresProblem problem;
+  problem.parameters = model.parameters();
+  problem.residual = [&](const Eigen::VectorXd& values) { return scaled_residuals(model, data, values, placed); };
+  std::vector<Eigen::Index> free;
+  for (std::size_t k = 0; k < problem.parameters.size(); ++k) {
+    if (problem.parameters[k].free) free.push_back(static_cast<Eigen::Index>(k));
+  }
+  if (free.empty()) return Eigen::MatrixXd(data.measured.size(), 0);
+  return -difference_jacobian(problem, parameters)(Eigen::all, free);
+}
+
+Eigen::MatrixXd stacked_signature(const TermModel& model, const FitData& data, const PlacedTerm& placed,
+                                  const Eigen::MatrixXd& simulated) {
+  const Eigen::MatrixXd columns = model.columns(placed, simulated);
+  const Eigen::Index bad = first_bad_row(columns);
+  if (bad < columns.rows()) refuse(fmt::format("the term {} is not finite at row {}", model.label(placed), bad + 1));
+  const Eigen::Index d = data.measured.cols();
+  Eigen::MatrixXd signature = Eigen::MatrixXd::Zero(data.measured.size(), columns.cols());
+  for (Eigen::Index i = 0; i < data.measured.rows(); ++i) {
+    signature.row(i * d + placed.output) =
+        columns.row(data.rows[static_cast<std::size_t>(i)]) / data.sigma(placed.output);
+  }
+  return signature;
+}
+
+TermFit fit_terms(const TermModel& model, const FitData& data, const Eigen::VectorXd& start,
+                  const std::vector<PlacedTerm>& placed) {
+  const Eigen::MatrixXd simulated = model.simulated(start);
+  const Eigen::Index bad = first_bad_row(simulated);
+  if (bad < simulated.rows()) refuse(fmt::format("the simulation is not finite at row {}", bad + 1));
+  for (const bool constants_are_free : {true, false}) {
+    const Layout layout = layout_of(model, data, start, placed, constants_are_free);
+    const auto own = static_cast<Eigen::Index>(layout.own);
+    LeastSquaresProblem problem;
+    problem.parameters = layout.parameters;
+    problem.residual = [&](const Eigen::VectorXd& values) {
+      return scaled_residuals(model, data, values.head(own), unpack(placed, values, layout.own));
+    };
+    const SolverResult result = solve(problem);
+    TermFit fit{
+        result.values.head(own), result.standard_errors.head(own), unpack(placed, result.values, layout.own), {}};
+    if (constants_are_free && !within_tried(model, placed, fit.placed)) continue;
+    Eigen::Index next = own;
+    for (const PlacedTerm& term : placed) {
+      const Eigen::Index k = term.coefficients.size() + term.constants.size();
+      Eigen::VectorXd errors = result.standard_errors.segment(next, k);
+      const std::vector<TermConstant>& constants = model.terms()[term.term].constants;
+      for (std::size_t c = 0; c < constants.size(); ++c) {
+        const Eigen::Index place = term.coefficients.size() + static_cast<Eigen::Index>(c);
+        if (!constants_are_free || !constants[c].smooth) errors(place) = std::numeric_limits<double>::quiet_NaN();
+      }
+      fit.errors.push_back(errors);
+      next += k;
+    }
+    return fit;
+  }
+  return {};
+}
+
+}  // namespace llmt::discovery

@@ -1,0 +1,188 @@
+#include "discovery/terms/term_question.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "llmt/random.hpp"
+
+namespace llmt::discovery {
+namespace {
+
+std::vector<Eigen::Index> repeat_numbers(const Inputs& inputs) {
+  std::map<std::vector<double>, Eigen::Index> numbers;
+  std::vector<Eigen::Index> repeats;
+  for (Eigen::Index i = 0; i < inputs.values.rows(); ++i) {
+    std::vector<double> setting;
+    for (Eigen::Index j = 0; j < inputs.values.cols(); ++j) {
+      if (inputs.names[static_cast<std::size_t>(j)] != inputs.order) setting.push_back(inputs.values(i, j));
+    }
+    // Without inputs beside the order nothing is a repeat.
+    if (setting.empty()) setting.push_back(static_cast<double>(i));
+    repeats.push_back(numbers.try_emplace(std::move(setting), static_cast<Eigen::Index>(numbers.size())).first->second);
+  }
+  return repeats;
+}
+
+// Terms of the library that need not be tried because they stand among the found ones.
+bool placed_already(const std::vector<PlacedTerm>& placed, std::size_t term, Eigen::Index output) {
+  return std::ranges::any_of(placed, [&](const PlacedTerm& p) { return p.term == term && p.output == output; });
+}
+
+// `slot`: of equal terms with different constants, those in the same slot exclude each other.
+EffectCandidate candidate_of(const TermModel& model, const FitData& data, const PlacedTerm& option,
+                             const Eigen::MatrixXd& simulated, std::size_t slot) {
+  const ModelTerm& term = model.terms()[option.term];
+  EffectCandidate candidate;
+  candidate.family = term.family;
+  candidate.location = term.location;
+  if (slot > 0) candidate.location += fmt::format("#{}", slot + 1);
+  if (model.outputs().size() > 1)
+    candidate.location += " on " + model.outputs()[static_cast<std::size_t>(option.output)];
+  candidate.signature = stacked_signature(model, data, option, simulated);
+  candidate.lower = term.lower;
+  candidate.upper = term.upper;
+  candidate.generic = term.generic;
+  candidate.prior_cost = option.prior_cost;
+  return candidate;
+}
+
+class Slots {
+ public:
+  std::size_t next(const TermModel& model, const PlacedTerm& option) {
+    const std::vector<TermConstant>& constants = model.terms()[option.term].constants;
+    if (constants.empty()) return 0;
+    return used_[{option.term, option.output}]++ % static_cast<std::size_t>(std::max(1, constants.front().most));
+  }
+
+ private:
+  std::map<std::pair<std::size_t, Eigen::Index>, std::size_t> used_;
+};
+
+Eigen::MatrixXd beside(const Eigen::MatrixXd& left, const Eigen::MatrixXd& right) {
+  Eigen::MatrixXd both(left.rows(), left.cols() + right.cols());
+  both << left, right;
+  return both;
+}
+
+// What is left if term t of the fit is taken away, and everything else that may explain it.
+TrialGround ground_without(const TermModel& model, const FitData& data, const TermFit& fit, std::size_t t) {
+  const Eigen::MatrixXd simulated = model.simulated(fit.parameters);
+  const PlacedTerm& placed = fit.placed[t];
+  TrialGround ground{scaled_residuals(model, data, fit.parameters, fit.placed),
+                     baseline_jacobian(model, data, fit.parameters, fit.placed)};
+  ground.residuals += stacked_signature(model, data, placed, simulated) * placed.coefficients;
+  for (std::size_t k = 0; k < fit.placed.size(); ++k) {
+    if (k != t) ground.nuisance = beside(ground.nuisance, stacked_signature(model, data, fit.placed[k], simulated));
+  }
+  return ground;
+}
+
+}  // namespace
+
+RowSplit split_rows(const Inputs& inputs, const MissingOptions& options) {
+  const std::vector<Eigen::Index> numbers = repeat_numbers(inputs);
+  const Eigen::Index groups = numbers.empty() ? 0 : *std::ranges::max_element(numbers) + 1;
+  Random random(options.seed);
+  const std::vector<std::ptrdiff_t> order = random.permutation(groups);
+  std::vector<std::ptrdiff_t> place(order.size());
+  for (std::size_t k = 0; k < order.size(); ++k)
+    place[static_cast<std::size_t>(order[k])] = static_cast<std::ptrdiff_t>(k);
+  const auto aside = static_cast<std::ptrdiff_t>(std::lround(options.held_out_share * static_cast<double>(groups)));
+  // Of very many rows only so many groups are searched.
+  const double rows_of_a_group =
+      static_cast<double>(numbers.size()) / static_cast<double>(std::max<Eigen::Index>(1, groups));
+  const auto last = aside + static_cast<std::ptrdiff_t>(static_cast<double>(options.largest_sample) / rows_of_a_group);
+  RowSplit split;
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
+    const std::ptrdiff_t p = place[static_cast<std::size_t>(numbers[i])];
+    if (p < aside) {
+      split.held_out.push_back(static_cast<Eigen::Index>(i));
+    } else if (p < last) {
+      split.searched.push_back(static_cast<Eigen::Index>(i));
+      split.repeats.push_back(numbers[i]);
+    }
+  }
+  return split;
+}
+
+FitData without_samples(const FitData& data, const std::vector<std::size_t>& left_out) {
+  std::vector<Eigen::Index> kept;
+  for (std::size_t i = 0; i < data.rows.size(); ++i) {
+    if (std::ranges::find(left_out, i) == left_out.end()) kept.push_back(static_cast<Eigen::Index>(i));
+  }
+  FitData result{{}, data.measured(kept, Eigen::all), data.sigma};
+  for (const Eigen::Index i : kept) result.rows.push_back(data.rows[static_cast<std::size_t>(i)]);
+  return result;
+}
+
+TermQuestion ask(const TermModel& model, const FitData& data, const TermFit& fit,
+                 const std::vector<Eigen::Index>& repeats, const std::vector<std::size_t>& outliers) {
+  TermQuestion question;
+  const Eigen::MatrixXd simulated = model.simulated(fit.parameters);
+  const auto d = data.measured.cols();
+  TrialGround ground{scaled_residuals(model, data, fit.parameters, fit.placed),
+                     baseline_jacobian(model, data, fit.parameters, fit.placed)};
+  question.evidence.jacobian = ground.nuisance;
+  question.evidence.residuals = ground.residuals;
+  question.evidence.components = d;
+  question.evidence.repeats = repeats;
+  Slots slots;
+  for (const PlacedTerm& placed : fit.placed) {
+    question.options.push_back(placed);
+    question.candidates.push_back(candidate_of(model, data, placed, simulated, slots.next(model, placed)));
+    question.evidence.residuals += question.candidates.back().signature * placed.coefficients;
+    ground.nuisance = beside(ground.nuisance, question.candidates.back().signature);
+  }
+  for (const std::size_t sample : outliers)
+    ground.residuals.segment(static_cast<Eigen::Index>(sample) * d, d).setZero();
+  for (std::size_t t = 0; t < model.terms().size(); ++t) {
+    const ModelTerm& term = model.terms()[t];
+    for (Eigen::Index o = 0; o < d; ++o) {
+      if (!term.output.empty() && term.output != model.outputs()[static_cast<std::size_t>(o)]) continue;
+      std::vector<PlacedTerm> options;
+      if (!term.constants.empty()) {
+        options = best_constants(model, data, ground, t, o, simulated, fit.placed);
+      } else if (!placed_already(fit.placed, t, o)) {
+        options.push_back({t, o, {}, Eigen::VectorXd::Zero(std::ssize(term.coefficients)), 0.0});
+      }
+      for (PlacedTerm& option : options) {
+        question.candidates.push_back(candidate_of(model, data, option, simulated, slots.next(model, option)));
+        question.options.push_back(std::move(option));
+      }
+    }
+  }
+  return question;
+}
+
+bool retry_constants(const TermModel& model, const FitData& data, TermFit& fit) {
+  bool changed = false;
+  for (std::size_t t = 0; t < fit.placed.size(); ++t) {
+    PlacedTerm& placed = fit.placed[t];
+    if (placed.constants.size() == 0) continue;
+    const TermConstant& constant = model.terms()[placed.term].constants.front();
+    const Eigen::MatrixXd simulated = model.simulated(fit.parameters);
+    const std::vector<PlacedTerm> best =
+        best_constants(model, data, ground_without(model, data, fit, t), placed.term, placed.output, simulated, {});
+    if (best.empty()) continue;
+    const double moved = std::abs(best.front().constants(0) - placed.constants(0));
+    const double step = spacing(constant.tried, placed.constants(0));
+    if (moved > (constant.smooth ? 2.0 * step : 0.0)) {
+      placed.constants = best.front().constants;
+      changed = true;
+    }
+  }
+  return changed;
+}
+
+void tell_trial_errors(const TermModel& model, const FitData& data, TermFit& fit) {
+  for (std::size_t t = 0; t < fit.placed.size(); ++t) {
+    const PlacedTerm& placed = fit.placed[t];
+    if (placed.constants.size() == 0 || model.terms()[placed.term].constants.front().smooth) continue;
+    fit.errors[t](placed.coefficients.size()) =
+        trial_error(model, data, ground_without(model, data, fit, t), placed, model.simulated(fit.parameters));
+  }
+}
+
+}  // namespace llmt::discovery

@@ -1,0 +1,156 @@
+// Constants of terms, found by trying.
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "discovery/search/workspace.hpp"
+#include "discovery/terms/term_model.hpp"
+
+namespace llmt::discovery {
+namespace {
+
+// What a term explains of residuals at one constant, beyond the nuisance.
+class Trials {
+ public:
+  Trials(const TermModel& model, const FitData& data, const TrialGround& ground, PlacedTerm placed,
+         const Eigen::MatrixXd& simulated)
+      : model_(&model), data_(&data), placed_(std::move(placed)), simulated_(&simulated) {
+    const Eigen::Index d = data.measured.cols();
+    const Eigen::Index n = data.measured.rows();
+    const auto own = Eigen::seqN(placed_.output, n, d);
+    const ModelTerm& term = model.terms()[placed_.term];
+    const Eigen::MatrixXd nuisance = ground.nuisance(own, Eigen::all);
+    const Eigen::Index powers = 1 + term.constants.front().beyond;
+    Eigen::MatrixXd all(n, nuisance.cols() + powers);
+    all.leftCols(nuisance.cols()) = nuisance;
+    for (Eigen::Index p = 0; p < powers; ++p) all.col(nuisance.cols() + p) = power(term, p);
+    constexpr double rank_tolerance = 1e-9;
+    basis_ = range_basis(all, rank_tolerance);
+    residuals_ = ground.residuals(own);
+    residuals_ -= basis_ * (basis_.transpose() * residuals_);
+  }
+
+  double gain(double constant) {
+    placed_.constants = Eigen::VectorXd::Constant(1, constant);
+    Eigen::MatrixXd columns = model_->columns(placed_, *simulated_)(data_->rows, Eigen::all);
+    if (!columns.allFinite()) return 0.0;
+    const Eigen::VectorXd norms = columns.colwise().norm();
+    if (!(norms.minCoeff() > 0.0)) return 0.0;
+    columns *= norms.cwiseInverse().asDiagonal();
+    columns -= basis_ * (basis_.transpose() * columns);
+    // What hardly differs from the nuisance explains only by chance.
+    constexpr double outside = 0.02;
+    const Eigen::LLT<Eigen::MatrixXd> factor(columns.transpose() * columns);
+    const Eigen::MatrixXd lower = factor.matrixL();
+    if (factor.info() != Eigen::Success || lower.diagonal().minCoeff() < outside) return 0.0;
+    return factor.matrixL().solve(columns.transpose() * residuals_).squaredNorm();
+  }
+
+  double sum_of_squares() const { return residuals_.squaredNorm(); }
+
+  const PlacedTerm& at(double constant) {
+    placed_.constants = Eigen::VectorXd::Constant(1, constant);
+    return placed_;
+  }
+
+ private:
+  const TermModel* model_;
+  const FitData* data_;
+  PlacedTerm placed_;
+  const Eigen::MatrixXd* simulated_;
+  Eigen::MatrixXd basis_;
+  Eigen::VectorXd residuals_;
+
+  // x^p of the first input, x within -1 ... 1; ones if the term has no input.
+  Eigen::VectorXd power(const ModelTerm& term, Eigen::Index p) const {
+    const Eigen::Index n = data_->measured.rows();
+    if (p == 0 || term.inputs.empty()) return Eigen::VectorXd::Ones(n);
+    const Eigen::VectorXd x = model_->input(term.inputs.front())(data_->rows);
+    const double middle = 0.5 * (x.minCoeff() + x.maxCoeff());
+    const double half = std::max(1e-300, 0.5 * (x.maxCoeff() - x.minCoeff()));
+    return ((x.array() - middle) / half).pow(static_cast<double>(p)).matrix();
+  }
+};
+
+// Halving steps between the neighbours of a value tried.
+double refined(Trials& trials, const TermConstant& constant, double value, double gain) {
+  if (!constant.smooth) return value;
+  const double step = spacing(constant.tried, value);
+  for (double width = 0.5 * step; width > 0.01 * step; width *= 0.5) {
+    const double centre = value;
+    for (const double trial : {centre - width, centre + width}) {
+      if (trial < constant.tried.front() || trial > constant.tried.back()) continue;
+      const double own = trials.gain(trial);
+      if (own > gain) {
+        gain = own;
+        value = trial;
+      }
+    }
+  }
+  return value;
+}
+
+}  // namespace
+
+double spacing(const std::vector<double>& tried, double value) {
+  if (tried.size() < 2) return std::max(1e-300, 0.01 * std::abs(value));
+  const auto above = std::ranges::lower_bound(tried, value);
+  const auto k = std::clamp<std::ptrdiff_t>(above - tried.begin(), 1, std::ssize(tried) - 1);
+  return std::max(1e-300, tried[static_cast<std::size_t>(k)] - tried[static_cast<std::size_t>(k - 1)]);
+}
+
+double trial_error(const TermModel& model, const FitData& data, const TrialGround& ground, const PlacedTerm& placed,
+                   const Eigen::MatrixXd& simulated) {
+  const std::vector<double>& tried = model.terms()[placed.term].constants.front().tried;
+  Trials trials(model, data, ground, placed, simulated);
+  const double value = placed.constants(0);
+  const double best = trials.gain(value);
+  const double variance = std::max(0.0, trials.sum_of_squares() - best) / static_cast<double>(data.rows.size());
+  const auto place = static_cast<std::ptrdiff_t>(std::ranges::lower_bound(tried, value) - tried.begin());
+  double error = spacing(tried, value);
+  for (const std::ptrdiff_t direction : {-1, 1}) {
+    for (std::ptrdiff_t k = place; k >= 0 && k < std::ssize(tried); k += direction) {
+      const double other = tried[static_cast<std::size_t>(k)];
+      error = std::max(error, std::abs(other - value));
+      if (best - trials.gain(other) > variance) break;
+    }
+  }
+  return error;
+}
+
+std::vector<PlacedTerm> best_constants(const TermModel& model, const FitData& data, const TrialGround& ground,
+                                       std::size_t term, Eigen::Index output, const Eigen::MatrixXd& simulated,
+                                       const std::vector<PlacedTerm>& taken) {
+  const ModelTerm& own = model.terms()[term];
+  const TermConstant& constant = own.constants.front();
+  PlacedTerm placed{.term = term,
+                    .output = output,
+                    .constants = {},
+                    .coefficients = Eigen::VectorXd::Zero(std::ssize(own.coefficients)),
+                    .prior_cost = 2.0 * std::log(static_cast<double>(constant.tried.size()))};
+  Trials trials(model, data, ground, placed, simulated);
+  std::vector<double> gains;
+  for (const double value : constant.tried) gains.push_back(trials.gain(value));
+  std::vector<std::size_t> order(gains.size());
+  for (std::size_t k = 0; k < order.size(); ++k) order[k] = k;
+  std::ranges::stable_sort(order, std::greater<>{}, [&](std::size_t k) { return gains[k]; });
+  std::vector<PlacedTerm> best;
+  std::vector<double> places;
+  for (const PlacedTerm& other : taken) {
+    if (other.term == term && other.output == output) places.push_back(other.constants(0));
+  }
+  const auto near = [&](double value, double place) {
+    constexpr double apart = 2.5;  // steps
+    return std::abs(value - place) < apart * std::max(spacing(constant.tried, value), spacing(constant.tried, place));
+  };
+  for (const std::size_t k : order) {
+    if (std::ssize(best) >= constant.kept || !(gains[k] > 0.0)) break;
+    const double value = constant.tried[k];
+    if (std::ranges::any_of(places, [&](double place) { return near(value, place); })) continue;
+    places.push_back(value);
+    best.push_back(trials.at(refined(trials, constant, value, gains[k])));
+  }
+  return best;
+}
+
+}  // namespace llmt::discovery

@@ -1,0 +1,225 @@
+#include "llmt/discovery/terms.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+#include <set>
+#include <stdexcept>
+
+#include "discovery/terms/term_builders.hpp"
+
+namespace llmt::discovery {
+namespace {
+
+[[noreturn]] void refuse(const std::string& message) {
+  throw std::invalid_argument("llmt::discovery::standard_terms: " + message);
+}
+
+Eigen::Index order_column(const Inputs& inputs) {
+  const auto found = std::ranges::find(inputs.names, inputs.order);
+  if (found == inputs.names.end()) refuse(fmt::format("the order \"{}\" is not an input", inputs.order));
+  return found - inputs.names.begin();
+}
+
+void check(const Inputs& inputs) {
+  if (std::ssize(inputs.names) != inputs.values.cols()) {
+    refuse(fmt::format("{} names for {} columns", inputs.names.size(), inputs.values.cols()));
+  }
+  std::set<std::string> seen;
+  for (const std::string& name : inputs.names) {
+    if (name.empty()) refuse("an input has no name");
+    if (!seen.insert(name).second) refuse(fmt::format("the input \"{}\" is there twice", name));
+  }
+  for (Eigen::Index j = 0; j < inputs.values.cols(); ++j) {
+    if (!inputs.values.col(j).allFinite()) {
+      refuse(fmt::format("the input \"{}\" has a value that is not finite", inputs.names[static_cast<std::size_t>(j)]));
+    }
+  }
+}
+
+bool is_angle(const std::string& name) { return name.ends_with("_deg") || name.ends_with("_rad"); }
+
+InputView view(const Inputs& inputs, Eigen::Index column) {
+  InputView own{.column = column,
+                .name = inputs.names[static_cast<std::size_t>(column)],
+                .low = 0.0,
+                .high = 0.0,
+                .distinct = {}};
+  const auto values = inputs.values.col(column);
+  own.distinct.assign(values.begin(), values.end());
+  std::ranges::sort(own.distinct);
+  own.distinct.erase(std::ranges::unique(own.distinct).begin(), own.distinct.end());
+  if (own.distinct.empty()) return own;
+  own.low = own.distinct.front();
+  own.high = own.distinct.back();
+  return own;
+}
+
+ModelTerm harmonic(const InputView& input, int order) {
+  const double radians = input.name.ends_with("_deg") ? std::numbers::pi / 180.0 : 1.0;
+  const std::string h = order == 1 ? "" : fmt::format("{} ", order);
+  return {.family = fmt::format("harmonic{}", order),
+          .location = input.name,
+          .formula = fmt::format("C cos({0}{1}) + S sin({0}{1})", h, input.name),
+          .inputs = {input.name},
+          .coefficients = {"C", "S"},
+          .columns = [column = input.column, factor = radians * order](const Rows& rows, const Eigen::VectorXd&) {
+            Eigen::MatrixXd waves(rows.inputs.rows(), 2);
+            waves.col(0) = (factor * rows.inputs.col(column).array()).cos();
+            waves.col(1) = (factor * rows.inputs.col(column).array()).sin();
+            return waves;
+          }};
+}
+
+ModelTerm product(const InputView& a, const InputView& b) {
+  const std::string formula = a.name + " " + b.name;
+  return {.family = "product",
+          .location = a.name + "," + b.name,
+          .formula = formula,
+          .inputs = {a.name, b.name},
+          .coefficients = {"coefficient"},
+          .per = fmt::format("({})", formula),
+          .columns = [i = a.column, j = b.column](const Rows& rows, const Eigen::VectorXd&) -> Eigen::MatrixXd {
+            return rows.inputs.col(i).cwiseProduct(rows.inputs.col(j));
+          }};
+}
+
+std::vector<ModelTerm> output_terms() {
+  const auto term = [](std::string family, std::string formula, std::string per, auto columns) {
+    return ModelTerm{.family = std::move(family),
+                     .location = "",
+                     .formula = std::move(formula),
+                     .inputs = {},
+                     .coefficients = {"coefficient"},
+                     .per = std::move(per),
+                     .columns = columns};
+  };
+  return {term("offset", "1", "",
+               [](const Rows& rows, const Eigen::VectorXd&) -> Eigen::MatrixXd {
+                 return Eigen::VectorXd::Ones(rows.inputs.rows());
+               }),
+          term("gain", "simulated output", "simulated",
+               [](const Rows& rows, const Eigen::VectorXd&) -> Eigen::MatrixXd { return rows.simulated; }),
+          term("gain_curvature", "simulated output^2", "simulated^2",
+               [](const Rows& rows, const Eigen::VectorXd&) -> Eigen::MatrixXd {
+                 return rows.simulated.array().square().matrix();
+               })};
+}
+
+void add_functions(const InputView& input, std::vector<ModelTerm>& terms) {
+  const std::string& x = input.name;
+  const std::size_t levels = input.distinct.size();
+  terms.push_back(function_term(input, "linear", x, x, [](double v) { return v; }));
+  if (levels > 2) terms.push_back(function_term(input, "square", x + "^2", x + "^2", [](double v) { return v * v; }));
+  if (levels > 3) terms.push_back(function_term(input, "cube", x + "^3", x + "^3", [](double v) { return v * v * v; }));
+  if (input.low < 0.0 && input.high > 0.0 && levels > 2) {
+    terms.push_back(function_term(input, "absolute", "|" + x + "|", x, [](double v) { return std::abs(v); }));
+    terms.push_back(function_term(input, "sign", "sign(" + x + ")", "", [](double v) {
+      return v > 0.0 ? 1.0 : v < 0.0 ? -1.0 : 0.0;
+    }));
+  }
+  if (is_angle(x) && levels > 4) {
+    terms.push_back(harmonic(input, 1));
+    terms.push_back(harmonic(input, 2));
+  }
+}
+
+}  // namespace
+
+ModelTerm function_term(const InputView& input, std::string family, std::string formula, std::string per,
+                        double (*function)(double)) {
+  return {.family = std::move(family),
+          .location = input.name,
+          .formula = std::move(formula),
+          .inputs = {input.name},
+          .coefficients = {"coefficient"},
+          .per = std::move(per),
+          .columns = [column = input.column, function](const Rows& rows, const Eigen::VectorXd&) -> Eigen::MatrixXd {
+            return rows.inputs.col(column).unaryExpr(function);
+          }};
+}
+
+ModelTerm own_term(std::string name, std::string formula, std::function<double(const Eigen::VectorXd& row)> function) {
+  return {.family = std::move(name),
+          .location = "",
+          .formula = std::move(formula),
+          .inputs = {},
+          .coefficients = {"coefficient"},
+          .columns = [own = std::move(function)](const Rows& rows, const Eigen::VectorXd&) {
+            Eigen::MatrixXd column(rows.inputs.rows(), 1);
+            for (Eigen::Index i = 0; i < column.rows(); ++i) column(i, 0) = own(rows.inputs.row(i).transpose());
+            return column;
+          }};
+}
+
+std::vector<ModelTerm> standard_terms(const Inputs& inputs, std::vector<UntestableTerm>* untestable) {
+  check(inputs);
+  if (!inputs.order.empty()) order_column(inputs);
+  std::vector<InputView> moving;
+  for (Eigen::Index j = 0; j < inputs.values.cols(); ++j) {
+    InputView own = view(inputs, j);
+    if (own.distinct.size() > 1) {
+      moving.push_back(std::move(own));
+    } else if (untestable != nullptr) {
+      untestable->push_back({own.name, "the input is constant"});
+    }
+  }
+  std::vector<ModelTerm> terms = output_terms();
+  const auto add = [&](std::vector<ModelTerm> more) {
+    for (ModelTerm& term : more) terms.push_back(std::move(term));
+  };
+  for (const InputView& input : moving) {
+    add_functions(input, terms);
+    add(searched_terms(input));
+    if (input.name != inputs.order) add(sequence_terms(input, inputs.order));
+  }
+  for (std::size_t a = 0; a < moving.size(); ++a) {
+    for (std::size_t b = a + 1; b < moving.size(); ++b) terms.push_back(product(moving[a], moving[b]));
+  }
+  add(shapes_of(moving));
+  return terms;
+}
+
+std::vector<ModelTerm> without_duplicates(std::vector<ModelTerm> library, const std::vector<ModelTerm>& own,
+                                          const Rows& rows) {
+  constexpr double rounding = 1e-12;
+  const auto direction = [&](const ModelTerm& term) -> Eigen::VectorXd {
+    if (term.coefficients.size() != 1 || !term.constants.empty() || term.generic) return {};
+    const Eigen::MatrixXd columns = term.columns(rows, {});
+    return columns.col(0).norm() > 0.0 ? Eigen::VectorXd(columns.col(0).normalized()) : Eigen::VectorXd();
+  };
+  std::vector<Eigen::VectorXd> taken;
+  for (const ModelTerm& term : own) taken.push_back(direction(term));
+  std::erase_if(library, [&](const ModelTerm& term) {
+    const Eigen::VectorXd mine = direction(term);
+    return mine.size() > 0 && std::ranges::any_of(taken, [&](const Eigen::VectorXd& other) {
+             return other.size() > 0 && 1.0 - std::abs(mine.dot(other)) < rounding;
+           });
+  });
+  return library;
+}
+
+Rows rows_of(const Inputs& inputs, const Eigen::VectorXd& simulated) {
+  check(inputs);
+  const Eigen::Index n = inputs.values.rows();
+  Rows rows{.inputs = inputs.values,
+            .simulated = simulated,
+            .sequence = {},
+            .instants = Eigen::VectorXd::LinSpaced(n, 0.0, static_cast<double>(n - 1))};
+  rows.sequence.resize(static_cast<std::size_t>(n));
+  std::iota(rows.sequence.begin(), rows.sequence.end(), 0);
+  if (inputs.order.empty()) return rows;
+  rows.instants = inputs.values.col(order_column(inputs));
+  std::ranges::stable_sort(rows.sequence, {}, [&](Eigen::Index i) { return rows.instants(i); });
+  for (std::size_t k = 1; k < rows.sequence.size(); ++k) {
+    if (rows.instants(rows.sequence[k]) == rows.instants(rows.sequence[k - 1])) {
+      refuse(fmt::format("the order \"{}\" has the value {} twice", inputs.order, rows.instants(rows.sequence[k])));
+    }
+  }
+  return rows;
+}
+
+}  // namespace llmt::discovery

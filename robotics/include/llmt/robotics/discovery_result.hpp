@@ -1,0 +1,107 @@
+/// \file
+/// What a discovery found.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "llmt/discovery/search.hpp"
+#include "llmt/robotics/calibration_report.hpp"
+#include "llmt/robotics/correction.hpp"
+
+namespace llmt::robotics {
+
+/// What an unknown effect looks like.
+struct Shape {
+  std::string acts_on;                  ///< "joint2", "tool", "base"
+  std::vector<std::string> depends_on;  ///< "q2", "temp_C"
+  std::optional<double> per_turn;       ///< periods in a turn of the joint
+  std::string kind;                     ///< "smooth", "bump at 35 deg", "step at -20 deg", ...
+};
+
+struct UntestableEffect {
+  std::string what;  ///< "backlash_approach@joint1", or the name of a type
+  std::string why;
+};
+
+struct FoundParameter {
+  std::string name;
+  double value = 0.0;
+  std::string unit;
+  double standard_error = 0.0;
+};
+
+/// An effect that was found and added.
+struct FoundEffect {
+  Effect effect;
+  std::string title;
+  bool confirmed = false;
+  std::vector<FoundParameter> parameters;
+  std::vector<std::string> rivals;  ///< labels: "link_bending@joint2", joined by " + " where it takes several
+  std::vector<std::vector<Effect>> rival_effects;  ///< the same, as effects that could stand in the robot
+  bool exact_alias = false;                        ///< a rival predicts the same at every pose: no pose can tell
+  double share = 0.0;                              ///< of the explained sum of squares
+  double rms_mm = 0.0;                             ///< of the displacement that it causes beyond what geometry absorbs
+};
+
+struct FoundShape {
+  Shape shape;
+  double share = 0.0;
+};
+
+/// Where the gap is.
+struct GapMap {
+  struct Region {
+    std::string conditions;  ///< "q2 > 35 deg and payload_kg > 5"
+    Eigen::Index poses = 0;
+    double mean_mm = 0.0;
+  };
+  std::vector<Region> regions;  ///< by falling error
+  struct Share {
+    std::string name;
+    double share = 0.0;
+  };
+  std::vector<Share> acts_like;   ///< of the sum of squares along the motion by each joint; 1/3 by chance
+  std::vector<Share> depends_on;  ///< importance of each input for the residual
+};
+
+/// Smallest amplitude that would have been found, 90 % of the time.
+struct Visible {
+  std::string what;
+  double value = 0.0;
+  std::string unit;
+};
+
+struct HeldOut {
+  ErrorFigures before;    ///< calibrated as given
+  ErrorFigures after;     ///< with what was found
+  double floor_mm = 0.0;  ///< mean distance that the noise alone makes
+  bool floor_from_repeats = false;
+  Eigen::Index poses = 0;
+};
+
+struct Discovery {
+  discovery::Answer answer = discovery::Answer::nothing_missing;
+  std::vector<FoundEffect> effects;
+  std::vector<FoundShape> unknown;
+  std::vector<Effect> maps;    ///< free maps of the joints that were added for the unknown
+  Robot before;                ///< calibrated without what was found
+  CorrectedRobot improved;     ///< with it, and with a correction of the rest where that helps
+  ErrorFigures fitted_before;  ///< of the poses that were searched
+  ErrorFigures fitted_after;
+  HeldOut held_out;
+  GapMap gap;                          ///< of `before`
+  std::vector<Eigen::Index> outliers;  ///< rows of the measurements, from 0
+  std::vector<UntestableEffect> not_testable;
+  std::vector<Visible> visible;
+  discovery::LackOfFit lack_of_fit;
+  double noise_mm = 0.0;  ///< standard deviation of one coordinate
+  double score_gain = 0.0;
+  double threshold = 0.0;
+  int hypotheses = 0;
+  int rounds = 0;
+  std::vector<std::string> notes;  ///< in sentences
+};
+
+}  // namespace llmt::robotics

@@ -1,0 +1,223 @@
+#include "llmt/robotics/calibration.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <span>
+
+#include "calibration/free_parameters.hpp"
+#include "calibration/joint_map_shift.hpp"
+#include "calibration/registration.hpp"
+
+namespace llmt::robotics {
+namespace {
+
+bool is_frame_parameter(const std::string& name) { return name.starts_with("base.") || name.starts_with("tool."); }
+
+discovery::SolverResult solve_for(Robot& robot, discovery::LeastSquaresProblem problem,
+                                  const std::vector<std::string>& reasons, const discovery::SolverOptions& solver) {
+  for (std::size_t k = 0; k < reasons.size(); ++k) problem.parameters[k].free = reasons[k].empty();
+  discovery::SolverResult result = discovery::solve(problem, solver);
+  robot = with_values(std::move(robot), result.values);
+  return result;
+}
+
+bool covers_base(const std::vector<std::string>& reasons) {
+  return std::all_of(reasons.begin(), reasons.begin() + 6, [](const std::string& why) { return why.empty(); });
+}
+
+// A spread of at most `count` rows: enough to tell good starts from bad ones.
+Measurements thinned(const Measurements& measurements, std::ptrdiff_t count) {
+  std::vector<std::ptrdiff_t> rows;
+  const std::ptrdiff_t step = std::max<std::ptrdiff_t>(1, measurements.count() / count);
+  for (std::ptrdiff_t i = 0; i < measurements.count(); i += step) rows.push_back(i);
+  return select(measurements, rows);
+}
+
+// The tool guess matters: with a wrong tool Kabsch finds a base that lies in the valley of another minimum.
+Robot best_start(const Robot& robot, const Measurements& measurements, const std::vector<std::string>& reasons,
+                 const discovery::SolverOptions& solver) {
+  const Measurements few = thinned(measurements, 200);
+  Eigen::Matrix3Xd guesses = Eigen::Matrix3Xd::Zero(3, 7);
+  constexpr double tool_guess_mm = 150.0;
+  for (int axis = 0; axis < 3; ++axis) {
+    guesses(axis, 1 + axis) = tool_guess_mm;
+    guesses(axis, 4 + axis) = -tool_guess_mm;
+  }
+  const bool tool_is_free = reasons[6].empty() && reasons[7].empty() && reasons[8].empty();
+  Robot best = robot;
+  double smallest = std::numeric_limits<double>::infinity();
+  for (Eigen::Index guess = 0; guess < (tool_is_free ? guesses.cols() : 1); ++guess) {
+    Robot start = robot;
+    start.chain.tool.xyz_mm += guesses.col(guess);
+    start = with_closed_form_base(std::move(start), few);
+    Robot trial = start;
+    const discovery::SolverResult result = solve_for(trial, calibration_problem(trial, few), reasons, solver);
+    // The first guess, the tool as given, wins unless another is better in earnest.
+    if (result.residual_norms.back() < 0.999 * smallest) {
+      smallest = result.residual_norms.back();
+      best = trial;
+    }
+  }
+  return best;
+}
+
+void set_priors(std::vector<discovery::Parameter>& parameters, Eigen::Index geometric,
+                const CalibrationOptions& options) {
+  constexpr double frame_factor = 10.0;
+  for (discovery::Parameter& parameter : std::span(parameters).first(static_cast<std::size_t>(geometric))) {
+    const double factor = is_frame_parameter(parameter.name) ? frame_factor : 1.0;
+    double sigma = 0.0;
+    if (parameter.unit == "mm") sigma = factor * options.prior_length_mm;
+    if (parameter.unit == "deg") sigma = factor * options.prior_angle_deg;
+    if (!(sigma > 0.0)) continue;
+    parameter.prior_sigma = sigma;
+    parameter.prior_value = parameter.value;
+  }
+}
+
+double root_mean_square(const Eigen::VectorXd& residuals, Eigen::Index dof) {
+  return residuals.norm() / std::sqrt(static_cast<double>(std::max<Eigen::Index>(1, dof)));
+}
+
+// Least squares with priors. Data and priors weigh against each other by the noise, which the registered robot
+// overestimates: the passes, each starting where the last one ended, take it from the fit before until it settles.
+void identify(Calibration& calibration, const discovery::LeastSquaresProblem& unweighted,
+              const std::vector<std::string>& reasons, const CalibrationOptions& options) {
+  const bool has_priors = options.prior_length_mm > 0.0 || options.prior_angle_deg > 0.0;
+  const int largest_number_of_passes = has_priors ? 10 : 1;
+  constexpr double smallest_noise_mm = 1e-9;
+  discovery::LeastSquaresProblem problem = unweighted;
+  set_priors(problem.parameters, geometric_parameter_count(calibration.robot.chain), options);
+  calibration.noise_mm =
+      root_mean_square(calibration.registration.residuals, calibration.registration.residuals.size());
+  for (int pass = 0; pass < largest_number_of_passes; ++pass) {
+    const double weight = 1.0 / std::max(smallest_noise_mm, calibration.noise_mm);
+    problem.weights = Eigen::VectorXd::Constant(calibration.registration.residuals.size(), weight);
+    calibration.result = solve_for(calibration.robot, problem, reasons, options.solver);
+    for (std::size_t k = 0; k < reasons.size(); ++k) {
+      problem.parameters[k].value = calibration.result.values(static_cast<Eigen::Index>(k));
+    }
+    const Eigen::VectorXd& residuals = calibration.result.residuals;
+    const double before = calibration.noise_mm;
+    calibration.noise_mm = root_mean_square(residuals, residuals.size() - calibration.result.rank);
+    if (calibration.noise_mm > 0.95 * before) break;
+  }
+  for (std::size_t k = 0; k < reasons.size(); ++k) {
+    const discovery::Parameter& parameter = problem.parameters[k];
+    const double error = calibration.result.standard_errors(static_cast<Eigen::Index>(k));
+    if (reasons[k].empty() && parameter.prior_sigma && error > 0.7 * *parameter.prior_sigma) {
+      calibration.weak.push_back(parameter.name);
+    }
+  }
+}
+
+std::vector<IdentifiedParameter> identified_parameters(const discovery::SolverResult& result,
+                                                       const std::vector<std::string>& reasons) {
+  std::vector<IdentifiedParameter> identified;
+  for (std::size_t k = 0; k < reasons.size(); ++k) {
+    const double error = result.standard_errors(static_cast<Eigen::Index>(k));
+    IdentifiedParameter entry{.name = result.parameters[k].name, .standard_error = {}, .state = reasons[k]};
+    if (reasons[k].empty()) {
+      entry.state = std::isfinite(error) ? "free" : "free, not identifiable";
+      if (std::isfinite(error)) entry.standard_error = error;
+    }
+    identified.push_back(std::move(entry));
+  }
+  return identified;
+}
+
+Eigen::VectorXd start_values(const discovery::LeastSquaresProblem& problem) {
+  Eigen::VectorXd values(std::ssize(problem.parameters));
+  for (std::size_t k = 0; k < problem.parameters.size(); ++k) {
+    values(static_cast<Eigen::Index>(k)) = problem.parameters[k].value;
+  }
+  return values;
+}
+
+}  // namespace
+
+discovery::LeastSquaresProblem calibration_problem(const Robot& robot, const Measurements& measurements) {
+  validate(robot);
+  validate(measurements, robot);
+  struct Shared {
+    Robot robot;
+    Measurements measurements;
+    std::vector<Eigen::Index> rows;
+    Eigen::VectorXd measured;
+  };
+  const auto shared = std::make_shared<Shared>(Shared{robot, measurements, measured_rows(measurements), {}});
+  const auto stacked = [](const Eigen::MatrixXd& points) -> Eigen::VectorXd {
+    const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> by_row = points;
+    return Eigen::Map<const Eigen::VectorXd>(by_row.data(), by_row.size());
+  };
+  shared->measured = stacked(measurements.positions_mm)(shared->rows);
+  discovery::LeastSquaresProblem problem;
+  problem.parameters = parameters(robot);
+  problem.residual = [shared, stacked](const Eigen::VectorXd& values) -> Eigen::VectorXd {
+    const Robot moved = with_values(shared->robot, values);
+    return stacked(positions(moved, shared->measurements.poses))(shared->rows) - shared->measured;
+  };
+  problem.jacobian = [shared](const Eigen::VectorXd& values) -> Eigen::MatrixXd {
+    const Robot moved = with_values(shared->robot, values);
+    const Eigen::MatrixXd jacobian = position_jacobian(moved, shared->measurements.poses);
+    return jacobian(shared->rows, Eigen::all);
+  };
+  return problem;
+}
+
+discovery::SolverResult register_frames(Robot& robot, const Measurements& measurements,
+                                        const CalibrationOptions& options) {
+  validate(robot);
+  validate(measurements, robot);
+  const std::vector<discovery::Parameter> all = parameters(robot);
+  std::vector<std::string> reasons = reasons_to_fix(robot, options);
+  for (std::size_t k = 0; k < all.size(); ++k) {
+    if (!is_frame_parameter(all[k].name)) reasons[k] = "not a frame";
+  }
+  const bool all_seen = std::ranges::all_of(measurements.measured, [](bool seen) { return seen; });
+  if (covers_base(reasons) && all_seen) robot = best_start(robot, measurements, reasons, options.solver);
+  return solve_for(robot, calibration_problem(robot, measurements), reasons, options.solver);
+}
+
+namespace {
+
+Calibration calibrate_without_maps(const Robot& robot, const Measurements& measurements,
+                                   const CalibrationOptions& options) {
+  Calibration calibration;
+  calibration.registered = robot;
+  // What an earlier calibration said, and a correction learnt from its residuals, hold no longer.
+  calibration.registered.identified.clear();
+  calibration.registered.correction_file.clear();
+  if (!options.start_as_given) {
+    calibration.registration = register_frames(calibration.registered, measurements, options);
+  }
+  calibration.robot = calibration.registered;
+  const discovery::LeastSquaresProblem problem = calibration_problem(calibration.robot, measurements);
+  if (options.start_as_given) {
+    calibration.registration.values = start_values(problem);
+    calibration.registration.residuals = problem.residual(calibration.registration.values);
+  }
+  std::vector<std::string> reasons = reasons_to_fix(robot, options);
+  const Eigen::MatrixXd jacobian = discovery::evaluate_jacobian(problem, calibration.registration.values);
+  fix_dependent(problem.parameters, jacobian, options.dependence_tolerance, reasons);
+  identify(calibration, problem, reasons, options);
+  calibration.robot.identified = identified_parameters(calibration.result, reasons);
+  for (std::size_t k = 0; k < reasons.size(); ++k) {
+    if (!reasons[k].empty()) calibration.fixed.push_back({problem.parameters[k].name, reasons[k]});
+  }
+  return calibration;
+}
+
+}  // namespace
+
+Calibration calibrate(const Robot& robot, const Measurements& measurements, const CalibrationOptions& options) {
+  const Unmapped plain = unmapped(robot, measurements);
+  Calibration calibration = calibrate_without_maps(plain.robot, plain.measurements, options);
+  for (Robot* fitted : {&calibration.robot, &calibration.registered}) {
+    fitted->effects.insert(fitted->effects.end(), plain.maps.begin(), plain.maps.end());
+  }
+  return calibration;
+}
+
+}  // namespace llmt::robotics

@@ -1,0 +1,180 @@
+#include "llmt/robotics/calibration_report.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <stdexcept>
+
+namespace llmt::robotics {
+namespace {
+
+struct Fitted {
+  Calibration calibration;
+  std::optional<FitResult> correction;
+};
+
+// Repeats of a pose must not sit on both sides of a fold.
+std::span<const double> pose_labels(const Measurements& measurements) {
+  const auto found = measurements.poses.covariates.find("pose");
+  if (found == measurements.poses.covariates.end()) return {};
+  return {found->second.data(), static_cast<std::size_t>(found->second.size())};
+}
+
+Fitted fit_all(const Robot& robot, const Measurements& measurements, const ReportOptions& options) {
+  Fitted fitted{.calibration = calibrate(robot, measurements, options.calibration), .correction = {}};
+  if (!options.correct) return fitted;
+  FitOptions fit;
+  fit.growth = options.growth;
+  fit.blend.validity = ValidityChoice::crisp;
+  fit.selection.folds = {.count = options.correction_folds,
+                         .kind = options.kind,
+                         .seed = options.seed,
+                         .groups = pose_labels(measurements)};
+  fit.intervals = false;
+  fit.max_threads = options.max_threads;
+  fitted.correction = fit_correction(fitted.calibration.robot, measurements, fit);
+  return fitted;
+}
+
+struct Distances {
+  Eigen::VectorXd nominal;
+  Eigen::VectorXd geometric;
+  Eigen::VectorXd corrected;  // empty without correction
+};
+
+Distances distances_of(const Fitted& fitted, const Measurements& measurements) {
+  Distances result;
+  result.nominal = distances(positions(fitted.calibration.registered, measurements.poses), measurements);
+  result.geometric = distances(positions(fitted.calibration.robot, measurements.poses), measurements);
+  if (fitted.correction) {
+    const CorrectedRobot corrected{fitted.calibration.robot, fitted.correction->model};
+    result.corrected = distances(positions(corrected, measurements.poses), measurements);
+  }
+  return result;
+}
+
+void tell(const ReportOptions& options, std::ptrdiff_t folds_done) {
+  if (options.progress) options.progress(folds_done + 1, options.folds + 1);
+}
+
+void hold_out(const Robot& robot, const Measurements& measurements, const ReportOptions& options,
+              CalibrationReport& report) {
+  const Eigen::Index n = measurements.count();
+  const std::span<const double> labels = pose_labels(measurements);
+  report.grouped = !labels.empty();
+  report.nominal.held_out_mm.resize(n);
+  report.geometric.held_out_mm.resize(n);
+  if (report.corrected) report.corrected->held_out_mm.resize(n);
+  for (const Fold& fold :
+       make_folds(n, {.count = options.folds, .kind = options.kind, .seed = options.seed, .groups = labels})) {
+    const Fitted fitted = fit_all(robot, select(measurements, fold.train), options);
+    const Distances held_out = distances_of(fitted, select(measurements, fold.held_out));
+    report.fold_terminations.push_back(fitted.calibration.result.termination);
+    report.nominal.held_out_mm(fold.held_out) = held_out.nominal;
+    report.geometric.held_out_mm(fold.held_out) = held_out.geometric;
+    if (report.corrected) report.corrected->held_out_mm(fold.held_out) = held_out.corrected;
+    tell(options, std::ssize(report.fold_terminations));
+  }
+  report.folds = options.folds;
+}
+
+void decide(CalibrationReport& report) {
+  if (!report.corrected) {
+    report.decision = "no correction was asked for";
+  } else if (report.folds == 0) {
+    report.correction_kept = true;
+    report.decision = "the correction is kept without being judged: no poses were held out";
+  } else {
+    const Eigen::VectorXd gains = report.geometric.held_out_mm - report.corrected->held_out_mm;
+    const double gain = gains.mean();
+    const double n = static_cast<double>(gains.size());
+    const double error = std::sqrt((gains.array() - gain).square().sum() / (n * std::max(1.0, n - 1.0)));
+    report.correction_kept = gain > 2.0 * error;
+    const std::string figures = fmt::format("held-out mean {:.4f} mm with it, {:.4f} mm without",
+                                            report.corrected->held_out_mm.mean(), report.geometric.held_out_mm.mean());
+    report.decision = report.correction_kept ? fmt::format("the correction is kept: {}", figures)
+                      : gain <= 0.0
+                          ? fmt::format("the correction is left out, it makes unseen poses worse: {}", figures)
+                          : fmt::format("the correction is left out, its gain is within chance (+-{:.4f} mm): {}",
+                                        2.0 * error, figures);
+  }
+}
+
+}  // namespace
+
+ErrorFigures error_figures(const Eigen::VectorXd& distances_mm) {
+  if (distances_mm.size() == 0) throw std::invalid_argument("llmt::robotics::error_figures: there are no distances");
+  std::vector<double> sorted(distances_mm.data(), distances_mm.data() + distances_mm.size());
+  std::ranges::sort(sorted);
+  const auto count = static_cast<double>(sorted.size());
+  const auto rank = static_cast<std::size_t>(std::ceil(0.95 * count)) - 1;
+  return {.mean = distances_mm.mean(),
+          .max = sorted.back(),
+          .p95 = sorted[rank],
+          .rms = distances_mm.norm() / std::sqrt(count)};
+}
+
+CorrectedRobot CalibrationReport::best() const {
+  CorrectedRobot robot{.robot = calibration.robot, .correction = {}};
+  if (correction_kept) robot.correction = correction->model;
+  return robot;
+}
+
+std::vector<std::string> suspicions(const Robot& robot, const Measurements& measurements,
+                                    const CalibrationReport& report) {
+  std::vector<std::string> found;
+  double length_mm = 0.0;
+  for (std::size_t j = 0; j < robot.chain.joints.size(); ++j) {
+    const Joint& joint = robot.chain.joints[j];
+    length_mm += std::abs(joint.a_mm) + std::abs(joint.d_mm);
+    if (!joint.limits) continue;
+    const double to_file_unit = joint.type == JointType::revolute ? 180.0 / std::numbers::pi : 1.0;
+    const Eigen::ArrayXd values = measurements.poses.joints.col(static_cast<Eigen::Index>(j)) * to_file_unit;
+    constexpr double slack = 1.0;  // degree or mm
+    const Eigen::Index outside = (values < joint.limits->at(0) - slack || values > joint.limits->at(1) + slack).count();
+    if (outside > 0) {
+      found.push_back(
+          fmt::format("{} of {} values of {} lie outside its limits {} to {} ({:.4g} to {:.4g} measured): are the "
+                      "units right, is it this robot?",
+                      outside, measurements.count(), joint.name, joint.limits->at(0), joint.limits->at(1),
+                      values.minCoeff(), values.maxCoeff()));
+    }
+  }
+  const double implausible_mm = length_mm / 50.0;
+  const bool is_held_out = report.geometric.held_out_mm.size() > 0;
+  const double nominal = report.nominal.in_sample_mm.mean();
+  const double calibrated = (is_held_out ? report.geometric.held_out_mm : report.geometric.in_sample_mm).mean();
+  if (calibrated > implausible_mm) {
+    found.push_back(
+        fmt::format("the calibrated robot still misses the {} by {:.4g} mm on average, {:.0f} % of the arm's length: "
+                    "this description does not belong to these measurements, and the identified values mean nothing; "
+                    "check units, signs and zeros of the joints, their order, and whether it is this robot",
+                    is_held_out ? "held-out points" : "measured points", calibrated, 100.0 * calibrated / length_mm));
+  } else if (nominal > implausible_mm) {
+    found.push_back(
+        fmt::format("the described robot misses the measured points by {:.4g} mm on average, whatever its base and "
+                    "tool: check units, signs and zeros of the joints, their order, and the description",
+                    nominal));
+  }
+  return found;
+}
+
+CalibrationReport report_calibration(const Robot& robot, const Measurements& measurements,
+                                     const ReportOptions& options) {
+  CalibrationReport report;
+  Fitted fitted = fit_all(robot, measurements, options);
+  const Distances in_sample = distances_of(fitted, measurements);
+  report.calibration = std::move(fitted.calibration);
+  report.correction = std::move(fitted.correction);
+  report.nominal.in_sample_mm = in_sample.nominal;
+  report.geometric.in_sample_mm = in_sample.geometric;
+  if (options.correct) report.corrected = Stage{.in_sample_mm = in_sample.corrected, .held_out_mm = {}};
+  tell(options, 0);
+  if (options.folds != 0) hold_out(robot, measurements, options, report);
+  decide(report);
+  return report;
+}
+
+}  // namespace llmt::robotics

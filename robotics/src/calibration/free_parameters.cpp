@@ -1,0 +1,100 @@
+#include "calibration/free_parameters.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <numbers>
+#include <stdexcept>
+
+namespace llmt::robotics {
+namespace {
+
+std::string owner_of(const std::string& name) { return name.substr(0, name.rfind('.')); }
+
+std::vector<bool> matches(const std::vector<discovery::Parameter>& parameters, const std::vector<std::string>& names,
+                          const char* field) {
+  std::vector<bool> matched(parameters.size(), false);
+  for (const std::string& name : names) {
+    bool found = false;
+    for (std::size_t k = 0; k < parameters.size(); ++k) {
+      if (parameters[k].name != name && owner_of(parameters[k].name) != name) continue;
+      matched[k] = true;
+      found = true;
+    }
+    if (!found) {
+      throw std::invalid_argument(
+          fmt::format("llmt::robotics::calibrate: {} names \"{}\", which is no parameter of the robot; parameters are "
+                      "e.g. \"base.x\", \"{}\"",
+                      field, name, parameters.back().name));
+    }
+  }
+  return matched;
+}
+
+// What the convention leaves out before any data are seen; empty: nothing.
+std::string excluded_by_convention(const Chain& chain, std::size_t joint, JointParameter which, double limit_deg) {
+  if (which == JointParameter::b) return "not part of the convention";
+  const bool parallel = is_nearly_parallel(chain, joint, limit_deg);
+  if (which == JointParameter::beta && !parallel) return "only needed where axes are nearly parallel";
+  if (which == JointParameter::d && parallel) return "axes are nearly parallel: beta takes its place";
+  return "";
+}
+
+}  // namespace
+
+bool is_nearly_parallel(const Chain& chain, std::size_t joint, double limit_deg) {
+  // In both conventions alpha and beta turn one axis into the next; the first (mdh) or last (dh) pair involves base or
+  // tool instead.
+  if (chain.convention == Convention::dh ? joint + 1 == chain.joints.size() : joint == 0) return false;
+  const double degrees = std::numbers::pi / 180.0;
+  const Joint& j = chain.joints[joint];
+  const double cosine = std::abs(std::cos(j.alpha_deg * degrees) * std::cos(j.beta_deg * degrees));
+  return cosine >= std::cos(limit_deg * degrees);
+}
+
+std::vector<std::string> reasons_to_fix(const Robot& robot, const CalibrationOptions& options) {
+  const std::vector<discovery::Parameter> all = parameters(robot);
+  std::vector<std::string> reasons(all.size());
+  const std::vector<bool> fixed = matches(all, options.fixed, "CalibrationOptions::fixed");
+  const std::vector<bool> only = matches(all, options.only, "CalibrationOptions::only");
+  if (options.only.empty()) {
+    for (std::size_t j = 0; j < robot.chain.joints.size(); ++j) {
+      for (const JointParameter which : {JointParameter::theta, JointParameter::d, JointParameter::a, JointParameter::b,
+                                         JointParameter::alpha, JointParameter::beta}) {
+        reasons[static_cast<std::size_t>(joint_parameter(j, which))] =
+            excluded_by_convention(robot.chain, j, which, options.parallel_axes_deg);
+      }
+    }
+  }
+  for (std::size_t k = 0; k < all.size(); ++k) {
+    if (fixed[k] || (!options.only.empty() && !only[k])) reasons[k] = "fixed by the user";
+  }
+  return reasons;
+}
+
+void fix_dependent(const std::vector<discovery::Parameter>& parameters, const Eigen::MatrixXd& jacobian,
+                   double tolerance, std::vector<std::string>& reasons) {
+  Eigen::MatrixXd basis(jacobian.rows(), jacobian.cols());
+  Eigen::Index kept = 0;
+  double largest = 0.0;
+  for (std::size_t k = 0; k < parameters.size(); ++k) {
+    if (!reasons[k].empty()) continue;
+    Eigen::VectorXd column = jacobian.col(static_cast<Eigen::Index>(k)) * parameters[k].scale;
+    const double size = column.norm();
+    // Gram-Schmidt twice: once is not orthogonal enough where columns nearly depend on each other.
+    for (int pass = 0; pass < 2; ++pass) {
+      const Eigen::VectorXd shares = basis.leftCols(kept).transpose() * column;
+      column -= basis.leftCols(kept) * shares;
+    }
+    largest = std::max(largest, size);
+    if (size <= tolerance * largest) {
+      reasons[k] = "does not move the measured point";
+    } else if (column.norm() <= tolerance * size) {
+      reasons[k] = "not distinguishable from parameters before it";
+    } else {
+      basis.col(kept++) = column.normalized();
+    }
+  }
+}
+
+}  // namespace llmt::robotics

@@ -1,0 +1,25 @@
+// Which parameters of a robot a calibration may free.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "llmt/robotics/calibration_options.hpp"
+#include "llmt/robotics/robot.hpp"
+
+namespace llmt::robotics {
+
+/// Per parameter of parameters(robot): empty if it may be free, else why it is fixed. Options and convention only, no
+/// data.
+std::vector<std::string> reasons_to_fix(const Robot& robot, const CalibrationOptions& options);
+
+/// Adds the reasons the data give: in order, every parameter whose column of `jacobian` depends on the columns of free
+/// parameters before it. Columns are compared in parameter scales.
+void fix_dependent(const std::vector<discovery::Parameter>& parameters, const Eigen::MatrixXd& jacobian,
+                   double tolerance, std::vector<std::string>& reasons);
+
+/// Whether the joint's beta replaces its d: the axes that its alpha and beta connect are within `limit_deg` of
+/// (anti)parallel.
+bool is_nearly_parallel(const Chain& chain, std::size_t joint, double limit_deg);
+
+}  // namespace llmt::robotics

@@ -1,0 +1,41 @@
+#include "calibration/registration.hpp"
+
+#include <Eigen/Geometry>
+#include <Eigen/SVD>
+#include <cmath>
+#include <numbers>
+
+namespace llmt::robotics {
+
+Pose kabsch(const Eigen::MatrixXd& from, const Eigen::MatrixXd& to) {
+  const Eigen::RowVector3d centre_from = from.colwise().mean();
+  const Eigen::RowVector3d centre_to = to.colwise().mean();
+  const Eigen::Matrix3d covariance = (from.rowwise() - centre_from).transpose() * (to.rowwise() - centre_to);
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  Eigen::Vector3d handedness = Eigen::Vector3d::Ones();
+  if ((svd.matrixV() * svd.matrixU().transpose()).determinant() < 0.0) handedness(2) = -1.0;
+  Pose pose;
+  pose.rotation = svd.matrixV() * handedness.asDiagonal() * svd.matrixU().transpose();
+  pose.position_mm = centre_to.transpose() - pose.rotation * centre_from.transpose();
+  return pose;
+}
+
+Eigen::Vector3d roll_pitch_yaw_deg(const Eigen::Matrix3d& rotation) {
+  const double cosine_of_pitch = std::hypot(rotation(0, 0), rotation(1, 0));
+  const double pitch = std::atan2(-rotation(2, 0), cosine_of_pitch);
+  // At pitch +-90 deg only roll -+ yaw is defined: yaw is taken as zero.
+  const bool degenerate = cosine_of_pitch < 1e-12;
+  const double roll =
+      degenerate ? std::atan2(-rotation(1, 2), rotation(1, 1)) : std::atan2(rotation(2, 1), rotation(2, 2));
+  const double yaw = degenerate ? 0.0 : std::atan2(rotation(1, 0), rotation(0, 0));
+  return Eigen::Vector3d(roll, pitch, yaw) * (180.0 / std::numbers::pi);
+}
+
+Robot with_closed_form_base(Robot robot, const Measurements& measurements) {
+  robot.chain.base = Frame{};
+  const Pose base = kabsch(positions(robot, measurements.poses), measurements.positions_mm);
+  robot.chain.base = {.xyz_mm = base.position_mm, .rpy_deg = roll_pitch_yaw_deg(base.rotation)};
+  return robot;
+}
+
+}  // namespace llmt::robotics

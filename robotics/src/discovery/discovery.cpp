@@ -1,0 +1,179 @@
+#include "llmt/robotics/discovery.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "calibration/joint_map_shift.hpp"
+#include "discovery/findings.hpp"
+#include "discovery/gap_map.hpp"
+#include "discovery/investigation.hpp"
+#include "discovery/pose_split.hpp"
+#include "discovery/rest_correction.hpp"
+
+namespace llmt::robotics {
+namespace {
+
+ErrorFigures figures(const CorrectedRobot& robot, const Measurements& measurements) {
+  return error_figures(distances(positions(robot, measurements.poses), measurements));
+}
+
+// Mean length of a vector of d independent normal components.
+double mean_distance(double sigma, Eigen::Index components) {
+  const auto d = static_cast<double>(components);
+  return sigma * std::sqrt(2.0) * std::exp(std::lgamma(0.5 * (d + 1.0)) - std::lgamma(0.5 * d));
+}
+
+// Lost beams among the poses set aside are told, not removed: nothing is chosen by these poses.
+void tell_far_poses(const CorrectedRobot& improved, const Measurements& test, Discovery& result) {
+  const Eigen::VectorXd errors = distances(positions(improved, test.poses), test);
+  std::vector<double> sorted(errors.begin(), errors.end());
+  std::ranges::nth_element(sorted, sorted.begin() + std::ssize(sorted) / 2);
+  const double median = sorted[sorted.size() / 2];
+  constexpr double far = 10.0;
+  const auto count = (errors.array() > far * median).count();
+  if (count > 0 && median > 0.0) {
+    result.notes.push_back(
+        fmt::format("{} of the {} poses set aside are more than ten times as far off as the median ({:.4f} mm): lost "
+                    "beams, or poses unlike the others.",
+                    count, errors.size(), median));
+  }
+}
+
+void verify(const Measurements& searched, const Measurements& test, Eigen::Index components, Discovery& result) {
+  result.fitted_before = figures({result.before, {}}, searched);
+  result.fitted_after = figures(result.improved, searched);
+  if (test.count() > 0) {
+    // Along the axes that were fitted: what was never seen is not promised.
+    Measurements common = test;
+    for (std::size_t axis = 0; axis < 3; ++axis) common.measured[axis] = test.measured[axis] && searched.measured[axis];
+    if (std::ranges::none_of(common.measured, [](bool seen) { return seen; })) {
+      throw std::runtime_error("the test measurements share no coordinate with those that were searched");
+    }
+    result.held_out.before = figures({result.before, {}}, common);
+    result.held_out.after = figures(result.improved, common);
+    result.held_out.poses = test.count();
+    tell_far_poses(result.improved, common, result);
+  }
+  constexpr Eigen::Index enough = 12;
+  const bool repeats_speak = result.lack_of_fit.dof >= enough;
+  result.held_out.floor_from_repeats = repeats_speak;
+  result.held_out.floor_mm = mean_distance(repeats_speak ? result.lack_of_fit.noise : result.noise_mm, components);
+}
+
+// Calibration must leave enough freedom for anything else to be told.
+void check_freedom(const Measurements& samples, const Calibration& baseline) {
+  const Eigen::Index coordinates = samples.count() * std::ranges::count(samples.measured, true);
+  const Eigen::Index needed = baseline.result.rank + std::max<Eigen::Index>(10, baseline.result.rank / 2);
+  if (coordinates < needed) {
+    throw std::runtime_error(
+        fmt::format("{} poses to search give {} coordinates, of which calibration takes {}: at least {} are needed to "
+                    "tell anything",
+                    samples.count(), coordinates, baseline.result.rank, needed));
+  }
+}
+
+// What no effect does: wrong units, order or sign of joints, another robot, too many lost beams.
+void check_plausible(const Robot& robot, const Measurements& samples) {
+  double reach = robot.chain.tool.xyz_mm.norm();
+  for (const Joint& joint : robot.chain.joints) reach += std::abs(joint.a_mm) + std::abs(joint.d_mm);
+  Eigen::VectorXd errors = distances(positions(robot, samples.poses), samples);
+  std::ranges::nth_element(errors, errors.begin() + errors.size() / 2);
+  const double median = errors(errors.size() / 2);
+  constexpr double implausible = 0.02;
+  if (reach > 0.0 && median > implausible * reach) {
+    throw std::runtime_error(
+        fmt::format("the calibrated model misses the measurements by {:.4g} mm, {:.0f} % of the arm's reach: no effect "
+                    "does that. Check "
+                    "units, order, signs and zeros of the joints, the axes of the instrument, and the description",
+                    median, 100.0 * median / reach));
+  }
+}
+
+bool is_exact(const Robot& robot, const Measurements& samples) {
+  constexpr double rounding = 1e-10;
+  const double largest = distances(positions(robot, samples.poses), samples).maxCoeff();
+  return largest < rounding * std::max(1.0, samples.positions_mm.cwiseAbs().maxCoeff());
+}
+
+Discovery discover_in(const Robot& robot, const PoseSplit& split, const DiscoveryOptions& options) {
+  // Maps that the robot has already move its joints; what is sought is sought beside them.
+  const Unmapped plain = unmapped(robot, split.samples);
+  Discovery result;
+  say(options, "calibrating");
+  Investigation investigation;
+  investigation.searched = plain.measurements;
+  investigation.baseline = calibrate(plain.robot, investigation.searched, options.calibration);
+  check_freedom(investigation.searched, investigation.baseline);
+  check_plausible(investigation.baseline.robot, investigation.searched);
+  if (is_exact(investigation.baseline.robot, investigation.searched)) {
+    result.before = calibrate(robot, split.samples, options.calibration).robot;
+    result.improved.robot = result.before;
+    result.notes.emplace_back(
+        "The calibrated model reproduces the measurements to rounding: there is no gap to explain.");
+    return result;
+  }
+  investigation.search(options);
+  const discovery::Verdict& verdict = investigation.verdict;
+  result.answer = verdict.answer;
+  describe_shapes(investigation.asked.hypotheses, verdict, result);
+  if (options.maps && verdict.answer == discovery::Answer::unknown) add_maps(investigation, options, result);
+  describe_effects(investigation.asked.hypotheses, verdict, investigation.fitted, options.mass_uncertainty, result);
+  describe_limits(investigation.asked.hypotheses, investigation.asked.untestable, verdict, robot, result);
+  for (const std::size_t sample : verdict.outliers) {
+    for (const Eigen::Index row : split.rows[sample]) result.outliers.push_back(row);
+  }
+  const Measurements kept = without_rows(split.samples, verdict.outliers);
+  result.before = calibrate(robot, kept, options.calibration).robot;
+  result.rounds = investigation.rounds;
+  result.improved.robot = investigation.fitted.robot;
+  for (const std::vector<Effect>* maps : {&plain.maps, static_cast<const std::vector<Effect>*>(&result.maps)}) {
+    result.improved.robot.effects.insert(result.improved.robot.effects.end(), maps->begin(), maps->end());
+  }
+  // A fit that went astray may not leave the user worse off than before.
+  if (total_distance(result.improved.robot, kept) > total_distance(result.before, kept)) {
+    result.improved.robot = result.before;
+    result.maps.clear();
+    result.notes.emplace_back(
+        "The refit with what was found did not converge to anything better: the model is as calibrated.");
+  }
+  if (options.correct && result.answer == discovery::Answer::unknown) {
+    say(options, "trying a correction");
+    correct_rest(kept, options.seed, result);
+  }
+  locate(kept, result);
+  return result;
+}
+
+}  // namespace
+
+Discovery discover(const Robot& robot, const Measurements& measurements, const std::optional<Measurements>& test,
+                   const DiscoveryOptions& options) {
+  validate(robot);
+  validate(measurements, robot);
+  const PoseSplit split = set_aside(measurements, test, options.held_out_share, options.seed, Repeats::as_marked);
+  const Eigen::Index components = std::ranges::count(measurements.measured, true);
+  if (split.samples.count() * components < 10) {
+    throw std::invalid_argument(
+        fmt::format("llmt::robotics::discover: {} poses to search are too few", split.samples.count()));
+  }
+  Discovery result = discover_in(robot, split, options);
+  // Repeats that scatter less than everything else do not show all of the noise, whatever the file says: then what was
+  // found must stand without counting them as independent.
+  constexpr Eigen::Index enough = 12;
+  const bool doubtful = result.answer != discovery::Answer::nothing_missing && result.lack_of_fit.dof >= enough &&
+                        result.lack_of_fit.p_value < 0.05;
+  if (doubtful) {
+    const discovery::LackOfFit repeats = result.lack_of_fit;
+    result = discover_in(robot, set_aside(measurements, test, options.held_out_share, options.seed, Repeats::averaged),
+                         options);
+    result.lack_of_fit = repeats;
+    result.notes.emplace_back("Repeats of a pose scatter less than the rest: each pose was counted once.");
+  }
+  verify(split.searched, split.test, components, result);
+  return result;
+}
+
+}  // namespace llmt::robotics

@@ -1,0 +1,218 @@
+#include "discovery/joint_maps.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "calibration/joint_map_shift.hpp"
+
+namespace llmt::robotics {
+namespace {
+
+struct Knots : EvenKnots {
+  std::size_t joint = 0;
+  Eigen::Index begin = 0;  // among all unknowns
+};
+
+std::vector<Knots> choose_knots(const Chain& chain, const Poses& poses) {
+  // Two degrees resolve what strain-wave gears do within a wave of their teeth; few poses cannot fill as many knots.
+  constexpr double finest = 2.0 * std::numbers::pi / 180.0;
+  std::vector<Knots> all;
+  Eigen::Index begin = 0;
+  for (std::size_t j = 0; j < chain.joints.size(); ++j) {
+    if (chain.joints[j].type != JointType::revolute) continue;
+    const Eigen::VectorXd q = poses.joints.col(static_cast<Eigen::Index>(j));
+    const double range = q.maxCoeff() - q.minCoeff();
+    if (range < 0.05) continue;
+    const auto most = std::max<Eigen::Index>(6, poses.count() / 4);
+    const auto count = std::clamp(static_cast<Eigen::Index>(std::ceil(range / finest)) + 1, Eigen::Index{6}, most);
+    all.push_back({{q.minCoeff(), range / static_cast<double>(count - 1), count}, j, begin});
+    begin += count;
+  }
+  return all;
+}
+
+Eigen::MatrixXd second_differences(Eigen::Index count) {
+  Eigen::MatrixXd penalty = Eigen::MatrixXd::Zero(count, count);
+  for (Eigen::Index k = 1; k + 1 < count; ++k) {
+    Eigen::RowVectorXd row = Eigen::RowVectorXd::Zero(count);
+    row(k - 1) = 1.0;
+    row(k) = -2.0;
+    row(k + 1) = 1.0;
+    penalty.middleRows(k - 1, 3) += row.segment(k - 1, 3).transpose() * row;
+  }
+  return penalty;
+}
+
+// The Bayesian reading of the penalties, by which their sizes are chosen.
+class Smoother {
+ public:
+  Smoother(Eigen::MatrixXd gram, Eigen::VectorXd moments, double squares, double freedom, std::vector<Knots> knots)
+      : gram_(std::move(gram)),
+        moments_(std::move(moments)),
+        squares_(squares),
+        freedom_(freedom),
+        knots_(std::move(knots)) {
+    information_ = gram_.trace() / static_cast<double>(gram_.cols());
+    for (const Knots& own : knots_) penalties_.push_back(second_differences(own.count));
+  }
+
+  Eigen::MatrixXd penalty(const std::vector<double>& log_smoothness) const {
+    // A level and a slope for each map that geometry nearly absorbs: held loosely.
+    constexpr double loose = 1e-5;
+    Eigen::MatrixXd all = Eigen::MatrixXd::Zero(gram_.rows(), gram_.cols());
+    for (std::size_t b = 0; b < knots_.size(); ++b) {
+      auto block = all.block(knots_[b].begin, knots_[b].begin, knots_[b].count, knots_[b].count);
+      block = std::pow(10.0, log_smoothness[b]) * information_ * penalties_[b];
+      block.diagonal().array() += loose * information_;
+    }
+    return all;
+  }
+
+  // -2 ln marginal likelihood, constants left out.
+  double cost(const std::vector<double>& log_smoothness) const {
+    double log_prior = 0.0;
+    Eigen::MatrixXd all = penalty(log_smoothness);
+    for (const Knots& own : knots_) {
+      log_prior += log_determinant(all.block(own.begin, own.begin, own.count, own.count));
+    }
+    all += gram_;
+    const Eigen::LLT<Eigen::MatrixXd> factor(all);
+    if (factor.info() != Eigen::Success) return std::numeric_limits<double>::infinity();
+    const double left = squares_ - moments_.dot(factor.solve(moments_));
+    return 2.0 * factor.matrixLLT().diagonal().array().log().sum() - log_prior +
+           freedom_ * std::log(std::max(left, 1e-12 * squares_));
+  }
+
+  // One smoothness for all, then each on its own.
+  std::vector<double> choose() const {
+    constexpr double roughest = -3.0;
+    constexpr double smoothest = 6.0;
+    std::vector<double> best(knots_.size(), smoothest);
+    double smallest = cost(best);
+    for (double common = smoothest - 1.5; common >= roughest; common -= 1.5) {
+      const std::vector<double> trial(knots_.size(), common);
+      const double own = cost(trial);
+      if (own < smallest) {
+        smallest = own;
+        best = trial;
+      }
+    }
+    for (const double step : {1.5, 0.75}) {
+      for (std::size_t b = 0; b < best.size(); ++b) {
+        for (const double direction : {step, -step}) {
+          while (true) {
+            std::vector<double> trial = best;
+            trial[b] = std::clamp(trial[b] + direction, roughest, smoothest + 2.0);
+            if (trial[b] == best[b]) break;
+            const double own = cost(trial);
+            if (own >= smallest) break;
+            smallest = own;
+            best = trial;
+          }
+        }
+      }
+    }
+    return best;
+  }
+
+ private:
+  Eigen::MatrixXd gram_;
+  Eigen::VectorXd moments_;
+  double squares_;
+  double freedom_;
+  std::vector<Knots> knots_;
+  double information_ = 1.0;
+  std::vector<Eigen::MatrixXd> penalties_;
+
+  static double log_determinant(const Eigen::MatrixXd& matrix) {
+    return 2.0 * Eigen::LLT<Eigen::MatrixXd>(matrix).matrixLLT().diagonal().array().log().sum();
+  }
+};
+
+// Distances when each sample is left out: (I - H_ii)^-1 e_i; `used` (k x N) such that H = used' used.
+Eigen::VectorXd left_out(const Eigen::MatrixXd& used, const Eigen::VectorXd& errors, Eigen::Index d) {
+  Eigen::VectorXd lengths(errors.size() / d);
+  for (Eigen::Index i = 0; i < lengths.size(); ++i) {
+    const auto columns = used.middleCols(i * d, d);
+    Eigen::MatrixXd own = Eigen::MatrixXd::Identity(d, d);
+    own.noalias() -= columns.transpose() * columns;
+    own.diagonal().array() += 1e-6;
+    lengths(i) = own.ldlt().solve(errors.segment(i * d, d)).norm();
+  }
+  return lengths;
+}
+
+}  // namespace
+
+std::optional<JointMaps> fit_joint_maps(const Robot& robot, const Measurements& measurements) {
+  const std::vector<Knots> knots = choose_knots(robot.chain, measurements.poses);
+  if (knots.empty()) return std::nullopt;
+  const Eigen::Index unknowns = knots.back().begin + knots.back().count;
+  const std::vector<Eigen::Index> rows = measured_rows(measurements);
+  const auto n = std::ssize(rows);
+  const Eigen::Index d = n / measurements.count();
+  Eigen::MatrixXd jacobian = position_jacobian(robot, measurements.poses)(rows, Eigen::all);
+  const Eigen::MatrixXd model = positions(robot, measurements.poses);
+  Eigen::VectorXd residuals(n);
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const Eigen::Index row = rows[static_cast<std::size_t>(k)];
+    residuals(k) = measurements.positions_mm(row / 3, row % 3) - model(row / 3, row % 3);
+  }
+  for (Eigen::Index c = 0; c < jacobian.cols(); ++c) {
+    if (jacobian.col(c).norm() > 0.0) jacobian.col(c).normalize();
+  }
+  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> factors(jacobian);
+  factors.setThreshold(1e-9);
+  Eigen::MatrixXd baseline = Eigen::MatrixXd::Identity(n, factors.rank());
+  baseline.applyOnTheLeft(factors.householderQ());
+  residuals -= baseline * (baseline.transpose() * residuals);
+  Eigen::MatrixXd hats = Eigen::MatrixXd::Zero(n, unknowns);
+  const Kinematics kinematics(robot.chain);
+  for (Eigen::Index k = 0; k < n;) {
+    const Eigen::Index pose = rows[static_cast<std::size_t>(k)] / 3;
+    const auto levers = kinematics.joint_jacobian(measurements.poses.joints.row(pose).transpose());
+    for (; k < n && rows[static_cast<std::size_t>(k)] / 3 == pose; ++k) {
+      const Eigen::Index axis = rows[static_cast<std::size_t>(k)] % 3;
+      for (const Knots& own : knots) {
+        const auto joint = static_cast<Eigen::Index>(own.joint);
+        const auto [below, above] = own.place(measurements.poses.joints(pose, joint));
+        hats(k, own.begin + below) += (1.0 - above) * levers(axis, joint);
+        hats(k, own.begin + below + 1) += above * levers(axis, joint);
+      }
+    }
+  }
+  const Eigen::MatrixXd inside = baseline.transpose() * hats;
+  hats.noalias() -= baseline * inside;
+  Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(unknowns, unknowns);
+  gram.selfadjointView<Eigen::Lower>().rankUpdate(hats.transpose());
+  gram.triangularView<Eigen::StrictlyUpper>() = gram.transpose();
+  const Eigen::VectorXd moments = hats.transpose() * residuals;
+  const Smoother smoother(gram, moments, residuals.squaredNorm(), static_cast<double>(n - baseline.cols()), knots);
+  JointMaps maps;
+  maps.smoothness = smoother.choose();
+  const Eigen::LLT<Eigen::MatrixXd> factor(gram + smoother.penalty(maps.smoothness));
+  const Eigen::VectorXd values = factor.solve(moments);
+  for (const Knots& own : knots) {
+    const Eigen::VectorXd part = values.segment(own.begin, own.count);
+    maps.effects.push_back({.type = "joint_map",
+                            .at = robot.chain.joints[own.joint].name,
+                            .values = {part.begin(), part.end()},
+                            .constants = {own.first, own.step}});
+  }
+  const Eigen::MatrixXd geometry = baseline.transpose();
+  maps.before = left_out(geometry, residuals, d);
+  Eigen::MatrixXd used(geometry.rows() + unknowns, n);
+  used.topRows(geometry.rows()) = geometry;
+  used.bottomRows(unknowns) = factor.matrixL().solve(hats.transpose());
+  maps.after = left_out(used, residuals - hats * values, d);
+  const Eigen::ArrayXd gain = (maps.before - maps.after).array();
+  const auto count = static_cast<double>(gain.size());
+  const double spread = std::sqrt((gain - gain.mean()).square().sum() / (count - 1.0) / count);
+  maps.gain_in_errors = spread > 0.0 ? gain.mean() / spread : 0.0;
+  return maps;
+}
+
+}  // namespace llmt::robotics

@@ -1,0 +1,116 @@
+#include "discovery/pose_split.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numeric>
+#include <stdexcept>
+
+#include "llmt/random.hpp"
+
+namespace llmt::robotics {
+namespace {
+
+std::vector<std::ptrdiff_t> all_rows(Eigen::Index count) {
+  std::vector<std::ptrdiff_t> rows(static_cast<std::size_t>(count));
+  std::iota(rows.begin(), rows.end(), 0);
+  return rows;
+}
+
+const Eigen::VectorXd* column(const Poses& poses, const char* name) {
+  const auto found = poses.covariates.find(name);
+  return found == poses.covariates.end() ? nullptr : &found->second;
+}
+
+Measurements averaged(const Measurements& measurements, Repeats repeats,
+                      std::vector<std::vector<Eigen::Index>>& samples) {
+  const Eigen::VectorXd* pose = column(measurements.poses, "pose");
+  const Eigen::VectorXd* dwelled = column(measurements.poses, "dwelled");
+  const Eigen::VectorXd* returned = column(measurements.poses, "returned");
+  std::map<double, std::size_t> groups;
+  samples.clear();
+  for (Eigen::Index i = 0; i < measurements.count(); ++i) {
+    const bool stood_still =
+        (dwelled != nullptr && (*dwelled)(i) != 0.0) || (returned != nullptr && (*returned)(i) == 0.0);
+    if (pose != nullptr && (stood_still || repeats == Repeats::averaged)) {
+      const auto [group, is_new] = groups.try_emplace((*pose)(i), samples.size());
+      if (!is_new) {
+        samples[group->second].push_back(i);
+        continue;
+      }
+    }
+    samples.push_back({i});
+  }
+  if (std::ssize(samples) == measurements.count()) return measurements;
+  std::vector<std::ptrdiff_t> first;
+  for (const auto& sample : samples) first.push_back(sample.front());
+  Measurements result = select(measurements, first);
+  for (std::size_t s = 0; s < samples.size(); ++s) {
+    const auto row = static_cast<Eigen::Index>(s);
+    result.positions_mm.row(row) = measurements.positions_mm(samples[s], Eigen::all).colwise().mean();
+    result.poses.joints.row(row) = measurements.poses.joints(samples[s], Eigen::all).colwise().mean();
+    for (auto& [name, values] : result.poses.covariates) {
+      values(row) = measurements.poses.covariates.at(name)(samples[s]).mean();
+    }
+  }
+  return result;
+}
+
+}  // namespace
+
+PoseSplit set_aside(const Measurements& measurements, const std::optional<Measurements>& test, double share,
+                    std::uint64_t seed, Repeats repeats) {
+  PoseSplit split;
+  std::vector<std::ptrdiff_t> searched = all_rows(measurements.count());
+  if (test) {
+    split.test = *test;
+  } else if (share > 0.0) {
+    const Eigen::VectorXd* pose = column(measurements.poses, "pose");
+    std::map<double, std::vector<std::ptrdiff_t>> groups;
+    for (const std::ptrdiff_t i : searched) groups[pose != nullptr ? (*pose)(i) : static_cast<double>(i)].push_back(i);
+    std::vector<std::vector<std::ptrdiff_t>> units;
+    for (auto& [number, rows] : groups) units.push_back(rows);
+    Random random(seed);
+    const std::vector<std::ptrdiff_t> order = random.permutation(std::ssize(units));
+    const auto aside = static_cast<std::ptrdiff_t>(std::lround(share * static_cast<double>(units.size())));
+    std::vector<std::ptrdiff_t> tested;
+    searched.clear();
+    for (std::ptrdiff_t k = 0; k < std::ssize(order); ++k) {
+      auto& target = k < aside ? tested : searched;
+      const auto& unit = units[static_cast<std::size_t>(order[static_cast<std::size_t>(k)])];
+      target.insert(target.end(), unit.begin(), unit.end());
+    }
+    std::ranges::sort(searched);
+    std::ranges::sort(tested);
+    split.test = select(measurements, tested);
+  }
+  split.searched = select(measurements, searched);
+  split.samples = averaged(split.searched, repeats, split.rows);
+  for (std::vector<Eigen::Index>& sample : split.rows) {
+    for (Eigen::Index& row : sample) row = searched[static_cast<std::size_t>(row)];
+  }
+  return split;
+}
+
+std::vector<Eigen::Index> repeats_of(const Poses& poses) {
+  const Eigen::VectorXd* pose = column(poses, "pose");
+  if (pose == nullptr) return {};
+  std::map<double, Eigen::Index> numbers;
+  std::vector<Eigen::Index> repeats;
+  for (const double number : *pose) {
+    repeats.push_back(numbers.try_emplace(number, static_cast<Eigen::Index>(numbers.size())).first->second);
+  }
+  return repeats;
+}
+
+Measurements without_rows(const Measurements& measurements, const std::vector<std::size_t>& left_out) {
+  std::vector<std::ptrdiff_t> rows;
+  for (Eigen::Index i = 0; i < measurements.count(); ++i) {
+    if (std::ranges::find(left_out, static_cast<std::size_t>(i)) == left_out.end()) rows.push_back(i);
+  }
+  return select(measurements, rows);
+}
+
+}  // namespace llmt::robotics

@@ -1,0 +1,106 @@
+#include "discovery/question.hpp"
+
+#include <algorithm>
+
+#include "discovery/pose_split.hpp"
+#include "hypotheses/catalogue_effects.hpp"
+#include "hypotheses/scans.hpp"
+#include "hypotheses/shapes.hpp"
+
+namespace llmt::robotics {
+namespace {
+
+Eigen::VectorXd stacked_residuals(const Robot& robot, const Measurements& measurements) {
+  const Eigen::MatrixXd model = positions(robot, measurements.poses);
+  Eigen::VectorXd residuals = Eigen::VectorXd::Zero(3 * measurements.count());
+  for (Eigen::Index i = 0; i < measurements.count(); ++i) {
+    for (Eigen::Index axis = 0; axis < 3; ++axis) {
+      if (measurements.measured[static_cast<std::size_t>(axis)])
+        residuals(3 * i + axis) = measurements.positions_mm(i, axis) - model(i, axis);
+    }
+  }
+  return residuals;
+}
+
+// An effect that an earlier round added, as a hypothesis among the others: what it was, at the present estimates.
+Hypothesis found_before(const Hypothesis& earlier, const Effect& effect, const Eigen::MatrixXd& signature) {
+  Hypothesis hypothesis = earlier;
+  hypothesis.effect = effect;
+  hypothesis.candidate.signature = signature;
+  return hypothesis;
+}
+
+// Where the fit starts. A value that hardly moves anything can come out anywhere; plausible sizes bound it.
+std::vector<double> within_limits(const discovery::EffectCandidate& candidate, const Eigen::VectorXd& values) {
+  Eigen::VectorXd bounded = values;
+  if (candidate.lower.size() == values.size()) bounded = values.cwiseMax(candidate.lower).cwiseMin(candidate.upper);
+  return {bounded.begin(), bounded.end()};
+}
+
+}  // namespace
+
+EffectQuestion question(const Robot& robot, const std::vector<Hypothesis>& found, const Measurements& measurements,
+                        const DiscoveryOptions& options) {
+  const std::size_t own = robot.effects.size() - found.size();
+  EffectQuestion result;
+  const Eigen::VectorXd residuals = stacked_residuals(robot, measurements);
+  const Scene scene = make_scene(robot, measurements.poses, residuals, measurements.measured);
+  result.hypotheses = catalogue_hypotheses(scene, options.catalogue, result.untestable);
+  if (options.scans) {
+    for (Hypothesis& scanned : scanned_effects(scene, options.catalogue))
+      result.hypotheses.push_back(std::move(scanned));
+  }
+  add_signatures(scene, result.hypotheses);
+  const Eigen::MatrixXd jacobian = position_jacobian(robot, measurements.poses);
+  Eigen::VectorXd explained = residuals;
+  Eigen::Index column = geometric_parameter_count(robot.chain);
+  for (std::size_t e = 0; e < robot.effects.size(); ++e) {
+    const Effect& effect = robot.effects[e];
+    const Eigen::Index k = std::ssize(effect.values);
+    if (e >= own) {
+      const Eigen::Map<const Eigen::VectorXd> values(effect.values.data(), k);
+      explained += jacobian.middleCols(column, k) * values;
+      result.hypotheses.push_back(found_before(found[e - own], effect, jacobian.middleCols(column, k)));
+    }
+    column += k;
+  }
+  if (options.shapes) {
+    for (Hypothesis& shape : shape_hypotheses(scene)) result.hypotheses.push_back(std::move(shape));
+  }
+  const std::vector<Eigen::Index> rows = measured_rows(measurements);
+  Eigen::Index baseline = geometric_parameter_count(robot.chain);
+  for (std::size_t e = 0; e < own; ++e) baseline += std::ssize(robot.effects[e].values);
+  result.evidence.residuals = explained(rows);
+  result.evidence.jacobian = jacobian(rows, Eigen::seqN(0, baseline));
+  result.evidence.components = std::ranges::count(measurements.measured, true);
+  result.evidence.repeats = repeats_of(measurements.poses);
+  // Deflections over levers are a hundredth at most, and first order is wrong by a share of that.
+  constexpr double first_order = 1e-5;
+  result.evidence.resolution = first_order;
+  for (Hypothesis& hypothesis : result.hypotheses) {
+    hypothesis.candidate.signature = Eigen::MatrixXd(hypothesis.candidate.signature(rows, Eigen::all));
+  }
+  return result;
+}
+
+std::vector<discovery::EffectCandidate> candidates_of(const EffectQuestion& question) {
+  std::vector<discovery::EffectCandidate> candidates;
+  for (const Hypothesis& hypothesis : question.hypotheses) candidates.push_back(hypothesis.candidate);
+  return candidates;
+}
+
+std::vector<Hypothesis> effects_of(const EffectQuestion& question, const discovery::Verdict& verdict) {
+  std::vector<Hypothesis> found;
+  for (const discovery::Finding& finding : verdict.findings) {
+    for (const discovery::FindingTerm& term : finding.terms) {
+      const Hypothesis& hypothesis = question.hypotheses[term.candidate];
+      if (!hypothesis.effect) continue;
+      found.push_back(hypothesis);
+      found.back().candidate.signature.resize(0, 0);
+      found.back().effect->values = within_limits(hypothesis.candidate, term.values);
+    }
+  }
+  return found;
+}
+
+}  // namespace llmt::robotics

@@ -1,0 +1,45 @@
+#include "discovery/rest_correction.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "llmt/folds.hpp"
+
+namespace llmt::robotics {
+
+void correct_rest(const Measurements& searched, std::uint64_t seed, Discovery& result) {
+  constexpr Eigen::Index fewest = 100;
+  constexpr int folds = 5;
+  if (searched.count() < fewest) return;
+  FitOptions fitting;
+  fitting.blend.validity = ValidityChoice::crisp;
+  fitting.intervals = false;
+  fitting.selection.folds.seed = seed;
+  const Robot& robot = result.improved.robot;
+  const Eigen::VectorXd without = distances(positions(robot, searched.poses), searched);
+  Eigen::VectorXd with = without;
+  FoldOptions dealing;
+  dealing.count = folds;
+  dealing.seed = seed;
+  for (const Fold& fold : make_folds(searched.count(), dealing)) {
+    const CorrectedRobot trained{robot, fit_correction(robot, select(searched, fold.train), fitting).model};
+    const Measurements held_out = select(searched, fold.held_out);
+    with(fold.held_out) = distances(positions(trained, held_out.poses), held_out);
+  }
+  const Eigen::ArrayXd gain = (without - with).array();
+  const auto n = static_cast<double>(gain.size());
+  const double error = std::sqrt((gain - gain.mean()).square().sum() / (n - 1.0) / n);
+  constexpr double convincing = 2.0;
+  if (!(gain.mean() > convincing * error)) {
+    result.notes.push_back(
+        fmt::format("A tree of the rest does not help: {:.4f} mm without, {:.4f} with it on poses left out.",
+                    without.mean(), with.mean()));
+    return;
+  }
+  result.improved.correction = fit_correction(robot, searched, fitting).model;
+  result.notes.push_back(fmt::format("A tree of the rest lowers the error on poses left out from {:.4f} to {:.4f} mm.",
+                                     without.mean(), with.mean()));
+}
+
+}  // namespace llmt::robotics

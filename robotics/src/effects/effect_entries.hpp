@@ -1,0 +1,62 @@
+// The parts of the catalogue, and what their formulas share.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "llmt/robotics/effect_type.hpp"
+
+namespace llmt::robotics {
+
+inline constexpr double metres = 1e-3;  // m per mm
+
+/// Formulas, units and places; sizes, titles and notes come from the table robotics/catalogue.yaml.
+std::vector<EffectType> elastic_effects();
+std::vector<EffectType> joint_effects();
+std::vector<EffectType> whole_arm_effects();
+EffectType formula_effect();
+
+/// The table robotics/catalogue.yaml as text.
+extern const char* const default_catalogue_yaml;
+
+using ApplyFunction = decltype(EffectType::apply);
+
+/// The effect's expressions as a function that keeps what it needs. Throws mu::ParserError.
+ApplyFunction compile_formula(const Chain& chain, const Effect& effect);
+
+/// All names of variables in an expression. Throws mu::ParserError.
+std::set<std::string> names_in_formula(const std::string& text);
+
+/// Names in the expressions that are neither joint values nor torques.
+std::vector<std::string> formula_columns(const std::vector<FormulaTerm>& terms);
+
+/// The typical size of what a term is multiplied by: as stated, or else that of what it acts on.
+double scale_of(const FormulaTerm& term, bool is_prismatic);
+
+/// Why an effect of type "formula" cannot be evaluated, or nothing.
+std::string formula_refusal(const Chain& chain, const Effect& effect);
+
+/// "{}" replaced by the number of the joint.
+std::string with_joint_number(std::string pattern, std::size_t joint);
+
+/// Whether the effect is one of a whole robot: its type is, or it is a formula at no joint.
+bool is_of_whole_robot(const EffectType& type, const Effect& effect);
+
+inline bool is_prismatic(const Chain& chain, std::size_t joint) {
+  return chain.joints[joint].type == JointType::prismatic;
+}
+
+/// What gravity does to a joint: its torque in N m, or its force in N for a prismatic joint.
+inline double gravity_load(const PoseContext& pose, std::size_t joint) {
+  const Load& load = pose.load[joint];
+  return pose.skeleton.joint_axis[joint].dot(is_prismatic(pose.chain, joint) ? load.force_N : load.moment_Nm);
+}
+
+/// Everything from joint `joint` on, its axis included, moves by a twist about the joint's origin.
+inline Deformation::Twist& twist_before(Deformation& deformation, std::size_t joint) {
+  return joint == 0 ? deformation.base : deformation.link[joint - 1];
+}
+
+}  // namespace llmt::robotics

@@ -1,0 +1,168 @@
+#include "hypotheses/scans.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace llmt::robotics {
+
+namespace {
+
+struct Peak {
+  double order;
+  double gain;
+};
+
+double order_gain(const JointSignal& signal, double order) {
+  Eigen::Matrix2d gram = Eigen::Matrix2d::Zero();
+  Eigen::Vector2d moment = Eigen::Vector2d::Zero();
+  for (std::size_t i = 0; i < signal.angle.size(); ++i) {
+    const Eigen::Vector2d wave(std::cos(order * signal.angle[i]), std::sin(order * signal.angle[i]));
+    gram += signal.weight[i] * wave * wave.transpose();
+    moment += signal.along[i] * wave;
+  }
+  return gram.determinant() > 1e-6 * gram.trace() * gram.trace() ? moment.dot(gram.ldlt().solve(moment)) : 0.0;
+}
+
+// The gain on a grid of orders, with cosines and sines by rotation from order to order.
+std::vector<Peak> order_spectrum(const JointSignal& signal, double first, double last, double step) {
+  std::vector<Peak> spectrum;
+  const auto n = static_cast<Eigen::Index>(signal.angle.size());
+  const Eigen::Map<const Eigen::ArrayXd> angle(signal.angle.data(), n);
+  const Eigen::Map<const Eigen::ArrayXd> along(signal.along.data(), n);
+  const Eigen::Map<const Eigen::ArrayXd> weight(signal.weight.data(), n);
+  Eigen::ArrayXd cosine = (first * angle).cos();
+  Eigen::ArrayXd sine = (first * angle).sin();
+  const Eigen::ArrayXd turn_cosine = (step * angle).cos();
+  const Eigen::ArrayXd turn_sine = (step * angle).sin();
+  Eigen::ArrayXd next(n);
+  for (double order = first; order <= last; order += step) {
+    const double cc = (weight * cosine * cosine).sum();
+    const double cs = (weight * cosine * sine).sum();
+    const double ss = (weight * sine * sine).sum();
+    const double c = (along * cosine).sum();
+    const double s = (along * sine).sum();
+    const double determinant = cc * ss - cs * cs;
+    const double gain =
+        determinant > 1e-6 * (cc + ss) * (cc + ss) ? (ss * c * c - 2.0 * cs * c * s + cc * s * s) / determinant : 0.0;
+    spectrum.push_back({order, gain});
+    next = cosine * turn_cosine - sine * turn_sine;
+    sine = sine * turn_cosine + cosine * turn_sine;
+    cosine = next;
+  }
+  return spectrum;
+}
+
+double refined(const JointSignal& signal, double order, double step) {
+  double best = order;
+  double gain = order_gain(signal, order);
+  for (double width = 0.5 * step; width > 0.02 * step; width *= 0.5) {
+    const double centre = best;
+    for (const double trial : {centre - width, centre + width}) {
+      const double own = order_gain(signal, trial);
+      if (own > gain) {
+        gain = own;
+        best = trial;
+      }
+    }
+  }
+  return best;
+}
+
+const EffectType* type_of(const std::vector<EffectType>& catalogue, const std::string& name) {
+  const auto found = std::ranges::find(catalogue, name, &EffectType::name);
+  return found != catalogue.end() && found->searched ? &*found : nullptr;
+}
+
+Hypothesis hypothesis_of(const EffectType& type, const Chain& chain, std::size_t index, double constant,
+                         double choices) {
+  Hypothesis hypothesis;
+  hypothesis.effect = make_effect(type, chain, index, {constant});
+  hypothesis.candidate.family = type.family;
+  hypothesis.candidate.location =
+      fmt::format("{}[{:.2f}]", type.place == EffectPlace::robot ? "" : chain.joints[index].name, constant);
+  set_limits(type, std::ssize(hypothesis.effect->values), hypothesis.candidate);
+  hypothesis.candidate.prior_cost = 2.0 * std::log(choices);
+  return hypothesis;
+}
+
+void add_orders(const Scene& scene, const EffectType& type, std::vector<Hypothesis>& hypotheses) {
+  // Below three per turn the catalogue's eccentricities and the smooth shapes speak.
+  constexpr double lowest = 2.6;
+  constexpr double highest = 450.0;
+  constexpr std::size_t kept = 2;
+  const Chain& chain = scene.robot.chain;
+  for (std::size_t j = 0; j < chain.joints.size(); ++j) {
+    if (!suits(type, chain, j)) continue;
+    const JointSignal signal = joint_signal(scene, j);
+    const double range = signal.high - signal.low;
+    if (signal.angle.size() < 12 || range < 0.2) continue;
+    const double step = 1.2 / range;
+    std::vector<Peak> spectrum = order_spectrum(signal, lowest, highest, step);
+    const double choices = static_cast<double>(spectrum.size() * chain.joints.size());
+    std::ranges::sort(spectrum, std::greater<>{}, &Peak::gain);
+    std::vector<double> taken;
+    if (const std::optional<double>& ratio = chain.joints[j].gear_ratio) taken = {*ratio, 2.0 * *ratio, 4.0 * *ratio};
+    const std::size_t known = taken.size();
+    for (const Peak& peak : spectrum) {
+      if (taken.size() >= known + kept) break;
+      if (std::ranges::any_of(taken, [&](double order) { return std::abs(order - peak.order) < 3.0 * step; })) continue;
+      const double order = refined(signal, peak.order, step);
+      taken.push_back(peak.order);
+      hypotheses.push_back(hypothesis_of(type, chain, j, order, choices));
+    }
+  }
+}
+
+void add_knocks(const Scene& scene, const EffectType& type, std::vector<Hypothesis>& hypotheses) {
+  const auto column = [&](const char* name) {
+    const auto found = scene.poses.covariates.find(name);
+    return found == scene.poses.covariates.end() ? nullptr : &found->second;
+  };
+  const Eigen::VectorXd* time = column("order") != nullptr ? column("order") : column("time_s");
+  if (time == nullptr) return;
+  std::vector<Eigen::Index> rows;
+  for (Eigen::Index i = 0; i < time->size(); ++i) rows.push_back(i);
+  std::ranges::stable_sort(rows, {}, [&](Eigen::Index i) { return (*time)(i); });
+  const auto n = static_cast<double>(rows.size());
+  std::vector<Peak> cuts;
+  Eigen::Vector3d before = Eigen::Vector3d::Zero();
+  Eigen::Vector3d total = Eigen::Vector3d::Zero();
+  for (const Eigen::Index i : rows) total += scene.clipped.segment(3 * i, 3);
+  constexpr std::size_t least = 3;
+  for (std::size_t k = 0; k + 1 < rows.size(); ++k) {
+    before += scene.clipped.segment(3 * rows[k], 3);
+    const double first = (*time)(rows[k]);
+    const double second = (*time)(rows[k + 1]);
+    if (k + 1 < least || k + 1 + least > rows.size() || !(second > first)) continue;
+    const double m = static_cast<double>(k + 1);
+    cuts.push_back({0.5 * (first + second), (before - m / n * total).squaredNorm() * n / (m * (n - m))});
+  }
+  const double choices = std::max(1.0, static_cast<double>(cuts.size()));
+  std::ranges::stable_sort(cuts, std::greater<>{}, &Peak::gain);
+  for (std::size_t k = 0; k < std::min<std::size_t>(3, cuts.size()); ++k) {
+    hypotheses.push_back(hypothesis_of(type, scene.robot.chain, 0, cuts[k].order, choices));
+  }
+}
+
+}  // namespace
+
+std::vector<Hypothesis> scanned_effects(const Scene& scene, const std::vector<EffectType>& catalogue) {
+  std::vector<Hypothesis> hypotheses;
+  if (const EffectType* type = type_of(catalogue, "transmission_error")) add_orders(scene, *type, hypotheses);
+  if (const EffectType* type = type_of(catalogue, "tracker_knock")) add_knocks(scene, *type, hypotheses);
+  std::vector<Hypothesis> fresh;
+  for (Hypothesis& hypothesis : hypotheses) {
+    const std::string label = effect_label(*hypothesis.effect);
+    const bool present =
+        std::ranges::any_of(scene.robot.effects, [&](const Effect& e) { return effect_label(e) == label; });
+    if (!present) fresh.push_back(std::move(hypothesis));
+  }
+  return fresh;
+}
+
+}  // namespace llmt::robotics

@@ -1,0 +1,54 @@
+#include "hypotheses/scene.hpp"
+
+#include <algorithm>
+
+#include "llmt/robotics/kinematics.hpp"
+
+namespace llmt::robotics {
+
+Scene make_scene(const Robot& robot, const Poses& poses, const Eigen::VectorXd& residuals,
+                 const std::array<bool, 3>& measured) {
+  Scene scene{robot, poses, residuals, measured, {}, residuals};
+  const Kinematics kinematics(robot.chain);
+  scene.lever.assign(robot.chain.joints.size(), Eigen::MatrixXd::Zero(3 * poses.count(), 1));
+  Eigen::VectorXd size(poses.count());
+  for (Eigen::Index i = 0; i < poses.count(); ++i) {
+    const auto jacobian = kinematics.joint_jacobian(poses.joints.row(i).transpose());
+    for (std::size_t j = 0; j < scene.lever.size(); ++j) {
+      for (Eigen::Index axis = 0; axis < 3; ++axis) {
+        if (measured[static_cast<std::size_t>(axis)])
+          scene.lever[j](3 * i + axis, 0) = jacobian(axis, static_cast<Eigen::Index>(j));
+      }
+    }
+    size(i) = residuals.segment(3 * i, 3).norm();
+  }
+  // A lost beam would draw every scan to itself; whether it is an outlier is for the search to say.
+  std::vector<double> sorted(size.begin(), size.end());
+  std::ranges::nth_element(sorted, sorted.begin() + std::ssize(sorted) / 2);
+  constexpr double far_beyond = 6.0;
+  const double limit = far_beyond * sorted[sorted.size() / 2];
+  for (Eigen::Index i = 0; i < size.size(); ++i) {
+    if (size(i) > limit) scene.clipped.segment(3 * i, 3) *= limit / size(i);
+  }
+  return scene;
+}
+
+JointSignal joint_signal(const Scene& scene, std::size_t joint) {
+  JointSignal signal;
+  const Eigen::Index n = scene.poses.count();
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const auto lever = scene.lever[joint].col(0).segment(3 * i, 3);
+    signal.rows.push_back(i);
+    signal.along.push_back(lever.dot(scene.clipped.segment(3 * i, 3)));
+    signal.weight.push_back(lever.squaredNorm());
+    signal.angle.push_back(scene.poses.joints(i, static_cast<Eigen::Index>(joint)));
+  }
+  if (!signal.angle.empty()) {
+    const auto [low, high] = std::ranges::minmax(signal.angle);
+    signal.low = low;
+    signal.high = high;
+  }
+  return signal;
+}
+
+}  // namespace llmt::robotics

@@ -1,0 +1,114 @@
+#include "llmt/robotics/robot.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <stdexcept>
+
+#include "robot/robot_evaluator.hpp"
+
+namespace llmt::robotics {
+
+Poses select(const Poses& poses, const std::vector<std::ptrdiff_t>& rows) {
+  Poses chosen{.joints = poses.joints(rows, Eigen::all), .covariates = {}};
+  for (const auto& [name, values] : poses.covariates) chosen.covariates[name] = values(rows);
+  return chosen;
+}
+
+void validate(const Robot& robot) {
+  validate(robot.chain);
+  std::set<std::string> seen;
+  for (const Effect& effect : robot.effects) {
+    effect_index(robot.chain, effect);
+    if (!seen.insert(effect_label(effect)).second) {
+      throw std::invalid_argument(fmt::format("llmt::robotics::Robot: effect {} is there twice", effect_label(effect)));
+    }
+    for (const std::vector<double>* numbers : {&effect.values, &effect.constants}) {
+      if (!std::ranges::all_of(*numbers, [](double value) { return std::isfinite(value); }))
+        throw std::invalid_argument("llmt::robotics::Robot: a number of " + effect_label(effect) + " is not finite");
+    }
+  }
+}
+
+std::vector<discovery::Parameter> parameters(const Robot& robot) {
+  std::vector<discovery::Parameter> all = geometric_parameters(robot.chain);
+  for (const Effect& effect : robot.effects) {
+    const std::vector<EffectParameter> own = effect_parameters(robot.chain, effect);
+    for (std::size_t k = 0; k < own.size(); ++k) {
+      all.push_back({.name = effect_parameter_name(effect, own[k]),
+                     .unit = own[k].unit,
+                     .value = effect.values[k],
+                     .scale = own[k].scale});
+    }
+  }
+  return all;
+}
+
+Robot with_values(Robot robot, const Eigen::VectorXd& values) {
+  const Eigen::Index geometric = geometric_parameter_count(robot.chain);
+  Eigen::Index expected = geometric;
+  for (const Effect& effect : robot.effects) expected += std::ssize(effect.values);
+  if (values.size() != expected) {
+    throw std::invalid_argument(
+        fmt::format("llmt::robotics::with_values: values has {} entries, must be {}", values.size(), expected));
+  }
+  robot.chain = with_geometric_values(std::move(robot.chain), values.head(geometric));
+  Eigen::Index next = geometric;
+  for (Effect& effect : robot.effects) {
+    for (double& value : effect.values) value = values(next++);
+  }
+  return robot;
+}
+
+Eigen::MatrixXd positions(const Robot& robot, const Poses& poses) {
+  RobotEvaluator evaluator(robot, poses);
+  Eigen::MatrixXd result(poses.count(), 3);
+  for (Eigen::Index i = 0; i < poses.count(); ++i) result.row(i) = evaluator.position(i).transpose();
+  return result;
+}
+
+Eigen::MatrixXd position_jacobian(const Robot& robot, const Poses& poses) {
+  RobotEvaluator evaluator(robot, poses);
+  Eigen::MatrixXd result(3 * poses.count(), static_cast<Eigen::Index>(parameters(robot).size()));
+  for (Eigen::Index i = 0; i < poses.count(); ++i) result.middleRows(3 * i, 3) = evaluator.jacobian(i);
+  return result;
+}
+
+Eigen::MatrixXd gravity_loads(const Robot& robot, const Poses& poses) {
+  RobotEvaluator evaluator(robot, poses);
+  Eigen::MatrixXd result(poses.count(), poses.joints.cols());
+  for (Eigen::Index i = 0; i < poses.count(); ++i) result.row(i) = evaluator.gravity_loads(i).transpose();
+  return result;
+}
+
+Eigen::MatrixXd effect_signatures(const Robot& baseline, const std::vector<Effect>& candidates, const Poses& poses) {
+  RobotEvaluator evaluator(baseline, poses);
+  std::vector<PreparedEffect> prepared;
+  Eigen::Index columns = 0;
+  for (const Effect& candidate : candidates) {
+    prepared.push_back(prepare(baseline.chain, candidate, poses));
+    columns += std::ssize(candidate.values);
+  }
+  Eigen::MatrixXd result(3 * poses.count(), columns);
+  Eigen::Matrix3Xd one(3, columns);
+  for (Eigen::Index i = 0; i < poses.count(); ++i) {
+    evaluator.signatures(i, prepared, one);
+    result.middleRows(3 * i, 3) = one;
+  }
+  return result;
+}
+
+bool has_columns(const EffectType& type, const Chain& chain, std::size_t index, const Poses& poses,
+                 std::string* missing) {
+  const Effect effect = make_effect(type, chain, index);
+  for (const std::string& names : effect_columns(chain, effect)) {
+    if (find_column(poses, names) != nullptr) continue;
+    if (missing != nullptr) *missing = names;
+    return false;
+  }
+  return true;
+}
+
+}  // namespace llmt::robotics

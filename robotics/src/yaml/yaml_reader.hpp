@@ -1,0 +1,53 @@
+// A YAML map read key by key: every mistake names file, line and key, and keys that nobody asked for are mistakes.
+#pragma once
+
+#include <yaml-cpp/yaml.h>
+
+#include <Eigen/Core>
+#include <set>
+#include <string>
+#include <vector>
+
+namespace llmt::robotics {
+
+class YamlMap {
+ public:
+  /// `where` names the map in messages, e.g. "joints[2]".
+  YamlMap(const YAML::Node& node, std::string file, std::string where);
+
+  bool has(const std::string& key) const { return static_cast<bool>(node_[key]); }
+
+  std::string text(const std::string& key);
+  double number(const std::string& key);
+  Eigen::Vector3d vector(const std::string& key);
+  std::vector<double> numbers(const std::string& key, std::size_t count);
+  std::vector<double> all_numbers(const std::string& key);
+  YamlMap map(const std::string& key);
+  std::vector<YamlMap> maps(const std::string& key);
+
+  double number_or(const std::string& key, double otherwise) { return has(key) ? number(key) : otherwise; }
+  Eigen::Vector3d vector_or(const std::string& key, const Eigen::Vector3d& otherwise) {
+    return has(key) ? vector(key) : otherwise;
+  }
+  std::string text_or(const std::string& key, const std::string& otherwise) { return has(key) ? text(key) : otherwise; }
+
+  /// To be called last: throws if the map has a key that was not asked for. `known` keys are listed in the message.
+  void finish(const std::vector<std::string>& known) const;
+
+  [[noreturn]] void refuse(const std::string& message) const { refuse_at(node_, message); }
+
+ private:
+  YAML::Node node_;
+  std::string file_;
+  std::string where_;
+  std::set<std::string> asked_;
+
+  YAML::Node at(const std::string& key);
+  double to_number(const YAML::Node& node, const std::string& key) const;
+  [[noreturn]] void refuse_at(const YAML::Node& node, const std::string& message) const;
+};
+
+/// Parses a text. Throws std::runtime_error `file:line: ...` if it is no YAML.
+YAML::Node parse_yaml(const std::string& text, const std::string& file);
+
+}  // namespace llmt::robotics
