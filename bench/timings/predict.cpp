@@ -1,17 +1,16 @@
 // Prediction, error beside time. Rivals in the same run: the equations row by row (naive) and, as the least that any
 // linear model costs, the product of the inputs with one column of coefficients (product).
 //
-// Arguments: leaves / inputs / threads. Counters: items_per_second = rows per second of processor time, all threads
-// together, so that a busy machine shows less; rmse = of the noise-free truth (noise of the
-// data: 1); reach = leaves that reach a row in the mean.
+// Arguments: leaves / inputs / threads. Counters: items_per_second = rows per second of CPU time of all threads
+// together, which a busy machine disturbs less than wall time; rmse = of the noise-free truth (noise of the data: 1);
+// reach = mean number of leaves that reach a row.
 #include <benchmark/benchmark.h>
 
 #include <Eigen/Core>
-#include <cmath>
 #include <map>
 #include <tuple>
 
-#include "llmt/fit.hpp"
+#include "methods.hpp"
 #include "oracles/predict_oracle.hpp"
 #include "synthetic.hpp"
 
@@ -19,46 +18,35 @@ namespace {
 
 constexpr Eigen::Index query_rows = 100000;
 
-/// Grown once for all benchmarks that ask for it.
+// Each model is grown once, for all benchmarks that use it.
 const llmt::Model& model_of(llmt::ValidityChoice validity, std::int64_t leaves, std::int64_t inputs) {
   static std::map<std::tuple<llmt::ValidityChoice, std::int64_t, std::int64_t>, llmt::Model> models;
   const auto key = std::make_tuple(validity, leaves, inputs);
-  if (const auto found = models.find(key); found != models.end()) {
-    return found->second;
-  }
+  if (const auto found = models.find(key); found != models.end()) return found->second;
   const bench::Sample train = bench::sample(20000, inputs, 1);
-  llmt::FitOptions options;
-  options.growth = {.significance = 1.0,
-                    .min_variance_gain = -1.0,
-                    .min_leaf_samples = 20,
-                    .max_leaves = leaves,
-                    .split_inputs = {0, 1}};
-  for (int j = 2; j < std::min<std::int64_t>(inputs, 8); ++j) {
-    options.growth.split_inputs.push_back(j);
-  }
-  // What joint estimation of more coefficients costs prediction does not care for; but local estimation of wide blends
-  // is far from the truth.
-  const bool few = leaves * (inputs + 1) <= 1500;
-  options.blend = {.validity = validity,
-                   .estimation = few ? llmt::Estimation::joint : llmt::Estimation::local,
-                   .widths = {1.0},
-                   .ridges = {1e-4}};
-  options.selection.folds.count = 0;
+  llmt::FitOptions options = bench::with_leaves(leaves);
+  options.growth.min_leaf_samples = 20;
+  for (int j = 0; j < std::min<std::int64_t>(inputs, 8); ++j) options.growth.split_inputs.push_back(j);
+  // Prediction takes the same time whatever the estimation. Joint estimation of more coefficients than this takes too
+  // long; local estimation of wide blends is far from the truth.
+  const bool joint = leaves * (inputs + 1) <= 1500;
+  options.blend.validity = validity;
+  options.blend.estimation = joint ? llmt::Estimation::joint : llmt::Estimation::local;
+  options.blend.widths = {1.0};
+  options.blend.ridges = {1e-4};
   return models.emplace(key, llmt::fit(train.x, train.y, options).model).first->second;
 }
 
 const bench::Sample& queries(std::int64_t inputs) {
   static std::map<std::int64_t, bench::Sample> samples;
-  if (!samples.contains(inputs)) {
-    samples.emplace(inputs, bench::sample(query_rows, inputs, 2));
-  }
+  if (!samples.contains(inputs)) samples.emplace(inputs, bench::sample(query_rows, inputs, 2));
   return samples.at(inputs);
 }
 
 void report(benchmark::State& state, const llmt::Model& model, const Eigen::VectorXd& predicted,
             const bench::Sample& test) {
   const Eigen::Index rows = predicted.size();
-  state.counters["rmse"] = std::sqrt((predicted - test.truth.head(rows)).squaredNorm() / static_cast<double>(rows));
+  state.counters["rmse"] = llmt::rmse(predicted, test.truth.head(rows))(0);
   state.counters["reach"] = (model.validities(test.x.topRows(1000), 0).array() > 0.0).cast<double>().sum() / 1000.0;
   state.SetItemsProcessed(state.iterations() * rows);
 }
@@ -67,9 +55,7 @@ void predict(benchmark::State& state, llmt::ValidityChoice validity) {
   const llmt::Model& model = model_of(validity, state.range(0), state.range(1));
   const bench::Sample& test = queries(state.range(1));
   Eigen::VectorXd predicted;
-  for (auto _ : state) {
-    predicted = model.predict(test.x, static_cast<int>(state.range(2)));
-  }
+  for (auto _ : state) predicted = model.predict(test.x, static_cast<int>(state.range(2)));
   report(state, model, predicted, test);
 }
 
@@ -78,9 +64,7 @@ void naive(benchmark::State& state, llmt::ValidityChoice validity) {
   const bench::Sample& test = queries(state.range(1));
   const Eigen::MatrixXd x = test.x.topRows(1000);
   Eigen::VectorXd predicted;
-  for (auto _ : state) {
-    predicted = oracle::predict_rows(model, x);
-  }
+  for (auto _ : state) predicted = oracle::predict_rows(model, x);
   report(state, model, predicted, test);
   state.counters["difference"] = (predicted - model.predict(x)).cwiseAbs().maxCoeff();
 }
@@ -108,13 +92,11 @@ void jacobian_of_row(benchmark::State& state, llmt::ValidityChoice validity) {
 void leverages(benchmark::State& state, llmt::ValidityChoice validity) {
   const llmt::Model& model = model_of(validity, state.range(0), state.range(1));
   const bench::Sample& test = queries(state.range(1));
-  for (auto _ : state) {
-    benchmark::DoNotOptimize(model.extrapolation(test.x).data());
-  }
+  for (auto _ : state) benchmark::DoNotOptimize(model.extrapolation(test.x).data());
   state.SetItemsProcessed(state.iterations() * query_rows);
 }
 
-/// The least: one linear model.
+// The lower bound: one linear model.
 void product(benchmark::State& state) {
   const bench::Sample& test = queries(state.range(1));
   const Eigen::VectorXd slope = Eigen::VectorXd::LinSpaced(state.range(1), -1.0, 1.0);

@@ -1,9 +1,10 @@
 // The two kernels of growth: Gram matrices of rows of features, and eight factorisations at once.
 //
-// gram/INPUTS/ROWS/ORDER: ROWS at a time out of 100000, ORDER 0: one after the other, 1: scattered, as the rows of a
-// node sorted by an input are. flops: multiplications and additions of the lower triangle, what fills up vectors not
-// counted. of_peak: flops as a part of what the machine does in multiply-then-add; bytes: of the features read.
-// factor/INPUTS: residual sums of squares per second. Error beside time: of_sum, the largest difference from Eigen's.
+// gram/INPUTS/ROWS/ORDER: ROWS at a time out of 100000; ORDER 0: in the order of memory, 1: scattered, like the rows of
+// a node sorted by an input. flops: multiplications and additions of the lower triangle, without those that only fill
+// up vectors. of_peak: flops as a fraction of the machine's peak of multiply-then-add; bytes: of the features read.
+// of_sum: largest difference from Eigen's sums, relative to the largest sum.
+// factor/INPUTS: residual sums of squares per second.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -16,12 +17,12 @@
 
 namespace {
 
-constexpr std::ptrdiff_t all_rows = 100000;
+constexpr Eigen::Index all_rows = 100000;
 
-llmt::Features features(std::ptrdiff_t inputs) {
+llmt::Features features(Eigen::Index inputs) {
   llmt::Random random(1);
   llmt::Features result(all_rows, inputs + 1, 1);
-  for (std::ptrdiff_t i = 0; i < all_rows; ++i) {
+  for (Eigen::Index i = 0; i < all_rows; ++i) {
     double* row = result.row(i);
     row[0] = 1.0;
     std::generate(row + 1, row + inputs + 2, [&] { return random.normal(); });
@@ -35,10 +36,8 @@ double difference_from_eigen(const llmt::Features& rows, const llmt::GramShape& 
   const Eigen::Map<const RowMajor> all(rows.row(0), rows.rows(), rows.columns());
   const Eigen::MatrixXd expected = all.transpose() * all;
   double largest = 0.0;
-  for (std::ptrdiff_t i = 0; i < rows.columns(); ++i) {
-    for (std::ptrdiff_t j = 0; j <= i; ++j) {
-      largest = std::max(largest, std::abs(expected(i, j) - gram[static_cast<std::size_t>(shape.at(i, j))]));
-    }
+  for (Eigen::Index i = 0; i < rows.columns(); ++i) {
+    for (Eigen::Index j = 0; j <= i; ++j) largest = std::max(largest, std::abs(expected(i, j) - gram[shape.at(i, j)]));
   }
   return largest / expected.cwiseAbs().maxCoeff();
 }
@@ -57,14 +56,13 @@ void gram(benchmark::State& state) {
   }
   std::vector<double> sums;
   for (auto _ : state) {
-    sums.assign(static_cast<std::size_t>(shape.size()), 0.0);
-    for (std::ptrdiff_t begin = 0; begin < all_rows; begin += state.range(1)) {
-      llmt::add_rows(rows, order.data() + begin, std::min<std::ptrdiff_t>(state.range(1), all_rows - begin),
-                     sums.data());
+    sums.assign(shape.size(), 0.0);
+    for (Eigen::Index begin = 0; begin < all_rows; begin += state.range(1)) {
+      llmt::add_rows(rows, order.data() + begin, std::min<Eigen::Index>(state.range(1), all_rows - begin), sums.data());
     }
     benchmark::DoNotOptimize(sums.data());
   }
-  const double work = static_cast<double>(state.iterations()) * static_cast<double>(all_rows);
+  const double work = static_cast<double>(state.iterations() * all_rows);
   const double columns = static_cast<double>(rows.columns());
   state.SetBytesProcessed(static_cast<std::int64_t>(work * columns * 8.0));
   state.counters["flops"] = benchmark::Counter(work * columns * (columns + 1.0), benchmark::Counter::kIsRate);
@@ -75,12 +73,12 @@ void gram(benchmark::State& state) {
 void factor(benchmark::State& state) {
   const llmt::Features rows = features(state.range(0));
   const llmt::GramShape shape(rows);
-  constexpr std::size_t count = 256;
-  std::vector<std::vector<double>> grams(count, std::vector<double>(static_cast<std::size_t>(shape.size()), 0.0));
+  constexpr int count = 256;
+  std::vector<std::vector<double>> grams(count, std::vector<double>(shape.size(), 0.0));
   std::vector<const double*> at;
-  for (std::size_t k = 0; k < count; ++k) {
+  for (int k = 0; k < count; ++k) {
     std::vector<int> some(200);
-    std::iota(some.begin(), some.end(), static_cast<int>(200 * k));
+    std::iota(some.begin(), some.end(), 200 * k);
     llmt::add_rows(rows, some.data(), std::ssize(some), grams[k].data());
     at.push_back(grams[k].data());
   }
@@ -91,7 +89,7 @@ void factor(benchmark::State& state) {
     sums.evaluate(at.data(), count, rss.data(), rank.data());
     benchmark::DoNotOptimize(rss.data());
   }
-  state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(count));
+  state.SetItemsProcessed(state.iterations() * count);
 }
 
 BENCHMARK(gram)->ArgsProduct({{2, 5, 10, 20, 32}, {16, 256}, {0, 1}})->Unit(benchmark::kMillisecond);

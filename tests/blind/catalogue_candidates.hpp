@@ -1,5 +1,6 @@
-// The catalogue of robot effects as candidates of llmt::discovery::search, as discover() makes them but without scans
-// and shapes.
+/// \file
+/// The catalogue of robot effects as candidates of llmt::discovery::search, as discover() makes them but without scans
+/// and shapes. The generator of the blind test must not include it.
 #pragma once
 
 #include <fmt/format.h>
@@ -12,13 +13,13 @@
 #include "llmt/robotics/effects.hpp"
 #include "llmt/robotics/measurements.hpp"
 
-namespace bench {
+namespace blind {
 
 using namespace llmt::robotics;
 using Candidate = llmt::discovery::EffectCandidate;
 using llmt::discovery::Evidence;
 
-/// What distinguishes the variants of a type at a place; nothing if it cannot be there.
+/// The constants of each variant of a type at a place; none if the type cannot be there.
 inline std::vector<std::vector<double>> variants(const EffectType& type, const Chain& chain, std::size_t index,
                                                  const Poses& poses) {
   if (type.constants.empty()) return {{}};
@@ -40,7 +41,7 @@ inline std::vector<std::vector<double>> variants(const EffectType& type, const C
   return {usual};
 }
 
-/// Effects of the catalogue where they can be, all values 0.
+/// Effects of the catalogue at every place where they can be, all values 0.
 inline std::vector<Effect> catalogue(const Robot& robot, const Poses& poses) {
   std::vector<Effect> effects;
   const Chain& chain = robot.chain;
@@ -68,8 +69,8 @@ inline Candidate candidate(const Chain& chain, const Effect& effect, Eigen::Matr
   result.lower.resize(signature.cols());
   result.upper.resize(signature.cols());
   for (Eigen::Index k = 0; k < signature.cols(); ++k) {
-    result.lower(k) = parameters[static_cast<std::size_t>(k)].lower;
-    result.upper(k) = parameters[static_cast<std::size_t>(k)].upper;
+    result.lower(k) = parameters[k].lower;
+    result.upper(k) = parameters[k].upper;
   }
   result.signature = std::move(signature);
   return result;
@@ -97,11 +98,11 @@ inline Evidence evidence_of(const Robot& robot, const Measurements& measurements
   evidence.components = std::ssize(rows) / measurements.count();
   evidence.residuals.resize(std::ssize(rows));
   for (Eigen::Index k = 0; k < std::ssize(rows); ++k) {
-    const Eigen::Index row = rows[static_cast<std::size_t>(k)];
+    const Eigen::Index row = rows[k];
     evidence.residuals(k) = measurements.positions_mm(row / 3, row % 3) - model(row / 3, row % 3);
   }
   evidence.jacobian = position_jacobian(robot, measurements.poses)(rows, Eigen::all);
   return evidence;
 }
 
-}  // namespace bench
+}  // namespace blind

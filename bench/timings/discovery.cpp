@@ -1,14 +1,13 @@
-// Finding a missing effect of a six-axis arm, one thread. Counters: hypotheses = candidates; right = 1 if the verdict
-// names joint compliance at joint 2, which is what is hidden, and nothing else.
+// Finding a missing effect of a six-axis arm, one thread. Joint compliance at joint 2 is hidden. Counters: hypotheses =
+// number of candidates; right = 1 if the verdict names that effect and nothing else.
 //
-// search: arguments poses / candidates; signatures and search with all null draws. discover: argument poses;
-// calibrations, scans, shapes and all rounds too.
+// search: arguments poses / candidates; signatures and search with all null draws. discover_all: argument poses; with
+// calibrations, scans, shapes and all rounds.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
-#include <map>
 
-#include "catalogue_candidates.hpp"
+#include "blind/catalogue_candidates.hpp"
 #include "llmt/random.hpp"
 #include "llmt/robotics/discovery.hpp"
 #include "llmt/robotics/robot_file.hpp"
@@ -27,7 +26,7 @@ Robot nominal() {
   return robot;
 }
 
-// Every column that an effect may need, and 20 um of noise.
+// Measurements with every column that an effect may need, and 20 um of noise.
 Measurements session(const Robot& robot, Eigen::Index count) {
   Robot truth = robot;
   truth.effects.push_back({.type = "joint_compliance", .at = hidden_place, .values = {2e-7}});
@@ -43,21 +42,22 @@ Measurements session(const Robot& robot, Eigen::Index count) {
   poses.covariates["time_s"] = 20.0 * rows;
   column("temp_C", [&] { return random.uniform(18.0, 26.0); });
   column("payload_kg", [&] { return random.uniform() < 0.5 ? 0.0 : 60.0; });
-  for (std::size_t j = 1; j <= robot.chain.joints.size(); ++j) {
-    column("dir" + std::to_string(j), [&] { return random.uniform() < 0.5 ? -1.0 : 1.0; });
-    column("qmeas" + std::to_string(j) + "_rad", [&] { return 1e-4 * random.normal(); });
-    poses.covariates["qmeas" + std::to_string(j) + "_rad"] += poses.joints.col(static_cast<Eigen::Index>(j) - 1);
+  for (Eigen::Index j = 0; j < std::ssize(robot.chain.joints); ++j) {
+    const std::string read_back = fmt::format("qmeas{}_rad", j + 1);
+    column(fmt::format("dir{}", j + 1), [&] { return random.uniform() < 0.5 ? -1.0 : 1.0; });
+    column(read_back, [&] { return 1e-4 * random.normal(); });
+    poses.covariates[read_back] += poses.joints.col(j);
   }
   add_moves(poses, robot.chain);
   return simulate(truth, poses, {.noise_um = 20.0, .seed = 3});
 }
 
-// The catalogue, cut or filled up with transmission errors of further orders.
-std::vector<Effect> hypotheses(const Robot& robot, const Poses& poses, std::size_t count) {
-  std::vector<Effect> effects = bench::catalogue(robot, poses);
+// The first `count` effects of the catalogue, filled up with transmission errors of further orders.
+std::vector<Effect> hypotheses(const Robot& robot, const Poses& poses, Eigen::Index count) {
+  std::vector<Effect> effects = blind::catalogue(robot, poses);
   const EffectType& type = effect_type("transmission_error");
-  for (std::size_t k = 0; effects.size() < count; ++k) {
-    effects.push_back(make_effect(type, robot.chain, k % 6, {3.3 + 0.7 * static_cast<double>(k / 6)}));
+  for (int k = 0; std::ssize(effects) < count; ++k) {
+    effects.push_back(make_effect(type, robot.chain, k % 6, {3.3 + 0.7 * (k / 6)}));
   }
   effects.resize(count);
   return effects;
@@ -67,12 +67,12 @@ void search(benchmark::State& state) {
   const Robot robot = nominal();
   const Measurements measured = session(robot, state.range(0));
   const Robot calibrated = calibrate(robot, measured).robot;
-  const std::vector<Effect> effects = hypotheses(calibrated, measured.poses, static_cast<std::size_t>(state.range(1)));
-  const discovery::Evidence evidence = bench::evidence_of(calibrated, measured);
+  const std::vector<Effect> effects = hypotheses(calibrated, measured.poses, state.range(1));
+  const discovery::Evidence evidence = blind::evidence_of(calibrated, measured);
   discovery::Verdict verdict;
   std::vector<discovery::EffectCandidate> candidates;
   for (auto _ : state) {
-    candidates = bench::candidates_of(calibrated, effects, measured);
+    candidates = blind::candidates_of(calibrated, effects, measured);
     verdict = discovery::search(evidence, candidates);
   }
   bool right = verdict.findings.size() == 1 && verdict.findings[0].family == "joint_compliance";
@@ -88,8 +88,8 @@ void search(benchmark::State& state) {
 void signatures(benchmark::State& state) {
   const Robot robot = nominal();
   const Measurements measured = session(robot, state.range(0));
-  const std::vector<Effect> effects = hypotheses(robot, measured.poses, static_cast<std::size_t>(state.range(1)));
-  for (auto _ : state) benchmark::DoNotOptimize(bench::candidates_of(robot, effects, measured));
+  const std::vector<Effect> effects = hypotheses(robot, measured.poses, state.range(1));
+  for (auto _ : state) benchmark::DoNotOptimize(blind::candidates_of(robot, effects, measured));
 }
 
 void discover_all(benchmark::State& state) {

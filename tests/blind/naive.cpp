@@ -1,15 +1,15 @@
-// naive_discovery CASES_DIR: two simple ways to name a missing effect, on the cases of the blind test (folders with
-// robot.yaml and measured.csv; CASES_DIR/truth/<case>.json is read to score the answers, after they are given).
+// blind_naive: two simple ways to name a missing effect, on the cases of the blind test (folders with robot.yaml and
+// measured.csv; truth/<case>.json is read to score the answers, after they are given).
 //
-//   best   the one family, all its places at once, with the largest in-sample R^2 beside a refitted geometry, accepted
-//   at
-//          p < 0.05 of its F test
+//   best   the family, with all its places at once, of the largest in-sample R^2 beside a refitted geometry, accepted
+//          at p < 0.05 of its F test
 //   every  all families with p < 0.05, uncorrected
 //
-// Outliers are left in, and there are no shapes: neither design knows of them. Families of exact aliases count as
-// right.
+// Outliers are left in and shapes are not searched, because neither design knows of them. A family that is an exact
+// alias of the hidden one counts as right.
 #include <fmt/format.h>
 
+#include <CLI/CLI.hpp>
 #include <Eigen/QR>
 #include <boost/math/distributions/fisher_f.hpp>
 #include <cstdio>
@@ -20,7 +20,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "catalogue_candidates.hpp"
+#include "blind/catalogue_candidates.hpp"
 #include "llmt/robotics/robot_file.hpp"
 
 namespace {
@@ -48,16 +48,16 @@ Eigen::MatrixXd basis_of(Eigen::MatrixXd columns, double tolerance) {
 // The F test of every family beside the baseline.
 std::vector<Tested> tests(const Robot& nominal, const Measurements& measured) {
   const Robot robot = calibrate(nominal, measured).robot;
-  const bench::Evidence evidence = bench::evidence_of(robot, measured);
-  const std::vector<bench::Candidate> candidates =
-      bench::candidates_of(robot, bench::catalogue(robot, measured.poses), measured);
+  const blind::Evidence evidence = blind::evidence_of(robot, measured);
+  const std::vector<blind::Candidate> candidates =
+      blind::candidates_of(robot, blind::catalogue(robot, measured.poses), measured);
   const Eigen::MatrixXd baseline = basis_of(evidence.jacobian, 1e-9);
   const auto project = [&](const Eigen::MatrixXd& m) -> Eigen::MatrixXd {
     return m - baseline * (baseline.transpose() * m);
   };
   const Eigen::VectorXd residuals = project(evidence.residuals);
   std::map<std::string, Eigen::MatrixXd> families;
-  for (const bench::Candidate& one : candidates) {
+  for (const blind::Candidate& one : candidates) {
     const Eigen::MatrixXd outside = project(one.signature);
     Eigen::MatrixXd& all = families.try_emplace(one.family, residuals.size(), 0).first->second;
     for (Eigen::Index k = 0; k < outside.cols(); ++k) {
@@ -121,54 +121,65 @@ void print(const std::string& arm, const char* design, const Tally& t) {
              share(t.wrongly_named, t.unknown));
 }
 
+struct Said {
+  std::set<std::string> best, every;
+};
+
+Said families(const std::vector<Tested>& all) {
+  constexpr double level = 0.05;
+  Said said;
+  const auto first = std::ranges::min_element(all, {}, &Tested::left);
+  if (first != all.end() && first->p_value < level) said.best.insert(first->family);
+  for (const Tested& one : all) {
+    if (one.p_value < level) said.every.insert(one.family);
+  }
+  return said;
+}
+
+void run(const fs::path& folder) {
+  std::map<std::string, std::array<Tally, 2>> arms;
+  int refused = 0;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder / "truth")) {
+    if (entry.path().extension() != ".json") continue;
+    const fs::path data = folder / entry.path().stem();
+    Said said;
+    try {
+      const Robot robot = read_robot((data / "robot.yaml").string());
+      said = families(tests(robot, read_measurements((data / "measured.csv").string(), robot)));
+    } catch (const std::exception& error) {
+      fmt::print(stderr, "{}: {}\n", data.filename().string(), error.what());
+      ++refused;
+      continue;
+    }
+    std::ifstream file(entry.path());
+    const nlohmann::json truth = nlohmann::json::parse(file);
+    // Dirty data, as in the blind test's tables, are another question.
+    if (truth["dirty"] != "") continue;
+    auto& [best, every] = arms[truth["arm"]];
+    best.add(truth, said.best);
+    every.add(truth, said.every);
+  }
+  fmt::print("{:<8} {:<6} {:<16} {:<16} {:<13} {}\n", "arm", "design", "false alarm", "exact name", "mean # names",
+             "unknown effect named");
+  for (const auto& [arm, tallies] : arms) {
+    print(arm, "best", tallies[0]);
+    print(arm, "every", tallies[1]);
+  }
+  fmt::print("single and unknown effects with lambda >= 40, clean data, {} cases refused\n", refused);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc != 2) {
-    fmt::print(stderr, "naive_discovery CASES_DIR\n");
-    return 2;
-  }
+  CLI::App app("Scores two simple ways to name a missing effect");
+  std::string folder;
+  app.add_option("cases", folder, "folder that blind_generate wrote")->required()->check(CLI::ExistingDirectory);
+  CLI11_PARSE(app, argc, argv);
   try {
-    constexpr double level = 0.05;
-    std::map<std::string, std::array<Tally, 2>> arms;
-    int refused = 0;
-    const fs::path folder(argv[1]);
-    for (const fs::directory_entry& entry : fs::directory_iterator(folder / "truth")) {
-      if (entry.path().extension() != ".json") continue;
-      const fs::path data = folder / entry.path().stem();
-      std::vector<Tested> all;
-      try {
-        const Robot robot = read_robot((data / "robot.yaml").string());
-        all = tests(robot, read_measurements((data / "measured.csv").string(), robot));
-      } catch (const std::exception& error) {
-        fmt::print(stderr, "{}: {}\n", data.filename().string(), error.what());
-        ++refused;
-        continue;
-      }
-      std::set<std::string> best, every;
-      const auto first = std::ranges::min_element(all, {}, &Tested::left);
-      if (first != all.end() && first->p_value < level) best.insert(first->family);
-      for (const Tested& one : all) {
-        if (one.p_value < level) every.insert(one.family);
-      }
-      std::ifstream file(entry.path());
-      const nlohmann::json truth = nlohmann::json::parse(file);
-      // Dirty data, as in the blind test's tables, are another question.
-      if (truth["dirty"] != "") continue;
-      auto& [one, many] = arms[truth["arm"]];
-      one.add(truth, best);
-      many.add(truth, every);
-    }
-    fmt::print("{:<8} {:<6} {:<16} {:<16} {:<13} {}\n", "arm", "design", "false alarm", "exact name", "mean # names",
-               "unknown effect named");
-    for (const auto& [arm, tallies] : arms) {
-      print(arm, "best", tallies[0]);
-      print(arm, "every", tallies[1]);
-    }
-    fmt::print("single and unknown effects with lambda >= 40, clean data, {} cases refused\n", refused);
-    return 0;
+    run(folder);
   } catch (const std::exception& error) {
-    fmt::print(stderr, "naive_discovery: {}\n", error.what());
+    fmt::print(stderr, "blind_naive: {}\n", error.what());
     return 1;
   }
+  return 0;
 }

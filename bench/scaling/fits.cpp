@@ -1,58 +1,57 @@
-// How time and memory of a whole fit with default options grow with rows, inputs and threads.
-//
-// scaling [MAX_ROWS = 1e6] [SECONDS_PER_FIT = 600]: the function of synthetic.hpp, training rows 1e3, 1e4, ...
-// MAX_ROWS, inputs 2, 5, 10, 20, 32, threads 1 and 2. Every fit is a process of its own, so that its peak memory is its
-// own; one that needs more CPU time than allowed is stopped, and larger ones of its kind are left out. Error: RMSE of
-// the noise-free truth on 100000 fresh rows (noise of the data: 1). Memory: what the fit holds beyond the data at its
-// peak, in MiB and as a multiple of the data (rows x (inputs + 1) doubles).
+// How time and memory of a whole fit with default options grow with rows, inputs and threads: the function of
+// synthetic.hpp, training rows 1e3, 1e4, ..., inputs 2, 5, 10, 20, 32, threads 1 and 2. Every fit is a process of its
+// own, so that its peak memory is its own; a fit that needs more CPU time than allowed is stopped, and larger ones of
+// its kind are left out. Error: RMSE of the noise-free truth on 100000 fresh rows (noise of the data: 1). Memory: what
+// the fit holds beyond the data at its peak, in MiB and as a multiple of the data (rows x (inputs + 1) doubles).
 #include <fmt/format.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
-#include <cstdio>
+#include <memory>
 #include <optional>
 #include <vector>
 
 #include "llmt/fit.hpp"
 #include "resources.hpp"
+#include "scaling/scaling.hpp"
 #include "synthetic.hpp"
 
+namespace bench {
 namespace {
 
 struct Run {
   Eigen::Index rows = 0;
   Eigen::Index inputs = 0;
   int threads = 0;
-  bench::Cost fit;
+  Cost fit = {};
   double predict = 0.0;  // CPU seconds per million rows
   double rmse = 0.0;
   double leaves = 0.0;
 };
 
-void measure(Run& run) {
-  const bench::Sample train = bench::sample(run.rows, run.inputs, 1);
+void fill(Run& run) {
+  const Sample train = sample(run.rows, run.inputs, 1);
   std::optional<llmt::FitResult> result;
-  run.fit = bench::measure([&] { result.emplace(llmt::fit(train.x, train.y, {.max_threads = run.threads})); });
+  run.fit = measure([&] { result.emplace(llmt::fit(train.x, train.y, {.max_threads = run.threads})); });
   run.leaves = static_cast<double>(result->summary.partitions[0].leaves);
-  const bench::Sample test = bench::sample(100000, run.inputs, 2);
+  const Sample test = sample(100000, run.inputs, 2);
   Eigen::MatrixXd predicted;
-  run.predict = 10.0 * bench::measure([&] { predicted = result->model.predict(test.x, run.threads); }).cpu;
+  run.predict = 10.0 * measure([&] { predicted = result->model.predict(test.x, run.threads); }).cpu;
   run.rmse = llmt::rmse(predicted, test.truth)(0);
 }
 
-/// In a process of its own. Nothing if that did not end well.
+// The run in a process of its own; nothing if that did not end well.
 std::optional<Run> measure_apart(Run run, rlim_t seconds) {
   int pipe_ends[2];
-  if (pipe(pipe_ends) != 0) {
-    return {};
-  }
+  if (pipe(pipe_ends) != 0) return {};
   const pid_t child = fork();
   if (child == 0) {
     const rlimit limit{seconds, seconds};
     setrlimit(RLIMIT_CPU, &limit);
     try {
-      measure(run);
+      fill(run);
     } catch (const std::exception& error) {
       fmt::print(stderr, "scaling: {}\n", error.what());
       _exit(1);
@@ -62,9 +61,7 @@ std::optional<Run> measure_apart(Run run, rlim_t seconds) {
   close(pipe_ends[1]);
   const bool complete = child > 0 && read(pipe_ends[0], &run, sizeof run) == sizeof run;
   close(pipe_ends[0]);
-  if (child > 0) {
-    waitpid(child, nullptr, 0);
-  }
+  if (child > 0) waitpid(child, nullptr, 0);
   return complete ? std::optional(run) : std::nullopt;
 }
 
@@ -76,20 +73,16 @@ void print(const Run& run) {
   std::fflush(stdout);
 }
 
-/// Least-squares slope of log(time) against log(size), with the slopes from each size to the next.
+// Least-squares slope of log(time) against log(size), with the slopes from each size to the next.
 template <class Size>
 void print_exponent(const char* name, const std::vector<Run>& runs, const Size& size) {
-  if (runs.size() < 2) {
-    return;
-  }
-  double mean_x = 0.0;
-  double mean_y = 0.0;
+  if (runs.size() < 2) return;
+  double mean_x = 0.0, mean_y = 0.0;
   for (const Run& run : runs) {
     mean_x += std::log(size(run)) / static_cast<double>(runs.size());
     mean_y += std::log(run.fit.cpu) / static_cast<double>(runs.size());
   }
-  double xx = 0.0;
-  double xy = 0.0;
+  double xx = 0.0, xy = 0.0;
   std::string steps;
   for (std::size_t i = 0; i < runs.size(); ++i) {
     const double x = std::log(size(runs[i])) - mean_x;
@@ -106,7 +99,7 @@ void print_exponent(const char* name, const std::vector<Run>& runs, const Size& 
 template <class Chosen>
 std::vector<Run> only(const std::vector<Run>& runs, const Chosen& chosen) {
   std::vector<Run> result;
-  std::copy_if(runs.begin(), runs.end(), std::back_inserter(result), chosen);
+  std::ranges::copy_if(runs, std::back_inserter(result), chosen);
   return result;
 }
 
@@ -131,15 +124,7 @@ void summarise(const std::vector<Run>& runs) {
   }
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
-  const double max_rows = argc > 1 ? std::strtod(argv[1], nullptr) : 1e6;
-  const double seconds = argc > 2 ? std::strtod(argv[2], nullptr) : 600.0;
-  if (argc > 3 || !(max_rows >= 1e3) || !(seconds >= 1.0)) {
-    fmt::print(stderr, "usage: scaling [MAX_ROWS = 1e6] [SECONDS_PER_FIT = 600]\n");
-    return 2;
-  }
+void study(double max_rows, double seconds) {
   fmt::print("{:>9} {:>7} {:>8} {:>10} {:>10} {:>10} {:>8} {:>7} {:>10} {:>8}\n", "rows", "inputs", "threads",
              "fit wall s", "fit CPU s", "CPU s/1e6", "rmse", "leaves", "extra MiB", "x data");
   std::vector<Run> runs;
@@ -147,7 +132,7 @@ int main(int argc, char** argv) {
     double feasible = max_rows;
     for (const int threads : {1, 2}) {
       for (Eigen::Index rows = 1000; static_cast<double>(rows) <= feasible; rows *= 10) {
-        const auto run = measure_apart({rows, inputs, threads, {}, 0.0, 0.0, 0.0}, static_cast<rlim_t>(seconds));
+        const auto run = measure_apart({rows, inputs, threads}, static_cast<rlim_t>(seconds));
         if (run) {
           print(*run);
           runs.push_back(*run);
@@ -159,5 +144,23 @@ int main(int argc, char** argv) {
     }
   }
   summarise(runs);
-  return 0;
 }
+
+}  // namespace
+
+void add_fits(CLI::App& program) {
+  struct Arguments {
+    double max_rows = 1e6, seconds = 600.0;
+  };
+  const auto arguments = std::make_shared<Arguments>();
+  CLI::App* command = program.add_subcommand("fits", "Time, memory and error of whole fits");
+  command->add_option("--max-rows", arguments->max_rows, "largest number of training rows")
+      ->check(CLI::Range(1e3, 1e9))
+      ->capture_default_str();
+  command->add_option("--seconds", arguments->seconds, "CPU seconds that a fit may take")
+      ->check(CLI::Range(1.0, 1e9))
+      ->capture_default_str();
+  command->callback([arguments] { study(arguments->max_rows, arguments->seconds); });
+}
+
+}  // namespace bench

@@ -5,7 +5,6 @@
 #include <benchmark/benchmark.h>
 
 #include <Eigen/QR>
-#include <cmath>
 #include <optional>
 
 #include "llmt/fit.hpp"
@@ -14,7 +13,7 @@
 namespace {
 
 void report(benchmark::State& state, const Eigen::VectorXd& predicted, const bench::Sample& test, double leaves) {
-  state.counters["rmse"] = std::sqrt((predicted - test.truth).squaredNorm() / static_cast<double>(test.truth.size()));
+  state.counters["rmse"] = bench::error(predicted, test);
   state.counters["leaves"] = leaves;
 }
 
@@ -24,9 +23,7 @@ void fit_tree(benchmark::State& state, int folds) {
   const llmt::FitOptions options{.selection = {.folds = {.count = folds}},
                                  .max_threads = static_cast<int>(state.range(2))};
   std::optional<llmt::FitResult> result;
-  for (auto _ : state) {
-    result.emplace(llmt::fit(train.x, train.y, options));
-  }
+  for (auto _ : state) result.emplace(llmt::fit(train.x, train.y, options));
   report(state, result->model.predict(test.x), test, static_cast<double>(result->summary.partitions[0].leaves));
 }
 
@@ -42,9 +39,7 @@ void least_squares(benchmark::State& state) {
     return regressors;
   };
   Eigen::VectorXd coefficients;
-  for (auto _ : state) {
-    coefficients = with_constant(train.x).colPivHouseholderQr().solve(train.y);
-  }
+  for (auto _ : state) coefficients = with_constant(train.x).colPivHouseholderQr().solve(train.y);
   report(state, with_constant(test.x) * coefficients, test, 1.0);
 }
 

@@ -1,5 +1,5 @@
-// Reading tables: bytes of text per second of processor time, summed over the threads (so: per core), and of real time
-// beside it. Rivals in the same run: a bare loop of fast_float::from_chars over the same text, which knows where every
+// Reading tables: bytes of text per second of CPU time summed over the threads (that is, per core), and per second of
+// wall time. Rivals in the same run: a bare loop of fast_float::from_chars over the same text, which knows where every
 // number begins and checks nothing (upper bound); strtod; std::istream.
 //
 // Arguments: 0 = 17 significant digits, 1 = 5 significant digits, 2 = 17 digits in quotes / threads.
@@ -20,20 +20,20 @@
 
 namespace {
 
-constexpr std::ptrdiff_t rows = 1'000'000;
-constexpr std::ptrdiff_t columns = 11;
+constexpr Eigen::Index rows = 1'000'000;
+constexpr Eigen::Index columns = 11;
 
 enum Style : std::int64_t { long_numbers, short_numbers, quoted_numbers };
 
 std::string make_table(std::int64_t style) {
   std::string text;
-  for (std::ptrdiff_t column = 0; column < columns; ++column) {
+  for (Eigen::Index column = 0; column < columns; ++column) {
     text += fmt::format("{}c{}", column == 0 ? "" : ",", column);
   }
   text += '\n';
   llmt::Random random(1);
-  for (std::ptrdiff_t row = 0; row < rows; ++row) {
-    for (std::ptrdiff_t column = 0; column < columns; ++column) {
+  for (Eigen::Index row = 0; row < rows; ++row) {
+    for (Eigen::Index column = 0; column < columns; ++column) {
       text += column == 0 ? "" : ",";
       const double value = 10.0 * random.normal();
       const auto out = std::back_inserter(text);
@@ -53,19 +53,17 @@ std::string make_table(std::int64_t style) {
 const std::string& table(std::int64_t style) {
   static std::map<std::int64_t, std::string> tables;
   std::string& text = tables[style];
-  if (text.empty()) {
-    text = make_table(style);
-  }
+  if (text.empty()) text = make_table(style);
   return text;
 }
 
 void report(benchmark::State& state) {
-  const double bytes = static_cast<double>(table(state.range(0)).size());
-  state.SetBytesProcessed(state.iterations() * static_cast<std::int64_t>(bytes));
-  state.counters["MB"] = bytes / 1e6;
+  const std::int64_t bytes = std::ssize(table(state.range(0)));
+  state.SetBytesProcessed(state.iterations() * bytes);
+  state.counters["MB"] = 1e-6 * static_cast<double>(bytes);
 }
 
-/// Where rows begin, and that each has as many fields as the header.
+// Finds where rows begin and checks that each has the number of fields of the header.
 void find_rows(benchmark::State& state) {
   for (auto _ : state) {
     state.PauseTiming();
@@ -77,16 +75,14 @@ void find_rows(benchmark::State& state) {
   report(state);
 }
 
-/// All columns as numbers, from rows that are known.
+// All columns as numbers, from rows that are known.
 void numbers(benchmark::State& state) {
   const llmt::Csv csv = llmt::Csv::parse(table(state.range(0)), "table");
-  for (auto _ : state) {
-    benchmark::DoNotOptimize(csv.numbers(csv.columns(), static_cast<int>(state.range(1))));
-  }
+  for (auto _ : state) benchmark::DoNotOptimize(csv.numbers(csv.columns(), static_cast<int>(state.range(1))));
   report(state);
 }
 
-/// Both of them, from text in memory.
+// Both of the above, from text in memory.
 void rows_and_numbers(benchmark::State& state) {
   for (auto _ : state) {
     state.PauseTiming();
@@ -98,7 +94,7 @@ void rows_and_numbers(benchmark::State& state) {
   report(state);
 }
 
-/// All of it, from a file that the system has in memory.
+// The same from a file that is in the page cache.
 void file_to_numbers(benchmark::State& state) {
   const std::string path = (std::filesystem::temp_directory_path() / "llmt_csv_bench.csv").string();
   llmt::write_file(path, table(state.range(0)));
@@ -110,7 +106,7 @@ void file_to_numbers(benchmark::State& state) {
   report(state);
 }
 
-/// One of eleven columns: the others are only walked over.
+// One of eleven columns: the others are only skipped.
 void last_column(benchmark::State& state) {
   const llmt::Csv csv = llmt::Csv::parse(table(state.range(0)), "table");
   for (auto _ : state) {
@@ -120,19 +116,17 @@ void last_column(benchmark::State& state) {
   report(state);
 }
 
-/// Begin of the first row, on the first character of a number.
+// The first character of the first row, which begins a number.
 const char* first_number(const std::string& text) { return text.data() + text.find('\n') + 1; }
 
 void bare_from_chars(benchmark::State& state) {
   const std::string& text = table(state.range(0));
   const char* const end = text.data() + text.size();
-  const std::ptrdiff_t around = state.range(0) == quoted_numbers ? 1 : 0;
+  const Eigen::Index around = state.range(0) == quoted_numbers ? 1 : 0;
   Eigen::VectorXd values(rows * columns);
   for (auto _ : state) {
     const char* cursor = first_number(text);
-    for (double& value : values) {
-      cursor = fast_float::from_chars(cursor + around, end, value).ptr + around + 1;
-    }
+    for (double& value : values) cursor = fast_float::from_chars(cursor + around, end, value).ptr + around + 1;
     benchmark::DoNotOptimize(values.data());
   }
   report(state);
@@ -142,10 +136,11 @@ void bare_strtod(benchmark::State& state) {
   const std::string& text = table(state.range(0));
   Eigen::VectorXd values(rows * columns);
   for (auto _ : state) {
-    char* cursor = const_cast<char*>(first_number(text));
+    const char* cursor = first_number(text);
     for (double& value : values) {
-      value = std::strtod(cursor, &cursor);
-      ++cursor;
+      char* behind = nullptr;
+      value = std::strtod(cursor, &behind);
+      cursor = behind + 1;
     }
     benchmark::DoNotOptimize(values.data());
   }

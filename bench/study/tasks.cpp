@@ -1,12 +1,13 @@
-#include "family_tasks.hpp"
+#include "study/tasks.hpp"
+
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <memory>
 #include <numbers>
+#include <stdexcept>
 
-#include "llmt/csv.hpp"
 #include "llmt/random.hpp"
 #include "llmt/robotics/calibration.hpp"
 #include "llmt/robotics/robot_file.hpp"
@@ -38,48 +39,48 @@ double ridge(const Eigen::VectorXd& x) {
 Eigen::MatrixXd uniform(Eigen::Index rows, Eigen::Index inputs, double low, double high, llmt::Random& random) {
   Eigen::MatrixXd x(rows, inputs);
   for (Eigen::Index i = 0; i < rows; ++i) {
-    for (Eigen::Index j = 0; j < inputs; ++j) {
-      x(i, j) = low + (high - low) * random.uniform();
-    }
+    for (Eigen::Index j = 0; j < inputs; ++j) x(i, j) = low + (high - low) * random.uniform();
   }
+  return x;
+}
+
+// A grid over [low, 1]^2 with `side` rows along each input.
+Eigen::MatrixXd square_grid(int side, double low) {
+  Eigen::MatrixXd x(side * side, 2);
+  const auto at = [&](int k) { return low + (1.0 - low) * k / (side - 1.0); };
+  for (int i = 0; i < x.rows(); ++i) x.row(i) << at(i / side), at(i % side);
   return x;
 }
 
 Eigen::VectorXd values(const Function& truth, const Eigen::MatrixXd& x) {
   Eigen::VectorXd y(x.rows());
-  for (Eigen::Index i = 0; i < x.rows(); ++i) {
-    y(i) = truth(x.row(i).transpose());
-  }
+  for (Eigen::Index i = 0; i < x.rows(); ++i) y(i) = truth(x.row(i).transpose());
   return y;
 }
 
-/// Rows uniform on [low, high]^inputs; the test rows a grid where there are two inputs.
-Task task(const std::string& name, Function truth, Eigen::Index rows, Eigen::Index inputs, double low, double noise) {
-  const auto trial = [=](int seed) {
-    llmt::Random random(static_cast<std::uint64_t>(seed) + 1);
+std::vector<std::string> numbered(Eigen::Index inputs) {
+  std::vector<std::string> names;
+  for (Eigen::Index j = 1; j <= inputs; ++j) names.push_back(fmt::format("x{}", j));
+  return names;
+}
+
+// Training rows uniform on [low, 1]^inputs; test rows a grid where there are two inputs, else uniform too.
+Task known_truth(const std::string& name, Function truth, Eigen::Index rows, Eigen::Index inputs, double low,
+                 double noise) {
+  const auto trial = [=](int number) {
+    llmt::Random random(static_cast<std::uint64_t>(number) + 1);
     Trial result;
     result.train_inputs = uniform(rows, inputs, low, 1.0, random);
     result.train_output = values(truth, result.train_inputs);
-    for (double& y : result.train_output) {
-      y += noise * random.normal();
-    }
-    if (inputs == 2) {
-      constexpr int side = 41;
-      result.test_inputs.resize(side * side, 2);
-      for (Eigen::Index i = 0; i < side * side; ++i) {
-        result.test_inputs.row(i) << low + (1.0 - low) * static_cast<double>(i / side) / (side - 1.0),
-            low + (1.0 - low) * static_cast<double>(i % side) / (side - 1.0);
-      }
-    } else {
-      result.test_inputs = uniform(20000, inputs, low, 1.0, random);
-    }
+    for (double& y : result.train_output) y += noise * random.normal();
+    result.test_inputs = inputs == 2 ? square_grid(41, low) : uniform(20000, inputs, low, 1.0, random);
     result.test_output = values(truth, result.test_inputs);
     return result;
   };
-  return {name, 5, trial};
+  return {name, numbered(inputs), 5, trial};
 }
 
-/// The flexible planar arm of Benes et al. on its grids: what the calibrated rigid arm leaves of x, or x itself.
+// The flexible planar arm of Benes et al. on its grids: x, or the residual of x that the calibrated rigid arm leaves.
 Trial arm(bool residual) {
   namespace robotics = llmt::robotics;
   const robotics::Robot flexible = robotics::read_robot(std::string(LLMT_ROBOTS_DIR) + "/planar_two_link.yaml");
@@ -110,39 +111,33 @@ Trial arm(bool residual) {
 }  // namespace
 
 std::vector<Task> known_truths() {
-  std::vector<Task> tasks = {task("cross", cross, 500, 2, -1.0, 0.1), task("friedman1", friedman, 2000, 10, 0.0, 1.0),
-                             task("ridge", ridge, 2000, 5, -1.0, 0.05), task("jumps", truth, 10000, 10, 0.0, 1.0)};
-  tasks.push_back({"arm residual", 1, [](int) { return arm(true); }});
-  tasks.push_back({"arm x", 1, [](int) { return arm(false); }});
-  return tasks;
+  return {known_truth("cross", cross, 500, 2, -1.0, 0.1),
+          known_truth("friedman1", friedman, 2000, 10, 0.0, 1.0),
+          known_truth("ridge", ridge, 2000, 5, -1.0, 0.05),
+          known_truth("jumps", truth, 10000, 10, 0.0, 1.0),
+          {"arm residual", numbered(2), 1, [](int) { return arm(true); }},
+          {"arm x", numbered(2), 1, [](int) { return arm(false); }}};
 }
 
-std::vector<Task> given_sets(const std::string& folder) {
+std::vector<Task> chosen_tasks(const TaskChoice& choice) {
   std::vector<Task> tasks;
-  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
-    const std::string file = entry.path().filename().string();
-    const std::size_t end = file.find(".splits.csv");
-    if (end == std::string::npos) {
-      continue;
+  if (!choice.folder.empty()) {
+    for (const std::string& name : choice.names.empty() ? data_set_names(choice.folder) : choice.names) {
+      const auto set = std::make_shared<const DataSet>(read_data_set(choice.folder, name));
+      const auto splits = static_cast<int>(set->splits());
+      tasks.push_back({name, set->inputs, splits, [set](int split) { return set->trial(split); }});
     }
-    const std::string name = file.substr(0, end);
-    const llmt::Csv data = llmt::Csv::read(folder + "/" + name + ".csv");
-    const llmt::Csv splits = llmt::Csv::read(folder + "/" + file);
-    const auto all = std::make_shared<Eigen::MatrixXd>(data.numbers(data.columns()));
-    const auto is_test = std::make_shared<Eigen::MatrixXd>(splits.numbers(splits.columns()));
-    const auto trial = [all, is_test](int split) {
-      std::vector<Eigen::Index> train;
-      std::vector<Eigen::Index> test;
-      for (Eigen::Index row = 0; row < all->rows(); ++row) {
-        ((*is_test)(row, split) > 0.5 ? test : train).push_back(row);
-      }
-      const Eigen::Index inputs = all->cols() - 1;
-      return Trial{(*all)(train, Eigen::seqN(0, inputs)), (*all)(train, inputs), (*all)(test, Eigen::seqN(0, inputs)),
-                   (*all)(test, inputs)};
-    };
-    tasks.push_back({name, static_cast<int>(is_test->cols()), trial});
+  } else if (choice.names.empty()) {
+    tasks = known_truths();
+  } else {
+    const std::vector<Task> all = known_truths();
+    for (const std::string& name : choice.names) {
+      const auto found = std::ranges::find(all, name, &Task::name);
+      if (found == all.end()) throw std::invalid_argument(fmt::format("no task '{}'; --data names a folder", name));
+      tasks.push_back(*found);
+    }
   }
-  std::sort(tasks.begin(), tasks.end(), [](const Task& a, const Task& b) { return a.name < b.name; });
+  for (Task& task : tasks) task.trials = std::min(task.trials, choice.trials);
   return tasks;
 }
 
