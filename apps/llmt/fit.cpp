@@ -40,7 +40,7 @@ CLI::CheckedTransformer choice_of(const std::array<const char*, Count>& names) {
   return CLI::CheckedTransformer(values);
 }
 
-/// "blend, sparse, width 2, jumps from 4, ridge 0.001, shrinkage 0.1".
+// "blend, sparse, width 2, jumps from 4, ridge 0.001, shrinkage 0.1".
 std::string describe(const Candidate& candidate) {
   const char* const sparse = candidate.sparse ? ", sparse" : "";
   if (candidate.validity.kind == ValidityKind::crisp) {
@@ -93,8 +93,8 @@ Json summary_json(const FitArguments& arguments, const FitResult& result) {
   for (const PartitionSummary& partition : result.summary.partitions) {
     Json entry;
     for (std::size_t o = 0; o < partition.outputs.size(); ++o) {
-      entry["targets"].push_back(result.model.outputs()[static_cast<std::size_t>(partition.outputs[o])].name);
-      entry["train_rmse"].push_back(partition.train_rmse(static_cast<std::ptrdiff_t>(o)));
+      entry["targets"].push_back(result.model.outputs()[partition.outputs[o]].name);
+      entry["train_rmse"].push_back(partition.train_rmse(o));
     }
     entry["leaves"] = partition.leaves;
     entry["local_models"] = partition.leaves;  // one each
@@ -126,11 +126,9 @@ Json summary_json(const FitArguments& arguments, const FitResult& result) {
   return json;
 }
 
-/// How the held-out rows came to be.
+// How the held-out rows came to be.
 std::string selection_text(const FitArguments& arguments, const PartitionSummary& partition) {
-  if (partition.cv_folds == 0) {
-    return "no held-out rows: the tree stays as grown";
-  }
+  if (partition.cv_folds == 0) return "no held-out rows: the tree stays as grown";
   if (partition.cv_folds == 1) {
     return fmt::format("chosen on {} rows held out once", partition.held_out_rows);
   }
@@ -138,7 +136,7 @@ std::string selection_text(const FitArguments& arguments, const PartitionSummary
                      arguments.learning.contiguous ? " over contiguous blocks of rows" : "");
 }
 
-/// What the local models are made of, and what spoke for it; nothing for what was not asked.
+// What the local models are made of, and what spoke for it; nothing for what was not asked.
 std::string local_models_text(const FitArguments& arguments, const FitSummary& summary) {
   const LocalModelOptions& asked = arguments.learning.options.local_models;
   std::string text;
@@ -162,7 +160,7 @@ std::string local_models_text(const FitArguments& arguments, const FitSummary& s
   return text;
 }
 
-/// How the splits of the final tree were searched; nothing if there were none to search.
+// How the splits of the final tree were searched; nothing if there were none to search.
 std::string search_text(const SearchSummary& search) {
   if (search.binned_nodes == 0) {
     return search.exact_nodes == 0 || search.evaluations == 0 ? "" : "Splits searched exactly.\n";
@@ -200,13 +198,10 @@ void print_summary(const FitArguments& arguments, const FitResult& result) {
   Table table({"target", "model", "leaves", "RMSE held-out", "+-", "RMSE in-sample"});
   for (const PartitionSummary& partition : result.summary.partitions) {
     for (std::size_t o = 0; o < partition.outputs.size(); ++o) {
-      const std::string& target = result.model.outputs()[static_cast<std::size_t>(partition.outputs[o])].name;
+      const std::string& target = result.model.outputs()[partition.outputs[o]].name;
       table.add({target, describe(partition.chosen.candidate), fmt::format("{}", partition.leaves),
-                 number(partition.chosen.rmse), number(partition.chosen.spread, 2),
-                 number(partition.train_rmse(static_cast<std::ptrdiff_t>(o)))});
-      if (o > 0) {
-        continue;
-      }
+                 number(partition.chosen.rmse), number(partition.chosen.spread, 2), number(partition.train_rmse(o))});
+      if (o > 0) continue;
       const Candidate& chosen = partition.chosen.candidate;
       for (const CandidateError& other : partition.best_of_kind) {
         const Candidate& candidate = other.candidate;
@@ -242,7 +237,7 @@ void fit_command(FitArguments arguments) {
   LearningTable table = read_learning_table(arguments.learning);
   Progress progress("growing trees");
   table.options.intervals = !arguments.no_intervals && !arguments.output.empty();
-  table.options.progress = [&](std::ptrdiff_t done, std::ptrdiff_t total) { progress.show(done, total); };
+  table.options.progress = [&](Eigen::Index done, Eigen::Index total) { progress.show(done, total); };
   FitResult result = fit(table.inputs.values, table.outputs, table.options);
   progress.clear();
   result.model = result.model.named(table.names, arguments.learning.targets, table.inputs.levels);

@@ -14,14 +14,14 @@ namespace llmt::apps {
 namespace {
 
 bool contains(const std::vector<std::string>& names, const std::string& name) {
-  return std::find(names.begin(), names.end(), name) != names.end();
+  return std::ranges::find(names, name) != names.end();
 }
 
 std::vector<int> positions(const char* option, const std::vector<std::string>& names,
                            const std::vector<std::string>& inputs) {
   std::vector<int> result;
   for (const std::string& name : names) {
-    const auto found = std::find(inputs.begin(), inputs.end(), name);
+    const auto found = std::ranges::find(inputs, name);
     if (found == inputs.end()) {
       throw std::invalid_argument(
           fmt::format("{} has \"{}\", which is not among the inputs {}", option, name, fmt::join(inputs, ", ")));
@@ -31,20 +31,17 @@ std::vector<int> positions(const char* option, const std::vector<std::string>& n
   return result;
 }
 
-/// Of each input 1, or -1 where its name has a leading minus; 0 where it is not named. Empty if none is.
+// Of each input 1, or -1 where its name has a leading minus; 0 where it is not named. Empty if none is.
 std::vector<int> signs_of(const char* option, const std::vector<std::string>& names,
                           const std::vector<std::string>& inputs) {
-  if (names.empty()) {
-    return {};
-  }
+  if (names.empty()) return {};
   std::vector<int> result(inputs.size(), 0);
   for (const std::string& name : names) {
     const bool falls = !contains(inputs, name) && name.starts_with('-');
     const int position = positions(option, {falls ? name.substr(1) : name}, inputs).front();
-    int& sign = result[static_cast<std::size_t>(position)];
+    int& sign = result[position];
     if (sign == (falls ? 1 : -1)) {
-      throw std::invalid_argument(
-          fmt::format("{} names \"{}\" with both signs", option, inputs[static_cast<std::size_t>(position)]));
+      throw std::invalid_argument(fmt::format("{} names \"{}\" with both signs", option, inputs[position]));
     }
     sign = falls ? -1 : 1;
   }
@@ -70,9 +67,7 @@ std::vector<std::string> choose_inputs(const Csv& csv, const LearningArguments& 
       throw std::invalid_argument(fmt::format("--inputs has \"{}\", which is a target, the weight or ignored", column));
     }
   }
-  if (inputs.empty()) {
-    throw std::invalid_argument("no column is left to learn from");
-  }
+  if (inputs.empty()) throw std::invalid_argument("no column is left to learn from");
   return inputs;
 }
 
@@ -96,8 +91,7 @@ LearningTable read_learning_table(const LearningArguments& arguments) {
     const int monotone = options.monotone.empty() ? 0 : options.monotone[j];
     const int sign = options.slope_signs.empty() ? 0 : options.slope_signs[j];
     const std::vector<int>& categorical = table.inputs.categorical;
-    if ((monotone != 0 || sign != 0) &&
-        std::find(categorical.begin(), categorical.end(), static_cast<int>(j)) != categorical.end()) {
+    if ((monotone != 0 || sign != 0) && std::ranges::find(categorical, static_cast<int>(j)) != categorical.end()) {
       throw std::invalid_argument(fmt::format("{} names \"{}\", which is categorical",
                                               monotone != 0 ? "--monotone" : "--slope-sign", table.names[j]));
     }

@@ -19,7 +19,7 @@
 namespace llmt::apps {
 namespace {
 
-/// What was learned, and from what.
+// What was learned, and from what.
 struct Learned {
   std::string name;
   std::vector<std::string> inputs;
@@ -32,7 +32,7 @@ void refuse_other_options(const CLI::App& command) {
                                                       "significance", "output",     "json"};
   for (const CLI::Option* option : command.get_options()) {
     const std::string name = option->get_single_name();
-    if (option->count() > 0 && std::find(taken.begin(), taken.end(), name) == taken.end()) {
+    if (option->count() > 0 && std::ranges::find(taken, name) == taken.end()) {
       throw std::invalid_argument(fmt::format("--{} is not for --stream", name));
     }
   }
@@ -53,7 +53,7 @@ StreamOptions options_of(const CLI::App& command, const StreamArguments& argumen
   return options;
 }
 
-/// Rows so far and the running errors, on one line that is rewritten, where stderr is a terminal.
+// Rows so far and the running errors, on one line that is rewritten, where stderr is a terminal.
 void show_progress(const Stream& stream) {
   if (::isatty(STDERR_FILENO) != 0) {
     fmt::print(stderr, "\r\033[K{} rows, RMSE before learning {:.5g}, of the last 1000 {:.5g}", stream.counts().rows,
@@ -72,7 +72,7 @@ void add(const Csv& piece, const StreamArguments& arguments, Learned& learned) {
   const LearningArguments& learning = arguments.learning;
   const Eigen::MatrixXd targets = piece.numbers(learning.targets, 1);
   const Eigen::VectorXd weights = learning.weight.empty() ? Eigen::VectorXd() : piece.numbers(learning.weight, 1);
-  for (std::ptrdiff_t row = 0; row < weights.size(); ++row) {
+  for (Eigen::Index row = 0; row < weights.size(); ++row) {
     if (weights(row) < 0.0) {
       throw std::runtime_error(fmt::format("{}:{}: column \"{}\": a weight must not be negative, it is {}",
                                            learned.name, piece.line_of(row), learning.weight, weights(row)));
@@ -96,9 +96,7 @@ Learned learn(const CLI::App& command, const StreamArguments& arguments) {
   std::ifstream file;
   if (!standard_input) {
     file.open(learning.data, std::ios::binary);
-    if (!file) {
-      throw std::runtime_error(fmt::format("{}: cannot be read", learned.name));
-    }
+    if (!file) throw std::runtime_error(fmt::format("{}: cannot be read", learned.name));
   } else {
     std::ios::sync_with_stdio(false);
   }
@@ -139,8 +137,8 @@ Json summary_json(const StreamArguments& arguments, const Learned& learned, cons
   const Eigen::VectorXd all = learned.stream->prequential_rmse();
   const Eigen::VectorXd recent = learned.stream->recent_rmse();
   for (const Partition& partition : model.partitions()) {
-    const std::ptrdiff_t output = partition.outputs.front();
-    json["partitions"].push_back({{"targets", {arguments.learning.targets[static_cast<std::size_t>(output)]}},
+    const Eigen::Index output = partition.outputs.front();
+    json["partitions"].push_back({{"targets", {arguments.learning.targets[output]}},
                                   {"validity", partition.validity.kind == ValidityKind::crisp ? "crisp" : "blend"},
                                   {"width", partition.validity.width},
                                   {"leaves", partition.num_leaves()},
@@ -167,8 +165,8 @@ void print_summary(const StreamArguments& arguments, const Learned& learned, con
   const Eigen::VectorXd all = learned.stream->prequential_rmse();
   const Eigen::VectorXd recent = learned.stream->recent_rmse();
   for (const Partition& partition : model.partitions()) {
-    const std::ptrdiff_t output = partition.outputs.front();
-    table.add({arguments.learning.targets[static_cast<std::size_t>(output)],
+    const Eigen::Index output = partition.outputs.front();
+    table.add({arguments.learning.targets[output],
                partition.validity.kind == ValidityKind::crisp
                    ? "crisp"
                    : fmt::format("blend, width {}", number(partition.validity.width, 3)),

@@ -17,7 +17,7 @@ using program::Outcome;
 
 const std::string llmt_program = LLMT_PROGRAM;
 
-/// 300 rows: y has a kink in `a`, z is affine, `label` is words.
+// 300 rows: y has a kink in `a`, z is affine, `label` is words.
 std::string table() {
   llmt::Random random(1);
   std::string text = "label,a,b,y,z\n";
@@ -29,7 +29,7 @@ std::string table() {
   return text;
 }
 
-/// `rows` rows: y = |a| + b / 2 + normal noise of 0.05.
+// `rows` rows: y = |a| + b / 2 + normal noise of 0.05.
 std::string kinked(int rows, int seed) {
   llmt::Random random(seed);
   std::string text = "a,b,y\n";
@@ -41,13 +41,13 @@ std::string kinked(int rows, int seed) {
   return text;
 }
 
-/// 240 rows: y = x, but 3 - x for blue; every 20th colour and every 12th x is missing.
+// 240 rows: y = x, but 3 - x for blue; every 20th colour and every 12th x is missing.
 std::string coloured() {
   llmt::Random random(3);
   const std::vector<std::string> colours = {"red", "green", "blue"};
   std::string text = "colour,x,y\n";
   for (int i = 0; i < 240; ++i) {
-    const std::string& colour = colours[static_cast<std::size_t>(i % 3)];
+    const std::string& colour = colours[i % 3];
     const double x = random.uniform(-1.0, 1.0);
     const double y = (colour == "blue" ? 3.0 - x : x) + 0.05 * random.normal();
     text += fmt::format("{},{},{}\n", i % 20 == 7 ? "" : colour, i % 12 == 5 ? "NA" : fmt::format("{}", x), y);
@@ -55,7 +55,7 @@ std::string coloured() {
   return text;
 }
 
-/// 200 rows: y = (a - b)^2 + c with normal noise of 0.05.
+// 200 rows: y = (a - b)^2 + c with normal noise of 0.05.
 std::string bent() {
   llmt::Random random(4);
   std::string text = "a,b,c,y\n";
@@ -261,7 +261,7 @@ TEST(LlmtProgram, ExplanationsAddUp) {
                 (row == 6 && entry["input"] == "x") || (row == 8 && entry["input"] == "colour"));
     }
     EXPECT_NEAR(sum, target["prediction"], 1e-12);
-    EXPECT_NEAR(target["prediction"], predicted["targets"][0]["predicted"][static_cast<std::size_t>(row - 1)], 1e-12);
+    EXPECT_NEAR(target["prediction"], predicted["targets"][0]["predicted"][row - 1], 1e-12);
   }
   EXPECT_NE(folder.run(llmt_program + " explain m.json d.csv --row 6").out.find("The contributions add up:"),
             std::string::npos);

@@ -15,12 +15,12 @@ using nlohmann::json;
 using program::Folder;
 using program::Outcome;
 
-/// `llmt fit --stream` of column y of `data`.
+// `llmt fit --stream` of column y of `data`.
 std::string fit_stream(const std::string& data) {
   return std::string(LLMT_PROGRAM) + " fit " + data + " --stream -t y ";
 }
 
-/// y has a kink in `a`; a row in ten has no `b`.
+// y has a kink in `a`; a row in ten has no `b`.
 std::string kinked(int rows, const char* line_end = "\n") {
   llmt::Random random(1);
   std::string text = fmt::format("a,b,y{}", line_end);

@@ -17,8 +17,7 @@ namespace oracle {
 template <int Coefficients>
 class NormalEquations {
  public:
-  explicit NormalEquations(const Eigen::VectorXd& weights)
-      : weights_(weights), products_(static_cast<std::size_t>(weights.size())) {}
+  explicit NormalEquations(const Eigen::VectorXd& weights) : weights_(weights), products_(weights.size()) {}
 
   void add(const double* row) {
     for (int i = 0; i < Coefficients; ++i) {
@@ -29,7 +28,7 @@ class NormalEquations {
     for (std::size_t o = 0; o < products_.size(); ++o) {
       const double residual = row[Coefficients + static_cast<int>(o)];
       for (int i = 0; i < Coefficients; ++i) {
-        products_[o].sums[static_cast<std::size_t>(i)] += row[i] * residual;
+        products_[o].sums[i] += row[i] * residual;
       }
       products_[o].squares += residual * residual;
     }
@@ -42,14 +41,14 @@ class NormalEquations {
     for (int k = 0; k < Coefficients; ++k) {
       double pivot = gram_[at(k, k)];
       for (int j = 0; j < k; ++j) {
-        pivot -= factor[at(k, j)] * factor[at(k, j)] * inverse[static_cast<std::size_t>(j)];
+        pivot -= factor[at(k, j)] * factor[at(k, j)] * inverse[j];
       }
       const bool dependent = !(pivot > llmt::pivot_tolerance * gram_[at(k, k)]);
-      inverse[static_cast<std::size_t>(k)] = dependent ? 0.0 : 1.0 / pivot;
+      inverse[k] = dependent ? 0.0 : 1.0 / pivot;
       for (int i = k + 1; i < Coefficients; ++i) {
         double sum = gram_[at(i, k)];
         for (int j = 0; j < k; ++j) {
-          sum -= factor[at(i, j)] * factor[at(k, j)] * inverse[static_cast<std::size_t>(j)];
+          sum -= factor[at(i, j)] * factor[at(k, j)] * inverse[j];
         }
         factor[at(i, k)] = sum;
       }
@@ -59,19 +58,19 @@ class NormalEquations {
       std::array<double, Coefficients> solution = products_[o].sums;
       double left = products_[o].squares;
       for (int k = 0; k < Coefficients; ++k) {
-        double& value = solution[static_cast<std::size_t>(k)];
+        double& value = solution[k];
         for (int j = 0; j < k; ++j) {
-          value -= factor[at(k, j)] * inverse[static_cast<std::size_t>(j)] * solution[static_cast<std::size_t>(j)];
+          value -= factor[at(k, j)] * inverse[j] * solution[j];
         }
-        left -= value * value * inverse[static_cast<std::size_t>(k)];
+        left -= value * value * inverse[k];
       }
-      total += weights_(static_cast<std::ptrdiff_t>(o)) * left;
+      total += weights_(o) * left;
     }
     return std::max(total, 0.0);
   }
 
  private:
-  static constexpr std::size_t at(int i, int j) { return static_cast<std::size_t>(i * Coefficients + j); }
+  static constexpr std::size_t at(int i, int j) { return i * Coefficients + j; }
   struct Products {
     std::array<double, Coefficients> sums{};
     double squares = 0.0;
@@ -83,50 +82,49 @@ class NormalEquations {
 
 struct BruteForceSplit {
   int input = -1;
-  std::ptrdiff_t left = 0;
+  Eigen::Index left = 0;
   double rss = std::numeric_limits<double>::infinity();
-  std::ptrdiff_t evaluations = 0;
+  Eigen::Index evaluations = 0;
 };
 
 /// Orders and values of the inputs as in llmt::InputSearch. Of splits within the tie tolerance of the best: the first
 /// input, then the smallest threshold.
 template <int Coefficients>
 BruteForceSplit search(const llmt::SearchNode& node, std::span<const std::vector<int>> orders,
-                       std::span<const std::vector<double>> values, std::ptrdiff_t min_leaf_samples) {
+                       std::span<const std::vector<double>> values, Eigen::Index min_leaf_samples) {
   constexpr double none = std::numeric_limits<double>::infinity();
   std::vector<std::vector<double>> all;
   BruteForceSplit best;
   for (std::size_t j = 0; j < orders.size(); ++j) {
     const std::vector<int>& order = orders[j];
-    const std::ptrdiff_t rows = std::ssize(order);
-    const auto admissible = [&](std::ptrdiff_t left) {
+    const Eigen::Index rows = std::ssize(order);
+    const auto admissible = [&](Eigen::Index left) {
       return left >= min_leaf_samples && rows - left >= min_leaf_samples && left > 0 && left < rows &&
-             values[j][static_cast<std::size_t>(left - 1)] < values[j][static_cast<std::size_t>(left)];
+             values[j][left - 1] < values[j][left];
     };
-    const auto row = [&](std::ptrdiff_t k) { return node.features.row(order[static_cast<std::size_t>(k)]); };
-    std::vector<double>& rss = all.emplace_back(static_cast<std::size_t>(rows) + 1, none);
+    const auto row = [&](Eigen::Index k) { return node.features.row(order[k]); };
+    std::vector<double>& rss = all.emplace_back(rows + 1, none);
     NormalEquations<Coefficients> from_left(node.weights);
-    for (std::ptrdiff_t left = 1; left <= rows; ++left) {
+    for (Eigen::Index left = 1; left <= rows; ++left) {
       from_left.add(row(left - 1));
       if (admissible(left)) {
-        rss[static_cast<std::size_t>(left)] = from_left.rss();
+        rss[left] = from_left.rss();
         ++best.evaluations;
       }
     }
     const double without_value = rows < node.features.rows() ? node.rss - from_left.rss() : 0.0;
     NormalEquations<Coefficients> from_right(node.weights);
-    for (std::ptrdiff_t left = rows - 1; left >= 1; --left) {
+    for (Eigen::Index left = rows - 1; left >= 1; --left) {
       from_right.add(row(left));
       if (admissible(left)) {
-        rss[static_cast<std::size_t>(left)] += from_right.rss() + without_value;
+        rss[left] += from_right.rss() + without_value;
       }
     }
-    best.rss = std::min(best.rss, *std::min_element(rss.begin(), rss.end()));
+    best.rss = std::min(best.rss, *std::ranges::min_element(rss));
   }
   for (std::size_t j = 0; j < orders.size() && best.input < 0; ++j) {
-    const auto found = std::find_if(all[j].begin(), all[j].end(), [&](double value) {
-      return value < none && value <= best.rss + llmt::tie_tolerance * node.rss;
-    });
+    const auto found = std::ranges::find_if(
+        all[j], [&](double value) { return value < none && value <= best.rss + llmt::tie_tolerance * node.rss; });
     if (found != all[j].end()) {
       best.input = static_cast<int>(j);
       best.left = found - all[j].begin();

@@ -25,10 +25,9 @@ struct Split {
 };
 
 /// Refits both children of every admissible split.
-Split best_split(const Eigen::MatrixXd& x, const Eigen::MatrixXd& y, std::ptrdiff_t min_leaf,
-                 long double tie_tolerance);
+Split best_split(const Eigen::MatrixXd& x, const Eigen::MatrixXd& y, Eigen::Index min_leaf, long double tie_tolerance);
 
-inline Eigen::MatrixXd uniform(std::ptrdiff_t rows, std::ptrdiff_t columns, std::uint64_t seed) {
+inline Eigen::MatrixXd uniform(Eigen::Index rows, Eigen::Index columns, std::uint64_t seed) {
   llmt::Random random(seed);
   Eigen::MatrixXd values(rows, columns);
   for (double& value : values.reshaped()) {
@@ -42,11 +41,11 @@ inline Eigen::MatrixXd uniform(std::ptrdiff_t rows, std::ptrdiff_t columns, std:
 inline Eigen::MatrixXd firm(Eigen::MatrixXd x) {
   for (auto column : x.colwise()) {
     for (const double sign : {1.0, -1.0}) {
-      std::ptrdiff_t first = 0;
+      Eigen::Index first = 0;
       const double outermost = (sign * column).maxCoeff(&first);
       const double kept = column(first);
       column(first) = -sign * std::numeric_limits<double>::infinity();
-      std::ptrdiff_t second = 0;
+      Eigen::Index second = 0;
       (sign * column).maxCoeff(&second);
       column(first) = kept;
       column(second) = sign * outermost;
@@ -64,7 +63,7 @@ inline Eigen::MatrixXd coarse(const Eigen::MatrixXd& values) {
 inline Eigen::MatrixXd curved(const Eigen::MatrixXd& x, double noise = 0.0, std::uint64_t seed = 7) {
   llmt::Random random(seed);
   Eigen::MatrixXd y(x.rows(), 1);
-  for (std::ptrdiff_t i = 0; i < x.rows(); ++i) {
+  for (Eigen::Index i = 0; i < x.rows(); ++i) {
     y(i, 0) = std::sin(3.0 * x(i, 0)) + std::abs(x(i, 1) - 0.2) + 0.3 * x(i, x.cols() - 1) + noise * random.normal();
   }
   return y;

@@ -9,14 +9,12 @@ namespace {
 
 bool is_number_split(const llmt::Node& node) { return node.level_side.empty(); }
 
-/// What a split compares.
+// What a split compares.
 double side(const llmt::Model& model, const llmt::Node& node, const Eigen::VectorXd& row) {
-  if (node.direction.size() == 0) {
-    return row(node.split_input);
-  }
+  if (node.direction.size() == 0) return row(node.split_input);
   double sum = 0.0;
-  for (std::ptrdiff_t j = 0; j < row.size(); ++j) {
-    const double centre = model.inputs()[static_cast<std::size_t>(j)].centre;
+  for (Eigen::Index j = 0; j < row.size(); ++j) {
+    const double centre = model.inputs()[j].centre;
     sum += node.direction(j) == 0.0 || std::isnan(row(j)) ? 0.0 : node.direction(j) * (row(j) - centre);
   }
   return sum;
@@ -30,16 +28,10 @@ double share_of_left(const llmt::Model& model, const llmt::Partition& partition,
     const int side = known ? node.level_side[static_cast<std::size_t>(x)] : 0;
     return side == 0 ? node.missing_left : side < 0 ? 1.0 : 0.0;
   }
-  if (std::isnan(x)) {
-    return node.missing_left;
-  }
-  if (node.half_width == 0.0) {
-    return x <= node.threshold ? 1.0 : 0.0;
-  }
+  if (std::isnan(x)) return node.missing_left;
+  if (node.half_width == 0.0) return x <= node.threshold ? 1.0 : 0.0;
   const double u = (x - node.threshold) / node.half_width;
-  if (partition.validity.kind == llmt::ValidityKind::logistic) {
-    return 1.0 / (1.0 + std::exp(u));
-  }
+  if (partition.validity.kind == llmt::ValidityKind::logistic) return 1.0 / (1.0 + std::exp(u));
   const double v = (std::clamp(u, -1.0, 1.0) + 1.0) / 2.0;
   return partition.validity.smoothness == 1 ? 1.0 - v * v * (3.0 - 2.0 * v)
                                             : 1.0 - v * v * v * (10.0 - 15.0 * v + 6.0 * v * v);
@@ -47,9 +39,9 @@ double share_of_left(const llmt::Model& model, const llmt::Partition& partition,
 
 void share(const llmt::Model& model, const llmt::Partition& partition, int index, double validity,
            const Eigen::VectorXd& row, std::vector<double>& result) {
-  const llmt::Node& node = partition.nodes[static_cast<std::size_t>(index)];
+  const llmt::Node& node = partition.nodes[index];
   if (node.is_leaf()) {
-    result[static_cast<std::size_t>(index)] = validity;
+    result[index] = validity;
     return;
   }
   const double left = share_of_left(model, partition, node, row);
@@ -57,67 +49,61 @@ void share(const llmt::Model& model, const llmt::Partition& partition, int index
   share(model, partition, node.right, validity * (1.0 - left), row, result);
 }
 
-void share_gaussians(const llmt::Model& model, std::ptrdiff_t index, const Eigen::VectorXd& row,
+void share_gaussians(const llmt::Model& model, Eigen::Index index, const Eigen::VectorXd& row,
                      std::vector<double>& result) {
-  const llmt::Partition& partition = model.partitions()[static_cast<std::size_t>(index)];
+  const llmt::Partition& partition = model.partitions()[index];
   const std::vector<llmt::Leaf> leaves = model.leaves(index);
   Eigen::VectorXd exponent = Eigen::VectorXd::Zero(std::ssize(leaves));
   for (const llmt::Node& node : partition.nodes) {
-    if (node.is_leaf() || !is_number_split(node) || std::isnan(row(node.split_input))) {
-      continue;
-    }
-    const std::ptrdiff_t j = node.split_input;
-    const llmt::InputColumn& input = model.inputs()[static_cast<std::size_t>(j)];
+    if (node.is_leaf() || !is_number_split(node) || std::isnan(row(node.split_input))) continue;
+    const Eigen::Index j = node.split_input;
+    const llmt::InputColumn& input = model.inputs()[j];
     for (std::size_t i = 0; i < leaves.size(); ++i) {
       const double low = std::max(leaves[i].low(j), input.low);
       const double high = std::min(leaves[i].high(j), input.high);
       const double z = (row(j) - 0.5 * (low + high)) / (partition.validity.width * (high - low));
       // An input that is split several times counts once.
-      const bool first = &node == &*std::find_if(partition.nodes.begin(), partition.nodes.end(),
-                                                 [&](const llmt::Node& other) { return other.split_input == j; });
-      exponent(static_cast<std::ptrdiff_t>(i)) -= first ? 0.5 * z * z : 0.0;
+      const bool first = &node == &*std::ranges::find_if(
+                                      partition.nodes, [&](const llmt::Node& other) { return other.split_input == j; });
+      exponent(i) -= first ? 0.5 * z * z : 0.0;
     }
   }
   const double largest = exponent.maxCoeff();
   const Eigen::VectorXd mu = (exponent.array() - largest < -40.0).select(0.0, (exponent.array() - largest).exp());
   for (std::size_t i = 0; i < leaves.size(); ++i) {
-    result[static_cast<std::size_t>(leaves[i].node)] = mu(static_cast<std::ptrdiff_t>(i)) / mu.sum();
+    result[leaves[i].node] = mu(i) / mu.sum();
   }
 }
 
 double hold(double z, double low, double high) {
   const double r = (high - low) / 10.0;
-  if (z > high) {
-    return z < high + r ? z - (z - high) * (z - high) / (2.0 * r) : high + r / 2.0;
-  }
-  if (z < low) {
-    return z > low - r ? z + (z - low) * (z - low) / (2.0 * r) : low - r / 2.0;
-  }
+  if (z > high) return z < high + r ? z - (z - high) * (z - high) / (2.0 * r) : high + r / 2.0;
+  if (z < low) return z > low - r ? z + (z - low) * (z - low) / (2.0 * r) : low - r / 2.0;
   return z;
 }
 
 Eigen::VectorXd held(const llmt::Node& node, const Eigen::VectorXd& deviations) {
   Eigen::VectorXd result(deviations.size());
-  for (std::ptrdiff_t k = 0; k < deviations.size(); ++k) {
+  for (Eigen::Index k = 0; k < deviations.size(); ++k) {
     result(k) = std::isnan(deviations(k)) ? node.mean(k) : hold(deviations(k), node.low(k), node.high(k));
   }
   return result;
 }
 
 int parent_of(const llmt::Partition& partition, int index) {
-  return static_cast<int>(std::distance(
-      partition.nodes.begin(),
-      std::find_if(partition.nodes.begin(), partition.nodes.end(),
-                   [&](const llmt::Node& other) { return other.left == index || other.right == index; })));
+  return static_cast<int>(
+      std::distance(partition.nodes.begin(), std::ranges::find_if(partition.nodes, [&](const llmt::Node& other) {
+                      return other.left == index || other.right == index;
+                    })));
 }
 
 Eigen::VectorXd local(const llmt::Partition& partition, int leaf, const Eigen::VectorXd& deviations) {
-  const llmt::Node& node = partition.nodes[static_cast<std::size_t>(leaf)];
+  const llmt::Node& node = partition.nodes[leaf];
   Eigen::VectorXd below = held(node, deviations);
   Eigen::VectorXd value = node.value + node.slope * below;
   for (int index = leaf; index > 0;) {
     const int parent = index == leaf && node.guard_parent >= 0 ? node.guard_parent : parent_of(partition, index);
-    const llmt::Node& ancestor = partition.nodes[static_cast<std::size_t>(parent)];
+    const llmt::Node& ancestor = partition.nodes[parent];
     const Eigen::VectorXd reached = deviations.array().isNaN().select(below, held(ancestor, deviations));
     value += ancestor.slope * (reached - below);
     below = reached;
@@ -130,20 +116,20 @@ Eigen::VectorXd local(const llmt::Partition& partition, int leaf, const Eigen::V
 
 Eigen::VectorXd deviations(const llmt::Model& model, const Eigen::VectorXd& row) {
   const auto factor = [&](int j) {
-    const llmt::InputColumn& input = model.inputs()[static_cast<std::size_t>(j)];
+    const llmt::InputColumn& input = model.inputs()[j];
     return hold(row(j) - input.centre, input.low - input.centre, input.high - input.centre);
   };
   Eigen::VectorXd result(std::ssize(model.regressors()));
   for (std::size_t k = 0; k < model.regressors().size(); ++k) {
     const llmt::Regressor& regressor = model.regressors()[k];
     const double x = row(regressor.input);
-    double& deviation = result(static_cast<std::ptrdiff_t>(k));
+    double& deviation = result(k);
     if (regressor.second_input >= 0) {
       deviation = factor(regressor.input) * factor(regressor.second_input) - regressor.centre;
     } else if (regressor.level < 0) {
       deviation = x - regressor.centre;
     } else {
-      const std::size_t levels = model.inputs()[static_cast<std::size_t>(regressor.input)].levels.size();
+      const std::size_t levels = model.inputs()[regressor.input].levels.size();
       const bool known = x >= 0.0 && x < static_cast<double>(levels);
       deviation = known ? (x == regressor.level ? 1.0 : 0.0) - regressor.centre : std::nan("");
     }
@@ -175,7 +161,7 @@ Eigen::VectorXd predict(const llmt::Model& model, const Eigen::VectorXd& row) {
     }
     const Eigen::VectorXd c = held(root, d);
     const Eigen::VectorXd of_root = root.value + root.slope * c;
-    for (std::ptrdiff_t o = 0; o < partition.residual_range.rows(); ++o) {
+    for (Eigen::Index o = 0; o < partition.residual_range.rows(); ++o) {
       const double margin = 0.1 * (partition.residual_range(o, 1) - partition.residual_range(o, 0));
       value(o) = of_root(o) + hold(value(o) - of_root(o), partition.residual_range(o, 0) - margin,
                                    partition.residual_range(o, 1) + margin);
@@ -183,7 +169,7 @@ Eigen::VectorXd predict(const llmt::Model& model, const Eigen::VectorXd& row) {
     value += (partition.outer_slope.size() > 0 ? partition.outer_slope : root.slope) *
              d.array().isNaN().select(0.0, d - c).matrix();
     for (std::size_t o = 0; o < partition.outputs.size(); ++o) {
-      result(partition.outputs[o]) = value(static_cast<std::ptrdiff_t>(o));
+      result(partition.outputs[o]) = value(o);
     }
   }
   return result;
@@ -191,7 +177,7 @@ Eigen::VectorXd predict(const llmt::Model& model, const Eigen::VectorXd& row) {
 
 Eigen::MatrixXd predict_rows(const llmt::Model& model, const Eigen::MatrixXd& rows) {
   Eigen::MatrixXd result(rows.rows(), model.num_outputs());
-  for (std::ptrdiff_t i = 0; i < rows.rows(); ++i) {
+  for (Eigen::Index i = 0; i < rows.rows(); ++i) {
     result.row(i) = predict(model, rows.row(i).transpose()).transpose();
   }
   return result;

@@ -34,7 +34,7 @@ inline llmt::Model with_smoothness(const llmt::Model& model, int smoothness) {
 }
 
 /// One candidate, no choice.
-inline llmt::FitOptions only(const Kind& kind, llmt::Estimation estimation, std::ptrdiff_t max_leaves,
+inline llmt::FitOptions only(const Kind& kind, llmt::Estimation estimation, Eigen::Index max_leaves,
                              double ridge = 1e-3) {
   llmt::FitOptions options;
   options.growth = {.significance = 1.0, .min_variance_gain = -1.0, .max_leaves = max_leaves};
@@ -55,7 +55,7 @@ struct Data {
 
 inline Eigen::VectorXd affine(const Eigen::MatrixXd& x) { return (x * Eigen::Vector3d(1.0, -2.0, 0.5)).array() + 3.0; }
 
-inline Data data(std::uint64_t seed, std::ptrdiff_t rows = 300, bool corners = false) {
+inline Data data(std::uint64_t seed, Eigen::Index rows = 300, bool corners = false) {
   Eigen::MatrixXd x = oracle::uniform(rows, 3, seed);
   for (int corner = 0; corner < (corners ? 16 : 0); ++corner) {  // each twice
     for (int j = 0; j < 3; ++j) {

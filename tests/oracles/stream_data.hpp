@@ -8,7 +8,7 @@
 
 namespace stream_data {
 
-inline Eigen::MatrixXd noise(std::ptrdiff_t rows, std::uint64_t seed) {
+inline Eigen::MatrixXd noise(Eigen::Index rows, std::uint64_t seed) {
   llmt::Random random(seed);
   Eigen::MatrixXd values(rows, 1);
   for (double& value : values.reshaped()) {

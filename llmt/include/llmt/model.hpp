@@ -57,7 +57,7 @@ struct Node {
   double half_width = 0.0;    ///< h of the transition of a blend or a logistic gate, in the unit of s; 0: a jump
   double missing_left = 0.5;  ///< validity of the left child where the split input is missing or its level was not seen
 
-  std::ptrdiff_t samples = 0;  ///< training rows in the node's box
+  Eigen::Index samples = 0;  ///< training rows in the node's box
   /// Of [1, regressors] over those rows: the coefficients that the rows could determine. Where regressors were selected
   /// (FitOptions::local_models) the number of coefficients; the slopes of the others are 0.
   int rank = 0;
@@ -94,7 +94,7 @@ struct Partition {
   /// held.
   Eigen::MatrixXd residual_range = {};
 
-  std::ptrdiff_t num_leaves() const { return (std::ssize(nodes) + 1) / 2; }
+  Eigen::Index num_leaves() const { return (std::ssize(nodes) + 1) / 2; }
 };
 
 /// What a model knows of its inputs.
@@ -134,11 +134,11 @@ struct ObliqueSide {
 
 /// A leaf as a person reads it: where it holds and what it says there.
 struct Leaf {
-  int node = 0;                ///< index into Partition::nodes
-  std::ptrdiff_t samples = 0;  ///< training rows
-  int rank = 0;                ///< as Node::rank
-  Eigen::VectorXd low;         ///< box, one per model input: low < x <= high; -infinity where open
-  Eigen::VectorXd high;        ///< +infinity where open
+  int node = 0;              ///< index into Partition::nodes
+  Eigen::Index samples = 0;  ///< training rows
+  int rank = 0;              ///< as Node::rank
+  Eigen::VectorXd low;       ///< box, one per model input: low < x <= high; -infinity where open
+  Eigen::VectorXd high;      ///< +infinity where open
   /// On which sides of oblique splits it lies as well, from the root down.
   std::vector<ObliqueSide> sides = {};
   std::vector<std::vector<int>>
@@ -190,8 +190,8 @@ class Model {
   Model(std::vector<InputColumn> inputs, std::vector<OutputColumn> outputs, std::vector<Regressor> regressors,
         std::vector<Partition> partitions);
 
-  std::ptrdiff_t num_inputs() const { return std::ssize(inputs_); }
-  std::ptrdiff_t num_outputs() const { return std::ssize(outputs_); }
+  Eigen::Index num_inputs() const { return std::ssize(inputs_); }
+  Eigen::Index num_outputs() const { return std::ssize(outputs_); }
   const std::vector<InputColumn>& inputs() const { return inputs_; }
   const std::vector<OutputColumn>& outputs() const { return outputs_; }
   const std::vector<Regressor>& regressors() const { return regressors_; }  ///< columns of the local models
@@ -212,7 +212,7 @@ class Model {
 
   /// The validities of the leaves of a partition at each row, rows x leaves as in leaves(partition). Throws as
   /// predict(), and if there is no such partition.
-  Eigen::MatrixXd validities(const Eigen::Ref<const Eigen::MatrixXd>& inputs, std::ptrdiff_t partition,
+  Eigen::MatrixXd validities(const Eigen::Ref<const Eigen::MatrixXd>& inputs, Eigen::Index partition,
                              int max_threads = 0) const;
 
   /// How far each row lies from what the model has seen. Missing values do not count. Throws as predict().
@@ -226,11 +226,11 @@ class Model {
 
   /// The leaves of a partition from left to right in the tree. Throws std::invalid_argument if there is no such
   /// partition.
-  std::vector<Leaf> leaves(std::ptrdiff_t partition) const;
+  std::vector<Leaf> leaves(Eigen::Index partition) const;
 
   /// The model as it was when each partition had at most `max_leaves` leaves: inner nodes' local models, not fitted
   /// anew. Throws std::invalid_argument if max_leaves < 1.
-  Model prefix(std::ptrdiff_t max_leaves) const;
+  Model prefix(Eigen::Index max_leaves) const;
 
   /// The same model with other names of columns and, if there are any, of the levels of each input (empty for numbers).
   /// Throws std::invalid_argument if their numbers differ.
@@ -246,7 +246,7 @@ class Model {
 };
 
 /// Partition `partition` as it was with at most `max_leaves` leaves.
-Partition prefix(const Partition& partition, std::ptrdiff_t max_leaves);
+Partition prefix(const Partition& partition, Eigen::Index max_leaves);
 
 /// The model as JSON text, format version 2; docs/file-formats.md describes it. Numbers are written so that they read
 /// back exactly.

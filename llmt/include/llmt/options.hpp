@@ -82,10 +82,10 @@ struct GrowthOptions {
   double min_variance_gain = 0.0;
   /// Smallest number of rows in a leaf. 0: twice the number of coefficients of a local model for a crisp tree, 2 for
   /// M5'; where blends are among the candidates as many as regressors, at least 5.
-  std::ptrdiff_t min_leaf_samples = 0;
+  Eigen::Index min_leaf_samples = 0;
   /// Largest number of leaves of a partition. 0: no limit for a crisp tree; where blends are among the candidates as
   /// many as make 1500 coefficients, within 20 ... 400.
-  std::ptrdiff_t max_leaves = 0;
+  Eigen::Index max_leaves = 0;
   /// Growth ends when further splits lower the residual sum of squares of the whole tree by less than this fraction
   /// each, in the geometric mean over the next ten splits of best-first growth; those are not kept.
   /// Benes et al. (2022) stop at "less than 2 %" without saying of what; this is our reading, docs/algorithms.md gives
@@ -201,7 +201,7 @@ struct FitOptions {
   int max_threads = 0;           ///< 0: all that the machine has. The result does not depend on it.
   /// Called after each growth (a tree of a fold, or a final one) with how many of how many are done; one call at a
   /// time, from any thread.
-  std::function<void(std::ptrdiff_t done, std::ptrdiff_t total)> progress = {};
+  std::function<void(Eigen::Index done, Eigen::Index total)> progress = {};
 };
 
 }  // namespace llmt

@@ -19,29 +19,29 @@ struct StreamOptions {
   double significance = 0.05;
   /// Smallest decrease of the residual variance by a split, as a fraction of the variance of the output.
   double min_variance_gain = 0.0;
-  std::ptrdiff_t min_leaf_samples = 0;  ///< on either side of a split. 0: twice the coefficients of a local model
+  Eigen::Index min_leaf_samples = 0;  ///< on either side of a split. 0: twice the coefficients of a local model
   /// Largest number of leaves of each tree, which bounds memory. 0: as many as have about 64 MiB of sums, within
   /// 16 ... 500.
-  std::ptrdiff_t max_leaves = 0;
+  Eigen::Index max_leaves = 0;
   int bins = 16;  ///< of an input in a leaf, 4 ... 256
   /// Leaf models are drawn towards the model that their parent had when it was split, see BlendOptions::shrinkages.
   double shrinkage = 0.1;
   /// Rows that are kept: a quarter of them is held out and chooses what a snapshot is, at most; the others estimate
   /// blends. 0: a snapshot is the crisp tree as it stands.
-  std::ptrdiff_t reservoir_rows = 20000;
+  Eigen::Index reservoir_rows = 20000;
 };
 
 /// What a stream has gone through.
 struct StreamCounts {
-  std::ptrdiff_t rows = 0;            ///< of positive weight
-  std::ptrdiff_t missing_values = 0;  ///< in the inputs
-  std::ptrdiff_t held_out = 0;        ///< rows in the reservoir that no tree has learned from
-  std::ptrdiff_t leaves = 0;          ///< of all trees
-  std::ptrdiff_t splits = 0;
-  std::ptrdiff_t prunes = 0;        ///< splits taken back because recent rows do not need them
-  std::ptrdiff_t drifts = 0;        ///< alarms: branches whose errors rose abruptly and whose models restarted
-  std::ptrdiff_t replacements = 0;  ///< branches that a new one, grown from the alarm on, has replaced
-  std::ptrdiff_t bytes = 0;         ///< that sums, models and reservoir take
+  Eigen::Index rows = 0;            ///< of positive weight
+  Eigen::Index missing_values = 0;  ///< in the inputs
+  Eigen::Index held_out = 0;        ///< rows in the reservoir that no tree has learned from
+  Eigen::Index leaves = 0;          ///< of all trees
+  Eigen::Index splits = 0;
+  Eigen::Index prunes = 0;        ///< splits taken back because recent rows do not need them
+  Eigen::Index drifts = 0;        ///< alarms: branches whose errors rose abruptly and whose models restarted
+  Eigen::Index replacements = 0;  ///< branches that a new one, grown from the alarm on, has replaced
+  Eigen::Index bytes = 0;         ///< that sums, models and reservoir take
 };
 
 class StreamState;
@@ -63,7 +63,7 @@ class Stream {
  public:
   /// Throws std::invalid_argument naming field, value and bound if there is no input or output, or an option is out of
   /// range.
-  Stream(std::ptrdiff_t num_inputs, std::ptrdiff_t num_outputs, const StreamOptions& options = {});
+  Stream(Eigen::Index num_inputs, Eigen::Index num_outputs, const StreamOptions& options = {});
   ~Stream();
   Stream(Stream&&) noexcept;
   Stream& operator=(Stream&&) noexcept;

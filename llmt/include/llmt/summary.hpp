@@ -34,7 +34,7 @@ struct Candidate {
   double ridge = 0.0;      ///< of joint estimation
   double shrinkage = 0.0;  ///< see BlendOptions::shrinkages
   bool sparse = false;     ///< see SparseChoice
-  std::ptrdiff_t leaves = 1;
+  Eigen::Index leaves = 1;
 };
 
 /// A candidate and what it left on rows that took no part.
@@ -48,10 +48,10 @@ struct CandidateError {
 
 /// How the splits of a tree were searched; RA, LOLIMOT and M5' do not search among two models' sums of squares.
 struct SearchSummary {
-  std::ptrdiff_t exact_nodes = 0;
-  std::ptrdiff_t binned_nodes = 0;
+  Eigen::Index exact_nodes = 0;
+  Eigen::Index binned_nodes = 0;
   /// Splits whose residual sum of squares was computed.
-  std::ptrdiff_t evaluations = 0;
+  Eigen::Index evaluations = 0;
   /// Of the nodes searched by bins: the most by which the residual sum of squares of the split that was found can
   /// exceed that of the best one, as a fraction of the node's own. The true excess is far smaller as a rule.
   double largest_excess = 0.0;
@@ -60,28 +60,28 @@ struct SearchSummary {
 /// What happened to one partition.
 struct PartitionSummary {
   std::vector<int> outputs;
-  std::ptrdiff_t leaves = 0;        ///< in the model
-  std::ptrdiff_t grown_leaves = 0;  ///< before the choice by cross-validation
+  Eigen::Index leaves = 0;        ///< in the model
+  Eigen::Index grown_leaves = 0;  ///< before the choice by cross-validation
   StopReason stop = StopReason::leaf_samples;
-  std::ptrdiff_t rank_deficient_leaves =
+  Eigen::Index rank_deficient_leaves =
       0;  ///< leaves whose rows do not determine all coefficients; those keep their parent's slopes. Sparse models: 0
-  std::ptrdiff_t coefficients = 0;  ///< of all leaves, for one output: constants and slopes that are not 0
-  Eigen::VectorXd train_rmse;       ///< one per output of the partition
-  CandidateError chosen;            ///< errors NaN without folds
+  Eigen::Index coefficients = 0;  ///< of all leaves, for one output: constants and slopes that are not 0
+  Eigen::VectorXd train_rmse;     ///< one per output of the partition
+  CandidateError chosen;          ///< errors NaN without folds
   /// What it was chosen against: least squares first, then the best of each validity and width. Empty without folds.
   /// For many rows the errors of all blends but the best one are of models made from samples of the training rows.
   std::vector<CandidateError> best_of_kind;
   /// Held-out RMSE of the crisp prefixes with 1, 2, ... leaves; empty without folds.
   Eigen::VectorXd crisp_cv_rmse;
-  std::ptrdiff_t cv_folds = 0;
-  std::ptrdiff_t held_out_rows = 0;  ///< that errors are from, over all folds; at most 10000 of each
-  SearchSummary search;              ///< of the tree grown on all rows
+  Eigen::Index cv_folds = 0;
+  Eigen::Index held_out_rows = 0;  ///< that errors are from, over all folds; at most 10000 of each
+  SearchSummary search;            ///< of the tree grown on all rows
 };
 
 struct FitSummary {
-  std::ptrdiff_t samples = 0;           ///< of positive weight
-  std::ptrdiff_t missing_values = 0;    ///< in the inputs
-  std::ptrdiff_t min_leaf_samples = 0;  ///< as used
+  Eigen::Index samples = 0;           ///< of positive weight
+  Eigen::Index missing_values = 0;    ///< in the inputs
+  Eigen::Index min_leaf_samples = 0;  ///< as used
   std::vector<PartitionSummary> partitions;
   bool quadratic = false;  ///< whether the local models have products
   /// LocalTerms::automatic: what the terms that were not taken left on the held-out rows, one per partition. Else

@@ -12,11 +12,9 @@
 namespace llmt {
 
 inline void check_finite(const char* function, const char* argument, const Eigen::Ref<const Eigen::MatrixXd>& values) {
-  if (values.allFinite()) {
-    return;
-  }
-  for (std::ptrdiff_t column = 0; column < values.cols(); ++column) {
-    for (std::ptrdiff_t row = 0; row < values.rows(); ++row) {
+  if (values.allFinite()) return;
+  for (Eigen::Index column = 0; column < values.cols(); ++column) {
+    for (Eigen::Index row = 0; row < values.rows(); ++row) {
       if (!std::isfinite(values(row, column))) {
         throw std::invalid_argument(
             fmt::format("{}: {}({}, {}) is {}, it must be finite (rows and columns counted from 0)", function, argument,
@@ -29,11 +27,9 @@ inline void check_finite(const char* function, const char* argument, const Eigen
 /// As check_finite(), but NaN stands for a missing value.
 inline void check_finite_or_missing(const char* function, const char* argument,
                                     const Eigen::Ref<const Eigen::MatrixXd>& values) {
-  if ((values.array().isNaN() || values.array().isFinite()).all()) {
-    return;
-  }
-  for (std::ptrdiff_t column = 0; column < values.cols(); ++column) {
-    for (std::ptrdiff_t row = 0; row < values.rows(); ++row) {
+  if ((values.array().isNaN() || values.array().isFinite()).all()) return;
+  for (Eigen::Index column = 0; column < values.cols(); ++column) {
+    for (Eigen::Index row = 0; row < values.rows(); ++row) {
       if (std::isinf(values(row, column))) {
         throw std::invalid_argument(
             fmt::format("{}: {}({}, {}) is {}, it must be finite, or NaN where it is missing (rows and columns counted "
@@ -46,17 +42,17 @@ inline void check_finite_or_missing(const char* function, const char* argument,
 
 /// Every index in [0, count), none twice.
 inline void check_columns(const char* function, const char* argument, const std::vector<int>& columns,
-                          std::ptrdiff_t count) {
-  std::vector<bool> seen(static_cast<std::size_t>(count), false);
+                          Eigen::Index count) {
+  std::vector<bool> seen(count, false);
   for (const int column : columns) {
     if (column < 0 || column >= count) {
       throw std::invalid_argument(
           fmt::format("{}: {} names column {}, there are {}", function, argument, column, count));
     }
-    if (seen[static_cast<std::size_t>(column)]) {
+    if (seen[column]) {
       throw std::invalid_argument(fmt::format("{}: {} names column {} twice", function, argument, column));
     }
-    seen[static_cast<std::size_t>(column)] = true;
+    seen[column] = true;
   }
 }
 

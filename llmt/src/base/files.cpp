@@ -20,7 +20,7 @@ namespace {
 
 using Produce = std::function<void(const TextSink&)>;
 
-/// Writes all that `produce` passes on; on failure returns the reason.
+// Writes all that `produce` passes on; on failure returns the reason.
 std::string try_write(const std::string& path, const Produce& produce) {
   errno = 0;
   std::ofstream file(path, std::ios::binary | std::ios::trunc);
@@ -48,7 +48,7 @@ std::string read_file(const std::string& path) {
   constexpr std::streamsize piece = 1 << 18;
   const auto buffer = std::make_unique_for_overwrite<char[]>(piece);
   while (file.read(buffer.get(), piece) || file.gcount() > 0) {
-    content.append(buffer.get(), static_cast<std::size_t>(file.gcount()));
+    content.append(buffer.get(), file.gcount());
   }
   if (!file.is_open() || file.bad()) {
     fail(path, "read", std::strerror(errno != 0 ? errno : EIO));

@@ -6,16 +6,16 @@
 
 namespace llmt {
 
-void parallel_for(std::ptrdiff_t count, int max_threads, const std::function<void(std::ptrdiff_t)>& body) {
+void parallel_for(Eigen::Index count, int max_threads, const std::function<void(Eigen::Index)>& body) {
   if (max_threads == 1 || count <= 1) {
-    for (std::ptrdiff_t i = 0; i < count; ++i) {
+    for (Eigen::Index i = 0; i < count; ++i) {
       body(i);
     }
     return;
   }
   const auto run = [&] {
-    tbb::parallel_for(tbb::blocked_range<std::ptrdiff_t>(0, count, 1), [&](const auto& range) {
-      for (std::ptrdiff_t i = range.begin(); i != range.end(); ++i) {
+    tbb::parallel_for(tbb::blocked_range<Eigen::Index>(0, count, 1), [&](const auto& range) {
+      for (Eigen::Index i = range.begin(); i != range.end(); ++i) {
         body(i);
       }
     });

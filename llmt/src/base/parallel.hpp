@@ -2,6 +2,7 @@
 /// Parallelism over independent slots: the only way this library runs on several threads.
 #pragma once
 
+#include <Eigen/Core>
 #include <cstddef>
 #include <functional>
 
@@ -12,6 +13,6 @@ namespace llmt {
 ///
 /// Each call must write to its own slot only; what is reduced over the slots is reduced afterwards, in order. Results
 /// are then the same bytes at every thread count. May be nested. An exception from a body is passed on.
-void parallel_for(std::ptrdiff_t count, int max_threads, const std::function<void(std::ptrdiff_t)>& body);
+void parallel_for(Eigen::Index count, int max_threads, const std::function<void(Eigen::Index)>& body);
 
 }  // namespace llmt

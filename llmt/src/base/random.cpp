@@ -73,9 +73,9 @@ double Random::normal() {
   return u * factor;
 }
 
-std::vector<std::ptrdiff_t> Random::permutation(std::ptrdiff_t size) {
-  std::vector<std::ptrdiff_t> order(static_cast<std::size_t>(size));
-  std::iota(order.begin(), order.end(), std::ptrdiff_t{0});
+std::vector<Eigen::Index> Random::permutation(Eigen::Index size) {
+  std::vector<Eigen::Index> order(static_cast<std::size_t>(size));
+  std::iota(order.begin(), order.end(), Eigen::Index{0});
   for (std::size_t i = order.size(); i > 1; --i) {
     std::swap(order[i - 1], order[below(i)]);
   }

@@ -5,6 +5,7 @@
 /// include this are compiled with -ffp-contract=off.
 #pragma once
 
+#include <Eigen/Core>
 #include <cstddef>
 
 // Before a function: one of it per instruction set, chosen by the loader. Sanitizers do not get along with that.
@@ -21,15 +22,15 @@ namespace llmt {
 
 /// Eight doubles, aligned like one, so that any address will do.
 using Lanes = double __attribute__((vector_size(64), aligned(8)));
-inline constexpr std::ptrdiff_t lanes = 8;
+inline constexpr Eigen::Index lanes = 8;
 
 /// Four doubles; comparisons give masks, that choose by `mask ? a : b`.
 using Quad = double __attribute__((vector_size(32)));
 using QuadMask = decltype(Quad{} < Quad{});
-constexpr std::ptrdiff_t quad = 4;
+constexpr Eigen::Index quad = 4;
 
 /// `count` rounded up to whole quads.
-constexpr std::ptrdiff_t padded_to_quads(std::ptrdiff_t count) { return (count + quad - 1) / quad * quad; }
+constexpr Eigen::Index padded_to_quads(Eigen::Index count) { return (count + quad - 1) / quad * quad; }
 
 /// From any address.
 LLMT_INLINE Quad load_quad(const double* from) {
@@ -38,7 +39,7 @@ LLMT_INLINE Quad load_quad(const double* from) {
 }
 
 /// The first `count` (at least one) from any address, then zeros.
-LLMT_INLINE Quad load_quad(const double* from, std::ptrdiff_t count) {
+LLMT_INLINE Quad load_quad(const double* from, Eigen::Index count) {
   return count >= quad ? load_quad(from) : Quad{from[0], count > 1 ? from[1] : 0.0, count > 2 ? from[2] : 0.0, 0.0};
 }
 

@@ -15,7 +15,7 @@
 namespace llmt {
 namespace {
 
-constexpr std::ptrdiff_t most_rows = 1000;
+constexpr Eigen::Index most_rows = 1000;
 
 double seconds_of(const std::function<void()>& work) {
   const auto start = std::chrono::steady_clock::now();
@@ -23,8 +23,8 @@ double seconds_of(const std::function<void()>& work) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-/// Rows of the options that speak of single rows, for a part of them.
-FitOptions for_rows(FitOptions options, const std::vector<std::ptrdiff_t>& rows) {
+// Rows of the options that speak of single rows, for a part of them.
+FitOptions for_rows(FitOptions options, const std::vector<Eigen::Index>& rows) {
   if (options.weights.size() > 0) {
     options.weights = Eigen::VectorXd(options.weights(rows));
   }
@@ -32,8 +32,8 @@ FitOptions for_rows(FitOptions options, const std::vector<std::ptrdiff_t>& rows)
   return options;
 }
 
-std::ptrdiff_t count_parameters(const Model& model) {
-  std::ptrdiff_t count = 0;
+Eigen::Index count_parameters(const Model& model) {
+  Eigen::Index count = 0;
   for (const Partition& partition : model.partitions()) {
     count += partition.num_leaves() - 1;
     for (const Node& node : partition.nodes) {
@@ -45,7 +45,7 @@ std::ptrdiff_t count_parameters(const Model& model) {
   return count;
 }
 
-/// Mean of the differences of two methods' errors over the folds, and its standard error.
+// Mean of the differences of two methods' errors over the folds, and its standard error.
 struct Paired {
   double mean;
   double error;
@@ -112,7 +112,7 @@ void recommend(const std::vector<Method>& methods, ComparisonResult& result) {
 
 }  // namespace
 
-std::vector<Method> usual_methods(const FitOptions& base, std::ptrdiff_t inputs) {
+std::vector<Method> usual_methods(const FitOptions& base, Eigen::Index inputs) {
   FitOptions plain = base;
   plain.intervals = false;
   plain.progress = {};
@@ -138,8 +138,8 @@ std::vector<Method> usual_methods(const FitOptions& base, std::ptrdiff_t inputs)
     options.growth.min_improvement = 0.0;
   });
   // Gaussians overlap everywhere: their joint estimates cost the square of the number of leaves.
-  const std::ptrdiff_t gaussian_leaves =
-      base.growth.max_leaves > 0 ? std::min<std::ptrdiff_t>(base.growth.max_leaves, 50) : 50;
+  const Eigen::Index gaussian_leaves =
+      base.growth.max_leaves > 0 ? std::min<Eigen::Index>(base.growth.max_leaves, 50) : 50;
   add("Gaussians, as grown", [=](FitOptions& options) {
     options.blend.validity = ValidityChoice::gaussian;
     options.blend.estimation = Estimation::as_grown;
@@ -162,7 +162,7 @@ std::vector<Method> usual_methods(const FitOptions& base, std::ptrdiff_t inputs)
     options.blend.validity = ValidityChoice::automatic;
     options.growth.max_leaves = gaussian_leaves;
   });
-  if (const std::ptrdiff_t numbers = count_numbers(inputs, base); numbers > 0 && numbers <= most_inputs_of_products) {
+  if (const Eigen::Index numbers = count_numbers(inputs, base); numbers > 0 && numbers <= most_inputs_of_products) {
     add("crisp tree, quadratic leaves",
         [](FitOptions& options) { options.local_models.terms = LocalTerms::quadratic; });
   }
@@ -181,8 +181,8 @@ std::vector<Method> usual_methods(const FitOptions& base, std::ptrdiff_t inputs)
 
 namespace {
 
-/// Moves a row to either side of the plane of a node's split: along the split input, or in an oblique split
-/// orthogonally to the plane, every input measured by its training range. Inputs without a value stay.
+// Moves a row to either side of the plane of a node's split: along the split input, or in an oblique split
+// orthogonally to the plane, every input measured by its training range. Inputs without a value stay.
 std::pair<Eigen::VectorXd, Eigen::VectorXd> sides_of_plane(const Model& model, const Node& node,
                                                            const Eigen::VectorXd& row) {
   std::pair<Eigen::VectorXd, Eigen::VectorXd> sides{row, row};
@@ -194,8 +194,8 @@ std::pair<Eigen::VectorXd, Eigen::VectorXd> sides_of_plane(const Model& model, c
   Eigen::VectorXd way = Eigen::VectorXd::Zero(row.size());  // by which s grows by 1
   double side = 0.0;
   double scale = 0.0;
-  for (std::ptrdiff_t j = 0; j < row.size(); ++j) {
-    const InputColumn& input = model.inputs()[static_cast<std::size_t>(j)];
+  for (Eigen::Index j = 0; j < row.size(); ++j) {
+    const InputColumn& input = model.inputs()[j];
     if (node.direction(j) != 0.0 && !std::isnan(row(j))) {
       const double range = input.high - input.low;
       side += node.direction(j) * (row(j) - input.centre);
@@ -216,21 +216,18 @@ std::pair<Eigen::VectorXd, Eigen::VectorXd> sides_of_plane(const Model& model, c
 }  // namespace
 
 double largest_jump(const Model& model, const Eigen::Ref<const Eigen::MatrixXd>& inputs) {
-  const std::ptrdiff_t step = std::max<std::ptrdiff_t>(1, (inputs.rows() + most_rows - 1) / most_rows);
+  const Eigen::Index step = std::max<Eigen::Index>(1, (inputs.rows() + most_rows - 1) / most_rows);
   double largest = 0.0;
   for (const Partition& partition : model.partitions()) {
     const Evaluator evaluator(partition, model.inputs(), std::ssize(model.regressors()));
     // Rows just left and right of each split that may jump. Splits with a transition do not; Gaussians never do.
     std::vector<Eigen::VectorXd> left;
     std::vector<Eigen::VectorXd> right;
-    for (std::ptrdiff_t row = 0; row < inputs.rows() && partition.validity.kind != ValidityKind::gaussian;
-         row += step) {
+    for (Eigen::Index row = 0; row < inputs.rows() && partition.validity.kind != ValidityKind::gaussian; row += step) {
       const Eigen::VectorXd x = inputs.row(row).transpose();
-      for (std::ptrdiff_t index = 0; index >= 0;) {
-        const Node& node = partition.nodes[static_cast<std::size_t>(index)];
-        if (node.is_leaf()) {
-          break;
-        }
+      for (Eigen::Index index = 0; index >= 0;) {
+        const Node& node = partition.nodes[index];
+        if (node.is_leaf()) break;
         if (node.level_side.empty() && node.half_width == 0.0) {
           auto [first, second] = sides_of_plane(model, node, x);
           left.push_back(std::move(first));
@@ -242,14 +239,12 @@ double largest_jump(const Model& model, const Eigen::Ref<const Eigen::MatrixXd>&
         index = evaluator.child_of(static_cast<int>(index), x.data());
       }
     }
-    if (left.empty()) {
-      continue;
-    }
+    if (left.empty()) continue;
     Eigen::MatrixXd at_left(std::ssize(left), model.num_inputs());
     Eigen::MatrixXd at_right(std::ssize(left), model.num_inputs());
     for (std::size_t k = 0; k < left.size(); ++k) {
-      at_left.row(static_cast<std::ptrdiff_t>(k)) = left[k].transpose();
-      at_right.row(static_cast<std::ptrdiff_t>(k)) = right[k].transpose();
+      at_left.row(k) = left[k].transpose();
+      at_right.row(k) = right[k].transpose();
     }
     const int output = partition.outputs.front();
     largest = std::max(
@@ -261,18 +256,16 @@ double largest_jump(const Model& model, const Eigen::Ref<const Eigen::MatrixXd>&
 ComparisonResult compare(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
                          const Eigen::Ref<const Eigen::MatrixXd>& output, const std::vector<Method>& methods,
                          const CompareOptions& options) {
-  if (methods.empty()) {
-    throw std::invalid_argument("llmt::compare: there is no method");
-  }
+  if (methods.empty()) throw std::invalid_argument("llmt::compare: there is no method");
   if (output.cols() != 1 || output.rows() != inputs.rows()) {
     throw std::invalid_argument(fmt::format("llmt::compare: output is {} x {}, one column and {} rows are needed",
                                             output.rows(), output.cols(), inputs.rows()));
   }
   FoldOptions fold_options = options.folds;
-  fold_options.count = static_cast<int>(std::min<std::ptrdiff_t>(fold_options.count, inputs.rows()));
+  fold_options.count = static_cast<int>(std::min<Eigen::Index>(fold_options.count, inputs.rows()));
   const std::vector<Fold> folds = make_folds(inputs.rows(), fold_options);
-  const std::ptrdiff_t total = std::ssize(methods) * (std::ssize(folds) + 1);
-  std::ptrdiff_t done = 0;
+  const Eigen::Index total = std::ssize(methods) * (std::ssize(folds) + 1);
+  Eigen::Index done = 0;
   const auto report = [&](const Method& method) {
     ++done;
     if (options.progress) {
@@ -298,7 +291,7 @@ ComparisonResult compare(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
       const double of_fold = weights.dot(error.cwiseAbs2());
       squares += of_fold;
       weight += weights.sum();
-      entry.fold_rmse(static_cast<std::ptrdiff_t>(f)) = weights.sum() > 0.0 ? std::sqrt(of_fold / weights.sum()) : 0.0;
+      entry.fold_rmse(f) = weights.sum() > 0.0 ? std::sqrt(of_fold / weights.sum()) : 0.0;
       report(method);
     }
     entry.cv_rmse = std::sqrt(squares / weight);

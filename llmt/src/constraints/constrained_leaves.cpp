@@ -11,25 +11,25 @@
 namespace llmt {
 namespace {
 
-/// Room that estimates leave at ordered splits, relative to the range of the root's residuals: what rounding may take.
+// Room that estimates leave at ordered splits, relative to the range of the root's residuals: what rounding may take.
 constexpr double least_room = 1e-6;
 
-/// Slopes are wrong beyond this, in the same unit for a column of unit size.
+// Slopes are wrong beyond this, in the same unit for a column of unit size.
 constexpr double rounding = 1e-11;
 
-/// Times that violated inequalities are added. What is left then is mended at last.
+// Times that violated inequalities are added. What is left then is mended at last.
 constexpr int most_rounds = 20;
 
-double room_of(const Partition& partition, std::ptrdiff_t output) {
+double room_of(const Partition& partition, Eigen::Index output) {
   return least_room * (partition.residual_range(output, 1) - partition.residual_range(output, 0));
 }
 
-/// [value, slopes] of all nodes, one column each.
-Eigen::MatrixXd models_of(const Partition& partition, std::ptrdiff_t output) {
-  const std::ptrdiff_t regressors = partition.nodes.front().slope.cols();
+// [value, slopes] of all nodes, one column each.
+Eigen::MatrixXd models_of(const Partition& partition, Eigen::Index output) {
+  const Eigen::Index regressors = partition.nodes.front().slope.cols();
   Eigen::MatrixXd models(regressors + 1, std::ssize(partition.nodes));
-  for (std::ptrdiff_t i = 0; i < models.cols(); ++i) {
-    const Node& node = partition.nodes[static_cast<std::size_t>(i)];
+  for (Eigen::Index i = 0; i < models.cols(); ++i) {
+    const Node& node = partition.nodes[i];
     models(0, i) = node.value(output);
     models.col(i).tail(regressors) = node.slope.row(output).transpose();
   }
@@ -39,7 +39,7 @@ Eigen::MatrixXd models_of(const Partition& partition, std::ptrdiff_t output) {
 class LeafProblem {
  public:
   LeafProblem(const Partition& partition, const TrainingRows& training, const std::vector<int>& leaves,
-              const Eigen::VectorXd& root, std::ptrdiff_t output)
+              const Eigen::VectorXd& root, Eigen::Index output)
       : leaves_(leaves),
         root_(root),
         signs_(coefficient_signs(training)),
@@ -51,42 +51,42 @@ class LeafProblem {
         unit_(Eigen::VectorXd::Ones(root.size())) {
     unit_.tail(root.size() - 1) = training.scale.cwiseInverse();
     for (std::size_t k = 0; k < leaves.size(); ++k) {
-      position_[static_cast<std::size_t>(leaves[k])] = static_cast<std::ptrdiff_t>(k);
+      position_[leaves[k]] = static_cast<Eigen::Index>(k);
     }
   }
 
   std::vector<LeafInequality> violated(const Eigen::VectorXd& coefficients) {
-    const std::ptrdiff_t size = root_.size();
+    const Eigen::Index size = root_.size();
     std::vector<LeafInequality> result;
     if (!splits_.empty()) {
       for (std::size_t k = 0; k < leaves_.size(); ++k) {
-        const auto of_leaf = coefficients.segment(static_cast<std::ptrdiff_t>(k) * size, size);
+        const auto of_leaf = coefficients.segment(static_cast<Eigen::Index>(k) * size, size);
         models_.col(leaves_[k]) = (of_leaf + root_).cwiseProduct(unit_);
       }
       result = splits_.violated(models_, 0.5 * room_, room_);
     }
-    for (std::ptrdiff_t at = 0; at < coefficients.size() && !signs_.empty(); ++at) {
-      const int sign = signs_[static_cast<std::size_t>(at % size)];
+    for (Eigen::Index at = 0; at < coefficients.size() && !signs_.empty(); ++at) {
+      const int sign = signs_[at % size];
       if (sign * (coefficients(at) + root_(at % size)) < -tolerance_) {
-        const int leaf = leaves_[static_cast<std::size_t>(at / size)];
+        const int leaf = leaves_[at / size];
         result.push_back({leaf, leaf, sign * Eigen::VectorXd::Unit(size, at % size), Eigen::VectorXd::Zero(size), 0.0});
       }
     }
     return result;
   }
 
-  /// As normals' change >= bounds for a change of the coefficients.
+  // As normals' change >= bounds for a change of the coefficients.
   Eigen::MatrixXd normals(const std::vector<LeafInequality>& found, const Eigen::VectorXd& coefficients,
                           Eigen::VectorXd& bounds) const {
-    const std::ptrdiff_t size = root_.size();
+    const Eigen::Index size = root_.size();
     Eigen::MatrixXd result = Eigen::MatrixXd::Zero(coefficients.size(), std::ssize(found));
     bounds.resize(std::ssize(found));
     for (std::size_t c = 0; c < found.size(); ++c) {
-      const std::ptrdiff_t column = static_cast<std::ptrdiff_t>(c);
+      const Eigen::Index column = static_cast<Eigen::Index>(c);
       const Eigen::VectorXd left = found[c].of_left.cwiseProduct(unit_);
       const Eigen::VectorXd right = found[c].of_right.cwiseProduct(unit_);
-      result.col(column).segment(position_[static_cast<std::size_t>(found[c].left)] * size, size) += left;
-      result.col(column).segment(position_[static_cast<std::size_t>(found[c].right)] * size, size) += right;
+      result.col(column).segment(position_[found[c].left] * size, size) += left;
+      result.col(column).segment(position_[found[c].right] * size, size) += right;
       bounds(column) = found[c].bound - (left + right).dot(root_);
     }
     bounds -= result.transpose() * coefficients;
@@ -101,8 +101,8 @@ class LeafProblem {
   Eigen::MatrixXd models_;
   double room_;
   double tolerance_;
-  std::vector<std::ptrdiff_t> position_;  // of a leaf's node among the leaves
-  Eigen::VectorXd unit_;                  // of natural coefficients, in scaled ones
+  std::vector<Eigen::Index> position_;  // of a leaf's node among the leaves
+  Eigen::VectorXd unit_;                // of natural coefficients, in scaled ones
 };
 
 }  // namespace
@@ -110,9 +110,9 @@ class LeafProblem {
 void constrain_leaves(const Partition& partition, const TrainingRows& training, const std::vector<int>& leaves,
                       const RowMajor& factor, const Eigen::MatrixXd& root, Eigen::MatrixXd& coefficients,
                       ActiveInequalities& active) {
-  active.resize(static_cast<std::size_t>(coefficients.cols()));
-  for (std::ptrdiff_t o = 0; o < coefficients.cols(); ++o) {
-    std::vector<LeafInequality>& start = active[static_cast<std::size_t>(o)];
+  active.resize(coefficients.cols());
+  for (Eigen::Index o = 0; o < coefficients.cols(); ++o) {
+    std::vector<LeafInequality>& start = active[o];
     LeafProblem problem(partition, training, leaves, root.col(o), o);
     const Eigen::VectorXd free = coefficients.col(o);
     std::vector<LeafInequality> found = problem.violated(free);
@@ -132,8 +132,8 @@ void constrain_leaves(const Partition& partition, const TrainingRows& training, 
       Eigen::VectorXd change = distance.solve();
       // What is not active any more is found again if need be: no round makes the change smaller.
       std::vector<LeafInequality> kept;
-      for (const std::ptrdiff_t c : distance.keep_active()) {
-        kept.push_back(std::move(all[static_cast<std::size_t>(c)]));
+      for (const Eigen::Index c : distance.keep_active()) {
+        kept.push_back(std::move(all[c]));
       }
       all = std::move(kept);
       factor.triangularView<Eigen::Upper>().solveInPlace(change);
@@ -146,32 +146,28 @@ void constrain_leaves(const Partition& partition, const TrainingRows& training, 
 
 void finish_constrained(Partition& partition, const TrainingRows& training) {
   const std::vector<int> signs = coefficient_signs(training);
-  if (signs.empty()) {
-    return;
-  }
+  if (signs.empty()) return;
   for (Node& node : partition.nodes) {
-    for (std::ptrdiff_t k = 0; k < node.slope.cols(); ++k) {
-      const int sign = signs[static_cast<std::size_t>(k) + 1];
-      for (std::ptrdiff_t o = 0; sign != 0 && o < node.slope.rows(); ++o) {
+    for (Eigen::Index k = 0; k < node.slope.cols(); ++k) {
+      const int sign = signs[k + 1];
+      for (Eigen::Index o = 0; sign != 0 && o < node.slope.rows(); ++o) {
         node.slope(o, k) = sign * node.slope(o, k) > 0.0 ? node.slope(o, k) : 0.0;
       }
     }
   }
-  if (!has_ordered_splits(partition, training)) {
-    return;
-  }
-  for (std::ptrdiff_t o = 0; o < std::ssize(partition.outputs); ++o) {
+  if (!has_ordered_splits(partition, training)) return;
+  for (Eigen::Index o = 0; o < std::ssize(partition.outputs); ++o) {
     Eigen::MatrixXd models = models_of(partition, o);
     OrderedSplits(partition, training, o).separate(models, room_of(partition, o));
     for (std::size_t i = 0; i < partition.nodes.size(); ++i) {
-      partition.nodes[i].value(o) = models(0, static_cast<std::ptrdiff_t>(i));
+      partition.nodes[i].value(o) = models(0, i);
     }
   }
 }
 
 double order_room(const Partition& partition, const TrainingRows& training) {
   double least = std::numeric_limits<double>::infinity();
-  for (std::ptrdiff_t o = 0; o < std::ssize(partition.outputs) && has_ordered_splits(partition, training); ++o) {
+  for (Eigen::Index o = 0; o < std::ssize(partition.outputs) && has_ordered_splits(partition, training); ++o) {
     least = std::min(least, OrderedSplits(partition, training, o).room(models_of(partition, o)));
   }
   return least;

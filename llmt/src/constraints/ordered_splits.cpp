@@ -14,13 +14,13 @@
 namespace llmt {
 namespace {
 
-/// Parts of a transition whose Bernstein coefficients are taken one by one: the more, the closer to the polynomial.
+// Parts of a transition whose Bernstein coefficients are taken one by one: the more, the closer to the polynomial.
 constexpr int parts = 4;
 
-/// Pieces bent less than this, relative to their values, are straight.
+// Pieces bent less than this, relative to their values, are straight.
 constexpr double straight = 1e-12;
 
-/// Bernstein coefficients of a polynomial on 0 ... 1, by de Casteljau's rule those on from ... to.
+// Bernstein coefficients of a polynomial on 0 ... 1, by de Casteljau's rule those on from ... to.
 std::vector<double> on_part(std::vector<double> b, double from, double to) {
   const std::size_t degree = b.size() - 1;
   for (std::size_t step = 0; step < degree; ++step) {  // on 0 ... to
@@ -39,7 +39,7 @@ std::vector<double> on_part(std::vector<double> b, double from, double to) {
 
 }  // namespace
 
-OrderedSplits::OrderedSplits(const Partition& partition, const TrainingRows& training, std::ptrdiff_t output) {
+OrderedSplits::OrderedSplits(const Partition& partition, const TrainingRows& training, Eigen::Index output) {
   const Geometry geometry(partition, training, output);
   below_.resize(partition.nodes.size());
   children_.resize(partition.nodes.size(), {-1, -1});
@@ -50,8 +50,8 @@ OrderedSplits::OrderedSplits(const Partition& partition, const TrainingRows& tra
       continue;
     }
     children_[i] = {node.left, node.right};
-    const std::vector<int>& left = below_[static_cast<std::size_t>(node.left)];
-    const std::vector<int>& right = below_[static_cast<std::size_t>(node.right)];
+    const std::vector<int>& left = below_[node.left];
+    const std::vector<int>& right = below_[node.right];
     below_[i] = left;
     below_[i].insert(below_[i].end(), right.begin(), right.end());
     if (geometry.sign(static_cast<int>(i)) != 0) {
@@ -67,15 +67,11 @@ OrderedSplits::OrderedSplits(const Partition& partition, const TrainingRows& tra
 void OrderedSplits::add_pair(const Geometry& geometry, int split, int left, int right) {
   const Node& node = geometry.node(split);
   const int input = node.split_input;
-  if (!geometry.meet(left, right, input)) {
-    return;
-  }
+  if (!geometry.meet(left, right, input)) return;
   const double h = geometry.half_width(split);
   const double from = std::max({node.threshold - h, geometry.low(input, left), geometry.low(input, right)});
   const double to = std::min({node.threshold + h, geometry.high(input, left), geometry.high(input, right)});
-  if (h > 0.0 ? !(from < to) : !(from <= to)) {
-    return;
-  }
+  if (h > 0.0 ? !(from < to) : !(from <= to)) return;
   Pair pair{.split = split,
             .left = left,
             .right = right,
@@ -116,8 +112,8 @@ void OrderedSplits::add_pair(const Geometry& geometry, int split, int left, int 
   }
   // Slopes have the sign: of two with no smaller coefficient one is enough.
   for (std::size_t i = 0; i < found.size(); ++i) {
-    const bool implied = std::any_of(found.begin(), found.end(), [&](const Coefficient& other) {
-      const std::size_t at = static_cast<std::size_t>(&other - found.data());
+    const bool implied = std::ranges::any_of(found, [&](const Coefficient& other) {
+      const std::size_t at = &other - found.data();
       return at != i && other.of_left <= found[i].of_left && other.of_right <= found[i].of_right &&
              (at < i || other.of_left < found[i].of_left || other.of_right < found[i].of_right);
     });
@@ -146,16 +142,14 @@ void OrderedSplits::add_pair(const Geometry& geometry, int split, int left, int 
 }
 
 void OrderedSplits::add_options(const Geometry& geometry, int input, int left, int right) {
-  const std::vector<std::ptrdiff_t>& regressors = geometry.regressors_of(input);
-  if (regressors.empty()) {
-    return;
-  }
+  const std::vector<Eigen::Index>& regressors = geometry.regressors_of(input);
+  if (regressors.empty()) return;
   Range group{std::ssize(options_), 0};
   if (geometry.is_categorical(input)) {
     for (int level = 0; level < geometry.levels(input); ++level) {
       if (geometry.reaches(left, input, level) && geometry.reaches(right, input, level)) {
         std::vector<double> deviations;
-        for (const std::ptrdiff_t k : regressors) {
+        for (const Eigen::Index k : regressors) {
           deviations.push_back((geometry.level_of(k) == level ? 1.0 : 0.0) - geometry.centre(k));
         }
         add_option(geometry, regressors, deviations, left, right);
@@ -171,7 +165,7 @@ void OrderedSplits::add_options(const Geometry& geometry, int input, int left, i
   }
   if (geometry.reaches_missing(left, input) && geometry.reaches_missing(right, input)) {
     Option option{0.0, std::ssize(terms_), 0};
-    for (const std::ptrdiff_t k : regressors) {
+    for (const Eigen::Index k : regressors) {
       terms_.push_back({k, geometry.node(left).mean(k), geometry.node(right).mean(k)});
     }
     option.count = std::ssize(terms_) - option.first;
@@ -181,7 +175,7 @@ void OrderedSplits::add_options(const Geometry& geometry, int input, int left, i
   groups_.push_back(group);
 }
 
-void OrderedSplits::add_option(const Geometry& geometry, const std::vector<std::ptrdiff_t>& regressors,
+void OrderedSplits::add_option(const Geometry& geometry, const std::vector<Eigen::Index>& regressors,
                                const std::vector<double>& deviations, int left, int right) {
   Option option{0.0, std::ssize(terms_), std::ssize(regressors)};
   for (std::size_t i = 0; i < regressors.size(); ++i) {
@@ -193,9 +187,9 @@ void OrderedSplits::add_option(const Geometry& geometry, const std::vector<std::
   options_.push_back(option);
 }
 
-/// f_r - f_l as a function of one regressor is made of parabolas between the ends of ranges and of their roundings: no
-/// smaller than their Bernstein coefficients, the values at both ends and one between.
-void OrderedSplits::add_pieces(const Geometry& geometry, std::ptrdiff_t regressor, double low, double high, int left,
+// f_r - f_l as a function of one regressor is made of parabolas between the ends of ranges and of their roundings: no
+// smaller than their Bernstein coefficients, the values at both ends and one between.
+void OrderedSplits::add_pieces(const Geometry& geometry, Eigen::Index regressor, double low, double high, int left,
                                int right) {
   std::vector<double> at;
   for (const int leaf : {left, right}) {
@@ -206,7 +200,7 @@ void OrderedSplits::add_pieces(const Geometry& geometry, std::ptrdiff_t regresso
       at.push_back(end);
     }
   }
-  std::sort(at.begin(), at.end());
+  std::ranges::sort(at);
   at.erase(std::unique(at.begin(), at.end()), at.end());
   const auto values = [&](double d) {
     const auto [of_left, rest_left] = geometry.held(left, regressor, d);
@@ -240,15 +234,15 @@ void OrderedSplits::add_pieces(const Geometry& geometry, std::ptrdiff_t regresso
 
 OrderedSplits::Worst OrderedSplits::worst(const Pair& pair, const Eigen::MatrixXd& models) const {
   Worst result{.room = pair.sign * (models(0, pair.right) - models(0, pair.left)), .coefficient = {}, .options = {}};
-  for (std::ptrdiff_t g = pair.inputs.first; g < pair.inputs.first + pair.inputs.count; ++g) {
-    const Range& group = groups_[static_cast<std::size_t>(g)];
+  for (Eigen::Index g = pair.inputs.first; g < pair.inputs.first + pair.inputs.count; ++g) {
+    const Range& group = groups_[g];
     double smallest = std::numeric_limits<double>::infinity();
-    std::ptrdiff_t chosen = group.first;
-    for (std::ptrdiff_t i = group.first; i < group.first + group.count; ++i) {
-      const Option& option = options_[static_cast<std::size_t>(i)];
+    Eigen::Index chosen = group.first;
+    for (Eigen::Index i = group.first; i < group.first + group.count; ++i) {
+      const Option& option = options_[i];
       double value = option.constant;
-      for (std::ptrdiff_t t = option.first; t < option.first + option.count; ++t) {
-        const Term& term = terms_[static_cast<std::size_t>(t)];
+      for (Eigen::Index t = option.first; t < option.first + option.count; ++t) {
+        const Term& term = terms_[t];
         value +=
             models(1 + term.regressor, pair.right) * term.right - models(1 + term.regressor, pair.left) * term.left;
       }
@@ -258,13 +252,13 @@ OrderedSplits::Worst OrderedSplits::worst(const Pair& pair, const Eigen::MatrixX
       }
     }
     result.room += smallest;
-    result.options.push_back(options_[static_cast<std::size_t>(chosen)]);
+    result.options.push_back(options_[chosen]);
   }
   const double left = pair.regressor < 0 ? 0.0 : pair.sign * models(1 + pair.regressor, pair.left);
   const double right = pair.regressor < 0 ? 0.0 : pair.sign * models(1 + pair.regressor, pair.right);
   double least = std::numeric_limits<double>::infinity();
-  for (std::ptrdiff_t i = pair.coefficients.first; i < pair.coefficients.first + pair.coefficients.count; ++i) {
-    const Coefficient& each = coefficients_[static_cast<std::size_t>(i)];
+  for (Eigen::Index i = pair.coefficients.first; i < pair.coefficients.first + pair.coefficients.count; ++i) {
+    const Coefficient& each = coefficients_[i];
     const double value = each.of_left * left + each.of_right * right;
     if (value < least) {
       least = value;
@@ -275,14 +269,14 @@ OrderedSplits::Worst OrderedSplits::worst(const Pair& pair, const Eigen::MatrixX
   return result;
 }
 
-LeafInequality OrderedSplits::inequality(const Pair& pair, const Worst& worst, std::ptrdiff_t size, double room) const {
+LeafInequality OrderedSplits::inequality(const Pair& pair, const Worst& worst, Eigen::Index size, double room) const {
   LeafInequality result{pair.left, pair.right, Eigen::VectorXd::Zero(size), Eigen::VectorXd::Zero(size), room};
   result.of_left(0) = -pair.sign;
   result.of_right(0) = pair.sign;
   for (const Option& option : worst.options) {
     result.bound -= pair.sign * option.constant;
-    for (std::ptrdiff_t t = option.first; t < option.first + option.count; ++t) {
-      const Term& term = terms_[static_cast<std::size_t>(t)];
+    for (Eigen::Index t = option.first; t < option.first + option.count; ++t) {
+      const Term& term = terms_[t];
       result.of_left(1 + term.regressor) -= pair.sign * term.left;
       result.of_right(1 + term.regressor) += pair.sign * term.right;
     }
@@ -299,9 +293,7 @@ std::vector<LeafInequality> OrderedSplits::violated(const Eigen::MatrixXd& model
   for (std::size_t p = 0; p < pairs_.size(); ++p) {
     const Pair& pair = pairs_[p];
     const double here = worst(pair, models).room;
-    if (!(here < least)) {
-      continue;
-    }
+    if (!(here < least)) continue;
     for (const auto& key : {std::array<int, 3>{pair.split, 0, pair.left}, {pair.split, 1, pair.right}}) {
       const auto [entry, is_new] = worst_of.try_emplace(key, here, p);
       if (here < entry->second.first) {
@@ -338,11 +330,11 @@ void OrderedSplits::separate(Eigen::MatrixXd& models, double room) const {
     }
     if (least < 0.5 * room) {
       const double move = 0.5 * pair.sign * (room - least);
-      const auto [left, right] = children_[static_cast<std::size_t>(pair.split)];
-      for (const int leaf : below_[static_cast<std::size_t>(left)]) {
+      const auto [left, right] = children_[pair.split];
+      for (const int leaf : below_[left]) {
         models(0, leaf) -= move;
       }
-      for (const int leaf : below_[static_cast<std::size_t>(right)]) {
+      for (const int leaf : below_[right]) {
         models(0, leaf) += move;
       }
     }

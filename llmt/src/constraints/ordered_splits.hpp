@@ -33,7 +33,7 @@ struct LeafInequality {
 /// half widths are those of `partition`; leaves' models are given anew each time.
 class OrderedSplits {
  public:
-  OrderedSplits(const Partition& partition, const TrainingRows& training, std::ptrdiff_t output);
+  OrderedSplits(const Partition& partition, const TrainingRows& training, Eigen::Index output);
 
   bool empty() const { return pairs_.empty(); }
 
@@ -56,15 +56,15 @@ class OrderedSplits {
     double rest = 0.0;
   };
   struct Term {
-    std::ptrdiff_t regressor;
+    Eigen::Index regressor;
     double left;
     double right;
   };
   /// A value of an input: part of f_r - f_l there, constant + sum of slope_r right - slope_l left.
   struct Option {
     double constant;
-    std::ptrdiff_t first;
-    std::ptrdiff_t count;
+    Eigen::Index first;
+    Eigen::Index count;
   };
   /// f_r - f_l + of_left f_l' + of_right f_r' >= 0.
   struct Coefficient {
@@ -72,16 +72,16 @@ class OrderedSplits {
     double of_right;
   };
   struct Range {
-    std::ptrdiff_t first;
-    std::ptrdiff_t count;
+    Eigen::Index first;
+    Eigen::Index count;
   };
   struct Pair {
     int split;
     int left;
     int right;
     double sign;
-    std::ptrdiff_t regressor;  // of the split input; -1: none
-    Range inputs;              // among groups_
+    Eigen::Index regressor;  // of the split input; -1: none
+    Range inputs;            // among groups_
     Range coefficients;
   };
   /// Where the worst point of a pair is.
@@ -94,11 +94,11 @@ class OrderedSplits {
 
   void add_pair(const Geometry& geometry, int split, int left, int right);
   void add_options(const Geometry& geometry, int input, int left, int right);
-  void add_option(const Geometry& geometry, const std::vector<std::ptrdiff_t>& regressors,
+  void add_option(const Geometry& geometry, const std::vector<Eigen::Index>& regressors,
                   const std::vector<double>& deviations, int left, int right);
-  void add_pieces(const Geometry& geometry, std::ptrdiff_t regressor, double low, double high, int left, int right);
+  void add_pieces(const Geometry& geometry, Eigen::Index regressor, double low, double high, int left, int right);
   Worst worst(const Pair& pair, const Eigen::MatrixXd& models) const;
-  LeafInequality inequality(const Pair& pair, const Worst& worst, std::ptrdiff_t size, double room) const;
+  LeafInequality inequality(const Pair& pair, const Worst& worst, Eigen::Index size, double room) const;
 
   std::vector<Pair> pairs_;    // of one split one after the other
   std::vector<Range> groups_;  // options of an input of a pair

@@ -7,26 +7,24 @@
 namespace llmt {
 namespace {
 
-/// On the diagonal of a node's Gram matrix, in rows: where rows say nothing a model stays.
+// On the diagonal of a node's Gram matrix, in rows: where rows say nothing a model stays.
 constexpr double least_hold = 1e-9;
 
 }  // namespace
 
 std::vector<int> coefficient_signs(const TrainingRows& training) {
   const std::vector<int>& of_inputs = training.table->slope_signs;
-  if (std::all_of(of_inputs.begin(), of_inputs.end(), [](int sign) { return sign == 0; })) {
-    return {};
-  }
+  if (std::ranges::all_of(of_inputs, [](int sign) { return sign == 0; })) return {};
   std::vector<int> signs = {0};
   for (const Regressor& regressor : training.regressors) {
-    signs.push_back(regressor.level < 0 ? of_inputs[static_cast<std::size_t>(regressor.input)] : 0);
+    signs.push_back(regressor.level < 0 ? of_inputs[regressor.input] : 0);
   }
   return signs;
 }
 
 bool has_signs(const std::vector<int>& signs, const Node& node) {
   for (std::size_t k = 1; k < signs.size(); ++k) {
-    if (signs[k] != 0 && (signs[k] * node.slope.col(static_cast<std::ptrdiff_t>(k) - 1).array() < 0.0).any()) {
+    if (signs[k] != 0 && (signs[k] * node.slope.col(static_cast<Eigen::Index>(k) - 1).array() < 0.0).any()) {
       return false;
     }
   }
@@ -38,8 +36,8 @@ void keep_signs_by_gram(const std::vector<int>& signs, const Eigen::MatrixXd& gr
   Eigen::MatrixXd matrix = gram;
   matrix.diagonal().array() += least_hold * (1.0 + gram(0, 0));
   const Eigen::LLT<Eigen::MatrixXd> factor(matrix);
-  const std::ptrdiff_t regressors = scale.size();
-  for (std::ptrdiff_t o = 0; o < node.value.size(); ++o) {
+  const Eigen::Index regressors = scale.size();
+  for (Eigen::Index o = 0; o < node.value.size(); ++o) {
     Eigen::VectorXd model(regressors + 1);
     model << node.value(o), node.slope.row(o).transpose().cwiseProduct(scale);
     const Eigen::VectorXd moved = nearest_with_signs(factor, model, signs);
@@ -51,10 +49,8 @@ void keep_signs_by_gram(const std::vector<int>& signs, const Eigen::MatrixXd& gr
 
 void keep_signs(const std::vector<int>& signs, const Eigen::MatrixXd& deviations, const Eigen::VectorXd& weights,
                 Node& node) {
-  if (has_signs(signs, node)) {
-    return;
-  }
-  const std::ptrdiff_t regressors = deviations.cols();
+  if (has_signs(signs, node)) return;
+  const Eigen::Index regressors = deviations.cols();
   const Eigen::VectorXd scale =
       (weights.transpose() * deviations.cwiseAbs2() / weights.sum()).cwiseSqrt().transpose().unaryExpr([](double size) {
         return size > 0.0 ? size : 1.0;

@@ -3,6 +3,7 @@
 /// numbers.
 #pragma once
 
+#include <Eigen/Core>
 #include <cstddef>
 #include <string>
 #include <string_view>

@@ -16,12 +16,10 @@ constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
 
 std::string_view between(const char* begin, const char* end) { return {begin, static_cast<std::size_t>(end - begin)}; }
 
-/// The first of these that the header has, outside quotes or inside.
+// The first of these that the header has, outside quotes or inside.
 char separator_of(std::string_view header) {
   for (const char candidate : {',', ';', '\t'}) {
-    if (header.find(candidate) != std::string_view::npos) {
-      return candidate;
-    }
+    if (header.find(candidate) != std::string_view::npos) return candidate;
   }
   return ',';
 }
@@ -63,9 +61,7 @@ void Csv::read_header() {
           fmt::format("{}:{}: the header has column \"{}\" twice", name_, line_at(header_begin_), column));
     }
     columns_.push_back(std::move(column));
-    if (field_end == end) {
-      return;
-    }
+    if (field_end == end) return;
     begin = field_end + 1;
   }
 }
@@ -77,7 +73,7 @@ void Csv::find_rows() {
   for (const char* begin = after(csv::record_at(text + header_begin_, end, separator_)); begin != end;) {
     const csv::Record record = csv::record_at(begin, end, separator_);
     if (!csv::is_blank(between(begin, record.end))) {
-      row_begins_.push_back(static_cast<std::size_t>(begin - text));
+      row_begins_.push_back(begin - text);
       if (record.fields != columns_.size()) {
         const bool is_last =
             !more_follows_ && between(record.end, end).find_first_not_of(" \t\r\n") == std::string_view::npos;
@@ -100,20 +96,18 @@ std::size_t Csv::index_of(std::string_view column) const {
   return found->second;
 }
 
-std::string_view Csv::row_text(std::ptrdiff_t row) const {
-  return record_text(row_begins_[static_cast<std::size_t>(row)]);
-}
+std::string_view Csv::row_text(Eigen::Index row) const { return record_text(row_begins_[row]); }
 
 std::string_view Csv::header_text() const { return record_text(header_begin_); }
 
-std::ptrdiff_t Csv::line_of(std::ptrdiff_t row) const { return line_at(row_begins_[static_cast<std::size_t>(row)]); }
+Eigen::Index Csv::line_of(Eigen::Index row) const { return line_at(row_begins_[row]); }
 
-std::vector<std::ptrdiff_t> Csv::lines_of(std::span<const std::ptrdiff_t> rows) const {
-  std::vector<std::ptrdiff_t> lines;
-  std::ptrdiff_t line = 1 + lines_left_out_;
+std::vector<Eigen::Index> Csv::lines_of(std::span<const Eigen::Index> rows) const {
+  std::vector<Eigen::Index> lines;
+  Eigen::Index line = 1 + lines_left_out_;
   auto counted = text_.begin();
-  for (const std::ptrdiff_t row : rows) {
-    const auto begin = text_.begin() + static_cast<std::ptrdiff_t>(row_begins_[static_cast<std::size_t>(row)]);
+  for (const Eigen::Index row : rows) {
+    const auto begin = text_.begin() + static_cast<Eigen::Index>(row_begins_[row]);
     line += std::count(counted, begin, '\n');
     lines.push_back(line);
     counted = begin;
@@ -121,11 +115,11 @@ std::vector<std::ptrdiff_t> Csv::lines_of(std::span<const std::ptrdiff_t> rows) 
   return lines;
 }
 
-std::ptrdiff_t Csv::line_at(std::size_t offset) const {
-  return 1 + lines_left_out_ + std::count(text_.begin(), text_.begin() + static_cast<std::ptrdiff_t>(offset), '\n');
+Eigen::Index Csv::line_at(std::size_t offset) const {
+  return 1 + lines_left_out_ + std::count(text_.begin(), text_.begin() + static_cast<Eigen::Index>(offset), '\n');
 }
 
-/// The record at `begin` without its line end.
+// The record at `begin` without its line end.
 std::string_view Csv::record_text(std::size_t begin) const {
   const char* const end = text_.data() + text_.size();
   const std::string_view text =

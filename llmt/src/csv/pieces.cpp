@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::size_t longest_record = 16 << 20;
 
-/// How much of `text` is whole records.
+// How much of `text` is whole records.
 std::size_t whole_records(const std::string& text) {
   const char* const end = text.data() + text.size();
   const char* begin = text.data();
@@ -21,7 +21,7 @@ std::size_t whole_records(const std::string& text) {
        record = csv::record_at(begin, end, ',')) {
     begin = record.end + 1;
   }
-  return static_cast<std::size_t>(begin - text.data());
+  return begin - text.data();
 }
 
 }  // namespace
@@ -42,36 +42,30 @@ std::optional<Csv> CsvPieces::next() {
       const std::size_t more = std::max(bytes_, old);
       pending_.resize(old + more);
       input_.read(pending_.data() + old, static_cast<std::streamsize>(more));
-      pending_.resize(old + static_cast<std::size_t>(input_.gcount()));
-      if (input_.bad()) {
-        throw std::runtime_error(fmt::format("{}: cannot be read", name_));
-      }
+      pending_.resize(old + input_.gcount());
+      if (input_.bad()) throw std::runtime_error(fmt::format("{}: cannot be read", name_));
       whole = input_ ? whole_records(pending_) : pending_.size();
     }
     const bool last = !input_;
     const std::string rows = pending_.substr(0, whole);
     pending_.erase(0, whole);
-    if (rows.empty() && !header_.empty()) {
-      return std::nullopt;
-    }
+    if (rows.empty() && !header_.empty()) return std::nullopt;
     if (header_.empty() && !last && rows.find_first_not_of(" \t\r\n") == std::string::npos) {
-      lines_ += std::count(rows.begin(), rows.end(), '\n');
+      lines_ += std::ranges::count(rows, '\n');
       continue;  // blank lines before the header
     }
     Csv csv;
     csv.name_ = name_;
     csv.more_follows_ = !last;
     csv.text_ = header_ + rows;
-    csv.lines_left_out_ = lines_ - std::count(header_.begin(), header_.end(), '\n');
-    lines_ += std::count(rows.begin(), rows.end(), '\n');
+    csv.lines_left_out_ = lines_ - std::ranges::count(header_, '\n');
+    lines_ += std::ranges::count(rows, '\n');
     csv.read_header();
     csv.find_rows();
     if (header_.empty()) {
       header_ = std::string(csv.header_text()) + '\n';
     }
-    if (csv.rows() > 0) {
-      return csv;
-    }
+    if (csv.rows() > 0) return csv;
   }
 }
 

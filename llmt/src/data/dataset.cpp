@@ -17,9 +17,9 @@
 namespace llmt {
 namespace {
 
-/// Levels that get a regressor: all that occur but the most frequent one, which is the reference; ascending.
+// Levels that get a regressor: all that occur but the most frequent one, which is the reference; ascending.
 std::vector<int> level_regressors(const Eigen::Ref<const Eigen::VectorXd>& values, int num_levels) {
-  std::vector<std::ptrdiff_t> count(static_cast<std::size_t>(num_levels), 0);
+  std::vector<Eigen::Index> count(num_levels, 0);
   for (const double value : values) {
     if (!std::isnan(value)) {
       ++count[static_cast<std::size_t>(value)];
@@ -27,22 +27,20 @@ std::vector<int> level_regressors(const Eigen::Ref<const Eigen::VectorXd>& value
   }
   std::vector<int> levels(count.size());
   std::iota(levels.begin(), levels.end(), 0);
-  std::stable_sort(levels.begin(), levels.end(), [&](int a, int b) {
-    return count[static_cast<std::size_t>(a)] > count[static_cast<std::size_t>(b)];
-  });
-  std::erase_if(levels, [&](int level) { return count[static_cast<std::size_t>(level)] == 0; });
+  std::ranges::stable_sort(levels, [&](int a, int b) { return count[a] > count[b]; });
+  std::erase_if(levels, [&](int level) { return count[level] == 0; });
   if (!levels.empty()) {
     levels.erase(levels.begin());
   }
   levels.resize(std::min<std::size_t>(levels.size(), max_level_regressors));
-  std::sort(levels.begin(), levels.end());
+  std::ranges::sort(levels);
   return levels;
 }
 
-InputColumn describe_input(const TrainingRows& training, std::ptrdiff_t position) {
+InputColumn describe_input(const TrainingRows& training, Eigen::Index position) {
   InputColumn column;
   column.name = fmt::format("x{}", position + 1);
-  for (int level = 0; level < training.table->num_levels[static_cast<std::size_t>(position)]; ++level) {
+  for (int level = 0; level < training.table->num_levels[position]; ++level) {
     column.levels.push_back(fmt::format("{}", level));
   }
   double low = std::numeric_limits<double>::infinity();
@@ -66,7 +64,7 @@ InputColumn describe_input(const TrainingRows& training, std::ptrdiff_t position
   return column;
 }
 
-OutputColumn describe_output(const TrainingRows& training, std::ptrdiff_t position) {
+OutputColumn describe_output(const TrainingRows& training, Eigen::Index position) {
   OutputColumn column{.name = training.table->outputs.cols() == 1 ? "y" : fmt::format("y{}", position + 1),
                       .low = std::numeric_limits<double>::infinity(),
                       .high = -std::numeric_limits<double>::infinity()};
@@ -77,7 +75,7 @@ OutputColumn describe_output(const TrainingRows& training, std::ptrdiff_t positi
   return column;
 }
 
-/// The part of the rows with a value of `input` that have this level.
+// The part of the rows with a value of `input` that have this level.
 double share_of_level(const TrainingRows& training, int input, int level) {
   double present = 0.0;
   double here = 0.0;
@@ -89,7 +87,7 @@ double share_of_level(const TrainingRows& training, int input, int level) {
   return present > 0.0 ? here / present : 0.0;
 }
 
-/// The two smallest, or with `sign` -1 largest, of the values seen.
+// The two smallest, or with `sign` -1 largest, of the values seen.
 struct Extremes {
   double sign = 1.0;
   double first = std::numeric_limits<double>::infinity();  // sign * value
@@ -102,7 +100,7 @@ struct Extremes {
   }
 };
 
-/// What the rows tell of a regressor.
+// What the rows tell of a regressor.
 struct RegressorRange {
   bool has_missing = false;
   double scale = 1.0;
@@ -112,10 +110,9 @@ struct RegressorRange {
 
 RegressorRange describe_regressor(const TrainingRows& training, const Regressor& regressor) {
   const Table& table = *training.table;
-  const InputColumn& column = training.columns[static_cast<std::size_t>(regressor.input)];
+  const InputColumn& column = training.columns[regressor.input];
   const bool is_level = regressor.level >= 0;
-  const InputColumn* second =
-      is_product(regressor) ? &training.columns[static_cast<std::size_t>(regressor.second_input)] : nullptr;
+  const InputColumn* second = is_product(regressor) ? &training.columns[regressor.second_input] : nullptr;
   // Squares are taken of parts of the largest deviation: those of the deviations may be too large, or too small.
   const auto farthest = [](const InputColumn& input, double centre) {
     return std::max({input.high - centre, centre - input.low, 0.0});
@@ -127,7 +124,7 @@ RegressorRange describe_regressor(const TrainingRows& training, const Regressor&
   double squares = 0.0;
   Extremes low{1.0};
   Extremes high{-1.0};
-  std::ptrdiff_t present = 0;
+  Eigen::Index present = 0;
   RegressorRange range;
   for (const int row : training.rows) {
     double x = table.inputs(row, regressor.input);
@@ -161,13 +158,13 @@ RegressorRange describe_regressor(const TrainingRows& training, const Regressor&
 
 Eigen::VectorXd TrainingRows::low() const {
   Eigen::VectorXd result(std::ssize(columns));
-  std::transform(columns.begin(), columns.end(), result.begin(), [](const InputColumn& column) { return column.low; });
+  std::ranges::transform(columns, result.begin(), [](const InputColumn& column) { return column.low; });
   return result;
 }
 
 Eigen::VectorXd TrainingRows::high() const {
   Eigen::VectorXd result(std::ssize(columns));
-  std::transform(columns.begin(), columns.end(), result.begin(), [](const InputColumn& column) { return column.high; });
+  std::ranges::transform(columns, result.begin(), [](const InputColumn& column) { return column.high; });
   return result;
 }
 
@@ -176,16 +173,16 @@ TrainingRows training_rows(const Table& table, std::vector<int> rows, int max_th
   training.table = &table;
   training.rows = std::move(rows);
   training.weight_unit = static_cast<double>(training.count()) / total_weight(training);
-  training.columns.resize(static_cast<std::size_t>(table.inputs.cols()));
+  training.columns.resize(table.inputs.cols());
   parallel_for(table.inputs.cols(), max_threads,
-               [&](std::ptrdiff_t j) { training.columns[static_cast<std::size_t>(j)] = describe_input(training, j); });
-  for (std::ptrdiff_t o = 0; o < table.outputs.cols(); ++o) {
+               [&](Eigen::Index j) { training.columns[j] = describe_input(training, j); });
+  for (Eigen::Index o = 0; o < table.outputs.cols(); ++o) {
     training.output_columns.push_back(describe_output(training, o));
   }
   for (const int input : table.regression_inputs) {
-    const int num_levels = table.num_levels[static_cast<std::size_t>(input)];
+    const int num_levels = table.num_levels[input];
     if (num_levels == 0) {
-      training.regressors.push_back({input, -1, training.columns[static_cast<std::size_t>(input)].centre});
+      training.regressors.push_back({input, -1, training.columns[input].centre});
       continue;
     }
     // From all rows of the table, so that the folds agree.
@@ -195,21 +192,21 @@ TrainingRows training_rows(const Table& table, std::vector<int> rows, int max_th
   }
   const std::size_t first_product = training.regressors.size();
   training.regressors.resize(first_product + table.products.size());
-  parallel_for(std::ssize(table.products), max_threads, [&](std::ptrdiff_t k) {
-    const std::size_t slot = static_cast<std::size_t>(k);
+  parallel_for(std::ssize(table.products), max_threads, [&](Eigen::Index k) {
+    const std::size_t slot = k;
     training.regressors[first_product + slot] =
         product_regressor(table, training.rows, training.columns, table.products[slot]);
   });
-  const std::ptrdiff_t regressors = std::ssize(training.regressors);
+  const Eigen::Index regressors = std::ssize(training.regressors);
   std::vector<RegressorRange> ranges(training.regressors.size());
-  parallel_for(regressors, max_threads, [&](std::ptrdiff_t k) {
-    const std::size_t slot = static_cast<std::size_t>(k);
+  parallel_for(regressors, max_threads, [&](Eigen::Index k) {
+    const std::size_t slot = k;
     ranges[slot] = describe_regressor(training, training.regressors[slot]);
   });
   training.scale.resize(regressors);
   training.spread.resize(2, regressors);
-  for (std::ptrdiff_t k = 0; k < regressors; ++k) {
-    const RegressorRange& range = ranges[static_cast<std::size_t>(k)];
+  for (Eigen::Index k = 0; k < regressors; ++k) {
+    const RegressorRange& range = ranges[k];
     training.has_missing = training.has_missing || range.has_missing;
     training.scale(k) = range.scale;
     training.spread.col(k) << range.low, range.high;
@@ -236,24 +233,22 @@ double total_weight(const TrainingRows& rows) {
 }
 
 Chunk fetch(const TrainingRows& rows, const std::vector<int>& positions, const std::vector<int>& outputs) {
-  const std::ptrdiff_t count = std::ssize(positions);
+  const Eigen::Index count = std::ssize(positions);
   const Table& table = *rows.table;
-  const auto row_at = [&](std::ptrdiff_t i) {
-    return rows.rows[static_cast<std::size_t>(positions[static_cast<std::size_t>(i)])];
-  };
+  const auto row_at = [&](Eigen::Index i) { return rows.rows[positions[i]]; };
   Chunk chunk{RowMajor(count, table.inputs.cols()), RowMajor(count, std::ssize(rows.regressors)),
               RowMajor(count, std::ssize(outputs)), Eigen::VectorXd(count)};
-  for (std::ptrdiff_t j = 0; j < table.inputs.cols(); ++j) {
-    for (std::ptrdiff_t i = 0; i < count; ++i) {
+  for (Eigen::Index j = 0; j < table.inputs.cols(); ++j) {
+    for (Eigen::Index i = 0; i < count; ++i) {
       chunk.inputs(i, j) = table.inputs(row_at(i), j);
     }
   }
-  for (std::ptrdiff_t o = 0; o < std::ssize(outputs); ++o) {
-    for (std::ptrdiff_t i = 0; i < count; ++i) {
-      chunk.outputs(i, o) = table.outputs(row_at(i), outputs[static_cast<std::size_t>(o)]);
+  for (Eigen::Index o = 0; o < std::ssize(outputs); ++o) {
+    for (Eigen::Index i = 0; i < count; ++i) {
+      chunk.outputs(i, o) = table.outputs(row_at(i), outputs[o]);
     }
   }
-  for (std::ptrdiff_t i = 0; i < count; ++i) {
+  for (Eigen::Index i = 0; i < count; ++i) {
     chunk.weights(i) = rows.weight_unit * table.weights(row_at(i));
     deviations_at(rows.columns, rows.regressors, chunk.inputs.row(i).data(), chunk.deviations.row(i).data());
   }
@@ -263,35 +258,33 @@ Chunk fetch(const TrainingRows& rows, const std::vector<int>& positions, const s
 RowMajor inputs_of(const TrainingRows& rows, std::span<const int> positions) {
   const Eigen::Ref<const Eigen::MatrixXd>& inputs = rows.table->inputs;
   RowMajor result(std::ssize(positions), inputs.cols());
-  for (std::ptrdiff_t i = 0; i < result.rows(); ++i) {
-    const int row = rows.rows[static_cast<std::size_t>(positions[static_cast<std::size_t>(i)])];
-    for (std::ptrdiff_t j = 0; j < result.cols(); ++j) {
+  for (Eigen::Index i = 0; i < result.rows(); ++i) {
+    const int row = rows.rows[positions[i]];
+    for (Eigen::Index j = 0; j < result.cols(); ++j) {
       result(i, j) = inputs(row, j);
     }
   }
   return result;
 }
 
-Chunk fetch(const TrainingRows& rows, std::ptrdiff_t index, const std::vector<int>& outputs) {
-  std::vector<int> positions(static_cast<std::size_t>(std::min(chunk_rows, rows.count() - index * chunk_rows)));
+Chunk fetch(const TrainingRows& rows, Eigen::Index index, const std::vector<int>& outputs) {
+  std::vector<int> positions(std::min(chunk_rows, rows.count() - index * chunk_rows));
   std::iota(positions.begin(), positions.end(), static_cast<int>(index * chunk_rows));
   return fetch(rows, positions, outputs);
 }
 
 void for_each_chunk(const TrainingRows& rows, const std::vector<int>& outputs, int max_threads,
                     const std::function<void(std::size_t, const Chunk&)>& body) {
-  parallel_for(std::min(num_slots, num_chunks(rows)), max_threads, [&](std::ptrdiff_t slot) {
-    for (std::ptrdiff_t index = slot; index < num_chunks(rows); index += num_slots) {
-      body(static_cast<std::size_t>(slot), fetch(rows, index, outputs));
+  parallel_for(std::min(num_slots, num_chunks(rows)), max_threads, [&](Eigen::Index slot) {
+    for (Eigen::Index index = slot; index < num_chunks(rows); index += num_slots) {
+      body(slot, fetch(rows, index, outputs));
     }
   });
 }
 
-TrainingRows thinned(const TrainingRows& rows, std::ptrdiff_t count) {
+TrainingRows thinned(const TrainingRows& rows, Eigen::Index count) {
   TrainingRows result = rows;
-  if (rows.count() <= count + count / 4) {
-    return result;
-  }
+  if (rows.count() <= count + count / 4) return result;
   // The rows with the smallest hashes of their values. Steps of splitmix64 (Steele, Lea & Flood 2014).
   const auto mixed = [](std::uint64_t state, double value) {
     std::uint64_t z = state + std::bit_cast<std::uint64_t>(value + 0.0) + 0x9e3779b97f4a7c15ULL;  // -0 as 0
@@ -302,18 +295,18 @@ TrainingRows thinned(const TrainingRows& rows, std::ptrdiff_t count) {
   std::vector<std::uint64_t> hashes;
   for (const int row : rows.rows) {
     std::uint64_t hash = 0;
-    for (std::ptrdiff_t j = 0; j < rows.table->inputs.cols(); ++j) {
+    for (Eigen::Index j = 0; j < rows.table->inputs.cols(); ++j) {
       const double value = rows.table->inputs(row, j);
       hash = mixed(hash, std::isnan(value) ? std::numeric_limits<double>::infinity() : value);
     }
-    for (std::ptrdiff_t o = 0; o < rows.table->outputs.cols(); ++o) {
+    for (Eigen::Index o = 0; o < rows.table->outputs.cols(); ++o) {
       hash = mixed(hash, rows.table->outputs(row, o));
     }
     hashes.push_back(hash);
   }
   std::vector<std::uint64_t> order = hashes;
   std::nth_element(order.begin(), order.begin() + (count - 1), order.end());
-  const std::uint64_t last = order[static_cast<std::size_t>(count - 1)];
+  const std::uint64_t last = order[count - 1];
   result.rows.clear();
   for (std::size_t i = 0; i < hashes.size(); ++i) {
     if (hashes[i] <= last) {

@@ -26,7 +26,7 @@ struct TrainingRows {
   Eigen::VectorXd scale;     ///< root mean square of each regressor's deviations; 1 where it is 0
   Eigen::MatrixXd spread;    ///< 2 x regressors: smallest and largest deviation but for the one row at either end
 
-  std::ptrdiff_t count() const { return std::ssize(rows); }
+  Eigen::Index count() const { return std::ssize(rows); }
   Eigen::VectorXd low() const;  ///< extent of the inputs
   Eigen::VectorXd high() const;
 };
@@ -44,18 +44,18 @@ struct Chunk {
   RowMajor outputs;     ///< the ones asked for
   Eigen::VectorXd weights;
 
-  std::ptrdiff_t count() const { return weights.size(); }
+  Eigen::Index count() const { return weights.size(); }
 };
 
-inline constexpr std::ptrdiff_t chunk_rows = 2048;
+inline constexpr Eigen::Index chunk_rows = 2048;
 
-inline std::ptrdiff_t num_chunks(const TrainingRows& rows) { return (rows.count() + chunk_rows - 1) / chunk_rows; }
+inline Eigen::Index num_chunks(const TrainingRows& rows) { return (rows.count() + chunk_rows - 1) / chunk_rows; }
 
 /// Sum of the rows' weights.
 double total_weight(const TrainingRows& rows);
 
 /// The rows at positions index * chunk_rows ... of `rows`.
-Chunk fetch(const TrainingRows& rows, std::ptrdiff_t index, const std::vector<int>& outputs);
+Chunk fetch(const TrainingRows& rows, Eigen::Index index, const std::vector<int>& outputs);
 
 /// Inputs of some rows, given by their positions among `rows`; NaN: missing.
 RowMajor inputs_of(const TrainingRows& rows, std::span<const int> positions);
@@ -65,15 +65,15 @@ Chunk fetch(const TrainingRows& rows, const std::vector<int>& positions, const s
 
 /// Passes over the rows in parallel: the chunks index, index + num_slots, ... of a slot come one after the other. What
 /// is summed up is summed per slot, and the slots in order.
-inline constexpr std::ptrdiff_t num_slots = 16;
+inline constexpr Eigen::Index num_slots = 16;
 void for_each_chunk(const TrainingRows& rows, const std::vector<int>& outputs, int max_threads,
                     const std::function<void(std::size_t slot, const Chunk& chunk)>& body);
 
 /// About `count` of the rows, or all if they are few more, with weights that make them stand for all. Which ones
 /// depends on the rows' values, not on their order; fewer are among more.
-TrainingRows thinned(const TrainingRows& rows, std::ptrdiff_t count);
+TrainingRows thinned(const TrainingRows& rows, Eigen::Index count);
 
 /// Levels beyond this many, the rarest, share the reference level's place in the local models.
-inline constexpr std::ptrdiff_t max_level_regressors = 30;
+inline constexpr Eigen::Index max_level_regressors = 30;
 
 }  // namespace llmt

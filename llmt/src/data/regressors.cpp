@@ -6,14 +6,12 @@
 namespace llmt {
 namespace {
 
-/// How many different values a column has; 3 stands for more.
+// How many different values a column has; 3 stands for more.
 int distinct_values(const Eigen::Ref<const Eigen::VectorXd>& column) {
   double first = std::nan("");
   double second = std::nan("");
   for (const double value : column) {
-    if (std::isnan(value) || value == first || value == second) {
-      continue;
-    }
+    if (std::isnan(value) || value == first || value == second) continue;
     if (std::isnan(first)) {
       first = value;
     } else if (std::isnan(second)) {
@@ -29,17 +27,15 @@ int distinct_values(const Eigen::Ref<const Eigen::VectorXd>& column) {
 
 std::vector<int> numeric_regression_inputs(const Table& table) {
   std::vector<int> result;
-  std::copy_if(table.regression_inputs.begin(), table.regression_inputs.end(), std::back_inserter(result),
-               [&](int input) { return table.num_levels[static_cast<std::size_t>(input)] == 0; });
+  std::ranges::copy_if(table.regression_inputs, std::back_inserter(result),
+                       [&](int input) { return table.num_levels[input] == 0; });
   return result;
 }
 
 std::vector<std::pair<int, int>> products_of(const Table& table) {
   std::vector<int> inputs = numeric_regression_inputs(table);
   // The slope in an input that products change has no sign.
-  std::erase_if(inputs, [&](int input) {
-    return !table.slope_signs.empty() && table.slope_signs[static_cast<std::size_t>(input)] != 0;
-  });
+  std::erase_if(inputs, [&](int input) { return !table.slope_signs.empty() && table.slope_signs[input] != 0; });
   std::vector<int> distinct;
   for (const int input : inputs) {
     distinct.push_back(distinct_values(table.inputs.col(input)));
@@ -58,8 +54,8 @@ std::vector<std::pair<int, int>> products_of(const Table& table) {
 Regressor product_regressor(const Table& table, const std::vector<int>& rows, const std::vector<InputColumn>& columns,
                             const std::pair<int, int>& inputs) {
   const auto [first, second] = inputs;
-  const double first_centre = columns[static_cast<std::size_t>(first)].centre;
-  const double second_centre = columns[static_cast<std::size_t>(second)].centre;
+  const double first_centre = columns[first].centre;
+  const double second_centre = columns[second].centre;
   double sum = 0.0;
   double present = 0.0;
   for (const int row : rows) {

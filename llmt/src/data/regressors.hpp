@@ -13,7 +13,7 @@ namespace llmt {
 
 /// Products make (d + 1) (d + 2) / 2 coefficients of d numbers, and growth costs the square of that: beyond so many
 /// numeric regression inputs (105 coefficients) there are none.
-inline constexpr std::ptrdiff_t most_inputs_of_products = 13;
+inline constexpr Eigen::Index most_inputs_of_products = 13;
 
 /// Numeric regression inputs of a table.
 std::vector<int> numeric_regression_inputs(const Table& table);

@@ -10,11 +10,11 @@
 namespace llmt {
 namespace {
 
-/// Leaves of the tree that are asked whether they agree on a slope beyond the training extent.
-constexpr std::ptrdiff_t leaves_that_agree = 32;
+// Leaves of the tree that are asked whether they agree on a slope beyond the training extent.
+constexpr Eigen::Index leaves_that_agree = 32;
 
-/// From a sample with so many rows for each unknown the joint estimate on many more rows starts.
-constexpr std::ptrdiff_t rows_per_unknown = 50;
+// From a sample with so many rows for each unknown the joint estimate on many more rows starts.
+constexpr Eigen::Index rows_per_unknown = 50;
 
 }  // namespace
 
@@ -29,8 +29,8 @@ Eigen::MatrixXd agreed_slope(const Partition& grown) {
     }
   }
   Eigen::MatrixXd slope = root.slope;
-  for (std::ptrdiff_t o = 0; o < spread.rows(); ++o) {
-    for (std::ptrdiff_t k = 0; k < spread.cols(); ++k) {
+  for (Eigen::Index o = 0; o < spread.rows(); ++o) {
+    for (Eigen::Index k = 0; k < spread.cols(); ++k) {
       const double squared = root.slope(o, k) * root.slope(o, k);
       slope(o, k) *= squared > spread(o, k) ? 1.0 - spread(o, k) / squared : 0.0;
     }
@@ -44,7 +44,7 @@ Partition blended(const TrainingRows& training, const GrownTree& grown, const Va
   set_half_widths(partition, training.low(), training.high());
   limit_half_widths(partition, training);
   for (std::size_t i = 0; i < partition.nodes.size(); ++i) {
-    if (grown.jumps(static_cast<std::ptrdiff_t>(i)) >= jump) {
+    if (grown.jumps(i) >= jump) {
       partition.nodes[i].half_width = 0.0;
     }
   }
@@ -63,7 +63,7 @@ Partition estimate(const TrainingRows& training, const GrownTree& grown, const C
                : fit.as_grown(candidate.leaves);
   }
   const Regularisation regularisation{candidate.ridge, candidate.shrinkage, candidate.sparse};
-  const std::ptrdiff_t enough = rows_per_unknown * candidate.leaves * (std::ssize(training.regressors) + 1);
+  const Eigen::Index enough = rows_per_unknown * candidate.leaves * (std::ssize(training.regressors) + 1);
   if (candidate.estimation == Estimation::joint && training.count() > 2 * enough) {
     const TrainingRows sample = thinned(training, enough);
     const JointFit fit(sample, std::move(partition), max_threads, candidate.sparse);
@@ -88,7 +88,7 @@ Eigen::VectorXd prefix_squared_errors(const Partition& partition, const Training
   std::vector<Eigen::VectorXd> changes(num_slots, Eigen::VectorXd::Zero(partition.num_leaves()));
   for_each_chunk(rows, partition.outputs, max_threads, [&](std::size_t slot, const Chunk& chunk) {
     Eigen::VectorXd values(std::ssize(partition.outputs));
-    for (std::ptrdiff_t row = 0; row < chunk.count(); ++row) {
+    for (Eigen::Index row = 0; row < chunk.count(); ++row) {
       const double* deviations = chunk.deviations.row(row).data();
       double previous = 0.0;
       for (int node = 0; node >= 0;) {
@@ -99,9 +99,7 @@ Eigen::VectorXd prefix_squared_errors(const Partition& partition, const Training
         // Nodes 2k-1 and 2k come with the k-th split, that is with k + 1 leaves.
         changes[slot]((node + 1) / 2) += squared - previous;
         previous = squared;
-        node = partition.nodes[static_cast<std::size_t>(node)].is_leaf()
-                   ? -1
-                   : evaluator.child_of(node, chunk.inputs.row(row).data());
+        node = partition.nodes[node].is_leaf() ? -1 : evaluator.child_of(node, chunk.inputs.row(row).data());
       }
     }
   });
@@ -109,7 +107,7 @@ Eigen::VectorXd prefix_squared_errors(const Partition& partition, const Training
   for (const Eigen::VectorXd& change : changes) {
     sums += change;
   }
-  for (std::ptrdiff_t leaves = 1; leaves < sums.size(); ++leaves) {
+  for (Eigen::Index leaves = 1; leaves < sums.size(); ++leaves) {
     sums(leaves) += sums(leaves - 1);
   }
   return sums.cwiseMax(0.0);
@@ -122,7 +120,7 @@ double squared_error(const Partition& partition, const TrainingRows& columns, co
   Eigen::VectorXd values(std::ssize(partition.outputs));
   double sum = 0.0;
   for (const Chunk& chunk : rows) {
-    for (std::ptrdiff_t row = 0; row < chunk.count(); ++row) {
+    for (Eigen::Index row = 0; row < chunk.count(); ++row) {
       evaluator.activate(chunk.inputs.row(row).data(), active);
       evaluator.combine(active, chunk.deviations.row(row).data(), values.data());
       sum += chunk.weights(row) * weights.dot((chunk.outputs.row(row).transpose() - values).cwiseAbs2());

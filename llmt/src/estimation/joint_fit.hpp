@@ -41,17 +41,17 @@ class JointFit {
   JointFit(const TrainingRows& training, Partition partition, int max_threads, bool sparse = false);
 
   /// The prefix with `leaves` leaves and the joint estimates for each ridge and shrinkage, in order.
-  std::vector<Partition> joint(std::ptrdiff_t leaves, const std::vector<Regularisation>& regularisations) const;
+  std::vector<Partition> joint(Eigen::Index leaves, const std::vector<Regularisation>& regularisations) const;
 
   /// One joint estimate on the rows `all`, of which this fit's are a sample that stands for them: from the estimate on
   /// the sample by conjugate gradients, preconditioned with it. Local estimates and hold are those of the sample.
-  Partition joint_on(const TrainingRows& all, std::ptrdiff_t leaves, const Regularisation& regularisation) const;
+  Partition joint_on(const TrainingRows& all, Eigen::Index leaves, const Regularisation& regularisation) const;
 
   /// The prefix with `leaves` leaves and locally weighted estimates.
-  Partition local(std::ptrdiff_t leaves, double shrinkage, bool sparse = false) const;
+  Partition local(Eigen::Index leaves, double shrinkage, bool sparse = false) const;
 
   /// The prefix as grown, with the ranges of the validities.
-  Partition as_grown(std::ptrdiff_t leaves) const;
+  Partition as_grown(Eigen::Index leaves) const;
 
   /// Whether leaves have to be in order across some split, so that only estimates of the same prefix keep it.
   bool has_ordered_leaves() const;
@@ -59,7 +59,7 @@ class JointFit {
  private:
   /// The normal equations of a prefix.
   struct System {
-    std::ptrdiff_t leaves = 0;
+    Eigen::Index leaves = 0;
     std::vector<int> nodes;     // its leaves
     std::vector<int> position;  // of every node at or below one of them: that leaf's among `nodes`; else -1
     RowMajor matrix;            // upper triangle
@@ -69,19 +69,19 @@ class JointFit {
     std::vector<Eigen::MatrixXd> local;  // of every node
     Eigen::MatrixXd anchors;             // of the leaves, one below the other
     Eigen::MatrixXd coefficients;
-    std::vector<std::ptrdiff_t> kept;  // unknowns of a sparse estimate
-    RowMajor factor;                   // of the matrix of the unknowns
+    std::vector<Eigen::Index> kept;  // unknowns of a sparse estimate
+    RowMajor factor;                 // of the matrix of the unknowns
   };
 
-  System system(std::ptrdiff_t leaves) const;
+  System system(Eigen::Index leaves) const;
   Solution solve(const System& system, const Regularisation& regularisation) const;
   /// Coefficients of the unknowns of a sparse estimate.
-  std::vector<std::ptrdiff_t> kept_unknowns(const System& system) const;
+  std::vector<Eigen::Index> kept_unknowns(const System& system) const;
   /// Replaces `right` by the factored matrix' inverse times it; 0 where a sparse estimate has no unknown.
   static void divide(const Solution& solution, Eigen::MatrixXd& right);
   Partition with_solution(const System& system, const Solution& solution, ActiveInequalities& active) const;
   /// The models of a prefix's nodes, leaves each estimated for itself, under the constraints.
-  Partition constrained(std::ptrdiff_t leaves, std::vector<Eigen::MatrixXd> models, double shrinkage) const;
+  Partition constrained(Eigen::Index leaves, std::vector<Eigen::MatrixXd> models, double shrinkage) const;
   /// What holds the leaves' coefficients, times a change of them.
   Eigen::MatrixXd held(const System& system, const Regularisation& regularisation, const Eigen::MatrixXd& change) const;
   /// sum_n q_n Phi_i a r over `rows`, r what the coefficients leave of the outputs, or of zero.
@@ -91,20 +91,20 @@ class JointFit {
   std::vector<Eigen::MatrixXd> local_models(std::size_t nodes, double shrinkage, bool sparse) const;
   /// Of one node, with the selected coefficients alone. `parent`: its parent's model, for the root its own full one.
   Eigen::MatrixXd sparse_model(std::size_t node, const Eigen::MatrixXd& parent, double shrinkage) const;
-  Partition with_models(std::ptrdiff_t leaves, const std::vector<Eigen::MatrixXd>& models, bool sparse) const;
+  Partition with_models(Eigen::Index leaves, const std::vector<Eigen::MatrixXd>& models, bool sparse) const;
   /// The coefficients that the rows of a node ask for.
-  std::vector<std::ptrdiff_t> select(std::size_t node) const;
+  std::vector<Eigen::Index> select(std::size_t node) const;
   Eigen::VectorXd hold(std::size_t node, double shrinkage) const;
   void set_model(Node& node, const Eigen::MatrixXd& coefficients) const;
 
   const TrainingRows& training_;
   Partition partition_;
   int max_threads_;
-  std::ptrdiff_t size_;   // coefficients of a local model
+  Eigen::Index size_;     // coefficients of a local model
   Eigen::MatrixXd root_;  // coefficients of the root's model
   NormalEquations sums_;
-  std::vector<std::vector<std::ptrdiff_t>> selected_;  // coefficients of every node's sparse model
-  std::vector<int> signs_;                             // of the coefficients; empty: none
+  std::vector<std::vector<Eigen::Index>> selected_;  // coefficients of every node's sparse model
+  std::vector<int> signs_;                           // of the coefficients; empty: none
 };
 
 }  // namespace llmt

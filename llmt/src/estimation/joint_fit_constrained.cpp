@@ -8,7 +8,7 @@ namespace llmt {
 
 bool JointFit::has_ordered_leaves() const { return has_ordered_splits(partition_, training_); }
 
-Partition JointFit::constrained(std::ptrdiff_t leaves, std::vector<Eigen::MatrixXd> models, double shrinkage) const {
+Partition JointFit::constrained(Eigen::Index leaves, std::vector<Eigen::MatrixXd> models, double shrinkage) const {
   Partition result = with_models(leaves, models, false);
   if (!has_ordered_splits(result, training_)) {
     finish_constrained(result, training_);
@@ -25,8 +25,8 @@ Partition JointFit::constrained(std::ptrdiff_t leaves, std::vector<Eigen::Matrix
   solution.coefficients.resize(leaves * size_, root_.cols());
   solution.factor.setZero(leaves * size_, leaves * size_);
   for (std::size_t k = 0; k < blocks.nodes.size(); ++k) {
-    const std::size_t node = static_cast<std::size_t>(blocks.nodes[k]);
-    const std::ptrdiff_t at = static_cast<std::ptrdiff_t>(k) * size_;
+    const std::size_t node = blocks.nodes[k];
+    const Eigen::Index at = static_cast<Eigen::Index>(k) * size_;
     solution.coefficients.middleRows(at, size_) = models[node];
     Eigen::MatrixXd matrix = sums_.gram[node];
     matrix.diagonal() += hold(node, shrinkage);

@@ -10,34 +10,34 @@
 namespace llmt {
 namespace {
 
-/// Beyond the outermost rows of a leaf its slopes go on for this part of its range: thresholds lie between rows, and on
-/// a grid the nearest queries half a step from them.
+// Beyond the outermost rows of a leaf its slopes go on for this part of its range: thresholds lie between rows, and on
+// a grid the nearest queries half a step from them.
 constexpr double range_margin = 0.25;
 
-/// Logistic gates reach every row a little: a leaf's range is that of the rows where it has more validity than this.
+// Logistic gates reach every row a little: a leaf's range is that of the rows where it has more validity than this.
 constexpr double reach_of_logistic = 1e-3;
 
-/// a += factor * b.
-inline void add_scaled(double* a, const double* b, double factor, std::ptrdiff_t size) {
-  for (std::ptrdiff_t k = 0; k < size; ++k) {
+// a += factor * b.
+inline void add_scaled(double* a, const double* b, double factor, Eigen::Index size) {
+  for (Eigen::Index k = 0; k < size; ++k) {
     a[k] += factor * b[k];
   }
 }
 
-/// A leaf that reaches a row.
+// A leaf that reaches a row.
 struct Entry {
   int leaf;
   double validity;
 };
 
-/// A row that a leaf reaches.
+// A row that a leaf reaches.
 struct Use {
-  std::ptrdiff_t row;     // in the chunk
-  std::ptrdiff_t before;  // first entry of the row
-  std::ptrdiff_t entry;   // that of the leaf
+  Eigen::Index row;     // in the chunk
+  Eigen::Index before;  // first entry of the row
+  Eigen::Index entry;   // that of the leaf
 };
 
-/// A chunk of rows with the leaves that reach them.
+// A chunk of rows with the leaves that reach them.
 struct Reached {
   Chunk chunk;
   std::vector<Entry> entries;          // of a row: ascending leaves
@@ -74,11 +74,11 @@ class Assembly {
   }
 
   NormalEquations run(int max_threads) {
-    for (std::ptrdiff_t index = 0; index < num_chunks(training_); ++index) {
+    for (Eigen::Index index = 0; index < num_chunks(training_); ++index) {
       const Reached reached = reach(index);
       // Every leaf for itself: its own sums and its blocks with the leaves before it.
-      parallel_for(std::ssize(sums_.leaves), max_threads, [&](std::ptrdiff_t position) {
-        const std::size_t leaf = static_cast<std::size_t>(position);
+      parallel_for(std::ssize(sums_.leaves), max_threads, [&](Eigen::Index position) {
+        const std::size_t leaf = position;
         if (!reached.uses[leaf].empty()) {
           widen_range(reached, leaf);
           if (sums_.missing) {
@@ -94,33 +94,31 @@ class Assembly {
   }
 
  private:
-  Reached reach(std::ptrdiff_t index) const {
+  Reached reach(Eigen::Index index) const {
     Reached reached{.chunk = fetch(training_, index, partition_.outputs),
                     .entries = {},
                     .uses = std::vector<std::vector<Use>>(sums_.leaves.size()),
                     .regressors = {},
                     .residuals = {},
                     .outer = {}};
-    const std::ptrdiff_t rows = reached.chunk.count();
+    const Eigen::Index rows = reached.chunk.count();
     reached.regressors = RowMajor::Zero(rows, size_);
     reached.residuals = RowMajor::Zero(rows, root_.cols());
     reached.outer.resize(sums_.missing ? 0 : rows, packed_);
     std::vector<Activation> active;
-    for (std::ptrdiff_t row = 0; row < rows; ++row) {
+    for (Eigen::Index row = 0; row < rows; ++row) {
       const double* inputs = reached.chunk.inputs.row(row).data();
-      if (leave_out_ && evaluator_.is_ambiguous(inputs)) {
-        continue;
-      }
+      if (leave_out_ && evaluator_.is_ambiguous(inputs)) continue;
       evaluator_.activate(inputs, active);
-      std::sort(active.begin(), active.end(), [](const auto& a, const auto& b) { return a.node < b.node; });
-      const std::ptrdiff_t before = std::ssize(reached.entries);
+      std::ranges::sort(active, [](const auto& a, const auto& b) { return a.node < b.node; });
+      const Eigen::Index before = std::ssize(reached.entries);
       for (const Activation& entry : active) {
-        const int leaf = leaf_of_node_[static_cast<std::size_t>(entry.node)];
-        reached.uses[static_cast<std::size_t>(leaf)].push_back({row, before, std::ssize(reached.entries)});
+        const int leaf = leaf_of_node_[entry.node];
+        reached.uses[leaf].push_back({row, before, std::ssize(reached.entries)});
         reached.entries.push_back({leaf, entry.validity});
       }
       reached.regressors(row, 0) = 1.0;
-      for (std::ptrdiff_t k = 1; k < size_; ++k) {
+      for (Eigen::Index k = 1; k < size_; ++k) {
         reached.regressors(row, k) = reached.chunk.deviations(row, k - 1) / training_.scale(k - 1);
       }
       reached.residuals.row(row) = reached.chunk.outputs.row(row);
@@ -132,8 +130,8 @@ class Assembly {
       }
       reached.residuals.row(row) -= reached.regressors.row(row) * root_;
       double* out = reached.outer.row(row).data();
-      for (std::ptrdiff_t i = 0; i < size_; ++i) {
-        for (std::ptrdiff_t j = 0; j <= i; ++j) {
+      for (Eigen::Index i = 0; i < size_; ++i) {
+        for (Eigen::Index j = 0; j <= i; ++j) {
           *out++ = reached.regressors(row, i) * reached.regressors(row, j);
         }
       }
@@ -141,26 +139,24 @@ class Assembly {
     return reached;
   }
 
-  /// Regressors with missing values at the mean of a node's rows.
-  Eigen::VectorXd regressors_at(const Reached& reached, std::ptrdiff_t row, int node) const {
+  // Regressors with missing values at the mean of a node's rows.
+  Eigen::VectorXd regressors_at(const Reached& reached, Eigen::Index row, int node) const {
     Eigen::VectorXd result = reached.regressors.row(row);
-    for (std::ptrdiff_t k = 1; k < size_; ++k) {
+    for (Eigen::Index k = 1; k < size_; ++k) {
       if (std::isnan(result(k))) {
-        result(k) = partition_.nodes[static_cast<std::size_t>(node)].mean(k - 1) / training_.scale(k - 1);
+        result(k) = partition_.nodes[node].mean(k - 1) / training_.scale(k - 1);
       }
     }
     return result;
   }
 
   void widen_range(const Reached& reached, std::size_t leaf) {
-    const std::size_t node = static_cast<std::size_t>(sums_.leaves[leaf]);
+    const std::size_t node = sums_.leaves[leaf];
     const double least = partition_.validity.kind == ValidityKind::logistic ? reach_of_logistic : 0.0;
     for (const Use& use : reached.uses[leaf]) {
-      if (!(reached.entries[static_cast<std::size_t>(use.entry)].validity > least)) {
-        continue;
-      }
+      if (!(reached.entries[use.entry].validity > least)) continue;
       const double* deviations = reached.chunk.deviations.row(use.row).data();
-      for (std::ptrdiff_t k = 0; k < size_ - 1; ++k) {
+      for (Eigen::Index k = 0; k < size_ - 1; ++k) {
         low_[node](k) = deviations[k] < low_[node](k) ? deviations[k] : low_[node](k);
         high_[node](k) = deviations[k] > high_[node](k) ? deviations[k] : high_[node](k);
       }
@@ -169,44 +165,43 @@ class Assembly {
 
   std::vector<double>& block_to_add_to(std::size_t leaf, std::size_t other) {
     std::vector<double>& block = sums_.blocks[leaf][other];
-    block.resize(static_cast<std::size_t>(packed_), 0.0);
+    block.resize(packed_, 0.0);
     return block;
   }
 
-  /// All blocks of a leaf as one matrix product: validities of the leaves before it times weighted outer products.
+  // All blocks of a leaf as one matrix product: validities of the leaves before it times weighted outer products.
   void add(const Reached& reached, std::size_t leaf) {
     const std::vector<Use>& uses = reached.uses[leaf];
-    const std::size_t node = static_cast<std::size_t>(sums_.leaves[leaf]);
+    const std::size_t node = sums_.leaves[leaf];
     std::vector<int> column_of(leaf + 1, -1);
     std::vector<int> others;
     for (const Use& use : uses) {
-      for (std::ptrdiff_t e = use.before; e <= use.entry; ++e) {
-        const int other = reached.entries[static_cast<std::size_t>(e)].leaf;
-        if (column_of[static_cast<std::size_t>(other)] < 0) {
-          column_of[static_cast<std::size_t>(other)] = static_cast<int>(others.size());
+      for (Eigen::Index e = use.before; e <= use.entry; ++e) {
+        const int other = reached.entries[e].leaf;
+        if (column_of[other] < 0) {
+          column_of[other] = static_cast<int>(others.size());
           others.push_back(other);
         }
       }
     }
-    const std::ptrdiff_t columns = std::ssize(others) + 1;  // last: 1, for G
+    const Eigen::Index columns = std::ssize(others) + 1;  // last: 1, for G
     RowMajor validities = RowMajor::Zero(std::ssize(uses), columns);
     RowMajor products(std::ssize(uses), packed_);
     for (std::size_t u = 0; u < uses.size(); ++u) {
       const Use& use = uses[u];
-      const std::ptrdiff_t row = static_cast<std::ptrdiff_t>(u);
-      const double weight =
-          reached.chunk.weights(use.row) * reached.entries[static_cast<std::size_t>(use.entry)].validity;
+      const Eigen::Index row = static_cast<Eigen::Index>(u);
+      const double weight = reached.chunk.weights(use.row) * reached.entries[use.entry].validity;
       const double* outer = reached.outer.row(use.row).data();
       double* product = products.row(row).data();
-      for (std::ptrdiff_t k = 0; k < packed_; ++k) {
+      for (Eigen::Index k = 0; k < packed_; ++k) {
         product[k] = weight * outer[k];
       }
-      for (std::ptrdiff_t e = use.before; e <= use.entry; ++e) {
-        const Entry& entry = reached.entries[static_cast<std::size_t>(e)];
-        validities(row, column_of[static_cast<std::size_t>(entry.leaf)]) = entry.validity;
+      for (Eigen::Index e = use.before; e <= use.entry; ++e) {
+        const Entry& entry = reached.entries[e];
+        validities(row, column_of[entry.leaf]) = entry.validity;
       }
       validities(row, columns - 1) = 1.0;
-      for (std::ptrdiff_t o = 0; o < root_.cols(); ++o) {
+      for (Eigen::Index o = 0; o < root_.cols(); ++o) {
         sums_.squares[node](o) += weight * reached.residuals(use.row, o) * reached.residuals(use.row, o);
         add_scaled(sums_.products[node].col(o).data(), reached.regressors.row(use.row).data(),
                    weight * reached.residuals(use.row, o), size_);
@@ -216,12 +211,12 @@ class Assembly {
     add_transposed_product(columns, packed_, validities.rows(), 1.0, validities.data(), columns, products.data(),
                            packed_, sums.data(), packed_);
     for (std::size_t k = 0; k < others.size(); ++k) {
-      std::vector<double>& block = block_to_add_to(leaf, static_cast<std::size_t>(others[k]));
-      Eigen::Map<Eigen::VectorXd>(block.data(), packed_) += sums.row(static_cast<std::ptrdiff_t>(k)).transpose();
+      std::vector<double>& block = block_to_add_to(leaf, others[k]);
+      Eigen::Map<Eigen::VectorXd>(block.data(), packed_) += sums.row(k).transpose();
     }
     const double* sum = sums.row(columns - 1).data();
-    for (std::ptrdiff_t i = 0; i < size_; ++i) {
-      for (std::ptrdiff_t j = 0; j <= i; ++j, ++sum) {
+    for (Eigen::Index i = 0; i < size_; ++i) {
+      for (Eigen::Index j = 0; j <= i; ++j, ++sum) {
         sums_.gram[node](i, j) += *sum;
         sums_.gram[node](j, i) += i == j ? 0.0 : *sum;
       }
@@ -232,29 +227,28 @@ class Assembly {
     const int node = sums_.leaves[leaf];
     for (const Use& use : reached.uses[leaf]) {
       const Eigen::VectorXd x = regressors_at(reached, use.row, node);
-      const double weight =
-          reached.chunk.weights(use.row) * reached.entries[static_cast<std::size_t>(use.entry)].validity;
-      for (std::ptrdiff_t e = use.before; e <= use.entry; ++e) {
-        const Entry& entry = reached.entries[static_cast<std::size_t>(e)];
-        const std::size_t other = static_cast<std::size_t>(entry.leaf);
+      const double weight = reached.chunk.weights(use.row) * reached.entries[use.entry].validity;
+      for (Eigen::Index e = use.before; e <= use.entry; ++e) {
+        const Entry& entry = reached.entries[e];
+        const std::size_t other = entry.leaf;
         const Eigen::VectorXd of_other = regressors_at(reached, use.row, sums_.leaves[other]);
         std::vector<double>& block = block_to_add_to(leaf, other);
-        for (std::ptrdiff_t i = 0; i < size_; ++i) {
+        for (Eigen::Index i = 0; i < size_; ++i) {
           add_scaled(block.data() + i * size_, of_other.data(), weight * entry.validity * x(i), size_);
         }
       }
-      sums_.gram[static_cast<std::size_t>(node)] += weight * x * x.transpose();
-      sums_.products[static_cast<std::size_t>(node)] += weight * x * reached.residuals.row(use.row);
-      sums_.squares[static_cast<std::size_t>(node)] += weight * reached.residuals.row(use.row).cwiseAbs2().transpose();
+      sums_.gram[node] += weight * x * x.transpose();
+      sums_.products[node] += weight * x * reached.residuals.row(use.row);
+      sums_.squares[node] += weight * reached.residuals.row(use.row).cwiseAbs2().transpose();
     }
   }
 
-  /// Of inner nodes from those of the leaves, and all ranges.
+  // Of inner nodes from those of the leaves, and all ranges.
   void sum_up() {
     const std::vector<int> parents = parents_of(partition_);
     for (std::size_t i = partition_.nodes.size(); i-- > 0;) {
       Node& node = partition_.nodes[i];
-      for (std::ptrdiff_t k = 0; k < size_ - 1; ++k) {
+      for (Eigen::Index k = 0; k < size_ - 1; ++k) {
         if (low_[i](k) <= high_[i](k)) {
           const double margin = range_margin * (high_[i](k) - low_[i](k));
           node.low(k) = std::clamp(low_[i](k) - margin, training_.spread(0, k), training_.spread(1, k));
@@ -262,7 +256,7 @@ class Assembly {
         }
       }
       if (i > 0) {
-        const std::size_t parent = static_cast<std::size_t>(parents[i]);
+        const std::size_t parent = parents[i];
         sums_.gram[parent] += sums_.gram[i];
         sums_.products[parent] += sums_.products[i];
         sums_.squares[parent] += sums_.squares[i];
@@ -275,8 +269,8 @@ class Assembly {
   const TrainingRows& training_;
   Partition& partition_;
   const Eigen::MatrixXd& root_;
-  const std::ptrdiff_t size_ = std::ssize(training_.regressors) + 1;
-  const std::ptrdiff_t packed_ = training_.has_missing ? size_ * size_ : size_ * (size_ + 1) / 2;
+  const Eigen::Index size_ = std::ssize(training_.regressors) + 1;
+  const Eigen::Index packed_ = training_.has_missing ? size_ * size_ : size_ * (size_ + 1) / 2;
   const Evaluator evaluator_;
   const bool leave_out_;
   std::vector<int> leaf_of_node_;
@@ -290,8 +284,8 @@ class Assembly {
 Eigen::MatrixXd NormalEquations::block(std::size_t i, std::size_t j) const {
   Eigen::MatrixXd result(size, size);
   const double* values = blocks[i][j].data();
-  for (std::ptrdiff_t r = 0; r < size; ++r) {
-    for (std::ptrdiff_t c = 0; c < (missing ? size : r + 1); ++c) {
+  for (Eigen::Index r = 0; r < size; ++r) {
+    for (Eigen::Index c = 0; c < (missing ? size : r + 1); ++c) {
       result(r, c) = *values++;
       if (!missing) {
         result(c, r) = result(r, c);
@@ -304,9 +298,9 @@ Eigen::MatrixXd NormalEquations::block(std::size_t i, std::size_t j) const {
 bool leaves_out_ambiguous(const TrainingRows& training, const Evaluator& evaluator) {
   double ambiguous = 0.0;
   double all = 0.0;
-  for (std::ptrdiff_t index = 0; training.has_missing && index < num_chunks(training); ++index) {
+  for (Eigen::Index index = 0; training.has_missing && index < num_chunks(training); ++index) {
     const Chunk chunk = fetch(training, index, {});
-    for (std::ptrdiff_t r = 0; r < chunk.count(); ++r) {
+    for (Eigen::Index r = 0; r < chunk.count(); ++r) {
       all += chunk.weights(r);
       ambiguous += evaluator.is_ambiguous(chunk.inputs.row(r).data()) ? chunk.weights(r) : 0.0;
     }

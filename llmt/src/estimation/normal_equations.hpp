@@ -14,7 +14,7 @@ namespace llmt {
 ///   S_ij = q Phi_i Phi_j a a',  G_i = q Phi_i a a',  b_i = q Phi_i a r,  q Phi_i r^2
 /// in columns scaled over all rows. Where values are missing, a depends on the leaf.
 struct NormalEquations {
-  std::ptrdiff_t size = 0;  ///< coefficients of a local model
+  Eigen::Index size = 0;    ///< coefficients of a local model
   bool missing = false;     ///< blocks of rows with missing values are not symmetric, so all are stored in full
   std::vector<int> leaves;  ///< nodes, ascending
   /// S_ij of leaf i with leaves j = 0 ... i, lower triangles row by row. Empty: the leaves share no row.

@@ -15,11 +15,11 @@
 namespace llmt {
 namespace {
 
-/// Pieces are halved at most this often on one line, and no further than to this length.
+// Pieces are halved at most this often on one line, and no further than to this length.
 constexpr int most_halvings = 5000;
 constexpr double shortest_piece = 1e-9;
 
-/// How well a line is integrated.
+// How well a line is integrated.
 struct Precision {
   double tolerance;  // of the sum over a piece, as a fraction of the output's range
   bool exact;        // cut at all kinks, orders by degree; else equal pieces and one order
@@ -28,7 +28,7 @@ constexpr Precision fine = {1e-10, true};
 constexpr Precision coarse = {1e-4, false};
 constexpr int coarse_pieces = 8;
 
-/// The shares of one partition along one line.
+// The shares of one partition along one line.
 class Line {
  public:
   Line(const Model& model, const Partition& partition, const Evaluator& evaluator,
@@ -41,18 +41,17 @@ class Line {
         has_products_(std::any_of(model.regressors().begin(), model.regressors().end(), is_product)),
         line_(model, reference, point),
         deviations_(std::ssize(model.regressors())) {
-    const std::ptrdiff_t outputs = std::ssize(partition.outputs);
+    const Eigen::Index outputs = std::ssize(partition.outputs);
     tolerance_.resize(outputs);
-    for (std::ptrdiff_t o = 0; o < outputs; ++o) {
-      const OutputColumn& output =
-          model.outputs()[static_cast<std::size_t>(partition.outputs[static_cast<std::size_t>(o)])];
+    for (Eigen::Index o = 0; o < outputs; ++o) {
+      const OutputColumn& output = model.outputs()[partition.outputs[o]];
       tolerance_(o) = precision_.tolerance * (output.high - output.low) +
                       1e-14 * std::max(std::abs(output.low), std::abs(output.high));
     }
     shares_.setZero(outputs, point.size());
   }
 
-  /// Sets the rows of the partition's outputs.
+  // Sets the rows of the partition's outputs.
   void run(Attribution& result) {
     Pieces pieces = cut_line(model_, partition_, evaluator_, line_, precision_.exact);
     std::vector<double>& cuts = pieces.cuts;
@@ -61,7 +60,7 @@ class Line {
       for (int k = 1; k < coarse_pieces; ++k) {
         cuts.push_back(static_cast<double>(k) / coarse_pieces);
       }
-      std::sort(cuts.begin(), cuts.end());
+      std::ranges::sort(cuts);
     }
     Eigen::VectorXd row = line_.reference;
     Eigen::VectorXd value = predict(row);
@@ -82,14 +81,14 @@ class Line {
       }
       Eigen::VectorXd end_value = predict(end);
       integrate(from, to, row, value, end_value);
-      std::stable_sort(crossings.begin() + static_cast<std::ptrdiff_t>(first),
-                       crossings.begin() + static_cast<std::ptrdiff_t>(next),
+      std::stable_sort(crossings.begin() + static_cast<Eigen::Index>(first),
+                       crossings.begin() + static_cast<Eigen::Index>(next),
                        [](const Crossing& a, const Crossing& b) { return a.input < b.input; });
       for (std::size_t c = first; c < next; ++c) {
         jump(crossings[c].input, crossings[c].after, crossings[c].parts, end, end_value);
       }
       if (to == 0.5) {
-        for (const std::ptrdiff_t j : line_.switched) {
+        for (const Eigen::Index j : line_.switched) {
           jump(j, line_.point(j), {}, end, end_value);
         }
       }
@@ -99,14 +98,14 @@ class Line {
     }
     set(result.prediction, value);
     for (std::size_t o = 0; o < partition_.outputs.size(); ++o) {
-      result.contributions.row(partition_.outputs[o]) = shares_.row(static_cast<std::ptrdiff_t>(o));
+      result.contributions.row(partition_.outputs[o]) = shares_.row(o);
     }
   }
 
  private:
   void set(Eigen::VectorXd& values, const Eigen::VectorXd& of_partition) const {
     for (std::size_t o = 0; o < partition_.outputs.size(); ++o) {
-      values(partition_.outputs[o]) = of_partition(static_cast<std::ptrdiff_t>(o));
+      values(partition_.outputs[o]) = of_partition(o);
     }
   }
 
@@ -118,9 +117,8 @@ class Line {
     return values;
   }
 
-  /// Sets one input, and gives it what that changes; or all inputs their `parts` of it.
-  void jump(std::ptrdiff_t input, double to, const Eigen::VectorXd& parts, Eigen::VectorXd& row,
-            Eigen::VectorXd& value) {
+  // Sets one input, and gives it what that changes; or all inputs their `parts` of it.
+  void jump(Eigen::Index input, double to, const Eigen::VectorXd& parts, Eigen::VectorXd& row, Eigen::VectorXd& value) {
     row(input) = to;
     const Eigen::VectorXd changed = predict(row);
     if (parts.size() > 0) {
@@ -131,22 +129,20 @@ class Line {
     value = changed;
   }
 
-  /// Degree of the prediction, as a polynomial of the position, around a point on the line.
+  // Degree of the prediction, as a polynomial of the position, around a point on the line.
   int degree(int index, const Eigen::VectorXd& row) const {
-    const Node& node = partition_.nodes[static_cast<std::size_t>(index)];
+    const Node& node = partition_.nodes[index];
     if (node.is_leaf()) {
       return has_products_ ? 8 : 2;  // where a guard sets in, and the holds of both factors
     }
     const double left = evaluator_.left_share(index, row.data());
-    if (left >= 1.0 || left <= 0.0) {
-      return degree(left >= 1.0 ? node.left : node.right, row);
-    }
+    if (left >= 1.0 || left <= 0.0) return degree(left >= 1.0 ? node.left : node.right, row);
     const bool moves = node.is_oblique() || line_.way(node.split_input) != 0.0;
     const int of_transition = !moves ? 0 : partition_.validity.smoothness == 1 ? 3 : 5;
     return of_transition + std::max(degree(node.left, row), degree(node.right, row));
   }
 
-  /// Mean of dF/dx_j (point_j - reference_j) between two positions, outputs x inputs.
+  // Mean of dF/dx_j (point_j - reference_j) between two positions, outputs x inputs.
   Eigen::MatrixXd mean_rate(double from, double to, const Eigen::VectorXd& row, int order) {
     const Quadrature& rule = quadrature(order);
     Eigen::MatrixXd mean = Eigen::MatrixXd::Zero(shares_.rows(), shares_.cols());
@@ -155,23 +151,21 @@ class Line {
       deviations_at(model_.inputs(), model_.regressors(), x.data(), deviations_.data());
       evaluator_.derivatives(x.data(), deviations_.data(), by_input_, by_regressor_);
       add_through_regressors(model_.inputs(), model_.regressors(), x.data(), by_regressor_, by_input_);
-      for (const std::ptrdiff_t j : line_.moving) {
+      for (const Eigen::Index j : line_.moving) {
         mean.col(j) += rule.weights[i] * line_.way(j) * by_input_.col(j);
       }
     }
     return mean;
   }
 
-  /// Adds the shares of a piece in which nothing jumps.
+  // Adds the shares of a piece in which nothing jumps.
   void integrate(double from, double to, const Eigen::VectorXd& row, const Eigen::VectorXd& value,
                  const Eigen::VectorXd& end_value) {
     const ValidityKind kind = partition_.validity.kind;
     const bool polynomial = kind == ValidityKind::crisp || kind == ValidityKind::blend;
     const double length = to - from;
     const Eigen::VectorXd change = end_value - value;
-    if (line_.moving.empty() || (length <= 0.0 && change.isZero(0.0))) {
-      return;
-    }
+    if (line_.moving.empty() || (length <= 0.0 && change.isZero(0.0))) return;
     const double middle = from + 0.5 * length;
     const Eigen::VectorXd middle_row = line_.at(middle, row);
     const int of_prediction = !precision_.exact || !polynomial ? 8 : degree(0, middle_row);
@@ -197,9 +191,9 @@ class Line {
     }
     Eigen::MatrixXd share = length * rate;
     const Eigen::VectorXd rest = change - share.rowwise().sum();
-    for (std::ptrdiff_t o = 0; o < share.rows(); ++o) {
+    for (Eigen::Index o = 0; o < share.rows(); ++o) {
       const double total = rate.row(o).cwiseAbs().sum();
-      for (const std::ptrdiff_t j : line_.moving) {
+      for (const Eigen::Index j : line_.moving) {
         share(o, j) +=
             rest(o) * (total > 0.0 ? std::abs(rate(o, j)) / total : 1.0 / static_cast<double>(line_.moving.size()));
       }
@@ -279,19 +273,18 @@ Eigen::MatrixXd importance(const Model& model, const Eigen::Ref<const Eigen::Mat
   check_finite_or_missing("llmt::importance", "inputs", inputs);
   const std::vector<Evaluator> evaluators = evaluators_of(model);
   const Eigen::VectorXd reference = reference_point(model);
-  const std::ptrdiff_t count = std::min(inputs.rows(), importance_rows);
-  std::vector<Eigen::MatrixXd> of_row(static_cast<std::size_t>(count));
-  parallel_for(count, max_threads, [&](std::ptrdiff_t k) {
+  const Eigen::Index count = std::min(inputs.rows(), importance_rows);
+  std::vector<Eigen::MatrixXd> of_row(count);
+  parallel_for(count, max_threads, [&](Eigen::Index k) {
     const Eigen::VectorXd point = inputs.row(k * inputs.rows() / count).transpose();
-    of_row[static_cast<std::size_t>(k)] =
-        attribute_with(model, evaluators, point, reference, coarse).contributions.cwiseAbs();
+    of_row[k] = attribute_with(model, evaluators, point, reference, coarse).contributions.cwiseAbs();
   });
   Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(model.num_outputs(), model.num_inputs());
   for (const Eigen::MatrixXd& contributions : of_row) {
     sum += contributions;
   }
-  for (std::ptrdiff_t o = 0; o < sum.rows(); ++o) {
-    const OutputColumn& output = model.outputs()[static_cast<std::size_t>(o)];
+  for (Eigen::Index o = 0; o < sum.rows(); ++o) {
+    const OutputColumn& output = model.outputs()[o];
     const double rounding = 1e-14 * std::max(std::abs(output.low), std::abs(output.high));
     const double total = sum.row(o).sum();
     sum.row(o) *= total > rounding * static_cast<double>(count) ? 1.0 / total : 0.0;

@@ -11,13 +11,13 @@
 namespace llmt {
 namespace {
 
-/// Transitions shorter than this part of the line count as jumps.
+// Transitions shorter than this part of the line count as jumps.
 constexpr double short_transition = 1e-9;
 
-/// Where a logistic gate bends most: smaller pieces there save halvings.
+// Where a logistic gate bends most: smaller pieces there save halvings.
 constexpr double bends_of_logistic[] = {-6.0, 0.0, 6.0};
 
-/// What a split compares, along the line: base + position * slope.
+// What a split compares, along the line: base + position * slope.
 struct Comparison {
   double base = 0.0;
   double slope = 0.0;
@@ -46,7 +46,7 @@ class Cutter {
       visit(0, 0.0, line_.switched.empty() ? 1.0 : 0.5, line_.reference);
       if (!line_.switched.empty()) {
         Eigen::VectorXd row = line_.reference;
-        for (const std::ptrdiff_t j : line_.switched) {
+        for (const Eigen::Index j : line_.switched) {
           row(j) = line_.point(j);
         }
         visit(0, 0.5, 1.0, row);
@@ -61,7 +61,7 @@ class Cutter {
     std::vector<double>& cuts = pieces_.cuts;
     std::vector<Crossing>& crossings = pieces_.crossings;
     // In the order in which an input meets them, each once.
-    std::sort(crossings.begin(), crossings.end(), [&](const Crossing& a, const Crossing& b) {
+    std::ranges::sort(crossings, [&](const Crossing& a, const Crossing& b) {
       return a.position != b.position ? a.position < b.position
              : a.input != b.input     ? a.input < b.input
                                       : (a.before - b.before) * line_.way(a.input) < 0.0;
@@ -74,7 +74,7 @@ class Cutter {
     for (const Crossing& crossing : crossings) {
       cuts.push_back(crossing.position);
     }
-    std::sort(cuts.begin(), cuts.end());
+    std::ranges::sort(cuts);
     // Of positions that count as one, the middle and the end of the line are kept as they are.
     for (double& position : cuts) {
       for (const double kept : {0.5, 1.0}) {
@@ -91,12 +91,12 @@ class Cutter {
     }
   }
 
-  /// Where on the line the product of two deviations has a value, both within the training extent.
+  // Where on the line the product of two deviations has a value, both within the training extent.
   std::vector<double> positions_of_product(const Regressor& regressor, double value) const {
-    const std::ptrdiff_t i = regressor.input;
-    const std::ptrdiff_t j = regressor.second_input;
-    const double first = line_.reference(i) - model_.inputs()[static_cast<std::size_t>(i)].centre;
-    const double second = line_.reference(j) - model_.inputs()[static_cast<std::size_t>(j)].centre;
+    const Eigen::Index i = regressor.input;
+    const Eigen::Index j = regressor.second_input;
+    const double first = line_.reference(i) - model_.inputs()[i].centre;
+    const double second = line_.reference(j) - model_.inputs()[j].centre;
     const double square = line_.way(i) * line_.way(j);
     const double half = 0.5 * (first * line_.way(j) + second * line_.way(i));
     const double constant = first * second - value;
@@ -108,13 +108,13 @@ class Cutter {
     return {larger / square, constant / larger};
   }
 
-  /// Where factors of products leave the training extent, and where their holds end.
+  // Where factors of products leave the training extent, and where their holds end.
   void cut_at_extent() {
     if (!at_kinks_ || std::none_of(model_.regressors().begin(), model_.regressors().end(), is_product)) {
       return;
     }
-    for (const std::ptrdiff_t j : line_.moving) {
-      const InputColumn& input = model_.inputs()[static_cast<std::size_t>(j)];
+    for (const Eigen::Index j : line_.moving) {
+      const InputColumn& input = model_.inputs()[j];
       const double round = rounding_of_hold * (input.high - input.low);
       for (const double bound : {input.low - round, input.low, input.high, input.high + round}) {
         cut_at((bound - line_.reference(j)) / line_.way(j), 0.0, 1.0);
@@ -122,11 +122,11 @@ class Cutter {
     }
   }
 
-  /// Where a node's guard sets in or ends.
+  // Where a node's guard sets in or ends.
   void cut_at_ranges(const Node& node, double from, double to) {
     for (std::size_t k = 0; at_kinks_ && k < model_.regressors().size(); ++k) {
       const Regressor& regressor = model_.regressors()[k];
-      const std::ptrdiff_t column = static_cast<std::ptrdiff_t>(k);
+      const Eigen::Index column = static_cast<Eigen::Index>(k);
       const double round = rounding_of_hold * (node.high(column) - node.low(column));
       for (const double bound :
            {node.low(column) - round, node.low(column), node.high(column), node.high(column) + round}) {
@@ -136,35 +136,29 @@ class Cutter {
           }
           continue;
         }
-        if (regressor.level >= 0 || line_.way(regressor.input) == 0.0) {
-          break;
-        }
+        if (regressor.level >= 0 || line_.way(regressor.input) == 0.0) break;
         cut_at((bound + regressor.centre - line_.reference(regressor.input)) / line_.way(regressor.input), from, to);
       }
     }
   }
 
   Comparison comparison(const Node& node, const Eigen::VectorXd& row) const {
-    if (!node.is_oblique()) {
-      return {line_.reference(node.split_input), line_.way(node.split_input)};
-    }
+    if (!node.is_oblique()) return {line_.reference(node.split_input), line_.way(node.split_input)};
     Comparison result;
-    for (std::ptrdiff_t j = 0; j < node.direction.size(); ++j) {
+    for (Eigen::Index j = 0; j < node.direction.size(); ++j) {
       const double x = line_.way(j) != 0.0 ? line_.reference(j) : row(j);
       const bool counts = node.direction(j) != 0.0 && !std::isnan(x);
-      result.base += counts ? node.direction(j) * (x - model_.inputs()[static_cast<std::size_t>(j)].centre) : 0.0;
+      result.base += counts ? node.direction(j) * (x - model_.inputs()[j].centre) : 0.0;
       result.slope += node.direction(j) * line_.way(j);
     }
     return result;
   }
 
-  /// Cuts and crossings below a node that is reached from `from` to `to`.
+  // Cuts and crossings below a node that is reached from `from` to `to`.
   void visit(int index, double from, double to, const Eigen::VectorXd& row) {
-    const Node& node = partition_.nodes[static_cast<std::size_t>(index)];
+    const Node& node = partition_.nodes[index];
     cut_at_ranges(node, from, to);
-    if (node.is_leaf()) {
-      return;
-    }
+    if (node.is_leaf()) return;
     const Comparison along = comparison(node, row);
     if (along.slope == 0.0) {
       const double left = evaluator_.left_share(index, row.data());
@@ -211,9 +205,9 @@ class Cutter {
     }
   }
 
-  /// Of an axis-orthogonal split; before and after are the same where the whole line is on one side.
+  // Of an axis-orthogonal split; before and after are the same where the whole line is on one side.
   Crossing crossing_of(const Node& node, const Comparison& along, double reach) const {
-    const std::ptrdiff_t j = node.split_input;
+    const Eigen::Index j = node.split_input;
     const auto on_line = [&](double value) {
       return std::clamp(value, std::min(line_.reference(j), line_.point(j)),
                         std::max(line_.reference(j), line_.point(j)));
@@ -226,12 +220,12 @@ class Cutter {
             .after = along.slope > 0.0 ? right : left};
   }
 
-  /// Of an oblique split: the input that moves what is compared most is put on the two sides; before and after are the
-  /// same where all from `from` to `to` is on one side. The parts are what the jump is shared out by, the limit of ever
-  /// steeper gates.
+  // Of an oblique split: the input that moves what is compared most is put on the two sides; before and after are the
+  // same where all from `from` to `to` is on one side. The parts are what the jump is shared out by, the limit of ever
+  // steeper gates.
   Crossing oblique_crossing(int index, const Comparison& along, double from, double to,
                             const Eigen::VectorXd& row) const {
-    const Node& node = partition_.nodes[static_cast<std::size_t>(index)];
+    const Node& node = partition_.nodes[index];
     Crossing crossing;
     const Eigen::VectorXd moved = node.direction.cwiseProduct(line_.way);
     crossing.parts = moved / along.slope;
@@ -272,9 +266,9 @@ class Cutter {
 StraightLine::StraightLine(const Model& model, const Eigen::Ref<const Eigen::VectorXd>& from,
                            const Eigen::Ref<const Eigen::VectorXd>& to)
     : reference(from), point(to), way(Eigen::VectorXd::Zero(to.size())) {
-  for (std::ptrdiff_t j = 0; j < point.size(); ++j) {
+  for (Eigen::Index j = 0; j < point.size(); ++j) {
     const bool missing = std::isnan(point(j));
-    if (model.inputs()[static_cast<std::size_t>(j)].is_categorical() || missing || std::isnan(reference(j))) {
+    if (model.inputs()[j].is_categorical() || missing || std::isnan(reference(j))) {
       if (!(point(j) == reference(j) || (missing && std::isnan(reference(j))))) {
         switched.push_back(j);
       }
@@ -287,7 +281,7 @@ StraightLine::StraightLine(const Model& model, const Eigen::Ref<const Eigen::Vec
 
 Eigen::VectorXd StraightLine::at(double position, const Eigen::VectorXd& row) const {
   Eigen::VectorXd x = row;
-  for (const std::ptrdiff_t j : moving) {
+  for (const Eigen::Index j : moving) {
     x(j) = position == 1.0 ? point(j) : reference(j) + position * way(j);
   }
   return x;

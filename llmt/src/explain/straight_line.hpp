@@ -25,9 +25,9 @@ struct StraightLine {
 
   Eigen::VectorXd reference;
   Eigen::VectorXd point;
-  Eigen::VectorXd way;                   ///< point - reference where an input moves, else 0
-  std::vector<std::ptrdiff_t> moving;    ///< inputs
-  std::vector<std::ptrdiff_t> switched;  ///< inputs that change at the middle of the line
+  Eigen::VectorXd way;                 ///< point - reference where an input moves, else 0
+  std::vector<Eigen::Index> moving;    ///< inputs
+  std::vector<Eigen::Index> switched;  ///< inputs that change at the middle of the line
 };
 
 /// A place on the line where a threshold without transition is passed.

@@ -5,17 +5,16 @@
 namespace llmt {
 namespace {
 
-/// Of a crisp tree that is grown without a test, to be pruned: of many rows it would have leaves without number.
-constexpr std::ptrdiff_t most_pruned_leaves = 1000;
+// Of a crisp tree that is grown without a test, to be pruned: of many rows it would have leaves without number.
+constexpr Eigen::Index most_pruned_leaves = 1000;
 
-/// Leaves on the two sides of splits on monotone inputs are compared in pairs.
-constexpr std::ptrdiff_t most_ordered_leaves = 30;
+// Leaves on the two sides of splits on monotone inputs are compared in pairs.
+constexpr Eigen::Index most_ordered_leaves = 30;
 
-/// Whether an input in which the prediction is to be monotone may be split.
+// Whether an input in which the prediction is to be monotone may be split.
 bool may_split_monotone(const Table& table) {
-  return std::any_of(table.split_inputs.begin(), table.split_inputs.end(), [&](int input) {
-    return !table.monotone.empty() && table.monotone[static_cast<std::size_t>(input)] != 0;
-  });
+  return std::ranges::any_of(table.split_inputs,
+                             [&](int input) { return !table.monotone.empty() && table.monotone[input] != 0; });
 }
 
 }  // namespace
@@ -24,7 +23,7 @@ bool is_lolimot(GrowthRule rule) { return rule == GrowthRule::lolimot || rule ==
 
 bool is_hilomot(GrowthRule rule) { return rule == GrowthRule::hilomot; }
 
-Plan make_plan(const FitOptions& options, const TrainingRows& all, std::ptrdiff_t folds) {
+Plan make_plan(const FitOptions& options, const TrainingRows& all, Eigen::Index folds) {
   const bool has_folds = folds > 0;
   // Many rows: the widest transitions and the larger ridges, which are for few, take most of the time.
   const bool many_rows = folds == 1;
@@ -84,7 +83,7 @@ Plan make_plan(const FitOptions& options, const TrainingRows& all, std::ptrdiff_
                            : sparse == SparseChoice::automatic && has_folds ? std::vector<bool>{false, true}
                                                                             : std::vector<bool>{false};
   GrowthOptions& growth = plan.growth;
-  const std::ptrdiff_t regressors = std::ssize(all.regressors);
+  const Eigen::Index regressors = std::ssize(all.regressors);
   const bool many_leaves = !crisp_only && has_folds;
   if (growth.significance < 0.0) {
     // What prunes best-first trees is what splits gain further down, and the held-out error says how far.
@@ -94,13 +93,13 @@ Plan make_plan(const FitOptions& options, const TrainingRows& all, std::ptrdiff_
     growth.min_leaf_samples = 2;  // fewer than four rows are not split (Quinlan 1992)
   }
   if (growth.min_leaf_samples == 0) {
-    growth.min_leaf_samples = many_leaves ? std::max<std::ptrdiff_t>(5, regressors) : 2 * (regressors + 1);
+    growth.min_leaf_samples = many_leaves ? std::max<Eigen::Index>(5, regressors) : 2 * (regressors + 1);
   }
   if (growth.max_leaves == 0 && logistic) {
     growth.max_leaves = 50;
   }
   if (growth.max_leaves == 0 && (many_leaves || ordered)) {
-    growth.max_leaves = std::clamp<std::ptrdiff_t>(1500 / (regressors + 1), 20, ordered ? most_ordered_leaves : 400);
+    growth.max_leaves = std::clamp<Eigen::Index>(1500 / (regressors + 1), 20, ordered ? most_ordered_leaves : 400);
   }
   if (has_folds && growth.max_leaves == 0 && growth.pruning == Pruning::weakest_link && !is_lolimot(growth.rule)) {
     growth.max_leaves = most_pruned_leaves;

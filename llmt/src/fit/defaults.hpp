@@ -17,6 +17,6 @@ bool is_lolimot(GrowthRule rule);
 bool is_hilomot(GrowthRule rule);
 
 /// Fills in the defaults, which depend on the data and on the number of folds.
-Plan make_plan(const FitOptions& options, const TrainingRows& all, std::ptrdiff_t folds);
+Plan make_plan(const FitOptions& options, const TrainingRows& all, Eigen::Index folds);
 
 }  // namespace llmt

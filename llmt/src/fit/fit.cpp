@@ -27,17 +27,17 @@
 namespace llmt {
 namespace {
 
-/// A tree that is pruned by the weakest link has so many times the leaves that are asked for before: what a split gains
-/// shows when those below it are made. Not with LOLIMOT and HILOMOT, whose splits cost too much for that.
-constexpr std::ptrdiff_t grown_to_be_pruned = 3;
+// A tree that is pruned by the weakest link has so many times the leaves that are asked for before: what a split gains
+// shows when those below it are made. Not with LOLIMOT and HILOMOT, whose splits cost too much for that.
+constexpr Eigen::Index grown_to_be_pruned = 3;
 
-std::vector<int> all_rows(std::ptrdiff_t count) {
-  std::vector<int> rows(static_cast<std::size_t>(count));
+std::vector<int> all_rows(Eigen::Index count) {
+  std::vector<int> rows(count);
   std::iota(rows.begin(), rows.end(), 0);
   return rows;
 }
 
-/// What growth needs of the rows lives no longer than this.
+// What growth needs of the rows lives no longer than this.
 GrownPartition grow_in_order(const TrainingRows& rows, const std::vector<int>& served, const Plan& plan,
                              bool stop_by_aicc, int max_threads) {
   const Table& table = *rows.table;
@@ -47,12 +47,8 @@ GrownPartition grow_in_order(const TrainingRows& rows, const std::vector<int>& s
     const bool joint = !plan.candidates.widths.empty() && plan.candidates.estimation == Estimation::joint;
     return grow_hilomot(problem, {joint ? GateModels::joint : GateModels::local, stop_by_aicc && !plan.leaves_given});
   }
-  if (problem.options.rule == GrowthRule::m5) {
-    return grow_m5(problem);
-  }
-  if (!is_lolimot(problem.options.rule)) {
-    return grow(problem);
-  }
+  if (problem.options.rule == GrowthRule::m5) return grow_m5(problem);
+  if (!is_lolimot(problem.options.rule)) return grow(problem);
   const double width = plan.candidates.widths.empty() ? 0.0 : plan.candidates.widths.front();
   return grow_lolimot(problem, {.width = width,
                                 .low = rows.low()(table.split_inputs),
@@ -102,14 +98,14 @@ Grown grow_rows(const TrainingRows& rows, const std::vector<int>& served, const 
   return {{std::move(partition), std::move(jumps)}, result.stop, result.search};
 }
 
-/// Weights of the outputs' squared errors: 1 for a single one; else 1 / variance, so that outputs of any scale count
-/// alike.
+// Weights of the outputs' squared errors: 1 for a single one; else 1 / variance, so that outputs of any scale count
+// alike.
 Eigen::VectorXd error_weights(const Table& table, const std::vector<int>& served) {
   Eigen::VectorXd weights = Eigen::VectorXd::Ones(std::ssize(served));
   for (std::size_t o = 0; o < served.size() && served.size() > 1; ++o) {
     const auto output = table.outputs.col(served[o]).array();
     const double variance = (output - output.mean()).square().mean();
-    weights(static_cast<std::ptrdiff_t>(o)) = variance > 0.0 ? 1.0 / variance : 1.0;
+    weights(o) = variance > 0.0 ? 1.0 / variance : 1.0;
   }
   return weights;
 }
@@ -139,13 +135,13 @@ FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<
     return fit_best_terms(inputs, outputs, options);
   }
   const Table table = make_table(inputs, outputs, options);
-  if (const std::vector<std::ptrdiff_t> kept = rows_with_weight(table); std::ssize(kept) < inputs.rows()) {
+  if (const std::vector<Eigen::Index> kept = rows_with_weight(table); std::ssize(kept) < inputs.rows()) {
     FitOptions of_kept = options;
     of_kept.weights = table.weights(kept);
     std::vector<double> groups;
-    for (const std::ptrdiff_t row : kept) {
+    for (const Eigen::Index row : kept) {
       if (!options.selection.folds.groups.empty()) {
-        groups.push_back(options.selection.folds.groups[static_cast<std::size_t>(row)]);
+        groups.push_back(options.selection.folds.groups[row]);
       }
     }
     of_kept.selection.folds.groups = groups;
@@ -168,9 +164,9 @@ FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<
       served.push_back({o});
     }
   }
-  const std::ptrdiff_t tasks = std::ssize(served) * (std::ssize(folds) + 1);
+  const Eigen::Index tasks = std::ssize(served) * (std::ssize(folds) + 1);
   std::mutex progress_mutex;
-  std::ptrdiff_t done = 0;
+  Eigen::Index done = 0;
   const auto report = [&] {
     if (options.progress) {
       const std::lock_guard<std::mutex> lock(progress_mutex);
@@ -189,13 +185,13 @@ FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<
   // Where rows are many enough for one hold-out, a tree has work for all threads; several at a time would only hold
   // their rows in memory together.
   const int trees_at_once = folds.size() == 1 ? 1 : options.max_threads;
-  parallel_for(std::ssize(served), trees_at_once, [&](std::ptrdiff_t index) {
-    const std::size_t p = static_cast<std::size_t>(index);
+  parallel_for(std::ssize(served), trees_at_once, [&](Eigen::Index index) {
+    const std::size_t p = index;
     const Eigen::VectorXd weights = error_weights(table, served[p]);
     std::vector<GrownTree> trees(folds.size());  // of the folds
-    parallel_for(std::ssize(trees), options.max_threads, [&](std::ptrdiff_t f) {
-      const FoldRows& fold = folds[static_cast<std::size_t>(f)];
-      trees[static_cast<std::size_t>(f)] = grow_rows(fold.training, served[p], plan, false, options.max_threads).tree;
+    parallel_for(std::ssize(trees), options.max_threads, [&](Eigen::Index f) {
+      const FoldRows& fold = folds[f];
+      trees[f] = grow_rows(fold.training, served[p], plan, false, options.max_threads).tree;
       report();
     });
     Selection selection;
@@ -205,7 +201,7 @@ FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<
       candidate = selection.chosen.candidate;
     }
     Grown grown = grow_rows(all, served[p], plan, trees.empty(), options.max_threads);
-    const std::ptrdiff_t grown_leaves = grown.tree.partition.num_leaves();
+    const Eigen::Index grown_leaves = grown.tree.partition.num_leaves();
     if (trees.empty()) {
       candidate.leaves = grown_leaves;
       candidate.shrinkage = plan.candidates.shrinkages.front();
@@ -219,16 +215,15 @@ FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<
     } else if (candidate.leaves < grown_leaves) {
       grown.stop = StopReason::cross_validation;
     }
-    parallel_for(std::ssize(fold_partitions), options.max_threads, [&](std::ptrdiff_t f) {
-      const GrownTree& tree = trees[static_cast<std::size_t>(f)];
+    parallel_for(std::ssize(fold_partitions), options.max_threads, [&](Eigen::Index f) {
+      const GrownTree& tree = trees[f];
       if (!selection.made.empty()) {
-        fold_partitions[static_cast<std::size_t>(f)][p] = std::move(selection.made[static_cast<std::size_t>(f)]);
+        fold_partitions[f][p] = std::move(selection.made[f]);
         return;
       }
       Candidate of_fold = candidate;
       of_fold.leaves = std::min(of_fold.leaves, tree.partition.num_leaves());
-      fold_partitions[static_cast<std::size_t>(f)][p] =
-          estimate(folds[static_cast<std::size_t>(f)].training, tree, of_fold, options.max_threads);
+      fold_partitions[f][p] = estimate(folds[f].training, tree, of_fold, options.max_threads);
     });
     candidate.leaves = std::min(candidate.leaves, grown_leaves);
     Partition partition = estimate(all, grown.tree, candidate, options.max_threads);

@@ -9,20 +9,20 @@
 
 namespace llmt {
 
-std::ptrdiff_t count_numbers(std::ptrdiff_t inputs, const FitOptions& options) {
-  std::ptrdiff_t count = 0;
+Eigen::Index count_numbers(Eigen::Index inputs, const FitOptions& options) {
+  Eigen::Index count = 0;
   const std::vector<int>& chosen = options.growth.regression_inputs;
   for (int input = 0; input < inputs; ++input) {
-    const bool used = chosen.empty() || std::find(chosen.begin(), chosen.end(), input) != chosen.end();
+    const bool used = chosen.empty() || std::ranges::find(chosen, input) != chosen.end();
     const std::vector<int>& categorical = options.categorical_inputs;
-    count += used && std::find(categorical.begin(), categorical.end(), input) == categorical.end() ? 1 : 0;
+    count += used && std::ranges::find(categorical, input) == categorical.end() ? 1 : 0;
   }
   return count;
 }
 
 namespace {
 
-/// The errors of all partitions as one, each in parts of what the linear models leave of it.
+// The errors of all partitions as one, each in parts of what the linear models leave of it.
 CandidateError mean_error(const FitSummary& of, const FitSummary& linear) {
   CandidateError mean{.candidate = {}, .fold_rmse = Eigen::VectorXd::Zero(linear.partitions[0].cv_folds)};
   const double partitions = static_cast<double>(linear.partitions.size());
@@ -38,29 +38,26 @@ CandidateError mean_error(const FitSummary& of, const FitSummary& linear) {
 
 FitResult fit_best_terms(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
                          const Eigen::Ref<const Eigen::MatrixXd>& outputs, const FitOptions& options) {
-  const std::ptrdiff_t numbers = count_numbers(inputs.cols(), options);
+  const Eigen::Index numbers = count_numbers(inputs.cols(), options);
   const bool both = numbers > 0 && numbers <= most_inputs_of_products && options.selection.folds.count != 0 &&
                     !(inputs.array().abs() > largest_factor).any();
   FitOptions with_terms = options;
-  const auto fit_with = [&](LocalTerms terms, std::ptrdiff_t half) {
+  const auto fit_with = [&](LocalTerms terms, Eigen::Index half) {
     with_terms.local_models.terms = terms;
     if (options.progress && both) {
-      with_terms.progress = [&options, half](std::ptrdiff_t done, std::ptrdiff_t total) {
+      with_terms.progress = [&options, half](Eigen::Index done, Eigen::Index total) {
         options.progress(half * total + done, 2 * total);
       };
     }
     return fit(inputs, outputs, with_terms);
   };
   FitResult linear = fit_with(LocalTerms::linear, 0);
-  if (!both || linear.summary.partitions.front().cv_folds == 0) {
-    return linear;
-  }
+  if (!both || linear.summary.partitions.front().cv_folds == 0) return linear;
   FitResult quadratic = fit_with(LocalTerms::quadratic, 1);
   const CandidateError of_linear = mean_error(linear.summary, linear.summary);
   const CandidateError of_quadratic = mean_error(quadratic.summary, linear.summary);
   const std::vector<PartitionSummary>& trees = linear.summary.partitions;
-  const bool least_squares =
-      std::all_of(trees.begin(), trees.end(), [](const PartitionSummary& tree) { return tree.leaves == 1; });
+  const bool least_squares = std::ranges::all_of(trees, [](const PartitionSummary& tree) { return tree.leaves == 1; });
   const bool is_better = least_squares ? is_beyond_chance(of_linear, of_quadratic) : of_quadratic.rmse < of_linear.rmse;
   FitResult& taken = is_better ? quadratic : linear;
   for (const PartitionSummary& partition : (is_better ? linear : quadratic).summary.partitions) {

@@ -7,7 +7,7 @@
 namespace llmt {
 
 /// Numeric regression inputs among so many inputs.
-std::ptrdiff_t count_numbers(std::ptrdiff_t inputs, const FitOptions& options);
+Eigen::Index count_numbers(Eigen::Index inputs, const FitOptions& options);
 
 /// fit() with LocalTerms::automatic: both fits, and the one to take.
 FitResult fit_best_terms(const Eigen::Ref<const Eigen::MatrixXd>& inputs,

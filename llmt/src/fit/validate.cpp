@@ -41,13 +41,13 @@ void check_inputs(const Eigen::Ref<const Eigen::MatrixXd>& inputs) {
   require(largest <= largest_magnitude, "a magnitude in inputs", largest, "at most 1e150");
 }
 
-std::vector<int> all_columns(std::ptrdiff_t count) {
-  std::vector<int> columns(static_cast<std::size_t>(count));
+std::vector<int> all_columns(Eigen::Index count) {
+  std::vector<int> columns(count);
   std::iota(columns.begin(), columns.end(), 0);
   return columns;
 }
 
-void check_growth(const GrowthOptions& options, std::ptrdiff_t inputs) {
+void check_growth(const GrowthOptions& options, Eigen::Index inputs) {
   require(std::isfinite(options.significance), "growth.significance", options.significance, "finite");
   require(std::isfinite(options.min_variance_gain), "growth.min_variance_gain", options.min_variance_gain, "finite");
   require(options.min_leaf_samples >= 0, "growth.min_leaf_samples", static_cast<double>(options.min_leaf_samples),
@@ -74,7 +74,7 @@ void check_blend(const BlendOptions& options) {
   }
 }
 
-/// M5' has models of its own: dropped inputs, smoothing along the path. Estimating them anew would undo it.
+// M5' has models of its own: dropped inputs, smoothing along the path. Estimating them anew would undo it.
 void check_m5(const FitOptions& options) {
   if (options.blend.validity == ValidityChoice::blend || options.blend.validity == ValidityChoice::gaussian) {
     throw std::invalid_argument(
@@ -94,23 +94,21 @@ void check_m5(const FitOptions& options) {
   }
 }
 
-/// Number of levels of every input, 0 for numbers.
+// Number of levels of every input, 0 for numbers.
 std::vector<int> count_levels(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const std::vector<int>& categorical) {
   check_columns("llmt::fit", "categorical_inputs", categorical, inputs.cols());
-  std::vector<int> num_levels(static_cast<std::size_t>(inputs.cols()), 0);
+  std::vector<int> num_levels(inputs.cols(), 0);
   constexpr double most = 10000.0;
   for (const int column : categorical) {
     for (const double value : inputs.col(column)) {
-      if (std::isnan(value)) {
-        continue;
-      }
+      if (std::isnan(value)) continue;
       require(value >= 0.0 && value < most && value == std::floor(value),
               fmt::format("a category of input {}", column).c_str(), value, "a whole number from 0 to 9999");
-      int& levels = num_levels[static_cast<std::size_t>(column)];
+      int& levels = num_levels[column];
       levels = std::max(levels, static_cast<int>(value) + 1);
     }
     // All missing: a category that never occurs.
-    num_levels[static_cast<std::size_t>(column)] = std::max(num_levels[static_cast<std::size_t>(column)], 1);
+    num_levels[column] = std::max(num_levels[column], 1);
   }
   return num_levels;
 }
@@ -127,14 +125,12 @@ void check_signs(const char* option, const std::vector<int>& signs, const std::v
   }
 }
 
-/// Signs of slopes and of the prediction, which includes the former.
+// Signs of slopes and of the prediction, which includes the former.
 void set_signs(const FitOptions& options, Table& table) {
   check_signs("slope_signs", options.slope_signs, table.num_levels);
   check_signs("monotone", options.monotone, table.num_levels);
   table.slope_signs = options.slope_signs;
-  if (std::all_of(options.monotone.begin(), options.monotone.end(), [](int sign) { return sign == 0; })) {
-    return;
-  }
+  if (std::ranges::all_of(options.monotone, [](int sign) { return sign == 0; })) return;
   table.monotone = options.monotone;
   table.slope_signs.resize(table.monotone.size(), 0);
   for (std::size_t j = 0; j < table.monotone.size(); ++j) {
@@ -144,8 +140,8 @@ void set_signs(const FitOptions& options, Table& table) {
   }
 }
 
-/// Whether splits may be made on inputs in which the prediction is to be monotone: where gates and local models are
-/// made of functions of one input each and no missing value sends a row to both sides, see docs/algorithms.md.
+// Whether splits may be made on inputs in which the prediction is to be monotone: where gates and local models are
+// made of functions of one input each and no missing value sends a row to both sides, see docs/algorithms.md.
 bool may_order_splits(const FitOptions& options, const Eigen::Ref<const Eigen::MatrixXd>& inputs) {
   const GrowthRule rule = options.growth.rule;
   return (rule == GrowthRule::rd || rule == GrowthRule::retis || rule == GrowthRule::ra) &&
@@ -155,7 +151,7 @@ bool may_order_splits(const FitOptions& options, const Eigen::Ref<const Eigen::M
 
 }  // namespace
 
-void check_options(const FitOptions& options, std::ptrdiff_t inputs) {
+void check_options(const FitOptions& options, Eigen::Index inputs) {
   check_growth(options.growth, inputs);
   check_blend(options.blend);
   require(options.local_models.sparse == SparseChoice::never || options.blend.estimation != Estimation::as_grown ||
@@ -213,7 +209,7 @@ Table make_table(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::R
   }
   set_signs(options, table);
   if (options.local_models.terms == LocalTerms::quadratic) {
-    const std::ptrdiff_t numbers = std::ssize(numeric_regression_inputs(table));
+    const Eigen::Index numbers = std::ssize(numeric_regression_inputs(table));
     require(numbers <= most_inputs_of_products,
             "the number of numeric regression inputs of quadratic local models (local_models.terms)",
             static_cast<double>(numbers), "at most 13; growth.regression_inputs chooses them");
@@ -222,14 +218,14 @@ Table make_table(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::R
     table.products = products_of(table);
   }
   if (!table.monotone.empty() && !may_order_splits(options, inputs)) {
-    std::erase_if(table.split_inputs, [&](int j) { return table.monotone[static_cast<std::size_t>(j)] != 0; });
+    std::erase_if(table.split_inputs, [&](int j) { return table.monotone[j] != 0; });
   }
   return table;
 }
 
-std::vector<std::ptrdiff_t> rows_with_weight(const Table& table) {
-  std::vector<std::ptrdiff_t> result;
-  for (std::ptrdiff_t row = 0; row < table.weights.size(); ++row) {
+std::vector<Eigen::Index> rows_with_weight(const Table& table) {
+  std::vector<Eigen::Index> result;
+  for (Eigen::Index row = 0; row < table.weights.size(); ++row) {
     // Far below the largest, a weight changes nothing but rounding.
     if (table.weights(row) > 1e-12) {
       result.push_back(row);
@@ -238,20 +234,16 @@ std::vector<std::ptrdiff_t> rows_with_weight(const Table& table) {
   return result;
 }
 
-std::vector<Fold> selection_folds(std::ptrdiff_t rows, const SelectionOptions& selection) {
+std::vector<Fold> selection_folds(Eigen::Index rows, const SelectionOptions& selection) {
   FoldOptions options = selection.folds;
-  if (options.count == 0) {
-    return {};
-  }
+  if (options.count == 0) return {};
   require(options.count >= 2, "selection.folds.count", options.count, "0 or at least 2");
   std::vector<double> distinct(options.groups.begin(), options.groups.end());
-  std::sort(distinct.begin(), distinct.end());
+  std::ranges::sort(distinct);
   distinct.erase(std::unique(distinct.begin(), distinct.end()), distinct.end());
-  const std::ptrdiff_t groups = options.groups.empty() ? rows : std::ssize(distinct);
-  options.count = static_cast<int>(std::min<std::ptrdiff_t>(options.count, groups));
-  if (options.count < 2) {
-    return {};
-  }
+  const Eigen::Index groups = options.groups.empty() ? rows : std::ssize(distinct);
+  options.count = static_cast<int>(std::min<Eigen::Index>(options.count, groups));
+  if (options.count < 2) return {};
   std::vector<Fold> folds = make_folds(rows, options);
   if (rows >= single_hold_out_rows) {
     folds.resize(1);

@@ -13,19 +13,19 @@ namespace llmt {
 inline constexpr double largest_magnitude = 1e150;
 inline constexpr double largest_factor = 1e70;
 
-void check_options(const FitOptions& options, std::ptrdiff_t inputs);
+void check_options(const FitOptions& options, Eigen::Index inputs);
 
 /// The caller's data, checked; no columns named means all of them.
 Table make_table(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<const Eigen::MatrixXd>& outputs,
                  const FitOptions& options);
 
 /// Rows that count.
-std::vector<std::ptrdiff_t> rows_with_weight(const Table& table);
+std::vector<Eigen::Index> rows_with_weight(const Table& table);
 
 /// From this many rows on, one fold is held out once instead of every fold in turn.
-inline constexpr std::ptrdiff_t single_hold_out_rows = 50000;
+inline constexpr Eigen::Index single_hold_out_rows = 50000;
 
 /// The folds that the choice is made on: all, the first one for many rows, or none.
-std::vector<Fold> selection_folds(std::ptrdiff_t rows, const SelectionOptions& selection);
+std::vector<Fold> selection_folds(Eigen::Index rows, const SelectionOptions& selection);
 
 }  // namespace llmt

@@ -10,17 +10,17 @@ namespace llmt {
 GrowthData::GrowthData(const GrowthProblem& growth) : problem(growth), training(*growth.training) {
   const Table& table = *training.table;
   for (const int input : growth.options.split_inputs) {
-    num_levels.push_back(table.num_levels[static_cast<std::size_t>(input)]);
+    num_levels.push_back(table.num_levels[input]);
   }
   weights = training.weight_unit * table.weights(training.rows);
-  const std::ptrdiff_t count = std::ssize(growth.outputs);
+  const Eigen::Index count = std::ssize(growth.outputs);
   outputs.resize(training.count(), count);
   output_mean.resize(count);
   output_scale.resize(count);
   output_weights.resize(count);
   rounding.resize(count);
-  for (std::ptrdiff_t o = 0; o < count; ++o) {
-    outputs.col(o) = table.outputs.col(growth.outputs[static_cast<std::size_t>(o)])(training.rows);
+  for (Eigen::Index o = 0; o < count; ++o) {
+    outputs.col(o) = table.outputs.col(growth.outputs[o])(training.rows);
     const double magnitude = outputs.col(o).cwiseAbs().maxCoeff();
     output_mean(o) = outputs.col(o).dot(weights) / weights.sum();
     outputs.col(o).array() -= output_mean(o);
@@ -33,7 +33,7 @@ GrowthData::GrowthData(const GrowthProblem& growth) : problem(growth), training(
   }
 }
 
-double GrowthData::significant_rss(double weight, int rank, double rss, std::ptrdiff_t tested) const {
+double GrowthData::significant_rss(double weight, int rank, double rss, Eigen::Index tested) const {
   const GrowthOptions& options = problem.options;
   if (options.rule != GrowthRule::rd || options.significance >= 1.0 || tested == 0) {
     return std::numeric_limits<double>::infinity();
@@ -41,27 +41,21 @@ double GrowthData::significant_rss(double weight, int rank, double rss, std::ptr
   // One more coefficient is the least that two models can have; the more there are, the more they must gain.
   const double added = static_cast<double>(output_weights.size());
   const double freedom = added * (weight - rank) - added;
-  if (freedom <= 0.0) {
-    return std::numeric_limits<double>::infinity();
-  }
+  if (freedom <= 0.0) return std::numeric_limits<double>::infinity();
   // A little less, so that rounding excludes nothing.
   const double f = 0.999 * f_quantile(options.significance / static_cast<double>(tested), added, freedom);
   return rss / (1.0 + f * added / freedom);
 }
 
 bool GrowthData::is_significant(double level, double weight, int rank, double rss, const SplitRanks& split,
-                                double split_rss, std::ptrdiff_t tested) const {
-  if (level >= 1.0) {
-    return true;
-  }
+                                double split_rss, Eigen::Index tested) const {
+  if (level >= 1.0) return true;
   // Several outputs count as that many independent observations of equal variance, which the weights make them at the
   // root.
   const double num_outputs = static_cast<double>(output_weights.size());
   const double added = num_outputs * (split.left + split.right - rank);
   const double freedom = num_outputs * (weight - split.left - split.right);
-  if (added <= 0.0 || freedom <= 0.0) {
-    return false;
-  }
+  if (added <= 0.0 || freedom <= 0.0) return false;
   const double f = ((rss - split_rss) / added) / (split_rss / freedom);
   return f_survival(f, added, freedom) * static_cast<double>(tested) < level;
 }

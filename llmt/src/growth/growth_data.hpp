@@ -32,12 +32,11 @@ struct GrowthData {
   Eigen::VectorXd
       rounding;  ///< root mean square residual, in scaled outputs, that is rounding of the outputs themselves
 
-  std::ptrdiff_t split_inputs() const { return std::ssize(problem.options.split_inputs); }
+  Eigen::Index split_inputs() const { return std::ssize(problem.options.split_inputs); }
 
   /// Value of a split input in a training row.
-  double split_value(int row, std::ptrdiff_t split_input) const {
-    return training.table->inputs(training.rows[static_cast<std::size_t>(row)],
-                                  problem.options.split_inputs[static_cast<std::size_t>(split_input)]);
+  double split_value(int row, Eigen::Index split_input) const {
+    return training.table->inputs(training.rows[row], problem.options.split_inputs[split_input]);
   }
 
   /// Where the two child models of a split meet, on average over the node's rows, if that is in the gap low ... high of
@@ -49,15 +48,15 @@ struct GrowthData {
   /// The largest residual sum of squares of two child models with which a split may pass the significance test,
   /// whatever the children's ranks; infinity without a test. `weight`, `rank`, `rss`: of the node; `tested`: candidate
   /// splits, or fewer.
-  double significant_rss(double weight, int rank, double rss, std::ptrdiff_t tested) const;
+  double significant_rss(double weight, int rank, double rss, Eigen::Index tested) const;
 
   /// Whether a split passes the F test (eq. 2) at a level; 1 and more: any does. `weight`, `rank`, `rss`: of the node;
   /// `tested`: candidate splits.
   bool is_significant(double level, double weight, int rank, double rss, const SplitRanks& split, double split_rss,
-                      std::ptrdiff_t tested) const;
+                      Eigen::Index tested) const;
 
   /// Threads for work on so many numbers: one where starting another costs more than it saves.
-  int threads_for(std::ptrdiff_t work) const { return work < 30000 ? 1 : problem.max_threads; }
+  int threads_for(Eigen::Index work) const { return work < 30000 ? 1 : problem.max_threads; }
 };
 
 }  // namespace llmt

@@ -12,12 +12,10 @@ std::vector<std::size_t> prune(std::vector<Node>& nodes, const Eigen::VectorXd& 
     Node& node = nodes[i];
     const double samples = static_cast<double>(node.samples);
     error[i] = (weights.dot(node.rss) + m * prior) / (samples + m);
-    if (node.is_leaf()) {
-      continue;
-    }
+    if (node.is_leaf()) continue;
     double backed = 0.0;
     for (const int child : {node.left, node.right}) {
-      const std::size_t c = static_cast<std::size_t>(child);
+      const std::size_t c = child;
       backed += (static_cast<double>(nodes[c].samples) + 0.5 * m) / (samples + m) * error[c];
     }
     if (error[i] <= backed) {
@@ -33,12 +31,10 @@ std::vector<std::size_t> prune(std::vector<Node>& nodes, const Eigen::VectorXd& 
   std::vector<bool> reachable(nodes.size(), false);
   reachable[0] = true;
   for (std::size_t i = 0; i < nodes.size(); ++i) {
-    if (!reachable[i]) {
-      continue;
-    }
+    if (!reachable[i]) continue;
     if (!nodes[i].is_leaf()) {
-      reachable[static_cast<std::size_t>(nodes[i].left)] = true;
-      reachable[static_cast<std::size_t>(nodes[i].right)] = true;
+      reachable[nodes[i].left] = true;
+      reachable[nodes[i].right] = true;
     }
     new_index[i] = static_cast<int>(kept.size());
     kept.push_back(nodes[i]);
@@ -46,8 +42,8 @@ std::vector<std::size_t> prune(std::vector<Node>& nodes, const Eigen::VectorXd& 
   }
   for (Node& node : kept) {
     if (!node.is_leaf()) {
-      node.left = new_index[static_cast<std::size_t>(node.left)];
-      node.right = new_index[static_cast<std::size_t>(node.right)];
+      node.left = new_index[node.left];
+      node.right = new_index[node.right];
     }
   }
   nodes = std::move(kept);

@@ -18,7 +18,7 @@ void Evaluator::combine(const std::vector<Activation>& active, const double* dev
 }
 
 void Evaluator::predict(const RowBlock& block, std::vector<double>& values) const {
-  values.assign(static_cast<std::size_t>(block.rows() * num_outputs()), 0.0);
+  values.assign(block.rows() * num_outputs(), 0.0);
   validities_.for_each_leaf(
       block, [&](int node, const RowList& list) { models_.add(node, list, block.deviations.data(), values.data()); });
   models_.finish_rows(block.rows(), block.deviations.data(), values.data());

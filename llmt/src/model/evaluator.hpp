@@ -17,14 +17,14 @@ namespace llmt {
 class Evaluator {
  public:
   /// `inputs`: columns of the model, whose extents close the boxes.
-  Evaluator(const Partition& partition, const std::vector<InputColumn>& inputs, std::ptrdiff_t regressors)
+  Evaluator(const Partition& partition, const std::vector<InputColumn>& inputs, Eigen::Index regressors)
       : inputs_(std::ssize(inputs)),
         regressors_(regressors),
         validities_(partition, inputs),
         models_(partition, regressors) {}
 
   const LeafValidities& validities() const { return validities_; }
-  std::ptrdiff_t num_outputs() const { return models_.num_outputs(); }
+  Eigen::Index num_outputs() const { return models_.num_outputs(); }
 
   /// See LeafValidities.
   void activate(const double* row, std::vector<Activation>& active) const { validities_.activate(row, active); }
@@ -56,8 +56,8 @@ class Evaluator {
   void add_blend_derivatives(int node, double validity, const double* row, const double* deviations, double* values,
                              Eigen::MatrixXd& by_input, Eigen::MatrixXd& by_regressor) const;
 
-  std::ptrdiff_t inputs_;
-  std::ptrdiff_t regressors_;
+  Eigen::Index inputs_;
+  Eigen::Index regressors_;
   LeafValidities validities_;
   LocalModels models_;
 };

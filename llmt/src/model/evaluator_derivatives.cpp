@@ -8,36 +8,34 @@
 namespace llmt {
 
 double LeafValidities::left_share_derivative(int node, const double* row) const {
-  const Branch& branch = branches_[static_cast<std::size_t>(node)];
-  if (branch.first_level >= 0 || branch.per_half_width == 0.0) {
-    return 0.0;
-  }
+  const Branch& branch = branches_[node];
+  if (branch.first_level >= 0 || branch.per_half_width == 0.0) return 0.0;
   const double u = (side(branch, row) - branch.threshold) * branch.per_half_width;
   return branch.per_half_width *
          (kind_ == ValidityKind::logistic ? logistic_derivative(logistic(u)) : transition_derivative(u, smoothness_));
 }
 
 void LeafValidities::add_side_derivatives(int node, const Eigen::VectorXd& factor, Eigen::MatrixXd& by_input) const {
-  const Branch& branch = branches_[static_cast<std::size_t>(node)];
+  const Branch& branch = branches_[node];
   if (branch.first_term < 0) {
     by_input.col(branch.input) += factor;
   }
   for (int k = 0; k < branch.terms; ++k) {
-    const Term& term = terms_[static_cast<std::size_t>(branch.first_term + k)];
+    const Term& term = terms_[branch.first_term + k];
     by_input.col(term.input) += term.weight * factor;
   }
 }
 
 Eigen::MatrixXd LeafValidities::exponent_derivatives(const std::vector<Activation>& active, const double* row) const {
   Eigen::MatrixXd result(gaussians_.inputs, std::ssize(active));
-  std::ptrdiff_t at = 0;  // both are in order of growth
-  for (std::ptrdiff_t i = 0; i < result.cols(); ++i) {
-    while (gaussians_.nodes[static_cast<std::size_t>(at)] != active[static_cast<std::size_t>(i)].node) {
+  Eigen::Index at = 0;  // both are in order of growth
+  for (Eigen::Index i = 0; i < result.cols(); ++i) {
+    while (gaussians_.nodes[at] != active[i].node) {
       ++at;
     }
     const double* centre = gaussians_.centres.data() + at * gaussians_.stride;
     const double* per_sigma = gaussians_.per_sigma.data() + at * gaussians_.stride;
-    for (std::ptrdiff_t j = 0; j < gaussians_.inputs; ++j) {
+    for (Eigen::Index j = 0; j < gaussians_.inputs; ++j) {
       result(j, i) = -(row[j] - centre[j]) * per_sigma[j] * per_sigma[j];
     }
   }
@@ -45,12 +43,12 @@ Eigen::MatrixXd LeafValidities::exponent_derivatives(const std::vector<Activatio
 }
 
 void LocalModels::add_slopes(int node, double validity, const double* deviations, Eigen::MatrixXd& by_regressor) const {
-  for (std::ptrdiff_t k = 0; k < regressors_; ++k) {
+  for (Eigen::Index k = 0; k < regressors_; ++k) {
     double below = 0.0;  // derivative of the held deviation of the node below
-    for (int at = node; at >= 0 && below < 1.0; at = parents_[static_cast<std::size_t>(at)]) {
+    for (int at = node; at >= 0 && below < 1.0; at = parents_[at]) {
       const double derivative = hold_derivative(deviations[k], low(at)[k], high(at)[k]);
       const double weight = validity * (derivative - below);
-      for (std::ptrdiff_t o = 0; weight != 0.0 && o < outputs_; ++o) {
+      for (Eigen::Index o = 0; weight != 0.0 && o < outputs_; ++o) {
         by_regressor(o, k) += weight * slopes(at, o)[k];
       }
       below = derivative;
@@ -62,21 +60,19 @@ void LocalModels::finish_slopes(const double* deviations, const double* values, 
                                 Eigen::MatrixXd& by_regressor) const {
   Eigen::VectorXd root = Eigen::VectorXd::Zero(outputs_);
   add(0, 1.0, deviations, root.data());
-  for (std::ptrdiff_t o = 0; o < residual_range_.rows(); ++o) {
+  for (Eigen::Index o = 0; o < residual_range_.rows(); ++o) {
     const double derivative = hold_derivative(values[o] - root(o), residual_range_(o, 0), residual_range_(o, 1));
-    if (derivative == 1.0) {
-      continue;
-    }
+    if (derivative == 1.0) continue;
     by_input.row(o) *= derivative;
     by_regressor.row(o) *= derivative;
-    for (std::ptrdiff_t k = 0; k < regressors_; ++k) {
+    for (Eigen::Index k = 0; k < regressors_; ++k) {
       by_regressor(o, k) +=
           (1.0 - derivative) * slopes(0, o)[k] * hold_derivative(deviations[k], low(0)[k], high(0)[k]);
     }
   }
-  for (std::ptrdiff_t k = 0; k < regressors_; ++k) {
+  for (Eigen::Index k = 0; k < regressors_; ++k) {
     const double beyond = 1.0 - hold_derivative(deviations[k], low(0)[k], high(0)[k]);
-    for (std::ptrdiff_t o = 0; beyond > 0.0 && o < outputs_; ++o) {
+    for (Eigen::Index o = 0; beyond > 0.0 && o < outputs_; ++o) {
       by_regressor(o, k) += outer_slopes(o)[k] * beyond;
     }
   }
@@ -87,7 +83,7 @@ void Evaluator::derivatives(const double* row, const double* deviations, Eigen::
   by_input.setZero(num_outputs(), inputs_);
   by_regressor.setZero(num_outputs(), regressors_);
   // A subtree leaves its values in front and works behind them, no deeper than there are leaves.
-  std::vector<double> values(static_cast<std::size_t>((validities_.num_leaves() + 1) * num_outputs()));
+  std::vector<double> values((validities_.num_leaves() + 1) * num_outputs());
   if (validities_.are_gaussian()) {
     add_gaussian_derivatives(row, deviations, values.data(), by_input, by_regressor);
   } else {
@@ -104,12 +100,12 @@ void Evaluator::add_gaussian_derivatives(const double* row, const double* deviat
   Eigen::MatrixXd exponents = validities_.exponent_derivatives(active, row);
   Eigen::VectorXd mean = Eigen::VectorXd::Zero(exponents.rows());
   for (std::size_t i = 0; i < active.size(); ++i) {
-    mean += active[i].validity * exponents.col(static_cast<std::ptrdiff_t>(i));
+    mean += active[i].validity * exponents.col(i);
   }
   Eigen::VectorXd of_leaf(num_outputs());
   for (std::size_t i = 0; i < active.size(); ++i) {
     local(active[i].node, deviations, of_leaf.data());
-    by_input += active[i].validity * of_leaf * (exponents.col(static_cast<std::ptrdiff_t>(i)) - mean).transpose();
+    by_input += active[i].validity * of_leaf * (exponents.col(i) - mean).transpose();
     models_.add(active[i].node, active[i].validity, deviations, values);
     models_.add_slopes(active[i].node, active[i].validity, deviations, by_regressor);
   }
@@ -135,7 +131,7 @@ void Evaluator::add_blend_derivatives(int node, double validity, const double* r
                         by_regressor);
   Eigen::VectorXd by_side(num_outputs());
   const double by_share = validity * validities_.left_share_derivative(node, row);
-  for (std::ptrdiff_t o = 0; o < num_outputs(); ++o) {
+  for (Eigen::Index o = 0; o < num_outputs(); ++o) {
     by_side(o) = by_share * (values[o] - of_right[o]);
     values[o] = left * values[o] + (1.0 - left) * of_right[o];
   }

@@ -21,9 +21,7 @@ LLMT_INLINE Number hold(Number x, Number low, Number high) {
 }
 
 inline double hold_derivative(double x, double low, double high) {
-  if (!(x > high || x < low)) {
-    return 1.0;
-  }
+  if (!(x > high || x < low)) return 1.0;
   const double round = rounding_of_hold * (high - low);
   const double beyond = x > high ? x - high : low - x;
   return beyond >= round ? 0.0 : 1.0 - beyond / round;

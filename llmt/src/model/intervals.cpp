@@ -35,7 +35,7 @@ Intervals::Intervals(std::vector<Model> models, std::vector<Eigen::MatrixXd> res
     if (!residuals_[k].allFinite() || (residuals_[k].array() < 0.0).any()) {
       throw std::invalid_argument(fmt::format("llmt::Intervals: a residual of fold {} is negative or not finite", k));
     }
-    for (std::ptrdiff_t o = 0; o < residuals_[k].cols(); ++o) {
+    for (Eigen::Index o = 0; o < residuals_[k].cols(); ++o) {
       std::sort(residuals_[k].col(o).begin(), residuals_[k].col(o).end());
     }
   }
@@ -48,13 +48,13 @@ Bounds Intervals::predict(const Eigen::Ref<const Eigen::MatrixXd>& inputs, doubl
   if (!(level > 0.0 && level < 1.0)) {
     throw std::invalid_argument(fmt::format("llmt::Intervals: level is {}, it must lie between 0 and 1", level));
   }
-  std::ptrdiff_t rows = 0;
+  Eigen::Index rows = 0;
   for (const Eigen::MatrixXd& residuals : residuals_) {
     rows += residuals.rows();
   }
   // Both ends leave out the same number of values. The slack keeps 0.1 * 30 from becoming 2.
-  const std::ptrdiff_t rank =
-      static_cast<std::ptrdiff_t>(std::floor((1.0 - level) * static_cast<double>(rows + 1) * (1.0 + 1e-12)));
+  const Eigen::Index rank =
+      static_cast<Eigen::Index>(std::floor((1.0 - level) * static_cast<double>(rows + 1) * (1.0 + 1e-12)));
   if (rank < 1) {
     throw std::invalid_argument(
         fmt::format("llmt::Intervals: level {} needs at least {:.0f} held-out rows, there are {}", level,
@@ -66,26 +66,26 @@ Bounds Intervals::predict(const Eigen::Ref<const Eigen::MatrixXd>& inputs, doubl
   }
   Bounds bounds{Eigen::MatrixXd(inputs.rows(), predicted[0].cols()),
                 Eigen::MatrixXd(inputs.rows(), predicted[0].cols())};
-  constexpr std::ptrdiff_t block = 256;
-  parallel_for((inputs.rows() + block - 1) / block, max_threads, [&](std::ptrdiff_t index) {
+  constexpr Eigen::Index block = 256;
+  parallel_for((inputs.rows() + block - 1) / block, max_threads, [&](Eigen::Index index) {
     std::vector<double> lower;
     std::vector<double> upper;
-    for (std::ptrdiff_t row = index * block; row < std::min(inputs.rows(), (index + 1) * block); ++row) {
-      for (std::ptrdiff_t o = 0; o < predicted[0].cols(); ++o) {
+    for (Eigen::Index row = index * block; row < std::min(inputs.rows(), (index + 1) * block); ++row) {
+      for (Eigen::Index o = 0; o < predicted[0].cols(); ++o) {
         lower.clear();
         upper.clear();
         // Only the `rank` largest residuals of a fold can be among the `rank` outermost values.
         for (std::size_t k = 0; k < models_.size(); ++k) {
-          const std::ptrdiff_t count = residuals_[k].rows();
-          for (std::ptrdiff_t i = std::max<std::ptrdiff_t>(0, count - rank); i < count; ++i) {
+          const Eigen::Index count = residuals_[k].rows();
+          for (Eigen::Index i = std::max<Eigen::Index>(0, count - rank); i < count; ++i) {
             lower.push_back(predicted[k](row, o) - residuals_[k](i, o));
             upper.push_back(predicted[k](row, o) + residuals_[k](i, o));
           }
         }
         std::nth_element(lower.begin(), lower.begin() + (rank - 1), lower.end());
         std::nth_element(upper.begin(), upper.begin() + (rank - 1), upper.end(), std::greater<>());
-        bounds.lower(row, o) = lower[static_cast<std::size_t>(rank - 1)];
-        bounds.upper(row, o) = upper[static_cast<std::size_t>(rank - 1)];
+        bounds.lower(row, o) = lower[rank - 1];
+        bounds.upper(row, o) = upper[rank - 1];
         if (bounds.lower(row, o) > bounds.upper(row, o)) {  // the folds' models disagree by more than their residuals
           bounds.lower(row, o) = bounds.upper(row, o) = 0.5 * (bounds.lower(row, o) + bounds.upper(row, o));
         }
@@ -104,7 +104,7 @@ void save(const Model& model, const Intervals& intervals, const std::string& pat
   json["intervals"] = Json::array();
   for (std::size_t k = 0; k < intervals.models().size(); ++k) {
     Json residuals = Json::array();
-    for (std::ptrdiff_t o = 0; o < intervals.residuals()[k].cols(); ++o) {
+    for (Eigen::Index o = 0; o < intervals.residuals()[k].cols(); ++o) {
       const Eigen::VectorXd column = intervals.residuals()[k].col(o);
       residuals.push_back(std::vector<double>(column.begin(), column.end()));
     }
@@ -124,9 +124,7 @@ Intervals load_intervals(const std::string& path) {
   std::vector<Model> models;
   std::vector<Eigen::MatrixXd> residuals;
   try {
-    if (!json.is_object() || !json.contains("intervals")) {
-      return {};
-    }
+    if (!json.is_object() || !json.contains("intervals")) return {};
     for (const Json& fold : json.at("intervals")) {
       models.push_back(from_json(fold.at("model").dump(), fmt::format("{}: /intervals/{}/model", path, models.size())));
       const std::vector<std::vector<double>> columns = fold.at("residuals").get<std::vector<std::vector<double>>>();
@@ -135,8 +133,7 @@ Intervals load_intervals(const std::string& path) {
         if (std::ssize(columns[o]) != values.rows()) {
           throw std::runtime_error(fmt::format("{}: /intervals: residuals of outputs differ in number", path));
         }
-        values.col(static_cast<std::ptrdiff_t>(o)) =
-            Eigen::Map<const Eigen::VectorXd>(columns[o].data(), std::ssize(columns[o]));
+        values.col(o) = Eigen::Map<const Eigen::VectorXd>(columns[o].data(), std::ssize(columns[o]));
       }
       residuals.push_back(std::move(values));
     }

@@ -12,7 +12,7 @@
 namespace llmt {
 namespace {
 
-/// Validities below this share of the largest are left out of Gaussians.
+// Validities below this share of the largest are left out of Gaussians.
 constexpr double negligible_log = -40.0;
 
 }  // namespace
@@ -39,9 +39,9 @@ LeafValidities::LeafValidities(const Partition& partition, const std::vector<Inp
     }
     if (node.is_oblique()) {
       branch.first_term = static_cast<int>(terms_.size());
-      for (std::ptrdiff_t j = 0; j < node.direction.size(); ++j) {
+      for (Eigen::Index j = 0; j < node.direction.size(); ++j) {
         if (node.direction(j) != 0.0) {
-          terms_.push_back({static_cast<int>(j), node.direction(j), inputs[static_cast<std::size_t>(j)].centre});
+          terms_.push_back({static_cast<int>(j), node.direction(j), inputs[j].centre});
           ++branch.terms;
         }
       }
@@ -54,12 +54,12 @@ LeafValidities::LeafValidities(const Partition& partition, const std::vector<Inp
 }
 
 void LeafValidities::add_gaussians(const Partition& partition, const std::vector<InputColumn>& inputs) {
-  const std::ptrdiff_t count = std::ssize(inputs);
+  const Eigen::Index count = std::ssize(inputs);
   Eigen::VectorXd low(count);
   Eigen::VectorXd high(count);
-  for (std::ptrdiff_t j = 0; j < count; ++j) {
-    low(j) = inputs[static_cast<std::size_t>(j)].low;
-    high(j) = inputs[static_cast<std::size_t>(j)].high;
+  for (Eigen::Index j = 0; j < count; ++j) {
+    low(j) = inputs[j].low;
+    high(j) = inputs[j].high;
   }
   gaussians_.inputs = count;
   gaussians_.stride = padded_to_quads(count);
@@ -67,17 +67,15 @@ void LeafValidities::add_gaussians(const Partition& partition, const std::vector
   std::vector<bool> is_split(inputs.size(), false);
   for (const Node& node : partition.nodes) {
     if (!node.is_leaf() && node.level_side.empty() && node.threshold < std::numeric_limits<double>::max()) {
-      is_split[static_cast<std::size_t>(node.split_input)] = true;
+      is_split[node.split_input] = true;
     }
   }
   for (std::size_t i = 0; i < partition.nodes.size(); ++i) {
-    if (!partition.nodes[i].is_leaf()) {
-      continue;
-    }
-    const std::ptrdiff_t box = static_cast<std::ptrdiff_t>(i);
+    if (!partition.nodes[i].is_leaf()) continue;
+    const Eigen::Index box = static_cast<Eigen::Index>(i);
     gaussians_.nodes.push_back(static_cast<int>(i));
-    for (std::ptrdiff_t j = 0; j < gaussians_.stride; ++j) {
-      const bool used = j < count && is_split[static_cast<std::size_t>(j)];
+    for (Eigen::Index j = 0; j < gaussians_.stride; ++j) {
+      const bool used = j < count && is_split[j];
       const double sigma = used ? partition.validity.width * (boxes.high(j, box) - boxes.low(j, box)) : 0.0;
       // Where no leaf was cut, all Gaussians are alike and cancel.
       gaussians_.per_sigma.push_back(sigma > 0.0 ? 1.0 / sigma : 0.0);
@@ -92,18 +90,14 @@ double LeafValidities::left_share(const Branch& branch, double x) const {
     return known ? level_share_[static_cast<std::size_t>(branch.first_level) + static_cast<std::size_t>(x)]
                  : branch.missing_left;
   }
-  if (std::isnan(x)) {
-    return branch.missing_left;
-  }
-  if (branch.per_half_width == 0.0) {
-    return x <= branch.threshold ? 1.0 : 0.0;
-  }
+  if (std::isnan(x)) return branch.missing_left;
+  if (branch.per_half_width == 0.0) return x <= branch.threshold ? 1.0 : 0.0;
   const double u = (x - branch.threshold) * branch.per_half_width;
   return kind_ == ValidityKind::logistic ? logistic(u) : transition(u, smoothness_);
 }
 
 int LeafValidities::child_of(int node, const double* row) const {
-  const Branch& branch = branches_[static_cast<std::size_t>(node)];
+  const Branch& branch = branches_[node];
   if (const double x = side(branch, row); branch.first_level < 0 && !std::isnan(x)) {
     return x <= branch.threshold ? branch.left : branch.right;
   }
@@ -115,10 +109,8 @@ bool LeafValidities::is_ambiguous(const double* row) const {
   while (!open.empty()) {
     const int node = open.back();
     open.pop_back();
-    const Branch& branch = branches_[static_cast<std::size_t>(node)];
-    if (branch.left < 0) {
-      continue;
-    }
+    const Branch& branch = branches_[node];
+    if (branch.left < 0) continue;
     const double left = left_share(node, row);
     if (branch.first_term < 0 && std::isnan(row[branch.input]) && left > 1.0 - clear_share && left < clear_share) {
       return true;
@@ -143,7 +135,7 @@ void LeafValidities::activate(const double* row, std::vector<Activation>& active
 }
 
 void LeafValidities::descend(int node, double validity, const double* row, std::vector<Activation>& active) const {
-  const Branch* branch = &branches_[static_cast<std::size_t>(node)];
+  const Branch* branch = &branches_[node];
   while (branch->left >= 0) {
     const double left = left_share(*branch, side(*branch, row));
     if (left > 0.0 && left < 1.0) {
@@ -151,7 +143,7 @@ void LeafValidities::descend(int node, double validity, const double* row, std::
       validity *= 1.0 - left;
     }
     node = left < 1.0 ? branch->right : branch->left;
-    branch = &branches_[static_cast<std::size_t>(node)];
+    branch = &branches_[node];
   }
   active.push_back({node, validity});
 }
@@ -163,7 +155,7 @@ double LeafValidities::set_exponents(const double* row, Activation* active) cons
   const double* per_sigma = gaussians_.per_sigma.data();
   for (std::size_t i = 0; i < gaussians_.nodes.size(); ++i) {
     Quad sum = {};
-    for (std::ptrdiff_t j = 0; j < gaussians_.inputs; j += quad, centre += quad, per_sigma += quad) {
+    for (Eigen::Index j = 0; j < gaussians_.inputs; j += quad, centre += quad, per_sigma += quad) {
       const Quad x = load_quad(row + j, gaussians_.inputs - j);
       const Quad z = x != x ? Quad{} : (x - load_quad(centre)) * load_quad(per_sigma);
       sum += z * z;

@@ -37,14 +37,14 @@ class LeafValidities {
 
   /// Validity of the left child at a split, and its derivative with respect to what the split compares.
   double left_share(int node, const double* row) const {
-    const Branch& branch = branches_[static_cast<std::size_t>(node)];
+    const Branch& branch = branches_[node];
     return left_share(branch, side(branch, row));
   }
   double left_share_derivative(int node, const double* row) const;
   /// by_input += factor * derivatives, by the inputs, of what the split compares.
   void add_side_derivatives(int node, const Eigen::VectorXd& factor, Eigen::MatrixXd& by_input) const;
   /// What the split compares with its threshold.
-  double side(int node, const double* row) const { return side(branches_[static_cast<std::size_t>(node)], row); }
+  double side(int node, const double* row) const { return side(branches_[node], row); }
 
   /// Whether a missing value sends the row to both sides of some split in earnest.
   bool is_ambiguous(const double* row) const;
@@ -52,10 +52,10 @@ class LeafValidities {
   int child_of(int node, const double* row) const;
 
   /// Left and right child of a node, -1 in a leaf.
-  int left(int node) const { return branches_[static_cast<std::size_t>(node)].left; }
-  int right(int node) const { return branches_[static_cast<std::size_t>(node)].right; }
+  int left(int node) const { return branches_[node].left; }
+  int right(int node) const { return branches_[node].right; }
 
-  std::ptrdiff_t num_leaves() const { return std::ssize(branches_) / 2 + 1; }
+  Eigen::Index num_leaves() const { return std::ssize(branches_) / 2 + 1; }
   bool are_gaussian() const { return kind_ == ValidityKind::gaussian; }
   /// Derivatives of the exponents of Gaussians by the inputs, inputs x `active`, the leaves that reach the row.
   Eigen::MatrixXd exponent_derivatives(const std::vector<Activation>& active, const double* row) const;
@@ -82,8 +82,8 @@ class LeafValidities {
   /// Of the leaves, in order of growth; rows of `stride` entries, padded with zeros to whole quads.
   struct Gaussians {
     std::vector<int> nodes = {};
-    std::ptrdiff_t inputs = 0;
-    std::ptrdiff_t stride = 0;
+    Eigen::Index inputs = 0;
+    Eigen::Index stride = 0;
     std::vector<double> centres = {};
     std::vector<double> per_sigma = {};  // 1 / sigma; 0 for an input without extent, or categorical
   };
@@ -97,10 +97,10 @@ class LeafValidities {
     return branch.first_term < 0 ? row[branch.input] : oblique_side(branch, row, 1);
   }
   /// Inputs that are `stride` apart. A missing one counts as its centre.
-  double oblique_side(const Branch& branch, const double* row, std::ptrdiff_t stride) const {
+  double oblique_side(const Branch& branch, const double* row, Eigen::Index stride) const {
     double sum = 0.0;
     for (int k = 0; k < branch.terms; ++k) {
-      const Term& term = terms_[static_cast<std::size_t>(branch.first_term + k)];
+      const Term& term = terms_[branch.first_term + k];
       const double x = row[term.input * stride];
       sum += x == x ? term.weight * (x - term.centre) : 0.0;
     }
@@ -108,7 +108,7 @@ class LeafValidities {
   }
   double left_share(const Branch& branch, double x) const;
   void descend(int node, double validity, const double* row, std::vector<Activation>& active) const;
-  void descend(int node, std::ptrdiff_t begin, std::ptrdiff_t count, const RowBlock& block, Waiting& waiting,
+  void descend(int node, Eigen::Index begin, Eigen::Index count, const RowBlock& block, Waiting& waiting,
                const std::function<void(int node, const RowList& list)>& visit) const;
   void add_gaussians(const Partition& partition, const std::vector<InputColumn>& inputs);
   /// Exponents of the Gaussians as validities, one of `active` each; returns the largest.

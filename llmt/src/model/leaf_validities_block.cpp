@@ -8,11 +8,11 @@
 namespace llmt {
 namespace {
 
-/// Rows of a node on their way to its children.
+// Rows of a node on their way to its children.
 struct Fork {
   const int* rows;
   const double* validities;
-  std::ptrdiff_t count;
+  Eigen::Index count;
   int* left_rows;  // room for all
   double* left_validities;
   int* right_rows;  // may be those that come in
@@ -20,14 +20,14 @@ struct Fork {
 };
 
 struct Counts {
-  std::ptrdiff_t left = 0;
-  std::ptrdiff_t right = 0;
+  Eigen::Index left = 0;
+  Eigen::Index right = 0;
 };
 
-/// A jump on a number that no row lacks.
+// A jump on a number that no row lacks.
 Counts jump(const Fork& fork, const double* column, double threshold) {
   Counts counts;
-  for (std::ptrdiff_t i = 0; i < fork.count; ++i) {
+  for (Eigen::Index i = 0; i < fork.count; ++i) {
     const int row = fork.rows[i];
     const double validity = fork.validities[i];
     // Both are written, and one is kept: no branch to be guessed wrong.
@@ -42,11 +42,10 @@ Counts jump(const Fork& fork, const double* column, double threshold) {
   return counts;
 }
 
-/// `share(i)`: of the left child in the i-th row.
+// `share(i)`: of the left child in the i-th row.
 template <class Share>
-LLMT_INLINE void hand_over(const Fork& fork, std::ptrdiff_t begin, std::ptrdiff_t end, const Share& share,
-                           Counts& counts) {
-  for (std::ptrdiff_t i = begin; i < end; ++i) {
+LLMT_INLINE void hand_over(const Fork& fork, Eigen::Index begin, Eigen::Index end, const Share& share, Counts& counts) {
+  for (Eigen::Index i = begin; i < end; ++i) {
     const double left = share(i);
     const int row = fork.rows[i];
     const double validity = fork.validities[i];
@@ -59,39 +58,39 @@ LLMT_INLINE void hand_over(const Fork& fork, std::ptrdiff_t begin, std::ptrdiff_
   }
 }
 
-/// A transition on a number that no row lacks.
+// A transition on a number that no row lacks.
 LLMT_FOR_EACH_INSTRUCTION_SET
 Counts blend(const Fork& fork, const double* column, double threshold, double per_half_width, int smoothness) {
-  constexpr std::ptrdiff_t at_once = 64;
+  constexpr Eigen::Index at_once = 64;
   double left[at_once] = {};
   Counts counts;
-  for (std::ptrdiff_t begin = 0; begin < fork.count; begin += at_once) {
-    const std::ptrdiff_t size = std::min(at_once, fork.count - begin);
-    for (std::ptrdiff_t i = 0; i < size; ++i) {
+  for (Eigen::Index begin = 0; begin < fork.count; begin += at_once) {
+    const Eigen::Index size = std::min(at_once, fork.count - begin);
+    for (Eigen::Index i = 0; i < size; ++i) {
       left[i] = column[fork.rows[begin + i]];
     }
-    for (std::ptrdiff_t i = 0; i < size; ++i) {
+    for (Eigen::Index i = 0; i < size; ++i) {
       left[i] = transition((left[i] - threshold) * per_half_width, smoothness);
     }
     hand_over(
-        fork, begin, begin + size, [&](std::ptrdiff_t i) { return left[i - begin]; }, counts);
+        fork, begin, begin + size, [&](Eigen::Index i) { return left[i - begin]; }, counts);
   }
   return counts;
 }
 
-/// Logistic gates; `side`: of the i-th row.
+// Logistic gates; `side`: of the i-th row.
 LLMT_FOR_EACH_INSTRUCTION_SET
 Counts gate(const Fork& fork, const double* side, double threshold, double per_half_width) {
-  constexpr std::ptrdiff_t at_once = 64;
+  constexpr Eigen::Index at_once = 64;
   double left[at_once] = {};
   Counts counts;
-  for (std::ptrdiff_t begin = 0; begin < fork.count; begin += at_once) {
-    const std::ptrdiff_t size = std::min(at_once, fork.count - begin);
-    for (std::ptrdiff_t i = 0; i < size; ++i) {
+  for (Eigen::Index begin = 0; begin < fork.count; begin += at_once) {
+    const Eigen::Index size = std::min(at_once, fork.count - begin);
+    for (Eigen::Index i = 0; i < size; ++i) {
       left[i] = logistic((side[begin + i] - threshold) * per_half_width);
     }
     hand_over(
-        fork, begin, begin + size, [&](std::ptrdiff_t i) { return left[i - begin]; }, counts);
+        fork, begin, begin + size, [&](Eigen::Index i) { return left[i - begin]; }, counts);
   }
   return counts;
 }
@@ -100,17 +99,17 @@ Counts gate(const Fork& fork, const double* side, double threshold, double per_h
 
 void LeafValidities::for_each_leaf(const RowBlock& block,
                                    const std::function<void(int node, const RowList& list)>& visit) const {
-  const std::size_t rows = static_cast<std::size_t>(block.rows());
+  const std::size_t rows = block.rows();
   if (are_gaussian()) {
     std::vector<Waiting> of_node(branches_.size());
     std::vector<Activation> active;
     Eigen::VectorXd x(block.inputs.cols());
     for (std::size_t row = 0; row < rows; ++row) {
-      x = block.inputs.row(static_cast<std::ptrdiff_t>(row));
+      x = block.inputs.row(row);
       activate_gaussians(x.data(), active);
       for (const Activation& entry : active) {
-        of_node[static_cast<std::size_t>(entry.node)].rows.push_back(static_cast<int>(row));
-        of_node[static_cast<std::size_t>(entry.node)].validities.push_back(entry.validity);
+        of_node[entry.node].rows.push_back(static_cast<int>(row));
+        of_node[entry.node].validities.push_back(entry.validity);
       }
     }
     for (std::size_t node = 0; node < of_node.size(); ++node) {
@@ -128,11 +127,11 @@ void LeafValidities::for_each_leaf(const RowBlock& block,
   descend(0, 0, block.rows(), block, waiting, visit);
 }
 
-void LeafValidities::descend(int node, std::ptrdiff_t begin, std::ptrdiff_t count, const RowBlock& block,
-                             Waiting& waiting, const std::function<void(int node, const RowList& list)>& visit) const {
+void LeafValidities::descend(int node, Eigen::Index begin, Eigen::Index count, const RowBlock& block, Waiting& waiting,
+                             const std::function<void(int node, const RowList& list)>& visit) const {
   while (count > 0 && left(node) >= 0) {
-    const Branch& branch = branches_[static_cast<std::size_t>(node)];
-    const std::size_t needed = static_cast<std::size_t>(begin + 2 * count);
+    const Branch& branch = branches_[node];
+    const std::size_t needed = begin + 2 * count;
     if (waiting.rows.size() < needed) {
       waiting.rows.resize(2 * needed);
       waiting.validities.resize(2 * needed);
@@ -144,26 +143,25 @@ void LeafValidities::descend(int node, std::ptrdiff_t begin, std::ptrdiff_t coun
     Counts counts;
     if (branch.first_term >= 0) {
       const double* first = block.inputs.data();
-      const std::ptrdiff_t stride = block.inputs.outerStride();
-      std::vector<double> sides(static_cast<std::size_t>(count));
-      for (std::ptrdiff_t i = 0; i < count; ++i) {
-        sides[static_cast<std::size_t>(i)] = oblique_side(branch, first + rows[i], stride);
+      const Eigen::Index stride = block.inputs.outerStride();
+      std::vector<double> sides(count);
+      for (Eigen::Index i = 0; i < count; ++i) {
+        sides[i] = oblique_side(branch, first + rows[i], stride);
       }
       if (kind_ == ValidityKind::logistic && branch.per_half_width != 0.0) {
         counts = gate(fork, sides.data(), branch.threshold, branch.per_half_width);
       } else {
         hand_over(
-            fork, 0, count, [&](std::ptrdiff_t i) { return left_share(branch, sides[static_cast<std::size_t>(i)]); },
-            counts);
+            fork, 0, count, [&](Eigen::Index i) { return left_share(branch, sides[i]); }, counts);
       }
-    } else if (branch.first_level >= 0 || block.has_missing[static_cast<std::size_t>(branch.input)]) {
+    } else if (branch.first_level >= 0 || block.has_missing[branch.input]) {
       hand_over(
-          fork, 0, count, [&](std::ptrdiff_t i) { return left_share(branch, column[fork.rows[i]]); }, counts);
+          fork, 0, count, [&](Eigen::Index i) { return left_share(branch, column[fork.rows[i]]); }, counts);
     } else if (branch.per_half_width == 0.0) {
       counts = jump(fork, column, branch.threshold);
     } else if (kind_ == ValidityKind::logistic) {
       hand_over(
-          fork, 0, count, [&](std::ptrdiff_t i) { return left_share(branch, column[fork.rows[i]]); }, counts);
+          fork, 0, count, [&](Eigen::Index i) { return left_share(branch, column[fork.rows[i]]); }, counts);
     } else {
       counts = blend(fork, column, branch.threshold, branch.per_half_width, smoothness_);
     }

@@ -8,20 +8,20 @@
 namespace llmt {
 namespace {
 
-/// Predictions may differ from the root's model by more than its residuals did, by this fraction of their range.
+// Predictions may differ from the root's model by more than its residuals did, by this fraction of their range.
 constexpr double output_margin = 0.1;
 
-/// A row of deviations padded with zeros.
+// A row of deviations padded with zeros.
 struct PaddedRow {
   const double* at;
-  LLMT_INLINE Quad operator()(std::ptrdiff_t k) const { return load_quad(at + k); }
+  LLMT_INLINE Quad operator()(Eigen::Index k) const { return load_quad(at + k); }
 };
 
-/// A row of deviations as it comes.
+// A row of deviations as it comes.
 struct BareRow {
   const double* at;
-  std::ptrdiff_t size;
-  LLMT_INLINE Quad operator()(std::ptrdiff_t k) const { return load_quad(at + k, size - k); }
+  Eigen::Index size;
+  LLMT_INLINE Quad operator()(Eigen::Index k) const { return load_quad(at + k, size - k); }
 };
 
 }  // namespace
@@ -30,9 +30,9 @@ void deviations_at(const std::vector<InputColumn>& inputs, const std::vector<Reg
                    double* deviations) {
   for (std::size_t k = 0; k < regressors.size(); ++k) {
     const Regressor& regressor = regressors[k];
-    const std::size_t input = static_cast<std::size_t>(regressor.input);
+    const std::size_t input = regressor.input;
     if (regressor.second_input >= 0) {
-      const std::size_t second = static_cast<std::size_t>(regressor.second_input);
+      const std::size_t second = regressor.second_input;
       deviations[k] = factor_at(inputs[input], row[input]) * factor_at(inputs[second], row[second]) - regressor.centre;
       continue;
     }
@@ -43,7 +43,7 @@ void deviations_at(const std::vector<InputColumn>& inputs, const std::vector<Reg
   }
 }
 
-LocalModels::LocalModels(const Partition& partition, std::ptrdiff_t regressors)
+LocalModels::LocalModels(const Partition& partition, Eigen::Index regressors)
     : outputs_(std::ssize(partition.outputs)),
       regressors_(regressors),
       stride_(padded_to_quads(regressors)),
@@ -56,27 +56,27 @@ LocalModels::LocalModels(const Partition& partition, std::ptrdiff_t regressors)
   }
   const auto append = [&](std::vector<double>& to, const auto& values) {
     to.insert(to.end(), values.begin(), values.end());
-    to.resize(to.size() + static_cast<std::size_t>(stride_ - regressors_), 0.0);
+    to.resize(to.size() + (stride_ - regressors_), 0.0);
   };
-  data_.reserve(partition.nodes.size() * static_cast<std::size_t>((3 + outputs_) * stride_));
+  data_.reserve(partition.nodes.size() * ((3 + outputs_) * stride_));
   for (const Node& node : partition.nodes) {
     append(data_, node.low);
     append(data_, node.high);
     append(data_, node.mean);
-    for (std::ptrdiff_t o = 0; o < outputs_; ++o) {
+    for (Eigen::Index o = 0; o < outputs_; ++o) {
       append(data_, node.slope.row(o));
     }
     values_.insert(values_.end(), node.value.begin(), node.value.end());
   }
   const Eigen::MatrixXd& outer =
       partition.outer_slope.size() > 0 ? partition.outer_slope : partition.nodes.front().slope;
-  for (std::ptrdiff_t o = 0; o < outputs_; ++o) {
+  for (Eigen::Index o = 0; o < outputs_; ++o) {
     append(outer_slopes_, outer.row(o));
   }
 }
 
-/// Whether the row lies in the node's range. `first`: the local model of the first output without guards, for it costs
-/// little beside the check.
+// Whether the row lies in the node's range. `first`: the local model of the first output without guards, for it costs
+// little beside the check.
 template <class Row>
 LLMT_INLINE bool LocalModels::sum_inside(int node, const Row& row, double& first) const {
   const double* lows = low(node);
@@ -84,7 +84,7 @@ LLMT_INLINE bool LocalModels::sum_inside(int node, const Row& row, double& first
   const double* slope = slopes(node, 0);
   QuadMask inside = ~QuadMask{};
   Quad sum = {};
-  for (std::ptrdiff_t k = 0; k < stride_; k += quad) {
+  for (Eigen::Index k = 0; k < stride_; k += quad) {
     const Quad d = row(k);
     inside &= (d >= load_quad(lows + k)) & (d <= load_quad(highs + k));
     sum += load_quad(slope + k) * d;
@@ -94,27 +94,26 @@ LLMT_INLINE bool LocalModels::sum_inside(int node, const Row& row, double& first
 }
 
 template <class Row>
-LLMT_INLINE double LocalModels::sum(int node, std::ptrdiff_t output, const Row& row) const {
+LLMT_INLINE double LocalModels::sum(int node, Eigen::Index output, const Row& row) const {
   const double* slope = slopes(node, output);
   Quad sum = {};
-  for (std::ptrdiff_t k = 0; k < stride_; k += quad) {
+  for (Eigen::Index k = 0; k < stride_; k += quad) {
     sum += load_quad(slope + k) * row(k);
   }
   return value(node, output) + sum_of(sum);
 }
 
-/// The local model of a row that lies outside the node's range, or lacks a value: equation 14.
+// The local model of a row that lies outside the node's range, or lacks a value: equation 14.
 template <class Row>
-LLMT_INLINE double LocalModels::guarded(int node, std::ptrdiff_t output, const Row& row) const {
+LLMT_INLINE double LocalModels::guarded(int node, Eigen::Index output, const Row& row) const {
   Quad sum = {};
-  for (std::ptrdiff_t k = 0; k < stride_; k += quad) {
+  for (Eigen::Index k = 0; k < stride_; k += quad) {
     const Quad d = row(k);
     const QuadMask missing = d != d;
     Quad held = missing ? load_quad(mean(node) + k) : hold(d, load_quad(low(node) + k), load_quad(high(node) + k));
     sum += load_quad(slopes(node, output) + k) * held;
     QuadMask outside = ~missing & (held != d);
-    for (int at = parents_[static_cast<std::size_t>(node)]; at >= 0 && any_of(outside);
-         at = parents_[static_cast<std::size_t>(at)]) {
+    for (int at = parents_[node]; at >= 0 && any_of(outside); at = parents_[at]) {
       const Quad reached = outside ? hold(d, load_quad(low(at) + k), load_quad(high(at) + k)) : held;
       sum += load_quad(slopes(at, output) + k) * (reached - held);
       held = reached;
@@ -125,9 +124,9 @@ LLMT_INLINE double LocalModels::guarded(int node, std::ptrdiff_t output, const R
 }
 
 template <class Row>
-LLMT_INLINE double LocalModels::beyond_root(std::ptrdiff_t output, const Row& row) const {
+LLMT_INLINE double LocalModels::beyond_root(Eigen::Index output, const Row& row) const {
   Quad sum = {};
-  for (std::ptrdiff_t k = 0; k < stride_; k += quad) {
+  for (Eigen::Index k = 0; k < stride_; k += quad) {
     const Quad d = row(k);
     const Quad beyond = d != d ? Quad{} : d - hold(d, load_quad(low(0) + k), load_quad(high(0) + k));
     sum += load_quad(outer_slopes(output) + k) * beyond;
@@ -140,11 +139,11 @@ LLMT_INLINE void LocalModels::add_row(int node, double validity, const Row& row,
   double first = 0.0;
   if (sum_inside(node, row, first)) {
     sums[0] += validity * first;
-    for (std::ptrdiff_t o = 1; o < outputs_; ++o) {
+    for (Eigen::Index o = 1; o < outputs_; ++o) {
       sums[o] += validity * sum(node, o, row);
     }
   } else {
-    for (std::ptrdiff_t o = 0; o < outputs_; ++o) {
+    for (Eigen::Index o = 0; o < outputs_; ++o) {
       sums[o] += validity * guarded(node, o, row);
     }
   }
@@ -154,11 +153,11 @@ template <class Row>
 LLMT_INLINE void LocalModels::finish_row(const Row& row, double* values) const {
   double first = 0.0;
   const bool inside = sum_inside(0, row, first);
-  for (std::ptrdiff_t o = 0; o < residual_range_.rows(); ++o) {
+  for (Eigen::Index o = 0; o < residual_range_.rows(); ++o) {
     const double root = !inside ? guarded(0, o, row) : o == 0 ? first : sum(0, o, row);
     values[o] = root + hold(values[o] - root, residual_range_(o, 0), residual_range_(o, 1));
   }
-  for (std::ptrdiff_t o = 0; !inside && o < outputs_; ++o) {
+  for (Eigen::Index o = 0; !inside && o < outputs_; ++o) {
     values[o] += beyond_root(o, row);
   }
 }
@@ -175,15 +174,15 @@ void LocalModels::finish(const double* deviations, double* values) const {
 
 LLMT_FOR_EACH_INSTRUCTION_SET
 void LocalModels::add(int node, const RowList& list, const double* deviations, double* sums) const {
-  for (std::ptrdiff_t i = 0; i < list.count; ++i) {
-    const std::ptrdiff_t row = list.rows[i];
+  for (Eigen::Index i = 0; i < list.count; ++i) {
+    const Eigen::Index row = list.rows[i];
     add_row(node, list.validities[i], PaddedRow{deviations + row * stride_}, sums + row * outputs_);
   }
 }
 
 LLMT_FOR_EACH_INSTRUCTION_SET
-void LocalModels::finish_rows(std::ptrdiff_t rows, const double* deviations, double* values) const {
-  for (std::ptrdiff_t row = 0; row < rows; ++row) {
+void LocalModels::finish_rows(Eigen::Index rows, const double* deviations, double* values) const {
+  for (Eigen::Index row = 0; row < rows; ++row) {
     finish_row(PaddedRow{deviations + row * stride_}, values + row * outputs_);
   }
 }

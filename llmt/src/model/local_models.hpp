@@ -27,7 +27,7 @@ void deviations_at(const std::vector<InputColumn>& inputs, const std::vector<Reg
 struct RowList {
   const int* rows;
   const double* validities;
-  std::ptrdiff_t count;
+  Eigen::Index count;
 };
 
 /// Immutable after construction.
@@ -36,9 +36,9 @@ struct RowList {
 /// l + 8, ..., plus the value: on every machine, for single rows and for blocks.
 class LocalModels {
  public:
-  LocalModels(const Partition& partition, std::ptrdiff_t regressors);
+  LocalModels(const Partition& partition, Eigen::Index regressors);
 
-  std::ptrdiff_t num_outputs() const { return outputs_; }
+  Eigen::Index num_outputs() const { return outputs_; }
 
   /// sums[o] += validity * local model of the node for output o, with its ancestors' slopes beyond the node's range and
   /// none beyond the root's.
@@ -49,7 +49,7 @@ class LocalModels {
 
   /// The same for rows of a block: `deviations` as in RowBlock, `sums` rows x outputs, one row after the other.
   void add(int node, const RowList& list, const double* deviations, double* sums) const;
-  void finish_rows(std::ptrdiff_t rows, const double* deviations, double* values) const;
+  void finish_rows(Eigen::Index rows, const double* deviations, double* values) const;
 
   /// by_regressor += validity * derivatives of add(), outputs x regressors.
   void add_slopes(int node, double validity, const double* deviations, Eigen::MatrixXd& by_regressor) const;
@@ -62,28 +62,26 @@ class LocalModels {
   const double* low(int node) const { return data_.data() + node * (3 + outputs_) * stride_; }
   const double* high(int node) const { return low(node) + stride_; }
   const double* mean(int node) const { return low(node) + 2 * stride_; }
-  const double* slopes(int node, std::ptrdiff_t output) const { return low(node) + (3 + output) * stride_; }
-  double value(int node, std::ptrdiff_t output) const {
-    return values_[static_cast<std::size_t>(node * outputs_ + output)];
-  }
-  const double* outer_slopes(std::ptrdiff_t output) const { return outer_slopes_.data() + output * stride_; }
+  const double* slopes(int node, Eigen::Index output) const { return low(node) + (3 + output) * stride_; }
+  double value(int node, Eigen::Index output) const { return values_[node * outputs_ + output]; }
+  const double* outer_slopes(Eigen::Index output) const { return outer_slopes_.data() + output * stride_; }
 
   template <class Row>
   bool sum_inside(int node, const Row& row, double& first) const;
   template <class Row>
-  double sum(int node, std::ptrdiff_t output, const Row& row) const;
+  double sum(int node, Eigen::Index output, const Row& row) const;
   template <class Row>
-  double guarded(int node, std::ptrdiff_t output, const Row& row) const;
+  double guarded(int node, Eigen::Index output, const Row& row) const;
   template <class Row>
-  double beyond_root(std::ptrdiff_t output, const Row& row) const;
+  double beyond_root(Eigen::Index output, const Row& row) const;
   template <class Row>
   void add_row(int node, double validity, const Row& row, double* sums) const;
   template <class Row>
   void finish_row(const Row& row, double* values) const;
 
-  std::ptrdiff_t outputs_;
-  std::ptrdiff_t regressors_;
-  std::ptrdiff_t stride_;       // regressors, padded with zeros to whole quads
+  Eigen::Index outputs_;
+  Eigen::Index regressors_;
+  Eigen::Index stride_;         // regressors, padded with zeros to whole quads
   std::vector<int> parents_;    // see guard_parents_of()
   std::vector<double> data_;    // per node: low, high, mean, slopes of each output
   std::vector<double> values_;  // per node and output

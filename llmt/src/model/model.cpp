@@ -18,9 +18,7 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 [[noreturn]] void reject(const std::string& what) { throw std::invalid_argument("llmt::Model: " + what); }
 
 void check_direction(const Node& node, const std::vector<InputColumn>& inputs, const std::string& where) {
-  if (!node.is_oblique()) {
-    return;
-  }
+  if (!node.is_oblique()) return;
   if (node.direction.size() != std::ssize(inputs) || !node.direction.allFinite()) {
     reject(fmt::format("{}: direction has {} entries, it must have {} finite ones", where, node.direction.size(),
                        inputs.size()));
@@ -30,17 +28,17 @@ void check_direction(const Node& node, const std::vector<InputColumn>& inputs, c
     reject(fmt::format("{}: direction has weight 0 for the split input {}", where, node.split_input));
   }
   for (std::size_t j = 0; j < inputs.size(); ++j) {
-    if (inputs[j].is_categorical() && node.direction(static_cast<std::ptrdiff_t>(j)) != 0.0) {
+    if (inputs[j].is_categorical() && node.direction(j) != 0.0) {
       reject(fmt::format("{}: direction has weight {} for the categorical input \"{}\", it must be 0", where,
-                         node.direction(static_cast<std::ptrdiff_t>(j)), inputs[j].name));
+                         node.direction(j), inputs[j].name));
     }
   }
 }
 
-void check_node(const Partition& partition, std::ptrdiff_t index, const std::vector<InputColumn>& inputs,
-                std::ptrdiff_t regressors, const std::string& where) {
-  const Node& node = partition.nodes[static_cast<std::size_t>(index)];
-  const std::ptrdiff_t outputs = std::ssize(partition.outputs);
+void check_node(const Partition& partition, Eigen::Index index, const std::vector<InputColumn>& inputs,
+                Eigen::Index regressors, const std::string& where) {
+  const Node& node = partition.nodes[index];
+  const Eigen::Index outputs = std::ssize(partition.outputs);
   if (node.value.size() != outputs || node.rss.size() != outputs || node.slope.rows() != outputs ||
       node.slope.cols() != regressors) {
     reject(fmt::format("{}: value, rss and slope must have {} outputs and slope {} regression inputs", where, outputs,
@@ -88,18 +86,18 @@ void check_node(const Partition& partition, std::ptrdiff_t index, const std::vec
     reject(
         fmt::format("{}: split input {} does not exist, there are {} inputs", where, node.split_input, inputs.size()));
   }
-  const InputColumn& input = inputs[static_cast<std::size_t>(node.split_input)];
+  const InputColumn& input = inputs[node.split_input];
   if (node.level_side.size() != input.levels.size()) {
     reject(fmt::format("{}: {} sides for the {} levels of \"{}\"", where, node.level_side.size(), input.levels.size(),
                        input.name));
   }
   check_direction(node, inputs, where);
-  if (std::any_of(node.level_side.begin(), node.level_side.end(), [](int side) { return side < -1 || side > 1; })) {
+  if (std::ranges::any_of(node.level_side, [](int side) { return side < -1 || side > 1; })) {
     reject(fmt::format("{}: the side of a level must be -1, 0 or 1", where));
   }
 }
 
-void check_partition(const Partition& partition, const std::vector<InputColumn>& inputs, std::ptrdiff_t regressors,
+void check_partition(const Partition& partition, const std::vector<InputColumn>& inputs, Eigen::Index regressors,
                      const std::string& where) {
   const Validity& validity = partition.validity;
   if (!(validity.width >= 0.0 && std::isfinite(validity.width)) ||
@@ -111,7 +109,7 @@ void check_partition(const Partition& partition, const std::vector<InputColumn>&
     reject(fmt::format("{}: it needs an output and an odd number of nodes", where));
   }
   if (validity.kind == ValidityKind::gaussian &&
-      std::any_of(partition.nodes.begin(), partition.nodes.end(), [](const Node& node) { return node.is_oblique(); })) {
+      std::ranges::any_of(partition.nodes, [](const Node& node) { return node.is_oblique(); })) {
     reject(fmt::format("{}: Gaussians need boxes, and a node has a direction", where));
   }
   if (partition.outer_slope.size() > 0 &&
@@ -127,14 +125,14 @@ void check_partition(const Partition& partition, const std::vector<InputColumn>&
   }
   std::vector<bool> has_parent(partition.nodes.size(), false);
   for (std::size_t i = 0; i < partition.nodes.size(); ++i) {
-    check_node(partition, static_cast<std::ptrdiff_t>(i), inputs, regressors, fmt::format("{} node {}", where, i));
+    check_node(partition, i, inputs, regressors, fmt::format("{} node {}", where, i));
     const Node& node = partition.nodes[i];
     if (!node.is_leaf()) {
-      if (has_parent[static_cast<std::size_t>(node.left)]) {
+      if (has_parent[node.left]) {
         reject(fmt::format("{} node {}: it has two parents", where, node.left));
       }
-      has_parent[static_cast<std::size_t>(node.left)] = true;
-      has_parent[static_cast<std::size_t>(node.right)] = true;
+      has_parent[node.left] = true;
+      has_parent[node.right] = true;
     }
   }
   if (std::find(has_parent.begin() + 1, has_parent.end(), false) != has_parent.end()) {
@@ -142,10 +140,10 @@ void check_partition(const Partition& partition, const std::vector<InputColumn>&
   }
 }
 
-/// Nodes of the leaves from left to right, with their boxes.
+// Nodes of the leaves from left to right, with their boxes.
 void collect_leaves(const Partition& partition, int index, Leaf box, const std::vector<InputColumn>& inputs,
                     const std::vector<Regressor>& regressors, std::vector<Leaf>& leaves) {
-  const Node& node = partition.nodes[static_cast<std::size_t>(index)];
+  const Node& node = partition.nodes[index];
   if (!node.is_leaf()) {
     Leaf right = box;
     if (node.is_oblique()) {
@@ -155,7 +153,7 @@ void collect_leaves(const Partition& partition, int index, Leaf box, const std::
       box.high(node.split_input) = std::min(box.high(node.split_input), node.threshold);
       right.low(node.split_input) = std::max(right.low(node.split_input), node.threshold);
     } else {
-      const std::size_t input = static_cast<std::size_t>(node.split_input);
+      const std::size_t input = node.split_input;
       std::vector<int> all = box.levels[input];
       if (all.empty()) {
         for (int level = 0; level < std::ssize(node.level_side); ++level) {
@@ -164,8 +162,7 @@ void collect_leaves(const Partition& partition, int index, Leaf box, const std::
       }
       const auto keep = [&](std::vector<int>& kept, int side) {
         kept.clear();
-        std::copy_if(all.begin(), all.end(), std::back_inserter(kept),
-                     [&](int level) { return node.level_side[static_cast<std::size_t>(level)] == side; });
+        std::ranges::copy_if(all, std::back_inserter(kept), [&](int level) { return node.level_side[level] == side; });
       };
       keep(box.levels[input], -1);
       keep(right.levels[input], 1);
@@ -177,11 +174,11 @@ void collect_leaves(const Partition& partition, int index, Leaf box, const std::
   box.node = index;
   box.samples = node.samples;
   box.rank = node.rank;
-  box.rmse = (node.rss / static_cast<double>(std::max<std::ptrdiff_t>(node.samples, 1))).cwiseSqrt();
+  box.rmse = (node.rss / static_cast<double>(std::max<Eigen::Index>(node.samples, 1))).cwiseSqrt();
   box.slope = node.slope;
   box.intercept = node.value;
   for (std::size_t k = 0; k < regressors.size(); ++k) {
-    box.intercept -= node.slope.col(static_cast<std::ptrdiff_t>(k)) * regressors[k].centre;
+    box.intercept -= node.slope.col(k) * regressors[k].centre;
   }
   leaves.push_back(std::move(box));
 }
@@ -212,7 +209,7 @@ Model::Model(std::vector<InputColumn> inputs, std::vector<OutputColumn> outputs,
   }
   for (const Regressor& regressor : regressors_) {
     const bool exists = regressor.input >= 0 && regressor.input < num_inputs();
-    const std::ptrdiff_t levels = exists ? std::ssize(inputs_[static_cast<std::size_t>(regressor.input)].levels) : 0;
+    const Eigen::Index levels = exists ? std::ssize(inputs_[regressor.input].levels) : 0;
     if (!exists || regressor.level < -1 || regressor.level >= levels || (regressor.level < 0 && levels > 0) ||
         !std::isfinite(regressor.centre)) {
       reject(fmt::format("regressor of input {}, level {}, centre {}: no such input or level, or not finite",
@@ -220,7 +217,7 @@ Model::Model(std::vector<InputColumn> inputs, std::vector<OutputColumn> outputs,
     }
     const int second = regressor.second_input;
     if (second != -1 && (second < regressor.input || second >= num_inputs() || regressor.level >= 0 ||
-                         inputs_[static_cast<std::size_t>(second)].is_categorical())) {
+                         inputs_[second].is_categorical())) {
       reject(
           fmt::format("regressor of inputs {} and {}: a product is of two numeric inputs, the second not below the "
                       "first",
@@ -243,7 +240,7 @@ Model::Model(std::vector<InputColumn> inputs, std::vector<OutputColumn> outputs,
   evaluators_ = std::make_shared<const std::vector<Evaluator>>(std::move(evaluators));
 }
 
-std::vector<Leaf> Model::leaves(std::ptrdiff_t partition) const {
+std::vector<Leaf> Model::leaves(Eigen::Index partition) const {
   if (partition < 0 || partition >= std::ssize(partitions_)) {
     throw std::invalid_argument(
         fmt::format("llmt::Model::leaves: partition is {}, the model has {}", partition, partitions_.size()));
@@ -253,15 +250,15 @@ std::vector<Leaf> Model::leaves(std::ptrdiff_t partition) const {
   everywhere.high = Eigen::VectorXd::Constant(num_inputs(), infinity);
   everywhere.levels.resize(inputs_.size());
   std::vector<Leaf> result;
-  collect_leaves(partitions_[static_cast<std::size_t>(partition)], 0, everywhere, inputs_, regressors_, result);
+  collect_leaves(partitions_[partition], 0, everywhere, inputs_, regressors_, result);
   return result;
 }
 
-Partition prefix(const Partition& partition, std::ptrdiff_t max_leaves) {
+Partition prefix(const Partition& partition, Eigen::Index max_leaves) {
   if (max_leaves < 1) {
     throw std::invalid_argument(fmt::format("llmt::prefix: max_leaves is {}, it must be at least 1", max_leaves));
   }
-  const std::ptrdiff_t kept = 2 * std::min(max_leaves, partition.num_leaves()) - 1;
+  const Eigen::Index kept = 2 * std::min(max_leaves, partition.num_leaves()) - 1;
   Partition result{.outputs = partition.outputs,
                    .validity = partition.validity,
                    .nodes = {partition.nodes.begin(), partition.nodes.begin() + kept},
@@ -275,7 +272,7 @@ Partition prefix(const Partition& partition, std::ptrdiff_t max_leaves) {
   return result;
 }
 
-Model Model::prefix(std::ptrdiff_t max_leaves) const {
+Model Model::prefix(Eigen::Index max_leaves) const {
   std::vector<Partition> partitions;
   for (const Partition& partition : partitions_) {
     partitions.push_back(llmt::prefix(partition, max_leaves));

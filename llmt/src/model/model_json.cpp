@@ -28,7 +28,7 @@ Json to_array(const Eigen::VectorXd& values) { return Json(std::vector<double>(v
 
 Json rows_to_json(const Eigen::MatrixXd& matrix) {
   Json rows = Json::array();
-  for (std::ptrdiff_t i = 0; i < matrix.rows(); ++i) {
+  for (Eigen::Index i = 0; i < matrix.rows(); ++i) {
     rows.push_back(to_array(matrix.row(i)));
   }
   return rows;
@@ -37,8 +37,7 @@ Json rows_to_json(const Eigen::MatrixXd& matrix) {
 Json node_to_json(const Node& node, const Model& model) {
   Json json;
   if (!node.is_leaf()) {
-    json["split"] = {{"input", model.inputs()[static_cast<std::size_t>(node.split_input)].name},
-                     {"column", node.split_input}};
+    json["split"] = {{"input", model.inputs()[node.split_input].name}, {"column", node.split_input}};
     if (node.is_oblique()) {
       json["split"]["direction"] = to_array(node.direction);
     }
@@ -65,8 +64,8 @@ Json node_to_json(const Node& node, const Model& model) {
   }
   if (node.inverse_gram.size() > 0) {
     std::vector<double> lower;  // triangle, row by row
-    for (std::ptrdiff_t i = 0; i < node.inverse_gram.rows(); ++i) {
-      for (std::ptrdiff_t j = 0; j <= i; ++j) {
+    for (Eigen::Index i = 0; i < node.inverse_gram.rows(); ++i) {
+      for (Eigen::Index j = 0; j <= i; ++j) {
         lower.push_back(node.inverse_gram(i, j));
       }
     }
@@ -75,7 +74,7 @@ Json node_to_json(const Node& node, const Model& model) {
   return json;
 }
 
-/// A JSON value together with the way to it, so that an error can say where it is.
+// A JSON value together with the way to it, so that an error can say where it is.
 class Reader {
  public:
   Reader(const Json& json, std::string where) : json_(json), where_(std::move(where)) {}
@@ -131,7 +130,7 @@ class Reader {
     return result;
   }
 
-  Eigen::VectorXd vector(std::ptrdiff_t size) const {
+  Eigen::VectorXd vector(Eigen::Index size) const {
     const std::vector<double> values = list<double>();
     if (std::ssize(values) != size) {
       fail(fmt::format("{} numbers are needed, there are {}", size, values.size()));
@@ -139,7 +138,7 @@ class Reader {
     return Eigen::Map<const Eigen::VectorXd>(values.data(), size);
   }
 
-  /// `path: /member/0`, a JSON pointer behind the name of the file.
+  // `path: /member/0`, a JSON pointer behind the name of the file.
   std::string child(const std::string& key) const {
     return fmt::format("{}{}{}", where_, where_.find(": /") == std::string::npos ? ": /" : "/", key);
   }
@@ -153,19 +152,19 @@ class Reader {
   std::string where_;
 };
 
-Eigen::MatrixXd rows_from_json(const Reader& json, std::ptrdiff_t rows, std::ptrdiff_t columns) {
+Eigen::MatrixXd rows_from_json(const Reader& json, Eigen::Index rows, Eigen::Index columns) {
   const std::vector<Reader> elements = json.elements();
   if (std::ssize(elements) != rows) {
     json.fail(fmt::format("{} rows are needed, there are {}", rows, elements.size()));
   }
   Eigen::MatrixXd matrix(rows, columns);
-  for (std::ptrdiff_t i = 0; i < rows; ++i) {
-    matrix.row(i) = elements[static_cast<std::size_t>(i)].vector(columns).transpose();
+  for (Eigen::Index i = 0; i < rows; ++i) {
+    matrix.row(i) = elements[i].vector(columns).transpose();
   }
   return matrix;
 }
 
-Node node_from_json(const Reader& json, std::ptrdiff_t inputs, std::ptrdiff_t outputs, std::ptrdiff_t regressors) {
+Node node_from_json(const Reader& json, Eigen::Index inputs, Eigen::Index outputs, Eigen::Index regressors) {
   Node node;
   if (json.has("split")) {
     const Reader split = json.member("split");
@@ -183,7 +182,7 @@ Node node_from_json(const Reader& json, std::ptrdiff_t inputs, std::ptrdiff_t ou
     node.left = split.member("left").as<int>();
     node.right = split.member("right").as<int>();
   }
-  node.samples = json.member("samples").as<std::ptrdiff_t>();
+  node.samples = json.member("samples").as<Eigen::Index>();
   node.rank = json.member("rank").as<int>();
   node.rss = json.member("rss").vector(outputs);
   node.value = json.member("value").vector(outputs);
@@ -195,8 +194,8 @@ Node node_from_json(const Reader& json, std::ptrdiff_t inputs, std::ptrdiff_t ou
   if (json.has("inverse_gram")) {
     const Eigen::VectorXd lower = json.member("inverse_gram").vector((regressors + 1) * (regressors + 2) / 2);
     node.inverse_gram.resize(regressors + 1, regressors + 1);
-    for (std::ptrdiff_t i = 0, k = 0; i <= regressors; ++i) {
-      for (std::ptrdiff_t j = 0; j <= i; ++j, ++k) {
+    for (Eigen::Index i = 0, k = 0; i <= regressors; ++i) {
+      for (Eigen::Index j = 0; j <= i; ++j, ++k) {
         node.inverse_gram(i, j) = node.inverse_gram(j, i) = lower(k);
       }
     }
@@ -206,7 +205,7 @@ Node node_from_json(const Reader& json, std::ptrdiff_t inputs, std::ptrdiff_t ou
 
 Validity validity_from_json(const Reader& json) {
   const std::string kind = json.member("kind").as<std::string>();
-  const auto found = std::find(validity_names.begin(), validity_names.end(), kind);
+  const auto found = std::ranges::find(validity_names, kind);
   if (found == validity_names.end()) {
     json.member("kind").fail(fmt::format("\"{}\" is not known: crisp, blend, gaussian and logistic are", kind));
   }

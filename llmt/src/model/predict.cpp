@@ -15,8 +15,8 @@ namespace {
 
 using Inputs = Eigen::Ref<const Eigen::MatrixXd>;
 
-/// With fewer rows the way through the tree costs less one by one.
-constexpr std::ptrdiff_t few_rows = 16;
+// With fewer rows the way through the tree costs less one by one.
+constexpr Eigen::Index few_rows = 16;
 
 void check_columns_of_query(const char* function, const Model& model, const Inputs& inputs) {
   if (inputs.cols() != model.num_inputs()) {
@@ -25,13 +25,13 @@ void check_columns_of_query(const char* function, const Model& model, const Inpu
   }
 }
 
-/// Calls body(begin, block) for the rows in blocks, which begin at the row `begin`.
+// Calls body(begin, block) for the rows in blocks, which begin at the row `begin`.
 template <class Body>
 void for_each_block(const char* function, const Model& model, const Inputs& inputs, int max_threads, const Body& body) {
   check_columns_of_query(function, model, inputs);
-  const std::ptrdiff_t size = rows_of_block(model.num_inputs(), std::ssize(model.regressors()));
-  parallel_for((inputs.rows() + size - 1) / size, max_threads, [&](std::ptrdiff_t index) {
-    const std::ptrdiff_t begin = index * size;
+  const Eigen::Index size = rows_of_block(model.num_inputs(), std::ssize(model.regressors()));
+  parallel_for((inputs.rows() + size - 1) / size, max_threads, [&](Eigen::Index index) {
+    const Eigen::Index begin = index * size;
     const RowBlock block = make_row_block(inputs.middleRows(begin, std::min(size, inputs.rows() - begin)),
                                           model.inputs(), model.regressors());
     if (block.has_infinite) {
@@ -41,11 +41,11 @@ void for_each_block(const char* function, const Model& model, const Inputs& inpu
   });
 }
 
-/// Position in leaves() of every leaf's node.
+// Position in leaves() of every leaf's node.
 std::vector<int> leaf_positions(const Partition& partition, const std::vector<Leaf>& leaves) {
   std::vector<int> position(partition.nodes.size(), -1);
   for (std::size_t k = 0; k < leaves.size(); ++k) {
-    position[static_cast<std::size_t>(leaves[k].node)] = static_cast<int>(k);
+    position[leaves[k].node] = static_cast<int>(k);
   }
   return position;
 }
@@ -63,20 +63,20 @@ Eigen::MatrixXd Model::predict(const Inputs& inputs, int max_threads) const {
     Eigen::VectorXd values(num_outputs());
     std::vector<Activation> active;
     active.reserve(32);
-    for (std::ptrdiff_t row = 0; row < inputs.rows(); ++row) {
+    for (Eigen::Index row = 0; row < inputs.rows(); ++row) {
       x = inputs.row(row).transpose();
       deviations_at(inputs_, regressors_, x.data(), deviations.data());
       for (std::size_t p = 0; p < partitions_.size(); ++p) {
         (*evaluators_)[p].activate(x.data(), active);
         (*evaluators_)[p].combine(active, deviations.data(), values.data());
         for (std::size_t o = 0; o < partitions_[p].outputs.size(); ++o) {
-          predicted(row, partitions_[p].outputs[o]) = values(static_cast<std::ptrdiff_t>(o));
+          predicted(row, partitions_[p].outputs[o]) = values(o);
         }
       }
     }
     return predicted;
   }
-  for_each_block(function, *this, inputs, max_threads, [&](std::ptrdiff_t begin, const RowBlock& block) {
+  for_each_block(function, *this, inputs, max_threads, [&](Eigen::Index begin, const RowBlock& block) {
     std::vector<double> values;
     for (std::size_t p = 0; p < partitions_.size(); ++p) {
       (*evaluators_)[p].predict(block, values);
@@ -104,42 +104,41 @@ Eigen::MatrixXd Model::jacobian(const Eigen::Ref<const Eigen::VectorXd>& point) 
     (*evaluators_)[p].derivatives(point.data(), deviations.data(), by_input, by_regressor);
     add_through_regressors(inputs_, regressors_, point.data(), by_regressor, by_input);
     for (std::size_t o = 0; o < partitions_[p].outputs.size(); ++o) {
-      result.row(partitions_[p].outputs[o]) = by_input.row(static_cast<std::ptrdiff_t>(o));
+      result.row(partitions_[p].outputs[o]) = by_input.row(o);
     }
   }
   return result;
 }
 
-Eigen::MatrixXd Model::validities(const Inputs& inputs, std::ptrdiff_t partition, int max_threads) const {
+Eigen::MatrixXd Model::validities(const Inputs& inputs, Eigen::Index partition, int max_threads) const {
   const std::vector<Leaf> table = leaves(partition);
-  const std::vector<int> position = leaf_positions(partitions_[static_cast<std::size_t>(partition)], table);
-  const LeafValidities& validities = (*evaluators_)[static_cast<std::size_t>(partition)].validities();
+  const std::vector<int> position = leaf_positions(partitions_[partition], table);
+  const LeafValidities& validities = (*evaluators_)[partition].validities();
   Eigen::MatrixXd result = Eigen::MatrixXd::Zero(inputs.rows(), std::ssize(table));
-  for_each_block("llmt::Model::validities", *this, inputs, max_threads,
-                 [&](std::ptrdiff_t begin, const RowBlock& block) {
-                   validities.for_each_leaf(block, [&](int node, const RowList& list) {
-                     for (std::ptrdiff_t i = 0; i < list.count; ++i) {
-                       result(begin + list.rows[i], position[static_cast<std::size_t>(node)]) = list.validities[i];
-                     }
-                   });
-                 });
+  for_each_block("llmt::Model::validities", *this, inputs, max_threads, [&](Eigen::Index begin, const RowBlock& block) {
+    validities.for_each_leaf(block, [&](int node, const RowList& list) {
+      for (Eigen::Index i = 0; i < list.count; ++i) {
+        result(begin + list.rows[i], position[node]) = list.validities[i];
+      }
+    });
+  });
   return result;
 }
 
 Eigen::MatrixXi Model::leaf_of(const Inputs& inputs, int max_threads) const {
   std::vector<std::vector<int>> positions;
   for (std::size_t p = 0; p < partitions_.size(); ++p) {
-    positions.push_back(leaf_positions(partitions_[p], leaves(static_cast<std::ptrdiff_t>(p))));
+    positions.push_back(leaf_positions(partitions_[p], leaves(p)));
   }
   Eigen::MatrixXi result(inputs.rows(), std::ssize(partitions_));
-  for_each_block("llmt::Model::leaf_of", *this, inputs, max_threads, [&](std::ptrdiff_t begin, const RowBlock& block) {
+  for_each_block("llmt::Model::leaf_of", *this, inputs, max_threads, [&](Eigen::Index begin, const RowBlock& block) {
     for (std::size_t p = 0; p < partitions_.size(); ++p) {
       Eigen::VectorXd largest = Eigen::VectorXd::Zero(block.rows());
       (*evaluators_)[p].validities().for_each_leaf(block, [&](int node, const RowList& list) {
-        for (std::ptrdiff_t i = 0; i < list.count; ++i) {
+        for (Eigen::Index i = 0; i < list.count; ++i) {
           if (list.validities[i] > largest(list.rows[i])) {
             largest(list.rows[i]) = list.validities[i];
-            result(begin + list.rows[i], static_cast<std::ptrdiff_t>(p)) = positions[p][static_cast<std::size_t>(node)];
+            result(begin + list.rows[i], p) = positions[p][node];
           }
         }
       });
@@ -149,13 +148,13 @@ Eigen::MatrixXi Model::leaf_of(const Inputs& inputs, int max_threads) const {
 }
 
 std::vector<Extrapolation> Model::extrapolation(const Inputs& inputs, int max_threads) const {
-  std::vector<Extrapolation> result(static_cast<std::size_t>(inputs.rows()));
-  const auto body = [&](std::ptrdiff_t begin, const RowBlock& block) {
+  std::vector<Extrapolation> result(inputs.rows());
+  const auto body = [&](Eigen::Index begin, const RowBlock& block) {
     Extrapolation* const of_row = result.data() + begin;
-    for (std::ptrdiff_t j = 0; j < num_inputs(); ++j) {
-      const InputColumn& input = inputs_[static_cast<std::size_t>(j)];
+    for (Eigen::Index j = 0; j < num_inputs(); ++j) {
+      const InputColumn& input = inputs_[j];
       const double range = input.high - input.low;
-      for (std::ptrdiff_t row = 0; row < block.rows(); ++row) {
+      for (Eigen::Index row = 0; row < block.rows(); ++row) {
         const double excess = std::max(input.low - block.inputs(row, j), block.inputs(row, j) - input.high);
         if (excess > 0.0) {
           const double distance = range > 0.0 ? excess / range : std::numeric_limits<double>::infinity();
@@ -167,12 +166,12 @@ std::vector<Extrapolation> Model::extrapolation(const Inputs& inputs, int max_th
       Eigen::VectorXd sum = Eigen::VectorXd::Zero(block.rows());
       std::vector<double> of_leaf;
       (*evaluators_)[p].validities().for_each_leaf(block, [&](int node, const RowList& list) {
-        leverages(partitions_[p].nodes[static_cast<std::size_t>(node)], list, block, of_leaf);
-        for (std::ptrdiff_t i = 0; i < list.count; ++i) {
-          sum(list.rows[i]) += list.validities[i] * of_leaf[static_cast<std::size_t>(i)];
+        leverages(partitions_[p].nodes[node], list, block, of_leaf);
+        for (Eigen::Index i = 0; i < list.count; ++i) {
+          sum(list.rows[i]) += list.validities[i] * of_leaf[i];
         }
       });
-      for (std::ptrdiff_t row = 0; row < block.rows(); ++row) {
+      for (Eigen::Index row = 0; row < block.rows(); ++row) {
         of_row[row].leverage = std::max(of_row[row].leverage, sum(row));
       }
     }
@@ -197,19 +196,19 @@ Eigen::MatrixXd Model::standard_errors(const Inputs& inputs, int max_threads) co
     overall.emplace_back(rss / std::max(1.0, static_cast<double>(root.samples) - coefficients));
   }
   Eigen::MatrixXd variance = Eigen::MatrixXd::Zero(inputs.rows(), num_outputs());
-  const auto body = [&](std::ptrdiff_t begin, const RowBlock& block) {
+  const auto body = [&](Eigen::Index begin, const RowBlock& block) {
     std::vector<double> of_leaf;
     for (std::size_t p = 0; p < partitions_.size(); ++p) {
       const std::vector<int>& outputs = partitions_[p].outputs;
       (*evaluators_)[p].validities().for_each_leaf(block, [&](int node, const RowList& list) {
-        const Node& leaf = partitions_[p].nodes[static_cast<std::size_t>(node)];
+        const Node& leaf = partitions_[p].nodes[node];
         const double freedom = std::max(0.0, static_cast<double>(leaf.samples - leaf.rank)) + pooled_rows;
         const Eigen::VectorXd of_noise = (leaf.rss + pooled_rows * overall[p]) / freedom;
         leverages(leaf, list, block, of_leaf);
-        for (std::ptrdiff_t i = 0; i < list.count; ++i) {
-          const double factor = list.validities[i] * of_leaf[static_cast<std::size_t>(i)];
+        for (Eigen::Index i = 0; i < list.count; ++i) {
+          const double factor = list.validities[i] * of_leaf[i];
           for (std::size_t o = 0; o < outputs.size(); ++o) {
-            variance(begin + list.rows[i], outputs[o]) += factor * of_noise(static_cast<std::ptrdiff_t>(o));
+            variance(begin + list.rows[i], outputs[o]) += factor * of_noise(o);
           }
         }
       });

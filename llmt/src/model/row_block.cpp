@@ -17,11 +17,11 @@ struct Oddities {
 };
 
 LLMT_FOR_EACH_INSTRUCTION_SET
-Oddities oddities_of(const double* values, std::ptrdiff_t size) {
+Oddities oddities_of(const double* values, Eigen::Index size) {
   // Counted, for that is done several values at a time.
-  std::ptrdiff_t missing = 0;
-  std::ptrdiff_t infinite = 0;
-  for (std::ptrdiff_t i = 0; i < size; ++i) {
+  Eigen::Index missing = 0;
+  Eigen::Index infinite = 0;
+  for (Eigen::Index i = 0; i < size; ++i) {
     missing += values[i] != values[i] ? 1 : 0;
     infinite += std::abs(values[i]) > std::numeric_limits<double>::max() ? 1 : 0;
   }
@@ -29,29 +29,29 @@ Oddities oddities_of(const double* values, std::ptrdiff_t size) {
 }
 
 void set_deviations(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const std::vector<InputColumn>& columns,
-                    const std::vector<Regressor>& regressors, std::ptrdiff_t stride, double* deviations) {
-  constexpr std::ptrdiff_t tile = 16;  // rows that stay in the first cache while their columns come in
-  for (std::ptrdiff_t begin = 0; begin < inputs.rows(); begin += tile) {
-    const std::ptrdiff_t end = std::min(inputs.rows(), begin + tile);
+                    const std::vector<Regressor>& regressors, Eigen::Index stride, double* deviations) {
+  constexpr Eigen::Index tile = 16;  // rows that stay in the first cache while their columns come in
+  for (Eigen::Index begin = 0; begin < inputs.rows(); begin += tile) {
+    const Eigen::Index end = std::min(inputs.rows(), begin + tile);
     for (std::size_t k = 0; k < regressors.size(); ++k) {
       const Regressor& regressor = regressors[k];
       const double* x = inputs.col(regressor.input).data();
       const double centre = regressor.centre;
       double* out = deviations + k;
       if (regressor.second_input >= 0) {
-        const InputColumn& first = columns[static_cast<std::size_t>(regressor.input)];
-        const InputColumn& second = columns[static_cast<std::size_t>(regressor.second_input)];
+        const InputColumn& first = columns[regressor.input];
+        const InputColumn& second = columns[regressor.second_input];
         const double* z = inputs.col(regressor.second_input).data();
-        for (std::ptrdiff_t row = begin; row < end; ++row) {
+        for (Eigen::Index row = begin; row < end; ++row) {
           out[row * stride] = factor_at(first, x[row]) * factor_at(second, z[row]) - centre;
         }
       } else if (regressor.level < 0) {
-        for (std::ptrdiff_t row = begin; row < end; ++row) {
+        for (Eigen::Index row = begin; row < end; ++row) {
           out[row * stride] = x[row] - centre;
         }
       } else {
-        const std::size_t levels = columns[static_cast<std::size_t>(regressor.input)].levels.size();
-        for (std::ptrdiff_t row = begin; row < end; ++row) {
+        const std::size_t levels = columns[regressor.input].levels.size();
+        for (Eigen::Index row = begin; row < end; ++row) {
           out[row * stride] = indicator_deviation(x[row], regressor.level, static_cast<double>(levels), centre);
         }
       }
@@ -61,21 +61,21 @@ void set_deviations(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const std::
 
 }  // namespace
 
-std::ptrdiff_t rows_of_block(std::ptrdiff_t inputs, std::ptrdiff_t regressors) {
-  constexpr std::ptrdiff_t cached = 49152;  // doubles
-  return std::clamp<std::ptrdiff_t>(cached / (inputs + padded_to_quads(regressors)), 256, 4096);
+Eigen::Index rows_of_block(Eigen::Index inputs, Eigen::Index regressors) {
+  constexpr Eigen::Index cached = 49152;  // doubles
+  return std::clamp<Eigen::Index>(cached / (inputs + padded_to_quads(regressors)), 256, 4096);
 }
 
 RowBlock make_row_block(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const std::vector<InputColumn>& columns,
                         const std::vector<Regressor>& regressors) {
-  const std::ptrdiff_t rows = inputs.rows();
+  const Eigen::Index rows = inputs.rows();
   RowBlock block{.inputs = inputs, .stride = padded_to_quads(std::ssize(regressors))};
   for (const auto column : inputs.colwise()) {
     const Oddities oddities = oddities_of(column.data(), rows);
     block.has_missing.push_back(oddities.missing);
     block.has_infinite = block.has_infinite || oddities.infinite;
   }
-  block.deviations.resize(static_cast<std::size_t>(rows * block.stride));
+  block.deviations.resize(rows * block.stride);
   set_deviations(inputs, columns, regressors, block.stride, block.deviations.data());
   return block;
 }

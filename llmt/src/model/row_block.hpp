@@ -14,16 +14,16 @@ struct RowBlock {
   Eigen::Ref<const Eigen::MatrixXd> inputs;  ///< rows x inputs
   std::vector<bool> has_missing = {};        ///< one per input: whether some row lacks it
   bool has_infinite = false;                 ///< some value is infinite: not to be predicted
-  std::ptrdiff_t stride = 0;                 ///< from the deviations of a row to those of the next
+  Eigen::Index stride = 0;                   ///< from the deviations of a row to those of the next
   /// Of the regressors from their centres, one row after the other, padded with zeros to whole quads; NaN where an
   /// input is missing or its level unknown.
   std::vector<double> deviations = {};
 
-  std::ptrdiff_t rows() const { return inputs.rows(); }
+  Eigen::Index rows() const { return inputs.rows(); }
 };
 
 /// How many rows make a block: what it holds stays in a cache of the second level.
-std::ptrdiff_t rows_of_block(std::ptrdiff_t inputs, std::ptrdiff_t regressors);
+Eigen::Index rows_of_block(Eigen::Index inputs, Eigen::Index regressors);
 
 /// Lays out rows of a model's inputs, which must outlive the block.
 RowBlock make_row_block(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const std::vector<InputColumn>& columns,

@@ -9,7 +9,7 @@
 namespace llmt {
 namespace {
 
-/// Whether children stand behind their parents, so that parents_of() may be asked. Model names what is wrong if not.
+// Whether children stand behind their parents, so that parents_of() may be asked. Model names what is wrong if not.
 bool is_tree(const std::vector<Node>& nodes) {
   std::vector<bool> has_parent(nodes.size(), false);
   for (int i = 0; i < std::ssize(nodes); ++i) {

@@ -10,10 +10,10 @@ void add_through_regressors(const std::vector<InputColumn>& inputs, const std::v
                             const double* row, const Eigen::MatrixXd& by_regressor, Eigen::MatrixXd& by_input) {
   for (std::size_t k = 0; k < regressors.size(); ++k) {
     const Regressor& regressor = regressors[k];
-    const auto derivative = by_regressor.col(static_cast<std::ptrdiff_t>(k));
+    const auto derivative = by_regressor.col(k);
     if (is_product(regressor)) {
-      const InputColumn& first = inputs[static_cast<std::size_t>(regressor.input)];
-      const InputColumn& second = inputs[static_cast<std::size_t>(regressor.second_input)];
+      const InputColumn& first = inputs[regressor.input];
+      const InputColumn& second = inputs[regressor.second_input];
       const double x = row[regressor.input];
       const double z = row[regressor.second_input];
       if (!std::isnan(x) && !std::isnan(z)) {

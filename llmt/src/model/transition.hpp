@@ -20,9 +20,7 @@ LLMT_INLINE double transition(double u, int smoothness) {
 }
 
 inline double transition_derivative(double u, int smoothness) {
-  if (!(std::abs(u) < 1.0)) {
-    return 0.0;
-  }
+  if (!(std::abs(u) < 1.0)) return 0.0;
   const double v = 0.5 * (u + 1.0);
   const double bump = v * (1.0 - v);
   return smoothness == 1 ? -3.0 * bump : -15.0 * bump * bump;

@@ -18,8 +18,8 @@ std::vector<int> parents_of(const Partition& partition) {
   for (std::size_t i = 0; i < partition.nodes.size(); ++i) {
     const Node& node = partition.nodes[i];
     if (!node.is_leaf()) {
-      parents[static_cast<std::size_t>(node.left)] = static_cast<int>(i);
-      parents[static_cast<std::size_t>(node.right)] = static_cast<int>(i);
+      parents[node.left] = static_cast<int>(i);
+      parents[node.right] = static_cast<int>(i);
     }
   }
   return parents;
@@ -34,13 +34,11 @@ std::vector<int> guard_parents_of(const Partition& partition) {
 }
 
 Boxes boxes_of(const Partition& partition, const Eigen::VectorXd& low, const Eigen::VectorXd& high) {
-  const std::ptrdiff_t nodes = std::ssize(partition.nodes);
+  const Eigen::Index nodes = std::ssize(partition.nodes);
   Boxes boxes{low.replicate(1, nodes), high.replicate(1, nodes)};
-  for (std::ptrdiff_t i = 0; i < nodes; ++i) {
-    const Node& node = partition.nodes[static_cast<std::size_t>(i)];
-    if (node.is_leaf()) {
-      continue;
-    }
+  for (Eigen::Index i = 0; i < nodes; ++i) {
+    const Node& node = partition.nodes[i];
+    if (node.is_leaf()) continue;
     for (const int child : {node.left, node.right}) {
       boxes.low.col(child) = boxes.low.col(i);
       boxes.high.col(child) = boxes.high.col(i);
@@ -67,7 +65,7 @@ void set_half_widths(Partition& partition, const Eigen::VectorXd& low, const Eig
     node.half_width = 0.0;
     if (!node.is_leaf() && node.level_side.empty() && !node.is_oblique() &&
         node.threshold < std::numeric_limits<double>::max()) {
-      const std::ptrdiff_t box = static_cast<std::ptrdiff_t>(i);
+      const Eigen::Index box = static_cast<Eigen::Index>(i);
       const double extent = std::min(node.threshold - boxes.low(node.split_input, box),
                                      boxes.high(node.split_input, box) - node.threshold);
       node.half_width = std::max(0.0, width * extent);

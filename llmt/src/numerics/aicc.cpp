@@ -17,9 +17,7 @@ double effective_parameters(const Eigen::MatrixXd& deviations, const Eigen::Vect
 }
 
 double aicc(double rows, double loss, double effective) {
-  if (rows - effective - 1.0 <= 0.0) {
-    return std::numeric_limits<double>::infinity();
-  }
+  if (rows - effective - 1.0 <= 0.0) return std::numeric_limits<double>::infinity();
   return rows * std::log(loss / rows) + 2.0 * effective +
          2.0 * effective * (effective + 1.0) / (rows - effective - 1.0);
 }

@@ -17,13 +17,13 @@ namespace llmt {
 /// inequalities are exchanged at once a few times, which mostly is enough.
 class LeastDistance {
  public:
-  explicit LeastDistance(std::ptrdiff_t dimensions) : normals_(dimensions, 0) {}
+  explicit LeastDistance(Eigen::Index dimensions) : normals_(dimensions, 0) {}
 
   /// One column, not zero, per inequality. Columns are scaled to length 1.
   void add(const Eigen::MatrixXd& normals, const Eigen::VectorXd& bounds);
 
   /// Forgets all inequalities but the active ones; returns where these stood. The next solution is no shorter.
-  std::vector<std::ptrdiff_t> keep_active();
+  std::vector<Eigen::Index> keep_active();
 
   /// The solution. If no vector meets all inequalities, one that comes near.
   Eigen::VectorXd solve();
@@ -33,14 +33,14 @@ class LeastDistance {
 
  private:
   bool exchange(const Eigen::VectorXd& tolerance);
-  void enter(std::ptrdiff_t c);
-  void leave(std::ptrdiff_t position);
+  void enter(Eigen::Index c);
+  void leave(Eigen::Index position);
 
   Eigen::MatrixXd normals_;
   Eigen::MatrixXd gram_;
   Eigen::VectorXd bounds_;
   Eigen::VectorXd multipliers_;
-  std::vector<std::ptrdiff_t> active_;
+  std::vector<Eigen::Index> active_;
   Eigen::MatrixXd factor_;  // lower Cholesky factor of their Gram matrix, in the corner
 };
 

@@ -9,13 +9,15 @@
 #include <Eigen/Core>
 #include <cstddef>
 
+#include "base/matrix.hpp"
+
 namespace llmt {
 
 /// Adds sign * A' B to C: A is depth x rows, B depth x columns, C rows x columns, all stored row by row with the given
 /// distances between rows. C may not overlap A or B.
-void add_transposed_product(std::ptrdiff_t rows, std::ptrdiff_t columns, std::ptrdiff_t depth, double sign,
-                            const double* a, std::ptrdiff_t a_stride, const double* b, std::ptrdiff_t b_stride,
-                            double* c, std::ptrdiff_t c_stride);
+void add_transposed_product(Eigen::Index rows, Eigen::Index columns, Eigen::Index depth, double sign, const double* a,
+                            Eigen::Index a_stride, const double* b, Eigen::Index b_stride, double* c,
+                            Eigen::Index c_stride);
 
 /// Factors a symmetric positive definite matrix S = U' U in place: the upper triangle of `matrix` (row by row) holds S,
 /// then U. Returns false, leaving the matrix undefined, if a pivot is not positive.

@@ -13,12 +13,8 @@ using Policy = policy<promote_double<false>, underflow_error<ignore_error>, over
 }  // namespace
 
 double f_survival(double f, double d1, double d2) {
-  if (!(f > 0.0)) {
-    return 1.0;
-  }
-  if (std::isinf(f)) {
-    return 0.0;
-  }
+  if (!(f > 0.0)) return 1.0;
+  if (std::isinf(f)) return 0.0;
   return boost::math::ibeta(d2 / 2.0, d1 / 2.0, d2 / (d2 + d1 * f), Policy());
 }
 

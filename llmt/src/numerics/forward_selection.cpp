@@ -6,15 +6,15 @@
 namespace llmt {
 namespace {
 
-/// What a regressor must have of its own, as a part of its variance.
+// What a regressor must have of its own, as a part of its variance.
 constexpr double least_independence = 1e-8;
 
-/// A residual sum of squares below this part of that about the mean is rounding.
+// A residual sum of squares below this part of that about the mean is rounding.
 constexpr double rounding = 1e-13;
 
 constexpr int steps_without_gain = 10;
 
-/// Correlations, what of them those before leave.
+// Correlations, what of them those before leave.
 struct Remaining {
   Eigen::MatrixXd factor;      // columns of the pivoted Cholesky factor of the regressors' correlations
   Eigen::VectorXd variance;    // of each regressor, 1 at the start; 0: constant or taken
@@ -22,11 +22,11 @@ struct Remaining {
   Eigen::VectorXd rss;         // of the outputs, 1 at the start
 };
 
-/// The regressor that lowers the sum of squares most; of those alike the first. -1: none is left.
-std::ptrdiff_t best_of(const Remaining& remaining) {
-  std::ptrdiff_t best = -1;
+// The regressor that lowers the sum of squares most; of those alike the first. -1: none is left.
+Eigen::Index best_of(const Remaining& remaining) {
+  Eigen::Index best = -1;
   double most = 0.0;
-  for (std::ptrdiff_t k = 0; k < remaining.variance.size(); ++k) {
+  for (Eigen::Index k = 0; k < remaining.variance.size(); ++k) {
     if (remaining.variance(k) > least_independence) {
       const double gain = remaining.covariance.row(k).squaredNorm() / remaining.variance(k);
       if (gain > most * (1.0 + 1e-10)) {
@@ -38,7 +38,7 @@ std::ptrdiff_t best_of(const Remaining& remaining) {
   return best;
 }
 
-void take(std::ptrdiff_t k, const Eigen::MatrixXd& correlation, std::ptrdiff_t step, Remaining& remaining) {
+void take(Eigen::Index k, const Eigen::MatrixXd& correlation, Eigen::Index step, Remaining& remaining) {
   const double root = std::sqrt(remaining.variance(k));
   auto column = remaining.factor.col(step);
   column =
@@ -58,14 +58,12 @@ double aicc(const Eigen::VectorXd& rss, double rows, double coefficients) {
 
 }  // namespace
 
-std::vector<std::ptrdiff_t> select_regressors(const LocalSums& sums, double rows_per_weight) {
-  const std::ptrdiff_t regressors = sums.gram.rows() - 1;
+std::vector<Eigen::Index> select_regressors(const LocalSums& sums, double rows_per_weight) {
+  const Eigen::Index regressors = sums.gram.rows() - 1;
   const double weight = sums.gram(0, 0);
   const double rows = rows_per_weight * weight;
-  std::vector<std::ptrdiff_t> chosen = {0};
-  if (!(weight > 0.0)) {
-    return chosen;
-  }
+  std::vector<Eigen::Index> chosen = {0};
+  if (!(weight > 0.0)) return chosen;
   const Eigen::VectorXd mean = sums.gram.col(0).tail(regressors) / weight;
   const Eigen::RowVectorXd mean_output = sums.products.row(0) / weight;
   Eigen::MatrixXd correlation = sums.gram.bottomRightCorner(regressors, regressors) - weight * mean * mean.transpose();
@@ -83,15 +81,13 @@ std::vector<std::ptrdiff_t> select_regressors(const LocalSums& sums, double rows
                                     (sums.products.bottomRows(regressors) - weight * mean * mean_output) *
                                     per_output.matrix().asDiagonal(),
                       .rss = (per_output > 0.0).select(Eigen::ArrayXd::Ones(per_output.size()), 0.0)};
-  std::vector<std::ptrdiff_t> order;
+  std::vector<Eigen::Index> order;
   std::size_t best = 0;
   double smallest = aicc(remaining.rss, rows, 1.0);
   while (order.size() < best + steps_without_gain && rows - static_cast<double>(order.size()) > 4.0 + 1.0 &&
          remaining.rss.maxCoeff() > rounding) {
-    const std::ptrdiff_t next = best_of(remaining);
-    if (next < 0) {
-      break;
-    }
+    const Eigen::Index next = best_of(remaining);
+    if (next < 0) break;
     take(next, correlation, std::ssize(order), remaining);
     order.push_back(next);
     const double criterion = aicc(remaining.rss, rows, 1.0 + static_cast<double>(order.size()));
@@ -103,7 +99,7 @@ std::vector<std::ptrdiff_t> select_regressors(const LocalSums& sums, double rows
   for (std::size_t i = 0; i < best; ++i) {
     chosen.push_back(order[i] + 1);
   }
-  std::sort(chosen.begin(), chosen.end());
+  std::ranges::sort(chosen);
   return chosen;
 }
 

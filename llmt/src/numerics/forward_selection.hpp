@@ -22,6 +22,6 @@ struct LocalSums {
 ///   sum over outputs of [N ln(RSS / N) + 2 k + 2 k (k + 1) / (N - k - 1)],  k = coefficients + 1,
 /// N = `rows_per_weight` times the weight; the search ends when 10 further regressors brought none smaller, or nothing
 /// but rounding is left. Returns the positions of the chosen coefficients, ascending, the constant's first.
-std::vector<std::ptrdiff_t> select_regressors(const LocalSums& sums, double rows_per_weight);
+std::vector<Eigen::Index> select_regressors(const LocalSums& sums, double rows_per_weight);
 
 }  // namespace llmt

@@ -7,43 +7,43 @@
 namespace llmt {
 namespace {
 
-/// Doubles that stay in the innermost cache while several tiles pass over them.
-constexpr std::ptrdiff_t buffer_size = 2304;
+// Doubles that stay in the innermost cache while several tiles pass over them.
+constexpr Eigen::Index buffer_size = 2304;
 
-constexpr std::ptrdiff_t few_columns = 16;
+constexpr Eigen::Index few_columns = 16;
 
-/// Rows are asked for this many before they are needed: those of a node lie all over the features.
-constexpr std::ptrdiff_t ahead = 12;
+// Rows are asked for this many before they are needed: those of a node lie all over the features.
+constexpr Eigen::Index ahead = 12;
 
-/// Rows of features, here and there in memory.
+// Rows of features, here and there in memory.
 struct Scattered {
   const double* features;
-  std::ptrdiff_t stride;
+  Eigen::Index stride;
   const int* rows;
-  std::ptrdiff_t following;  // how many rows will be asked for after the first
-  const double* at(std::ptrdiff_t k) const { return features + rows[k] * stride; }
-  void prefetch(std::ptrdiff_t k) const {
+  Eigen::Index following;  // how many rows will be asked for after the first
+  const double* at(Eigen::Index k) const { return features + rows[k] * stride; }
+  void prefetch(Eigen::Index k) const {
     const double* next = at(k + std::min(ahead, following - k));
     __builtin_prefetch(next);
     __builtin_prefetch(next + lanes);
   }
 };
 
-/// Rows one after the other.
+// Rows one after the other.
 struct Packed {
   const double* rows;
-  std::ptrdiff_t stride;
-  const double* at(std::ptrdiff_t k) const { return rows + k * stride; }
-  void prefetch(std::ptrdiff_t) const {}
+  Eigen::Index stride;
+  const double* at(Eigen::Index k) const { return rows + k * stride; }
+  void prefetch(Eigen::Index) const {}
 };
 
-/// Sums f_i f_j over `count` rows, for `Rows` columns i from `first_row` and `Columns` vectors of columns j from
-/// `first_column`, in registers.
+// Sums f_i f_j over `count` rows, for `Rows` columns i from `first_row` and `Columns` vectors of columns j from
+// `first_column`, in registers.
 template <int Rows, int Columns, class Source>
-LLMT_INLINE void add_tile(const Source& source, std::ptrdiff_t count, std::ptrdiff_t first_row,
-                          std::ptrdiff_t first_column, double* gram) {
+LLMT_INLINE void add_tile(const Source& source, Eigen::Index count, Eigen::Index first_row, Eigen::Index first_column,
+                          double* gram) {
   Lanes sums[Rows][Columns] = {};
-  for (std::ptrdiff_t k = 0; k < count; ++k) {
+  for (Eigen::Index k = 0; k < count; ++k) {
     const double* row = source.at(k);
     if (first_row == 0) {
       source.prefetch(k);
@@ -64,8 +64,8 @@ LLMT_INLINE void add_tile(const Source& source, std::ptrdiff_t count, std::ptrdi
 }
 
 template <int Rows, class Source>
-LLMT_INLINE void add_tile_row(const Source& source, std::ptrdiff_t count, std::ptrdiff_t first_row, double* gram) {
-  std::ptrdiff_t column = 0;
+LLMT_INLINE void add_tile_row(const Source& source, Eigen::Index count, Eigen::Index first_row, double* gram) {
+  Eigen::Index column = 0;
   for (; column + lanes <= first_row; column += 2 * lanes) {
     add_tile<Rows, 2>(source, count, first_row, column, gram);
   }
@@ -75,8 +75,8 @@ LLMT_INLINE void add_tile_row(const Source& source, std::ptrdiff_t count, std::p
 }
 
 template <class Source>
-LLMT_INLINE void add_tiles(const Source& source, std::ptrdiff_t columns, std::ptrdiff_t count, double* gram) {
-  for (std::ptrdiff_t row = 0; row < columns; row += lanes) {
+LLMT_INLINE void add_tiles(const Source& source, Eigen::Index columns, Eigen::Index count, double* gram) {
+  for (Eigen::Index row = 0; row < columns; row += lanes) {
     if (columns - row > 4) {
       add_tile_row<8>(source, count, row, gram);
     } else {
@@ -85,23 +85,23 @@ LLMT_INLINE void add_tiles(const Source& source, std::ptrdiff_t columns, std::pt
   }
 }
 
-/// Few columns: the tiles pass over the rows where they are.
+// Few columns: the tiles pass over the rows where they are.
 LLMT_FOR_EACH_INSTRUCTION_SET
-void add_scattered(const double* features, std::ptrdiff_t columns, const int* rows, std::ptrdiff_t count,
-                   std::ptrdiff_t following, double* gram) {
+void add_scattered(const double* features, Eigen::Index columns, const int* rows, Eigen::Index count,
+                   Eigen::Index following, double* gram) {
   add_tiles(Scattered{features, columns, rows, following}, columns, count, gram);
 }
 
-/// Many columns, many tiles: the rows are brought together first.
+// Many columns, many tiles: the rows are brought together first.
 LLMT_FOR_EACH_INSTRUCTION_SET
-void add_packed(const double* features, std::ptrdiff_t columns, const int* rows, std::ptrdiff_t count,
-                std::ptrdiff_t following, double* buffer, double* gram) {
+void add_packed(const double* features, Eigen::Index columns, const int* rows, Eigen::Index count,
+                Eigen::Index following, double* buffer, double* gram) {
   const Scattered source{features, columns, rows, following};
-  const std::ptrdiff_t stride = (columns + lanes - 1) / lanes * lanes;
-  for (std::ptrdiff_t k = 0; k < count; ++k) {
+  const Eigen::Index stride = (columns + lanes - 1) / lanes * lanes;
+  for (Eigen::Index k = 0; k < count; ++k) {
     const double* next = source.at(k + std::min(ahead, following - k));
     const double* from = source.at(k);
-    for (std::ptrdiff_t c = 0; c < stride; c += lanes) {
+    for (Eigen::Index c = 0; c < stride; c += lanes) {
       __builtin_prefetch(next + c);
       *reinterpret_cast<Lanes*>(buffer + k * stride + c) = *reinterpret_cast<const Lanes*>(from + c);
     }
@@ -110,38 +110,38 @@ void add_packed(const double* features, std::ptrdiff_t columns, const int* rows,
 }
 
 LLMT_FOR_EACH_INSTRUCTION_SET
-void add_vectors(const double* from, double* to, std::ptrdiff_t size) {
-  for (std::ptrdiff_t k = 0; k < size; k += lanes) {
+void add_vectors(const double* from, double* to, Eigen::Index size) {
+  for (Eigen::Index k = 0; k < size; k += lanes) {
     *reinterpret_cast<Lanes*>(to + k) += *reinterpret_cast<const Lanes*>(from + k);
   }
 }
 
-LLMT_INLINE void gather(const double* const* from, std::ptrdiff_t at, Lanes& to) {
+LLMT_INLINE void gather(const double* const* from, Eigen::Index at, Lanes& to) {
   to = Lanes{from[0][at], from[1][at], from[2][at], from[3][at], from[4][at], from[5][at], from[6][at], from[7][at]};
 }
 
-/// Eight factorisations at once, one in every lane. Row k of `factor` holds l_k0 d_0, l_k1 d_1, ..., in `unit` l_k0,
-/// l_k1, ...; `inverse` holds 1 / d or 0. A residual is one more row, whose pivot is its residual sum of squares.
+// Eight factorisations at once, one in every lane. Row k of `factor` holds l_k0 d_0, l_k1 d_1, ..., in `unit` l_k0,
+// l_k1, ...; `inverse` holds 1 / d or 0. A residual is one more row, whose pivot is its residual sum of squares.
 LLMT_FOR_EACH_INSTRUCTION_SET
-void evaluate_eight(const double* const* grams, std::ptrdiff_t coefficients, std::ptrdiff_t columns,
-                    const double* weights, double* scratch, double* rss, double* rank) {
+void evaluate_eight(const double* const* grams, Eigen::Index coefficients, Eigen::Index columns, const double* weights,
+                    double* scratch, double* rss, double* rank) {
   Lanes* row = reinterpret_cast<Lanes*>(scratch);
   Lanes* inverse = row + columns;
   Lanes* unit = inverse + columns;
   Lanes total = {};
   Lanes ranks = {};
-  for (std::ptrdiff_t k = 0; k < columns; ++k) {
-    const std::ptrdiff_t begin = GramShape::row_begin(k);
+  for (Eigen::Index k = 0; k < columns; ++k) {
+    const Eigen::Index begin = GramShape::row_begin(k);
     Lanes diagonal;
     gather(grams, begin + k, diagonal);
     Lanes pivot = diagonal;
-    const std::ptrdiff_t before = std::min(k, coefficients);
+    const Eigen::Index before = std::min(k, coefficients);
     Lanes* unit_k = unit + k * (k + 1) / 2;
-    for (std::ptrdiff_t j = 0; j < before; ++j) {
+    for (Eigen::Index j = 0; j < before; ++j) {
       const Lanes* unit_j = unit + j * (j + 1) / 2;
       Lanes sum;
       gather(grams, begin + j, sum);
-      for (std::ptrdiff_t m = 0; m < j; ++m) {
+      for (Eigen::Index m = 0; m < j; ++m) {
         sum -= row[m] * unit_j[m];
       }
       row[j] = sum;
@@ -167,14 +167,14 @@ void evaluate_eight(const double* const* grams, std::ptrdiff_t coefficients, std
 
 }  // namespace
 
-void add_rows(const Features& features, const int* rows, std::ptrdiff_t count, double* gram) {
+void add_rows(const Features& features, const int* rows, Eigen::Index count, double* gram) {
   const double* data = features.row(0);
-  const std::ptrdiff_t columns = features.columns();
-  const std::ptrdiff_t stride = (columns + lanes - 1) / lanes * lanes;
-  const std::ptrdiff_t chunk = std::max<std::ptrdiff_t>(1, buffer_size / stride);
+  const Eigen::Index columns = features.columns();
+  const Eigen::Index stride = (columns + lanes - 1) / lanes * lanes;
+  const Eigen::Index chunk = std::max<Eigen::Index>(1, buffer_size / stride);
   alignas(64) double buffer[buffer_size];
-  for (std::ptrdiff_t k = 0; k < count; k += chunk) {
-    const std::ptrdiff_t size = std::min(chunk, count - k);
+  for (Eigen::Index k = 0; k < count; k += chunk) {
+    const Eigen::Index size = std::min(chunk, count - k);
     if (columns <= few_columns) {
       add_scattered(data, columns, rows + k, size, count - 1 - k, gram);
     } else {
@@ -187,23 +187,23 @@ void add(const GramShape& shape, const double* other, double* gram) { add_vector
 
 ResidualSums::ResidualSums(const GramShape& shape, const Eigen::VectorXd& weights)
     : shape_(shape), weights_(weights.begin(), weights.end()) {
-  const std::ptrdiff_t columns = shape.columns();
-  scratch_.resize(static_cast<std::size_t>(2 * columns + columns * (columns + 1) / 2));
+  const Eigen::Index columns = shape.columns();
+  scratch_.resize(2 * columns + columns * (columns + 1) / 2);
 }
 
-void ResidualSums::evaluate(const double* const* grams, std::ptrdiff_t count, double* rss, int* rank) {
-  for (std::ptrdiff_t k = 0; k < count; k += lanes) {
+void ResidualSums::evaluate(const double* const* grams, Eigen::Index count, double* rss, int* rank) {
+  for (Eigen::Index k = 0; k < count; k += lanes) {
     std::array<const double*, 8> eight;
-    for (std::ptrdiff_t l = 0; l < lanes; ++l) {
-      eight[static_cast<std::size_t>(l)] = grams[std::min(k + l, count - 1)];
+    for (Eigen::Index l = 0; l < lanes; ++l) {
+      eight[l] = grams[std::min(k + l, count - 1)];
     }
     std::array<double, 8> sums;
     std::array<double, 8> ranks;
     evaluate_eight(eight.data(), shape_.coefficients(), shape_.columns(), weights_.data(),
                    scratch_.front().values.data(), sums.data(), ranks.data());
-    for (std::ptrdiff_t l = 0; l < std::min(lanes, count - k); ++l) {
-      rss[k + l] = sums[static_cast<std::size_t>(l)];
-      rank[k + l] = static_cast<int>(ranks[static_cast<std::size_t>(l)]);
+    for (Eigen::Index l = 0; l < std::min(lanes, count - k); ++l) {
+      rss[k + l] = sums[l];
+      rank[k + l] = static_cast<int>(ranks[l]);
     }
   }
 }

@@ -17,30 +17,27 @@ namespace llmt {
 class Features {
  public:
   Features() = default;
-  Features(std::ptrdiff_t rows, std::ptrdiff_t coefficients, std::ptrdiff_t outputs)
-      : rows_(rows),
-        coefficients_(coefficients),
-        outputs_(outputs),
-        values_(static_cast<std::size_t>(rows * columns() + room), 0.0) {}
+  Features(Eigen::Index rows, Eigen::Index coefficients, Eigen::Index outputs)
+      : rows_(rows), coefficients_(coefficients), outputs_(outputs), values_(rows * columns() + room, 0.0) {}
 
-  std::ptrdiff_t rows() const { return rows_; }
-  std::ptrdiff_t coefficients() const { return coefficients_; }  ///< constant and regressors
-  std::ptrdiff_t outputs() const { return outputs_; }
-  std::ptrdiff_t columns() const { return coefficients_ + outputs_; }
-  double* row(std::ptrdiff_t i) { return values_.data() + i * columns(); }
-  const double* row(std::ptrdiff_t i) const { return values_.data() + i * columns(); }
+  Eigen::Index rows() const { return rows_; }
+  Eigen::Index coefficients() const { return coefficients_; }  ///< constant and regressors
+  Eigen::Index outputs() const { return outputs_; }
+  Eigen::Index columns() const { return coefficients_ + outputs_; }
+  double* row(Eigen::Index i) { return values_.data() + i * columns(); }
+  const double* row(Eigen::Index i) const { return values_.data() + i * columns(); }
   /// Asks for a row that will be needed soon.
-  void prefetch(std::ptrdiff_t i) const {
+  void prefetch(Eigen::Index i) const {
     for (const double* at = row(i); at < row(i + 1); at += 8) {
       __builtin_prefetch(at);
     }
   }
 
  private:
-  static constexpr std::ptrdiff_t room = 16;
-  std::ptrdiff_t rows_ = 0;
-  std::ptrdiff_t coefficients_ = 0;
-  std::ptrdiff_t outputs_ = 0;
+  static constexpr Eigen::Index room = 16;
+  Eigen::Index rows_ = 0;
+  Eigen::Index coefficients_ = 0;
+  Eigen::Index outputs_ = 0;
   std::vector<double> values_;
 };
 
@@ -48,28 +45,28 @@ class Features {
 /// registers, the number of rows to a multiple of four. What fills up is undefined.
 class GramShape {
  public:
-  GramShape(std::ptrdiff_t coefficients, std::ptrdiff_t outputs)
+  GramShape(Eigen::Index coefficients, Eigen::Index outputs)
       : coefficients_(coefficients), columns_(coefficients + outputs) {}
   explicit GramShape(const Features& features) : GramShape(features.coefficients(), features.outputs()) {}
 
-  std::ptrdiff_t coefficients() const { return coefficients_; }
-  std::ptrdiff_t columns() const { return columns_; }
-  static constexpr std::ptrdiff_t row_begin(std::ptrdiff_t i) {
-    const std::ptrdiff_t group = i / lanes;
+  Eigen::Index coefficients() const { return coefficients_; }
+  Eigen::Index columns() const { return columns_; }
+  static constexpr Eigen::Index row_begin(Eigen::Index i) {
+    const Eigen::Index group = i / lanes;
     return lanes * (lanes * group * (group + 1) / 2 + (i - lanes * group) * (group + 1));
   }
-  std::ptrdiff_t at(std::ptrdiff_t i, std::ptrdiff_t j) const { return row_begin(i) + j; }  ///< i >= j
-  std::ptrdiff_t size() const { return row_begin((columns_ + 3) / 4 * 4); }                 ///< in doubles
+  Eigen::Index at(Eigen::Index i, Eigen::Index j) const { return row_begin(i) + j; }  ///< i >= j
+  Eigen::Index size() const { return row_begin((columns_ + 3) / 4 * 4); }             ///< in doubles
 
-  static constexpr std::ptrdiff_t lanes = 8;
+  static constexpr Eigen::Index lanes = 8;
 
  private:
-  std::ptrdiff_t coefficients_;
-  std::ptrdiff_t columns_;
+  Eigen::Index coefficients_;
+  Eigen::Index columns_;
 };
 
 /// Adds the Gram matrix of the given rows of `features` to `gram`.
-void add_rows(const Features& features, const int* rows, std::ptrdiff_t count, double* gram);
+void add_rows(const Features& features, const int* rows, Eigen::Index count, double* gram);
 
 /// gram += other, entry by entry.
 void add(const GramShape& shape, const double* other, double* gram);
@@ -84,7 +81,7 @@ class ResidualSums {
   ResidualSums(const GramShape& shape, const Eigen::VectorXd& weights);
 
   /// rss[i] and rank[i] of grams[i], i < count.
-  void evaluate(const double* const* grams, std::ptrdiff_t count, double* rss, int* rank);
+  void evaluate(const double* const* grams, Eigen::Index count, double* rss, int* rank);
 
  private:
   struct alignas(64) Slot {

@@ -11,13 +11,13 @@
 namespace llmt {
 namespace {
 
-/// Smallest share of a column's variance that the columns before it may leave for a Cholesky factor to be good enough:
-/// its digits are squared.
+// Smallest share of a column's variance that the columns before it may leave for a Cholesky factor to be good enough:
+// its digits are squared.
 constexpr double least_independence = 1e-6;
 
-/// Columns of x that vary over the rows, and what makes them deviations of size one.
+// Columns of x that vary over the rows, and what makes them deviations of size one.
 struct Columns {
-  std::vector<std::ptrdiff_t> varying;
+  std::vector<Eigen::Index> varying;
   Eigen::VectorXd mean;
   Eigen::VectorXd low;
   Eigen::VectorXd high;
@@ -25,16 +25,16 @@ struct Columns {
 };
 
 Columns describe(const RowMajor& x, const Eigen::VectorXd& weights) {
-  const std::ptrdiff_t count = x.cols();
+  const Eigen::Index count = x.cols();
   Columns columns;
   columns.low.setConstant(count, std::numeric_limits<double>::infinity());
   columns.high = -columns.low;
   Eigen::VectorXd present = Eigen::VectorXd::Zero(count);
   Eigen::VectorXd sum = Eigen::VectorXd::Zero(count);
-  for (std::ptrdiff_t i = 0; i < x.rows(); ++i) {
+  for (Eigen::Index i = 0; i < x.rows(); ++i) {
     const double* row = x.data() + i * count;
     const double weight = weights(i);
-    for (std::ptrdiff_t j = 0; j < count; ++j) {
+    for (Eigen::Index j = 0; j < count; ++j) {
       const double value = row[j];
       const bool known = value == value;
       present(j) += known ? weight : 0.0;
@@ -45,7 +45,7 @@ Columns describe(const RowMajor& x, const Eigen::VectorXd& weights) {
   }
   columns.mean.setZero(count);
   columns.largest.resize(count);
-  for (std::ptrdiff_t j = 0; j < count; ++j) {
+  for (Eigen::Index j = 0; j < count; ++j) {
     if (columns.low(j) < columns.high(j)) {
       columns.mean(j) = sum(j) / present(j);
       columns.largest(std::ssize(columns.varying)) =
@@ -59,43 +59,42 @@ Columns describe(const RowMajor& x, const Eigen::VectorXd& weights) {
   return columns;
 }
 
-/// Constant, deviations of the varying columns divided by the largest, and residuals about their mean.
+// Constant, deviations of the varying columns divided by the largest, and residuals about their mean.
 Features scaled_features(const RowMajor& x, const Columns& columns, const Eigen::MatrixXd& residuals,
                          const Eigen::RowVectorXd& mean, const Eigen::VectorXd& weights) {
-  const std::ptrdiff_t kept = std::ssize(columns.varying);
+  const Eigen::Index kept = std::ssize(columns.varying);
   Features features(x.rows(), 1 + kept, residuals.cols());
   // Dividing by the largest deviation keeps the squares of very small and very large columns in range.
   const Eigen::VectorXd inverse = columns.largest.head(kept).cwiseInverse();
-  for (std::ptrdiff_t i = 0; i < x.rows(); ++i) {
+  for (Eigen::Index i = 0; i < x.rows(); ++i) {
     const double root = std::sqrt(weights(i));
     double* row = features.row(i);
     row[0] = root;
-    for (std::ptrdiff_t k = 0; k < kept; ++k) {
-      const std::ptrdiff_t j = columns.varying[static_cast<std::size_t>(k)];
+    for (Eigen::Index k = 0; k < kept; ++k) {
+      const Eigen::Index j = columns.varying[k];
       const double deviation = (x(i, j) - columns.mean(j)) * inverse(k);
       row[1 + k] = deviation == deviation ? root * deviation : 0.0;
     }
-    for (std::ptrdiff_t o = 0; o < residuals.cols(); ++o) {
+    for (Eigen::Index o = 0; o < residuals.cols(); ++o) {
       row[1 + kept + o] = root * (residuals(i, o) - mean(o));
     }
   }
   return features;
 }
 
-/// W such that the regressors times W are orthogonal with mean square 1, from the Gram matrix of scaled features; empty
-/// if they are too collinear for that.
+// W such that the regressors times W are orthogonal with mean square 1, from the Gram matrix of scaled features; empty
+// if they are too collinear for that.
 Eigen::MatrixXd whitening_matrix(const GramShape& shape, const std::vector<double>& gram, double total) {
-  const std::ptrdiff_t count = shape.coefficients() - 1;
+  const Eigen::Index count = shape.coefficients() - 1;
   Eigen::VectorXd scale(count);
-  for (std::ptrdiff_t k = 0; k < count; ++k) {
-    scale(k) = std::sqrt(gram[static_cast<std::size_t>(shape.at(k + 1, k + 1))] / total);
+  for (Eigen::Index k = 0; k < count; ++k) {
+    scale(k) = std::sqrt(gram[shape.at(k + 1, k + 1)] / total);
   }
   Eigen::MatrixXd factor = Eigen::MatrixXd::Zero(count, count);  // lower triangle L of the correlation matrix L L'
-  for (std::ptrdiff_t i = 0; i < count; ++i) {
-    for (std::ptrdiff_t j = 0; j <= i; ++j) {
-      double sum =
-          i == j ? 1.0 : gram[static_cast<std::size_t>(shape.at(i + 1, j + 1))] / (total * scale(i) * scale(j));
-      for (std::ptrdiff_t k = 0; k < j; ++k) {
+  for (Eigen::Index i = 0; i < count; ++i) {
+    for (Eigen::Index j = 0; j <= i; ++j) {
+      double sum = i == j ? 1.0 : gram[shape.at(i + 1, j + 1)] / (total * scale(i) * scale(j));
+      for (Eigen::Index k = 0; k < j; ++k) {
         sum -= factor(i, k) * factor(j, k);
       }
       if (i > j) {
@@ -112,14 +111,14 @@ Eigen::MatrixXd whitening_matrix(const GramShape& shape, const std::vector<doubl
   return scale.cwiseInverse().asDiagonal() * inverse;
 }
 
-/// Orthogonalises the regressors by Householder QR with column pivoting; sets the rank. Returns the matrix that takes
-/// the products of residuals with them, divided by the total weight, to slopes of minimum norm in columns of unit
-/// variance.
+// Orthogonalises the regressors by Householder QR with column pivoting; sets the rank. Returns the matrix that takes
+// the products of residuals with them, divided by the total weight, to slopes of minimum norm in columns of unit
+// variance.
 Eigen::MatrixXd orthogonalise(Features& features, double total, int& rank) {
-  const std::ptrdiff_t rows = features.rows();
-  const std::ptrdiff_t count = features.coefficients() - 1;
+  const Eigen::Index rows = features.rows();
+  const Eigen::Index count = features.coefficients() - 1;
   Eigen::MatrixXd x(rows, count);
-  for (std::ptrdiff_t i = 0; i < rows; ++i) {
+  for (Eigen::Index i = 0; i < rows; ++i) {
     x.row(i) = Eigen::Map<const Eigen::RowVectorXd>(features.row(i) + 1, count);
   }
   const Eigen::VectorXd scale = (x.colwise().squaredNorm() / total).cwiseSqrt().transpose();
@@ -132,7 +131,7 @@ Eigen::MatrixXd orthogonalise(Features& features, double total, int& rank) {
   basis.applyOnTheLeft(decomposition.householderQ());
   basis *= std::sqrt(total);
   Features reduced(rows, rank, features.outputs());
-  for (std::ptrdiff_t i = 0; i < rows; ++i) {
+  for (Eigen::Index i = 0; i < rows; ++i) {
     reduced.row(i)[0] = features.row(i)[0];
     Eigen::Map<Eigen::RowVectorXd>(reduced.row(i) + 1, rank - 1) = basis.row(i);
     std::copy_n(features.row(i) + 1 + count, features.outputs(), reduced.row(i) + rank);
@@ -145,9 +144,9 @@ Eigen::MatrixXd orthogonalise(Features& features, double total, int& rank) {
 
 Eigen::MatrixXd NodeFit::residuals() const {
   Eigen::MatrixXd result(features.rows(), features.outputs());
-  for (std::ptrdiff_t i = 0; i < features.rows(); ++i) {
+  for (Eigen::Index i = 0; i < features.rows(); ++i) {
     const double* row = features.row(i);
-    for (std::ptrdiff_t o = 0; o < features.outputs(); ++o) {
+    for (Eigen::Index o = 0; o < features.outputs(); ++o) {
       result(i, o) = row[features.coefficients() + o] / row[0];
     }
   }
@@ -168,22 +167,22 @@ NodeFit fit_node(const RowMajor& x, const Eigen::MatrixXd& residuals, const Eige
   Features& features = fit.features;
   features = scaled_features(x, columns, residuals, mean, weights);
 
-  const std::ptrdiff_t kept = std::ssize(columns.varying);
+  const Eigen::Index kept = std::ssize(columns.varying);
   Eigen::MatrixXd to_slopes(kept, 0);  // from coefficients of the orthogonal regressors to those of the scaled columns
   if (kept > 0) {
     const GramShape shape(features);
-    std::vector<double> gram(static_cast<std::size_t>(shape.size()), 0.0);
-    std::vector<int> all(static_cast<std::size_t>(x.rows()));
+    std::vector<double> gram(shape.size(), 0.0);
+    std::vector<int> all(x.rows());
     std::iota(all.begin(), all.end(), 0);
     add_rows(features, all.data(), x.rows(), gram.data());
     to_slopes = whitening_matrix(shape, gram, total);
     if (to_slopes.size() > 0) {
       fit.rank = 1 + static_cast<int>(kept);
-      const std::ptrdiff_t width = (kept + GramShape::lanes - 1) / GramShape::lanes * GramShape::lanes;
-      std::vector<double> matrix(static_cast<std::size_t>(kept * width), 0.0);
-      for (std::ptrdiff_t i = 0; i < kept; ++i) {
-        for (std::ptrdiff_t j = i; j < kept; ++j) {
-          matrix[static_cast<std::size_t>(i * width + j)] = to_slopes(i, j);
+      const Eigen::Index width = (kept + GramShape::lanes - 1) / GramShape::lanes * GramShape::lanes;
+      std::vector<double> matrix(kept * width, 0.0);
+      for (Eigen::Index i = 0; i < kept; ++i) {
+        for (Eigen::Index j = i; j < kept; ++j) {
+          matrix[i * width + j] = to_slopes(i, j);
         }
       }
       transform_regressors(features, matrix);
@@ -191,8 +190,8 @@ NodeFit fit_node(const RowMajor& x, const Eigen::MatrixXd& residuals, const Eige
       to_slopes = orthogonalise(features, total, fit.rank);
     }
   }
-  for (std::ptrdiff_t o = 0; o < residuals.cols(); ++o) {
-    std::vector<double> coefficients(static_cast<std::size_t>(fit.rank), 0.0);
+  for (Eigen::Index o = 0; o < residuals.cols(); ++o) {
+    std::vector<double> coefficients(fit.rank, 0.0);
     Eigen::VectorXd sum = Eigen::VectorXd::Zero(fit.rank);
     // The first pass only finds the coefficients. Of the two that subtract, the second removes what rounding left of
     // the first, so that the residuals are orthogonal to the regressors to rounding relative to themselves, not to the
@@ -203,15 +202,15 @@ NodeFit fit_node(const RowMajor& x, const Eigen::MatrixXd& residuals, const Eige
       if (pass < 2) {
         for (std::size_t k = 0; k < coefficients.size(); ++k) {
           coefficients[k] = remainder.products[k] / total;
-          sum(static_cast<std::ptrdiff_t>(k)) += coefficients[k];
+          sum(k) += coefficients[k];
         }
       }
     }
     fit.rss(o) = remainder.squares;
     fit.centre_change(o) += sum(0);
     const Eigen::VectorXd slopes = to_slopes * sum.tail(fit.rank - 1);
-    for (std::ptrdiff_t k = 0; k < kept; ++k) {
-      const std::ptrdiff_t column = columns.varying[static_cast<std::size_t>(k)];
+    for (Eigen::Index k = 0; k < kept; ++k) {
+      const Eigen::Index column = columns.varying[k];
       fit.slope_change(o, column) = slopes(k) / columns.largest(k);
       fit.centre_change(o) -= fit.slope_change(o, column) * fit.mean(column);
     }

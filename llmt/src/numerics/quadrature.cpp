@@ -9,7 +9,7 @@
 namespace llmt {
 namespace {
 
-/// Gauss-Legendre of a given order: zeros of the Legendre polynomial by Newton's method.
+// Gauss-Legendre of a given order: zeros of the Legendre polynomial by Newton's method.
 Quadrature gauss_legendre(int order) {
   Quadrature rule;
   for (int i = 1; i <= order; ++i) {
@@ -40,11 +40,11 @@ const Quadrature& quadrature(int order) {
   static const std::array<Quadrature, highest_order> rules = [] {
     std::array<Quadrature, highest_order> all;
     for (int k = 0; k < highest_order; ++k) {
-      all[static_cast<std::size_t>(k)] = gauss_legendre(k + 1);
+      all[k] = gauss_legendre(k + 1);
     }
     return all;
   }();
-  return rules[static_cast<std::size_t>(std::clamp(order, 1, highest_order) - 1)];
+  return rules[std::clamp(order, 1, highest_order) - 1];
 }
 
 }  // namespace llmt

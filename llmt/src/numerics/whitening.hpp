@@ -20,13 +20,13 @@ struct Remainder {
 };
 
 /// Takes [1, z] . coefficients off the residuals of an output.
-Remainder subtract_fit(Features& features, std::ptrdiff_t output, const std::vector<double>& coefficients);
+Remainder subtract_fit(Features& features, Eigen::Index output, const std::vector<double>& coefficients);
 
 /// A pseudo-inverse square root: columns that make a covariance the identity on the directions that there are.
 struct Whitening {
   Eigen::MatrixXd forward;
   Eigen::MatrixXd back;
-  std::ptrdiff_t rank = 0;
+  Eigen::Index rank = 0;
 };
 
 /// Of a covariance matrix; directions whose variance is below `covariance_tolerance` of the largest count as none.

@@ -32,8 +32,8 @@ struct Selection {
   CandidateError chosen;
   std::vector<CandidateError> best_of_kind;
   Eigen::VectorXd crisp_rmse;
-  std::ptrdiff_t held_out_rows = 0;  ///< that errors are from
-  std::vector<Partition> made;       ///< the chosen candidate in every fold, if it had to be made; else empty
+  Eigen::Index held_out_rows = 0;  ///< that errors are from
+  std::vector<Partition> made;     ///< the chosen candidate in every fold, if it had to be made; else empty
 };
 
 }  // namespace llmt

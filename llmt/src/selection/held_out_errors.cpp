@@ -10,8 +10,8 @@
 namespace llmt {
 namespace {
 
-/// A threshold that keeps the same jumps of these trees as `jump`, in the middle of the gap between those kept and the
-/// others: the scores of the tree grown on all rows are a little different.
+// A threshold that keeps the same jumps of these trees as `jump`, in the middle of the gap between those kept and the
+// others: the scores of the tree grown on all rows are a little different.
 double middle_of_gap(const std::vector<GrownTree>& grown, double jump) {
   double kept = no_jump;
   double left_out = 0.0;
@@ -30,9 +30,9 @@ double middle_of_gap(const std::vector<GrownTree>& grown, double jump) {
 
 }  // namespace
 
-std::ptrdiff_t enough_rows(std::ptrdiff_t leaves, std::ptrdiff_t coefficients) {
-  constexpr std::ptrdiff_t rows_per_unknown = 25;
-  constexpr std::ptrdiff_t smallest_sample = 10000;
+Eigen::Index enough_rows(Eigen::Index leaves, Eigen::Index coefficients) {
+  constexpr Eigen::Index rows_per_unknown = 25;
+  constexpr Eigen::Index smallest_sample = 10000;
   return std::max(smallest_sample, rows_per_unknown * leaves * coefficients);
 }
 
@@ -44,9 +44,9 @@ HeldOutErrors::HeldOutErrors(const std::vector<FoldRows>& folds, const std::vect
       weights_(weights),
       max_threads_(max_threads),
       of_folds_(folds.size()) {
-  std::set<std::ptrdiff_t> seen;
+  std::set<Eigen::Index> seen;
   for (const double jump : candidates.jumps) {
-    std::ptrdiff_t kept = 0;
+    Eigen::Index kept = 0;
     for (const GrownTree& tree : grown) {
       kept += (tree.jumps.array() >= jump).count();
     }
@@ -56,17 +56,17 @@ HeldOutErrors::HeldOutErrors(const std::vector<FoldRows>& folds, const std::vect
       }
     }
   }
-  std::ptrdiff_t largest = 1;
+  Eigen::Index largest = 1;
   for (const GrownTree& tree : grown) {
     largest = std::max(largest, tree.partition.num_leaves());
   }
-  for (std::ptrdiff_t count = largest; count > 1; count = std::min(count - 1, (count * 2 + 1) / 3)) {
+  for (Eigen::Index count = largest; count > 1; count = std::min(count - 1, (count * 2 + 1) / 3)) {
     leaf_counts_.push_back(count);
   }
-  std::reverse(leaf_counts_.begin(), leaf_counts_.end());
+  std::ranges::reverse(leaf_counts_);
   for (const FoldRows& fold : folds) {
     std::vector<Chunk>& held_out = held_out_.emplace_back();
-    for (std::ptrdiff_t index = 0; index < num_chunks(fold.held_out); ++index) {
+    for (Eigen::Index index = 0; index < num_chunks(fold.held_out); ++index) {
       held_out.push_back(fetch(fold.held_out, index, grown.front().partition.outputs));
     }
     samples_.push_back(thinned(fold.training, enough_rows(largest, std::ssize(fold.training.regressors) + 1)));
@@ -83,7 +83,7 @@ Candidate HeldOutErrors::candidate(const Key& key) const {
           .leaves = leaf_counts_[key.leaves]};
 }
 
-/// Errors of one shape; `keys` ascending.
+// Errors of one shape; `keys` ascending.
 std::map<Key, double> HeldOutErrors::evaluate_shape(std::size_t fold, const std::vector<Key>& keys) const {
   const Candidate first = candidate(keys.front());
   const TrainingRows& sample = samples_[fold];
@@ -94,7 +94,7 @@ std::map<Key, double> HeldOutErrors::evaluate_shape(std::size_t fold, const std:
   // A fit serves all its prefixes, so the largest tree comes first. Not for Gaussians: a prefix has others.
   for (auto last = keys.rbegin(); last != keys.rend();) {
     const std::size_t count = last->leaves;
-    const std::ptrdiff_t leaves = std::min(leaf_counts_[count], partition.num_leaves());
+    const Eigen::Index leaves = std::min(leaf_counts_[count], partition.num_leaves());
     if (!fit || candidates_.kind == ValidityKind::gaussian) {
       rows = thinned(sample, enough_rows(leaves, std::ssize(sample.regressors) + 1));
       fit.emplace(*rows, prefix(partition, leaves), max_threads_, candidates_.sparse.back());
@@ -140,8 +140,8 @@ void HeldOutErrors::evaluate(const std::set<Key>& keys, std::size_t folds) {
       tasks.push_back({fold, std::move(missing), {}});
     }
   }
-  parallel_for(std::ssize(tasks), max_threads_, [&](std::ptrdiff_t index) {
-    Task& task = tasks[static_cast<std::size_t>(index)];
+  parallel_for(std::ssize(tasks), max_threads_, [&](Eigen::Index index) {
+    Task& task = tasks[index];
     task.errors = evaluate_shape(task.fold, task.keys);
   });
   for (Task& task : tasks) {

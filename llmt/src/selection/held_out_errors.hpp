@@ -29,7 +29,7 @@ struct Key {
 
 /// Training rows that show which of several candidates is best. All of them have as many for each unknown, so that none
 /// looks better for having more: 25, with which a joint estimate adds 4 % to the variance of the noise.
-std::ptrdiff_t enough_rows(std::ptrdiff_t leaves, std::ptrdiff_t coefficients);
+Eigen::Index enough_rows(Eigen::Index leaves, Eigen::Index coefficients);
 
 class HeldOutErrors {
  public:
@@ -39,7 +39,7 @@ class HeldOutErrors {
   /// All widths with all jumps, but for those that keep the same splits crisp as one before.
   const std::vector<Shape>& shapes() const { return shapes_; }
   /// 2, 3, 4, 6, 9, ..., the largest tree's: each half as large again as the one before, counted from the largest down.
-  const std::vector<std::ptrdiff_t>& leaf_counts() const { return leaf_counts_; }
+  const std::vector<Eigen::Index>& leaf_counts() const { return leaf_counts_; }
 
   /// Evaluates on the first `folds` folds what was not before.
   void evaluate(const std::set<Key>& keys, std::size_t folds);
@@ -58,7 +58,7 @@ class HeldOutErrors {
   const Eigen::VectorXd& weights_;
   int max_threads_;
   std::vector<Shape> shapes_;
-  std::vector<std::ptrdiff_t> leaf_counts_;
+  std::vector<Eigen::Index> leaf_counts_;
   std::vector<TrainingRows> samples_;            // of the folds' training rows, enough for the largest tree
   std::vector<std::vector<Chunk>> held_out_;     // of the folds
   std::vector<std::map<Key, double>> of_folds_;  // sums of squared errors

@@ -16,7 +16,7 @@ inline double sum_of(const std::vector<double>& values) { return std::accumulate
 /// Errors of candidates with the measures that the user sees.
 class Judge {
  public:
-  Judge(const std::vector<FoldRows>& folds, std::ptrdiff_t outputs) {
+  Judge(const std::vector<FoldRows>& folds, Eigen::Index outputs) {
     for (const FoldRows& fold : folds) {
       weights_.push_back(total_weight(fold.held_out) * static_cast<double>(outputs));
     }
@@ -26,7 +26,7 @@ class Judge {
     CandidateError result{candidate, std::sqrt(sum_of(errors) / sum_of(weights_)), 0.0};
     result.fold_rmse.resize(std::ssize(errors));
     for (std::size_t f = 0; f < errors.size(); ++f) {
-      result.fold_rmse(static_cast<std::ptrdiff_t>(f)) = std::sqrt(errors[f] / weights_[f]);
+      result.fold_rmse(f) = std::sqrt(errors[f] / weights_[f]);
     }
     if (errors.size() > 1) {
       result.spread = std::sqrt((result.fold_rmse.array() - result.fold_rmse.mean()).square().sum() /

@@ -14,48 +14,46 @@
 namespace llmt {
 namespace {
 
-/// Held-out rows that are enough to tell good candidates from bad ones, and how many of a fold are looked at.
-constexpr std::ptrdiff_t screening_rows = 1000;
-constexpr std::ptrdiff_t most_held_out_rows = 10000;
+// Held-out rows that are enough to tell good candidates from bad ones, and how many of a fold are looked at.
+constexpr Eigen::Index screening_rows = 1000;
+constexpr Eigen::Index most_held_out_rows = 10000;
 
-/// Widths that go on to all folds.
+// Widths that go on to all folds.
 constexpr std::size_t finalists = 2;
 
-/// Candidates of each finalist that are compared on all folds, whatever their leaf count.
+// Candidates of each finalist that are compared on all folds, whatever their leaf count.
 constexpr std::size_t candidates_on_all_folds = 3;
 
-/// What is less simple has to be better by more than this many standard errors of the gain.
+// What is less simple has to be better by more than this many standard errors of the gain.
 constexpr double standard_errors_of_a_gain = 2.0;
 
-/// Up to this many unknowns every ridge is tried with every leaf count; beyond, in screening, the best one so far.
-constexpr std::ptrdiff_t cheap_unknowns = 300;
+// Up to this many unknowns every ridge is tried with every leaf count; beyond, in screening, the best one so far.
+constexpr Eigen::Index cheap_unknowns = 300;
 
-/// A shape is at its end when so many leaf counts brought nothing.
+// A shape is at its end when so many leaf counts brought nothing.
 constexpr std::size_t steps_without_gain = 2;
 
-/// Screening goes on to three times as many unknowns with the better half of the shapes, but at least so many.
-constexpr std::ptrdiff_t next_unknowns = 3;
+// Screening goes on to three times as many unknowns with the better half of the shapes, but at least so many.
+constexpr Eigen::Index next_unknowns = 3;
 constexpr std::size_t fewest_shapes = 3;
 
-/// Errors of crisp trees whose leaves have to be in order: each number of leaves has models of its own, so only some
-/// are tried, each half as large again as the one before; the others are infinite.
-Eigen::VectorXd ordered_prefix_errors(const JointFit& fit, std::ptrdiff_t largest, double shrinkage,
-                                      const FoldRows& fold, const Eigen::VectorXd& weights) {
+// Errors of crisp trees whose leaves have to be in order: each number of leaves has models of its own, so only some
+// are tried, each half as large again as the one before; the others are infinite.
+Eigen::VectorXd ordered_prefix_errors(const JointFit& fit, Eigen::Index largest, double shrinkage, const FoldRows& fold,
+                                      const Eigen::VectorXd& weights) {
   Eigen::VectorXd errors = Eigen::VectorXd::Constant(largest, std::numeric_limits<double>::infinity());
-  for (std::ptrdiff_t leaves = 1;; leaves = std::min(largest, leaves + (leaves + 1) / 2)) {
+  for (Eigen::Index leaves = 1;; leaves = std::min(largest, leaves + (leaves + 1) / 2)) {
     const Partition models = shrinkage > 0.0 ? fit.local(leaves, shrinkage) : fit.as_grown(leaves);
     std::vector<Chunk> held_out;
-    for (std::ptrdiff_t index = 0; index < num_chunks(fold.held_out); ++index) {
+    for (Eigen::Index index = 0; index < num_chunks(fold.held_out); ++index) {
       held_out.push_back(fetch(fold.held_out, index, models.outputs));
     }
     errors(leaves - 1) = squared_error(models, fold.training, held_out, weights);
-    if (leaves == largest) {
-      return errors;
-    }
+    if (leaves == largest) return errors;
   }
 }
 
-/// Fills in least squares, the crisp trees and the best of them.
+// Fills in least squares, the crisp trees and the best of them.
 void compare_crisp(const std::vector<FoldRows>& folds, const std::vector<GrownTree>& grown,
                    const Candidates& candidates, const Eigen::VectorXd& weights, int max_threads, const Judge& judge,
                    Selection& selection) {
@@ -70,11 +68,11 @@ void compare_crisp(const std::vector<FoldRows>& folds, const std::vector<GrownTr
     }
   }
   std::vector<std::vector<Eigen::VectorXd>> errors(variants.size(), std::vector<Eigen::VectorXd>(folds.size()));
-  parallel_for(std::ssize(folds), max_threads, [&](std::ptrdiff_t index) {
-    const std::size_t f = static_cast<std::size_t>(index);
+  parallel_for(std::ssize(folds), max_threads, [&](Eigen::Index index) {
+    const std::size_t f = index;
     const JointFit fit(folds[f].training, blended(folds[f].training, grown[f], {}, no_jump), max_threads,
                        candidates.sparse.back());
-    const std::ptrdiff_t leaves = grown[f].partition.num_leaves();
+    const Eigen::Index leaves = grown[f].partition.num_leaves();
     for (std::size_t v = 0; v < variants.size(); ++v) {
       const auto [sparse, shrinkage] = variants[v];
       if (fit.has_ordered_leaves()) {
@@ -89,11 +87,11 @@ void compare_crisp(const std::vector<FoldRows>& folds, const std::vector<GrownTr
       }
     }
   });
-  std::ptrdiff_t largest = 0;
+  Eigen::Index largest = 0;
   for (const Eigen::VectorXd& fold : errors.front()) {
     largest = std::max(largest, fold.size());
   }
-  const auto error_of = [&](std::size_t variant, std::ptrdiff_t leaves) {
+  const auto error_of = [&](std::size_t variant, Eigen::Index leaves) {
     std::vector<double> of_folds;
     for (const Eigen::VectorXd& fold : errors[variant]) {
       of_folds.push_back(fold(std::min(leaves, fold.size()) - 1));  // a smaller tree stays at its last one
@@ -106,7 +104,7 @@ void compare_crisp(const std::vector<FoldRows>& folds, const std::vector<GrownTr
   best.candidate.shrinkage = 0.0;
   selection.best_of_kind.push_back(best);
   for (std::size_t v = 0; v < variants.size(); ++v) {
-    for (std::ptrdiff_t leaves = 1; leaves <= largest; ++leaves) {
+    for (Eigen::Index leaves = 1; leaves <= largest; ++leaves) {
       const CandidateError error = error_of(v, leaves);
       selection.crisp_rmse(leaves - 1) = std::min(selection.crisp_rmse(leaves - 1), error.rmse);
       if (error.rmse < best.rmse) {
@@ -123,8 +121,8 @@ void compare_crisp(const std::vector<FoldRows>& folds, const std::vector<GrownTr
 
 using Ranked = std::vector<std::pair<double, Key>>;
 
-/// Largest leaf count of each shape: where in some fold two steps brought nothing. The best of ever more leaves would
-/// often be best by chance.
+// Largest leaf count of each shape: where in some fold two steps brought nothing. The best of ever more leaves would
+// often be best by chance.
 std::map<std::size_t, std::size_t> last_counts(const std::map<Key, std::vector<double>>& all, std::size_t folds) {
   std::map<std::size_t, std::size_t> last;
   for (std::size_t fold = 0; fold < folds; ++fold) {
@@ -143,7 +141,7 @@ std::map<std::size_t, std::size_t> last_counts(const std::map<Key, std::vector<d
   return last;
 }
 
-/// Best first; ties: the smaller key.
+// Best first; ties: the smaller key.
 Ranked ranked(const HeldOutErrors& comparison, std::size_t folds) {
   const std::map<Key, std::vector<double>> all = comparison.errors(folds);
   std::map<std::size_t, std::size_t> last = last_counts(all, folds);
@@ -153,11 +151,11 @@ Ranked ranked(const HeldOutErrors& comparison, std::size_t folds) {
       order.emplace_back(sum_of(errors), key);
     }
   }
-  std::sort(order.begin(), order.end());
+  std::ranges::sort(order);
   return order;
 }
 
-/// The first of each kind, a kind being what `kind_of` makes of a key.
+// The first of each kind, a kind being what `kind_of` makes of a key.
 template <class KindOf>
 Ranked first_of_each(Ranked order, const KindOf& kind_of) {
   std::set<decltype(kind_of(order.front().second))> seen;
@@ -170,9 +168,9 @@ Ranked first_of_each(Ranked order, const KindOf& kind_of) {
   return firsts;
 }
 
-/// Every shape with few leaves; then the better half with three times as many, and so on, while that helps.
-void screen(HeldOutErrors& comparison, const Candidates& candidates, std::ptrdiff_t coefficients, std::size_t folds) {
-  const std::vector<std::ptrdiff_t>& counts = comparison.leaf_counts();
+// Every shape with few leaves; then the better half with three times as many, and so on, while that helps.
+void screen(HeldOutErrors& comparison, const Candidates& candidates, Eigen::Index coefficients, std::size_t folds) {
+  const std::vector<Eigen::Index>& counts = comparison.leaf_counts();
   const std::size_t usual = candidates.shrinkages.size() / 2;
   const std::size_t ridges = std::max<std::size_t>(candidates.ridges.size(), 1);
   // Ridge and sparseness of those still in the race.
@@ -181,7 +179,7 @@ void screen(HeldOutErrors& comparison, const Candidates& candidates, std::ptrdif
     best_of_shape[shape] = {ridges / 2, 0};
   }
   std::size_t next = 0;
-  for (std::ptrdiff_t unknowns = cheap_unknowns; next < counts.size() && !best_of_shape.empty();
+  for (Eigen::Index unknowns = cheap_unknowns; next < counts.size() && !best_of_shape.empty();
        unknowns *= next_unknowns) {
     std::set<Key> keys;
     std::size_t end = next;
@@ -196,9 +194,7 @@ void screen(HeldOutErrors& comparison, const Candidates& candidates, std::ptrdif
         }
       }
     }
-    if (end == next) {
-      continue;
-    }
+    if (end == next) continue;
     next = end;
     comparison.evaluate(keys, folds);
     // The better half of those in the race. One at its end goes no further.
@@ -215,7 +211,7 @@ void screen(HeldOutErrors& comparison, const Candidates& candidates, std::ptrdif
   }
 }
 
-/// The best two widths, each with its best jump and with none.
+// The best two widths, each with its best jump and with none.
 Ranked finalists_of(const HeldOutErrors& comparison, std::size_t folds) {
   const std::vector<Shape>& shapes = comparison.shapes();
   const Ranked of_shape = first_of_each(ranked(comparison, folds), [](const Key& key) { return key.shape; });
@@ -233,9 +229,9 @@ Ranked finalists_of(const HeldOutErrors& comparison, std::size_t folds) {
   return result;
 }
 
-/// Other ridges and shrinkages at the finalists' best leaf counts; where that is cheap, at its neighbours too.
-void refine(HeldOutErrors& comparison, const Candidates& candidates, std::ptrdiff_t coefficients, std::size_t folds) {
-  const std::vector<std::ptrdiff_t>& counts = comparison.leaf_counts();
+// Other ridges and shrinkages at the finalists' best leaf counts; where that is cheap, at its neighbours too.
+void refine(HeldOutErrors& comparison, const Candidates& candidates, Eigen::Index coefficients, std::size_t folds) {
+  const std::vector<Eigen::Index>& counts = comparison.leaf_counts();
   std::set<Key> keys;
   for (const auto& [error, best] : finalists_of(comparison, folds)) {
     const bool cheap = counts[best.leaves] * coefficients <= next_unknowns * cheap_unknowns;
@@ -257,8 +253,8 @@ void refine(HeldOutErrors& comparison, const Candidates& candidates, std::ptrdif
   comparison.evaluate(keys, folds);
 }
 
-/// On all folds: of each finalist the best few, and the best of each leaf count near its best.
-std::set<Key> compare_on_all_folds(HeldOutErrors& comparison, std::ptrdiff_t coefficients, std::size_t screening,
+// On all folds: of each finalist the best few, and the best of each leaf count near its best.
+std::set<Key> compare_on_all_folds(HeldOutErrors& comparison, Eigen::Index coefficients, std::size_t screening,
                                    std::size_t folds) {
   std::set<Key> kept;
   for (const auto& [least, best] : finalists_of(comparison, screening)) {
@@ -278,7 +274,7 @@ std::set<Key> compare_on_all_folds(HeldOutErrors& comparison, std::ptrdiff_t coe
   return kept;
 }
 
-/// The best of each width: with jumps only if their gain on none is beyond chance.
+// The best of each width: with jumps only if their gain on none is beyond chance.
 std::vector<CandidateError> best_of_widths(const HeldOutErrors& comparison, const std::set<Key>& kept,
                                            const std::vector<FoldRows>& folds, const Judge& judge) {
   const std::map<Key, std::vector<double>> errors = comparison.errors(folds.size());
@@ -287,7 +283,7 @@ std::vector<CandidateError> best_of_widths(const HeldOutErrors& comparison, cons
   std::vector<CandidateError> result;
   for (const auto& [error, key] : first_of_each(order, [](const Key& each) { return each.shape; })) {
     const CandidateError entry = judge(comparison.candidate(key), errors.at(key));
-    const auto same = std::find_if(result.begin(), result.end(), [&](const CandidateError& other) {
+    const auto same = std::ranges::find_if(result, [&](const CandidateError& other) {
       return other.candidate.validity.width == entry.candidate.validity.width;
     });
     if (same == result.end()) {
@@ -296,18 +292,18 @@ std::vector<CandidateError> best_of_widths(const HeldOutErrors& comparison, cons
       *same = entry;
     }
   }
-  std::stable_sort(result.begin(), result.end(), [](const auto& a, const auto& b) { return a.rmse < b.rmse; });
+  std::ranges::stable_sort(result, [](const auto& a, const auto& b) { return a.rmse < b.rmse; });
   return result;
 }
 
-/// Candidates are told apart on samples of the training rows. Against a crisp tree, whose models all rows have made,
-/// the best blend is at a disadvantage then: it is made from all rows too, where one hold-out says that there are many.
+// Candidates are told apart on samples of the training rows. Against a crisp tree, whose models all rows have made,
+// the best blend is at a disadvantage then: it is made from all rows too, where one hold-out says that there are many.
 Partition make_from_all_rows(const FoldRows& fold, const GrownTree& grown, const Eigen::VectorXd& weights,
                              int max_threads, const Judge& judge, CandidateError& best) {
   Candidate candidate = best.candidate;
   candidate.leaves = std::min(candidate.leaves, grown.partition.num_leaves());
   Partition partition = estimate(fold.training, grown, candidate, max_threads);
-  std::vector<int> all(static_cast<std::size_t>(fold.held_out.count()));
+  std::vector<int> all(fold.held_out.count());
   std::iota(all.begin(), all.end(), 0);
   const std::vector<Chunk> held_out = {fetch(fold.held_out, all, partition.outputs)};
   best = judge(best.candidate, {squared_error(partition, fold.training, held_out, weights)});
@@ -318,9 +314,7 @@ Partition make_from_all_rows(const FoldRows& fold, const GrownTree& grown, const
 
 bool is_beyond_chance(const CandidateError& simple, const CandidateError& other) {
   const Eigen::VectorXd gain = simple.fold_rmse - other.fold_rmse;
-  if (gain.size() < 2) {
-    return other.rmse < simple.rmse;
-  }
+  if (gain.size() < 2) return other.rmse < simple.rmse;
   const double folds = static_cast<double>(gain.size());
   const double error = std::sqrt((gain.array() - gain.mean()).square().sum() / (folds - 1.0) / folds);
   return gain.mean() > standard_errors_of_a_gain * error;
@@ -338,10 +332,10 @@ Selection select(const std::vector<FoldRows>& folds, const std::vector<GrownTree
   compare_crisp(compared, grown, candidates, weights, max_threads, judge, selection);
   if (!candidates.widths.empty() && selection.crisp_rmse.size() > 1) {
     std::size_t screening = 0;
-    for (std::ptrdiff_t rows = 0; screening < compared.size() && rows < screening_rows; ++screening) {
+    for (Eigen::Index rows = 0; screening < compared.size() && rows < screening_rows; ++screening) {
       rows += compared[screening].held_out.count();
     }
-    const std::ptrdiff_t coefficients = std::ssize(compared.front().training.regressors) + 1;
+    const Eigen::Index coefficients = std::ssize(compared.front().training.regressors) + 1;
     HeldOutErrors comparison(compared, grown, candidates, weights, max_threads);
     screen(comparison, candidates, coefficients, screening);
     refine(comparison, candidates, coefficients, screening);

@@ -29,17 +29,17 @@ BlendCorrection::BlendCorrection(const TrainingRows& rows, Partition blended)
   const Evaluator evaluator(partition_, rows.columns, size_ - 1);
   const std::vector<int> parents = parents_of(partition_);
   std::vector<Activation> active;
-  std::ptrdiff_t at = 0;
+  Eigen::Index at = 0;
   begins_.push_back(0);
   regressors_.resize(size_, rows.count());
-  for (std::ptrdiff_t index = 0; index < num_chunks(rows); ++index) {
+  for (Eigen::Index index = 0; index < num_chunks(rows); ++index) {
     const Chunk chunk = fetch(rows, index, partition_.outputs);
-    for (std::ptrdiff_t r = 0; r < chunk.count(); ++r, ++at) {
+    for (Eigen::Index r = 0; r < chunk.count(); ++r, ++at) {
       const double root = std::sqrt(chunk.weights(r));
       evaluator.activate(chunk.inputs.row(r).data(), active);
       const Activation& largest = *std::max_element(
           active.begin(), active.end(), [](const auto& l, const auto& m) { return l.validity < m.validity; });
-      const Eigen::VectorXd& mean = partition_.nodes[static_cast<std::size_t>(largest.node)].mean;
+      const Eigen::VectorXd& mean = partition_.nodes[largest.node].mean;
       const Eigen::VectorXd given = chunk.deviations.row(r).transpose();
       const Eigen::VectorXd deviations = given.array().isNaN().select(mean, given);
       auto a = regressors_.col(at);
@@ -47,14 +47,14 @@ BlendCorrection::BlendCorrection(const TrainingRows& rows, Partition blended)
       a.tail(size_ - 1) = root * deviations.cwiseQuotient(scale_);
       double value = chunk.outputs(r, 0);
       for (const Activation& entry : active) {
-        Node& node = partition_.nodes[static_cast<std::size_t>(entry.node)];
+        Node& node = partition_.nodes[entry.node];
         node.low = node.low.cwiseMin(deviations);
         node.high = node.high.cwiseMax(deviations);
         value -= entry.validity * (node.value(0) + node.slope.row(0).dot(deviations));
-        const int leaf = position[static_cast<std::size_t>(entry.node)];
+        const int leaf = position[entry.node];
         positions_.push_back(leaf);
         validities_.push_back(entry.validity);
-        grams_[static_cast<std::size_t>(leaf)].selfadjointView<Eigen::Lower>().rankUpdate(a, entry.validity);
+        grams_[leaf].selfadjointView<Eigen::Lower>().rankUpdate(a, entry.validity);
       }
       residuals_(at) = root * value;
       begins_.push_back(static_cast<int>(positions_.size()));
@@ -64,32 +64,30 @@ BlendCorrection::BlendCorrection(const TrainingRows& rows, Partition blended)
     gram.triangularView<Eigen::StrictlyUpper>() = gram.transpose();
   }
   for (std::size_t i = partition_.nodes.size(); i-- > 1;) {
-    Node& parent = partition_.nodes[static_cast<std::size_t>(parents[i])];
+    Node& parent = partition_.nodes[parents[i]];
     parent.low = parent.low.cwiseMin(partition_.nodes[i].low);
     parent.high = parent.high.cwiseMax(partition_.nodes[i].high);
   }
 }
 
-/// A'A change, A the rows of Phi_i a.
+// A'A change, A the rows of Phi_i a.
 Eigen::VectorXd BlendCorrection::apply(const Eigen::VectorXd& change) const {
   Eigen::VectorXd result = Eigen::VectorXd::Zero(change.size());
   for (std::size_t row = 0; row + 1 < begins_.size(); ++row) {
-    const auto a = regressors_.col(static_cast<std::ptrdiff_t>(row));
+    const auto a = regressors_.col(row);
     double value = 0.0;
     for (int e = begins_[row]; e < begins_[row + 1]; ++e) {
-      value += validities_[static_cast<std::size_t>(e)] *
-               a.dot(change.segment(positions_[static_cast<std::size_t>(e)] * size_, size_));
+      value += validities_[e] * a.dot(change.segment(positions_[e] * size_, size_));
     }
     for (int e = begins_[row]; e < begins_[row + 1]; ++e) {
-      result.segment(positions_[static_cast<std::size_t>(e)] * size_, size_) +=
-          validities_[static_cast<std::size_t>(e)] * value * a;
+      result.segment(positions_[e] * size_, size_) += validities_[e] * value * a;
     }
   }
   return result;
 }
 
 Partition BlendCorrection::corrected(double ridge) const {
-  const std::ptrdiff_t leaves = std::ssize(leaves_);
+  const Eigen::Index leaves = std::ssize(leaves_);
   std::vector<Eigen::LLT<Eigen::MatrixXd>> blocks;
   std::vector<Eigen::VectorXd> holds;
   for (const Eigen::MatrixXd& gram : grams_) {
@@ -99,17 +97,15 @@ Partition BlendCorrection::corrected(double ridge) const {
   }
   const auto precondition = [&](const Eigen::VectorXd& from) {
     Eigen::VectorXd to(from.size());
-    for (std::ptrdiff_t i = 0; i < leaves; ++i) {
-      to.segment(i * size_, size_) = blocks[static_cast<std::size_t>(i)].solve(from.segment(i * size_, size_));
+    for (Eigen::Index i = 0; i < leaves; ++i) {
+      to.segment(i * size_, size_) = blocks[i].solve(from.segment(i * size_, size_));
     }
     return to;
   };
   Eigen::VectorXd residual = Eigen::VectorXd::Zero(leaves * size_);
   for (std::size_t row = 0; row + 1 < begins_.size(); ++row) {
     for (int e = begins_[row]; e < begins_[row + 1]; ++e) {
-      residual.segment(positions_[static_cast<std::size_t>(e)] * size_, size_) +=
-          validities_[static_cast<std::size_t>(e)] * residuals_(static_cast<std::ptrdiff_t>(row)) *
-          regressors_.col(static_cast<std::ptrdiff_t>(row));
+      residual.segment(positions_[e] * size_, size_) += validities_[e] * residuals_(row) * regressors_.col(row);
     }
   }
   Eigen::VectorXd change = Eigen::VectorXd::Zero(leaves * size_);
@@ -119,15 +115,12 @@ Partition BlendCorrection::corrected(double ridge) const {
   const double first = now;
   for (int step = 0; step < most_steps && now > enough * first; ++step) {
     Eigen::VectorXd product = apply(direction);
-    for (std::ptrdiff_t i = 0; i < leaves; ++i) {
+    for (Eigen::Index i = 0; i < leaves; ++i) {
       const auto of_leaf = direction.segment(i * size_, size_);
-      product.segment(i * size_, size_) += ridge * (grams_[static_cast<std::size_t>(i)] * of_leaf) +
-                                           holds[static_cast<std::size_t>(i)].cwiseProduct(of_leaf);
+      product.segment(i * size_, size_) += ridge * (grams_[i] * of_leaf) + holds[i].cwiseProduct(of_leaf);
     }
     const double curvature = direction.dot(product);
-    if (!(curvature > 0.0)) {
-      break;
-    }
+    if (!(curvature > 0.0)) break;
     change += now / curvature * direction;
     residual -= now / curvature * product;
     conditioned = precondition(residual);
@@ -136,8 +129,8 @@ Partition BlendCorrection::corrected(double ridge) const {
     now = next;
   }
   Partition result = partition_;
-  for (std::ptrdiff_t i = 0; i < leaves; ++i) {
-    Node& node = result.nodes[static_cast<std::size_t>(leaves_[static_cast<std::size_t>(i)])];
+  for (Eigen::Index i = 0; i < leaves; ++i) {
+    Node& node = result.nodes[leaves_[i]];
     const auto of_leaf = change.segment(i * size_, size_);
     node.value(0) += of_leaf(0);
     node.slope.row(0) += of_leaf.tail(size_ - 1).cwiseQuotient(scale_).transpose();

@@ -29,7 +29,7 @@ class BlendCorrection {
   Eigen::VectorXd apply(const Eigen::VectorXd& change) const;
 
   Partition partition_;
-  std::ptrdiff_t size_;
+  Eigen::Index size_;
   Eigen::VectorXd scale_;
   std::vector<int> leaves_;     // nodes
   std::vector<int> begins_;     // of each row's entries below, and their end

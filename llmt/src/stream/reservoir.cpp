@@ -8,7 +8,7 @@
 namespace llmt {
 namespace {
 
-/// A step of splitmix64 (Steele, Lea & Flood 2014).
+// A step of splitmix64 (Steele, Lea & Flood 2014).
 std::uint64_t mixed(std::uint64_t state, std::uint64_t bits) {
   std::uint64_t z = state + bits + 0x9e3779b97f4a7c15ULL;
   z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ULL;
@@ -19,18 +19,14 @@ std::uint64_t mixed(std::uint64_t state, std::uint64_t bits) {
 }  // namespace
 
 bool Reservoir::add(const double* values) {
-  if (capacity_ == 0) {
-    return false;
-  }
+  if (capacity_ == 0) return false;
   std::uint64_t hash = 0;
-  for (std::ptrdiff_t k = 0; k < width_; ++k) {
+  for (Eigen::Index k = 0; k < width_; ++k) {
     const double value = std::isnan(values[k]) ? std::numeric_limits<double>::infinity() : values[k] + 0.0;  // -0 as 0
     hash = mixed(hash, std::bit_cast<std::uint64_t>(value));
   }
   const bool full = std::ssize(rows_) >= capacity_;
-  if (full && hash > std::prev(rows_.end())->first) {
-    return false;
-  }
+  if (full && hash > std::prev(rows_.end())->first) return false;
   const bool held_out = mixed(hash, 0) % 8 == 0;
   const auto [at, added] = rows_.try_emplace(hash, Row{{}, held_out, 0});
   ++at->second.times;
@@ -54,10 +50,10 @@ void Reservoir::remove_if(const std::function<bool(const double* values)>& drop)
   });
 }
 
-std::ptrdiff_t Reservoir::bytes() const {
+Eigen::Index Reservoir::bytes() const {
   // A node of the map: three pointers and a colour beside key and value.
   const std::size_t node = 4 * sizeof(void*) + sizeof(std::pair<std::uint64_t, Row>);
-  return std::ssize(rows_) * static_cast<std::ptrdiff_t>(node + static_cast<std::size_t>(width_) * sizeof(double));
+  return std::ssize(rows_) * static_cast<Eigen::Index>(node + static_cast<std::size_t>(width_) * sizeof(double));
 }
 
 }  // namespace llmt

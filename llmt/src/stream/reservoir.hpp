@@ -2,6 +2,7 @@
 /// A sample of fixed size of the rows of a stream.
 #pragma once
 
+#include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -15,12 +16,12 @@ namespace llmt {
 class Reservoir {
  public:
   /// Rows of `width` numbers.
-  Reservoir(std::ptrdiff_t capacity, std::ptrdiff_t width) : capacity_(capacity), width_(width) {}
+  Reservoir(Eigen::Index capacity, Eigen::Index width) : capacity_(capacity), width_(width) {}
 
   struct Row {
     std::vector<double> values;
     bool held_out;
-    std::ptrdiff_t times;  ///< that it has come
+    Eigen::Index times;  ///< that it has come
   };
 
   /// Offers a row; true if it is now in the sample and held out.
@@ -38,13 +39,13 @@ class Reservoir {
   /// In the order of their hashes, which is random but for equal rows.
   const std::map<std::uint64_t, Row>& rows() const { return rows_; }
 
-  std::ptrdiff_t bytes() const;
+  Eigen::Index bytes() const;
 
  private:
-  std::ptrdiff_t capacity_;
-  std::ptrdiff_t width_;
+  Eigen::Index capacity_;
+  Eigen::Index width_;
   std::map<std::uint64_t, Row> rows_;
-  std::ptrdiff_t times_ = 0;  // sum over the rows
+  Eigen::Index times_ = 0;  // sum over the rows
 };
 
 }  // namespace llmt

@@ -9,15 +9,15 @@
 namespace llmt {
 namespace {
 
-/// Rows whose quantiles are the first edges.
-constexpr std::ptrdiff_t first_rows = 64;
+// Rows whose quantiles are the first edges.
+constexpr Eigen::Index first_rows = 64;
 
-/// Tests come when rows have grown by this factor.
+// Tests come when rows have grown by this factor.
 constexpr double test_growth = 1.25;
 
-/// A split that passes still waits until it beats the best one on another input by a standard error of the difference,
-/// or rows have grown by this factor since it passed first: the first split that is better than none is often not the
-/// right one, and what is below it depends on it.
+// A split that passes still waits until it beats the best one on another input by a standard error of the difference,
+// or rows have grown by this factor since it passed first: the first split that is better than none is often not the
+// right one, and what is below it depends on it.
 constexpr double patience_with_rivals = 2.0;
 
 }  // namespace
@@ -25,32 +25,31 @@ constexpr double patience_with_rivals = 2.0;
 LeafSearch::LeafSearch(const StreamSetting& setting)
     : setting_(setting),
       residuals_(setting.shape, Eigen::VectorXd::Ones(1)),
-      bins_(static_cast<std::size_t>(setting.inputs)),
+      bins_(setting.inputs),
       next_test_(std::max(first_rows, 2 * setting.options.min_leaf_samples)) {}
 
 void LeafSearch::set_edges(Bins& bins, std::vector<double> edges) const {
   bins.edges = std::move(edges);
-  bins.grams.assign((bins.edges.size() + 1) * static_cast<std::size_t>(setting_.shape.size()), 0.0);
+  bins.grams.assign((bins.edges.size() + 1) * setting_.shape.size(), 0.0);
   bins.rows.assign(bins.edges.size() + 1, 0);
 }
 
-/// Edges halfway between neighbouring values at the quantiles of the first rows.
+// Edges halfway between neighbouring values at the quantiles of the first rows.
 void LeafSearch::lay_out(const Basis& basis) {
-  const std::ptrdiff_t stride = setting_.inputs + 2;
-  const std::ptrdiff_t count = std::ssize(first_rows_) / stride;
-  for (std::ptrdiff_t j = 0; j < setting_.inputs; ++j) {
+  const Eigen::Index stride = setting_.inputs + 2;
+  const Eigen::Index count = std::ssize(first_rows_) / stride;
+  for (Eigen::Index j = 0; j < setting_.inputs; ++j) {
     std::vector<double> values;
-    for (std::ptrdiff_t i = 0; i < count; ++i) {
-      if (const double value = first_rows_[static_cast<std::size_t>(i * stride + j)]; !std::isnan(value)) {
+    for (Eigen::Index i = 0; i < count; ++i) {
+      if (const double value = first_rows_[i * stride + j]; !std::isnan(value)) {
         values.push_back(value);
       }
     }
-    std::sort(values.begin(), values.end());
+    std::ranges::sort(values);
     std::vector<double> edges;
     for (int b = 1; b < setting_.options.bins && !values.empty(); ++b) {
-      const std::size_t at =
-          static_cast<std::size_t>(b) * values.size() / static_cast<std::size_t>(setting_.options.bins);
-      const auto above = std::upper_bound(values.begin(), values.end(), values[at > 0 ? at - 1 : 0]);
+      const std::size_t at = b * values.size() / setting_.options.bins;
+      const auto above = std::ranges::upper_bound(values, values[at > 0 ? at - 1 : 0]);
       if (above != values.end()) {
         const double edge = *(above - 1) + 0.5 * (*above - *(above - 1));
         if (edges.empty() || edge > edges.back()) {
@@ -58,16 +57,16 @@ void LeafSearch::lay_out(const Basis& basis) {
         }
       }
     }
-    set_edges(bins_[static_cast<std::size_t>(j)], std::move(edges));
+    set_edges(bins_[j], std::move(edges));
   }
   RowProducts products(setting_.shape);
   std::vector<double> kept = std::move(first_rows_);
   first_rows_ = {};
   laid_out_ = true;
   Eigen::VectorXd z(setting_.inputs);
-  for (std::ptrdiff_t i = 0; i < count; ++i) {
+  for (Eigen::Index i = 0; i < count; ++i) {
     const double* row = kept.data() + i * stride;
-    for (std::ptrdiff_t j = 0; j < setting_.inputs; ++j) {
+    for (Eigen::Index j = 0; j < setting_.inputs; ++j) {
       z(j) = setting_.scaled(j, row[j]);
     }
     const StreamRow first{row, z.data(), row[setting_.inputs], row[setting_.inputs + 1], 1.0};
@@ -77,22 +76,20 @@ void LeafSearch::lay_out(const Basis& basis) {
 }
 
 void LeafSearch::put(const StreamRow& row, const RowProducts& products) {
-  const std::ptrdiff_t size = setting_.shape.size();
+  const Eigen::Index size = setting_.shape.size();
   // The sums of all leaves do not fit into a cache: they are asked for before they are needed.
   sums_of_row_.clear();
-  for (std::ptrdiff_t j = 0; j < setting_.inputs; ++j) {
-    Bins& bins = bins_[static_cast<std::size_t>(j)];
-    if (std::isnan(row.x[j]) || bins.edges.empty()) {
-      continue;
-    }
-    const auto edge = std::lower_bound(bins.edges.begin(), bins.edges.end(), row.x[j]);
-    const std::ptrdiff_t bin = edge - bins.edges.begin();
+  for (Eigen::Index j = 0; j < setting_.inputs; ++j) {
+    Bins& bins = bins_[j];
+    if (std::isnan(row.x[j]) || bins.edges.empty()) continue;
+    const auto edge = std::ranges::lower_bound(bins.edges, row.x[j]);
+    const Eigen::Index bin = edge - bins.edges.begin();
     double* const sums = bins.grams.data() + bin * size;
-    for (std::ptrdiff_t k = 0; k < size; k += 8) {
+    for (Eigen::Index k = 0; k < size; k += 8) {
       __builtin_prefetch(sums + k, 1);
     }
     sums_of_row_.push_back(sums);
-    ++bins.rows[static_cast<std::size_t>(bin)];
+    ++bins.rows[bin];
   }
   for (double* const sums : sums_of_row_) {
     products.add_to(sums);
@@ -114,7 +111,7 @@ void LeafSearch::add(const StreamRow& row, const Basis& basis, const RowProducts
 }
 
 Sums LeafSearch::side(const Bins& bins, std::size_t begin, std::size_t end) const {
-  const std::size_t size = static_cast<std::size_t>(setting_.shape.size());
+  const std::size_t size = setting_.shape.size();
   Sums sums{std::vector<double>(size, 0.0), 0};
   for (std::size_t b = begin; b < end; ++b) {
     llmt::add(setting_.shape, bins.grams.data() + b * size, sums.gram.data());
@@ -124,14 +121,12 @@ Sums LeafSearch::side(const Bins& bins, std::size_t begin, std::size_t end) cons
 }
 
 LeafSearch::Edges LeafSearch::edges(int input) {
-  const Bins& bins = bins_[static_cast<std::size_t>(input)];
+  const Bins& bins = bins_[input];
   Edges result;
   result.thresholds = bins.edges;
   const std::size_t count = bins.edges.size();
-  if (count == 0) {
-    return result;
-  }
-  const std::size_t size = static_cast<std::size_t>(setting_.shape.size());
+  if (count == 0) return result;
+  const std::size_t size = setting_.shape.size();
   // Left of each edge, then right of it, then all.
   std::vector<double> grams((2 * count + 1) * size, 0.0);
   for (std::size_t e = 0; e < count; ++e) {
@@ -156,7 +151,7 @@ LeafSearch::Edges LeafSearch::edges(int input) {
   std::vector<double> rss(pointers.size());
   std::vector<int> rank(pointers.size());
   residuals_.evaluate(pointers.data(), std::ssize(pointers), rss.data(), rank.data());
-  const std::ptrdiff_t edge_count = std::ssize(bins.edges);
+  const Eigen::Index edge_count = std::ssize(bins.edges);
   result.rss_left.assign(rss.begin(), rss.begin() + edge_count);
   result.rss_right.assign(rss.begin() + edge_count, rss.end() - 1);
   result.rank_left.assign(rank.begin(), rank.begin() + edge_count);
@@ -166,7 +161,7 @@ LeafSearch::Edges LeafSearch::edges(int input) {
   return result;
 }
 
-/// The best edge of an input, if it has an admissible one.
+// The best edge of an input, if it has an admissible one.
 LeafSearch::Found LeafSearch::look_at(int input) {
   const Edges all = edges(input);
   Found found;
@@ -190,9 +185,7 @@ LeafSearch::Found LeafSearch::look_at(int input) {
 bool LeafSearch::passes(const Found& found) const {
   const double added = found.rank_left + found.rank_right - found.rank;
   const double freedom = different_ * static_cast<double>(found.rows) - found.rank_left - found.rank_right;
-  if (added <= 0.0 || freedom <= 0.0) {
-    return false;
-  }
+  if (added <= 0.0 || freedom <= 0.0) return false;
   const double f = found.ratio > 0.0 ? ((1.0 - found.ratio) / added) / (found.ratio / freedom)
                                      : std::numeric_limits<double>::infinity();
   const double tests = static_cast<double>(tests_) * static_cast<double>(tests_ + 1);
@@ -206,17 +199,15 @@ bool LeafSearch::passes(const Found& found) const {
 
 std::optional<StreamSplit> LeafSearch::test(const Eigen::VectorXd& low, const Eigen::VectorXd& high, double different) {
   different_ = different;
-  if (rows_ < next_test_) {
-    return std::nullopt;
-  }
+  if (rows_ < next_test_) return std::nullopt;
   next_test_ = rows_ + std::max(setting_.coefficients(),
-                                static_cast<std::ptrdiff_t>((test_growth - 1.0) * static_cast<double>(rows_)));
+                                static_cast<Eigen::Index>((test_growth - 1.0) * static_cast<double>(rows_)));
   ++tests_;
   Found found;
   double rival = 1.0;  // ratio of the best split on another input
   for (int j = 0; j < setting_.inputs; ++j) {
     const Found of_input = look_at(j);
-    const std::ptrdiff_t tested = found.tested + of_input.tested;
+    const Eigen::Index tested = found.tested + of_input.tested;
     if (of_input.input >= 0 && (found.input < 0 || of_input.ratio < found.ratio)) {
       rival = found.input < 0 ? 1.0 : found.ratio;
       found = of_input;
@@ -239,7 +230,7 @@ std::optional<StreamSplit> LeafSearch::test(const Eigen::VectorXd& low, const Ei
 }
 
 StreamSplit LeafSearch::split_at(const Found& found, const Eigen::VectorXd& low, const Eigen::VectorXd& high) const {
-  const Bins& bins = bins_[static_cast<std::size_t>(found.input)];
+  const Bins& bins = bins_[found.input];
   const double edge = bins.edges[found.edge];
   const double before = found.edge > 0 ? bins.edges[found.edge - 1] : low(found.input);
   const double behind = found.edge + 1 < bins.edges.size() ? bins.edges[found.edge + 1] : high(found.input);
@@ -251,12 +242,12 @@ StreamSplit LeafSearch::split_at(const Found& found, const Eigen::VectorXd& low,
           found.rss * (1.0 - found.ratio) / static_cast<double>(found.rows)};
 }
 
-std::ptrdiff_t LeafSearch::bytes() const {
+Eigen::Index LeafSearch::bytes() const {
   std::size_t doubles = first_rows_.capacity();
   for (const Bins& bins : bins_) {
     doubles += bins.grams.capacity() + bins.edges.capacity() + bins.rows.capacity();
   }
-  return static_cast<std::ptrdiff_t>(sizeof(LeafSearch) + doubles * sizeof(double));
+  return static_cast<Eigen::Index>(sizeof(LeafSearch) + doubles * sizeof(double));
 }
 
 }  // namespace llmt

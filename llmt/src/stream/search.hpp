@@ -24,7 +24,7 @@ struct StreamRow {
 /// What all nodes of a tree share. Options as used: no zeros that stand for defaults.
 struct StreamSetting {
   StreamOptions options;
-  std::ptrdiff_t inputs;
+  Eigen::Index inputs;
   GramShape shape;
   double output_variance = 0.0;  ///< of the first rows
   double rounding = 0.0;         ///< residuals below this are rounding
@@ -32,9 +32,9 @@ struct StreamSetting {
   Eigen::VectorXd scale;
   bool detect_drift = true;  ///< off in tests of what streams do without it
 
-  std::ptrdiff_t coefficients() const { return inputs + 1; }
-  double scaled(std::ptrdiff_t input, double x) const { return (x - centre(input)) / scale(input); }
-  double unscaled(std::ptrdiff_t input, double z) const { return centre(input) + scale(input) * z; }
+  Eigen::Index coefficients() const { return inputs + 1; }
+  double scaled(Eigen::Index input, double x) const { return (x - centre(input)) / scale(input); }
+  double unscaled(Eigen::Index input, double z) const { return centre(input) + scale(input) * z; }
 };
 
 struct StreamSplit {
@@ -64,25 +64,25 @@ class LeafSearch {
   /// What the edges between the bins of an input leave; empty before bins are laid out.
   struct Edges {
     std::vector<double> thresholds;
-    std::vector<std::ptrdiff_t> rows_left;
+    std::vector<Eigen::Index> rows_left;
     std::vector<double> rss_left;
     std::vector<double> rss_right;
     std::vector<int> rank_left;
     std::vector<int> rank_right;
-    std::ptrdiff_t rows = 0;  ///< in all bins
-    double rss = 0.0;         ///< of one model
+    Eigen::Index rows = 0;  ///< in all bins
+    double rss = 0.0;       ///< of one model
     int rank = 0;
   };
   Edges edges(int input);
 
-  std::ptrdiff_t bytes() const;
+  Eigen::Index bytes() const;
 
  private:
   /// Bins of one input: bin b holds edges[b - 1] < x <= edges[b].
   struct Bins {
     std::vector<double> edges;
     std::vector<double> grams;  // edges.size() + 1 of them
-    std::vector<std::ptrdiff_t> rows;
+    std::vector<Eigen::Index> rows;
   };
   struct Found {
     int input = -1;
@@ -92,8 +92,8 @@ class LeafSearch {
     int rank = 0;
     int rank_left = 0;
     int rank_right = 0;
-    std::ptrdiff_t rows = 0;
-    std::ptrdiff_t tested = 0;
+    Eigen::Index rows = 0;
+    Eigen::Index tested = 0;
   };
 
   void lay_out(const Basis& basis);
@@ -110,9 +110,9 @@ class LeafSearch {
   bool laid_out_ = false;
   std::vector<Bins> bins_;            // per input
   std::vector<double*> sums_of_row_;  // of put()
-  std::ptrdiff_t rows_ = 0;
-  std::ptrdiff_t next_test_ = 0;
-  std::ptrdiff_t first_passed_ = 0;
+  Eigen::Index rows_ = 0;
+  Eigen::Index next_test_ = 0;
+  Eigen::Index first_passed_ = 0;
   int tests_ = 0;
   double different_ = 1.0;  // see StreamRow
 };

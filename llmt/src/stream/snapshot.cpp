@@ -15,10 +15,10 @@
 namespace llmt {
 namespace {
 
-/// `node` as a leaf of a Partition.
+// `node` as a leaf of a Partition.
 Node leaf_of(const StreamTree& tree, const StreamNode& node, const std::vector<ColumnRange>& columns) {
   const StreamSetting& setting = tree.setting();
-  const std::ptrdiff_t inputs = setting.inputs;
+  const Eigen::Index inputs = setting.inputs;
   const Sums sums = all_sums(setting, node);
   int rank = 0;
   const Eigen::VectorXd change = solve(setting.shape, sums.gram.data(), setting.options.shrinkage, rank);
@@ -34,8 +34,8 @@ Node leaf_of(const StreamTree& tree, const StreamNode& node, const std::vector<C
   result.low.resize(inputs);
   result.high.resize(inputs);
   result.value = Eigen::VectorXd::Constant(1, model(0));
-  for (std::ptrdiff_t k = 0; k < inputs; ++k) {
-    const ColumnRange& column = columns[static_cast<std::size_t>(k)];
+  for (Eigen::Index k = 0; k < inputs; ++k) {
+    const ColumnRange& column = columns[k];
     const double origin = setting.unscaled(k, node.basis.origin(k));
     result.slope(0, k) = model(k + 1) / setting.scale(k);
     result.value(0) += result.slope(0, k) * (column.mean - origin);
@@ -47,8 +47,8 @@ Node leaf_of(const StreamTree& tree, const StreamNode& node, const std::vector<C
   }
   // [1, deviations] of the model = turn * [1, z - origin] of the sums.
   Eigen::MatrixXd turn = Eigen::MatrixXd::Identity(inputs + 1, inputs + 1);
-  for (std::ptrdiff_t k = 0; k < inputs; ++k) {
-    turn(k + 1, 0) = setting.unscaled(k, node.basis.origin(k)) - columns[static_cast<std::size_t>(k)].mean;
+  for (Eigen::Index k = 0; k < inputs; ++k) {
+    turn(k + 1, 0) = setting.unscaled(k, node.basis.origin(k)) - columns[k].mean;
     turn(k + 1, k + 1) = setting.scale(k);
   }
   const Eigen::MatrixXd gram = matrix_of(setting.shape, sums.gram.data()).topLeftCorner(inputs + 1, inputs + 1);
@@ -99,13 +99,13 @@ Partition crisp_partition(const StreamTree& tree, const std::vector<ColumnRange>
 
 namespace {
 
-/// Held-out rows that choose, at least.
-constexpr std::ptrdiff_t enough_rows = 20;
+// Held-out rows that choose, at least.
+constexpr Eigen::Index enough_rows = 20;
 
-/// Rows of a correction for each of its unknowns, at least.
-constexpr std::ptrdiff_t rows_per_unknown = 10;
+// Rows of a correction for each of its unknowns, at least.
+constexpr Eigen::Index rows_per_unknown = 10;
 
-/// Candidates.
+// Candidates.
 constexpr std::array<double, 3> widths = {0.5, 1.0, 2.0};
 constexpr double first_ridge = 0.1;
 constexpr std::array<double, 4> further_ridges = {1e-3, 0.01, 1.0, 10.0};  // of the best with the first
@@ -116,9 +116,9 @@ Eigen::MatrixXd range_of_residuals(const std::array<const TrainingRows*, 2>& par
   Eigen::MatrixXd range(1, 2);
   range << std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity();
   for (const TrainingRows* rows : parts) {
-    for (std::ptrdiff_t index = 0; index < num_chunks(*rows); ++index) {
+    for (Eigen::Index index = 0; index < num_chunks(*rows); ++index) {
       const Chunk chunk = fetch(*rows, index, partition.outputs);
-      for (std::ptrdiff_t r = 0; r < chunk.count(); ++r) {
+      for (Eigen::Index r = 0; r < chunk.count(); ++r) {
         const Eigen::VectorXd deviations = chunk.deviations.row(r).transpose();
         const double residual = chunk.outputs(r, 0) - root.value(0) -
                                 root.slope.row(0).dot(deviations.array().isNaN().select(root.mean, deviations));
@@ -134,30 +134,26 @@ Eigen::MatrixXd range_of_residuals(const std::array<const TrainingRows*, 2>& par
 
 Partition choose(const TrainingRows& others, const TrainingRows& held_out, Partition crisp, ValidityChoice validity) {
   const Eigen::VectorXd one = Eigen::VectorXd::Ones(1);
-  if (held_out.count() < enough_rows || others.count() < enough_rows) {
-    return crisp;
-  }
+  if (held_out.count() < enough_rows || others.count() < enough_rows) return crisp;
   crisp.residual_range = range_of_residuals({&others, &held_out}, crisp);
   const Eigen::VectorXd of_prefixes = prefix_squared_errors(crisp, held_out, one, 1);
-  std::ptrdiff_t best_prefix = 0;
+  Eigen::Index best_prefix = 0;
   double smallest = of_prefixes.minCoeff(&best_prefix);
   Partition chosen = prefix(crisp, best_prefix + 1);
-  if (validity == ValidityChoice::crisp || crisp.num_leaves() == 1) {
-    return chosen;
-  }
+  if (validity == ValidityChoice::crisp || crisp.num_leaves() == 1) return chosen;
   if (validity == ValidityChoice::blend) {
     smallest = std::numeric_limits<double>::infinity();
   }
   std::vector<Chunk> rows;
-  for (std::ptrdiff_t index = 0; index < num_chunks(held_out); ++index) {
+  for (Eigen::Index index = 0; index < num_chunks(held_out); ++index) {
     rows.push_back(fetch(held_out, index, crisp.outputs));
   }
   // A correction has rows for so many leaves.
-  const std::ptrdiff_t most =
-      std::max<std::ptrdiff_t>(2, others.count() / (rows_per_unknown * (std::ssize(others.regressors) + 1)));
-  std::set<std::ptrdiff_t> leaf_counts;
-  for (const std::ptrdiff_t leaves : {best_prefix + 1, crisp.num_leaves(), std::min(crisp.num_leaves(), most) / 2}) {
-    leaf_counts.insert(std::clamp<std::ptrdiff_t>(leaves, 2, std::min(crisp.num_leaves(), most)));
+  const Eigen::Index most =
+      std::max<Eigen::Index>(2, others.count() / (rows_per_unknown * (std::ssize(others.regressors) + 1)));
+  std::set<Eigen::Index> leaf_counts;
+  for (const Eigen::Index leaves : {best_prefix + 1, crisp.num_leaves(), std::min(crisp.num_leaves(), most) / 2}) {
+    leaf_counts.insert(std::clamp<Eigen::Index>(leaves, 2, std::min(crisp.num_leaves(), most)));
   }
   const GrownTree grown{crisp, jump_sizes(others, crisp, 1)};
   std::optional<BlendCorrection> best;
@@ -170,7 +166,7 @@ Partition choose(const TrainingRows& others, const TrainingRows& held_out, Parti
     }
     return false;
   };
-  for (const std::ptrdiff_t leaves : leaf_counts) {
+  for (const Eigen::Index leaves : leaf_counts) {
     for (const double jump : jumps) {
       for (const double width : widths) {
         BlendCorrection correction(others,

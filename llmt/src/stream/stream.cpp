@@ -17,16 +17,16 @@
 namespace llmt {
 namespace {
 
-/// Rows from which the units are taken; and that recent errors are over.
-constexpr std::ptrdiff_t unit_rows = 50;
+// Rows from which the units are taken; and that recent errors are over.
+constexpr Eigen::Index unit_rows = 50;
 constexpr double recent_rows = 1000.0;
 
-/// Sums of all leaves' bins.
+// Sums of all leaves' bins.
 constexpr double default_bytes = 64.0 * 1024.0 * 1024.0;
 
 [[noreturn]] void reject(const std::string& what) { throw std::invalid_argument("llmt::Stream: " + what); }
 
-StreamOptions checked(std::ptrdiff_t inputs, std::ptrdiff_t outputs, StreamOptions options) {
+StreamOptions checked(Eigen::Index inputs, Eigen::Index outputs, StreamOptions options) {
   if (inputs < 1 || outputs < 1) {
     reject(fmt::format("it has {} inputs and {} outputs, both must be at least 1", inputs, outputs));
   }
@@ -51,8 +51,7 @@ StreamOptions checked(std::ptrdiff_t inputs, std::ptrdiff_t outputs, StreamOptio
   if (options.max_leaves == 0) {
     const double bytes_per_leaf =
         static_cast<double>(inputs * options.bins * GramShape(inputs + 1, 1).size()) * sizeof(double);
-    options.max_leaves =
-        std::clamp<std::ptrdiff_t>(static_cast<std::ptrdiff_t>(default_bytes / bytes_per_leaf), 16, 500);
+    options.max_leaves = std::clamp<Eigen::Index>(static_cast<Eigen::Index>(default_bytes / bytes_per_leaf), 16, 500);
   }
   return options;
 }
@@ -61,12 +60,12 @@ StreamOptions checked(std::ptrdiff_t inputs, std::ptrdiff_t outputs, StreamOptio
 
 class StreamState {
  public:
-  StreamState(std::ptrdiff_t inputs, std::ptrdiff_t outputs, const StreamOptions& options)
+  StreamState(Eigen::Index inputs, Eigen::Index outputs, const StreamOptions& options)
       : inputs_(inputs),
         outputs_(outputs),
         options_(checked(inputs, outputs, options)),
         reservoir_(options.reservoir_rows, inputs + outputs + 1),
-        columns_(static_cast<std::size_t>(inputs + outputs)),
+        columns_(inputs + outputs),
         known_(Eigen::VectorXd::Zero(inputs + outputs)),
         squares_(Eigen::VectorXd::Zero(outputs)),
         recent_(Eigen::VectorXd::Constant(outputs, std::nan(""))) {}
@@ -74,13 +73,13 @@ class StreamState {
   void add(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<const Eigen::MatrixXd>& outputs,
            const Eigen::Ref<const Eigen::VectorXd>& weights) {
     check(inputs, outputs, weights);
-    std::vector<double> row(static_cast<std::size_t>(inputs_ + outputs_ + 1));
-    for (std::ptrdiff_t i = 0; i < inputs.rows(); ++i) {
-      for (std::ptrdiff_t j = 0; j < inputs_; ++j) {
-        row[static_cast<std::size_t>(j)] = inputs(i, j);
+    std::vector<double> row(inputs_ + outputs_ + 1);
+    for (Eigen::Index i = 0; i < inputs.rows(); ++i) {
+      for (Eigen::Index j = 0; j < inputs_; ++j) {
+        row[j] = inputs(i, j);
       }
-      for (std::ptrdiff_t o = 0; o < outputs_; ++o) {
-        row[static_cast<std::size_t>(inputs_ + o)] = outputs(i, o);
+      for (Eigen::Index o = 0; o < outputs_; ++o) {
+        row[inputs_ + o] = outputs(i, o);
       }
       row.back() = weights.size() > 0 ? weights(i) : 1.0;
       ++offered_;
@@ -98,14 +97,14 @@ class StreamState {
     Eigen::MatrixXd result(inputs.rows(), outputs_);
     Eigen::VectorXd x(inputs_);
     Eigen::VectorXd z(inputs_);
-    for (std::ptrdiff_t i = 0; i < inputs.rows(); ++i) {
+    for (Eigen::Index i = 0; i < inputs.rows(); ++i) {
       x = inputs.row(i).transpose();
-      for (std::ptrdiff_t o = 0; o < outputs_; ++o) {
+      for (Eigen::Index o = 0; o < outputs_; ++o) {
         if (trees_.empty()) {
-          result(i, o) = rows_ > 0 ? columns_[static_cast<std::size_t>(inputs_ + o)].mean : std::nan("");
+          result(i, o) = rows_ > 0 ? columns_[inputs_ + o].mean : std::nan("");
           continue;
         }
-        const StreamTree& tree = *trees_[static_cast<std::size_t>(o)];
+        const StreamTree& tree = *trees_[o];
         scale(tree.setting(), x.data(), z);
         result(i, o) = tree.predict({x.data(), z.data(), 0.0, 1.0, 1.0});
       }
@@ -133,7 +132,7 @@ class StreamState {
       counts.replacements += of_tree.replacements;
       counts.bytes += tree->bytes();
     }
-    counts.bytes += reservoir_.bytes() + static_cast<std::ptrdiff_t>(first_rows_.capacity() * sizeof(double));
+    counts.bytes += reservoir_.bytes() + static_cast<Eigen::Index>(first_rows_.capacity() * sizeof(double));
     return counts;
   }
 
@@ -149,17 +148,17 @@ class StreamState {
                       "inputs and {} outputs",
                       inputs.rows(), inputs.cols(), outputs.rows(), outputs.cols(), weights.size(), inputs_, outputs_));
     }
-    for (std::ptrdiff_t i = 0; i < inputs.rows(); ++i) {
-      const auto refuse = [&](const char* what, std::ptrdiff_t column, double value, const char* bound) {
+    for (Eigen::Index i = 0; i < inputs.rows(); ++i) {
+      const auto refuse = [&](const char* what, Eigen::Index column, double value, const char* bound) {
         reject(fmt::format("add(): {}({}, {}) is {}, it must be {} (row {} of the stream; counted from 0)", what, i,
                            column, value, bound, offered_ + i));
       };
-      for (std::ptrdiff_t j = 0; j < inputs_; ++j) {
+      for (Eigen::Index j = 0; j < inputs_; ++j) {
         if (std::abs(inputs(i, j)) > largest_magnitude) {
           refuse("inputs", j, inputs(i, j), "at most 1e150 in magnitude, or NaN where it is missing");
         }
       }
-      for (std::ptrdiff_t o = 0; o < outputs_; ++o) {
+      for (Eigen::Index o = 0; o < outputs_; ++o) {
         if (!(std::abs(outputs(i, o)) <= largest_magnitude)) {
           refuse("outputs", o, outputs(i, o), "finite and at most 1e150 in magnitude");
         }
@@ -171,20 +170,20 @@ class StreamState {
   }
 
   static void scale(const StreamSetting& setting, const double* x, Eigen::VectorXd& z) {
-    for (std::ptrdiff_t j = 0; j < setting.inputs; ++j) {
+    for (Eigen::Index j = 0; j < setting.inputs; ++j) {
       z(j) = setting.scaled(j, x[j]);
     }
   }
 
   void add_row(const std::vector<double>& row) {
     ++rows_;
-    for (std::ptrdiff_t k = 0; k < inputs_ + outputs_; ++k) {
-      const double value = row[static_cast<std::size_t>(k)];
+    for (Eigen::Index k = 0; k < inputs_ + outputs_; ++k) {
+      const double value = row[k];
       if (std::isnan(value)) {
         ++missing_;
         continue;
       }
-      ColumnRange& column = columns_[static_cast<std::size_t>(k)];
+      ColumnRange& column = columns_[k];
       known_(k) += 1.0;
       column.low = known_(k) == 1.0 ? value : std::min(column.low, value);
       column.high = known_(k) == 1.0 ? value : std::max(column.high, value);
@@ -206,34 +205,34 @@ class StreamState {
     Eigen::VectorXd z(inputs_);
     scale(trees_.front()->setting(), row, z);
     ++tested_;
-    for (std::ptrdiff_t o = 0; o < outputs_; ++o) {
-      const double error = trees_[static_cast<std::size_t>(o)]->learn(
-          {row, z.data(), row[inputs_ + o], row[inputs_ + outputs_], reservoir_.share_of_different()});
+    for (Eigen::Index o = 0; o < outputs_; ++o) {
+      const double error =
+          trees_[o]->learn({row, z.data(), row[inputs_ + o], row[inputs_ + outputs_], reservoir_.share_of_different()});
       squares_(o) += error * error;
       const double rate = 1.0 / std::min(static_cast<double>(tested_), recent_rows);
       recent_(o) = tested_ == 1 ? error * error : recent_(o) + rate * (error * error - recent_(o));
     }
   }
 
-  /// Units and first models from the first rows, which are then learned.
+  // Units and first models from the first rows, which are then learned.
   void start() {
-    const std::ptrdiff_t width = inputs_ + outputs_ + 1;
-    const std::ptrdiff_t count = std::ssize(first_rows_) / width;
+    const Eigen::Index width = inputs_ + outputs_ + 1;
+    const Eigen::Index count = std::ssize(first_rows_) / width;
     const Eigen::Map<const RowMajor> first(first_rows_.data(), count, width);
     Eigen::VectorXd centre = Eigen::VectorXd::Zero(inputs_);
     Eigen::VectorXd scale_of_input = Eigen::VectorXd::Ones(inputs_);
-    for (std::ptrdiff_t j = 0; j < inputs_; ++j) {
-      centre(j) = columns_[static_cast<std::size_t>(j)].mean;
+    for (Eigen::Index j = 0; j < inputs_; ++j) {
+      centre(j) = columns_[j].mean;
       double squares = 0.0;
-      for (std::ptrdiff_t i = 0; i < count; ++i) {
+      for (Eigen::Index i = 0; i < count; ++i) {
         squares += std::isnan(first(i, j)) ? 0.0 : (first(i, j) - centre(j)) * (first(i, j) - centre(j));
       }
       if (squares > 0.0) {
         scale_of_input(j) = std::sqrt(squares / std::max(1.0, known_(j)));
       }
     }
-    for (std::ptrdiff_t o = 0; o < outputs_; ++o) {
-      const double mean = columns_[static_cast<std::size_t>(inputs_ + o)].mean;
+    for (Eigen::Index o = 0; o < outputs_; ++o) {
+      const double mean = columns_[inputs_ + o].mean;
       const auto column = first.col(inputs_ + o).array();
       const double variance = (column - mean).square().mean();
       StreamSetting setting{.options = options_,
@@ -249,8 +248,8 @@ class StreamState {
       Eigen::VectorXd z(inputs_);
       for (int pass = 0; pass < 2; ++pass) {
         RowProducts products(setting.shape);
-        Sums sums{std::vector<double>(static_cast<std::size_t>(setting.shape.size()), 0.0), 0};
-        for (std::ptrdiff_t i = 0; i < count; ++i) {
+        Sums sums{std::vector<double>(setting.shape.size(), 0.0), 0};
+        for (Eigen::Index i = 0; i < count; ++i) {
           scale(setting, first_rows_.data() + i * width, z);
           products.set(basis, z.data(), first(i, inputs_ + o), first(i, inputs_ + outputs_));
           products.add_to(sums);
@@ -265,7 +264,7 @@ class StreamState {
     }
     const std::vector<double> rows = std::move(first_rows_);
     first_rows_ = {};
-    for (std::ptrdiff_t i = 0; i < count; ++i) {
+    for (Eigen::Index i = 0; i < count; ++i) {
       learn(rows.data() + i * width);
     }
     tested_ = 0;  // these rows have made the first model
@@ -273,8 +272,8 @@ class StreamState {
     recent_.setConstant(std::nan(""));
   }
 
-  std::ptrdiff_t inputs_;
-  std::ptrdiff_t outputs_;
+  Eigen::Index inputs_;
+  Eigen::Index outputs_;
   StreamOptions options_;
   Reservoir reservoir_;
   std::vector<double> first_rows_;
@@ -282,10 +281,10 @@ class StreamState {
   Eigen::VectorXd known_;  // number of values of each column
   Eigen::VectorXd squares_;
   Eigen::VectorXd recent_;
-  std::ptrdiff_t offered_ = 0;
-  std::ptrdiff_t rows_ = 0;
-  std::ptrdiff_t tested_ = 0;
-  std::ptrdiff_t missing_ = 0;
+  Eigen::Index offered_ = 0;
+  Eigen::Index rows_ = 0;
+  Eigen::Index tested_ = 0;
+  Eigen::Index missing_ = 0;
   std::vector<std::unique_ptr<StreamTree>> trees_;
 };
 
@@ -297,7 +296,7 @@ Model StreamState::snapshot(ValidityChoice validity) const {
     reject("snapshot(): ValidityChoice::gaussian is not for streams");
   }
   if (trees_.empty()) {
-    const std::ptrdiff_t width = inputs_ + outputs_ + 1;
+    const Eigen::Index width = inputs_ + outputs_ + 1;
     const Eigen::Map<const RowMajor> first(first_rows_.data(), std::ssize(first_rows_) / width, width);
     FitOptions one_leaf;
     one_leaf.growth.max_leaves = 1;
@@ -308,37 +307,37 @@ Model StreamState::snapshot(ValidityChoice validity) const {
   std::vector<InputColumn> inputs;
   std::vector<OutputColumn> outputs;
   std::vector<Regressor> regressors;
-  for (std::ptrdiff_t j = 0; j < inputs_; ++j) {
-    const ColumnRange& column = columns_[static_cast<std::size_t>(j)];
+  for (Eigen::Index j = 0; j < inputs_; ++j) {
+    const ColumnRange& column = columns_[j];
     inputs.push_back(
         {.name = fmt::format("x{}", j + 1), .low = column.low, .high = column.high, .centre = column.mean});
     regressors.push_back({static_cast<int>(j), -1, column.mean});
   }
-  for (std::ptrdiff_t o = 0; o < outputs_; ++o) {
-    const ColumnRange& column = columns_[static_cast<std::size_t>(inputs_ + o)];
+  for (Eigen::Index o = 0; o < outputs_; ++o) {
+    const ColumnRange& column = columns_[inputs_ + o];
     outputs.push_back({outputs_ == 1 ? "y" : fmt::format("y{}", o + 1), column.low, column.high});
   }
   std::vector<Partition> partitions;
-  for (std::ptrdiff_t o = 0; o < outputs_; ++o) {
-    partitions.push_back(crisp_partition(*trees_[static_cast<std::size_t>(o)],
-                                         {columns_.begin(), columns_.begin() + inputs_}, static_cast<int>(o)));
+  for (Eigen::Index o = 0; o < outputs_; ++o) {
+    partitions.push_back(
+        crisp_partition(*trees_[o], {columns_.begin(), columns_.begin() + inputs_}, static_cast<int>(o)));
   }
   if (std::ssize(reservoir_.rows()) > 0) {
-    const std::ptrdiff_t count = std::ssize(reservoir_.rows());
+    const Eigen::Index count = std::ssize(reservoir_.rows());
     Eigen::MatrixXd values(count, inputs_ + outputs_ + 1);
     std::vector<int> others;
     std::vector<int> held_out;
-    std::ptrdiff_t at = 0;
+    Eigen::Index at = 0;
     for (const auto& [hash, row] : reservoir_.rows()) {
       (row.held_out ? held_out : others).push_back(static_cast<int>(at));
       values.row(at++) = Eigen::Map<const Eigen::RowVectorXd>(row.values.data(), values.cols());
     }
-    std::vector<int> all_inputs(static_cast<std::size_t>(inputs_));
+    std::vector<int> all_inputs(inputs_);
     std::iota(all_inputs.begin(), all_inputs.end(), 0);
     const Table table{values.leftCols(inputs_),
                       values.middleCols(inputs_, outputs_),
                       values.rightCols(1),
-                      std::vector<int>(static_cast<std::size_t>(inputs_), 0),
+                      std::vector<int>(inputs_, 0),
                       all_inputs,
                       all_inputs};
     if (!others.empty()) {
@@ -361,7 +360,7 @@ Model StreamState::snapshot(ValidityChoice validity) const {
   return Model(std::move(inputs), std::move(outputs), std::move(regressors), std::move(partitions));
 }
 
-Stream::Stream(std::ptrdiff_t num_inputs, std::ptrdiff_t num_outputs, const StreamOptions& options)
+Stream::Stream(Eigen::Index num_inputs, Eigen::Index num_outputs, const StreamOptions& options)
     : state_(std::make_unique<StreamState>(num_inputs, num_outputs, options)) {}
 Stream::~Stream() = default;
 Stream::Stream(Stream&&) noexcept = default;

@@ -9,18 +9,18 @@ namespace llmt {
 namespace {
 
 LLMT_FOR_EACH_INSTRUCTION_SET
-void multiply(const double* features, std::ptrdiff_t columns, double* products) {
-  for (std::ptrdiff_t i = 0; i < columns; ++i) {
+void multiply(const double* features, Eigen::Index columns, double* products) {
+  for (Eigen::Index i = 0; i < columns; ++i) {
     double* out = products + GramShape::row_begin(i);
-    for (std::ptrdiff_t j = 0; j <= i; j += lanes) {
+    for (Eigen::Index j = 0; j <= i; j += lanes) {
       *reinterpret_cast<Lanes*>(out + j) = features[i] * *reinterpret_cast<const Lanes*>(features + j);
     }
   }
 }
 
 LLMT_FOR_EACH_INSTRUCTION_SET
-void add_all(const double* from, std::ptrdiff_t size, double* to) {
-  for (std::ptrdiff_t k = 0; k < size; k += lanes) {
+void add_all(const double* from, Eigen::Index size, double* to) {
+  for (Eigen::Index k = 0; k < size; k += lanes) {
     *reinterpret_cast<Lanes*>(to + k) += *reinterpret_cast<const Lanes*>(from + k);
   }
 }
@@ -28,7 +28,7 @@ void add_all(const double* from, std::ptrdiff_t size, double* to) {
 }  // namespace
 
 void Sums::clear() {
-  std::fill(gram.begin(), gram.end(), 0.0);
+  std::ranges::fill(gram, 0.0);
   rows = 0;
 }
 
@@ -38,22 +38,20 @@ void Sums::add(const GramShape& shape, const Sums& other) {
 }
 
 RowProducts::RowProducts(const GramShape& shape)
-    : shape_(shape),
-      features_(static_cast<std::size_t>((shape.columns() + lanes - 1) / lanes * lanes), 0.0),
-      products_(static_cast<std::size_t>(shape.size()), 0.0) {}
+    : shape_(shape), features_((shape.columns() + lanes - 1) / lanes * lanes, 0.0), products_(shape.size(), 0.0) {}
 
 void RowProducts::set(const Basis& basis, const double* z, double y, double weight) {
-  const std::ptrdiff_t coefficients = shape_.coefficients();
+  const Eigen::Index coefficients = shape_.coefficients();
   const double root = std::sqrt(weight);
   double residual = y - basis.base(0);
   features_[0] = root;
-  for (std::ptrdiff_t k = 1; k < coefficients; ++k) {
+  for (Eigen::Index k = 1; k < coefficients; ++k) {
     const double deviation = z[k - 1] - basis.origin(k - 1);
     const double held = deviation == deviation ? deviation : 0.0;
     residual -= basis.base(k) * held;
-    features_[static_cast<std::size_t>(k)] = root * held;
+    features_[k] = root * held;
   }
-  features_[static_cast<std::size_t>(coefficients)] = root * residual;
+  features_[coefficients] = root * residual;
   multiply(features_.data(), shape_.columns(), products_.data());
 }
 
@@ -61,8 +59,8 @@ void RowProducts::add_to(double* gram) const { add_all(products_.data(), shape_.
 
 Eigen::MatrixXd matrix_of(const GramShape& shape, const double* gram) {
   Eigen::MatrixXd matrix(shape.columns(), shape.columns());
-  for (std::ptrdiff_t i = 0; i < shape.columns(); ++i) {
-    for (std::ptrdiff_t j = 0; j <= i; ++j) {
+  for (Eigen::Index i = 0; i < shape.columns(); ++i) {
+    for (Eigen::Index j = 0; j <= i; ++j) {
       matrix(i, j) = matrix(j, i) = gram[shape.at(i, j)];
     }
   }
@@ -70,22 +68,20 @@ Eigen::MatrixXd matrix_of(const GramShape& shape, const double* gram) {
 }
 
 Eigen::VectorXd solve(const GramShape& shape, const double* gram, double shrinkage, int& rank) {
-  const std::ptrdiff_t size = shape.coefficients();
+  const Eigen::Index size = shape.coefficients();
   Eigen::VectorXd change = Eigen::VectorXd::Zero(size);
   rank = 0;
   const double total = gram[0];
-  if (!(total > 0.0)) {
-    return change;
-  }
+  if (!(total > 0.0)) return change;
   rank = 1;
   // The covariance of the regressors and the residual, in columns of unit variance.
   Eigen::VectorXd mean(size);
-  for (std::ptrdiff_t k = 0; k < size; ++k) {
+  for (Eigen::Index k = 0; k < size; ++k) {
     mean(k) = gram[shape.at(k, 0)] / total;
   }
   const double residual_mean = gram[shape.at(size, 0)] / total;
   Eigen::VectorXd scale = Eigen::VectorXd::Zero(size);
-  for (std::ptrdiff_t k = 1; k < size; ++k) {
+  for (Eigen::Index k = 1; k < size; ++k) {
     const double square = gram[shape.at(k, k)];
     const double variance = square - total * mean(k) * mean(k);
     scale(k) = variance > pivot_tolerance * square ? std::sqrt(variance) : 0.0;
@@ -93,47 +89,41 @@ Eigen::VectorXd solve(const GramShape& shape, const double* gram, double shrinka
   // L D L' of the correlation matrix; columns that follow from those before are left out.
   Eigen::MatrixXd factor = Eigen::MatrixXd::Zero(size, size);
   Eigen::VectorXd right = Eigen::VectorXd::Zero(size);
-  std::vector<std::ptrdiff_t> kept;
+  std::vector<Eigen::Index> kept;
   const double hold = shrinkage / total;
-  for (std::ptrdiff_t k = 1; k < size; ++k) {
-    if (!(scale(k) > 0.0)) {
-      continue;
-    }
+  for (Eigen::Index k = 1; k < size; ++k) {
+    if (!(scale(k) > 0.0)) continue;
     double pivot = 1.0 + hold;
-    for (const std::ptrdiff_t j : kept) {
+    for (const Eigen::Index j : kept) {
       double sum = (gram[shape.at(k, j)] - total * mean(k) * mean(j)) / (scale(k) * scale(j));
-      for (const std::ptrdiff_t m : kept) {
-        if (m >= j) {
-          break;
-        }
+      for (const Eigen::Index m : kept) {
+        if (m >= j) break;
         sum -= factor(k, m) * factor(j, m);
       }
       factor(k, j) = sum / factor(j, j);
       pivot -= factor(k, j) * factor(k, j);
     }
-    if (!(pivot > 1e-10)) {
-      continue;
-    }
+    if (!(pivot > 1e-10)) continue;
     factor(k, k) = std::sqrt(pivot);
     double sum = (gram[shape.at(size, k)] - total * mean(k) * residual_mean) / scale(k);
-    for (const std::ptrdiff_t j : kept) {
+    for (const Eigen::Index j : kept) {
       sum -= factor(k, j) * right(j);
     }
     right(k) = sum / factor(k, k);
     kept.push_back(k);
   }
   rank += static_cast<int>(kept.size());
-  for (std::ptrdiff_t at = std::ssize(kept) - 1; at >= 0; --at) {
-    const std::ptrdiff_t k = kept[static_cast<std::size_t>(at)];
+  for (Eigen::Index at = std::ssize(kept) - 1; at >= 0; --at) {
+    const Eigen::Index k = kept[at];
     double sum = right(k);
-    for (std::ptrdiff_t later = at + 1; later < std::ssize(kept); ++later) {
-      const std::ptrdiff_t m = kept[static_cast<std::size_t>(later)];
+    for (Eigen::Index later = at + 1; later < std::ssize(kept); ++later) {
+      const Eigen::Index m = kept[later];
       sum -= factor(m, k) * change(m);
     }
     change(k) = sum / factor(k, k);
   }
   change(0) = residual_mean;
-  for (const std::ptrdiff_t k : kept) {
+  for (const Eigen::Index k : kept) {
     change(k) /= scale(k);
     change(0) -= change(k) * mean(k);
   }
@@ -141,11 +131,11 @@ Eigen::VectorXd solve(const GramShape& shape, const double* gram, double shrinka
 }
 
 double remaining(const GramShape& shape, const double* gram, const Eigen::VectorXd& change) {
-  const std::ptrdiff_t size = shape.coefficients();
+  const Eigen::Index size = shape.coefficients();
   double sum = gram[shape.at(size, size)];
-  for (std::ptrdiff_t i = 0; i < size; ++i) {
+  for (Eigen::Index i = 0; i < size; ++i) {
     sum -= 2.0 * change(i) * gram[shape.at(size, i)];
-    for (std::ptrdiff_t j = 0; j < size; ++j) {
+    for (Eigen::Index j = 0; j < size; ++j) {
       sum += change(i) * change(j) * gram[shape.at(std::max(i, j), std::min(i, j))];
     }
   }
@@ -154,14 +144,14 @@ double remaining(const GramShape& shape, const double* gram, const Eigen::Vector
 
 void rebase(const GramShape& shape, const Eigen::VectorXd& shift, const Eigen::VectorXd& change,
             std::vector<double>& gram) {
-  const std::ptrdiff_t size = shape.coefficients();
+  const Eigen::Index size = shape.coefficients();
   Eigen::MatrixXd to = Eigen::MatrixXd::Identity(size + 1, size + 1);
   to.block(0, 1, 1, size - 1) = -shift.transpose();
   to.block(0, size, size, 1) = -change;
   const Eigen::MatrixXd result = to.transpose() * matrix_of(shape, gram.data()) * to;
-  for (std::ptrdiff_t i = 0; i <= size; ++i) {
-    for (std::ptrdiff_t j = 0; j <= i; ++j) {
-      gram[static_cast<std::size_t>(shape.at(i, j))] = result(i, j);
+  for (Eigen::Index i = 0; i <= size; ++i) {
+    for (Eigen::Index j = 0; j <= i; ++j) {
+      gram[shape.at(i, j)] = result(i, j);
     }
   }
 }

@@ -19,7 +19,7 @@ struct Basis {
 /// Sums over rows: the Gram matrix of their features times the root of the weight, as GramShape lays it out.
 struct Sums {
   std::vector<double> gram;
-  std::ptrdiff_t rows = 0;
+  Eigen::Index rows = 0;
 
   void clear();
   void add(const GramShape& shape, const Sums& other);

@@ -9,52 +9,52 @@
 namespace llmt {
 namespace {
 
-/// RiseDetector: rows that the usual error is a mean of, rows before it counts, the rise that is put up with, and the
-/// alarm: the sum of the errors' excesses over usual * (1 + tolerated). Errors count as at most `largest` usual ones,
-/// so that outliers raise no alarm.
+// RiseDetector: rows that the usual error is a mean of, rows before it counts, the rise that is put up with, and the
+// alarm: the sum of the errors' excesses over usual * (1 + tolerated). Errors count as at most `largest` usual ones,
+// so that outliers raise no alarm.
 constexpr double memory = 5000.0;
-constexpr std::ptrdiff_t settling = 300;
+constexpr Eigen::Index settling = 300;
 constexpr double tolerated = 0.1;
 constexpr double largest = 4.0;
 constexpr double alarm = 80.0;
 
-/// A duel is about so many rows, decided at this many standard errors, and given up after so many rows.
+// A duel is about so many rows, decided at this many standard errors, and given up after so many rows.
 constexpr double duel_memory = 500.0;
 constexpr double duel_t = 3.0;
-constexpr std::ptrdiff_t duel_rows = 20000;
-constexpr std::ptrdiff_t duel_interval = 25;
+constexpr Eigen::Index duel_rows = 20000;
+constexpr Eigen::Index duel_interval = 25;
 
-/// A split is taken back if as many new rows as decided it, and again, tell no difference at this level.
+// A split is taken back if as many new rows as decided it, and again, tell no difference at this level.
 constexpr double pruning_level = 0.01;
 
-/// So many rows beside a threshold tell whether it should move: by how many standard errors of what that gains.
-constexpr std::ptrdiff_t watch_rows = 200;
-constexpr std::ptrdiff_t watch_interval = 50;
+// So many rows beside a threshold tell whether it should move: by how many standard errors of what that gains.
+constexpr Eigen::Index watch_rows = 200;
+constexpr Eigen::Index watch_interval = 50;
 constexpr double watch_t = 4.0;
 
-/// Models are solved for anew when their rows have grown by this factor.
+// Models are solved for anew when their rows have grown by this factor.
 constexpr double solve_growth = 1.05;
 
 double value_of(const StreamNode& node, const double* z) {
   double value = node.model(0);
-  for (std::ptrdiff_t k = 0; k < node.basis.origin.size(); ++k) {
+  for (Eigen::Index k = 0; k < node.basis.origin.size(); ++k) {
     const double deviation = z[k] - node.basis.origin(k);
     value += deviation == deviation ? node.model(k + 1) * deviation : 0.0;
   }
   return value;
 }
 
-std::ptrdiff_t leaves_of(const StreamNode& node) {
+Eigen::Index leaves_of(const StreamNode& node) {
   return (node.is_leaf() ? 1 : leaves_of(*node.children[0]) + leaves_of(*node.children[1])) +
          (node.alternate ? leaves_of(*node.alternate) : 0);
 }
 
-std::ptrdiff_t bytes_of(const StreamNode& node) {
-  std::size_t doubles = static_cast<std::size_t>(3 * node.model.size() + 3 * node.low.size());
+Eigen::Index bytes_of(const StreamNode& node) {
+  std::size_t doubles = 3 * node.model.size() + 3 * node.low.size();
   for (const Sums* sums : {&node.sums, &node.sides[0], &node.sides[1]}) {
     doubles += sums->gram.capacity();
   }
-  std::ptrdiff_t bytes = static_cast<std::ptrdiff_t>(sizeof(StreamNode) + doubles * sizeof(double));
+  Eigen::Index bytes = static_cast<Eigen::Index>(sizeof(StreamNode) + doubles * sizeof(double));
   bytes += node.search ? node.search->bytes() : 0;
   for (const StreamNode* below : {node.children[0].get(), node.children[1].get(), node.alternate.get()}) {
     bytes += below != nullptr ? bytes_of(*below) : 0;
@@ -96,9 +96,7 @@ double ThresholdWatch::add(double x, double squared_left, double squared_right) 
   sums_[bin] += difference;
   squares_[bin] += difference * difference;
   ++rows_;
-  if (rows_ < watch_rows && rows_ % watch_interval != 0) {
-    return threshold_;
-  }
+  if (rows_ < watch_rows && rows_ % watch_interval != 0) return threshold_;
   // Rows between the threshold and a better one are on the wrong side: of all edges the one that gains most.
   double most = 0.0;
   double to = threshold_;
@@ -145,7 +143,7 @@ std::unique_ptr<StreamNode> StreamTree::make_node(Basis basis) const {
   auto node = std::make_unique<StreamNode>();
   node->model = basis.base;
   node->basis = std::move(basis);
-  node->sums.gram.assign(static_cast<std::size_t>(setting_.shape.size()), 0.0);
+  node->sums.gram.assign(setting_.shape.size(), 0.0);
   node->low.setConstant(setting_.inputs, std::numeric_limits<double>::infinity());
   node->high = -node->low;
   return node;
@@ -163,15 +161,15 @@ double StreamTree::predict(const StreamNode& top, const StreamRow& row) {
 
 double StreamTree::learn(const StreamRow& row) { return learn(root_, row, !setting_.detect_drift); }
 
-/// `watched`: an alternate grows at or above the node already, no alarm is needed.
+// `watched`: an alternate grows at or above the node already, no alarm is needed.
 double StreamTree::learn(std::unique_ptr<StreamNode>& slot, const StreamRow& row, bool watched) {
   StreamNode& node = *slot;
-  for (std::ptrdiff_t k = 0; k < setting_.inputs; ++k) {
+  for (Eigen::Index k = 0; k < setting_.inputs; ++k) {
     node.low(k) = row.x[k] < node.low(k) ? row.x[k] : node.low(k);
     node.high(k) = row.x[k] > node.high(k) ? row.x[k] : node.high(k);
   }
   const bool watched_here = watched || node.alternate;
-  const std::ptrdiff_t alarms = alarms_;
+  const Eigen::Index alarms = alarms_;
   double error = 0.0;
   if (node.is_leaf()) {
     error = row.y - value_of(node, row.z);
@@ -260,8 +258,8 @@ void StreamTree::split(StreamNode& leaf, const StreamSplit& found) {
     leaf.sides[side].clear();
     const Sums& sums = side == 0 ? found.left : found.right;
     Eigen::VectorXd shift(setting_.inputs);
-    for (std::ptrdiff_t k = 0; k < setting_.inputs; ++k) {
-      shift(k) = sums.gram[static_cast<std::size_t>(setting_.shape.at(k + 1, 0))] / sums.gram[0];
+    for (Eigen::Index k = 0; k < setting_.inputs; ++k) {
+      shift(k) = sums.gram[setting_.shape.at(k + 1, 0)] / sums.gram[0];
     }
     auto child = make_node({leaf.basis.origin + shift, shifted_model(leaf.model, shift)});
     child->sums = sums;
@@ -277,7 +275,7 @@ void StreamTree::split(StreamNode& leaf, const StreamSplit& found) {
   recount();
 }
 
-/// The split of a node above two leaves is tested on the rows of the epoch: one model against two.
+// The split of a node above two leaves is tested on the rows of the epoch: one model against two.
 void StreamTree::end_epoch(StreamNode& node, double different) {
   Sums both = node.sides[0];
   both.add(setting_.shape, node.sides[1]);
@@ -311,7 +309,7 @@ void StreamTree::end_epoch(StreamNode& node, double different) {
   node.epoch *= 2;
 }
 
-/// The alternate takes the place of the branch, or goes.
+// The alternate takes the place of the branch, or goes.
 void StreamTree::settle(std::unique_ptr<StreamNode>& slot) {
   StreamNode& node = *slot;
   if (node.duel.rows() % duel_interval != 0 || node.duel.rows() < 2 * setting_.coefficients()) {
@@ -328,9 +326,9 @@ void StreamTree::settle(std::unique_ptr<StreamNode>& slot) {
   }
 }
 
-/// Everything at and below the node counts as if it came from few rows.
+// Everything at and below the node counts as if it came from few rows.
 void StreamTree::restart(StreamNode& node) const {
-  const std::ptrdiff_t kept = 2 * setting_.coefficients();
+  const Eigen::Index kept = 2 * setting_.coefficients();
   if (!node.is_leaf()) {
     node.sums.add(setting_.shape, node.sides[0]);
     node.sums.add(setting_.shape, node.sides[1]);
@@ -354,6 +352,6 @@ void StreamTree::restart(StreamNode& node) const {
 
 void StreamTree::recount() { counts_.leaves = leaves_of(*root_); }
 
-std::ptrdiff_t StreamTree::bytes() const { return bytes_of(*root_); }
+Eigen::Index StreamTree::bytes() const { return bytes_of(*root_); }
 
 }  // namespace llmt

@@ -27,14 +27,14 @@ class RiseDetector {
  private:
   double usual_ = 0.0;  // mean of absolute errors, over about the last `memory`
   double excess_ = 0.0;
-  std::ptrdiff_t rows_ = 0;
+  Eigen::Index rows_ = 0;
 };
 
 /// Which of two models has had the smaller absolute errors lately.
 class Duel {
  public:
   void add(double first, double second);
-  std::ptrdiff_t rows() const { return rows_; }
+  Eigen::Index rows() const { return rows_; }
   /// Mean of first - second over its standard error.
   double t() const;
 
@@ -42,7 +42,7 @@ class Duel {
   double weight_ = 0.0;
   double mean_ = 0.0;
   double square_ = 0.0;
-  std::ptrdiff_t rows_ = 0;
+  Eigen::Index rows_ = 0;
 };
 
 /// Whether a threshold should move: of the rows beside it, how much larger the squared error of what is left of it is
@@ -61,7 +61,7 @@ class ThresholdWatch {
   static constexpr std::size_t half = 16;  // bins on either side
   double threshold_ = 0.0;
   double reach_ = 0.0;
-  std::ptrdiff_t rows_ = 0;
+  Eigen::Index rows_ = 0;
   std::array<double, 2 * half> sums_{};
   std::array<double, 2 * half> squares_{};
 };
@@ -71,7 +71,7 @@ struct StreamNode {
   Basis basis;
   Sums sums;              ///< leaf: of all its rows; inner: of those before `sides`
   Eigen::VectorXd model;  ///< constant and slopes in the basis' origin
-  std::ptrdiff_t solved_at = 0;
+  Eigen::Index solved_at = 0;
   Eigen::VectorXd low;  ///< range of the inputs over all its rows; low > high: no value yet
   Eigen::VectorXd high;
   std::unique_ptr<LeafSearch> search;  ///< leaves that may still be split
@@ -81,7 +81,7 @@ struct StreamNode {
   ThresholdWatch watch;
   double gain = 0.0;          ///< of the split, see StreamSplit
   std::array<Sums, 2> sides;  ///< inner: rows of the epoch that went left and right
-  std::ptrdiff_t epoch = 0;   ///< its length: rows until the split is tested again
+  Eigen::Index epoch = 0;     ///< its length: rows until the split is tested again
   std::array<std::unique_ptr<StreamNode>, 2> children;
 
   RiseDetector rise;
@@ -89,7 +89,7 @@ struct StreamNode {
   Duel duel;
 
   bool is_leaf() const { return children[0] == nullptr; }
-  std::ptrdiff_t rows() const { return sums.rows + sides[0].rows + sides[1].rows; }
+  Eigen::Index rows() const { return sums.rows + sides[0].rows + sides[1].rows; }
 };
 
 class StreamTree {
@@ -98,11 +98,11 @@ class StreamTree {
   StreamTree(const StreamSetting& setting, const Eigen::VectorXd& first_model);
 
   struct Counts {
-    std::ptrdiff_t leaves = 1;
-    std::ptrdiff_t splits = 0;
-    std::ptrdiff_t prunes = 0;
-    std::ptrdiff_t drifts = 0;
-    std::ptrdiff_t replacements = 0;
+    Eigen::Index leaves = 1;
+    Eigen::Index splits = 0;
+    Eigen::Index prunes = 0;
+    Eigen::Index drifts = 0;
+    Eigen::Index replacements = 0;
   };
 
   /// Learns a row; returns the error of the prediction before.
@@ -112,7 +112,7 @@ class StreamTree {
   const StreamSetting& setting() const { return setting_; }
   const StreamNode& root() const { return *root_; }
   const Counts& counts() const { return counts_; }
-  std::ptrdiff_t bytes() const;
+  Eigen::Index bytes() const;
 
   /// Called where the models of a branch restart, with what tells whether inputs belong to it.
   std::function<void(const std::function<bool(const double* x)>&)> on_drift;
@@ -132,7 +132,7 @@ class StreamTree {
   RowProducts products_;
   ResidualSums residuals_;
   Counts counts_;
-  std::ptrdiff_t alarms_ = 0;
+  Eigen::Index alarms_ = 0;
   std::unique_ptr<StreamNode> root_;
 };
 
@@ -144,9 +144,7 @@ Sums all_sums(const StreamSetting& setting, const StreamNode& node);
 
 /// 0 left, 1 right; a missing value goes with the most rows.
 inline std::size_t side_of(const StreamNode& node, double x) {
-  if (x == x) {
-    return x <= node.threshold ? 0 : 1;
-  }
+  if (x == x) return x <= node.threshold ? 0 : 1;
   return node.children[0]->rows() >= node.children[1]->rows() ? 0 : 1;
 }
 

@@ -17,7 +17,7 @@ TEST(Folds, EveryRowIsHeldOutOnce) {
       EXPECT_EQ(fold.train.size() + fold.held_out.size(), 103U);
       EXPECT_GE(fold.held_out.size(), 20U);
       EXPECT_LE(fold.held_out.size(), 21U);
-      for (const std::ptrdiff_t row : fold.held_out) {
+      for (const Eigen::Index row : fold.held_out) {
         ++held_out[static_cast<std::size_t>(row)];
         EXPECT_FALSE(std::binary_search(fold.train.begin(), fold.train.end(), row));
       }
@@ -39,7 +39,7 @@ TEST(Folds, GroupsStayTogether) {
   }
   for (const llmt::Fold& fold : llmt::make_folds(60, {.count = 5, .groups = pose})) {
     EXPECT_EQ(fold.held_out.size(), 12U);
-    for (const std::ptrdiff_t row : fold.held_out) {
+    for (const Eigen::Index row : fold.held_out) {
       EXPECT_TRUE(std::binary_search(fold.held_out.begin(), fold.held_out.end(), (row + 20) % 60));
     }
   }

@@ -23,7 +23,7 @@ using Eigen::VectorXd;
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
-MatrixXd normal(std::ptrdiff_t rows, std::ptrdiff_t columns, llmt::Random& random) {
+MatrixXd normal(Eigen::Index rows, Eigen::Index columns, llmt::Random& random) {
   MatrixXd values(rows, columns);
   for (double& value : values.reshaped()) {
     value = random.normal();
@@ -31,12 +31,12 @@ MatrixXd normal(std::ptrdiff_t rows, std::ptrdiff_t columns, llmt::Random& rando
   return values;
 }
 
-/// The shortest feasible of the shortest points on every set of active inequalities.
+// The shortest feasible of the shortest points on every set of active inequalities.
 VectorXd shortest(const MatrixXd& normals, const VectorXd& bounds) {
   VectorXd best;
   for (int set = 0; set < 1 << bounds.size(); ++set) {
-    std::vector<std::ptrdiff_t> active;
-    for (std::ptrdiff_t c = 0; c < bounds.size(); ++c) {
+    std::vector<Eigen::Index> active;
+    for (Eigen::Index c = 0; c < bounds.size(); ++c) {
       if ((set >> c & 1) != 0) {
         active.push_back(c);
       }
@@ -57,8 +57,8 @@ VectorXd shortest(const MatrixXd& normals, const VectorXd& bounds) {
 TEST(LeastDistance, EqualsBruteForceOverActiveSets) {
   for (std::uint64_t seed = 0; seed < 200; ++seed) {
     llmt::Random random(seed);
-    const std::ptrdiff_t size = 3 + static_cast<std::ptrdiff_t>(seed % 4);
-    const std::ptrdiff_t count = 1 + static_cast<std::ptrdiff_t>(seed % 8);
+    const Eigen::Index size = 3 + static_cast<Eigen::Index>(seed % 4);
+    const Eigen::Index count = 1 + static_cast<Eigen::Index>(seed % 8);
     MatrixXd normals = normal(size, count, random);
     if (count > 2) {
       normals.col(1) = 2.0 * normals.col(0);  // one inequality twice
@@ -85,8 +85,8 @@ TEST(SignedLeastSquares, EqualsTheBestOfAllSetsOfZeros) {
     VectorXd best = VectorXd::Zero(4);
     double least = std::numeric_limits<double>::infinity();
     for (int set = 0; set < 16; ++set) {
-      std::vector<std::ptrdiff_t> kept;
-      for (std::ptrdiff_t k = 0; k < 4; ++k) {
+      std::vector<Eigen::Index> kept;
+      for (Eigen::Index k = 0; k < 4; ++k) {
         if ((set >> k & 1) != 0) {
           kept.push_back(k);
         }
@@ -97,7 +97,7 @@ TEST(SignedLeastSquares, EqualsTheBestOfAllSetsOfZeros) {
       }
       bool feasible = true;
       for (std::size_t k = 0; k < 4; ++k) {
-        feasible = feasible && signs[k] * model(static_cast<std::ptrdiff_t>(k)) >= 0.0;
+        feasible = feasible && signs[k] * model(k) >= 0.0;
       }
       if (feasible && (y - x * model).squaredNorm() < least) {
         least = (y - x * model).squaredNorm();
@@ -107,17 +107,17 @@ TEST(SignedLeastSquares, EqualsTheBestOfAllSetsOfZeros) {
     const Eigen::LLT<MatrixXd> factor(x.transpose() * x);
     const VectorXd found = llmt::nearest_with_signs(factor, factor.solve(x.transpose() * y), signs);
     EXPECT_LE((found - best).norm(), 1e-9) << seed;
-    for (std::ptrdiff_t k = 0; k < 4; ++k) {
+    for (Eigen::Index k = 0; k < 4; ++k) {
       EXPECT_EQ(best(k) == 0.0, found(k) == 0.0) << seed;
     }
   }
 }
 
-/// Rises with x1 but for a dip, falls with x2 but for a wave, and both depend on x3 and x4.
+// Rises with x1 but for a dip, falls with x2 but for a wave, and both depend on x3 and x4.
 MatrixXd nearly_monotone(const MatrixXd& x, double noise, std::uint64_t seed) {
   llmt::Random random(seed);
   MatrixXd y(x.rows(), 1);
-  for (std::ptrdiff_t i = 0; i < x.rows(); ++i) {
+  for (Eigen::Index i = 0; i < x.rows(); ++i) {
     const double third = std::isnan(x(i, 2)) ? 0.5 : x(i, 2);
     y(i, 0) = (2.0 + third) * std::tanh(2.0 * x(i, 0)) - 1.5 * std::exp(-20.0 * std::pow(x(i, 0) - 0.3, 2)) -
               x(i, 1) * (1.5 + std::sin(4.0 * x(i, 1))) + 2.0 * std::abs(third) + noise * random.normal();
@@ -125,9 +125,9 @@ MatrixXd nearly_monotone(const MatrixXd& x, double noise, std::uint64_t seed) {
   return y;
 }
 
-/// Where lines through a model are looked at: all over, and next to everything where it changes.
+// Where lines through a model are looked at: all over, and next to everything where it changes.
 std::vector<double> stations(const llmt::Model& model, int input) {
-  const llmt::InputColumn& column = model.inputs()[static_cast<std::size_t>(input)];
+  const llmt::InputColumn& column = model.inputs()[input];
   const double range = column.high - column.low;
   std::vector<double> at;
   for (int k = 0; k <= 120; ++k) {
@@ -147,33 +147,33 @@ std::vector<double> stations(const llmt::Model& model, int input) {
       }
       for (std::size_t k = 0; k < model.regressors().size(); ++k) {
         if (model.regressors()[k].input == input) {
-          add(column.centre + node.low(static_cast<std::ptrdiff_t>(k)));
-          add(column.centre + node.high(static_cast<std::ptrdiff_t>(k)));
+          add(column.centre + node.low(k));
+          add(column.centre + node.high(k));
         }
       }
     }
   }
-  std::sort(at.begin(), at.end());
+  std::ranges::sort(at);
   at.erase(std::unique(at.begin(), at.end()), at.end());
   return at;
 }
 
-/// The largest fall of sign * any output along lines in direction of an input: through points all over the box and
-/// outside, at its corners, at thresholds, and with missing values.
+// The largest fall of sign * any output along lines in direction of an input: through points all over the box and
+// outside, at its corners, at thresholds, and with missing values.
 double largest_fall(const llmt::Model& model, int input, int sign, std::uint64_t seed, bool with_missing) {
   llmt::Random random(seed);
   const std::vector<double> at = stations(model, input);
-  const std::ptrdiff_t count = std::ssize(at);
+  const Eigen::Index count = std::ssize(at);
   std::vector<llmt::Node> splits;
   for (const llmt::Partition& partition : model.partitions()) {
-    std::copy_if(partition.nodes.begin(), partition.nodes.end(), std::back_inserter(splits),
-                 [](const llmt::Node& node) { return !node.is_leaf(); });
+    std::ranges::copy_if(partition.nodes, std::back_inserter(splits),
+                         [](const llmt::Node& node) { return !node.is_leaf(); });
   }
   double largest = 0.0;
   for (int line = 0; line < 60; ++line) {
     MatrixXd points(count, model.num_inputs());
-    for (std::ptrdiff_t j = 0; j < points.cols(); ++j) {
-      const llmt::InputColumn& column = model.inputs()[static_cast<std::size_t>(j)];
+    for (Eigen::Index j = 0; j < points.cols(); ++j) {
+      const llmt::InputColumn& column = model.inputs()[j];
       double value = random.uniform(column.low, column.high);
       if (column.is_categorical()) {
         value = static_cast<double>(random.below(column.levels.size()));
@@ -189,7 +189,7 @@ double largest_fall(const llmt::Model& model, int input, int sign, std::uint64_t
     }
     points.col(input) = Eigen::Map<const VectorXd>(at.data(), count);
     const MatrixXd values = sign * model.predict(points);
-    for (std::ptrdiff_t o = 0; o < values.cols(); ++o) {
+    for (Eigen::Index o = 0; o < values.cols(); ++o) {
       double highest = values(0, o);
       for (const double value : values.col(o)) {
         highest = std::max(highest, value);
@@ -253,7 +253,7 @@ std::vector<Case> cases() {
   return result;
 }
 
-/// Evaluation rounds sums of numbers of this size.
+// Evaluation rounds sums of numbers of this size.
 constexpr double rounding = 1e-12;
 
 TEST(Monotone, PredictionsNeverFallAnywhere) {
@@ -282,7 +282,7 @@ TEST(Monotone, HoldsWithCategoriesWeightsMissingValuesAndSharedPartitions) {
     MatrixXd x = oracle::uniform(300, 4, seed);
     MatrixXd y(300, 2);
     y << nearly_monotone(x, 0.5, seed), nearly_monotone(x, 0.8, seed + 10);
-    for (std::ptrdiff_t i = 0; i < x.rows(); ++i) {
+    for (Eigen::Index i = 0; i < x.rows(); ++i) {
       x(i, 3) = static_cast<double>(random.below(4));
       y(i, 0) += x(i, 3) == 2.0 ? 3.0 * x(i, 0) : 0.0;
     }
@@ -294,7 +294,7 @@ TEST(Monotone, HoldsWithCategoriesWeightsMissingValuesAndSharedPartitions) {
       options.weights = oracle::uniform(300, 1, seed).cwiseAbs();
       for (const bool lacking : {false, true}) {
         MatrixXd inputs = x;
-        for (std::ptrdiff_t i = 0; lacking && i < x.rows(); i += 7) {
+        for (Eigen::Index i = 0; lacking && i < x.rows(); i += 7) {
           inputs(i, i % 4) = nan;
         }
         const llmt::Model model = llmt::fit(inputs, y, options).model;
@@ -337,12 +337,12 @@ TEST(Monotone, HoldsForEstimatesThatStartFromASampleAndForBins) {
   EXPECT_LE(largest_fall(model, 1, -1, 4, true), rounding);
 }
 
-/// A table and the rows of it that a fit would train on.
+// A table and the rows of it that a fit would train on.
 struct Rows {
   llmt::Table table;
   llmt::TrainingRows training;
   Rows(const MatrixXd& x, const MatrixXd& y, const std::vector<int>& monotone)
-      : table{x, y, VectorXd::Ones(x.rows()), std::vector<int>(static_cast<std::size_t>(x.cols()), 0), {}, {}} {
+      : table{x, y, VectorXd::Ones(x.rows()), std::vector<int>(x.cols(), 0), {}, {}} {
     for (int j = 0; j < x.cols(); ++j) {
       table.regression_inputs.push_back(j);
       table.split_inputs.push_back(j);
@@ -370,17 +370,15 @@ TEST(Monotone, TheRoomAtAJumpIsTheSmallestStepOfTheLeaves) {
     const llmt::Model model(fitted.inputs(), fitted.outputs(), fitted.regressors(), {partition});
     double smallest = std::numeric_limits<double>::infinity();
     for (const llmt::Node& node : partition.nodes) {
-      if (node.split_input != 0) {
-        continue;
-      }
-      constexpr std::ptrdiff_t steps = 20001;
+      if (node.split_input != 0) continue;
+      constexpr Eigen::Index steps = 20001;
       MatrixXd left(steps, 2);
       left.col(0).setConstant(node.threshold);
       left.col(1) = VectorXd::LinSpaced(steps, -1.5, 1.5);
       MatrixXd right = left;
       right.col(0).setConstant(std::nextafter(node.threshold, 2.0));
       const VectorXd step = model.predict(right).col(0) - model.predict(left).col(0);
-      for (std::ptrdiff_t i = 0; i < steps; ++i) {
+      for (Eigen::Index i = 0; i < steps; ++i) {
         // Only where this split is the one that both points are divided by.
         const MatrixXd both = (MatrixXd(2, 2) << left.row(i), right.row(i)).finished();
         const Eigen::MatrixXi leaves = model.leaf_of(both);
@@ -401,7 +399,7 @@ TEST(Monotone, ASplitAgainstTheTrendIsTheBestContinuousOrLevelOne) {
   // A falling step: the best two constants in order are one constant.
   MatrixXd x(200, 1);
   MatrixXd y(200, 1);
-  for (std::ptrdiff_t i = 0; i < 200; ++i) {
+  for (Eigen::Index i = 0; i < 200; ++i) {
     x(i, 0) = static_cast<double>(i) / 200.0;
     y(i, 0) = (i < 100 ? 3.0 : 1.0) + 0.01 * static_cast<double>(i % 3);
   }
@@ -425,7 +423,7 @@ TEST(SlopeSigns, AgainstTheTrendAreExactlyZeroInEveryNode) {
     llmt::FitOptions options = each.options;
     options.slope_signs = {1, 0};
     const llmt::Model model = llmt::fit(x, y, options).model;
-    std::ptrdiff_t zeros = 0;
+    Eigen::Index zeros = 0;
     for (const llmt::Node& node : model.partitions()[0].nodes) {
       EXPECT_GE(node.slope(0, 0), 0.0) << each.name;
       zeros += node.slope(0, 0) == 0.0 ? 1 : 0;
@@ -443,7 +441,7 @@ TEST(SlopeSigns, ThatTheFitHasAnywayLeaveItsBytes) {
     llmt::FitOptions options = each.options;
     const llmt::Model free = llmt::fit(x, y, options).model;
     const std::vector<llmt::Node>& nodes = free.partitions()[0].nodes;
-    if (std::all_of(nodes.begin(), nodes.end(), [](const llmt::Node& node) { return node.slope(0, 0) > 0.0; })) {
+    if (std::ranges::all_of(nodes, [](const llmt::Node& node) { return node.slope(0, 0) > 0.0; })) {
       ++strict;
       options.slope_signs = {1, 0};
       EXPECT_EQ(llmt::to_json(llmt::fit(x, y, options).model), llmt::to_json(free)) << each.name;

@@ -84,7 +84,7 @@ bool is_missing(const std::string& field) {
   return std::regex_match(bare(field), mark);
 }
 
-/// The number, or why there is none.
+// The number, or why there is none.
 std::string read_number(const std::string& field, double& value) {
   static const std::regex number("[+-]?([0-9]+\\.?[0-9]*|\\.[0-9]+)([eE][+-]?[0-9]+)?");
   static const std::regex word("[+-]?(nan|inf|infinity)", std::regex::icase);
@@ -126,7 +126,7 @@ Table naive(const std::string& text) {
       table.error = fmt::format("t:{}: column {} of the header has no name", header.line, table.columns.size() + 1);
       return table;
     }
-    if (std::find(table.columns.begin(), table.columns.end(), name) != table.columns.end()) {
+    if (std::ranges::find(table.columns, name) != table.columns.end()) {
       table.error = fmt::format("t:{}: the header has column \"{}\" twice", header.line, name);
       return table;
     }
@@ -145,7 +145,7 @@ Table naive(const std::string& text) {
   return table;
 }
 
-/// The named columns, or the first error in the order of the file.
+// The named columns, or the first error in the order of the file.
 std::string naive_numbers(const Table& table, const std::vector<std::size_t>& wanted, bool allow_missing,
                           Eigen::MatrixXd& values) {
   values.resize(std::ssize(table.cells), std::ssize(wanted));
@@ -160,7 +160,7 @@ std::string naive_numbers(const Table& table, const std::vector<std::size_t>& wa
         if (!problem.empty()) {
           return fmt::format("t:{}: column \"{}\": {}", table.records[row].line, table.columns[field], problem);
         }
-        values(static_cast<Eigen::Index>(row), static_cast<Eigen::Index>(i)) = value;
+        values(row, i) = value;
       }
     }
   }
@@ -263,7 +263,7 @@ std::string error_of(Call call) {
   return "";
 }
 
-/// Equal, NaN to NaN and zeros with their signs.
+// Equal, NaN to NaN and zeros with their signs.
 bool same(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
   if (a.rows() != b.rows() || a.cols() != b.cols()) return false;
   for (Eigen::Index i = 0; i < a.size(); ++i) {
@@ -316,8 +316,8 @@ TEST(CsvOracle, RandomTablesReadAsByTheNaiveParser) {
         ASSERT_EQ(texts[row], is_missing(cell) ? "" : trimmed(unquoted(cell)));
       }
     }
-    std::vector<std::ptrdiff_t> rows;
-    std::vector<std::ptrdiff_t> lines;
+    std::vector<Eigen::Index> rows;
+    std::vector<Eigen::Index> lines;
     for (const Record& record : expected.records) {
       rows.push_back(std::ssize(rows));
       lines.push_back(record.line);
@@ -333,11 +333,11 @@ TEST(CsvOracle, RandomTablesReadAsByTheNaiveParser) {
 TEST(CsvOracle, ErrorsAndNumbersDoNotDependOnThreads) {
   llmt::Random random(7);
   for (int repeat = 0; repeat < 6; ++repeat) {
-    constexpr std::ptrdiff_t rows = 30000;
+    constexpr Eigen::Index rows = 30000;
     Eigen::MatrixXd expected(rows, 3);
     std::string text = "a,b,c\n";
     std::vector<std::size_t> begins;
-    for (std::ptrdiff_t row = 0; row < rows; ++row) {
+    for (Eigen::Index row = 0; row < rows; ++row) {
       begins.push_back(text.size());
       for (int column = 0; column < 3; ++column) {
         expected(row, column) = random.normal();
@@ -359,7 +359,7 @@ TEST(CsvOracle, ErrorsAndNumbersDoNotDependOnThreads) {
     EXPECT_TRUE(error.starts_with(fmt::format("t:{}: column \"a\": 'x", first + 2))) << error;
     EXPECT_EQ(error_of([&] { bad.numbers(names, 2); }), error);
     const llmt::CsvNumbers read = bad.read_numbers(names, 2);
-    EXPECT_EQ(read.cells[1].first_other, static_cast<std::ptrdiff_t>(first));
+    EXPECT_EQ(read.cells[1].first_other, first);
     EXPECT_EQ(read.cells[1].other, read.values.col(1).array().isNaN().count());
     EXPECT_EQ(read.cells[0].other + read.cells[0].missing, 0);
   }

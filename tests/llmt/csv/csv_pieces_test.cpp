@@ -8,7 +8,7 @@
 
 namespace {
 
-/// Cells of all pieces, or the error.
+// Cells of all pieces, or the error.
 std::string all_cells(const std::string& text, std::size_t bytes) {
   std::istringstream stream(text);
   llmt::CsvPieces pieces(stream, "t.csv", bytes);
@@ -18,8 +18,8 @@ std::string all_cells(const std::string& text, std::size_t bytes) {
       EXPECT_GT(piece->rows(), 0);
       const Eigen::MatrixXd values = piece->numbers_or_missing(std::vector<std::string>{"a"});
       const std::vector<std::string> words = piece->texts("b");
-      for (std::ptrdiff_t i = 0; i < values.rows(); ++i) {
-        result += fmt::format("{}:{}|{}\n", piece->line_of(i), values(i, 0), words[static_cast<std::size_t>(i)]);
+      for (Eigen::Index i = 0; i < values.rows(); ++i) {
+        result += fmt::format("{}:{}|{}\n", piece->line_of(i), values(i, 0), words[i]);
       }
     }
   } catch (const std::runtime_error& error) {
@@ -28,15 +28,15 @@ std::string all_cells(const std::string& text, std::size_t bytes) {
   return result;
 }
 
-/// The same from a Csv that holds everything.
+// The same from a Csv that holds everything.
 std::string whole(const std::string& text) {
   std::string result;
   try {
     const llmt::Csv csv = llmt::Csv::parse(text, "t.csv");
     const Eigen::MatrixXd values = csv.numbers_or_missing(std::vector<std::string>{"a"});
     const std::vector<std::string> words = csv.texts("b");
-    for (std::ptrdiff_t i = 0; i < values.rows(); ++i) {
-      result += fmt::format("{}:{}|{}\n", csv.line_of(i), values(i, 0), words[static_cast<std::size_t>(i)]);
+    for (Eigen::Index i = 0; i < values.rows(); ++i) {
+      result += fmt::format("{}:{}|{}\n", csv.line_of(i), values(i, 0), words[i]);
     }
   } catch (const std::runtime_error& error) {
     return error.what();

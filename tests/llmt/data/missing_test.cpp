@@ -20,10 +20,10 @@ TEST(Fit, SameBytesAtAnyNumberOfThreadsWithCategoriesAndMissingValues) {
   llmt::Random random(51);
   Eigen::MatrixXd x = oracle::uniform(400, 3, 51);
   const Eigen::MatrixXd y = oracle::curved(x, 0.1);
-  for (std::ptrdiff_t i = 0; i < 400; ++i) {
+  for (Eigen::Index i = 0; i < 400; ++i) {
     x(i, 1) = std::floor(2.0 * x(i, 1) + 2.0);
     if (i % 5 == 0) {
-      x(i, static_cast<std::ptrdiff_t>(random.below(3))) = nan;
+      x(i, random.below(3)) = nan;
     }
   }
   for (const llmt::ValidityChoice choice : {llmt::ValidityChoice::automatic, llmt::ValidityChoice::gaussian}) {
@@ -86,7 +86,7 @@ TEST(Missing, InformativeMissingnessIsLearned) {
   const auto table = [](std::uint64_t seed) {
     llmt::Random random(seed);
     Data d{oracle::uniform(1000, 3, seed), Eigen::MatrixXd(1000, 1)};
-    for (std::ptrdiff_t i = 0; i < 1000; ++i) {
+    for (Eigen::Index i = 0; i < 1000; ++i) {
       const bool missing = random.uniform() < 0.3;
       d.y(i, 0) = std::sin(3.0 * d.x(i, 1)) + d.x(i, 2) + (missing ? 5.0 : 0.0) + 0.1 * random.normal();
       d.x(i, 0) = missing ? nan : d.x(i, 0);
@@ -104,7 +104,7 @@ TEST(Missing, SplitInputThatIsMissingAtOneEndIsLearned) {
   const auto table = [](std::uint64_t seed) {
     llmt::Random random(seed);
     Data d{oracle::uniform(1000, 2, seed), Eigen::MatrixXd(1000, 1)};
-    for (std::ptrdiff_t i = 0; i < 1000; ++i) {
+    for (Eigen::Index i = 0; i < 1000; ++i) {
       d.y(i, 0) = (d.x(i, 0) > 0.1 ? 5.0 : 0.0) + d.x(i, 1) + 0.1 * random.normal();
       d.x(i, 0) = d.x(i, 0) > 0.4 ? nan : d.x(i, 0);
     }
@@ -122,7 +122,7 @@ TEST(Categorical, OffsetsAndSlopesOfLevelsAreRecovered) {
   Eigen::MatrixXd x = oracle::uniform(1000, 2, 71);
   Eigen::MatrixXd y(1000, 1);
   Eigen::VectorXd truth(1000);
-  for (std::ptrdiff_t i = 0; i < 1000; ++i) {
+  for (Eigen::Index i = 0; i < 1000; ++i) {
     const std::size_t level = random.below(4);
     x(i, 0) = static_cast<double>(level);
     truth(i) = offset[level] + slope[level] * x(i, 1);
@@ -136,7 +136,7 @@ TEST(Categorical, OffsetsAndSlopesOfLevelsAreRecovered) {
   EXPECT_LT(llmt::rmse(model.predict(x), truth)(0), 0.02);
   for (int level = 0; level < 4; ++level) {
     const Eigen::Vector2d point(level, 0.2);
-    EXPECT_NEAR(model.jacobian(point)(0, 1), slope[static_cast<std::size_t>(level)], 0.1);
+    EXPECT_NEAR(model.jacobian(point)(0, 1), slope[level], 0.1);
     EXPECT_EQ(model.jacobian(point)(0, 0), 0.0);
   }
   Eigen::MatrixXd query(4, 2);

@@ -18,8 +18,8 @@ TEST(Weights, IntegersAreRepeatedRows) {
   const Eigen::MatrixXd query = oracle::uniform(300, 3, 55);
   llmt::Random random(56);
   Eigen::VectorXd weights(200);
-  std::vector<std::ptrdiff_t> repeated;
-  for (std::ptrdiff_t i = 0; i < 200; ++i) {
+  std::vector<Eigen::Index> repeated;
+  for (Eigen::Index i = 0; i < 200; ++i) {
     weights(i) = static_cast<double>(1 + random.below(3));
     repeated.insert(repeated.end(), static_cast<std::size_t>(weights(i)), i);
   }
@@ -44,8 +44,8 @@ TEST(Weights, ZeroIsADeletedRow) {
   Eigen::MatrixXd x = oracle::uniform(300, 3, 57);
   Eigen::MatrixXd y = oracle::curved(x, 0.1);
   Eigen::VectorXd weights = Eigen::VectorXd::Ones(300);
-  std::vector<std::ptrdiff_t> kept;
-  for (std::ptrdiff_t i = 0; i < 300; ++i) {
+  std::vector<Eigen::Index> kept;
+  for (Eigen::Index i = 0; i < 300; ++i) {
     x(i, 2) = std::floor(2.0 * x(i, 2) + 2.0);
     if (i % 3 == 0) {
       weights(i) = 0.0;

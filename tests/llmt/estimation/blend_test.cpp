@@ -20,9 +20,9 @@ TEST(Validities, AreNotNegativeAndSumToOneEverywhere) {
       Eigen::MatrixXd query(900, 3);
       query << oracle::uniform(300, 3, seed + 100), 3.0 * oracle::uniform(300, 3, seed + 200),
           1e6 * oracle::uniform(300, 3, seed + 300);
-      for (std::ptrdiff_t p = 0; p < std::ssize(model.partitions()); ++p) {
+      for (Eigen::Index p = 0; p < std::ssize(model.partitions()); ++p) {
         const Eigen::MatrixXd validities = model.validities(query, p);
-        ASSERT_EQ(validities.cols(), model.partitions()[static_cast<std::size_t>(p)].num_leaves());
+        ASSERT_EQ(validities.cols(), model.partitions()[p].num_leaves());
         EXPECT_GE(validities.minCoeff(), 0.0);
         EXPECT_LT((validities.rowwise().sum().array() - 1.0).abs().maxCoeff(), 1e-12);
         EXPECT_TRUE(model.predict(query).allFinite());
@@ -79,7 +79,7 @@ TEST(Blend, JacobianIsTheDifferenceQuotient) {
       options.growth.shared_partition = seed == 2;
       const llmt::Model model = llmt::fit(d.x, d.y, options).model;
       const Eigen::MatrixXd points = 1.4 * oracle::uniform(100, 3, seed + 100);
-      for (std::ptrdiff_t i = 0; i < points.rows(); ++i) {
+      for (Eigen::Index i = 0; i < points.rows(); ++i) {
         const Eigen::MatrixXd jacobian = model.jacobian(points.row(i).transpose());
         Eigen::MatrixXd sides(6, 3);
         for (int j = 0; j < 3; ++j) {
@@ -110,7 +110,7 @@ TEST(Blend, JacobianIsContinuousAcrossThresholdsAndTransitionEnds) {
       const Eigen::MatrixXd points = oracle::uniform(20, 3, seed + 100);
       int tried = 0;
       for (const llmt::Node& node : model.partitions()[0].nodes) {
-        for (std::ptrdiff_t i = 0; i < (node.is_leaf() ? 0 : points.rows()); ++i) {
+        for (Eigen::Index i = 0; i < (node.is_leaf() ? 0 : points.rows()); ++i) {
           for (const double at : {-1.0, 0.0, 1.0}) {
             Eigen::VectorXd left = points.row(i).transpose();
             left(node.split_input) = node.threshold + (at - 1e-7) * node.half_width;
@@ -128,13 +128,13 @@ TEST(Blend, JacobianIsContinuousAcrossThresholdsAndTransitionEnds) {
   }
 }
 
-/// Largest change of the second derivative between neighbouring points of a grid of that step.
+// Largest change of the second derivative between neighbouring points of a grid of that step.
 double largest_jump_of_curvature(const llmt::Model& model, double step) {
   double largest = 0.0;
   double slope = 0.0;
   double curvature = 0.0;
-  const std::ptrdiff_t points = static_cast<std::ptrdiff_t>(1.8 / step);
-  for (std::ptrdiff_t i = 0; i < points; ++i) {
+  const Eigen::Index points = static_cast<Eigen::Index>(1.8 / step);
+  for (Eigen::Index i = 0; i < points; ++i) {
     const double here = model.jacobian(Eigen::VectorXd::Constant(1, -0.9 + step * static_cast<double>(i)))(0, 0);
     const double change = (here - slope) / step;
     if (i > 1) {

@@ -15,7 +15,7 @@ using namespace random_trees;
 TEST(Blend, JointEstimateWithoutOverlapIsTheCrispTree) {
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
     const Data d = data(seed);
-    const Kind narrow{llmt::ValidityChoice::blend, 1, 1e-9};
+    const Kind narrow{llmt::ValidityChoice::blend, 1e-9};
     const llmt::Model crisp = llmt::fit(d.x, d.y.col(0), only(kinds[0], llmt::Estimation::as_grown, 10)).model;
     const llmt::Model blend = llmt::fit(d.x, d.y.col(0), only(narrow, llmt::Estimation::joint, 10)).model;
     ASSERT_EQ(blend.partitions()[0].num_leaves(), 10);
@@ -36,10 +36,10 @@ TEST(Blend, LocalEstimateIsWeightedLeastSquaresOfEachLeaf) {
       const std::vector<llmt::Leaf> leaves = model.leaves(0);
       Eigen::MatrixXd a(d.x.rows(), 4);
       a << Eigen::VectorXd::Ones(d.x.rows()), d.x;
-      for (std::ptrdiff_t leaf = 0; leaf < validities.cols(); ++leaf) {
+      for (Eigen::Index leaf = 0; leaf < validities.cols(); ++leaf) {
         const Eigen::VectorXd roots = validities.col(leaf).cwiseSqrt();
         const Eigen::VectorXd expected = oracle::least_squares(roots.asDiagonal() * a, roots.asDiagonal() * d.y.col(0));
-        const llmt::Leaf& found = leaves[static_cast<std::size_t>(leaf)];
+        const llmt::Leaf& found = leaves[leaf];
         // A millionth of a row holds the slopes at the parent's.
         EXPECT_NEAR(found.intercept(0), expected(0), 1e-5);
         EXPECT_LT((found.slope.row(0).transpose() - expected.tail(3)).cwiseAbs().maxCoeff(), 1e-5);
@@ -65,12 +65,12 @@ TEST(Blend, JointEstimateIsLeastSquaresOnAllLeavesAtOnce) {
         Eigen::MatrixXd a(300, 4);
         a << Eigen::VectorXd::Ones(300), x;
         // Rows of the data, then for every leaf those that draw its model to the locally weighted one.
-        const std::ptrdiff_t leaves = validities.cols();
+        const Eigen::Index leaves = validities.cols();
         Eigen::MatrixXd stacked = Eigen::MatrixXd::Zero(300 * (leaves + 1), 4 * leaves);
         Eigen::VectorXd target = Eigen::VectorXd::Zero(stacked.rows());
         const Eigen::VectorXd roots = options.weights.cwiseSqrt();
         target.head(300) = roots.asDiagonal() * y;
-        for (std::ptrdiff_t leaf = 0; leaf < leaves; ++leaf) {
+        for (Eigen::Index leaf = 0; leaf < leaves; ++leaf) {
           stacked.block(0, 4 * leaf, 300, 4) = roots.cwiseProduct(validities.col(leaf)).asDiagonal() * a;
           const Eigen::VectorXd local_roots = options.weights.cwiseProduct(validities.col(leaf)).cwiseSqrt();
           const Eigen::VectorXd local =
@@ -81,7 +81,7 @@ TEST(Blend, JointEstimateIsLeastSquaresOnAllLeavesAtOnce) {
         }
         const Eigen::VectorXd coefficients = oracle::least_squares(stacked, target);
         Eigen::VectorXd expected = Eigen::VectorXd::Zero(300);
-        for (std::ptrdiff_t leaf = 0; leaf < leaves; ++leaf) {
+        for (Eigen::Index leaf = 0; leaf < leaves; ++leaf) {
           expected += validities.col(leaf).cwiseProduct(a * coefficients.segment(4 * leaf, 4));
         }
         EXPECT_LT((model.predict(x).col(0) - expected).cwiseAbs().maxCoeff(), ridge > 0.0 ? 1e-5 : 1e-3)
@@ -93,7 +93,7 @@ TEST(Blend, JointEstimateIsLeastSquaresOnAllLeavesAtOnce) {
 
 TEST(Blend, OrderOfRowsChangesNothingBeyondRounding) {
   const Data d = data(52, 400);
-  const std::vector<std::ptrdiff_t> order = llmt::Random(3).permutation(400);
+  const std::vector<Eigen::Index> order = llmt::Random(3).permutation(400);
   const Eigen::MatrixXd query = 2.0 * oracle::uniform(300, 3, 53);
   for (const Kind& kind : kinds) {
     llmt::FitOptions options = only(kind, llmt::Estimation::joint, 15);

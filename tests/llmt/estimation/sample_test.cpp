@@ -24,7 +24,7 @@ struct Rows {
   llmt::Table table{inputs, outputs, Eigen::VectorXd::Ones(inputs.rows()), {0, 0, 0}, {0, 1, 2}, {0, 1, 2}};
 };
 
-Rows rows(std::ptrdiff_t count, std::uint64_t seed) {
+Rows rows(Eigen::Index count, std::uint64_t seed) {
   Eigen::MatrixXd x = oracle::uniform(count, 3, seed);
   Eigen::MatrixXd y(count, 2);
   y << (2.0 * x.col(0).array()).sin() * x.col(1).array(), x.col(2).cwiseAbs2();
@@ -35,13 +35,13 @@ Rows rows(std::ptrdiff_t count, std::uint64_t seed) {
   return {std::move(x), std::move(y)};
 }
 
-std::vector<int> all(std::ptrdiff_t count) {
-  std::vector<int> result(static_cast<std::size_t>(count));
+std::vector<int> all(Eigen::Index count) {
+  std::vector<int> result(count);
   std::iota(result.begin(), result.end(), 0);
   return result;
 }
 
-/// A tree over both outputs, blended.
+// A tree over both outputs, blended.
 Partition blended_tree(const llmt::TrainingRows& training) {
   llmt::GrowthProblem problem{&training, {0, 1}, {}, 0};
   problem.options.significance = 1.0;
@@ -80,7 +80,7 @@ TEST(Sample, JointEstimateOnAllRowsIsReachedFromIt) {
             llmt::JointFit(training, tree, 1).as_grown(8).residual_range);
 }
 
-/// Weighted sum of squared errors over all rows.
+// Weighted sum of squared errors over all rows.
 double loss(const Partition& partition, const llmt::TrainingRows& training) {
   const Eigen::VectorXd weights = Eigen::VectorXd::Ones(2);
   const std::vector<llmt::Chunk> chunks = {llmt::fetch(training, all(training.count()), partition.outputs)};
@@ -92,7 +92,7 @@ double loss(const Partition& partition, const llmt::TrainingRows& training) {
 TEST(Sample, LeafThatItHardlyHoldsDoesNotSpoilTheEstimateOnAllRows) {
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
     Rows data = rows(20000, seed);
-    for (std::ptrdiff_t row = 0; row < 15; ++row) {
+    for (Eigen::Index row = 0; row < 15; ++row) {
       data.inputs(row, 0) += 40.0;
       data.outputs.row(row).array() += 30.0;
     }
@@ -107,26 +107,26 @@ TEST(Sample, LeafThatItHardlyHoldsDoesNotSpoilTheEstimateOnAllRows) {
   }
 }
 
-/// Sum of squared errors of the best coefficients that leave the slopes of `partition` which are 0 at 0, and its own.
+// Sum of squared errors of the best coefficients that leave the slopes of `partition` which are 0 at 0, and its own.
 std::pair<double, double> best_and_own_error(const Rows& data, const llmt::TrainingRows& training,
                                              const Partition& partition) {
   const llmt::Evaluator evaluator(partition, training.columns, 3);
-  const std::ptrdiff_t count = training.count();
+  const Eigen::Index count = training.count();
   Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(count, 4 * std::ssize(partition.nodes));
   Eigen::MatrixXd predicted(count, 2);
   std::vector<llmt::Activation> active;
   Eigen::Vector3d deviations;
   Eigen::Vector2d values;
-  for (std::ptrdiff_t i = 0; i < count; ++i) {
+  for (Eigen::Index i = 0; i < count; ++i) {
     const Eigen::Vector3d row = data.inputs.row(i);
     llmt::deviations_at(training.columns, training.regressors, row.data(), deviations.data());
     evaluator.activate(row.data(), active);
     predicted.row(i).setZero();
     for (const llmt::Activation& entry : active) {  // without guards, as estimates are made
-      const llmt::Node& node = partition.nodes[static_cast<std::size_t>(entry.node)];
+      const llmt::Node& node = partition.nodes[entry.node];
       predicted.row(i) += entry.validity * (node.value + node.slope * deviations).transpose();
       columns(i, 4 * entry.node) = entry.validity;
-      for (std::ptrdiff_t k = 0; k < 3; ++k) {
+      for (Eigen::Index k = 0; k < 3; ++k) {
         columns(i, 4 * entry.node + 1 + k) = node.slope.col(k).isZero(0.0) ? 0.0 : entry.validity * deviations(k);
       }
     }
@@ -143,7 +143,7 @@ TEST(Sample, SparseEstimateOnAllRowsIsReachedFromItWithItsZeros) {
   const llmt::JointFit fit(sample, blended_tree(training), 1, true);
   const Partition before = fit.joint(8, {regularisation}).front();
   const Partition after = fit.joint_on(training, 8, regularisation);
-  std::ptrdiff_t zeros = 0;
+  Eigen::Index zeros = 0;
   for (std::size_t i = 0; i < after.nodes.size(); ++i) {
     if (after.nodes[i].is_leaf()) {
       EXPECT_TRUE(((after.nodes[i].slope.array() == 0.0) == (before.nodes[i].slope.array() == 0.0)).all());
@@ -160,7 +160,7 @@ TEST(Sample, SparseEstimateOnAllRowsIsReachedFromItWithItsZeros) {
 TEST(Sample, DependsOnTheRowsAndNotOnTheirOrder) {
   const Rows data = rows(5000, 2);
   std::vector<int> order = all(5000);
-  std::reverse(order.begin(), order.end());
+  std::ranges::reverse(order);
   const Eigen::MatrixXd inputs = data.inputs(order, Eigen::all);
   const Eigen::MatrixXd outputs = data.outputs(order, Eigen::all);
   const llmt::Table reversed{inputs, outputs, data.table.weights, {0, 0, 0}, {0, 1, 2}, {0, 1, 2}};
@@ -172,7 +172,7 @@ TEST(Sample, DependsOnTheRowsAndNotOnTheirOrder) {
   for (int& row : other.rows) {
     row = 4999 - row;
   }
-  std::reverse(other.rows.begin(), other.rows.end());
+  std::ranges::reverse(other.rows);
   EXPECT_EQ(sample.rows, other.rows);
   // Fewer are among more.
   const llmt::TrainingRows fewer = llmt::thinned(sample, 100);

@@ -24,15 +24,15 @@ const Kind kinds[] = {{llmt::ValidityChoice::crisp},
                       {llmt::ValidityChoice::blend, 2},
                       {llmt::ValidityChoice::gaussian}};
 
-/// Three numbers, of which one is often missing, and a category; two outputs.
+// Three numbers, of which one is often missing, and a category; two outputs.
 struct Data {
   Eigen::MatrixXd x;
   Eigen::MatrixXd y;
 };
-Data mixed(std::ptrdiff_t rows) {
+Data mixed(Eigen::Index rows) {
   llmt::Random random(5);
   Data data{oracle::uniform(rows, 4, 4), Eigen::MatrixXd(rows, 2)};
-  for (std::ptrdiff_t i = 0; i < rows; ++i) {
+  for (Eigen::Index i = 0; i < rows; ++i) {
     data.x(i, 3) = static_cast<double>(random.below(4));
     data.y(i, 0) = std::sin(3.0 * data.x(i, 0)) * data.x(i, 1) + std::abs(data.x(i, 2)) + 0.5 * data.x(i, 3);
     data.y(i, 1) = data.x(i, 3) == 2.0 ? std::exp(data.x(i, 0)) : data.x(i, 1) * data.x(i, 2);
@@ -56,22 +56,22 @@ llmt::Model fitted(const Data& data, const Kind& kind, std::vector<int> categori
   return random_trees::with_smoothness(llmt::fit(data.x, data.y, options).model, kind.smoothness);
 }
 
-/// Steps along the line, in each of which one input after the other is moved, in both orders: from predictions alone.
+// Steps along the line, in each of which one input after the other is moved, in both orders: from predictions alone.
 Eigen::MatrixXd step_by_step(const llmt::Model& model, const Eigen::VectorXd& point, const Eigen::VectorXd& reference,
                              int steps) {
-  const std::ptrdiff_t inputs = point.size();
+  const Eigen::Index inputs = point.size();
   std::vector<Eigen::VectorXd> line = {reference};
-  const auto is_switched = [&](std::ptrdiff_t j) {
-    return std::isnan(reference(j) + point(j)) || model.inputs()[static_cast<std::size_t>(j)].is_categorical();
+  const auto is_switched = [&](Eigen::Index j) {
+    return std::isnan(reference(j) + point(j)) || model.inputs()[j].is_categorical();
   };
   for (int step = 1; step <= steps; ++step) {
     line.push_back(line.back());
-    for (std::ptrdiff_t j = 0; j < inputs; ++j) {
+    for (Eigen::Index j = 0; j < inputs; ++j) {
       if (!is_switched(j)) {
         line.back()(j) = reference(j) + (point(j) - reference(j)) * step / steps;
       }
     }
-    for (std::ptrdiff_t j = 0; 2 * step == steps && j < inputs; ++j) {
+    for (Eigen::Index j = 0; 2 * step == steps && j < inputs; ++j) {
       if (is_switched(j)) {
         line.push_back(line.back());
         line.back()(j) = point(j);
@@ -79,13 +79,13 @@ Eigen::MatrixXd step_by_step(const llmt::Model& model, const Eigen::VectorXd& po
     }
   }
   Eigen::MatrixXd rows(2 * std::ssize(line) * (inputs + 1), inputs);
-  std::ptrdiff_t row = 0;
+  Eigen::Index row = 0;
   for (std::size_t k = 0; k + 1 < line.size(); ++k) {
     for (const bool forward : {true, false}) {
       Eigen::VectorXd x = line[k];
       rows.row(row++) = x;
-      for (std::ptrdiff_t i = 0; i < inputs; ++i) {
-        const std::ptrdiff_t j = forward ? i : inputs - 1 - i;
+      for (Eigen::Index i = 0; i < inputs; ++i) {
+        const Eigen::Index j = forward ? i : inputs - 1 - i;
         x(j) = line[k + 1](j);
         rows.row(row++) = x;
       }
@@ -96,7 +96,7 @@ Eigen::MatrixXd step_by_step(const llmt::Model& model, const Eigen::VectorXd& po
   row = 0;
   for (std::size_t k = 0; k + 1 < line.size(); ++k) {
     for (const bool forward : {true, false}) {
-      for (std::ptrdiff_t i = 0; i < inputs; ++i, ++row) {
+      for (Eigen::Index i = 0; i < inputs; ++i, ++row) {
         shares.col(forward ? i : inputs - 1 - i) += 0.5 * (predicted.row(row + 1) - predicted.row(row)).transpose();
       }
       ++row;
@@ -111,7 +111,7 @@ double worst_sum(const llmt::Attribution& attribution) {
       .maxCoeff();
 }
 
-/// Splits x1 at 0 and then both halves x2 at 0; constant leaves.
+// Splits x1 at 0 and then both halves x2 at 0; constant leaves.
 llmt::Model four_fields(double half_width, const Eigen::Vector4d& values) {
   const auto node = [&](int left, int input, double value) {
     llmt::Node made;
@@ -254,12 +254,12 @@ TEST(Explain, ImportanceIsTheShareOfTheMovedOutput) {
     const llmt::Model model = fitted(data, kind);
     // More rows than it looks at for the kind that is cheap.
     const Eigen::MatrixXd rows = data.x.topRows(kind.validity == llmt::ValidityChoice::crisp ? 700 : 60);
-    const std::ptrdiff_t looked_at = std::min(rows.rows(), llmt::importance_rows);
+    const Eigen::Index looked_at = std::min(rows.rows(), llmt::importance_rows);
     Eigen::MatrixXd mean = Eigen::MatrixXd::Zero(2, 4);
-    for (std::ptrdiff_t k = 0; k < looked_at; ++k) {
+    for (Eigen::Index k = 0; k < looked_at; ++k) {
       mean += llmt::attribute(model, rows.row(k * rows.rows() / looked_at).transpose()).contributions.cwiseAbs();
     }
-    for (std::ptrdiff_t o = 0; o < 2; ++o) {
+    for (Eigen::Index o = 0; o < 2; ++o) {
       mean.row(o) /= mean.row(o).sum();
     }
     const Eigen::MatrixXd found = llmt::importance(model, rows, 1);

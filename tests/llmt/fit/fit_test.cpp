@@ -11,18 +11,18 @@
 
 namespace {
 
-/// The crisp tree as it was grown.
+// The crisp tree as it was grown.
 llmt::FitOptions as_grown(llmt::GrowthOptions growth = {}) {
   return {.growth = std::move(growth),
           .blend = {.validity = llmt::ValidityChoice::crisp},
           .selection = {.folds = {.count = 0}}};
 }
 
-/// The crisp tree of plain least-squares leaves with the leaf count that cross-validation chooses.
+// The crisp tree of plain least-squares leaves with the leaf count that cross-validation chooses.
 llmt::FitOptions crisp() { return {.blend = {.validity = llmt::ValidityChoice::crisp, .shrinkages = {0.0}}}; }
 
-/// Same splits, same rows, same local models to rounding of their normal equations; what only whole trees have - errors
-/// and the slopes beyond the training extent - aside.
+// Same splits, same rows, same local models to rounding of their normal equations; what only whole trees have - errors
+// and the slopes beyond the training extent - aside.
 void expect_same_tree(const llmt::Model& model, const llmt::Model& expected) {
   const std::vector<llmt::Node>& nodes = model.partitions()[0].nodes;
   const std::vector<llmt::Node>& expected_nodes = expected.partitions()[0].nodes;
@@ -130,7 +130,7 @@ TEST(Fit, EveryPrefixIsTheTreeGrownToThatManyLeaves) {
   const Eigen::MatrixXd x = oracle::uniform(400, 3, 5);
   const Eigen::MatrixXd y = oracle::curved(x, 0.05);
   const llmt::Model full = llmt::fit(x, y, as_grown()).model;
-  for (std::ptrdiff_t leaves = 1; leaves <= full.partitions()[0].num_leaves(); ++leaves) {
+  for (Eigen::Index leaves = 1; leaves <= full.partitions()[0].num_leaves(); ++leaves) {
     expect_same_tree(full.prefix(leaves), llmt::fit(x, y, as_grown({.max_leaves = leaves})).model);
   }
 }
@@ -262,12 +262,12 @@ TEST(Fit, ImprovementRuleStopsWhereTheNextTenSplitsHelpTooLittle) {
   const Eigen::MatrixXd y = oracle::curved(x);
   const llmt::Model full = llmt::fit(x, y, as_grown({.significance = 1.0})).model;
   const llmt::FitResult stopped = llmt::fit(x, y, as_grown({.significance = 1.0, .min_improvement = 0.05}));
-  const std::ptrdiff_t leaves = stopped.summary.partitions[0].leaves;
+  const Eigen::Index leaves = stopped.summary.partitions[0].leaves;
   EXPECT_EQ(stopped.summary.partitions[0].stop, llmt::StopReason::improvement);
   expect_same_tree(stopped.model, full.prefix(leaves));
-  const auto rss = [&](std::ptrdiff_t count) { return std::pow(llmt::rmse(full.prefix(count).predict(x), y)(0), 2); };
+  const auto rss = [&](Eigen::Index count) { return std::pow(llmt::rmse(full.prefix(count).predict(x), y)(0), 2); };
   const double enough = std::pow(0.95, 10);
-  for (std::ptrdiff_t count = 1; count < leaves; ++count) {
+  for (Eigen::Index count = 1; count < leaves; ++count) {
     EXPECT_LE(rss(count + 10), enough * rss(count)) << count;
   }
   EXPECT_GT(rss(leaves + 10), enough * rss(leaves));
@@ -276,9 +276,9 @@ TEST(Fit, ImprovementRuleStopsWhereTheNextTenSplitsHelpTooLittle) {
 TEST(Fit, VarianceGainBoundsTheTree) {
   const Eigen::MatrixXd x = oracle::uniform(600, 2, 12);
   const Eigen::MatrixXd y = oracle::curved(x, 0.01);
-  std::ptrdiff_t previous = 1000;
+  Eigen::Index previous = 1000;
   for (const double gain : {0.0, 1e-3, 1e-2, 0.1, 2.0}) {
-    const std::ptrdiff_t leaves = llmt::fit(x, y, as_grown({.min_variance_gain = gain})).summary.partitions[0].leaves;
+    const Eigen::Index leaves = llmt::fit(x, y, as_grown({.min_variance_gain = gain})).summary.partitions[0].leaves;
     EXPECT_LE(leaves, previous);
     previous = leaves;
   }
@@ -293,7 +293,7 @@ TEST(Fit, CrossValidationIsTheHeldOutErrorOfRegrownTrees) {
   options.selection.folds = {.count = 4, .kind = llmt::FoldKind::contiguous};
   const llmt::PartitionSummary summary = llmt::fit(x, y, options).summary.partitions[0];
   ASSERT_EQ(summary.crisp_cv_rmse.size(), 12);
-  for (std::ptrdiff_t leaves = 1; leaves <= 12; ++leaves) {
+  for (Eigen::Index leaves = 1; leaves <= 12; ++leaves) {
     double squared = 0.0;
     for (const llmt::Fold& fold : llmt::make_folds(150, options.selection.folds)) {
       const llmt::Model model = llmt::fit(x(fold.train, Eigen::all), y(fold.train, Eigen::all),
@@ -303,7 +303,7 @@ TEST(Fit, CrossValidationIsTheHeldOutErrorOfRegrownTrees) {
     }
     EXPECT_NEAR(summary.crisp_cv_rmse(leaves - 1), std::sqrt(squared / 150.0), 1e-12);
   }
-  std::ptrdiff_t best = 0;
+  Eigen::Index best = 0;
   summary.crisp_cv_rmse.minCoeff(&best);
   EXPECT_EQ(summary.leaves, best + 1);
 }
@@ -323,7 +323,7 @@ TEST(Fit, RetisPruningFollowsTheMEstimates) {
     return partition.num_leaves();
   };
   const llmt::Model large = unpruned({.min_leaf_samples = 4});
-  const std::ptrdiff_t kept = pruned_leaves(large, 2.0);
+  const Eigen::Index kept = pruned_leaves(large, 2.0);
   EXPECT_GT(large.partitions()[0].num_leaves(), kept);
   EXPECT_GE(kept, pruned_leaves(large, 50.0));
   const llmt::GrowthOptions retis = {.rule = llmt::GrowthRule::retis, .min_leaf_samples = 4};
@@ -333,7 +333,7 @@ TEST(Fit, RetisPruningFollowsTheMEstimates) {
   const llmt::Model two = unpruned({.max_leaves = 2});
   std::array<std::vector<int>, 2> rows;
   for (int i = 0; i < 300; ++i) {
-    rows[static_cast<std::size_t>(two.leaf_of(x.row(i))(0, 0))].push_back(i);
+    rows[two.leaf_of(x.row(i))(0, 0)].push_back(i);
   }
   const double prior = static_cast<double>(oracle::rss(x, y)) / 300.0;
   for (const double m : {0.5, 2.0, 10.0, 100.0, 1000.0}) {
@@ -343,7 +343,7 @@ TEST(Fit, RetisPruningFollowsTheMEstimates) {
       const double rss = static_cast<double>(oracle::rss(x(of_leaf, Eigen::all), y(of_leaf, Eigen::all)));
       children += (n + m / 2.0) / (300.0 + m) * (rss + m * prior) / (n + m);
     }
-    const std::ptrdiff_t expected = prior <= children ? 1 : 2;
+    const Eigen::Index expected = prior <= children ? 1 : 2;
     EXPECT_EQ(pruned_leaves(two, m), expected) << m;
   }
 }

@@ -16,7 +16,7 @@ Data data() {
   return {x, oracle::coarse(oracle::curved(x, 0.02))};
 }
 
-llmt::FitOptions as_grown(std::ptrdiff_t min_leaf_samples = 0) {
+llmt::FitOptions as_grown(Eigen::Index min_leaf_samples = 0) {
   return {.growth = {.min_leaf_samples = min_leaf_samples},
           .blend = {.validity = llmt::ValidityChoice::crisp},
           .selection = {.folds = {.count = 0}}};
@@ -26,7 +26,7 @@ llmt::Partition grow(const Eigen::MatrixXd& x, const Eigen::MatrixXd& y) {
   return llmt::fit(x, y, as_grown()).model.partitions()[0];
 }
 
-/// Same splits; thresholds map as t -> scale t + shift of their input, within `tolerance` of the input's unit before.
+// Same splits; thresholds map as t -> scale t + shift of their input, within `tolerance` of the input's unit before.
 void expect_same_tree(const llmt::Partition& tree, const llmt::Partition& expected, double tolerance,
                       double scale = 1.0, double shift = 0.0) {
   ASSERT_GT(expected.nodes.size(), 9U);
@@ -42,7 +42,7 @@ void expect_same_tree(const llmt::Partition& tree, const llmt::Partition& expect
 
 TEST(Invariance, OrderOfRows) {
   const Data d = data();
-  const std::vector<std::ptrdiff_t> order = llmt::Random(3).permutation(400);
+  const std::vector<Eigen::Index> order = llmt::Random(3).permutation(400);
   expect_same_tree(grow(d.x(order, Eigen::all), d.y(order, Eigen::all)), grow(d.x, d.y), 1e-9);
 }
 

@@ -12,6 +12,7 @@
 
 #include "llmt/compare.hpp"
 #include "llmt/fit.hpp"
+#include "numerics/forward_selection.hpp"
 #include "oracles/oracles.hpp"
 #include "oracles/predict_oracle.hpp"
 #include "oracles/random_trees.hpp"
@@ -25,8 +26,8 @@ using llmt::ValidityChoice;
 constexpr double missing = std::numeric_limits<double>::quiet_NaN();
 const std::vector<ValidityChoice> kinds = {ValidityChoice::crisp, ValidityChoice::blend, ValidityChoice::gaussian};
 
-/// One candidate, no choice.
-llmt::FitOptions only(ValidityChoice validity, std::ptrdiff_t max_leaves, LocalTerms terms,
+// One candidate, no choice.
+llmt::FitOptions only(ValidityChoice validity, Eigen::Index max_leaves, LocalTerms terms,
                       SparseChoice sparse = SparseChoice::never) {
   llmt::FitOptions options;
   options.growth = {.significance = 1.0, .min_variance_gain = -1.0, .max_leaves = max_leaves};
@@ -39,15 +40,13 @@ llmt::FitOptions only(ValidityChoice validity, std::ptrdiff_t max_leaves, LocalT
   return options;
 }
 
-/// Regressors as they stand in Leaf: products of deviations from the means of the inputs.
+// Regressors as they stand in Leaf: products of deviations from the means of the inputs.
 Eigen::MatrixXd regressors_of(const llmt::Model& model, const Eigen::MatrixXd& x) {
   Eigen::MatrixXd result(x.rows(), std::ssize(model.regressors()));
   for (std::size_t k = 0; k < model.regressors().size(); ++k) {
     const llmt::Regressor& regressor = model.regressors()[k];
-    const auto deviation = [&](int input) {
-      return x.col(input).array() - model.inputs()[static_cast<std::size_t>(input)].centre;
-    };
-    auto column = result.col(static_cast<std::ptrdiff_t>(k));
+    const auto deviation = [&](int input) { return x.col(input).array() - model.inputs()[input].centre; };
+    auto column = result.col(k);
     if (regressor.second_input < 0) {
       column = x.col(regressor.input);
     } else {
@@ -91,7 +90,7 @@ TEST(Quadratic, AffineAndQuadraticDataAreReproducedInTheTrainingExtent) {
     const llmt::Model model = llmt::fit(x, y, options).model;
     EXPECT_EQ(model.partitions()[0].num_leaves(), 6);
     Eigen::MatrixXd queries = oracle::uniform(500, 3, 2);
-    for (std::ptrdiff_t j = 0; j < 3; ++j) {
+    for (Eigen::Index j = 0; j < 3; ++j) {
       for (int corner = 0; corner < 8; ++corner) {
         queries(corner, j) = (corner >> j) % 2 == 0 ? x.col(j).minCoeff() : x.col(j).maxCoeff();
       }
@@ -104,7 +103,7 @@ TEST(Quadratic, AffineAndQuadraticDataAreReproducedInTheTrainingExtent) {
               1e-6);
     EXPECT_LT((predicted.col(2) - quadratic_function(queries)).cwiseAbs().maxCoeff(), 1e-6);
     // Beyond the extent, and the tenth over which holds are rounded off, an affine output goes on and nothing bends.
-    for (std::ptrdiff_t j = 0; j < 3; ++j) {
+    for (Eigen::Index j = 0; j < 3; ++j) {
       Eigen::MatrixXd line = Eigen::MatrixXd::Constant(3, 3, 0.1);
       line.col(j) << 3.0, 5.0, 7.0;
       const Eigen::MatrixXd outside = model.predict(line);
@@ -137,8 +136,8 @@ TEST(Quadratic, LeavesAreLeastSquaresOnExpandedColumns) {
     const std::vector<llmt::Leaf> leaves = model.leaves(0);
     const Eigen::MatrixXd columns = with_constant(regressors_of(model, x));
     for (std::size_t leaf = 0; leaf < leaves.size(); ++leaf) {
-      std::vector<std::ptrdiff_t> rows;
-      for (std::ptrdiff_t i = 0; i < 300; ++i) {
+      std::vector<Eigen::Index> rows;
+      for (Eigen::Index i = 0; i < 300; ++i) {
         if (leaf_of(i, 0) == static_cast<int>(leaf)) {
           rows.push_back(i);
         }
@@ -154,7 +153,7 @@ TEST(Quadratic, PredictionIsWhatTheEquationsSayAloneAndInBlocksAndFromAFile) {
   for (const ValidityChoice validity : kinds) {
     Eigen::MatrixXd x = oracle::uniform(400, 4, 3);
     const Eigen::VectorXd y = oracle::curved(x, 0.05);
-    for (std::ptrdiff_t i = 0; i < 400; ++i) {
+    for (Eigen::Index i = 0; i < 400; ++i) {
       x(i, 3) = static_cast<double>(i % 3);
       if (i % 7 == 0) {
         x(i, 1) = missing;
@@ -165,7 +164,7 @@ TEST(Quadratic, PredictionIsWhatTheEquationsSayAloneAndInBlocksAndFromAFile) {
     const llmt::Model model = llmt::fit(x, y, options).model;
     ASSERT_EQ(model.regressors().size(), 3U + 2U + 6U);  // numbers, levels, products of numbers
     Eigen::MatrixXd queries = 1.6 * oracle::uniform(200, 4, 4);
-    for (std::ptrdiff_t i = 0; i < 200; ++i) {
+    for (Eigen::Index i = 0; i < 200; ++i) {
       queries(i, 3) = static_cast<double>(i % 4);
       if (i % 5 == 0) {
         queries(i, i % 3) = missing;
@@ -175,7 +174,7 @@ TEST(Quadratic, PredictionIsWhatTheEquationsSayAloneAndInBlocksAndFromAFile) {
     EXPECT_LT((predicted - oracle::predict_rows(model, queries)).cwiseAbs().maxCoeff(), 1e-11);
     const llmt::Model read = llmt::from_json(llmt::to_json(model));
     EXPECT_EQ(llmt::to_json(read), llmt::to_json(model));
-    for (std::ptrdiff_t i = 0; i < 200; ++i) {
+    for (Eigen::Index i = 0; i < 200; ++i) {
       EXPECT_EQ(model.predict(queries.row(i))(0, 0), predicted(i, 0));
       EXPECT_EQ(read.predict(queries.row(i))(0, 0), predicted(i, 0));
     }
@@ -193,9 +192,9 @@ TEST(Quadratic, JacobianIsTheDifferenceQuotient) {
     const Eigen::MatrixXd points = 1.3 * oracle::uniform(200, 3, 6);  // some beyond the extent
     constexpr double step = 1e-5;
     std::vector<double> differences;
-    for (std::ptrdiff_t i = 0; i < points.rows(); ++i) {
+    for (Eigen::Index i = 0; i < points.rows(); ++i) {
       const Eigen::MatrixXd jacobian = model.jacobian(points.row(i).transpose());
-      for (std::ptrdiff_t j = 0; j < 3; ++j) {
+      for (Eigen::Index j = 0; j < 3; ++j) {
         Eigen::MatrixXd around = points.row(i).replicate(2, 1);
         around(0, j) -= step;
         around(1, j) += step;
@@ -205,7 +204,7 @@ TEST(Quadratic, JacobianIsTheDifferenceQuotient) {
       }
     }
     // Across a threshold of a crisp tree, or where a hold sets in, quotients are of two pieces.
-    std::sort(differences.begin(), differences.end());
+    std::ranges::sort(differences);
     EXPECT_LT(differences[differences.size() * 98 / 100], 1e-6);
   }
 }
@@ -231,7 +230,7 @@ TEST(LocalTerms, AutomaticTakesProductsWhereTheyHelpAndLeavesLeastSquaresBeyondC
     const Eigen::MatrixXd x = oracle::uniform(300, 3, seed);
     llmt::Random random(seed);
     Eigen::MatrixXd y(300, 2);
-    for (std::ptrdiff_t i = 0; i < 300; ++i) {
+    for (Eigen::Index i = 0; i < 300; ++i) {
       y(i, 0) = quadratic_function(x.row(i))(0) + 0.1 * random.normal();
       y(i, 1) = x(i, 0) - x(i, 2) + 0.1 * random.normal();
     }
@@ -257,22 +256,22 @@ TEST(LocalTerms, AutomaticTakesProductsWhereTheyHelpAndLeavesLeastSquaresBeyondC
   EXPECT_FALSE(llmt::fit(wide, quadratic_function(wide), options).summary.quadratic);
 }
 
-/// Greedy choice by refitting with every regressor at every step, and AICc of every step.
-std::vector<std::ptrdiff_t> refit_selection(const Eigen::MatrixXd& x, const Eigen::VectorXd& y) {
+// Greedy choice by refitting with every regressor at every step, and AICc of every step.
+std::vector<Eigen::Index> refit_selection(const Eigen::MatrixXd& x, const Eigen::VectorXd& y) {
   const double rows = static_cast<double>(x.rows());
   const auto aicc = [&](double rss, double coefficients) {
     const double k = coefficients + 1.0;
     return rows * std::log(rss) + 2.0 * k + 2.0 * k * (k + 1.0) / (rows - k - 1.0);
   };
-  std::vector<std::ptrdiff_t> chosen;
-  std::vector<std::ptrdiff_t> best;
+  std::vector<Eigen::Index> chosen;
+  std::vector<Eigen::Index> best;
   double smallest = aicc((y.array() - y.mean()).square().sum(), 1.0);
   while (std::ssize(chosen) < x.cols() && chosen.size() < best.size() + 10) {
     double least = std::numeric_limits<double>::infinity();
-    std::ptrdiff_t next = -1;
-    for (std::ptrdiff_t k = 0; k < x.cols(); ++k) {
-      if (std::find(chosen.begin(), chosen.end(), k) == chosen.end()) {
-        std::vector<std::ptrdiff_t> tried = chosen;
+    Eigen::Index next = -1;
+    for (Eigen::Index k = 0; k < x.cols(); ++k) {
+      if (std::ranges::find(chosen, k) == chosen.end()) {
+        std::vector<Eigen::Index> tried = chosen;
         tried.push_back(k);
         const double rss = static_cast<double>(oracle::rss(x(Eigen::all, tried), y));
         if (rss < least) {
@@ -287,7 +286,7 @@ std::vector<std::ptrdiff_t> refit_selection(const Eigen::MatrixXd& x, const Eige
       best = chosen;
     }
   }
-  std::sort(best.begin(), best.end());
+  std::ranges::sort(best);
   return best;
 }
 
@@ -304,8 +303,8 @@ TEST(ForwardSelection, IsThatOfARefitAtEveryStep) {
     }
     const Eigen::MatrixXd a = with_constant(x);
     const llmt::LocalSums sums{a.transpose() * a, a.transpose() * y, Eigen::VectorXd::Constant(1, y.squaredNorm())};
-    std::vector<std::ptrdiff_t> expected = {0};
-    for (const std::ptrdiff_t k : refit_selection(x, y)) {
+    std::vector<Eigen::Index> expected = {0};
+    for (const Eigen::Index k : refit_selection(x, y)) {
       expected.push_back(k + 1);
     }
     EXPECT_EQ(llmt::select_regressors(sums, 1.0), expected) << "seed " << seed;
@@ -322,11 +321,11 @@ TEST(ForwardSelection, TakesNothingOfNoiseNorOfConstantAndDoubledColumns) {
   const Eigen::VectorXd y = x.col(0);
   const Eigen::MatrixXd a = with_constant(x);
   const llmt::LocalSums sums{a.transpose() * a, a.transpose() * y, Eigen::VectorXd::Constant(1, y.squaredNorm())};
-  EXPECT_EQ(llmt::select_regressors(sums, 1.0), (std::vector<std::ptrdiff_t>{0, 1}));
+  EXPECT_EQ(llmt::select_regressors(sums, 1.0), (std::vector<Eigen::Index>{0, 1}));
   const Eigen::VectorXd constant = Eigen::VectorXd::Constant(500, 4.0);
   const llmt::LocalSums level{a.transpose() * a, a.transpose() * constant,
                               Eigen::VectorXd::Constant(1, constant.squaredNorm())};
-  EXPECT_EQ(llmt::select_regressors(level, 1.0), (std::vector<std::ptrdiff_t>{0}));
+  EXPECT_EQ(llmt::select_regressors(level, 1.0), (std::vector<Eigen::Index>{0}));
 }
 
 // Slopes that are not selected are exactly 0; the others are least squares on all leaves at once, drawn to those of
@@ -342,11 +341,11 @@ TEST(Sparse, JointEstimateIsLeastSquaresOfTheSelectedColumns) {
     const Eigen::MatrixXd validities = model.validities(x, 0);
     const Eigen::MatrixXd columns = with_constant(regressors_of(model, x));
     const double ridge = validity == ValidityChoice::crisp ? 1.0 : 1e-3;
-    std::vector<std::vector<std::ptrdiff_t>> used;
-    std::ptrdiff_t unknowns = 0;
+    std::vector<std::vector<Eigen::Index>> used;
+    Eigen::Index unknowns = 0;
     for (const llmt::Leaf& leaf : leaves) {
       used.push_back({0});
-      for (std::ptrdiff_t k = 0; k < leaf.slope.cols(); ++k) {
+      for (Eigen::Index k = 0; k < leaf.slope.cols(); ++k) {
         if (leaf.slope(0, k) != 0.0) {
           used.back().push_back(k + 1);
         }
@@ -359,10 +358,10 @@ TEST(Sparse, JointEstimateIsLeastSquaresOfTheSelectedColumns) {
     Eigen::MatrixXd stacked = Eigen::MatrixXd::Zero(300 * (std::ssize(leaves) + 1), unknowns);
     Eigen::VectorXd target = Eigen::VectorXd::Zero(stacked.rows());
     target.head(300) = y;
-    std::ptrdiff_t at = 0;
+    Eigen::Index at = 0;
     for (std::size_t leaf = 0; leaf < leaves.size(); ++leaf) {
-      const std::ptrdiff_t l = static_cast<std::ptrdiff_t>(leaf);
-      const std::ptrdiff_t count = std::ssize(used[leaf]);
+      const Eigen::Index l = static_cast<Eigen::Index>(leaf);
+      const Eigen::Index count = std::ssize(used[leaf]);
       const Eigen::MatrixXd a = columns(Eigen::all, used[leaf]);
       const Eigen::VectorXd roots = validities.col(l).cwiseSqrt();
       const Eigen::VectorXd local = oracle::least_squares(roots.asDiagonal() * a, roots.asDiagonal() * y);
@@ -377,7 +376,7 @@ TEST(Sparse, JointEstimateIsLeastSquaresOfTheSelectedColumns) {
     for (std::size_t leaf = 0; leaf < leaves.size(); ++leaf) {
       EXPECT_NEAR(leaves[leaf].intercept(0), expected(at), 1e-4);
       for (std::size_t k = 1; k < used[leaf].size(); ++k) {
-        EXPECT_NEAR(leaves[leaf].slope(0, used[leaf][k] - 1), expected(at + static_cast<std::ptrdiff_t>(k)), 1e-4);
+        EXPECT_NEAR(leaves[leaf].slope(0, used[leaf][k] - 1), expected(at + static_cast<Eigen::Index>(k)), 1e-4);
       }
       at += std::ssize(used[leaf]);
     }
@@ -394,8 +393,8 @@ TEST(Sparse, LeverageAndParametersAreOfTheSelectedColumns) {
   const llmt::FitOptions options = only(ValidityChoice::crisp, 1, LocalTerms::linear, SparseChoice::always);
   const llmt::Model model = llmt::fit(x, y, options).model;
   const llmt::Leaf leaf = model.leaves(0)[0];
-  std::vector<std::ptrdiff_t> used;
-  for (std::ptrdiff_t k = 0; k < 6; ++k) {
+  std::vector<Eigen::Index> used;
+  for (Eigen::Index k = 0; k < 6; ++k) {
     if (leaf.slope(0, k) != 0.0) {
       used.push_back(k);
     }
@@ -404,8 +403,8 @@ TEST(Sparse, LeverageAndParametersAreOfTheSelectedColumns) {
   const Eigen::MatrixXd a = with_constant(x(Eigen::all, used));
   const Eigen::MatrixXd hat = a * (a.transpose() * a).inverse() * a.transpose();
   const std::vector<llmt::Extrapolation> found = model.extrapolation(x);
-  for (std::ptrdiff_t i = 0; i < 200; ++i) {
-    EXPECT_NEAR(found[static_cast<std::size_t>(i)].leverage, hat(i, i), 1e-5);
+  for (Eigen::Index i = 0; i < 200; ++i) {
+    EXPECT_NEAR(found[i].leverage, hat(i, i), 1e-5);
   }
   const llmt::ComparisonResult compared = llmt::compare(x, y, {{"sparse", options}});
   EXPECT_EQ(compared.methods[0].parameters, 1 + std::ssize(used));

@@ -12,7 +12,7 @@
 #include "llmt/model.hpp"
 #include "oracles/oracles.hpp"
 #include "oracles/random_trees.hpp"
-#include "selection/candidates.hpp"
+#include "selection/selection.hpp"
 
 namespace {
 

@@ -6,7 +6,7 @@
 namespace {
 
 llmt::FitResult grow(const Eigen::MatrixXd& x, const Eigen::MatrixXd& y, llmt::SplitSearch search,
-                     std::ptrdiff_t max_leaves, llmt::FitOptions options = {}) {
+                     Eigen::Index max_leaves, llmt::FitOptions options = {}) {
   options.growth.significance = 1.0;
   options.growth.min_variance_gain = -1.0;
   options.growth.max_leaves = max_leaves;
@@ -44,8 +44,8 @@ void expect_same_tree(const std::vector<llmt::Node>& a, const std::vector<llmt::
   }
 }
 
-/// Inputs of so few values that every one has a bin of its own.
-Eigen::MatrixXd grid(std::ptrdiff_t rows, std::ptrdiff_t columns, std::uint64_t seed) {
+// Inputs of so few values that every one has a bin of its own.
+Eigen::MatrixXd grid(Eigen::Index rows, Eigen::Index columns, std::uint64_t seed) {
   return (oracle::uniform(rows, columns, seed) * 32.0).array().round() / 32.0;
 }
 
@@ -66,7 +66,7 @@ TEST(BinnedGrowth, CategoriesWeightsAndSharedOutputsAreThoseOfTheExactSearch) {
   x.col(3) = ((x.col(3).array() + 1.0) * 3.4).floor().cwiseMax(0.0).cwiseMin(6.0);
   Eigen::MatrixXd y(9000, 2);
   y << oracle::curved(x.leftCols(3), 0.1, 7), oracle::curved(x.leftCols(3).rowwise().reverse(), 0.2, 8);
-  for (std::ptrdiff_t i = 0; i < 9000; ++i) {
+  for (Eigen::Index i = 0; i < 9000; ++i) {
     y.row(i).array() += x(i, 3) == 2.0 || x(i, 3) == 5.0 ? 2.0 * x(i, 0) : 0.0;
   }
   llmt::FitOptions options;
@@ -115,7 +115,7 @@ TEST(BinnedGrowth, SmallResidualsKeepTheirDigits) {
   // A target of pieces whose residuals fall by twelve orders of magnitude along the tree.
   Eigen::MatrixXd x = grid(9000, 2, 3);
   Eigen::MatrixXd y(9000, 1);
-  for (std::ptrdiff_t i = 0; i < 9000; ++i) {
+  for (Eigen::Index i = 0; i < 9000; ++i) {
     const double a = x(i, 0);
     y(i, 0) = (a > 0.01 ? 1.0 + a : -1.0) + 1e-6 * std::abs(x(i, 1) - 0.3) * (a > 0.01 ? 1.0 : 0.0);
   }

@@ -9,7 +9,7 @@
 
 namespace {
 
-/// A node with a sorted list of rows for every input; NaN: no value.
+// A node with a sorted list of rows for every input; NaN: no value.
 struct Problem {
   llmt::Features features;
   Eigen::VectorXd weights;
@@ -21,21 +21,21 @@ struct Problem {
 };
 
 Problem make_problem(const Eigen::MatrixXd& x, const Eigen::MatrixXd& y, const Eigen::VectorXd& weights,
-                     std::ptrdiff_t regressors) {
+                     Eigen::Index regressors) {
   Problem problem;
   const Eigen::MatrixXd known = x.array().isNaN().select(0.0, x);
   llmt::NodeFit fit = llmt::fit_node(known.leftCols(regressors), y, weights);
   problem.weights = Eigen::VectorXd::Constant(y.cols(), 2.0);
   problem.rss = problem.weights.dot(fit.rss);
   problem.features = std::move(fit.features);
-  for (std::ptrdiff_t j = 0; j < x.cols(); ++j) {
+  for (Eigen::Index j = 0; j < x.cols(); ++j) {
     std::vector<int> order;
     for (int row = 0; row < x.rows(); ++row) {
       if (!std::isnan(x(row, j))) {
         order.push_back(row);
       }
     }
-    std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return x(a, j) < x(b, j); });
+    std::ranges::stable_sort(order, [&](int a, int b) { return x(a, j) < x(b, j); });
     const Eigen::VectorXd sorted = x.col(j)(order);
     problem.values.emplace_back(sorted.begin(), sorted.end());
     problem.orders.push_back(std::move(order));
@@ -46,11 +46,11 @@ Problem make_problem(const Eigen::MatrixXd& x, const Eigen::MatrixXd& y, const E
 struct Result {
   int input = -1;
   llmt::SplitCandidate split;
-  std::ptrdiff_t evaluations = 0;
+  Eigen::Index evaluations = 0;
 };
 
-/// As growth does it: the inputs share what the edges of their blocks found.
-Result search(const Problem& problem, std::ptrdiff_t min_leaf_samples) {
+// As growth does it: the inputs share what the edges of their blocks found.
+Result search(const Problem& problem, Eigen::Index min_leaf_samples) {
   std::vector<llmt::InputSearch> searches;
   searches.reserve(problem.orders.size());
   double limit = std::numeric_limits<double>::infinity();
@@ -76,7 +76,7 @@ Result search(const Problem& problem, std::ptrdiff_t min_leaf_samples) {
 }
 
 template <int Coefficients>
-void expect_brute_force(const Problem& problem, std::ptrdiff_t min_leaf_samples) {
+void expect_brute_force(const Problem& problem, Eigen::Index min_leaf_samples) {
   ASSERT_EQ(problem.features.coefficients(), Coefficients);
   const oracle::BruteForceSplit expected =
       oracle::search<Coefficients>(problem.node(), problem.orders, problem.values, min_leaf_samples);
@@ -88,7 +88,7 @@ void expect_brute_force(const Problem& problem, std::ptrdiff_t min_leaf_samples)
   }
 }
 
-Eigen::VectorXd ones(std::ptrdiff_t rows) { return Eigen::VectorXd::Ones(rows); }
+Eigen::VectorXd ones(Eigen::Index rows) { return Eigen::VectorXd::Ones(rows); }
 
 TEST(ExactSearch, EqualsBruteForceOnCurvedTargets) {
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
@@ -142,8 +142,8 @@ TEST(ExactSearch, EqualsBruteForceWithWeightsOutputsAndMissingValues) {
     Eigen::MatrixXd y(1100, 2);
     y << oracle::curved(x, 0.1, seed), oracle::curved(x.rowwise().reverse(), 0.3, seed + 1);
     const Eigen::VectorXd weights = oracle::uniform(1100, 1, seed + 9).array().abs() + 1e-3;
-    for (std::ptrdiff_t row = 0; row < 1100; row += 7) {
-      x(row, static_cast<std::ptrdiff_t>(seed) % 3) = std::nan("");
+    for (Eigen::Index row = 0; row < 1100; row += 7) {
+      x(row, static_cast<Eigen::Index>(seed) % 3) = std::nan("");
     }
     expect_brute_force<4>(make_problem(x, y, weights, 3), 6);
   }
@@ -157,7 +157,7 @@ TEST(ExactSearch, LeavesMostSplitsAloneWhereThereIsSomethingToFind) {
 }
 
 TEST(ExactSearch, NodesOfAnySizeAreSearchedWhole) {
-  for (std::ptrdiff_t rows = 2; rows < 200; ++rows) {
+  for (Eigen::Index rows = 2; rows < 200; ++rows) {
     SCOPED_TRACE(rows);
     const Eigen::MatrixXd x = oracle::uniform(rows, 1, 5);
     const Problem problem = make_problem(x, oracle::uniform(rows, 1, 6), ones(rows), 1);

@@ -17,8 +17,8 @@ using llmt::Estimation;
 
 constexpr double missing = std::numeric_limits<double>::quiet_NaN();
 
-/// As many leaves as asked for.
-llmt::FitOptions hilomot(std::ptrdiff_t leaves, Estimation estimation = Estimation::joint) {
+// As many leaves as asked for.
+llmt::FitOptions hilomot(Eigen::Index leaves, Estimation estimation = Estimation::joint) {
   llmt::FitOptions options;
   options.growth.rule = llmt::GrowthRule::hilomot;
   options.growth.max_leaves = leaves;
@@ -27,7 +27,7 @@ llmt::FitOptions hilomot(std::ptrdiff_t leaves, Estimation estimation = Estimati
   return options;
 }
 
-Eigen::VectorXd unit_vector(std::ptrdiff_t size, std::uint64_t seed) {
+Eigen::VectorXd unit_vector(Eigen::Index size, std::uint64_t seed) {
   llmt::Random random(seed);
   Eigen::VectorXd result(size);
   for (double& entry : result) {
@@ -36,12 +36,12 @@ Eigen::VectorXd unit_vector(std::ptrdiff_t size, std::uint64_t seed) {
   return result.normalized();
 }
 
-/// In degrees, without regard to the sense.
+// In degrees, without regard to the sense.
 double angle(const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
   return std::acos(std::min(1.0, std::abs(a.normalized().dot(b.normalized())))) * 180.0 / std::numbers::pi;
 }
 
-/// 0 where direction . x <= 0, else `right` + slope . x; inputs from -1 to 1. Half width 0: crisp.
+// 0 where direction . x <= 0, else `right` + slope . x; inputs from -1 to 1. Half width 0: crisp.
 llmt::Model two_leaves(const Eigen::VectorXd& direction, double right, double half_width = 0.0,
                        const Eigen::VectorXd& slope = {}) {
   const auto node = [&](double value) {
@@ -90,7 +90,7 @@ TEST(Hilomot, RecoversTheGateThatMadeTheData) {
     EXPECT_NEAR(root.half_width / root.direction.norm(), 0.15, 1e-5) << seed;
     double origin = root.threshold;  // s at x = 0 is minus this, plus the threshold
     for (int j = 0; j < 4; ++j) {
-      origin += root.direction(j) * model.inputs()[static_cast<std::size_t>(j)].centre;
+      origin += root.direction(j) * model.inputs()[j].centre;
     }
     EXPECT_NEAR(origin / root.direction.dot(w), 0.1, 1e-5) << seed;
   }
@@ -216,7 +216,7 @@ TEST(Hilomot, MissingValuesCategoriesWeightsAndSeveralOutputs) {
   llmt::Random random(81);
   Eigen::MatrixXd x = oracle::uniform(500, 4, 82);
   Eigen::MatrixXd y(500, 2);
-  for (std::ptrdiff_t i = 0; i < 500; ++i) {
+  for (Eigen::Index i = 0; i < 500; ++i) {
     x(i, 3) = std::floor(random.uniform(0.0, 3.0));
     const double s = x(i, 0) + x(i, 1);
     y(i, 0) = std::abs(s) + (x(i, 3) == 1.0 ? 5.0 * x(i, 2) : 0.0);
@@ -257,7 +257,7 @@ TEST(Hilomot, JacobianIsThatOfDifferences) {
   const Eigen::MatrixXd x = oracle::uniform(400, 3, 91);
   const llmt::Model model = llmt::fit(x, oracle::curved(x, 0.01), hilomot(8)).model;
   const Eigen::MatrixXd points = 1.1 * oracle::uniform(40, 3, 92);
-  for (std::ptrdiff_t i = 0; i < points.rows(); ++i) {
+  for (Eigen::Index i = 0; i < points.rows(); ++i) {
     const Eigen::VectorXd point = points.row(i).transpose();
     const Eigen::MatrixXd jacobian = model.jacobian(point);
     for (int j = 0; j < 3; ++j) {
@@ -328,15 +328,15 @@ TEST(Hilomot, LeavesTellOnWhichSidesOfPlanesTheyLie) {
   const std::vector<llmt::Leaf> leaves = model.leaves(0);
   const Eigen::MatrixXi leaf_of = model.leaf_of(x);
   ASSERT_GT(leaves.size(), 3U);
-  std::vector<std::ptrdiff_t> rows(leaves.size(), 0);
-  for (std::ptrdiff_t i = 0; i < x.rows(); ++i) {
+  std::vector<Eigen::Index> rows(leaves.size(), 0);
+  for (Eigen::Index i = 0; i < x.rows(); ++i) {
     for (std::size_t k = 0; k < leaves.size(); ++k) {
       bool inside = true;
       for (const llmt::ObliqueSide& side : leaves[k].sides) {
-        const llmt::Node& node = model.partitions()[0].nodes[static_cast<std::size_t>(side.node)];
+        const llmt::Node& node = model.partitions()[0].nodes[side.node];
         double s = 0.0;
         for (int j = 0; j < 3; ++j) {
-          s += node.direction(j) * (x(i, j) - model.inputs()[static_cast<std::size_t>(j)].centre);
+          s += node.direction(j) * (x(i, j) - model.inputs()[j].centre);
         }
         inside = inside && (s <= node.threshold) == side.left;
       }

@@ -11,7 +11,7 @@
 
 namespace {
 
-using Rows = std::vector<std::ptrdiff_t>;
+using Rows = std::vector<Eigen::Index>;
 
 llmt::FitResult grow(const Eigen::MatrixXd& x, const Eigen::MatrixXd& y, llmt::FitOptions options = {}) {
   options.growth.rule = llmt::GrowthRule::m5;
@@ -21,7 +21,7 @@ llmt::FitResult grow(const Eigen::MatrixXd& x, const Eigen::MatrixXd& y, llmt::F
 
 const std::vector<llmt::Node>& nodes(const llmt::FitResult& result) { return result.model.partitions()[0].nodes; }
 
-/// M5' as docs/algorithms.md has it, the plain way: every split compared, every model refitted.
+// M5' as docs/algorithms.md has it, the plain way: every split compared, every model refitted.
 class PlainM5 {
  public:
   struct Tree {
@@ -37,7 +37,7 @@ class PlainM5 {
   };
 
   PlainM5(const Eigen::MatrixXd& x, const Eigen::VectorXd& y) : x_(x), y_(y) {
-    for (std::ptrdiff_t i = 0; i < x.rows(); ++i) {
+    for (Eigen::Index i = 0; i < x.rows(); ++i) {
       root_.rows.push_back(i);
     }
     grow(root_);
@@ -65,12 +65,12 @@ class PlainM5 {
     std::array<Rows, 2> best;
     for (int j = 0; j < x_.cols(); ++j) {
       std::set<double> values;
-      for (const std::ptrdiff_t row : tree.rows) {
+      for (const Eigen::Index row : tree.rows) {
         values.insert(x_(row, j));
       }
       for (auto at = values.begin(); std::next(at) != values.end(); ++at) {
         std::array<Rows, 2> sides;
-        for (const std::ptrdiff_t row : tree.rows) {
+        for (const Eigen::Index row : tree.rows) {
           sides[x_(row, j) <= *at ? 0 : 1].push_back(row);
         }
         const double left_over = impurity(sides[0]) + impurity(sides[1]);
@@ -101,19 +101,19 @@ class PlainM5 {
 
   Eigen::VectorXd residuals(const Rows& rows, const Eigen::VectorXd& model) const {
     return y_(rows) - (x_(rows, Eigen::all) * model.tail(x_.cols())).array().matrix() -
-           Eigen::VectorXd::Constant(static_cast<std::ptrdiff_t>(rows.size()), model(0));
+           Eigen::VectorXd::Constant(std::ssize(rows), model(0));
   }
 
-  /// Of the inputs given.
+  // Of the inputs given.
   Eigen::VectorXd fit(const Rows& rows, const std::vector<int>& inputs) const {
-    Eigen::MatrixXd regressors(static_cast<std::ptrdiff_t>(rows.size()), 1 + std::ssize(inputs));
+    Eigen::MatrixXd regressors(std::ssize(rows), 1 + std::ssize(inputs));
     regressors.col(0).setOnes();
     regressors.rightCols(std::ssize(inputs)) = x_(rows, inputs);
     const Eigen::VectorXd found = oracle::least_squares(regressors, y_(rows));
     Eigen::VectorXd model = Eigen::VectorXd::Zero(1 + x_.cols());
     model(0) = found(0);
     for (std::size_t k = 0; k < inputs.size(); ++k) {
-      model(1 + inputs[k]) = found(1 + static_cast<std::ptrdiff_t>(k));
+      model(1 + inputs[k]) = found(1 + static_cast<Eigen::Index>(k));
     }
     return model;
   }
@@ -124,14 +124,12 @@ class PlainM5 {
     while (true) {
       tree.model = fit(tree.rows, inputs);
       tree.coefficients = 1.0 + static_cast<double>(inputs.size());
-      if (inputs.empty()) {
-        return;
-      }
+      if (inputs.empty()) return;
       double smallest = std::numeric_limits<double>::infinity();
       std::vector<int> fewer;
       for (std::size_t k = 0; k < inputs.size(); ++k) {
         std::vector<int> without = inputs;
-        without.erase(without.begin() + static_cast<std::ptrdiff_t>(k));
+        without.erase(without.begin() + static_cast<Eigen::Index>(k));
         const double squares = residuals(tree.rows, fit(tree.rows, without)).squaredNorm();
         if (squares < smallest) {
           smallest = squares;
@@ -139,20 +137,16 @@ class PlainM5 {
         }
       }
       const double with = adjusted(residuals(tree.rows, tree.model).squaredNorm(), n, tree.coefficients);
-      if (n > tree.coefficients && adjusted(smallest, n, tree.coefficients - 1.0) > with) {
-        return;
-      }
+      if (n > tree.coefficients && adjusted(smallest, n, tree.coefficients - 1.0) > with) return;
       inputs = fewer;
     }
   }
 
-  /// Sum of squares of the tree.
+  // Sum of squares of the tree.
   double prune(Tree& tree) {
     fit(tree);
     const double of_model = residuals(tree.rows, tree.model).squaredNorm();
-    if (tree.children.empty()) {
-      return of_model;
-    }
+    if (tree.children.empty()) return of_model;
     const double below = prune(tree.children[0]) + prune(tree.children[1]);
     const double coefficients = tree.children[0].coefficients + tree.children[1].coefficients + 1.0;
     const double n = static_cast<double>(tree.rows.size());
@@ -164,7 +158,7 @@ class PlainM5 {
     return below;
   }
 
-  /// `above`: the ancestors, from the root down.
+  // `above`: the ancestors, from the root down.
   void smooth(Tree& tree, std::vector<const Tree*> above) {
     tree.smoothed = tree.model;
     double n = static_cast<double>(tree.rows.size());
@@ -183,21 +177,19 @@ class PlainM5 {
   Tree root_;
 };
 
-/// Number of leaves that were compared.
+// Number of leaves that were compared.
 int expect_same(const PlainM5::Tree& plain, const llmt::Model& model, int index) {
-  const llmt::Node& node = model.partitions()[0].nodes[static_cast<std::size_t>(index)];
+  const llmt::Node& node = model.partitions()[0].nodes[index];
   EXPECT_EQ(node.samples, std::ssize(plain.rows));
   Eigen::VectorXd centres(std::ssize(model.regressors()));
   for (std::size_t k = 0; k < model.regressors().size(); ++k) {
-    centres(static_cast<std::ptrdiff_t>(k)) = model.regressors()[k].centre;
+    centres(k) = model.regressors()[k].centre;
   }
   const Eigen::VectorXd slope = node.slope.row(0).transpose();
   EXPECT_NEAR(node.value(0) - slope.dot(centres), plain.smoothed(0), 1e-8);
   EXPECT_LT((slope - plain.smoothed.tail(slope.size())).norm(), 1e-8);
   EXPECT_EQ(node.is_leaf(), plain.children.empty());
-  if (node.is_leaf() || plain.children.empty()) {
-    return 1;
-  }
+  if (node.is_leaf() || plain.children.empty()) return 1;
   EXPECT_EQ(node.split_input, plain.input);
   EXPECT_NEAR(node.threshold, 0.5 * (plain.low + plain.high), 1e-12);
   return expect_same(plain.children[0], model, node.left) + expect_same(plain.children[1], model, node.right);
@@ -207,7 +199,7 @@ TEST(M5, IsThePlainOneNodeByNode) {
   int leaves = 0;
   for (std::uint64_t seed = 1; seed <= 25; ++seed) {
     SCOPED_TRACE(seed);
-    const std::ptrdiff_t rows = 20 + 10 * static_cast<std::ptrdiff_t>(seed);
+    const Eigen::Index rows = 20 + 10 * static_cast<Eigen::Index>(seed);
     Eigen::MatrixXd x = oracle::uniform(rows, 3, seed);
     x.col(1) = (4.0 * x.col(1)).array().round();  // ties
     const Eigen::VectorXd y =
@@ -221,7 +213,7 @@ TEST(M5, IsThePlainOneNodeByNode) {
 TEST(M5, DropsInputsAsRefittingDoes) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     SCOPED_TRACE(seed);
-    const std::ptrdiff_t rows = 9 + 4 * static_cast<std::ptrdiff_t>(seed);
+    const Eigen::Index rows = 9 + 4 * static_cast<Eigen::Index>(seed);
     Eigen::MatrixXd x = oracle::uniform(rows, 6, seed);
     x.col(3) += 0.9 * x.col(0);
     x.col(5).array() += 1e6;
@@ -245,19 +237,17 @@ TEST(M5, DropsInputsAsRefittingDoes) {
       std::vector<int> best;
       for (std::size_t k = 0; k < inputs.size(); ++k) {
         std::vector<int> fewer = inputs;
-        fewer.erase(fewer.begin() + static_cast<std::ptrdiff_t>(k));
+        fewer.erase(fewer.begin() + static_cast<Eigen::Index>(k));
         best = k == 0 || error(fewer) < error(best) ? fewer : best;
       }
-      if (error(best) > error(inputs)) {
-        break;
-      }
+      if (error(best) > error(inputs)) break;
       inputs = best;
     }
     ASSERT_EQ(found.coefficients, 1 + static_cast<int>(inputs.size()));
     const Eigen::MatrixXd a = regressors(inputs);
     const Eigen::VectorXd solution = oracle::least_squares(a, y);
     for (std::size_t k = 0; k < inputs.size(); ++k) {
-      EXPECT_NEAR(found.slope(inputs[k]), solution(static_cast<std::ptrdiff_t>(k) + 1), 1e-8);
+      EXPECT_NEAR(found.slope(inputs[k]), solution(static_cast<Eigen::Index>(k) + 1), 1e-8);
     }
     EXPECT_LT((found.residuals - (y - a * solution)).norm(), 1e-8);
   }
@@ -288,8 +278,8 @@ TEST(M5, SmoothingIsThatOfAComputationByHand) {
   // 10, so (20 x 0 + 15 x 5) / 35 and (20 x 10 + 15 x 5) / 35 at x = 0, slope 15 x 3 / 35.
   Eigen::MatrixXd x(40, 1);
   Eigen::MatrixXd y(40, 1);
-  for (std::ptrdiff_t i = 0; i < 40; ++i) {
-    x(i, 0) = std::array<double, 4>{-2.0, -1.0, 1.0, 2.0}[static_cast<std::size_t>(i % 4)];
+  for (Eigen::Index i = 0; i < 40; ++i) {
+    x(i, 0) = std::array<double, 4>{-2.0, -1.0, 1.0, 2.0}[i % 4];
     y(i, 0) = x(i, 0) > 0.0 ? 10.0 : 0.0;
   }
   const llmt::FitResult result = grow(x, y);
@@ -335,7 +325,7 @@ TEST(M5, CategoriesAreCutInTheOrderOfTheirMeans) {
   Eigen::MatrixXd x = oracle::uniform(600, 2, 11);
   x.col(1) = ((x.col(1).array() + 1.0) * 3.0).floor().cwiseMin(5.0);
   Eigen::VectorXd y(600);
-  for (std::ptrdiff_t i = 0; i < 600; ++i) {
+  for (Eigen::Index i = 0; i < 600; ++i) {
     y(i) = x(i, 1) == 0.0 || x(i, 1) == 4.0 || x(i, 1) == 5.0 ? 10.0 * x(i, 0) : -20.0;
   }
   llmt::FitOptions options;
@@ -351,7 +341,7 @@ TEST(M5, MissingValuesMayTellSomethingAndRowsOfNoWeightDoNot) {
   Eigen::VectorXd y = x.col(0);
   llmt::FitOptions options;
   options.weights = Eigen::VectorXd::Ones(600);
-  for (std::ptrdiff_t i = 0; i < 600; ++i) {
+  for (Eigen::Index i = 0; i < 600; ++i) {
     if (i % 3 == 0) {
       x(i, 1) = std::nan("");
       y(i) += 20.0;
@@ -368,7 +358,7 @@ TEST(M5, MissingValuesMayTellSomethingAndRowsOfNoWeightDoNot) {
   // Missing at random: rows without a value teach no child, but the tree is found and predicts.
   Eigen::MatrixXd gappy = oracle::uniform(900, 2, 13);
   const Eigen::VectorXd z = (gappy.col(0).array() > 0.1).cast<double>() * 5.0 + gappy.col(1).array();
-  for (std::ptrdiff_t i = 0; i < 900; i += 10) {
+  for (Eigen::Index i = 0; i < 900; i += 10) {
     gappy(i, 0) = std::nan("");
   }
   const llmt::FitResult of_gappy = grow(gappy, z);
@@ -381,8 +371,8 @@ TEST(M5, MissingValuesMayTellSomethingAndRowsOfNoWeightDoNot) {
 TEST(M5, RowsWithoutAValueTeachTheChildThatTheyClearlyBelongTo) {
   Eigen::MatrixXd x = oracle::uniform(900, 1, 13);
   Eigen::VectorXd y = (x.col(0).array() > 0.1).cast<double>() * 5.0 + 0.1 * oracle::uniform(900, 1, 14).col(0).array();
-  std::ptrdiff_t left = 0;
-  for (std::ptrdiff_t i = 0; i < 900; ++i) {
+  Eigen::Index left = 0;
+  for (Eigen::Index i = 0; i < 900; ++i) {
     if (i % 10 == 0) {
       x(i, 0) = std::nan("");
       y(i) -= y(i) > 2.5 ? 5.0 : 0.0;  // all as on the left

@@ -15,8 +15,8 @@ using llmt::Gate;
 using llmt::GateModels;
 using llmt::GateProblem;
 
-/// Curved outputs over correlated inputs, unequal weights; a, z and y as GateProblem asks for.
-GateProblem problem(GateModels models, std::ptrdiff_t rows, std::ptrdiff_t inputs, std::uint64_t seed) {
+// Curved outputs over correlated inputs, unequal weights; a, z and y as GateProblem asks for.
+GateProblem problem(GateModels models, Eigen::Index rows, Eigen::Index inputs, std::uint64_t seed) {
   GateProblem result;
   llmt::Random random(seed);
   const Eigen::MatrixXd x = oracle::uniform(rows, inputs, seed) *
@@ -42,7 +42,7 @@ GateProblem problem(GateModels models, std::ptrdiff_t rows, std::ptrdiff_t input
   return result;
 }
 
-Gate gate(std::ptrdiff_t inputs, double half_width, std::uint64_t seed) {
+Gate gate(Eigen::Index inputs, double half_width, std::uint64_t seed) {
   llmt::Random random(seed);
   Gate result(inputs + 1);
   for (double& entry : result) {
@@ -52,17 +52,17 @@ Gate gate(std::ptrdiff_t inputs, double half_width, std::uint64_t seed) {
   return result;
 }
 
-/// By Householder QR, nothing precomputed.
+// By Householder QR, nothing precomputed.
 double loss(const GateProblem& problem, const Eigen::VectorXd& shares) {
-  const std::ptrdiff_t size = problem.a.cols();
+  const Eigen::Index size = problem.a.cols();
   Eigen::MatrixXd b(problem.a.rows(), 2 * size);
   b << shares.asDiagonal() * problem.a, (1.0 - shares.array()).matrix().asDiagonal() * problem.a;
-  const auto fit = [&](const Eigen::VectorXd& weights, const Eigen::MatrixXd& columns, std::ptrdiff_t output) {
+  const auto fit = [&](const Eigen::VectorXd& weights, const Eigen::MatrixXd& columns, Eigen::Index output) {
     const Eigen::VectorXd root = weights.cwiseSqrt();
     return oracle::least_squares(root.asDiagonal() * columns, root.cwiseProduct(problem.y.col(output)));
   };
   double sum = 0.0;
-  for (std::ptrdiff_t o = 0; o < problem.y.cols(); ++o) {
+  for (Eigen::Index o = 0; o < problem.y.cols(); ++o) {
     Eigen::VectorXd coefficients(2 * size);
     if (problem.models == GateModels::joint) {
       coefficients = fit(problem.weights, b, o);
@@ -108,7 +108,7 @@ TEST(ObliqueSplit, GradientIsThatOfDifferences) {
       const GateProblem given = problem(models, 600, 4, 15);
       const Gate at = gate(4, half_width, 16);
       const Eigen::VectorXd gradient = llmt::gate_gradient(given, at);
-      for (std::ptrdiff_t k = 0; k < at.size(); ++k) {
+      for (Eigen::Index k = 0; k < at.size(); ++k) {
         const double step = 1e-4;
         const auto along = [&](double distance) {
           return llmt::share_loss(given, llmt::gate_shares(given, at + distance * Gate::Unit(at.size(), k)));

@@ -17,7 +17,7 @@ namespace {
 
 using namespace random_trees;
 
-/// A tree whose splits carry their number as threshold, and gains that are zero for leaves.
+// A tree whose splits carry their number as threshold, and gains that are zero for leaves.
 struct Tree {
   std::vector<llmt::Node> nodes;
   std::vector<double> gains;
@@ -41,12 +41,12 @@ Tree random_tree(llmt::Random& random, int splits) {
   return tree;
 }
 
-/// Splits, by their numbers, in the order of the nodes that they made.
+// Splits, by their numbers, in the order of the nodes that they made.
 std::vector<int> order_of(const std::vector<llmt::Node>& nodes) {
   std::vector<int> order(nodes.size() / 2);
   for (const llmt::Node& node : nodes) {
     if (!node.is_leaf()) {
-      order[static_cast<std::size_t>((node.left - 1) / 2)] = static_cast<int>(node.threshold);
+      order[(node.left - 1) / 2] = static_cast<int>(node.threshold);
     }
   }
   return order;
@@ -56,22 +56,22 @@ double sum_over_prefixes(const std::vector<int>& order, const std::vector<double
   double gain = 0.0;
   double sum = 0.0;
   for (const int split : order) {
-    gain += gains[static_cast<std::size_t>(split)];
+    gain += gains[split];
     sum += gain;
   }
   return sum;
 }
 
-/// Calls visit(order) for every order of splits in which each stands behind the one above it.
+// Calls visit(order) for every order of splits in which each stands behind the one above it.
 void for_each_order(const Tree& tree, std::vector<int>& order, std::set<int> open,
                     const std::function<void(const std::vector<int>&)>& visit) {
   visit(order);
   for (const int split : open) {
     std::set<int> rest = open;
     rest.erase(split);
-    const llmt::Node& node = tree.nodes[static_cast<std::size_t>(split)];
+    const llmt::Node& node = tree.nodes[split];
     for (const int child : {node.left, node.right}) {
-      if (!tree.nodes[static_cast<std::size_t>(child)].is_leaf()) {
+      if (!tree.nodes[child].is_leaf()) {
         rest.insert(child);
       }
     }
@@ -114,7 +114,7 @@ TEST(WeakestLink, EveryCostComplexityTreeIsAPrefix) {
       for_each_order(tree, order, {0}, [&](const std::vector<int>& each) {
         double gain = 0.0;
         for (const int split : each) {
-          gain += tree.gains[static_cast<std::size_t>(split)] - cost;
+          gain += tree.gains[split] - cost;
         }
         if (gain > best + 1e-12) {
           best = gain;
@@ -122,8 +122,8 @@ TEST(WeakestLink, EveryCostComplexityTreeIsAPrefix) {
         }
       });
       std::vector<int> prefix(own.begin(), own.begin() + std::ssize(kept));
-      std::sort(prefix.begin(), prefix.end());
-      std::sort(kept.begin(), kept.end());
+      std::ranges::sort(prefix);
+      std::ranges::sort(kept);
       EXPECT_EQ(prefix, kept) << "cost " << cost;
     }
   }
@@ -158,7 +158,7 @@ TEST(WeakestLink, PrunedTreesOfAFitLeaveLessThanThoseOfTheOrderOfGrowth) {
     const auto left = [&] {
       const llmt::Model model = llmt::fit(d.x, d.y.col(0), options).model;
       double sum = 0.0;
-      for (std::ptrdiff_t leaves = 1; leaves <= model.partitions()[0].num_leaves(); ++leaves) {
+      for (Eigen::Index leaves = 1; leaves <= model.partitions()[0].num_leaves(); ++leaves) {
         const llmt::Model pruned = model.prefix(leaves);
         for (const llmt::Node& node : pruned.partitions()[0].nodes) {
           sum += node.is_leaf() ? node.rss(0) : 0.0;
@@ -176,12 +176,12 @@ TEST(WeakestLink, PrunedTreesOfAFitLeaveLessThanThoseOfTheOrderOfGrowth) {
   EXPECT_GT(less, 0.0);
 }
 
-/// Where x1 < -1/2 noise of standard deviation 3; elsewhere the signs of x2 and x3 multiplied, noise 0.1: the first
-/// split there gains next to nothing, the second and third nearly all.
-Data signs_beside_noise(std::uint64_t seed, std::ptrdiff_t rows) {
+// Where x1 < -1/2 noise of standard deviation 3; elsewhere the signs of x2 and x3 multiplied, noise 0.1: the first
+// split there gains next to nothing, the second and third nearly all.
+Data signs_beside_noise(std::uint64_t seed, Eigen::Index rows) {
   llmt::Random random(seed);
   Data d{oracle::uniform(rows, 3, seed), Eigen::MatrixXd(rows, 2)};
-  for (std::ptrdiff_t i = 0; i < rows; ++i) {
+  for (Eigen::Index i = 0; i < rows; ++i) {
     const bool noisy = d.x(i, 0) < -0.5;
     d.y(i, 1) = noisy ? -5.0 : std::copysign(1.0, d.x(i, 1)) * std::copysign(1.0, d.x(i, 2));  // the truth
     d.y(i, 0) = d.y(i, 1) + (noisy ? 3.0 : 0.1) * random.normal();

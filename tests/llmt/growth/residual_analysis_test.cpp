@@ -13,13 +13,11 @@ namespace {
 using llmt::SignStatistics;
 
 SignStatistics statistics(const Eigen::VectorXd& x, const Eigen::VectorXd& residuals, const Eigen::VectorXd& weights) {
-  const auto span = [](const Eigen::VectorXd& values) {
-    return std::span(values.data(), static_cast<std::size_t>(values.size()));
-  };
+  const auto span = [](const Eigen::VectorXd& values) { return std::span(values.data(), values.size()); };
   return llmt::sign_statistics(span(x), span(residuals), span(weights));
 }
 
-/// Student's two-sample statistic as in a textbook, rows of weight w as w rows.
+// Student's two-sample statistic as in a textbook, rows of weight w as w rows.
 long double student(const std::vector<double>& a, const std::vector<double>& b, const std::vector<double>& weight_a,
                     const std::vector<double>& weight_b) {
   const auto moments = [](const std::vector<double>& x, const std::vector<double>& w) {
@@ -54,7 +52,7 @@ const std::vector<llmt::Node>& nodes(const llmt::FitResult& result) { return res
 TEST(ResidualAnalysis, StatisticsAreThoseOfATextbook) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     SCOPED_TRACE(seed);
-    const std::ptrdiff_t rows = 7 + 13 * static_cast<std::ptrdiff_t>(seed);
+    const Eigen::Index rows = 7 + 13 * static_cast<Eigen::Index>(seed);
     Eigen::VectorXd x = 1e6 + oracle::uniform(rows, 1, seed).col(0).array().cube();
     const Eigen::VectorXd residuals = oracle::uniform(rows, 1, seed + 100).col(0) + 1e-1 * (x.array() - 1e6).matrix();
     Eigen::VectorXd weights = oracle::uniform(rows, 1, seed + 200).col(0).array().abs() + 0.2;
@@ -64,7 +62,7 @@ TEST(ResidualAnalysis, StatisticsAreThoseOfATextbook) {
     x(3) = std::nan("");
     std::array<std::vector<double>, 2> of_class;
     std::array<std::vector<double>, 2> weight;
-    for (std::ptrdiff_t i = 0; i < rows; ++i) {
+    for (Eigen::Index i = 0; i < rows; ++i) {
       if (!std::isnan(x(i))) {
         of_class[residuals(i) >= 0.0 ? 0 : 1].push_back(x(i));
         weight[residuals(i) >= 0.0 ? 0 : 1].push_back(weights(i));
@@ -122,7 +120,7 @@ TEST(ResidualAnalysis, ConstantInputsAndEmptyClassesTellNothingAndPureClassesEve
   EXPECT_TRUE(std::isinf(statistics(1e6 + residuals.array(), residuals, ones).means));
 }
 
-/// Input that the root of a tree of y is split on.
+// Input that the root of a tree of y is split on.
 int first_input(const Eigen::MatrixXd& x, const Eigen::VectorXd& y, double* threshold = nullptr) {
   const llmt::FitResult result = grow(x, y);
   if (threshold != nullptr) {
@@ -169,7 +167,7 @@ TEST(ResidualAnalysis, PureNoiseIsRarelySplit) {
 }
 
 TEST(ResidualAnalysis, CostOfANodeDoesNotDependOnItsRows) {
-  for (const std::ptrdiff_t rows : {1000, 10000, 40000}) {
+  for (const Eigen::Index rows : {1000, 10000, 40000}) {
     SCOPED_TRACE(rows);
     llmt::FitOptions options;
     options.growth.max_leaves = 6;
@@ -186,7 +184,7 @@ TEST(ResidualAnalysis, ThresholdsThatLeaveTooFewRowsGiveWayToTheNextInput) {
   Eigen::MatrixXd x = oracle::uniform(300, 2, 9);
   Eigen::VectorXd y = x.col(1).cwiseAbs();
   x.col(0) = x.col(0) * 1e-6;
-  for (std::ptrdiff_t i = 0; i < 3; ++i) {
+  for (Eigen::Index i = 0; i < 3; ++i) {
     x(i, 0) = 50.0;
     y(i) = 5.0;
   }
@@ -254,12 +252,12 @@ TEST(ResidualAnalysis, OffsetsAndScalesDoNotChangeTheTree) {
 }
 
 TEST(ResidualAnalysis, CategoriesMissingValuesAndWeightsAreFollowed) {
-  for (const std::ptrdiff_t rows : {900, 6000}) {  // small and large nodes
+  for (const Eigen::Index rows : {900, 6000}) {  // small and large nodes
     SCOPED_TRACE(rows);
     Eigen::MatrixXd x = oracle::firm(oracle::uniform(rows, 3, 21));
     x.col(2) = ((x.col(2).array() + 1.0) * 2.5).floor().cwiseMin(4.0);
     Eigen::VectorXd y(rows);
-    for (std::ptrdiff_t i = 0; i < rows; ++i) {
+    for (Eigen::Index i = 0; i < rows; ++i) {
       y(i) = (x(i, 2) == 1.0 || x(i, 2) == 3.0 ? 4.0 : -4.0) * x(i, 0);
     }
     llmt::FitOptions options;
@@ -274,11 +272,11 @@ TEST(ResidualAnalysis, CategoriesMissingValuesAndWeightsAreFollowed) {
     Eigen::VectorXd z = gappy.col(0);
     options.categorical_inputs = {};
     options.weights = Eigen::VectorXd::Ones(rows);
-    for (std::ptrdiff_t i = 0; i < rows; i += 3) {
+    for (Eigen::Index i = 0; i < rows; i += 3) {
       gappy(i, 1) = std::nan("");
       z(i) += 7.0;
     }
-    for (std::ptrdiff_t i = 1; i < rows; i += 3) {
+    for (Eigen::Index i = 1; i < rows; i += 3) {
       options.weights(i) = 0.0;
       z(i) = 1e3;
     }

@@ -10,12 +10,12 @@
 
 namespace {
 
-/// Two leaves, no test of whether the split is worth it, as grown.
-std::vector<llmt::Node> one_split(const Eigen::MatrixXd& x, const Eigen::MatrixXd& y, std::ptrdiff_t min_leaf) {
-  std::vector<int> inputs(static_cast<std::size_t>(x.cols()));
+// Two leaves, no test of whether the split is worth it, as grown.
+std::vector<llmt::Node> one_split(const Eigen::MatrixXd& x, const Eigen::MatrixXd& y, Eigen::Index min_leaf) {
+  std::vector<int> inputs(x.cols());
   std::iota(inputs.begin(), inputs.end(), 0);
   const llmt::Table table{x, y, Eigen::VectorXd::Ones(x.rows()), std::vector<int>(inputs.size(), 0), inputs, inputs};
-  std::vector<int> rows(static_cast<std::size_t>(x.rows()));
+  std::vector<int> rows(x.rows());
   std::iota(rows.begin(), rows.end(), 0);
   const llmt::TrainingRows training = llmt::training_rows(table, rows);
   llmt::GrowthProblem problem{&training, {0}, {}, 0};
@@ -24,15 +24,13 @@ std::vector<llmt::Node> one_split(const Eigen::MatrixXd& x, const Eigen::MatrixX
   return llmt::grow(problem).nodes;
 }
 
-void expect_brute_force_split(const Eigen::MatrixXd& x, const Eigen::MatrixXd& y, std::ptrdiff_t min_leaf,
+void expect_brute_force_split(const Eigen::MatrixXd& x, const Eigen::MatrixXd& y, Eigen::Index min_leaf,
                               double tolerance = 1e-11) {
   const oracle::Split expected = oracle::best_split(x, y, min_leaf, llmt::tie_tolerance);
   const std::vector<llmt::Node> nodes = one_split(x, y, min_leaf);
   const llmt::Node& root = nodes[0];
   ASSERT_EQ(root.split_input, expected.input);
-  if (expected.input < 0) {
-    return;
-  }
+  if (expected.input < 0) return;
   EXPECT_GE(root.threshold, expected.low);
   EXPECT_LT(root.threshold, expected.high);
   EXPECT_NEAR(nodes[1].rss(0) + nodes[2].rss(0), static_cast<double>(expected.rss), tolerance * root.rss(0));
@@ -41,9 +39,9 @@ void expect_brute_force_split(const Eigen::MatrixXd& x, const Eigen::MatrixXd& y
 TEST(SplitSearch, BestSplitEqualsBruteForceRefit) {
   for (std::uint64_t seed = 1; seed <= 30; ++seed) {
     SCOPED_TRACE(seed);
-    const std::ptrdiff_t columns = 1 + static_cast<std::ptrdiff_t>(seed % 4);
-    const Eigen::MatrixXd x = oracle::uniform(60, std::max<std::ptrdiff_t>(columns, 2), seed);
-    expect_brute_force_split(x, oracle::curved(x, 0.1, seed), 3 + static_cast<std::ptrdiff_t>(seed % 5));
+    const Eigen::Index columns = 1 + static_cast<Eigen::Index>(seed % 4);
+    const Eigen::MatrixXd x = oracle::uniform(60, std::max<Eigen::Index>(columns, 2), seed);
+    expect_brute_force_split(x, oracle::curved(x, 0.1, seed), 3 + static_cast<Eigen::Index>(seed % 5));
   }
 }
 

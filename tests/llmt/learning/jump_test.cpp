@@ -27,11 +27,11 @@ TEST(JumpingTruth, DefaultIsNeverMuchWorseThanTheCrispTree) {
       const Eigen::MatrixXd test = oracle::uniform(4000, 2, 1000 + seed);
       llmt::Random random(seed);
       Eigen::VectorXd y(x.rows());
-      for (std::ptrdiff_t i = 0; i < x.rows(); ++i) {
+      for (Eigen::Index i = 0; i < x.rows(); ++i) {
         y(i) = truth.value(x(i, 0), x(i, 1)) + 0.1 * random.normal();
       }
       Eigen::VectorXd expected(test.rows());
-      for (std::ptrdiff_t i = 0; i < test.rows(); ++i) {
+      for (Eigen::Index i = 0; i < test.rows(); ++i) {
         expected(i) = truth.value(test(i, 0), test(i, 1));
       }
       llmt::FitOptions crisp;

@@ -13,10 +13,10 @@
 
 namespace {
 
-constexpr std::ptrdiff_t rows = 4000;
-constexpr std::ptrdiff_t columns = 10;
+constexpr Eigen::Index rows = 4000;
+constexpr Eigen::Index columns = 10;
 
-/// Two regimes, a kink and a line; x uniform on [0, 1]^10, noise of variance 1.
+// Two regimes, a kink and a line; x uniform on [0, 1]^10, noise of variance 1.
 double regimes(const Eigen::VectorXd& x) {
   const double regime = x(0) < 0.4 ? 10.0 * std::sin(std::numbers::pi * x(1) * x(2)) + 5.0 * x(3)
                                    : 20.0 * (x(4) - 0.5) * (x(4) - 0.5) + 10.0 * x(5) * x(6) - 5.0;
@@ -31,8 +31,8 @@ struct Sample {
 Sample sample(std::uint64_t seed) {
   llmt::Random random(seed);
   Sample result{Eigen::MatrixXd(rows, columns), Eigen::MatrixXd(rows, 1)};
-  for (std::ptrdiff_t i = 0; i < rows; ++i) {
-    for (std::ptrdiff_t j = 0; j < columns; ++j) {
+  for (Eigen::Index i = 0; i < rows; ++i) {
+    for (Eigen::Index j = 0; j < columns; ++j) {
       result.x(i, j) = random.uniform();
     }
     result.y(i, 0) = regimes(result.x.row(i).transpose()) + random.normal();
@@ -53,7 +53,7 @@ class Robustness : public testing::Test {
     base = r_squared(*model, test);
   }
 
-  /// R2 of a default fit, recorded with the test.
+  // R2 of a default fit, recorded with the test.
   double refitted(const Sample& on, const Sample& with) {
     const double found = r_squared(llmt::fit(on.x, on.y).model, with);
     RecordProperty("r_squared", std::to_string(found));
@@ -87,7 +87,7 @@ TEST_F(Robustness, OutputWithOffset) {
 
 TEST_F(Robustness, InputsWithOffsets) {
   const auto moved = [](Sample s) {
-    for (std::ptrdiff_t j = 0; j < columns; ++j) {
+    for (Eigen::Index j = 0; j < columns; ++j) {
       s.x.col(j).array() += j % 2 == 1 ? 1e6 : 1e8;
     }
     return s;
@@ -97,7 +97,7 @@ TEST_F(Robustness, InputsWithOffsets) {
 
 TEST_F(Robustness, InputsOfDifferentScales) {
   const auto scaled = [](Sample s) {
-    for (std::ptrdiff_t j = 0; j < columns; ++j) {
+    for (Eigen::Index j = 0; j < columns; ++j) {
       s.x.col(j) *= j % 2 == 1 ? 1e-8 : 1e8;
     }
     return s;
@@ -130,8 +130,8 @@ TEST_F(Robustness, FivePercentOfTheInputsMissing) {
 TEST_F(Robustness, FarRowsAlongAnInputThatIsLinear) {
   llmt::Random random(5);
   Sample far = test;
-  for (std::ptrdiff_t i = 0; i < rows / 100; ++i) {
-    const std::ptrdiff_t row = static_cast<std::ptrdiff_t>(random.below(rows));
+  for (Eigen::Index i = 0; i < rows / 100; ++i) {
+    const Eigen::Index row = static_cast<Eigen::Index>(random.below(rows));
     far.y(row, 0) += 2.0 * (10.0 - far.x(row, 8));
     far.x(row, 8) = 10.0;
   }

@@ -73,7 +73,7 @@ TEST(Model, LeverageOfALeafIsThatOfItsLeastSquares) {
       if (leaf_of_query(i, 0) == k) {
         const Eigen::Vector3d at(1.0, query(i, 0), query(i, 1));
         const double expected = at.dot(gram.inverse() * at);
-        EXPECT_NEAR(found[static_cast<std::size_t>(i)].leverage / expected, 1.0, 1e-9);
+        EXPECT_NEAR(found[i].leverage / expected, 1.0, 1e-9);
       }
     }
   }
@@ -95,8 +95,8 @@ TEST(Model, RejectsQueriesThatDoNotFit) {
 TEST(Model, LeavesCoverTheSpaceOnce) {
   const llmt::Model model = example();
   const Eigen::MatrixXd query = 3.0 * oracle::uniform(500, 2, 32);
-  for (std::ptrdiff_t p = 0; p < 2; ++p) {
-    for (std::ptrdiff_t i = 0; i < query.rows(); ++i) {
+  for (Eigen::Index p = 0; p < 2; ++p) {
+    for (Eigen::Index i = 0; i < query.rows(); ++i) {
       int holding = 0;
       for (const llmt::Leaf& leaf : model.leaves(p)) {
         holding += (query.row(i).transpose().array() > leaf.low.array()).all() &&
@@ -157,9 +157,7 @@ TEST(ModelFile, AFailedWriteLosesNothing) {
 }
 
 TEST(ModelFile, AFullDiskIsReported) {
-  if (!std::filesystem::exists("/dev/full")) {
-    return;
-  }
+  if (!std::filesystem::exists("/dev/full")) return;
   try {
     llmt::write_file("/dev/full", "x");
     FAIL() << "no error";

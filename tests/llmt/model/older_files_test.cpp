@@ -11,8 +11,8 @@
 
 namespace {
 
-/// Node 3 shares the local model of node 1: beyond the range of its rows the root's slopes take over, not those of its
-/// parent, node 2.
+// Node 3 shares the local model of node 1: beyond the range of its rows the root's slopes take over, not those of its
+// parent, node 2.
 const std::string shared_leaves =
     R"(
 {"format": "llmt-model", "version": 2, "inputs": [{"name": "a", "low": -0.998, "high": 0.992, "centre": -0.04149},
@@ -37,7 +37,7 @@ void replace(std::string& text, const std::string& from, const std::string& to) 
   }
 }
 
-/// The same as a blend with two continuous derivatives.
+// The same as a blend with two continuous derivatives.
 std::string two_derivatives() {
   std::string text = shared_leaves;
   replace(text, R"("kind": "crisp")", R"("kind": "blend")");
@@ -47,7 +47,7 @@ std::string two_derivatives() {
   return text;
 }
 
-/// Inside the ranges of the leaves, beyond those of node 3, beyond the training extent, and with a missing value.
+// Inside the ranges of the leaves, beyond those of node 3, beyond the training extent, and with a missing value.
 Eigen::MatrixXd queries() {
   Eigen::MatrixXd x(8, 2);
   x << 0.5, -0.5, -0.5, 0.5, 0.9, -0.95, -0.9, -0.9, 0.1, 0.1, 5.0, -5.0, -4.0, 3.0,
@@ -55,7 +55,7 @@ Eigen::MatrixXd queries() {
   return x;
 }
 
-/// What the version that wrote such files predicted; only the fifth query lies on a transition.
+// What the version that wrote such files predicted; only the fifth query lies on a transition.
 Eigen::VectorXd recorded(double on_the_transition) {
   Eigen::VectorXd y(8);
   y << 0.25418078, -0.25781921999999996, 0.3945501320000001, -1.469189868, on_the_transition, -0.2017532795000001,
@@ -63,7 +63,7 @@ Eigen::VectorXd recorded(double on_the_transition) {
   return y;
 }
 
-/// The predictions are the recorded ones, by the library, by the oracle, and after the file was written anew.
+// The predictions are the recorded ones, by the library, by the oracle, and after the file was written anew.
 void expect_recorded(const std::string& file, const Eigen::VectorXd& expected) {
   const llmt::Model model = llmt::from_json(file);
   EXPECT_LT((model.predict(queries()).col(0) - expected).cwiseAbs().maxCoeff(), 1e-14);

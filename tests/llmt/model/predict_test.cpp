@@ -31,7 +31,7 @@ struct Kind {
   bool oblique = false;  // splits on numbers
 };
 
-Eigen::VectorXd normal(std::ptrdiff_t size, llmt::Random& random) {
+Eigen::VectorXd normal(Eigen::Index size, llmt::Random& random) {
   Eigen::VectorXd values(size);
   for (double& value : values) {
     value = random.normal();
@@ -39,10 +39,10 @@ Eigen::VectorXd normal(std::ptrdiff_t size, llmt::Random& random) {
   return values;
 }
 
-/// Its ranges are cut out of low ... high.
-llmt::Node local_model(std::ptrdiff_t outputs, const Eigen::VectorXd& low, const Eigen::VectorXd& high,
+// Its ranges are cut out of low ... high.
+llmt::Node local_model(Eigen::Index outputs, const Eigen::VectorXd& low, const Eigen::VectorXd& high,
                        llmt::Random& random) {
-  const std::ptrdiff_t regressors = low.size();
+  const Eigen::Index regressors = low.size();
   llmt::Node node;
   node.samples = 100;
   node.rank = static_cast<int>(regressors) + 1;
@@ -60,9 +60,9 @@ llmt::Node local_model(std::ptrdiff_t outputs, const Eigen::VectorXd& low, const
 }
 
 llmt::Partition random_partition(const Kind& kind, std::vector<int> outputs,
-                                 const std::vector<llmt::InputColumn>& inputs, std::ptrdiff_t regressors,
+                                 const std::vector<llmt::InputColumn>& inputs, Eigen::Index regressors,
                                  llmt::Random& random) {
-  const std::ptrdiff_t served = std::ssize(outputs);
+  const Eigen::Index served = std::ssize(outputs);
   llmt::Partition partition{
       .outputs = std::move(outputs),
       .validity = {kind.validity, kind.validity == ValidityKind::gaussian ? 0.4 : 1.0, kind.smoothness},
@@ -84,7 +84,7 @@ llmt::Partition random_partition(const Kind& kind, std::vector<int> outputs,
     node.right = count + 1;
     node.split_input = static_cast<int>(random.uniform() * static_cast<double>(inputs.size()));
     node.missing_left = random.uniform() < 0.3 ? 1.0 : random.uniform();
-    const llmt::InputColumn& input = inputs[static_cast<std::size_t>(node.split_input)];
+    const llmt::InputColumn& input = inputs[node.split_input];
     if (input.is_categorical()) {
       for (std::size_t level = 0; level < input.levels.size(); ++level) {
         node.level_side.push_back(static_cast<int>(random.uniform() * 3.0) - 1);
@@ -93,8 +93,8 @@ llmt::Partition random_partition(const Kind& kind, std::vector<int> outputs,
       const double from = low[index](node.split_input);
       const double to = high[index](node.split_input);
       node.threshold = from + random.uniform(0.2, 0.8) * (to - from);
-      high[static_cast<std::size_t>(count)](node.split_input) = node.threshold;
-      low[static_cast<std::size_t>(count) + 1](node.split_input) = node.threshold;
+      high[count](node.split_input) = node.threshold;
+      low[count + 1](node.split_input) = node.threshold;
       if (kind.validity == ValidityKind::blend && random.uniform() < 0.9) {
         node.half_width = std::min(node.threshold - from, to - node.threshold);
       }
@@ -153,13 +153,13 @@ llmt::Model random_model(const Kind& kind, std::uint64_t seed) {
   return {inputs, outputs, regressors, partitions};
 }
 
-/// Rows inside, outside and on thresholds; with and without missing values and levels that nobody knows.
-Eigen::MatrixXd queries(const Kind& kind, const llmt::Model& model, std::ptrdiff_t rows, std::uint64_t seed) {
+// Rows inside, outside and on thresholds; with and without missing values and levels that nobody knows.
+Eigen::MatrixXd queries(const Kind& kind, const llmt::Model& model, Eigen::Index rows, std::uint64_t seed) {
   llmt::Random random(seed);
   Eigen::MatrixXd x(rows, kind.inputs);
-  for (std::ptrdiff_t i = 0; i < rows; ++i) {
+  for (Eigen::Index i = 0; i < rows; ++i) {
     const double reach = i % 3 == 0 ? 2.0 : 0.9;
-    for (std::ptrdiff_t j = 0; j < kind.inputs; ++j) {
+    for (Eigen::Index j = 0; j < kind.inputs; ++j) {
       x(i, j) =
           j < kind.inputs - kind.categories ? random.uniform(-reach, reach) : std::floor(random.uniform(0.0, 4.2));
       if (i % 5 == 0 && random.uniform() < 0.3) {
@@ -167,7 +167,7 @@ Eigen::MatrixXd queries(const Kind& kind, const llmt::Model& model, std::ptrdiff
       }
     }
     const std::vector<llmt::Node>& nodes = model.partitions()[0].nodes;
-    const llmt::Node& node = nodes[static_cast<std::size_t>(i) % nodes.size()];
+    const llmt::Node& node = nodes[i % nodes.size()];
     if (i % 7 == 0 && !node.is_leaf() && node.level_side.empty()) {
       x(i, node.split_input) = node.threshold;
     }
@@ -177,15 +177,15 @@ Eigen::MatrixXd queries(const Kind& kind, const llmt::Model& model, std::ptrdiff
 
 bool same_bytes(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
   return a.rows() == b.rows() && a.cols() == b.cols() &&
-         std::memcmp(a.data(), b.data(), static_cast<std::size_t>(a.size()) * sizeof(double)) == 0;
+         std::memcmp(a.data(), b.data(), a.size() * sizeof(double)) == 0;
 }
 
 void PrintTo(const Kind& kind, std::ostream* out) { *out << kind.name; }
 
-/// As LocalModels documents it.
+// As LocalModels documents it.
 double sum_in_quads(double value, const Eigen::MatrixXd& slope, const Eigen::VectorXd& deviations) {
   double partial[4] = {};
-  for (std::ptrdiff_t k = 0; k < deviations.size(); ++k) {
+  for (Eigen::Index k = 0; k < deviations.size(); ++k) {
     partial[k % 4] += slope(0, k) * deviations(k);
   }
   return value + ((partial[0] + partial[2]) + (partial[1] + partial[3]));
@@ -193,10 +193,8 @@ double sum_in_quads(double value, const Eigen::MatrixXd& slope, const Eigen::Vec
 
 double blended(const llmt::Partition& partition, int index, double validity, const Eigen::VectorXd& row,
                const Eigen::VectorXd& deviations, double sum) {
-  const llmt::Node& node = partition.nodes[static_cast<std::size_t>(index)];
-  if (node.is_leaf()) {
-    return sum + validity * sum_in_quads(node.value(0), node.slope, deviations);
-  }
+  const llmt::Node& node = partition.nodes[index];
+  if (node.is_leaf()) return sum + validity * sum_in_quads(node.value(0), node.slope, deviations);
   const double x = row(node.split_input);
   double left = x <= node.threshold ? 1.0 : 0.0;
   if (node.half_width > 0.0) {
@@ -220,7 +218,7 @@ TEST(PredictionInQuads, IsTheSameBytesAsOneNumberAtATime) {
   const llmt::Model model(held.inputs(), held.outputs(), held.regressors(), {partition});
   const Eigen::MatrixXd x = oracle::uniform(5000, kind.inputs, 22);
   Eigen::VectorXd expected(x.rows());
-  for (std::ptrdiff_t i = 0; i < x.rows(); ++i) {
+  for (Eigen::Index i = 0; i < x.rows(); ++i) {
     const Eigen::VectorXd row = x.row(i).transpose();
     expected(i) = blended(partition, 0, 1.0, row, oracle::deviations(model, row), 0.0);
   }
@@ -242,21 +240,21 @@ TEST_P(Prediction, IsWhatTheEquationsSay) {
 
 TEST_P(Prediction, OfARowDoesNotDependOnTheOthers) {
   const llmt::Model model = random_model(GetParam(), 7);
-  const std::ptrdiff_t rows = 9001;
+  const Eigen::Index rows = 9001;
   const Eigen::MatrixXd x = queries(GetParam(), model, rows, 8);
   const Eigen::MatrixXd together = model.predict(x, 1);
   for (const int threads : {0, 2, 3}) {
     EXPECT_TRUE(same_bytes(model.predict(x, threads), together)) << threads;
   }
-  for (std::ptrdiff_t i = 0; i < rows; i += 7) {
+  for (Eigen::Index i = 0; i < rows; i += 7) {
     ASSERT_TRUE(same_bytes(model.predict(x.row(i)), together.row(i))) << i;
   }
-  for (const std::ptrdiff_t size : {2, 8, 15, 16, 17, 33, 1000}) {
-    for (std::ptrdiff_t begin = 0; begin + size <= rows; begin += 1300) {
+  for (const Eigen::Index size : {2, 8, 15, 16, 17, 33, 1000}) {
+    for (Eigen::Index begin = 0; begin + size <= rows; begin += 1300) {
       ASSERT_TRUE(same_bytes(model.predict(x.middleRows(begin, size)), together.middleRows(begin, size))) << size;
     }
   }
-  std::vector<int> order(static_cast<std::size_t>(rows));
+  std::vector<int> order(rows);
   std::iota(order.begin(), order.end(), 0);
   llmt::Random random(9);
   for (std::size_t i = order.size() - 1; i > 0; --i) {
@@ -272,26 +270,26 @@ TEST_P(Prediction, ValiditiesAndWhatFollowsFromThem) {
   const std::vector<llmt::Extrapolation> extrapolation = model.extrapolation(x);
   const Eigen::MatrixXd standard_errors = model.standard_errors(x);
   Eigen::VectorXd leverage = Eigen::VectorXd::Zero(x.rows());
-  for (std::ptrdiff_t p = 0; p < std::ssize(model.partitions()); ++p) {
-    const llmt::Partition& partition = model.partitions()[static_cast<std::size_t>(p)];
+  for (Eigen::Index p = 0; p < std::ssize(model.partitions()); ++p) {
+    const llmt::Partition& partition = model.partitions()[p];
     const std::vector<llmt::Leaf> leaves = model.leaves(p);
     const Eigen::MatrixXd found = model.validities(x, p);
     double rank = 0.0;
     Eigen::VectorXd rss = Eigen::VectorXd::Zero(std::ssize(partition.outputs));
     for (const llmt::Leaf& leaf : leaves) {
       rank += leaf.rank;
-      rss += partition.nodes[static_cast<std::size_t>(leaf.node)].rss;
+      rss += partition.nodes[leaf.node].rss;
     }
     const Eigen::VectorXd pooled = rss / std::max(1.0, 100.0 - rank);
-    for (std::ptrdiff_t i = 0; i < x.rows(); ++i) {
+    for (Eigen::Index i = 0; i < x.rows(); ++i) {
       const std::vector<double> expected = oracle::validities(model, partition, x.row(i).transpose());
       double largest = 0.0;
       double of_row = 0.0;
       Eigen::VectorXd variance = Eigen::VectorXd::Zero(std::ssize(partition.outputs));
       for (std::size_t k = 0; k < leaves.size(); ++k) {
-        const llmt::Node& node = partition.nodes[static_cast<std::size_t>(leaves[k].node)];
-        const double validity = expected[static_cast<std::size_t>(leaves[k].node)];
-        ASSERT_NEAR(found(i, static_cast<std::ptrdiff_t>(k)), validity, 1e-13);
+        const llmt::Node& node = partition.nodes[leaves[k].node];
+        const double validity = expected[leaves[k].node];
+        ASSERT_NEAR(found(i, k), validity, 1e-13);
         largest = std::max(largest, validity);
         Eigen::VectorXd a(node.mean.size() + 1);
         a << 1.0, oracle::deviations(model, x.row(i).transpose());
@@ -300,17 +298,16 @@ TEST_P(Prediction, ValiditiesAndWhatFollowsFromThem) {
         of_row += validity * quadratic;
         variance += validity * quadratic * (node.rss + 10.0 * pooled) / (std::max(0.0, 100.0 - node.rank) + 10.0);
       }
-      EXPECT_NEAR(expected[static_cast<std::size_t>(leaves[static_cast<std::size_t>(leaf_of(i, p))].node)], largest,
-                  1e-13);
+      EXPECT_NEAR(expected[leaves[leaf_of(i, p)].node], largest, 1e-13);
       leverage(i) = std::max(leverage(i), of_row);
       for (std::size_t o = 0; o < partition.outputs.size(); ++o) {
-        const double expected_error = std::sqrt(variance(static_cast<std::ptrdiff_t>(o)));
+        const double expected_error = std::sqrt(variance(o));
         EXPECT_NEAR(standard_errors(i, partition.outputs[o]) / expected_error, 1.0, 1e-11);
       }
     }
   }
-  for (std::ptrdiff_t i = 0; i < x.rows(); ++i) {
-    EXPECT_NEAR(extrapolation[static_cast<std::size_t>(i)].leverage / leverage(i), 1.0, 1e-11);
+  for (Eigen::Index i = 0; i < x.rows(); ++i) {
+    EXPECT_NEAR(extrapolation[i].leverage / leverage(i), 1.0, 1e-11);
   }
 }
 

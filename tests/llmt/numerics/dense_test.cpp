@@ -14,16 +14,16 @@ namespace {
 
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-RowMajor positive_definite(std::ptrdiff_t size, std::uint64_t seed) {
+RowMajor positive_definite(Eigen::Index size, std::uint64_t seed) {
   const Eigen::MatrixXd a = oracle::uniform(size + 5, size, seed);
   return a.transpose() * a + 0.1 * Eigen::MatrixXd::Identity(size, size);
 }
 
 TEST(Dense, ProductIsThatOfEigen) {
   // Every element is a sum of `depth` products of numbers below 1, which rounds by at most depth^2 units of 1e-16.
-  for (const std::ptrdiff_t rows : {1, 3, 7, 63, 65, 130}) {
-    for (const std::ptrdiff_t columns : {1, 5, 8, 9, 127}) {
-      for (const std::ptrdiff_t depth : {1, 2, 33, 255, 257, 600}) {
+  for (const Eigen::Index rows : {1, 3, 7, 63, 65, 130}) {
+    for (const Eigen::Index columns : {1, 5, 8, 9, 127}) {
+      for (const Eigen::Index depth : {1, 2, 33, 255, 257, 600}) {
         const RowMajor a = oracle::uniform(depth, rows, 1);
         const RowMajor b = oracle::uniform(depth, columns, 2);
         for (const double sign : {1.0, -1.0}) {
@@ -52,12 +52,12 @@ TEST(Dense, ProductOfPartsOfMatricesLeavesTheRestAlone) {
 }
 
 TEST(Dense, FactorAndSolutionAreThoseOfEigen) {
-  std::vector<std::ptrdiff_t> sizes;
-  for (std::ptrdiff_t size = 1; size <= 130; ++size) {
+  std::vector<Eigen::Index> sizes;
+  for (Eigen::Index size = 1; size <= 130; ++size) {
     sizes.push_back(size);
   }
   sizes.insert(sizes.end(), {255, 256, 257, 300, 513});  // around the panels
-  for (const std::ptrdiff_t size : sizes) {
+  for (const Eigen::Index size : sizes) {
     SCOPED_TRACE(size);
     const RowMajor matrix = positive_definite(size, static_cast<std::uint64_t>(size));
     RowMajor factor = matrix;
@@ -74,9 +74,9 @@ TEST(Dense, FactorAndSolutionAreThoseOfEigen) {
 }
 
 TEST(Dense, MatrixThatIsNotPositiveDefiniteIsRefused) {
-  for (const std::ptrdiff_t size : {1, 2, 31, 33, 65, 130, 300}) {
+  for (const Eigen::Index size : {1, 2, 31, 33, 65, 130, 300}) {
     SCOPED_TRACE(size);
-    for (const std::ptrdiff_t at : {std::ptrdiff_t{0}, size / 2, size - 1}) {
+    for (const Eigen::Index at : {Eigen::Index{0}, size / 2, size - 1}) {
       RowMajor negative = positive_definite(size, 8);
       negative(at, at) = -1.0;
       EXPECT_FALSE(llmt::factor_cholesky(negative));

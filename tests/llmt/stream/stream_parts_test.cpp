@@ -22,7 +22,7 @@ using llmt::GramShape;
 using llmt::StreamOptions;
 using namespace stream_data;
 
-llmt::StreamSetting setting_for(std::ptrdiff_t inputs, StreamOptions options = {}) {
+llmt::StreamSetting setting_for(Eigen::Index inputs, StreamOptions options = {}) {
   options.min_leaf_samples = 2 * (inputs + 1);
   options.max_leaves = 100;
   return {.options = options,
@@ -34,15 +34,15 @@ llmt::StreamSetting setting_for(std::ptrdiff_t inputs, StreamOptions options = {
           .scale = Eigen::VectorXd::Ones(inputs)};
 }
 
-llmt::Basis origin_basis(std::ptrdiff_t inputs) {
+llmt::Basis origin_basis(Eigen::Index inputs) {
   return {Eigen::VectorXd::Zero(inputs), Eigen::VectorXd::Zero(inputs + 1)};
 }
 
 std::vector<double> sums_of(const GramShape& shape, const llmt::Basis& basis, const Eigen::MatrixXd& x,
                             const Eigen::MatrixXd& y, const Eigen::VectorXd& weights) {
   llmt::RowProducts products(shape);
-  std::vector<double> gram(static_cast<std::size_t>(shape.size()), 0.0);
-  for (std::ptrdiff_t i = 0; i < x.rows(); ++i) {
+  std::vector<double> gram(shape.size(), 0.0);
+  for (Eigen::Index i = 0; i < x.rows(); ++i) {
     const Eigen::VectorXd row = x.row(i).transpose();
     products.set(basis, row.data(), y(i, 0), weights(i));
     products.add_to(gram.data());
@@ -115,7 +115,7 @@ TEST(StreamSearch, EveryEdgeLeavesWhatBruteForceRefitsLeave) {
   llmt::LeafSearch search(setting);
   const llmt::Basis basis = origin_basis(3);
   llmt::RowProducts products(setting.shape);
-  for (std::ptrdiff_t i = 0; i < x.rows(); ++i) {
+  for (Eigen::Index i = 0; i < x.rows(); ++i) {
     const Eigen::VectorXd row = x.row(i).transpose();
     products.set(basis, row.data(), y(i, 0), 1.0);
     search.add({row.data(), row.data(), y(i, 0), 1.0, 1.0}, basis, products);
@@ -124,9 +124,9 @@ TEST(StreamSearch, EveryEdgeLeavesWhatBruteForceRefitsLeave) {
     const llmt::LeafSearch::Edges edges = search.edges(input);
     ASSERT_GE(edges.thresholds.size(), input == 1 ? 5U : 13U);
     for (std::size_t e = 0; e < edges.thresholds.size(); ++e) {
-      std::vector<std::ptrdiff_t> left;
-      std::vector<std::ptrdiff_t> right;
-      for (std::ptrdiff_t i = 0; i < x.rows(); ++i) {
+      std::vector<Eigen::Index> left;
+      std::vector<Eigen::Index> right;
+      for (Eigen::Index i = 0; i < x.rows(); ++i) {
         if (!std::isnan(x(i, input))) {
           (x(i, input) <= edges.thresholds[e] ? left : right).push_back(i);
         }
@@ -170,9 +170,9 @@ TEST(StreamTree, AThresholdStaysWhereItIsRight) {
   }
 }
 
-/// Learns rows of weight 1 that come once.
+// Learns rows of weight 1 that come once.
 void learn(llmt::StreamTree& tree, const Eigen::MatrixXd& x, const Eigen::MatrixXd& y) {
-  for (std::ptrdiff_t i = 0; i < x.rows(); ++i) {
+  for (Eigen::Index i = 0; i < x.rows(); ++i) {
     const Eigen::VectorXd row = x.row(i).transpose();
     tree.learn({row.data(), row.data(), y(i, 0), 1.0, 1.0});
   }
@@ -200,7 +200,7 @@ TEST(StreamTree, WithoutAlarmsAChangeIsLearnedFarMoreSlowly) {
     llmt::StreamTree tree(setting, Eigen::VectorXd::Zero(3));
     learn(tree, x.topRows(6000), kink(x.topRows(6000)) + 0.1 * noise(6000, 2));
     learn(tree, x.bottomRows(6000), -kink(x.bottomRows(6000)) + 0.1 * noise(6000, 3));
-    for (std::ptrdiff_t i = 0; i < query.rows(); ++i) {
+    for (Eigen::Index i = 0; i < query.rows(); ++i) {
       const Eigen::VectorXd row = query.row(i).transpose();
       const double error = tree.predict({row.data(), row.data(), 0.0, 1.0, 1.0}) + kink(query.row(i))(0, 0);
       errors[detect ? 0 : 1] += error * error;
@@ -231,10 +231,10 @@ TEST(Reservoir, IsTheSameWhateverTheOrderAndKnowsRowsAgain) {
   llmt::Random random(1);
   llmt::Reservoir forward(50, 2);
   llmt::Reservoir shuffled(50, 2);
-  const std::vector<std::ptrdiff_t> order = random.permutation(500);
-  for (std::ptrdiff_t i = 0; i < 500; ++i) {
+  const std::vector<Eigen::Index> order = random.permutation(500);
+  for (Eigen::Index i = 0; i < 500; ++i) {
     const Eigen::VectorXd first = x.row(i).transpose();
-    const Eigen::VectorXd second = x.row(order[static_cast<std::size_t>(i)]).transpose();
+    const Eigen::VectorXd second = x.row(order[i]).transpose();
     forward.add(first.data());
     shuffled.add(second.data());
   }
@@ -245,7 +245,7 @@ TEST(Reservoir, IsTheSameWhateverTheOrderAndKnowsRowsAgain) {
     EXPECT_EQ(left->second.values, right->second.values);
   }
   for (int pass = 0; pass < 3; ++pass) {
-    for (std::ptrdiff_t i = 0; i < 500; ++i) {
+    for (Eigen::Index i = 0; i < 500; ++i) {
       const Eigen::VectorXd row = x.row(i).transpose();
       forward.add(row.data());
     }
@@ -285,14 +285,14 @@ TEST(BlendCorrection, IsTheAnchoredLeastSquaresFit) {
   const Eigen::MatrixXd one =
       with_one(x.rowwise() - Eigen::RowVector2d(rows.regressors[0].centre, rows.regressors[1].centre));
   for (int i = 0; i < 4; ++i) {
-    const llmt::Node& node = partition.nodes[static_cast<std::size_t>(leaves[static_cast<std::size_t>(i)])];
+    const llmt::Node& node = partition.nodes[leaves[i]];
     a.middleCols(3 * i, 3) = phi.col(i).asDiagonal() * one;
     residual -= phi.col(i).cwiseProduct(one * (Eigen::VectorXd(3) << node.value, node.slope.transpose()).finished());
     hold.block(3 * i, 3 * i, 3, 3) = ridge * one.transpose() * phi.col(i).asDiagonal() * one;
   }
   const Eigen::VectorXd change = (a.transpose() * a + hold).llt().solve(a.transpose() * residual);
   for (int i = 0; i < 4; ++i) {
-    const std::size_t node = static_cast<std::size_t>(leaves[static_cast<std::size_t>(i)]);
+    const std::size_t node = leaves[i];
     const Eigen::Vector3d found(corrected.nodes[node].value(0) - partition.nodes[node].value(0),
                                 corrected.nodes[node].slope(0, 0) - partition.nodes[node].slope(0, 0),
                                 corrected.nodes[node].slope(0, 1) - partition.nodes[node].slope(0, 1));

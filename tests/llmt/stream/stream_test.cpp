@@ -39,7 +39,7 @@ TEST(Stream, OneRowAtATimeOrInBlocksGivesTheSameBytes) {
   Stream whole(3, 1);
   Stream rows(3, 1);
   whole.add(x, y);
-  for (std::ptrdiff_t i = 0; i < x.rows(); ++i) {
+  for (Eigen::Index i = 0; i < x.rows(); ++i) {
     rows.add(x.row(i), y.row(i));
   }
   EXPECT_GT(whole.counts().leaves, 1);
@@ -73,7 +73,7 @@ TEST(Stream, AJumpIsFoundFarMoreCloselyThanABinIsWide) {
   // Rows on the wrong side of the jump, as a width: a bin is 0.13 wide.
   const Eigen::MatrixXd fresh = oracle::uniform(20000, 2, 3);
   const Eigen::ArrayXd truth = (fresh.col(0).array() > 0.3713).select(4.0, fresh.col(1)).array();
-  const std::ptrdiff_t wrong = ((stream.predict(fresh).col(0).array() - truth).abs() > 1.5).count();
+  const Eigen::Index wrong = ((stream.predict(fresh).col(0).array() - truth).abs() > 1.5).count();
   EXPECT_LT(2.0 * static_cast<double>(wrong) / 20000.0, 0.01);
 }
 
@@ -155,7 +155,7 @@ TEST(Stream, NoAlarmWithoutAChange) {
 
 TEST(Stream, MemoryHasABound) {
   Stream stream(3, 1, {.max_leaves = 6, .reservoir_rows = 1000});
-  std::ptrdiff_t most = 0;
+  Eigen::Index most = 0;
   for (std::uint64_t block = 1; block <= 40; ++block) {
     const Eigen::MatrixXd x = oracle::uniform(1000, 3, block);
     stream.add(x, oracle::curved(x, 0.01, block));
@@ -163,7 +163,7 @@ TEST(Stream, MemoryHasABound) {
     most = std::max(most, stream.counts().bytes);
   }
   // Of a leaf: bins of every input; of the reservoir: what a row holds and its place in the map.
-  const std::ptrdiff_t gram = GramShape(4, 1).size() * 8;
+  const Eigen::Index gram = GramShape(4, 1).size() * 8;
   EXPECT_LE(most, 6 * (3 * 16 * gram + 20 * gram) + 1000 * (5 * 8 + 96) + 10000);
 }
 
@@ -188,7 +188,7 @@ TEST(Stream, RowsOfWeightZeroTakeNoPart) {
   Eigen::MatrixXd y = kink(x) + 0.1 * noise(2000, 2);
   Eigen::VectorXd weights = Eigen::VectorXd::Ones(2000);
   Stream kept(2, 1);
-  for (std::ptrdiff_t i = 0; i < 2000; ++i) {
+  for (Eigen::Index i = 0; i < 2000; ++i) {
     if (i % 3 == 0) {
       weights(i) = 0.0;
     } else {
@@ -245,12 +245,12 @@ TEST(Stream, LeveragesAreThoseOfAllRowsThatALeafHasSeen) {
   Eigen::MatrixXd query = x.topRows(3);
   query.row(2) << 4.0, 900.0;
   const std::vector<llmt::Extrapolation> told = model.extrapolation(query);
-  for (std::ptrdiff_t i = 0; i < 3; ++i) {
+  for (Eigen::Index i = 0; i < 3; ++i) {
     const Eigen::Vector3d row(1.0, query(i, 0), query(i, 1));
     const double leverage = row.dot((a.transpose() * a).colPivHouseholderQr().solve(row));
     // One row in eight is held out.
     const double rows = static_cast<double>(model.partitions()[0].nodes[0].samples) / 400.0;
-    EXPECT_NEAR(told[static_cast<std::size_t>(i)].leverage * rows, leverage, 0.1 * leverage) << i;
+    EXPECT_NEAR(told[i].leverage * rows, leverage, 0.1 * leverage) << i;
   }
 }
 

@@ -19,19 +19,19 @@
 namespace llmt {
 namespace {
 
-/// From this many rows on, inputs are cut into bins; nodes below the other number of rows are searched exactly even
-/// then, and by RA have features of their own. bench/search_modes prints where these pay.
-constexpr std::ptrdiff_t binned_rows = 200000;
-constexpr std::ptrdiff_t exact_rows = 2000;
+// From this many rows on, inputs are cut into bins; nodes below the other number of rows are searched exactly even
+// then, and by RA have features of their own. bench/search_modes prints where these pay.
+constexpr Eigen::Index binned_rows = 200000;
+constexpr Eigen::Index exact_rows = 2000;
 
-/// Weight of the prior in the m-estimates of RETIS, in rows: the error of one model for all data.
+// Weight of the prior in the m-estimates of RETIS, in rows: the error of one model for all data.
 constexpr double prior_rows = 2.0;
 
-/// Splits over which GrowthOptions::min_improvement takes the mean: one split alone may help little before the next one
-/// helps much.
-constexpr std::ptrdiff_t improvement_lookahead = 10;
+// Splits over which GrowthOptions::min_improvement takes the mean: one split alone may help little before the next one
+// helps much.
+constexpr Eigen::Index improvement_lookahead = 10;
 
-/// A node that may still be split.
+// A node that may still be split.
 struct OpenLeaf {
   int node = 0;
   std::variant<ExactLeaf, BinnedLeaf, SignLeaf> data;
@@ -41,8 +41,8 @@ struct OpenLeaf {
   double excess = 0.0;  // that a split inside a bin could gain on it
 };
 
-/// Which open leaf comes next: the largest gain, then the oldest node. The gain is compared in single precision, so
-/// that gains that are equal but for rounding count as equal.
+// Which open leaf comes next: the largest gain, then the oldest node. The gain is compared in single precision, so
+// that gains that are equal but for rounding count as equal.
 struct Priority {
   float gain;
   int node;
@@ -51,9 +51,7 @@ struct Priority {
 };
 
 bool by_bins(const GrowthData& data) {
-  if (data.problem.options.rule == GrowthRule::ra) {
-    return false;
-  }
+  if (data.problem.options.rule == GrowthRule::ra) return false;
   switch (data.problem.options.search) {
     case SplitSearch::exact:
       return false;
@@ -96,7 +94,7 @@ class Grower {
       split(next.leaf);
     }
     if (!stopped) {
-      stop = static_cast<StopReason>(std::max_element(refusals_.begin(), refusals_.end()) - refusals_.begin());
+      stop = static_cast<StopReason>(std::ranges::max_element(refusals_) - refusals_.begin());
     }
     gains_.resize(nodes_.size(), 0.0);
     if (options_.rule == GrowthRule::retis) {
@@ -118,7 +116,7 @@ class Grower {
 
  private:
   void open_root() {
-    const std::ptrdiff_t regressors = std::ssize(data_.training.regressors);
+    const Eigen::Index regressors = std::ssize(data_.training.regressors);
     Node parentless;
     parentless.value = Eigen::VectorXd::Zero(data_.outputs.cols());
     parentless.slope = Eigen::MatrixXd::Zero(data_.outputs.cols(), regressors);
@@ -130,7 +128,7 @@ class Grower {
     } else if (signs_) {
       root.data = signs_->root();
     } else {
-      std::vector<int> rows(static_cast<std::size_t>(data_.training.count()));
+      std::vector<int> rows(data_.training.count());
       std::iota(rows.begin(), rows.end(), 0);
       root.data = exact_.open(rows, parentless);
     }
@@ -139,9 +137,9 @@ class Grower {
     enter(std::move(root));
   }
 
-  /// Fits the leaf's local model and finds its best split.
+  // Fits the leaf's local model and finds its best split.
   void examine(OpenLeaf& leaf, const Node& parent) {
-    Node& node = nodes_[static_cast<std::size_t>(leaf.node)];
+    Node& node = nodes_[leaf.node];
     if (BinnedLeaf* const binned = std::get_if<BinnedLeaf>(&leaf.data)) {
       leaf.best = binned_->examine(*binned, parent, node, leaf.excess);
       leaf.weight = binned->weight;
@@ -156,9 +154,9 @@ class Grower {
     leaf.rss = data_.output_weights.dot(node.rss);
   }
 
-  /// Why the leaf's best split is not to be made, if so.
+  // Why the leaf's best split is not to be made, if so.
   std::optional<StopReason> refusal(const OpenLeaf& leaf) const {
-    const Node& node = nodes_[static_cast<std::size_t>(leaf.node)];
+    const Node& node = nodes_[leaf.node];
     const double samples = leaf.weight;
     if ((node.rss.array() <= samples * data_.rounding.array().square()).all()) {
       return StopReason::exact_fit;
@@ -166,9 +164,7 @@ class Grower {
     if (leaf.best.input < 0) {
       return leaf.best.tested > 0 ? StopReason::significance : StopReason::leaf_samples;
     }
-    if (options_.rule == GrowthRule::retis) {
-      return std::nullopt;
-    }
+    if (options_.rule == GrowthRule::retis) return std::nullopt;
     if (!data_.is_significant(options_.significance, samples, node.rank, leaf.rss,
                               {leaf.best.rank_left, leaf.best.rank_right}, leaf.best.rss, leaf.best.tested)) {
       return StopReason::significance;
@@ -188,17 +184,15 @@ class Grower {
   }
 
   bool improves_too_little() const {
-    const std::size_t lookahead = static_cast<std::size_t>(improvement_lookahead);
-    if (!(options_.min_improvement > 0.0) || tree_rss_.size() <= lookahead) {
-      return false;
-    }
+    const std::size_t lookahead = improvement_lookahead;
+    if (!(options_.min_improvement > 0.0) || tree_rss_.size() <= lookahead) return false;
     const double before = tree_rss_[tree_rss_.size() - 1 - lookahead];
     return tree_rss_.back() > std::pow(1.0 - options_.min_improvement, static_cast<double>(lookahead)) * before;
   }
 
-  /// Undoes the last splits, those that showed that going on does not pay.
+  // Undoes the last splits, those that showed that going on does not pay.
   void drop_lookahead() {
-    const std::ptrdiff_t leaves = std::ssize(tree_rss_) - improvement_lookahead;
+    const Eigen::Index leaves = std::ssize(tree_rss_) - improvement_lookahead;
     nodes_ = prefix(Partition{.outputs = {}, .nodes = std::move(nodes_)}, leaves).nodes;
     for (std::size_t i = 0; i < nodes_.size(); ++i) {
       gains_[i] = nodes_[i].is_leaf() ? 0.0 : gains_[i];
@@ -226,7 +220,7 @@ class Grower {
   void split(std::size_t position) {
     OpenLeaf leaf = std::move(*leaves_[position]);
     leaves_[position].reset();
-    const Node parent = nodes_[static_cast<std::size_t>(leaf.node)];
+    const Node parent = nodes_[leaf.node];
     std::array<OpenLeaf, 2> children;
     double missing_left = 0.0;
     divide(leaf, parent, children, missing_left);
@@ -235,13 +229,13 @@ class Grower {
       nodes_.emplace_back();
     }
     parallel_for(2, data_.threads_for(parent.samples * data_.split_inputs()),
-                 [&](std::ptrdiff_t side) { examine(children[static_cast<std::size_t>(side)], parent); });
-    Node& node = nodes_[static_cast<std::size_t>(leaf.node)];
+                 [&](Eigen::Index side) { examine(children[side], parent); });
+    Node& node = nodes_[leaf.node];
     gains_.resize(nodes_.size(), 0.0);
-    gains_[static_cast<std::size_t>(leaf.node)] = leaf.rss - leaf.best.rss;
+    gains_[leaf.node] = leaf.rss - leaf.best.rss;
     node.left = children[0].node;
     node.right = children[1].node;
-    node.split_input = options_.split_inputs[static_cast<std::size_t>(leaf.best.input)];
+    node.split_input = options_.split_inputs[leaf.best.input];
     node.level_side = leaf.best.level_side;
     node.threshold = leaf.best.by_missing ? std::numeric_limits<double>::max() : 0.0;
     if (!leaf.best.by_missing && node.level_side.empty()) {
@@ -270,7 +264,7 @@ class Grower {
     }
   }
 
-  /// Small parts go on as exact leaves. Returns the left one's share of the rows.
+  // Small parts go on as exact leaves. Returns the left one's share of the rows.
   template <class Leaf>
   double open_parts(const Leaf& leaf, std::array<Leaf, 2> parts, const Node& parent,
                     std::array<OpenLeaf, 2>& children) const {
@@ -286,9 +280,9 @@ class Grower {
   }
 
   double threshold(const OpenLeaf& leaf) const {
-    const Node& node = nodes_[static_cast<std::size_t>(leaf.node)];
-    const Node& left = nodes_[static_cast<std::size_t>(node.left)];
-    const Node& right = nodes_[static_cast<std::size_t>(node.right)];
+    const Node& node = nodes_[leaf.node];
+    const Node& left = nodes_[node.left];
+    const Node& right = nodes_[node.right];
     if (const BinnedLeaf* const binned = std::get_if<BinnedLeaf>(&leaf.data)) {
       return binned_->threshold(*binned, leaf.best, node, left, right);
     }
@@ -306,9 +300,9 @@ class Grower {
   std::vector<Node> nodes_;
   std::vector<std::optional<OpenLeaf>> leaves_;
   std::priority_queue<Priority> queue_;
-  std::array<std::ptrdiff_t, 9> refusals_{};  // leaves that stay, by StopReason
-  std::vector<double> tree_rss_;              // weighted, with 1, 2, ... leaves
-  std::vector<double> gains_;                 // of the nodes' splits
+  std::array<Eigen::Index, 9> refusals_{};  // leaves that stay, by StopReason
+  std::vector<double> tree_rss_;            // weighted, with 1, 2, ... leaves
+  std::vector<double> gains_;               // of the nodes' splits
   SearchSummary search_;
 };
 

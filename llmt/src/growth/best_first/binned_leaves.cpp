@@ -5,16 +5,15 @@
 namespace llmt {
 namespace {
 
-/// Histograms of leaves that wait may take this part of what the features take, and at least as much as this many
-/// nodes.
-constexpr std::ptrdiff_t kept_part = 4;
-constexpr std::ptrdiff_t kept_nodes = 8;
+// Histograms of leaves that wait may take this part of what the features take, and at least as much as this many
+// nodes.
+constexpr Eigen::Index kept_part = 4;
+constexpr Eigen::Index kept_nodes = 8;
 
 }  // namespace
 
 bool BinnedLeaves::possible(const GrowthData& data) {
-  const bool few_levels =
-      std::all_of(data.num_levels.begin(), data.num_levels.end(), [](int levels) { return levels <= most_bins; });
+  const bool few_levels = std::ranges::all_of(data.num_levels, [](int levels) { return levels <= most_bins; });
   return few_levels && is_complete(data);
 }
 
@@ -45,10 +44,8 @@ SplitCandidate BinnedLeaves::examine(BinnedLeaf& leaf, const Node& parent, Node&
 }
 
 void BinnedLeaves::wait(BinnedLeaf& leaf) {
-  if (!leaf.histogram) {
-    return;
-  }
-  const std::ptrdiff_t size = std::ssize(leaf.histogram->grams);
+  if (!leaf.histogram) return;
+  const Eigen::Index size = std::ssize(leaf.histogram->grams);
   if (size <= memory_left_) {
     memory_left_ -= size;
   } else {
@@ -58,8 +55,8 @@ void BinnedLeaves::wait(BinnedLeaf& leaf) {
 
 std::array<BinnedLeaf, 2> BinnedLeaves::divide(BinnedLeaf& leaf, const SplitCandidate& split) {
   std::array<BinnedLeaf, 2> children;
-  children[0].rows.resize(static_cast<std::size_t>(split.left));
-  children[1].rows.resize(leaf.rows.size() - static_cast<std::size_t>(split.left));
+  children[0].rows.resize(split.left);
+  children[1].rows.resize(leaf.rows.size() - split.left);
   std::array<int*, 2> next = {children[1].rows.data(), children[0].rows.data()};
   for (const int row : leaf.rows) {
     *next[rows_.goes_left(row, split) ? 1 : 0]++ = row;

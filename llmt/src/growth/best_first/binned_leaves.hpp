@@ -42,7 +42,7 @@ class BinnedLeaves {
  private:
   const GrowthData& data_;
   BinnedRows rows_;
-  std::ptrdiff_t memory_left_;  // for histograms of leaves that wait, in doubles
+  Eigen::Index memory_left_;  // for histograms of leaves that wait, in doubles
 };
 
 }  // namespace llmt

@@ -10,20 +10,20 @@
 namespace llmt {
 namespace {
 
-/// About this many rows decide where the edges lie: 250 a bin, so that a bin's share is known to 6 %.
-constexpr std::ptrdiff_t sample_rows = 65536;
+// About this many rows decide where the edges lie: 250 a bin, so that a bin's share is known to 6 %.
+constexpr Eigen::Index sample_rows = 65536;
 
-/// Rows whose values, taken together, hash to a small number: the same rows in whatever order they come.
+// Rows whose values, taken together, hash to a small number: the same rows in whatever order they come.
 std::vector<int> sample(const GrowthData& data) {
-  const std::ptrdiff_t rows = data.training.count();
-  const std::uint64_t ratio = static_cast<std::uint64_t>(std::max<std::ptrdiff_t>(1, rows / sample_rows));
-  constexpr std::ptrdiff_t block = 4096;
-  const std::ptrdiff_t blocks = (rows + block - 1) / block;
-  std::vector<std::vector<int>> taken(static_cast<std::size_t>(blocks));
-  parallel_for(blocks, data.problem.max_threads, [&](std::ptrdiff_t index) {
+  const Eigen::Index rows = data.training.count();
+  const std::uint64_t ratio = static_cast<std::uint64_t>(std::max<Eigen::Index>(1, rows / sample_rows));
+  constexpr Eigen::Index block = 4096;
+  const Eigen::Index blocks = (rows + block - 1) / block;
+  std::vector<std::vector<int>> taken(blocks);
+  parallel_for(blocks, data.problem.max_threads, [&](Eigen::Index index) {
     const int begin = static_cast<int>(index * block);
-    std::vector<std::uint64_t> hashes(static_cast<std::size_t>(std::min(block, rows - begin)), 0);
-    for (std::ptrdiff_t j = 0; j < data.split_inputs(); ++j) {
+    std::vector<std::uint64_t> hashes(std::min(block, rows - begin), 0);
+    for (Eigen::Index j = 0; j < data.split_inputs(); ++j) {
       for (std::size_t k = 0; k < hashes.size(); ++k) {
         // Adding zero makes one of the two zeros.
         const double value = data.split_value(begin + static_cast<int>(k), j) + 0.0;
@@ -34,7 +34,7 @@ std::vector<int> sample(const GrowthData& data) {
     }
     for (std::size_t k = 0; k < hashes.size(); ++k) {
       if (hashes[k] % ratio == 0) {
-        taken[static_cast<std::size_t>(index)].push_back(begin + static_cast<int>(k));
+        taken[index].push_back(begin + static_cast<int>(k));
       }
     }
   });
@@ -45,9 +45,9 @@ std::vector<int> sample(const GrowthData& data) {
   return all;
 }
 
-/// At most bins - 1 edges, each between two neighbouring values of the sample.
+// At most bins - 1 edges, each between two neighbouring values of the sample.
 std::vector<double> quantile_edges(std::vector<double> values, int bins) {
-  std::sort(values.begin(), values.end());
+  std::ranges::sort(values);
   std::vector<double> distinct = values;
   distinct.erase(std::unique(distinct.begin(), distinct.end()), distinct.end());
   const auto between = [](double low, double high) {
@@ -61,8 +61,8 @@ std::vector<double> quantile_edges(std::vector<double> values, int bins) {
     return edges;
   }
   for (std::size_t bin = 1; bin < static_cast<std::size_t>(bins); ++bin) {
-    const double value = values[bin * values.size() / static_cast<std::size_t>(bins)];
-    const auto next = std::upper_bound(values.begin(), values.end(), value);
+    const double value = values[bin * values.size() / bins];
+    const auto next = std::ranges::upper_bound(values, value);
     if (next != values.end()) {
       const double edge = between(value, *next);
       if (edges.empty() || edges.back() < edge) {
@@ -73,25 +73,25 @@ std::vector<double> quantile_edges(std::vector<double> values, int bins) {
   return edges;
 }
 
-/// Smallest and largest value in each bin.
+// Smallest and largest value in each bin.
 struct Extent {
   std::array<double, most_bins> low;
   std::array<double, most_bins> high;
 };
 
-/// Codes of some rows of a number: how many edges are below the value, in steps of powers of two, without branches, for
-/// some values at a time.
-void encode(const GrowthData& data, std::ptrdiff_t split_input, const std::vector<double>& edges, int begin, int end,
+// Codes of some rows of a number: how many edges are below the value, in steps of powers of two, without branches, for
+// some values at a time.
+void encode(const GrowthData& data, Eigen::Index split_input, const std::vector<double>& edges, int begin, int end,
             std::uint8_t* codes, Extent& extent) {
   std::array<double, most_bins> padded;
   padded.fill(std::numeric_limits<double>::infinity());
-  std::copy(edges.begin(), edges.end(), padded.begin());
-  const std::size_t stride = static_cast<std::size_t>(data.split_inputs());
+  std::ranges::copy(edges, padded.begin());
+  const std::size_t stride = data.split_inputs();
   constexpr int at_once = 16;
   std::array<double, at_once> value{};
   std::array<std::uint32_t, at_once> below{};
   for (; begin < end; begin += at_once) {
-    const std::size_t count = static_cast<std::size_t>(std::min(at_once, end - begin));
+    const std::size_t count = std::min(at_once, end - begin);
     for (std::size_t k = 0; k < count; ++k) {
       value[k] = data.split_value(begin + static_cast<int>(k), split_input);
     }
@@ -103,7 +103,7 @@ void encode(const GrowthData& data, std::ptrdiff_t split_input, const std::vecto
     }
     for (std::size_t k = 0; k < count; ++k) {
       const std::uint32_t bin = below[k];
-      codes[(static_cast<std::size_t>(begin) + k) * stride] = static_cast<std::uint8_t>(bin);
+      codes[(begin + k) * stride] = static_cast<std::uint8_t>(bin);
       extent.low[bin] = std::min(extent.low[bin], value[k]);
       extent.high[bin] = std::max(extent.high[bin], value[k]);
     }
@@ -113,13 +113,13 @@ void encode(const GrowthData& data, std::ptrdiff_t split_input, const std::vecto
 }  // namespace
 
 BinnedInputs make_bins(const GrowthData& data, int bins) {
-  const std::size_t inputs = static_cast<std::size_t>(data.split_inputs());
+  const std::size_t inputs = data.split_inputs();
   const int rows = static_cast<int>(data.training.count());
-  BinnedInputs result{std::vector<Bins>(inputs), std::vector<std::uint8_t>(static_cast<std::size_t>(rows) * inputs)};
+  BinnedInputs result{std::vector<Bins>(inputs), std::vector<std::uint8_t>(rows * inputs)};
   const std::vector<int> sampled = sample(data);
-  parallel_for(data.split_inputs(), data.problem.max_threads, [&](std::ptrdiff_t j) {
-    Bins& input = result.bins[static_cast<std::size_t>(j)];
-    input.count = data.num_levels[static_cast<std::size_t>(j)];
+  parallel_for(data.split_inputs(), data.problem.max_threads, [&](Eigen::Index j) {
+    Bins& input = result.bins[j];
+    input.count = data.num_levels[j];
     if (input.count == 0) {
       std::vector<double> values;
       for (const int row : sampled) {
@@ -134,8 +134,8 @@ BinnedInputs make_bins(const GrowthData& data, int bins) {
   constexpr double infinity = std::numeric_limits<double>::infinity();
   constexpr int slots = 16;
   std::vector<std::vector<Extent>> extents(slots, std::vector<Extent>(inputs));
-  parallel_for(slots, data.problem.max_threads, [&](std::ptrdiff_t slot) {
-    std::vector<Extent>& own = extents[static_cast<std::size_t>(slot)];
+  parallel_for(slots, data.problem.max_threads, [&](Eigen::Index slot) {
+    std::vector<Extent>& own = extents[slot];
     for (Extent& extent : own) {
       extent.low.fill(infinity);
       extent.high.fill(-infinity);
@@ -144,13 +144,11 @@ BinnedInputs make_bins(const GrowthData& data, int bins) {
       const int end = std::min(rows, (index + 1) * block);
       for (std::size_t j = 0; j < inputs; ++j) {
         if (data.num_levels[j] == 0) {
-          encode(data, static_cast<std::ptrdiff_t>(j), result.bins[j].edges, index * block, end,
-                 result.codes.data() + j, own[j]);
+          encode(data, j, result.bins[j].edges, index * block, end, result.codes.data() + j, own[j]);
           continue;
         }
         for (int row = index * block; row < end; ++row) {
-          result.codes[static_cast<std::size_t>(row) * inputs + j] =
-              static_cast<std::uint8_t>(data.split_value(row, static_cast<std::ptrdiff_t>(j)));
+          result.codes[row * inputs + j] = static_cast<std::uint8_t>(data.split_value(row, j));
         }
       }
     }

@@ -21,7 +21,7 @@ struct BinnedInputs {
   std::vector<Bins> bins;           ///< of each split input
   std::vector<std::uint8_t> codes;  ///< bin, or level: training rows x split inputs, one row after the other
 
-  int code(int row, std::size_t input) const { return codes[static_cast<std::size_t>(row) * bins.size() + input]; }
+  int code(int row, std::size_t input) const { return codes[row * bins.size() + input]; }
 };
 
 inline constexpr int most_bins = 256;

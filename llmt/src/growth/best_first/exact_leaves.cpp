@@ -15,8 +15,8 @@ namespace {
 
 using Rows = std::vector<int>;
 
-/// The learned share of the left child in rows without a value starts from the share of the others, which counts as
-/// this many rows.
+// The learned share of the left child in rows without a value starts from the share of the others, which counts as
+// this many rows.
 constexpr double prior_rows = 10.0;
 
 struct ValueOfRow {
@@ -29,14 +29,14 @@ struct ValueOfRow {
 
 }  // namespace
 
-double ExactLeaves::split_value(const ExactLeaf& leaf, std::ptrdiff_t row, std::ptrdiff_t split_input) const {
-  return leaf.inputs(row, data_.problem.options.split_inputs[static_cast<std::size_t>(split_input)]);
+double ExactLeaves::split_value(const ExactLeaf& leaf, Eigen::Index row, Eigen::Index split_input) const {
+  return leaf.inputs(row, data_.problem.options.split_inputs[split_input]);
 }
 
 RowMajor ExactLeaves::deviations(const ExactLeaf& leaf) const {
   const std::vector<Regressor>& regressors = data_.training.regressors;
   RowMajor result(leaf.inputs.rows(), std::ssize(regressors));
-  for (std::ptrdiff_t row = 0; row < result.rows(); ++row) {
+  for (Eigen::Index row = 0; row < result.rows(); ++row) {
     deviations_at(data_.training.columns, regressors, leaf.inputs.row(row).data(), result.row(row).data());
   }
   return result;
@@ -53,22 +53,20 @@ ExactLeaf ExactLeaves::open(const Rows& rows, const Node& parent) const {
   }
   leaf.residuals = data_.outputs(rows, Eigen::all) - x * parent.slope.transpose();
   leaf.residuals.rowwise() -= parent.value.transpose();
-  leaf.orders.resize(static_cast<std::size_t>(data_.split_inputs()));
-  parallel_for(data_.split_inputs(), data_.threads_for(std::ssize(rows)), [&](std::ptrdiff_t j) {
-    if (data_.num_levels[static_cast<std::size_t>(j)] > 0 || by_signs()) {
-      return;
-    }
+  leaf.orders.resize(data_.split_inputs());
+  parallel_for(data_.split_inputs(), data_.threads_for(std::ssize(rows)), [&](Eigen::Index j) {
+    if (data_.num_levels[j] > 0 || by_signs()) return;
     std::vector<ValueOfRow> values;
     values.reserve(rows.size());
-    for (std::ptrdiff_t k = 0; k < leaf.inputs.rows(); ++k) {
+    for (Eigen::Index k = 0; k < leaf.inputs.rows(); ++k) {
       if (const double value = split_value(leaf, k, j); !std::isnan(value)) {
         values.push_back({value, static_cast<int>(k)});
       }
     }
     std::sort(values.begin(), values.end());
-    Rows& order = leaf.orders[static_cast<std::size_t>(j)];
+    Rows& order = leaf.orders[j];
     order.resize(values.size());
-    std::transform(values.begin(), values.end(), order.begin(), [](const ValueOfRow& entry) { return entry.position; });
+    std::ranges::transform(values, order.begin(), [](const ValueOfRow& entry) { return entry.position; });
   });
   return leaf;
 }
@@ -90,20 +88,20 @@ SplitCandidate ExactLeaves::examine(ExactLeaf& leaf, const Node& parent, Node& n
   return find_split(leaf, fit, data_.output_weights.dot(node.rss));
 }
 
-/// Residuals of the parent's local model with missing values at the mean of these rows instead of the parent's.
+// Residuals of the parent's local model with missing values at the mean of these rows instead of the parent's.
 Eigen::MatrixXd ExactLeaves::about_own_mean(const RowMajor& deviations, const Node& parent, Eigen::MatrixXd residuals,
                                             const Eigen::VectorXd& weights) const {
-  for (std::ptrdiff_t k = 0; k < deviations.cols(); ++k) {
+  for (Eigen::Index k = 0; k < deviations.cols(); ++k) {
     double sum = 0.0;
     double present = 0.0;
-    for (std::ptrdiff_t i = 0; i < deviations.rows(); ++i) {
+    for (Eigen::Index i = 0; i < deviations.rows(); ++i) {
       if (!std::isnan(deviations(i, k))) {
         sum += weights(i) * deviations(i, k);
         present += weights(i);
       }
     }
     const double mean = present > 0.0 ? sum / present : 0.0;
-    for (std::ptrdiff_t i = 0; i < deviations.rows(); ++i) {
+    for (Eigen::Index i = 0; i < deviations.rows(); ++i) {
       if (std::isnan(deviations(i, k))) {
         residuals.row(i) += parent.slope.col(k).transpose() * (parent.mean(k) - mean);
       }
@@ -112,10 +110,10 @@ Eigen::MatrixXd ExactLeaves::about_own_mean(const RowMajor& deviations, const No
   return residuals;
 }
 
-/// Level of each row of the leaf in a categorical split input, -1 where it is missing.
-std::vector<int> ExactLeaves::levels_of(const ExactLeaf& leaf, std::ptrdiff_t split_input) const {
+// Level of each row of the leaf in a categorical split input, -1 where it is missing.
+std::vector<int> ExactLeaves::levels_of(const ExactLeaf& leaf, Eigen::Index split_input) const {
   std::vector<int> levels;
-  for (std::ptrdiff_t row = 0; row < leaf.inputs.rows(); ++row) {
+  for (Eigen::Index row = 0; row < leaf.inputs.rows(); ++row) {
     const double value = split_value(leaf, row, split_input);
     levels.push_back(std::isnan(value) ? -1 : static_cast<int>(value));
   }
@@ -124,20 +122,16 @@ std::vector<int> ExactLeaves::levels_of(const ExactLeaf& leaf, std::ptrdiff_t sp
 
 SplitCandidate ExactLeaves::find_split(const ExactLeaf& leaf, const NodeFit& fit, double rss) const {
   SplitCandidate best;
-  const std::ptrdiff_t smallest_leaf = data_.problem.options.min_leaf_samples;
-  if (leaf.inputs.rows() < 2 * smallest_leaf) {
-    return best;
-  }
+  const Eigen::Index smallest_leaf = data_.problem.options.min_leaf_samples;
+  if (leaf.inputs.rows() < 2 * smallest_leaf) return best;
   const SearchNode node{fit.features, data_.output_weights, rss};
-  if (by_signs()) {
-    return find_split_by_signs(leaf, node, fit.rank);
-  }
+  if (by_signs()) return find_split_by_signs(leaf, node, fit.rank);
   const std::size_t inputs = leaf.orders.size();
   const int threads = data_.threads_for(leaf.inputs.rows() * data_.split_inputs());
   std::vector<std::optional<InputSearch>> searches(inputs);
   std::vector<SplitCandidate> found(inputs);
-  parallel_for(std::ssize(found), threads, [&](std::ptrdiff_t j) {
-    const std::size_t slot = static_cast<std::size_t>(j);
+  parallel_for(std::ssize(found), threads, [&](Eigen::Index j) {
+    const std::size_t slot = j;
     if (data_.num_levels[slot] > 0) {
       found[slot] = search_levels(node, levels_of(leaf, j), data_.num_levels[slot], smallest_leaf);
       return;
@@ -152,14 +146,14 @@ SplitCandidate ExactLeaves::find_split(const ExactLeaf& leaf, const NodeFit& fit
   });
   // What one input has found spares the others work, in a way that does not depend on who was first.
   double limit = std::numeric_limits<double>::infinity();
-  std::ptrdiff_t numeric = 0;  // candidate splits on numbers
+  Eigen::Index numeric = 0;  // candidate splits on numbers
   for (std::size_t j = 0; j < inputs; ++j) {
     limit = std::min(limit, searches[j] ? searches[j]->smallest() : limit);
     numeric += searches[j] ? searches[j]->tested() : 0;
   }
   limit = std::min(limit, data_.significant_rss(leaf.weights.sum(), fit.rank, rss, numeric));
-  parallel_for(std::ssize(found), threads, [&](std::ptrdiff_t j) {
-    const std::size_t slot = static_cast<std::size_t>(j);
+  parallel_for(std::ssize(found), threads, [&](Eigen::Index j) {
+    const std::size_t slot = j;
     if (searches[slot]) {
       searches[slot]->refine(limit);
       found[slot] = searches[slot]->best();
@@ -172,17 +166,17 @@ SplitCandidate ExactLeaves::find_split(const ExactLeaf& leaf, const NodeFit& fit
   return first_of_best(found, rss);
 }
 
-/// The inputs' thresholds by the signs of the residuals; categories, and that a value is missing, as in the exact
-/// search.
+// The inputs' thresholds by the signs of the residuals; categories, and that a value is missing, as in the exact
+// search.
 SplitCandidate ExactLeaves::find_split_by_signs(const ExactLeaf& leaf, const SearchNode& node, int rank) const {
-  Rows rows(static_cast<std::size_t>(leaf.inputs.rows()));
+  Rows rows(leaf.inputs.rows());
   std::iota(rows.begin(), rows.end(), 0);
   const int threads = data_.threads_for(leaf.inputs.rows() * data_.split_inputs());
   const Eigen::MatrixXd values = leaf.inputs(Eigen::all, data_.problem.options.split_inputs);
   SignSplit numeric = search_by_signs(data_, {node, rank, rows, values, leaf.residuals, leaf.weights, {}, threads});
   std::vector<SplitCandidate> found(leaf.orders.size());
-  parallel_for(std::ssize(found), threads, [&](std::ptrdiff_t j) {
-    const std::size_t slot = static_cast<std::size_t>(j);
+  parallel_for(std::ssize(found), threads, [&](Eigen::Index j) {
+    const std::size_t slot = j;
     if (numeric.best.input == j) {
       found[slot] = std::move(numeric.best);
     }
@@ -196,15 +190,15 @@ SplitCandidate ExactLeaves::find_split_by_signs(const ExactLeaf& leaf, const Sea
   return first_of_best(found, node.rss);
 }
 
-/// Takes the split into rows with and without a value if it is better: that a value is missing can say something.
-void ExactLeaves::consider_missing(const SearchNode& node, const ExactLeaf& leaf, std::ptrdiff_t j,
+// Takes the split into rows with and without a value if it is better: that a value is missing can say something.
+void ExactLeaves::consider_missing(const SearchNode& node, const ExactLeaf& leaf, Eigen::Index j,
                                    SplitCandidate& best) const {
   std::vector<int> is_missing;
-  for (std::ptrdiff_t row = 0; row < leaf.inputs.rows(); ++row) {
+  for (Eigen::Index row = 0; row < leaf.inputs.rows(); ++row) {
     is_missing.push_back(std::isnan(split_value(leaf, row, j)) ? 1 : 0);
   }
   SplitCandidate candidate = search_levels(node, is_missing, 2, data_.problem.options.min_leaf_samples);
-  const std::ptrdiff_t tested = best.tested + candidate.tested;
+  const Eigen::Index tested = best.tested + candidate.tested;
   if (candidate.input >= 0 && (best.input < 0 || candidate.rss < best.rss - tie_tolerance * node.rss)) {
     best = std::move(candidate);
     best.level_side.clear();
@@ -213,53 +207,51 @@ void ExactLeaves::consider_missing(const SearchNode& node, const ExactLeaf& leaf
   best.tested = tested;
 }
 
-/// Where the best split of a leaf sends its rows.
+// Where the best split of a leaf sends its rows.
 std::vector<ExactLeaves::Side> ExactLeaves::sides_of(const ExactLeaf& leaf, const SplitCandidate& split) const {
-  std::vector<Side> sides(static_cast<std::size_t>(leaf.inputs.rows()), Side::both);
+  std::vector<Side> sides(leaf.inputs.rows(), Side::both);
   if (split.by_missing) {
     for (std::size_t k = 0; k < sides.size(); ++k) {
-      sides[k] = std::isnan(split_value(leaf, static_cast<std::ptrdiff_t>(k), split.input)) ? Side::right : Side::left;
+      sides[k] = std::isnan(split_value(leaf, k, split.input)) ? Side::right : Side::left;
     }
     return sides;
   }
-  if (data_.num_levels[static_cast<std::size_t>(split.input)] > 0) {
+  if (data_.num_levels[split.input] > 0) {
     const std::vector<int> levels = levels_of(leaf, split.input);
     for (std::size_t k = 0; k < sides.size(); ++k) {
       if (levels[k] >= 0) {
-        sides[k] = split.level_side[static_cast<std::size_t>(levels[k])] < 0 ? Side::left : Side::right;
+        sides[k] = split.level_side[levels[k]] < 0 ? Side::left : Side::right;
       }
     }
     return sides;
   }
   if (by_signs()) {
     for (std::size_t k = 0; k < sides.size(); ++k) {
-      const double value = split_value(leaf, static_cast<std::ptrdiff_t>(k), split.input);
+      const double value = split_value(leaf, k, split.input);
       sides[k] = value <= split.last_left ? Side::left : std::isnan(value) ? Side::both : Side::right;
     }
     return sides;
   }
-  const Rows& order = leaf.orders[static_cast<std::size_t>(split.input)];
+  const Rows& order = leaf.orders[split.input];
   for (std::size_t k = 0; k < order.size(); ++k) {
-    sides[static_cast<std::size_t>(order[k])] = static_cast<std::ptrdiff_t>(k) < split.left ? Side::left : Side::right;
+    sides[order[k]] = static_cast<Eigen::Index>(k) < split.left ? Side::left : Side::right;
   }
   return sides;
 }
 
-/// Share of the left child in rows that have no value for the split: the one that minimises their squared error
-/// under the local models of the rows that have one, drawn towards the share of those; in [0, 1].
+// Share of the left child in rows that have no value for the split: the one that minimises their squared error
+// under the local models of the rows that have one, drawn towards the share of those; in [0, 1].
 double ExactLeaves::learn_missing_left(const ExactLeaf& leaf, const Node& parent,
                                        const std::vector<Side>& sides) const {
   std::array<Rows, 3> positions;
   std::array<double, 3> weight{};
   for (std::size_t k = 0; k < sides.size(); ++k) {
     positions[static_cast<std::size_t>(sides[k])].push_back(static_cast<int>(k));
-    weight[static_cast<std::size_t>(sides[k])] += leaf.weights(static_cast<std::ptrdiff_t>(k));
+    weight[static_cast<std::size_t>(sides[k])] += leaf.weights(static_cast<Eigen::Index>(k));
   }
   const double known = weight[0] / (weight[0] + weight[1]);
   const Rows& missing = positions[2];
-  if (missing.empty()) {
-    return known;
-  }
+  if (missing.empty()) return known;
   const RowMajor all = deviations(leaf);
   const RowMajor queries = all(missing, Eigen::all);
   std::array<Eigen::MatrixXd, 2> change;  // child's prediction minus the leaf's, rows x outputs
@@ -270,8 +262,8 @@ double ExactLeaves::learn_missing_left(const ExactLeaf& leaf, const Node& parent
         about_own_mean(of_child, parent, leaf.residuals(positions[side], Eigen::all), weights);
     const NodeFit fit = fit_node(of_child, residuals, weights);
     change[side] = fit.centre_change.transpose().replicate(queries.rows(), 1);
-    for (std::ptrdiff_t i = 0; i < queries.rows(); ++i) {
-      for (std::ptrdiff_t k = 0; k < queries.cols(); ++k) {
+    for (Eigen::Index i = 0; i < queries.rows(); ++i) {
+      for (Eigen::Index k = 0; k < queries.cols(); ++k) {
         if (std::isnan(queries(i, k))) {
           change[side].row(i) +=
               (fit.slope_change.col(k) * fit.mean(k) + parent.slope.col(k) * (fit.mean(k) - parent.mean(k)))
@@ -291,7 +283,7 @@ double ExactLeaves::learn_missing_left(const ExactLeaf& leaf, const Node& parent
   return squares > 0.0 ? std::clamp((product + prior * known) / (squares + prior), 0.0, 1.0) : known;
 }
 
-/// All orders stay sorted.
+// All orders stay sorted.
 ExactLeaves::Children ExactLeaves::divide(const ExactLeaf& leaf, const Node& node, const SplitCandidate& split) const {
   const std::vector<Side> sides = sides_of(leaf, split);
   Children children;
@@ -309,7 +301,7 @@ ExactLeaves::Children ExactLeaves::divide(const ExactLeaf& leaf, const Node& nod
       if (share >= clear_share) {
         position_in_child[k] = static_cast<int>(positions.size());
         positions.push_back(static_cast<int>(k));
-        weights.push_back(share * leaf.weights(static_cast<std::ptrdiff_t>(k)));
+        weights.push_back(share * leaf.weights(k));
       }
     }
     child.weights = Eigen::Map<const Eigen::VectorXd>(weights.data(), std::ssize(weights));
@@ -319,7 +311,7 @@ ExactLeaves::Children ExactLeaves::divide(const ExactLeaf& leaf, const Node& nod
     for (std::size_t j = 0; j < leaf.orders.size(); ++j) {
       child.orders[j].reserve(positions.size());
       for (const int k : leaf.orders[j]) {
-        if (const int position = position_in_child[static_cast<std::size_t>(k)]; position >= 0) {
+        if (const int position = position_in_child[k]; position >= 0) {
           child.orders[j].push_back(position);
         }
       }
@@ -330,7 +322,7 @@ ExactLeaves::Children ExactLeaves::divide(const ExactLeaf& leaf, const Node& nod
 
 double ExactLeaves::threshold(const ExactLeaf& leaf, const SplitCandidate& split, const Node& node, const Node& left,
                               const Node& right) const {
-  Rows order = leaf.orders[static_cast<std::size_t>(split.input)];
+  Rows order = leaf.orders[split.input];
   if (by_signs()) {
     // Those that go left first, as in a sorted order.
     const std::vector<Side> sides = sides_of(leaf, split);
@@ -344,7 +336,7 @@ double ExactLeaves::threshold(const ExactLeaf& leaf, const SplitCandidate& split
   }
   Eigen::VectorXd values(std::ssize(order));
   for (std::size_t k = 0; k < order.size(); ++k) {
-    values(static_cast<std::ptrdiff_t>(k)) = split_value(leaf, order[k], split.input);
+    values(k) = split_value(leaf, order[k], split.input);
   }
   // The regression of the child models' difference on the split input over the node's rows says how far apart they are,
   // on average, on the plane x_j = t: a + b (t - mean).
@@ -360,7 +352,7 @@ double ExactLeaves::threshold(const ExactLeaf& leaf, const SplitCandidate& split
   const Eigen::VectorXd weighted = centred.cwiseProduct(weights);
   const Eigen::VectorXd b = apart.transpose() * weighted / weighted.dot(centred);
   const Eigen::VectorXd a = apart.transpose() * weights / weights.sum();
-  const std::ptrdiff_t right_rows = values.size() - split.left;
+  const Eigen::Index right_rows = values.size() - split.left;
   return data_.place_threshold(values.head(split.left).maxCoeff(), values.tail(right_rows).minCoeff(), mean, a, b);
 }
 

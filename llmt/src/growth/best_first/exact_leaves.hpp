@@ -47,15 +47,15 @@ class ExactLeaves {
   /// Where a row of a leaf goes.
   enum class Side : signed char { left, right, both };
 
-  double split_value(const ExactLeaf& leaf, std::ptrdiff_t row, std::ptrdiff_t split_input) const;
+  double split_value(const ExactLeaf& leaf, Eigen::Index row, Eigen::Index split_input) const;
   RowMajor deviations(const ExactLeaf& leaf) const;
   Eigen::MatrixXd about_own_mean(const RowMajor& deviations, const Node& parent, Eigen::MatrixXd residuals,
                                  const Eigen::VectorXd& weights) const;
-  std::vector<int> levels_of(const ExactLeaf& leaf, std::ptrdiff_t split_input) const;
+  std::vector<int> levels_of(const ExactLeaf& leaf, Eigen::Index split_input) const;
   bool by_signs() const { return data_.problem.options.rule == GrowthRule::ra; }
   SplitCandidate find_split(const ExactLeaf& leaf, const NodeFit& fit, double rss) const;
   SplitCandidate find_split_by_signs(const ExactLeaf& leaf, const SearchNode& node, int rank) const;
-  void consider_missing(const SearchNode& node, const ExactLeaf& leaf, std::ptrdiff_t split_input,
+  void consider_missing(const SearchNode& node, const ExactLeaf& leaf, Eigen::Index split_input,
                         SplitCandidate& best) const;
   std::vector<Side> sides_of(const ExactLeaf& leaf, const SplitCandidate& split) const;
   double learn_missing_left(const ExactLeaf& leaf, const Node& parent, const std::vector<Side>& sides) const;

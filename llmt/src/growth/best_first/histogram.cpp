@@ -9,19 +9,19 @@
 namespace llmt {
 namespace {
 
-/// Doubles that the histogram of a node may take; where Gram matrices are large, the bins are fewer.
-constexpr std::ptrdiff_t histogram_size = std::ptrdiff_t{1} << 21;
+// Doubles that the histogram of a node may take; where Gram matrices are large, the bins are fewer.
+constexpr Eigen::Index histogram_size = Eigen::Index{1} << 21;
 constexpr int fewest_bins = 32;
 
-/// Rows at a time, so few that their features stay in the cache.
-constexpr std::ptrdiff_t block_rows = 4096;
+// Rows at a time, so few that their features stay in the cache.
+constexpr Eigen::Index block_rows = 4096;
 
 }  // namespace
 
 BinnedRows::BinnedRows(const GrowthData& data) : data_(data), whitened_(data), shape_(whitened_.features()) {
-  const std::ptrdiff_t bins = histogram_size / (shape_.size() * data.split_inputs());
-  inputs_ = make_bins(data, static_cast<int>(std::clamp<std::ptrdiff_t>(bins, fewest_bins, most_bins)));
-  std::ptrdiff_t sum = 0;
+  const Eigen::Index bins = histogram_size / (shape_.size() * data.split_inputs());
+  inputs_ = make_bins(data, static_cast<int>(std::clamp<Eigen::Index>(bins, fewest_bins, most_bins)));
+  Eigen::Index sum = 0;
   for (const Bins& input : inputs_.bins) {
     first_bin_.push_back(sum);
     sum += input.count;
@@ -30,52 +30,49 @@ BinnedRows::BinnedRows(const GrowthData& data) : data_(data), whitened_(data), s
 }
 
 std::span<const double> BinnedRows::grams(const Histogram& histogram, std::size_t input) const {
-  const std::ptrdiff_t first = first_bin_[input] * shape_.size();
-  return std::span(histogram.grams)
-      .subspan(static_cast<std::size_t>(first),
-               static_cast<std::size_t>(first_bin_[input + 1] * shape_.size() - first));
+  const Eigen::Index first = first_bin_[input] * shape_.size();
+  return std::span(histogram.grams).subspan(first, (first_bin_[input + 1] * shape_.size() - first));
 }
 
-std::span<const std::ptrdiff_t> BinnedRows::counts(const Histogram& histogram, std::size_t input) const {
-  return std::span(histogram.counts)
-      .subspan(static_cast<std::size_t>(first_bin_[input]), static_cast<std::size_t>(inputs_.bins[input].count));
+std::span<const Eigen::Index> BinnedRows::counts(const Histogram& histogram, std::size_t input) const {
+  return std::span(histogram.counts).subspan(first_bin_[input], inputs_.bins[input].count);
 }
 
-/// Rows are taken in blocks that stay in the cache while they are sorted into the bins of one input after the other.
-/// Inputs are dealt to threads; each bin's sum is formed in the same order whatever their number.
+// Rows are taken in blocks that stay in the cache while they are sorted into the bins of one input after the other.
+// Inputs are dealt to threads; each bin's sum is formed in the same order whatever their number.
 Histogram BinnedRows::accumulate(const std::vector<int>& rows) const {
-  Histogram histogram{std::vector<double>(static_cast<std::size_t>(first_bin_.back() * shape_.size()), 0.0),
-                      std::vector<std::ptrdiff_t>(static_cast<std::size_t>(first_bin_.back()), 0)};
-  const std::ptrdiff_t inputs = data_.split_inputs();
+  Histogram histogram{std::vector<double>(first_bin_.back() * shape_.size(), 0.0),
+                      std::vector<Eigen::Index>(first_bin_.back(), 0)};
+  const Eigen::Index inputs = data_.split_inputs();
   const int threads = data_.threads_for(std::ssize(rows) * inputs);
-  const std::ptrdiff_t groups = threads == 1 ? 1 : std::min<std::ptrdiff_t>(inputs, std::max(threads, 4));
-  parallel_for(groups, threads, [&](std::ptrdiff_t group) {
+  const Eigen::Index groups = threads == 1 ? 1 : std::min<Eigen::Index>(inputs, std::max(threads, 4));
+  parallel_for(groups, threads, [&](Eigen::Index group) {
     std::vector<int> sorted(block_rows);
-    for (std::ptrdiff_t begin = 0; begin < std::ssize(rows); begin += block_rows) {
-      const std::ptrdiff_t end = std::min(std::ssize(rows), begin + block_rows);
-      for (std::ptrdiff_t k = begin; k < end; ++k) {
-        features().prefetch(rows[static_cast<std::size_t>(k)]);
+    for (Eigen::Index begin = 0; begin < std::ssize(rows); begin += block_rows) {
+      const Eigen::Index end = std::min(std::ssize(rows), begin + block_rows);
+      for (Eigen::Index k = begin; k < end; ++k) {
+        features().prefetch(rows[k]);
       }
-      for (std::ptrdiff_t j = inputs * group / groups; j < inputs * (group + 1) / groups; ++j) {
-        const std::size_t input = static_cast<std::size_t>(j);
+      for (Eigen::Index j = inputs * group / groups; j < inputs * (group + 1) / groups; ++j) {
+        const std::size_t input = j;
         const int bins = inputs_.bins[input].count;
         std::array<int, most_bins + 1> place{};
-        for (std::ptrdiff_t k = begin; k < end; ++k) {
-          ++place[1U + static_cast<std::size_t>(inputs_.code(rows[static_cast<std::size_t>(k)], input))];
+        for (Eigen::Index k = begin; k < end; ++k) {
+          ++place[1U + (inputs_.code(rows[k], input))];
         }
-        const std::ptrdiff_t first = first_bin_[input];
+        const Eigen::Index first = first_bin_[input];
         for (int bin = 0; bin < bins; ++bin) {
-          const std::size_t at = static_cast<std::size_t>(bin);
-          histogram.counts[static_cast<std::size_t>(first) + at] += place[at + 1];
+          const std::size_t at = bin;
+          histogram.counts[first + at] += place[at + 1];
           place[at + 1] += place[at];
         }
-        for (std::ptrdiff_t k = begin; k < end; ++k) {
-          const int row = rows[static_cast<std::size_t>(k)];
-          sorted[static_cast<std::size_t>(place[static_cast<std::size_t>(inputs_.code(row, input))]++)] = row;
+        for (Eigen::Index k = begin; k < end; ++k) {
+          const int row = rows[k];
+          sorted[place[inputs_.code(row, input)]++] = row;
         }
         int at = 0;
         for (int bin = 0; bin < bins; ++bin) {
-          const int after = place[static_cast<std::size_t>(bin)];
+          const int after = place[bin];
           if (after > at) {
             add_rows(features(), sorted.data() + at, after - at,
                      histogram.grams.data() + (first + bin) * shape_.size());
@@ -89,12 +86,12 @@ Histogram BinnedRows::accumulate(const std::vector<int>& rows) const {
 }
 
 std::vector<double> BinnedRows::total(const Histogram& histogram) const {
-  std::vector<double> sum(static_cast<std::size_t>(shape_.size()), 0.0);
+  std::vector<double> sum(shape_.size(), 0.0);
   const std::span<const double> of_input = grams(histogram, 0);
-  const std::span<const std::ptrdiff_t> rows = counts(histogram, 0);
+  const std::span<const Eigen::Index> rows = counts(histogram, 0);
   for (std::size_t bin = 0; bin < rows.size(); ++bin) {
     if (rows[bin] > 0) {
-      add(shape_, of_input.data() + static_cast<std::ptrdiff_t>(bin) * shape_.size(), sum.data());
+      add(shape_, of_input.data() + static_cast<Eigen::Index>(bin) * shape_.size(), sum.data());
     }
   }
   return sum;
@@ -106,10 +103,8 @@ std::pair<double, double> BinnedRows::gap(const std::vector<int>& rows, const Sp
   int bin_of_high = most_bins;
   for (const int row : rows) {
     // Values are looked at in the split's bin and the next one that has rows.
-    const int code = inputs_.code(row, static_cast<std::size_t>(split.input));
-    if (code < split.bin || code > bin_of_high) {
-      continue;
-    }
+    const int code = inputs_.code(row, split.input);
+    if (code < split.bin || code > bin_of_high) continue;
     const double value = data_.split_value(row, split.input);
     if (code == split.bin && value <= split.last_left) {
       low = std::max(low, value);
@@ -122,11 +117,9 @@ std::pair<double, double> BinnedRows::gap(const std::vector<int>& rows, const Sp
 }
 
 bool BinnedRows::goes_left(int row, const SplitCandidate& split) const {
-  const std::size_t input = static_cast<std::size_t>(split.input);
+  const std::size_t input = split.input;
   const int code = inputs_.code(row, input);
-  if (data_.num_levels[input] > 0) {
-    return split.level_side[static_cast<std::size_t>(code)] < 0;
-  }
+  if (data_.num_levels[input] > 0) return split.level_side[code] < 0;
   return code < split.bin || (code == split.bin && data_.split_value(row, split.input) <= split.last_left);
 }
 

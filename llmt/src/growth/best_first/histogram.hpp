@@ -15,7 +15,7 @@ namespace llmt {
 /// Gram matrices and row counts of the bins of all split inputs.
 struct Histogram {
   std::vector<double> grams;
-  std::vector<std::ptrdiff_t> counts;
+  std::vector<Eigen::Index> counts;
 };
 
 /// The features of all training rows and the bins of their inputs.
@@ -25,7 +25,7 @@ class BinnedRows {
 
   WhitenedRows& whitened() { return whitened_; }
   const WhitenedRows& whitened() const { return whitened_; }
-  std::ptrdiff_t num_bins() const { return first_bin_.back(); }  ///< of all inputs
+  Eigen::Index num_bins() const { return first_bin_.back(); }  ///< of all inputs
 
   Histogram accumulate(const std::vector<int>& rows) const;
 
@@ -48,8 +48,8 @@ class BinnedRows {
   /// What the edges of one input's bins have told, and what is needed to look into the bins.
   struct Edges {
     SplitCandidate best;
-    std::vector<std::ptrdiff_t> bins;  // those with rows
-    std::vector<std::ptrdiff_t> rows_before;
+    std::vector<Eigen::Index> bins;  // those with rows
+    std::vector<Eigen::Index> rows_before;
     std::vector<double> grams_left;  // of the rows up to each edge
     std::vector<double> grams_right;
     std::vector<double> rss_left;
@@ -59,14 +59,14 @@ class BinnedRows {
 
   const Features& features() const { return whitened_.features(); }
   std::span<const double> grams(const Histogram& histogram, std::size_t input) const;
-  std::span<const std::ptrdiff_t> counts(const Histogram& histogram, std::size_t input) const;
+  std::span<const Eigen::Index> counts(const Histogram& histogram, std::size_t input) const;
   Edges search_edges(const Histogram& histogram, std::size_t input, double node_rss) const;
   SplitCandidate look_into(const Edges& edges, const std::vector<std::size_t>& chosen, std::size_t input,
                            const std::vector<int>& rows, double node_rss, double limit) const;
 
   const GrowthData& data_;
   BinnedInputs inputs_;
-  std::vector<std::ptrdiff_t> first_bin_;  // of each input among all bins
+  std::vector<Eigen::Index> first_bin_;  // of each input among all bins
   WhitenedRows whitened_;
   GramShape shape_;
 };

@@ -8,10 +8,10 @@
 namespace llmt {
 namespace {
 
-constexpr std::ptrdiff_t block_rows = 4096;
+constexpr Eigen::Index block_rows = 4096;
 
-/// Rows are asked for this many before they are needed: those of a node lie all over the features.
-constexpr std::ptrdiff_t ahead = 12;
+// Rows are asked for this many before they are needed: those of a node lie all over the features.
+constexpr Eigen::Index ahead = 12;
 
 }  // namespace
 
@@ -22,23 +22,23 @@ SignLeaf SignLeaves::root() const {
   return leaf;
 }
 
-/// What the node's model leaves, times the root of the row's weight: only signs count.
+// What the node's model leaves, times the root of the row's weight: only signs count.
 Eigen::MatrixXd SignLeaves::residuals(const SignLeaf& leaf, const Node& node, int threads) const {
   const Features& features = rows_.features();
-  const std::ptrdiff_t count = std::ssize(leaf.rows);
-  const std::ptrdiff_t coefficients = features.coefficients();
+  const Eigen::Index count = std::ssize(leaf.rows);
+  const Eigen::Index coefficients = features.coefficients();
   // In the features' own regressors, about the model whose residuals they hold.
   Eigen::MatrixXd model(features.outputs(), coefficients);
   model.col(0) = node.value - leaf.value;
   model.rightCols(coefficients - 1) = (node.slope - leaf.slope) * data_.training.scale.asDiagonal() * rows_.colouring();
   Eigen::MatrixXd result(count, features.outputs());
-  parallel_for((count + block_rows - 1) / block_rows, threads, [&](std::ptrdiff_t block) {
-    for (std::ptrdiff_t k = block * block_rows; k < std::min(count, (block + 1) * block_rows); ++k) {
-      features.prefetch(leaf.rows[static_cast<std::size_t>(std::min(count - 1, k + ahead))]);
-      const double* const row = features.row(leaf.rows[static_cast<std::size_t>(k)]);
-      for (std::ptrdiff_t o = 0; o < features.outputs(); ++o) {
+  parallel_for((count + block_rows - 1) / block_rows, threads, [&](Eigen::Index block) {
+    for (Eigen::Index k = block * block_rows; k < std::min(count, (block + 1) * block_rows); ++k) {
+      features.prefetch(leaf.rows[std::min(count - 1, k + ahead)]);
+      const double* const row = features.row(leaf.rows[k]);
+      for (Eigen::Index o = 0; o < features.outputs(); ++o) {
         double predicted = 0.0;
-        for (std::ptrdiff_t c = 0; c < coefficients; ++c) {
+        for (Eigen::Index c = 0; c < coefficients; ++c) {
           predicted += model(o, c) * row[c];
         }
         result(k, o) = row[coefficients + o] - predicted;
@@ -48,18 +48,17 @@ Eigen::MatrixXd SignLeaves::residuals(const SignLeaf& leaf, const Node& node, in
   return result;
 }
 
-SplitCandidate SignLeaves::search_categories(const SignLeaf& leaf, std::ptrdiff_t j, double node_rss) const {
+SplitCandidate SignLeaves::search_categories(const SignLeaf& leaf, Eigen::Index j, double node_rss) const {
   const GramShape shape(rows_.features());
-  std::vector<std::vector<int>> of_level(static_cast<std::size_t>(data_.num_levels[static_cast<std::size_t>(j)]));
+  std::vector<std::vector<int>> of_level(data_.num_levels[j]);
   for (std::size_t k = 0; k < leaf.rows.size(); ++k) {
-    of_level[static_cast<std::size_t>(leaf.values(static_cast<std::ptrdiff_t>(k), j))].push_back(leaf.rows[k]);
+    of_level[static_cast<std::size_t>(leaf.values(static_cast<Eigen::Index>(k), j))].push_back(leaf.rows[k]);
   }
-  std::vector<double> grams(of_level.size() * static_cast<std::size_t>(shape.size()), 0.0);
-  std::vector<std::ptrdiff_t> counts;
+  std::vector<double> grams(of_level.size() * shape.size(), 0.0);
+  std::vector<Eigen::Index> counts;
   for (std::size_t level = 0; level < of_level.size(); ++level) {
     counts.push_back(std::ssize(of_level[level]));
-    add_rows(rows_.features(), of_level[level].data(), counts.back(),
-             grams.data() + level * static_cast<std::size_t>(shape.size()));
+    add_rows(rows_.features(), of_level[level].data(), counts.back(), grams.data() + level * shape.size());
   }
   return search_level_grams(shape, data_.output_weights, node_rss, 0.0, grams, counts,
                             data_.problem.options.min_leaf_samples);
@@ -72,9 +71,7 @@ SplitCandidate SignLeaves::examine(SignLeaf& leaf, const Node& parent, Node& nod
     leaf.gram = sum_gram(rows_.features(), leaf.rows, threads);
     fit_whitened(data_, rows_, leaf.gram, parent, leaf, node);
   }
-  if (std::ssize(leaf.rows) < 2 * data_.problem.options.min_leaf_samples) {
-    return {};
-  }
+  if (std::ssize(leaf.rows) < 2 * data_.problem.options.min_leaf_samples) return {};
   const double rss = data_.output_weights.dot(node.rss);
   const Eigen::MatrixXd left_over = residuals(leaf, node, threads);
   const Eigen::VectorXd weights = data_.weights(leaf.rows);
@@ -82,13 +79,13 @@ SplitCandidate SignLeaves::examine(SignLeaf& leaf, const Node& parent, Node& nod
   SignSplit numeric =
       search_by_signs(data_, {search, node.rank, leaf.rows, leaf.values, left_over, weights, leaf.gram, threads});
   std::vector<SplitCandidate> found(data_.num_levels.size());
-  parallel_for(std::ssize(found), threads, [&](std::ptrdiff_t j) {
-    if (data_.num_levels[static_cast<std::size_t>(j)] > 0) {
-      found[static_cast<std::size_t>(j)] = search_categories(leaf, j, rss);
+  parallel_for(std::ssize(found), threads, [&](Eigen::Index j) {
+    if (data_.num_levels[j] > 0) {
+      found[j] = search_categories(leaf, j, rss);
     }
   });
   if (numeric.best.input >= 0) {
-    found[static_cast<std::size_t>(numeric.best.input)] = numeric.best;
+    found[numeric.best.input] = numeric.best;
   }
   const SplitCandidate best = first_of_best(found, rss);
   if (best.level_side.empty()) {
@@ -101,7 +98,7 @@ std::array<SignLeaf, 2> SignLeaves::divide(SignLeaf& leaf, const SplitCandidate&
   std::array<SignLeaf, 2> children;
   std::array<std::vector<int>, 2> positions;
   for (std::size_t k = 0; k < leaf.rows.size(); ++k) {
-    const double value = leaf.values(static_cast<std::ptrdiff_t>(k), split.input);
+    const double value = leaf.values(k, split.input);
     const bool left =
         split.level_side.empty() ? value <= split.last_left : split.level_side[static_cast<std::size_t>(value)] < 0;
     positions[left ? 0 : 1].push_back(static_cast<int>(k));

@@ -35,7 +35,7 @@ class SignLeaves {
 
  private:
   Eigen::MatrixXd residuals(const SignLeaf& leaf, const Node& node, int threads) const;
-  SplitCandidate search_categories(const SignLeaf& leaf, std::ptrdiff_t split_input, double node_rss) const;
+  SplitCandidate search_categories(const SignLeaf& leaf, Eigen::Index split_input, double node_rss) const;
 
   const GrowthData& data_;
   WhitenedRows rows_;

@@ -10,26 +10,26 @@
 namespace llmt {
 namespace {
 
-/// Deviates that agree to this part are equal: rounding does not choose between inputs.
+// Deviates that agree to this part are equal: rounding does not choose between inputs.
 constexpr double tie_of_deviates = 1e-9;
 
-/// Thresholds are rounded to this part of the input's range in the node, so that a threshold on a value of the data, as
-/// on grids, does not send its rows left or right by rounding.
+// Thresholds are rounded to this part of the input's range in the node, so that a threshold on a value of the data, as
+// on grids, does not send its rows left or right by rounding.
 constexpr double grid = 0x1p-32;
 
-/// A split that does not pass the F test at this level, or at that asked for, makes the next input worth a try.
+// A split that does not pass the F test at this level, or at that asked for, makes the next input worth a try.
 constexpr double usual_significance = 0.05;
 
-constexpr std::ptrdiff_t partial_sums = 16;
-constexpr std::ptrdiff_t rows_of_a_sum = 4096;
+constexpr Eigen::Index partial_sums = 16;
+constexpr Eigen::Index rows_of_a_sum = 4096;
 
 struct Cut {
-  std::ptrdiff_t input;
+  Eigen::Index input;
   double threshold;
   double deviate;
 };
 
-/// (m+ + m-) / 2 on a grid of the node's range.
+// (m+ + m-) / 2 on a grid of the node's range.
 double threshold_of(const SignStatistics& statistics) {
   const double range = statistics.high - statistics.low;
   const double middle =
@@ -37,19 +37,19 @@ double threshold_of(const SignStatistics& statistics) {
   return statistics.low + std::round(middle / range / grid) * grid * range;
 }
 
-/// The first of those that are about the most significant.
+// The first of those that are about the most significant.
 std::size_t next_candidate(const std::vector<Cut>& candidates) {
   double largest = 0.0;
   for (const Cut& candidate : candidates) {
     largest = std::max(largest, candidate.deviate);
   }
   return static_cast<std::size_t>(
-      std::find_if(candidates.begin(), candidates.end(),
-                   [&](const Cut& candidate) { return candidate.deviate >= (1.0 - tie_of_deviates) * largest; }) -
+      std::ranges::find_if(
+          candidates, [&](const Cut& candidate) { return candidate.deviate >= (1.0 - tie_of_deviates) * largest; }) -
       candidates.begin());
 }
 
-/// Fills in the sums of squares of the two child models.
+// Fills in the sums of squares of the two child models.
 void evaluate(const SignNode& node, SignSplit& split) {
   const Features& features = node.search.features;
   const GramShape shape(features);
@@ -64,7 +64,7 @@ void evaluate(const SignNode& node, SignSplit& split) {
     std::vector<int> rows;
     rows.reserve(split.sides[side].size());
     for (const int position : split.sides[side]) {
-      rows.push_back(node.rows[static_cast<std::size_t>(position)]);
+      rows.push_back(node.rows[position]);
     }
     split.grams[side] = sum_gram(features, rows, node.threads);
   }
@@ -84,14 +84,12 @@ void evaluate(const SignNode& node, SignSplit& split) {
 
 std::vector<double> sum_gram(const Features& features, std::span<const int> rows, int threads) {
   const GramShape shape(features);
-  const std::ptrdiff_t count = std::ssize(rows);
-  const std::ptrdiff_t parts = std::clamp<std::ptrdiff_t>(count / rows_of_a_sum, 1, partial_sums);
-  std::vector<std::vector<double>> sums(static_cast<std::size_t>(parts),
-                                        std::vector<double>(static_cast<std::size_t>(shape.size()), 0.0));
-  parallel_for(parts, threads, [&](std::ptrdiff_t part) {
-    const std::ptrdiff_t begin = count * part / parts;
-    add_rows(features, rows.data() + begin, count * (part + 1) / parts - begin,
-             sums[static_cast<std::size_t>(part)].data());
+  const Eigen::Index count = std::ssize(rows);
+  const Eigen::Index parts = std::clamp<Eigen::Index>(count / rows_of_a_sum, 1, partial_sums);
+  std::vector<std::vector<double>> sums(parts, std::vector<double>(shape.size(), 0.0));
+  parallel_for(parts, threads, [&](Eigen::Index part) {
+    const Eigen::Index begin = count * part / parts;
+    add_rows(features, rows.data() + begin, count * (part + 1) / parts - begin, sums[part].data());
   });
   for (std::size_t part = 1; part < sums.size(); ++part) {
     add(shape, sums[part].data(), sums[0].data());
@@ -100,42 +98,39 @@ std::vector<double> sum_gram(const Features& features, std::span<const int> rows
 }
 
 SignSplit search_by_signs(const GrowthData& data, const SignNode& node) {
-  const std::ptrdiff_t inputs = data.split_inputs();
-  const std::ptrdiff_t outputs = node.residuals.cols();
-  const std::ptrdiff_t count = std::ssize(node.rows);
-  const std::ptrdiff_t smallest_leaf = data.problem.options.min_leaf_samples;
-  const auto values_of = [&](std::ptrdiff_t j) {
-    return std::span(node.values.col(j).data(), static_cast<std::size_t>(count));
-  };
-  std::vector<SignStatistics> statistics(static_cast<std::size_t>(inputs * outputs));
-  parallel_for(inputs * outputs, node.threads, [&](std::ptrdiff_t k) {
-    if (data.num_levels[static_cast<std::size_t>(k / outputs)] == 0) {
-      statistics[static_cast<std::size_t>(k)] = sign_statistics(
-          values_of(k / outputs), std::span(node.residuals.col(k % outputs).data(), static_cast<std::size_t>(count)),
-          std::span(node.weights.data(), static_cast<std::size_t>(count)));
+  const Eigen::Index inputs = data.split_inputs();
+  const Eigen::Index outputs = node.residuals.cols();
+  const Eigen::Index count = std::ssize(node.rows);
+  const Eigen::Index smallest_leaf = data.problem.options.min_leaf_samples;
+  const auto values_of = [&](Eigen::Index j) { return std::span(node.values.col(j).data(), count); };
+  std::vector<SignStatistics> statistics(inputs * outputs);
+  parallel_for(inputs * outputs, node.threads, [&](Eigen::Index k) {
+    if (data.num_levels[k / outputs] == 0) {
+      statistics[k] = sign_statistics(values_of(k / outputs), std::span(node.residuals.col(k % outputs).data(), count),
+                                      std::span(node.weights.data(), count));
     }
   });
   std::vector<Cut> candidates;
-  for (std::ptrdiff_t j = 0; j < inputs; ++j) {
-    for (std::ptrdiff_t o = 0; o < outputs; ++o) {
-      const SignStatistics& each = statistics[static_cast<std::size_t>(j * outputs + o)];
+  for (Eigen::Index j = 0; j < inputs; ++j) {
+    for (Eigen::Index o = 0; o < outputs; ++o) {
+      const SignStatistics& each = statistics[j * outputs + o];
       if (each.deviate() > 0.0) {
         candidates.push_back({j, threshold_of(each), each.deviate()});
       }
     }
   }
-  const std::ptrdiff_t tested = std::ssize(candidates);
+  const Eigen::Index tested = std::ssize(candidates);
   const double level = std::min(data.problem.options.significance, usual_significance);
   const auto passes = [&](const SplitCandidate& split) {
     return split.input >= 0 && data.is_significant(level, node.weights.sum(), node.rank, node.search.rss,
                                                    {split.rank_left, split.rank_right}, split.rss, tested);
   };
   SignSplit best;
-  std::ptrdiff_t evaluations = 0;
+  Eigen::Index evaluations = 0;
   while (!candidates.empty() && !passes(best.best)) {
     const std::size_t next = next_candidate(candidates);
     const Cut candidate = candidates[next];
-    candidates.erase(candidates.begin() + static_cast<std::ptrdiff_t>(next));
+    candidates.erase(candidates.begin() + static_cast<Eigen::Index>(next));
     SignSplit split;
     const std::span<const double> values = values_of(candidate.input);
     for (std::size_t i = 0; i < values.size(); ++i) {
@@ -143,7 +138,7 @@ SignSplit search_by_signs(const GrowthData& data, const SignNode& node) {
         split.sides[values[i] <= candidate.threshold ? 0 : 1].push_back(static_cast<int>(i));
       }
     }
-    if (std::min(std::ssize(split.sides[0]), std::ssize(split.sides[1])) < std::max<std::ptrdiff_t>(smallest_leaf, 1)) {
+    if (std::min(std::ssize(split.sides[0]), std::ssize(split.sides[1])) < std::max<Eigen::Index>(smallest_leaf, 1)) {
       continue;
     }
     split.best.input = static_cast<int>(candidate.input);

@@ -9,38 +9,36 @@
 namespace llmt {
 namespace {
 
-/// What the pooled variance may be of the mean square and still be rounding.
+// What the pooled variance may be of the mean square and still be rounding.
 constexpr double no_scatter = 1e-14;
 
-/// Student's statistic of two classes' means with the pooled variance. `squares`: sums about the class means;
-/// `largest_squares`: what they and the difference are rounding against.
+// Student's statistic of two classes' means with the pooled variance. `squares`: sums about the class means;
+// `largest_squares`: what they and the difference are rounding against.
 double student(double difference, double squares, double largest_squares, const std::array<double, 2>& counts) {
   const double freedom = counts[0] + counts[1] - 2.0;
   const double tiny = no_scatter * largest_squares;
-  if (!(freedom > 0.0) || difference * difference * (counts[0] + counts[1]) <= tiny) {
-    return 0.0;
-  }
+  if (!(freedom > 0.0) || difference * difference * (counts[0] + counts[1]) <= tiny) return 0.0;
   const double error = std::sqrt(std::max(squares, 0.0) / freedom * (1.0 / counts[0] + 1.0 / counts[1]));
   return squares <= tiny ? std::copysign(std::numeric_limits<double>::infinity(), difference) : difference / error;
 }
 
-/// Four sums of each kind over the rows i, i + 4, ...
+// Four sums of each kind over the rows i, i + 4, ...
 struct ClassSums {
   std::array<double, 2> count{};  // weights
   std::array<double, 2> sum{};    // of the values
   std::array<double, 2> squares{};
 };
 
-/// Weighted sums over the rows of either class, positive and negative, of values about `origin[class]`, or with
-/// `absolute` of their magnitudes. Without branches, for signs come in no order.
+// Weighted sums over the rows of either class, positive and negative, of values about `origin[class]`, or with
+// `absolute` of their magnitudes. Without branches, for signs come in no order.
 template <bool Absolute>
 LLMT_INLINE ClassSums class_sums(const double* values, const double* residuals, const double* weights,
-                                 std::ptrdiff_t count, const std::array<double, 2>& origin) {
+                                 Eigen::Index count, const std::array<double, 2>& origin) {
   Quad counts[2] = {};
   Quad sums[2] = {};
   Quad squares[2] = {};
-  for (std::ptrdiff_t i = 0; i < count; i += quad) {
-    const std::ptrdiff_t left = count - i;
+  for (Eigen::Index i = 0; i < count; i += quad) {
+    const Eigen::Index left = count - i;
     const Quad value = load_quad(values + i, left);
     const QuadMask negative = load_quad(residuals + i, left) < 0.0;
     Quad z = value - (negative ? Quad{} + origin[1] : Quad{} + origin[0]);
@@ -67,13 +65,13 @@ LLMT_INLINE ClassSums class_sums(const double* values, const double* residuals, 
 }
 
 LLMT_FOR_EACH_INSTRUCTION_SET
-ClassSums about_origin(const double* values, const double* residuals, const double* weights, std::ptrdiff_t count,
+ClassSums about_origin(const double* values, const double* residuals, const double* weights, Eigen::Index count,
                        double origin) {
   return class_sums<false>(values, residuals, weights, count, {origin, origin});
 }
 
 LLMT_FOR_EACH_INSTRUCTION_SET
-ClassSums distances_from(const double* values, const double* residuals, const double* weights, std::ptrdiff_t count,
+ClassSums distances_from(const double* values, const double* residuals, const double* weights, Eigen::Index count,
                          const std::array<double, 2>& means) {
   return class_sums<true>(values, residuals, weights, count, means);
 }
@@ -96,18 +94,14 @@ SignStatistics sign_statistics(std::span<const double> values, std::span<const d
     result.low = value < result.low ? value : result.low;
     result.high = value > result.high ? value : result.high;
   }
-  if (!(result.low < result.high)) {
-    return result;
-  }
+  if (!(result.low < result.high)) return result;
   // Which digits are lost does not depend on the offset of the input, nor on the order of the rows.
   const double origin = result.low + 0.5 * (result.high - result.low);
-  const std::ptrdiff_t rows = std::ssize(values);
+  const Eigen::Index rows = std::ssize(values);
   const ClassSums first = about_origin(values.data(), residuals.data(), weights.data(), rows, origin);
   const std::array<double, 2>& count = first.count;
   result.freedom = count[0] + count[1] - 2.0;
-  if (!(count[0] > 0.0 && count[1] > 0.0)) {
-    return result;
-  }
+  if (!(count[0] > 0.0 && count[1] > 0.0)) return result;
   result.positive_mean = origin + first.sum[0] / count[0];
   result.negative_mean = origin + first.sum[1] / count[1];
   const ClassSums second = distances_from(values.data(), residuals.data(), weights.data(), rows,

@@ -55,7 +55,7 @@ bool refreshed(const GrowthData& data, WhitenedRows& rows, const std::vector<dou
                WhitenedLeaf& leaf);
 
 /// The threshold of a split in the gap low ... high of a split input.
-double place_threshold(const GrowthData& data, const WhitenedLeaf& leaf, std::ptrdiff_t split_input, double low,
+double place_threshold(const GrowthData& data, const WhitenedLeaf& leaf, Eigen::Index split_input, double low,
                        double high, const Node& node, const Node& left, const Node& right);
 
 }  // namespace llmt

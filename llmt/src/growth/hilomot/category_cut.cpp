@@ -7,49 +7,45 @@
 namespace llmt {
 namespace {
 
-/// The levels of a categorical input are put in so many orders, and each is cut in at most so many places.
+// The levels of a categorical input are put in so many orders, and each is cut in at most so many places.
 constexpr std::size_t orders_of_levels = 3;
 constexpr std::size_t most_level_cuts = 32;
 
-/// Of a leaf's rows: their level, -1 where there is none, and the weight of every level.
+// Of a leaf's rows: their level, -1 where there is none, and the weight of every level.
 struct Levels {
   std::vector<int> of_row;
   Eigen::VectorXd weight;
 };
 
 Levels levels_of(const GateProblem& problem, const Eigen::VectorXd& values, int count) {
-  Levels levels{std::vector<int>(static_cast<std::size_t>(values.size()), -1), Eigen::VectorXd::Zero(count)};
+  Levels levels{std::vector<int>(values.size(), -1), Eigen::VectorXd::Zero(count)};
   for (std::size_t i = 0; i < levels.of_row.size(); ++i) {
-    const double value = values(static_cast<std::ptrdiff_t>(i));
+    const double value = values(i);
     if (!std::isnan(value)) {
       levels.of_row[i] = static_cast<int>(value);
-      levels.weight(levels.of_row[i]) += problem.weights(static_cast<std::ptrdiff_t>(i));
+      levels.weight(levels.of_row[i]) += problem.weights(i);
     }
   }
   return levels;
 }
 
-/// Rows without a level belong to both sides.
+// Rows without a level belong to both sides.
 void cut_order(const GateProblem& problem, const Levels& levels, const std::vector<int>& order, LevelCut& best) {
   const std::size_t step = std::max<std::size_t>(1, order.size() / most_level_cuts);
-  std::vector<int> side(static_cast<std::size_t>(levels.weight.size()), 0);
+  std::vector<int> side(levels.weight.size(), 0);
   for (const int level : order) {
-    side[static_cast<std::size_t>(level)] = 1;
+    side[level] = 1;
   }
   const double known = levels.weight.sum();
   double on_left = 0.0;
   for (std::size_t k = 0; k + 1 < order.size(); ++k) {
-    side[static_cast<std::size_t>(order[k])] = -1;
+    side[order[k]] = -1;
     on_left += levels.weight(order[k]);
-    if ((k + 1) % step != 0) {
-      continue;
-    }
+    if ((k + 1) % step != 0) continue;
     Eigen::VectorXd share(std::ssize(levels.of_row));
     for (std::size_t i = 0; i < levels.of_row.size(); ++i) {
       const int level = levels.of_row[i];
-      share(static_cast<std::ptrdiff_t>(i)) = level < 0                                   ? on_left / known
-                                              : side[static_cast<std::size_t>(level)] < 0 ? 1.0
-                                                                                          : 0.0;
+      share(i) = level < 0 ? on_left / known : side[level] < 0 ? 1.0 : 0.0;
     }
     const double loss = share_loss(problem, share);
     ++best.evaluations;
@@ -66,12 +62,12 @@ void cut_order(const GateProblem& problem, const Levels& levels, const std::vect
 
 LevelCut best_level_cut(const GateProblem& problem, const Eigen::VectorXd& values, int count) {
   const Levels levels = levels_of(problem, values, count);
-  const std::ptrdiff_t columns = problem.a.cols();
+  const Eigen::Index columns = problem.a.cols();
   const Eigen::VectorXd residual = problem.weights.cwiseProduct(problem.y * problem.output_weights.cwiseSqrt());
   Eigen::MatrixXd means = Eigen::MatrixXd::Zero(columns, levels.weight.size());
   for (std::size_t i = 0; i < levels.of_row.size(); ++i) {
     if (levels.of_row[i] >= 0) {
-      const std::ptrdiff_t row = static_cast<std::ptrdiff_t>(i);
+      const Eigen::Index row = static_cast<Eigen::Index>(i);
       means.col(levels.of_row[i]) += residual(row) * problem.a.row(row).transpose();
     }
   }
@@ -83,13 +79,13 @@ LevelCut best_level_cut(const GateProblem& problem, const Eigen::VectorXd& value
     }
   }
   const Eigen::VectorXd spread = means.cwiseAbs2() * levels.weight;
-  std::vector<std::ptrdiff_t> keys(static_cast<std::size_t>(columns));
-  std::iota(keys.begin(), keys.end(), std::ptrdiff_t{0});
-  std::stable_sort(keys.begin(), keys.end(), [&](auto a, auto b) { return spread(a) > spread(b); });
+  std::vector<Eigen::Index> keys(columns);
+  std::iota(keys.begin(), keys.end(), Eigen::Index{0});
+  std::ranges::stable_sort(keys, [&](auto a, auto b) { return spread(a) > spread(b); });
   keys.resize(std::min(keys.size(), orders_of_levels));
   LevelCut best;
-  for (const std::ptrdiff_t key : keys) {
-    std::stable_sort(present.begin(), present.end(), [&](int a, int b) { return means(key, a) < means(key, b); });
+  for (const Eigen::Index key : keys) {
+    std::ranges::stable_sort(present, [&](int a, int b) { return means(key, a) < means(key, b); });
     cut_order(problem, levels, present, best);
   }
   return best;

@@ -17,16 +17,16 @@
 namespace llmt {
 namespace {
 
-/// AICc has to improve within this many further leaves.
-constexpr std::ptrdiff_t patience = 10;
+// AICc has to improve within this many further leaves.
+constexpr Eigen::Index patience = 10;
 
-/// Rows with less validity than this take no part in growth below.
+// Rows with less validity than this take no part in growth below.
 constexpr double negligible = 1e-5;
 
-/// Directions of this part of the largest variance, in standardised inputs, are collinear with others.
+// Directions of this part of the largest variance, in standardised inputs, are collinear with others.
 constexpr double collinear = 1e-8;
 
-/// A local model that no other stands below.
+// A local model that no other stands below.
 struct OpenLeaf {
   int node = 0;
   std::vector<int> rows;     // that it reaches
@@ -36,7 +36,7 @@ struct OpenLeaf {
   bool splittable = true;
 };
 
-/// How a leaf may be split.
+// How a leaf may be split.
 struct Cut {
   double loss = std::numeric_limits<double>::infinity();
   Eigen::VectorXd normal;  // of length 1 in standardised inputs; empty: by levels
@@ -50,10 +50,10 @@ struct Cut {
 class Hilomot {
  public:
   Hilomot(const GrowthProblem& problem, const HilomotOptions& options)
-      : data_(problem), options_(options), leaf_of_row_(static_cast<std::size_t>(data_.training.count()), 0) {
+      : data_(problem), options_(options), leaf_of_row_(data_.training.count(), 0) {
     const TrainingRows& training = data_.training;
     deviations_.resize(training.count(), std::ssize(training.regressors));
-    for (std::ptrdiff_t index = 0; index < num_chunks(training); ++index) {
+    for (Eigen::Index index = 0; index < num_chunks(training); ++index) {
       const Chunk chunk = fetch(training, index, {});
       deviations_.middleRows(index * chunk_rows, chunk.count()) =
           chunk.deviations.array().isNaN().select(0.0, chunk.deviations);
@@ -65,7 +65,7 @@ class Hilomot {
     open_root();
     StopReason stop = StopReason::leaf_samples;
     double best_criterion = criterion();
-    std::ptrdiff_t best_leaves = 1;
+    Eigen::Index best_leaves = 1;
     while (true) {
       if (data_.problem.options.max_leaves > 0 && std::ssize(leaves_) >= data_.problem.options.max_leaves) {
         stop = StopReason::max_leaves;
@@ -75,9 +75,7 @@ class Hilomot {
         stop = StopReason::exact_fit;
         break;
       }
-      if (!split_worst()) {
-        break;
-      }
+      if (!split_worst()) break;
       if (options_.stop_by_aicc) {
         const double now = criterion();
         if (now < best_criterion) {
@@ -97,19 +95,19 @@ class Hilomot {
   }
 
  private:
-  /// Numeric split inputs that vary, about their centres and by their standard deviations; missing values are 0.
+  // Numeric split inputs that vary, about their centres and by their standard deviations; missing values are 0.
   void standardise_inputs() {
     const TrainingRows& training = data_.training;
     const double total = data_.weights.sum();
-    for (std::ptrdiff_t j = 0; j < data_.split_inputs(); ++j) {
-      const int input = data_.problem.options.split_inputs[static_cast<std::size_t>(j)];
-      if (data_.num_levels[static_cast<std::size_t>(j)] > 0) {
+    for (Eigen::Index j = 0; j < data_.split_inputs(); ++j) {
+      const int input = data_.problem.options.split_inputs[j];
+      if (data_.num_levels[j] > 0) {
         categorical_.push_back(input);
         continue;
       }
-      const double centre = training.columns[static_cast<std::size_t>(input)].centre;
+      const double centre = training.columns[input].centre;
       Eigen::VectorXd values(training.count());
-      for (std::ptrdiff_t i = 0; i < values.size(); ++i) {
+      for (Eigen::Index i = 0; i < values.size(); ++i) {
         const double value = data_.split_value(static_cast<int>(i), j);
         values(i) = std::isnan(value) ? 0.0 : value - centre;
       }
@@ -141,7 +139,7 @@ class Hilomot {
     describe(leaves_[0]);
   }
 
-  /// Least squares weighted with the validity, as a correction of the parent's model.
+  // Least squares weighted with the validity, as a correction of the parent's model.
   Node local_model(const OpenLeaf& leaf, const Node& parent) const {
     const RowMajor x = deviations_(leaf.rows, Eigen::all);
     const Eigen::MatrixXd residuals = (data_.outputs(leaf.rows, Eigen::all) - x * parent.slope.transpose()).rowwise() -
@@ -163,7 +161,7 @@ class Hilomot {
            Eigen::RowVectorXd(model.value.transpose());
   }
 
-  /// Weighted squared errors of the whole model at some rows, of all outputs.
+  // Weighted squared errors of the whole model at some rows, of all outputs.
   Eigen::VectorXd squared_errors(const std::vector<int>& rows) const {
     const Eigen::MatrixXd error = data_.outputs(rows, Eigen::all) - predicted_(rows, Eigen::all);
     return data_.weights(rows).cwiseProduct(error.cwiseAbs2() * data_.output_weights);
@@ -182,9 +180,7 @@ class Hilomot {
   }
 
   double criterion() const {
-    if (!options_.stop_by_aicc) {
-      return 0.0;
-    }
+    if (!options_.stop_by_aicc) return 0.0;
     const double outputs = static_cast<double>(data_.outputs.cols());
     double effective = 0.0;
     for (const OpenLeaf& leaf : leaves_) {
@@ -198,7 +194,7 @@ class Hilomot {
     return aicc(data_.weights.sum() * outputs, std::max(loss, 1e-24 * outputs), effective);
   }
 
-  /// Splits the worst local model that can be split; false if there is none.
+  // Splits the worst local model that can be split; false if there is none.
   bool split_worst() {
     while (true) {
       OpenLeaf* worst = nullptr;
@@ -210,9 +206,7 @@ class Hilomot {
           largest = loss;
         }
       }
-      if (worst == nullptr) {
-        return false;
-      }
+      if (worst == nullptr) return false;
       if (const std::optional<Cut> cut = best_cut(*worst)) {
         split(*worst, *cut);
         return true;
@@ -226,16 +220,14 @@ class Hilomot {
     problem.weights = leaf.validity.cwiseProduct(data_.weights(leaf.rows));
     problem.least_weight = std::max(static_cast<double>(data_.problem.options.min_leaf_samples),
                                     static_cast<double>(deviations_.cols() + 1));
-    if (problem.weights.sum() < 2.0 * problem.least_weight) {
-      return std::nullopt;
-    }
+    if (problem.weights.sum() < 2.0 * problem.least_weight) return std::nullopt;
     problem.output_weights = data_.output_weights;
     problem.models = options_.models;
     // In orthonormal columns, and without what one model explains.
     const NodeFit whole =
         fit_node(deviations_(leaf.rows, Eigen::all), data_.outputs(leaf.rows, Eigen::all), problem.weights);
     problem.a.resize(std::ssize(leaf.rows), whole.features.coefficients());
-    for (std::ptrdiff_t i = 0; i < problem.a.rows(); ++i) {
+    for (Eigen::Index i = 0; i < problem.a.rows(); ++i) {
       const double* row = whole.features.row(i);
       problem.a.row(i) = Eigen::Map<const Eigen::RowVectorXd>(row, problem.a.cols()) / row[0];
     }
@@ -244,11 +236,11 @@ class Hilomot {
     for (const int input : categorical_) {
       const Table& table = *data_.training.table;
       Eigen::VectorXd values(std::ssize(leaf.rows));
-      for (std::ptrdiff_t i = 0; i < values.size(); ++i) {
-        const int row = leaf.rows[static_cast<std::size_t>(i)];
-        values(i) = table.inputs(data_.training.rows[static_cast<std::size_t>(row)], input);
+      for (Eigen::Index i = 0; i < values.size(); ++i) {
+        const int row = leaf.rows[i];
+        values(i) = table.inputs(data_.training.rows[row], input);
       }
-      LevelCut cut = best_level_cut(problem, values, table.num_levels[static_cast<std::size_t>(input)]);
+      LevelCut cut = best_level_cut(problem, values, table.num_levels[input]);
       evaluations_ += cut.evaluations;
       if (cut.loss < best.loss) {
         best = {.loss = cut.loss,
@@ -263,24 +255,20 @@ class Hilomot {
     return best.loss < before ? std::optional<Cut>(std::move(best)) : std::nullopt;
   }
 
-  /// `problem.z` is set here.
+  // `problem.z` is set here.
   Cut best_plane(const OpenLeaf& leaf, GateProblem& problem) {
     Cut cut;
-    const std::ptrdiff_t inputs = std::ssize(numeric_);
-    if (inputs == 0) {
-      return cut;
-    }
+    const Eigen::Index inputs = std::ssize(numeric_);
+    if (inputs == 0) return cut;
     const double total = problem.weights.sum();
     Eigen::MatrixXd x = standardised_(leaf.rows, Eigen::all);
     const Eigen::RowVectorXd mean = problem.weights.transpose() * x / total;
     x.rowwise() -= mean;
     const Eigen::MatrixXd covariance = x.transpose() * (problem.weights.asDiagonal() * x) / total;
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(covariance);
-    const std::ptrdiff_t kept =
+    const Eigen::Index kept =
         (eigen.eigenvalues().array() > collinear * std::max(1e-12, eigen.eigenvalues().maxCoeff())).count();
-    if (kept == 0) {
-      return cut;
-    }
+    if (kept == 0) return cut;
     const Eigen::VectorXd root = eigen.eigenvalues().tail(kept).cwiseSqrt();
     const Eigen::MatrixXd whiten = eigen.eigenvectors().rightCols(kept) * root.cwiseInverse().asDiagonal();
     const Eigen::MatrixXd colour = eigen.eigenvectors().rightCols(kept) * root.asDiagonal();  // its transpose undoes it
@@ -291,9 +279,7 @@ class Hilomot {
         leaf.normal.size() > 0 ? Eigen::VectorXd(colour.transpose() * leaf.normal) : Eigen::VectorXd::Zero(kept);
     const GateFit best = best_gate(problem, directions, inputs, data_.problem.max_threads);
     evaluations_ += best.evaluations;
-    if (!std::isfinite(best.loss)) {
-      return cut;
-    }
+    if (!std::isfinite(best.loss)) return cut;
     cut.loss = best.loss;
     // u = steepness . z + offset = normal . (standardised - mean) / half width + offset.
     const Eigen::VectorXd normal = whiten * best.gate.head(kept);
@@ -305,15 +291,15 @@ class Hilomot {
   }
 
   void split(OpenLeaf& leaf, const Cut& cut) {
-    Node& parent = nodes_[static_cast<std::size_t>(leaf.node)];
+    Node& parent = nodes_[leaf.node];
     parent.left = static_cast<int>(nodes_.size());
     parent.right = parent.left + 1;
     set_split(parent, cut);
-    std::ptrdiff_t on_left = 0;
+    Eigen::Index on_left = 0;
     for (std::size_t i = 0; i < leaf.rows.size(); ++i) {
-      int& of_row = leaf_of_row_[static_cast<std::size_t>(leaf.rows[i])];
+      int& of_row = leaf_of_row_[leaf.rows[i]];
       if (of_row == leaf.node) {
-        const bool left = cut.share(static_cast<std::ptrdiff_t>(i)) >= 0.5;
+        const bool left = cut.share(i) >= 0.5;
         of_row = left ? parent.left : parent.right;
         on_left += left ? 1 : 0;
       }
@@ -330,7 +316,7 @@ class Hilomot {
       const Eigen::VectorXd validity = leaf.validity.cwiseProduct(share);
       std::vector<double> kept;
       for (std::size_t i = 0; i < leaf.rows.size(); ++i) {
-        if (const double here = validity(static_cast<std::ptrdiff_t>(i)); here > negligible) {
+        if (const double here = validity(i); here > negligible) {
           child.rows.push_back(leaf.rows[i]);
           kept.push_back(here);
         }
@@ -358,7 +344,7 @@ class Hilomot {
     node.direction = Eigen::VectorXd::Zero(std::ssize(data_.training.columns));
     double largest = 0.0;
     for (std::size_t k = 0; k < numeric_.size(); ++k) {
-      const double weight = cut.normal(static_cast<std::ptrdiff_t>(k));
+      const double weight = cut.normal(k);
       node.direction(numeric_[k]) = weight / spreads_[k];
       if (std::abs(weight) > largest) {
         largest = std::abs(weight);
@@ -388,7 +374,7 @@ class Hilomot {
   std::vector<Node> nodes_;       // in scaled outputs
   std::vector<OpenLeaf> leaves_;
   std::vector<int> leaf_of_row_;  // whose side of all planes a row is on
-  std::ptrdiff_t evaluations_ = 0;
+  Eigen::Index evaluations_ = 0;
 };
 
 }  // namespace

@@ -15,33 +15,33 @@ namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-/// Weight, relative to all, that holds the coefficients of a model at zero: nothing to what rows determine.
+// Weight, relative to all, that holds the coefficients of a model at zero: nothing to what rows determine.
 constexpr double hold = 1e-9;
 
-/// Where along a direction the optimisation may start, as parts of the weight.
+// Where along a direction the optimisation may start, as parts of the weight.
 constexpr double quantiles[] = {0.2, 0.35, 0.5, 0.65, 0.8};
 
 constexpr int most_evaluations = 40;
 constexpr double small_gain = 1e-5;  // of the loss: a step that brings less is the last one
 
-/// Rows that are summed up at a time.
-constexpr std::ptrdiff_t rows_at_once = 256;
+// Rows that are summed up at a time.
+constexpr Eigen::Index rows_at_once = 256;
 
 LLMT_FOR_EACH_INSTRUCTION_SET
-void set_shares(const double* u, std::ptrdiff_t count, double* shares) {
-  for (std::ptrdiff_t i = 0; i < count; ++i) {
+void set_shares(const double* u, Eigen::Index count, double* shares) {
+  for (Eigen::Index i = 0; i < count; ++i) {
     shares[i] = logistic(u[i]);
   }
 }
 
-/// sum' += left' right.
-void add_product(const RowMajor& left, const RowMajor& right, std::ptrdiff_t rows, RowMajor& sum) {
+// sum' += left' right.
+void add_product(const RowMajor& left, const RowMajor& right, Eigen::Index rows, RowMajor& sum) {
   add_transposed_product(left.cols(), right.cols(), rows, 1.0, left.data(), left.cols(), right.data(), right.cols(),
                          sum.data(), sum.cols());
 }
 
-/// The two models under given shares g. With b = [a, g a] both say b' [second; difference]; B' W B is made of
-/// total * 1, `once` and `twice`.
+// The two models under given shares g. With b = [a, g a] both say b' [second; difference]; B' W B is made of
+// total * 1, `once` and `twice`.
 struct Fitted {
   Eigen::MatrixXd once;        // sum of w g a a'
   Eigen::MatrixXd twice;       // sum of w g^2 a a'
@@ -52,7 +52,7 @@ struct Fitted {
 };
 
 void fit_models(const GateProblem& problem, double total, Fitted& fitted) {
-  const std::ptrdiff_t size = problem.a.cols();
+  const Eigen::Index size = problem.a.cols();
   const Eigen::MatrixXd identity = Eigen::MatrixXd::Identity(size, size);
   if (problem.models == GateModels::joint) {
     const Eigen::MatrixXd rest = fitted.twice - fitted.once * fitted.once / total + hold * total * identity;
@@ -79,18 +79,16 @@ Fitted with_shares(const GateProblem& problem, const Eigen::VectorXd& shares) {
   const double total = problem.weights.sum();
   const double on_left = problem.weights.dot(shares);
   Fitted fitted;
-  if (!(on_left >= problem.least_weight && total - on_left >= problem.least_weight)) {
-    return fitted;
-  }
-  const std::ptrdiff_t size = problem.a.cols();
-  const std::ptrdiff_t outputs = problem.y.cols();
+  if (!(on_left >= problem.least_weight && total - on_left >= problem.least_weight)) return fitted;
+  const Eigen::Index size = problem.a.cols();
+  const Eigen::Index outputs = problem.y.cols();
   RowMajor left(rows_at_once, size);
   RowMajor right(rows_at_once, 2 * size + outputs);
   RowMajor sum = RowMajor::Zero(size, 2 * size + outputs);
-  for (std::ptrdiff_t begin = 0; begin < problem.a.rows(); begin += rows_at_once) {
-    const std::ptrdiff_t count = std::min(rows_at_once, problem.a.rows() - begin);
-    for (std::ptrdiff_t i = 0; i < count; ++i) {
-      const std::ptrdiff_t row = begin + i;
+  for (Eigen::Index begin = 0; begin < problem.a.rows(); begin += rows_at_once) {
+    const Eigen::Index count = std::min(rows_at_once, problem.a.rows() - begin);
+    for (Eigen::Index i = 0; i < count; ++i) {
+      const Eigen::Index row = begin + i;
       const double share = shares(row);
       left.row(i) = problem.weights(row) * share * problem.a.row(row);
       right.row(i).head(size) = problem.a.row(row);
@@ -106,19 +104,19 @@ Fitted with_shares(const GateProblem& problem, const Eigen::VectorXd& shares) {
   return fitted;
 }
 
-/// Gauss and Newton's matrix and the gradient of half the loss.
+// Gauss and Newton's matrix and the gradient of half the loss.
 struct Linearised {
   Eigen::MatrixXd matrix;
   Eigen::VectorXd gradient;
 };
 
-/// Of one output. The residuals' derivatives at fixed coefficients are D = -g' (a' difference) z, what the coefficients
-/// follow is added as B K. Joint models: K = -(B' W B)^-1 B' W D, the approximation of Kaufman (1975), with which the
-/// gradient is exact. Local models: exactly the derivatives of either weighted least squares.
-void add_output(const GateProblem& problem, const Eigen::VectorXd& shares, const Fitted& fitted, std::ptrdiff_t output,
+// Of one output. The residuals' derivatives at fixed coefficients are D = -g' (a' difference) z, what the coefficients
+// follow is added as B K. Joint models: K = -(B' W B)^-1 B' W D, the approximation of Kaufman (1975), with which the
+// gradient is exact. Local models: exactly the derivatives of either weighted least squares.
+void add_output(const GateProblem& problem, const Eigen::VectorXd& shares, const Fitted& fitted, Eigen::Index output,
                 Linearised& result) {
-  const std::ptrdiff_t size = problem.a.cols();
-  const std::ptrdiff_t entries = problem.z.cols();
+  const Eigen::Index size = problem.a.cols();
+  const Eigen::Index entries = problem.z.cols();
   RowMajor by_gate(rows_at_once, entries);  // w D
   RowMajor pulled(rows_at_once, entries);   // w g' (y - left model) z
   RowMajor right(rows_at_once, 2 * size + entries + 1);
@@ -127,10 +125,10 @@ void add_output(const GateProblem& problem, const Eigen::VectorXd& shares, const
   RowMajor pull = RowMajor::Zero(entries, size);
   const Eigen::VectorXd second = fitted.second.col(output);
   const Eigen::VectorXd difference = fitted.difference.col(output);
-  for (std::ptrdiff_t begin = 0; begin < problem.a.rows(); begin += rows_at_once) {
-    const std::ptrdiff_t count = std::min(rows_at_once, problem.a.rows() - begin);
-    for (std::ptrdiff_t i = 0; i < count; ++i) {
-      const std::ptrdiff_t row = begin + i;
+  for (Eigen::Index begin = 0; begin < problem.a.rows(); begin += rows_at_once) {
+    const Eigen::Index count = std::min(rows_at_once, problem.a.rows() - begin);
+    for (Eigen::Index i = 0; i < count; ++i) {
+      const Eigen::Index row = begin + i;
       const double share = shares(row);
       const double slope = logistic_derivative(share);
       const double gap = problem.a.row(row).dot(difference);
@@ -175,24 +173,24 @@ void add_output(const GateProblem& problem, const Eigen::VectorXd& shares, const
 }
 
 Linearised linearise(const GateProblem& problem, const Gate& gate, const Fitted& fitted) {
-  const std::ptrdiff_t entries = problem.z.cols();
+  const Eigen::Index entries = problem.z.cols();
   Linearised result{Eigen::MatrixXd::Zero(entries, entries), Eigen::VectorXd::Zero(entries)};
   const Eigen::VectorXd shares = gate_shares(problem, gate);
-  for (std::ptrdiff_t output = 0; output < problem.y.cols(); ++output) {
+  for (Eigen::Index output = 0; output < problem.y.cols(); ++output) {
     add_output(problem, shares, fitted, output, result);
   }
   return result;
 }
 
-/// The same plane, its half width held.
+// The same plane, its half width held.
 Gate held(const Gate& gate, double least_width, double most_width) {
   const double steepness = gate.head(gate.size() - 1).norm();
   return gate * (std::clamp(steepness, 1.0 / most_width, 1.0 / least_width) / steepness);
 }
 
-/// Takes out what would change the half width.
+// Takes out what would change the half width.
 void fix_width(const Gate& gate, Linearised& at) {
-  const std::ptrdiff_t inputs = gate.size() - 1;
+  const Eigen::Index inputs = gate.size() - 1;
   Eigen::MatrixXd along = Eigen::MatrixXd::Identity(gate.size(), gate.size());
   const Eigen::VectorXd unit = gate.head(inputs).normalized();
   along.topLeftCorner(inputs, inputs) -= unit * unit.transpose();
@@ -221,9 +219,9 @@ GateFit best_threshold(const GateProblem& problem, const Eigen::VectorXd& direct
   Gate gate = Gate::Zero(problem.z.cols());
   gate.head(direction.size()) = direction.normalized() / half_width;
   const Eigen::VectorXd side = problem.z * gate;
-  std::vector<int> order(static_cast<std::size_t>(side.size()));
+  std::vector<int> order(side.size());
   std::iota(order.begin(), order.end(), 0);
-  std::stable_sort(order.begin(), order.end(), [&](int i, int j) { return side(i) < side(j); });
+  std::ranges::stable_sort(order, [&](int i, int j) { return side(i) < side(j); });
   GateFit best{gate, infinity};
   const double total = problem.weights.sum();
   double sum = 0.0;

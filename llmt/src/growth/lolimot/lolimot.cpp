@@ -16,13 +16,13 @@
 namespace llmt {
 namespace {
 
-/// AICc has to improve within this many further leaves.
-constexpr std::ptrdiff_t patience = 10;
+// AICc has to improve within this many further leaves.
+constexpr Eigen::Index patience = 10;
 
-/// Rows with less validity than this take no part in a local estimate.
+// Rows with less validity than this take no part in a local estimate.
 constexpr double negligible = 1e-9;
 
-/// A local model with its validity function.
+// A local model with its validity function.
 struct LocalModel {
   int node = 0;
   Eigen::VectorXd low;  // box, of the split inputs
@@ -39,7 +39,7 @@ class Lolimot {
     const TrainingRows& training = *problem.training;
     const Table& table = *training.table;
     deviations_.resize(training.count(), std::ssize(training.regressors));
-    for (std::ptrdiff_t index = 0; index < num_chunks(training); ++index) {
+    for (Eigen::Index index = 0; index < num_chunks(training); ++index) {
       const Chunk chunk = fetch(training, index, {});
       deviations_.middleRows(index * chunk_rows, chunk.count()) =
           chunk.deviations.array().isNaN().select(0.0, chunk.deviations);
@@ -71,7 +71,7 @@ class Lolimot {
     models_ = {std::move(root)};
     StopReason stop = StopReason::leaf_samples;
     double best_criterion = criterion();
-    std::ptrdiff_t best_leaves = 1;
+    Eigen::Index best_leaves = 1;
     while (true) {
       if (problem_.options.max_leaves > 0 && std::ssize(models_) >= problem_.options.max_leaves) {
         stop = StopReason::max_leaves;
@@ -81,9 +81,7 @@ class Lolimot {
         stop = StopReason::exact_fit;
         break;
       }
-      if (!split_worst()) {
-        break;
-      }
+      if (!split_worst()) break;
       if (options_.stop_by_aicc) {
         const double now = criterion();
         if (now < best_criterion) {
@@ -110,13 +108,11 @@ class Lolimot {
   Eigen::VectorXd validity_function(const Eigen::VectorXd& low, const Eigen::VectorXd& high) const {
     const Eigen::MatrixXd& values = split_values_;
     Eigen::VectorXd exponent = Eigen::VectorXd::Zero(values.rows());
-    for (std::ptrdiff_t j = 0; j < values.cols(); ++j) {
+    for (Eigen::Index j = 0; j < values.cols(); ++j) {
       const double sigma = options_.width * (high(j) - low(j));
-      if (!(sigma > 0.0) || is_categorical(j)) {
-        continue;
-      }
+      if (!(sigma > 0.0) || is_categorical(j)) continue;
       const double centre = 0.5 * (low(j) + high(j));
-      for (std::ptrdiff_t i = 0; i < values.rows(); ++i) {
+      for (Eigen::Index i = 0; i < values.rows(); ++i) {
         const double z = std::isnan(values(i, j)) ? 0.0 : (values(i, j) - centre) / sigma;
         exponent(i) -= 0.5 * z * z;
       }
@@ -126,10 +122,10 @@ class Lolimot {
     return exponent.array().exp().max(1e-280);
   }
 
-  /// Weighted least squares with weights `validity`, as a correction of the parent's model.
+  // Weighted least squares with weights `validity`, as a correction of the parent's model.
   void fit(LocalModel& model, const Node& parent, const Eigen::VectorXd& validity) const {
     std::vector<int> rows;
-    for (std::ptrdiff_t i = 0; i < validity.size(); ++i) {
+    for (Eigen::Index i = 0; i < validity.size(); ++i) {
       if (validity(i) > negligible) {
         rows.push_back(static_cast<int>(i));
       }
@@ -169,7 +165,7 @@ class Lolimot {
     return sum;
   }
 
-  /// Weighted squared error of every row under sums of mu times prediction, and of mu.
+  // Weighted squared error of every row under sums of mu times prediction, and of mu.
   Eigen::VectorXd squared_errors(const Eigen::MatrixXd& numerator, const Eigen::VectorXd& mu) const {
     const Eigen::MatrixXd error = outputs_ - mu.cwiseInverse().asDiagonal() * numerator;
     return weights_.cwiseProduct(error.cwiseAbs2() * output_weights_);
@@ -177,7 +173,7 @@ class Lolimot {
 
   double loss() const { return squared_errors(numerator(), sum_of_mu()).sum(); }
 
-  /// AICc with the effective number of parameters of local estimation.
+  // AICc with the effective number of parameters of local estimation.
   double criterion() const {
     const double rows = weights_.sum() * static_cast<double>(outputs_.cols());
     const Eigen::VectorXd total = sum_of_mu();
@@ -188,14 +184,10 @@ class Lolimot {
     return aicc(rows, std::max(loss(), floor_), effective * static_cast<double>(outputs_.cols()));
   }
 
-  /// Where input j of a box is split, if anywhere.
-  std::optional<double> threshold(const LocalModel& model, std::ptrdiff_t j) const {
-    if (is_categorical(j) || !(model.low(j) < model.high(j))) {
-      return std::nullopt;
-    }
-    if (!options_.data_driven) {
-      return 0.5 * (model.low(j) + model.high(j));
-    }
+  // Where input j of a box is split, if anywhere.
+  std::optional<double> threshold(const LocalModel& model, Eigen::Index j) const {
+    if (is_categorical(j) || !(model.low(j) < model.high(j))) return std::nullopt;
+    if (!options_.data_driven) return 0.5 * (model.low(j) + model.high(j));
     const std::vector<int> rows = rows_in(model);
     std::vector<int> order;
     for (std::size_t k = 0; k < rows.size(); ++k) {
@@ -203,12 +195,10 @@ class Lolimot {
         order.push_back(static_cast<int>(k));
       }
     }
-    const auto value = [&](int k) { return split_values_(rows[static_cast<std::size_t>(k)], j); };
-    std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return value(a) < value(b); });
-    const std::ptrdiff_t smallest = problem_.options.min_leaf_samples;
-    if (std::ssize(order) < 2 * smallest) {
-      return std::nullopt;
-    }
+    const auto value = [&](int k) { return split_values_(rows[k], j); };
+    std::ranges::stable_sort(order, [&](int a, int b) { return value(a) < value(b); });
+    const Eigen::Index smallest = problem_.options.min_leaf_samples;
+    if (std::ssize(order) < 2 * smallest) return std::nullopt;
     const NodeFit crisp = fit_node(deviations_(rows, Eigen::all), outputs_(rows, Eigen::all), weights_(rows));
     std::vector<double> values;
     for (const int k : order) {
@@ -220,20 +210,18 @@ class Lolimot {
     search.search_edges();
     search.refine(std::numeric_limits<double>::infinity());
     const SplitCandidate found = search.best();
-    if (found.input < 0) {
-      return std::nullopt;
-    }
-    const double low = values[static_cast<std::size_t>(found.left - 1)];
-    const double high = values[static_cast<std::size_t>(found.left)];
+    if (found.input < 0) return std::nullopt;
+    const double low = values[found.left - 1];
+    const double high = values[found.left];
     return std::min(low + 0.5 * (high - low), std::nextafter(high, low));
   }
 
-  /// Rows whose values lie in the box; rows without a value only in boxes that are not cut there.
+  // Rows whose values lie in the box; rows without a value only in boxes that are not cut there.
   std::vector<int> rows_in(const LocalModel& model) const {
     std::vector<int> rows;
-    for (std::ptrdiff_t i = 0; i < split_values_.rows(); ++i) {
+    for (Eigen::Index i = 0; i < split_values_.rows(); ++i) {
       bool inside = true;
-      for (std::ptrdiff_t j = 0; j < split_values_.cols() && inside; ++j) {
+      for (Eigen::Index j = 0; j < split_values_.cols() && inside; ++j) {
         const double x = split_values_(i, j);
         inside = std::isnan(x) ? model.low(j) == options_.low(j) && model.high(j) == options_.high(j)
                                : (x > model.low(j) || model.low(j) == options_.low(j)) && x <= model.high(j);
@@ -252,41 +240,39 @@ class Lolimot {
     LocalModel right;
   };
 
-  /// Splits the worst local model that can be split; false if there is none.
+  // Splits the worst local model that can be split; false if there is none.
   bool split_worst() {
     const Eigen::MatrixXd numerators = numerator();
     const Eigen::VectorXd total = sum_of_mu();
     const Eigen::VectorXd errors = squared_errors(numerators, total);
     while (true) {
-      std::ptrdiff_t worst = -1;
+      Eigen::Index worst = -1;
       double largest = 0.0;
-      for (std::ptrdiff_t m = 0; m < std::ssize(models_); ++m) {
-        const LocalModel& model = models_[static_cast<std::size_t>(m)];
+      for (Eigen::Index m = 0; m < std::ssize(models_); ++m) {
+        const LocalModel& model = models_[m];
         const double local = model.mu.cwiseQuotient(total).dot(errors);
         if (model.splittable && (worst < 0 || local > largest)) {
           worst = m;
           largest = local;
         }
       }
-      if (worst < 0) {
-        return false;
-      }
-      LocalModel& model = models_[static_cast<std::size_t>(worst)];
-      std::vector<Split> splits(static_cast<std::size_t>(split_values_.cols()));
-      parallel_for(std::ssize(splits), problem_.max_threads, [&](std::ptrdiff_t j) {
+      if (worst < 0) return false;
+      LocalModel& model = models_[worst];
+      std::vector<Split> splits(split_values_.cols());
+      parallel_for(std::ssize(splits), problem_.max_threads, [&](Eigen::Index j) {
         if (const std::optional<double> at = threshold(model, j)) {
-          splits[static_cast<std::size_t>(j)] = try_split(model, j, *at, numerators, total);
+          splits[j] = try_split(model, j, *at, numerators, total);
         }
       });
-      const auto best = std::min_element(splits.begin(), splits.end(),
-                                         [](const Split& a, const Split& b) { return a.loss < b.loss; });
+      const auto best =
+          std::ranges::min_element(splits, [](const Split& a, const Split& b) { return a.loss < b.loss; });
       if (best == splits.end() || !std::isfinite(best->loss)) {
         model.splittable = false;
         continue;
       }
-      const std::ptrdiff_t input = best - splits.begin();
-      Node& parent = nodes_[static_cast<std::size_t>(model.node)];
-      parent.split_input = problem_.options.split_inputs[static_cast<std::size_t>(input)];
+      const Eigen::Index input = best - splits.begin();
+      Node& parent = nodes_[model.node];
+      parent.split_input = problem_.options.split_inputs[input];
       parent.threshold = best->threshold;
       parent.left = static_cast<int>(nodes_.size());
       parent.right = parent.left + 1;
@@ -295,7 +281,7 @@ class Lolimot {
       const double samples = static_cast<double>(best->left.model.samples + best->right.model.samples);
       parent.missing_left = samples > 0.0 ? static_cast<double>(best->left.model.samples) / samples : 0.5;
       gains_.resize(nodes_.size() + 2, 0.0);
-      gains_[static_cast<std::size_t>(model.node)] = errors.sum() - best->loss;
+      gains_[model.node] = errors.sum() - best->loss;
       nodes_.push_back(best->left.model);
       nodes_.push_back(best->right.model);
       model = std::move(best->left);
@@ -304,7 +290,7 @@ class Lolimot {
     }
   }
 
-  Split try_split(const LocalModel& model, std::ptrdiff_t j, double at, const Eigen::MatrixXd& numerators,
+  Split try_split(const LocalModel& model, Eigen::Index j, double at, const Eigen::MatrixXd& numerators,
                   const Eigen::VectorXd& total) const {
     Split split;
     split.threshold = at;
@@ -322,9 +308,7 @@ class Lolimot {
     const Eigen::VectorXd safe_sum = sum.cwiseMax(split.left.mu + split.right.mu);
     for (LocalModel* half : {&split.left, &split.right}) {
       const Eigen::VectorXd validity = half->mu.cwiseQuotient(safe_sum);
-      if (validity.dot(weights_) < static_cast<double>(deviations_.cols() + 1)) {
-        return split;
-      }
+      if (validity.dot(weights_) < static_cast<double>(deviations_.cols() + 1)) return split;
       fit(*half, model.model, validity);
     }
     const Eigen::MatrixXd changed = numerators - model.mu.asDiagonal() * model.predictions +
@@ -334,9 +318,9 @@ class Lolimot {
     return split;
   }
 
-  bool is_categorical(std::ptrdiff_t split_input) const {
-    const int input = problem_.options.split_inputs[static_cast<std::size_t>(split_input)];
-    return problem_.training->table->num_levels[static_cast<std::size_t>(input)] > 0;
+  bool is_categorical(Eigen::Index split_input) const {
+    const int input = problem_.options.split_inputs[split_input];
+    return problem_.training->table->num_levels[input] > 0;
   }
 
   const GrowthProblem& problem_;

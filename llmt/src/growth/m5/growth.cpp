@@ -16,18 +16,18 @@ namespace {
 
 using Rows = std::vector<int>;
 
-/// A subtree does not stay if one model leaves less than this part of it: what is left is rounding.
+// A subtree does not stay if one model leaves less than this part of it: what is left is rounding.
 constexpr double negligible_error = 1e-5;
 
-/// Rows that the model of a node counts as when that of its child is drawn towards it (Quinlan 1992).
+// Rows that the model of a node counts as when that of its child is drawn towards it (Quinlan 1992).
 constexpr double smoothing_rows = 15.0;
 
 class M5 {
  public:
   explicit M5(const GrowthProblem& problem) : data_(problem), tree_(grow_m5_tree(data_)) {
-    const std::ptrdiff_t regressors = std::ssize(data_.training.regressors);
+    const Eigen::Index regressors = std::ssize(data_.training.regressors);
     deviations_.resize(data_.training.count(), regressors);
-    for (std::ptrdiff_t index = 0; index < num_chunks(data_.training); ++index) {
+    for (Eigen::Index index = 0; index < num_chunks(data_.training); ++index) {
       const Chunk chunk = fetch(data_.training, index, {});
       deviations_.middleRows(index * chunk_rows, chunk.count()) = chunk.deviations;
     }
@@ -35,18 +35,18 @@ class M5 {
   }
 
   GrownPartition run() {
-    const std::ptrdiff_t grown = std::ssize(tree_.branches);
+    const Eigen::Index grown = std::ssize(tree_.branches);
     residuals_.resize(data_.training.count(), data_.outputs.cols());
     // Children stand after their parents: backwards is from the leaves up.
-    for (std::ptrdiff_t i = grown; i-- > 0;) {
-      prune(static_cast<std::size_t>(i));
+    for (Eigen::Index i = grown; i-- > 0;) {
+      prune(i);
     }
     return finish();
   }
 
  private:
-  /// Regressors of the inputs that are tested at or below a node; of a tree that tests none all, for one model is all
-  /// that is left then.
+  // Regressors of the inputs that are tested at or below a node; of a tree that tests none all, for one model is all
+  // that is left then.
   std::vector<int> regressors_of(const M5Branch& branch) const {
     std::vector<int> result;
     const std::vector<Regressor>& regressors = data_.training.regressors;
@@ -65,13 +65,13 @@ class M5 {
     return result;
   }
 
-  /// Regressors of some rows, missing values at the means of the rows.
+  // Regressors of some rows, missing values at the means of the rows.
   RowMajor regressors_at(const Rows& rows, const std::vector<int>& columns, const Eigen::VectorXd& weights) const {
     RowMajor x = deviations_(rows, columns);
-    for (std::ptrdiff_t k = 0; data_.training.has_missing && k < x.cols(); ++k) {
+    for (Eigen::Index k = 0; data_.training.has_missing && k < x.cols(); ++k) {
       double sum = 0.0;
       double present = 0.0;
-      for (std::ptrdiff_t i = 0; i < x.rows(); ++i) {
+      for (Eigen::Index i = 0; i < x.rows(); ++i) {
         sum += std::isnan(x(i, k)) ? 0.0 : weights(i) * x(i, k);
         present += std::isnan(x(i, k)) ? 0.0 : weights(i);
       }
@@ -81,8 +81,8 @@ class M5 {
     return x;
   }
 
-  /// Fits the node's model and lets it take the place of the subtree, the children of which are done, unless that has
-  /// the smaller adjusted error.
+  // Fits the node's model and lets it take the place of the subtree, the children of which are done, unless that has
+  // the smaller adjusted error.
   void prune(std::size_t index) {
     M5Branch& branch = tree_.branches[index];
     for (const auto& [row, weight] : branch.shared) {
@@ -91,12 +91,12 @@ class M5 {
     const std::span<int> own = tree_.rows_of(branch);
     const Rows rows(own.begin(), own.end());
     const Eigen::VectorXd weights = tree_.weights(rows);
-    const std::ptrdiff_t outputs = data_.outputs.cols();
+    const Eigen::Index outputs = data_.outputs.cols();
     const bool is_leaf = branch.left < 0;
     if (!is_leaf) {
       for (std::size_t j = 0; j < branch.tested.size(); ++j) {
-        branch.tested[j] = branch.tested[j] || tree_.branches[static_cast<std::size_t>(branch.left)].tested[j] ||
-                           tree_.branches[static_cast<std::size_t>(branch.right)].tested[j];
+        branch.tested[j] =
+            branch.tested[j] || tree_.branches[branch.left].tested[j] || tree_.branches[branch.right].tested[j];
       }
     }
     const std::vector<int> columns = regressors_of(branch);
@@ -109,7 +109,7 @@ class M5 {
     double of_model = 0.0;
     double of_subtree = 0.0;
     Eigen::VectorXd below = Eigen::VectorXd::Zero(outputs);
-    for (std::ptrdiff_t o = 0; o < outputs; ++o) {
+    for (Eigen::Index o = 0; o < outputs; ++o) {
       FewInputsModel fit = fit_few_inputs(x, data_.outputs.col(o)(rows), weights);
       model.value(o) = fit.value;
       model.slope.row(o)(columns) = fit.slope.transpose();
@@ -117,11 +117,11 @@ class M5 {
       residuals.col(o) = fit.residuals;
       of_model += unit_(o) * adjusted_error(fit.rms, branch.weight, fit.coefficients);
       if (!is_leaf) {
-        below(o) = tree_.branches[static_cast<std::size_t>(branch.left)].model.coefficients(o) +
-                   tree_.branches[static_cast<std::size_t>(branch.right)].model.coefficients(o) + 1.0;
+        below(o) = tree_.branches[branch.left].model.coefficients(o) +
+                   tree_.branches[branch.right].model.coefficients(o) + 1.0;
         // Rows of neither child count alike on both sides.
-        const std::ptrdiff_t neither = tree_.branches[static_cast<std::size_t>(branch.right)].end - branch.begin;
-        for (std::ptrdiff_t k = neither; k < std::ssize(rows); ++k) {
+        const Eigen::Index neither = tree_.branches[branch.right].end - branch.begin;
+        for (Eigen::Index k = neither; k < std::ssize(rows); ++k) {
           residuals_(branch.begin + k, o) = fit.residuals(k);
         }
         const Eigen::VectorXd left_over = residuals_.col(o).segment(branch.begin, std::ssize(rows));
@@ -138,13 +138,13 @@ class M5 {
     }
   }
 
-  /// The smoothed model of a node: from below, p' = (n p + 15 q) / (n + 15) with the model q of each ancestor and the
-  /// weight n of its child on the path.
+  // The smoothed model of a node: from below, p' = (n p + 15 q) / (n + 15) with the model q of each ancestor and the
+  // weight n of its child on the path.
   M5Model smoothed(int index) const {
-    const M5Branch* child = &tree_.branches[static_cast<std::size_t>(index)];
+    const M5Branch* child = &tree_.branches[index];
     M5Model result = child->model;
     for (int at = child->parent; at >= 0; at = child->parent) {
-      const M5Branch& ancestor = tree_.branches[static_cast<std::size_t>(at)];
+      const M5Branch& ancestor = tree_.branches[at];
       const double share = child->weight / (child->weight + smoothing_rows);
       result.value = share * result.value + (1.0 - share) * ancestor.model.value;
       result.slope = share * result.slope + (1.0 - share) * ancestor.model.slope;
@@ -154,7 +154,7 @@ class M5 {
   }
 
   Node make_node(int index) {
-    const M5Branch& branch = tree_.branches[static_cast<std::size_t>(index)];
+    const M5Branch& branch = tree_.branches[index];
     const std::span<int> own = tree_.rows_of(branch);
     const Rows rows(own.begin(), own.end());
     const Eigen::VectorXd weights = data_.weights(rows);
@@ -177,7 +177,7 @@ class M5 {
     return node;
   }
 
-  /// The tree that is left, the split with the largest decrease first.
+  // The tree that is left, the split with the largest decrease first.
   GrownPartition finish() {
     GrownPartition result;
     result.stop = pruned_ ? StopReason::pruning : StopReason::leaf_samples;
@@ -191,14 +191,14 @@ class M5 {
     };
     std::priority_queue<Next> queue;
     const auto enter = [&](int branch) {
-      const M5Branch& entered = tree_.branches[static_cast<std::size_t>(branch)];
+      const M5Branch& entered = tree_.branches[branch];
       if (entered.left >= 0) {
         queue.push({static_cast<float>(entered.split.decrease), branch, static_cast<int>(result.nodes.size())});
       }
       result.nodes.push_back(make_node(branch));
     };
     enter(0);
-    const std::ptrdiff_t most = data_.problem.options.max_leaves;
+    const Eigen::Index most = data_.problem.options.max_leaves;
     while (!queue.empty()) {
       if (most > 0 && (std::ssize(result.nodes) + 1) / 2 >= most) {
         result.stop = StopReason::max_leaves;
@@ -206,11 +206,11 @@ class M5 {
       }
       const Next next = queue.top();
       queue.pop();
-      const M5Branch& branch = tree_.branches[static_cast<std::size_t>(next.branch)];
-      Node& node = result.nodes[static_cast<std::size_t>(next.node)];
+      const M5Branch& branch = tree_.branches[next.branch];
+      Node& node = result.nodes[next.node];
       node.left = static_cast<int>(result.nodes.size());
       node.right = node.left + 1;
-      node.split_input = data_.problem.options.split_inputs[static_cast<std::size_t>(branch.split.input)];
+      node.split_input = data_.problem.options.split_inputs[branch.split.input];
       node.threshold = branch.split.by_missing ? std::numeric_limits<double>::max() : branch.split.threshold;
       node.level_side = branch.split.level_side;
       node.missing_left = branch.missing_left;

@@ -8,20 +8,20 @@
 namespace llmt {
 namespace {
 
-/// A column of which the ones before it leave less is collinear with them: the digits of a sum of squares.
+// A column of which the ones before it leave less is collinear with them: the digits of a sum of squares.
 constexpr double least_independence = 1e-10;
 
-/// What a sum of squares has of rounding.
+// What a sum of squares has of rounding.
 constexpr double rounding_of_squares = 1e-15;
 
-/// Columns that are not collinear, in order, by a Cholesky factor of their correlations.
-std::vector<std::ptrdiff_t> independent_columns(const Eigen::MatrixXd& correlations) {
-  const std::ptrdiff_t count = correlations.rows();
+// Columns that are not collinear, in order, by a Cholesky factor of their correlations.
+std::vector<Eigen::Index> independent_columns(const Eigen::MatrixXd& correlations) {
+  const Eigen::Index count = correlations.rows();
   Eigen::MatrixXd factor = Eigen::MatrixXd::Zero(count, count);
-  std::vector<std::ptrdiff_t> kept;
-  for (std::ptrdiff_t i = 0; i < count; ++i) {
+  std::vector<Eigen::Index> kept;
+  for (Eigen::Index i = 0; i < count; ++i) {
     double pivot = correlations(i, i);
-    for (const std::ptrdiff_t j : kept) {
+    for (const Eigen::Index j : kept) {
       factor(i, j) = (correlations(i, j) - factor.row(i).head(j).dot(factor.row(j).head(j))) / factor(j, j);
       pivot -= factor(i, j) * factor(i, j);
     }
@@ -33,28 +33,28 @@ std::vector<std::ptrdiff_t> independent_columns(const Eigen::MatrixXd& correlati
   return kept;
 }
 
-/// The least-squares solution, and what dropping columns does to it, in columns of unit variance.
+// The least-squares solution, and what dropping columns does to it, in columns of unit variance.
 struct Solution {
-  std::vector<std::ptrdiff_t> columns;
+  std::vector<Eigen::Index> columns;
   Eigen::MatrixXd inverse;  // of their correlations
   Eigen::VectorXd coefficients;
   double squares;  // mean of the squared residuals
 
-  /// The column whose loss costs least, and what: coefficient^2 / inverse_jj.
-  std::ptrdiff_t cheapest(double& cost) const {
-    std::ptrdiff_t at = 0;
+  // The column whose loss costs least, and what: coefficient^2 / inverse_jj.
+  Eigen::Index cheapest(double& cost) const {
+    Eigen::Index at = 0;
     cost = coefficients.cwiseAbs2().cwiseQuotient(inverse.diagonal()).minCoeff(&at);
     return at;
   }
 
-  void drop(std::ptrdiff_t at, double cost) {
-    const std::ptrdiff_t last = std::ssize(columns) - 1;
+  void drop(Eigen::Index at, double cost) {
+    const Eigen::Index last = std::ssize(columns) - 1;
     const Eigen::VectorXd of_column = inverse.col(at);
     coefficients -= of_column * (coefficients(at) / of_column(at));
     inverse -= of_column * of_column.transpose() / of_column(at);
     columns.erase(columns.begin() + at);
-    std::vector<std::ptrdiff_t> left;
-    for (std::ptrdiff_t k = 0; k <= last; ++k) {
+    std::vector<Eigen::Index> left;
+    for (Eigen::Index k = 0; k <= last; ++k) {
       if (k != at) {
         left.push_back(k);
       }
@@ -78,9 +78,9 @@ FewInputsModel fit_few_inputs(const RowMajor& x, const Eigen::VectorXd& y, const
   const double y_mean = weights.dot(y) / total;
   const RowMajor centred = x.rowwise() - mean;
   const Eigen::VectorXd y_centred = y.array() - y_mean;
-  std::vector<std::ptrdiff_t> varying;
+  std::vector<Eigen::Index> varying;
   std::vector<double> largest;  // deviation of each
-  for (std::ptrdiff_t k = 0; k < x.cols(); ++k) {
+  for (Eigen::Index k = 0; k < x.cols(); ++k) {
     if (x.col(k).minCoeff() < x.col(k).maxCoeff()) {
       varying.push_back(k);
       largest.push_back(centred.col(k).cwiseAbs().maxCoeff());
@@ -107,12 +107,10 @@ FewInputsModel fit_few_inputs(const RowMajor& x, const Eigen::VectorXd& y, const
   while (!solution.columns.empty()) {
     const double coefficients = static_cast<double>(solution.columns.size()) + 1.0;
     double cost = 0.0;
-    const std::ptrdiff_t cheapest = solution.cheapest(cost);
+    const Eigen::Index cheapest = solution.cheapest(cost);
     const double with = adjusted_error(std::sqrt(solution.squares), total, coefficients);
     const double without = adjusted_error(std::sqrt(solution.squares + cost), total, coefficients - 1.0);
-    if (std::min(rows, total) > coefficients && without > with) {
-      break;
-    }
+    if (std::min(rows, total) > coefficients && without > with) break;
     solution.drop(cheapest, cost);
   }
 
@@ -131,9 +129,9 @@ FewInputsModel fit_few_inputs(const RowMajor& x, const Eigen::VectorXd& y, const
   }
   model.value = y_mean;
   for (std::size_t k = 0; k < solution.columns.size(); ++k) {
-    const std::ptrdiff_t at = solution.columns[k];
-    const std::ptrdiff_t column = varying[static_cast<std::size_t>(at)];
-    model.slope(column) = coefficients(static_cast<std::ptrdiff_t>(k)) / (deviation(at) * magnitude(at));
+    const Eigen::Index at = solution.columns[k];
+    const Eigen::Index column = varying[at];
+    model.slope(column) = coefficients(k) / (deviation(at) * magnitude(at));
     model.value -= model.slope(column) * mean(column);
   }
   model.rms = std::sqrt(weights.dot(model.residuals.cwiseAbs2()) / total);

@@ -22,8 +22,8 @@ struct M5Branch {
   int parent = -1;
   int left = -1;
   int right = -1;
-  std::ptrdiff_t begin = 0;  // its rows among all: those of the left child, of the right one, of neither
-  std::ptrdiff_t end = 0;
+  Eigen::Index begin = 0;  // its rows among all: those of the left child, of the right one, of neither
+  Eigen::Index end = 0;
   double weight = 0.0;
   DeviationSplit split;
   double missing_left = 0.5;
@@ -38,8 +38,7 @@ struct M5Tree {
   Eigen::VectorXd weights;         ///< of the training rows in the leaves that have them
 
   std::span<int> rows_of(const M5Branch& branch) {
-    return std::span(rows).subspan(static_cast<std::size_t>(branch.begin),
-                                   static_cast<std::size_t>(branch.end - branch.begin));
+    return std::span(rows).subspan(branch.begin, (branch.end - branch.begin));
   }
 };
 

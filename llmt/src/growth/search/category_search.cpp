@@ -6,29 +6,25 @@
 namespace llmt {
 namespace {
 
-/// Orders of the levels that are seen, by the mean of each residual and of each residual times each regressor.
+// Orders of the levels that are seen, by the mean of each residual and of each residual times each regressor.
 std::vector<std::vector<int>> level_orders(const GramShape& shape, std::span<const double> grams,
-                                           std::span<const std::ptrdiff_t> counts) {
+                                           std::span<const Eigen::Index> counts) {
   const auto gram = [&](int level) { return grams.data() + level * shape.size(); };
   std::vector<int> seen;
   for (int level = 0; level < std::ssize(counts); ++level) {
-    if (counts[static_cast<std::size_t>(level)] > 0) {
+    if (counts[level] > 0) {
       seen.push_back(level);
     }
   }
   std::vector<std::vector<int>> orders;
-  if (seen.size() < 2) {
-    return orders;
-  }
-  for (std::ptrdiff_t output = shape.coefficients(); output < shape.columns(); ++output) {
-    for (std::ptrdiff_t k = 0; k < shape.coefficients(); ++k) {
+  if (seen.size() < 2) return orders;
+  for (Eigen::Index output = shape.coefficients(); output < shape.columns(); ++output) {
+    for (Eigen::Index k = 0; k < shape.coefficients(); ++k) {
       orders.push_back(seen);
       std::stable_sort(orders.back().begin(), orders.back().end(), [&](int a, int b) {
         return gram(a)[shape.at(output, k)] / gram(a)[0] < gram(b)[shape.at(output, k)] / gram(b)[0];
       });
-      if (seen.size() == 2) {
-        return orders;
-      }
+      if (seen.size() == 2) return orders;
     }
   }
   return orders;
@@ -38,49 +34,47 @@ std::vector<std::vector<int>> level_orders(const GramShape& shape, std::span<con
 
 SplitCandidate search_level_grams(const GramShape& shape, const Eigen::VectorXd& weights, double node_rss,
                                   double without_value, std::span<const double> grams,
-                                  std::span<const std::ptrdiff_t> counts, std::ptrdiff_t min_leaf_samples) {
-  const std::ptrdiff_t size = shape.size();
+                                  std::span<const Eigen::Index> counts, Eigen::Index min_leaf_samples) {
+  const Eigen::Index size = shape.size();
   const auto gram = [&](int level) { return grams.data() + level * size; };
-  std::ptrdiff_t present = 0;
-  for (const std::ptrdiff_t count : counts) {
+  Eigen::Index present = 0;
+  for (const Eigen::Index count : counts) {
     present += count;
   }
   ResidualSums sums(shape, weights);
   SplitCandidate best;
   for (const std::vector<int>& order : level_orders(shape, grams, counts)) {
-    const std::ptrdiff_t cuts = std::ssize(order) - 1;
-    std::vector<double> left(static_cast<std::size_t>(cuts * size));
+    const Eigen::Index cuts = std::ssize(order) - 1;
+    std::vector<double> left(cuts * size);
     std::vector<double> right(left.size());
     std::vector<const double*> at_left;
     std::vector<const double*> at_right;
-    for (std::ptrdiff_t k = 0; k < cuts; ++k) {
+    for (Eigen::Index k = 0; k < cuts; ++k) {
       double* const to = left.data() + k * size;
       if (k > 0) {
         std::copy(to - size, to, to);
       }
-      add(shape, gram(order[static_cast<std::size_t>(k)]), to);
+      add(shape, gram(order[k]), to);
       at_left.push_back(to);
       at_right.push_back(right.data() + k * size);
     }
-    for (std::ptrdiff_t k = cuts; k-- > 0;) {
+    for (Eigen::Index k = cuts; k-- > 0;) {
       double* const to = right.data() + k * size;
       if (k + 1 < cuts) {
         std::copy(to + size, to + 2 * size, to);
       }
-      add(shape, gram(order[static_cast<std::size_t>(k + 1)]), to);
+      add(shape, gram(order[k + 1]), to);
     }
-    std::vector<double> rss_left(static_cast<std::size_t>(cuts));
+    std::vector<double> rss_left(cuts);
     std::vector<double> rss_right(rss_left.size());
     std::vector<int> rank_left(rss_left.size());
     std::vector<int> rank_right(rss_left.size());
     sums.evaluate(at_left.data(), cuts, rss_left.data(), rank_left.data());
     sums.evaluate(at_right.data(), cuts, rss_right.data(), rank_right.data());
-    std::ptrdiff_t rows_left = 0;
+    Eigen::Index rows_left = 0;
     for (std::size_t k = 0; k < rss_left.size(); ++k) {
-      rows_left += counts[static_cast<std::size_t>(order[k])];
-      if (rows_left < min_leaf_samples || present - rows_left < min_leaf_samples) {
-        continue;
-      }
+      rows_left += counts[order[k]];
+      if (rows_left < min_leaf_samples || present - rows_left < min_leaf_samples) continue;
       const double rss = rss_left[k] + rss_right[k] + without_value;
       ++best.tested;
       if (best.input < 0 || rss < best.rss - tie_tolerance * node_rss) {
@@ -91,7 +85,7 @@ SplitCandidate search_level_grams(const GramShape& shape, const Eigen::VectorXd&
         best.rank_right = rank_right[k];
         best.level_side.assign(counts.size(), 0);
         for (std::size_t i = 0; i < order.size(); ++i) {
-          best.level_side[static_cast<std::size_t>(order[i])] = i <= k ? -1 : 1;
+          best.level_side[order[i]] = i <= k ? -1 : 1;
         }
       }
     }
@@ -101,17 +95,17 @@ SplitCandidate search_level_grams(const GramShape& shape, const Eigen::VectorXd&
 }
 
 SplitCandidate search_levels(const SearchNode& node, std::span<const int> levels, int num_levels,
-                             std::ptrdiff_t min_leaf_samples) {
+                             Eigen::Index min_leaf_samples) {
   const GramShape shape(node.features);
-  std::vector<double> grams(static_cast<std::size_t>(num_levels * shape.size()), 0.0);
-  std::vector<std::ptrdiff_t> counts(static_cast<std::size_t>(num_levels), 0);
-  std::vector<double> all(static_cast<std::size_t>(shape.size()), 0.0);
-  std::ptrdiff_t present = 0;
+  std::vector<double> grams(num_levels * shape.size(), 0.0);
+  std::vector<Eigen::Index> counts(num_levels, 0);
+  std::vector<double> all(shape.size(), 0.0);
+  Eigen::Index present = 0;
   for (std::size_t row = 0; row < levels.size(); ++row) {
     if (const int level = levels[row]; level >= 0) {
       const int index = static_cast<int>(row);
       add_rows(node.features, &index, 1, grams.data() + level * shape.size());
-      ++counts[static_cast<std::size_t>(level)];
+      ++counts[level];
       ++present;
     }
   }

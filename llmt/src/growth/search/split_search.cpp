@@ -8,23 +8,23 @@ namespace {
 
 constexpr double no_split = std::numeric_limits<double>::infinity();
 
-/// Rows of a block, within these bounds such that there are at most `most_blocks`.
-constexpr std::ptrdiff_t smallest_block = 64;
-constexpr std::ptrdiff_t most_blocks = 400;
+// Rows of a block, within these bounds such that there are at most `most_blocks`.
+constexpr Eigen::Index smallest_block = 64;
+constexpr Eigen::Index most_blocks = 400;
 
-/// Rows of the parts that a block is cut into. On pure noise a part is passed over if the rows it holds, which its
-/// bound does not count, are fewer than what the best split gains beyond a chance one, in units of the noise; that is
-/// some twenty.
-constexpr std::ptrdiff_t part_rows = 12;
-constexpr std::ptrdiff_t most_parts = 33;
+// Rows of the parts that a block is cut into. On pure noise a part is passed over if the rows it holds, which its
+// bound does not count, are fewer than what the best split gains beyond a chance one, in units of the noise; that is
+// some twenty.
+constexpr Eigen::Index part_rows = 12;
+constexpr Eigen::Index most_parts = 33;
 
-/// Up to this many rows all splits of a block are compared.
-constexpr std::ptrdiff_t few_rows = 16;
+// Up to this many rows all splits of a block are compared.
+constexpr Eigen::Index few_rows = 16;
 
 }  // namespace
 
 InputSearch::InputSearch(const SearchNode& node, std::vector<double> values, std::span<const int> order,
-                         std::ptrdiff_t min_leaf_samples)
+                         Eigen::Index min_leaf_samples)
     : node_(node),
       values_(std::move(values)),
       order_(order),
@@ -33,41 +33,40 @@ InputSearch::InputSearch(const SearchNode& node, std::vector<double> values, std
       sums_(shape_, node.weights),
       limit_(no_split),
       smallest_(no_split),
-      none_(static_cast<std::size_t>(shape_.size()), 0.0),
+      none_(shape_.size(), 0.0),
       all_{0, std::ssize(order), none_.data(), none_.data(), 0.0, 0.0} {
-  for (std::ptrdiff_t left = 1; left < std::ssize(order); ++left) {
+  for (Eigen::Index left = 1; left < std::ssize(order); ++left) {
     tested_ += admissible(left) ? 1 : 0;
   }
 }
 
 InputSearch::InputSearch(const SearchNode& node, std::vector<double> values, std::span<const int> order,
-                         std::ptrdiff_t min_leaf_samples, const Beyond& front, const Beyond& behind)
+                         Eigen::Index min_leaf_samples, const Beyond& front, const Beyond& behind)
     : InputSearch(node, std::move(values), order, min_leaf_samples) {
   rows_in_front_ = front.rows;
   rows_behind_ = behind.rows;
   all_ = {0, std::ssize(order), front.gram, behind.gram, front.rss, behind.rss};
 }
 
-/// Here splits are named by the number of rows of the stretch on their left.
-bool InputSearch::admissible(std::ptrdiff_t left) const {
+// Here splits are named by the number of rows of the stretch on their left.
+bool InputSearch::admissible(Eigen::Index left) const {
   return left > 0 && left < std::ssize(order_) && rows_in_front_ + left >= min_leaf_samples_ &&
-         std::ssize(order_) - left + rows_behind_ >= min_leaf_samples_ &&
-         values_[static_cast<std::size_t>(left - 1)] < values_[static_cast<std::size_t>(left)];
+         std::ssize(order_) - left + rows_behind_ >= min_leaf_samples_ && values_[left - 1] < values_[left];
 }
 
 bool InputSearch::holds_candidates(const Segment& segment) const {
-  const std::ptrdiff_t first = std::max(segment.begin + 1, min_leaf_samples_ - rows_in_front_);
-  const std::ptrdiff_t last = std::min(segment.end - 1, std::ssize(order_) + rows_behind_ - min_leaf_samples_);
-  return first <= last && values_[static_cast<std::size_t>(first - 1)] < values_[static_cast<std::size_t>(last)];
+  const Eigen::Index first = std::max(segment.begin + 1, min_leaf_samples_ - rows_in_front_);
+  const Eigen::Index last = std::min(segment.end - 1, std::ssize(order_) + rows_behind_ - min_leaf_samples_);
+  return first <= last && values_[first - 1] < values_[last];
 }
 
-/// Gram matrices and residual sums of squares on either side of the inner edges, that is of all but the first and last.
-void InputSearch::take_sides(const std::vector<std::ptrdiff_t>& edges, const double* before, const double* behind,
+// Gram matrices and residual sums of squares on either side of the inner edges, that is of all but the first and last.
+void InputSearch::take_sides(const std::vector<Eigen::Index>& edges, const double* before, const double* behind,
                              Sides& sides) {
-  const std::ptrdiff_t size = shape_.size();
-  const std::ptrdiff_t inner = std::ssize(edges) - 2;
-  const std::size_t count = static_cast<std::size_t>(inner);
-  sides.left.resize(static_cast<std::size_t>(inner * size));
+  const Eigen::Index size = shape_.size();
+  const Eigen::Index inner = std::ssize(edges) - 2;
+  const std::size_t count = inner;
+  sides.left.resize(inner * size);
   sides.right.resize(sides.left.size());
   for (std::vector<double>* rss : {&sides.rss_left, &sides.rss_right}) {
     rss->resize(count);
@@ -75,32 +74,31 @@ void InputSearch::take_sides(const std::vector<std::ptrdiff_t>& edges, const dou
   for (std::vector<int>* rank : {&sides.rank_left, &sides.rank_right}) {
     rank->resize(count);
   }
-  sides.parts.assign(static_cast<std::size_t>((inner + 1) * size), 0.0);
-  for (std::ptrdiff_t i = 0; i <= inner; ++i) {
-    const std::ptrdiff_t begin = edges[static_cast<std::size_t>(i)];
-    add_rows(node_.features, order_.data() + begin, edges[static_cast<std::size_t>(i + 1)] - begin,
-             sides.parts.data() + i * size);
+  sides.parts.assign((inner + 1) * size, 0.0);
+  for (Eigen::Index i = 0; i <= inner; ++i) {
+    const Eigen::Index begin = edges[i];
+    add_rows(node_.features, order_.data() + begin, edges[i + 1] - begin, sides.parts.data() + i * size);
   }
-  const auto sum = [&](const double* so_far, std::ptrdiff_t part, double* gram) {
+  const auto sum = [&](const double* so_far, Eigen::Index part, double* gram) {
     std::copy(so_far, so_far + size, gram);
     add(shape_, sides.parts.data() + part * size, gram);
     return gram;
   };
   std::vector<const double*> grams(count);
   const double* last = before;
-  for (std::ptrdiff_t i = 0; i < inner; ++i) {
-    last = grams[static_cast<std::size_t>(i)] = sum(last, i, sides.left.data() + i * size);
+  for (Eigen::Index i = 0; i < inner; ++i) {
+    last = grams[i] = sum(last, i, sides.left.data() + i * size);
   }
   sums_.evaluate(grams.data(), inner, sides.rss_left.data(), sides.rank_left.data());
   last = behind;
-  for (std::ptrdiff_t i = inner; i-- > 0;) {
-    last = grams[static_cast<std::size_t>(i)] = sum(last, i + 1, sides.right.data() + i * size);
+  for (Eigen::Index i = inner; i-- > 0;) {
+    last = grams[i] = sum(last, i + 1, sides.right.data() + i * size);
   }
   sums_.evaluate(grams.data(), inner, sides.rss_right.data(), sides.rank_right.data());
   evaluations_ += inner;
 }
 
-void InputSearch::offer(const std::vector<std::ptrdiff_t>& edges, const Sides& sides) {
+void InputSearch::offer(const std::vector<Eigen::Index>& edges, const Sides& sides) {
   const double tolerance = tie_tolerance * node_.rss;
   for (std::size_t i = 0; i + 2 < edges.size(); ++i) {
     const double rss = sides.rss_left[i] + sides.rss_right[i];
@@ -111,36 +109,33 @@ void InputSearch::offer(const std::vector<std::ptrdiff_t>& edges, const Sides& s
   }
 }
 
-std::vector<InputSearch::Segment> InputSearch::cut(const Segment& segment, const std::vector<std::ptrdiff_t>& edges,
+std::vector<InputSearch::Segment> InputSearch::cut(const Segment& segment, const std::vector<Eigen::Index>& edges,
                                                    const Sides& sides) const {
-  const std::ptrdiff_t size = shape_.size();
+  const Eigen::Index size = shape_.size();
   const std::size_t inner = edges.size() - 2;
   std::vector<Segment> result;
   for (std::size_t i = 0; i <= inner; ++i) {
     result.push_back(
-        {edges[i], edges[i + 1], i == 0 ? segment.left : sides.left.data() + static_cast<std::ptrdiff_t>(i - 1) * size,
-         i == inner ? segment.right : sides.right.data() + static_cast<std::ptrdiff_t>(i) * size,
+        {edges[i], edges[i + 1], i == 0 ? segment.left : sides.left.data() + static_cast<Eigen::Index>(i - 1) * size,
+         i == inner ? segment.right : sides.right.data() + static_cast<Eigen::Index>(i) * size,
          i == 0 ? segment.rss_left : sides.rss_left[i - 1], i == inner ? segment.rss_right : sides.rss_right[i]});
   }
-  std::stable_sort(result.begin(), result.end(),
-                   [](const Segment& a, const Segment& b) { return a.bound() < b.bound(); });
+  std::ranges::stable_sort(result, [](const Segment& a, const Segment& b) { return a.bound() < b.bound(); });
   return result;
 }
 
 void InputSearch::search_edges() {
-  const std::ptrdiff_t rows = std::ssize(order_);
-  if (tested_ == 0) {
-    return;
-  }
-  const std::ptrdiff_t block = std::max(smallest_block, (rows + most_blocks - 1) / most_blocks);
-  for (std::ptrdiff_t begin = 0; begin < rows; begin += block) {
+  const Eigen::Index rows = std::ssize(order_);
+  if (tested_ == 0) return;
+  const Eigen::Index block = std::max(smallest_block, (rows + most_blocks - 1) / most_blocks);
+  for (Eigen::Index begin = 0; begin < rows; begin += block) {
     edges_.push_back(begin);
   }
   edges_.push_back(rows);
   take_sides(edges_, none_.data(), none_.data(), sides_);
   if (rows < node_.features.rows()) {  // the rest is compared with its own single model
     std::vector<double> all = none_;
-    for (std::ptrdiff_t i = 0; i + 1 < std::ssize(edges_); ++i) {
+    for (Eigen::Index i = 0; i + 1 < std::ssize(edges_); ++i) {
       add(shape_, sides_.parts.data() + i * shape_.size(), all.data());
     }
     const double* gram = all.data();
@@ -175,12 +170,12 @@ void InputSearch::look_into(const Segment& segment, std::size_t depth) {
   if (deeper_.size() <= depth) {
     deeper_.resize(depth + 1);
   }
-  const std::ptrdiff_t length = segment.end - segment.begin;
-  std::vector<std::ptrdiff_t> edges{segment.begin};
+  const Eigen::Index length = segment.end - segment.begin;
+  std::vector<Eigen::Index> edges{segment.begin};
   const bool all = length <= few_rows;
-  const std::ptrdiff_t parts = std::min(most_parts, length / part_rows + 1);
-  for (std::ptrdiff_t i = 1; i < (all ? length : parts); ++i) {
-    const std::ptrdiff_t edge = segment.begin + (all ? i : i * length / parts);
+  const Eigen::Index parts = std::min(most_parts, length / part_rows + 1);
+  for (Eigen::Index i = 1; i < (all ? length : parts); ++i) {
+    const Eigen::Index edge = segment.begin + (all ? i : i * length / parts);
     if (!all || admissible(edge)) {
       edges.push_back(edge);
     }
@@ -221,8 +216,8 @@ SplitCandidate InputSearch::best() const {
 SplitCandidate first_of_best(std::span<const SplitCandidate> found, double rss) {
   SplitCandidate best;
   double smallest = std::numeric_limits<double>::infinity();
-  std::ptrdiff_t tested = 0;
-  std::ptrdiff_t evaluations = 0;
+  Eigen::Index tested = 0;
+  Eigen::Index evaluations = 0;
   for (const SplitCandidate& candidate : found) {
     tested += candidate.tested;
     evaluations += candidate.evaluations;

@@ -14,13 +14,13 @@ namespace llmt {
 
 /// The best split of a node found so far, or none.
 struct SplitCandidate {
-  int input = -1;           ///< column that is split; -1: there is no admissible split
-  std::ptrdiff_t left = 0;  ///< rows of the left child: the first `left` in the order of that input
-  double rss = 0.0;         ///< weighted residual sum of squares of the two child models
-  int rank_left = 0;        ///< ranks of the two children's least-squares problems
+  int input = -1;         ///< column that is split; -1: there is no admissible split
+  Eigen::Index left = 0;  ///< rows of the left child: the first `left` in the order of that input
+  double rss = 0.0;       ///< weighted residual sum of squares of the two child models
+  int rank_left = 0;      ///< ranks of the two children's least-squares problems
   int rank_right = 0;
-  std::ptrdiff_t tested = 0;       ///< number of admissible splits among which it is the best
-  std::ptrdiff_t evaluations = 0;  ///< number of splits whose residual sum of squares was computed
+  Eigen::Index tested = 0;       ///< number of admissible splits among which it is the best
+  Eigen::Index evaluations = 0;  ///< number of splits whose residual sum of squares was computed
   /// Search by bins: the last bin of the left child, and the largest of its values that go left. RA: the threshold.
   int bin = -1;
   double last_left = std::numeric_limits<double>::infinity();
@@ -52,11 +52,11 @@ class InputSearch {
   /// `values` are the input's values and `order` the rows of the features, both ascending in the value. What is
   /// referred to must live as long as this.
   InputSearch(const SearchNode& node, std::vector<double> values, std::span<const int> order,
-              std::ptrdiff_t min_leaf_samples);
+              Eigen::Index min_leaf_samples);
 
   /// Rows on one side of a stretch, whose Gram matrix and residual sum of squares are known.
   struct Beyond {
-    std::ptrdiff_t rows;
+    Eigen::Index rows;
     const double* gram;
     double rss;
   };
@@ -64,7 +64,7 @@ class InputSearch {
   /// The same for a stretch of an input whose other rows lie in front of it or behind: only refine() is of use, and
   /// splits are named by the number of all rows on their left.
   InputSearch(const SearchNode& node, std::vector<double> values, std::span<const int> order,
-              std::ptrdiff_t min_leaf_samples, const Beyond& front, const Beyond& behind);
+              Eigen::Index min_leaf_samples, const Beyond& front, const Beyond& behind);
 
   /// Looks at the edges of the blocks.
   void search_edges();
@@ -73,7 +73,7 @@ class InputSearch {
   double smallest() const { return smallest_; }
 
   /// Number of admissible splits.
-  std::ptrdiff_t tested() const { return tested_; }
+  Eigen::Index tested() const { return tested_; }
 
   /// Looks into the blocks that may hold a split of at most `limit`.
   void refine(double limit);
@@ -85,8 +85,8 @@ class InputSearch {
  private:
   /// Rows begin ... end - 1, and what is known at its ends.
   struct Segment {
-    std::ptrdiff_t begin;
-    std::ptrdiff_t end;
+    Eigen::Index begin;
+    Eigen::Index end;
     const double* left;   // Gram matrix of the rows before
     const double* right;  // and of those behind
     double rss_left;      // their residual sums of squares
@@ -94,7 +94,7 @@ class InputSearch {
     double bound() const { return rss_left + rss_right; }
   };
   struct Found {
-    std::ptrdiff_t left;
+    Eigen::Index left;
     double rss;
     int rank_left;
     int rank_right;
@@ -110,30 +110,30 @@ class InputSearch {
     std::vector<int> rank_right;
   };
 
-  bool admissible(std::ptrdiff_t left) const;
+  bool admissible(Eigen::Index left) const;
   bool holds_candidates(const Segment& segment) const;
-  void take_sides(const std::vector<std::ptrdiff_t>& edges, const double* before, const double* behind, Sides& sides);
-  void offer(const std::vector<std::ptrdiff_t>& edges, const Sides& sides);
+  void take_sides(const std::vector<Eigen::Index>& edges, const double* before, const double* behind, Sides& sides);
+  void offer(const std::vector<Eigen::Index>& edges, const Sides& sides);
   void look_into(const Segment& segment, std::size_t depth);
-  std::vector<Segment> cut(const Segment& segment, const std::vector<std::ptrdiff_t>& edges, const Sides& sides) const;
+  std::vector<Segment> cut(const Segment& segment, const std::vector<Eigen::Index>& edges, const Sides& sides) const;
 
   SearchNode node_;
   std::vector<double> values_;
   std::span<const int> order_;
-  std::ptrdiff_t min_leaf_samples_;
-  std::ptrdiff_t rows_in_front_ = 0;
-  std::ptrdiff_t rows_behind_ = 0;
+  Eigen::Index min_leaf_samples_;
+  Eigen::Index rows_in_front_ = 0;
+  Eigen::Index rows_behind_ = 0;
   GramShape shape_;
   ResidualSums sums_;
-  std::ptrdiff_t tested_ = 0;
-  std::ptrdiff_t evaluations_ = 0;
+  Eigen::Index tested_ = 0;
+  Eigen::Index evaluations_ = 0;
   double without_value_ = 0.0;  // what the rows without a value leave, whatever the split
   double limit_;
   double smallest_;
   std::vector<Found> found_;  // within the tolerance of the smallest
   std::vector<double> none_;  // Gram matrix of no rows
   Segment all_;
-  std::vector<std::ptrdiff_t> edges_;
+  std::vector<Eigen::Index> edges_;
   Sides sides_;
   std::vector<Sides> deeper_;
 };
@@ -143,12 +143,12 @@ class InputSearch {
 /// Tries the levels in ascending order of the mean of the residuals, and of the residuals times each regressor, split
 /// between any two: all splits for two levels, all that matter for one-dimensional scores (Fisher 1958) for more.
 SplitCandidate search_levels(const SearchNode& node, std::span<const int> levels, int num_levels,
-                             std::ptrdiff_t min_leaf_samples);
+                             Eigen::Index min_leaf_samples);
 
 /// As above, from the Gram matrices and row counts of the levels; `without_value`: see InputSearch.
 SplitCandidate search_level_grams(const GramShape& shape, const Eigen::VectorXd& weights, double node_rss,
                                   double without_value, std::span<const double> grams,
-                                  std::span<const std::ptrdiff_t> counts, std::ptrdiff_t min_leaf_samples);
+                                  std::span<const Eigen::Index> counts, Eigen::Index min_leaf_samples);
 
 /// Of the best splits of the inputs, in order, the best one, its `input` the position; equally good: the first. Tested
 /// and evaluated are those of all. `node_rss`: of the node's own model.
