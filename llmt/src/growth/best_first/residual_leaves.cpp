@@ -115,8 +115,8 @@ std::array<ResidualLeaf, 2> ResidualLeaves::divide(ResidualLeaf& leaf, const Spl
   return children;
 }
 
-double ResidualLeaves::threshold(const ResidualLeaf& leaf, const SplitCandidate& split, const Node& node, const Node& left,
-                             const Node& right) const {
+double ResidualLeaves::threshold(const ResidualLeaf& leaf, const SplitCandidate& split, const Node& node,
+                                 const Node& left, const Node& right) const {
   double low = -std::numeric_limits<double>::infinity();
   double high = -low;
   for (const double value : leaf.values.col(split.input)) {

@@ -106,8 +106,9 @@ ResidualSplit search_by_residuals(const GrowthData& data, const ResidualNode& no
   std::vector<ResidualStatistics> statistics(inputs * outputs);
   parallel_for(inputs * outputs, node.threads, [&](Eigen::Index k) {
     if (data.num_levels[k / outputs] == 0) {
-      statistics[k] = residual_statistics(values_of(k / outputs), std::span(node.residuals.col(k % outputs).data(), count),
-                                      std::span(node.weights.data(), count));
+      statistics[k] =
+          residual_statistics(values_of(k / outputs), std::span(node.residuals.col(k % outputs).data(), count),
+                              std::span(node.weights.data(), count));
     }
   });
   std::vector<Cut> candidates;

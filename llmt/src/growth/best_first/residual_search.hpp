@@ -31,7 +31,7 @@ struct ResidualStatistics {
 
 /// `values`: of the input, NaN where missing. Weights are positive.
 ResidualStatistics residual_statistics(std::span<const double> values, std::span<const double> residuals,
-                               std::span<const double> weights);
+                                       std::span<const double> weights);
 
 /// Rows of a node, in features whose residuals are those of a model that need not be the node's own.
 struct ResidualNode {

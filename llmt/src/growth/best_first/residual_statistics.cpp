@@ -86,7 +86,7 @@ double ResidualStatistics::deviate() const {
 }
 
 ResidualStatistics residual_statistics(std::span<const double> values, std::span<const double> residuals,
-                               std::span<const double> weights) {
+                                       std::span<const double> weights) {
   ResidualStatistics result;
   result.low = std::numeric_limits<double>::infinity();
   result.high = -result.low;
