@@ -35,9 +35,9 @@ std::vector<int> regressors_of(const GrowthData& data, const M5Tree& tree, const
   return result;
 }
 
-class Pruning {
+class Pruner {
  public:
-  Pruning(const GrowthData& data, const RowMajor& deviations, M5Tree& tree)
+  Pruner(const GrowthData& data, const RowMajor& deviations, M5Tree& tree)
       : data_(data),
         deviations_(deviations),
         tree_(tree),
@@ -64,7 +64,7 @@ class Pruning {
   bool pruned_ = false;
 };
 
-bool Pruning::run() {
+bool Pruner::run() {
   // Children stand after their parents: backwards is from the leaves up.
   for (Eigen::Index i = std::ssize(tree_.branches); i-- > 0;) {
     prune(tree_.branches[i]);
@@ -73,7 +73,7 @@ bool Pruning::run() {
 }
 
 // The children of the node are done.
-void Pruning::prune(M5Branch& branch) {
+void Pruner::prune(M5Branch& branch) {
   restore_weights(branch);
   collect_tested(branch);
   const std::span<int> own = tree_.rows_of(branch);
@@ -100,14 +100,14 @@ void Pruning::prune(M5Branch& branch) {
 }
 
 // Rows that a child has in part count in full here.
-void Pruning::restore_weights(const M5Branch& branch) {
+void Pruner::restore_weights(const M5Branch& branch) {
   for (const auto& [row, weight] : branch.shared) {
     tree_.weights(row) = weight;
   }
 }
 
 // Adds the split inputs that are tested below the node to those that it tests itself.
-void Pruning::collect_tested(M5Branch& branch) const {
+void Pruner::collect_tested(M5Branch& branch) const {
   if (branch.left < 0) return;
   for (std::size_t j = 0; j < branch.tested.size(); ++j) {
     const bool below = tree_.branches[branch.left].tested[j] || tree_.branches[branch.right].tested[j];
@@ -116,8 +116,8 @@ void Pruning::collect_tested(M5Branch& branch) const {
 }
 
 // Missing values are taken at the means of the rows.
-RowMajor Pruning::regressors_at(const Rows& rows, const std::vector<int>& columns,
-                                const Eigen::VectorXd& weights) const {
+RowMajor Pruner::regressors_at(const Rows& rows, const std::vector<int>& columns,
+                               const Eigen::VectorXd& weights) const {
   const RowMajor x = deviations_(rows, columns);
   if (!data_.training.has_missing) return x;
   Eigen::VectorXd mean(x.cols());
@@ -129,7 +129,7 @@ RowMajor Pruning::regressors_at(const Rows& rows, const std::vector<int>& column
 
 // Sets the node's model and `error`, its adjusted error summed over the outputs in units of their deviations. Returns
 // the residuals, rows x outputs.
-Eigen::MatrixXd Pruning::fit(const Rows& rows, const Eigen::VectorXd& weights, M5Branch& branch, double& error) const {
+Eigen::MatrixXd Pruner::fit(const Rows& rows, const Eigen::VectorXd& weights, M5Branch& branch, double& error) const {
   const Eigen::Index outputs = data_.outputs.cols();
   const std::vector<int> columns = regressors_of(data_, tree_, branch);
   const RowMajor x = regressors_at(rows, columns, weights);
@@ -151,15 +151,15 @@ Eigen::MatrixXd Pruning::fit(const Rows& rows, const Eigen::VectorXd& weights, M
 }
 
 // Coefficients of the children's models or subtrees and one more for the split, per output.
-Eigen::VectorXd Pruning::coefficients_below(const M5Branch& branch) const {
+Eigen::VectorXd Pruner::coefficients_below(const M5Branch& branch) const {
   const M5Model& left = tree_.branches[branch.left].model;
   const M5Model& right = tree_.branches[branch.right].model;
   return (left.coefficients + right.coefficients).array() + 1.0;
 }
 
 // Adjusted error of the leaves below the node, as in fit().
-double Pruning::error_of_subtree(const M5Branch& branch, const Eigen::VectorXd& weights,
-                                 const Eigen::VectorXd& coefficients) const {
+double Pruner::error_of_subtree(const M5Branch& branch, const Eigen::VectorXd& weights,
+                                const Eigen::VectorXd& coefficients) const {
   double error = 0.0;
   for (Eigen::Index o = 0; o < data_.outputs.cols(); ++o) {
     const Eigen::VectorXd left_over = residuals_.col(o).segment(branch.begin, weights.size());
@@ -172,7 +172,7 @@ double Pruning::error_of_subtree(const M5Branch& branch, const Eigen::VectorXd& 
 }  // namespace
 
 bool prune_m5_tree(const GrowthData& data, const RowMajor& deviations, M5Tree& tree) {
-  return Pruning(data, deviations, tree).run();
+  return Pruner(data, deviations, tree).run();
 }
 
 }  // namespace llmt
