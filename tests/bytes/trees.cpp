@@ -20,7 +20,7 @@ std::string answers(const llmt::Model& model, const Eigen::MatrixXd& queries, in
   for (const llmt::Extrapolation& point : model.extrapolation(queries, threads)) {
     hash.add(point.distance).add(point.leverage);
   }
-  for (std::ptrdiff_t partition = 0; partition < std::ssize(model.partitions()); ++partition) {
+  for (Eigen::Index partition = 0; partition < std::ssize(model.partitions()); ++partition) {
     hash.add(model.validities(queries, partition, threads));
     for (const llmt::Leaf& leaf : model.leaves(partition)) hash.add(leaf.low).add(leaf.high).add(leaf.intercept);
   }
@@ -93,8 +93,6 @@ void add_for_threads(Results& results, const std::string& name, const std::funct
 }
 
 void witness_trees(const std::string&, Results& results) { add_sets("trees", option_sets(), results); }
-
-void witness_retiring(const std::string&, Results& results) { add_sets("retiring", retiring_option_sets(), results); }
 
 // From 50000 rows on one fold is held out once, candidates are compared on samples, splits are searched by bins, and
 // the joint estimate goes from a sample to all rows.
