@@ -48,8 +48,8 @@ Eigen::MatrixXd read_same_inputs(const Csv& simulated, const Csv& measured, cons
       if (std::abs(one(i, j) - other(i, j)) <= rounding * std::max(range, 1e-3 * std::abs(one(i, j)))) continue;
       throw std::runtime_error(
           fmt::format("{}:{}: column \"{}\" is {}, but {} at {}:{}; rows must stand in the same order in both files",
-                      measured.name(), measured.line_of(i), names[static_cast<std::size_t>(j)], other(i, j), one(i, j),
-                      simulated.name(), simulated.line_of(i)));
+                      measured.name(), measured.line_of(i), names[j], other(i, j), one(i, j), simulated.name(),
+                      simulated.line_of(i)));
     }
   }
   return other;
@@ -58,7 +58,7 @@ Eigen::MatrixXd read_same_inputs(const Csv& simulated, const Csv& measured, cons
 void check_names(const DiscoverArguments& arguments) {
   for (const std::vector<std::string>* names : {&arguments.inputs, &arguments.outputs}) {
     for (std::size_t k = 0; k < names->size(); ++k) {
-      const auto rest = names->begin() + static_cast<std::ptrdiff_t>(k) + 1;
+      const auto rest = names->begin() + static_cast<Eigen::Index>(k) + 1;
       if (std::find(rest, names->end(), (*names)[k]) != names->end()) {
         throw std::invalid_argument(fmt::format("\"{}\" is given twice", (*names)[k]));
       }

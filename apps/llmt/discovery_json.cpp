@@ -74,7 +74,7 @@ Json parameters_json(const discovery::Missing& missing) {
     adjusted.push_back({{"name", parameter.name},
                         {"value", parameter.value},
                         {"unit", parameter.unit},
-                        {"std_error", number_or_null(missing.standard_errors(static_cast<Eigen::Index>(k)))}});
+                        {"std_error", number_or_null(missing.standard_errors(k))}});
   }
   return adjusted;
 }

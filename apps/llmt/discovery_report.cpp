@@ -132,7 +132,7 @@ void print_report(const DiscoveryReport& report) {
     const discovery::Parameter& parameter = missing.parameters[k];
     if (!parameter.free) continue;
     print(fmt::format("\n{} of the simulation adjusted to {} +- {}\n", parameter.name, number(parameter.value),
-                      number(missing.standard_errors(static_cast<Eigen::Index>(k)), 2)));
+                      number(missing.standard_errors(k), 2)));
   }
   print_gaps(report);
   print_regions(report);

@@ -88,18 +88,18 @@ Solver::Solver(const LeastSquaresProblem& problem, const SolverOptions& options)
   check_options(options);
   check_parameters(problem.parameters);
   if (!problem.residual) refuse("the problem has no residual function");
-  const auto count = static_cast<Eigen::Index>(problem.parameters.size());
+  const auto count = std::ssize(problem.parameters);
   start_.resize(count);
   std::vector<double> scales;
   for (Eigen::Index k = 0; k < count; ++k) {
-    const Parameter& p = problem.parameters[static_cast<std::size_t>(k)];
+    const Parameter& p = problem.parameters[k];
     start_(k) = p.value;
     if (!p.free) continue;
-    if (p.prior_sigma) prior_.push_back(static_cast<Eigen::Index>(free_.size()));
+    if (p.prior_sigma) prior_.push_back(std::ssize(free_));
     free_.push_back(k);
     scales.push_back(p.scale);
   }
-  scales_ = Eigen::Map<const Eigen::VectorXd>(scales.data(), static_cast<Eigen::Index>(scales.size()));
+  scales_ = Eigen::Map<const Eigen::VectorXd>(scales.data(), std::ssize(scales));
   values_ = start_;
   residuals_ = problem.residual(values_);
   const Eigen::Index weights = problem.weights.size();
@@ -117,12 +117,12 @@ Solver::Solver(const LeastSquaresProblem& problem, const SolverOptions& options)
 
 Eigen::VectorXd Solver::weighted(const Eigen::VectorXd& residuals, const Eigen::VectorXd& values) const {
   const Eigen::Index n = residuals.size();
-  Eigen::VectorXd rows(n + static_cast<Eigen::Index>(prior_.size()));
+  Eigen::VectorXd rows(n + std::ssize(prior_));
   rows.head(n) = residuals;
   if (problem_.weights.size() != 0) rows.head(n).array() *= problem_.weights.array();
   for (std::size_t i = 0; i < prior_.size(); ++i) {
-    const Eigen::Index k = free_[static_cast<std::size_t>(prior_[i])];
-    const Parameter& parameter = problem_.parameters[static_cast<std::size_t>(k)];
+    const Eigen::Index k = free_[prior_[i]];
+    const Parameter& parameter = problem_.parameters[k];
     rows(n + static_cast<Eigen::Index>(i)) =
         (values(k) - parameter.prior_value.value_or(parameter.value)) / *parameter.prior_sigma;
   }
@@ -143,8 +143,8 @@ Eigen::MatrixXd Solver::jacobian_at(const Eigen::VectorXd& values) const {
     refuse(fmt::format("the Jacobian is {} x {}, expected {} x {}", all.rows(), all.cols(), residuals_.size(),
                        start_.size()));
   }
-  Eigen::MatrixXd columns(all.rows(), static_cast<Eigen::Index>(free_.size()));
-  for (std::size_t i = 0; i < free_.size(); ++i) columns.col(static_cast<Eigen::Index>(i)) = all.col(free_[i]);
+  Eigen::MatrixXd columns(all.rows(), std::ssize(free_));
+  for (std::size_t i = 0; i < free_.size(); ++i) columns.col(i) = all.col(free_[i]);
   return columns;
 }
 
@@ -155,9 +155,8 @@ Linearisation Solver::linearise_here() {
   if (problem_.weights.size() != 0) matrix.topRows(n).array().colwise() *= problem_.weights.array();
   for (std::size_t i = 0; i < prior_.size(); ++i) {
     const Eigen::Index column = prior_[i];
-    const Eigen::Index k = free_[static_cast<std::size_t>(column)];
-    matrix(n + static_cast<Eigen::Index>(i), column) =
-        scales_(column) / *problem_.parameters[static_cast<std::size_t>(k)].prior_sigma;
+    const Eigen::Index k = free_[column];
+    matrix(n + static_cast<Eigen::Index>(i), column) = scales_(column) / *problem_.parameters[k].prior_sigma;
   }
   return linearise(matrix, weighted_, options_.rank_tolerance);
 }
@@ -242,7 +241,7 @@ bool Solver::advance(const Linearisation& linear) {
 void Solver::describe_uncertainty(const Linearisation& linear) {
   const Eigen::Index rank = linear.rank;
   std::vector<std::string> names;
-  for (const Eigen::Index k : free_) names.push_back(problem_.parameters[static_cast<std::size_t>(k)].name);
+  for (const Eigen::Index k : free_) names.push_back(problem_.parameters[k].name);
   result_.unidentifiable = null_combinations(linear, names, scales_);
   result_.singular_values = linear.singular_values;
   result_.rank = rank;
@@ -295,7 +294,7 @@ SolverResult Solver::run() {
   result_.residuals = residuals_;
   result_.standard_errors = result_.covariance.diagonal().cwiseSqrt();
   result_.parameters = problem_.parameters;
-  for (Eigen::Index k = 0; k < values_.size(); ++k) result_.parameters[static_cast<std::size_t>(k)].value = values_(k);
+  for (Eigen::Index k = 0; k < values_.size(); ++k) result_.parameters[k].value = values_(k);
   return std::move(result_);
 }
 

@@ -160,7 +160,7 @@ std::vector<Rival> rivals_of(const Scoring& scoring, const Set& set, const std::
   return rivals;
 }
 
-// `whole` is the best explanation with everything small that is not told: rivals are judged beside it.
+// `whole` is the best explanation before immaterial families are dropped; rivals are compared within it.
 Finding finding_of(const Scoring& scoring, const Set& set, const Set& whole, const std::string& family,
                    const SearchOptions& options) {
   const SetFit fit = scoring.fit(set);
@@ -187,7 +187,7 @@ LackOfFit lack_of_fit(const Scoring& scoring, const SetFit& fit, const std::vect
   std::map<Eigen::Index, std::vector<Eigen::Index>> groups;
   for (std::size_t i = 0; i < repeats.size(); ++i) {
     if (std::ranges::find(scoring.workspace().dropped(), i) == scoring.workspace().dropped().end()) {
-      groups[repeats[i]].push_back(static_cast<Eigen::Index>(i));
+      groups[repeats[i]].push_back(i);
     }
   }
   double squares = 0.0;
