@@ -4,9 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
 #include <stdexcept>
 
+#include "discovery/least_squares/check.hpp"
 #include "discovery/least_squares/linearisation.hpp"
 
 namespace llmt::discovery {
@@ -16,40 +16,6 @@ constexpr double largest_damping = 1e12;
 constexpr double negligible_damping = 1e-14;
 // A relative decrease of the sum of squares below this is lost in its own rounding.
 constexpr double resolvable_decrease = 1e-12;
-
-[[noreturn]] void refuse(const std::string& message) {
-  throw std::invalid_argument("llmt::discovery::solve: " + message);
-}
-
-void check_options(const SolverOptions& options) {
-  const auto check = [](const char* field, double value, bool good, const char* bound) {
-    if (!good) refuse(fmt::format("SolverOptions::{} is {}, must be {}", field, value, bound));
-  };
-  check("damping", options.damping, options.damping >= 0.0 && std::isfinite(options.damping), ">= 0 and finite");
-  check("max_iterations", options.max_iterations, options.max_iterations >= 0, ">= 0");
-  check("gradient_tolerance", options.gradient_tolerance, options.gradient_tolerance >= 0.0, ">= 0");
-  check("step_tolerance", options.step_tolerance, options.step_tolerance >= 0.0, ">= 0");
-  check("rank_tolerance", options.rank_tolerance, options.rank_tolerance > 0.0 && options.rank_tolerance < 1.0,
-        "between 0 and 1");
-}
-
-void check_parameters(const std::vector<Parameter>& parameters) {
-  std::set<std::string> names;
-  for (const Parameter& p : parameters) {
-    if (p.name.empty()) refuse("a parameter has no name");
-    if (!names.insert(p.name).second) refuse(fmt::format("parameter \"{}\" is there twice", p.name));
-    if (!std::isfinite(p.value)) refuse(fmt::format("parameter \"{}\": value is {}, must be finite", p.name, p.value));
-    if (!(p.scale > 0.0) || !std::isfinite(p.scale)) {
-      refuse(fmt::format("parameter \"{}\": scale is {}, must be > 0 and finite", p.name, p.scale));
-    }
-    if (p.prior_sigma && !(*p.prior_sigma > 0.0)) {
-      refuse(fmt::format("parameter \"{}\": prior_sigma is {}, must be > 0", p.name, *p.prior_sigma));
-    }
-    if (p.prior_value && !std::isfinite(*p.prior_value)) {
-      refuse(fmt::format("parameter \"{}\": prior_value is {}, must be finite", p.name, *p.prior_value));
-    }
-  }
-}
 
 // The problem as the iteration sees it: free columns, scaled, weighted, priors as extra rows.
 class Solver {
@@ -85,9 +51,9 @@ class Solver {
 
 Solver::Solver(const LeastSquaresProblem& problem, const SolverOptions& options)
     : problem_(problem), options_(options), damping_(options.damping) {
-  check_options(options);
-  check_parameters(problem.parameters);
-  if (!problem.residual) refuse("the problem has no residual function");
+  check(options);
+  check(problem.parameters);
+  if (!problem.residual) refuse_to_solve("the problem has no residual function");
   const auto count = std::ssize(problem.parameters);
   start_.resize(count);
   std::vector<double> scales;
@@ -104,13 +70,14 @@ Solver::Solver(const LeastSquaresProblem& problem, const SolverOptions& options)
   residuals_ = problem.residual(values_);
   const Eigen::Index weights = problem.weights.size();
   if (weights != 0 && weights != residuals_.size()) {
-    refuse(fmt::format("weights has {} entries but there are {} residuals", weights, residuals_.size()));
+    refuse_to_solve(fmt::format("weights has {} entries but there are {} residuals", weights, residuals_.size()));
   }
   if (weights != 0 && !(problem.weights.allFinite() && problem.weights.minCoeff() >= 0.0)) {
-    refuse("weights must be finite and >= 0");
+    refuse_to_solve("weights must be finite and >= 0");
   }
   for (Eigen::Index i = 0; i < residuals_.size(); ++i) {
-    if (!std::isfinite(residuals_(i))) refuse(fmt::format("residual {} is {} at the start values", i, residuals_(i)));
+    if (!std::isfinite(residuals_(i)))
+      refuse_to_solve(fmt::format("residual {} is {} at the start values", i, residuals_(i)));
   }
   weighted_ = weighted(residuals_, values_);
 }
@@ -132,7 +99,8 @@ Eigen::VectorXd Solver::weighted(const Eigen::VectorXd& residuals, const Eigen::
 Eigen::VectorXd Solver::residuals_at(const Eigen::VectorXd& values) const {
   Eigen::VectorXd residuals = problem_.residual(values);
   if (residuals.size() != residuals_.size()) {
-    refuse(fmt::format("the residual function returned {} rows, then {}", residuals_.size(), residuals.size()));
+    refuse_to_solve(
+        fmt::format("the residual function returned {} rows, then {}", residuals_.size(), residuals.size()));
   }
   return residuals;
 }
@@ -140,8 +108,8 @@ Eigen::VectorXd Solver::residuals_at(const Eigen::VectorXd& values) const {
 Eigen::MatrixXd Solver::jacobian_at(const Eigen::VectorXd& values) const {
   const Eigen::MatrixXd all = evaluate_jacobian(problem_, values);
   if (all.rows() != residuals_.size() || all.cols() != start_.size()) {
-    refuse(fmt::format("the Jacobian is {} x {}, expected {} x {}", all.rows(), all.cols(), residuals_.size(),
-                       start_.size()));
+    refuse_to_solve(fmt::format("the Jacobian is {} x {}, expected {} x {}", all.rows(), all.cols(), residuals_.size(),
+                                start_.size()));
   }
   Eigen::MatrixXd columns(all.rows(), std::ssize(free_));
   for (std::size_t i = 0; i < free_.size(); ++i) columns.col(i) = all.col(free_[i]);
@@ -277,7 +245,7 @@ SolverResult Solver::run() {
     if (result_.dof > 0) result_.sigma = weighted_.norm() / std::sqrt(static_cast<double>(result_.dof));
   } else {
     jacobian_ = jacobian_at(values_);
-    if (!jacobian_.allFinite()) refuse("the Jacobian is not finite at the start values");
+    if (!jacobian_.allFinite()) refuse_to_solve("the Jacobian is not finite at the start values");
     Linearisation linear = linearise_here();
     while (!finished_at(linear) && advance(linear)) {
       Eigen::MatrixXd jacobian = jacobian_at(values_);
