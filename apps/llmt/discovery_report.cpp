@@ -149,7 +149,7 @@ void print_report(const DiscoveryReport& report) {
   if (missing.answer == Answer::nothing_missing) print_visible(missing);
   if (!missing.not_testable.empty()) {
     print("\nNot testable with these rows:\n");
-    for (const discovery::UntestableTerm& entry : missing.not_testable)
+    for (const discovery::UntestableCause& entry : missing.not_testable)
       print(fmt::format("  {}: {}\n", entry.what, entry.why));
   }
   if (!report.corrected.empty()) print(fmt::format("\nCorrected simulation written to {}\n", report.corrected));

@@ -36,7 +36,7 @@ struct Row {
   std::optional<ErrorFigures> test;
 };
 
-/// Figures on measurements that took no part in anything.
+// Figures on measurements that took no part in anything.
 ErrorFigures test_figures(const robotics::CorrectedRobot& robot, const robotics::Measurements& test) {
   return error_figures(robotics::distances(robotics::positions(robot, test.poses), test));
 }
@@ -206,7 +206,7 @@ void print_report(const CalibrateArguments& arguments, const robotics::Robot& no
   }
 }
 
-/// CAL.yaml and, if the correction is kept, CAL.correction.json beside it.
+// CAL.yaml and, if the correction is kept, CAL.correction.json beside it.
 std::vector<std::string> write_result(const std::string& path, const CalibrationReport& report) {
   robotics::CorrectedRobot best = report.best();
   std::vector<std::string> written;

@@ -13,7 +13,7 @@ namespace {
 using robotics::Poses;
 using robotics::Robot;
 
-/// The planar arm's tool moves in x and y.
+// The planar arm's tool moves in x and y.
 Eigen::MatrixXd plane_positions(const Robot& robot, const Poses& poses) {
   return robotics::positions(robot, poses).leftCols(2);
 }
@@ -23,7 +23,7 @@ TotalError total_error(const Eigen::MatrixXd& model, const Eigen::MatrixXd& trut
   return {distances.mean(), distances.maxCoeff()};
 }
 
-/// Grown to a given size without a test, from three samples a leaf on: the paper's trees.
+// Grown to a given size without a test, from three samples a leaf on: the paper's trees.
 FitOptions grown_to(Eigen::Index leaves) {
   FitOptions options;
   options.growth = {.significance = 1.0, .min_variance_gain = -1.0, .min_leaf_samples = 3, .max_leaves = leaves};
@@ -32,8 +32,8 @@ FitOptions grown_to(Eigen::Index leaves) {
   return options;
 }
 
-/// The same trees with at most this number of leaves, smoothed: width, ridge and leaf count by cross-validation on the
-/// training poses.
+// The same trees with at most this number of leaves, smoothed: width, ridge and leaf count by cross-validation on the
+// training poses.
 FitOptions blended(Eigen::Index leaves, std::uint64_t seed) {
   FitOptions options = grown_to(leaves);
   options.blend.validity = ValidityChoice::automatic;
@@ -41,15 +41,15 @@ FitOptions blended(Eigen::Index leaves, std::uint64_t seed) {
   return options;
 }
 
-/// The same with products of the joints in the local models, six coefficients instead of three, so from six samples a
-/// leaf on.
+// The same with products of the joints in the local models, six coefficients instead of three, so from six samples a
+// leaf on.
 FitOptions quadratic(FitOptions options) {
   options.local_models.terms = LocalTerms::quadratic;
   options.growth.min_leaf_samples = 6;
   return options;
 }
 
-/// The paper's smoothing: Gaussians of the given width over the leaves as they were grown.
+// The paper's smoothing: Gaussians of the given width over the leaves as they were grown.
 FitOptions gaussian_as_grown(Eigen::Index leaves, double width) {
   FitOptions options = grown_to(leaves);
   options.blend.validity = ValidityChoice::gaussian;
@@ -58,7 +58,7 @@ FitOptions gaussian_as_grown(Eigen::Index leaves, double width) {
   return options;
 }
 
-/// One tree per axis, each with its own options.
+// One tree per axis, each with its own options.
 struct AxisTrees {
   std::vector<Model> models;
   std::vector<Eigen::Index> leaves;
@@ -83,7 +83,7 @@ AxisTrees fit_axes(const Eigen::MatrixXd& joints, const Eigen::MatrixXd& outputs
   return trees;
 }
 
-/// The calibrated arm, d = [L2, v2, L3, v3], eq. (12)-(15), by the undamped method of eq. (6)-(9).
+// The calibrated arm, d = [L2, v2, L3, v3], eq. (12)-(15), by the undamped method of eq. (6)-(9).
 discovery::SolverResult calibrate_plane(const Robot& rigid, const Poses& poses, const Eigen::MatrixXd& truth) {
   robotics::Measurements measurements;
   measurements.poses = poses;
@@ -98,7 +98,7 @@ discovery::SolverResult calibrate_plane(const Robot& rigid, const Poses& poses, 
   return discovery::solve(problem, {.damping = 0.0});
 }
 
-/// The arms, the grids of poses and the true positions on them.
+// The arms, the grids of poses and the true positions on them.
 struct PlanarData {
   Robot flexible;
   Robot rigid;
@@ -123,13 +123,13 @@ PlanarData planar_data(bool carry_over) {
   return data;
 }
 
-/// What the calibrated arm leaves, and its predictions where it is tested.
+// What the calibrated arm leaves, and its predictions where it is tested.
 struct CalibratedPlane {
   Eigen::MatrixXd residual;  // eq. (16), (17)
   Eigen::MatrixXd test;
 };
 
-/// Rows of the arm: rigid, calibrated, and corrected by every kind of tree.
+// Rows of the arm: rigid, calibrated, and corrected by every kind of tree.
 void study_arm(const PlanarData& data, const CalibratedPlane& calibrated, std::uint64_t seed, PlanarStudy& study) {
   const Eigen::Index poses = data.train.count();
   study.arm.push_back(
@@ -158,7 +158,7 @@ void study_arm(const PlanarData& data, const CalibratedPlane& calibrated, std::u
   correct("blend, quadratic, 25 leaves", {quadratic(blended(25, seed)), quadratic(blended(25, seed))});
 }
 
-/// Crisp and blended trees of the residual in x with noise.
+// Crisp and blended trees of the residual in x with noise.
 void study_noise(const PlanarData& data, const CalibratedPlane& calibrated, std::uint64_t seed, PlanarStudy& study) {
   Random random(seed);
   Eigen::VectorXd noisy = calibrated.residual.col(0);
@@ -176,7 +176,7 @@ void study_noise(const PlanarData& data, const CalibratedPlane& calibrated, std:
   study.noisy_blend = noisy_error(blended(93, seed));
 }
 
-/// Trees of the positions themselves, without a model of the arm.
+// Trees of the positions themselves, without a model of the arm.
 void study_black_box(const PlanarData& data, bool large, std::uint64_t seed, PlanarStudy& study) {
   const auto add = [&](const std::string& name, const Poses& poses, const Eigen::MatrixXd& positions,
                        const std::vector<FitOptions>& options, std::optional<TotalError> paper) {

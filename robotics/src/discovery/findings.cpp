@@ -76,8 +76,9 @@ void describe_effects(const std::vector<Hypothesis>& hypotheses, const discovery
   }
 }
 
-void describe_limits(const std::vector<Hypothesis>& hypotheses, const std::vector<UntestableEffect>& untestable,
-                     const discovery::Verdict& verdict, const Robot& robot, Discovery& result) {
+void describe_limits(const std::vector<Hypothesis>& hypotheses,
+                     const std::vector<discovery::UntestableCause>& untestable, const discovery::Verdict& verdict,
+                     const Robot& robot, Discovery& result) {
   result.hypotheses = static_cast<int>(hypotheses.size());
   result.score_gain = verdict.score_gain;
   result.threshold = verdict.threshold;

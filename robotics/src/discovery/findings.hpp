@@ -13,7 +13,8 @@ void describe_shapes(const std::vector<Hypothesis>& hypotheses, const discovery:
 
 /// Discovery::not_testable and visible: which effects could not be tested, and from which size on the others would have
 /// been found.
-void describe_limits(const std::vector<Hypothesis>& hypotheses, const std::vector<UntestableEffect>& untestable,
-                     const discovery::Verdict& verdict, const Robot& robot, Discovery& result);
+void describe_limits(const std::vector<Hypothesis>& hypotheses,
+                     const std::vector<discovery::UntestableCause>& untestable, const discovery::Verdict& verdict,
+                     const Robot& robot, Discovery& result);
 
 }  // namespace llmt::robotics

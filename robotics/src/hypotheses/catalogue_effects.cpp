@@ -58,7 +58,7 @@ std::set<std::string> labels_of(const Robot& robot) {
 }  // namespace
 
 std::vector<Hypothesis> catalogue_hypotheses(const Scene& scene, const std::vector<EffectType>& catalogue,
-                                             std::vector<UntestableEffect>& untestable) {
+                                             std::vector<discovery::UntestableCause>& untestable) {
   const Chain& chain = scene.robot.chain;
   const std::set<std::string> present = labels_of(scene.robot);
   std::vector<Hypothesis> hypotheses;

@@ -11,7 +11,7 @@ namespace llmt::robotics {
 /// Effects of the catalogue at every place that suits them, without their signatures. Effects whose columns are missing
 /// are listed in `untestable`.
 std::vector<Hypothesis> catalogue_hypotheses(const Scene& scene, const std::vector<EffectType>& catalogue,
-                                             std::vector<UntestableEffect>& untestable);
+                                             std::vector<discovery::UntestableCause>& untestable);
 
 /// Signatures of all hypotheses that have an effect.
 void add_signatures(const Scene& scene, std::vector<Hypothesis>& hypotheses);

@@ -39,6 +39,12 @@ struct EffectCandidate {
   double prior_cost = 0.0;
 };
 
+/// A cause that these samples cannot test.
+struct UntestableCause {
+  std::string what;  ///< "backlash_approach@joint1", "square a"
+  std::string why;   ///< in words
+};
+
 struct SearchOptions {
   double false_alarm_rate = 0.003;  ///< of the whole search when nothing is missing
   int null_draws = 300;             ///< of each kind, see search()

@@ -111,7 +111,7 @@ struct Missing {
   std::vector<Eigen::Index> searched;  ///< rows
   std::vector<Eigen::Index> held_out;  ///< rows
   std::vector<Eigen::Index> outliers;  ///< rows that fit nothing and were left out of the fit
-  std::vector<UntestableTerm> not_testable;
+  std::vector<UntestableCause> not_testable;
   std::vector<VisibleTerm> visible;  ///< of the causes that were tried, most visible first
   bool floor_from_repeats = false;
   std::vector<Structure> structure;  ///< material; terms found beside it are not confirmed

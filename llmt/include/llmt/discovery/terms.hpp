@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "llmt/abi.hpp"
+#include "llmt/discovery/search.hpp"
 
 namespace llmt::discovery {
 
@@ -58,11 +59,6 @@ struct Inputs {
   std::string order = {};          ///< the input that says in which order rows were taken; empty: as they stand
 };
 
-struct UntestableTerm {
-  std::string what;
-  std::string why;
-};
-
 /// The library of terms, for inputs x, x':
 ///   offset 1; gain s and gain_curvature s^2 of the simulated output s;
 ///   linear x; square x^2; cube x^3; product x x'; absolute |x|; sign sgn(x);
@@ -77,7 +73,7 @@ struct UntestableTerm {
 /// A term that equals a simpler one at these values is left out: x^2 for an input of two values, |x| for one sign.
 /// Constant inputs go to `untestable` if that is given. Throws std::invalid_argument for wrong shapes, empty or
 /// repeated names, values that are not finite, and an order that is not an input or holds equal values.
-std::vector<ModelTerm> standard_terms(const Inputs& inputs, std::vector<UntestableTerm>* untestable = nullptr);
+std::vector<ModelTerm> standard_terms(const Inputs& inputs, std::vector<UntestableCause>* untestable = nullptr);
 
 /// `library` without the terms of one column that are proportional to one of `own`: the user's name for it wins.
 std::vector<ModelTerm> without_duplicates(std::vector<ModelTerm> library, const std::vector<ModelTerm>& own,

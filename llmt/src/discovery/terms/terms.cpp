@@ -151,7 +151,7 @@ ModelTerm own_term(std::string name, std::string formula, std::function<double(c
           }};
 }
 
-std::vector<ModelTerm> standard_terms(const Inputs& inputs, std::vector<UntestableTerm>* untestable) {
+std::vector<ModelTerm> standard_terms(const Inputs& inputs, std::vector<UntestableCause>* untestable) {
   check(inputs);
   if (!inputs.order.empty()) order_column(inputs);
   std::vector<InputView> moving;

@@ -20,11 +20,6 @@ struct Shape {
   std::string kind;                     ///< "smooth", "bump at 35 deg", "step at -20 deg", ...
 };
 
-struct UntestableEffect {
-  std::string what;  ///< "backlash_approach@joint1", or the name of a type
-  std::string why;
-};
-
 struct FoundParameter {
   std::string name;
   double value = 0.0;
@@ -93,7 +88,7 @@ struct Discovery {
   HeldOut held_out;
   GapMap gap;                          ///< of `before`
   std::vector<Eigen::Index> outliers;  ///< rows of the measurements, from 0
-  std::vector<UntestableEffect> not_testable;
+  std::vector<discovery::UntestableCause> not_testable;
   std::vector<Visible> visible;
   discovery::LackOfFit lack_of_fit;
   double noise_mm = 0.0;  ///< standard deviation of one coordinate
