@@ -37,7 +37,7 @@ std::vector<GapRegion> gap_regions(const discovery::Inputs& inputs, const discov
   options.blend.validity = ValidityChoice::crisp;
   options.growth.max_leaves = 5;
   options.growth.significance = 0.01;
-  options.growth.min_leaf_samples = std::max<std::ptrdiff_t>(5, std::ssize(rows) / 20);
+  options.growth.min_leaf_samples = std::max<Eigen::Index>(5, std::ssize(rows) / 20);
   for (int j = 0; j < p; ++j) options.growth.split_inputs.push_back(j);
   options.growth.regression_inputs = {static_cast<int>(p)};
   std::vector<GapRegion> regions;
