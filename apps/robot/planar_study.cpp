@@ -26,9 +26,12 @@ TotalError total_error(const Eigen::MatrixXd& model, const Eigen::MatrixXd& trut
 /// Grown to a given size without a test, from three samples a leaf on: the paper's trees.
 FitOptions grown_to(std::ptrdiff_t leaves) {
   FitOptions options;
-  options.growth = {.significance = 1.0, .min_variance_gain = -1.0, .min_leaf_samples = 3, .max_leaves = leaves};
-  options.blend.validity = ValidityChoice::crisp;
-  options.selection.folds.count = 0;
+  options.max_leaves = leaves;
+  options.min_leaf_samples = 3;
+  options.significance = 1.0;
+  options.expert.min_variance_gain = -1.0;
+  options.validity = ValidityChoice::crisp;
+  options.folds.count = 0;
   return options;
 }
 
@@ -36,25 +39,25 @@ FitOptions grown_to(std::ptrdiff_t leaves) {
 /// training poses.
 FitOptions blended(std::ptrdiff_t leaves, std::uint64_t seed) {
   FitOptions options = grown_to(leaves);
-  options.blend.validity = ValidityChoice::automatic;
-  options.selection.folds = {.count = 5, .seed = seed};
+  options.validity = ValidityChoice::automatic;
+  options.folds = {.count = 5, .seed = seed};
   return options;
 }
 
 /// The same with products of the joints in the local models, six coefficients instead of three, so from six samples a
 /// leaf on.
 FitOptions quadratic(FitOptions options) {
-  options.local_models.terms = LocalTerms::quadratic;
-  options.growth.min_leaf_samples = 6;
+  options.terms = LocalTerms::quadratic;
+  options.min_leaf_samples = 6;
   return options;
 }
 
 /// The paper's smoothing: Gaussians of the given width over the leaves as they were grown.
 FitOptions gaussian_as_grown(std::ptrdiff_t leaves, double width) {
   FitOptions options = grown_to(leaves);
-  options.blend.validity = ValidityChoice::gaussian;
-  options.blend.estimation = Estimation::as_grown;
-  options.blend.widths = {width};
+  options.validity = ValidityChoice::gaussian;
+  options.expert.estimation = Estimation::as_grown;
+  options.expert.widths = {width};
   return options;
 }
 
@@ -132,10 +135,10 @@ PlanarStudy planar_study(bool carry_over, bool large, std::uint64_t seed) {
   };
   correct("corrected, the paper's leaf counts", {grown_to(93), grown_to(75)}, TotalError{0.0157, 0.131});
   FitOptions until_two_percent = grown_to(0);
-  until_two_percent.growth.min_improvement = 0.02;
+  until_two_percent.expert.min_improvement = 0.02;
   correct("corrected, stopped at 2 %", {until_two_percent, until_two_percent}, std::nullopt);
   FitOptions cross_validated = grown_to(0);
-  cross_validated.selection.folds = {.count = 5, .seed = seed};
+  cross_validated.folds = {.count = 5, .seed = seed};
   correct("corrected, leaves by 5-fold CV", {cross_validated, cross_validated}, std::nullopt);
   correct("Gaussians, narrow, as grown", {gaussian_as_grown(93, 1.0 / 3.0), gaussian_as_grown(75, 1.0 / 3.0)},
           std::nullopt);
@@ -154,11 +157,11 @@ PlanarStudy planar_study(bool carry_over, bool large, std::uint64_t seed) {
   }
   const Eigen::VectorXd truth = (test_truth - calibrated_test).col(0);
   const auto noisy_error = [&](FitOptions options) {
-    options.growth.min_leaf_samples = 0;
+    options.min_leaf_samples = 0;
     return rmse(fit(train.joints, noisy, options).model.predict(test.joints), truth)(0);
   };
   FitOptions crisp = blended(93, seed);
-  crisp.blend.validity = ValidityChoice::crisp;
+  crisp.validity = ValidityChoice::crisp;
   study.noisy_crisp = noisy_error(crisp);
   study.noisy_blend = noisy_error(blended(93, seed));
 
