@@ -151,7 +151,6 @@ const std::vector<OptionSet>& option_sets() {
          task.options.validity = ValidityChoice::blend;
          task.options.max_leaves = 8;
        }},
-      {"single_hold_out", [](Task& task) { task.options.selection.single_hold_out_rows = 100; }},
       {"contiguous_folds", [](Task& task) { task.options.folds.kind = llmt::FoldKind::contiguous; }},
       {"grouped_folds", [](Task& task) { task.options.folds.groups = group_labels(); }},
       {"some_columns",
@@ -171,20 +170,6 @@ const std::vector<OptionSet>& option_sets() {
          task.options.expert.min_improvement = 0.02;
          task.options.intervals = false;
        }},
-  };
-  return sets;
-}
-
-const std::vector<OptionSet>& retiring_option_sets() {
-  static const std::vector<OptionSet> sets = {
-      {"merged", [](Task& task) { task.options.growth.merge_leaves = true; }},
-      {"smoothness_2",
-       [](Task& task) {
-         task.options.blend.smoothness = 2;
-         task.options.validity = ValidityChoice::blend;
-       }},
-      {"midpoint", [](Task& task) { task.options.growth.threshold = llmt::ThresholdPlacement::midpoint; }},
-      {"pruning_m_0", [](Task& task) { task.options.growth.pruning_m = 0.0; }},
   };
   return sets;
 }

@@ -12,9 +12,9 @@
 #include "constraints/constrained_leaves.hpp"
 #include "estimation/estimate.hpp"
 #include "llmt/fit.hpp"
-#include "llmt/oracles.hpp"
 #include "llmt/random.hpp"
 #include "numerics/bounded_least_squares.hpp"
+#include "oracles/oracles.hpp"
 
 namespace {
 

@@ -73,6 +73,22 @@ TEST(CalibrationReport, WithoutFoldsThereAreNoHeldOutFigures) {
   EXPECT_EQ(report.nominal.in_sample_mm.size(), 50);
 }
 
+TEST(CalibrationReport, DescriptionOfAnotherRobotIsSaidNotToBelong) {
+  const Robot other = mdh_like();
+  const Robot own = perturbed(ur_like(), 0.5, 0.05, 16);
+  for (const int folds : {0, 5}) {
+    const auto suspicions_of = [&](const Robot& measured) {
+      const Measurements seen = measure(measured, random_poses(measured.chain, 60, 17), 0.05, 18);
+      return suspicions(ur_like(), seen, report_calibration(ur_like(), seen, {.folds = folds}));
+    };
+    const std::vector<std::string> wrong = suspicions_of(other);
+    ASSERT_FALSE(wrong.empty());
+    EXPECT_NE(wrong.back().find("does not belong to these measurements"), std::string::npos) << wrong.back();
+    EXPECT_NE(wrong.back().find(folds > 0 ? "held-out points" : "measured points"), std::string::npos) << wrong.back();
+    EXPECT_TRUE(suspicions_of(own).empty());
+  }
+}
+
 TEST(Correction, IsTheSameSeenFromAnotherBase) {
   const Robot truth = perturbed(mdh_like(), 0.0, 0.0, 12);
   const Measurements seen = with_step(truth, 300, 0.002, 13);
