@@ -280,10 +280,12 @@ void add_calibrate(CLI::App& app) {
       ->delimiter(',');
   command->add_option("--only", options.calibration.only, "Free these parameters and no others, base and tool included")
       ->delimiter(',');
-  command->add_option("--max-leaves", options.growth.max_leaves, "Most leaves of a tree of the correction, 0: no limit")
+  command
+      ->add_option("--max-leaves", options.correction.max_leaves,
+                   "Most leaves of a tree of the correction, 0: no limit")
       ->capture_default_str();
   command
-      ->add_option("--min-leaf", options.growth.min_leaf_samples,
+      ->add_option("--min-leaf", options.correction.min_leaf_samples,
                    "Fewest poses in a leaf, 0: twice the coefficients of a leaf")
       ->capture_default_str();
   command->add_option("--seed", options.seed, "Of the random folds")->capture_default_str();

@@ -26,9 +26,12 @@ TotalError total_error(const Eigen::MatrixXd& model, const Eigen::MatrixXd& trut
 // Grown to a given size without a test, from three samples a leaf on: the paper's trees.
 FitOptions grown_to(Eigen::Index leaves) {
   FitOptions options;
-  options.growth = {.significance = 1.0, .min_variance_gain = -1.0, .min_leaf_samples = 3, .max_leaves = leaves};
-  options.blend.validity = ValidityChoice::crisp;
-  options.selection.folds.count = 0;
+  options.max_leaves = leaves;
+  options.min_leaf_samples = 3;
+  options.significance = 1.0;
+  options.expert.min_variance_gain = -1.0;
+  options.validity = ValidityChoice::crisp;
+  options.folds.count = 0;
   return options;
 }
 
@@ -36,25 +39,25 @@ FitOptions grown_to(Eigen::Index leaves) {
 // training poses.
 FitOptions blended(Eigen::Index leaves, std::uint64_t seed) {
   FitOptions options = grown_to(leaves);
-  options.blend.validity = ValidityChoice::automatic;
-  options.selection.folds = {.count = 5, .seed = seed};
+  options.validity = ValidityChoice::automatic;
+  options.folds = {.count = 5, .seed = seed};
   return options;
 }
 
 // The same with products of the joints in the local models, six coefficients instead of three, so from six samples a
 // leaf on.
 FitOptions quadratic(FitOptions options) {
-  options.local_models.terms = LocalTerms::quadratic;
-  options.growth.min_leaf_samples = 6;
+  options.terms = LocalTerms::quadratic;
+  options.min_leaf_samples = 6;
   return options;
 }
 
 // The paper's smoothing: Gaussians of the given width over the leaves as they were grown.
 FitOptions gaussian_as_grown(Eigen::Index leaves, double width) {
   FitOptions options = grown_to(leaves);
-  options.blend.validity = ValidityChoice::gaussian;
-  options.blend.estimation = Estimation::as_grown;
-  options.blend.widths = {width};
+  options.validity = ValidityChoice::gaussian;
+  options.expert.estimation = Estimation::as_grown;
+  options.expert.widths = {width};
   return options;
 }
 
@@ -144,10 +147,26 @@ void study_arm(const PlanarData& data, const CalibratedPlane& calibrated, std::u
   };
   correct("corrected, the paper's leaf counts", {grown_to(93), grown_to(75)}, TotalError{0.0157, 0.131});
   FitOptions until_two_percent = grown_to(0);
-  until_two_percent.growth.min_improvement = 0.02;
+<<<<<<< HEAD
+  until_two_percent.expert.min_improvement = 0.02;
+  correct("corrected, stopped at 2 %", {until_two_percent, until_two_percent}, std::nullopt);
+  FitOptions cross_validated = grown_to(0);
+  cross_validated.folds = {.count = 5, .seed = seed};
+  correct("corrected, leaves by 5-fold CV", {cross_validated, cross_validated}, std::nullopt);
+  correct("Gaussians, narrow, as grown", {gaussian_as_grown(93, 1.0 / 3.0), gaussian_as_grown(75, 1.0 / 3.0)},
+          std::nullopt);
+  correct("Gaussians, wide, as grown", {gaussian_as_grown(93, 0.7), gaussian_as_grown(75, 0.7)}, std::nullopt);
+  correct("blend, the paper's leaf counts", {blended(93, seed), blended(75, seed)}, std::nullopt);
+  correct("blend, a third of the leaves", {blended(25, seed), blended(25, seed)}, std::nullopt);
+  correct("quadratic, half the leaves", {quadratic(grown_to(46)), quadratic(grown_to(37))}, std::nullopt);
+  correct("blend, quadratic, half the leaves", {quadratic(blended(46, seed)), quadratic(blended(37, seed))},
+          std::nullopt);
+  correct("blend, quadratic, 25 leaves", {quadratic(blended(25, seed)), quadratic(blended(25, seed))}, std::nullopt);
+=======
+  until_two_percent.expert.min_improvement = 0.02;
   correct("corrected, stopped at 2 %", {until_two_percent, until_two_percent});
   FitOptions cross_validated = grown_to(0);
-  cross_validated.selection.folds = {.count = 5, .seed = seed};
+  cross_validated.folds = {.count = 5, .seed = seed};
   correct("corrected, leaves by 5-fold CV", {cross_validated, cross_validated});
   correct("Gaussians, narrow, as grown", {gaussian_as_grown(93, 1.0 / 3.0), gaussian_as_grown(75, 1.0 / 3.0)});
   correct("Gaussians, wide, as grown", {gaussian_as_grown(93, 0.7), gaussian_as_grown(75, 0.7)});
@@ -157,6 +176,7 @@ void study_arm(const PlanarData& data, const CalibratedPlane& calibrated, std::u
   correct("blend, quadratic, half the leaves", {quadratic(blended(46, seed)), quadratic(blended(37, seed))});
   correct("blend, quadratic, 25 leaves", {quadratic(blended(25, seed)), quadratic(blended(25, seed))});
 }
+>>>>>>> main
 
 // Crisp and blended trees of the residual in x with noise.
 void study_noise(const PlanarData& data, const CalibratedPlane& calibrated, std::uint64_t seed, PlanarStudy& study) {
@@ -167,11 +187,16 @@ void study_noise(const PlanarData& data, const CalibratedPlane& calibrated, std:
   }
   const Eigen::VectorXd truth = (data.test_truth - calibrated.test).col(0);
   const auto noisy_error = [&](FitOptions options) {
-    options.growth.min_leaf_samples = 0;
+<<<<<<< HEAD
+    options.min_leaf_samples = 0;
+    return rmse(fit(train.joints, noisy, options).model.predict(test.joints), truth)(0);
+=======
+    options.min_leaf_samples = 0;
     return rmse(fit(data.train.joints, noisy, options).model.predict(data.test.joints), truth)(0);
+>>>>>>> main
   };
   FitOptions crisp = blended(93, seed);
-  crisp.blend.validity = ValidityChoice::crisp;
+  crisp.validity = ValidityChoice::crisp;
   study.noisy_crisp = noisy_error(crisp);
   study.noisy_blend = noisy_error(blended(93, seed));
 }

@@ -101,7 +101,7 @@ void witness_many_rows(const std::string&, Results& results) {
     add_for_threads(results, has_missing ? "many_rows/missing" : "many_rows/default", [&](int threads) {
       Task task{make_sample(50000, 5), {}};
       if (has_missing) remove_values(task.sample.inputs);
-      task.options.growth.max_leaves = 40;
+      task.options.max_leaves = 40;
       task.options.max_threads = threads;
       return fit_and_hash(task, threads);
     });

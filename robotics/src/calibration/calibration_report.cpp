@@ -27,13 +27,12 @@ std::span<const double> pose_labels(const Measurements& measurements) {
 Fitted fit_all(const Robot& robot, const Measurements& measurements, const ReportOptions& options) {
   Fitted fitted{.calibration = calibrate(robot, measurements, options.calibration), .correction = {}};
   if (!options.correct) return fitted;
-  FitOptions fit;
-  fit.growth = options.growth;
-  fit.blend.validity = ValidityChoice::crisp;
-  fit.selection.folds = {.count = options.correction_folds,
-                         .kind = options.kind,
-                         .seed = options.seed,
-                         .groups = pose_labels(measurements)};
+  FitOptions fit = options.correction;
+  fit.validity = ValidityChoice::crisp;
+  fit.folds = {.count = options.correction_folds,
+               .kind = options.kind,
+               .seed = options.seed,
+               .groups = pose_labels(measurements)};
   fit.intervals = false;
   fit.max_threads = options.max_threads;
   fitted.correction = fit_correction(fitted.calibration.robot, measurements, fit);

@@ -60,9 +60,9 @@ std::string conditions_of(const Leaf& leaf, const Inputs& inputs) {
 FitOptions tree_options(Eigen::Index samples) {
   FitOptions options;
   constexpr int most_regions = 6;
-  options.growth.max_leaves = most_regions;
-  options.growth.min_leaf_samples = static_cast<int>(std::max<Eigen::Index>(8, samples / 25));
-  options.blend.validity = ValidityChoice::crisp;
+  options.max_leaves = most_regions;
+  options.min_leaf_samples = static_cast<int>(std::max<Eigen::Index>(8, samples / 25));
+  options.validity = ValidityChoice::crisp;
   options.intervals = false;
   return options;
 }

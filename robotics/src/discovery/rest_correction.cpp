@@ -12,9 +12,9 @@ void correct_rest(const Measurements& searched, std::uint64_t seed, Discovery& r
   constexpr int folds = 5;
   if (searched.count() < fewest) return;
   FitOptions fitting;
-  fitting.blend.validity = ValidityChoice::crisp;
+  fitting.validity = ValidityChoice::crisp;
   fitting.intervals = false;
-  fitting.selection.folds.seed = seed;
+  fitting.folds.seed = seed;
   const Robot& robot = result.improved.robot;
   const Eigen::VectorXd without = distances(positions(robot, searched.poses), searched);
   Eigen::VectorXd with = without;

@@ -47,9 +47,9 @@ TEST(CalibrationReport, CorrectionOfPureNoiseIsLeftOut) {
   const Robot truth = perturbed(ur_like(), 0.5, 0.05, 3);
   const Measurements seen = measure(truth, random_poses(truth.chain, 60, 4), 0.05, 5);
   ReportOptions options{.correct = true};
-  options.growth.significance = 1.0;  // a tree that follows every wiggle
+  options.correction.significance = 1.0;  // a tree that follows every wiggle
   options.correction_folds = 0;
-  options.growth.max_leaves = 5;
+  options.correction.max_leaves = 5;
   const CalibrationReport report = report_calibration(ur_like(), seen, options);
   EXPECT_LT(report.corrected->in_sample_mm.mean(), report.geometric.in_sample_mm.mean());
   EXPECT_FALSE(report.correction_kept) << report.decision;

@@ -158,9 +158,9 @@ TEST(PlanarArm, CorrectionRemovesMostOfTheRest) {
   const Measurements test = exact(flexible(), grid(rigid().chain, 0.05));
   const Calibration calibration = calibrate(rigid(), training, {.only = {"joint2.a", "joint2.b", "tool.x", "tool.y"}});
   FitOptions options;
-  options.growth.significance = 1.0;
-  options.growth.max_leaves = 40;
-  options.selection.folds.count = 0;
+  options.significance = 1.0;
+  options.max_leaves = 40;
+  options.folds.count = 0;
   const CorrectedRobot corrected{calibration.robot, fit_correction(calibration.robot, training, options).model};
   const double before = distances(positions(calibration.robot, test.poses), test).mean();
   const double after = distances(positions(corrected, test.poses), test).mean();

@@ -27,9 +27,10 @@ ErrorFigures error_figures(const Eigen::VectorXd& distances_mm);
 
 struct ReportOptions {
   CalibrationOptions calibration = {};
-  bool correct = false;       ///< grow a residual correction and judge it
-  GrowthOptions growth = {};  ///< of the correction
-  int folds = 5;              ///< 0: no held-out figures
+  bool correct = false;  ///< grow a residual correction and judge it
+  /// Of the correction. Its leaves are crisp; folds and threads are those below, intervals are not made.
+  FitOptions correction = {};
+  int folds = 5;  ///< 0: no held-out figures
   FoldKind kind = FoldKind::random;
   int correction_folds = 5;  ///< for the correction's leaf count, within every fold; 0: as grown
   std::uint64_t seed = 1;
