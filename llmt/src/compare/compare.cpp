@@ -28,7 +28,7 @@ FitOptions for_rows(FitOptions options, const std::vector<Eigen::Index>& rows) {
   if (options.weights.size() > 0) {
     options.weights = Eigen::VectorXd(options.weights(rows));
   }
-  options.selection.folds.groups = {};
+  options.folds.groups = {};
   return options;
 }
 
@@ -59,11 +59,11 @@ Paired paired(const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
   return {mean, folds > 1.0 ? std::sqrt(squares / (folds - 1.0) / folds) : 0.0};
 }
 
-bool is_least_squares(const Method& method) { return method.options.growth.max_leaves == 1; }
+bool is_least_squares(const Method& method) { return method.options.max_leaves == 1; }
 
 bool is_readable(const Method& method) {
-  return method.options.growth.rule == GrowthRule::rd && method.options.blend.validity == ValidityChoice::crisp &&
-         method.options.local_models.terms == LocalTerms::linear;
+  return method.options.rule == GrowthRule::rd && method.options.validity == ValidityChoice::crisp &&
+         method.options.terms == LocalTerms::linear;
 }
 
 void recommend(const std::vector<Method>& methods, ComparisonResult& result) {
@@ -116,61 +116,60 @@ std::vector<Method> usual_methods(const FitOptions& base, Eigen::Index inputs) {
   FitOptions plain = base;
   plain.intervals = false;
   plain.progress = {};
-  plain.growth.pruning = Pruning::last_splits;
-  plain.blend.validity = ValidityChoice::crisp;
-  plain.local_models = {};
+  plain.pruning = Pruning::last_splits;
+  plain.validity = ValidityChoice::crisp;
+  plain.terms = LocalTerms::linear;
+  plain.sparse = SparseChoice::never;
   std::vector<Method> methods;
   const auto add = [&](const std::string& name, const auto& change) {
     methods.push_back({name, plain});
     change(methods.back().options);
   };
   add("least squares", [](FitOptions& options) {
-    options.growth.max_leaves = 1;
-    options.selection.folds.count = 0;
+    options.max_leaves = 1;
+    options.folds.count = 0;
   });
   add("crisp tree, RD", [](FitOptions&) {});
-  add("crisp tree, RETIS", [](FitOptions& options) { options.growth.rule = GrowthRule::retis; });
-  add("crisp tree, RA", [](FitOptions& options) { options.growth.rule = GrowthRule::ra; });
+  add("crisp tree, RETIS", [](FitOptions& options) { options.rule = GrowthRule::retis; });
+  add("crisp tree, RA", [](FitOptions& options) { options.rule = GrowthRule::ra; });
   add("M5', smoothed", [](FitOptions& options) {
-    options.growth.rule = GrowthRule::m5;
-    options.selection.folds.count = 0;  // its pruning decides
-    options.blend.shrinkages = {};
-    options.growth.min_improvement = 0.0;
+    options.rule = GrowthRule::m5;
+    options.folds.count = 0;  // its pruning decides
+    options.expert.shrinkages = {};
+    options.expert.min_improvement = 0.0;
   });
   // Gaussians overlap everywhere: their joint estimates cost the square of the number of leaves.
-  const Eigen::Index gaussian_leaves =
-      base.growth.max_leaves > 0 ? std::min<Eigen::Index>(base.growth.max_leaves, 50) : 50;
+  const Eigen::Index gaussian_leaves = base.max_leaves > 0 ? std::min<Eigen::Index>(base.max_leaves, 50) : 50;
   add("Gaussians, as grown", [=](FitOptions& options) {
-    options.blend.validity = ValidityChoice::gaussian;
-    options.blend.estimation = Estimation::as_grown;
-    options.growth.max_leaves = gaussian_leaves;
+    options.validity = ValidityChoice::gaussian;
+    options.expert.estimation = Estimation::as_grown;
+    options.max_leaves = gaussian_leaves;
   });
   add("Gaussians, re-estimated", [=](FitOptions& options) {
-    options.blend.validity = ValidityChoice::gaussian;
-    options.blend.widths = {1.0 / 3.0, 2.0 / 3.0};
-    options.growth.max_leaves = gaussian_leaves;
+    options.validity = ValidityChoice::gaussian;
+    options.expert.widths = {1.0 / 3.0, 2.0 / 3.0};
+    options.max_leaves = gaussian_leaves;
   });
-  add("blend, joint", [](FitOptions& options) { options.blend.validity = ValidityChoice::blend; });
+  add("blend, joint", [](FitOptions& options) { options.validity = ValidityChoice::blend; });
   add("LOLIMOT", [=](FitOptions& options) {
-    options.growth.rule = GrowthRule::lolimot;
-    options.blend.estimation = Estimation::as_grown;
-    options.growth.max_leaves = gaussian_leaves;
+    options.rule = GrowthRule::lolimot;
+    options.expert.estimation = Estimation::as_grown;
+    options.max_leaves = gaussian_leaves;
   });
   // So do logistic gates.
   add("HILOMOT", [=](FitOptions& options) {
-    options.growth.rule = GrowthRule::hilomot;
-    options.blend.validity = ValidityChoice::automatic;
-    options.growth.max_leaves = gaussian_leaves;
+    options.rule = GrowthRule::hilomot;
+    options.validity = ValidityChoice::automatic;
+    options.max_leaves = gaussian_leaves;
   });
   if (const Eigen::Index numbers = count_numbers(inputs, base); numbers > 0 && numbers <= most_inputs_of_products) {
-    add("crisp tree, quadratic leaves",
-        [](FitOptions& options) { options.local_models.terms = LocalTerms::quadratic; });
+    add("crisp tree, quadratic leaves", [](FitOptions& options) { options.terms = LocalTerms::quadratic; });
   }
-  if (base.growth.pruning == Pruning::weakest_link) {
+  if (base.pruning == Pruning::weakest_link) {
     const auto pruned = [](ValidityChoice validity) {
       return [validity](FitOptions& options) {
-        options.growth.pruning = Pruning::weakest_link;
-        options.blend.validity = validity;
+        options.pruning = Pruning::weakest_link;
+        options.validity = validity;
       };
     };
     add("crisp tree, RD, pruned", pruned(ValidityChoice::crisp));

@@ -27,12 +27,23 @@ Plan make_plan(const FitOptions& options, const TrainingRows& all, Eigen::Index 
   const bool has_folds = folds > 0;
   // Many rows: the widest transitions and the larger ridges, which are for few, take most of the time.
   const bool many_rows = folds == 1;
-  Plan plan{options.growth, {}, options.growth.max_leaves > 0};
-  const bool is_m5 = options.growth.rule == GrowthRule::m5;
-  const ValidityChoice choice = is_lolimot(options.growth.rule) ? ValidityChoice::gaussian
-                                : is_m5                         ? ValidityChoice::crisp
-                                                                : options.blend.validity;
-  const bool logistic = is_hilomot(options.growth.rule);
+  Plan plan{.growth = {.rule = options.rule,
+                       .significance = options.significance,
+                       .min_variance_gain = options.expert.min_variance_gain,
+                       .min_leaf_samples = options.min_leaf_samples,
+                       .max_leaves = options.max_leaves,
+                       .min_improvement = options.expert.min_improvement,
+                       .split_inputs = all.table->split_inputs,
+                       .search = options.expert.search},
+            .candidates = {},
+            .pruning = options.pruning,
+            .shared_partition = options.shared_partition,
+            .leaves_given = options.max_leaves > 0};
+  const bool is_m5 = options.rule == GrowthRule::m5;
+  const ValidityChoice choice = is_lolimot(options.rule) ? ValidityChoice::gaussian
+                                : is_m5                  ? ValidityChoice::crisp
+                                                         : options.validity;
+  const bool logistic = is_hilomot(options.rule);
   const bool crisp_only =
       choice == ValidityChoice::crisp || (choice == ValidityChoice::automatic && !has_folds && !logistic);
   // Every estimate under ordered splits is a quadratic programme, so fewer are tried.
@@ -41,9 +52,9 @@ Plan make_plan(const FitOptions& options, const TrainingRows& all, Eigen::Index 
   plan.candidates.kind = choice == ValidityChoice::gaussian ? ValidityKind::gaussian
                          : logistic                         ? ValidityKind::logistic
                                                             : ValidityKind::blend;
-  plan.candidates.estimation = options.blend.estimation;
+  plan.candidates.estimation = options.expert.estimation;
   if (!crisp_only) {
-    plan.candidates.widths = options.blend.widths;
+    plan.candidates.widths = options.expert.widths;
     if (plan.candidates.widths.empty()) {
       plan.candidates.widths = choice == ValidityChoice::gaussian ? std::vector<double>{1.0 / 3.0}
                                : logistic                         ? std::vector<double>{1.0, 2.0, 4.0}
@@ -54,7 +65,7 @@ Plan make_plan(const FitOptions& options, const TrainingRows& all, Eigen::Index 
         plan.candidates.widths = {0.25, 0.5, 1.0};
       }
     }
-    plan.candidates.jumps = options.blend.jumps;
+    plan.candidates.jumps = options.expert.jumps;
     if (plan.candidates.jumps.empty() || logistic) {
       plan.candidates.jumps = {no_jump};
       if (has_folds && ordered) {
@@ -63,8 +74,8 @@ Plan make_plan(const FitOptions& options, const TrainingRows& all, Eigen::Index 
         plan.candidates.jumps.insert(plan.candidates.jumps.end(), {4.0, 2.0, 1.0, 0.5});
       }
     }
-    if (options.blend.estimation == Estimation::joint) {
-      plan.candidates.ridges = options.blend.ridges;
+    if (options.expert.estimation == Estimation::joint) {
+      plan.candidates.ridges = options.expert.ridges;
       if (plan.candidates.ridges.empty()) {
         plan.candidates.ridges = ordered     ? std::vector<double>{1e-6, 1e-3}
                                  : many_rows ? std::vector<double>{1e-8, 1e-6, 1e-4, 1e-2}
@@ -72,13 +83,13 @@ Plan make_plan(const FitOptions& options, const TrainingRows& all, Eigen::Index 
       }
     }
   }
-  plan.candidates.shrinkages = options.blend.shrinkages;
+  plan.candidates.shrinkages = options.expert.shrinkages;
   if (plan.candidates.shrinkages.empty()) {
     plan.candidates.shrinkages = !has_folds || is_m5 ? std::vector<double>{0.0}
                                  : ordered           ? std::vector<double>{0.1}
                                                      : std::vector<double>{0.0, 0.1, 1.0};
   }
-  const SparseChoice sparse = options.local_models.sparse;
+  const SparseChoice sparse = options.sparse;
   plan.candidates.sparse = sparse == SparseChoice::always                   ? std::vector<bool>{true}
                            : sparse == SparseChoice::automatic && has_folds ? std::vector<bool>{false, true}
                                                                             : std::vector<bool>{false};
@@ -87,7 +98,7 @@ Plan make_plan(const FitOptions& options, const TrainingRows& all, Eigen::Index 
   const bool many_leaves = !crisp_only && has_folds;
   if (growth.significance < 0.0) {
     // What prunes best-first trees is what splits gain further down, and the held-out error says how far.
-    growth.significance = many_leaves || (has_folds && growth.pruning == Pruning::weakest_link) ? 1.0 : 0.05;
+    growth.significance = many_leaves || (has_folds && options.pruning == Pruning::weakest_link) ? 1.0 : 0.05;
   }
   if (growth.min_leaf_samples == 0 && is_m5) {
     growth.min_leaf_samples = 2;  // fewer than four rows are not split (Quinlan 1992)
@@ -101,7 +112,7 @@ Plan make_plan(const FitOptions& options, const TrainingRows& all, Eigen::Index 
   if (growth.max_leaves == 0 && (many_leaves || ordered)) {
     growth.max_leaves = std::clamp<Eigen::Index>(1500 / (regressors + 1), 20, ordered ? most_ordered_leaves : 400);
   }
-  if (has_folds && growth.max_leaves == 0 && growth.pruning == Pruning::weakest_link && !is_lolimot(growth.rule)) {
+  if (has_folds && growth.max_leaves == 0 && options.pruning == Pruning::weakest_link && !is_lolimot(growth.rule)) {
     growth.max_leaves = most_pruned_leaves;
   }
   if (growth.max_leaves == 0 && is_lolimot(growth.rule)) {

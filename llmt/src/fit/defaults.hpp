@@ -2,6 +2,7 @@
 /// The options of a fit without blanks.
 #pragma once
 
+#include "growth/problem.hpp"
 #include "selection/selection.hpp"
 
 namespace llmt {
@@ -10,7 +11,9 @@ namespace llmt {
 struct Plan {
   GrowthOptions growth;
   Candidates candidates;
-  bool leaves_given = false;  ///< by GrowthOptions::max_leaves: what growth.max_leaves says is not a default
+  Pruning pruning = Pruning::last_splits;
+  bool shared_partition = false;
+  bool leaves_given = false;  ///< by FitOptions::max_leaves: growth.max_leaves is not a default
 };
 
 bool is_lolimot(GrowthRule rule);

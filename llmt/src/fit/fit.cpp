@@ -42,7 +42,6 @@ GrownPartition grow_in_order(const TrainingRows& rows, const std::vector<int>& s
                              bool stop_by_aicc, int max_threads) {
   const Table& table = *rows.table;
   GrowthProblem problem{&rows, served, plan.growth, max_threads};
-  problem.options.split_inputs = table.split_inputs;
   if (is_hilomot(problem.options.rule)) {
     const bool joint = !plan.candidates.widths.empty() && plan.candidates.estimation == Estimation::joint;
     return grow_hilomot(problem, {joint ? GateModels::joint : GateModels::local, stop_by_aicc && !plan.leaves_given});
@@ -59,7 +58,7 @@ GrownPartition grow_in_order(const TrainingRows& rows, const std::vector<int>& s
 
 GrownPartition grow_nodes(const TrainingRows& rows, const std::vector<int>& served, const Plan& plan, bool stop_by_aicc,
                           int max_threads) {
-  if (plan.growth.pruning == Pruning::last_splits) {
+  if (plan.pruning == Pruning::last_splits) {
     return grow_in_order(rows, served, plan, stop_by_aicc, max_threads);
   }
   Plan larger = plan;
@@ -131,7 +130,7 @@ PartitionSummary summarise(const Partition& partition, const TrainingRows& rows,
 FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<const Eigen::MatrixXd>& outputs,
               const FitOptions& options) {
   check_options(options, inputs.cols());
-  if (options.local_models.terms == LocalTerms::automatic) {
+  if (options.terms == LocalTerms::automatic) {
     return fit_best_terms(inputs, outputs, options);
   }
   const Table table = make_table(inputs, outputs, options);
@@ -140,16 +139,16 @@ FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<
     of_kept.weights = table.weights(kept);
     std::vector<double> groups;
     for (const Eigen::Index row : kept) {
-      if (!options.selection.folds.groups.empty()) {
-        groups.push_back(options.selection.folds.groups[row]);
+      if (!options.folds.groups.empty()) {
+        groups.push_back(options.folds.groups[row]);
       }
     }
-    of_kept.selection.folds.groups = groups;
+    of_kept.folds.groups = groups;
     return fit(inputs(kept, Eigen::all), outputs(kept, Eigen::all), of_kept);
   }
   const TrainingRows all = training_rows(table, all_rows(inputs.rows()), options.max_threads);
   std::vector<FoldRows> folds;
-  for (const Fold& fold : selection_folds(inputs.rows(), options.selection)) {
+  for (const Fold& fold : selection_folds(inputs.rows(), options.folds)) {
     TrainingRows training = training_rows(table, {fold.train.begin(), fold.train.end()}, options.max_threads);
     TrainingRows held_out = query_rows(table, {fold.held_out.begin(), fold.held_out.end()}, training);
     folds.push_back({std::move(training), std::move(held_out)});
@@ -158,7 +157,7 @@ FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<
 
   std::vector<std::vector<int>> served;
   for (int o = 0; o < outputs.cols(); ++o) {
-    if (plan.growth.shared_partition && o > 0) {
+    if (plan.shared_partition && o > 0) {
       served.front().push_back(o);
     } else {
       served.push_back({o});

@@ -47,50 +47,50 @@ std::vector<int> all_columns(Eigen::Index count) {
   return columns;
 }
 
-void check_growth(const GrowthOptions& options, Eigen::Index inputs) {
-  require(std::isfinite(options.significance), "growth.significance", options.significance, "finite");
-  require(std::isfinite(options.min_variance_gain), "growth.min_variance_gain", options.min_variance_gain, "finite");
-  require(options.min_leaf_samples >= 0, "growth.min_leaf_samples", static_cast<double>(options.min_leaf_samples),
+void check_growth(const FitOptions& options, Eigen::Index inputs) {
+  const ExpertOptions& expert = options.expert;
+  require(std::isfinite(options.significance), "significance", options.significance, "finite");
+  require(std::isfinite(expert.min_variance_gain), "expert.min_variance_gain", expert.min_variance_gain, "finite");
+  require(options.min_leaf_samples >= 0, "min_leaf_samples", static_cast<double>(options.min_leaf_samples),
           "at least 0");
-  require(options.max_leaves >= 0, "growth.max_leaves", static_cast<double>(options.max_leaves), "at least 0");
-  require(options.min_improvement >= 0.0 && options.min_improvement < 1.0, "growth.min_improvement",
-          options.min_improvement, "in [0, 1)");
-  check_columns("llmt::fit", "growth.split_inputs", options.split_inputs, inputs);
-  check_columns("llmt::fit", "growth.regression_inputs", options.regression_inputs, inputs);
+  require(options.max_leaves >= 0, "max_leaves", static_cast<double>(options.max_leaves), "at least 0");
+  require(expert.min_improvement >= 0.0 && expert.min_improvement < 1.0, "expert.min_improvement",
+          expert.min_improvement, "in [0, 1)");
+  check_columns("llmt::fit", "split_inputs", options.split_inputs, inputs);
+  check_columns("llmt::fit", "regression_inputs", options.regression_inputs, inputs);
 }
 
-void check_blend(const BlendOptions& options) {
-  for (const double width : options.widths) {
-    require(std::isfinite(width) && width > 0.0, "blend.widths", width, "finite and positive");
+void check_candidates(const ExpertOptions& expert) {
+  for (const double width : expert.widths) {
+    require(std::isfinite(width) && width > 0.0, "expert.widths", width, "finite and positive");
   }
-  for (const double ridge : options.ridges) {
-    require(ridge >= 0.0 && std::isfinite(ridge), "blend.ridges", ridge, "finite and not negative");
+  for (const double ridge : expert.ridges) {
+    require(ridge >= 0.0 && std::isfinite(ridge), "expert.ridges", ridge, "finite and not negative");
   }
-  for (const double shrinkage : options.shrinkages) {
-    require(shrinkage >= 0.0 && std::isfinite(shrinkage), "blend.shrinkages", shrinkage, "finite and not negative");
+  for (const double shrinkage : expert.shrinkages) {
+    require(shrinkage >= 0.0 && std::isfinite(shrinkage), "expert.shrinkages", shrinkage, "finite and not negative");
   }
-  for (const double jump : options.jumps) {
-    require(jump >= 0.0, "blend.jumps", jump, "not negative");
+  for (const double jump : expert.jumps) {
+    require(jump >= 0.0, "expert.jumps", jump, "not negative");
   }
 }
 
 // M5' has models of its own: dropped inputs, smoothing along the path. Estimating them anew would undo it.
 void check_m5(const FitOptions& options) {
-  if (options.blend.validity == ValidityChoice::blend || options.blend.validity == ValidityChoice::gaussian) {
+  if (options.validity == ValidityChoice::blend || options.validity == ValidityChoice::gaussian) {
     throw std::invalid_argument(
-        fmt::format("llmt::fit: blend.validity is {}, with growth.rule m5 it must be automatic or crisp",
-                    options.blend.validity == ValidityChoice::blend ? "blend" : "gaussian"));
+        fmt::format("llmt::fit: validity is {}, with rule m5 it must be auto or crisp", name_of(options.validity)));
   }
-  for (const double shrinkage : options.blend.shrinkages) {
-    require(shrinkage == 0.0, "blend.shrinkages", shrinkage, "0 with growth.rule m5, which smooths along the path");
+  for (const double shrinkage : options.expert.shrinkages) {
+    require(shrinkage == 0.0, "expert.shrinkages", shrinkage, "0 with rule m5, which smooths along the path");
   }
-  require(options.growth.min_improvement == 0.0, "growth.min_improvement", options.growth.min_improvement,
-          "0 with growth.rule m5, which prunes");
-  if (options.growth.pruning != Pruning::last_splits || options.local_models.terms != LocalTerms::linear ||
-      options.local_models.sparse != SparseChoice::never) {
+  require(options.expert.min_improvement == 0.0, "expert.min_improvement", options.expert.min_improvement,
+          "0 with rule m5, which prunes");
+  if (options.pruning != Pruning::last_splits || options.terms != LocalTerms::linear ||
+      options.sparse != SparseChoice::never) {
     throw std::invalid_argument(
-        "llmt::fit: growth.pruning, local_models.terms and local_models.sparse must be as they are by default with "
-        "growth.rule m5, which has its own local models and pruning");
+        "llmt::fit: pruning, terms and sparse must be as they are by default with rule m5, which has its own local "
+        "models and pruning");
   }
 }
 
@@ -143,33 +143,33 @@ void set_signs(const FitOptions& options, Table& table) {
 // Whether splits may be made on inputs in which the prediction is to be monotone: where gates and local models are
 // made of functions of one input each and no missing value sends a row to both sides, see docs/algorithms.md.
 bool may_order_splits(const FitOptions& options, const Eigen::Ref<const Eigen::MatrixXd>& inputs) {
-  const GrowthRule rule = options.growth.rule;
+  const GrowthRule rule = options.rule;
   return (rule == GrowthRule::rd || rule == GrowthRule::retis || rule == GrowthRule::ra) &&
-         options.blend.validity != ValidityChoice::gaussian && options.local_models.terms == LocalTerms::linear &&
-         !inputs.hasNaN();
+         options.validity != ValidityChoice::gaussian && options.terms == LocalTerms::linear && !inputs.hasNaN();
 }
 
 }  // namespace
 
 void check_options(const FitOptions& options, Eigen::Index inputs) {
-  check_growth(options.growth, inputs);
-  check_blend(options.blend);
-  require(options.local_models.sparse == SparseChoice::never || options.blend.estimation != Estimation::as_grown ||
-              (options.blend.validity == ValidityChoice::crisp && !is_lolimot(options.growth.rule)),
-          "local_models.sparse", static_cast<double>(options.local_models.sparse),
-          "never where blend.estimation is as_grown, for those models are full");
-  if ((!options.monotone.empty() || !options.slope_signs.empty()) &&
-      options.local_models.sparse != SparseChoice::never) {
-    throw std::invalid_argument("llmt::fit: monotone and slope_signs need local_models.sparse never");
+  check_growth(options, inputs);
+  check_candidates(options.expert);
+  const bool crisp = options.validity == ValidityChoice::crisp && !is_lolimot(options.rule);
+  if (options.sparse != SparseChoice::never && options.expert.estimation == Estimation::as_grown && !crisp) {
+    throw std::invalid_argument(
+        fmt::format("llmt::fit: sparse is {}, it must be never where expert.estimation is as-grown, for those models "
+                    "are full",
+                    name_of(options.sparse)));
   }
-  if (options.growth.rule == GrowthRule::m5) {
+  if ((!options.monotone.empty() || !options.slope_signs.empty()) && options.sparse != SparseChoice::never) {
+    throw std::invalid_argument("llmt::fit: monotone and slope_signs need sparse never");
+  }
+  if (options.rule == GrowthRule::m5) {
     check_m5(options);
   }
   require(options.max_threads >= 0, "max_threads", options.max_threads, "at least 0");
-  if (options.growth.rule == GrowthRule::hilomot && options.blend.validity != ValidityChoice::automatic &&
-      options.blend.validity != ValidityChoice::crisp) {
-    throw std::invalid_argument(
-        "llmt::fit: blend.validity must be automatic or crisp for growth.rule hilomot, whose gates are logistic");
+  if (options.rule == GrowthRule::hilomot && options.validity != ValidityChoice::automatic &&
+      options.validity != ValidityChoice::crisp) {
+    throw std::invalid_argument("llmt::fit: validity must be auto or crisp for rule hilomot, whose gates are logistic");
   }
 }
 
@@ -187,8 +187,8 @@ Table make_table(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::R
               outputs,
               options.weights,
               count_levels(inputs, options.categorical_inputs),
-              options.growth.regression_inputs,
-              options.growth.split_inputs};
+              options.regression_inputs,
+              options.split_inputs};
   if (table.weights.size() == 0) {
     table.weights = Eigen::VectorXd::Ones(inputs.rows());
   } else {
@@ -208,11 +208,11 @@ Table make_table(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::R
     std::sort(columns->begin(), columns->end());
   }
   set_signs(options, table);
-  if (options.local_models.terms == LocalTerms::quadratic) {
+  if (options.terms == LocalTerms::quadratic) {
     const Eigen::Index numbers = std::ssize(numeric_regression_inputs(table));
     require(numbers <= most_inputs_of_products,
-            "the number of numeric regression inputs of quadratic local models (local_models.terms)",
-            static_cast<double>(numbers), "at most 13; growth.regression_inputs chooses them");
+            "the number of numeric regression inputs of quadratic local models (terms)", static_cast<double>(numbers),
+            "at most 13; regression_inputs chooses them");
     const double largest = inputs.array().isNaN().select(0.0, inputs).cwiseAbs().maxCoeff();
     require(largest <= largest_factor, "a magnitude in inputs, with quadratic local models,", largest, "at most 1e70");
     table.products = products_of(table);
@@ -234,10 +234,9 @@ std::vector<Eigen::Index> rows_with_weight(const Table& table) {
   return result;
 }
 
-std::vector<Fold> selection_folds(Eigen::Index rows, const SelectionOptions& selection) {
-  FoldOptions options = selection.folds;
+std::vector<Fold> selection_folds(Eigen::Index rows, FoldOptions options) {
   if (options.count == 0) return {};
-  require(options.count >= 2, "selection.folds.count", options.count, "0 or at least 2");
+  require(options.count >= 2, "folds.count", options.count, "0 or at least 2");
   std::vector<double> distinct(options.groups.begin(), options.groups.end());
   std::ranges::sort(distinct);
   distinct.erase(std::unique(distinct.begin(), distinct.end()), distinct.end());

@@ -26,6 +26,6 @@ std::vector<Eigen::Index> rows_with_weight(const Table& table);
 inline constexpr Eigen::Index single_hold_out_rows = 50000;
 
 /// The folds that the choice is made on: all, the first one for many rows, or none.
-std::vector<Fold> selection_folds(Eigen::Index rows, const SelectionOptions& selection);
+std::vector<Fold> selection_folds(Eigen::Index rows, FoldOptions options);
 
 }  // namespace llmt

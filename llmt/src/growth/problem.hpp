@@ -5,9 +5,22 @@
 #include <vector>
 
 #include "data/dataset.hpp"
+#include "llmt/options.hpp"
 #include "llmt/summary.hpp"
 
 namespace llmt {
+
+/// The options of FitOptions that growth reads, without blanks.
+struct GrowthOptions {
+  GrowthRule rule = GrowthRule::rd;
+  double significance = 1.0;  ///< 1 or more: no test
+  double min_variance_gain = 0.0;
+  Eigen::Index min_leaf_samples = 0;
+  Eigen::Index max_leaves = 0;  ///< 0: no limit
+  double min_improvement = 0.0;
+  std::vector<int> split_inputs = {};
+  SplitSearch search = SplitSearch::automatic;
+};
 
 /// What a tree is grown from.
 struct GrowthProblem {

@@ -18,9 +18,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// In the order of ValidityKind.
-constexpr std::array<const char*, 4> validity_names = {"crisp", "blend", "gaussian", "logistic"};
-
 constexpr const char* format_name = "llmt-model";
 constexpr int format_version = 2;
 
@@ -205,11 +202,11 @@ Node node_from_json(const Reader& json, Eigen::Index inputs, Eigen::Index output
 
 Validity validity_from_json(const Reader& json) {
   const std::string kind = json.member("kind").as<std::string>();
-  const auto found = std::ranges::find(validity_names, kind);
-  if (found == validity_names.end()) {
+  const auto found = std::ranges::find(choices<ValidityKind>(), kind, &Choice<ValidityKind>::name);
+  if (found == choices<ValidityKind>().end()) {
     json.member("kind").fail(fmt::format("\"{}\" is not known: crisp, blend, gaussian and logistic are", kind));
   }
-  return {.kind = static_cast<ValidityKind>(found - validity_names.begin()),
+  return {.kind = found->value,
           .width = json.member("width").as<double>(),
           .smoothness = json.member("smoothness").as<int>()};
 }
@@ -253,7 +250,7 @@ std::string to_json(const Model& model) {
     json["partitions"].push_back(
         {{"outputs", partition.outputs},
          {"validity",
-          {{"kind", validity_names[static_cast<std::size_t>(partition.validity.kind)]},
+          {{"kind", name_of(partition.validity.kind)},
            {"width", partition.validity.width},
            {"smoothness", partition.validity.smoothness}}},
          {"outer_slope",

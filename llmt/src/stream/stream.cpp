@@ -10,6 +10,7 @@
 
 #include "base/checks.hpp"
 #include "fit/validate.hpp"
+#include "llmt/fit.hpp"
 #include "stream/reservoir.hpp"
 #include "stream/snapshot.hpp"
 #include "stream/tree.hpp"
@@ -299,8 +300,8 @@ Model StreamState::snapshot(ValidityChoice validity) const {
     const Eigen::Index width = inputs_ + outputs_ + 1;
     const Eigen::Map<const RowMajor> first(first_rows_.data(), std::ssize(first_rows_) / width, width);
     FitOptions one_leaf;
-    one_leaf.growth.max_leaves = 1;
-    one_leaf.selection.folds.count = 0;
+    one_leaf.max_leaves = 1;
+    one_leaf.folds.count = 0;
     one_leaf.weights = first.rightCols(1);
     return fit(first.leftCols(inputs_), first.middleCols(inputs_, outputs_), one_leaf).model;
   }

@@ -41,9 +41,9 @@ long double student(const std::vector<double>& a, const std::vector<double>& b, 
 }
 
 llmt::FitResult grow(const Eigen::MatrixXd& x, const Eigen::MatrixXd& y, llmt::FitOptions options = {}) {
-  options.growth.rule = llmt::GrowthRule::ra;
-  options.blend.validity = llmt::ValidityChoice::crisp;
-  options.selection.folds.count = 0;
+  options.rule = llmt::GrowthRule::ra;
+  options.validity = llmt::ValidityChoice::crisp;
+  options.folds.count = 0;
   return llmt::fit(x, y, options);
 }
 
@@ -170,7 +170,7 @@ TEST(ResidualAnalysis, CostOfANodeDoesNotDependOnItsRows) {
   for (const Eigen::Index rows : {1000, 10000, 40000}) {
     SCOPED_TRACE(rows);
     llmt::FitOptions options;
-    options.growth.max_leaves = 6;
+    options.max_leaves = 6;
     const Eigen::MatrixXd x = oracle::uniform(rows, 3, 5);
     const llmt::FitResult result = grow(x, oracle::curved(x, 0.1, 5), options);
     ASSERT_EQ(nodes(result).size(), 11U);
@@ -203,8 +203,8 @@ TEST(ResidualAnalysis, LargeAndSmallNodesSplitAlike) {
   Eigen::MatrixXd wider(4000, 4);
   wider << x, Eigen::VectorXd::Constant(4000, std::nan(""));
   llmt::FitOptions options;
-  options.growth.max_leaves = 8;
-  options.growth.regression_inputs = {0, 1, 2};
+  options.max_leaves = 8;
+  options.regression_inputs = {0, 1, 2};
   const llmt::FitResult large = grow(x, y, options);
   const llmt::FitResult own = grow(wider, y, options);
   ASSERT_EQ(nodes(large).size(), nodes(own).size());
@@ -221,8 +221,8 @@ TEST(ResidualAnalysis, SameBytesAtAnyNumberOfThreadsAndSameTreeInAnyOrderOfRows)
   y << oracle::curved(x, 0.1, 5), oracle::curved(x.rowwise().reverse(), 0.1, 6);
   for (const bool shared : {false, true}) {
     llmt::FitOptions options;
-    options.growth.shared_partition = shared;
-    options.growth.max_leaves = 20;
+    options.shared_partition = shared;
+    options.max_leaves = 20;
     options.max_threads = 1;
     const llmt::FitResult one = grow(x, y, options);
     options.max_threads = 4;
@@ -291,7 +291,7 @@ TEST(ResidualAnalysis, PrefixesAreNestedAndBlendsAreChosenAsForAnyRule) {
   const Eigen::MatrixXd x = oracle::uniform(600, 2, 31);
   const Eigen::MatrixXd y = oracle::curved(x, 0.05, 31);
   llmt::FitOptions options;
-  options.growth.rule = llmt::GrowthRule::ra;
+  options.rule = llmt::GrowthRule::ra;
   const llmt::FitResult result = llmt::fit(x, y, options);
   const llmt::PartitionSummary& summary = result.summary.partitions[0];
   EXPECT_EQ(summary.chosen.candidate.validity.kind, llmt::ValidityKind::blend);
