@@ -10,11 +10,11 @@
 
 namespace {
 
-using llmt::SignStatistics;
+using llmt::ResidualStatistics;
 
-SignStatistics statistics(const Eigen::VectorXd& x, const Eigen::VectorXd& residuals, const Eigen::VectorXd& weights) {
+ResidualStatistics statistics(const Eigen::VectorXd& x, const Eigen::VectorXd& residuals, const Eigen::VectorXd& weights) {
   const auto span = [](const Eigen::VectorXd& values) { return std::span(values.data(), values.size()); };
-  return llmt::sign_statistics(span(x), span(residuals), span(weights));
+  return llmt::residual_statistics(span(x), span(residuals), span(weights));
 }
 
 // Student's two-sample statistic as in a textbook, rows of weight w as w rows.
@@ -82,7 +82,7 @@ TEST(ResidualAnalysis, StatisticsAreThoseOfATextbook) {
         distance[c].push_back(static_cast<double>(std::abs(value - sum / total)));
       }
     }
-    const SignStatistics found = statistics(x, residuals, weights);
+    const ResidualStatistics found = statistics(x, residuals, weights);
     EXPECT_NEAR(found.positive_mean, mean[0], 1e-9);
     EXPECT_NEAR(found.negative_mean, mean[1], 1e-9);
     EXPECT_NEAR(found.means, static_cast<double>(student(of_class[0], of_class[1], weight[0], weight[1])), 1e-7);
@@ -96,7 +96,7 @@ TEST(ResidualAnalysis, DeviatesAreThoseOfTheSameProbability) {
   for (const double freedom : {5.0, 20.0, 100.0, 1e4}) {
     const boost::math::students_t distribution(freedom);
     for (const double t : {0.1, 1.0, 2.0, 4.0, 7.0}) {
-      const SignStatistics each{.means = 0.5 * t, .variances = -t, .freedom = freedom};
+      const ResidualStatistics each{.means = 0.5 * t, .variances = -t, .freedom = freedom};
       const double p = boost::math::cdf(boost::math::complement(distribution, t));
       const double deviate = boost::math::quantile(boost::math::complement(normal, p));
       EXPECT_NEAR(each.deviate(), deviate, 0.01 * deviate);
@@ -105,8 +105,8 @@ TEST(ResidualAnalysis, DeviatesAreThoseOfTheSameProbability) {
 }
 
 TEST(ResidualAnalysis, ComparesInputsWhereProbabilitiesUnderflow) {
-  const SignStatistics less{.means = 60.0, .variances = 0.0, .freedom = 1e6};
-  const SignStatistics more{.means = 60.1, .variances = 0.0, .freedom = 1e6};
+  const ResidualStatistics less{.means = 60.0, .variances = 0.0, .freedom = 1e6};
+  const ResidualStatistics more{.means = 60.1, .variances = 0.0, .freedom = 1e6};
   EXPECT_EQ(boost::math::cdf(boost::math::complement(boost::math::students_t(1e6), 60.0)), 0.0);
   EXPECT_LT(less.deviate(), more.deviate());
 }

@@ -1,0 +1,21 @@
+/// \file
+/// Regressors without a value (NaN): local models take them at the mean of a node's rows.
+#pragma once
+
+#include <Eigen/Core>
+
+#include "base/matrix.hpp"
+#include "data/dataset.hpp"
+
+namespace llmt {
+
+/// Deviations of the regressors from their centres in all rows, rows x regressors; NaN: missing.
+RowMajor all_deviations(const TrainingRows& rows);
+
+/// `x` (rows x regressors) with `mean` (one entry per regressor) in place of missing values.
+RowMajor imputed(const RowMajor& x, const Eigen::VectorXd& mean);
+
+/// Weighted mean of the values of a column that are not missing; 0 if all are. `weights`: one per row.
+double mean_of_present(const RowMajor& x, Eigen::Index column, const Eigen::VectorXd& weights);
+
+}  // namespace llmt
