@@ -9,7 +9,7 @@
 #include <stdexcept>
 
 #include "base/checks.hpp"
-#include "fit/validate.hpp"
+#include "data/table.hpp"
 #include "llmt/fit.hpp"
 #include "stream/reservoir.hpp"
 #include "stream/snapshot.hpp"
