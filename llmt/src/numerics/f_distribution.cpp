@@ -24,4 +24,8 @@ double f_quantile(double probability, double d1, double d2) {
   return d2 * rest / (d1 * x);
 }
 
+double chow_p_value(double gained, double added, double variance, double freedom) {
+  return f_survival(gained / added / variance, added, freedom);
+}
+
 }  // namespace llmt

@@ -10,6 +10,8 @@
 #include <cstddef>
 #include <vector>
 
+#include "numerics/tolerances.hpp"
+
 namespace llmt {
 
 /// Rows of features [1, z, r]: the constant, the regressors and the residuals of the outputs, each times the square
@@ -91,8 +93,5 @@ class ResidualSums {
   std::vector<double> weights_;
   std::vector<Slot> scratch_;
 };
-
-/// The rounding of the sums is about 1e-15 of them; what a narrow child legitimately leaves of a direction is larger.
-inline constexpr double pivot_tolerance = 1e-12;
 
 }  // namespace llmt

@@ -13,7 +13,7 @@ namespace llmt {
 ///
 /// Columns of X are centred, scaled to unit variance in the node and orthogonalised, so that neither offsets, nor
 /// scales, nor collinearity of the inputs cost digits: by a Cholesky factor of their correlation matrix, or, if that is
-/// ill-conditioned, by column-pivoted Householder QR. See docs/algorithms.md.
+/// ill-conditioned, by column-pivoted Householder QR. See docs/algorithms/numerics.md.
 struct NodeFit {
   /// Constant, regressors and residuals, times the root of the row's weight. The regressors are orthogonal columns of
   /// weighted mean square 1 that span X without its mean; the residuals are what the fit leaves.
@@ -23,9 +23,9 @@ struct NodeFit {
   Eigen::VectorXd low;            ///< smallest value of each column; its mean if there is none
   Eigen::VectorXd high;           ///< largest value
   Eigen::VectorXd centre_change;  ///< of the local models' value at `origin`, one per output
-  Eigen::MatrixXd
-      slope_change;  ///< of the local models' slopes, outputs x columns of X; of minimum norm in scaled columns
-  int rank = 1;      ///< of [1, X] over these rows, the constant included
+  /// Of the local models' slopes, outputs x columns of X; of minimum norm in scaled columns.
+  Eigen::MatrixXd slope_change;
+  int rank = 1;  ///< of [1, X] over these rows, the constant included
 
   Eigen::MatrixXd residuals() const;  ///< rows x outputs, without the root of the weight
 };
@@ -34,8 +34,5 @@ struct NodeFit {
 /// caller; NaN: missing, taken as the mean of its column). The change of value is that at deviation 0. At least one
 /// row; weights are positive.
 NodeFit fit_node(const RowMajor& x, const Eigen::MatrixXd& residuals, const Eigen::VectorXd& weights);
-
-/// Pivots below this, relative to the largest one, count as zero: columns that agree to about ten digits are collinear.
-inline constexpr double rank_tolerance = 1e-10;
 
 }  // namespace llmt

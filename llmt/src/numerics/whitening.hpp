@@ -29,10 +29,8 @@ struct Whitening {
   Eigen::Index rank = 0;
 };
 
-/// Of a covariance matrix; directions whose variance is below `covariance_tolerance` of the largest count as none.
+/// Of a covariance matrix. Directions whose variance is at most `collinearity_tolerance` times the largest count as
+/// none.
 Whitening whiten(const Eigen::MatrixXd& covariance);
-
-/// The digits that a sum of squares has.
-inline constexpr double covariance_tolerance = 1e-10;
 
 }  // namespace llmt
