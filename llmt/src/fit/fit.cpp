@@ -11,7 +11,7 @@
 
 #include "base/parallel.hpp"
 #include "data/dataset.hpp"
-#include "estimation/joint_fit.hpp"
+#include "estimation/leaf_statistics.hpp"
 #include "estimation/jumps.hpp"
 #include "estimation/tree_signs.hpp"
 #include "fit/defaults.hpp"
