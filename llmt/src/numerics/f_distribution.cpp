@@ -6,7 +6,7 @@
 namespace llmt {
 namespace {
 
-// In double throughout: long double differs between platforms. Underflow to 0 is the right answer, not an error.
+// Double throughout, because long double differs between platforms. Underflow to 0 is the right answer, not an error.
 using namespace boost::math::policies;
 using Policy = policy<promote_double<false>, underflow_error<ignore_error>, overflow_error<ignore_error>>;
 

@@ -16,13 +16,13 @@ namespace {
 // its variance. It has half the digits of a QR factorisation.
 constexpr double least_independence = 1e-6;
 
-// Columns of x that vary over the rows, and what makes them deviations of size one.
+// The columns of x that vary over the rows, and their means and sizes.
 struct Columns {
   std::vector<Eigen::Index> varying;
   Eigen::VectorXd mean;
   Eigen::VectorXd low;
   Eigen::VectorXd high;
-  Eigen::VectorXd largest;  // deviation from the mean, of the varying columns
+  Eigen::VectorXd largest;  // largest deviation from the mean, of each varying column
 };
 
 Columns describe(const RowMajor& x, const Eigen::VectorXd& weights) {
@@ -83,8 +83,8 @@ Features scaled_features(const RowMajor& x, const Columns& columns, const Eigen:
   return features;
 }
 
-// W such that the regressors times W are orthogonal with mean square 1, from the Gram matrix of scaled features; empty
-// if they are too collinear for that.
+// The matrix W with which the regressors z W are orthogonal with mean square 1, from the Gram matrix of scaled
+// features. Empty if the regressors are too collinear for that.
 Eigen::MatrixXd whitening_matrix(const GramShape& shape, const std::vector<double>& gram, double total) {
   const Eigen::Index count = shape.coefficients() - 1;
   Eigen::VectorXd scale(count);

@@ -1,5 +1,5 @@
 /// \file
-/// Least squares in one node: what the split search and the local models are built on.
+/// Least squares in one node, on which the split search and the local models are built.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,12 +11,12 @@ namespace llmt {
 
 /// Weighted least squares of residuals on [1, X] over the rows of a node.
 ///
-/// Columns of X are centred, scaled to unit variance in the node and orthogonalised, so that neither offsets, nor
-/// scales, nor collinearity of the inputs cost digits: by a Cholesky factor of their correlation matrix, or, if that is
-/// ill-conditioned, by column-pivoted Householder QR. See docs/algorithms/numerics.md.
+/// Columns of X are centred, scaled to unit variance in the node and orthogonalised, so that no digits are lost by
+/// offsets, scales or collinearity of the inputs. They are orthogonalised by a Cholesky factor of their correlation
+/// matrix or, if that is ill-conditioned, by column-pivoted Householder QR. See docs/algorithms/numerics.md.
 struct NodeFit {
   /// Constant, regressors and residuals, times the root of the row's weight. The regressors are orthogonal columns of
-  /// weighted mean square 1 that span X without its mean; the residuals are what the fit leaves.
+  /// weighted mean square 1 that span X without its mean; the residuals are those of the fit.
   Features features;
   Eigen::VectorXd rss;            ///< weighted sum of squares of each output's residuals
   Eigen::VectorXd mean;           ///< of the columns of X, over the rows that have a value

@@ -30,7 +30,8 @@ void transform(double* row, Eigen::Index rows, Eigen::Index stride, Eigen::Index
   }
 }
 
-// Columns behind the regressors have coefficient zero; what stands behind the row is finite.
+// Rows are read in whole vectors: columns behind the regressors have coefficient zero, and the numbers behind the last
+// row are finite.
 LLMT_FOR_EACH_INSTRUCTION_SET
 void subtract(double* row, Eigen::Index rows, Eigen::Index stride, Eigen::Index width, Eigen::Index residual,
               const double* coefficients, double* products, double* squares) {
