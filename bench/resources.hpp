@@ -20,14 +20,12 @@ inline double cpu_seconds() {
   return seconds(usage.ru_utime) + seconds(usage.ru_stime);
 }
 
-/// Most memory that this program has held, in bytes. From /proc where there is one: ru_maxrss remembers the program
-/// that started this one.
+/// Largest memory that this program has held, in bytes. Read from /proc where it exists, because ru_maxrss starts at
+/// the peak of the program that started this one.
 inline double peak_memory() {
   std::ifstream status("/proc/self/status");
   for (std::string line; std::getline(status, line);) {
-    if (line.starts_with("VmHWM:")) {
-      return 1024.0 * std::stod(line.substr(6));
-    }
+    if (line.starts_with("VmHWM:")) return 1024.0 * std::stod(line.substr(6));
   }
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
@@ -35,8 +33,8 @@ inline double peak_memory() {
 }
 
 struct Cost {
-  double wall = 0.0;
-  double cpu = 0.0;
+  double wall = 0.0;    ///< s
+  double cpu = 0.0;     ///< s, all threads
   double memory = 0.0;  ///< bytes by which the peak grew
 };
 

@@ -51,7 +51,7 @@ void compare_command(CompareArguments arguments) {
   CompareOptions options;
   options.folds = arguments.learning.options.selection.folds;
   Progress progress("fitting");
-  options.progress = [&](const std::string&, std::ptrdiff_t done, std::ptrdiff_t total) { progress.show(done, total); };
+  options.progress = [&](const std::string&, Eigen::Index done, Eigen::Index total) { progress.show(done, total); };
   const ComparisonResult result =
       compare(table.inputs.values, table.outputs, usual_methods(table.options, table.inputs.values.cols()), options);
   progress.clear();

@@ -20,35 +20,34 @@ namespace {
 struct ExplainArguments {
   std::string model;
   std::string data;
-  std::ptrdiff_t row = 0;  // counted from 1; 0: the whole table
+  Eigen::Index row = 0;  // counted from 1; 0: the whole table
   bool json = false;
   int threads = 0;
 };
 
-/// Inputs, the largest magnitude first; equal ones in the order of the columns.
+// Inputs, the largest magnitude first; equal ones in the order of the columns.
 std::vector<std::size_t> by_size(const Eigen::VectorXd& values) {
-  std::vector<std::size_t> order(static_cast<std::size_t>(values.size()));
+  std::vector<std::size_t> order(values.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-    return std::abs(values(static_cast<std::ptrdiff_t>(a))) > std::abs(values(static_cast<std::ptrdiff_t>(b)));
-  });
+  std::ranges::stable_sort(order,
+                           [&](std::size_t a, std::size_t b) { return std::abs(values(a)) > std::abs(values(b)); });
   return order;
 }
 
 void explain_table(const ExplainArguments& arguments, const Model& model, const Eigen::MatrixXd& inputs) {
   const Eigen::MatrixXd shares = importance(model, inputs, arguments.threads);
-  const std::ptrdiff_t used = std::min(inputs.rows(), importance_rows);
+  const Eigen::Index used = std::min(inputs.rows(), importance_rows);
   Json json = {{"model", arguments.model}, {"data", arguments.data}, {"rows", inputs.rows()}, {"rows_used", used}};
   json["targets"] = Json::array();
   if (!arguments.json) {
     print(fmt::format("{}: importance over {} of {} rows\n", arguments.data, used, inputs.rows()));
   }
-  for (std::ptrdiff_t o = 0; o < model.num_outputs(); ++o) {
-    const std::string& target = model.outputs()[static_cast<std::size_t>(o)].name;
+  for (Eigen::Index o = 0; o < model.num_outputs(); ++o) {
+    const std::string& target = model.outputs()[o].name;
     Table printed({"input", "importance"});
     Json entries = Json::array();
     for (const std::size_t j : by_size(shares.row(o))) {
-      const double share = shares(o, static_cast<std::ptrdiff_t>(j));
+      const double share = shares(o, j);
       printed.add({model.inputs()[j].name, fmt::format("{:.3f}", share)});
       entries.push_back({{"input", model.inputs()[j].name}, {"importance", share}});
     }
@@ -76,13 +75,13 @@ void explain_row(const ExplainArguments& arguments, const Model& model, const Ei
   if (!arguments.json) {
     print(fmt::format("{}: row {}\n", arguments.data, arguments.row));
   }
-  for (std::ptrdiff_t o = 0; o < model.num_outputs(); ++o) {
-    const std::string& target = model.outputs()[static_cast<std::size_t>(o)].name;
+  for (Eigen::Index o = 0; o < model.num_outputs(); ++o) {
+    const std::string& target = model.outputs()[o].name;
     Table printed({"input", "value", "contribution"});
     Json entries = Json::array();
     for (const std::size_t j : by_size(attribution.contributions.row(o))) {
-      const double value = point(static_cast<std::ptrdiff_t>(j));
-      const double contribution = attribution.contributions(o, static_cast<std::ptrdiff_t>(j));
+      const double value = point(j);
+      const double contribution = attribution.contributions(o, j);
       const InputColumn& input = model.inputs()[j];
       const bool known = !std::isnan(value);
       const std::string level = known && input.is_categorical() ? input.levels[static_cast<std::size_t>(value)] : "";

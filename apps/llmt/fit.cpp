@@ -21,14 +21,12 @@ struct FitArguments {
   bool json = false;
   bool no_intervals = false;
   bool stream = false;
-  StreamRule stream_rule = StreamRule::rd;
 };
 
 constexpr std::array<const char*, 7> rule_names = {"rd", "retis", "lolimot", "lolimot-data",
                                                    "ra", "m5",    "hilomot"};                  // as GrowthRule
 constexpr std::array<const char*, 4> validity_names = {"auto", "crisp", "blend", "gaussian"};  // as ValidityChoice
 constexpr std::array<const char*, 3> search_names = {"auto", "exact", "binned"};               // as SplitSearch
-constexpr std::array<const char*, 2> stream_rule_names = {"rd", "ra"};                         // as StreamRule
 constexpr std::array<const char*, 3> estimation_names = {"as-grown", "local", "joint"};        // as Estimation
 constexpr std::array<const char*, 3> terms_names = {"linear", "quadratic", "auto"};            // as LocalTerms
 constexpr std::array<const char*, 3> sparse_names = {"never", "auto", "always"};               // as SparseChoice
@@ -42,7 +40,7 @@ CLI::CheckedTransformer choice_of(const std::array<const char*, Count>& names) {
   return CLI::CheckedTransformer(values);
 }
 
-/// "blend, sparse, width 2, jumps from 4, ridge 0.001, shrinkage 0.1".
+// "blend, sparse, width 2, jumps from 4, ridge 0.001, shrinkage 0.1".
 std::string describe(const Candidate& candidate) {
   const char* const sparse = candidate.sparse ? ", sparse" : "";
   if (candidate.validity.kind == ValidityKind::crisp) {
@@ -70,7 +68,7 @@ Json candidate_json(const CandidateError& entry) {
           {"shrinkage", entry.candidate.shrinkage},
           {"sparse", entry.candidate.sparse},
           {"leaves", entry.candidate.leaves},
-          {"local_models", entry.candidate.local_models > 0 ? entry.candidate.local_models : entry.candidate.leaves},
+          {"local_models", entry.candidate.leaves},
           {"cv_rmse", or_null(entry.rmse)},
           {"spread", or_null(entry.spread)}};
 }
@@ -95,11 +93,11 @@ Json summary_json(const FitArguments& arguments, const FitResult& result) {
   for (const PartitionSummary& partition : result.summary.partitions) {
     Json entry;
     for (std::size_t o = 0; o < partition.outputs.size(); ++o) {
-      entry["targets"].push_back(result.model.outputs()[static_cast<std::size_t>(partition.outputs[o])].name);
-      entry["train_rmse"].push_back(partition.train_rmse(static_cast<std::ptrdiff_t>(o)));
+      entry["targets"].push_back(result.model.outputs()[partition.outputs[o]].name);
+      entry["train_rmse"].push_back(partition.train_rmse(o));
     }
     entry["leaves"] = partition.leaves;
-    entry["local_models"] = partition.local_models;
+    entry["local_models"] = partition.leaves;  // one each
     entry["grown_leaves"] = partition.grown_leaves;
     entry["coefficients"] = partition.coefficients;
     entry["rank_deficient_leaves"] = partition.rank_deficient_leaves;
@@ -128,11 +126,9 @@ Json summary_json(const FitArguments& arguments, const FitResult& result) {
   return json;
 }
 
-/// How the held-out rows came to be.
+// How the held-out rows came to be.
 std::string selection_text(const FitArguments& arguments, const PartitionSummary& partition) {
-  if (partition.cv_folds == 0) {
-    return "no held-out rows: the tree stays as grown";
-  }
+  if (partition.cv_folds == 0) return "no held-out rows: the tree stays as grown";
   if (partition.cv_folds == 1) {
     return fmt::format("chosen on {} rows held out once", partition.held_out_rows);
   }
@@ -140,7 +136,7 @@ std::string selection_text(const FitArguments& arguments, const PartitionSummary
                      arguments.learning.contiguous ? " over contiguous blocks of rows" : "");
 }
 
-/// What the local models are made of, and what spoke for it; nothing for what was not asked.
+// What the local models are made of, and what spoke for it; nothing for what was not asked.
 std::string local_models_text(const FitArguments& arguments, const FitSummary& summary) {
   const LocalModelOptions& asked = arguments.learning.options.local_models;
   std::string text;
@@ -164,7 +160,7 @@ std::string local_models_text(const FitArguments& arguments, const FitSummary& s
   return text;
 }
 
-/// How the splits of the final tree were searched; nothing if there were none to search.
+// How the splits of the final tree were searched; nothing if there were none to search.
 std::string search_text(const SearchSummary& search) {
   if (search.binned_nodes == 0) {
     return search.exact_nodes == 0 || search.evaluations == 0 ? "" : "Splits searched exactly.\n";
@@ -202,22 +198,15 @@ void print_summary(const FitArguments& arguments, const FitResult& result) {
   Table table({"target", "model", "leaves", "RMSE held-out", "+-", "RMSE in-sample"});
   for (const PartitionSummary& partition : result.summary.partitions) {
     for (std::size_t o = 0; o < partition.outputs.size(); ++o) {
-      const std::string& target = result.model.outputs()[static_cast<std::size_t>(partition.outputs[o])].name;
-      table.add({target, describe(partition.chosen.candidate),
-                 partition.local_models < partition.leaves
-                     ? fmt::format("{} in {} models", partition.leaves, partition.local_models)
-                     : fmt::format("{}", partition.leaves),
-                 number(partition.chosen.rmse), number(partition.chosen.spread, 2),
-                 number(partition.train_rmse(static_cast<std::ptrdiff_t>(o)))});
-      if (o > 0) {
-        continue;
-      }
+      const std::string& target = result.model.outputs()[partition.outputs[o]].name;
+      table.add({target, describe(partition.chosen.candidate), fmt::format("{}", partition.leaves),
+                 number(partition.chosen.rmse), number(partition.chosen.spread, 2), number(partition.train_rmse(o))});
+      if (o > 0) continue;
       const Candidate& chosen = partition.chosen.candidate;
       for (const CandidateError& other : partition.best_of_kind) {
         const Candidate& candidate = other.candidate;
         if (candidate.validity.kind != chosen.validity.kind || candidate.validity.width != chosen.validity.width ||
-            candidate.jump != chosen.jump || candidate.leaves != chosen.leaves ||
-            candidate.local_models != chosen.local_models) {
+            candidate.jump != chosen.jump || candidate.leaves != chosen.leaves) {
           table.add({"  against", describe(candidate), fmt::format("{}", candidate.leaves), number(other.rmse),
                      number(other.spread, 2), ""});
         }
@@ -248,7 +237,7 @@ void fit_command(FitArguments arguments) {
   LearningTable table = read_learning_table(arguments.learning);
   Progress progress("growing trees");
   table.options.intervals = !arguments.no_intervals && !arguments.output.empty();
-  table.options.progress = [&](std::ptrdiff_t done, std::ptrdiff_t total) { progress.show(done, total); };
+  table.options.progress = [&](Eigen::Index done, Eigen::Index total) { progress.show(done, total); };
   FitResult result = fit(table.inputs.values, table.outputs, table.options);
   progress.clear();
   result.model = result.model.named(table.names, arguments.learning.targets, table.inputs.levels);
@@ -332,23 +321,15 @@ void add_fit(CLI::App& app) {
   command->add_option("--shrinkage", blend.shrinkages, "Shrinkages to choose from: towards the parent's model, in rows")
       ->delimiter(',')
       ->option_text("FLOAT,... [0,0.1,1]");
-  command->add_option("--smoothness", blend.smoothness, "Continuous derivatives of a blend, 1 or 2")
-      ->capture_default_str();
   command->add_option("-o,--output", arguments->output, "Model file to write");
   command->add_flag("--no-intervals", arguments->no_intervals,
                     "Leave the folds' models out of the file; it is smaller and has no prediction intervals");
   command->add_flag("--json", arguments->json, "Print the summary as JSON");
   command->add_flag("--stream", arguments->stream, "Learn row by row in constant memory; DATA - is standard input");
-  command->add_option("--stream-rule", arguments->stream_rule, "How leaves of a stream find splits")
-      ->transform(choice_of<StreamRule>(stream_rule_names))
-      ->option_text("rd|ra [rd]");
   command->callback([command, arguments] {
     if (arguments->stream) {
-      stream_command(*command, {arguments->learning, arguments->stream_rule, arguments->output, arguments->json});
+      stream_command(*command, {arguments->learning, arguments->output, arguments->json});
       return;
-    }
-    if (command->count("--stream-rule") > 0) {
-      throw std::invalid_argument("--stream-rule needs --stream");
     }
     fit_command(*arguments);
   });

@@ -19,42 +19,42 @@ struct InspectArguments {
   bool json = false;
 };
 
-/// What the oblique split of a node compares, without its constant: "0.8 x1 - 0.3 x2".
+// What the oblique split of a node compares, without its constant: "0.8 x1 - 0.3 x2".
 std::string direction(const Model& model, const Node& node) {
   std::string text;
-  for (std::ptrdiff_t j = 0; j < node.direction.size(); ++j) {
+  for (Eigen::Index j = 0; j < node.direction.size(); ++j) {
     if (const double weight = node.direction(j); weight != 0.0) {
       const char* sign = weight < 0.0 ? "-" : text.empty() ? "" : "+";
       text += fmt::format("{}{}{}{} {}", text.empty() ? "" : " ", sign, text.empty() ? "" : " ",
-                          number(std::abs(weight)), model.inputs()[static_cast<std::size_t>(j)].name);
+                          number(std::abs(weight)), model.inputs()[j].name);
     }
   }
   return text;
 }
 
-/// The threshold of that.
+// The threshold of that.
 double threshold(const Model& model, const Node& node) {
   double value = node.threshold;
-  for (std::ptrdiff_t j = 0; j < node.direction.size(); ++j) {
-    value += node.direction(j) * model.inputs()[static_cast<std::size_t>(j)].centre;
+  for (Eigen::Index j = 0; j < node.direction.size(); ++j) {
+    value += node.direction(j) * model.inputs()[j].centre;
   }
   return value;
 }
 
-/// "x1 <= 3, -1 < x2 <= 4"; "everywhere" for a single leaf; "s2 > 0.5" for the side of the second split of growth.
+// "x1 <= 3, -1 < x2 <= 4"; "everywhere" for a single leaf; "s2 > 0.5" for the side of the second split of growth.
 std::string conditions(const Model& model, const Partition& partition, const Leaf& leaf) {
   std::vector<std::string> parts;
   for (const ObliqueSide& side : leaf.sides) {
-    const Node& node = partition.nodes[static_cast<std::size_t>(side.node)];
+    const Node& node = partition.nodes[side.node];
     parts.push_back(fmt::format("s{} {} {}", node.right / 2, side.left ? "<=" : ">", number(threshold(model, node))));
   }
-  for (std::ptrdiff_t j = 0; j < model.num_inputs(); ++j) {
-    const InputColumn& input = model.inputs()[static_cast<std::size_t>(j)];
+  for (Eigen::Index j = 0; j < model.num_inputs(); ++j) {
+    const InputColumn& input = model.inputs()[j];
     const std::string& name = input.name;
-    if (const std::vector<int>& levels = leaf.levels[static_cast<std::size_t>(j)]; !levels.empty()) {
+    if (const std::vector<int>& levels = leaf.levels[j]; !levels.empty()) {
       std::vector<std::string> names;
       for (const int level : levels) {
-        names.push_back(input.levels[static_cast<std::size_t>(level)]);
+        names.push_back(input.levels[level]);
       }
       parts.push_back(fmt::format("{} in {{{}}}", name, fmt::join(names, ", ")));
     }
@@ -79,29 +79,27 @@ std::string conditions(const Model& model, const Partition& partition, const Lea
   return parts.empty() ? "everywhere" : fmt::format("{}", fmt::join(parts, ", "));
 }
 
-/// "x1", "[colour = red]" for the indicator of a category, or "(x1 - 0.5)*(x2 + 3)", "(x1 - 0.5)^2" for a product.
+// "x1", "[colour = red]" for the indicator of a category, or "(x1 - 0.5)*(x2 + 3)", "(x1 - 0.5)^2" for a product.
 std::string regressor_name(const Model& model, std::size_t k) {
   const Regressor& regressor = model.regressors()[k];
-  const InputColumn& input = model.inputs()[static_cast<std::size_t>(regressor.input)];
+  const InputColumn& input = model.inputs()[regressor.input];
   if (regressor.second_input >= 0) {
     const auto factor = [](const InputColumn& of) {
       return of.centre == 0.0
                  ? of.name
                  : fmt::format("({} {} {})", of.name, of.centre < 0.0 ? "+" : "-", number(std::abs(of.centre), 6));
     };
-    const InputColumn& second = model.inputs()[static_cast<std::size_t>(regressor.second_input)];
+    const InputColumn& second = model.inputs()[regressor.second_input];
     return regressor.second_input == regressor.input ? factor(input) + "^2" : factor(input) + "*" + factor(second);
   }
-  return regressor.level < 0
-             ? input.name
-             : fmt::format("[{} = {}]", input.name, input.levels[static_cast<std::size_t>(regressor.level)]);
+  return regressor.level < 0 ? input.name : fmt::format("[{} = {}]", input.name, input.levels[regressor.level]);
 }
 
-/// "1.5 + 2 x1 - 0.3 x2".
-std::string formula(const Model& model, const Leaf& leaf, std::ptrdiff_t output) {
+// "1.5 + 2 x1 - 0.3 x2".
+std::string formula(const Model& model, const Leaf& leaf, Eigen::Index output) {
   std::string text = number(leaf.intercept(output));
   for (std::size_t k = 0; k < model.regressors().size(); ++k) {
-    const double slope = leaf.slope(output, static_cast<std::ptrdiff_t>(k));
+    const double slope = leaf.slope(output, k);
     if (slope != 0.0) {
       text += fmt::format(" {} {} {}", slope < 0.0 ? "-" : "+", number(std::abs(slope)), regressor_name(model, k));
     }
@@ -109,7 +107,7 @@ std::string formula(const Model& model, const Leaf& leaf, std::ptrdiff_t output)
   return text;
 }
 
-/// How the leaves share the input space, in words.
+// How the leaves share the input space, in words.
 std::string validity_text(const Validity& validity) {
   switch (validity.kind) {
     case ValidityKind::crisp:
@@ -129,16 +127,15 @@ std::string validity_text(const Validity& validity) {
   return "";
 }
 
-/// Where a blend jumps all the same: "x1 = 0.4, x3 = 7".
+// Where a blend jumps all the same: "x1 = 0.4, x3 = 7".
 std::string jumps_text(const Model& model, const Partition& partition) {
   std::vector<std::string> places;
   for (const Node& node : partition.nodes) {
     const bool on_number = !node.is_leaf() && !node.is_oblique() && node.level_side.empty() &&
                            node.threshold < std::numeric_limits<double>::max();
     if (partition.validity.kind == ValidityKind::blend && on_number && node.half_width == 0.0) {
-      const std::string place = fmt::format("{} = {}", model.inputs()[static_cast<std::size_t>(node.split_input)].name,
-                                            number(node.threshold));
-      if (std::find(places.begin(), places.end(), place) == places.end()) {
+      const std::string place = fmt::format("{} = {}", model.inputs()[node.split_input].name, number(node.threshold));
+      if (std::ranges::find(places, place) == places.end()) {
         places.push_back(place);
       }
     }
@@ -172,26 +169,17 @@ void print_model(const Model& model, const std::string& path) {
     inputs.add({input.name, number(input.low), number(input.high), number(input.centre)});
   }
   print(inputs.text());
-  for (std::ptrdiff_t p = 0; p < std::ssize(model.partitions()); ++p) {
-    const Partition& partition = model.partitions()[static_cast<std::size_t>(p)];
+  for (Eigen::Index p = 0; p < std::ssize(model.partitions()); ++p) {
+    const Partition& partition = model.partitions()[p];
     for (std::size_t o = 0; o < partition.outputs.size(); ++o) {
-      const std::string& name = model.outputs()[static_cast<std::size_t>(partition.outputs[o])].name;
-      const std::string sharing = partition.num_local_models() < partition.num_leaves()
-                                      ? fmt::format(" that share {} formulas", partition.num_local_models())
-                                      : "";
-      print(fmt::format("\n{}: {} leaves{}, {}\n", name, partition.num_leaves(), sharing,
-                        validity_text(partition.validity)));
+      const std::string& name = model.outputs()[partition.outputs[o]].name;
+      print(fmt::format("\n{}: {} leaves, {}\n", name, partition.num_leaves(), validity_text(partition.validity)));
       Table table({"leaf", "rows", "RMSE", "where", name + " ="});
       const std::vector<Leaf> leaves = model.leaves(p);
       for (std::size_t k = 0; k < leaves.size(); ++k) {
-        const std::ptrdiff_t output = static_cast<std::ptrdiff_t>(o);
-        const auto first = std::find_if(leaves.begin(), leaves.end(),
-                                        [&](const Leaf& other) { return other.local_model == leaves[k].local_model; });
-        const std::ptrdiff_t shown = first - leaves.begin();
+        const Eigen::Index output = static_cast<Eigen::Index>(o);
         table.add({fmt::format("{}", k + 1), fmt::format("{}", leaves[k].samples), number(leaves[k].rmse(output), 3),
-                   conditions(model, partition, leaves[k]),
-                   shown < static_cast<std::ptrdiff_t>(k) ? fmt::format("as in leaf {}", shown + 1)
-                                                          : formula(model, leaves[k], output)});
+                   conditions(model, partition, leaves[k]), formula(model, leaves[k], output)});
       }
       print(table.text());
     }
@@ -223,8 +211,8 @@ Json leaf_table(const Model& model) {
   for (std::size_t k = 0; k < model.regressors().size(); ++k) {
     json["regressors"].push_back(regressor_name(model, k));
   }
-  for (std::ptrdiff_t p = 0; p < std::ssize(model.partitions()); ++p) {
-    const Partition& partition = model.partitions()[static_cast<std::size_t>(p)];
+  for (Eigen::Index p = 0; p < std::ssize(model.partitions()); ++p) {
+    const Partition& partition = model.partitions()[p];
     constexpr std::array<const char*, 4> kinds = {"crisp", "blend", "gaussian", "logistic"};
     Json entry;
     entry["validity"] = {{"kind", kinds[static_cast<std::size_t>(partition.validity.kind)]},
@@ -247,12 +235,12 @@ Json leaf_table(const Model& model) {
         sides.push_back({{"node", side.node}, {"side", side.left ? "left" : "right"}});
       }
       Json slopes = Json::array();
-      for (std::ptrdiff_t o = 0; o < leaf.slope.rows(); ++o) {
+      for (Eigen::Index o = 0; o < leaf.slope.rows(); ++o) {
         slopes.push_back(finite_or_null(leaf.slope.row(o)));
       }
       entry["leaves"].push_back({{"rows", leaf.samples},
                                  {"rank", leaf.rank},
-                                 {"local_model", leaf.local_model},
+                                 {"local_model", entry["leaves"].size()},  // one each, counted from left to right
                                  {"low", finite_or_null(leaf.low)},
                                  {"high", finite_or_null(leaf.high)},
                                  {"levels", leaf.levels},

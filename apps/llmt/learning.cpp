@@ -8,19 +8,20 @@
 #include <utility>
 
 #include "llmt/csv.hpp"
+#include "llmt/retired_options.hpp"
 
 namespace llmt::apps {
 namespace {
 
 bool contains(const std::vector<std::string>& names, const std::string& name) {
-  return std::find(names.begin(), names.end(), name) != names.end();
+  return std::ranges::find(names, name) != names.end();
 }
 
 std::vector<int> positions(const char* option, const std::vector<std::string>& names,
                            const std::vector<std::string>& inputs) {
   std::vector<int> result;
   for (const std::string& name : names) {
-    const auto found = std::find(inputs.begin(), inputs.end(), name);
+    const auto found = std::ranges::find(inputs, name);
     if (found == inputs.end()) {
       throw std::invalid_argument(
           fmt::format("{} has \"{}\", which is not among the inputs {}", option, name, fmt::join(inputs, ", ")));
@@ -30,20 +31,17 @@ std::vector<int> positions(const char* option, const std::vector<std::string>& n
   return result;
 }
 
-/// Of each input 1, or -1 where its name has a leading minus; 0 where it is not named. Empty if none is.
+// Of each input 1, or -1 where its name has a leading minus; 0 where it is not named. Empty if none is.
 std::vector<int> signs_of(const char* option, const std::vector<std::string>& names,
                           const std::vector<std::string>& inputs) {
-  if (names.empty()) {
-    return {};
-  }
+  if (names.empty()) return {};
   std::vector<int> result(inputs.size(), 0);
   for (const std::string& name : names) {
     const bool falls = !contains(inputs, name) && name.starts_with('-');
     const int position = positions(option, {falls ? name.substr(1) : name}, inputs).front();
-    int& sign = result[static_cast<std::size_t>(position)];
+    int& sign = result[position];
     if (sign == (falls ? 1 : -1)) {
-      throw std::invalid_argument(
-          fmt::format("{} names \"{}\" with both signs", option, inputs[static_cast<std::size_t>(position)]));
+      throw std::invalid_argument(fmt::format("{} names \"{}\" with both signs", option, inputs[position]));
     }
     sign = falls ? -1 : 1;
   }
@@ -69,9 +67,7 @@ std::vector<std::string> choose_inputs(const Csv& csv, const LearningArguments& 
       throw std::invalid_argument(fmt::format("--inputs has \"{}\", which is a target, the weight or ignored", column));
     }
   }
-  if (inputs.empty()) {
-    throw std::invalid_argument("no column is left to learn from");
-  }
+  if (inputs.empty()) throw std::invalid_argument("no column is left to learn from");
   return inputs;
 }
 
@@ -95,8 +91,7 @@ LearningTable read_learning_table(const LearningArguments& arguments) {
     const int monotone = options.monotone.empty() ? 0 : options.monotone[j];
     const int sign = options.slope_signs.empty() ? 0 : options.slope_signs[j];
     const std::vector<int>& categorical = table.inputs.categorical;
-    if ((monotone != 0 || sign != 0) &&
-        std::find(categorical.begin(), categorical.end(), static_cast<int>(j)) != categorical.end()) {
+    if ((monotone != 0 || sign != 0) && std::ranges::find(categorical, static_cast<int>(j)) != categorical.end()) {
       throw std::invalid_argument(fmt::format("{} names \"{}\", which is categorical",
                                               monotone != 0 ? "--monotone" : "--slope-sign", table.names[j]));
     }
@@ -144,8 +139,6 @@ void add_learning_options(CLI::App& command, LearningArguments& arguments) {
   command.add_flag_callback(
       "--prune", [&growth] { growth.pruning = Pruning::weakest_link; },
       "Undo the splits of the weakest branches first, not the last ones, where fewer leaves predict better");
-  command.add_flag("--merge", growth.merge_leaves,
-                   "Let leaves that touch share one local model where that predicts better");
   command
       .add_option("--cv", folds.count,
                   "Folds of the held-out error by which everything is chosen, 0: keep the tree as grown")
@@ -155,6 +148,7 @@ void add_learning_options(CLI::App& command, LearningArguments& arguments) {
   command.add_option("--seed", folds.seed, "Of the random folds")->capture_default_str();
   command.add_option("--threads", arguments.options.max_threads, "0: all; the result does not depend on it")
       ->capture_default_str();
+  refuse_retired_options(command);
 }
 
 }  // namespace llmt::apps

@@ -32,28 +32,28 @@ struct Predicted {
   Eigen::MatrixXd values;
   std::vector<Extrapolation> extrapolation;
   std::optional<Bounds> bounds;
-  std::ptrdiff_t missing = 0;
-  std::ptrdiff_t unknown = 0;
-  /// RMSE of the targets that the table also holds, in the order of targets; NaN for the others.
+  Eigen::Index missing = 0;
+  Eigen::Index unknown = 0;
+  // RMSE of the targets that the table also holds, in the order of targets; NaN for the others.
   Eigen::VectorXd rmse;
 };
 
-/// Shortest text that reads back as the same number.
+// Shortest text that reads back as the same number.
 void append_number(std::string& text, double value) {
   char buffer[32];
   const std::to_chars_result end = std::to_chars(std::begin(buffer), std::end(buffer), value);
   text.append(buffer, end.ptr);
 }
 
-std::ptrdiff_t count_outside(const Predicted& predicted) {
-  return std::count_if(predicted.extrapolation.begin(), predicted.extrapolation.end(),
-                       [](const Extrapolation& row) { return row.distance > 0.0; });
+Eigen::Index count_outside(const Predicted& predicted) {
+  return std::ranges::count_if(predicted.extrapolation, [](const Extrapolation& row) { return row.distance > 0.0; });
 }
 
-/// Local models that are carried beyond their rows although every input lies in its range.
-std::ptrdiff_t count_high_leverage(const Predicted& predicted) {
-  return std::count_if(predicted.extrapolation.begin(), predicted.extrapolation.end(),
-                       [](const Extrapolation& row) { return row.distance == 0.0 && row.leverage > 1.0 + 1e-9; });
+// Local models that are carried beyond their rows although every input lies in its range.
+Eigen::Index count_high_leverage(const Predicted& predicted) {
+  return std::ranges::count_if(predicted.extrapolation, [](const Extrapolation& row) {
+    return row.distance == 0.0 && row.leverage > 1.0 + 1e-9;
+  });
 }
 
 Predicted predict_table(const PredictArguments& arguments, const Model& model, const Csv& csv) {
@@ -81,7 +81,7 @@ Predicted predict_table(const PredictArguments& arguments, const Model& model, c
   predicted.rmse = Eigen::VectorXd::Constant(model.num_outputs(), std::nan(""));
   for (std::size_t o = 0; o < predicted.targets.size(); ++o) {
     if (csv.has(predicted.targets[o]) && csv.rows() > 0) {
-      const std::ptrdiff_t column = static_cast<std::ptrdiff_t>(o);
+      const Eigen::Index column = static_cast<Eigen::Index>(o);
       try {
         predicted.rmse(column) =
             rmse(predicted.values.col(column), csv.numbers(predicted.targets[o], arguments.threads))(0);
@@ -93,7 +93,7 @@ Predicted predict_table(const PredictArguments& arguments, const Model& model, c
   return predicted;
 }
 
-/// The table as it came, with columns added; piece by piece, because the table is in memory already.
+// The table as it came, with columns added; piece by piece, because the table is in memory already.
 void write_csv(const Csv& csv, const Predicted& predicted, const TextSink& sink) {
   std::vector<std::string> added;
   for (const std::string& target : predicted.targets) {
@@ -112,9 +112,9 @@ void write_csv(const Csv& csv, const Predicted& predicted, const TextSink& sink)
     text += csv.separator() + csv_field(column, csv.separator());
   }
   text += '\n';
-  for (std::ptrdiff_t row = 0; row < csv.rows(); ++row) {
+  for (Eigen::Index row = 0; row < csv.rows(); ++row) {
     text += csv.row_text(row);
-    for (std::ptrdiff_t o = 0; o < predicted.values.cols(); ++o) {
+    for (Eigen::Index o = 0; o < predicted.values.cols(); ++o) {
       text += csv.separator();
       append_number(text, predicted.values(row, o));
       if (predicted.bounds) {
@@ -124,7 +124,7 @@ void write_csv(const Csv& csv, const Predicted& predicted, const TextSink& sink)
         append_number(text, predicted.bounds->upper(row, o));
       }
     }
-    const Extrapolation& extrapolation = predicted.extrapolation[static_cast<std::size_t>(row)];
+    const Extrapolation& extrapolation = predicted.extrapolation[row];
     text += csv.separator();
     text += extrapolation.distance > 0.0 ? '1' : '0';
     text += csv.separator();
@@ -148,7 +148,7 @@ Json summary_json(const Predicted& predicted, bool with_values) {
   json["unknown_categories"] = predicted.unknown;
   json["targets"] = Json::array();
   for (std::size_t o = 0; o < predicted.targets.size(); ++o) {
-    const std::ptrdiff_t column = static_cast<std::ptrdiff_t>(o);
+    const Eigen::Index column = static_cast<Eigen::Index>(o);
     Json target = {{"name", predicted.targets[o]},
                    {"rmse", std::isnan(predicted.rmse(column)) ? Json(nullptr) : Json(predicted.rmse(column))}};
     if (with_values) {
@@ -175,10 +175,10 @@ Json summary_json(const Predicted& predicted, bool with_values) {
 }
 
 void summarise(const PredictArguments& arguments, const Predicted& predicted) {
-  const std::ptrdiff_t outside = count_outside(predicted);
+  const Eigen::Index outside = count_outside(predicted);
   std::string text = fmt::format("{}: {} rows predicted", arguments.data, predicted.values.rows());
   for (std::size_t o = 0; o < predicted.targets.size(); ++o) {
-    const double error = predicted.rmse(static_cast<std::ptrdiff_t>(o));
+    const double error = predicted.rmse(o);
     text += std::isnan(error) ? "" : fmt::format("; RMSE of {} {}", predicted.targets[o], number(error));
   }
   if (outside > 0) {
@@ -189,7 +189,7 @@ void summarise(const PredictArguments& arguments, const Predicted& predicted) {
     text += fmt::format("; {} rows lie outside the training extent, by up to {} of an input's range", outside,
                         number(farthest, 2));
   }
-  if (const std::ptrdiff_t rows = count_high_leverage(predicted); rows > 0) {
+  if (const Eigen::Index rows = count_high_leverage(predicted); rows > 0) {
     text +=
         fmt::format("; {} rows inside it combine inputs as no training row near them does (leverage above 1)", rows);
   }

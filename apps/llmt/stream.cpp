@@ -19,7 +19,7 @@
 namespace llmt::apps {
 namespace {
 
-/// What was learned, and from what.
+// What was learned, and from what.
 struct Learned {
   std::string name;
   std::vector<std::string> inputs;
@@ -27,12 +27,12 @@ struct Learned {
 };
 
 void refuse_other_options(const CLI::App& command) {
-  constexpr std::array<std::string_view, 14> taken = {"data",      "target",       "inputs", "ignore",   "weight",
-                                                      "min-leaf",  "max-leaves",   "stream", "validity", "stream-rule",
-                                                      "shrinkage", "significance", "output", "json"};
+  constexpr std::array<std::string_view, 13> taken = {"data",         "target",     "inputs", "ignore",   "weight",
+                                                      "min-leaf",     "max-leaves", "stream", "validity", "shrinkage",
+                                                      "significance", "output",     "json"};
   for (const CLI::Option* option : command.get_options()) {
     const std::string name = option->get_single_name();
-    if (option->count() > 0 && std::find(taken.begin(), taken.end(), name) == taken.end()) {
+    if (option->count() > 0 && std::ranges::find(taken, name) == taken.end()) {
       throw std::invalid_argument(fmt::format("--{} is not for --stream", name));
     }
   }
@@ -40,8 +40,7 @@ void refuse_other_options(const CLI::App& command) {
 
 StreamOptions options_of(const CLI::App& command, const StreamArguments& arguments) {
   const FitOptions& fit = arguments.learning.options;
-  StreamOptions options{
-      .rule = arguments.rule, .min_leaf_samples = fit.growth.min_leaf_samples, .max_leaves = fit.growth.max_leaves};
+  StreamOptions options{.min_leaf_samples = fit.growth.min_leaf_samples, .max_leaves = fit.growth.max_leaves};
   if (command.count("--significance") > 0) {
     options.significance = fit.growth.significance;
   }
@@ -54,7 +53,7 @@ StreamOptions options_of(const CLI::App& command, const StreamArguments& argumen
   return options;
 }
 
-/// Rows so far and the running errors, on one line that is rewritten, where stderr is a terminal.
+// Rows so far and the running errors, on one line that is rewritten, where stderr is a terminal.
 void show_progress(const Stream& stream) {
   if (::isatty(STDERR_FILENO) != 0) {
     fmt::print(stderr, "\r\033[K{} rows, RMSE before learning {:.5g}, of the last 1000 {:.5g}", stream.counts().rows,
@@ -73,7 +72,7 @@ void add(const Csv& piece, const StreamArguments& arguments, Learned& learned) {
   const LearningArguments& learning = arguments.learning;
   const Eigen::MatrixXd targets = piece.numbers(learning.targets, 1);
   const Eigen::VectorXd weights = learning.weight.empty() ? Eigen::VectorXd() : piece.numbers(learning.weight, 1);
-  for (std::ptrdiff_t row = 0; row < weights.size(); ++row) {
+  for (Eigen::Index row = 0; row < weights.size(); ++row) {
     if (weights(row) < 0.0) {
       throw std::runtime_error(fmt::format("{}:{}: column \"{}\": a weight must not be negative, it is {}",
                                            learned.name, piece.line_of(row), learning.weight, weights(row)));
@@ -97,9 +96,7 @@ Learned learn(const CLI::App& command, const StreamArguments& arguments) {
   std::ifstream file;
   if (!standard_input) {
     file.open(learning.data, std::ios::binary);
-    if (!file) {
-      throw std::runtime_error(fmt::format("{}: cannot be read", learned.name));
-    }
+    if (!file) throw std::runtime_error(fmt::format("{}: cannot be read", learned.name));
   } else {
     std::ios::sync_with_stdio(false);
   }
@@ -127,7 +124,7 @@ Json summary_json(const StreamArguments& arguments, const Learned& learned, cons
   Json json = {{"data", learned.name},
                {"rows", counts.rows},
                {"missing_values", counts.missing_values},
-               {"rule", arguments.rule == StreamRule::rd ? "rd" : "ra"},
+               {"rule", "rd"},
                {"inputs", learned.inputs},
                {"held_out", counts.held_out},
                {"grown_leaves", counts.leaves},
@@ -140,8 +137,8 @@ Json summary_json(const StreamArguments& arguments, const Learned& learned, cons
   const Eigen::VectorXd all = learned.stream->prequential_rmse();
   const Eigen::VectorXd recent = learned.stream->recent_rmse();
   for (const Partition& partition : model.partitions()) {
-    const std::ptrdiff_t output = partition.outputs.front();
-    json["partitions"].push_back({{"targets", {arguments.learning.targets[static_cast<std::size_t>(output)]}},
+    const Eigen::Index output = partition.outputs.front();
+    json["partitions"].push_back({{"targets", {arguments.learning.targets[output]}},
                                   {"validity", partition.validity.kind == ValidityKind::crisp ? "crisp" : "blend"},
                                   {"width", partition.validity.width},
                                   {"leaves", partition.num_leaves()},
@@ -160,16 +157,16 @@ void print_summary(const StreamArguments& arguments, const Learned& learned, con
     print(fmt::format("Missing values in the inputs: {}\n", counts.missing_values));
   }
   print(
-      fmt::format("Learned row by row, rule {}: {} splits, {} taken back, {} alarms for changes, {} branches replaced; "
+      fmt::format("Learned row by row, rule rd: {} splits, {} taken back, {} alarms for changes, {} branches replaced; "
                   "{} MiB\n\n",
-                  arguments.rule == StreamRule::rd ? "rd" : "ra", counts.splits, counts.prunes, counts.drifts,
-                  counts.replacements, number(static_cast<double>(counts.bytes) / 1048576.0, 3)));
+                  counts.splits, counts.prunes, counts.drifts, counts.replacements,
+                  number(static_cast<double>(counts.bytes) / 1048576.0, 3)));
   Table table({"target", "model", "leaves", "RMSE before learning", "of the last 1000"});
   const Eigen::VectorXd all = learned.stream->prequential_rmse();
   const Eigen::VectorXd recent = learned.stream->recent_rmse();
   for (const Partition& partition : model.partitions()) {
-    const std::ptrdiff_t output = partition.outputs.front();
-    table.add({arguments.learning.targets[static_cast<std::size_t>(output)],
+    const Eigen::Index output = partition.outputs.front();
+    table.add({arguments.learning.targets[output],
                partition.validity.kind == ValidityKind::crisp
                    ? "crisp"
                    : fmt::format("blend, width {}", number(partition.validity.width, 3)),

@@ -12,7 +12,6 @@ namespace llmt::apps {
 
 struct StreamArguments {
   LearningArguments learning;
-  StreamRule rule = StreamRule::rd;
   std::string output;
   bool json = false;
 };

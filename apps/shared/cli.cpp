@@ -11,9 +11,9 @@
 namespace llmt::apps {
 namespace {
 
-/// Columns on a terminal: bytes of UTF-8 that begin a character.
+// Columns on a terminal: bytes of UTF-8 that begin a character.
 std::size_t width(const std::string& text) {
-  return static_cast<std::size_t>(std::count_if(text.begin(), text.end(), [](char c) { return (c & 0xC0) != 0x80; }));
+  return std::ranges::count_if(text, [](char c) { return (c & 0xC0) != 0x80; });
 }
 
 bool looks_like_number(const std::string& text) {
@@ -64,13 +64,9 @@ std::string Table::text() const {
 }
 
 std::string number(double value, int digits) {
-  if (std::isnan(value)) {
-    return "-";
-  }
+  if (std::isnan(value)) return "-";
   const double magnitude = std::abs(value);
-  if (magnitude == 0.0) {
-    return "0";
-  }
+  if (magnitude == 0.0) return "0";
   if (magnitude < 1e-4 || magnitude >= 1e7 || !std::isfinite(value)) {
     return fmt::format("{:.{}g}", value, digits);
   }
@@ -88,14 +84,11 @@ void print_json(const Json& json) { print(json.dump(2) + "\n"); }
 
 void warn(const std::string& text) { fmt::print(stderr, "{}\n", text); }
 
-void Progress::show(std::ptrdiff_t done, std::ptrdiff_t total) {
-  if (::isatty(STDERR_FILENO) == 0) {
-    return;
-  }
-  constexpr std::ptrdiff_t bar = 30;
-  const std::ptrdiff_t filled = total > 0 ? bar * done / total : bar;
-  fmt::print(stderr, "\r{} [{}{}] {}/{}", what_, std::string(static_cast<std::size_t>(filled), '#'),
-             std::string(static_cast<std::size_t>(bar - filled), '.'), done, total);
+void Progress::show(Eigen::Index done, Eigen::Index total) {
+  if (::isatty(STDERR_FILENO) == 0) return;
+  constexpr Eigen::Index bar = 30;
+  const Eigen::Index filled = total > 0 ? bar * done / total : bar;
+  fmt::print(stderr, "\r{} [{}{}] {}/{}", what_, std::string(filled, '#'), std::string(bar - filled, '.'), done, total);
   std::fflush(stderr);
   shown_ = true;
 }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <Eigen/Core>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <string_view>
@@ -50,7 +51,7 @@ class Progress {
   ~Progress() { clear(); }
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
-  void show(std::ptrdiff_t done, std::ptrdiff_t total);
+  void show(Eigen::Index done, Eigen::Index total);
   void clear();
 
  private:

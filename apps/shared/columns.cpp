@@ -14,15 +14,15 @@ namespace {
 
 constexpr double missing = std::numeric_limits<double>::quiet_NaN();
 
-/// Names and their numbers, looked up without a copy.
-using Numbering = std::map<std::string, std::ptrdiff_t, std::less<>>;
+// Names and their numbers, looked up without a copy.
+using Numbering = std::map<std::string, Eigen::Index, std::less<>>;
 
-/// Writes the categories of a column into `values`; returns their sorted names.
+// Writes the categories of a column into `values`; returns their sorted names.
 std::vector<std::string> take_levels(const Numbering& in_order_of_appearance, Eigen::Ref<Eigen::VectorXd> values) {
   std::vector<std::string> levels;
   std::vector<double> positions(in_order_of_appearance.size());
   for (const auto& [name, appearance] : in_order_of_appearance) {
-    positions[static_cast<std::size_t>(appearance)] = static_cast<double>(levels.size());
+    positions[appearance] = static_cast<double>(levels.size());
     levels.push_back(name);
   }
   for (double& value : values) {
@@ -34,14 +34,14 @@ std::vector<std::string> take_levels(const Numbering& in_order_of_appearance, Ei
   return levels;
 }
 
-/// Replaces the listed columns of `inputs` by categories.
+// Replaces the listed columns of `inputs` by categories.
 void read_categories(const Csv& csv, const std::vector<std::string>& names, InputColumns& inputs) {
   std::vector<std::string> wanted;
   for (const int column : inputs.categorical) {
-    wanted.push_back(names[static_cast<std::size_t>(column)]);
+    wanted.push_back(names[column]);
   }
   std::vector<Numbering> seen(wanted.size());
-  csv.visit_texts(wanted, [&](std::ptrdiff_t row, std::size_t i, std::string_view text) {
+  csv.visit_texts(wanted, [&](Eigen::Index row, std::size_t i, std::string_view text) {
     double& value = inputs.values(row, inputs.categorical[i]);
     if (text.empty()) {
       value = missing;
@@ -55,12 +55,12 @@ void read_categories(const Csv& csv, const std::vector<std::string>& names, Inpu
   });
   for (std::size_t i = 0; i < wanted.size(); ++i) {
     const int column = inputs.categorical[i];
-    inputs.levels[static_cast<std::size_t>(column)] = take_levels(seen[i], inputs.values.col(column));
+    inputs.levels[column] = take_levels(seen[i], inputs.values.col(column));
   }
 }
 
 bool contains(const std::vector<std::string>& names, const std::string& name) {
-  return std::find(names.begin(), names.end(), name) != names.end();
+  return std::ranges::find(names, name) != names.end();
 }
 
 }  // namespace
@@ -82,7 +82,7 @@ LearningColumns read_learning_columns(const Csv& csv, const ColumnRoles& roles, 
   auto [values, cells] = csv.read_numbers(columns, max_threads);
 
   LearningColumns result;
-  std::vector<std::ptrdiff_t> bad(columns.size(), ColumnCells::no_row);
+  std::vector<Eigen::Index> bad(columns.size(), ColumnCells::no_row);
   for (std::size_t i = 0; i < columns.size(); ++i) {
     const bool is_input = i < num_inputs;
     const bool only_words = cells[i].other > 0 && cells[i].other + cells[i].missing == csv.rows();
@@ -93,7 +93,7 @@ LearningColumns read_learning_columns(const Csv& csv, const ColumnRoles& roles, 
     }
   }
   const std::span<const std::string> names(columns);
-  const std::span<const std::ptrdiff_t> bad_rows(bad);
+  const std::span<const Eigen::Index> bad_rows(bad);
   csv.refuse_first(names.subspan(num_inputs), bad_rows.subspan(num_inputs));
   try {
     csv.refuse_first(names.first(num_inputs), bad_rows.first(num_inputs));
@@ -115,7 +115,7 @@ LearningColumns read_learning_columns(const Csv& csv, const ColumnRoles& roles, 
 ModelInputs read_inputs(const Csv& csv, const Model& model, int max_threads) {
   std::vector<std::string> columns;
   std::vector<std::string> categorical;
-  std::vector<std::ptrdiff_t> column_of;  // per categorical column
+  std::vector<Eigen::Index> column_of;  // per categorical column
   std::vector<Numbering> levels;
   for (const InputColumn& input : model.inputs()) {
     if (input.is_categorical()) {
@@ -123,21 +123,21 @@ ModelInputs read_inputs(const Csv& csv, const Model& model, int max_threads) {
       categorical.push_back(input.name);
       Numbering& numbering = levels.emplace_back();
       for (std::size_t k = 0; k < input.levels.size(); ++k) {
-        numbering.emplace(input.levels[k], static_cast<std::ptrdiff_t>(k));
+        numbering.emplace(input.levels[k], k);
       }
     }
     columns.push_back(input.name);
   }
   auto [values, cells] = csv.read_numbers(columns, max_threads);
   ModelInputs inputs{std::move(values)};
-  std::vector<std::ptrdiff_t> bad;
+  std::vector<Eigen::Index> bad;
   for (std::size_t i = 0; i < columns.size(); ++i) {
     const bool is_number = !model.inputs()[i].is_categorical();
     bad.push_back(is_number ? cells[i].first_other : ColumnCells::no_row);
     inputs.missing += cells[i].missing;  // no category is a text that says that there is none
   }
   csv.refuse_first(columns, bad);
-  csv.visit_texts(categorical, [&](std::ptrdiff_t row, std::size_t i, std::string_view text) {
+  csv.visit_texts(categorical, [&](Eigen::Index row, std::size_t i, std::string_view text) {
     const auto found = levels[i].find(text);
     inputs.values(row, column_of[i]) = found == levels[i].end() ? missing : static_cast<double>(found->second);
     inputs.unknown += !text.empty() && found == levels[i].end() ? 1 : 0;

@@ -2,7 +2,7 @@
 """llmt beside the regressors that a Debian machine can install, in one run, on the same data, under the same limits.
 
 On the benchmarks' synthetic function (error: RMSE to the noise-free truth on 100000 fresh rows; noise of the data: 1), or
-with --sets FOLDER on every NAME.csv with a NAME.splits.csv (format: regression_sets.cpp; error: mean test RMSE).
+with --sets FOLDER on every NAME.csv with a NAME.splits.csv (format: bench/data_sets.hpp; error: mean test RMSE).
 
 Every fit is a process of its own, `RUNNER METHOD TRAIN TEST COLUMNS THREADS`, that reads two files of doubles (column
 after column, the output last) and prints one line of JSON: fit_wall and fit_cpu, the seconds from data in memory to a
@@ -10,10 +10,7 @@ model; predict_wall and predict_cpu, seconds per million rows; memory, the bytes
 rmse; leaves (for earth terms). Exit 77: not installed.
 """
 import argparse
-import array
 import collections
-import csv
-import glob
 import json
 import math
 import os
@@ -35,7 +32,7 @@ PACKAGES = {
 
 def arguments():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--bin", default=os.path.join(ROOT, "build/release/bin"), help="where llmt's benchmarks are")
+    parser.add_argument("--bin", default=os.path.join(ROOT, "build/bench/bin"), help="where llmt's benchmarks are")
     parser.add_argument("--methods", default=",".join(PACKAGES), help="comma-separated; default: %(default)s")
     parser.add_argument("--rows", default="1e4,1e5", help="numbers of training rows; default: %(default)s")
     parser.add_argument("--inputs", type=int, default=10)
@@ -56,9 +53,14 @@ class Bench:
         self.left_out = {}  # method -> why
         self.records = []
 
+    def rivals(self, *arguments):
+        """What bench/rivals/rivals.cpp prints."""
+        command = [os.path.join(self.options.bin, "rivals"), *map(str, arguments)]
+        return subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout
+
     def command(self, method):
         if method.startswith("llmt"):
-            return [os.path.join(self.options.bin, "rival_llmt")]
+            return [os.path.join(self.options.bin, "rivals"), "fit"]
         if method == "M5P":
             classes = os.path.join(self.folder, "java")
             if not os.path.isdir(classes):
@@ -145,40 +147,26 @@ def synthetic(bench):
         rows = int(float(rows))
 
         def sample(seed):
-            subprocess.run([os.path.join(options.bin, "rival_write_sample"), str(rows), str(options.inputs), str(seed),
-                            bench.train, bench.test], check=True)
+            bench.rivals("sample", rows, options.inputs, seed, bench.train, bench.test)
             return options.inputs + 1
 
         bench.run_all(f"synthetic function, {rows} rows x {options.inputs} inputs, {options.threads} thread(s)",
                       [lambda seed=seed: sample(seed) for seed in range(1, options.seeds + 1)])
 
 
-def write(path, columns):
-    with open(path, "wb") as file:
-        for column in columns:
-            array.array("d", column).tofile(file)
-
-
-def read(path):
-    with open(path, newline="") as file:
-        return [tuple(map(float, row)) for row in list(csv.reader(file))[1:]]
-
-
 def sets(bench):
     folder = bench.options.sets
-    names = bench.options.names.split(",") if bench.options.names else sorted(
-        os.path.basename(path)[:-len(".splits.csv")] for path in glob.glob(os.path.join(folder, "*.splits.csv")))
+    names = bench.options.names.split(",") if bench.options.names else []
     ratios = collections.defaultdict(list)
-    for name in names:
-        rows, splits = read(os.path.join(folder, name + ".csv")), read(os.path.join(folder, name + ".splits.csv"))
+    for line in bench.rivals("sets", folder, *names).splitlines():
+        name, rows, columns, splits = line.split("\t")
 
         def sample(split):
-            for path, test in ((bench.train, False), (bench.test, True)):
-                write(path, zip(*(row for row, part in zip(rows, splits) if (part[split] > 0.5) == test)))
-            return len(rows[0])
+            bench.rivals("split", folder, name, split, bench.train, bench.test)
+            return int(columns)
 
-        data = f"{name}, {len(rows)} rows x {len(rows[0]) - 1} inputs, {bench.options.threads} thread(s)"
-        summary = bench.run_all(data, [lambda split=split: sample(split) for split in range(len(splits[0]))])
+        data = f"{name}, {rows} rows x {int(columns) - 1} inputs, {bench.options.threads} thread(s)"
+        summary = bench.run_all(data, [lambda split=split: sample(split) for split in range(int(splits))])
         # A method that was too slow gets another chance with the next data set.
         bench.left_out = {method: why for method, why in bench.left_out.items() if why == "not installed"}
         for method, row in summary.items():
@@ -201,8 +189,8 @@ def machine():
 
 def main():
     options = arguments()
-    if not os.access(os.path.join(options.bin, "rival_llmt"), os.X_OK):
-        sys.exit(f"run.py: no rival_llmt in {options.bin}; build the benchmarks, or say where with --bin")
+    if not os.access(os.path.join(options.bin, "rivals"), os.X_OK):
+        sys.exit(f"run.py: no program rivals in {options.bin}; build the preset bench, or say where with --bin")
     if unknown := set(options.methods.split(",")) - set(PACKAGES):
         sys.exit(f"run.py: no method {', '.join(sorted(unknown))}; there are {', '.join(PACKAGES)}")
     with tempfile.TemporaryDirectory() as folder:

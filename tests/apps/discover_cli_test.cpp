@@ -22,7 +22,7 @@ struct Row {
   double b;
 };
 
-/// Writes s.csv and m.csv: y = 3 + 2 a - 4 b simulated, `hidden` and normal noise of 0.05 in what was measured.
+// Writes s.csv and m.csv: y = 3 + 2 a - 4 b simulated, `hidden` and normal noise of 0.05 in what was measured.
 void write_tables(const Folder& folder, int rows, const std::function<double(const Row&)>& hidden,
                   std::uint64_t seed = 1) {
   llmt::Random random(seed);
@@ -150,15 +150,15 @@ TEST(LlmtDiscover, TheSimulationMayAdjustItself) {
 TEST(LlmtDiscover, TheOrderOfMeasurementIsAnInput) {
   const Folder folder;
   llmt::Random random(5);
-  const std::vector<std::ptrdiff_t> order = random.permutation(160);
+  const std::vector<Eigen::Index> order = random.permutation(160);
   std::string simulated = "x,y\n";
   std::string measured = "x,when,y\n";
   std::vector<double> x(160);
   for (double& value : x) value = random.uniform(-1.0, 1.0);
   std::vector<std::size_t> row_at(160);
-  for (std::size_t i = 0; i < 160; ++i) row_at[static_cast<std::size_t>(order[i])] = i;
+  for (std::size_t i = 0; i < 160; ++i) row_at[order[i]] = i;
   for (std::size_t i = 0; i < 160; ++i) {
-    const auto when = static_cast<std::size_t>(order[i]);
+    const auto when = order[i];
     const double before = when > 0 ? x[row_at[when - 1]] : x[i];
     simulated += fmt::format("{},{}\n", x[i], x[i]);
     measured += fmt::format("{},{},{}\n", x[i], when, x[i] + (x[i] > before ? 0.2 : -0.2) + 0.02 * random.normal());
@@ -223,7 +223,7 @@ TEST(LlmtDiscover, OddDataHaveASaneVerdict) {
   EXPECT_EQ(report["not_testable"].back()["why"], "the input is constant");
 }
 
-/// What stands between ```language and ``` for the k-th time.
+// What stands between ```language and ``` for the k-th time.
 std::string block(const std::string& page, const std::string& language, int k) {
   std::size_t begin = 0;
   for (; k > 0; --k) begin = page.find("```" + language + "\n", begin) + language.size() + 4;

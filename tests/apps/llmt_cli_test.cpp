@@ -17,7 +17,7 @@ using program::Outcome;
 
 const std::string llmt_program = LLMT_PROGRAM;
 
-/// 300 rows: y has a kink in `a`, z is affine, `label` is words.
+// 300 rows: y has a kink in `a`, z is affine, `label` is words.
 std::string table() {
   llmt::Random random(1);
   std::string text = "label,a,b,y,z\n";
@@ -29,7 +29,7 @@ std::string table() {
   return text;
 }
 
-/// `rows` rows: y = |a| + b / 2 + normal noise of 0.05.
+// `rows` rows: y = |a| + b / 2 + normal noise of 0.05.
 std::string kinked(int rows, int seed) {
   llmt::Random random(seed);
   std::string text = "a,b,y\n";
@@ -41,13 +41,13 @@ std::string kinked(int rows, int seed) {
   return text;
 }
 
-/// 240 rows: y = x, but 3 - x for blue; every 20th colour and every 12th x is missing.
+// 240 rows: y = x, but 3 - x for blue; every 20th colour and every 12th x is missing.
 std::string coloured() {
   llmt::Random random(3);
   const std::vector<std::string> colours = {"red", "green", "blue"};
   std::string text = "colour,x,y\n";
   for (int i = 0; i < 240; ++i) {
-    const std::string& colour = colours[static_cast<std::size_t>(i % 3)];
+    const std::string& colour = colours[i % 3];
     const double x = random.uniform(-1.0, 1.0);
     const double y = (colour == "blue" ? 3.0 - x : x) + 0.05 * random.normal();
     text += fmt::format("{},{},{}\n", i % 20 == 7 ? "" : colour, i % 12 == 5 ? "NA" : fmt::format("{}", x), y);
@@ -55,7 +55,7 @@ std::string coloured() {
   return text;
 }
 
-/// 200 rows: y = (a - b)^2 + c with normal noise of 0.05.
+// 200 rows: y = (a - b)^2 + c with normal noise of 0.05.
 std::string bent() {
   llmt::Random random(4);
   std::string text = "a,b,c,y\n";
@@ -139,34 +139,22 @@ TEST(LlmtProgram, FitPredictInspectAgreeWithTheLibrary) {
   EXPECT_NE(folder.run(llmt_program + " inspect m.json").out.find("everywhere"), std::string::npos);
 }
 
-TEST(LlmtProgram, MergedLeavesShareAFormula) {
-  // One model where both inputs are positive, another elsewhere: three boxes.
-  llmt::Random random(3);
-  std::string text = "a,b,y\n";
-  for (int i = 0; i < 400; ++i) {
-    const double a = random.uniform(-1.0, 1.0);
-    const double b = random.uniform(-1.0, 1.0);
-    text += fmt::format("{},{},{}\n", a, b, (a > 0.0 && b > 0.0 ? 2.0 - a : a + 0.5 * b) + 0.1 * random.normal());
-  }
+TEST(LlmtProgram, RetiredOptionsSayWhyAndWhatToUse) {
   const Folder folder;
-  folder.write("d.csv", text);
-  const std::string fit = llmt_program + " fit d.csv -t y --validity crisp --prune --merge";
-  const Outcome fitted = folder.run(fit + " -o m.json --json");
-  ASSERT_EQ(fitted.exit_code, 0) << fitted.err;
-  const json summary = json::parse(fitted.out)["partitions"][0];
-  const int leaves = summary["leaves"];
-  const int local_models = summary["local_models"];
-  EXPECT_GE(leaves, 3);
-  EXPECT_LT(local_models, leaves);
-  EXPECT_EQ(summary["chosen"]["local_models"], local_models);
-  const std::string inspected = folder.run(llmt_program + " inspect m.json").out;
-  EXPECT_NE(inspected.find(fmt::format("{} leaves that share {} formulas", leaves, local_models)), std::string::npos)
-      << inspected;
-  EXPECT_NE(inspected.find("as in leaf 1"), std::string::npos) << inspected;
-  EXPECT_EQ(folder.run(llmt_program + " predict m.json d.csv --interval 0.9").exit_code, 0);
-  const Outcome without_folds = folder.run(fit + " --cv 0");
-  EXPECT_EQ(without_folds.exit_code, 2);
-  EXPECT_NE(without_folds.err.find("growth.merge_leaves"), std::string::npos);
+  folder.write("d.csv", table());
+  const auto refusal = [&](const std::string& arguments) {
+    const Outcome outcome = folder.run(llmt_program + " " + arguments);
+    EXPECT_EQ(outcome.exit_code, 2) << arguments;
+    EXPECT_EQ(outcome.out, "") << arguments;
+    return outcome.err;
+  };
+  const std::string merge = "llmt: --merge was retired in this version: leaves that shared a local model";
+  EXPECT_TRUE(refusal("fit d.csv -t y --merge").starts_with(merge));
+  EXPECT_TRUE(refusal("compare d.csv -t y --merge").starts_with(merge));
+  EXPECT_TRUE(refusal("fit --merge d.csv -t y").starts_with(merge));
+  EXPECT_NE(refusal("fit d.csv -t y --smoothness 2").find("--smoothness was retired"), std::string::npos);
+  EXPECT_NE(refusal("fit d.csv -t y --stream --stream-rule rd").find("--stream-rule was retired"), std::string::npos);
+  EXPECT_EQ(folder.run(llmt_program + " fit --help").out.find("--merge"), std::string::npos);
 }
 
 TEST(LlmtProgram, QueriesOutsideTheTrainingExtentAreFlagged) {
@@ -273,7 +261,7 @@ TEST(LlmtProgram, ExplanationsAddUp) {
                 (row == 6 && entry["input"] == "x") || (row == 8 && entry["input"] == "colour"));
     }
     EXPECT_NEAR(sum, target["prediction"], 1e-12);
-    EXPECT_NEAR(target["prediction"], predicted["targets"][0]["predicted"][static_cast<std::size_t>(row - 1)], 1e-12);
+    EXPECT_NEAR(target["prediction"], predicted["targets"][0]["predicted"][row - 1], 1e-12);
   }
   EXPECT_NE(folder.run(llmt_program + " explain m.json d.csv --row 6").out.find("The contributions add up:"),
             std::string::npos);

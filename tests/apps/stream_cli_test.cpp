@@ -15,12 +15,12 @@ using nlohmann::json;
 using program::Folder;
 using program::Outcome;
 
-/// `llmt fit --stream` of column y of `data`.
+// `llmt fit --stream` of column y of `data`.
 std::string fit_stream(const std::string& data) {
   return std::string(LLMT_PROGRAM) + " fit " + data + " --stream -t y ";
 }
 
-/// y has a kink in `a`; a row in ten has no `b`.
+// y has a kink in `a`; a row in ten has no `b`.
 std::string kinked(int rows, const char* line_end = "\n") {
   llmt::Random random(1);
   std::string text = fmt::format("a,b,y{}", line_end);
@@ -110,7 +110,7 @@ TEST(StreamProgram, WrongUsageIsSaid) {
   EXPECT_NE(usage("d.csv -t y --stream --shared").find("--shared is not for --stream"), std::string::npos);
   EXPECT_NE(usage("d.csv -t y --stream --monotone a").find("--monotone is not for --stream"), std::string::npos);
   EXPECT_NE(usage("d.csv -t y --stream --local-models auto").find("--local-models is not"), std::string::npos);
-  EXPECT_NE(usage("d.csv -t y --stream-rule ra").find("--stream-rule needs --stream"), std::string::npos);
+  EXPECT_NE(usage("d.csv -t y --stream-rule ra").find("--stream-rule was retired in this version"), std::string::npos);
   EXPECT_NE(usage("-t y --stream").find("data is required"), std::string::npos);
 }
 

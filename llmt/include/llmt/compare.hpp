@@ -22,14 +22,14 @@ struct Method {
 /// crisp tree as in Benes et al. (2022), without re-estimation, and with joint re-estimation; the blend with joint
 /// estimation; LOLIMOT; HILOMOT; where the number of `inputs` is given and of their local models quadratic ones can be
 /// made (LocalTerms), the crisp tree by RD with these. `base` gives the columns, weights, seeds and threads.
-std::vector<Method> usual_methods(const FitOptions& base = {}, std::ptrdiff_t inputs = 0);
+std::vector<Method> usual_methods(const FitOptions& base = {}, Eigen::Index inputs = 0);
 
 /// What one method made of the data.
 struct Comparison {
   std::string method;
-  std::ptrdiff_t leaves = 0;  ///< of the model of all rows
+  Eigen::Index leaves = 0;  ///< of the model of all rows
   /// Constants and slopes other than 0 of the local models, thresholds of the splits, directions and gates.
-  std::ptrdiff_t parameters = 0;
+  Eigen::Index parameters = 0;
   Eigen::VectorXd fold_rmse;  ///< held-out, one per fold
   double cv_rmse = 0.0;       ///< over all held-out rows
   double spread = 0.0;        ///< standard deviation of fold_rmse
@@ -48,7 +48,7 @@ struct ComparisonResult {
 struct CompareOptions {
   FoldOptions folds = {};  ///< outer folds: each method makes all its choices within the training part
   /// Called with the method and how many of how many fits are done.
-  std::function<void(const std::string& method, std::ptrdiff_t done, std::ptrdiff_t total)> progress = {};
+  std::function<void(const std::string& method, Eigen::Index done, Eigen::Index total)> progress = {};
 };
 
 /// Fits every method in every fold and on all rows. One output. Recommended is the smallest held-out error; but a

@@ -21,12 +21,12 @@ namespace llmt {
 /// What the cells of a column are when they are read as numbers.
 struct ColumnCells {
   /// "There is no such row."
-  static constexpr std::ptrdiff_t no_row = std::numeric_limits<std::ptrdiff_t>::max();
+  static constexpr Eigen::Index no_row = std::numeric_limits<Eigen::Index>::max();
 
-  std::ptrdiff_t missing = 0;             ///< cells that are empty or say NA, N/A, NaN, null or ? (in any case)
-  std::ptrdiff_t other = 0;               ///< cells that are neither missing nor a finite number
-  std::ptrdiff_t first_missing = no_row;  ///< row
-  std::ptrdiff_t first_other = no_row;    ///< row
+  Eigen::Index missing = 0;             ///< cells that are empty or say NA, N/A, NaN, null or ? (in any case)
+  Eigen::Index other = 0;               ///< cells that are neither missing nor a finite number
+  Eigen::Index first_missing = no_row;  ///< row
+  Eigen::Index first_other = no_row;    ///< row
 };
 
 /// Columns read as numbers, whatever their cells say.
@@ -55,7 +55,7 @@ class Csv {
 
   const std::string& name() const { return name_; }
   const std::vector<std::string>& columns() const { return columns_; }
-  std::ptrdiff_t rows() const { return std::ssize(row_begins_); }
+  Eigen::Index rows() const { return std::ssize(row_begins_); }
 
   bool has(std::string_view column) const { return fields_.contains(column); }
 
@@ -79,28 +79,28 @@ class Csv {
 
   /// Throws the error of numbers() at the first cell, in file order, of those in rows[i] of columns[i]; does nothing if
   /// all rows are ColumnCells::no_row.
-  void refuse_first(std::span<const std::string> columns, std::span<const std::ptrdiff_t> rows) const;
+  void refuse_first(std::span<const std::string> columns, std::span<const Eigen::Index> rows) const;
 
   /// Calls visit(row, i, text) for the cell of columns[i] in every row, in file order, with its text: quotes and outer
   /// blanks taken off, cells that numbers_or_missing() takes for missing are empty. The text lives as long as the call.
   /// A column may be named once. Errors as index_of().
   void visit_texts(std::span<const std::string> columns,
-                   const std::function<void(std::ptrdiff_t, std::size_t, std::string_view)>& visit) const;
+                   const std::function<void(Eigen::Index, std::size_t, std::string_view)>& visit) const;
 
   /// One column as text, as visit_texts() has it. Errors as index_of().
   std::vector<std::string> texts(const std::string& column) const;
 
   /// The text of a row as it stands in the file, without its line end.
-  std::string_view row_text(std::ptrdiff_t row) const;
+  std::string_view row_text(Eigen::Index row) const;
 
   /// The header as it stands in the file, without byte-order mark and line end.
   std::string_view header_text() const;
 
   /// Line of the file, counted from 1, on which a row begins. Counts the lines before it.
-  std::ptrdiff_t line_of(std::ptrdiff_t row) const;
+  Eigen::Index line_of(Eigen::Index row) const;
 
   /// Lines of ascending rows, counted in one go.
-  std::vector<std::ptrdiff_t> lines_of(std::span<const std::ptrdiff_t> rows) const;
+  std::vector<Eigen::Index> lines_of(std::span<const Eigen::Index> rows) const;
 
   char separator() const { return separator_; }
 
@@ -114,14 +114,14 @@ class Csv {
   std::vector<std::string> columns_;
   std::map<std::string, std::size_t, std::less<>> fields_;  // position of a column
   std::vector<std::size_t> row_begins_;                     // offsets into text_
-  std::ptrdiff_t lines_left_out_ = 0;                       // between the header and the first row, see CsvPieces
+  Eigen::Index lines_left_out_ = 0;                         // between the header and the first row, see CsvPieces
   bool more_follows_ = false;
 
   friend class CsvPieces;
   void read_header();
   void find_rows();
   std::string_view record_text(std::size_t begin) const;
-  std::ptrdiff_t line_at(std::size_t offset) const;
+  Eigen::Index line_at(std::size_t offset) const;
 };
 
 /// A CSV text that need not fit into memory: its rows a piece at a time, each with the header, and with the lines of
@@ -139,9 +139,9 @@ class CsvPieces {
   std::istream& input_;
   std::string name_;
   std::size_t bytes_;
-  std::string pending_;       // what has been read and not yet handed out
-  std::string header_;        // once it is known, with a line break
-  std::ptrdiff_t lines_ = 0;  // handed out, those of the header included
+  std::string pending_;     // what has been read and not yet handed out
+  std::string header_;      // once it is known, with a line break
+  Eigen::Index lines_ = 0;  // handed out, those of the header included
 };
 
 /// `text` as one CSV field: in double quotes, inner quotes doubled, if it holds the separator, a quote or a line break.

@@ -48,7 +48,7 @@ Attribution attribute(const Model& model, const Eigen::Ref<const Eigen::VectorXd
 Attribution attribute(const Model& model, const Eigen::Ref<const Eigen::VectorXd>& point);
 
 /// importance() looks at no more than this many rows, evenly spaced over the table.
-inline constexpr std::ptrdiff_t importance_rows = 500;
+inline constexpr Eigen::Index importance_rows = 500;
 
 /// How much each input moves the predictions over a table, outputs x inputs: the mean of |contribution| of attribute()
 /// from reference_point() over at most `importance_rows` rows, divided by its sum over the inputs. Rows sum to 1, or

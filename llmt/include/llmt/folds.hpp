@@ -3,10 +3,13 @@
 /// discovery.
 #pragma once
 
+#include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
+
+#include "llmt/abi.hpp"
 
 namespace llmt {
 
@@ -26,8 +29,8 @@ struct FoldOptions {
 
 /// The rows of one fold, ascending.
 struct Fold {
-  std::vector<std::ptrdiff_t> train;     ///< rows outside the fold
-  std::vector<std::ptrdiff_t> held_out;  ///< rows inside the fold
+  std::vector<Eigen::Index> train;     ///< rows outside the fold
+  std::vector<Eigen::Index> held_out;  ///< rows inside the fold
 };
 
 /// Partitions the rows 0 ... rows-1 into K folds whose sizes, counted in groups, differ by at most one.
@@ -35,6 +38,6 @@ struct Fold {
 /// Every row is held out exactly once. A group keeps together; groups are taken in order of first appearance.
 /// Throws std::invalid_argument if there are fewer groups than folds, fewer than two folds, or a label count other than
 /// `rows`.
-std::vector<Fold> make_folds(std::ptrdiff_t rows, const FoldOptions& options);
+std::vector<Fold> make_folds(Eigen::Index rows, const FoldOptions& options);
 
 }  // namespace llmt

@@ -35,7 +35,7 @@ struct Validity {
   /// smaller child), for splits on numbers; gaussian: k_sigma; logistic: h as a multiple of that of growth. 0 for
   /// crisp.
   double width = 0.0;
-  int smoothness = 1;  ///< blend: continuous derivatives of the prediction, 1 or 2
+  int smoothness = 1;  ///< blend: continuous derivatives of the prediction; 2 is in files of earlier versions alone
 };
 
 /// One node of a partition's tree, inner or leaf. Inner nodes keep a local model of their own.
@@ -57,7 +57,7 @@ struct Node {
   double half_width = 0.0;    ///< h of the transition of a blend or a logistic gate, in the unit of s; 0: a jump
   double missing_left = 0.5;  ///< validity of the left child where the split input is missing or its level was not seen
 
-  std::ptrdiff_t samples = 0;  ///< training rows in the node's box
+  Eigen::Index samples = 0;  ///< training rows in the node's box
   /// Of [1, regressors] over those rows: the coefficients that the rows could determine. Where regressors were selected
   /// (FitOptions::local_models) the number of coefficients; the slopes of the others are 0.
   int rank = 0;
@@ -71,10 +71,9 @@ struct Node {
   Eigen::VectorXd high;
   /// Leaves: inverse of the sum of validity * weight * a a', a = [1, deviations]; for leverages. May be empty.
   Eigen::MatrixXd inverse_gram;
-  /// Leaves that share a local model: the first of them in order of growth; -1 in that one and in all others. What
-  /// belongs to the model - rank, value, slope, low, high, inverse_gram - is that of the rows of all of them and the
-  /// same in all; samples, rss and mean are the box's own.
-  int shared_with = -1;
+  /// The node whose slopes take over beyond low ... high; -1: the parent. Another node than the parent is in leaves of
+  /// older files alone, where several leaves shared one local model: the root of the smallest subtree that holds them.
+  int guard_parent = -1;
 
   bool is_leaf() const { return left < 0; }
   bool is_oblique() const { return direction.size() > 0; }
@@ -95,8 +94,7 @@ struct Partition {
   /// held.
   Eigen::MatrixXd residual_range = {};
 
-  std::ptrdiff_t num_leaves() const { return (std::ssize(nodes) + 1) / 2; }
-  std::ptrdiff_t num_local_models() const;  ///< of the leaves, shared ones counted once
+  Eigen::Index num_leaves() const { return (std::ssize(nodes) + 1) / 2; }
 };
 
 /// What a model knows of its inputs.
@@ -136,11 +134,11 @@ struct ObliqueSide {
 
 /// A leaf as a person reads it: where it holds and what it says there.
 struct Leaf {
-  int node = 0;                ///< index into Partition::nodes
-  std::ptrdiff_t samples = 0;  ///< training rows
-  int rank = 0;                ///< as Node::rank
-  Eigen::VectorXd low;         ///< box, one per model input: low < x <= high; -infinity where open
-  Eigen::VectorXd high;        ///< +infinity where open
+  int node = 0;              ///< index into Partition::nodes
+  Eigen::Index samples = 0;  ///< training rows
+  int rank = 0;              ///< as Node::rank
+  Eigen::VectorXd low;       ///< box, one per model input: low < x <= high; -infinity where open
+  Eigen::VectorXd high;      ///< +infinity where open
   /// On which sides of oblique splits it lies as well, from the root down.
   std::vector<ObliqueSide> sides = {};
   std::vector<std::vector<int>>
@@ -150,7 +148,6 @@ struct Leaf {
   /// is where the inputs are 0; but a product is 0 where one of its factors is at its mean.
   Eigen::VectorXd intercept;
   Eigen::MatrixXd slope;  ///< outputs of the partition x regressors
-  int local_model = 0;    ///< leaves of equal number share one; numbered from left to right
 };
 
 /// How far a query lies from what the model has seen.
@@ -179,8 +176,7 @@ class Evaluator;
 ///   f_i(x) = value_i + slope_i . c_i + sum over ancestors a of slope_a . (c_a - c_below a)
 /// with c the deviations held to the node's range. What the prediction adds to the root's model is then held to the
 /// range of the root's residuals in training, widened by a tenth of it on both sides, and at last, beyond the training
-/// extent, outer_slope . (d - c_root) is added: the root's slopes as far as the first leaves agree on them. For leaves
-/// that share a local model the ancestors are those of the smallest subtree that holds them all. Every hold
+/// extent, outer_slope . (d - c_root) is added: the root's slopes as far as the first leaves agree on them. Every hold
 /// is rounded off over a tenth of its range, so that derivatives stay continuous. Affine data are reproduced
 /// everywhere; data that are quadratic in the inputs, by a model with products, within the training extent. Beyond it
 /// products stay where their factors leave it, and the linear parts go on.
@@ -194,8 +190,8 @@ class Model {
   Model(std::vector<InputColumn> inputs, std::vector<OutputColumn> outputs, std::vector<Regressor> regressors,
         std::vector<Partition> partitions);
 
-  std::ptrdiff_t num_inputs() const { return std::ssize(inputs_); }
-  std::ptrdiff_t num_outputs() const { return std::ssize(outputs_); }
+  Eigen::Index num_inputs() const { return std::ssize(inputs_); }
+  Eigen::Index num_outputs() const { return std::ssize(outputs_); }
   const std::vector<InputColumn>& inputs() const { return inputs_; }
   const std::vector<OutputColumn>& outputs() const { return outputs_; }
   const std::vector<Regressor>& regressors() const { return regressors_; }  ///< columns of the local models
@@ -216,7 +212,7 @@ class Model {
 
   /// The validities of the leaves of a partition at each row, rows x leaves as in leaves(partition). Throws as
   /// predict(), and if there is no such partition.
-  Eigen::MatrixXd validities(const Eigen::Ref<const Eigen::MatrixXd>& inputs, std::ptrdiff_t partition,
+  Eigen::MatrixXd validities(const Eigen::Ref<const Eigen::MatrixXd>& inputs, Eigen::Index partition,
                              int max_threads = 0) const;
 
   /// How far each row lies from what the model has seen. Missing values do not count. Throws as predict().
@@ -230,11 +226,11 @@ class Model {
 
   /// The leaves of a partition from left to right in the tree. Throws std::invalid_argument if there is no such
   /// partition.
-  std::vector<Leaf> leaves(std::ptrdiff_t partition) const;
+  std::vector<Leaf> leaves(Eigen::Index partition) const;
 
   /// The model as it was when each partition had at most `max_leaves` leaves: inner nodes' local models, not fitted
-  /// anew; leaves that stay keep the local models that they share. Throws std::invalid_argument if max_leaves < 1.
-  Model prefix(std::ptrdiff_t max_leaves) const;
+  /// anew. Throws std::invalid_argument if max_leaves < 1.
+  Model prefix(Eigen::Index max_leaves) const;
 
   /// The same model with other names of columns and, if there are any, of the levels of each input (empty for numbers).
   /// Throws std::invalid_argument if their numbers differ.
@@ -250,7 +246,7 @@ class Model {
 };
 
 /// Partition `partition` as it was with at most `max_leaves` leaves.
-Partition prefix(const Partition& partition, std::ptrdiff_t max_leaves);
+Partition prefix(const Partition& partition, Eigen::Index max_leaves);
 
 /// The model as JSON text, format version 2; docs/file-formats.md describes it. Numbers are written so that they read
 /// back exactly.

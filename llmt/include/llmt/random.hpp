@@ -6,10 +6,13 @@
 /// written out.
 #pragma once
 
+#include <Eigen/Core>
 #include <array>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
+
+#include "llmt/abi.hpp"
 
 namespace llmt {
 
@@ -35,7 +38,7 @@ class Random {
   double normal();
 
   /// The numbers 0 ... size-1 in random order (Fisher-Yates).
-  std::vector<std::ptrdiff_t> permutation(std::ptrdiff_t size);
+  std::vector<Eigen::Index> permutation(Eigen::Index size);
 
  private:
   std::array<std::uint64_t, 4> state_;

@@ -13,59 +13,48 @@
 
 namespace llmt {
 
-/// How a leaf of a growing stream finds its split (Potts & Sammut 2005; docs/algorithms.md).
-enum class StreamRule {
-  /// Residual differences: every leaf keeps the sums of squares and products of its rows in bins of every input, so
-  /// that the residual sums of squares of both sides of every edge between bins are known exactly; the best edge must
-  /// pass the F test of Chow (1960).
-  rd,
-  /// Residual analysis: the means and the scatter of every input over the rows above and below the leaf's model are
-  /// compared by t tests; where the most significant input says, two models are tried, which must pass the F test.
-  /// Costs
-  /// less per row, learns more slowly.
-  ra
-};
-
 struct StreamOptions {
-  StreamRule rule = StreamRule::rd;
   /// Probability, at most, that a leaf whose rows follow one linear model with normal noise is ever split: divided by
   /// the number of candidates and shared out over the repeated tests.
   double significance = 0.05;
   /// Smallest decrease of the residual variance by a split, as a fraction of the variance of the output.
   double min_variance_gain = 0.0;
-  std::ptrdiff_t min_leaf_samples = 0;  ///< on either side of a split. 0: twice the coefficients of a local model
+  Eigen::Index min_leaf_samples = 0;  ///< on either side of a split. 0: twice the coefficients of a local model
   /// Largest number of leaves of each tree, which bounds memory. 0: as many as have about 64 MiB of sums, within
   /// 16 ... 500.
-  std::ptrdiff_t max_leaves = 0;
+  Eigen::Index max_leaves = 0;
   int bins = 16;  ///< of an input in a leaf, 4 ... 256
   /// Leaf models are drawn towards the model that their parent had when it was split, see BlendOptions::shrinkages.
   double shrinkage = 0.1;
-  /// Whether models give up what they know where the errors rise abruptly.
-  bool detect_drift = true;
   /// Rows that are kept: a quarter of them is held out and chooses what a snapshot is, at most; the others estimate
   /// blends. 0: a snapshot is the crisp tree as it stands.
-  std::ptrdiff_t reservoir_rows = 20000;
+  Eigen::Index reservoir_rows = 20000;
 };
 
 /// What a stream has gone through.
 struct StreamCounts {
-  std::ptrdiff_t rows = 0;            ///< of positive weight
-  std::ptrdiff_t missing_values = 0;  ///< in the inputs
-  std::ptrdiff_t held_out = 0;        ///< rows in the reservoir that no tree has learned from
-  std::ptrdiff_t leaves = 0;          ///< of all trees
-  std::ptrdiff_t splits = 0;
-  std::ptrdiff_t prunes = 0;        ///< splits taken back because recent rows do not need them
-  std::ptrdiff_t drifts = 0;        ///< alarms: branches whose errors rose abruptly and whose models restarted
-  std::ptrdiff_t replacements = 0;  ///< branches that a new one, grown from the alarm on, has replaced
-  std::ptrdiff_t bytes = 0;         ///< that sums, models and reservoir take
+  Eigen::Index rows = 0;            ///< of positive weight
+  Eigen::Index missing_values = 0;  ///< in the inputs
+  Eigen::Index held_out = 0;        ///< rows in the reservoir that no tree has learned from
+  Eigen::Index leaves = 0;          ///< of all trees
+  Eigen::Index splits = 0;
+  Eigen::Index prunes = 0;        ///< splits taken back because recent rows do not need them
+  Eigen::Index drifts = 0;        ///< alarms: branches whose errors rose abruptly and whose models restarted
+  Eigen::Index replacements = 0;  ///< branches that a new one, grown from the alarm on, has replaced
+  Eigen::Index bytes = 0;         ///< that sums, models and reservoir take
 };
 
 class StreamState;
 
 /// A tree for every output that learns from rows as they come: each row is seen once and forgotten.
 ///
+/// Splits are found by residual differences (Potts & Sammut 2005; docs/algorithms.md): every leaf keeps the sums of
+/// squares and products of its rows in bins of every input, so that the residual sums of squares of both sides of every
+/// edge between bins are known exactly; the best edge must pass the F test of Chow (1960).
+///
 /// A leaf's model is the least-squares fit of all rows that reached it since its branch began, those included that its
-/// parent counted on its side of the split; a leaf is split, and a split taken back, when rows tell. The same rows give
+/// parent counted on its side of the split; a leaf is split, and a split taken back, when rows tell. Where the errors
+/// of a branch rise abruptly, its models give up what they have learned and a new branch grows. The same rows give
 /// the same bytes, one at a time or in blocks; their order matters. To go over data several times, add them again.
 ///
 /// Inputs may be missing (NaN): such a row follows the side with more rows and counts in a local model with the leaf's
@@ -74,7 +63,7 @@ class Stream {
  public:
   /// Throws std::invalid_argument naming field, value and bound if there is no input or output, or an option is out of
   /// range.
-  Stream(std::ptrdiff_t num_inputs, std::ptrdiff_t num_outputs, const StreamOptions& options = {});
+  Stream(Eigen::Index num_inputs, Eigen::Index num_outputs, const StreamOptions& options = {});
   ~Stream();
   Stream(Stream&&) noexcept;
   Stream& operator=(Stream&&) noexcept;

@@ -1,0 +1,8 @@
+// study: what members of the family and their options bring, as tables of test errors, leaves and seconds.
+#include "program.hpp"
+#include "study/study.hpp"
+
+int main(int argc, char** argv) {
+  return bench::run_program("study", "Tables of test errors, leaves and seconds", argc, argv, bench::add_members,
+                            bench::add_modes, bench::add_monotone, bench::add_pruning, bench::add_sets);
+}

@@ -1,0 +1,176 @@
+#include "constraints/constrained_leaves.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "constraints/ordered_splits.hpp"
+#include "constraints/signs.hpp"
+#include "numerics/bounded_least_squares.hpp"
+
+namespace llmt {
+namespace {
+
+// Room that estimates leave at ordered splits, relative to the range of the root's residuals: what rounding may take.
+constexpr double least_room = 1e-6;
+
+// Slopes are wrong beyond this, in the same unit for a column of unit size.
+constexpr double rounding = 1e-11;
+
+// Times that violated inequalities are added. What is left then is mended at last.
+constexpr int most_rounds = 20;
+
+double room_of(const Partition& partition, Eigen::Index output) {
+  return least_room * (partition.residual_range(output, 1) - partition.residual_range(output, 0));
+}
+
+// [value, slopes] of all nodes, one column each.
+Eigen::MatrixXd models_of(const Partition& partition, Eigen::Index output) {
+  const Eigen::Index regressors = partition.nodes.front().slope.cols();
+  Eigen::MatrixXd models(regressors + 1, std::ssize(partition.nodes));
+  for (Eigen::Index i = 0; i < models.cols(); ++i) {
+    const Node& node = partition.nodes[i];
+    models(0, i) = node.value(output);
+    models.col(i).tail(regressors) = node.slope.row(output).transpose();
+  }
+  return models;
+}
+
+class LeafProblem {
+ public:
+  LeafProblem(const Partition& partition, const TrainingRows& training, const std::vector<int>& leaves,
+              const Eigen::VectorXd& root, Eigen::Index output)
+      : leaves_(leaves),
+        root_(root),
+        signs_(coefficient_signs(training)),
+        splits_(partition, training, output),
+        models_(models_of(partition, output)),
+        room_(room_of(partition, output)),
+        tolerance_(rounding / least_room * room_),
+        position_(partition.nodes.size(), -1),
+        unit_(Eigen::VectorXd::Ones(root.size())) {
+    unit_.tail(root.size() - 1) = training.scale.cwiseInverse();
+    for (std::size_t k = 0; k < leaves.size(); ++k) {
+      position_[leaves[k]] = static_cast<Eigen::Index>(k);
+    }
+  }
+
+  std::vector<LeafInequality> violated(const Eigen::VectorXd& coefficients) {
+    const Eigen::Index size = root_.size();
+    std::vector<LeafInequality> result;
+    if (!splits_.empty()) {
+      for (std::size_t k = 0; k < leaves_.size(); ++k) {
+        const auto of_leaf = coefficients.segment(static_cast<Eigen::Index>(k) * size, size);
+        models_.col(leaves_[k]) = (of_leaf + root_).cwiseProduct(unit_);
+      }
+      result = splits_.violated(models_, 0.5 * room_, room_);
+    }
+    for (Eigen::Index at = 0; at < coefficients.size() && !signs_.empty(); ++at) {
+      const int sign = signs_[at % size];
+      if (sign * (coefficients(at) + root_(at % size)) < -tolerance_) {
+        const int leaf = leaves_[at / size];
+        result.push_back({leaf, leaf, sign * Eigen::VectorXd::Unit(size, at % size), Eigen::VectorXd::Zero(size), 0.0});
+      }
+    }
+    return result;
+  }
+
+  // As normals' change >= bounds for a change of the coefficients.
+  Eigen::MatrixXd normals(const std::vector<LeafInequality>& found, const Eigen::VectorXd& coefficients,
+                          Eigen::VectorXd& bounds) const {
+    const Eigen::Index size = root_.size();
+    Eigen::MatrixXd result = Eigen::MatrixXd::Zero(coefficients.size(), std::ssize(found));
+    bounds.resize(std::ssize(found));
+    for (std::size_t c = 0; c < found.size(); ++c) {
+      const Eigen::Index column = static_cast<Eigen::Index>(c);
+      const Eigen::VectorXd left = found[c].of_left.cwiseProduct(unit_);
+      const Eigen::VectorXd right = found[c].of_right.cwiseProduct(unit_);
+      result.col(column).segment(position_[found[c].left] * size, size) += left;
+      result.col(column).segment(position_[found[c].right] * size, size) += right;
+      bounds(column) = found[c].bound - (left + right).dot(root_);
+    }
+    bounds -= result.transpose() * coefficients;
+    return result;
+  }
+
+ private:
+  const std::vector<int>& leaves_;
+  Eigen::VectorXd root_;
+  std::vector<int> signs_;
+  OrderedSplits splits_;
+  Eigen::MatrixXd models_;
+  double room_;
+  double tolerance_;
+  std::vector<Eigen::Index> position_;  // of a leaf's node among the leaves
+  Eigen::VectorXd unit_;                // of natural coefficients, in scaled ones
+};
+
+}  // namespace
+
+void constrain_leaves(const Partition& partition, const TrainingRows& training, const std::vector<int>& leaves,
+                      const RowMajor& factor, const Eigen::MatrixXd& root, Eigen::MatrixXd& coefficients,
+                      ActiveInequalities& active) {
+  active.resize(coefficients.cols());
+  for (Eigen::Index o = 0; o < coefficients.cols(); ++o) {
+    std::vector<LeafInequality>& start = active[o];
+    LeafProblem problem(partition, training, leaves, root.col(o), o);
+    const Eigen::VectorXd free = coefficients.col(o);
+    std::vector<LeafInequality> found = problem.violated(free);
+    if (found.empty()) {
+      start.clear();
+      continue;
+    }
+    found.insert(found.begin(), start.begin(), start.end());
+    std::vector<LeafInequality> all;
+    LeastDistance distance(free.size());
+    for (int round = 0; round < most_rounds && !found.empty(); ++round) {
+      Eigen::VectorXd bounds;
+      Eigen::MatrixXd normals = problem.normals(found, free, bounds);
+      factor.triangularView<Eigen::Upper>().transpose().solveInPlace(normals);
+      distance.add(normals, bounds);
+      all.insert(all.end(), found.begin(), found.end());
+      Eigen::VectorXd change = distance.solve();
+      // What is not active any more is found again if need be: no round makes the change smaller.
+      std::vector<LeafInequality> kept;
+      for (const Eigen::Index c : distance.keep_active()) {
+        kept.push_back(std::move(all[c]));
+      }
+      all = std::move(kept);
+      factor.triangularView<Eigen::Upper>().solveInPlace(change);
+      coefficients.col(o) = free + change;
+      found = problem.violated(coefficients.col(o));
+    }
+    start = std::move(all);
+  }
+}
+
+void finish_constrained(Partition& partition, const TrainingRows& training) {
+  const std::vector<int> signs = coefficient_signs(training);
+  if (signs.empty()) return;
+  for (Node& node : partition.nodes) {
+    for (Eigen::Index k = 0; k < node.slope.cols(); ++k) {
+      const int sign = signs[k + 1];
+      for (Eigen::Index o = 0; sign != 0 && o < node.slope.rows(); ++o) {
+        node.slope(o, k) = sign * node.slope(o, k) > 0.0 ? node.slope(o, k) : 0.0;
+      }
+    }
+  }
+  if (!has_ordered_splits(partition, training)) return;
+  for (Eigen::Index o = 0; o < std::ssize(partition.outputs); ++o) {
+    Eigen::MatrixXd models = models_of(partition, o);
+    OrderedSplits(partition, training, o).separate(models, room_of(partition, o));
+    for (std::size_t i = 0; i < partition.nodes.size(); ++i) {
+      partition.nodes[i].value(o) = models(0, i);
+    }
+  }
+}
+
+double order_room(const Partition& partition, const TrainingRows& training) {
+  double least = std::numeric_limits<double>::infinity();
+  for (Eigen::Index o = 0; o < std::ssize(partition.outputs) && has_ordered_splits(partition, training); ++o) {
+    least = std::min(least, OrderedSplits(partition, training, o).room(models_of(partition, o)));
+  }
+  return least;
+}
+
+}  // namespace llmt

@@ -1,0 +1,162 @@
+#include "csv/cells.hpp"
+
+#include <fast_float/fast_float.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <utility>
+
+namespace llmt::csv {
+namespace {
+
+constexpr std::string_view blanks = " \t\r";
+
+std::string_view trimmed(std::string_view text) {
+  const std::size_t first = text.find_first_not_of(blanks);
+  return first == std::string_view::npos ? std::string_view{}
+                                         : text.substr(first, text.find_last_not_of(blanks) + 1 - first);
+}
+
+std::string_view without_quotes(std::string_view field) {
+  const bool is_quoted = field.size() >= 2 && field.front() == '"' && field.back() == '"';
+  return is_quoted ? field.substr(1, field.size() - 2) : field;
+}
+
+// Without outer blanks, quotes, and blanks inside them.
+std::string_view bare(std::string_view field) { return trimmed(without_quotes(trimmed(field))); }
+
+// Whether a bare field says that there is no value.
+bool is_missing(std::string_view text) {
+  constexpr std::array<std::string_view, 6> marks = {"", "na", "n/a", "nan", "null", "?"};
+  const auto same = [](char c, char mark) { return c == mark || (c >= 'A' && c <= 'Z' && c - 'A' + 'a' == mark); };
+  return std::ranges::any_of(marks, [&](std::string_view mark) {
+    return std::equal(text.begin(), text.end(), mark.begin(), mark.end(), same);
+  });
+}
+
+// End of the number at `begin`, null if there is none. A plus is taken. Out of range is no error: too large reads as
+// infinity, too small as zero. These and leading white space, line breaks too, are what versions and options of
+// fast_float differ in.
+const char* number_end(const char* begin, const char* end, double& value) {
+  const bool has_sign = begin != end && (*begin == '+' || *begin == '-');
+  const char* const first = begin + (has_sign ? 1 : 0);
+  if (first == end || *first <= ' ' || *first == '-') return nullptr;
+  const fast_float::from_chars_result result = fast_float::from_chars(*begin == '+' ? first : begin, end, value);
+  return result.ec == std::errc() || result.ec == std::errc::result_out_of_range ? result.ptr : nullptr;
+}
+
+// One past the blanks at `begin`. Where tabs separate they are not blank.
+const char* after_blanks(const char* begin, const char* end, char separator) {
+  while (begin != end && (*begin == ' ' || *begin == '\r' || *begin == '\t') && *begin != separator) {
+    ++begin;
+  }
+  return begin;
+}
+
+// The beginning of what would fill a screen.
+std::string shortened(std::string_view text) {
+  constexpr std::size_t most = 60;
+  if (text.size() <= most) return std::string(text);
+  std::size_t end = most;
+  while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0U) == 0x80U) {
+    --end;  // not within a character of UTF-8
+  }
+  return std::string(text.substr(0, end)) + "...";
+}
+
+std::size_t count(const char* begin, const char* end, char wanted) {
+  std::size_t result = 0;
+  while (begin != end) {
+    // So few that a byte counts them: a vector then has sixteen counters, not two.
+    const char* const stop = begin + std::min<Eigen::Index>(end - begin, std::numeric_limits<unsigned char>::max());
+    unsigned char found = 0;
+    for (; begin != stop; ++begin) {
+      found = static_cast<unsigned char>(found + (*begin == wanted ? 1 : 0));
+    }
+    result += found;
+  }
+  return result;
+}
+
+// First `wanted`, or `end`.
+const char* find(const char* begin, const char* end, char wanted) {
+  const void* const found = std::memchr(begin, wanted, end - begin);
+  return found == nullptr ? end : static_cast<const char*>(found);
+}
+
+}  // namespace
+
+Record record_at(const char* begin, const char* end, char separator) {
+  const char* record_end = find(begin, end, '\n');
+  std::size_t quotes = count(begin, record_end, '"');
+  if (quotes == 0) return {record_end, 1 + count(begin, record_end, separator)};
+  // A line with an odd number of quotes leaves one open: the record goes on.
+  while (quotes % 2 != 0 && record_end != end) {
+    const char* const line = record_end;
+    record_end = find(line + 1, end, '\n');
+    quotes += count(line, record_end, '"');
+  }
+  // Without branches, which would often go another way than the processor thought.
+  std::size_t fields = 1;
+  bool quoted = false;
+  for (const char* c = begin; c != record_end; ++c) {
+    quoted = quoted != (*c == '"');
+    fields += (*c == separator) > quoted ? 1 : 0;
+  }
+  return {record_end, fields};
+}
+
+bool is_blank(std::string_view text) { return text.find_first_not_of(blanks) == std::string_view::npos; }
+
+std::string unquoted(std::string_view field) {
+  field = trimmed(field);
+  const std::string_view inner = without_quotes(field);
+  std::string result;
+  for (std::size_t i = 0; i < inner.size(); ++i) {
+    result += inner[i];
+    i += inner[i] == '"' && inner.size() < field.size() ? 1 : 0;  // a doubled quote stands for one
+  }
+  return result;
+}
+
+std::string_view cell_text(std::string_view field, std::string& buffer) {
+  const std::string_view text = bare(field);
+  if (is_missing(text)) return {};
+  if (text.find('"') == std::string_view::npos) return text;
+  buffer = unquoted(field);
+  return trimmed(buffer);
+}
+
+Cell read_cell(const char*& cursor, const char* end, char separator, double& value) {
+  // Most cells are a number and nothing else, and where the number ends the field does: nobody looks for the separator.
+  const char* const begin = after_blanks(cursor, end, separator);
+  const bool quoted = begin != end && *begin == '"';
+  const char* after = number_end(begin + (quoted ? 1 : 0), end, value);
+  if (after != nullptr && std::isfinite(value) && (!quoted || (after != end && *after == '"'))) {
+    after = after_blanks(after + (quoted ? 1 : 0), end, separator);
+    if (after == end || *after == separator || *after == '\n') {
+      cursor = after;
+      return Cell::number;
+    }
+  }
+  const char* const field = std::exchange(cursor, field_end(begin, end, separator));
+  const std::string_view text = bare(std::string_view(field, cursor - field));
+  if (is_missing(text)) return Cell::missing;
+  const char* const text_end = text.data() + text.size();
+  return number_end(text.data(), text_end, value) == text_end && std::isfinite(value) ? Cell::number : Cell::other;
+}
+
+std::string problem_of(std::string_view field) {
+  const std::string_view text = bare(field);
+  if (text.empty()) return "the cell is empty, a number is needed";
+  double value = 0.0;
+  const bool is_infinite_or_nan =
+      number_end(text.data(), text.data() + text.size(), value) == text.data() + text.size();
+  return fmt::format("'{}' is not {}", shortened(text), is_infinite_or_nan ? "finite" : "a number");
+}
+
+}  // namespace llmt::csv

@@ -1,0 +1,51 @@
+/// \file
+/// Records and fields of CSV text and what they say: all that there is to know about quotes, blanks, missing values and
+/// numbers.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <string>
+#include <string_view>
+
+namespace llmt::csv {
+
+/// End of the field that begins at `begin`: its separator or line break, outside quotes, or `end`.
+inline const char* field_end(const char* begin, const char* end, char separator) {
+  bool quoted = false;
+  for (; begin != end; ++begin) {
+    if (*begin == '"') {
+      quoted = !quoted;
+    } else if ((*begin == separator || *begin == '\n') && !quoted) {
+      break;
+    }
+  }
+  return begin;
+}
+
+/// A line, or several where quotes hold line breaks.
+struct Record {
+  const char* end = nullptr;  ///< its line break, or the end of the text
+  std::size_t fields = 0;
+};
+Record record_at(const char* begin, const char* end, char separator);
+
+/// Nothing but blanks, which are spaces, tabs and carriage returns.
+bool is_blank(std::string_view text);
+
+/// A field as text: outer blanks and quotes taken off, doubled quotes halved.
+std::string unquoted(std::string_view field);
+
+/// What a cell says: as unquoted(), also without blanks inside the quotes; empty if it says that there is no value.
+/// Lies in `field`, or in `buffer` if quotes were halved.
+std::string_view cell_text(std::string_view field, std::string& buffer);
+
+enum class Cell { number, missing, other };
+
+/// What the cell at `cursor` is, and in `value` which number. Moves `cursor` to the end of the field.
+Cell read_cell(const char*& cursor, const char* end, char separator, double& value);
+
+/// Why a cell is not a number.
+std::string problem_of(std::string_view field);
+
+}  // namespace llmt::csv

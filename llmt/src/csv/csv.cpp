@@ -1,0 +1,144 @@
+#include "llmt/csv.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "csv/cells.hpp"
+#include "llmt/files.hpp"
+
+namespace llmt {
+namespace {
+
+constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
+
+std::string_view between(const char* begin, const char* end) { return {begin, static_cast<std::size_t>(end - begin)}; }
+
+// The first of these that the header has, outside quotes or inside.
+char separator_of(std::string_view header) {
+  for (const char candidate : {',', ';', '\t'}) {
+    if (header.find(candidate) != std::string_view::npos) return candidate;
+  }
+  return ',';
+}
+
+}  // namespace
+
+Csv Csv::read(const std::string& path) { return parse(read_file(path), path); }
+
+Csv Csv::parse(std::string text, std::string name) {
+  Csv csv;
+  csv.name_ = std::move(name);
+  csv.text_ = std::move(text);
+  csv.read_header();
+  csv.find_rows();
+  return csv;
+}
+
+void Csv::read_header() {
+  header_begin_ = text_.starts_with(byte_order_mark) ? byte_order_mark.size() : 0;
+  while (header_begin_ < text_.size() && csv::is_blank(record_text(header_begin_))) {
+    header_begin_ = text_.find('\n', header_begin_);
+    header_begin_ = header_begin_ == std::string::npos ? text_.size() : header_begin_ + 1;
+  }
+  if (header_begin_ >= text_.size()) {
+    throw std::runtime_error(fmt::format("{}: the file is empty, a header row is needed", name_));
+  }
+  const std::string_view header = header_text();
+  const char* const end = header.data() + header.size();
+  separator_ = separator_of(header);
+  for (const char* begin = header.data();;) {
+    const char* const field_end = csv::field_end(begin, end, separator_);
+    std::string column = csv::unquoted(between(begin, field_end));
+    if (column.empty()) {
+      throw std::runtime_error(fmt::format("{}:{}: column {} of the header has no name", name_, line_at(header_begin_),
+                                           columns_.size() + 1));
+    }
+    if (!fields_.emplace(column, columns_.size()).second) {
+      throw std::runtime_error(
+          fmt::format("{}:{}: the header has column \"{}\" twice", name_, line_at(header_begin_), column));
+    }
+    columns_.push_back(std::move(column));
+    if (field_end == end) return;
+    begin = field_end + 1;
+  }
+}
+
+void Csv::find_rows() {
+  const char* const text = text_.data();
+  const char* const end = text + text_.size();
+  const auto after = [&](const csv::Record& record) { return record.end == end ? end : record.end + 1; };
+  for (const char* begin = after(csv::record_at(text + header_begin_, end, separator_)); begin != end;) {
+    const csv::Record record = csv::record_at(begin, end, separator_);
+    if (!csv::is_blank(between(begin, record.end))) {
+      row_begins_.push_back(begin - text);
+      if (record.fields != columns_.size()) {
+        const bool is_last =
+            !more_follows_ && between(record.end, end).find_first_not_of(" \t\r\n") == std::string_view::npos;
+        throw std::runtime_error(
+            fmt::format("{}:{}: the row has {} field{}, the header has {}{}", name_, line_at(row_begins_.back()),
+                        record.fields, record.fields == 1 ? "" : "s", columns_.size(),
+                        is_last && record.fields < columns_.size() ? " (is the file cut off?)" : ""));
+      }
+    }
+    begin = after(record);
+  }
+}
+
+std::size_t Csv::index_of(std::string_view column) const {
+  const auto found = fields_.find(column);
+  if (found == fields_.end()) {
+    throw std::runtime_error(
+        fmt::format("{}: there is no column \"{}\"; the columns are {}", name_, column, fmt::join(columns_, ", ")));
+  }
+  return found->second;
+}
+
+std::string_view Csv::row_text(Eigen::Index row) const { return record_text(row_begins_[row]); }
+
+std::string_view Csv::header_text() const { return record_text(header_begin_); }
+
+Eigen::Index Csv::line_of(Eigen::Index row) const { return line_at(row_begins_[row]); }
+
+std::vector<Eigen::Index> Csv::lines_of(std::span<const Eigen::Index> rows) const {
+  std::vector<Eigen::Index> lines;
+  Eigen::Index line = 1 + lines_left_out_;
+  auto counted = text_.begin();
+  for (const Eigen::Index row : rows) {
+    const auto begin = text_.begin() + static_cast<Eigen::Index>(row_begins_[row]);
+    line += std::count(counted, begin, '\n');
+    lines.push_back(line);
+    counted = begin;
+  }
+  return lines;
+}
+
+Eigen::Index Csv::line_at(std::size_t offset) const {
+  return 1 + lines_left_out_ + std::count(text_.begin(), text_.begin() + static_cast<Eigen::Index>(offset), '\n');
+}
+
+// The record at `begin` without its line end.
+std::string_view Csv::record_text(std::size_t begin) const {
+  const char* const end = text_.data() + text_.size();
+  const std::string_view text =
+      between(text_.data() + begin, csv::record_at(text_.data() + begin, end, separator_).end);
+  return text.ends_with('\r') ? text.substr(0, text.size() - 1) : text;
+}
+
+std::string csv_field(std::string_view text, char separator) {
+  if (text.find_first_of("\"\r\n") == std::string_view::npos && text.find(separator) == std::string_view::npos) {
+    return std::string(text);
+  }
+  std::string quoted = "\"";
+  for (const char c : text) {
+    quoted += c;
+    if (c == '"') {
+      quoted += c;
+    }
+  }
+  return quoted + '"';
+}
+
+}  // namespace llmt

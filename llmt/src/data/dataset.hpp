@@ -1,0 +1,79 @@
+/// \file
+/// The rows that a model is made from, in the forms its parts need.
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "base/matrix.hpp"
+#include "data/table.hpp"
+#include "llmt/model.hpp"
+
+namespace llmt {
+
+/// Some rows of a table with what a model says of the columns. Also used for rows that are held out, then with the
+/// columns of the training rows.
+struct TrainingRows {
+  const Table* table = nullptr;
+  std::vector<int> rows;  ///< of the table, ascending
+  std::vector<InputColumn> columns;
+  std::vector<OutputColumn> output_columns;
+  std::vector<Regressor> regressors;
+  double weight_unit = 1.0;  ///< times the table's weight is a row's weight; in training these have mean 1
+  bool has_missing = false;  ///< whether a regressor is missing in some row
+  Eigen::VectorXd scale;     ///< root mean square of each regressor's deviations; 1 where it is 0
+  Eigen::MatrixXd spread;    ///< 2 x regressors: smallest and largest deviation but for the one row at either end
+
+  Eigen::Index count() const { return std::ssize(rows); }
+  Eigen::VectorXd low() const;  ///< extent of the inputs
+  Eigen::VectorXd high() const;
+};
+
+/// The given rows, columns described from them. `table` must live as long as the result.
+TrainingRows training_rows(const Table& table, std::vector<int> rows, int max_threads = 1);
+
+/// The given rows under the columns of `training`.
+TrainingRows query_rows(const Table& table, std::vector<int> rows, const TrainingRows& training);
+
+/// A few rows laid out one after the other, for passes over all of them.
+struct Chunk {
+  RowMajor inputs;      ///< NaN: missing
+  RowMajor deviations;  ///< of the regressors from their centres; NaN: missing
+  RowMajor outputs;     ///< the ones asked for
+  Eigen::VectorXd weights;
+
+  Eigen::Index count() const { return weights.size(); }
+};
+
+inline constexpr Eigen::Index chunk_rows = 2048;
+
+inline Eigen::Index num_chunks(const TrainingRows& rows) { return (rows.count() + chunk_rows - 1) / chunk_rows; }
+
+/// Sum of the rows' weights.
+double total_weight(const TrainingRows& rows);
+
+/// The rows at positions index * chunk_rows ... of `rows`.
+Chunk fetch(const TrainingRows& rows, Eigen::Index index, const std::vector<int>& outputs);
+
+/// Inputs of some rows, given by their positions among `rows`; NaN: missing.
+RowMajor inputs_of(const TrainingRows& rows, std::span<const int> positions);
+
+/// The rows at the given positions of `rows`.
+Chunk fetch(const TrainingRows& rows, const std::vector<int>& positions, const std::vector<int>& outputs);
+
+/// Passes over the rows in parallel: the chunks index, index + num_slots, ... of a slot come one after the other. What
+/// is summed up is summed per slot, and the slots in order.
+inline constexpr Eigen::Index num_slots = 16;
+void for_each_chunk(const TrainingRows& rows, const std::vector<int>& outputs, int max_threads,
+                    const std::function<void(std::size_t slot, const Chunk& chunk)>& body);
+
+/// About `count` of the rows, or all if they are few more, with weights that make them stand for all. Which ones
+/// depends on the rows' values, not on their order; fewer are among more.
+TrainingRows thinned(const TrainingRows& rows, Eigen::Index count);
+
+/// Levels beyond this many, the rarest, share the reference level's place in the local models.
+inline constexpr Eigen::Index max_level_regressors = 30;
+
+}  // namespace llmt

@@ -1,0 +1,30 @@
+/// \file
+/// Products of two numbers as columns of the local models.
+#pragma once
+
+#include <Eigen/Core>
+#include <utility>
+#include <vector>
+
+#include "data/table.hpp"
+#include "llmt/model.hpp"
+
+namespace llmt {
+
+/// Products make (d + 1) (d + 2) / 2 coefficients of d numbers, and growth costs the square of that: beyond so many
+/// numeric regression inputs (105 coefficients) there are none.
+inline constexpr Eigen::Index most_inputs_of_products = 13;
+
+/// Numeric regression inputs of a table.
+std::vector<int> numeric_regression_inputs(const Table& table);
+
+/// All pairs of numeric regression inputs, i <= j, that say something of their own: none of an input that never varies,
+/// no square of one that takes two values.
+std::vector<std::pair<int, int>> products_of(const Table& table);
+
+/// The product of the deviations of two inputs with its weighted mean over `rows`, where both have a value. `columns`:
+/// of all inputs.
+Regressor product_regressor(const Table& table, const std::vector<int>& rows, const std::vector<InputColumn>& columns,
+                            const std::pair<int, int>& inputs);
+
+}  // namespace llmt

@@ -1,0 +1,69 @@
+#include "fit/linear_or_quadratic.hpp"
+
+#include <algorithm>
+
+#include "data/regressors.hpp"
+#include "fit/validate.hpp"
+#include "llmt/fit.hpp"
+#include "selection/selection.hpp"
+
+namespace llmt {
+
+Eigen::Index count_numbers(Eigen::Index inputs, const FitOptions& options) {
+  Eigen::Index count = 0;
+  const std::vector<int>& chosen = options.growth.regression_inputs;
+  for (int input = 0; input < inputs; ++input) {
+    const bool used = chosen.empty() || std::ranges::find(chosen, input) != chosen.end();
+    const std::vector<int>& categorical = options.categorical_inputs;
+    count += used && std::ranges::find(categorical, input) == categorical.end() ? 1 : 0;
+  }
+  return count;
+}
+
+namespace {
+
+// The errors of all partitions as one, each in parts of what the linear models leave of it.
+CandidateError mean_error(const FitSummary& of, const FitSummary& linear) {
+  CandidateError mean{.candidate = {}, .fold_rmse = Eigen::VectorXd::Zero(linear.partitions[0].cv_folds)};
+  const double partitions = static_cast<double>(linear.partitions.size());
+  for (std::size_t p = 0; p < linear.partitions.size(); ++p) {
+    const double unit = linear.partitions[p].chosen.rmse > 0.0 ? linear.partitions[p].chosen.rmse : 1.0;
+    mean.rmse += of.partitions[p].chosen.rmse / unit / partitions;
+    mean.fold_rmse += of.partitions[p].chosen.fold_rmse / (unit * partitions);
+  }
+  return mean;
+}
+
+}  // namespace
+
+FitResult fit_best_terms(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
+                         const Eigen::Ref<const Eigen::MatrixXd>& outputs, const FitOptions& options) {
+  const Eigen::Index numbers = count_numbers(inputs.cols(), options);
+  const bool both = numbers > 0 && numbers <= most_inputs_of_products && options.selection.folds.count != 0 &&
+                    !(inputs.array().abs() > largest_factor).any();
+  FitOptions with_terms = options;
+  const auto fit_with = [&](LocalTerms terms, Eigen::Index half) {
+    with_terms.local_models.terms = terms;
+    if (options.progress && both) {
+      with_terms.progress = [&options, half](Eigen::Index done, Eigen::Index total) {
+        options.progress(half * total + done, 2 * total);
+      };
+    }
+    return fit(inputs, outputs, with_terms);
+  };
+  FitResult linear = fit_with(LocalTerms::linear, 0);
+  if (!both || linear.summary.partitions.front().cv_folds == 0) return linear;
+  FitResult quadratic = fit_with(LocalTerms::quadratic, 1);
+  const CandidateError of_linear = mean_error(linear.summary, linear.summary);
+  const CandidateError of_quadratic = mean_error(quadratic.summary, linear.summary);
+  const std::vector<PartitionSummary>& trees = linear.summary.partitions;
+  const bool least_squares = std::ranges::all_of(trees, [](const PartitionSummary& tree) { return tree.leaves == 1; });
+  const bool is_better = least_squares ? is_beyond_chance(of_linear, of_quadratic) : of_quadratic.rmse < of_linear.rmse;
+  FitResult& taken = is_better ? quadratic : linear;
+  for (const PartitionSummary& partition : (is_better ? linear : quadratic).summary.partitions) {
+    taken.summary.other_terms.push_back(partition.chosen);
+  }
+  return std::move(taken);
+}
+
+}  // namespace llmt

@@ -1,0 +1,65 @@
+/// \file
+/// The split of a node by the signs of its residuals: residual analysis (docs/algorithms.md, "Residual analysis").
+#pragma once
+
+#include <array>
+#include <span>
+#include <vector>
+
+#include "growth/growth_data.hpp"
+#include "growth/search/split_search.hpp"
+
+namespace llmt {
+
+/// How an input differs between the rows with residual >= 0 and those with residual < 0.
+struct SignStatistics {
+  double positive_mean = 0.0;  ///< m+, weighted, over the rows that have a value
+  double negative_mean = 0.0;  ///< m-
+  /// Student's statistic of m+ - m-, with the pooled variance:
+  ///   T = (m+ - m-) / (s sqrt(1 / n+ + 1 / n-)),  s^2 = (SS+ + SS-) / (n+ + n- - 2)
+  /// 0 for a constant input or an empty class, infinite if there is no scatter within the classes.
+  double means = 0.0;
+  double variances = 0.0;  ///< Levene's: the same of |x - mean of its class|
+  double freedom = 0.0;    ///< n+ + n- - 2, sums of weights
+  double low = 0.0;        ///< smallest value
+  double high = 0.0;       ///< largest value
+
+  /// The more significant of the two as a normal deviate of the same two-sided p: comparable between inputs, and does
+  /// not underflow as p does. Wallace (1959): (8 f + 1) / (8 f + 3) sqrt(f log(1 + t^2 / f)).
+  double deviate() const;
+};
+
+/// `values`: of the input, NaN where missing. Weights are positive.
+SignStatistics sign_statistics(std::span<const double> values, std::span<const double> residuals,
+                               std::span<const double> weights);
+
+/// Rows of a node, in features whose residuals are those of a model that need not be the node's own.
+struct SignNode {
+  SearchNode search;                 ///< features and the node's residual sum of squares
+  int rank;                          ///< of the node's model
+  std::span<const int> rows;         ///< of the features
+  const Eigen::MatrixXd& values;     ///< of the split inputs in these rows, rows x split inputs; NaN: missing
+  const Eigen::MatrixXd& residuals;  ///< of the node's own model, rows x outputs; only their signs count
+  const Eigen::VectorXd& weights;    ///< of the rows
+  std::span<const double> gram;      ///< of the rows, if it is known and no value is missing; else empty
+  int threads = 1;
+};
+
+/// What was found. `best.last_left` is the threshold: values up to it go left.
+struct SignSplit {
+  SplitCandidate best;
+  std::array<std::vector<int>, 2> sides;     ///< positions among the node's rows of those that go left and right
+  std::array<std::vector<double>, 2> grams;  ///< and their Gram matrices
+};
+
+/// Of the numeric split inputs that whose classes differ most significantly, over all outputs, split at (m+ + m-) / 2.
+/// If that leaves too few rows on a side, or if it does not pass the F test at 5 % - a product of two inputs leaves
+/// signs that depend on neither of them alone - the next one; if none passes, that with the smallest sum of squares.
+/// Equally significant to nine digits: the first input. `best.tested` counts the inputs and outputs that could be
+/// tested. One pass over the values of each input, another one and one over the features for each split that is tried.
+SignSplit search_by_signs(const GrowthData& data, const SignNode& node);
+
+/// Gram matrix of some rows of features, in partial sums whose number does not depend on that of threads.
+std::vector<double> sum_gram(const Features& features, std::span<const int> rows, int threads);
+
+}  // namespace llmt

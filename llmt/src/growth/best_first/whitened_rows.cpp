@@ -1,0 +1,189 @@
+#include "growth/best_first/whitened_rows.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "base/parallel.hpp"
+
+namespace llmt {
+namespace {
+
+// A node with so small a part of the sum of squares that the features hold gets features of its own residuals.
+constexpr double digits_at_risk = 1e-4;
+
+}  // namespace
+
+// Regressors are whitened over all rows; residuals are those of the mean.
+WhitenedRows::WhitenedRows(const GrowthData& data)
+    : features_(data.training.count(), std::ssize(data.training.regressors) + 1, data.outputs.cols()) {
+  const GramShape shape(features_);
+  const TrainingRows& training = data.training;
+  const Eigen::Index regressors = std::ssize(training.regressors);
+  const Eigen::Index chunks = num_chunks(training);
+  const int threads = data.problem.max_threads;
+  const Eigen::RowVectorXd per_scale = training.scale.cwiseInverse().transpose();
+  constexpr Eigen::Index blocks = 64;  // partial sums, added up in order
+  std::vector<std::vector<double>> grams(blocks, std::vector<double>(shape.size(), 0.0));
+  parallel_for(blocks, threads, [&](Eigen::Index block) {
+    std::vector<int> rows;
+    for (Eigen::Index index = chunks * block / blocks; index < chunks * (block + 1) / blocks; ++index) {
+      const Chunk chunk = fetch(training, index, {});
+      for (Eigen::Index i = 0; i < chunk.count(); ++i) {
+        const Eigen::Index at = index * chunk_rows + i;
+        const double root = std::sqrt(chunk.weights(i));
+        double* row = features_.row(at);
+        row[0] = root;
+        Eigen::Map<Eigen::RowVectorXd>(row + 1, regressors) = root * chunk.deviations.row(i).cwiseProduct(per_scale);
+        Eigen::Map<Eigen::RowVectorXd>(row + 1 + regressors, data.outputs.cols()) = root * data.outputs.row(at);
+        rows.push_back(static_cast<int>(at));
+      }
+    }
+    add_rows(features_, rows.data(), std::ssize(rows), grams[block].data());
+  });
+  for (std::size_t block = 1; block < grams.size(); ++block) {
+    add(shape, grams[block].data(), grams[0].data());
+  }
+  Eigen::MatrixXd covariance(regressors, regressors);
+  for (Eigen::Index i = 0; i < regressors; ++i) {
+    for (Eigen::Index j = 0; j <= i; ++j) {
+      covariance(i, j) = covariance(j, i) = grams[0][shape.at(i + 1, j + 1)] / grams[0][0];
+    }
+  }
+  const Whitening whitening = whiten(covariance);
+  const Eigen::MatrixXd& forward = whitening.forward;
+  colouring_ = whitening.back;
+  parallel_for(chunks, threads, [&](Eigen::Index index) {
+    const Eigen::Index begin = index * chunk_rows;
+    const Eigen::Index count = std::min(chunk_rows, training.count() - begin);
+    using Stride = Eigen::OuterStride<>;
+    Eigen::Map<RowMajor, 0, Stride> block(features_.row(begin) + 1, count, regressors, Stride(features_.columns()));
+    const RowMajor whitened = block * forward;
+    block = whitened;
+  });
+}
+
+void WhitenedRows::subtract(const std::vector<int>& rows, const Eigen::VectorXd& value, const Eigen::MatrixXd& slope) {
+  const Eigen::Index regressors = slope.cols();
+  // slope . x = (colouring' slope) . regressors
+  const Eigen::MatrixXd of_features = slope * colouring_;
+  for (const int row : rows) {
+    double* const at = features_.row(row);
+    const Eigen::Map<const Eigen::VectorXd> x(at + 1, regressors);
+    for (Eigen::Index o = 0; o < value.size(); ++o) {
+      at[1 + regressors + o] -= value(o) * at[0] + of_features.row(o).dot(x);
+    }
+  }
+}
+
+bool is_complete(const GrowthData& data) {
+  const std::vector<int>& inputs = data.problem.options.split_inputs;
+  const auto complete = [&](int input) { return !data.training.table->inputs.col(input).hasNaN(); };
+  return !data.training.has_missing && std::ranges::all_of(inputs, complete);
+}
+
+WhitenedLeaf whitened_root(const GrowthData& data) {
+  WhitenedLeaf leaf;
+  leaf.rows.resize(data.training.count());
+  std::iota(leaf.rows.begin(), leaf.rows.end(), 0);
+  leaf.value = Eigen::VectorXd::Zero(data.outputs.cols());
+  leaf.slope = Eigen::MatrixXd::Zero(data.outputs.cols(), std::ssize(data.training.regressors));
+  return leaf;
+}
+
+void fit_whitened(const GrowthData& data, const WhitenedRows& rows, const std::vector<double>& gram, const Node& parent,
+                  WhitenedLeaf& leaf, Node& node) {
+  const GramShape shape(rows.features());
+  const Eigen::MatrixXd& colouring = rows.colouring();
+  const Eigen::Index regressors = std::ssize(data.training.regressors);
+  const auto entry = [&](Eigen::Index i, Eigen::Index j) { return gram[i >= j ? shape.at(i, j) : shape.at(j, i)]; };
+  const double weight = entry(0, 0);
+  leaf.weight = weight;
+  Eigen::VectorXd mean(regressors);
+  Eigen::MatrixXd covariance(regressors, regressors);
+  for (Eigen::Index i = 0; i < regressors; ++i) {
+    mean(i) = entry(i + 1, 0) / weight;
+  }
+  for (Eigen::Index i = 0; i < regressors; ++i) {
+    for (Eigen::Index j = 0; j < regressors; ++j) {
+      covariance(i, j) = entry(i + 1, j + 1) / weight - mean(i) * mean(j);
+    }
+  }
+  leaf.mean = colouring * mean;
+  leaf.covariance = colouring * covariance * colouring.transpose();
+  Eigen::VectorXd deviation(regressors);  // 0: constant in the node
+  for (Eigen::Index k = 0; k < regressors; ++k) {
+    const double variance = leaf.covariance(k, k);
+    deviation(k) = variance > 1e-12 * (1.0 + leaf.mean(k) * leaf.mean(k)) ? std::sqrt(variance) : 0.0;
+  }
+  const Eigen::VectorXd per_deviation =
+      deviation.unaryExpr([](double value) { return value > 0.0 ? 1.0 / value : 0.0; });
+  const Whitening whitening = whiten(per_deviation.asDiagonal() * leaf.covariance * per_deviation.asDiagonal());
+  const Eigen::MatrixXd inverse = whitening.forward * whitening.forward.transpose();
+  const Eigen::Index outputs = data.outputs.cols();
+  node.samples = std::ssize(leaf.rows);
+  node.rank = 1 + static_cast<int>(whitening.rank);
+  node.mean = data.training.scale.cwiseProduct(leaf.mean);
+  node.low = node.high = node.mean;
+  node.rss.resize(outputs);
+  node.value.resize(outputs);
+  node.slope.resize(outputs, regressors);
+  for (Eigen::Index o = 0; o < outputs; ++o) {
+    const Eigen::Index residual = shape.coefficients() + o;
+    Eigen::VectorXd product(regressors);
+    const double mean_residual = entry(residual, 0) / weight;
+    for (Eigen::Index k = 0; k < regressors; ++k) {
+      product(k) = entry(residual, k + 1) / weight - mean_residual * mean(k);
+    }
+    // The parent's model about the one whose residuals the features hold, then the correction of it.
+    const Eigen::VectorXd of_parent =
+        data.training.scale.cwiseProduct((parent.slope.row(o) - leaf.slope.row(o)).transpose());
+    const Eigen::VectorXd left = colouring * product - leaf.covariance * of_parent;
+    const Eigen::VectorXd correction = per_deviation.cwiseProduct(inverse * per_deviation.cwiseProduct(left));
+    const Eigen::VectorXd slope = of_parent + correction;
+    const double variance = entry(residual, residual) / weight - mean_residual * mean_residual;
+    const double explained = 2.0 * slope.dot(colouring * product) - slope.dot(leaf.covariance * slope);
+    node.rss(o) = std::max(0.0, weight * (variance - explained));
+    node.slope.row(o) = leaf.slope.row(o) + slope.cwiseQuotient(data.training.scale).transpose();
+    node.value(o) = leaf.value(o) + mean_residual - slope.dot(leaf.mean);
+  }
+}
+
+bool refreshed(const GrowthData& data, WhitenedRows& rows, const std::vector<double>& gram, const Node& node,
+               WhitenedLeaf& leaf) {
+  const GramShape shape(rows.features());
+  double held = 0.0;
+  for (Eigen::Index o = 0; o < data.outputs.cols(); ++o) {
+    const Eigen::Index residual = shape.coefficients() + o;
+    held += data.output_weights(o) * gram[shape.at(residual, residual)];
+  }
+  if (data.output_weights.dot(node.rss) >= digits_at_risk * held) return false;
+  rows.subtract(leaf.rows, node.value - leaf.value, (node.slope - leaf.slope) * data.training.scale.asDiagonal());
+  leaf.value = node.value;
+  leaf.slope = node.slope;
+  return true;
+}
+
+double place_threshold(const GrowthData& data, const WhitenedLeaf& leaf, Eigen::Index split_input, double low,
+                       double high, const Node& node, const Node& left, const Node& right) {
+  // The regression of the children's difference on the split input over the node's rows follows from the regressors'
+  // covariance if the input is one of them.
+  const TrainingRows& training = data.training;
+  const int column = data.problem.options.split_inputs[split_input];
+  const auto regressor = std::ranges::find_if(
+      training.regressors, [&](const Regressor& each) { return each.input == column && each.level < 0; });
+  const Eigen::Index outputs = left.value.size();
+  if (regressor == training.regressors.end()) {
+    return data.place_threshold(low, high, low, Eigen::VectorXd::Zero(outputs), Eigen::VectorXd::Zero(outputs));
+  }
+  const Eigen::Index k = regressor - training.regressors.begin();
+  const Eigen::MatrixXd slopes = (right.slope - left.slope) * training.scale.asDiagonal();
+  const Eigen::VectorXd apart = right.value - left.value + slopes * leaf.mean;
+  const double variance = leaf.covariance(k, k);
+  const Eigen::VectorXd slope = variance > 0.0
+                                    ? Eigen::VectorXd(slopes * leaf.covariance.col(k) / (variance * training.scale(k)))
+                                    : Eigen::VectorXd::Zero(outputs);
+  return data.place_threshold(low, high, regressor->centre + node.mean(k), apart, slope);
+}
+
+}  // namespace llmt

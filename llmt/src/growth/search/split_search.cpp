@@ -1,0 +1,237 @@
+#include "growth/search/split_search.hpp"
+
+#include <algorithm>
+#include <limits>
+
+namespace llmt {
+namespace {
+
+constexpr double no_split = std::numeric_limits<double>::infinity();
+
+// Rows of a block, within these bounds such that there are at most `most_blocks`.
+constexpr Eigen::Index smallest_block = 64;
+constexpr Eigen::Index most_blocks = 400;
+
+// Rows of the parts that a block is cut into. On pure noise a part is passed over if the rows it holds, which its
+// bound does not count, are fewer than what the best split gains beyond a chance one, in units of the noise; that is
+// some twenty.
+constexpr Eigen::Index part_rows = 12;
+constexpr Eigen::Index most_parts = 33;
+
+// Up to this many rows all splits of a block are compared.
+constexpr Eigen::Index few_rows = 16;
+
+}  // namespace
+
+InputSearch::InputSearch(const SearchNode& node, std::vector<double> values, std::span<const int> order,
+                         Eigen::Index min_leaf_samples)
+    : node_(node),
+      values_(std::move(values)),
+      order_(order),
+      min_leaf_samples_(min_leaf_samples),
+      shape_(node.features),
+      sums_(shape_, node.weights),
+      limit_(no_split),
+      smallest_(no_split),
+      none_(shape_.size(), 0.0),
+      all_{0, std::ssize(order), none_.data(), none_.data(), 0.0, 0.0} {
+  for (Eigen::Index left = 1; left < std::ssize(order); ++left) {
+    tested_ += admissible(left) ? 1 : 0;
+  }
+}
+
+InputSearch::InputSearch(const SearchNode& node, std::vector<double> values, std::span<const int> order,
+                         Eigen::Index min_leaf_samples, const Beyond& front, const Beyond& behind)
+    : InputSearch(node, std::move(values), order, min_leaf_samples) {
+  rows_in_front_ = front.rows;
+  rows_behind_ = behind.rows;
+  all_ = {0, std::ssize(order), front.gram, behind.gram, front.rss, behind.rss};
+}
+
+// Here splits are named by the number of rows of the stretch on their left.
+bool InputSearch::admissible(Eigen::Index left) const {
+  return left > 0 && left < std::ssize(order_) && rows_in_front_ + left >= min_leaf_samples_ &&
+         std::ssize(order_) - left + rows_behind_ >= min_leaf_samples_ && values_[left - 1] < values_[left];
+}
+
+bool InputSearch::holds_candidates(const Segment& segment) const {
+  const Eigen::Index first = std::max(segment.begin + 1, min_leaf_samples_ - rows_in_front_);
+  const Eigen::Index last = std::min(segment.end - 1, std::ssize(order_) + rows_behind_ - min_leaf_samples_);
+  return first <= last && values_[first - 1] < values_[last];
+}
+
+// Gram matrices and residual sums of squares on either side of the inner edges, that is of all but the first and last.
+void InputSearch::take_sides(const std::vector<Eigen::Index>& edges, const double* before, const double* behind,
+                             Sides& sides) {
+  const Eigen::Index size = shape_.size();
+  const Eigen::Index inner = std::ssize(edges) - 2;
+  const std::size_t count = inner;
+  sides.left.resize(inner * size);
+  sides.right.resize(sides.left.size());
+  for (std::vector<double>* rss : {&sides.rss_left, &sides.rss_right}) {
+    rss->resize(count);
+  }
+  for (std::vector<int>* rank : {&sides.rank_left, &sides.rank_right}) {
+    rank->resize(count);
+  }
+  sides.parts.assign((inner + 1) * size, 0.0);
+  for (Eigen::Index i = 0; i <= inner; ++i) {
+    const Eigen::Index begin = edges[i];
+    add_rows(node_.features, order_.data() + begin, edges[i + 1] - begin, sides.parts.data() + i * size);
+  }
+  const auto sum = [&](const double* so_far, Eigen::Index part, double* gram) {
+    std::copy(so_far, so_far + size, gram);
+    add(shape_, sides.parts.data() + part * size, gram);
+    return gram;
+  };
+  std::vector<const double*> grams(count);
+  const double* last = before;
+  for (Eigen::Index i = 0; i < inner; ++i) {
+    last = grams[i] = sum(last, i, sides.left.data() + i * size);
+  }
+  sums_.evaluate(grams.data(), inner, sides.rss_left.data(), sides.rank_left.data());
+  last = behind;
+  for (Eigen::Index i = inner; i-- > 0;) {
+    last = grams[i] = sum(last, i + 1, sides.right.data() + i * size);
+  }
+  sums_.evaluate(grams.data(), inner, sides.rss_right.data(), sides.rank_right.data());
+  evaluations_ += inner;
+}
+
+void InputSearch::offer(const std::vector<Eigen::Index>& edges, const Sides& sides) {
+  const double tolerance = tie_tolerance * node_.rss;
+  for (std::size_t i = 0; i + 2 < edges.size(); ++i) {
+    const double rss = sides.rss_left[i] + sides.rss_right[i];
+    if (rss <= smallest_ + tolerance && admissible(edges[i + 1])) {
+      smallest_ = std::min(smallest_, rss);
+      found_.push_back({edges[i + 1], rss, sides.rank_left[i], sides.rank_right[i]});
+    }
+  }
+}
+
+std::vector<InputSearch::Segment> InputSearch::cut(const Segment& segment, const std::vector<Eigen::Index>& edges,
+                                                   const Sides& sides) const {
+  const Eigen::Index size = shape_.size();
+  const std::size_t inner = edges.size() - 2;
+  std::vector<Segment> result;
+  for (std::size_t i = 0; i <= inner; ++i) {
+    result.push_back(
+        {edges[i], edges[i + 1], i == 0 ? segment.left : sides.left.data() + static_cast<Eigen::Index>(i - 1) * size,
+         i == inner ? segment.right : sides.right.data() + static_cast<Eigen::Index>(i) * size,
+         i == 0 ? segment.rss_left : sides.rss_left[i - 1], i == inner ? segment.rss_right : sides.rss_right[i]});
+  }
+  std::ranges::stable_sort(result, [](const Segment& a, const Segment& b) { return a.bound() < b.bound(); });
+  return result;
+}
+
+void InputSearch::search_edges() {
+  const Eigen::Index rows = std::ssize(order_);
+  if (tested_ == 0) return;
+  const Eigen::Index block = std::max(smallest_block, (rows + most_blocks - 1) / most_blocks);
+  for (Eigen::Index begin = 0; begin < rows; begin += block) {
+    edges_.push_back(begin);
+  }
+  edges_.push_back(rows);
+  take_sides(edges_, none_.data(), none_.data(), sides_);
+  if (rows < node_.features.rows()) {  // the rest is compared with its own single model
+    std::vector<double> all = none_;
+    for (Eigen::Index i = 0; i + 1 < std::ssize(edges_); ++i) {
+      add(shape_, sides_.parts.data() + i * shape_.size(), all.data());
+    }
+    const double* gram = all.data();
+    double rss = 0.0;
+    int rank = 0;
+    sums_.evaluate(&gram, 1, &rss, &rank);
+    without_value_ = node_.rss - rss;
+    for (double& left : sides_.rss_left) {
+      left += without_value_;
+    }
+  }
+  offer(edges_, sides_);
+}
+
+void InputSearch::refine(double limit) {
+  limit_ = limit;
+  if (edges_.empty()) {
+    look_into(all_, 0);
+    return;
+  }
+  all_.rss_left = without_value_;
+  for (const Segment& segment : cut(all_, edges_, sides_)) {
+    look_into(segment, 0);
+  }
+}
+
+void InputSearch::look_into(const Segment& segment, std::size_t depth) {
+  // Twice the tolerance: a split within the tolerance of the best one counts as equal to it.
+  if (segment.bound() > std::min(limit_, smallest_) + 2.0 * tie_tolerance * node_.rss || !holds_candidates(segment)) {
+    return;
+  }
+  if (deeper_.size() <= depth) {
+    deeper_.resize(depth + 1);
+  }
+  const Eigen::Index length = segment.end - segment.begin;
+  std::vector<Eigen::Index> edges{segment.begin};
+  const bool all = length <= few_rows;
+  const Eigen::Index parts = std::min(most_parts, length / part_rows + 1);
+  for (Eigen::Index i = 1; i < (all ? length : parts); ++i) {
+    const Eigen::Index edge = segment.begin + (all ? i : i * length / parts);
+    if (!all || admissible(edge)) {
+      edges.push_back(edge);
+    }
+  }
+  edges.push_back(segment.end);
+  Sides sides = std::move(deeper_[depth]);
+  take_sides(edges, segment.left, segment.right, sides);
+  for (double& left : sides.rss_left) {
+    left += without_value_;
+  }
+  offer(edges, sides);
+  if (!all) {
+    for (const Segment& part : cut(segment, edges, sides)) {
+      look_into(part, depth + 1);
+    }
+  }
+  deeper_[depth] = std::move(sides);
+}
+
+SplitCandidate InputSearch::best() const {
+  SplitCandidate best;
+  best.tested = tested_;
+  best.evaluations = evaluations_;
+  const double largest = smallest_ + tie_tolerance * node_.rss;
+  for (const Found& found : found_) {
+    if (found.rss <= largest && (best.input < 0 || found.left < best.left)) {
+      best.input = 0;
+      best.left = found.left;
+      best.rss = std::max(0.0, found.rss);
+      best.rank_left = found.rank_left;
+      best.rank_right = found.rank_right;
+    }
+  }
+  best.left += best.input >= 0 ? rows_in_front_ : 0;
+  return best;
+}
+
+SplitCandidate first_of_best(std::span<const SplitCandidate> found, double rss) {
+  SplitCandidate best;
+  double smallest = std::numeric_limits<double>::infinity();
+  Eigen::Index tested = 0;
+  Eigen::Index evaluations = 0;
+  for (const SplitCandidate& candidate : found) {
+    tested += candidate.tested;
+    evaluations += candidate.evaluations;
+    smallest = candidate.input >= 0 ? std::min(smallest, candidate.rss) : smallest;
+  }
+  for (std::size_t j = 0; j < found.size() && best.input < 0; ++j) {
+    if (found[j].input >= 0 && found[j].rss <= smallest + tie_tolerance * rss) {
+      best = found[j];
+      best.input = static_cast<int>(j);
+    }
+  }
+  best.tested = tested;
+  best.evaluations = evaluations;
+  return best;
+}
+
+}  // namespace llmt

@@ -1,0 +1,65 @@
+/// \file
+/// A partition laid out for evaluation.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "llmt/model.hpp"
+#include "model/leaf_validities.hpp"
+#include "model/local_models.hpp"
+#include "model/row_block.hpp"
+#include "model/tree.hpp"
+
+namespace llmt {
+
+/// See Model for what it computes. Immutable after construction. A row gives the same bytes alone and in a block.
+class Evaluator {
+ public:
+  /// `inputs`: columns of the model, whose extents close the boxes.
+  Evaluator(const Partition& partition, const std::vector<InputColumn>& inputs, Eigen::Index regressors)
+      : inputs_(std::ssize(inputs)),
+        regressors_(regressors),
+        validities_(partition, inputs),
+        models_(partition, regressors) {}
+
+  const LeafValidities& validities() const { return validities_; }
+  Eigen::Index num_outputs() const { return models_.num_outputs(); }
+
+  /// See LeafValidities.
+  void activate(const double* row, std::vector<Activation>& active) const { validities_.activate(row, active); }
+  double left_share(int node, const double* row) const { return validities_.left_share(node, row); }
+  bool is_ambiguous(const double* row) const { return validities_.is_ambiguous(row); }
+  int child_of(int node, const double* row) const { return validities_.child_of(node, row); }
+
+  /// Local model of a node, one value per output, with its ancestors' slopes beyond the node's range and none beyond
+  /// the root's.
+  void local(int node, const double* deviations, double* values) const;
+
+  /// Holds values near the root's model and goes on beyond the root's range.
+  void finish(const double* deviations, double* values) const { models_.finish(deviations, values); }
+
+  /// The prediction: sum of validity times local model, finished.
+  void combine(const std::vector<Activation>& active, const double* deviations, double* values) const;
+
+  /// Predictions of a block, rows x outputs of the partition, one row after the other.
+  void predict(const RowBlock& block, std::vector<double>& values) const;
+
+  /// Derivatives of all outputs at a point without missing values: with respect to the inputs at fixed local models
+  /// and to the regressors at fixed validities.
+  void derivatives(const double* row, const double* deviations, Eigen::MatrixXd& by_input,
+                   Eigen::MatrixXd& by_regressor) const;
+
+ private:
+  void add_gaussian_derivatives(const double* row, const double* deviations, double* values, Eigen::MatrixXd& by_input,
+                                Eigen::MatrixXd& by_regressor) const;
+  void add_blend_derivatives(int node, double validity, const double* row, const double* deviations, double* values,
+                             Eigen::MatrixXd& by_input, Eigen::MatrixXd& by_regressor) const;
+
+  Eigen::Index inputs_;
+  Eigen::Index regressors_;
+  LeafValidities validities_;
+  LocalModels models_;
+};
+
+}  // namespace llmt

@@ -1,0 +1,148 @@
+#include "llmt/intervals.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+#include "base/parallel.hpp"
+#include "llmt/files.hpp"
+
+namespace llmt {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+}  // namespace
+
+Intervals::Intervals(std::vector<Model> models, std::vector<Eigen::MatrixXd> residuals)
+    : models_(std::move(models)), residuals_(std::move(residuals)) {
+  if (models_.size() != residuals_.size()) {
+    throw std::invalid_argument(
+        fmt::format("llmt::Intervals: {} models and {} matrices of residuals", models_.size(), residuals_.size()));
+  }
+  for (std::size_t k = 0; k < models_.size(); ++k) {
+    if (models_[k].num_inputs() != models_[0].num_inputs() || models_[k].num_outputs() != models_[0].num_outputs() ||
+        residuals_[k].cols() != models_[0].num_outputs()) {
+      throw std::invalid_argument(
+          fmt::format("llmt::Intervals: fold {} has {} inputs, {} outputs and {} columns of residuals, fold 0 has {} "
+                      "inputs and {} outputs",
+                      k, models_[k].num_inputs(), models_[k].num_outputs(), residuals_[k].cols(),
+                      models_[0].num_inputs(), models_[0].num_outputs()));
+    }
+    if (!residuals_[k].allFinite() || (residuals_[k].array() < 0.0).any()) {
+      throw std::invalid_argument(fmt::format("llmt::Intervals: a residual of fold {} is negative or not finite", k));
+    }
+    for (Eigen::Index o = 0; o < residuals_[k].cols(); ++o) {
+      std::sort(residuals_[k].col(o).begin(), residuals_[k].col(o).end());
+    }
+  }
+}
+
+Bounds Intervals::predict(const Eigen::Ref<const Eigen::MatrixXd>& inputs, double level, int max_threads) const {
+  if (empty()) {
+    throw std::invalid_argument("llmt::Intervals: there are no held-out residuals; fit with folds");
+  }
+  if (!(level > 0.0 && level < 1.0)) {
+    throw std::invalid_argument(fmt::format("llmt::Intervals: level is {}, it must lie between 0 and 1", level));
+  }
+  Eigen::Index rows = 0;
+  for (const Eigen::MatrixXd& residuals : residuals_) {
+    rows += residuals.rows();
+  }
+  // Both ends leave out the same number of values. The slack keeps 0.1 * 30 from becoming 2.
+  const Eigen::Index rank =
+      static_cast<Eigen::Index>(std::floor((1.0 - level) * static_cast<double>(rows + 1) * (1.0 + 1e-12)));
+  if (rank < 1) {
+    throw std::invalid_argument(
+        fmt::format("llmt::Intervals: level {} needs at least {:.0f} held-out rows, there are {}", level,
+                    std::ceil(1.0 / (1.0 - level)) - 1.0, rows));
+  }
+  std::vector<Eigen::MatrixXd> predicted;
+  for (const Model& model : models_) {
+    predicted.push_back(model.predict(inputs, max_threads));
+  }
+  Bounds bounds{Eigen::MatrixXd(inputs.rows(), predicted[0].cols()),
+                Eigen::MatrixXd(inputs.rows(), predicted[0].cols())};
+  constexpr Eigen::Index block = 256;
+  parallel_for((inputs.rows() + block - 1) / block, max_threads, [&](Eigen::Index index) {
+    std::vector<double> lower;
+    std::vector<double> upper;
+    for (Eigen::Index row = index * block; row < std::min(inputs.rows(), (index + 1) * block); ++row) {
+      for (Eigen::Index o = 0; o < predicted[0].cols(); ++o) {
+        lower.clear();
+        upper.clear();
+        // Only the `rank` largest residuals of a fold can be among the `rank` outermost values.
+        for (std::size_t k = 0; k < models_.size(); ++k) {
+          const Eigen::Index count = residuals_[k].rows();
+          for (Eigen::Index i = std::max<Eigen::Index>(0, count - rank); i < count; ++i) {
+            lower.push_back(predicted[k](row, o) - residuals_[k](i, o));
+            upper.push_back(predicted[k](row, o) + residuals_[k](i, o));
+          }
+        }
+        std::nth_element(lower.begin(), lower.begin() + (rank - 1), lower.end());
+        std::nth_element(upper.begin(), upper.begin() + (rank - 1), upper.end(), std::greater<>());
+        bounds.lower(row, o) = lower[rank - 1];
+        bounds.upper(row, o) = upper[rank - 1];
+        if (bounds.lower(row, o) > bounds.upper(row, o)) {  // the folds' models disagree by more than their residuals
+          bounds.lower(row, o) = bounds.upper(row, o) = 0.5 * (bounds.lower(row, o) + bounds.upper(row, o));
+        }
+      }
+    }
+  });
+  return bounds;
+}
+
+void save(const Model& model, const Intervals& intervals, const std::string& path) {
+  if (intervals.empty()) {
+    save(model, path);
+    return;
+  }
+  Json json = Json::parse(to_json(model));
+  json["intervals"] = Json::array();
+  for (std::size_t k = 0; k < intervals.models().size(); ++k) {
+    Json residuals = Json::array();
+    for (Eigen::Index o = 0; o < intervals.residuals()[k].cols(); ++o) {
+      const Eigen::VectorXd column = intervals.residuals()[k].col(o);
+      residuals.push_back(std::vector<double>(column.begin(), column.end()));
+    }
+    json["intervals"].push_back(
+        {{"residuals", std::move(residuals)}, {"model", Json::parse(to_json(intervals.models()[k]))}});
+  }
+  write_file(path, json.dump(1) + "\n");
+}
+
+Intervals load_intervals(const std::string& path) {
+  Json json;
+  try {
+    json = Json::parse(read_file(path));
+  } catch (const Json::parse_error& error) {
+    throw std::runtime_error(fmt::format("{}: not JSON, or cut off: {}", path, error.what()));
+  }
+  std::vector<Model> models;
+  std::vector<Eigen::MatrixXd> residuals;
+  try {
+    if (!json.is_object() || !json.contains("intervals")) return {};
+    for (const Json& fold : json.at("intervals")) {
+      models.push_back(from_json(fold.at("model").dump(), fmt::format("{}: /intervals/{}/model", path, models.size())));
+      const std::vector<std::vector<double>> columns = fold.at("residuals").get<std::vector<std::vector<double>>>();
+      Eigen::MatrixXd values(columns.empty() ? 0 : std::ssize(columns.front()), std::ssize(columns));
+      for (std::size_t o = 0; o < columns.size(); ++o) {
+        if (std::ssize(columns[o]) != values.rows()) {
+          throw std::runtime_error(fmt::format("{}: /intervals: residuals of outputs differ in number", path));
+        }
+        values.col(o) = Eigen::Map<const Eigen::VectorXd>(columns[o].data(), std::ssize(columns[o]));
+      }
+      residuals.push_back(std::move(values));
+    }
+    return {std::move(models), std::move(residuals)};
+  } catch (const Json::exception& error) {
+    throw std::runtime_error(fmt::format("{}: /intervals: {}", path, error.what()));
+  } catch (const std::invalid_argument& error) {
+    throw std::runtime_error(fmt::format("{}: /intervals: {}", path, error.what()));
+  }
+}
+
+}  // namespace llmt

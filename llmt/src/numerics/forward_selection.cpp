@@ -1,0 +1,106 @@
+#include "numerics/forward_selection.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace llmt {
+namespace {
+
+// What a regressor must have of its own, as a part of its variance.
+constexpr double least_independence = 1e-8;
+
+// A residual sum of squares below this part of that about the mean is rounding.
+constexpr double rounding = 1e-13;
+
+constexpr int steps_without_gain = 10;
+
+// Correlations, what of them those before leave.
+struct Remaining {
+  Eigen::MatrixXd factor;      // columns of the pivoted Cholesky factor of the regressors' correlations
+  Eigen::VectorXd variance;    // of each regressor, 1 at the start; 0: constant or taken
+  Eigen::MatrixXd covariance;  // with the outputs, regressors x outputs
+  Eigen::VectorXd rss;         // of the outputs, 1 at the start
+};
+
+// The regressor that lowers the sum of squares most; of those alike the first. -1: none is left.
+Eigen::Index best_of(const Remaining& remaining) {
+  Eigen::Index best = -1;
+  double most = 0.0;
+  for (Eigen::Index k = 0; k < remaining.variance.size(); ++k) {
+    if (remaining.variance(k) > least_independence) {
+      const double gain = remaining.covariance.row(k).squaredNorm() / remaining.variance(k);
+      if (gain > most * (1.0 + 1e-10)) {
+        best = k;
+        most = gain;
+      }
+    }
+  }
+  return best;
+}
+
+void take(Eigen::Index k, const Eigen::MatrixXd& correlation, Eigen::Index step, Remaining& remaining) {
+  const double root = std::sqrt(remaining.variance(k));
+  auto column = remaining.factor.col(step);
+  column =
+      (correlation.col(k) - remaining.factor.leftCols(step) * remaining.factor.row(k).head(step).transpose()) / root;
+  const Eigen::RowVectorXd projection = remaining.covariance.row(k) / root;
+  remaining.rss -= projection.cwiseAbs2().transpose();
+  remaining.covariance -= column * projection;
+  remaining.variance -= column.cwiseAbs2();
+  remaining.variance(k) = 0.0;
+}
+
+double aicc(const Eigen::VectorXd& rss, double rows, double coefficients) {
+  const double k = coefficients + 1.0;
+  const double penalty = 2.0 * k + 2.0 * k * (k + 1.0) / (rows - k - 1.0);
+  return (rows * rss.array().max(rounding).log() + penalty).sum();
+}
+
+}  // namespace
+
+std::vector<Eigen::Index> select_regressors(const LocalSums& sums, double rows_per_weight) {
+  const Eigen::Index regressors = sums.gram.rows() - 1;
+  const double weight = sums.gram(0, 0);
+  const double rows = rows_per_weight * weight;
+  std::vector<Eigen::Index> chosen = {0};
+  if (!(weight > 0.0)) return chosen;
+  const Eigen::VectorXd mean = sums.gram.col(0).tail(regressors) / weight;
+  const Eigen::RowVectorXd mean_output = sums.products.row(0) / weight;
+  Eigen::MatrixXd correlation = sums.gram.bottomRightCorner(regressors, regressors) - weight * mean * mean.transpose();
+  // What centring leaves of a column that is constant here is rounding.
+  const Eigen::ArrayXd scale =
+      (correlation.diagonal().array() > rounding * sums.gram.diagonal().tail(regressors).array())
+          .select(correlation.diagonal().array().max(0.0).sqrt(), 0.0);
+  const Eigen::ArrayXd inverse = (scale > 0.0).select(scale.inverse(), 0.0);
+  correlation = inverse.matrix().asDiagonal() * correlation * inverse.matrix().asDiagonal();
+  const Eigen::ArrayXd total = (sums.squares.array() - weight * mean_output.transpose().array().square()).max(0.0);
+  const Eigen::ArrayXd per_output = (total > rounding * sums.squares.array()).select(total.sqrt().inverse(), 0.0);
+  Remaining remaining{.factor = Eigen::MatrixXd::Zero(regressors, regressors),
+                      .variance = (scale > 0.0).select(Eigen::ArrayXd::Ones(regressors), 0.0),
+                      .covariance = inverse.matrix().asDiagonal() *
+                                    (sums.products.bottomRows(regressors) - weight * mean * mean_output) *
+                                    per_output.matrix().asDiagonal(),
+                      .rss = (per_output > 0.0).select(Eigen::ArrayXd::Ones(per_output.size()), 0.0)};
+  std::vector<Eigen::Index> order;
+  std::size_t best = 0;
+  double smallest = aicc(remaining.rss, rows, 1.0);
+  while (order.size() < best + steps_without_gain && rows - static_cast<double>(order.size()) > 4.0 + 1.0 &&
+         remaining.rss.maxCoeff() > rounding) {
+    const Eigen::Index next = best_of(remaining);
+    if (next < 0) break;
+    take(next, correlation, std::ssize(order), remaining);
+    order.push_back(next);
+    const double criterion = aicc(remaining.rss, rows, 1.0 + static_cast<double>(order.size()));
+    if (criterion < smallest) {
+      smallest = criterion;
+      best = order.size();
+    }
+  }
+  for (std::size_t i = 0; i < best; ++i) {
+    chosen.push_back(order[i] + 1);
+  }
+  std::ranges::sort(chosen);
+  return chosen;
+}
+
+}  // namespace llmt

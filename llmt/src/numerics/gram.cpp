@@ -1,0 +1,211 @@
+#include "numerics/gram.hpp"
+
+#include <algorithm>
+
+#include "base/simd.hpp"
+
+namespace llmt {
+namespace {
+
+// Doubles that stay in the innermost cache while several tiles pass over them.
+constexpr Eigen::Index buffer_size = 2304;
+
+constexpr Eigen::Index few_columns = 16;
+
+// Rows are asked for this many before they are needed: those of a node lie all over the features.
+constexpr Eigen::Index ahead = 12;
+
+// Rows of features, here and there in memory.
+struct Scattered {
+  const double* features;
+  Eigen::Index stride;
+  const int* rows;
+  Eigen::Index following;  // how many rows will be asked for after the first
+  const double* at(Eigen::Index k) const { return features + rows[k] * stride; }
+  void prefetch(Eigen::Index k) const {
+    const double* next = at(k + std::min(ahead, following - k));
+    __builtin_prefetch(next);
+    __builtin_prefetch(next + lanes);
+  }
+};
+
+// Rows one after the other.
+struct Packed {
+  const double* rows;
+  Eigen::Index stride;
+  const double* at(Eigen::Index k) const { return rows + k * stride; }
+  void prefetch(Eigen::Index) const {}
+};
+
+// Sums f_i f_j over `count` rows, for `Rows` columns i from `first_row` and `Columns` vectors of columns j from
+// `first_column`, in registers.
+template <int Rows, int Columns, class Source>
+LLMT_INLINE void add_tile(const Source& source, Eigen::Index count, Eigen::Index first_row, Eigen::Index first_column,
+                          double* gram) {
+  Lanes sums[Rows][Columns] = {};
+  for (Eigen::Index k = 0; k < count; ++k) {
+    const double* row = source.at(k);
+    if (first_row == 0) {
+      source.prefetch(k);
+    }
+    const Lanes* right = reinterpret_cast<const Lanes*>(row + first_column);
+    for (int i = 0; i < Rows; ++i) {
+      for (int j = 0; j < Columns; ++j) {
+        sums[i][j] += row[first_row + i] * right[j];
+      }
+    }
+  }
+  for (int i = 0; i < Rows; ++i) {
+    Lanes* out = reinterpret_cast<Lanes*>(gram + GramShape::row_begin(first_row + i) + first_column);
+    for (int j = 0; j < Columns; ++j) {
+      out[j] += sums[i][j];
+    }
+  }
+}
+
+template <int Rows, class Source>
+LLMT_INLINE void add_tile_row(const Source& source, Eigen::Index count, Eigen::Index first_row, double* gram) {
+  Eigen::Index column = 0;
+  for (; column + lanes <= first_row; column += 2 * lanes) {
+    add_tile<Rows, 2>(source, count, first_row, column, gram);
+  }
+  if (column <= first_row) {
+    add_tile<Rows, 1>(source, count, first_row, column, gram);
+  }
+}
+
+template <class Source>
+LLMT_INLINE void add_tiles(const Source& source, Eigen::Index columns, Eigen::Index count, double* gram) {
+  for (Eigen::Index row = 0; row < columns; row += lanes) {
+    if (columns - row > 4) {
+      add_tile_row<8>(source, count, row, gram);
+    } else {
+      add_tile_row<4>(source, count, row, gram);
+    }
+  }
+}
+
+// Few columns: the tiles pass over the rows where they are.
+LLMT_FOR_EACH_INSTRUCTION_SET
+void add_scattered(const double* features, Eigen::Index columns, const int* rows, Eigen::Index count,
+                   Eigen::Index following, double* gram) {
+  add_tiles(Scattered{features, columns, rows, following}, columns, count, gram);
+}
+
+// Many columns, many tiles: the rows are brought together first.
+LLMT_FOR_EACH_INSTRUCTION_SET
+void add_packed(const double* features, Eigen::Index columns, const int* rows, Eigen::Index count,
+                Eigen::Index following, double* buffer, double* gram) {
+  const Scattered source{features, columns, rows, following};
+  const Eigen::Index stride = (columns + lanes - 1) / lanes * lanes;
+  for (Eigen::Index k = 0; k < count; ++k) {
+    const double* next = source.at(k + std::min(ahead, following - k));
+    const double* from = source.at(k);
+    for (Eigen::Index c = 0; c < stride; c += lanes) {
+      __builtin_prefetch(next + c);
+      *reinterpret_cast<Lanes*>(buffer + k * stride + c) = *reinterpret_cast<const Lanes*>(from + c);
+    }
+  }
+  add_tiles(Packed{buffer, stride}, columns, count, gram);
+}
+
+LLMT_FOR_EACH_INSTRUCTION_SET
+void add_vectors(const double* from, double* to, Eigen::Index size) {
+  for (Eigen::Index k = 0; k < size; k += lanes) {
+    *reinterpret_cast<Lanes*>(to + k) += *reinterpret_cast<const Lanes*>(from + k);
+  }
+}
+
+LLMT_INLINE void gather(const double* const* from, Eigen::Index at, Lanes& to) {
+  to = Lanes{from[0][at], from[1][at], from[2][at], from[3][at], from[4][at], from[5][at], from[6][at], from[7][at]};
+}
+
+// Eight factorisations at once, one in every lane. Row k of `factor` holds l_k0 d_0, l_k1 d_1, ..., in `unit` l_k0,
+// l_k1, ...; `inverse` holds 1 / d or 0. A residual is one more row, whose pivot is its residual sum of squares.
+LLMT_FOR_EACH_INSTRUCTION_SET
+void evaluate_eight(const double* const* grams, Eigen::Index coefficients, Eigen::Index columns, const double* weights,
+                    double* scratch, double* rss, double* rank) {
+  Lanes* row = reinterpret_cast<Lanes*>(scratch);
+  Lanes* inverse = row + columns;
+  Lanes* unit = inverse + columns;
+  Lanes total = {};
+  Lanes ranks = {};
+  for (Eigen::Index k = 0; k < columns; ++k) {
+    const Eigen::Index begin = GramShape::row_begin(k);
+    Lanes diagonal;
+    gather(grams, begin + k, diagonal);
+    Lanes pivot = diagonal;
+    const Eigen::Index before = std::min(k, coefficients);
+    Lanes* unit_k = unit + k * (k + 1) / 2;
+    for (Eigen::Index j = 0; j < before; ++j) {
+      const Lanes* unit_j = unit + j * (j + 1) / 2;
+      Lanes sum;
+      gather(grams, begin + j, sum);
+      for (Eigen::Index m = 0; m < j; ++m) {
+        sum -= row[m] * unit_j[m];
+      }
+      row[j] = sum;
+      const Lanes scaled = sum * inverse[j];
+      pivot -= sum * scaled;
+      if (k < coefficients) {
+        unit_k[j] = scaled;
+      }
+    }
+    if (k < coefficients) {
+      const auto independent = pivot > pivot_tolerance * diagonal;
+      const Lanes one = Lanes{} + 1.0;
+      inverse[k] = independent ? one / pivot : Lanes{};
+      ranks += independent ? one : Lanes{};
+    } else {
+      total += weights[k - coefficients] * pivot;
+    }
+  }
+  total = total > 0.0 ? total : Lanes{};
+  *reinterpret_cast<Lanes*>(rss) = total;
+  *reinterpret_cast<Lanes*>(rank) = ranks;
+}
+
+}  // namespace
+
+void add_rows(const Features& features, const int* rows, Eigen::Index count, double* gram) {
+  const double* data = features.row(0);
+  const Eigen::Index columns = features.columns();
+  const Eigen::Index stride = (columns + lanes - 1) / lanes * lanes;
+  const Eigen::Index chunk = std::max<Eigen::Index>(1, buffer_size / stride);
+  alignas(64) double buffer[buffer_size];
+  for (Eigen::Index k = 0; k < count; k += chunk) {
+    const Eigen::Index size = std::min(chunk, count - k);
+    if (columns <= few_columns) {
+      add_scattered(data, columns, rows + k, size, count - 1 - k, gram);
+    } else {
+      add_packed(data, columns, rows + k, size, count - 1 - k, buffer, gram);
+    }
+  }
+}
+
+void add(const GramShape& shape, const double* other, double* gram) { add_vectors(other, gram, shape.size()); }
+
+ResidualSums::ResidualSums(const GramShape& shape, const Eigen::VectorXd& weights)
+    : shape_(shape), weights_(weights.begin(), weights.end()) {
+  const Eigen::Index columns = shape.columns();
+  scratch_.resize(2 * columns + columns * (columns + 1) / 2);
+}
+
+void ResidualSums::evaluate(const double* const* grams, Eigen::Index count, double* rss, int* rank) {
+  for (Eigen::Index k = 0; k < count; k += lanes) {
+    std::array<const double*, 8> eight;
+    for (Eigen::Index l = 0; l < lanes; ++l) {
+      eight[l] = grams[std::min(k + l, count - 1)];
+    }
+    std::array<double, 8> sums;
+    std::array<double, 8> ranks;
+    evaluate_eight(eight.data(), shape_.coefficients(), shape_.columns(), weights_.data(),
+                   scratch_.front().values.data(), sums.data(), ranks.data());
+    for (Eigen::Index l = 0; l < std::min(lanes, count - k); ++l) {
+      rss[k + l] = sums[l];
+      rank[k + l] = static_cast<int>(ranks[l]);
+    }
+  }
+}
+
+}  // namespace llmt

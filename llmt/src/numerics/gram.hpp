@@ -1,0 +1,98 @@
+/// \file
+/// Gram matrices of rows of features, and the residual sums of squares that follow from them: the two kernels in which
+/// growth spends its time.
+///
+/// Compiled for several instruction sets like dense.hpp, with the same sums in the same order on all of them.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstddef>
+#include <vector>
+
+namespace llmt {
+
+/// Rows of features [1, z, r]: the constant, the regressors and the residuals of the outputs, each times the square
+/// root of the row's weight. One row after the other in memory, with room for a whole vector register behind the last.
+class Features {
+ public:
+  Features() = default;
+  Features(Eigen::Index rows, Eigen::Index coefficients, Eigen::Index outputs)
+      : rows_(rows), coefficients_(coefficients), outputs_(outputs), values_(rows * columns() + room, 0.0) {}
+
+  Eigen::Index rows() const { return rows_; }
+  Eigen::Index coefficients() const { return coefficients_; }  ///< constant and regressors
+  Eigen::Index outputs() const { return outputs_; }
+  Eigen::Index columns() const { return coefficients_ + outputs_; }
+  double* row(Eigen::Index i) { return values_.data() + i * columns(); }
+  const double* row(Eigen::Index i) const { return values_.data() + i * columns(); }
+  /// Asks for a row that will be needed soon.
+  void prefetch(Eigen::Index i) const {
+    for (const double* at = row(i); at < row(i + 1); at += 8) {
+      __builtin_prefetch(at);
+    }
+  }
+
+ private:
+  static constexpr Eigen::Index room = 16;
+  Eigen::Index rows_ = 0;
+  Eigen::Index coefficients_ = 0;
+  Eigen::Index outputs_ = 0;
+  std::vector<double> values_;
+};
+
+/// Where the entries of the lower triangle of a Gram matrix lie: row after row, each filled up to whole vector
+/// registers, the number of rows to a multiple of four. What fills up is undefined.
+class GramShape {
+ public:
+  GramShape(Eigen::Index coefficients, Eigen::Index outputs)
+      : coefficients_(coefficients), columns_(coefficients + outputs) {}
+  explicit GramShape(const Features& features) : GramShape(features.coefficients(), features.outputs()) {}
+
+  Eigen::Index coefficients() const { return coefficients_; }
+  Eigen::Index columns() const { return columns_; }
+  static constexpr Eigen::Index row_begin(Eigen::Index i) {
+    const Eigen::Index group = i / lanes;
+    return lanes * (lanes * group * (group + 1) / 2 + (i - lanes * group) * (group + 1));
+  }
+  Eigen::Index at(Eigen::Index i, Eigen::Index j) const { return row_begin(i) + j; }  ///< i >= j
+  Eigen::Index size() const { return row_begin((columns_ + 3) / 4 * 4); }             ///< in doubles
+
+  static constexpr Eigen::Index lanes = 8;
+
+ private:
+  Eigen::Index coefficients_;
+  Eigen::Index columns_;
+};
+
+/// Adds the Gram matrix of the given rows of `features` to `gram`.
+void add_rows(const Features& features, const int* rows, Eigen::Index count, double* gram);
+
+/// gram += other, entry by entry.
+void add(const GramShape& shape, const double* other, double* gram);
+
+/// Weighted residual sum of squares of the least-squares fit of the residuals on constant and regressors, from their
+/// Gram matrix, and the rank of the latter; for several matrices at once.
+///
+/// By an LDL' factorisation in which columns are left out whose pivot is below `pivot_tolerance` times their sum of
+/// squares. `weights`: of the outputs.
+class ResidualSums {
+ public:
+  ResidualSums(const GramShape& shape, const Eigen::VectorXd& weights);
+
+  /// rss[i] and rank[i] of grams[i], i < count.
+  void evaluate(const double* const* grams, Eigen::Index count, double* rss, int* rank);
+
+ private:
+  struct alignas(64) Slot {
+    std::array<double, 8> values;
+  };
+  GramShape shape_;
+  std::vector<double> weights_;
+  std::vector<Slot> scratch_;
+};
+
+/// The rounding of the sums is about 1e-15 of them; what a narrow child legitimately leaves of a direction is larger.
+inline constexpr double pivot_tolerance = 1e-12;
+
+}  // namespace llmt

@@ -1,0 +1,166 @@
+#include "selection/held_out_errors.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "base/parallel.hpp"
+#include "estimation/joint_fit.hpp"
+
+namespace llmt {
+namespace {
+
+// A threshold that keeps the same jumps of these trees as `jump`, in the middle of the gap between those kept and the
+// others: the scores of the tree grown on all rows are a little different.
+double middle_of_gap(const std::vector<GrownTree>& grown, double jump) {
+  double kept = no_jump;
+  double left_out = 0.0;
+  for (const GrownTree& tree : grown) {
+    for (const double score : tree.jumps) {
+      if (score >= jump) {
+        kept = std::min(kept, score);
+      } else {
+        left_out = std::max(left_out, score);
+      }
+    }
+  }
+  // Far below a jump lies its quarter at least: no score is as good as one of nearly nothing.
+  return kept < no_jump ? std::sqrt(kept * std::max(left_out, kept / 16.0)) : no_jump;
+}
+
+}  // namespace
+
+Eigen::Index enough_rows(Eigen::Index leaves, Eigen::Index coefficients) {
+  constexpr Eigen::Index rows_per_unknown = 25;
+  constexpr Eigen::Index smallest_sample = 10000;
+  return std::max(smallest_sample, rows_per_unknown * leaves * coefficients);
+}
+
+HeldOutErrors::HeldOutErrors(const std::vector<FoldRows>& folds, const std::vector<GrownTree>& grown,
+                             const Candidates& candidates, const Eigen::VectorXd& weights, int max_threads)
+    : folds_(folds),
+      grown_(grown),
+      candidates_(candidates),
+      weights_(weights),
+      max_threads_(max_threads),
+      of_folds_(folds.size()) {
+  std::set<Eigen::Index> seen;
+  for (const double jump : candidates.jumps) {
+    Eigen::Index kept = 0;
+    for (const GrownTree& tree : grown) {
+      kept += (tree.jumps.array() >= jump).count();
+    }
+    if (seen.insert(kept).second) {
+      for (const double width : candidates.widths) {
+        shapes_.push_back({width, middle_of_gap(grown, jump)});
+      }
+    }
+  }
+  Eigen::Index largest = 1;
+  for (const GrownTree& tree : grown) {
+    largest = std::max(largest, tree.partition.num_leaves());
+  }
+  for (Eigen::Index count = largest; count > 1; count = std::min(count - 1, (count * 2 + 1) / 3)) {
+    leaf_counts_.push_back(count);
+  }
+  std::ranges::reverse(leaf_counts_);
+  for (const FoldRows& fold : folds) {
+    std::vector<Chunk>& held_out = held_out_.emplace_back();
+    for (Eigen::Index index = 0; index < num_chunks(fold.held_out); ++index) {
+      held_out.push_back(fetch(fold.held_out, index, grown.front().partition.outputs));
+    }
+    samples_.push_back(thinned(fold.training, enough_rows(largest, std::ssize(fold.training.regressors) + 1)));
+  }
+}
+
+Candidate HeldOutErrors::candidate(const Key& key) const {
+  return {.validity = {candidates_.kind, shapes_[key.shape].width},
+          .jump = shapes_[key.shape].jump,
+          .estimation = candidates_.estimation,
+          .ridge = candidates_.ridges.empty() ? 0.0 : candidates_.ridges[key.ridge],
+          .shrinkage = candidates_.shrinkages[key.shrinkage],
+          .sparse = candidates_.sparse[key.sparse],
+          .leaves = leaf_counts_[key.leaves]};
+}
+
+// Errors of one shape; `keys` ascending.
+std::map<Key, double> HeldOutErrors::evaluate_shape(std::size_t fold, const std::vector<Key>& keys) const {
+  const Candidate first = candidate(keys.front());
+  const TrainingRows& sample = samples_[fold];
+  const Partition partition = blended(sample, grown_[fold], first.validity, first.jump);
+  std::map<Key, double> errors;
+  std::optional<TrainingRows> rows;
+  std::optional<JointFit> fit;
+  // A fit serves all its prefixes, so the largest tree comes first. Not for Gaussians: a prefix has others.
+  for (auto last = keys.rbegin(); last != keys.rend();) {
+    const std::size_t count = last->leaves;
+    const Eigen::Index leaves = std::min(leaf_counts_[count], partition.num_leaves());
+    if (!fit || candidates_.kind == ValidityKind::gaussian) {
+      rows = thinned(sample, enough_rows(leaves, std::ssize(sample.regressors) + 1));
+      fit.emplace(*rows, prefix(partition, leaves), max_threads_, candidates_.sparse.back());
+    }
+    std::vector<Key> same;
+    std::vector<Regularisation> regularisations;
+    for (; last != keys.rend() && last->leaves == count; ++last) {
+      const Candidate each = candidate(*last);
+      same.push_back(*last);
+      regularisations.push_back({each.ridge, each.shrinkage, each.sparse});
+    }
+    std::vector<Partition> models;
+    if (candidates_.estimation == Estimation::joint) {
+      models = fit->joint(leaves, regularisations);
+    } else {
+      for (const Regularisation& each : regularisations) {
+        models.push_back(candidates_.estimation == Estimation::local ? fit->local(leaves, each.shrinkage, each.sparse)
+                                                                     : fit->as_grown(leaves));
+      }
+    }
+    for (std::size_t i = 0; i < same.size(); ++i) {
+      errors[same[i]] = squared_error(models[i], folds_[fold].held_out, held_out_[fold], weights_);
+    }
+  }
+  return errors;
+}
+
+void HeldOutErrors::evaluate(const std::set<Key>& keys, std::size_t folds) {
+  struct Task {
+    std::size_t fold;
+    std::vector<Key> keys;
+    std::map<Key, double> errors;
+  };
+  std::vector<Task> tasks;
+  for (std::size_t fold = 0; fold < folds; ++fold) {
+    std::map<std::size_t, std::vector<Key>> of_shape;
+    for (const Key& key : keys) {
+      if (!of_folds_[fold].contains(key)) {
+        of_shape[key.shape].push_back(key);
+      }
+    }
+    for (auto& [shape, missing] : of_shape) {
+      tasks.push_back({fold, std::move(missing), {}});
+    }
+  }
+  parallel_for(std::ssize(tasks), max_threads_, [&](Eigen::Index index) {
+    Task& task = tasks[index];
+    task.errors = evaluate_shape(task.fold, task.keys);
+  });
+  for (Task& task : tasks) {
+    of_folds_[task.fold].merge(task.errors);
+  }
+}
+
+std::map<Key, std::vector<double>> HeldOutErrors::errors(std::size_t folds) const {
+  std::map<Key, std::vector<double>> result;
+  for (const auto& [key, error] : of_folds_.front()) {
+    std::vector<double> all;
+    for (std::size_t fold = 0; fold < folds && of_folds_[fold].contains(key); ++fold) {
+      all.push_back(of_folds_[fold].at(key));
+    }
+    if (all.size() == folds) {
+      result[key] = std::move(all);
+    }
+  }
+  return result;
+}
+
+}  // namespace llmt

@@ -1,0 +1,42 @@
+/// \file
+/// Held-out errors as the user sees them.
+#pragma once
+
+#include <Eigen/Core>
+#include <cmath>
+#include <numeric>
+#include <vector>
+
+#include "selection/candidates.hpp"
+
+namespace llmt {
+
+inline double sum_of(const std::vector<double>& values) { return std::accumulate(values.begin(), values.end(), 0.0); }
+
+/// Errors of candidates with the measures that the user sees.
+class Judge {
+ public:
+  Judge(const std::vector<FoldRows>& folds, Eigen::Index outputs) {
+    for (const FoldRows& fold : folds) {
+      weights_.push_back(total_weight(fold.held_out) * static_cast<double>(outputs));
+    }
+  }
+
+  CandidateError operator()(const Candidate& candidate, const std::vector<double>& errors) const {
+    CandidateError result{candidate, std::sqrt(sum_of(errors) / sum_of(weights_)), 0.0};
+    result.fold_rmse.resize(std::ssize(errors));
+    for (std::size_t f = 0; f < errors.size(); ++f) {
+      result.fold_rmse(f) = std::sqrt(errors[f] / weights_[f]);
+    }
+    if (errors.size() > 1) {
+      result.spread = std::sqrt((result.fold_rmse.array() - result.fold_rmse.mean()).square().sum() /
+                                static_cast<double>(errors.size() - 1));
+    }
+    return result;
+  }
+
+ private:
+  std::vector<double> weights_;
+};
+
+}  // namespace llmt

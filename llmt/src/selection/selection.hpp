@@ -1,0 +1,21 @@
+/// \file
+/// Which candidate predicts held-out rows best.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "selection/candidates.hpp"
+
+namespace llmt {
+
+/// Whether the gain of `other` on `simple` is beyond chance: more than two standard errors of the paired differences of
+/// the folds. A single hold-out has no such measure.
+bool is_beyond_chance(const CandidateError& simple, const CandidateError& other);
+
+/// Compares on the held-out rows of all folds, see docs/algorithms.md, section 7. `grown`: of each fold the tree grown
+/// without its held-out rows.
+Selection select(const std::vector<FoldRows>& folds, const std::vector<GrownTree>& grown, const Candidates& candidates,
+                 const Eigen::VectorXd& weights, int max_threads);
+
+}  // namespace llmt

@@ -1,0 +1,120 @@
+/// \file
+/// How a leaf of a stream finds its split.
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <vector>
+
+#include "llmt/stream.hpp"
+#include "stream/sums.hpp"
+
+namespace llmt {
+
+/// A row on its way down a tree.
+struct StreamRow {
+  const double* x;  ///< inputs; NaN: missing
+  const double* z;  ///< the same in scaled units
+  double y;
+  double weight;
+  /// Different rows / rows of the stream. Rows that come again tell nothing new: tests count so many of them.
+  double different;
+};
+
+/// What all nodes of a tree share. Options as used: no zeros that stand for defaults.
+struct StreamSetting {
+  StreamOptions options;
+  Eigen::Index inputs;
+  GramShape shape;
+  double output_variance = 0.0;  ///< of the first rows
+  double rounding = 0.0;         ///< residuals below this are rounding
+  Eigen::VectorXd centre;        ///< of the inputs: z = (x - centre) / scale
+  Eigen::VectorXd scale;
+  bool detect_drift = true;  ///< off in tests of what streams do without it
+
+  Eigen::Index coefficients() const { return inputs + 1; }
+  double scaled(Eigen::Index input, double x) const { return (x - centre(input)) / scale(input); }
+  double unscaled(Eigen::Index input, double z) const { return centre(input) + scale(input) * z; }
+};
+
+struct StreamSplit {
+  int input = -1;
+  double threshold = 0.0;
+  double reach = 0.0;  ///< distance to the edges beside the threshold
+  Sums left;           ///< of the rows that decided it, in the leaf's basis
+  Sums right;
+  double gain = 0.0;  ///< decrease of the mean squared residual
+};
+
+/// Candidates of one leaf, by residual differences: every edge between bins, see docs/algorithms.md.
+///
+/// The first rows are kept: their quantiles are the edges between the bins of each input. Then only sums are kept, for
+/// each bin of each input. Tests come whenever the number of rows has grown by a quarter; the k-th is made at
+/// significance / (k (k + 1)).
+class LeafSearch {
+ public:
+  explicit LeafSearch(const StreamSetting& setting);
+
+  /// `products`: of the row in the leaf's basis.
+  void add(const StreamRow& row, const Basis& basis, const RowProducts& products);
+
+  /// The split to make, if a test is due and shows one. `low`, `high`: range of the inputs in the leaf.
+  std::optional<StreamSplit> test(const Eigen::VectorXd& low, const Eigen::VectorXd& high, double different);
+
+  /// What the edges between the bins of an input leave; empty before bins are laid out.
+  struct Edges {
+    std::vector<double> thresholds;
+    std::vector<Eigen::Index> rows_left;
+    std::vector<double> rss_left;
+    std::vector<double> rss_right;
+    std::vector<int> rank_left;
+    std::vector<int> rank_right;
+    Eigen::Index rows = 0;  ///< in all bins
+    double rss = 0.0;       ///< of one model
+    int rank = 0;
+  };
+  Edges edges(int input);
+
+  Eigen::Index bytes() const;
+
+ private:
+  /// Bins of one input: bin b holds edges[b - 1] < x <= edges[b].
+  struct Bins {
+    std::vector<double> edges;
+    std::vector<double> grams;  // edges.size() + 1 of them
+    std::vector<Eigen::Index> rows;
+  };
+  struct Found {
+    int input = -1;
+    std::size_t edge = 0;
+    double ratio = 1.0;  // residual sum of squares, two models to one
+    double rss = 0.0;    // of one model
+    int rank = 0;
+    int rank_left = 0;
+    int rank_right = 0;
+    Eigen::Index rows = 0;
+    Eigen::Index tested = 0;
+  };
+
+  void lay_out(const Basis& basis);
+  void set_edges(Bins& bins, std::vector<double> edges) const;
+  void put(const StreamRow& row, const RowProducts& products);
+  Sums side(const Bins& bins, std::size_t begin, std::size_t end) const;
+  Found look_at(int input);
+  bool passes(const Found& found) const;
+  StreamSplit split_at(const Found& found, const Eigen::VectorXd& low, const Eigen::VectorXd& high) const;
+
+  const StreamSetting& setting_;
+  ResidualSums residuals_;
+  std::vector<double> first_rows_;  // inputs, output, weight
+  bool laid_out_ = false;
+  std::vector<Bins> bins_;            // per input
+  std::vector<double*> sums_of_row_;  // of put()
+  Eigen::Index rows_ = 0;
+  Eigen::Index next_test_ = 0;
+  Eigen::Index first_passed_ = 0;
+  int tests_ = 0;
+  double different_ = 1.0;  // see StreamRow
+};
+
+}  // namespace llmt

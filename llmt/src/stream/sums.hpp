@@ -1,0 +1,65 @@
+/// \file
+/// Sums of squares and products of rows as they come, in the basis of one linear model.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "numerics/gram.hpp"
+
+namespace llmt {
+
+/// What rows are taken relative to: features [1, z - origin, y - base . [1, z - origin]], z the scaled regressors. Sums
+/// of squares of what a model near the truth leaves keep their digits (docs/algorithms.md, section 2).
+struct Basis {
+  Eigen::VectorXd origin;
+  Eigen::VectorXd base;  // constant and slopes
+};
+
+/// Sums over rows: the Gram matrix of their features times the root of the weight, as GramShape lays it out.
+struct Sums {
+  std::vector<double> gram;
+  Eigen::Index rows = 0;
+
+  void clear();
+  void add(const GramShape& shape, const Sums& other);
+};
+
+/// A row's features padded with zeros to whole vectors, and their products.
+class RowProducts {
+ public:
+  explicit RowProducts(const GramShape& shape);
+
+  /// `z`: scaled regressors, NaN: missing, taken as the origin.
+  void set(const Basis& basis, const double* z, double y, double weight);
+  void add_to(double* gram) const;
+  void add_to(Sums& sums) const {
+    add_to(sums.gram.data());
+    ++sums.rows;
+  }
+
+ private:
+  GramShape shape_;
+  std::vector<double> features_;
+  std::vector<double> products_;
+};
+
+/// The model [constant, slopes] in the basis of `gram`, as a change of the basis' base: least squares of the residuals,
+/// plus `shrinkage` rows of the variance that each regressor has, uncorrelated, that say "no change". Regressors that
+/// do not vary, or follow from those before, change nothing. `rank`: of [1, z].
+Eigen::VectorXd solve(const GramShape& shape, const double* gram, double shrinkage, int& rank);
+
+/// Sum of squared residuals that a change of the base leaves of the rows in `gram`.
+double remaining(const GramShape& shape, const double* gram, const Eigen::VectorXd& change);
+
+/// Takes sums to a basis whose origin is shifted by `shift` and whose base differs by `change` (as solve() gives it).
+void rebase(const GramShape& shape, const Eigen::VectorXd& shift, const Eigen::VectorXd& change,
+            std::vector<double>& gram);
+
+/// Full symmetric matrix.
+Eigen::MatrixXd matrix_of(const GramShape& shape, const double* gram);
+
+/// base + change, written about the origin shifted by `shift`.
+Eigen::VectorXd shifted_model(const Eigen::VectorXd& model, const Eigen::VectorXd& shift);
+
+}  // namespace llmt

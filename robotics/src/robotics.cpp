@@ -1,1 +1,0 @@
-#include "llmt/robotics/robotics.hpp"

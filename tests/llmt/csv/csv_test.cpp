@@ -1,0 +1,108 @@
+#include "llmt/csv.hpp"
+
+#include <gtest/gtest.h>
+
+#include <functional>
+
+namespace {
+
+std::string error_of(const std::function<void()>& call) {
+  try {
+    call();
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+std::string error_in(const std::string& text) {
+  return error_of([&] {
+    const llmt::Csv csv = llmt::Csv::parse(text, "t.csv");
+    csv.numbers(csv.columns());
+  });
+}
+
+TEST(Csv, ReadsNumbersInFileOrder) {
+  const llmt::Csv csv = llmt::Csv::parse(
+      "\xEF\xBB\xBF"
+      "a, b ,c\r\n1,2.5,-3e-2\r\n\r\n+4, 5 ,\"6\"\r\n",
+      "t.csv");
+  EXPECT_EQ(csv.columns(), (std::vector<std::string>{"a", "b", "c"}));
+  Eigen::MatrixXd expected(2, 2);
+  expected << -3e-2, 1.0, 6.0, 4.0;
+  EXPECT_EQ(csv.numbers(std::vector<std::string>{"c", "a"}), expected);
+  EXPECT_EQ(csv.row_text(1), "+4, 5 ,\"6\"");
+  EXPECT_EQ(csv.line_of(1), 4);
+}
+
+TEST(Csv, NumbersAreCorrectlyRounded) {
+  const llmt::Csv csv = llmt::Csv::parse("a\n0.1\n1.7976931348623157e308\n5e-324\n9007199254740993\n", "t.csv");
+  EXPECT_EQ(csv.numbers("a"), Eigen::Vector4d(0.1, 1.7976931348623157e308, 5e-324, 9007199254740992.0));
+}
+
+TEST(Csv, TakesSemicolonsAndTabsWhenTheHeaderHasNoComma) {
+  EXPECT_EQ(llmt::Csv::parse("a;b\n1;2\n", "t").numbers("b")(0), 2.0);
+  EXPECT_EQ(llmt::Csv::parse("a\tb\n1\t2", "t").numbers("b")(0), 2.0);
+}
+
+TEST(Csv, QuotedFieldsMayHoldAnything) {
+  const llmt::Csv csv = llmt::Csv::parse("\"a, \"\"quoted\"\"\",b\n\"two\nlines\",1\nword,2\n", "t.csv");
+  EXPECT_EQ(csv.columns()[0], "a, \"quoted\"");
+  EXPECT_EQ(csv.numbers("b"), Eigen::Vector2d(1.0, 2.0));
+  EXPECT_EQ(csv.line_of(1), 4);
+  EXPECT_EQ(llmt::csv_field("a, \"quoted\""), "\"a, \"\"quoted\"\"\"");
+}
+
+TEST(Csv, WordsHurtOnlyWhoAsksForThem) {
+  const llmt::Csv csv = llmt::Csv::parse("name,v\nleft,1\n", "t.csv");
+  EXPECT_EQ(csv.numbers("v")(0), 1.0);
+  EXPECT_EQ(error_of([&] { csv.numbers("name"); }), "t.csv:2: column \"name\": 'left' is not a number");
+}
+
+TEST(Csv, ErrorsNameFileLineAndColumn) {
+  EXPECT_EQ(error_in(""), "t.csv: the file is empty, a header row is needed");
+  EXPECT_EQ(error_in("a,b\n1,2\n3\n"), "t.csv:3: the row has 1 field, the header has 2 (is the file cut off?)");
+  EXPECT_EQ(error_in("a,b\n1,2,3\n3,4\n"), "t.csv:2: the row has 3 fields, the header has 2");
+  EXPECT_EQ(error_in("a,b\n1,\n"), "t.csv:2: column \"b\": the cell is empty, a number is needed");
+  EXPECT_EQ(error_in("a,b\n1,nan\n"), "t.csv:2: column \"b\": 'nan' is not finite");
+  EXPECT_EQ(error_in("a,b\n1,2\n\n1,inf\n"), "t.csv:4: column \"b\": 'inf' is not finite");
+  EXPECT_EQ(error_in("a,b\n1,1e999\n"), "t.csv:2: column \"b\": '1e999' is not finite");
+  EXPECT_EQ(error_in("a,b\n1,2 mm\n"), "t.csv:2: column \"b\": '2 mm' is not a number");
+  EXPECT_EQ(error_in("a,b\n1,+-2\n"), "t.csv:2: column \"b\": '+-2' is not a number");
+  EXPECT_EQ(error_in("a,b\n1,\n3,4\n"), "t.csv:2: column \"b\": the cell is empty, a number is needed");
+  EXPECT_EQ(error_in("a,b\n1," + std::string(59, 'x') + "\u00E9 and more\n"),
+            "t.csv:2: column \"b\": '" + std::string(59, 'x') + "...' is not a number");
+  EXPECT_EQ(error_in("a,a\n1,2\n"), "t.csv:1: the header has column \"a\" twice");
+  EXPECT_EQ(error_in(",a\n1,2\n"), "t.csv:1: column 1 of the header has no name");
+  EXPECT_EQ(error_of([] { llmt::Csv::parse("a,b\n", "t.csv").numbers("c"); }),
+            "t.csv: there is no column \"c\"; the columns are a, b");
+  EXPECT_EQ(error_of([] { llmt::Csv::read("no/such/file.csv"); }),
+            "no/such/file.csv: cannot be read: No such file or directory");
+}
+
+TEST(Csv, AColumnMayBeAskedForTwice) {
+  const llmt::Csv csv = llmt::Csv::parse("a,b\n1,2\n3,4\n", "t.csv");
+  Eigen::MatrixXd expected(2, 3);
+  expected << 1.0, 2.0, 1.0, 3.0, 4.0, 3.0;
+  EXPECT_EQ(csv.numbers(std::vector<std::string>{"a", "b", "a"}), expected);
+}
+
+TEST(Csv, CellsThatAreNoNumbersAreCounted) {
+  const llmt::Csv csv = llmt::Csv::parse("a,b,c\n1,left,NA\n,right,\n3,?,inf\n", "t.csv");
+  const llmt::CsvNumbers read = csv.read_numbers(csv.columns());
+  EXPECT_EQ(read.cells[0].missing, 1);
+  EXPECT_EQ(read.cells[0].first_missing, 1);
+  EXPECT_EQ(read.cells[0].other, 0);
+  EXPECT_EQ(read.cells[0].first_other, llmt::ColumnCells::no_row);
+  EXPECT_EQ(read.cells[1].other, 2);
+  EXPECT_EQ(read.cells[1].first_other, 0);
+  EXPECT_EQ(read.cells[2].first_missing, 0);
+  EXPECT_EQ(read.cells[2].first_other, 2);
+  EXPECT_EQ(read.values.array().isNaN().count(), 7);
+  const std::vector<Eigen::Index> rows = {llmt::ColumnCells::no_row, 1, 1};
+  EXPECT_EQ(error_of([&] { csv.refuse_first(csv.columns(), rows); }), "t.csv:3: column \"b\": 'right' is not a number");
+}
+
+TEST(Csv, AHeaderAloneHasNoRows) { EXPECT_EQ(llmt::Csv::parse("a,b\n", "t.csv").rows(), 0); }
+
+}  // namespace

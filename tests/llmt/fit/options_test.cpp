@@ -1,0 +1,60 @@
+// Mistakes of the caller are named.
+#include <gtest/gtest.h>
+
+#include <Eigen/Core>
+#include <functional>
+#include <limits>
+#include <string>
+#include "oracles/random_trees.hpp"
+
+namespace {
+
+using namespace random_trees;
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+
+TEST(Fit, MistakesInWeightsCategoriesAndBlendsAreNamed) {
+  const Eigen::MatrixXd x = oracle::uniform(20, 2, 72).cwiseAbs();
+  const Eigen::MatrixXd y = x.col(0);
+  const auto error = [&](const std::function<void(llmt::FitOptions&)>& change) {
+    llmt::FitOptions options;
+    change(options);
+    return message_of([&] { llmt::fit(x, y, options); });
+  };
+  const auto starts = [](const std::string& text, const std::string& with) {
+    return text.rfind(with, 0) == 0 ? with : text;
+  };
+  const std::string category = error([](auto& options) { options.categorical_inputs = {1}; });
+  EXPECT_EQ(starts(category, "llmt::fit: a category of input 1 is 0."), "llmt::fit: a category of input 1 is 0.");
+  EXPECT_NE(category.find("it must be a whole number from 0 to 9999"), std::string::npos) << category;
+  Eigen::MatrixXd halves = x;
+  halves.col(1).setConstant(1.5);
+  EXPECT_EQ(message_of([&] { llmt::fit(halves, y, {.categorical_inputs = {1}}); }),
+            "llmt::fit: a category of input 1 is 1.5, it must be a whole number from 0 to 9999");
+  EXPECT_EQ(error([](auto& options) { options.categorical_inputs = {2}; }),
+            "llmt::fit: categorical_inputs names column 2, there are 2");
+  EXPECT_EQ(error([](auto& options) { options.weights = Eigen::VectorXd::Constant(20, -1.0); }),
+            "llmt::fit: a weight is -1, it must be at least 0");
+  EXPECT_EQ(error([](auto& options) { options.weights = Eigen::VectorXd::Zero(20); }),
+            "llmt::fit: the largest weight is 0, it must be positive");
+  EXPECT_EQ(error([](auto& options) { options.weights = Eigen::VectorXd::Ones(19); }),
+            "llmt::fit: weights has 19 entries, inputs has 20 rows");
+  EXPECT_EQ(error([](auto& options) { options.blend.widths = {0.0}; }),
+            "llmt::fit: blend.widths is 0, it must be finite and positive");
+  EXPECT_EQ(error([](auto& options) {
+              options.blend.widths = {1.0, -2.0};
+            }),
+            "llmt::fit: blend.widths is -2, it must be finite and positive");
+  EXPECT_EQ(error([](auto& options) { options.blend.ridges = {-1.0}; }),
+            "llmt::fit: blend.ridges is -1, it must be finite and not negative");
+  EXPECT_EQ(error([](auto& options) { options.blend.shrinkages = {nan}; }),
+            "llmt::fit: blend.shrinkages is nan, it must be finite and not negative");
+  const llmt::Model model = llmt::fit(x, y).model;
+  Eigen::MatrixXd query = x;
+  query(2, 1) = -std::numeric_limits<double>::infinity();
+  EXPECT_EQ(message_of([&] { model.predict(query); }),
+            "llmt::Model::predict: inputs(2, 1) is -inf, it must be finite, or NaN where it is missing (rows and "
+            "columns counted from 0)");
+}
+
+}  // namespace

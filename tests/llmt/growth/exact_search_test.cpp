@@ -1,0 +1,168 @@
+#include <gtest/gtest.h>
+
+#include <numeric>
+
+#include "growth/search/split_search.hpp"
+#include "numerics/node_fit.hpp"
+#include "oracles/brute_force_search.hpp"
+#include "oracles/oracles.hpp"
+
+namespace {
+
+// A node with a sorted list of rows for every input; NaN: no value.
+struct Problem {
+  llmt::Features features;
+  Eigen::VectorXd weights;
+  double rss = 0.0;
+  std::vector<std::vector<int>> orders;
+  std::vector<std::vector<double>> values;
+
+  llmt::SearchNode node() const { return {features, weights, rss}; }
+};
+
+Problem make_problem(const Eigen::MatrixXd& x, const Eigen::MatrixXd& y, const Eigen::VectorXd& weights,
+                     Eigen::Index regressors) {
+  Problem problem;
+  const Eigen::MatrixXd known = x.array().isNaN().select(0.0, x);
+  llmt::NodeFit fit = llmt::fit_node(known.leftCols(regressors), y, weights);
+  problem.weights = Eigen::VectorXd::Constant(y.cols(), 2.0);
+  problem.rss = problem.weights.dot(fit.rss);
+  problem.features = std::move(fit.features);
+  for (Eigen::Index j = 0; j < x.cols(); ++j) {
+    std::vector<int> order;
+    for (int row = 0; row < x.rows(); ++row) {
+      if (!std::isnan(x(row, j))) {
+        order.push_back(row);
+      }
+    }
+    std::ranges::stable_sort(order, [&](int a, int b) { return x(a, j) < x(b, j); });
+    const Eigen::VectorXd sorted = x.col(j)(order);
+    problem.values.emplace_back(sorted.begin(), sorted.end());
+    problem.orders.push_back(std::move(order));
+  }
+  return problem;
+}
+
+struct Result {
+  int input = -1;
+  llmt::SplitCandidate split;
+  Eigen::Index evaluations = 0;
+};
+
+// As growth does it: the inputs share what the edges of their blocks found.
+Result search(const Problem& problem, Eigen::Index min_leaf_samples) {
+  std::vector<llmt::InputSearch> searches;
+  searches.reserve(problem.orders.size());
+  double limit = std::numeric_limits<double>::infinity();
+  for (std::size_t j = 0; j < problem.orders.size(); ++j) {
+    searches.emplace_back(problem.node(), problem.values[j], problem.orders[j], min_leaf_samples).search_edges();
+    limit = std::min(limit, searches.back().smallest());
+  }
+  double smallest = limit;
+  for (llmt::InputSearch& input : searches) {
+    input.refine(limit);
+    smallest = std::min(smallest, input.smallest());
+  }
+  Result result;
+  for (std::size_t j = 0; j < searches.size(); ++j) {
+    const llmt::SplitCandidate split = searches[j].best();
+    result.evaluations += split.evaluations;
+    if (result.input < 0 && split.input >= 0 && split.rss <= smallest + llmt::tie_tolerance * problem.rss) {
+      result.input = static_cast<int>(j);
+      result.split = split;
+    }
+  }
+  return result;
+}
+
+template <int Coefficients>
+void expect_brute_force(const Problem& problem, Eigen::Index min_leaf_samples) {
+  ASSERT_EQ(problem.features.coefficients(), Coefficients);
+  const oracle::BruteForceSplit expected =
+      oracle::search<Coefficients>(problem.node(), problem.orders, problem.values, min_leaf_samples);
+  const Result found = search(problem, min_leaf_samples);
+  ASSERT_EQ(found.input, expected.input);
+  if (expected.input >= 0) {
+    EXPECT_EQ(found.split.left, expected.left);
+    EXPECT_NEAR(found.split.rss, expected.rss, 1e-11 * problem.rss);
+  }
+}
+
+Eigen::VectorXd ones(Eigen::Index rows) { return Eigen::VectorXd::Ones(rows); }
+
+TEST(ExactSearch, EqualsBruteForceOnCurvedTargets) {
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    SCOPED_TRACE(seed);
+    const Eigen::MatrixXd x = oracle::uniform(1500, 4, seed);
+    expect_brute_force<5>(make_problem(x, oracle::curved(x, 0.2, seed), ones(1500), 4), 10);
+  }
+}
+
+TEST(ExactSearch, EqualsBruteForceOnPureNoise) {
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    SCOPED_TRACE(seed);
+    const Eigen::MatrixXd x = oracle::uniform(1500, 4, seed);
+    expect_brute_force<5>(make_problem(x, oracle::uniform(1500, 1, seed + 100), ones(1500), 4), 1);
+  }
+}
+
+TEST(ExactSearch, EqualsBruteForceWithTiesConstantsAndDuplicates) {
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    for (const double levels : {1.0, 5.0, 40.0, 700.0}) {
+      SCOPED_TRACE(seed);
+      Eigen::MatrixXd x(1200, 5);
+      x << (oracle::uniform(1200, 2, seed) * levels).array().round().matrix(), oracle::uniform(1200, 1, seed + 50),
+          Eigen::VectorXd::Constant(1200, 4.0), Eigen::VectorXd::Zero(1200);
+      x.col(4) = x.col(2);
+      x.bottomRows(300) = x.topRows(300).eval();
+      const Eigen::MatrixXd y = oracle::curved(x, 0.1, seed);
+      expect_brute_force<4>(make_problem(x, y, ones(1200), 5), 4);
+    }
+  }
+}
+
+TEST(ExactSearch, EqualsBruteForceWithNearlyCollinearInputs) {
+  for (const double apart : {1e-2, 1e-5, 1e-8, 1e-12}) {
+    SCOPED_TRACE(apart);
+    Eigen::MatrixXd x = oracle::uniform(1000, 3, 7);
+    x.col(2) = x.col(0) + apart * x.col(2);
+    const Problem problem = make_problem(x, oracle::curved(x, 0.05, 7), ones(1000), 3);
+    if (apart > 1e-10) {
+      expect_brute_force<4>(problem, 5);
+    } else {
+      expect_brute_force<3>(problem, 5);
+    }
+  }
+}
+
+TEST(ExactSearch, EqualsBruteForceWithWeightsOutputsAndMissingValues) {
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    SCOPED_TRACE(seed);
+    Eigen::MatrixXd x = oracle::uniform(1100, 3, seed);
+    Eigen::MatrixXd y(1100, 2);
+    y << oracle::curved(x, 0.1, seed), oracle::curved(x.rowwise().reverse(), 0.3, seed + 1);
+    const Eigen::VectorXd weights = oracle::uniform(1100, 1, seed + 9).array().abs() + 1e-3;
+    for (Eigen::Index row = 0; row < 1100; row += 7) {
+      x(row, static_cast<Eigen::Index>(seed) % 3) = std::nan("");
+    }
+    expect_brute_force<4>(make_problem(x, y, weights, 3), 6);
+  }
+}
+
+TEST(ExactSearch, LeavesMostSplitsAloneWhereThereIsSomethingToFind) {
+  const Eigen::MatrixXd x = oracle::uniform(20000, 3, 3);
+  const Problem problem = make_problem(x, oracle::curved(x, 0.1, 3), ones(20000), 3);
+  expect_brute_force<4>(problem, 8);
+  EXPECT_LT(search(problem, 8).evaluations, 60000 / 20);
+}
+
+TEST(ExactSearch, NodesOfAnySizeAreSearchedWhole) {
+  for (Eigen::Index rows = 2; rows < 200; ++rows) {
+    SCOPED_TRACE(rows);
+    const Eigen::MatrixXd x = oracle::uniform(rows, 1, 5);
+    const Problem problem = make_problem(x, oracle::uniform(rows, 1, 6), ones(rows), 1);
+    expect_brute_force<2>(problem, 1);
+  }
+}
+
+}  // namespace

@@ -1,0 +1,79 @@
+// Trees of any validity on random data.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <functional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "llmt/fit.hpp"
+#include "oracles/oracles.hpp"
+
+namespace random_trees {
+
+struct Kind {
+  llmt::ValidityChoice validity;
+  double width;
+};
+
+inline const std::vector<Kind> kinds = {{llmt::ValidityChoice::crisp, 1.0},
+                                        {llmt::ValidityChoice::blend, 0.5},
+                                        {llmt::ValidityChoice::blend, 2.0},
+                                        {llmt::ValidityChoice::blend, 1.0},
+                                        {llmt::ValidityChoice::gaussian, 1.0 / 3.0}};
+
+/// The model as a file of an earlier version may hold it: blends with `smoothness` continuous derivatives.
+inline llmt::Model with_smoothness(const llmt::Model& model, int smoothness) {
+  std::vector<llmt::Partition> partitions = model.partitions();
+  for (llmt::Partition& partition : partitions) {
+    partition.validity.smoothness = smoothness;
+  }
+  return {model.inputs(), model.outputs(), model.regressors(), std::move(partitions)};
+}
+
+/// One candidate, no choice.
+inline llmt::FitOptions only(const Kind& kind, llmt::Estimation estimation, Eigen::Index max_leaves,
+                             double ridge = 1e-3) {
+  llmt::FitOptions options;
+  options.growth = {.significance = 1.0, .min_variance_gain = -1.0, .max_leaves = max_leaves};
+  options.blend = {.validity = kind.validity,
+                   .estimation = estimation,
+                   .widths = {kind.width},
+                   .ridges = {ridge},
+                   .shrinkages = {0.0}};
+  options.selection.folds.count = 0;
+  return options;
+}
+
+/// A curved output and an affine one, which a shared partition has to serve both.
+struct Data {
+  Eigen::MatrixXd x;
+  Eigen::MatrixXd y;
+};
+
+inline Eigen::VectorXd affine(const Eigen::MatrixXd& x) { return (x * Eigen::Vector3d(1.0, -2.0, 0.5)).array() + 3.0; }
+
+inline Data data(std::uint64_t seed, Eigen::Index rows = 300, bool corners = false) {
+  Eigen::MatrixXd x = oracle::uniform(rows, 3, seed);
+  for (int corner = 0; corner < (corners ? 16 : 0); ++corner) {  // each twice
+    for (int j = 0; j < 3; ++j) {
+      x(corner, j) = (corner >> j) % 2 == 0 ? -1.0 : 1.0;
+    }
+  }
+  Eigen::MatrixXd y(rows, 2);
+  y << oracle::curved(x, 0.1, seed), affine(x);
+  return {std::move(x), std::move(y)};
+}
+
+inline std::string message_of(const std::function<void()>& call) {
+  try {
+    call();
+  } catch (const std::invalid_argument& error) {
+    return error.what();
+  }
+  return "no std::invalid_argument";
+}
+
+}  // namespace random_trees
