@@ -63,7 +63,7 @@ struct Node {
 
   Eigen::Index samples = 0;  ///< training rows in the node's box
   /// Of [1, regressors] over those rows: the coefficients that the rows could determine. Where regressors were selected
-  /// (FitOptions::local_models) the number of coefficients; the slopes of the others are 0.
+  /// (FitOptions::sparse) the number of coefficients; the slopes of the others are 0.
   int rank = 0;
   Eigen::VectorXd rss;    ///< weighted residual sum of squares over those rows, one per output of the partition
   Eigen::VectorXd value;  ///< local model at the centre of the regressors, one per output of the partition
