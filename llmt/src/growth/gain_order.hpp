@@ -18,7 +18,9 @@ struct ByGain {
   int node = 0;
   Content content = {};
 
-  friend bool operator<(const ByGain& a, const ByGain& b) { return a.gain != b.gain ? a.gain < b.gain : a.node > b.node; }
+  friend bool operator<(const ByGain& a, const ByGain& b) {
+    return a.gain != b.gain ? a.gain < b.gain : a.node > b.node;
+  }
 };
 
 /// The gains of the splits that `nodes` still has: one entry per node, 0 for leaves. `gains` may hold further entries,

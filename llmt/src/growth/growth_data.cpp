@@ -55,8 +55,7 @@ bool GrowthData::is_significant(double level, double weight, int rank, double rs
   const double added = num_outputs * (split.left + split.right - rank);
   const double freedom = num_outputs * (weight - split.left - split.right);
   if (added <= 0.0 || freedom <= 0.0) return false;
-  const double f = ((rss - split_rss) / added) / (split_rss / freedom);
-  return f_survival(f, added, freedom) * static_cast<double>(tested) < level;
+  return chow_p_value(rss - split_rss, added, split_rss / freedom, freedom) * static_cast<double>(tested) < level;
 }
 
 double GrowthData::place_threshold(double low, double high, double mean, const Eigen::VectorXd& apart,

@@ -4,18 +4,19 @@
 #include <limits>
 
 #include "base/parallel.hpp"
-#include "estimation/joint_fit.hpp"
+#include "estimation/local_estimate.hpp"
+#include "estimation/squared_errors.hpp"
 
 namespace llmt {
 namespace {
 
 // Errors of crisp trees whose leaves have to be in order: each number of leaves has models of its own, so only some
 // are tried, each half as large again as the one before; the others are infinite.
-Eigen::VectorXd ordered_prefix_errors(const JointFit& fit, Eigen::Index largest, double shrinkage, const FoldRows& fold,
+Eigen::VectorXd ordered_prefix_errors(const LeafSums& sums, Eigen::Index largest, double shrinkage, const FoldRows& fold,
                                       const Eigen::VectorXd& weights) {
   Eigen::VectorXd errors = Eigen::VectorXd::Constant(largest, std::numeric_limits<double>::infinity());
   for (Eigen::Index leaves = 1;; leaves = std::min(largest, leaves + (leaves + 1) / 2)) {
-    const Partition models = shrinkage > 0.0 ? fit.local(leaves, shrinkage) : fit.as_grown(leaves);
+    const Partition models = shrinkage > 0.0 ? local(sums, leaves, shrinkage) : as_grown(sums, leaves);
     std::vector<Chunk> held_out;
     for (Eigen::Index index = 0; index < num_chunks(fold.held_out); ++index) {
       held_out.push_back(fetch(fold.held_out, index, models.outputs));
@@ -43,20 +44,20 @@ void compare_crisp(const std::vector<FoldRows>& folds, const std::vector<GrownTr
   std::vector<std::vector<Eigen::VectorXd>> errors(variants.size(), std::vector<Eigen::VectorXd>(folds.size()));
   parallel_for(std::ssize(folds), max_threads, [&](Eigen::Index index) {
     const std::size_t f = index;
-    const JointFit fit(folds[f].training, blended(folds[f].training, grown[f], {}, no_jump), max_threads,
-                       candidates.sparse.back());
+    const LeafSums sums = sum_leaves(folds[f].training, blended(folds[f].training, grown[f], {}, no_jump), max_threads,
+                                     candidates.sparse.back());
     const Eigen::Index leaves = grown[f].partition.num_leaves();
     for (std::size_t v = 0; v < variants.size(); ++v) {
       const auto [sparse, shrinkage] = variants[v];
-      if (fit.has_ordered_leaves()) {
-        errors[v][f] = ordered_prefix_errors(fit, leaves, shrinkage, folds[f], weights);
+      if (has_ordered_leaves(sums)) {
+        errors[v][f] = ordered_prefix_errors(sums, leaves, shrinkage, folds[f], weights);
         continue;
       }
-      const Partition models = sparse || shrinkage > 0.0 ? fit.local(leaves, shrinkage, sparse) : fit.as_grown(leaves);
+      const Partition models = sparse || shrinkage > 0.0 ? local(sums, leaves, shrinkage, sparse) : as_grown(sums, leaves);
       errors[v][f] = prefix_squared_errors(models, folds[f].held_out, weights, max_threads);
       if (sparse && leaves > 1) {  // the root of a larger tree is full
         errors[v][f](0) =
-            prefix_squared_errors(fit.local(1, shrinkage, true), folds[f].held_out, weights, max_threads)(0);
+            prefix_squared_errors(local(sums, 1, shrinkage, true), folds[f].held_out, weights, max_threads)(0);
       }
     }
   });

@@ -7,7 +7,7 @@
 #include <optional>
 
 #include "base/parallel.hpp"
-#include "estimation/joint_fit.hpp"
+#include "estimation/squared_errors.hpp"
 #include "numerics/paired_difference.hpp"
 #include "selection/crisp_trees.hpp"
 #include "selection/held_out_errors.hpp"

@@ -23,9 +23,9 @@ Eigen::MatrixXd change_of_prediction(const RowMajor& queries, const NodeFit& chi
   for (Eigen::Index i = 0; i < queries.rows(); ++i) {
     for (Eigen::Index k = 0; k < queries.cols(); ++k) {
       if (std::isnan(queries(i, k))) {
-        change.row(i) += (child.slope_change.col(k) * child.mean(k) +
-                          parent.slope.col(k) * (child.mean(k) - parent.mean(k)))
-                             .transpose();
+        change.row(i) +=
+            (child.slope_change.col(k) * child.mean(k) + parent.slope.col(k) * (child.mean(k) - parent.mean(k)))
+                .transpose();
       } else {
         change.row(i) += child.slope_change.col(k).transpose() * queries(i, k);
       }

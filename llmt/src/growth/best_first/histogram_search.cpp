@@ -96,8 +96,8 @@ SplitCandidate BinnedRows::best_edge(const Edges& edges, std::span<const Eigen::
   return best;
 }
 
-// The bound (docs/algorithms/split-search.md, S.1) of the splits inside each bin that has rows; infinity if a bin has no
-// admissible split inside.
+// The bound (docs/algorithms/split-search.md, S.1) of the splits inside each bin that has rows; infinity if a bin has
+// no admissible split inside.
 std::vector<double> BinnedRows::bounds_of_bins(const Edges& edges, std::span<const Eigen::Index> rows,
                                                std::size_t input) const {
   const Eigen::Index smallest_leaf = data_.problem.options.min_leaf_samples;
@@ -150,9 +150,9 @@ SplitCandidate BinnedRows::look_into(const Edges& edges, const std::vector<std::
       values.push_back(value);
       order.push_back(row);
     }
-    const InputSearch::Beyond front{
-        edges.rows_before[at], at > 0 ? edges.grams_left.data() + (at - 1) * shape_.size() : nothing.data(),
-        at > 0 ? edges.rss_left[at - 1] : 0.0};
+    const InputSearch::Beyond front{edges.rows_before[at],
+                                    at > 0 ? edges.grams_left.data() + (at - 1) * shape_.size() : nothing.data(),
+                                    at > 0 ? edges.rss_left[at - 1] : 0.0};
     const InputSearch::Beyond behind{std::ssize(rows) - front.rows - std::ssize(order),
                                      last ? nothing.data() : edges.grams_right.data() + at * shape_.size(),
                                      last ? 0.0 : edges.rss_right[at]};
