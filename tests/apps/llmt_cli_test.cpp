@@ -6,7 +6,6 @@
 
 #include "apps/program.hpp"
 #include "llmt/csv.hpp"
-#include "llmt/files.hpp"
 #include "llmt/fit.hpp"
 #include "llmt/random.hpp"
 
@@ -364,22 +363,6 @@ TEST(LlmtProgram, SameBytesWhateverTheThreads) {
   }
   EXPECT_EQ(llmt::read_file(folder.file("m1.json")), llmt::read_file(folder.file("m2.json")));
   EXPECT_EQ(llmt::read_file(folder.file("m1.json")), llmt::read_file(folder.file("m8.json")));
-}
-
-TEST(LlmtProgram, HelpAndCommandsPageStateTheDefaultsOfTheLibrary) {
-  Folder folder;
-  const std::string help = folder.run(llmt_program + " fit --help").out;
-  const std::string page = llmt::read_file(LLMT_DOCS "/commands.md");
-  for (const char* option :
-       {"max_leaves", "min_leaf_samples", "significance", "widths", "jumps", "ridges", "shrinkages"}) {
-    const std::string text = llmt::default_text(option);
-    EXPECT_NE(help.find("[" + text + "]"), std::string::npos) << option << ": " << text << "\n" << help;
-    EXPECT_NE(page.find(": " + text), std::string::npos) << option << ": " << text;
-  }
-  for (const llmt::Choice<llmt::GrowthRule>& rule : llmt::choices<llmt::GrowthRule>()) {
-    EXPECT_NE(help.find(fmt::format("{} ({})", rule.name, llmt::summary_of(rule.value))), std::string::npos);
-    EXPECT_NE(page.find(fmt::format("`{}`", rule.name)), std::string::npos);
-  }
 }
 
 }  // namespace
