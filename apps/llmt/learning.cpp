@@ -131,10 +131,10 @@ void add_learning_options(CLI::App& command, LearningArguments& arguments) {
       .add_option("--slope-sign", arguments.slope_signs,
                   "Inputs with slopes >= 0, or with a leading minus <= 0, in every local model; not across leaves")
       ->delimiter(',');
-  command.add_option("--max-leaves", options.max_leaves, "Most leaves of a tree, 0: see docs/commands.md")
-      ->capture_default_str();
-  command.add_option("--min-leaf", options.min_leaf_samples, "Fewest rows in a leaf, 0: see docs/commands.md")
-      ->capture_default_str();
+  command.add_option("--max-leaves", options.max_leaves, "Most leaves of a tree; 0: the default")
+      ->option_text(fmt::format("INT [{}]", default_text("max_leaves")));
+  command.add_option("--min-leaf", options.min_leaf_samples, "Fewest rows in a leaf; 0: the default")
+      ->option_text(fmt::format("INT [{}]", default_text("min_leaf_samples")));
   command.add_flag_callback(
       "--prune", [&options] { options.pruning = Pruning::weakest_link; },
       "Undo the splits of the weakest branches first, not the last ones, where fewer leaves predict better");

@@ -18,17 +18,18 @@ struct Method {
   FitOptions options;
 };
 
-/// Least squares; crisp trees grown by RD, by RETIS and by RA; M5' with its own pruning and smoothing; Gaussians over a
-/// crisp tree as in Benes et al. (2022), without re-estimation, and with joint re-estimation; the blend with joint
-/// estimation; LOLIMOT; HILOMOT; where the number of `inputs` is given and of their local models quadratic ones can be
-/// made (LocalTerms), the crisp tree by RD with these. `base` gives the columns, weights, seeds and threads.
+/// The methods of `llmt compare`: least squares; the crisp tree of each growth rule that has one (RD, RETIS, RA, M5');
+/// Gaussians over a crisp tree as in Benes et al. (2022), as grown and with joint estimation; the blend with joint
+/// estimation; LOLIMOT; HILOMOT. With `inputs`, the number of input columns, also the crisp tree with quadratic local
+/// models where these can be made. `base` gives columns, weights, folds and threads; with Pruning::weakest_link the
+/// pruned crisp tree and blend are added.
 std::vector<Method> usual_methods(const FitOptions& base = {}, Eigen::Index inputs = 0);
 
 /// What one method made of the data.
 struct Comparison {
   std::string method;
   Eigen::Index leaves = 0;  ///< of the model of all rows
-  /// Constants and slopes other than 0 of the local models, thresholds of the splits, directions and gates.
+  /// Number of constants and non-zero slopes of the local models, thresholds, directions and gates of the splits.
   Eigen::Index parameters = 0;
   Eigen::VectorXd fold_rmse = {};  ///< held-out, one entry a fold
   double cv_rmse = 0.0;            ///< over all held-out rows
@@ -36,7 +37,7 @@ struct Comparison {
   /// Largest change of the prediction across a split, at the training rows' projections on it (at most 1000 rows).
   double largest_jump = 0.0;
   double fit_seconds = 0.0;      ///< of the model of all rows, its own selection included
-  double predict_seconds = 0.0;  ///< for a million rows
+  double predict_seconds = 0.0;  ///< time to predict a million rows
 };
 
 struct ComparisonResult {
@@ -47,13 +48,13 @@ struct ComparisonResult {
 
 struct CompareOptions {
   FoldOptions folds = {};  ///< outer folds: each method makes all its choices within the training part
-  /// Called with the method and how many of how many fits are done.
+  /// Called after each fit with the method, the number of fits done and of all fits.
   std::function<void(const std::string& method, Eigen::Index done, Eigen::Index total)> progress = {};
 };
 
-/// Fits every method in every fold and on all rows. One output. Recommended is the smallest held-out error; but a
-/// simpler method that comes within one standard error of the paired difference over the folds is preferred: least
-/// squares to all, and a crisp tree by RD to all but least squares, for it is read most easily.
+/// Fits every method in every fold and on all rows. One output. The method with the smallest held-out error is
+/// recommended, unless a simpler one is within one standard error of it (of the paired differences over the folds):
+/// least squares before all others, then the crisp tree by RD.
 ///
 /// Throws std::invalid_argument as fit(), and if there is no method, or more than one output.
 ComparisonResult compare(const Eigen::Ref<const Eigen::MatrixXd>& inputs,

@@ -1,5 +1,5 @@
 /// \file
-/// What a caller may ask of fit(). The defaults that depend on the data are those of docs/commands.md.
+/// What a caller may ask of fit(). Defaults that depend on the data: default_text().
 #pragma once
 
 #include <Eigen/Core>
@@ -94,7 +94,8 @@ enum class Estimation {
 inline constexpr double no_jump = std::numeric_limits<double>::infinity();
 
 /// Options that people rarely turn. Lists are candidates: the smallest held-out error decides among them, and without
-/// folds the first entry is taken. An empty list stands for the defaults of docs/commands.md.
+/// folds the first entry is taken. An empty list stands for the default, see
+/// default_text().
 struct ExpertOptions {
   /// rd, ra: smallest decrease of the residual variance by a split, as a fraction of the variance of the output. 0: any
   /// decrease. Negative: no demand.
@@ -119,10 +120,10 @@ struct ExpertOptions {
 /// The options of a fit. Column indices count from 0.
 struct FitOptions {
   GrowthRule rule = GrowthRule::rd;
-  Eigen::Index max_leaves = 0;        ///< largest number of leaves of a tree; 0: the default of docs/commands.md
-  Eigen::Index min_leaf_samples = 0;  ///< smallest number of rows in a leaf; 0: the default of docs/commands.md
+  Eigen::Index max_leaves = 0;        ///< largest number of leaves of a tree; 0: see default_text()
+  Eigen::Index min_leaf_samples = 0;  ///< smallest number of rows in a leaf; 0: see default_text()
   /// rd, ra: a split is made if its p-value times the number of candidate splits (Bonferroni) is below this level.
-  /// 1 or more: no test. Negative: the default of docs/commands.md, 0.05 for a crisp tree.
+  /// 1 or more: no test. Negative: 0.05 for a crisp tree, see default_text().
   double significance = -1.0;
   std::vector<int> split_inputs = {};       ///< columns that may be split; empty: all
   std::vector<int> regression_inputs = {};  ///< columns that local models use; empty: all
@@ -150,9 +151,9 @@ struct FitOptions {
   ExpertOptions expert = {};
 };
 
-/// The default of an option that is a table by case, in words: "1 where blends or Gaussians are candidates; ...; else
-/// 0.05". `option`: "widths", "jumps", "ridges", "shrinkages" or "significance"; throws std::invalid_argument for
-/// others.
+/// The default of an option whose default depends on the case, in words: "1 where blends or Gaussians are candidates;
+/// ...; else 0.05". `option`: "max_leaves", "min_leaf_samples", "significance", "widths", "jumps", "ridges" or
+/// "shrinkages"; throws std::invalid_argument for others. docs/commands.md has these texts too.
 std::string default_text(std::string_view option);
 
 /// One phrase for help: "no test, pruned by m-estimates". Throws std::invalid_argument for a number that is no rule.

@@ -1,5 +1,5 @@
 /// \file
-/// Local linear model trees from a stream of rows, in memory that does not depend on how many there are.
+/// Local linear model trees from a stream of rows, in memory that does not depend on the number of rows.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,24 +14,25 @@
 namespace llmt {
 
 struct StreamOptions {
-  /// Probability, at most, that a leaf whose rows follow one linear model with normal noise is ever split: divided by
-  /// the number of candidates and shared out over the repeated tests.
+  /// Upper bound of the probability that a leaf whose rows follow one linear model with normal noise is ever split. The
+  /// level of a single test is this divided by the number of candidate splits and shared out over the repeated tests.
   double significance = 0.05;
   /// Smallest decrease of the residual variance by a split, as a fraction of the variance of the output.
   double min_variance_gain = 0.0;
   Eigen::Index min_leaf_samples = 0;  ///< on either side of a split. 0: twice the coefficients of a local model
-  /// Largest number of leaves of each tree, which bounds memory. 0: as many as have about 64 MiB of sums, within
+  /// Largest number of leaves of each tree, which bounds memory. 0: the number whose sums take about 64 MiB, within
   /// 16 ... 500.
   Eigen::Index max_leaves = 0;
-  int bins = 16;  ///< of an input in a leaf, 4 ... 256
-  /// Leaf models are drawn towards the model that their parent had when it was split, see ExpertOptions::shrinkages.
+  int bins = 16;  ///< bins of an input in a leaf, 4 ... 256
+  /// A leaf's model is drawn to the model that its parent had when it was split, as if this many further rows of the
+  /// leaf lay on it.
   double shrinkage = 0.1;
-  /// Rows that are kept: a quarter of them is held out and chooses what a snapshot is, at most; the others estimate
-  /// blends. 0: a snapshot is the crisp tree as it stands.
+  /// Rows that are kept. At most a quarter of them is held out: these choose crisp or blended leaves and the leaf count
+  /// of a snapshot. The others estimate blends. 0: a snapshot is the crisp tree as it stands.
   Eigen::Index reservoir_rows = 20000;
 };
 
-/// What a stream has gone through.
+/// What a stream has seen and done so far.
 struct StreamCounts {
   Eigen::Index rows = 0;            ///< of positive weight
   Eigen::Index missing_values = 0;  ///< in the inputs
@@ -41,7 +42,7 @@ struct StreamCounts {
   Eigen::Index prunes = 0;        ///< splits taken back because recent rows do not need them
   Eigen::Index drifts = 0;        ///< alarms: branches whose errors rose abruptly and whose models restarted
   Eigen::Index replacements = 0;  ///< branches that a new one, grown from the alarm on, has replaced
-  Eigen::Index bytes = 0;         ///< that sums, models and reservoir take
+  Eigen::Index bytes = 0;         ///< memory of sums, models and reservoir
 };
 
 class StreamState;
@@ -52,10 +53,10 @@ class StreamState;
 /// squares and products of its rows in bins of every input, so that the residual sums of squares of both sides of every
 /// edge between bins are known exactly; the best edge must pass the F test of Chow (1960).
 ///
-/// A leaf's model is the least-squares fit of all rows that reached it since its branch began, those included that its
-/// parent counted on its side of the split; a leaf is split, and a split taken back, when rows tell. Where the errors
-/// of a branch rise abruptly, its models give up what they have learned and a new branch grows. The same rows give
-/// the same bytes, one at a time or in blocks; their order matters. To go over data several times, add them again.
+/// A leaf's model is the least-squares fit of all rows that reached it since its branch began, including those that its
+/// parent counted on its side of the split. A split is taken back when recent rows no longer need it. Where the errors
+/// of a branch rise abruptly, its models start anew and a new branch grows beside it. The same rows in the same order
+/// give the same bytes, added one at a time or in blocks. To go over data several times, add them again.
 ///
 /// Inputs may be missing (NaN): such a row follows the side with more rows and counts in a local model with the leaf's
 /// mean. Inputs are numbers; categories are not supported.
@@ -84,9 +85,9 @@ class Stream {
 
   StreamCounts counts() const;
 
-  /// The model as it stands. Throws std::invalid_argument if there is no row yet. `automatic`: crisp or a blend, and
-  /// how many leaves of the tree, is what predicts the held-out rows best; `crisp`: the same among crisp trees; `blend`
-  /// likewise. `gaussian` throws.
+  /// The model as it stands. `automatic`: crisp or a blend, with the number of leaves that predicts the held-out rows
+  /// best; `crisp`, `blend`: the same among these alone. Throws std::invalid_argument if there is no row yet, and for
+  /// `gaussian`.
   Model snapshot(ValidityChoice validity = ValidityChoice::automatic) const;
 
  private:

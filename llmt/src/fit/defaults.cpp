@@ -4,7 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <array>
+#include <map>
 #include <stdexcept>
 
 namespace llmt {
@@ -85,14 +85,22 @@ const std::vector<double>& values_of(const Rows& rows, const Case& each) {
   return std::ranges::find_if(rows, [&](const Row& row) { return row.holds(each); })->values;
 }
 
-// "1 for that; else 0.05".
+// "1e-6,0.001".
+std::string list_of(const std::vector<double>& values) {
+  std::vector<std::string> texts;
+  for (const double value : values) {
+    std::string& text = texts.emplace_back(fmt::format("{:.3g}", value));
+    if (const std::size_t zero = text.find("e-0"); zero != std::string::npos) text.erase(zero + 2, 1);
+  }
+  return fmt::format("{}", fmt::join(texts, ","));
+}
+
+// "1 in that case; else 0.05".
 std::string text_of(const Rows& rows) {
   std::string text;
   for (const Row& row : rows) {
-    std::vector<std::string> values;
-    for (const double value : row.values) values.push_back(fmt::format("{:.3g}", value));
-    text += row.when[0] != '\0' ? fmt::format("{} {}; ", fmt::join(values, ","), row.when)
-                                : fmt::format("else {}", fmt::join(values, ","));
+    const std::string values = list_of(row.values);
+    text += row.when[0] != '\0' ? fmt::format("{} {}; ", values, row.when) : fmt::format("else {}", values);
   }
   return text;
 }
@@ -108,6 +116,9 @@ constexpr Eigen::Index most_ordered_leaves = 30;
 // Of a crisp tree that is grown without a test, to be pruned: of many rows it would have leaves without number.
 constexpr Eigen::Index most_pruned_leaves = 1000;
 
+// Rows in a leaf that overlaps others: a joint estimate has those of its neighbours too.
+constexpr Eigen::Index fewest_rows_of_overlapping = 5;
+
 Eigen::Index default_max_leaves(const Case& each, const Rule& rule, Eigen::Index coefficients) {
   if (rule.most_leaves > 0 && !rule.most_leaves_without_folds) return rule.most_leaves;
   if (each.overlapping || each.ordered) {
@@ -120,8 +131,36 @@ Eigen::Index default_max_leaves(const Case& each, const Rule& rule, Eigen::Index
 
 Eigen::Index default_min_leaf(const Case& each, const Rule& rule, Eigen::Index coefficients) {
   if (rule.fewest_rows > 0) return rule.fewest_rows;
-  constexpr Eigen::Index fewest = 5;
-  return each.overlapping ? std::max(fewest, coefficients - 1) : 2 * coefficients;
+  return each.overlapping ? std::max(fewest_rows_of_overlapping, coefficients - 1) : 2 * coefficients;
+}
+
+std::string max_leaves_text() {
+  std::string text;
+  for (const Rule& rule : rule_table()) {
+    if (rule.most_leaves > 0 && !rule.most_leaves_without_folds) {
+      text += fmt::format("{} with {}; ", rule.most_leaves, rule.name);
+    }
+  }
+  text += fmt::format(
+      "{} / coefficients of a local model, within {} ... {}, where blends or Gaussians are candidates; "
+      "the same within {} ... {} if monotone inputs may be split; {} with --prune and folds; ",
+      most_coefficients, fewest_of_most_leaves, most_overlapping_leaves, fewest_of_most_leaves, most_ordered_leaves,
+      most_pruned_leaves);
+  for (const Rule& rule : rule_table()) {
+    if (rule.most_leaves_without_folds) text += fmt::format("{} with {} without folds; ", rule.most_leaves, rule.name);
+  }
+  return text + "else no limit";
+}
+
+std::string min_leaf_text() {
+  std::string text;
+  for (const Rule& rule : rule_table()) {
+    if (rule.fewest_rows > 0) text += fmt::format("{} with {}; ", rule.fewest_rows, rule.name);
+  }
+  return text + fmt::format(
+                    "number of regressors, at least {}, where blends or Gaussians are candidates; "
+                    "else twice the coefficients of a local model",
+                    fewest_rows_of_overlapping);
 }
 
 // Whether an input in which the prediction is to be monotone may be split.
@@ -194,15 +233,18 @@ Plan with_defaults(const FitOptions& options, const TrainingRows& all, Eigen::In
 }
 
 std::string default_text(std::string_view option) {
-  if (option == "widths") return text_of(width_rows());
-  if (option == "jumps") return text_of(jump_rows());
-  if (option == "ridges") return text_of(ridge_rows());
-  if (option == "shrinkages") return text_of(shrinkage_rows());
-  if (option == "significance") return text_of(significance_rows());
-  throw std::invalid_argument(
-      fmt::format("llmt::default_text: {} is none of widths, jumps, ridges, shrinkages, "
-                  "significance",
-                  option));
+  static const std::map<std::string, std::string, std::less<>> texts = {{"max_leaves", max_leaves_text()},
+                                                                        {"min_leaf_samples", min_leaf_text()},
+                                                                        {"significance", text_of(significance_rows())},
+                                                                        {"widths", text_of(width_rows())},
+                                                                        {"jumps", text_of(jump_rows())},
+                                                                        {"ridges", text_of(ridge_rows())},
+                                                                        {"shrinkages", text_of(shrinkage_rows())}};
+  const auto found = texts.find(option);
+  if (found == texts.end()) {
+    throw std::invalid_argument(fmt::format("llmt::default_text: {} has no default that depends on the data", option));
+  }
+  return found->second;
 }
 
 }  // namespace llmt

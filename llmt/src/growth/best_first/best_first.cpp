@@ -17,7 +17,7 @@ namespace {
 // Weight of the prior in the m-estimates of RETIS, in rows: the error of one model for all data.
 constexpr double prior_rows = 2.0;
 
-// Splits over which GrowthOptions::min_improvement takes the mean. One split alone may help little before the next one
+// Splits over which ExpertOptions::min_improvement takes the mean. One split alone may help little before the next one
 // helps much.
 constexpr Eigen::Index improvement_lookahead = 10;
 
@@ -54,7 +54,7 @@ std::optional<StopReason> refusal(const GrowthData& data, const OpenLeaf& leaf, 
   return std::nullopt;
 }
 
-// Whether the last splits improved the tree by less than GrowthOptions::min_improvement asks for. `tree_rss`: weighted
+// Whether the last splits improved the tree by less than ExpertOptions::min_improvement asks for. `tree_rss`: weighted
 // RSS of the tree with 1, 2, ... leaves.
 bool improves_too_little(const std::vector<double>& tree_rss, double min_improvement) {
   const Eigen::Index splits = std::ssize(tree_rss) - 1;

@@ -18,14 +18,16 @@ struct Open {
 llmt::Node leaf_of(const llmt::GrowthProblem& problem, const std::vector<int>& rows) {
   const llmt::Chunk chunk = llmt::fetch(*problem.training, rows, problem.outputs);
   const llmt::NodeFit fit = llmt::fit_node(chunk.deviations, chunk.outputs, chunk.weights);
-  return {.samples = chunk.count(),
-          .rank = fit.rank,
-          .rss = fit.rss,
-          .value = fit.centre_change,
-          .slope = fit.slope_change,
-          .mean = fit.mean,
-          .low = fit.low,
-          .high = fit.high};
+  llmt::Node node;
+  node.samples = chunk.count();
+  node.rank = fit.rank;
+  node.rss = fit.rss;
+  node.value = fit.centre_change;
+  node.slope = fit.slope_change;
+  node.mean = fit.mean;
+  node.low = fit.low;
+  node.high = fit.high;
+  return node;
 }
 
 }  // namespace

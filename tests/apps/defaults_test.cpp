@@ -1,0 +1,26 @@
+// The defaults of the library, of the help text and of docs/commands.md are the same.
+#include <fmt/format.h>
+
+#include "apps/program.hpp"
+#include "llmt/files.hpp"
+#include "llmt/options.hpp"
+
+namespace {
+
+TEST(Defaults, HelpAndCommandsPageStateThoseOfTheLibrary) {
+  const program::Folder folder;
+  const std::string help = folder.run(LLMT_PROGRAM " fit --help").out;
+  const std::string page = llmt::read_file(LLMT_DOCS "/commands.md");
+  for (const char* option :
+       {"max_leaves", "min_leaf_samples", "significance", "widths", "jumps", "ridges", "shrinkages"}) {
+    const std::string text = llmt::default_text(option);
+    EXPECT_NE(help.find("[" + text + "]"), std::string::npos) << option << ": " << text << "\n" << help;
+    EXPECT_NE(page.find(": " + text), std::string::npos) << option << ": " << text;
+  }
+  for (const llmt::Choice<llmt::GrowthRule>& rule : llmt::choices<llmt::GrowthRule>()) {
+    EXPECT_NE(help.find(fmt::format("{} ({})", rule.name, llmt::summary_of(rule.value))), std::string::npos);
+    EXPECT_NE(page.find(fmt::format("`{}`", rule.name)), std::string::npos);
+  }
+}
+
+}  // namespace
