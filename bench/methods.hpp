@@ -8,29 +8,29 @@ namespace bench {
 
 /// Linear least squares: one leaf, nothing to choose.
 inline llmt::FitOptions least_squares(llmt::FitOptions options = {}) {
-  options.growth.max_leaves = 1;
-  options.selection.folds.count = 0;
+  options.max_leaves = 1;
+  options.folds.count = 0;
   return options;
 }
 
 /// A tree without blends.
 inline llmt::FitOptions crisp(llmt::FitOptions options = {}) {
-  options.blend.validity = llmt::ValidityChoice::crisp;
+  options.validity = llmt::ValidityChoice::crisp;
   return options;
 }
 
 /// A tree with this number of leaves, whether its splits pass the tests of growth or not, and no choice by held-out
 /// error.
 inline llmt::FitOptions with_leaves(Eigen::Index leaves, llmt::FitOptions options = {}) {
-  options.growth.max_leaves = leaves;
-  options.growth.significance = 1.0;
-  options.growth.min_variance_gain = -1.0;
-  options.selection.folds.count = 0;
+  options.max_leaves = leaves;
+  options.significance = 1.0;
+  options.expert.min_variance_gain = -1.0;
+  options.folds.count = 0;
   return options;
 }
 
 inline llmt::FitOptions with_rule(llmt::GrowthRule rule, llmt::FitOptions options = {}) {
-  options.growth.rule = rule;
+  options.rule = rule;
   return options;
 }
 

@@ -44,12 +44,12 @@ void compare_command(CompareArguments arguments) {
   if (arguments.learning.targets.size() != 1) {
     throw std::invalid_argument("compare takes one --target");
   }
-  if (arguments.learning.options.selection.folds.count < 2) {
+  if (arguments.learning.options.folds.count < 2) {
     throw std::invalid_argument("compare needs --cv 2 or more");
   }
   const LearningTable table = read_learning_table(arguments.learning);
   CompareOptions options;
-  options.folds = arguments.learning.options.selection.folds;
+  options.folds = arguments.learning.options.folds;
   Progress progress("fitting");
   options.progress = [&](const std::string&, Eigen::Index done, Eigen::Index total) { progress.show(done, total); };
   const ComparisonResult result =

@@ -29,14 +29,14 @@ struct DiscoverArguments {
   discovery::MissingOptions options;
 };
 
-/// Both tables, row by row.
+// Both tables, row by row.
 struct Comparison {
   discovery::Inputs inputs;  // with the order, if that is a column of its own
   Eigen::MatrixXd simulated;
   discovery::MeasuredOutputs measured;
 };
 
-/// The inputs, which both files must have alike.
+// The inputs, which both files must have alike.
 Eigen::MatrixXd read_same_inputs(const Csv& simulated, const Csv& measured, const std::vector<std::string>& names) {
   const Eigen::MatrixXd one = simulated.numbers(names);
   Eigen::MatrixXd other = measured.numbers(names);
@@ -48,8 +48,8 @@ Eigen::MatrixXd read_same_inputs(const Csv& simulated, const Csv& measured, cons
       if (std::abs(one(i, j) - other(i, j)) <= rounding * std::max(range, 1e-3 * std::abs(one(i, j)))) continue;
       throw std::runtime_error(
           fmt::format("{}:{}: column \"{}\" is {}, but {} at {}:{}; rows must stand in the same order in both files",
-                      measured.name(), measured.line_of(i), names[static_cast<std::size_t>(j)], other(i, j), one(i, j),
-                      simulated.name(), simulated.line_of(i)));
+                      measured.name(), measured.line_of(i), names[j], other(i, j), one(i, j), simulated.name(),
+                      simulated.line_of(i)));
     }
   }
   return other;
@@ -58,7 +58,7 @@ Eigen::MatrixXd read_same_inputs(const Csv& simulated, const Csv& measured, cons
 void check_names(const DiscoverArguments& arguments) {
   for (const std::vector<std::string>* names : {&arguments.inputs, &arguments.outputs}) {
     for (std::size_t k = 0; k < names->size(); ++k) {
-      const auto rest = names->begin() + static_cast<std::ptrdiff_t>(k) + 1;
+      const auto rest = names->begin() + static_cast<Eigen::Index>(k) + 1;
       if (std::find(rest, names->end(), (*names)[k]) != names->end()) {
         throw std::invalid_argument(fmt::format("\"{}\" is given twice", (*names)[k]));
       }
@@ -99,7 +99,7 @@ Comparison read_comparison(const DiscoverArguments& arguments) {
 }
 
 std::vector<discovery::ModelTerm> terms_to_try(const DiscoverArguments& arguments, const Comparison& comparison,
-                                               std::vector<discovery::UntestableTerm>& untestable) {
+                                               std::vector<discovery::UntestableCause>& untestable) {
   std::vector<discovery::ModelTerm> library = discovery::standard_terms(comparison.inputs, &untestable);
   if (arguments.terms.empty()) return library;
   std::vector<std::string> taken;
@@ -146,7 +146,7 @@ DiscoveryReport discovered(const DiscoverArguments& arguments, const Comparison&
                          .rows = comparison.simulated.rows(),
                          .missing = {},
                          .regions = {}};
-  std::vector<discovery::UntestableTerm> untestable;
+  std::vector<discovery::UntestableCause> untestable;
   try {
     const std::vector<discovery::ModelTerm> terms = terms_to_try(arguments, comparison, untestable);
     const discovery::Simulation simulation =
@@ -157,7 +157,7 @@ DiscoveryReport discovered(const DiscoverArguments& arguments, const Comparison&
     // What the library refuses after the options were checked is in the data.
     throw std::runtime_error(fmt::format("{}: {}", arguments.measured, error.what()));
   }
-  for (discovery::UntestableTerm& entry : untestable) report.missing.not_testable.push_back(std::move(entry));
+  for (discovery::UntestableCause& entry : untestable) report.missing.not_testable.push_back(std::move(entry));
   report.regions = gap_regions(comparison.inputs, comparison.measured, report.missing);
   return report;
 }

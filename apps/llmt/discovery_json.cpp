@@ -34,7 +34,7 @@ Json effects_json(const discovery::Missing& missing) {
   return effects;
 }
 
-/// Shapes without a name, and structure that nothing explains.
+// Shapes without a name, and structure that nothing explains.
 Json unknown_json(const discovery::Missing& missing) {
   Json shapes = Json::array();
   const auto add = [&](const std::string& output, const std::vector<std::string>& inputs, const std::string& kind,
@@ -74,7 +74,7 @@ Json parameters_json(const discovery::Missing& missing) {
     adjusted.push_back({{"name", parameter.name},
                         {"value", parameter.value},
                         {"unit", parameter.unit},
-                        {"std_error", number_or_null(missing.standard_errors(static_cast<Eigen::Index>(k)))}});
+                        {"std_error", number_or_null(missing.standard_errors(k))}});
   }
   return adjusted;
 }
@@ -92,7 +92,7 @@ Json report_json(const DiscoveryReport& report) {
                        {"mean_gap", region.mean_gap}});
   }
   Json untestable = Json::array();
-  for (const discovery::UntestableTerm& entry : missing.not_testable) {
+  for (const discovery::UntestableCause& entry : missing.not_testable) {
     untestable.push_back({{"effect", entry.what}, {"why", entry.why}});
   }
   Json visible = Json::array();

@@ -132,7 +132,7 @@ void print_report(const DiscoveryReport& report) {
     const discovery::Parameter& parameter = missing.parameters[k];
     if (!parameter.free) continue;
     print(fmt::format("\n{} of the simulation adjusted to {} +- {}\n", parameter.name, number(parameter.value),
-                      number(missing.standard_errors(static_cast<Eigen::Index>(k)), 2)));
+                      number(missing.standard_errors(k), 2)));
   }
   print_gaps(report);
   print_regions(report);
@@ -149,7 +149,7 @@ void print_report(const DiscoveryReport& report) {
   if (missing.answer == Answer::nothing_missing) print_visible(missing);
   if (!missing.not_testable.empty()) {
     print("\nNot testable with these rows:\n");
-    for (const discovery::UntestableTerm& entry : missing.not_testable)
+    for (const discovery::UntestableCause& entry : missing.not_testable)
       print(fmt::format("  {}: {}\n", entry.what, entry.why));
   }
   if (!report.corrected.empty()) print(fmt::format("\nCorrected simulation written to {}\n", report.corrected));

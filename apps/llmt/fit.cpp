@@ -1,10 +1,10 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <array>
 #include <cmath>
 #include <map>
 #include <memory>
+#include <string_view>
 
 #include "llmt/commands.hpp"
 #include "llmt/fit.hpp"
@@ -23,21 +23,28 @@ struct FitArguments {
   bool stream = false;
 };
 
-constexpr std::array<const char*, 7> rule_names = {"rd", "retis", "lolimot", "lolimot-data",
-                                                   "ra", "m5",    "hilomot"};                  // as GrowthRule
-constexpr std::array<const char*, 4> validity_names = {"auto", "crisp", "blend", "gaussian"};  // as ValidityChoice
-constexpr std::array<const char*, 3> search_names = {"auto", "exact", "binned"};               // as SplitSearch
-constexpr std::array<const char*, 3> estimation_names = {"as-grown", "local", "joint"};        // as Estimation
-constexpr std::array<const char*, 3> terms_names = {"linear", "quadratic", "auto"};            // as LocalTerms
-constexpr std::array<const char*, 3> sparse_names = {"never", "auto", "always"};               // as SparseChoice
-
-template <class Enum, std::size_t Count>
-CLI::CheckedTransformer choice_of(const std::array<const char*, Count>& names) {
+template <class Enum>
+CLI::CheckedTransformer choice_of() {
   std::map<std::string, Enum> values;
-  for (std::size_t i = 0; i < Count; ++i) {
-    values[names[i]] = static_cast<Enum>(i);
+  for (const Choice<Enum>& choice : choices<Enum>()) {
+    values.emplace(choice.name, choice.value);
   }
   return CLI::CheckedTransformer(values);
+}
+
+// "linear|quadratic|auto [linear]", with the default in brackets.
+template <class Enum>
+std::string choices_text(Enum standard) {
+  return fmt::format("{} [{}]", list_names<Enum>("|"), name_of(standard));
+}
+
+// "Growth rule: rd (best split by F test), ...".
+std::string rules_text() {
+  std::string text;
+  for (const Choice<GrowthRule>& choice : choices<GrowthRule>()) {
+    text += fmt::format("{}{} ({})", text.empty() ? "Growth rule: " : ", ", choice.name, summary_of(choice.value));
+  }
+  return text;
 }
 
 // "blend, sparse, width 2, jumps from 4, ridge 0.001, shrinkage 0.1".
@@ -47,9 +54,10 @@ std::string describe(const Candidate& candidate) {
     const std::string name = fmt::format("{}{}", candidate.leaves == 1 ? "least squares" : "crisp", sparse);
     return candidate.shrinkage > 0.0 ? fmt::format("{}, shrinkage {}", name, candidate.shrinkage) : name;
   }
-  constexpr std::array<const char*, 4> kinds = {"crisp", "blend", "Gaussians", "gates"};
-  std::string text = fmt::format("{}{}, width {}", kinds[static_cast<std::size_t>(candidate.validity.kind)], sparse,
-                                 number(candidate.validity.width, 3));
+  const std::string_view kind = candidate.validity.kind == ValidityKind::gaussian   ? "Gaussians"
+                                : candidate.validity.kind == ValidityKind::logistic ? "gates"
+                                                                                    : "blend";
+  std::string text = fmt::format("{}{}, width {}", kind, sparse, number(candidate.validity.width, 3));
   text += candidate.jump < no_jump ? fmt::format(", jumps from {}", number(candidate.jump, 3)) : "";
   text += candidate.estimation == Estimation::as_grown ? ", as grown"
           : candidate.estimation == Estimation::local  ? ", local"
@@ -59,11 +67,10 @@ std::string describe(const Candidate& candidate) {
 
 Json candidate_json(const CandidateError& entry) {
   const auto or_null = [](double value) { return std::isnan(value) ? Json(nullptr) : Json(value); };
-  constexpr std::array<const char*, 4> kinds = {"crisp", "blend", "gaussian", "logistic"};
-  return {{"validity", kinds[static_cast<std::size_t>(entry.candidate.validity.kind)]},
+  return {{"validity", name_of(entry.candidate.validity.kind)},
           {"width", entry.candidate.validity.width},
           {"jump", entry.candidate.jump < no_jump ? Json(entry.candidate.jump) : Json(nullptr)},
-          {"estimation", estimation_names[static_cast<std::size_t>(entry.candidate.estimation)]},
+          {"estimation", name_of(entry.candidate.estimation)},
           {"ridge", entry.candidate.ridge},
           {"shrinkage", entry.candidate.shrinkage},
           {"sparse", entry.candidate.sparse},
@@ -82,7 +89,7 @@ Json summary_json(const FitArguments& arguments, const FitResult& result) {
   json["data"] = arguments.learning.data;
   json["rows"] = result.summary.samples;
   json["missing_values"] = result.summary.missing_values;
-  json["rule"] = rule_names[static_cast<std::size_t>(arguments.learning.options.growth.rule)];
+  json["rule"] = name_of(arguments.learning.options.rule);
   json["min_leaf_samples"] = result.summary.min_leaf_samples;
   json["inputs"] = Json::array();
   for (const InputColumn& input : result.model.inputs()) {
@@ -138,7 +145,7 @@ std::string selection_text(const FitArguments& arguments, const PartitionSummary
 
 // What the local models are made of, and what spoke for it; nothing for what was not asked.
 std::string local_models_text(const FitArguments& arguments, const FitSummary& summary) {
-  const LocalModelOptions& asked = arguments.learning.options.local_models;
+  const FitOptions& asked = arguments.learning.options;
   std::string text;
   if (asked.terms != LocalTerms::linear) {
     text += fmt::format("Local models are {}", summary.quadratic ? "quadratic" : "linear");
@@ -192,8 +199,7 @@ void print_summary(const FitArguments& arguments, const FitResult& result) {
   if (!constant.empty()) {
     print(fmt::format("Constant, so without influence: {}\n", fmt::join(constant, ", ")));
   }
-  print(fmt::format("Rule {}, at least {} rows in a leaf; {}\n\n",
-                    rule_names[static_cast<std::size_t>(arguments.learning.options.growth.rule)],
+  print(fmt::format("Rule {}, at least {} rows in a leaf; {}\n\n", name_of(arguments.learning.options.rule),
                     result.summary.min_leaf_samples, selection_text(arguments, result.summary.partitions.front())));
   Table table({"target", "model", "leaves", "RMSE held-out", "+-", "RMSE in-sample"});
   for (const PartitionSummary& partition : result.summary.partitions) {
@@ -221,7 +227,7 @@ void print_summary(const FitArguments& arguments, const FitResult& result) {
   for (const PartitionSummary& partition : result.summary.partitions) {
     print(search_text(partition.search));
     // M5' drops inputs on its own; its leaves keep nothing of their parent's but what smoothing gives them.
-    if (partition.rank_deficient_leaves > 0 && arguments.learning.options.growth.rule != GrowthRule::m5) {
+    if (partition.rank_deficient_leaves > 0 && !has_own_models(arguments.learning.options.rule)) {
       print(fmt::format(
           "Leaves whose rows do not determine all slopes (constant or collinear inputs, few rows) and keep their "
           "parent's there: {}.\n",
@@ -258,69 +264,65 @@ void add_fit(CLI::App& app) {
   command->footer("Example: llmt fit concrete.csv --target strength -o concrete.json");
   const auto arguments = std::make_shared<FitArguments>();
   add_learning_options(*command, arguments->learning);
-  GrowthOptions& growth = arguments->learning.options.growth;
-  BlendOptions& blend = arguments->learning.options.blend;
+  FitOptions& options = arguments->learning.options;
+  ExpertOptions& expert = options.expert;
+  command->add_option("--rule", options.rule, rules_text())
+      ->transform(choice_of<GrowthRule>())
+      ->option_text(choices_text(options.rule));
   command
-      ->add_option("--rule", growth.rule,
-                   "Growth rule: rd, retis (m-estimate pruning), lolimot (halves boxes), lolimot-data (data-driven "
-                   "thresholds), ra (by the signs of residuals, no search), m5 (M5', smoothed), hilomot (oblique "
-                   "splits)")
-      ->transform(choice_of<GrowthRule>(rule_names))
-      ->option_text("rd|retis|lolimot|lolimot-data|ra|m5|hilomot [rd]");
-  command
-      ->add_option("--significance", growth.significance,
+      ->add_option("--significance", options.significance,
                    "rd, ra: of the F test, over all candidate splits; 1: no test")
       ->check(CLI::NonNegativeNumber)
-      ->option_text("FLOAT [see docs/commands.md]");
+      ->option_text(fmt::format("FLOAT [{}]", default_text("significance")));
   command
-      ->add_option("--min-improvement", growth.min_improvement,
+      ->add_option("--min-improvement", expert.min_improvement,
                    "Stop when further splits lower the training sum of squares by less than this fraction each")
       ->capture_default_str();
   command
-      ->add_option("--search", growth.search,
+      ->add_option("--search", expert.search,
                    "Search for splits: exact; by bins, exact in small nodes and where bins may hold a better split; or "
                    "bins for many rows")
-      ->transform(choice_of<SplitSearch>(search_names))
-      ->option_text("auto|exact|binned [auto]");
-  command->add_flag("--shared", growth.shared_partition, "One tree for all targets instead of one each");
-  LocalModelOptions& local_models = arguments->learning.options.local_models;
+      ->transform(choice_of<SplitSearch>())
+      ->option_text(choices_text(expert.search));
+  command->add_flag("--shared", options.shared_partition, "One tree for all targets instead of one each");
   command
-      ->add_option("--local-models", local_models.terms,
+      ->add_option("--local-models", options.terms,
                    "Local models linear, with products and squares of the inputs, or the better of the two")
-      ->transform(choice_of<LocalTerms>(terms_names))
-      ->option_text("linear|quadratic|auto [linear]");
+      ->transform(choice_of<LocalTerms>())
+      ->option_text(choices_text(options.terms));
   command
       ->add_option(
-          "--sparse", local_models.sparse,
+          "--sparse", options.sparse,
           "Local models keep only the slopes that forward selection takes: never, always, or where the held-out "
           "error says so")
-      ->transform(choice_of<SparseChoice>(sparse_names))
-      ->option_text("never|auto|always [never]");
+      ->transform(choice_of<SparseChoice>())
+      ->option_text(choices_text(options.sparse));
   command
-      ->add_option("--validity", blend.validity,
+      ->add_option("--validity", options.validity,
                    "Crisp leaves, blends over the splits, Gaussians, or the best of the first two")
-      ->transform(choice_of<ValidityChoice>(validity_names))
-      ->option_text("auto|crisp|blend|gaussian [auto]");
-  command->add_option("--estimation", blend.estimation, "Local models as grown, weighted by validity, or all at once")
-      ->transform(choice_of<Estimation>(estimation_names))
-      ->option_text("as-grown|local|joint [joint]");
+      ->transform(choice_of<ValidityChoice>())
+      ->option_text(choices_text(options.validity));
+  command->add_option("--estimation", expert.estimation, "Local models as grown, weighted by validity, or all at once")
+      ->transform(choice_of<Estimation>())
+      ->option_text(choices_text(expert.estimation));
   command
       ->add_option(
-          "--width", blend.widths,
+          "--width", expert.widths,
           "Widths to choose from: of a transition by the smaller child's extent; k_sigma; of the gates of hilomot")
       ->delimiter(',')
-      ->option_text("FLOAT,... [0.5,1,2,4; Gaussians 0.333; hilomot 1,2,4]");
+      ->option_text(fmt::format("FLOAT,... [{}]", default_text("widths")));
   command
-      ->add_option("--jump", blend.jumps,
+      ->add_option("--jump", expert.jumps,
                    "Jumps to choose from: where the output jumps by so many standard deviations there is no transition")
       ->delimiter(',')
-      ->option_text("FLOAT,... [inf,4,2,1,0.5]");
-  command->add_option("--ridge", blend.ridges, "Ridges to choose from: hold of the joint estimate at the local one")
+      ->option_text(fmt::format("FLOAT,... [{}]", default_text("jumps")));
+  command->add_option("--ridge", expert.ridges, "Ridges to choose from: hold of the joint estimate at the local one")
       ->delimiter(',')
-      ->option_text("FLOAT,... [1e-8 ... 0.1]");
-  command->add_option("--shrinkage", blend.shrinkages, "Shrinkages to choose from: towards the parent's model, in rows")
+      ->option_text(fmt::format("FLOAT,... [{}]", default_text("ridges")));
+  command
+      ->add_option("--shrinkage", expert.shrinkages, "Shrinkages to choose from: towards the parent's model, in rows")
       ->delimiter(',')
-      ->option_text("FLOAT,... [0,0.1,1]");
+      ->option_text(fmt::format("FLOAT,... [{}]", default_text("shrinkages")));
   command->add_option("-o,--output", arguments->output, "Model file to write");
   command->add_flag("--no-intervals", arguments->no_intervals,
                     "Leave the folds' models out of the file; it is smaller and has no prediction intervals");

@@ -32,14 +32,23 @@ std::vector<GapRegion> gap_regions(const discovery::Inputs& inputs, const discov
   Eigen::MatrixXd table = Eigen::MatrixXd::Zero(std::ssize(rows), p + 1);
   table.leftCols(p) = inputs.values(rows, Eigen::all);
   FitOptions options;
-  options.selection.folds.count = 0;
+  options.folds.count = 0;
   options.intervals = false;
-  options.blend.validity = ValidityChoice::crisp;
-  options.growth.max_leaves = 5;
-  options.growth.significance = 0.01;
-  options.growth.min_leaf_samples = std::max<std::ptrdiff_t>(5, std::ssize(rows) / 20);
-  for (int j = 0; j < p; ++j) options.growth.split_inputs.push_back(j);
-  options.growth.regression_inputs = {static_cast<int>(p)};
+<<<<<<< HEAD
+  options.validity = ValidityChoice::crisp;
+  options.max_leaves = 5;
+  options.significance = 0.01;
+  options.min_leaf_samples = std::max<std::ptrdiff_t>(5, std::ssize(rows) / 20);
+  for (int j = 0; j < p; ++j) options.split_inputs.push_back(j);
+  options.regression_inputs = {static_cast<int>(p)};
+=======
+  options.validity = ValidityChoice::crisp;
+  options.max_leaves = 5;
+  options.significance = 0.01;
+  options.min_leaf_samples = std::max<Eigen::Index>(5, std::ssize(rows) / 20);
+  for (int j = 0; j < p; ++j) options.split_inputs.push_back(j);
+  options.regression_inputs = {static_cast<int>(p)};
+>>>>>>> main
   std::vector<GapRegion> regions;
   for (std::size_t o = 0; o < measured.names.size(); ++o) {
     const auto column = static_cast<Eigen::Index>(o);

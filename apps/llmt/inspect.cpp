@@ -2,7 +2,6 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <memory>
@@ -213,9 +212,8 @@ Json leaf_table(const Model& model) {
   }
   for (Eigen::Index p = 0; p < std::ssize(model.partitions()); ++p) {
     const Partition& partition = model.partitions()[p];
-    constexpr std::array<const char*, 4> kinds = {"crisp", "blend", "gaussian", "logistic"};
     Json entry;
-    entry["validity"] = {{"kind", kinds[static_cast<std::size_t>(partition.validity.kind)]},
+    entry["validity"] = {{"kind", name_of(partition.validity.kind)},
                          {"width", partition.validity.width},
                          {"smoothness", partition.validity.smoothness}};
     for (const int output : partition.outputs) {

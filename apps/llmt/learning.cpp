@@ -82,8 +82,8 @@ LearningTable read_learning_table(const LearningArguments& arguments) {
       csv, {inputs, arguments.categorical, arguments.targets, arguments.weight}, hint, arguments.options.max_threads);
   LearningTable table{inputs, std::move(columns.inputs), std::move(columns.targets), arguments.options};
   FitOptions& options = table.options;
-  options.growth.split_inputs = positions("--split-inputs", arguments.split_inputs, table.names);
-  options.growth.regression_inputs = positions("--regression-inputs", arguments.regression_inputs, table.names);
+  options.split_inputs = positions("--split-inputs", arguments.split_inputs, table.names);
+  options.regression_inputs = positions("--regression-inputs", arguments.regression_inputs, table.names);
   options.monotone = signs_of("--monotone", arguments.monotone, table.names);
   options.slope_signs = signs_of("--slope-sign", arguments.slope_signs, table.names);
   options.categorical_inputs = table.inputs.categorical;
@@ -101,13 +101,12 @@ LearningTable read_learning_table(const LearningArguments& arguments) {
     }
   }
   options.weights = std::move(columns.weights);
-  options.selection.folds.kind = arguments.contiguous ? FoldKind::contiguous : FoldKind::random;
+  options.folds.kind = arguments.contiguous ? FoldKind::contiguous : FoldKind::random;
   return table;
 }
 
 void add_learning_options(CLI::App& command, LearningArguments& arguments) {
-  GrowthOptions& growth = arguments.options.growth;
-  FoldOptions& folds = arguments.options.selection.folds;
+  FitOptions& options = arguments.options;
   command.add_option("data", arguments.data, "CSV file with a header row")->required();
   command.add_option("-t,--target", arguments.targets, "Column to predict; repeat for several")
       ->required()
@@ -132,21 +131,21 @@ void add_learning_options(CLI::App& command, LearningArguments& arguments) {
       .add_option("--slope-sign", arguments.slope_signs,
                   "Inputs with slopes >= 0, or with a leading minus <= 0, in every local model; not across leaves")
       ->delimiter(',');
-  command.add_option("--max-leaves", growth.max_leaves, "Most leaves of a tree, 0: see docs/commands.md")
+  command.add_option("--max-leaves", options.max_leaves, "Most leaves of a tree, 0: see docs/commands.md")
       ->capture_default_str();
-  command.add_option("--min-leaf", growth.min_leaf_samples, "Fewest rows in a leaf, 0: see docs/commands.md")
+  command.add_option("--min-leaf", options.min_leaf_samples, "Fewest rows in a leaf, 0: see docs/commands.md")
       ->capture_default_str();
   command.add_flag_callback(
-      "--prune", [&growth] { growth.pruning = Pruning::weakest_link; },
+      "--prune", [&options] { options.pruning = Pruning::weakest_link; },
       "Undo the splits of the weakest branches first, not the last ones, where fewer leaves predict better");
   command
-      .add_option("--cv", folds.count,
+      .add_option("--cv", options.folds.count,
                   "Folds of the held-out error by which everything is chosen, 0: keep the tree as grown")
       ->capture_default_str();
   command.add_flag("--contiguous", arguments.contiguous,
                    "Folds are blocks of consecutive rows (measured paths, grids, time series)");
-  command.add_option("--seed", folds.seed, "Of the random folds")->capture_default_str();
-  command.add_option("--threads", arguments.options.max_threads, "0: all; the result does not depend on it")
+  command.add_option("--seed", options.folds.seed, "Of the random folds")->capture_default_str();
+  command.add_option("--threads", options.max_threads, "0: all; the result does not depend on it")
       ->capture_default_str();
   refuse_retired_options(command);
 }

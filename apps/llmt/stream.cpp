@@ -40,15 +40,15 @@ void refuse_other_options(const CLI::App& command) {
 
 StreamOptions options_of(const CLI::App& command, const StreamArguments& arguments) {
   const FitOptions& fit = arguments.learning.options;
-  StreamOptions options{.min_leaf_samples = fit.growth.min_leaf_samples, .max_leaves = fit.growth.max_leaves};
+  StreamOptions options{.min_leaf_samples = fit.min_leaf_samples, .max_leaves = fit.max_leaves};
   if (command.count("--significance") > 0) {
-    options.significance = fit.growth.significance;
+    options.significance = fit.significance;
   }
-  if (fit.blend.shrinkages.size() > 1) {
+  if (fit.expert.shrinkages.size() > 1) {
     throw std::invalid_argument("--shrinkage takes one number with --stream");
   }
-  if (fit.blend.shrinkages.size() == 1) {
-    options.shrinkage = fit.blend.shrinkages.front();
+  if (fit.expert.shrinkages.size() == 1) {
+    options.shrinkage = fit.expert.shrinkages.front();
   }
   return options;
 }
@@ -182,7 +182,7 @@ void print_summary(const StreamArguments& arguments, const Learned& learned, con
 
 void stream_command(const CLI::App& command, const StreamArguments& arguments) {
   refuse_other_options(command);
-  const ValidityChoice validity = arguments.learning.options.blend.validity;
+  const ValidityChoice validity = arguments.learning.options.validity;
   if (validity == ValidityChoice::gaussian) {
     throw std::invalid_argument("--validity gaussian is not for --stream");
   }

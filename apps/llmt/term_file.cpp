@@ -71,7 +71,7 @@ discovery::ModelTerm term_of(const std::string& name, const std::string& text, c
     Eigen::MatrixXd column(rows.inputs.rows(), 1);
     for (Eigen::Index i = 0; i < column.rows(); ++i) {
       for (Eigen::Index j = 0; j < rows.inputs.cols(); ++j) {
-        expression->variables[static_cast<std::size_t>(j)] = rows.inputs(i, j);
+        expression->variables[j] = rows.inputs(i, j);
       }
       expression->variables.back() = rows.simulated(i);
       column(i, 0) = expression->parser.Eval();

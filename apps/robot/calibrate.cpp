@@ -36,7 +36,7 @@ struct Row {
   std::optional<ErrorFigures> test;
 };
 
-/// Figures on measurements that took no part in anything.
+// Figures on measurements that took no part in anything.
 ErrorFigures test_figures(const robotics::CorrectedRobot& robot, const robotics::Measurements& test) {
   return error_figures(robotics::distances(robotics::positions(robot, test.poses), test));
 }
@@ -89,7 +89,7 @@ Json report_json(const CalibrateArguments& arguments, const robotics::Measuremen
   json["coordinate_noise_mm"] = report.calibration.noise_mm;
   json["parameters"] = Json::array();
   for (Eigen::Index k = 0; k < result.values.size(); ++k) {
-    const discovery::Parameter& parameter = result.parameters[static_cast<std::size_t>(k)];
+    const discovery::Parameter& parameter = result.parameters[k];
     if (parameter.free) {
       json["parameters"].push_back(
           {{"name", parameter.name},
@@ -149,7 +149,7 @@ std::string parameter_table(const robotics::Robot& nominal, const CalibrationRep
     const discovery::Parameter& after = result.parameters[k];
     const auto nominal_value = std::ranges::find(before, after.name, &discovery::Parameter::name);
     if (after.free && nominal_value != before.end()) {
-      const double error = result.standard_errors(static_cast<Eigen::Index>(k));
+      const double error = result.standard_errors(k);
       table.add({after.name, number(nominal_value->value, 7), number(after.value, 7),
                  number(after.value - nominal_value->value, 4), std::isfinite(error) ? number(error, 2) : "-",
                  after.unit});
@@ -193,8 +193,7 @@ void print_report(const CalibrateArguments& arguments, const robotics::Robot& no
     std::vector<std::string> leaves;
     for (const PartitionSummary& partition : report.correction->summary.partitions) {
       for (const int output : partition.outputs) {
-        leaves.push_back(fmt::format("{} {}", report.correction->model.outputs()[static_cast<std::size_t>(output)].name,
-                                     partition.leaves));
+        leaves.push_back(fmt::format("{} {}", report.correction->model.outputs()[output].name, partition.leaves));
       }
     }
     print(fmt::format("Leaves of the correction: {}\n", fmt::join(leaves, ", ")));
@@ -207,7 +206,7 @@ void print_report(const CalibrateArguments& arguments, const robotics::Robot& no
   }
 }
 
-/// CAL.yaml and, if the correction is kept, CAL.correction.json beside it.
+// CAL.yaml and, if the correction is kept, CAL.correction.json beside it.
 std::vector<std::string> write_result(const std::string& path, const CalibrationReport& report) {
   robotics::CorrectedRobot best = report.best();
   std::vector<std::string> written;
@@ -236,7 +235,7 @@ void calibrate_command(CalibrateArguments arguments) {
   }
   arguments.options.kind = arguments.contiguous ? FoldKind::contiguous : FoldKind::random;
   Progress progress("calibrating");
-  arguments.options.progress = [&](std::ptrdiff_t done, std::ptrdiff_t total) { progress.show(done, total); };
+  arguments.options.progress = [&](Eigen::Index done, Eigen::Index total) { progress.show(done, total); };
   const CalibrationReport report = robotics::report_calibration(nominal, measurements, arguments.options);
   progress.clear();
   const std::vector<std::string> suspicions = robotics::suspicions(nominal, measurements, report);
@@ -281,10 +280,12 @@ void add_calibrate(CLI::App& app) {
       ->delimiter(',');
   command->add_option("--only", options.calibration.only, "Free these parameters and no others, base and tool included")
       ->delimiter(',');
-  command->add_option("--max-leaves", options.growth.max_leaves, "Most leaves of a tree of the correction, 0: no limit")
+  command
+      ->add_option("--max-leaves", options.correction.max_leaves,
+                   "Most leaves of a tree of the correction, 0: no limit")
       ->capture_default_str();
   command
-      ->add_option("--min-leaf", options.growth.min_leaf_samples,
+      ->add_option("--min-leaf", options.correction.min_leaf_samples,
                    "Fewest poses in a leaf, 0: twice the coefficients of a leaf")
       ->capture_default_str();
   command->add_option("--seed", options.seed, "Of the random folds")->capture_default_str();

@@ -58,7 +58,7 @@ std::string telling_line(const robotics::TellingPose& pose) {
                      number(pose.payload_kg, 3), pose.disagreement_mm);
 }
 
-// Which poses would tell a finding from its first rival.
+// Poses at which a finding and its first rival predict different positions.
 std::string telling_lines(const Discovery& found, const robotics::Measurements& data) {
   std::string text;
   const std::vector<robotics::Effect>& all = found.improved.robot.effects;
@@ -94,7 +94,7 @@ void save_improved(const robotics::CorrectedRobot& improved, const std::string& 
   robotics::save(robot, path);
 }
 
-// Everything found anew without each fold, judged on it.
+// The whole discovery repeated without each fold and judged on it.
 Json folds_json(const robotics::Robot& robot, const robotics::Measurements& data, const DiscoverArguments& arguments) {
   FoldOptions dealing;
   dealing.count = arguments.folds;
@@ -107,7 +107,7 @@ Json folds_json(const robotics::Robot& robot, const robotics::Measurements& data
   double before = 0.0;
   double after = 0.0;
   Progress progress("fold");
-  std::ptrdiff_t done = 0;
+  Eigen::Index done = 0;
   for (const Fold& fold : make_folds(data.count(), dealing)) {
     progress.show(done++, arguments.folds);
     const robotics::Measurements held_out = robotics::select(data, fold.held_out);
@@ -119,7 +119,7 @@ Json folds_json(const robotics::Robot& robot, const robotics::Measurements& data
   return {{"folds", arguments.folds}, {"contiguous", arguments.contiguous}, {"before_mm", before}, {"after_mm", after}};
 }
 
-// The output may not be one of the files that are read, and its folder must be there: said before the work, not after.
+// Refuses an output that is one of the input files or whose folder does not exist, before the work starts.
 void check_output(const DiscoverArguments& arguments) {
   if (arguments.output.empty()) return;
   const std::filesystem::path output = arguments.output;
@@ -146,7 +146,7 @@ void discover_command(DiscoverArguments arguments) {
   if (!arguments.test.empty()) test = robotics::read_measurements(arguments.test, robot, also);
   for (const std::string& warning : data.warnings) warn(warning);
   Progress progress("discover");
-  std::ptrdiff_t step = 0;
+  Eigen::Index step = 0;
   arguments.options.progress = [&](const std::string&) { progress.show(step++, 0); };
   const Discovery found = robotics::discover(robot, data, test, arguments.options);
   progress.clear();

@@ -70,7 +70,7 @@ Json gap_json(const robotics::Discovery& found) {
 
 Json discovery_json(const robotics::Discovery& found) {
   Json untestable = Json::array();
-  for (const robotics::UntestableEffect& entry : found.not_testable) {
+  for (const discovery::UntestableCause& entry : found.not_testable) {
     untestable.push_back({{"effect", entry.what}, {"why", entry.why}});
   }
   Json visible = Json::array();

@@ -15,7 +15,7 @@ namespace {
 using robotics::Discovery;
 using robotics::FoundEffect;
 
-/// A value with its error in the unit that needs no exponent: 1.1e-6 rad/(N m) is 1.10 +- 0.05 urad/(N m).
+// A value with its error in the unit that needs no exponent: 1.1e-6 rad/(N m) is 1.10 +- 0.05 urad/(N m).
 std::string with_unit(double value, double error, const std::string& unit) {
   struct Prefix {
     double factor;
@@ -133,7 +133,7 @@ std::string gap_lines(const Discovery& found) {
 
 std::string untestable_lines(const Discovery& found) {
   std::map<std::string, std::vector<std::string>> by_reason;
-  for (const robotics::UntestableEffect& entry : found.not_testable) {
+  for (const discovery::UntestableCause& entry : found.not_testable) {
     // Columns of the single joints are one matter: dir1, dir2, ... are dirN.
     static const std::regex numbered("([a-z])[0-9]+(_|$|\\|)");
     by_reason[std::regex_replace(entry.why, numbered, "$1N$2")].push_back(entry.what);

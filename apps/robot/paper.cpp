@@ -26,7 +26,7 @@ std::string leaves_text(const StudyRow& row) {
 
 std::string millimetres(double value) { return fmt::format("{:.4f}", value); }
 
-/// Errors of the arm's models: in mm, and in per cent of the calibrated model's, which is what can be compared.
+// Errors of the arm's models: in mm, and in per cent of the calibrated model's, which is what can be compared.
 void print_arm(const PlanarStudy& study) {
   const TotalError calibrated = study.arm[1].error;
   const TotalError paper_calibrated = *study.arm[1].paper;
@@ -140,7 +140,7 @@ Json planar_json(const std::vector<PlanarStudy>& studies) {
   return json;
 }
 
-/// Mean and range over the trials of one figure.
+// Mean and range over the trials of one figure.
 struct Spread {
   double mean = 0.0;
   double low = 0.0;

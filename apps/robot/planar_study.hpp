@@ -21,8 +21,8 @@ struct TotalError {
 /// One model of the arm.
 struct StudyRow {
   std::string model;
-  std::ptrdiff_t training_poses = 0;
-  std::vector<std::ptrdiff_t> leaves;  ///< of the x and the y tree; empty without trees
+  Eigen::Index training_poses = 0;
+  std::vector<Eigen::Index> leaves;  ///< of the x and the y tree; empty without trees
   TotalError error;
   std::optional<TotalError> paper;  ///< as printed there
 };

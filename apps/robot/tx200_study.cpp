@@ -18,7 +18,8 @@ std::vector<Tx200Trial> tx200_study(bool compliance, std::uint64_t first_seed, i
   options.correct = true;
   options.folds = 45;
   // 45 poses do not fill five leaves of twice seven: eight a leaf leave each one more pose than coefficients.
-  options.growth = {.significance = 1.0, .min_variance_gain = -1.0, .min_leaf_samples = 8, .max_leaves = 5};
+  options.correction = {
+      .max_leaves = 5, .min_leaf_samples = 8, .significance = 1.0, .expert = {.min_variance_gain = -1.0}};
   options.correction_folds = 0;
 
   std::vector<Tx200Trial> trials;

@@ -12,13 +12,13 @@
 // TRAIN and TEST are files of doubles, column after column, the output last.
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <fstream>
 #include <memory>
 #include <optional>
 
 #include "data_sets.hpp"
 #include "methods.hpp"
+#include "program.hpp"
 #include "resources.hpp"
 #include "synthetic.hpp"
 
@@ -166,17 +166,6 @@ void add_split(CLI::App& program) {
 }  // namespace bench
 
 int main(int argc, char** argv) {
-  CLI::App program("The part of run.py that is written in C++", "rivals");
-  program.require_subcommand(1);
-  bench::add_fit(program);
-  bench::add_sample(program);
-  bench::add_sets(program);
-  bench::add_split(program);
-  try {
-    CLI11_PARSE(program, argc, argv);
-  } catch (const std::exception& error) {
-    fmt::print(stderr, "rivals: {}\n", error.what());
-    return 1;
-  }
-  return 0;
+  return bench::run_program("rivals", "The part of run.py that is written in C++", argc, argv, bench::add_fit,
+                            bench::add_sample, bench::add_sets, bench::add_split);
 }

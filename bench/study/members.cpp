@@ -26,43 +26,43 @@ struct Member {
 
 // With a given number of leaves nothing is chosen, and a transition is as wide as its box.
 FitOptions blend(Eigen::Index leaves, FitOptions options) {
-  options.blend.validity = llmt::ValidityChoice::blend;
+  options.validity = llmt::ValidityChoice::blend;
   if (leaves > 0) {
-    options.blend.widths = {1.0};
-    options.blend.ridges = {1e-4};
+    options.expert.widths = {1.0};
+    options.expert.ridges = {1e-4};
   }
   return options;
 }
 
 // Half the leaves, because a quadratic local model stands for several linear ones.
 FitOptions quadratic(Eigen::Index leaves, FitOptions options) {
-  options.local_models.terms = llmt::LocalTerms::quadratic;
-  options.growth.max_leaves = (leaves + 1) / 2;
+  options.terms = llmt::LocalTerms::quadratic;
+  options.max_leaves = (leaves + 1) / 2;
   return options;
 }
 
 // LOLIMOT or HILOMOT. The time of the joint estimate grows with the square of the number of leaves, because Gaussians
 // and sigmoids reach everywhere; hence at most 50.
 FitOptions soft(GrowthRule rule, bool joint, Eigen::Index leaves, FitOptions options) {
-  options.growth.rule = rule;
-  options.growth.max_leaves = leaves > 0 ? leaves : 50;
-  if (!joint) options.blend.estimation = llmt::Estimation::as_grown;
-  if (joint && leaves > 0) options.blend.ridges = {1e-4};
+  options.rule = rule;
+  options.max_leaves = leaves > 0 ? leaves : 50;
+  if (!joint) options.expert.estimation = llmt::Estimation::as_grown;
+  if (joint && leaves > 0) options.expert.ridges = {1e-4};
   return options;
 }
 
 FitOptions pruned(FitOptions options) {
-  options.growth.pruning = llmt::Pruning::weakest_link;
+  options.pruning = llmt::Pruning::weakest_link;
   return options;
 }
 
 FitOptions sparse(FitOptions options) {
-  options.local_models.sparse = llmt::SparseChoice::automatic;
+  options.sparse = llmt::SparseChoice::automatic;
   return options;
 }
 
 FitOptions m5(FitOptions options) {
-  options.selection.folds.count = 0;
+  options.folds.count = 0;
   return with_rule(GrowthRule::m5, options);
 }
 
@@ -103,7 +103,7 @@ Result run(const Member& member, const Task& task) {
   for (int t = 0; t < task.trials; ++t) {
     const Trial trial = task.trial(t);
     FitOptions options = member.options;
-    options.growth.max_leaves = std::min<Eigen::Index>(options.growth.max_leaves, trial.train_inputs.rows());
+    options.max_leaves = std::min<Eigen::Index>(options.max_leaves, trial.train_inputs.rows());
     std::optional<llmt::FitResult> fit;
     const Cost cost = measure([&] { fit = llmt::fit(trial.train_inputs, trial.train_output, options); });
     result.seconds += cost.cpu / task.trials;

@@ -22,8 +22,8 @@ struct Growth {
 
 Growth grow(const Sample& train, const Sample& test, llmt::GrowthRule rule, llmt::SplitSearch search) {
   llmt::FitOptions options = crisp(with_rule(rule));
-  options.growth.search = search;
-  options.selection.folds.count = 0;
+  options.expert.search = search;
+  options.folds.count = 0;
   options.max_threads = 1;
   std::optional<llmt::FitResult> fit;
   const Cost cost = measure([&] { fit = llmt::fit(train.x, train.y, options); });

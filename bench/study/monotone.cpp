@@ -74,7 +74,7 @@ std::vector<Method> methods(const std::vector<int>& signs) {
   slopes.slope_signs = monotone.monotone = signs;
   llmt::FitOptions unsplit = monotone;
   for (int j = 0; j < std::ssize(signs); ++j) {
-    if (signs[j] == 0) unsplit.growth.split_inputs.push_back(j);
+    if (signs[j] == 0) unsplit.split_inputs.push_back(j);
   }
   return {{"none", {}}, {"signs of slopes", slopes}, {"monotone", monotone}, {"monotone, unsplit", unsplit}};
 }

@@ -18,7 +18,7 @@ using llmt::ValidityChoice;
 struct Variant {
   ValidityChoice validity = ValidityChoice::crisp;
   Pruning pruning = Pruning::last_splits;
-  double significance = -1.0;  // as in GrowthOptions: negative: the default, 1: no test
+  double significance = -1.0;  // as in FitOptions: negative: the default, 1: no test
 };
 
 constexpr Variant variants[] = {{},
@@ -29,9 +29,9 @@ constexpr Variant variants[] = {{},
 
 llmt::FitOptions options_of(const Variant& variant) {
   llmt::FitOptions options;
-  options.blend.validity = variant.validity;
-  options.growth.significance = variant.significance;
-  options.growth.pruning = variant.pruning;
+  options.validity = variant.validity;
+  options.significance = variant.significance;
+  options.pruning = variant.pruning;
   options.intervals = false;
   return options;
 }

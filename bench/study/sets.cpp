@@ -113,11 +113,11 @@ void add_sets(CLI::App& study) {
   CLI::App* command = study.add_subcommand("sets", "One tree beside least squares");
   add_task_options(*command, arguments->tasks);
   // The options of `llmt fit`.
-  command->add_option("--local-models", arguments->options.local_models.terms, "linear, quadratic or auto")
+  command->add_option("--local-models", arguments->options.terms, "linear, quadratic or auto")
       ->transform(CLI::CheckedTransformer(terms));
-  command->add_option("--sparse", arguments->options.local_models.sparse, "never, auto or always")
+  command->add_option("--sparse", arguments->options.sparse, "never, auto or always")
       ->transform(CLI::CheckedTransformer(sparse));
-  command->add_option("--validity", arguments->options.blend.validity, "auto or crisp")
+  command->add_option("--validity", arguments->options.validity, "auto or crisp")
       ->transform(CLI::CheckedTransformer(validity));
   command->callback([arguments] { study_sets(*arguments); });
 }

@@ -12,6 +12,7 @@
 #include "llmt/robotics/calibration.hpp"
 #include "llmt/robotics/robot_file.hpp"
 #include "llmt/robotics/simulation.hpp"
+#include "study/study.hpp"
 #include "synthetic.hpp"
 
 namespace bench {
@@ -117,6 +118,15 @@ std::vector<Task> known_truths() {
           known_truth("jumps", truth, 10000, 10, 0.0, 1.0),
           {"arm residual", numbered(2), 1, [](int) { return arm(true); }},
           {"arm x", numbered(2), 1, [](int) { return arm(false); }}};
+}
+
+void add_task_options(CLI::App& command, TaskChoice& choice) {
+  command.add_option("tasks", choice.names, "names of known truths, or of data sets with --data; default: all");
+  command.add_option("--data", choice.folder, "folder with NAME.csv and NAME.splits.csv")
+      ->check(CLI::ExistingDirectory);
+  command.add_option("--trials", choice.trials, "largest number of seeds or splits of a task")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
 }
 
 std::vector<Task> chosen_tasks(const TaskChoice& choice) {

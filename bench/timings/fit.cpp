@@ -20,8 +20,7 @@ void report(benchmark::State& state, const Eigen::VectorXd& predicted, const ben
 void fit_tree(benchmark::State& state, int folds) {
   const bench::Sample train = bench::sample(state.range(0), state.range(1), 1);
   const bench::Sample test = bench::sample(10000, state.range(1), 2);
-  const llmt::FitOptions options{.selection = {.folds = {.count = folds}},
-                                 .max_threads = static_cast<int>(state.range(2))};
+  const llmt::FitOptions options{.folds = {.count = folds}, .max_threads = static_cast<int>(state.range(2))};
   std::optional<llmt::FitResult> result;
   for (auto _ : state) result.emplace(llmt::fit(train.x, train.y, options));
   report(state, result->model.predict(test.x), test, static_cast<double>(result->summary.partitions[0].leaves));

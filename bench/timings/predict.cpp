@@ -25,15 +25,15 @@ const llmt::Model& model_of(llmt::ValidityChoice validity, std::int64_t leaves, 
   if (const auto found = models.find(key); found != models.end()) return found->second;
   const bench::Sample train = bench::sample(20000, inputs, 1);
   llmt::FitOptions options = bench::with_leaves(leaves);
-  options.growth.min_leaf_samples = 20;
-  for (int j = 0; j < std::min<std::int64_t>(inputs, 8); ++j) options.growth.split_inputs.push_back(j);
+  options.min_leaf_samples = 20;
+  for (int j = 0; j < std::min<std::int64_t>(inputs, 8); ++j) options.split_inputs.push_back(j);
   // Prediction takes the same time whatever the estimation. Joint estimation of more coefficients than this takes too
   // long; local estimation of wide blends is far from the truth.
   const bool joint = leaves * (inputs + 1) <= 1500;
-  options.blend.validity = validity;
-  options.blend.estimation = joint ? llmt::Estimation::joint : llmt::Estimation::local;
-  options.blend.widths = {1.0};
-  options.blend.ridges = {1e-4};
+  options.validity = validity;
+  options.expert.estimation = joint ? llmt::Estimation::joint : llmt::Estimation::local;
+  options.expert.widths = {1.0};
+  options.expert.ridges = {1e-4};
   return models.emplace(key, llmt::fit(train.x, train.y, options).model).first->second;
 }
 

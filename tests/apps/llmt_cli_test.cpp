@@ -188,14 +188,13 @@ TEST(LlmtProgram, MistakesHaveTheirExitCodeAndMessage) {
   expect("", 2, "subcommand");
   expect("fit d.csv", 2, "--target is required");
   expect("fit d.csv -t y --rule cart", 2, "cart");
-  expect("fit d.csv -t y --ignore label --rule m5 --validity blend", 2,
-         "with growth.rule m5 it must be automatic or crisp");
+  expect("fit d.csv -t y --ignore label --rule m5 --validity blend", 2, "with rule m5 it must be auto or crisp");
   expect("fit d.csv -t y --monotone label", 2, "--monotone names \"label\", which is categorical");
   expect("fit d.csv -t y --ignore label --monotone a,-a", 2, "--monotone names \"a\" with both signs");
   expect("fit d.csv -t y --ignore label --monotone a --slope-sign=-a", 2,
          "--monotone and --slope-sign name \"a\" with opposite signs");
   expect("fit d.csv -t y --ignore label --cv 1", 2, "folds.count is 1");
-  expect("fit d.csv -t y --ignore label --width -1", 2, "blend.widths is -1, it must be finite and positive");
+  expect("fit d.csv -t y --ignore label --width -1", 2, "expert.widths is -1, it must be finite and positive");
   expect("fit d.csv -t y --ignore label --categorical nope", 1, "\"nope\" is categorical, but not an input");
   expect("fit d.csv -t y --ignore label --split-inputs nope", 2, "\"nope\", which is not among the inputs a, b, z");
   expect("fit word.csv -t y", 1, "word.csv:3: column \"b\": 'x' is not a number (--ignore COLUMN leaves a column out)");

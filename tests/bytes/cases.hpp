@@ -15,7 +15,7 @@ using Results = std::map<std::string, std::string>;
 using Part = std::function<void(const std::string& folder, Results& results)>;
 
 void witness_trees(const std::string& folder, Results& results);
-void witness_retiring(const std::string& folder, Results& results);
+void witness_many_rows(const std::string& folder, Results& results);
 void witness_comparison(const std::string& folder, Results& results);
 void witness_streams(const std::string& folder, Results& results);
 void witness_llmt(const std::string& folder, Results& results);

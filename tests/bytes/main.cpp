@@ -15,7 +15,7 @@ namespace {
 
 const std::map<std::string, Part>& parts() {
   static const std::map<std::string, Part> all = {
-      {"trees", witness_trees},     {"retiring", witness_retiring}, {"comparison", witness_comparison},
+      {"trees", witness_trees},     {"many_rows", witness_many_rows}, {"comparison", witness_comparison},
       {"streams", witness_streams},
 #ifdef LLMT_PROGRAM
       {"llmt", witness_llmt},

@@ -37,8 +37,8 @@ const std::vector<GrowthRuleName>& growth_rules() {
 
 Task make_task(GrowthRule rule, int threads) {
   Task task{make_sample(rows, 1), {}};
-  task.options.growth.rule = rule;
-  task.options.selection.folds.count = 3;
+  task.options.rule = rule;
+  task.options.folds.count = 3;
   task.options.max_threads = threads;
   return task;
 }
@@ -46,42 +46,42 @@ Task make_task(GrowthRule rule, int threads) {
 const std::vector<OptionSet>& option_sets() {
   static const std::vector<OptionSet> sets = {
       {"default", [](Task&) {}},
-      {"crisp", [](Task& task) { task.options.blend.validity = ValidityChoice::crisp; }},
-      {"blend", [](Task& task) { task.options.blend.validity = ValidityChoice::blend; }},
-      {"gaussian", [](Task& task) { task.options.blend.validity = ValidityChoice::gaussian; }},
+      {"crisp", [](Task& task) { task.options.validity = ValidityChoice::crisp; }},
+      {"blend", [](Task& task) { task.options.validity = ValidityChoice::blend; }},
+      {"gaussian", [](Task& task) { task.options.validity = ValidityChoice::gaussian; }},
       {"blend_local",
        [](Task& task) {
-         task.options.blend.validity = ValidityChoice::blend;
-         task.options.blend.estimation = Estimation::local;
+         task.options.validity = ValidityChoice::blend;
+         task.options.expert.estimation = Estimation::local;
        }},
       {"gaussian_local",
        [](Task& task) {
-         task.options.blend.validity = ValidityChoice::gaussian;
-         task.options.blend.estimation = Estimation::local;
+         task.options.validity = ValidityChoice::gaussian;
+         task.options.expert.estimation = Estimation::local;
        }},
-      {"local", [](Task& task) { task.options.blend.estimation = Estimation::local; }},
-      {"as_grown", [](Task& task) { task.options.blend.estimation = Estimation::as_grown; }},
+      {"local", [](Task& task) { task.options.expert.estimation = Estimation::local; }},
+      {"as_grown", [](Task& task) { task.options.expert.estimation = Estimation::as_grown; }},
       {"one_candidate",
        [](Task& task) {
-         task.options.blend.widths = {0.75};
-         task.options.blend.ridges = {0.0};
-         task.options.blend.jumps = {1.5};
-         task.options.blend.shrinkages = {0.5};
+         task.options.expert.widths = {0.75};
+         task.options.expert.ridges = {0.0};
+         task.options.expert.jumps = {1.5};
+         task.options.expert.shrinkages = {0.5};
        }},
-      {"quadratic", [](Task& task) { task.options.local_models.terms = LocalTerms::quadratic; }},
+      {"quadratic", [](Task& task) { task.options.terms = LocalTerms::quadratic; }},
       {"quadratic_crisp",
        [](Task& task) {
-         task.options.local_models.terms = LocalTerms::quadratic;
-         task.options.blend.validity = ValidityChoice::crisp;
+         task.options.terms = LocalTerms::quadratic;
+         task.options.validity = ValidityChoice::crisp;
        }},
-      {"linear_or_quadratic", [](Task& task) { task.options.local_models.terms = LocalTerms::automatic; }},
-      {"sparse", [](Task& task) { task.options.local_models.sparse = SparseChoice::always; }},
-      {"full_or_sparse", [](Task& task) { task.options.local_models.sparse = SparseChoice::automatic; }},
+      {"linear_or_quadratic", [](Task& task) { task.options.terms = LocalTerms::automatic; }},
+      {"sparse", [](Task& task) { task.options.sparse = SparseChoice::always; }},
+      {"full_or_sparse", [](Task& task) { task.options.sparse = SparseChoice::automatic; }},
       {"sparse_quadratic",
        [](Task& task) {
-         task.options.local_models.sparse = SparseChoice::always;
-         task.options.local_models.terms = LocalTerms::quadratic;
-         task.options.blend.validity = ValidityChoice::crisp;
+         task.options.sparse = SparseChoice::always;
+         task.options.terms = LocalTerms::quadratic;
+         task.options.validity = ValidityChoice::crisp;
        }},
       {"monotone",
        [](Task& task) {
@@ -104,7 +104,7 @@ const std::vector<OptionSet>& option_sets() {
       {"slope_signs_crisp",
        [](Task& task) {
          task.options.slope_signs = {1, -1, 0};
-         task.options.blend.validity = ValidityChoice::crisp;
+         task.options.validity = ValidityChoice::crisp;
        }},
       {"missing", [](Task& task) { remove_values(task.sample.inputs); }},
       {"categorical",
@@ -123,68 +123,53 @@ const std::vector<OptionSet>& option_sets() {
       {"two_outputs",
        [](Task& task) {
          add_output(task.sample);
-         task.options.blend.validity = ValidityChoice::crisp;
+         task.options.validity = ValidityChoice::crisp;
        }},
       {"shared",
        [](Task& task) {
          add_output(task.sample);
-         task.options.growth.shared_partition = true;
+         task.options.shared_partition = true;
        }},
-      {"weakest_link", [](Task& task) { task.options.growth.pruning = llmt::Pruning::weakest_link; }},
+      {"weakest_link", [](Task& task) { task.options.pruning = llmt::Pruning::weakest_link; }},
       {"weakest_link_crisp",
        [](Task& task) {
-         task.options.growth.pruning = llmt::Pruning::weakest_link;
-         task.options.blend.validity = ValidityChoice::crisp;
+         task.options.pruning = llmt::Pruning::weakest_link;
+         task.options.validity = ValidityChoice::crisp;
        }},
       {"binned",
        [](Task& task) {
          task.sample = make_sample(3000, 2);
-         task.options.growth.search = llmt::SplitSearch::binned;
-         task.options.growth.max_leaves = 12;
-         task.options.blend.validity = ValidityChoice::crisp;
-         task.options.selection.folds.count = 0;
+         task.options.expert.search = llmt::SplitSearch::binned;
+         task.options.max_leaves = 12;
+         task.options.validity = ValidityChoice::crisp;
+         task.options.folds.count = 0;
        }},
-      {"no_folds", [](Task& task) { task.options.selection.folds.count = 0; }},
+      {"no_folds", [](Task& task) { task.options.folds.count = 0; }},
       {"no_folds_blend",
        [](Task& task) {
-         task.options.selection.folds.count = 0;
-         task.options.blend.validity = ValidityChoice::blend;
-         task.options.growth.max_leaves = 8;
+         task.options.folds.count = 0;
+         task.options.validity = ValidityChoice::blend;
+         task.options.max_leaves = 8;
        }},
-      {"single_hold_out", [](Task& task) { task.options.selection.single_hold_out_rows = 100; }},
-      {"contiguous_folds", [](Task& task) { task.options.selection.folds.kind = llmt::FoldKind::contiguous; }},
-      {"grouped_folds", [](Task& task) { task.options.selection.folds.groups = group_labels(); }},
+      {"contiguous_folds", [](Task& task) { task.options.folds.kind = llmt::FoldKind::contiguous; }},
+      {"grouped_folds", [](Task& task) { task.options.folds.groups = group_labels(); }},
       {"some_columns",
        [](Task& task) {
-         task.options.growth.split_inputs = {1};
-         task.options.growth.regression_inputs = {0, 2};
+         task.options.split_inputs = {1};
+         task.options.regression_inputs = {0, 2};
        }},
       {"growth_limits",
        [](Task& task) {
-         task.options.growth.max_leaves = 6;
-         task.options.growth.min_leaf_samples = 15;
-         task.options.growth.significance = 0.2;
-         task.options.growth.min_variance_gain = 0.01;
+         task.options.max_leaves = 6;
+         task.options.min_leaf_samples = 15;
+         task.options.significance = 0.2;
+         task.options.expert.min_variance_gain = 0.01;
        }},
       {"min_improvement",
        [](Task& task) {
-         task.options.growth.min_improvement = 0.02;
+         task.options.expert.min_improvement = 0.02;
          task.options.intervals = false;
        }},
-  };
-  return sets;
-}
-
-const std::vector<OptionSet>& retiring_option_sets() {
-  static const std::vector<OptionSet> sets = {
-      {"merged", [](Task& task) { task.options.growth.merge_leaves = true; }},
-      {"smoothness_2",
-       [](Task& task) {
-         task.options.blend.smoothness = 2;
-         task.options.blend.validity = ValidityChoice::blend;
-       }},
-      {"midpoint", [](Task& task) { task.options.growth.threshold = llmt::ThresholdPlacement::midpoint; }},
-      {"pruning_m_0", [](Task& task) { task.options.growth.pruning_m = 0.0; }},
   };
   return sets;
 }

@@ -29,10 +29,6 @@ struct OptionSet {
 const std::vector<GrowthRuleName>& growth_rules();
 const std::vector<OptionSet>& option_sets();
 
-/// Sets whose options are about to go: leaf merging, twice differentiable blends, thresholds in the middle, the m of
-/// RETIS. They have a block of their own in the manifest, "retiring/...".
-const std::vector<OptionSet>& retiring_option_sets();
-
 /// The task that option sets change: 240 rows, 3 folds, everything else by default.
 Task make_task(llmt::GrowthRule rule, int threads);
 

@@ -22,7 +22,6 @@ const std::vector<StreamSet>& stream_sets() {
       {"two_outputs", [](llmt::StreamOptions&) {}, false, false, 2},
       {"missing_weighted", [](llmt::StreamOptions&) {}, true},
       {"drift", [](llmt::StreamOptions&) {}, false, true},
-      {"drift_ignored", [](llmt::StreamOptions& options) { options.detect_drift = false; }, false, true},
       {"no_reservoir", [](llmt::StreamOptions& options) { options.reservoir_rows = 0; }},
       {"few_bins_and_leaves",
        [](llmt::StreamOptions& options) {

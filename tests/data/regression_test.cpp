@@ -39,9 +39,9 @@ TEST_P(RegressionSet, DefaultFitIsBelowTheBoundAndAQuarterBelowLeastSquares) {
   EXPECT_LE(rmse, GetParam().bound);
   // One leaf is least squares.
   llmt::FitOptions one_leaf;
-  one_leaf.growth.max_leaves = 1;
-  one_leaf.blend.validity = llmt::ValidityChoice::crisp;
-  one_leaf.selection.folds.count = 0;
+  one_leaf.max_leaves = 1;
+  one_leaf.validity = llmt::ValidityChoice::crisp;
+  one_leaf.folds.count = 0;
   EXPECT_LT(rmse, 0.75 * llmt::rmse(llmt::fit(x, y, one_leaf).model.predict(x_test), y_test)(0));
 }
 

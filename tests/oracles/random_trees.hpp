@@ -37,13 +37,15 @@ inline llmt::Model with_smoothness(const llmt::Model& model, int smoothness) {
 inline llmt::FitOptions only(const Kind& kind, llmt::Estimation estimation, Eigen::Index max_leaves,
                              double ridge = 1e-3) {
   llmt::FitOptions options;
-  options.growth = {.significance = 1.0, .min_variance_gain = -1.0, .max_leaves = max_leaves};
-  options.blend = {.validity = kind.validity,
-                   .estimation = estimation,
-                   .widths = {kind.width},
-                   .ridges = {ridge},
-                   .shrinkages = {0.0}};
-  options.selection.folds.count = 0;
+  options.max_leaves = max_leaves;
+  options.significance = 1.0;
+  options.expert.min_variance_gain = -1.0;
+  options.validity = kind.validity;
+  options.expert.estimation = estimation;
+  options.expert.widths = {kind.width};
+  options.expert.ridges = {ridge};
+  options.expert.shrinkages = {0.0};
+  options.folds.count = 0;
   return options;
 }
 

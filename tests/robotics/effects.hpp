@@ -68,7 +68,7 @@ inline double column_of(const Poses& poses, const std::string& name, Eigen::Inde
 
 /// Where the rigid arm puts its tool with one joint moved by `change`.
 inline Eigen::Vector3d moved_tool(const Robot& robot, Eigen::VectorXd q, std::size_t joint, double change) {
-  q(static_cast<Eigen::Index>(joint)) += change;
+  q(joint) += change;
   return forward(robot.chain, q).position_mm;
 }
 
@@ -95,7 +95,7 @@ inline double gravity_by_energy(const Robot& robot, Eigen::VectorXd q, double pa
   const double step = turns ? 1e-5 : 1e-2;
   const auto energy = [&](double change) {
     Eigen::VectorXd moved = q;
-    moved(static_cast<Eigen::Index>(joint)) += change;
+    moved(joint) += change;
     const Skeleton skeleton = Kinematics(robot.chain).skeleton(moved);
     const Eigen::Vector3d gravity = skeleton.base_rotation * robot.chain.gravity_m_s2;
     double sum = -payload_kg * gravity.dot(skeleton.payload_centre);

@@ -74,10 +74,10 @@ inline Robot scara() {
 inline Poses random_poses(const Chain& chain, Eigen::Index n, std::uint64_t seed) {
   Random random(seed);
   Poses poses;
-  poses.joints.resize(n, static_cast<Eigen::Index>(chain.joints.size()));
+  poses.joints.resize(n, std::ssize(chain.joints));
   for (Eigen::Index i = 0; i < n; ++i) {
     for (Eigen::Index j = 0; j < poses.joints.cols(); ++j) {
-      const bool turns = chain.joints[static_cast<std::size_t>(j)].type == JointType::revolute;
+      const bool turns = chain.joints[j].type == JointType::revolute;
       poses.joints(i, j) = turns ? random.uniform(-2.5, 2.5) : random.uniform(0.0, 200.0);
     }
   }

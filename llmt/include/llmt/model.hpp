@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "llmt/abi.hpp"
+#include "llmt/names.hpp"
 
 namespace llmt {
 
@@ -28,6 +29,9 @@ enum class ValidityKind {
   /// side of the split, see Node, the left child has the share g = 1 / (1 + exp(u)) and the right one 1 - g.
   logistic
 };
+
+template <>
+std::span<const Choice<ValidityKind>> choices();
 
 struct Validity {
   ValidityKind kind = ValidityKind::crisp;

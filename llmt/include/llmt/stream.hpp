@@ -8,8 +8,8 @@
 #include <memory>
 
 #include "llmt/abi.hpp"
-#include "llmt/fit.hpp"
 #include "llmt/model.hpp"
+#include "llmt/options.hpp"
 
 namespace llmt {
 
@@ -24,7 +24,7 @@ struct StreamOptions {
   /// 16 ... 500.
   Eigen::Index max_leaves = 0;
   int bins = 16;  ///< of an input in a leaf, 4 ... 256
-  /// Leaf models are drawn towards the model that their parent had when it was split, see BlendOptions::shrinkages.
+  /// Leaf models are drawn towards the model that their parent had when it was split, see ExpertOptions::shrinkages.
   double shrinkage = 0.1;
   /// Rows that are kept: a quarter of them is held out and chooses what a snapshot is, at most; the others estimate
   /// blends. 0: a snapshot is the crisp tree as it stands.

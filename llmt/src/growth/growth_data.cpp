@@ -35,9 +35,8 @@ GrowthData::GrowthData(const GrowthProblem& growth) : problem(growth), training(
 
 double GrowthData::significant_rss(double weight, int rank, double rss, Eigen::Index tested) const {
   const GrowthOptions& options = problem.options;
-  if (options.rule != GrowthRule::rd || options.significance >= 1.0 || tested == 0) {
-    return std::numeric_limits<double>::infinity();
-  }
+  const bool has_test = problem.criterion == SplitCriterion::f_test && options.significance < 1.0;
+  if (!has_test || tested == 0) return std::numeric_limits<double>::infinity();
   // One more coefficient is the least that two models can have; the more there are, the more they must gain.
   const double added = static_cast<double>(output_weights.size());
   const double freedom = added * (weight - rank) - added;

@@ -1,5 +1,6 @@
 #include <queue>
 
+#include "growth/gain_order.hpp"
 #include "growth/pruning.hpp"
 
 namespace llmt {
@@ -10,16 +11,6 @@ struct Block {
   double gain = 0.0;
   double splits = 1.0;
   int last = -1;  // node of the last of them
-};
-
-// A block that waits to be joined to that of the split above it.
-struct Waiting {
-  float mean_gain;  // in single precision, so that gains equal but for rounding count as equal
-  int node;         // its topmost
-  double splits;    // it had then
-  bool operator<(const Waiting& other) const {
-    return mean_gain != other.mean_gain ? mean_gain < other.mean_gain : node > other.node;
-  }
 };
 
 std::vector<double> gains_of(const std::vector<Node>& nodes) {
@@ -42,7 +33,9 @@ std::vector<int> order_of_splits(const std::vector<Node>& nodes, const std::vect
   std::vector<int> above(nodes.size(), -1);
   std::vector<int> next(nodes.size(), -1);
   std::vector<Block> blocks(nodes.size());
-  std::priority_queue<Waiting> queue;
+  // Blocks that wait to be joined to the block of the split above, by their mean gain: topmost node, and the number of
+  // splits when they were entered.
+  std::priority_queue<ByGain<double>> queue;
   for (std::size_t i = 0; i < nodes.size(); ++i) {
     const int node = static_cast<int>(i);
     if (nodes[i].is_leaf()) continue;
@@ -62,10 +55,10 @@ std::vector<int> order_of_splits(const std::vector<Node>& nodes, const std::vect
     return node;
   };
   while (!queue.empty()) {
-    const Waiting first = queue.top();
+    const ByGain<double> first = queue.top();
     queue.pop();
     const std::size_t own = first.node;
-    if (top[own] != first.node || blocks[own].splits != first.splits) {
+    if (top[own] != first.node || blocks[own].splits != first.content) {
       continue;  // it has been joined, or has grown since
     }
     const int onto = top_of(above[own]);

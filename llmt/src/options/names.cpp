@@ -1,6 +1,51 @@
+#include <array>
+
+#include "llmt/options.hpp"
 #include "llmt/summary.hpp"
 
 namespace llmt {
+namespace {
+
+// The names are those of the command line and of its JSON, and stay.
+constexpr std::array<Choice<ValidityChoice>, 4> validity_choices = {{{ValidityChoice::automatic, "auto"},
+                                                                     {ValidityChoice::crisp, "crisp"},
+                                                                     {ValidityChoice::blend, "blend"},
+                                                                     {ValidityChoice::gaussian, "gaussian"}}};
+constexpr std::array<Choice<LocalTerms>, 3> terms = {
+    {{LocalTerms::linear, "linear"}, {LocalTerms::quadratic, "quadratic"}, {LocalTerms::automatic, "auto"}}};
+constexpr std::array<Choice<SparseChoice>, 3> sparse_choices = {
+    {{SparseChoice::never, "never"}, {SparseChoice::automatic, "auto"}, {SparseChoice::always, "always"}}};
+constexpr std::array<Choice<SplitSearch>, 3> searches = {
+    {{SplitSearch::automatic, "auto"}, {SplitSearch::exact, "exact"}, {SplitSearch::binned, "binned"}}};
+constexpr std::array<Choice<Estimation>, 3> estimations = {
+    {{Estimation::as_grown, "as-grown"}, {Estimation::local, "local"}, {Estimation::joint, "joint"}}};
+
+}  // namespace
+
+template <>
+std::span<const Choice<ValidityChoice>> choices() {
+  return validity_choices;
+}
+
+template <>
+std::span<const Choice<LocalTerms>> choices() {
+  return terms;
+}
+
+template <>
+std::span<const Choice<SparseChoice>> choices() {
+  return sparse_choices;
+}
+
+template <>
+std::span<const Choice<SplitSearch>> choices() {
+  return searches;
+}
+
+template <>
+std::span<const Choice<Estimation>> choices() {
+  return estimations;
+}
 
 std::string describe(StopReason reason) {
   switch (reason) {

@@ -6,7 +6,7 @@
 
 #include "base/matrix.hpp"
 #include "data/dataset.hpp"
-#include "fit/validate.hpp"
+#include "data/table.hpp"
 #include "llmt/fit.hpp"
 #include "stream/crisp_partition.hpp"
 #include "stream/snapshot.hpp"
@@ -43,8 +43,8 @@ Model StreamState::snapshot(ValidityChoice validity) const {
 Model StreamState::model_of_first_rows() const {
   const Eigen::Map<const RowMajor> first(first_rows_.data(), std::ssize(first_rows_) / width(), width());
   FitOptions one_leaf;
-  one_leaf.growth.max_leaves = 1;
-  one_leaf.selection.folds.count = 0;
+  one_leaf.max_leaves = 1;
+  one_leaf.folds.count = 0;
   one_leaf.weights = first.rightCols(1);
   return fit(first.leftCols(inputs_), first.middleCols(inputs_, outputs_), one_leaf).model;
 }

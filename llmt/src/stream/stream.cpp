@@ -7,7 +7,7 @@
 #include <stdexcept>
 
 #include "base/checks.hpp"
-#include "fit/validate.hpp"
+#include "data/table.hpp"
 #include "stream/state.hpp"
 
 namespace llmt {

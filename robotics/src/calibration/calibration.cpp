@@ -26,18 +26,18 @@ bool covers_base(const std::vector<std::string>& reasons) {
   return std::all_of(reasons.begin(), reasons.begin() + 6, [](const std::string& why) { return why.empty(); });
 }
 
-// A spread of at most `count` rows: enough to tell good starts from bad ones.
-Measurements thinned(const Measurements& measurements, std::ptrdiff_t count) {
-  std::vector<std::ptrdiff_t> rows;
-  const std::ptrdiff_t step = std::max<std::ptrdiff_t>(1, measurements.count() / count);
-  for (std::ptrdiff_t i = 0; i < measurements.count(); i += step) rows.push_back(i);
+// About `count` rows at equal steps: enough to compare starts.
+Measurements rows_at_steps(const Measurements& measurements, Eigen::Index count) {
+  std::vector<Eigen::Index> rows;
+  const Eigen::Index step = std::max<Eigen::Index>(1, measurements.count() / count);
+  for (Eigen::Index i = 0; i < measurements.count(); i += step) rows.push_back(i);
   return select(measurements, rows);
 }
 
-// The tool guess matters: with a wrong tool Kabsch finds a base that lies in the valley of another minimum.
+// The guess of the tool matters: with a wrong one, Kabsch's base lies in the basin of another minimum.
 Robot best_start(const Robot& robot, const Measurements& measurements, const std::vector<std::string>& reasons,
                  const discovery::SolverOptions& solver) {
-  const Measurements few = thinned(measurements, 200);
+  const Measurements few = rows_at_steps(measurements, 200);
   Eigen::Matrix3Xd guesses = Eigen::Matrix3Xd::Zero(3, 7);
   constexpr double tool_guess_mm = 150.0;
   for (int axis = 0; axis < 3; ++axis) {
@@ -53,7 +53,7 @@ Robot best_start(const Robot& robot, const Measurements& measurements, const std
     start = with_closed_form_base(std::move(start), few);
     Robot trial = start;
     const discovery::SolverResult result = solve_for(trial, calibration_problem(trial, few), reasons, solver);
-    // The first guess, the tool as given, wins unless another is better in earnest.
+    // The tool as given comes first and is kept unless another guess is better by more than 0.1 %.
     if (result.residual_norms.back() < 0.999 * smallest) {
       smallest = result.residual_norms.back();
       best = trial;
@@ -80,8 +80,9 @@ double root_mean_square(const Eigen::VectorXd& residuals, Eigen::Index dof) {
   return residuals.norm() / std::sqrt(static_cast<double>(std::max<Eigen::Index>(1, dof)));
 }
 
-// Least squares with priors. Data and priors weigh against each other by the noise, which the registered robot
-// overestimates: the passes, each starting where the last one ended, take it from the fit before until it settles.
+// Least squares with priors. The weight of the data against the priors depends on the noise, which the residuals of the
+// registered robot overestimate. So the fit is repeated from its own result, with the noise of the fit before, until
+// the noise settles.
 void identify(Calibration& calibration, const discovery::LeastSquaresProblem& unweighted,
               const std::vector<std::string>& reasons, const CalibrationOptions& options) {
   const bool has_priors = options.prior_length_mm > 0.0 || options.prior_angle_deg > 0.0;
@@ -96,7 +97,7 @@ void identify(Calibration& calibration, const discovery::LeastSquaresProblem& un
     problem.weights = Eigen::VectorXd::Constant(calibration.registration.residuals.size(), weight);
     calibration.result = solve_for(calibration.robot, problem, reasons, options.solver);
     for (std::size_t k = 0; k < reasons.size(); ++k) {
-      problem.parameters[k].value = calibration.result.values(static_cast<Eigen::Index>(k));
+      problem.parameters[k].value = calibration.result.values(k);
     }
     const Eigen::VectorXd& residuals = calibration.result.residuals;
     const double before = calibration.noise_mm;
@@ -105,7 +106,7 @@ void identify(Calibration& calibration, const discovery::LeastSquaresProblem& un
   }
   for (std::size_t k = 0; k < reasons.size(); ++k) {
     const discovery::Parameter& parameter = problem.parameters[k];
-    const double error = calibration.result.standard_errors(static_cast<Eigen::Index>(k));
+    const double error = calibration.result.standard_errors(k);
     if (reasons[k].empty() && parameter.prior_sigma && error > 0.7 * *parameter.prior_sigma) {
       calibration.weak.push_back(parameter.name);
     }
@@ -116,7 +117,7 @@ std::vector<IdentifiedParameter> identified_parameters(const discovery::SolverRe
                                                        const std::vector<std::string>& reasons) {
   std::vector<IdentifiedParameter> identified;
   for (std::size_t k = 0; k < reasons.size(); ++k) {
-    const double error = result.standard_errors(static_cast<Eigen::Index>(k));
+    const double error = result.standard_errors(k);
     IdentifiedParameter entry{.name = result.parameters[k].name, .standard_error = {}, .state = reasons[k]};
     if (reasons[k].empty()) {
       entry.state = std::isfinite(error) ? "free" : "free, not identifiable";
@@ -130,7 +131,7 @@ std::vector<IdentifiedParameter> identified_parameters(const discovery::SolverRe
 Eigen::VectorXd start_values(const discovery::LeastSquaresProblem& problem) {
   Eigen::VectorXd values(std::ssize(problem.parameters));
   for (std::size_t k = 0; k < problem.parameters.size(); ++k) {
-    values(static_cast<Eigen::Index>(k)) = problem.parameters[k].value;
+    values(k) = problem.parameters[k].value;
   }
   return values;
 }

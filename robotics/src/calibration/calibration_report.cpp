@@ -7,6 +7,8 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "calibration/paired_gain.hpp"
+
 namespace llmt::robotics {
 namespace {
 
@@ -25,13 +27,12 @@ std::span<const double> pose_labels(const Measurements& measurements) {
 Fitted fit_all(const Robot& robot, const Measurements& measurements, const ReportOptions& options) {
   Fitted fitted{.calibration = calibrate(robot, measurements, options.calibration), .correction = {}};
   if (!options.correct) return fitted;
-  FitOptions fit;
-  fit.growth = options.growth;
-  fit.blend.validity = ValidityChoice::crisp;
-  fit.selection.folds = {.count = options.correction_folds,
-                         .kind = options.kind,
-                         .seed = options.seed,
-                         .groups = pose_labels(measurements)};
+  FitOptions fit = options.correction;
+  fit.validity = ValidityChoice::crisp;
+  fit.folds = {.count = options.correction_folds,
+               .kind = options.kind,
+               .seed = options.seed,
+               .groups = pose_labels(measurements)};
   fit.intervals = false;
   fit.max_threads = options.max_threads;
   fitted.correction = fit_correction(fitted.calibration.robot, measurements, fit);
@@ -55,7 +56,7 @@ Distances distances_of(const Fitted& fitted, const Measurements& measurements) {
   return result;
 }
 
-void tell(const ReportOptions& options, std::ptrdiff_t folds_done) {
+void tell(const ReportOptions& options, Eigen::Index folds_done) {
   if (options.progress) options.progress(folds_done + 1, options.folds + 1);
 }
 
@@ -87,18 +88,15 @@ void decide(CalibrationReport& report) {
     report.correction_kept = true;
     report.decision = "the correction is kept without being judged: no poses were held out";
   } else {
-    const Eigen::VectorXd gains = report.geometric.held_out_mm - report.corrected->held_out_mm;
-    const double gain = gains.mean();
-    const double n = static_cast<double>(gains.size());
-    const double error = std::sqrt((gains.array() - gain).square().sum() / (n * std::max(1.0, n - 1.0)));
-    report.correction_kept = gain > 2.0 * error;
+    const PairedGain gain = paired_gain(report.geometric.held_out_mm, report.corrected->held_out_mm);
+    report.correction_kept = gain.is_beyond_chance();
     const std::string figures = fmt::format("held-out mean {:.4f} mm with it, {:.4f} mm without",
                                             report.corrected->held_out_mm.mean(), report.geometric.held_out_mm.mean());
     report.decision = report.correction_kept ? fmt::format("the correction is kept: {}", figures)
-                      : gain <= 0.0
+                      : gain.mean <= 0.0
                           ? fmt::format("the correction is left out, it makes unseen poses worse: {}", figures)
                           : fmt::format("the correction is left out, its gain is within chance (+-{:.4f} mm): {}",
-                                        2.0 * error, figures);
+                                        2.0 * gain.standard_error, figures);
   }
 }
 
@@ -131,7 +129,7 @@ std::vector<std::string> suspicions(const Robot& robot, const Measurements& meas
     length_mm += std::abs(joint.a_mm) + std::abs(joint.d_mm);
     if (!joint.limits) continue;
     const double to_file_unit = joint.type == JointType::revolute ? 180.0 / std::numbers::pi : 1.0;
-    const Eigen::ArrayXd values = measurements.poses.joints.col(static_cast<Eigen::Index>(j)) * to_file_unit;
+    const Eigen::ArrayXd values = measurements.poses.joints.col(j) * to_file_unit;
     constexpr double slack = 1.0;  // degree or mm
     const Eigen::Index outside = (values < joint.limits->at(0) - slack || values > joint.limits->at(1) + slack).count();
     if (outside > 0) {

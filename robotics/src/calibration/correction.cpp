@@ -46,7 +46,7 @@ Eigen::MatrixXd residuals(const Robot& robot, const Measurements& measurements) 
   validate(measurements, robot);
   Eigen::MatrixXd world = measurements.positions_mm - positions(robot, measurements.poses);
   for (Eigen::Index axis = 0; axis < 3; ++axis) {
-    if (!measurements.measured[static_cast<std::size_t>(axis)]) world.col(axis).setZero();
+    if (!measurements.measured[axis]) world.col(axis).setZero();
   }
   return world * base_rotation(robot.chain);  // rows: r' R = (R' r)'
 }
@@ -58,7 +58,7 @@ FitResult fit_correction(const Robot& robot, const Measurements& measurements, c
   for (Eigen::Index axis = 0; axis < 3; ++axis) {
     if (all.col(axis).isZero(0.0)) continue;
     axes.push_back(axis);
-    names.push_back(output_names[static_cast<std::size_t>(axis)]);
+    names.push_back(output_names[axis]);
   }
   if (axes.empty()) throw std::invalid_argument("llmt::robotics::fit_correction: all residuals are zero");
   const Eigen::MatrixXd outputs = all(Eigen::all, axes);
@@ -81,7 +81,7 @@ Eigen::MatrixXd positions(const CorrectedRobot& robot, const Poses& poses) {
   const Eigen::MatrixXd predicted = model.predict(poses.joints);
   for (std::size_t k = 0; k < axes.size(); ++k) {
     const OutputColumn& seen = model.outputs()[k];
-    error.col(axes[k]) = predicted.col(static_cast<Eigen::Index>(k)).cwiseMax(seen.low).cwiseMin(seen.high);
+    error.col(axes[k]) = predicted.col(k).cwiseMax(seen.low).cwiseMin(seen.high);
   }
   points += error * base_rotation(robot.robot.chain).transpose();
   return points;

@@ -61,8 +61,7 @@ std::vector<std::string> reasons_to_fix(const Robot& robot, const CalibrationOpt
     for (std::size_t j = 0; j < robot.chain.joints.size(); ++j) {
       for (const JointParameter which : {JointParameter::theta, JointParameter::d, JointParameter::a, JointParameter::b,
                                          JointParameter::alpha, JointParameter::beta}) {
-        reasons[static_cast<std::size_t>(joint_parameter(j, which))] =
-            excluded_by_convention(robot.chain, j, which, options.parallel_axes_deg);
+        reasons[joint_parameter(j, which)] = excluded_by_convention(robot.chain, j, which, options.parallel_axes_deg);
       }
     }
   }
@@ -79,7 +78,7 @@ void fix_dependent(const std::vector<discovery::Parameter>& parameters, const Ei
   double largest = 0.0;
   for (std::size_t k = 0; k < parameters.size(); ++k) {
     if (!reasons[k].empty()) continue;
-    Eigen::VectorXd column = jacobian.col(static_cast<Eigen::Index>(k)) * parameters[k].scale;
+    Eigen::VectorXd column = jacobian.col(k) * parameters[k].scale;
     const double size = column.norm();
     // Gram-Schmidt twice: once is not orthogonal enough where columns nearly depend on each other.
     for (int pass = 0; pass < 2; ++pass) {

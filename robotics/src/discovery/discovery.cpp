@@ -26,8 +26,8 @@ double mean_distance(double sigma, Eigen::Index components) {
   return sigma * std::sqrt(2.0) * std::exp(std::lgamma(0.5 * (d + 1.0)) - std::lgamma(0.5 * d));
 }
 
-// Lost beams among the poses set aside are told, not removed: nothing is chosen by these poses.
-void tell_far_poses(const CorrectedRobot& improved, const Measurements& test, Discovery& result) {
+// Reports poses set aside that are far off, such as lost beams. They are not removed: no choice depends on these poses.
+void report_far_poses(const CorrectedRobot& improved, const Measurements& test, Discovery& result) {
   const Eigen::VectorXd errors = distances(positions(improved, test.poses), test);
   std::vector<double> sorted(errors.begin(), errors.end());
   std::ranges::nth_element(sorted, sorted.begin() + std::ssize(sorted) / 2);
@@ -46,7 +46,7 @@ void verify(const Measurements& searched, const Measurements& test, Eigen::Index
   result.fitted_before = figures({result.before, {}}, searched);
   result.fitted_after = figures(result.improved, searched);
   if (test.count() > 0) {
-    // Along the axes that were fitted: what was never seen is not promised.
+    // Only along axes that were fitted: the others were never measured.
     Measurements common = test;
     for (std::size_t axis = 0; axis < 3; ++axis) common.measured[axis] = test.measured[axis] && searched.measured[axis];
     if (std::ranges::none_of(common.measured, [](bool seen) { return seen; })) {
@@ -55,15 +55,14 @@ void verify(const Measurements& searched, const Measurements& test, Eigen::Index
     result.held_out.before = figures({result.before, {}}, common);
     result.held_out.after = figures(result.improved, common);
     result.held_out.poses = test.count();
-    tell_far_poses(result.improved, common, result);
+    report_far_poses(result.improved, common, result);
   }
-  constexpr Eigen::Index enough = 12;
-  const bool repeats_speak = result.lack_of_fit.dof >= enough;
-  result.held_out.floor_from_repeats = repeats_speak;
-  result.held_out.floor_mm = mean_distance(repeats_speak ? result.lack_of_fit.noise : result.noise_mm, components);
+  result.held_out.floor_from_repeats = result.lack_of_fit.has_enough_repeats();
+  const double noise_mm = result.held_out.floor_from_repeats ? result.lack_of_fit.noise : result.noise_mm;
+  result.held_out.floor_mm = mean_distance(noise_mm, components);
 }
 
-// Calibration must leave enough freedom for anything else to be told.
+// Throws if calibration leaves too few degrees of freedom for a search.
 void check_freedom(const Measurements& samples, const Calibration& baseline) {
   const Eigen::Index coordinates = samples.count() * std::ranges::count(samples.measured, true);
   const Eigen::Index needed = baseline.result.rank + std::max<Eigen::Index>(10, baseline.result.rank / 2);
@@ -75,7 +74,8 @@ void check_freedom(const Measurements& samples, const Calibration& baseline) {
   }
 }
 
-// What no effect does: wrong units, order or sign of joints, another robot, too many lost beams.
+// Throws if the error is larger than any effect makes it: wrong units, order or signs of joints, another robot, too
+// many lost beams.
 void check_plausible(const Robot& robot, const Measurements& samples) {
   double reach = robot.chain.tool.xyz_mm.norm();
   for (const Joint& joint : robot.chain.joints) reach += std::abs(joint.a_mm) + std::abs(joint.d_mm);
@@ -99,7 +99,7 @@ bool is_exact(const Robot& robot, const Measurements& samples) {
 }
 
 Discovery discover_in(const Robot& robot, const PoseSplit& split, const DiscoveryOptions& options) {
-  // Maps that the robot has already move its joints; what is sought is sought beside them.
+  // Joint maps that the robot has already are applied to the joint values, and the search is made without them.
   const Unmapped plain = unmapped(robot, split.samples);
   Discovery result;
   say(options, "calibrating");
@@ -132,7 +132,7 @@ Discovery discover_in(const Robot& robot, const PoseSplit& split, const Discover
   for (const std::vector<Effect>* maps : {&plain.maps, static_cast<const std::vector<Effect>*>(&result.maps)}) {
     result.improved.robot.effects.insert(result.improved.robot.effects.end(), maps->begin(), maps->end());
   }
-  // A fit that went astray may not leave the user worse off than before.
+  // A refit that ended in a worse minimum is discarded.
   if (total_distance(result.improved.robot, kept) > total_distance(result.before, kept)) {
     result.improved.robot = result.before;
     result.maps.clear();
@@ -160,11 +160,11 @@ Discovery discover(const Robot& robot, const Measurements& measurements, const s
         fmt::format("llmt::robotics::discover: {} poses to search are too few", split.samples.count()));
   }
   Discovery result = discover_in(robot, split, options);
-  // Repeats that scatter less than everything else do not show all of the noise, whatever the file says: then what was
-  // found must stand without counting them as independent.
-  constexpr Eigen::Index enough = 12;
-  const bool doubtful = result.answer != discovery::Answer::nothing_missing && result.lack_of_fit.dof >= enough &&
-                        result.lack_of_fit.p_value < 0.05;
+  // Repeats that scatter less than the rest do not show all of the noise, whatever the file says. What was found must
+  // then hold without counting them as independent measurements.
+  constexpr double surprising = 0.05;
+  const bool doubtful = result.answer != discovery::Answer::nothing_missing &&
+                        result.lack_of_fit.has_enough_repeats() && result.lack_of_fit.p_value < surprising;
   if (doubtful) {
     const discovery::LackOfFit repeats = result.lack_of_fit;
     result = discover_in(robot, set_aside(measurements, test, options.held_out_share, options.seed, Repeats::averaged),

@@ -20,7 +20,7 @@ std::vector<FoundParameter> parameters_of(const Effect& effect, const Calibratio
   for (const EffectParameter& parameter : effect_parameters(fitted.robot.chain, effect)) {
     const std::string name = effect_parameter_name(effect, parameter);
     const auto index = std::ranges::find(all, name, &discovery::Parameter::name) - all.begin();
-    const double value = all[static_cast<std::size_t>(index)].value;
+    const double value = all[index].value;
     // Calibration holds what does not move the tool: its value is not determined.
     const double error = fitted.result.standard_errors(index);
     const double known = effect_type(effect.type).weighted ? mass_uncertainty * value : 0.0;
@@ -76,8 +76,9 @@ void describe_effects(const std::vector<Hypothesis>& hypotheses, const discovery
   }
 }
 
-void describe_limits(const std::vector<Hypothesis>& hypotheses, const std::vector<UntestableEffect>& untestable,
-                     const discovery::Verdict& verdict, const Robot& robot, Discovery& result) {
+void describe_limits(const std::vector<Hypothesis>& hypotheses,
+                     const std::vector<discovery::UntestableCause>& untestable, const discovery::Verdict& verdict,
+                     const Robot& robot, Discovery& result) {
   result.hypotheses = static_cast<int>(hypotheses.size());
   result.score_gain = verdict.score_gain;
   result.threshold = verdict.threshold;

@@ -1,4 +1,4 @@
-// What a search found, in the terms of the robot.
+// What a search found, as effects, shapes and limits of a robot.
 #pragma once
 
 #include <vector>
@@ -11,8 +11,10 @@ void describe_effects(const std::vector<Hypothesis>& hypotheses, const discovery
                       const Calibration& fitted, double mass_uncertainty, Discovery& result);
 void describe_shapes(const std::vector<Hypothesis>& hypotheses, const discovery::Verdict& verdict, Discovery& result);
 
-/// What could not be told, and from what size on it would have been.
-void describe_limits(const std::vector<Hypothesis>& hypotheses, const std::vector<UntestableEffect>& untestable,
-                     const discovery::Verdict& verdict, const Robot& robot, Discovery& result);
+/// Discovery::not_testable and visible: which effects could not be tested, and from which size on the others would have
+/// been found.
+void describe_limits(const std::vector<Hypothesis>& hypotheses,
+                     const std::vector<discovery::UntestableCause>& untestable, const discovery::Verdict& verdict,
+                     const Robot& robot, Discovery& result);
 
 }  // namespace llmt::robotics

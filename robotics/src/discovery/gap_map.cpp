@@ -24,8 +24,7 @@ Inputs inputs_of(const Measurements& measurements, const Chain& chain) {
   std::vector<Eigen::VectorXd> columns;
   for (std::size_t j = 0; j < chain.joints.size(); ++j) {
     const bool turns = chain.joints[j].type == JointType::revolute;
-    columns.emplace_back((turns ? 180.0 / std::numbers::pi : 1.0) *
-                         measurements.poses.joints.col(static_cast<Eigen::Index>(j)));
+    columns.emplace_back((turns ? 180.0 / std::numbers::pi : 1.0) * measurements.poses.joints.col(j));
     inputs.names.push_back(fmt::format("q{}", j + 1));
     inputs.units.emplace_back(turns ? " deg" : " mm");
   }
@@ -38,15 +37,15 @@ Inputs inputs_of(const Measurements& measurements, const Chain& chain) {
     inputs.units.emplace_back("");
   }
   inputs.values.resize(measurements.count(), std::ssize(columns));
-  for (std::size_t c = 0; c < columns.size(); ++c) inputs.values.col(static_cast<Eigen::Index>(c)) = columns[c];
+  for (std::size_t c = 0; c < columns.size(); ++c) inputs.values.col(c) = columns[c];
   return inputs;
 }
 
 std::string conditions_of(const Leaf& leaf, const Inputs& inputs) {
   std::vector<std::string> parts;
   for (std::size_t c = 0; c < inputs.names.size(); ++c) {
-    const double low = leaf.low(static_cast<Eigen::Index>(c));
-    const double high = leaf.high(static_cast<Eigen::Index>(c));
+    const double low = leaf.low(c);
+    const double high = leaf.high(c);
     if (std::isfinite(low) && std::isfinite(high)) {
       parts.push_back(fmt::format("{} from {:.4g} to {:.4g}{}", inputs.names[c], low, high, inputs.units[c]));
     } else if (std::isfinite(low)) {
@@ -61,9 +60,9 @@ std::string conditions_of(const Leaf& leaf, const Inputs& inputs) {
 FitOptions tree_options(Eigen::Index samples) {
   FitOptions options;
   constexpr int most_regions = 6;
-  options.growth.max_leaves = most_regions;
-  options.growth.min_leaf_samples = static_cast<int>(std::max<Eigen::Index>(8, samples / 25));
-  options.blend.validity = ValidityChoice::crisp;
+  options.max_leaves = most_regions;
+  options.min_leaf_samples = static_cast<int>(std::max<Eigen::Index>(8, samples / 25));
+  options.validity = ValidityChoice::crisp;
   options.intervals = false;
   return options;
 }
@@ -102,7 +101,7 @@ void add_dependences(const Inputs& inputs, const Eigen::MatrixXd& residuals, Gap
   const Eigen::VectorXd energy = outputs.colwise().squaredNorm().transpose() / outputs.squaredNorm();
   const Eigen::VectorXd weights = shares.transpose() * energy;
   for (std::size_t c = 0; c < inputs.names.size(); ++c) {
-    const double share = weights(static_cast<Eigen::Index>(c));
+    const double share = weights(c);
     if (share > 0.02) map.depends_on.push_back({inputs.names[c], share});
   }
   std::ranges::stable_sort(map.depends_on, std::greater<>{}, &GapMap::Share::share);
@@ -117,7 +116,7 @@ void add_levers(const Robot& robot, const Measurements& measurements, const Eige
     for (Eigen::Index j = 0; j < along.size(); ++j) {
       Eigen::Vector3d lever = levers.col(j).head<3>();
       for (Eigen::Index axis = 0; axis < 3; ++axis) {
-        if (!measurements.measured[static_cast<std::size_t>(axis)]) lever(axis) = 0.0;
+        if (!measurements.measured[axis]) lever(axis) = 0.0;
       }
       if (lever.squaredNorm() > 0.0) along(j) += std::pow(lever.dot(world.row(i)), 2) / lever.squaredNorm();
     }
@@ -125,7 +124,7 @@ void add_levers(const Robot& robot, const Measurements& measurements, const Eige
   const double total = world.squaredNorm();
   if (!(total > 0.0)) return;
   for (Eigen::Index j = 0; j < along.size(); ++j) {
-    map.acts_like.push_back({chain.joints[static_cast<std::size_t>(j)].name, along(j) / total});
+    map.acts_like.push_back({chain.joints[j].name, along(j) / total});
   }
   std::ranges::stable_sort(map.acts_like, std::greater<>{}, &GapMap::Share::share);
 }
@@ -137,7 +136,7 @@ void locate(const Measurements& searched, Discovery& result) {
   const Robot& robot = result.before;
   Eigen::MatrixXd world = searched.positions_mm - positions(robot, searched.poses);
   for (Eigen::Index axis = 0; axis < 3; ++axis) {
-    if (!searched.measured[static_cast<std::size_t>(axis)]) world.col(axis).setZero();
+    if (!searched.measured[axis]) world.col(axis).setZero();
   }
   add_levers(robot, searched, world, result.gap);
   if (searched.count() < fewest) return;

@@ -17,7 +17,8 @@ std::set<std::string> labels_of(const std::vector<Hypothesis>& found) {
   return labels;
 }
 
-// From the registered frames; where that ends in a worse minimum than geometry alone, from the calibrated geometry.
+// Fits the robot with the found effects, starting from the registered frames. If that is worse than geometry alone, the
+// fit is repeated from the calibrated geometry, and the better one is kept.
 Calibration refit(const Calibration& baseline, const std::vector<Hypothesis>& found, const Measurements& measurements,
                   const std::vector<std::size_t>& outliers, const DiscoveryOptions& options) {
   const Measurements kept = without_rows(measurements, outliers);

@@ -22,7 +22,8 @@ struct Investigation {
   void apply(const std::vector<Effect>& maps);
 };
 
-/// Free maps on top of what was found, then the search once more beside them: what they cannot be may show only now.
+/// Adds joint maps to what was found if they lower the error on poses left out, then searches once more: an effect that
+/// the maps cannot imitate may show only now.
 void add_maps(Investigation& investigation, const DiscoveryOptions& options, Discovery& result);
 
 /// Calls the progress callback, if there is one.

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "calibration/joint_map_shift.hpp"
+#include "calibration/paired_gain.hpp"
 
 namespace llmt::robotics {
 namespace {
@@ -17,13 +18,13 @@ struct Knots : EvenKnots {
 };
 
 std::vector<Knots> choose_knots(const Chain& chain, const Poses& poses) {
-  // Two degrees resolve what strain-wave gears do within a wave of their teeth; few poses cannot fill as many knots.
+  // Knots every two degrees resolve the errors of strain-wave gears. There are four poses or more for every knot.
   constexpr double finest = 2.0 * std::numbers::pi / 180.0;
   std::vector<Knots> all;
   Eigen::Index begin = 0;
   for (std::size_t j = 0; j < chain.joints.size(); ++j) {
     if (chain.joints[j].type != JointType::revolute) continue;
-    const Eigen::VectorXd q = poses.joints.col(static_cast<Eigen::Index>(j));
+    const Eigen::VectorXd q = poses.joints.col(j);
     const double range = q.maxCoeff() - q.minCoeff();
     if (range < 0.05) continue;
     const auto most = std::max<Eigen::Index>(6, poses.count() / 4);
@@ -46,7 +47,7 @@ Eigen::MatrixXd second_differences(Eigen::Index count) {
   return penalty;
 }
 
-// The Bayesian reading of the penalties, by which their sizes are chosen.
+// Chooses the sizes of the penalties by the marginal likelihood: a penalty is the inverse covariance of a prior.
 class Smoother {
  public:
   Smoother(Eigen::MatrixXd gram, Eigen::VectorXd moments, double squares, double freedom, std::vector<Knots> knots)
@@ -60,7 +61,7 @@ class Smoother {
   }
 
   Eigen::MatrixXd penalty(const std::vector<double>& log_smoothness) const {
-    // A level and a slope for each map that geometry nearly absorbs: held loosely.
+    // Geometry nearly absorbs the level and the slope of each map; a weak penalty determines them.
     constexpr double loose = 1e-5;
     Eigen::MatrixXd all = Eigen::MatrixXd::Zero(gram_.rows(), gram_.cols());
     for (std::size_t b = 0; b < knots_.size(); ++b) {
@@ -145,47 +146,69 @@ Eigen::VectorXd left_out(const Eigen::MatrixXd& used, const Eigen::VectorXd& err
   return lengths;
 }
 
-}  // namespace
+// The residuals and the hats at the measured coordinates, with what geometry and the robot's effects imitate projected
+// out.
+struct ProjectedMaps {
+  Eigen::MatrixXd baseline;   // n x rank, orthonormal: the range of the robot's Jacobian
+  Eigen::VectorXd residuals;  // n
+  Eigen::MatrixXd hats;       // n x unknowns
+};
 
-std::optional<JointMaps> fit_joint_maps(const Robot& robot, const Measurements& measurements) {
-  const std::vector<Knots> knots = choose_knots(robot.chain, measurements.poses);
-  if (knots.empty()) return std::nullopt;
-  const Eigen::Index unknowns = knots.back().begin + knots.back().count;
+// Hat functions of the joint angles, pushed through the joints' levers: derivatives of the measured coordinates.
+Eigen::MatrixXd pushed_hats(const Robot& robot, const Poses& poses, const std::vector<Knots>& knots,
+                            const std::vector<Eigen::Index>& rows) {
+  Eigen::MatrixXd hats = Eigen::MatrixXd::Zero(std::ssize(rows), knots.back().begin + knots.back().count);
+  const Kinematics kinematics(robot.chain);
+  for (Eigen::Index k = 0; k < hats.rows();) {
+    const Eigen::Index pose = rows[k] / 3;
+    const auto levers = kinematics.joint_jacobian(poses.joints.row(pose).transpose());
+    for (; k < hats.rows() && rows[k] / 3 == pose; ++k) {
+      const Eigen::Index axis = rows[k] % 3;
+      for (const Knots& own : knots) {
+        const auto joint = static_cast<Eigen::Index>(own.joint);
+        const auto [below, above] = own.place(poses.joints(pose, joint));
+        hats(k, own.begin + below) += (1.0 - above) * levers(axis, joint);
+        hats(k, own.begin + below + 1) += above * levers(axis, joint);
+      }
+    }
+  }
+  return hats;
+}
+
+ProjectedMaps project(const Robot& robot, const Measurements& measurements, const std::vector<Knots>& knots) {
   const std::vector<Eigen::Index> rows = measured_rows(measurements);
   const auto n = std::ssize(rows);
-  const Eigen::Index d = n / measurements.count();
+  ProjectedMaps projected;
   Eigen::MatrixXd jacobian = position_jacobian(robot, measurements.poses)(rows, Eigen::all);
   const Eigen::MatrixXd model = positions(robot, measurements.poses);
-  Eigen::VectorXd residuals(n);
+  projected.residuals.resize(n);
   for (Eigen::Index k = 0; k < n; ++k) {
-    const Eigen::Index row = rows[static_cast<std::size_t>(k)];
-    residuals(k) = measurements.positions_mm(row / 3, row % 3) - model(row / 3, row % 3);
+    projected.residuals(k) = measurements.positions_mm(rows[k] / 3, rows[k] % 3) - model(rows[k] / 3, rows[k] % 3);
   }
   for (Eigen::Index c = 0; c < jacobian.cols(); ++c) {
     if (jacobian.col(c).norm() > 0.0) jacobian.col(c).normalize();
   }
   Eigen::ColPivHouseholderQR<Eigen::MatrixXd> factors(jacobian);
   factors.setThreshold(1e-9);
-  Eigen::MatrixXd baseline = Eigen::MatrixXd::Identity(n, factors.rank());
+  Eigen::MatrixXd& baseline = projected.baseline;
+  baseline = Eigen::MatrixXd::Identity(n, factors.rank());
   baseline.applyOnTheLeft(factors.householderQ());
-  residuals -= baseline * (baseline.transpose() * residuals);
-  Eigen::MatrixXd hats = Eigen::MatrixXd::Zero(n, unknowns);
-  const Kinematics kinematics(robot.chain);
-  for (Eigen::Index k = 0; k < n;) {
-    const Eigen::Index pose = rows[static_cast<std::size_t>(k)] / 3;
-    const auto levers = kinematics.joint_jacobian(measurements.poses.joints.row(pose).transpose());
-    for (; k < n && rows[static_cast<std::size_t>(k)] / 3 == pose; ++k) {
-      const Eigen::Index axis = rows[static_cast<std::size_t>(k)] % 3;
-      for (const Knots& own : knots) {
-        const auto joint = static_cast<Eigen::Index>(own.joint);
-        const auto [below, above] = own.place(measurements.poses.joints(pose, joint));
-        hats(k, own.begin + below) += (1.0 - above) * levers(axis, joint);
-        hats(k, own.begin + below + 1) += above * levers(axis, joint);
-      }
-    }
-  }
-  const Eigen::MatrixXd inside = baseline.transpose() * hats;
-  hats.noalias() -= baseline * inside;
+  projected.residuals -= baseline * (baseline.transpose() * projected.residuals);
+  projected.hats = pushed_hats(robot, measurements.poses, knots, rows);
+  const Eigen::MatrixXd inside = baseline.transpose() * projected.hats;
+  projected.hats.noalias() -= baseline * inside;
+  return projected;
+}
+
+}  // namespace
+
+std::optional<JointMaps> fit_joint_maps(const Robot& robot, const Measurements& measurements) {
+  const std::vector<Knots> knots = choose_knots(robot.chain, measurements.poses);
+  if (knots.empty()) return std::nullopt;
+  const auto [baseline, residuals, hats] = project(robot, measurements, knots);
+  const Eigen::Index n = hats.rows();
+  const Eigen::Index unknowns = hats.cols();
+  const Eigen::Index d = n / measurements.count();
   Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(unknowns, unknowns);
   gram.selfadjointView<Eigen::Lower>().rankUpdate(hats.transpose());
   gram.triangularView<Eigen::StrictlyUpper>() = gram.transpose();
@@ -208,10 +231,8 @@ std::optional<JointMaps> fit_joint_maps(const Robot& robot, const Measurements& 
   used.topRows(geometry.rows()) = geometry;
   used.bottomRows(unknowns) = factor.matrixL().solve(hats.transpose());
   maps.after = left_out(used, residuals - hats * values, d);
-  const Eigen::ArrayXd gain = (maps.before - maps.after).array();
-  const auto count = static_cast<double>(gain.size());
-  const double spread = std::sqrt((gain - gain.mean()).square().sum() / (count - 1.0) / count);
-  maps.gain_in_errors = spread > 0.0 ? gain.mean() / spread : 0.0;
+  const PairedGain gain = paired_gain(maps.before, maps.after);
+  maps.gain_in_errors = gain.standard_error > 0.0 ? gain.mean / gain.standard_error : 0.0;
   return maps;
 }
 

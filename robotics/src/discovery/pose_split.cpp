@@ -13,8 +13,8 @@
 namespace llmt::robotics {
 namespace {
 
-std::vector<std::ptrdiff_t> all_rows(Eigen::Index count) {
-  std::vector<std::ptrdiff_t> rows(static_cast<std::size_t>(count));
+std::vector<Eigen::Index> all_rows(Eigen::Index count) {
+  std::vector<Eigen::Index> rows(static_cast<std::size_t>(count));
   std::iota(rows.begin(), rows.end(), 0);
   return rows;
 }
@@ -44,7 +44,7 @@ Measurements averaged(const Measurements& measurements, Repeats repeats,
     samples.push_back({i});
   }
   if (std::ssize(samples) == measurements.count()) return measurements;
-  std::vector<std::ptrdiff_t> first;
+  std::vector<Eigen::Index> first;
   for (const auto& sample : samples) first.push_back(sample.front());
   Measurements result = select(measurements, first);
   for (std::size_t s = 0; s < samples.size(); ++s) {
@@ -63,23 +63,23 @@ Measurements averaged(const Measurements& measurements, Repeats repeats,
 PoseSplit set_aside(const Measurements& measurements, const std::optional<Measurements>& test, double share,
                     std::uint64_t seed, Repeats repeats) {
   PoseSplit split;
-  std::vector<std::ptrdiff_t> searched = all_rows(measurements.count());
+  std::vector<Eigen::Index> searched = all_rows(measurements.count());
   if (test) {
     split.test = *test;
   } else if (share > 0.0) {
     const Eigen::VectorXd* pose = column(measurements.poses, "pose");
-    std::map<double, std::vector<std::ptrdiff_t>> groups;
-    for (const std::ptrdiff_t i : searched) groups[pose != nullptr ? (*pose)(i) : static_cast<double>(i)].push_back(i);
-    std::vector<std::vector<std::ptrdiff_t>> units;
+    std::map<double, std::vector<Eigen::Index>> groups;
+    for (const Eigen::Index i : searched) groups[pose != nullptr ? (*pose)(i) : static_cast<double>(i)].push_back(i);
+    std::vector<std::vector<Eigen::Index>> units;
     for (auto& [number, rows] : groups) units.push_back(rows);
     Random random(seed);
-    const std::vector<std::ptrdiff_t> order = random.permutation(std::ssize(units));
-    const auto aside = static_cast<std::ptrdiff_t>(std::lround(share * static_cast<double>(units.size())));
-    std::vector<std::ptrdiff_t> tested;
+    const std::vector<Eigen::Index> order = random.permutation(std::ssize(units));
+    const auto aside = static_cast<Eigen::Index>(std::lround(share * static_cast<double>(units.size())));
+    std::vector<Eigen::Index> tested;
     searched.clear();
-    for (std::ptrdiff_t k = 0; k < std::ssize(order); ++k) {
+    for (Eigen::Index k = 0; k < std::ssize(order); ++k) {
       auto& target = k < aside ? tested : searched;
-      const auto& unit = units[static_cast<std::size_t>(order[static_cast<std::size_t>(k)])];
+      const auto& unit = units[order[k]];
       target.insert(target.end(), unit.begin(), unit.end());
     }
     std::ranges::sort(searched);
@@ -89,7 +89,7 @@ PoseSplit set_aside(const Measurements& measurements, const std::optional<Measur
   split.searched = select(measurements, searched);
   split.samples = averaged(split.searched, repeats, split.rows);
   for (std::vector<Eigen::Index>& sample : split.rows) {
-    for (Eigen::Index& row : sample) row = searched[static_cast<std::size_t>(row)];
+    for (Eigen::Index& row : sample) row = searched[row];
   }
   return split;
 }
@@ -100,13 +100,13 @@ std::vector<Eigen::Index> repeats_of(const Poses& poses) {
   std::map<double, Eigen::Index> numbers;
   std::vector<Eigen::Index> repeats;
   for (const double number : *pose) {
-    repeats.push_back(numbers.try_emplace(number, static_cast<Eigen::Index>(numbers.size())).first->second);
+    repeats.push_back(numbers.try_emplace(number, std::ssize(numbers)).first->second);
   }
   return repeats;
 }
 
 Measurements without_rows(const Measurements& measurements, const std::vector<std::size_t>& left_out) {
-  std::vector<std::ptrdiff_t> rows;
+  std::vector<Eigen::Index> rows;
   for (Eigen::Index i = 0; i < measurements.count(); ++i) {
     if (std::ranges::find(left_out, static_cast<std::size_t>(i)) == left_out.end()) rows.push_back(i);
   }

@@ -1,4 +1,4 @@
-// Which poses are searched, which are set aside, and which belong together.
+// Which poses are searched, which are set aside for verification, and which are repeats of one pose.
 #pragma once
 
 #include <cstdint>
@@ -9,8 +9,8 @@
 
 namespace llmt::robotics {
 
-/// How repeats of a pose are taken: as independent measurements unless the file says that the arm stood still, or each
-/// pose as one.
+/// How repeats of a pose count. as_marked: as independent measurements, unless the file says that the arm stood still.
+/// averaged: every pose as one measurement.
 enum class Repeats { as_marked, averaged };
 
 struct PoseSplit {
@@ -20,16 +20,16 @@ struct PoseSplit {
   std::vector<std::vector<Eigen::Index>> rows;  ///< of the file, behind every sample
 };
 
-/// Sets a share aside, repeats of a pose together; or takes the test measurements as given. Readings taken while the
-/// arm stood still are one measurement of that pose (`pose` with `dwelled` = 1 or `returned` = 0): their scatter is the
-/// instrument's, not the arm's.
+/// Sets a share of the poses aside, repeats of a pose together; if test measurements are given, takes those instead.
+/// Readings taken while the arm stood still (`pose` with `dwelled` = 1 or `returned` = 0) count as one measurement of
+/// that pose, because their scatter is that of the instrument alone.
 PoseSplit set_aside(const Measurements& measurements, const std::optional<Measurements>& test, double share,
                     std::uint64_t seed, Repeats repeats);
 
 /// Numbers that are equal for repeats of a pose, or nothing.
 std::vector<Eigen::Index> repeats_of(const Poses& poses);
 
-/// The measurements but those of the given numbers.
+/// The measurements without the rows of the given numbers.
 Measurements without_rows(const Measurements& measurements, const std::vector<std::size_t>& left_out);
 
 }  // namespace llmt::robotics

@@ -15,14 +15,13 @@ Eigen::VectorXd stacked_residuals(const Robot& robot, const Measurements& measur
   Eigen::VectorXd residuals = Eigen::VectorXd::Zero(3 * measurements.count());
   for (Eigen::Index i = 0; i < measurements.count(); ++i) {
     for (Eigen::Index axis = 0; axis < 3; ++axis) {
-      if (measurements.measured[static_cast<std::size_t>(axis)])
-        residuals(3 * i + axis) = measurements.positions_mm(i, axis) - model(i, axis);
+      if (measurements.measured[axis]) residuals(3 * i + axis) = measurements.positions_mm(i, axis) - model(i, axis);
     }
   }
   return residuals;
 }
 
-// An effect that an earlier round added, as a hypothesis among the others: what it was, at the present estimates.
+// An effect that an earlier round added, as a hypothesis with its signature at the present estimates.
 Hypothesis found_before(const Hypothesis& earlier, const Effect& effect, const Eigen::MatrixXd& signature) {
   Hypothesis hypothesis = earlier;
   hypothesis.effect = effect;
@@ -30,7 +29,8 @@ Hypothesis found_before(const Hypothesis& earlier, const Effect& effect, const E
   return hypothesis;
 }
 
-// Where the fit starts. A value that hardly moves anything can come out anywhere; plausible sizes bound it.
+// Start values of the fit. The estimate of a value that hardly moves the tool can be arbitrarily large, so estimates
+// are clamped to their plausible limits.
 std::vector<double> within_limits(const discovery::EffectCandidate& candidate, const Eigen::VectorXd& values) {
   Eigen::VectorXd bounded = values;
   if (candidate.lower.size() == values.size()) bounded = values.cwiseMax(candidate.lower).cwiseMin(candidate.upper);
@@ -74,7 +74,8 @@ EffectQuestion question(const Robot& robot, const std::vector<Hypothesis>& found
   result.evidence.jacobian = jacobian(rows, Eigen::seqN(0, baseline));
   result.evidence.components = std::ranges::count(measurements.measured, true);
   result.evidence.repeats = repeats_of(measurements.poses);
-  // Deflections over levers are a hundredth at most, and first order is wrong by a share of that.
+  // Deflections are at most a hundredth of the levers, and the error of first order is a fraction of that, here
+  // squared.
   constexpr double first_order = 1e-5;
   result.evidence.resolution = first_order;
   for (Hypothesis& hypothesis : result.hypotheses) {

@@ -14,7 +14,7 @@ namespace llmt::robotics {
 struct EffectQuestion {
   discovery::Evidence evidence;
   std::vector<Hypothesis> hypotheses;
-  std::vector<UntestableEffect> untestable;
+  std::vector<discovery::UntestableCause> untestable;
 };
 
 /// The last effects of the robot are those that were found.

@@ -2,8 +2,7 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
-
+#include "calibration/paired_gain.hpp"
 #include "llmt/folds.hpp"
 
 namespace llmt::robotics {
@@ -13,9 +12,9 @@ void correct_rest(const Measurements& searched, std::uint64_t seed, Discovery& r
   constexpr int folds = 5;
   if (searched.count() < fewest) return;
   FitOptions fitting;
-  fitting.blend.validity = ValidityChoice::crisp;
+  fitting.validity = ValidityChoice::crisp;
   fitting.intervals = false;
-  fitting.selection.folds.seed = seed;
+  fitting.folds.seed = seed;
   const Robot& robot = result.improved.robot;
   const Eigen::VectorXd without = distances(positions(robot, searched.poses), searched);
   Eigen::VectorXd with = without;
@@ -27,11 +26,7 @@ void correct_rest(const Measurements& searched, std::uint64_t seed, Discovery& r
     const Measurements held_out = select(searched, fold.held_out);
     with(fold.held_out) = distances(positions(trained, held_out.poses), held_out);
   }
-  const Eigen::ArrayXd gain = (without - with).array();
-  const auto n = static_cast<double>(gain.size());
-  const double error = std::sqrt((gain - gain.mean()).square().sum() / (n - 1.0) / n);
-  constexpr double convincing = 2.0;
-  if (!(gain.mean() > convincing * error)) {
+  if (!paired_gain(without, with).is_beyond_chance()) {
     result.notes.push_back(
         fmt::format("A tree of the rest does not help: {:.4f} mm without, {:.4f} with it on poses left out.",
                     without.mean(), with.mean()));

@@ -56,7 +56,7 @@ Predictions predict(const EffectQuestion& question, const Poses& poses) {
   predictions.columns << jacobian(Eigen::all, adjusted), signatures.leftCols(rivals);
   predictions.found = signatures.rightCols(own) * Eigen::Map<const Eigen::VectorXd>(question.found.values.data(), own);
   for (Eigen::Index row = 0; row < predictions.found.size(); ++row) {
-    if (question.measured_axes[static_cast<std::size_t>(row % 3)]) continue;
+    if (question.measured_axes[row % 3]) continue;
     predictions.columns.row(row).setZero();
     predictions.found(row) = 0.0;
   }
@@ -79,7 +79,7 @@ Normal normal_equations(const EffectQuestion& question, const Poses& poses, Eige
   constexpr Eigen::Index block = 1000;
   Normal normal{Eigen::MatrixXd::Zero(columns, columns), Eigen::VectorXd::Zero(columns)};
   for (Eigen::Index first = 0; first < poses.count(); first += block) {
-    std::vector<std::ptrdiff_t> rows(static_cast<std::size_t>(std::min(block, poses.count() - first)));
+    std::vector<Eigen::Index> rows(static_cast<std::size_t>(std::min(block, poses.count() - first)));
     std::iota(rows.begin(), rows.end(), first);
     const Predictions part = predict(question, select(poses, rows));
     normal.add(part.columns, part.found);
@@ -133,19 +133,19 @@ Poses candidate_poses(const EffectQuestion& question, const Poses& measured, con
   constexpr Eigen::Index places = 400;
   const Chain& chain = question.without.chain;
   const auto loads = std::ssize(payloads);
-  std::vector<std::ptrdiff_t> rows;
+  std::vector<Eigen::Index> rows;
   for (Eigen::Index p = 0; p < places; ++p) {
     rows.insert(rows.end(), payloads.size(),
-                static_cast<std::ptrdiff_t>(random.below(static_cast<std::uint64_t>(measured.count()))));
+                static_cast<Eigen::Index>(random.below(static_cast<std::uint64_t>(measured.count()))));
   }
   Poses poses = select(measured, rows);
   Eigen::VectorXd carried(std::ssize(rows));
-  for (Eigen::Index i = 0; i < carried.size(); ++i) carried(i) = payloads[static_cast<std::size_t>(i % loads)];
+  for (Eigen::Index i = 0; i < carried.size(); ++i) carried(i) = payloads[i % loads];
   poses.covariates["payload_kg"] = carried;
   const Eigen::MatrixXd before = poses.joints;
   for (Eigen::Index p = 0; p < places; ++p) {
     for (Eigen::Index j = 0; j < poses.joints.cols(); ++j) {
-      const auto [low, high] = range_of(chain.joints[static_cast<std::size_t>(j)], measured.joints.col(j));
+      const auto [low, high] = range_of(chain.joints[j], measured.joints.col(j));
       poses.joints.col(j).segment(p * loads, loads).setConstant(random.uniform(low, high));
     }
   }
@@ -216,7 +216,7 @@ Telling telling_poses(const Robot& fitted, std::size_t effect, const std::vector
   require(std::isfinite(noise_mm) && noise_mm >= 0.0, fmt::format("noise_mm is {}, must be >= 0", noise_mm));
   require(std::ranges::count(measured_axes, true) > 0, "no axis is measured");
   EffectQuestion question{fitted, fitted.effects[effect], rival, measured_axes};
-  question.without.effects.erase(question.without.effects.begin() + static_cast<std::ptrdiff_t>(effect));
+  question.without.effects.erase(question.without.effects.begin() + static_cast<Eigen::Index>(effect));
   const Payloads payloads = payloads_of(fitted, measured);
   Random random(seed);
   const Poses poses = candidate_poses(question, measured, payloads.all, random);

@@ -13,12 +13,12 @@ using Values = std::span<const double>;
 void apply_joint_compliance(const PoseContext& pose, std::size_t j, Values values, Values, Deformation& deformation) {
   // A prismatic joint yields along its axis to the force; its compliance is then in m/N.
   const double unit = is_prismatic(pose.chain, j) ? 1.0 / metres : 1.0;
-  deformation.joint(static_cast<Eigen::Index>(j)) += values[0] * unit * gravity_load(pose, j);
+  deformation.joint(j) += values[0] * unit * gravity_load(pose, j);
 }
 
 void apply_joint_compliance_measured(const PoseContext& pose, std::size_t j, Values values, Values,
                                      Deformation& deformation) {
-  deformation.joint(static_cast<Eigen::Index>(j)) += values[0] * pose.columns[0];
+  deformation.joint(j) += values[0] * pose.columns[0];
 }
 
 void apply_joint_compliance_free_masses(const PoseContext& pose, std::size_t j, Values values, Values,
@@ -33,7 +33,7 @@ void apply_joint_compliance_free_masses(const PoseContext& pose, std::size_t j, 
     if (v.isZero(0.0)) continue;
     sum += lever.dot(pose.skeleton.body_rotation[k] * v);
   }
-  deformation.joint(static_cast<Eigen::Index>(j)) += sum;
+  deformation.joint(j) += sum;
 }
 
 // The straight bar that stands for a link, mm. DH parameters only tell where axes are: between (nearly) parallel axes

@@ -115,15 +115,15 @@ ApplyFunction compile_formula(const Chain& chain, const Effect& effect) {
                    Deformation& deformation) {
     const std::size_t joints = pose.chain.joints.size();
     for (std::size_t j = 0; j < joints; ++j) {
-      program->variables[j] = pose.q(static_cast<Eigen::Index>(j));
+      program->variables[j] = pose.q(j);
       program->variables[joints + j] = gravity_load(pose, j);
     }
-    std::ranges::copy(pose.columns, program->variables.begin() + static_cast<std::ptrdiff_t>(2 * joints));
+    std::ranges::copy(pose.columns, program->variables.begin() + static_cast<Eigen::Index>(2 * joints));
     for (std::size_t k = 0; k < values.size(); ++k) {
       if (values[k] == 0.0) continue;
       const double error = values[k] * program->parsers[k].Eval();
       const int axis = program->axes[k];
-      (axis < 0 ? deformation.joint(static_cast<Eigen::Index>(joint)) : deformation.world_mm(axis)) += error;
+      (axis < 0 ? deformation.joint(joint) : deformation.world_mm(axis)) += error;
     }
   };
 }

@@ -14,11 +14,11 @@ using Values = std::span<const double>;
 template <typename Error>
 auto joint_error(Error error) {
   return [error](const PoseContext& pose, std::size_t j, Values values, Values constants, Deformation& deformation) {
-    deformation.joint(static_cast<Eigen::Index>(j)) += error(pose, j, values, constants);
+    deformation.joint(j) += error(pose, j, values, constants);
   };
 }
 
-double joint_value(const PoseContext& pose, std::size_t j) { return pose.q(static_cast<Eigen::Index>(j)); }
+double joint_value(const PoseContext& pose, std::size_t j) { return pose.q(j); }
 
 double sign(double value) { return value > 0.0 ? 1.0 : value < 0.0 ? -1.0 : 0.0; }
 
@@ -63,8 +63,8 @@ double counterbalance_spring(const PoseContext& pose, std::size_t j, Values valu
 }
 
 double backlash_gravity(const PoseContext& pose, std::size_t j, Values values, Values) {
-  // About a plumb axis gravity has no torque but rounding, or what the deflection of the arm makes of it: friction
-  // holds.
+  // About a vertical axis gravity has no torque except rounding errors and the part that the deflection of the arm
+  // causes. Friction holds the joint there.
   constexpr double held = 1e-3;
   const double torque = gravity_load(pose, j);
   const Load& load = pose.load[j];

@@ -45,7 +45,7 @@ std::vector<std::vector<double>> constants_for(const EffectType& type, const Sce
 }
 
 bool masses_known(const Chain& chain, std::size_t index) {
-  return std::any_of(chain.joints.begin() + static_cast<std::ptrdiff_t>(index), chain.joints.end(),
+  return std::any_of(chain.joints.begin() + static_cast<Eigen::Index>(index), chain.joints.end(),
                      [](const Joint& joint) { return joint.mass_kg > 0.0; });
 }
 
@@ -58,7 +58,7 @@ std::set<std::string> labels_of(const Robot& robot) {
 }  // namespace
 
 std::vector<Hypothesis> catalogue_hypotheses(const Scene& scene, const std::vector<EffectType>& catalogue,
-                                             std::vector<UntestableEffect>& untestable) {
+                                             std::vector<discovery::UntestableCause>& untestable) {
   const Chain& chain = scene.robot.chain;
   const std::set<std::string> present = labels_of(scene.robot);
   std::vector<Hypothesis> hypotheses;
@@ -69,7 +69,8 @@ std::vector<Hypothesis> catalogue_hypotheses(const Scene& scene, const std::vect
       std::string why;
       const std::string place = place_name(chain, type.place, index);
       if (!suits(type, chain, index, &why)) continue;
-      // A function of all joints beyond with three unknowns a body imitates much: only where nothing better is known.
+      // This type has three unknowns per body and imitates many other effects: it is tried only where masses are
+      // unknown.
       if (type.name == "joint_compliance_free_masses" && masses_known(chain, index)) continue;
       if (!has_columns(type, chain, index, scene.poses, &why)) {
         untestable.push_back({place.empty() ? type.name : type.name + "@" + place, "there is no column " + why});

@@ -8,9 +8,10 @@
 
 namespace llmt::robotics {
 
-/// Effects of the catalogue where they can be, without their signatures; what cannot is told in `untestable`.
+/// Effects of the catalogue at every place that suits them, without their signatures. Effects whose columns are missing
+/// are listed in `untestable`.
 std::vector<Hypothesis> catalogue_hypotheses(const Scene& scene, const std::vector<EffectType>& catalogue,
-                                             std::vector<UntestableEffect>& untestable);
+                                             std::vector<discovery::UntestableCause>& untestable);
 
 /// Signatures of all hypotheses that have an effect.
 void add_signatures(const Scene& scene, std::vector<Hypothesis>& hypotheses);

@@ -31,7 +31,7 @@ double order_gain(const JointSignal& signal, double order) {
 // The gain on a grid of orders, with cosines and sines by rotation from order to order.
 std::vector<Peak> order_spectrum(const JointSignal& signal, double first, double last, double step) {
   std::vector<Peak> spectrum;
-  const auto n = static_cast<Eigen::Index>(signal.angle.size());
+  const auto n = std::ssize(signal.angle);
   const Eigen::Map<const Eigen::ArrayXd> angle(signal.angle.data(), n);
   const Eigen::Map<const Eigen::ArrayXd> along(signal.along.data(), n);
   const Eigen::Map<const Eigen::ArrayXd> weight(signal.weight.data(), n);
@@ -91,7 +91,7 @@ Hypothesis hypothesis_of(const EffectType& type, const Chain& chain, std::size_t
 }
 
 void add_orders(const Scene& scene, const EffectType& type, std::vector<Hypothesis>& hypotheses) {
-  // Below three per turn the catalogue's eccentricities and the smooth shapes speak.
+  // Lower orders are covered by the eccentricities of the catalogue and by the smooth shapes.
   constexpr double lowest = 2.6;
   constexpr double highest = 450.0;
   constexpr std::size_t kept = 2;

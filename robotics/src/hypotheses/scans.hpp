@@ -9,8 +9,8 @@
 
 namespace llmt::robotics {
 
-/// Transmission errors of the orders that the residuals show, tracker knocks at the rows where they show: the best few,
-/// each with how many it was chosen from.
+/// Transmission errors of the orders, and tracker knocks at the rows, that explain most of the residuals: the best few.
+/// The prior cost of each accounts for the number of orders or rows that it was chosen from.
 std::vector<Hypothesis> scanned_effects(const Scene& scene, const std::vector<EffectType>& catalogue);
 
 }  // namespace llmt::robotics

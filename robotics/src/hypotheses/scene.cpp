@@ -16,13 +16,12 @@ Scene make_scene(const Robot& robot, const Poses& poses, const Eigen::VectorXd& 
     const auto jacobian = kinematics.joint_jacobian(poses.joints.row(i).transpose());
     for (std::size_t j = 0; j < scene.lever.size(); ++j) {
       for (Eigen::Index axis = 0; axis < 3; ++axis) {
-        if (measured[static_cast<std::size_t>(axis)])
-          scene.lever[j](3 * i + axis, 0) = jacobian(axis, static_cast<Eigen::Index>(j));
+        if (measured[axis]) scene.lever[j](3 * i + axis, 0) = jacobian(axis, j);
       }
     }
     size(i) = residuals.segment(3 * i, 3).norm();
   }
-  // A lost beam would draw every scan to itself; whether it is an outlier is for the search to say.
+  // A lost beam would dominate every scan, so it is shortened. Whether it is an outlier is decided by the search.
   std::vector<double> sorted(size.begin(), size.end());
   std::ranges::nth_element(sorted, sorted.begin() + std::ssize(sorted) / 2);
   constexpr double far_beyond = 6.0;

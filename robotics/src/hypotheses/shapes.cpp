@@ -49,7 +49,7 @@ bool moves(const Eigen::VectorXd& x) { return x.maxCoeff() - x.minCoeff() > 0.05
 void add_smooth(const Scene& scene, std::vector<Hypothesis>& shapes) {
   const std::vector<Joint>& joints = scene.robot.chain.joints;
   for (std::size_t input = 0; input < joints.size(); ++input) {
-    const Eigen::VectorXd q = scene.poses.joints.col(static_cast<Eigen::Index>(input));
+    const Eigen::VectorXd q = scene.poses.joints.col(input);
     if (!moves(q)) continue;
     const std::string name = fmt::format("q{}", input + 1);
     for (std::size_t j = 0; j < joints.size(); ++j) {
@@ -116,9 +116,8 @@ void add_local(const Scene& scene, std::vector<Hypothesis>& shapes) {
         }
       }
       if (best.gain < 0.0) continue;
-      const Eigen::VectorXd function = scene.poses.joints.col(static_cast<Eigen::Index>(j)).unaryExpr([&](double q) {
-        return local_value(best, q);
-      });
+      const Eigen::VectorXd function =
+          scene.poses.joints.col(j).unaryExpr([&](double q) { return local_value(best, q); });
       const std::string kind =
           is_step ? fmt::format("a step at {:.0f} deg", degrees * best.centre)
                   : fmt::format("a bump at {:.0f} deg, {:.0f} deg wide", degrees * best.centre, degrees * best.width);
@@ -149,13 +148,13 @@ void add_pairs(const Scene& scene, std::vector<Hypothesis>& shapes) {
   std::vector<Pair> pairs;
   for (std::size_t j = 0; j < joints.size(); ++j) {
     const JointSignal signal = joint_signal(scene, j);
-    const auto n = static_cast<Eigen::Index>(signal.rows.size());
+    const auto n = std::ssize(signal.rows);
     const Eigen::Map<const Eigen::VectorXd> along(signal.along.data(), n);
     const Eigen::Map<const Eigen::VectorXd> weight(signal.weight.data(), n);
     for (std::size_t a = 0; a < joints.size(); ++a) {
       for (std::size_t b = a + 1; b < joints.size(); ++b) {
-        const Eigen::MatrixXd waves = pair_waves(scene.poses.joints(signal.rows, static_cast<Eigen::Index>(a)),
-                                                 scene.poses.joints(signal.rows, static_cast<Eigen::Index>(b)));
+        const Eigen::MatrixXd waves =
+            pair_waves(scene.poses.joints(signal.rows, a), scene.poses.joints(signal.rows, b));
         Eigen::MatrixXd gram = waves.transpose() * weight.asDiagonal() * waves;
         gram.diagonal().array() *= 1.0 + 1e-6;
         const Eigen::VectorXd moment = waves.transpose() * along;
@@ -170,8 +169,7 @@ void add_pairs(const Scene& scene, std::vector<Hypothesis>& shapes) {
     const Pair& pair = pairs[k];
     const std::string qa = fmt::format("q{}", pair.a + 1);
     const std::string qb = fmt::format("q{}", pair.b + 1);
-    const Eigen::MatrixXd waves = pair_waves(scene.poses.joints.col(static_cast<Eigen::Index>(pair.a)),
-                                             scene.poses.joints.col(static_cast<Eigen::Index>(pair.b)));
+    const Eigen::MatrixXd waves = pair_waves(scene.poses.joints.col(pair.a), scene.poses.joints.col(pair.b));
     shapes.push_back(shape_of("?pair", fmt::format("{}({},{})", joints[pair.joint].name, qa, qb),
                               acting_on(scene, pair.joint, waves),
                               {joints[pair.joint].name, {qa, qb}, std::nullopt, "a function of two joints"}, choices));
@@ -182,7 +180,7 @@ void add_pairs(const Scene& scene, std::vector<Hypothesis>& shapes) {
 void add_loads(const Scene& scene, std::vector<Hypothesis>& shapes) {
   const Eigen::MatrixXd loads = gravity_loads(scene.robot, scene.poses);
   for (std::size_t j = 0; j < scene.robot.chain.joints.size(); ++j) {
-    const Eigen::VectorXd load = loads.col(static_cast<Eigen::Index>(j));
+    const Eigen::VectorXd load = loads.col(j);
     const double largest = load.cwiseAbs().maxCoeff();
     if (!(largest > 0.0)) continue;
     Eigen::MatrixXd functions(load.size(), 3);
@@ -213,7 +211,7 @@ void add_tool(const Scene& scene, std::vector<Hypothesis>& shapes) {
         down(2) * down(0);
     for (Eigen::Index axis = 0; axis < 3; ++axis) {
       for (Eigen::Index row = 0; row < 3; ++row) {
-        if (!scene.measured[static_cast<std::size_t>(row)]) continue;
+        if (!scene.measured[row]) continue;
         linear.block(3 * i + row, 3 * axis, 1, 3) = tool(row, axis) * down.transpose();
         square.block(3 * i + row, 6 * axis, 1, 6) = tool(row, axis) * squares.transpose();
       }
@@ -234,7 +232,7 @@ void add_covariates(const Scene& scene, std::vector<Hypothesis>& shapes) {
     Eigen::MatrixXd signature = Eigen::MatrixXd::Zero(3 * x.size(), 3 * functions.cols());
     for (Eigen::Index i = 0; i < x.size(); ++i) {
       for (Eigen::Index axis = 0; axis < 3; ++axis) {
-        if (scene.measured[static_cast<std::size_t>(axis)]) {
+        if (scene.measured[axis]) {
           signature.block(3 * i + axis, axis * functions.cols(), 1, functions.cols()) = functions.row(i);
         }
       }

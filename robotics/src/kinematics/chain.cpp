@@ -96,7 +96,7 @@ std::vector<discovery::Parameter> geometric_parameters(const Chain& chain) {
 }
 
 Eigen::Index geometric_parameter_count(const Chain& chain) {
-  return 2 * frame_parameters + joint_parameters * static_cast<Eigen::Index>(chain.joints.size());
+  return 2 * frame_parameters + joint_parameters * std::ssize(chain.joints);
 }
 
 Eigen::VectorXd geometric_values(const Chain& chain) {

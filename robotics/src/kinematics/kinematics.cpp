@@ -87,7 +87,7 @@ Kinematics::Kinematics(const Chain& chain) : payload_centre_mm_(chain.payload.co
 }
 
 void Kinematics::set_values(const Eigen::VectorXd& values) {
-  if (values.size() != static_cast<Eigen::Index>(elements_.size())) {
+  if (values.size() != std::ssize(elements_)) {
     throw std::invalid_argument("llmt::robotics::Kinematics::set_values: values has " + std::to_string(values.size()) +
                                 " entries, must be " + std::to_string(elements_.size()));
   }
@@ -177,15 +177,15 @@ Eigen::Matrix3Xd Kinematics::position_jacobian(const Eigen::VectorXd& q, const D
   Eigen::Matrix3Xd axes(3, elements_.size());
   Eigen::Matrix3Xd origins(3, elements_.size());
   const auto visit = [&](std::size_t i, const Pose& frame) {
-    axes.col(static_cast<Eigen::Index>(i)) = frame.rotation.col(elements_[i].axis);
-    origins.col(static_cast<Eigen::Index>(i)) = frame.position_mm;
+    axes.col(i) = frame.rotation.col(elements_[i].axis);
+    origins.col(i) = frame.position_mm;
   };
   Eigen::Vector3d tool = walk(q, deformation, visit).position_mm;
   if (deformation != nullptr) tool -= deformation->world_mm;
   Eigen::Matrix3Xd jacobian(3, elements_.size());
   for (std::size_t i = 0; i < elements_.size(); ++i) {
-    const Eigen::Vector3d axis = axes.col(static_cast<Eigen::Index>(i));
-    const Eigen::Vector3d arm = tool - origins.col(static_cast<Eigen::Index>(i));
+    const Eigen::Vector3d axis = axes.col(i);
+    const Eigen::Vector3d arm = tool - origins.col(i);
     const Element& element = elements_[i];
     if (element.rotation) {
       jacobian.col(element.parameter) = radians * axis.cross(arm);

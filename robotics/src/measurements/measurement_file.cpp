@@ -123,7 +123,7 @@ Eigen::MatrixXd Header::joints() const {
       refuse(fmt::format("robot \"{}\" has {} joints, there is no column {} for {}; columns: {}", robot_.chain.name,
                          joints.size(), spellings(name, units), joints[j].name, fmt::join(csv_.columns(), ", ")));
     }
-    factors(static_cast<Eigen::Index>(j)) = factor(name, units);
+    factors(j) = factor(name, units);
     columns.push_back(quantities_.at(name).column);
   }
   for (const auto& [name, quantity] : quantities_) {
@@ -145,7 +145,7 @@ void Header::positions(Measurements& measurements) const {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     if (!quantities_.contains(names[axis])) continue;
     measurements.measured[axis] = true;
-    measurements.positions_mm.col(static_cast<Eigen::Index>(axis)) =
+    measurements.positions_mm.col(axis) =
         factor(names[axis], lengths_in_mm) * csv_.numbers(quantities_.at(names[axis]).column);
   }
   if (std::ranges::none_of(measurements.measured, [](bool seen) { return seen; })) {
@@ -166,7 +166,7 @@ Orientation Header::orientation() const {
     for (std::size_t k = 0; k < 3; ++k) {
       const Quantity& quantity = quantities_.at(angles[k]);
       const double to_deg = quantity.unit == "deg" ? 1.0 : factor(angles[k], angles_in_rad) / radians;
-      orientation.values.col(static_cast<Eigen::Index>(k)) = to_deg * csv_.numbers(quantity.column);
+      orientation.values.col(k) = to_deg * csv_.numbers(quantity.column);
     }
   } else if (all_there(quaternion)) {
     orientation.kind = Orientation::Kind::quaternion;
@@ -189,9 +189,9 @@ std::map<std::string, Eigen::VectorXd> Header::covariates() const {
 }
 
 // Instruments that lose the target often write zeros: such rows are no measurements.
-std::vector<std::ptrdiff_t> seen_rows(const Csv& csv, Measurements& measurements) {
-  std::vector<std::ptrdiff_t> seen;
-  std::vector<std::ptrdiff_t> missing;
+std::vector<Eigen::Index> seen_rows(const Csv& csv, Measurements& measurements) {
+  std::vector<Eigen::Index> seen;
+  std::vector<Eigen::Index> missing;
   for (Eigen::Index i = 0; i < measurements.count(); ++i) {
     if (measurements.positions_mm.row(i).isZero(0.0)) {
       missing.push_back(i);
@@ -216,7 +216,7 @@ Measurements from_csv(const Csv& csv, const Robot& robot, const std::vector<std:
   add_moves(measurements.poses, robot.chain);
   header.positions(measurements);
   measurements.orientation = header.orientation();
-  const std::vector<std::ptrdiff_t> seen = seen_rows(csv, measurements);
+  const std::vector<Eigen::Index> seen = seen_rows(csv, measurements);
   std::vector<std::string> warnings = std::move(measurements.warnings);
   if (std::ssize(seen) < measurements.count()) measurements = select(measurements, seen);
   measurements.warnings = std::move(warnings);
@@ -255,11 +255,10 @@ std::string to_csv(const Measurements& measurements, const Robot& robot) {
   };
   for (std::size_t j = 0; j < robot.chain.joints.size(); ++j) {
     add(fmt::format("q{}_{}", j + 1, robot.chain.joints[j].type == JointType::revolute ? "rad" : "mm"),
-        measurements.poses.joints.col(static_cast<Eigen::Index>(j)));
+        measurements.poses.joints.col(j));
   }
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    if (measurements.measured[axis])
-      add(fmt::format("{}_mm", "xyz"[axis]), measurements.positions_mm.col(static_cast<Eigen::Index>(axis)));
+    if (measurements.measured[axis]) add(fmt::format("{}_mm", "xyz"[axis]), measurements.positions_mm.col(axis));
   }
   const bool angles = measurements.orientation.kind == Orientation::Kind::angles_deg;
   for (Eigen::Index k = 0; k < measurements.orientation.values.cols(); ++k) {

@@ -9,7 +9,7 @@
 
 namespace llmt::robotics {
 
-Measurements select(const Measurements& measurements, const std::vector<std::ptrdiff_t>& rows) {
+Measurements select(const Measurements& measurements, const std::vector<Eigen::Index>& rows) {
   Measurements chosen;
   chosen.poses = select(measurements.poses, rows);
   chosen.positions_mm = measurements.positions_mm(rows, Eigen::all);
@@ -26,7 +26,7 @@ void validate(const Measurements& measurements, const Robot& robot) {
     throw std::invalid_argument("llmt::robotics::Measurements: " + message);
   };
   const Poses& poses = measurements.poses;
-  const std::ptrdiff_t joints = std::ssize(robot.chain.joints);
+  const Eigen::Index joints = std::ssize(robot.chain.joints);
   if (poses.joints.cols() != joints) {
     refuse(fmt::format("there are {} joints, robot \"{}\" has {}", poses.joints.cols(), robot.chain.name, joints));
   }
@@ -61,7 +61,7 @@ void add_moves(Poses& poses, const Chain& chain) {
   }
   for (std::size_t j = 0; j < chain.joints.size(); ++j) {
     const char* unit = chain.joints[j].type == JointType::revolute ? "rad" : "mm";
-    poses.covariates[fmt::format("move{}_{}", j + 1, unit)] = moves.col(static_cast<Eigen::Index>(j));
+    poses.covariates[fmt::format("move{}_{}", j + 1, unit)] = moves.col(j);
   }
 }
 
@@ -71,7 +71,7 @@ std::vector<Eigen::Index> measured_rows(const Measurements& measurements) {
   std::vector<Eigen::Index> rows;
   for (Eigen::Index i = 0; i < measurements.count(); ++i) {
     for (Eigen::Index axis = 0; axis < 3; ++axis) {
-      if (measurements.measured[static_cast<std::size_t>(axis)]) rows.push_back(3 * i + axis);
+      if (measurements.measured[axis]) rows.push_back(3 * i + axis);
     }
   }
   return rows;
@@ -80,7 +80,7 @@ std::vector<Eigen::Index> measured_rows(const Measurements& measurements) {
 Eigen::VectorXd distances(const Eigen::MatrixXd& model_mm, const Measurements& measurements) {
   Eigen::VectorXd squares = Eigen::VectorXd::Zero(measurements.count());
   for (Eigen::Index axis = 0; axis < 3; ++axis) {
-    if (!measurements.measured[static_cast<std::size_t>(axis)]) continue;
+    if (!measurements.measured[axis]) continue;
     squares += (model_mm.col(axis) - measurements.positions_mm.col(axis)).cwiseAbs2();
   }
   return squares.cwiseSqrt();

@@ -11,7 +11,7 @@
 
 namespace llmt::robotics {
 
-Poses select(const Poses& poses, const std::vector<std::ptrdiff_t>& rows) {
+Poses select(const Poses& poses, const std::vector<Eigen::Index>& rows) {
   Poses chosen{.joints = poses.joints(rows, Eigen::all), .covariates = {}};
   for (const auto& [name, values] : poses.covariates) chosen.covariates[name] = values(rows);
   return chosen;
@@ -71,7 +71,7 @@ Eigen::MatrixXd positions(const Robot& robot, const Poses& poses) {
 
 Eigen::MatrixXd position_jacobian(const Robot& robot, const Poses& poses) {
   RobotEvaluator evaluator(robot, poses);
-  Eigen::MatrixXd result(3 * poses.count(), static_cast<Eigen::Index>(parameters(robot).size()));
+  Eigen::MatrixXd result(3 * poses.count(), std::ssize(parameters(robot)));
   for (Eigen::Index i = 0; i < poses.count(); ++i) result.middleRows(3 * i, 3) = evaluator.jacobian(i);
   return result;
 }

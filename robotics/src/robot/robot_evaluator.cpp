@@ -58,7 +58,7 @@ RobotEvaluator::RobotEvaluator(const Robot& robot, const Poses& poses)
       loads_(robot.chain.joints.size()),
       deformation_(robot.chain.joints.size()),
       trial_(robot.chain.joints.size()) {
-  if (poses.joints.cols() != static_cast<Eigen::Index>(robot.chain.joints.size())) {
+  if (poses.joints.cols() != std::ssize(robot.chain.joints)) {
     throw std::invalid_argument(fmt::format("llmt::robotics::positions: the poses have {} joints, robot {} has {}",
                                             poses.joints.cols(), robot.chain.name, robot.chain.joints.size()));
   }
@@ -145,7 +145,7 @@ Eigen::VectorXd RobotEvaluator::gravity_loads(Eigen::Index row) {
   Eigen::VectorXd loads(q_.size());
   for (std::size_t j = 0; j < loads_.size(); ++j) {
     const bool slides = robot_.chain.joints[j].type == JointType::prismatic;
-    loads(static_cast<Eigen::Index>(j)) = rigid_.joint_axis[j].dot(slides ? loads_[j].force_N : loads_[j].moment_Nm);
+    loads(j) = rigid_.joint_axis[j].dot(slides ? loads_[j].force_N : loads_[j].moment_Nm);
   }
   return loads;
 }
@@ -164,7 +164,7 @@ void RobotEvaluator::set_levers() {
 Eigen::Vector3d RobotEvaluator::displacement(const Deformation& change) const {
   Eigen::Vector3d sum = change.world_mm + change.base.translation_mm + change.base.rotation_rad.cross(levers_.base);
   for (std::size_t j = 0; j < levers_.joint.size(); ++j) {
-    sum += change.joint(static_cast<Eigen::Index>(j)) * levers_.joint[j];
+    sum += change.joint(j) * levers_.joint[j];
     sum += change.link[j].translation_mm + change.link[j].rotation_rad.cross(levers_.link[j]);
   }
   return sum;
@@ -189,9 +189,9 @@ void RobotEvaluator::derivatives(PoseContext& pose, Eigen::Index row, PreparedEf
     return;
   }
   for (Eigen::Index k = 0; k < out.cols(); ++k) {
-    double& value = effect.values[static_cast<std::size_t>(k)];
+    double& value = effect.values[k];
     const double before = value;
-    const double step = difference_step(before, effect.scales[static_cast<std::size_t>(k)]);
+    const double step = difference_step(before, effect.scales[k]);
     value = before + step;
     const Eigen::Vector3d above = moved_by(pose, row, effect);
     value = before - step;
@@ -210,9 +210,9 @@ void RobotEvaluator::whole_derivatives(Eigen::Index row, PreparedEffect& effect,
     return displacement(trial_);
   };
   for (Eigen::Index k = 0; k < out.cols(); ++k) {
-    double& value = effect.values[static_cast<std::size_t>(k)];
+    double& value = effect.values[k];
     const double before = value;
-    const double step = effect.scales[static_cast<std::size_t>(k)];
+    const double step = effect.scales[k];
     const Eigen::Vector3d above = moved(value, before + step);
     out.col(k) = (above - moved(value, before - step)) / (2.0 * step);
     value = before;

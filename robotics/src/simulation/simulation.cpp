@@ -63,7 +63,7 @@ Eigen::VectorXd gravity_torque(const Robot& robot, const Poses& poses, std::size
   // Only what changes payload or gravity matters; the others might want the very column that is being made.
   Robot loaded = robot;
   std::erase_if(loaded.effects, [](const Effect& effect) { return !effect_type(effect.type).adjust; });
-  return gravity_loads(loaded, poses).col(static_cast<Eigen::Index>(joint));
+  return gravity_loads(loaded, poses).col(joint);
 }
 
 Eigen::VectorXd neutral_values(const std::string& name, const Effect& effect, const Robot& robot, const Poses& poses,
@@ -115,7 +115,7 @@ Measurements simulate(const Robot& robot, const SimulationOptions& options) {
   for (Eigen::Index i = 0; i < options.poses; ++i) {
     for (std::size_t j = 0; j < joints.size(); ++j) {
       const std::array<double, 2> limits = limits_of(joints[j]);
-      poses.joints(i, static_cast<Eigen::Index>(j)) = random.uniform(limits[0], limits[1]);
+      poses.joints(i, j) = random.uniform(limits[0], limits[1]);
     }
   }
   return measured(robot, std::move(poses), options, random);
@@ -161,7 +161,7 @@ Poses grid(const Chain& chain, double step_rad) {
     const Eigen::Index steps = steps_within(chain.joints[j], step_rad);
     const double lower = limits_of(chain.joints[j])[0];
     for (Eigen::Index i = 0; i < poses.count(); ++i) {
-      poses.joints(i, static_cast<Eigen::Index>(j)) = lower + step_rad * static_cast<double>(i / repeats % steps);
+      poses.joints(i, j) = lower + step_rad * static_cast<double>(i / repeats % steps);
     }
     repeats *= steps;
   }

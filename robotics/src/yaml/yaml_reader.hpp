@@ -1,4 +1,4 @@
-// A YAML map read key by key: every mistake names file, line and key, and keys that nobody asked for are mistakes.
+// A YAML map read key by key. Every error names file, line and key; a key that was never read is an error too.
 #pragma once
 
 #include <yaml-cpp/yaml.h>

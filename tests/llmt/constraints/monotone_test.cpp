@@ -12,9 +12,9 @@
 #include "constraints/constrained_leaves.hpp"
 #include "estimation/estimate.hpp"
 #include "llmt/fit.hpp"
-#include "llmt/oracles.hpp"
 #include "llmt/random.hpp"
 #include "numerics/bounded_least_squares.hpp"
+#include "oracles/oracles.hpp"
 
 namespace {
 
@@ -207,46 +207,46 @@ struct Case {
 
 std::vector<Case> cases() {
   llmt::FitOptions base;
-  base.growth.max_leaves = 14;
-  base.growth.min_leaf_samples = 8;
-  base.growth.significance = 1.0;
-  base.selection.folds.count = 0;
+  base.max_leaves = 14;
+  base.min_leaf_samples = 8;
+  base.significance = 1.0;
+  base.folds.count = 0;
   std::vector<Case> result = {{"crisp", base}};
   for (const double width : {0.5, 1.0, 4.0}) {
     for (const double ridge : {1e-6, 1e-2}) {
       llmt::FitOptions blend = base;
-      blend.blend.validity = llmt::ValidityChoice::blend;
-      blend.blend.widths = {width};
-      blend.blend.ridges = {ridge};
+      blend.validity = llmt::ValidityChoice::blend;
+      blend.expert.widths = {width};
+      blend.expert.ridges = {ridge};
       result.push_back({"blend", blend});
     }
   }
   for (const llmt::Estimation estimation : {llmt::Estimation::as_grown, llmt::Estimation::local}) {
     llmt::FitOptions blend = base;
-    blend.blend.validity = llmt::ValidityChoice::blend;
-    blend.blend.widths = {1.0};
-    blend.blend.estimation = estimation;
+    blend.validity = llmt::ValidityChoice::blend;
+    blend.expert.widths = {1.0};
+    blend.expert.estimation = estimation;
     result.push_back({"blend, locally estimated", blend});
   }
   llmt::FitOptions jumps = result[1].options;
-  jumps.blend.jumps = {0.1};
+  jumps.expert.jumps = {0.1};
   result.push_back({"some jumps", jumps});
   llmt::FitOptions retis = base;
-  retis.growth.rule = llmt::GrowthRule::retis;
-  retis.blend.shrinkages = {1.0};
+  retis.rule = llmt::GrowthRule::retis;
+  retis.expert.shrinkages = {1.0};
   result.push_back({"retis", retis});
   llmt::FitOptions gaussian = base;
-  gaussian.blend.validity = llmt::ValidityChoice::gaussian;
-  gaussian.blend.widths = {0.33};
+  gaussian.validity = llmt::ValidityChoice::gaussian;
+  gaussian.expert.widths = {0.33};
   result.push_back({"gaussian", gaussian});
   llmt::FitOptions lolimot = base;
-  lolimot.growth.rule = llmt::GrowthRule::lolimot;
+  lolimot.rule = llmt::GrowthRule::lolimot;
   for (const llmt::Estimation estimation :
        {llmt::Estimation::as_grown, llmt::Estimation::local, llmt::Estimation::joint}) {
-    lolimot.blend.estimation = estimation;
-    lolimot.blend.ridges = {1e-4};
+    lolimot.expert.estimation = estimation;
+    lolimot.expert.ridges = {1e-4};
     if (estimation != llmt::Estimation::joint) {
-      lolimot.blend.ridges.clear();
+      lolimot.expert.ridges.clear();
     }
     result.push_back({"lolimot", lolimot});
   }
@@ -290,7 +290,7 @@ TEST(Monotone, HoldsWithCategoriesWeightsMissingValuesAndSharedPartitions) {
       llmt::FitOptions options = cases()[which].options;
       options.monotone = {1, -1, 0, 0};
       options.categorical_inputs = {3};
-      options.growth.shared_partition = seed == 1;
+      options.shared_partition = seed == 1;
       options.weights = oracle::uniform(300, 1, seed).cwiseAbs();
       for (const bool lacking : {false, true}) {
         MatrixXd inputs = x;
@@ -311,8 +311,8 @@ TEST(Monotone, HoldsWhenFoldsChooseAndInTheModelsOfTheFolds) {
   const MatrixXd x = oracle::uniform(300, 3, 3);
   const MatrixXd y = nearly_monotone(x, 0.3, 3);
   llmt::FitOptions options;
-  options.growth.max_leaves = 12;
-  options.selection.folds.count = 3;
+  options.max_leaves = 12;
+  options.folds.count = 3;
   options.monotone = {1, -1, 0};
   const llmt::FitResult result = llmt::fit(x, y, options);
   EXPECT_GT(result.summary.partitions[0].leaves, 1);
@@ -329,8 +329,8 @@ TEST(Monotone, HoldsForEstimatesThatStartFromASampleAndForBins) {
   const MatrixXd x = oracle::uniform(5000, 3, 4);
   const MatrixXd y = nearly_monotone(x, 0.5, 4);
   llmt::FitOptions options = cases()[3].options;
-  options.growth.max_leaves = 6;
-  options.growth.search = llmt::SplitSearch::binned;
+  options.max_leaves = 6;
+  options.expert.search = llmt::SplitSearch::binned;
   options.monotone = {1, -1, 0};
   const llmt::Model model = llmt::fit(x, y, options).model;
   EXPECT_LE(largest_fall(model, 0, 1, 4, true), rounding);
@@ -360,9 +360,9 @@ TEST(Monotone, TheRoomAtAJumpIsTheSmallestStepOfTheLeaves) {
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
     const MatrixXd x = oracle::uniform(200, 2, seed);
     llmt::FitOptions options;
-    options.growth.max_leaves = 4;
-    options.growth.significance = 1.0;
-    options.selection.folds.count = 0;
+    options.max_leaves = 4;
+    options.significance = 1.0;
+    options.folds.count = 0;
     const MatrixXd y = oracle::curved(x, 0.2, seed);
     const llmt::Model fitted = llmt::fit(x, y, options).model;
     llmt::Partition partition = fitted.partitions()[0];
@@ -404,9 +404,9 @@ TEST(Monotone, ASplitAgainstTheTrendIsTheBestContinuousOrLevelOne) {
     y(i, 0) = (i < 100 ? 3.0 : 1.0) + 0.01 * static_cast<double>(i % 3);
   }
   llmt::FitOptions options;
-  options.growth.max_leaves = 4;
-  options.growth.significance = 1.0;
-  options.selection.folds.count = 0;
+  options.max_leaves = 4;
+  options.significance = 1.0;
+  options.folds.count = 0;
   options.monotone = {1};
   const llmt::Model model = llmt::fit(x, y, options).model;
   EXPECT_GT(model.partitions()[0].num_leaves(), 1);
@@ -457,12 +457,12 @@ TEST(Monotone, CostsLittleOfWhatNotSplittingTheInputCosts) {
     return 3.0 * (4.0 * at.col(0)).array().tanh().matrix() + at.col(1).cwiseAbs2();
   };
   llmt::FitOptions options = cases()[1].options;
-  options.blend.widths = {0.25};
+  options.expert.widths = {0.25};
   const auto error = [&] { return llmt::rmse(llmt::fit(x, truth(x), options).model.predict(query), truth(query))(0); };
   const double free = error();
   options.monotone = {1, 0};
   const double constrained = error();
-  options.growth.split_inputs = {1};
+  options.split_inputs = {1};
   const double unsplit = error();
   EXPECT_LT(constrained, 1.1 * free);
   EXPECT_LT(constrained, 0.2 * unsplit);

@@ -30,7 +30,7 @@ TEST(Fit, SameBytesAtAnyNumberOfThreadsWithCategoriesAndMissingValues) {
     std::vector<std::string> models;
     for (const int threads : {1, 2, 8}) {
       llmt::FitOptions options;
-      options.blend.validity = choice;
+      options.validity = choice;
       options.categorical_inputs = {1};
       options.max_threads = threads;
       models.push_back(llmt::to_json(llmt::fit(x, y, options).model));
@@ -75,7 +75,7 @@ TEST(Missing, ColumnWithoutAnyValueChangesNothing) {
   Eigen::MatrixXd wider(200, 3);
   wider << x, Eigen::VectorXd::Constant(200, nan);
   llmt::FitOptions options = only(kinds[1], llmt::Estimation::joint, 6);
-  options.growth.min_leaf_samples = 8;  // its default depends on the number of inputs
+  options.min_leaf_samples = 8;  // its default depends on the number of inputs
   EXPECT_LT((llmt::fit(wider, y, options).model.predict(wider) - llmt::fit(x, y, options).model.predict(x))
                 .cwiseAbs()
                 .maxCoeff(),

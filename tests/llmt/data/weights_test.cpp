@@ -25,7 +25,7 @@ TEST(Weights, IntegersAreRepeatedRows) {
   }
   for (const Kind& kind : {kinds[0], kinds[1], kinds[4]}) {
     llmt::FitOptions options = only(kind, llmt::Estimation::joint, 8);
-    options.growth.min_leaf_samples = 1;  // it counts rows, whatever their weight
+    options.min_leaf_samples = 1;  // it counts rows, whatever their weight
     const llmt::Model expected = llmt::fit(x(repeated, Eigen::all), y(repeated, Eigen::all), options).model;
     options.weights = weights;
     const llmt::Model found = llmt::fit(x, y, options).model;

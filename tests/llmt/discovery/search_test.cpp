@@ -109,13 +109,13 @@ TEST(SearchVerdict, OutliersAreListedAndNotNamed) {
     Case data = random_case(static_cast<std::uint64_t>(seed) * 13, 100, 1, 4, 24, 6);
     const bool has_effect = seed % 2 == 0;
     if (has_effect) add_effect(data, 3, 1.0);
-    for (const std::size_t i : planted) data.evidence.residuals(static_cast<Eigen::Index>(i)) += i == 30 ? -30.0 : 25.0;
+    for (const std::size_t i : planted) data.evidence.residuals(i) += i == 30 ? -30.0 : 25.0;
     const Verdict verdict = search(data.evidence, data.candidates);
     const bool right = has_effect ? verdict.findings.size() == 1 && verdict.findings[0].terms[0].candidate == 3
                                   : verdict.findings.empty();
     alarms += right ? 0 : 1;
     for (const std::size_t i : verdict.outliers) (planted.contains(i) ? caught : dropped_wrongly) += 1;
-    for (const std::size_t i : verdict.outliers) EXPECT_EQ(verdict.remaining(static_cast<Eigen::Index>(i)), 0.0);
+    for (const std::size_t i : verdict.outliers) EXPECT_EQ(verdict.remaining(i), 0.0);
   }
   EXPECT_LE(alarms, 3);
   EXPECT_EQ(caught, 3 * seeds);

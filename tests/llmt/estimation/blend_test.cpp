@@ -15,7 +15,7 @@ TEST(Validities, AreNotNegativeAndSumToOneEverywhere) {
     for (std::uint64_t seed = 1; seed <= 5; ++seed) {
       const Data d = data(seed);
       llmt::FitOptions options = only(kind, llmt::Estimation::joint, 12);
-      options.growth.shared_partition = seed % 2 == 0;
+      options.shared_partition = seed % 2 == 0;
       const llmt::Model model = llmt::fit(d.x, d.y, options).model;
       Eigen::MatrixXd query(900, 3);
       query << oracle::uniform(300, 3, seed + 100), 3.0 * oracle::uniform(300, 3, seed + 200),
@@ -39,7 +39,7 @@ TEST(Blend, AffineOutputIsReproducedWhateverThePartition) {
       for (std::uint64_t seed = 1; seed <= 3; ++seed) {
         const Data d = data(seed, 300, true);
         llmt::FitOptions options = only(kind, estimation, 10);
-        options.growth.shared_partition = true;
+        options.shared_partition = true;
         const llmt::Model model = llmt::fit(d.x, d.y, options).model;
         ASSERT_EQ(model.partitions()[0].num_leaves(), 10);
         for (const double reach : {1.0, 5.0, 1e6}) {
@@ -76,7 +76,7 @@ TEST(Blend, JacobianIsTheDifferenceQuotient) {
     for (std::uint64_t seed = 1; seed <= 3; ++seed) {
       const Data d = data(seed);
       llmt::FitOptions options = only(kind, llmt::Estimation::joint, 10);
-      options.growth.shared_partition = seed == 2;
+      options.shared_partition = seed == 2;
       const llmt::Model model = llmt::fit(d.x, d.y, options).model;
       const Eigen::MatrixXd points = 1.4 * oracle::uniform(100, 3, seed + 100);
       for (Eigen::Index i = 0; i < points.rows(); ++i) {

@@ -46,12 +46,13 @@ Data mixed(Eigen::Index rows) {
 llmt::Model fitted(const Data& data, const Kind& kind, std::vector<int> categorical = {3},
                    llmt::LocalTerms terms = llmt::LocalTerms::linear) {
   llmt::FitOptions options;
-  options.local_models.terms = terms;
-  options.growth.max_leaves = 12;
-  options.growth.significance = 1.0;
-  options.growth.min_leaf_samples = 8;
-  options.blend = {.validity = kind.validity, .widths = {1.5}};
-  options.selection.folds.count = 0;
+  options.terms = terms;
+  options.max_leaves = 12;
+  options.significance = 1.0;
+  options.min_leaf_samples = 8;
+  options.validity = kind.validity;
+  options.expert.widths = {1.5};
+  options.folds.count = 0;
   options.categorical_inputs = std::move(categorical);
   return random_trees::with_smoothness(llmt::fit(data.x, data.y, options).model, kind.smoothness);
 }
@@ -195,13 +196,14 @@ TEST(Explain, AnInputThatIsNotUsedGetsNothing) {
   Data data = mixed(400);
   for (const Kind& kind : kinds) {
     llmt::FitOptions options;
-    options.growth = {.significance = 1.0,
-                      .min_leaf_samples = 8,
-                      .max_leaves = 12,
-                      .split_inputs = {0, 2, 3},
-                      .regression_inputs = {0, 2, 3}};
-    options.blend = {.validity = kind.validity, .widths = {1.5}};
-    options.selection.folds.count = 0;
+    options.significance = 1.0;
+    options.min_leaf_samples = 8;
+    options.max_leaves = 12;
+    options.split_inputs = {0, 2, 3};
+    options.regression_inputs = {0, 2, 3};
+    options.validity = kind.validity;
+    options.expert.widths = {1.5};
+    options.folds.count = 0;
     options.categorical_inputs = {3};
     const llmt::Model model = random_trees::with_smoothness(llmt::fit(data.x, data.y, options).model, kind.smoothness);
     for (int row = 0; row < 20; ++row) {

@@ -12,14 +12,14 @@
 namespace {
 
 // The crisp tree as it was grown.
-llmt::FitOptions as_grown(llmt::GrowthOptions growth = {}) {
-  return {.growth = std::move(growth),
-          .blend = {.validity = llmt::ValidityChoice::crisp},
-          .selection = {.folds = {.count = 0}}};
+llmt::FitOptions as_grown(llmt::FitOptions options = {}) {
+  options.validity = llmt::ValidityChoice::crisp;
+  options.folds.count = 0;
+  return options;
 }
 
 // The crisp tree of plain least-squares leaves with the leaf count that cross-validation chooses.
-llmt::FitOptions crisp() { return {.blend = {.validity = llmt::ValidityChoice::crisp, .shrinkages = {0.0}}}; }
+llmt::FitOptions crisp() { return {.validity = llmt::ValidityChoice::crisp, .expert = {.shrinkages = {0.0}}}; }
 
 // Same splits, same rows, same local models to rounding of their normal equations; what only whole trees have - errors
 // and the slopes beyond the training extent - aside.
@@ -91,7 +91,8 @@ TEST(Fit, EveryLeafIsLeastSquaresOfItsRows) {
 TEST(Fit, AffineDataGiveOneLeafWithoutAnyTest) {
   const Eigen::MatrixXd x = oracle::uniform(200, 3, 3);
   const Eigen::MatrixXd y = (x * Eigen::Vector3d(1.0, -2.0, 0.5)).array() + 3.0;
-  const llmt::FitResult result = llmt::fit(x, y, as_grown({.significance = 1.0, .min_variance_gain = -1.0}));
+  const llmt::FitResult result =
+      llmt::fit(x, y, as_grown({.significance = 1.0, .expert = {.min_variance_gain = -1.0}}));
   EXPECT_EQ(result.summary.partitions[0].leaves, 1);
   EXPECT_EQ(result.summary.partitions[0].stop, llmt::StopReason::exact_fit);
   EXPECT_LT((result.model.predict(x * 5.0) - ((x * 5.0 * Eigen::Vector3d(1.0, -2.0, 0.5)).array() + 3.0).matrix())
@@ -245,9 +246,9 @@ TEST(Fit, SharedPartitionOfCopiesIsThePartitionOfOne) {
   const Eigen::MatrixXd y = oracle::curved(x, 0.02);
   Eigen::MatrixXd copies(300, 3);
   copies << y, 1000.0 * y, -y;
-  const llmt::GrowthOptions growth{.significance = 1.0, .max_leaves = 8, .shared_partition = true};
+  const llmt::FitOptions growth{.max_leaves = 8, .significance = 1.0, .shared_partition = true};
   const llmt::Model shared = llmt::fit(x, copies, as_grown(growth)).model;
-  const llmt::Model single = llmt::fit(x, y, as_grown({.significance = 1.0, .max_leaves = 8})).model;
+  const llmt::Model single = llmt::fit(x, y, as_grown({.max_leaves = 8, .significance = 1.0})).model;
   ASSERT_EQ(shared.partitions().size(), 1U);
   ASSERT_EQ(shared.partitions()[0].nodes.size(), single.partitions()[0].nodes.size());
   for (std::size_t i = 0; i < single.partitions()[0].nodes.size(); ++i) {
@@ -261,7 +262,7 @@ TEST(Fit, ImprovementRuleStopsWhereTheNextTenSplitsHelpTooLittle) {
   const Eigen::MatrixXd x = oracle::firm(oracle::uniform(600, 2, 11));
   const Eigen::MatrixXd y = oracle::curved(x);
   const llmt::Model full = llmt::fit(x, y, as_grown({.significance = 1.0})).model;
-  const llmt::FitResult stopped = llmt::fit(x, y, as_grown({.significance = 1.0, .min_improvement = 0.05}));
+  const llmt::FitResult stopped = llmt::fit(x, y, as_grown({.significance = 1.0, .expert = {.min_improvement = 0.05}}));
   const Eigen::Index leaves = stopped.summary.partitions[0].leaves;
   EXPECT_EQ(stopped.summary.partitions[0].stop, llmt::StopReason::improvement);
   expect_same_tree(stopped.model, full.prefix(leaves));
@@ -278,7 +279,8 @@ TEST(Fit, VarianceGainBoundsTheTree) {
   const Eigen::MatrixXd y = oracle::curved(x, 0.01);
   Eigen::Index previous = 1000;
   for (const double gain : {0.0, 1e-3, 1e-2, 0.1, 2.0}) {
-    const Eigen::Index leaves = llmt::fit(x, y, as_grown({.min_variance_gain = gain})).summary.partitions[0].leaves;
+    const Eigen::Index leaves =
+        llmt::fit(x, y, as_grown({.expert = {.min_variance_gain = gain}})).summary.partitions[0].leaves;
     EXPECT_LE(leaves, previous);
     previous = leaves;
   }
@@ -289,15 +291,16 @@ TEST(Fit, CrossValidationIsTheHeldOutErrorOfRegrownTrees) {
   const Eigen::MatrixXd x = oracle::uniform(150, 2, 13);
   const Eigen::MatrixXd y = oracle::curved(x, 0.2);
   llmt::FitOptions options = crisp();
-  options.growth = {.significance = 1.0, .max_leaves = 12};
-  options.selection.folds = {.count = 4, .kind = llmt::FoldKind::contiguous};
+  options.significance = 1.0;
+  options.max_leaves = 12;
+  options.folds = {.count = 4, .kind = llmt::FoldKind::contiguous};
   const llmt::PartitionSummary summary = llmt::fit(x, y, options).summary.partitions[0];
   ASSERT_EQ(summary.crisp_cv_rmse.size(), 12);
   for (Eigen::Index leaves = 1; leaves <= 12; ++leaves) {
     double squared = 0.0;
-    for (const llmt::Fold& fold : llmt::make_folds(150, options.selection.folds)) {
+    for (const llmt::Fold& fold : llmt::make_folds(150, options.folds)) {
       const llmt::Model model = llmt::fit(x(fold.train, Eigen::all), y(fold.train, Eigen::all),
-                                          as_grown({.significance = 1.0, .max_leaves = 12}))
+                                          as_grown({.max_leaves = 12, .significance = 1.0}))
                                     .model.prefix(leaves);
       squared += (model.predict(x(fold.held_out, Eigen::all)) - y(fold.held_out, Eigen::all)).squaredNorm();
     }
@@ -312,9 +315,9 @@ TEST(Fit, RetisPruningFollowsTheMEstimates) {
   const Eigen::MatrixXd x = oracle::uniform(300, 2, 14);
   const Eigen::MatrixXd y = oracle::curved(x, 0.3);
   // RD without its tests makes the splits of RETIS before pruning: both take the smallest sum of squares.
-  const auto unpruned = [&](llmt::GrowthOptions growth) {
+  const auto unpruned = [&](llmt::FitOptions growth) {
     growth.significance = 1.0;
-    growth.min_variance_gain = -1.0;
+    growth.expert.min_variance_gain = -1.0;
     return llmt::fit(x, y, as_grown(growth)).model;
   };
   const auto pruned_leaves = [](const llmt::Model& model, double m) {
@@ -326,7 +329,7 @@ TEST(Fit, RetisPruningFollowsTheMEstimates) {
   const Eigen::Index kept = pruned_leaves(large, 2.0);
   EXPECT_GT(large.partitions()[0].num_leaves(), kept);
   EXPECT_GE(kept, pruned_leaves(large, 50.0));
-  const llmt::GrowthOptions retis = {.rule = llmt::GrowthRule::retis, .min_leaf_samples = 4};
+  const llmt::FitOptions retis = {.rule = llmt::GrowthRule::retis, .min_leaf_samples = 4};
   EXPECT_EQ(llmt::fit(x, y, as_grown(retis)).summary.partitions[0].leaves, kept);
 
   // One split, by hand: kept exactly if the m-estimate of the parent exceeds that of the children.
@@ -363,15 +366,15 @@ TEST(Fit, CallersMistakesAreNamed) {
   EXPECT_EQ(message_of([&] { llmt::fit(x, bad); }),
             "llmt::fit: outputs(3, 1) is nan, it must be finite (rows and columns counted from 0)");
   EXPECT_EQ(message_of([&] { llmt::fit(x, y, as_grown({.split_inputs = {2}})); }),
-            "llmt::fit: growth.split_inputs names column 2, there are 2");
+            "llmt::fit: split_inputs names column 2, there are 2");
   EXPECT_EQ(message_of([&] {
               llmt::fit(x, y, as_grown({.regression_inputs = {1, 1}}));
             }),
-            "llmt::fit: growth.regression_inputs names column 1 twice");
-  EXPECT_EQ(message_of([&] { llmt::fit(x, y, as_grown({.min_improvement = 1.5})); }),
-            "llmt::fit: growth.min_improvement is 1.5, it must be in [0, 1)");
-  EXPECT_EQ(message_of([&] { llmt::fit(x, y, {.selection = {.folds = {.count = 1}}}); }),
-            "llmt::fit: selection.folds.count is 1, it must be 0 or at least 2");
+            "llmt::fit: regression_inputs names column 1 twice");
+  EXPECT_EQ(message_of([&] { llmt::fit(x, y, as_grown({.expert = {.min_improvement = 1.5}})); }),
+            "llmt::fit: expert.min_improvement is 1.5, it must be in [0, 1)");
+  EXPECT_EQ(message_of([&] { llmt::fit(x, y, {.folds = {.count = 1}}); }),
+            "llmt::fit: folds.count is 1, it must be 0 or at least 2");
 }
 
 }  // namespace

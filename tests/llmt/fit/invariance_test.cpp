@@ -17,9 +17,7 @@ Data data() {
 }
 
 llmt::FitOptions as_grown(Eigen::Index min_leaf_samples = 0) {
-  return {.growth = {.min_leaf_samples = min_leaf_samples},
-          .blend = {.validity = llmt::ValidityChoice::crisp},
-          .selection = {.folds = {.count = 0}}};
+  return {.min_leaf_samples = min_leaf_samples, .validity = llmt::ValidityChoice::crisp, .folds = {.count = 0}};
 }
 
 llmt::Partition grow(const Eigen::MatrixXd& x, const Eigen::MatrixXd& y) {
@@ -105,8 +103,7 @@ TEST(Invariance, SameBytesAtAnyNumberOfThreads) {
     std::vector<std::string> models;
     std::vector<Eigen::MatrixXd> predictions;
     for (const int threads : {1, 2, 8}) {
-      const llmt::FitResult result =
-          llmt::fit(d.x, y, {.growth = {.shared_partition = shared}, .max_threads = threads});
+      const llmt::FitResult result = llmt::fit(d.x, y, {.shared_partition = shared, .max_threads = threads});
       models.push_back(llmt::to_json(result.model));
       predictions.push_back(result.model.predict(d.x, threads));
     }

@@ -30,13 +30,16 @@ const std::vector<ValidityChoice> kinds = {ValidityChoice::crisp, ValidityChoice
 llmt::FitOptions only(ValidityChoice validity, Eigen::Index max_leaves, LocalTerms terms,
                       SparseChoice sparse = SparseChoice::never) {
   llmt::FitOptions options;
-  options.growth = {.significance = 1.0, .min_variance_gain = -1.0, .max_leaves = max_leaves};
-  options.local_models = {.terms = terms, .sparse = sparse};
-  options.blend = {.validity = validity,
-                   .widths = {validity == ValidityChoice::gaussian ? 1.0 / 3.0 : 1.0},
-                   .ridges = {1e-3},
-                   .shrinkages = {0.0}};
-  options.selection.folds.count = 0;
+  options.significance = 1.0;
+  options.expert.min_variance_gain = -1.0;
+  options.max_leaves = max_leaves;
+  options.terms = terms;
+  options.sparse = sparse;
+  options.validity = validity;
+  options.expert.widths = {validity == ValidityChoice::gaussian ? 1.0 / 3.0 : 1.0};
+  options.expert.ridges = {1e-3};
+  options.expert.shrinkages = {0.0};
+  options.folds.count = 0;
   return options;
 }
 
@@ -86,7 +89,7 @@ TEST(Quadratic, AffineAndQuadraticDataAreReproducedInTheTrainingExtent) {
     Eigen::MatrixXd y(400, 3);
     y << oracle::curved(x), 1.0 + x.col(0).array() - 3.0 * x.col(2).array(), quadratic_function(x);
     llmt::FitOptions options = only(validity, 6, LocalTerms::quadratic);
-    options.growth.shared_partition = true;
+    options.shared_partition = true;
     const llmt::Model model = llmt::fit(x, y, options).model;
     EXPECT_EQ(model.partitions()[0].num_leaves(), 6);
     Eigen::MatrixXd queries = oracle::uniform(500, 3, 2);
@@ -124,7 +127,7 @@ TEST(Quadratic, LeavesAreLeastSquaresOnExpandedColumns) {
     Eigen::MatrixXd expanded(300, 5);
     expanded << x, x.col(0).cwiseAbs2(), x.col(0).cwiseProduct(x.col(1)), x.col(1).cwiseAbs2();
     llmt::FitOptions linear = only(ValidityChoice::crisp, 6, LocalTerms::linear);
-    linear.growth.split_inputs = {0, 1};
+    linear.split_inputs = {0, 1};
     const llmt::Model same = llmt::fit(expanded, y, linear).model;
     const std::vector<llmt::Node>& nodes = model.partitions()[0].nodes;
     ASSERT_EQ(nodes.size(), same.partitions()[0].nodes.size());
@@ -235,8 +238,8 @@ TEST(LocalTerms, AutomaticTakesProductsWhereTheyHelpAndLeavesLeastSquaresBeyondC
       y(i, 1) = x(i, 0) - x(i, 2) + 0.1 * random.normal();
     }
     llmt::FitOptions options;
-    options.blend.validity = ValidityChoice::crisp;
-    options.local_models.terms = LocalTerms::automatic;
+    options.validity = ValidityChoice::crisp;
+    options.terms = LocalTerms::automatic;
     const llmt::FitSummary curved = llmt::fit(x, y.col(0), options).summary;
     EXPECT_TRUE(curved.quadratic);
     ASSERT_EQ(curved.other_terms.size(), 1U);
@@ -244,14 +247,14 @@ TEST(LocalTerms, AutomaticTakesProductsWhereTheyHelpAndLeavesLeastSquaresBeyondC
     quadratic += llmt::fit(x, y.col(1), options).summary.quadratic ? 1 : 0;
     if (seed == 1) {
       EXPECT_TRUE(llmt::fit(x, y, options).summary.quadratic);  // both outputs, one choice
-      options.selection.folds.count = 0;
+      options.folds.count = 0;
       EXPECT_FALSE(llmt::fit(x, y.col(0), options).summary.quadratic);
     }
   }
   EXPECT_LE(quadratic, 1);  // of four; beyond two standard errors is 5 % each
   llmt::FitOptions options;
-  options.growth.max_leaves = 1;
-  options.local_models.terms = LocalTerms::automatic;
+  options.max_leaves = 1;
+  options.terms = LocalTerms::automatic;
   const Eigen::MatrixXd wide = oracle::uniform(100, 14, 1);
   EXPECT_FALSE(llmt::fit(wide, quadratic_function(wide), options).summary.quadratic);
 }
@@ -418,9 +421,9 @@ TEST(Sparse, IsTakenWhereFewInputsCountAndHeldOutRowsSaySo) {
     value += 0.3 * random.normal();
   }
   llmt::FitOptions options;
-  options.blend.validity = ValidityChoice::crisp;
+  options.validity = ValidityChoice::crisp;
   const llmt::FitSummary full = llmt::fit(x, y, options).summary;
-  options.local_models.sparse = SparseChoice::automatic;
+  options.sparse = SparseChoice::automatic;
   const llmt::FitSummary sparse = llmt::fit(x, y, options).summary;
   EXPECT_TRUE(sparse.partitions[0].chosen.candidate.sparse);
   EXPECT_LT(sparse.partitions[0].chosen.rmse, full.partitions[0].chosen.rmse);
@@ -431,8 +434,9 @@ TEST(LocalModels, SameBytesAtAnyNumberOfThreadsAndOrderOfRowsChangesRoundingAlon
   Eigen::MatrixXd y(250, 2);
   y << oracle::curved(x, 0.1), quadratic_function(x);
   llmt::FitOptions options;
-  options.local_models = {.terms = LocalTerms::automatic, .sparse = SparseChoice::automatic};
-  options.growth.max_leaves = 8;
+  options.terms = LocalTerms::automatic;
+  options.sparse = SparseChoice::automatic;
+  options.max_leaves = 8;
   options.max_threads = 1;
   const llmt::Model one = llmt::fit(x, y, options).model;
   options.max_threads = 3;
@@ -450,18 +454,17 @@ TEST(LocalModels, MistakesAreNamed) {
   const Eigen::MatrixXd x = oracle::uniform(50, 14, 1);
   const Eigen::VectorXd y = x.col(0);
   EXPECT_EQ(message_of([&] { llmt::fit(x, y, only(ValidityChoice::crisp, 2, LocalTerms::quadratic)); }),
-            "llmt::fit: the number of numeric regression inputs of quadratic local models (local_models.terms) is 14, "
-            "it must be at most 13; growth.regression_inputs chooses them");
+            "llmt::fit: the number of numeric regression inputs of quadratic local models (terms) is 14, "
+            "it must be at most 13; regression_inputs chooses them");
   Eigen::MatrixXd large = x.leftCols(2);
   large(7, 1) = 1e80;
   EXPECT_EQ(message_of([&] { llmt::fit(large, y, only(ValidityChoice::crisp, 2, LocalTerms::quadratic)); }),
             "llmt::fit: a magnitude in inputs, with quadratic local models, is 1e+80, it must be at most 1e70");
   llmt::FitOptions options = only(ValidityChoice::blend, 2, LocalTerms::linear, SparseChoice::always);
-  options.blend.estimation = llmt::Estimation::as_grown;
+  options.expert.estimation = llmt::Estimation::as_grown;
   EXPECT_EQ(
       message_of([&] { llmt::fit(x, y, options); }),
-      "llmt::fit: local_models.sparse is 2, it must be never where blend.estimation is as_grown, for those models "
-      "are full");
+      "llmt::fit: sparse is always, it must be never where expert.estimation is as-grown, for those models are full");
   const llmt::Model model = llmt::fit(x.leftCols(2), y, only(ValidityChoice::crisp, 1, LocalTerms::quadratic)).model;
   std::vector<llmt::Regressor> regressors = model.regressors();
   regressors.back().second_input = 2;

@@ -39,16 +39,16 @@ TEST(Fit, MistakesInWeightsCategoriesAndBlendsAreNamed) {
             "llmt::fit: the largest weight is 0, it must be positive");
   EXPECT_EQ(error([](auto& options) { options.weights = Eigen::VectorXd::Ones(19); }),
             "llmt::fit: weights has 19 entries, inputs has 20 rows");
-  EXPECT_EQ(error([](auto& options) { options.blend.widths = {0.0}; }),
-            "llmt::fit: blend.widths is 0, it must be finite and positive");
+  EXPECT_EQ(error([](auto& options) { options.expert.widths = {0.0}; }),
+            "llmt::fit: expert.widths is 0, it must be finite and positive");
   EXPECT_EQ(error([](auto& options) {
-              options.blend.widths = {1.0, -2.0};
+              options.expert.widths = {1.0, -2.0};
             }),
-            "llmt::fit: blend.widths is -2, it must be finite and positive");
-  EXPECT_EQ(error([](auto& options) { options.blend.ridges = {-1.0}; }),
-            "llmt::fit: blend.ridges is -1, it must be finite and not negative");
-  EXPECT_EQ(error([](auto& options) { options.blend.shrinkages = {nan}; }),
-            "llmt::fit: blend.shrinkages is nan, it must be finite and not negative");
+            "llmt::fit: expert.widths is -2, it must be finite and positive");
+  EXPECT_EQ(error([](auto& options) { options.expert.ridges = {-1.0}; }),
+            "llmt::fit: expert.ridges is -1, it must be finite and not negative");
+  EXPECT_EQ(error([](auto& options) { options.expert.shrinkages = {nan}; }),
+            "llmt::fit: expert.shrinkages is nan, it must be finite and not negative");
   const llmt::Model model = llmt::fit(x, y).model;
   Eigen::MatrixXd query = x;
   query(2, 1) = -std::numeric_limits<double>::infinity();

@@ -7,12 +7,12 @@ namespace {
 
 llmt::FitResult grow(const Eigen::MatrixXd& x, const Eigen::MatrixXd& y, llmt::SplitSearch search,
                      Eigen::Index max_leaves, llmt::FitOptions options = {}) {
-  options.growth.significance = 1.0;
-  options.growth.min_variance_gain = -1.0;
-  options.growth.max_leaves = max_leaves;
-  options.growth.search = search;
-  options.blend.validity = llmt::ValidityChoice::crisp;
-  options.selection.folds.count = 0;
+  options.significance = 1.0;
+  options.expert.min_variance_gain = -1.0;
+  options.max_leaves = max_leaves;
+  options.expert.search = search;
+  options.validity = llmt::ValidityChoice::crisp;
+  options.folds.count = 0;
   return llmt::fit(x, y, options);
 }
 
@@ -71,7 +71,7 @@ TEST(BinnedGrowth, CategoriesWeightsAndSharedOutputsAreThoseOfTheExactSearch) {
   }
   llmt::FitOptions options;
   options.categorical_inputs = {3};
-  options.growth.shared_partition = true;
+  options.shared_partition = true;
   options.weights = oracle::uniform(9000, 1, 9).array().abs() + 0.1;
   expect_same_tree(nodes(grow(x, y, llmt::SplitSearch::binned, 10, options)),
                    nodes(grow(x, y, llmt::SplitSearch::exact, 10, options)), 1e-11);

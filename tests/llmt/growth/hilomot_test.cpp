@@ -20,10 +20,10 @@ constexpr double missing = std::numeric_limits<double>::quiet_NaN();
 // As many leaves as asked for.
 llmt::FitOptions hilomot(Eigen::Index leaves, Estimation estimation = Estimation::joint) {
   llmt::FitOptions options;
-  options.growth.rule = llmt::GrowthRule::hilomot;
-  options.growth.max_leaves = leaves;
-  options.blend.estimation = estimation;
-  options.selection.folds.count = 0;
+  options.rule = llmt::GrowthRule::hilomot;
+  options.max_leaves = leaves;
+  options.expert.estimation = estimation;
+  options.folds.count = 0;
   return options;
 }
 
@@ -130,7 +130,7 @@ TEST(Hilomot, IsBetterOnARidgeThanLolimotWithAsManyLeaves) {
       };
       llmt::FitOptions options = hilomot(8, estimation);
       const double oblique = llmt::rmse(llmt::fit(x, truth(x), options).model.predict(query), truth(query))(0);
-      options.growth.rule = llmt::GrowthRule::lolimot;
+      options.rule = llmt::GrowthRule::lolimot;
       const double orthogonal = llmt::rmse(llmt::fit(x, truth(x), options).model.predict(query), truth(query))(0);
       EXPECT_LT(oblique, 0.5 * orthogonal) << seed;
     }
@@ -150,7 +150,7 @@ TEST(Hilomot, AffineDataNeedOneLeafAndNoiseIsNotSplit) {
   }
   // With folds least squares stays, for the gain of the best candidate is within chance.
   llmt::FitOptions folds = hilomot(6);
-  folds.selection.folds.count = 4;
+  folds.folds.count = 4;
   EXPECT_EQ(llmt::fit(x, noisy, folds).summary.partitions[0].leaves, 1);
 }
 
@@ -173,7 +173,7 @@ TEST(Hilomot, SelectionPrefersGatesOnASmoothRidgeAndKeepsIntervals) {
     value += 0.05 * random.normal();
   }
   llmt::FitOptions options = hilomot(6);
-  options.selection.folds.count = 4;
+  options.folds.count = 4;
   const llmt::FitResult result = llmt::fit(x, y, options);
   EXPECT_EQ(result.summary.partitions[0].chosen.candidate.validity.kind, llmt::ValidityKind::logistic);
   EXPECT_LT(result.summary.partitions[0].chosen.rmse, 0.07);
@@ -188,7 +188,7 @@ TEST(Hilomot, SameBytesAtAnyNumberOfThreads) {
   y << oracle::curved(x, 0.05), oracle::curved(-x, 0.05, 8);
   for (const bool shared : {false, true}) {
     llmt::FitOptions options = hilomot(7);
-    options.growth.shared_partition = shared;
+    options.shared_partition = shared;
     options.max_threads = 1;
     const std::string one = llmt::to_json(llmt::fit(x, y, options).model);
     options.max_threads = 3;
@@ -249,7 +249,7 @@ TEST(Hilomot, MissingValuesCategoriesWeightsAndSeveralOutputs) {
   const Eigen::MatrixXd without = numbers.predict(query);
   query.col(1).setConstant(numbers.inputs()[1].centre);
   EXPECT_LT((without - numbers.predict(query)).cwiseAbs().maxCoeff(), 1e-12);
-  options.growth.shared_partition = true;
+  options.shared_partition = true;
   EXPECT_TRUE(llmt::fit(x, y, options).model.predict(x).allFinite());
 }
 
@@ -322,7 +322,7 @@ TEST(Hilomot, LargestJumpIsThatAcrossThePlane) {
 
 TEST(Hilomot, LeavesTellOnWhichSidesOfPlanesTheyLie) {
   llmt::FitOptions options = hilomot(7);
-  options.blend.validity = llmt::ValidityChoice::crisp;
+  options.validity = llmt::ValidityChoice::crisp;
   const Eigen::MatrixXd x = oracle::uniform(400, 3, 121);
   const llmt::Model model = llmt::fit(x, oracle::curved(x), options).model;
   const std::vector<llmt::Leaf> leaves = model.leaves(0);
@@ -400,9 +400,9 @@ TEST(Hilomot, FileReadsBackAndTellsWhatIsWrongWithADirection) {
 TEST(Hilomot, RefusesOtherValidities) {
   const Eigen::MatrixXd x = oracle::uniform(50, 2, 141);
   llmt::FitOptions options = hilomot(3);
-  options.blend.validity = llmt::ValidityChoice::gaussian;
+  options.validity = llmt::ValidityChoice::gaussian;
   EXPECT_THROW(llmt::fit(x, x.col(0), options), std::invalid_argument);
-  options.blend.validity = llmt::ValidityChoice::blend;
+  options.validity = llmt::ValidityChoice::blend;
   EXPECT_THROW(llmt::fit(x, x.col(0), options), std::invalid_argument);
 }
 

@@ -14,8 +14,8 @@ namespace {
 using Rows = std::vector<Eigen::Index>;
 
 llmt::FitResult grow(const Eigen::MatrixXd& x, const Eigen::MatrixXd& y, llmt::FitOptions options = {}) {
-  options.growth.rule = llmt::GrowthRule::m5;
-  options.selection.folds.count = 0;
+  options.rule = llmt::GrowthRule::m5;
+  options.folds.count = 0;
   return llmt::fit(x, y, options);
 }
 
@@ -308,8 +308,9 @@ TEST(M5, RootThatCannotBeSplitHasAllInputs) {
   const Eigen::MatrixXd x = oracle::uniform(20, 3, 9);
   const Eigen::MatrixXd y = 3.0 * x.col(0) - 2.0 * x.col(1) + x.col(2);
   llmt::FitOptions options;
-  options.growth = {.rule = llmt::GrowthRule::m5, .min_leaf_samples = 15};
-  options.selection.folds.count = 0;
+  options.rule = llmt::GrowthRule::m5;
+  options.min_leaf_samples = 15;
+  options.folds.count = 0;
   const llmt::Model model = llmt::fit(x, y, options).model;
   ASSERT_EQ(model.partitions()[0].nodes.size(), 1U);
   EXPECT_LT((model.partitions()[0].nodes[0].slope - Eigen::RowVector3d(3.0, -2.0, 1.0)).norm(), 1e-10);
@@ -398,9 +399,9 @@ TEST(M5, WeightsMultiplySquaredErrors) {
   llmt::FitOptions options;
   options.weights = Eigen::VectorXd::Ones(200);
   options.weights.head(100).setConstant(2.0);
-  options.growth.max_leaves = 2;
+  options.max_leaves = 2;
   llmt::FitOptions plain;
-  plain.growth.max_leaves = 2;
+  plain.max_leaves = 2;
   // Not the same n, for weights have mean 1; but the root's model drops nothing and is the same.
   EXPECT_LT((nodes(grow(x, y, options))[0].slope - nodes(grow(twice_x, twice_y, plain))[0].slope).norm(), 1e-10);
 }
@@ -410,7 +411,7 @@ TEST(M5, SharedTreesServeAllOutputs) {
   Eigen::MatrixXd y(800, 2);
   y << oracle::curved(x, 0.1, 15), oracle::curved(x.rowwise().reverse(), 0.1, 16);
   llmt::FitOptions options;
-  options.growth.shared_partition = true;
+  options.shared_partition = true;
   const llmt::FitResult result = grow(x, y, options);
   ASSERT_EQ(result.model.partitions().size(), 1U);
   std::set<int> inputs;
@@ -448,7 +449,7 @@ TEST(M5, FoldsChooseAmongItsPrefixesWithoutChangingItsModels) {
   const Eigen::MatrixXd x = oracle::uniform(600, 3, 18);
   const Eigen::MatrixXd y = oracle::curved(x, 0.3, 18);
   llmt::FitOptions options;
-  options.growth.rule = llmt::GrowthRule::m5;
+  options.rule = llmt::GrowthRule::m5;
   const llmt::FitResult chosen = llmt::fit(x, y, options);
   const llmt::FitResult all = grow(x, y);
   const llmt::PartitionSummary& summary = chosen.summary.partitions[0];
@@ -469,7 +470,7 @@ TEST(M5, WhatWouldUndoItsModelsIsRefused) {
   const Eigen::MatrixXd y = oracle::curved(x);
   const auto message = [&](const std::function<void(llmt::FitOptions&)>& change) -> std::string {
     llmt::FitOptions options;
-    options.growth.rule = llmt::GrowthRule::m5;
+    options.rule = llmt::GrowthRule::m5;
     change(options);
     try {
       llmt::fit(x, y, options);
@@ -478,14 +479,16 @@ TEST(M5, WhatWouldUndoItsModelsIsRefused) {
     }
     return "";
   };
-  EXPECT_EQ(message([](llmt::FitOptions& options) { options.blend.validity = llmt::ValidityChoice::gaussian; }),
-            "llmt::fit: blend.validity is gaussian, with growth.rule m5 it must be automatic or crisp");
+  EXPECT_EQ(message([](llmt::FitOptions& options) { options.validity = llmt::ValidityChoice::gaussian; }),
+            "llmt::fit: validity is gaussian, with rule m5 it must be auto or crisp");
   EXPECT_EQ(message([](llmt::FitOptions& options) {
-              options.blend.shrinkages = {0.0, 1.0};
+              options.expert.shrinkages = {0.0, 1.0};
             }),
-            "llmt::fit: blend.shrinkages is 1, it must be 0 with growth.rule m5, which smooths along the path");
-  EXPECT_EQ(message([](llmt::FitOptions& options) { options.growth.min_improvement = 0.02; }),
-            "llmt::fit: growth.min_improvement is 0.02, it must be 0 with growth.rule m5, which prunes");
+            "llmt::fit: expert.shrinkages is 1, it must be 0 with rule m5, which prunes and smooths its own local "
+            "models");
+  EXPECT_EQ(message([](llmt::FitOptions& options) { options.expert.min_improvement = 0.02; }),
+            "llmt::fit: expert.min_improvement is 0.02, it must be 0 with rule m5, which prunes and smooths its own "
+            "local models");
 }
 
 TEST(M5, StandsAmongTheUsualMethods) {

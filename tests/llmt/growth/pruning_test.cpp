@@ -135,12 +135,12 @@ TEST(WeakestLink, TheWholeTreeStaysTheSameUnderEveryRuleAndValidity) {
     for (const std::size_t kind : {0, 1, 4}) {
       const Data d = data(5);
       llmt::FitOptions options = only(kinds[kind], llmt::Estimation::local, 12);
-      options.growth.rule = rule;
-      options.growth.max_leaves = 0;
-      options.growth.min_leaf_samples = 25;
-      options.growth.shared_partition = kind == 1;
+      options.rule = rule;
+      options.max_leaves = 0;
+      options.min_leaf_samples = 25;
+      options.shared_partition = kind == 1;
       const llmt::Model grown = llmt::fit(d.x, d.y, options).model;
-      options.growth.pruning = llmt::Pruning::weakest_link;
+      options.pruning = llmt::Pruning::weakest_link;
       const llmt::Model ordered = llmt::fit(d.x, d.y, options).model;
       const Eigen::MatrixXd query = 0.9 * oracle::uniform(200, 3, 6);  // beyond the rows the first 32 leaves count
       ASSERT_GT(grown.partitions()[0].num_leaves(), 4);
@@ -154,7 +154,7 @@ TEST(WeakestLink, PrunedTreesOfAFitLeaveLessThanThoseOfTheOrderOfGrowth) {
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
     const Data d = data(seed);
     llmt::FitOptions options = only(kinds[0], llmt::Estimation::as_grown, 0);
-    options.growth.min_leaf_samples = 10;
+    options.min_leaf_samples = 10;
     const auto left = [&] {
       const llmt::Model model = llmt::fit(d.x, d.y.col(0), options).model;
       double sum = 0.0;
@@ -166,9 +166,9 @@ TEST(WeakestLink, PrunedTreesOfAFitLeaveLessThanThoseOfTheOrderOfGrowth) {
       }
       return sum;
     };
-    options.growth.pruning = llmt::Pruning::last_splits;
+    options.pruning = llmt::Pruning::last_splits;
     const double grown = left();
-    options.growth.pruning = llmt::Pruning::weakest_link;
+    options.pruning = llmt::Pruning::weakest_link;
     const double pruned = left();
     EXPECT_LE(pruned, grown * (1.0 + 1e-12));
     less += grown - pruned;
@@ -194,17 +194,17 @@ TEST(WeakestLink, FirstSplitThatGainsNothingStaysForThoseBelowIt) {
   for (std::uint64_t seed = 1; seed <= 2; ++seed) {
     const Data d = signs_beside_noise(seed, 2000);
     llmt::FitOptions options;
-    options.blend.validity = llmt::ValidityChoice::crisp;
-    options.growth.regression_inputs = {0};  // signs are no slopes
+    options.validity = llmt::ValidityChoice::crisp;
+    options.regression_inputs = {0};  // signs are no slopes
     options.intervals = false;
     const auto error = [&] {
       return llmt::rmse(llmt::fit(d.x, d.y.col(0), options).model.predict(test.x), test.y.col(1))(0);
     };
     const double with_test = error();
-    options.growth.significance = 1.0;
+    options.significance = 1.0;
     const double last_splits = error();
-    options.growth.significance = -1.0;
-    options.growth.pruning = llmt::Pruning::weakest_link;
+    options.significance = -1.0;
+    options.pruning = llmt::Pruning::weakest_link;
     const double weakest_link = error();
     // Where the signs are not found, three quarters of the rows have an error of 1: 0.87 in all.
     EXPECT_GT(with_test, 0.8);
@@ -223,8 +223,8 @@ TEST(WeakestLink, NoiseIsLeftToLeastSquares) {
       value = random.normal();
     }
     llmt::FitOptions options;
-    options.growth.pruning = llmt::Pruning::weakest_link;
-    options.blend.validity = llmt::ValidityChoice::crisp;
+    options.pruning = llmt::Pruning::weakest_link;
+    options.validity = llmt::ValidityChoice::crisp;
     split += llmt::fit(x, y, options).summary.partitions[0].leaves > 1 ? 1 : 0;
   }
   // A gain of two standard errors over five folds has a probability of 6 % by chance: more than 4 of 20 of 0.6 %.

@@ -10,11 +10,11 @@
 
 namespace {
 
-using llmt::SignStatistics;
+using llmt::ResidualStatistics;
 
-SignStatistics statistics(const Eigen::VectorXd& x, const Eigen::VectorXd& residuals, const Eigen::VectorXd& weights) {
+ResidualStatistics statistics(const Eigen::VectorXd& x, const Eigen::VectorXd& residuals, const Eigen::VectorXd& weights) {
   const auto span = [](const Eigen::VectorXd& values) { return std::span(values.data(), values.size()); };
-  return llmt::sign_statistics(span(x), span(residuals), span(weights));
+  return llmt::residual_statistics(span(x), span(residuals), span(weights));
 }
 
 // Student's two-sample statistic as in a textbook, rows of weight w as w rows.
@@ -41,9 +41,9 @@ long double student(const std::vector<double>& a, const std::vector<double>& b, 
 }
 
 llmt::FitResult grow(const Eigen::MatrixXd& x, const Eigen::MatrixXd& y, llmt::FitOptions options = {}) {
-  options.growth.rule = llmt::GrowthRule::ra;
-  options.blend.validity = llmt::ValidityChoice::crisp;
-  options.selection.folds.count = 0;
+  options.rule = llmt::GrowthRule::ra;
+  options.validity = llmt::ValidityChoice::crisp;
+  options.folds.count = 0;
   return llmt::fit(x, y, options);
 }
 
@@ -82,7 +82,7 @@ TEST(ResidualAnalysis, StatisticsAreThoseOfATextbook) {
         distance[c].push_back(static_cast<double>(std::abs(value - sum / total)));
       }
     }
-    const SignStatistics found = statistics(x, residuals, weights);
+    const ResidualStatistics found = statistics(x, residuals, weights);
     EXPECT_NEAR(found.positive_mean, mean[0], 1e-9);
     EXPECT_NEAR(found.negative_mean, mean[1], 1e-9);
     EXPECT_NEAR(found.means, static_cast<double>(student(of_class[0], of_class[1], weight[0], weight[1])), 1e-7);
@@ -96,7 +96,7 @@ TEST(ResidualAnalysis, DeviatesAreThoseOfTheSameProbability) {
   for (const double freedom : {5.0, 20.0, 100.0, 1e4}) {
     const boost::math::students_t distribution(freedom);
     for (const double t : {0.1, 1.0, 2.0, 4.0, 7.0}) {
-      const SignStatistics each{.means = 0.5 * t, .variances = -t, .freedom = freedom};
+      const ResidualStatistics each{.means = 0.5 * t, .variances = -t, .freedom = freedom};
       const double p = boost::math::cdf(boost::math::complement(distribution, t));
       const double deviate = boost::math::quantile(boost::math::complement(normal, p));
       EXPECT_NEAR(each.deviate(), deviate, 0.01 * deviate);
@@ -105,8 +105,8 @@ TEST(ResidualAnalysis, DeviatesAreThoseOfTheSameProbability) {
 }
 
 TEST(ResidualAnalysis, ComparesInputsWhereProbabilitiesUnderflow) {
-  const SignStatistics less{.means = 60.0, .variances = 0.0, .freedom = 1e6};
-  const SignStatistics more{.means = 60.1, .variances = 0.0, .freedom = 1e6};
+  const ResidualStatistics less{.means = 60.0, .variances = 0.0, .freedom = 1e6};
+  const ResidualStatistics more{.means = 60.1, .variances = 0.0, .freedom = 1e6};
   EXPECT_EQ(boost::math::cdf(boost::math::complement(boost::math::students_t(1e6), 60.0)), 0.0);
   EXPECT_LT(less.deviate(), more.deviate());
 }
@@ -170,7 +170,7 @@ TEST(ResidualAnalysis, CostOfANodeDoesNotDependOnItsRows) {
   for (const Eigen::Index rows : {1000, 10000, 40000}) {
     SCOPED_TRACE(rows);
     llmt::FitOptions options;
-    options.growth.max_leaves = 6;
+    options.max_leaves = 6;
     const Eigen::MatrixXd x = oracle::uniform(rows, 3, 5);
     const llmt::FitResult result = grow(x, oracle::curved(x, 0.1, 5), options);
     ASSERT_EQ(nodes(result).size(), 11U);
@@ -203,8 +203,8 @@ TEST(ResidualAnalysis, LargeAndSmallNodesSplitAlike) {
   Eigen::MatrixXd wider(4000, 4);
   wider << x, Eigen::VectorXd::Constant(4000, std::nan(""));
   llmt::FitOptions options;
-  options.growth.max_leaves = 8;
-  options.growth.regression_inputs = {0, 1, 2};
+  options.max_leaves = 8;
+  options.regression_inputs = {0, 1, 2};
   const llmt::FitResult large = grow(x, y, options);
   const llmt::FitResult own = grow(wider, y, options);
   ASSERT_EQ(nodes(large).size(), nodes(own).size());
@@ -221,8 +221,8 @@ TEST(ResidualAnalysis, SameBytesAtAnyNumberOfThreadsAndSameTreeInAnyOrderOfRows)
   y << oracle::curved(x, 0.1, 5), oracle::curved(x.rowwise().reverse(), 0.1, 6);
   for (const bool shared : {false, true}) {
     llmt::FitOptions options;
-    options.growth.shared_partition = shared;
-    options.growth.max_leaves = 20;
+    options.shared_partition = shared;
+    options.max_leaves = 20;
     options.max_threads = 1;
     const llmt::FitResult one = grow(x, y, options);
     options.max_threads = 4;
@@ -291,7 +291,7 @@ TEST(ResidualAnalysis, PrefixesAreNestedAndBlendsAreChosenAsForAnyRule) {
   const Eigen::MatrixXd x = oracle::uniform(600, 2, 31);
   const Eigen::MatrixXd y = oracle::curved(x, 0.05, 31);
   llmt::FitOptions options;
-  options.growth.rule = llmt::GrowthRule::ra;
+  options.rule = llmt::GrowthRule::ra;
   const llmt::FitResult result = llmt::fit(x, y, options);
   const llmt::PartitionSummary& summary = result.summary.partitions[0];
   EXPECT_EQ(summary.chosen.candidate.validity.kind, llmt::ValidityKind::blend);

@@ -35,7 +35,7 @@ TEST(JumpingTruth, DefaultIsNeverMuchWorseThanTheCrispTree) {
         expected(i) = truth.value(test(i, 0), test(i, 1));
       }
       llmt::FitOptions crisp;
-      crisp.blend.validity = llmt::ValidityChoice::crisp;
+      crisp.validity = llmt::ValidityChoice::crisp;
       const double of_default = llmt::rmse(llmt::fit(x, y).model.predict(test), expected)(0);
       const double of_crisp = llmt::rmse(llmt::fit(x, y, crisp).model.predict(test), expected)(0);
       EXPECT_LE(of_default, 1.02 * of_crisp) << truth.name << ", seed " << seed;
@@ -62,7 +62,7 @@ TEST(JumpingTruth, BlendKeepsTheJump) {
       value += 0.1 * random.normal();
     }
     llmt::FitOptions all_blended;
-    all_blended.blend.jumps = {llmt::no_jump};
+    all_blended.expert.jumps = {llmt::no_jump};
     const llmt::FitResult result = llmt::fit(x, y);
     const auto error = [&](const llmt::Model& model) {
       const Eigen::VectorXd off = ((test.col(0).array() - 0.2).abs() > 0.02).cast<double>();
@@ -89,11 +89,11 @@ TEST(JumpingTruth, SmoothAndKinkedTruthsHaveNoLargeJumps) {
       value += 0.1 * random.normal();
     }
     llmt::FitOptions options;
-    options.blend.validity = llmt::ValidityChoice::blend;
-    options.blend.jumps = {4.0};
-    options.growth.max_leaves = 20;
-    options.growth.significance = 1.0;
-    options.selection.folds.count = 0;
+    options.validity = llmt::ValidityChoice::blend;
+    options.expert.jumps = {4.0};
+    options.max_leaves = 20;
+    options.significance = 1.0;
+    options.folds.count = 0;
     for (const llmt::Node& node : llmt::fit(x, y, options).model.partitions()[0].nodes) {
       splits += node.is_leaf() ? 0.0 : 1.0;
       crisp_splits += !node.is_leaf() && node.half_width == 0.0 ? 1.0 : 0.0;

@@ -52,9 +52,7 @@ TEST(Model, TellsHowFarAQueryLiesOutside) {
 TEST(Model, LeverageOfALeafIsThatOfItsLeastSquares) {
   const Eigen::MatrixXd x = oracle::uniform(200, 2, 34);
   const llmt::Model model = llmt::fit(x, oracle::curved(x, 0.02),
-                                      {.growth = {.max_leaves = 3},
-                                       .blend = {.validity = llmt::ValidityChoice::crisp},
-                                       .selection = {.folds = {.count = 0}}})
+                                      {.max_leaves = 3, .validity = llmt::ValidityChoice::crisp, .folds = {.count = 0}})
                                 .model;
   const Eigen::MatrixXi leaf_of = model.leaf_of(x);
   Eigen::MatrixXd a(200, 3);

@@ -9,6 +9,7 @@
 
 #include "llmt/fit.hpp"
 #include "model/tree.hpp"
+#include "llmt/fit.hpp"
 #include "oracles/oracles.hpp"
 #include "oracles/stream_data.hpp"
 #include "stream/blend_correction.hpp"
@@ -258,8 +259,8 @@ TEST(BlendCorrection, IsTheAnchoredLeastSquaresFit) {
   const Eigen::MatrixXd x = oracle::uniform(200, 2, 1);
   const Eigen::MatrixXd y = oracle::curved(x, 0.05);
   llmt::FitOptions options;
-  options.growth.max_leaves = 4;
-  options.selection.folds.count = 0;
+  options.max_leaves = 4;
+  options.folds.count = 0;
   llmt::Partition partition = llmt::fit(x, y, options).model.partitions().front();
   ASSERT_EQ(partition.num_leaves(), 4);
   const llmt::Table table{x, y, Eigen::VectorXd::Ones(200), {0, 0}, {0, 1}, {0, 1}};

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "llmt/fit.hpp"
 #include "oracles/oracles.hpp"
 #include "oracles/stream_data.hpp"
 #include "stream/sums.hpp"
@@ -52,8 +53,8 @@ TEST(Stream, LearnsASmoothFunctionFarBetterThanOneModel) {
   const Eigen::MatrixXd fresh = oracle::uniform(2000, 3, 9);
   const Eigen::MatrixXd truth = oracle::curved(fresh);
   llmt::FitOptions one_leaf;
-  one_leaf.growth.max_leaves = 1;
-  one_leaf.selection.folds.count = 0;
+  one_leaf.max_leaves = 1;
+  one_leaf.folds.count = 0;
   const double linear = llmt::rmse(llmt::fit(x, y, one_leaf).model.predict(fresh), truth)(0);
   Stream stream(3, 1);
   stream.add(x, y);

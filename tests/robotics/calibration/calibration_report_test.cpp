@@ -47,9 +47,9 @@ TEST(CalibrationReport, CorrectionOfPureNoiseIsLeftOut) {
   const Robot truth = perturbed(ur_like(), 0.5, 0.05, 3);
   const Measurements seen = measure(truth, random_poses(truth.chain, 60, 4), 0.05, 5);
   ReportOptions options{.correct = true};
-  options.growth.significance = 1.0;  // a tree that follows every wiggle
+  options.correction.significance = 1.0;  // a tree that follows every wiggle
   options.correction_folds = 0;
-  options.growth.max_leaves = 5;
+  options.correction.max_leaves = 5;
   const CalibrationReport report = report_calibration(ur_like(), seen, options);
   EXPECT_LT(report.corrected->in_sample_mm.mean(), report.geometric.in_sample_mm.mean());
   EXPECT_FALSE(report.correction_kept) << report.decision;
@@ -71,6 +71,22 @@ TEST(CalibrationReport, WithoutFoldsThereAreNoHeldOutFigures) {
       report_calibration(ur_like(), measure(truth, random_poses(truth.chain, 50, 10), 0.05, 11), {.folds = 0});
   EXPECT_EQ(report.geometric.held_out_mm.size(), 0);
   EXPECT_EQ(report.nominal.in_sample_mm.size(), 50);
+}
+
+TEST(CalibrationReport, DescriptionOfAnotherRobotIsSaidNotToBelong) {
+  const Robot other = mdh_like();
+  const Robot own = perturbed(ur_like(), 0.5, 0.05, 16);
+  for (const int folds : {0, 5}) {
+    const auto suspicions_of = [&](const Robot& measured) {
+      const Measurements seen = measure(measured, random_poses(measured.chain, 60, 17), 0.05, 18);
+      return suspicions(ur_like(), seen, report_calibration(ur_like(), seen, {.folds = folds}));
+    };
+    const std::vector<std::string> wrong = suspicions_of(other);
+    ASSERT_FALSE(wrong.empty());
+    EXPECT_NE(wrong.back().find("does not belong to these measurements"), std::string::npos) << wrong.back();
+    EXPECT_NE(wrong.back().find(folds > 0 ? "held-out points" : "measured points"), std::string::npos) << wrong.back();
+    EXPECT_TRUE(suspicions_of(own).empty());
+  }
 }
 
 TEST(Correction, IsTheSameSeenFromAnotherBase) {

@@ -140,8 +140,8 @@ TEST(PlanarArm, EffectColumnsOfTheJacobianEqualDifferences) {
   const Robot robot = flexible();
   const discovery::LeastSquaresProblem problem =
       calibration_problem(robot, measure(robot, random_poses(robot.chain, 10, 5), 0.0, 6));
-  Eigen::VectorXd values(static_cast<Eigen::Index>(problem.parameters.size()));
-  for (Eigen::Index k = 0; k < values.size(); ++k) values(k) = problem.parameters[static_cast<std::size_t>(k)].value;
+  Eigen::VectorXd values(std::ssize(problem.parameters));
+  for (Eigen::Index k = 0; k < values.size(); ++k) values(k) = problem.parameters[k].value;
   const Eigen::MatrixXd analytic = problem.jacobian(values);
   const Eigen::MatrixXd difference = discovery::difference_jacobian(problem, values);
   // First-order displacements of an arm that turns by 6 mrad: equal up to the square of that angle and the like.
@@ -158,9 +158,9 @@ TEST(PlanarArm, CorrectionRemovesMostOfTheRest) {
   const Measurements test = exact(flexible(), grid(rigid().chain, 0.05));
   const Calibration calibration = calibrate(rigid(), training, {.only = {"joint2.a", "joint2.b", "tool.x", "tool.y"}});
   FitOptions options;
-  options.growth.significance = 1.0;
-  options.growth.max_leaves = 40;
-  options.selection.folds.count = 0;
+  options.significance = 1.0;
+  options.max_leaves = 40;
+  options.folds.count = 0;
   const CorrectedRobot corrected{calibration.robot, fit_correction(calibration.robot, training, options).model};
   const double before = distances(positions(calibration.robot, test.poses), test).mean();
   const double after = distances(positions(corrected, test.poses), test).mean();

@@ -67,7 +67,7 @@ Poses poses_of(const Telling& telling) {
   poses.joints.resize(std::ssize(telling.poses), telling.poses.front().joints.size());
   Eigen::VectorXd payload(std::ssize(telling.poses));
   for (Eigen::Index i = 0; i < payload.size(); ++i) {
-    const TellingPose& pose = telling.poses[static_cast<std::size_t>(i)];
+    const TellingPose& pose = telling.poses[i];
     poses.joints.row(i) = pose.joints.transpose();
     payload(i) = pose.payload_kg;
   }

@@ -37,7 +37,7 @@ Eigen::MatrixXd differences(const Robot& robot, const Effect& effect, const Pose
       return positions(with_effect(robot, other), poses).transpose();
     };
     const Eigen::MatrixXd slope = (moved(step) - moved(-step)) / (2.0 * step);
-    columns.col(static_cast<Eigen::Index>(k)) = slope.reshaped();
+    columns.col(k) = slope.reshaped();
   }
   return columns;
 }
@@ -59,7 +59,7 @@ TEST(EffectDerivatives, SignaturesAreDifferencesOfPositionsAtZero) {
         const double size = expected.col(k).norm();
         // The robot's own effects deform it: signatures are of first order, exact to its deflections over its levers. A
         // nanometre at the value's typical size is nothing.
-        const double scale = effect_parameters(robot.chain, candidate)[static_cast<std::size_t>(k)].scale;
+        const double scale = effect_parameters(robot.chain, candidate)[k].scale;
         EXPECT_LT((own.col(k) - expected.col(k)).norm(), 2e-3 * size + 1e-6 / scale)
             << effect_label(candidate) << " value " << k;
       }
@@ -93,9 +93,9 @@ TEST(EffectDerivatives, JacobianIsThatOfPositionsAtValuesOtherThanZero) {
   const Eigen::MatrixXd jacobian = position_jacobian(robot, poses);
   const std::vector<discovery::Parameter> all = parameters(robot);
   Eigen::VectorXd values(std::ssize(all));
-  for (std::size_t k = 0; k < all.size(); ++k) values(static_cast<Eigen::Index>(k)) = all[k].value;
+  for (std::size_t k = 0; k < all.size(); ++k) values(k) = all[k].value;
   for (Eigen::Index k = geometric_parameter_count(robot.chain); k < values.size(); ++k) {
-    const double step = 0.1 * all[static_cast<std::size_t>(k)].scale;
+    const double step = 0.1 * all[k].scale;
     const auto moved = [&](double change) -> Eigen::MatrixXd {
       Eigen::VectorXd other = values;
       other(k) += change;
@@ -103,8 +103,7 @@ TEST(EffectDerivatives, JacobianIsThatOfPositionsAtValuesOtherThanZero) {
     };
     const Eigen::VectorXd expected = ((moved(step) - moved(-step)) / (2.0 * step)).reshaped();
     // Effect columns are of first order at the deformed arm; the eccentricity turns a joint by 0.036 rad.
-    EXPECT_LT((jacobian.col(k) - expected).norm(), 0.04 * expected.norm() + 1e-6)
-        << all[static_cast<std::size_t>(k)].name;
+    EXPECT_LT((jacobian.col(k) - expected).norm(), 0.04 * expected.norm() + 1e-6) << all[k].name;
   }
 }
 

@@ -57,7 +57,7 @@ TEST(ElasticEffects, ComplianceTurnsAJointInProportionToTheSlopeOfTheEnergy) {
             Eigen::VectorXd bent = q;
             for (int pass = 0; pass < 20; ++pass) {
               yielded = compliance * gravity_by_energy(robot, bent, payload, j) * (turns ? 1.0 : 1000.0);
-              bent(static_cast<Eigen::Index>(j)) = q(static_cast<Eigen::Index>(j)) + yielded;
+              bent(j) = q(j) + yielded;
             }
             return moved_tool(robot, q, j, yielded);
           },

@@ -24,9 +24,9 @@ void expect_joint_error(const Robot& robot, const Effect& effect, std::size_t jo
 TEST(JointEffects, GainStretchesTheJointValue) {
   for (const std::size_t joint : {std::size_t{1}, std::size_t{2}}) {
     const Robot robot = scara();
-    expect_joint_error(
-        robot, {"joint_gain", robot.chain.joints[joint].name, {3e-4}}, joint, random_poses(robot.chain, 5, 1),
-        [&](const Eigen::VectorXd& q, Eigen::Index) { return 3e-4 * q(static_cast<Eigen::Index>(joint)); });
+    expect_joint_error(robot, {"joint_gain", robot.chain.joints[joint].name, {3e-4}}, joint,
+                       random_poses(robot.chain, 5, 1),
+                       [&](const Eigen::VectorXd& q, Eigen::Index) { return 3e-4 * q(joint); });
   }
 }
 
@@ -50,7 +50,7 @@ TEST(JointEffects, PeriodicErrorsRepeatWithTheirOrder) {
   const auto wave = [](double order, std::size_t joint) {
     return [=](const Eigen::VectorXd& q, Eigen::Index) {
       const std::complex<double> coefficients(2e-4, -1e-4);  // Re((a - i b) e^{i n q})
-      return (coefficients * std::polar(1.0, order * q(static_cast<Eigen::Index>(joint)))).real();
+      return (coefficients * std::polar(1.0, order * q(joint))).real();
     };
   };
   const Poses poses = random_poses(robot.chain, 5, 3);
@@ -189,15 +189,15 @@ TEST(JointEffects, WobbleTurnsTheAxisAndAllBeyondIt) {
       Chain shorter = robot.chain;
       shorter.tool = {};
       shorter.joints.resize(std::max<std::size_t>(j, 1));
-      Eigen::VectorXd first = q.head(static_cast<Eigen::Index>(shorter.joints.size()));
+      Eigen::VectorXd first = q.head(std::ssize(shorter.joints));
       if (j == 0) {  // a joint that does nothing stands for none
         shorter.joints[0] = Joint();
         shorter.joints[0].name = "none";
         first(0) = 0.0;
       }
       const Pose still = forward(shorter, first);
-      const double c = std::cos(q(static_cast<Eigen::Index>(j)));
-      const double s = std::sin(q(static_cast<Eigen::Index>(j)));
+      const double c = std::cos(q(j));
+      const double s = std::sin(q(j));
       const Vector3d turn =
           still.rotation * Vector3d(values[0] * c + values[1] * s, values[2] * c + values[3] * s, 0.0);
       const Vector3d tool = forward(robot.chain, q).position_mm;

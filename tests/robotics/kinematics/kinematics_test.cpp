@@ -27,7 +27,7 @@ Isometry3d textbook(const Chain& chain, const Eigen::VectorXd& q) {
   for (std::size_t i = 0; i < chain.joints.size(); ++i) {
     const Joint& j = chain.joints[i];
     const bool turns = j.type == JointType::revolute;
-    const double moved = j.sign * q(static_cast<Eigen::Index>(i));
+    const double moved = j.sign * q(i);
     const Isometry3d z = AngleAxisd(j.theta_deg * degree + (turns ? moved : 0.0), Vector3d::UnitZ()) *
                          Isometry3d(Translation3d(0.0, 0.0, j.d_mm + (turns ? 0.0 : moved)));
     const Isometry3d xy(Translation3d(j.a_mm, j.b_mm, 0.0));
@@ -143,9 +143,9 @@ TEST(Chain, ValuesGoInAndComeOutUnchanged) {
   EXPECT_EQ(geometric_values(with_geometric_values(mdh_like().chain, values)), values);
   EXPECT_EQ(values.size(), geometric_parameter_count(robot.chain));
   const std::vector<discovery::Parameter> named = geometric_parameters(robot.chain);
-  EXPECT_EQ(named[static_cast<std::size_t>(joint_parameter(2, JointParameter::a))].name, "joint3.a");
-  EXPECT_EQ(named[static_cast<std::size_t>(joint_parameter(2, JointParameter::a))].value, robot.chain.joints[2].a_mm);
-  EXPECT_EQ(named[static_cast<std::size_t>(tool_parameter(FrameParameter::rz))].name, "tool.rz");
+  EXPECT_EQ(named[joint_parameter(2, JointParameter::a)].name, "joint3.a");
+  EXPECT_EQ(named[joint_parameter(2, JointParameter::a)].value, robot.chain.joints[2].a_mm);
+  EXPECT_EQ(named[tool_parameter(FrameParameter::rz)].name, "tool.rz");
 }
 
 TEST(Chain, MistakesNameJointFieldAndValue) {

@@ -1,5 +1,5 @@
 /// \file
-/// Nonlinear least squares with named parameters: the one engine behind every calibration.
+/// Nonlinear least squares with named parameters, the engine of every calibration.
 #pragma once
 
 #include <Eigen/Core>
@@ -36,7 +36,7 @@ struct LeastSquaresProblem {
   std::vector<Parameter> parameters;
   Residual residual;
   Jacobian jacobian;        ///< empty: central differences
-  Eigen::VectorXd weights;  ///< 1/sigma of each residual row, or empty for ones; priors count residuals in these units
+  Eigen::VectorXd weights;  ///< n factors of the residuals, usually 1/sigma; empty: all 1
 };
 
 struct SolverOptions {
@@ -62,7 +62,7 @@ enum class Termination {
   no_information       ///< no free parameter changes any residual
 };
 
-/// A direction in parameter space that the data cannot tell: sum of coefficient * (unit step of the named parameter).
+/// A direction in parameter space that changes no residual: sum of coefficient * (unit step of the named parameter).
 struct Combination {
   struct Term {
     std::string name;
@@ -104,8 +104,8 @@ struct SolverResult {
 /// Solves a problem by damped, rank-revealing Gauss-Newton steps.
 ///
 /// Each step comes from the singular values of the scaled Jacobian (through its QR factorisation, so the cost is n
-/// k^2). Directions below the rank tolerance take no step: what the data cannot tell stays where it started and is
-/// reported by name. Outcomes, including failures, are fields of the result.
+/// k^2). No step is taken along directions below the rank tolerance: combinations of parameters that the data do not
+/// determine keep their start values and are reported by name. Outcomes, including failures, are fields of the result.
 ///
 /// Throws std::invalid_argument for wrong options or parameters (empty or repeated name, non-finite value, scale <= 0,
 /// prior <= 0), wrong shapes, and residuals or derivatives that are not finite at the start.

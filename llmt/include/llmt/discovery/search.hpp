@@ -19,8 +19,9 @@ struct Evidence {
   Eigen::Index components = 1;  ///< d
   /// n numbers, or empty: samples of equal number are repeats of one setting, independent draws of the noise.
   std::vector<Eigen::Index> repeats;
-  /// Share of the sum of squares that signatures, being of first order, cannot be trusted with: no explanation is
-  /// better than that, so data without noise do not call for ever more candidates. 0: they are exact.
+  /// Share of the sum of squares that signatures of first order leave even when the explanation is right. No
+  /// explanation counts as better than that; else data without noise would call for more and more candidates. 0: exact
+  /// signatures.
   double resolution = 0.0;
 
   Eigen::Index samples() const { return components > 0 ? residuals.size() / components : 0; }
@@ -38,12 +39,18 @@ struct EffectCandidate {
   double prior_cost = 0.0;
 };
 
+/// A cause that these samples cannot test.
+struct UntestableCause {
+  std::string what;  ///< "backlash_approach@joint1", "square a"
+  std::string why;   ///< in words
+};
+
 struct SearchOptions {
   double false_alarm_rate = 0.003;  ///< of the whole search when nothing is missing
   int null_draws = 300;             ///< of each kind, see search()
   double rival_margin = 6.0;        ///< score difference within which an alternative explains as well
-  /// A family that explains all but this share of what the explanation explains is a rival too, whatever the score:
-  /// masses, lengths and formulas are not known more closely.
+  /// A family that explains all but this share of what the explanation explains is a rival too, whatever its score,
+  /// because masses, lengths and formulas are not known more closely.
   double model_error = 0.008;
   double shape_margin = 0.0;     ///< score by which causes may be worse than shapes and still be named
   double materiality = 0.01;     ///< unique share of the explained sum of squares below which a family is left out
@@ -67,7 +74,7 @@ struct Rival {
   std::string family;
   std::vector<std::size_t> candidates;
   double score_difference = 0.0;  ///< of the whole explanation; positive: worse
-  bool exact = false;             ///< predicts the same at every sample: these samples cannot tell
+  bool exact = false;             ///< predicts the same at every sample: these samples cannot distinguish them
 };
 
 /// One family of the explanation.
@@ -90,12 +97,15 @@ struct Sensitivity {
   Eigen::VectorXd visible;
 };
 
-/// The test of residual scatter against the scatter of repeats.
+/// The F test of the residual scatter against the scatter of repeats.
 struct LackOfFit {
   Eigen::Index dof = 0;       ///< of the repeats; 0: there are none
   double noise = 0.0;         ///< standard deviation of one component from the repeats
   double p_value = 1.0;       ///< of scatter beyond the repeats when the explanation is right
-  double excess_share = 0.0;  ///< of the sum of squares beyond noise that is still there
+  double excess_share = 0.0;  ///< of the sum of squares beyond noise: the part that the explanation leaves
+
+  /// Whether the repeats are enough to take the noise from them: with 12 degrees of freedom its standard error is 20 %.
+  bool has_enough_repeats() const { return dof >= 12; }
 };
 
 enum class Answer { nothing_missing, named, indistinguishable, unknown };

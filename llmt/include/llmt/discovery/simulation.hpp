@@ -44,14 +44,14 @@ struct TermValue {
   std::string name;
   std::string unit;
   double value = 0.0;
-  /// NaN where the samples do not tell. Of a constant that is not smooth, such as a threshold: how far it can be moved,
-  /// to the next value tried beyond, before the sum of squares rises by more than the variance of the noise.
+  /// NaN where the samples do not determine the value. For a constant that is not smooth, such as a threshold: the
+  /// distance to the next value tried at which the sum of squares is larger by more than the variance of the noise.
   double standard_error = 0.0;
 };
 
 struct RivalTerms {
   std::string what;    ///< "cube a", joined by " + " where it takes several
-  bool exact = false;  ///< the same at every row: these rows cannot tell
+  bool exact = false;  ///< the same at every row: these rows cannot distinguish them
 };
 
 /// A term that is missing.
@@ -80,7 +80,7 @@ struct Gap {
   double noise_floor = 0.0;  ///< of the noise, from repeats where there are enough, else from what is left
 };
 
-/// What the terms found do not explain, although it is not noise: rows that are neighbours in some inputs deviate
+/// A part of the gap that is not noise and that no term explains: rows that are neighbours in some inputs deviate
 /// alike.
 struct Structure {
   std::string output;
@@ -111,7 +111,7 @@ struct Missing {
   std::vector<Eigen::Index> searched;  ///< rows
   std::vector<Eigen::Index> held_out;  ///< rows
   std::vector<Eigen::Index> outliers;  ///< rows that fit nothing and were left out of the fit
-  std::vector<UntestableTerm> not_testable;
+  std::vector<UntestableCause> not_testable;
   std::vector<VisibleTerm> visible;  ///< of the causes that were tried, most visible first
   bool floor_from_repeats = false;
   std::vector<Structure> structure;  ///< material; terms found beside it are not confirmed

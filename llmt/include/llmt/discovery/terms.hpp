@@ -8,10 +8,11 @@
 #include <vector>
 
 #include "llmt/abi.hpp"
+#include "llmt/discovery/search.hpp"
 
 namespace llmt::discovery {
 
-/// What terms are functions of.
+/// What the columns of a term are computed from.
 struct Rows {
   Eigen::MatrixXd inputs;              ///< n x p
   Eigen::VectorXd simulated;           ///< n: the output that the term is to change, without any term
@@ -25,10 +26,10 @@ struct TermConstant {
   std::string unit;
   std::vector<double> tried;  ///< ascending, at least one
   bool smooth = true;         ///< the term is differentiable by it: it is fitted with everything else afterwards
-  int kept = 1;               ///< how many of the best values compete
-  int most = 1;               ///< how many values may be used at once: more would be an approximation of something else
-  /// Powers 0 ... `beyond` of the first input of ModelTerm::inputs are set apart before values are compared, so that a
-  /// value does not win for what simpler terms explain.
+  int kept = 1;               ///< number of the best values that compete
+  int most = 1;               ///< largest number of values used at once; more would approximate another function
+  /// Powers 0 ... `beyond` of the first input of ModelTerm::inputs are projected out before values are compared, so
+  /// that no value is preferred for a part that simpler terms explain.
   int beyond = 0;
 };
 
@@ -58,11 +59,6 @@ struct Inputs {
   std::string order = {};          ///< the input that says in which order rows were taken; empty: as they stand
 };
 
-struct UntestableTerm {
-  std::string what;
-  std::string why;
-};
-
 /// The library of terms, for inputs x, x':
 ///   offset 1; gain s and gain_curvature s^2 of the simulated output s;
 ///   linear x; square x^2; cube x^3; product x x'; absolute |x|; sign sgn(x);
@@ -74,10 +70,10 @@ struct UntestableTerm {
 /// and shapes that carry "unknown": ?smooth (5 cosines over the range of x), ?fine (12), ?bump (a place searched, three
 /// widths), ?pair (10 products of cosines in x and x').
 ///
-/// Terms that the values cannot tell from simpler ones are left out: x^2 for an input of two values, |x| for one sign.
+/// A term that equals a simpler one at these values is left out: x^2 for an input of two values, |x| for one sign.
 /// Constant inputs go to `untestable` if that is given. Throws std::invalid_argument for wrong shapes, empty or
 /// repeated names, values that are not finite, and an order that is not an input or holds equal values.
-std::vector<ModelTerm> standard_terms(const Inputs& inputs, std::vector<UntestableTerm>* untestable = nullptr);
+std::vector<ModelTerm> standard_terms(const Inputs& inputs, std::vector<UntestableCause>* untestable = nullptr);
 
 /// `library` without the terms of one column that are proportional to one of `own`: the user's name for it wins.
 std::vector<ModelTerm> without_duplicates(std::vector<ModelTerm> library, const std::vector<ModelTerm>& own,

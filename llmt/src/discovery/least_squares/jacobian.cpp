@@ -11,8 +11,7 @@ Eigen::MatrixXd difference_jacobian(const LeastSquaresProblem& problem, const Ei
   Eigen::MatrixXd jacobian;
   Eigen::VectorXd moved = values;
   for (Eigen::Index k = 0; k < values.size(); ++k) {
-    const double step =
-        relative_step * std::max(std::abs(values(k)), problem.parameters[static_cast<std::size_t>(k)].scale);
+    const double step = relative_step * std::max(std::abs(values(k)), problem.parameters[k].scale);
     moved(k) = values(k) + step;
     const double upper = moved(k);
     const Eigen::VectorXd above = problem.residual(moved);
@@ -34,8 +33,8 @@ JacobianCheck check_jacobian(const LeastSquaresProblem& problem) {
   if (!problem.jacobian) {
     throw std::invalid_argument("llmt::discovery::check_jacobian: the problem has no analytic Jacobian");
   }
-  Eigen::VectorXd values(static_cast<Eigen::Index>(problem.parameters.size()));
-  for (Eigen::Index k = 0; k < values.size(); ++k) values(k) = problem.parameters[static_cast<std::size_t>(k)].value;
+  Eigen::VectorXd values(std::ssize(problem.parameters));
+  for (Eigen::Index k = 0; k < values.size(); ++k) values(k) = problem.parameters[k].value;
   const Eigen::MatrixXd analytic = problem.jacobian(values);
   const Eigen::MatrixXd difference = difference_jacobian(problem, values);
   if (analytic.rows() != difference.rows() || analytic.cols() != difference.cols()) {
@@ -46,12 +45,11 @@ JacobianCheck check_jacobian(const LeastSquaresProblem& problem) {
   // A column that moves nothing is compared on the scale of the others, not on that of its own rounding.
   double largest = std::numeric_limits<double>::min();
   for (Eigen::Index k = 0; k < values.size(); ++k) {
-    largest = std::max(largest,
-                       difference.col(k).cwiseAbs().maxCoeff() * problem.parameters[static_cast<std::size_t>(k)].scale);
+    largest = std::max(largest, difference.col(k).cwiseAbs().maxCoeff() * problem.parameters[k].scale);
   }
   JacobianCheck check;
   for (Eigen::Index k = 0; k < values.size(); ++k) {
-    const Parameter& parameter = problem.parameters[static_cast<std::size_t>(k)];
+    const Parameter& parameter = problem.parameters[k];
     const double size = std::max(difference.col(k).cwiseAbs().maxCoeff(), 1e-6 * largest / parameter.scale);
     Eigen::Index row = 0;
     const double error = (analytic.col(k) - difference.col(k)).cwiseAbs().maxCoeff(&row) / size;

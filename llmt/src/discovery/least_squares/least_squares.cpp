@@ -4,9 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
 #include <stdexcept>
 
+#include "discovery/least_squares/check.hpp"
 #include "discovery/least_squares/linearisation.hpp"
 
 namespace llmt::discovery {
@@ -16,40 +16,6 @@ constexpr double largest_damping = 1e12;
 constexpr double negligible_damping = 1e-14;
 // A relative decrease of the sum of squares below this is lost in its own rounding.
 constexpr double resolvable_decrease = 1e-12;
-
-[[noreturn]] void refuse(const std::string& message) {
-  throw std::invalid_argument("llmt::discovery::solve: " + message);
-}
-
-void check_options(const SolverOptions& options) {
-  const auto check = [](const char* field, double value, bool good, const char* bound) {
-    if (!good) refuse(fmt::format("SolverOptions::{} is {}, must be {}", field, value, bound));
-  };
-  check("damping", options.damping, options.damping >= 0.0 && std::isfinite(options.damping), ">= 0 and finite");
-  check("max_iterations", options.max_iterations, options.max_iterations >= 0, ">= 0");
-  check("gradient_tolerance", options.gradient_tolerance, options.gradient_tolerance >= 0.0, ">= 0");
-  check("step_tolerance", options.step_tolerance, options.step_tolerance >= 0.0, ">= 0");
-  check("rank_tolerance", options.rank_tolerance, options.rank_tolerance > 0.0 && options.rank_tolerance < 1.0,
-        "between 0 and 1");
-}
-
-void check_parameters(const std::vector<Parameter>& parameters) {
-  std::set<std::string> names;
-  for (const Parameter& p : parameters) {
-    if (p.name.empty()) refuse("a parameter has no name");
-    if (!names.insert(p.name).second) refuse(fmt::format("parameter \"{}\" is there twice", p.name));
-    if (!std::isfinite(p.value)) refuse(fmt::format("parameter \"{}\": value is {}, must be finite", p.name, p.value));
-    if (!(p.scale > 0.0) || !std::isfinite(p.scale)) {
-      refuse(fmt::format("parameter \"{}\": scale is {}, must be > 0 and finite", p.name, p.scale));
-    }
-    if (p.prior_sigma && !(*p.prior_sigma > 0.0)) {
-      refuse(fmt::format("parameter \"{}\": prior_sigma is {}, must be > 0", p.name, *p.prior_sigma));
-    }
-    if (p.prior_value && !std::isfinite(*p.prior_value)) {
-      refuse(fmt::format("parameter \"{}\": prior_value is {}, must be finite", p.name, *p.prior_value));
-    }
-  }
-}
 
 // The problem as the iteration sees it: free columns, scaled, weighted, priors as extra rows.
 class Solver {
@@ -85,44 +51,45 @@ class Solver {
 
 Solver::Solver(const LeastSquaresProblem& problem, const SolverOptions& options)
     : problem_(problem), options_(options), damping_(options.damping) {
-  check_options(options);
-  check_parameters(problem.parameters);
-  if (!problem.residual) refuse("the problem has no residual function");
-  const auto count = static_cast<Eigen::Index>(problem.parameters.size());
+  check(options);
+  check(problem.parameters);
+  if (!problem.residual) refuse_to_solve("the problem has no residual function");
+  const auto count = std::ssize(problem.parameters);
   start_.resize(count);
   std::vector<double> scales;
   for (Eigen::Index k = 0; k < count; ++k) {
-    const Parameter& p = problem.parameters[static_cast<std::size_t>(k)];
+    const Parameter& p = problem.parameters[k];
     start_(k) = p.value;
     if (!p.free) continue;
-    if (p.prior_sigma) prior_.push_back(static_cast<Eigen::Index>(free_.size()));
+    if (p.prior_sigma) prior_.push_back(std::ssize(free_));
     free_.push_back(k);
     scales.push_back(p.scale);
   }
-  scales_ = Eigen::Map<const Eigen::VectorXd>(scales.data(), static_cast<Eigen::Index>(scales.size()));
+  scales_ = Eigen::Map<const Eigen::VectorXd>(scales.data(), std::ssize(scales));
   values_ = start_;
   residuals_ = problem.residual(values_);
   const Eigen::Index weights = problem.weights.size();
   if (weights != 0 && weights != residuals_.size()) {
-    refuse(fmt::format("weights has {} entries but there are {} residuals", weights, residuals_.size()));
+    refuse_to_solve(fmt::format("weights has {} entries but there are {} residuals", weights, residuals_.size()));
   }
   if (weights != 0 && !(problem.weights.allFinite() && problem.weights.minCoeff() >= 0.0)) {
-    refuse("weights must be finite and >= 0");
+    refuse_to_solve("weights must be finite and >= 0");
   }
   for (Eigen::Index i = 0; i < residuals_.size(); ++i) {
-    if (!std::isfinite(residuals_(i))) refuse(fmt::format("residual {} is {} at the start values", i, residuals_(i)));
+    if (!std::isfinite(residuals_(i)))
+      refuse_to_solve(fmt::format("residual {} is {} at the start values", i, residuals_(i)));
   }
   weighted_ = weighted(residuals_, values_);
 }
 
 Eigen::VectorXd Solver::weighted(const Eigen::VectorXd& residuals, const Eigen::VectorXd& values) const {
   const Eigen::Index n = residuals.size();
-  Eigen::VectorXd rows(n + static_cast<Eigen::Index>(prior_.size()));
+  Eigen::VectorXd rows(n + std::ssize(prior_));
   rows.head(n) = residuals;
   if (problem_.weights.size() != 0) rows.head(n).array() *= problem_.weights.array();
   for (std::size_t i = 0; i < prior_.size(); ++i) {
-    const Eigen::Index k = free_[static_cast<std::size_t>(prior_[i])];
-    const Parameter& parameter = problem_.parameters[static_cast<std::size_t>(k)];
+    const Eigen::Index k = free_[prior_[i]];
+    const Parameter& parameter = problem_.parameters[k];
     rows(n + static_cast<Eigen::Index>(i)) =
         (values(k) - parameter.prior_value.value_or(parameter.value)) / *parameter.prior_sigma;
   }
@@ -132,7 +99,8 @@ Eigen::VectorXd Solver::weighted(const Eigen::VectorXd& residuals, const Eigen::
 Eigen::VectorXd Solver::residuals_at(const Eigen::VectorXd& values) const {
   Eigen::VectorXd residuals = problem_.residual(values);
   if (residuals.size() != residuals_.size()) {
-    refuse(fmt::format("the residual function returned {} rows, then {}", residuals_.size(), residuals.size()));
+    refuse_to_solve(
+        fmt::format("the residual function returned {} rows, then {}", residuals_.size(), residuals.size()));
   }
   return residuals;
 }
@@ -140,11 +108,11 @@ Eigen::VectorXd Solver::residuals_at(const Eigen::VectorXd& values) const {
 Eigen::MatrixXd Solver::jacobian_at(const Eigen::VectorXd& values) const {
   const Eigen::MatrixXd all = evaluate_jacobian(problem_, values);
   if (all.rows() != residuals_.size() || all.cols() != start_.size()) {
-    refuse(fmt::format("the Jacobian is {} x {}, expected {} x {}", all.rows(), all.cols(), residuals_.size(),
-                       start_.size()));
+    refuse_to_solve(fmt::format("the Jacobian is {} x {}, expected {} x {}", all.rows(), all.cols(), residuals_.size(),
+                                start_.size()));
   }
-  Eigen::MatrixXd columns(all.rows(), static_cast<Eigen::Index>(free_.size()));
-  for (std::size_t i = 0; i < free_.size(); ++i) columns.col(static_cast<Eigen::Index>(i)) = all.col(free_[i]);
+  Eigen::MatrixXd columns(all.rows(), std::ssize(free_));
+  for (std::size_t i = 0; i < free_.size(); ++i) columns.col(i) = all.col(free_[i]);
   return columns;
 }
 
@@ -155,9 +123,8 @@ Linearisation Solver::linearise_here() {
   if (problem_.weights.size() != 0) matrix.topRows(n).array().colwise() *= problem_.weights.array();
   for (std::size_t i = 0; i < prior_.size(); ++i) {
     const Eigen::Index column = prior_[i];
-    const Eigen::Index k = free_[static_cast<std::size_t>(column)];
-    matrix(n + static_cast<Eigen::Index>(i), column) =
-        scales_(column) / *problem_.parameters[static_cast<std::size_t>(k)].prior_sigma;
+    const Eigen::Index k = free_[column];
+    matrix(n + static_cast<Eigen::Index>(i), column) = scales_(column) / *problem_.parameters[k].prior_sigma;
   }
   return linearise(matrix, weighted_, options_.rank_tolerance);
 }
@@ -242,7 +209,7 @@ bool Solver::advance(const Linearisation& linear) {
 void Solver::describe_uncertainty(const Linearisation& linear) {
   const Eigen::Index rank = linear.rank;
   std::vector<std::string> names;
-  for (const Eigen::Index k : free_) names.push_back(problem_.parameters[static_cast<std::size_t>(k)].name);
+  for (const Eigen::Index k : free_) names.push_back(problem_.parameters[k].name);
   result_.unidentifiable = null_combinations(linear, names, scales_);
   result_.singular_values = linear.singular_values;
   result_.rank = rank;
@@ -278,7 +245,7 @@ SolverResult Solver::run() {
     if (result_.dof > 0) result_.sigma = weighted_.norm() / std::sqrt(static_cast<double>(result_.dof));
   } else {
     jacobian_ = jacobian_at(values_);
-    if (!jacobian_.allFinite()) refuse("the Jacobian is not finite at the start values");
+    if (!jacobian_.allFinite()) refuse_to_solve("the Jacobian is not finite at the start values");
     Linearisation linear = linearise_here();
     while (!finished_at(linear) && advance(linear)) {
       Eigen::MatrixXd jacobian = jacobian_at(values_);
@@ -295,7 +262,7 @@ SolverResult Solver::run() {
   result_.residuals = residuals_;
   result_.standard_errors = result_.covariance.diagonal().cwiseSqrt();
   result_.parameters = problem_.parameters;
-  for (Eigen::Index k = 0; k < values_.size(); ++k) result_.parameters[static_cast<std::size_t>(k)].value = values_(k);
+  for (Eigen::Index k = 0; k < values_.size(); ++k) result_.parameters[k].value = values_(k);
   return std::move(result_);
 }
 

@@ -81,8 +81,7 @@ std::vector<Combination> null_combinations(const Linearisation& linear, const st
     for (Eigen::Index j = 0; j < k; ++j) {
       const double entry = rows(i, j) / largest;
       if (std::abs(entry) < null_entry_tolerance) continue;
-      combinations[static_cast<std::size_t>(i)].terms.push_back(
-          {names[static_cast<std::size_t>(j)], entry * scales(j)});
+      combinations[i].terms.push_back({names[j], entry * scales(j)});
     }
   }
   return combinations;

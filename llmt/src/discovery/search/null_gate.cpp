@@ -80,7 +80,7 @@ double quantile_beyond(const Scoring& scoring, const Draws& draws, double rate, 
   constexpr double seen = 0.1;
   std::vector<double> gains;
   for (Eigen::Index i = 0; i < draws.moments.cols(); ++i) gains.push_back(best_gain(scoring, draws, i, scanned));
-  const auto place = gains.begin() + static_cast<std::ptrdiff_t>((1.0 - seen) * static_cast<double>(gains.size()));
+  const auto place = gains.begin() + static_cast<Eigen::Index>((1.0 - seen) * static_cast<double>(gains.size()));
   std::ranges::nth_element(gains, place);
   return *place + 2.0 * std::log(seen / rate);
 }

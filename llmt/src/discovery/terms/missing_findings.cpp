@@ -24,7 +24,7 @@ FoundTerm described(const TermModel& model, const PlacedTerm& placed, const Eige
   found.term = placed.term;
   found.family = term.family;
   found.location = term.location;
-  found.output = model.outputs()[static_cast<std::size_t>(placed.output)];
+  found.output = model.outputs()[placed.output];
   found.output_index = placed.output;
   found.formula = term.formula;
   found.inputs = term.inputs;
@@ -128,8 +128,8 @@ void look_for_structure(const TermModel& model, const FitData& data, const Input
     const double explained = std::max(0.0, gap.squaredNorm() - left.squaredNorm());
     const double p_value = found.p_value * static_cast<double>(data.measured.cols());
     if (p_value > surprising || common < material * (common + explained)) continue;
-    Structure structure{model.outputs()[static_cast<std::size_t>(o)], {}, p_value, common / (common + explained)};
-    for (const Eigen::Index j : found.columns) structure.inputs.push_back(inputs.names[static_cast<std::size_t>(j)]);
+    Structure structure{model.outputs()[o], {}, p_value, common / (common + explained)};
+    for (const Eigen::Index j : found.columns) structure.inputs.push_back(inputs.names[j]);
     missing.structure.push_back(structure);
     for (FoundTerm& term : missing.found) term.confirmed = term.confirmed && term.output_index != o;
   }

@@ -31,7 +31,7 @@ void check(const Simulation& simulation, const Inputs& inputs, const MeasuredOut
   }
   for (Eigen::Index o = 0; o < measured.values.cols(); ++o) {
     if (!measured.values.col(o).allFinite()) {
-      refuse(fmt::format("a measured value of \"{}\" is not finite", measured.names[static_cast<std::size_t>(o)]));
+      refuse(fmt::format("a measured value of \"{}\" is not finite", measured.names[o]));
     }
   }
   if (!(options.held_out_share >= 0.0 && options.held_out_share <= 0.9)) {
@@ -95,7 +95,7 @@ Progress search_until_settled(const TermModel& model, FitData& data, const std::
     if (key_of(progress.fit.placed, progress.verdict.outliers) == before) break;
     if (data.sigma.size() > 1 && progress.rounds < options.rounds) data.sigma = scatter(model, kept, progress.fit);
   }
-  tell_trial_errors(model, without_samples(data, progress.verdict.outliers), progress.fit);
+  set_trial_errors(model, without_samples(data, progress.verdict.outliers), progress.fit);
   return progress;
 }
 
@@ -114,7 +114,7 @@ Simulation tabulated(const Eigen::MatrixXd& simulated, const std::vector<std::st
   }
   Simulation simulation;
   for (std::size_t o = 0; o < outputs.size(); ++o) {
-    const auto column = simulated.col(static_cast<Eigen::Index>(o));
+    const auto column = simulated.col(o);
     const double spread = column.size() > 0 ? column.maxCoeff() - column.minCoeff() : 0.0;
     simulation.parameters.push_back({.name = outputs[o] + ".offset",
                                      .unit = outputs[o],
@@ -146,14 +146,13 @@ Missing find_missing(const Simulation& simulation, const Inputs& inputs, const M
   const Eigen::Index d = measured.values.cols();
   FitData data{split.searched, measured.values(split.searched, Eigen::all), Eigen::VectorXd::Ones(d)};
   const auto free = std::ranges::count_if(simulation.parameters, &Parameter::free);
-  constexpr std::ptrdiff_t fewest = 10;
+  constexpr Eigen::Index fewest = 10;
   if (std::ssize(data.rows) * d < fewest + 2 * free) {
     refuse(fmt::format("{} rows to search beside {} set aside are too few: {} free parameters need {} measured values",
                        data.rows.size(), split.held_out.size(), free, fewest + 2 * free));
   }
   Eigen::VectorXd start(std::ssize(simulation.parameters));
-  for (std::size_t k = 0; k < simulation.parameters.size(); ++k)
-    start(static_cast<Eigen::Index>(k)) = simulation.parameters[k].value;
+  for (std::size_t k = 0; k < simulation.parameters.size(); ++k) start(k) = simulation.parameters[k].value;
   TermFit baseline = fit_terms(model, data, start, {});
   data.sigma = scatter(model, data, baseline);
   if (d > 1) baseline = fit_terms(model, data, start, {});
@@ -168,7 +167,7 @@ Missing find_missing(const Simulation& simulation, const Inputs& inputs, const M
   doubt_approximations(missing);
   missing.parameters = simulation.parameters;
   for (std::size_t k = 0; k < missing.parameters.size(); ++k) {
-    missing.parameters[k].value = progress.fit.parameters(static_cast<Eigen::Index>(k));
+    missing.parameters[k].value = progress.fit.parameters(k);
   }
   missing.standard_errors = progress.fit.parameter_errors;
   missing.searched = split.searched;
@@ -180,12 +179,10 @@ Missing find_missing(const Simulation& simulation, const Inputs& inputs, const M
   missing.before = model.predict(baseline.parameters, {});
   missing.corrected = model.predict(progress.fit.parameters, progress.fit.placed);
   look_for_structure(model, without_samples(data, progress.verdict.outliers), inputs, missing);
-  constexpr Eigen::Index enough_repeats = 12;
-  missing.floor_from_repeats = progress.verdict.lack_of_fit.dof >= enough_repeats;
+  missing.floor_from_repeats = progress.verdict.lack_of_fit.has_enough_repeats();
   const double noise = missing.floor_from_repeats ? progress.verdict.lack_of_fit.noise : progress.verdict.noise;
   for (Eigen::Index o = 0; o < d; ++o) {
-    missing.gaps.push_back({measured.names[static_cast<std::size_t>(o)],
-                            rms_at(measured.values.col(o) - missing.before.col(o), split.held_out),
+    missing.gaps.push_back({measured.names[o], rms_at(measured.values.col(o) - missing.before.col(o), split.held_out),
                             rms_at(measured.values.col(o) - missing.corrected.col(o), split.held_out),
                             noise * data.sigma(o)});
   }
@@ -198,8 +195,7 @@ Eigen::MatrixXd corrected(const Simulation& simulation, const Missing& missing, 
   for (const Gap& gap : missing.gaps) outputs.push_back(gap.output);
   const TermModel model(simulation, inputs, outputs, terms);
   Eigen::VectorXd values(std::ssize(missing.parameters));
-  for (std::size_t k = 0; k < missing.parameters.size(); ++k)
-    values(static_cast<Eigen::Index>(k)) = missing.parameters[k].value;
+  for (std::size_t k = 0; k < missing.parameters.size(); ++k) values(k) = missing.parameters[k].value;
   std::vector<PlacedTerm> placed;
   for (const FoundTerm& found : missing.found) {
     placed.push_back({found.term, found.output_index, found.constants, found.coefficients, 0.0});

@@ -41,13 +41,13 @@ Pairing nearest(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& errors) {
       const double distance = (points.col(i) - points.col(k)).squaredNorm();
       if (k == i || distance >= least) continue;
       least = distance;
-      neighbour[static_cast<std::size_t>(i)] = k;
+      neighbour[i] = k;
     }
   }
   Pairing pairing;
   for (Eigen::Index i = 0; i < n; ++i) {
-    const Eigen::Index k = neighbour[static_cast<std::size_t>(i)];
-    const bool mutual = neighbour[static_cast<std::size_t>(k)] == i;
+    const Eigen::Index k = neighbour[i];
+    const bool mutual = neighbour[k] == i;
     if (!mutual || i < k) pairing.add(errors(i), errors(k), 1.0);
   }
   return pairing;

@@ -31,7 +31,7 @@ bool constant_is_fitted(const ModelTerm& term) { return !term.constants.empty() 
 Layout layout_of(const TermModel& model, const FitData& data, const Eigen::VectorXd& start,
                  const std::vector<PlacedTerm>& placed, bool constants_are_free) {
   Layout layout{model.parameters(), model.parameters().size()};
-  for (std::size_t k = 0; k < layout.own; ++k) layout.parameters[k].value = start(static_cast<Eigen::Index>(k));
+  for (std::size_t k = 0; k < layout.own; ++k) layout.parameters[k].value = start(k);
   const Eigen::MatrixXd& simulated = model.simulated(start);
   for (std::size_t t = 0; t < placed.size(); ++t) {
     const ModelTerm& term = model.terms()[placed[t].term];
@@ -48,7 +48,7 @@ Layout layout_of(const TermModel& model, const FitData& data, const Eigen::Vecto
     for (std::size_t c = 0; c < term.constants.size(); ++c) {
       Parameter parameter;
       parameter.name = fmt::format("term{}.constant{}", t, c);
-      parameter.value = placed[t].constants(static_cast<Eigen::Index>(c));
+      parameter.value = placed[t].constants(c);
       parameter.scale = 0.1 * spacing(term.constants[c].tried, parameter.value);
       parameter.free = constants_are_free && constant_is_fitted(term);
       layout.parameters.push_back(std::move(parameter));
@@ -75,8 +75,8 @@ bool within_tried(const TermModel& model, const std::vector<PlacedTerm>& before,
     const ModelTerm& term = model.terms()[after[t].term];
     for (std::size_t c = 0; c < term.constants.size(); ++c) {
       const std::vector<double>& tried = term.constants[c].tried;
-      const double start = before[t].constants(static_cast<Eigen::Index>(c));
-      const double value = after[t].constants(static_cast<Eigen::Index>(c));
+      const double start = before[t].constants(c);
+      const double value = after[t].constants(c);
       constexpr double far = 5.0;  // steps
       const double step = spacing(tried, start);
       if (value < tried.front() - step || value > tried.back() + step || std::abs(value - start) > far * step)
@@ -142,7 +142,7 @@ std::string TermModel::label(const PlacedTerm& placed) const {
   const ModelTerm& term = (*terms_)[placed.term];
   std::string text = term.family;
   if (!term.location.empty()) text += " " + term.location;
-  if (outputs_.size() > 1) text += " on " + outputs_[static_cast<std::size_t>(placed.output)];
+  if (outputs_.size() > 1) text += " on " + outputs_[placed.output];
   return text;
 }
 
@@ -152,7 +152,7 @@ Eigen::VectorXd scaled_residuals(const TermModel& model, const FitData& data, co
   const Eigen::Index d = data.measured.cols();
   Eigen::VectorXd residuals(data.measured.size());
   for (Eigen::Index i = 0; i < data.measured.rows(); ++i) {
-    const Eigen::Index row = data.rows[static_cast<std::size_t>(i)];
+    const Eigen::Index row = data.rows[i];
     residuals.segment(i * d, d) = (data.measured.row(i) - predicted.row(row)).transpose().cwiseQuotient(data.sigma);
   }
   return residuals;
@@ -165,7 +165,7 @@ Eigen::MatrixXd baseline_jacobian(const TermModel& model, const FitData& data, c
   problem.residual = [&](const Eigen::VectorXd& values) { return scaled_residuals(model, data, values, placed); };
   std::vector<Eigen::Index> free;
   for (std::size_t k = 0; k < problem.parameters.size(); ++k) {
-    if (problem.parameters[k].free) free.push_back(static_cast<Eigen::Index>(k));
+    if (problem.parameters[k].free) free.push_back(k);
   }
   if (free.empty()) return Eigen::MatrixXd(data.measured.size(), 0);
   return -difference_jacobian(problem, parameters)(Eigen::all, free);
@@ -179,8 +179,7 @@ Eigen::MatrixXd stacked_signature(const TermModel& model, const FitData& data, c
   const Eigen::Index d = data.measured.cols();
   Eigen::MatrixXd signature = Eigen::MatrixXd::Zero(data.measured.size(), columns.cols());
   for (Eigen::Index i = 0; i < data.measured.rows(); ++i) {
-    signature.row(i * d + placed.output) =
-        columns.row(data.rows[static_cast<std::size_t>(i)]) / data.sigma(placed.output);
+    signature.row(i * d + placed.output) = columns.row(data.rows[i]) / data.sigma(placed.output);
   }
   return signature;
 }

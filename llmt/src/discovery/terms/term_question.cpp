@@ -16,11 +16,11 @@ std::vector<Eigen::Index> repeat_numbers(const Inputs& inputs) {
   for (Eigen::Index i = 0; i < inputs.values.rows(); ++i) {
     std::vector<double> setting;
     for (Eigen::Index j = 0; j < inputs.values.cols(); ++j) {
-      if (inputs.names[static_cast<std::size_t>(j)] != inputs.order) setting.push_back(inputs.values(i, j));
+      if (inputs.names[j] != inputs.order) setting.push_back(inputs.values(i, j));
     }
     // Without inputs beside the order nothing is a repeat.
     if (setting.empty()) setting.push_back(static_cast<double>(i));
-    repeats.push_back(numbers.try_emplace(std::move(setting), static_cast<Eigen::Index>(numbers.size())).first->second);
+    repeats.push_back(numbers.try_emplace(std::move(setting), std::ssize(numbers)).first->second);
   }
   return repeats;
 }
@@ -38,8 +38,7 @@ EffectCandidate candidate_of(const TermModel& model, const FitData& data, const 
   candidate.family = term.family;
   candidate.location = term.location;
   if (slot > 0) candidate.location += fmt::format("#{}", slot + 1);
-  if (model.outputs().size() > 1)
-    candidate.location += " on " + model.outputs()[static_cast<std::size_t>(option.output)];
+  if (model.outputs().size() > 1) candidate.location += " on " + model.outputs()[option.output];
   candidate.signature = stacked_signature(model, data, option, simulated);
   candidate.lower = term.lower;
   candidate.upper = term.upper;
@@ -85,22 +84,21 @@ RowSplit split_rows(const Inputs& inputs, const MissingOptions& options) {
   const std::vector<Eigen::Index> numbers = repeat_numbers(inputs);
   const Eigen::Index groups = numbers.empty() ? 0 : *std::ranges::max_element(numbers) + 1;
   Random random(options.seed);
-  const std::vector<std::ptrdiff_t> order = random.permutation(groups);
-  std::vector<std::ptrdiff_t> place(order.size());
-  for (std::size_t k = 0; k < order.size(); ++k)
-    place[static_cast<std::size_t>(order[k])] = static_cast<std::ptrdiff_t>(k);
-  const auto aside = static_cast<std::ptrdiff_t>(std::lround(options.held_out_share * static_cast<double>(groups)));
-  // Of very many rows only so many groups are searched.
+  const std::vector<Eigen::Index> order = random.permutation(groups);
+  std::vector<Eigen::Index> place(order.size());
+  for (std::size_t k = 0; k < order.size(); ++k) place[order[k]] = static_cast<Eigen::Index>(k);
+  const auto aside = static_cast<Eigen::Index>(std::lround(options.held_out_share * static_cast<double>(groups)));
+  // At most about `largest_sample` rows are searched, in whole groups of repeats.
   const double rows_of_a_group =
       static_cast<double>(numbers.size()) / static_cast<double>(std::max<Eigen::Index>(1, groups));
-  const auto last = aside + static_cast<std::ptrdiff_t>(static_cast<double>(options.largest_sample) / rows_of_a_group);
+  const auto last = aside + static_cast<Eigen::Index>(static_cast<double>(options.largest_sample) / rows_of_a_group);
   RowSplit split;
   for (std::size_t i = 0; i < numbers.size(); ++i) {
-    const std::ptrdiff_t p = place[static_cast<std::size_t>(numbers[i])];
+    const Eigen::Index p = place[numbers[i]];
     if (p < aside) {
-      split.held_out.push_back(static_cast<Eigen::Index>(i));
+      split.held_out.push_back(i);
     } else if (p < last) {
-      split.searched.push_back(static_cast<Eigen::Index>(i));
+      split.searched.push_back(i);
       split.repeats.push_back(numbers[i]);
     }
   }
@@ -110,10 +108,10 @@ RowSplit split_rows(const Inputs& inputs, const MissingOptions& options) {
 FitData without_samples(const FitData& data, const std::vector<std::size_t>& left_out) {
   std::vector<Eigen::Index> kept;
   for (std::size_t i = 0; i < data.rows.size(); ++i) {
-    if (std::ranges::find(left_out, i) == left_out.end()) kept.push_back(static_cast<Eigen::Index>(i));
+    if (std::ranges::find(left_out, i) == left_out.end()) kept.push_back(i);
   }
   FitData result{{}, data.measured(kept, Eigen::all), data.sigma};
-  for (const Eigen::Index i : kept) result.rows.push_back(data.rows[static_cast<std::size_t>(i)]);
+  for (const Eigen::Index i : kept) result.rows.push_back(data.rows[i]);
   return result;
 }
 
@@ -140,7 +138,7 @@ TermQuestion ask(const TermModel& model, const FitData& data, const TermFit& fit
   for (std::size_t t = 0; t < model.terms().size(); ++t) {
     const ModelTerm& term = model.terms()[t];
     for (Eigen::Index o = 0; o < d; ++o) {
-      if (!term.output.empty() && term.output != model.outputs()[static_cast<std::size_t>(o)]) continue;
+      if (!term.output.empty() && term.output != model.outputs()[o]) continue;
       std::vector<PlacedTerm> options;
       if (!term.constants.empty()) {
         options = best_constants(model, data, ground, t, o, simulated, fit.placed);
@@ -176,7 +174,7 @@ bool retry_constants(const TermModel& model, const FitData& data, TermFit& fit) 
   return changed;
 }
 
-void tell_trial_errors(const TermModel& model, const FitData& data, TermFit& fit) {
+void set_trial_errors(const TermModel& model, const FitData& data, TermFit& fit) {
   for (std::size_t t = 0; t < fit.placed.size(); ++t) {
     const PlacedTerm& placed = fit.placed[t];
     if (placed.constants.size() == 0 || model.terms()[placed.term].constants.front().smooth) continue;

@@ -35,6 +35,6 @@ TermQuestion ask(const TermModel& model, const FitData& data, const TermFit& fit
 bool retry_constants(const TermModel& model, const FitData& data, TermFit& fit);
 
 /// Errors of constants that are not smooth, see trial_error().
-void tell_trial_errors(const TermModel& model, const FitData& data, TermFit& fit);
+void set_trial_errors(const TermModel& model, const FitData& data, TermFit& fit);
 
 }  // namespace llmt::discovery

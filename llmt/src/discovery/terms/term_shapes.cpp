@@ -105,7 +105,7 @@ ModelTerm pair_shape(const InputView& a, const InputView& b) {
 ModelTerm bump_shape(const InputView& input, int parts) {
   const double width = input.range() / parts;
   // Fewer are rather outliers than a bump.
-  constexpr std::ptrdiff_t fewest = 5;
+  constexpr Eigen::Index fewest = 5;
   std::vector<double> centres;
   for (double c = input.low; c <= input.high; c += 0.25 * width) {
     const auto begin = std::ranges::upper_bound(input.distinct, c - 0.7 * width);
@@ -129,7 +129,7 @@ ModelTerm bump_shape(const InputView& input, int parts) {
 std::vector<Eigen::Index> rows_before(const Rows& rows) {
   std::vector<Eigen::Index> before(rows.sequence.size());
   for (std::size_t k = 0; k < rows.sequence.size(); ++k) {
-    before[static_cast<std::size_t>(rows.sequence[k])] = rows.sequence[k > 0 ? k - 1 : 0];
+    before[rows.sequence[k]] = rows.sequence[k > 0 ? k - 1 : 0];
   }
   return before;
 }
@@ -217,7 +217,7 @@ std::vector<ModelTerm> sequence_terms(const InputView& input, const std::string&
       [column](const Rows& rows, const std::vector<Eigen::Index>& before) {
         Eigen::MatrixXd rate = Eigen::MatrixXd::Zero(rows.inputs.rows(), 1);
         for (Eigen::Index i = 0; i < rate.rows(); ++i) {
-          const Eigen::Index k = before[static_cast<std::size_t>(i)];
+          const Eigen::Index k = before[i];
           if (k == i) continue;
           rate(i, 0) = (rows.inputs(i, column) - rows.inputs(k, column)) / (rows.instants(i) - rows.instants(k));
         }
@@ -227,7 +227,7 @@ std::vector<ModelTerm> sequence_terms(const InputView& input, const std::string&
                                 [column](const Rows& rows, const std::vector<Eigen::Index>& before) {
                                   Eigen::MatrixXd direction = Eigen::MatrixXd::Zero(rows.inputs.rows(), 1);
                                   for (const Eigen::Index i : rows.sequence) {
-                                    const Eigen::Index k = before[static_cast<std::size_t>(i)];
+                                    const Eigen::Index k = before[i];
                                     const double change = rows.inputs(i, column) - rows.inputs(k, column);
                                     direction(i, 0) = change > 0.0 ? 1.0 : change < 0.0 ? -1.0 : direction(k, 0);
                                   }

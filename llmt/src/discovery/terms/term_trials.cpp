@@ -95,8 +95,8 @@ double refined(Trials& trials, const TermConstant& constant, double value, doubl
 double spacing(const std::vector<double>& tried, double value) {
   if (tried.size() < 2) return std::max(1e-300, 0.01 * std::abs(value));
   const auto above = std::ranges::lower_bound(tried, value);
-  const auto k = std::clamp<std::ptrdiff_t>(above - tried.begin(), 1, std::ssize(tried) - 1);
-  return std::max(1e-300, tried[static_cast<std::size_t>(k)] - tried[static_cast<std::size_t>(k - 1)]);
+  const auto k = std::clamp<Eigen::Index>(above - tried.begin(), 1, std::ssize(tried) - 1);
+  return std::max(1e-300, tried[k] - tried[k - 1]);
 }
 
 double trial_error(const TermModel& model, const FitData& data, const TrialGround& ground, const PlacedTerm& placed,
@@ -106,11 +106,11 @@ double trial_error(const TermModel& model, const FitData& data, const TrialGroun
   const double value = placed.constants(0);
   const double best = trials.gain(value);
   const double variance = std::max(0.0, trials.sum_of_squares() - best) / static_cast<double>(data.rows.size());
-  const auto place = static_cast<std::ptrdiff_t>(std::ranges::lower_bound(tried, value) - tried.begin());
+  const auto place = static_cast<Eigen::Index>(std::ranges::lower_bound(tried, value) - tried.begin());
   double error = spacing(tried, value);
-  for (const std::ptrdiff_t direction : {-1, 1}) {
-    for (std::ptrdiff_t k = place; k >= 0 && k < std::ssize(tried); k += direction) {
-      const double other = tried[static_cast<std::size_t>(k)];
+  for (const Eigen::Index direction : {-1, 1}) {
+    for (Eigen::Index k = place; k >= 0 && k < std::ssize(tried); k += direction) {
+      const double other = tried[k];
       error = std::max(error, std::abs(other - value));
       if (best - trials.gain(other) > variance) break;
     }

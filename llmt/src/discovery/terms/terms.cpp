@@ -35,7 +35,7 @@ void check(const Inputs& inputs) {
   }
   for (Eigen::Index j = 0; j < inputs.values.cols(); ++j) {
     if (!inputs.values.col(j).allFinite()) {
-      refuse(fmt::format("the input \"{}\" has a value that is not finite", inputs.names[static_cast<std::size_t>(j)]));
+      refuse(fmt::format("the input \"{}\" has a value that is not finite", inputs.names[j]));
     }
   }
 }
@@ -43,11 +43,7 @@ void check(const Inputs& inputs) {
 bool is_angle(const std::string& name) { return name.ends_with("_deg") || name.ends_with("_rad"); }
 
 InputView view(const Inputs& inputs, Eigen::Index column) {
-  InputView own{.column = column,
-                .name = inputs.names[static_cast<std::size_t>(column)],
-                .low = 0.0,
-                .high = 0.0,
-                .distinct = {}};
+  InputView own{.column = column, .name = inputs.names[column], .low = 0.0, .high = 0.0, .distinct = {}};
   const auto values = inputs.values.col(column);
   own.distinct.assign(values.begin(), values.end());
   std::ranges::sort(own.distinct);
@@ -155,7 +151,7 @@ ModelTerm own_term(std::string name, std::string formula, std::function<double(c
           }};
 }
 
-std::vector<ModelTerm> standard_terms(const Inputs& inputs, std::vector<UntestableTerm>* untestable) {
+std::vector<ModelTerm> standard_terms(const Inputs& inputs, std::vector<UntestableCause>* untestable) {
   check(inputs);
   if (!inputs.order.empty()) order_column(inputs);
   std::vector<InputView> moving;

@@ -32,9 +32,11 @@ class BinnedRows {
   /// Gram matrix of all rows of a histogram.
   std::vector<double> total(const Histogram& histogram) const;
 
-  /// The best split of the rows of a histogram. Compares the edges between bins, then searches those bins exactly whose
-  /// bounds allow a better split, of at most `limit`, the most promising first, while they hold at most half of the
-  /// rows. `excess`: what a split in one of the other bins could gain on the result, at most.
+  /// The best split of the rows of a histogram (docs/algorithms/split-search.md, "Search by bins"). Compares the edges
+  /// between bins, then searches those bins exactly whose bound (S.1) allows a better split that can pass the F test,
+  /// the lowest bound first, while they hold at most half of the rows. `rows`: those of the histogram; `node_rss` and
+  /// `rank`: of the node's model. Sets `excess` to what a split inside one of the other bins could gain on the result,
+  /// at most.
   SplitCandidate search(const Histogram& histogram, const std::vector<int>& rows, double node_rss, int rank,
                         double& excess) const;
 
@@ -45,7 +47,7 @@ class BinnedRows {
   bool goes_left(int row, const SplitCandidate& split) const;
 
  private:
-  /// What the edges of one input's bins have told, and what is needed to look into the bins.
+  /// Splits at the edges between the bins of one input, and what the search inside the bins starts from.
   struct Edges {
     SplitCandidate best;
     std::vector<Eigen::Index> bins;  // those with rows
@@ -57,10 +59,33 @@ class BinnedRows {
     std::vector<double> bounds;  // of splits inside each bin; infinity if there are none
   };
 
+  /// A bin that may hold a better split inside.
+  struct PromisingBin {
+    double bound;
+    std::size_t input;
+    std::size_t position;  // among the bins with rows
+  };
+
+  struct ChosenBins {
+    std::vector<std::vector<std::size_t>> of_input;  // positions among the bins with rows
+    Eigen::Index rows;                               // number of rows in the chosen bins and the first one left out
+    double first_bound_left_out;                     // infinity if no bin was left out
+  };
+
   const Features& features() const { return whitened_.features(); }
   std::span<const double> grams(const Histogram& histogram, std::size_t input) const;
   std::span<const Eigen::Index> counts(const Histogram& histogram, std::size_t input) const;
   Edges search_edges(const Histogram& histogram, std::size_t input, double node_rss) const;
+  SplitCandidate best_edge(const Edges& edges, std::span<const Eigen::Index> rows, const std::vector<int>& rank_left,
+                           const std::vector<int>& rank_right, std::size_t input, double node_rss) const;
+  std::vector<double> bounds_of_bins(const Edges& edges, std::span<const Eigen::Index> rows, std::size_t input) const;
+  std::vector<std::vector<int>> rows_in_bins(const Edges& edges, const std::vector<std::size_t>& chosen,
+                                             std::size_t input, const std::vector<int>& rows) const;
+  static std::vector<PromisingBin> promising_bins(const std::vector<Edges>& edges, double largest);
+  static ChosenBins choose_bins(const std::vector<PromisingBin>& promising, const std::vector<Edges>& edges,
+                                Eigen::Index rows);
+  static SplitCandidate best_of(const std::vector<Edges>& edges, const std::vector<SplitCandidate>& inside,
+                                double node_rss);
   SplitCandidate look_into(const Edges& edges, const std::vector<std::size_t>& chosen, std::size_t input,
                            const std::vector<int>& rows, double node_rss, double limit) const;
 

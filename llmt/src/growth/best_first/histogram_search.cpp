@@ -10,8 +10,35 @@ namespace {
 
 constexpr double none = std::numeric_limits<double>::infinity();
 
-// Looking into bins costs several times per row what the histogram costs: they may hold this part of the rows.
+// Searching bins exactly costs several times per row what the histogram costs. They may hold this part of the rows: one
+// in so many.
 constexpr Eigen::Index searched_part = 2;
+
+// Sums over the bins on one side of every edge, and the models that follow from them.
+struct SideOfEdges {
+  std::vector<double> grams;
+  std::vector<double> rss;
+  std::vector<int> rank;
+};
+
+// `grams`: of all bins of an input; `bins`: those that have rows. Sums are formed from the outermost bin inwards.
+SideOfEdges sum_side(const GramShape& shape, const Eigen::VectorXd& output_weights, std::span<const double> grams,
+                     const std::vector<Eigen::Index>& bins, bool from_left) {
+  const Eigen::Index size = shape.size();
+  const Eigen::Index count = std::max<Eigen::Index>(0, std::ssize(bins) - 1);
+  SideOfEdges side{std::vector<double>(count * size, 0.0), std::vector<double>(count), std::vector<int>(count)};
+  std::vector<const double*> at(count);
+  const double* before = nullptr;
+  for (Eigen::Index step = 0; step < count; ++step) {
+    const Eigen::Index edge = from_left ? step : count - 1 - step;
+    double* const gram = side.grams.data() + edge * size;
+    if (before != nullptr) std::copy(before, before + size, gram);
+    add(shape, grams.data() + bins[from_left ? edge : edge + 1] * size, gram);
+    before = at[edge] = gram;
+  }
+  ResidualSums(shape, output_weights).evaluate(at.data(), count, side.rss.data(), side.rank.data());
+  return side;
+}
 
 }  // namespace
 
@@ -19,7 +46,6 @@ BinnedRows::Edges BinnedRows::search_edges(const Histogram& histogram, std::size
   const std::span<const double> of_bin = grams(histogram, input);
   const std::span<const Eigen::Index> rows = counts(histogram, input);
   const Eigen::Index smallest_leaf = data_.problem.options.min_leaf_samples;
-  const Eigen::Index size = shape_.size();
   Edges edges;
   if (data_.num_levels[input] > 0) {
     edges.best = search_level_grams(shape_, data_.output_weights, node_rss, 0.0, of_bin, rows, smallest_leaf);
@@ -33,40 +59,27 @@ BinnedRows::Edges BinnedRows::search_edges(const Histogram& histogram, std::size
       all += rows[bin];
     }
   }
-  const Eigen::Index count = std::max<Eigen::Index>(0, std::ssize(edges.bins) - 1);
-  const auto sums = [&](bool from_left, std::vector<double>& side, std::vector<double>& rss, std::vector<int>& rank) {
-    side.assign(count * size, 0.0);
-    rss.resize(count);
-    rank.resize(count);
-    std::vector<const double*> at(count);
-    const double* before = nullptr;
-    for (Eigen::Index step = 0; step < count; ++step) {
-      const Eigen::Index edge = from_left ? step : count - 1 - step;
-      double* const gram = side.data() + edge * size;
-      if (before != nullptr) {
-        std::copy(before, before + size, gram);
-      }
-      add(shape_, of_bin.data() + edges.bins[from_left ? edge : edge + 1] * size, gram);
-      before = at[edge] = gram;
-    }
-    ResidualSums(shape_, data_.output_weights).evaluate(at.data(), count, rss.data(), rank.data());
-  };
-  std::vector<int> rank_left;
-  std::vector<int> rank_right;
-  sums(true, edges.grams_left, edges.rss_left, rank_left);
-  sums(false, edges.grams_right, edges.rss_right, rank_right);
-  SplitCandidate& best = edges.best;
-  edges.bounds.assign(edges.bins.size(), none);
-  for (std::size_t k = 0; k < edges.bins.size(); ++k) {
-    const std::size_t bin = edges.bins[k];
-    const Eigen::Index before = edges.rows_before[k];
-    const Eigen::Index left = before + rows[bin];
-    const bool last = static_cast<Eigen::Index>(k) == count;
-    if (inputs_.bins[input].splittable[bin] &&
-        std::max(before + 1, smallest_leaf) <= std::min(left - 1, all - smallest_leaf)) {
-      edges.bounds[k] = (k > 0 ? edges.rss_left[k - 1] : 0.0) + (last ? 0.0 : edges.rss_right[k]);
-    }
-    if (last || left < smallest_leaf || all - left < smallest_leaf) continue;
+  SideOfEdges left = sum_side(shape_, data_.output_weights, of_bin, edges.bins, true);
+  SideOfEdges right = sum_side(shape_, data_.output_weights, of_bin, edges.bins, false);
+  edges.grams_left = std::move(left.grams);
+  edges.grams_right = std::move(right.grams);
+  edges.rss_left = std::move(left.rss);
+  edges.rss_right = std::move(right.rss);
+  edges.best = best_edge(edges, rows, left.rank, right.rank, input, node_rss);
+  edges.bounds = bounds_of_bins(edges, rows, input);
+  return edges;
+}
+
+// The best split at an edge between two bins.
+SplitCandidate BinnedRows::best_edge(const Edges& edges, std::span<const Eigen::Index> rows,
+                                     const std::vector<int>& rank_left, const std::vector<int>& rank_right,
+                                     std::size_t input, double node_rss) const {
+  const Eigen::Index smallest_leaf = data_.problem.options.min_leaf_samples;
+  const Eigen::Index all = edges.bins.empty() ? 0 : edges.rows_before.back() + rows[edges.bins.back()];
+  SplitCandidate best;
+  for (std::size_t k = 0; k + 1 < edges.bins.size(); ++k) {
+    const Eigen::Index left = edges.rows_before[k + 1];
+    if (left < smallest_leaf || all - left < smallest_leaf) continue;
     const double rss = edges.rss_left[k] + edges.rss_right[k];
     ++best.tested;
     if (best.input < 0 || rss < best.rss - tie_tolerance * node_rss) {
@@ -75,27 +88,52 @@ BinnedRows::Edges BinnedRows::search_edges(const Histogram& histogram, std::size
       best.rss = rss;
       best.rank_left = rank_left[k];
       best.rank_right = rank_right[k];
-      best.bin = static_cast<int>(bin);
+      best.bin = static_cast<int>(edges.bins[k]);
       best.last_left = none;
     }
   }
   best.evaluations = best.tested;
-  return edges;
+  return best;
 }
 
-// Exact search in the chosen bins of an input, given by their positions among those with rows.
-SplitCandidate BinnedRows::look_into(const Edges& edges, const std::vector<std::size_t>& chosen, std::size_t input,
-                                     const std::vector<int>& rows, double node_rss, double limit) const {
+// The bound (docs/algorithms/split-search.md, S.1) of the splits inside each bin that has rows; infinity if a bin has
+// no admissible split inside.
+std::vector<double> BinnedRows::bounds_of_bins(const Edges& edges, std::span<const Eigen::Index> rows,
+                                               std::size_t input) const {
+  const Eigen::Index smallest_leaf = data_.problem.options.min_leaf_samples;
+  const std::size_t count = edges.bins.size();
+  const Eigen::Index all = count == 0 ? 0 : edges.rows_before.back() + rows[edges.bins.back()];
+  std::vector<double> bounds(count, none);
+  for (std::size_t k = 0; k < count; ++k) {
+    const Eigen::Index before = edges.rows_before[k];
+    const Eigen::Index after = before + rows[edges.bins[k]];
+    const Eigen::Index first = std::max(before + 1, smallest_leaf);
+    const Eigen::Index last = std::min(after - 1, all - smallest_leaf);
+    if (inputs_.bins[input].splittable[edges.bins[k]] && first <= last) {
+      bounds[k] = (k > 0 ? edges.rss_left[k - 1] : 0.0) + (k + 1 < count ? edges.rss_right[k] : 0.0);
+    }
+  }
+  return bounds;
+}
+
+// The chosen bins of an input, given by their positions among those with rows: the rows in each.
+std::vector<std::vector<int>> BinnedRows::rows_in_bins(const Edges& edges, const std::vector<std::size_t>& chosen,
+                                                       std::size_t input, const std::vector<int>& rows) const {
   std::vector<int> slot_of_bin(most_bins, -1);
   for (std::size_t k = 0; k < chosen.size(); ++k) {
     slot_of_bin[edges.bins[chosen[k]]] = static_cast<int>(k);
   }
   std::vector<std::vector<int>> held(chosen.size());
   for (const int row : rows) {
-    if (const int slot = slot_of_bin[inputs_.code(row, input)]; slot >= 0) {
-      held[slot].push_back(row);
-    }
+    if (const int slot = slot_of_bin[inputs_.code(row, input)]; slot >= 0) held[slot].push_back(row);
   }
+  return held;
+}
+
+// Exact search in the chosen bins of an input, given by their positions among those with rows.
+SplitCandidate BinnedRows::look_into(const Edges& edges, const std::vector<std::size_t>& chosen, std::size_t input,
+                                     const std::vector<int>& rows, double node_rss, double limit) const {
+  const std::vector<std::vector<int>> held = rows_in_bins(edges, chosen, input, rows);
   const std::vector<double> nothing(shape_.size(), 0.0);
   SplitCandidate best;
   for (std::size_t k = 0; k < chosen.size(); ++k) {
@@ -112,14 +150,12 @@ SplitCandidate BinnedRows::look_into(const Edges& edges, const std::vector<std::
       values.push_back(value);
       order.push_back(row);
     }
-    const InputSearch::Beyond front{
-        edges.rows_before[at],
-        at > 0 ? edges.grams_left.data() + static_cast<Eigen::Index>(at - 1) * shape_.size() : nothing.data(),
-        at > 0 ? edges.rss_left[at - 1] : 0.0};
-    const InputSearch::Beyond behind{
-        std::ssize(rows) - front.rows - std::ssize(order),
-        last ? nothing.data() : edges.grams_right.data() + static_cast<Eigen::Index>(at) * shape_.size(),
-        last ? 0.0 : edges.rss_right[at]};
+    const InputSearch::Beyond front{edges.rows_before[at],
+                                    at > 0 ? edges.grams_left.data() + (at - 1) * shape_.size() : nothing.data(),
+                                    at > 0 ? edges.rss_left[at - 1] : 0.0};
+    const InputSearch::Beyond behind{std::ssize(rows) - front.rows - std::ssize(order),
+                                     last ? nothing.data() : edges.grams_right.data() + at * shape_.size(),
+                                     last ? 0.0 : edges.rss_right[at]};
     InputSearch search({features(), data_.output_weights, node_rss}, values, order,
                        data_.problem.options.min_leaf_samples, front, behind);
     search.refine(limit);
@@ -138,68 +174,48 @@ SplitCandidate BinnedRows::look_into(const Edges& edges, const std::vector<std::
   return best;
 }
 
-SplitCandidate BinnedRows::search(const Histogram& histogram, const std::vector<int>& rows, double node_rss, int rank,
-                                  double& excess) const {
-  const std::size_t inputs = inputs_.bins.size();
-  const int threads = data_.threads_for(num_bins() * shape_.size() / 4);
-  std::vector<Edges> edges(inputs);
-  parallel_for(std::ssize(edges), threads, [&](Eigen::Index j) {
-    edges[static_cast<std::size_t>(j)] = search_edges(histogram, static_cast<std::size_t>(j), node_rss);
-  });
-  double smallest = none;
-  for (const Edges& input : edges) {
-    smallest = input.best.input >= 0 || !input.best.level_side.empty() ? std::min(smallest, input.best.rss) : smallest;
-  }
-  Eigen::Index compared = 0;
-  for (const Edges& input : edges) {
-    compared += input.best.tested;
-  }
-  const double limit = data_.significant_rss(total(histogram)[0], rank, node_rss, compared);
-  smallest = std::min(smallest, limit);
-  // Bins that may hold a better split, the lowest bound first.
-  struct Bin {
-    double bound;
-    std::size_t input;
-    std::size_t position;
-  };
-  std::vector<Bin> promising;
-  const double tolerance = 2.0 * tie_tolerance * node_rss;
-  for (std::size_t j = 0; j < inputs; ++j) {
+// Bins whose bound allows a split of at most `largest`, the lowest bound first.
+std::vector<BinnedRows::PromisingBin> BinnedRows::promising_bins(const std::vector<Edges>& edges, double largest) {
+  std::vector<PromisingBin> promising;
+  for (std::size_t j = 0; j < edges.size(); ++j) {
     for (std::size_t k = 0; k < edges[j].bounds.size(); ++k) {
-      if (edges[j].bounds[k] <= smallest + tolerance) {
-        promising.push_back({edges[j].bounds[k], j, k});
-      }
+      if (edges[j].bounds[k] <= largest) promising.push_back({edges[j].bounds[k], j, k});
     }
   }
-  std::ranges::stable_sort(promising, [](const Bin& a, const Bin& b) { return a.bound < b.bound; });
-  std::vector<std::vector<std::size_t>> chosen(inputs);
-  Eigen::Index searched = 0;
-  std::size_t next = 0;
-  for (; next < promising.size(); ++next) {
-    const Edges& of_input = edges[promising[next].input];
-    const std::size_t position = promising[next].position;
-    const Eigen::Index end =
-        position + 1 < of_input.bins.size() ? of_input.rows_before[position + 1] : std::ssize(rows);
-    searched += end - of_input.rows_before[position];
-    if (searched > std::ssize(rows) / searched_part && next > 1) break;
-    chosen[promising[next].input].push_back(position);
-  }
-  std::vector<SplitCandidate> inside(inputs);
-  parallel_for(std::ssize(inside), data_.threads_for(searched * 8), [&](Eigen::Index j) {
-    const std::size_t input = j;
-    if (!chosen[input].empty()) {
-      inside[input] = look_into(edges[input], chosen[input], input, rows, node_rss, smallest);
+  std::ranges::stable_sort(promising, {}, &PromisingBin::bound);
+  return promising;
+}
+
+// The first promising bins, as many as hold at most half of the rows, but two at least.
+BinnedRows::ChosenBins BinnedRows::choose_bins(const std::vector<PromisingBin>& promising,
+                                               const std::vector<Edges>& edges, Eigen::Index rows) {
+  ChosenBins chosen{std::vector<std::vector<std::size_t>>(edges.size()), 0, none};
+  for (std::size_t next = 0; next < promising.size(); ++next) {
+    const auto& [bound, input, position] = promising[next];
+    const std::vector<Eigen::Index>& rows_before = edges[input].rows_before;
+    const Eigen::Index end = position + 1 < rows_before.size() ? rows_before[position + 1] : rows;
+    chosen.rows += end - rows_before[position];
+    if (chosen.rows > rows / searched_part && next > 1) {
+      chosen.first_bound_left_out = bound;
+      break;
     }
-  });
+    chosen.of_input[input].push_back(position);
+  }
+  return chosen;
+}
+
+// The best of the splits at edges and inside bins. Of equally good ones the first input wins, then the smaller
+// threshold.
+SplitCandidate BinnedRows::best_of(const std::vector<Edges>& edges, const std::vector<SplitCandidate>& inside,
+                                   double node_rss) {
   SplitCandidate best;
   Eigen::Index tested = 0;
   Eigen::Index evaluations = 0;
-  for (std::size_t j = 0; j < inputs; ++j) {
-    for (SplitCandidate* candidate : {&edges[j].best, &inside[j]}) {
+  for (std::size_t j = 0; j < edges.size(); ++j) {
+    for (const SplitCandidate* candidate : {&edges[j].best, &inside[j]}) {
       tested += candidate->tested;
       evaluations += candidate->evaluations;
       const bool is_better = best.input < 0 || candidate->rss < best.rss - tie_tolerance * node_rss;
-      // Equally good on the same input: the smaller threshold.
       const bool is_before = best.input == static_cast<int>(j) && candidate->left < best.left &&
                              candidate->rss <= best.rss + tie_tolerance * node_rss;
       if (candidate->input >= 0 && (is_better || is_before)) {
@@ -210,9 +226,31 @@ SplitCandidate BinnedRows::search(const Histogram& histogram, const std::vector<
   }
   best.tested = tested;
   best.evaluations = evaluations;
-  excess = best.input >= 0 && best.rss <= limit && next < promising.size()
-               ? std::max(0.0, best.rss - promising[next].bound)
-               : 0.0;
+  return best;
+}
+
+SplitCandidate BinnedRows::search(const Histogram& histogram, const std::vector<int>& rows, double node_rss, int rank,
+                                  double& excess) const {
+  std::vector<Edges> edges(inputs_.bins.size());
+  parallel_for(std::ssize(edges), data_.threads_for(num_bins() * shape_.size() / 4),
+               [&](Eigen::Index j) { edges[j] = search_edges(histogram, j, node_rss); });
+  double smallest = none;
+  Eigen::Index compared = 0;
+  for (const Edges& input : edges) {
+    if (input.best.input >= 0 || !input.best.level_side.empty()) smallest = std::min(smallest, input.best.rss);
+    compared += input.best.tested;
+  }
+  const double limit = data_.significant_rss(total(histogram)[0], rank, node_rss, compared);
+  smallest = std::min(smallest, limit);
+  const ChosenBins chosen =
+      choose_bins(promising_bins(edges, smallest + 2.0 * tie_tolerance * node_rss), edges, std::ssize(rows));
+  std::vector<SplitCandidate> inside(edges.size());
+  parallel_for(std::ssize(inside), data_.threads_for(chosen.rows * 8), [&](Eigen::Index j) {
+    if (!chosen.of_input[j].empty()) inside[j] = look_into(edges[j], chosen.of_input[j], j, rows, node_rss, smallest);
+  });
+  const SplitCandidate best = best_of(edges, inside, node_rss);
+  const bool is_found = best.input >= 0 && best.rss <= limit;
+  excess = is_found ? std::max(0.0, best.rss - chosen.first_bound_left_out) : 0.0;
   return best;
 }
 

@@ -15,15 +15,15 @@ constexpr Eigen::Index ahead = 12;
 
 }  // namespace
 
-SignLeaf SignLeaves::root() const {
-  SignLeaf leaf{whitened_root(data_), {}, {}, {}};
+ResidualLeaf ResidualLeaves::root() const {
+  ResidualLeaf leaf{whitened_root(data_), {}, {}, {}};
   leaf.values = data_.training.table->inputs(data_.training.rows, data_.problem.options.split_inputs);
   leaf.gram = sum_gram(rows_.features(), leaf.rows, data_.problem.max_threads);
   return leaf;
 }
 
 // What the node's model leaves, times the root of the row's weight: only signs count.
-Eigen::MatrixXd SignLeaves::residuals(const SignLeaf& leaf, const Node& node, int threads) const {
+Eigen::MatrixXd ResidualLeaves::residuals(const ResidualLeaf& leaf, const Node& node, int threads) const {
   const Features& features = rows_.features();
   const Eigen::Index count = std::ssize(leaf.rows);
   const Eigen::Index coefficients = features.coefficients();
@@ -48,7 +48,7 @@ Eigen::MatrixXd SignLeaves::residuals(const SignLeaf& leaf, const Node& node, in
   return result;
 }
 
-SplitCandidate SignLeaves::search_categories(const SignLeaf& leaf, Eigen::Index j, double node_rss) const {
+SplitCandidate ResidualLeaves::search_categories(const ResidualLeaf& leaf, Eigen::Index j, double node_rss) const {
   const GramShape shape(rows_.features());
   std::vector<std::vector<int>> of_level(data_.num_levels[j]);
   for (std::size_t k = 0; k < leaf.rows.size(); ++k) {
@@ -64,7 +64,7 @@ SplitCandidate SignLeaves::search_categories(const SignLeaf& leaf, Eigen::Index 
                             data_.problem.options.min_leaf_samples);
 }
 
-SplitCandidate SignLeaves::examine(SignLeaf& leaf, const Node& parent, Node& node) {
+SplitCandidate ResidualLeaves::examine(ResidualLeaf& leaf, const Node& parent, Node& node) {
   const int threads = data_.threads_for(std::ssize(leaf.rows) * data_.split_inputs());
   fit_whitened(data_, rows_, leaf.gram, parent, leaf, node);
   if (refreshed(data_, rows_, leaf.gram, node, leaf)) {
@@ -76,8 +76,8 @@ SplitCandidate SignLeaves::examine(SignLeaf& leaf, const Node& parent, Node& nod
   const Eigen::MatrixXd left_over = residuals(leaf, node, threads);
   const Eigen::VectorXd weights = data_.weights(leaf.rows);
   const SearchNode search{rows_.features(), data_.output_weights, rss};
-  SignSplit numeric =
-      search_by_signs(data_, {search, node.rank, leaf.rows, leaf.values, left_over, weights, leaf.gram, threads});
+  ResidualSplit numeric =
+      search_by_residuals(data_, {search, node.rank, leaf.rows, leaf.values, left_over, weights, leaf.gram, threads});
   std::vector<SplitCandidate> found(data_.num_levels.size());
   parallel_for(std::ssize(found), threads, [&](Eigen::Index j) {
     if (data_.num_levels[j] > 0) {
@@ -94,8 +94,8 @@ SplitCandidate SignLeaves::examine(SignLeaf& leaf, const Node& parent, Node& nod
   return best;
 }
 
-std::array<SignLeaf, 2> SignLeaves::divide(SignLeaf& leaf, const SplitCandidate& split) const {
-  std::array<SignLeaf, 2> children;
+std::array<ResidualLeaf, 2> ResidualLeaves::divide(ResidualLeaf& leaf, const SplitCandidate& split) const {
+  std::array<ResidualLeaf, 2> children;
   std::array<std::vector<int>, 2> positions;
   for (std::size_t k = 0; k < leaf.rows.size(); ++k) {
     const double value = leaf.values(k, split.input);
@@ -115,8 +115,8 @@ std::array<SignLeaf, 2> SignLeaves::divide(SignLeaf& leaf, const SplitCandidate&
   return children;
 }
 
-double SignLeaves::threshold(const SignLeaf& leaf, const SplitCandidate& split, const Node& node, const Node& left,
-                             const Node& right) const {
+double ResidualLeaves::threshold(const ResidualLeaf& leaf, const SplitCandidate& split, const Node& node,
+                                 const Node& left, const Node& right) const {
   double low = -std::numeric_limits<double>::infinity();
   double high = -low;
   for (const double value : leaf.values.col(split.input)) {

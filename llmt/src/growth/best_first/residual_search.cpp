@@ -30,7 +30,7 @@ struct Cut {
 };
 
 // (m+ + m-) / 2 on a grid of the node's range.
-double threshold_of(const SignStatistics& statistics) {
+double threshold_of(const ResidualStatistics& statistics) {
   const double range = statistics.high - statistics.low;
   const double middle =
       statistics.positive_mean + 0.5 * (statistics.negative_mean - statistics.positive_mean) - statistics.low;
@@ -50,7 +50,7 @@ std::size_t next_candidate(const std::vector<Cut>& candidates) {
 }
 
 // Fills in the sums of squares of the two child models.
-void evaluate(const SignNode& node, SignSplit& split) {
+void evaluate(const ResidualNode& node, ResidualSplit& split) {
   const Features& features = node.search.features;
   const GramShape shape(features);
   const std::size_t small = split.sides[0].size() <= split.sides[1].size() ? 0 : 1;
@@ -97,23 +97,24 @@ std::vector<double> sum_gram(const Features& features, std::span<const int> rows
   return std::move(sums[0]);
 }
 
-SignSplit search_by_signs(const GrowthData& data, const SignNode& node) {
+ResidualSplit search_by_residuals(const GrowthData& data, const ResidualNode& node) {
   const Eigen::Index inputs = data.split_inputs();
   const Eigen::Index outputs = node.residuals.cols();
   const Eigen::Index count = std::ssize(node.rows);
   const Eigen::Index smallest_leaf = data.problem.options.min_leaf_samples;
   const auto values_of = [&](Eigen::Index j) { return std::span(node.values.col(j).data(), count); };
-  std::vector<SignStatistics> statistics(inputs * outputs);
+  std::vector<ResidualStatistics> statistics(inputs * outputs);
   parallel_for(inputs * outputs, node.threads, [&](Eigen::Index k) {
     if (data.num_levels[k / outputs] == 0) {
-      statistics[k] = sign_statistics(values_of(k / outputs), std::span(node.residuals.col(k % outputs).data(), count),
-                                      std::span(node.weights.data(), count));
+      statistics[k] =
+          residual_statistics(values_of(k / outputs), std::span(node.residuals.col(k % outputs).data(), count),
+                              std::span(node.weights.data(), count));
     }
   });
   std::vector<Cut> candidates;
   for (Eigen::Index j = 0; j < inputs; ++j) {
     for (Eigen::Index o = 0; o < outputs; ++o) {
-      const SignStatistics& each = statistics[j * outputs + o];
+      const ResidualStatistics& each = statistics[j * outputs + o];
       if (each.deviate() > 0.0) {
         candidates.push_back({j, threshold_of(each), each.deviate()});
       }
@@ -125,13 +126,13 @@ SignSplit search_by_signs(const GrowthData& data, const SignNode& node) {
     return split.input >= 0 && data.is_significant(level, node.weights.sum(), node.rank, node.search.rss,
                                                    {split.rank_left, split.rank_right}, split.rss, tested);
   };
-  SignSplit best;
+  ResidualSplit best;
   Eigen::Index evaluations = 0;
   while (!candidates.empty() && !passes(best.best)) {
     const std::size_t next = next_candidate(candidates);
     const Cut candidate = candidates[next];
     candidates.erase(candidates.begin() + static_cast<Eigen::Index>(next));
-    SignSplit split;
+    ResidualSplit split;
     const std::span<const double> values = values_of(candidate.input);
     for (std::size_t i = 0; i < values.size(); ++i) {
       if (!std::isnan(values[i])) {

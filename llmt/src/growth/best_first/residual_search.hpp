@@ -12,7 +12,7 @@
 namespace llmt {
 
 /// How an input differs between the rows with residual >= 0 and those with residual < 0.
-struct SignStatistics {
+struct ResidualStatistics {
   double positive_mean = 0.0;  ///< m+, weighted, over the rows that have a value
   double negative_mean = 0.0;  ///< m-
   /// Student's statistic of m+ - m-, with the pooled variance:
@@ -30,11 +30,11 @@ struct SignStatistics {
 };
 
 /// `values`: of the input, NaN where missing. Weights are positive.
-SignStatistics sign_statistics(std::span<const double> values, std::span<const double> residuals,
-                               std::span<const double> weights);
+ResidualStatistics residual_statistics(std::span<const double> values, std::span<const double> residuals,
+                                       std::span<const double> weights);
 
 /// Rows of a node, in features whose residuals are those of a model that need not be the node's own.
-struct SignNode {
+struct ResidualNode {
   SearchNode search;                 ///< features and the node's residual sum of squares
   int rank;                          ///< of the node's model
   std::span<const int> rows;         ///< of the features
@@ -46,7 +46,7 @@ struct SignNode {
 };
 
 /// What was found. `best.last_left` is the threshold: values up to it go left.
-struct SignSplit {
+struct ResidualSplit {
   SplitCandidate best;
   std::array<std::vector<int>, 2> sides;     ///< positions among the node's rows of those that go left and right
   std::array<std::vector<double>, 2> grams;  ///< and their Gram matrices
@@ -57,7 +57,7 @@ struct SignSplit {
 /// signs that depend on neither of them alone - the next one; if none passes, that with the smallest sum of squares.
 /// Equally significant to nine digits: the first input. `best.tested` counts the inputs and outputs that could be
 /// tested. One pass over the values of each input, another one and one over the features for each split that is tried.
-SignSplit search_by_signs(const GrowthData& data, const SignNode& node);
+ResidualSplit search_by_residuals(const GrowthData& data, const ResidualNode& node);
 
 /// Gram matrix of some rows of features, in partial sums whose number does not depend on that of threads.
 std::vector<double> sum_gram(const Features& features, std::span<const int> rows, int threads);

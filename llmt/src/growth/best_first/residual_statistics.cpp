@@ -78,16 +78,16 @@ ClassSums distances_from(const double* values, const double* residuals, const do
 
 }  // namespace
 
-double SignStatistics::deviate() const {
+double ResidualStatistics::deviate() const {
   const double t = std::max(std::abs(means), std::abs(variances));
   return freedom > 0.0
              ? (8.0 * freedom + 1.0) / (8.0 * freedom + 3.0) * std::sqrt(freedom * std::log1p(t * t / freedom))
              : 0.0;
 }
 
-SignStatistics sign_statistics(std::span<const double> values, std::span<const double> residuals,
-                               std::span<const double> weights) {
-  SignStatistics result;
+ResidualStatistics residual_statistics(std::span<const double> values, std::span<const double> residuals,
+                                       std::span<const double> weights) {
+  ResidualStatistics result;
   result.low = std::numeric_limits<double>::infinity();
   result.high = -result.low;
   for (const double value : values) {

@@ -2,8 +2,8 @@
 /// HILOMOT, the hierarchical local model tree of Nelles (2006): oblique splits with logistic gates.
 #pragma once
 
-#include "growth/best_first/best_first.hpp"
 #include "growth/hilomot/oblique_split.hpp"
+#include "growth/problem.hpp"
 
 namespace llmt {
 

@@ -2,7 +2,7 @@
 /// LOLIMOT, the local linear model tree of Nelles (2001, chapter 13).
 #pragma once
 
-#include "growth/best_first/best_first.hpp"
+#include "growth/problem.hpp"
 
 namespace llmt {
 

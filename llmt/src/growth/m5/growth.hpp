@@ -1,14 +1,14 @@
 /// \file
-/// M5': growth, pruning and smoothing.
+/// M5' (docs/algorithms/m5.md): growth, pruning and smoothing.
 #pragma once
 
-#include "growth/best_first/best_first.hpp"
+#include "growth/problem.hpp"
 
 namespace llmt {
 
-/// Grows by the decrease of the standard deviation, prunes by the adjusted error and folds the smoothing along the path
-/// into the local models (docs/algorithms.md, "M5'"). The splits that are left stand in the order of best-first growth,
-/// the largest decrease first, and every node has the smoothed model that it has as a leaf, so prefixes are models.
+/// Grows by the decrease of the outputs' scatter (Q.1), prunes by the adjusted error (Q.2) and folds the smoothing
+/// along the path (Q.3) into the local models. The remaining splits stand in the order of best-first growth, the
+/// largest decrease first. Every node has the smoothed model that it has as a leaf, so prefixes are models.
 GrownPartition grow_m5(const GrowthProblem& problem);
 
 }  // namespace llmt

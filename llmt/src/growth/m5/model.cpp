@@ -8,10 +8,11 @@
 namespace llmt {
 namespace {
 
-// A column of which the ones before it leave less is collinear with them: the digits of a sum of squares.
+// A column is collinear with the columns before it if they leave less than this part of its sum of squares. Sums of
+// squares have about 16 digits.
 constexpr double least_independence = 1e-10;
 
-// What a sum of squares has of rounding.
+// Relative rounding of a sum of squares.
 constexpr double rounding_of_squares = 1e-15;
 
 // Columns that are not collinear, in order, by a Cholesky factor of their correlations.
@@ -40,7 +41,7 @@ struct Solution {
   Eigen::VectorXd coefficients;
   double squares;  // mean of the squared residuals
 
-  // The column whose loss costs least, and what: coefficient^2 / inverse_jj.
+  // The column whose loss raises the mean squared residual least, by `cost` = coefficient^2 / inverse_jj.
   Eigen::Index cheapest(double& cost) const {
     Eigen::Index at = 0;
     cost = coefficients.cwiseAbs2().cwiseQuotient(inverse.diagonal()).minCoeff(&at);
@@ -65,6 +66,75 @@ struct Solution {
   }
 };
 
+// The columns that vary, about their means and in units of their deviations, and the products that the fit needs. All
+// means are weighted.
+struct Standardised {
+  Eigen::RowVectorXd mean;            // of all columns
+  std::vector<Eigen::Index> varying;  // columns that are not constant; what follows is of these
+  RowMajor scaled;                    // rows x varying columns
+  Eigen::VectorXd deviation;          // of each column: `scaled` times this is the column about its mean
+  Eigen::MatrixXd correlations;
+  Eigen::VectorXd products;  // mean of column times y
+  double y_mean = 0.0;
+  Eigen::VectorXd y;  // about its mean
+  double variance = 0.0;
+};
+
+Standardised standardise(const RowMajor& x, const Eigen::VectorXd& y, const Eigen::VectorXd& weights) {
+  const double total = weights.sum();
+  Standardised result;
+  result.mean = weights.transpose() * x / total;
+  result.y_mean = weights.dot(y) / total;
+  result.y = y.array() - result.y_mean;
+  const RowMajor centred = x.rowwise() - result.mean;
+  std::vector<double> largest;  // deviation of each column
+  for (Eigen::Index k = 0; k < x.cols(); ++k) {
+    if (x.col(k).minCoeff() < x.col(k).maxCoeff()) {
+      result.varying.push_back(k);
+      largest.push_back(centred.col(k).cwiseAbs().maxCoeff());
+    }
+  }
+  // Dividing by the largest deviation keeps the squares of very small and very large columns in range.
+  const Eigen::Map<const Eigen::VectorXd> magnitude(largest.data(), std::ssize(largest));
+  RowMajor& scaled = result.scaled;
+  scaled = centred(Eigen::all, result.varying) * magnitude.cwiseInverse().asDiagonal();
+  const Eigen::RowVectorXd deviation = (weights.transpose() * scaled.cwiseAbs2() / total).cwiseSqrt();
+  scaled *= deviation.cwiseInverse().asDiagonal();
+  result.deviation = deviation.transpose().cwiseProduct(magnitude);
+  result.correlations = scaled.transpose() * weights.asDiagonal() * scaled / total;
+  result.products = scaled.transpose() * weights.cwiseProduct(result.y) / total;
+  result.variance = weights.dot(result.y.cwiseAbs2()) / total;
+  return result;
+}
+
+// Least squares on all columns that are not collinear.
+Solution solve(const Standardised& data) {
+  Solution solution;
+  solution.columns = independent_columns(data.correlations);
+  if (!solution.columns.empty()) {
+    const Eigen::MatrixXd chosen = data.correlations(solution.columns, solution.columns);
+    solution.inverse = chosen.llt().solve(Eigen::MatrixXd::Identity(chosen.rows(), chosen.cols()));
+  }
+  solution.coefficients = solution.inverse * data.products(solution.columns);
+  const double explained = solution.coefficients.dot(data.products(solution.columns));
+  solution.squares = std::max(rounding_of_squares * data.variance, data.variance - explained);
+  return solution;
+}
+
+// Drops columns as long as the adjusted error (docs/algorithms/m5.md, Q.2) does not rise, and until there are more rows
+// than coefficients. `total`: sum of the weights.
+void drop_columns(double rows, double total, Solution& solution) {
+  while (!solution.columns.empty()) {
+    const double coefficients = static_cast<double>(solution.columns.size()) + 1.0;
+    double cost = 0.0;
+    const Eigen::Index cheapest = solution.cheapest(cost);
+    const double with = adjusted_error(std::sqrt(solution.squares), total, coefficients);
+    const double without = adjusted_error(std::sqrt(solution.squares + cost), total, coefficients - 1.0);
+    if (std::min(rows, total) > coefficients && without > with) return;
+    solution.drop(cheapest, cost);
+  }
+}
+
 }  // namespace
 
 double adjusted_error(double error, double n, double v) {
@@ -73,52 +143,15 @@ double adjusted_error(double error, double n, double v) {
 
 FewInputsModel fit_few_inputs(const RowMajor& x, const Eigen::VectorXd& y, const Eigen::VectorXd& weights) {
   const double total = weights.sum();
-  const double rows = static_cast<double>(x.rows());
-  const Eigen::RowVectorXd mean = weights.transpose() * x / total;
-  const double y_mean = weights.dot(y) / total;
-  const RowMajor centred = x.rowwise() - mean;
-  const Eigen::VectorXd y_centred = y.array() - y_mean;
-  std::vector<Eigen::Index> varying;
-  std::vector<double> largest;  // deviation of each
-  for (Eigen::Index k = 0; k < x.cols(); ++k) {
-    if (x.col(k).minCoeff() < x.col(k).maxCoeff()) {
-      varying.push_back(k);
-      largest.push_back(centred.col(k).cwiseAbs().maxCoeff());
-    }
-  }
-  // Dividing by the largest deviation keeps the squares of very small and very large columns in range.
-  const Eigen::Map<const Eigen::VectorXd> magnitude(largest.data(), std::ssize(largest));
-  RowMajor scaled = centred(Eigen::all, varying) * magnitude.cwiseInverse().asDiagonal();
-  const Eigen::RowVectorXd deviation = (weights.transpose() * scaled.cwiseAbs2() / total).cwiseSqrt();
-  scaled *= deviation.cwiseInverse().asDiagonal();
-  const Eigen::MatrixXd correlations = scaled.transpose() * weights.asDiagonal() * scaled / total;
-  const Eigen::VectorXd products = scaled.transpose() * weights.cwiseProduct(y_centred) / total;
-  const double variance = weights.dot(y_centred.cwiseAbs2()) / total;
-
-  Solution solution;
-  solution.columns = independent_columns(correlations);
-  if (!solution.columns.empty()) {
-    const Eigen::MatrixXd chosen = correlations(solution.columns, solution.columns);
-    solution.inverse = chosen.llt().solve(Eigen::MatrixXd::Identity(chosen.rows(), chosen.cols()));
-  }
-  solution.coefficients = solution.inverse * products(solution.columns);
-  const double floor = rounding_of_squares * variance;
-  solution.squares = std::max(floor, variance - solution.coefficients.dot(products(solution.columns)));
-  while (!solution.columns.empty()) {
-    const double coefficients = static_cast<double>(solution.columns.size()) + 1.0;
-    double cost = 0.0;
-    const Eigen::Index cheapest = solution.cheapest(cost);
-    const double with = adjusted_error(std::sqrt(solution.squares), total, coefficients);
-    const double without = adjusted_error(std::sqrt(solution.squares + cost), total, coefficients - 1.0);
-    if (std::min(rows, total) > coefficients && without > with) break;
-    solution.drop(cheapest, cost);
-  }
+  const Standardised data = standardise(x, y, weights);
+  Solution solution = solve(data);
+  drop_columns(static_cast<double>(x.rows()), total, solution);
 
   FewInputsModel model;
   model.slope = Eigen::VectorXd::Zero(x.cols());
   model.coefficients = static_cast<int>(solution.columns.size()) + 1;
-  model.residuals = y_centred;
-  const RowMajor regressors = scaled(Eigen::all, solution.columns);
+  model.residuals = data.y;
+  const RowMajor regressors = data.scaled(Eigen::all, solution.columns);
   // The second pass adds what rounding of the sums left.
   Eigen::VectorXd coefficients = Eigen::VectorXd::Zero(regressors.cols());
   for (int pass = 0; pass < 2 && regressors.cols() > 0; ++pass) {
@@ -127,12 +160,12 @@ FewInputsModel fit_few_inputs(const RowMajor& x, const Eigen::VectorXd& y, const
     coefficients += change;
     model.residuals -= regressors * change;
   }
-  model.value = y_mean;
+  model.value = data.y_mean;
   for (std::size_t k = 0; k < solution.columns.size(); ++k) {
     const Eigen::Index at = solution.columns[k];
-    const Eigen::Index column = varying[at];
-    model.slope(column) = coefficients(k) / (deviation(at) * magnitude(at));
-    model.value -= model.slope(column) * mean(column);
+    const Eigen::Index column = data.varying[at];
+    model.slope(column) = coefficients(k) / data.deviation(at);
+    model.value -= model.slope(column) * data.mean(column);
   }
   model.rms = std::sqrt(weights.dot(model.residuals.cwiseAbs2()) / total);
   return model;

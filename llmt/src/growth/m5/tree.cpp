@@ -6,6 +6,7 @@
 #include <iterator>
 #include <numeric>
 
+#include "growth/missing_left.hpp"
 #include "model/leaf_validities.hpp"
 
 namespace llmt {
@@ -13,160 +14,180 @@ namespace {
 
 using Rows = std::vector<int>;
 
-// A node is not split if its outputs deviate by less than this part of those of all rows (Quinlan 1992).
+// A node is not split if its outputs deviate by less than this part of the deviations of all rows (Quinlan 1992).
 constexpr double least_deviation = 0.05;
 
-// The learned share of the left child in rows without a value starts from the share of the others, which counts as
-// this many rows.
-constexpr double prior_rows = 10.0;
+enum class Side { left, right, none };
+
+// Where a row goes that has `value` in the split input.
+Side side_of(const DeviationSplit& split, double value) {
+  if (std::isnan(value)) return split.by_missing ? Side::right : Side::none;
+  if (split.by_missing) return Side::left;
+  if (!split.level_side.empty()) {
+    return split.level_side[static_cast<std::size_t>(value)] < 0 ? Side::left : Side::right;
+  }
+  return value <= split.threshold ? Side::left : Side::right;
+}
+
+// Rows of a node that go left, right and, without a value of the split input, to neither side.
+struct Division {
+  std::array<Rows, 3> rows;
+
+  Rows& operator[](Side side) { return rows[static_cast<std::size_t>(side)]; }
+  const Rows& operator[](Side side) const { return rows[static_cast<std::size_t>(side)]; }
+};
+
+// Rows by every numeric split input that have a value, ascending; empty for categories.
+std::vector<Rows> sorted_rows(const GrowthData& data, const Rows& rows) {
+  std::vector<Rows> orders(data.split_inputs());
+  for (Eigen::Index j = 0; j < data.split_inputs(); ++j) {
+    if (data.num_levels[j] > 0) continue;
+    const auto value = [&](int row) { return data.split_value(row, j); };
+    std::ranges::copy_if(rows, std::back_inserter(orders[j]), [&](int row) { return !std::isnan(value(row)); });
+    std::ranges::stable_sort(orders[j], {}, value);
+  }
+  return orders;
+}
+
+// Node::missing_left by equation D.2 of docs/algorithms/data.md, with the means of the two sides as the children's
+// models. `known`: the left side's part of the weight of the rows with a value.
+double learn_missing_left(const GrowthData& data, const Eigen::VectorXd& row_weights, const Division& division,
+                          double known) {
+  const auto mean_of = [&](Side side) -> Eigen::VectorXd {
+    const Eigen::VectorXd weights = row_weights(division[side]);
+    return data.outputs(division[side], Eigen::all).transpose() * weights / weights.sum();
+  };
+  const Eigen::VectorXd right = mean_of(Side::right);
+  const Eigen::VectorXd apart = mean_of(Side::left) - right;
+  MissingSums sums;
+  for (const int row : division[Side::none]) {
+    const Eigen::VectorXd error = data.outputs.row(row).transpose() - right;
+    sums.squares += row_weights(row) * data.output_weights.dot(apart.cwiseAbs2());
+    sums.products += row_weights(row) * data.output_weights.dot(apart.cwiseProduct(error));
+    sums.weight += row_weights(row);
+  }
+  return learned_missing_left(sums, known);
+}
 
 class Grower {
  public:
   explicit Grower(const GrowthData& data) : data_(data), side_(data.training.count()) { tree_.weights = data.weights; }
 
-  M5Tree run() {
-    tree_.rows.resize(data_.training.count());
-    std::iota(tree_.rows.begin(), tree_.rows.end(), 0);
-    std::vector<std::pair<int, std::vector<Rows>>> open;  // nodes and the orders of their rows
-    std::vector<Rows> orders(data_.split_inputs());
-    for (std::size_t j = 0; j < orders.size(); ++j) {
-      const Eigen::Index input = static_cast<Eigen::Index>(j);
-      if (data_.num_levels[j] == 0) {
-        std::ranges::copy_if(tree_.rows, std::back_inserter(orders[j]),
-                             [&](int row) { return !std::isnan(data_.split_value(row, input)); });
-        std::ranges::stable_sort(
-            orders[j], [&](int a, int b) { return data_.split_value(a, input) < data_.split_value(b, input); });
-      }
-    }
-    tree_.branches.resize(1);
-    tree_.branches[0].end = std::ssize(tree_.rows);
-    open.emplace_back(0, std::move(orders));
-    while (!open.empty()) {
-      auto [index, of_node] = std::move(open.back());
-      open.pop_back();
-      std::array<std::vector<Rows>, 2> of_children;
-      if (split(index, of_node, of_children)) {
-        const M5Branch& branch = tree_.branches[index];
-        open.emplace_back(branch.left, std::move(of_children[0]));
-        open.emplace_back(branch.right, std::move(of_children[1]));
-      }
-    }
-    return std::move(tree_);
-  }
+  M5Tree run();
 
  private:
-  // False if the node stays a leaf. Sets the weights of its rows.
-  bool split(std::size_t index, const std::vector<Rows>& orders, std::array<std::vector<Rows>, 2>& of_children) {
-    M5Branch& branch = tree_.branches[index];
-    const std::span<int> rows = tree_.rows_of(branch);
-    const Rows own(rows.begin(), rows.end());
-    const DeviationNode node{own, orders, tree_.weights};
-    branch.tested.assign(data_.split_inputs(), false);
-    for (const int row : own) {
-      branch.weight += tree_.weights(row);
-    }
-    const double all = static_cast<double>(data_.outputs.cols());
-    if (relative_deviation(data_, node) < least_deviation * all) return false;
-    branch.split = largest_decrease(data_, node);
-    if (branch.split.input < 0) return false;
-    std::array<Rows, 3> sides;  // left, right, neither
-    deal(branch, own, sides);
-    branch.tested[branch.split.input] = true;
-    Eigen::Index at = branch.begin;
-    branch.left = static_cast<int>(tree_.branches.size());
-    branch.right = branch.left + 1;
-    std::array<M5Branch, 2> children;
-    for (std::size_t side = 0; side < 3; ++side) {
-      const Eigen::Index begin = at;
-      at += std::ssize(sides[side]);
-      std::ranges::copy(sides[side], tree_.rows.begin() + begin);
-      if (side < 2) {
-        children[side].parent = static_cast<int>(index);
-        children[side].begin = begin;
-        children[side].end = at;
-      }
-    }
-    divide_orders(sides, orders, of_children);
-    tree_.branches.push_back(std::move(children[0]));
-    tree_.branches.push_back(std::move(children[1]));
-    return true;
-  }
+  // One per split input.
+  using Orders = std::vector<Rows>;
 
-  void divide_orders(const std::array<Rows, 3>& sides, const std::vector<Rows>& orders,
-                     std::array<std::vector<Rows>, 2>& of_children) {
-    for (std::size_t side = 0; side < 3; ++side) {
-      for (const int row : sides[side]) {
-        side_[row] = static_cast<signed char>(side);
-      }
-    }
-    for (std::size_t side = 0; side < 2; ++side) {
-      of_children[side].resize(orders.size());
-      for (std::size_t j = 0; j < orders.size(); ++j) {
-        std::ranges::copy_if(orders[j], std::back_inserter(of_children[side][j]),
-                             [&](int row) { return side_[row] == static_cast<signed char>(side); });
-      }
-    }
-  }
-
-  // The rows of either child. Those without a value go to the child that has nearly all of them, if one has.
-  void deal(M5Branch& branch, const Rows& rows, std::array<Rows, 3>& sides) {
-    const DeviationSplit& split = branch.split;
-    std::array<double, 2> weight{};
-    for (const int row : rows) {
-      const double value = data_.split_value(row, split.input);
-      const std::size_t side = std::isnan(value)  ? (split.by_missing ? 1 : 2)
-                               : split.by_missing ? 0
-                               : !split.level_side.empty()
-                                   ? (split.level_side[static_cast<std::size_t>(value)] < 0 ? 0 : 1)
-                               : value <= split.threshold ? 0
-                                                          : 1;
-      sides[side].push_back(row);
-      if (side < 2) {
-        weight[side] += tree_.weights(row);
-      }
-    }
-    branch.missing_left = split.by_missing ? 0.0 : learn_missing_left(sides, weight[0] / (weight[0] + weight[1]));
-    for (const std::size_t side : {0U, 1U}) {
-      const double share = side == 0 ? branch.missing_left : 1.0 - branch.missing_left;
-      if (share >= clear_share && !sides[2].empty()) {
-        for (const int row : sides[2]) {
-          branch.shared.emplace_back(row, tree_.weights(row));
-          tree_.weights(row) *= share;
-          sides[side].push_back(row);
-        }
-        sides[2].clear();
-        std::ranges::sort(sides[side]);
-      }
-    }
-  }
-
-  // Share of the left child in rows without a value that minimises their squared error under the means of the rows
-  // that have one, drawn towards the share `known` of those; in [0, 1].
-  double learn_missing_left(const std::array<Rows, 3>& sides, double known) const {
-    std::array<Eigen::VectorXd, 2> mean;
-    for (std::size_t side = 0; side < 2; ++side) {
-      const Eigen::VectorXd weights = tree_.weights(sides[side]);
-      mean[side] = data_.outputs(sides[side], Eigen::all).transpose() * weights / weights.sum();
-    }
-    const Eigen::VectorXd apart = mean[0] - mean[1];
-    double squares = 0.0;
-    double product = 0.0;
-    double weight = 0.0;
-    for (const int row : sides[2]) {
-      const Eigen::VectorXd error = data_.outputs.row(row).transpose() - mean[1];
-      squares += tree_.weights(row) * data_.output_weights.dot(apart.cwiseAbs2());
-      product += tree_.weights(row) * data_.output_weights.dot(apart.cwiseProduct(error));
-      weight += tree_.weights(row);
-    }
-    if (!(squares > 0.0)) return known;
-    const double prior = prior_rows * squares / weight;
-    return std::clamp((product + prior * known) / (squares + prior), 0.0, 1.0);
-  }
+  bool split(std::size_t index, const Orders& orders, std::array<Orders, 2>& of_children);
+  Division divide(M5Branch& branch, const Rows& rows);
+  void share_missing(M5Branch& branch, Division& division);
+  void divide_orders(const Division& division, const Orders& orders, std::array<Orders, 2>& of_children);
 
   const GrowthData& data_;
   M5Tree tree_;
-  std::vector<signed char> side_;  // of every row, while a node is split
+  std::vector<Side> side_;  // of every row, while a node is split
 };
+
+M5Tree Grower::run() {
+  tree_.rows.resize(data_.training.count());
+  std::iota(tree_.rows.begin(), tree_.rows.end(), 0);
+  tree_.branches.resize(1);
+  tree_.branches[0].end = std::ssize(tree_.rows);
+  std::vector<std::pair<int, Orders>> open;  // nodes and the orders of their rows
+  open.emplace_back(0, sorted_rows(data_, tree_.rows));
+  while (!open.empty()) {
+    auto [index, of_node] = std::move(open.back());
+    open.pop_back();
+    std::array<Orders, 2> of_children;
+    if (!split(index, of_node, of_children)) continue;
+    const M5Branch& branch = tree_.branches[index];
+    open.emplace_back(branch.left, std::move(of_children[0]));
+    open.emplace_back(branch.right, std::move(of_children[1]));
+  }
+  return std::move(tree_);
+}
+
+// False if the node stays a leaf. Sets the weights of its rows.
+bool Grower::split(std::size_t index, const Orders& orders, std::array<Orders, 2>& of_children) {
+  M5Branch& branch = tree_.branches[index];
+  const std::span<int> rows = tree_.rows_of(branch);
+  const Rows own(rows.begin(), rows.end());
+  const DeviationNode node{own, orders, tree_.weights};
+  branch.tested.assign(data_.split_inputs(), false);
+  for (const int row : own) {
+    branch.weight += tree_.weights(row);
+  }
+  const double outputs = static_cast<double>(data_.outputs.cols());
+  if (relative_deviation(data_, node) < least_deviation * outputs) return false;
+  branch.split = largest_decrease(data_, node);
+  if (branch.split.input < 0) return false;
+  const Division division = divide(branch, own);
+  branch.tested[branch.split.input] = true;
+  branch.left = static_cast<int>(tree_.branches.size());
+  branch.right = branch.left + 1;
+  std::array<M5Branch, 2> children;
+  Eigen::Index at = branch.begin;
+  for (const Side side : {Side::left, Side::right, Side::none}) {
+    const Eigen::Index begin = at;
+    at += std::ssize(division[side]);
+    std::ranges::copy(division[side], tree_.rows.begin() + begin);
+    if (side == Side::none) continue;
+    M5Branch& child = children[side == Side::left ? 0 : 1];
+    child.parent = static_cast<int>(index);
+    child.begin = begin;
+    child.end = at;
+  }
+  divide_orders(division, orders, of_children);
+  tree_.branches.push_back(std::move(children[0]));
+  tree_.branches.push_back(std::move(children[1]));
+  return true;
+}
+
+// Sets missing_left.
+Division Grower::divide(M5Branch& branch, const Rows& rows) {
+  Division division;
+  std::array<double, 3> weight{};
+  for (const int row : rows) {
+    const Side side = side_of(branch.split, data_.split_value(row, branch.split.input));
+    division[side].push_back(row);
+    weight[static_cast<std::size_t>(side)] += tree_.weights(row);
+  }
+  const double known = weight[0] / (weight[0] + weight[1]);
+  branch.missing_left = branch.split.by_missing ? 0.0 : learn_missing_left(data_, tree_.weights, division, known);
+  share_missing(branch, division);
+  return division;
+}
+
+// Rows without a value go to the child that has nearly all of their validity, if one has.
+void Grower::share_missing(M5Branch& branch, Division& division) {
+  for (const Side side : {Side::left, Side::right}) {
+    const double share = side == Side::left ? branch.missing_left : 1.0 - branch.missing_left;
+    if (share < clear_share || division[Side::none].empty()) continue;
+    for (const int row : division[Side::none]) {
+      branch.shared.emplace_back(row, tree_.weights(row));
+      tree_.weights(row) *= share;
+      division[side].push_back(row);
+    }
+    division[Side::none].clear();
+    std::ranges::sort(division[side]);
+  }
+}
+
+void Grower::divide_orders(const Division& division, const Orders& orders, std::array<Orders, 2>& of_children) {
+  for (const Side side : {Side::left, Side::right, Side::none}) {
+    for (const int row : division[side]) {
+      side_[row] = side;
+    }
+  }
+  for (const Side side : {Side::left, Side::right}) {
+    Orders& of_child = of_children[side == Side::left ? 0 : 1];
+    of_child.resize(orders.size());
+    for (std::size_t j = 0; j < orders.size(); ++j) {
+      std::ranges::copy_if(orders[j], std::back_inserter(of_child[j]), [&](int row) { return side_[row] == side; });
+    }
+  }
+}
 
 }  // namespace
 

@@ -21,18 +21,18 @@ struct FixedParameter {
 };
 
 struct Calibration {
-  Robot robot;       ///< identified; Robot::identified filled in
-  Robot registered;  ///< as given, with base and tool alone fitted: the nominal robot in the measurement's frame
-  discovery::SolverResult registration;  ///< of base and tool
-  discovery::SolverResult result;        ///< of everything; residual norms count residuals in units of noise_mm
+  Robot robot;       ///< with the identified values; Robot::identified is filled in
+  Robot registered;  ///< the nominal robot in the frame of the measurements: only base and tool are fitted
+  discovery::SolverResult registration;  ///< of the fit of base and tool
+  discovery::SolverResult result;        ///< of the whole fit; its residual norms are in units of noise_mm
   double noise_mm = 0.0;  ///< standard deviation of one coordinate's residual, as used to weigh data against priors
-  std::vector<std::string> weak;      ///< free parameters that the prior knows better than the data
+  std::vector<std::string> weak;      ///< free parameters that the prior determines more closely than the data
   std::vector<FixedParameter> fixed;  ///< every parameter that was not free, in the order of parameters()
 };
 
-/// Fits base and tool, jointly and damped, everything else as given. The start comes in closed form (Kabsch 1976) from
-/// several guesses of the tool. Parameters excluded by the options stay. Only positions are fitted: the tool's
-/// orientation stays as given. Throws as calibrate().
+/// Fits base and tool together by damped least squares; all other parameters keep their values. The fit starts from the
+/// base in closed form (Kabsch 1976) for several guesses of the tool. Parameters that the options fix are not changed.
+/// Only positions are fitted: the tool's orientation stays as given. Throws as calibrate().
 discovery::SolverResult register_frames(Robot& robot, const Measurements& measurements,
                                         const CalibrationOptions& options = {});
 

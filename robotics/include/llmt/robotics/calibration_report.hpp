@@ -14,7 +14,7 @@
 
 namespace llmt::robotics {
 
-/// Of the distances between model and measurement, mm.
+/// Figures of the distances between model and measurement, mm.
 struct ErrorFigures {
   double mean = 0.0;
   double max = 0.0;
@@ -22,24 +22,25 @@ struct ErrorFigures {
   double rms = 0.0;
 };
 
-/// Throws std::invalid_argument if there are none.
+/// Figures of n distances. Throws std::invalid_argument if n is 0.
 ErrorFigures error_figures(const Eigen::VectorXd& distances_mm);
 
 struct ReportOptions {
   CalibrationOptions calibration = {};
-  bool correct = false;       ///< grow a residual correction and judge it
-  GrowthOptions growth = {};  ///< of the correction
-  int folds = 5;              ///< 0: no held-out figures
+  bool correct = false;  ///< grow a residual correction and judge it
+  /// Of the correction. Its leaves are crisp; folds and threads are those below, intervals are not made.
+  FitOptions correction = {};
+  int folds = 5;  ///< 0: no held-out figures
   FoldKind kind = FoldKind::random;
   int correction_folds = 5;  ///< for the correction's leaf count, within every fold; 0: as grown
   std::uint64_t seed = 1;
   int max_threads = 0;
-  /// Called when everything is fitted to all poses, and after each fold, with how many of these are done.
-  std::function<void(std::ptrdiff_t done, std::ptrdiff_t total)> progress = {};
+  /// Called with the numbers of finished and of all fits: the fit to all poses first, then one per fold.
+  std::function<void(Eigen::Index done, Eigen::Index total)> progress = {};
 };
 
-/// Distances of every pose under the three models. Held-out: base, tool, geometry, effects, tree and its size fitted
-/// without the pose.
+/// Distances between one of the three models and the measurements. For a held-out distance, base, tool, geometry,
+/// effects, the tree and its size are fitted without that pose.
 struct Stage {
   Eigen::VectorXd in_sample_mm;  ///< n distances
   Eigen::VectorXd held_out_mm;   ///< n distances, or empty
@@ -47,17 +48,19 @@ struct Stage {
 
 struct CalibrationReport {
   Calibration calibration;              ///< from all poses
-  std::optional<FitResult> correction;  ///< grown on all poses; there even if it is not kept
+  std::optional<FitResult> correction;  ///< grown on all poses, whether it is kept or not
   Stage nominal;                        ///< base and tool registered, everything else as given
   Stage geometric;                      ///< calibrated
   std::optional<Stage> corrected;
-  bool correction_kept = false;  ///< held-out mean smaller by over two standard errors; no folds: kept unjudged
-  std::string decision;          ///< in a sentence, with the figures
+  /// The correction lowers the held-out mean error by more than two standard errors of the gain; without folds it is
+  /// kept without being judged.
+  bool correction_kept = false;
+  std::string decision;  ///< the same in a sentence with the figures
   int folds = 0;
   bool grouped = false;  ///< repeats of a pose (column `pose`) were kept together
   std::vector<discovery::Termination> fold_terminations;
 
-  /// The robot to be used: calibrated, corrected if the correction is kept.
+  /// The robot to use: calibrated, and corrected if the correction is kept.
   CorrectedRobot best() const;
 };
 

@@ -1,5 +1,5 @@
 /// \file
-/// The table of what is known beforehand of physical effects, and effects of the user's own, in YAML.
+/// Plausible sizes of physical effects, and the user's own effects, read from YAML.
 #pragma once
 
 #include <string>

@@ -19,10 +19,10 @@ Eigen::MatrixXd residuals(const Robot& robot, const Measurements& measurements);
 
 /// A calibrated robot and what is added to it, eq. (18)-(19) of Benes et al. 2022:
 ///   p(q) = p_robot(q) + R_world_base e(q),
-/// with every component of e kept within the residuals that were seen in training: a leaf fitted to poses that hardly
-/// move a joint has a slope along it that means nothing, and a pose that moves it would be corrected by metres. e the
-/// predictions of a model with inputs q1, q2, ... (rad or mm) and outputs among dx_mm, dy_mm, dz_mm; a missing one is
-/// zero.
+/// e the prediction of a model with inputs q1, q2, ... (rad or mm) and outputs among dx_mm, dy_mm, dz_mm; a missing
+/// output is zero. Every component of e is clamped to the range of the residuals seen in training. Without that, a leaf
+/// fitted to poses that hardly move a joint has a meaningless slope along it, and a pose that does move the joint would
+/// be corrected by metres.
 struct CorrectedRobot {
   Robot robot;
   std::optional<Model> correction;  ///< empty: no correction

@@ -10,8 +10,8 @@
 
 namespace llmt::robotics {
 
-/// Finds what is missing from the robot. `test`, or if it is empty a share of the measurements, takes no part until the
-/// end, when it is used once. The improved robot is fitted to all of `measurements` but that share.
+/// Finds what is missing from the robot. `test` is used once, at the end, to verify; without it a share of the
+/// measurements is set aside for that. The improved robot is fitted to all other measurements.
 ///
 /// Throws as calibrate(), and std::invalid_argument if there are too few poses to leave any freedom.
 Discovery discover(const Robot& robot, const Measurements& measurements, const std::optional<Measurements>& test = {},

@@ -1,5 +1,5 @@
 /// \file
-/// How a discovery goes about it.
+/// What a discovery looks for, and how.
 #pragma once
 
 #include <cstdint>
@@ -19,12 +19,12 @@ struct DiscoveryOptions {
   discovery::SearchOptions search = {};
   /// Share of the poses that is set aside before anything is looked at; not used where test measurements are given.
   double held_out_share = 0.2;
-  bool scans = true;    ///< orders of transmission errors, rows of knocks
-  bool shapes = true;   ///< hypotheses that carry "unknown"
-  bool maps = true;     ///< free maps of the joints for what stays unknown, if they help on poses left out
-  bool correct = true;  ///< a tree of what is left, if something unknown is and the tree helps on poses left out
-  /// Standard deviation of the masses in the description, as a share: part of the standard errors of compliances and
-  /// flexibilities, which the data know only as products with the masses.
+  bool scans = true;    ///< look for the orders of transmission errors and for the rows of knocks in the residuals
+  bool shapes = true;   ///< try shapes without a physical cause; they carry the answer "unknown effect"
+  bool maps = true;     ///< if the answer is unknown: add joint maps where they lower the error on poses left out
+  bool correct = true;  ///< if the answer is unknown: add a correction by trees where it lowers that error further
+  /// Relative standard deviation of the masses in the description. It is part of the standard errors of compliances and
+  /// flexibilities, because the data determine only their products with the masses.
   double mass_uncertainty = 0.05;
   int rounds = 4;  ///< of search and nonlinear refit
   std::uint64_t seed = 1;

@@ -20,11 +20,6 @@ struct Shape {
   std::string kind;                     ///< "smooth", "bump at 35 deg", "step at -20 deg", ...
 };
 
-struct UntestableEffect {
-  std::string what;  ///< "backlash_approach@joint1", or the name of a type
-  std::string why;
-};
-
 struct FoundParameter {
   std::string name;
   double value = 0.0;
@@ -39,10 +34,10 @@ struct FoundEffect {
   bool confirmed = false;
   std::vector<FoundParameter> parameters;
   std::vector<std::string> rivals;  ///< labels: "link_bending@joint2", joined by " + " where it takes several
-  std::vector<std::vector<Effect>> rival_effects;  ///< the same, as effects that could stand in the robot
-  bool exact_alias = false;                        ///< a rival predicts the same at every pose: no pose can tell
-  double share = 0.0;                              ///< of the explained sum of squares
-  double rms_mm = 0.0;                             ///< of the displacement that it causes beyond what geometry absorbs
+  std::vector<std::vector<Effect>> rival_effects;  ///< the rivals as effects that could stand in the robot
+  bool exact_alias = false;  ///< a rival predicts the same at every pose: no measurement can distinguish them
+  double share = 0.0;        ///< of the explained sum of squares
+  double rms_mm = 0.0;       ///< of the displacement that it causes beyond what geometry can imitate
 };
 
 struct FoundShape {
@@ -66,7 +61,7 @@ struct GapMap {
   std::vector<Share> depends_on;  ///< importance of each input for the residual
 };
 
-/// Smallest amplitude that would have been found, 90 % of the time.
+/// The smallest amplitude of an effect that would have been found with probability 0.9.
 struct Visible {
   std::string what;
   double value = 0.0;
@@ -74,9 +69,9 @@ struct Visible {
 };
 
 struct HeldOut {
-  ErrorFigures before;    ///< calibrated as given
-  ErrorFigures after;     ///< with what was found
-  double floor_mm = 0.0;  ///< mean distance that the noise alone makes
+  ErrorFigures before;    ///< of the calibrated robot as described
+  ErrorFigures after;     ///< of the robot with what was found
+  double floor_mm = 0.0;  ///< mean distance between a perfect model and measurements with this noise
   bool floor_from_repeats = false;
   Eigen::Index poses = 0;
 };
@@ -85,7 +80,7 @@ struct Discovery {
   discovery::Answer answer = discovery::Answer::nothing_missing;
   std::vector<FoundEffect> effects;
   std::vector<FoundShape> unknown;
-  std::vector<Effect> maps;    ///< free maps of the joints that were added for the unknown
+  std::vector<Effect> maps;    ///< joint maps that were added for the unknown effect
   Robot before;                ///< calibrated without what was found
   CorrectedRobot improved;     ///< with it, and with a correction of the rest where that helps
   ErrorFigures fitted_before;  ///< of the poses that were searched
@@ -93,7 +88,7 @@ struct Discovery {
   HeldOut held_out;
   GapMap gap;                          ///< of `before`
   std::vector<Eigen::Index> outliers;  ///< rows of the measurements, from 0
-  std::vector<UntestableEffect> not_testable;
+  std::vector<discovery::UntestableCause> not_testable;
   std::vector<Visible> visible;
   discovery::LackOfFit lack_of_fit;
   double noise_mm = 0.0;  ///< standard deviation of one coordinate

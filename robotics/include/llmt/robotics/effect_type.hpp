@@ -39,12 +39,13 @@ struct EffectParameter {
   double scale = 1.0;     ///< typical size, in that unit
   double lower = 0.0;     ///< plausible range on real arms, sign included
   double upper = 0.0;
-  bool list = false;                ///< as many values as the effect has; then it is the only parameter of its type
-  std::string prismatic_unit = {};  ///< at a prismatic joint, where it differs; in mm the sizes count 1000 times
+  bool list = false;                ///< stands for all values of the effect; then it is the only parameter of its type
+  std::string prismatic_unit = {};  ///< at a prismatic joint, where it differs; sizes in mm are 1000 times larger
   std::string prismatic_key = {};
 };
 
-/// What an effect of a type is given and calibration leaves alone: harmonic order, reference temperature, knots.
+/// A number of an effect that is given and that calibration does not change: harmonic order, reference temperature,
+/// knots.
 struct EffectConstant {
   std::string name;
   std::string key;                 ///< in robot files, with the unit
@@ -89,18 +90,18 @@ struct EffectType {
       apply = {};
   /// Changes what the effects are evaluated with (payload, gravity) before loads are summed and anything is applied.
   std::function<void(PoseContext&, std::span<const double> values)> adjust = {};
-  bool weighted = false;  ///< its values are in inverse proportion to the masses: as uncertain as they are
+  bool weighted = false;  ///< values are inversely proportional to the masses and share their relative uncertainty
   bool elastic = false;   ///< deforms under the arm's weight: the loads are those of the deformed arm
   bool linear = true;     ///< `apply` is linear in the values; if not, derivatives are taken by differences
   bool prismatic = true;  ///< may sit at a prismatic joint
   bool searched = true;   ///< discovery looks for it; false for reductions that are kept for comparison
   std::string note = {};  ///< where the plausible range is from
-  /// Of a list: how many values an effect at `index` has; empty or 0: any number.
+  /// For a list parameter: number of values of an effect at `index`; empty function or 0: any number.
   std::function<std::size_t(const Chain&, std::size_t index)> count = {};
   /// Why an effect is refused that has the right numbers of values and constants, or nothing.
   std::function<std::string(const Chain&, std::size_t index, std::span<const double> constants)> refusal = {};
-  /// Of a user's own effect: one for each parameter; "{}" stands for the number of the joint. Such a type has no
-  /// `apply`, make_effect() makes an effect of type "formula" of it.
+  /// Terms of a user's own effect, one for each parameter; "{}" stands for the number of the joint. Such a type has no
+  /// `apply`; make_effect() makes an effect of type "formula" from it.
   std::vector<FormulaTerm> terms = {};
 };
 

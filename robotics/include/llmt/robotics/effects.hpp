@@ -10,8 +10,8 @@
 
 namespace llmt::robotics {
 
-/// The catalogue, in a fixed order; docs/effects.md prints it. Formulas, units and sources stand in the entries, what
-/// is plausible comes from the table robotics/catalogue.yaml; see catalogue.hpp for tables and effects of one's own.
+/// The catalogue, in a fixed order; docs/effects.md prints it. Formulas, units and sources stand in the entries,
+/// plausible ranges in the table robotics/catalogue.yaml; catalogue.hpp reads tables and effects of the user.
 ///
 /// Angles in rad, lengths of the arm in m where forces are in N; L length, e unit chord of a link from its axis to the
 /// next; F weight of everything beyond its end b, M the moment of that weight about b, w the link's own weight per
@@ -23,9 +23,9 @@ const std::vector<EffectType>& effect_types();
 /// Throws std::invalid_argument listing the known names if there is none of that name.
 const EffectType& effect_type(std::string_view name);
 
-/// Position in the catalogue's sense of where an effect sits: joint or link index, 0 for the whole robot. Throws
-/// std::invalid_argument on an unknown type, an unknown joint, wrong numbers of values or constants, constants that are
-/// out of range, or a place that does not suit().
+/// Index of the joint or link that an effect is at; 0 for the whole robot. Throws std::invalid_argument on an unknown
+/// type, an unknown joint, wrong numbers of values or constants, constants that are out of range, or a place that does
+/// not suit the effect, see suits().
 std::size_t effect_index(const Chain& chain, const Effect& effect);
 
 /// Whether an effect of that type may sit at that joint or link (0 for the whole robot); if not, `why` says why not.
@@ -41,8 +41,8 @@ Effect make_effect(const EffectType& type, const Chain& chain, std::size_t index
 /// are those at its joint.
 std::vector<EffectParameter> effect_parameters(const Chain& chain, const Effect& effect);
 
-/// The same with the sizes and ranges of `type`, which may be of a catalogue of one's own; `effect` is one of that type
-/// as make_effect() makes it.
+/// The same with the sizes and ranges of `type`, which may come from the user's catalogue; `effect` is of that type, as
+/// made by make_effect().
 std::vector<EffectParameter> effect_parameters(const EffectType& type, const Chain& chain, const Effect& effect);
 
 /// The columns that an effect needs, numbers filled in; "a|b": one of them.

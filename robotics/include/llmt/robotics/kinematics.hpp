@@ -23,10 +23,9 @@ struct Deformation {
     Eigen::Vector3d translation_mm = Eigen::Vector3d::Zero();
     Eigen::Vector3d rotation_rad = Eigen::Vector3d::Zero();  ///< rotation vector
   };
-  explicit Deformation(std::size_t joints = 0)
-      : joint(Eigen::VectorXd::Zero(static_cast<Eigen::Index>(joints))), link(joints) {}
+  explicit Deformation(std::size_t joints = 0) : joint(Eigen::VectorXd::Zero(joints)), link(joints) {}
 
-  /// Everything is zero again; no memory is given back or asked for.
+  /// Sets everything to zero without freeing or allocating memory.
   void clear();
 
   Twist base;                                          ///< at the first joint's origin: everything moves with it
@@ -68,7 +67,7 @@ class Kinematics {
 
   Skeleton skeleton(const Eigen::VectorXd& q, const Deformation* deformation = nullptr) const;
 
-  /// The same into memory that is there already.
+  /// The same, written into an existing object without allocating memory.
   void skeleton_into(Skeleton& skeleton, const Eigen::VectorXd& q, const Deformation* deformation = nullptr) const;
 
   /// 3 x P derivatives of the tool position by the geometric parameters in the order of geometric_parameters(): mm per
@@ -104,7 +103,7 @@ class Kinematics {
   Pose walk(const Eigen::VectorXd& q, const Deformation* deformation, Visit visit) const;
 };
 
-/// Tool pose of a chain; compile a Kinematics where it is asked for often.
+/// Tool pose of a chain. For many poses construct a Kinematics once instead.
 Pose forward(const Chain& chain, const Eigen::VectorXd& q);
 
 }  // namespace llmt::robotics

@@ -1,5 +1,5 @@
 /// \file
-/// What an instrument saw of a robot, and the CSV files it comes in.
+/// Measured poses of a robot, and the CSV files that hold them.
 #pragma once
 
 #include <Eigen/Core>
@@ -20,20 +20,20 @@ struct Orientation {
   Eigen::MatrixXd values;  ///< n x 3: rx, ry, rz in degrees; or n x 4: w, x, y, z
 };
 
-/// n poses and where the tool was seen.
+/// n poses and the measured tool positions.
 struct Measurements {
   Poses poses;
   Eigen::MatrixXd positions_mm;                       ///< n x 3, world frame; columns that were not measured hold zeros
   std::array<bool, 3> measured = {true, true, true};  ///< which of x, y, z were measured
   Orientation orientation;                            ///< empty values if there is none
-  std::vector<std::string> unused_columns;            ///< columns of the file that mean nothing here
+  std::vector<std::string> unused_columns;            ///< columns of the file that are not used
   std::vector<std::string> warnings;                  ///< for people, e.g. rows left out because the point is missing
 
   Eigen::Index count() const { return poses.count(); }
 };
 
 /// The given rows; warnings and unused columns are not carried over.
-Measurements select(const Measurements& measurements, const std::vector<std::ptrdiff_t>& rows);
+Measurements select(const Measurements& measurements, const std::vector<Eigen::Index>& rows);
 
 /// Throws std::invalid_argument if shapes differ, a number is not finite, no row or no coordinate was measured, or the
 /// number of joints is not that of the robot.

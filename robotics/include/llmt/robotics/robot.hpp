@@ -14,7 +14,7 @@
 namespace llmt::robotics {
 
 /// The poses of the given rows.
-Poses select(const Poses& poses, const std::vector<std::ptrdiff_t>& rows);
+Poses select(const Poses& poses, const std::vector<Eigen::Index>& rows);
 
 /// Throws std::invalid_argument: see validate(Chain), unknown effects, non-finite effect values, an effect named twice
 /// at one place.
@@ -37,8 +37,8 @@ Eigen::MatrixXd positions(const Robot& robot, const Poses& poses);
 /// derivatives.
 Eigen::MatrixXd position_jacobian(const Robot& robot, const Poses& poses);
 
-/// What the weight of arm and payload does to each joint in the rigid pose, effects that change payload or gravity
-/// included: n x J, z_j . moment in N m, or z_j . force in N for a prismatic joint.
+/// Load of each joint by the weight of arm and payload in the rigid pose, n x J: the torque z_j . moment in N m, or the
+/// force z_j . force in N for a prismatic joint. Effects that change payload or gravity are included.
 Eigen::MatrixXd gravity_loads(const Robot& robot, const Poses& poses);
 
 /// First-order displacements of the tool by candidates that are not in the robot: 3n x (sum of their numbers of

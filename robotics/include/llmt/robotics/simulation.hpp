@@ -1,5 +1,5 @@
 /// \file
-/// Measurements of robots that are not there.
+/// Simulated measurements.
 #pragma once
 
 #include <cstdint>
@@ -23,8 +23,7 @@ Measurements simulate(const Robot& robot, const SimulationOptions& options = {})
 /// The same at given poses; `poses` of the options does not matter.
 Measurements simulate(const Robot& robot, Poses poses, const SimulationOptions& options = {});
 
-/// Adds the columns that the robot's effects need and the poses do not have, such that they say nothing new where that
-/// is possible:
+/// Adds the columns that the robot's effects need and the poses do not have, with neutral values where there are any:
 ///
 ///   order, time_s   number of the row
 ///   temp..._C       the reference temperature of the effect, or 20

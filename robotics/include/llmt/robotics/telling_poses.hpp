@@ -27,10 +27,10 @@ struct TellingPose {
 
 /// Where to measure next.
 struct Telling {
-  std::vector<TellingPose> poses;  ///< the most telling first; fewer than asked for if more would not tell more
+  std::vector<TellingPose> poses;  ///< by falling criterion; fewer than asked for where further poses add nothing
   bool payload_helps = false;      ///< some of them carry a payload that was not measured
-  double noise_mm = 0.0;           ///< what a disagreement is to be compared with
-  bool none_can = false;           ///< nowhere do the predictions differ by more than the noise; `poses` is empty
+  double noise_mm = 0.0;           ///< standard deviation of one coordinate, to compare a disagreement with
+  bool none_can = false;           ///< the predictions differ nowhere by more than the noise; `poses` is empty
 };
 
 /// Poses at which the effect that was found and a rival disagree most, found greedily among some hundred random ones
@@ -42,11 +42,11 @@ struct Telling {
 ///     b_g    = argmin |y_f - X_g b|^2 over the measured poses and those chosen so far
 ///     next   = argmax e' (1 + X_g(x) A^-1 X_g(x)')^-1 e,   e = y_f(x) - X_g(x) b_g,   A = sum of X_g' X_g
 ///
-/// The criterion is the growth of the smallest sum of squares: what the rival cannot follow even when it is fitted to
-/// the new pose too. Payloads are those measured, 0, and the description's; one that was not measured must tell 20 %
-/// more. Other columns are taken from a random measured pose, except that tauN_Nm becomes the torque of gravity and
+/// The criterion is the growth of the smallest sum of squares by the new pose when the rival is fitted to it too.
+/// Payloads are those measured, 0, and the description's; the criterion of a payload that was not measured must be 20 %
+/// larger. Other columns are taken from a random measured pose, except that tauN_Nm becomes the torque of gravity and
 /// qmeasN keeps its distance from the joint value. The rival's values are not held to their plausible limits.
-/// Whether a pose is free of collisions, and in sight of the instrument, nobody knows here.
+/// Collisions and the field of view of the instrument are not checked.
 ///
 /// `fitted` holds what was found, `effect` is its place in fitted.effects; `rival` are the effects that would stand in
 /// its place; `measured_axes` are the coordinates x, y, z that the instrument sees; `noise_mm` is the standard

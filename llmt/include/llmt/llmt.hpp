@@ -1,0 +1,17 @@
+/// \file
+/// All of LLMT but llmt::discovery: fit(), Model, Stream, compare(), explain, CSV.
+#pragma once
+
+#include "llmt/compare.hpp"
+#include "llmt/csv.hpp"
+#include "llmt/explain.hpp"
+#include "llmt/files.hpp"
+#include "llmt/fit.hpp"
+#include "llmt/folds.hpp"
+#include "llmt/intervals.hpp"
+#include "llmt/model.hpp"
+#include "llmt/names.hpp"
+#include "llmt/options.hpp"
+#include "llmt/random.hpp"
+#include "llmt/stream.hpp"
+#include "llmt/summary.hpp"

@@ -1,0 +1,54 @@
+/// \file
+/// The names of choices, as model files, the command line and messages have them.
+#pragma once
+
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+
+namespace llmt {
+
+/// One value of an enumeration and its name.
+template <class Enum>
+struct Choice {
+  Enum value;
+  std::string_view name;
+};
+
+/// All values of an enumeration, in the order in which help lists them. There is one for GrowthRule, ValidityChoice,
+/// LocalTerms, SparseChoice, SplitSearch, Estimation (options.hpp) and ValidityKind (model.hpp).
+template <class Enum>
+std::span<const Choice<Enum>> choices();
+
+/// The names: "linear, quadratic, auto".
+template <class Enum>
+std::string list_names(std::string_view separator = ", ") {
+  std::string list;
+  for (const Choice<Enum>& choice : choices<Enum>()) {
+    list += list.empty() ? std::string() : std::string(separator);
+    list += choice.name;
+  }
+  return list;
+}
+
+/// The name of a value: "retis". Throws std::invalid_argument for a number that is no value of the enumeration.
+template <class Enum>
+std::string_view name_of(Enum value) {
+  for (const Choice<Enum>& choice : choices<Enum>()) {
+    if (choice.value == value) return choice.name;
+  }
+  throw std::invalid_argument("llmt::name_of: " + std::to_string(static_cast<int>(value)) + " stands for none of " +
+                              list_names<Enum>());
+}
+
+/// The value with this name. Throws std::invalid_argument that lists the names.
+template <class Enum>
+Enum parse(std::string_view name) {
+  for (const Choice<Enum>& choice : choices<Enum>()) {
+    if (choice.name == name) return choice.value;
+  }
+  throw std::invalid_argument("llmt::parse: \"" + std::string(name) + "\" is none of " + list_names<Enum>());
+}
+
+}  // namespace llmt

@@ -1,0 +1,151 @@
+#include "discovery/search/findings.hpp"
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <boost/math/distributions/fisher_f.hpp>
+#include <cmath>
+#include <map>
+
+#include "discovery/search/explore.hpp"
+
+namespace llmt::discovery {
+namespace {
+
+// Members of the family are replaced by the best few of another one, or by the same family elsewhere.
+std::vector<Rival> rivals_of(const Scoring& scoring, const Set& set, const std::string& family,
+                             const SearchOptions& options) {
+  const std::vector<EffectCandidate>& candidates = scoring.candidates();
+  const double score = scoring.score(set);
+  const Set rest = without_family(scoring, set, family);
+  const double left = scoring.fit(set).left;
+  const double explained = scoring.workspace().sum_of_squares() - left;
+  constexpr double same = 1e-8;
+  std::set<std::string> others;
+  for (std::size_t a = 0; a < candidates.size(); ++a) {
+    if (scoring.usable(a) && !candidates[a].generic) others.insert(candidates[a].family);
+  }
+  std::vector<Rival> rivals;
+  for (const std::string& other : others) {
+    std::vector<bool> allowed(candidates.size());
+    for (std::size_t a = 0; a < candidates.size(); ++a) {
+      allowed[a] = candidates[a].family == other && !(other == family && contains(set, a));
+    }
+    Explained current{rest, scoring.score(rest)};
+    while (std::ssize(current.set) < options.largest_set) {
+      Explained next;
+      for (const Scoring::Move& move : scoring.additions(current.set, allowed)) {
+        if (move.score >= current.score) break;
+        const Set grown = with(current.set, move.candidate);
+        const double grown_score = scoring.score(grown);
+        if (grown_score >= current.score) continue;
+        next = {grown, grown_score};
+        break;
+      }
+      if (next.score >= current.score) break;
+      current = next;
+    }
+    if (current.set.size() == rest.size()) continue;
+    const double difference = scoring.fit(current.set).left - left;
+    const bool as_good = current.score <= score + options.rival_margin || difference < options.model_error * explained;
+    if (!as_good) continue;
+    rivals.push_back({other, filtered(current.set, [&](std::size_t a) { return !contains(rest, a); }),
+                      current.score - score, std::abs(difference) < same * explained});
+  }
+  std::ranges::stable_sort(rivals, {}, &Rival::score_difference);
+  return rivals;
+}
+
+}  // namespace
+
+std::set<std::string> families_of(const Scoring& scoring, const Set& set) {
+  std::set<std::string> families;
+  for (const std::size_t a : set) families.insert(scoring.candidates()[a].family);
+  return families;
+}
+
+Set without_family(const Scoring& scoring, const Set& set, const std::string& family) {
+  return filtered(set, [&](std::size_t a) { return scoring.candidates()[a].family != family; });
+}
+
+double share_of(const Scoring& scoring, const Set& set, const Set& rest) {
+  const double total = scoring.workspace().sum_of_squares();
+  const double left = scoring.fit(set).left;
+  return total > left ? (scoring.fit(rest).left - left) / (total - left) : 0.0;
+}
+
+Finding finding_of(const Scoring& scoring, const Set& set, const Set& whole, const std::string& family,
+                   const SearchOptions& options) {
+  const SetFit fit = scoring.fit(set);
+  const Set rest = without_family(scoring, set, family);
+  Finding finding{
+      .family = family, .generic = false, .confirmed = true, .terms = {}, .rivals = {}, .share = 0, .score_gain = 0};
+  for (const std::size_t a : set) {
+    if (scoring.candidates()[a].family != family) continue;
+    finding.generic = scoring.candidates()[a].generic;
+    finding.terms.push_back({a, scoring.values(fit, set, a), scoring.standard_errors(fit, set, a),
+                             share_of(scoring, set, without(set, a))});
+  }
+  finding.share = share_of(scoring, set, rest);
+  finding.score_gain = scoring.score(rest) - scoring.score(set);
+  if (!finding.generic) finding.rivals = rivals_of(scoring, whole, family, options);
+  return finding;
+}
+
+LackOfFit lack_of_fit(const Scoring& scoring, const SetFit& fit, const std::vector<Eigen::Index>& repeats,
+                      const Eigen::VectorXd& remaining) {
+  LackOfFit result;
+  const Eigen::Index d = scoring.workspace().components();
+  std::map<Eigen::Index, std::vector<Eigen::Index>> groups;
+  for (std::size_t i = 0; i < repeats.size(); ++i) {
+    if (std::ranges::find(scoring.workspace().dropped(), i) == scoring.workspace().dropped().end()) {
+      groups[repeats[i]].push_back(i);
+    }
+  }
+  double squares = 0.0;
+  for (const auto& [group, members] : groups) {
+    if (members.size() < 2) continue;
+    Eigen::VectorXd mean = Eigen::VectorXd::Zero(d);
+    for (const Eigen::Index i : members) mean += remaining.segment(i * d, d) / static_cast<double>(members.size());
+    for (const Eigen::Index i : members) squares += (remaining.segment(i * d, d) - mean).squaredNorm();
+    result.dof += d * (std::ssize(members) - 1);
+  }
+  const double dof = scoring.dof(fit);
+  const auto own = static_cast<double>(result.dof);
+  if (result.dof < 4 || dof <= own || !(squares > 0.0)) return {};
+  const double variance = squares / own;
+  result.noise = std::sqrt(variance);
+  const double ratio = std::max(0.0, fit.left - squares) / (dof - own) / variance;
+  result.p_value = boost::math::cdf(boost::math::complement(boost::math::fisher_f(dof - own, own), ratio));
+  const double before =
+      scoring.workspace().sum_of_squares() - (dof + static_cast<double>(fit.columns.size())) * variance;
+  if (before > 0.0) result.excess_share = std::max(0.0, fit.left - dof * variance) / before;
+  return result;
+}
+
+std::vector<Sensitivity> sensitivities(const Scoring& scoring, double threshold, double noise) {
+  constexpr double power_quantile = 1.2816;  // of the standard normal at 0.9
+  std::vector<Sensitivity> all;
+  for (std::size_t a = 0; a < scoring.candidates().size(); ++a) {
+    const Block& block = scoring.workspace().blocks()[a];
+    const Eigen::Index k = scoring.candidates()[a].signature.cols();
+    Sensitivity own{block.size == 0, block.outside, Eigen::VectorXd::Constant(k, impossible)};
+    if (block.size > 0) {
+      const double needed = std::max(0.0, threshold) + scoring.single_cost(a) - scoring.cost({});
+      // The gain of an energy E, in units of the noise: n ln(1 + E / (n - k)) - n ln(n / (n - k)).
+      const double n = scoring.workspace().degrees();
+      const double left = std::max(1.0, n - static_cast<double>(block.size));
+      const double least = left * std::expm1(std::max(0.0, needed) / n + std::log(std::max(1.0, n / left)));
+      const double energy = std::pow(std::sqrt(least) + power_quantile, 2.0);
+      // |U' S_i v|: how much a unit of value i alone contributes outside the baseline.
+      const Eigen::MatrixXd to_coefficients = block.to_values.completeOrthogonalDecomposition().pseudoInverse();
+      for (Eigen::Index i = 0; i < k; ++i) {
+        const double seen = to_coefficients.col(i).norm();
+        if (seen > 0.0) own.visible(i) = std::sqrt(energy) * noise / seen;
+      }
+    }
+    all.push_back(std::move(own));
+  }
+  return all;
+}
+
+}  // namespace llmt::discovery
