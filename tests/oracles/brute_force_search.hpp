@@ -13,6 +13,13 @@
 
 namespace oracle {
 
+/// A column whose sum of squares falls below this part when the columns before it are taken out counts as dependent.
+/// Sums of squares have about 16 digits, and columns that depend on each other leave some 1e-15 to 1e-14 of rounding.
+inline constexpr double dependent_column = 1e-12;
+
+/// Splits whose RSS differ by at most this part of the node's RSS are ties (docs/algorithms/split-search.md, "Ties").
+inline constexpr double tie = 1e-10;
+
 /// Normal equations of a growing set of rows; `Coefficients` known at compile time lets the loops be unrolled.
 template <int Coefficients>
 class NormalEquations {
@@ -43,7 +50,7 @@ class NormalEquations {
       for (int j = 0; j < k; ++j) {
         pivot -= factor[at(k, j)] * factor[at(k, j)] * inverse[j];
       }
-      const bool dependent = !(pivot > llmt::pivot_tolerance * gram_[at(k, k)]);
+      const bool dependent = !(pivot > dependent_column * gram_[at(k, k)]);
       inverse[k] = dependent ? 0.0 : 1.0 / pivot;
       for (int i = k + 1; i < Coefficients; ++i) {
         double sum = gram_[at(i, k)];
@@ -123,8 +130,8 @@ BruteForceSplit search(const llmt::SearchNode& node, std::span<const std::vector
     best.rss = std::min(best.rss, *std::ranges::min_element(rss));
   }
   for (std::size_t j = 0; j < orders.size() && best.input < 0; ++j) {
-    const auto found = std::ranges::find_if(
-        all[j], [&](double value) { return value < none && value <= best.rss + llmt::tie_tolerance * node.rss; });
+    const auto found =
+        std::ranges::find_if(all[j], [&](double value) { return value < none && value <= best.rss + tie * node.rss; });
     if (found != all[j].end()) {
       best.input = static_cast<int>(j);
       best.left = found - all[j].begin();

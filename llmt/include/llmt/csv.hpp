@@ -35,8 +35,8 @@ struct CsvNumbers {
   std::vector<ColumnCells> cells;  ///< per column
 };
 
-/// A CSV text with a header row, kept as text: a column is turned into numbers when it is asked for, so columns of
-/// words do no harm as long as nobody asks for them. What asks for several columns walks over the text once.
+/// A CSV text with a header row, kept as text. A column is turned into numbers when it is requested, so a column of
+/// words does no harm unless it is requested as numbers. A request for several columns passes over the text once.
 ///
 /// Accepted: fields separated by commas (or by semicolons or tabs, if the header has no comma); fields in double
 /// quotes, which may hold separators, line breaks and doubled quotes (RFC 4180); LF or CRLF; a UTF-8 byte-order mark;
@@ -74,16 +74,17 @@ class Csv {
   /// As numbers(), but a cell that is empty or says NA, N/A, NaN, null or ? (in any case) is missing, NaN.
   Eigen::MatrixXd numbers_or_missing(std::span<const std::string> columns, int max_threads = 0) const;
 
-  /// As numbers(), but leaves it to the caller what cells that are no numbers mean. Errors as index_of() alone.
+  /// As numbers(), but cells that are not numbers become NaN and are counted, and the caller decides what they mean.
+  /// Errors as index_of() only.
   CsvNumbers read_numbers(std::span<const std::string> columns, int max_threads = 0) const;
 
-  /// Throws the error of numbers() at the first cell, in file order, of those in rows[i] of columns[i]; does nothing if
-  /// all rows are ColumnCells::no_row.
+  /// Throws the error of numbers() for the first cell, in file order, among the cells in rows[i] of columns[i]. Does
+  /// nothing if all rows are ColumnCells::no_row.
   void refuse_first(std::span<const std::string> columns, std::span<const Eigen::Index> rows) const;
 
-  /// Calls visit(row, i, text) for the cell of columns[i] in every row, in file order, with its text: quotes and outer
-  /// blanks taken off, cells that numbers_or_missing() takes for missing are empty. The text lives as long as the call.
-  /// A column may be named once. Errors as index_of().
+  /// Calls visit(row, i, text) for the cell of columns[i] in every row, in file order. The text has neither quotes nor
+  /// outer blanks, is empty for cells that numbers_or_missing() takes for missing, and lives as long as the call. A
+  /// column may be named once. Errors as index_of().
   void visit_texts(std::span<const std::string> columns,
                    const std::function<void(Eigen::Index, std::size_t, std::string_view)>& visit) const;
 
@@ -124,15 +125,15 @@ class Csv {
   Eigen::Index line_at(std::size_t offset) const;
 };
 
-/// A CSV text that need not fit into memory: its rows a piece at a time, each with the header, and with the lines of
-/// the whole text in what it says.
+/// Reads a CSV text that need not fit into memory. Its rows come a piece at a time, each piece with the header; errors
+/// name the line of the whole text.
 class CsvPieces {
  public:
   /// `name` stands for the path in errors. A piece is about `bytes` long, longer if a row is.
   CsvPieces(std::istream& input, std::string name, std::size_t bytes = 1 << 20);
 
-  /// The next rows, at least one; nothing at the end. Throws as Csv::read(), also if no header comes, the stream cannot
-  /// be read, or a quoted field has no end within 16 MiB.
+  /// The next rows, at least one; nothing at the end. Throws as Csv::read(), and if there is no header, if the stream
+  /// cannot be read, or if a quoted field does not end within 16 MiB.
   std::optional<Csv> next();
 
  private:

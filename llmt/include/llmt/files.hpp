@@ -1,5 +1,5 @@
 /// \file
-/// Whole files in, whole files out.
+/// Reading and writing of whole files.
 #pragma once
 
 #include <functional>

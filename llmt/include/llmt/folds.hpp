@@ -1,6 +1,5 @@
 /// \file
-/// The one place that decides which rows are held out: for the choice of the leaf count, for calibration, for
-/// discovery.
+/// Which rows are held out: for the choice of the leaf count, for calibration and for discovery.
 #pragma once
 
 #include <Eigen/Core>
@@ -23,8 +22,8 @@ struct FoldOptions {
   int count = 5;                     ///< number of folds K, at least 2; as many as groups gives leave-one-out
   FoldKind kind = FoldKind::random;  ///< how rows are dealt to folds
   std::uint64_t seed = 1;            ///< for FoldKind::random
-  std::span<const double> groups =
-      {};  ///< one label a row; rows with equal labels (repeats of a pose) share a fold; empty: each row alone
+  /// One label per row. Rows with equal labels (repeats of a pose) share a fold. Empty: each row is a group of its own.
+  std::span<const double> groups = {};
 };
 
 /// The rows of one fold, ascending.

@@ -24,11 +24,11 @@ struct Bounds {
 /// The guarantee is a coverage of 1 - 2 a for exchangeable rows; in practice it is near 1 - a, the level that is asked
 /// for. With a single fold this is split conformal prediction, whose guarantee is 1 - a. Weights of rows are not used.
 ///
-/// The width follows the residuals of all rows, not those near x: where the noise differs between regions the coverage
-/// holds on average, not in each of them.
+/// The width depends on the residuals of all rows, not on the residuals near x. Where the noise differs between
+/// regions, the coverage holds on average over all regions, not in each of them.
 class Intervals {
  public:
-  /// No folds: nothing to say.
+  /// No folds; predict() throws.
   Intervals() = default;
 
   /// One model and one matrix of absolute residuals (rows x outputs) for each fold. Throws std::invalid_argument if the
@@ -39,8 +39,8 @@ class Intervals {
   const std::vector<Model>& models() const { return models_; }
   const std::vector<Eigen::MatrixXd>& residuals() const { return residuals_; }  ///< each column ascending
 
-  /// Intervals that hold `level` (such as 0.9) of the outputs. Throws std::invalid_argument if there are no folds, the
-  /// level is not between 0 and 1, or there are too few rows for it, and as Model::predict().
+  /// Intervals that contain the fraction `level` (0.9, for example) of the outputs. Throws std::invalid_argument if
+  /// there are no folds, the level is not between 0 and 1, or there are too few rows for it, and as Model::predict().
   Bounds predict(const Eigen::Ref<const Eigen::MatrixXd>& inputs, double level, int max_threads = 0) const;
 
  private:

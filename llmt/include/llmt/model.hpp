@@ -1,6 +1,6 @@
 /// \file
-/// The fitted model: a partition of the input space into boxes, an affine local model in every box, and validity
-/// functions that say how much each counts at a point.
+/// The fitted model: a partition of the input space, an affine local model in every leaf, and validity functions that
+/// say how much each leaf counts at a point. docs/algorithms/model.md has the equations.
 #pragma once
 
 #include <Eigen/Core>
@@ -51,10 +51,10 @@ struct Node {
   int left = -1;         ///< child for s <= threshold; -1 in a leaf
   int right = -1;        ///< child for s > threshold; -1 in a leaf
   int split_input = -1;  ///< column of the input that is compared, or counts most in an oblique split; -1 in a leaf
-  /// In the unit of s. The largest double: rows that have a value go left, rows without one right.
+  /// In the unit of s. The largest double means: rows that have a value go left, rows without one right.
   double threshold = 0.0;
-  /// Oblique split: weight of every input of the model, 0 for categorical ones, in units of 1 / the input's; as grown,
-  /// of length 1 where every input is measured by its standard deviation. Empty: axis-orthogonal.
+  /// Oblique split: weight of every input of the model, 0 for categorical ones, in units of 1 / the input's. A grown
+  /// direction has length 1 if every input is measured by its standard deviation. Empty: axis-orthogonal.
   Eigen::VectorXd direction = {};
   /// Split on a categorical input: for each of its levels -1 left, 1 right, 0 not seen here. Empty for numbers.
   std::vector<int> level_side = {};
@@ -62,28 +62,30 @@ struct Node {
   double missing_left = 0.5;  ///< validity of the left child where the split input is missing or its level was not seen
 
   Eigen::Index samples = 0;  ///< training rows in the node's box
-  /// Of [1, regressors] over those rows: the coefficients that the rows could determine. Where regressors were selected
-  /// (FitOptions::local_models) the number of coefficients; the slopes of the others are 0.
+  /// Number of coefficients that the rows determine: rank of [1, regressors] over the rows. In sparse local models
+  /// (FitOptions::sparse) the number of coefficients that were selected; the slopes of the others are 0.
   int rank = 0;
   Eigen::VectorXd rss;    ///< weighted residual sum of squares over those rows, one per output of the partition
   Eigen::VectorXd value;  ///< local model at the centre of the regressors, one per output of the partition
   Eigen::MatrixXd slope;  ///< d output / d regressor, outputs of the partition x regressors
   /// Of each regressor, as a deviation from its centre: the mean over the node's rows, which stands in for a missing
-  /// value, and the range over the rows that its validity reaches, beyond which the ancestors' slopes take over.
+  /// value, and the range over the rows that its validity reaches. Beyond the range the ancestors' slopes take over
+  /// (docs/algorithms/guards.md, B.2).
   Eigen::VectorXd mean;
   Eigen::VectorXd low;
   Eigen::VectorXd high;
   /// Leaves: inverse of the sum of validity * weight * a a', a = [1, deviations]; for leverages. May be empty.
   Eigen::MatrixXd inverse_gram;
-  /// The node whose slopes take over beyond low ... high; -1: the parent. Another node than the parent is in leaves of
-  /// older files alone, where several leaves shared one local model: the root of the smallest subtree that holds them.
+  /// The node whose slopes take over beyond low ... high; -1: the parent. Another node than the parent occurs only in
+  /// files of earlier versions, in leaves that share one local model: the root of the smallest subtree that holds them.
   int guard_parent = -1;
 
   bool is_leaf() const { return left < 0; }
   bool is_oblique() const { return direction.size() > 0; }
 };
 
-/// A tree of splits, axis-orthogonal unless the growth rule says otherwise, that serves one or several outputs.
+/// A tree of splits that serves one or several outputs. HILOMOT makes oblique splits, all other rules axis-orthogonal
+/// ones.
 ///
 /// Nodes stand in the order of growth: node 0 is the root and the k-th split (k = 1, 2, ...) made the nodes 2k-1 (left)
 /// and 2k (right). The first 2M-1 nodes are therefore the tree as it was with M leaves; with Pruning::weakest_link the
@@ -94,8 +96,8 @@ struct Partition {
   std::vector<Node> nodes;  ///< in order of growth
   /// Slopes beyond the training extent, outputs x regressors. Empty: the root's.
   Eigen::MatrixXd outer_slope = {};
-  /// Smallest and largest residual of the root's model over the training rows, outputs x 2. Empty: predictions are not
-  /// held.
+  /// Smallest and largest residual of the root's model over the training rows, outputs x 2. Predictions are held to the
+  /// root's model plus this range (docs/algorithms/guards.md, B.3). Empty: they are not.
   Eigen::MatrixXd residual_range = {};
 
   Eigen::Index num_leaves() const { return (std::ssize(nodes) + 1) / 2; }
@@ -122,7 +124,7 @@ struct OutputColumn {
 
 /// A column of the local models: a numeric input, the indicator (0 or 1) of one level of a categorical input, or the
 /// product of two numeric inputs' deviations, d_i d_j with d = x - InputColumn::centre. Beyond the training extent the
-/// factors of a product are held to it, rounded off as in the guards of Model, so that nothing quadratic goes on there.
+/// factors of a product are held to the extent (docs/algorithms/data.md, D.1), so that products are constant there.
 struct Regressor {
   int input = 0;
   int level = -1;         ///< -1 for a number
@@ -143,18 +145,18 @@ struct Leaf {
   int rank = 0;              ///< as Node::rank
   Eigen::VectorXd low;       ///< box, one per model input: low < x <= high; -infinity where open
   Eigen::VectorXd high;      ///< +infinity where open
-  /// On which sides of oblique splits it lies as well, from the root down.
+  /// The sides of oblique splits on which the leaf lies, from the root down.
   std::vector<ObliqueSide> sides = {};
   std::vector<std::vector<int>>
       levels;            ///< one per model input: levels that belong to the leaf; empty: all, or numeric
   Eigen::VectorXd rmse;  ///< sqrt(rss / samples) over the training rows, one per output of the partition
-  /// Local model where all regressors are 0, one per output of the partition: f = intercept + slope . regressors. That
-  /// is where the inputs are 0; but a product is 0 where one of its factors is at its mean.
+  /// f = intercept + slope . regressors, one intercept per output of the partition. Numbers are 0 as regressors where
+  /// the input is 0, but a product is 0 where one of its factors is at its mean.
   Eigen::VectorXd intercept;
   Eigen::MatrixXd slope;  ///< outputs of the partition x regressors
 };
 
-/// How far a query lies from what the model has seen.
+/// How far a query lies from the training rows.
 struct Extrapolation {
   /// The largest excess over the training extent, as a multiple of that input's training range; 0 inside, infinity
   /// where an input that never varied differs.
@@ -214,12 +216,12 @@ class Model {
   /// of the largest. Throws as predict().
   Eigen::MatrixXi leaf_of(const Eigen::Ref<const Eigen::MatrixXd>& inputs, int max_threads = 0) const;
 
-  /// The validities of the leaves of a partition at each row, rows x leaves as in leaves(partition). Throws as
+  /// Validities of the leaves of a partition at each row, rows x leaves as in leaves(partition). Throws as
   /// predict(), and if there is no such partition.
   Eigen::MatrixXd validities(const Eigen::Ref<const Eigen::MatrixXd>& inputs, Eigen::Index partition,
                              int max_threads = 0) const;
 
-  /// How far each row lies from what the model has seen. Missing values do not count. Throws as predict().
+  /// How far each row lies from the training rows. Missing values do not count. Throws as predict().
   std::vector<Extrapolation> extrapolation(const Eigen::Ref<const Eigen::MatrixXd>& inputs, int max_threads = 0) const;
 
   /// Standard errors of the local models' means, rows x outputs: the square root of the validity-weighted mean of

@@ -1,9 +1,9 @@
 /// \file
 /// Random numbers that are the same on every platform.
 ///
-/// The standard library fixes the engines but not the distributions, so a seed means different data with another
-/// vendor. Here both are ours: xoshiro256** (Blackman & Vigna 2018) seeded through splitmix64, and distributions
-/// written out.
+/// The C++ standard fixes the engines but not the distributions, so the same seed gives different data with the
+/// standard library of another vendor. Here both are fixed: the engine xoshiro256** (Blackman & Vigna 2018), seeded by
+/// splitmix64, and the distributions below.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,5 +1,5 @@
 /// \file
-/// What callers get told when their arguments do not fit.
+/// Checks of arguments. All throw std::invalid_argument that names function, argument, place and value.
 #pragma once
 
 #include <fmt/format.h>
@@ -11,6 +11,7 @@
 
 namespace llmt {
 
+/// Checks that all entries of a matrix are finite.
 inline void check_finite(const char* function, const char* argument, const Eigen::Ref<const Eigen::MatrixXd>& values) {
   if (values.allFinite()) return;
   for (Eigen::Index column = 0; column < values.cols(); ++column) {
@@ -40,7 +41,7 @@ inline void check_finite_or_missing(const char* function, const char* argument,
   }
 }
 
-/// Every index in [0, count), none twice.
+/// Checks that every column is in [0, count) and that none is named twice.
 inline void check_columns(const char* function, const char* argument, const std::vector<int>& columns,
                           Eigen::Index count) {
   std::vector<bool> seen(count, false);

@@ -38,9 +38,9 @@ bool is_missing(std::string_view text) {
   });
 }
 
-// End of the number at `begin`, null if there is none. A plus is taken. Out of range is no error: too large reads as
-// infinity, too small as zero. These and leading white space, line breaks too, are what versions and options of
-// fast_float differ in.
+// End of the number at `begin`, null if there is none. A leading plus is accepted, leading white space is not. A number
+// out of range is no error: too large reads as infinity, too small as zero. All three are handled here because versions
+// and options of fast_float differ in them.
 const char* number_end(const char* begin, const char* end, double& value) {
   const bool has_sign = begin != end && (*begin == '+' || *begin == '-');
   const char* const first = begin + (has_sign ? 1 : 0);
@@ -57,7 +57,7 @@ const char* after_blanks(const char* begin, const char* end, char separator) {
   return begin;
 }
 
-// The beginning of what would fill a screen.
+// A text that fits into a message: cut off after 60 bytes.
 std::string shortened(std::string_view text) {
   constexpr std::size_t most = 60;
   if (text.size() <= most) return std::string(text);
@@ -71,7 +71,7 @@ std::string shortened(std::string_view text) {
 std::size_t count(const char* begin, const char* end, char wanted) {
   std::size_t result = 0;
   while (begin != end) {
-    // So few that a byte counts them: a vector then has sixteen counters, not two.
+    // At a time no more bytes than one byte can count: a vector register then has sixteen counters instead of two.
     const char* const stop = begin + std::min<Eigen::Index>(end - begin, std::numeric_limits<unsigned char>::max());
     unsigned char found = 0;
     for (; begin != stop; ++begin) {
@@ -100,7 +100,7 @@ Record record_at(const char* begin, const char* end, char separator) {
     record_end = find(line + 1, end, '\n');
     quotes += count(line, record_end, '"');
   }
-  // Without branches, which would often go another way than the processor thought.
+  // Without branches, which the processor would often predict wrongly.
   std::size_t fields = 1;
   bool quoted = false;
   for (const char* c = begin; c != record_end; ++c) {
@@ -132,7 +132,8 @@ std::string_view cell_text(std::string_view field, std::string& buffer) {
 }
 
 Cell read_cell(const char*& cursor, const char* end, char separator, double& value) {
-  // Most cells are a number and nothing else, and where the number ends the field does: nobody looks for the separator.
+  // Most cells hold a number and nothing else. The field then ends where the number ends, and no search for the
+  // separator is needed.
   const char* const begin = after_blanks(cursor, end, separator);
   const bool quoted = begin != end && *begin == '"';
   const char* after = number_end(begin + (quoted ? 1 : 0), end, value);

@@ -1,6 +1,5 @@
 /// \file
-/// Records and fields of CSV text and what they say: all that there is to know about quotes, blanks, missing values and
-/// numbers.
+/// Records and fields of CSV text: quotes, blanks, missing values and numbers.
 #pragma once
 
 #include <Eigen/Core>
@@ -36,13 +35,13 @@ bool is_blank(std::string_view text);
 /// A field as text: outer blanks and quotes taken off, doubled quotes halved.
 std::string unquoted(std::string_view field);
 
-/// What a cell says: as unquoted(), also without blanks inside the quotes; empty if it says that there is no value.
-/// Lies in `field`, or in `buffer` if quotes were halved.
+/// The text of a cell as unquoted() has it, also without outer blanks inside the quotes; empty if the cell says that
+/// there is no value. The result refers to `field`, or to `buffer` if doubled quotes were halved.
 std::string_view cell_text(std::string_view field, std::string& buffer);
 
 enum class Cell { number, missing, other };
 
-/// What the cell at `cursor` is, and in `value` which number. Moves `cursor` to the end of the field.
+/// What the cell at `cursor` holds; a number is written to `value`. Moves `cursor` to the end of the field.
 Cell read_cell(const char*& cursor, const char* end, char separator, double& value);
 
 /// Why a cell is not a number.

@@ -71,8 +71,8 @@ Eigen::Index buffered_rows(Eigen::Index columns) {
   return std::max<Eigen::Index>(8, numbers / std::max<Eigen::Index>(columns, 1));
 }
 
-// The rows are read in tasks of so many: few tasks, because each counts cells in every column, and there may be
-// thousands.
+// Number of rows that one task reads. There are few tasks, because each of them counts the cells of every column, and
+// there may be thousands of columns.
 Eigen::Index rows_of_task(Eigen::Index rows) { return std::max<Eigen::Index>(4096, rows / 256 + 1); }
 
 }  // namespace

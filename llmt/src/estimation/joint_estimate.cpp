@@ -3,8 +3,8 @@
 #include <map>
 #include <utility>
 
-#include "data/missing.hpp"
 #include "model/evaluator.hpp"
+#include "model/imputed.hpp"
 #include "numerics/conjugate_gradients.hpp"
 
 namespace llmt {

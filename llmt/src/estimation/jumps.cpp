@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "base/parallel.hpp"
-#include "data/missing.hpp"
 #include "model/evaluator.hpp"
+#include "model/imputed.hpp"
 #include "numerics/f_distribution.hpp"
 
 namespace llmt {

@@ -6,7 +6,7 @@
 #include "base/parallel.hpp"
 #include "constraints/monotone_splits.hpp"
 #include "constraints/signs.hpp"
-#include "data/missing.hpp"
+#include "model/imputed.hpp"
 #include "numerics/forward_selection.hpp"
 
 namespace llmt {

@@ -4,8 +4,8 @@
 #include <limits>
 
 #include "base/parallel.hpp"
-#include "data/missing.hpp"
 #include "model/evaluator.hpp"
+#include "model/imputed.hpp"
 #include "numerics/dense.hpp"
 
 namespace llmt {

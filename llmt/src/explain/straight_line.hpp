@@ -1,5 +1,6 @@
 /// \file
-/// Where a straight line through the inputs meets the splits and guards of a partition.
+/// Where a straight line through the input space meets the splits and guards of a partition
+/// (docs/algorithms/explanation.md).
 #pragma once
 
 #include <Eigen/Core>
@@ -14,8 +15,8 @@ namespace llmt {
 /// Positions on a line that differ by less count as one.
 inline constexpr double same_position = 1e-12;
 
-/// From a reference at position 0 to a point at position 1. Inputs that cannot move, being categorical or missing at
-/// one end, are switched in the middle.
+/// The line from a reference at position 0 to a point at position 1. Inputs that cannot move, because they are
+/// categorical or missing at one end, are switched in the middle.
 struct StraightLine {
   StraightLine(const Model& model, const Eigen::Ref<const Eigen::VectorXd>& reference,
                const Eigen::Ref<const Eigen::VectorXd>& point);
@@ -45,7 +46,7 @@ struct Pieces {
   std::vector<Crossing> crossings;  ///< ascending
 };
 
-/// `at_kinks`: also where a transition or a guard sets in or ends.
+/// Cuts the line at jumps. `at_kinks`: also where a transition or a guard sets in or ends.
 Pieces cut_line(const Model& model, const Partition& partition, const Evaluator& evaluator, const StraightLine& line,
                 bool at_kinks);
 

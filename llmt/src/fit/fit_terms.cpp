@@ -7,7 +7,6 @@
 #include <optional>
 
 #include "base/parallel.hpp"
-#include "estimation/leaf_statistics.hpp"
 #include "fit/grow_tree.hpp"
 #include "selection/selection.hpp"
 

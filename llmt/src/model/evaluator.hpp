@@ -32,14 +32,13 @@ class Evaluator {
   bool is_ambiguous(const double* row) const { return validities_.is_ambiguous(row); }
   int child_of(int node, const double* row) const { return validities_.child_of(node, row); }
 
-  /// Local model of a node, one value per output, with its ancestors' slopes beyond the node's range and none beyond
-  /// the root's.
+  /// Guarded local model of a node (docs/algorithms/guards.md, B.2), one value per output.
   void local(int node, const double* deviations, double* values) const;
 
-  /// Holds values near the root's model and goes on beyond the root's range.
+  /// Applies the guards B.3 and B.4 of docs/algorithms/guards.md to `values`.
   void finish(const double* deviations, double* values) const { models_.finish(deviations, values); }
 
-  /// The prediction: sum of validity times local model, finished.
+  /// The prediction (docs/algorithms/model.md, M.2) with its guards: sum of validity times local model, finished.
   void combine(const std::vector<Activation>& active, const double* deviations, double* values) const;
 
   /// Predictions of a block, rows x outputs of the partition, one row after the other.

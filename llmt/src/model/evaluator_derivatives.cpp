@@ -82,7 +82,7 @@ void Evaluator::derivatives(const double* row, const double* deviations, Eigen::
                             Eigen::MatrixXd& by_regressor) const {
   by_input.setZero(num_outputs(), inputs_);
   by_regressor.setZero(num_outputs(), regressors_);
-  // A subtree leaves its values in front and works behind them, no deeper than there are leaves.
+  // A subtree writes its values in front and uses the space behind them; it needs no more levels than there are leaves.
   std::vector<double> values((validities_.num_leaves() + 1) * num_outputs());
   if (validities_.are_gaussian()) {
     add_gaussian_derivatives(row, deviations, values.data(), by_input, by_regressor);

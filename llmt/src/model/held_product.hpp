@@ -1,5 +1,5 @@
 /// \file
-/// The value of a product of two inputs. For sources compiled like lanes.hpp.
+/// Factors of a product of two inputs: docs/algorithms/data.md, D.1.
 #pragma once
 
 #include "llmt/model.hpp"
@@ -7,7 +7,7 @@
 
 namespace llmt {
 
-/// Deviation of an input from its mean, held to the training extent: beyond it a product goes no further.
+/// Deviation e of an input from its mean (D.1), held to the training extent so that a product is constant far outside.
 LLMT_INLINE double factor_at(const InputColumn& input, double x) {
   const double low = input.low - input.centre;
   const double high = input.high - input.centre;
@@ -15,6 +15,7 @@ LLMT_INLINE double factor_at(const InputColumn& input, double x) {
   return deviation > high || deviation < low ? hold(deviation, low, high) : deviation;
 }
 
+/// Derivative of factor_at() with respect to x.
 inline double factor_derivative(const InputColumn& input, double x) {
   return hold_derivative(x - input.centre, input.low - input.centre, input.high - input.centre);
 }

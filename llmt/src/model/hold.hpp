@@ -1,15 +1,15 @@
 /// \file
-/// Equation 13 of docs/algorithms.md: holding a value to a range.
+/// Holding a value to a range with a continuous derivative: docs/algorithms/guards.md, B.1.
 #pragma once
 
 #include "base/simd.hpp"
 
 namespace llmt {
 
-/// Over this fraction of a range the hold at its ends sets in.
+/// Length r of the parabola beyond either end of a range, as a fraction of the range.
 inline constexpr double rounding_of_hold = 0.1;
 
-/// `x` held to low ... high, with a parabola of length `round` at the ends; of numbers or quads.
+/// hold(x) of B.1 for the range low ... high. `Number`: double or Quad.
 template <class Number>
 LLMT_INLINE Number hold(Number x, Number low, Number high) {
   const Number round = rounding_of_hold * (high - low);
@@ -20,6 +20,7 @@ LLMT_INLINE Number hold(Number x, Number low, Number high) {
                    : x;
 }
 
+/// Derivative of hold() with respect to x.
 inline double hold_derivative(double x, double low, double high) {
   if (!(x > high || x < low)) return 1.0;
   const double round = rounding_of_hold * (high - low);

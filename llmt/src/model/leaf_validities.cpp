@@ -12,7 +12,7 @@
 namespace llmt {
 namespace {
 
-// Validities below this share of the largest are left out of Gaussians.
+// Gaussians whose logarithm lies this far below the largest one's are left out.
 constexpr double negligible_log = -40.0;
 
 }  // namespace
@@ -77,7 +77,7 @@ void LeafValidities::add_gaussians(const Partition& partition, const std::vector
     for (Eigen::Index j = 0; j < gaussians_.stride; ++j) {
       const bool used = j < count && is_split[j];
       const double sigma = used ? partition.validity.width * (boxes.high(j, box) - boxes.low(j, box)) : 0.0;
-      // Where no leaf was cut, all Gaussians are alike and cancel.
+      // An input that no split uses has the same factor in all Gaussians, which normalisation cancels.
       gaussians_.per_sigma.push_back(sigma > 0.0 ? 1.0 / sigma : 0.0);
       gaussians_.centres.push_back(used ? 0.5 * (boxes.low(j, box) + boxes.high(j, box)) : 0.0);
     }

@@ -1,5 +1,6 @@
 /// \file
-/// Which leaves reach a point and how much each counts there (docs/algorithms.md, section 5), laid out for evaluation.
+/// The leaves whose validity is positive at a point, and their validities (docs/algorithms/validities.md), laid out for
+/// evaluation.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,7 +14,7 @@
 
 namespace llmt {
 
-/// A row without a value for a split teaches a child if that has at least this share of it.
+/// A row without a value for a split takes part in the fit of a child if the child has at least this share of it.
 inline constexpr double clear_share = 0.9;
 
 /// A leaf that reaches a point.
@@ -35,20 +36,20 @@ class LeafValidities {
   /// The same for a block: each leaf that some row reaches, in that order, with its rows, ascending.
   void for_each_leaf(const RowBlock& block, const std::function<void(int node, const RowList& list)>& visit) const;
 
-  /// Validity of the left child at a split, and its derivative with respect to what the split compares.
+  /// Validity of the left child at a split, and its derivative with respect to the number that the split compares.
   double left_share(int node, const double* row) const {
     const Branch& branch = branches_[node];
     return left_share(branch, side(branch, row));
   }
   double left_share_derivative(int node, const double* row) const;
-  /// by_input += factor * derivatives, by the inputs, of what the split compares.
+  /// by_input += factor * derivatives, by the inputs, of the number that the split compares.
   void add_side_derivatives(int node, const Eigen::VectorXd& factor, Eigen::MatrixXd& by_input) const;
-  /// What the split compares with its threshold.
+  /// The number s(x) that the split compares with its threshold.
   double side(int node, const double* row) const { return side(branches_[node], row); }
 
-  /// Whether a missing value sends the row to both sides of some split in earnest.
+  /// Whether, at some split that the row reaches, a missing value leaves both children with more than a tenth of it.
   bool is_ambiguous(const double* row) const;
-  /// Where the larger share of a row goes.
+  /// The child that has the larger share of a row.
   int child_of(int node, const double* row) const;
 
   /// Left and right child of a node, -1 in a leaf.
@@ -70,16 +71,16 @@ class LeafValidities {
     int first_term = -1;  // of this split's entries in terms_; -1: axis-orthogonal
     int terms = 0;
     double threshold = 0.0;
-    double per_half_width = 0.0;  // 1 / h; 0: a jump
+    double per_half_width = 0.0;  // 1 / half width; 0: a jump
     double missing_left = 0.5;
   };
-  /// Of an oblique split, one for each input that counts.
+  /// A term of the direction of an oblique split; inputs of weight 0 have none.
   struct Term {
     int input;
     double weight;
     double centre;
   };
-  /// Of the leaves, in order of growth; rows of `stride` entries, padded with zeros to whole quads.
+  /// Gaussians of the leaves, in order of growth; rows of `stride` entries, padded with zeros to whole quads.
   struct Gaussians {
     std::vector<int> nodes = {};
     Eigen::Index inputs = 0;
@@ -87,7 +88,7 @@ class LeafValidities {
     std::vector<double> centres = {};
     std::vector<double> per_sigma = {};  // 1 / sigma; 0 for an input without extent, or categorical
   };
-  /// Rows on their way down: those of a node stand behind those that wait for a right child above it.
+  /// Rows on their way down the tree. The rows of a node stand behind the rows that wait for right children above it.
   struct Waiting {
     std::vector<int> rows;
     std::vector<double> validities;
@@ -96,7 +97,7 @@ class LeafValidities {
   double side(const Branch& branch, const double* row) const {
     return branch.first_term < 0 ? row[branch.input] : oblique_side(branch, row, 1);
   }
-  /// Inputs that are `stride` apart. A missing one counts as its centre.
+  /// s(x) of an oblique split; successive inputs are `stride` apart. A missing input counts as its centre.
   double oblique_side(const Branch& branch, const double* row, Eigen::Index stride) const {
     double sum = 0.0;
     for (int k = 0; k < branch.terms; ++k) {

@@ -13,9 +13,9 @@ struct Fork {
   const int* rows;
   const double* validities;
   Eigen::Index count;
-  int* left_rows;  // room for all
+  int* left_rows;  // with space for `count` rows
   double* left_validities;
-  int* right_rows;  // may be those that come in
+  int* right_rows;  // may be the same memory as `rows`
   double* right_validities;
 };
 
@@ -30,7 +30,7 @@ Counts jump(const Fork& fork, const double* column, double threshold) {
   for (Eigen::Index i = 0; i < fork.count; ++i) {
     const int row = fork.rows[i];
     const double validity = fork.validities[i];
-    // Both are written, and one is kept: no branch to be guessed wrong.
+    // Both sides are written and one is kept, without a branch that the processor could predict wrongly.
     fork.left_rows[counts.left] = row;
     fork.left_validities[counts.left] = validity;
     fork.right_rows[counts.right] = row;

@@ -10,8 +10,8 @@
 
 namespace llmt {
 
-/// a' (sum validity a a')^-1 a, a = [1, deviations], missing ones as in the mean of the leaf's rows, of each row of
-/// `list` in `block`; zeros if the leaf has no Node::inverse_gram.
+/// Leverages a' (sum validity a a')^-1 a of the rows of `list` in `block`, where a = [1, deviations] with missing
+/// deviations at the mean of the leaf's rows. Zeros if the leaf has no Node::inverse_gram.
 void leverages(const Node& leaf, const RowList& list, const RowBlock& block, std::vector<double>& result);
 
 }  // namespace llmt

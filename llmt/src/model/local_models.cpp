@@ -8,7 +8,7 @@
 namespace llmt {
 namespace {
 
-// Predictions may differ from the root's model by more than its residuals did, by this fraction of their range.
+// The range of the root's residuals is widened at both ends by this fraction (docs/algorithms/guards.md, B.3).
 constexpr double output_margin = 0.1;
 
 // A row of deviations padded with zeros.
@@ -75,8 +75,8 @@ LocalModels::LocalModels(const Partition& partition, Eigen::Index regressors)
   }
 }
 
-// Whether the row lies in the node's range. `first`: the local model of the first output without guards, for it costs
-// little beside the check.
+// Whether the row lies in the node's range. Sets `first` to the local model of the first output without guards, which
+// costs little beside the check.
 template <class Row>
 LLMT_INLINE bool LocalModels::sum_inside(int node, const Row& row, double& first) const {
   const double* lows = low(node);
@@ -103,7 +103,7 @@ LLMT_INLINE double LocalModels::sum(int node, Eigen::Index output, const Row& ro
   return value(node, output) + sum_of(sum);
 }
 
-// The local model of a row that lies outside the node's range, or lacks a value: equation 14.
+// The local model (B.2) at a row that lies outside the node's range or lacks a value.
 template <class Row>
 LLMT_INLINE double LocalModels::guarded(int node, Eigen::Index output, const Row& row) const {
   Quad sum = {};

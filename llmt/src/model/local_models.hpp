@@ -1,5 +1,5 @@
 /// \file
-/// The local models of a partition and their guards (docs/algorithms.md, section 9), laid out for evaluation.
+/// The local models of a partition and their guards (docs/algorithms/guards.md), laid out for evaluation.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,7 +14,7 @@ namespace llmt {
 /// Deviation of the indicator of a level from its centre where the input is `x`; NaN where that is missing or unknown.
 inline double indicator_deviation(double x, int level, double levels, double centre) {
   const double there = x == static_cast<double>(level) ? 1.0 - centre : 0.0 - centre;
-  // Without a branch, for levels come in no order.
+  // Without a branch: levels of successive rows are unrelated, so a branch would often be predicted wrongly.
   return static_cast<int>(x >= 0.0) & static_cast<int>(x < levels) ? there : std::numeric_limits<double>::quiet_NaN();
 }
 
@@ -32,19 +32,20 @@ struct RowList {
 
 /// Immutable after construction.
 ///
-/// A sum over the regressors is that of four partial ones, (s_0 + s_2) + (s_1 + s_3), s_l over the regressors l, l + 4,
-/// l + 8, ..., plus the value: on every machine, for single rows and for blocks.
+/// A sum over the regressors consists of four partial sums, (s_0 + s_2) + (s_1 + s_3), where s_l runs over the
+/// regressors l, l + 4, l + 8, ...; the value is added last. This order holds on every machine, for single rows and for
+/// blocks.
 class LocalModels {
  public:
   LocalModels(const Partition& partition, Eigen::Index regressors);
 
   Eigen::Index num_outputs() const { return outputs_; }
 
-  /// sums[o] += validity * local model of the node for output o, with its ancestors' slopes beyond the node's range and
-  /// none beyond the root's.
+  /// sums[o] += validity * f(x), where f is the guarded local model of the node for output o (B.2).
   void add(int node, double validity, const double* deviations, double* sums) const;
 
-  /// Holds values near the root's model and goes on beyond the root's range.
+  /// Applies the guards B.3 and B.4 to `values`: holds them near the root's model, and goes on with the outer slopes
+  /// beyond the root's range.
   void finish(const double* deviations, double* values) const;
 
   /// The same for rows of a block: `deviations` as in RowBlock, `sums` rows x outputs, one row after the other.
@@ -54,7 +55,7 @@ class LocalModels {
   /// by_regressor += validity * derivatives of add(), outputs x regressors.
   void add_slopes(int node, double validity, const double* deviations, Eigen::MatrixXd& by_regressor) const;
 
-  /// Makes derivatives of `values` with respect to inputs and regressors those of finish().
+  /// Turns derivatives of `values` with respect to inputs and regressors into the derivatives of finish().
   void finish_slopes(const double* deviations, const double* values, Eigen::MatrixXd& by_input,
                      Eigen::MatrixXd& by_regressor) const;
 

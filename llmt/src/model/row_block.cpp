@@ -18,7 +18,7 @@ struct Oddities {
 
 LLMT_FOR_EACH_INSTRUCTION_SET
 Oddities oddities_of(const double* values, Eigen::Index size) {
-  // Counted, for that is done several values at a time.
+  // Counting, unlike stopping at the first one, is done several values at a time.
   Eigen::Index missing = 0;
   Eigen::Index infinite = 0;
   for (Eigen::Index i = 0; i < size; ++i) {

@@ -1,5 +1,5 @@
 /// \file
-/// Derivatives by regressors as derivatives by inputs.
+/// Derivatives with respect to inputs from derivatives with respect to regressors (chain rule).
 #pragma once
 
 #include <Eigen/Core>
@@ -11,9 +11,8 @@ namespace llmt {
 
 inline bool is_product(const Regressor& regressor) { return regressor.second_input >= 0; }
 
-/// Derivatives with respect to regressors at a row of inputs turned into those with respect to inputs, and added.
-/// `by_regressor` outputs x regressors, `by_input` outputs x inputs. Levels have none, nor products with a factor that
-/// is missing.
+/// Adds to `by_input` (outputs x inputs) what `by_regressor` (outputs x regressors), the derivatives at the inputs
+/// `row`, contribute through the regressors. Levels contribute nothing, nor do products with a missing factor.
 void add_through_regressors(const std::vector<InputColumn>& inputs, const std::vector<Regressor>& regressors,
                             const double* row, const Eigen::MatrixXd& by_regressor, Eigen::MatrixXd& by_input);
 

@@ -1,5 +1,5 @@
 /// \file
-/// Equation 6 of docs/algorithms.md: how a split hands over from one child to the other.
+/// Transition of a blend from the left to the right child of a split: docs/algorithms/validities.md, V.1.
 #pragma once
 
 #include <cmath>
@@ -8,9 +8,8 @@
 
 namespace llmt {
 
-/// 1 left of -1, 0 right of 1, and `smoothness` continuous derivatives: 1, or 2 in models that an earlier version
-/// wrote. Fits make no such models any more; predictions, derivatives and attributions of these files stay what they
-/// were.
+/// Validity g of the left child: 1 for u <= -1, 0 for u >= 1, with `smoothness` continuous derivatives in between. 1 is
+/// V.1. 2 occurs only in model files of earlier versions, whose predictions, derivatives and attributions it preserves.
 LLMT_INLINE double transition(double u, int smoothness) {
   const double held = u < -1.0 ? -1.0 : u > 1.0 ? 1.0 : u;
   const double v = 0.5 * (held + 1.0);
@@ -19,6 +18,7 @@ LLMT_INLINE double transition(double u, int smoothness) {
   return share < 0.0 ? 0.0 : share > 1.0 ? 1.0 : share;  // rounding
 }
 
+/// Derivative of transition() with respect to u.
 inline double transition_derivative(double u, int smoothness) {
   if (!(std::abs(u) < 1.0)) return 0.0;
   const double v = 0.5 * (u + 1.0);

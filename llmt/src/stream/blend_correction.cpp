@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "data/missing.hpp"
+#include "model/imputed.hpp"
 #include "model/tree.hpp"
 #include "numerics/conjugate_gradients.hpp"
 

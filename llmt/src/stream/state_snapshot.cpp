@@ -6,7 +6,6 @@
 
 #include "base/matrix.hpp"
 #include "data/dataset.hpp"
-#include "data/table.hpp"
 #include "llmt/fit.hpp"
 #include "stream/crisp_partition.hpp"
 #include "stream/snapshot.hpp"

@@ -13,12 +13,12 @@
 namespace llmt {
 namespace {
 
-// The default of max_leaves is the number of leaves whose bins take 64 MiB, within 16 ... 500.
+// The default of max_leaves is the number of leaves whose bins take this many bytes, within these bounds.
 constexpr double default_bytes = 64.0 * 1024.0 * 1024.0;
 constexpr Eigen::Index fewest_default_leaves = 16;
 constexpr Eigen::Index most_default_leaves = 500;
 
-// The default of min_leaf_samples is two rows for each coefficient of a local model.
+// The default of min_leaf_samples.
 constexpr Eigen::Index rows_per_coefficient = 2;
 
 [[noreturn]] void reject(const std::string& what) { throw std::invalid_argument("llmt::Stream: " + what); }

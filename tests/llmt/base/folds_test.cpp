@@ -4,9 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 
 #include "llmt/random.hpp"
+#include "oracles/thrown.hpp"
 
 namespace {
 
@@ -52,10 +52,13 @@ TEST(Folds, SeedsChangeTheDealAndRepeatIt) {
 }
 
 TEST(Folds, MistakesAreNamed) {
-  EXPECT_THROW(llmt::make_folds(3, {.count = 5}), std::invalid_argument);
-  EXPECT_THROW(llmt::make_folds(10, {.count = 1}), std::invalid_argument);
+  EXPECT_EQ(oracle::thrown([] { llmt::make_folds(3, {.count = 5}); }),
+            "llmt::make_folds: 5 folds need at least 5 rows (or groups), there are 3");
+  EXPECT_EQ(oracle::thrown([] { llmt::make_folds(10, {.count = 1}); }),
+            "llmt::make_folds: count is 1, it must be at least 2");
   const std::vector<double> labels(9, 1.0);
-  EXPECT_THROW(llmt::make_folds(10, {.groups = labels}), std::invalid_argument);
+  EXPECT_EQ(oracle::thrown([&] { llmt::make_folds(10, {.groups = labels}); }),
+            "llmt::make_folds: groups has 9 labels for 10 rows");
 }
 
 TEST(Random, FollowsThePublishedGenerators) {

@@ -10,6 +10,7 @@
 #include "llmt/fit.hpp"
 #include "oracles/oracles.hpp"
 #include "oracles/random_trees.hpp"
+#include "oracles/thrown.hpp"
 
 namespace {
 
@@ -272,11 +273,17 @@ TEST(Explain, ImportanceIsTheShareOfTheMovedOutput) {
 
 TEST(Explain, RejectsWhatDoesNotFit) {
   const llmt::Model model = four_fields(1.0, {0.0, 1.0, 1.0, 5.0});
-  EXPECT_THROW(llmt::attribute(model, Eigen::Vector3d::Zero()), std::invalid_argument);
-  EXPECT_THROW(llmt::attribute(model, Eigen::Vector2d::Zero(), Eigen::VectorXd::Zero(1)), std::invalid_argument);
-  EXPECT_THROW(llmt::attribute(model, Eigen::Vector2d(0.0, HUGE_VAL)), std::invalid_argument);
-  EXPECT_THROW(llmt::importance(model, Eigen::MatrixXd::Zero(0, 2)), std::invalid_argument);
-  EXPECT_THROW(llmt::importance(model, Eigen::MatrixXd::Zero(2, 3)), std::invalid_argument);
+  using oracle::thrown;
+  EXPECT_EQ(thrown([&] { llmt::attribute(model, Eigen::Vector3d::Zero()); }),
+            "llmt::attribute: point has 3 entries, the model has 2 inputs");
+  EXPECT_EQ(thrown([&] { llmt::attribute(model, Eigen::Vector2d::Zero(), Eigen::VectorXd::Zero(1)); }),
+            "llmt::attribute: reference has 1 entries, the model has 2 inputs");
+  EXPECT_EQ(
+      thrown([&] { llmt::attribute(model, Eigen::Vector2d(0.0, HUGE_VAL)); }).find("llmt::attribute: point(1, 0)"), 0U);
+  EXPECT_EQ(thrown([&] { llmt::importance(model, Eigen::MatrixXd::Zero(0, 2)); }),
+            "llmt::importance: inputs is 0 x 2, it must have a row and the model's 2 inputs");
+  EXPECT_EQ(thrown([&] { llmt::importance(model, Eigen::MatrixXd::Zero(2, 3)); }),
+            "llmt::importance: inputs is 2 x 3, it must have a row and the model's 2 inputs");
 }
 
 }  // namespace

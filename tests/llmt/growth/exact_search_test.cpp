@@ -1,9 +1,11 @@
 #include <gtest/gtest.h>
 
-#include <numeric>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
 
 #include "growth/search/split_search.hpp"
-#include "numerics/node_fit.hpp"
 #include "oracles/brute_force_search.hpp"
 #include "oracles/oracles.hpp"
 
@@ -20,20 +22,51 @@ struct Problem {
   llmt::SearchNode node() const { return {features, weights, rss}; }
 };
 
+using Wide = Eigen::Matrix<long double, Eigen::Dynamic, Eigen::Dynamic>;
+
+// The part of `column` that is orthogonal to the orthonormal columns of `basis`.
+Wide orthogonal_part(const Wide& basis, Wide column) {
+  for (int pass = 0; pass < 2; ++pass) {  // the second pass takes out the rounding of the first
+    column -= basis * (basis.transpose() * column);
+  }
+  return column;
+}
+
+// [1, x] times the roots of the weights, made orthonormal by Gram and Schmidt in long double. A column of which less
+// than 1e-10 is left depends on the columns before it and is dropped.
+Wide orthonormal(const Eigen::MatrixXd& x, const Eigen::VectorXd& weights) {
+  Wide design(x.rows(), x.cols() + 1);
+  design << Wide::Ones(x.rows(), 1), x.cast<long double>();
+  design = weights.cast<long double>().cwiseSqrt().asDiagonal() * design;
+  Wide basis(x.rows(), 0);
+  for (Eigen::Index k = 0; k < design.cols(); ++k) {
+    const Wide rest = orthogonal_part(basis, design.col(k));
+    if (rest.norm() <= 1e-10L * design.col(k).norm()) continue;
+    basis.conservativeResize(Eigen::NoChange, basis.cols() + 1);
+    basis.rightCols(1) = rest.normalized();
+  }
+  return basis;
+}
+
 Problem make_problem(const Eigen::MatrixXd& x, const Eigen::MatrixXd& y, const Eigen::VectorXd& weights,
                      Eigen::Index regressors) {
   Problem problem;
   const Eigen::MatrixXd known = x.array().isNaN().select(0.0, x);
-  llmt::NodeFit fit = llmt::fit_node(known.leftCols(regressors), y, weights);
+  const Wide basis = orthonormal(known.leftCols(regressors), weights);
+  const Wide weighted = weights.cast<long double>().cwiseSqrt().asDiagonal() * y.cast<long double>();
+  const Eigen::MatrixXd residuals = orthogonal_part(basis, weighted).cast<double>();
+  const Eigen::MatrixXd columns = (basis * std::sqrt(weights.sum())).cast<double>();  // mean square 1 by weight
   problem.weights = Eigen::VectorXd::Constant(y.cols(), 2.0);
-  problem.rss = problem.weights.dot(fit.rss);
-  problem.features = std::move(fit.features);
+  problem.rss = problem.weights.dot(residuals.colwise().squaredNorm());
+  problem.features = llmt::Features(x.rows(), columns.cols(), y.cols());
+  for (Eigen::Index row = 0; row < x.rows(); ++row) {
+    Eigen::Map<Eigen::RowVectorXd> features(problem.features.row(row), problem.features.columns());
+    features << columns.row(row), residuals.row(row);
+  }
   for (Eigen::Index j = 0; j < x.cols(); ++j) {
     std::vector<int> order;
     for (int row = 0; row < x.rows(); ++row) {
-      if (!std::isnan(x(row, j))) {
-        order.push_back(row);
-      }
+      if (!std::isnan(x(row, j))) order.push_back(row);
     }
     std::ranges::stable_sort(order, [&](int a, int b) { return x(a, j) < x(b, j); });
     const Eigen::VectorXd sorted = x.col(j)(order);
@@ -67,7 +100,7 @@ Result search(const Problem& problem, Eigen::Index min_leaf_samples) {
   for (std::size_t j = 0; j < searches.size(); ++j) {
     const llmt::SplitCandidate split = searches[j].best();
     result.evaluations += split.evaluations;
-    if (result.input < 0 && split.input >= 0 && split.rss <= smallest + llmt::tie_tolerance * problem.rss) {
+    if (result.input < 0 && split.input >= 0 && split.rss <= smallest + oracle::tie * problem.rss) {
       result.input = static_cast<int>(j);
       result.split = split;
     }

@@ -21,7 +21,7 @@ llmt::FitResult grow(const Eigen::MatrixXd& x, const Eigen::MatrixXd& y, llmt::F
 
 const std::vector<llmt::Node>& nodes(const llmt::FitResult& result) { return result.model.partitions()[0].nodes; }
 
-// M5' as docs/algorithms.md has it, the plain way: every split compared, every model refitted.
+// M5' as docs/algorithms/m5.md defines it, written out plainly: every split compared, every model refitted.
 class PlainM5 {
  public:
   struct Tree {

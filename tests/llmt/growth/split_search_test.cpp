@@ -46,7 +46,7 @@ TEST(SplitSearch, BestSplitEqualsBruteForceRefit) {
 }
 
 TEST(SplitSearch, BestSplitEqualsBruteForceRefitForManyInputs) {
-  const Eigen::MatrixXd x = oracle::uniform(120, 11, 3);  // more than the sizes known at compile time
+  const Eigen::MatrixXd x = oracle::uniform(120, 11, 3);
   expect_brute_force_split(x, oracle::curved(x, 0.05), 15);
 }
 

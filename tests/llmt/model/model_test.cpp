@@ -4,11 +4,13 @@
 
 #include <Eigen/LU>
 #include <filesystem>
+#include <functional>
 #include <limits>
 
 #include "llmt/files.hpp"
 #include "llmt/fit.hpp"
 #include "oracles/oracles.hpp"
+#include "oracles/thrown.hpp"
 
 namespace {
 
@@ -79,14 +81,23 @@ TEST(Model, LeverageOfALeafIsThatOfItsLeastSquares) {
 
 TEST(Model, RejectsQueriesThatDoNotFit) {
   const llmt::Model model = example();
-  EXPECT_THROW(model.predict(Eigen::MatrixXd::Zero(3, 1)), std::invalid_argument);
-  EXPECT_THROW(model.predict(Eigen::MatrixXd::Constant(3, 2, std::numeric_limits<double>::infinity())),
-               std::invalid_argument);
-  EXPECT_THROW(model.jacobian(Eigen::Vector3d::Zero()), std::invalid_argument);
-  EXPECT_THROW(model.jacobian(Eigen::Vector2d(0.0, std::nan(""))), std::invalid_argument);
-  EXPECT_THROW(model.validities(Eigen::MatrixXd::Zero(3, 2), 2), std::invalid_argument);
-  EXPECT_THROW(model.leaves(2), std::invalid_argument);
-  EXPECT_THROW(model.prefix(0), std::invalid_argument);
+  using oracle::thrown;
+  constexpr double infinity = std::numeric_limits<double>::infinity();
+  EXPECT_EQ(thrown([&] { model.predict(Eigen::MatrixXd::Zero(3, 1)); }),
+            "llmt::Model::predict: inputs has 1 columns, the model has 2 inputs");
+  EXPECT_EQ(
+      thrown([&] { model.predict(Eigen::MatrixXd::Constant(3, 2, infinity)); }),
+      "llmt::Model::predict: inputs(0, 0) is inf, it must be finite, or NaN where it is missing (rows and columns "
+      "counted from 0)");
+  EXPECT_EQ(thrown([&] { model.jacobian(Eigen::Vector3d::Zero()); }),
+            "llmt::Model::jacobian: inputs has 3 columns, the model has 2 inputs");
+  EXPECT_EQ(thrown([&] { model.jacobian(Eigen::Vector2d(0.0, std::nan(""))); }),
+            "llmt::Model::jacobian: point(0, 1) is nan, it must be finite (rows and columns counted from 0)");
+  for (const auto& query : {std::function<void()>([&] { model.validities(Eigen::MatrixXd::Zero(3, 2), 2); }),
+                            std::function<void()>([&] { model.leaves(2); })}) {
+    EXPECT_EQ(thrown(query).find("llmt::Model::leaves: partition is 2, the model has "), 0U);
+  }
+  EXPECT_EQ(thrown([&] { model.prefix(0); }), "llmt::prefix: max_leaves is 0, it must be at least 1");
   EXPECT_EQ(model.predict(Eigen::MatrixXd(0, 2)).rows(), 0);
 }
 
@@ -145,8 +156,11 @@ TEST(ModelFile, AFailedWriteLosesNothing) {
   const std::string path = folder + "/m.json";
   llmt::save(example(), path);
   const std::string before = llmt::read_file(path);
-  EXPECT_THROW(llmt::save(example(), folder + "/missing/m.json"), std::runtime_error);
-  EXPECT_THROW(llmt::write_file(folder, "a folder is there"), std::runtime_error);
+  const std::string missing = folder + "/missing/m.json";
+  EXPECT_EQ(oracle::thrown<std::runtime_error>([&] { llmt::save(example(), missing); }),
+            missing + ": cannot be written: No such file or directory");
+  EXPECT_EQ(oracle::thrown<std::runtime_error>([&] { llmt::write_file(folder, "a folder is there"); }),
+            folder + ": cannot be written: Is a directory");
   EXPECT_EQ(llmt::read_file(path), before);
   llmt::save(llmt::load(path), path);
   EXPECT_EQ(llmt::read_file(path), before);

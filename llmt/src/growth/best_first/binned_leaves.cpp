@@ -5,8 +5,8 @@
 namespace llmt {
 namespace {
 
-// Histograms of leaves that wait may take this part of what the features take, and at least as much as this many
-// nodes.
+// Histograms of waiting leaves may take a quarter of the memory of the features, and at least the memory of the
+// histograms of eight nodes.
 constexpr Eigen::Index kept_part = 4;
 constexpr Eigen::Index kept_nodes = 8;
 

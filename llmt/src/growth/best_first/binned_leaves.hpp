@@ -15,9 +15,8 @@ struct BinnedLeaf : WhitenedLeaf {
 };
 
 /// The features of all rows stay in the basis of the root, so that the histogram of one child is that of its parent
-/// less that of the other child. Digits that this costs are watched: where a node's residual sum of squares is small
-/// against that of the model whose residuals the features hold, its own residuals take their place and its histogram is
-/// formed anew.
+/// less that of the other child. This subtraction loses digits where a node's RSS is small against the RSS of the model
+/// whose residuals the features hold. There the node's own residuals take their place and its histogram is formed anew.
 class BinnedLeaves {
  public:
   /// Whether the data can be binned: no missing values, no more than `most_bins` levels of an input.

@@ -10,7 +10,8 @@
 namespace llmt {
 namespace {
 
-// About this many rows decide where the edges lie: 250 a bin, so that a bin's share is known to 6 %.
+// About this many rows decide where the edges lie. These are 250 rows per bin, which give a bin's share of the rows to
+// 6 %.
 constexpr Eigen::Index sample_rows = 65536;
 
 // Rows whose values, taken together, hash to a small number: the same rows in whatever order they come.
@@ -25,7 +26,7 @@ std::vector<int> sample(const GrowthData& data) {
     std::vector<std::uint64_t> hashes(std::min(block, rows - begin), 0);
     for (Eigen::Index j = 0; j < data.split_inputs(); ++j) {
       for (std::size_t k = 0; k < hashes.size(); ++k) {
-        // Adding zero makes one of the two zeros.
+        // Adding zero turns -0 into +0, which is the same value.
         const double value = data.split_value(begin + static_cast<int>(k), j) + 0.0;
         std::uint64_t hash = hashes[k] ^ std::bit_cast<std::uint64_t>(value);
         hash = (hash ^ (hash >> 32)) * 0x9E3779B97F4A7C15U;
@@ -79,8 +80,8 @@ struct Extent {
   std::array<double, most_bins> high;
 };
 
-// Codes of some rows of a number: how many edges are below the value, in steps of powers of two, without branches, for
-// some values at a time.
+// Codes of the rows begin ... end - 1 of a numeric input: the number of edges below the value. It is found by bisection
+// in steps of powers of two, without branches and for several values at a time.
 void encode(const GrowthData& data, Eigen::Index split_input, const std::vector<double>& edges, int begin, int end,
             std::uint8_t* codes, Extent& extent) {
   std::array<double, most_bins> padded;

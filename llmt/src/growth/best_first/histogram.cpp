@@ -9,11 +9,11 @@
 namespace llmt {
 namespace {
 
-// Doubles that the histogram of a node may take; where Gram matrices are large, the bins are fewer.
+// Number of doubles that the histogram of a node may take. Where Gram matrices are large there are fewer bins.
 constexpr Eigen::Index histogram_size = Eigen::Index{1} << 21;
 constexpr int fewest_bins = 32;
 
-// Rows at a time, so few that their features stay in the cache.
+// Rows that are sorted into bins at a time: few enough that their features stay in the cache.
 constexpr Eigen::Index block_rows = 4096;
 
 }  // namespace

@@ -10,7 +10,8 @@ namespace {
 
 constexpr Eigen::Index block_rows = 4096;
 
-// Rows are asked for this many before they are needed: those of a node lie all over the features.
+// Rows are prefetched this many rows before they are needed, because the rows of a node are scattered over the
+// features.
 constexpr Eigen::Index ahead = 12;
 
 }  // namespace
@@ -22,7 +23,7 @@ ResidualLeaf ResidualLeaves::root() const {
   return leaf;
 }
 
-// What the node's model leaves, times the root of the row's weight: only signs count.
+// Residuals of the node's model times the square root of the row's weight; only their signs count.
 Eigen::MatrixXd ResidualLeaves::residuals(const ResidualLeaf& leaf, const Node& node, int threads) const {
   const Features& features = rows_.features();
   const Eigen::Index count = std::ssize(leaf.rows);

@@ -1,5 +1,6 @@
 /// \file
-/// Large leaves of a growing tree that are split by the signs of their residuals.
+/// Large leaves of a growing tree that are split by the signs of their residuals
+/// (docs/algorithms/residual-analysis.md).
 #pragma once
 
 #include <array>
@@ -16,9 +17,9 @@ struct ResidualLeaf : WhitenedLeaf {
   std::array<std::vector<double>, 2> child_grams;  ///< of both sides of the best split, if it is on a number
 };
 
-/// Residual analysis where no value is missing. The features of all rows stay in the basis of the root: a node costs a
-/// pass over its features for the residuals' signs, one over the values of each input, and one for the Gram matrices of
-/// its children, from which their models follow.
+/// Residual analysis where no value is missing. The features of all rows stay in the basis of the root. A node costs
+/// one pass over its features for the signs of the residuals, one pass over the values of each input, and one pass for
+/// the Gram matrices of its children, from which the children's models follow.
 class ResidualLeaves {
  public:
   explicit ResidualLeaves(const GrowthData& data) : data_(data), rows_(data) {}

@@ -10,14 +10,15 @@
 namespace llmt {
 namespace {
 
-// Deviates that agree to this part are equal: rounding does not choose between inputs.
+// Deviates whose relative difference is smaller count as equal, so that rounding does not choose between inputs.
 constexpr double tie_of_deviates = 1e-9;
 
 // Thresholds are rounded to this part of the input's range in the node, so that a threshold on a value of the data, as
 // on grids, does not send its rows left or right by rounding.
 constexpr double grid = 0x1p-32;
 
-// A split that does not pass the F test at this level, or at that asked for, makes the next input worth a try.
+// If a split does not pass the F test at this level, or at GrowthOptions::significance if that is lower, the next input
+// is tried.
 constexpr double usual_significance = 0.05;
 
 constexpr Eigen::Index partial_sums = 16;
@@ -29,7 +30,7 @@ struct Cut {
   double deviate;
 };
 
-// (m+ + m-) / 2 on a grid of the node's range.
+// The threshold (m+ + m-) / 2 of R.2, on a grid of the node's range.
 double threshold_of(const ResidualStatistics& statistics) {
   const double range = statistics.high - statistics.low;
   const double middle =
@@ -37,16 +38,14 @@ double threshold_of(const ResidualStatistics& statistics) {
   return statistics.low + std::round(middle / range / grid) * grid * range;
 }
 
-// The first of those that are about the most significant.
-std::size_t next_candidate(const std::vector<Cut>& candidates) {
+// Position of the candidate with the largest deviate; of equal ones the first.
+Eigen::Index next_candidate(const std::vector<Cut>& candidates) {
   double largest = 0.0;
   for (const Cut& candidate : candidates) {
     largest = std::max(largest, candidate.deviate);
   }
-  return static_cast<std::size_t>(
-      std::ranges::find_if(
-          candidates, [&](const Cut& candidate) { return candidate.deviate >= (1.0 - tie_of_deviates) * largest; }) -
-      candidates.begin());
+  const auto is_largest = [&](const Cut& candidate) { return candidate.deviate >= (1.0 - tie_of_deviates) * largest; };
+  return std::ranges::find_if(candidates, is_largest) - candidates.begin();
 }
 
 // Fills in the sums of squares of the two child models.
@@ -80,6 +79,41 @@ void evaluate(const ResidualNode& node, ResidualSplit& split) {
   split.best.rank_right = rank[1];
 }
 
+std::span<const double> values_of(const ResidualNode& node, Eigen::Index split_input) {
+  return std::span(node.values.col(split_input).data(), node.rows.size());
+}
+
+// Where each numeric input would be split for each output, if the test of its classes says anything.
+std::vector<Cut> candidates_of(const GrowthData& data, const ResidualNode& node) {
+  const Eigen::Index outputs = node.residuals.cols();
+  std::vector<ResidualStatistics> statistics(data.split_inputs() * outputs);
+  parallel_for(std::ssize(statistics), node.threads, [&](Eigen::Index k) {
+    if (data.num_levels[k / outputs] > 0) return;
+    const std::span residuals(node.residuals.col(k % outputs).data(), node.rows.size());
+    statistics[k] =
+        residual_statistics(values_of(node, k / outputs), residuals, std::span(node.weights.data(), node.rows.size()));
+  });
+  std::vector<Cut> candidates;
+  for (Eigen::Index k = 0; k < std::ssize(statistics); ++k) {
+    const double deviate = statistics[k].deviate();
+    if (deviate > 0.0) candidates.push_back({k / outputs, threshold_of(statistics[k]), deviate});
+  }
+  return candidates;
+}
+
+// The split at a candidate's threshold, without the models of its sides.
+ResidualSplit divide(const ResidualNode& node, const Cut& candidate) {
+  ResidualSplit split;
+  const std::span<const double> values = values_of(node, candidate.input);
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (!std::isnan(values[i])) split.sides[values[i] <= candidate.threshold ? 0 : 1].push_back(static_cast<int>(i));
+  }
+  split.best.input = static_cast<int>(candidate.input);
+  split.best.left = std::ssize(split.sides[0]);
+  split.best.last_left = candidate.threshold;
+  return split;
+}
+
 }  // namespace
 
 std::vector<double> sum_gram(const Features& features, std::span<const int> rows, int threads) {
@@ -98,29 +132,9 @@ std::vector<double> sum_gram(const Features& features, std::span<const int> rows
 }
 
 ResidualSplit search_by_residuals(const GrowthData& data, const ResidualNode& node) {
-  const Eigen::Index inputs = data.split_inputs();
-  const Eigen::Index outputs = node.residuals.cols();
-  const Eigen::Index count = std::ssize(node.rows);
-  const Eigen::Index smallest_leaf = data.problem.options.min_leaf_samples;
-  const auto values_of = [&](Eigen::Index j) { return std::span(node.values.col(j).data(), count); };
-  std::vector<ResidualStatistics> statistics(inputs * outputs);
-  parallel_for(inputs * outputs, node.threads, [&](Eigen::Index k) {
-    if (data.num_levels[k / outputs] == 0) {
-      statistics[k] =
-          residual_statistics(values_of(k / outputs), std::span(node.residuals.col(k % outputs).data(), count),
-                              std::span(node.weights.data(), count));
-    }
-  });
-  std::vector<Cut> candidates;
-  for (Eigen::Index j = 0; j < inputs; ++j) {
-    for (Eigen::Index o = 0; o < outputs; ++o) {
-      const ResidualStatistics& each = statistics[j * outputs + o];
-      if (each.deviate() > 0.0) {
-        candidates.push_back({j, threshold_of(each), each.deviate()});
-      }
-    }
-  }
+  std::vector<Cut> candidates = candidates_of(data, node);
   const Eigen::Index tested = std::ssize(candidates);
+  const Eigen::Index smallest_leaf = std::max<Eigen::Index>(data.problem.options.min_leaf_samples, 1);
   const double level = std::min(data.problem.options.significance, usual_significance);
   const auto passes = [&](const SplitCandidate& split) {
     return split.input >= 0 && data.is_significant(level, node.weights.sum(), node.rank, node.search.rss,
@@ -129,22 +143,10 @@ ResidualSplit search_by_residuals(const GrowthData& data, const ResidualNode& no
   ResidualSplit best;
   Eigen::Index evaluations = 0;
   while (!candidates.empty() && !passes(best.best)) {
-    const std::size_t next = next_candidate(candidates);
-    const Cut candidate = candidates[next];
-    candidates.erase(candidates.begin() + static_cast<Eigen::Index>(next));
-    ResidualSplit split;
-    const std::span<const double> values = values_of(candidate.input);
-    for (std::size_t i = 0; i < values.size(); ++i) {
-      if (!std::isnan(values[i])) {
-        split.sides[values[i] <= candidate.threshold ? 0 : 1].push_back(static_cast<int>(i));
-      }
-    }
-    if (std::min(std::ssize(split.sides[0]), std::ssize(split.sides[1])) < std::max<Eigen::Index>(smallest_leaf, 1)) {
-      continue;
-    }
-    split.best.input = static_cast<int>(candidate.input);
-    split.best.left = std::ssize(split.sides[0]);
-    split.best.last_left = candidate.threshold;
+    const auto next = candidates.begin() + next_candidate(candidates);
+    ResidualSplit split = divide(node, *next);
+    candidates.erase(next);
+    if (std::min(std::ssize(split.sides[0]), std::ssize(split.sides[1])) < smallest_leaf) continue;
     evaluate(node, split);
     ++evaluations;
     if (best.best.input < 0 || split.best.rss < best.best.rss - tie_tolerance * node.search.rss) {

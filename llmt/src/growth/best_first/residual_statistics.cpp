@@ -9,7 +9,7 @@
 namespace llmt {
 namespace {
 
-// What the pooled variance may be of the mean square and still be rounding.
+// A pooled variance below this part of the mean square is rounding.
 constexpr double no_scatter = 1e-14;
 
 // Student's statistic of two classes' means with the pooled variance. `squares`: sums about the class means;
@@ -22,7 +22,7 @@ double student(double difference, double squares, double largest_squares, const 
   return squares <= tiny ? std::copysign(std::numeric_limits<double>::infinity(), difference) : difference / error;
 }
 
-// Four sums of each kind over the rows i, i + 4, ...
+// Sums over the rows of each class, + first.
 struct ClassSums {
   std::array<double, 2> count{};  // weights
   std::array<double, 2> sum{};    // of the values
@@ -30,7 +30,8 @@ struct ClassSums {
 };
 
 // Weighted sums over the rows of either class, positive and negative, of values about `origin[class]`, or with
-// `absolute` of their magnitudes. Without branches, for signs come in no order.
+// `Absolute` of their magnitudes. Four partial sums run over the rows i, i + 4, .... There are no branches, because the
+// signs of successive rows are unrelated.
 template <bool Absolute>
 LLMT_INLINE ClassSums class_sums(const double* values, const double* residuals, const double* weights,
                                  Eigen::Index count, const std::array<double, 2>& origin) {
@@ -95,7 +96,7 @@ ResidualStatistics residual_statistics(std::span<const double> values, std::span
     result.high = value > result.high ? value : result.high;
   }
   if (!(result.low < result.high)) return result;
-  // Which digits are lost does not depend on the offset of the input, nor on the order of the rows.
+  // About the middle of the range, so that the rounding depends neither on the input's offset nor on the order of rows.
   const double origin = result.low + 0.5 * (result.high - result.low);
   const Eigen::Index rows = std::ssize(values);
   const ClassSums first = about_origin(values.data(), residuals.data(), weights.data(), rows, origin);

@@ -9,7 +9,7 @@
 namespace llmt {
 namespace {
 
-// A node with so small a part of the sum of squares that the features hold gets features of its own residuals.
+// A node whose RSS is below this part of the sum of squares that its features hold gets features of its own residuals.
 constexpr double digits_at_risk = 1e-4;
 
 }  // namespace

@@ -28,7 +28,7 @@ class WhitenedRows {
   Eigen::MatrixXd colouring_;
 };
 
-/// Some rows, and what has been told of them.
+/// Some rows with the sums over them.
 struct WhitenedLeaf {
   std::vector<int> rows;  ///< of the training rows, ascending
   double weight = 0.0;    ///< of the rows
@@ -38,10 +38,10 @@ struct WhitenedLeaf {
   Eigen::MatrixXd covariance;  ///< of the scaled regressors
 };
 
-/// Whether no split input and no regressor is missing in any row, which these leaves ask for.
+/// Whether no split input and no regressor is missing in any row. Whitened leaves require that.
 bool is_complete(const GrowthData& data);
 
-/// All rows, and the features as they are at first: the residuals of nothing.
+/// The leaf of all rows, with features that hold the outputs themselves: residuals of a model that is zero.
 WhitenedLeaf whitened_root(const GrowthData& data);
 
 /// Fills in `node` from the Gram matrix of the leaf's rows: the local model as a correction of the parent's, of minimum
@@ -49,8 +49,9 @@ WhitenedLeaf whitened_root(const GrowthData& data);
 void fit_whitened(const GrowthData& data, const WhitenedRows& rows, const std::vector<double>& gram, const Node& parent,
                   WhitenedLeaf& leaf, Node& node);
 
-/// Where a node's residual sum of squares is small against that of the model whose residuals the features hold, digits
-/// are at risk: its own residuals take their place. True if so; what was summed over the leaf's rows is void then.
+/// If the node's RSS is small against the RSS of the model whose residuals the features hold, differences of sums lose
+/// digits. Then the node's own residuals take the place of those residuals, and the result is true: sums over the
+/// leaf's rows must be formed anew.
 bool refreshed(const GrowthData& data, WhitenedRows& rows, const std::vector<double>& gram, const Node& node,
                WhitenedLeaf& leaf);
 

@@ -7,7 +7,7 @@
 namespace llmt {
 namespace {
 
-// The levels of a categorical input are put in so many orders, and each is cut in at most so many places.
+// Number of orders of the levels of a categorical input that are tried, and of places where an order is cut.
 constexpr std::size_t orders_of_levels = 3;
 constexpr std::size_t most_level_cuts = 32;
 

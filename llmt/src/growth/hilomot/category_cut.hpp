@@ -17,9 +17,9 @@ struct LevelCut {
   int evaluations = 0;
 };
 
-/// The levels that occur are put in order by the mean, over their rows, of the residual times a regressor: levels of
-/// which the slopes differ. Of these orders those in which levels differ most are cut where that leaves least. Rows
-/// without a level (NaN among `values`) belong to both sides. `count`: levels of the input.
+/// The best division of the levels into two sets. The levels that occur are put in order by the mean, over their rows,
+/// of the residual times a regressor, which separates levels whose slopes differ. The three orders in which the levels
+/// differ most are tried. Rows without a level (NaN among `values`) belong to both sides. `count`: levels of the input.
 LevelCut best_level_cut(const GateProblem& problem, const Eigen::VectorXd& values, int count);
 
 }  // namespace llmt

@@ -11,18 +11,18 @@
 namespace llmt {
 namespace {
 
-// Half widths in standard deviations of the node's rows along the direction. Of local models that of the source, a
-// twentieth of the distance of the two centres, which are sqrt(3) standard deviations apart where evenly spread rows
-// are halved; of joint models bounds, and where the optimisation starts.
+// Half widths in standard deviations of the node's rows along the direction (docs/algorithms/hilomot.md, "Half
+// widths"). Local models have the fixed one of Nelles: a twentieth of the distance of the two centres, which are
+// sqrt(3) standard deviations apart if evenly spread rows are halved. For joint models it is optimised between bounds.
 constexpr double local_width = 0.087;
 constexpr double joint_width = 0.4;
 constexpr double least_joint_width = 0.05;
 constexpr double most_joint_width = 1.0;
 
-// Directions shorter than this, of a unit vector's parts that vary in a node, are no start.
+// A direction is no start if the part of its unit vector that varies in the node is shorter than this.
 constexpr double least_direction = 1e-6;
 
-// Of the axis-orthogonal splits so many are starts of the optimisation.
+// Number of axis-orthogonal splits from which the optimisation starts.
 constexpr Eigen::Index axes_to_start_from = 2;
 
 }  // namespace

@@ -6,8 +6,9 @@
 
 namespace llmt {
 
-/// From the best of the first `axes` directions (columns, in the coordinates of GateProblem::z) and from all others;
-/// those that are zero do not count. `evaluations` are those of all starts; an infinite loss: nothing is admissible.
+/// The best gate that the optimisation finds from several starts: the best two of the first `axes` directions (columns,
+/// in the coordinates of GateProblem::z) and all other directions that are not zero. `evaluations` is the sum over all
+/// starts. The loss is infinite if no gate is admissible.
 GateFit best_gate(const GateProblem& problem, const Eigen::MatrixXd& directions, Eigen::Index axes, int max_threads);
 
 /// The direction in which the residuals are most curved: principal Hessian direction (Li 1992).

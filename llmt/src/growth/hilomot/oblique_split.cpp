@@ -15,14 +15,15 @@ namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-// Weight, relative to all, that holds the coefficients of a model at zero: nothing to what rows determine.
-constexpr double hold = 1e-9;
+// Ridge that draws the coefficients of a model towards zero, as a part of the total weight. Coefficients that the rows
+// determine do not notice it.
+constexpr double ridge = 1e-9;
 
-// Where along a direction the optimisation may start, as parts of the weight.
+// Thresholds along a direction where the optimisation may start: quantiles of the weighted rows.
 constexpr double quantiles[] = {0.2, 0.35, 0.5, 0.65, 0.8};
 
 constexpr int most_evaluations = 40;
-constexpr double small_gain = 1e-5;  // of the loss: a step that brings less is the last one
+constexpr double small_gain = 1e-5;  // a step that lowers the loss by a smaller part is the last one
 
 // Rows that are summed up at a time.
 constexpr Eigen::Index rows_at_once = 256;
@@ -55,13 +56,13 @@ void fit_models(const GateProblem& problem, double total, Fitted& fitted) {
   const Eigen::Index size = problem.a.cols();
   const Eigen::MatrixXd identity = Eigen::MatrixXd::Identity(size, size);
   if (problem.models == GateModels::joint) {
-    const Eigen::MatrixXd rest = fitted.twice - fitted.once * fitted.once / total + hold * total * identity;
+    const Eigen::MatrixXd rest = fitted.twice - fitted.once * fitted.once / total + ridge * total * identity;
     fitted.difference = rest.llt().solve(fitted.products);
     fitted.second = -fitted.once * fitted.difference / total;
   } else {
     // y is orthogonal to a, so the products of the right side are those of the left one, negative.
-    const Eigen::MatrixXd first = (fitted.once + hold * total * identity).llt().solve(fitted.products);
-    fitted.second = -((1.0 + hold) * total * identity - fitted.once).llt().solve(fitted.products);
+    const Eigen::MatrixXd first = (fitted.once + ridge * total * identity).llt().solve(fitted.products);
+    fitted.second = -((1.0 + ridge) * total * identity - fitted.once).llt().solve(fitted.products);
     fitted.difference = first - fitted.second;
   }
   const auto& [once, twice, products, second, difference, loss] = fitted;
@@ -155,12 +156,12 @@ void add_output(const GateProblem& problem, const Eigen::VectorXd& shares, const
   Eigen::MatrixXd follow(2 * size, entries);
   Eigen::VectorXd left_over = Eigen::VectorXd::Zero(2 * size);  // B' W r
   if (problem.models == GateModels::joint) {
-    normal.bottomRightCorner(size, size) += hold * total * identity;
+    normal.bottomRightCorner(size, size) += ridge * total * identity;
     follow = -normal.llt().solve(cross);
   } else {
-    const Eigen::MatrixXd of_left = (fitted.once + hold * total * identity).llt().solve(pull.transpose());
+    const Eigen::MatrixXd of_left = (fitted.once + ridge * total * identity).llt().solve(pull.transpose());
     const Eigen::MatrixXd of_right =
-        ((1.0 + hold) * total * identity - fitted.once).llt().solve(pull.transpose() - cross.topRows(size));
+        ((1.0 + ridge) * total * identity - fitted.once).llt().solve(pull.transpose() - cross.topRows(size));
     follow << of_right, -of_left - of_right;
     left_over << -total * second - fitted.once * difference,
         fitted.products.col(output) - fitted.once * second - fitted.twice * difference;
@@ -182,13 +183,13 @@ Linearised linearise(const GateProblem& problem, const Gate& gate, const Fitted&
   return result;
 }
 
-// The same plane, its half width held.
-Gate held(const Gate& gate, double least_width, double most_width) {
+// The same plane with its half width clamped to the two.
+Gate clamped(const Gate& gate, double least_width, double most_width) {
   const double steepness = gate.head(gate.size() - 1).norm();
   return gate * (std::clamp(steepness, 1.0 / most_width, 1.0 / least_width) / steepness);
 }
 
-// Takes out what would change the half width.
+// Takes out the part of a step that would change the half width.
 void fix_width(const Gate& gate, Linearised& at) {
   const Eigen::Index inputs = gate.size() - 1;
   Eigen::MatrixXd along = Eigen::MatrixXd::Identity(gate.size(), gate.size());
@@ -243,7 +244,7 @@ GateFit best_threshold(const GateProblem& problem, const Eigen::VectorXd& direct
 
 GateFit optimise_gate(const GateProblem& problem, const GateFit& start, double least_width, double most_width) {
   GateFit fit = start;
-  fit.gate = held(start.gate, least_width, most_width);
+  fit.gate = clamped(start.gate, least_width, most_width);
   Fitted now = with_shares(problem, gate_shares(problem, fit.gate));
   fit.loss = now.loss;
   double damping = 1e-2;
@@ -258,7 +259,7 @@ GateFit optimise_gate(const GateProblem& problem, const GateFit& start, double l
     for (; left > 0 && gain == 0.0 && damping < 1e8; --left) {
       Eigen::MatrixXd matrix = at.matrix;
       matrix.diagonal() += damping * (at.matrix.diagonal().array() + 1e-3 * mean).matrix();
-      const Gate gate = held(fit.gate - matrix.ldlt().solve(at.gradient), least_width, most_width);
+      const Gate gate = clamped(fit.gate - matrix.ldlt().solve(at.gradient), least_width, most_width);
       if (gate.allFinite()) {
         Fitted there = with_shares(problem, gate_shares(problem, gate));
         ++fit.evaluations;

@@ -1,6 +1,7 @@
 /// \file
-/// The best plane through weighted rows whose two local models share them by a logistic gate: separable nonlinear least
-/// squares, the local models being nested inside (variable projection, Golub & Pereyra 1973).
+/// The best plane and logistic gate for two local models of weighted rows (docs/algorithms/hilomot.md, H.3). This is
+/// separable nonlinear least squares: the local models are fitted anew for every gate (variable projection, Golub &
+/// Pereyra 1973).
 #pragma once
 
 #include <Eigen/Core>
@@ -15,7 +16,7 @@ enum class GateModels {
   joint   ///< both at once, so that g f_1 + (1 - g) f_2 fits best
 };
 
-/// What is to be split.
+/// The rows of a local model that is to be split.
 struct GateProblem {
   RowMajor a;                      ///< rows x coefficients: orthogonal columns of weighted mean square 1
   RowMajor z;                      ///< rows x inputs of the gate: of weighted mean 0 and covariance 1, and a last 1
@@ -30,14 +31,14 @@ struct GateProblem {
 /// standard deviations along the direction.
 using Gate = Eigen::VectorXd;
 
-/// One for each row.
+/// Share of the left model in each row.
 Eigen::VectorXd gate_shares(const GateProblem& problem, const Gate& gate);
 
 /// sum_n weights_n (y_n - g_n f_1 - (1 - g_n) f_2)^2 for given shares g of the left model, the local models fitted;
 /// infinity where a side has too little weight.
 double share_loss(const GateProblem& problem, const Eigen::VectorXd& shares);
 
-/// Its derivatives by the entries of a gate, at that gate's shares.
+/// Derivatives of share_loss() with respect to the entries of a gate, at that gate's shares.
 Eigen::VectorXd gate_gradient(const GateProblem& problem, const Gate& gate);
 
 struct GateFit {

@@ -1,5 +1,5 @@
 /// \file
-/// The linear model of a node of M5': least squares with few inputs.
+/// The linear model of a node of M5': least squares with few inputs (docs/algorithms/m5.md, "Models").
 #pragma once
 
 #include <Eigen/Core>
@@ -22,9 +22,9 @@ struct FewInputsModel {
   double rms = 0.0;  ///< weighted root mean square of the residuals
 };
 
-/// Weighted least squares of y on [1, x] without the columns that do not pay: starting from all, the one whose loss
-/// raises the sum of squares least is dropped as long as the adjusted error does not rise. Constant and collinear
-/// columns go first, and there are always more rows than coefficients. No value is missing; weights are positive.
+/// Weighted least squares of y on [1, x] with as few columns as possible. Constant and collinear columns are left out.
+/// Of the others the column whose loss raises the sum of squares least is dropped as long as the adjusted error (Q.2)
+/// does not rise, and until there are more rows than coefficients. No value may be missing; weights must be positive.
 FewInputsModel fit_few_inputs(const RowMajor& x, const Eigen::VectorXd& y, const Eigen::VectorXd& weights);
 
 }  // namespace llmt

@@ -14,7 +14,7 @@ namespace {
 
 using Rows = std::vector<int>;
 
-// Mean and sum of squares about it, row by row (Welford 1962): a side whose outputs are equal has exactly none.
+// Mean and sum of squares about the mean, row by row (Welford 1962). A side with equal outputs has exactly 0.
 struct Spread {
   double weight = 0.0;
   double mean = 0.0;
@@ -29,14 +29,14 @@ struct Spread {
   double variance() const { return std::max(squares, 0.0) / weight; }
 };
 
-// Quinlan (1992) compares standard deviations, M5' as it is known from WEKA this root of the variance, which gives
-// small pure parts more credit.
+// The power of the variance in Q.1. Quinlan (1992) compares standard deviations; Weka's M5P takes this power, which
+// favours small parts with little scatter.
 constexpr double root = 1.0 / 5.0;
 
-// And it leaves so many rows on either side of a threshold, one in this many.
+// Weka's M5P leaves at least one in this many rows on either side of a threshold.
 constexpr Eigen::Index least_share = 5;
 
-// Where a sequence of rows is cut best.
+// The best cut of a sequence of rows.
 struct Cut {
   Eigen::Index left = 0;  // rows; 0: nowhere
   double decrease = 0.0;
@@ -140,7 +140,7 @@ DeviationSplit split_levels(const GrowthData& data, const DeviationNode& node, E
   return split;
 }
 
-// Rows with a value against rows without one: that it is missing can say something.
+// Rows with a value against rows without one: it can be informative that a value is missing.
 DeviationSplit split_missing(const GrowthData& data, const DeviationNode& node, Eigen::Index j) {
   Rows order;
   for (const bool missing : {false, true}) {

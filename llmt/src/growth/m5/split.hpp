@@ -1,5 +1,5 @@
 /// \file
-/// The split of M5': the largest decrease of the scatter of the outputs.
+/// The split of M5': the largest decrease of the scatter of the outputs (docs/algorithms/m5.md, Q.1).
 #pragma once
 
 #include <vector>

@@ -15,14 +15,14 @@ namespace llmt {
 struct M5Model {
   Eigen::VectorXd value;
   Eigen::MatrixXd slope;         // outputs x regressors
-  Eigen::VectorXd coefficients;  // number of them, per output; of the subtree where it is not pruned
+  Eigen::VectorXd coefficients;  // their number, per output; if the subtree stays, the number in the subtree
 };
 
 struct M5Branch {
   int parent = -1;
   int left = -1;
   int right = -1;
-  Eigen::Index begin = 0;  // its rows among all: those of the left child, of the right one, of neither
+  Eigen::Index begin = 0;  // its rows in M5Tree::rows: of the left child, of the right child, of neither child
   Eigen::Index end = 0;
   double weight = 0.0;
   DeviationSplit split;
@@ -42,8 +42,8 @@ struct M5Tree {
   }
 };
 
-/// Splits every node as far as it goes: until it has too few rows, or outputs that deviate by less than 5 % of those of
-/// all rows (Quinlan 1992).
+/// Splits every node that has enough rows and whose outputs deviate by at least 5 % of the standard deviation of all
+/// rows (Quinlan 1992).
 M5Tree grow_m5_tree(const GrowthData& data);
 
 }  // namespace llmt

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <numeric>
 #include <vector>
 
 #include "growth/search/split_search.hpp"
@@ -6,7 +7,8 @@
 namespace llmt {
 namespace {
 
-// Orders of the levels that are seen, by the mean of each residual and of each residual times each regressor.
+// Orders of the levels that occur: by the mean of each residual, and of each residual times each regressor
+// (docs/algorithms/data.md, "Splits on categories"). Two levels have one order.
 std::vector<std::vector<int>> level_orders(const GramShape& shape, std::span<const double> grams,
                                            std::span<const Eigen::Index> counts) {
   const auto gram = [&](int level) { return grams.data() + level * shape.size(); };
@@ -30,64 +32,65 @@ std::vector<std::vector<int>> level_orders(const GramShape& shape, std::span<con
   return orders;
 }
 
+// Sums of the levels' Gram matrices on one side of every cut of an order, and the models that follow from them.
+struct SideOfCuts {
+  std::vector<double> rss;
+  std::vector<int> rank;
+};
+
+// `grams`: of all levels. Sums are formed from the end of the order inwards.
+SideOfCuts sum_side(const GramShape& shape, std::span<const double> grams, const std::vector<int>& order,
+                    bool from_left, ResidualSums& models) {
+  const Eigen::Index size = shape.size();
+  const Eigen::Index cuts = std::ssize(order) - 1;
+  std::vector<double> sums(cuts * size, 0.0);
+  std::vector<const double*> at(cuts);
+  const double* before = nullptr;
+  for (Eigen::Index step = 0; step < cuts; ++step) {
+    const Eigen::Index cut = from_left ? step : cuts - 1 - step;
+    double* const to = sums.data() + cut * size;
+    if (before != nullptr) std::copy(before, before + size, to);
+    add(shape, grams.data() + order[from_left ? cut : cut + 1] * size, to);
+    before = at[cut] = to;
+  }
+  SideOfCuts side{std::vector<double>(cuts), std::vector<int>(cuts)};
+  models.evaluate(at.data(), cuts, side.rss.data(), side.rank.data());
+  return side;
+}
+
+// SplitCandidate::level_side of an order whose first `left` levels go left.
+std::vector<int> sides_of_levels(const std::vector<int>& order, std::size_t left, std::size_t levels) {
+  std::vector<int> sides(levels, 0);
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    sides[order[i]] = i < left ? -1 : 1;
+  }
+  return sides;
+}
+
 }  // namespace
 
 SplitCandidate search_level_grams(const GramShape& shape, const Eigen::VectorXd& weights, double node_rss,
                                   double without_value, std::span<const double> grams,
                                   std::span<const Eigen::Index> counts, Eigen::Index min_leaf_samples) {
-  const Eigen::Index size = shape.size();
-  const auto gram = [&](int level) { return grams.data() + level * size; };
-  Eigen::Index present = 0;
-  for (const Eigen::Index count : counts) {
-    present += count;
-  }
-  ResidualSums sums(shape, weights);
+  const Eigen::Index present = std::accumulate(counts.begin(), counts.end(), Eigen::Index{0});
+  ResidualSums models(shape, weights);
   SplitCandidate best;
   for (const std::vector<int>& order : level_orders(shape, grams, counts)) {
-    const Eigen::Index cuts = std::ssize(order) - 1;
-    std::vector<double> left(cuts * size);
-    std::vector<double> right(left.size());
-    std::vector<const double*> at_left;
-    std::vector<const double*> at_right;
-    for (Eigen::Index k = 0; k < cuts; ++k) {
-      double* const to = left.data() + k * size;
-      if (k > 0) {
-        std::copy(to - size, to, to);
-      }
-      add(shape, gram(order[k]), to);
-      at_left.push_back(to);
-      at_right.push_back(right.data() + k * size);
-    }
-    for (Eigen::Index k = cuts; k-- > 0;) {
-      double* const to = right.data() + k * size;
-      if (k + 1 < cuts) {
-        std::copy(to + size, to + 2 * size, to);
-      }
-      add(shape, gram(order[k + 1]), to);
-    }
-    std::vector<double> rss_left(cuts);
-    std::vector<double> rss_right(rss_left.size());
-    std::vector<int> rank_left(rss_left.size());
-    std::vector<int> rank_right(rss_left.size());
-    sums.evaluate(at_left.data(), cuts, rss_left.data(), rank_left.data());
-    sums.evaluate(at_right.data(), cuts, rss_right.data(), rank_right.data());
+    const SideOfCuts left = sum_side(shape, grams, order, true, models);
+    const SideOfCuts right = sum_side(shape, grams, order, false, models);
     Eigen::Index rows_left = 0;
-    for (std::size_t k = 0; k < rss_left.size(); ++k) {
+    for (std::size_t k = 0; k < left.rss.size(); ++k) {
       rows_left += counts[order[k]];
       if (rows_left < min_leaf_samples || present - rows_left < min_leaf_samples) continue;
-      const double rss = rss_left[k] + rss_right[k] + without_value;
+      const double rss = left.rss[k] + right.rss[k] + without_value;
       ++best.tested;
-      if (best.input < 0 || rss < best.rss - tie_tolerance * node_rss) {
-        best.input = 0;
-        best.left = rows_left;
-        best.rss = std::max(0.0, rss);
-        best.rank_left = rank_left[k];
-        best.rank_right = rank_right[k];
-        best.level_side.assign(counts.size(), 0);
-        for (std::size_t i = 0; i < order.size(); ++i) {
-          best.level_side[order[i]] = i <= k ? -1 : 1;
-        }
-      }
+      if (best.input >= 0 && rss >= best.rss - tie_tolerance * node_rss) continue;
+      best.input = 0;
+      best.left = rows_left;
+      best.rss = std::max(0.0, rss);
+      best.rank_left = left.rank[k];
+      best.rank_right = right.rank[k];
+      best.level_side = sides_of_levels(order, k + 1, counts.size());
     }
   }
   best.evaluations = best.tested;

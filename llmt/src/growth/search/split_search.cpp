@@ -8,13 +8,13 @@ namespace {
 
 constexpr double no_split = std::numeric_limits<double>::infinity();
 
-// Rows of a block, within these bounds such that there are at most `most_blocks`.
+// A block has at least this many rows, and more where there would be more than `most_blocks` blocks.
 constexpr Eigen::Index smallest_block = 64;
 constexpr Eigen::Index most_blocks = 400;
 
-// Rows of the parts that a block is cut into. On pure noise a part is passed over if the rows it holds, which its
-// bound does not count, are fewer than what the best split gains beyond a chance one, in units of the noise; that is
-// some twenty.
+// Rows of the parts that a block is cut into. The bound of a part does not count the part's own rows. On pure noise a
+// part is passed over if it holds fewer rows than the best split gains beyond a random one, in units of the noise
+// variance; that is about twenty.
 constexpr Eigen::Index part_rows = 12;
 constexpr Eigen::Index most_parts = 33;
 
@@ -48,7 +48,7 @@ InputSearch::InputSearch(const SearchNode& node, std::vector<double> values, std
   all_ = {0, std::ssize(order), front.gram, behind.gram, front.rss, behind.rss};
 }
 
-// Here splits are named by the number of rows of the stretch on their left.
+// A split is given by the number of rows of the stretch on its left.
 bool InputSearch::admissible(Eigen::Index left) const {
   return left > 0 && left < std::ssize(order_) && rows_in_front_ + left >= min_leaf_samples_ &&
          std::ssize(order_) - left + rows_behind_ >= min_leaf_samples_ && values_[left - 1] < values_[left];
@@ -60,7 +60,7 @@ bool InputSearch::holds_candidates(const Segment& segment) const {
   return first <= last && values_[first - 1] < values_[last];
 }
 
-// Gram matrices and residual sums of squares on either side of the inner edges, that is of all but the first and last.
+// Gram matrices and RSS on either side of the inner edges, that is of all edges but the first and the last.
 void InputSearch::take_sides(const std::vector<Eigen::Index>& edges, const double* before, const double* behind,
                              Sides& sides) {
   const Eigen::Index size = shape_.size();
@@ -133,7 +133,9 @@ void InputSearch::search_edges() {
   }
   edges_.push_back(rows);
   take_sides(edges_, none_.data(), none_.data(), sides_);
-  if (rows < node_.features.rows()) {  // the rest is compared with its own single model
+  if (rows < node_.features.rows()) {
+    // The rows without a value add the same RSS to every split: the node's RSS minus the RSS of one model of the
+    // others.
     std::vector<double> all = none_;
     for (Eigen::Index i = 0; i + 1 < std::ssize(edges_); ++i) {
       add(shape_, sides_.parts.data() + i * shape_.size(), all.data());

@@ -1,5 +1,6 @@
 /// \file
-/// The exact search for the split of a node whose two least-squares models leave the least.
+/// The exact search for the split of a node with the smallest sum of the two children's RSS
+/// (docs/algorithms/split-search.md).
 #pragma once
 
 #include <Eigen/Core>
@@ -21,36 +22,34 @@ struct SplitCandidate {
   int rank_right = 0;
   Eigen::Index tested = 0;       ///< number of admissible splits among which it is the best
   Eigen::Index evaluations = 0;  ///< number of splits whose residual sum of squares was computed
-  /// Search by bins: the last bin of the left child, and the largest of its values that go left. RA: the threshold.
+  /// Search by bins: the last bin of the left child, and the largest value in it that goes left. RA: the threshold.
   int bin = -1;
   double last_left = std::numeric_limits<double>::infinity();
   bool by_missing = false;      ///< rows with a value go left, rows without one right
   std::vector<int> level_side;  ///< categorical input: -1 left, 1 right, 0 not seen, one per level
 };
 
-/// What the search of a node needs to know of its rows.
+/// The rows of a node, for the search of its split.
 struct SearchNode {
   const Features& features;        ///< regressors about orthogonal in the node
   const Eigen::VectorXd& weights;  ///< of the outputs' residual sums of squares
   double rss;                      ///< weighted, of the node's own model
 };
 
-/// Exact search along one numeric input, in two steps so that all inputs of a node can share what they have found.
+/// Exact search along one numeric input. It has two steps, so that the best value that one input has found bounds the
+/// search of all inputs of the node.
 ///
-/// The least of a sum of squares cannot fall when terms are added. Along a sorted input the residual sum of squares of
-/// the left rows therefore never falls and that of the right rows never rises, and every split between the positions a
-/// < b leaves at least RSS_left(a) + RSS_right(b). The first step takes the sums at the edges of blocks of rows; the
-/// second looks only into blocks whose bound is not above the best split known, which it cuts into parts, and so on.
-/// Sums are only ever added to, from the left and from the right, never subtracted from: no digits are lost at the
-/// ends.
+/// The first step evaluates the edges between blocks of rows. The second step cuts those blocks into parts whose bound
+/// (S.1) is not above the best value known, evaluates the edges between the parts, and so on. Sums are only added to,
+/// from the left and from the right, and never subtracted from, so that no digits are lost at the ends.
 ///
 /// Compares every split between two distinct values that leaves `min_leaf_samples` rows on either side. Rows without a
-/// value take part in neither side; the gain of the others is what counts. Of splits that agree within `tie_tolerance`
+/// value are on neither side; only the RSS of the other rows is compared. Of splits that agree within `tie_tolerance`
 /// times node.rss, the one with the smallest threshold is taken.
 class InputSearch {
  public:
-  /// `values` are the input's values and `order` the rows of the features, both ascending in the value. What is
-  /// referred to must live as long as this.
+  /// `values`: of the input, ascending; `order`: the rows of the features in the same order. `node`'s members and
+  /// `order` must live as long as this.
   InputSearch(const SearchNode& node, std::vector<double> values, std::span<const int> order,
               Eigen::Index min_leaf_samples);
 
@@ -61,12 +60,12 @@ class InputSearch {
     double rss;
   };
 
-  /// The same for a stretch of an input whose other rows lie in front of it or behind: only refine() is of use, and
-  /// splits are named by the number of all rows on their left.
+  /// The same for a stretch of an input whose other rows lie in front of the stretch or behind it. search_edges() must
+  /// not be called then. SplitCandidate::left counts all rows on the left.
   InputSearch(const SearchNode& node, std::vector<double> values, std::span<const int> order,
               Eigen::Index min_leaf_samples, const Beyond& front, const Beyond& behind);
 
-  /// Looks at the edges of the blocks.
+  /// First step: evaluates the edges of the blocks.
   void search_edges();
 
   /// Smallest residual sum of squares found so far; infinity if there is none.
@@ -75,15 +74,14 @@ class InputSearch {
   /// Number of admissible splits.
   Eigen::Index tested() const { return tested_; }
 
-  /// Looks into the blocks that may hold a split of at most `limit`.
+  /// Second step: searches the blocks that may hold a split with an RSS of at most `limit`.
   void refine(double limit);
 
-  /// The best split found; `input` is 0, or -1 if nothing is admissible or not above the limit. Exact if its sum is not
-  /// above the limit.
+  /// The best split found, exact if its RSS is not above the limit. `input` is 0, or -1 if no split was found.
   SplitCandidate best() const;
 
  private:
-  /// Rows begin ... end - 1, and what is known at its ends.
+  /// Rows begin ... end - 1, with the sums on either side of them.
   struct Segment {
     Eigen::Index begin;
     Eigen::Index end;
@@ -99,7 +97,7 @@ class InputSearch {
     int rank_left;
     int rank_right;
   };
-  /// Gram matrices on either side of some edges, and what follows from them.
+  /// Gram matrices on either side of some edges, and the models that follow from them.
   struct Sides {
     std::vector<double> parts;  // between the edges
     std::vector<double> left;
@@ -127,7 +125,7 @@ class InputSearch {
   ResidualSums sums_;
   Eigen::Index tested_ = 0;
   Eigen::Index evaluations_ = 0;
-  double without_value_ = 0.0;  // what the rows without a value leave, whatever the split
+  double without_value_ = 0.0;  // part of node.rss that falls on the rows without a value, the same for all splits
   double limit_;
   double smallest_;
   std::vector<Found> found_;  // within the tolerance of the smallest
@@ -145,16 +143,18 @@ class InputSearch {
 SplitCandidate search_levels(const SearchNode& node, std::span<const int> levels, int num_levels,
                              Eigen::Index min_leaf_samples);
 
-/// As above, from the Gram matrices and row counts of the levels; `without_value`: see InputSearch.
+/// As above, from the Gram matrices and row counts of the levels. `without_value`: part of `node_rss` that falls on the
+/// rows without a level.
 SplitCandidate search_level_grams(const GramShape& shape, const Eigen::VectorXd& weights, double node_rss,
                                   double without_value, std::span<const double> grams,
                                   std::span<const Eigen::Index> counts, Eigen::Index min_leaf_samples);
 
-/// Of the best splits of the inputs, in order, the best one, its `input` the position; equally good: the first. Tested
-/// and evaluated are those of all. `node_rss`: of the node's own model.
+/// The best of the splits of the inputs, with the input's position as `input`; of equally good ones the first. `tested`
+/// and `evaluations` are sums over all inputs. `node_rss`: of the node's own model.
 SplitCandidate first_of_best(std::span<const SplitCandidate> found, double node_rss);
 
-/// Rounding differs with the order of rows and with columns that carry no information; ties must not depend on it.
+/// Splits whose RSS differ by less than this part of the node's RSS count as equally good. Rounding depends on the
+/// order of the rows and on columns that carry no information, and must not decide between them.
 inline constexpr double tie_tolerance = 1e-10;
 
 }  // namespace llmt

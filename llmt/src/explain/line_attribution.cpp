@@ -1,0 +1,259 @@
+#include "explain/line_attribution.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+#include <vector>
+
+#include "explain/straight_line.hpp"
+#include "model/through_regressors.hpp"
+#include "numerics/quadrature.hpp"
+
+namespace llmt {
+namespace {
+
+// Pieces are halved at most this often on one line, and no further than to this length.
+constexpr int most_halvings = 5000;
+constexpr double shortest_piece = 1e-9;
+
+// Equal pieces of a line that is not cut at kinks.
+constexpr int coarse_pieces = 8;
+
+// Relative rounding of a prediction.
+constexpr double rounding_of_outputs = 1e-14;
+
+// The shares of one partition along one line.
+class Line {
+ public:
+  Line(const Model& model, const Partition& partition, const Evaluator& evaluator,
+       const Eigen::Ref<const Eigen::VectorXd>& point, const Eigen::Ref<const Eigen::VectorXd>& reference,
+       const Precision& precision);
+
+  void run(Attribution& result);
+
+ private:
+  // A position on the line: inputs and prediction of the partition there.
+  struct Place {
+    double position = 0.0;
+    Eigen::VectorXd row;
+    Eigen::VectorXd value;
+  };
+
+  Pieces pieces() const;
+  Eigen::VectorXd predict(const Eigen::VectorXd& row);
+
+  // One piece of the line after the other, and the jumps between them.
+  Place move_to(const Place& from, double to, std::span<Crossing> crossings);
+  void jump(Eigen::Index input, double to, const Eigen::VectorXd& parts, Place& place);
+
+  // The integral of X.1 over a piece.
+  int degree(int index, const Eigen::VectorXd& row) const;
+  Eigen::MatrixXd mean_rate(double from, double to, const Eigen::VectorXd& row, int order);
+  bool estimate_rate(const Place& from, const Place& to, const Eigen::VectorXd& middle_row, Eigen::MatrixXd& rate);
+  void integrate(const Place& from, const Place& to);
+  void add_shares(double length, const Eigen::VectorXd& change, const Eigen::MatrixXd& rate);
+
+  const Model& model_;
+  const Partition& partition_;
+  const Evaluator& evaluator_;
+  Precision precision_;
+  bool has_products_;
+  StraightLine line_;
+  Eigen::VectorXd tolerance_;  // of the sum over a piece, per output
+  Eigen::MatrixXd shares_;     // outputs of the partition x inputs
+  int halvings_ = 0;
+
+  // Work space.
+  Eigen::VectorXd deviations_;
+  std::vector<Activation> active_;
+  Eigen::MatrixXd by_input_;
+  Eigen::MatrixXd by_regressor_;
+};
+
+Line::Line(const Model& model, const Partition& partition, const Evaluator& evaluator,
+           const Eigen::Ref<const Eigen::VectorXd>& point, const Eigen::Ref<const Eigen::VectorXd>& reference,
+           const Precision& precision)
+    : model_(model),
+      partition_(partition),
+      evaluator_(evaluator),
+      precision_(precision),
+      has_products_(std::any_of(model.regressors().begin(), model.regressors().end(), is_product)),
+      line_(model, reference, point),
+      deviations_(std::ssize(model.regressors())) {
+  const Eigen::Index outputs = std::ssize(partition.outputs);
+  tolerance_.resize(outputs);
+  for (Eigen::Index o = 0; o < outputs; ++o) {
+    const OutputColumn& output = model.outputs()[partition.outputs[o]];
+    tolerance_(o) = precision_.tolerance * (output.high - output.low) +
+                    rounding_of_outputs * std::max(std::abs(output.low), std::abs(output.high));
+  }
+  shares_.setZero(outputs, point.size());
+}
+
+// Sets the rows of the partition's outputs.
+void Line::run(Attribution& result) {
+  Pieces pieces = this->pieces();
+  const std::vector<double>& cuts = pieces.cuts;
+  std::vector<Crossing>& crossings = pieces.crossings;
+  Place at{0.0, line_.reference, predict(line_.reference)};
+  result.reference(partition_.outputs) = at.value;
+  std::size_t next = 0;  // crossing
+  for (std::size_t k = 0; k < cuts.size();) {
+    const double to = cuts[k];
+    // Half as far as cut_line() moves cuts to the middle and the end, so that these are never skipped.
+    while (k < cuts.size() && cuts[k] <= to + 0.5 * same_position) ++k;
+    const std::size_t first = next;
+    while (next < crossings.size() && crossings[next].position <= to + same_position) ++next;
+    at = move_to(at, to, std::span(crossings).subspan(first, next - first));
+  }
+  result.prediction(partition_.outputs) = at.value;
+  result.contributions(partition_.outputs, Eigen::all) = shares_;
+}
+
+Pieces Line::pieces() const {
+  Pieces pieces = cut_line(model_, partition_, evaluator_, line_, precision_.exact);
+  if (!precision_.exact && partition_.validity.kind != ValidityKind::crisp) {
+    for (int k = 1; k < coarse_pieces; ++k) {
+      pieces.cuts.push_back(static_cast<double>(k) / coarse_pieces);
+    }
+    std::ranges::sort(pieces.cuts);
+  }
+  return pieces;
+}
+
+Eigen::VectorXd Line::predict(const Eigen::VectorXd& row) {
+  deviations_at(model_.inputs(), model_.regressors(), row.data(), deviations_.data());
+  Eigen::VectorXd values(std::ssize(partition_.outputs));
+  evaluator_.activate(row.data(), active_);
+  evaluator_.combine(active_, deviations_.data(), values.data());
+  return values;
+}
+
+// Adds the shares from one position to the next and of the jumps there. `crossings`: those at the next position.
+Line::Place Line::move_to(const Place& from, double to, std::span<Crossing> crossings) {
+  Place end{to, line_.at(to, from.row), {}};
+  for (std::size_t c = crossings.size(); c-- > 0;) {  // the first of an input wins
+    end.row(crossings[c].input) = crossings[c].before;
+  }
+  end.value = predict(end.row);
+  integrate(from, end);
+  std::ranges::stable_sort(crossings, {}, &Crossing::input);
+  for (const Crossing& crossing : crossings) {
+    jump(crossing.input, crossing.after, crossing.parts, end);
+  }
+  if (to == 0.5) {
+    for (const Eigen::Index j : line_.switched) {
+      jump(j, line_.point(j), {}, end);
+    }
+  }
+  return end;
+}
+
+// Sets one input and adds the change of the prediction to its share; or to the shares of all inputs by their `parts`.
+void Line::jump(Eigen::Index input, double to, const Eigen::VectorXd& parts, Place& place) {
+  place.row(input) = to;
+  const Eigen::VectorXd changed = predict(place.row);
+  if (parts.size() > 0) {
+    shares_ += (changed - place.value) * parts.transpose();
+  } else {
+    shares_.col(input) += changed - place.value;
+  }
+  place.value = changed;
+}
+
+// Degree of the prediction, as a polynomial of the position, around a point on the line.
+int Line::degree(int index, const Eigen::VectorXd& row) const {
+  const Node& node = partition_.nodes[index];
+  if (node.is_leaf()) {
+    return has_products_ ? 8 : 2;  // where a guard sets in, and the holds of both factors
+  }
+  const double left = evaluator_.left_share(index, row.data());
+  if (left >= 1.0 || left <= 0.0) return degree(left >= 1.0 ? node.left : node.right, row);
+  const int of_children = std::max(degree(node.left, row), degree(node.right, row));
+  const bool moves = node.is_oblique() || line_.way(node.split_input) != 0.0;
+  if (!moves) return of_children;
+  return of_children + (partition_.validity.smoothness == 1 ? 3 : 5);
+}
+
+// Mean of dF/dx_j (point_j - reference_j) between two positions, outputs x inputs.
+Eigen::MatrixXd Line::mean_rate(double from, double to, const Eigen::VectorXd& row, int order) {
+  const Quadrature& rule = quadrature(order);
+  Eigen::MatrixXd mean = Eigen::MatrixXd::Zero(shares_.rows(), shares_.cols());
+  for (std::size_t i = 0; i < rule.nodes.size(); ++i) {
+    const Eigen::VectorXd x = line_.at(from + rule.nodes[i] * (to - from), row);
+    deviations_at(model_.inputs(), model_.regressors(), x.data(), deviations_.data());
+    evaluator_.derivatives(x.data(), deviations_.data(), by_input_, by_regressor_);
+    add_through_regressors(model_.inputs(), model_.regressors(), x.data(), by_regressor_, by_input_);
+    for (const Eigen::Index j : line_.moving) {
+      mean.col(j) += rule.weights[i] * line_.way(j) * by_input_.col(j);
+    }
+  }
+  return mean;
+}
+
+// Sets the mean rates of a piece. True if they are good enough: the shares of the piece add up to the change of the
+// prediction, and where the prediction is no polynomial two orders of integration agree.
+bool Line::estimate_rate(const Place& from, const Place& to, const Eigen::VectorXd& middle_row, Eigen::MatrixXd& rate) {
+  const ValidityKind kind = partition_.validity.kind;
+  const bool polynomial = kind == ValidityKind::crisp || kind == ValidityKind::blend;
+  const double length = to.position - from.position;
+  const Eigen::VectorXd change = to.value - from.value;
+  const auto adds_up = [&] {
+    return ((change - length * rate.rowwise().sum()).array().abs() <= tolerance_.array()).all();
+  };
+  const int of_prediction = !precision_.exact || !polynomial ? 8 : degree(0, middle_row);
+  rate = mean_rate(from.position, to.position, from.row, (of_prediction + 1) / 2);
+  bool accepted = adds_up();
+  if (precision_.exact && (!accepted || !polynomial)) {
+    // Twice the order: enough for a held output, and a second opinion on what is not a polynomial.
+    const Eigen::MatrixXd better = mean_rate(from.position, to.position, from.row, 2 * of_prediction);
+    const bool agree = ((length * (better - rate)).cwiseAbs().rowwise().maxCoeff().array() <= tolerance_.array()).all();
+    rate = better;
+    accepted = adds_up() && (agree || polynomial);
+  }
+  return accepted;
+}
+
+// Adds the shares of a piece in which nothing jumps.
+void Line::integrate(const Place& from, const Place& to) {
+  const double length = to.position - from.position;
+  const Eigen::VectorXd change = to.value - from.value;
+  if (line_.moving.empty() || (length <= 0.0 && change.isZero(0.0))) return;
+  Place middle{from.position + 0.5 * length, {}, {}};
+  middle.row = line_.at(middle.position, from.row);
+  Eigen::MatrixXd rate;
+  const bool accepted = estimate_rate(from, to, middle.row, rate);
+  if (!accepted && length > shortest_piece && halvings_ < most_halvings) {
+    ++halvings_;
+    middle.value = predict(middle.row);
+    integrate(from, middle);
+    integrate({middle.position, from.row, middle.value}, to);
+    return;
+  }
+  add_shares(length, change, rate);
+}
+
+// What the shares of a piece lack of the change is divided over the inputs in proportion to their rates.
+void Line::add_shares(double length, const Eigen::VectorXd& change, const Eigen::MatrixXd& rate) {
+  Eigen::MatrixXd share = length * rate;
+  const Eigen::VectorXd rest = change - share.rowwise().sum();
+  for (Eigen::Index o = 0; o < share.rows(); ++o) {
+    const double total = rate.row(o).cwiseAbs().sum();
+    for (const Eigen::Index j : line_.moving) {
+      share(o, j) +=
+          rest(o) * (total > 0.0 ? std::abs(rate(o, j)) / total : 1.0 / static_cast<double>(line_.moving.size()));
+    }
+  }
+  shares_ += share;
+}
+
+}  // namespace
+
+void attribute_along_line(const Model& model, const Partition& partition, const Evaluator& evaluator,
+                          const Eigen::Ref<const Eigen::VectorXd>& point,
+                          const Eigen::Ref<const Eigen::VectorXd>& reference, const Precision& precision,
+                          Attribution& result) {
+  Line(model, partition, evaluator, point, reference, precision).run(result);
+}
+
+}  // namespace llmt
