@@ -12,6 +12,40 @@ namespace {
 // A node whose RSS is below this part of the sum of squares that its features hold gets features of its own residuals.
 constexpr double digits_at_risk = 1e-4;
 
+// Mean and covariance of the regressors of the features, from the Gram matrix of a node's rows.
+struct Moments {
+  double weight;
+  Eigen::VectorXd mean;
+  Eigen::MatrixXd covariance;
+};
+
+Moments moments_of(const GramShape& shape, const std::vector<double>& gram) {
+  const Eigen::Index regressors = shape.coefficients() - 1;
+  const auto entry = [&](Eigen::Index i, Eigen::Index j) { return gram[i >= j ? shape.at(i, j) : shape.at(j, i)]; };
+  Moments moments{entry(0, 0), Eigen::VectorXd(regressors), Eigen::MatrixXd(regressors, regressors)};
+  for (Eigen::Index i = 0; i < regressors; ++i) {
+    moments.mean(i) = entry(i + 1, 0) / moments.weight;
+  }
+  for (Eigen::Index i = 0; i < regressors; ++i) {
+    for (Eigen::Index j = 0; j < regressors; ++j) {
+      moments.covariance(i, j) = entry(i + 1, j + 1) / moments.weight - moments.mean(i) * moments.mean(j);
+    }
+  }
+  return moments;
+}
+
+// 1 / standard deviation of each scaled regressor in the node; 0 where it is constant but for rounding.
+Eigen::VectorXd inverse_deviations(const WhitenedLeaf& leaf) {
+  constexpr double rounding = 1e-12;  // of a mean square
+  Eigen::VectorXd result(leaf.mean.size());
+  for (Eigen::Index k = 0; k < result.size(); ++k) {
+    const double variance = leaf.covariance(k, k);
+    const bool varies = variance > rounding * (1.0 + leaf.mean(k) * leaf.mean(k));
+    result(k) = varies ? 1.0 / std::sqrt(variance) : 0.0;
+  }
+  return result;
+}
+
 }  // namespace
 
 // Regressors are whitened over all rows; residuals are those of the mean.
@@ -90,44 +124,6 @@ WhitenedLeaf whitened_root(const GrowthData& data) {
   leaf.slope = Eigen::MatrixXd::Zero(data.outputs.cols(), std::ssize(data.training.regressors));
   return leaf;
 }
-
-namespace {
-
-// Mean and covariance of the regressors of the features, from the Gram matrix of a node's rows.
-struct Moments {
-  double weight;
-  Eigen::VectorXd mean;
-  Eigen::MatrixXd covariance;
-};
-
-Moments moments_of(const GramShape& shape, const std::vector<double>& gram) {
-  const Eigen::Index regressors = shape.coefficients() - 1;
-  const auto entry = [&](Eigen::Index i, Eigen::Index j) { return gram[i >= j ? shape.at(i, j) : shape.at(j, i)]; };
-  Moments moments{entry(0, 0), Eigen::VectorXd(regressors), Eigen::MatrixXd(regressors, regressors)};
-  for (Eigen::Index i = 0; i < regressors; ++i) {
-    moments.mean(i) = entry(i + 1, 0) / moments.weight;
-  }
-  for (Eigen::Index i = 0; i < regressors; ++i) {
-    for (Eigen::Index j = 0; j < regressors; ++j) {
-      moments.covariance(i, j) = entry(i + 1, j + 1) / moments.weight - moments.mean(i) * moments.mean(j);
-    }
-  }
-  return moments;
-}
-
-// 1 / standard deviation of each scaled regressor in the node; 0 where it is constant but for rounding.
-Eigen::VectorXd inverse_deviations(const WhitenedLeaf& leaf) {
-  constexpr double rounding = 1e-12;  // of a mean square
-  Eigen::VectorXd result(leaf.mean.size());
-  for (Eigen::Index k = 0; k < result.size(); ++k) {
-    const double variance = leaf.covariance(k, k);
-    const bool varies = variance > rounding * (1.0 + leaf.mean(k) * leaf.mean(k));
-    result(k) = varies ? 1.0 / std::sqrt(variance) : 0.0;
-  }
-  return result;
-}
-
-}  // namespace
 
 void fit_whitened(const GrowthData& data, const WhitenedRows& rows, const std::vector<double>& gram, const Node& parent,
                   WhitenedLeaf& leaf, Node& node) {
