@@ -27,3 +27,39 @@ function(llmt_library target name)
                POSITION_INDEPENDENT_CODE ON
                VERIFY_INTERFACE_HEADER_SETS ON)
 endfunction()
+
+# Eigen, fmt, GoogleTest and the standard library are most of what an average source compiles. With LLMT_PRECOMPILE_HEADERS they
+# are compiled once for all targets that share their flags. Each source includes what it uses all the same: the test
+# `consumer_sources` and the header sets are built without.
+
+# llmt_precompile(NAME HEADERS <header>... LIBS <target>...): a target that only compiles the headers. The caller gives it the
+# flags of those that reuse it.
+function(llmt_precompile name)
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "HEADERS;LIBS")
+  set(source "${CMAKE_CURRENT_BINARY_DIR}/${name}.cpp")
+  file(CONFIGURE OUTPUT "${source}" CONTENT "")
+  add_library(${name} OBJECT "${source}")
+  llmt_target_defaults(${name})
+  target_link_libraries(${name} PRIVATE ${arg_LIBS})
+  target_precompile_headers(${name} PRIVATE ${arg_HEADERS})
+  foreach(library IN LISTS arg_LIBS)
+    foreach(kind IN ITEMS DEFINITIONS OPTIONS)
+      get_target_property(values ${library} INTERFACE_COMPILE_${kind})
+      if(values)
+        set_property(TARGET ${name} APPEND PROPERTY LLMT_${kind} "${values}")
+      endif()
+    endforeach()
+  endforeach()
+endfunction()
+
+# llmt_reuse_precompiled(TARGET NAME): TARGET sees the headers of NAME, if there is such a target. GCC refuses precompiled headers
+# whose macros differ, so TARGET gets the flags of NAME's libraries, whether it links them or not.
+function(llmt_reuse_precompiled target name)
+  if(TARGET ${name})
+    target_precompile_headers(${target} REUSE_FROM ${name})
+    get_property(definitions TARGET ${name} PROPERTY LLMT_DEFINITIONS)
+    get_property(options TARGET ${name} PROPERTY LLMT_OPTIONS)
+    target_compile_definitions(${target} PRIVATE ${definitions})
+    target_compile_options(${target} PRIVATE ${options})
+  endif()
+endfunction()

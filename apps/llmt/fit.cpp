@@ -38,6 +38,15 @@ std::string choices_text(Enum standard) {
   return fmt::format("{} [{}]", list_names<Enum>("|"), name_of(standard));
 }
 
+// "Growth rule: rd (best split by F test), ...".
+std::string rules_text() {
+  std::string text;
+  for (const Choice<GrowthRule>& choice : choices<GrowthRule>()) {
+    text += fmt::format("{}{} ({})", text.empty() ? "Growth rule: " : ", ", choice.name, summary_of(choice.value));
+  }
+  return text;
+}
+
 // "blend, sparse, width 2, jumps from 4, ridge 0.001, shrinkage 0.1".
 std::string describe(const Candidate& candidate) {
   const char* const sparse = candidate.sparse ? ", sparse" : "";
@@ -218,7 +227,7 @@ void print_summary(const FitArguments& arguments, const FitResult& result) {
   for (const PartitionSummary& partition : result.summary.partitions) {
     print(search_text(partition.search));
     // M5' drops inputs on its own; its leaves keep nothing of their parent's but what smoothing gives them.
-    if (partition.rank_deficient_leaves > 0 && arguments.learning.options.rule != GrowthRule::m5) {
+    if (partition.rank_deficient_leaves > 0 && !has_own_models(arguments.learning.options.rule)) {
       print(fmt::format(
           "Leaves whose rows do not determine all slopes (constant or collinear inputs, few rows) and keep their "
           "parent's there: {}.\n",
@@ -257,18 +266,14 @@ void add_fit(CLI::App& app) {
   add_learning_options(*command, arguments->learning);
   FitOptions& options = arguments->learning.options;
   ExpertOptions& expert = options.expert;
-  command
-      ->add_option("--rule", options.rule,
-                   "Growth rule: rd, retis (m-estimate pruning), lolimot (halves boxes), lolimot-data (data-driven "
-                   "thresholds), ra (by the signs of residuals, no search), m5 (M5', smoothed), hilomot (oblique "
-                   "splits)")
+  command->add_option("--rule", options.rule, rules_text())
       ->transform(choice_of<GrowthRule>())
       ->option_text(choices_text(options.rule));
   command
       ->add_option("--significance", options.significance,
                    "rd, ra: of the F test, over all candidate splits; 1: no test")
       ->check(CLI::NonNegativeNumber)
-      ->option_text("FLOAT [see docs/commands.md]");
+      ->option_text(fmt::format("FLOAT [{}]", default_text("significance")));
   command
       ->add_option("--min-improvement", expert.min_improvement,
                    "Stop when further splits lower the training sum of squares by less than this fraction each")
@@ -305,19 +310,19 @@ void add_fit(CLI::App& app) {
           "--width", expert.widths,
           "Widths to choose from: of a transition by the smaller child's extent; k_sigma; of the gates of hilomot")
       ->delimiter(',')
-      ->option_text("FLOAT,... [0.5,1,2,4; Gaussians 0.333; hilomot 1,2,4]");
+      ->option_text(fmt::format("FLOAT,... [{}]", default_text("widths")));
   command
       ->add_option("--jump", expert.jumps,
                    "Jumps to choose from: where the output jumps by so many standard deviations there is no transition")
       ->delimiter(',')
-      ->option_text("FLOAT,... [inf,4,2,1,0.5]");
+      ->option_text(fmt::format("FLOAT,... [{}]", default_text("jumps")));
   command->add_option("--ridge", expert.ridges, "Ridges to choose from: hold of the joint estimate at the local one")
       ->delimiter(',')
-      ->option_text("FLOAT,... [1e-8 ... 0.1]");
+      ->option_text(fmt::format("FLOAT,... [{}]", default_text("ridges")));
   command
       ->add_option("--shrinkage", expert.shrinkages, "Shrinkages to choose from: towards the parent's model, in rows")
       ->delimiter(',')
-      ->option_text("FLOAT,... [0,0.1,1]");
+      ->option_text(fmt::format("FLOAT,... [{}]", default_text("shrinkages")));
   command->add_option("-o,--output", arguments->output, "Model file to write");
   command->add_flag("--no-intervals", arguments->no_intervals,
                     "Leave the folds' models out of the file; it is smaller and has no prediction intervals");

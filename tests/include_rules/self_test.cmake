@@ -42,7 +42,7 @@ check(rooms llmt/src/base/parallel.cpp "#include \"model/tree.hpp\"")
 check(rooms llmt/src/model/tree.cpp "#include \"llmt/fit.hpp\"")
 check(rooms llmt/src/model/tree.cpp "#include \"evaluator.hpp\"")
 check(rooms llmt/src/attic/tree.cpp "#include <vector>")
-check(none llmt/src/fit/fit.cpp "#include \"model/tree.hpp\"" "#include \"llmt/fit.hpp\"" "#include \"fit/validate.hpp\"")
+check(none llmt/src/fit/fit.cpp "#include \"model/tree.hpp\"" "#include \"llmt/fit.hpp\"" "#include \"fit/defaults.hpp\"")
 
 check(none llmt/src/base/parallel.cpp "#include <tbb/parallel_for.h>" "#include \"base/parallel.hpp\"")
 check(none llmt/include/llmt/model.hpp "#include <Eigen/Core>" "#include <vector>" "#include \"llmt/abi.hpp\"")

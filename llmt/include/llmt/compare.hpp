@@ -30,9 +30,9 @@ struct Comparison {
   Eigen::Index leaves = 0;  ///< of the model of all rows
   /// Constants and slopes other than 0 of the local models, thresholds of the splits, directions and gates.
   Eigen::Index parameters = 0;
-  Eigen::VectorXd fold_rmse;  ///< held-out, one per fold
-  double cv_rmse = 0.0;       ///< over all held-out rows
-  double spread = 0.0;        ///< standard deviation of fold_rmse
+  Eigen::VectorXd fold_rmse = {};  ///< held-out, one entry a fold
+  double cv_rmse = 0.0;            ///< over all held-out rows
+  double spread = 0.0;             ///< standard deviation of fold_rmse
   /// Largest change of the prediction across a split, at the training rows' projections on it (at most 1000 rows).
   double largest_jump = 0.0;
   double fit_seconds = 0.0;      ///< of the model of all rows, its own selection included

@@ -150,6 +150,17 @@ struct FitOptions {
   ExpertOptions expert = {};
 };
 
+/// The default of an option that is a table by case, in words: "1 where blends or Gaussians are candidates; ...; else
+/// 0.05". `option`: "widths", "jumps", "ridges", "shrinkages" or "significance"; throws std::invalid_argument for
+/// others.
+std::string default_text(std::string_view option);
+
+/// One phrase for help: "no test, pruned by m-estimates". Throws std::invalid_argument for a number that is no rule.
+std::string_view summary_of(GrowthRule rule);
+
+/// Whether a rule prunes, drops inputs and smooths by itself, so that its local models are not estimated anew (M5').
+bool has_own_models(GrowthRule rule);
+
 // Names, see names.hpp.
 template <>
 std::span<const Choice<GrowthRule>> choices();

@@ -5,17 +5,13 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 
-#include "data/regressors.hpp"
-#include "fit/linear_or_quadratic.hpp"
-#include "model/evaluator.hpp"
+#include "growth/rules/rule.hpp"
+#include "numerics/paired_difference.hpp"
 
 namespace llmt {
 namespace {
-
-constexpr Eigen::Index most_rows = 1000;
 
 double seconds_of(const std::function<void()>& work) {
   const auto start = std::chrono::steady_clock::now();
@@ -45,24 +41,10 @@ Eigen::Index count_parameters(const Model& model) {
   return count;
 }
 
-// Mean of the differences of two methods' errors over the folds, and its standard error.
-struct Paired {
-  double mean;
-  double error;
-};
-
-Paired paired(const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
-  const Eigen::VectorXd difference = a - b;
-  const double folds = static_cast<double>(difference.size());
-  const double mean = difference.mean();
-  const double squares = (difference.array() - mean).square().sum();
-  return {mean, folds > 1.0 ? std::sqrt(squares / (folds - 1.0) / folds) : 0.0};
-}
-
 bool is_least_squares(const Method& method) { return method.options.max_leaves == 1; }
 
 bool is_readable(const Method& method) {
-  return method.options.rule == GrowthRule::rd && method.options.validity == ValidityChoice::crisp &&
+  return rule_of(method.options.rule).is_read_most_easily && method.options.validity == ValidityChoice::crisp &&
          method.options.terms == LocalTerms::linear;
 }
 
@@ -75,8 +57,8 @@ void recommend(const std::vector<Method>& methods, ComparisonResult& result) {
   }
   result.recommended = best;
   const auto ties = [&](std::size_t m) {
-    const Paired difference = paired(result.methods[m].fold_rmse, result.methods[best].fold_rmse);
-    return difference.mean <= difference.error;
+    const PairedDifference difference = paired_difference(result.methods[m].fold_rmse, result.methods[best].fold_rmse);
+    return difference.mean <= difference.standard_error;
   };
   for (const auto& simple : {is_readable, is_least_squares}) {
     for (std::size_t m = 0; m < methods.size() && !is_least_squares(methods[best]); ++m) {
@@ -110,147 +92,47 @@ void recommend(const std::vector<Method>& methods, ComparisonResult& result) {
   result.recommendation += ".";
 }
 
-}  // namespace
-
-std::vector<Method> usual_methods(const FitOptions& base, Eigen::Index inputs) {
-  FitOptions plain = base;
-  plain.intervals = false;
-  plain.progress = {};
-  plain.pruning = Pruning::last_splits;
-  plain.validity = ValidityChoice::crisp;
-  plain.terms = LocalTerms::linear;
-  plain.sparse = SparseChoice::never;
-  std::vector<Method> methods;
-  const auto add = [&](const std::string& name, const auto& change) {
-    methods.push_back({name, plain});
-    change(methods.back().options);
-  };
-  add("least squares", [](FitOptions& options) {
-    options.max_leaves = 1;
-    options.folds.count = 0;
-  });
-  add("crisp tree, RD", [](FitOptions&) {});
-  add("crisp tree, RETIS", [](FitOptions& options) { options.rule = GrowthRule::retis; });
-  add("crisp tree, RA", [](FitOptions& options) { options.rule = GrowthRule::ra; });
-  add("M5', smoothed", [](FitOptions& options) {
-    options.rule = GrowthRule::m5;
-    options.folds.count = 0;  // its pruning decides
-    options.expert.shrinkages = {};
-    options.expert.min_improvement = 0.0;
-  });
-  // Gaussians overlap everywhere: their joint estimates cost the square of the number of leaves.
-  const Eigen::Index gaussian_leaves = base.max_leaves > 0 ? std::min<Eigen::Index>(base.max_leaves, 50) : 50;
-  add("Gaussians, as grown", [=](FitOptions& options) {
-    options.validity = ValidityChoice::gaussian;
-    options.expert.estimation = Estimation::as_grown;
-    options.max_leaves = gaussian_leaves;
-  });
-  add("Gaussians, re-estimated", [=](FitOptions& options) {
-    options.validity = ValidityChoice::gaussian;
-    options.expert.widths = {1.0 / 3.0, 2.0 / 3.0};
-    options.max_leaves = gaussian_leaves;
-  });
-  add("blend, joint", [](FitOptions& options) { options.validity = ValidityChoice::blend; });
-  add("LOLIMOT", [=](FitOptions& options) {
-    options.rule = GrowthRule::lolimot;
-    options.expert.estimation = Estimation::as_grown;
-    options.max_leaves = gaussian_leaves;
-  });
-  // So do logistic gates.
-  add("HILOMOT", [=](FitOptions& options) {
-    options.rule = GrowthRule::hilomot;
-    options.validity = ValidityChoice::automatic;
-    options.max_leaves = gaussian_leaves;
-  });
-  if (const Eigen::Index numbers = count_numbers(inputs, base); numbers > 0 && numbers <= most_inputs_of_products) {
-    add("crisp tree, quadratic leaves", [](FitOptions& options) { options.terms = LocalTerms::quadratic; });
+// The held-out errors of a method: fills in fold_rmse, cv_rmse and spread. Calls `done` after each fold.
+void judge_on_folds(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<const Eigen::MatrixXd>& output,
+                    const Method& method, const std::vector<Fold>& folds, const std::function<void()>& done,
+                    Comparison& entry) {
+  double squares = 0.0;
+  double weight = 0.0;
+  entry.fold_rmse.resize(std::ssize(folds));
+  for (std::size_t f = 0; f < folds.size(); ++f) {
+    const Fold& fold = folds[f];
+    const FitResult fitted =
+        fit(inputs(fold.train, Eigen::all), output(fold.train, Eigen::all), for_rows(method.options, fold.train));
+    const Eigen::VectorXd error =
+        fitted.model.predict(inputs(fold.held_out, Eigen::all)) - Eigen::MatrixXd(output(fold.held_out, Eigen::all));
+    Eigen::VectorXd weights = Eigen::VectorXd::Ones(error.size());
+    if (method.options.weights.size() > 0) {
+      weights = method.options.weights(fold.held_out);
+    }
+    const double of_fold = weights.dot(error.cwiseAbs2());
+    squares += of_fold;
+    weight += weights.sum();
+    entry.fold_rmse(f) = weights.sum() > 0.0 ? std::sqrt(of_fold / weights.sum()) : 0.0;
+    done();
   }
-  if (base.pruning == Pruning::weakest_link) {
-    const auto pruned = [](ValidityChoice validity) {
-      return [validity](FitOptions& options) {
-        options.pruning = Pruning::weakest_link;
-        options.validity = validity;
-      };
-    };
-    add("crisp tree, RD, pruned", pruned(ValidityChoice::crisp));
-    add("blend, joint, pruned", pruned(ValidityChoice::blend));
-  }
-  return methods;
+  entry.cv_rmse = std::sqrt(squares / weight);
+  entry.spread = spread_of(entry.fold_rmse);
 }
 
-namespace {
-
-// Moves a row to either side of the plane of a node's split: along the split input, or in an oblique split
-// orthogonally to the plane, every input measured by its training range. Inputs without a value stay.
-std::pair<Eigen::VectorXd, Eigen::VectorXd> sides_of_plane(const Model& model, const Node& node,
-                                                           const Eigen::VectorXd& row) {
-  std::pair<Eigen::VectorXd, Eigen::VectorXd> sides{row, row};
-  if (!node.is_oblique()) {
-    sides.first(node.split_input) = node.threshold;
-    sides.second(node.split_input) = std::nextafter(node.threshold, std::numeric_limits<double>::infinity());
-    return sides;
-  }
-  Eigen::VectorXd way = Eigen::VectorXd::Zero(row.size());  // by which s grows by 1
-  double side = 0.0;
-  double scale = 0.0;
-  for (Eigen::Index j = 0; j < row.size(); ++j) {
-    const InputColumn& input = model.inputs()[j];
-    if (node.direction(j) != 0.0 && !std::isnan(row(j))) {
-      const double range = input.high - input.low;
-      side += node.direction(j) * (row(j) - input.centre);
-      scale += std::abs(node.direction(j)) * (range + std::abs(row(j)) + std::abs(input.centre));
-      way(j) = node.direction(j) * range * range;
-    }
-  }
-  const double square = node.direction.dot(way);
-  if (square > 0.0) {
-    // Far enough from the plane for rounding, too near for the local models to differ by it.
-    const double step = 1e-12 * scale;
-    sides.first += (node.threshold - step - side) / square * way;
-    sides.second += (node.threshold + step - side) / square * way;
-  }
-  return sides;
+// The model of all rows: its size, its largest jump and its times.
+void describe_model(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<const Eigen::MatrixXd>& output,
+                    const Method& method, Comparison& entry) {
+  std::vector<FitResult> all;
+  entry.fit_seconds = seconds_of([&] { all.push_back(fit(inputs, output, method.options)); });
+  const Model& model = all.front().model;
+  entry.predict_seconds =
+      seconds_of([&] { model.predict(inputs, method.options.max_threads); }) * 1e6 / static_cast<double>(inputs.rows());
+  entry.leaves = model.partitions().front().num_leaves();
+  entry.parameters = count_parameters(model);
+  entry.largest_jump = largest_jump(model, inputs);
 }
 
 }  // namespace
-
-double largest_jump(const Model& model, const Eigen::Ref<const Eigen::MatrixXd>& inputs) {
-  const Eigen::Index step = std::max<Eigen::Index>(1, (inputs.rows() + most_rows - 1) / most_rows);
-  double largest = 0.0;
-  for (const Partition& partition : model.partitions()) {
-    const Evaluator evaluator(partition, model.inputs(), std::ssize(model.regressors()));
-    // Rows just left and right of each split that may jump. Splits with a transition do not; Gaussians never do.
-    std::vector<Eigen::VectorXd> left;
-    std::vector<Eigen::VectorXd> right;
-    for (Eigen::Index row = 0; row < inputs.rows() && partition.validity.kind != ValidityKind::gaussian; row += step) {
-      const Eigen::VectorXd x = inputs.row(row).transpose();
-      for (Eigen::Index index = 0; index >= 0;) {
-        const Node& node = partition.nodes[index];
-        if (node.is_leaf()) break;
-        if (node.level_side.empty() && node.half_width == 0.0) {
-          auto [first, second] = sides_of_plane(model, node, x);
-          left.push_back(std::move(first));
-          right.push_back(std::move(second));
-        }
-        if (!node.level_side.empty() || (!node.is_oblique() && std::isnan(x(node.split_input)))) {
-          break;  // what lies below a set of levels has no plane of its own here
-        }
-        index = evaluator.child_of(static_cast<int>(index), x.data());
-      }
-    }
-    if (left.empty()) continue;
-    Eigen::MatrixXd at_left(std::ssize(left), model.num_inputs());
-    Eigen::MatrixXd at_right(std::ssize(left), model.num_inputs());
-    for (std::size_t k = 0; k < left.size(); ++k) {
-      at_left.row(k) = left[k].transpose();
-      at_right.row(k) = right[k].transpose();
-    }
-    const int output = partition.outputs.front();
-    largest = std::max(
-        largest, (model.predict(at_left).col(output) - model.predict(at_right).col(output)).cwiseAbs().maxCoeff());
-  }
-  return largest;
-}
 
 ComparisonResult compare(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
                          const Eigen::Ref<const Eigen::MatrixXd>& output, const std::vector<Method>& methods,
@@ -265,49 +147,17 @@ ComparisonResult compare(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
   const std::vector<Fold> folds = make_folds(inputs.rows(), fold_options);
   const Eigen::Index total = std::ssize(methods) * (std::ssize(folds) + 1);
   Eigen::Index done = 0;
-  const auto report = [&](const Method& method) {
-    ++done;
-    if (options.progress) {
-      options.progress(method.name, done, total);
-    }
-  };
-
   ComparisonResult result;
   for (const Method& method : methods) {
-    Comparison entry{.method = method.name, .fold_rmse = Eigen::VectorXd(std::ssize(folds))};
-    double squares = 0.0;
-    double weight = 0.0;
-    for (std::size_t f = 0; f < folds.size(); ++f) {
-      const Fold& fold = folds[f];
-      const FitResult fitted =
-          fit(inputs(fold.train, Eigen::all), output(fold.train, Eigen::all), for_rows(method.options, fold.train));
-      const Eigen::VectorXd error =
-          fitted.model.predict(inputs(fold.held_out, Eigen::all)) - Eigen::MatrixXd(output(fold.held_out, Eigen::all));
-      Eigen::VectorXd weights = Eigen::VectorXd::Ones(error.size());
-      if (method.options.weights.size() > 0) {
-        weights = method.options.weights(fold.held_out);
-      }
-      const double of_fold = weights.dot(error.cwiseAbs2());
-      squares += of_fold;
-      weight += weights.sum();
-      entry.fold_rmse(f) = weights.sum() > 0.0 ? std::sqrt(of_fold / weights.sum()) : 0.0;
-      report(method);
-    }
-    entry.cv_rmse = std::sqrt(squares / weight);
-    const double mean = entry.fold_rmse.mean();
-    entry.spread = entry.fold_rmse.size() > 1 ? std::sqrt((entry.fold_rmse.array() - mean).square().sum() /
-                                                          static_cast<double>(entry.fold_rmse.size() - 1))
-                                              : 0.0;
-    std::vector<FitResult> all;
-    entry.fit_seconds = seconds_of([&] { all.push_back(fit(inputs, output, method.options)); });
-    const Model& model = all.front().model;
-    entry.predict_seconds = seconds_of([&] { model.predict(inputs, method.options.max_threads); }) * 1e6 /
-                            static_cast<double>(inputs.rows());
-    entry.leaves = model.partitions().front().num_leaves();
-    entry.parameters = count_parameters(model);
-    entry.largest_jump = largest_jump(model, inputs);
+    const auto report = [&] {
+      ++done;
+      if (options.progress) options.progress(method.name, done, total);
+    };
+    Comparison entry{.method = method.name};
+    judge_on_folds(inputs, output, method, folds, report, entry);
+    describe_model(inputs, output, method, entry);
     result.methods.push_back(std::move(entry));
-    report(method);
+    report();
   }
   recommend(methods, result);
   return result;

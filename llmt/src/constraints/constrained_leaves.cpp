@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "constraints/monotone_splits.hpp"
 #include "constraints/ordered_splits.hpp"
 #include "constraints/signs.hpp"
 #include "numerics/bounded_least_squares.hpp"
@@ -11,17 +12,17 @@
 namespace llmt {
 namespace {
 
-// Room that estimates leave at ordered splits, relative to the range of the root's residuals: what rounding may take.
-constexpr double least_room = 1e-6;
+// The feasibility margin of estimates at ordered splits, in ranges of the root's residuals. Rounding may use it up.
+constexpr double margin_in_ranges = 1e-6;
 
-// Slopes are wrong beyond this, in the same unit for a column of unit size.
-constexpr double rounding = 1e-11;
+// A slope violates its sign beyond this, in ranges of the root's residuals for each unit of a column of unit size.
+constexpr double tolerance_in_ranges = 1e-11;
 
-// Times that violated inequalities are added. What is left then is mended at last.
+// Rounds of cutting planes. finish_constrained() mends what is still violated then.
 constexpr int most_rounds = 20;
 
-double room_of(const Partition& partition, Eigen::Index output) {
-  return least_room * (partition.residual_range(output, 1) - partition.residual_range(output, 0));
+double margin_of(const Partition& partition, Eigen::Index output) {
+  return margin_in_ranges * (partition.residual_range(output, 1) - partition.residual_range(output, 0));
 }
 
 // [value, slopes] of all nodes, one column each.
@@ -36,6 +37,7 @@ Eigen::MatrixXd models_of(const Partition& partition, Eigen::Index output) {
   return models;
 }
 
+// The constraints on the leaves' coefficients of one output.
 class LeafProblem {
  public:
   LeafProblem(const Partition& partition, const TrainingRows& training, const std::vector<int>& leaves,
@@ -45,8 +47,8 @@ class LeafProblem {
         signs_(coefficient_signs(training)),
         splits_(partition, training, output),
         models_(models_of(partition, output)),
-        room_(room_of(partition, output)),
-        tolerance_(rounding / least_room * room_),
+        margin_(margin_of(partition, output)),
+        tolerance_(tolerance_in_ranges / margin_in_ranges * margin_),
         position_(partition.nodes.size(), -1),
         unit_(Eigen::VectorXd::Ones(root.size())) {
     unit_.tail(root.size() - 1) = training.scale.cwiseInverse();
@@ -63,7 +65,7 @@ class LeafProblem {
         const auto of_leaf = coefficients.segment(static_cast<Eigen::Index>(k) * size, size);
         models_.col(leaves_[k]) = (of_leaf + root_).cwiseProduct(unit_);
       }
-      result = splits_.violated(models_, 0.5 * room_, room_);
+      result = splits_.violated(models_, 0.5 * margin_, margin_);
     }
     for (Eigen::Index at = 0; at < coefficients.size() && !signs_.empty(); ++at) {
       const int sign = signs_[at % size];
@@ -75,7 +77,7 @@ class LeafProblem {
     return result;
   }
 
-  // As normals' change >= bounds for a change of the coefficients.
+  // The inequalities in the form normals' change >= bounds, for a change of the coefficients.
   Eigen::MatrixXd normals(const std::vector<LeafInequality>& found, const Eigen::VectorXd& coefficients,
                           Eigen::VectorXd& bounds) const {
     const Eigen::Index size = root_.size();
@@ -99,10 +101,10 @@ class LeafProblem {
   std::vector<int> signs_;
   OrderedSplits splits_;
   Eigen::MatrixXd models_;
-  double room_;
+  double margin_;
   double tolerance_;
   std::vector<Eigen::Index> position_;  // of a leaf's node among the leaves
-  Eigen::VectorXd unit_;                // of natural coefficients, in scaled ones
+  Eigen::VectorXd unit_;                // natural coefficients are scaled ones times this
 };
 
 }  // namespace
@@ -130,7 +132,8 @@ void constrain_leaves(const Partition& partition, const TrainingRows& training, 
       distance.add(normals, bounds);
       all.insert(all.end(), found.begin(), found.end());
       Eigen::VectorXd change = distance.solve();
-      // What is not active any more is found again if need be: no round makes the change smaller.
+      // Inequalities that are not active are dropped. If they are violated later they are found again. This ends,
+      // because no round makes the change smaller.
       std::vector<LeafInequality> kept;
       for (const Eigen::Index c : distance.keep_active()) {
         kept.push_back(std::move(all[c]));
@@ -158,17 +161,17 @@ void finish_constrained(Partition& partition, const TrainingRows& training) {
   if (!has_ordered_splits(partition, training)) return;
   for (Eigen::Index o = 0; o < std::ssize(partition.outputs); ++o) {
     Eigen::MatrixXd models = models_of(partition, o);
-    OrderedSplits(partition, training, o).separate(models, room_of(partition, o));
+    OrderedSplits(partition, training, o).separate(models, margin_of(partition, o));
     for (std::size_t i = 0; i < partition.nodes.size(); ++i) {
       partition.nodes[i].value(o) = models(0, i);
     }
   }
 }
 
-double order_room(const Partition& partition, const TrainingRows& training) {
+double order_margin(const Partition& partition, const TrainingRows& training) {
   double least = std::numeric_limits<double>::infinity();
   for (Eigen::Index o = 0; o < std::ssize(partition.outputs) && has_ordered_splits(partition, training); ++o) {
-    least = std::min(least, OrderedSplits(partition, training, o).room(models_of(partition, o)));
+    least = std::min(least, OrderedSplits(partition, training, o).smallest_margin(models_of(partition, o)));
   }
   return least;
 }

@@ -11,27 +11,28 @@
 
 namespace llmt {
 
-/// Of each output.
+/// The active inequalities of each output.
 using ActiveInequalities = std::vector<std::vector<LeafInequality>>;
 
-/// Changes the coefficients of the leaves, one below the other, each column an output, as little as possible so that
-/// all constraints hold: the w nearest in the norm |factor (w - coefficients)|, `factor` the upper Cholesky factor of
-/// the estimate's matrix, which is the constrained estimate. Inequalities of ordered splits are added as they are found
-/// to be violated (cutting planes). `active`: inequalities to begin with, of the same partition; then those that hold.
+/// Moves the coefficients of the leaves to the nearest ones under all constraints. Each column of `coefficients` is an
+/// output and has one leaf below the other. The distance is |factor (w - coefficients)|, with `factor` the upper
+/// Cholesky factor of the estimate's matrix; the nearest w is therefore the constrained estimate. Inequalities of
+/// ordered splits are added as they are found to be violated (cutting planes). `active`: inequalities to start from, of
+/// the same partition; afterwards those that are active.
 ///
-/// Coefficients are those of columns divided by training.scale, about the root's model `root`. `partition`: inner nodes
+/// Coefficients are those of columns divided by training.scale, less the root's model `root`. `partition`: inner nodes
 /// final; `leaves`: its leaves' nodes in the order of the coefficients.
 void constrain_leaves(const Partition& partition, const TrainingRows& training, const std::vector<int>& leaves,
                       const RowMajor& factor, const Eigen::MatrixXd& root, Eigen::MatrixXd& coefficients,
                       ActiveInequalities& active);
 
-/// The last step of every constrained estimate, on the numbers that a model is made of: slopes that have the wrong sign
-/// by rounding become 0, and leaves on either side of ordered splits are moved apart where they have less than the
-/// least room, by rounding or because the cutting planes were given up.
+/// The last step of every constrained estimate, on the numbers that a model consists of. Slopes that have the wrong
+/// sign by rounding become 0. Leaves on the two sides of an ordered split are moved apart if their margin is too small,
+/// because of rounding or because the cutting planes were given up.
 void finish_constrained(Partition& partition, const TrainingRows& training);
 
-/// The room that ordered splits of a finished partition leave, see OrderedSplits::room(); infinity without them. The
-/// smallest over the outputs.
-double order_room(const Partition& partition, const TrainingRows& training);
+/// The smallest feasibility margin of the ordered splits of a finished partition, see OrderedSplits::smallest_margin().
+/// The smallest over the outputs; infinity without ordered splits.
+double order_margin(const Partition& partition, const TrainingRows& training);
 
 }  // namespace llmt

@@ -32,6 +32,17 @@ std::vector<int> numeric_regression_inputs(const Table& table) {
   return result;
 }
 
+Eigen::Index count_numeric_inputs(Eigen::Index inputs, const FitOptions& options) {
+  Eigen::Index count = 0;
+  const std::vector<int>& chosen = options.regression_inputs;
+  for (int input = 0; input < inputs; ++input) {
+    const bool used = chosen.empty() || std::ranges::find(chosen, input) != chosen.end();
+    const std::vector<int>& categorical = options.categorical_inputs;
+    count += used && std::ranges::find(categorical, input) == categorical.end() ? 1 : 0;
+  }
+  return count;
+}
+
 std::vector<std::pair<int, int>> products_of(const Table& table) {
   std::vector<int> inputs = numeric_regression_inputs(table);
   // The slope in an input that products change has no sign.

@@ -1,14 +1,22 @@
 /// \file
-/// The caller's data, checked.
+/// The data of a fit: checked, without the rows of weight 0.
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <utility>
 #include <vector>
 
+#include "llmt/options.hpp"
+
 namespace llmt {
 
-/// The data of a fit: the caller's own, nothing is copied.
+/// Inputs beyond this are refused, so that squares stay finite; outputs too.
+inline constexpr double largest_magnitude = 1e150;
+/// With quadratic local models: squares of products of inputs stay finite.
+inline constexpr double largest_factor = 1e70;
+
+/// Data by column and what is known of the columns. Inputs and outputs belong to the caller or to FitData.
 struct Table {
   Eigen::Ref<const Eigen::MatrixXd> inputs;  ///< NaN: missing
   Eigen::Ref<const Eigen::MatrixXd> outputs;
@@ -20,6 +28,28 @@ struct Table {
   std::vector<std::pair<int, int>> products = {};
   std::vector<int> slope_signs = {};  ///< of each input, those of `monotone` included; empty: none
   std::vector<int> monotone = {};     ///< see FitOptions; empty: none
+};
+
+/// The caller's data. Nothing is copied unless there are rows of weight 0: then what takes part is.
+class FitData {
+ public:
+  /// Throws std::invalid_argument as fit(). No columns named means all of them. `orders_splits`: the growth rule can
+  /// split on inputs in which the prediction is to be monotone; else these are not split.
+  FitData(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<const Eigen::MatrixXd>& outputs,
+          const FitOptions& options, bool orders_splits);
+  FitData(const FitData&) = delete;
+  FitData& operator=(const FitData&) = delete;
+
+  const Table& table() const { return *table_; }
+  /// FitOptions::folds with the groups of the rows that take part.
+  const FoldOptions& folds() const { return folds_; }
+
+ private:
+  Eigen::MatrixXd inputs_;
+  Eigen::MatrixXd outputs_;
+  std::vector<double> groups_;
+  FoldOptions folds_;
+  std::optional<Table> table_;
 };
 
 }  // namespace llmt

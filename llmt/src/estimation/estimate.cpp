@@ -1,19 +1,20 @@
 #include "estimation/estimate.hpp"
 
-#include <algorithm>
-#include <cmath>
+#include <utility>
 
-#include "constraints/ordered_splits.hpp"
-#include "estimation/joint_fit.hpp"
-#include "model/evaluator.hpp"
+#include "constraints/monotone_splits.hpp"
+#include "estimation/joint_estimate.hpp"
+#include "estimation/local_estimate.hpp"
+#include "model/tree.hpp"
 
 namespace llmt {
 namespace {
 
-// Leaves of the tree that are asked whether they agree on a slope beyond the training extent.
+// Number of first leaves whose slopes decide how far the root's slope is extrapolated (B.4).
 constexpr Eigen::Index leaves_that_agree = 32;
 
-// From a sample with so many rows for each unknown the joint estimate on many more rows starts.
+// Rows for each unknown of the sample from which a joint estimate on many rows starts. It is used where there are more
+// than twice as many rows.
 constexpr Eigen::Index rows_per_unknown = 50;
 
 }  // namespace
@@ -44,9 +45,7 @@ Partition blended(const TrainingRows& training, const GrownTree& grown, const Va
   set_half_widths(partition, training.low(), training.high());
   limit_half_widths(partition, training);
   for (std::size_t i = 0; i < partition.nodes.size(); ++i) {
-    if (grown.jumps(i) >= jump) {
-      partition.nodes[i].half_width = 0.0;
-    }
+    if (grown.jumps(i) >= jump) partition.nodes[i].half_width = 0.0;
   }
   return partition;
 }
@@ -54,79 +53,27 @@ Partition blended(const TrainingRows& training, const GrownTree& grown, const Va
 Partition estimate(const TrainingRows& training, const GrownTree& grown, const Candidate& candidate, int max_threads) {
   Partition partition = prefix(blended(training, grown, candidate.validity, candidate.jump), candidate.leaves);
   if (candidate.leaves == 1) {
-    partition.outer_slope.resize(0, 0);  // one linear model goes on as it is
+    partition.outer_slope.resize(0, 0);  // one linear model goes on with its own slopes
   }
-  if (candidate.validity.kind == ValidityKind::crisp) {
-    const JointFit fit(training, std::move(partition), max_threads, candidate.sparse);
-    return candidate.sparse || candidate.shrinkage > 0.0
-               ? fit.local(candidate.leaves, candidate.shrinkage, candidate.sparse)
-               : fit.as_grown(candidate.leaves);
-  }
-  const Regularisation regularisation{candidate.ridge, candidate.shrinkage, candidate.sparse};
   const Eigen::Index enough = rows_per_unknown * candidate.leaves * (std::ssize(training.regressors) + 1);
-  if (candidate.estimation == Estimation::joint && training.count() > 2 * enough) {
-    const TrainingRows sample = thinned(training, enough);
-    const JointFit fit(sample, std::move(partition), max_threads, candidate.sparse);
-    return fit.joint_on(training, candidate.leaves, regularisation);
-  }
-  const JointFit fit(training, std::move(partition), max_threads, candidate.sparse);
-  switch (candidate.estimation) {
-    case Estimation::as_grown:
-      return fit.as_grown(candidate.leaves);
-    case Estimation::local:
-      return fit.local(candidate.leaves, candidate.shrinkage, candidate.sparse);
-    case Estimation::joint:
-      break;
-  }
-  return std::move(fit.joint(candidate.leaves, {regularisation}).front());
-}
-
-Eigen::VectorXd prefix_squared_errors(const Partition& partition, const TrainingRows& rows,
-                                      const Eigen::VectorXd& weights, int max_threads) {
-  const Evaluator evaluator(partition, rows.columns, std::ssize(rows.regressors));
-  // Of the sum, from M - 1 to M leaves.
-  std::vector<Eigen::VectorXd> changes(num_slots, Eigen::VectorXd::Zero(partition.num_leaves()));
-  for_each_chunk(rows, partition.outputs, max_threads, [&](std::size_t slot, const Chunk& chunk) {
-    Eigen::VectorXd values(std::ssize(partition.outputs));
-    for (Eigen::Index row = 0; row < chunk.count(); ++row) {
-      const double* deviations = chunk.deviations.row(row).data();
-      double previous = 0.0;
-      for (int node = 0; node >= 0;) {
-        evaluator.local(node, deviations, values.data());
-        evaluator.finish(deviations, values.data());
-        const double squared =
-            chunk.weights(row) * weights.dot((chunk.outputs.row(row).transpose() - values).cwiseAbs2());
-        // Nodes 2k-1 and 2k come with the k-th split, that is with k + 1 leaves.
-        changes[slot]((node + 1) / 2) += squared - previous;
-        previous = squared;
-        node = partition.nodes[node].is_leaf() ? -1 : evaluator.child_of(node, chunk.inputs.row(row).data());
-      }
+  const bool is_crisp = candidate.validity.kind == ValidityKind::crisp;
+  if (!is_crisp && candidate.estimation == Estimation::joint) {
+    const Regularisation regularisation{candidate.ridge, candidate.shrinkage, candidate.sparse};
+    if (training.count() > 2 * enough) {
+      const TrainingRows sample = thinned(training, enough);
+      const LeafSums sums = sum_leaves(sample, std::move(partition), max_threads, candidate.sparse);
+      return joint_from_sample(sums, training, candidate.leaves, regularisation);
     }
-  });
-  Eigen::VectorXd sums = Eigen::VectorXd::Zero(partition.num_leaves());
-  for (const Eigen::VectorXd& change : changes) {
-    sums += change;
+    const LeafSums sums = sum_leaves(training, std::move(partition), max_threads, candidate.sparse);
+    return std::move(joint(sums, candidate.leaves, {regularisation}).front());
   }
-  for (Eigen::Index leaves = 1; leaves < sums.size(); ++leaves) {
-    sums(leaves) += sums(leaves - 1);
+  const LeafSums sums = sum_leaves(training, std::move(partition), max_threads, candidate.sparse);
+  // Crisp leaves have the models of growth unless something was asked for that growth does not do.
+  const bool asks_for_more = candidate.sparse || candidate.shrinkage > 0.0;
+  if (is_crisp ? asks_for_more : candidate.estimation == Estimation::local) {
+    return local(sums, candidate.leaves, candidate.shrinkage, candidate.sparse);
   }
-  return sums.cwiseMax(0.0);
-}
-
-double squared_error(const Partition& partition, const TrainingRows& columns, const std::vector<Chunk>& rows,
-                     const Eigen::VectorXd& weights) {
-  const Evaluator evaluator(partition, columns.columns, std::ssize(columns.regressors));
-  std::vector<Activation> active;
-  Eigen::VectorXd values(std::ssize(partition.outputs));
-  double sum = 0.0;
-  for (const Chunk& chunk : rows) {
-    for (Eigen::Index row = 0; row < chunk.count(); ++row) {
-      evaluator.activate(chunk.inputs.row(row).data(), active);
-      evaluator.combine(active, chunk.deviations.row(row).data(), values.data());
-      sum += chunk.weights(row) * weights.dot((chunk.outputs.row(row).transpose() - values).cwiseAbs2());
-    }
-  }
-  return sum;
+  return as_grown(sums, candidate.leaves);
 }
 
 }  // namespace llmt

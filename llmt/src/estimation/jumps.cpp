@@ -8,30 +8,38 @@
 
 #include "base/parallel.hpp"
 #include "model/evaluator.hpp"
+#include "model/imputed.hpp"
 #include "numerics/f_distribution.hpp"
 
 namespace llmt {
 namespace {
 
-// Rows of a band: this part of the smaller side, but so many per coefficient of a local model, and at most half a
-// side: what is not narrow tells nothing.
-constexpr double band_share = 0.2;
+// Of data with more rows than this a sample is used.
+constexpr Eigen::Index enough_rows = 200000;
+
+// A band holds 20 % of the rows on the smaller side, at least 5 and at most 100 rows per coefficient of a local model.
+// For the lower bound it takes at most half of that side: a wide band would measure curvature. With fewer than 10 rows
+// the jump counts as 0.
+constexpr double part_of_smaller_side = 0.2;
 constexpr Eigen::Index least_rows_per_coefficient = 5;
 constexpr Eigen::Index most_rows_per_coefficient = 100;
 constexpr Eigen::Index least_rows = 10;
 
-// Where one side has fewer rows per coefficient, the gap is a constant.
+// The gap is a constant where one side of the band has fewer rows per coefficient than this.
 constexpr Eigen::Index rows_per_coefficient_of_gap = 3;
 
-// A side on which rows lie denser may have this many times the rows of the other.
+// Bands are equally wide. On the side where rows lie denser a band holds at most this many times the wanted rows.
 constexpr Eigen::Index densest = 4;
 
-// The threshold is the best of many, so chance makes gaps: those more probable than this, by Chow's test corrected for
-// the search as in growth, are none.
+// The threshold is the best of many, so chance makes gaps. A gap counts as 0 if Chow's test, corrected for the search
+// as in growth, does not reject at this level that there is none.
 constexpr double significance = 0.05;
 
 // Scatter below this part of the outputs' range is rounding.
 constexpr double rounding = 1e-10;
+
+// Columns of the gap below this part of the largest, after those of the continuous model are taken off, count as zero.
+constexpr double least_independence = 1e-6;
 
 // Rows of a node with a value of the split input, by their distance from the threshold.
 struct Sides {
@@ -39,8 +47,8 @@ struct Sides {
   std::vector<std::pair<double, int>> right;  // distances > 0
 };
 
-// How far from the threshold the `count` nearest rows reach; at least to the second distinct value. Ties stay
-// together, so that the order of rows does not matter.
+// The distance from the threshold that the `count` nearest rows reach, but at least the second distinct one; -1 if
+// there is one distance only. Rows of equal distance belong together, so that the order of rows does not matter.
 double reach(std::vector<std::pair<double, int>>& side, Eigen::Index count) {
   std::nth_element(side.begin(), side.begin() + (count - 1), side.end());
   const double last = side[count - 1].first;
@@ -55,10 +63,9 @@ double reach(std::vector<std::pair<double, int>>& side, Eigen::Index count) {
 // The rows of the bands on both sides; empty if there are not enough different values.
 std::vector<std::pair<double, int>> band(Sides& sides, Eigen::Index coefficients) {
   const Eigen::Index smaller = std::min(std::ssize(sides.left), std::ssize(sides.right));
-  const Eigen::Index share = static_cast<Eigen::Index>(band_share * static_cast<double>(smaller));
-  const Eigen::Index wanted =
-      std::min(std::max(share, std::min(least_rows_per_coefficient * coefficients, smaller / 2)),
-               most_rows_per_coefficient * coefficients);
+  const Eigen::Index part = static_cast<Eigen::Index>(part_of_smaller_side * static_cast<double>(smaller));
+  const Eigen::Index wanted = std::min(std::max(part, std::min(least_rows_per_coefficient * coefficients, smaller / 2)),
+                                       most_rows_per_coefficient * coefficients);
   const double left = wanted >= least_rows ? reach(sides.left, wanted) : -1.0;
   const double right = wanted >= least_rows ? reach(sides.right, wanted) : -1.0;
   std::vector<std::pair<double, int>> rows;
@@ -76,94 +83,138 @@ std::vector<std::pair<double, int>> band(Sides& sides, Eigen::Index coefficients
   return rows;
 }
 
-double jump_size(const TrainingRows& training, const Partition& grown, const Node& node, Sides& sides) {
-  // Products, which come last, matter little in a narrow band.
-  const Eigen::Index regressors = std::ssize(training.regressors) - std::ssize(training.table->products);
-  const std::vector<std::pair<double, int>> rows = band(sides, regressors + 1);
-  Eigen::Index on_left = 0;
-  std::vector<int> positions;
-  for (const auto& [distance, row] : rows) {
-    on_left += distance <= 0.0 ? 1 : 0;
-    positions.push_back(row);
-  }
-  // The regressors along the plane, where rows are enough for a gap that depends on them.
-  std::vector<Eigen::Index> along;
+// The regressors along the plane, if each side of the band has enough rows for a gap that depends on them.
+std::vector<Eigen::Index> regressors_of_gap(const TrainingRows& training, const Node& node, Eigen::Index regressors,
+                                            const std::vector<std::pair<double, int>>& rows) {
+  const Eigen::Index on_left = std::ranges::count_if(rows, [](const auto& row) { return row.first <= 0.0; });
   const Eigen::Index fewer = std::min(on_left, std::ssize(rows) - on_left);
+  std::vector<Eigen::Index> along;
   for (Eigen::Index k = 0; k < regressors && fewer >= rows_per_coefficient_of_gap * (regressors + 1); ++k) {
-    if (training.regressors[k].input != node.split_input) {
-      along.push_back(k);
-    }
+    if (training.regressors[k].input != node.split_input) along.push_back(k);
+  }
+  return along;
+}
+
+// The regression of the rows of a band; lines are multiplied by the root of the weight.
+struct BandRegression {
+  Eigen::MatrixXd plane;       // constant and regressors along the plane
+  Eigen::MatrixXd continuous;  // columns of a continuous model with a kink at the threshold
+  Eigen::MatrixXd jump;        // what a jump adds to them: `plane` on the right, 0 on the left
+  Eigen::MatrixXd residuals;   // of the node's model, one column for each output
+  double weight;               // of all rows
+};
+
+BandRegression regression(const TrainingRows& training, const Partition& grown, const Node& node,
+                          const std::vector<std::pair<double, int>>& rows, const std::vector<Eigen::Index>& along) {
+  std::vector<int> positions;
+  double largest = 0.0;
+  for (const auto& [distance, row] : rows) {
+    positions.push_back(row);
+    largest = std::max(largest, std::abs(distance));
   }
   const Chunk chunk = fetch(training, positions, grown.outputs);
   const Eigen::Index count = chunk.count();
   const Eigen::Index slopes = std::ssize(along);
-  double largest = 0.0;
-  for (const auto& [distance, row] : rows) {
-    largest = std::max(largest, std::abs(distance));
-  }
-  // A continuous model with a kink at the threshold, and what a jump adds to it.
-  Eigen::MatrixXd continuous(count, 3 + slopes);
-  Eigen::MatrixXd jump = Eigen::MatrixXd::Zero(count, 1 + slopes);
-  Eigen::MatrixXd plane(count, 1 + slopes);
-  Eigen::MatrixXd residuals(count, std::ssize(grown.outputs));
+  BandRegression result{Eigen::MatrixXd(count, 1 + slopes), Eigen::MatrixXd(count, 3 + slopes),
+                        Eigen::MatrixXd::Zero(count, 1 + slopes), Eigen::MatrixXd(count, std::ssize(grown.outputs)),
+                        chunk.weights.sum()};
   for (Eigen::Index i = 0; i < count; ++i) {
     const double root = std::sqrt(chunk.weights(i));
     const double distance = rows[i].first / largest;
-    Eigen::RowVectorXd deviations = chunk.deviations.row(i);
-    deviations = deviations.array().isNaN().select(node.mean.transpose(), deviations);
-    residuals.row(i) = root * (chunk.outputs.row(i) - (node.value + node.slope * deviations.transpose()).transpose());
-    plane(i, 0) = root;
+    const Eigen::VectorXd deviations = imputed(node, chunk.deviations.row(i));
+    result.residuals.row(i) = root * (chunk.outputs.row(i) - (node.value + node.slope * deviations).transpose());
+    result.plane(i, 0) = root;
     for (Eigen::Index k = 0; k < slopes; ++k) {
       const Eigen::Index regressor = along[k];
-      plane(i, 1 + k) = root * (deviations(regressor) - node.mean(regressor)) / training.scale(regressor);
+      result.plane(i, 1 + k) = root * (deviations(regressor) - node.mean(regressor)) / training.scale(regressor);
     }
-    continuous.row(i) << plane.row(i), root * distance, root * std::max(0.0, distance);
+    result.continuous.row(i) << result.plane.row(i), root * distance, root * std::max(0.0, distance);
     if (distance > 0.0) {
-      jump.row(i) = plane.row(i);
+      result.jump.row(i) = result.plane.row(i);
     }
   }
+  return result;
+}
+
+// Eq. (V.4), the mean over the outputs. `candidates`: thresholds among which growth chose.
+double root_mean_square_gap(BandRegression band, const std::vector<double>& least_scatter, double candidates) {
   // What the continuous model leaves of the other columns, and of the residuals.
-  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> first(continuous);
-  for (Eigen::MatrixXd* columns : {&jump, &residuals}) {
+  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> first(band.continuous);
+  for (Eigen::MatrixXd* columns : {&band.jump, &band.residuals}) {
     columns->applyOnTheLeft(first.householderQ().adjoint());
     columns->topRows(first.rank()).setZero();
   }
-  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> second(jump);
-  second.setThreshold(1e-6);
+  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> second(band.jump);
+  second.setThreshold(least_independence);
   const Eigen::Index rank = second.rank();
-  const Eigen::Index free = count - first.rank() - rank;
-  if (rank == 0 || free < 1) return 0.0;
-  residuals.applyOnTheLeft(second.householderQ().adjoint());
+  const Eigen::Index count = band.residuals.rows();
+  const Eigen::Index freedom = count - first.rank() - rank;
+  if (rank == 0 || freedom < 1) return 0.0;
+  band.residuals.applyOnTheLeft(second.householderQ().adjoint());
   // The gap on the plane is plane * inverse * the first rows of the residuals.
   Eigen::MatrixXd inverse = Eigen::MatrixXd::Identity(rank, rank);
   second.matrixR().topLeftCorner(rank, rank).triangularView<Eigen::Upper>().solveInPlace(inverse);
-  const Eigen::MatrixXd kept = (plane * second.colsPermutation()).leftCols(rank) * inverse;
-  const double weight = chunk.weights.sum();
-  const double candidates = static_cast<double>(node.samples * std::ssize(training.table->split_inputs));
-  double size = 0.0;
-  for (Eigen::Index o = 0; o < residuals.cols(); ++o) {
-    const OutputColumn& output = training.output_columns[grown.outputs[o]];
-    const double least = rounding * (output.high - output.low);
-    const double variance =
-        residuals.col(o).tail(count - rank).squaredNorm() / static_cast<double>(free) + least * least;
-    const double f = residuals.col(o).head(rank).squaredNorm() / static_cast<double>(rank) / variance;
-    if (f_survival(f, static_cast<double>(rank), static_cast<double>(free)) * candidates < significance) {
-      const double gap = (kept * residuals.col(o).head(rank)).squaredNorm() - variance * kept.squaredNorm();
-      size += std::max(0.0, gap / weight) / variance;
+  const Eigen::MatrixXd to_gap = (band.plane * second.colsPermutation()).leftCols(rank) * inverse;
+  double sum = 0.0;
+  for (Eigen::Index o = 0; o < band.residuals.cols(); ++o) {
+    const auto of_jump = band.residuals.col(o).head(rank);
+    const double variance = band.residuals.col(o).tail(count - rank).squaredNorm() / static_cast<double>(freedom) +
+                            least_scatter[o] * least_scatter[o];
+    const double p_value =
+        chow_p_value(of_jump.squaredNorm(), static_cast<double>(rank), variance, static_cast<double>(freedom));
+    if (p_value * candidates < significance) {
+      const double gap = (to_gap * of_jump).squaredNorm() - variance * to_gap.squaredNorm();
+      sum += std::max(0.0, gap / band.weight) / variance;
     }
   }
-  return std::sqrt(size / static_cast<double>(residuals.cols()));
+  return std::sqrt(sum / static_cast<double>(band.residuals.cols()));
 }
 
-// A jump that so many rows do not show is not worth keeping.
-constexpr Eigen::Index enough_rows = 200000;
+double jump_size(const TrainingRows& training, const Partition& grown, const Node& node, Sides& sides) {
+  // Products, which come last, matter little in a narrow band.
+  const Eigen::Index regressors = std::ssize(training.regressors) - std::ssize(training.table->products);
+  const std::vector<std::pair<double, int>> rows = band(sides, regressors + 1);
+  if (rows.empty()) return 0.0;
+  const std::vector<Eigen::Index> along = regressors_of_gap(training, node, regressors, rows);
+  std::vector<double> least_scatter;
+  for (const int output : grown.outputs) {
+    const OutputColumn& column = training.output_columns[output];
+    least_scatter.push_back(rounding * (column.high - column.low));
+  }
+  const double candidates = static_cast<double>(node.samples * std::ssize(training.table->split_inputs));
+  return root_mean_square_gap(regression(training, grown, node, rows, along), least_scatter, candidates);
+}
+
+// The rows of a node that have a value of its split input.
+Sides sides_of(const TrainingRows& training, const Partition& grown, int index,
+               const std::vector<std::vector<int>>& rows_of_leaf) {
+  const Node& node = grown.nodes[index];
+  Sides sides;
+  std::vector<int> open = {index};
+  while (!open.empty()) {
+    const Node& below = grown.nodes[open.back()];
+    const std::vector<int>& rows = rows_of_leaf[open.back()];
+    open.pop_back();
+    if (!below.is_leaf()) {
+      open.push_back(below.left);
+      open.push_back(below.right);
+    }
+    for (const int row : rows) {
+      const double distance = training.table->inputs(training.rows[row], node.split_input) - node.threshold;
+      if (!std::isnan(distance)) {
+        (distance > 0.0 ? sides.right : sides.left).emplace_back(std::abs(distance), row);
+      }
+    }
+  }
+  return sides;
+}
 
 }  // namespace
 
 Eigen::VectorXd jump_sizes(const TrainingRows& all, const Partition& grown, int max_threads) {
   const TrainingRows training = thinned(all, enough_rows);
   const Evaluator evaluator(grown, training.columns, std::ssize(training.regressors));
-  std::vector<std::vector<int>> of_node(grown.nodes.size());  // positions of the rows in its box
+  std::vector<std::vector<int>> rows_of_leaf(grown.nodes.size());  // their positions; empty for inner nodes
   for (Eigen::Index index = 0; index < num_chunks(training); ++index) {
     const Chunk chunk = fetch(training, index, {});
     for (Eigen::Index row = 0; row < chunk.count(); ++row) {
@@ -171,33 +222,15 @@ Eigen::VectorXd jump_sizes(const TrainingRows& all, const Partition& grown, int 
       while (!grown.nodes[leaf].is_leaf()) {
         leaf = evaluator.child_of(leaf, chunk.inputs.row(row).data());
       }
-      of_node[leaf].push_back(static_cast<int>(index * chunk_rows + row));
+      rows_of_leaf[leaf].push_back(static_cast<int>(index * chunk_rows + row));
     }
   }
   Eigen::VectorXd sizes = Eigen::VectorXd::Zero(std::ssize(grown.nodes));
   parallel_for(std::ssize(grown.nodes), max_threads, [&](Eigen::Index index) {
     const Node& node = grown.nodes[index];
-    if (node.is_leaf() || !node.level_side.empty() || node.is_oblique() ||
-        node.threshold == std::numeric_limits<double>::max()) {
-      return;
-    }
-    Sides sides;
-    std::vector<int> open = {static_cast<int>(index)};
-    while (!open.empty()) {
-      const Node& below = grown.nodes[open.back()];
-      const std::vector<int>& rows = of_node[open.back()];
-      open.pop_back();
-      if (!below.is_leaf()) {
-        open.push_back(below.left);
-        open.push_back(below.right);
-      }
-      for (const int row : rows) {
-        const double distance = training.table->inputs(training.rows[row], node.split_input) - node.threshold;
-        if (!std::isnan(distance)) {
-          (distance > 0.0 ? sides.right : sides.left).emplace_back(std::abs(distance), row);
-        }
-      }
-    }
+    const bool splits_by_presence = node.threshold == std::numeric_limits<double>::max();
+    if (node.is_leaf() || !node.level_side.empty() || node.is_oblique() || splits_by_presence) return;
+    Sides sides = sides_of(training, grown, static_cast<int>(index), rows_of_leaf);
     sizes(index) = jump_size(training, grown, node, sides);
   });
   return sizes;

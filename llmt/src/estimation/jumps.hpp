@@ -1,5 +1,5 @@
 /// \file
-/// At which splits of a grown tree the outputs really jump.
+/// How far the outputs jump at the splits of a grown tree.
 #pragma once
 
 #include <Eigen/Core>
@@ -8,13 +8,14 @@
 
 namespace llmt {
 
-/// For every node of a grown tree: how far the outputs jump at its threshold, as a multiple of the scatter of the rows
-/// there; 0 in leaves, at splits on categories, at oblique ones and where rows do not tell.
+/// For every node of a grown tree: how far the outputs jump at its threshold, in units of the scatter of the rows
+/// there, eq. (V.4) of docs/algorithms/validities.md. 0 in leaves, at splits on categories, at oblique splits, and
+/// where there are too few rows to measure a jump.
 ///
-/// Two linear models are fitted to a narrow band of the node's rows on either side of the threshold, and the root mean
-/// square of the gap between them on the plane x_j = threshold, its sampling variance taken off, is divided by the
-/// standard deviation of their residuals. Bands are equally wide: so curvature, which bends both models alike, does not
-/// look like a jump, nor does a kink. Where rows are few, the gap is a constant.
+/// Two linear models are fitted to the node's rows in two narrow bands, one on either side of the threshold. The root
+/// mean square of the gap between them on the plane x_j = threshold, less its sampling variance, is divided by the
+/// standard deviation of their residuals. Both bands have the same width, so curvature, which bends both models alike,
+/// does not look like a jump; nor does a kink. Where rows are few, the gap is a constant.
 Eigen::VectorXd jump_sizes(const TrainingRows& training, const Partition& grown, int max_threads);
 
 }  // namespace llmt

@@ -1,20 +1,26 @@
+#include "estimation/leaf_statistics.hpp"
+
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 
 #include "base/parallel.hpp"
-#include "estimation/estimate.hpp"
 #include "model/evaluator.hpp"
+#include "model/imputed.hpp"
 
 namespace llmt {
 namespace {
 
-// Rows for each unknown that tell leverages to a few percent.
+// Rows for each unknown of the sample from which leverages are computed; they are then right to a few percent.
 constexpr Eigen::Index rows_per_unknown = 200;
 
-// Weighted residual sums of squares of all nodes, outputs x nodes: of an inner node's own local model, as if it were a
-// leaf.
+// Smallest eigenvalue of a scaled Gram matrix that is inverted: in rows, and relative to the largest one.
+constexpr double least_eigenvalue = 1e-6;
+constexpr double least_relative_eigenvalue = 1e-12;
+
+// Weighted residual sums of squares of all nodes, outputs x nodes. An inner node has those of its own local model, as
+// if it were a leaf.
 Eigen::MatrixXd residual_sums(const TrainingRows& training, const Partition& partition, const Evaluator& evaluator,
                               int max_threads) {
   const Eigen::Index outputs = std::ssize(partition.outputs);
@@ -60,7 +66,7 @@ std::vector<Eigen::MatrixXd> gram_matrices(const TrainingRows& training, const P
         const Node& leaf = partition.nodes[entry.node];
         a(0) = 1.0;
         for (Eigen::Index k = 0; k < regressors; ++k) {
-          a(k + 1) = std::isnan(deviations[k]) ? leaf.mean(k) : deviations[k];
+          a(k + 1) = imputed(leaf, k, deviations[k]);
         }
         double* gram = of_slot[slot][entry.node].data();
         for (Eigen::Index j = 0; j <= regressors; ++j, gram += regressors + 1) {
@@ -96,7 +102,7 @@ std::vector<Eigen::Index> used_coefficients(const Node& node) {
 Eigen::MatrixXd inverse_gram(const Eigen::MatrixXd& gram, const Eigen::VectorXd& scale) {
   const Eigen::MatrixXd scaled = scale.cwiseInverse().asDiagonal() * gram * scale.cwiseInverse().asDiagonal();
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scaled);
-  const double floor = std::max(1e-6, 1e-12 * eigen.eigenvalues().maxCoeff());
+  const double floor = std::max(least_eigenvalue, least_relative_eigenvalue * eigen.eigenvalues().maxCoeff());
   const Eigen::MatrixXd result = eigen.eigenvectors() *
                                  eigen.eigenvalues().cwiseMax(floor).cwiseInverse().asDiagonal() *
                                  eigen.eigenvectors().transpose();

@@ -10,14 +10,15 @@
 
 namespace llmt {
 
-/// With a = [1, x], Phi_i the validity of leaf i, q the weights and r the residuals of the root's model, sums over rows
+/// The sums (E.4) of docs/algorithms/estimation.md. With a = [1, x], Phi_i the validity of leaf i, q the weights and r
+/// the residuals of the root's model, sums over rows of
 ///   S_ij = q Phi_i Phi_j a a',  G_i = q Phi_i a a',  b_i = q Phi_i a r,  q Phi_i r^2
-/// in columns scaled over all rows. Where values are missing, a depends on the leaf.
+/// in columns divided by TrainingRows::scale. Where values are missing, a depends on the leaf.
 struct NormalEquations {
   Eigen::Index size = 0;    ///< coefficients of a local model
-  bool missing = false;     ///< blocks of rows with missing values are not symmetric, so all are stored in full
+  bool missing = false;     ///< some value is missing; then blocks are not symmetric and are stored in full
   std::vector<int> leaves;  ///< nodes, ascending
-  /// S_ij of leaf i with leaves j = 0 ... i, lower triangles row by row. Empty: the leaves share no row.
+  /// S_ij of leaf i with the leaves j = 0 ... i, lower triangles row by row. Empty if the two leaves share no row.
   std::vector<std::vector<std::vector<double>>> blocks;
   std::vector<Eigen::MatrixXd> gram;      ///< G of every node, size x size
   std::vector<Eigen::MatrixXd> products;  ///< b of every node, size x outputs
@@ -27,12 +28,12 @@ struct NormalEquations {
   Eigen::MatrixXd block(std::size_t i, std::size_t j) const;
 };
 
-/// Whether rows whose missing values leave open which leaves they belong to take no part: they would teach all of them
-/// wrong.
+/// Whether rows that a missing value sends to several leaves are left out of the sums, because they would distort the
+/// models of all these leaves. They are not left out if they are more than half of the weight.
 bool leaves_out_ambiguous(const TrainingRows& training, const Evaluator& evaluator);
 
-/// Sums over all rows, and the nodes' ranges over the rows that their validities reach. `root`: coefficients of the
-/// root's model in scaled columns, size x outputs.
+/// Forms the sums over all rows, and sets the ranges of the nodes to those of the rows that their validities reach.
+/// `root`: coefficients of the root's model in scaled columns, size x outputs.
 NormalEquations assemble(const TrainingRows& training, Partition& partition, const Eigen::MatrixXd& root,
                          int max_threads);
 

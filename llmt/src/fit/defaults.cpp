@@ -1,15 +1,128 @@
 #include "fit/defaults.hpp"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include <algorithm>
+#include <array>
+#include <stdexcept>
 
 namespace llmt {
 namespace {
 
-// Of a crisp tree that is grown without a test, to be pruned: of many rows it would have leaves without number.
-constexpr Eigen::Index most_pruned_leaves = 1000;
+// What a default depends on. A row of a table below holds if its case does; the first such row counts.
+struct Case {
+  bool folds = false;        // something is chosen on held-out rows
+  bool one_fold = false;     // many rows, held out once: the widest transitions and some ridges would take most time
+  bool overlapping = false;  // leaves that overlap are candidates, and held-out rows decide
+  bool ordered = false;      // inputs in which the prediction is monotone may be split: estimates are costly
+  bool own_models = false;   // the rule's local models are not estimated anew
+  bool weakest_link = false;
+  ValidityKind kind = ValidityKind::crisp;  // of the leaves that overlap
+};
+
+struct Row {
+  bool (*holds)(const Case&);
+  const char* when;  // in words; empty: else
+  std::vector<double> values;
+};
+
+using Rows = std::vector<Row>;
+
+bool always(const Case&) { return true; }
+
+bool is_ordered(const Case& each) { return each.ordered; }
+
+const Rows& width_rows() {
+  static const Rows rows = {
+      // Transitions on monotone inputs that overlap share the room that the slopes leave them.
+      {is_ordered, "if monotone inputs may be split", {0.25, 0.5, 1.0}},
+      {[](const Case& each) { return each.kind == ValidityKind::gaussian; }, "for Gaussians", {1.0 / 3.0}},
+      {[](const Case& each) { return each.kind == ValidityKind::logistic; },
+       "for the gates of hilomot",
+       {1.0, 2.0, 4.0}},
+      {[](const Case& each) { return each.one_fold; }, "from 50000 rows on", {0.5, 1.0, 2.0}},
+      {always, "", {0.5, 1.0, 2.0, 4.0}}};
+  return rows;
+}
+
+const Rows& jump_rows() {
+  static const Rows rows = {
+      {[](const Case& each) { return !each.folds; }, "without folds", {no_jump}},
+      {is_ordered, "if monotone inputs may be split", {no_jump, 1.0}},
+      {[](const Case& each) { return each.kind != ValidityKind::blend; }, "for Gaussians and hilomot", {no_jump}},
+      {always, "", {no_jump, 4.0, 2.0, 1.0, 0.5}}};
+  return rows;
+}
+
+const Rows& ridge_rows() {
+  static const Rows rows = {
+      {is_ordered, "if monotone inputs may be split", {1e-6, 1e-3}},
+      {[](const Case& each) { return each.one_fold; }, "from 50000 rows on", {1e-8, 1e-6, 1e-4, 1e-2}},
+      {always, "", {1e-8, 1e-6, 1e-4, 1e-3, 1e-2, 1e-1}}};
+  return rows;
+}
+
+const Rows& shrinkage_rows() {
+  static const Rows rows = {
+      {[](const Case& each) { return !each.folds || each.own_models; }, "without folds or with m5", {0.0}},
+      {is_ordered, "if monotone inputs may be split", {0.1}},
+      {always, "", {0.0, 0.1, 1.0}}};
+  return rows;
+}
+
+const Rows& significance_rows() {
+  static const Rows rows = {
+      // The held-out error decides how many leaves stay, and a joint estimate bears many more than a crisp tree.
+      {[](const Case& each) { return each.overlapping; }, "where blends or Gaussians are candidates", {1.0}},
+      // A split may lower the error little before those below it lower it much.
+      {[](const Case& each) { return each.folds && each.weakest_link; }, "with --prune and folds", {1.0}},
+      {always, "", {0.05}}};
+  return rows;
+}
+
+const std::vector<double>& values_of(const Rows& rows, const Case& each) {
+  return std::ranges::find_if(rows, [&](const Row& row) { return row.holds(each); })->values;
+}
+
+// "1 for that; else 0.05".
+std::string text_of(const Rows& rows) {
+  std::string text;
+  for (const Row& row : rows) {
+    std::vector<std::string> values;
+    for (const double value : row.values) values.push_back(fmt::format("{:.3g}", value));
+    text += row.when[0] != '\0' ? fmt::format("{} {}; ", fmt::join(values, ","), row.when)
+                                : fmt::format("else {}", fmt::join(values, ","));
+  }
+  return text;
+}
+
+// Coefficients that a tree whose leaves overlap may have: joint estimates cost the square of their number.
+constexpr Eigen::Index most_coefficients = 1500;
+constexpr Eigen::Index fewest_of_most_leaves = 20;
+constexpr Eigen::Index most_overlapping_leaves = 400;
 
 // Leaves on the two sides of splits on monotone inputs are compared in pairs.
 constexpr Eigen::Index most_ordered_leaves = 30;
+
+// Of a crisp tree that is grown without a test, to be pruned: of many rows it would have leaves without number.
+constexpr Eigen::Index most_pruned_leaves = 1000;
+
+Eigen::Index default_max_leaves(const Case& each, const Rule& rule, Eigen::Index coefficients) {
+  if (rule.most_leaves > 0 && !rule.most_leaves_without_folds) return rule.most_leaves;
+  if (each.overlapping || each.ordered) {
+    return std::clamp<Eigen::Index>(most_coefficients / coefficients, fewest_of_most_leaves,
+                                    each.ordered ? most_ordered_leaves : most_overlapping_leaves);
+  }
+  if (each.folds && each.weakest_link && rule.grows_larger_to_be_pruned) return most_pruned_leaves;
+  return rule.most_leaves;
+}
+
+Eigen::Index default_min_leaf(const Case& each, const Rule& rule, Eigen::Index coefficients) {
+  if (rule.fewest_rows > 0) return rule.fewest_rows;
+  constexpr Eigen::Index fewest = 5;
+  return each.overlapping ? std::max(fewest, coefficients - 1) : 2 * coefficients;
+}
 
 // Whether an input in which the prediction is to be monotone may be split.
 bool may_split_monotone(const Table& table) {
@@ -17,108 +130,79 @@ bool may_split_monotone(const Table& table) {
                              [&](int input) { return !table.monotone.empty() && table.monotone[input] != 0; });
 }
 
+std::vector<double> given_or(const std::vector<double>& given, const Rows& rows, const Case& each) {
+  return given.empty() ? values_of(rows, each) : given;
+}
+
+// The validity that is asked for, where the rule leaves a choice.
+ValidityChoice choice_of(const FitOptions& options, const Rule& rule) {
+  if (rule.overlapping == ValidityKind::gaussian) return ValidityChoice::gaussian;
+  if (rule.overlapping == ValidityKind::crisp) return ValidityChoice::crisp;
+  return options.validity;
+}
+
+Candidates candidates_of(const FitOptions& options, const Case& each, ValidityChoice choice, bool crisp_only) {
+  const ExpertOptions& expert = options.expert;
+  Candidates candidates;
+  candidates.crisp = choice == ValidityChoice::automatic || choice == ValidityChoice::crisp;
+  candidates.kind = each.kind;
+  candidates.estimation = expert.estimation;
+  candidates.shrinkages = given_or(expert.shrinkages, shrinkage_rows(), each);
+  if (options.sparse == SparseChoice::always) candidates.sparse = {true};
+  if (options.sparse == SparseChoice::automatic && each.folds) candidates.sparse = {false, true};
+  if (crisp_only) return candidates;
+  candidates.widths = given_or(expert.widths, width_rows(), each);
+  // hilomot makes a jump a steep gate by itself.
+  const bool gates = each.kind == ValidityKind::logistic;
+  candidates.jumps = gates ? values_of(jump_rows(), each) : given_or(expert.jumps, jump_rows(), each);
+  if (expert.estimation == Estimation::joint) candidates.ridges = given_or(expert.ridges, ridge_rows(), each);
+  return candidates;
+}
+
 }  // namespace
 
-bool is_lolimot(GrowthRule rule) { return rule == GrowthRule::lolimot || rule == GrowthRule::lolimot_data_driven; }
-
-bool is_hilomot(GrowthRule rule) { return rule == GrowthRule::hilomot; }
-
-Plan make_plan(const FitOptions& options, const TrainingRows& all, Eigen::Index folds) {
-  const bool has_folds = folds > 0;
-  // Many rows: the widest transitions and the larger ridges, which are for few, take most of the time.
-  const bool many_rows = folds == 1;
-  Plan plan{.growth = {.rule = options.rule,
-                       .significance = options.significance,
-                       .min_variance_gain = options.expert.min_variance_gain,
-                       .min_leaf_samples = options.min_leaf_samples,
-                       .max_leaves = options.max_leaves,
-                       .min_improvement = options.expert.min_improvement,
-                       .split_inputs = all.table->split_inputs,
-                       .search = options.expert.search},
-            .candidates = {},
-            .pruning = options.pruning,
-            .shared_partition = options.shared_partition,
-            .leaves_given = options.max_leaves > 0};
-  const bool is_m5 = options.rule == GrowthRule::m5;
-  const ValidityChoice choice = is_lolimot(options.rule) ? ValidityChoice::gaussian
-                                : is_m5                  ? ValidityChoice::crisp
-                                                         : options.validity;
-  const bool logistic = is_hilomot(options.rule);
+Plan with_defaults(const FitOptions& options, const TrainingRows& all, Eigen::Index folds) {
+  const Rule& rule = rule_of(options.rule);
+  const ValidityChoice choice = choice_of(options, rule);
+  const bool logistic = rule.overlapping == ValidityKind::logistic;
   const bool crisp_only =
-      choice == ValidityChoice::crisp || (choice == ValidityChoice::automatic && !has_folds && !logistic);
-  // Every estimate under ordered splits is a quadratic programme, so fewer are tried.
-  const bool ordered = may_split_monotone(*all.table);
-  plan.candidates.crisp = choice == ValidityChoice::automatic || choice == ValidityChoice::crisp;
-  plan.candidates.kind = choice == ValidityChoice::gaussian ? ValidityKind::gaussian
-                         : logistic                         ? ValidityKind::logistic
-                                                            : ValidityKind::blend;
-  plan.candidates.estimation = options.expert.estimation;
-  if (!crisp_only) {
-    plan.candidates.widths = options.expert.widths;
-    if (plan.candidates.widths.empty()) {
-      plan.candidates.widths = choice == ValidityChoice::gaussian ? std::vector<double>{1.0 / 3.0}
-                               : logistic                         ? std::vector<double>{1.0, 2.0, 4.0}
-                               : many_rows                        ? std::vector<double>{0.5, 1.0, 2.0}
-                                                                  : std::vector<double>{0.5, 1.0, 2.0, 4.0};
-      // Transitions on monotone inputs that overlap share the room that slopes leave them.
-      if (ordered) {
-        plan.candidates.widths = {0.25, 0.5, 1.0};
-      }
-    }
-    plan.candidates.jumps = options.expert.jumps;
-    if (plan.candidates.jumps.empty() || logistic) {
-      plan.candidates.jumps = {no_jump};
-      if (has_folds && ordered) {
-        plan.candidates.jumps.push_back(1.0);
-      } else if (has_folds && plan.candidates.kind == ValidityKind::blend) {
-        plan.candidates.jumps.insert(plan.candidates.jumps.end(), {4.0, 2.0, 1.0, 0.5});
-      }
-    }
-    if (options.expert.estimation == Estimation::joint) {
-      plan.candidates.ridges = options.expert.ridges;
-      if (plan.candidates.ridges.empty()) {
-        plan.candidates.ridges = ordered     ? std::vector<double>{1e-6, 1e-3}
-                                 : many_rows ? std::vector<double>{1e-8, 1e-6, 1e-4, 1e-2}
-                                             : std::vector<double>{1e-8, 1e-6, 1e-4, 1e-3, 1e-2, 1e-1};
-      }
-    }
-  }
-  plan.candidates.shrinkages = options.expert.shrinkages;
-  if (plan.candidates.shrinkages.empty()) {
-    plan.candidates.shrinkages = !has_folds || is_m5 ? std::vector<double>{0.0}
-                                 : ordered           ? std::vector<double>{0.1}
-                                                     : std::vector<double>{0.0, 0.1, 1.0};
-  }
-  const SparseChoice sparse = options.sparse;
-  plan.candidates.sparse = sparse == SparseChoice::always                   ? std::vector<bool>{true}
-                           : sparse == SparseChoice::automatic && has_folds ? std::vector<bool>{false, true}
-                                                                            : std::vector<bool>{false};
-  GrowthOptions& growth = plan.growth;
-  const Eigen::Index regressors = std::ssize(all.regressors);
-  const bool many_leaves = !crisp_only && has_folds;
-  if (growth.significance < 0.0) {
-    // What prunes best-first trees is what splits gain further down, and the held-out error says how far.
-    growth.significance = many_leaves || (has_folds && options.pruning == Pruning::weakest_link) ? 1.0 : 0.05;
-  }
-  if (growth.min_leaf_samples == 0 && is_m5) {
-    growth.min_leaf_samples = 2;  // fewer than four rows are not split (Quinlan 1992)
-  }
-  if (growth.min_leaf_samples == 0) {
-    growth.min_leaf_samples = many_leaves ? std::max<Eigen::Index>(5, regressors) : 2 * (regressors + 1);
-  }
-  if (growth.max_leaves == 0 && logistic) {
-    growth.max_leaves = 50;
-  }
-  if (growth.max_leaves == 0 && (many_leaves || ordered)) {
-    growth.max_leaves = std::clamp<Eigen::Index>(1500 / (regressors + 1), 20, ordered ? most_ordered_leaves : 400);
-  }
-  if (has_folds && growth.max_leaves == 0 && options.pruning == Pruning::weakest_link && !is_lolimot(growth.rule)) {
-    growth.max_leaves = most_pruned_leaves;
-  }
-  if (growth.max_leaves == 0 && is_lolimot(growth.rule)) {
-    growth.max_leaves = 100;
-  }
-  return plan;
+      choice == ValidityChoice::crisp || (choice == ValidityChoice::automatic && folds == 0 && !logistic);
+  const Case each{.folds = folds > 0,
+                  .one_fold = folds == 1,
+                  .overlapping = !crisp_only && folds > 0,
+                  .ordered = may_split_monotone(*all.table),
+                  .own_models = rule.has_own_models,
+                  .weakest_link = options.pruning == Pruning::weakest_link,
+                  .kind = choice == ValidityChoice::gaussian ? ValidityKind::gaussian
+                          : logistic                         ? ValidityKind::logistic
+                                                             : ValidityKind::blend};
+  const Eigen::Index coefficients = std::ssize(all.regressors) + 1;
+  const auto or_default = [](Eigen::Index given, Eigen::Index standard) { return given > 0 ? given : standard; };
+  return {
+      .rule = &rule,
+      .growth = {.significance =
+                     options.significance >= 0.0 ? options.significance : values_of(significance_rows(), each).front(),
+                 .min_variance_gain = options.expert.min_variance_gain,
+                 .min_leaf_samples = or_default(options.min_leaf_samples, default_min_leaf(each, rule, coefficients)),
+                 .max_leaves = or_default(options.max_leaves, default_max_leaves(each, rule, coefficients)),
+                 .min_improvement = options.expert.min_improvement,
+                 .split_inputs = all.table->split_inputs,
+                 .search = options.expert.search},
+      .candidates = candidates_of(options, each, choice, crisp_only),
+      .pruning = options.pruning,
+      .leaves_given = options.max_leaves > 0};
+}
+
+std::string default_text(std::string_view option) {
+  if (option == "widths") return text_of(width_rows());
+  if (option == "jumps") return text_of(jump_rows());
+  if (option == "ridges") return text_of(ridge_rows());
+  if (option == "shrinkages") return text_of(shrinkage_rows());
+  if (option == "significance") return text_of(significance_rows());
+  throw std::invalid_argument(
+      fmt::format("llmt::default_text: {} is none of widths, jumps, ridges, shrinkages, "
+                  "significance",
+                  option));
 }
 
 }  // namespace llmt

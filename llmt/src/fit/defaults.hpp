@@ -2,24 +2,21 @@
 /// The options of a fit without blanks.
 #pragma once
 
-#include "growth/problem.hpp"
-#include "selection/selection.hpp"
+#include "growth/rules/rule.hpp"
+#include "selection/candidates.hpp"
 
 namespace llmt {
 
-/// What is compared, and growth options without blanks.
+/// What is grown, and what is compared on held-out rows.
 struct Plan {
+  const Rule* rule = nullptr;
   GrowthOptions growth;
   Candidates candidates;
   Pruning pruning = Pruning::last_splits;
-  bool shared_partition = false;
-  bool leaves_given = false;  ///< by FitOptions::max_leaves: growth.max_leaves is not a default
+  bool leaves_given = false;  ///< FitOptions::max_leaves is set: growth.max_leaves is not a default
 };
 
-bool is_lolimot(GrowthRule rule);
-bool is_hilomot(GrowthRule rule);
-
-/// Fills in the defaults, which depend on the data and on the number of folds.
-Plan make_plan(const FitOptions& options, const TrainingRows& all, Eigen::Index folds);
+/// Fills in the defaults, which depend on the rows and on the number of folds. default_text() describes them.
+Plan with_defaults(const FitOptions& options, const TrainingRows& all, Eigen::Index folds);
 
 }  // namespace llmt

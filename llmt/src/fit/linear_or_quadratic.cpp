@@ -3,22 +3,10 @@
 #include <algorithm>
 
 #include "data/regressors.hpp"
-#include "fit/validate.hpp"
-#include "llmt/fit.hpp"
+#include "fit/fit_terms.hpp"
 #include "selection/selection.hpp"
 
 namespace llmt {
-
-Eigen::Index count_numbers(Eigen::Index inputs, const FitOptions& options) {
-  Eigen::Index count = 0;
-  const std::vector<int>& chosen = options.regression_inputs;
-  for (int input = 0; input < inputs; ++input) {
-    const bool used = chosen.empty() || std::ranges::find(chosen, input) != chosen.end();
-    const std::vector<int>& categorical = options.categorical_inputs;
-    count += used && std::ranges::find(categorical, input) == categorical.end() ? 1 : 0;
-  }
-  return count;
-}
 
 namespace {
 
@@ -36,9 +24,9 @@ CandidateError mean_error(const FitSummary& of, const FitSummary& linear) {
 
 }  // namespace
 
-FitResult fit_best_terms(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
-                         const Eigen::Ref<const Eigen::MatrixXd>& outputs, const FitOptions& options) {
-  const Eigen::Index numbers = count_numbers(inputs.cols(), options);
+FitResult fit_linear_or_quadratic(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
+                                  const Eigen::Ref<const Eigen::MatrixXd>& outputs, const FitOptions& options) {
+  const Eigen::Index numbers = count_numeric_inputs(inputs.cols(), options);
   const bool both = numbers > 0 && numbers <= most_inputs_of_products && options.folds.count != 0 &&
                     !(inputs.array().abs() > largest_factor).any();
   FitOptions with_terms = options;
@@ -49,7 +37,7 @@ FitResult fit_best_terms(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
         options.progress(half * total + done, 2 * total);
       };
     }
-    return fit(inputs, outputs, with_terms);
+    return fit_terms(inputs, outputs, with_terms);
   };
   FitResult linear = fit_with(LocalTerms::linear, 0);
   if (!both || linear.summary.partitions.front().cv_folds == 0) return linear;

@@ -1,16 +1,14 @@
 /// \file
-/// Linear or quadratic local models: what the held-out rows say.
+/// Linear or quadratic local models: which of the two has the smaller held-out error.
 #pragma once
 
 #include "llmt/fit.hpp"
 
 namespace llmt {
 
-/// Numeric regression inputs among so many inputs.
-Eigen::Index count_numbers(Eigen::Index inputs, const FitOptions& options);
-
-/// fit() with LocalTerms::automatic: both fits, and the one to take.
-FitResult fit_best_terms(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
-                         const Eigen::Ref<const Eigen::MatrixXd>& outputs, const FitOptions& options);
+/// fit() for LocalTerms::automatic: both fits, and the better one. Linear without folds, and where quadratic local
+/// models cannot be made.
+FitResult fit_linear_or_quadratic(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
+                                  const Eigen::Ref<const Eigen::MatrixXd>& outputs, const FitOptions& options);
 
 }  // namespace llmt

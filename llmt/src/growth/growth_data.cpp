@@ -35,9 +35,8 @@ GrowthData::GrowthData(const GrowthProblem& growth) : problem(growth), training(
 
 double GrowthData::significant_rss(double weight, int rank, double rss, Eigen::Index tested) const {
   const GrowthOptions& options = problem.options;
-  if (options.rule != GrowthRule::rd || options.significance >= 1.0 || tested == 0) {
-    return std::numeric_limits<double>::infinity();
-  }
+  const bool has_test = problem.criterion == SplitCriterion::f_test && options.significance < 1.0;
+  if (!has_test || tested == 0) return std::numeric_limits<double>::infinity();
   // One more coefficient is the least that two models can have; the more there are, the more they must gain.
   const double added = static_cast<double>(output_weights.size());
   const double freedom = added * (weight - rank) - added;
@@ -56,8 +55,7 @@ bool GrowthData::is_significant(double level, double weight, int rank, double rs
   const double added = num_outputs * (split.left + split.right - rank);
   const double freedom = num_outputs * (weight - split.left - split.right);
   if (added <= 0.0 || freedom <= 0.0) return false;
-  const double f = ((rss - split_rss) / added) / (split_rss / freedom);
-  return f_survival(f, added, freedom) * static_cast<double>(tested) < level;
+  return chow_p_value(rss - split_rss, added, split_rss / freedom, freedom) * static_cast<double>(tested) < level;
 }
 
 double GrowthData::place_threshold(double low, double high, double mean, const Eigen::VectorXd& apart,

@@ -12,7 +12,6 @@ namespace llmt {
 
 /// The options of FitOptions that growth reads, without blanks.
 struct GrowthOptions {
-  GrowthRule rule = GrowthRule::rd;
   double significance = 1.0;  ///< 1 or more: no test
   double min_variance_gain = 0.0;
   Eigen::Index min_leaf_samples = 0;
@@ -22,12 +21,30 @@ struct GrowthOptions {
   SplitSearch search = SplitSearch::automatic;
 };
 
+/// How best-first growth chooses a split.
+enum class SplitCriterion {
+  f_test,         ///< RD: the smallest residual sum of squares, if it passes the F test
+  smallest_rss,   ///< RETIS: the smallest residual sum of squares; the tree is pruned by m-estimates
+  residual_signs  ///< RA: the input on which the signs of the residuals depend most, if the split passes the F test
+};
+
+/// What is done to the tree after it was grown. LOLIMOT and HILOMOT grow with the validities of the model to come.
+struct AfterGrowth {
+  double width = 0.0;  ///< the first candidate for Validity::width; 0 for crisp leaves
+  bool joint = false;  ///< the local models will be estimated jointly
+  /// No held-out rows will choose the number of leaves, so that AICc may.
+  bool keeps_all_leaves = false;
+  bool has_leaf_limit = false;  ///< the caller set FitOptions::max_leaves
+};
+
 /// What a tree is grown from.
 struct GrowthProblem {
   const TrainingRows* training = nullptr;
   std::vector<int> outputs;  ///< that the partition serves
-  GrowthOptions options;     ///< split_inputs listed, min_leaf_samples set
+  GrowthOptions options;
   int max_threads = 0;
+  SplitCriterion criterion = SplitCriterion::f_test;
+  AfterGrowth after = {};
 };
 
 struct GrownPartition {

@@ -6,14 +6,20 @@
 namespace llmt {
 namespace {
 
-// On the diagonal of the Gram matrix of normals of length 1: inequalities that nearly repeat one another stay apart.
+// Added to the diagonal of the Gram matrix of normals of length 1, so that it stays positive definite when two
+// inequalities are nearly the same.
 constexpr double diagonal = 1e-13;
 
-// An inequality is violated beyond this, relative to its bound.
+// An inequality counts as violated if more than this is missing, relative to its bound, plus this part of the largest
+// bound.
 constexpr double rounding = 1e-12;
+constexpr double rounding_of_largest = 1e-15;
 
-// Exchanges of all wrong inequalities at once, before they are exchanged one by one.
+// Number of attempts to exchange all wrong inequalities at once, before they are exchanged one by one.
 constexpr int most_exchanges = 12;
+
+// Limit of the steps of one inequality each: rounding could make the method cycle.
+constexpr Eigen::Index most_steps(Eigen::Index inequalities) { return 3 * inequalities + 50; }
 
 }  // namespace
 
@@ -67,8 +73,9 @@ void LeastDistance::leave(Eigen::Index position) {
   }
 }
 
-// All at once what enter() and leave() do one by one: inequalities with negative multipliers leave, violated ones
-// enter. Seldom more than a few times, but it may go in circles; false then, and nothing has changed.
+// Does all at once what enter() and leave() do one by one: inequalities with negative multipliers leave, violated ones
+// enter, until there are none of either. A few attempts are usual, but the method may cycle; then it returns false and
+// changes nothing.
 bool LeastDistance::exchange(const Eigen::VectorXd& tolerance) {
   std::vector<Eigen::Index> active = active_;
   for (int attempt = 0; attempt < most_exchanges; ++attempt) {
@@ -111,9 +118,10 @@ bool LeastDistance::exchange(const Eigen::VectorXd& tolerance) {
 Eigen::VectorXd LeastDistance::solve() {
   const Eigen::Index count = bounds_.size();
   if (count == 0) return Eigen::VectorXd::Zero(normals_.rows());
-  const Eigen::VectorXd tolerance = rounding * bounds_.cwiseAbs().array() + 1e-15 * bounds_.cwiseAbs().maxCoeff();
+  const Eigen::VectorXd tolerance =
+      rounding * bounds_.cwiseAbs().array() + rounding_of_largest * bounds_.cwiseAbs().maxCoeff();
   if (exchange(tolerance)) return normals_ * multipliers_;
-  for (Eigen::Index step = 0; step < 3 * count + 50; ++step) {
+  for (Eigen::Index step = 0; step < most_steps(count); ++step) {
     Eigen::VectorXd missing = bounds_;
     for (const Eigen::Index c : active_) {
       missing -= multipliers_(c) * gram_.col(c);
@@ -124,7 +132,7 @@ Eigen::VectorXd LeastDistance::solve() {
     Eigen::Index worst = 0;
     if (!((missing - tolerance).maxCoeff(&worst) > 0.0)) break;
     enter(worst);
-    // Towards the multipliers of the active inequalities as equations, as far as none becomes negative.
+    // Move towards the multipliers that make the active inequalities equations, as far as none becomes negative.
     while (!active_.empty()) {
       const Eigen::Index size = std::ssize(active_);
       Eigen::VectorXd target = bounds_(active_);

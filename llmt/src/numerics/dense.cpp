@@ -9,14 +9,17 @@
 namespace llmt {
 namespace {
 
+// Sizes of the blocks of a product: rows of a tile, rows of C, and the depth.
 constexpr Eigen::Index tile_rows = 4;
-constexpr Eigen::Index block = 64;  // rows of C at a time
+constexpr Eigen::Index block = 64;
 constexpr Eigen::Index depth_block = 256;
-constexpr Eigen::Index panel = 256;  // rows of a Cholesky factor
+
+// Rows of the panels in which a matrix is factored, and of the narrow panels inside them.
+constexpr Eigen::Index panel = 256;
 constexpr Eigen::Index narrow_panel = 32;
 
-// `columns` columns of a row-wise matrix as strips of `Width` columns, one strip after the other, row by row, filled
-// up with zeros: what a tile reads lies in a row.
+// Copies `columns` columns of a row-wise matrix into strips of `Width` columns, one strip after the other. Each strip
+// is stored row by row and padded with zeros, so that a tile reads contiguous memory.
 template <Eigen::Index Width>
 void pack(const double* from, Eigen::Index stride, Eigen::Index depth, Eigen::Index columns, std::vector<double>& to) {
   const Eigen::Index strips = (columns + Width - 1) / Width;
@@ -26,7 +29,7 @@ void pack(const double* from, Eigen::Index stride, Eigen::Index depth, Eigen::In
     const double* in = from + strip * Width;
     double* out = to.data() + strip * Width * depth;
     for (Eigen::Index k = 0; k < depth; ++k, in += stride, out += Width) {
-      // Constant trip counts: a call for eight numbers would cost more than they do.
+      // The trip count is a constant, so that the compiler unrolls the loop: a call for eight numbers would cost more.
       for (Eigen::Index l = 0; l < Width; ++l) {
         out[l] = l < used ? in[l] : 0.0;
       }
@@ -34,7 +37,7 @@ void pack(const double* from, Eigen::Index stride, Eigen::Index depth, Eigen::In
   }
 }
 
-// Products of strips of A with strips of B, a tile of tile_rows x lanes each.
+// Adds the products of strips of A with strips of B, in tiles of tile_rows x lanes.
 LLMT_FOR_EACH_INSTRUCTION_SET
 void multiply_strips(Eigen::Index rows, Eigen::Index columns, Eigen::Index depth, double sign, const double* a,
                      const double* b, double* c, Eigen::Index c_stride) {
@@ -93,14 +96,15 @@ bool factor_cholesky(RowMajor& matrix) {
   const Eigen::Index size = matrix.rows();
   double* data = matrix.data();
   const auto at = [&](Eigen::Index row, Eigen::Index column) { return data + row * size + column; };
-  // Subtracts the rows begin ... end, which are done, from the rows `end` ... `last`.
+  // Subtracts the part of the finished rows begin ... end from the rows end ... last.
   const auto subtract = [&](Eigen::Index begin, Eigen::Index end, Eigen::Index last) {
     for (Eigen::Index i = end; i < last; i += panel) {
       add_transposed_product(std::min(panel, last - i), size - i, end - begin, -1.0, at(begin, i), size, at(begin, i),
                              size, at(i, i), size);
     }
   };
-  // Panels of rows, and narrow panels inside them, so that what is left is read and written seldom.
+  // Panels of rows, and narrow panels inside them, so that the part that is not yet factored is read and written
+  // seldom.
   for (Eigen::Index outer = 0; outer < size; outer += panel) {
     const Eigen::Index outer_end = std::min(size, outer + panel);
     for (Eigen::Index inner = outer; inner < outer_end; inner += narrow_panel) {

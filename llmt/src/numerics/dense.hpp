@@ -1,9 +1,9 @@
 /// \file
 /// The two dense kernels in which joint estimation spends its time.
 ///
-/// Compiled for several instruction sets, of which the machine's best is taken when the program starts. Sums are formed
-/// in the same order on all of them and without fused multiply-add, so that the bytes of a result do not depend on the
-/// machine.
+/// They are compiled for several instruction sets; the best one that the machine has is chosen when the program starts.
+/// All of them form sums in the same order and without fused multiply-add, so the bytes of a result do not depend on
+/// the machine.
 #pragma once
 
 #include <Eigen/Core>

@@ -11,4 +11,10 @@ double f_survival(double f, double d1, double d2);
 /// The f with f_survival(f, d1, d2) = probability, which lies in (0, 1).
 double f_quantile(double probability, double d1, double d2);
 
+/// Chow's test (1960) of one linear model against two, eq. (G.2) of docs/algorithms/growth.md: the probability that F
+/// is at least (gained / added) / variance, which has `added` and `freedom` degrees of freedom. `gained`: by how much
+/// two models lower the residual sum of squares. `added`: number of coefficients that they have more. `variance`: what
+/// the two leave, divided by its degrees of freedom `freedom`.
+double chow_p_value(double gained, double added, double variance, double freedom);
+
 }  // namespace llmt

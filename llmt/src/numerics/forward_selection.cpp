@@ -6,15 +6,22 @@
 namespace llmt {
 namespace {
 
-// What a regressor must have of its own, as a part of its variance.
+// A regressor is passed over if the chosen ones leave less than this part of its variance.
 constexpr double least_independence = 1e-8;
+
+// Gains that differ by less than this part of them are equal.
+constexpr double tie_tolerance = 1e-10;
+
+// A model is tried only with more rows than its coefficients and these: AICc has a pole at two.
+constexpr double least_spare_rows = 3.0;
 
 // A residual sum of squares below this part of that about the mean is rounding.
 constexpr double rounding = 1e-13;
 
+// The search ends when this many further regressors have not lowered AICc.
 constexpr int steps_without_gain = 10;
 
-// Correlations, what of them those before leave.
+// What the chosen regressors leave of the correlations of all regressors and outputs.
 struct Remaining {
   Eigen::MatrixXd factor;      // columns of the pivoted Cholesky factor of the regressors' correlations
   Eigen::VectorXd variance;    // of each regressor, 1 at the start; 0: constant or taken
@@ -22,14 +29,14 @@ struct Remaining {
   Eigen::VectorXd rss;         // of the outputs, 1 at the start
 };
 
-// The regressor that lowers the sum of squares most; of those alike the first. -1: none is left.
+// The regressor that lowers the sum of squares most; of equal ones the first. -1: none is left.
 Eigen::Index best_of(const Remaining& remaining) {
   Eigen::Index best = -1;
   double most = 0.0;
   for (Eigen::Index k = 0; k < remaining.variance.size(); ++k) {
     if (remaining.variance(k) > least_independence) {
       const double gain = remaining.covariance.row(k).squaredNorm() / remaining.variance(k);
-      if (gain > most * (1.0 + 1e-10)) {
+      if (gain > most * (1.0 + tie_tolerance)) {
         best = k;
         most = gain;
       }
@@ -67,7 +74,7 @@ std::vector<Eigen::Index> select_regressors(const LocalSums& sums, double rows_p
   const Eigen::VectorXd mean = sums.gram.col(0).tail(regressors) / weight;
   const Eigen::RowVectorXd mean_output = sums.products.row(0) / weight;
   Eigen::MatrixXd correlation = sums.gram.bottomRightCorner(regressors, regressors) - weight * mean * mean.transpose();
-  // What centring leaves of a column that is constant here is rounding.
+  // A column that is constant here has no variance; what the subtraction of its mean leaves is rounding.
   const Eigen::ArrayXd scale =
       (correlation.diagonal().array() > rounding * sums.gram.diagonal().tail(regressors).array())
           .select(correlation.diagonal().array().max(0.0).sqrt(), 0.0);
@@ -84,8 +91,9 @@ std::vector<Eigen::Index> select_regressors(const LocalSums& sums, double rows_p
   std::vector<Eigen::Index> order;
   std::size_t best = 0;
   double smallest = aicc(remaining.rss, rows, 1.0);
-  while (order.size() < best + steps_without_gain && rows - static_cast<double>(order.size()) > 4.0 + 1.0 &&
-         remaining.rss.maxCoeff() > rounding) {
+  // The next model has the constant, the chosen regressors and one more.
+  const auto enough_rows = [&] { return rows - static_cast<double>(order.size()) > 2.0 + least_spare_rows; };
+  while (order.size() < best + steps_without_gain && enough_rows() && remaining.rss.maxCoeff() > rounding) {
     const Eigen::Index next = best_of(remaining);
     if (next < 0) break;
     take(next, correlation, std::ssize(order), remaining);

@@ -7,20 +7,21 @@
 namespace llmt {
 namespace {
 
-// Doubles that stay in the innermost cache while several tiles pass over them.
+// Number of doubles that stay in the first-level cache while several tiles pass over them.
 constexpr Eigen::Index buffer_size = 2304;
 
+// Up to this many columns the tiles read the rows where they are; with more, rows are first copied into a buffer.
 constexpr Eigen::Index few_columns = 16;
 
-// Rows are asked for this many before they are needed: those of a node lie all over the features.
+// Rows are prefetched by this number of rows ahead, because the rows of a node are scattered over the features.
 constexpr Eigen::Index ahead = 12;
 
-// Rows of features, here and there in memory.
+// Rows of features that are scattered in memory.
 struct Scattered {
   const double* features;
   Eigen::Index stride;
   const int* rows;
-  Eigen::Index following;  // how many rows will be asked for after the first
+  Eigen::Index following;  // number of rows after the first that will be read
   const double* at(Eigen::Index k) const { return features + rows[k] * stride; }
   void prefetch(Eigen::Index k) const {
     const double* next = at(k + std::min(ahead, following - k));
@@ -29,7 +30,7 @@ struct Scattered {
   }
 };
 
-// Rows one after the other.
+// Rows that lie one after the other.
 struct Packed {
   const double* rows;
   Eigen::Index stride;
@@ -85,14 +86,14 @@ LLMT_INLINE void add_tiles(const Source& source, Eigen::Index columns, Eigen::In
   }
 }
 
-// Few columns: the tiles pass over the rows where they are.
+// For few columns: the tiles read the rows where they are.
 LLMT_FOR_EACH_INSTRUCTION_SET
 void add_scattered(const double* features, Eigen::Index columns, const int* rows, Eigen::Index count,
                    Eigen::Index following, double* gram) {
   add_tiles(Scattered{features, columns, rows, following}, columns, count, gram);
 }
 
-// Many columns, many tiles: the rows are brought together first.
+// For many columns, and therefore many tiles: the rows are copied into a buffer first.
 LLMT_FOR_EACH_INSTRUCTION_SET
 void add_packed(const double* features, Eigen::Index columns, const int* rows, Eigen::Index count,
                 Eigen::Index following, double* buffer, double* gram) {

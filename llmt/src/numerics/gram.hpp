@@ -10,15 +10,18 @@
 #include <cstddef>
 #include <vector>
 
+#include "numerics/tolerances.hpp"
+
 namespace llmt {
 
 /// Rows of features [1, z, r]: the constant, the regressors and the residuals of the outputs, each times the square
-/// root of the row's weight. One row after the other in memory, with room for a whole vector register behind the last.
+/// root of the row's weight. Rows lie one after the other in memory. Behind the last there is padding for the whole
+/// vector registers in which rows are read.
 class Features {
  public:
   Features() = default;
   Features(Eigen::Index rows, Eigen::Index coefficients, Eigen::Index outputs)
-      : rows_(rows), coefficients_(coefficients), outputs_(outputs), values_(rows * columns() + room, 0.0) {}
+      : rows_(rows), coefficients_(coefficients), outputs_(outputs), values_(rows * columns() + padding, 0.0) {}
 
   Eigen::Index rows() const { return rows_; }
   Eigen::Index coefficients() const { return coefficients_; }  ///< constant and regressors
@@ -26,7 +29,7 @@ class Features {
   Eigen::Index columns() const { return coefficients_ + outputs_; }
   double* row(Eigen::Index i) { return values_.data() + i * columns(); }
   const double* row(Eigen::Index i) const { return values_.data() + i * columns(); }
-  /// Asks for a row that will be needed soon.
+  /// Prefetches a row that will be needed soon.
   void prefetch(Eigen::Index i) const {
     for (const double* at = row(i); at < row(i + 1); at += 8) {
       __builtin_prefetch(at);
@@ -34,15 +37,15 @@ class Features {
   }
 
  private:
-  static constexpr Eigen::Index room = 16;
+  static constexpr Eigen::Index padding = 16;
   Eigen::Index rows_ = 0;
   Eigen::Index coefficients_ = 0;
   Eigen::Index outputs_ = 0;
   std::vector<double> values_;
 };
 
-/// Where the entries of the lower triangle of a Gram matrix lie: row after row, each filled up to whole vector
-/// registers, the number of rows to a multiple of four. What fills up is undefined.
+/// The memory layout of the lower triangle of a Gram matrix: row after row, each padded to whole vector registers, and
+/// padded to a number of rows that is a multiple of four. Values of the padding are undefined.
 class GramShape {
  public:
   GramShape(Eigen::Index coefficients, Eigen::Index outputs)
@@ -71,10 +74,10 @@ void add_rows(const Features& features, const int* rows, Eigen::Index count, dou
 /// gram += other, entry by entry.
 void add(const GramShape& shape, const double* other, double* gram);
 
-/// Weighted residual sum of squares of the least-squares fit of the residuals on constant and regressors, from their
-/// Gram matrix, and the rank of the latter; for several matrices at once.
+/// Computes, from Gram matrices, the weighted residual sum of squares of the least-squares fit of the residuals on
+/// constant and regressors, and the rank of constant and regressors; for several matrices at once.
 ///
-/// By an LDL' factorisation in which columns are left out whose pivot is below `pivot_tolerance` times their sum of
+/// It uses an LDL' factorisation that leaves out columns whose pivot is at most `pivot_tolerance` times their sum of
 /// squares. `weights`: of the outputs.
 class ResidualSums {
  public:
@@ -91,8 +94,5 @@ class ResidualSums {
   std::vector<double> weights_;
   std::vector<Slot> scratch_;
 };
-
-/// The rounding of the sums is about 1e-15 of them; what a narrow child legitimately leaves of a direction is larger.
-inline constexpr double pivot_tolerance = 1e-12;
 
 }  // namespace llmt

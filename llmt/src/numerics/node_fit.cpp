@@ -6,22 +6,23 @@
 #include <numeric>
 #include <vector>
 
+#include "numerics/tolerances.hpp"
 #include "numerics/whitening.hpp"
 
 namespace llmt {
 namespace {
 
-// Smallest share of a column's variance that the columns before it may leave for a Cholesky factor to be good enough:
-// its digits are squared.
+// The Cholesky factor of the correlation matrix is used if the columns before each column leave at least this part of
+// its variance. It has half the digits of a QR factorisation.
 constexpr double least_independence = 1e-6;
 
-// Columns of x that vary over the rows, and what makes them deviations of size one.
+// The columns of x that vary over the rows, and their means and sizes.
 struct Columns {
   std::vector<Eigen::Index> varying;
   Eigen::VectorXd mean;
   Eigen::VectorXd low;
   Eigen::VectorXd high;
-  Eigen::VectorXd largest;  // deviation from the mean, of the varying columns
+  Eigen::VectorXd largest;  // largest deviation from the mean, of each varying column
 };
 
 Columns describe(const RowMajor& x, const Eigen::VectorXd& weights) {
@@ -82,8 +83,8 @@ Features scaled_features(const RowMajor& x, const Columns& columns, const Eigen:
   return features;
 }
 
-// W such that the regressors times W are orthogonal with mean square 1, from the Gram matrix of scaled features; empty
-// if they are too collinear for that.
+// The matrix W with which the regressors z W are orthogonal with mean square 1, from the Gram matrix of scaled
+// features. Empty if the regressors are too collinear for that.
 Eigen::MatrixXd whitening_matrix(const GramShape& shape, const std::vector<double>& gram, double total) {
   const Eigen::Index count = shape.coefficients() - 1;
   Eigen::VectorXd scale(count);
@@ -124,7 +125,7 @@ Eigen::MatrixXd orthogonalise(Features& features, double total, int& rank) {
   const Eigen::VectorXd scale = (x.colwise().squaredNorm() / total).cwiseSqrt().transpose();
   x *= scale.cwiseInverse().asDiagonal();
   Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> decomposition;
-  decomposition.setThreshold(rank_tolerance);
+  decomposition.setThreshold(collinearity_tolerance);
   decomposition.compute(x);
   rank = 1 + static_cast<int>(decomposition.rank());
   Eigen::MatrixXd basis = Eigen::MatrixXd::Identity(rows, decomposition.rank());
@@ -138,6 +139,50 @@ Eigen::MatrixXd orthogonalise(Features& features, double total, int& rank) {
   }
   features = std::move(reduced);
   return scale.cwiseInverse().asDiagonal() * decomposition.solve(basis);
+}
+
+// Makes the regressors orthogonal with weighted mean square 1 and sets the rank of [1, regressors]. Returns the matrix
+// that takes coefficients of the new regressors to slopes in the old ones.
+Eigen::MatrixXd orthonormalise(Features& features, double total, int& rank) {
+  const Eigen::Index count = features.coefficients() - 1;
+  rank = 1;
+  if (count == 0) return Eigen::MatrixXd(0, 0);
+  const GramShape shape(features);
+  std::vector<double> gram(shape.size(), 0.0);
+  std::vector<int> all(features.rows());
+  std::iota(all.begin(), all.end(), 0);
+  add_rows(features, all.data(), features.rows(), gram.data());
+  Eigen::MatrixXd to_slopes = whitening_matrix(shape, gram, total);
+  if (to_slopes.size() == 0) return orthogonalise(features, total, rank);
+  rank = 1 + static_cast<int>(count);
+  const Eigen::Index width = (count + GramShape::lanes - 1) / GramShape::lanes * GramShape::lanes;
+  std::vector<double> matrix(count * width, 0.0);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    for (Eigen::Index j = i; j < count; ++j) {
+      matrix[i * width + j] = to_slopes(i, j);
+    }
+  }
+  transform_regressors(features, matrix);
+  return to_slopes;
+}
+
+// Subtracts from the residuals of an output their projection on the orthonormal features. Returns its coefficients and
+// sets the sum of squares of what is left.
+Eigen::VectorXd subtract_projection(Features& features, Eigen::Index output, double total, double& rss) {
+  std::vector<double> coefficients(features.coefficients(), 0.0);
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(features.coefficients());
+  // Three passes over the rows: the first finds the coefficients, the second subtracts them and finds what rounding
+  // left of them, the third subtracts that. So the residuals are orthogonal to the regressors to rounding relative to
+  // the residuals, not to the outputs.
+  for (int pass = 0; pass < 2; ++pass) {
+    const Remainder remainder = subtract_fit(features, output, coefficients);
+    for (std::size_t k = 0; k < coefficients.size(); ++k) {
+      coefficients[k] = remainder.products[k] / total;
+      sum(k) += coefficients[k];
+    }
+  }
+  rss = subtract_fit(features, output, coefficients).squares;
+  return sum;
 }
 
 }  // namespace
@@ -167,49 +212,12 @@ NodeFit fit_node(const RowMajor& x, const Eigen::MatrixXd& residuals, const Eige
   Features& features = fit.features;
   features = scaled_features(x, columns, residuals, mean, weights);
 
-  const Eigen::Index kept = std::ssize(columns.varying);
-  Eigen::MatrixXd to_slopes(kept, 0);  // from coefficients of the orthogonal regressors to those of the scaled columns
-  if (kept > 0) {
-    const GramShape shape(features);
-    std::vector<double> gram(shape.size(), 0.0);
-    std::vector<int> all(x.rows());
-    std::iota(all.begin(), all.end(), 0);
-    add_rows(features, all.data(), x.rows(), gram.data());
-    to_slopes = whitening_matrix(shape, gram, total);
-    if (to_slopes.size() > 0) {
-      fit.rank = 1 + static_cast<int>(kept);
-      const Eigen::Index width = (kept + GramShape::lanes - 1) / GramShape::lanes * GramShape::lanes;
-      std::vector<double> matrix(kept * width, 0.0);
-      for (Eigen::Index i = 0; i < kept; ++i) {
-        for (Eigen::Index j = i; j < kept; ++j) {
-          matrix[i * width + j] = to_slopes(i, j);
-        }
-      }
-      transform_regressors(features, matrix);
-    } else {
-      to_slopes = orthogonalise(features, total, fit.rank);
-    }
-  }
+  const Eigen::MatrixXd to_slopes = orthonormalise(features, total, fit.rank);
   for (Eigen::Index o = 0; o < residuals.cols(); ++o) {
-    std::vector<double> coefficients(fit.rank, 0.0);
-    Eigen::VectorXd sum = Eigen::VectorXd::Zero(fit.rank);
-    // The first pass only finds the coefficients. Of the two that subtract, the second removes what rounding left of
-    // the first, so that the residuals are orthogonal to the regressors to rounding relative to themselves, not to the
-    // outputs.
-    Remainder remainder;
-    for (int pass = 0; pass < 3; ++pass) {
-      remainder = subtract_fit(features, o, coefficients);
-      if (pass < 2) {
-        for (std::size_t k = 0; k < coefficients.size(); ++k) {
-          coefficients[k] = remainder.products[k] / total;
-          sum(k) += coefficients[k];
-        }
-      }
-    }
-    fit.rss(o) = remainder.squares;
-    fit.centre_change(o) += sum(0);
-    const Eigen::VectorXd slopes = to_slopes * sum.tail(fit.rank - 1);
-    for (Eigen::Index k = 0; k < kept; ++k) {
+    const Eigen::VectorXd coefficients = subtract_projection(features, o, total, fit.rss(o));
+    fit.centre_change(o) += coefficients(0);
+    const Eigen::VectorXd slopes = to_slopes * coefficients.tail(fit.rank - 1);
+    for (Eigen::Index k = 0; k < slopes.size(); ++k) {
       const Eigen::Index column = columns.varying[k];
       fit.slope_change(o, column) = slopes(k) / columns.largest(k);
       fit.centre_change(o) -= fit.slope_change(o, column) * fit.mean(column);

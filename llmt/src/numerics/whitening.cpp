@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "base/simd.hpp"
+#include "numerics/tolerances.hpp"
 
 namespace llmt {
 namespace {
@@ -29,7 +30,8 @@ void transform(double* row, Eigen::Index rows, Eigen::Index stride, Eigen::Index
   }
 }
 
-// Columns behind the regressors have coefficient zero; what stands behind the row is finite.
+// Rows are read in whole vectors: columns behind the regressors have coefficient zero, and the numbers behind the last
+// row are finite.
 LLMT_FOR_EACH_INSTRUCTION_SET
 void subtract(double* row, Eigen::Index rows, Eigen::Index stride, Eigen::Index width, Eigen::Index residual,
               const double* coefficients, double* products, double* squares) {
@@ -72,7 +74,7 @@ Whitening whiten(const Eigen::MatrixXd& covariance) {
   Whitening result{Eigen::MatrixXd::Zero(size, size), Eigen::MatrixXd::Zero(size, size), 0};
   if (size == 0) return result;
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(covariance);
-  const double smallest = covariance_tolerance * std::max(eigen.eigenvalues().maxCoeff(), 0.0);
+  const double smallest = collinearity_tolerance * std::max(eigen.eigenvalues().maxCoeff(), 0.0);
   for (Eigen::Index k = size; k-- > 0;) {
     if (const double value = eigen.eigenvalues()(k); value > smallest && value > 0.0) {
       result.forward.col(result.rank) = eigen.eigenvectors().col(k) / std::sqrt(value);

@@ -1,5 +1,5 @@
 /// \file
-/// Passes over rows of features: changing the basis of the regressors, and taking a fit off the residuals.
+/// Passes over rows of features: to change the basis of the regressors, and to subtract a fit from the residuals.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,30 +9,29 @@
 
 namespace llmt {
 
-/// Replaces the regressors z of every row by z W. `matrix` is W, upper triangular, row by row, each row filled up with
+/// Replaces the regressors z of every row by z W. `matrix` is the upper triangular W, row by row, each row padded with
 /// zeros to a multiple of eight.
 void transform_regressors(Features& features, const std::vector<double>& matrix);
 
-/// What subtract_fit() leaves.
+/// The residuals after subtract_fit().
 struct Remainder {
   std::vector<double> products;  ///< sum of the remaining residual times constant and regressors
   double squares = 0.0;          ///< sum of its squares
 };
 
-/// Takes [1, z] . coefficients off the residuals of an output.
+/// Subtracts [1, z] . coefficients from the residuals of an output.
 Remainder subtract_fit(Features& features, Eigen::Index output, const std::vector<double>& coefficients);
 
-/// A pseudo-inverse square root: columns that make a covariance the identity on the directions that there are.
+/// The inverse square root of a covariance matrix, on the directions that have variance: forward' covariance forward is
+/// the identity, and covariance = back back'.
 struct Whitening {
   Eigen::MatrixXd forward;
   Eigen::MatrixXd back;
   Eigen::Index rank = 0;
 };
 
-/// Of a covariance matrix; directions whose variance is below `covariance_tolerance` of the largest count as none.
+/// Of a covariance matrix. Directions whose variance is at most `collinearity_tolerance` times the largest count as
+/// none.
 Whitening whiten(const Eigen::MatrixXd& covariance);
-
-/// The digits that a sum of squares has.
-inline constexpr double covariance_tolerance = 1e-10;
 
 }  // namespace llmt

@@ -5,16 +5,10 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "data/dataset.hpp"
+#include "data/fold_rows.hpp"
 #include "estimation/estimate.hpp"
 
 namespace llmt {
-
-/// What a fold trains on, and what it holds out.
-struct FoldRows {
-  TrainingRows training;
-  TrainingRows held_out;
-};
 
 /// What the candidates are.
 struct Candidates {

@@ -5,7 +5,9 @@
 #include <optional>
 
 #include "base/parallel.hpp"
-#include "estimation/joint_fit.hpp"
+#include "estimation/joint_estimate.hpp"
+#include "estimation/local_estimate.hpp"
+#include "estimation/squared_errors.hpp"
 
 namespace llmt {
 namespace {
@@ -90,14 +92,15 @@ std::map<Key, double> HeldOutErrors::evaluate_shape(std::size_t fold, const std:
   const Partition partition = blended(sample, grown_[fold], first.validity, first.jump);
   std::map<Key, double> errors;
   std::optional<TrainingRows> rows;
-  std::optional<JointFit> fit;
-  // A fit serves all its prefixes, so the largest tree comes first. Not for Gaussians: a prefix has others.
+  std::optional<LeafSums> sums;
+  // The sums of a tree serve all its prefixes, so the largest tree comes first. This does not hold for Gaussians, whose
+  // prefixes have validities of their own.
   for (auto last = keys.rbegin(); last != keys.rend();) {
     const std::size_t count = last->leaves;
     const Eigen::Index leaves = std::min(leaf_counts_[count], partition.num_leaves());
-    if (!fit || candidates_.kind == ValidityKind::gaussian) {
+    if (!sums || candidates_.kind == ValidityKind::gaussian) {
       rows = thinned(sample, enough_rows(leaves, std::ssize(sample.regressors) + 1));
-      fit.emplace(*rows, prefix(partition, leaves), max_threads_, candidates_.sparse.back());
+      sums = sum_leaves(*rows, prefix(partition, leaves), max_threads_, candidates_.sparse.back());
     }
     std::vector<Key> same;
     std::vector<Regularisation> regularisations;
@@ -108,11 +111,11 @@ std::map<Key, double> HeldOutErrors::evaluate_shape(std::size_t fold, const std:
     }
     std::vector<Partition> models;
     if (candidates_.estimation == Estimation::joint) {
-      models = fit->joint(leaves, regularisations);
+      models = joint(*sums, leaves, regularisations);
     } else {
       for (const Regularisation& each : regularisations) {
-        models.push_back(candidates_.estimation == Estimation::local ? fit->local(leaves, each.shrinkage, each.sparse)
-                                                                     : fit->as_grown(leaves));
+        models.push_back(candidates_.estimation == Estimation::local ? local(*sums, leaves, each.shrinkage, each.sparse)
+                                                                     : as_grown(*sums, leaves));
       }
     }
     for (std::size_t i = 0; i < same.size(); ++i) {

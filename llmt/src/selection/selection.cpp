@@ -7,9 +7,10 @@
 #include <optional>
 
 #include "base/parallel.hpp"
-#include "estimation/joint_fit.hpp"
+#include "estimation/squared_errors.hpp"
+#include "numerics/paired_difference.hpp"
+#include "selection/crisp_trees.hpp"
 #include "selection/held_out_errors.hpp"
-#include "selection/judge.hpp"
 
 namespace llmt {
 namespace {
@@ -36,88 +37,6 @@ constexpr std::size_t steps_without_gain = 2;
 // Screening goes on to three times as many unknowns with the better half of the shapes, but at least so many.
 constexpr Eigen::Index next_unknowns = 3;
 constexpr std::size_t fewest_shapes = 3;
-
-// Errors of crisp trees whose leaves have to be in order: each number of leaves has models of its own, so only some
-// are tried, each half as large again as the one before; the others are infinite.
-Eigen::VectorXd ordered_prefix_errors(const JointFit& fit, Eigen::Index largest, double shrinkage, const FoldRows& fold,
-                                      const Eigen::VectorXd& weights) {
-  Eigen::VectorXd errors = Eigen::VectorXd::Constant(largest, std::numeric_limits<double>::infinity());
-  for (Eigen::Index leaves = 1;; leaves = std::min(largest, leaves + (leaves + 1) / 2)) {
-    const Partition models = shrinkage > 0.0 ? fit.local(leaves, shrinkage) : fit.as_grown(leaves);
-    std::vector<Chunk> held_out;
-    for (Eigen::Index index = 0; index < num_chunks(fold.held_out); ++index) {
-      held_out.push_back(fetch(fold.held_out, index, models.outputs));
-    }
-    errors(leaves - 1) = squared_error(models, fold.training, held_out, weights);
-    if (leaves == largest) return errors;
-  }
-}
-
-// Fills in least squares, the crisp trees and the best of them.
-void compare_crisp(const std::vector<FoldRows>& folds, const std::vector<GrownTree>& grown,
-                   const Candidates& candidates, const Eigen::VectorXd& weights, int max_threads, const Judge& judge,
-                   Selection& selection) {
-  struct Variant {
-    bool sparse;
-    double shrinkage;
-  };
-  std::vector<Variant> variants;
-  for (const bool sparse : candidates.sparse) {
-    for (const double shrinkage : candidates.shrinkages) {
-      variants.push_back({sparse, shrinkage});
-    }
-  }
-  std::vector<std::vector<Eigen::VectorXd>> errors(variants.size(), std::vector<Eigen::VectorXd>(folds.size()));
-  parallel_for(std::ssize(folds), max_threads, [&](Eigen::Index index) {
-    const std::size_t f = index;
-    const JointFit fit(folds[f].training, blended(folds[f].training, grown[f], {}, no_jump), max_threads,
-                       candidates.sparse.back());
-    const Eigen::Index leaves = grown[f].partition.num_leaves();
-    for (std::size_t v = 0; v < variants.size(); ++v) {
-      const auto [sparse, shrinkage] = variants[v];
-      if (fit.has_ordered_leaves()) {
-        errors[v][f] = ordered_prefix_errors(fit, leaves, shrinkage, folds[f], weights);
-        continue;
-      }
-      const Partition models = sparse || shrinkage > 0.0 ? fit.local(leaves, shrinkage, sparse) : fit.as_grown(leaves);
-      errors[v][f] = prefix_squared_errors(models, folds[f].held_out, weights, max_threads);
-      if (sparse && leaves > 1) {  // the root of a larger tree is full
-        errors[v][f](0) =
-            prefix_squared_errors(fit.local(1, shrinkage, true), folds[f].held_out, weights, max_threads)(0);
-      }
-    }
-  });
-  Eigen::Index largest = 0;
-  for (const Eigen::VectorXd& fold : errors.front()) {
-    largest = std::max(largest, fold.size());
-  }
-  const auto error_of = [&](std::size_t variant, Eigen::Index leaves) {
-    std::vector<double> of_folds;
-    for (const Eigen::VectorXd& fold : errors[variant]) {
-      of_folds.push_back(fold(std::min(leaves, fold.size()) - 1));  // a smaller tree stays at its last one
-    }
-    return judge({.shrinkage = variants[variant].shrinkage, .sparse = variants[variant].sparse, .leaves = leaves},
-                 of_folds);
-  };
-  selection.crisp_rmse = Eigen::VectorXd::Constant(largest, std::numeric_limits<double>::infinity());
-  CandidateError best = error_of(0, 1);
-  best.candidate.shrinkage = 0.0;
-  selection.best_of_kind.push_back(best);
-  for (std::size_t v = 0; v < variants.size(); ++v) {
-    for (Eigen::Index leaves = 1; leaves <= largest; ++leaves) {
-      const CandidateError error = error_of(v, leaves);
-      selection.crisp_rmse(leaves - 1) = std::min(selection.crisp_rmse(leaves - 1), error.rmse);
-      if (error.rmse < best.rmse) {
-        best = error;
-      }
-    }
-  }
-  selection.chosen = selection.best_of_kind.front();
-  if (candidates.crisp) {
-    selection.best_of_kind.push_back(best);
-    selection.chosen = best;
-  }
-}
 
 using Ranked = std::vector<std::pair<double, Key>>;
 
@@ -276,13 +195,13 @@ std::set<Key> compare_on_all_folds(HeldOutErrors& comparison, Eigen::Index coeff
 
 // The best of each width: with jumps only if their gain on none is beyond chance.
 std::vector<CandidateError> best_of_widths(const HeldOutErrors& comparison, const std::set<Key>& kept,
-                                           const std::vector<FoldRows>& folds, const Judge& judge) {
+                                           const std::vector<FoldRows>& folds, const FoldErrors& error_of_folds) {
   const std::map<Key, std::vector<double>> errors = comparison.errors(folds.size());
   Ranked order = ranked(comparison, folds.size());
   std::erase_if(order, [&](const auto& entry) { return !kept.contains(entry.second); });
   std::vector<CandidateError> result;
   for (const auto& [error, key] : first_of_each(order, [](const Key& each) { return each.shape; })) {
-    const CandidateError entry = judge(comparison.candidate(key), errors.at(key));
+    const CandidateError entry = error_of_folds(comparison.candidate(key), errors.at(key));
     const auto same = std::ranges::find_if(result, [&](const CandidateError& other) {
       return other.candidate.validity.width == entry.candidate.validity.width;
     });
@@ -299,25 +218,23 @@ std::vector<CandidateError> best_of_widths(const HeldOutErrors& comparison, cons
 // Candidates are told apart on samples of the training rows. Against a crisp tree, whose models all rows have made,
 // the best blend is at a disadvantage then: it is made from all rows too, where one hold-out says that there are many.
 Partition make_from_all_rows(const FoldRows& fold, const GrownTree& grown, const Eigen::VectorXd& weights,
-                             int max_threads, const Judge& judge, CandidateError& best) {
+                             int max_threads, const FoldErrors& error_of_folds, CandidateError& best) {
   Candidate candidate = best.candidate;
   candidate.leaves = std::min(candidate.leaves, grown.partition.num_leaves());
   Partition partition = estimate(fold.training, grown, candidate, max_threads);
   std::vector<int> all(fold.held_out.count());
   std::iota(all.begin(), all.end(), 0);
   const std::vector<Chunk> held_out = {fetch(fold.held_out, all, partition.outputs)};
-  best = judge(best.candidate, {squared_error(partition, fold.training, held_out, weights)});
+  best = error_of_folds(best.candidate, {squared_error(partition, fold.training, held_out, weights)});
   return partition;
 }
 
 }  // namespace
 
 bool is_beyond_chance(const CandidateError& simple, const CandidateError& other) {
-  const Eigen::VectorXd gain = simple.fold_rmse - other.fold_rmse;
-  if (gain.size() < 2) return other.rmse < simple.rmse;
-  const double folds = static_cast<double>(gain.size());
-  const double error = std::sqrt((gain.array() - gain.mean()).square().sum() / (folds - 1.0) / folds);
-  return gain.mean() > standard_errors_of_a_gain * error;
+  if (simple.fold_rmse.size() < 2) return other.rmse < simple.rmse;
+  const PairedDifference gain = paired_difference(simple.fold_rmse, other.fold_rmse);
+  return gain.mean > standard_errors_of_a_gain * gain.standard_error;
 }
 
 Selection select(const std::vector<FoldRows>& folds, const std::vector<GrownTree>& grown, const Candidates& candidates,
@@ -328,8 +245,8 @@ Selection select(const std::vector<FoldRows>& folds, const std::vector<GrownTree
     compared.push_back({fold.training, thinned(fold.held_out, most_held_out_rows)});
     selection.held_out_rows += compared.back().held_out.count();
   }
-  const Judge judge(compared, weights.size());
-  compare_crisp(compared, grown, candidates, weights, max_threads, judge, selection);
+  const FoldErrors error_of_folds(compared, weights.size());
+  compare_crisp(compared, grown, candidates, weights, max_threads, error_of_folds, selection);
   if (!candidates.widths.empty() && selection.crisp_rmse.size() > 1) {
     std::size_t screening = 0;
     for (Eigen::Index rows = 0; screening < compared.size() && rows < screening_rows; ++screening) {
@@ -340,10 +257,10 @@ Selection select(const std::vector<FoldRows>& folds, const std::vector<GrownTree
     screen(comparison, candidates, coefficients, screening);
     refine(comparison, candidates, coefficients, screening);
     const std::set<Key> kept = compare_on_all_folds(comparison, coefficients, screening, compared.size());
-    std::vector<CandidateError> best = best_of_widths(comparison, kept, compared, judge);
+    std::vector<CandidateError> best = best_of_widths(comparison, kept, compared, error_of_folds);
     std::optional<Partition> made;
     if (compared.size() == 1 && !best.empty()) {
-      made = make_from_all_rows(compared.front(), grown.front(), weights, max_threads, judge, best.front());
+      made = make_from_all_rows(compared.front(), grown.front(), weights, max_threads, error_of_folds, best.front());
     }
     selection.best_of_kind.insert(selection.best_of_kind.end(), best.begin(), best.end());
     if (!candidates.crisp) {

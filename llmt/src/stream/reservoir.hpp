@@ -11,8 +11,9 @@
 
 namespace llmt {
 
-/// The different rows with the smallest hashes of their values: a sample without replacement of all different rows so
-/// far, whatever their order, in which a row that comes again is found again. One in eight is held out.
+/// Of all different rows so far, those with the smallest hashes of their values: a sample without replacement that does
+/// not depend on the order of the rows, and in which a row that comes again is recognised. One row in eight is held
+/// out.
 class Reservoir {
  public:
   /// Rows of `width` numbers.
@@ -21,22 +22,22 @@ class Reservoir {
   struct Row {
     std::vector<double> values;
     bool held_out;
-    Eigen::Index times;  ///< that it has come
+    Eigen::Index times;  ///< how often it has come
   };
 
-  /// Offers a row; true if it is now in the sample and held out.
+  /// Offers a row. Returns true if it is in the sample now and held out.
   bool add(const double* values);
 
-  /// Different rows / rows of the stream: 1 if none has come twice. Of the rows in the sample, which have been counted
-  /// since their first time.
-  double share_of_different() const {
+  /// Number of different rows divided by number of rows, over the rows in the sample and all times that they have come.
+  /// 1 if none has come twice.
+  double different_fraction() const {
     return rows_.empty() ? 1.0 : static_cast<double>(rows_.size()) / static_cast<double>(times_);
   }
 
-  /// Drops rows.
+  /// Drops the rows for which `drop` is true.
   void remove_if(const std::function<bool(const double* values)>& drop);
 
-  /// In the order of their hashes, which is random but for equal rows.
+  /// In the order of their hashes, which is a random order.
   const std::map<std::uint64_t, Row>& rows() const { return rows_; }
 
   Eigen::Index bytes() const;

@@ -2,23 +2,25 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "numerics/f_distribution.hpp"
 
 namespace llmt {
 namespace {
 
-// Rows whose quantiles are the first edges.
+// Number of rows whose quantiles become the edges between bins.
 constexpr Eigen::Index first_rows = 64;
 
-// Tests come when rows have grown by this factor.
+// The next test is due when the number of rows has grown by this factor.
 constexpr double test_growth = 1.25;
 
-// A split that passes still waits until it beats the best one on another input by a standard error of the difference,
-// or rows have grown by this factor since it passed first: the first split that is better than none is often not the
-// right one, and what is below it depends on it.
+// A split that passes waits until it beats the best one on any other input by a standard error of the difference (T.2),
+// or until the number of rows has grown by this factor since it passed first. The first split that is better than none
+// is often not the best one, and all later splits below it depend on it.
 constexpr double patience_with_rivals = 2.0;
+
+// Doubles that are prefetched at a time: one line of the cache.
+constexpr Eigen::Index cache_line = 8;
 
 }  // namespace
 
@@ -26,7 +28,7 @@ LeafSearch::LeafSearch(const StreamSetting& setting)
     : setting_(setting),
       residuals_(setting.shape, Eigen::VectorXd::Ones(1)),
       bins_(setting.inputs),
-      next_test_(std::max(first_rows, 2 * setting.options.min_leaf_samples)) {}
+      next_test_(std::max(first_rows, 2 * setting.min_leaf_samples)) {}
 
 void LeafSearch::set_edges(Bins& bins, std::vector<double> edges) const {
   bins.edges = std::move(edges);
@@ -35,29 +37,32 @@ void LeafSearch::set_edges(Bins& bins, std::vector<double> edges) const {
 }
 
 // Edges halfway between neighbouring values at the quantiles of the first rows.
+std::vector<double> LeafSearch::edges_of_first_rows(Eigen::Index input) const {
+  const Eigen::Index stride = setting_.inputs + 2;
+  const Eigen::Index count = std::ssize(first_rows_) / stride;
+  std::vector<double> values;
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const double value = first_rows_[i * stride + input];
+    if (!std::isnan(value)) values.push_back(value);
+  }
+  std::ranges::sort(values);
+  std::vector<double> edges;
+  for (int b = 1; b < setting_.bins && !values.empty(); ++b) {
+    const std::size_t at = b * values.size() / setting_.bins;
+    const auto above = std::ranges::upper_bound(values, values[at > 0 ? at - 1 : 0]);
+    if (above == values.end()) continue;
+    const double edge = *(above - 1) + 0.5 * (*above - *(above - 1));
+    if (edges.empty() || edge > edges.back()) edges.push_back(edge);
+  }
+  return edges;
+}
+
+// Lays out the bins and puts the first rows into them.
 void LeafSearch::lay_out(const Basis& basis) {
   const Eigen::Index stride = setting_.inputs + 2;
   const Eigen::Index count = std::ssize(first_rows_) / stride;
   for (Eigen::Index j = 0; j < setting_.inputs; ++j) {
-    std::vector<double> values;
-    for (Eigen::Index i = 0; i < count; ++i) {
-      if (const double value = first_rows_[i * stride + j]; !std::isnan(value)) {
-        values.push_back(value);
-      }
-    }
-    std::ranges::sort(values);
-    std::vector<double> edges;
-    for (int b = 1; b < setting_.options.bins && !values.empty(); ++b) {
-      const std::size_t at = b * values.size() / setting_.options.bins;
-      const auto above = std::ranges::upper_bound(values, values[at > 0 ? at - 1 : 0]);
-      if (above != values.end()) {
-        const double edge = *(above - 1) + 0.5 * (*above - *(above - 1));
-        if (edges.empty() || edge > edges.back()) {
-          edges.push_back(edge);
-        }
-      }
-    }
-    set_edges(bins_[j], std::move(edges));
+    set_edges(bins_[j], edges_of_first_rows(j));
   }
   RowProducts products(setting_.shape);
   std::vector<double> kept = std::move(first_rows_);
@@ -77,7 +82,7 @@ void LeafSearch::lay_out(const Basis& basis) {
 
 void LeafSearch::put(const StreamRow& row, const RowProducts& products) {
   const Eigen::Index size = setting_.shape.size();
-  // The sums of all leaves do not fit into a cache: they are asked for before they are needed.
+  // The sums of all leaves do not fit into a cache, so they are prefetched before they are needed.
   sums_of_row_.clear();
   for (Eigen::Index j = 0; j < setting_.inputs; ++j) {
     Bins& bins = bins_[j];
@@ -85,7 +90,7 @@ void LeafSearch::put(const StreamRow& row, const RowProducts& products) {
     const auto edge = std::ranges::lower_bound(bins.edges, row.x[j]);
     const Eigen::Index bin = edge - bins.edges.begin();
     double* const sums = bins.grams.data() + bin * size;
-    for (Eigen::Index k = 0; k < size; k += 8) {
+    for (Eigen::Index k = 0; k < size; k += cache_line) {
       __builtin_prefetch(sums + k, 1);
     }
     sums_of_row_.push_back(sums);
@@ -170,7 +175,7 @@ LeafSearch::Found LeafSearch::look_at(int input) {
   }
   for (std::size_t e = 0; e < all.thresholds.size(); ++e) {
     if (different_ * static_cast<double>(std::min(all.rows_left[e], all.rows - all.rows_left[e])) <
-        static_cast<double>(setting_.options.min_leaf_samples)) {
+        static_cast<double>(setting_.min_leaf_samples)) {
       continue;
     }
     ++found.tested;
@@ -186,15 +191,13 @@ bool LeafSearch::passes(const Found& found) const {
   const double added = found.rank_left + found.rank_right - found.rank;
   const double freedom = different_ * static_cast<double>(found.rows) - found.rank_left - found.rank_right;
   if (added <= 0.0 || freedom <= 0.0) return false;
-  const double f = found.ratio > 0.0 ? ((1.0 - found.ratio) / added) / (found.ratio / freedom)
-                                     : std::numeric_limits<double>::infinity();
+  // In units of the residual sum of squares of one model.
+  const double p_value = chow_p_value(1.0 - found.ratio, added, found.ratio / freedom, freedom);
   const double tests = static_cast<double>(tests_) * static_cast<double>(tests_ + 1);
-  if (!(f_survival(f, added, freedom) * static_cast<double>(found.tested) * tests < setting_.options.significance)) {
-    return false;
-  }
+  if (!(p_value * static_cast<double>(found.tested) * tests < setting_.significance)) return false;
   const double before = different_ * found.rss / (different_ * static_cast<double>(found.rows) - found.rank);
   const double after = different_ * found.rss * found.ratio / freedom;
-  return before - after >= setting_.options.min_variance_gain * setting_.output_variance;
+  return before - after >= setting_.min_variance_gain * setting_.output_variance;
 }
 
 std::optional<StreamSplit> LeafSearch::test(const Eigen::VectorXd& low, const Eigen::VectorXd& high, double different) {

@@ -6,37 +6,12 @@
 #include <optional>
 #include <vector>
 
-#include "llmt/stream.hpp"
+#include "stream/setting.hpp"
 #include "stream/sums.hpp"
 
 namespace llmt {
 
-/// A row on its way down a tree.
-struct StreamRow {
-  const double* x;  ///< inputs; NaN: missing
-  const double* z;  ///< the same in scaled units
-  double y;
-  double weight;
-  /// Different rows / rows of the stream. Rows that come again tell nothing new: tests count so many of them.
-  double different;
-};
-
-/// What all nodes of a tree share. Options as used: no zeros that stand for defaults.
-struct StreamSetting {
-  StreamOptions options;
-  Eigen::Index inputs;
-  GramShape shape;
-  double output_variance = 0.0;  ///< of the first rows
-  double rounding = 0.0;         ///< residuals below this are rounding
-  Eigen::VectorXd centre;        ///< of the inputs: z = (x - centre) / scale
-  Eigen::VectorXd scale;
-  bool detect_drift = true;  ///< off in tests of what streams do without it
-
-  Eigen::Index coefficients() const { return inputs + 1; }
-  double scaled(Eigen::Index input, double x) const { return (x - centre(input)) / scale(input); }
-  double unscaled(Eigen::Index input, double z) const { return centre(input) + scale(input) * z; }
-};
-
+/// A split to make.
 struct StreamSplit {
   int input = -1;
   double threshold = 0.0;
@@ -46,11 +21,11 @@ struct StreamSplit {
   double gain = 0.0;  ///< decrease of the mean squared residual
 };
 
-/// Candidates of one leaf, by residual differences: every edge between bins, see docs/algorithms.md.
+/// The search for a leaf's split by residual differences (docs/algorithms/stream.md).
 ///
-/// The first rows are kept: their quantiles are the edges between the bins of each input. Then only sums are kept, for
-/// each bin of each input. Tests come whenever the number of rows has grown by a quarter; the k-th is made at
-/// significance / (k (k + 1)).
+/// The first rows are kept; their quantiles become the edges between the bins of each input. From then on only the sums
+/// of each bin of each input are kept. Every edge is a candidate. A test is due whenever the number of rows has grown
+/// by a quarter; the k-th test is made at significance / (k (k + 1)), eq. (T.1).
 class LeafSearch {
  public:
   explicit LeafSearch(const StreamSetting& setting);
@@ -58,10 +33,10 @@ class LeafSearch {
   /// `products`: of the row in the leaf's basis.
   void add(const StreamRow& row, const Basis& basis, const RowProducts& products);
 
-  /// The split to make, if a test is due and shows one. `low`, `high`: range of the inputs in the leaf.
+  /// The split to make, if a test is due and finds one. `low`, `high`: range of the inputs in the leaf.
   std::optional<StreamSplit> test(const Eigen::VectorXd& low, const Eigen::VectorXd& high, double different);
 
-  /// What the edges between the bins of an input leave; empty before bins are laid out.
+  /// The residual sums of squares for the edges between the bins of an input; empty before bins are laid out.
   struct Edges {
     std::vector<double> thresholds;
     std::vector<Eigen::Index> rows_left;
@@ -96,6 +71,7 @@ class LeafSearch {
     Eigen::Index tested = 0;
   };
 
+  std::vector<double> edges_of_first_rows(Eigen::Index input) const;
   void lay_out(const Basis& basis);
   void set_edges(Bins& bins, std::vector<double> edges) const;
   void put(const StreamRow& row, const RowProducts& products);

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "base/simd.hpp"
+#include "numerics/tolerances.hpp"
 
 namespace llmt {
 namespace {
@@ -47,9 +48,9 @@ void RowProducts::set(const Basis& basis, const double* z, double y, double weig
   features_[0] = root;
   for (Eigen::Index k = 1; k < coefficients; ++k) {
     const double deviation = z[k - 1] - basis.origin(k - 1);
-    const double held = deviation == deviation ? deviation : 0.0;
-    residual -= basis.base(k) * held;
-    features_[k] = root * held;
+    const double known = deviation == deviation ? deviation : 0.0;
+    residual -= basis.base(k) * known;
+    features_[k] = root * known;
   }
   features_[coefficients] = root * residual;
   multiply(features_.data(), shape_.columns(), products_.data());
@@ -67,52 +68,76 @@ Eigen::MatrixXd matrix_of(const GramShape& shape, const double* gram) {
   return matrix;
 }
 
-Eigen::VectorXd solve(const GramShape& shape, const double* gram, double shrinkage, int& rank) {
+namespace {
+
+// Means and scales of the columns in a Gram matrix.
+struct Moments {
+  double total;          // weight
+  Eigen::VectorXd mean;  // of the coefficients' columns, the constant's first
+  double residual_mean;
+  Eigen::VectorXd scale;  // root of the sum of squares about the mean; 0: the column does not vary
+};
+
+Moments moments_of(const GramShape& shape, const double* gram) {
   const Eigen::Index size = shape.coefficients();
-  Eigen::VectorXd change = Eigen::VectorXd::Zero(size);
-  rank = 0;
-  const double total = gram[0];
-  if (!(total > 0.0)) return change;
-  rank = 1;
-  // The covariance of the regressors and the residual, in columns of unit variance.
-  Eigen::VectorXd mean(size);
+  Moments result{gram[0], Eigen::VectorXd(size), gram[shape.at(size, 0)] / gram[0], Eigen::VectorXd::Zero(size)};
   for (Eigen::Index k = 0; k < size; ++k) {
-    mean(k) = gram[shape.at(k, 0)] / total;
+    result.mean(k) = gram[shape.at(k, 0)] / result.total;
   }
-  const double residual_mean = gram[shape.at(size, 0)] / total;
-  Eigen::VectorXd scale = Eigen::VectorXd::Zero(size);
   for (Eigen::Index k = 1; k < size; ++k) {
     const double square = gram[shape.at(k, k)];
-    const double variance = square - total * mean(k) * mean(k);
-    scale(k) = variance > pivot_tolerance * square ? std::sqrt(variance) : 0.0;
+    const double variance = square - result.total * result.mean(k) * result.mean(k);
+    result.scale(k) = variance > pivot_tolerance * square ? std::sqrt(variance) : 0.0;
   }
-  // L D L' of the correlation matrix; columns that follow from those before are left out.
-  Eigen::MatrixXd factor = Eigen::MatrixXd::Zero(size, size);
-  Eigen::VectorXd right = Eigen::VectorXd::Zero(size);
+  return result;
+}
+
+// Cholesky factor of the correlation matrix of the regressors that are independent of those before them.
+struct CorrelationFactor {
+  Eigen::MatrixXd factor;  // in the rows and columns `kept`
+  Eigen::VectorXd right;   // its inverse times the correlations with the residual
   std::vector<Eigen::Index> kept;
-  const double hold = shrinkage / total;
+};
+
+CorrelationFactor factorise(const GramShape& shape, const double* gram, const Moments& moments, double shrinkage) {
+  const Eigen::Index size = shape.coefficients();
+  const auto& [total, mean, residual_mean, scale] = moments;
+  CorrelationFactor result{Eigen::MatrixXd::Zero(size, size), Eigen::VectorXd::Zero(size), {}};
+  Eigen::MatrixXd& factor = result.factor;
+  const double added_to_diagonal = shrinkage / total;
   for (Eigen::Index k = 1; k < size; ++k) {
     if (!(scale(k) > 0.0)) continue;
-    double pivot = 1.0 + hold;
-    for (const Eigen::Index j : kept) {
+    double pivot = 1.0 + added_to_diagonal;
+    for (const Eigen::Index j : result.kept) {
       double sum = (gram[shape.at(k, j)] - total * mean(k) * mean(j)) / (scale(k) * scale(j));
-      for (const Eigen::Index m : kept) {
+      for (const Eigen::Index m : result.kept) {
         if (m >= j) break;
         sum -= factor(k, m) * factor(j, m);
       }
       factor(k, j) = sum / factor(j, j);
       pivot -= factor(k, j) * factor(k, j);
     }
-    if (!(pivot > 1e-10)) continue;
+    if (!(pivot > collinearity_tolerance)) continue;
     factor(k, k) = std::sqrt(pivot);
     double sum = (gram[shape.at(size, k)] - total * mean(k) * residual_mean) / scale(k);
-    for (const Eigen::Index j : kept) {
-      sum -= factor(k, j) * right(j);
+    for (const Eigen::Index j : result.kept) {
+      sum -= factor(k, j) * result.right(j);
     }
-    right(k) = sum / factor(k, k);
-    kept.push_back(k);
+    result.right(k) = sum / factor(k, k);
+    result.kept.push_back(k);
   }
-  rank += static_cast<int>(kept.size());
+  return result;
+}
+
+}  // namespace
+
+Eigen::VectorXd solve(const GramShape& shape, const double* gram, double shrinkage, int& rank) {
+  Eigen::VectorXd change = Eigen::VectorXd::Zero(shape.coefficients());
+  rank = 0;
+  if (!(gram[0] > 0.0)) return change;
+  const Moments moments = moments_of(shape, gram);
+  const auto [factor, right, kept] = factorise(shape, gram, moments, shrinkage);
+  rank = 1 + static_cast<int>(kept.size());
   for (Eigen::Index at = std::ssize(kept) - 1; at >= 0; --at) {
     const Eigen::Index k = kept[at];
     double sum = right(k);
@@ -122,10 +147,10 @@ Eigen::VectorXd solve(const GramShape& shape, const double* gram, double shrinka
     }
     change(k) = sum / factor(k, k);
   }
-  change(0) = residual_mean;
+  change(0) = moments.residual_mean;
   for (const Eigen::Index k : kept) {
-    change(k) /= scale(k);
-    change(0) -= change(k) * mean(k);
+    change(k) /= moments.scale(k);
+    change(0) -= change(k) * moments.mean(k);
   }
   return change;
 }

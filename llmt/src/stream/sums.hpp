@@ -9,11 +9,12 @@
 
 namespace llmt {
 
-/// What rows are taken relative to: features [1, z - origin, y - base . [1, z - origin]], z the scaled regressors. Sums
-/// of squares of what a model near the truth leaves keep their digits (docs/algorithms.md, section 2).
+/// What the features of rows are relative to: they are [1, z - origin, y - base . [1, z - origin]], z the scaled
+/// regressors. `base` is a model near the truth, so that sums of squares of the residual keep their digits
+/// (docs/algorithms/stream.md).
 struct Basis {
   Eigen::VectorXd origin;
-  Eigen::VectorXd base;  // constant and slopes
+  Eigen::VectorXd base;  ///< constant and slopes
 };
 
 /// Sums over rows: the Gram matrix of their features times the root of the weight, as GramShape lays it out.
@@ -44,22 +45,24 @@ class RowProducts {
   std::vector<double> products_;
 };
 
-/// The model [constant, slopes] in the basis of `gram`, as a change of the basis' base: least squares of the residuals,
-/// plus `shrinkage` rows of the variance that each regressor has, uncorrelated, that say "no change". Regressors that
-/// do not vary, or follow from those before, change nothing. `rank`: of [1, z].
+/// The model [constant, slopes] in the basis of `gram`, as a change of the basis' base. It is the least-squares fit of
+/// the residuals, with slopes drawn towards 0 as in eq. (E.2): as if `shrinkage` further rows, with the variances that
+/// the regressors have and without correlation, said that nothing changes. Slopes of regressors that do not vary, or
+/// are collinear with those before, do not change. `rank`: set to that of [1, z].
 Eigen::VectorXd solve(const GramShape& shape, const double* gram, double shrinkage, int& rank);
 
-/// Sum of squared residuals that a change of the base leaves of the rows in `gram`.
+/// Sum of squared residuals of the rows in `gram` after a change of the base.
 double remaining(const GramShape& shape, const double* gram, const Eigen::VectorXd& change);
 
-/// Takes sums to a basis whose origin is shifted by `shift` and whose base differs by `change` (as solve() gives it).
+/// Transforms sums to a basis whose origin is shifted by `shift` and whose base differs by `change`, as solve() returns
+/// it.
 void rebase(const GramShape& shape, const Eigen::VectorXd& shift, const Eigen::VectorXd& change,
             std::vector<double>& gram);
 
-/// Full symmetric matrix.
+/// The full symmetric matrix.
 Eigen::MatrixXd matrix_of(const GramShape& shape, const double* gram);
 
-/// base + change, written about the origin shifted by `shift`.
+/// The same model with coefficients about an origin shifted by `shift`.
 Eigen::VectorXd shifted_model(const Eigen::VectorXd& model, const Eigen::VectorXd& shift);
 
 }  // namespace llmt

@@ -23,7 +23,7 @@ discovery::SolverResult solve_for(Robot& robot, discovery::LeastSquaresProblem p
 }
 
 bool covers_base(const std::vector<std::string>& reasons) {
-  return std::all_of(reasons.begin(), reasons.begin() + 6, [](const std::string& why) { return why.empty(); });
+  return std::ranges::all_of(std::span(reasons).first(6), [](const std::string& why) { return why.empty(); });
 }
 
 // About `count` rows at equal steps: enough to compare starts.
@@ -65,7 +65,7 @@ Robot best_start(const Robot& robot, const Measurements& measurements, const std
 void set_priors(std::vector<discovery::Parameter>& parameters, Eigen::Index geometric,
                 const CalibrationOptions& options) {
   constexpr double frame_factor = 10.0;
-  for (discovery::Parameter& parameter : std::span(parameters).first(static_cast<std::size_t>(geometric))) {
+  for (discovery::Parameter& parameter : std::span(parameters).first(geometric)) {
     const double factor = is_frame_parameter(parameter.name) ? frame_factor : 1.0;
     double sigma = 0.0;
     if (parameter.unit == "mm") sigma = factor * options.prior_length_mm;

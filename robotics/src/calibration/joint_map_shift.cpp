@@ -18,13 +18,12 @@ Unmapped unmapped(const Robot& robot, const Measurements& measurements) {
     return true;
   });
   for (const Effect& map : plain.maps) {
-    const auto joint = static_cast<Eigen::Index>(joint_index(robot.chain, map.at));
+    const Eigen::Index joint = joint_index(robot.chain, map.at);
     if (joint >= plain.measurements.poses.joints.cols()) continue;  // for validate() to refuse
     const EvenKnots knots{map.constants[0], map.constants[1], std::ssize(map.values)};
     for (Eigen::Index i = 0; i < measurements.count(); ++i) {
       const auto [below, above] = knots.place(measurements.poses.joints(i, joint));
-      const auto k = static_cast<std::size_t>(below);
-      plain.measurements.poses.joints(i, joint) += (1.0 - above) * map.values[k] + above * map.values[k + 1];
+      plain.measurements.poses.joints(i, joint) += (1.0 - above) * map.values[below] + above * map.values[below + 1];
     }
   }
   return plain;

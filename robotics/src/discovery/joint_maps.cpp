@@ -165,7 +165,7 @@ Eigen::MatrixXd pushed_hats(const Robot& robot, const Poses& poses, const std::v
     for (; k < hats.rows() && rows[k] / 3 == pose; ++k) {
       const Eigen::Index axis = rows[k] % 3;
       for (const Knots& own : knots) {
-        const auto joint = static_cast<Eigen::Index>(own.joint);
+        const Eigen::Index joint = own.joint;
         const auto [below, above] = own.place(poses.joints(pose, joint));
         hats(k, own.begin + below) += (1.0 - above) * levers(axis, joint);
         hats(k, own.begin + below + 1) += above * levers(axis, joint);

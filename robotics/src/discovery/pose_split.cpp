@@ -14,7 +14,7 @@ namespace llmt::robotics {
 namespace {
 
 std::vector<Eigen::Index> all_rows(Eigen::Index count) {
-  std::vector<Eigen::Index> rows(static_cast<std::size_t>(count));
+  std::vector<Eigen::Index> rows(count);
   std::iota(rows.begin(), rows.end(), 0);
   return rows;
 }

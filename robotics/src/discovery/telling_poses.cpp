@@ -18,7 +18,7 @@ namespace {
 constexpr double radians = std::numbers::pi / 180.0;
 
 // The two explanations: what was found, and all that may be fitted to imitate it.
-struct EffectQuestion {
+struct ExplanationPair {
   Robot without;  // the effect that was found
   Effect found;
   std::vector<Effect> rival;
@@ -31,9 +31,9 @@ struct Predictions {
   Eigen::VectorXd found;
 };
 
-// Calibration leaves maps of joints alone, so they do not imitate anything.
+// Calibration leaves joint maps as they are, so they imitate nothing.
 std::vector<Eigen::Index> fitted_columns(const Robot& robot) {
-  std::vector<Eigen::Index> columns(static_cast<std::size_t>(geometric_parameter_count(robot.chain)));
+  std::vector<Eigen::Index> columns(geometric_parameter_count(robot.chain));
   std::iota(columns.begin(), columns.end(), 0);
   Eigen::Index next = std::ssize(columns);
   for (const Effect& effect : robot.effects) {
@@ -44,7 +44,7 @@ std::vector<Eigen::Index> fitted_columns(const Robot& robot) {
   return columns;
 }
 
-Predictions predict(const EffectQuestion& question, const Poses& poses) {
+Predictions predict(const ExplanationPair& question, const Poses& poses) {
   std::vector<Effect> effects = question.rival;
   effects.push_back(question.found);
   const Eigen::MatrixXd signatures = effect_signatures(question.without, effects, poses);
@@ -75,11 +75,11 @@ struct Normal {
 };
 
 // Block by block: the derivatives of 100 000 poses at once would fill the memory.
-Normal normal_equations(const EffectQuestion& question, const Poses& poses, Eigen::Index columns) {
+Normal normal_equations(const ExplanationPair& question, const Poses& poses, Eigen::Index columns) {
   constexpr Eigen::Index block = 1000;
   Normal normal{Eigen::MatrixXd::Zero(columns, columns), Eigen::VectorXd::Zero(columns)};
   for (Eigen::Index first = 0; first < poses.count(); first += block) {
-    std::vector<Eigen::Index> rows(static_cast<std::size_t>(std::min(block, poses.count() - first)));
+    std::vector<Eigen::Index> rows(std::min(block, poses.count() - first));
     std::iota(rows.begin(), rows.end(), first);
     const Predictions part = predict(question, select(poses, rows));
     normal.add(part.columns, part.found);
@@ -128,7 +128,7 @@ std::array<double, 2> range_of(const Joint& joint, const Eigen::VectorXd& measur
 }
 
 // Each random pose with each payload.
-Poses candidate_poses(const EffectQuestion& question, const Poses& measured, const std::vector<double>& payloads,
+Poses candidate_poses(const ExplanationPair& question, const Poses& measured, const std::vector<double>& payloads,
                       Random& random) {
   constexpr Eigen::Index places = 400;
   const Chain& chain = question.without.chain;
@@ -163,7 +163,7 @@ Poses candidate_poses(const EffectQuestion& question, const Poses& measured, con
 }
 
 // What the effects in question look at in that row, apart from what follows from joints and payload.
-std::map<std::string, double> conditions(const EffectQuestion& question, const Poses& poses, Eigen::Index row) {
+std::map<std::string, double> conditions(const ExplanationPair& question, const Poses& poses, Eigen::Index row) {
   std::vector<Effect> effects = question.rival;
   effects.push_back(question.found);
   std::map<std::string, double> values;
@@ -215,8 +215,8 @@ Telling telling_poses(const Robot& fitted, std::size_t effect, const std::vector
   require(count >= 1, fmt::format("count is {}, must be >= 1", count));
   require(std::isfinite(noise_mm) && noise_mm >= 0.0, fmt::format("noise_mm is {}, must be >= 0", noise_mm));
   require(std::ranges::count(measured_axes, true) > 0, "no axis is measured");
-  EffectQuestion question{fitted, fitted.effects[effect], rival, measured_axes};
-  question.without.effects.erase(question.without.effects.begin() + static_cast<Eigen::Index>(effect));
+  ExplanationPair question{fitted, fitted.effects[effect], rival, measured_axes};
+  question.without.effects.erase(question.without.effects.begin() + effect);
   const Payloads payloads = payloads_of(fitted, measured);
   Random random(seed);
   const Poses poses = candidate_poses(question, measured, payloads.all, random);

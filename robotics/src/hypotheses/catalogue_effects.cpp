@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <set>
+#include <span>
 
 namespace llmt::robotics {
 namespace {
@@ -45,8 +46,8 @@ std::vector<std::vector<double>> constants_for(const EffectType& type, const Sce
 }
 
 bool masses_known(const Chain& chain, std::size_t index) {
-  return std::any_of(chain.joints.begin() + static_cast<Eigen::Index>(index), chain.joints.end(),
-                     [](const Joint& joint) { return joint.mass_kg > 0.0; });
+  return std::ranges::any_of(std::span(chain.joints).subspan(index),
+                             [](const Joint& joint) { return joint.mass_kg > 0.0; });
 }
 
 std::set<std::string> labels_of(const Robot& robot) {

@@ -40,7 +40,7 @@ JointSignal joint_signal(const Scene& scene, std::size_t joint) {
     signal.rows.push_back(i);
     signal.along.push_back(lever.dot(scene.clipped.segment(3 * i, 3)));
     signal.weight.push_back(lever.squaredNorm());
-    signal.angle.push_back(scene.poses.joints(i, static_cast<Eigen::Index>(joint)));
+    signal.angle.push_back(scene.poses.joints(i, joint));
   }
   if (!signal.angle.empty()) {
     const auto [low, high] = std::ranges::minmax(signal.angle);

@@ -52,7 +52,7 @@ void add_moves(Poses& poses, const Chain& chain) {
   auto column = poses.covariates.find("order");
   if (column == poses.covariates.end()) column = poses.covariates.find("time_s");
   if (column == poses.covariates.end()) return;
-  std::vector<Eigen::Index> sequence(static_cast<std::size_t>(poses.count()));
+  std::vector<Eigen::Index> sequence(poses.count());
   std::iota(sequence.begin(), sequence.end(), Eigen::Index{0});
   std::ranges::stable_sort(sequence, {}, [&](Eigen::Index row) { return column->second(row); });
   Eigen::MatrixXd moves = Eigen::MatrixXd::Zero(poses.count(), poses.joints.cols());

@@ -82,7 +82,7 @@ Eigen::VectorXd neutral_values(const std::string& name, const Effect& effect, co
   } else if (name.starts_with("tau") && is_of_joint) {
     values = gravity_torque(robot, poses, number - 1);
   } else if (name.starts_with("qmeas") && is_of_joint) {
-    values = poses.joints.col(static_cast<Eigen::Index>(number - 1));
+    values = poses.joints.col(number - 1);
   }
   return values;
 }

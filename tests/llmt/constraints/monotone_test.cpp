@@ -387,10 +387,10 @@ TEST(Monotone, TheRoomAtAJumpIsTheSmallestStepOfTheLeaves) {
     }
     if (std::isfinite(smallest)) {
       const Rows rows(x, y, {1, 0});
-      // Parabolas are bounded by their control points, so the room may be less than what is there, by a little.
-      const double room = llmt::order_room(partition, rows.training);
-      EXPECT_LE(room, smallest + 1e-9) << seed;
-      EXPECT_GE(room, smallest - 0.05 * y.cwiseAbs().maxCoeff()) << seed;
+      // Parabolas are bounded by their control points, so the margin may be a little smaller than the smallest step.
+      const double margin = llmt::order_margin(partition, rows.training);
+      EXPECT_LE(margin, smallest + 1e-9) << seed;
+      EXPECT_GE(margin, smallest - 0.05 * y.cwiseAbs().maxCoeff()) << seed;
     }
   }
 }

@@ -7,8 +7,9 @@
 #include <utility>
 
 #include "data/dataset.hpp"
-#include "estimation/estimate.hpp"
-#include "estimation/joint_fit.hpp"
+#include "estimation/joint_estimate.hpp"
+#include "estimation/local_estimate.hpp"
+#include "estimation/squared_errors.hpp"
 #include "growth/best_first/best_first.hpp"
 #include "model/evaluator.hpp"
 #include "model/tree.hpp"
@@ -72,12 +73,13 @@ TEST(Sample, JointEstimateOnAllRowsIsReachedFromIt) {
   const Partition tree = blended_tree(training);
   const llmt::TrainingRows sample = llmt::thinned(training, 60 * 4 * 8);
   const llmt::Regularisation regularisation{1e-6, 0.0};
-  const Partition exact = llmt::JointFit(training, tree, 1).joint(8, {regularisation}).front();
-  const llmt::JointFit fit(sample, tree, 1);
-  const double before = distance(fit.joint(8, {regularisation}).front(), exact);
-  EXPECT_LE(distance(fit.joint_on(training, 8, regularisation), exact), 0.1 * before);
-  EXPECT_EQ(fit.joint_on(training, 8, regularisation).residual_range,
-            llmt::JointFit(training, tree, 1).as_grown(8).residual_range);
+  const llmt::LeafSums of_all = llmt::sum_leaves(training, tree, 1);
+  const Partition exact = llmt::joint(of_all, 8, {regularisation}).front();
+  const llmt::LeafSums of_sample = llmt::sum_leaves(sample, tree, 1);
+  const double before = distance(llmt::joint(of_sample, 8, {regularisation}).front(), exact);
+  const Partition found = llmt::joint_from_sample(of_sample, training, 8, regularisation);
+  EXPECT_LE(distance(found, exact), 0.1 * before);
+  EXPECT_EQ(found.residual_range, llmt::as_grown(of_all, 8).residual_range);
 }
 
 // Weighted sum of squared errors over all rows.
@@ -101,9 +103,11 @@ TEST(Sample, LeafThatItHardlyHoldsDoesNotSpoilTheEstimateOnAllRows) {
     const Partition tree = blended_tree(training);
     const llmt::TrainingRows sample = llmt::thinned(training, 60 * 4 * 8);
     const llmt::Regularisation regularisation{1e-6, 0.0};
-    const double exact = loss(llmt::JointFit(training, tree, 1).joint(8, {regularisation}).front(), training);
-    EXPECT_LE(loss(llmt::JointFit(sample, tree, 1).joint_on(training, 8, regularisation), training), 1.05 * exact)
-        << "seed " << seed;
+    const llmt::LeafSums of_all = llmt::sum_leaves(training, tree, 1);
+    const llmt::LeafSums of_sample = llmt::sum_leaves(sample, tree, 1);
+    const double exact = loss(llmt::joint(of_all, 8, {regularisation}).front(), training);
+    const double found = loss(llmt::joint_from_sample(of_sample, training, 8, regularisation), training);
+    EXPECT_LE(found, 1.05 * exact) << "seed " << seed;
   }
 }
 
@@ -140,9 +144,9 @@ TEST(Sample, SparseEstimateOnAllRowsIsReachedFromItWithItsZeros) {
   const llmt::TrainingRows training = llmt::training_rows(data.table, all(4000));
   const llmt::TrainingRows sample = llmt::thinned(training, 30 * 4 * 8);
   const llmt::Regularisation regularisation{1e-8, 0.0, true};
-  const llmt::JointFit fit(sample, blended_tree(training), 1, true);
-  const Partition before = fit.joint(8, {regularisation}).front();
-  const Partition after = fit.joint_on(training, 8, regularisation);
+  const llmt::LeafSums of_sample = llmt::sum_leaves(sample, blended_tree(training), 1, true);
+  const Partition before = llmt::joint(of_sample, 8, {regularisation}).front();
+  const Partition after = llmt::joint_from_sample(of_sample, training, 8, regularisation);
   Eigen::Index zeros = 0;
   for (std::size_t i = 0; i < after.nodes.size(); ++i) {
     if (after.nodes[i].is_leaf()) {

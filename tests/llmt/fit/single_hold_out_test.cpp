@@ -8,7 +8,7 @@
 
 #include "data/dataset.hpp"
 #include "estimation/jumps.hpp"
-#include "fit/validate.hpp"
+#include "data/fold_rows.hpp"
 #include "llmt/model.hpp"
 #include "oracles/oracles.hpp"
 #include "oracles/random_trees.hpp"

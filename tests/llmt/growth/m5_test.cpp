@@ -484,9 +484,11 @@ TEST(M5, WhatWouldUndoItsModelsIsRefused) {
   EXPECT_EQ(message([](llmt::FitOptions& options) {
               options.expert.shrinkages = {0.0, 1.0};
             }),
-            "llmt::fit: expert.shrinkages is 1, it must be 0 with rule m5, which smooths along the path");
+            "llmt::fit: expert.shrinkages is 1, it must be 0 with rule m5, which prunes and smooths its own local "
+            "models");
   EXPECT_EQ(message([](llmt::FitOptions& options) { options.expert.min_improvement = 0.02; }),
-            "llmt::fit: expert.min_improvement is 0.02, it must be 0 with rule m5, which prunes");
+            "llmt::fit: expert.min_improvement is 0.02, it must be 0 with rule m5, which prunes and smooths its own "
+            "local models");
 }
 
 TEST(M5, StandsAmongTheUsualMethods) {

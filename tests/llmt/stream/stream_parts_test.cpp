@@ -7,11 +7,13 @@
 #include <numeric>
 #include <optional>
 
+#include "llmt/fit.hpp"
 #include "model/tree.hpp"
 #include "llmt/fit.hpp"
 #include "oracles/oracles.hpp"
 #include "oracles/stream_data.hpp"
 #include "stream/blend_correction.hpp"
+#include "stream/detectors.hpp"
 #include "stream/reservoir.hpp"
 #include "stream/search.hpp"
 #include "stream/sums.hpp"
@@ -20,13 +22,11 @@
 namespace {
 
 using llmt::GramShape;
-using llmt::StreamOptions;
 using namespace stream_data;
 
-llmt::StreamSetting setting_for(Eigen::Index inputs, StreamOptions options = {}) {
-  options.min_leaf_samples = 2 * (inputs + 1);
-  options.max_leaves = 100;
-  return {.options = options,
+llmt::StreamSetting setting_for(Eigen::Index inputs) {
+  return {.min_leaf_samples = 2 * (inputs + 1),
+          .max_leaves = 100,
           .inputs = inputs,
           .shape = GramShape(inputs + 1, 1),
           .output_variance = 1.0,
@@ -240,7 +240,7 @@ TEST(Reservoir, IsTheSameWhateverTheOrderAndKnowsRowsAgain) {
     shuffled.add(second.data());
   }
   ASSERT_EQ(forward.rows().size(), 50U);
-  EXPECT_EQ(forward.share_of_different(), 1.0);
+  EXPECT_EQ(forward.different_fraction(), 1.0);
   for (auto left = forward.rows().begin(), right = shuffled.rows().begin(); left != forward.rows().end();
        ++left, ++right) {
     EXPECT_EQ(left->second.values, right->second.values);
@@ -252,7 +252,7 @@ TEST(Reservoir, IsTheSameWhateverTheOrderAndKnowsRowsAgain) {
     }
   }
   EXPECT_EQ(forward.rows().size(), 50U);
-  EXPECT_EQ(forward.share_of_different(), 0.25);
+  EXPECT_EQ(forward.different_fraction(), 0.25);
 }
 
 TEST(BlendCorrection, IsTheAnchoredLeastSquaresFit) {

@@ -228,7 +228,12 @@ TEST(Stream, ASnapshotIsAnOrdinaryModel) {
 TEST(Stream, AFewRowsGiveALinearModel) {
   const Eigen::MatrixXd x = oracle::uniform(10, 2, 1);
   Stream stream(2, 1);
-  EXPECT_THROW(stream.snapshot(), std::invalid_argument);
+  try {
+    stream.snapshot();
+    FAIL() << "a snapshot without a row";
+  } catch (const std::invalid_argument& error) {
+    EXPECT_STREQ(error.what(), "llmt::Stream: snapshot(): there is no row yet");
+  }
   EXPECT_TRUE(stream.predict(x).array().isNaN().all());
   stream.add(x, affine(x));
   EXPECT_LT((stream.snapshot().predict(x) - affine(x)).norm(), 1e-9);

@@ -156,7 +156,7 @@ TEST(Discovery, TellsWhatItCannotTestWithoutColumns) {
   const Robot planar = rigid(arm("planar_two_link"));
   const Discovery found = discover(planar, in_plane(seen(planar, 40, 10 * um, 8)));
   const auto why = [&](const std::string& what) {
-    const auto one = std::ranges::find(found.not_testable, what, &Untestable::what);
+    const auto one = std::ranges::find(found.not_testable, what, &discovery::UntestableCause::what);
     return one == found.not_testable.end() ? std::string("(testable)") : one->why;
   };
   EXPECT_EQ(why("backlash_approach@joint1"), "there is no column dir1");

@@ -3,128 +3,12 @@
 /// effects go in, a verdict comes out. Nothing here knows what the simulation is of.
 #pragma once
 
-#include <Eigen/Core>
-#include <cstdint>
 #include <string>
 #include <vector>
 
-#include "llmt/abi.hpp"
+#include "llmt/discovery/verdict.hpp"
 
 namespace llmt::discovery {
-
-/// What the baseline leaves over, n samples of d components each, stacked sample by sample.
-struct Evidence {
-  Eigen::VectorXd residuals;    ///< n d: measured - predicted
-  Eigen::MatrixXd jacobian;     ///< n d x P: derivatives of the prediction by what the baseline may adjust
-  Eigen::Index components = 1;  ///< d
-  /// n numbers, or empty: samples of equal number are repeats of one setting, independent draws of the noise.
-  std::vector<Eigen::Index> repeats;
-  /// Share of the sum of squares that signatures of first order leave even when the explanation is right. No
-  /// explanation counts as better than that; else data without noise would call for more and more candidates. 0: exact
-  /// signatures.
-  double resolution = 0.0;
-
-  Eigen::Index samples() const { return components > 0 ? residuals.size() / components : 0; }
-};
-
-/// One effect at one place: the prediction changes by signature * values to first order.
-struct EffectCandidate {
-  std::string family;         ///< the cause, e.g. "joint_compliance"; variants of one cause share it
-  std::string location;       ///< where, e.g. "joint2"; a family is used at most once at a location
-  Eigen::MatrixXd signature;  ///< n d x k
-  Eigen::VectorXd lower;      ///< k plausible limits of the values, or empty: none
-  Eigen::VectorXd upper;
-  bool generic = false;  ///< not a cause but a shape: what it explains is "unknown, looks like this"
-  /// Added to the score; 2 ln m for one that was picked as the best of m by looking at the residuals.
-  double prior_cost = 0.0;
-};
-
-/// A cause that these samples cannot test.
-struct UntestableCause {
-  std::string what;  ///< "backlash_approach@joint1", "square a"
-  std::string why;   ///< in words
-};
-
-struct SearchOptions {
-  double false_alarm_rate = 0.003;  ///< of the whole search when nothing is missing
-  int null_draws = 300;             ///< of each kind, see search()
-  double rival_margin = 6.0;        ///< score difference within which an alternative explains as well
-  /// A family that explains all but this share of what the explanation explains is a rival too, whatever its score,
-  /// because masses, lengths and formulas are not known more closely.
-  double model_error = 0.008;
-  double shape_margin = 0.0;     ///< score by which causes may be worse than shapes and still be named
-  double materiality = 0.01;     ///< unique share of the explained sum of squares below which a family is left out
-  double tentative_share = 0.1;  ///< share of the explained sum of squares in generic candidates that casts doubt
-  double largest_outlier_share = 0.15;
-  int largest_set = 16;              ///< candidates at once
-  double absorbed_tolerance = 1e-3;  ///< a direction with less of its norm outside the baseline's range is absorbed
-  std::uint64_t seed = 1;
-};
-
-/// A candidate that is part of an explanation.
-struct FindingTerm {
-  std::size_t candidate = 0;
-  Eigen::VectorXd values;           ///< k; directions that the baseline absorbs are zero
-  Eigen::VectorXd standard_errors;  ///< k, at the estimated noise
-  double share = 0.0;               ///< of the explained sum of squares that goes with it alone
-};
-
-/// Another family that explains the data as well in the place of a finding.
-struct Rival {
-  std::string family;
-  std::vector<std::size_t> candidates;
-  double score_difference = 0.0;  ///< of the whole explanation; positive: worse
-  bool exact = false;             ///< predicts the same at every sample: these samples cannot distinguish them
-};
-
-/// One family of the explanation.
-struct Finding {
-  std::string family;
-  bool generic = false;
-  bool confirmed = false;  ///< passed the gate, and nothing material is left that it does not explain
-  std::vector<FindingTerm> terms;
-  std::vector<Rival> rivals;
-  double share = 0.0;       ///< of the explained sum of squares that goes with the family alone
-  double score_gain = 0.0;  ///< score lost without it
-};
-
-/// What a candidate could have shown.
-struct Sensitivity {
-  bool absorbed = false;  ///< the baseline can imitate it entirely
-  double outside = 0.0;   ///< share of its norm that the baseline cannot imitate
-  /// k: smallest value of each parameter, the others zero, that would be found with probability 0.9; infinite if
-  /// absorbed.
-  Eigen::VectorXd visible;
-};
-
-/// The F test of the residual scatter against the scatter of repeats.
-struct LackOfFit {
-  Eigen::Index dof = 0;       ///< of the repeats; 0: there are none
-  double noise = 0.0;         ///< standard deviation of one component from the repeats
-  double p_value = 1.0;       ///< of scatter beyond the repeats when the explanation is right
-  double excess_share = 0.0;  ///< of the sum of squares beyond noise: the part that the explanation leaves
-
-  /// Whether the repeats are enough to take the noise from them: with 12 degrees of freedom its standard error is 20 %.
-  bool has_enough_repeats() const { return dof >= 12; }
-};
-
-enum class Answer { nothing_missing, named, indistinguishable, unknown };
-
-/// Outcome of search().
-struct Verdict {
-  Answer answer = Answer::nothing_missing;
-  std::vector<Finding> findings;      ///< by falling share
-  std::vector<std::size_t> outliers;  ///< samples that fit nothing, in the order of falling evidence
-  double score_gain = 0.0;            ///< of the explanation over none
-  double threshold = 0.0;             ///< that chance alone exceeds at the false alarm rate
-  double sum_of_squares = 0.0;        ///< of the residuals, adjusted baseline, no effects, outliers left out
-  double left = 0.0;                  ///< with the explanation
-  Eigen::Index dof = 0;               ///< of `left`
-  double noise = 0.0;                 ///< standard deviation of one component: sqrt(left / dof)
-  LackOfFit lack_of_fit;
-  std::vector<Sensitivity> sensitivity;  ///< one for each candidate
-  Eigen::VectorXd remaining;             ///< n d: residuals that the explanation leaves, zero at outliers
-};
 
 /// Searches for the set of candidates that explains the residuals, in this order:
 ///

@@ -3,128 +3,30 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <cstdint>
-#include <functional>
 #include <string>
 #include <vector>
 
 #include "llmt/abi.hpp"
-#include "llmt/discovery/least_squares.hpp"
+#include "llmt/discovery/missing.hpp"
 #include "llmt/discovery/search.hpp"
 #include "llmt/discovery/terms.hpp"
 
 namespace llmt::discovery {
 
-/// A simulation with parameters that it may adjust (those that are free) before anything counts as missing.
-struct Simulation {
-  std::vector<Parameter> parameters = {};
-  /// inputs (n x p), values of all parameters -> n x d outputs.
-  std::function<Eigen::MatrixXd(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& values)> predict;
-};
-
-/// A simulation that is known only as a table of its outputs (n x d), for the rows that were measured. `offset` and
-/// `scale` let it adjust  output = offset + scale * table  for each output; else it is as it is.
+/// A simulation that is known only as a table of its outputs (n x d) at the measured rows. With `offset` or `scale` it
+/// may adjust  output = offset + scale * table  for each output; without them it is fixed.
 Simulation tabulated(const Eigen::MatrixXd& simulated, const std::vector<std::string>& outputs, bool offset = false,
                      bool scale = false);
 
-struct MeasuredOutputs {
-  std::vector<std::string> names;  ///< d
-  Eigen::MatrixXd values;          ///< n x d, beside Inputs::values
-};
-
-struct MissingOptions {
-  double held_out_share = 0.2;  ///< of the rows, set aside before anything is looked at; equal inputs keep together
-  std::uint64_t seed = 1;       ///< of the rows set aside
-  int rounds = 4;               ///< of search and nonlinear refit
-  Eigen::Index largest_sample = 4000;           ///< rows that are searched and fitted; of more a random part
-  SearchOptions search = {.model_error = 0.0};  ///< formulas of terms are meant as they stand
-};
-
-struct TermValue {
-  std::string name;
-  std::string unit;
-  double value = 0.0;
-  /// NaN where the samples do not determine the value. For a constant that is not smooth, such as a threshold: the
-  /// distance to the next value tried at which the sum of squares is larger by more than the variance of the noise.
-  double standard_error = 0.0;
-};
-
-struct RivalTerms {
-  std::string what;    ///< "cube a", joined by " + " where it takes several
-  bool exact = false;  ///< the same at every row: these rows cannot distinguish them
-};
-
-/// A term that is missing.
-struct FoundTerm {
-  std::size_t term = 0;  ///< of the terms given
-  std::string family;
-  std::string location;
-  std::string output;
-  std::string formula;
-  std::vector<std::string> inputs;  ///< ModelTerm::inputs
-  bool generic = false;             ///< a shape, not a cause
-  bool confirmed = false;  ///< see Finding::confirmed; and no structure is left, and it is not one of many of an input
-  Eigen::Index output_index = 0;
-  Eigen::VectorXd coefficients;
-  Eigen::VectorXd constants;
-  std::vector<TermValue> values;  ///< coefficients, then constants
-  std::vector<RivalTerms> rivals;
-  double share = 0.0;  ///< of the explained sum of squares that goes with it alone
-};
-
-/// Root mean square errors of one output on the rows that were set aside (NaN if there are none).
-struct Gap {
-  std::string output;
-  double before = 0.0;       ///< the simulation, its own parameters adjusted
-  double after = 0.0;        ///< with the terms found
-  double noise_floor = 0.0;  ///< of the noise, from repeats where there are enough, else from what is left
-};
-
-/// A part of the gap that is not noise and that no term explains: rows that are neighbours in some inputs deviate
-/// alike.
-struct Structure {
-  std::string output;
-  std::vector<std::string> inputs;  ///< that the most significant neighbourhood was taken in
-  double p_value = 1.0;             ///< of that in noise, corrected for the neighbourhoods tried
-  double share = 0.0;  ///< of the gap that can be explained (by the terms found, or as common to neighbours)
-};
-
-/// The smallest amplitude of a term that would have been found, 90 % of the time.
-struct VisibleTerm {
-  std::string what;
-  double coefficient = 0.0;
-  double rms = 0.0;  ///< of the change of the output that it makes
-};
-
-/// Outcome of find_missing().
-struct Missing {
-  /// As Verdict::answer; but unknown if material structure is left although nothing was found.
-  Answer answer = Answer::nothing_missing;
-  Verdict verdict;  ///< of the last search; candidates in it are numbers of `candidates`, samples those of `searched`
-  std::vector<std::string> candidates;
-  std::vector<FoundTerm> found;        ///< by falling share; shapes last
-  std::vector<Parameter> parameters;   ///< of the simulation, fitted together with the terms
-  Eigen::VectorXd standard_errors;     ///< of those
-  std::vector<Gap> gaps;               ///< d
-  Eigen::MatrixXd before;              ///< n x d: the simulation, its own parameters adjusted
-  Eigen::MatrixXd corrected;           ///< n x d: with the terms found
-  std::vector<Eigen::Index> searched;  ///< rows
-  std::vector<Eigen::Index> held_out;  ///< rows
-  std::vector<Eigen::Index> outliers;  ///< rows that fit nothing and were left out of the fit
-  std::vector<UntestableCause> not_testable;
-  std::vector<VisibleTerm> visible;  ///< of the causes that were tried, most visible first
-  bool floor_from_repeats = false;
-  std::vector<Structure> structure;  ///< material; terms found beside it are not confirmed
-  std::vector<std::string> notes;    ///< in sentences
-  int rounds = 0;
-};
-
 /// Finds which of the terms the simulation lacks, and how large they are.
 ///
-/// Some rows are set aside. On the others: adjust the simulation's own parameters; search() the residuals, with
-/// constants of terms tried on what is left at the present estimates; fit parameters, coefficients and smooth constants
-/// of what was found together (solve()); linearise there and search again, where what was found competes anew, until
-/// the found set stays the same. Outputs count by the inverse of what is left of each. Then, once, the rows set aside.
+/// 1. A share of the rows is set aside. Steps 2 to 5 use the other rows.
+/// 2. The free parameters of the simulation are fitted.
+/// 3. search() explains the residuals; constants of terms are tried at the present estimates.
+/// 4. Parameters, coefficients and smooth constants of what was found are fitted together (solve()).
+/// 5. Steps 3 and 4 are repeated at the new estimates, where what was found competes again, until the found set stays
+///    the same. Of several outputs, each is weighted by the inverse of the scatter that is left of it.
+/// 6. The errors on the rows set aside are computed, once.
 ///
 /// Throws std::invalid_argument for wrong shapes, names or options, values that are not finite, too few rows, and a
 /// prediction or a term that has the wrong shape or is not finite, naming it.

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "llmt/discovery/least_squares.hpp"
+#include "llmt/discovery/problem.hpp"
 
 namespace llmt::discovery {
 

@@ -90,8 +90,7 @@ Eigen::VectorXd Solver::weighted(const Eigen::VectorXd& residuals, const Eigen::
   for (std::size_t i = 0; i < prior_.size(); ++i) {
     const Eigen::Index k = free_[prior_[i]];
     const Parameter& parameter = problem_.parameters[k];
-    rows(n + static_cast<Eigen::Index>(i)) =
-        (values(k) - parameter.prior_value.value_or(parameter.value)) / *parameter.prior_sigma;
+    rows(n + i) = (values(k) - parameter.prior_value.value_or(parameter.value)) / *parameter.prior_sigma;
   }
   return rows;
 }
@@ -124,7 +123,7 @@ Linearisation Solver::linearise_here() {
   for (std::size_t i = 0; i < prior_.size(); ++i) {
     const Eigen::Index column = prior_[i];
     const Eigen::Index k = free_[column];
-    matrix(n + static_cast<Eigen::Index>(i), column) = scales_(column) / *problem_.parameters[k].prior_sigma;
+    matrix(n + i, column) = scales_(column) / *problem_.parameters[k].prior_sigma;
   }
   return linearise(matrix, weighted_, options_.rank_tolerance);
 }
@@ -159,8 +158,7 @@ bool Solver::finished_at(const Linearisation& linear) {
 bool Solver::try_step(const Eigen::VectorXd& scaled_step) {
   Eigen::VectorXd values = values_;
   for (std::size_t i = 0; i < free_.size(); ++i) {
-    const auto column = static_cast<Eigen::Index>(i);
-    values(free_[i]) += scales_(column) * scaled_step(column);
+    values(free_[i]) += scales_(i) * scaled_step(i);
   }
   ++result_.iterations;
   Eigen::VectorXd residuals = residuals_at(values);
@@ -228,10 +226,8 @@ void Solver::describe_uncertainty(const Linearisation& linear) {
   const Eigen::VectorXd null_share = linear.directions.rightCols(scales_.size() - rank).rowwise().norm();
   for (std::size_t i = 0; i < free_.size(); ++i) {
     for (std::size_t j = 0; j < free_.size(); ++j) {
-      const auto a = static_cast<Eigen::Index>(i);
-      const auto b = static_cast<Eigen::Index>(j);
-      const bool known = null_share(a) < null_entry_tolerance && null_share(b) < null_entry_tolerance;
-      result_.covariance(free_[i], free_[j]) = known ? covariance(a, b) : std::numeric_limits<double>::quiet_NaN();
+      const bool known = null_share(i) < null_entry_tolerance && null_share(j) < null_entry_tolerance;
+      result_.covariance(free_[i], free_[j]) = known ? covariance(i, j) : std::numeric_limits<double>::quiet_NaN();
     }
   }
 }
@@ -283,9 +279,7 @@ std::string Combination::names() const {
 
 const Parameter& SolverResult::parameter(const std::string& name) const { return parameters[index_of(*this, name)]; }
 
-double SolverResult::standard_error(const std::string& name) const {
-  return standard_errors(static_cast<Eigen::Index>(index_of(*this, name)));
-}
+double SolverResult::standard_error(const std::string& name) const { return standard_errors(index_of(*this, name)); }
 
 SolverResult solve(const LeastSquaresProblem& problem, const SolverOptions& options) {
   return Solver(problem, options).run();

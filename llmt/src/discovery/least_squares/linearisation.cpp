@@ -75,7 +75,7 @@ std::vector<Combination> null_combinations(const Linearisation& linear, const st
       rows.row(other) -= factor * rows.row(i);
     }
   }
-  std::vector<Combination> combinations(static_cast<std::size_t>(count));
+  std::vector<Combination> combinations(count);
   for (Eigen::Index i = 0; i < count; ++i) {
     const double largest = rows.row(i).cwiseAbs().maxCoeff();
     for (Eigen::Index j = 0; j < k; ++j) {

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "llmt/discovery/least_squares.hpp"
+#include "llmt/discovery/problem.hpp"
 
 namespace llmt::discovery {
 

@@ -35,7 +35,7 @@ class Scoring {
   /// family twice at a location, or has values beyond their limits.
   double score(const Set& set) const;
 
-  /// What the set costs whatever it explains.
+  /// The part of the score that does not depend on how much the set explains.
   double cost(const Set& set) const;
   double outlier_cost() const;
   /// N ln(left / (N - k)) of an explanation with k directions; impossible where k leaves too little freedom to judge.
@@ -43,7 +43,7 @@ class Scoring {
 
   bool usable(std::size_t candidate) const { return workspace_->blocks()[candidate].size > 0; }
 
-  /// A set and its score, as far as it is known without looking at limits.
+  /// A candidate to add and the score with it; limits of values are not checked.
   struct Move {
     std::size_t candidate;
     double score;

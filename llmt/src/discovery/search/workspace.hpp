@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "llmt/discovery/search.hpp"
+#include "llmt/discovery/verdict.hpp"
 
 namespace llmt::discovery {
 
@@ -21,7 +21,7 @@ class Workspace {
  public:
   Workspace(const Evidence& evidence, const std::vector<EffectCandidate>& candidates, double absorbed_tolerance);
 
-  /// Leaves samples out, as free shifts of their means: each takes d more directions away.
+  /// Leaves samples out by projecting out a free shift of each: d more directions per sample.
   void drop(const std::vector<std::size_t>& samples);
 
   const std::vector<Block>& blocks() const { return blocks_; }
@@ -40,7 +40,7 @@ class Workspace {
   double resolution() const { return resolution_; }
   /// Sum of squares of the residuals as given, before the baseline is adjusted: rounding errors are relative to it.
   double given_sum_of_squares() const { return given_sum_of_squares_; }
-  /// v without its part in the baseline's range, for every column.
+  /// Subtracts from every column its part in the range of the baseline.
   void project(Eigen::Ref<Eigen::MatrixXd> columns) const;
 
  private:

@@ -22,10 +22,10 @@ void describe_findings(const TermModel& model, const Progress& progress, Missing
 /// Missing::visible and not_testable.
 void describe_limits(const Progress& progress, const FitData& data, Missing& missing);
 
-/// Many terms of one input approximate something else, however well they fit: they are not confirmed.
+/// Three or more kinds of terms of one input may only approximate another function: they are not confirmed.
 void doubt_approximations(Missing& missing);
 
-/// Missing::structure and answer. What neighbours have in common is not noise.
+/// Missing::structure and answer. Deviations that neighbouring rows share are not noise.
 void look_for_structure(const TermModel& model, const FitData& data, const Inputs& inputs, Missing& missing);
 
 }  // namespace llmt::discovery

@@ -22,7 +22,7 @@ struct Pairing {
 };
 
 Pairing along(const Eigen::VectorXd& input, const Eigen::VectorXd& errors) {
-  std::vector<Eigen::Index> order(static_cast<std::size_t>(input.size()));
+  std::vector<Eigen::Index> order(input.size());
   std::iota(order.begin(), order.end(), 0);
   std::ranges::stable_sort(order, {}, [&](Eigen::Index i) { return input(i); });
   Pairing pairing;
@@ -33,7 +33,7 @@ Pairing along(const Eigen::VectorXd& input, const Eigen::VectorXd& errors) {
 // Nearest neighbours; `inputs` scaled to equal spread.
 Pairing nearest(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& errors) {
   const Eigen::Index n = inputs.rows();
-  std::vector<Eigen::Index> neighbour(static_cast<std::size_t>(n), 0);
+  std::vector<Eigen::Index> neighbour(n, 0);
   const Eigen::MatrixXd points = inputs.transpose();
   for (Eigen::Index i = 0; i < n; ++i) {
     double least = std::numeric_limits<double>::infinity();

@@ -1,7 +1,7 @@
 // How the library's terms are put together.
 #pragma once
 
-#include "llmt/discovery/terms.hpp"
+#include "llmt/discovery/model_term.hpp"
 
 namespace llmt::discovery {
 

@@ -7,6 +7,9 @@
 #include <limits>
 #include <stdexcept>
 
+#include "llmt/discovery/least_squares.hpp"
+#include "llmt/discovery/terms.hpp"
+
 namespace llmt::discovery {
 namespace {
 

@@ -3,7 +3,8 @@
 
 #include <vector>
 
-#include "llmt/discovery/simulation.hpp"
+#include "llmt/discovery/missing.hpp"
+#include "llmt/discovery/model_term.hpp"
 
 namespace llmt::discovery {
 
@@ -16,7 +17,7 @@ struct PlacedTerm {
   double prior_cost = 0.0;
 };
 
-/// Everything stays on all rows, rows set aside included: terms may look at the inputs of the row before.
+/// Evaluates on all rows, those set aside included, because terms may depend on the inputs of the row before.
 class TermModel {
  public:
   TermModel(const Simulation& simulation, const Inputs& inputs, std::vector<std::string> outputs,
@@ -92,8 +93,8 @@ std::vector<PlacedTerm> best_constants(const TermModel& model, const FitData& da
                                        std::size_t term, Eigen::Index output, const Eigen::MatrixXd& simulated,
                                        const std::vector<PlacedTerm>& taken);
 
-/// How far a constant can be moved, to the next value tried beyond, before the sum of squares rises by more than the
-/// variance of what is left.
+/// Distance from a constant to the next value tried at which the sum of squares is larger by more than the variance of
+/// what is left.
 double trial_error(const TermModel& model, const FitData& data, const TrialGround& ground, const PlacedTerm& placed,
                    const Eigen::MatrixXd& simulated);
 

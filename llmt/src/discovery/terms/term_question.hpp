@@ -26,15 +26,16 @@ struct TermQuestion {
   std::vector<EffectCandidate> candidates;
 };
 
-/// The found terms compete anew, with what they explain added back. Constants of the others are tried on what is left;
-/// samples that are `outliers` do not count there.
+/// The question at the present estimates. The found terms compete again, with what they explain added back to the
+/// residuals. Constants of the other terms are tried on the residuals without the samples in `outliers`.
 TermQuestion ask(const TermModel& model, const FitData& data, const TermFit& fit,
                  const std::vector<Eigen::Index>& repeats, const std::vector<std::size_t>& outliers);
 
-/// Terms whose constants have a better value elsewhere now that everything else is fitted get it; true if there is one.
+/// Moves constants of terms to a better value, if there is one now that everything else is fitted. Returns whether any
+/// was moved.
 bool retry_constants(const TermModel& model, const FitData& data, TermFit& fit);
 
-/// Errors of constants that are not smooth, see trial_error().
+/// Sets the errors of constants that are not smooth, see trial_error().
 void set_trial_errors(const TermModel& model, const FitData& data, TermFit& fit);
 
 }  // namespace llmt::discovery

@@ -205,7 +205,7 @@ Rows rows_of(const Inputs& inputs, const Eigen::VectorXd& simulated) {
             .simulated = simulated,
             .sequence = {},
             .instants = Eigen::VectorXd::LinSpaced(n, 0.0, static_cast<double>(n - 1))};
-  rows.sequence.resize(static_cast<std::size_t>(n));
+  rows.sequence.resize(n);
   std::iota(rows.sequence.begin(), rows.sequence.end(), 0);
   if (inputs.order.empty()) return rows;
   rows.instants = inputs.values.col(order_column(inputs));

@@ -45,7 +45,7 @@ std::optional<StopReason> refusal(const GrowthData& data, const OpenLeaf& leaf, 
   if (is_exact(data, leaf, node)) return StopReason::exact_fit;
   if (best.input < 0) return best.tested > 0 ? StopReason::significance : StopReason::leaf_samples;
   const GrowthOptions& options = data.problem.options;
-  if (options.rule == GrowthRule::retis) return std::nullopt;
+  if (data.problem.criterion == SplitCriterion::smallest_rss) return std::nullopt;
   if (!data.is_significant(options.significance, leaf.weight, node.rank, leaf.rss, {best.rank_left, best.rank_right},
                            best.rss, best.tested)) {
     return StopReason::significance;
@@ -101,7 +101,7 @@ GrownPartition BestFirstTree::grow() {
   open_root();
   StopReason stop = split_leaves();
   gains_.resize(nodes_.size(), 0.0);
-  if (data_.problem.options.rule == GrowthRule::retis && prune_by_m_estimates()) stop = StopReason::pruning;
+  if (data_.problem.criterion == SplitCriterion::smallest_rss && prune_by_m_estimates()) stop = StopReason::pruning;
   for (Node& node : nodes_) {
     to_units_of_outputs(data_, node);
     node.missing_left = std::clamp(node.missing_left, 0.0, 1.0);
@@ -171,7 +171,7 @@ void BestFirstTree::enter(OpenLeaf leaf) {
   if (std::holds_alternative<BinnedLeaf>(leaf.data)) {
     ++search_.binned_nodes;
     search_.largest_excess = std::max(search_.largest_excess, leaf.rss > 0.0 ? leaf.excess / leaf.rss : 0.0);
-  } else if (data_.problem.options.rule != GrowthRule::ra) {
+  } else if (data_.problem.criterion != SplitCriterion::residual_signs) {
     ++search_.exact_nodes;
   }
   open_.wait(leaf);

@@ -47,7 +47,7 @@ std::vector<Side> sides_of(const GrowthData& data, const ExactLeaf& leaf, const 
     for (std::size_t k = 0; k < sides.size(); ++k) {
       if (levels[k] >= 0) sides[k] = split.level_side[levels[k]] < 0 ? Side::left : Side::right;
     }
-  } else if (data.problem.options.rule == GrowthRule::ra) {
+  } else if (data.problem.criterion == SplitCriterion::residual_signs) {
     for (std::size_t k = 0; k < sides.size(); ++k) {
       sides[k] = side_by_threshold(leaf.split_value(data, k, split.input), split.last_left);
     }

@@ -34,7 +34,7 @@ class ExactLeaves {
                    const Node& right) const;
 
  private:
-  bool by_residuals() const { return data_.problem.options.rule == GrowthRule::ra; }
+  bool by_residuals() const { return data_.problem.criterion == SplitCriterion::residual_signs; }
   std::vector<int> sorted_rows(const ExactLeaf& leaf, Eigen::Index split_input) const;
 
   const GrowthData& data_;

@@ -102,7 +102,7 @@ SplitCandidate compare_residuals(const GrowthData& data, const ExactLeaf& leaf, 
 SplitCandidate find_split(const GrowthData& data, const ExactLeaf& leaf, const NodeFit& fit, double rss) {
   if (leaf.inputs.rows() < 2 * data.problem.options.min_leaf_samples) return {};
   const SearchNode node{fit.features, data.output_weights, rss};
-  if (data.problem.options.rule == GrowthRule::ra) return compare_residuals(data, leaf, node, fit.rank);
+  if (data.problem.criterion == SplitCriterion::residual_signs) return compare_residuals(data, leaf, node, fit.rank);
   return compare_all_thresholds(data, leaf, node, fit.rank);
 }
 

@@ -12,7 +12,7 @@ constexpr Eigen::Index binned_rows = 200000;
 constexpr Eigen::Index exact_rows = 2000;
 
 bool is_searched_by_bins(const GrowthData& data) {
-  if (data.problem.options.rule == GrowthRule::ra) return false;
+  if (data.problem.criterion == SplitCriterion::residual_signs) return false;
   switch (data.problem.options.search) {
     case SplitSearch::exact:
       return false;
@@ -25,7 +25,7 @@ bool is_searched_by_bins(const GrowthData& data) {
 }
 
 bool is_searched_by_residuals(const GrowthData& data) {
-  return data.problem.options.rule == GrowthRule::ra && data.training.count() >= exact_rows && is_complete(data);
+  return data.problem.criterion == SplitCriterion::residual_signs && data.training.count() >= exact_rows && is_complete(data);
 }
 
 }  // namespace

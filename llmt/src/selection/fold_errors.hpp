@@ -1,5 +1,5 @@
 /// \file
-/// Held-out errors as the user sees them.
+/// From sums of squared held-out errors to RMSE and its spread over the folds.
 #pragma once
 
 #include <Eigen/Core>
@@ -7,16 +7,17 @@
 #include <numeric>
 #include <vector>
 
+#include "numerics/paired_difference.hpp"
 #include "selection/candidates.hpp"
 
 namespace llmt {
 
 inline double sum_of(const std::vector<double>& values) { return std::accumulate(values.begin(), values.end(), 0.0); }
 
-/// Errors of candidates with the measures that the user sees.
-class Judge {
+/// Makes CandidateError from the sums of weighted squared errors of the folds.
+class FoldErrors {
  public:
-  Judge(const std::vector<FoldRows>& folds, Eigen::Index outputs) {
+  FoldErrors(const std::vector<FoldRows>& folds, Eigen::Index outputs) {
     for (const FoldRows& fold : folds) {
       weights_.push_back(total_weight(fold.held_out) * static_cast<double>(outputs));
     }
@@ -28,10 +29,7 @@ class Judge {
     for (std::size_t f = 0; f < errors.size(); ++f) {
       result.fold_rmse(f) = std::sqrt(errors[f] / weights_[f]);
     }
-    if (errors.size() > 1) {
-      result.spread = std::sqrt((result.fold_rmse.array() - result.fold_rmse.mean()).square().sum() /
-                                static_cast<double>(errors.size() - 1));
-    }
+    result.spread = spread_of(result.fold_rmse);
     return result;
   }
 

@@ -1,27 +1,38 @@
 /// \file
-/// Where the leaves of a partition reach, and their guarded local models: what ordered splits are made from.
+/// Where the leaves of a partition have validity, and their guarded local models: what the conditions between leaves
+/// are made from.
 #pragma once
 
+#include <Eigen/Core>
 #include <vector>
 
-#include "constraints/ordered_splits.hpp"
+#include "data/dataset.hpp"
 
 namespace llmt {
 
-class OrderedSplits::Geometry {
+/// A leaf's guarded part of one regressor, eq. (B.2) of docs/algorithms/guards.md, as a function of the leaf's own
+/// slope: slope x deviation + rest.
+struct ClampedDeviation {
+  double deviation = 0.0;  ///< clamped to the range of the leaf
+  double rest = 0.0;       ///< what the slopes of the ancestors add beyond it
+};
+
+/// The geometry of a partition for one output. Partition and rows must live as long as this.
+class LeafGeometry {
  public:
-  Geometry(const Partition& partition, const TrainingRows& training, Eigen::Index output);
+  LeafGeometry(const Partition& partition, const TrainingRows& training, Eigen::Index output);
 
   const Node& node(int index) const { return partition_.nodes[index]; }
   int inputs() const { return static_cast<int>(std::ssize(training_.columns)); }
 
-  /// Of the monotone input that a node splits; 0: none.
+  /// The sign of the monotone input that a node splits; 0 if there is none.
   int sign(int node) const { return signs_[node]; }
   double half_width(int node) const;
 
   bool is_categorical(int input) const { return levels(input) > 0; }
   int levels(int input) const { return training_.table->num_levels[input]; }
   const std::vector<Eigen::Index>& regressors_of(int input) const { return regressors_[input]; }
+  /// The first regressor of an input; -1 if it has none.
   Eigen::Index regressor_of(int input) const {
     return regressors_of(input).empty() ? -1 : regressors_of(input).front();
   }
@@ -31,23 +42,22 @@ class OrderedSplits::Geometry {
   /// Values of a numeric input between which a node may have validity; open ends.
   double low(int input, int node) const { return low_(input, node); }
   double high(int input, int node) const { return high_(input, node); }
-  /// Whether a row with this level, or without a value, of an input may reach a node.
-  bool reaches(int node, int input, int level) const {
-    const std::vector<char>& reached = levels_[input][node];
-    return reached[level] != 0;
-  }
+  /// Whether a row with this level of a categorical input may reach a node.
+  bool reaches(int node, int input, int level) const { return levels_[input][node][level] != 0; }
+  /// Whether a row without a value of an input may reach a node.
   bool reaches_missing(int node, int input) const { return missing_(input, node) != 0; }
 
-  /// Whether two leaves count at the same point for some value of each input, but for one input.
-  bool meet(int left, int right, int but) const;
+  /// Whether there are values of all inputs but `except` at which both leaves have validity.
+  bool meet(int left, int right, int except) const;
 
-  /// One over the number of splits above a leaf whose transitions on the input reach into from ... to.
-  double share(int leaf, int input, double from, double to) const;
+  /// s_i of eq. (O.1), the part of a leaf's slope that one split may use: one over the number of splits above the leaf
+  /// whose transitions on the input overlap from ... to.
+  double slope_share(int leaf, int input, double from, double to) const;
 
-  /// A leaf's part of one regressor at a deviation.
-  Held held(int leaf, Eigen::Index regressor, double deviation) const;
+  /// A leaf's part of one regressor at a deviation, as LocalModels evaluates it.
+  ClampedDeviation clamped(int leaf, Eigen::Index regressor, double deviation) const;
 
-  /// Adds the deviations between low and high where this function has another formula before than behind.
+  /// Adds to `to` the deviations between low and high at which that function goes over from one parabola to the next.
   void add_kinks(int leaf, Eigen::Index regressor, double low, double high, std::vector<double>& to) const;
 
  private:
@@ -64,18 +74,5 @@ class OrderedSplits::Geometry {
   Eigen::MatrixXi missing_;
   std::vector<std::vector<std::vector<char>>> levels_;  // of each input and node; empty for numbers
 };
-
-/// Half width of a node's transition as it is evaluated: 0 where one over it is not finite.
-double half_width_of(const Node& node);
-
-/// Sign of the monotone input that a node splits; 0: none.
-int ordered_sign(const Node& node, const TrainingRows& training);
-
-/// Values of each input between which each node may have validity, inputs x nodes; infinite where open.
-struct Supports {
-  Eigen::MatrixXd low;
-  Eigen::MatrixXd high;
-};
-Supports supports_of(const Partition& partition, Eigen::Index inputs);
 
 }  // namespace llmt

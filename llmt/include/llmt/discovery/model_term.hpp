@@ -1,0 +1,58 @@
+/// \file
+/// A term that a simulation may lack, and the inputs that it is a function of.
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "llmt/abi.hpp"
+
+namespace llmt::discovery {
+
+/// What the columns of a term are computed from.
+struct Rows {
+  Eigen::MatrixXd inputs;              ///< n x p
+  Eigen::VectorXd simulated;           ///< n: the output that the term is to change, without any term
+  std::vector<Eigen::Index> sequence;  ///< n: the rows in the order in which they were taken
+  Eigen::VectorXd instants;            ///< n: when each row was taken, or its number
+};
+
+/// An unknown inside a term, such as a time constant: tried at all these values, the best of which competes.
+struct TermConstant {
+  std::string name;
+  std::string unit;
+  std::vector<double> tried;  ///< ascending, at least one
+  bool smooth = true;         ///< the term is differentiable by it: it is fitted with everything else afterwards
+  int kept = 1;               ///< number of the best values that compete
+  int most = 1;               ///< largest number of values used at once; more would approximate another function
+  /// Powers 0 ... `beyond` of the first input of ModelTerm::inputs are projected out before values are compared, so
+  /// that no value is preferred for a part that simpler terms explain.
+  int beyond = 0;
+};
+
+/// One candidate: output += columns(rows, constants) * coefficients.
+struct ModelTerm {
+  std::string family;                     ///< the cause, "square"; variants of one cause share it
+  std::string location;                   ///< where, "a"; a family is used at most once at a location
+  std::string formula;                    ///< for people: "a^2"
+  std::vector<std::string> inputs;        ///< what it depends on
+  std::vector<std::string> coefficients;  ///< k names
+  std::string per = {};  ///< a coefficient is in units of the output by this, "a^2"; empty: in those of the output
+  std::function<Eigen::MatrixXd(const Rows& rows, const Eigen::VectorXd& constants)> columns;  ///< n x k
+  std::vector<TermConstant> constants = {};                                                    ///< at most one
+  std::string output = {};     ///< the output it changes; empty: each output is a place of its own
+  bool generic = false;        ///< not a cause but a shape: what it explains is "unknown, depends on `inputs`"
+  Eigen::VectorXd lower = {};  ///< k plausible limits of the coefficients, or empty: none
+  Eigen::VectorXd upper = {};
+};
+
+/// Inputs that terms are made of.
+struct Inputs {
+  std::vector<std::string> names;  ///< p
+  Eigen::MatrixXd values;          ///< n x p
+  std::string order = {};          ///< the input that says in which order rows were taken; empty: as they stand
+};
+
+}  // namespace llmt::discovery

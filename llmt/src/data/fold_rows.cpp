@@ -1,0 +1,38 @@
+#include "data/fold_rows.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <stdexcept>
+
+namespace llmt {
+
+std::vector<Fold> selection_folds(Eigen::Index rows, FoldOptions options) {
+  if (options.count == 0) return {};
+  if (options.count < 2) {
+    throw std::invalid_argument(fmt::format("llmt::fit: folds.count is {}, it must be 0 or at least 2", options.count));
+  }
+  std::vector<double> distinct(options.groups.begin(), options.groups.end());
+  std::ranges::sort(distinct);
+  distinct.erase(std::unique(distinct.begin(), distinct.end()), distinct.end());
+  const Eigen::Index groups = options.groups.empty() ? rows : std::ssize(distinct);
+  options.count = static_cast<int>(std::min<Eigen::Index>(options.count, groups));
+  if (options.count < 2) return {};
+  std::vector<Fold> folds = make_folds(rows, options);
+  if (rows >= single_hold_out_rows) {
+    folds.resize(1);
+  }
+  return folds;
+}
+
+std::vector<FoldRows> deal(const Table& table, const FoldOptions& options, int max_threads) {
+  std::vector<FoldRows> folds;
+  for (const Fold& fold : selection_folds(table.inputs.rows(), options)) {
+    TrainingRows training = training_rows(table, {fold.train.begin(), fold.train.end()}, max_threads);
+    TrainingRows held_out = query_rows(table, {fold.held_out.begin(), fold.held_out.end()}, training);
+    folds.push_back({std::move(training), std::move(held_out)});
+  }
+  return folds;
+}
+
+}  // namespace llmt

@@ -1,0 +1,22 @@
+/// \file
+/// Squared errors of partitions on rows.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "data/dataset.hpp"
+
+namespace llmt {
+
+/// Sums of the weighted squared errors, over some rows, of the prefixes of `partition` with 1, 2, ..., num_leaves
+/// leaves, crisp and with the models that the nodes have. `weights`: of the outputs' squared errors.
+Eigen::VectorXd prefix_squared_errors(const Partition& partition, const TrainingRows& rows,
+                                      const Eigen::VectorXd& weights, int max_threads);
+
+/// Sum of the weighted squared errors over rows that were fetched before, for callers that use the same rows many
+/// times. `columns`: what the rows were fetched from.
+double squared_error(const Partition& partition, const TrainingRows& columns, const std::vector<Chunk>& rows,
+                     const Eigen::VectorXd& weights);
+
+}  // namespace llmt

@@ -1,0 +1,232 @@
+#include "fit/fit_terms.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <mutex>
+#include <numeric>
+#include <optional>
+
+#include "base/parallel.hpp"
+#include "fit/grow_tree.hpp"
+#include "selection/selection.hpp"
+
+namespace llmt {
+namespace {
+
+// What all stages of a fit read.
+struct Setting {
+  const TrainingRows& all;
+  const std::vector<FoldRows>& folds;
+  const Plan& plan;
+  const FitOptions& options;
+};
+
+// Calls FitOptions::progress, one call at a time.
+class Report {
+ public:
+  Report(const FitOptions& options, Eigen::Index trees) : options_(options), trees_(trees) {}
+
+  void tree_done() {
+    if (!options_.progress) return;
+    const std::lock_guard<std::mutex> lock(mutex_);
+    options_.progress(++done_, trees_);
+  }
+
+ private:
+  const FitOptions& options_;
+  Eigen::Index trees_;
+  Eigen::Index done_ = 0;
+  std::mutex mutex_;
+};
+
+// The outputs that each partition serves.
+std::vector<std::vector<int>> output_groups(Eigen::Index outputs, bool shared) {
+  std::vector<int> all(outputs);
+  std::iota(all.begin(), all.end(), 0);
+  if (shared) return {all};
+  std::vector<std::vector<int>> groups;
+  for (const int output : all) groups.push_back({output});
+  return groups;
+}
+
+// Weights of the outputs' squared errors: 1 for a single one; else 1 / variance, so that outputs of any scale count
+// alike.
+Eigen::VectorXd error_weights(const Table& table, const std::vector<int>& served) {
+  Eigen::VectorXd weights = Eigen::VectorXd::Ones(std::ssize(served));
+  for (std::size_t o = 0; o < served.size() && served.size() > 1; ++o) {
+    const auto output = table.outputs.col(served[o]).array();
+    const double variance = (output - output.mean()).square().mean();
+    weights(o) = variance > 0.0 ? 1.0 / variance : 1.0;
+  }
+  return weights;
+}
+
+std::vector<GrownTree> grow_folds(const Setting& setting, const std::vector<int>& served, Report& report) {
+  std::vector<GrownTree> trees(setting.folds.size());
+  const int threads = setting.options.max_threads;
+  parallel_for(std::ssize(trees), threads, [&](Eigen::Index f) {
+    trees[f] = grow_tree(setting.folds[f].training, served, setting.plan, false, threads).tree;
+    report.tree_done();
+  });
+  return trees;
+}
+
+// The first of all candidates, and all leaves.
+Selection first_candidate(const Candidates& candidates, Eigen::Index leaves) {
+  Candidate first{.shrinkage = candidates.shrinkages.front(), .sparse = candidates.sparse.front(), .leaves = leaves};
+  if (!candidates.widths.empty()) {
+    first.validity = {candidates.kind, candidates.widths.front()};
+    first.jump = candidates.jumps.front();
+    first.estimation = candidates.estimation;
+    first.ridge = candidates.ridges.empty() ? 0.0 : candidates.ridges.front();
+  }
+  Selection selection;
+  selection.chosen = {first, std::nan(""), std::nan("")};
+  return selection;
+}
+
+// The chosen candidate in every fold, for the intervals.
+std::vector<Partition> finish_folds(const Setting& setting, const std::vector<GrownTree>& trees, Selection& choice) {
+  if (!setting.options.intervals) return {};
+  if (!choice.made.empty()) return std::move(choice.made);
+  const int threads = setting.options.max_threads;
+  std::vector<std::optional<Partition>> made(trees.size());
+  parallel_for(std::ssize(trees), threads, [&](Eigen::Index f) {
+    Candidate of_fold = choice.chosen.candidate;
+    of_fold.leaves = std::min(of_fold.leaves, trees[f].partition.num_leaves());
+    made[f] = estimate(setting.folds[f].training, trees[f], of_fold, threads);
+  });
+  std::vector<Partition> partitions;
+  for (std::optional<Partition>& partition : made) partitions.push_back(std::move(*partition));
+  return partitions;
+}
+
+// What the leaves of a finished partition tell.
+PartitionSummary describe(const Partition& partition, const TrainingRows& rows, bool sparse) {
+  PartitionSummary summary;
+  summary.outputs = partition.outputs;
+  summary.leaves = partition.num_leaves();
+  Eigen::VectorXd rss = Eigen::VectorXd::Zero(std::ssize(partition.outputs));
+  for (const Node& node : partition.nodes) {
+    if (node.is_leaf()) {
+      rss += node.rss;
+      summary.rank_deficient_leaves += !sparse && node.rank < std::ssize(rows.regressors) + 1 ? 1 : 0;
+      summary.coefficients += 1 + (node.slope.row(0).array() != 0.0).count();
+    }
+  }
+  summary.train_rmse = (rss / total_weight(rows)).cwiseSqrt();
+  return summary;
+}
+
+// A partition of the model, and of the folds' models.
+struct FittedPartition {
+  Partition partition;
+  PartitionSummary summary;
+  std::vector<Partition> of_folds;
+};
+
+FittedPartition finish(const Setting& setting, const FinalTree& grown, Selection choice,
+                       std::vector<Partition> of_folds) {
+  const int threads = setting.options.max_threads;
+  const Eigen::Index grown_leaves = grown.tree.partition.num_leaves();
+  Candidate& candidate = choice.chosen.candidate;
+  const bool fewer = candidate.leaves < grown_leaves;
+  candidate.leaves = std::min(candidate.leaves, grown_leaves);
+  Partition partition = estimate(setting.all, grown.tree, candidate, threads);
+  describe_leaves(setting.all, partition, candidate.sparse, threads);
+  PartitionSummary summary = describe(partition, setting.all, candidate.sparse);
+  summary.grown_leaves = grown_leaves;
+  summary.stop = fewer ? StopReason::cross_validation : grown.stop;
+  summary.search = grown.search;
+  summary.chosen = std::move(choice.chosen);
+  summary.best_of_kind = std::move(choice.best_of_kind);
+  summary.crisp_cv_rmse = std::move(choice.crisp_rmse);
+  summary.cv_folds = std::ssize(setting.folds);
+  summary.held_out_rows = choice.held_out_rows;
+  return {std::move(partition), std::move(summary), std::move(of_folds)};
+}
+
+// Grow, choose, finish.
+FittedPartition fit_partition(const Setting& setting, const std::vector<int>& served, Report& report) {
+  const int threads = setting.options.max_threads;
+  const bool has_folds = !setting.folds.empty();
+  const std::vector<GrownTree> trees = grow_folds(setting, served, report);
+  Selection choice;
+  if (has_folds) {
+    const Eigen::VectorXd weights = error_weights(*setting.all.table, served);
+    choice = select(setting.folds, trees, setting.plan.candidates, weights, threads);
+  }
+  const FinalTree grown = grow_tree(setting.all, served, setting.plan, !has_folds, threads);
+  if (!has_folds) choice = first_candidate(setting.plan.candidates, grown.tree.partition.num_leaves());
+  std::vector<Partition> of_folds = finish_folds(setting, trees, choice);
+  FittedPartition fitted = finish(setting, grown, std::move(choice), std::move(of_folds));
+  report.tree_done();
+  return fitted;
+}
+
+// Model and held-out residuals of every fold.
+Intervals make_intervals(const Setting& setting, std::vector<FittedPartition>& fitted) {
+  std::vector<Model> models;
+  std::vector<Eigen::MatrixXd> residuals;
+  const Table& table = *setting.all.table;
+  for (std::size_t f = 0; f < fitted.front().of_folds.size(); ++f) {
+    const FoldRows& rows = setting.folds[f];
+    std::vector<Partition> partitions;
+    for (FittedPartition& each : fitted) partitions.push_back(std::move(each.of_folds[f]));
+    models.emplace_back(rows.training.columns, rows.training.output_columns, rows.training.regressors,
+                        std::move(partitions));
+    const std::vector<int>& held_out = rows.held_out.rows;
+    const Eigen::MatrixXd predicted =
+        models.back().predict(table.inputs(held_out, Eigen::all), setting.options.max_threads);
+    residuals.push_back((table.outputs(held_out, Eigen::all) - predicted).cwiseAbs());
+  }
+  return Intervals(std::move(models), std::move(residuals));
+}
+
+FitResult assemble(const Setting& setting, std::vector<FittedPartition> fitted) {
+  const Table& table = *setting.all.table;
+  FitSummary summary{.samples = setting.all.count(),
+                     .missing_values = table.inputs.array().isNaN().count(),
+                     .min_leaf_samples = setting.plan.growth.min_leaf_samples,
+                     .partitions = {},
+                     .quadratic = !table.products.empty()};
+  Intervals intervals = make_intervals(setting, fitted);
+  std::vector<Partition> partitions;
+  for (FittedPartition& each : fitted) {
+    summary.partitions.push_back(std::move(each.summary));
+    partitions.push_back(std::move(each.partition));
+  }
+  return {Model(setting.all.columns, setting.all.output_columns, setting.all.regressors, std::move(partitions)),
+          std::move(summary), std::move(intervals)};
+}
+
+std::vector<int> all_rows(Eigen::Index count) {
+  std::vector<int> rows(count);
+  std::iota(rows.begin(), rows.end(), 0);
+  return rows;
+}
+
+}  // namespace
+
+FitResult fit_terms(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<const Eigen::MatrixXd>& outputs,
+                    const FitOptions& options) {
+  const FitData data(inputs, outputs, options, rule_of(options.rule).splits_on_monotone_inputs);
+  const Table& table = data.table();
+  const TrainingRows all = training_rows(table, all_rows(table.inputs.rows()), options.max_threads);
+  const std::vector<FoldRows> folds = deal(table, data.folds(), options.max_threads);
+  const Plan plan = with_defaults(options, all, std::ssize(folds));
+  const Setting setting{all, folds, plan, options};
+  const std::vector<std::vector<int>> groups = output_groups(table.outputs.cols(), options.shared_partition);
+  Report report(options, std::ssize(groups) * (std::ssize(folds) + 1));
+  std::vector<std::optional<FittedPartition>> fitted(groups.size());
+  // With a single hold-out rows are many, and one tree has work for all threads: several at a time would only hold more
+  // rows in memory.
+  const int groups_at_once = folds.size() == 1 ? 1 : options.max_threads;
+  parallel_for(std::ssize(groups), groups_at_once,
+               [&](Eigen::Index p) { fitted[p] = fit_partition(setting, groups[p], report); });
+  std::vector<FittedPartition> finished;
+  for (std::optional<FittedPartition>& each : fitted) finished.push_back(std::move(*each));
+  return assemble(setting, std::move(finished));
+}
+
+}  // namespace llmt

@@ -1,0 +1,18 @@
+/// \file
+/// Held-out errors of least squares and of crisp trees of every size.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "selection/fold_errors.hpp"
+
+namespace llmt {
+
+/// Fills in Selection::crisp_rmse, and as best_of_kind and chosen least squares and the best crisp tree. `weights`: of
+/// the outputs' squared errors.
+void compare_crisp(const std::vector<FoldRows>& folds, const std::vector<GrownTree>& grown,
+                   const Candidates& candidates, const Eigen::VectorXd& weights, int max_threads,
+                   const FoldErrors& error_of_folds, Selection& selection);
+
+}  // namespace llmt
