@@ -25,7 +25,8 @@ bool is_searched_by_bins(const GrowthData& data) {
 }
 
 bool is_searched_by_residuals(const GrowthData& data) {
-  return data.problem.criterion == SplitCriterion::residual_signs && data.training.count() >= exact_rows && is_complete(data);
+  return data.problem.criterion == SplitCriterion::residual_signs && data.training.count() >= exact_rows &&
+         is_complete(data);
 }
 
 }  // namespace
