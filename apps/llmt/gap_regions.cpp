@@ -34,21 +34,12 @@ std::vector<GapRegion> gap_regions(const discovery::Inputs& inputs, const discov
   FitOptions options;
   options.folds.count = 0;
   options.intervals = false;
-<<<<<<< HEAD
-  options.validity = ValidityChoice::crisp;
-  options.max_leaves = 5;
-  options.significance = 0.01;
-  options.min_leaf_samples = std::max<std::ptrdiff_t>(5, std::ssize(rows) / 20);
-  for (int j = 0; j < p; ++j) options.split_inputs.push_back(j);
-  options.regression_inputs = {static_cast<int>(p)};
-=======
   options.validity = ValidityChoice::crisp;
   options.max_leaves = 5;
   options.significance = 0.01;
   options.min_leaf_samples = std::max<Eigen::Index>(5, std::ssize(rows) / 20);
   for (int j = 0; j < p; ++j) options.split_inputs.push_back(j);
   options.regression_inputs = {static_cast<int>(p)};
->>>>>>> main
   std::vector<GapRegion> regions;
   for (std::size_t o = 0; o < measured.names.size(); ++o) {
     const auto column = static_cast<Eigen::Index>(o);

@@ -147,22 +147,6 @@ void study_arm(const PlanarData& data, const CalibratedPlane& calibrated, std::u
   };
   correct("corrected, the paper's leaf counts", {grown_to(93), grown_to(75)}, TotalError{0.0157, 0.131});
   FitOptions until_two_percent = grown_to(0);
-<<<<<<< HEAD
-  until_two_percent.expert.min_improvement = 0.02;
-  correct("corrected, stopped at 2 %", {until_two_percent, until_two_percent}, std::nullopt);
-  FitOptions cross_validated = grown_to(0);
-  cross_validated.folds = {.count = 5, .seed = seed};
-  correct("corrected, leaves by 5-fold CV", {cross_validated, cross_validated}, std::nullopt);
-  correct("Gaussians, narrow, as grown", {gaussian_as_grown(93, 1.0 / 3.0), gaussian_as_grown(75, 1.0 / 3.0)},
-          std::nullopt);
-  correct("Gaussians, wide, as grown", {gaussian_as_grown(93, 0.7), gaussian_as_grown(75, 0.7)}, std::nullopt);
-  correct("blend, the paper's leaf counts", {blended(93, seed), blended(75, seed)}, std::nullopt);
-  correct("blend, a third of the leaves", {blended(25, seed), blended(25, seed)}, std::nullopt);
-  correct("quadratic, half the leaves", {quadratic(grown_to(46)), quadratic(grown_to(37))}, std::nullopt);
-  correct("blend, quadratic, half the leaves", {quadratic(blended(46, seed)), quadratic(blended(37, seed))},
-          std::nullopt);
-  correct("blend, quadratic, 25 leaves", {quadratic(blended(25, seed)), quadratic(blended(25, seed))}, std::nullopt);
-=======
   until_two_percent.expert.min_improvement = 0.02;
   correct("corrected, stopped at 2 %", {until_two_percent, until_two_percent});
   FitOptions cross_validated = grown_to(0);
@@ -176,7 +160,6 @@ void study_arm(const PlanarData& data, const CalibratedPlane& calibrated, std::u
   correct("blend, quadratic, half the leaves", {quadratic(blended(46, seed)), quadratic(blended(37, seed))});
   correct("blend, quadratic, 25 leaves", {quadratic(blended(25, seed)), quadratic(blended(25, seed))});
 }
->>>>>>> main
 
 // Crisp and blended trees of the residual in x with noise.
 void study_noise(const PlanarData& data, const CalibratedPlane& calibrated, std::uint64_t seed, PlanarStudy& study) {
@@ -187,13 +170,8 @@ void study_noise(const PlanarData& data, const CalibratedPlane& calibrated, std:
   }
   const Eigen::VectorXd truth = (data.test_truth - calibrated.test).col(0);
   const auto noisy_error = [&](FitOptions options) {
-<<<<<<< HEAD
-    options.min_leaf_samples = 0;
-    return rmse(fit(train.joints, noisy, options).model.predict(test.joints), truth)(0);
-=======
     options.min_leaf_samples = 0;
     return rmse(fit(data.train.joints, noisy, options).model.predict(data.test.joints), truth)(0);
->>>>>>> main
   };
   FitOptions crisp = blended(93, seed);
   crisp.validity = ValidityChoice::crisp;
