@@ -9,9 +9,12 @@
 #include <vector>
 
 #include "llmt/fit.hpp"
+#include "oracles/messages.hpp"
 #include "oracles/oracles.hpp"
 
 namespace random_trees {
+
+using oracle::message_of;
 
 struct Kind {
   llmt::ValidityChoice validity;
@@ -67,15 +70,6 @@ inline Data data(std::uint64_t seed, Eigen::Index rows = 300, bool corners = fal
   Eigen::MatrixXd y(rows, 2);
   y << oracle::curved(x, 0.1, seed), affine(x);
   return {std::move(x), std::move(y)};
-}
-
-inline std::string message_of(const std::function<void()>& call) {
-  try {
-    call();
-  } catch (const std::invalid_argument& error) {
-    return error.what();
-  }
-  return "no std::invalid_argument";
 }
 
 }  // namespace random_trees

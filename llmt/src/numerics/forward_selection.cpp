@@ -7,7 +7,7 @@ namespace llmt {
 namespace {
 
 // A regressor is passed over if the chosen ones leave less than this part of its variance.
-constexpr double least_independence = 1e-8;
+constexpr double least_new_variance = 1e-8;
 
 // Gains that differ by less than this part of them are equal.
 constexpr double tie_tolerance = 1e-10;
@@ -16,7 +16,7 @@ constexpr double tie_tolerance = 1e-10;
 constexpr double least_spare_rows = 3.0;
 
 // A residual sum of squares below this part of that about the mean is rounding.
-constexpr double rounding = 1e-13;
+constexpr double rounding_of_squares = 1e-13;
 
 // The search ends when ten further regressors have not lowered AICc.
 constexpr int steps_without_gain = 10;
@@ -34,7 +34,7 @@ Eigen::Index best_of(const Remaining& remaining) {
   Eigen::Index best = -1;
   double most = 0.0;
   for (Eigen::Index k = 0; k < remaining.variance.size(); ++k) {
-    if (remaining.variance(k) > least_independence) {
+    if (remaining.variance(k) > least_new_variance) {
       const double gain = remaining.covariance.row(k).squaredNorm() / remaining.variance(k);
       if (gain > most * (1.0 + tie_tolerance)) {
         best = k;
@@ -60,7 +60,7 @@ void take(Eigen::Index k, const Eigen::MatrixXd& correlation, Eigen::Index step,
 double aicc(const Eigen::VectorXd& rss, double rows, double coefficients) {
   const double k = coefficients + 1.0;
   const double penalty = 2.0 * k + 2.0 * k * (k + 1.0) / (rows - k - 1.0);
-  return (rows * rss.array().max(rounding).log() + penalty).sum();
+  return (rows * rss.array().max(rounding_of_squares).log() + penalty).sum();
 }
 
 }  // namespace
@@ -76,12 +76,13 @@ std::vector<Eigen::Index> select_regressors(const LocalSums& sums, double rows_p
   Eigen::MatrixXd correlation = sums.gram.bottomRightCorner(regressors, regressors) - weight * mean * mean.transpose();
   // A column that is constant here has no variance; what the subtraction of its mean leaves is rounding.
   const Eigen::ArrayXd scale =
-      (correlation.diagonal().array() > rounding * sums.gram.diagonal().tail(regressors).array())
+      (correlation.diagonal().array() > rounding_of_squares * sums.gram.diagonal().tail(regressors).array())
           .select(correlation.diagonal().array().max(0.0).sqrt(), 0.0);
   const Eigen::ArrayXd inverse = (scale > 0.0).select(scale.inverse(), 0.0);
   correlation = inverse.matrix().asDiagonal() * correlation * inverse.matrix().asDiagonal();
   const Eigen::ArrayXd total = (sums.squares.array() - weight * mean_output.transpose().array().square()).max(0.0);
-  const Eigen::ArrayXd per_output = (total > rounding * sums.squares.array()).select(total.sqrt().inverse(), 0.0);
+  const Eigen::ArrayXd per_output =
+      (total > rounding_of_squares * sums.squares.array()).select(total.sqrt().inverse(), 0.0);
   Remaining remaining{.factor = Eigen::MatrixXd::Zero(regressors, regressors),
                       .variance = (scale > 0.0).select(Eigen::ArrayXd::Ones(regressors), 0.0),
                       .covariance = inverse.matrix().asDiagonal() *
@@ -93,7 +94,7 @@ std::vector<Eigen::Index> select_regressors(const LocalSums& sums, double rows_p
   double smallest = aicc(remaining.rss, rows, 1.0);
   // The next model has the constant, the chosen regressors and one more.
   const auto enough_rows = [&] { return rows - static_cast<double>(order.size()) > 2.0 + least_spare_rows; };
-  while (order.size() < best + steps_without_gain && enough_rows() && remaining.rss.maxCoeff() > rounding) {
+  while (order.size() < best + steps_without_gain && enough_rows() && remaining.rss.maxCoeff() > rounding_of_squares) {
     const Eigen::Index next = best_of(remaining);
     if (next < 0) break;
     take(next, correlation, std::ssize(order), remaining);

@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "discovery/terms/missing_findings.hpp"
+#include "discovery/terms/refuse.hpp"
 #include "discovery/terms/term_question.hpp"
 
 namespace llmt::discovery {
@@ -15,32 +16,29 @@ namespace {
 
 constexpr double unknown_number = std::numeric_limits<double>::quiet_NaN();
 
-[[noreturn]] void refuse(const std::string& message) {
-  throw std::invalid_argument("llmt::discovery::find_missing: " + message);
-}
-
 void check(const Simulation& simulation, const Inputs& inputs, const MeasuredOutputs& measured,
            const MissingOptions& options) {
   const Eigen::Index n = inputs.values.rows();
-  if (!simulation.predict) refuse("the simulation has no function predict");
+  if (!simulation.predict) refuse("find_missing", "the simulation has no function predict");
   if (measured.values.rows() != n) {
-    refuse(fmt::format("{} rows of measured outputs for {} rows of inputs", measured.values.rows(), n));
+    refuse("find_missing", fmt::format("{} rows of measured outputs for {} rows of inputs", measured.values.rows(), n));
   }
   if (measured.names.empty() || std::ssize(measured.names) != measured.values.cols()) {
-    refuse(fmt::format("{} names for {} measured outputs", measured.names.size(), measured.values.cols()));
+    refuse("find_missing",
+           fmt::format("{} names for {} measured outputs", measured.names.size(), measured.values.cols()));
   }
   for (Eigen::Index o = 0; o < measured.values.cols(); ++o) {
     if (!measured.values.col(o).allFinite()) {
-      refuse(fmt::format("a measured value of \"{}\" is not finite", measured.names[o]));
+      refuse("find_missing", fmt::format("a measured value of \"{}\" is not finite", measured.names[o]));
     }
   }
   if (!(options.held_out_share >= 0.0 && options.held_out_share <= 0.9)) {
-    refuse(fmt::format("held_out_share is {}, must be within 0 ... 0.9", options.held_out_share));
+    refuse("find_missing", fmt::format("held_out_share is {}, must be within 0 ... 0.9", options.held_out_share));
   }
-  if (options.rounds < 1) refuse(fmt::format("rounds is {}, must be at least 1", options.rounds));
+  if (options.rounds < 1) refuse("find_missing", fmt::format("rounds is {}, must be at least 1", options.rounds));
   constexpr Eigen::Index fewest = 50;
   if (options.largest_sample < fewest) {
-    refuse(fmt::format("largest_sample is {}, must be at least {}", options.largest_sample, fewest));
+    refuse("find_missing", fmt::format("largest_sample is {}, must be at least {}", options.largest_sample, fewest));
   }
 }
 
@@ -148,7 +146,8 @@ Missing find_missing(const Simulation& simulation, const Inputs& inputs, const M
   const auto free = std::ranges::count_if(simulation.parameters, &Parameter::free);
   constexpr Eigen::Index fewest = 10;
   if (std::ssize(data.rows) * d < fewest + 2 * free) {
-    refuse(fmt::format("{} rows to search beside {} set aside are too few: {} free parameters need {} measured values",
+    refuse("find_missing",
+           fmt::format("{} rows to search beside {} set aside are too few: {} free parameters need {} measured values",
                        data.rows.size(), split.held_out.size(), free, fewest + 2 * free));
   }
   Eigen::VectorXd start(std::ssize(simulation.parameters));

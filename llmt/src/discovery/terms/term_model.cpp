@@ -7,15 +7,12 @@
 #include <limits>
 #include <stdexcept>
 
+#include "discovery/terms/refuse.hpp"
 #include "llmt/discovery/least_squares.hpp"
 #include "llmt/discovery/terms.hpp"
 
 namespace llmt::discovery {
 namespace {
-
-[[noreturn]] void refuse(const std::string& message) {
-  throw std::invalid_argument("llmt::discovery::find_missing: " + message);
-}
 
 Eigen::Index first_bad_row(const Eigen::MatrixXd& values) {
   Eigen::Index row = 0;
@@ -102,8 +99,8 @@ TermModel::TermModel(const Simulation& simulation, const Inputs& inputs, std::ve
 Eigen::MatrixXd TermModel::evaluate(const Eigen::VectorXd& values) const {
   Eigen::MatrixXd simulated = simulation_->predict(inputs_->values, values);
   if (simulated.rows() != inputs_->values.rows() || simulated.cols() != std::ssize(outputs_)) {
-    refuse(fmt::format("the simulation gave {} x {} outputs, must be {} x {}", simulated.rows(), simulated.cols(),
-                       inputs_->values.rows(), outputs_.size()));
+    refuse("find_missing", fmt::format("the simulation gave {} x {} outputs, must be {} x {}", simulated.rows(),
+                                       simulated.cols(), inputs_->values.rows(), outputs_.size()));
   }
   return simulated;
 }
@@ -122,8 +119,8 @@ Eigen::MatrixXd TermModel::columns(const PlacedTerm& placed, const Eigen::Matrix
   rows_.simulated = simulated.col(placed.output);
   Eigen::MatrixXd columns = term.columns(rows_, placed.constants);
   if (columns.rows() != simulated.rows() || columns.cols() != std::ssize(term.coefficients)) {
-    refuse(fmt::format("the term {} gave {} x {} values, must be {} x {}", label(placed), columns.rows(),
-                       columns.cols(), simulated.rows(), term.coefficients.size()));
+    refuse("find_missing", fmt::format("the term {} gave {} x {} values, must be {} x {}", label(placed),
+                                       columns.rows(), columns.cols(), simulated.rows(), term.coefficients.size()));
   }
   return columns;
 }
@@ -137,7 +134,8 @@ Eigen::MatrixXd TermModel::predict(const Eigen::VectorXd& values, const std::vec
 
 Eigen::VectorXd TermModel::input(const std::string& name) const {
   const auto found = std::ranges::find(inputs_->names, name);
-  if (found == inputs_->names.end()) refuse(fmt::format("a term depends on \"{}\", which is not an input", name));
+  if (found == inputs_->names.end())
+    refuse("find_missing", fmt::format("a term depends on \"{}\", which is not an input", name));
   return inputs_->values.col(found - inputs_->names.begin());
 }
 
@@ -178,7 +176,8 @@ Eigen::MatrixXd stacked_signature(const TermModel& model, const FitData& data, c
                                   const Eigen::MatrixXd& simulated) {
   const Eigen::MatrixXd columns = model.columns(placed, simulated);
   const Eigen::Index bad = first_bad_row(columns);
-  if (bad < columns.rows()) refuse(fmt::format("the term {} is not finite at row {}", model.label(placed), bad + 1));
+  if (bad < columns.rows())
+    refuse("find_missing", fmt::format("the term {} is not finite at row {}", model.label(placed), bad + 1));
   const Eigen::Index d = data.measured.cols();
   Eigen::MatrixXd signature = Eigen::MatrixXd::Zero(data.measured.size(), columns.cols());
   for (Eigen::Index i = 0; i < data.measured.rows(); ++i) {
@@ -191,7 +190,7 @@ TermFit fit_terms(const TermModel& model, const FitData& data, const Eigen::Vect
                   const std::vector<PlacedTerm>& placed) {
   const Eigen::MatrixXd simulated = model.simulated(start);
   const Eigen::Index bad = first_bad_row(simulated);
-  if (bad < simulated.rows()) refuse(fmt::format("the simulation is not finite at row {}", bad + 1));
+  if (bad < simulated.rows()) refuse("find_missing", fmt::format("the simulation is not finite at row {}", bad + 1));
   for (const bool constants_are_free : {true, false}) {
     const Layout layout = layout_of(model, data, start, placed, constants_are_free);
     const auto own = static_cast<Eigen::Index>(layout.own);

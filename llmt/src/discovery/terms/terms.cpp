@@ -9,33 +9,31 @@
 #include <set>
 #include <stdexcept>
 
+#include "discovery/terms/refuse.hpp"
 #include "discovery/terms/term_builders.hpp"
 
 namespace llmt::discovery {
 namespace {
 
-[[noreturn]] void refuse(const std::string& message) {
-  throw std::invalid_argument("llmt::discovery::standard_terms: " + message);
-}
-
 Eigen::Index order_column(const Inputs& inputs) {
   const auto found = std::ranges::find(inputs.names, inputs.order);
-  if (found == inputs.names.end()) refuse(fmt::format("the order \"{}\" is not an input", inputs.order));
+  if (found == inputs.names.end())
+    refuse("standard_terms", fmt::format("the order \"{}\" is not an input", inputs.order));
   return found - inputs.names.begin();
 }
 
 void check(const Inputs& inputs) {
   if (std::ssize(inputs.names) != inputs.values.cols()) {
-    refuse(fmt::format("{} names for {} columns", inputs.names.size(), inputs.values.cols()));
+    refuse("standard_terms", fmt::format("{} names for {} columns", inputs.names.size(), inputs.values.cols()));
   }
   std::set<std::string> seen;
   for (const std::string& name : inputs.names) {
-    if (name.empty()) refuse("an input has no name");
-    if (!seen.insert(name).second) refuse(fmt::format("the input \"{}\" is there twice", name));
+    if (name.empty()) refuse("standard_terms", "an input has no name");
+    if (!seen.insert(name).second) refuse("standard_terms", fmt::format("the input \"{}\" is there twice", name));
   }
   for (Eigen::Index j = 0; j < inputs.values.cols(); ++j) {
     if (!inputs.values.col(j).allFinite()) {
-      refuse(fmt::format("the input \"{}\" has a value that is not finite", inputs.names[j]));
+      refuse("standard_terms", fmt::format("the input \"{}\" has a value that is not finite", inputs.names[j]));
     }
   }
 }
@@ -212,7 +210,8 @@ Rows rows_of(const Inputs& inputs, const Eigen::VectorXd& simulated) {
   std::ranges::stable_sort(rows.sequence, {}, [&](Eigen::Index i) { return rows.instants(i); });
   for (std::size_t k = 1; k < rows.sequence.size(); ++k) {
     if (rows.instants(rows.sequence[k]) == rows.instants(rows.sequence[k - 1])) {
-      refuse(fmt::format("the order \"{}\" has the value {} twice", inputs.order, rows.instants(rows.sequence[k])));
+      refuse("standard_terms",
+             fmt::format("the order \"{}\" has the value {} twice", inputs.order, rows.instants(rows.sequence[k])));
     }
   }
   return rows;

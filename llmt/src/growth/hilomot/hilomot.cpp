@@ -16,11 +16,7 @@ namespace llmt {
 namespace {
 
 // Rows with less validity than this take no part in growth below.
-constexpr double negligible = 1e-5;
-
-// AICc takes the logarithm of the error. An error below this, per output, is rounding; the outputs' sums of squares
-// are 1.
-constexpr double least_loss = 1e-24;
+constexpr double least_child_validity = 1e-5;
 
 // Least squares weighted with the leaf's validity, as a correction of the parent's model.
 Node local_model(const GrowthData& data, const HilomotInputs& inputs, const HilomotLeaf& leaf, const Node& parent) {
@@ -50,7 +46,7 @@ HilomotLeaf child_of(const HilomotLeaf& leaf, const Eigen::VectorXd& validity) {
   HilomotLeaf child;
   std::vector<double> kept;
   for (std::size_t i = 0; i < leaf.rows.size(); ++i) {
-    if (const double here = validity(i); here > negligible) {
+    if (const double here = validity(i); here > least_child_validity) {
       child.rows.push_back(leaf.rows[i]);
       kept.push_back(here);
     }

@@ -17,10 +17,7 @@ namespace llmt {
 namespace {
 
 // Rows with less validity than this take no part in a local estimate.
-constexpr double negligible = 1e-9;
-
-// An error below this, per output, is rounding; the outputs' sums of squares are 1.
-constexpr double least_loss = 1e-24;
+constexpr double least_local_validity = 1e-9;
 
 // A local model with its box.
 struct LocalModel {
@@ -56,7 +53,7 @@ Eigen::VectorXd squared_errors(const LolimotData& data, const WholeModel& whole)
 void fit(const LolimotData& data, const Node& parent, const Eigen::VectorXd& validity, LocalModel& model) {
   std::vector<int> rows;
   for (Eigen::Index i = 0; i < validity.size(); ++i) {
-    if (validity(i) > negligible) rows.push_back(static_cast<int>(i));
+    if (validity(i) > least_local_validity) rows.push_back(static_cast<int>(i));
   }
   const Eigen::MatrixXd x = data.deviations(rows, Eigen::all);
   const Eigen::MatrixXd residuals = (data.outputs(rows, Eigen::all) - x * parent.slope.transpose()).rowwise() -

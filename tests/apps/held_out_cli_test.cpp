@@ -1,0 +1,101 @@
+#include <fmt/format.h>
+
+#include <cmath>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "apps/program.hpp"
+#include "llmt/csv.hpp"
+#include "llmt/fit.hpp"
+#include "llmt/random.hpp"
+
+namespace {
+
+using nlohmann::json;
+using program::Folder;
+using program::Outcome;
+
+const std::string llmt_program = LLMT_PROGRAM;
+
+// `rows` rows: y = |a| + b / 2 + normal noise of 0.05.
+std::string kinked(int rows, int seed) {
+  llmt::Random random(seed);
+  std::string text = "a,b,y\n";
+  for (int i = 0; i < rows; ++i) {
+    const double a = random.uniform(-1.0, 1.0);
+    const double b = random.uniform(-1.0, 1.0);
+    text += fmt::format("{},{},{}\n", a, b, std::abs(a) + 0.5 * b + 0.05 * random.normal());
+  }
+  return text;
+}
+
+TEST(LlmtProgram, IntervalsHoldTheirLevelOnFreshRows) {
+  const Folder folder;
+  folder.write("d.csv", kinked(200, 1));
+  folder.write("fresh.csv", kinked(1000, 2));
+  ASSERT_EQ(folder.run(llmt_program + " fit d.csv -t y --cv 3 -o m.json").exit_code, 0);
+  const Outcome predicted = folder.run(llmt_program + " predict m.json fresh.csv --interval 0.9 -o p.csv");
+  ASSERT_EQ(predicted.exit_code, 0) << predicted.err;
+  const llmt::Csv result = llmt::Csv::read(folder.file("p.csv"));
+  EXPECT_EQ(result.columns(), (std::vector<std::string>{"a", "b", "y", "y_pred", "y_low", "y_high", "outside",
+                                                        "outside_by", "leverage"}));
+  const Eigen::ArrayXd y = result.numbers("y");
+  const Eigen::ArrayXd low = result.numbers("y_low");
+  const Eigen::ArrayXd high = result.numbers("y_high");
+  const double inside = static_cast<double>((low <= y && y <= high).count()) / 1000.0;
+  EXPECT_GT(inside, 0.85);
+  EXPECT_LT(inside, 0.97);
+  EXPECT_LT((high - low).mean(), 0.25);  // 3.3 standard deviations of the noise are 0.16
+
+  const json values = json::parse(folder.run(llmt_program + " predict m.json fresh.csv --interval 0.9 --json").out);
+  EXPECT_EQ(values["targets"][0]["low"][0], low(0));
+  EXPECT_EQ(values["targets"][0]["high"][0], high(0));
+  const Outcome narrow = folder.run(llmt_program + " predict m.json fresh.csv --interval 0.999");
+  EXPECT_NE(narrow.exit_code, 0);
+  EXPECT_NE(narrow.err.find("level 0.999 needs at least 999 held-out rows, there are 200"), std::string::npos);
+}
+
+TEST(LlmtProgram, NoIntervalsWithoutHeldOutResiduals) {
+  const Folder folder;
+  folder.write("d.csv", kinked(100, 1));
+  for (const char* without : {"--cv 3 --no-intervals", "--cv 0"}) {
+    ASSERT_EQ(folder.run(fmt::format("{} fit d.csv -t y {} -o m.json", llmt_program, without)).exit_code, 0);
+    const Outcome predicted = folder.run(llmt_program + " predict m.json d.csv --interval 0.9");
+    EXPECT_EQ(predicted.exit_code, 1) << without;
+    EXPECT_EQ(predicted.out, "");
+    EXPECT_NE(predicted.err.find("m.json: the file has no held-out residuals"), std::string::npos) << predicted.err;
+    EXPECT_NE(predicted.err.find("fit without --no-intervals and with folds"), std::string::npos);
+  }
+}
+
+TEST(LlmtProgram, CompareListsTheMethodsAndRecommendsOne) {
+  const Folder folder;
+  folder.write("d.csv", kinked(200, 1));
+  const Outcome compared = folder.run(llmt_program + " compare d.csv -t y --cv 3 --json");
+  ASSERT_EQ(compared.exit_code, 0) << compared.err;
+  const json result = json::parse(compared.out);
+  EXPECT_EQ(result["rows"], 200);
+  EXPECT_EQ(result["folds"], 3);
+  std::vector<std::string> names;
+  std::map<std::string, double> errors;
+  for (const json& method : result["methods"]) {
+    names.push_back(method["method"]);
+    errors[names.back()] = method["cv_rmse"];
+    EXPECT_EQ(method["fold_rmse"].size(), 3U) << names.back();
+    EXPECT_GE(method["parameters"], 3 * method["leaves"].get<int>()) << names.back();
+    EXPECT_GE(method["largest_jump"], 0.0) << names.back();
+  }
+  EXPECT_EQ(names, (std::vector<std::string>{"least squares", "crisp tree, RD", "crisp tree, RETIS", "crisp tree, RA",
+                                             "M5', smoothed", "Gaussians, as grown", "Gaussians, re-estimated",
+                                             "blend, joint", "LOLIMOT", "HILOMOT", "crisp tree, quadratic leaves"}));
+  ASSERT_TRUE(errors.contains(result["recommended"])) << result["recommended"];
+  EXPECT_LT(errors[result["recommended"]], 0.5 * errors["least squares"]);
+  const std::string why = result["recommendation"];
+  EXPECT_TRUE(why.starts_with("Take " + result["recommended"].get<std::string>() + ":")) << why;
+
+  const Outcome text = folder.run(llmt_program + " compare d.csv -t y --cv 3");
+  ASSERT_EQ(text.exit_code, 0);
+  EXPECT_NE(text.out.find(why), std::string::npos);
+}
+
+}  // namespace
