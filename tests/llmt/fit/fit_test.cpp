@@ -4,7 +4,6 @@
 
 #include <array>
 #include <cmath>
-#include <limits>
 
 #include "growth/pruning.hpp"
 #include "oracles/oracles.hpp"
@@ -36,15 +35,6 @@ void expect_same_tree(const llmt::Model& model, const llmt::Model& expected) {
     EXPECT_LT((nodes[i].value - expected_nodes[i].value).cwiseAbs().maxCoeff(), 1e-9);
     EXPECT_LT((nodes[i].slope - expected_nodes[i].slope).cwiseAbs().maxCoeff(), 1e-9);
   }
-}
-
-std::string message_of(const std::function<void()>& call) {
-  try {
-    call();
-  } catch (const std::invalid_argument& error) {
-    return error.what();
-  }
-  return "no std::invalid_argument";
 }
 
 TEST(Fit, OneLeafIsLeastSquares) {
@@ -349,32 +339,6 @@ TEST(Fit, RetisPruningFollowsTheMEstimates) {
     const Eigen::Index expected = prior <= children ? 1 : 2;
     EXPECT_EQ(pruned_leaves(two, m), expected) << m;
   }
-}
-
-TEST(Fit, CallersMistakesAreNamed) {
-  const Eigen::MatrixXd x = oracle::uniform(10, 2, 15);
-  const Eigen::MatrixXd y = x.col(0);
-  EXPECT_EQ(message_of([&] { llmt::fit(x, y.topRows(9)); }), "llmt::fit: inputs has 10 rows, outputs has 9");
-  EXPECT_EQ(message_of([&] { llmt::fit(Eigen::MatrixXd(0, 2), Eigen::MatrixXd(0, 1)); }),
-            "llmt::fit: inputs is 0 x 2, at least one row and one column are needed");
-  Eigen::MatrixXd bad = x;
-  bad(3, 1) = std::numeric_limits<double>::infinity();
-  EXPECT_EQ(message_of([&] { llmt::fit(bad, y); }),
-            "llmt::fit: inputs(3, 1) is inf, it must be finite, or NaN where it is missing (rows and columns counted "
-            "from 0)");
-  bad(3, 1) = std::nan("");
-  EXPECT_EQ(message_of([&] { llmt::fit(x, bad); }),
-            "llmt::fit: outputs(3, 1) is nan, it must be finite (rows and columns counted from 0)");
-  EXPECT_EQ(message_of([&] { llmt::fit(x, y, as_grown({.split_inputs = {2}})); }),
-            "llmt::fit: split_inputs names column 2, there are 2");
-  EXPECT_EQ(message_of([&] {
-              llmt::fit(x, y, as_grown({.regression_inputs = {1, 1}}));
-            }),
-            "llmt::fit: regression_inputs names column 1 twice");
-  EXPECT_EQ(message_of([&] { llmt::fit(x, y, as_grown({.expert = {.min_improvement = 1.5}})); }),
-            "llmt::fit: expert.min_improvement is 1.5, it must be in [0, 1)");
-  EXPECT_EQ(message_of([&] { llmt::fit(x, y, {.folds = {.count = 1}}); }),
-            "llmt::fit: folds.count is 1, it must be 0 or at least 2");
 }
 
 }  // namespace

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "data/dataset.hpp"
-#include "estimation/jumps.hpp"
 #include "data/fold_rows.hpp"
+#include "estimation/jumps.hpp"
 #include "llmt/model.hpp"
 #include "oracles/oracles.hpp"
 #include "oracles/random_trees.hpp"
