@@ -78,11 +78,11 @@ void fit(const std::string& method, const Files& files, Eigen::Index columns, in
   const Cost predict =
       measure_repeated([&] { predicted = result->model.predict(test.leftCols(columns - 1), threads); });
   const double per_million = 1e6 / static_cast<double>(test.rows());
-  fmt::print(
-      R"({{"fit_wall": {}, "fit_cpu": {}, "predict_wall": {}, "predict_cpu": {}, "memory": {}, "rmse": {}, "leaves": {}}})"
-      "\n",
-      cost.wall, cost.cpu, predict.wall * per_million, predict.cpu * per_million, cost.memory,
-      llmt::rmse(predicted, test.rightCols(1))(0), result->summary.partitions[0].leaves);
+  fmt::print(R"({{"fit_wall": {}, "fit_cpu": {}, "predict_wall": {}, "predict_cpu": {}, )"
+             R"("memory": {}, "rmse": {}, "leaves": {}}})"
+             "\n",
+             cost.wall, cost.cpu, predict.wall * per_million, predict.cpu * per_million, cost.memory,
+             llmt::rmse(predicted, test.rightCols(1))(0), result->summary.partitions[0].leaves);
 }
 
 void add_fit(CLI::App& program) {

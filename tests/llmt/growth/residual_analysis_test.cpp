@@ -12,7 +12,8 @@ namespace {
 
 using llmt::ResidualStatistics;
 
-ResidualStatistics statistics(const Eigen::VectorXd& x, const Eigen::VectorXd& residuals, const Eigen::VectorXd& weights) {
+ResidualStatistics statistics(const Eigen::VectorXd& x, const Eigen::VectorXd& residuals,
+                              const Eigen::VectorXd& weights) {
   const auto span = [](const Eigen::VectorXd& values) { return std::span(values.data(), values.size()); };
   return llmt::residual_statistics(span(x), span(residuals), span(weights));
 }
