@@ -89,7 +89,8 @@ void add_candidates(CLI::App& command, ExpertOptions& expert) {
       ->option_text(fmt::format("FLOAT,... [{}]", default_text("widths")));
   command
       .add_option("--jump", expert.jumps,
-                  "Jumps to choose from: where the output jumps by so many standard deviations there is no transition")
+                  "Jumps to choose from: a split where the output jumps by this many "
+                  "standard deviations has no transition")
       ->delimiter(',')
       ->option_text(fmt::format("FLOAT,... [{}]", default_text("jumps")));
   command.add_option("--ridge", expert.ridges, "Ridges to choose from: hold of the joint estimate at the local one")
