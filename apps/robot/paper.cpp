@@ -94,12 +94,14 @@ void print_planar(const std::vector<PlanarStudy>& studies) {
   }
   print(table.text());
   print(R"(
-What may be compared. The paper does not print its bending model; the physics from its data does not give its 0.643 mm for the rigid
-arm, and neither variant above was tuned to it. So the three rows of the arm are compared as ratios to the calibrated model. The black
-box hardly feels the bending (1 mm in 2000): compare it in mm. The leaf counts are the paper's; where it stopped at "less than 2 %" of
-an unnamed measure, the row "stopped at 2 %" uses ours: the next ten models lower the sum of squares by less than 2 % each.
-The paper's figure for the real Staubli TX200 (0.057 -> 0.0126 mm) is in-sample: 45 poses, judged on the poses that were fitted.
-`llmt-robot paper --study tx200` shows what that is worth.
+What may be compared. The paper does not print its bending model; the physics from its data does not
+give its 0.643 mm for the rigid arm, and neither variant above was tuned to it. So the three rows of
+the arm are compared as ratios to the calibrated model. The black box hardly feels the bending (1 mm
+in 2000): compare it in mm. The leaf counts are the paper's; where it stopped at "less than 2 %" of
+an unnamed measure, the row "stopped at 2 %" uses ours: the next ten models lower the sum of squares
+by less than 2 % each. The paper's figure for the real Staubli TX200 (0.057 -> 0.0126 mm) is
+in-sample: 45 poses, judged on the poses that were fitted. `llmt-robot paper --study tx200` shows
+what that is worth.
 )");
 }
 

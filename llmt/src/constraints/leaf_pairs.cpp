@@ -11,8 +11,8 @@ namespace {
 using Pair = LeafPairs::Pair;
 using Coefficient = LeafPairs::Coefficient;
 
-// A transition is cut into this many parts, each with Bernstein coefficients of its own: the more parts, the closer
-// these are to the polynomial.
+// A transition is cut into four parts, each with Bernstein coefficients of its own. With more parts the coefficients
+// are closer to the values of the polynomial, and there are more inequalities.
 constexpr int parts = 4;
 
 // Pieces bent less than this, relative to their values, are straight.

@@ -13,10 +13,6 @@ RowMajor all_deviations(const TrainingRows& rows) {
   return all;
 }
 
-RowMajor imputed(const RowMajor& x, const Eigen::VectorXd& mean) {
-  return x.array().isNaN().select(mean.transpose().replicate(x.rows(), 1), x);
-}
-
 double mean_of_present(const RowMajor& x, Eigen::Index column, const Eigen::VectorXd& weights) {
   double sum = 0.0;
   double present = 0.0;

@@ -1,5 +1,5 @@
 /// \file
-/// Regressors without a value (NaN): local models take them at the mean of a node's rows.
+/// Deviations of the regressors in all rows, some of which may be missing (NaN).
 #pragma once
 
 #include <Eigen/Core>
@@ -11,9 +11,6 @@ namespace llmt {
 
 /// Deviations of the regressors from their centres in all rows, rows x regressors; NaN: missing.
 RowMajor all_deviations(const TrainingRows& rows);
-
-/// `x` (rows x regressors) with `mean` (one entry per regressor) in place of missing values.
-RowMajor imputed(const RowMajor& x, const Eigen::VectorXd& mean);
 
 /// Weighted mean of the values of a column that are not missing; 0 if all are. `weights`: one per row.
 double mean_of_present(const RowMajor& x, Eigen::Index column, const Eigen::VectorXd& weights);

@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <cmath>
 
+#include "base/matrix.hpp"
 #include "llmt/model.hpp"
 
 namespace llmt {
@@ -17,6 +18,11 @@ inline double imputed(const Node& node, Eigen::Index regressor, double deviation
 /// The same for all regressors of a row.
 inline Eigen::VectorXd imputed(const Node& node, const Eigen::Ref<const Eigen::RowVectorXd>& deviations) {
   return deviations.transpose().array().isNaN().select(node.mean, deviations.transpose());
+}
+
+/// `x` (rows x regressors) with `mean`, one entry per regressor, in place of missing values.
+inline RowMajor imputed(const RowMajor& x, const Eigen::VectorXd& mean) {
+  return x.array().isNaN().select(mean.transpose().replicate(x.rows(), 1), x);
 }
 
 }  // namespace llmt

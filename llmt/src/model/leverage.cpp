@@ -1,9 +1,9 @@
 #include "model/leverage.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include "base/simd.hpp"
+#include "model/imputed.hpp"
 
 namespace llmt {
 namespace {
@@ -33,7 +33,7 @@ void leverages(const Node& leaf, const RowList& list, const RowBlock& block, std
   for (Eigen::Index i = 0; i < list.count; ++i) {
     const double* deviations = block.deviations.data() + list.rows[i] * block.stride;
     for (Eigen::Index k = 0; k + 1 < size; ++k) {
-      a[k + 1] = std::isnan(deviations[k]) ? leaf.mean(k) : deviations[k];
+      a[k + 1] = imputed(leaf, k, deviations[k]);
     }
     result[i] = quadratic_form(leaf.inverse_gram.data(), size, a.data());
   }

@@ -18,7 +18,7 @@ constexpr double least_spare_rows = 3.0;
 // A residual sum of squares below this part of that about the mean is rounding.
 constexpr double rounding = 1e-13;
 
-// The search ends when this many further regressors have not lowered AICc.
+// The search ends when ten further regressors have not lowered AICc.
 constexpr int steps_without_gain = 10;
 
 // What the chosen regressors leave of the correlations of all regressors and outputs.

@@ -26,50 +26,59 @@ Eigen::VectorXd ordered_prefix_errors(const LeafSums& sums, Eigen::Index largest
   }
 }
 
+// How the crisp trees of a comparison are estimated.
+struct Variant {
+  bool sparse;
+  double shrinkage;
+};
+
+std::vector<Variant> variants_of(const Candidates& candidates) {
+  std::vector<Variant> variants;
+  for (const bool sparse : candidates.sparse) {
+    for (const double shrinkage : candidates.shrinkages) variants.push_back({sparse, shrinkage});
+  }
+  return variants;
+}
+
+// Of one fold, for each variant: the squared errors of the trees with 1, 2, ... leaves.
+std::vector<Eigen::VectorXd> errors_in_fold(const FoldRows& fold, const GrownTree& grown,
+                                            const std::vector<Variant>& variants, const Eigen::VectorXd& weights,
+                                            int max_threads) {
+  const LeafSums sums =
+      sum_leaves(fold.training, blended(fold.training, grown, {}, no_jump), max_threads, variants.back().sparse);
+  const Eigen::Index leaves = grown.partition.num_leaves();
+  std::vector<Eigen::VectorXd> errors;
+  for (const auto& [sparse, shrinkage] : variants) {
+    if (has_ordered_leaves(sums)) {
+      errors.push_back(ordered_prefix_errors(sums, leaves, shrinkage, fold, weights));
+      continue;
+    }
+    const Partition models =
+        sparse || shrinkage > 0.0 ? local(sums, leaves, shrinkage, sparse) : as_grown(sums, leaves);
+    errors.push_back(prefix_squared_errors(models, fold.held_out, weights, max_threads));
+    if (sparse && leaves > 1) {  // the root of a larger tree is full
+      errors.back()(0) = prefix_squared_errors(local(sums, 1, shrinkage, true), fold.held_out, weights, max_threads)(0);
+    }
+  }
+  return errors;
+}
+
 }  // namespace
 
 void compare_crisp(const std::vector<FoldRows>& folds, const std::vector<GrownTree>& grown,
                    const Candidates& candidates, const Eigen::VectorXd& weights, int max_threads,
                    const FoldErrors& error_of_folds, Selection& selection) {
-  struct Variant {
-    bool sparse;
-    double shrinkage;
-  };
-  std::vector<Variant> variants;
-  for (const bool sparse : candidates.sparse) {
-    for (const double shrinkage : candidates.shrinkages) {
-      variants.push_back({sparse, shrinkage});
-    }
-  }
-  std::vector<std::vector<Eigen::VectorXd>> errors(variants.size(), std::vector<Eigen::VectorXd>(folds.size()));
-  parallel_for(std::ssize(folds), max_threads, [&](Eigen::Index index) {
-    const std::size_t f = index;
-    const LeafSums sums = sum_leaves(folds[f].training, blended(folds[f].training, grown[f], {}, no_jump), max_threads,
-                                     candidates.sparse.back());
-    const Eigen::Index leaves = grown[f].partition.num_leaves();
-    for (std::size_t v = 0; v < variants.size(); ++v) {
-      const auto [sparse, shrinkage] = variants[v];
-      if (has_ordered_leaves(sums)) {
-        errors[v][f] = ordered_prefix_errors(sums, leaves, shrinkage, folds[f], weights);
-        continue;
-      }
-      const Partition models =
-          sparse || shrinkage > 0.0 ? local(sums, leaves, shrinkage, sparse) : as_grown(sums, leaves);
-      errors[v][f] = prefix_squared_errors(models, folds[f].held_out, weights, max_threads);
-      if (sparse && leaves > 1) {  // the root of a larger tree is full
-        errors[v][f](0) =
-            prefix_squared_errors(local(sums, 1, shrinkage, true), folds[f].held_out, weights, max_threads)(0);
-      }
-    }
-  });
+  const std::vector<Variant> variants = variants_of(candidates);
+  std::vector<std::vector<Eigen::VectorXd>> errors(folds.size());  // of each fold and variant
+  parallel_for(std::ssize(folds), max_threads,
+               [&](Eigen::Index f) { errors[f] = errors_in_fold(folds[f], grown[f], variants, weights, max_threads); });
   Eigen::Index largest = 0;
-  for (const Eigen::VectorXd& fold : errors.front()) {
-    largest = std::max(largest, fold.size());
-  }
+  for (const std::vector<Eigen::VectorXd>& fold : errors) largest = std::max(largest, fold.front().size());
   const auto error_of = [&](std::size_t variant, Eigen::Index leaves) {
     std::vector<double> of_folds;
-    for (const Eigen::VectorXd& fold : errors[variant]) {
-      of_folds.push_back(fold(std::min(leaves, fold.size()) - 1));  // a smaller tree stays at its last one
+    for (const std::vector<Eigen::VectorXd>& fold : errors) {
+      // A smaller tree stays at its largest number of leaves.
+      of_folds.push_back(fold[variant](std::min(leaves, fold[variant].size()) - 1));
     }
     return error_of_folds(
         {.shrinkage = variants[variant].shrinkage, .sparse = variants[variant].sparse, .leaves = leaves}, of_folds);

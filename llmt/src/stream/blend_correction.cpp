@@ -11,7 +11,7 @@
 namespace llmt {
 namespace {
 
-// Conjugate gradients end after this many steps, or at this part of the squared preconditioned gradient.
+// Conjugate gradients end after 15 steps, or when the squared preconditioned gradient is below 1e-5 of its first value.
 constexpr int most_steps = 15;
 constexpr double enough = 1e-5;
 

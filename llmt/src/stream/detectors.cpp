@@ -5,20 +5,20 @@
 namespace llmt {
 namespace {
 
-// RiseDetector. Rows over which the mean error is taken; rows before the sum begins; the rise that is tolerated, and
-// the largest error that counts, in units of the mean error, so that outliers raise no alarm; and the sum of excesses
-// over 1 + tolerated at which the alarm is raised.
+// RiseDetector. Number of rows over which the mean error is taken, and number of rows before the sum begins. Errors are
+// in units of the mean error: an excess is what is above 1 + tolerated, and an error counts as at most `largest`, so
+// that outliers raise no alarm. The alarm is raised when the sum of the excesses passes `alarm`.
 constexpr double memory = 5000.0;
 constexpr Eigen::Index settling = 300;
 constexpr double tolerated = 0.1;
 constexpr double largest = 4.0;
 constexpr double alarm = 80.0;
 
-// Rows over which the errors of a duel are averaged.
+// Number of rows over which a duel averages the errors.
 constexpr double duel_memory = 500.0;
 
-// ThresholdWatch. Rows near a threshold after which it stays or moves; how often it may move earlier, in rows; and the
-// gain that moves it, in standard errors.
+// ThresholdWatch. After 200 rows near a threshold the watch begins anew; before, every 50 rows, the threshold may move.
+// It moves if the gain is larger than 4 standard errors.
 constexpr Eigen::Index watch_rows = 200;
 constexpr Eigen::Index watch_interval = 50;
 constexpr double watch_t = 4.0;

@@ -16,8 +16,8 @@ std::uint64_t mixed(std::uint64_t state, std::uint64_t bits) {
   return z ^ (z >> 31);
 }
 
-// One row in this many is held out.
-constexpr std::uint64_t one_in = 8;
+// One row in eight is held out.
+constexpr std::uint64_t held_out_one_in = 8;
 
 }  // namespace
 
@@ -30,7 +30,7 @@ bool Reservoir::add(const double* values) {
   }
   const bool full = std::ssize(rows_) >= capacity_;
   if (full && hash > std::prev(rows_.end())->first) return false;
-  const bool held_out = mixed(hash, 0) % one_in == 0;
+  const bool held_out = mixed(hash, 0) % held_out_one_in == 0;
   const auto [at, added] = rows_.try_emplace(hash, Row{{}, held_out, 0});
   ++at->second.times;
   ++times_;

@@ -9,7 +9,7 @@
 namespace llmt {
 namespace {
 
-// The units of inputs and outputs, and the first models, are taken from this many rows, or from two for each
+// The units of inputs and outputs, and the first models, are taken from the first 50 rows, or from two for each
 // coefficient if that is more.
 constexpr Eigen::Index unit_rows = 50;
 constexpr Eigen::Index unit_rows_per_coefficient = 2;

@@ -9,23 +9,22 @@
 namespace llmt {
 namespace {
 
-// An alternate takes the place of its branch if its errors are smaller by this many standard errors. It is dropped
-// after this many rows. The comparison is made every so many rows.
+// An alternate takes the place of its branch if its errors are smaller by 3 standard errors. The comparison is made
+// every 25 rows. After 20000 rows the alternate is dropped.
 constexpr double duel_t = 3.0;
-constexpr Eigen::Index duel_rows = 20000;
 constexpr Eigen::Index duel_interval = 25;
+constexpr Eigen::Index duel_rows = 20000;
 
 // A split is taken back if the rows of an epoch do not show at this level that two models are better than one.
 constexpr double pruning_level = 0.01;
 
-// The first epoch has this many times the rows that decided the split, each further one this many times those of the
-// epoch before.
+// The first epoch has twice the rows that decided the split; each further epoch is twice as long as the one before.
 constexpr Eigen::Index epoch_growth = 2;
 
 // Models are solved for anew when their number of rows has grown by this factor.
 constexpr double solve_growth = 1.05;
 
-// A model with fewer rows per coefficient than this is not used.
+// Models are not made from fewer rows per coefficient than this.
 constexpr Eigen::Index few_rows_per_coefficient = 2;
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <limits>
 
 #include "base/parallel.hpp"
 
@@ -111,53 +112,59 @@ void encode(const GrowthData& data, Eigen::Index split_input, const std::vector<
   }
 }
 
+// Bins of one split input, without `splittable`. `sampled`: rows that decide where the edges lie.
+Bins cut_input(const GrowthData& data, const std::vector<int>& sampled, Eigen::Index split_input, int most) {
+  Bins bins;
+  bins.count = data.num_levels[split_input];
+  if (bins.count > 0) return bins;
+  std::vector<double> values;
+  for (const int row : sampled) {
+    values.push_back(data.split_value(row, split_input));
+  }
+  bins.edges = quantile_edges(std::move(values), most);
+  bins.count = static_cast<int>(std::ssize(bins.edges)) + 1;
+  return bins;
+}
+
+// Codes of the rows begin ... end - 1 in all split inputs. Widens `extents`, one per input.
+void encode_rows(const GrowthData& data, int begin, int end, BinnedInputs& inputs, std::vector<Extent>& extents) {
+  const std::size_t count = inputs.bins.size();
+  for (std::size_t j = 0; j < count; ++j) {
+    if (data.num_levels[j] == 0) {
+      encode(data, j, inputs.bins[j].edges, begin, end, inputs.codes.data() + j, extents[j]);
+      continue;
+    }
+    for (int row = begin; row < end; ++row) {
+      inputs.codes[row * count + j] = static_cast<std::uint8_t>(data.split_value(row, j));
+    }
+  }
+}
+
 }  // namespace
 
 BinnedInputs make_bins(const GrowthData& data, int bins) {
   const std::size_t inputs = data.split_inputs();
   const int rows = static_cast<int>(data.training.count());
+  const int threads = data.problem.max_threads;
   BinnedInputs result{std::vector<Bins>(inputs), std::vector<std::uint8_t>(rows * inputs)};
   const std::vector<int> sampled = sample(data);
-  parallel_for(data.split_inputs(), data.problem.max_threads, [&](Eigen::Index j) {
-    Bins& input = result.bins[j];
-    input.count = data.num_levels[j];
-    if (input.count == 0) {
-      std::vector<double> values;
-      for (const int row : sampled) {
-        values.push_back(data.split_value(row, j));
-      }
-      input.edges = quantile_edges(std::move(values), bins);
-      input.count = static_cast<int>(std::ssize(input.edges)) + 1;
-    }
-  });
-  constexpr int block = 16384;
-  const int blocks = (rows + block - 1) / block;
-  constexpr double infinity = std::numeric_limits<double>::infinity();
+  parallel_for(data.split_inputs(), threads,
+               [&](Eigen::Index j) { result.bins[j] = cut_input(data, sampled, j, bins); });
+  constexpr int block = 16384;  // rows
   constexpr int slots = 16;
-  std::vector<std::vector<Extent>> extents(slots, std::vector<Extent>(inputs));
-  parallel_for(slots, data.problem.max_threads, [&](Eigen::Index slot) {
-    std::vector<Extent>& own = extents[slot];
-    for (Extent& extent : own) {
-      extent.low.fill(infinity);
-      extent.high.fill(-infinity);
-    }
-    for (int index = static_cast<int>(slot); index < blocks; index += slots) {
-      const int end = std::min(rows, (index + 1) * block);
-      for (std::size_t j = 0; j < inputs; ++j) {
-        if (data.num_levels[j] == 0) {
-          encode(data, j, result.bins[j].edges, index * block, end, result.codes.data() + j, own[j]);
-          continue;
-        }
-        for (int row = index * block; row < end; ++row) {
-          result.codes[row * inputs + j] = static_cast<std::uint8_t>(data.split_value(row, j));
-        }
-      }
+  Extent nothing;
+  nothing.low.fill(std::numeric_limits<double>::infinity());
+  nothing.high.fill(-std::numeric_limits<double>::infinity());
+  std::vector<std::vector<Extent>> extents(slots, std::vector<Extent>(inputs, nothing));
+  parallel_for(slots, threads, [&](Eigen::Index slot) {
+    for (int begin = static_cast<int>(slot) * block; begin < rows; begin += slots * block) {
+      encode_rows(data, begin, std::min(rows, begin + block), result, extents[slot]);
     }
   });
   for (std::size_t j = 0; j < inputs; ++j) {
-    for (std::size_t bin = 0; bin < static_cast<std::size_t>(result.bins[j].count); ++bin) {
-      double low = infinity;
-      double high = -infinity;
+    for (int bin = 0; bin < result.bins[j].count; ++bin) {
+      double low = nothing.low[bin];
+      double high = nothing.high[bin];
       for (const std::vector<Extent>& extent : extents) {
         low = std::min(low, extent[j].low[bin]);
         high = std::max(high, extent[j].high[bin]);

@@ -4,9 +4,9 @@
 #include <cmath>
 
 #include "base/parallel.hpp"
-#include "data/missing.hpp"
 #include "growth/best_first/division.hpp"
 #include "growth/best_first/exact_search.hpp"
+#include "model/imputed.hpp"
 #include "model/leaf_validities.hpp"
 #include "numerics/node_fit.hpp"
 

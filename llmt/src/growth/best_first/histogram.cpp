@@ -50,39 +50,42 @@ Histogram BinnedRows::accumulate(const std::vector<int>& rows) const {
     std::vector<int> sorted(block_rows);
     for (Eigen::Index begin = 0; begin < std::ssize(rows); begin += block_rows) {
       const Eigen::Index end = std::min(std::ssize(rows), begin + block_rows);
-      for (Eigen::Index k = begin; k < end; ++k) {
-        features().prefetch(rows[k]);
+      const std::span<const int> block = std::span(rows).subspan(begin, end - begin);
+      for (const int row : block) {
+        features().prefetch(row);
       }
       for (Eigen::Index j = inputs * group / groups; j < inputs * (group + 1) / groups; ++j) {
-        const std::size_t input = j;
-        const int bins = inputs_.bins[input].count;
-        std::array<int, most_bins + 1> place{};
-        for (Eigen::Index k = begin; k < end; ++k) {
-          ++place[1U + (inputs_.code(rows[k], input))];
-        }
-        const Eigen::Index first = first_bin_[input];
-        for (int bin = 0; bin < bins; ++bin) {
-          const std::size_t at = bin;
-          histogram.counts[first + at] += place[at + 1];
-          place[at + 1] += place[at];
-        }
-        for (Eigen::Index k = begin; k < end; ++k) {
-          const int row = rows[k];
-          sorted[place[inputs_.code(row, input)]++] = row;
-        }
-        int at = 0;
-        for (int bin = 0; bin < bins; ++bin) {
-          const int after = place[bin];
-          if (after > at) {
-            add_rows(features(), sorted.data() + at, after - at,
-                     histogram.grams.data() + (first + bin) * shape_.size());
-          }
-          at = after;
-        }
+        add_block(block, j, sorted, histogram);
       }
     }
   });
   return histogram;
+}
+
+// Adds some rows to the bins of one input. `sorted`: work space for the rows.
+void BinnedRows::add_block(std::span<const int> rows, std::size_t input, std::vector<int>& sorted,
+                           Histogram& histogram) const {
+  const int bins = inputs_.bins[input].count;
+  const Eigen::Index first = first_bin_[input];
+  std::array<int, most_bins + 1> place{};  // where the rows of a bin begin among the sorted rows
+  for (const int row : rows) {
+    ++place[1 + inputs_.code(row, input)];
+  }
+  for (int bin = 0; bin < bins; ++bin) {
+    histogram.counts[first + bin] += place[bin + 1];
+    place[bin + 1] += place[bin];
+  }
+  for (const int row : rows) {
+    sorted[place[inputs_.code(row, input)]++] = row;
+  }
+  int at = 0;
+  for (int bin = 0; bin < bins; ++bin) {
+    const int after = place[bin];
+    if (after > at) {
+      add_rows(features(), sorted.data() + at, after - at, histogram.grams.data() + (first + bin) * shape_.size());
+    }
+    at = after;
+  }
 }
 
 std::vector<double> BinnedRows::total(const Histogram& histogram) const {

@@ -75,6 +75,7 @@ class BinnedRows {
   const Features& features() const { return whitened_.features(); }
   std::span<const double> grams(const Histogram& histogram, std::size_t input) const;
   std::span<const Eigen::Index> counts(const Histogram& histogram, std::size_t input) const;
+  void add_block(std::span<const int> rows, std::size_t input, std::vector<int>& sorted, Histogram& histogram) const;
   Edges search_edges(const Histogram& histogram, std::size_t input, double node_rss) const;
   SplitCandidate best_edge(const Edges& edges, std::span<const Eigen::Index> rows, const std::vector<int>& rank_left,
                            const std::vector<int>& rank_right, std::size_t input, double node_rss) const;

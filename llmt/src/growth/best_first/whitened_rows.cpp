@@ -12,6 +12,40 @@ namespace {
 // A node whose RSS is below this part of the sum of squares that its features hold gets features of its own residuals.
 constexpr double digits_at_risk = 1e-4;
 
+// Mean and covariance of the regressors of the features, from the Gram matrix of a node's rows.
+struct Moments {
+  double weight;
+  Eigen::VectorXd mean;
+  Eigen::MatrixXd covariance;
+};
+
+Moments moments_of(const GramShape& shape, const std::vector<double>& gram) {
+  const Eigen::Index regressors = shape.coefficients() - 1;
+  const auto entry = [&](Eigen::Index i, Eigen::Index j) { return gram[i >= j ? shape.at(i, j) : shape.at(j, i)]; };
+  Moments moments{entry(0, 0), Eigen::VectorXd(regressors), Eigen::MatrixXd(regressors, regressors)};
+  for (Eigen::Index i = 0; i < regressors; ++i) {
+    moments.mean(i) = entry(i + 1, 0) / moments.weight;
+  }
+  for (Eigen::Index i = 0; i < regressors; ++i) {
+    for (Eigen::Index j = 0; j < regressors; ++j) {
+      moments.covariance(i, j) = entry(i + 1, j + 1) / moments.weight - moments.mean(i) * moments.mean(j);
+    }
+  }
+  return moments;
+}
+
+// 1 / standard deviation of each scaled regressor in the node; 0 where it is constant but for rounding.
+Eigen::VectorXd inverse_deviations(const WhitenedLeaf& leaf) {
+  constexpr double rounding = 1e-12;  // of a mean square
+  Eigen::VectorXd result(leaf.mean.size());
+  for (Eigen::Index k = 0; k < result.size(); ++k) {
+    const double variance = leaf.covariance(k, k);
+    const bool varies = variance > rounding * (1.0 + leaf.mean(k) * leaf.mean(k));
+    result(k) = varies ? 1.0 / std::sqrt(variance) : 0.0;
+  }
+  return result;
+}
+
 }  // namespace
 
 // Regressors are whitened over all rows; residuals are those of the mean.
@@ -96,31 +130,14 @@ void fit_whitened(const GrowthData& data, const WhitenedRows& rows, const std::v
   const GramShape shape(rows.features());
   const Eigen::MatrixXd& colouring = rows.colouring();
   const Eigen::Index regressors = std::ssize(data.training.regressors);
-  const auto entry = [&](Eigen::Index i, Eigen::Index j) { return gram[i >= j ? shape.at(i, j) : shape.at(j, i)]; };
-  const double weight = entry(0, 0);
+  const Eigen::Index outputs = data.outputs.cols();
+  const auto [weight, mean, covariance] = moments_of(shape, gram);
   leaf.weight = weight;
-  Eigen::VectorXd mean(regressors);
-  Eigen::MatrixXd covariance(regressors, regressors);
-  for (Eigen::Index i = 0; i < regressors; ++i) {
-    mean(i) = entry(i + 1, 0) / weight;
-  }
-  for (Eigen::Index i = 0; i < regressors; ++i) {
-    for (Eigen::Index j = 0; j < regressors; ++j) {
-      covariance(i, j) = entry(i + 1, j + 1) / weight - mean(i) * mean(j);
-    }
-  }
   leaf.mean = colouring * mean;
   leaf.covariance = colouring * covariance * colouring.transpose();
-  Eigen::VectorXd deviation(regressors);  // 0: constant in the node
-  for (Eigen::Index k = 0; k < regressors; ++k) {
-    const double variance = leaf.covariance(k, k);
-    deviation(k) = variance > 1e-12 * (1.0 + leaf.mean(k) * leaf.mean(k)) ? std::sqrt(variance) : 0.0;
-  }
-  const Eigen::VectorXd per_deviation =
-      deviation.unaryExpr([](double value) { return value > 0.0 ? 1.0 / value : 0.0; });
+  const Eigen::VectorXd per_deviation = inverse_deviations(leaf);
   const Whitening whitening = whiten(per_deviation.asDiagonal() * leaf.covariance * per_deviation.asDiagonal());
   const Eigen::MatrixXd inverse = whitening.forward * whitening.forward.transpose();
-  const Eigen::Index outputs = data.outputs.cols();
   node.samples = std::ssize(leaf.rows);
   node.rank = 1 + static_cast<int>(whitening.rank);
   node.mean = data.training.scale.cwiseProduct(leaf.mean);
@@ -131,17 +148,17 @@ void fit_whitened(const GrowthData& data, const WhitenedRows& rows, const std::v
   for (Eigen::Index o = 0; o < outputs; ++o) {
     const Eigen::Index residual = shape.coefficients() + o;
     Eigen::VectorXd product(regressors);
-    const double mean_residual = entry(residual, 0) / weight;
+    const double mean_residual = gram[shape.at(residual, 0)] / weight;
     for (Eigen::Index k = 0; k < regressors; ++k) {
-      product(k) = entry(residual, k + 1) / weight - mean_residual * mean(k);
+      product(k) = gram[shape.at(residual, k + 1)] / weight - mean_residual * mean(k);
     }
-    // The parent's model about the one whose residuals the features hold, then the correction of it.
+    // The parent's model about the model whose residuals the features hold, then the correction of it.
     const Eigen::VectorXd of_parent =
         data.training.scale.cwiseProduct((parent.slope.row(o) - leaf.slope.row(o)).transpose());
     const Eigen::VectorXd left = colouring * product - leaf.covariance * of_parent;
     const Eigen::VectorXd correction = per_deviation.cwiseProduct(inverse * per_deviation.cwiseProduct(left));
     const Eigen::VectorXd slope = of_parent + correction;
-    const double variance = entry(residual, residual) / weight - mean_residual * mean_residual;
+    const double variance = gram[shape.at(residual, residual)] / weight - mean_residual * mean_residual;
     const double explained = 2.0 * slope.dot(colouring * product) - slope.dot(leaf.covariance * slope);
     node.rss(o) = std::max(0.0, weight * (variance - explained));
     node.slope.row(o) = leaf.slope.row(o) + slope.cwiseQuotient(data.training.scale).transpose();

@@ -111,21 +111,22 @@ struct Linearised {
   Eigen::VectorXd gradient;
 };
 
-// Of one output. The residuals' derivatives at fixed coefficients are D = -g' (a' difference) z, what the coefficients
-// follow is added as B K. Joint models: K = -(B' W B)^-1 B' W D, the approximation of Kaufman (1975), with which the
-// gradient is exact. Local models: exactly the derivatives of either weighted least squares.
-void add_output(const GateProblem& problem, const Eigen::VectorXd& shares, const Fitted& fitted, Eigen::Index output,
-                Linearised& result) {
+// Sums over the rows for one output. The residuals' derivatives by the gate at fixed coefficients are
+// D = -g' (a' difference) z.
+struct GateSums {
+  RowMajor products;  // (w D)' times [a, g a, D, residual]
+  RowMajor pull;      // local models: sum of w g' (y - left model) z a'
+};
+
+GateSums sum_output(const GateProblem& problem, const Eigen::VectorXd& shares, const Eigen::VectorXd& second,
+                    const Eigen::VectorXd& difference, Eigen::Index output) {
   const Eigen::Index size = problem.a.cols();
   const Eigen::Index entries = problem.z.cols();
   RowMajor by_gate(rows_at_once, entries);  // w D
   RowMajor pulled(rows_at_once, entries);   // w g' (y - left model) z
   RowMajor right(rows_at_once, 2 * size + entries + 1);
   RowMajor regressors(rows_at_once, size);
-  RowMajor sum = RowMajor::Zero(entries, right.cols());
-  RowMajor pull = RowMajor::Zero(entries, size);
-  const Eigen::VectorXd second = fitted.second.col(output);
-  const Eigen::VectorXd difference = fitted.difference.col(output);
+  GateSums sums{RowMajor::Zero(entries, right.cols()), RowMajor::Zero(entries, size)};
   for (Eigen::Index begin = 0; begin < problem.a.rows(); begin += rows_at_once) {
     const Eigen::Index count = std::min(rows_at_once, problem.a.rows() - begin);
     for (Eigen::Index i = 0; i < count; ++i) {
@@ -143,11 +144,22 @@ void add_output(const GateProblem& problem, const Eigen::VectorXd& shares, const
       right.row(i).segment(2 * size, entries) = -slope * gap * problem.z.row(row);
       right(i, 2 * size + entries) = of_right - share * gap;
     }
-    add_product(by_gate, right, count, sum);
-    if (problem.models == GateModels::local) {
-      add_product(pulled, regressors, count, pull);
-    }
+    add_product(by_gate, right, count, sums.products);
+    if (problem.models == GateModels::local) add_product(pulled, regressors, count, sums.pull);
   }
+  return sums;
+}
+
+// Adds the part of one output. The coefficients follow the gate, which adds B K to the derivatives D of the residuals.
+// Joint models: K = -(B' W B)^-1 B' W D, the approximation of Kaufman (1975), with which the gradient is exact. Local
+// models: the exact derivatives of the two weighted least-squares fits.
+void add_output(const GateProblem& problem, const Eigen::VectorXd& shares, const Fitted& fitted, Eigen::Index output,
+                Linearised& result) {
+  const Eigen::Index size = problem.a.cols();
+  const Eigen::Index entries = problem.z.cols();
+  const Eigen::VectorXd second = fitted.second.col(output);
+  const Eigen::VectorXd difference = fitted.difference.col(output);
+  const auto [sum, pull] = sum_output(problem, shares, second, difference, output);
   const double total = problem.weights.sum();
   const Eigen::MatrixXd identity = Eigen::MatrixXd::Identity(size, size);
   Eigen::MatrixXd normal(2 * size, 2 * size);  // B' W B

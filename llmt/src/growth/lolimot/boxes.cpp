@@ -7,6 +7,7 @@
 #include "constraints/signs.hpp"
 #include "data/missing.hpp"
 #include "growth/search/split_search.hpp"
+#include "model/imputed.hpp"
 #include "numerics/node_fit.hpp"
 
 namespace llmt {

@@ -1,0 +1,171 @@
+// A parser of CSV text that is slow and obvious.
+#pragma once
+
+#include <fmt/format.h>
+
+#include <Eigen/Core>
+#include <cmath>
+#include <cstdlib>
+#include <optional>
+#include <regex>
+#include <string>
+#include <vector>
+
+namespace oracle::csv {
+
+struct Record {
+  std::string text;  // without the line break
+  int line = 0;
+};
+
+inline std::string trimmed(std::string text) {
+  const auto blank = [](char c) { return c == ' ' || c == '\t' || c == '\r'; };
+  while (!text.empty() && blank(text.back())) text.pop_back();
+  while (!text.empty() && blank(text.front())) text.erase(0, 1);
+  return text;
+}
+
+inline bool is_quoted(const std::string& text) { return text.size() >= 2 && text.front() == '"' && text.back() == '"'; }
+
+inline std::string unquoted(const std::string& field) {
+  const std::string text = trimmed(field);
+  if (!is_quoted(text)) return text;
+  const std::string inner = text.substr(1, text.size() - 2);
+  std::string result;
+  for (std::size_t i = 0; i < inner.size(); ++i) {
+    result += inner[i];
+    if (inner[i] == '"') ++i;
+  }
+  return result;
+}
+
+inline std::string bare(const std::string& field) {
+  const std::string text = trimmed(field);
+  return is_quoted(text) ? trimmed(text.substr(1, text.size() - 2)) : text;
+}
+
+inline std::vector<Record> records_of(const std::string& text) {
+  std::vector<Record> records;
+  Record record{"", 1};
+  int line = 1;
+  bool quoted = false;
+  const auto finish = [&] {
+    if (!trimmed(record.text).empty()) records.push_back(record);
+  };
+  for (const char c : text) {
+    line += c == '\n' ? 1 : 0;
+    quoted = quoted != (c == '"');
+    if (c == '\n' && !quoted) {
+      finish();
+      record = {"", line};
+    } else {
+      record.text += c;
+    }
+  }
+  finish();
+  return records;
+}
+
+inline std::vector<std::string> fields_of(const Record& record, char separator) {
+  std::vector<std::string> fields(1);
+  bool quoted = false;
+  for (const char c : record.text) {
+    quoted = quoted != (c == '"');
+    if (c == separator && !quoted) {
+      fields.emplace_back();
+    } else {
+      fields.back() += c;
+    }
+  }
+  return fields;
+}
+
+inline bool is_missing(const std::string& field) {
+  static const std::regex mark("|na|n/a|nan|null|\\?", std::regex::icase);
+  return std::regex_match(bare(field), mark);
+}
+
+// The number, or why there is none.
+inline std::string read_number(const std::string& field, double& value) {
+  static const std::regex number("[+-]?([0-9]+\\.?[0-9]*|\\.[0-9]+)([eE][+-]?[0-9]+)?");
+  static const std::regex word("[+-]?(nan|inf|infinity)", std::regex::icase);
+  const std::string text = bare(field);
+  if (text.empty()) return "the cell is empty, a number is needed";
+  const bool is_number = std::regex_match(text, number);
+  value = is_number ? std::strtod(text.c_str(), nullptr) : std::nan("");
+  if (is_number && std::isfinite(value)) return "";
+  const std::string shown = text.size() > 60 ? text.substr(0, 60) + "..." : text;  // all is ASCII here
+  return fmt::format("'{}' is not {}", shown, is_number || std::regex_match(text, word) ? "finite" : "a number");
+}
+
+struct Table {
+  std::vector<std::string> columns;
+  std::vector<Record> records;
+  std::vector<std::vector<std::string>> cells;  // as they stand in the text
+  std::string error;                            // of finding the rows
+};
+
+inline Table naive(const std::string& text) {
+  Table table;
+  table.records = records_of(text.starts_with("\xEF\xBB\xBF") ? text.substr(3) : text);
+  if (table.records.empty()) {
+    table.error = "t: the file is empty, a header row is needed";
+    return table;
+  }
+  const Record header = table.records.front();
+  table.records.erase(table.records.begin());
+  char separator = ',';
+  for (const char candidate : {'\t', ';', ','}) {
+    if (header.text.find(candidate) != std::string::npos) separator = candidate;
+  }
+  // The carriage return of a line end is no part of the header.
+  const std::string header_text =
+      header.text.ends_with('\r') ? header.text.substr(0, header.text.size() - 1) : header.text;
+  for (const std::string& field : fields_of({header_text, 0}, separator)) {
+    const std::string name = unquoted(field);
+    if (name.empty()) {
+      table.error = fmt::format("t:{}: column {} of the header has no name", header.line, table.columns.size() + 1);
+      return table;
+    }
+    if (std::ranges::find(table.columns, name) != table.columns.end()) {
+      table.error = fmt::format("t:{}: the header has column \"{}\" twice", header.line, name);
+      return table;
+    }
+    table.columns.push_back(name);
+  }
+  for (const Record& record : table.records) {
+    table.cells.push_back(fields_of(record, separator));
+    const std::size_t fields = table.cells.back().size();
+    if (fields != table.columns.size()) {
+      const bool cut = &record == &table.records.back() && fields < table.columns.size();
+      table.error = fmt::format("t:{}: the row has {} field{}, the header has {}{}", record.line, fields,
+                                fields == 1 ? "" : "s", table.columns.size(), cut ? " (is the file cut off?)" : "");
+      return table;
+    }
+  }
+  return table;
+}
+
+// The named columns, or the first error in the order of the file.
+std::string naive_numbers(const Table& table, const std::vector<std::size_t>& wanted, bool allow_missing,
+                          Eigen::MatrixXd& values) {
+  values.resize(std::ssize(table.cells), std::ssize(wanted));
+  for (std::size_t row = 0; row < table.cells.size(); ++row) {
+    for (std::size_t field = 0; field < table.columns.size(); ++field) {
+      for (std::size_t i = 0; i < wanted.size(); ++i) {
+        if (wanted[i] != field) continue;
+        double value = std::nan("");
+        const std::string& cell = table.cells[row][field];
+        const bool is_left_out = allow_missing && is_missing(cell);
+        const std::string problem = is_left_out ? "" : read_number(cell, value);
+        if (!problem.empty()) {
+          return fmt::format("t:{}: column \"{}\": {}", table.records[row].line, table.columns[field], problem);
+        }
+        values(row, i) = value;
+      }
+    }
+  }
+  return "";
+}
+
+}  // namespace oracle::csv
