@@ -11,8 +11,8 @@
 
 namespace llmt {
 
-/// Products make (d + 1) (d + 2) / 2 coefficients of d numbers, and growth costs the square of that: beyond so many
-/// numeric regression inputs (105 coefficients) there are none.
+/// Largest number d of numeric regression inputs of quadratic local models. They have (d + 1) (d + 2) / 2 coefficients,
+/// 105 for d = 13, and growth costs the square of that.
 inline constexpr Eigen::Index most_inputs_of_products = 13;
 
 /// Numeric regression inputs of a table.

@@ -26,7 +26,7 @@ double middle_of_gap(const std::vector<GrownTree>& grown, double jump) {
       }
     }
   }
-  // Far below a jump lies its quarter at least: no score is as good as one of nearly nothing.
+  // If no jump was left out, the next one is assumed at a sixteenth of the smallest kept: the threshold is a quarter.
   return kept < no_jump ? std::sqrt(kept * std::max(left_out, kept / 16.0)) : no_jump;
 }
 

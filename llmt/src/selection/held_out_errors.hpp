@@ -27,8 +27,9 @@ struct Key {
   auto operator<=>(const Key&) const = default;
 };
 
-/// Training rows that show which of several candidates is best. All of them have as many for each unknown, so that none
-/// looks better for having more: 25, with which a joint estimate adds 4 % to the variance of the noise.
+/// Number of training rows on which candidates are compared: 25 for each unknown, with which a joint estimate adds 4 %
+/// to the variance of the noise. The ratio is the same for all candidates, so that none looks better for having more
+/// rows.
 Eigen::Index enough_rows(Eigen::Index leaves, Eigen::Index coefficients);
 
 class HeldOutErrors {

@@ -31,10 +31,10 @@ constexpr double standard_errors_of_a_gain = 2.0;
 // Up to this many unknowns every ridge is tried with every leaf count; beyond, in screening, the best one so far.
 constexpr Eigen::Index cheap_unknowns = 300;
 
-// A shape is at its end when so many leaf counts brought nothing.
+// Leaves are no longer added to a (width, jump) pair after this number of larger leaf counts without improvement.
 constexpr std::size_t steps_without_gain = 2;
 
-// Screening goes on to three times as many unknowns with the better half of the shapes, but at least so many.
+// Each round of screening triples the unknowns and keeps the better half of the (width, jump) pairs, at least three.
 constexpr Eigen::Index next_unknowns = 3;
 constexpr std::size_t fewest_shapes = 3;
 
@@ -87,7 +87,8 @@ Ranked first_of_each(Ranked order, const KindOf& kind_of) {
   return firsts;
 }
 
-// Every shape with few leaves; then the better half with three times as many, and so on, while that helps.
+// Compares every (width, jump) pair with few leaves, then the better half with three times the unknowns, and so on
+// while that helps.
 void screen(HeldOutErrors& comparison, const Candidates& candidates, Eigen::Index coefficients, std::size_t folds) {
   const std::vector<Eigen::Index>& counts = comparison.leaf_counts();
   const std::size_t usual = candidates.shrinkages.size() / 2;

@@ -4,7 +4,6 @@
 
 #include <array>
 #include <cmath>
-#include <limits>
 
 #include "growth/pruning.hpp"
 #include "oracles/oracles.hpp"

@@ -12,17 +12,14 @@
 
 #include "llmt/compare.hpp"
 #include "llmt/fit.hpp"
-#include "llmt/fit/local_model_cases.hpp"
-#include "numerics/forward_selection.hpp"
-#include "oracles/messages.hpp"
+#include "llmt/fit/local_models.hpp"
 #include "oracles/oracles.hpp"
 #include "oracles/predict_oracle.hpp"
 #include "oracles/random_trees.hpp"
 
 namespace {
 
-using namespace local_model_cases;
-using oracle::message_of;
+using namespace local_models;
 
 // The partition is that of a curved output; the others are affine and quadratic. Queries reach into corners without
 // rows, where products lie beyond all those of the training rows.

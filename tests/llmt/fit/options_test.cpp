@@ -2,9 +2,11 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Core>
+#include <cmath>
 #include <functional>
 #include <limits>
 #include <string>
+
 #include "oracles/random_trees.hpp"
 
 namespace {
@@ -12,6 +14,32 @@ namespace {
 using namespace random_trees;
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+
+TEST(Fit, MistakesInShapesAndLimitsAreNamed) {
+  const Eigen::MatrixXd x = oracle::uniform(10, 2, 15);
+  const Eigen::MatrixXd y = x.col(0);
+  EXPECT_EQ(message_of([&] { llmt::fit(x, y.topRows(9)); }), "llmt::fit: inputs has 10 rows, outputs has 9");
+  EXPECT_EQ(message_of([&] { llmt::fit(Eigen::MatrixXd(0, 2), Eigen::MatrixXd(0, 1)); }),
+            "llmt::fit: inputs is 0 x 2, at least one row and one column are needed");
+  Eigen::MatrixXd bad = x;
+  bad(3, 1) = std::numeric_limits<double>::infinity();
+  EXPECT_EQ(message_of([&] { llmt::fit(bad, y); }),
+            "llmt::fit: inputs(3, 1) is inf, it must be finite, or NaN where it is missing (rows and columns counted "
+            "from 0)");
+  bad(3, 1) = std::nan("");
+  EXPECT_EQ(message_of([&] { llmt::fit(x, bad); }),
+            "llmt::fit: outputs(3, 1) is nan, it must be finite (rows and columns counted from 0)");
+  EXPECT_EQ(message_of([&] { llmt::fit(x, y, {.split_inputs = {2}}); }),
+            "llmt::fit: split_inputs names column 2, there are 2");
+  EXPECT_EQ(message_of([&] {
+              llmt::fit(x, y, {.regression_inputs = {1, 1}});
+            }),
+            "llmt::fit: regression_inputs names column 1 twice");
+  EXPECT_EQ(message_of([&] { llmt::fit(x, y, {.expert = {.min_improvement = 1.5}}); }),
+            "llmt::fit: expert.min_improvement is 1.5, it must be in [0, 1)");
+  EXPECT_EQ(message_of([&] { llmt::fit(x, y, {.folds = {.count = 1}}); }),
+            "llmt::fit: folds.count is 1, it must be 0 or at least 2");
+}
 
 TEST(Fit, MistakesInWeightsCategoriesAndBlendsAreNamed) {
   const Eigen::MatrixXd x = oracle::uniform(20, 2, 72).cwiseAbs();

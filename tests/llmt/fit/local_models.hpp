@@ -1,14 +1,16 @@
-/// \file
-/// Fits with quadratic and sparse local models, and what they are held against.
+// Options and references for the tests of local models.
 #pragma once
 
 #include <Eigen/Core>
+#include <functional>
 #include <limits>
+#include <stdexcept>
+#include <string>
 #include <vector>
 
 #include "llmt/fit.hpp"
 
-namespace local_model_cases {
+namespace local_models {
 
 using llmt::LocalTerms;
 using llmt::SparseChoice;
@@ -18,7 +20,7 @@ inline constexpr double missing = std::numeric_limits<double>::quiet_NaN();
 inline const std::vector<ValidityChoice> kinds = {ValidityChoice::crisp, ValidityChoice::blend,
                                                   ValidityChoice::gaussian};
 
-/// One candidate, no choice.
+// One candidate, no choice.
 inline llmt::FitOptions only(ValidityChoice validity, Eigen::Index max_leaves, LocalTerms terms,
                              SparseChoice sparse = SparseChoice::never) {
   llmt::FitOptions options;
@@ -35,7 +37,7 @@ inline llmt::FitOptions only(ValidityChoice validity, Eigen::Index max_leaves, L
   return options;
 }
 
-/// Regressors as they stand in Leaf: products of deviations from the means of the inputs.
+// Regressors as they stand in Leaf: products of deviations from the means of the inputs.
 inline Eigen::MatrixXd regressors_of(const llmt::Model& model, const Eigen::MatrixXd& x) {
   Eigen::MatrixXd result(x.rows(), std::ssize(model.regressors()));
   for (std::size_t k = 0; k < model.regressors().size(); ++k) {
@@ -64,4 +66,13 @@ inline Eigen::MatrixXd with_constant(const Eigen::MatrixXd& x) {
   return result;
 }
 
-}  // namespace local_model_cases
+inline std::string message_of(const std::function<void()>& call) {
+  try {
+    call();
+  } catch (const std::invalid_argument& error) {
+    return error.what();
+  }
+  return "no std::invalid_argument";
+}
+
+}  // namespace local_models

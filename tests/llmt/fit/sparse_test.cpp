@@ -1,4 +1,4 @@
-// What forward selection and sparse local models promise.
+// What sparse local models promise.
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
@@ -12,7 +12,7 @@
 
 #include "llmt/compare.hpp"
 #include "llmt/fit.hpp"
-#include "llmt/fit/local_model_cases.hpp"
+#include "llmt/fit/local_models.hpp"
 #include "numerics/forward_selection.hpp"
 #include "oracles/oracles.hpp"
 #include "oracles/predict_oracle.hpp"
@@ -20,7 +20,7 @@
 
 namespace {
 
-using namespace local_model_cases;
+using namespace local_models;
 
 // Greedy choice by refitting with every regressor at every step, and AICc of every step.
 std::vector<Eigen::Index> refit_selection(const Eigen::MatrixXd& x, const Eigen::VectorXd& y) {

@@ -1,0 +1,14 @@
+/// \file
+/// The options of `llmt fit` that `llmt compare` does not have: rule, local models, candidates.
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+#include "llmt/fit.hpp"
+
+namespace llmt::apps {
+
+/// Adds them to a command. `options` must live as long as the command.
+void add_fit_options(CLI::App& command, FitOptions& options);
+
+}  // namespace llmt::apps

@@ -1,0 +1,220 @@
+#include "llmt/fit_summary.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <cmath>
+#include <string_view>
+#include <vector>
+
+namespace llmt::apps {
+namespace {
+
+// "blend, sparse, width 2, jumps from 4, ridge 0.001, shrinkage 0.1".
+std::string describe(const Candidate& candidate) {
+  const char* const sparse = candidate.sparse ? ", sparse" : "";
+  if (candidate.validity.kind == ValidityKind::crisp) {
+    const std::string name = fmt::format("{}{}", candidate.leaves == 1 ? "least squares" : "crisp", sparse);
+    return candidate.shrinkage > 0.0 ? fmt::format("{}, shrinkage {}", name, candidate.shrinkage) : name;
+  }
+  const std::string_view kind = candidate.validity.kind == ValidityKind::gaussian   ? "Gaussians"
+                                : candidate.validity.kind == ValidityKind::logistic ? "gates"
+                                                                                    : "blend";
+  std::string text = fmt::format("{}{}, width {}", kind, sparse, number(candidate.validity.width, 3));
+  text += candidate.jump < no_jump ? fmt::format(", jumps from {}", number(candidate.jump, 3)) : "";
+  text += candidate.estimation == Estimation::as_grown ? ", as grown"
+          : candidate.estimation == Estimation::local  ? ", local"
+                                                       : fmt::format(", ridge {}", candidate.ridge);
+  return candidate.shrinkage > 0.0 ? text + fmt::format(", shrinkage {}", candidate.shrinkage) : text;
+}
+
+Json candidate_json(const CandidateError& entry) {
+  const auto or_null = [](double value) { return std::isnan(value) ? Json(nullptr) : Json(value); };
+  return {{"validity", name_of(entry.candidate.validity.kind)},
+          {"width", entry.candidate.validity.width},
+          {"jump", entry.candidate.jump < no_jump ? Json(entry.candidate.jump) : Json(nullptr)},
+          {"estimation", name_of(entry.candidate.estimation)},
+          {"ridge", entry.candidate.ridge},
+          {"shrinkage", entry.candidate.shrinkage},
+          {"sparse", entry.candidate.sparse},
+          {"leaves", entry.candidate.leaves},
+          {"local_models", entry.candidate.leaves},
+          {"cv_rmse", or_null(entry.rmse)},
+          {"spread", or_null(entry.spread)}};
+}
+
+double least_squares_rmse(const PartitionSummary& partition) {
+  return partition.best_of_kind.empty() ? std::nan("") : partition.best_of_kind.front().rmse;
+}
+
+// How the held-out rows came to be.
+std::string selection_text(const FitRun& run, const PartitionSummary& partition) {
+  if (partition.cv_folds == 0) return "no held-out rows: the tree stays as grown";
+  if (partition.cv_folds == 1) {
+    return fmt::format("chosen on {} rows held out once", partition.held_out_rows);
+  }
+  return fmt::format("chosen by {}-fold cross-validation{}, the tree grown anew in every fold", partition.cv_folds,
+                     run.learning.contiguous ? " over contiguous blocks of rows" : "");
+}
+
+// What the local models are made of, and what spoke for it; nothing for what was not asked.
+std::string local_models_text(const FitRun& run, const FitSummary& summary) {
+  const FitOptions& asked = run.learning.options;
+  std::string text;
+  if (asked.terms != LocalTerms::linear) {
+    text += fmt::format("Local models are {}", summary.quadratic ? "quadratic" : "linear");
+    for (std::size_t p = 0; p < summary.other_terms.size(); ++p) {
+      text += fmt::format("{} RMSE held-out {}",
+                          p == 0 ? fmt::format("; {} ones:", summary.quadratic ? "linear" : "quadratic") : ",",
+                          number(summary.other_terms[p].rmse));
+    }
+    text += asked.terms == LocalTerms::automatic && summary.other_terms.empty()
+                ? ", without a comparison: it needs folds and 1 to 13 numeric regression inputs.\n"
+                : ".\n";
+  }
+  for (const PartitionSummary& partition : summary.partitions) {
+    if (partition.chosen.candidate.sparse) {
+      text +=
+          fmt::format("Sparse local models: {} coefficients in {} leaves.\n", partition.coefficients, partition.leaves);
+    }
+  }
+  return text;
+}
+
+// How the splits of the final tree were searched; nothing if there were none to search.
+std::string search_text(const SearchSummary& search) {
+  if (search.binned_nodes == 0) {
+    return search.exact_nodes == 0 || search.evaluations == 0 ? "" : "Splits searched exactly.\n";
+  }
+  return fmt::format(
+      "Splits searched by bins in {} nodes, exactly in {} small ones. {}\n", search.binned_nodes, search.exact_nodes,
+      search.largest_excess > 0.0
+          ? fmt::format("A better split may exist by at most {} % of a node's residual sum of squares; --search exact "
+                        "looks for it.",
+                        number(100.0 * search.largest_excess, 2))
+          : "There are no better ones.");
+}
+
+void print_data(const FitRun& run, const FitResult& result) {
+  std::vector<std::string> inputs;
+  std::vector<std::string> constant;
+  for (const InputColumn& input : result.model.inputs()) {
+    inputs.push_back(input.is_categorical() ? fmt::format("{} ({} categories)", input.name, input.levels.size())
+                                            : input.name);
+    if (input.low == input.high) {
+      constant.push_back(input.name);
+    }
+  }
+  print(fmt::format("{}: {} rows, {} inputs: {}\n", run.learning.data, result.summary.samples, inputs.size(),
+                    fmt::join(inputs, ", ")));
+  if (result.summary.missing_values > 0) {
+    print(fmt::format("Missing values in the inputs: {}\n", result.summary.missing_values));
+  }
+  if (!constant.empty()) {
+    print(fmt::format("Constant, so without influence: {}\n", fmt::join(constant, ", ")));
+  }
+}
+
+bool is_same_but_for_ridge(const Candidate& a, const Candidate& b) {
+  return a.validity.kind == b.validity.kind && a.validity.width == b.validity.width && a.jump == b.jump &&
+         a.leaves == b.leaves;
+}
+
+// The chosen model of every target, and below it what it was chosen against.
+Table models_table(const FitResult& result) {
+  Table table({"target", "model", "leaves", "RMSE held-out", "+-", "RMSE in-sample"});
+  for (const PartitionSummary& partition : result.summary.partitions) {
+    for (std::size_t o = 0; o < partition.outputs.size(); ++o) {
+      const std::string& target = result.model.outputs()[partition.outputs[o]].name;
+      table.add({target, describe(partition.chosen.candidate), fmt::format("{}", partition.leaves),
+                 number(partition.chosen.rmse), number(partition.chosen.spread, 2), number(partition.train_rmse(o))});
+      if (o > 0) continue;
+      const Candidate& chosen = partition.chosen.candidate;
+      for (const CandidateError& other : partition.best_of_kind) {
+        const Candidate& candidate = other.candidate;
+        if (!is_same_but_for_ridge(candidate, chosen)) {
+          table.add({"  against", describe(candidate), fmt::format("{}", candidate.leaves), number(other.rmse),
+                     number(other.spread, 2), ""});
+        }
+      }
+    }
+  }
+  return table;
+}
+
+}  // namespace
+
+Json summary_json(const FitRun& run, const FitResult& result) {
+  Json json;
+  json["data"] = run.learning.data;
+  json["rows"] = result.summary.samples;
+  json["missing_values"] = result.summary.missing_values;
+  json["rule"] = name_of(run.learning.options.rule);
+  json["min_leaf_samples"] = result.summary.min_leaf_samples;
+  json["inputs"] = Json::array();
+  for (const InputColumn& input : result.model.inputs()) {
+    json["inputs"].push_back(input.name);
+  }
+  json["local_models"] = result.summary.quadratic ? "quadratic" : "linear";
+  json["partitions"] = Json::array();
+  for (const PartitionSummary& partition : result.summary.partitions) {
+    Json entry;
+    for (std::size_t o = 0; o < partition.outputs.size(); ++o) {
+      entry["targets"].push_back(result.model.outputs()[partition.outputs[o]].name);
+      entry["train_rmse"].push_back(partition.train_rmse(o));
+    }
+    entry["leaves"] = partition.leaves;
+    entry["local_models"] = partition.leaves;  // one each
+    entry["grown_leaves"] = partition.grown_leaves;
+    entry["coefficients"] = partition.coefficients;
+    entry["rank_deficient_leaves"] = partition.rank_deficient_leaves;
+    entry["growth_ended_by"] = describe(partition.stop);
+    entry["search"] = {{"exact_nodes", partition.search.exact_nodes},
+                       {"binned_nodes", partition.search.binned_nodes},
+                       {"evaluations", partition.search.evaluations},
+                       {"largest_excess", partition.search.largest_excess}};
+    entry["cv_folds"] = partition.cv_folds;
+    const bool judged = partition.cv_folds > 0;
+    entry["chosen"] = candidate_json(partition.chosen);
+    entry["compared"] = Json::array();
+    for (const CandidateError& other : partition.best_of_kind) {
+      entry["compared"].push_back(candidate_json(other));
+    }
+    entry["cv_rmse"] = judged ? Json(partition.chosen.rmse) : Json(nullptr);
+    entry["cv_rmse_least_squares"] = judged ? Json(least_squares_rmse(partition)) : Json(nullptr);
+    entry["crisp_cv_rmse_by_leaves"] =
+        std::vector<double>(partition.crisp_cv_rmse.begin(), partition.crisp_cv_rmse.end());
+    if (!result.summary.other_terms.empty()) {
+      entry["other_terms"] = candidate_json(result.summary.other_terms[json["partitions"].size()]);
+    }
+    json["partitions"].push_back(std::move(entry));
+  }
+  json["model"] = run.output.empty() ? Json(nullptr) : Json(run.output);
+  return json;
+}
+
+void print_summary(const FitRun& run, const FitResult& result) {
+  print_data(run, result);
+  print(fmt::format("Rule {}, at least {} rows in a leaf; {}\n\n", name_of(run.learning.options.rule),
+                    result.summary.min_leaf_samples, selection_text(run, result.summary.partitions.front())));
+  print(models_table(result).text());
+  if (result.summary.partitions.front().outputs.size() > 1) {
+    print("Held-out errors of the shared tree are over all targets, each divided by its standard deviation.\n");
+  }
+  print(local_models_text(run, result.summary));
+  for (const PartitionSummary& partition : result.summary.partitions) {
+    print(search_text(partition.search));
+    // M5' drops inputs on its own; its leaves keep nothing of their parent's but what smoothing gives them.
+    if (partition.rank_deficient_leaves > 0 && !has_own_models(run.learning.options.rule)) {
+      print(fmt::format(
+          "Leaves whose rows do not determine all slopes (constant or collinear inputs, few rows) and keep their "
+          "parent's there: {}.\n",
+          partition.rank_deficient_leaves));
+    }
+  }
+  if (!run.output.empty()) {
+    print(fmt::format("Model written to {}\n", run.output));
+  }
+}
+
+}  // namespace llmt::apps
