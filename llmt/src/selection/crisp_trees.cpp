@@ -12,8 +12,8 @@ namespace {
 
 // Errors of crisp trees whose leaves have to be in order: each number of leaves has models of its own, so only some
 // are tried, each half as large again as the one before; the others are infinite.
-Eigen::VectorXd ordered_prefix_errors(const LeafSums& sums, Eigen::Index largest, double shrinkage, const FoldRows& fold,
-                                      const Eigen::VectorXd& weights) {
+Eigen::VectorXd ordered_prefix_errors(const LeafSums& sums, Eigen::Index largest, double shrinkage,
+                                      const FoldRows& fold, const Eigen::VectorXd& weights) {
   Eigen::VectorXd errors = Eigen::VectorXd::Constant(largest, std::numeric_limits<double>::infinity());
   for (Eigen::Index leaves = 1;; leaves = std::min(largest, leaves + (leaves + 1) / 2)) {
     const Partition models = shrinkage > 0.0 ? local(sums, leaves, shrinkage) : as_grown(sums, leaves);
@@ -53,7 +53,8 @@ void compare_crisp(const std::vector<FoldRows>& folds, const std::vector<GrownTr
         errors[v][f] = ordered_prefix_errors(sums, leaves, shrinkage, folds[f], weights);
         continue;
       }
-      const Partition models = sparse || shrinkage > 0.0 ? local(sums, leaves, shrinkage, sparse) : as_grown(sums, leaves);
+      const Partition models =
+          sparse || shrinkage > 0.0 ? local(sums, leaves, shrinkage, sparse) : as_grown(sums, leaves);
       errors[v][f] = prefix_squared_errors(models, folds[f].held_out, weights, max_threads);
       if (sparse && leaves > 1) {  // the root of a larger tree is full
         errors[v][f](0) =
