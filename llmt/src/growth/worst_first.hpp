@@ -8,8 +8,8 @@
 
 namespace llmt {
 
-/// A weighted sum of squared errors below this, per output, is rounding: the outputs' sums of squares are 1. AICc, which
-/// takes the logarithm of the error, does not go below it.
+/// A weighted sum of squared errors below this, per output, is rounding, for the outputs' sums of squares are 1. AICc,
+/// which takes the logarithm of the error, does not go below it.
 inline constexpr double least_loss = 1e-24;
 
 /// How growth ended.

@@ -9,8 +9,11 @@
 #include <vector>
 
 #include "llmt/fit.hpp"
+#include "oracles/messages.hpp"
 
 namespace local_models {
+
+using oracle::message_of;
 
 using llmt::LocalTerms;
 using llmt::SparseChoice;
@@ -64,15 +67,6 @@ inline Eigen::MatrixXd with_constant(const Eigen::MatrixXd& x) {
   Eigen::MatrixXd result(x.rows(), x.cols() + 1);
   result << Eigen::VectorXd::Ones(x.rows()), x;
   return result;
-}
-
-inline std::string message_of(const std::function<void()>& call) {
-  try {
-    call();
-  } catch (const std::invalid_argument& error) {
-    return error.what();
-  }
-  return "no std::invalid_argument";
 }
 
 }  // namespace local_models
