@@ -13,7 +13,7 @@ namespace llmt {
 namespace {
 
 // Rows for each unknown of the sample from which leverages are computed; they are then right to a few percent.
-constexpr Eigen::Index rows_per_unknown = 200;
+constexpr Eigen::Index sample_rows_per_unknown = 200;
 
 // Smallest eigenvalue of a scaled Gram matrix that is inverted: in rows, and relative to the largest one.
 constexpr double least_eigenvalue = 1e-6;
@@ -113,7 +113,7 @@ void describe_leaves(const TrainingRows& training, Partition& partition, bool sp
   const Eigen::Index regressors = std::ssize(training.regressors);
   const Evaluator evaluator(partition, training.columns, regressors);
   const Eigen::MatrixXd rss = residual_sums(training, partition, evaluator, max_threads);
-  const TrainingRows sample = thinned(training, rows_per_unknown * partition.num_leaves() * (regressors + 1));
+  const TrainingRows sample = thinned(training, sample_rows_per_unknown * partition.num_leaves() * (regressors + 1));
   const std::vector<Eigen::MatrixXd> gram = gram_matrices(sample, partition, evaluator, max_threads);
   Eigen::VectorXd scale = Eigen::VectorXd::Ones(regressors + 1);
   for (Eigen::Index k = 0; k < regressors; ++k) {

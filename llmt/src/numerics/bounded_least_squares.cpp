@@ -8,7 +8,7 @@ namespace {
 
 // Added to the diagonal of the Gram matrix of normals of length 1, so that it stays positive definite when two
 // inequalities are nearly the same.
-constexpr double diagonal = 1e-13;
+constexpr double added_to_diagonal = 1e-13;
 
 // An inequality counts as violated if more than this is missing, relative to its bound, plus this part of the largest
 // bound.
@@ -61,7 +61,7 @@ void LeastDistance::enter(Eigen::Index c) {
   const auto lower = factor_.topLeftCorner(size, size).triangularView<Eigen::Lower>();
   lower.solveInPlace(row);
   factor_.row(size).head(size) = row.transpose();
-  factor_(size, size) = std::sqrt(std::max(gram_(c, c) - row.squaredNorm(), 0.0) + diagonal);
+  factor_(size, size) = std::sqrt(std::max(gram_(c, c) - row.squaredNorm(), 0.0) + added_to_diagonal);
   active_.push_back(c);
 }
 
@@ -80,7 +80,7 @@ bool LeastDistance::exchange(const Eigen::VectorXd& tolerance) {
   std::vector<Eigen::Index> active = active_;
   for (int attempt = 0; attempt < most_exchanges; ++attempt) {
     Eigen::MatrixXd matrix = gram_(active, active);
-    matrix.diagonal().array() += diagonal;
+    matrix.diagonal().array() += added_to_diagonal;
     const Eigen::LLT<Eigen::MatrixXd> factor(matrix);
     const Eigen::VectorXd right = bounds_(active);
     const Eigen::VectorXd solution = factor.solve(right);

@@ -5,17 +5,15 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <numeric>
 #include <stdexcept>
 
+#include "kinematics/units.hpp"
 #include "llmt/random.hpp"
 #include "llmt/robotics/simulation.hpp"
 
 namespace llmt::robotics {
 namespace {
-
-constexpr double radians = std::numbers::pi / 180.0;
 
 // The two explanations: what was found, and all that may be fitted to imitate it.
 struct ExplanationPair {

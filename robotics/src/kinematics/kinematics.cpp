@@ -3,14 +3,13 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <stdexcept>
 #include <string>
 
+#include "kinematics/units.hpp"
+
 namespace llmt::robotics {
 namespace {
-
-constexpr double radians = std::numbers::pi / 180.0;
 
 // R := R * rotation about its own axis: only the other two columns change.
 void rotate(Eigen::Matrix3d& rotation, int axis, double sine, double cosine) {

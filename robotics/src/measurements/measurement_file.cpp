@@ -3,20 +3,18 @@
 
 #include <algorithm>
 #include <map>
-#include <numbers>
 #include <optional>
 #include <regex>
 #include <set>
 #include <stdexcept>
 
 #include "effects/effect_entries.hpp"
+#include "kinematics/units.hpp"
 #include "llmt/csv.hpp"
 #include "llmt/robotics/measurements.hpp"
 
 namespace llmt::robotics {
 namespace {
-
-constexpr double radians = std::numbers::pi / 180.0;
 
 const std::map<std::string, double> lengths_in_mm = {{"mm", 1.0}, {"m", 1000.0}, {"um", 0.001}};
 const std::map<std::string, double> angles_in_rad = {{"rad", 1.0}, {"deg", radians}};

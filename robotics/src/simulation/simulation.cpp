@@ -4,16 +4,14 @@
 
 #include <cmath>
 #include <cstdlib>
-#include <numbers>
 #include <stdexcept>
 
+#include "kinematics/units.hpp"
 #include "llmt/random.hpp"
 #include "robot/robot_evaluator.hpp"
 
 namespace llmt::robotics {
 namespace {
-
-constexpr double radians = std::numbers::pi / 180.0;
 
 std::array<double, 2> limits_of(const Joint& joint) {
   const bool turns = joint.type == JointType::revolute;

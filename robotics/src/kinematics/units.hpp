@@ -1,0 +1,11 @@
+/// \file
+/// Units of angles.
+#pragma once
+
+#include <numbers>
+
+namespace llmt::robotics {
+
+inline constexpr double radians = std::numbers::pi / 180.0;  ///< in one degree
+
+}  // namespace llmt::robotics
