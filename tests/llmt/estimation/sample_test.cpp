@@ -49,7 +49,6 @@ Partition blended_tree(const llmt::TrainingRows& training) {
   problem.options.min_leaf_samples = 10;
   problem.options.max_leaves = 8;
   problem.options.split_inputs = {0, 1, 2};
-  problem.options.shared_partition = true;
   Partition partition{
       .outputs = {0, 1}, .validity = {llmt::ValidityKind::blend, 1.0, 1}, .nodes = llmt::grow(problem).nodes};
   llmt::set_half_widths(partition, training.low(), training.high());
