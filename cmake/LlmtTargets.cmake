@@ -13,8 +13,8 @@ function(llmt_target_defaults target)
   )
 endfunction()
 
-# Eigen's templates are instantiated again in every source; ten sources compiled as one take about half of the time.
-option(LLMT_UNITY_BUILD "Compile the libraries' sources ten at a time, for builds from scratch" OFF)
+# Eigen's templates are instantiated again in every source; the sources of a room compiled as one take less than half of the time.
+option(LLMT_UNITY_BUILD "Compile the sources of a room of a library as one, for builds from scratch" OFF)
 
 # llmt_library(TARGET NAME): the alias llmt::NAME, and what an exported library needs. The caller adds sources, the header
 # file set and dependencies.
@@ -29,8 +29,24 @@ function(llmt_library target name)
                SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR}
                POSITION_INDEPENDENT_CODE ON
                VERIFY_INTERFACE_HEADER_SETS ON)
+endfunction()
+
+# llmt_rooms(TARGET EXCEPT <regex>...): adds every source below this folder but those whose path matches EXCEPT. With
+# LLMT_UNITY_BUILD the sources of a room are compiled as one.
+function(llmt_rooms target)
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "EXCEPT")
+  file(GLOB_RECURSE sources CONFIGURE_DEPENDS RELATIVE "${CMAKE_CURRENT_SOURCE_DIR}" *.cpp)
+  foreach(regex IN LISTS arg_EXCEPT)
+    list(FILTER sources EXCLUDE REGEX "${regex}")
+  endforeach()
+  target_sources(${target} PRIVATE ${sources})
   if(LLMT_UNITY_BUILD)
-    set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 10)
+    set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_MODE GROUP)
+    foreach(source IN LISTS sources)
+      get_filename_component(room "${source}" DIRECTORY)
+      string(MAKE_C_IDENTIFIER "${room}" room)
+      set_source_files_properties("${source}" PROPERTIES UNITY_GROUP "${room}")
+    endforeach()
   endif()
 endfunction()
 

@@ -5,12 +5,10 @@
 
 #include "estimation/estimate.hpp"
 #include "estimation/leaf_statistics.hpp"
+#include "stream/setting.hpp"
 
 namespace llmt {
 namespace {
-
-// A leaf with fewer rows per coefficient than this keeps the model that predict() uses.
-constexpr Eigen::Index few_rows_per_coefficient = 2;
 
 // The inverse Gram matrix of [1, deviations] of the model, from the sums of [1, z - origin].
 Eigen::MatrixXd inverse_gram_of(const StreamSetting& setting, const Basis& basis, const Sums& sums,

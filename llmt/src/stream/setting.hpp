@@ -8,6 +8,9 @@
 
 namespace llmt {
 
+/// A local model is not made from fewer rows per coefficient than this.
+inline constexpr Eigen::Index few_rows_per_coefficient = 2;
+
 /// A row on its way down a tree.
 struct StreamRow {
   const double* x;  ///< inputs; NaN: missing

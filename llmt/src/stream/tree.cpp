@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "numerics/f_distribution.hpp"
+#include "stream/setting.hpp"
 
 namespace llmt {
 namespace {
@@ -23,9 +24,6 @@ constexpr Eigen::Index epoch_growth = 2;
 
 // Models are solved for anew when their number of rows has grown by this factor.
 constexpr double solve_growth = 1.05;
-
-// Models are not made from fewer rows per coefficient than this.
-constexpr Eigen::Index few_rows_per_coefficient = 2;
 
 }  // namespace
 

@@ -9,7 +9,6 @@
 
 #include "llmt/fit.hpp"
 #include "model/tree.hpp"
-#include "llmt/fit.hpp"
 #include "oracles/oracles.hpp"
 #include "oracles/stream_data.hpp"
 #include "stream/blend_correction.hpp"
