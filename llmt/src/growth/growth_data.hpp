@@ -55,7 +55,7 @@ struct GrowthData {
   bool is_significant(double level, double weight, int rank, double rss, const SplitRanks& split, double split_rss,
                       Eigen::Index tested) const;
 
-  /// Threads for work on so many numbers: one where starting another costs more than it saves.
+  /// Threads for work on `work` numbers: one where starting another costs more than it saves.
   int threads_for(Eigen::Index work) const { return work < 30000 ? 1 : problem.max_threads; }
 };
 
