@@ -27,8 +27,8 @@ struct StreamOptions {
   /// A leaf's model is drawn to the model that its parent had when it was split, as if this many further rows of the
   /// leaf lay on it.
   double shrinkage = 0.1;
-  /// Rows that are kept. At most a quarter of them is held out: these choose crisp or blended leaves and the leaf count
-  /// of a snapshot. The others estimate blends. 0: a snapshot is the crisp tree as it stands.
+  /// Rows that are kept. One in eight is held out: these choose crisp or blended leaves and the leaf count of a
+  /// snapshot. The others estimate blends. 0: a snapshot is the crisp tree as it stands.
   Eigen::Index reservoir_rows = 20000;
 };
 

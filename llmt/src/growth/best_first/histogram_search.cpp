@@ -10,8 +10,8 @@ namespace {
 
 constexpr double none = std::numeric_limits<double>::infinity();
 
-// Searching a bin exactly costs several times per row what the histogram costs. So the bins that are searched exactly may
-// hold at most one row in this number of rows.
+// Searching a bin exactly costs several times per row what the histogram costs. So the bins that are searched exactly
+// may hold at most one row in this number of rows.
 constexpr Eigen::Index searched_part = 2;
 
 // Sums over the bins on one side of every edge, and the models that follow from them.
