@@ -58,7 +58,7 @@ Eigen::MatrixXd read_same_inputs(const Csv& simulated, const Csv& measured, cons
 void check_names(const DiscoverArguments& arguments) {
   for (const std::vector<std::string>* names : {&arguments.inputs, &arguments.outputs}) {
     for (std::size_t k = 0; k < names->size(); ++k) {
-      const auto rest = names->begin() + static_cast<Eigen::Index>(k) + 1;
+      const auto rest = names->begin() + k + 1;
       if (std::find(rest, names->end(), (*names)[k]) != names->end()) {
         throw std::invalid_argument(fmt::format("\"{}\" is given twice", (*names)[k]));
       }

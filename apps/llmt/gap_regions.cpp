@@ -13,7 +13,7 @@ namespace {
 std::string region_conditions(const std::vector<std::string>& names, const Leaf& leaf) {
   std::vector<std::string> parts;
   for (std::size_t j = 0; j < names.size(); ++j) {
-    const auto column = static_cast<Eigen::Index>(j);
+    const Eigen::Index column = j;
     if (std::isfinite(leaf.low(column))) parts.push_back(fmt::format("{} > {}", names[j], number(leaf.low(column), 3)));
     if (std::isfinite(leaf.high(column))) {
       parts.push_back(fmt::format("{} <= {}", names[j], number(leaf.high(column), 3)));
@@ -42,7 +42,7 @@ std::vector<GapRegion> gap_regions(const discovery::Inputs& inputs, const discov
   options.regression_inputs = {static_cast<int>(p)};
   std::vector<GapRegion> regions;
   for (std::size_t o = 0; o < measured.names.size(); ++o) {
-    const auto column = static_cast<Eigen::Index>(o);
+    const Eigen::Index column = o;
     const Eigen::MatrixXd gap = (measured.values.col(column) - missing.before.col(column)).cwiseAbs()(rows);
     const Model model = fit(table, gap, options).model;
     const Eigen::MatrixXi leaf_of = model.leaf_of(table);

@@ -176,7 +176,7 @@ void print_model(const Model& model, const std::string& path) {
       Table table({"leaf", "rows", "RMSE", "where", name + " ="});
       const std::vector<Leaf> leaves = model.leaves(p);
       for (std::size_t k = 0; k < leaves.size(); ++k) {
-        const Eigen::Index output = static_cast<Eigen::Index>(o);
+        const Eigen::Index output = o;
         table.add({fmt::format("{}", k + 1), fmt::format("{}", leaves[k].samples), number(leaves[k].rmse(output), 3),
                    conditions(model, partition, leaves[k]), formula(model, leaves[k], output)});
       }
@@ -217,7 +217,7 @@ Json leaf_table(const Model& model) {
                          {"width", partition.validity.width},
                          {"smoothness", partition.validity.smoothness}};
     for (const int output : partition.outputs) {
-      entry["targets"].push_back(model.outputs()[static_cast<std::size_t>(output)].name);
+      entry["targets"].push_back(model.outputs()[output].name);
     }
     for (std::size_t i = 0; i < partition.nodes.size(); ++i) {
       if (const Node& node = partition.nodes[i]; node.is_oblique()) {

@@ -81,7 +81,7 @@ Predicted predict_table(const PredictArguments& arguments, const Model& model, c
   predicted.rmse = Eigen::VectorXd::Constant(model.num_outputs(), std::nan(""));
   for (std::size_t o = 0; o < predicted.targets.size(); ++o) {
     if (csv.has(predicted.targets[o]) && csv.rows() > 0) {
-      const Eigen::Index column = static_cast<Eigen::Index>(o);
+      const Eigen::Index column = o;
       try {
         predicted.rmse(column) =
             rmse(predicted.values.col(column), csv.numbers(predicted.targets[o], arguments.threads))(0);
@@ -148,7 +148,7 @@ Json summary_json(const Predicted& predicted, bool with_values) {
   json["unknown_categories"] = predicted.unknown;
   json["targets"] = Json::array();
   for (std::size_t o = 0; o < predicted.targets.size(); ++o) {
-    const Eigen::Index column = static_cast<Eigen::Index>(o);
+    const Eigen::Index column = o;
     Json target = {{"name", predicted.targets[o]},
                    {"rmse", std::isnan(predicted.rmse(column)) ? Json(nullptr) : Json(predicted.rmse(column))}};
     if (with_values) {

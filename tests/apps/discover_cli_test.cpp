@@ -14,7 +14,7 @@ using nlohmann::json;
 using program::Folder;
 using program::Outcome;
 
-const std::string discover = std::string(LLMT_PROGRAM) + " discover ";
+const std::string discover = LLMT_PROGRAM " discover ";
 
 struct Row {
   double t;

@@ -16,9 +16,7 @@ using program::Folder;
 using program::Outcome;
 
 // `llmt fit --stream` of column y of `data`.
-std::string fit_stream(const std::string& data) {
-  return std::string(LLMT_PROGRAM) + " fit " + data + " --stream -t y ";
-}
+std::string fit_stream(const std::string& data) { return LLMT_PROGRAM " fit " + data + " --stream -t y "; }
 
 // y has a kink in `a`; a row in ten has no `b`.
 std::string kinked(int rows, const char* line_end = "\n") {
@@ -69,9 +67,9 @@ TEST(StreamProgram, TheModelPredictsAndIsInspected) {
   ASSERT_EQ(fitted.exit_code, 0) << fitted.err;
   EXPECT_NE(fitted.out.find("d.csv: 5000 rows, 1 inputs: a"), std::string::npos) << fitted.out;
   EXPECT_NE(fitted.out.find("RMSE before learning"), std::string::npos);
-  const json predicted = json::parse(folder.run(std::string(LLMT_PROGRAM) + " predict m.json d.csv --json").out);
+  const json predicted = json::parse(folder.run(LLMT_PROGRAM " predict m.json d.csv --json").out);
   EXPECT_LT(predicted["targets"][0]["rmse"], 0.06);
-  EXPECT_EQ(folder.run(std::string(LLMT_PROGRAM) + " inspect m.json").exit_code, 0);
+  EXPECT_EQ(folder.run(LLMT_PROGRAM " inspect m.json").exit_code, 0);
 }
 
 TEST(StreamProgram, RefusesWithFileLineAndColumn) {
@@ -102,7 +100,7 @@ TEST(StreamProgram, WrongUsageIsSaid) {
   const Folder folder;
   folder.write("d.csv", kinked(100));
   const auto usage = [&](const std::string& command) {
-    const Outcome outcome = folder.run(std::string(LLMT_PROGRAM) + " fit " + command);
+    const Outcome outcome = folder.run(LLMT_PROGRAM " fit " + command);
     EXPECT_EQ(outcome.exit_code, 2) << command << outcome.err;
     return outcome.err;
   };

@@ -64,7 +64,7 @@ std::vector<Isometry3d> frames(const Pieces& pieces, const Eigen::VectorXd& q, c
     frame = frame * piece;
     if (joint) {
       if (change != nullptr) frame = frame * turn_by(change->tilt[j]);
-      const auto index = static_cast<Eigen::Index>(j);
+      const Eigen::Index index = j;
       frame = frame * turn(Vector3d::UnitZ(), q(index) + (change != nullptr ? change->angle(index) : 0.0));
     }
     result.push_back(frame);
@@ -97,14 +97,14 @@ Eigen::VectorXd gravity_torque(const Pieces& pieces, const Eigen::VectorXd& q, d
 
 Bar bar_of_link(const Arm& arm, int joint) {
   const Pieces pieces(arm);
-  const auto next = static_cast<std::size_t>(joint) + 1;
+  const std::size_t next = joint + 1;
   const Isometry3d& piece = pieces.rigid[next];
   if (joint + 1 == arm.size()) {
     const double length = piece.translation().norm();
     return {Vector3d::Zero(), piece.translation() / length, length};
   }
   const Joint& owner = arm.joints[arm.mdh ? next : next - 1];
-  const double depth = pieces.com[static_cast<std::size_t>(joint)].z();
+  const double depth = pieces.com[joint].z();
   if (std::abs(owner.a) >= std::abs(owner.d)) {
     const double angle = arm.mdh ? 0.0 : owner.theta;
     const Vector3d along(std::cos(angle), std::sin(angle), 0.0);
@@ -125,7 +125,7 @@ std::string to_yaml(const Arm& arm, const std::vector<int>& elastic_joints, cons
   text +=
       fmt::format("payload: {{mass_kg: {:.10g}, com_mm: {}}}\njoints:\n", arm.payload, numbers(arm.payload_com, 1e3));
   for (int j = 0; j < arm.size(); ++j) {
-    const Joint& joint = arm.joints[static_cast<std::size_t>(j)];
+    const Joint& joint = arm.joints[j];
     text += fmt::format(
         "  - {{name: joint{}, type: revolute, alpha_deg: {:.10g}, a_mm: {:.10g}, d_mm: {:.10g}, theta_deg: {:.10g},\n"
         "     limits_deg: [{:.10g}, {:.10g}],",

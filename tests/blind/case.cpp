@@ -44,10 +44,10 @@ void make_elastic(Case& c, bool very, llmt::Random& random) {
   // A wrong load or gravity shows on a soft arm only, and the planar arm is a stiff one.
   const double low = very ? 0.7 * scale.main_high : std::sqrt(scale.main_low * scale.main_high);
   const double high = very ? (c.arm.planar ? 4.0 : 1.5) * scale.main_high : scale.main_high;
-  c.base.joint_compliance.assign(static_cast<std::size_t>(c.arm.size()), 0.0);
+  c.base.joint_compliance.assign(c.arm.size(), 0.0);
   for (const int joint : {first, first + 1}) {
     const double value = log_uniform(random, low, high);
-    c.base.joint_compliance[static_cast<std::size_t>(joint)] = value;
+    c.base.joint_compliance[joint] = value;
     c.elastic_joints.push_back(joint);
     c.elastic_values.push_back(value);
   }
@@ -111,8 +111,8 @@ bool hide(Case& c, const std::vector<std::string>& kinds, llmt::Random& random) 
     if (aliases(c.arm, c.hidden[0].effect, c.hidden[1].effect)) return false;
     const double dot = seen[0].dot(seen[1]);
     for (int k = 0; k < 2; ++k) {
-      HiddenShare& share = c.hidden[static_cast<std::size_t>(k)];
-      share.lambda_beyond_other = share.lambda - dot * dot / seen[static_cast<std::size_t>(1 - k)].squaredNorm();
+      HiddenShare& share = c.hidden[k];
+      share.lambda_beyond_other = share.lambda - dot * dot / seen[1 - k].squaredNorm();
     }
     const auto [low, high] = std::minmax(c.hidden[0].lambda, c.hidden[1].lambda);
     const double beyond = std::min(c.hidden[0].lambda_beyond_other, c.hidden[1].lambda_beyond_other);
@@ -144,13 +144,13 @@ void measure(Case& c, llmt::Random& random) {
 
   // Dwelling repeats see only part of what coming back would scatter; the rest is common to them.
   constexpr double own = 0.6;
-  std::vector<Eigen::Vector3d> common(static_cast<std::size_t>(c.options.poses) + 1, Eigen::Vector3d::Zero());
+  std::vector<Eigen::Vector3d> common(c.options.poses + 1, Eigen::Vector3d::Zero());
   for (Eigen::Vector3d& shift : common) shift = Eigen::Vector3d(noise(), noise(), noise()) * std::sqrt(1.0 - own * own);
   for (Eigen::Index i = 0; i < c.measured_mm.rows(); ++i) {
-    const auto row = static_cast<std::size_t>(i);
+    const std::size_t row = i;
     const bool dwelled = c.options.dwelled && c.sessions.measured.returned[row];
     for (int k = 0; k < 3; ++k) c.measured_mm(i, k) += (dwelled ? own : 1.0) * noise();
-    if (dwelled) c.measured_mm.row(i) += common[static_cast<std::size_t>(c.sessions.measured.pose[row])].transpose();
+    if (dwelled) c.measured_mm.row(i) += common[c.sessions.measured.pose[row]].transpose();
   }
   for (Eigen::Index i = 0; i < c.held_out_mm.rows(); ++i) {
     for (int k = 0; k < 3; ++k) c.held_out_mm(i, k) += noise();
@@ -159,7 +159,7 @@ void measure(Case& c, llmt::Random& random) {
   const auto rows = random.permutation(c.measured_mm.rows());
   const auto wanted = std::max<std::ptrdiff_t>(1, (3 * c.measured_mm.rows() + 50) / 100);
   for (std::ptrdiff_t k = 0; k < wanted; ++k) {
-    const auto row = rows[static_cast<std::size_t>(k)];
+    const auto row = rows[k];
     Eigen::Vector3d way(random.normal(), random.normal(), c.arm.planar ? 0.0 : random.normal());
     c.measured_mm.row(row) += log_uniform(random, 10.0, 100.0) * c.noise_mm * way.normalized().transpose();
     c.outliers.push_back(static_cast<int>(row));
@@ -187,7 +187,7 @@ Case make_case(const Order& order) {
       // An order that is no multiple of a known ratio must come without the ratio, one that is with it.
       constexpr std::array<double, 6> ratios = {100, 101, 120.5, 121, 80, 161};
       for (int j = 0; j < c.arm.size(); ++j) {
-        const auto index = static_cast<std::size_t>(j);
+        const std::size_t index = j;
         const double ratio = has("transmission_error_order") ? 0.0 : ratios[random.below(ratios.size())];
         c.described.joints[index].gear_ratio = c.arm.joints[index].gear_ratio = ratio;
       }

@@ -70,7 +70,7 @@ std::string to_csv(const Session& s, const Eigen::MatrixXd& points_mm, bool plan
     text += fmt::format("{:g},{:.4f},{:.3f},{:.6g}", s.payload(i), s.temperature(i), s.time(i), s.order(i));
     for (Eigen::Index j = 0; j < joints; ++j) text += fmt::format(",{:g}", s.approach(i, j));
     for (Eigen::Index j = 0; j < joints; ++j) text += fmt::format(",{:.9f}", s.read_back(i, j));
-    const auto row = static_cast<std::size_t>(i);
+    const std::size_t row = i;
     text += repeats ? fmt::format(",{},{}\n", s.pose[row], s.returned[row] ? 1 : 0) : "\n";
   }
   return text;

@@ -34,7 +34,7 @@ int main(int argc, char** argv) {
     }
     if (orders.empty()) throw std::invalid_argument("no case with this arm and kind");
     const auto begin = std::min<std::size_t>(static_cast<std::size_t>(std::max(first, 0)), orders.size());
-    const auto end = count < 0 ? orders.size() : std::min(orders.size(), begin + static_cast<std::size_t>(count));
+    const auto end = count < 0 ? orders.size() : std::min(orders.size(), begin + count);
     for (std::size_t i = begin; i < end; ++i) blind::write(blind::make_case(orders[i]), folder);
     fmt::print("{} cases in {}\n", end - begin, folder);
     return 0;

@@ -9,7 +9,7 @@ namespace blind {
 Eigen::MatrixXd positions_mm(const Arm& arm, const Elasticity& base, const std::vector<const Hidden*>& hidden,
                              const Session& session) {
   const Pieces pieces(arm);
-  std::vector<Change> changes(static_cast<std::size_t>(session.count()), Change(arm.size()));
+  std::vector<Change> changes(session.count(), Change(arm.size()));
   Elasticity elasticity = base;
   for (const Hidden* effect : hidden) {
     if (effect->elastic) effect->elastic(elasticity);
@@ -20,7 +20,7 @@ Eigen::MatrixXd positions_mm(const Arm& arm, const Elasticity& base, const std::
   const Eigen::Isometry3d to_base = pieces.base.inverse();
   Eigen::MatrixXd points(session.count(), 3);
   for (Eigen::Index i = 0; i < session.count(); ++i) {
-    const Change& change = changes[static_cast<std::size_t>(i)];
+    const Change& change = changes[i];
     const Eigen::VectorXd q = session.q.row(i).transpose();
     Eigen::Vector3d point = tool_point(pieces, q, &change);
     if (at_rest) {  // the deflection, at the angles where the drives really are
@@ -40,17 +40,17 @@ GeometryFree::GeometryFree(const Arm& arm, const Elasticity& base, const Session
   std::vector<int> soft;
   if (elastic) {
     for (int j = 0; j < joints; ++j) {
-      if (base.joint_compliance[static_cast<std::size_t>(j)] > 0.0) soft.push_back(j);
+      if (base.joint_compliance[j] > 0.0) soft.push_back(j);
     }
   }
   const Eigen::Index axes = planar_ ? 2 : 3, twists = 6 * (joints + 1);
-  Eigen::MatrixXd all(session.count() * axes, twists + 3 + static_cast<Eigen::Index>(soft.size()));
+  Eigen::MatrixXd all(session.count() * axes, twists + 3 + soft.size());
   for (Eigen::Index i = 0; i < session.count(); ++i) {
     const std::vector<Eigen::Isometry3d> frame = frames(pieces, session.q.row(i).transpose());
     const Eigen::Vector3d tool = frame.back().translation();
     Eigen::Index column = 0;
     for (int j = -1; j < joints; ++j) {
-      const Eigen::Isometry3d& at = j < 0 ? pieces.base : frame[static_cast<std::size_t>(j)];
+      const Eigen::Isometry3d& at = j < 0 ? pieces.base : frame[j];
       for (int k = 0; k < 3; ++k) {
         const Eigen::Vector3d axis = at.linear().col(k), moved = axis.cross(tool - at.translation());
         all.col(column++).segment(i * axes, axes) = axis.head(axes);
@@ -62,8 +62,8 @@ GeometryFree::GeometryFree(const Arm& arm, const Elasticity& base, const Session
   const Eigen::MatrixXd before = elastic ? positions_mm(arm, base, {}, session) : Eigen::MatrixXd();
   for (std::size_t k = 0; k < soft.size(); ++k) {
     Elasticity softer = base;
-    softer.joint_compliance[static_cast<std::size_t>(soft[k])] *= 1.5;
-    all.col(twists + 3 + static_cast<Eigen::Index>(k)) = stacked(positions_mm(arm, softer, {}, session) - before);
+    softer.joint_compliance[soft[k]] *= 1.5;
+    all.col(twists + 3 + k) = stacked(positions_mm(arm, softer, {}, session) - before);
   }
   for (Eigen::Index c = 0; c < all.cols(); ++c) {
     const double norm = all.col(c).norm();

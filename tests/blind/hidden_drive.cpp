@@ -17,8 +17,7 @@ template <typename Error>
 void at_joint(Hidden& h, int joint, Error error) {
   h.locations = {joint_name(joint)};
   h.change = [joint, error](const Session& s, std::vector<Change>& changes) {
-    for (Eigen::Index i = 0; i < s.count(); ++i)
-      changes[static_cast<std::size_t>(i)].angle(joint) += error(s.q(i, joint));
+    for (Eigen::Index i = 0; i < s.count(); ++i) changes[i].angle(joint) += error(s.q(i, joint));
   };
 }
 
@@ -55,7 +54,7 @@ void eccentricity_twice(Hidden& h, const Scene& s, int joint) {
 
 void transmission(Hidden& h, const Scene& s, int joint, bool by_gear) {
   const double a = log_uniform(s.random, 5e-5, 3e-4), first = phase(s.random), second = phase(s.random);
-  const double ratio = s.arm.joints[static_cast<std::size_t>(joint)].gear_ratio;
+  const double ratio = s.arm.joints[joint].gear_ratio;
   const double order = by_gear ? 2.0 * ratio : log_uniform(s.random, 15.0, 120.0);
   h.parameters = {{"amplitude", joint_name(joint), a, "rad"}, {"per_turn", joint_name(joint), order, "1"}};
   at_joint(h, joint, [=](double q) {
@@ -91,25 +90,25 @@ void hysteresis(Hidden& h, const Scene& s, int joint) {
       if (std::abs(before - at) > 2.0 * last_move) follower.move(before - at);
       at = session.q(i, joint);
       follower.move(at - before);
-      changes[static_cast<std::size_t>(i)].angle(joint) -= width * follower.state;
+      changes[i].angle(joint) -= width * follower.state;
     }
   };
 }
 
 void read_back_lag(Hidden& h, const Scene& s) {
-  std::vector<double> share(static_cast<std::size_t>(s.joints()), 0.0);
+  std::vector<double> share(s.joints(), 0.0);
   const int only = s.random.uniform() < 0.6 ? s.pick(0, std::min(s.joints() - 1, 4)) : -1;
   for (int j = 0; j < s.joints(); ++j) {
     if (only >= 0 && j != only) continue;
-    share[static_cast<std::size_t>(j)] = log_uniform(s.random, 0.05, 0.6);
+    share[j] = log_uniform(s.random, 0.05, 0.6);
     h.locations.push_back(joint_name(j));
-    h.parameters.push_back({"share", joint_name(j), share[static_cast<std::size_t>(j)], "1"});
+    h.parameters.push_back({"share", joint_name(j), share[j], "1"});
   }
   h.change = [share](const Session& session, std::vector<Change>& changes) {
     for (Eigen::Index i = 0; i < session.count(); ++i) {
       for (std::size_t j = 0; j < share.size(); ++j) {
-        const auto c = static_cast<Eigen::Index>(j);
-        changes[static_cast<std::size_t>(i)].angle(c) += share[j] * (session.read_back(i, c) - session.q(i, c));
+        const Eigen::Index c = j;
+        changes[i].angle(c) += share[j] * (session.read_back(i, c) - session.q(i, c));
       }
     }
   };
@@ -122,7 +121,7 @@ void wrist_coupling(Hidden& h, const Scene& s) {
   h.parameters = {{"coupling", joint_name(joint), k, "1"}};
   h.change = [joint, k](const Session& session, std::vector<Change>& changes) {
     for (Eigen::Index i = 0; i < session.count(); ++i) {
-      changes[static_cast<std::size_t>(i)].angle(joint) += k * session.q(i, joint - 1);
+      changes[i].angle(joint) += k * session.q(i, joint - 1);
     }
   };
 }

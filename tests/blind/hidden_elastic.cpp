@@ -32,12 +32,12 @@ void joint_compliance(Hidden& h, const Scene& s) {
     if (std::ranges::find(joints, next) == joints.end()) joints.push_back(next);
   }
   std::ranges::sort(joints);
-  std::vector<double> compliance(static_cast<std::size_t>(s.joints()), 0.0);
+  std::vector<double> compliance(s.joints(), 0.0);
   for (const int j : joints) {
     const bool wrist = j >= 3;
     const double c = log_uniform(s.random, wrist ? s.scale.wrist_low : s.scale.main_low,
                                  wrist ? s.scale.wrist_high : s.scale.main_high);
-    compliance[static_cast<std::size_t>(j)] = c;
+    compliance[j] = c;
     h.locations.push_back(joint_name(j));
     h.parameters.push_back({"compliance", joint_name(j), c, "rad/Nm"});
   }

@@ -27,8 +27,7 @@ void axis_wobble(Hidden& h, const Scene& s) {
     for (Eigen::Index i = 0; i < session.count(); ++i) {
       const double at = session.q(i, joint) + ahead;
       const Vector3d lean(angle * std::cos(at), second * std::sin(at), 0.0);
-      changes[static_cast<std::size_t>(i)].tilt[static_cast<std::size_t>(joint)] +=
-          Eigen::AngleAxisd(turned, Vector3d::UnitZ()) * lean;
+      changes[i].tilt[joint] += Eigen::AngleAxisd(turned, Vector3d::UnitZ()) * lean;
     }
   };
 }
@@ -37,12 +36,12 @@ void thermal_growth(Hidden& h, const Scene& s) {
   std::vector<double> growth;
   for (int j = 0; j <= s.joints(); ++j) growth.push_back(s.random.uniform(10e-6, 14e-6));
   for (int j = 0; j < s.joints(); ++j) {
-    h.parameters.push_back({"growth", joint_name(j), growth[static_cast<std::size_t>(j) + 1], "1/K"});
+    h.parameters.push_back({"growth", joint_name(j), growth[j + 1], "1/K"});
   }
   h.change = [growth](const Session& session, std::vector<Change>& changes) {
     for (Eigen::Index i = 0; i < session.count(); ++i) {
       for (std::size_t j = 0; j < growth.size(); ++j) {
-        changes[static_cast<std::size_t>(i)].stretch[j] += growth[j] * (session.temperature(i) - 20.0);
+        changes[i].stretch[j] += growth[j] * (session.temperature(i) - 20.0);
       }
     }
   };
@@ -56,7 +55,7 @@ void drift(Hidden& h, const Scene& s) {
     for (Eigen::Index i = 0; i < session.count(); ++i) {
       const double t = (session.time(i) - session.time_span(0)) / (session.time_span(1) - session.time_span(0));
       const Eigen::Isometry3d moved(Eigen::Translation3d((t + curve * (t * t - t)) * way));
-      Change& change = changes[static_cast<std::size_t>(i)];
+      Change& change = changes[i];
       change.world = moved * change.world;
     }
   };
@@ -79,7 +78,7 @@ void tracker_knock(Hidden& h, const Scene& s) {
   for (int i = 0; i < 3; ++i) h.parameters.push_back({std::string("shift_") + "xyz"[i], "", shift(i) * 1e3, "mm"});
   h.change = [moment, moved](const Session& session, std::vector<Change>& changes) {
     for (Eigen::Index i = 0; i < session.count(); ++i) {
-      Change& change = changes[static_cast<std::size_t>(i)];
+      Change& change = changes[i];
       if (session.time(i) > moment) change.world = moved * change.world;
     }
   };

@@ -12,7 +12,7 @@ using Eigen::Vector3d;
 constexpr double pi = std::numbers::pi;
 
 double inside(const Scene& s, int joint, double share) {
-  const Joint& j = s.arm.joints[static_cast<std::size_t>(joint)];
+  const Joint& j = s.arm.joints[joint];
   return 0.5 * (j.low + j.high) + share * s.random.uniform(-0.5, 0.5) * (j.high - j.low);
 }
 
@@ -20,7 +20,7 @@ double inside(const Scene& s, int joint, double share) {
 // the controller has no model of.
 void cable(Hidden& h, const Scene& s) {
   const int first = s.arm.planar ? 0 : 1;
-  const auto forearm = static_cast<std::size_t>(first) + 1;
+  const std::size_t forearm = first + 1;
   const double reach = s.arm.name == "small6" ? 0.4 : 1.0;
   const Vector3d hook = reach * Vector3d(s.random.uniform(-0.5, 0.5), s.random.uniform(-0.5, 0.5),
                                          s.arm.planar ? 0.0 : s.random.uniform(0.2, 0.8));
@@ -55,7 +55,7 @@ void cable(Hidden& h, const Scene& s) {
   h.change = [pull, scale, first](const Session& session, std::vector<Change>& changes) {
     for (Eigen::Index i = 0; i < session.count(); ++i) {
       const Eigen::Vector2d angle = scale * pull(session.q.row(i).transpose());
-      for (int k = 0; k < 2; ++k) changes[static_cast<std::size_t>(i)].angle(first + k) += angle(k);
+      for (int k = 0; k < 2; ++k) changes[i].angle(first + k) += angle(k);
     }
   };
 }
@@ -72,8 +72,7 @@ void worn_tooth(Hidden& h, const Scene& s, int joint) {
   h.change = [=](const Session& session, std::vector<Change>& changes) {
     for (Eigen::Index i = 0; i < session.count(); ++i) {
       const double x = (session.q(i, joint) - centre) / half;
-      if (std::abs(x) < 1.0)
-        changes[static_cast<std::size_t>(i)].angle(joint) += 0.5 * height * (1.0 + std::cos(pi * x));
+      if (std::abs(x) < 1.0) changes[i].angle(joint) += 0.5 * height * (1.0 + std::cos(pi * x));
     }
   };
 }
@@ -83,7 +82,7 @@ void step(Hidden& h, const Scene& s, int joint) {
   h.locations = {joint_name(joint)};
   h.change = [=](const Session& session, std::vector<Change>& changes) {
     for (Eigen::Index i = 0; i < session.count(); ++i) {
-      if (session.q(i, joint) > at) changes[static_cast<std::size_t>(i)].angle(joint) += height;
+      if (session.q(i, joint) > at) changes[i].angle(joint) += height;
     }
   };
 }
@@ -96,8 +95,7 @@ void cross(Hidden& h, const Scene& s, int joint) {
   h.locations = {joint_name(joint)};
   h.change = [=](const Session& session, std::vector<Change>& changes) {
     for (Eigen::Index i = 0; i < session.count(); ++i) {
-      changes[static_cast<std::size_t>(i)].angle(joint) +=
-          size * std::sin(session.q(i, a)) * std::cos(2.0 * session.q(i, b));
+      changes[i].angle(joint) += size * std::sin(session.q(i, a)) * std::cos(2.0 * session.q(i, b));
     }
   };
 }
@@ -110,10 +108,10 @@ void loose_flange(Hidden& h, const Scene& s) {
   const Pieces pieces = s.pieces;
   h.change = [=](const Session& session, std::vector<Change>& changes) {
     const Vector3d down = (pieces.base.linear() * pieces.gravity).normalized();
-    const auto flange = static_cast<std::size_t>(session.q.cols()) - 1;
+    const std::size_t flange = session.q.cols() - 1;
     for (Eigen::Index i = 0; i < session.count(); ++i) {
       const Vector3d u = frames(pieces, session.q.row(i).transpose())[flange].linear().transpose() * down;
-      Vector3d& tilt = changes[static_cast<std::size_t>(i)].tilt[flange + 1];
+      Vector3d& tilt = changes[i].tilt[flange + 1];
       if (planar) {
         tilt.z() += most * std::tanh(sharp * u.y());
       } else {
@@ -138,7 +136,7 @@ void friction_load(Hidden& h, const Scene& s) {
   h.change = [=](const Session& session, std::vector<Change>& changes) {
     for (Eigen::Index i = 0; i < session.count(); ++i) {
       const double load = gravity_torque(pieces, session.q.row(i).transpose(), session.payload(i))(joint) / largest;
-      changes[static_cast<std::size_t>(i)].angle(joint) += size * std::tanh(sharp * load) * std::sqrt(std::abs(load));
+      changes[i].angle(joint) += size * std::tanh(sharp * load) * std::sqrt(std::abs(load));
     }
   };
 }

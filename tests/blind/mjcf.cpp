@@ -111,7 +111,7 @@ std::string to_mjcf(const Arm& arm, const Elasticity& elasticity) {
   }
   Isometry3d to_here = Isometry3d::Identity();
   for (int j = 0; j < arm.size(); ++j) {
-    const auto index = static_cast<std::size_t>(j);
+    const std::size_t index = j;
     Body body{fmt::format("link{}", j + 1), to_here * pieces.rigid[index], {}, {}, {}};
     body.hinges.push_back({fmt::format("q{}", j + 1), Vector3d::UnitZ(), 0.0});
     for (const Play& play : elasticity.plays) {

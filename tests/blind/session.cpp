@@ -12,8 +12,8 @@ Session empty(Eigen::Index rows, int joints) {
   Session s;
   for (Eigen::MatrixXd* m : {&s.q, &s.read_back, &s.approach}) *m = Eigen::MatrixXd::Zero(rows, joints);
   for (Eigen::VectorXd* v : {&s.payload, &s.temperature, &s.time, &s.order}) *v = Eigen::VectorXd::Zero(rows);
-  s.pose.assign(static_cast<std::size_t>(rows), 0);
-  s.returned.assign(static_cast<std::size_t>(rows), false);
+  s.pose.assign(rows, 0);
+  s.returned.assign(rows, false);
   return s;
 }
 
@@ -27,7 +27,7 @@ void arrive(Session& s, Eigen::Index row, double jitter, llmt::Random& random) {
 
 void new_pose(Session& s, Eigen::Index row, const Arm& arm, const std::vector<double>& loads, llmt::Random& random) {
   for (Eigen::Index j = 0; j < s.q.cols(); ++j) {
-    const Joint& joint = arm.joints[static_cast<std::size_t>(j)];
+    const Joint& joint = arm.joints[j];
     s.q(row, j) = random.uniform(joint.low, joint.high);
   }
   s.payload(row) = loads[random.below(loads.size())];
@@ -49,10 +49,10 @@ Eigen::VectorXd walk(Eigen::Index rows, llmt::Random& random) {
 }  // namespace
 
 Session select(const Session& session, const std::vector<int>& rows) {
-  Session s = empty(static_cast<Eigen::Index>(rows.size()), static_cast<int>(session.q.cols()));
+  Session s = empty(rows.size(), static_cast<int>(session.q.cols()));
   for (std::size_t k = 0; k < rows.size(); ++k) {
-    const auto i = static_cast<Eigen::Index>(k);
-    const auto from = static_cast<std::size_t>(rows[k]);
+    const Eigen::Index i = k;
+    const std::size_t from = rows[k];
     s.q.row(i) = session.q.row(rows[k]);
     s.read_back.row(i) = session.read_back.row(rows[k]);
     s.approach.row(i) = session.approach.row(rows[k]);
@@ -72,20 +72,19 @@ Sessions make_sessions(const Arm& arm, const std::vector<double>& payloads, cons
   if (!options.two_payloads) loads = {payloads.back()};
 
   // Which pose stands in which row.
-  std::vector<int> visits(static_cast<std::size_t>(options.poses));
-  for (int i = 0; i < options.poses; ++i) visits[static_cast<std::size_t>(i)] = i;
+  std::vector<int> visits(options.poses);
+  for (int i = 0; i < options.poses; ++i) visits[i] = i;
   std::vector<bool> again(visits.size(), false);
   if (options.repeats) {
     const int groups = 5 + static_cast<int>(random.below(4));
     const auto chosen = random.permutation(options.poses);
     for (int g = 0; g < groups; ++g) {
-      const int pose = static_cast<int>(chosen[static_cast<std::size_t>(g)]);
-      again[static_cast<std::size_t>(pose)] = true;
+      const int pose = static_cast<int>(chosen[g]);
+      again[pose] = true;
       for (int k = 0; k < 3; ++k) {
         const auto first = std::ranges::find(visits, pose) - visits.begin();
-        const auto after = first + 1 +
-                           static_cast<std::ptrdiff_t>(
-                               options.dwelled ? 0 : random.below(visits.size() - static_cast<std::size_t>(first)));
+        const auto after =
+            first + 1 + static_cast<std::ptrdiff_t>(options.dwelled ? 0 : random.below(visits.size() - first));
         visits.insert(visits.begin() + after, pose);
       }
     }
@@ -102,13 +101,12 @@ Sessions make_sessions(const Arm& arm, const std::vector<double>& payloads, cons
   for (int row = 0; row < total; ++row) {
     const bool held = row >= gap && row < gap + options.held_out;
     (held ? held_rows : measured_rows).push_back(row);
-    const auto index = static_cast<std::size_t>(row);
+    const std::size_t index = row;
     all.time(row) = clock += random.uniform(20.0, 60.0);
     all.order(row) = row + 1;
-    const int pose =
-        held ? options.poses + row - gap : visits[static_cast<std::size_t>(row < gap ? row : row - options.held_out)];
+    const int pose = held ? options.poses + row - gap : visits[row < gap ? row : row - options.held_out];
     all.pose[index] = pose + 1;
-    int* first = held ? nullptr : &first_row[static_cast<std::size_t>(pose)];
+    int* first = held ? nullptr : &first_row[pose];
     if (first != nullptr && *first >= 0) {
       all.q.row(row) = all.q.row(*first);
       all.payload(row) = all.payload(*first);
@@ -117,7 +115,7 @@ Sessions make_sessions(const Arm& arm, const std::vector<double>& payloads, cons
       if (first != nullptr) *first = row;
     }
     arrive(all, row, options.read_back_jitter, random);
-    if (!held && again[static_cast<std::size_t>(pose)]) {
+    if (!held && again[pose]) {
       all.returned[index] = true;
       if (options.dwelled) {
         all.approach.row(row) = all.approach.row(*first);
@@ -131,7 +129,7 @@ Sessions make_sessions(const Arm& arm, const std::vector<double>& payloads, cons
   for (double& moment : moments) moment = random.uniform(0.0, total - 1.0);
   std::ranges::sort(moments);
   for (int i = 0; i < 100; ++i) {
-    const double moment = moments[static_cast<std::size_t>(i)];
+    const double moment = moments[i];
     const auto before = static_cast<Eigen::Index>(moment);
     const auto between = [&](const Eigen::VectorXd& v) {
       return v(before) + (moment - static_cast<double>(before)) * (v(before + 1) - v(before));
@@ -139,7 +137,7 @@ Sessions make_sessions(const Arm& arm, const std::vector<double>& payloads, cons
     fresh.time(i) = between(all.time);
     fresh.order(i) = between(all.order);
     fresh.temperature(i) = between(all.temperature);
-    fresh.pose[static_cast<std::size_t>(i)] = 1000 + i;
+    fresh.pose[i] = 1000 + i;
     new_pose(fresh, i, arm, loads, random);
     arrive(fresh, i, options.read_back_jitter, random);
   }

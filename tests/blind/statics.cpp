@@ -113,7 +113,7 @@ StaticArm::StaticArm(const Arm& arm, const Elasticity& elasticity) : engine_(std
   for (int dof = 0; dof < e.model->nv; ++dof) {
     if (e.model->jnt_stiffness[dof] > 0.0) e.elastic.push_back(dof);
   }
-  e.loose_angle = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(e.plays.size()));
+  e.loose_angle = Eigen::VectorXd::Zero(e.plays.size());
 }
 
 StaticArm::~StaticArm() {
@@ -128,12 +128,12 @@ Eigen::Vector3d StaticArm::tool_point(const Eigen::VectorXd& q, double payload_k
   Engine& e = *engine_;
   e.model->body_mass[e.payload_body] = payload_kg + e.extra_payload;
   std::fill_n(e.data->qpos, e.model->nq, 0.0);
-  for (std::size_t j = 0; j < e.motor.size(); ++j) e.data->qpos[e.motor[j]] = q(static_cast<Eigen::Index>(j));
+  for (std::size_t j = 0; j < e.motor.size(); ++j) e.data->qpos[e.motor[j]] = q(j);
   // Plays hardly feel each other: two rounds settle them.
   for (int round = 0; round < (e.plays.size() > 1 ? 3 : 1); ++round) {
     for (std::size_t i = 0; i < e.plays.size(); ++i) {
       const double at = e.rest(e.plays[i], e.loose[i], approach(e.plays[i].joint));
-      e.data->qpos[e.loose[i]] = e.loose_angle(static_cast<Eigen::Index>(i)) = at;
+      e.data->qpos[e.loose[i]] = e.loose_angle(i) = at;
     }
   }
   e.settle_springs();

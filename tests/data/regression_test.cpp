@@ -20,7 +20,7 @@ void PrintTo(const Set& set, std::ostream* to) { *to << set.name; }
 class RegressionSet : public testing::TestWithParam<Set> {};
 
 TEST_P(RegressionSet, DefaultFitIsBelowTheBoundAndAQuarterBelowLeastSquares) {
-  const std::string path = std::string(LLMT_DATA_DIR) + "/regression/" + GetParam().name;
+  const std::string path = std::string(LLMT_DATA_DIR "/regression/") + GetParam().name;
   const llmt::Csv data = llmt::Csv::read(path + ".csv");
   const llmt::Csv splits = llmt::Csv::read(path + ".splits.csv");
   const Eigen::MatrixXd all = data.numbers(data.columns());

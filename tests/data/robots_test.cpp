@@ -16,8 +16,8 @@ struct Arm {
 };
 
 Arm load_arm(const std::string& robot_name, const std::string& data_name) {
-  Arm arm{.robot = read_robot(std::string(LLMT_ROBOTS_DIR) + "/" + robot_name + ".yaml"), .measurements = {}};
-  arm.measurements = read_measurements(std::string(LLMT_DATA_DIR) + "/robots/" + data_name + ".csv", arm.robot);
+  Arm arm{.robot = read_robot(LLMT_ROBOTS_DIR "/" + robot_name + ".yaml"), .measurements = {}};
+  arm.measurements = read_measurements(LLMT_DATA_DIR "/robots/" + data_name + ".csv", arm.robot);
   return arm;
 }
 

@@ -107,7 +107,7 @@ class PlainM5 {
     Eigen::VectorXd model = Eigen::VectorXd::Zero(1 + x_.cols());
     model(0) = found(0);
     for (std::size_t k = 0; k < inputs.size(); ++k) {
-      model(1 + inputs[k]) = found(1 + static_cast<Eigen::Index>(k));
+      model(1 + inputs[k]) = found(1 + k);
     }
     return model;
   }
@@ -123,7 +123,7 @@ class PlainM5 {
       std::vector<int> fewer;
       for (std::size_t k = 0; k < inputs.size(); ++k) {
         std::vector<int> without = inputs;
-        without.erase(without.begin() + static_cast<Eigen::Index>(k));
+        without.erase(without.begin() + k);
         const double squares = residuals(tree.rows, fit(tree.rows, without)).squaredNorm();
         if (squares < smallest) {
           smallest = squares;

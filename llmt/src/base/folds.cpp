@@ -12,11 +12,10 @@ namespace {
 
 // Group number of every row, numbered in order of first appearance.
 std::vector<Eigen::Index> number_groups(Eigen::Index rows, std::span<const double> labels) {
-  std::vector<Eigen::Index> groups(static_cast<std::size_t>(rows));
+  std::vector<Eigen::Index> groups(rows);
   std::map<double, Eigen::Index> seen;
-  for (std::size_t row = 0; row < groups.size(); ++row) {
-    groups[row] =
-        labels.empty() ? static_cast<Eigen::Index>(row) : seen.emplace(labels[row], std::ssize(seen)).first->second;
+  for (Eigen::Index row = 0; row < rows; ++row) {
+    groups[row] = labels.empty() ? row : seen.emplace(labels[row], std::ssize(seen)).first->second;
   }
   return groups;
 }

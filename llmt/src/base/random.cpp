@@ -74,7 +74,7 @@ double Random::normal() {
 }
 
 std::vector<Eigen::Index> Random::permutation(Eigen::Index size) {
-  std::vector<Eigen::Index> order(static_cast<std::size_t>(size));
+  std::vector<Eigen::Index> order(size);
   std::iota(order.begin(), order.end(), Eigen::Index{0});
   for (std::size_t i = order.size(); i > 1; --i) {
     std::swap(order[i - 1], order[below(i)]);

@@ -53,7 +53,7 @@ class LeafProblem {
         unit_(Eigen::VectorXd::Ones(root.size())) {
     unit_.tail(root.size() - 1) = training.scale.cwiseInverse();
     for (std::size_t k = 0; k < leaves.size(); ++k) {
-      position_[leaves[k]] = static_cast<Eigen::Index>(k);
+      position_[leaves[k]] = k;
     }
   }
 
@@ -62,7 +62,7 @@ class LeafProblem {
     std::vector<LeafInequality> result;
     if (!splits_.empty()) {
       for (std::size_t k = 0; k < leaves_.size(); ++k) {
-        const auto of_leaf = coefficients.segment(static_cast<Eigen::Index>(k) * size, size);
+        const auto of_leaf = coefficients.segment(k * size, size);
         models_.col(leaves_[k]) = (of_leaf + root_).cwiseProduct(unit_);
       }
       result = splits_.violated(models_, 0.5 * margin_, margin_);
@@ -83,13 +83,12 @@ class LeafProblem {
     const Eigen::Index size = root_.size();
     Eigen::MatrixXd result = Eigen::MatrixXd::Zero(coefficients.size(), std::ssize(found));
     bounds.resize(std::ssize(found));
-    for (std::size_t c = 0; c < found.size(); ++c) {
-      const Eigen::Index column = static_cast<Eigen::Index>(c);
-      const Eigen::VectorXd left = found[c].of_left.cwiseProduct(unit_);
-      const Eigen::VectorXd right = found[c].of_right.cwiseProduct(unit_);
-      result.col(column).segment(position_[found[c].left] * size, size) += left;
-      result.col(column).segment(position_[found[c].right] * size, size) += right;
-      bounds(column) = found[c].bound - (left + right).dot(root_);
+    for (Eigen::Index column = 0; column < std::ssize(found); ++column) {
+      const Eigen::VectorXd left = found[column].of_left.cwiseProduct(unit_);
+      const Eigen::VectorXd right = found[column].of_right.cwiseProduct(unit_);
+      result.col(column).segment(position_[found[column].left] * size, size) += left;
+      result.col(column).segment(position_[found[column].right] * size, size) += right;
+      bounds(column) = found[column].bound - (left + right).dot(root_);
     }
     bounds -= result.transpose() * coefficients;
     return result;

@@ -24,9 +24,9 @@ LeafGeometry::LeafGeometry(const Partition& partition, const TrainingRows& train
   for (int input = 0; input < inputs(); ++input) {
     levels_.emplace_back(is_categorical(input) ? partition.nodes.size() : 0, std::vector<char>(levels(input), 1));
   }
-  for (std::size_t i = 0; i < partition.nodes.size(); ++i) {
+  for (int i = 0; i < std::ssize(partition.nodes); ++i) {
     signs_.push_back(ordered_sign(partition.nodes[i], training));
-    hand_down(static_cast<int>(i));
+    hand_down(i);
   }
 }
 

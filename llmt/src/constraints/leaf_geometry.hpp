@@ -6,6 +6,7 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "base/count.hpp"
 #include "data/dataset.hpp"
 
 namespace llmt {
@@ -23,7 +24,7 @@ class LeafGeometry {
   LeafGeometry(const Partition& partition, const TrainingRows& training, Eigen::Index output);
 
   const Node& node(int index) const { return partition_.nodes[index]; }
-  int inputs() const { return static_cast<int>(std::ssize(training_.columns)); }
+  int inputs() const { return count_of(training_.columns); }
 
   /// The sign of the monotone input that a node splits; 0 if there is none.
   int sign(int node) const { return signs_[node]; }

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <utility>
 
+#include "base/count.hpp"
+
 namespace llmt {
 namespace {
 
@@ -261,7 +263,7 @@ void PairBuilder::add_pieces(Eigen::Index regressor, double low, double high, in
 LeafPairs leaf_pairs(const LeafGeometry& geometry, const Partition& partition,
                      const std::vector<std::vector<int>>& below) {
   PairBuilder builder(geometry);
-  for (int i = static_cast<int>(partition.nodes.size()) - 1; i >= 0; --i) {
+  for (int i = count_of(partition.nodes) - 1; i >= 0; --i) {
     if (partition.nodes[i].is_leaf() || geometry.sign(i) == 0) continue;
     for (const int left : below[partition.nodes[i].left]) {
       for (const int right : below[partition.nodes[i].right]) {

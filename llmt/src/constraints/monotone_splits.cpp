@@ -26,9 +26,9 @@ std::vector<int> usual_levels(const TrainingRows& training) {
 }
 
 Eigen::Index numeric_regressor(const TrainingRows& training, int input) {
-  for (std::size_t k = 0; k < training.regressors.size(); ++k) {
+  for (Eigen::Index k = 0; k < std::ssize(training.regressors); ++k) {
     if (training.regressors[k].input == input && training.regressors[k].level < 0) {
-      return static_cast<Eigen::Index>(k);
+      return k;
     }
   }
   return -1;
@@ -87,8 +87,8 @@ namespace {
 void widen_ranges(Partition& partition, const TrainingRows& training, const Supports& supports, Eigen::Index index) {
   Node& node = partition.nodes[index];
   const Node& root = partition.nodes.front();
-  for (Eigen::Index input = 0; input < std::ssize(training.columns); ++input) {
-    const Eigen::Index k = numeric_regressor(training, static_cast<int>(input));
+  for (int input = 0; input < std::ssize(training.columns); ++input) {
+    const Eigen::Index k = numeric_regressor(training, input);
     if (training.table->monotone[input] == 0 || k < 0) continue;
     const double centre = training.regressors[k].centre;
     const double least = index == 0 ? training.spread(0, k) : root.low(k);

@@ -21,10 +21,10 @@ constexpr double tolerated_part_of_margin = 0.5;
 
 OrderedSplits::OrderedSplits(const Partition& partition, const TrainingRows& training, Eigen::Index output)
     : below_(partition.nodes.size()), children_(partition.nodes.size(), {-1, -1}) {
-  for (std::size_t i = partition.nodes.size(); i-- > 0;) {
+  for (int i = count_of(partition.nodes); i-- > 0;) {
     const Node& node = partition.nodes[i];
     if (node.is_leaf()) {
-      below_[i] = {static_cast<int>(i)};
+      below_[i] = {i};
       continue;
     }
     children_[i] = {node.left, node.right};

@@ -24,8 +24,8 @@ std::vector<int> coefficient_signs(const TrainingRows& training) {
 }
 
 bool has_signs(const std::vector<int>& signs, const Node& node) {
-  for (std::size_t k = 1; k < signs.size(); ++k) {
-    if (signs[k] != 0 && (signs[k] * node.slope.col(static_cast<Eigen::Index>(k) - 1).array() < 0.0).any()) {
+  for (Eigen::Index k = 1; k < std::ssize(signs); ++k) {
+    if (signs[k] != 0 && (signs[k] * node.slope.col(k - 1).array() < 0.0).any()) {
       return false;
     }
   }

@@ -28,7 +28,7 @@ Request request_of(const Csv& csv, std::span<const std::string> columns) {
     const std::size_t field = request.field.emplace_back(csv.index_of(columns[i]));
     request.column.resize(std::max(request.column.size(), field + 1), unused);
     if (request.column[field] == unused) {
-      request.column[field] = static_cast<Eigen::Index>(i);
+      request.column[field] = i;
     }
   }
   return request;

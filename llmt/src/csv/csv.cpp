@@ -107,7 +107,7 @@ std::vector<Eigen::Index> Csv::lines_of(std::span<const Eigen::Index> rows) cons
   Eigen::Index line = 1 + lines_left_out_;
   auto counted = text_.begin();
   for (const Eigen::Index row : rows) {
-    const auto begin = text_.begin() + static_cast<Eigen::Index>(row_begins_[row]);
+    const auto begin = text_.begin() + row_begins_[row];
     line += std::count(counted, begin, '\n');
     lines.push_back(line);
     counted = begin;
@@ -116,7 +116,7 @@ std::vector<Eigen::Index> Csv::lines_of(std::span<const Eigen::Index> rows) cons
 }
 
 Eigen::Index Csv::line_at(std::size_t offset) const {
-  return 1 + lines_left_out_ + std::count(text_.begin(), text_.begin() + static_cast<Eigen::Index>(offset), '\n');
+  return 1 + lines_left_out_ + std::count(text_.begin(), text_.begin() + offset, '\n');
 }
 
 // The record at `begin` without its line end.

@@ -34,10 +34,10 @@ Partition constrained_one_by_one(const LeafSums& sums, Eigen::Index leaves, cons
   free.models = models;
   free.leaf_coefficients.resize(leaves * size, sums.root.cols());
   free.factor.setZero(leaves * size, leaves * size);
-  for (std::size_t node = 0; node < result.nodes.size(); ++node) {
+  for (int node = 0; node < std::ssize(result.nodes); ++node) {
     if (!result.nodes[node].is_leaf()) continue;
     const Eigen::Index at = std::ssize(leaf_nodes) * size;
-    leaf_nodes.push_back(static_cast<int>(node));
+    leaf_nodes.push_back(node);
     free.leaf_coefficients.middleRows(at, size) = models[node];
     Eigen::MatrixXd matrix = sums.equations.gram[node];
     matrix.diagonal() += shrinkage_diagonal(sums, node, shrinkage);

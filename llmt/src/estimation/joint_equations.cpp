@@ -1,5 +1,6 @@
 #include "estimation/joint_equations.hpp"
 
+#include "base/count.hpp"
 #include "estimation/local_estimate.hpp"
 #include "model/tree.hpp"
 #include "numerics/dense.hpp"
@@ -18,13 +19,13 @@ void find_leaves(const Partition& tree, JointEquations& equations) {
   const std::vector<int> parents = parents_of(tree);
   const Eigen::Index nodes = 2 * equations.leaves - 1;
   equations.position.assign(tree.nodes.size(), -1);
-  for (Eigen::Index i = 0; i < std::ssize(tree.nodes); ++i) {
+  for (int i = 0; i < std::ssize(tree.nodes); ++i) {
     const Node& node = tree.nodes[i];
     if (i >= nodes) {
       equations.position[i] = equations.position[parents[i]];
     } else if (node.is_leaf() || node.left >= nodes) {
-      equations.position[i] = static_cast<int>(equations.leaf_nodes.size());
-      equations.leaf_nodes.push_back(static_cast<int>(i));
+      equations.position[i] = count_of(equations.leaf_nodes);
+      equations.leaf_nodes.push_back(i);
     }
   }
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "base/count.hpp"
 #include "base/parallel.hpp"
 #include "constraints/monotone_splits.hpp"
 #include "constraints/signs.hpp"
@@ -111,7 +112,7 @@ Partition with_models(const LeafSums& sums, Eigen::Index leaves, const std::vect
   for (std::size_t i = 0; i < result.nodes.size(); ++i) {
     set_model(sums, models[i], result.nodes[i]);
     if (sparse && (i > 0 || leaves == 1)) {
-      result.nodes[i].rank = static_cast<int>(sums.selected[i].size());
+      result.nodes[i].rank = count_of(sums.selected[i]);
     }
   }
   return result;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "base/count.hpp"
 #include "base/parallel.hpp"
 #include "model/evaluator.hpp"
 #include "model/imputed.hpp"
@@ -89,13 +90,13 @@ Assembly::Assembly(const TrainingRows& training, Partition& partition, const Eig
       evaluator_(partition, training.columns, std::ssize(training.regressors)),
       leave_out_(leaves_out_ambiguous(training, evaluator_)),
       leaf_of_node_(partition.nodes.size(), -1) {
-  const std::size_t nodes = partition.nodes.size();
+  const int nodes = count_of(partition.nodes);
   sums_.size = size_;
   sums_.missing = training.has_missing;
-  for (std::size_t i = 0; i < nodes; ++i) {
+  for (int i = 0; i < nodes; ++i) {
     if (partition.nodes[i].is_leaf()) {
-      leaf_of_node_[i] = static_cast<int>(sums_.leaves.size());
-      sums_.leaves.push_back(static_cast<int>(i));
+      leaf_of_node_[i] = count_of(sums_.leaves);
+      sums_.leaves.push_back(i);
       sums_.blocks.emplace_back(sums_.leaves.size());
     }
   }
@@ -215,7 +216,7 @@ void Assembly::add(const Reached& reached, std::size_t leaf) {
     for (Eigen::Index e = use.before; e <= use.entry; ++e) {
       const int other = reached.entries[e].leaf;
       if (column_of[other] < 0) {
-        column_of[other] = static_cast<int>(others.size());
+        column_of[other] = count_of(others);
         others.push_back(other);
       }
     }
@@ -223,9 +224,8 @@ void Assembly::add(const Reached& reached, std::size_t leaf) {
   const Eigen::Index columns = std::ssize(others) + 1;  // last: 1, for G
   RowMajor validities = RowMajor::Zero(std::ssize(uses), columns);
   RowMajor products(std::ssize(uses), packed_);
-  for (std::size_t u = 0; u < uses.size(); ++u) {
-    const Use& use = uses[u];
-    const Eigen::Index row = static_cast<Eigen::Index>(u);
+  for (Eigen::Index row = 0; row < std::ssize(uses); ++row) {
+    const Use& use = uses[row];
     const double weight = reached.chunk.weights(use.row) * reached.entries[use.entry].validity;
     const double* outer = reached.outer.row(use.row).data();
     double* product = products.row(row).data();

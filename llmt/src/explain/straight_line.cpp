@@ -162,9 +162,8 @@ void Cutter::cut_at_extent() {
 
 // Where a node's guard sets in or ends.
 void Cutter::cut_at_ranges(const Node& node, double from, double to) {
-  for (std::size_t k = 0; at_kinks_ && k < model_.regressors().size(); ++k) {
-    const Regressor& regressor = model_.regressors()[k];
-    const Eigen::Index column = static_cast<Eigen::Index>(k);
+  for (Eigen::Index column = 0; at_kinks_ && column < std::ssize(model_.regressors()); ++column) {
+    const Regressor& regressor = model_.regressors()[column];
     const double round = rounding_of_hold * (node.high(column) - node.low(column));
     for (const double bound :
          {node.low(column) - round, node.low(column), node.high(column), node.high(column) + round}) {

@@ -1,5 +1,6 @@
 #include "growth/pruning.hpp"
 
+#include "base/count.hpp"
 #include "model/evaluator.hpp"
 
 namespace llmt {
@@ -36,7 +37,7 @@ std::vector<std::size_t> prune(std::vector<Node>& nodes, const Eigen::VectorXd& 
       reachable[nodes[i].left] = true;
       reachable[nodes[i].right] = true;
     }
-    new_index[i] = static_cast<int>(kept.size());
+    new_index[i] = count_of(kept);
     kept.push_back(nodes[i]);
     places.push_back(i);
   }

@@ -1,5 +1,6 @@
 #include <queue>
 
+#include "base/count.hpp"
 #include "growth/gain_order.hpp"
 #include "growth/pruning.hpp"
 
@@ -36,14 +37,13 @@ std::vector<int> order_of_splits(const std::vector<Node>& nodes, const std::vect
   // Blocks that wait to be joined to the block of the split above, by their mean gain: topmost node, and the number of
   // splits when they were entered.
   std::priority_queue<ByGain<double>> queue;
-  for (std::size_t i = 0; i < nodes.size(); ++i) {
-    const int node = static_cast<int>(i);
-    if (nodes[i].is_leaf()) continue;
-    above[nodes[i].left] = above[nodes[i].right] = node;
-    top[i] = node;
-    blocks[i] = {gains[i], 1.0, node};
-    if (i > 0) {
-      queue.push({static_cast<float>(gains[i]), node, 1.0});
+  for (int node = 0; node < std::ssize(nodes); ++node) {
+    if (nodes[node].is_leaf()) continue;
+    above[nodes[node].left] = above[nodes[node].right] = node;
+    top[node] = node;
+    blocks[node] = {gains[node], 1.0, node};
+    if (node > 0) {
+      queue.push({static_cast<float>(gains[node]), node, 1.0});
     }
   }
   const auto top_of = [&](int node) {
@@ -90,10 +90,10 @@ std::vector<Node> in_pruning_order(const std::vector<Node>& nodes, std::vector<d
   for (const int split : order_of_splits(nodes, gains)) {
     const Node& node = nodes[split];
     Node& placed = result[place[split]];
-    placed.left = static_cast<int>(result.size());
+    placed.left = count_of(result);
     placed.right = placed.left + 1;
     for (const int child : {node.left, node.right}) {
-      place[child] = static_cast<int>(result.size());
+      place[child] = count_of(result);
       result.push_back(nodes[child]);
     }
   }

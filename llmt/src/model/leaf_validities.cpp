@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "base/count.hpp"
 #include "base/simd.hpp"
 #include "model/logistic.hpp"
 #include "model/transition.hpp"
@@ -31,14 +32,14 @@ LeafValidities::LeafValidities(const Partition& partition, const std::vector<Inp
                   .per_half_width = std::isfinite(1.0 / node.half_width) ? 1.0 / node.half_width : 0.0,
                   .missing_left = node.missing_left};
     if (!node.level_side.empty()) {
-      branch.first_level = static_cast<int>(level_share_.size());
-      branch.levels = static_cast<int>(node.level_side.size());
+      branch.first_level = count_of(level_share_);
+      branch.levels = count_of(node.level_side);
       for (const int side : node.level_side) {
         level_share_.push_back(side < 0 ? 1.0 : side > 0 ? 0.0 : node.missing_left);
       }
     }
     if (node.is_oblique()) {
-      branch.first_term = static_cast<int>(terms_.size());
+      branch.first_term = count_of(terms_);
       for (Eigen::Index j = 0; j < node.direction.size(); ++j) {
         if (node.direction(j) != 0.0) {
           terms_.push_back({static_cast<int>(j), node.direction(j), inputs[j].centre});
@@ -70,10 +71,9 @@ void LeafValidities::add_gaussians(const Partition& partition, const std::vector
       is_split[node.split_input] = true;
     }
   }
-  for (std::size_t i = 0; i < partition.nodes.size(); ++i) {
-    if (!partition.nodes[i].is_leaf()) continue;
-    const Eigen::Index box = static_cast<Eigen::Index>(i);
-    gaussians_.nodes.push_back(static_cast<int>(i));
+  for (int box = 0; box < std::ssize(partition.nodes); ++box) {
+    if (!partition.nodes[box].is_leaf()) continue;
+    gaussians_.nodes.push_back(box);
     for (Eigen::Index j = 0; j < gaussians_.stride; ++j) {
       const bool used = j < count && is_split[j];
       const double sigma = used ? partition.validity.width * (boxes.high(j, box) - boxes.low(j, box)) : 0.0;

@@ -44,8 +44,8 @@ void for_each_block(const char* function, const Model& model, const Inputs& inpu
 // Position in leaves() of every leaf's node.
 std::vector<int> leaf_positions(const Partition& partition, const std::vector<Leaf>& leaves) {
   std::vector<int> position(partition.nodes.size(), -1);
-  for (std::size_t k = 0; k < leaves.size(); ++k) {
-    position[leaves[k].node] = static_cast<int>(k);
+  for (int k = 0; k < std::ssize(leaves); ++k) {
+    position[leaves[k].node] = k;
   }
   return position;
 }

@@ -15,11 +15,11 @@ void make_leaf(Node& node) {
 
 std::vector<int> parents_of(const Partition& partition) {
   std::vector<int> parents(partition.nodes.size(), -1);
-  for (std::size_t i = 0; i < partition.nodes.size(); ++i) {
+  for (int i = 0; i < std::ssize(partition.nodes); ++i) {
     const Node& node = partition.nodes[i];
     if (!node.is_leaf()) {
-      parents[node.left] = static_cast<int>(i);
-      parents[node.right] = static_cast<int>(i);
+      parents[node.left] = i;
+      parents[node.right] = i;
     }
   }
   return parents;
@@ -65,7 +65,7 @@ void set_half_widths(Partition& partition, const Eigen::VectorXd& low, const Eig
     node.half_width = 0.0;
     if (!node.is_leaf() && node.level_side.empty() && !node.is_oblique() &&
         node.threshold < std::numeric_limits<double>::max()) {
-      const Eigen::Index box = static_cast<Eigen::Index>(i);
+      const Eigen::Index box = i;
       const double extent = std::min(node.threshold - boxes.low(node.split_input, box),
                                      boxes.high(node.split_input, box) - node.threshold);
       node.half_width = std::max(0.0, width * extent);

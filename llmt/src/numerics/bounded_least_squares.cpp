@@ -46,9 +46,7 @@ std::vector<Eigen::Index> LeastDistance::keep_active() {
   gram_ = Eigen::MatrixXd(gram_(kept, kept));
   bounds_ = Eigen::VectorXd(bounds_(kept));
   multipliers_ = Eigen::VectorXd(multipliers_(kept));
-  for (std::size_t k = 0; k < kept.size(); ++k) {
-    active_[k] = static_cast<Eigen::Index>(k);
-  }
+  std::iota(active_.begin(), active_.begin() + std::ssize(kept), Eigen::Index{0});
   return kept;
 }
 

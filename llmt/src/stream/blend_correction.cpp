@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/count.hpp"
 #include "model/imputed.hpp"
 #include "model/tree.hpp"
 #include "numerics/conjugate_gradients.hpp"
@@ -30,10 +31,10 @@ BlendCorrection::BlendCorrection(const TrainingRows& rows, Partition blended)
       begins_({0}),
       regressors_(size_, rows.count()),
       residuals_(rows.count()) {
-  for (std::size_t i = 0; i < partition_.nodes.size(); ++i) {
+  for (int i = 0; i < std::ssize(partition_.nodes); ++i) {
     if (partition_.nodes[i].is_leaf()) {
-      position_[i] = static_cast<int>(leaves_.size());
-      leaves_.push_back(static_cast<int>(i));
+      position_[i] = count_of(leaves_);
+      leaves_.push_back(i);
     }
   }
   grams_.assign(leaves_.size(), Eigen::MatrixXd::Zero(size_, size_));
@@ -78,7 +79,7 @@ void BlendCorrection::add_row(const Evaluator& evaluator, const Chunk& chunk, Ei
     grams_[leaf].selfadjointView<Eigen::Lower>().rankUpdate(a, entry.validity);
   }
   residuals_(at) = root * value;
-  begins_.push_back(static_cast<int>(positions_.size()));
+  begins_.push_back(count_of(positions_));
 }
 
 // A' A change, where A has a row Phi_i a for every row of the data.

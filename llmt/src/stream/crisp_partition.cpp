@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <queue>
 
+#include "base/count.hpp"
 #include "estimation/estimate.hpp"
 #include "estimation/leaf_statistics.hpp"
 #include "stream/setting.hpp"
@@ -82,7 +83,7 @@ Partition crisp_partition(const StreamSetting& setting, const StreamNode& root, 
     const Waiting next = queue.top();
     queue.pop();
     const StreamNode& from = *next.node;
-    const int left = static_cast<int>(partition.nodes.size());
+    const int left = count_of(partition.nodes);
     Node& node = partition.nodes[next.position];
     node.left = left;
     node.right = left + 1;

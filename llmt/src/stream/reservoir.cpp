@@ -55,8 +55,8 @@ void Reservoir::remove_if(const std::function<bool(const double* values)>& drop)
 
 Eigen::Index Reservoir::bytes() const {
   // A node of the map: three pointers and a colour beside key and value.
-  const std::size_t node = 4 * sizeof(void*) + sizeof(std::pair<std::uint64_t, Row>);
-  return std::ssize(rows_) * static_cast<Eigen::Index>(node + static_cast<std::size_t>(width_) * sizeof(double));
+  const Eigen::Index node = 4 * sizeof(void*) + sizeof(std::pair<std::uint64_t, Row>);
+  return std::ssize(rows_) * (node + width_ * Eigen::Index{sizeof(double)});
 }
 
 }  // namespace llmt

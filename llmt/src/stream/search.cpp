@@ -169,8 +169,9 @@ LeafSearch::Edges LeafSearch::edges(int input) {
 // The best edge of an input, if it has an admissible one.
 LeafSearch::Found LeafSearch::look_at(int input) {
   const Edges all = edges(input);
+  const double rows = static_cast<double>(all.rows);
   Found found;
-  if (!(all.rss > static_cast<double>(all.rows) * setting_.rounding * setting_.rounding)) {
+  if (!(all.rss > rows * setting_.rounding * setting_.rounding)) {
     return found;  // one model fits exactly
   }
   for (std::size_t e = 0; e < all.thresholds.size(); ++e) {
@@ -181,7 +182,7 @@ LeafSearch::Found LeafSearch::look_at(int input) {
     ++found.tested;
     const double ratio = (all.rss_left[e] + all.rss_right[e]) / all.rss;
     if (found.input < 0 || ratio < found.ratio) {
-      found = {input, e, ratio, all.rss, all.rank, all.rank_left[e], all.rank_right[e], all.rows, found.tested};
+      found = {input, e, ratio, all.rss, all.rank, all.rank_left[e], all.rank_right[e], rows, found.tested};
     }
   }
   return found;
@@ -189,13 +190,13 @@ LeafSearch::Found LeafSearch::look_at(int input) {
 
 bool LeafSearch::passes(const Found& found) const {
   const double added = found.rank_left + found.rank_right - found.rank;
-  const double freedom = different_ * static_cast<double>(found.rows) - found.rank_left - found.rank_right;
+  const double freedom = different_ * found.rows - found.rank_left - found.rank_right;
   if (added <= 0.0 || freedom <= 0.0) return false;
   // In units of the residual sum of squares of one model.
   const double p_value = chow_p_value(1.0 - found.ratio, added, found.ratio / freedom, freedom);
-  const double tests = static_cast<double>(tests_) * static_cast<double>(tests_ + 1);
-  if (!(p_value * static_cast<double>(found.tested) * tests < setting_.significance)) return false;
-  const double before = different_ * found.rss / (different_ * static_cast<double>(found.rows) - found.rank);
+  const double tests = tests_ * (tests_ + 1.0);
+  if (!(p_value * found.tested * tests < setting_.significance)) return false;
+  const double before = different_ * found.rss / (different_ * found.rows - found.rank);
   const double after = different_ * found.rss * found.ratio / freedom;
   return before - after >= setting_.min_variance_gain * setting_.output_variance;
 }
@@ -210,7 +211,7 @@ std::optional<StreamSplit> LeafSearch::test(const Eigen::VectorXd& low, const Ei
   double rival = 1.0;  // ratio of the best split on another input
   for (int j = 0; j < setting_.inputs; ++j) {
     const Found of_input = look_at(j);
-    const Eigen::Index tested = found.tested + of_input.tested;
+    const double tested = found.tested + of_input.tested;
     if (of_input.input >= 0 && (found.input < 0 || of_input.ratio < found.ratio)) {
       rival = found.input < 0 ? 1.0 : found.ratio;
       found = of_input;
@@ -221,7 +222,7 @@ std::optional<StreamSplit> LeafSearch::test(const Eigen::VectorXd& low, const Ei
   }
   if (found.input >= 0 && passes(found)) {
     first_passed_ = first_passed_ > 0 ? first_passed_ : rows_;
-    const double n = different_ * static_cast<double>(found.rows);
+    const double n = different_ * found.rows;
     // Squared residuals of two fits differ by 2 e (f_1 - f_2), about, and the fits by what both gain.
     const double scatter = 2.0 * std::sqrt(found.ratio * (2.0 - found.ratio - rival) / n);
     if (rival - found.ratio > scatter ||
@@ -242,7 +243,7 @@ StreamSplit LeafSearch::split_at(const Found& found, const Eigen::VectorXd& low,
           std::max(edge - before, behind - edge),
           side(bins, 0, found.edge + 1),
           side(bins, found.edge + 1, bins.edges.size() + 1),
-          found.rss * (1.0 - found.ratio) / static_cast<double>(found.rows)};
+          found.rss * (1.0 - found.ratio) / found.rows};
 }
 
 Eigen::Index LeafSearch::bytes() const {

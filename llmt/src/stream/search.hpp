@@ -67,8 +67,8 @@ class LeafSearch {
     int rank = 0;
     int rank_left = 0;
     int rank_right = 0;
-    Eigen::Index rows = 0;
-    Eigen::Index tested = 0;
+    double rows = 0.0;
+    double tested = 0.0;
   };
 
   std::vector<double> edges_of_first_rows(Eigen::Index input) const;

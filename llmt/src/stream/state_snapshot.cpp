@@ -18,11 +18,11 @@ Model StreamState::snapshot(ValidityChoice validity) const {
   std::vector<InputColumn> inputs;
   std::vector<OutputColumn> outputs;
   std::vector<Regressor> regressors;
-  for (Eigen::Index j = 0; j < inputs_; ++j) {
+  for (int j = 0; j < inputs_; ++j) {
     const ColumnRange& column = columns_[j];
     inputs.push_back(
         {.name = fmt::format("x{}", j + 1), .low = column.low, .high = column.high, .centre = column.mean});
-    regressors.push_back({static_cast<int>(j), -1, column.mean});
+    regressors.push_back({j, -1, column.mean});
   }
   for (Eigen::Index o = 0; o < outputs_; ++o) {
     const ColumnRange& column = columns_[inputs_ + o];
@@ -51,9 +51,9 @@ Model StreamState::model_of_first_rows() const {
 std::vector<Partition> StreamState::crisp_partitions() const {
   const std::vector<ColumnRange> of_inputs(columns_.begin(), columns_.begin() + inputs_);
   std::vector<Partition> partitions;
-  for (Eigen::Index o = 0; o < outputs_; ++o) {
+  for (int o = 0; o < outputs_; ++o) {
     const StreamTree& tree = *trees_[o];
-    partitions.push_back(crisp_partition(tree.setting(), tree.root(), of_inputs, static_cast<int>(o)));
+    partitions.push_back(crisp_partition(tree.setting(), tree.root(), of_inputs, o));
   }
   return partitions;
 }
@@ -64,9 +64,9 @@ void StreamState::choose_by_reservoir(const std::vector<InputColumn>& inputs, co
   Eigen::MatrixXd values(std::ssize(reservoir_.rows()), width());
   std::vector<int> others;
   std::vector<int> held_out;
-  Eigen::Index at = 0;
+  int at = 0;
   for (const auto& [hash, row] : reservoir_.rows()) {
-    (row.held_out ? held_out : others).push_back(static_cast<int>(at));
+    (row.held_out ? held_out : others).push_back(at);
     values.row(at++) = Eigen::Map<const Eigen::RowVectorXd>(row.values.data(), values.cols());
   }
   if (others.empty()) return;

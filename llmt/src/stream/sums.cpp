@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/count.hpp"
 #include "base/simd.hpp"
 #include "numerics/tolerances.hpp"
 
@@ -137,7 +138,7 @@ Eigen::VectorXd solve(const GramShape& shape, const double* gram, double shrinka
   if (!(gram[0] > 0.0)) return change;
   const Moments moments = moments_of(shape, gram);
   const auto [factor, right, kept] = factorise(shape, gram, moments, shrinkage);
-  rank = 1 + static_cast<int>(kept.size());
+  rank = 1 + count_of(kept);
   for (Eigen::Index at = std::ssize(kept) - 1; at >= 0; --at) {
     const Eigen::Index k = kept[at];
     double sum = right(k);

@@ -47,12 +47,11 @@ Measurements averaged(const Measurements& measurements, Repeats repeats,
   std::vector<Eigen::Index> first;
   for (const auto& sample : samples) first.push_back(sample.front());
   Measurements result = select(measurements, first);
-  for (std::size_t s = 0; s < samples.size(); ++s) {
-    const auto row = static_cast<Eigen::Index>(s);
-    result.positions_mm.row(row) = measurements.positions_mm(samples[s], Eigen::all).colwise().mean();
-    result.poses.joints.row(row) = measurements.poses.joints(samples[s], Eigen::all).colwise().mean();
+  for (Eigen::Index row = 0; row < std::ssize(samples); ++row) {
+    result.positions_mm.row(row) = measurements.positions_mm(samples[row], Eigen::all).colwise().mean();
+    result.poses.joints.row(row) = measurements.poses.joints(samples[row], Eigen::all).colwise().mean();
     for (auto& [name, values] : result.poses.covariates) {
-      values(row) = measurements.poses.covariates.at(name)(samples[s]).mean();
+      values(row) = measurements.poses.covariates.at(name)(samples[row]).mean();
     }
   }
   return result;

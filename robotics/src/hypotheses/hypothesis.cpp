@@ -6,7 +6,7 @@ void set_limits(const EffectType& type, Eigen::Index values, discovery::EffectCa
   candidate.lower.resize(values);
   candidate.upper.resize(values);
   for (Eigen::Index k = 0; k < values; ++k) {
-    const EffectParameter& parameter = type.parameters[type.parameters[0].list ? 0 : static_cast<std::size_t>(k)];
+    const EffectParameter& parameter = type.parameters[type.parameters[0].list ? 0 : k];
     candidate.lower(k) = parameter.lower;
     candidate.upper(k) = parameter.upper;
   }

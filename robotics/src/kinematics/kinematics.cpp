@@ -103,7 +103,7 @@ void Kinematics::set_values(const Eigen::VectorXd& values) {
 // before the first axis.
 template <typename Visit>
 Pose Kinematics::walk(const Eigen::VectorXd& q, const Deformation* deformation, Visit visit) const {
-  if (q.size() != static_cast<Eigen::Index>(joints())) {
+  if (q.size() != std::ssize(variable_)) {
     throw std::invalid_argument("llmt::robotics::Kinematics: q has " + std::to_string(q.size()) +
                                 " entries, the chain has " + std::to_string(joints()) + " joints");
   }
@@ -114,7 +114,7 @@ Pose Kinematics::walk(const Eigen::VectorXd& q, const Deformation* deformation, 
     double cosine = element.cosine;
     double value = element.value;
     if (element.joint >= 0) {
-      const auto joint = static_cast<std::size_t>(element.joint);
+      const std::size_t joint = element.joint;
       if (deformation != nullptr) apply(frame, joint > 0 ? deformation->link[joint - 1] : deformation->base);
       double moved = q(element.joint);
       if (deformation != nullptr) moved += deformation->joint(element.joint);
@@ -161,7 +161,7 @@ void Kinematics::skeleton_into(Skeleton& skeleton, const Eigen::VectorXd& q, con
       ++body;
     }
     if (elements_[i].joint < 0) return;
-    const auto joint = static_cast<std::size_t>(elements_[i].joint);
+    const std::size_t joint = elements_[i].joint;
     if (joint > 0) skeleton.link_end[joint - 1] = frame.position_mm;
     skeleton.joint_origin[joint] = frame.position_mm;
     skeleton.joint_frame[joint] = frame.rotation;
@@ -199,7 +199,7 @@ Eigen::Matrix<double, 6, Eigen::Dynamic> Kinematics::joint_jacobian(const Eigen:
   const Skeleton skeleton = this->skeleton(q);
   Eigen::Matrix<double, 6, Eigen::Dynamic> jacobian(6, joints());
   for (std::size_t j = 0; j < joints(); ++j) {
-    const auto column = static_cast<Eigen::Index>(j);
+    const Eigen::Index column = j;
     const Eigen::Vector3d& axis = skeleton.joint_axis[j];
     if (elements_[variable_[j]].rotation) {
       jacobian.col(column) << axis.cross(skeleton.tool.position_mm - skeleton.joint_origin[j]), axis;

@@ -181,10 +181,9 @@ void RobotEvaluator::derivatives(PoseContext& pose, Eigen::Index row, PreparedEf
                                  Eigen::Ref<Eigen::Matrix3Xd> out) {
   if (effect.type->linear) {
     for (Eigen::Index k = 0; k < out.cols(); ++k) {
-      const auto own = static_cast<std::size_t>(k);
       effect.values.assign(effect.values.size(), 0.0);
-      effect.values[own] = effect.scales[own];
-      out.col(k) = moved_by(pose, row, effect) / effect.scales[own];
+      effect.values[k] = effect.scales[k];
+      out.col(k) = moved_by(pose, row, effect) / effect.scales[k];
     }
     return;
   }

@@ -18,7 +18,7 @@ TEST(Folds, EveryRowIsHeldOutOnce) {
       EXPECT_GE(fold.held_out.size(), 20U);
       EXPECT_LE(fold.held_out.size(), 21U);
       for (const Eigen::Index row : fold.held_out) {
-        ++held_out[static_cast<std::size_t>(row)];
+        ++held_out[row];
         EXPECT_FALSE(std::binary_search(fold.train.begin(), fold.train.end(), row));
       }
     }

@@ -126,7 +126,7 @@ TEST(Sparse, JointEstimateIsLeastSquaresOfTheSelectedColumns) {
     target.head(300) = y;
     Eigen::Index at = 0;
     for (std::size_t leaf = 0; leaf < leaves.size(); ++leaf) {
-      const Eigen::Index l = static_cast<Eigen::Index>(leaf);
+      const Eigen::Index l = leaf;
       const Eigen::Index count = std::ssize(used[leaf]);
       const Eigen::MatrixXd a = columns(Eigen::all, used[leaf]);
       const Eigen::VectorXd roots = validities.col(l).cwiseSqrt();
@@ -142,7 +142,7 @@ TEST(Sparse, JointEstimateIsLeastSquaresOfTheSelectedColumns) {
     for (std::size_t leaf = 0; leaf < leaves.size(); ++leaf) {
       EXPECT_NEAR(leaves[leaf].intercept(0), expected(at), 1e-4);
       for (std::size_t k = 1; k < used[leaf].size(); ++k) {
-        EXPECT_NEAR(leaves[leaf].slope(0, used[leaf][k] - 1), expected(at + static_cast<Eigen::Index>(k)), 1e-4);
+        EXPECT_NEAR(leaves[leaf].slope(0, used[leaf][k] - 1), expected(at + k), 1e-4);
       }
       at += std::ssize(used[leaf]);
     }

@@ -176,7 +176,7 @@ TEST(ExactSearch, EqualsBruteForceWithWeightsOutputsAndMissingValues) {
     y << oracle::curved(x, 0.1, seed), oracle::curved(x.rowwise().reverse(), 0.3, seed + 1);
     const Eigen::VectorXd weights = oracle::uniform(1100, 1, seed + 9).array().abs() + 1e-3;
     for (Eigen::Index row = 0; row < 1100; row += 7) {
-      x(row, static_cast<Eigen::Index>(seed) % 3) = std::nan("");
+      x(row, seed % 3) = std::nan("");
     }
     expect_brute_force<4>(make_problem(x, y, weights, 3), 6);
   }

@@ -45,7 +45,7 @@ TEST(M5, IsThePlainOneNodeByNode) {
   int leaves = 0;
   for (std::uint64_t seed = 1; seed <= 25; ++seed) {
     SCOPED_TRACE(seed);
-    const Eigen::Index rows = 20 + 10 * static_cast<Eigen::Index>(seed);
+    const Eigen::Index rows = 20 + 10 * seed;
     Eigen::MatrixXd x = oracle::uniform(rows, 3, seed);
     x.col(1) = (4.0 * x.col(1)).array().round();  // ties
     const Eigen::VectorXd y =
@@ -59,7 +59,7 @@ TEST(M5, IsThePlainOneNodeByNode) {
 TEST(M5, DropsInputsAsRefittingDoes) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     SCOPED_TRACE(seed);
-    const Eigen::Index rows = 9 + 4 * static_cast<Eigen::Index>(seed);
+    const Eigen::Index rows = 9 + 4 * seed;
     Eigen::MatrixXd x = oracle::uniform(rows, 6, seed);
     x.col(3) += 0.9 * x.col(0);
     x.col(5).array() += 1e6;
@@ -83,7 +83,7 @@ TEST(M5, DropsInputsAsRefittingDoes) {
       std::vector<int> best;
       for (std::size_t k = 0; k < inputs.size(); ++k) {
         std::vector<int> fewer = inputs;
-        fewer.erase(fewer.begin() + static_cast<Eigen::Index>(k));
+        fewer.erase(fewer.begin() + k);
         best = k == 0 || error(fewer) < error(best) ? fewer : best;
       }
       if (error(best) > error(inputs)) break;
@@ -93,7 +93,7 @@ TEST(M5, DropsInputsAsRefittingDoes) {
     const Eigen::MatrixXd a = regressors(inputs);
     const Eigen::VectorXd solution = oracle::least_squares(a, y);
     for (std::size_t k = 0; k < inputs.size(); ++k) {
-      EXPECT_NEAR(found.slope(inputs[k]), solution(static_cast<Eigen::Index>(k) + 1), 1e-8);
+      EXPECT_NEAR(found.slope(inputs[k]), solution(k + 1), 1e-8);
     }
     EXPECT_LT((found.residuals - (y - a * solution)).norm(), 1e-8);
   }

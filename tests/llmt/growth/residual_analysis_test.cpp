@@ -53,7 +53,7 @@ const std::vector<llmt::Node>& nodes(const llmt::FitResult& result) { return res
 TEST(ResidualAnalysis, StatisticsAreThoseOfATextbook) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     SCOPED_TRACE(seed);
-    const Eigen::Index rows = 7 + 13 * static_cast<Eigen::Index>(seed);
+    const Eigen::Index rows = 7 + 13 * seed;
     Eigen::VectorXd x = 1e6 + oracle::uniform(rows, 1, seed).col(0).array().cube();
     const Eigen::VectorXd residuals = oracle::uniform(rows, 1, seed + 100).col(0) + 1e-1 * (x.array() - 1e6).matrix();
     Eigen::VectorXd weights = oracle::uniform(rows, 1, seed + 200).col(0).array().abs() + 0.2;

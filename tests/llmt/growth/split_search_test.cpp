@@ -39,9 +39,9 @@ void expect_brute_force_split(const Eigen::MatrixXd& x, const Eigen::MatrixXd& y
 TEST(SplitSearch, BestSplitEqualsBruteForceRefit) {
   for (std::uint64_t seed = 1; seed <= 30; ++seed) {
     SCOPED_TRACE(seed);
-    const Eigen::Index columns = 1 + static_cast<Eigen::Index>(seed % 4);
+    const Eigen::Index columns = 1 + seed % 4;
     const Eigen::MatrixXd x = oracle::uniform(60, std::max<Eigen::Index>(columns, 2), seed);
-    expect_brute_force_split(x, oracle::curved(x, 0.1, seed), 3 + static_cast<Eigen::Index>(seed % 5));
+    expect_brute_force_split(x, oracle::curved(x, 0.1, seed), 3 + seed % 5);
   }
 }
 

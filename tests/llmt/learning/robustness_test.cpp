@@ -131,7 +131,7 @@ TEST_F(Robustness, FarRowsAlongAnInputThatIsLinear) {
   llmt::Random random(5);
   Sample far = test;
   for (Eigen::Index i = 0; i < rows / 100; ++i) {
-    const Eigen::Index row = static_cast<Eigen::Index>(random.below(rows));
+    const Eigen::Index row = random.below(rows);
     far.y(row, 0) += 2.0 * (10.0 - far.x(row, 8));
     far.x(row, 8) = 10.0;
   }

@@ -49,8 +49,8 @@ VectorXd shortest(const MatrixXd& normals, const VectorXd& bounds) {
 TEST(LeastDistance, EqualsBruteForceOverActiveSets) {
   for (std::uint64_t seed = 0; seed < 200; ++seed) {
     llmt::Random random(seed);
-    const Eigen::Index size = 3 + static_cast<Eigen::Index>(seed % 4);
-    const Eigen::Index count = 1 + static_cast<Eigen::Index>(seed % 8);
+    const Eigen::Index size = 3 + seed % 4;
+    const Eigen::Index count = 1 + seed % 8;
     MatrixXd normals = normal(size, count, random);
     if (count > 2) {
       normals.col(1) = 2.0 * normals.col(0);  // one inequality twice

@@ -13,7 +13,7 @@ namespace llmt::robotics {
 namespace {
 
 Robot flexible(const std::string& effect = "link_bending") {
-  Robot robot = read_robot(std::string(LLMT_ROBOTS_DIR) + "/planar_two_link.yaml");
+  Robot robot = read_robot(LLMT_ROBOTS_DIR "/planar_two_link.yaml");
   for (Effect& bending : robot.effects) bending.type = effect;
   return robot;
 }

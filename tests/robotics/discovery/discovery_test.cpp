@@ -21,7 +21,7 @@ Effect effect(const std::string& type, const std::string& at, std::vector<double
   return {.type = type, .at = at, .values = std::move(values), .constants = std::move(constants)};
 }
 
-Robot arm(const std::string& name) { return read_robot(std::string(LLMT_ROBOTS_DIR) + "/" + name + ".yaml"); }
+Robot arm(const std::string& name) { return read_robot(LLMT_ROBOTS_DIR "/" + name + ".yaml"); }
 
 Robot rigid(Robot robot) {
   robot.effects.clear();

@@ -19,7 +19,7 @@ Effect effect(const std::string& type, const std::string& at, std::vector<double
 }
 
 Robot rigid_planar() {
-  Robot robot = read_robot(std::string(LLMT_ROBOTS_DIR) + "/planar_two_link.yaml");
+  Robot robot = read_robot(LLMT_ROBOTS_DIR "/planar_two_link.yaml");
   robot.effects.clear();
   return robot;
 }

@@ -35,8 +35,8 @@ TEST(ElasticEffects, LoadsOfJointsAreSlopesOfThePotentialEnergy) {
     const Eigen::MatrixXd loads = gravity_loads(robot, poses);
     for (Eigen::Index i = 0; i < poses.count(); ++i) {
       for (Eigen::Index j = 0; j < loads.cols(); ++j) {
-        const double expected = gravity_by_energy(robot, poses.joints.row(i).transpose(),
-                                                  column_of(poses, "payload_kg", i), static_cast<std::size_t>(j));
+        const double expected =
+            gravity_by_energy(robot, poses.joints.row(i).transpose(), column_of(poses, "payload_kg", i), j);
         EXPECT_NEAR(loads(i, j), expected, 1e-5) << robot.chain.name << j;
       }
     }
@@ -213,7 +213,7 @@ TEST(ElasticEffects, BaseTurnsByTheMomentOfTheWholeWeight) {
 }
 
 TEST(ElasticEffects, OnThePlanarArmAnElasticBaseIsAnElasticFirstJoint) {
-  Robot robot = read_robot(std::string(LLMT_ROBOTS_DIR) + "/planar_two_link.yaml");
+  Robot robot = read_robot(LLMT_ROBOTS_DIR "/planar_two_link.yaml");
   robot.effects.clear();
   const Poses poses = random_poses(robot.chain, 20, 8);
   const Eigen::MatrixXd base = positions(with_effect(robot, {"elastic_base", "", {1e-6}}), poses);

@@ -19,8 +19,7 @@ Draws normal_draws(const Workspace& workspace, int count, Random& random) {
   const Eigen::Index n = workspace.residuals().size();
   const Eigen::Index k = workspace.basis().cols();
   Draws draws;
-  const double free = std::max(1.0, workspace.degrees() - static_cast<double>(workspace.dropped().size()) *
-                                                              static_cast<double>(workspace.components()));
+  const double free = std::max(1.0, workspace.degrees() - workspace.dropped_degrees());
   if (n <= 2 * k || n <= 1000) {
     Eigen::MatrixXd noise(n, count);
     for (double& value : noise.reshaped()) value = random.normal();

@@ -50,7 +50,7 @@ Scoring::Scoring(const Workspace& workspace, const std::vector<EffectCandidate>&
 
 double Scoring::misfit(double left, Eigen::Index directions) const {
   const double n = workspace_->degrees();
-  const double used = static_cast<double>(directions + std::ssize(workspace_->dropped()) * workspace_->components());
+  const double used = static_cast<double>(directions) + workspace_->dropped_degrees();
   // Schwarz's approximation is for few directions and many data.
   constexpr double largest_share = 0.4;
   if (used > largest_share * n) return impossible;
@@ -100,8 +100,7 @@ SetFit Scoring::fit(const Set& set) const {
 }
 
 double Scoring::dof(const SetFit& fit) const {
-  const double taken = static_cast<double>(fit.columns.size()) + static_cast<double>(workspace_->dropped().size()) *
-                                                                     static_cast<double>(workspace_->components());
+  const double taken = static_cast<double>(fit.columns.size()) + workspace_->dropped_degrees();
   return std::max(1.0, workspace_->degrees() - taken);
 }
 

@@ -138,7 +138,7 @@ Verdict search(const Evidence& evidence, const std::vector<EffectCandidate>& can
   verdict.remaining = scoring.remaining(fit);
   for (const std::size_t sample : verdict.outliers) {
     const Eigen::Index d = workspace.components();
-    verdict.remaining.segment(static_cast<Eigen::Index>(sample) * d, d).setZero();
+    verdict.remaining.segment(sample * d, d).setZero();
   }
   verdict.lack_of_fit = lack_of_fit(scoring, fit, evidence.repeats, verdict.remaining);
   verdict.sensitivity = sensitivities(scoring, verdict.threshold, verdict.noise);

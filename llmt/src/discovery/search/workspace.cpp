@@ -101,7 +101,7 @@ void Workspace::project(Eigen::Ref<Eigen::MatrixXd> columns) const {
 void Workspace::drop(const std::vector<std::size_t>& samples) {
   if (samples.empty()) return;
   for (const std::size_t sample : samples) {
-    const Eigen::Index first = static_cast<Eigen::Index>(sample) * components_;
+    const Eigen::Index first = sample * components_;
     Eigen::MatrixXd shift = Eigen::MatrixXd::Zero(residuals_.size(), components_);
     shift.middleRows(first, components_).setIdentity();
     project(shift);

@@ -35,6 +35,8 @@ class Workspace {
   Eigen::Index samples() const { return residuals_.size() / components_; }
   /// n d - rank of the Jacobian, dropped samples not counted off.
   double degrees() const { return degrees_; }
+  /// Those that the dropped samples take: a degree for each component.
+  double dropped_degrees() const { return static_cast<double>(std::ssize(dropped_) * components_); }
   double sum_of_squares() const { return residuals_.squaredNorm(); }
   /// Evidence::resolution, or the share that rounding errors reach if that is larger.
   double resolution() const { return resolution_; }

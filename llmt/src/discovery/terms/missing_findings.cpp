@@ -31,15 +31,12 @@ FoundTerm described(const TermModel& model, const PlacedTerm& placed, const Eige
   found.generic = term.generic;
   found.coefficients = placed.coefficients;
   found.constants = placed.constants;
-  for (std::size_t k = 0; k < term.coefficients.size(); ++k) {
-    const auto place = static_cast<Eigen::Index>(k);
-    found.values.push_back(
-        {term.coefficients[k], unit_of(found.output, term.per), placed.coefficients(place), errors(place)});
+  for (Eigen::Index k = 0; k < std::ssize(term.coefficients); ++k) {
+    found.values.push_back({term.coefficients[k], unit_of(found.output, term.per), placed.coefficients(k), errors(k)});
   }
-  for (std::size_t c = 0; c < term.constants.size(); ++c) {
-    const auto place = static_cast<Eigen::Index>(c);
-    found.values.push_back({term.constants[c].name, term.constants[c].unit, placed.constants(place),
-                            errors(placed.coefficients.size() + place)});
+  for (Eigen::Index c = 0; c < std::ssize(term.constants); ++c) {
+    found.values.push_back(
+        {term.constants[c].name, term.constants[c].unit, placed.constants(c), errors(placed.coefficients.size() + c)});
   }
   return found;
 }

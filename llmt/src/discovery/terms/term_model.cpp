@@ -59,7 +59,7 @@ Layout layout_of(const TermModel& model, const FitData& data, const Eigen::Vecto
 
 std::vector<PlacedTerm> unpack(const std::vector<PlacedTerm>& placed, const Eigen::VectorXd& values, std::size_t own) {
   std::vector<PlacedTerm> result = placed;
-  Eigen::Index next = static_cast<Eigen::Index>(own);
+  Eigen::Index next = own;
   for (PlacedTerm& term : result) {
     term.coefficients = values.segment(next, term.coefficients.size());
     next += term.coefficients.size();
@@ -193,7 +193,7 @@ TermFit fit_terms(const TermModel& model, const FitData& data, const Eigen::Vect
   if (bad < simulated.rows()) refuse("find_missing", fmt::format("the simulation is not finite at row {}", bad + 1));
   for (const bool constants_are_free : {true, false}) {
     const Layout layout = layout_of(model, data, start, placed, constants_are_free);
-    const auto own = static_cast<Eigen::Index>(layout.own);
+    const Eigen::Index own = layout.own;
     LeastSquaresProblem problem;
     problem.parameters = layout.parameters;
     problem.residual = [&](const Eigen::VectorXd& values) {
@@ -209,7 +209,7 @@ TermFit fit_terms(const TermModel& model, const FitData& data, const Eigen::Vect
       Eigen::VectorXd errors = result.standard_errors.segment(next, k);
       const std::vector<TermConstant>& constants = model.terms()[term.term].constants;
       for (std::size_t c = 0; c < constants.size(); ++c) {
-        const Eigen::Index place = term.coefficients.size() + static_cast<Eigen::Index>(c);
+        const Eigen::Index place = term.coefficients.size() + c;
         if (!constants_are_free || !constants[c].smooth) errors(place) = std::numeric_limits<double>::quiet_NaN();
       }
       fit.errors.push_back(errors);

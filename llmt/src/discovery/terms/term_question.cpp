@@ -86,7 +86,7 @@ RowSplit split_rows(const Inputs& inputs, const MissingOptions& options) {
   Random random(options.seed);
   const std::vector<Eigen::Index> order = random.permutation(groups);
   std::vector<Eigen::Index> place(order.size());
-  for (std::size_t k = 0; k < order.size(); ++k) place[order[k]] = static_cast<Eigen::Index>(k);
+  for (std::size_t k = 0; k < order.size(); ++k) place[order[k]] = k;
   const auto aside = static_cast<Eigen::Index>(std::lround(options.held_out_share * static_cast<double>(groups)));
   // At most about `largest_sample` rows are searched, in whole groups of repeats.
   const double rows_of_a_group =
@@ -133,8 +133,7 @@ TermQuestion ask(const TermModel& model, const FitData& data, const TermFit& fit
     question.evidence.residuals += question.candidates.back().signature * placed.coefficients;
     ground.nuisance = beside(ground.nuisance, question.candidates.back().signature);
   }
-  for (const std::size_t sample : outliers)
-    ground.residuals.segment(static_cast<Eigen::Index>(sample) * d, d).setZero();
+  for (const std::size_t sample : outliers) ground.residuals.segment(sample * d, d).setZero();
   for (std::size_t t = 0; t < model.terms().size(); ++t) {
     const ModelTerm& term = model.terms()[t];
     for (Eigen::Index o = 0; o < d; ++o) {

@@ -6,6 +6,7 @@
 #include <optional>
 #include <queue>
 
+#include "base/count.hpp"
 #include "base/parallel.hpp"
 #include "growth/best_first/open_leaves.hpp"
 #include "growth/gain_order.hpp"
@@ -144,7 +145,7 @@ void BestFirstTree::split(std::size_t position) {
   const Node parent = nodes_[leaf.node];
   auto [children, missing_left] = open_.divide(leaf, parent);
   for (OpenLeaf& child : children) {
-    child.node = static_cast<int>(nodes_.size());
+    child.node = count_of(nodes_);
     nodes_.emplace_back();
   }
   parallel_for(2, data_.threads_for(parent.samples * data_.split_inputs()), [&, &parts = children](Eigen::Index side) {

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "base/count.hpp"
 #include "base/parallel.hpp"
 
 namespace llmt {
@@ -122,7 +123,7 @@ Bins cut_input(const GrowthData& data, const std::vector<int>& sampled, Eigen::I
     values.push_back(data.split_value(row, split_input));
   }
   bins.edges = quantile_edges(std::move(values), most);
-  bins.count = static_cast<int>(std::ssize(bins.edges)) + 1;
+  bins.count = count_of(bins.edges) + 1;
   return bins;
 }
 

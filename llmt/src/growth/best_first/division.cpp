@@ -77,9 +77,9 @@ double learn_missing_left(const GrowthData& data, const ExactLeaf& leaf, const N
                           const std::vector<Side>& sides) {
   std::array<std::vector<int>, 3> positions;  // of the rows on the left, on the right and without a value
   std::array<double, 3> weight{};
-  for (std::size_t k = 0; k < sides.size(); ++k) {
+  for (int k = 0; k < std::ssize(sides); ++k) {
     const std::size_t side = static_cast<std::size_t>(sides[k]);
-    positions[side].push_back(static_cast<int>(k));
+    positions[side].push_back(k);
     weight[side] += leaf.weights(k);
   }
   const double known = weight[0] / (weight[0] + weight[1]);

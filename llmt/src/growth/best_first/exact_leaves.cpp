@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/count.hpp"
 #include "base/parallel.hpp"
 #include "growth/best_first/division.hpp"
 #include "growth/best_first/exact_search.hpp"
@@ -35,11 +36,11 @@ struct Part {
 Part part_of(const ExactLeaf& leaf, const std::vector<Side>& sides, Side own, double share) {
   Part part;
   part.position_in_child.assign(sides.size(), -1);
-  for (std::size_t k = 0; k < sides.size(); ++k) {
+  for (int k = 0; k < std::ssize(sides); ++k) {
     const double validity = sides[k] == Side::both ? share : 1.0;
     if ((sides[k] != own && sides[k] != Side::both) || validity < clear_share) continue;
-    part.position_in_child[k] = static_cast<int>(part.positions.size());
-    part.positions.push_back(static_cast<int>(k));
+    part.position_in_child[k] = count_of(part.positions);
+    part.positions.push_back(k);
     part.weights.push_back(validity * leaf.weights(k));
   }
   return part;
@@ -100,9 +101,9 @@ ExactLeaf ExactLeaves::open(const Rows& rows, const Node& parent) const {
 Rows ExactLeaves::sorted_rows(const ExactLeaf& leaf, Eigen::Index split_input) const {
   std::vector<ValueOfRow> values;
   values.reserve(leaf.inputs.rows());
-  for (Eigen::Index k = 0; k < leaf.inputs.rows(); ++k) {
+  for (int k = 0; k < leaf.inputs.rows(); ++k) {
     if (const double value = leaf.split_value(data_, k, split_input); !std::isnan(value)) {
-      values.push_back({value, static_cast<int>(k)});
+      values.push_back({value, k});
     }
   }
   std::sort(values.begin(), values.end());
@@ -144,8 +145,8 @@ double ExactLeaves::threshold(const ExactLeaf& leaf, const SplitCandidate& split
     // The rows that go left come first, as in a sorted order.
     const std::vector<Side> sides = sides_of(data_, leaf, split);
     for (const Side side : {Side::left, Side::right}) {
-      for (std::size_t k = 0; k < sides.size(); ++k) {
-        if (sides[k] == side) order.push_back(static_cast<int>(k));
+      for (int k = 0; k < std::ssize(sides); ++k) {
+        if (sides[k] == side) order.push_back(k);
       }
     }
   }

@@ -94,7 +94,7 @@ std::vector<double> BinnedRows::total(const Histogram& histogram) const {
   const std::span<const Eigen::Index> rows = counts(histogram, 0);
   for (std::size_t bin = 0; bin < rows.size(); ++bin) {
     if (rows[bin] > 0) {
-      add(shape_, of_input.data() + static_cast<Eigen::Index>(bin) * shape_.size(), sum.data());
+      add(shape_, of_input.data() + bin * shape_.size(), sum.data());
     }
   }
   return sum;

@@ -120,8 +120,8 @@ std::vector<double> BinnedRows::bounds_of_bins(const Edges& edges, std::span<con
 std::vector<std::vector<int>> BinnedRows::rows_in_bins(const Edges& edges, const std::vector<std::size_t>& chosen,
                                                        std::size_t input, const std::vector<int>& rows) const {
   std::vector<int> slot_of_bin(most_bins, -1);
-  for (std::size_t k = 0; k < chosen.size(); ++k) {
-    slot_of_bin[edges.bins[chosen[k]]] = static_cast<int>(k);
+  for (int k = 0; k < std::ssize(chosen); ++k) {
+    slot_of_bin[edges.bins[chosen[k]]] = k;
   }
   std::vector<std::vector<int>> held(chosen.size());
   for (const int row : rows) {
@@ -211,16 +211,16 @@ SplitCandidate BinnedRows::best_of(const std::vector<Edges>& edges, const std::v
   SplitCandidate best;
   Eigen::Index tested = 0;
   Eigen::Index evaluations = 0;
-  for (std::size_t j = 0; j < edges.size(); ++j) {
+  for (int j = 0; j < std::ssize(edges); ++j) {
     for (const SplitCandidate* candidate : {&edges[j].best, &inside[j]}) {
       tested += candidate->tested;
       evaluations += candidate->evaluations;
       const bool is_better = best.input < 0 || candidate->rss < best.rss - tie_tolerance * node_rss;
-      const bool is_before = best.input == static_cast<int>(j) && candidate->left < best.left &&
-                             candidate->rss <= best.rss + tie_tolerance * node_rss;
+      const bool is_before =
+          best.input == j && candidate->left < best.left && candidate->rss <= best.rss + tie_tolerance * node_rss;
       if (candidate->input >= 0 && (is_better || is_before)) {
         best = *candidate;
-        best.input = static_cast<int>(j);
+        best.input = j;
       }
     }
   }

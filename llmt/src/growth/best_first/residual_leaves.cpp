@@ -52,8 +52,8 @@ Eigen::MatrixXd ResidualLeaves::residuals(const ResidualLeaf& leaf, const Node& 
 SplitCandidate ResidualLeaves::search_categories(const ResidualLeaf& leaf, Eigen::Index j, double node_rss) const {
   const GramShape shape(rows_.features());
   std::vector<std::vector<int>> of_level(data_.num_levels[j]);
-  for (std::size_t k = 0; k < leaf.rows.size(); ++k) {
-    of_level[static_cast<std::size_t>(leaf.values(static_cast<Eigen::Index>(k), j))].push_back(leaf.rows[k]);
+  for (Eigen::Index k = 0; k < std::ssize(leaf.rows); ++k) {
+    of_level[static_cast<Eigen::Index>(leaf.values(k, j))].push_back(leaf.rows[k]);
   }
   std::vector<double> grams(of_level.size() * shape.size(), 0.0);
   std::vector<Eigen::Index> counts;
@@ -98,11 +98,11 @@ SplitCandidate ResidualLeaves::examine(ResidualLeaf& leaf, const Node& parent, N
 std::array<ResidualLeaf, 2> ResidualLeaves::divide(ResidualLeaf& leaf, const SplitCandidate& split) const {
   std::array<ResidualLeaf, 2> children;
   std::array<std::vector<int>, 2> positions;
-  for (std::size_t k = 0; k < leaf.rows.size(); ++k) {
+  for (int k = 0; k < std::ssize(leaf.rows); ++k) {
     const double value = leaf.values(k, split.input);
     const bool left =
         split.level_side.empty() ? value <= split.last_left : split.level_side[static_cast<std::size_t>(value)] < 0;
-    positions[left ? 0 : 1].push_back(static_cast<int>(k));
+    positions[left ? 0 : 1].push_back(k);
     children[left ? 0 : 1].rows.push_back(leaf.rows[k]);
   }
   for (std::size_t side = 0; side < 2; ++side) {

@@ -105,8 +105,8 @@ std::vector<Cut> candidates_of(const GrowthData& data, const ResidualNode& node)
 ResidualSplit divide(const ResidualNode& node, const Cut& candidate) {
   ResidualSplit split;
   const std::span<const double> values = values_of(node, candidate.input);
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    if (!std::isnan(values[i])) split.sides[values[i] <= candidate.threshold ? 0 : 1].push_back(static_cast<int>(i));
+  for (int i = 0; i < std::ssize(values); ++i) {
+    if (!std::isnan(values[i])) split.sides[values[i] <= candidate.threshold ? 0 : 1].push_back(i);
   }
   split.best.input = static_cast<int>(candidate.input);
   split.best.left = std::ssize(split.sides[0]);

@@ -65,10 +65,9 @@ LevelCut best_level_cut(const GateProblem& problem, const Eigen::VectorXd& value
   const Eigen::Index columns = problem.a.cols();
   const Eigen::VectorXd residual = problem.weights.cwiseProduct(problem.y * problem.output_weights.cwiseSqrt());
   Eigen::MatrixXd means = Eigen::MatrixXd::Zero(columns, levels.weight.size());
-  for (std::size_t i = 0; i < levels.of_row.size(); ++i) {
-    if (levels.of_row[i] >= 0) {
-      const Eigen::Index row = static_cast<Eigen::Index>(i);
-      means.col(levels.of_row[i]) += residual(row) * problem.a.row(row).transpose();
+  for (Eigen::Index row = 0; row < std::ssize(levels.of_row); ++row) {
+    if (levels.of_row[row] >= 0) {
+      means.col(levels.of_row[row]) += residual(row) * problem.a.row(row).transpose();
     }
   }
   std::vector<int> present;

@@ -120,8 +120,8 @@ HilomotInputs::HilomotInputs(const GrowthData& data) {
     }
     const double centre = training.columns[input].centre;
     Eigen::VectorXd values(training.count());
-    for (Eigen::Index i = 0; i < values.size(); ++i) {
-      const double value = data.split_value(static_cast<int>(i), j);
+    for (int i = 0; i < values.size(); ++i) {
+      const double value = data.split_value(i, j);
       values(i) = std::isnan(value) ? 0.0 : value - centre;
     }
     const double largest = values.cwiseAbs().maxCoeff();

@@ -6,6 +6,7 @@
 #include <numeric>
 #include <optional>
 
+#include "base/count.hpp"
 #include "growth/growth_data.hpp"
 #include "growth/hilomot/cut.hpp"
 #include "growth/worst_first.hpp"
@@ -181,7 +182,7 @@ bool HilomotTree::split_worst() {
 
 void HilomotTree::split(HilomotLeaf& leaf, const HilomotCut& cut) {
   Node& parent = nodes_[leaf.node];
-  parent.left = static_cast<int>(nodes_.size());
+  parent.left = count_of(nodes_);
   parent.right = parent.left + 1;
   set_split(inputs_, std::ssize(data_.training.columns), cut, parent);
   const Eigen::Index on_left = send_rows_down(leaf, cut, parent.left);

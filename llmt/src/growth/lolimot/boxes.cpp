@@ -61,10 +61,10 @@ std::vector<int> rows_in(const LolimotData& data, const Box& box, const Box& who
     return (x > box.low(j) || is_first) && x <= box.high(j);
   };
   std::vector<int> rows;
-  for (Eigen::Index i = 0; i < data.split_values.rows(); ++i) {
+  for (int i = 0; i < data.split_values.rows(); ++i) {
     Eigen::Index j = 0;
     while (j < data.split_values.cols() && is_inside(data.split_values(i, j), j)) ++j;
-    if (j == data.split_values.cols()) rows.push_back(static_cast<int>(i));
+    if (j == data.split_values.cols()) rows.push_back(i);
   }
   return rows;
 }

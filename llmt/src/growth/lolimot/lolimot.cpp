@@ -5,6 +5,7 @@
 #include <limits>
 #include <optional>
 
+#include "base/count.hpp"
 #include "base/parallel.hpp"
 #include "constraints/signs.hpp"
 #include "growth/gain_order.hpp"
@@ -52,8 +53,8 @@ Eigen::VectorXd squared_errors(const LolimotData& data, const WholeModel& whole)
 // Weighted least squares with the validities of the local model as weights, as a correction of the parent's model.
 void fit(const LolimotData& data, const Node& parent, const Eigen::VectorXd& validity, LocalModel& model) {
   std::vector<int> rows;
-  for (Eigen::Index i = 0; i < validity.size(); ++i) {
-    if (validity(i) > least_local_validity) rows.push_back(static_cast<int>(i));
+  for (int i = 0; i < validity.size(); ++i) {
+    if (validity(i) > least_local_validity) rows.push_back(i);
   }
   const Eigen::MatrixXd x = data.deviations(rows, Eigen::all);
   const Eigen::MatrixXd residuals = (data.outputs(rows, Eigen::all) - x * parent.slope.transpose()).rowwise() -
@@ -229,7 +230,7 @@ void LolimotTree::make_split(LocalModel& model, Split split, Eigen::Index split_
   Node& parent = nodes_[model.node];
   parent.split_input = data_.problem.options.split_inputs[split_input];
   parent.threshold = split.threshold;
-  parent.left = static_cast<int>(nodes_.size());
+  parent.left = count_of(nodes_);
   parent.right = parent.left + 1;
   split.left.node = parent.left;
   split.right.node = parent.right;

@@ -3,6 +3,7 @@
 #include <limits>
 #include <queue>
 
+#include "base/count.hpp"
 #include "data/missing.hpp"
 #include "growth/gain_order.hpp"
 #include "growth/m5/pruning.hpp"
@@ -68,7 +69,7 @@ GrownPartition in_order_of_growth(const GrowthData& data, const RowMajor& deviat
   const auto enter = [&](int index) {
     const M5Branch& branch = tree.branches[index];
     if (branch.left >= 0) {
-      queue.push({static_cast<float>(branch.split.decrease), static_cast<int>(result.nodes.size()), index});
+      queue.push({static_cast<float>(branch.split.decrease), count_of(result.nodes), index});
     }
     result.nodes.push_back(make_node(data, deviations, tree, index));
   };
@@ -83,7 +84,7 @@ GrownPartition in_order_of_growth(const GrowthData& data, const RowMajor& deviat
     queue.pop();
     const M5Branch& branch = tree.branches[next.content];
     Node& node = result.nodes[next.node];
-    node.left = static_cast<int>(result.nodes.size());
+    node.left = count_of(result.nodes);
     node.right = node.left + 1;
     set_split(data, branch, node);
     enter(branch.left);

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <vector>
 
+#include "base/count.hpp"
+
 namespace llmt {
 namespace {
 
@@ -149,7 +151,7 @@ FewInputsModel fit_few_inputs(const RowMajor& x, const Eigen::VectorXd& y, const
 
   FewInputsModel model;
   model.slope = Eigen::VectorXd::Zero(x.cols());
-  model.coefficients = static_cast<int>(solution.columns.size()) + 1;
+  model.coefficients = count_of(solution.columns) + 1;
   model.residuals = data.y;
   const RowMajor regressors = data.scaled(Eigen::all, solution.columns);
   // The second pass adds what rounding of the sums left.

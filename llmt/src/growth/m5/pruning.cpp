@@ -26,10 +26,10 @@ std::vector<int> regressors_of(const GrowthData& data, const M5Tree& tree, const
     std::iota(result.begin(), result.end(), 0);
     return result;
   }
-  for (std::size_t k = 0; k < regressors.size(); ++k) {
+  for (int k = 0; k < std::ssize(regressors); ++k) {
     for (std::size_t j = 0; j < branch.tested.size(); ++j) {
       if (branch.tested[j] && data.problem.options.split_inputs[j] == regressors[k].input) {
-        result.push_back(static_cast<int>(k));
+        result.push_back(k);
       }
     }
   }

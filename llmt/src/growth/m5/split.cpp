@@ -82,7 +82,7 @@ Cut best_cut(const GrowthData& data, const DeviationNode& node, const Rows& orde
   return {};
 }
 
-DeviationSplit split_number(const GrowthData& data, const DeviationNode& node, Eigen::Index j) {
+DeviationSplit split_number(const GrowthData& data, const DeviationNode& node, int j) {
   const Rows& order = node.orders[j];
   std::vector<double> values(order.size());
   std::ranges::transform(order, values.begin(), [&](int row) { return data.split_value(row, j); });
@@ -90,15 +90,15 @@ DeviationSplit split_number(const GrowthData& data, const DeviationNode& node, E
   if (const Cut cut = best_cut(data, node, order, values, std::ssize(order) / least_share); cut.left > 0) {
     const double low = values[cut.left - 1];
     const double high = values[cut.left];
-    split.input = static_cast<int>(j);
+    split.input = j;
     split.threshold = std::min(low + 0.5 * (high - low), std::nextafter(high, low));
     split.decrease = cut.decrease;
   }
   return split;
 }
 
-DeviationSplit split_levels(const GrowthData& data, const DeviationNode& node, Eigen::Index j) {
-  const std::size_t levels = data.num_levels[j];
+DeviationSplit split_levels(const GrowthData& data, const DeviationNode& node, int j) {
+  const int levels = data.num_levels[j];
   std::vector<Rows> of_level(levels);
   for (const int row : node.rows) {
     if (const double value = data.split_value(row, j); !std::isnan(value)) {
@@ -109,31 +109,31 @@ DeviationSplit split_levels(const GrowthData& data, const DeviationNode& node, E
   for (Eigen::Index o = 0; o < data.outputs.cols(); ++o) {
     std::vector<double> mean(levels, 0.0);
     Rows seen;
-    for (std::size_t level = 0; level < levels; ++level) {
+    for (int level = 0; level < levels; ++level) {
       Spread spread;
       for (const int row : of_level[level]) {
         spread.add(node.weights(row), data.outputs(row, o));
       }
       mean[level] = spread.mean;
       if (!of_level[level].empty()) {
-        seen.push_back(static_cast<int>(level));
+        seen.push_back(level);
       }
     }
     std::ranges::stable_sort(seen, [&](int a, int b) { return mean[a] < mean[b]; });
     Rows order;
     std::vector<double> rank;
-    for (std::size_t k = 0; k < seen.size(); ++k) {
+    for (int k = 0; k < std::ssize(seen); ++k) {
       const Rows& rows = of_level[seen[k]];
       order.insert(order.end(), rows.begin(), rows.end());
-      rank.insert(rank.end(), rows.size(), static_cast<double>(k));
+      rank.insert(rank.end(), rows.size(), k);
     }
     const Cut cut = best_cut(data, node, order, rank, std::ssize(order) / least_share);
     if (cut.left > 0 && (split.input < 0 || cut.decrease > split.decrease * (1.0 + tie_tolerance))) {
-      split.input = static_cast<int>(j);
+      split.input = j;
       split.decrease = cut.decrease;
       split.level_side.assign(levels, 0);
-      for (std::size_t k = 0; k < seen.size(); ++k) {
-        split.level_side[seen[k]] = static_cast<double>(k) <= rank[cut.left - 1] ? -1 : 1;
+      for (int k = 0; k < std::ssize(seen); ++k) {
+        split.level_side[seen[k]] = k <= rank[cut.left - 1] ? -1 : 1;
       }
     }
   }
@@ -141,7 +141,7 @@ DeviationSplit split_levels(const GrowthData& data, const DeviationNode& node, E
 }
 
 // Rows with a value against rows without one: it can be informative that a value is missing.
-DeviationSplit split_missing(const GrowthData& data, const DeviationNode& node, Eigen::Index j) {
+DeviationSplit split_missing(const GrowthData& data, const DeviationNode& node, int j) {
   Rows order;
   for (const bool missing : {false, true}) {
     std::ranges::copy_if(node.rows, std::back_inserter(order),
@@ -152,7 +152,7 @@ DeviationSplit split_missing(const GrowthData& data, const DeviationNode& node, 
                          [&](int row) { return std::isnan(data.split_value(row, j)) ? 1.0 : 0.0; });
   DeviationSplit split;
   if (const Cut cut = best_cut(data, node, order, keys); cut.left > 0) {
-    split.input = static_cast<int>(j);
+    split.input = j;
     split.by_missing = true;
     split.decrease = cut.decrease;
   }
@@ -175,7 +175,7 @@ double relative_deviation(const GrowthData& data, const DeviationNode& node) {
 
 DeviationSplit largest_decrease(const GrowthData& data, const DeviationNode& node) {
   std::vector<std::array<DeviationSplit, 2>> found(data.split_inputs());
-  parallel_for(std::ssize(found), data.threads_for(std::ssize(node.rows) * std::ssize(found)), [&](Eigen::Index j) {
+  parallel_for(std::ssize(found), data.threads_for(std::ssize(node.rows) * std::ssize(found)), [&](int j) {
     std::array<DeviationSplit, 2>& of_input = found[j];
     if (data.num_levels[j] > 0) {
       of_input[0] = split_levels(data, node, j);

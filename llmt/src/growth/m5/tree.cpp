@@ -6,6 +6,7 @@
 #include <iterator>
 #include <numeric>
 
+#include "base/count.hpp"
 #include "growth/missing_left.hpp"
 #include "model/leaf_validities.hpp"
 
@@ -124,7 +125,7 @@ bool Grower::split(std::size_t index, const Orders& orders, std::array<Orders, 2
   if (branch.split.input < 0) return false;
   const Division division = divide(branch, own);
   branch.tested[branch.split.input] = true;
-  branch.left = static_cast<int>(tree_.branches.size());
+  branch.left = count_of(tree_.branches);
   branch.right = branch.left + 1;
   std::array<M5Branch, 2> children;
   Eigen::Index at = branch.begin;

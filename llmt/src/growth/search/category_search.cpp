@@ -104,10 +104,9 @@ SplitCandidate search_levels(const SearchNode& node, std::span<const int> levels
   std::vector<Eigen::Index> counts(num_levels, 0);
   std::vector<double> all(shape.size(), 0.0);
   Eigen::Index present = 0;
-  for (std::size_t row = 0; row < levels.size(); ++row) {
+  for (int row = 0; row < std::ssize(levels); ++row) {
     if (const int level = levels[row]; level >= 0) {
-      const int index = static_cast<int>(row);
-      add_rows(node.features, &index, 1, grams.data() + level * shape.size());
+      add_rows(node.features, &row, 1, grams.data() + level * shape.size());
       ++counts[level];
       ++present;
     }

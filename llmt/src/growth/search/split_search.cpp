@@ -115,10 +115,10 @@ std::vector<InputSearch::Segment> InputSearch::cut(const Segment& segment, const
   const std::size_t inner = edges.size() - 2;
   std::vector<Segment> result;
   for (std::size_t i = 0; i <= inner; ++i) {
-    result.push_back(
-        {edges[i], edges[i + 1], i == 0 ? segment.left : sides.left.data() + static_cast<Eigen::Index>(i - 1) * size,
-         i == inner ? segment.right : sides.right.data() + static_cast<Eigen::Index>(i) * size,
-         i == 0 ? segment.rss_left : sides.rss_left[i - 1], i == inner ? segment.rss_right : sides.rss_right[i]});
+    result.push_back({edges[i], edges[i + 1], i == 0 ? segment.left : sides.left.data() + (i - 1) * size,
+                      i == inner ? segment.right : sides.right.data() + i * size,
+                      i == 0 ? segment.rss_left : sides.rss_left[i - 1],
+                      i == inner ? segment.rss_right : sides.rss_right[i]});
   }
   std::ranges::stable_sort(result, [](const Segment& a, const Segment& b) { return a.bound() < b.bound(); });
   return result;
@@ -225,10 +225,10 @@ SplitCandidate first_of_best(std::span<const SplitCandidate> found, double rss) 
     evaluations += candidate.evaluations;
     smallest = candidate.input >= 0 ? std::min(smallest, candidate.rss) : smallest;
   }
-  for (std::size_t j = 0; j < found.size() && best.input < 0; ++j) {
+  for (int j = 0; j < std::ssize(found) && best.input < 0; ++j) {
     if (found[j].input >= 0 && found[j].rss <= smallest + tie_tolerance * rss) {
       best = found[j];
-      best.input = static_cast<int>(j);
+      best.input = j;
     }
   }
   best.tested = tested;
