@@ -266,7 +266,9 @@ void add_calibrate(CLI::App& app) {
       "Identify base, tool and geometry of a robot from measured tool positions; with --correct, learn what is left\n"
       "as a function of the joint values. Held-out figures: everything, the size of the correction included, is\n"
       "fitted without the poses it is judged on.\n"
-      "The correction is kept if its held-out mean error is the smaller one.");
+      "The correction is kept if it lowers the held-out mean error by more than two standard errors of the "
+      "difference;\n"
+      "with --folds 0 it is kept without a test.");
   command->footer("Example: llmt-robot calibrate robotics/robots/ur10.yaml measured.csv --correct -o calibrated.yaml");
   const auto arguments = std::make_shared<CalibrateArguments>();
   robotics::ReportOptions& options = arguments->options;
