@@ -56,6 +56,12 @@ void add_growth(CLI::App& command, FitOptions& options) {
 
 void add_local_models(CLI::App& command, FitOptions& options) {
   command
+      .add_option("--loss", options.loss,
+                  "What is made small: squares of the residuals, or squares with rows far from a preliminary tree left "
+                  "out (Tukey's biweight)")
+      ->transform(choice_of<Loss>())
+      ->option_text(choices_text(options.loss));
+  command
       .add_option("--local-models", options.terms,
                   "Local models linear, with products and squares of the inputs, or the better of the two")
       ->transform(choice_of<LocalTerms>())

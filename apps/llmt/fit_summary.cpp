@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <cmath>
+#include <ranges>
 #include <string_view>
 #include <vector>
 
@@ -95,6 +96,15 @@ std::string search_text(const SearchSummary& search) {
           : "There are no better ones.");
 }
 
+// Counted from 1.
+std::vector<Eigen::Index> rows_without_weight(const FitSummary& summary) {
+  std::vector<Eigen::Index> rows;
+  for (Eigen::Index row = 0; row < summary.loss_weights.size(); ++row) {
+    if (summary.loss_weights(row) == 0.0) rows.push_back(row + 1);
+  }
+  return rows;
+}
+
 void print_data(const FitRun& run, const FitResult& result) {
   std::vector<std::string> inputs;
   std::vector<std::string> constant;
@@ -109,6 +119,13 @@ void print_data(const FitRun& run, const FitResult& result) {
                     fmt::join(inputs, ", ")));
   if (result.summary.missing_values > 0) {
     print(fmt::format("Missing values in the inputs: {}\n", result.summary.missing_values));
+  }
+  if (run.learning.options.loss == Loss::tukey) {
+    const std::vector<Eigen::Index> rows = rows_without_weight(result.summary);
+    print(fmt::format("Rows left out by the Tukey loss: {} of {}{}\n", rows.size(), result.summary.loss_weights.size(),
+                      rows.empty() ? ""
+                                   : fmt::format(" (row {}{})", fmt::join(rows | std::views::take(10), ", "),
+                                                 rows.size() > 10 ? ", ..." : "")));
   }
   if (!constant.empty()) {
     print(fmt::format("Constant, so without influence: {}\n", fmt::join(constant, ", ")));
@@ -151,6 +168,7 @@ Json summary_json(const FitRun& run, const FitResult& result) {
   json["missing_values"] = result.summary.missing_values;
   json["rule"] = name_of(run.learning.options.rule);
   json["min_leaf_samples"] = result.summary.min_leaf_samples;
+  if (run.learning.options.loss == Loss::tukey) json["rows_left_out"] = rows_without_weight(result.summary);
   json["inputs"] = Json::array();
   for (const InputColumn& input : result.model.inputs()) {
     json["inputs"].push_back(input.name);

@@ -8,7 +8,9 @@
 #include <utility>
 
 #include "llmt/csv.hpp"
+#include "llmt/outliers.hpp"
 #include "llmt/retired_options.hpp"
+#include "shared/cli.hpp"
 
 namespace llmt::apps {
 namespace {
@@ -48,6 +50,42 @@ std::vector<int> signs_of(const char* option, const std::vector<std::string>& na
   return result;
 }
 
+constexpr std::size_t named_rows = 5;
+
+// "lines 13 (5.3e+03), 57 (-4e+03)".
+std::string places_of(const Csv& csv, const std::vector<Eigen::Index>& rows, const Eigen::VectorXd& target) {
+  std::string text = rows.size() == 1 ? "line " : "lines ";
+  for (std::size_t k = 0; k < std::min(rows.size(), named_rows); ++k) {
+    text += fmt::format("{}{} ({:.4g})", k == 0 ? "" : ", ", csv.line_of(rows[k]), target(rows[k]));
+  }
+  return rows.size() > named_rows ? text + ", ..." : text;
+}
+
+// Says which few rows decide a fit by squares. Refuses a value beside which all others are rounding errors.
+void look_for_heavy_rows(const Csv& csv, const LearningArguments& arguments, const LearningColumns& columns) {
+  if (arguments.options.loss != Loss::squared) return;
+  for (std::size_t o = 0; o < arguments.targets.size(); ++o) {
+    Eigen::VectorXd target = columns.targets.col(o);
+    if (columns.weights.size() > 0) {
+      target = (columns.weights.array() > 0.0).select(target, bulk_of(target).centre);
+    }
+    const HeavyRows heavy = heavy_rows(target);
+    if (heavy.rows.empty()) continue;
+    const std::string& name = arguments.targets[o];
+    if (heavy.hide_the_others) {
+      throw std::runtime_error(fmt::format(
+          "{}:{}: column \"{}\": {:.6g} is so large that the differences between all other values are below its "
+          "rounding error; correct it, leave the row out, or use --loss tukey",
+          arguments.data, csv.line_of(heavy.rows.front()), name, target(heavy.rows.front())));
+    }
+    warn(fmt::format(
+        "llmt: {} of {} rows {} {:.3g} % of the squares of \"{}\" about its median: {}. If they are mistakes, correct "
+        "them or use --loss tukey",
+        heavy.rows.size(), target.size(), heavy.rows.size() == 1 ? "carries" : "carry", 100.0 * heavy.share, name,
+        places_of(csv, heavy.rows, target)));
+  }
+}
+
 }  // namespace
 
 std::vector<std::string> choose_inputs(const Csv& csv, const LearningArguments& arguments) {
@@ -80,6 +118,7 @@ LearningTable read_learning_table(const LearningArguments& arguments) {
   const std::string hint = arguments.inputs.empty() ? " (--ignore COLUMN leaves a column out)" : "";
   LearningColumns columns = read_learning_columns(
       csv, {inputs, arguments.categorical, arguments.targets, arguments.weight}, hint, arguments.options.max_threads);
+  look_for_heavy_rows(csv, arguments, columns);
   LearningTable table{inputs, std::move(columns.inputs), std::move(columns.targets), arguments.options};
   FitOptions& options = table.options;
   options.split_inputs = positions("--split-inputs", arguments.split_inputs, table.names);

@@ -173,6 +173,11 @@ void print_summary(const StreamArguments& arguments, const Learned& learned, con
                fmt::format("{}", partition.num_leaves()), number(all(output)), number(recent(output))});
   }
   print(table.text());
+  if (counts.max_leaves == 1 && arguments.learning.options.max_leaves == 0) {
+    print(fmt::format(
+        "{} inputs: the sums of a leaf would take more than 1 GiB, so nothing was split. --max-leaves 16 splits.\n",
+        learned.inputs.size()));
+  }
   if (!arguments.output.empty()) {
     print(fmt::format("Model written to {}\n", arguments.output));
   }

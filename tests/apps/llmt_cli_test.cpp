@@ -56,6 +56,32 @@ std::string bent() {
   return text;
 }
 
+TEST(LlmtProgram, OutliersAreNamedRefusedAndLeftOut) {
+  const Folder folder;
+  std::string text = table();
+  const std::size_t third_line = text.find("row 1,");
+  const std::size_t value = text.rfind(',', text.rfind(',', text.find('\n', third_line)) - 1) + 1;
+  const auto with = [&](const char* written) {
+    std::string changed = text;
+    const std::size_t end = changed.find(',', value);
+    return changed.replace(value, end - value, written);
+  };
+  folder.write("far.csv", with("5000"));
+  folder.write("absurd.csv", with("1e30"));
+  const std::string fit = llmt_program + " fit --target y --ignore label,z --validity crisp ";
+  const Outcome warned = folder.run(fit + "far.csv");
+  EXPECT_EQ(warned.exit_code, 0) << warned.err;
+  EXPECT_NE(warned.err.find("1 of 300 rows carries"), std::string::npos) << warned.err;
+  EXPECT_NE(warned.err.find("line 3 (5000)"), std::string::npos) << warned.err;
+  const Outcome refused = folder.run(fit + "absurd.csv");
+  EXPECT_EQ(refused.exit_code, 1);
+  EXPECT_NE(refused.err.find("absurd.csv:3: column \"y\": 1e+30"), std::string::npos) << refused.err;
+  const Outcome robust = folder.run(fit + "absurd.csv --loss tukey --json");
+  ASSERT_EQ(robust.exit_code, 0) << robust.err;
+  EXPECT_EQ(robust.err, "");
+  EXPECT_EQ(json::parse(robust.out)["rows_left_out"][0], 2);
+}
+
 TEST(LlmtProgram, LocalModelsAreQuadraticAndSparseWhereAsked) {
   const Folder folder;
   folder.write("d.csv", bent());

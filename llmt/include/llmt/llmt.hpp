@@ -12,6 +12,7 @@
 #include "llmt/model.hpp"
 #include "llmt/names.hpp"
 #include "llmt/options.hpp"
+#include "llmt/outliers.hpp"
 #include "llmt/random.hpp"
 #include "llmt/stream.hpp"
 #include "llmt/summary.hpp"

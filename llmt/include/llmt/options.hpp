@@ -83,6 +83,14 @@ enum class SplitSearch {
   binned
 };
 
+/// What a fit makes small.
+enum class Loss {
+  squared,  ///< squares of the residuals
+  /// Squares of the residuals, each row weighted by Tukey's biweight of its residual from a preliminary tree. Rows
+  /// whose output is far from that tree count nothing. Fits two small trees more.
+  tukey
+};
+
 /// What the local models of a partition are fitted to.
 enum class Estimation {
   as_grown,  ///< least squares of the rows in the leaf's box, whatever the validities
@@ -131,6 +139,7 @@ struct FitOptions {
   Pruning pruning = Pruning::last_splits;
   ValidityChoice validity = ValidityChoice::automatic;
   LocalTerms terms = LocalTerms::linear;
+  Loss loss = Loss::squared;
   SparseChoice sparse = SparseChoice::never;
   /// The tree is grown anew in every fold, and what predicts the held-out rows best is kept. count 0: no choice, the
   /// tree stays as grown. From 50 000 rows on, only the first fold is held out.
@@ -175,5 +184,7 @@ template <>
 std::span<const Choice<SplitSearch>> choices();
 template <>
 std::span<const Choice<Estimation>> choices();
+template <>
+std::span<const Choice<Loss>> choices();
 
 }  // namespace llmt

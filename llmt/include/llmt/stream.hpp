@@ -21,7 +21,7 @@ struct StreamOptions {
   double min_variance_gain = 0.0;
   Eigen::Index min_leaf_samples = 0;  ///< on either side of a split. 0: twice the coefficients of a local model
   /// Largest number of leaves of each tree, which bounds memory. 0: the number whose sums take about 64 MiB, within
-  /// 16 ... 500.
+  /// 16 ... 500; fewer where 16 leaves would take more than 1 GiB (about 100 inputs), 1 from about 250 inputs on.
   Eigen::Index max_leaves = 0;
   int bins = 16;  ///< bins of an input in a leaf, 4 ... 256
   /// A leaf's model is drawn to the model that its parent had when it was split, as if this many further rows of the
@@ -38,6 +38,7 @@ struct StreamCounts {
   Eigen::Index missing_values = 0;  ///< in the inputs
   Eigen::Index held_out = 0;        ///< rows in the reservoir that no tree has learned from
   Eigen::Index leaves = 0;          ///< of all trees
+  Eigen::Index max_leaves = 0;      ///< of each tree, as used
   Eigen::Index splits = 0;
   Eigen::Index prunes = 0;        ///< splits taken back because recent rows do not need them
   Eigen::Index drifts = 0;        ///< alarms: branches whose errors rose abruptly and whose models restarted

@@ -87,6 +87,8 @@ struct FitSummary {
   bool quadratic = false;  ///< whether the local models have products
   /// LocalTerms::automatic: the best candidate with the terms that were not taken, one entry a partition. Else empty.
   std::vector<CandidateError> other_terms = {};
+  /// Loss::tukey: the weight in [0, 1] that each row had by its residual, 0 for outliers. Else empty.
+  Eigen::VectorXd loss_weights = {};
 };
 
 /// What ended growth, in a few words: "the significance test".

@@ -168,14 +168,14 @@ std::vector<Eigen::Index> rows_of_weight(const Eigen::VectorXd& weights) {
 FitData::FitData(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<const Eigen::MatrixXd>& outputs,
                  const FitOptions& options, bool orders_splits)
     : folds_(options.folds), table_(make_table(inputs, outputs, options, orders_splits)) {
-  const std::vector<Eigen::Index> kept = rows_of_weight(table_->weights);
-  if (std::ssize(kept) == inputs.rows()) return;
-  inputs_ = inputs(kept, Eigen::all);
-  outputs_ = outputs(kept, Eigen::all);
+  rows_ = rows_of_weight(table_->weights);
+  if (std::ssize(rows_) == inputs.rows()) return;
+  inputs_ = inputs(rows_, Eigen::all);
+  outputs_ = outputs(rows_, Eigen::all);
   FitOptions of_kept = options;
-  of_kept.weights = table_->weights(kept);
+  of_kept.weights = table_->weights(rows_);
   if (!options.folds.groups.empty()) {
-    for (const Eigen::Index row : kept) groups_.push_back(options.folds.groups[row]);
+    for (const Eigen::Index row : rows_) groups_.push_back(options.folds.groups[row]);
     folds_.groups = groups_;
   }
   table_.emplace(make_table(inputs_, outputs_, of_kept, orders_splits));

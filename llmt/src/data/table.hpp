@@ -43,8 +43,11 @@ class FitData {
   const Table& table() const { return *table_; }
   /// FitOptions::folds with the groups of the rows that take part.
   const FoldOptions& folds() const { return folds_; }
+  /// The caller's rows that take part, ascending.
+  const std::vector<Eigen::Index>& rows() const { return rows_; }
 
  private:
+  std::vector<Eigen::Index> rows_;
   Eigen::MatrixXd inputs_;
   Eigen::MatrixXd outputs_;
   std::vector<double> groups_;

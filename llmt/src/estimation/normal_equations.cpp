@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <numeric>
 
 #include "base/count.hpp"
 #include "base/parallel.hpp"
@@ -18,6 +19,9 @@ constexpr double range_margin = 0.25;
 
 // Logistic gates give every leaf some validity at every row. Only rows with more than this count in a leaf's range.
 constexpr double reach_of_logistic = 1e-3;
+
+// Most numbers that the outer products of the rows of one step take: 64 MiB.
+constexpr Eigen::Index outer_products = Eigen::Index{1} << 23;
 
 // a += factor * b.
 inline void add_scaled(double* a, const double* b, double factor, Eigen::Index size) {
@@ -59,7 +63,7 @@ class Assembly {
   NormalEquations run(int max_threads);
 
  private:
-  Reached reach(Eigen::Index index) const;
+  Reached reach(Eigen::Index begin, Eigen::Index rows) const;
   void describe_row(Reached& reached, Eigen::Index row, const std::vector<Activation>& active) const;
   Eigen::VectorXd regressors_at(const Reached& reached, Eigen::Index row, int node) const;
   void widen_range(const Reached& reached, std::size_t leaf);
@@ -108,8 +112,9 @@ Assembly::Assembly(const TrainingRows& training, Partition& partition, const Eig
 }
 
 NormalEquations Assembly::run(int max_threads) {
-  for (Eigen::Index index = 0; index < num_chunks(training_); ++index) {
-    const Reached reached = reach(index);
+  const Eigen::Index at_once = std::clamp<Eigen::Index>(outer_products / packed_, 1, chunk_rows);
+  for (Eigen::Index begin = 0; begin < training_.count(); begin += at_once) {
+    const Reached reached = reach(begin, std::min(at_once, training_.count() - begin));
     // Leaves are independent: each adds to its own sums and to its blocks with the leaves before it.
     parallel_for(std::ssize(sums_.leaves), max_threads, [&](Eigen::Index position) {
       const std::size_t leaf = position;
@@ -127,14 +132,15 @@ NormalEquations Assembly::run(int max_threads) {
   return std::move(sums_);
 }
 
-Reached Assembly::reach(Eigen::Index index) const {
-  Reached reached{.chunk = fetch(training_, index, partition_.outputs),
+Reached Assembly::reach(Eigen::Index begin, Eigen::Index rows) const {
+  std::vector<int> positions(rows);
+  std::iota(positions.begin(), positions.end(), static_cast<int>(begin));
+  Reached reached{.chunk = fetch(training_, positions, partition_.outputs),
                   .entries = {},
                   .uses = std::vector<std::vector<Use>>(sums_.leaves.size()),
                   .regressors = {},
                   .residuals = {},
                   .outer = {}};
-  const Eigen::Index rows = reached.chunk.count();
   reached.regressors = RowMajor::Zero(rows, size_);
   reached.residuals = RowMajor::Zero(rows, root_.cols());
   reached.outer.resize(sums_.missing ? 0 : rows, packed_);

@@ -1,14 +1,18 @@
 #include "fit/fit_terms.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <mutex>
 #include <numeric>
 #include <optional>
+#include <stdexcept>
 
 #include "base/parallel.hpp"
 #include "estimation/leaf_statistics.hpp"
 #include "fit/grow_tree.hpp"
+#include "llmt/outliers.hpp"
 #include "selection/selection.hpp"
 
 namespace llmt {
@@ -201,6 +205,18 @@ FitResult assemble(const Setting& setting, std::vector<FittedPartition> fitted) 
           std::move(summary), std::move(intervals)};
 }
 
+// Least squares cannot fit what the rounding of one output's error hides.
+void refuse_hidden_outputs(const Table& table) {
+  for (Eigen::Index o = 0; o < table.outputs.cols(); ++o) {
+    const HeavyRows heavy = heavy_rows(table.outputs.col(o));
+    if (!heavy.hide_the_others) continue;
+    throw std::invalid_argument(fmt::format(
+        "llmt::fit: outputs(., {}) holds {}, beside which the other values differ by less than its rounding error; "
+        "leave that row out, or set loss to tukey",
+        o, table.outputs(heavy.rows.front(), o)));
+  }
+}
+
 std::vector<int> all_rows(Eigen::Index count) {
   std::vector<int> rows(count);
   std::iota(rows.begin(), rows.end(), 0);
@@ -213,6 +229,7 @@ FitResult fit_terms(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen
                     const FitOptions& options) {
   const FitData data(inputs, outputs, options, rule_of(options.rule).splits_on_monotone_inputs);
   const Table& table = data.table();
+  refuse_hidden_outputs(table);
   const TrainingRows all = training_rows(table, all_rows(table.inputs.rows()), options.max_threads);
   const std::vector<FoldRows> folds = deal(table, data.folds(), options.max_threads);
   const Plan plan = with_defaults(options, all, std::ssize(folds));

@@ -19,6 +19,7 @@ constexpr std::array<Choice<SplitSearch>, 3> searches = {
     {{SplitSearch::automatic, "auto"}, {SplitSearch::exact, "exact"}, {SplitSearch::binned, "binned"}}};
 constexpr std::array<Choice<Estimation>, 3> estimations = {
     {{Estimation::as_grown, "as-grown"}, {Estimation::local, "local"}, {Estimation::joint, "joint"}}};
+constexpr std::array<Choice<Loss>, 2> losses = {{{Loss::squared, "squared"}, {Loss::tukey, "tukey"}}};
 
 }  // namespace
 
@@ -45,6 +46,11 @@ std::span<const Choice<SplitSearch>> choices() {
 template <>
 std::span<const Choice<Estimation>> choices() {
   return estimations;
+}
+
+template <>
+std::span<const Choice<Loss>> choices() {
+  return losses;
 }
 
 std::string describe(StopReason reason) {

@@ -194,6 +194,7 @@ StreamCounts StreamState::counts() const {
     counts.replacements += of_tree.replacements;
     counts.bytes += tree->bytes();
   }
+  counts.max_leaves = options_.max_leaves;
   counts.bytes += reservoir_.bytes() + static_cast<Eigen::Index>(first_rows_.capacity() * sizeof(double));
   return counts;
 }

@@ -13,8 +13,11 @@
 namespace llmt {
 namespace {
 
-// The default of max_leaves is the number of leaves whose bins take this many bytes, within these bounds.
+// The default of max_leaves is the number of leaves whose bins take this many bytes, within these bounds. If
+// the fewest leaves take more than `most_default_bytes`, because there are many inputs, there are fewer leaves, down to
+// one, which needs no bins.
 constexpr double default_bytes = 64.0 * 1024.0 * 1024.0;
+constexpr double most_default_bytes = 1024.0 * 1024.0 * 1024.0;
 constexpr Eigen::Index fewest_default_leaves = 16;
 constexpr Eigen::Index most_default_leaves = 500;
 
@@ -49,8 +52,10 @@ StreamOptions with_defaults(Eigen::Index inputs, StreamOptions options) {
   if (options.max_leaves == 0) {
     const double bytes_per_leaf =
         static_cast<double>(inputs * options.bins * GramShape(inputs + 1, 1).size()) * sizeof(double);
+    const auto most = static_cast<Eigen::Index>(most_default_bytes / bytes_per_leaf);
     options.max_leaves = std::clamp(static_cast<Eigen::Index>(default_bytes / bytes_per_leaf), fewest_default_leaves,
                                     most_default_leaves);
+    options.max_leaves = std::clamp<Eigen::Index>(most, 1, options.max_leaves);
   }
   return options;
 }

@@ -127,6 +127,15 @@ TEST_F(Robustness, FivePercentOfTheInputsMissing) {
   EXPECT_GE(refitted(holed(train, 3), holed(test, 4)), 0.885);
 }
 
+TEST_F(Robustness, OnePercentOfTheOutputsAThousandfoldWithTukeysLoss) {
+  llmt::Random random(6);
+  Sample wrong = train;
+  for (double& value : wrong.y.reshaped()) value *= random.uniform() < 0.01 ? 1000.0 : 1.0;
+  const double found = r_squared(llmt::fit(wrong.x, wrong.y, {.loss = llmt::Loss::tukey}).model, test);
+  RecordProperty("r_squared", std::to_string(found));
+  EXPECT_GE(found, base - 0.01);
+}
+
 TEST_F(Robustness, FarRowsAlongAnInputThatIsLinear) {
   llmt::Random random(5);
   Sample far = test;

@@ -1,0 +1,57 @@
+#include "llmt/outliers.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <stdexcept>
+#include <vector>
+
+namespace llmt {
+namespace {
+
+constexpr double normal_by_median = 1.4826;  // standard deviation of a normal variable by its median absolute value
+constexpr double heavy_share = 0.9;
+constexpr Eigen::Index one_row_in = 100;
+constexpr double far_spreads = 20.0;
+
+double median(Eigen::VectorXd values) {
+  const auto middle = values.begin() + values.size() / 2;
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+}  // namespace
+
+Bulk bulk_of(const Eigen::Ref<const Eigen::VectorXd>& values) {
+  if (values.size() == 0) throw std::invalid_argument("llmt::bulk_of: there is no value");
+  const double centre = median(values);
+  return {centre, normal_by_median * median((values.array() - centre).abs())};
+}
+
+HeavyRows heavy_rows(const Eigen::Ref<const Eigen::VectorXd>& output) {
+  const Bulk bulk = bulk_of(output);
+  const Eigen::VectorXd distance = (output.array() - bulk.centre).abs();
+  const double farthest = distance.maxCoeff();
+  if (!(bulk.spread > 0.0 && farthest > far_spreads * bulk.spread)) return {};
+  const Eigen::VectorXd squares = (distance / farthest).array().square();  // so that they stay finite
+  const double all = squares.sum();
+  std::vector<Eigen::Index> rows(output.size());
+  std::iota(rows.begin(), rows.end(), Eigen::Index{0});
+  const Eigen::Index most = std::max<Eigen::Index>(1, output.size() / one_row_in);
+  const auto end = rows.begin() + most;
+  std::ranges::partial_sort(rows, end, [&](Eigen::Index a, Eigen::Index b) {
+    return distance(a) != distance(b) ? distance(a) > distance(b) : a < b;
+  });
+  HeavyRows heavy;
+  for (auto row = rows.begin(); row != end && heavy.share < heavy_share; ++row) {
+    if (distance(*row) <= far_spreads * bulk.spread) break;
+    heavy.rows.push_back(*row);
+    heavy.share += squares(*row) / all;
+  }
+  if (heavy.share < heavy_share) return {};
+  heavy.hide_the_others = farthest * std::numeric_limits<double>::epsilon() > bulk.spread;
+  return heavy;
+}
+
+}  // namespace llmt

@@ -1,0 +1,94 @@
+#include "fit/robust_weights.hpp"
+
+#include <algorithm>
+#include <vector>
+
+#include "data/table.hpp"
+#include "fit/fit_terms.hpp"
+#include "llmt/outliers.hpp"
+
+namespace llmt {
+namespace {
+
+constexpr double clip_spreads = 5.0;  // the outputs of the first tree lie within this many spreads of their median
+constexpr double biweight_spreads = 4.685;  // 95 % of the efficiency of least squares for normal noise
+constexpr double least_spread = 1e-9;       // of the residuals, by the spread of the output
+constexpr Eigen::Index least_leaf_rows = 10;
+
+// The outputs, held within `clip_spreads` spreads of their median.
+Eigen::MatrixXd clipped(const Eigen::Ref<const Eigen::MatrixXd>& outputs) {
+  Eigen::MatrixXd result = outputs;
+  for (auto output : result.colwise()) {
+    const Bulk bulk = bulk_of(output);
+    if (bulk.spread == 0.0) continue;
+    const double reach = clip_spreads * bulk.spread;
+    output = output.cwiseMax(bulk.centre - reach).cwiseMin(bulk.centre + reach);
+  }
+  return result;
+}
+
+// A tree that is cheap to fit and whose leaves tell where residuals are large.
+FitOptions preliminary(const FitOptions& options) {
+  return {.max_leaves = options.max_leaves,
+          .min_leaf_samples = options.min_leaf_samples,
+          .split_inputs = options.split_inputs,
+          .regression_inputs = options.regression_inputs,
+          .shared_partition = options.shared_partition,
+          .validity = ValidityChoice::crisp,
+          .folds = options.folds,
+          .categorical_inputs = options.categorical_inputs,
+          .weights = options.weights,
+          .intervals = false,
+          .max_threads = options.max_threads};
+}
+
+// For each row the spread of the residuals in its leaf, or of all residuals if that is larger.
+Eigen::VectorXd spreads_at(const Eigen::VectorXd& residuals, const Eigen::VectorXi& leaf, double least) {
+  std::vector<std::vector<Eigen::Index>> rows(leaf.maxCoeff() + 1);
+  for (Eigen::Index row = 0; row < leaf.size(); ++row) rows[leaf(row)].push_back(row);
+  const double all = std::max(least, bulk_of(residuals).spread);
+  Eigen::VectorXd spread = Eigen::VectorXd::Constant(residuals.size(), all);
+  for (const std::vector<Eigen::Index>& of_leaf : rows) {
+    if (std::ssize(of_leaf) < least_leaf_rows) continue;
+    spread(of_leaf).setConstant(std::max(all, bulk_of(residuals(of_leaf)).spread));
+  }
+  return spread;
+}
+
+Eigen::VectorXd biweights(const Model& model, const Eigen::Ref<const Eigen::MatrixXd>& inputs,
+                          const Eigen::Ref<const Eigen::MatrixXd>& outputs, int max_threads) {
+  const Eigen::MatrixXd residuals = outputs - model.predict(inputs, max_threads);
+  const Eigen::MatrixXi leaves = model.leaf_of(inputs, max_threads);
+  Eigen::VectorXd weights = Eigen::VectorXd::Ones(outputs.rows());
+  for (std::size_t p = 0; p < model.partitions().size(); ++p) {
+    for (const int output : model.partitions()[p].outputs) {
+      const double least = least_spread * bulk_of(outputs.col(output)).spread;
+      const Eigen::VectorXd spread = spreads_at(residuals.col(output), leaves.col(p), least);
+      // A spread of 0: more than half of the outputs agree, and are predicted without an error.
+      const Eigen::ArrayXd u =
+          (spread.array() > 0.0).select(residuals.col(output).array() / (biweight_spreads * spread.array()), 0.0);
+      const Eigen::VectorXd biweight = (1.0 - u.square()).max(0.0).square();
+      weights = weights.cwiseMin(biweight);
+    }
+  }
+  return weights;
+}
+
+}  // namespace
+
+Eigen::VectorXd robust_weights(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
+                               const Eigen::Ref<const Eigen::MatrixXd>& outputs, const FitOptions& options) {
+  const FitData data(inputs, outputs, options, true);
+  const Table& table = data.table();
+  FitOptions first = preliminary(options);
+  first.folds = data.folds();
+  first.weights = table.weights;
+  const Model of_clipped = fit_terms(table.inputs, clipped(table.outputs), first).model;
+  first.weights = table.weights.cwiseProduct(biweights(of_clipped, table.inputs, table.outputs, options.max_threads));
+  const Model of_weighted = fit_terms(table.inputs, table.outputs, first).model;
+  Eigen::VectorXd weights = Eigen::VectorXd::Zero(outputs.rows());
+  weights(data.rows()) = biweights(of_weighted, table.inputs, table.outputs, options.max_threads);
+  return weights;
+}
+
+}  // namespace llmt

@@ -1,0 +1,17 @@
+/// \file
+/// Weights of rows by which outliers in the outputs lose their influence.
+#pragma once
+
+#include <Eigen/Core>
+
+#include "llmt/options.hpp"
+
+namespace llmt {
+
+/// Tukey's biweight of the residuals of two preliminary crisp trees (docs/algorithms/robust.md): one weight in [0, 1]
+/// for each row, 0 for outliers. The weights of `options` are not multiplied in. `options` are checked; throws
+/// std::invalid_argument as fit().
+Eigen::VectorXd robust_weights(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
+                               const Eigen::Ref<const Eigen::MatrixXd>& outputs, const FitOptions& options);
+
+}  // namespace llmt

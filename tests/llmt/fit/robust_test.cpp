@@ -1,0 +1,112 @@
+// The loss by Tukey's biweight.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+#include "llmt/fit.hpp"
+#include "llmt/random.hpp"
+
+namespace {
+
+struct Sample {
+  Eigen::MatrixXd x;
+  Eigen::MatrixXd y;
+};
+
+// y = |a| + b, with normal noise of 0.1, ten times as large where a > 0.
+Sample sample(Eigen::Index rows, std::uint64_t seed) {
+  llmt::Random random(seed);
+  Sample s{Eigen::MatrixXd(rows, 2), Eigen::MatrixXd(rows, 1)};
+  for (Eigen::Index i = 0; i < rows; ++i) {
+    s.x.row(i) << random.uniform(-1.0, 1.0), random.uniform(-1.0, 1.0);
+    const double noise = s.x(i, 0) > 0.0 ? 1.0 : 0.1;
+    s.y(i, 0) = 10.0 * std::abs(s.x(i, 0)) + s.x(i, 1) + noise * random.normal();
+  }
+  return s;
+}
+
+double error(const llmt::Model& model, const Sample& test) { return llmt::rmse(model.predict(test.x), test.y)(0); }
+
+const llmt::FitOptions tukey = {.loss = llmt::Loss::tukey};
+
+TEST(RobustLoss, OnePercentOfTheOutputsAThousandfold) {
+  const Sample clean = sample(1000, 1);
+  const Sample test = sample(2000, 2);
+  Sample wrong = clean;
+  for (Eigen::Index i = 0; i < 1000; i += 100) wrong.y(i, 0) *= 1000.0;
+  const double base = error(llmt::fit(clean.x, clean.y).model, test);
+  EXPECT_GT(error(llmt::fit(wrong.x, wrong.y).model, test), 10.0 * base);
+  const llmt::FitResult robust = llmt::fit(wrong.x, wrong.y, tukey);
+  EXPECT_LT(error(robust.model, test), 1.02 * base);
+  for (Eigen::Index i = 0; i < 1000; i += 100) EXPECT_EQ(robust.summary.loss_weights(i), 0.0) << i;
+}
+
+TEST(RobustLoss, ATenthOfTheOutputsWrongOnOneSide) {
+  const Sample clean = sample(1000, 1);
+  const Sample test = sample(2000, 2);
+  Sample wrong = clean;
+  for (Eigen::Index i = 0; i < 1000; i += 10) wrong.y(i, 0) += 40.0;
+  const double base = error(llmt::fit(clean.x, clean.y).model, test);
+  EXPECT_LT(error(llmt::fit(wrong.x, wrong.y, tukey).model, test), 1.05 * base);
+}
+
+TEST(RobustLoss, CostsLittleWhereThereIsNothingWrong) {
+  const Sample clean = sample(1000, 1);
+  const Sample test = sample(2000, 2);
+  const double base = error(llmt::fit(clean.x, clean.y).model, test);
+  const llmt::FitResult robust = llmt::fit(clean.x, clean.y, tukey);
+  EXPECT_LT(error(robust.model, test), 1.02 * base);
+  // Noise that is larger on one side is not taken for outliers.
+  EXPECT_LT((robust.summary.loss_weights.array() == 0.0).count(), 20);
+}
+
+TEST(RobustLoss, OutputBesideWhichAllOthersAreRoundingErrors) {
+  Sample s = sample(300, 1);
+  const Sample test = sample(2000, 2);
+  const double base = error(llmt::fit(s.x, s.y).model, test);
+  s.y(7, 0) = 1e30;
+  try {
+    llmt::fit(s.x, s.y);
+    FAIL() << "it was fitted";
+  } catch (const std::invalid_argument& refused) {
+    EXPECT_NE(std::string(refused.what()).find("1e+30"), std::string::npos) << refused.what();
+  }
+  EXPECT_LT(error(llmt::fit(s.x, s.y, tukey).model, test), 1.05 * base);
+}
+
+TEST(RobustLoss, WeightsOfTheCallerAreKept) {
+  Sample s = sample(400, 1);
+  llmt::FitOptions options = tukey;
+  options.weights = Eigen::VectorXd::Ones(400);
+  options.weights.head(100).setZero();
+  const llmt::FitResult some = llmt::fit(s.x, s.y, options);
+  EXPECT_EQ(some.summary.samples, (some.summary.loss_weights.tail(300).array() > 0.0).count());
+  EXPECT_TRUE((some.summary.loss_weights.head(100).array() == 0.0).all());
+  s.y.topRows(100).setConstant(1e6);  // rows that take no part
+  const llmt::FitResult same = llmt::fit(s.x, s.y, options);
+  EXPECT_EQ(llmt::to_json(same.model), llmt::to_json(some.model));
+}
+
+TEST(RobustLoss, SeveralOutputsAndMissingInputs) {
+  Sample s = sample(600, 1);
+  Sample test = sample(1000, 2);
+  s.y.conservativeResize(600, 2);
+  s.y.col(1) = -s.y.col(0);
+  s.y(5, 1) = 1e5;
+  for (Eigen::Index i = 0; i < 600; i += 20) s.x(i, 1) = std::nan("");
+  const llmt::FitResult robust = llmt::fit(s.x, s.y, tukey);
+  EXPECT_EQ(robust.summary.loss_weights(5), 0.0);
+  EXPECT_LT(llmt::rmse(robust.model.predict(test.x).leftCols(1), test.y)(0), 1.0);
+}
+
+TEST(RobustLoss, OutputsThatMostlyAgree) {
+  Sample s = sample(200, 1);
+  s.y.setZero();
+  s.y(3, 0) = 5.0;
+  const llmt::FitResult robust = llmt::fit(s.x, s.y, tukey);
+  EXPECT_TRUE(robust.model.predict(s.x).allFinite());
+}
+
+}  // namespace
