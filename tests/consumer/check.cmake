@@ -1,7 +1,7 @@
 # cmake -D CASE=<case> -D ... -P check.cmake: one way of using llmt from another project, from a clean folder on.
 #   package   install all, then find_package(llmt COMPONENTS robotics), or the core where there is no robotics
 #   core      install the core only: it works, and asking it for robotics is refused in words
-#   sources   add_subdirectory: all of it is configured, but only llmt::llmt is built anew, which takes a minute as it is
+#   sources   add_subdirectory: all of it is configured. Only the smallest library, llmt::discovery, is built anew
 # SOURCE_DIR, BUILD_DIR: llmt's. WORK_DIR: where to work. ROBOTICS: ON where llmt::robotics was built. OPTIONS: for configuring.
 cmake_minimum_required(VERSION 3.25)
 
@@ -31,14 +31,16 @@ elseif(CASE STREQUAL "core")
   endif()
   file(REMOVE_RECURSE "${WORK_DIR}/build")
 elseif(CASE STREQUAL "sources")
-  list(APPEND configure "-DLLMT_SOURCE_DIR=${SOURCE_DIR}" -DLLMT_UNITY_BUILD=ON -DLLMT_PRECOMPILE_HEADERS=ON)
+  list(APPEND configure "-DLLMT_SOURCE_DIR=${SOURCE_DIR}" -DLLMT_UNITY_BUILD=ON)
 else()
   message(FATAL_ERROR "unknown CASE '${CASE}'")
 endif()
 
 run(${configure} "-DWITH_ROBOTICS=${ROBOTICS}")
-set(programs fit_and_predict)
-if(ROBOTICS AND NOT CASE STREQUAL "sources")
+set(programs fit_and_predict solve)
+if(CASE STREQUAL "sources")
+  set(programs solve)
+elseif(ROBOTICS)
   list(APPEND programs use_robotics)
 endif()
 run("${CMAKE_COMMAND}" --build "${WORK_DIR}/build" --parallel 2 --target ${programs})
