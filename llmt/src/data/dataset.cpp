@@ -224,6 +224,14 @@ TrainingRows query_rows(const Table& table, std::vector<int> rows, const Trainin
   return query;
 }
 
+TrainingRows with_table(const TrainingRows& rows, const Table& table) {
+  TrainingRows result = rows;
+  result.table = &table;
+  result.weight_unit = 1.0;
+  result.weight_unit = static_cast<double>(result.count()) / total_weight(result);
+  return result;
+}
+
 double total_weight(const TrainingRows& rows) {
   double sum = 0.0;
   for (const int row : rows.rows) {

@@ -34,6 +34,9 @@ struct TrainingRows {
 /// The given rows, columns described from them. `table` must live as long as the result.
 TrainingRows training_rows(const Table& table, std::vector<int> rows, int max_threads = 1);
 
+/// The same rows of a table with other weights, under the same columns.
+TrainingRows with_table(const TrainingRows& rows, const Table& table);
+
 /// The given rows under the columns of `training`.
 TrainingRows query_rows(const Table& table, std::vector<int> rows, const TrainingRows& training);
 

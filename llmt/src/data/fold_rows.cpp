@@ -25,11 +25,11 @@ std::vector<Fold> selection_folds(Eigen::Index rows, FoldOptions options) {
   return folds;
 }
 
-std::vector<FoldRows> deal(const Table& table, const FoldOptions& options, int max_threads) {
+std::vector<FoldRows> deal(const Table& table, const Table& measured, const FoldOptions& options, int max_threads) {
   std::vector<FoldRows> folds;
   for (const Fold& fold : selection_folds(table.inputs.rows(), options)) {
     TrainingRows training = training_rows(table, {fold.train.begin(), fold.train.end()}, max_threads);
-    TrainingRows held_out = query_rows(table, {fold.held_out.begin(), fold.held_out.end()}, training);
+    TrainingRows held_out = query_rows(measured, {fold.held_out.begin(), fold.held_out.end()}, training);
     folds.push_back({std::move(training), std::move(held_out)});
   }
   return folds;

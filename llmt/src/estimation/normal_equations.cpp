@@ -6,6 +6,7 @@
 
 #include "base/count.hpp"
 #include "base/parallel.hpp"
+#include "estimation/missing_by_validity.hpp"
 #include "model/evaluator.hpp"
 #include "model/imputed.hpp"
 #include "numerics/dense.hpp"
@@ -112,6 +113,8 @@ Assembly::Assembly(const TrainingRows& training, Partition& partition, const Eig
 }
 
 NormalEquations Assembly::run(int max_threads) {
+  const bool overlap = partition_.validity.kind != ValidityKind::crisp;
+  if (overlap && sums_.missing) describe_missing_by_validity(training_, evaluator_, leave_out_, partition_);
   const Eigen::Index at_once = std::clamp<Eigen::Index>(outer_products / packed_, 1, chunk_rows);
   for (Eigen::Index begin = 0; begin < training_.count(); begin += at_once) {
     const Reached reached = reach(begin, std::min(at_once, training_.count() - begin));
@@ -129,6 +132,7 @@ NormalEquations Assembly::run(int max_threads) {
     });
   }
   add_up_to_parents();
+  if (overlap && !sums_.missing) describe_missing_by_sums(sums_, training_.scale, partition_);
   return std::move(sums_);
 }
 

@@ -12,6 +12,7 @@
 #include "base/parallel.hpp"
 #include "estimation/leaf_statistics.hpp"
 #include "fit/grow_tree.hpp"
+#include "fit/missing_weights.hpp"
 #include "llmt/outliers.hpp"
 #include "selection/selection.hpp"
 
@@ -21,6 +22,7 @@ namespace {
 // What all stages of a fit read.
 struct Setting {
   const TrainingRows& all;
+  const TrainingRows& measured;  // the same rows with the weights that they have in errors
   const std::vector<FoldRows>& folds;
   const Plan& plan;
   const FitOptions& options;
@@ -138,8 +140,8 @@ FittedPartition finish(const Setting& setting, const FinalTree& grown, Selection
   const bool fewer = candidate.leaves < grown_leaves;
   candidate.leaves = std::min(candidate.leaves, grown_leaves);
   Partition partition = estimate(setting.all, grown.tree, candidate, threads);
-  describe_leaves(setting.all, partition, candidate.sparse, threads);
-  PartitionSummary summary = describe(partition, setting.all, candidate.sparse);
+  describe_leaves(setting.measured, partition, candidate.sparse, threads);
+  PartitionSummary summary = describe(partition, setting.measured, candidate.sparse);
   summary.grown_leaves = grown_leaves;
   summary.stop = fewer ? StopReason::cross_validation : grown.stop;
   summary.search = grown.search;
@@ -230,10 +232,13 @@ FitResult fit_terms(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen
   const FitData data(inputs, outputs, options, rule_of(options.rule).splits_on_monotone_inputs);
   const Table& table = data.table();
   refuse_hidden_outputs(table);
-  const TrainingRows all = training_rows(table, all_rows(table.inputs.rows()), options.max_threads);
-  const std::vector<FoldRows> folds = deal(table, data.folds(), options.max_threads);
+  Table weighted = table;
+  if (table.inputs.hasNaN()) weighted.weights = table.weights.cwiseProduct(weights_by_missing(table, options));
+  const TrainingRows all = training_rows(weighted, all_rows(table.inputs.rows()), options.max_threads);
+  const TrainingRows measured = with_table(all, table);
+  const std::vector<FoldRows> folds = deal(weighted, table, data.folds(), options.max_threads);
   const Plan plan = with_defaults(options, all, std::ssize(folds));
-  const Setting setting{all, folds, plan, options};
+  const Setting setting{all, measured, folds, plan, options};
   const std::vector<std::vector<int>> groups = output_groups(table.outputs.cols(), options.shared_partition);
   Report report(options, std::ssize(groups) * (std::ssize(folds) + 1));
   std::vector<std::optional<FittedPartition>> fitted(groups.size());

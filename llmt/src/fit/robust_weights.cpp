@@ -5,6 +5,7 @@
 
 #include "data/table.hpp"
 #include "fit/fit_terms.hpp"
+#include "fit/preliminary.hpp"
 #include "llmt/outliers.hpp"
 
 namespace llmt {
@@ -25,21 +26,6 @@ Eigen::MatrixXd clipped(const Eigen::Ref<const Eigen::MatrixXd>& outputs) {
     output = output.cwiseMax(bulk.centre - reach).cwiseMin(bulk.centre + reach);
   }
   return result;
-}
-
-// A tree that is cheap to fit and whose leaves tell where residuals are large.
-FitOptions preliminary(const FitOptions& options) {
-  return {.max_leaves = options.max_leaves,
-          .min_leaf_samples = options.min_leaf_samples,
-          .split_inputs = options.split_inputs,
-          .regression_inputs = options.regression_inputs,
-          .shared_partition = options.shared_partition,
-          .validity = ValidityChoice::crisp,
-          .folds = options.folds,
-          .categorical_inputs = options.categorical_inputs,
-          .weights = options.weights,
-          .intervals = false,
-          .max_threads = options.max_threads};
 }
 
 // For each row the spread of the residuals in its leaf, or of all residuals if that is larger.
@@ -80,7 +66,7 @@ Eigen::VectorXd robust_weights(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
                                const Eigen::Ref<const Eigen::MatrixXd>& outputs, const FitOptions& options) {
   const FitData data(inputs, outputs, options, true);
   const Table& table = data.table();
-  FitOptions first = preliminary(options);
+  FitOptions first = preliminary_options(options);
   first.folds = data.folds();
   first.weights = table.weights;
   const Model of_clipped = fit_terms(table.inputs, clipped(table.outputs), first).model;

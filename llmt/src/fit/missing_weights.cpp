@@ -1,0 +1,65 @@
+#include "fit/missing_weights.hpp"
+
+#include <Eigen/Cholesky>
+#include <numeric>
+#include <vector>
+
+#include "fit/defaults.hpp"
+#include "fit/grow_tree.hpp"
+#include "fit/preliminary.hpp"
+
+namespace llmt {
+namespace {
+
+constexpr double least_weight = 0.01;
+constexpr double prior_rows = 40.0;  // for an input, as if this many rows more had no larger variance without it
+
+// Squared residuals of preliminary trees, of all outputs together, each divided by its variance.
+Eigen::VectorXd squared_residuals(const Table& table, const FitOptions& options) {
+  std::vector<int> rows(table.inputs.rows());
+  std::iota(rows.begin(), rows.end(), 0);
+  const TrainingRows all = training_rows(table, std::move(rows), options.max_threads);
+  const Plan plan = with_defaults(preliminary_options(options), all, 0);
+  std::vector<Partition> partitions;
+  for (int output = 0; output < table.outputs.cols(); ++output) {
+    partitions.push_back(grow_tree(all, {output}, plan, true, options.max_threads).tree.partition);
+  }
+  const Model model(all.columns, all.output_columns, all.regressors, std::move(partitions));
+  const Eigen::MatrixXd residuals = table.outputs - model.predict(table.inputs, options.max_threads);
+  Eigen::VectorXd squares = Eigen::VectorXd::Zero(residuals.rows());
+  for (Eigen::Index o = 0; o < residuals.cols(); ++o) {
+    const double variance = (table.outputs.col(o).array() - table.outputs.col(o).mean()).square().mean();
+    if (variance > 0.0) squares += residuals.col(o).cwiseAbs2() / variance;
+  }
+  return squares;
+}
+
+// Columns 1, and for each input with missing values whether it is missing.
+Eigen::MatrixXd indicators(const Table& table) {
+  const Eigen::MatrixXd missing = table.inputs.array().isNaN().cast<double>();
+  std::vector<Eigen::Index> columns;
+  for (Eigen::Index j = 0; j < missing.cols(); ++j) {
+    if (missing.col(j).maxCoeff() > 0.0) columns.push_back(j);
+  }
+  Eigen::MatrixXd result(missing.rows(), 1 + std::ssize(columns));
+  result << Eigen::VectorXd::Ones(missing.rows()), missing(Eigen::all, columns);
+  return result;
+}
+
+}  // namespace
+
+Eigen::VectorXd weights_by_missing(const Table& table, const FitOptions& options) {
+  const Eigen::VectorXd squares = squared_residuals(table, options);
+  const Eigen::MatrixXd a = indicators(table);
+  const auto weighted = table.weights.asDiagonal();
+  Eigen::MatrixXd gram = a.transpose() * weighted * a;
+  gram.diagonal().tail(gram.rows() - 1).array() += prior_rows;
+  Eigen::VectorXd variances = gram.ldlt().solve(a.transpose() * (weighted * squares));
+  const double complete = variances(0);
+  if (!(complete > 0.0)) return Eigen::VectorXd::Ones(table.inputs.rows());
+  const Eigen::VectorXd added = variances.tail(variances.size() - 1).cwiseMax(0.0) / complete;
+  const Eigen::VectorXd variance = (a.rightCols(added.size()) * added).array() + 1.0;
+  return variance.cwiseInverse().cwiseMax(least_weight);
+}
+
+}  // namespace llmt

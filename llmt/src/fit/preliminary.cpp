@@ -1,0 +1,19 @@
+#include "fit/preliminary.hpp"
+
+namespace llmt {
+
+FitOptions preliminary_options(const FitOptions& options) {
+  return {.max_leaves = options.max_leaves,
+          .min_leaf_samples = options.min_leaf_samples,
+          .split_inputs = options.split_inputs,
+          .regression_inputs = options.regression_inputs,
+          .shared_partition = options.shared_partition,
+          .validity = ValidityChoice::crisp,
+          .folds = options.folds,
+          .categorical_inputs = options.categorical_inputs,
+          .weights = options.weights,
+          .intervals = false,
+          .max_threads = options.max_threads};
+}
+
+}  // namespace llmt
