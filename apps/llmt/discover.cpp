@@ -11,6 +11,7 @@
 #include "llmt/files.hpp"
 #include "llmt/term_file.hpp"
 #include "shared/cli.hpp"
+#include "shared/options.hpp"
 
 namespace llmt::apps {
 namespace {
@@ -188,8 +189,8 @@ void add_discover(CLI::App& app) {
       app.add_subcommand("discover", "Find and name what a simulation lacks, from measurements beside it");
   command->footer("Example: llmt discover simulated.csv measured.csv --inputs a,b,t --output y -o corrected.csv");
   const auto arguments = std::make_shared<DiscoverArguments>();
-  command->add_option("simulated", arguments->simulated, "Inputs and simulated outputs (CSV)")->required();
-  command->add_option("measured", arguments->measured, "The same inputs, row by row, and measured outputs (CSV)")
+  add_input_file(*command, "simulated", arguments->simulated, "Inputs and simulated outputs (CSV)")->required();
+  add_input_file(*command, "measured", arguments->measured, "The same inputs, row by row, and measured outputs (CSV)")
       ->required();
   command
       ->add_option("--inputs", arguments->inputs,
@@ -200,8 +201,8 @@ void add_discover(CLI::App& app) {
       ->required();
   command->add_option("--order", arguments->order,
                       "Column that says in which order rows were measured; it is an input too [rows as they stand]");
-  command->add_option("--terms", arguments->terms,
-                      "File of your own terms, a line each: name = expression of the inputs");
+  add_input_file(*command, "--terms", arguments->terms,
+                 "File of your own terms, a line each: name = expression of the inputs");
   command
       ->add_flag("--own-terms-only", arguments->own_terms_only, "Leave the built-in terms out, but for unknown shapes")
       ->needs("--terms");
@@ -209,11 +210,11 @@ void add_discover(CLI::App& app) {
       ->add_option("--allow", arguments->adjusted, "What the simulation may adjust before anything counts as missing")
       ->delimiter(',')
       ->check(CLI::IsMember({"offset", "scale"}));
-  command->add_option("--held-out", arguments->options.held_out_share, "Share of the rows set aside for verification")
-      ->check(CLI::Range(0.0, 0.9))
+  add_number(*command, "--held-out", arguments->options.held_out_share, share_set_aside,
+             "Share of the rows set aside for verification")
       ->capture_default_str();
-  command->add_option("--seed", arguments->options.seed, "Of the rows set aside")->capture_default_str();
-  command->add_option("-o,--corrected", arguments->corrected, "Corrected simulation to write (CSV)");
+  add_seed(*command, arguments->options.seed, "Of the rows set aside");
+  add_output_file(*command, "-o,--corrected", arguments->corrected, "Corrected simulation to write (CSV)");
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->callback([arguments] { discover_command(*arguments); });
 }

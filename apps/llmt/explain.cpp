@@ -13,6 +13,7 @@
 #include "llmt/model.hpp"
 #include "shared/cli.hpp"
 #include "shared/columns.hpp"
+#include "shared/options.hpp"
 
 namespace llmt::apps {
 namespace {
@@ -135,12 +136,10 @@ void add_explain(CLI::App& app) {
       "input moves the prediction away from the one at the means of the inputs.");
   command->footer("Example: llmt explain concrete.json concrete.csv --row 3");
   const auto arguments = std::make_shared<ExplainArguments>();
-  command->add_option("model", arguments->model, "Model file of llmt fit")->required();
-  command->add_option("data", arguments->data, "CSV file with the model's inputs")->required();
-  command->add_option("--row", arguments->row, "Row to explain, the first one below the header is 1")
-      ->check(CLI::PositiveNumber);
-  command->add_option("--threads", arguments->threads, "0: all; the result does not depend on it")
-      ->capture_default_str();
+  add_input_file(*command, "model", arguments->model, "Model file of llmt fit")->required();
+  add_input_file(*command, "data", arguments->data, "CSV file with the model's inputs")->required();
+  add_count(*command, "--row", arguments->row, Eigen::Index{1}, "Row to explain, the first one below the header is 1");
+  add_threads(*command, arguments->threads);
   command->add_flag("--json", arguments->json, "Print JSON");
   command->callback([arguments] { explain_command(*arguments); });
 }

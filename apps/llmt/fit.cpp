@@ -7,6 +7,7 @@
 #include "llmt/learning.hpp"
 #include "llmt/stream_command.hpp"
 #include "shared/cli.hpp"
+#include "shared/options.hpp"
 
 namespace llmt::apps {
 namespace {
@@ -45,7 +46,7 @@ void add_fit(CLI::App& app) {
   const auto arguments = std::make_shared<FitArguments>();
   add_learning_options(*command, arguments->learning);
   add_fit_options(*command, arguments->learning.options);
-  command->add_option("-o,--output", arguments->output, "Model file to write");
+  add_output_file(*command, "-o,--output", arguments->output, "Model file to write");
   command->add_flag("--no-intervals", arguments->no_intervals,
                     "Leave the folds' models out of the file; it is smaller and has no prediction intervals");
   command->add_flag("--json", arguments->json, "Print the summary as JSON");

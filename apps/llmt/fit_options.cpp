@@ -2,11 +2,18 @@
 
 #include <fmt/format.h>
 
+#include <limits>
 #include <map>
 #include <string>
 
+#include "shared/options.hpp"
+
 namespace llmt::apps {
 namespace {
+
+constexpr NumberRange below_one = {0.0, 1.0 - std::numeric_limits<double>::epsilon(), "a number from 0 to below 1"};
+constexpr NumberRange threshold_or_inf = {0.0, std::numeric_limits<double>::infinity(),
+                                          "a number of 0 or more, or inf"};
 
 template <class Enum>
 CLI::CheckedTransformer choice_of() {
@@ -36,14 +43,11 @@ void add_growth(CLI::App& command, FitOptions& options) {
   command.add_option("--rule", options.rule, rules_text())
       ->transform(choice_of<GrowthRule>())
       ->option_text(choices_text(options.rule));
-  command
-      .add_option("--significance", options.significance,
-                  "rd, ra: of the F test, over all candidate splits; 1: no test")
-      ->check(CLI::NonNegativeNumber)
-      ->option_text(fmt::format("FLOAT [{}]", default_text("significance")));
-  command
-      .add_option("--min-improvement", options.expert.min_improvement,
-                  "Stop when further splits lower the training sum of squares by less than this fraction each")
+  add_number(command, "--significance", options.significance, any_share,
+             "rd, ra: of the F test, over all candidate splits; 1: no test")
+      ->option_text(fmt::format("NUMBER [{}]", default_text("significance")));
+  add_number(command, "--min-improvement", options.expert.min_improvement, below_one,
+             "Stop when further splits lower the training sum of squares by less than this fraction each")
       ->capture_default_str();
   command
       .add_option("--search", options.expert.search,
@@ -87,25 +91,21 @@ void add_local_models(CLI::App& command, FitOptions& options) {
 
 // Lists, of which the held-out error chooses an entry.
 void add_candidates(CLI::App& command, ExpertOptions& expert) {
-  command
-      .add_option(
-          "--width", expert.widths,
-          "Widths to choose from: of a transition by the smaller child's extent; k_sigma; of the gates of hilomot")
-      ->delimiter(',')
-      ->option_text(fmt::format("FLOAT,... [{}]", default_text("widths")));
-  command
-      .add_option("--jump", expert.jumps,
-                  "Jumps to choose from: a split where the output jumps by this many "
-                  "standard deviations has no transition")
-      ->delimiter(',')
-      ->option_text(fmt::format("FLOAT,... [{}]", default_text("jumps")));
-  command.add_option("--ridge", expert.ridges, "Ridges to choose from: hold of the joint estimate at the local one")
-      ->delimiter(',')
-      ->option_text(fmt::format("FLOAT,... [{}]", default_text("ridges")));
-  command
-      .add_option("--shrinkage", expert.shrinkages, "Shrinkages to choose from: towards the parent's model, in rows")
-      ->delimiter(',')
-      ->option_text(fmt::format("FLOAT,... [{}]", default_text("shrinkages")));
+  const auto add = [&](const char* name, std::vector<double>& values, const NumberRange& range, const char* help,
+                       std::string_view defaults) {
+    add_numbers(command, name, values, range, help)
+        ->option_text(fmt::format("NUMBER,... [{}]", default_text(defaults)));
+  };
+  add("--width", expert.widths, above_zero,
+      "Widths to choose from: of a transition by the smaller child's extent; k_sigma; of the gates of hilomot",
+      "widths");
+  add("--jump", expert.jumps, threshold_or_inf,
+      "Jumps to choose from: a split where the output jumps by this many standard deviations has no transition",
+      "jumps");
+  add("--ridge", expert.ridges, not_negative, "Ridges to choose from: hold of the joint estimate at the local one",
+      "ridges");
+  add("--shrinkage", expert.shrinkages, not_negative, "Shrinkages to choose from: towards the parent's model, in rows",
+      "shrinkages");
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include "llmt/commands.hpp"
 #include "llmt/model.hpp"
 #include "shared/cli.hpp"
+#include "shared/options.hpp"
 
 namespace llmt::apps {
 namespace {
@@ -258,7 +259,7 @@ void add_inspect(CLI::App& app) {
   CLI::App* command = app.add_subcommand("inspect", "Print a model's leaves: where each holds and what it says");
   command->footer("Example: llmt inspect concrete.json");
   const auto arguments = std::make_shared<InspectArguments>();
-  command->add_option("model", arguments->model, "Model file of llmt fit")->required();
+  add_input_file(*command, "model", arguments->model, "Model file of llmt fit")->required();
   command->add_flag("--json", arguments->json, "Print JSON");
   command->callback([arguments] {
     const Model model = load(arguments->model);

@@ -11,6 +11,7 @@
 #include "llmt/outliers.hpp"
 #include "llmt/retired_options.hpp"
 #include "shared/cli.hpp"
+#include "shared/options.hpp"
 
 namespace llmt::apps {
 namespace {
@@ -116,8 +117,10 @@ LearningTable read_learning_table(const LearningArguments& arguments) {
   }
   const std::vector<std::string> inputs = choose_inputs(csv, arguments);
   const std::string hint = arguments.inputs.empty() ? " (--ignore COLUMN leaves a column out)" : "";
-  LearningColumns columns = read_learning_columns(
-      csv, {inputs, arguments.categorical, arguments.targets, arguments.weight}, hint, arguments.options.max_threads);
+  const double largest_input = arguments.options.terms == LocalTerms::quadratic ? largest_factor : largest_magnitude;
+  LearningColumns columns =
+      read_learning_columns(csv, {inputs, arguments.categorical, arguments.targets, arguments.weight}, hint,
+                            largest_input, arguments.options.max_threads);
   look_for_heavy_rows(csv, arguments, columns);
   LearningTable table{inputs, std::move(columns.inputs), std::move(columns.targets), arguments.options};
   FitOptions& options = table.options;
@@ -146,7 +149,7 @@ LearningTable read_learning_table(const LearningArguments& arguments) {
 
 void add_learning_options(CLI::App& command, LearningArguments& arguments) {
   FitOptions& options = arguments.options;
-  command.add_option("data", arguments.data, "CSV file with a header row")->required();
+  add_input_file(command, "data", arguments.data, "CSV file with a header row")->required();
   command.add_option("-t,--target", arguments.targets, "Column to predict; repeat for several")
       ->required()
       ->delimiter(',');
@@ -170,22 +173,20 @@ void add_learning_options(CLI::App& command, LearningArguments& arguments) {
       .add_option("--slope-sign", arguments.slope_signs,
                   "Inputs with slopes >= 0, or with a leading minus <= 0, in every local model; not across leaves")
       ->delimiter(',');
-  command.add_option("--max-leaves", options.max_leaves, "Most leaves of a tree; 0: the default")
-      ->option_text(fmt::format("INT [{}]", default_text("max_leaves")));
-  command.add_option("--min-leaf", options.min_leaf_samples, "Fewest rows in a leaf; 0: the default")
-      ->option_text(fmt::format("INT [{}]", default_text("min_leaf_samples")));
+  add_count(command, "--max-leaves", options.max_leaves, Eigen::Index{0}, "Most leaves of a tree; 0: the default")
+      ->option_text(fmt::format("COUNT [{}]", default_text("max_leaves")));
+  add_count(command, "--min-leaf", options.min_leaf_samples, Eigen::Index{0}, "Fewest rows in a leaf; 0: the default")
+      ->option_text(fmt::format("COUNT [{}]", default_text("min_leaf_samples")));
   command.add_flag_callback(
       "--prune", [&options] { options.pruning = Pruning::weakest_link; },
       "Undo the splits of the weakest branches first, not the last ones, where fewer leaves predict better");
-  command
-      .add_option("--cv", options.folds.count,
-                  "Folds of the held-out error by which everything is chosen, 0: keep the tree as grown")
+  add_count(command, "--cv", options.folds.count, 0,
+            "Folds of the held-out error by which everything is chosen, 0: keep the tree as grown")
       ->capture_default_str();
   command.add_flag("--contiguous", arguments.contiguous,
                    "Folds are blocks of consecutive rows (measured paths, grids, time series)");
-  command.add_option("--seed", options.folds.seed, "Of the random folds")->capture_default_str();
-  command.add_option("--threads", options.max_threads, "0: all; the result does not depend on it")
-      ->capture_default_str();
+  add_seed(command, options.folds.seed, "Of the random folds");
+  add_threads(command, options.max_threads);
   refuse_retired_options(command);
 }
 

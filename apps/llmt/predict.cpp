@@ -14,6 +14,7 @@
 #include "llmt/intervals.hpp"
 #include "shared/cli.hpp"
 #include "shared/columns.hpp"
+#include "shared/options.hpp"
 
 namespace llmt::apps {
 namespace {
@@ -214,7 +215,7 @@ void predict_command(const PredictArguments& arguments) {
     return;
   }
   if (arguments.output.empty()) {
-    write_csv(csv, predicted, [](std::string_view text) { print(text); });
+    write_csv(csv, predicted, print_bytes);
   }
   summarise(arguments, predicted);
 }
@@ -230,16 +231,15 @@ void add_predict(CLI::App& app) {
       "its RMSE is reported. leverage: of the row on its local models; 1 and more is extrapolation.");
   command->footer("Example: llmt predict concrete.json new.csv -o predicted.csv");
   const auto arguments = std::make_shared<PredictArguments>();
-  command->add_option("model", arguments->model, "Model file of llmt fit")->required();
-  command->add_option("data", arguments->data, "CSV file with the model's inputs; other columns are passed through")
+  add_input_file(*command, "model", arguments->model, "Model file of llmt fit")->required();
+  add_input_file(*command, "data", arguments->data,
+                 "CSV file with the model's inputs; other columns are passed through")
       ->required();
-  command->add_option("-o,--output", arguments->output, "CSV file to write (default: standard output)");
-  command
-      ->add_option("--interval", arguments->interval,
-                   "Level of prediction intervals, such as 0.9: adds TARGET_low and TARGET_high")
-      ->check(CLI::Range(0.01, 0.9999));
-  command->add_option("--threads", arguments->threads, "0: all; the result does not depend on it")
-      ->capture_default_str();
+  add_output_file(*command, "-o,--output", arguments->output, "CSV file to write (default: standard output)");
+  constexpr NumberRange level = {0.01, 0.9999, "a number from 0.01 to 0.9999"};
+  add_number(*command, "--interval", arguments->interval, level,
+             "Level of prediction intervals, such as 0.9: adds TARGET_low and TARGET_high");
+  add_threads(*command, arguments->threads);
   command->add_flag("--json", arguments->json, "Print JSON; it holds the predictions unless -o is given");
   command->callback([arguments] { predict_command(*arguments); });
 }

@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <cmath>
 #include <cstdio>
+#include <cstring>
 #include <fstream>
 #include <iostream>
 #include <memory>
@@ -24,6 +26,8 @@ struct Learned {
   std::string name;
   std::vector<std::string> inputs;
   std::unique_ptr<Stream> stream;
+  std::vector<LargestMagnitude> largest_inputs;
+  std::vector<LargestMagnitude> largest_targets;
 };
 
 void refuse_other_options(const CLI::App& command) {
@@ -68,16 +72,25 @@ void clear_progress() {
   }
 }
 
+void look_at(const Csv& piece, const Eigen::MatrixXd& values, std::vector<LargestMagnitude>& largest) {
+  largest.resize(values.cols());
+  for (std::size_t j = 0; j < largest.size(); ++j) {
+    largest[j].add(piece, values.col(j));
+  }
+}
+
+void refuse_small(const std::string& file, const std::vector<std::string>& columns,
+                  const std::vector<LargestMagnitude>& largest) {
+  for (std::size_t j = 0; j < largest.size(); ++j) {
+    largest[j].refuse_small(file, columns[j]);
+  }
+}
+
 void add(const Csv& piece, const StreamArguments& arguments, Learned& learned) {
   const LearningArguments& learning = arguments.learning;
   const Eigen::MatrixXd targets = piece.numbers(learning.targets, 1);
   const Eigen::VectorXd weights = learning.weight.empty() ? Eigen::VectorXd() : piece.numbers(learning.weight, 1);
-  for (Eigen::Index row = 0; row < weights.size(); ++row) {
-    if (weights(row) < 0.0) {
-      throw std::runtime_error(fmt::format("{}:{}: column \"{}\": a weight must not be negative, it is {}",
-                                           learned.name, piece.line_of(row), learning.weight, weights(row)));
-    }
-  }
+  refuse_negative_weight(piece, learning.weight, weights);
   Eigen::MatrixXd inputs;
   try {
     inputs = piece.numbers_or_missing(learned.inputs, 1);
@@ -85,18 +98,25 @@ void add(const Csv& piece, const StreamArguments& arguments, Learned& learned) {
     throw std::runtime_error(std::string(error.what()) +
                              " (--stream takes no categories; --ignore COLUMN leaves a column out)");
   }
+  refuse_large(piece, learned.inputs, inputs, std::vector<double>(learned.inputs.size(), largest_magnitude));
+  refuse_large(piece, learning.targets, targets, std::vector<double>(learning.targets.size(), largest_magnitude));
+  if (weights.size() > 0) refuse_large(piece, {&learning.weight, 1}, weights, {&largest_magnitude, 1});
   learned.stream->add(inputs, targets, weights);
+  look_at(piece, inputs, learned.largest_inputs);
+  look_at(piece, targets, learned.largest_targets);
 }
 
 Learned learn(const CLI::App& command, const StreamArguments& arguments) {
   const StreamOptions options = options_of(command, arguments);
   const LearningArguments& learning = arguments.learning;
   const bool standard_input = learning.data == "-";
-  Learned learned{standard_input ? "standard input" : learning.data, {}, nullptr};
+  Learned learned{standard_input ? "standard input" : learning.data, {}, nullptr, {}, {}};
   std::ifstream file;
   if (!standard_input) {
     file.open(learning.data, std::ios::binary);
-    if (!file) throw std::runtime_error(fmt::format("{}: cannot be read", learned.name));
+    if (!file) {
+      throw std::runtime_error(fmt::format("{}: cannot be read: {}", learned.name, std::strerror(errno)));
+    }
   } else {
     std::ios::sync_with_stdio(false);
   }
@@ -114,7 +134,19 @@ Learned learn(const CLI::App& command, const StreamArguments& arguments) {
     throw std::runtime_error(
         fmt::format("{}: there is a header and no rows{}", learned.name, learned.stream ? " of positive weight" : ""));
   }
+  refuse_small(learned.name, learned.inputs, learned.largest_inputs);
+  refuse_small(learned.name, learning.targets, learned.largest_targets);
   return learned;
+}
+
+Model snapshot(const Learned& learned, ValidityChoice validity) {
+  try {
+    return learned.stream->snapshot(validity);
+  } catch (const std::invalid_argument&) {  // all else has been checked
+    throw std::runtime_error(fmt::format(
+        "{}: with these weights and magnitudes the sums of squares overflow or vanish; other units are needed",
+        learned.name));
+  }
 }
 
 Json finite_or_null(double value) { return std::isnan(value) ? Json(nullptr) : Json(value); }
@@ -192,7 +224,7 @@ void stream_command(const CLI::App& command, const StreamArguments& arguments) {
     throw std::invalid_argument("--validity gaussian is not for --stream");
   }
   const Learned learned = learn(command, arguments);
-  const Model model = learned.stream->snapshot(validity).named(learned.inputs, arguments.learning.targets);
+  const Model model = snapshot(learned, validity).named(learned.inputs, arguments.learning.targets);
   if (!arguments.output.empty()) {
     save(model, arguments.output);
   }

@@ -87,7 +87,7 @@ std::vector<discovery::ModelTerm> read_terms(const std::string& path, const disc
                                              const std::string& output, const discovery::Rows& rows,
                                              const std::vector<std::string>& taken) {
   std::vector<discovery::ModelTerm> terms;
-  std::istringstream text(read_file(path));
+  std::istringstream text(read_file(path, description_limit));
   std::string line;
   for (int number = 1; std::getline(text, line); ++number) {
     const auto refuse = [&](const std::string& reason) {

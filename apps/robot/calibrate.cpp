@@ -3,15 +3,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <memory>
 #include <stdexcept>
 
-#include "llmt/files.hpp"
 #include "llmt/robotics/calibration_report.hpp"
 #include "llmt/robotics/robot_file.hpp"
 #include "robot/commands.hpp"
+#include "robot/corrected_file.hpp"
 #include "shared/cli.hpp"
+#include "shared/options.hpp"
 
 namespace llmt::apps {
 namespace {
@@ -206,24 +206,9 @@ void print_report(const CalibrateArguments& arguments, const robotics::Robot& no
   }
 }
 
-// CAL.yaml and, if the correction is kept, CAL.correction.json beside it.
-std::vector<std::string> write_result(const std::string& path, const CalibrationReport& report) {
-  robotics::CorrectedRobot best = report.best();
-  std::vector<std::string> written;
-  best.robot.correction_file.clear();
-  if (best.correction) {
-    const std::filesystem::path file = std::filesystem::path(path).replace_extension(".correction.json");
-    llmt::save(*best.correction, file.string());
-    best.robot.correction_file = file.filename().string();
-    written.push_back(file.string());
-  }
-  robotics::save(best.robot, path);
-  written.push_back(path);
-  return written;
-}
-
 void calibrate_command(CalibrateArguments arguments) {
   const robotics::Robot nominal = robotics::read_robot(arguments.robot);
+  refuse_lost_correction(nominal, arguments.robot, arguments.output);
   robotics::Measurements measurements = robotics::read_measurements(arguments.data, nominal);
   if (measurements.count() < arguments.options.folds) {
     throw std::runtime_error(fmt::format("{}: {} poses do not make {} folds", arguments.data, measurements.count(),
@@ -242,7 +227,7 @@ void calibrate_command(CalibrateArguments arguments) {
   const std::vector<Row> rows = rows_of(report, test);
   std::vector<std::string> written;
   if (!arguments.output.empty()) {
-    written = write_result(arguments.output, report);
+    written = save_corrected(report.best(), arguments.output);
   }
   if (arguments.json) {
     measurements.warnings.insert(measurements.warnings.end(), suspicions.begin(), suspicions.end());
@@ -272,29 +257,26 @@ void add_calibrate(CLI::App& app) {
   command->footer("Example: llmt-robot calibrate robotics/robots/ur10.yaml measured.csv --correct -o calibrated.yaml");
   const auto arguments = std::make_shared<CalibrateArguments>();
   robotics::ReportOptions& options = arguments->options;
-  command->add_option("robot", arguments->robot, "Robot description (YAML)")->required();
-  command->add_option("data", arguments->data, "Measurements (CSV with units in the column names)")->required();
+  add_input_file(*command, "robot", arguments->robot, "Robot description (YAML)")->required();
+  add_input_file(*command, "data", arguments->data, "Measurements (CSV with units in the column names)")->required();
   command->add_flag("--correct", options.correct, "Learn the residual as a function of the joint values");
-  command->add_option("--folds", options.folds, "Folds of the held-out figures, 0: none")->capture_default_str();
+  add_count(*command, "--folds", options.folds, 0, "Folds of the held-out figures, 0: none")->capture_default_str();
   command->add_flag("--contiguous", arguments->contiguous, "Folds are blocks of consecutive rows: for paths and grids");
-  command->add_option("--test", arguments->test, "Further measurements that take no part, judged at the end");
+  add_input_file(*command, "--test", arguments->test, "Further measurements that take no part, judged at the end");
   command->add_option("--fix", options.calibration.fixed, "Parameters to keep as given: joint2.a, joint3, base, tool")
       ->delimiter(',');
   command->add_option("--only", options.calibration.only, "Free these parameters and no others, base and tool included")
       ->delimiter(',');
-  command
-      ->add_option("--max-leaves", options.correction.max_leaves,
-                   "Most leaves of a tree of the correction, 0: no limit")
+  add_count(*command, "--max-leaves", options.correction.max_leaves, Eigen::Index{0},
+            "Most leaves of a tree of the correction, 0: no limit")
       ->capture_default_str();
-  command
-      ->add_option("--min-leaf", options.correction.min_leaf_samples,
-                   "Fewest poses in a leaf, 0: twice the coefficients of a leaf")
+  add_count(*command, "--min-leaf", options.correction.min_leaf_samples, Eigen::Index{0},
+            "Fewest poses in a leaf, 0: twice the coefficients of a leaf")
       ->capture_default_str();
-  command->add_option("--seed", options.seed, "Of the random folds")->capture_default_str();
-  command->add_option("--threads", options.max_threads, "0: all; the result does not depend on it")
-      ->capture_default_str();
-  command->add_option("-o,--output", arguments->output,
-                      "Calibrated description to write (the correction goes beside it)");
+  add_seed(*command, options.seed, "Of the random folds");
+  add_threads(*command, options.max_threads);
+  add_output_file(*command, "-o,--output", arguments->output,
+                  "Calibrated description to write (the correction goes beside it)", {correction_extension});
   command->add_flag("--json", arguments->json, "Print the report as JSON");
   command->callback([arguments] { calibrate_command(*arguments); });
 }

@@ -2,7 +2,6 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <filesystem>
 #include <memory>
 
 #include "llmt/folds.hpp"
@@ -11,8 +10,10 @@
 #include "llmt/robotics/robot_file.hpp"
 #include "llmt/robotics/telling_poses.hpp"
 #include "robot/commands.hpp"
+#include "robot/corrected_file.hpp"
 #include "robot/discovery_page.hpp"
 #include "shared/cli.hpp"
+#include "shared/options.hpp"
 
 namespace llmt::apps {
 namespace {
@@ -82,18 +83,6 @@ std::string telling_lines(const Discovery& found, const robotics::Measurements& 
   return text;
 }
 
-// IMPROVED.yaml and, where it helps, IMPROVED.correction.json beside it.
-void save_improved(const robotics::CorrectedRobot& improved, const std::string& path) {
-  robotics::Robot robot = improved.robot;
-  robot.correction_file.clear();
-  if (improved.correction) {
-    const std::filesystem::path file = std::filesystem::path(path).replace_extension(".correction.json");
-    llmt::save(*improved.correction, file.string());
-    robot.correction_file = file.filename().string();
-  }
-  robotics::save(robot, path);
-}
-
 // The whole discovery repeated without each fold and judged on it.
 Json folds_json(const robotics::Robot& robot, const robotics::Measurements& data, const DiscoverArguments& arguments) {
   FoldOptions dealing;
@@ -119,26 +108,9 @@ Json folds_json(const robotics::Robot& robot, const robotics::Measurements& data
   return {{"folds", arguments.folds}, {"contiguous", arguments.contiguous}, {"before_mm", before}, {"after_mm", after}};
 }
 
-// Refuses an output that is one of the input files or whose folder does not exist, before the work starts.
-void check_output(const DiscoverArguments& arguments) {
-  if (arguments.output.empty()) return;
-  const std::filesystem::path output = arguments.output;
-  for (const std::string& input : {arguments.robot, arguments.data, arguments.test, arguments.catalogue}) {
-    std::error_code unknown;
-    if (!input.empty() && std::filesystem::equivalent(input, output, unknown)) {
-      throw std::runtime_error(arguments.output + ": is an input; the improved description needs a file of its own");
-    }
-  }
-  const std::filesystem::path folder = output.has_parent_path() ? output.parent_path() : ".";
-  if (std::filesystem::is_directory(output) || !std::filesystem::is_directory(folder)) {
-    throw std::runtime_error(arguments.output + ": cannot be written: " +
-                             (std::filesystem::is_directory(output) ? "it is a folder" : "its folder does not exist"));
-  }
-}
-
 void discover_command(DiscoverArguments arguments) {
-  check_output(arguments);
   const robotics::Robot robot = robotics::read_robot(arguments.robot);
+  refuse_lost_correction(robot, arguments.robot, arguments.output);
   if (!arguments.catalogue.empty()) arguments.options.catalogue = robotics::read_catalogue(arguments.catalogue);
   const std::vector<std::string> also = columns_of(arguments.options.catalogue, robot);
   const robotics::Measurements data = robotics::read_measurements(arguments.data, robot, also);
@@ -152,7 +124,7 @@ void discover_command(DiscoverArguments arguments) {
   progress.clear();
   arguments.options.progress = {};
   const Json folds = arguments.folds > 0 ? folds_json(robot, data, arguments) : Json(nullptr);
-  if (!arguments.output.empty()) save_improved(found.improved, arguments.output);
+  if (!arguments.output.empty()) save_corrected(found.improved, arguments.output);
   if (arguments.json) {
     Json json = discovery_json(found);
     json["cross_validation"] = folds;
@@ -181,24 +153,24 @@ void add_discover(CLI::App& app) {
       "apart, or that the catalogue does not know what is there.");
   command->footer("Example: llmt-robot discover robot.yaml measured.csv -o improved.yaml");
   const auto arguments = std::make_shared<DiscoverArguments>();
-  command->add_option("robot", arguments->robot, "Robot description (YAML)")->required();
-  command->add_option("measured", arguments->data, "Measurements (CSV)")->required();
-  command->add_option("--test", arguments->test,
-                      "Measurements that take no part until the end (CSV); without it a share is set aside");
-  command->add_option("--held-out", arguments->options.held_out_share, "Share of the poses that is set aside")
-      ->check(CLI::Range(0.0, 0.9))
+  add_input_file(*command, "robot", arguments->robot, "Robot description (YAML)")->required();
+  add_input_file(*command, "measured", arguments->data, "Measurements (CSV)")->required();
+  add_input_file(*command, "--test", arguments->test,
+                 "Measurements that take no part until the end (CSV); without it a share is set aside");
+  add_number(*command, "--held-out", arguments->options.held_out_share, share_set_aside,
+             "Share of the poses that is set aside")
       ->capture_default_str();
-  command->add_option("--folds", arguments->folds, "Besides, cross-validate the whole discovery with that many folds")
-      ->check(CLI::Range(2, 100));
+  add_count(*command, "--folds", arguments->folds, 2,
+            "Besides, cross-validate the whole discovery with that many folds", 100);
   command->add_flag("--contiguous", arguments->contiguous, "Folds are blocks of consecutive rows");
-  command->add_option("--catalogue", arguments->catalogue, "Effects to look for, and their plausible sizes (YAML)");
-  command
-      ->add_option("--mass-uncertainty", arguments->options.mass_uncertainty,
-                   "Standard deviation of the described masses, as a share: part of the errors of compliances")
-      ->check(CLI::Range(0.0, 1.0))
+  add_input_file(*command, "--catalogue", arguments->catalogue,
+                 "Effects to look for, and their plausible sizes (YAML)");
+  add_number(*command, "--mass-uncertainty", arguments->options.mass_uncertainty, any_share,
+             "Standard deviation of the described masses, as a share: part of the errors of compliances")
       ->capture_default_str();
-  command->add_option("-o,--output", arguments->output, "Improved robot description to write (YAML)");
-  command->add_option("--seed", arguments->options.seed, "Of the poses set aside")->capture_default_str();
+  add_output_file(*command, "-o,--output", arguments->output, "Improved robot description to write (YAML)",
+                  {correction_extension});
+  add_seed(*command, arguments->options.seed, "Of the poses set aside");
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->callback([arguments] { discover_command(*arguments); });
 }

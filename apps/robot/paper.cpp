@@ -9,6 +9,7 @@
 #include "robot/planar_study.hpp"
 #include "robot/tx200_study.hpp"
 #include "shared/cli.hpp"
+#include "shared/options.hpp"
 
 namespace llmt::apps {
 namespace {
@@ -243,11 +244,8 @@ void add_paper(CLI::App& app) {
   command->add_option("--study", arguments->study, "planar or tx200")
       ->check(CLI::IsMember({"planar", "tx200"}))
       ->capture_default_str();
-  command->add_option("--seeds", arguments->seeds, "tx200: number of simulated data sets")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
-  command->add_option("--seed", arguments->seed, "planar: of the cross-validation's folds; tx200: the first seed")
-      ->capture_default_str();
+  add_count(*command, "--seeds", arguments->seeds, 1, "tx200: number of simulated data sets")->capture_default_str();
+  add_seed(*command, arguments->seed, "planar: of the cross-validation's folds; tx200: the first seed");
   command->add_flag("--json", arguments->json, "Print JSON");
   command->callback([arguments] { paper_command(*arguments); });
 }

@@ -8,10 +8,14 @@
 #include "llmt/robotics/robot_file.hpp"
 #include "llmt/robotics/simulation.hpp"
 #include "robot/commands.hpp"
+#include "robot/corrected_file.hpp"
 #include "shared/cli.hpp"
+#include "shared/options.hpp"
 
 namespace llmt::apps {
 namespace {
+
+constexpr Eigen::Index most_poses = 1'000'000;
 
 struct SimulateArguments {
   std::string robot;
@@ -23,6 +27,7 @@ struct SimulateArguments {
 
 void simulate_command(const SimulateArguments& arguments) {
   const robotics::CorrectedRobot robot = robotics::read_corrected_robot(arguments.robot);
+  refuse_lost_correction(robot.robot, arguments.robot, arguments.output);
   robotics::Measurements measurements =
       arguments.poses_from.empty()
           ? robotics::simulate(robot.robot, arguments.options)
@@ -36,7 +41,7 @@ void simulate_command(const SimulateArguments& arguments) {
   if (!arguments.output.empty()) {
     write_file(arguments.output, csv);
   } else if (!arguments.json) {
-    print(csv);
+    print_bytes(csv);
   }
   if (arguments.json) {
     print_json({{"robot", arguments.robot},
@@ -63,18 +68,18 @@ void add_simulate(CLI::App& app) {
   command->footer(
       "Example: llmt-robot simulate robotics/robots/tx200_like.yaml --poses 200 --noise-um 10 -o measured.csv");
   const auto arguments = std::make_shared<SimulateArguments>();
-  command->add_option("robot", arguments->robot, "Robot description (YAML)")->required();
+  add_input_file(*command, "robot", arguments->robot, "Robot description (YAML)")->required();
   CLI::Option* poses =
-      command->add_option("--poses", arguments->options.poses, "Number of poses")->capture_default_str();
-  command
-      ->add_option("--poses-from", arguments->poses_from,
-                   "CSV file whose joint values and covariates to take instead; measured positions in it do not matter")
+      add_count(*command, "--poses", arguments->options.poses, Eigen::Index{1}, "Number of poses", most_poses)
+          ->capture_default_str();
+  add_input_file(*command, "--poses-from", arguments->poses_from,
+                 "CSV file whose joint values and covariates to take instead; measured positions in it do not matter")
       ->excludes(poses);
-  command
-      ->add_option("--noise-um", arguments->options.noise_um, "Standard deviation of each coordinate, in micrometres")
+  add_number(*command, "--noise-um", arguments->options.noise_um, not_negative,
+             "Standard deviation of each coordinate, in micrometres")
       ->capture_default_str();
-  command->add_option("--seed", arguments->options.seed, "Of poses and noise")->capture_default_str();
-  command->add_option("-o,--output", arguments->output, "CSV file to write (default: standard output)");
+  add_seed(*command, arguments->options.seed, "Of poses and noise");
+  add_output_file(*command, "-o,--output", arguments->output, "CSV file to write (default: standard output)");
   command->add_flag("--json", arguments->json, "Print a summary as JSON; with it the measurements go to -o only");
   command->callback([arguments] { simulate_command(*arguments); });
 }

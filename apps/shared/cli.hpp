@@ -18,9 +18,10 @@ inline constexpr int exit_done = 0;
 inline constexpr int exit_refused = 1;
 inline constexpr int exit_usage = 2;
 
-/// Parses the command line, runs the callbacks of the subcommands and turns what they throw into a message on stderr
-/// and an exit code: std::invalid_argument (an option that the library cannot accept) is wrong usage, every other
-/// exception a refusal.
+/// Adds --version, parses the command line, runs the callbacks of the subcommands and turns what they throw into a
+/// message on stderr and an exit code: std::invalid_argument (an option that the library cannot accept) is wrong usage,
+/// every other exception a refusal. SIGINT, SIGTERM and SIGHUP end the program without leaving a temporary file; a file
+/// that may not grow further (SIGXFSZ) is a failed write.
 int run(CLI::App& app, int argc, char** argv);
 
 /// Rows of text under a header, columns aligned: words to the left, numbers to the right.
@@ -37,11 +38,19 @@ class Table {
 /// A number for people: `digits` significant digits, without an exponent where that is short.
 std::string number(double value, int digits = 4);
 
-/// Prints to stdout and reports a stdout that cannot take it (a full disk, a closed pipe) as std::runtime_error.
+/// The text with control characters but tabs and line breaks written as \x1b: names that come from files cannot give
+/// orders to a terminal.
+std::string without_controls(std::string_view text);
+
+/// Prints text for people to stdout, without_controls(), and reports a stdout that cannot take it (a full disk, a
+/// closed pipe) as std::runtime_error.
 void print(std::string_view text);
+/// Prints data for programs: as it is, but on a terminal as print().
+void print_bytes(std::string_view text);
+/// Bytes that are not UTF-8 become U+FFFD.
 void print_json(const Json& json);
 
-/// A line on stderr.
+/// A line on stderr, without_controls(). Of a long text (a message may quote what it refuses) the middle is left out.
 void warn(const std::string& text);
 
 /// How far a long job is: "fold 3 of 5" on one line of stderr, rewritten in place, only where stderr is a terminal.

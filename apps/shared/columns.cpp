@@ -9,6 +9,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "llmt/options.hpp"
+
 namespace llmt::apps {
 namespace {
 
@@ -35,7 +37,8 @@ std::vector<std::string> take_levels(const Numbering& in_order_of_appearance, Ei
 }
 
 // Replaces the listed columns of `inputs` by categories.
-void read_categories(const Csv& csv, const std::vector<std::string>& names, InputColumns& inputs) {
+void read_categories(const Csv& csv, const std::vector<std::string>& names, const std::string& hint,
+                     InputColumns& inputs) {
   std::vector<std::string> wanted;
   for (const int column : inputs.categorical) {
     wanted.push_back(names[column]);
@@ -49,6 +52,9 @@ void read_categories(const Csv& csv, const std::vector<std::string>& names, Inpu
     }
     auto found = seen[i].find(text);
     if (found == seen[i].end()) {
+      if (seen[i].size() == most_categories) {
+        csv.refuse(row, wanted[i], fmt::format("more than {} categories{}", most_categories, hint));
+      }
       found = seen[i].emplace(text, std::ssize(seen[i])).first;
     }
     value = static_cast<double>(found->second);
@@ -65,8 +71,53 @@ bool contains(const std::vector<std::string>& names, const std::string& name) {
 
 }  // namespace
 
+void refuse_large(const Csv& csv, std::span<const std::string> columns, const Eigen::MatrixXd& values,
+                  std::span<const double> most) {
+  const auto is_large = [&](Eigen::Index column) { return (values.col(column).array().abs() > most[column]).any(); };
+  bool any = false;
+  for (Eigen::Index column = 0; column < values.cols(); ++column) {
+    any = any || is_large(column);
+  }
+  if (!any) return;
+  for (Eigen::Index row = 0; row < values.rows(); ++row) {
+    for (Eigen::Index column = 0; column < values.cols(); ++column) {
+      if (const double value = values(row, column); std::abs(value) > most[column]) {
+        csv.refuse(row, columns[column],
+                   fmt::format("{} is beyond {}, the largest magnitude to learn from", value, most[column]));
+      }
+    }
+  }
+}
+
+void LargestMagnitude::add(const Csv& csv, const Eigen::Ref<const Eigen::VectorXd>& column) {
+  Eigen::Index row = -1;
+  for (Eigen::Index i = 0; i < column.size(); ++i) {
+    if (std::abs(column(i)) > value) {  // not NaN
+      value = std::abs(column(i));
+      row = i;
+    }
+  }
+  if (row >= 0) line = csv.line_of(row);
+}
+
+void LargestMagnitude::refuse_small(const std::string& file, const std::string& column) const {
+  if (value == 0.0 || value >= smallest_magnitude) return;
+  throw std::runtime_error(fmt::format(
+      "{}:{}: column \"{}\": the largest magnitude of the column is {}, so that squares vanish: at least {} is needed, "
+      "by another unit",
+      file, line, column, value, smallest_magnitude));
+}
+
+void refuse_negative_weight(const Csv& csv, const std::string& column, const Eigen::VectorXd& weights) {
+  for (Eigen::Index row = 0; row < weights.size(); ++row) {
+    if (weights(row) < 0.0) {
+      csv.refuse(row, column, fmt::format("a weight must not be negative, it is {}", weights(row)));
+    }
+  }
+}
+
 LearningColumns read_learning_columns(const Csv& csv, const ColumnRoles& roles, const std::string& input_hint,
-                                      int max_threads) {
+                                      double largest_input, int max_threads) {
   for (const std::string& name : roles.categorical) {
     if (!contains(roles.inputs, name)) {
       throw std::runtime_error(fmt::format("{}: column \"{}\" is categorical, but not an input", csv.name(), name));
@@ -101,14 +152,30 @@ LearningColumns read_learning_columns(const Csv& csv, const ColumnRoles& roles, 
     throw std::runtime_error(error.what() + input_hint);
   }
 
+  std::vector<double> most(columns.size(), largest_magnitude);
+  std::fill_n(most.begin(), num_inputs, largest_input);
+  for (const int column : result.inputs.categorical) {
+    most[column] = std::numeric_limits<double>::infinity();
+  }
+  refuse_large(csv, columns, values, most);
+  for (std::size_t i = 0; i < num_inputs + roles.targets.size(); ++i) {
+    if (std::isinf(most[i])) continue;
+    LargestMagnitude largest;
+    largest.add(csv, values.col(i));
+    largest.refuse_small(csv.name(), columns[i]);
+  }
   result.targets = values.middleCols(std::ssize(roles.inputs), std::ssize(roles.targets));
   if (!roles.weight.empty()) {
     result.weights = values.rightCols(1);
+    refuse_negative_weight(csv, roles.weight, result.weights);
+    if (result.weights.isZero(0.0)) {
+      throw std::runtime_error(fmt::format("{}: column \"{}\": every weight is 0", csv.name(), roles.weight));
+    }
   }
   values.conservativeResize(Eigen::NoChange, std::ssize(roles.inputs));
   result.inputs.values = std::move(values);
   result.inputs.levels.resize(num_inputs);
-  read_categories(csv, roles.inputs, result.inputs);
+  read_categories(csv, roles.inputs, input_hint, result.inputs);
   return result;
 }
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -32,11 +33,31 @@ struct LearningColumns {
   Eigen::VectorXd weights;  ///< empty if there is no such column
 };
 
+/// Throws std::runtime_error `path:line: column "c": ...` for the first value, in file order, whose magnitude is above
+/// that of its column in `most`; NaN passes.
+void refuse_large(const Csv& csv, std::span<const std::string> columns, const Eigen::MatrixXd& values,
+                  std::span<const double> most);
+
+/// The largest magnitude of a column over one table or several pieces, and where it stands.
+struct LargestMagnitude {
+  double value = 0.0;
+  Eigen::Index line = 0;
+
+  void add(const Csv& csv, const Eigen::Ref<const Eigen::VectorXd>& column);
+  /// Throws std::runtime_error `file:line: column "c": ...` if it is so small, and not 0, that squares vanish.
+  void refuse_small(const std::string& file, const std::string& column) const;
+};
+
+/// As refuse_large() for the first weight below 0.
+void refuse_negative_weight(const Csv& csv, const std::string& column, const Eigen::VectorXd& weights);
+
 /// Reads the columns. An input is categorical if it is listed as such, or if none of its cells is a number. A cell that
 /// is needed as a number and is none, a word among numbers, is an error, `path:line: column "c": ...`; for an input it
-/// ends in `input_hint`. Throws std::runtime_error, also for a categorical column that is not among the inputs.
+/// ends in `input_hint`. The same holds for what the learner cannot take: numbers above `largest_input` (targets and
+/// weights: largest_magnitude), columns too small to be squared, negative weights, weights that are all 0, too many
+/// categories. Throws std::runtime_error, also for a categorical column that is not among the inputs.
 LearningColumns read_learning_columns(const Csv& csv, const ColumnRoles& roles, const std::string& input_hint,
-                                      int max_threads);
+                                      double largest_input, int max_threads);
 
 /// Inputs of a model.
 struct ModelInputs {

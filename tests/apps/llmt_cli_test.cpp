@@ -208,7 +208,7 @@ TEST(LlmtProgram, MistakesHaveTheirExitCodeAndMessage) {
   expect("fit d.csv -t y --ignore label --monotone a --slope-sign=-a", 2,
          "--monotone and --slope-sign name \"a\" with opposite signs");
   expect("fit d.csv -t y --ignore label --cv 1", 2, "folds.count is 1");
-  expect("fit d.csv -t y --ignore label --width -1", 2, "expert.widths is -1, it must be finite and positive");
+  expect("fit d.csv -t y --ignore label --width -1", 2, "--width is \"-1\", it must be a finite number above 0");
   expect("fit d.csv -t y --ignore label --categorical nope", 1, "\"nope\" is categorical, but not an input");
   expect("fit d.csv -t y --ignore label --split-inputs nope", 2, "\"nope\", which is not among the inputs a, b, z");
   expect("fit word.csv -t y", 1, "word.csv:3: column \"b\": 'x' is not a number (--ignore COLUMN leaves a column out)");

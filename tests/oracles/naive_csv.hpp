@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <optional>
@@ -98,6 +99,12 @@ inline std::string read_number(const std::string& field, double& value) {
   return fmt::format("'{}' is not {}", shown, is_number || std::regex_match(text, word) ? "finite" : "a number");
 }
 
+// All is ASCII here but for a byte-order mark, of which a fault may leave a part.
+inline bool is_utf8(const std::string& text) {
+  const std::string rest = std::regex_replace(text, std::regex("\xEF\xBB\xBF"), "");
+  return std::ranges::all_of(rest, [](char c) { return static_cast<unsigned char>(c) < 128; });
+}
+
 struct Table {
   std::vector<std::string> columns;
   std::vector<Record> records;
@@ -125,6 +132,11 @@ inline Table naive(const std::string& text) {
     const std::string name = unquoted(field);
     if (name.empty()) {
       table.error = fmt::format("t:{}: column {} of the header has no name", header.line, table.columns.size() + 1);
+      return table;
+    }
+    if (!is_utf8(name)) {
+      table.error =
+          fmt::format("t:{}: the name of column {} of the header is not UTF-8", header.line, table.columns.size() + 1);
       return table;
     }
     if (std::ranges::find(table.columns, name) != table.columns.end()) {

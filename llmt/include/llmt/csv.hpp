@@ -46,8 +46,9 @@ struct CsvNumbers {
 /// `max_threads` is 0 for all that the machine has; results and errors do not depend on it.
 class Csv {
  public:
-  /// Reads a file. Throws std::runtime_error, starting with `path` or `path:line`, if it cannot be read, is empty, has
-  /// an unnamed or repeated column, or a row with too few or too many fields.
+  /// Reads a file. Throws std::runtime_error, starting with `path` or `path:line`, if it cannot be read, takes more
+  /// than half of the machine's memory, has a line of more than 16 MiB, is empty or not UTF-8, has an unnamed or
+  /// repeated column, or a row with too few or too many fields.
   static Csv read(const std::string& path);
 
   /// As read(), from memory; `name` stands for the path in errors.
@@ -82,13 +83,17 @@ class Csv {
   /// nothing if all rows are ColumnCells::no_row.
   void refuse_first(std::span<const std::string> columns, std::span<const Eigen::Index> rows) const;
 
+  /// Throws std::runtime_error `path:line: column "c": reason`.
+  [[noreturn]] void refuse(Eigen::Index row, std::string_view column, const std::string& reason) const;
+
   /// Calls visit(row, i, text) for the cell of columns[i] in every row, in file order. The text has neither quotes nor
   /// outer blanks, is empty for cells that numbers_or_missing() takes for missing, and lives as long as the call. A
-  /// column may be named once. Errors as index_of().
+  /// column may be named once. Errors as index_of(); throws std::runtime_error `path:line: column "c": ...` at a cell
+  /// that is not UTF-8.
   void visit_texts(std::span<const std::string> columns,
                    const std::function<void(Eigen::Index, std::size_t, std::string_view)>& visit) const;
 
-  /// One column as text, as visit_texts() has it. Errors as index_of().
+  /// One column as text, as visit_texts() has it; errors too.
   std::vector<std::string> texts(const std::string& column) const;
 
   /// The text of a row as it stands in the file, without its line end.

@@ -1,15 +1,20 @@
 #include "llmt/files.hpp"
 
+#include <fcntl.h>
 #include <fmt/format.h>
-#include <unistd.h>
+#include <sys/stat.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <memory>
 #include <stdexcept>
 #include <system_error>
+#include <vector>
+
+#include "base/descriptor.hpp"
+#include "base/staged_file.hpp"
 
 namespace llmt {
 namespace {
@@ -18,78 +23,134 @@ namespace {
   throw std::runtime_error(fmt::format("{}: cannot be {}: {}", path, what, reason));
 }
 
-using Produce = std::function<void(const TextSink&)>;
+[[noreturn]] void fail(const std::string& path, const char* what, int error) {
+  fail(path, what, std::string(std::strerror(error)));
+}
 
-// Writes all that `produce` passes on; on failure returns the reason.
-std::string try_write(const std::string& path, const Produce& produce) {
-  errno = 0;
-  std::ofstream file(path, std::ios::binary | std::ios::trunc);
-  if (file) {
-    produce([&](std::string_view piece) { file.write(piece.data(), static_cast<std::streamsize>(piece.size())); });
+// "16 MiB", "7.8 GiB".
+std::string size_text(std::uintmax_t bytes) {
+  constexpr double kibi = 1024.0;
+  double size = static_cast<double>(bytes);
+  const char* unit = "bytes";
+  for (const char* larger : {"KiB", "MiB", "GiB"}) {
+    if (size < kibi) break;
+    size /= kibi;
+    unit = larger;
   }
-  file.close();
-  return file ? std::string{} : std::string(std::strerror(errno != 0 ? errno : EIO));
+  return fmt::format("{:.3g} {}", size, unit);
+}
+
+// Counts what has been read against the limit.
+class Meter {
+ public:
+  Meter(const std::string& path, const FileLimit& limit) : path_(path), limit_(limit) {}
+
+  void add(std::string_view piece) {
+    bytes_ += piece.size();
+    if (bytes_ > limit_.bytes) fail_size();
+    const std::size_t last_break = piece.rfind('\n');
+    line_bytes_ = last_break == std::string_view::npos ? line_bytes_ + piece.size() : piece.size() - last_break - 1;
+    if (line_bytes_ > limit_.line_bytes) {
+      fail(path_, "read", fmt::format("no line ends within {}", size_text(limit_.line_bytes)));
+    }
+  }
+  [[noreturn]] void fail_size() const {
+    fail(path_, "read", fmt::format("it holds more than {}, the most that is read", size_text(limit_.bytes)));
+  }
+
+ private:
+  const std::string& path_;
+  const FileLimit& limit_;
+  std::uintmax_t bytes_ = 0;
+  std::uintmax_t line_bytes_ = 0;
+};
+
+// The file that a link, or a chain of links, leads to, whether it is there or not.
+std::filesystem::path end_of_links(const std::string& path) {
+  std::filesystem::path target = path;
+  std::error_code error;
+  for (int links = 0; std::filesystem::is_symlink(target, error); ++links) {
+    constexpr int most_links = 40;
+    if (links == most_links) fail(path, "written", ELOOP);
+    const std::filesystem::path next = std::filesystem::read_symlink(target, error);
+    if (error) fail(path, "written", error.message());
+    target = target.parent_path() / next;
+  }
+  return target;
+}
+
+// A device, a pipe, a folder.
+bool is_special(const std::string& path) {
+  std::error_code unknown;
+  const std::filesystem::file_status there = std::filesystem::status(path, unknown);
+  return std::filesystem::exists(there) && !std::filesystem::is_regular_file(there);
+}
+
+void write_directly(const std::string& path, const std::function<void(const TextSink&)>& produce) {
+  Descriptor file(::open(path.c_str(), O_WRONLY | O_TRUNC | O_CLOEXEC | O_NOCTTY));
+  if (!file.is_open()) fail(path, "written", errno);
+  produce([&](std::string_view piece) {
+    if (!write_all(file, piece)) fail(path, "written", errno);
+  });
+  if (!file.close()) fail(path, "written", errno);
 }
 
 }  // namespace
 
-std::string read_file(const std::string& path) {
-  if (std::filesystem::is_directory(path)) {
-    fail(path, "read", "it is a folder");
-  }
-  std::error_code ignored;
-  const std::uintmax_t size = std::filesystem::file_size(path, ignored);
-  errno = 0;
-  std::ifstream file(path, std::ios::binary);
+std::string read_file(const std::string& path, const FileLimit& limit) {
+  const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOCTTY));
+  struct stat status = {};
+  if (!file.is_open() || ::fstat(file.number(), &status) != 0) fail(path, "read", errno);
+  if (S_ISDIR(status.st_mode)) fail(path, "read", std::string("it is a folder"));
+  Meter meter(path, limit);
   std::string content;
-  if (const bool known = std::filesystem::is_regular_file(path, ignored); file && known) {
+  if (S_ISREG(status.st_mode) && status.st_size > 0) {
+    const auto size = static_cast<std::uintmax_t>(status.st_size);
+    if (size > limit.bytes) meter.fail_size();
     content.reserve(size);  // a table may take half of the memory: no second copy while it grows
   }
-  constexpr std::streamsize piece = 1 << 18;
+  constexpr std::size_t piece = 1 << 18;
   const auto buffer = std::make_unique_for_overwrite<char[]>(piece);
-  while (file.read(buffer.get(), piece) || file.gcount() > 0) {
-    content.append(buffer.get(), file.gcount());
+  for (;;) {
+    const ssize_t count = ::read(file.number(), buffer.get(), piece);
+    if (count == 0) return content;
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) fail(path, "read", errno);
+    const std::string_view text(buffer.get(), count);
+    meter.add(text);
+    content.append(text);
   }
-  if (!file.is_open() || file.bad()) {
-    fail(path, "read", std::strerror(errno != 0 ? errno : EIO));
-  }
-  return content;
 }
 
 void write_file(const std::string& path, std::string_view content) {
   write_file(path, [&](const TextSink& sink) { sink(content); });
 }
 
-void write_file(const std::string& path, const Produce& produce) {
-  std::error_code ignored;
-  // A link stays a link: the file it points to is replaced.
-  const std::filesystem::path target = std::filesystem::is_symlink(path, ignored)
-                                           ? std::filesystem::weakly_canonical(path)
-                                           : std::filesystem::path(path);
-  if (std::filesystem::exists(target, ignored) && !std::filesystem::is_regular_file(target, ignored)) {
-    const std::string reason = try_write(path, produce);
-    if (!reason.empty()) {
-      fail(path, "written", reason);
-    }
+void write_files(std::span<const NewFile> files) {
+  std::vector<std::unique_ptr<StagedFile>> staged;
+  for (const NewFile& file : files) {
+    if (is_special(file.path)) continue;
+    staged.push_back(std::make_unique<StagedFile>(file.path, end_of_links(file.path)));
+    staged.back()->write(file.content);
+    staged.back()->finish();
+  }
+  for (const NewFile& file : files) {
+    if (is_special(file.path)) write_file(file.path, file.content);
+  }
+  for (const auto& file : staged) file->replace_target();
+  for (const auto& file : staged) file->make_durable();
+}
+
+void write_file(const std::string& path, const std::function<void(const TextSink&)>& produce) {
+  if (is_special(path)) {
+    write_directly(path, produce);
     return;
   }
-  const std::string temporary = fmt::format("{}.{}.tmp", target.string(), ::getpid());
-  std::string reason;
-  try {
-    reason = try_write(temporary, produce);
-  } catch (...) {
-    std::filesystem::remove(temporary, ignored);
-    throw;
-  }
-  if (reason.empty()) {
-    std::error_code error;
-    std::filesystem::rename(temporary, target, error);
-    reason = error ? error.message() : std::string{};
-  }
-  if (!reason.empty()) {
-    std::filesystem::remove(temporary, ignored);
-    fail(path, "written", reason);
-  }
+  StagedFile file(path, end_of_links(path));
+  produce([&](std::string_view piece) { file.write(piece); });
+  file.finish();
+  file.replace_target();
+  file.make_durable();
 }
 
 }  // namespace llmt

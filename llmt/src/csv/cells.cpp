@@ -57,15 +57,18 @@ const char* after_blanks(const char* begin, const char* end, char separator) {
   return begin;
 }
 
-// A text that fits into a message: cut off after 60 bytes.
+// A text that fits into a message: cut off after 60 bytes, and a byte of 0, which would end the message, spelled out.
 std::string shortened(std::string_view text) {
   constexpr std::size_t most = 60;
-  if (text.size() <= most) return std::string(text);
-  std::size_t end = most;
-  while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0U) == 0x80U) {
+  std::size_t end = std::min(text.size(), most);
+  while (end > 0 && end < text.size() && (static_cast<unsigned char>(text[end]) & 0xC0U) == 0x80U) {
     --end;  // not within a character of UTF-8
   }
-  return std::string(text.substr(0, end)) + "...";
+  std::string result;
+  for (const char c : text.substr(0, end)) {
+    result += c == '\0' ? "\\0" : std::string(1, c);
+  }
+  return end < text.size() ? result + "..." : result;
 }
 
 std::size_t count(const char* begin, const char* end, char wanted) {
@@ -108,6 +111,41 @@ Record record_at(const char* begin, const char* end, char separator) {
     fields += (*c == separator) > quoted ? 1 : 0;
   }
   return {record_end, fields};
+}
+
+std::size_t header_begin(std::string_view text) {
+  constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
+  std::size_t begin = 0;
+  while (begin < text.size()) {
+    if (text.substr(begin).starts_with(byte_order_mark)) {
+      begin += byte_order_mark.size();
+      continue;
+    }
+    const std::size_t line_end = std::min(text.find('\n', begin), text.size());
+    if (!is_blank(text.substr(begin, line_end - begin))) return begin;
+    begin = std::min(line_end + 1, text.size());
+  }
+  return begin;
+}
+
+bool is_utf8(std::string_view text) {
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const auto lead = static_cast<unsigned char>(text[i]);
+    if (lead < 0x80) continue;
+    const std::size_t more = lead >= 0xF0 ? 3 : lead >= 0xE0 ? 2 : 1;
+    if (lead < 0xC2 || lead > 0xF4 || text.size() - i <= more) return false;
+    const auto next = static_cast<unsigned char>(text[i + 1]);
+    // Neither longer than needed, nor half of a pair of UTF-16, nor beyond U+10FFFF.
+    if ((lead == 0xE0 && next < 0xA0) || (lead == 0xED && next > 0x9F) || (lead == 0xF0 && next < 0x90) ||
+        (lead == 0xF4 && next > 0x8F)) {
+      return false;
+    }
+    for (std::size_t k = 1; k <= more; ++k) {
+      if ((static_cast<unsigned char>(text[i + k]) & 0xC0U) != 0x80U) return false;
+    }
+    i += more;
+  }
+  return true;
 }
 
 bool is_blank(std::string_view text) { return text.find_first_not_of(blanks) == std::string_view::npos; }

@@ -9,6 +9,16 @@
 
 namespace llmt::csv {
 
+/// A record that is longer is refused, in files and in pieces: an input without a line break must end before memory.
+inline constexpr std::size_t longest_record = 16 << 20;
+
+/// Where the header begins: behind blank lines and a byte-order mark, in any order. The size of the text if there is
+/// nothing else.
+std::size_t header_begin(std::string_view text);
+
+/// Whether a text is UTF-8 (RFC 3629).
+bool is_utf8(std::string_view text);
+
 /// End of the field that begins at `begin`: its separator or line break, outside quotes, or `end`.
 inline const char* field_end(const char* begin, const char* end, char separator) {
   bool quoted = false;

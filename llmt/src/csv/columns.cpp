@@ -134,8 +134,7 @@ void Csv::refuse_first(std::span<const std::string> columns, std::span<const Eig
   const char* const end = record.data() + record.size();
   for_each_requested(request, record.data(), end, separator_, [&](std::size_t, const char*& cursor) {
     const std::string_view field(cursor, csv::field_end(cursor, end, separator_));
-    throw std::runtime_error(
-        fmt::format("{}:{}: column \"{}\": {}", name_, line_of(row), columns_[wanted], csv::problem_of(field)));
+    refuse(row, columns_[wanted], csv::problem_of(field));
   });
 }
 
@@ -172,7 +171,9 @@ void Csv::visit_texts(std::span<const std::string> columns,
     const char* const begin = text_.data() + row_begins_[row];
     for_each_requested(request, begin, end, separator_, [&](std::size_t column, const char*& cursor) {
       const char* const field = std::exchange(cursor, csv::field_end(cursor, end, separator_));
-      visit(row, column, csv::cell_text(std::string_view(field, cursor), buffer));
+      const std::string_view cell = csv::cell_text(std::string_view(field, cursor), buffer);
+      if (!csv::is_utf8(cell)) refuse(row, columns[column], "the cell is not UTF-8");
+      visit(row, column, cell);
     });
   }
 }

@@ -2,8 +2,10 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <cstdint>
 #include <stdexcept>
 
 #include "csv/cells.hpp"
@@ -12,9 +14,13 @@
 namespace llmt {
 namespace {
 
-constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
-
 std::string_view between(const char* begin, const char* end) { return {begin, static_cast<std::size_t>(end - begin)}; }
+
+// The most that the text of a table may take: the other half is for its numbers.
+std::uintmax_t half_of_memory() {
+  const auto pages = static_cast<std::uintmax_t>(std::max(::sysconf(_SC_PHYS_PAGES), 1L));
+  return pages * static_cast<std::uintmax_t>(::sysconf(_SC_PAGESIZE)) / 2;
+}
 
 // The first of these that the header has, outside quotes or inside.
 char separator_of(std::string_view header) {
@@ -26,7 +32,9 @@ char separator_of(std::string_view header) {
 
 }  // namespace
 
-Csv Csv::read(const std::string& path) { return parse(read_file(path), path); }
+Csv Csv::read(const std::string& path) {
+  return parse(read_file(path, {.bytes = half_of_memory(), .line_bytes = csv::longest_record}), path);
+}
 
 Csv Csv::parse(std::string text, std::string name) {
   Csv csv;
@@ -38,16 +46,15 @@ Csv Csv::parse(std::string text, std::string name) {
 }
 
 void Csv::read_header() {
-  header_begin_ = text_.starts_with(byte_order_mark) ? byte_order_mark.size() : 0;
-  while (header_begin_ < text_.size() && csv::is_blank(record_text(header_begin_))) {
-    header_begin_ = text_.find('\n', header_begin_);
-    header_begin_ = header_begin_ == std::string::npos ? text_.size() : header_begin_ + 1;
-  }
+  header_begin_ = csv::header_begin(text_);
   if (header_begin_ >= text_.size()) {
     throw std::runtime_error(fmt::format("{}: the file is empty, a header row is needed", name_));
   }
   const std::string_view header = header_text();
   const char* const end = header.data() + header.size();
+  if (header.starts_with("\xFF\xFE") || header.starts_with("\xFE\xFF") || header.find('\0') != std::string_view::npos) {
+    throw std::runtime_error(fmt::format("{}: this is UTF-16 or no text at all, UTF-8 is needed", name_));
+  }
   separator_ = separator_of(header);
   for (const char* begin = header.data();;) {
     const char* const field_end = csv::field_end(begin, end, separator_);
@@ -55,6 +62,10 @@ void Csv::read_header() {
     if (column.empty()) {
       throw std::runtime_error(fmt::format("{}:{}: column {} of the header has no name", name_, line_at(header_begin_),
                                            columns_.size() + 1));
+    }
+    if (!csv::is_utf8(column)) {
+      throw std::runtime_error(fmt::format("{}:{}: the name of column {} of the header is not UTF-8", name_,
+                                           line_at(header_begin_), columns_.size() + 1));
     }
     if (!fields_.emplace(column, columns_.size()).second) {
       throw std::runtime_error(
@@ -94,6 +105,10 @@ std::size_t Csv::index_of(std::string_view column) const {
         fmt::format("{}: there is no column \"{}\"; the columns are {}", name_, column, fmt::join(columns_, ", ")));
   }
   return found->second;
+}
+
+void Csv::refuse(Eigen::Index row, std::string_view column, const std::string& reason) const {
+  throw std::runtime_error(fmt::format("{}:{}: column \"{}\": {}", name_, line_of(row), column, reason));
 }
 
 std::string_view Csv::row_text(Eigen::Index row) const { return record_text(row_begins_[row]); }

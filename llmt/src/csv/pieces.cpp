@@ -1,6 +1,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cerrno>
+#include <cstring>
 #include <istream>
 #include <stdexcept>
 
@@ -9,8 +11,6 @@
 
 namespace llmt {
 namespace {
-
-constexpr std::size_t longest_record = 16 << 20;
 
 // How much of `text` is whole records.
 std::size_t whole_records(const std::string& text) {
@@ -35,22 +35,25 @@ std::optional<Csv> CsvPieces::next() {
     std::size_t whole = 0;
     while (whole == 0 && input_) {
       const std::size_t old = pending_.size();
-      if (old > longest_record) {
+      if (old > csv::longest_record) {
         throw std::runtime_error(
             fmt::format("{}:{}: no row ends within 16 MiB (is a quote left open?)", name_, lines_ + 1));
       }
       const std::size_t more = std::max(bytes_, old);
       pending_.resize(old + more);
+      errno = 0;
       input_.read(pending_.data() + old, static_cast<std::streamsize>(more));
       pending_.resize(old + input_.gcount());
-      if (input_.bad()) throw std::runtime_error(fmt::format("{}: cannot be read", name_));
+      if (input_.bad()) {
+        throw std::runtime_error(fmt::format("{}: cannot be read: {}", name_, std::strerror(errno != 0 ? errno : EIO)));
+      }
       whole = input_ ? whole_records(pending_) : pending_.size();
     }
     const bool last = !input_;
     const std::string rows = pending_.substr(0, whole);
     pending_.erase(0, whole);
     if (rows.empty() && !header_.empty()) return std::nullopt;
-    if (header_.empty() && !last && rows.find_first_not_of(" \t\r\n") == std::string::npos) {
+    if (header_.empty() && !last && csv::header_begin(rows) == rows.size()) {
       lines_ += std::ranges::count(rows, '\n');
       continue;  // blank lines before the header
     }

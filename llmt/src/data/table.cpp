@@ -27,25 +27,36 @@ void check_size(const char* name, const Eigen::Ref<const Eigen::MatrixXd>& data)
   }
 }
 
+double largest_of(const Eigen::Ref<const Eigen::MatrixXd>& values) {
+  return values.array().isNaN().select(0.0, values).cwiseAbs().maxCoeff();
+}
+
+// Squares must neither overflow nor vanish.
+void check_magnitudes(const char* name, const Eigen::Ref<const Eigen::MatrixXd>& values) {
+  const double largest = largest_of(values);
+  require(largest <= largest_magnitude, fmt::format("a magnitude in {}", name).c_str(), largest, "at most 1e150");
+  for (Eigen::Index column = 0; column < values.cols(); ++column) {
+    const double of_column = largest_of(values.col(column));
+    require(of_column == 0.0 || of_column >= smallest_magnitude,
+            fmt::format("the largest magnitude in column {} of {}", column, name).c_str(), of_column,
+            "0 or at least 1e-140");
+  }
+}
+
 void check_outputs(const Eigen::Ref<const Eigen::MatrixXd>& outputs, Eigen::Index rows) {
   check_size("outputs", outputs);
   check_finite("llmt::fit", "outputs", outputs);
-  require(outputs.cwiseAbs().maxCoeff() <= largest_magnitude, "a magnitude in outputs", outputs.cwiseAbs().maxCoeff(),
-          "at most 1e150");
+  check_magnitudes("outputs", outputs);
   if (rows != outputs.rows()) {
     throw std::invalid_argument(fmt::format("llmt::fit: inputs has {} rows, outputs has {}", rows, outputs.rows()));
   }
   require(rows <= std::numeric_limits<int>::max(), "the number of rows", static_cast<double>(rows), "below 2^31");
 }
 
-double largest_of(const Eigen::Ref<const Eigen::MatrixXd>& inputs) {
-  return inputs.array().isNaN().select(0.0, inputs).cwiseAbs().maxCoeff();
-}
-
 void check_inputs(const Eigen::Ref<const Eigen::MatrixXd>& inputs) {
   check_size("inputs", inputs);
   check_finite_or_missing("llmt::fit", "inputs", inputs);
-  require(largest_of(inputs) <= largest_magnitude, "a magnitude in inputs", largest_of(inputs), "at most 1e150");
+  check_magnitudes("inputs", inputs);
 }
 
 std::vector<int> all_columns(Eigen::Index count) {
@@ -58,11 +69,10 @@ std::vector<int> all_columns(Eigen::Index count) {
 std::vector<int> count_levels(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const std::vector<int>& categorical) {
   check_columns("llmt::fit", "categorical_inputs", categorical, inputs.cols());
   std::vector<int> num_levels(inputs.cols(), 0);
-  constexpr double most = 10000.0;
   for (const int column : categorical) {
     for (const double value : inputs.col(column)) {
       if (std::isnan(value)) continue;
-      require(value >= 0.0 && value < most && value == std::floor(value),
+      require(value >= 0.0 && value < most_categories && value == std::floor(value),
               fmt::format("a category of input {}", column).c_str(), value, "a whole number from 0 to 9999");
       int& levels = num_levels[column];
       levels = std::max(levels, static_cast<int>(value) + 1);

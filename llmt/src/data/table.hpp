@@ -11,11 +11,6 @@
 
 namespace llmt {
 
-/// Inputs beyond this are refused, so that squares stay finite; outputs too.
-inline constexpr double largest_magnitude = 1e150;
-/// With quadratic local models: squares of products of inputs stay finite.
-inline constexpr double largest_factor = 1e70;
-
 /// Data by column and what is known of the columns. Inputs and outputs belong to the caller or to FitData.
 struct Table {
   Eigen::Ref<const Eigen::MatrixXd> inputs;  ///< NaN: missing

@@ -154,6 +154,8 @@ std::vector<EffectType> parse_catalogue(const std::string& text, const std::stri
   return read_entries(text, name, effect_types());
 }
 
-std::vector<EffectType> read_catalogue(const std::string& path) { return parse_catalogue(read_file(path), path); }
+std::vector<EffectType> read_catalogue(const std::string& path) {
+  return parse_catalogue(read_file(path, description_limit), path);
+}
 
 }  // namespace llmt::robotics

@@ -177,7 +177,7 @@ Robot parse_robot(const std::string& text, const std::string& name) {
   return robot;
 }
 
-Robot read_robot(const std::string& path) { return parse_robot(read_file(path), path); }
+Robot read_robot(const std::string& path) { return parse_robot(read_file(path, description_limit), path); }
 
 void save(const Robot& robot, const std::string& path) { write_file(path, to_yaml(robot)); }
 

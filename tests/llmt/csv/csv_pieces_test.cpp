@@ -55,6 +55,16 @@ TEST(CsvPieces, TogetherAreTheWholeTable) {
   }
 }
 
+TEST(CsvPieces, AgreeOnBlankLinesAroundAByteOrderMark) {
+  const std::string mark = "\xEF\xBB\xBF";
+  for (const std::string& before :
+       {"\n" + mark, mark + "\n", "\n \r\n" + mark + "\n", mark + mark, "\n" + mark + " \n\n"}) {
+    const std::string text = before + "a,b\n1,x\n2,y\n";
+    ASSERT_NE(whole(text).find(":1|x"), std::string::npos) << whole(text);
+    for (std::size_t bytes = 1; bytes < 40; ++bytes) EXPECT_EQ(all_cells(text, bytes), whole(text)) << bytes;
+  }
+}
+
 TEST(CsvPieces, ErrorsHaveTheLinesOfTheWholeText) {
   // Pieces before the error have been handed out.
   const std::string rows = "a;b\n1;x\n2;\"y\ny\"\n\n3;z\n";

@@ -105,4 +105,31 @@ TEST(Csv, CellsThatAreNoNumbersAreCounted) {
 
 TEST(Csv, AHeaderAloneHasNoRows) { EXPECT_EQ(llmt::Csv::parse("a,b\n", "t.csv").rows(), 0); }
 
+TEST(Csv, TextThatIsNotUtf8IsNamed) {
+  const auto header = [](const std::string& text) { return error_in(text); };
+  const std::string utf_16 = "t.csv: this is UTF-16 or no text at all, UTF-8 is needed";
+  EXPECT_EQ(header(std::string("\xFF\xFE"
+                               "a\0,\0b\0\n\0",
+                               10)),
+            utf_16);
+  EXPECT_EQ(header(std::string("\xFE\xFF"
+                               "\0a\0,\0b\0\n",
+                               10)),
+            utf_16);
+  EXPECT_EQ(header(std::string("a\0,\0b\0\n\0", 8)), utf_16);
+  // Cut off, longer than needed, half of a pair of UTF-16, beyond U+10FFFF, a byte that begins nothing.
+  for (const char* name :
+       {"b\xC3", "b\xE2\x82", "\xC0\xAF", "\xE0\x80\xAF", "\xED\xA0\x80", "\xF4\x90\x80\x80", "\xFF"}) {
+    EXPECT_EQ(header(std::string("\n\na,") + name + "\n"), "t.csv:3: the name of column 2 of the header is not UTF-8");
+  }
+  EXPECT_EQ(llmt::Csv::parse("\xC3\xB6,\xE2\x82\xAC,\xF0\x9F\x8C\xB2,\xEE\x80\x80\n", "t").columns().size(), 4U);
+  const llmt::Csv csv = llmt::Csv::parse("a,b\n1,\xF6\n2,x\n", "t.csv");
+  EXPECT_EQ(csv.numbers("a")(1), 2.0);
+  EXPECT_EQ(error_of([&] { csv.texts("b"); }), "t.csv:2: column \"b\": the cell is not UTF-8");
+}
+
+TEST(Csv, AByteOfZeroDoesNotEndAMessage) {
+  EXPECT_EQ(error_in(std::string("a\n1\0x\n", 6)), "t.csv:2: column \"a\": '1\\0x' is not a number");
+}
+
 }  // namespace

@@ -42,6 +42,10 @@ TEST(Fit, CallersMistakesAreNamed) {
             "llmt::fit: expert.min_improvement is 1.5, it must be in [0, 1)");
   EXPECT_EQ(message_of([&] { llmt::fit(x, y, {.folds = {.count = 1}}); }),
             "llmt::fit: folds.count is 1, it must be 0 or at least 2");
+  EXPECT_EQ(message_of([&] { llmt::fit(Eigen::MatrixXd::Constant(10, 2, 1e-320), y); }),
+            "llmt::fit: the largest magnitude in column 0 of inputs is 1e-320, it must be 0 or at least 1e-140");
+  EXPECT_EQ(message_of([&] { llmt::fit(x, Eigen::MatrixXd::Constant(10, 1, 1e200)); }),
+            "llmt::fit: a magnitude in outputs is 1e+200, it must be at most 1e150");
 }
 
 }  // namespace

@@ -1,0 +1,22 @@
+/// \file
+/// A robot description on its way to a file, with its correction beside it.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "llmt/robotics/correction.hpp"
+
+namespace llmt::apps {
+
+/// FILE.correction.json stands beside FILE.yaml.
+inline constexpr const char* correction_extension = ".correction.json";
+
+/// Writes the description and, if there is one, the correction. Both files are replaced or none. Returns their names.
+std::vector<std::string> save_corrected(robotics::CorrectedRobot robot, const std::string& path);
+
+/// Refuses to lose the correction that the description at `input` names: throws std::invalid_argument if it is `output`
+/// or the correction beside that.
+void refuse_lost_correction(const robotics::Robot& robot, const std::string& input, const std::string& output);
+
+}  // namespace llmt::apps

@@ -1,0 +1,158 @@
+#include "shared/options.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <charconv>
+#include <stdexcept>
+
+namespace llmt::apps {
+namespace {
+
+constexpr const char* input_type = "FILE";
+constexpr const char* output_type = "NEWFILE";
+
+[[noreturn]] void refuse(const std::string& option, const std::string& text, const std::string& words) {
+  throw std::invalid_argument(fmt::format("{} is \"{}\", it must be {}", option, text, words));
+}
+
+// The whole text as a number; false if it is none, or beyond the type.
+template <class Number>
+bool parse_number(const std::string& text, Number& value) {
+  const char* const begin = text.data() + (text.starts_with('+') ? 1 : 0);
+  const char* const end = text.data() + text.size();
+  const auto [stop, error] = std::from_chars(begin, end, value);
+  return error == std::errc() && stop == end && !text.starts_with("+-");
+}
+
+double read_number(const std::string& option, const std::string& text, const NumberRange& range) {
+  double value = 0.0;
+  if (!parse_number(text, value) || !(value >= range.low && value <= range.high)) refuse(option, text, range.words);
+  return value;
+}
+
+bool is_same_file(const std::string& one, const std::string& other) {
+  std::error_code unknown;
+  return std::filesystem::equivalent(one, other, unknown) && std::filesystem::is_regular_file(one, unknown);
+}
+
+void refuse_impossible_place(const std::string& path) {
+  std::error_code unknown;
+  const auto fail = [&](const char* reason) {
+    throw std::runtime_error(fmt::format("{}: cannot be written: {}", path, reason));
+  };
+  if (std::filesystem::is_directory(path, unknown)) fail("it is a folder");
+  const std::filesystem::path parent = std::filesystem::path(path).parent_path();
+  if (!parent.empty() && !std::filesystem::is_directory(parent, unknown)) fail("its folder does not exist");
+}
+
+}  // namespace
+
+CLI::Option* add_text(CLI::App& command, const std::string& name, const char* type, const CLI::callback_t& take,
+                      const std::string& help, const std::function<std::string()>& show) {
+  return command.add_option(name, take, help, false, show)->type_name(type);
+}
+
+CLI::Option* add_number(CLI::App& command, const std::string& name, double& value, const NumberRange& range,
+                        const std::string& help) {
+  const auto take = [name, &value, range](const CLI::results_t& texts) {
+    value = read_number(name, texts.back(), range);
+    return true;
+  };
+  return add_text(command, name, "NUMBER", take, help, [&value] { return fmt::format("{}", value); });
+}
+
+CLI::Option* add_numbers(CLI::App& command, const std::string& name, std::vector<double>& values,
+                         const NumberRange& range, const std::string& help) {
+  const auto take = [name, &values, range](const CLI::results_t& texts) {
+    values.clear();
+    for (const std::string& text : texts) {
+      values.push_back(read_number(name, text, range));
+    }
+    return true;
+  };
+  return add_text(command, name, "NUMBER", take, help, [&values] { return fmt::format("{}", fmt::join(values, ",")); })
+      ->expected(CLI::detail::expected_max_vector_size)
+      ->delimiter(',');
+}
+
+std::int64_t read_count(const std::string& option, const std::string& text, std::int64_t low, std::int64_t high) {
+  std::int64_t value = 0;
+  if (!parse_number(text, value) || value < low || value > high) {
+    refuse(option, text, fmt::format("a whole number from {} to {}", low, high));
+  }
+  return value;
+}
+
+CLI::Option* add_seed(CLI::App& command, std::uint64_t& seed, const std::string& help) {
+  const auto take = [&seed](const CLI::results_t& texts) {
+    if (!parse_number(texts.back(), seed)) {
+      constexpr std::uint64_t largest = std::numeric_limits<std::uint64_t>::max();
+      refuse("--seed", texts.back(), fmt::format("a whole number from 0 to {}", largest));
+    }
+    return true;
+  };
+  return add_text(command, "--seed", "COUNT", take, help, [&seed] { return std::to_string(seed); })
+      ->capture_default_str();
+}
+
+CLI::Option* add_threads(CLI::App& command, int& threads) {
+  constexpr int most = 4096;
+  return add_count(command, "--threads", threads, 0, "0: all; the result does not depend on it", most)
+      ->capture_default_str();
+}
+
+CLI::Option* add_input_file(CLI::App& command, const std::string& name, std::string& path, const std::string& help) {
+  return command.add_option(name, path, help)->type_name(input_type);
+}
+
+CLI::Option* add_output_file(CLI::App& command, const std::string& name, std::string& path, const std::string& help,
+                             const std::vector<std::string>& extensions) {
+  // The texts of all options are there before the first of them is taken.
+  const auto take = [&command, &path, extensions](const CLI::results_t& texts) {
+    path = texts.back();
+    std::vector<std::string> written = {path};
+    for (const std::string& extension : extensions) {
+      written.push_back(beside(path, extension).string());
+    }
+    const auto is_input = [](const CLI::Option* option) { return option->get_type_name() == input_type; };
+    for (const CLI::Option* option : std::as_const(command).get_options(is_input)) {
+      for (const std::string& input : option->results()) {
+        for (const std::string& output : written) {
+          refuse_lost_input(output, input == "-" ? "/dev/stdin" : input);
+        }
+      }
+    }
+    for (const std::string& output : written) {
+      refuse_impossible_place(output);
+    }
+    return true;
+  };
+  return add_text(command, name, output_type, take, help, {});
+}
+
+void refuse_lost_input(const std::string& output, const std::string& input) {
+  if (!is_same_file(output, input)) return;
+  throw std::invalid_argument(
+      fmt::format("{}: would be overwritten, and is an input of this command ({}); give the output a name of its own",
+                  output, input));
+}
+
+std::filesystem::path beside(const std::string& path, const std::string& extension) {
+  return std::filesystem::path(path).replace_extension(extension);
+}
+
+void require_ranges(const CLI::App& app) {
+  for (const CLI::Option* option : app.get_options()) {
+    for (const char* type : {"FLOAT", "INT", "UINT"}) {  // what CLI11 calls numbers that it reads itself
+      if (option->get_type_name().starts_with(type)) {
+        throw std::logic_error(fmt::format("option {} has no range", option->get_name()));
+      }
+    }
+  }
+  for (const CLI::App* command : app.get_subcommands({})) {
+    require_ranges(*command);
+  }
+}
+
+}  // namespace llmt::apps

@@ -1,0 +1,82 @@
+/// \file
+/// The options that both programs offer: numbers with the range they keep, files with the part they play. run() refuses
+/// to start a program with an option that takes a number and has no range.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <concepts>
+#include <cstdint>
+#include <filesystem>
+#include <limits>
+#include <string>
+#include <vector>
+
+namespace llmt::apps {
+
+/// Numbers from `low` to `high`, both included. NaN is in no range.
+struct NumberRange {
+  double low;
+  double high;
+  const char* words;  ///< "a number from 0 to 1"
+};
+
+inline constexpr double largest_number = std::numeric_limits<double>::max();
+inline constexpr double smallest_number = std::numeric_limits<double>::denorm_min();
+inline constexpr NumberRange any_share = {0.0, 1.0, "a number from 0 to 1"};
+inline constexpr NumberRange share_set_aside = {0.0, 0.9, "a number from 0 to 0.9"};
+inline constexpr NumberRange not_negative = {0.0, largest_number, "a finite number, 0 or more"};
+inline constexpr NumberRange above_zero = {smallest_number, largest_number, "a finite number above 0"};
+
+/// An option with a number, shown as NUMBER. Reading it throws std::invalid_argument that names option, text and range,
+/// if the text is no number or outside the range.
+CLI::Option* add_number(CLI::App& command, const std::string& name, double& value, const NumberRange& range,
+                        const std::string& help);
+
+/// The same with several numbers, separated by commas.
+CLI::Option* add_numbers(CLI::App& command, const std::string& name, std::vector<double>& values,
+                         const NumberRange& range, const std::string& help);
+
+/// A whole number in [low, high]; throws as add_number().
+std::int64_t read_count(const std::string& option, const std::string& text, std::int64_t low, std::int64_t high);
+
+/// As CLI::App::add_option() without a type.
+CLI::Option* add_text(CLI::App& command, const std::string& name, const char* type, const CLI::callback_t& take,
+                      const std::string& help, const std::function<std::string()>& show);
+
+/// An option with a whole number from `low` to `high`, shown as COUNT.
+template <std::signed_integral Whole>
+CLI::Option* add_count(CLI::App& command, const std::string& name, Whole& value, Whole low, const std::string& help,
+                       Whole high = std::numeric_limits<Whole>::max()) {
+  const auto take = [name, &value, low, high](const CLI::results_t& texts) {
+    value = static_cast<Whole>(read_count(name, texts.back(), low, high));
+    return true;
+  };
+  return add_text(command, name, "COUNT", take, help, [&value] { return std::to_string(value); });
+}
+
+/// The seed of random numbers, from 0 to 2^64 - 1.
+CLI::Option* add_seed(CLI::App& command, std::uint64_t& seed, const std::string& help);
+
+/// --threads; the default is shown.
+CLI::Option* add_threads(CLI::App& command, int& threads);
+
+/// A file that the command reads, shown as FILE. A dash is standard input where the command says so.
+CLI::Option* add_input_file(CLI::App& command, const std::string& name, std::string& path, const std::string& help);
+
+/// The file that the command writes, shown as NEWFILE. It is checked before the command runs. Throws
+/// std::invalid_argument if it is one of the input files, by whatever name, and std::runtime_error if it is a folder or
+/// lies in none. `extensions`: of further files that are written beside it under its name.
+CLI::Option* add_output_file(CLI::App& command, const std::string& name, std::string& path, const std::string& help,
+                             const std::vector<std::string>& extensions = {});
+
+/// The check above for an input that is known only when another one has been read.
+void refuse_lost_input(const std::string& output, const std::string& input);
+
+/// FILE of a file written beside `path`: the same name with another extension.
+std::filesystem::path beside(const std::string& path, const std::string& extension);
+
+/// Throws std::logic_error if a command has an option with a number that add_number(), add_count() and the like did not
+/// make.
+void require_ranges(const CLI::App& app);
+
+}  // namespace llmt::apps

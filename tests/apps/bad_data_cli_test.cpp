@@ -1,0 +1,125 @@
+// Tables that cannot be learned from: each message has file, line and column, and the exit code is that of data.
+#include <fmt/format.h>
+
+#include "apps/program.hpp"
+#include "llmt/random.hpp"
+
+namespace {
+
+using program::Folder;
+using program::Outcome;
+
+const std::string llmt_program = LLMT_PROGRAM;
+
+// The message that `llmt ARGUMENTS` refuses d.csv with.
+std::string refusal(const Folder& folder, const std::string& text, const std::string& arguments) {
+  folder.write("d.csv", text);
+  const Outcome outcome = folder.run(llmt_program + " " + arguments);
+  EXPECT_EQ(outcome.exit_code, 1) << arguments << ": " << outcome.err;
+  EXPECT_EQ(outcome.out, "") << arguments;
+  return outcome.err;
+}
+
+// 30 rows of a, b, w, y, of which row 5 (line 6) is another one.
+std::string table(const std::string& odd_row) {
+  std::string text = "a,b,w,y\n";
+  for (int i = 1; i <= 30; ++i) text += i == 5 ? odd_row + "\n" : fmt::format("{},{},{},{}\n", i, i % 7, 1, 2 * i);
+  return text;
+}
+
+TEST(BadData, MagnitudesBeyondTheLargestAreNamed) {
+  const Folder folder;
+  const std::string fit = "fit d.csv -t y --weight w";
+  for (const std::string stream : {"", " --stream"}) {
+    const auto refused = [&](const std::string& row, const std::string& message) {
+      EXPECT_EQ(refusal(folder, table(row), fit + stream), "llmt: d.csv:6: column " + message + "\n") << stream;
+    };
+    refused("1e151,1,1,1", "\"a\": 1e+151 is beyond 1e+150, the largest magnitude to learn from");
+    refused("1,-1e308,1,1", "\"b\": -1e+308 is beyond 1e+150, the largest magnitude to learn from");
+    refused("1,1,1,-2e200", "\"y\": -2e+200 is beyond 1e+150, the largest magnitude to learn from");
+    refused("1,1,1e308,1", "\"w\": 1e+308 is beyond 1e+150, the largest magnitude to learn from");
+    refused("1,1,-3,1", "\"w\": a weight must not be negative, it is -3");
+  }
+  EXPECT_EQ(refusal(folder, table("1e71,1,1,1"), "fit d.csv -t y --local-models quadratic"),
+            "llmt: d.csv:6: column \"a\": 1e+71 is beyond 1e+70, the largest magnitude to learn from\n");
+  EXPECT_EQ(refusal(folder, table("1e151,1,1,1"), "compare d.csv -t y --cv 2"),
+            "llmt: d.csv:6: column \"a\": 1e+151 is beyond 1e+150, the largest magnitude to learn from\n");
+}
+
+TEST(BadData, LabelsOfCategoriesMayBeAnyNumber) {
+  const Folder folder;
+  folder.write("d.csv", table("1e200,1,1,1"));
+  const Outcome outcome = folder.run(llmt_program + " fit d.csv -t y --categorical a --cv 0");
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+}
+
+TEST(BadData, ColumnsWhoseSquaresVanishAreNamed) {
+  const Folder folder;
+  std::string text = "x,y\n";
+  for (int i = 1; i <= 30; ++i) text += fmt::format("{},{}\n", i * 5e-324, i);
+  for (const std::string stream : {"", " --stream"}) {
+    EXPECT_EQ(
+        refusal(folder, text, "fit d.csv -t y" + stream),
+        "llmt: d.csv:31: column \"x\": the largest magnitude of the column is 1.5e-322, so that squares vanish: at "
+        "least 1e-140 is needed, by another unit\n")
+        << stream;
+  }
+}
+
+TEST(BadData, WeightsThatAreAllZeroAreNamed) {
+  const Folder folder;
+  std::string text = "x,w,y\n";
+  for (int i = 1; i <= 30; ++i) text += fmt::format("{},0,{}\n", i, i);
+  EXPECT_EQ(refusal(folder, text, "fit d.csv -t y --weight w"), "llmt: d.csv: column \"w\": every weight is 0\n");
+}
+
+TEST(BadData, TooManyCategoriesAreNamed) {
+  const Folder folder;
+  std::string text = "word,x,y\n";
+  for (int i = 0; i <= 10000; ++i) text += fmt::format("w{},{},{}\n", i, i % 5, i % 3);
+  EXPECT_EQ(refusal(folder, text, "fit d.csv -t y"),
+            "llmt: d.csv:10002: column \"word\": more than 10000 categories (--ignore COLUMN leaves a column out)\n");
+}
+
+TEST(BadData, TextThatIsNotUtf8IsNamedBeforeTheWork) {
+  const Folder folder;
+  EXPECT_EQ(refusal(folder, "gr\xF6sse,y\n1,2\n2,3\n", "fit d.csv -t y --json"),
+            "llmt: d.csv:1: the name of column 1 of the header is not UTF-8\n");
+  EXPECT_EQ(refusal(folder, "c,y\na,2\n\xF6,3\nb,4\n", "fit d.csv -t y --json"),
+            "llmt: d.csv:3: column \"c\": the cell is not UTF-8\n");
+  EXPECT_EQ(refusal(folder, std::string("\xFF\xFE", 2) + std::string("x\0,\0y\0\n\0", 8), "fit d.csv -t y"),
+            "llmt: d.csv: this is UTF-16 or no text at all, UTF-8 is needed\n");
+  EXPECT_EQ(refusal(folder, std::string("x,y\n1,2\na\0b,3\n", 14), "fit d.csv -t y"),
+            "llmt: d.csv:3: column \"x\": 'a\\0b' is not a number (--ignore COLUMN leaves a column out)\n");
+  folder.write("d\xF6.csv", table("1,1,1,1"));
+  const Outcome named = folder.run(llmt_program + " fit d\xF6.csv -t y --cv 0 --json");
+  EXPECT_EQ(named.exit_code, 0) << named.err;
+  EXPECT_NE(named.out.find("d\xEF\xBF\xBD.csv"), std::string::npos) << named.out;
+}
+
+TEST(BadData, EndlessInputsAreRefused) {
+  const Folder folder;
+  const auto refused = [&](const std::string& arguments, const std::string& message) {
+    const Outcome outcome = folder.run(llmt_program + " " + arguments);
+    EXPECT_EQ(outcome.exit_code, 1) << arguments;
+    EXPECT_EQ(outcome.err, "llmt: " + message + "\n") << arguments;
+  };
+  refused("fit /dev/zero -t y", "/dev/zero: cannot be read: no line ends within 16 MiB");
+  refused("fit /dev/zero -t y --stream", "/dev/zero:1: no row ends within 16 MiB (is a quote left open?)");
+  folder.write("d.csv", table("1,1,1,1"));
+  refused("discover d.csv d.csv --output y --terms /dev/zero",
+          "/dev/zero: cannot be read: it holds more than 16 MiB, the most that is read");
+}
+
+TEST(BadData, StreamsSayWhyTheyCannotBeRead) {
+  const Folder folder;
+  const auto reason = [&](const std::string& path) {
+    const Outcome outcome = folder.run(llmt_program + " fit " + path + " -t y --stream");
+    EXPECT_EQ(outcome.exit_code, 1);
+    return outcome.err;
+  };
+  EXPECT_EQ(reason("no.csv"), "llmt: no.csv: cannot be read: No such file or directory\n");
+  EXPECT_EQ(reason("."), "llmt: .: cannot be read: Is a directory\n");
+}
+
+}  // namespace

@@ -1,0 +1,80 @@
+// What the command line of llmt-robot refuses before any work.
+#include <fmt/format.h>
+
+#include <filesystem>
+
+#include "apps/program.hpp"
+
+namespace {
+
+using program::Folder;
+using program::Outcome;
+
+const std::string robot_program = LLMT_ROBOT_PROGRAM;
+const std::string arm = LLMT_ROBOTS "/tx200_like.yaml";
+
+void expect_usage(const Folder& folder, const std::string& arguments, const std::string& message) {
+  const Outcome outcome = folder.run(robot_program + " " + arguments);
+  EXPECT_EQ(outcome.exit_code, 2) << arguments << ": " << outcome.err;
+  EXPECT_EQ(outcome.err, "llmt-robot: " + message + "\n") << arguments;
+}
+
+TEST(RobotOptions, NumbersOutsideTheirRangeAreRefusedWithIt) {
+  const Folder folder;
+  const auto refused = [&](const std::string& command, const std::string& option, const std::string& value,
+                           const std::string& range) {
+    expect_usage(folder, fmt::format("{} {} {}", command, option, value),
+                 fmt::format("{} is \"{}\", it must be {}", option, value, range));
+  };
+  const std::string seed = "a whole number from 0 to 18446744073709551615";
+  refused("discover r.yaml d.csv", "--held-out", "nan", "a number from 0 to 0.9");
+  refused("discover r.yaml d.csv", "--mass-uncertainty", "nan", "a number from 0 to 1");
+  refused("discover r.yaml d.csv", "--folds", "1", "a whole number from 2 to 100");
+  refused("discover r.yaml d.csv", "--seed", "-1", seed);
+  refused("calibrate r.yaml d.csv", "--seed", "99999999999999999999", seed);
+  refused("calibrate r.yaml d.csv", "--folds", "-1", "a whole number from 0 to 2147483647");
+  refused("calibrate r.yaml d.csv", "--threads", "-1", "a whole number from 0 to 4096");
+  refused("simulate r.yaml", "--noise-um", "nan", "a finite number, 0 or more");
+  refused("simulate r.yaml", "--noise-um", "-1", "a finite number, 0 or more");
+  refused("simulate r.yaml", "--poses", "1000000000", "a whole number from 1 to 1000000");
+  refused("paper", "--seeds", "0", "a whole number from 1 to 2147483647");
+  refused("paper", "--seed", "-1", seed);
+}
+
+TEST(RobotOptions, AnOutputThatIsAnInputIsRefusedBeforeTheWork) {
+  const Folder folder;
+  const std::string description = llmt::read_file(arm);
+  folder.write("r.yaml", description);
+  ASSERT_EQ(folder.run(robot_program + " simulate r.yaml --poses 150 --noise-um 10 -o d.csv").exit_code, 0);
+  std::filesystem::create_symlink("r.yaml", folder.file("link.yaml"));
+  const auto lost = [&](const std::string& arguments, const std::string& output, const std::string& input) {
+    expect_usage(folder, arguments,
+                 output + ": would be overwritten, and is an input of this command (" + input +
+                     "); give the output a name of its own");
+  };
+  lost("simulate r.yaml -o r.yaml", "r.yaml", "r.yaml");
+  lost("simulate r.yaml --poses-from d.csv -o d.csv", "d.csv", "d.csv");
+  lost("calibrate r.yaml d.csv -o link.yaml", "link.yaml", "r.yaml");
+  lost("calibrate r.yaml d.csv --test r.yaml -o d.csv", "d.csv", "d.csv");
+  lost("discover r.yaml d.csv -o r.yaml", "r.yaml", "r.yaml");
+  EXPECT_EQ(llmt::read_file(folder.file("r.yaml")), description);
+
+  // The correction that the description names is an input too.
+  ASSERT_EQ(folder.run(robot_program + " calibrate r.yaml d.csv --correct --folds 0 -o c.yaml").exit_code, 0);
+  ASSERT_TRUE(std::filesystem::exists(folder.file("c.correction.json")));
+  std::filesystem::copy(folder.file("c.yaml"), folder.file("c2.yaml"));
+  lost("simulate c2.yaml -o c.correction.json", "c.correction.json", "c.correction.json");
+  lost("calibrate c2.yaml d.csv -o c.yaml", "c.correction.json", "c.correction.json");
+}
+
+TEST(RobotOptions, EndlessDescriptionsAreRefused) {
+  const Folder folder;
+  const Outcome outcome = folder.run(robot_program + " simulate /dev/zero");
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_EQ(outcome.err, "llmt-robot: /dev/zero: cannot be read: it holds more than 16 MiB, the most that is read\n");
+  const Outcome version = folder.run(robot_program + " --version");
+  EXPECT_EQ(version.exit_code, 0);
+  EXPECT_EQ(version.out, "llmt-robot " LLMT_VERSION "\n");
+}
+
+}  // namespace

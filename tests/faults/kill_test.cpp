@@ -1,0 +1,68 @@
+// Signals at random times, two processes on one output.
+#include <signal.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <thread>
+
+#include "faults/job.hpp"
+
+extern char** environ;
+
+namespace {
+
+using faults::JobFolder;
+
+// Starts the job with a shell that becomes the program.
+pid_t start(const JobFolder& at) {
+  const std::string command =
+      fmt::format("cd '{}' && exec {} >/dev/null 2>&1 </dev/null", at.folder.file("."), at.job().command);
+  std::vector<std::string> words = {"sh", "-c", command};
+  std::vector<char*> arguments = {words[0].data(), words[1].data(), words[2].data(), nullptr};
+  pid_t process = 0;
+  EXPECT_EQ(::posix_spawn(&process, "/bin/sh", nullptr, nullptr, arguments.data(), environ), 0);
+  return process;
+}
+
+int wait_for(pid_t process) {
+  int status = 0;
+  EXPECT_EQ(::waitpid(process, &status, 0), process);
+  return status;
+}
+
+TEST(Kills, AtRandomTimesLeaveTheOldFileOrTheNewOne) {
+  JobFolder at(faults::fit_job());
+  at.write_tables();
+  const auto begin = std::chrono::steady_clock::now();
+  at.learn_new_content();
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  llmt::Random random(14);
+  for (const int signal : {SIGTERM, SIGINT, SIGKILL}) {
+    for (int i = 0; i < 8; ++i) {
+      at.put_old_files();
+      const pid_t process = start(at);
+      std::this_thread::sleep_for(std::chrono::duration<double>(random.uniform(0.0, 1.2 * seconds)));
+      ::kill(process, signal);
+      wait_for(process);
+      at.count_new_files();
+    }
+  }
+}
+
+TEST(TwoProcesses, OnOneOutputLeaveItWhole) {
+  JobFolder at(faults::fit_job());
+  at.write_tables();
+  at.learn_new_content();
+  for (int i = 0; i < 5; ++i) {
+    at.put_old_files();
+    const pid_t one = start(at);
+    const pid_t other = start(at);
+    EXPECT_EQ(wait_for(one), 0);
+    EXPECT_EQ(wait_for(other), 0);
+    EXPECT_EQ(at.count_new_files(), 1);
+  }
+}
+
+}  // namespace
