@@ -14,12 +14,12 @@ bool has_gate(const Partition& partition, const Node& node) {
   return partition.validity.kind == ValidityKind::blend && !node.is_leaf() && node.level_side.empty();
 }
 
-// Sums over rows that have a value: of each leaf's regressors, and of the weight of each node.
+// Sums over rows, one column or entry for each node. The validity of an inner node is that of the leaves below it.
 struct Present {
-  Eigen::MatrixXd sums;      // regressors x nodes, weighted by validity
+  Eigen::MatrixXd sums;      // of the regressors, over the rows that have them, weighted by validity
   Eigen::MatrixXd weights;   // the same of 1
-  Eigen::VectorXd validity;  // of each node: sum of the weights times validities of the leaves below
-  Eigen::VectorXd in_box;    // of each node: sum of the weights of the rows in its box
+  Eigen::VectorXd validity;  // of the weighted validities
+  Eigen::VectorXd in_box;    // of the weights of the rows in the node's box
 };
 
 Present add_up(const TrainingRows& training, const Evaluator& evaluator, bool leave_out, const Partition& partition) {
@@ -52,6 +52,8 @@ Present add_up(const TrainingRows& training, const Evaluator& evaluator, bool le
   for (Eigen::Index node = nodes - 1; node > 0; --node) {
     present.validity(parents[node]) += present.validity(node);
     present.in_box(parents[node]) += present.in_box(node);
+    present.sums.col(parents[node]) += present.sums.col(node);
+    present.weights.col(parents[node]) += present.weights.col(node);
   }
   return present;
 }
@@ -63,10 +65,11 @@ void describe_missing_by_validity(const TrainingRows& training, const Evaluator&
   const Present present = add_up(training, evaluator, leave_out, partition);
   for (Eigen::Index i = 0; i < std::ssize(partition.nodes); ++i) {
     Node& node = partition.nodes[i];
-    if (node.is_leaf()) {
+    if (i > 0) {
       const auto weight = present.weights.col(i).array();
       node.mean = (weight > 0.0).select(present.sums.col(i).array() / weight, node.mean.array());
-    } else if (has_gate(partition, node) && present.in_box(i) > 0.0 && present.validity(i) > 0.0) {
+    }
+    if (has_gate(partition, node) && present.in_box(i) > 0.0 && present.validity(i) > 0.0) {
       const double by_validity = present.validity(node.left) / present.validity(i);
       const double by_rows = present.in_box(node.left) / present.in_box(i);
       node.missing_left = std::clamp(node.missing_left + by_validity - by_rows, 0.0, 1.0);
@@ -79,9 +82,8 @@ void describe_missing_by_sums(const NormalEquations& sums, const Eigen::VectorXd
     Node& node = partition.nodes[i];
     const double weight = sums.gram[i](0, 0);
     if (!(weight > 0.0)) continue;
-    if (node.is_leaf()) {
-      node.mean = scale.cwiseProduct(sums.gram[i].col(0).tail(scale.size())) / weight;
-    } else if (has_gate(partition, node)) {
+    if (i > 0) node.mean = scale.cwiseProduct(sums.gram[i].col(0).tail(scale.size())) / weight;
+    if (has_gate(partition, node)) {
       node.missing_left = std::clamp(sums.gram[node.left](0, 0) / weight, 0.0, 1.0);
     }
   }

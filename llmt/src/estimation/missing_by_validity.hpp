@@ -6,10 +6,11 @@
 
 namespace llmt {
 
-/// Sets for each leaf Node::mean to the mean of the regressors over the rows that have them, weighted by the leaf's
-/// validity. Adds to Node::missing_left of a split on a number what the mean of the left child's validity gate over
-/// the node is larger than the part of the rows that lie on the left of the threshold. Growth has set both from the
-/// rows in the boxes. `leave_out`: rows that a missing value sends to several leaves take no part.
+/// Sets for each node but the root Node::mean to the mean of the regressors over the rows that have them, weighted by
+/// the validity of the node's leaves. Adds to Node::missing_left of a split on a number what the mean of the left
+/// child's validity gate over the node is larger than the part of the rows that lie on the left of the threshold.
+/// Growth has set both from the rows in the boxes. `leave_out`: rows that a missing value sends to several leaves take
+/// no part.
 void describe_missing_by_validity(const TrainingRows& training, const Evaluator& evaluator, bool leave_out,
                                   Partition& partition);
 

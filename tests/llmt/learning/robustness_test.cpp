@@ -115,7 +115,7 @@ TEST_F(Robustness, DuplicatedAndConstantColumn) {
 }
 
 // The mean of the function over what is missing, which is the best that can be said, has 0.908; boosted trees that send
-// missing values the better way reach 0.882 (LightGBM, XGBoost, HistGradientBoosting). We have 0.891.
+// missing values the better way reach 0.882 (LightGBM, XGBoost, HistGradientBoosting).
 TEST_F(Robustness, FivePercentOfTheInputsMissing) {
   const auto holed = [](Sample s, std::uint64_t seed) {
     llmt::Random random(seed);
@@ -124,7 +124,7 @@ TEST_F(Robustness, FivePercentOfTheInputsMissing) {
     }
     return s;
   };
-  EXPECT_GE(refitted(holed(train, 3), holed(test, 4)), 0.885);
+  EXPECT_GE(refitted(holed(train, 3), holed(test, 4)), 0.895);
 }
 
 TEST_F(Robustness, OnePercentOfTheOutputsAThousandfoldWithTukeysLoss) {
