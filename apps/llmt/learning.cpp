@@ -68,6 +68,15 @@ std::vector<std::string> choose_inputs(const Csv& csv, const LearningArguments& 
     }
   }
   if (inputs.empty()) throw std::invalid_argument("no column is left to learn from");
+  for (const std::vector<std::string>* names : {&arguments.targets, &std::as_const(inputs)}) {
+    for (const std::string& name : *names) {
+      if (!is_utf8(name)) {
+        throw std::runtime_error(
+            fmt::format("{}: header: the name of column {} is not valid UTF-8; write the table as UTF-8", csv.name(),
+                        csv.index_of(name) + 1));
+      }
+    }
+  }
   return inputs;
 }
 

@@ -80,7 +80,7 @@ void print(std::string_view text) {
   }
 }
 
-void print_json(const Json& json) { print(json.dump(2) + "\n"); }
+void print_json(const Json& json) { print(json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n"); }
 
 void warn(const std::string& text) { fmt::print(stderr, "{}\n", text); }
 

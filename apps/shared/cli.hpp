@@ -39,6 +39,7 @@ std::string number(double value, int digits = 4);
 
 /// Prints to stdout and reports a stdout that cannot take it (a full disk, a closed pipe) as std::runtime_error.
 void print(std::string_view text);
+/// What is not UTF-8, such as the name of a file, is replaced by U+FFFD; a number that is not finite is null.
 void print_json(const Json& json);
 
 /// A line on stderr.

@@ -9,6 +9,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "shared/cli.hpp"
+
 namespace llmt::apps {
 namespace {
 
@@ -49,6 +51,12 @@ void read_categories(const Csv& csv, const std::vector<std::string>& names, Inpu
     }
     auto found = seen[i].find(text);
     if (found == seen[i].end()) {
+      if (!is_utf8(text)) {
+        throw std::runtime_error(
+            fmt::format("{}:{}: column \"{}\": the category is not valid UTF-8; write the table as "
+                        "UTF-8",
+                        csv.name(), csv.line_of(row), wanted[i]));
+      }
       found = seen[i].emplace(text, std::ssize(seen[i])).first;
     }
     value = static_cast<double>(found->second);
@@ -64,6 +72,15 @@ bool contains(const std::vector<std::string>& names, const std::string& name) {
 }
 
 }  // namespace
+
+bool is_utf8(std::string_view text) {
+  try {
+    static_cast<void>(Json(text).dump());
+    return true;
+  } catch (const Json::type_error&) {
+    return false;
+  }
+}
 
 LearningColumns read_learning_columns(const Csv& csv, const ColumnRoles& roles, const std::string& input_hint,
                                       int max_threads) {

@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "llmt/csv.hpp"
@@ -18,6 +19,9 @@ struct ColumnRoles {
   std::vector<std::string> targets;
   std::string weight;  ///< empty: none
 };
+
+/// Whether a text is valid UTF-8. Names of columns and categories have to be: model files hold them.
+bool is_utf8(std::string_view text);
 
 /// Inputs to learn from.
 struct InputColumns {
@@ -34,7 +38,8 @@ struct LearningColumns {
 
 /// Reads the columns. An input is categorical if it is listed as such, or if none of its cells is a number. A cell that
 /// is needed as a number and is none, a word among numbers, is an error, `path:line: column "c": ...`; for an input it
-/// ends in `input_hint`. Throws std::runtime_error, also for a categorical column that is not among the inputs.
+/// ends in `input_hint`. Throws std::runtime_error, also for a categorical column that is not among the inputs and for
+/// a category that is not valid UTF-8.
 LearningColumns read_learning_columns(const Csv& csv, const ColumnRoles& roles, const std::string& input_hint,
                                       int max_threads);
 
