@@ -13,7 +13,8 @@
 #include <thread>
 #include <vector>
 
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__)
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && \
+    !defined(__SANITIZE_THREAD__)
 #define BENCH_FOR_EACH_INSTRUCTION_SET __attribute__((target_clones("avx512f", "arch=haswell", "default")))
 #define BENCH_HAS_FMA (__builtin_cpu_supports("fma") != 0)
 #else
@@ -23,7 +24,7 @@
 
 namespace bench::peak {
 
-using Lanes = double __attribute__((vector_size(64), aligned(8)));
+typedef double Lanes __attribute__((vector_size(64), aligned(8)));  // NOLINT(modernize-use-using): clang
 inline constexpr Eigen::Index lanes = 8;
 
 struct Product {

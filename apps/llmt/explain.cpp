@@ -35,8 +35,16 @@ std::vector<std::size_t> by_size(const Eigen::VectorXd& values) {
   return order;
 }
 
+void warn_if_not_finite(const ExplainArguments& arguments, const char* what, const Eigen::MatrixXd& values) {
+  if (const Eigen::Index count = values.size() - values.array().isFinite().count(); count > 0) {
+    warn(fmt::format("llmt: warning: {} of {} {} are not finite: numbers of {} are too large for these rows", count,
+                     values.size(), what, arguments.model));
+  }
+}
+
 void explain_table(const ExplainArguments& arguments, const Model& model, const Eigen::MatrixXd& inputs) {
   const Eigen::MatrixXd shares = importance(model, inputs, arguments.threads);
+  warn_if_not_finite(arguments, "importances", shares);
   const Eigen::Index used = std::min(inputs.rows(), importance_rows);
   Json json = {{"model", arguments.model}, {"data", arguments.data}, {"rows", inputs.rows()}, {"rows_used", used}};
   json["targets"] = Json::array();
@@ -71,6 +79,7 @@ void explain_row(const ExplainArguments& arguments, const Model& model, const Ei
   }
   const Eigen::VectorXd point = inputs.row(arguments.row - 1);
   const Attribution attribution = attribute(model, point);
+  warn_if_not_finite(arguments, "contributions", attribution.contributions);
   Json json = {{"model", arguments.model}, {"data", arguments.data}, {"row", arguments.row}};
   json["targets"] = Json::array();
   if (!arguments.json) {

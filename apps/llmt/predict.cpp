@@ -37,6 +37,8 @@ struct Predicted {
   Eigen::Index unknown = 0;
   // RMSE of the targets that the table also holds, in the order of targets; NaN for the others.
   Eigen::VectorXd rmse;
+
+  Eigen::Index count_not_finite() const { return values.size() - values.array().isFinite().count(); }
 };
 
 // Shortest text that reads back as the same number.
@@ -57,7 +59,8 @@ Eigen::Index count_high_leverage(const Predicted& predicted) {
   });
 }
 
-Predicted predict_table(const PredictArguments& arguments, const Model& model, const Csv& csv) {
+Predicted predict_table(const PredictArguments& arguments, const ModelWithIntervals& file, const Csv& csv) {
+  const Model& model = file.model;
   const ModelInputs inputs = read_inputs(csv, model, arguments.threads);
   Predicted predicted;
   for (const OutputColumn& output : model.outputs()) {
@@ -68,13 +71,12 @@ Predicted predict_table(const PredictArguments& arguments, const Model& model, c
   predicted.missing = inputs.missing;
   predicted.unknown = inputs.unknown;
   if (arguments.interval > 0.0) {
-    const Intervals intervals = load_intervals(arguments.model);
-    if (intervals.empty()) {
+    if (file.intervals.empty()) {
       throw std::runtime_error(fmt::format(
           "{}: the file has no held-out residuals; fit without --no-intervals and with folds", arguments.model));
     }
     try {
-      predicted.bounds = intervals.predict(inputs.values, arguments.interval, arguments.threads);
+      predicted.bounds = file.intervals.predict(inputs.values, arguments.interval, arguments.threads);
     } catch (const std::invalid_argument& error) {  // too few rows for the level: the model's fault, not the caller's
       throw std::runtime_error(fmt::format("{}: {}", arguments.model, error.what()));
     }
@@ -147,11 +149,14 @@ Json summary_json(const Predicted& predicted, bool with_values) {
   json["outside_rows"] = count_outside(predicted);
   json["missing_values"] = predicted.missing;
   json["unknown_categories"] = predicted.unknown;
+  if (const Eigen::Index count = predicted.count_not_finite(); count > 0) {
+    json["not_finite_predictions"] = count;
+  }
   json["targets"] = Json::array();
   for (std::size_t o = 0; o < predicted.targets.size(); ++o) {
     const Eigen::Index column = o;
     Json target = {{"name", predicted.targets[o]},
-                   {"rmse", std::isnan(predicted.rmse(column)) ? Json(nullptr) : Json(predicted.rmse(column))}};
+                   {"rmse", std::isfinite(predicted.rmse(column)) ? Json(predicted.rmse(column)) : Json(nullptr)}};
     if (with_values) {
       target["predicted"] =
           std::vector<double>(predicted.values.col(column).begin(), predicted.values.col(column).end());
@@ -204,9 +209,14 @@ void summarise(const PredictArguments& arguments, const Predicted& predicted) {
 }
 
 void predict_command(const PredictArguments& arguments) {
-  const Model model = load(arguments.model);
+  const ModelWithIntervals file =
+      arguments.interval > 0.0 ? load_with_intervals(arguments.model) : ModelWithIntervals{load(arguments.model), {}};
   const Csv csv = Csv::read(arguments.data);
-  const Predicted predicted = predict_table(arguments, model, csv);
+  const Predicted predicted = predict_table(arguments, file, csv);
+  if (const Eigen::Index count = predicted.count_not_finite(); count > 0) {
+    warn(fmt::format("llmt: warning: {} of {} predictions are not finite: numbers of {} are too large for these rows",
+                     count, predicted.values.size(), arguments.model));
+  }
   if (!arguments.output.empty()) {
     write_file(arguments.output, [&](const TextSink& sink) { write_csv(csv, predicted, sink); });
   }

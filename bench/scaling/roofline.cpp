@@ -16,7 +16,7 @@ namespace {
 
 constexpr Eigen::Index row_size = 12;  // doubles, 96 bytes
 
-using HalfLanes = double __attribute__((vector_size(32), aligned(8)));
+typedef double HalfLanes __attribute__((vector_size(32), aligned(8)));  // NOLINT(modernize-use-using): clang
 
 BENCH_FOR_EACH_INSTRUCTION_SET
 double sum_rows(const double* data, const std::uint32_t* rows, Eigen::Index count) {

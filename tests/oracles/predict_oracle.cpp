@@ -101,8 +101,11 @@ Eigen::VectorXd local(const llmt::Partition& partition, int leaf, const Eigen::V
   const llmt::Node& node = partition.nodes[leaf];
   Eigen::VectorXd below = held(node, deviations);
   Eigen::VectorXd value = node.value + node.slope * below;
-  for (int index = leaf; index > 0;) {
-    const int parent = index == leaf && node.guard_parent >= 0 ? node.guard_parent : parent_of(partition, index);
+  int asked = 0;
+  for (int index = leaf; index > 0; ++asked) {
+    const int parent = asked >= 64                               ? 0
+                       : index == leaf && node.guard_parent >= 0 ? node.guard_parent
+                                                                 : parent_of(partition, index);
     const llmt::Node& ancestor = partition.nodes[parent];
     const Eigen::VectorXd reached = deviations.array().isNaN().select(below, held(ancestor, deviations));
     value += ancestor.slope * (reached - below);

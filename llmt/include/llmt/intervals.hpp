@@ -32,7 +32,7 @@ class Intervals {
   Intervals() = default;
 
   /// One model and one matrix of absolute residuals (rows x outputs) for each fold. Throws std::invalid_argument if the
-  /// numbers of folds, inputs or outputs differ, or a residual is negative or not finite.
+  /// numbers of folds, inputs, outputs or levels differ, or a residual is negative or not finite.
   Intervals(std::vector<Model> models, std::vector<Eigen::MatrixXd> residuals);
 
   bool empty() const { return models_.empty(); }
@@ -48,10 +48,20 @@ class Intervals {
   std::vector<Eigen::MatrixXd> residuals_;
 };
 
-/// Writes a model as save() does, with the intervals beside it in the file (nothing if they are empty).
+/// A model and the intervals that were made with it.
+struct ModelWithIntervals {
+  Model model;
+  Intervals intervals;  ///< may be empty
+};
+
+/// Writes a model as save() does, with the intervals beside it in the file (nothing if they are empty). Throws
+/// std::invalid_argument if the intervals belong to another model: if a model of theirs has other numbers of inputs,
+/// outputs or levels, names other than the model's or those that fit() gives (x1, x2, ... and y, or y1, y2, ...), or
+/// was trained on rows outside of the model's training extent. Throws as save().
 void save(const Model& model, const Intervals& intervals, const std::string& path);
 
-/// The intervals in a file that save() wrote; empty if there are none. Throws as load().
-Intervals load_intervals(const std::string& path);
+/// Reads a file that save() wrote, with its intervals, which are empty if it has none. Throws std::runtime_error as
+/// load(), and if the intervals belong to another model.
+ModelWithIntervals load_with_intervals(const std::string& path);
 
 }  // namespace llmt

@@ -192,7 +192,10 @@ class Evaluator;
 class Model {
  public:
   /// Throws std::invalid_argument naming the part that does not fit: no partition or node, an output served twice or
-  /// not at all, children out of order, an index out of range, a shape, or a number that is not finite.
+  /// not at all, children out of order, an index out of range, a shape, a number that is not finite, two columns or
+  /// levels of one name. Or that does not go with the training extent, which InputColumn and OutputColumn give: a
+  /// centre, mean or range of a regressor outside of it, more rows in a node than in its parent, a rank above the
+  /// number of coefficients, a residual_range that the outputs and the root's model cannot leave.
   Model(std::vector<InputColumn> inputs, std::vector<OutputColumn> outputs, std::vector<Regressor> regressors,
         std::vector<Partition> partitions);
 
@@ -231,7 +234,7 @@ class Model {
   Eigen::MatrixXd standard_errors(const Eigen::Ref<const Eigen::MatrixXd>& inputs, int max_threads = 0) const;
 
   /// The leaves of a partition from left to right in the tree. Throws std::invalid_argument if there is no such
-  /// partition.
+  /// partition, std::runtime_error if the boxes list more than 10^8 levels and sides of oblique splits.
   std::vector<Leaf> leaves(Eigen::Index partition) const;
 
   /// The model as it was when each partition had at most `max_leaves` leaves: inner nodes' local models, not fitted
@@ -239,7 +242,7 @@ class Model {
   Model prefix(Eigen::Index max_leaves) const;
 
   /// The same model with other names of columns and, if there are any, of the levels of each input (empty for numbers).
-  /// Throws std::invalid_argument if their numbers differ.
+  /// Throws std::invalid_argument if their numbers differ, or two inputs, outputs or levels of an input have one name.
   Model named(const std::vector<std::string>& inputs, const std::vector<std::string>& outputs,
               const std::vector<std::vector<std::string>>& levels = {}) const;
 
@@ -258,15 +261,18 @@ Partition prefix(const Partition& partition, Eigen::Index max_leaves);
 /// back exactly.
 std::string to_json(const Model& model);
 
-/// Reads what to_json() wrote. Throws std::runtime_error, starting with `name`, that says which member is missing, has
-/// the wrong type or shape, or holds a number that cannot be accepted, and for another format or version.
+/// Reads what to_json() wrote. The text may be of any origin. Throws std::runtime_error, starting with `name` and the
+/// JSON pointer to the place, that says which member is missing, has the wrong type or shape, or holds a number that
+/// Model does not accept; for another format or version; and for JSON that is nested deeper than 32 levels or has a
+/// number beyond the range of a double.
 Model from_json(const std::string& text, const std::string& name = "model");
 
 /// Writes to_json() to a file, through a temporary file beside it that is renamed at the end: a failed write leaves the
 /// old file as it was. Throws std::runtime_error naming the path.
 void save(const Model& model, const std::string& path);
 
-/// Reads a file that save() wrote. Throws std::runtime_error naming the path.
+/// Reads a file that save() wrote, without the intervals that it may hold. Throws std::runtime_error as from_json(),
+/// starting with the path.
 Model load(const std::string& path);
 
 }  // namespace llmt

@@ -1,10 +1,50 @@
 #include "base/parallel.hpp"
 
+#if defined(__SANITIZE_THREAD__)
+#include <algorithm>
+#include <atomic>
+#include <exception>
+#include <mutex>
+#include <thread>
+#include <utility>
+#include <vector>
+#else
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
+#endif
 
 namespace llmt {
+
+#if defined(__SANITIZE_THREAD__)
+
+// ThreadSanitizer does not see into oneTBB, and takes what its threads hand over to each other for races. Threads of
+// the standard library it sees. Nested calls run on one thread.
+void parallel_for(Eigen::Index count, int max_threads, const std::function<void(Eigen::Index)>& body) {
+  thread_local bool is_nested = false;
+  constexpr Eigen::Index usual_threads = 4;
+  const Eigen::Index threads = std::min(count, is_nested ? 1 : max_threads > 0 ? max_threads : usual_threads);
+  std::atomic<Eigen::Index> next = 0;
+  std::exception_ptr thrown;
+  std::mutex mutex;
+  const auto work = [&] {
+    const bool was_nested = std::exchange(is_nested, true);
+    try {
+      for (Eigen::Index i = next++; i < count; i = next++) body(i);
+    } catch (...) {
+      const std::lock_guard lock(mutex);
+      thrown = std::current_exception();
+    }
+    is_nested = was_nested;
+  };
+  std::vector<std::thread> others;
+  for (Eigen::Index i = 1; i < threads; ++i) others.emplace_back(work);
+  work();
+  for (std::thread& other : others) other.join();
+  if (thrown) std::rethrow_exception(thrown);
+}
+
+#else
 
 void parallel_for(Eigen::Index count, int max_threads, const std::function<void(Eigen::Index)>& body) {
   if (max_threads == 1 || count <= 1) {
@@ -28,5 +68,7 @@ void parallel_for(Eigen::Index count, int max_threads, const std::function<void(
     tbb::task_arena(max_threads).execute(run);
   }
 }
+
+#endif
 
 }  // namespace llmt

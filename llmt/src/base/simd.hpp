@@ -9,9 +9,11 @@
 #include <Eigen/Core>
 #include <cstddef>
 
-// Compiles the function once per instruction set and lets the loader pick one. Off under the address sanitizer, which
-// does not support functions that the loader picks.
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__)
+// Compiles the function once per instruction set and lets the loader pick one. Off under the address and the thread
+// sanitizer, which do not support functions that the loader picks, and with clang 14, which does not have the
+// attribute.
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && \
+    !defined(__SANITIZE_THREAD__)
 #define LLMT_FOR_EACH_INSTRUCTION_SET __attribute__((target_clones("avx512f", "avx2", "default")))
 #else
 #define LLMT_FOR_EACH_INSTRUCTION_SET
@@ -22,8 +24,11 @@
 
 namespace llmt {
 
+// Types of less alignment than their size are typedefs: clang ignores `aligned` in an alias (using).
+
 /// Eight doubles with the alignment of one, so that they may be read from any address.
-using Lanes = double __attribute__((vector_size(64), aligned(8)));
+typedef double Lanes __attribute__((vector_size(64), aligned(8)));  // NOLINT(modernize-use-using)
+static_assert(alignof(Lanes) == alignof(double));
 inline constexpr Eigen::Index lanes = 8;
 
 /// Four doubles. A comparison of two quads is a mask; `mask ? a : b` chooses number by number.
@@ -36,7 +41,8 @@ constexpr Eigen::Index padded_to_quads(Eigen::Index count) { return (count + qua
 
 /// Loads a quad from any address.
 LLMT_INLINE Quad load_quad(const double* from) {
-  using Anywhere = double __attribute__((vector_size(32), aligned(8), may_alias));
+  typedef double Anywhere __attribute__((vector_size(32), aligned(8), may_alias));  // NOLINT(modernize-use-using)
+  static_assert(alignof(Anywhere) == alignof(double));
   return *reinterpret_cast<const Anywhere*>(from);
 }
 

@@ -94,7 +94,9 @@ ClampedDeviation LeafGeometry::clamped(int leaf, Eigen::Index regressor, double 
   };
   ClampedDeviation result{clamped_by(leaf), 0.0};
   double below = result.deviation;
-  for (int at = parents_[leaf]; at >= 0 && below != deviation; at = parents_[at]) {
+  int left = most_ancestors;
+  for (int at = next_ancestor(parents_, leaf, left); at >= 0 && below != deviation;
+       at = next_ancestor(parents_, at, left)) {
     const double reached = clamped_by(at);
     result.rest += node(at).slope(output_, regressor) * (reached - below);
     below = reached;
@@ -103,7 +105,8 @@ ClampedDeviation LeafGeometry::clamped(int leaf, Eigen::Index regressor, double 
 }
 
 void LeafGeometry::add_kinks(int leaf, Eigen::Index regressor, double low, double high, std::vector<double>& to) const {
-  for (int at = leaf; at >= 0; at = parents_[at]) {
+  int left = most_ancestors;
+  for (int at = leaf; at >= 0; at = next_ancestor(parents_, at, left)) {
     const double first = node(at).low(regressor);
     const double last = node(at).high(regressor);
     const double round = rounding_of_hold * (last - first);

@@ -16,6 +16,13 @@ namespace {
 constexpr int most_halvings = 5000;
 constexpr double shortest_piece = 1e-9;
 
+// Bounds on the time of one line: on the values of local models that are computed for its integrals, and on the number
+// of pieces times that of leaves. Beyond them the line is not cut at kinks, pieces are not halved, and integrals are of
+// low order. Trees that are fitted stay far below; a file may hold a chain of a thousand leaves that all overlap.
+constexpr double most_values = 2e8;
+constexpr double most_coarse_values = 1e6;
+constexpr double most_pieces_and_leaves = 2e7;
+
 // Equal pieces of a line that is not cut at kinks.
 constexpr int coarse_pieces = 8;
 
@@ -39,15 +46,17 @@ class Line {
     Eigen::VectorXd value;
   };
 
-  Pieces pieces() const;
+  Pieces pieces();
   Eigen::VectorXd predict(const Eigen::VectorXd& row);
 
   // One piece of the line after the other, and the jumps between them.
   Place move_to(const Place& from, double to, std::span<Crossing> crossings);
   void jump(Eigen::Index input, double to, const Eigen::VectorXd& parts, Place& place);
 
+  bool may_go_on() const { return values_ < (precision_.exact ? most_values : most_coarse_values); }
+
   // The integral of X.1 over a piece.
-  int degree(int index, const Eigen::VectorXd& row) const;
+  int degree(const Eigen::VectorXd& row) const;
   Eigen::MatrixXd mean_rate(double from, double to, const Eigen::VectorXd& row, int order);
   bool estimate_rate(const Place& from, const Place& to, const Eigen::VectorXd& middle_row, Eigen::MatrixXd& rate);
   void integrate(const Place& from, const Place& to);
@@ -62,6 +71,7 @@ class Line {
   Eigen::VectorXd tolerance_;  // of the sum over a piece, per output
   Eigen::MatrixXd shares_;     // outputs of the partition x inputs
   int halvings_ = 0;
+  double values_ = 0.0;  // of local models, that were computed
 
   // Work space.
   Eigen::VectorXd deviations_;
@@ -110,8 +120,14 @@ void Line::run(Attribution& result) {
   result.contributions(partition_.outputs, Eigen::all) = shares_;
 }
 
-Pieces Line::pieces() const {
+Pieces Line::pieces() {
   Pieces pieces = cut_line(model_, partition_, evaluator_, line_, precision_.exact);
+  const double leaves = static_cast<double>(partition_.num_leaves());
+  if (precision_.exact && partition_.validity.kind != ValidityKind::crisp &&
+      static_cast<double>(pieces.cuts.size()) * leaves > most_pieces_and_leaves) {
+    precision_.exact = false;
+    pieces = cut_line(model_, partition_, evaluator_, line_, false);
+  }
   if (!precision_.exact && partition_.validity.kind != ValidityKind::crisp) {
     for (int k = 1; k < coarse_pieces; ++k) {
       pieces.cuts.push_back(static_cast<double>(k) / coarse_pieces);
@@ -126,6 +142,7 @@ Eigen::VectorXd Line::predict(const Eigen::VectorXd& row) {
   Eigen::VectorXd values(std::ssize(partition_.outputs));
   evaluator_.activate(row.data(), active_);
   evaluator_.combine(active_, deviations_.data(), values.data());
+  values_ += static_cast<double>(active_.size());
   return values;
 }
 
@@ -162,17 +179,30 @@ void Line::jump(Eigen::Index input, double to, const Eigen::VectorXd& parts, Pla
 }
 
 // Degree of the prediction, as a polynomial of the position, around a point on the line.
-int Line::degree(int index, const Eigen::VectorXd& row) const {
-  const Node& node = partition_.nodes[index];
-  if (node.is_leaf()) {
-    return has_products_ ? 8 : 2;  // where a guard sets in, and the holds of both factors
+int Line::degree(const Eigen::VectorXd& row) const {
+  struct Open {
+    int node;
+    int degree;  // of the validity
+  };
+  std::vector<Open> open = {{0, 0}};
+  int largest = 0;
+  while (!open.empty()) {
+    const auto [index, of_validity] = open.back();
+    open.pop_back();
+    const Node& node = partition_.nodes[index];
+    if (node.is_leaf()) {
+      // Where a guard sets in, and the holds of both factors.
+      largest = std::max(largest, of_validity + (has_products_ ? 8 : 2));
+      continue;
+    }
+    const double left = evaluator_.left_share(index, row.data());
+    const bool moves = node.is_oblique() || line_.way(node.split_input) != 0.0;
+    const bool is_shared = !(left >= 1.0 || left <= 0.0);
+    const int more = is_shared && moves ? (partition_.validity.smoothness == 1 ? 3 : 5) : 0;
+    if (!(left <= 0.0)) open.push_back({node.left, of_validity + more});
+    if (!(left >= 1.0)) open.push_back({node.right, of_validity + more});
   }
-  const double left = evaluator_.left_share(index, row.data());
-  if (left >= 1.0 || left <= 0.0) return degree(left >= 1.0 ? node.left : node.right, row);
-  const int of_children = std::max(degree(node.left, row), degree(node.right, row));
-  const bool moves = node.is_oblique() || line_.way(node.split_input) != 0.0;
-  if (!moves) return of_children;
-  return of_children + (partition_.validity.smoothness == 1 ? 3 : 5);
+  return largest;
 }
 
 // Mean of dF/dx_j (point_j - reference_j) between two positions, outputs x inputs.
@@ -183,6 +213,7 @@ Eigen::MatrixXd Line::mean_rate(double from, double to, const Eigen::VectorXd& r
     const Eigen::VectorXd x = line_.at(from + rule.nodes[i] * (to - from), row);
     deviations_at(model_.inputs(), model_.regressors(), x.data(), deviations_.data());
     evaluator_.derivatives(x.data(), deviations_.data(), by_input_, by_regressor_);
+    values_ += static_cast<double>(active_.size());  // as many as at the end of the piece, or nearly so
     add_through_regressors(model_.inputs(), model_.regressors(), x.data(), by_regressor_, by_input_);
     for (const Eigen::Index j : line_.moving) {
       mean.col(j) += rule.weights[i] * line_.way(j) * by_input_.col(j);
@@ -201,10 +232,11 @@ bool Line::estimate_rate(const Place& from, const Place& to, const Eigen::Vector
   const auto adds_up = [&] {
     return ((change - length * rate.rowwise().sum()).array().abs() <= tolerance_.array()).all();
   };
-  const int of_prediction = !precision_.exact || !polynomial ? 8 : degree(0, middle_row);
+  const bool exact = precision_.exact && may_go_on();
+  const int of_prediction = !exact || !polynomial ? 8 : degree(middle_row);
   rate = mean_rate(from.position, to.position, from.row, (of_prediction + 1) / 2);
   bool accepted = adds_up();
-  if (precision_.exact && (!accepted || !polynomial)) {
+  if (exact && (!accepted || !polynomial)) {
     // Twice the order: enough for a held output, and a second opinion on what is not a polynomial.
     const Eigen::MatrixXd better = mean_rate(from.position, to.position, from.row, 2 * of_prediction);
     const bool agree = ((length * (better - rate)).cwiseAbs().rowwise().maxCoeff().array() <= tolerance_.array()).all();
@@ -223,7 +255,7 @@ void Line::integrate(const Place& from, const Place& to) {
   middle.row = line_.at(middle.position, from.row);
   Eigen::MatrixXd rate;
   const bool accepted = estimate_rate(from, to, middle.row, rate);
-  if (!accepted && length > shortest_piece && halvings_ < most_halvings) {
+  if (!accepted && length > shortest_piece && halvings_ < most_halvings && may_go_on()) {
     ++halvings_;
     middle.value = predict(middle.row);
     integrate(from, middle);

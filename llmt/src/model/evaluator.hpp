@@ -52,7 +52,7 @@ class Evaluator {
  private:
   void add_gaussian_derivatives(const double* row, const double* deviations, double* values, Eigen::MatrixXd& by_input,
                                 Eigen::MatrixXd& by_regressor) const;
-  void add_blend_derivatives(int node, double validity, const double* row, const double* deviations, double* values,
+  void add_blend_derivatives(const double* row, const double* deviations, std::vector<double>& values,
                              Eigen::MatrixXd& by_input, Eigen::MatrixXd& by_regressor) const;
 
   Eigen::Index inputs_;

@@ -45,7 +45,8 @@ Eigen::MatrixXd LeafValidities::exponent_derivatives(const std::vector<Activatio
 void LocalModels::add_slopes(int node, double validity, const double* deviations, Eigen::MatrixXd& by_regressor) const {
   for (Eigen::Index k = 0; k < regressors_; ++k) {
     double below = 0.0;  // derivative of the held deviation of the node below
-    for (int at = node; at >= 0 && below < 1.0; at = parents_[at]) {
+    int left = most_ancestors;
+    for (int at = node; at >= 0 && below < 1.0; at = next_ancestor(parents_, at, left)) {
       const double derivative = hold_derivative(deviations[k], low(at)[k], high(at)[k]);
       const double weight = validity * (derivative - below);
       for (Eigen::Index o = 0; weight != 0.0 && o < outputs_; ++o) {
@@ -82,12 +83,11 @@ void Evaluator::derivatives(const double* row, const double* deviations, Eigen::
                             Eigen::MatrixXd& by_regressor) const {
   by_input.setZero(num_outputs(), inputs_);
   by_regressor.setZero(num_outputs(), regressors_);
-  // A subtree writes its values in front and uses the space behind them; it needs no more levels than there are leaves.
-  std::vector<double> values((validities_.num_leaves() + 1) * num_outputs());
+  std::vector<double> values(num_outputs());
   if (validities_.are_gaussian()) {
     add_gaussian_derivatives(row, deviations, values.data(), by_input, by_regressor);
   } else {
-    add_blend_derivatives(0, 1.0, row, deviations, values.data(), by_input, by_regressor);
+    add_blend_derivatives(row, deviations, values, by_input, by_regressor);
   }
   models_.finish_slopes(deviations, values.data(), by_input, by_regressor);
 }
@@ -112,30 +112,55 @@ void Evaluator::add_gaussian_derivatives(const double* row, const double* deviat
 }
 
 // The value of a subtree is g V_left + (1 - g) V_right: its derivative by g is V_left - V_right.
-void Evaluator::add_blend_derivatives(int node, double validity, const double* row, const double* deviations,
-                                      double* values, Eigen::MatrixXd& by_input, Eigen::MatrixXd& by_regressor) const {
-  if (validities_.left(node) < 0) {
-    local(node, deviations, values);
-    models_.add_slopes(node, validity, deviations, by_regressor);
-    return;
+void Evaluator::add_blend_derivatives(const double* row, const double* deviations, std::vector<double>& values,
+                                      Eigen::MatrixXd& by_input, Eigen::MatrixXd& by_regressor) const {
+  // Leaves that the row reaches and nodes that share it out, each before the nodes below it, the right ones first.
+  struct Visit {
+    int node;
+    double validity;
+    double left;  // share of the left child
+  };
+  std::vector<Visit> visits;
+  std::vector<Activation> waiting = {{0, 1.0}};  // left children
+  while (!waiting.empty()) {
+    auto [node, validity] = waiting.back();
+    waiting.pop_back();
+    double left = 0.0;
+    while (validities_.left(node) >= 0) {
+      left = left_share(node, row);
+      if (left >= 1.0 || left <= 0.0) {
+        node = left >= 1.0 ? validities_.left(node) : validities_.right(node);
+        continue;
+      }
+      visits.push_back({node, validity, left});
+      waiting.push_back({validities_.left(node), validity * left});
+      node = validities_.right(node);
+      validity *= 1.0 - left;
+    }
+    visits.push_back({node, validity, left});
   }
-  const double left = left_share(node, row);
-  if (left >= 1.0 || left <= 0.0) {
-    add_blend_derivatives(left >= 1.0 ? validities_.left(node) : validities_.right(node), validity, row, deviations,
-                          values, by_input, by_regressor);
-    return;
+  // Backwards: leaves from left to right, and each node after the nodes below it. The values of subtrees that wait for
+  // the subtree beside them stand one behind the other.
+  const Eigen::Index outputs = num_outputs();
+  values.clear();
+  Eigen::VectorXd by_side(outputs);
+  for (auto visit = visits.rbegin(); visit != visits.rend(); ++visit) {
+    if (validities_.left(visit->node) < 0) {
+      values.resize(values.size() + outputs);
+      local(visit->node, deviations, values.data() + values.size() - outputs);
+      models_.add_slopes(visit->node, visit->validity, deviations, by_regressor);
+      continue;
+    }
+    const double* of_right = values.data() + values.size() - outputs;
+    double* of_left = values.data() + values.size() - 2 * outputs;
+    const double by_share = visit->validity * validities_.left_share_derivative(visit->node, row);
+    for (Eigen::Index o = 0; o < outputs; ++o) {
+      by_side(o) = by_share * (of_left[o] - of_right[o]);
+      of_left[o] = visit->left * of_left[o] + (1.0 - visit->left) * of_right[o];
+    }
+    validities_.add_side_derivatives(visit->node, by_side, by_input);
+    values.resize(values.size() - outputs);
   }
-  double* of_right = values + num_outputs();
-  add_blend_derivatives(validities_.left(node), validity * left, row, deviations, values, by_input, by_regressor);
-  add_blend_derivatives(validities_.right(node), validity * (1.0 - left), row, deviations, of_right, by_input,
-                        by_regressor);
-  Eigen::VectorXd by_side(num_outputs());
-  const double by_share = validity * validities_.left_share_derivative(node, row);
-  for (Eigen::Index o = 0; o < num_outputs(); ++o) {
-    by_side(o) = by_share * (values[o] - of_right[o]);
-    values[o] = left * values[o] + (1.0 - left) * of_right[o];
-  }
-  validities_.add_side_derivatives(node, by_side, by_input);
 }
 
 }  // namespace llmt

@@ -4,16 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
 #include <stdexcept>
 
 #include "base/parallel.hpp"
-#include "llmt/files.hpp"
+#include "model/interval_checks.hpp"
 
 namespace llmt {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 // Number of values that lie outside the interval at either end: floor(a (n + 1)) with a = 1 - level.
 Eigen::Index values_outside(double level, Eigen::Index rows) {
@@ -44,6 +41,7 @@ Interval interval_at(const std::vector<Eigen::MatrixXd>& predicted, const std::v
   std::vector<double> upper;
   // Only the `rank` largest residuals of a fold can be among the `rank` outermost values.
   for (std::size_t k = 0; k < predicted.size(); ++k) {
+    if (std::isnan(predicted[k](row, output))) return {std::nan(""), std::nan("")};
     const Eigen::Index count = residuals[k].rows();
     for (Eigen::Index i = std::max<Eigen::Index>(0, count - rank); i < count; ++i) {
       lower.push_back(predicted[k](row, output) - residuals[k](i, output));
@@ -68,13 +66,12 @@ Intervals::Intervals(std::vector<Model> models, std::vector<Eigen::MatrixXd> res
         fmt::format("llmt::Intervals: {} models and {} matrices of residuals", models_.size(), residuals_.size()));
   }
   for (std::size_t k = 0; k < models_.size(); ++k) {
-    if (models_[k].num_inputs() != models_[0].num_inputs() || models_[k].num_outputs() != models_[0].num_outputs() ||
-        residuals_[k].cols() != models_[0].num_outputs()) {
-      throw std::invalid_argument(
-          fmt::format("llmt::Intervals: fold {} has {} inputs, {} outputs and {} columns of residuals, fold 0 has {} "
-                      "inputs and {} outputs",
-                      k, models_[k].num_inputs(), models_[k].num_outputs(), residuals_[k].cols(),
-                      models_[0].num_inputs(), models_[0].num_outputs()));
+    if (const std::string difference = difference_of_columns(models_[k], models_[0]); !difference.empty()) {
+      throw std::invalid_argument(fmt::format("llmt::Intervals: fold {} and fold 0 differ: {}", k, difference));
+    }
+    if (residuals_[k].cols() != models_[0].num_outputs()) {
+      throw std::invalid_argument(fmt::format("llmt::Intervals: fold {} has {} columns of residuals for {} outputs", k,
+                                              residuals_[k].cols(), models_[0].num_outputs()));
     }
     if (!residuals_[k].allFinite() || (residuals_[k].array() < 0.0).any()) {
       throw std::invalid_argument(fmt::format("llmt::Intervals: a residual of fold {} is negative or not finite", k));
@@ -111,56 +108,6 @@ Bounds Intervals::predict(const Eigen::Ref<const Eigen::MatrixXd>& inputs, doubl
     }
   });
   return bounds;
-}
-
-void save(const Model& model, const Intervals& intervals, const std::string& path) {
-  if (intervals.empty()) {
-    save(model, path);
-    return;
-  }
-  Json json = Json::parse(to_json(model));
-  json["intervals"] = Json::array();
-  for (std::size_t k = 0; k < intervals.models().size(); ++k) {
-    Json residuals = Json::array();
-    for (Eigen::Index o = 0; o < intervals.residuals()[k].cols(); ++o) {
-      const Eigen::VectorXd column = intervals.residuals()[k].col(o);
-      residuals.push_back(std::vector<double>(column.begin(), column.end()));
-    }
-    json["intervals"].push_back(
-        {{"residuals", std::move(residuals)}, {"model", Json::parse(to_json(intervals.models()[k]))}});
-  }
-  write_file(path, json.dump(1) + "\n");
-}
-
-Intervals load_intervals(const std::string& path) {
-  Json json;
-  try {
-    json = Json::parse(read_file(path));
-  } catch (const Json::parse_error& error) {
-    throw std::runtime_error(fmt::format("{}: not JSON, or cut off: {}", path, error.what()));
-  }
-  std::vector<Model> models;
-  std::vector<Eigen::MatrixXd> residuals;
-  try {
-    if (!json.is_object() || !json.contains("intervals")) return {};
-    for (const Json& fold : json.at("intervals")) {
-      models.push_back(from_json(fold.at("model").dump(), fmt::format("{}: /intervals/{}/model", path, models.size())));
-      const std::vector<std::vector<double>> columns = fold.at("residuals").get<std::vector<std::vector<double>>>();
-      Eigen::MatrixXd values(columns.empty() ? 0 : std::ssize(columns.front()), std::ssize(columns));
-      for (std::size_t o = 0; o < columns.size(); ++o) {
-        if (std::ssize(columns[o]) != values.rows()) {
-          throw std::runtime_error(fmt::format("{}: /intervals: residuals of outputs differ in number", path));
-        }
-        values.col(o) = Eigen::Map<const Eigen::VectorXd>(columns[o].data(), std::ssize(columns[o]));
-      }
-      residuals.push_back(std::move(values));
-    }
-    return {std::move(models), std::move(residuals)};
-  } catch (const Json::exception& error) {
-    throw std::runtime_error(fmt::format("{}: /intervals: {}", path, error.what()));
-  } catch (const std::invalid_argument& error) {
-    throw std::runtime_error(fmt::format("{}: /intervals: {}", path, error.what()));
-  }
 }
 
 }  // namespace llmt

@@ -8,10 +8,9 @@ JsonReader JsonReader::member(const char* key) const {
 }
 
 std::vector<JsonReader> JsonReader::elements() const {
-  if (!json_.is_array()) fail("an array is needed");
   std::vector<JsonReader> result;
-  for (std::size_t i = 0; i < json_.size(); ++i) {
-    result.emplace_back(json_[i], child(std::to_string(i)));
+  for (const Json& element : array()) {
+    result.emplace_back(element, child(std::to_string(result.size())));
   }
   return result;
 }
@@ -32,8 +31,18 @@ Eigen::MatrixXd JsonReader::matrix(Eigen::Index rows, Eigen::Index columns) cons
   return matrix;
 }
 
-std::string JsonReader::child(const std::string& key) const {
-  return fmt::format("{}{}{}", where_, where_.find(": /") == std::string::npos ? ": /" : "/", key);
+void JsonReader::fail_at(const std::string& pointer, const std::string& what) const {
+  throw std::runtime_error(fmt::format("{}: {}", at(pointer), what));
+}
+
+const Json& JsonReader::array() const {
+  if (!json_.is_array()) fail(fmt::format("an array is needed, not {}", quotable(json_)));
+  return json_;
+}
+
+std::string JsonReader::at(const std::string& pointer) const {
+  if (pointer.empty()) return where_;
+  return fmt::format("{}{}{}", where_, where_.find(": /") == std::string::npos ? ": " : "", pointer);
 }
 
 }  // namespace llmt

@@ -5,21 +5,17 @@
 #include <fmt/format.h>
 
 #include <Eigen/Core>
+#include <concepts>
 #include <cstdint>
-#include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <string>
 #include <type_traits>
 #include <utility>
 #include <vector>
 
+#include "model/json_parser.hpp"
+
 namespace llmt {
-
-using Json = nlohmann::ordered_json;
-
-/// The format of model files, as their members "format" and "version" say.
-inline constexpr const char* model_format_name = "llmt-model";
-inline constexpr int model_format_version = 2;
 
 /// A JSON value together with the way to it. All readers throw std::runtime_error that begins with the way, if a member
 /// is missing or a value has the wrong type or size.
@@ -32,18 +28,18 @@ class JsonReader {
   JsonReader member(const char* key) const;
   bool has(const char* key) const { return json_.is_object() && json_.contains(key); }
   std::vector<JsonReader> elements() const;
+  Eigen::Index size() const { return std::ssize(array()); }
 
   /// A number, whole number or text.
   template <class Value>
   Value as() const {
-    if (!fits<Value>()) fail(fmt::format("{} is needed, not {}", description<Value>(), json_.dump().substr(0, 40)));
-    if constexpr (std::is_integral_v<Value>) {
-      const std::int64_t value = json_.get<std::int64_t>();
-      if (!std::in_range<Value>(value)) fail(fmt::format("{} is out of range", value));
-      return static_cast<Value>(value);
-    } else {
-      return json_.get<Value>();
+    if (!fits<Value>(json_)) fail(fmt::format("{} is needed, not {}", description<Value>(), quotable(json_)));
+    if constexpr (std::integral<Value>) {
+      const bool in_range = json_.is_number_unsigned() ? std::in_range<Value>(json_.get<std::uint64_t>())
+                                                       : std::in_range<Value>(json_.get<std::int64_t>());
+      if (!in_range) fail(fmt::format("{} is out of range", quotable(json_)));
     }
+    return json_.get<Value>();
   }
 
   /// The value of a member, or `otherwise` if there is no such member.
@@ -55,8 +51,12 @@ class JsonReader {
   template <class Value>
   std::vector<Value> list() const {
     std::vector<Value> result;
-    for (const JsonReader& element : elements()) {
-      result.push_back(element.as<Value>());
+    for (const Json& element : array()) {
+      if (!std::integral<Value> && fits<Value>(element)) {
+        result.push_back(element.get<Value>());
+      } else {
+        result.push_back(JsonReader(element, child(std::to_string(result.size()))).as<Value>());
+      }
     }
     return result;
   }
@@ -66,27 +66,28 @@ class JsonReader {
   /// A matrix as an array of rows.
   Eigen::MatrixXd matrix(Eigen::Index rows, Eigen::Index columns) const;
 
-  /// Throws std::runtime_error with the way to this value before `what`.
-  [[noreturn]] void fail(const std::string& what) const {
-    throw std::runtime_error(fmt::format("{}: {}", where_, what));
-  }
+  /// Throws std::runtime_error with the way to this value before `what`. `pointer`: the way on from here, `/nodes/3`.
+  [[noreturn]] void fail(const std::string& what) const { fail_at("", what); }
+  [[noreturn]] void fail_at(const std::string& pointer, const std::string& what) const;
 
  private:
   template <class Value>
-  bool fits() const {
-    if constexpr (std::is_same_v<Value, std::string>) return json_.is_string();
-    if constexpr (std::is_integral_v<Value>) return json_.is_number_integer();
-    return json_.is_number();
+  static bool fits(const Json& json) {
+    if constexpr (std::same_as<Value, std::string>) return json.is_string();
+    if constexpr (std::integral<Value>) return json.is_number_integer();
+    return json.is_number();
   }
 
   template <class Value>
   static const char* description() {
-    if constexpr (std::is_same_v<Value, std::string>) return "a text";
-    if constexpr (std::is_integral_v<Value>) return "a whole number";
+    if constexpr (std::same_as<Value, std::string>) return "a text";
+    if constexpr (std::integral<Value>) return "a whole number";
     return "a number";
   }
 
-  std::string child(const std::string& key) const;
+  const Json& array() const;
+  std::string at(const std::string& pointer) const;
+  std::string child(const std::string& key) const { return at("/" + key); }
 
   const Json& json_;
   std::string where_;

@@ -49,6 +49,11 @@ LeafValidities::LeafValidities(const Partition& partition, const std::vector<Inp
     }
     branches_.push_back(branch);
   }
+  std::vector<Eigen::Index> depths(partition.nodes.size(), 0);
+  for (std::size_t i = 0; i < partition.nodes.size(); ++i) {  // parents stand before their children
+    depth_ = std::max(depth_, depths[i]);
+    if (const Node& node = partition.nodes[i]; !node.is_leaf()) depths[node.left] = depths[node.right] = depths[i] + 1;
+  }
   if (are_gaussian()) {
     add_gaussians(partition, inputs);
   }
@@ -78,7 +83,7 @@ void LeafValidities::add_gaussians(const Partition& partition, const std::vector
       const bool used = j < count && is_split[j];
       const double sigma = used ? partition.validity.width * (boxes.high(j, box) - boxes.low(j, box)) : 0.0;
       // An input that no split uses has the same factor in all Gaussians, which normalisation cancels.
-      gaussians_.per_sigma.push_back(sigma > 0.0 ? 1.0 / sigma : 0.0);
+      gaussians_.per_sigma.push_back(std::isfinite(1.0 / sigma) ? 1.0 / sigma : 0.0);
       gaussians_.centres.push_back(used ? 0.5 * (boxes.low(j, box) + boxes.high(j, box)) : 0.0);
     }
   }
@@ -129,23 +134,23 @@ void LeafValidities::activate(const double* row, std::vector<Activation>& active
   active.clear();
   if (are_gaussian()) {
     activate_gaussians(row, active);
-  } else {
-    descend(0, 1.0, row, active);
+    return;
   }
-}
-
-void LeafValidities::descend(int node, double validity, const double* row, std::vector<Activation>& active) const {
-  const Branch* branch = &branches_[node];
-  while (branch->left >= 0) {
-    const double left = left_share(*branch, side(*branch, row));
-    if (left > 0.0 && left < 1.0) {
-      descend(branch->left, validity * left, row, active);
-      validity *= 1.0 - left;
+  thread_local std::vector<Activation> waiting;  // right children, the leftmost last; kept for its memory
+  waiting.assign(1, {0, 1.0});
+  while (!waiting.empty()) {
+    auto [node, validity] = waiting.back();
+    waiting.pop_back();
+    for (const Branch* branch = &branches_[node]; branch->left >= 0; branch = &branches_[node]) {
+      const double left = left_share(*branch, side(*branch, row));
+      node = left <= 0.0 ? branch->right : branch->left;
+      if (left > 0.0 && left < 1.0) {
+        waiting.push_back({branch->right, validity * (1.0 - left)});
+        validity *= left;
+      }
     }
-    node = left < 1.0 ? branch->right : branch->left;
-    branch = &branches_[node];
+    active.push_back({node, validity});
   }
-  active.push_back({node, validity});
 }
 
 LLMT_FOR_EACH_INSTRUCTION_SET

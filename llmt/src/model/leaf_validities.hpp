@@ -57,6 +57,8 @@ class LeafValidities {
   int right(int node) const { return branches_[node].right; }
 
   Eigen::Index num_leaves() const { return std::ssize(branches_) / 2 + 1; }
+  /// Largest number of splits above a leaf.
+  Eigen::Index depth() const { return depth_; }
   bool are_gaussian() const { return kind_ == ValidityKind::gaussian; }
   /// Derivatives of the exponents of Gaussians by the inputs, inputs x `active`, the leaves that reach the row.
   Eigen::MatrixXd exponent_derivatives(const std::vector<Activation>& active, const double* row) const;
@@ -93,6 +95,10 @@ class LeafValidities {
     std::vector<int> rows;
     std::vector<double> validities;
   };
+  struct ForkCounts {
+    Eigen::Index left = 0;
+    Eigen::Index right = 0;
+  };
 
   double side(const Branch& branch, const double* row) const {
     return branch.first_term < 0 ? row[branch.input] : oblique_side(branch, row, 1);
@@ -108,9 +114,9 @@ class LeafValidities {
     return sum;
   }
   double left_share(const Branch& branch, double x) const;
-  void descend(int node, double validity, const double* row, std::vector<Activation>& active) const;
-  void descend(int node, Eigen::Index begin, Eigen::Index count, const RowBlock& block, Waiting& waiting,
-               const std::function<void(int node, const RowList& list)>& visit) const;
+  /// Sends the `count` rows of a node, which stand in `waiting` from `begin` on, to its children: those of the right
+  /// child stand there afterwards, those of the left child behind all.
+  ForkCounts fork(int node, Eigen::Index begin, Eigen::Index count, const RowBlock& block, Waiting& waiting) const;
   void add_gaussians(const Partition& partition, const std::vector<InputColumn>& inputs);
   /// Exponents of the Gaussians as validities, one of `active` each; returns the largest.
   double set_exponents(const double* row, Activation* active) const;
@@ -119,6 +125,7 @@ class LeafValidities {
   ValidityKind kind_;
   int smoothness_;
   std::vector<Branch> branches_;
+  Eigen::Index depth_ = 0;
   std::vector<double> level_share_;  // of the left child
   std::vector<Term> terms_;
   Gaussians gaussians_;

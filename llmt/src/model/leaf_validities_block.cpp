@@ -124,54 +124,62 @@ void LeafValidities::for_each_leaf(const RowBlock& block,
     waiting.rows[row] = static_cast<int>(row);
     waiting.validities[row] = 1.0;
   }
-  descend(0, 0, block.rows(), block, waiting, visit);
+  struct Open {
+    int node;
+    Eigen::Index begin;
+    Eigen::Index count;
+  };
+  std::vector<Open> open = {{0, 0, block.rows()}};  // right children that wait, the leftmost last
+  while (!open.empty()) {
+    auto [node, begin, count] = open.back();
+    open.pop_back();
+    while (count > 0 && left(node) >= 0) {
+      const ForkCounts counts = fork(node, begin, count, block, waiting);
+      open.push_back({right(node), begin, counts.right});
+      node = left(node);
+      begin += count;
+      count = counts.left;
+    }
+    if (count > 0) visit(node, {waiting.rows.data() + begin, waiting.validities.data() + begin, count});
+  }
 }
 
-void LeafValidities::descend(int node, Eigen::Index begin, Eigen::Index count, const RowBlock& block, Waiting& waiting,
-                             const std::function<void(int node, const RowList& list)>& visit) const {
-  while (count > 0 && left(node) >= 0) {
-    const Branch& branch = branches_[node];
-    const std::size_t needed = begin + 2 * count;
-    if (waiting.rows.size() < needed) {
-      waiting.rows.resize(2 * needed);
-      waiting.validities.resize(2 * needed);
+LeafValidities::ForkCounts LeafValidities::fork(int node, Eigen::Index begin, Eigen::Index count, const RowBlock& block,
+                                                Waiting& waiting) const {
+  const Branch& branch = branches_[node];
+  const std::size_t needed = begin + 2 * count;
+  if (waiting.rows.size() < needed) {
+    waiting.rows.resize(2 * needed);
+    waiting.validities.resize(2 * needed);
+  }
+  int* rows = waiting.rows.data() + begin;
+  double* validities = waiting.validities.data() + begin;
+  const Fork parts{rows, validities, count, rows + count, validities + count, rows, validities};
+  const double* column = block.inputs.col(branch.input).data();
+  Counts counts;
+  if (branch.first_term >= 0) {
+    const double* first = block.inputs.data();
+    const Eigen::Index stride = block.inputs.outerStride();
+    std::vector<double> sides(count);
+    for (Eigen::Index i = 0; i < count; ++i) {
+      sides[i] = oblique_side(branch, first + rows[i], stride);
     }
-    int* rows = waiting.rows.data() + begin;
-    double* validities = waiting.validities.data() + begin;
-    const Fork fork{rows, validities, count, rows + count, validities + count, rows, validities};
-    const double* column = block.inputs.col(branch.input).data();
-    Counts counts;
-    if (branch.first_term >= 0) {
-      const double* first = block.inputs.data();
-      const Eigen::Index stride = block.inputs.outerStride();
-      std::vector<double> sides(count);
-      for (Eigen::Index i = 0; i < count; ++i) {
-        sides[i] = oblique_side(branch, first + rows[i], stride);
-      }
-      if (kind_ == ValidityKind::logistic && branch.per_half_width != 0.0) {
-        counts = gate(fork, sides.data(), branch.threshold, branch.per_half_width);
-      } else {
-        hand_over(
-            fork, 0, count, [&](Eigen::Index i) { return left_share(branch, sides[i]); }, counts);
-      }
-    } else if (branch.first_level >= 0 || block.has_missing[branch.input]) {
-      hand_over(
-          fork, 0, count, [&](Eigen::Index i) { return left_share(branch, column[fork.rows[i]]); }, counts);
-    } else if (branch.per_half_width == 0.0) {
-      counts = jump(fork, column, branch.threshold);
-    } else if (kind_ == ValidityKind::logistic) {
-      hand_over(
-          fork, 0, count, [&](Eigen::Index i) { return left_share(branch, column[fork.rows[i]]); }, counts);
+    if (kind_ == ValidityKind::logistic && branch.per_half_width != 0.0) {
+      counts = gate(parts, sides.data(), branch.threshold, branch.per_half_width);
     } else {
-      counts = blend(fork, column, branch.threshold, branch.per_half_width, smoothness_);
+      hand_over(
+          parts, 0, count, [&](Eigen::Index i) { return left_share(branch, sides[i]); }, counts);
     }
-    descend(branch.left, begin + count, counts.left, block, waiting, visit);
-    node = branch.right;
-    count = counts.right;
+  } else if (branch.first_level >= 0 || block.has_missing[branch.input] ||
+             (kind_ == ValidityKind::logistic && branch.per_half_width != 0.0)) {
+    hand_over(
+        parts, 0, count, [&](Eigen::Index i) { return left_share(branch, column[rows[i]]); }, counts);
+  } else if (branch.per_half_width == 0.0) {
+    counts = jump(parts, column, branch.threshold);
+  } else {
+    counts = blend(parts, column, branch.threshold, branch.per_half_width, smoothness_);
   }
-  if (count > 0) {
-    visit(node, {waiting.rows.data() + begin, waiting.validities.data() + begin, count});
-  }
+  return {counts.left, counts.right};
 }
 
 }  // namespace llmt

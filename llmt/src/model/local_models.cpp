@@ -113,7 +113,9 @@ LLMT_INLINE double LocalModels::guarded(int node, Eigen::Index output, const Row
     Quad held = missing ? load_quad(mean(node) + k) : hold(d, load_quad(low(node) + k), load_quad(high(node) + k));
     sum += load_quad(slopes(node, output) + k) * held;
     QuadMask outside = ~missing & (held != d);
-    for (int at = parents_[node]; at >= 0 && any_of(outside); at = parents_[at]) {
+    int left = most_ancestors;
+    for (int at = next_ancestor(parents_, node, left); at >= 0 && any_of(outside);
+         at = next_ancestor(parents_, at, left)) {
       const Quad reached = outside ? hold(d, load_quad(low(at) + k), load_quad(high(at) + k)) : held;
       sum += load_quad(slopes(at, output) + k) * (reached - held);
       held = reached;

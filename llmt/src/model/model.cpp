@@ -15,47 +15,54 @@ namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-// Nodes of the leaves from left to right, with their boxes.
-void collect_leaves(const Partition& partition, int index, Leaf box, const std::vector<InputColumn>& inputs,
-                    const std::vector<Regressor>& regressors, std::vector<Leaf>& leaves) {
-  const Node& node = partition.nodes[index];
-  if (!node.is_leaf()) {
-    Leaf right = box;
-    if (node.is_oblique()) {
-      box.sides.push_back({index, true});
-      right.sides.push_back({index, false});
-    } else if (node.level_side.empty()) {
-      box.high(node.split_input) = std::min(box.high(node.split_input), node.threshold);
-      right.low(node.split_input) = std::max(right.low(node.split_input), node.threshold);
-    } else {
-      const std::size_t input = node.split_input;
-      std::vector<int> all = box.levels[input];
-      if (all.empty()) {
-        for (int level = 0; level < std::ssize(node.level_side); ++level) {
-          all.push_back(level);
-        }
+// Levels and sides that the boxes of all leaves may list: some 400 MB. In a chain of oblique splits the leaves have as
+// many sides as the square of their number.
+constexpr std::size_t most_listed = 100'000'000;
+
+// Cuts the box of a node in two: `box` becomes that of the left child, and that of the right one is returned.
+Leaf cut(const Node& node, int index, Leaf& box) {
+  Leaf right = box;
+  if (node.is_oblique()) {
+    box.sides.push_back({index, true});
+    right.sides.push_back({index, false});
+  } else if (node.level_side.empty()) {
+    box.high(node.split_input) = std::min(box.high(node.split_input), node.threshold);
+    right.low(node.split_input) = std::max(right.low(node.split_input), node.threshold);
+  } else {
+    const std::size_t input = node.split_input;
+    std::vector<int> all = box.levels[input];
+    if (all.empty()) {
+      for (int level = 0; level < std::ssize(node.level_side); ++level) {
+        all.push_back(level);
       }
-      const auto keep = [&](std::vector<int>& kept, int side) {
-        kept.clear();
-        std::ranges::copy_if(all, std::back_inserter(kept), [&](int level) { return node.level_side[level] == side; });
-      };
-      keep(box.levels[input], -1);
-      keep(right.levels[input], 1);
     }
-    collect_leaves(partition, node.left, std::move(box), inputs, regressors, leaves);
-    collect_leaves(partition, node.right, std::move(right), inputs, regressors, leaves);
-    return;
+    const auto keep = [&](std::vector<int>& kept, int side) {
+      kept.clear();
+      std::ranges::copy_if(all, std::back_inserter(kept), [&](int level) { return node.level_side[level] == side; });
+    };
+    keep(box.levels[input], -1);
+    keep(right.levels[input], 1);
   }
-  box.node = index;
-  box.samples = node.samples;
-  box.rank = node.rank;
-  box.rmse = (node.rss / static_cast<double>(std::max<Eigen::Index>(node.samples, 1))).cwiseSqrt();
-  box.slope = node.slope;
-  box.intercept = node.value;
+  return right;
+}
+
+void describe(const Node& node, const std::vector<Regressor>& regressors, Leaf& leaf) {
+  leaf.samples = node.samples;
+  leaf.rank = node.rank;
+  leaf.rmse = (node.rss / static_cast<double>(std::max<Eigen::Index>(node.samples, 1))).cwiseSqrt();
+  leaf.slope = node.slope;
+  leaf.intercept = node.value;
   for (std::size_t k = 0; k < regressors.size(); ++k) {
-    box.intercept -= node.slope.col(k) * regressors[k].centre;
+    leaf.intercept -= node.slope.col(k) * regressors[k].centre;
   }
-  leaves.push_back(std::move(box));
+}
+
+std::size_t listed(const Leaf& leaf) {
+  std::size_t count = leaf.sides.size();
+  for (const std::vector<int>& levels : leaf.levels) {
+    count += levels.size();
+  }
+  return count;
 }
 
 }  // namespace
@@ -83,8 +90,27 @@ std::vector<Leaf> Model::leaves(Eigen::Index partition) const {
   everywhere.low = Eigen::VectorXd::Constant(num_inputs(), -infinity);
   everywhere.high = Eigen::VectorXd::Constant(num_inputs(), infinity);
   everywhere.levels.resize(inputs_.size());
+  const std::vector<Node>& nodes = partitions_[partition].nodes;
   std::vector<Leaf> result;
-  collect_leaves(partitions_[partition], 0, everywhere, inputs_, regressors_, result);
+  std::vector<Leaf> waiting = {std::move(everywhere)};  // boxes of nodes, the leftmost last
+  for (std::size_t count = 0; !waiting.empty();) {
+    Leaf box = std::move(waiting.back());
+    waiting.pop_back();
+    while (!nodes[box.node].is_leaf()) {
+      const Node& node = nodes[box.node];
+      Leaf right = cut(node, box.node, box);
+      right.node = node.right;
+      box.node = node.left;
+      count += listed(right);
+      if (count > most_listed) {
+        throw std::runtime_error(
+            fmt::format("llmt::Model::leaves: the boxes of partition {} are too many to be listed", partition));
+      }
+      waiting.push_back(std::move(right));
+    }
+    describe(nodes[box.node], regressors_, box);
+    result.push_back(std::move(box));
+  }
   return result;
 }
 
@@ -135,6 +161,7 @@ Model Model::named(const std::vector<std::string>& inputs, const std::vector<std
   for (std::size_t o = 0; o < outputs.size(); ++o) {
     result.outputs_[o].name = outputs[o];
   }
+  check_names(result.inputs_, result.outputs_);
   return result;
 }
 

@@ -4,7 +4,8 @@
 
 #include "llmt/files.hpp"
 #include "llmt/model.hpp"
-#include "model/json_reader.hpp"
+#include "model/model_checks.hpp"
+#include "model/model_json.hpp"
 #include "model/shared_leaves.hpp"
 
 namespace llmt {
@@ -58,7 +59,8 @@ Validity validity_from_json(const JsonReader& json) {
   const std::string kind = json.member("kind").as<std::string>();
   const auto found = std::ranges::find(choices<ValidityKind>(), kind, &Choice<ValidityKind>::name);
   if (found == choices<ValidityKind>().end()) {
-    json.member("kind").fail(fmt::format("\"{}\" is not known: crisp, blend, gaussian and logistic are", kind));
+    json.member("kind").fail(
+        fmt::format("\"{}\" is not known: crisp, blend, gaussian and logistic are", quotable(kind)));
   }
   return {.kind = found->value,
           .width = json.member("width").as<double>(),
@@ -132,14 +134,7 @@ auto all_of(const JsonReader& array, const Read& read) {
 
 }  // namespace
 
-Model from_json(const std::string& text, const std::string& name) {
-  Json json;
-  try {
-    json = Json::parse(text);
-  } catch (const Json::parse_error& error) {
-    throw std::runtime_error(fmt::format("{}: not JSON, or cut off: {}", name, error.what()));
-  }
-  const JsonReader root(json, name);
+Model model_from(const JsonReader& root) {
   check_format(root);
   std::vector<InputColumn> inputs = all_of(root.member("inputs"), input_from_json);
   std::vector<OutputColumn> outputs = all_of(root.member("outputs"), output_from_json);
@@ -149,9 +144,14 @@ Model from_json(const std::string& text, const std::string& name) {
   });
   try {
     return {std::move(inputs), std::move(outputs), std::move(regressors), std::move(partitions)};
-  } catch (const std::invalid_argument& error) {
-    throw std::runtime_error(fmt::format("{}: {}", name, error.what()));
+  } catch (const ModelFault& fault) {
+    root.fail_at(fault.pointer(), fault.problem());
   }
+}
+
+Model from_json(const std::string& text, const std::string& name) {
+  const Json json = parse_json(text, name);
+  return model_from({json, name});
 }
 
 Model load(const std::string& path) { return from_json(read_file(path), path); }

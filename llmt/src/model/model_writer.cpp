@@ -3,7 +3,7 @@
 
 #include "llmt/files.hpp"
 #include "llmt/model.hpp"
-#include "model/json_reader.hpp"
+#include "model/model_json.hpp"
 
 namespace llmt {
 namespace {
@@ -92,7 +92,7 @@ Json to_json(const Partition& partition, const Model& model) {
 
 }  // namespace
 
-std::string to_json(const Model& model) {
+Json json_of(const Model& model) {
   Json json;
   json["format"] = model_format_name;
   json["version"] = model_format_version;
@@ -112,12 +112,18 @@ std::string to_json(const Model& model) {
   for (const Partition& partition : model.partitions()) {
     json["partitions"].push_back(to_json(partition, model));
   }
+  return json;
+}
+
+std::string model_text(const Json& json) {
   try {
     return json.dump(1) + "\n";
   } catch (const Json::type_error&) {
     throw std::runtime_error("llmt::to_json: a column name is not valid UTF-8");
   }
 }
+
+std::string to_json(const Model& model) { return model_text(json_of(model)); }
 
 void save(const Model& model, const std::string& path) { write_file(path, to_json(model)); }
 

@@ -25,11 +25,21 @@ void check_columns_of_query(const char* function, const Model& model, const Inpu
   }
 }
 
+// Splits above the deepest leaf.
+Eigen::Index depth_of(const std::vector<Evaluator>& evaluators) {
+  Eigen::Index depth = 0;
+  for (const Evaluator& evaluator : evaluators) {
+    depth = std::max(depth, evaluator.validities().depth());
+  }
+  return depth;
+}
+
 // Calls body(begin, block) for the rows in blocks, which begin at the row `begin`.
 template <class Body>
-void for_each_block(const char* function, const Model& model, const Inputs& inputs, int max_threads, const Body& body) {
+void for_each_block(const char* function, const Model& model, Eigen::Index depth, const Inputs& inputs, int max_threads,
+                    const Body& body) {
   check_columns_of_query(function, model, inputs);
-  const Eigen::Index size = rows_of_block(model.num_inputs(), std::ssize(model.regressors()));
+  const Eigen::Index size = rows_of_block(model.num_inputs(), std::ssize(model.regressors()), depth);
   parallel_for((inputs.rows() + size - 1) / size, max_threads, [&](Eigen::Index index) {
     const Eigen::Index begin = index * size;
     const RowBlock block = make_row_block(inputs.middleRows(begin, std::min(size, inputs.rows() - begin)),
@@ -76,19 +86,20 @@ Eigen::MatrixXd Model::predict(const Inputs& inputs, int max_threads) const {
     }
     return predicted;
   }
-  for_each_block(function, *this, inputs, max_threads, [&](Eigen::Index begin, const RowBlock& block) {
-    std::vector<double> values;
-    for (std::size_t p = 0; p < partitions_.size(); ++p) {
-      (*evaluators_)[p].predict(block, values);
-      const std::size_t outputs = partitions_[p].outputs.size();
-      for (std::size_t o = 0; o < outputs; ++o) {
-        double* column = predicted.col(partitions_[p].outputs[o]).data() + begin;
-        for (std::size_t row = 0; row < static_cast<std::size_t>(block.rows()); ++row) {
-          column[row] = values[row * outputs + o];
-        }
-      }
-    }
-  });
+  for_each_block(function, *this, depth_of(*evaluators_), inputs, max_threads,
+                 [&](Eigen::Index begin, const RowBlock& block) {
+                   std::vector<double> values;
+                   for (std::size_t p = 0; p < partitions_.size(); ++p) {
+                     (*evaluators_)[p].predict(block, values);
+                     const std::size_t outputs = partitions_[p].outputs.size();
+                     for (std::size_t o = 0; o < outputs; ++o) {
+                       double* column = predicted.col(partitions_[p].outputs[o]).data() + begin;
+                       for (std::size_t row = 0; row < static_cast<std::size_t>(block.rows()); ++row) {
+                         column[row] = values[row * outputs + o];
+                       }
+                     }
+                   }
+                 });
   return predicted;
 }
 
@@ -115,13 +126,14 @@ Eigen::MatrixXd Model::validities(const Inputs& inputs, Eigen::Index partition, 
   const std::vector<int> position = leaf_positions(partitions_[partition], table);
   const LeafValidities& validities = (*evaluators_)[partition].validities();
   Eigen::MatrixXd result = Eigen::MatrixXd::Zero(inputs.rows(), std::ssize(table));
-  for_each_block("llmt::Model::validities", *this, inputs, max_threads, [&](Eigen::Index begin, const RowBlock& block) {
-    validities.for_each_leaf(block, [&](int node, const RowList& list) {
-      for (Eigen::Index i = 0; i < list.count; ++i) {
-        result(begin + list.rows[i], position[node]) = list.validities[i];
-      }
-    });
-  });
+  for_each_block("llmt::Model::validities", *this, depth_of(*evaluators_), inputs, max_threads,
+                 [&](Eigen::Index begin, const RowBlock& block) {
+                   validities.for_each_leaf(block, [&](int node, const RowList& list) {
+                     for (Eigen::Index i = 0; i < list.count; ++i) {
+                       result(begin + list.rows[i], position[node]) = list.validities[i];
+                     }
+                   });
+                 });
   return result;
 }
 
@@ -131,19 +143,20 @@ Eigen::MatrixXi Model::leaf_of(const Inputs& inputs, int max_threads) const {
     positions.push_back(leaf_positions(partitions_[p], leaves(p)));
   }
   Eigen::MatrixXi result(inputs.rows(), std::ssize(partitions_));
-  for_each_block("llmt::Model::leaf_of", *this, inputs, max_threads, [&](Eigen::Index begin, const RowBlock& block) {
-    for (std::size_t p = 0; p < partitions_.size(); ++p) {
-      Eigen::VectorXd largest = Eigen::VectorXd::Zero(block.rows());
-      (*evaluators_)[p].validities().for_each_leaf(block, [&](int node, const RowList& list) {
-        for (Eigen::Index i = 0; i < list.count; ++i) {
-          if (list.validities[i] > largest(list.rows[i])) {
-            largest(list.rows[i]) = list.validities[i];
-            result(begin + list.rows[i], p) = positions[p][node];
-          }
-        }
-      });
-    }
-  });
+  for_each_block("llmt::Model::leaf_of", *this, depth_of(*evaluators_), inputs, max_threads,
+                 [&](Eigen::Index begin, const RowBlock& block) {
+                   for (std::size_t p = 0; p < partitions_.size(); ++p) {
+                     Eigen::VectorXd largest = Eigen::VectorXd::Zero(block.rows());
+                     (*evaluators_)[p].validities().for_each_leaf(block, [&](int node, const RowList& list) {
+                       for (Eigen::Index i = 0; i < list.count; ++i) {
+                         if (list.validities[i] > largest(list.rows[i])) {
+                           largest(list.rows[i]) = list.validities[i];
+                           result(begin + list.rows[i], p) = positions[p][node];
+                         }
+                       }
+                     });
+                   }
+                 });
   return result;
 }
 
@@ -176,7 +189,7 @@ std::vector<Extrapolation> Model::extrapolation(const Inputs& inputs, int max_th
       }
     }
   };
-  for_each_block("llmt::Model::extrapolation", *this, inputs, max_threads, body);
+  for_each_block("llmt::Model::extrapolation", *this, depth_of(*evaluators_), inputs, max_threads, body);
   return result;
 }
 
@@ -214,7 +227,7 @@ Eigen::MatrixXd Model::standard_errors(const Inputs& inputs, int max_threads) co
       });
     }
   };
-  for_each_block("llmt::Model::standard_errors", *this, inputs, max_threads, body);
+  for_each_block("llmt::Model::standard_errors", *this, depth_of(*evaluators_), inputs, max_threads, body);
   return variance.cwiseSqrt();
 }
 

@@ -61,9 +61,11 @@ void set_deviations(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const std::
 
 }  // namespace
 
-Eigen::Index rows_of_block(Eigen::Index inputs, Eigen::Index regressors) {
+Eigen::Index rows_of_block(Eigen::Index inputs, Eigen::Index regressors, Eigen::Index depth) {
   constexpr Eigen::Index cached = 49152;  // doubles
-  return std::clamp<Eigen::Index>(cached / (inputs + padded_to_quads(regressors)), 256, 4096);
+  constexpr Eigen::Index most_waiting = 1 << 20;
+  return std::min(std::clamp<Eigen::Index>(cached / (inputs + padded_to_quads(regressors)), 256, 4096),
+                  std::max<Eigen::Index>(most_waiting / (depth + 1), 1));
 }
 
 RowBlock make_row_block(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const std::vector<InputColumn>& columns,

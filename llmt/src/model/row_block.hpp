@@ -22,8 +22,9 @@ struct RowBlock {
   Eigen::Index rows() const { return inputs.rows(); }
 };
 
-/// How many rows make a block: what it holds stays in a cache of the second level.
-Eigen::Index rows_of_block(Eigen::Index inputs, Eigen::Index regressors);
+/// How many rows make a block: what it holds stays in a cache of the second level. `depth`: of the deepest tree; every
+/// split above a leaf may hold a list of the block's rows that wait.
+Eigen::Index rows_of_block(Eigen::Index inputs, Eigen::Index regressors, Eigen::Index depth);
 
 /// Lays out rows of a model's inputs, which must outlive the block.
 RowBlock make_row_block(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const std::vector<InputColumn>& columns,

@@ -18,6 +18,18 @@ std::vector<int> parents_of(const Partition& partition);
 /// The node whose slopes take over beyond the range of each node, -1 for the root: see Node::guard_parent.
 std::vector<int> guard_parents_of(const Partition& partition);
 
+/// The guard of a leaf asks this many ancestors, and then the root: a bound on the time that a leaf takes in a tree of
+/// any depth (docs/algorithms/guards.md, B.2).
+inline constexpr int most_ancestors = 64;
+
+/// The ancestor that the guard asks after `at`, -1 after the root. `left`: how many may be asked before the root is;
+/// most_ancestors at the leaf.
+inline int next_ancestor(const std::vector<int>& parents, int at, int& left) {
+  const int parent = parents[at];
+  if (parent <= 0) return parent;
+  return --left < 0 ? 0 : parent;
+}
+
 /// Boxes of all nodes, inputs x nodes each, cut out of low ... high by the axis-orthogonal splits on numbers.
 struct Boxes {
   Eigen::MatrixXd low;

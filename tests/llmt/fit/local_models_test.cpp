@@ -239,7 +239,7 @@ TEST(LocalModels, MistakesAreNamed) {
   std::vector<llmt::Regressor> regressors = model.regressors();
   regressors.back().second_input = 2;
   EXPECT_EQ(message_of([&] { llmt::Model(model.inputs(), model.outputs(), regressors, model.partitions()); }),
-            "llmt::Model: regressor of inputs 1 and 2: a product is of two numeric inputs, the second not below the "
+            "llmt::Model: regressor 4: inputs 1 and 2: a product is of two numeric inputs, the second not below the "
             "first");
 }
 

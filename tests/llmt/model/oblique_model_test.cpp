@@ -24,7 +24,7 @@ llmt::FitOptions hilomot(Eigen::Index leaves) {
   return options;
 }
 
-// 0 where direction . x <= 0, else `right` + slope . x; inputs from -1 to 1. Half width 0: crisp.
+// 0 where direction . x <= 0, else `right` + slope . x; inputs from -9 to 9. Half width 0: crisp.
 llmt::Model two_leaves(const Eigen::VectorXd& direction, double right, double half_width = 0.0,
                        const Eigen::VectorXd& slope = {}) {
   const auto node = [&](double value) {
@@ -53,7 +53,7 @@ llmt::Model two_leaves(const Eigen::VectorXd& direction, double right, double ha
   std::vector<llmt::InputColumn> inputs;
   std::vector<llmt::Regressor> regressors;
   for (int j = 0; j < direction.size(); ++j) {
-    inputs.push_back({.name = "x" + std::to_string(j), .low = -1.0, .high = 1.0});
+    inputs.push_back({.name = "x" + std::to_string(j), .low = -9.0, .high = 9.0});
     regressors.push_back({.input = j});
   }
   return {inputs, {{.name = "y", .low = 0.0, .high = 1.0}}, regressors, {partition}};

@@ -1,0 +1,28 @@
+/// \file
+/// JSON from text of any origin.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+
+namespace llmt {
+
+using Json = nlohmann::ordered_json;
+
+/// What a JSON text may have. Model files have less than 12 levels and less than 15 members.
+inline constexpr std::size_t most_json_levels = 32;
+inline constexpr std::size_t most_json_members = 100;  ///< of one object
+
+/// Parses a text. Throws std::runtime_error that begins with `name` and the JSON pointer to the place, for what is not
+/// JSON, nests deeper than most_json_levels, has an object with more members than most_json_members or one member
+/// twice, or a number beyond the range of a double. No value of the result is nested deeper than most_json_levels, so
+/// that functions that call themselves for every level are safe.
+Json parse_json(const std::string& text, const std::string& name);
+
+/// A text of a file as messages quote it: at most 40 bytes, and a question mark for what is no printable ASCII.
+std::string quotable(const std::string& text);
+
+/// A value as messages quote it, however large it is: a scalar as it is written, else "an object" or "an array".
+std::string quotable(const Json& value);
+
+}  // namespace llmt
