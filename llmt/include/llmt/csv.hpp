@@ -119,7 +119,7 @@ class Csv {
   bool more_follows_ = false;
 
   friend class CsvPieces;
-  void read_header();
+  void read_header(std::size_t begin);  // `begin`: after a byte-order mark
   void find_rows();
   std::string_view record_text(std::size_t begin) const;
   Eigen::Index line_at(std::size_t offset) const;
@@ -141,6 +141,7 @@ class CsvPieces {
   std::string name_;
   std::size_t bytes_;
   std::string pending_;     // what has been read and not yet handed out
+  bool begun_ = false;      // a record has been read
   std::string header_;      // once it is known, with a line break
   Eigen::Index lines_ = 0;  // handed out, those of the header included
 };

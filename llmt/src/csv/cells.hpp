@@ -9,6 +9,9 @@
 
 namespace llmt::csv {
 
+/// Length of the byte-order mark that a text begins with, 0 if there is none.
+inline std::size_t byte_order_mark(std::string_view text) { return text.starts_with("\xEF\xBB\xBF") ? 3 : 0; }
+
 /// End of the field that begins at `begin`: its separator or line break, outside quotes, or `end`.
 inline const char* field_end(const char* begin, const char* end, char separator) {
   bool quoted = false;

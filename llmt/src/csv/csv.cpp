@@ -12,8 +12,6 @@
 namespace llmt {
 namespace {
 
-constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
-
 std::string_view between(const char* begin, const char* end) { return {begin, static_cast<std::size_t>(end - begin)}; }
 
 // The first of these that the header has, outside quotes or inside.
@@ -32,13 +30,13 @@ Csv Csv::parse(std::string text, std::string name) {
   Csv csv;
   csv.name_ = std::move(name);
   csv.text_ = std::move(text);
-  csv.read_header();
+  csv.read_header(csv::byte_order_mark(csv.text_));
   csv.find_rows();
   return csv;
 }
 
-void Csv::read_header() {
-  header_begin_ = text_.starts_with(byte_order_mark) ? byte_order_mark.size() : 0;
+void Csv::read_header(std::size_t begin) {
+  header_begin_ = begin;
   while (header_begin_ < text_.size() && csv::is_blank(record_text(header_begin_))) {
     header_begin_ = text_.find('\n', header_begin_);
     header_begin_ = header_begin_ == std::string::npos ? text_.size() : header_begin_ + 1;

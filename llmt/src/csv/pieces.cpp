@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <istream>
 #include <stdexcept>
+#include <utility>
 
 #include "csv/cells.hpp"
 #include "llmt/csv.hpp"
@@ -46,6 +47,11 @@ std::optional<Csv> CsvPieces::next() {
       if (input_.bad()) throw std::runtime_error(fmt::format("{}: cannot be read", name_));
       whole = input_ ? whole_records(pending_) : pending_.size();
     }
+    if (!std::exchange(begun_, true)) {
+      const std::size_t mark = csv::byte_order_mark(pending_);
+      pending_.erase(0, mark);
+      whole -= mark;
+    }
     const bool last = !input_;
     const std::string rows = pending_.substr(0, whole);
     pending_.erase(0, whole);
@@ -60,7 +66,7 @@ std::optional<Csv> CsvPieces::next() {
     csv.text_ = header_ + rows;
     csv.lines_left_out_ = lines_ - std::ranges::count(header_, '\n');
     lines_ += std::ranges::count(rows, '\n');
-    csv.read_header();
+    csv.read_header(0);
     csv.find_rows();
     if (header_.empty()) {
       header_ = std::string(csv.header_text()) + '\n';

@@ -55,6 +55,19 @@ TEST(CsvPieces, TogetherAreTheWholeTable) {
   }
 }
 
+TEST(CsvPieces, ByteOrderMarkCountsAtTheVeryBeginningAlone) {
+  const std::string mark = "\xEF\xBB\xBF";
+  const std::string table = "a,b\n1,x\n2,y\n";
+  for (std::size_t bytes = 1; bytes < 30; ++bytes) {
+    EXPECT_EQ(all_cells(mark + "\n \r\n" + table, bytes), whole(mark + "\n \r\n" + table)) << bytes;
+    // Elsewhere it is part of the first name.
+    EXPECT_EQ(all_cells("\n" + mark + table, bytes), whole("\n" + mark + table)) << bytes;
+    EXPECT_EQ(all_cells(mark, bytes), whole(mark)) << bytes;
+    EXPECT_EQ(all_cells(mark + mark + table, bytes), whole(mark + mark + table)) << bytes;
+  }
+  EXPECT_EQ(whole(mark + "\n" + table), "3:1|x\n4:2|y\n");
+}
+
 TEST(CsvPieces, ErrorsHaveTheLinesOfTheWholeText) {
   // Pieces before the error have been handed out.
   const std::string rows = "a;b\n1;x\n2;\"y\ny\"\n\n3;z\n";
