@@ -2,15 +2,16 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <muParser.h>
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <memory>
 #include <numbers>
 #include <sstream>
 #include <stdexcept>
 
+#include "expressions/expression.hpp"
 #include "llmt/files.hpp"
 
 namespace llmt::apps {
@@ -27,54 +28,56 @@ std::string trimmed(const std::string& text) {
   return begin == std::string::npos ? "" : text.substr(begin, text.find_last_not_of(" \t\r") - begin + 1);
 }
 
-// An expression with the variables it reads; the parser holds pointers into them.
-struct Expression {
-  std::vector<double> variables;  // inputs, then the simulated output
-  mu::Parser parser;
+// What an expression may name.
+std::vector<std::string> words_of(const discovery::Inputs& inputs, const std::string& output) {
+  std::vector<std::string> words;
+  std::ranges::copy_if(inputs.names, std::back_inserter(words), is_word);
+  if (is_word(output) && std::ranges::find(words, output) == words.end()) words.push_back(output);
+  return words;
+}
+
+// An expression and where its variables stand: the number of an input, or the number of inputs for the simulated
+// output.
+struct Compiled {
+  Expression expression;
+  std::vector<std::size_t> places = {};
+  std::vector<double> variables = {};
 };
 
-std::shared_ptr<Expression> compiled(const std::string& text, const discovery::Inputs& inputs,
-                                     const std::string& output) {
-  auto expression = std::make_shared<Expression>();
-  expression->variables.resize(inputs.names.size() + 1);
-  std::vector<std::string> known;
-  const auto define = [&](const std::string& name, std::size_t place) {
-    if (!is_word(name)) return;
-    expression->parser.DefineVar(name, &expression->variables[place]);
-    known.push_back(name);
-  };
-  for (std::size_t j = 0; j < inputs.names.size(); ++j) define(inputs.names[j], j);
-  if (std::ranges::find(known, output) == known.end()) define(output, inputs.names.size());
-  if (std::ranges::find(known, "pi") == known.end()) expression->parser.DefineConst("pi", std::numbers::pi);
-  expression->parser.SetExpr(text);
-  for (const auto& [name, value] : expression->parser.GetUsedVar()) {
+std::shared_ptr<Compiled> compiled(const std::string& text, const discovery::Inputs& inputs,
+                                   const std::string& output) {
+  const std::vector<std::string> known = words_of(inputs, output);
+  std::map<std::string, double> constants;
+  if (std::ranges::find(known, "pi") == known.end()) constants["pi"] = std::numbers::pi;
+  auto result = std::make_shared<Compiled>(Expression(text, constants));
+  for (const std::string& name : result->expression.names()) {
     if (std::ranges::find(known, name) == known.end()) {
-      throw std::runtime_error(fmt::format("\"{}\" is not an input; there are {}", name, fmt::join(known, ", ")));
+      throw ExpressionError(fmt::format("\"{}\" is not an input; there are {}", name, fmt::join(known, ", ")));
     }
+    result->places.push_back(std::ranges::find(inputs.names, name) - inputs.names.begin());
   }
-  expression->parser.Eval();
-  return expression;
+  result->variables.resize(result->places.size());
+  return result;
 }
 
 discovery::ModelTerm term_of(const std::string& name, const std::string& text, const discovery::Inputs& inputs,
                              const std::string& output) {
-  const std::shared_ptr<Expression> expression = compiled(text, inputs, output);
+  const std::shared_ptr<Compiled> term_code = compiled(text, inputs, output);
   discovery::ModelTerm term;
   term.family = name;
   term.formula = text;
-  for (const auto& [used, value] : expression->parser.GetUsedVar()) {
+  for (const std::string& used : term_code->expression.names()) {
     if (used != output || output.empty()) term.inputs.push_back(used);
   }
   term.coefficients = {"coefficient"};
   term.per = "(" + text + ")";
-  term.columns = [expression](const discovery::Rows& rows, const Eigen::VectorXd&) {
+  term.columns = [term_code](const discovery::Rows& rows, const Eigen::VectorXd&) {
     Eigen::MatrixXd column(rows.inputs.rows(), 1);
     for (Eigen::Index i = 0; i < column.rows(); ++i) {
-      for (Eigen::Index j = 0; j < rows.inputs.cols(); ++j) {
-        expression->variables[j] = rows.inputs(i, j);
-      }
-      expression->variables.back() = rows.simulated(i);
-      column(i, 0) = expression->parser.Eval();
+      std::ranges::transform(term_code->places, term_code->variables.begin(), [&](Eigen::Index place) {
+        return place < rows.inputs.cols() ? rows.inputs(i, place) : rows.simulated(i);
+      });
+      column(i, 0) = term_code->expression.value(term_code->variables);
     }
     return column;
   };
@@ -86,12 +89,19 @@ discovery::ModelTerm term_of(const std::string& name, const std::string& text, c
 std::vector<discovery::ModelTerm> read_terms(const std::string& path, const discovery::Inputs& inputs,
                                              const std::string& output, const discovery::Rows& rows,
                                              const std::vector<std::string>& taken) {
+  return parse_terms(read_file(path, description_limit), path, inputs, output, rows, taken);
+}
+
+std::vector<discovery::ModelTerm> parse_terms(const std::string& text, const std::string& file,
+                                              const discovery::Inputs& inputs, const std::string& output,
+                                              const discovery::Rows& rows, const std::vector<std::string>& taken) {
+  constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
   std::vector<discovery::ModelTerm> terms;
-  std::istringstream text(read_file(path, description_limit));
+  std::istringstream lines(text.substr(text.starts_with(byte_order_mark) ? byte_order_mark.size() : 0));
   std::string line;
-  for (int number = 1; std::getline(text, line); ++number) {
+  for (int number = 1; std::getline(lines, line); ++number) {
     const auto refuse = [&](const std::string& reason) {
-      throw std::runtime_error(fmt::format("{}:{}: {}", path, number, reason));
+      throw std::runtime_error(fmt::format("{}:{}: {}", file, number, reason));
     };
     line = trimmed(line.substr(0, line.find('#')));
     if (line.empty()) continue;
@@ -108,9 +118,7 @@ std::vector<discovery::ModelTerm> read_terms(const std::string& path, const disc
     if (expression.empty()) refuse(fmt::format("{}: no expression after =", name));
     try {
       terms.push_back(term_of(name, expression, inputs, output));
-    } catch (const mu::Parser::exception_type& error) {
-      refuse(fmt::format("{}: column {} of \"{}\": {}", name, error.GetPos() + 1, expression, error.GetMsg()));
-    } catch (const std::runtime_error& error) {
+    } catch (const ExpressionError& error) {
       refuse(fmt::format("{}: {}", name, error.what()));
     }
     const Eigen::MatrixXd values = terms.back().columns(rows, {});

@@ -217,7 +217,9 @@ void calibrate_command(CalibrateArguments arguments) {
   std::optional<robotics::Measurements> test;
   if (!arguments.test.empty()) {
     test = robotics::read_measurements(arguments.test, nominal);
+    check_positions(arguments.robot, nominal, test->poses);
   }
+  check_positions(arguments.robot, nominal, measurements.poses);
   arguments.options.kind = arguments.contiguous ? FoldKind::contiguous : FoldKind::random;
   Progress progress("calibrating");
   arguments.options.progress = [&](Eigen::Index done, Eigen::Index total) { progress.show(done, total); };

@@ -3,8 +3,14 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <string>
+
+#include "llmt/robotics/robot.hpp"
 
 namespace llmt::apps {
+
+/// Throws std::runtime_error, with the name of the robot's file, if a tool position at these poses makes no sense.
+void check_positions(const std::string& file, const robotics::Robot& robot, const robotics::Poses& poses);
 
 void add_paper(CLI::App& app);
 void add_simulate(CLI::App& app);

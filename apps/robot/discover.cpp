@@ -116,6 +116,8 @@ void discover_command(DiscoverArguments arguments) {
   const robotics::Measurements data = robotics::read_measurements(arguments.data, robot, also);
   std::optional<robotics::Measurements> test;
   if (!arguments.test.empty()) test = robotics::read_measurements(arguments.test, robot, also);
+  check_positions(arguments.robot, robot, data.poses);
+  if (test) check_positions(arguments.robot, robot, test->poses);
   for (const std::string& warning : data.warnings) warn(warning);
   Progress progress("discover");
   Eigen::Index step = 0;

@@ -1,5 +1,12 @@
+#include <stdexcept>
+
 #include "robot/commands.hpp"
 #include "shared/cli.hpp"
+
+void llmt::apps::check_positions(const std::string& file, const robotics::Robot& robot, const robotics::Poses& poses) {
+  const std::string reason = robotics::position_refusal(robot, poses);
+  if (!reason.empty()) throw std::runtime_error(file + ": " + reason);
+}
 
 int main(int argc, char** argv) {
   CLI::App app{"Calibrate a robot from measured positions, learn what its model misses, and remove it.", "llmt-robot"};

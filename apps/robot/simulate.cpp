@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <memory>
+#include <optional>
 #include <stdexcept>
 
 #include "llmt/files.hpp"
@@ -25,13 +26,20 @@ struct SimulateArguments {
   robotics::SimulationOptions options;
 };
 
+robotics::Measurements simulated(const robotics::Robot& robot, const SimulateArguments& arguments) {
+  std::optional<robotics::Poses> poses;
+  if (!arguments.poses_from.empty()) poses = robotics::read_poses(arguments.poses_from, robot);
+  try {
+    return poses ? robotics::simulate(robot, *poses, arguments.options) : robotics::simulate(robot, arguments.options);
+  } catch (const std::runtime_error& error) {
+    throw std::runtime_error(arguments.robot + ": " + error.what());
+  }
+}
+
 void simulate_command(const SimulateArguments& arguments) {
   const robotics::CorrectedRobot robot = robotics::read_corrected_robot(arguments.robot);
   refuse_lost_correction(robot.robot, arguments.robot, arguments.output);
-  robotics::Measurements measurements =
-      arguments.poses_from.empty()
-          ? robotics::simulate(robot.robot, arguments.options)
-          : robotics::simulate(robot.robot, robotics::read_poses(arguments.poses_from, robot.robot), arguments.options);
+  robotics::Measurements measurements = simulated(robot.robot, arguments);
   if (robot.correction) {
     // The correction is part of what the description says of the robot.
     measurements.positions_mm +=

@@ -261,6 +261,8 @@ TEST(LlmtDiscover, MistakesHaveTheirExitCodeAndMessage) {
   folder.write("bad5.txt", "slip = a\nslip = b\n");
   folder.write("bad6.txt", "square = a\n");
   folder.write("bad7.txt", "2x = a\n");
+  folder.write("bad8.txt", "\xEF\xBB\xBF# a byte-order mark is no part of a name\nslip = (a = 7)\n");
+  folder.write("bad9.txt", "\xEF\xBB\xBFslip = b\nslip = a\n");
   struct Case {
     std::string arguments;
     int exit_code;
@@ -296,6 +298,9 @@ TEST(LlmtDiscover, MistakesHaveTheirExitCodeAndMessage) {
       {"s.csv m.csv --output y --terms bad5.txt", 1, "bad5.txt:2: the name \"slip\" is there twice"},
       {"s.csv m.csv --output y --terms bad6.txt", 1, "bad6.txt:1: \"square\" is the name of a built-in term"},
       {"s.csv m.csv --output y --terms bad7.txt", 1, "bad7.txt:1: the name \"2x\" is not a word"},
+      {"s.csv m.csv --output y --terms bad8.txt", 1,
+       "bad8.txt:2: slip: column 4 of \"(a = 7)\": == compares; = is not allowed"},
+      {"s.csv m.csv --output y --terms bad9.txt", 1, "bad9.txt:2: the name \"slip\" is there twice"},
       {"s.csv m.csv --output y -o no/c.csv", 1, "no/c.csv: cannot be written"},
   };
   for (const Case& entry : cases) {

@@ -164,7 +164,34 @@ TEST(RobotProgram, MistakesHaveTheirExitCodeAndMessage) {
   expect("calibrate bad.yaml few.csv", 1, "bad.yaml:1: key \"joints\" is missing");
   expect("calibrate " + arm + " none.csv", 1, "none.csv: cannot be read: No such file or directory");
   expect("simulate " + arm + " --poses 0", 2, "poses");
+  expect("simulate " + arm + " --poses 1000000000", 2, "must be between 1 and 1000000");
   expect("paper --study puma", 2, "puma");
+}
+
+TEST(RobotProgram, PositionsThatAreNotFiniteNameFilePoseAndEffect) {
+  const Folder folder;
+  const std::string arm =
+      "name: arm\nconvention: dh\njoints:\n  - {name: joint1, type: revolute, alpha_deg: 0, a_mm: 500, "
+      "d_mm: 0, theta_deg: 0}\n";
+  folder.write("pole.yaml",
+               arm + "effects:\n  - {type: formula, name: pole, terms: [{x: ln(0 * q1)}], coefficients: [1]}\n");
+  std::string data = "q1_deg,x_mm,y_mm,z_mm\n";
+  for (int i = 0; i < 20; ++i) data += fmt::format("{},1,2,3\n", 10 * i);
+  folder.write("d.csv", data);
+  for (const std::string& command :
+       {std::string("simulate pole.yaml"), std::string("simulate pole.yaml --poses-from d.csv"),
+        std::string("calibrate pole.yaml d.csv"), std::string("discover pole.yaml d.csv")}) {
+    const Outcome outcome = folder.run(robot_program + " " + command);
+    EXPECT_EQ(outcome.exit_code, 1) << command << outcome.err;
+    EXPECT_NE(outcome.err.find("llmt-robot: pole.yaml: the tool position of pose 1 is "), std::string::npos)
+        << command << outcome.err;
+    EXPECT_NE(outcome.err.find("effect formula[pole] makes it so"), std::string::npos) << command << outcome.err;
+  }
+  folder.write("arm.yaml", arm);
+  folder.write("far.csv", data + "0,1,1e300,3\n");
+  const Outcome far = folder.run(robot_program + " calibrate arm.yaml far.csv");
+  EXPECT_EQ(far.exit_code, 1);
+  EXPECT_NE(far.err.find("far.csv:22: column \"y_mm\": 1e+300 mm"), std::string::npos) << far.err;
 }
 
 }  // namespace

@@ -27,6 +27,8 @@ check(llmt_knows_no_robotics llmt/src/model.cpp "#include \"llmt/robotics/chain.
 check(llmt_knows_no_robotics llmt/src/fit.cpp "  #  include <robotics/chain.hpp>" "#include <vector>")
 check(libraries_know_no_apps robotics/src/chain.cpp "#include \"shared/exit_codes.hpp\"")
 check(libraries_know_no_apps llmt/src/model/model.cpp "#include \"apps/shared/cli.hpp\"")
+check(llmt_knows_no_expressions llmt/src/fit/fit.cpp "#include \"expressions/expression.hpp\"")
+check(expressions_know_nobody expressions/src/expression.cpp "#include \"llmt/csv.hpp\"")
 check(no_parent_folders apps/robot/main.cpp "#include \"../shared/exit_codes.hpp\"")
 check(discovery_knows_no_trees llmt/src/discovery/verdict.cpp "#include \"llmt/model.hpp\"")
 check(discovery_knows_no_trees llmt/include/llmt/discovery/verdict.hpp "#include \"llmt/fit.hpp\"")

@@ -24,7 +24,7 @@ endfunction()
 
 set(violations "")
 set(count 0)
-foreach(folder IN ITEMS llmt robotics apps tests bench docs)
+foreach(folder IN ITEMS llmt expressions robotics apps tests bench docs)
   file(GLOB_RECURSE sources RELATIVE "${ROOT}" "${ROOT}/${folder}/*.[ch]pp")
   foreach(source IN LISTS sources)
     math(EXPR count "${count} + 1")

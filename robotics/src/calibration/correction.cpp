@@ -1,12 +1,14 @@
 #include "llmt/robotics/correction.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
 #include <filesystem>
 #include <stdexcept>
 
+#include "llmt/files.hpp"
 #include "llmt/robotics/robot_file.hpp"
 
 namespace llmt::robotics {
@@ -27,6 +29,20 @@ std::vector<std::string> joint_names(const Chain& chain) {
   return names;
 }
 
+void check_inputs(const Model& model, const Chain& chain) {
+  std::vector<std::string> inputs;
+  bool numbers = true;
+  for (const InputColumn& input : model.inputs()) {
+    inputs.push_back(input.name);
+    numbers = numbers && !input.is_categorical();
+  }
+  const std::vector<std::string> joints = joint_names(chain);
+  if (inputs == joints && numbers) return;
+  throw std::invalid_argument(
+      fmt::format("llmt::robotics: the correction has the inputs {}, robot \"{}\" needs the numbers {}, in this order",
+                  fmt::join(inputs, ", "), chain.name, fmt::join(joints, ", ")));
+}
+
 std::vector<Eigen::Index> axes_of(const Model& model) {
   std::vector<Eigen::Index> axes;
   for (const OutputColumn& output : model.outputs()) {
@@ -36,6 +52,10 @@ std::vector<Eigen::Index> axes_of(const Model& model) {
           fmt::format("llmt::robotics: output \"{}\" of the correction is none of dx_mm, dy_mm, dz_mm", output.name));
     }
     axes.push_back(found - output_names.begin());
+    if (std::ranges::count(axes, axes.back()) > 1) {
+      throw std::invalid_argument(
+          fmt::format("llmt::robotics: output \"{}\" of the correction is there twice", output.name));
+    }
   }
   return axes;
 }
@@ -71,11 +91,7 @@ Eigen::MatrixXd positions(const CorrectedRobot& robot, const Poses& poses) {
   Eigen::MatrixXd points = positions(robot.robot, poses);
   if (!robot.correction) return points;
   const Model& model = *robot.correction;
-  if (model.num_inputs() != std::ssize(robot.robot.chain.joints)) {
-    throw std::invalid_argument(fmt::format("llmt::robotics: the correction has {} inputs, robot \"{}\" has {} joints",
-                                            model.num_inputs(), robot.robot.chain.name,
-                                            robot.robot.chain.joints.size()));
-  }
+  check_inputs(model, robot.robot.chain);
   const std::vector<Eigen::Index> axes = axes_of(model);
   Eigen::MatrixXd error = Eigen::MatrixXd::Zero(poses.count(), 3);
   const Eigen::MatrixXd predicted = model.predict(poses.joints);
@@ -91,8 +107,14 @@ CorrectedRobot read_corrected_robot(const std::string& path) {
   CorrectedRobot robot{.robot = read_robot(path), .correction = {}};
   if (robot.robot.correction_file.empty()) return robot;
   const std::filesystem::path model = std::filesystem::path(path).parent_path() / robot.robot.correction_file;
-  robot.correction = load(model.string());
+  const std::string text = read_file(model.string());
+  // A description may name any file. What a message says of a file that is no model must not show what it holds.
+  if (text.find("\"llmt-model\"") == std::string::npos) {
+    throw std::runtime_error(fmt::format("{}: correction: {} is no model file", path, model.string()));
+  }
+  robot.correction = from_json(text, model.string());
   try {
+    check_inputs(*robot.correction, robot.robot.chain);
     axes_of(*robot.correction);
   } catch (const std::invalid_argument& error) {
     throw std::runtime_error(fmt::format("{}: {}", model.string(), error.what()));

@@ -6,7 +6,7 @@ namespace llmt::robotics {
 
 std::pair<Eigen::Index, double> EvenKnots::place(double q) const {
   const double u = std::clamp((q - first) / step, 0.0, static_cast<double>(count - 1));
-  const auto below = std::min(static_cast<Eigen::Index>(u), count - 2);
+  const auto below = std::min(static_cast<Eigen::Index>(u), std::max<Eigen::Index>(0, count - 2));
   return {below, u - static_cast<double>(below)};
 }
 
@@ -23,7 +23,9 @@ Unmapped unmapped(const Robot& robot, const Measurements& measurements) {
     const EvenKnots knots{map.constants[0], map.constants[1], std::ssize(map.values)};
     for (Eigen::Index i = 0; i < measurements.count(); ++i) {
       const auto [below, above] = knots.place(measurements.poses.joints(i, joint));
-      plain.measurements.poses.joints(i, joint) += (1.0 - above) * map.values[below] + above * map.values[below + 1];
+      double& q = plain.measurements.poses.joints(i, joint);
+      // A map may have one knot.
+      q += above > 0.0 ? (1.0 - above) * map.values[below] + above * map.values[below + 1] : map.values[below];
     }
   }
   return plain;

@@ -14,7 +14,8 @@ struct EvenKnots {
   double step = 1.0;
   Eigen::Index count = 0;
 
-  /// Number of the knot below q and the weight of the one above; outside the knots those of the nearest end.
+  /// Number of the knot below q and the weight of the one above; outside the knots those of the nearest end. A single
+  /// knot has the weight 0 of one above.
   std::pair<Eigen::Index, double> place(double q) const;
 };
 

@@ -14,19 +14,23 @@
 namespace llmt::robotics {
 namespace {
 
+constexpr std::size_t most_entries = 1000;
+constexpr std::size_t most_terms = 100;  // of one effect
+
 void read_sizes(YamlMap& map, double& scale, double& lower, double& upper) {
   scale = map.number_or("scale", scale);
   lower = map.number_or("lower", lower);
   upper = map.number_or("upper", upper);
-  if (!(scale > 0.0)) map.refuse(fmt::format("\"scale\" is {}, must be > 0", scale));
-  if (!(lower <= upper)) map.refuse(fmt::format("\"lower\" is {}, must not be above \"upper\", {}", lower, upper));
+  if (!(scale > 0.0)) map.refuse("scale", fmt::format("\"scale\" is {}, must be > 0", scale));
+  if (!(lower <= upper))
+    map.refuse("lower", fmt::format("\"lower\" is {}, must not be above \"upper\", {}", lower, upper));
 }
 
 bool read_yes_or_no(YamlMap& map, const std::string& key, bool otherwise) {
   const std::string text = map.text_or(key, otherwise ? "true" : "false");
   if (text == "true") return true;
   if (text == "false") return false;
-  map.refuse(fmt::format("\"{}\" is \"{}\", must be true or false", key, text));
+  map.refuse(key, fmt::format("\"{}\" is \"{}\", must be true or false", key, text));
 }
 
 void read_words(YamlMap& map, EffectType& type) {
@@ -41,7 +45,7 @@ void change_type(YamlMap map, std::vector<EffectType>& types) {
   if (type == types.end()) {
     std::vector<std::string> known;
     for (const EffectType& other : types) known.push_back(other.name);
-    map.refuse(fmt::format("\"type\" is \"{}\", which is no effect; known: {}", name, fmt::join(known, ", ")));
+    map.refuse("type", fmt::format("\"type\" is \"{}\", which is no effect; known: {}", name, fmt::join(known, ", ")));
   }
   read_words(map, *type);
   if (map.has("parameters")) {
@@ -63,7 +67,7 @@ EffectPlace read_place(YamlMap& map) {
   const std::string place = map.text("place");
   if (place == "joint") return EffectPlace::joint;
   if (place == "robot") return EffectPlace::robot;
-  map.refuse(fmt::format("\"place\" is \"{}\", must be joint or robot", place));
+  map.refuse("place", fmt::format("\"place\" is \"{}\", must be joint or robot", place));
 }
 
 void read_own_term(YamlMap map, EffectType& type) {
@@ -81,13 +85,26 @@ void read_own_term(YamlMap map, EffectType& type) {
 }
 
 // Of an arm with more joints than any: mistakes in the expressions show here, those in joint numbers at the robot.
-void check_own(const YamlMap& map, const EffectType& type) {
+Chain longest_arm() {
   Chain any;
   for (int j = 1; j <= 99; ++j) any.joints.emplace_back().name = fmt::format("joint{}", j);
-  Effect effect{.type = "formula", .at = type.place == EffectPlace::joint ? "joint99" : "", .values = {}};
-  effect.formula = {type.name, type.terms};
-  for (FormulaTerm& term : effect.formula.terms) term.text = with_joint_number(term.text, 98);
-  const std::string reason = formula_refusal(any, effect);
+  return any;
+}
+
+void read_own_terms(YamlMap& map, EffectType& type) {
+  const Chain any = longest_arm();
+  const Effect effect{.type = "formula", .at = type.place == EffectPlace::joint ? "joint99" : "", .values = {}};
+  for (const YamlMap& entry : map.maps("terms", most_terms)) {
+    read_own_term(entry, type);
+    FormulaTerm term = type.terms.back();
+    term.text = with_joint_number(term.text, 98);
+    const std::string reason = term_refusal(any, effect, term);
+    if (!reason.empty()) entry.refuse(term.acts_on, reason);
+  }
+  Effect whole = effect;
+  whole.formula = {type.name, type.terms};
+  for (FormulaTerm& term : whole.formula.terms) term.text = with_joint_number(term.text, 98);
+  const std::string reason = formula_refusal(any, whole);
   if (!reason.empty()) map.refuse(reason);
 }
 
@@ -107,26 +124,25 @@ std::vector<std::string> own_columns(const EffectType& type) {
 EffectType read_own(YamlMap map, const std::vector<EffectType>& types) {
   EffectType type{.name = map.text("formula")};
   if (std::ranges::find(types, type.name, &EffectType::name) != types.end()) {
-    map.refuse(fmt::format("\"formula\" is \"{}\", which is the name of another effect", type.name));
+    map.refuse("formula", fmt::format("\"formula\" is \"{}\", which is the name of another effect", type.name));
   }
   type.family = type.name;
   type.title = type.name;
   type.source = "the user";
   read_words(map, type);
   type.place = read_place(map);
-  for (const YamlMap& term : map.maps("terms")) read_own_term(term, type);
+  read_own_terms(map, type);
   for (const FormulaTerm& term : type.terms) {
     type.formula += fmt::format("{}{}: {}", type.formula.empty() ? "" : ", ", term.acts_on, term.text);
   }
   map.finish({"formula", "title", "search", "note", "place", "terms"});
-  check_own(map, type);
   type.columns = own_columns(type);
   return type;
 }
 
 std::vector<EffectType> read_entries(const std::string& text, const std::string& name, std::vector<EffectType> types) {
   YamlMap map(parse_yaml(text, name), name, "");
-  for (const YamlMap& entry : map.maps("effects")) {
+  for (const YamlMap& entry : map.maps("effects", most_entries)) {
     if (entry.has("formula")) {
       types.push_back(read_own(entry, types));
     } else {

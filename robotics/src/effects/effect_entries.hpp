@@ -2,7 +2,6 @@
 #pragma once
 
 #include <Eigen/Geometry>
-#include <set>
 #include <string>
 #include <vector>
 
@@ -23,11 +22,11 @@ extern const char* const default_catalogue_yaml;
 
 using ApplyFunction = decltype(EffectType::apply);
 
-/// The effect's expressions as a function that keeps what it needs. Throws mu::ParserError.
+/// The effect's expressions as a function that keeps what it needs. Throws ExpressionError.
 ApplyFunction compile_formula(const Chain& chain, const Effect& effect);
 
-/// All names of variables in an expression. Throws mu::ParserError.
-std::set<std::string> names_in_formula(const std::string& text);
+/// All names of variables in an expression, ascending. Throws ExpressionError.
+std::vector<std::string> names_in_formula(const std::string& text);
 
 /// Names in the expressions that are neither joint values nor torques.
 std::vector<std::string> formula_columns(const std::vector<FormulaTerm>& terms);
@@ -37,6 +36,9 @@ double scale_of(const FormulaTerm& term, bool is_prismatic);
 
 /// Why an effect of type "formula" cannot be evaluated, or nothing.
 std::string formula_refusal(const Chain& chain, const Effect& effect);
+
+/// Why one of its terms cannot be evaluated, or nothing. Of `effect` only the place counts.
+std::string term_refusal(const Chain& chain, const Effect& effect, const FormulaTerm& term);
 
 /// "{}" replaced by the number of the joint.
 std::string with_joint_number(std::string pattern, std::size_t joint);

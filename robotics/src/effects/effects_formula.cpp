@@ -1,12 +1,12 @@
-// Effects that a user writes down as expressions, evaluated by muParser.
+// Effects that a user writes down as expressions.
 #include <fmt/format.h>
-#include <muParser.h>
 
 #include <algorithm>
 #include <memory>
 #include <set>
 
 #include "effects/effect_entries.hpp"
+#include "expressions/expression.hpp"
 
 namespace llmt::robotics {
 namespace {
@@ -19,59 +19,29 @@ std::size_t joint_number(const std::string& name, const std::string& prefix) {
   return static_cast<std::size_t>(std::stoi(digits));
 }
 
-// Expressions with the variables they read; the parsers hold pointers into the variables.
-struct Program {
-  std::vector<double> variables;  // q of all joints, tau of all joints, columns
-  std::vector<mu::Parser> parsers;
-  std::vector<int> axes;  // 0, 1, 2 of the world, or -1: the joint
+// A term, ready to be evaluated: where each of its variables stands among q of all joints, tau of all joints, columns.
+struct Compiled {
+  Expression expression;
+  int axis;  // 0, 1, 2 of the world, or -1: the joint
+  std::vector<std::size_t> places = {};
+  std::vector<double> variables = {};
 };
 
-void define_variables(Program& program, const Chain& chain, const std::vector<std::string>& columns) {
-  const std::size_t joints = chain.joints.size();
-  program.variables.assign(2 * joints + columns.size(), 0.0);
-  for (mu::Parser& parser : program.parsers) {
-    for (std::size_t j = 0; j < joints; ++j) {
-      parser.DefineVar(fmt::format("q{}", j + 1), &program.variables[j]);
-      parser.DefineVar(fmt::format("tau{}", j + 1), &program.variables[joints + j]);
-    }
-    for (std::size_t c = 0; c < columns.size(); ++c) parser.DefineVar(columns[c], &program.variables[2 * joints + c]);
+Compiled compiled(const FormulaTerm& term, const std::vector<std::string>& columns, std::size_t joints) {
+  Compiled result{.expression = Expression(term.text), .axis = term.acts_on == "joint" ? -1 : term.acts_on[0] - 'x'};
+  for (const std::string& name : result.expression.names()) {
+    const std::size_t q = joint_number(name, "q");
+    const std::size_t tau = joint_number(name, "tau");
+    const std::size_t column = std::ranges::find(columns, name) - columns.begin();
+    result.places.push_back(q > 0 ? q - 1 : tau > 0 ? joints + tau - 1 : 2 * joints + column);
   }
-}
-
-std::string term_refusal(const Chain& chain, const Effect& effect, const FormulaTerm& term) {
-  static const std::set<std::string> targets = {"joint", "x", "y", "z"};
-  if (!targets.contains(term.acts_on)) {
-    return fmt::format("a term acts on \"{}\", must be joint, x, y or z", term.acts_on);
-  }
-  if (term.acts_on == "joint" && effect.at.empty()) return "a term acts on a joint, but there is no \"at\"";
-  if (!(term.scale >= 0.0)) return fmt::format("the scale of a term is {}, must be > 0", term.scale);
-  try {
-    for (const std::string& name : names_in_formula(term.text)) {
-      const std::size_t number = std::max(joint_number(name, "q"), joint_number(name, "tau"));
-      if (number > chain.joints.size()) {
-        return fmt::format("\"{}\" names {}, the robot has {} joints", term.text, name, chain.joints.size());
-      }
-    }
-    // Mistakes that only show when it is evaluated, such as a function with too few arguments.
-    Effect one = effect;
-    one.formula.terms = {term};
-    one.values = {1.0};
-    compile_formula(chain, one);
-  } catch (const mu::Parser::exception_type& error) {
-    return fmt::format("\"{}\": {}", term.text, error.GetMsg());
-  }
-  return "";
+  result.variables.resize(result.places.size());
+  return result;
 }
 
 }  // namespace
 
-std::set<std::string> names_in_formula(const std::string& text) {
-  mu::Parser parser;
-  parser.SetExpr(text);
-  std::set<std::string> names;
-  for (const auto& [name, value] : parser.GetUsedVar()) names.insert(name);
-  return names;
-}
+std::vector<std::string> names_in_formula(const std::string& text) { return Expression(text).names(); }
 
 double scale_of(const FormulaTerm& term, bool is_prismatic) {
   constexpr double usual_rad = 1e-4;
@@ -90,6 +60,26 @@ std::vector<std::string> formula_columns(const std::vector<FormulaTerm>& terms) 
   return {columns.begin(), columns.end()};
 }
 
+std::string term_refusal(const Chain& chain, const Effect& effect, const FormulaTerm& term) {
+  static const std::set<std::string> targets = {"joint", "x", "y", "z"};
+  if (!targets.contains(term.acts_on)) {
+    return fmt::format("a term acts on \"{}\", must be joint, x, y or z", term.acts_on);
+  }
+  if (term.acts_on == "joint" && effect.at.empty()) return "a term acts on a joint, but there is no \"at\"";
+  if (!(term.scale >= 0.0)) return fmt::format("the scale of a term is {}, must be > 0", term.scale);
+  try {
+    for (const std::string& name : names_in_formula(term.text)) {
+      const std::size_t number = std::max(joint_number(name, "q"), joint_number(name, "tau"));
+      if (number > chain.joints.size()) {
+        return fmt::format("an expression names {}, the robot has {} joints", name, chain.joints.size());
+      }
+    }
+  } catch (const ExpressionError& error) {
+    return error.what();
+  }
+  return "";
+}
+
 std::string formula_refusal(const Chain& chain, const Effect& effect) {
   if (effect.formula.name.empty()) return "a formula needs a name";
   if (effect.formula.name.find_first_of(".[]@,") != std::string::npos) {
@@ -104,26 +94,24 @@ std::string formula_refusal(const Chain& chain, const Effect& effect) {
 }
 
 ApplyFunction compile_formula(const Chain& chain, const Effect& effect) {
-  const auto program = std::make_shared<Program>();
+  const std::vector<std::string> columns = formula_columns(effect.formula.terms);
+  const auto terms = std::make_shared<std::vector<Compiled>>();
   for (const FormulaTerm& term : effect.formula.terms) {
-    program->parsers.emplace_back().SetExpr(term.text);
-    program->axes.push_back(term.acts_on == "joint" ? -1 : term.acts_on[0] - 'x');
+    terms->push_back(compiled(term, columns, chain.joints.size()));
   }
-  define_variables(*program, chain, formula_columns(effect.formula.terms));
-  for (mu::Parser& parser : program->parsers) parser.Eval();
-  return [program](const PoseContext& pose, std::size_t joint, std::span<const double> values, std::span<const double>,
-                   Deformation& deformation) {
+  return [terms](const PoseContext& pose, std::size_t joint, std::span<const double> values, std::span<const double>,
+                 Deformation& deformation) {
     const std::size_t joints = pose.chain.joints.size();
-    for (std::size_t j = 0; j < joints; ++j) {
-      program->variables[j] = pose.q(j);
-      program->variables[joints + j] = gravity_load(pose, j);
-    }
-    std::ranges::copy(pose.columns, program->variables.begin() + static_cast<Eigen::Index>(2 * joints));
+    const auto quantity = [&](std::size_t place) {
+      if (place < joints) return pose.q(place);
+      return place < 2 * joints ? gravity_load(pose, place - joints) : pose.columns[place - 2 * joints];
+    };
     for (std::size_t k = 0; k < values.size(); ++k) {
       if (values[k] == 0.0) continue;
-      const double error = values[k] * program->parsers[k].Eval();
-      const int axis = program->axes[k];
-      (axis < 0 ? deformation.joint(joint) : deformation.world_mm(axis)) += error;
+      Compiled& term = (*terms)[k];
+      std::ranges::transform(term.places, term.variables.begin(), quantity);
+      const double error = values[k] * term.expression.value(term.variables);
+      (term.axis < 0 ? deformation.joint(joint) : deformation.world_mm(term.axis)) += error;
     }
   };
 }

@@ -16,7 +16,8 @@ FormulaTerm read_formula_term(YamlMap& map) {
   term.name = map.text_or("name", "");
   term.unit = map.text_or("unit", "");
   term.scale = map.number_or("scale", term.scale);
-  if (map.has("scale") && !(term.scale > 0.0)) map.refuse(fmt::format("\"scale\" is {}, must be > 0", term.scale));
+  if (map.has("scale") && !(term.scale > 0.0))
+    map.refuse("scale", fmt::format("\"scale\" is {}, must be > 0", term.scale));
   return term;
 }
 

@@ -6,6 +6,8 @@
 #include <set>
 #include <stdexcept>
 
+#include "kinematics/checks.hpp"
+
 namespace llmt::robotics {
 namespace {
 
@@ -14,8 +16,8 @@ constexpr double angle_scale_deg = 0.1;  // moves a point one metre away by abou
 constexpr Eigen::Index frame_parameters = 6;
 constexpr Eigen::Index joint_parameters = 6;
 
-[[noreturn]] void refuse(const std::string& message) {
-  throw std::invalid_argument("llmt::robotics::Chain: " + message);
+[[noreturn]] void refuse(const std::string& field, const std::string& message) {
+  throw FieldError(field, "llmt::robotics::Chain: " + message);
 }
 
 // Every geometric value of a chain in the fixed order; one place decides the order for reading and writing.
@@ -37,37 +39,45 @@ void visit_values(ChainType& chain, Visit visit) {
 
 void validate_joint(const Joint& joint) {
   if (joint.sign != 1.0 && joint.sign != -1.0)
-    refuse(fmt::format("{}: sign is {}, must be 1 or -1", joint.name, joint.sign));
+    refuse("sign", fmt::format("{}: sign is {}, must be 1 or -1", joint.name, joint.sign));
   if (!(joint.mass_kg >= 0.0) || !std::isfinite(joint.mass_kg)) {
-    refuse(fmt::format("{}: mass_kg is {}, must be >= 0", joint.name, joint.mass_kg));
+    refuse("mass_kg", fmt::format("{}: mass_kg is {}, must be >= 0", joint.name, joint.mass_kg));
   }
-  if (!joint.com_mm.allFinite()) refuse(fmt::format("{}: com_mm is not finite", joint.name));
+  if (!joint.com_mm.allFinite()) refuse("com_mm", fmt::format("{}: com_mm is not finite", joint.name));
   if (joint.limits && !((*joint.limits)[0] < (*joint.limits)[1])) {
-    refuse(fmt::format("{}: limits are [{}, {}], the first must be the smaller", joint.name, (*joint.limits)[0],
+    refuse(joint.type == JointType::revolute ? "limits_deg" : "limits_mm",
+           fmt::format("{}: limits are [{}, {}], the first must be the smaller", joint.name, (*joint.limits)[0],
                        (*joint.limits)[1]));
   }
   if (joint.gear_ratio && !(std::isfinite(*joint.gear_ratio) && *joint.gear_ratio != 0.0)) {
-    refuse(fmt::format("{}: gear_ratio is {}, must be finite and not 0", joint.name, *joint.gear_ratio));
+    refuse("gear_ratio", fmt::format("{}: gear_ratio is {}, must be finite and not 0", joint.name, *joint.gear_ratio));
   }
 }
 
 }  // namespace
 
 void validate(const Chain& chain) {
-  if (chain.joints.empty()) refuse("there are no joints");
+  if (!chain.gravity_m_s2.allFinite()) refuse("gravity_m_s2", "gravity_m_s2 is not finite");
+  if (!(chain.payload.mass_kg >= 0.0)) {
+    refuse("payload", fmt::format("payload mass_kg is {}, must be >= 0", chain.payload.mass_kg));
+  }
+  if (chain.joints.empty()) refuse("joints", "there are no joints");
+  if (chain.joints.size() > most_joints) {
+    refuse("joints", fmt::format("there are {} joints, at most {} are possible", chain.joints.size(), most_joints));
+  }
   std::set<std::string> names = {"base", "tool", "payload"};
   for (const Joint& joint : chain.joints) {
-    if (joint.name.empty()) refuse("a joint has no name");
-    if (joint.name.find('.') != std::string::npos) refuse(fmt::format("joint name \"{}\" has a dot", joint.name));
-    if (!names.insert(joint.name).second) refuse(fmt::format("joint name \"{}\" is taken", joint.name));
+    if (joint.name.empty()) refuse("name", "a joint has no name");
+    if (joint.name.find('.') != std::string::npos)
+      refuse("name", fmt::format("joint name \"{}\" has a dot", joint.name));
+    if (!names.insert(joint.name).second) refuse("name", fmt::format("joint name \"{}\" is taken", joint.name));
     validate_joint(joint);
   }
-  if (!chain.gravity_m_s2.allFinite()) refuse("gravity_m_s2 is not finite");
-  if (!(chain.payload.mass_kg >= 0.0))
-    refuse(fmt::format("payload mass_kg is {}, must be >= 0", chain.payload.mass_kg));
   for (const discovery::Parameter& parameter : geometric_parameters(chain)) {
-    if (!std::isfinite(parameter.value))
-      refuse(fmt::format("{} is {}, must be finite", parameter.name, parameter.value));
+    if (!std::isfinite(parameter.value)) {
+      throw std::invalid_argument(
+          fmt::format("llmt::robotics::Chain: {} is {}, must be finite", parameter.name, parameter.value));
+    }
   }
 }
 

@@ -2,6 +2,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <optional>
 #include <regex>
@@ -25,7 +26,10 @@ class Header {
   Header(const Csv& csv, const Robot& robot, const std::vector<std::string>& also)
       : csv_(csv), robot_(robot), also_(also.begin(), also.end()) {
     for (const Effect& effect : robot.effects) {
-      for (const FormulaTerm& term : effect.formula.terms) also_.merge(names_in_formula(term.text));
+      for (const FormulaTerm& term : effect.formula.terms) {
+        const std::vector<std::string> names = names_in_formula(term.text);
+        also_.insert(names.begin(), names.end());
+      }
     }
     for (const std::string& column : csv.columns()) take(column);
   }
@@ -54,6 +58,7 @@ class Header {
   }
   void take(const std::string& column);
   void take_quantity(const std::string& name, const std::string& column, const std::string& unit);
+  void check_reach(const Eigen::VectorXd& coordinate_mm, const std::string& column) const;
   double factor(const std::string& name, const std::map<std::string, double>& units) const;
   static std::string spellings(const std::string& name, const std::map<std::string, double>& units);
 };
@@ -145,10 +150,19 @@ void Header::positions(Measurements& measurements) const {
     measurements.measured[axis] = true;
     measurements.positions_mm.col(axis) =
         factor(names[axis], lengths_in_mm) * csv_.numbers(quantities_.at(names[axis]).column);
+    check_reach(measurements.positions_mm.col(axis), quantities_.at(names[axis]).column);
   }
   if (std::ranges::none_of(measurements.measured, [](bool seen) { return seen; })) {
     refuse(fmt::format("no measured position: write x_mm, y_mm, z_mm (or _m, _um); columns: {}",
                        fmt::join(csv_.columns(), ", ")));
+  }
+}
+
+void Header::check_reach(const Eigen::VectorXd& coordinate_mm, const std::string& column) const {
+  for (Eigen::Index row = 0; row < coordinate_mm.size(); ++row) {
+    if (std::abs(coordinate_mm(row)) <= farthest_mm) continue;
+    throw std::runtime_error(fmt::format("{}:{}: column \"{}\": {} mm, at most {} mm are possible", csv_.name(),
+                                         csv_.line_of(row), column, coordinate_mm(row), farthest_mm));
   }
 }
 

@@ -7,6 +7,7 @@
 #include <set>
 #include <stdexcept>
 
+#include "robot/checks.hpp"
 #include "robot/robot_evaluator.hpp"
 
 namespace llmt::robotics {
@@ -17,18 +18,29 @@ Poses select(const Poses& poses, const std::vector<Eigen::Index>& rows) {
   return chosen;
 }
 
+void validate(const Chain& chain, const Effect& effect) {
+  effect_index(chain, effect);
+  for (const std::vector<double>* numbers : {&effect.values, &effect.constants}) {
+    if (!std::ranges::all_of(*numbers, [](double value) { return std::isfinite(value); }))
+      throw std::invalid_argument("llmt::robotics::Robot: a number of " + effect_label(effect) + " is not finite");
+  }
+}
+
 void validate(const Robot& robot) {
   validate(robot.chain);
   std::set<std::string> seen;
+  std::size_t values = 0;
   for (const Effect& effect : robot.effects) {
-    effect_index(robot.chain, effect);
+    validate(robot.chain, effect);
     if (!seen.insert(effect_label(effect)).second) {
       throw std::invalid_argument(fmt::format("llmt::robotics::Robot: effect {} is there twice", effect_label(effect)));
     }
-    for (const std::vector<double>* numbers : {&effect.values, &effect.constants}) {
-      if (!std::ranges::all_of(*numbers, [](double value) { return std::isfinite(value); }))
-        throw std::invalid_argument("llmt::robotics::Robot: a number of " + effect_label(effect) + " is not finite");
-    }
+    values += effect.values.size();
+  }
+  if (robot.effects.size() > most_effects || values > most_effect_values) {
+    throw std::invalid_argument(
+        fmt::format("llmt::robotics::Robot: {} effects with {} values, at most {} with {} are possible",
+                    robot.effects.size(), values, most_effects, most_effect_values));
   }
 }
 
@@ -67,6 +79,25 @@ Eigen::MatrixXd positions(const Robot& robot, const Poses& poses) {
   Eigen::MatrixXd result(poses.count(), 3);
   for (Eigen::Index i = 0; i < poses.count(); ++i) result.row(i) = evaluator.position(i).transpose();
   return result;
+}
+
+std::string position_refusal(const Robot& robot, const Poses& poses) {
+  const auto acceptable = [](const auto& points) { return (points.array().abs() <= farthest_mm).all(); };
+  const Eigen::MatrixXd all = positions(robot, poses);
+  Eigen::Index row = 0;
+  while (row < all.rows() && acceptable(all.row(row))) ++row;
+  if (row == all.rows()) return "";
+  const Poses pose = select(poses, {row});
+  Robot part = robot;
+  part.effects.clear();
+  std::string cause = "the geometry";
+  for (auto next = robot.effects.begin(); acceptable(positions(part, pose)) && next != robot.effects.end(); ++next) {
+    part.effects.push_back(*next);
+    cause = "effect " + effect_label(*next);
+  }
+  return fmt::format(
+      "the tool position of pose {} is {}, {}, {} mm, which is not finite or beyond {} mm; {} makes it so", row + 1,
+      all(row, 0), all(row, 1), all(row, 2), farthest_mm, cause);
 }
 
 Eigen::MatrixXd position_jacobian(const Robot& robot, const Poses& poses) {

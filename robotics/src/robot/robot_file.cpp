@@ -3,14 +3,31 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <map>
+#include <set>
 #include <stdexcept>
 
+#include "effects/effect_entries.hpp"
 #include "effects/formula_term.hpp"
+#include "kinematics/checks.hpp"
 #include "llmt/files.hpp"
+#include "robot/checks.hpp"
 #include "yaml/yaml_reader.hpp"
 
 namespace llmt::robotics {
 namespace {
+
+// Mistakes that the checks of a chain or an effect find belong to the file.
+template <typename Check>
+void check_in_file(const YamlMap& map, Check check) {
+  try {
+    check();
+  } catch (const FieldError& error) {
+    map.refuse(error.field, error.what());
+  } catch (const std::invalid_argument& error) {
+    map.refuse(error.what());
+  }
+}
 
 Frame read_frame(YamlMap map) {
   Frame frame{.xyz_mm = map.vector_or("xyz_mm", Eigen::Vector3d::Zero()),
@@ -29,7 +46,7 @@ JointType read_joint_type(YamlMap& map) {
   const std::string type = map.text("type");
   if (type == "revolute") return JointType::revolute;
   if (type == "prismatic") return JointType::prismatic;
-  map.refuse(fmt::format("\"type\" is \"{}\", must be revolute or prismatic", type));
+  map.refuse("type", fmt::format("\"type\" is \"{}\", must be revolute or prismatic", type));
 }
 
 Joint read_joint(YamlMap map) {
@@ -63,14 +80,17 @@ const EffectType& read_effect_type(YamlMap& map) {
     if (type.name == name) return type;
     known += (known.empty() ? "" : ", ") + type.name;
   }
-  map.refuse(fmt::format("\"type\" is \"{}\", which is no effect; known: {}", name, known));
+  map.refuse("type", fmt::format("\"type\" is \"{}\", which is no effect; known: {}", name, known));
 }
 
-void read_formula(YamlMap& map, Formula& formula) {
-  formula.name = map.text("name");
-  for (YamlMap term : map.maps("terms")) {
-    formula.terms.push_back(read_formula_term(term));
+// Each term is checked by itself, so that a mistake is found at its line.
+void read_formula(YamlMap& map, const Chain& chain, Effect& effect) {
+  effect.formula.name = map.text("name");
+  for (YamlMap term : map.maps("terms", most_effect_values)) {
+    effect.formula.terms.push_back(read_formula_term(term));
     term.finish({"name", "joint", "x", "y", "z", "unit", "scale"});
+    const std::string reason = term_refusal(chain, effect, effect.formula.terms.back());
+    if (!reason.empty()) term.refuse(effect.formula.terms.back().acts_on, reason);
   }
 }
 
@@ -80,9 +100,9 @@ Effect read_effect(YamlMap map, const Chain& chain) {
   std::vector<std::string> known = {"type"};
   bool slides = false;
   if (type.name == "formula") {
-    read_formula(map, effect.formula);
-    known.insert(known.end(), {"name", "terms", "at"});
     effect.at = map.text_or("at", "");
+    read_formula(map, chain, effect);
+    known.insert(known.end(), {"name", "terms", "at"});
   } else if (type.place != EffectPlace::robot) {
     effect.at = map.text("at");
     known.emplace_back("at");
@@ -96,7 +116,7 @@ Effect read_effect(YamlMap map, const Chain& chain) {
   for (const EffectConstant& constant : type.constants) effect.constants.push_back(map.number(key_of(constant)));
   for (const EffectParameter& parameter : type.parameters) {
     if (parameter.list) {
-      effect.values = map.all_numbers(key_of(parameter));
+      effect.values = map.all_numbers(key_of(parameter), most_effect_values);
     } else {
       effect.values.push_back(map.number(key_of(parameter)));
     }
@@ -105,49 +125,72 @@ Effect read_effect(YamlMap map, const Chain& chain) {
   return effect;
 }
 
-IdentifiedParameter read_identified(YamlMap map, const std::vector<discovery::Parameter>& all) {
-  IdentifiedParameter entry{.name = map.text("parameter"), .standard_error = {}, .state = map.text("state")};
-  if (map.has("standard_error")) entry.standard_error = map.number("standard_error");
-  const std::string unit = map.text_or("unit", "");
-  map.finish({"parameter", "state", "standard_error", "unit"});
-  for (const discovery::Parameter& parameter : all) {
-    if (parameter.name != entry.name) continue;
-    if (!unit.empty() && unit != parameter.unit) {
-      map.refuse(fmt::format("\"unit\" of {} is \"{}\", must be {}", entry.name, unit, parameter.unit));
+std::vector<Effect> read_effects(YamlMap& map, const Chain& chain) {
+  std::vector<Effect> effects;
+  std::set<std::string> seen;
+  std::size_t values = 0;
+  for (const YamlMap& entry : map.maps("effects", most_effects)) {
+    const Effect& effect = effects.emplace_back(read_effect(entry, chain));
+    check_in_file(entry, [&] { validate(chain, effect); });
+    if (!seen.insert(effect_label(effect)).second) {
+      entry.refuse(fmt::format("effect {} is there twice", effect_label(effect)));
     }
-    return entry;
+    values += effect.values.size();
+    if (values > most_effect_values) {
+      entry.refuse(
+          fmt::format("the effects have {} values up to here, at most {} are possible", values, most_effect_values));
+    }
   }
-  map.refuse(fmt::format("\"parameter\" is \"{}\", which the robot does not have", entry.name));
+  return effects;
+}
+
+std::vector<IdentifiedParameter> read_identified(YamlMap& map, const Robot& robot) {
+  std::map<std::string, std::string> unit_of;
+  for (const discovery::Parameter& parameter : parameters(robot)) unit_of[parameter.name] = parameter.unit;
+  std::vector<IdentifiedParameter> all;
+  std::set<std::string> seen;
+  for (YamlMap& entry : map.maps("identified", unit_of.size())) {
+    IdentifiedParameter& read = all.emplace_back();
+    read.name = entry.text("parameter");
+    read.state = entry.text("state");
+    if (entry.has("standard_error")) read.standard_error = entry.number("standard_error");
+    const std::string unit = entry.text_or("unit", "");
+    entry.finish({"parameter", "state", "standard_error", "unit"});
+    const auto known = unit_of.find(read.name);
+    if (known == unit_of.end()) {
+      entry.refuse("parameter", fmt::format("\"parameter\" is \"{}\", which the robot does not have", read.name));
+    }
+    if (!unit.empty() && unit != known->second) {
+      entry.refuse("unit", fmt::format("\"unit\" of {} is \"{}\", must be {}", read.name, unit, known->second));
+    }
+    if (!seen.insert(read.name).second) entry.refuse(fmt::format("\"{}\" is there twice", read.name));
+  }
+  return all;
 }
 
 Convention read_convention(YamlMap& map) {
   const std::string convention = map.text("convention");
   if (convention == "dh") return Convention::dh;
   if (convention == "mdh") return Convention::mdh;
-  map.refuse(fmt::format("\"convention\" is \"{}\", must be dh or mdh", convention));
+  map.refuse("convention", fmt::format("\"convention\" is \"{}\", must be dh or mdh", convention));
 }
 
+// Joints first: each is checked as it comes, and what is wrong with the rest of the chain is found at its own line.
 Chain read_chain(YamlMap& map) {
   Chain chain;
   chain.name = map.text("name");
   chain.convention = read_convention(map);
+  for (const YamlMap& joint : map.maps("joints", most_joints)) {
+    chain.joints.push_back(read_joint(joint));
+    check_in_file(joint, [&] { validate(chain); });
+  }
   chain.gravity_m_s2 = map.vector_or("gravity_m_s2", chain.gravity_m_s2);
   chain.orientation = map.text_or("orientation", "");
   if (map.has("base")) chain.base = read_frame(map.map("base"));
   if (map.has("tool")) chain.tool = read_frame(map.map("tool"));
   if (map.has("payload")) chain.payload = read_payload(map.map("payload"));
-  for (const YamlMap& joint : map.maps("joints")) chain.joints.push_back(read_joint(joint));
+  check_in_file(map, [&] { validate(chain); });
   return chain;
-}
-
-// Mistakes that validate() finds belong to the file.
-template <typename Check>
-void check_in_file(const YamlMap& map, Check check) {
-  try {
-    check();
-  } catch (const std::invalid_argument& error) {
-    map.refuse(error.what());
-  }
 }
 
 }  // namespace
@@ -156,17 +199,8 @@ Robot parse_robot(const std::string& text, const std::string& name) {
   YamlMap map(parse_yaml(text, name), name, "");
   Robot robot;
   robot.chain = read_chain(map);
-  check_in_file(map, [&] { validate(robot); });
-  if (map.has("effects")) {
-    for (const YamlMap& effect : map.maps("effects")) {
-      robot.effects.push_back(read_effect(effect, robot.chain));
-      check_in_file(effect, [&] { validate(robot); });
-    }
-  }
-  if (map.has("identified")) {
-    const std::vector<discovery::Parameter> all = parameters(robot);
-    for (const YamlMap& entry : map.maps("identified")) robot.identified.push_back(read_identified(entry, all));
-  }
+  if (map.has("effects")) robot.effects = read_effects(map, robot.chain);
+  if (map.has("identified")) robot.identified = read_identified(map, robot);
   if (map.has("correction")) {
     YamlMap correction = map.map("correction");
     robot.correction_file = correction.text("model");

@@ -13,6 +13,9 @@
 namespace llmt::robotics {
 namespace {
 
+constexpr Eigen::Index most_poses = 1000000;
+constexpr double largest_noise_um = 1e12;
+
 std::array<double, 2> limits_of(const Joint& joint) {
   const bool turns = joint.type == JointType::revolute;
   if (!joint.limits && !turns) {
@@ -86,13 +89,16 @@ Eigen::VectorXd neutral_values(const std::string& name, const Effect& effect, co
 }
 
 Measurements measured(const Robot& robot, Poses poses, const SimulationOptions& options, Random& random) {
-  if (!(options.noise_um >= 0.0)) {
-    throw std::invalid_argument(
-        fmt::format("llmt::robotics::simulate: noise_um is {}, must be >= 0", options.noise_um));
+  if (!(options.noise_um >= 0.0 && options.noise_um <= largest_noise_um)) {
+    throw std::invalid_argument(fmt::format("llmt::robotics::simulate: noise_um is {}, must be between 0 and {}",
+                                            options.noise_um, largest_noise_um));
   }
   Measurements measurements;
   measurements.poses = with_needed_columns(robot, std::move(poses), options.seed);
   measurements.positions_mm = positions(robot, measurements.poses);
+  if (!(measurements.positions_mm.array().abs() <= farthest_mm).all()) {
+    throw std::runtime_error(position_refusal(robot, measurements.poses));
+  }
   for (Eigen::Index i = 0; i < measurements.count(); ++i) {
     for (Eigen::Index axis = 0; axis < 3; ++axis)
       measurements.positions_mm(i, axis) += 1e-3 * options.noise_um * random.normal();
@@ -104,8 +110,10 @@ Measurements measured(const Robot& robot, Poses poses, const SimulationOptions& 
 
 Measurements simulate(const Robot& robot, const SimulationOptions& options) {
   validate(robot);
-  if (options.poses < 1)
-    throw std::invalid_argument(fmt::format("llmt::robotics::simulate: poses is {}, must be >= 1", options.poses));
+  if (options.poses < 1 || options.poses > most_poses) {
+    throw std::invalid_argument(
+        fmt::format("llmt::robotics::simulate: poses is {}, must be between 1 and {}", options.poses, most_poses));
+  }
   Random random(options.seed);
   const std::vector<Joint>& joints = robot.chain.joints;
   Poses poses;

@@ -2,18 +2,77 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <yaml-cpp/eventhandler.h>
 
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <sstream>
 #include <stdexcept>
 
 namespace llmt::robotics {
+namespace {
+
+constexpr std::size_t most_bytes = 16 << 20;
+constexpr int most_nodes = 300000;
+constexpr std::size_t longest_text = 10000;
+
+// What a message shows of a text that a file holds.
+std::string shown(const std::string& text) {
+  constexpr std::size_t most = 60;
+  if (text.size() <= most) return text;
+  std::size_t end = most;
+  while (end > 0 && (text[end] & 0xC0) == 0x80) --end;  // whole characters of UTF-8
+  return text.substr(0, end) + "...";
+}
+
+// Reads a text without keeping it, to see how much it holds.
+class Counter : public YAML::EventHandler {
+ public:
+  void OnDocumentStart(const YAML::Mark& mark) override {
+    if (++documents_ == 2) throw YAML::ParserException(mark, "a second document begins, a file holds one");
+  }
+  void OnNull(const YAML::Mark& mark, YAML::anchor_t /*anchor*/) override { count(mark); }
+  void OnAlias(const YAML::Mark& mark, YAML::anchor_t /*anchor*/) override { count(mark); }
+  void OnScalar(const YAML::Mark& mark, const std::string& /*tag*/, YAML::anchor_t /*anchor*/,
+                const std::string& /*value*/) override {
+    count(mark);
+  }
+  void OnSequenceStart(const YAML::Mark& mark, const std::string& /*tag*/, YAML::anchor_t /*anchor*/,
+                       YAML::EmitterStyle::value /*style*/) override {
+    count(mark);
+  }
+  void OnMapStart(const YAML::Mark& mark, const std::string& /*tag*/, YAML::anchor_t /*anchor*/,
+                  YAML::EmitterStyle::value /*style*/) override {
+    count(mark);
+  }
+  void OnDocumentEnd() override {}
+  void OnSequenceEnd() override {}
+  void OnMapEnd() override {}
+
+ private:
+  int documents_ = 0;
+  int nodes_ = 0;
+
+  void count(const YAML::Mark& mark) {
+    if (++nodes_ > most_nodes) {
+      throw YAML::ParserException(mark, fmt::format("more than {} keys, values and lists", most_nodes));
+    }
+  }
+};
+
+}  // namespace
 
 YAML::Node parse_yaml(const std::string& text, const std::string& file) {
+  if (text.size() > most_bytes) {
+    throw std::runtime_error(fmt::format("{}: {} bytes, at most {} are read", file, text.size(), most_bytes));
+  }
   try {
+    std::istringstream stream(text);
+    YAML::Parser parser(stream);
+    for (Counter counter; parser.HandleNextDocument(counter);) continue;
     return YAML::Load(text);
-  } catch (const YAML::ParserException& error) {
+  } catch (const YAML::Exception& error) {
     throw std::runtime_error(fmt::format("{}:{}: {}", file, error.mark.line + 1, error.msg));
   }
 }
@@ -25,7 +84,7 @@ YamlMap::YamlMap(const YAML::Node& node, std::string file, std::string where)
   for (const auto& entry : node_) {
     if (!entry.first.IsScalar()) refuse_at(entry.first, "a key must be a word");
     if (!seen.insert(entry.first.Scalar()).second)
-      refuse_at(entry.first, fmt::format("key \"{}\" is there twice", entry.first.Scalar()));
+      refuse_at(entry.first, fmt::format("key \"{}\" is there twice", shown(entry.first.Scalar())));
   }
 }
 
@@ -34,6 +93,11 @@ void YamlMap::refuse_at(const YAML::Node& node, const std::string& message) cons
   const std::string place = line < 0 ? file_ : fmt::format("{}:{}", file_, line + 1);
   throw std::runtime_error(where_.empty() ? fmt::format("{}: {}", place, message)
                                           : fmt::format("{}: {}: {}", place, where_, message));
+}
+
+void YamlMap::refuse(const std::string& key, const std::string& message) const {
+  const YAML::Node value = node_[key];
+  refuse_at(value ? value : node_, message);
 }
 
 YAML::Node YamlMap::at(const std::string& key) {
@@ -46,6 +110,10 @@ YAML::Node YamlMap::at(const std::string& key) {
 std::string YamlMap::text(const std::string& key) {
   const YAML::Node value = at(key);
   if (!value.IsScalar()) refuse_at(value, fmt::format("\"{}\" must be a word", key));
+  if (value.Scalar().size() > longest_text) {
+    refuse_at(value,
+              fmt::format("\"{}\" has {} characters, at most {} are read", key, value.Scalar().size(), longest_text));
+  }
   return value.Scalar();
 }
 
@@ -57,7 +125,7 @@ double YamlMap::to_number(const YAML::Node& node, const std::string& key) const 
   double value = 0.0;
   const auto [stop, error] = std::from_chars(begin, end, value);
   if (error != std::errc() || stop != end || !std::isfinite(value)) {
-    refuse_at(node, fmt::format("\"{}\" must be a number, is \"{}\"", key, text));
+    refuse_at(node, fmt::format("\"{}\" must be a number, is \"{}\"", key, shown(text)));
   }
   return value;
 }
@@ -68,12 +136,15 @@ std::vector<double> YamlMap::numbers(const std::string& key, std::size_t count) 
   const YAML::Node value = at(key);
   if (!value.IsSequence() || value.size() != count)
     refuse_at(value, fmt::format("\"{}\" must be a list of {} numbers", key, count));
-  return all_numbers(key);
+  return all_numbers(key, count);
 }
 
-std::vector<double> YamlMap::all_numbers(const std::string& key) {
+std::vector<double> YamlMap::all_numbers(const std::string& key, std::size_t most) {
   const YAML::Node value = at(key);
   if (!value.IsSequence()) refuse_at(value, fmt::format("\"{}\" must be a list of numbers", key));
+  if (value.size() > most) {
+    refuse_at(value, fmt::format("\"{}\" has {} numbers, at most {} are read", key, value.size(), most));
+  }
   std::vector<double> result;
   for (const YAML::Node& entry : value) result.push_back(to_number(entry, key));
   return result;
@@ -86,11 +157,14 @@ Eigen::Vector3d YamlMap::vector(const std::string& key) {
 
 YamlMap YamlMap::map(const std::string& key) { return {at(key), file_, where_.empty() ? key : where_ + "." + key}; }
 
-std::vector<YamlMap> YamlMap::maps(const std::string& key) {
+std::vector<YamlMap> YamlMap::maps(const std::string& key, std::size_t most) {
   const YAML::Node value = at(key);
   std::vector<YamlMap> result;
   if (value.IsNull()) return result;
   if (!value.IsSequence()) refuse_at(value, fmt::format("\"{}\" must be a list", key));
+  if (value.size() > most) {
+    refuse_at(value, fmt::format("\"{}\" has {} entries, at most {} are read", key, value.size(), most));
+  }
   const std::string where = where_.empty() ? key : where_ + "." + key;
   for (const YAML::Node& entry : value) result.emplace_back(entry, file_, fmt::format("{}[{}]", where, result.size()));
   return result;
@@ -102,7 +176,7 @@ void YamlMap::finish(const std::vector<std::string>& known) const {
     if (asked_.contains(key)) continue;
     if (std::ranges::find(known, key) != known.end())
       refuse_at(entry.first, fmt::format("key \"{}\" does not belong here", key));
-    refuse_at(entry.first, fmt::format("unknown key \"{}\"; known: {}", key, fmt::join(known, ", ")));
+    refuse_at(entry.first, fmt::format("unknown key \"{}\"; known: {}", shown(key), fmt::join(known, ", ")));
   }
 }
 

@@ -17,13 +17,13 @@ class YamlMap {
 
   bool has(const std::string& key) const { return static_cast<bool>(node_[key]); }
 
-  std::string text(const std::string& key);
+  std::string text(const std::string& key);  ///< at most 10 000 characters
   double number(const std::string& key);
   Eigen::Vector3d vector(const std::string& key);
   std::vector<double> numbers(const std::string& key, std::size_t count);
-  std::vector<double> all_numbers(const std::string& key);
+  std::vector<double> all_numbers(const std::string& key, std::size_t most);
   YamlMap map(const std::string& key);
-  std::vector<YamlMap> maps(const std::string& key);
+  std::vector<YamlMap> maps(const std::string& key, std::size_t most);
 
   double number_or(const std::string& key, double otherwise) { return has(key) ? number(key) : otherwise; }
   Eigen::Vector3d vector_or(const std::string& key, const Eigen::Vector3d& otherwise) {
@@ -36,6 +36,9 @@ class YamlMap {
 
   [[noreturn]] void refuse(const std::string& message) const { refuse_at(node_, message); }
 
+  /// The same at the line of a key's value, or of the map if it has no such key.
+  [[noreturn]] void refuse(const std::string& key, const std::string& message) const;
+
  private:
   YAML::Node node_;
   std::string file_;
@@ -47,7 +50,8 @@ class YamlMap {
   [[noreturn]] void refuse_at(const YAML::Node& node, const std::string& message) const;
 };
 
-/// Parses a text. Throws std::runtime_error `file:line: ...` if it is no YAML.
+/// Parses a text of one document. Throws std::runtime_error `file:line: ...` if it is no YAML, holds a second document,
+/// more than 16 MiB or more than 300 000 nodes.
 YAML::Node parse_yaml(const std::string& text, const std::string& file);
 
 }  // namespace llmt::robotics

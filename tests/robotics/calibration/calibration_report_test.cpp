@@ -4,7 +4,9 @@
 
 #include <filesystem>
 
+#include "llmt/files.hpp"
 #include "llmt/robotics/robot_file.hpp"
+#include "oracles/thrown.hpp"
 #include "robotics/robots.hpp"
 
 namespace llmt::robotics {
@@ -112,6 +114,49 @@ TEST(Correction, SavedRobotWithItsModelPredictsTheSame) {
   save(corrected.robot, (folder / "arm.yaml").string());
   const CorrectedRobot again = read_corrected_robot((folder / "arm.yaml").string());
   EXPECT_EQ(positions(again, seen.poses), positions(corrected, seen.poses));
+  std::filesystem::remove_all(folder);
+}
+
+TEST(Correction, MustBeAModelOfTheRobotsJoints) {
+  const Robot truth = perturbed(mdh_like(), 0.0, 0.0, 14);
+  const Measurements seen = with_step(truth, 300, 0.002, 15);
+  const Model right = fit_correction(truth, seen).model;
+  const std::vector<std::string> joints = {"q1_rad", "q2_rad", "q3_rad", "q4_rad", "q5_rad", "q6_rad"};
+  const std::vector<std::string> outputs = {"dx_mm", "dy_mm", "dz_mm"};
+  const auto refusal = [&](const std::vector<std::string>& inputs, const std::vector<std::string>& names) {
+    const CorrectedRobot robot{truth, right.named(inputs, names)};
+    return oracle::thrown([&] { positions(robot, seen.poses); });
+  };
+  EXPECT_EQ(refusal(joints, outputs), "nothing was thrown");
+  EXPECT_EQ(
+      refusal({"q2_rad", "q1_rad", "q3_rad", "q4_rad", "q5_rad", "q6_rad"}, outputs),
+      "llmt::robotics: the correction has the inputs q2_rad, q1_rad, q3_rad, q4_rad, q5_rad, q6_rad, robot \"arm\" "
+      "needs the numbers q1_rad, q2_rad, q3_rad, q4_rad, q5_rad, q6_rad, in this order");
+  EXPECT_NE(refusal({"q1_mm", "q2_rad", "q3_rad", "q4_rad", "q5_rad", "q6_rad"}, outputs), "nothing was thrown");
+  EXPECT_NE(refusal(joints, {"dx_mm", "dy_mm", "dw_mm"}).find("\"dw_mm\" of the correction is none of"),
+            std::string::npos);
+  CorrectedRobot shorter{truth, right};
+  shorter.robot.chain.joints.pop_back();
+  EXPECT_THROW(positions(shorter, {seen.poses.joints.leftCols(5), {}}), std::invalid_argument);
+}
+
+TEST(Correction, OfAFileThatIsNoModelShowsNothingOfIt) {
+  const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / "correction_secret_test";
+  std::filesystem::create_directories(folder);
+  Robot robot = mdh_like();
+  robot.correction_file = "../correction_secret_test/secret.txt";
+  save(robot, (folder / "arm.yaml").string());
+  write_file((folder / "secret.txt").string(), "Password: 1234\n");
+  const auto refusal = [&] {
+    return oracle::thrown<std::runtime_error>([&] { read_corrected_robot((folder / "arm.yaml").string()); });
+  };
+  EXPECT_TRUE(refusal().starts_with((folder / "arm.yaml").string() + ": correction: ")) << refusal();
+  EXPECT_TRUE(refusal().ends_with("secret.txt is no model file")) << refusal();
+  const Measurements seen = with_step(robot, 300, 0.002, 15);
+  const Model other = fit(seen.poses.joints.leftCols(3), seen.positions_mm.leftCols(1)).model;
+  llmt::save(other.named({"b1", "b2", "b3"}, {"dx_mm"}), (folder / "secret.txt").string());
+  EXPECT_NE(refusal().find("secret.txt: llmt::robotics: the correction has the inputs b1, b2, b3"), std::string::npos)
+      << refusal();
   std::filesystem::remove_all(folder);
 }
 

@@ -5,6 +5,7 @@
 
 #include "llmt/robotics/catalogue.hpp"
 #include "llmt/robotics/robot_file.hpp"
+#include "oracles/thrown.hpp"
 #include "robotics/effects.hpp"
 
 namespace llmt::robotics {
@@ -112,13 +113,41 @@ TEST(EffectFiles, MistakesNameLineEffectAndWhatWouldBeRight) {
   expect_refused("type: elastic_base, at: joint1, compliance_rad_per_Nm: 0", "unknown key \"at\"");
   const std::string formula = "type: formula, name: own, coefficients: [1], ";
   EXPECT_NO_THROW(parse_robot(arm_with(formula + "at: joint1, terms: [{joint: sin(q1)}]"), "arm.yaml"));
-  expect_refused(formula + "at: joint1, terms: [{joint: sin(q1}]", "\"sin(q1\": ");
+  expect_refused(formula + "at: joint1, terms: [{joint: sin(q1}]", "of \"sin(q1\": ");
+  expect_refused(formula + "at: joint1, terms: [{joint: q1=3}]", "column 3 of \"q1=3\": == compares; = is not allowed");
   expect_refused(formula + "at: joint1, terms: [{joint: sin(q3)}]", "names q3, the robot has 2 joints");
   expect_refused(formula + "terms: [{joint: sin(q1)}]", "there is no \"at\"");
   expect_refused(formula + "terms: [{x: q1, y: q1}]", "one of joint, x, y, z");
   expect_refused(formula + "terms: [{x: q1, scale: 0}]", "\"scale\" is 0, must be > 0");
   expect_refused(formula + "terms: [{text: q1}]", "needs one of the keys");
   expect_refused(formula + "terms: [{x: q1}, {y: q1}]", "has 1 values, must be 2");
+}
+
+TEST(EffectFiles, MistakesInTermsAreFoundAtTheirLine) {
+  const std::string text = arm_with("type: joint_gain, at: joint1, gain: 0") +
+                           "  - type: formula\n    name: own\n    coefficients: [1, 1]\n    terms:\n      - x: q1\n"
+                           "      - unit: mm\n        y: q1 = 2\n";  // in line 14
+  EXPECT_EQ(oracle::thrown<std::runtime_error>([&] { parse_robot(text, "arm.yaml"); }),
+            "arm.yaml:14: effects[1].terms[1]: column 4 of \"q1 = 2\": == compares; = is not allowed");
+}
+
+std::string map_of(std::size_t values) {
+  std::string text = "type: joint_map, at: joint1, first_rad: 0, step_rad: 0.001, values_rad: [0";
+  for (std::size_t k = 1; k < values; ++k) text += ",0";
+  return text + "]";
+}
+
+TEST(EffectFiles, SizesAreBounded) {
+  EXPECT_EQ(parse_robot(arm_with(map_of(10000)), "arm.yaml").effects.front().values.size(), 10000U);
+  expect_refused(map_of(10001), "\"values_rad\" has 10001 numbers, at most 10000 are read");
+  EXPECT_EQ(oracle::thrown<std::runtime_error>([] {
+              parse_robot(arm_with(map_of(9999)) + "  - {type: drift, from: 0, to: 1, vx_mm: 0, vy_mm: 0, vz_mm: 0}\n",
+                          "arm.yaml");
+            }),
+            "arm.yaml:8: effects[1]: the effects have 10002 values up to here, at most 10000 are possible");
+  const std::string many =
+      oracle::thrown<std::runtime_error>([] { parse_robot(arm_with(map_of(400000)), "arm.yaml"); });
+  EXPECT_EQ(many, "arm.yaml:7: more than 300000 keys, values and lists");
 }
 
 TEST(Catalogue, TableAndFormulasHaveTheSameParameters) {
@@ -169,7 +198,7 @@ void expect_refused_catalogue(const std::string& text, const std::string& place,
 TEST(Catalogue, MistakesNameLineAndKey) {
   expect_refused_catalogue("  - {type: joint_gian}\n", "2: effects[0]", "no effect; known: joint_compliance");
   expect_refused_catalogue("  - type: joint_gain\n    serch: true\n", "3: effects[0]", "unknown key \"serch\"");
-  expect_refused_catalogue("  - type: joint_gain\n    search: perhaps\n", "2: effects[0]", "must be true or false");
+  expect_refused_catalogue("  - type: joint_gain\n    search: perhaps\n", "3: effects[0]", "must be true or false");
   expect_refused_catalogue("  - type: joint_gain\n    parameters: {gian: {scale: 1}}\n", "3: effects[0].parameters",
                            "unknown key \"gian\"; known: gain");
   expect_refused_catalogue("  - type: joint_gain\n    parameters:\n      gain: {scale: 0}\n",
@@ -178,7 +207,10 @@ TEST(Catalogue, MistakesNameLineAndKey) {
                            "4: effects[0].parameters.gain", "must not be above");
   expect_refused_catalogue("  - {formula: joint_gain, place: robot}\n", "2: effects[0]", "the name of another effect");
   const std::string own = "  - formula: own\n    place: joint\n    terms:\n      - ";
-  expect_refused_catalogue(own + "{joint: \"sin(q{}\", lower: 0, upper: 1}\n", "2: effects[0]", "\"sin(q99\": ");
+  expect_refused_catalogue(own + "{joint: \"sin(q{}\", lower: 0, upper: 1}\n", "5: effects[0].terms[0]",
+                           "of \"sin(q99\": ");
+  expect_refused_catalogue(own + "{joint: \"q{} = 1\", lower: 0, upper: 1}\n", "5: effects[0].terms[0]",
+                           "== compares; = is not allowed");
   expect_refused_catalogue(own + "{joint: \"q{}\", lower: 0}\n", "5: effects[0].terms[0]", "\"upper\" is missing");
   expect_refused_catalogue("  - {formula: own, place: robot, terms: [{joint: q1, lower: 0, upper: 1}]}\n",
                            "2: effects[0]", "acts on a joint");

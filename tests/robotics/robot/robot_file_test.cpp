@@ -123,18 +123,61 @@ TEST(RobotFile, MistakesNameLineKeyAndWhatWouldBeRight) {
   expect_message(with("d_mm: 100", "d_mm: .nan"), "arm.yaml:6", "\"d_mm\" must be a number");
   expect_message(with("[1, 2, 3]", "[1, 2]"), "arm.yaml:4: tool", "list of 3 numbers");
   expect_message(with("prismatic", "linear"), "arm.yaml:7", "must be revolute or prismatic");
-  expect_message(with("convention: dh", "convention: DH"), "arm.yaml:1", "must be dh or mdh");
+  expect_message(with("convention: dh", "convention: DH"), "arm.yaml:2: ", "must be dh or mdh");
   expect_message(with("joint_compliance", "joint_complience"), "arm.yaml:9: effects[0]",
                  "known: joint_compliance, joint_compliance_measured");
   expect_message(with("at: joint1", "at: joint7"), "arm.yaml:9: effects[0]", "no joint \"joint7\"");
-  expect_message(with("name: joint2", "name: joint1"), "arm.yaml:1", "\"joint1\" is taken");
-  expect_message(with("[-180, 180]", "[180, -180]"), "arm.yaml:1", "joint1: limits are [180, -180]");
+  expect_message(with("name: joint2", "name: joint1"), "arm.yaml:7: joints[1]", "\"joint1\" is taken");
+  expect_message(with("[-180, 180]", "[180, -180]"), "arm.yaml:6: joints[0]", "joint1: limits are [180, -180]");
   expect_message(good + "name: again\n", "arm.yaml:10", "\"name\" is there twice");
   expect_message(good + "jonts: []\n", "arm.yaml:10", "unknown key \"jonts\"");
   expect_message(with("joints:", "joints: ["), "arm.yaml:", "");
   expect_message("[1, 2]", "arm.yaml:1", "must be a map");
   expect_message("", "arm.yaml", "must be a map");
   EXPECT_THROW(read_robot("/does/not/exist.yaml"), std::runtime_error);
+}
+
+TEST(RobotFile, ValuesThatMakeNoSenseAreFoundAtTheirLine) {
+  std::string joint =
+      "  - name: joint3\n    type: revolute\n    alpha_deg: 0\n    a_mm: 0\n    d_mm: 0\n    theta_deg: 0\n";
+  const auto with_joint = [&](const std::string& field) { return with("effects:\n", joint + field + "effects:\n"); };
+  EXPECT_EQ(message_of(with_joint("    sign: 1\n")), "no error");
+  expect_message(with_joint("    sign: 3\n"), "arm.yaml:14: joints[2]", "sign is 3, must be 1 or -1");
+  expect_message(with_joint("    mass_kg: -1\n"), "arm.yaml:14: joints[2]", "mass_kg is -1");
+  expect_message(with_joint("    gear_ratio: 0\n"), "arm.yaml:14: joints[2]", "gear_ratio is 0");
+  expect_message(with_joint("    sign: -1\n    limits_deg: [1, 0]\n"), "arm.yaml:15: joints[2]", "limits are [1, 0]");
+  joint.replace(joint.find("joint3"), 6, "joint2");
+  expect_message(with_joint(""), "arm.yaml:8: joints[2]", "\"joint2\" is taken");
+  expect_message(with("joints:", "payload: {mass_kg: -2}\njoints:"), "arm.yaml:5: ", "payload mass_kg is -2");
+  expect_message("name: a\nconvention: dh\njoints: []\n", "arm.yaml:3: ", "there are no joints");
+  expect_message(good + "  - {type: joint_compliance, at: joint1, compliance_rad_per_Nm: 2e-7}\n",
+                 "arm.yaml:10: effects[1]", "effect joint_compliance@joint1 is there twice");
+  expect_message(good +
+                     "identified:\n  - {parameter: joint1.a, state: free}\n  - parameter: joint1.d\n    state: free\n"
+                     "    unit: m\n",
+                 "arm.yaml:14: identified[1]", "must be mm");
+  expect_message(good + "identified:\n  - {parameter: joint1.a, state: free}\n  - {parameter: joint1.a, state: free}\n",
+                 "arm.yaml:12: identified[1]", "\"joint1.a\" is there twice");
+}
+
+TEST(RobotFile, HoldsOneDocument) {
+  expect_message(good + "---\nname: other\n", "arm.yaml:1", "a second document begins, a file holds one");
+  EXPECT_EQ(message_of("---\n" + good + "...\n"), "no error");
+  EXPECT_EQ(message_of("# nothing\n---\n" + good), "no error");
+}
+
+TEST(RobotFile, SizesAreBounded) {
+  std::string joints;
+  for (int j = 3; j <= 101; ++j) {
+    joints +=
+        "  - {name: joint" + std::to_string(j) + ", type: revolute, alpha_deg: 0, a_mm: 0, d_mm: 0, theta_deg: 0}\n";
+  }
+  expect_message(with("effects:\n", joints + "effects:\n"), "arm.yaml:6", "\"joints\" has 101 entries, at most 100");
+  expect_message(with("name: two", "name: " + std::string(20000, 'x')), "arm.yaml:1",
+                 "\"name\" has 20000 characters, at most 10000 are read");
+  expect_message(good + std::string(17 << 20, '#'), "arm.yaml: ", "bytes, at most 16777216 are read");
+  const std::string message = message_of(with("d_mm: 100", "d_mm: " + std::string(100000, 'x')));
+  EXPECT_LT(message.size(), 200U) << message;
 }
 
 }  // namespace

@@ -67,9 +67,9 @@ struct Chain {
   Payload payload;
 };
 
-/// Throws std::invalid_argument naming joint, field, value and bound: no joints, repeated or empty joint names, names
-/// that collide with "base" or "tool", non-finite numbers, sign other than +1 or -1, limits out of order, negative
-/// mass.
+/// Throws std::invalid_argument naming joint, field, value and bound: no joints or more than 100, repeated or empty
+/// joint names, names that collide with "base" or "tool", non-finite numbers, sign other than +1 or -1, limits out of
+/// order, negative mass.
 void validate(const Chain& chain);
 
 /// The geometric parameters in their fixed order: base.{x,y,z,rx,ry,rz}, tool.{...}, then per joint

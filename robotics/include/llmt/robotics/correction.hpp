@@ -33,11 +33,12 @@ struct CorrectedRobot {
 FitResult fit_correction(const Robot& robot, const Measurements& measurements, const FitOptions& options = {});
 
 /// Tool positions in the world frame, n x 3, mm. Throws std::invalid_argument if the model's inputs are not the robot's
-/// joints or an output is none of the three.
+/// joints in their order, named q1_rad, q2_rad, ... (_mm if prismatic), or an output is none of the three or there
+/// twice.
 Eigen::MatrixXd positions(const CorrectedRobot& robot, const Poses& poses);
 
 /// Reads the robot and, if it names one, its correction model; a relative path is relative to the robot file. Throws
-/// std::runtime_error.
+/// std::runtime_error, whose message shows nothing of a file that is no model.
 CorrectedRobot read_corrected_robot(const std::string& path);
 
 }  // namespace llmt::robotics

@@ -13,11 +13,14 @@
 
 namespace llmt::robotics {
 
+/// Largest coordinate of a tool position that is taken for a position, mm. Squares of larger ones lose all meaning.
+inline constexpr double farthest_mm = 1e15;
+
 /// The poses of the given rows.
 Poses select(const Poses& poses, const std::vector<Eigen::Index>& rows);
 
 /// Throws std::invalid_argument: see validate(Chain), unknown effects, non-finite effect values, an effect named twice
-/// at one place.
+/// at one place, more than 1000 effects or 10 000 values of all effects.
 void validate(const Robot& robot);
 
 /// All parameters: geometry (see geometric_parameters()), then the effects' in order, named as by
@@ -30,6 +33,11 @@ Robot with_values(Robot robot, const Eigen::VectorXd& values);
 /// Tool positions in the world frame, n x 3, mm.
 /// Throws std::invalid_argument if the number of joints does not match or a column that an effect needs is missing.
 Eigen::MatrixXd positions(const Robot& robot, const Poses& poses);
+
+/// Why the positions() make no sense, or nothing if they do: the first pose, counted from 1, at which one is not finite
+/// or beyond farthest_mm, and the effect that makes it so. Numbers of a description may be finite and their products
+/// not, and an expression may divide by zero. Throws as positions().
+std::string position_refusal(const Robot& robot, const Poses& poses);
 
 /// Derivatives of the tool positions by parameters(), 3n x P: rows x, y, z of pose 0, then of pose 1, ...
 /// Geometry columns are exact for a rigid robot; with effects they hold the deformation constant (a relative error of

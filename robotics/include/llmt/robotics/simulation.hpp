@@ -9,15 +9,16 @@
 namespace llmt::robotics {
 
 struct SimulationOptions {
-  Eigen::Index poses = 200;
-  double noise_um = 0.0;  ///< standard deviation of each measured coordinate, normal
+  Eigen::Index poses = 200;  ///< 1 ... 1 000 000
+  double noise_um = 0.0;     ///< standard deviation of each measured coordinate, normal; 0 ... 1e12
   std::uint64_t seed = 1;
 };
 
 /// Poses uniform within the joint limits (revolute joints without limits: +-180 deg), and where the robot, its effects
 /// included, puts its tool. The same options give the same numbers on every platform, up to the last bits of sine and
-/// cosine. Throws std::invalid_argument: see validate(Robot); fewer than one pose, negative noise, a prismatic joint
-/// without limits. Columns that effects need are filled in by with_needed_columns().
+/// cosine. Throws std::invalid_argument: see validate(Robot); a number of poses or a noise out of range, a prismatic
+/// joint without limits. Throws std::runtime_error, see position_refusal(), if a position makes no sense. Columns that
+/// effects need are filled in by with_needed_columns().
 Measurements simulate(const Robot& robot, const SimulationOptions& options = {});
 
 /// The same at given poses; `poses` of the options does not matter.
