@@ -180,11 +180,11 @@ void Line::jump(Eigen::Index input, double to, const Eigen::VectorXd& parts, Pla
 
 // Degree of the prediction, as a polynomial of the position, around a point on the line.
 int Line::degree(const Eigen::VectorXd& row) const {
-  struct Open {
+  struct OpenNode {
     int node;
     int degree;  // of the validity
   };
-  std::vector<Open> open = {{0, 0}};
+  std::vector<OpenNode> open = {{0, 0}};
   int largest = 0;
   while (!open.empty()) {
     const auto [index, of_validity] = open.back();
