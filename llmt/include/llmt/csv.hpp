@@ -119,7 +119,7 @@ class Csv {
   bool more_follows_ = false;
 
   friend class CsvPieces;
-  void read_header(std::size_t begin);  // `begin`: after a byte-order mark
+  void read_header(std::size_t first);  // `first`: after a byte-order mark
   void find_rows();
   std::string_view record_text(std::size_t begin) const;
   Eigen::Index line_at(std::size_t offset) const;

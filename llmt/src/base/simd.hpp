@@ -22,8 +22,9 @@
 
 namespace llmt {
 
-/// Eight doubles with the alignment of one, so that they may be read from any address.
-using Lanes = double __attribute__((vector_size(64), aligned(8)));
+/// Eight doubles with the alignment of one, so that they may be read from any address. In an alias declaration clang
+/// ignores `aligned`.
+typedef double Lanes __attribute__((vector_size(64), aligned(8)));  // NOLINT(modernize-use-using)
 inline constexpr Eigen::Index lanes = 8;
 
 /// Four doubles. A comparison of two quads is a mask; `mask ? a : b` chooses number by number.
@@ -36,7 +37,7 @@ constexpr Eigen::Index padded_to_quads(Eigen::Index count) { return (count + qua
 
 /// Loads a quad from any address.
 LLMT_INLINE Quad load_quad(const double* from) {
-  using Anywhere = double __attribute__((vector_size(32), aligned(8), may_alias));
+  typedef double Anywhere __attribute__((vector_size(32), aligned(8), may_alias));  // NOLINT(modernize-use-using)
   return *reinterpret_cast<const Anywhere*>(from);
 }
 

@@ -35,8 +35,8 @@ Csv Csv::parse(std::string text, std::string name) {
   return csv;
 }
 
-void Csv::read_header(std::size_t begin) {
-  header_begin_ = begin;
+void Csv::read_header(std::size_t first) {
+  header_begin_ = first;
   while (header_begin_ < text_.size() && csv::is_blank(record_text(header_begin_))) {
     header_begin_ = text_.find('\n', header_begin_);
     header_begin_ = header_begin_ == std::string::npos ? text_.size() : header_begin_ + 1;
