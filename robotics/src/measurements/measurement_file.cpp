@@ -161,7 +161,7 @@ void Header::positions(Measurements& measurements) const {
 void Header::check_reach(const Eigen::VectorXd& coordinate_mm, const std::string& column) const {
   for (Eigen::Index row = 0; row < coordinate_mm.size(); ++row) {
     if (std::abs(coordinate_mm(row)) <= farthest_mm) continue;
-    throw std::runtime_error(fmt::format("{}:{}: column \"{}\": {} mm, at most {} mm are possible", csv_.name(),
+    throw std::runtime_error(fmt::format("{}:{}: column \"{}\": {} mm, at most {:g} mm are possible", csv_.name(),
                                          csv_.line_of(row), column, coordinate_mm(row), farthest_mm));
   }
 }

@@ -96,7 +96,7 @@ std::string position_refusal(const Robot& robot, const Poses& poses) {
     cause = "effect " + effect_label(*next);
   }
   return fmt::format(
-      "the tool position of pose {} is {}, {}, {} mm, which is not finite or beyond {} mm; {} makes it so", row + 1,
+      "the tool position of pose {} is {}, {}, {} mm, which is not finite or beyond {:g} mm; {} makes it so", row + 1,
       all(row, 0), all(row, 1), all(row, 2), farthest_mm, cause);
 }
 

@@ -1,0 +1,77 @@
+// CSV text: a table read whole and the same table read in pieces hold the same.
+#include <optional>
+#include <sstream>
+#include <stdexcept>
+
+#include "fuzz/fuzz.hpp"
+#include "llmt/csv.hpp"
+
+namespace {
+
+struct Outcome {
+  std::vector<std::string> rows;  // line, text, numbers and words of each
+  std::string error;              // or none
+};
+
+void add_rows(const llmt::Csv& csv, std::vector<std::string>& rows) {
+  const std::size_t before = rows.size();
+  const llmt::CsvNumbers numbers = csv.read_numbers(csv.columns(), 1);
+  for (Eigen::Index row = 0; row < csv.rows(); ++row) {
+    std::string& text = rows.emplace_back(fmt::format("{}|{}", csv.line_of(row), csv.row_text(row)));
+    for (Eigen::Index column = 0; column < numbers.values.cols(); ++column) {
+      text += fmt::format("|{}", numbers.values(row, column));
+    }
+  }
+  csv.visit_texts(csv.columns(), [&](Eigen::Index row, std::size_t, std::string_view cell) {
+    rows[before + row] += fmt::format("|{}", cell);
+  });
+}
+
+// A row that lacks fields and that nothing but blank lines follow is known to be the last one by a reader of the whole
+// text alone.
+std::string without_hint(std::string message) {
+  const std::size_t hint = message.find(" (is the file cut off?)");
+  return hint == std::string::npos ? message : message.erase(hint);
+}
+
+Outcome whole(const std::string& text) {
+  Outcome outcome;
+  try {
+    add_rows(llmt::Csv::parse(text, "t"), outcome.rows);
+  } catch (const std::runtime_error& error) {
+    outcome.error = without_hint(error.what());
+  }
+  return outcome;
+}
+
+Outcome in_pieces(const std::string& text, std::size_t bytes) {
+  Outcome outcome;
+  std::istringstream stream(text);
+  llmt::CsvPieces pieces(stream, "t", bytes);
+  try {
+    while (const std::optional<llmt::Csv> piece = pieces.next()) {
+      fuzz::require(piece->rows() > 0, "a piece has rows");
+      add_rows(*piece, outcome.rows);
+    }
+  } catch (const std::runtime_error& error) {
+    outcome.error = without_hint(error.what());
+  }
+  return outcome;
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const std::string text = fuzz::text_of(data, size);
+  const Outcome expected = whole(text);
+  for (const std::size_t bytes : {std::size_t{1}, 1 + size % 17, size + 1}) {
+    const Outcome outcome = in_pieces(text, bytes);
+    fuzz::require(outcome.error == expected.error,
+                  fmt::format("pieces of {} bytes say '{}', the whole '{}'", bytes, outcome.error, expected.error));
+    // Rows before an error have been handed out.
+    if (expected.error.empty()) {
+      fuzz::require(outcome.rows == expected.rows, fmt::format("pieces of {} bytes are together the whole", bytes));
+    }
+  }
+  return 0;
+}

@@ -1,0 +1,53 @@
+// Intervals in model files: a file whose model and intervals are both accepted gives bounds for every output.
+#include <unistd.h>
+
+#include <filesystem>
+#include <stdexcept>
+
+#include "fuzz/fitted_models.hpp"
+#include "fuzz/json_mutator.hpp"
+#include "llmt/files.hpp"
+#include "llmt/intervals.hpp"
+
+namespace {
+
+const std::vector<std::string> words = {"", "x1", "y", "model", "residuals", "intervals", "format"};
+
+// A file of this process, made once and written anew for each input.
+const std::string& scratch() {
+  static const std::string path =
+      (std::filesystem::temp_directory_path() / fmt::format("llmt-fuzz-{}.json", ::getpid())).string();
+  static const int removed = std::atexit([] { std::filesystem::remove(path); });
+  static_cast<void>(removed);
+  return path;
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  fuzz::Bytes bytes(data, size);
+  fuzz::Json json = fuzz::Json::parse(bytes.one_of(fuzz::fitted_models()));
+  // Folds of the model, or of another one, or of both.
+  const fuzz::Json model = bytes.byte() % 4 == 0 ? fuzz::Json::parse(bytes.one_of(fuzz::fitted_models())) : json;
+  const fuzz::Json other = bytes.byte() % 4 == 0 ? fuzz::Json::parse(bytes.one_of(fuzz::fitted_models())) : model;
+  fuzz::Json residuals = fuzz::Json::array();
+  for (std::size_t o = 0; o < model["outputs"].size(); ++o) residuals.push_back({0.5, 0.1, 0.2, 0.4, 0.3, 0.6});
+  json["intervals"] = {{{"residuals", residuals}, {"model", model}}, {{"residuals", residuals}, {"model", other}}};
+  if (bytes.coin()) fuzz::mutate(json["intervals"], bytes, words);
+  if (bytes.byte() % 4 == 0) fuzz::mutate(json, bytes, words);
+  llmt::write_file(scratch(), json.dump(-1, ' ', false, fuzz::Json::error_handler_t::replace));
+  try {
+    const llmt::Model read = llmt::load(scratch());
+    const llmt::Intervals intervals = llmt::load_intervals(scratch());
+    if (intervals.empty()) return 0;
+    const Eigen::MatrixXd x = Eigen::MatrixXd::Constant(3, read.num_inputs(), 0.25);
+    Eigen::Index rows = 0;
+    for (const Eigen::MatrixXd& each : intervals.residuals()) rows += each.rows();
+    if (rows < 9) return 0;  // too few for the level
+    const llmt::Bounds bounds = intervals.predict(x, 0.9, 1);
+    fuzz::require(bounds.lower.cols() == read.num_outputs(), "there are bounds for every output");
+  } catch (const std::runtime_error& error) {
+    fuzz::require(std::string(error.what()).starts_with(scratch()), fmt::format("'{}' names the file", error.what()));
+  }
+  return 0;
+}
