@@ -31,7 +31,7 @@ TEST(HostileTables, NamesThatAreNotUtf8AreRefusedBeforeTheFit) {
   for (const char* options : {"", "--json", "-o m.json", "--stream --ignore kind"}) {
     const Outcome name = folder.run(llmt_program + " fit name.csv -t y " + options);
     EXPECT_EQ(name.exit_code, 1);
-    EXPECT_EQ(name.err, "llmt: name.csv: header: the name of column 1 is not valid UTF-8; write the table as UTF-8\n");
+    EXPECT_EQ(name.err, "llmt: name.csv:1: the name of column 1 of the header is not UTF-8\n");
   }
   EXPECT_NE(folder.run(llmt_program + " fit target.csv -t '" + latin + "'").err.find("the name of column 3"),
             std::string::npos);

@@ -164,7 +164,7 @@ TEST(RobotProgram, MistakesHaveTheirExitCodeAndMessage) {
   expect("calibrate bad.yaml few.csv", 1, "bad.yaml:1: key \"joints\" is missing");
   expect("calibrate " + arm + " none.csv", 1, "none.csv: cannot be read: No such file or directory");
   expect("simulate " + arm + " --poses 0", 2, "poses");
-  expect("simulate " + arm + " --poses 1000000000", 2, "must be between 1 and 1000000");
+  expect("simulate " + arm + " --poses 1000000000", 2, "must be a whole number from 1 to 1000000");
   expect("paper --study puma", 2, "puma");
 }
 

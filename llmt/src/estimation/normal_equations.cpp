@@ -113,7 +113,9 @@ Assembly::Assembly(const TrainingRows& training, Partition& partition, const Eig
 }
 
 NormalEquations Assembly::run(int max_threads) {
-  const bool overlap = partition_.validity.kind != ValidityKind::crisp;
+  // Logistic gates take the mean of the input for a missing value, as their local models do.
+  const ValidityKind kind = partition_.validity.kind;
+  const bool overlap = kind == ValidityKind::blend || kind == ValidityKind::gaussian;
   if (overlap && sums_.missing) describe_missing_by_validity(training_, evaluator_, leave_out_, partition_);
   const Eigen::Index at_once = std::clamp<Eigen::Index>(outer_products / packed_, 1, chunk_rows);
   for (Eigen::Index begin = 0; begin < training_.count(); begin += at_once) {

@@ -180,7 +180,8 @@ std::set<Key> compare_on_all_folds(HeldOutErrors& comparison, Eigen::Index coeff
   for (const auto& [least, best] : finalists_of(comparison, screening)) {
     const std::size_t reach = comparison.leaf_counts()[best.leaves] * coefficients <= cheap_unknowns ? 2 : 1;
     Ranked order = ranked(comparison, screening);
-    std::erase_if(order, [&](const auto& entry) { return entry.second.shape != best.shape; });
+    // clang 14 lets no lambda have a name of a structured binding.
+    std::erase_if(order, [shape = best.shape](const auto& entry) { return entry.second.shape != shape; });
     for (const auto& [error, key] : first_of_each(order, [](const Key& each) { return each.leaves; })) {
       if (key.leaves + reach >= best.leaves && key.leaves <= best.leaves + reach) {
         kept.insert(key);

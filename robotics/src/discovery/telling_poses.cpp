@@ -103,8 +103,7 @@ Payloads payloads_of(const Robot& robot, const Poses& poses) {
   } else {
     payloads.measured.assign(column->second.begin(), column->second.end());
     std::ranges::sort(payloads.measured);
-    const auto repeated = std::ranges::unique(payloads.measured);
-    payloads.measured.erase(repeated.begin(), repeated.end());
+    payloads.measured.erase(std::unique(payloads.measured.begin(), payloads.measured.end()), payloads.measured.end());
   }
   const std::size_t last = payloads.measured.size() - 1;
   const std::size_t taken = std::min(most, last + 1);

@@ -187,7 +187,7 @@ TEST(Explain, EqualsSmallStepsAlongTheLine) {
       const Eigen::MatrixXd exact = llmt::attribute(model, point).contributions;
       // Where a step crosses a jump, what its order changes is the step times the change of slope.
       const double bound = kind.validity == llmt::ValidityChoice::crisp ? 1e-2 : 1e-5;
-      EXPECT_LT((exact - step_by_step(model, point, reference, 2000)).cwiseAbs().maxCoeff(), bound)
+      EXPECT_LT((exact - step_by_step(model, point, reference, 8000)).cwiseAbs().maxCoeff(), bound)
           << k << " row " << row;
     }
   }

@@ -48,7 +48,9 @@ TEST(Expression, TooLongOnesAreNotShownWhole) {
   const std::string message = refusal(sum + "+a");
   EXPECT_NE(message.find("has 10001 characters, at most 10000 are read"), std::string::npos) << message;
   EXPECT_LT(message.size(), 200U);
-  EXPECT_LT(refusal(std::string(9999, 'x') + " y").size(), 400U);
+  std::string text(9999, 'x');
+  text += " y";
+  EXPECT_LT(refusal(text).size(), 400U);
 }
 
 }  // namespace

@@ -45,7 +45,7 @@ InputView view(const Inputs& inputs, Eigen::Index column) {
   const auto values = inputs.values.col(column);
   own.distinct.assign(values.begin(), values.end());
   std::ranges::sort(own.distinct);
-  own.distinct.erase(std::ranges::unique(own.distinct).begin(), own.distinct.end());
+  own.distinct.erase(std::unique(own.distinct.begin(), own.distinct.end()), own.distinct.end());
   if (own.distinct.empty()) return own;
   own.low = own.distinct.front();
   own.high = own.distinct.back();

@@ -100,7 +100,7 @@ double learn_missing_left(const GrowthData& data, const ExactLeaf& leaf, const N
   const Eigen::VectorXd weights = leaf.weights(missing);
   return learned_missing_left({.squares = weights.dot(apart.cwiseAbs2() * data.output_weights),
                                .products = weights.dot(apart.cwiseProduct(error) * data.output_weights),
-                               .weight = weights.sum()},
+                               .rows = static_cast<double>(weights.size())},
                               known);
 }
 

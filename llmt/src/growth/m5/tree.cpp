@@ -65,7 +65,7 @@ double learn_missing_left(const GrowthData& data, const Eigen::VectorXd& row_wei
     const Eigen::VectorXd error = data.outputs.row(row).transpose() - right;
     sums.squares += row_weights(row) * data.output_weights.dot(apart.cwiseAbs2());
     sums.products += row_weights(row) * data.output_weights.dot(apart.cwiseProduct(error));
-    sums.weight += row_weights(row);
+    sums.rows += 1.0;
   }
   return learned_missing_left(sums, known);
 }
