@@ -37,8 +37,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (bytes.byte() % 4 == 0) fuzz::mutate(json, bytes, words);
   llmt::write_file(scratch(), json.dump(-1, ' ', false, fuzz::Json::error_handler_t::replace));
   try {
-    const llmt::Model read = llmt::load(scratch());
-    const llmt::Intervals intervals = llmt::load_intervals(scratch());
+    const auto [read, intervals] = llmt::load_with_intervals(scratch());
     if (intervals.empty()) return 0;
     const Eigen::MatrixXd x = Eigen::MatrixXd::Constant(3, read.num_inputs(), 0.25);
     Eigen::Index rows = 0;

@@ -24,13 +24,11 @@ constexpr double reach_of_logistic = 1e-3;
 // Most numbers that the outer products of the rows of one step take: 64 MiB.
 constexpr Eigen::Index outer_products = Eigen::Index{1} << 23;
 
-// a += factor * b.
 inline void add_scaled(double* a, const double* b, double factor, Eigen::Index size) {
   for (Eigen::Index k = 0; k < size; ++k) {
     a[k] += factor * b[k];
   }
 }
-
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
 // A leaf that reaches a row.
