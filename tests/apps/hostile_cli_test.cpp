@@ -36,8 +36,8 @@ TEST(HostileTables, NamesThatAreNotUtf8AreRefusedBeforeTheFit) {
   EXPECT_NE(folder.run(llmt_program + " fit target.csv -t '" + latin + "'").err.find("the name of column 3"),
             std::string::npos);
   EXPECT_EQ(folder.run(llmt_program + " fit level.csv -t y --json").err,
-            "llmt: level.csv:23: column \"kind\": the category is not valid UTF-8; write the table as UTF-8\n");
-  EXPECT_EQ(folder.run(llmt_program + " fit unused.csv -t y --ignore '" + latin + "' --cv 0").exit_code, 0);
+            "llmt: level.csv:23: column \"kind\": the cell is not UTF-8\n");
+  EXPECT_EQ(folder.run(llmt_program + " fit unused.csv -t y --ignore '" + latin + "' --cv 0").exit_code, 1);
 }
 
 TEST(HostileTables, TheNameOfAFileMayBeAnything) {
