@@ -111,7 +111,9 @@ TEST_F(Files, WhatNeverEndsIsRefusedAtTheLimit) {
             "/dev/zero: cannot be read: it holds more than 16 MiB, the most that is read");
   EXPECT_EQ(oracle::thrown<std::runtime_error>([] { llmt::read_file("/dev/zero", {.line_bytes = 1 << 20}); }),
             "/dev/zero: cannot be read: no line ends within 1 MiB");
-  llmt::write_file(path("f"), std::string(4096, 'x') + "\n" + std::string(4096, 'x'));
+  std::string two_lines(4096, 'x');
+  two_lines.append("\n").append(4096, 'x');
+  llmt::write_file(path("f"), two_lines);
   EXPECT_EQ(llmt::read_file(path("f"), {.bytes = 8193}).size(), 8193U);
   EXPECT_EQ(oracle::thrown<std::runtime_error>([&] { llmt::read_file(path("f"), {.bytes = 8192}); }),
             path("f") + ": cannot be read: it holds more than 8 KiB, the most that is read");
