@@ -3,8 +3,9 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <cmath>
-#include <ranges>
+#include <span>
 #include <string_view>
 #include <vector>
 
@@ -122,10 +123,12 @@ void print_data(const FitRun& run, const FitResult& result) {
   }
   if (run.learning.options.loss == Loss::tukey) {
     const std::vector<Eigen::Index> rows = rows_without_weight(result.summary);
-    print(fmt::format("Rows left out by the Tukey loss: {} of {}{}\n", rows.size(), result.summary.loss_weights.size(),
-                      rows.empty() ? ""
-                                   : fmt::format(" (row {}{})", fmt::join(rows | std::views::take(10), ", "),
-                                                 rows.size() > 10 ? ", ..." : "")));
+    print(fmt::format(
+        "Rows left out by the Tukey loss: {} of {}{}\n", rows.size(), result.summary.loss_weights.size(),
+        rows.empty()
+            ? ""
+            : fmt::format(" (row {}{})", fmt::join(std::span(rows).first(std::min<std::size_t>(rows.size(), 10)), ", "),
+                          rows.size() > 10 ? ", ..." : "")));
   }
   if (!constant.empty()) {
     print(fmt::format("Constant, so without influence: {}\n", fmt::join(constant, ", ")));

@@ -49,7 +49,7 @@ std::shared_ptr<Compiled> compiled(const std::string& text, const discovery::Inp
   const std::vector<std::string> known = words_of(inputs, output);
   std::map<std::string, double> constants;
   if (std::ranges::find(known, "pi") == known.end()) constants["pi"] = std::numbers::pi;
-  auto result = std::make_shared<Compiled>(Expression(text, constants));
+  auto result = std::make_shared<Compiled>(Compiled{Expression(text, constants)});
   for (const std::string& name : result->expression.names()) {
     if (std::ranges::find(known, name) == known.end()) {
       throw ExpressionError(fmt::format("\"{}\" is not an input; there are {}", name, fmt::join(known, ", ")));

@@ -9,12 +9,12 @@
 #include <vector>
 
 #include "llmt/fit.hpp"
-#include "oracles/messages.hpp"
 #include "oracles/oracles.hpp"
+#include "oracles/thrown.hpp"
 
 namespace random_trees {
 
-using oracle::message_of;
+using oracle::thrown;
 
 struct Kind {
   llmt::ValidityChoice validity;

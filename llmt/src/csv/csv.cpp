@@ -2,12 +2,12 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cstdint>
 #include <stdexcept>
 
+#include "base/memory.hpp"
 #include "csv/cells.hpp"
 #include "llmt/files.hpp"
 
@@ -17,10 +17,7 @@ namespace {
 std::string_view between(const char* begin, const char* end) { return {begin, static_cast<std::size_t>(end - begin)}; }
 
 // The most that the text of a table may take: the other half is for its numbers.
-std::uintmax_t half_of_memory() {
-  const auto pages = static_cast<std::uintmax_t>(std::max(::sysconf(_SC_PHYS_PAGES), 1L));
-  return pages * static_cast<std::uintmax_t>(::sysconf(_SC_PAGESIZE)) / 2;
-}
+std::uintmax_t half_of_memory() { return machine_memory() / 2; }
 
 // The first of these that the header has, outside quotes or inside.
 char separator_of(std::string_view header) {

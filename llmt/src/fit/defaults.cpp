@@ -108,6 +108,8 @@ std::string text_of(const Rows& rows) {
 // Coefficients that a tree whose leaves overlap may have: joint estimates cost the square of their number.
 constexpr Eigen::Index most_coefficients = 1500;
 constexpr Eigen::Index fewest_of_most_leaves = 20;
+// But never more coefficients than this, or the matrix of a joint estimate takes more than 300 MB.
+constexpr Eigen::Index most_joint_coefficients = 6000;
 constexpr Eigen::Index most_overlapping_leaves = 400;
 
 // Leaves on the two sides of splits on monotone inputs are compared in pairs.
@@ -122,7 +124,9 @@ constexpr Eigen::Index fewest_rows_of_overlapping = 5;
 Eigen::Index default_max_leaves(const Case& each, const Rule& rule, Eigen::Index coefficients) {
   if (rule.most_leaves > 0 && !rule.most_leaves_without_folds) return rule.most_leaves;
   if (each.overlapping || each.ordered) {
-    return std::clamp<Eigen::Index>(most_coefficients / coefficients, fewest_of_most_leaves,
+    const Eigen::Index fewest =
+        std::clamp<Eigen::Index>(most_joint_coefficients / coefficients, 2, fewest_of_most_leaves);
+    return std::clamp<Eigen::Index>(most_coefficients / coefficients, fewest,
                                     each.ordered ? most_ordered_leaves : most_overlapping_leaves);
   }
   if (each.folds && each.weakest_link && rule.grows_larger_to_be_pruned) return most_pruned_leaves;
@@ -142,10 +146,11 @@ std::string max_leaves_text() {
     }
   }
   text += fmt::format(
-      "{} / coefficients of a local model, within {} ... {}, where blends or Gaussians are candidates; "
-      "the same within {} ... {} if monotone inputs may be split; {} with --prune and folds; ",
-      most_coefficients, fewest_of_most_leaves, most_overlapping_leaves, fewest_of_most_leaves, most_ordered_leaves,
-      most_pruned_leaves);
+      "{} / coefficients of a local model, within {} ... {}, where blends or Gaussians are candidates, and no more "
+      "than "
+      "{} coefficients in all; the same within {} ... {} if monotone inputs may be split; {} with --prune and folds; ",
+      most_coefficients, fewest_of_most_leaves, most_overlapping_leaves, most_joint_coefficients, fewest_of_most_leaves,
+      most_ordered_leaves, most_pruned_leaves);
   for (const Rule& rule : rule_table()) {
     if (rule.most_leaves_without_folds) text += fmt::format("{} with {} without folds; ", rule.most_leaves, rule.name);
   }

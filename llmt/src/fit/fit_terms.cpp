@@ -9,9 +9,11 @@
 #include <optional>
 #include <stdexcept>
 
+#include "base/memory.hpp"
 #include "base/parallel.hpp"
 #include "estimation/leaf_statistics.hpp"
 #include "fit/grow_tree.hpp"
+#include "fit/memory.hpp"
 #include "fit/missing_weights.hpp"
 #include "llmt/outliers.hpp"
 #include "selection/selection.hpp"
@@ -27,6 +29,18 @@ struct Setting {
   const Plan& plan;
   const FitOptions& options;
 };
+
+void refuse_beyond_memory(const Setting& setting, Eigen::Index leaves) {
+  const Eigen::Index folds = std::ssize(setting.folds);
+  refuse_beyond_memory(size_of(setting.all, setting.plan, leaves, folds, setting.options.max_threads),
+                       machine_memory());
+}
+
+Eigen::Index most_leaves(const std::vector<GrownTree>& trees) {
+  Eigen::Index most = 0;
+  for (const GrownTree& tree : trees) most = std::max(most, tree.partition.num_leaves());
+  return most;
+}
 
 // Calls FitOptions::progress, one call at a time.
 class Report {
@@ -158,12 +172,14 @@ FittedPartition fit_partition(const Setting& setting, const std::vector<int>& se
   const int threads = setting.options.max_threads;
   const bool has_folds = !setting.folds.empty();
   const std::vector<GrownTree> trees = grow_folds(setting, served, report);
+  refuse_beyond_memory(setting, most_leaves(trees));
   Selection choice;
   if (has_folds) {
     const Eigen::VectorXd weights = error_weights(*setting.all.table, served);
     choice = select(setting.folds, trees, setting.plan.candidates, weights, threads);
   }
   const FinalTree grown = grow_tree(setting.all, served, setting.plan, !has_folds, threads);
+  refuse_beyond_memory(setting, grown.tree.partition.num_leaves());
   if (!has_folds) choice = first_candidate(setting.plan.candidates, grown.tree.partition.num_leaves());
   std::vector<Partition> of_folds = finish_folds(setting, trees, choice);
   FittedPartition fitted = finish(setting, grown, std::move(choice), std::move(of_folds));
@@ -239,6 +255,7 @@ FitResult fit_terms(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen
   const std::vector<FoldRows> folds = deal(weighted, table, data.folds(), options.max_threads);
   const Plan plan = with_defaults(options, all, std::ssize(folds));
   const Setting setting{all, measured, folds, plan, options};
+  refuse_beyond_memory(setting, 0);
   const std::vector<std::vector<int>> groups = output_groups(table.outputs.cols(), options.shared_partition);
   Report report(options, std::ssize(groups) * (std::ssize(folds) + 1));
   std::vector<std::optional<FittedPartition>> fitted(groups.size());

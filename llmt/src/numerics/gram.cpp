@@ -187,12 +187,11 @@ void add_rows(const Features& features, const int* rows, Eigen::Index count, dou
 void add(const GramShape& shape, const double* other, double* gram) { add_vectors(other, gram, shape.size()); }
 
 ResidualSums::ResidualSums(const GramShape& shape, const Eigen::VectorXd& weights)
-    : shape_(shape), weights_(weights.begin(), weights.end()) {
-  const Eigen::Index columns = shape.columns();
-  scratch_.resize(2 * columns + columns * (columns + 1) / 2);
-}
+    : shape_(shape), weights_(weights.begin(), weights.end()) {}
 
 void ResidualSums::evaluate(const double* const* grams, Eigen::Index count, double* rss, int* rank) {
+  const Eigen::Index columns = shape_.columns();
+  scratch_.resize(2 * columns + columns * (columns + 1) / 2);
   for (Eigen::Index k = 0; k < count; k += lanes) {
     std::array<const double*, 8> eight;
     for (Eigen::Index l = 0; l < lanes; ++l) {

@@ -86,6 +86,9 @@ class ResidualSums {
   /// rss[i] and rank[i] of grams[i], i < count.
   void evaluate(const double* const* grams, Eigen::Index count, double* rss, int* rank);
 
+  /// Frees the working memory, eight times that of a Gram matrix. evaluate() takes it again.
+  void forget() { std::vector<Slot>().swap(scratch_); }
+
  private:
   struct alignas(64) Slot {
     std::array<double, 8> values;

@@ -27,7 +27,7 @@ TEST(Missing, BlendOfCompleteRowsPredictsItsMeanOverTheMissingValue) {
   }
   const llmt::Model model = llmt::fit(x, y, {.validity = llmt::ValidityChoice::blend}).model;
   ASSERT_GT(model.partitions()[0].num_leaves(), 5);
-  const Eigen::MatrixXd asked = oracle::uniform(60, 3, 8);
+  const Eigen::MatrixXd asked = oracle::uniform(15, 3, 8);
   for (Eigen::Index input = 0; input < 3; ++input) {
     double squares = 0.0;
     double spread = 0.0;

@@ -9,11 +9,11 @@
 #include <vector>
 
 #include "llmt/fit.hpp"
-#include "oracles/messages.hpp"
+#include "oracles/thrown.hpp"
 
 namespace local_models {
 
-using oracle::message_of;
+using oracle::thrown;
 
 using llmt::LocalTerms;
 using llmt::SparseChoice;

@@ -223,22 +223,22 @@ TEST(LocalModels, SameBytesAtAnyNumberOfThreadsAndOrderOfRowsChangesRoundingAlon
 TEST(LocalModels, MistakesAreNamed) {
   const Eigen::MatrixXd x = oracle::uniform(50, 14, 1);
   const Eigen::VectorXd y = x.col(0);
-  EXPECT_EQ(message_of([&] { llmt::fit(x, y, only(ValidityChoice::crisp, 2, LocalTerms::quadratic)); }),
+  EXPECT_EQ(thrown([&] { llmt::fit(x, y, only(ValidityChoice::crisp, 2, LocalTerms::quadratic)); }),
             "llmt::fit: the number of numeric regression inputs of quadratic local models (terms) is 14, "
             "it must be at most 13; regression_inputs chooses them");
   Eigen::MatrixXd large = x.leftCols(2);
   large(7, 1) = 1e80;
-  EXPECT_EQ(message_of([&] { llmt::fit(large, y, only(ValidityChoice::crisp, 2, LocalTerms::quadratic)); }),
+  EXPECT_EQ(thrown([&] { llmt::fit(large, y, only(ValidityChoice::crisp, 2, LocalTerms::quadratic)); }),
             "llmt::fit: a magnitude in inputs, with quadratic local models, is 1e+80, it must be at most 1e70");
   llmt::FitOptions options = only(ValidityChoice::blend, 2, LocalTerms::linear, SparseChoice::always);
   options.expert.estimation = llmt::Estimation::as_grown;
   EXPECT_EQ(
-      message_of([&] { llmt::fit(x, y, options); }),
+      thrown([&] { llmt::fit(x, y, options); }),
       "llmt::fit: sparse is always, it must be never where expert.estimation is as-grown, for those models are full");
   const llmt::Model model = llmt::fit(x.leftCols(2), y, only(ValidityChoice::crisp, 1, LocalTerms::quadratic)).model;
   std::vector<llmt::Regressor> regressors = model.regressors();
   regressors.back().second_input = 2;
-  EXPECT_EQ(message_of([&] { llmt::Model(model.inputs(), model.outputs(), regressors, model.partitions()); }),
+  EXPECT_EQ(thrown([&] { llmt::Model(model.inputs(), model.outputs(), regressors, model.partitions()); }),
             "llmt::Model: regressor 4: inputs 1 and 2: a product is of two numeric inputs, the second not below the "
             "first");
 }

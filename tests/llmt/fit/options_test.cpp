@@ -18,26 +18,26 @@ constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 TEST(Fit, MistakesInShapesAndLimitsAreNamed) {
   const Eigen::MatrixXd x = oracle::uniform(10, 2, 15);
   const Eigen::MatrixXd y = x.col(0);
-  EXPECT_EQ(message_of([&] { llmt::fit(x, y.topRows(9)); }), "llmt::fit: inputs has 10 rows, outputs has 9");
-  EXPECT_EQ(message_of([&] { llmt::fit(Eigen::MatrixXd(0, 2), Eigen::MatrixXd(0, 1)); }),
+  EXPECT_EQ(thrown([&] { llmt::fit(x, y.topRows(9)); }), "llmt::fit: inputs has 10 rows, outputs has 9");
+  EXPECT_EQ(thrown([&] { llmt::fit(Eigen::MatrixXd(0, 2), Eigen::MatrixXd(0, 1)); }),
             "llmt::fit: inputs is 0 x 2, at least one row and one column are needed");
   Eigen::MatrixXd bad = x;
   bad(3, 1) = std::numeric_limits<double>::infinity();
-  EXPECT_EQ(message_of([&] { llmt::fit(bad, y); }),
+  EXPECT_EQ(thrown([&] { llmt::fit(bad, y); }),
             "llmt::fit: inputs(3, 1) is inf, it must be finite, or NaN where it is missing (rows and columns counted "
             "from 0)");
   bad(3, 1) = std::nan("");
-  EXPECT_EQ(message_of([&] { llmt::fit(x, bad); }),
+  EXPECT_EQ(thrown([&] { llmt::fit(x, bad); }),
             "llmt::fit: outputs(3, 1) is nan, it must be finite (rows and columns counted from 0)");
-  EXPECT_EQ(message_of([&] { llmt::fit(x, y, {.split_inputs = {2}}); }),
+  EXPECT_EQ(thrown([&] { llmt::fit(x, y, {.split_inputs = {2}}); }),
             "llmt::fit: split_inputs names column 2, there are 2");
-  EXPECT_EQ(message_of([&] {
+  EXPECT_EQ(thrown([&] {
               llmt::fit(x, y, {.regression_inputs = {1, 1}});
             }),
             "llmt::fit: regression_inputs names column 1 twice");
-  EXPECT_EQ(message_of([&] { llmt::fit(x, y, {.expert = {.min_improvement = 1.5}}); }),
+  EXPECT_EQ(thrown([&] { llmt::fit(x, y, {.expert = {.min_improvement = 1.5}}); }),
             "llmt::fit: expert.min_improvement is 1.5, it must be in [0, 1)");
-  EXPECT_EQ(message_of([&] { llmt::fit(x, y, {.folds = {.count = 1}}); }),
+  EXPECT_EQ(thrown([&] { llmt::fit(x, y, {.folds = {.count = 1}}); }),
             "llmt::fit: folds.count is 1, it must be 0 or at least 2");
 }
 
@@ -47,7 +47,7 @@ TEST(Fit, MistakesInWeightsCategoriesAndBlendsAreNamed) {
   const auto error = [&](const std::function<void(llmt::FitOptions&)>& change) {
     llmt::FitOptions options;
     change(options);
-    return message_of([&] { llmt::fit(x, y, options); });
+    return thrown([&] { llmt::fit(x, y, options); });
   };
   const auto starts = [](const std::string& text, const std::string& with) {
     return text.rfind(with, 0) == 0 ? with : text;
@@ -57,7 +57,7 @@ TEST(Fit, MistakesInWeightsCategoriesAndBlendsAreNamed) {
   EXPECT_NE(category.find("it must be a whole number from 0 to 9999"), std::string::npos) << category;
   Eigen::MatrixXd halves = x;
   halves.col(1).setConstant(1.5);
-  EXPECT_EQ(message_of([&] { llmt::fit(halves, y, {.categorical_inputs = {1}}); }),
+  EXPECT_EQ(thrown([&] { llmt::fit(halves, y, {.categorical_inputs = {1}}); }),
             "llmt::fit: a category of input 1 is 1.5, it must be a whole number from 0 to 9999");
   EXPECT_EQ(error([](auto& options) { options.categorical_inputs = {2}; }),
             "llmt::fit: categorical_inputs names column 2, there are 2");
@@ -80,7 +80,7 @@ TEST(Fit, MistakesInWeightsCategoriesAndBlendsAreNamed) {
   const llmt::Model model = llmt::fit(x, y).model;
   Eigen::MatrixXd query = x;
   query(2, 1) = -std::numeric_limits<double>::infinity();
-  EXPECT_EQ(message_of([&] { model.predict(query); }),
+  EXPECT_EQ(thrown([&] { model.predict(query); }),
             "llmt::Model::predict: inputs(2, 1) is -inf, it must be finite, or NaN where it is missing (rows and "
             "columns counted from 0)");
 }

@@ -83,13 +83,14 @@ struct Result {
 };
 
 // As growth does it: the inputs share what the edges of their blocks found.
-Result search(const Problem& problem, Eigen::Index min_leaf_samples) {
+Result search(const Problem& problem, Eigen::Index min_leaf_samples, bool forget = false) {
   std::vector<llmt::InputSearch> searches;
   searches.reserve(problem.orders.size());
   double limit = std::numeric_limits<double>::infinity();
   for (std::size_t j = 0; j < problem.orders.size(); ++j) {
     searches.emplace_back(problem.node(), problem.values[j], problem.orders[j], min_leaf_samples).search_edges();
     limit = std::min(limit, searches.back().smallest());
+    if (forget) searches.back().forget_sums();
   }
   double smallest = limit;
   for (llmt::InputSearch& input : searches) {
@@ -119,6 +120,12 @@ void expect_brute_force(const Problem& problem, Eigen::Index min_leaf_samples) {
     EXPECT_EQ(found.split.left, expected.left);
     EXPECT_NEAR(found.split.rss, expected.rss, 1e-11 * problem.rss);
   }
+  // Sums that are formed again are the same sums.
+  const Result again = search(problem, min_leaf_samples, true);
+  EXPECT_EQ(again.input, found.input);
+  EXPECT_EQ(again.split.left, found.split.left);
+  EXPECT_EQ(again.split.rss, found.split.rss);
+  EXPECT_EQ(again.evaluations, found.evaluations);
 }
 
 Eigen::VectorXd ones(Eigen::Index rows) { return Eigen::VectorXd::Ones(rows); }

@@ -10,9 +10,13 @@ namespace {
 constexpr Eigen::Index kept_part = 4;
 constexpr Eigen::Index kept_nodes = 8;
 
+// In doubles, 128 MiB: about 100 inputs. A search holds three of them, besides those that wait.
+constexpr Eigen::Index largest_histogram = Eigen::Index{1} << 24;
+
 }  // namespace
 
 bool BinnedLeaves::possible(const GrowthData& data) {
+  if (BinnedRows::size_of_histogram(data) > largest_histogram) return false;
   const bool few_levels = std::ranges::all_of(data.num_levels, [](int levels) { return levels <= most_bins; });
   return few_levels && is_complete(data);
 }

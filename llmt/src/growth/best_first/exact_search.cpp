@@ -35,6 +35,9 @@ void consider_missing(const GrowthData& data, const ExactLeaf& leaf, const Searc
   best.tested = tested;
 }
 
+// Most doubles (256 MiB) that the sums of all inputs may take between the two steps of the search.
+constexpr Eigen::Index most_sums = Eigen::Index{1} << 25;
+
 // The search along one numeric input, with the edges of its blocks searched.
 InputSearch search_blocks(const GrowthData& data, const ExactLeaf& leaf, const SearchNode& node,
                           Eigen::Index split_input) {
@@ -51,11 +54,14 @@ SplitCandidate compare_all_thresholds(const GrowthData& data, const ExactLeaf& l
   const int threads = data.threads_for(leaf.inputs.rows() * data.split_inputs());
   std::vector<std::optional<InputSearch>> searches(inputs);
   std::vector<SplitCandidate> found(inputs);
+  const GramShape shape(node.features);
+  const bool forget = InputSearch::size_of_sums(shape, leaf.inputs.rows()) > most_sums / inputs;
   parallel_for(inputs, threads, [&](Eigen::Index j) {
     if (data.num_levels[j] > 0) {
       found[j] = search_categories(data, leaf, node, j);
     } else {
       searches[j].emplace(search_blocks(data, leaf, node, j));
+      if (forget) searches[j]->forget_sums();
     }
   });
   // The smallest RSS that any input has found bounds the search of all. It is taken after all edges are known, so that

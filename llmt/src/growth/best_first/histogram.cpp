@@ -16,11 +16,21 @@ constexpr int fewest_bins = 32;
 // Rows that are sorted into bins at a time: few enough that their features stay in the cache.
 constexpr Eigen::Index block_rows = 4096;
 
+Eigen::Index bins_of_input(const GramShape& shape, Eigen::Index inputs) {
+  return std::clamp<Eigen::Index>(histogram_size / (shape.size() * inputs), fewest_bins, most_bins);
+}
+
 }  // namespace
 
+Eigen::Index BinnedRows::size_of_histogram(const GrowthData& data) {
+  const GramShape shape(std::ssize(data.training.regressors) + 1, data.outputs.cols());
+  Eigen::Index bins = 0;
+  for (const int levels : data.num_levels) bins += levels > 0 ? levels : bins_of_input(shape, data.split_inputs());
+  return shape.size() * bins;
+}
+
 BinnedRows::BinnedRows(const GrowthData& data) : data_(data), whitened_(data), shape_(whitened_.features()) {
-  const Eigen::Index bins = histogram_size / (shape_.size() * data.split_inputs());
-  inputs_ = make_bins(data, static_cast<int>(std::clamp<Eigen::Index>(bins, fewest_bins, most_bins)));
+  inputs_ = make_bins(data, static_cast<int>(bins_of_input(shape_, data.split_inputs())));
   Eigen::Index sum = 0;
   for (const Bins& input : inputs_.bins) {
     first_bin_.push_back(sum);

@@ -23,6 +23,9 @@ class BinnedRows {
  public:
   explicit BinnedRows(const GrowthData& data);
 
+  /// Doubles that the histogram of a node takes, at most.
+  static Eigen::Index size_of_histogram(const GrowthData& data);
+
   WhitenedRows& whitened() { return whitened_; }
   const WhitenedRows& whitened() const { return whitened_; }
   Eigen::Index num_bins() const { return first_bin_.back(); }  ///< of all inputs

@@ -21,6 +21,23 @@ constexpr Eigen::Index most_parts = 33;
 // Up to this many rows all splits of a block are compared.
 constexpr Eigen::Index few_rows = 16;
 
+// Where Gram matrices are large there are fewer blocks and parts, so that their sums take at most this many doubles
+// (64 MiB), but never fewer than the other number.
+constexpr Eigen::Index most_sums = Eigen::Index{1} << 23;
+constexpr Eigen::Index fewest_pieces = 4;
+
+// Every piece has a sum of its own, one of all rows to its left, and one of all to its right.
+constexpr Eigen::Index sums_of_piece = 3;
+
+Eigen::Index most_pieces(const GramShape& shape, Eigen::Index most) {
+  return std::min(most, std::max(fewest_pieces, most_sums / (sums_of_piece * shape.size())));
+}
+
+Eigen::Index rows_of_block(const GramShape& shape, Eigen::Index rows) {
+  const Eigen::Index most = most_pieces(shape, most_blocks);
+  return std::max(smallest_block, (rows + most - 1) / most);
+}
+
 }  // namespace
 
 InputSearch::InputSearch(const SearchNode& node, std::vector<double> values, std::span<const int> order,
@@ -60,20 +77,17 @@ bool InputSearch::holds_candidates(const Segment& segment) const {
   return first <= last && values_[first - 1] < values_[last];
 }
 
-// Gram matrices and RSS on either side of the inner edges, that is of all edges but the first and the last.
-void InputSearch::take_sides(const std::vector<Eigen::Index>& edges, const double* before, const double* behind,
-                             Sides& sides) {
+Eigen::Index InputSearch::size_of_sums(const GramShape& shape, Eigen::Index rows) {
+  return sums_of_piece * shape.size() * (rows / rows_of_block(shape, rows) + 1);
+}
+
+// Gram matrices between the edges, and on either side of the inner edges, that is of all but the first and the last.
+void InputSearch::sum_sides(const std::vector<Eigen::Index>& edges, const double* before, const double* behind,
+                            Sides& sides) const {
   const Eigen::Index size = shape_.size();
   const Eigen::Index inner = std::ssize(edges) - 2;
-  const std::size_t count = inner;
   sides.left.resize(inner * size);
-  sides.right.resize(sides.left.size());
-  for (std::vector<double>* rss : {&sides.rss_left, &sides.rss_right}) {
-    rss->resize(count);
-  }
-  for (std::vector<int>* rank : {&sides.rank_left, &sides.rank_right}) {
-    rank->resize(count);
-  }
+  sides.right.resize(inner * size);
   sides.parts.assign((inner + 1) * size, 0.0);
   for (Eigen::Index i = 0; i <= inner; ++i) {
     const Eigen::Index begin = edges[i];
@@ -84,17 +98,30 @@ void InputSearch::take_sides(const std::vector<Eigen::Index>& edges, const doubl
     add(shape_, sides.parts.data() + part * size, gram);
     return gram;
   };
-  std::vector<const double*> grams(count);
   const double* last = before;
   for (Eigen::Index i = 0; i < inner; ++i) {
-    last = grams[i] = sum(last, i, sides.left.data() + i * size);
+    last = sum(last, i, sides.left.data() + i * size);
   }
-  sums_.evaluate(grams.data(), inner, sides.rss_left.data(), sides.rank_left.data());
   last = behind;
   for (Eigen::Index i = inner; i-- > 0;) {
-    last = grams[i] = sum(last, i + 1, sides.right.data() + i * size);
+    last = sum(last, i + 1, sides.right.data() + i * size);
   }
-  sums_.evaluate(grams.data(), inner, sides.rss_right.data(), sides.rank_right.data());
+}
+
+// As above, and the RSS on either side.
+void InputSearch::take_sides(const std::vector<Eigen::Index>& edges, const double* before, const double* behind,
+                             Sides& sides) {
+  sum_sides(edges, before, behind, sides);
+  const std::size_t inner = edges.size() - 2;
+  const auto evaluate = [&](const std::vector<double>& sums, std::vector<double>& rss, std::vector<int>& rank) {
+    std::vector<const double*> grams(inner);
+    for (std::size_t i = 0; i < inner; ++i) grams[i] = sums.data() + i * shape_.size();
+    rss.resize(inner);
+    rank.resize(inner);
+    sums_.evaluate(grams.data(), inner, rss.data(), rank.data());
+  };
+  evaluate(sides.left, sides.rss_left, sides.rank_left);
+  evaluate(sides.right, sides.rss_right, sides.rank_right);
   evaluations_ += inner;
 }
 
@@ -111,12 +138,14 @@ void InputSearch::offer(const std::vector<Eigen::Index>& edges, const Sides& sid
 
 std::vector<InputSearch::Segment> InputSearch::cut(const Segment& segment, const std::vector<Eigen::Index>& edges,
                                                    const Sides& sides) const {
-  const Eigen::Index size = shape_.size();
   const std::size_t inner = edges.size() - 2;
+  const auto at = [&](const std::vector<double>& sums, std::size_t i) {
+    return sums.empty() ? nullptr : sums.data() + i * shape_.size();
+  };
   std::vector<Segment> result;
   for (std::size_t i = 0; i <= inner; ++i) {
-    result.push_back({edges[i], edges[i + 1], i == 0 ? segment.left : sides.left.data() + (i - 1) * size,
-                      i == inner ? segment.right : sides.right.data() + i * size,
+    result.push_back({edges[i], edges[i + 1], i == 0 ? segment.left : at(sides.left, i - 1),
+                      i == inner ? segment.right : at(sides.right, i),
                       i == 0 ? segment.rss_left : sides.rss_left[i - 1],
                       i == inner ? segment.rss_right : sides.rss_right[i]});
   }
@@ -127,7 +156,7 @@ std::vector<InputSearch::Segment> InputSearch::cut(const Segment& segment, const
 void InputSearch::search_edges() {
   const Eigen::Index rows = std::ssize(order_);
   if (tested_ == 0) return;
-  const Eigen::Index block = std::max(smallest_block, (rows + most_blocks - 1) / most_blocks);
+  const Eigen::Index block = rows_of_block(shape_, rows);
   for (Eigen::Index begin = 0; begin < rows; begin += block) {
     edges_.push_back(begin);
   }
@@ -152,30 +181,47 @@ void InputSearch::search_edges() {
   offer(edges_, sides_);
 }
 
+void InputSearch::forget_sums() {
+  for (std::vector<double>* sums : {&sides_.parts, &sides_.left, &sides_.right, &none_}) {
+    std::vector<double>().swap(*sums);
+  }
+  sums_.forget();
+  forgotten_ = true;
+}
+
+// Twice the tolerance: a split within the tolerance of the best one counts as equal to it.
+bool InputSearch::may_hold_the_best(const Segment& segment) const {
+  return segment.bound() <= std::min(limit_, smallest_) + 2.0 * tie_tolerance * node_.rss && holds_candidates(segment);
+}
+
 void InputSearch::refine(double limit) {
   limit_ = limit;
   if (edges_.empty()) {
-    look_into(all_, 0);
+    if (!forgotten_) look_into(all_, 0);
     return;
   }
   all_.rss_left = without_value_;
+  if (forgotten_) {
+    const auto is_promising = [&](const Segment& segment) { return may_hold_the_best(segment); };
+    if (std::ranges::none_of(cut(all_, edges_, sides_), is_promising)) return;
+    none_.assign(shape_.size(), 0.0);
+    all_.left = all_.right = none_.data();
+    sum_sides(edges_, none_.data(), none_.data(), sides_);
+  }
   for (const Segment& segment : cut(all_, edges_, sides_)) {
     look_into(segment, 0);
   }
 }
 
 void InputSearch::look_into(const Segment& segment, std::size_t depth) {
-  // Twice the tolerance: a split within the tolerance of the best one counts as equal to it.
-  if (segment.bound() > std::min(limit_, smallest_) + 2.0 * tie_tolerance * node_.rss || !holds_candidates(segment)) {
-    return;
-  }
+  if (!may_hold_the_best(segment)) return;
   if (deeper_.size() <= depth) {
     deeper_.resize(depth + 1);
   }
   const Eigen::Index length = segment.end - segment.begin;
   std::vector<Eigen::Index> edges{segment.begin};
   const bool all = length <= few_rows;
-  const Eigen::Index parts = std::min(most_parts, length / part_rows + 1);
+  const Eigen::Index parts = std::min(most_pieces(shape_, most_parts), length / part_rows + 1);
   for (Eigen::Index i = 1; i < (all ? length : parts); ++i) {
     const Eigen::Index edge = segment.begin + (all ? i : i * length / parts);
     if (!all || admissible(edge)) {

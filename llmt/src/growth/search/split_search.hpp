@@ -68,6 +68,12 @@ class InputSearch {
   /// First step: evaluates the edges of the blocks.
   void search_edges();
 
+  /// Most doubles that the first step takes for the Gram matrices of `rows` rows.
+  static Eigen::Index size_of_sums(const GramShape& shape, Eigen::Index rows);
+
+  /// Frees the Gram matrices of the first step. The second step forms them anew if it needs them.
+  void forget_sums();
+
   /// Smallest residual sum of squares found so far; infinity if there is none.
   double smallest() const { return smallest_; }
 
@@ -110,6 +116,9 @@ class InputSearch {
 
   bool admissible(Eigen::Index left) const;
   bool holds_candidates(const Segment& segment) const;
+  bool may_hold_the_best(const Segment& segment) const;
+  void sum_sides(const std::vector<Eigen::Index>& edges, const double* before, const double* behind,
+                 Sides& sides) const;
   void take_sides(const std::vector<Eigen::Index>& edges, const double* before, const double* behind, Sides& sides);
   void offer(const std::vector<Eigen::Index>& edges, const Sides& sides);
   void look_into(const Segment& segment, std::size_t depth);
@@ -126,6 +135,7 @@ class InputSearch {
   Eigen::Index tested_ = 0;
   Eigen::Index evaluations_ = 0;
   double without_value_ = 0.0;  // part of node.rss that falls on the rows without a value, the same for all splits
+  bool forgotten_ = false;      // the sums of sides_
   double limit_;
   double smallest_;
   std::vector<Found> found_;  // within the tolerance of the smallest
