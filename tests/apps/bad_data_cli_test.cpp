@@ -81,6 +81,12 @@ TEST(BadData, TooManyCategoriesAreNamed) {
             "llmt: d.csv:10002: column \"word\": more than 10000 categories (--ignore COLUMN leaves a column out)\n");
 }
 
+TEST(BadData, AColumnOfInfinityIsNoColumnOfWords) {
+  const Folder folder;
+  EXPECT_EQ(refusal(folder, "a,x,y\ninf,1,2\n,2,3\n1e400,3,4\n", "fit d.csv -t y"),
+            "llmt: d.csv:2: column \"a\": 'inf' is not finite (--ignore COLUMN leaves a column out)\n");
+}
+
 TEST(BadData, TextThatIsNotUtf8IsNamedBeforeTheWork) {
   const Folder folder;
   EXPECT_EQ(refusal(folder, "gr\xF6sse,y\n1,2\n2,3\n", "fit d.csv -t y --json"),

@@ -25,6 +25,7 @@ struct ColumnCells {
 
   Eigen::Index missing = 0;             ///< cells that are empty or say NA, N/A, NaN, null or ? (in any case)
   Eigen::Index other = 0;               ///< cells that are neither missing nor a finite number
+  Eigen::Index infinite = 0;            ///< those of the others that are numbers, as inf or 1e400
   Eigen::Index first_missing = no_row;  ///< row
   Eigen::Index first_other = no_row;    ///< row
 };

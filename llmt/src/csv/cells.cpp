@@ -186,7 +186,8 @@ Cell read_cell(const char*& cursor, const char* end, char separator, double& val
   const std::string_view text = bare(std::string_view(field, cursor - field));
   if (is_missing(text)) return Cell::missing;
   const char* const text_end = text.data() + text.size();
-  return number_end(text.data(), text_end, value) == text_end && std::isfinite(value) ? Cell::number : Cell::other;
+  if (number_end(text.data(), text_end, value) != text_end) return Cell::word;
+  return std::isfinite(value) ? Cell::number : Cell::infinite;
 }
 
 std::string problem_of(std::string_view field) {

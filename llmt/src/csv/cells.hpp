@@ -49,7 +49,7 @@ std::string unquoted(std::string_view field);
 /// there is no value. The result refers to `field`, or to `buffer` if doubled quotes were halved.
 std::string_view cell_text(std::string_view field, std::string& buffer);
 
-enum class Cell { number, missing, other };
+enum class Cell { number, missing, infinite, word };
 
 /// What the cell at `cursor` holds; a number is written to `value`. Moves `cursor` to the end of the field.
 Cell read_cell(const char*& cursor, const char* end, char separator, double& value);

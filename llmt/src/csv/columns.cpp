@@ -53,11 +53,13 @@ void count_cell(ColumnCells& cells, csv::Cell cell, Eigen::Index row) {
   Eigen::Index& first = missing ? cells.first_missing : cells.first_other;
   first = std::min(first, row);
   ++(missing ? cells.missing : cells.other);
+  if (cell == csv::Cell::infinite) ++cells.infinite;
 }
 
 void add(ColumnCells& sum, const ColumnCells& part) {
   sum.missing += part.missing;
   sum.other += part.other;
+  sum.infinite += part.infinite;
   sum.first_missing = std::min(sum.first_missing, part.first_missing);
   sum.first_other = std::min(sum.first_other, part.first_other);
 }

@@ -98,6 +98,8 @@ TEST(Csv, CellsThatAreNoNumbersAreCounted) {
   EXPECT_EQ(read.cells[1].first_other, 0);
   EXPECT_EQ(read.cells[2].first_missing, 0);
   EXPECT_EQ(read.cells[2].first_other, 2);
+  EXPECT_EQ(read.cells[1].infinite, 0);
+  EXPECT_EQ(read.cells[2].infinite, 1);
   EXPECT_EQ(read.values.array().isNaN().count(), 7);
   const std::vector<Eigen::Index> rows = {llmt::ColumnCells::no_row, 1, 1};
   EXPECT_EQ(error_of([&] { csv.refuse_first(csv.columns(), rows); }), "t.csv:3: column \"b\": 'right' is not a number");

@@ -93,7 +93,8 @@ TEST(JumpingTruth, SmoothAndKinkedTruthsHaveNoLargeJumps) {
     options.max_leaves = 20;
     options.significance = 1.0;
     options.folds.count = 0;
-    for (const llmt::Node& node : llmt::fit(x, y, options).model.partitions()[0].nodes) {
+    const llmt::Model model = llmt::fit(x, y, options).model;
+    for (const llmt::Node& node : model.partitions()[0].nodes) {
       splits += node.is_leaf() ? 0.0 : 1.0;
       crisp_splits += !node.is_leaf() && node.half_width == 0.0 ? 1.0 : 0.0;
     }
