@@ -2,6 +2,7 @@
 #include <optional>
 #include <sstream>
 #include <stdexcept>
+#include <string_view>
 
 #include "fuzz/fuzz.hpp"
 #include "llmt/csv.hpp"
@@ -30,8 +31,9 @@ void add_rows(const llmt::Csv& csv, std::vector<std::string>& rows) {
 // A row that lacks fields and that nothing but blank lines follow is known to be the last one by a reader of the whole
 // text alone.
 std::string without_hint(std::string message) {
-  const std::size_t hint = message.find(" (is the file cut off?)");
-  return hint == std::string::npos ? message : message.erase(hint);
+  constexpr std::string_view hint = " (is the file cut off?)";
+  if (message.ends_with(hint)) message.resize(message.size() - hint.size());
+  return message;
 }
 
 Outcome whole(const std::string& text) {

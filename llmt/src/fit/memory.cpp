@@ -45,7 +45,7 @@ void refuse_beyond_memory(const FitSize& size, std::uintmax_t available) {
   if (estimate <= static_cast<double>(available)) return;
   const std::string leaves = size.unknowns == 0 ? "" : fmt::format(" and {} leaves", size.unknowns / size.coefficients);
   throw std::runtime_error(
-      fmt::format("llmt::fit: {} rows with {} inputs{} need about {:.1f} GB of memory, this machine has {:.1f} GB; "
+      fmt::format("{} rows with {} inputs{} need about {:.1f} GB of memory, this machine has {:.1f} GB; "
                   "take fewer inputs "
                   "or a lower limit of leaves, or fit a stream",
                   size.rows, size.inputs, leaves, estimate / 1e9, static_cast<double>(available) / 1e9));
