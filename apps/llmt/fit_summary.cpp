@@ -118,6 +118,13 @@ void print_data(const FitRun& run, const FitResult& result) {
   }
   print(fmt::format("{}: {} rows, {} inputs: {}\n", run.learning.data, result.summary.samples, inputs.size(),
                     fmt::join(inputs, ", ")));
+  if (result.summary.repeats) {
+    print("Rows with equal inputs are taken for repeats of one measurement, and are held out together\n");
+  }
+  if (result.summary.copies > 0) {
+    print(fmt::format("Copies of other rows: {}; they only add to the weight of the rows that they copy\n",
+                      result.summary.copies));
+  }
   if (result.summary.missing_values > 0) {
     print(fmt::format("Missing values in the inputs: {}\n", result.summary.missing_values));
   }
@@ -168,6 +175,8 @@ Json summary_json(const FitRun& run, const FitResult& result) {
   Json json;
   json["data"] = run.learning.data;
   json["rows"] = result.summary.samples;
+  json["copies"] = result.summary.copies;
+  json["repeats"] = result.summary.repeats;
   json["missing_values"] = result.summary.missing_values;
   json["rule"] = name_of(run.learning.options.rule);
   json["min_leaf_samples"] = result.summary.min_leaf_samples;

@@ -80,7 +80,9 @@ struct PartitionSummary {
 };
 
 struct FitSummary {
-  Eigen::Index samples = 0;           ///< rows of positive weight
+  Eigen::Index samples = 0;           ///< rows of positive weight, copies included
+  Eigen::Index copies = 0;            ///< rows that were taken for copies of others and only add to their weight
+  bool repeats = false;               ///< rows with equal inputs were taken for repeats, and held out together
   Eigen::Index missing_values = 0;    ///< in the inputs
   Eigen::Index min_leaf_samples = 0;  ///< as used
   std::vector<PartitionSummary> partitions;

@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <numeric>
 #include <stdexcept>
 
+#include "data/equal_rows.hpp"
 #include "growth/rules/rule.hpp"
 #include "numerics/paired_difference.hpp"
 
@@ -39,6 +41,15 @@ Eigen::Index count_parameters(const Model& model) {
     }
   }
   return count;
+}
+
+// One label per row where rows are repeats or copies of others; else empty.
+std::vector<double> groups_of_repeats(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
+                                      const Eigen::Ref<const Eigen::MatrixXd>& output) {
+  std::vector<Eigen::Index> rows(inputs.rows());
+  std::iota(rows.begin(), rows.end(), 0);
+  const std::vector<int> group = find_equal_rows(inputs, output, rows).group;
+  return {group.begin(), group.end()};
 }
 
 bool is_least_squares(const Method& method) { return method.options.max_leaves == 1; }
@@ -144,6 +155,9 @@ ComparisonResult compare(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
   }
   FoldOptions fold_options = options.folds;
   fold_options.count = static_cast<int>(std::min<Eigen::Index>(fold_options.count, inputs.rows()));
+  const std::vector<double> repeats =
+      fold_options.groups.empty() ? groups_of_repeats(inputs, output) : std::vector<double>{};
+  if (!repeats.empty()) fold_options.groups = repeats;
   const std::vector<Fold> folds = make_folds(inputs.rows(), fold_options);
   const Eigen::Index total = std::ssize(methods) * (std::ssize(folds) + 1);
   Eigen::Index done = 0;

@@ -9,6 +9,8 @@
 #include <stdexcept>
 
 #include "base/checks.hpp"
+#include "base/count.hpp"
+#include "data/equal_rows.hpp"
 #include "data/regressors.hpp"
 
 namespace llmt {
@@ -178,17 +180,45 @@ std::vector<Eigen::Index> rows_of_weight(const Eigen::VectorXd& weights) {
 FitData::FitData(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<const Eigen::MatrixXd>& outputs,
                  const FitOptions& options, bool orders_splits)
     : folds_(options.folds), table_(make_table(inputs, outputs, options, orders_splits)) {
-  rows_ = rows_of_weight(table_->weights);
-  if (std::ssize(rows_) == inputs.rows()) return;
-  inputs_ = inputs(rows_, Eigen::all);
-  outputs_ = outputs(rows_, Eigen::all);
-  FitOptions of_kept = options;
-  of_kept.weights = table_->weights(rows_);
+  std::vector<Eigen::Index> rows = rows_of_weight(table_->weights);
+  row_of_.assign(inputs.rows(), -1);
+  for (int i = 0; i < count_of(rows); ++i) row_of_[rows[i]] = i;
+  Eigen::VectorXd weights = table_->weights;
   if (!options.folds.groups.empty()) {
-    for (const Eigen::Index row : rows_) groups_.push_back(options.folds.groups[row]);
-    folds_.groups = groups_;
+    for (const Eigen::Index row : rows) groups_.push_back(options.folds.groups[row]);
+  } else {
+    const EqualRows equal = find_equal_rows(inputs, outputs, rows);
+    has_repeats_ = equal.are_repeats;
+    if (has_repeats_) groups_.assign(equal.group.begin(), equal.group.end());
+    if (!equal.copy_of.empty()) leave_out_copies(equal.copy_of, rows, weights);
   }
+  if (!groups_.empty()) folds_.groups = groups_;
+  if (std::ssize(rows) == inputs.rows()) return;
+  inputs_ = inputs(rows, Eigen::all);
+  outputs_ = outputs(rows, Eigen::all);
+  FitOptions of_kept = options;
+  of_kept.weights = weights(rows);
   table_.emplace(make_table(inputs_, outputs_, of_kept, orders_splits));
+}
+
+// Adds the weights of copies to those of the rows that they copy, and leaves them out of `rows`.
+void FitData::leave_out_copies(const std::vector<int>& copy_of, std::vector<Eigen::Index>& rows,
+                               Eigen::VectorXd& weights) {
+  std::vector<Eigen::Index> left;
+  std::vector<double> groups;
+  for (int i = 0; i < count_of(rows); ++i) {
+    if (copy_of[i] != i) {
+      weights(rows[copy_of[i]]) += weights(rows[i]);
+      row_of_[rows[i]] = row_of_[rows[copy_of[i]]];
+      continue;
+    }
+    row_of_[rows[i]] = count_of(left);
+    left.push_back(rows[i]);
+    if (has_repeats_) groups.push_back(groups_[i]);
+  }
+  copies_ = std::ssize(rows) - std::ssize(left);
+  rows = std::move(left);
+  groups_ = std::move(groups);
 }
 
 }  // namespace llmt

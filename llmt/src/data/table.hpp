@@ -25,7 +25,8 @@ struct Table {
   std::vector<int> monotone = {};     ///< see FitOptions; empty: none
 };
 
-/// The caller's data. Nothing is copied unless there are rows of weight 0: then what takes part is.
+/// The caller's data. Rows of weight 0 take no part; copies of a row (find_equal_rows()) add to its weight; repeats of
+/// a measurement share a fold. Nothing is copied where all rows take part.
 class FitData {
  public:
   /// Throws std::invalid_argument as fit(). No columns named means all of them. `orders_splits`: the growth rule can
@@ -36,13 +37,21 @@ class FitData {
   FitData& operator=(const FitData&) = delete;
 
   const Table& table() const { return *table_; }
-  /// FitOptions::folds with the groups of the rows that take part.
+  /// FitOptions::folds with the groups of the table's rows.
   const FoldOptions& folds() const { return folds_; }
-  /// The caller's rows that take part, ascending.
-  const std::vector<Eigen::Index>& rows() const { return rows_; }
+  /// Of each row of the caller, the row of the table that it is; -1: it takes no part.
+  const std::vector<int>& row_of() const { return row_of_; }
+  /// The number of the caller's rows that are copies.
+  Eigen::Index copies() const { return copies_; }
+  /// Whether rows with equal inputs are repeats.
+  bool has_repeats() const { return has_repeats_; }
 
  private:
-  std::vector<Eigen::Index> rows_;
+  void leave_out_copies(const std::vector<int>& copy_of, std::vector<Eigen::Index>& rows, Eigen::VectorXd& weights);
+
+  std::vector<int> row_of_;
+  Eigen::Index copies_ = 0;
+  bool has_repeats_ = false;
   Eigen::MatrixXd inputs_;
   Eigen::MatrixXd outputs_;
   std::vector<double> groups_;

@@ -266,7 +266,11 @@ FitResult fit_terms(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen
                [&](Eigen::Index p) { fitted[p] = fit_partition(setting, groups[p], report); });
   std::vector<FittedPartition> finished;
   for (std::optional<FittedPartition>& each : fitted) finished.push_back(std::move(*each));
-  return assemble(setting, std::move(finished));
+  FitResult result = assemble(setting, std::move(finished));
+  result.summary.samples += data.copies();
+  result.summary.copies = data.copies();
+  result.summary.repeats = data.has_repeats();
+  return result;
 }
 
 }  // namespace llmt

@@ -72,8 +72,11 @@ Eigen::VectorXd robust_weights(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
   const Model of_clipped = fit_terms(table.inputs, clipped(table.outputs), first).model;
   first.weights = table.weights.cwiseProduct(biweights(of_clipped, table.inputs, table.outputs, options.max_threads));
   const Model of_weighted = fit_terms(table.inputs, table.outputs, first).model;
+  const Eigen::VectorXd of_table = biweights(of_weighted, table.inputs, table.outputs, options.max_threads);
   Eigen::VectorXd weights = Eigen::VectorXd::Zero(outputs.rows());
-  weights(data.rows()) = biweights(of_weighted, table.inputs, table.outputs, options.max_threads);
+  for (Eigen::Index row = 0; row < outputs.rows(); ++row) {
+    if (const int of_row = data.row_of()[row]; of_row >= 0) weights(row) = of_table(of_row);
+  }
   return weights;
 }
 

@@ -1,0 +1,172 @@
+#include "data/equal_rows.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <map>
+#include <numeric>
+#include <utility>
+
+#include "base/count.hpp"
+
+namespace llmt {
+namespace {
+
+// Rows that meet others with equal inputs are of one measurement if they are at most this many on average. More of them
+// are cells of a table of few values.
+constexpr double most_repeats = 10.0;
+
+// Where fewer rows than this have another one, new rows will have one as often as held-out rows do.
+constexpr double fewest_repeats = 0.2;
+
+// Part of the rows that meet in half of the inputs and in all of them.
+constexpr double part_that_meets = 0.5;
+
+// A table that is written several times has at least this number of different rows: of few, all may be there twice by
+// chance.
+constexpr int fewest_different = 10;
+
+// The same for 0 and -0, and for all NaN.
+std::uint64_t bits_of(double value) {
+  if (std::isnan(value)) value = std::numeric_limits<double>::quiet_NaN();
+  return std::bit_cast<std::uint64_t>(value == 0.0 ? 0.0 : value);
+}
+
+// By Steele, Lea & Flood (2014), the output function of SplitMix64.
+std::uint64_t mixed(std::uint64_t bits) {
+  bits = (bits ^ (bits >> 30)) * 0xBF58476D1CE4E5B9U;
+  bits = (bits ^ (bits >> 27)) * 0x94D049BB133111EBU;
+  return bits ^ (bits >> 31);
+}
+
+std::vector<int> sizes_of(const std::vector<int>& numbers) {
+  std::vector<int> sizes(numbers.size(), 0);
+  for (const int number : numbers) ++sizes[number];
+  return sizes;
+}
+
+int different(const std::vector<int>& numbers) { return *std::ranges::max_element(numbers) + 1; }
+
+// Mean, over the rows, of the number of rows that are the same.
+double mean_size(const std::vector<int>& numbers) {
+  double squares = 0.0;
+  for (const int size : sizes_of(numbers)) squares += static_cast<double>(size) * size;
+  return squares / static_cast<double>(numbers.size());
+}
+
+// Numbers the different pairs of two numbers, in order of first appearance.
+std::vector<int> pairs_of(const std::vector<int>& a, const std::vector<int>& b) {
+  std::map<std::pair<int, int>, int> seen;
+  std::vector<int> numbers;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    numbers.push_back(seen.try_emplace({a[i], b[i]}, count_of(seen)).first->second);
+  }
+  return numbers;
+}
+
+std::vector<int> all_columns(const Eigen::Ref<const Eigen::MatrixXd>& table) {
+  std::vector<int> columns(table.cols());
+  std::iota(columns.begin(), columns.end(), 0);
+  return columns;
+}
+
+// Every second column from `first` on.
+std::vector<int> every_second(int first, Eigen::Index columns) {
+  std::vector<int> result;
+  for (int j = first; j < columns; j += 2) result.push_back(j);
+  return result;
+}
+
+// The rule (C.2).
+bool are_repeats(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const std::vector<Eigen::Index>& rows,
+                 const std::vector<int>& by_inputs) {
+  const double size = mean_size(by_inputs);
+  if (size < 1.0 + fewest_repeats || size > most_repeats) return false;
+  if (inputs.cols() == 1) return true;
+  const auto size_by = [&](int first) {
+    return mean_size(number_different_rows(inputs, rows, every_second(first, inputs.cols())));
+  };
+  return size - 1.0 >= part_that_meets * (std::min(size_by(0), size_by(1)) - 1.0);
+}
+
+// How often a table was written if every row stands there so often, or a multiple of it.
+int times_written(const std::vector<int>& by_all) {
+  if (different(by_all) < fewest_different) return 1;
+  int times = 0;
+  for (const int size : sizes_of(by_all)) times = std::gcd(times, size);
+  return times;
+}
+
+// Of each row the one that it copies, itself if none: of rows that are the same, one of `times` is left, at least one.
+std::vector<int> copies(const std::vector<int>& by_all, int times) {
+  const std::vector<int> sizes = sizes_of(by_all);
+  std::vector<std::vector<int>> left(by_all.size());
+  std::vector<int> seen(by_all.size(), 0);
+  std::vector<int> copy_of(by_all.size());
+  for (int i = 0; i < count_of(by_all); ++i) {
+    const int number = by_all[i];
+    const int stay = std::max(1, sizes[number] / times);
+    if (count_of(left[number]) < stay) left[number].push_back(i);
+    copy_of[i] = left[number][seen[number]++ % stay];
+  }
+  return copy_of;
+}
+
+}  // namespace
+
+std::vector<int> number_different_rows(const Eigen::Ref<const Eigen::MatrixXd>& table,
+                                       const std::vector<Eigen::Index>& rows, const std::vector<int>& columns) {
+  std::vector<std::pair<std::uint64_t, int>> order(rows.size());  // hash and row
+  for (int i = 0; i < count_of(rows); ++i) order[i] = {0, i};
+  for (const int j : columns) {
+    for (auto& [hash, i] : order) hash = mixed(hash + 0x9E3779B97F4A7C15U + bits_of(table(rows[i], j)));
+  }
+  std::ranges::sort(order);
+  const auto compare = [&](int a, int b) -> int {
+    for (const int j : columns) {
+      const std::uint64_t of_a = bits_of(table(rows[a], j));
+      const std::uint64_t of_b = bits_of(table(rows[b], j));
+      if (of_a != of_b) return of_a < of_b ? -1 : 1;
+    }
+    return 0;
+  };
+  std::vector<int> first(rows.size());  // row that is the same
+  for (auto begin = order.begin(); begin != order.end();) {
+    const auto end = std::find_if(begin, order.end(), [&](const auto& each) { return each.first != begin->first; });
+    // Rows of one hash are ordered by their values, so that rows made to collide cost no more than others.
+    std::sort(begin, end, [&](const auto& a, const auto& b) {
+      const int difference = compare(a.second, b.second);
+      return difference != 0 ? difference < 0 : a.second < b.second;
+    });
+    for (auto at = begin; at != end; ++at) {
+      const bool same = at != begin && compare(std::prev(at)->second, at->second) == 0;
+      first[at->second] = same ? first[std::prev(at)->second] : at->second;
+    }
+    begin = end;
+  }
+  int different = 0;
+  std::vector<int> numbers(rows.size());
+  for (int i = 0; i < count_of(rows); ++i) numbers[i] = first[i] == i ? different++ : numbers[first[i]];
+  return numbers;
+}
+
+EqualRows find_equal_rows(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
+                          const Eigen::Ref<const Eigen::MatrixXd>& outputs, const std::vector<Eigen::Index>& rows) {
+  std::vector<int> by_inputs = number_different_rows(inputs, rows, all_columns(inputs));
+  if (different(by_inputs) == count_of(rows)) return {};
+  const std::vector<int> by_all = pairs_of(by_inputs, number_different_rows(outputs, rows, all_columns(outputs)));
+  EqualRows result;
+  result.are_repeats = are_repeats(inputs, rows, by_inputs);
+  if (result.are_repeats) {
+    result.copy_of = copies(by_all, std::numeric_limits<int>::max());
+    result.group = std::move(by_inputs);
+  } else if (const int times = times_written(by_all); times > 1) {
+    result.copy_of = copies(by_all, times);
+    result.group = result.copy_of;
+  }
+  return result;
+}
+
+}  // namespace llmt
