@@ -186,7 +186,7 @@ FitData::FitData(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::R
   Eigen::VectorXd weights = table_->weights;
   if (!options.folds.groups.empty()) {
     for (const Eigen::Index row : rows) groups_.push_back(options.folds.groups[row]);
-  } else {
+  } else if (options.folds.count > 0) {
     const EqualRows equal = find_equal_rows(inputs, outputs, rows);
     has_repeats_ = equal.are_repeats;
     if (has_repeats_) groups_.assign(equal.group.begin(), equal.group.end());

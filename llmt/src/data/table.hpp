@@ -25,8 +25,8 @@ struct Table {
   std::vector<int> monotone = {};     ///< see FitOptions; empty: none
 };
 
-/// The caller's data. Rows of weight 0 take no part; copies of a row (find_equal_rows()) add to its weight; repeats of
-/// a measurement share a fold. Nothing is copied where all rows take part.
+/// The caller's data. Rows of weight 0 take no part. Where rows are held out, copies of a row (find_equal_rows()) only
+/// add to its weight, and repeats of a measurement share a fold. Nothing is copied where all rows take part.
 class FitData {
  public:
   /// Throws std::invalid_argument as fit(). No columns named means all of them. `orders_splits`: the growth rule can
