@@ -15,7 +15,6 @@
 #include "fit/grow_tree.hpp"
 #include "fit/memory.hpp"
 #include "fit/missing_weights.hpp"
-#include "llmt/outliers.hpp"
 #include "selection/selection.hpp"
 
 namespace llmt {
@@ -223,18 +222,6 @@ FitResult assemble(const Setting& setting, std::vector<FittedPartition> fitted) 
           std::move(summary), std::move(intervals)};
 }
 
-// Least squares cannot fit what the rounding of one output's error hides.
-void refuse_hidden_outputs(const Table& table) {
-  for (Eigen::Index o = 0; o < table.outputs.cols(); ++o) {
-    const HeavyRows heavy = heavy_rows(table.outputs.col(o));
-    if (!heavy.hide_the_others) continue;
-    throw std::invalid_argument(fmt::format(
-        "llmt::fit: outputs(., {}) holds {}, beside which the other values differ by less than its rounding error; "
-        "leave that row out, or set loss to tukey",
-        o, table.outputs(heavy.rows.front(), o)));
-  }
-}
-
 std::vector<int> all_rows(Eigen::Index count) {
   std::vector<int> rows(count);
   std::iota(rows.begin(), rows.end(), 0);
@@ -247,7 +234,6 @@ FitResult fit_terms(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen
                     const FitOptions& options) {
   const FitData data(inputs, outputs, options, rule_of(options.rule).splits_on_monotone_inputs);
   const Table& table = data.table();
-  refuse_hidden_outputs(table);
   Table weighted = table;
   if (table.inputs.hasNaN()) weighted.weights = table.weights.cwiseProduct(weights_by_missing(table, options));
   const TrainingRows all = training_rows(weighted, all_rows(table.inputs.rows()), options.max_threads);

@@ -6,7 +6,7 @@
 
 #include "base/matrix.hpp"
 #include "data/dataset.hpp"
-#include "llmt/fit.hpp"
+#include "fit/fit_terms.hpp"
 #include "stream/crisp_partition.hpp"
 #include "stream/snapshot.hpp"
 #include "stream/state.hpp"
@@ -45,7 +45,8 @@ Model StreamState::model_of_first_rows() const {
   one_leaf.max_leaves = 1;
   one_leaf.folds.count = 0;
   one_leaf.weights = first.rightCols(1);
-  return fit(first.leftCols(inputs_), first.middleCols(inputs_, outputs_), one_leaf).model;
+  // Not fit(), which refuses an output that hides the others: the trees of a stream take it too.
+  return fit_terms(first.leftCols(inputs_), first.middleCols(inputs_, outputs_), one_leaf).model;
 }
 
 std::vector<Partition> StreamState::crisp_partitions() const {
