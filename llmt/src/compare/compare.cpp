@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cmath>
 #include <numeric>
+#include <set>
 #include <stdexcept>
 
 #include "data/equal_rows.hpp"
@@ -157,7 +158,11 @@ ComparisonResult compare(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
   fold_options.count = static_cast<int>(std::min<Eigen::Index>(fold_options.count, inputs.rows()));
   const std::vector<double> repeats =
       fold_options.groups.empty() ? groups_of_repeats(inputs, output) : std::vector<double>{};
-  if (!repeats.empty()) fold_options.groups = repeats;
+  if (!repeats.empty()) {
+    fold_options.groups = repeats;
+    const Eigen::Index groups = std::ssize(std::set<double>(repeats.begin(), repeats.end()));
+    fold_options.count = static_cast<int>(std::min<Eigen::Index>(fold_options.count, groups));
+  }
   const std::vector<Fold> folds = make_folds(inputs.rows(), fold_options);
   const Eigen::Index total = std::ssize(methods) * (std::ssize(folds) + 1);
   Eigen::Index done = 0;

@@ -24,8 +24,8 @@ constexpr double fewest_repeats = 0.2;
 // Part of the rows that meet in half of the inputs and in all of them.
 constexpr double part_that_meets = 0.5;
 
-// A table that is written several times has at least this number of different rows: of few, all may be there twice by
-// chance.
+// Repeats and copies are looked for where there are at least this number of different rows: few rows may be there twice
+// by chance, and can hardly be dealt to folds.
 constexpr int fewest_different = 10;
 
 // The same for 0 and -0, and for all NaN.
@@ -93,7 +93,6 @@ bool are_repeats(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const std::vec
 
 // How often a table was written if every row stands there so often, or a multiple of it.
 int times_written(const std::vector<int>& by_all) {
-  if (different(by_all) < fewest_different) return 1;
   int times = 0;
   for (const int size : sizes_of(by_all)) times = std::gcd(times, size);
   return times;
@@ -155,7 +154,8 @@ std::vector<int> number_different_rows(const Eigen::Ref<const Eigen::MatrixXd>& 
 EqualRows find_equal_rows(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
                           const Eigen::Ref<const Eigen::MatrixXd>& outputs, const std::vector<Eigen::Index>& rows) {
   std::vector<int> by_inputs = number_different_rows(inputs, rows, all_columns(inputs));
-  if (different(by_inputs) == count_of(rows)) return {};
+  const int cells = different(by_inputs);
+  if (cells == count_of(rows) || cells < fewest_different) return {};
   const std::vector<int> by_all = pairs_of(by_inputs, number_different_rows(outputs, rows, all_columns(outputs)));
   EqualRows result;
   result.are_repeats = are_repeats(inputs, rows, by_inputs);

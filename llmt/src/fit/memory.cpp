@@ -11,8 +11,7 @@ namespace {
 constexpr double bytes = sizeof(double);
 
 // Copies, in doubles: of the table and its regressors; of Gram matrices of one node, for the nodes that are examined
-// together; of the matrix of a joint system. Measured, see tests/llmt/fit/memory_test.cpp and
-// docs/algorithms/numerics.md.
+// together; of the matrix of a joint system. docs/algorithms/numerics.md sets the estimate beside measured peaks.
 constexpr double copies_of_rows = 8.0;
 constexpr double copies_of_gram = 16.0;
 constexpr double copies_of_system = 3.0;

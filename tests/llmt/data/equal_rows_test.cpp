@@ -128,6 +128,17 @@ TEST(EqualRows, HeldOutErrorOfRepeatedMeasurementsIsThatOfNewPoints) {
   EXPECT_NEAR(compared.methods[0].cv_rmse / error, 1.0, 0.15);
 }
 
+TEST(EqualRows, FewRepeatedPointsAreComparedOnAsManyFolds) {
+  const Eigen::MatrixXd x = times(Eigen::VectorXd::LinSpaced(12, 0.0, 1.0), 4);
+  const Eigen::MatrixXd y = x + 0.1 * oracle::uniform(48, 1, 5);
+  llmt::CompareOptions options;
+  options.folds.count = 20;
+  const llmt::ComparisonResult compared = llmt::compare(x, y, {{.name = "usual", .options = {}}}, options);
+  EXPECT_EQ(compared.methods[0].fold_rmse.size(), 12);
+  // Nine points are too few to tell.
+  EXPECT_FALSE(repeats(times(Eigen::VectorXd::LinSpaced(9, 0.0, 1.0), 4), all_of(36)));
+}
+
 TEST(EqualRows, GroupsOfTheCallerAreUsedAsTheyAre) {
   const Eigen::MatrixXd x = oracle::uniform(100, 2, 5);
   const Eigen::MatrixXd y = oracle::curved(x, 0.1, 5);
