@@ -17,6 +17,9 @@ std::string describe(const Candidate& candidate) {
   const char* const sparse = candidate.sparse ? ", sparse" : "";
   if (candidate.validity.kind == ValidityKind::crisp) {
     const std::string name = fmt::format("{}{}", candidate.leaves == 1 ? "least squares" : "crisp", sparse);
+    if (candidate.leaves == 1 && candidate.shrinkage > 0.0) {
+      return fmt::format("ridge regression, shrinkage {}", number(candidate.shrinkage, 3));
+    }
     return candidate.shrinkage > 0.0 ? fmt::format("{}, shrinkage {}", name, candidate.shrinkage) : name;
   }
   const std::string_view kind = candidate.validity.kind == ValidityKind::gaussian   ? "Gaussians"
@@ -79,6 +82,31 @@ std::string local_models_text(const FitRun& run, const FitSummary& summary) {
       text +=
           fmt::format("Sparse local models: {} coefficients in {} leaves.\n", partition.coefficients, partition.leaves);
     }
+  }
+  return text;
+}
+
+std::vector<std::string> names_of(const Model& model, const std::vector<int>& inputs) {
+  std::vector<std::string> names;
+  for (const int input : inputs) names.push_back(model.inputs()[input].name);
+  return names;
+}
+
+// Which inputs the partitions do not use, and what that gained; nothing for those that use all.
+std::string left_out_text(const FitResult& result) {
+  std::string text;
+  for (const PartitionSummary& partition : result.summary.partitions) {
+    if (partition.left_out.empty()) continue;
+    const std::vector<InputStep>& steps = partition.input_steps;
+    const auto kept = result.model.num_inputs() - std::ssize(partition.left_out);
+    const auto chosen = std::ranges::find(steps, kept, &InputStep::inputs);
+    const std::string target = result.summary.partitions.size() == 1
+                                   ? ""
+                                   : fmt::format(" of {}", result.model.outputs()[partition.outputs[0]].name);
+    text += fmt::format(
+        "Inputs left out{}: {} of {} ({}); held-out RMSE of simple candidates {} with all inputs, {} without these.\n",
+        target, partition.left_out.size(), result.model.num_inputs(),
+        fmt::join(names_of(result.model, partition.left_out), ", "), number(steps.front().rmse), number(chosen->rmse));
   }
   return text;
 }
@@ -203,6 +231,11 @@ Json summary_json(const FitRun& run, const FitResult& result) {
                        {"binned_nodes", partition.search.binned_nodes},
                        {"evaluations", partition.search.evaluations},
                        {"largest_excess", partition.search.largest_excess}};
+    entry["left_out"] = names_of(result.model, partition.left_out);
+    entry["cv_rmse_by_inputs"] = Json::array();
+    for (const InputStep& step : partition.input_steps) {
+      entry["cv_rmse_by_inputs"].push_back({{"inputs", step.inputs}, {"cv_rmse", step.rmse}});
+    }
     entry["cv_folds"] = partition.cv_folds;
     const bool judged = partition.cv_folds > 0;
     entry["chosen"] = candidate_json(partition.chosen);
@@ -231,6 +264,7 @@ void print_summary(const FitRun& run, const FitResult& result) {
   if (result.summary.partitions.front().outputs.size() > 1) {
     print("Held-out errors of the shared tree are over all targets, each divided by its standard deviation.\n");
   }
+  print(left_out_text(result));
   print(local_models_text(run, result.summary));
   for (const PartitionSummary& partition : result.summary.partitions) {
     print(search_text(partition.search));

@@ -165,6 +165,9 @@ void add_learning_options(CLI::App& command, LearningArguments& arguments) {
       ->delimiter(',');
   command.add_option("--regression-inputs", arguments.regression_inputs, "Inputs of the local models (default: all)")
       ->delimiter(',');
+  command.add_flag_callback(
+      "--all-inputs", [&options] { options.choose_inputs = false; },
+      "Keep inputs that do not lower the held-out error");
   command
       .add_option("--monotone", arguments.monotone,
                   "Inputs with which the prediction never falls, or with a leading minus never rises (--monotone=-x)")

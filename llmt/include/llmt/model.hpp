@@ -40,6 +40,8 @@ struct Validity {
   /// crisp.
   double width = 0.0;
   int smoothness = 1;  ///< blend: continuous derivatives of the prediction; 2 is in files of earlier versions alone
+
+  bool operator==(const Validity&) const = default;
 };
 
 /// One node of a partition's tree, inner or leaf. Inner nodes keep a local model of their own.
@@ -130,6 +132,8 @@ struct Regressor {
   int level = -1;         ///< -1 for a number
   double centre = 0.0;    ///< mean over the training rows; local models use the deviation from it
   int second_input = -1;  ///< of a product, not below `input`; else -1
+
+  bool operator==(const Regressor&) const = default;
 };
 
 /// On which side of an oblique split a leaf lies.

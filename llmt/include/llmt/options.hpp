@@ -144,6 +144,9 @@ struct FitOptions {
   double significance = -1.0;
   std::vector<int> split_inputs = {};       ///< columns that may be split; empty: all
   std::vector<int> regression_inputs = {};  ///< columns that local models use; empty: all
+  /// Leave out inputs where that lowers the held-out error beyond chance: RD, RETIS and RA, with two folds or more and
+  /// fewer than 300 rows an input, where neither split_inputs nor regression_inputs nor monotone is given.
+  bool choose_inputs = true;
   bool shared_partition = false;  ///< one tree for all outputs, their RSS divided by their variances; else one each
   Pruning pruning = Pruning::last_splits;
   ValidityChoice validity = ValidityChoice::automatic;

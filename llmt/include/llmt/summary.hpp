@@ -35,6 +35,8 @@ struct Candidate {
   double shrinkage = 0.0;  ///< see ExpertOptions::shrinkages
   bool sparse = false;     ///< see SparseChoice
   Eigen::Index leaves = 1;
+
+  bool operator==(const Candidate&) const = default;
 };
 
 /// A candidate and its error on the rows that took no part in making it.
@@ -58,6 +60,12 @@ struct SearchSummary {
   double largest_excess = 0.0;
 };
 
+/// The held-out error with a number of inputs, of the few candidates with which these numbers are compared.
+struct InputStep {
+  Eigen::Index inputs = 0;
+  double rmse = 0.0;
+};
+
 /// How one partition was made.
 struct PartitionSummary {
   std::vector<int> outputs;       ///< columns that the partition serves
@@ -77,6 +85,9 @@ struct PartitionSummary {
   Eigen::Index cv_folds = 0;       ///< folds that were held out
   Eigen::Index held_out_rows = 0;  ///< rows that the errors are from, over all folds; at most 10 000 of each fold
   SearchSummary search;            ///< of the tree grown on all rows
+  std::vector<int> left_out;       ///< inputs that FitOptions::choose_inputs left out, ascending
+  /// What choose_inputs compared: all inputs first, then fewer. Empty: nothing.
+  std::vector<InputStep> input_steps;
 };
 
 struct FitSummary {

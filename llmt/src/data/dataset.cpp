@@ -3,9 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
-#include <cstdint>
 #include <limits>
 #include <numeric>
 
@@ -190,6 +188,7 @@ TrainingRows training_rows(const Table& table, std::vector<int> rows, int max_th
       training.regressors.push_back({input, level, share_of_level(training, input, level)});
     }
   }
+  training.split_inputs = table.split_inputs;
   const std::size_t first_product = training.regressors.size();
   training.regressors.resize(first_product + table.products.size());
   parallel_for(std::ssize(table.products), max_threads, [&](Eigen::Index k) {
@@ -221,6 +220,7 @@ TrainingRows query_rows(const Table& table, std::vector<int> rows, const Trainin
   query.columns = training.columns;
   query.output_columns = training.output_columns;
   query.regressors = training.regressors;
+  query.split_inputs = training.split_inputs;
   return query;
 }
 
@@ -288,41 +288,6 @@ void for_each_chunk(const TrainingRows& rows, const std::vector<int>& outputs, i
       body(slot, fetch(rows, index, outputs));
     }
   });
-}
-
-TrainingRows thinned(const TrainingRows& rows, Eigen::Index count) {
-  TrainingRows result = rows;
-  if (rows.count() <= count + count / 4) return result;
-  // The rows with the smallest hashes of their values. Steps of splitmix64 (Steele, Lea & Flood 2014).
-  const auto mixed = [](std::uint64_t state, double value) {
-    std::uint64_t z = state + std::bit_cast<std::uint64_t>(value + 0.0) + 0x9e3779b97f4a7c15ULL;  // -0 as 0
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ULL;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebULL;
-    return z ^ (z >> 31);
-  };
-  std::vector<std::uint64_t> hashes;
-  for (const int row : rows.rows) {
-    std::uint64_t hash = 0;
-    for (Eigen::Index j = 0; j < rows.table->inputs.cols(); ++j) {
-      const double value = rows.table->inputs(row, j);
-      hash = mixed(hash, std::isnan(value) ? std::numeric_limits<double>::infinity() : value);
-    }
-    for (Eigen::Index o = 0; o < rows.table->outputs.cols(); ++o) {
-      hash = mixed(hash, rows.table->outputs(row, o));
-    }
-    hashes.push_back(hash);
-  }
-  std::vector<std::uint64_t> order = hashes;
-  std::nth_element(order.begin(), order.begin() + (count - 1), order.end());
-  const std::uint64_t last = order[count - 1];
-  result.rows.clear();
-  for (std::size_t i = 0; i < hashes.size(); ++i) {
-    if (hashes[i] <= last) {
-      result.rows.push_back(rows.rows[i]);
-    }
-  }
-  result.weight_unit *= total_weight(rows) / total_weight(result);
-  return result;
 }
 
 }  // namespace llmt

@@ -21,10 +21,11 @@ struct TrainingRows {
   std::vector<InputColumn> columns;
   std::vector<OutputColumn> output_columns;
   std::vector<Regressor> regressors;
-  double weight_unit = 1.0;  ///< times the table's weight is a row's weight; in training these have mean 1
-  bool has_missing = false;  ///< whether a regressor is missing in some row
-  Eigen::VectorXd scale;     ///< root mean square of each regressor's deviations; 1 where it is 0
-  Eigen::MatrixXd spread;    ///< 2 x regressors: smallest and largest deviation but for the one row at either end
+  std::vector<int> split_inputs;  ///< that growth may split, ascending
+  double weight_unit = 1.0;       ///< times the table's weight is a row's weight; in training these have mean 1
+  bool has_missing = false;       ///< whether a regressor is missing in some row
+  Eigen::VectorXd scale;          ///< root mean square of each regressor's deviations; 1 where it is 0
+  Eigen::MatrixXd spread;         ///< 2 x regressors: smallest and largest deviation but for the one row at either end
 
   Eigen::Index count() const { return std::ssize(rows); }
   Eigen::VectorXd low() const;  ///< extent of the inputs
@@ -36,6 +37,9 @@ TrainingRows training_rows(const Table& table, std::vector<int> rows, int max_th
 
 /// The same rows of a table with other weights, under the same columns.
 TrainingRows with_table(const TrainingRows& rows, const Table& table);
+
+/// The same rows, of which only the given inputs (ascending) may be split and have regressors.
+TrainingRows narrowed(const TrainingRows& rows, const std::vector<int>& inputs);
 
 /// The given rows under the columns of `training`.
 TrainingRows query_rows(const Table& table, std::vector<int> rows, const TrainingRows& training);

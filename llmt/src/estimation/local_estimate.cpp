@@ -40,6 +40,13 @@ Eigen::MatrixXd full_model(const LeafSums& sums, std::size_t node, const Eigen::
   return model;
 }
 
+// The model with slopes of 0, relative to the root's.
+Eigen::MatrixXd without_slopes(const LeafSums& sums) {
+  Eigen::MatrixXd model = -sums.root;
+  model.row(0).setZero();
+  return model;
+}
+
 }  // namespace
 
 std::vector<Eigen::MatrixXd> local_models(const LeafSums& sums, std::size_t nodes, double shrinkage, bool sparse) {
@@ -48,6 +55,8 @@ std::vector<Eigen::MatrixXd> local_models(const LeafSums& sums, std::size_t node
   models[0] = Eigen::MatrixXd::Zero(sums.size(), sums.root.cols());
   if (sparse && nodes == 1) {
     models[0] = sparse_model(sums, 0, models[0], 0.0);
+  } else if (nodes == 1 && shrinkage > 0.0) {
+    models[0] = full_model(sums, 0, without_slopes(sums), shrinkage);
   }
   for (std::size_t i = 1; i < nodes; ++i) {
     const Eigen::MatrixXd& parent = models[parents[i]];

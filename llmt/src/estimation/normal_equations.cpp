@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <limits>
-#include <numeric>
 
 #include "base/count.hpp"
 #include "base/parallel.hpp"
 #include "estimation/missing_by_validity.hpp"
+#include "estimation/rows_by_leaf.hpp"
 #include "model/evaluator.hpp"
 #include "model/imputed.hpp"
 #include "numerics/dense.hpp"
@@ -20,6 +20,9 @@ constexpr double range_margin = 0.25;
 
 // Logistic gates give every leaf some validity at every row. Only rows with more than this count in a leaf's range.
 constexpr double reach_of_logistic = 1e-3;
+
+// Rows of one step.
+constexpr Eigen::Index rows_at_once = 256;
 
 // Most numbers that the outer products of the rows of one step take: 64 MiB.
 constexpr Eigen::Index outer_products = Eigen::Index{1} << 23;
@@ -62,7 +65,7 @@ class Assembly {
   NormalEquations run(int max_threads);
 
  private:
-  Reached reach(Eigen::Index begin, Eigen::Index rows) const;
+  Reached reach(std::vector<int> positions) const;
   void describe_row(Reached& reached, Eigen::Index row, const std::vector<Activation>& active) const;
   Eigen::VectorXd regressors_at(const Reached& reached, Eigen::Index row, int node) const;
   void widen_range(const Reached& reached, std::size_t leaf);
@@ -115,9 +118,12 @@ NormalEquations Assembly::run(int max_threads) {
   const ValidityKind kind = partition_.validity.kind;
   const bool overlap = kind == ValidityKind::blend || kind == ValidityKind::gaussian;
   if (overlap && sums_.missing) describe_missing_by_validity(training_, evaluator_, leave_out_, partition_);
-  const Eigen::Index at_once = std::clamp<Eigen::Index>(outer_products / packed_, 1, chunk_rows);
-  for (Eigen::Index begin = 0; begin < training_.count(); begin += at_once) {
-    const Reached reached = reach(begin, std::min(at_once, training_.count() - begin));
+  const Eigen::Index at_once = std::clamp<Eigen::Index>(outer_products / packed_, 1, rows_at_once);
+  const std::vector<int> rows = rows_by_leaf(training_, partition_, evaluator_);
+  for (auto begin = rows.begin(); begin != rows.end();) {
+    const auto end = begin + std::min<std::ptrdiff_t>(at_once, rows.end() - begin);
+    const Reached reached = reach({begin, end});
+    begin = end;
     // Leaves are independent: each adds to its own sums and to its blocks with the leaves before it.
     parallel_for(std::ssize(sums_.leaves), max_threads, [&](Eigen::Index position) {
       const std::size_t leaf = position;
@@ -136,9 +142,8 @@ NormalEquations Assembly::run(int max_threads) {
   return std::move(sums_);
 }
 
-Reached Assembly::reach(Eigen::Index begin, Eigen::Index rows) const {
-  std::vector<int> positions(rows);
-  std::iota(positions.begin(), positions.end(), static_cast<int>(begin));
+Reached Assembly::reach(std::vector<int> positions) const {
+  const Eigen::Index rows = std::ssize(positions);
   Reached reached{.chunk = fetch(training_, positions, partition_.outputs),
                   .entries = {},
                   .uses = std::vector<std::vector<Use>>(sums_.leaves.size()),
@@ -313,20 +318,6 @@ void Assembly::add_up_to_parents() {
 }
 
 }  // namespace
-
-Eigen::MatrixXd NormalEquations::block(std::size_t i, std::size_t j) const {
-  Eigen::MatrixXd result(size, size);
-  const double* values = blocks[i][j].data();
-  for (Eigen::Index r = 0; r < size; ++r) {
-    for (Eigen::Index c = 0; c < (missing ? size : r + 1); ++c) {
-      result(r, c) = *values++;
-      if (!missing) {
-        result(c, r) = result(r, c);
-      }
-    }
-  }
-  return result;
-}
 
 bool leaves_out_ambiguous(const TrainingRows& training, const Evaluator& evaluator) {
   double ambiguous = 0.0;

@@ -36,20 +36,25 @@ Eigen::VectorXd prefix_squared_errors(const Partition& partition, const Training
   return sums.cwiseMax(0.0);
 }
 
-double squared_error(const Partition& partition, const TrainingRows& columns, const std::vector<Chunk>& rows,
-                     const Eigen::VectorXd& weights) {
+Eigen::VectorXd squared_errors(const Partition& partition, const TrainingRows& columns, const std::vector<Chunk>& rows,
+                               const Eigen::VectorXd& weights) {
   const Evaluator evaluator(partition, columns.columns, std::ssize(columns.regressors));
   std::vector<Activation> active;
   Eigen::VectorXd values(std::ssize(partition.outputs));
-  double sum = 0.0;
+  Eigen::Index count = 0;
+  for (const Chunk& chunk : rows) count += chunk.count();
+  Eigen::VectorXd sums = Eigen::VectorXd::Zero(error_blocks);
+  Eigen::Index before = 0;
   for (const Chunk& chunk : rows) {
     for (Eigen::Index row = 0; row < chunk.count(); ++row) {
       evaluator.activate(chunk.inputs.row(row).data(), active);
       evaluator.combine(active, chunk.deviations.row(row).data(), values.data());
-      sum += chunk.weights(row) * weights.dot((chunk.outputs.row(row).transpose() - values).cwiseAbs2());
+      sums((before + row) * error_blocks / count) +=
+          chunk.weights(row) * weights.dot((chunk.outputs.row(row).transpose() - values).cwiseAbs2());
     }
+    before += chunk.count();
   }
-  return sum;
+  return sums;
 }
 
 }  // namespace llmt

@@ -14,9 +14,10 @@ namespace llmt {
 Eigen::VectorXd prefix_squared_errors(const Partition& partition, const TrainingRows& rows,
                                       const Eigen::VectorXd& weights, int max_threads);
 
-/// Sum of the weighted squared errors over rows that were fetched before, for callers that use the same rows many
-/// times. `columns`: what the rows were fetched from.
-double squared_error(const Partition& partition, const TrainingRows& columns, const std::vector<Chunk>& rows,
-                     const Eigen::VectorXd& weights);
+/// Weighted squared errors over rows that were fetched before, for callers that use the same rows many times, summed
+/// over each of error_blocks parts of the rows, in their order. `columns`: what the rows were fetched from.
+inline constexpr Eigen::Index error_blocks = 16;
+Eigen::VectorXd squared_errors(const Partition& partition, const TrainingRows& columns, const std::vector<Chunk>& rows,
+                               const Eigen::VectorXd& weights);
 
 }  // namespace llmt

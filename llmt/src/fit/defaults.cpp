@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 #include <map>
 #include <stdexcept>
 
@@ -185,7 +186,11 @@ ValidityChoice choice_of(const FitOptions& options, const Rule& rule) {
   return options.validity;
 }
 
-Candidates candidates_of(const FitOptions& options, const Case& each, ValidityChoice choice, bool crisp_only) {
+// Shrinkages of one linear model, in parts of the number of rows: ridge regression, from hardly to mostly drawn to 0.
+constexpr std::array linear_shrinkages = {0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0};
+
+Candidates candidates_of(const FitOptions& options, const Case& each, ValidityChoice choice, bool crisp_only,
+                         Eigen::Index rows) {
   const ExpertOptions& expert = options.expert;
   Candidates candidates;
   candidates.crisp = choice == ValidityChoice::automatic || choice == ValidityChoice::crisp;
@@ -194,6 +199,11 @@ Candidates candidates_of(const FitOptions& options, const Case& each, ValidityCh
   candidates.shrinkages = given_or(expert.shrinkages, shrinkage_rows(), each);
   if (options.sparse == SparseChoice::always) candidates.sparse = {true};
   if (options.sparse == SparseChoice::automatic && each.folds) candidates.sparse = {false, true};
+  if (each.folds && !each.own_models && !each.ordered && options.max_leaves != 1) {
+    for (const double part : linear_shrinkages) {
+      candidates.linear_shrinkages.push_back(part * static_cast<double>(rows));
+    }
+  }
   if (crisp_only) return candidates;
   candidates.widths = given_or(expert.widths, width_rows(), each);
   // hilomot makes a jump a steep gate by itself.
@@ -230,9 +240,9 @@ Plan with_defaults(const FitOptions& options, const TrainingRows& all, Eigen::In
                  .min_leaf_samples = or_default(options.min_leaf_samples, default_min_leaf(each, rule, coefficients)),
                  .max_leaves = or_default(options.max_leaves, default_max_leaves(each, rule, coefficients)),
                  .min_improvement = options.expert.min_improvement,
-                 .split_inputs = all.table->split_inputs,
+                 .split_inputs = all.split_inputs,
                  .search = options.expert.search},
-      .candidates = candidates_of(options, each, choice, crisp_only),
+      .candidates = candidates_of(options, each, choice, crisp_only, all.count()),
       .pruning = options.pruning,
       .leaves_given = options.max_leaves > 0};
 }

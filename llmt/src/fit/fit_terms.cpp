@@ -13,8 +13,10 @@
 #include "base/parallel.hpp"
 #include "estimation/leaf_statistics.hpp"
 #include "fit/grow_tree.hpp"
+#include "fit/input_choice.hpp"
 #include "fit/memory.hpp"
 #include "fit/missing_weights.hpp"
+#include "fit/same_regressors.hpp"
 #include "selection/selection.hpp"
 
 namespace llmt {
@@ -108,10 +110,11 @@ Selection first_candidate(const Candidates& candidates, Eigen::Index leaves) {
 // The chosen candidate in every fold, for the intervals.
 std::vector<Partition> finish_folds(const Setting& setting, const std::vector<GrownTree>& trees, Selection& choice) {
   if (!setting.options.intervals) return {};
-  if (!choice.made.empty()) return std::move(choice.made);
   const int threads = setting.options.max_threads;
-  std::vector<std::optional<Partition>> made(trees.size());
+  std::vector<std::optional<Partition>> made = std::move(choice.made);
+  made.resize(trees.size());
   parallel_for(std::ssize(trees), threads, [&](Eigen::Index f) {
+    if (made[f]) return;
     Candidate of_fold = choice.chosen.candidate;
     of_fold.leaves = std::min(of_fold.leaves, trees[f].partition.num_leaves());
     made[f] = estimate(setting.folds[f].training, trees[f], of_fold, threads);
@@ -140,9 +143,9 @@ PartitionSummary describe(const Partition& partition, const TrainingRows& rows, 
 
 // A partition of the model, and of the folds' models.
 struct FittedPartition {
-  Partition partition;
+  PartitionOn of_all;
   PartitionSummary summary;
-  std::vector<Partition> of_folds;
+  std::vector<PartitionOn> of_folds;
 };
 
 FittedPartition finish(const Setting& setting, const FinalTree& grown, Selection choice,
@@ -163,11 +166,15 @@ FittedPartition finish(const Setting& setting, const FinalTree& grown, Selection
   summary.crisp_cv_rmse = std::move(choice.crisp_rmse);
   summary.cv_folds = std::ssize(setting.folds);
   summary.held_out_rows = choice.held_out_rows;
-  return {std::move(partition), std::move(summary), std::move(of_folds)};
+  FittedPartition fitted{{setting.all.regressors, std::move(partition)}, std::move(summary), {}};
+  for (std::size_t f = 0; f < of_folds.size(); ++f) {
+    fitted.of_folds.push_back({setting.folds[f].training.regressors, std::move(of_folds[f])});
+  }
+  return fitted;
 }
 
 // Grow, choose, finish.
-FittedPartition fit_partition(const Setting& setting, const std::vector<int>& served, Report& report) {
+FittedPartition fit_on_inputs(const Setting& setting, const std::vector<int>& served, Report& report) {
   const int threads = setting.options.max_threads;
   const bool has_folds = !setting.folds.empty();
   const std::vector<GrownTree> trees = grow_folds(setting, served, report);
@@ -186,6 +193,28 @@ FittedPartition fit_partition(const Setting& setting, const std::vector<int>& se
   return fitted;
 }
 
+// With the inputs that are worth it.
+FittedPartition fit_partition(const Setting& setting, const std::vector<int>& served, Report& report) {
+  const Eigen::VectorXd weights = error_weights(*setting.all.table, served);
+  const ChosenInputs chosen = choose_inputs(setting.all, setting.folds, served, weights, setting.plan, setting.options);
+  const std::vector<int>& every = setting.all.split_inputs;
+  FittedPartition fitted = [&] {
+    if (chosen.of_all == every) return fit_on_inputs(setting, served, report);
+    const TrainingRows all = narrowed(setting.all, chosen.of_all);
+    const TrainingRows measured = narrowed(setting.measured, chosen.of_all);
+    std::vector<FoldRows> folds;
+    for (std::size_t f = 0; f < setting.folds.size(); ++f) {
+      folds.push_back({narrowed(setting.folds[f].training, chosen.of_folds[f]),
+                       narrowed(setting.folds[f].held_out, chosen.of_folds[f])});
+    }
+    const Plan plan = with_defaults(setting.options, all, std::ssize(folds));
+    return fit_on_inputs({all, measured, folds, plan, setting.options}, served, report);
+  }();
+  std::ranges::set_difference(every, chosen.of_all, std::back_inserter(fitted.summary.left_out));
+  fitted.summary.input_steps = chosen.steps;
+  return fitted;
+}
+
 // Model and held-out residuals of every fold.
 Intervals make_intervals(const Setting& setting, std::vector<FittedPartition>& fitted) {
   std::vector<Model> models;
@@ -193,10 +222,9 @@ Intervals make_intervals(const Setting& setting, std::vector<FittedPartition>& f
   const Table& table = *setting.all.table;
   for (std::size_t f = 0; f < fitted.front().of_folds.size(); ++f) {
     const FoldRows& rows = setting.folds[f];
-    std::vector<Partition> partitions;
+    std::vector<PartitionOn> partitions;
     for (FittedPartition& each : fitted) partitions.push_back(std::move(each.of_folds[f]));
-    models.emplace_back(rows.training.columns, rows.training.output_columns, rows.training.regressors,
-                        std::move(partitions));
+    models.push_back(make_model(rows.training, std::move(partitions)));
     const std::vector<int>& held_out = rows.held_out.rows;
     const Eigen::MatrixXd predicted =
         models.back().predict(table.inputs(held_out, Eigen::all), setting.options.max_threads);
@@ -213,13 +241,12 @@ FitResult assemble(const Setting& setting, std::vector<FittedPartition> fitted) 
                      .partitions = {},
                      .quadratic = !table.products.empty()};
   Intervals intervals = make_intervals(setting, fitted);
-  std::vector<Partition> partitions;
+  std::vector<PartitionOn> partitions;
   for (FittedPartition& each : fitted) {
     summary.partitions.push_back(std::move(each.summary));
-    partitions.push_back(std::move(each.partition));
+    partitions.push_back(std::move(each.of_all));
   }
-  return {Model(setting.all.columns, setting.all.output_columns, setting.all.regressors, std::move(partitions)),
-          std::move(summary), std::move(intervals)};
+  return {make_model(setting.all, std::move(partitions)), std::move(summary), std::move(intervals)};
 }
 
 std::vector<int> all_rows(Eigen::Index count) {

@@ -18,6 +18,7 @@ GrowthProblem problem_of(const TrainingRows& rows, const std::vector<int>& serve
                          bool keeps_all_leaves, int max_threads) {
   const Candidates& candidates = plan.candidates;
   GrowthProblem problem{.training = &rows, .outputs = served, .options = plan.growth, .max_threads = max_threads};
+  problem.options.split_inputs = rows.split_inputs;
   problem.after = {.width = candidates.widths.empty() ? 0.0 : candidates.widths.front(),
                    .joint = !candidates.widths.empty() && candidates.estimation == Estimation::joint,
                    .keeps_all_leaves = keeps_all_leaves,

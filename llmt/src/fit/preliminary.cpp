@@ -7,6 +7,7 @@ FitOptions preliminary_options(const FitOptions& options) {
           .min_leaf_samples = options.min_leaf_samples,
           .split_inputs = options.split_inputs,
           .regression_inputs = options.regression_inputs,
+          .choose_inputs = false,
           .shared_partition = options.shared_partition,
           .validity = ValidityChoice::crisp,
           .folds = options.folds,

@@ -6,6 +6,7 @@
 #include "base/parallel.hpp"
 #include "estimation/local_estimate.hpp"
 #include "estimation/squared_errors.hpp"
+#include "numerics/paired_difference.hpp"
 
 namespace llmt {
 namespace {
@@ -21,7 +22,7 @@ Eigen::VectorXd ordered_prefix_errors(const LeafSums& sums, Eigen::Index largest
     for (Eigen::Index index = 0; index < num_chunks(fold.held_out); ++index) {
       held_out.push_back(fetch(fold.held_out, index, models.outputs));
     }
-    errors(leaves - 1) = squared_error(models, fold.training, held_out, weights);
+    errors(leaves - 1) = squared_errors(models, fold.training, held_out, weights).sum();
     if (leaves == largest) return errors;
   }
 }
@@ -40,14 +41,22 @@ std::vector<Variant> variants_of(const Candidates& candidates) {
   return variants;
 }
 
-// Of one fold, for each variant: the squared errors of the trees with 1, 2, ... leaves.
-std::vector<Eigen::VectorXd> errors_in_fold(const FoldRows& fold, const GrownTree& grown,
-                                            const std::vector<Variant>& variants, const Eigen::VectorXd& weights,
-                                            int max_threads) {
+// Of one fold.
+struct CrispErrors {
+  std::vector<Eigen::VectorXd> of_trees;  // of each variant: squared errors of the trees with 1, 2, ... leaves
+  std::vector<double> of_ridges;          // of one leaf, for each of the linear shrinkages
+};
+
+CrispErrors errors_in_fold(const FoldRows& fold, const GrownTree& grown, const std::vector<Variant>& variants,
+                           const std::vector<double>& ridges, const Eigen::VectorXd& weights, int max_threads) {
   const LeafSums sums =
       sum_leaves(fold.training, blended(fold.training, grown, {}, no_jump), max_threads, variants.back().sparse);
   const Eigen::Index leaves = grown.partition.num_leaves();
-  std::vector<Eigen::VectorXd> errors;
+  CrispErrors result;
+  for (const double ridge : ridges) {
+    result.of_ridges.push_back(prefix_squared_errors(local(sums, 1, ridge), fold.held_out, weights, max_threads)(0));
+  }
+  std::vector<Eigen::VectorXd>& errors = result.of_trees;
   for (const auto& [sparse, shrinkage] : variants) {
     if (has_ordered_leaves(sums)) {
       errors.push_back(ordered_prefix_errors(sums, leaves, shrinkage, fold, weights));
@@ -60,7 +69,21 @@ std::vector<Eigen::VectorXd> errors_in_fold(const FoldRows& fold, const GrownTre
       errors.back()(0) = prefix_squared_errors(local(sums, 1, shrinkage, true), fold.held_out, weights, max_threads)(0);
     }
   }
-  return errors;
+  return result;
+}
+
+// The ridge regression with the smallest error, if its gain on least squares is more than a standard error.
+CandidateError best_linear(const CandidateError& least_squares, const std::vector<CrispErrors>& errors,
+                           const std::vector<double>& ridges, const FoldErrors& error_of_folds) {
+  CandidateError best = least_squares;
+  for (std::size_t r = 0; r < ridges.size(); ++r) {
+    std::vector<double> of_folds;
+    for (const CrispErrors& fold : errors) of_folds.push_back(fold.of_ridges[r]);
+    const CandidateError ridge = error_of_folds({.shrinkage = ridges[r], .leaves = 1}, of_folds);
+    if (ridge.rmse < best.rmse) best = ridge;
+  }
+  const PairedDifference gain = paired_difference(least_squares.fold_rmse, best.fold_rmse);
+  return gain.mean > gain.standard_error ? best : least_squares;
 }
 
 }  // namespace
@@ -69,16 +92,19 @@ void compare_crisp(const std::vector<FoldRows>& folds, const std::vector<GrownTr
                    const Candidates& candidates, const Eigen::VectorXd& weights, int max_threads,
                    const FoldErrors& error_of_folds, Selection& selection) {
   const std::vector<Variant> variants = variants_of(candidates);
-  std::vector<std::vector<Eigen::VectorXd>> errors(folds.size());  // of each fold and variant
-  parallel_for(std::ssize(folds), max_threads,
-               [&](Eigen::Index f) { errors[f] = errors_in_fold(folds[f], grown[f], variants, weights, max_threads); });
+  const std::vector<double>& ridges = candidates.linear_shrinkages;
+  std::vector<CrispErrors> errors(folds.size());
+  parallel_for(std::ssize(folds), max_threads, [&](Eigen::Index f) {
+    errors[f] = errors_in_fold(folds[f], grown[f], variants, ridges, weights, max_threads);
+  });
   Eigen::Index largest = 0;
-  for (const std::vector<Eigen::VectorXd>& fold : errors) largest = std::max(largest, fold.front().size());
+  for (const CrispErrors& fold : errors) largest = std::max(largest, fold.of_trees.front().size());
   const auto error_of = [&](std::size_t variant, Eigen::Index leaves) {
     std::vector<double> of_folds;
-    for (const std::vector<Eigen::VectorXd>& fold : errors) {
+    for (const CrispErrors& fold : errors) {
       // A smaller tree stays at its largest number of leaves.
-      of_folds.push_back(fold[variant](std::min(leaves, fold[variant].size()) - 1));
+      const Eigen::VectorXd& of_trees = fold.of_trees[variant];
+      of_folds.push_back(of_trees(std::min(leaves, of_trees.size()) - 1));
     }
     return error_of_folds(
         {.shrinkage = variants[variant].shrinkage, .sparse = variants[variant].sparse, .leaves = leaves}, of_folds);
@@ -87,6 +113,7 @@ void compare_crisp(const std::vector<FoldRows>& folds, const std::vector<GrownTr
   CandidateError best = error_of(0, 1);
   best.candidate.shrinkage = 0.0;
   selection.best_of_kind.push_back(best);
+  selection.linear = best_linear(best, errors, ridges, error_of_folds);
   for (std::size_t v = 0; v < variants.size(); ++v) {
     for (Eigen::Index leaves = 1; leaves <= largest; ++leaves) {
       const CandidateError error = error_of(v, leaves);
@@ -96,10 +123,11 @@ void compare_crisp(const std::vector<FoldRows>& folds, const std::vector<GrownTr
       }
     }
   }
-  selection.chosen = selection.best_of_kind.front();
+  selection.chosen = selection.linear;
   if (candidates.crisp) {
+    if (selection.linear.candidate.shrinkage > 0.0) selection.best_of_kind.push_back(selection.linear);
     selection.best_of_kind.push_back(best);
-    selection.chosen = best;
+    if (best.rmse < selection.chosen.rmse) selection.chosen = best;
   }
 }
 

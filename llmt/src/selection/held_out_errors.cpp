@@ -8,6 +8,7 @@
 #include "estimation/joint_estimate.hpp"
 #include "estimation/local_estimate.hpp"
 #include "estimation/squared_errors.hpp"
+#include "numerics/paired_difference.hpp"
 
 namespace llmt {
 namespace {
@@ -85,12 +86,13 @@ Candidate HeldOutErrors::candidate(const Key& key) const {
           .leaves = leaf_counts_[key.leaves]};
 }
 
-// Errors of one shape; `keys` ascending.
-std::map<Key, double> HeldOutErrors::evaluate_shape(std::size_t fold, const std::vector<Key>& keys) const {
+// One shape; `keys` ascending.
+HeldOutErrors::Evaluated HeldOutErrors::evaluate_shape(std::size_t fold, const std::vector<Key>& keys,
+                                                       bool keeps_models) const {
   const Candidate first = candidate(keys.front());
   const TrainingRows& sample = samples_[fold];
   const Partition partition = blended(sample, grown_[fold], first.validity, first.jump);
-  std::map<Key, double> errors;
+  Evaluated result;
   std::optional<TrainingRows> rows;
   std::optional<LeafSums> sums;
   // The sums of a tree serve all its prefixes, so the largest tree comes first. This does not hold for Gaussians, whose
@@ -119,23 +121,26 @@ std::map<Key, double> HeldOutErrors::evaluate_shape(std::size_t fold, const std:
       }
     }
     for (std::size_t i = 0; i < same.size(); ++i) {
-      errors[same[i]] = squared_error(models[i], folds_[fold].held_out, held_out_[fold], weights_);
+      result.errors[same[i]] = squared_errors(models[i], folds_[fold].held_out, held_out_[fold], weights_);
+      if (keeps_models && rows->count() == folds_[fold].training.count()) {
+        result.models[same[i]] = std::move(models[i]);
+      }
     }
   }
-  return errors;
+  return result;
 }
 
-void HeldOutErrors::evaluate(const std::set<Key>& keys, std::size_t folds) {
+void HeldOutErrors::evaluate(const std::set<Key>& keys, std::size_t folds, bool keeps_models) {
   struct Task {
     std::size_t fold;
     std::vector<Key> keys;
-    std::map<Key, double> errors;
+    Evaluated evaluated;
   };
   std::vector<Task> tasks;
   for (std::size_t fold = 0; fold < folds; ++fold) {
     std::map<std::size_t, std::vector<Key>> of_shape;
     for (const Key& key : keys) {
-      if (!of_folds_[fold].contains(key)) {
+      if (!of_folds_[fold].errors.contains(key)) {
         of_shape[key.shape].push_back(key);
       }
     }
@@ -145,19 +150,42 @@ void HeldOutErrors::evaluate(const std::set<Key>& keys, std::size_t folds) {
   }
   parallel_for(std::ssize(tasks), max_threads_, [&](Eigen::Index index) {
     Task& task = tasks[index];
-    task.errors = evaluate_shape(task.fold, task.keys);
+    task.evaluated = evaluate_shape(task.fold, task.keys, keeps_models);
   });
   for (Task& task : tasks) {
-    of_folds_[task.fold].merge(task.errors);
+    of_folds_[task.fold].errors.merge(task.evaluated.errors);
+    of_folds_[task.fold].models.merge(task.evaluated.models);
   }
+}
+
+std::vector<std::optional<Partition>> HeldOutErrors::models(const Key& key) const {
+  std::vector<std::optional<Partition>> result;
+  for (const Evaluated& of_fold : of_folds_) {
+    const auto found = of_fold.models.find(key);
+    result.push_back(found != of_fold.models.end() ? std::optional(found->second) : std::nullopt);
+  }
+  return result;
+}
+
+bool HeldOutErrors::is_clearly_worse(const Key& key, const Key& best, std::size_t folds) const {
+  constexpr double standard_errors = 3.0;
+  Eigen::VectorXd of_key(static_cast<Eigen::Index>(folds) * error_blocks);
+  Eigen::VectorXd of_best(of_key.size());
+  for (std::size_t fold = 0; fold < folds; ++fold) {
+    const Eigen::Index begin = static_cast<Eigen::Index>(fold) * error_blocks;
+    of_key.segment(begin, error_blocks) = of_folds_[fold].errors.at(key);
+    of_best.segment(begin, error_blocks) = of_folds_[fold].errors.at(best);
+  }
+  const PairedDifference difference = paired_difference(of_key, of_best);
+  return difference.mean > standard_errors * difference.standard_error;
 }
 
 std::map<Key, std::vector<double>> HeldOutErrors::errors(std::size_t folds) const {
   std::map<Key, std::vector<double>> result;
-  for (const auto& [key, error] : of_folds_.front()) {
+  for (const auto& [key, error] : of_folds_.front().errors) {
     std::vector<double> all;
-    for (std::size_t fold = 0; fold < folds && of_folds_[fold].contains(key); ++fold) {
-      all.push_back(of_folds_[fold].at(key));
+    for (std::size_t fold = 0; fold < folds && of_folds_[fold].errors.contains(key); ++fold) {
+      all.push_back(of_folds_[fold].errors.at(key).sum());
     }
     if (all.size() == folds) {
       result[key] = std::move(all);

@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 #include <map>
+#include <optional>
 #include <set>
 #include <vector>
 
@@ -42,16 +43,30 @@ class HeldOutErrors {
   /// 2, 3, 4, 6, 9, ..., the largest tree's: each half as large again as the one before, counted from the largest down.
   const std::vector<Eigen::Index>& leaf_counts() const { return leaf_counts_; }
 
-  /// Evaluates on the first `folds` folds what was not before.
-  void evaluate(const std::set<Key>& keys, std::size_t folds);
+  /// Evaluates on the first `folds` folds what was not before. `keeps_models`: and keeps the models of what is new if
+  /// they are made from all training rows of their fold.
+  void evaluate(const std::set<Key>& keys, std::size_t folds, bool keeps_models = false);
+
+  /// The models of a candidate that were kept, one a fold.
+  std::vector<std::optional<Partition>> models(const Key& key) const;
 
   /// The sums of squared errors of each of the first `folds` folds, for all keys that these have.
   std::map<Key, std::vector<double>> errors(std::size_t folds) const;
 
+  /// Whether the held-out rows of the first `folds` folds say beyond doubt that `key` predicts worse than `best`: by
+  /// the differences of the sums of squared errors over parts of these rows, (C.3) of docs/algorithms/selection.md.
+  bool is_clearly_worse(const Key& key, const Key& best, std::size_t folds) const;
+
   Candidate candidate(const Key& key) const;
 
  private:
-  std::map<Key, double> evaluate_shape(std::size_t fold, const std::vector<Key>& keys) const;
+  /// Squared errors, summed over parts of the held-out rows, and models.
+  struct Evaluated {
+    std::map<Key, Eigen::VectorXd> errors;
+    std::map<Key, Partition> models;
+  };
+
+  Evaluated evaluate_shape(std::size_t fold, const std::vector<Key>& keys, bool keeps_models) const;
 
   const std::vector<FoldRows>& folds_;
   const std::vector<GrownTree>& grown_;
@@ -60,9 +75,9 @@ class HeldOutErrors {
   int max_threads_;
   std::vector<Shape> shapes_;
   std::vector<Eigen::Index> leaf_counts_;
-  std::vector<TrainingRows> samples_;            // of the folds' training rows, enough for the largest tree
-  std::vector<std::vector<Chunk>> held_out_;     // of the folds
-  std::vector<std::map<Key, double>> of_folds_;  // sums of squared errors
+  std::vector<TrainingRows> samples_;         // of the folds' training rows, enough for the largest tree
+  std::vector<std::vector<Chunk>> held_out_;  // of the folds
+  std::vector<Evaluated> of_folds_;
 };
 
 }  // namespace llmt

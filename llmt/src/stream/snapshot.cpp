@@ -63,7 +63,7 @@ class BestPartition {
 
   // Whether the candidate is the best so far.
   bool offer(Partition candidate) {
-    const double error = squared_error(candidate, held_out_, rows_, Eigen::VectorXd::Ones(1));
+    const double error = squared_errors(candidate, held_out_, rows_, Eigen::VectorXd::Ones(1)).sum();
     if (!(error < smallest_)) return false;
     smallest_ = error;
     best_ = std::move(candidate);

@@ -85,7 +85,7 @@ TEST(Sample, JointEstimateOnAllRowsIsReachedFromIt) {
 double loss(const Partition& partition, const llmt::TrainingRows& training) {
   const Eigen::VectorXd weights = Eigen::VectorXd::Ones(2);
   const std::vector<llmt::Chunk> chunks = {llmt::fetch(training, all(training.count()), partition.outputs)};
-  return llmt::squared_error(partition, training, chunks, weights);
+  return llmt::squared_errors(partition, training, chunks, weights).sum();
 }
 
 // A few rows far out have a leaf, and next to none of them is in the sample: the sample says nothing of the leaf's

@@ -49,11 +49,11 @@ TEST(SingleHoldOut, SameChoiceAtAnyNumberOfThreadsAndTheBestBlendIsMadeFromAllRo
     EXPECT_EQ(chosen[0].chosen.candidate.leaves, chosen[1].chosen.candidate.leaves);
     EXPECT_EQ(chosen[0].chosen.candidate.ridge, chosen[1].chosen.candidate.ridge);
     const auto text = [&](const llmt::Selection& selection) {
-      return llmt::to_json({training.columns, {training.output_columns[0]}, training.regressors, selection.made});
+      return llmt::to_json({training.columns, {training.output_columns[0]}, training.regressors, {*selection.made[0]}});
     };
     EXPECT_EQ(text(chosen[0]), text(chosen[1]));
     // Its held-out error is that of the model from all training rows.
-    const llmt::Model made{training.columns, {training.output_columns[0]}, training.regressors, chosen[0].made};
+    const llmt::Model made{training.columns, {training.output_columns[0]}, training.regressors, {*chosen[0].made[0]}};
     const Eigen::MatrixXd predicted = made.predict(d.x(held, Eigen::all));
     EXPECT_NEAR(llmt::rmse(predicted, d.y.col(0)(held))(0), chosen[0].chosen.rmse, 1e-12);
   }

@@ -1,0 +1,306 @@
+#include "selection/screening.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "selection/fold_errors.hpp"
+
+namespace llmt {
+namespace {
+
+// Widths that go on to all folds, and for which jumps are tried.
+constexpr std::size_t finalists = 2;
+
+// Candidates of each finalist that are compared on all folds, whatever their leaf count.
+constexpr std::size_t candidates_on_all_folds = 3;
+
+// Unknowns of the first round of screening, in which every ridge is tried; where no candidate has so few, in the first
+// round that has one.
+constexpr Eigen::Index cheap_unknowns = 300;
+
+// Shrinkage in screening, in rows; the nearest of the candidates.
+constexpr double screened_shrinkage = 0.1;
+
+// Leaves are no longer added to a (width, jump) pair after this number of larger leaf counts without improvement.
+constexpr std::size_t steps_without_gain = 2;
+
+// Each round of screening triples the unknowns and keeps the better half of the (width, jump) pairs, at least three.
+constexpr Eigen::Index next_unknowns = 3;
+constexpr std::size_t fewest_shapes = 3;
+
+// Largest leaf count of each shape: where in some fold two steps brought nothing. The best of ever more leaves would
+// often be best by chance.
+std::map<std::size_t, std::size_t> last_counts(const std::map<Key, std::vector<double>>& all, std::size_t folds) {
+  std::map<std::size_t, std::size_t> last;
+  for (std::size_t fold = 0; fold < folds; ++fold) {
+    std::map<std::size_t, std::pair<double, std::size_t>> best;  // of each shape: error, leaf count
+    for (const auto& [key, errors] : all) {
+      const auto [entry, is_new] = best.try_emplace(key.shape, errors[fold], key.leaves);
+      if (errors[fold] < entry->second.first && key.leaves <= entry->second.second + steps_without_gain) {
+        entry->second = {errors[fold], key.leaves};
+      }
+    }
+    for (const auto& [shape, entry] : best) {
+      const auto [count, is_new] = last.try_emplace(shape, entry.second + steps_without_gain);
+      count->second = std::min(count->second, entry.second + steps_without_gain);
+    }
+  }
+  return last;
+}
+
+std::size_t shape_of(const Key& key) { return key.shape; }
+
+class Steps {
+ public:
+  Steps(HeldOutErrors& comparison, const Candidates& candidates, Eigen::Index coefficients, std::size_t screening,
+        std::size_t folds)
+      : comparison_(comparison),
+        candidates_(candidates),
+        counts_(comparison.leaf_counts()),
+        coefficients_(coefficients),
+        screening_(screening),
+        folds_(folds),
+        ridges_(std::max<std::size_t>(candidates.ridges.size(), 1)) {}
+
+  std::set<Key> run() {
+    screen();
+    refine();
+    return compare_on_all_folds();
+  }
+
+ private:
+  // Ridge and sparseness of the shapes that are still in the race.
+  using Race = std::map<std::size_t, std::pair<std::size_t, std::size_t>>;
+
+  bool has_jumps(std::size_t shape) const {
+    return comparison_.shapes()[shape].jump < comparison_.shapes().front().jump;
+  }
+  double width_of(const Key& key) const { return comparison_.shapes()[key.shape].width; }
+  // The shrinkage with which blends are screened: larger ones favour small trees.
+  std::size_t usual_shrinkage() const {
+    const auto apart = [](double shrinkage) {
+      return std::abs(std::log(std::max(shrinkage, 1e-3) / screened_shrinkage));
+    };
+    return std::ranges::min_element(candidates_.shrinkages, {}, apart) - candidates_.shrinkages.begin();
+  }
+
+  // Compares every width with few leaves, with jumps the best two of them; with the best jump threshold all of them if
+  // it is better than none. Then the better half of these shapes with three times the unknowns, and so on while that
+  // helps.
+  void screen() {
+    Race race;
+    for (std::size_t shape = 0; shape < comparison_.shapes().size(); ++shape) {
+      if (!has_jumps(shape)) race[shape] = {ridges_ / 2, 0};
+    }
+    std::size_t next = 0;
+    for (Eigen::Index unknowns = cheap_unknowns; next < counts_.size() && !race.empty(); unknowns *= next_unknowns) {
+      const std::size_t begin = next;
+      while (next < counts_.size() && counts_[next] * coefficients_ <= unknowns) ++next;
+      if (next == begin) continue;
+      evaluate_counts(race, begin, next, begin == 0);
+      if (begin == 0) {
+        race = with_jumps(race);
+        evaluate_counts(race, begin, next, false);
+        const Race same = with_best_jump();
+        evaluate_counts(same, begin, next, false);
+        race.insert(same.begin(), same.end());
+      }
+      race = better_half(race, next);
+    }
+  }
+
+  // Leaf counts begin ... end - 1 of the shapes in the race, with the best ridges so far or all of them.
+  void evaluate_counts(const Race& race, std::size_t begin, std::size_t end, bool all_ridges) {
+    std::set<Key> keys;
+    for (std::size_t leaves = begin; leaves < end; ++leaves) {
+      for (const auto& [shape, best] : race) {
+        for (std::size_t ridge = 0; ridge < ridges_; ++ridge) {
+          for (std::size_t sparse = 0; sparse < candidates_.sparse.size(); ++sparse) {
+            if (all_ridges || std::pair(ridge, sparse) == best) {
+              keys.insert({shape, leaves, ridge, usual_shrinkage(), sparse});
+            }
+          }
+        }
+      }
+    }
+    comparison_.evaluate(keys, screening_);
+  }
+
+  // Adds the best widths with jumps, with the ridges that are best without.
+  Race with_jumps(Race race) const {
+    Ranked best = first_of_each(ranked(comparison_, screening_), shape_of);
+    for (const auto& [error, key] : best) race[key.shape] = {key.ridge, key.sparse};
+    best.resize(std::min(best.size(), finalists));
+    for (std::size_t shape = 0; shape < comparison_.shapes().size(); ++shape) {
+      for (const auto& [error, key] : best) {
+        if (has_jumps(shape) && comparison_.shapes()[shape].width == width_of(key)) {
+          race[shape] = {key.ridge, key.sparse};
+        }
+      }
+    }
+    return race;
+  }
+
+  // If jumps predict best: the same threshold with every width, for wider transitions pay where none crosses a jump.
+  Race with_best_jump() const {
+    const std::vector<Shape>& shapes = comparison_.shapes();
+    const Key best = ranked(comparison_, screening_).front().second;
+    Race race;
+    for (std::size_t shape = 0; shape < shapes.size() && has_jumps(best.shape); ++shape) {
+      if (shapes[shape].jump == shapes[best.shape].jump) race[shape] = {best.ridge, best.sparse};
+    }
+    return race;
+  }
+
+  // Of the shapes in the race, without those that are at their end or clearly worse than the best.
+  Race better_half(const Race& racing, std::size_t next) const {
+    Ranked best = first_of_each(ranked(comparison_, screening_), shape_of);
+    std::erase_if(best, [&](const auto& entry) { return !racing.contains(entry.second.shape); });
+    best.resize(std::min(best.size(), std::max(fewest_shapes, (best.size() + 1) / 2)));
+    Race race;
+    for (const auto& [error, key] : best) {
+      if (key.leaves + steps_without_gain >= next &&
+          !comparison_.is_clearly_worse(key, best.front().second, screening_)) {
+        race[key.shape] = {key.ridge, key.sparse};
+      }
+    }
+    return race;
+  }
+
+  // The best two widths, each with its best jump and with none, without those that are clearly worse than the best.
+  Ranked finalists_of() const {
+    const Ranked of_shape = first_of_each(ranked(comparison_, screening_), shape_of);
+    Ranked result = first_of_each(of_shape, [this](const Key& key) { return width_of(key); });
+    result.resize(std::min(result.size(), finalists));
+    for (std::size_t k = result.size(); k-- > 0;) {
+      const Key best = result[k].second;
+      const auto smooth = std::ranges::find_if(of_shape, [&](const auto& entry) {
+        return width_of(entry.second) == width_of(best) && !has_jumps(entry.second.shape);
+      });
+      if (has_jumps(best.shape) && smooth != of_shape.end()) result.push_back(*smooth);
+    }
+    const Key best = of_shape.front().second;
+    std::erase_if(result,
+                  [&](const auto& entry) { return comparison_.is_clearly_worse(entry.second, best, screening_); });
+    return result;
+  }
+
+  // Other ridges and shrinkages at the finalists' best leaf counts. Up to so many unknowns as in the first round of
+  // screening at the neighbouring leaf counts too, and in its second round the best of them.
+  void refine() {
+    const Ranked last = finalists_of();
+    std::set<Key> keys;
+    for (const auto& [error, best] : last) {
+      for (const std::size_t leaves : neighbours(best.leaves, unknowns_of(best) <= cheap_unknowns ? 1 : 0)) {
+        add_regularisations(best, leaves, keys);
+      }
+    }
+    comparison_.evaluate(keys, screening_);
+    keys.clear();
+    for (const auto& [error, best] : last) {
+      if (!tries_all_pairs(best)) continue;
+      for (const Key& key : best_of_shape(best.shape, candidates_on_all_folds)) {
+        for (const std::size_t leaves : neighbours(best.leaves, key.leaves == best.leaves ? 1 : 0)) {
+          keys.insert({key.shape, leaves, key.ridge, key.shrinkage, key.sparse});
+        }
+      }
+    }
+    comparison_.evaluate(keys, screening_);
+  }
+
+  // All pairs of a ridge and a shrinkage; with many unknowns the neighbouring ridges, and all shrinkages.
+  void add_regularisations(const Key& best, std::size_t leaves, std::set<Key>& keys) const {
+    for (std::size_t ridge = 0; ridge < ridges_; ++ridge) {
+      for (std::size_t shrinkage = 0; shrinkage < candidates_.shrinkages.size(); ++shrinkage) {
+        const bool next_ridge = ridge + 1 >= best.ridge && ridge <= best.ridge + 1;
+        if (tries_all_pairs(best) || (next_ridge && shrinkage == best.shrinkage) || ridge == best.ridge) {
+          for (std::size_t sparse = 0; sparse < candidates_.sparse.size(); ++sparse) {
+            keys.insert({best.shape, leaves, ridge, shrinkage, sparse});
+          }
+        }
+      }
+    }
+  }
+
+  Eigen::Index unknowns_of(const Key& key) const { return counts_[key.leaves] * coefficients_; }
+  bool tries_all_pairs(const Key& key) const { return unknowns_of(key) <= next_unknowns * cheap_unknowns; }
+
+  std::vector<std::size_t> neighbours(std::size_t leaves, std::size_t reach) const {
+    std::vector<std::size_t> result;
+    for (std::size_t each = leaves - std::min(reach, leaves); each < std::min(counts_.size(), leaves + reach + 1);
+         ++each) {
+      result.push_back(each);
+    }
+    return result;
+  }
+
+  // The first few candidates of a shape.
+  std::vector<Key> best_of_shape(std::size_t shape, std::size_t count) const {
+    std::vector<Key> best;
+    for (const auto& [error, key] : ranked(comparison_, screening_)) {
+      if (key.shape == shape && best.size() < count) best.push_back(key);
+    }
+    return best;
+  }
+
+  // Of each finalist the best few, and the best of each leaf count near its best; on half of the other folds, then
+  // those that are not clearly worse on all.
+  std::set<Key> compare_on_all_folds() {
+    std::set<Key> kept;
+    for (const auto& [least, best] : finalists_of()) {
+      const std::size_t reach = counts_[best.leaves] * coefficients_ <= cheap_unknowns ? 2 : 1;
+      Ranked order = ranked(comparison_, screening_);
+      // clang 14 lets no lambda have a name of a structured binding.
+      std::erase_if(order, [shape = best.shape](const auto& entry) { return entry.second.shape != shape; });
+      for (const auto& [error, key] : first_of_each(order, [](const Key& each) { return each.leaves; })) {
+        if (key.leaves + reach >= best.leaves && key.leaves <= best.leaves + reach) kept.insert(key);
+      }
+      for (std::size_t k = 0; k < std::min(order.size(), candidates_on_all_folds); ++k) kept.insert(order[k].second);
+    }
+    kept = without_clearly_worse(kept, screening_);
+    const std::size_t half = screening_ + (folds_ - screening_ + 1) / 2;
+    if (half < folds_) {
+      comparison_.evaluate(kept, half, true);
+      kept = without_clearly_worse(kept, half);
+    }
+    comparison_.evaluate(kept, folds_, true);
+    return kept;
+  }
+
+  std::set<Key> without_clearly_worse(std::set<Key> keys, std::size_t folds) const {
+    const Ranked order = ranked(comparison_, folds);
+    const auto best = std::ranges::find_if(order, [&](const auto& entry) { return keys.contains(entry.second); });
+    if (best == order.end()) return keys;
+    std::erase_if(keys, [&](const Key& key) { return comparison_.is_clearly_worse(key, best->second, folds); });
+    return keys;
+  }
+
+  HeldOutErrors& comparison_;
+  const Candidates& candidates_;
+  const std::vector<Eigen::Index>& counts_;
+  Eigen::Index coefficients_;
+  std::size_t screening_;
+  std::size_t folds_;
+  std::size_t ridges_;
+};
+
+}  // namespace
+
+Ranked ranked(const HeldOutErrors& comparison, std::size_t folds) {
+  const std::map<Key, std::vector<double>> all = comparison.errors(folds);
+  std::map<std::size_t, std::size_t> last = last_counts(all, folds);
+  Ranked order;
+  for (const auto& [key, errors] : all) {
+    if (key.leaves <= last[key.shape]) order.emplace_back(sum_of(errors), key);
+  }
+  std::ranges::sort(order);
+  return order;
+}
+
+std::set<Key> compare_in_steps(HeldOutErrors& comparison, const Candidates& candidates, Eigen::Index coefficients,
+                               std::size_t screening, std::size_t folds) {
+  return Steps(comparison, candidates, coefficients, screening, folds).run();
+}
+
+}  // namespace llmt
