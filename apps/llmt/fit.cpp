@@ -1,10 +1,16 @@
+#include <fmt/format.h>
+
 #include <memory>
+#include <optional>
+#include <stdexcept>
 
 #include "llmt/commands.hpp"
 #include "llmt/fit.hpp"
 #include "llmt/fit_options.hpp"
 #include "llmt/fit_summary.hpp"
 #include "llmt/learning.hpp"
+#include "llmt/readable.hpp"
+#include "llmt/readable_summary.hpp"
 #include "llmt/stream_command.hpp"
 #include "shared/cli.hpp"
 #include "shared/options.hpp"
@@ -18,9 +24,46 @@ struct FitArguments {
   bool json = false;
   bool no_intervals = false;
   bool stream = false;
+  std::string readable;  ///< the loss in per cent; empty: none is asked for
 };
 
+constexpr NumberRange per_cent = {0.0, 1000.0, "a number of per cent from 0 to 1000"};
+constexpr const char* readable_extension = ".readable.json";
+
+// What a readable tree does not go with, before the work.
+void refuse_unreadable(const FitOptions& options, const LearningArguments& learning) {
+  const auto refuse = [](const char* option, const char* why) {
+    throw std::invalid_argument(fmt::format("--readable does not go with {}: {}", option, why));
+  };
+  if (options.folds.count == 0) refuse("--cv 0", "the tree is chosen by its error on held-out rows");
+  if (options.validity == ValidityChoice::blend || options.validity == ValidityChoice::gaussian) {
+    refuse("--validity blend or gaussian", "it is measured by the best crisp tree");
+  }
+  if (options.rule == GrowthRule::lolimot || options.rule == GrowthRule::lolimot_data_driven) {
+    refuse("--rule lolimot or lolimot-data", "it is measured by the best crisp tree");
+  }
+  if (!learning.monotone.empty() || !learning.slope_signs.empty()) {
+    refuse("--monotone or --slope-sign", "its equations do not keep them");
+  }
+}
+
+// The readable tree beside the model, written if the model is.
+std::optional<ReadableResult> make_readable(const FitArguments& arguments, const LearningTable& table,
+                                            const FitSummary& fitted, double loss) {
+  ReadableResult readable = fit_readable(table.inputs.values, table.outputs, table.options, fitted, loss);
+  readable.model = readable.model.named(table.names, arguments.learning.targets, table.inputs.levels);
+  if (!arguments.output.empty()) {
+    save(readable.model, readable.intervals, beside(arguments.output, readable_extension).string());
+  }
+  return readable;
+}
+
 void fit_command(FitArguments arguments) {
+  double loss = 0.0;
+  if (!arguments.readable.empty()) {
+    loss = read_number("--readable", arguments.readable, per_cent) / 100.0;
+    refuse_unreadable(arguments.learning.options, arguments.learning);
+  }
   LearningTable table = read_learning_table(arguments.learning);
   Progress progress("growing trees");
   table.options.intervals = !arguments.no_intervals && !arguments.output.empty();
@@ -31,10 +74,20 @@ void fit_command(FitArguments arguments) {
   if (!arguments.output.empty()) {
     save(result.model, result.intervals, arguments.output);
   }
+  std::optional<ReadableResult> readable;
+  if (!arguments.readable.empty()) readable = make_readable(arguments, table, result.summary, loss);
+  const FitRun run{arguments.learning, arguments.output};
   if (arguments.json) {
-    print_json(summary_json({arguments.learning, arguments.output}, result));
-  } else {
-    print_summary({arguments.learning, arguments.output}, result);
+    Json summary = summary_json(run, result);
+    if (readable) summary["readable"] = readable_json(*readable);
+    print_json(summary);
+    return;
+  }
+  print_summary(run, result);
+  if (readable) print_readable(result, *readable, loss);
+  if (readable && !arguments.output.empty()) {
+    print(fmt::format("Readable tree written to {}; llmt inspect --rules prints it\n",
+                      beside(arguments.output, readable_extension).string()));
   }
 }
 
@@ -46,9 +99,14 @@ void add_fit(CLI::App& app) {
   const auto arguments = std::make_shared<FitArguments>();
   add_learning_options(*command, arguments->learning);
   add_fit_options(*command, arguments->learning.options);
-  add_output_file(*command, "-o,--output", arguments->output, "Model file to write");
+  add_output_file(*command, "-o,--output", arguments->output, "Model file to write", {readable_extension});
   command->add_flag("--no-intervals", arguments->no_intervals,
                     "Leave the folds' models out of the file; it is smaller and has no prediction intervals");
+  command
+      ->add_flag("--readable{10}", arguments->readable,
+                 "Also the smallest crisp tree with short, rounded equations whose held-out error is at most this many "
+                 "per cent above that of the best crisp tree; written beside the model as NAME.readable.json")
+      ->option_text("[=LOSS] [10]");
   command->add_flag("--json", arguments->json, "Print the summary as JSON");
   command->add_flag("--stream", arguments->stream, "Learn row by row in constant memory; DATA - is standard input");
   command->callback([command, arguments] {

@@ -111,6 +111,21 @@ std::string left_out_text(const FitResult& result) {
   return text;
 }
 
+// Of the outputs that are clamped, between what, and what that gained.
+std::string range_text(const Model& model, const PartitionSummary& summary, const Partition& partition) {
+  std::string text;
+  for (std::size_t o = 0; o < summary.range_guards.size(); ++o) {
+    if (const RangeGuard& guard = summary.range_guards[o]; guard.taken) {
+      text += fmt::format("{} is kept between {} and {}, the range of the training rows: RMSE held-out {} -> {}.\n",
+                          model.outputs()[summary.outputs[o]].name,
+                          number(partition.output_range(static_cast<Eigen::Index>(o), 0)),
+                          number(partition.output_range(static_cast<Eigen::Index>(o), 1)), number(guard.rmse_without),
+                          number(guard.rmse_with));
+    }
+  }
+  return text;
+}
+
 // How the splits of the final tree were searched; nothing if there were none to search.
 std::string search_text(const SearchSummary& search) {
   if (search.binned_nodes == 0) {
@@ -244,6 +259,11 @@ Json summary_json(const FitRun& run, const FitResult& result) {
       entry["compared"].push_back(candidate_json(other));
     }
     entry["cv_rmse"] = judged ? Json(partition.chosen.rmse) : Json(nullptr);
+    entry["range_guards"] = Json::array();  // one a target
+    for (const RangeGuard& guard : partition.range_guards) {
+      entry["range_guards"].push_back(
+          {{"taken", guard.taken}, {"cv_rmse_without", guard.rmse_without}, {"cv_rmse_with", guard.rmse_with}});
+    }
     entry["cv_rmse_least_squares"] = judged ? Json(least_squares_rmse(partition)) : Json(nullptr);
     entry["crisp_cv_rmse_by_leaves"] =
         std::vector<double>(partition.crisp_cv_rmse.begin(), partition.crisp_cv_rmse.end());
@@ -265,6 +285,9 @@ void print_summary(const FitRun& run, const FitResult& result) {
     print("Held-out errors of the shared tree are over all targets, each divided by its standard deviation.\n");
   }
   print(left_out_text(result));
+  for (std::size_t p = 0; p < result.summary.partitions.size(); ++p) {
+    print(range_text(result.model, result.summary.partitions[p], result.model.partitions()[p]));
+  }
   print(local_models_text(run, result.summary));
   for (const PartitionSummary& partition : result.summary.partitions) {
     print(search_text(partition.search));

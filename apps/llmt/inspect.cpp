@@ -8,6 +8,7 @@
 
 #include "llmt/commands.hpp"
 #include "llmt/model.hpp"
+#include "llmt/rules.hpp"
 #include "shared/cli.hpp"
 #include "shared/options.hpp"
 
@@ -17,6 +18,7 @@ namespace {
 struct InspectArguments {
   std::string model;
   bool json = false;
+  bool rules = false;
 };
 
 // What the oblique split of a node compares, without its constant: "0.8 x1 - 0.3 x2".
@@ -143,6 +145,11 @@ std::string jumps_text(const Model& model, const Partition& partition) {
   return fmt::format("{}", fmt::join(places, ", "));
 }
 
+// Whether predictions of an output of the partition are clamped.
+bool is_clamped(const Partition& partition, Eigen::Index output) {
+  return partition.output_range.size() > 0 && partition.output_range.row(output).allFinite();
+}
+
 void print_directions(const Model& model, const Partition& partition) {
   Table table({"oblique split", "compares", "half width"});
   bool any = false;
@@ -171,17 +178,20 @@ void print_model(const Model& model, const std::string& path) {
   print(inputs.text());
   for (Eigen::Index p = 0; p < std::ssize(model.partitions()); ++p) {
     const Partition& partition = model.partitions()[p];
-    for (std::size_t o = 0; o < partition.outputs.size(); ++o) {
-      const std::string& name = model.outputs()[partition.outputs[o]].name;
+    for (Eigen::Index output = 0; output < std::ssize(partition.outputs); ++output) {
+      const std::string& name = model.outputs()[partition.outputs[output]].name;
       print(fmt::format("\n{}: {} leaves, {}\n", name, partition.num_leaves(), validity_text(partition.validity)));
       Table table({"leaf", "rows", "RMSE", "where", name + " ="});
       const std::vector<Leaf> leaves = model.leaves(p);
       for (std::size_t k = 0; k < leaves.size(); ++k) {
-        const Eigen::Index output = o;
         table.add({fmt::format("{}", k + 1), fmt::format("{}", leaves[k].samples), number(leaves[k].rmse(output), 3),
                    conditions(model, partition, leaves[k]), formula(model, leaves[k], output)});
       }
       print(table.text());
+      if (is_clamped(partition, output)) {
+        print(fmt::format("Predictions are kept between {} and {}, the range of the training rows\n",
+                          number(partition.output_range(output, 0)), number(partition.output_range(output, 1))));
+      }
     }
     print_directions(model, partition);
     if (const std::string jumps = jumps_text(model, partition); !jumps.empty()) {
@@ -218,7 +228,11 @@ Json leaf_table(const Model& model) {
                          {"width", partition.validity.width},
                          {"smoothness", partition.validity.smoothness}};
     for (const int output : partition.outputs) {
+      const Eigen::Index position = std::ssize(entry["targets"]);
       entry["targets"].push_back(model.outputs()[output].name);
+      entry["output_range"].push_back(is_clamped(partition, position) ? Json({partition.output_range(position, 0),
+                                                                              partition.output_range(position, 1)})
+                                                                      : Json(nullptr));
     }
     for (std::size_t i = 0; i < partition.nodes.size(); ++i) {
       if (const Node& node = partition.nodes[i]; node.is_oblique()) {
@@ -260,11 +274,14 @@ void add_inspect(CLI::App& app) {
   command->footer("Example: llmt inspect concrete.json");
   const auto arguments = std::make_shared<InspectArguments>();
   add_input_file(*command, "model", arguments->model, "Model file of llmt fit")->required();
-  command->add_flag("--json", arguments->json, "Print JSON");
+  CLI::Option* const json = command->add_flag("--json", arguments->json, "Print JSON");
+  command->add_flag("--rules", arguments->rules, "Print a crisp model as rules and as a tree")->excludes(json);
   command->callback([arguments] {
     const Model model = load(arguments->model);
     if (arguments->json) {
       print_json(leaf_table(model));
+    } else if (arguments->rules) {
+      print(rules_text(model, arguments->model));
     } else {
       print_model(model, arguments->model);
     }

@@ -25,12 +25,6 @@ bool parse_number(const std::string& text, Number& value) {
   return error == std::errc() && stop == end && !text.starts_with("+-");
 }
 
-double read_number(const std::string& option, const std::string& text, const NumberRange& range) {
-  double value = 0.0;
-  if (!parse_number(text, value) || !(value >= range.low && value <= range.high)) refuse(option, text, range.words);
-  return value;
-}
-
 bool is_same_file(const std::string& one, const std::string& other) {
   std::error_code unknown;
   return std::filesystem::equivalent(one, other, unknown) && std::filesystem::is_regular_file(one, unknown);
@@ -47,6 +41,12 @@ void refuse_impossible_place(const std::string& path) {
 }
 
 }  // namespace
+
+double read_number(const std::string& option, const std::string& text, const NumberRange& range) {
+  double value = 0.0;
+  if (!parse_number(text, value) || !(value >= range.low && value <= range.high)) refuse(option, text, range.words);
+  return value;
+}
 
 CLI::Option* add_text(CLI::App& command, const std::string& name, const char* type, const CLI::callback_t& take,
                       const std::string& help, const std::function<std::string()>& show) {

@@ -36,6 +36,9 @@ CLI::Option* add_number(CLI::App& command, const std::string& name, double& valu
 CLI::Option* add_numbers(CLI::App& command, const std::string& name, std::vector<double>& values,
                          const NumberRange& range, const std::string& help);
 
+/// A number in the range; throws as add_number().
+double read_number(const std::string& option, const std::string& text, const NumberRange& range);
+
 /// A whole number in [low, high]; throws as add_number().
 std::int64_t read_count(const std::string& option, const std::string& text, std::int64_t low, std::int64_t high);
 

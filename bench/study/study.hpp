@@ -16,5 +16,6 @@ void add_modes(CLI::App& study);
 void add_monotone(CLI::App& study);
 void add_pruning(CLI::App& study);
 void add_sets(CLI::App& study);
+void add_srbench(CLI::App& study);
 
 }  // namespace bench

@@ -32,6 +32,21 @@ inline std::string fitted_model(llmt::FitOptions options, bool has_categories, E
   return to_json(llmt::fit(x, y, options).model);
 }
 
+// Every second output is clamped.
+inline std::string clamped(const std::string& text) {
+  constexpr double open = std::numeric_limits<double>::infinity();
+  const llmt::Model model = llmt::from_json(text);
+  std::vector<llmt::Partition> partitions = model.partitions();
+  for (llmt::Partition& partition : partitions) {
+    partition.output_range.resize(std::ssize(partition.outputs), 2);
+    for (Eigen::Index o = 0; o < partition.output_range.rows(); ++o) {
+      const llmt::OutputColumn& output = model.outputs()[partition.outputs[o]];
+      partition.output_range.row(o) << (o % 2 == 0 ? output.low : -open), (o % 2 == 0 ? output.high : open);
+    }
+  }
+  return to_json(llmt::Model(model.inputs(), model.outputs(), model.regressors(), partitions));
+}
+
 inline const std::vector<std::string>& fitted_models() {
   static const std::vector<std::string> models = [] {
     std::vector<std::string> all;
@@ -44,6 +59,8 @@ inline const std::vector<std::string>& fitted_models() {
     all.push_back(fitted_model({.rule = llmt::GrowthRule::m5}, true, 1));
     all.push_back(fitted_model({.terms = llmt::LocalTerms::quadratic}, false, 1));
     all.push_back(fitted_model({.max_leaves = 1}, true, 2));
+    all.push_back(clamped(all[1]));
+    all.push_back(clamped(all[2]));
     return all;
   }();
   return models;

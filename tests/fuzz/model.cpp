@@ -9,8 +9,9 @@
 
 namespace {
 
-const std::vector<std::string> words = {"",      "crisp", "blend", "gaussian",     "logistic",  "x1",   "y1",
-                                        "level", "split", "left",  "guard_parent", "direction", "rank", "\xC3\xB6"};
+const std::vector<std::string> words = {"",     "crisp",        "blend",   "gaussian", "logistic",     "x1",
+                                        "y1",   "level",        "split",   "left",     "guard_parent", "direction",
+                                        "rank", "output_range", "\xC3\xB6"};
 
 bool same_bytes(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
   return a.rows() == b.rows() && a.cols() == b.cols() &&
@@ -40,6 +41,13 @@ void evaluate(const llmt::Model& model) {
   const Eigen::MatrixXd together = model.predict(x, 1);
   for (Eigen::Index i = 0; i < x.rows(); ++i) {
     fuzz::require(same_bytes(model.predict(x.row(i), 1), together.row(i)), "a row alone is as in a block");
+  }
+  for (const llmt::Partition& partition : model.partitions()) {
+    for (Eigen::Index o = 0; o < partition.output_range.rows(); ++o) {
+      for (const double value : together.col(partition.outputs[o])) {
+        fuzz::require(!(value < partition.output_range(o, 0) || value > partition.output_range(o, 1)), "it is clamped");
+      }
+    }
   }
   fuzz::require(model.leaf_of(x, 1).minCoeff() >= 0, "every row is in a leaf");
   model.extrapolation(x, 1);

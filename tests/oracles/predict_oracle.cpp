@@ -171,6 +171,9 @@ Eigen::VectorXd predict(const llmt::Model& model, const Eigen::VectorXd& row) {
     }
     value += (partition.outer_slope.size() > 0 ? partition.outer_slope : root.slope) *
              d.array().isNaN().select(0.0, d - c).matrix();
+    for (Eigen::Index o = 0; o < partition.output_range.rows(); ++o) {
+      value(o) = std::min(std::max(value(o), partition.output_range(o, 0)), partition.output_range(o, 1));
+    }
     for (std::size_t o = 0; o < partition.outputs.size(); ++o) {
       result(partition.outputs[o]) = value(o);
     }

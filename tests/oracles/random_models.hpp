@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <algorithm>
+#include <limits>
 #include <ostream>
 #include <string>
 #include <vector>
@@ -25,6 +26,7 @@ struct Kind {
   bool shared = false;  // one partition for all outputs
   int leaves = 20;
   bool oblique = false;  // splits on numbers
+  bool clamped = false;  // every second output
 };
 
 /// For GoogleTest.
@@ -117,6 +119,14 @@ inline llmt::Partition random_partition(const Kind& kind, std::vector<int> outpu
   partition.outer_slope = 0.5 * partition.nodes.front().slope;
   partition.residual_range.resize(served, 2);
   partition.residual_range << Eigen::VectorXd::Constant(served, -3.0), Eigen::VectorXd::Constant(served, 2.5);
+  if (kind.clamped) {
+    constexpr double open = std::numeric_limits<double>::infinity();
+    partition.output_range.resize(served, 2);
+    for (Eigen::Index o = 0; o < served; ++o) {
+      const bool is_open = partition.outputs[o] % 2 != 0;
+      partition.output_range.row(o) << (is_open ? -open : -0.7), (is_open ? open : 0.9);
+    }
+  }
   return partition;
 }
 

@@ -14,5 +14,7 @@
 #include "llmt/options.hpp"
 #include "llmt/outliers.hpp"
 #include "llmt/random.hpp"
+#include "llmt/readable.hpp"
+#include "llmt/size.hpp"
 #include "llmt/stream.hpp"
 #include "llmt/summary.hpp"

@@ -101,6 +101,10 @@ struct Partition {
   /// Smallest and largest residual of the root's model over the training rows, outputs x 2. Predictions are held to the
   /// root's model plus this range (docs/algorithms/guards.md, B.3). Empty: they are not.
   Eigen::MatrixXd residual_range = {};
+  /// Smallest and largest prediction of each output, outputs x 2, within the output's range in training. What lies
+  /// outside is clamped, after all other guards (docs/algorithms/guards.md, B.5). -infinity, infinity: this output is
+  /// not clamped. Empty: none is.
+  Eigen::MatrixXd output_range = {};
 
   Eigen::Index num_leaves() const { return (std::ssize(nodes) + 1) / 2; }
 };
@@ -191,6 +195,9 @@ class Evaluator;
 /// everywhere; data that are quadratic in the inputs, by a model with products, within the training extent. Beyond it
 /// products stay where their factors leave it, and the linear parts go on.
 ///
+/// A fourth guard is there where held-out rows asked for it: the value is clamped to Partition::output_range. It is
+/// constant outside of that range, and its derivative jumps where it enters the range.
+///
 /// A missing value (NaN) takes the share that was learned at each split on its input, and in a local model the mean of
 /// the leaf's rows.
 class Model {
@@ -199,7 +206,8 @@ class Model {
   /// not at all, children out of order, an index out of range, a shape, a number that is not finite, two columns or
   /// levels of one name. Or that does not go with the training extent, which InputColumn and OutputColumn give: a
   /// centre, mean or range of a regressor outside of it, more rows in a node than in its parent, a rank above the
-  /// number of coefficients, a residual_range that the outputs and the root's model cannot leave.
+  /// number of coefficients, a residual_range that the outputs and the root's model cannot leave, an output_range
+  /// outside of the output's.
   Model(std::vector<InputColumn> inputs, std::vector<OutputColumn> outputs, std::vector<Regressor> regressors,
         std::vector<Partition> partitions);
 
@@ -215,8 +223,9 @@ class Model {
   /// differs or a value is infinite. Same bytes at any number of threads (0: all), and for a row alone or among others.
   Eigen::MatrixXd predict(const Eigen::Ref<const Eigen::MatrixXd>& inputs, int max_threads = 0) const;
 
-  /// Derivatives of the prediction at one point, outputs x inputs, in closed form. Zero for categorical inputs; at a
-  /// jump of a crisp model that of the side the point belongs to. Throws as predict(), and if a value is missing.
+  /// Derivatives of the prediction at one point, outputs x inputs, in closed form. Zero for categorical inputs, and of
+  /// an output that is clamped there; at a jump of a crisp model that of the side the point belongs to. Throws as
+  /// predict(), and if a value is missing.
   Eigen::MatrixXd jacobian(const Eigen::Ref<const Eigen::VectorXd>& point) const;
 
   /// Which leaf holds each row, rows x partitions: positions in leaves(partition); where validities overlap, the leaf
@@ -261,8 +270,8 @@ class Model {
 /// Partition `partition` as it was with at most `max_leaves` leaves.
 Partition prefix(const Partition& partition, Eigen::Index max_leaves);
 
-/// The model as JSON text, format version 2; docs/file-formats.md describes it. Numbers are written so that they read
-/// back exactly.
+/// The model as JSON text; docs/file-formats.md describes it. Format version 2, or 3 if there is an output_range, which
+/// readers of version 2 do not know. Numbers are written so that they read back exactly.
 std::string to_json(const Model& model);
 
 /// Reads what to_json() wrote. The text may be of any origin. Throws std::runtime_error, starting with `name` and the

@@ -49,6 +49,15 @@ struct CandidateError {
   Eigen::VectorXd fold_rmse = {};  ///< one entry a fold
 };
 
+/// Whether predictions of an output are clamped to its range in training (docs/algorithms/guards.md, B.5), and the
+/// root mean square errors on held-out rows, in the output's unit, that decided it. Every fold's model was clamped to
+/// the range of its own training rows.
+struct RangeGuard {
+  bool taken = false;
+  double rmse_without = 0.0;
+  double rmse_with = 0.0;
+};
+
 /// How the splits of a tree were searched. All 0 for rules that do not compare the residual sums of squares of two
 /// child models: RA, LOLIMOT, M5', HILOMOT.
 struct SearchSummary {
@@ -76,8 +85,9 @@ struct PartitionSummary {
   Eigen::Index rank_deficient_leaves = 0;
   Eigen::Index coefficients = 0;  ///< of all leaves, for one output: constants and slopes that are not 0
   Eigen::VectorXd train_rmse;     ///< in-sample, one entry an output of the partition, in its unit
-  CandidateError chosen;          ///< errors NaN without folds
-  /// The alternatives: least squares first, then the best candidate of each validity and width. Empty without folds.
+  CandidateError chosen;          ///< as in the model, clamped if a range_guard is taken; errors NaN without folds
+  /// The alternatives: least squares first, then the best candidate of each validity and width, none of them clamped.
+  /// Empty without folds.
   /// From 50 000 rows on, all blends but the best one are made from samples of the training rows.
   std::vector<CandidateError> best_of_kind;
   /// Held-out RMSE of the crisp trees with 1, 2, ... leaves; empty without folds.
@@ -88,6 +98,7 @@ struct PartitionSummary {
   std::vector<int> left_out;       ///< inputs that FitOptions::choose_inputs left out, ascending
   /// What choose_inputs compared: all inputs first, then fewer. Empty: nothing.
   std::vector<InputStep> input_steps;
+  std::vector<RangeGuard> range_guards = {};  ///< one an output of the partition; empty without folds
 };
 
 struct FitSummary {

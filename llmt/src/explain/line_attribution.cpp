@@ -7,6 +7,7 @@
 
 #include "explain/straight_line.hpp"
 #include "model/through_regressors.hpp"
+#include "numerics/chebyshev.hpp"
 #include "numerics/quadrature.hpp"
 
 namespace llmt {
@@ -22,6 +23,9 @@ constexpr double shortest_piece = 1e-9;
 constexpr double most_values = 2e8;
 constexpr double most_coarse_values = 1e6;
 constexpr double most_pieces_and_leaves = 2e7;
+
+// What is not a polynomial is taken for one of this degree, and so is everything where little precision is asked for.
+constexpr int usual_degree = 8;
 
 // Equal pieces of a line that is not cut at kinks.
 constexpr int coarse_pieces = 8;
@@ -48,11 +52,15 @@ class Line {
 
   Pieces pieces();
   Eigen::VectorXd predict(const Eigen::VectorXd& row);
+  Eigen::VectorXd predict_unclamped(const Eigen::VectorXd& row);
 
   // One piece of the line after the other, and the jumps between them.
   Place move_to(const Place& from, double to, std::span<Crossing> crossings);
   void jump(Eigen::Index input, double to, const Eigen::VectorXd& parts, Place& place);
 
+  bool is_polynomial() const {
+    return partition_.validity.kind == ValidityKind::crisp || partition_.validity.kind == ValidityKind::blend;
+  }
   bool may_go_on() const { return values_ < (precision_.exact ? most_values : most_coarse_values); }
 
   // The integral of X.1 over a piece.
@@ -60,6 +68,8 @@ class Line {
   Eigen::MatrixXd mean_rate(double from, double to, const Eigen::VectorXd& row, int order);
   bool estimate_rate(const Place& from, const Place& to, const Eigen::VectorXd& middle_row, Eigen::MatrixXd& rate);
   void integrate(const Place& from, const Place& to);
+  void integrate_one_side(const Place& from, const Place& to);
+  std::vector<double> entries_of_range(const Place& from, double to);
   void add_shares(double length, const Eigen::VectorXd& change, const Eigen::MatrixXd& rate);
 
   const Model& model_;
@@ -138,10 +148,16 @@ Pieces Line::pieces() {
 }
 
 Eigen::VectorXd Line::predict(const Eigen::VectorXd& row) {
+  Eigen::VectorXd values = predict_unclamped(row);
+  evaluator_.clamp(values.data());
+  return values;
+}
+
+Eigen::VectorXd Line::predict_unclamped(const Eigen::VectorXd& row) {
   deviations_at(model_.inputs(), model_.regressors(), row.data(), deviations_.data());
   Eigen::VectorXd values(std::ssize(partition_.outputs));
   evaluator_.activate(row.data(), active_);
-  evaluator_.combine(active_, deviations_.data(), values.data());
+  evaluator_.combine_unclamped(active_, deviations_.data(), values.data());
   values_ += static_cast<double>(active_.size());
   return values;
 }
@@ -225,15 +241,14 @@ Eigen::MatrixXd Line::mean_rate(double from, double to, const Eigen::VectorXd& r
 // Sets the mean rates of a piece. True if they are good enough: the shares of the piece add up to the change of the
 // prediction, and where the prediction is no polynomial two orders of integration agree.
 bool Line::estimate_rate(const Place& from, const Place& to, const Eigen::VectorXd& middle_row, Eigen::MatrixXd& rate) {
-  const ValidityKind kind = partition_.validity.kind;
-  const bool polynomial = kind == ValidityKind::crisp || kind == ValidityKind::blend;
+  const bool polynomial = is_polynomial();
   const double length = to.position - from.position;
   const Eigen::VectorXd change = to.value - from.value;
   const auto adds_up = [&] {
     return ((change - length * rate.rowwise().sum()).array().abs() <= tolerance_.array()).all();
   };
   const bool exact = precision_.exact && may_go_on();
-  const int of_prediction = !exact || !polynomial ? 8 : degree(middle_row);
+  const int of_prediction = !exact || !polynomial ? usual_degree : degree(middle_row);
   rate = mean_rate(from.position, to.position, from.row, (of_prediction + 1) / 2);
   bool accepted = adds_up();
   if (exact && (!accepted || !polynomial)) {
@@ -246,8 +261,47 @@ bool Line::estimate_rate(const Place& from, const Place& to, const Eigen::Vector
   return accepted;
 }
 
+// Where between two positions an output enters or leaves the range that it is clamped to, ascending. Exact where the
+// prediction is a polynomial; elsewhere near enough for halves of the piece to be cut better.
+std::vector<double> Line::entries_of_range(const Place& from, double to) {
+  if (!evaluator_.has_output_range() || line_.moving.empty()) return {};
+  const double length = to - from.position;
+  const bool polynomial = precision_.exact && may_go_on() && is_polynomial();
+  const int of_prediction = polynomial ? degree(line_.at(from.position + 0.5 * length, from.row)) : usual_degree;
+  const std::vector<double> points = chebyshev_points(of_prediction);
+  Eigen::MatrixXd values(std::ssize(partition_.outputs), std::ssize(points));
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    values.col(k) = predict_unclamped(line_.at(from.position + points[k] * length, from.row));
+  }
+  std::vector<double> positions;
+  for (Eigen::Index o = 0; o < values.rows(); ++o) {
+    const Eigen::VectorXd coefficients = chebyshev_coefficients(values.row(o).transpose());
+    for (const double bound : evaluator_.output_range().row(o)) {
+      for (const double point : positions_of_level(coefficients, bound)) {
+        positions.push_back(from.position + point * length);
+      }
+    }
+  }
+  std::erase_if(positions, [&](double position) {
+    return position <= from.position + same_position || position >= to - same_position;
+  });
+  std::ranges::sort(positions);
+  return positions;
+}
+
 // Adds the shares of a piece in which nothing jumps.
 void Line::integrate(const Place& from, const Place& to) {
+  Place at = from;
+  for (const double position : entries_of_range(from, to.position)) {
+    Place next{position, from.row, predict(line_.at(position, from.row))};
+    integrate_one_side(at, next);
+    at = std::move(next);
+  }
+  integrate_one_side(at, to);
+}
+
+// Adds the shares of a piece in which nothing jumps, and each output is clamped everywhere or nowhere.
+void Line::integrate_one_side(const Place& from, const Place& to) {
   const double length = to.position - from.position;
   const Eigen::VectorXd change = to.value - from.value;
   if (line_.moving.empty() || (length <= 0.0 && change.isZero(0.0))) return;

@@ -16,6 +16,7 @@
 #include "fit/input_choice.hpp"
 #include "fit/memory.hpp"
 #include "fit/missing_weights.hpp"
+#include "fit/output_range.hpp"
 #include "fit/same_regressors.hpp"
 #include "selection/selection.hpp"
 
@@ -107,9 +108,8 @@ Selection first_candidate(const Candidates& candidates, Eigen::Index leaves) {
   return selection;
 }
 
-// The chosen candidate in every fold, for the intervals.
+// The chosen candidate in every fold, for the guard of the range and the intervals.
 std::vector<Partition> finish_folds(const Setting& setting, const std::vector<GrownTree>& trees, Selection& choice) {
-  if (!setting.options.intervals) return {};
   const int threads = setting.options.max_threads;
   std::vector<std::optional<Partition>> made = std::move(choice.made);
   made.resize(trees.size());
@@ -148,7 +148,7 @@ struct FittedPartition {
   std::vector<PartitionOn> of_folds;
 };
 
-FittedPartition finish(const Setting& setting, const FinalTree& grown, Selection choice,
+FittedPartition finish(const Setting& setting, const FinalTree& grown, Selection choice, std::vector<RangeGuard> guards,
                        std::vector<Partition> of_folds) {
   const int threads = setting.options.max_threads;
   const Eigen::Index grown_leaves = grown.tree.partition.num_leaves();
@@ -156,6 +156,7 @@ FittedPartition finish(const Setting& setting, const FinalTree& grown, Selection
   const bool fewer = candidate.leaves < grown_leaves;
   candidate.leaves = std::min(candidate.leaves, grown_leaves);
   Partition partition = estimate(setting.all, grown.tree, candidate, threads);
+  partition.output_range = output_range(guards, partition.outputs, setting.all);
   describe_leaves(setting.measured, partition, candidate.sparse, threads);
   PartitionSummary summary = describe(partition, setting.measured, candidate.sparse);
   summary.grown_leaves = grown_leaves;
@@ -166,6 +167,7 @@ FittedPartition finish(const Setting& setting, const FinalTree& grown, Selection
   summary.crisp_cv_rmse = std::move(choice.crisp_rmse);
   summary.cv_folds = std::ssize(setting.folds);
   summary.held_out_rows = choice.held_out_rows;
+  summary.range_guards = std::move(guards);
   FittedPartition fitted{{setting.all.regressors, std::move(partition)}, std::move(summary), {}};
   for (std::size_t f = 0; f < of_folds.size(); ++f) {
     fitted.of_folds.push_back({setting.folds[f].training.regressors, std::move(of_folds[f])});
@@ -179,16 +181,19 @@ FittedPartition fit_on_inputs(const Setting& setting, const std::vector<int>& se
   const bool has_folds = !setting.folds.empty();
   const std::vector<GrownTree> trees = grow_folds(setting, served, report);
   refuse_beyond_memory(setting, most_leaves(trees));
+  const Eigen::VectorXd weights = error_weights(*setting.all.table, served);
   Selection choice;
   if (has_folds) {
-    const Eigen::VectorXd weights = error_weights(*setting.all.table, served);
     choice = select(setting.folds, trees, setting.plan.candidates, weights, threads);
   }
   const FinalTree grown = grow_tree(setting.all, served, setting.plan, !has_folds, threads);
   refuse_beyond_memory(setting, grown.tree.partition.num_leaves());
   if (!has_folds) choice = first_candidate(setting.plan.candidates, grown.tree.partition.num_leaves());
   std::vector<Partition> of_folds = finish_folds(setting, trees, choice);
-  FittedPartition fitted = finish(setting, grown, std::move(choice), std::move(of_folds));
+  std::vector<RangeGuard> guards;
+  if (has_folds) guards = guard_output_range(setting.folds, weights, threads, of_folds, choice.chosen);
+  if (!setting.options.intervals) of_folds.clear();
+  FittedPartition fitted = finish(setting, grown, std::move(choice), std::move(guards), std::move(of_folds));
   report.tree_done();
   return fitted;
 }

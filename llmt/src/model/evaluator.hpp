@@ -21,7 +21,8 @@ class Evaluator {
       : inputs_(std::ssize(inputs)),
         regressors_(regressors),
         validities_(partition, inputs),
-        models_(partition, regressors) {}
+        models_(partition, regressors),
+        output_range_(partition.output_range) {}
 
   const LeafValidities& validities() const { return validities_; }
   Eigen::Index num_outputs() const { return models_.num_outputs(); }
@@ -38,8 +39,17 @@ class Evaluator {
   /// Applies the guards B.3 and B.4 of docs/algorithms/guards.md to `values`.
   void finish(const double* deviations, double* values) const { models_.finish(deviations, values); }
 
-  /// The prediction (docs/algorithms/model.md, M.2) with its guards: sum of validity times local model, finished.
+  /// The prediction (docs/algorithms/model.md, M.2) with its guards: sum of validity times local model, finished, and
+  /// clamped (B.5).
   void combine(const std::vector<Activation>& active, const double* deviations, double* values) const;
+
+  /// The two parts of combine().
+  void combine_unclamped(const std::vector<Activation>& active, const double* deviations, double* values) const;
+  void clamp(double* values) const;
+
+  /// See Partition.
+  const Eigen::MatrixXd& output_range() const { return output_range_; }
+  bool has_output_range() const { return output_range_.size() > 0; }
 
   /// Predictions of a block, rows x outputs of the partition, one row after the other.
   void predict(const RowBlock& block, std::vector<double>& values) const;
@@ -59,6 +69,7 @@ class Evaluator {
   Eigen::Index regressors_;
   LeafValidities validities_;
   LocalModels models_;
+  Eigen::MatrixXd output_range_;
 };
 
 }  // namespace llmt

@@ -90,6 +90,14 @@ void Evaluator::derivatives(const double* row, const double* deviations, Eigen::
     add_blend_derivatives(row, deviations, values, by_input, by_regressor);
   }
   models_.finish_slopes(deviations, values.data(), by_input, by_regressor);
+  if (!has_output_range()) return;
+  models_.finish(deviations, values.data());
+  for (Eigen::Index o = 0; o < num_outputs(); ++o) {
+    if (values[o] < output_range_(o, 0) || values[o] > output_range_(o, 1)) {
+      by_input.row(o).setZero();
+      by_regressor.row(o).setZero();
+    }
+  }
 }
 
 // d Phi_i = Phi_i (d l_i - sum_k Phi_k d l_k), l_i the exponent.

@@ -123,7 +123,8 @@ Partition prefix(const Partition& partition, Eigen::Index max_leaves) {
                    .validity = partition.validity,
                    .nodes = {partition.nodes.begin(), partition.nodes.begin() + kept},
                    .outer_slope = partition.outer_slope,
-                   .residual_range = partition.residual_range};
+                   .residual_range = partition.residual_range,
+                   .output_range = partition.output_range};
   for (Node& node : result.nodes) {
     if (node.left >= kept) {
       make_leaf(node);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <set>
 #include <string_view>
 
@@ -44,6 +45,21 @@ void check_validity(const Partition& partition, const ModelPart& part) {
   }
 }
 
+void check_output_range(const Partition& partition, const ModelPart& part) {
+  const Eigen::MatrixXd& range = partition.output_range;
+  if (range.size() == 0) return;
+  const auto is_one = [](double low, double high) {
+    const bool is_open = low == -std::numeric_limits<double>::infinity() && high == -low;
+    return is_open || (std::isfinite(low) && std::isfinite(high) && low <= high);
+  };
+  bool fits = range.rows() == std::ssize(partition.outputs) && range.cols() == 2;
+  for (Eigen::Index o = 0; fits && o < range.rows(); ++o) fits = is_one(range(o, 0), range(o, 1));
+  if (!fits) {
+    throw ModelFault(part,
+                     fmt::format("output_range must be finite or open, {} x 2, low <= high", partition.outputs.size()));
+  }
+}
+
 void check_partition(const Partition& partition, Eigen::Index index, const std::vector<InputColumn>& inputs,
                      Eigen::Index regressors) {
   const ModelPart part{"partition", index};
@@ -62,6 +78,7 @@ void check_partition(const Partition& partition, Eigen::Index index, const std::
        (partition.residual_range.col(0).array() > partition.residual_range.col(1).array()).any())) {
     throw ModelFault(part, fmt::format("residual_range must be finite, {} x 2, low <= high", partition.outputs.size()));
   }
+  check_output_range(partition, part);
   check_tree(partition, index, inputs, regressors);
 }
 

@@ -10,6 +10,8 @@ namespace llmt {
 /// The format of model files, as their members "format" and "version" say.
 inline constexpr const char* model_format_name = "llmt-model";
 inline constexpr int model_format_version = 2;
+/// Of a file with an output_range, which programs that know version 2 alone would ignore.
+inline constexpr int model_format_version_with_range = 3;
 
 /// The value that to_json() writes.
 Json json_of(const Model& model);

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <limits>
 #include <optional>
 #include <stdexcept>
 
@@ -67,14 +68,17 @@ Validity validity_from_json(const JsonReader& json) {
           .smoothness = json.member("smoothness").as<int>()};
 }
 
-void check_format(const JsonReader& root) {
+// Returns the version.
+int check_format(const JsonReader& root) {
   if (!root.has("format") || root.member("format").as<std::string>() != model_format_name) {
     root.fail(fmt::format("not a model file: \"format\" is not \"{}\"", model_format_name));
   }
-  if (const int version = root.member("version").as<int>(); version != model_format_version) {
-    root.fail(fmt::format("version {} of the model format cannot be read, this program knows version {}", version,
-                          model_format_version));
+  const int version = root.member("version").as<int>();
+  if (version != model_format_version && version != model_format_version_with_range) {
+    root.fail(fmt::format("version {} of the model format cannot be read, this program knows versions {} and {}",
+                          version, model_format_version, model_format_version_with_range));
   }
+  return version;
 }
 
 InputColumn input_from_json(const JsonReader& json) {
@@ -98,16 +102,39 @@ Regressor regressor_from_json(const JsonReader& json) {
           .second_input = json.as("second_column", -1)};
 }
 
-Partition partition_from_json(const JsonReader& json, Eigen::Index inputs, Eigen::Index regressors) {
+// [] for an output that is not clamped.
+Eigen::MatrixXd output_range_from_json(const JsonReader& json, Eigen::Index outputs) {
+  const std::vector<JsonReader> of_output = json.elements();
+  if (std::ssize(of_output) != outputs) {
+    json.fail(fmt::format("{} rows are needed, there are {}", outputs, of_output.size()));
+  }
+  constexpr double open = std::numeric_limits<double>::infinity();
+  Eigen::MatrixXd range(outputs, 2);
+  for (Eigen::Index o = 0; o < outputs; ++o) {
+    range.row(o) << -open, open;
+    if (of_output[o].size() > 0) range.row(o) = of_output[o].vector(2).transpose();
+  }
+  return range;
+}
+
+Partition partition_from_json(const JsonReader& json, Eigen::Index inputs, Eigen::Index regressors, int version) {
   Partition partition{.outputs = json.member("outputs").list<int>(),
                       .validity = validity_from_json(json.member("validity")),
                       .nodes = {},
                       .outer_slope = {},
-                      .residual_range = {}};
+                      .residual_range = {},
+                      .output_range = {}};
   const Eigen::Index outputs = std::ssize(partition.outputs);
   partition.outer_slope = json.member("outer_slope").matrix(outputs, regressors);
   if (const JsonReader range = json.member("residual_range"); !range.elements().empty()) {
     partition.residual_range = range.matrix(outputs, 2);
+  }
+  if (json.has("output_range")) {
+    const JsonReader range = json.member("output_range");
+    if (version < model_format_version_with_range) {
+      range.fail(fmt::format("a file of version {} has no such member", version));
+    }
+    partition.output_range = output_range_from_json(range, outputs);
   }
   std::vector<std::optional<int>> shared_with;
   for (const JsonReader& node : json.member("nodes").elements()) {
@@ -135,12 +162,12 @@ auto all_of(const JsonReader& array, const Read& read) {
 }  // namespace
 
 Model model_from(const JsonReader& root) {
-  check_format(root);
+  const int version = check_format(root);
   std::vector<InputColumn> inputs = all_of(root.member("inputs"), input_from_json);
   std::vector<OutputColumn> outputs = all_of(root.member("outputs"), output_from_json);
   std::vector<Regressor> regressors = all_of(root.member("regressors"), regressor_from_json);
   std::vector<Partition> partitions = all_of(root.member("partitions"), [&](const JsonReader& entry) {
-    return partition_from_json(entry, std::ssize(inputs), std::ssize(regressors));
+    return partition_from_json(entry, std::ssize(inputs), std::ssize(regressors), version);
   });
   try {
     return {std::move(inputs), std::move(outputs), std::move(regressors), std::move(partitions)};

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <stdexcept>
 #include <vector>
 
@@ -74,20 +75,33 @@ Json to_json(const Regressor& regressor) {
   return json;
 }
 
+bool has_output_range(const Partition& partition) { return partition.output_range.size() > 0; }
+
+// [] for an output that is not clamped.
+Json output_range_to_json(const Eigen::MatrixXd& range) {
+  Json rows = Json::array();
+  for (Eigen::Index o = 0; o < range.rows(); ++o) {
+    rows.push_back(range.row(o).allFinite() ? to_array(range.row(o)) : Json::array());
+  }
+  return rows;
+}
+
 Json to_json(const Partition& partition, const Model& model) {
   Json nodes = Json::array();
   for (const Node& node : partition.nodes) {
     nodes.push_back(to_json(node, model));
   }
   const bool has_outer_slope = partition.outer_slope.size() > 0;
-  return {{"outputs", partition.outputs},
-          {"validity",
-           {{"kind", name_of(partition.validity.kind)},
-            {"width", partition.validity.width},
-            {"smoothness", partition.validity.smoothness}}},
-          {"outer_slope", rows_to_json(has_outer_slope ? partition.outer_slope : partition.nodes.front().slope)},
-          {"residual_range", rows_to_json(partition.residual_range)},
-          {"nodes", std::move(nodes)}};
+  Json json = {{"outputs", partition.outputs},
+               {"validity",
+                {{"kind", name_of(partition.validity.kind)},
+                 {"width", partition.validity.width},
+                 {"smoothness", partition.validity.smoothness}}},
+               {"outer_slope", rows_to_json(has_outer_slope ? partition.outer_slope : partition.nodes.front().slope)},
+               {"residual_range", rows_to_json(partition.residual_range)}};
+  if (has_output_range(partition)) json["output_range"] = output_range_to_json(partition.output_range);
+  json["nodes"] = std::move(nodes);
+  return json;
 }
 
 }  // namespace
@@ -95,7 +109,8 @@ Json to_json(const Partition& partition, const Model& model) {
 Json json_of(const Model& model) {
   Json json;
   json["format"] = model_format_name;
-  json["version"] = model_format_version;
+  json["version"] = std::ranges::any_of(model.partitions(), has_output_range) ? model_format_version_with_range
+                                                                              : model_format_version;
   json["inputs"] = Json::array();
   for (const InputColumn& input : model.inputs()) {
     json["inputs"].push_back(to_json(input));

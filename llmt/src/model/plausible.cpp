@@ -105,6 +105,22 @@ void check_residual_range(const Partition& partition, Eigen::Index index, const 
   }
 }
 
+void check_range_of_predictions(const Partition& partition, Eigen::Index index,
+                                const std::vector<OutputColumn>& outputs) {
+  for (Eigen::Index o = 0; o < partition.output_range.rows(); ++o) {
+    const double low = partition.output_range(o, 0);
+    const double high = partition.output_range(o, 1);
+    if (std::isinf(low) && std::isinf(high)) continue;  // not clamped
+    const OutputColumn& output = outputs[partition.outputs[o]];
+    const double slack = slack_of(output.low, output.high);
+    if (is_outside(low, output.low, output.high, slack) || is_outside(high, output.low, output.high, slack)) {
+      throw ModelFault({"partition", index},
+                       fmt::format("output_range {} ... {} of output {} lies outside of its training range {} ... {}",
+                                   low, high, partition.outputs[o], output.low, output.high));
+    }
+  }
+}
+
 }  // namespace
 
 std::vector<RegressorRange> check_centres(const std::vector<InputColumn>& inputs,
@@ -136,6 +152,7 @@ void check_plausible(const Partition& partition, Eigen::Index index, const std::
   }
   check_samples(partition, index);
   check_residual_range(partition, index, regressors, outputs);
+  check_range_of_predictions(partition, index, outputs);
 }
 
 }  // namespace llmt

@@ -63,14 +63,16 @@ double aicc(const Eigen::VectorXd& rss, double rows, double coefficients) {
   return (rows * rss.array().max(rounding_of_squares).log() + penalty).sum();
 }
 
-}  // namespace
+// Regressors and outputs about their means, each of length 1.
+struct Standardised {
+  Eigen::MatrixXd correlation;  // of the regressors
+  Eigen::ArrayXd total;         // of the outputs, sums of squares about their means
+  Remaining remaining;          // before the first regressor is taken
+};
 
-std::vector<Eigen::Index> select_regressors(const LocalSums& sums, double rows_per_weight) {
+Standardised standardised(const LocalSums& sums) {
   const Eigen::Index regressors = sums.gram.rows() - 1;
   const double weight = sums.gram(0, 0);
-  const double rows = rows_per_weight * weight;
-  std::vector<Eigen::Index> chosen = {0};
-  if (!(weight > 0.0)) return chosen;
   const Eigen::VectorXd mean = sums.gram.col(0).tail(regressors) / weight;
   const Eigen::RowVectorXd mean_output = sums.products.row(0) / weight;
   Eigen::MatrixXd correlation = sums.gram.bottomRightCorner(regressors, regressors) - weight * mean * mean.transpose();
@@ -89,6 +91,17 @@ std::vector<Eigen::Index> select_regressors(const LocalSums& sums, double rows_p
                                     (sums.products.bottomRows(regressors) - weight * mean * mean_output) *
                                     per_output.matrix().asDiagonal(),
                       .rss = (per_output > 0.0).select(Eigen::ArrayXd::Ones(per_output.size()), 0.0)};
+  return {std::move(correlation), total, std::move(remaining)};
+}
+
+}  // namespace
+
+std::vector<Eigen::Index> select_regressors(const LocalSums& sums, double rows_per_weight) {
+  const double weight = sums.gram(0, 0);
+  const double rows = rows_per_weight * weight;
+  std::vector<Eigen::Index> chosen = {0};
+  if (!(weight > 0.0)) return chosen;
+  auto [correlation, total, remaining] = standardised(sums);
   std::vector<Eigen::Index> order;
   std::size_t best = 0;
   double smallest = aicc(remaining.rss, rows, 1.0);
@@ -110,6 +123,22 @@ std::vector<Eigen::Index> select_regressors(const LocalSums& sums, double rows_p
   }
   std::ranges::sort(chosen);
   return chosen;
+}
+
+SelectionPath selection_path(const LocalSums& sums, Eigen::Index most) {
+  SelectionPath path;
+  auto [correlation, total, remaining] = standardised(sums);
+  std::vector<Eigen::VectorXd> rss = {total.matrix().cwiseProduct(remaining.rss)};
+  while (std::ssize(path.regressors) < most && remaining.rss.maxCoeff() > rounding_of_squares) {
+    const Eigen::Index next = best_of(remaining);
+    if (next < 0) break;
+    take(next, correlation, std::ssize(path.regressors), remaining);
+    path.regressors.push_back(next);
+    rss.emplace_back(total.matrix().cwiseProduct(remaining.rss.cwiseMax(0.0)));
+  }
+  path.rss.resize(total.size(), std::ssize(rss));
+  for (std::size_t k = 0; k < rss.size(); ++k) path.rss.col(k) = rss[k];
+  return path;
 }
 
 }  // namespace llmt

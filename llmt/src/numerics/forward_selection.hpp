@@ -25,4 +25,14 @@ struct LocalSums {
 /// the residuals are rounding. Returns the positions of the chosen coefficients, ascending, the constant's first.
 std::vector<Eigen::Index> select_regressors(const LocalSums& sums, double rows_per_weight);
 
+/// The models on the way of that forward selection.
+struct SelectionPath {
+  std::vector<Eigen::Index> regressors;  ///< in the order in which they enter, counted from 0 without the constant
+  Eigen::MatrixXd
+      rss;  ///< residual sums of squares with the constant and the first 0, 1, 2, ... of them, one row an output
+};
+
+/// At most `most` regressors; fewer where the others say nothing new or the residuals are rounding.
+SelectionPath selection_path(const LocalSums& sums, Eigen::Index most);
+
 }  // namespace llmt

@@ -101,7 +101,7 @@ class Steps {
       evaluate_counts(race, begin, next, begin == 0);
       if (begin == 0) {
         race = with_jumps(race);
-        evaluate_counts(race, begin, next, false);
+        evaluate_counts(race, begin, next, true);
         const Race same = with_best_jump();
         evaluate_counts(same, begin, next, false);
         race.insert(same.begin(), same.end());
@@ -127,7 +127,7 @@ class Steps {
     comparison_.evaluate(keys, screening_);
   }
 
-  // Adds the best widths with jumps, with the ridges that are best without.
+  // Adds the best widths with jumps.
   Race with_jumps(Race race) const {
     Ranked best = first_of_each(ranked(comparison_, screening_), shape_of);
     for (const auto& [error, key] : best) race[key.shape] = {key.ridge, key.sparse};
@@ -153,15 +153,14 @@ class Steps {
     return race;
   }
 
-  // Of the shapes in the race, without those that are at their end or clearly worse than the best.
+  // Of the shapes in the race, without those that are at their end, or clearly worse than the best.
   Race better_half(const Race& racing, std::size_t next) const {
     Ranked best = first_of_each(ranked(comparison_, screening_), shape_of);
     std::erase_if(best, [&](const auto& entry) { return !racing.contains(entry.second.shape); });
     best.resize(std::min(best.size(), std::max(fewest_shapes, (best.size() + 1) / 2)));
     Race race;
     for (const auto& [error, key] : best) {
-      if (key.leaves + steps_without_gain >= next &&
-          !comparison_.is_clearly_worse(key, best.front().second, screening_)) {
+      if (key.leaves + steps_without_gain >= next && !is_clearly_worse(key, best.front().second, screening_)) {
         race[key.shape] = {key.ridge, key.sparse};
       }
     }
@@ -181,8 +180,7 @@ class Steps {
       if (has_jumps(best.shape) && smooth != of_shape.end()) result.push_back(*smooth);
     }
     const Key best = of_shape.front().second;
-    std::erase_if(result,
-                  [&](const auto& entry) { return comparison_.is_clearly_worse(entry.second, best, screening_); });
+    std::erase_if(result, [&](const auto& entry) { return is_clearly_worse(entry.second, best, screening_); });
     return result;
   }
 
@@ -268,12 +266,26 @@ class Steps {
     return kept;
   }
 
-  std::set<Key> without_clearly_worse(std::set<Key> keys, std::size_t folds) const {
-    const Ranked order = ranked(comparison_, folds);
-    const auto best = std::ranges::find_if(order, [&](const auto& entry) { return keys.contains(entry.second); });
-    if (best == order.end()) return keys;
-    std::erase_if(keys, [&](const Key& key) { return comparison_.is_clearly_worse(key, best->second, folds); });
-    return keys;
+  // Only where candidates are costly: a few folds may all miss what happens in the next one.
+  bool is_clearly_worse(const Key& key, const Key& best, std::size_t folds) const {
+    return !tries_all_pairs(key) && comparison_.is_clearly_worse(key, best, folds);
+  }
+
+  // Where one with jumps stays, the best of its width without jumps does too: jumps must gain on it beyond chance.
+  std::set<Key> without_clearly_worse(const std::set<Key>& keys, std::size_t folds) const {
+    Ranked order = ranked(comparison_, folds);
+    std::erase_if(order, [&](const auto& entry) { return !keys.contains(entry.second); });
+    std::set<Key> left;
+    for (const auto& [error, key] : order) {
+      if (!is_clearly_worse(key, order.front().second, folds)) left.insert(key);
+    }
+    for (const Key& key : std::set<Key>(left)) {
+      const auto smooth = std::ranges::find_if(order, [&](const auto& entry) {
+        return width_of(entry.second) == width_of(key) && !has_jumps(entry.second.shape);
+      });
+      if (has_jumps(key.shape) && smooth != order.end()) left.insert(smooth->second);
+    }
+    return left;
   }
 
   HeldOutErrors& comparison_;

@@ -5,9 +5,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "llmt/fit.hpp"
+#include "oracles/clamped.hpp"
 #include "oracles/oracles.hpp"
 #include "oracles/random_trees.hpp"
 #include "oracles/thrown.hpp"
@@ -190,6 +192,54 @@ TEST(Explain, EqualsSmallStepsAlongTheLine) {
       EXPECT_LT((exact - step_by_step(model, point, reference, 8000)).cwiseAbs().maxCoeff(), bound)
           << k << " row " << row;
     }
+  }
+}
+
+TEST(Explain, ClampedModelsEqualSmallStepsAlongTheLine) {
+  const Data data = mixed(400);
+  Eigen::MatrixXd range(2, 2);
+  range << 0.3, 1.6, -0.1, 0.9;
+  int clamped_lines = 0;
+  for (int k = 0; k < 8; ++k) {
+    const Kind& kind = kinds[k % 4];
+    const llmt::LocalTerms terms = k < 4 ? llmt::LocalTerms::linear : llmt::LocalTerms::quadratic;
+    const llmt::Model free = fitted(data, kind, {3}, terms);
+    const llmt::Model model = oracle::clamped(free, range);
+    const Eigen::VectorXd reference = llmt::reference_point(model);
+    for (int row = 0; row < 8; ++row) {
+      Eigen::VectorXd point = data.x.row(row);
+      point.head(3) *= row % 4 == 0 ? 2.0 : 1.0;
+      const llmt::Attribution found = llmt::attribute(model, point);
+      EXPECT_LT(worst_sum(found), 1e-12);
+      // Where a step enters or leaves the range, its order changes no more than what the step moves the output: with
+      // slopes of less than 4 along a line of less than 2 it is less than 8 / 8000.
+      const double bound = kind.validity == llmt::ValidityChoice::crisp ? 1e-2 : 1e-3;
+      const Eigen::MatrixXd expected = step_by_step(model, point, reference, 8000);
+      EXPECT_LT((found.contributions - expected).cwiseAbs().maxCoeff(), bound) << k << " row " << row;
+      clamped_lines += (found.contributions - llmt::attribute(free, point).contributions).norm() > 0.05 ? 1 : 0;
+    }
+  }
+  EXPECT_GT(clamped_lines, 20);
+}
+
+// A hill that leaves the range for a short part of the line between two points where nothing is clamped.
+TEST(Explain, AShortWayOutsideIsNotMissed) {
+  llmt::Model hill = four_fields(1.0, {0.0, 1.0, 1.0, 0.0});
+  const Eigen::Vector2d from(-0.6, 0.9);
+  const Eigen::Vector2d to(0.5, -0.8);
+  double top = 0.0;
+  for (int k = 0; k <= 10000; ++k) {
+    top = std::max(top, hill.predict((from + k / 10000.0 * (to - from)).transpose())(0));
+  }
+  for (const double below : {1e-2, 1e-4}) {
+    Eigen::MatrixXd range(1, 2);
+    range << 0.0, top - below;
+    const llmt::Model model = oracle::clamped(hill, range);
+    const Eigen::MatrixXd expected = step_by_step(model, to, from, 200000);
+    const Eigen::MatrixXd found = llmt::attribute(model, to, from).contributions;
+    const Eigen::MatrixXd without = llmt::attribute(hill, to, from).contributions;
+    EXPECT_GT((without - expected).cwiseAbs().maxCoeff(), 0.2 * below);
+    EXPECT_LT((found - expected).cwiseAbs().maxCoeff(), 1e-3 * below);
   }
 }
 

@@ -1,0 +1,55 @@
+/// \file
+/// The smallest crisp tree with short equations that predicts nearly as well as the best crisp tree.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "llmt/abi.hpp"
+#include "llmt/intervals.hpp"
+#include "llmt/model.hpp"
+#include "llmt/options.hpp"
+#include "llmt/summary.hpp"
+
+namespace llmt {
+
+/// One partition of a readable model.
+struct ReadablePartition {
+  std::vector<int> outputs;      ///< columns that it serves
+  Eigen::Index leaves = 0;       ///< rules
+  Eigen::Index most_terms = 0;   ///< regressors with a slope in the leaf that has most of them
+  Eigen::Index used_inputs = 0;  ///< inputs that occur in a split or an equation
+  Eigen::Index size = 0;         ///< expression_size()
+  /// Held-out root mean square error, as CandidateError::rmse, and its standard deviation over the folds. It is the
+  /// error of the smallest of many trees that were good enough, and therefore a little too small.
+  double rmse = 0.0;
+  double spread = 0.0;
+  Eigen::VectorXd fold_rmse = {};  ///< one entry a fold
+  /// Smallest held-out error of the crisp trees of the fit and of the trees without products that were compared here.
+  double best_crisp = 0.0;
+  bool is_within_loss = true;  ///< rmse <= (1 + loss) best_crisp; else no tree was, and this is the best one
+};
+
+struct ReadableResult {
+  Model model;
+  std::vector<ReadablePartition> partitions;
+  Intervals intervals;  ///< from the folds; empty without FitOptions::intervals
+};
+
+/// Finds, for every partition of a fit, the crisp tree with the smallest expression whose held-out error is at most
+/// (1 + loss) times the smallest held-out error of a crisp tree. Equations have few terms; coefficients and thresholds
+/// are rounded; all of it, rounding included, is judged on the same folds as the fit. Between the smallest and the
+/// largest training value of each input the model predicts what its printed equations say.
+/// docs/algorithms/readable.md has the equations.
+///
+/// `options`, `inputs`, `outputs`: those of fit(); `fitted`: its summary. Of the options the tree uses columns,
+/// weights, folds, shared_partition, max_leaves, min_leaf_samples, expert.search and max_threads; with
+/// LocalTerms::quadratic or automatic equations may have products of two inputs. `loss`: 0.1 for ten per cent.
+///
+/// Throws std::invalid_argument as fit(), and if `loss` is negative or not finite, if nothing was held out in the fit,
+/// if no crisp tree was a candidate in it, or if slope_signs or monotone are set.
+ReadableResult fit_readable(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
+                            const Eigen::Ref<const Eigen::MatrixXd>& outputs, const FitOptions& options,
+                            const FitSummary& fitted, double loss = 0.1);
+
+}  // namespace llmt

@@ -1,0 +1,129 @@
+#include "readable/input_walk.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "base/count.hpp"
+#include "data/regressors.hpp"
+#include "growth/rules/rule.hpp"
+
+namespace llmt {
+namespace {
+
+// Part of the inputs that goes on.
+constexpr double kept_part = 0.7;
+
+// Prices are the variance of the output times 2^(-k / 4), k = 0, 1, ...
+constexpr std::size_t prices = 121;
+constexpr double prices_per_octave = 4.0;
+
+// Splits are searched on a sample of about this many rows; equations and errors are of all rows.
+constexpr Eigen::Index growth_rows = 10000;
+
+// Inputs of the local models with which splits are searched: the time grows with the square of their number.
+constexpr Eigen::Index most_growth_inputs = 13;
+
+// Rows in a leaf, where the caller says nothing.
+constexpr Eigen::Index fewest_rows = 5;
+
+// Leaves before pruning, where the caller says nothing.
+constexpr Eigen::Index most_leaves = 200;
+
+bool contains(const std::vector<int>& inputs, int input) { return std::ranges::binary_search(inputs, input); }
+
+std::vector<int> common(const std::vector<int>& columns, const std::vector<int>& inputs) {
+  std::vector<int> result;
+  std::ranges::copy_if(columns, std::back_inserter(result), [&](int column) { return contains(inputs, column); });
+  return result;
+}
+
+std::vector<Node> grow(const Sample& sample, const TreePlan& plan, const WalkStep& step) {
+  Table table = *sample.described.table;
+  table.regression_inputs = common(table.regression_inputs, step.growth_inputs);
+  table.products.clear();
+  const TrainingRows rows = thinned(training_rows(table, sample.described.rows, plan.max_threads), growth_rows);
+  GrowthProblem problem{
+      .training = &rows, .outputs = sample.outputs, .options = plan.growth, .max_threads = plan.max_threads};
+  GrowthOptions& options = problem.options;
+  options.split_inputs = common(table.split_inputs, step.inputs);
+  if (options.split_inputs.empty()) return std::vector<Node>(1);
+  const Eigen::Index coefficients = std::ssize(rows.regressors) + 1;
+  if (options.min_leaf_samples == 0) options.min_leaf_samples = std::max(fewest_rows, coefficients);
+  if (options.max_leaves == 0) options.max_leaves = most_leaves;
+  return rule_of(GrowthRule::rd).grow(problem).nodes;
+}
+
+std::vector<int> usable_inputs(const Sample& sample) {
+  const Table& table = *sample.described.table;
+  std::vector<int> inputs = table.regression_inputs;
+  inputs.insert(inputs.end(), table.split_inputs.begin(), table.split_inputs.end());
+  std::ranges::sort(inputs);
+  inputs.erase(std::unique(inputs.begin(), inputs.end()), inputs.end());
+  return inputs;
+}
+
+std::vector<int> most_important(const std::vector<int>& inputs, const Eigen::VectorXd& importance, Eigen::Index count) {
+  std::vector<int> order = inputs;
+  std::ranges::stable_sort(order, [&](int a, int b) { return importance(a) > importance(b); });
+  order.resize(count);
+  std::ranges::sort(order);
+  return order;
+}
+
+EquationTree with_terms(const Sample& sample, std::vector<Node> grown, const std::vector<int>& inputs,
+                        const Form& form) {
+  const std::vector<int> of_terms = common(sample.described.table->regression_inputs, inputs);
+  const bool products = form.products && std::ssize(of_terms) <= most_inputs_of_products;
+  return {sample, std::move(grown), terms_of(sample, of_terms, products), form.coarseness};
+}
+
+Eigen::VectorXd importance_of(const EquationTree& tree) { return tree.importance(tree.pruned(tree.schwarz_price())); }
+
+std::vector<JudgedTree> judge(EquationTree& tree) {
+  std::vector<JudgedTree> judged;
+  std::vector<int> before;
+  for (std::size_t price = 0; price < prices; ++price) {
+    std::vector<int> pruned = tree.pruned(price_of(tree, price));
+    judged.push_back(pruned == before ? judged.back() : JudgedTree{tree.held_out_error(pruned), tree.size(pruned)});
+    before = std::move(pruned);
+  }
+  return judged;
+}
+
+}  // namespace
+
+const std::vector<Form>& forms() {
+  static const std::vector<Form> all = {{false, 1.0}, {false, 0.1}, {true, 1.0}, {true, 0.1}};
+  return all;
+}
+
+double price_of(const EquationTree& tree, std::size_t price) {
+  return tree.variance() * std::exp2(-static_cast<double>(price) / prices_per_octave);
+}
+
+EquationTree make_tree(const Sample& sample, const TreePlan& plan, const WalkStep& step, const Form& form) {
+  return with_terms(sample, grow(sample, plan, step), step.inputs, form);
+}
+
+std::vector<WalkStep> walk_inputs(const Sample& sample, const TreePlan& plan) {
+  std::vector<WalkStep> steps;
+  std::vector<int> inputs = usable_inputs(sample);
+  Eigen::VectorXd importance = importance_of(with_terms(sample, std::vector<Node>(1), inputs, forms().front()));
+  while (true) {
+    const Eigen::Index count = std::ssize(inputs);
+    WalkStep& step = steps.emplace_back(
+        WalkStep{inputs, most_important(inputs, importance, std::min(count, most_growth_inputs)), {}});
+    const std::vector<Node> grown = grow(sample, plan, step);
+    for (const Form& form : forms()) {
+      EquationTree tree = with_terms(sample, grown, inputs, form);
+      step.trees.push_back(judge(tree));
+      importance = importance_of(tree);
+    }
+    if (count == 1) return steps;
+    const auto part = static_cast<Eigen::Index>(std::ceil(kept_part * static_cast<double>(count)));
+    inputs = most_important(inputs, importance, std::min(part, count - 1));
+  }
+}
+
+}  // namespace llmt
