@@ -50,6 +50,11 @@ void refuse_unreadable(const FitOptions& options, const LearningArguments& learn
 // The readable tree beside the model, written if the model is.
 std::optional<ReadableResult> make_readable(const FitArguments& arguments, const LearningTable& table,
                                             const FitSummary& fitted, double loss) {
+  if (fitted.partitions.front().cv_folds == 0) {
+    throw std::runtime_error(
+        fmt::format("{}: --readable chooses on held-out rows, and the {} row(s) leave none to hold out",
+                    arguments.learning.data, fitted.samples));
+  }
   ReadableResult readable = fit_readable(table.inputs.values, table.outputs, table.options, fitted, loss);
   readable.model = readable.model.named(table.names, arguments.learning.targets, table.inputs.levels);
   if (!arguments.output.empty()) {

@@ -242,6 +242,15 @@ TEST(ReadableProgram, WrongUseIsRefusedBeforeTheWork) {
   refused("--readable --stream", "--readable is not for --stream");
 }
 
+TEST(ReadableProgram, ARowAloneLeavesNoneToHoldOut) {
+  const Folder folder;
+  folder.write("one.csv", "x,y\n1,2\n");
+  const Outcome outcome = folder.run(llmt_program + " fit one.csv -t y --readable");
+  EXPECT_EQ(outcome.exit_code, 1) << outcome.err;
+  EXPECT_NE(outcome.err.find("one.csv: --readable chooses on held-out rows"), std::string::npos) << outcome.err;
+  EXPECT_EQ(outcome.err.find("::"), std::string::npos) << outcome.err;
+}
+
 TEST(ReadableProgram, RulesOfABlendAreRefusedAndOfOtherTreesSayWhatTheyLeaveOut) {
   const Folder folder;
   folder.write("d.csv", table(rows()));

@@ -1,11 +1,13 @@
 #include "fit/input_choice.hpp"
 
 #include <algorithm>
-#include <cmath>
+#include <limits>
 #include <numeric>
 #include <optional>
+#include <span>
 
 #include "base/parallel.hpp"
+#include "data/fewer_inputs.hpp"
 #include "fit/grow_tree.hpp"
 #include "llmt/explain.hpp"
 #include "numerics/paired_difference.hpp"
@@ -13,9 +15,6 @@
 
 namespace llmt {
 namespace {
-
-// Each number of inputs is this part of the one before.
-constexpr double next_size = 0.7;
 
 // No smaller number is tried once the error is this multiple of the smallest. Errors rise and fall on the way.
 constexpr double largest_ratio = 1.2;
@@ -66,14 +65,6 @@ Eigen::VectorXd importance_of(const TrainingRows& rows, Partition partition, int
   return importance(model, rows.table->inputs(some.rows, Eigen::all), max_threads).colwise().sum();
 }
 
-// Those that count most; of inputs that count alike the first columns.
-std::vector<int> most_important(std::vector<int> inputs, const Eigen::VectorXd& importance, Eigen::Index count) {
-  std::ranges::stable_sort(inputs, [&](int a, int b) { return importance(a) > importance(b); });
-  inputs.resize(count);
-  std::ranges::sort(inputs);
-  return inputs;
-}
-
 // Estimates the candidate of a step on a grown tree, and keeps the next number of inputs.
 std::vector<int> next_inputs(const TrainingRows& rows, const std::vector<int>& inputs, const GrownTree& grown,
                              std::optional<Partition> made, Candidate candidate, Eigen::Index count, int max_threads) {
@@ -82,11 +73,6 @@ std::vector<int> next_inputs(const TrainingRows& rows, const std::vector<int>& i
     made = estimate(rows, grown, candidate, max_threads);
   }
   return most_important(inputs, importance_of(rows, std::move(*made), max_threads), count);
-}
-
-// D, then 0.7 of the number before, rounded up, to 1.
-Eigen::Index size_after(Eigen::Index size) {
-  return std::min(size - 1, static_cast<Eigen::Index>(std::ceil(next_size * static_cast<double>(size))));
 }
 
 // A number of inputs in the walk.
@@ -107,7 +93,7 @@ class Walk {
     std::vector<Step> steps;
     std::vector<std::vector<int>> of_folds(folds_.size(), all_.split_inputs);
     double least = std::numeric_limits<double>::infinity();
-    for (Eigen::Index size = std::ssize(all_.split_inputs); size >= 1; size = size_after(size)) {
+    for (Eigen::Index size = std::ssize(all_.split_inputs); size >= 1; size = fewer_inputs(size)) {
       const Plan plan = plan_for(of_folds.front());
       const std::vector<FoldRows> folds = narrowed_folds(of_folds);
       std::vector<GrownTree> trees(folds.size());
@@ -121,7 +107,7 @@ class Walk {
       selection.made.resize(folds.size());
       parallel_for(std::ssize(folds), options_.max_threads, [&](Eigen::Index f) {
         of_folds[f] = next_inputs(folds[f].training, of_folds[f], trees[f], std::move(selection.made[f]),
-                                  selection.chosen.candidate, size_after(size), 1);
+                                  selection.chosen.candidate, fewer_inputs(size), 1);
       });
     }
     return steps;
@@ -133,7 +119,7 @@ class Walk {
     for (const Step& step : steps.first(steps.size() - 1)) {
       const TrainingRows rows = narrowed(all_, inputs);
       const FinalTree grown = grow_tree(rows, served_, plan_for(inputs), false, options_.max_threads);
-      inputs = next_inputs(rows, inputs, grown.tree, {}, step.chosen.candidate, size_after(step.inputs),
+      inputs = next_inputs(rows, inputs, grown.tree, {}, step.chosen.candidate, fewer_inputs(step.inputs),
                            options_.max_threads);
     }
     return inputs;

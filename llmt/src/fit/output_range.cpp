@@ -12,9 +12,6 @@
 namespace llmt {
 namespace {
 
-// As many held-out rows of a fold as the selection looks at.
-constexpr Eigen::Index most_judging_rows = 10000;
-
 // A clamp can only help on rows within the range, and what lies beyond it no model that is clamped will ever say. A
 // gain below this part of the error is not worth that.
 constexpr double least_gain = 0.01;
@@ -72,7 +69,7 @@ bool is_worth_it(const CandidateError& without, const CandidateError& with) {
 std::vector<RangeGuard> guard_output_range(const std::vector<FoldRows>& folds, const Eigen::VectorXd& weights,
                                            int max_threads, std::vector<Partition>& of_folds, CandidateError& chosen) {
   std::vector<FoldRows> judging;
-  for (const FoldRows& fold : folds) judging.push_back({fold.training, thinned(fold.held_out, most_judging_rows)});
+  for (const FoldRows& fold : folds) judging.push_back({fold.training, thinned(fold.held_out, most_held_out_rows)});
   std::vector<SquaredErrors> errors(folds.size());
   parallel_for(std::ssize(folds), max_threads, [&](Eigen::Index f) { errors[f] = errors_of(of_folds[f], judging[f]); });
   const FoldErrors of_one(judging, 1);

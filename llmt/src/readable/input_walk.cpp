@@ -5,14 +5,12 @@
 #include <numeric>
 
 #include "base/count.hpp"
+#include "data/fewer_inputs.hpp"
 #include "data/regressors.hpp"
 #include "growth/rules/rule.hpp"
 
 namespace llmt {
 namespace {
-
-// Part of the inputs that goes on.
-constexpr double kept_part = 0.7;
 
 // Prices are the variance of the output times 2^(-k / 4), k = 0, 1, ...
 constexpr std::size_t prices = 121;
@@ -61,14 +59,6 @@ std::vector<int> usable_inputs(const Sample& sample) {
   std::ranges::sort(inputs);
   inputs.erase(std::unique(inputs.begin(), inputs.end()), inputs.end());
   return inputs;
-}
-
-std::vector<int> most_important(const std::vector<int>& inputs, const Eigen::VectorXd& importance, Eigen::Index count) {
-  std::vector<int> order = inputs;
-  std::ranges::stable_sort(order, [&](int a, int b) { return importance(a) > importance(b); });
-  order.resize(count);
-  std::ranges::sort(order);
-  return order;
 }
 
 EquationTree with_terms(const Sample& sample, std::vector<Node> grown, const std::vector<int>& inputs,
@@ -121,8 +111,7 @@ std::vector<WalkStep> walk_inputs(const Sample& sample, const TreePlan& plan) {
       importance = importance_of(tree);
     }
     if (count == 1) return steps;
-    const auto part = static_cast<Eigen::Index>(std::ceil(kept_part * static_cast<double>(count)));
-    inputs = most_important(inputs, importance, std::min(part, count - 1));
+    inputs = most_important(inputs, importance, fewer_inputs(count));
   }
 }
 

@@ -16,9 +16,8 @@
 namespace llmt {
 namespace {
 
-// Held-out rows that are enough to tell good candidates from bad ones, and how many of a fold are looked at.
+// Held-out rows that are enough to tell good candidates from bad ones.
 constexpr Eigen::Index screening_rows = 1000;
-constexpr Eigen::Index most_held_out_rows = 10000;
 
 // What is less simple has to be better by more than this many standard errors of the gain.
 constexpr double standard_errors_of_a_gain = 2.0;

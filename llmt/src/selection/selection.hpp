@@ -9,6 +9,9 @@
 
 namespace llmt {
 
+/// A fold's held-out rows that are looked at; of more a sample.
+inline constexpr Eigen::Index most_held_out_rows = 10000;
+
 /// Whether the gain of `other` on `simple` is beyond chance: more than two standard errors of the paired differences of
 /// the folds. A single hold-out has no such measure.
 bool is_beyond_chance(const CandidateError& simple, const CandidateError& other);
