@@ -184,8 +184,8 @@ class Steps {
     return result;
   }
 
-  // Other ridges and shrinkages at the finalists' best leaf counts. With the unknowns of the first round of screening, at
-  // the neighbouring leaf counts too; with those of the second round, the best of them there.
+  // Other ridges and shrinkages at the finalists' best leaf counts. With the unknowns of the first round of screening,
+  // at the neighbouring leaf counts too; with those of the second round, the best of them there.
   void refine() {
     const Ranked last = finalists_of();
     std::set<Key> keys;
