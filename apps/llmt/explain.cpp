@@ -94,13 +94,14 @@ void explain_row(const ExplainArguments& arguments, const Model& model, const Ei
       const double contribution = attribution.contributions(o, j);
       const InputColumn& input = model.inputs()[j];
       const bool known = !std::isnan(value);
-      const std::string level = known && input.is_categorical() ? input.levels[static_cast<std::size_t>(value)] : "";
-      const std::string shown = !known ? "missing" : input.is_categorical() ? level : number(value);
+      const bool is_word = input.is_categorical() && input.codes.empty();
+      const std::string level = known && is_word ? input.levels[static_cast<std::size_t>(value)] : "";
+      const std::string shown = !known ? "missing" : is_word ? level : number(value);
       printed.add({input.name, shown, number(contribution)});
       entries.push_back({{"input", input.name},
-                         {"value", !known                   ? Json(nullptr)
-                                   : input.is_categorical() ? Json(level)
-                                                            : Json(value)},
+                         {"value", !known    ? Json(nullptr)
+                                   : is_word ? Json(level)
+                                             : Json(value)},
                          {"contribution", contribution}});
     }
     json["targets"].push_back({{"name", target},

@@ -70,7 +70,7 @@ void fit_command(FitArguments arguments) {
     refuse_unreadable(arguments.learning.options, arguments.learning);
   }
   LearningTable table = read_learning_table(arguments.learning);
-  Progress progress("growing trees");
+  Progress progress("fitting");
   table.options.intervals = !arguments.no_intervals && !arguments.output.empty();
   table.options.progress = [&](Eigen::Index done, Eigen::Index total) { progress.show(done, total); };
   FitResult result = fit(table.inputs.values, table.outputs, table.options);

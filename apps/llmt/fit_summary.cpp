@@ -111,6 +111,17 @@ std::string left_out_text(const FitResult& result) {
   return text;
 }
 
+// Which inputs are codes, and what that gained; nothing if none is.
+std::string codes_text(const FitResult& result) {
+  const CodeChoice& codes = result.summary.codes;
+  if (codes.taken.empty()) return "";
+  return fmt::format(
+      "Numbers taken for codes, that is for categories: {}; held-out RMSE of simple candidates {}{} as numbers, {} as "
+      "codes.\n",
+      fmt::join(names_of(result.model, codes.taken), ", "), result.summary.partitions.size() > 1 ? "relative, " : "",
+      number(codes.rmse_as_numbers), number(codes.rmse_as_codes));
+}
+
 // Of the outputs that are clamped, between what, and what that gained.
 std::string range_text(const Model& model, const PartitionSummary& summary, const Partition& partition) {
   std::string text;
@@ -228,6 +239,12 @@ Json summary_json(const FitRun& run, const FitResult& result) {
   for (const InputColumn& input : result.model.inputs()) {
     json["inputs"].push_back(input.name);
   }
+  if (const CodeChoice& codes = result.summary.codes; !codes.compared.empty()) {
+    json["codes"] = {{"compared", names_of(result.model, codes.compared)},
+                     {"taken", names_of(result.model, codes.taken)},
+                     {"cv_rmse_as_numbers", codes.rmse_as_numbers},
+                     {"cv_rmse_as_codes", codes.rmse_as_codes}};
+  }
   json["local_models"] = result.summary.quadratic ? "quadratic" : "linear";
   json["partitions"] = Json::array();
   for (const PartitionSummary& partition : result.summary.partitions) {
@@ -284,6 +301,7 @@ void print_summary(const FitRun& run, const FitResult& result) {
   if (result.summary.partitions.front().outputs.size() > 1) {
     print("Held-out errors of the shared tree are over all targets, each divided by its standard deviation.\n");
   }
+  print(codes_text(result));
   print(left_out_text(result));
   for (std::size_t p = 0; p < result.summary.partitions.size(); ++p) {
     print(range_text(result.model, result.summary.partitions[p], result.model.partitions()[p]));

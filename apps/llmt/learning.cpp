@@ -168,6 +168,9 @@ void add_learning_options(CLI::App& command, LearningArguments& arguments) {
   command.add_flag_callback(
       "--all-inputs", [&options] { options.choose_inputs = false; },
       "Keep inputs that do not lower the held-out error");
+  command.add_flag_callback(
+      "--no-codes", [&options] { options.choose_codes = false; },
+      "Do not take inputs of few whole numbers for categories where that lowers the held-out error");
   command
       .add_option("--monotone", arguments.monotone,
                   "Inputs with which the prediction never falls, or with a leading minus never rises (--monotone=-x)")

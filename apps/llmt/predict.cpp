@@ -35,6 +35,7 @@ struct Predicted {
   std::optional<Bounds> bounds;
   Eigen::Index missing = 0;
   Eigen::Index unknown = 0;
+  Eigen::Index unseen_codes = 0;
   // RMSE of the targets that the table also holds, in the order of targets; NaN for the others.
   Eigen::VectorXd rmse;
 
@@ -70,6 +71,7 @@ Predicted predict_table(const PredictArguments& arguments, const ModelWithInterv
   predicted.extrapolation = model.extrapolation(inputs.values, arguments.threads);
   predicted.missing = inputs.missing;
   predicted.unknown = inputs.unknown;
+  predicted.unseen_codes = inputs.unseen_codes;
   if (arguments.interval > 0.0) {
     if (file.intervals.empty()) {
       throw std::runtime_error(fmt::format(
@@ -149,6 +151,7 @@ Json summary_json(const Predicted& predicted, bool with_values) {
   json["outside_rows"] = count_outside(predicted);
   json["missing_values"] = predicted.missing;
   json["unknown_categories"] = predicted.unknown;
+  if (predicted.unseen_codes > 0) json["unseen_codes"] = predicted.unseen_codes;
   if (const Eigen::Index count = predicted.count_not_finite(); count > 0) {
     json["not_finite_predictions"] = count;
   }
@@ -204,6 +207,9 @@ void summarise(const PredictArguments& arguments, const Predicted& predicted) {
   }
   if (predicted.unknown > 0) {
     text += fmt::format("; {} values of categories that were not in training, taken as missing", predicted.unknown);
+  }
+  if (predicted.unseen_codes > 0) {
+    text += fmt::format("; {} codes that were not in training, taken as the nearest", predicted.unseen_codes);
   }
   warn(text);
 }

@@ -97,7 +97,7 @@ void LargestMagnitude::add(const Csv& csv, const Eigen::Ref<const Eigen::VectorX
       row = i;
     }
   }
-  if (row >= 0) line = csv.line_of(row);
+  if (row >= 0 && value < smallest_magnitude) line = csv.line_of(row);  // else nobody asks, and lines are counted
 }
 
 void LargestMagnitude::refuse_small(const std::string& file, const std::string& column) const {
@@ -185,7 +185,7 @@ ModelInputs read_inputs(const Csv& csv, const Model& model, int max_threads) {
   std::vector<Eigen::Index> column_of;  // per categorical column
   std::vector<Numbering> levels;
   for (const InputColumn& input : model.inputs()) {
-    if (input.is_categorical()) {
+    if (input.is_categorical() && input.codes.empty()) {
       column_of.push_back(std::ssize(columns));
       categorical.push_back(input.name);
       Numbering& numbering = levels.emplace_back();
@@ -199,7 +199,12 @@ ModelInputs read_inputs(const Csv& csv, const Model& model, int max_threads) {
   ModelInputs inputs{std::move(values)};
   std::vector<Eigen::Index> bad;
   for (std::size_t i = 0; i < columns.size(); ++i) {
-    const bool is_number = !model.inputs()[i].is_categorical();
+    const std::vector<double>& codes = model.inputs()[i].codes;
+    const bool is_number = !model.inputs()[i].is_categorical() || !codes.empty();
+    for (Eigen::Index row = 0; row < csv.rows() && !codes.empty(); ++row) {
+      const double value = inputs.values(row, static_cast<Eigen::Index>(i));
+      inputs.unseen_codes += !std::isnan(value) && !std::ranges::binary_search(codes, value) ? 1 : 0;
+    }
     bad.push_back(is_number ? cells[i].first_other : ColumnCells::no_row);
     inputs.missing += cells[i].missing;  // no category is a text that says that there is none
   }

@@ -61,9 +61,10 @@ LearningColumns read_learning_columns(const Csv& csv, const ColumnRoles& roles, 
 
 /// Inputs of a model.
 struct ModelInputs {
-  Eigen::MatrixXd values;    ///< as Model::predict() takes them
-  Eigen::Index missing = 0;  ///< cells without a value
-  Eigen::Index unknown = 0;  ///< cells with a category that training had not
+  Eigen::MatrixXd values;         ///< as Model::predict() takes them
+  Eigen::Index missing = 0;       ///< cells without a value
+  Eigen::Index unknown = 0;       ///< cells with a category that training had not
+  Eigen::Index unseen_codes = 0;  ///< cells with a number that is none of InputColumn::codes
 };
 ModelInputs read_inputs(const Csv& csv, const Model& model, int max_threads);
 

@@ -11,6 +11,7 @@ namespace bench {
 /// Adds [TASK...], --data FOLDER and --trials N.
 void add_task_options(CLI::App& command, TaskChoice& choice);
 
+void add_codes(CLI::App& study);
 void add_members(CLI::App& study);
 void add_modes(CLI::App& study);
 void add_monotone(CLI::App& study);

@@ -23,7 +23,9 @@ struct Node {
   std::vector<std::vector<int>> orders;
   std::vector<std::vector<double>> values;
 
-  llmt::SearchNode search() const { return {features, weights, rss}; }
+  int rank = 0;
+
+  llmt::SearchNode search() const { return {features, weights, rss, static_cast<double>(features.rows()), rank}; }
 };
 
 Node make_node(Eigen::Index rows, Eigen::Index inputs, bool signal) {
@@ -32,6 +34,7 @@ Node make_node(Eigen::Index rows, Eigen::Index inputs, bool signal) {
   Node node;
   llmt::NodeFit fit = llmt::fit_node(data.x, data.y, Eigen::VectorXd::Ones(rows));
   node.rss = fit.rss(0);
+  node.rank = fit.rank;
   node.features = std::move(fit.features);
   for (const auto column : data.x.colwise()) {
     std::vector<int> order(rows);

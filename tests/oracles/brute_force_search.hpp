@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "growth/search/split_search.hpp"
+#include "oracles/oracles.hpp"
 
 namespace oracle {
 
@@ -41,8 +42,14 @@ class NormalEquations {
     }
   }
 
+  struct Model {
+    double rss;
+    int rank;
+  };
+
   /// By LDL', dependent columns left out.
-  double rss() const {
+  Model model() const {
+    int rank = 0;
     std::array<double, Coefficients * Coefficients> factor{};
     std::array<double, Coefficients> inverse{};
     for (int k = 0; k < Coefficients; ++k) {
@@ -52,6 +59,7 @@ class NormalEquations {
       }
       const bool dependent = !(pivot > dependent_column * gram_[at(k, k)]);
       inverse[k] = dependent ? 0.0 : 1.0 / pivot;
+      rank += dependent ? 0 : 1;
       for (int i = k + 1; i < Coefficients; ++i) {
         double sum = gram_[at(i, k)];
         for (int j = 0; j < k; ++j) {
@@ -73,7 +81,7 @@ class NormalEquations {
       }
       total += weights_(o) * left;
     }
-    return std::max(total, 0.0);
+    return {std::max(total, 0.0), rank};
   }
 
  private:
@@ -91,51 +99,57 @@ struct BruteForceSplit {
   int input = -1;
   Eigen::Index left = 0;
   double rss = std::numeric_limits<double>::infinity();
+  double adjusted = std::numeric_limits<double>::infinity();
   Eigen::Index evaluations = 0;
 };
 
-/// Orders and values of the inputs as in llmt::InputSearch. Of splits within the tie tolerance of the best: the first
-/// input, then the smallest threshold.
+/// Orders and values of the inputs as in llmt::InputSearch. Splits in which two rows next to the split decide a
+/// direction of a child are left out. Of splits within the tie tolerance of the best: the first input, then the
+/// smallest threshold.
 template <int Coefficients>
 BruteForceSplit search(const llmt::SearchNode& node, std::span<const std::vector<int>> orders,
                        std::span<const std::vector<double>> values, Eigen::Index min_leaf_samples) {
-  constexpr double none = std::numeric_limits<double>::infinity();
-  std::vector<std::vector<double>> all;
+  using Model = typename NormalEquations<Coefficients>::Model;
+  const WholeNode whole{node.weight, node.rank, node.rss};
+  std::vector<BruteForceSplit> all;
   BruteForceSplit best;
-  for (std::size_t j = 0; j < orders.size(); ++j) {
+  for (int j = 0; j < std::ssize(orders); ++j) {
     const std::vector<int>& order = orders[j];
     const Eigen::Index rows = std::ssize(order);
-    const auto admissible = [&](Eigen::Index left) {
-      return left >= min_leaf_samples && rows - left >= min_leaf_samples && left > 0 && left < rows &&
-             values[j][left - 1] < values[j][left];
-    };
     const auto row = [&](Eigen::Index k) { return node.features.row(order[k]); };
-    std::vector<double>& rss = all.emplace_back(rows + 1, none);
+    std::vector<Model> lefts(rows + 1, Model{0.0, 0});
     NormalEquations<Coefficients> from_left(node.weights);
     for (Eigen::Index left = 1; left <= rows; ++left) {
       from_left.add(row(left - 1));
-      if (admissible(left)) {
-        rss[left] = from_left.rss();
-        ++best.evaluations;
-      }
+      lefts[left] = from_left.model();
     }
-    const double without_value = rows < node.features.rows() ? node.rss - from_left.rss() : 0.0;
+    const double without_value = rows < node.features.rows() ? node.rss - lefts[rows].rss : 0.0;
+    std::vector<Model> rights(rows + 1, Model{0.0, 0});
     NormalEquations<Coefficients> from_right(node.weights);
-    for (Eigen::Index left = rows - 1; left >= 1; --left) {
+    for (Eigen::Index left = rows - 1; left >= 0; --left) {
       from_right.add(row(left));
-      if (admissible(left)) {
-        rss[left] += from_right.rss() + without_value;
-      }
+      rights[left] = from_right.model();
     }
-    best.rss = std::min(best.rss, *std::ranges::min_element(rss));
+    const auto left_side = [&](Eigen::Index left) { return Side{left, lefts[std::max<Eigen::Index>(left, 0)].rank}; };
+    const auto right_side = [&](Eigen::Index left) { return Side{rows - left, rights[std::min(left, rows)].rank}; };
+    for (Eigen::Index left = 1; left < rows; ++left) {
+      if (left < min_leaf_samples || rows - left < min_leaf_samples || !(values[j][left - 1] < values[j][left]))
+        continue;
+      ++best.evaluations;
+      if (two_rows_decide(whole, left_side(left), left_side(left - 2))) continue;
+      if (two_rows_decide(whole, right_side(left), right_side(left + 2))) continue;
+      const double rss = lefts[left].rss + rights[left].rss + without_value;
+      const auto adjusted = static_cast<double>(adjusted_rss(whole, rss, left_side(left), right_side(left)));
+      all.push_back({j, left, rss, adjusted, 0});
+      best.adjusted = std::min(best.adjusted, all.back().adjusted);
+    }
   }
-  for (std::size_t j = 0; j < orders.size() && best.input < 0; ++j) {
-    const auto found =
-        std::ranges::find_if(all[j], [&](double value) { return value < none && value <= best.rss + tie * node.rss; });
-    if (found != all[j].end()) {
-      best.input = static_cast<int>(j);
-      best.left = found - all[j].begin();
-    }
+  for (const BruteForceSplit& split : all) {
+    if (split.adjusted > best.adjusted + tie * node.rss) continue;
+    const Eigen::Index evaluations = best.evaluations;
+    best = split;
+    best.evaluations = evaluations;
+    break;
   }
   return best;
 }

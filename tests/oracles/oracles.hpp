@@ -14,6 +14,32 @@ namespace oracle {
 /// Residual sum of squares of least squares of y on [1, x], rank-revealing, in long double.
 long double rss(const Eigen::MatrixXd& x, const Eigen::MatrixXd& y);
 
+/// Rank of [1, x].
+int rank(const Eigen::MatrixXd& x);
+
+/// A node whose splits are compared: number of rows (sum of the weights), rank and residual sum of squares of one
+/// model.
+struct WholeNode {
+  double rows;
+  int rank;
+  long double rss;
+};
+
+/// One child of a split.
+struct Side {
+  Eigen::Index rows;
+  int rank;
+};
+
+/// Residual sum of squares of a split as it is compared: by what it leaves per degree of freedom, in units in which a
+/// split whose children have the rank of the node has its RSS. Children with fewer rows than twice the rank count as
+/// such.
+long double adjusted_rss(const WholeNode& node, long double rss, const Side& left, const Side& right);
+
+/// Whether a side's model has a direction that only its two rows next to the split decide. `without`: the side without
+/// them.
+bool two_rows_decide(const WholeNode& node, const Side& side, const Side& without);
+
 /// Coefficients of least squares of y on the columns of `regressors`.
 Eigen::VectorXd least_squares(const Eigen::MatrixXd& regressors, const Eigen::VectorXd& y);
 
@@ -22,9 +48,10 @@ struct Split {
   double low = 0.0;  // the gap
   double high = 0.0;
   long double rss = std::numeric_limits<long double>::infinity();
+  long double adjusted = std::numeric_limits<long double>::infinity();
 };
 
-/// Refits both children of every admissible split.
+/// Refits both children of every admissible split in which no two rows next to the split decide a direction of a child.
 Split best_split(const Eigen::MatrixXd& x, const Eigen::MatrixXd& y, Eigen::Index min_leaf, long double tie_tolerance);
 
 inline Eigen::MatrixXd uniform(Eigen::Index rows, Eigen::Index columns, std::uint64_t seed) {

@@ -117,6 +117,9 @@ struct InputColumn {
   double centre = 0.0;  ///< mean of the training values; local models are written about it
   /// Categorical input: the names of its values 0, 1, 2, ... Empty for numbers.
   std::vector<std::string> levels = {};
+  /// Categorical input that is told as a number: the numbers of its levels, ascending. Another number counts as the
+  /// nearest of them, of two the smaller. Empty: the input is told as the position of its level.
+  std::vector<double> codes = {};
 
   bool is_categorical() const { return !levels.empty(); }
 };
@@ -219,8 +222,9 @@ class Model {
   const std::vector<Partition>& partitions() const { return partitions_; }
 
   /// Predictions, rows x outputs, for `inputs` (rows x inputs; NaN: missing; categorical inputs as positions in
-  /// InputColumn::levels, others than those count as missing). Throws std::invalid_argument if the number of columns
-  /// differs or a value is infinite. Same bytes at any number of threads (0: all), and for a row alone or among others.
+  /// InputColumn::levels, others than those count as missing, or as InputColumn::codes). Throws std::invalid_argument
+  /// if the number of columns differs or a value is infinite. Same bytes at any number of threads (0: all), and for a
+  /// row alone or among others.
   Eigen::MatrixXd predict(const Eigen::Ref<const Eigen::MatrixXd>& inputs, int max_threads = 0) const;
 
   /// Derivatives of the prediction at one point, outputs x inputs, in closed form. Zero for categorical inputs, and of
@@ -254,7 +258,8 @@ class Model {
   /// anew. Throws std::invalid_argument if max_leaves < 1.
   Model prefix(Eigen::Index max_leaves) const;
 
-  /// The same model with other names of columns and, if there are any, of the levels of each input (empty for numbers).
+  /// The same model with other names of columns and, if there are any, of the levels of each input (empty for numbers
+  /// and codes).
   /// Throws std::invalid_argument if their numbers differ, or two inputs, outputs or levels of an input have one name.
   Model named(const std::vector<std::string>& inputs, const std::vector<std::string>& outputs,
               const std::vector<std::vector<std::string>>& levels = {}) const;
@@ -271,7 +276,8 @@ class Model {
 Partition prefix(const Partition& partition, Eigen::Index max_leaves);
 
 /// The model as JSON text; docs/file-formats.md describes it. Format version 2, or 3 if there is an output_range, which
-/// readers of version 2 do not know. Numbers are written so that they read back exactly.
+/// readers of version 2 do not know, or 4 if an input has codes, which those of version 3 do not. Numbers are written
+/// so that they read back exactly.
 std::string to_json(const Model& model);
 
 /// Reads what to_json() wrote. The text may be of any origin. Throws std::runtime_error, starting with `name` and the

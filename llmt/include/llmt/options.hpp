@@ -147,6 +147,10 @@ struct FitOptions {
   /// Leave out inputs where that lowers the held-out error beyond chance: RD, RETIS and RA, with two folds or more and
   /// fewer than 300 rows an input, where neither split_inputs nor regression_inputs nor monotone is given.
   bool choose_inputs = true;
+  /// Take inputs of few whole numbers for categories where that lowers the held-out error beyond chance: RD, RETIS and
+  /// RA with crisp leaves or blends, with two folds or more, where none of split_inputs, regression_inputs, slope_signs
+  /// and monotone is given. See docs/algorithms/codes.md.
+  bool choose_codes = true;
   bool shared_partition = false;  ///< one tree for all outputs, their RSS divided by their variances; else one each
   Pruning pruning = Pruning::last_splits;
   ValidityChoice validity = ValidityChoice::automatic;
@@ -166,8 +170,9 @@ struct FitOptions {
   Eigen::VectorXd weights = {};  ///< one entry a row, not negative; a row of weight 0 takes no part. Empty: all 1
   bool intervals = true;         ///< keep the folds' models and residuals for prediction intervals
   int max_threads = 0;           ///< 0: all that the machine has. The result does not depend on it
-  /// Called after each tree (of a fold, or of all rows) with the number of trees done and of all trees. One call at a
-  /// time, from any thread.
+  /// Called as the work goes on with how much of it is done: `done` of `total` equal parts. The work is counted in
+  /// operations, and what is still to come is estimated. `done` rises from call to call and ends at `total`. One call
+  /// at a time, from any thread.
   std::function<void(Eigen::Index done, Eigen::Index total)> progress = {};
   ExpertOptions expert = {};
 };

@@ -101,6 +101,18 @@ struct PartitionSummary {
   std::vector<RangeGuard> range_guards = {};  ///< one an output of the partition; empty without folds
 };
 
+/// Which inputs are codes, that is categories told as numbers (docs/algorithms/codes.md): FitOptions::choose_codes.
+struct CodeChoice {
+  std::vector<int> compared = {};  ///< inputs that were compared in both forms, ascending
+  std::vector<int> taken = {};     ///< those that are categories in the model, ascending
+  /// One list an input: its codes, ascending; empty for the others. No lists if none is taken.
+  std::vector<std::vector<double>> codes = {};
+  /// The held-out error of the few candidates with which this is compared; relative to that of numbers where there are
+  /// several partitions.
+  double rmse_as_numbers = 0.0;
+  double rmse_as_codes = 0.0;  ///< of those taken; as numbers if none is
+};
+
 struct FitSummary {
   Eigen::Index samples = 0;           ///< rows of positive weight, copies included
   Eigen::Index copies = 0;            ///< rows that were taken for copies of others and only add to their weight
@@ -109,6 +121,7 @@ struct FitSummary {
   Eigen::Index min_leaf_samples = 0;  ///< as used
   std::vector<PartitionSummary> partitions;
   bool quadratic = false;  ///< whether the local models have products
+  CodeChoice codes = {};
   /// LocalTerms::automatic: the best candidate with the terms that were not taken, one entry a partition. Else empty.
   std::vector<CandidateError> other_terms = {};
   /// Loss::tukey: the weight in [0, 1] that each row had by its residual, 0 for outliers. Else empty.

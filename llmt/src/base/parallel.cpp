@@ -54,11 +54,15 @@ void parallel_for(Eigen::Index count, int max_threads, const std::function<void(
     return;
   }
   const auto run = [&] {
-    tbb::parallel_for(tbb::blocked_range<Eigen::Index>(0, count, 1), [&](const auto& range) {
+    // Where a body of an outer loop throws, oneTBB would end the loops inside its other bodies early and in silence,
+    // and these bodies would go on with empty slots.
+    tbb::task_group_context own(tbb::task_group_context::isolated);
+    const auto bodies = [&](const auto& range) {
       for (Eigen::Index i = range.begin(); i != range.end(); ++i) {
         body(i);
       }
-    });
+    };
+    tbb::parallel_for(tbb::blocked_range<Eigen::Index>(0, count, 1), bodies, own);
   };
   // A nested call already runs inside an arena that is small enough.
   if (max_threads <= 0 || tbb::this_task_arena::max_concurrency() <= max_threads) {

@@ -31,6 +31,9 @@ typedef double Lanes __attribute__((vector_size(64), aligned(8)));  // NOLINT(mo
 static_assert(alignof(Lanes) == alignof(double));
 inline constexpr Eigen::Index lanes = 8;
 
+/// `count` rounded up to whole lanes.
+constexpr Eigen::Index padded_to_lanes(Eigen::Index count) { return (count + lanes - 1) / lanes * lanes; }
+
 /// Four doubles. A comparison of two quads is a mask; `mask ? a : b` chooses number by number.
 using Quad = double __attribute__((vector_size(32)));
 using QuadMask = decltype(Quad{} < Quad{});

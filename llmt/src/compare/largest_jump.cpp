@@ -3,6 +3,7 @@
 #include <limits>
 
 #include "llmt/compare.hpp"
+#include "model/codes.hpp"
 #include "model/evaluator.hpp"
 
 namespace llmt {
@@ -44,7 +45,8 @@ std::pair<Eigen::VectorXd, Eigen::VectorXd> sides_of_plane(const Model& model, c
 
 }  // namespace
 
-double largest_jump(const Model& model, const Eigen::Ref<const Eigen::MatrixXd>& inputs) {
+double largest_jump(const Model& model, const Eigen::Ref<const Eigen::MatrixXd>& told) {
+  const Eigen::MatrixXd inputs = at_positions(model.inputs(), told);
   const Eigen::Index step = std::max<Eigen::Index>(1, (inputs.rows() + most_rows - 1) / most_rows);
   double largest = 0.0;
   for (const Partition& partition : model.partitions()) {

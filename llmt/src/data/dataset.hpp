@@ -78,7 +78,7 @@ void for_each_chunk(const TrainingRows& rows, const std::vector<int>& outputs, i
 
 /// About `count` of the rows, or all if they are few more, with weights that make them stand for all. Which ones
 /// depends on the rows' values, not on their order; fewer are among more.
-TrainingRows thinned(const TrainingRows& rows, Eigen::Index count);
+TrainingRows thinned(const TrainingRows& rows, Eigen::Index count, int max_threads = 1);
 
 /// Levels beyond this many, the rarest, share the reference level's place in the local models.
 inline constexpr Eigen::Index max_level_regressors = 30;

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "base/count.hpp"
+#include "base/parallel.hpp"
 
 namespace llmt {
 namespace {
@@ -27,6 +28,10 @@ constexpr double part_that_meets = 0.5;
 // Repeats and copies are looked for where there are at least this number of different rows: few rows may be there twice
 // by chance, and can hardly be dealt to folds.
 constexpr int fewest_different = 10;
+
+// Rows that are hashed at a time. Hashes are sorted in parts, by this many of their first bits.
+constexpr Eigen::Index rows_at_once = 16384;
+constexpr int bits_of_part = 4;
 
 // The same for 0 and -0, and for all NaN.
 std::uint64_t bits_of(double value) {
@@ -116,13 +121,20 @@ std::vector<int> copies(const std::vector<int>& by_all, int times) {
 }  // namespace
 
 std::vector<int> number_different_rows(const Eigen::Ref<const Eigen::MatrixXd>& table,
-                                       const std::vector<Eigen::Index>& rows, const std::vector<int>& columns) {
-  std::vector<std::pair<std::uint64_t, int>> order(rows.size());  // hash and row
-  for (int i = 0; i < count_of(rows); ++i) order[i] = {0, i};
-  for (const int j : columns) {
-    for (auto& [hash, i] : order) hash = mixed(hash + 0x9E3779B97F4A7C15U + bits_of(table(rows[i], j)));
-  }
-  std::ranges::sort(order);
+                                       const std::vector<Eigen::Index>& rows, const std::vector<int>& columns,
+                                       int max_threads) {
+  std::vector<std::uint64_t> hashes(rows.size(), 0);
+  parallel_for((std::ssize(rows) + rows_at_once - 1) / rows_at_once, max_threads, [&](Eigen::Index part) {
+    const Eigen::Index end = std::min(std::ssize(rows), (part + 1) * rows_at_once);
+    for (const int j : columns) {
+      for (Eigen::Index i = part * rows_at_once; i < end; ++i) {
+        hashes[i] = mixed(hashes[i] + 0x9E3779B97F4A7C15U + bits_of(table(rows[i], j)));
+      }
+    }
+  });
+  using Entry = std::pair<std::uint64_t, int>;  // hash and row
+  std::vector<std::vector<Entry>> parts(std::size_t{1} << bits_of_part);
+  for (int i = 0; i < count_of(rows); ++i) parts[hashes[i] >> (64 - bits_of_part)].emplace_back(hashes[i], i);
   const auto compare = [&](int a, int b) -> int {
     for (const int j : columns) {
       const std::uint64_t of_a = bits_of(table(rows[a], j));
@@ -132,19 +144,23 @@ std::vector<int> number_different_rows(const Eigen::Ref<const Eigen::MatrixXd>& 
     return 0;
   };
   std::vector<int> first(rows.size());  // row that is the same
-  for (auto begin = order.begin(); begin != order.end();) {
-    const auto end = std::find_if(begin, order.end(), [&](const auto& each) { return each.first != begin->first; });
-    // Rows of one hash are ordered by their values, so that rows made to collide cost no more than others.
-    std::sort(begin, end, [&](const auto& a, const auto& b) {
-      const int difference = compare(a.second, b.second);
-      return difference != 0 ? difference < 0 : a.second < b.second;
-    });
-    for (auto at = begin; at != end; ++at) {
-      const bool same = at != begin && compare(std::prev(at)->second, at->second) == 0;
-      first[at->second] = same ? first[std::prev(at)->second] : at->second;
+  parallel_for(std::ssize(parts), max_threads, [&](Eigen::Index part) {
+    std::vector<Entry>& order = parts[part];
+    std::ranges::sort(order);
+    for (auto begin = order.begin(); begin != order.end();) {
+      const auto end = std::find_if(begin, order.end(), [&](const Entry& each) { return each.first != begin->first; });
+      // Rows of one hash are ordered by their values, so that rows made to collide cost no more than others.
+      std::sort(begin, end, [&](const Entry& a, const Entry& b) {
+        const int difference = compare(a.second, b.second);
+        return difference != 0 ? difference < 0 : a.second < b.second;
+      });
+      for (auto at = begin; at != end; ++at) {
+        const bool same = at != begin && compare(std::prev(at)->second, at->second) == 0;
+        first[at->second] = same ? first[std::prev(at)->second] : at->second;
+      }
+      begin = end;
     }
-    begin = end;
-  }
+  });
   int different = 0;
   std::vector<int> numbers(rows.size());
   for (int i = 0; i < count_of(rows); ++i) numbers[i] = first[i] == i ? different++ : numbers[first[i]];
@@ -152,8 +168,9 @@ std::vector<int> number_different_rows(const Eigen::Ref<const Eigen::MatrixXd>& 
 }
 
 EqualRows find_equal_rows(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
-                          const Eigen::Ref<const Eigen::MatrixXd>& outputs, const std::vector<Eigen::Index>& rows) {
-  std::vector<int> by_inputs = number_different_rows(inputs, rows, all_columns(inputs));
+                          const Eigen::Ref<const Eigen::MatrixXd>& outputs, const std::vector<Eigen::Index>& rows,
+                          int max_threads) {
+  std::vector<int> by_inputs = number_different_rows(inputs, rows, all_columns(inputs), max_threads);
   const int cells = different(by_inputs);
   if (cells == count_of(rows) || cells < fewest_different) return {};
   const std::vector<int> by_all = pairs_of(by_inputs, number_different_rows(outputs, rows, all_columns(outputs)));

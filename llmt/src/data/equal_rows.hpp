@@ -10,7 +10,8 @@ namespace llmt {
 /// Numbers the different rows of some columns of a table, in order of first appearance. `rows`: those of the table that
 /// count. Missing values equal each other.
 std::vector<int> number_different_rows(const Eigen::Ref<const Eigen::MatrixXd>& table,
-                                       const std::vector<Eigen::Index>& rows, const std::vector<int>& columns);
+                                       const std::vector<Eigen::Index>& rows, const std::vector<int>& columns,
+                                       int max_threads = 1);
 
 /// Rows that are no measurements of their own, see "Rows with equal inputs" (C.2) in docs/algorithms/selection.md.
 struct EqualRows {
@@ -21,6 +22,7 @@ struct EqualRows {
   std::vector<int> copy_of;
 };
 EqualRows find_equal_rows(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
-                          const Eigen::Ref<const Eigen::MatrixXd>& outputs, const std::vector<Eigen::Index>& rows);
+                          const Eigen::Ref<const Eigen::MatrixXd>& outputs, const std::vector<Eigen::Index>& rows,
+                          int max_threads = 1);
 
 }  // namespace llmt

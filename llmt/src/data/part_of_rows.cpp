@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <limits>
 
+#include "base/parallel.hpp"
 #include "data/dataset.hpp"
 #include "data/regressors.hpp"
 #include "model/through_regressors.hpp"
@@ -35,7 +36,7 @@ TrainingRows narrowed(const TrainingRows& rows, const std::vector<int>& inputs) 
   return result;
 }
 
-TrainingRows thinned(const TrainingRows& rows, Eigen::Index count) {
+TrainingRows thinned(const TrainingRows& rows, Eigen::Index count, int max_threads) {
   TrainingRows result = rows;
   if (rows.count() <= count + count / 4) return result;
   // The rows with the smallest hashes of their values. Steps of splitmix64 (Steele, Lea & Flood 2014).
@@ -45,18 +46,20 @@ TrainingRows thinned(const TrainingRows& rows, Eigen::Index count) {
     z = (z ^ (z >> 27)) * 0x94d049bb133111ebULL;
     return z ^ (z >> 31);
   };
-  std::vector<std::uint64_t> hashes;
-  for (const int row : rows.rows) {
-    std::uint64_t hash = 0;
-    for (Eigen::Index j = 0; j < rows.table->inputs.cols(); ++j) {
-      const double value = rows.table->inputs(row, j);
-      hash = mixed(hash, std::isnan(value) ? std::numeric_limits<double>::infinity() : value);
+  std::vector<std::uint64_t> hashes(rows.rows.size(), 0);
+  parallel_for(num_chunks(rows), max_threads, [&](Eigen::Index index) {
+    const Eigen::Index end = std::min(rows.count(), (index + 1) * chunk_rows);
+    for (Eigen::Index i = index * chunk_rows; i < end; ++i) {
+      const int row = rows.rows[i];
+      for (Eigen::Index j = 0; j < rows.table->inputs.cols(); ++j) {
+        const double value = rows.table->inputs(row, j);
+        hashes[i] = mixed(hashes[i], std::isnan(value) ? std::numeric_limits<double>::infinity() : value);
+      }
+      for (Eigen::Index o = 0; o < rows.table->outputs.cols(); ++o) {
+        hashes[i] = mixed(hashes[i], rows.table->outputs(row, o));
+      }
     }
-    for (Eigen::Index o = 0; o < rows.table->outputs.cols(); ++o) {
-      hash = mixed(hash, rows.table->outputs(row, o));
-    }
-    hashes.push_back(hash);
-  }
+  });
   std::vector<std::uint64_t> order = hashes;
   std::nth_element(order.begin(), order.begin() + (count - 1), order.end());
   const std::uint64_t last = order[count - 1];

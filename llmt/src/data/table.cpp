@@ -187,7 +187,7 @@ FitData::FitData(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::R
   if (!options.folds.groups.empty()) {
     for (const Eigen::Index row : rows) groups_.push_back(options.folds.groups[row]);
   } else if (options.folds.count > 0) {
-    const EqualRows equal = find_equal_rows(inputs, outputs, rows);
+    const EqualRows equal = find_equal_rows(inputs, outputs, rows, options.max_threads);
     has_repeats_ = equal.are_repeats;
     if (has_repeats_) groups_.assign(equal.group.begin(), equal.group.end());
     if (!equal.copy_of.empty()) leave_out_copies(equal.copy_of, rows, weights);

@@ -1,7 +1,6 @@
 #include "estimation/joint_equations.hpp"
 
 #include "base/count.hpp"
-#include "estimation/local_estimate.hpp"
 #include "model/tree.hpp"
 #include "numerics/dense.hpp"
 
@@ -93,12 +92,13 @@ JointEquations joint_equations(const LeafSums& sums, Eigen::Index leaves) {
   return result;
 }
 
-JointSolution solve(const LeafSums& sums, const JointEquations& equations, const Regularisation& regularisation) {
+JointSolution solve(const LeafSums& sums, const JointEquations& equations, const Regularisation& regularisation,
+                    const std::vector<Eigen::MatrixXd>& local) {
   const Eigen::Index size = sums.size();
   JointSolution result;
   FreeEstimate& estimate = result.estimate;
   estimate.sparse = regularisation.sparse;
-  estimate.models = local_models(sums, 2 * equations.leaves - 1, regularisation.shrinkage, regularisation.sparse);
+  estimate.models = local;
   if (regularisation.sparse) {
     result.unknowns = sparse_unknowns(sums, equations);
   }

@@ -33,7 +33,9 @@ struct JointSolution {
   Eigen::MatrixXd anchors;             ///< the local estimates of the leaves, one below the other
   std::vector<Eigen::Index> unknowns;  ///< sparse: positions of the unknowns among the leaves' coefficients
 };
-JointSolution solve(const LeafSums& sums, const JointEquations& equations, const Regularisation& regularisation);
+/// `local`: what local_models() gives for these nodes with this shrinkage and sparseness.
+JointSolution solve(const LeafSums& sums, const JointEquations& equations, const Regularisation& regularisation,
+                    const std::vector<Eigen::MatrixXd>& local);
 
 /// The inverse of the regularised matrix times `right`; 0 where a sparse estimate has no unknown.
 Eigen::MatrixXd times_inverse(const JointSolution& solution, const Eigen::MatrixXd& right);

@@ -3,6 +3,7 @@
 #include <map>
 #include <utility>
 
+#include "estimation/local_estimate.hpp"
 #include "model/evaluator.hpp"
 #include "model/imputed.hpp"
 #include "numerics/conjugate_gradients.hpp"
@@ -97,9 +98,14 @@ std::vector<Partition> joint(const LeafSums& sums, Eigen::Index leaves,
                              const std::vector<Regularisation>& regularisations) {
   const JointEquations equations = joint_equations(sums, leaves);
   std::vector<Partition> results;
+  std::map<std::pair<double, bool>, std::vector<Eigen::MatrixXd>> of_nodes;  // of each shrinkage, full or sparse
   std::map<double, ActiveInequalities> active;  // of each shrinkage, on which the inner nodes depend
   for (const Regularisation& regularisation : regularisations) {
-    const JointSolution solution = solve(sums, equations, regularisation);
+    const auto [entry, is_new] = of_nodes.try_emplace({regularisation.shrinkage, regularisation.sparse});
+    if (is_new) {
+      entry->second = local_models(sums, 2 * equations.leaves - 1, regularisation.shrinkage, regularisation.sparse);
+    }
+    const JointSolution solution = solve(sums, equations, regularisation, entry->second);
     results.push_back(constrained(sums, equations.leaf_nodes, solution.estimate, active[regularisation.shrinkage]));
   }
   return results;
@@ -108,7 +114,9 @@ std::vector<Partition> joint(const LeafSums& sums, Eigen::Index leaves,
 Partition joint_from_sample(const LeafSums& sample, const TrainingRows& all, Eigen::Index leaves,
                             const Regularisation& regularisation) {
   const JointEquations equations = joint_equations(sample, leaves);
-  JointSolution solution = solve(sample, equations, regularisation);
+  JointSolution solution =
+      solve(sample, equations, regularisation,
+            local_models(sample, 2 * equations.leaves - 1, regularisation.shrinkage, regularisation.sparse));
   Eigen::MatrixXd& coefficients = solution.estimate.leaf_coefficients;
   const Partition partition = prefix(sample.partition, leaves);
   const GradientSum gradient_sum(all, partition, equations, sample.training->scale);

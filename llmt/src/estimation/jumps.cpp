@@ -221,19 +221,18 @@ TrainingRows rows_to_measure_on(const TrainingRows& all) {
 }  // namespace
 
 Eigen::VectorXd jump_sizes(const TrainingRows& all, const Partition& grown, int max_threads) {
-  const TrainingRows training = thinned(rows_to_measure_on(all), enough_rows);
+  const TrainingRows training = thinned(rows_to_measure_on(all), enough_rows, max_threads);
   const Evaluator evaluator(grown, training.columns, std::ssize(training.regressors));
-  std::vector<std::vector<int>> rows_of_leaf(grown.nodes.size());  // their positions; empty for inner nodes
-  for (Eigen::Index index = 0; index < num_chunks(training); ++index) {
+  std::vector<int> leaf_of_row(training.count(), 0);
+  parallel_for(num_chunks(training), max_threads, [&](Eigen::Index index) {
     const Chunk chunk = fetch(training, index, {});
     for (Eigen::Index row = 0; row < chunk.count(); ++row) {
-      int leaf = 0;
-      while (!grown.nodes[leaf].is_leaf()) {
-        leaf = evaluator.child_of(leaf, chunk.inputs.row(row).data());
-      }
-      rows_of_leaf[leaf].push_back(static_cast<int>(index * chunk_rows + row));
+      int& leaf = leaf_of_row[index * chunk_rows + row];
+      while (!grown.nodes[leaf].is_leaf()) leaf = evaluator.child_of(leaf, chunk.inputs.row(row).data());
     }
-  }
+  });
+  std::vector<std::vector<int>> rows_of_leaf(grown.nodes.size());  // their positions; empty for inner nodes
+  for (int row = 0; row < std::ssize(leaf_of_row); ++row) rows_of_leaf[leaf_of_row[row]].push_back(row);
   Eigen::VectorXd sizes = Eigen::VectorXd::Zero(std::ssize(grown.nodes));
   parallel_for(std::ssize(grown.nodes), max_threads, [&](Eigen::Index index) {
     const Node& node = grown.nodes[index];

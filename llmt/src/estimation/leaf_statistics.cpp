@@ -113,7 +113,8 @@ void describe_leaves(const TrainingRows& training, Partition& partition, bool sp
   const Eigen::Index regressors = std::ssize(training.regressors);
   const Evaluator evaluator(partition, training.columns, regressors);
   const Eigen::MatrixXd rss = residual_sums(training, partition, evaluator, max_threads);
-  const TrainingRows sample = thinned(training, sample_rows_per_unknown * partition.num_leaves() * (regressors + 1));
+  const Eigen::Index enough = sample_rows_per_unknown * partition.num_leaves() * (regressors + 1);
+  const TrainingRows sample = thinned(training, enough, max_threads);
   const std::vector<Eigen::MatrixXd> gram = gram_matrices(sample, partition, evaluator, max_threads);
   Eigen::VectorXd scale = Eigen::VectorXd::Ones(regressors + 1);
   for (Eigen::Index k = 0; k < regressors; ++k) {

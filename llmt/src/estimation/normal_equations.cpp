@@ -2,14 +2,15 @@
 
 #include <algorithm>
 #include <limits>
+#include <span>
 
 #include "base/count.hpp"
 #include "base/parallel.hpp"
+#include "base/simd.hpp"
 #include "estimation/missing_by_validity.hpp"
+#include "estimation/reached_rows.hpp"
 #include "estimation/rows_by_leaf.hpp"
 #include "model/evaluator.hpp"
-#include "model/imputed.hpp"
-#include "numerics/dense.hpp"
 
 namespace llmt {
 namespace {
@@ -21,41 +22,80 @@ constexpr double range_margin = 0.25;
 // Logistic gates give every leaf some validity at every row. Only rows with more than this count in a leaf's range.
 constexpr double reach_of_logistic = 1e-3;
 
-// Rows of one step.
-constexpr Eigen::Index rows_at_once = 256;
+// Rows that are laid out together, and how many such lots are taken at once.
+constexpr Eigen::Index rows_of_lot = 128;
+constexpr Eigen::Index lots_at_once = 32;
 
-// Most numbers that the outer products of the rows of one step take: 64 MiB.
+// Most numbers that the outer products of the rows taken at once take: 64 MiB.
 constexpr Eigen::Index outer_products = Eigen::Index{1} << 23;
 
-inline void add_scaled(double* a, const double* b, double factor, Eigen::Index size) {
-  for (Eigen::Index k = 0; k < size; ++k) {
-    a[k] += factor * b[k];
-  }
-}
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-// A leaf that reaches a row.
-struct Entry {
-  int leaf;
-  double validity;
-};
+// Sums that are formed at once.
+constexpr Eigen::Index tile = 4;
+static_assert(tile <= ReachedRows::more_columns);
 
-// A row that a leaf reaches.
-struct Use {
-  Eigen::Index row;     // in the chunk
-  Eigen::Index before;  // position of the row's first entry
-  Eigen::Index entry;   // position of the leaf's entry for this row
-};
+// Rows of outer products times a factor for each use, laid out as in ReachedRows, one row for each use; and their sum.
+LLMT_FOR_EACH_INSTRUCTION_SET
+void scale_rows(std::span<const ReachedRows::Use> uses, const std::vector<double>& factors, const ReachedRows& reached,
+                std::vector<double>& scaled, double* sum) {
+  const Eigen::Index count = std::ssize(uses);
+  const Eigen::Index strip = reached.chunk.count() * lanes;
+  scaled.resize(std::ssize(reached.outer) / reached.chunk.count() * count);
+  double* out = scaled.data();
+  for (const double* in = reached.outer.data(); out != scaled.data() + scaled.size(); in += strip, sum += lanes) {
+    Lanes total = {};
+    for (Eigen::Index u = 0; u < count; ++u, out += lanes) {
+      const Lanes product = factors[u] * *reinterpret_cast<const Lanes*>(in + uses[u].row * lanes);
+      *reinterpret_cast<Lanes*>(out) = product;
+      total += product;
+    }
+    *reinterpret_cast<Lanes*>(sum) += total;
+  }
+}
 
-// A chunk of rows with the leaves that reach them.
-struct Reached {
-  Chunk chunk;
-  std::vector<Entry> entries;          // row after row; within a row by ascending leaf
-  std::vector<std::vector<Use>> uses;  // of every leaf
-  RowMajor regressors;                 // scaled, with the constant; NaN: missing
-  RowMajor residuals;
-  RowMajor outer;  // lower triangles of a a', without missing values
-};
+// Sums over the uses of a leaf of validity x row, for the validities of `tile` leaves from `column` on. `sums`: tile x
+// padded numbers.
+LLMT_FOR_EACH_INSTRUCTION_SET
+void sum_tile(std::span<const ReachedRows::Use> uses, const RowMajor& validities, Eigen::Index column,
+              const std::vector<double>& scaled, double* sums) {
+  const Eigen::Index numbers = std::ssize(scaled) / std::ssize(uses);
+  const double* row = scaled.data();
+  for (Eigen::Index begin = 0; begin < numbers; begin += lanes) {
+    Lanes sum[tile] = {};
+    for (const ReachedRows::Use& use : uses) {
+      const double* validity = validities.data() + use.row * validities.cols() + column;
+      const Lanes of_row = *reinterpret_cast<const Lanes*>(row);
+      for (Eigen::Index t = 0; t < tile; ++t) {
+        sum[t] += validity[t] * of_row;
+      }
+      row += lanes;
+    }
+    for (Eigen::Index t = 0; t < tile; ++t) {
+      *reinterpret_cast<Lanes*>(sums + t * numbers + begin) = sum[t];
+    }
+  }
+}
+
+LLMT_FOR_EACH_INSTRUCTION_SET
+void add_numbers(const double* from, Eigen::Index count, double* to) {
+  for (Eigen::Index k = 0; k < count; ++k) {
+    to[k] += from[k];
+  }
+}
+
+// Widens ranges to `values`, of which NaN, a missing one, widens none.
+LLMT_FOR_EACH_INSTRUCTION_SET
+void widen(const double* values, Eigen::Index count, double* low, double* high) {
+  for (Eigen::Index k = 0; k < count; ++k) {
+    low[k] = values[k] < low[k] ? values[k] : low[k];
+    high[k] = values[k] > high[k] ? values[k] : high[k];
+  }
+}
+
+std::span<const ReachedRows::Use> uses_of(const ReachedRows& reached, std::size_t leaf) {
+  return {reached.uses.begin() + reached.first_use[leaf], reached.uses.begin() + reached.first_use[leaf + 1]};
+}
 
 // One pass over the rows that forms the sums.
 class Assembly {
@@ -65,13 +105,11 @@ class Assembly {
   NormalEquations run(int max_threads);
 
  private:
-  Reached reach(std::vector<int> positions) const;
-  void describe_row(Reached& reached, Eigen::Index row, const std::vector<Activation>& active) const;
-  Eigen::VectorXd regressors_at(const Reached& reached, Eigen::Index row, int node) const;
-  void widen_range(const Reached& reached, std::size_t leaf);
+  void widen_range(const ReachedRows& reached, std::size_t leaf);
   std::vector<double>& block_to_add_to(std::size_t leaf, std::size_t other);
-  void add(const Reached& reached, std::size_t leaf);
-  void add_with_missing(const Reached& reached, std::size_t leaf);
+  void add(const ReachedRows& reached, std::size_t leaf);
+  void add_with_missing(const ReachedRows& reached, std::size_t leaf);
+  void unpack_gram();
   void add_up_to_parents();
 
   const TrainingRows& training_;
@@ -80,10 +118,11 @@ class Assembly {
   const Eigen::Index size_;    // coefficients of a local model
   const Eigen::Index packed_;  // numbers that a block is stored in
   const Evaluator evaluator_;
-  const bool leave_out_;
   std::vector<int> leaf_of_node_;
+  const ReachedBy by_;
   NormalEquations sums_;
-  std::vector<Eigen::VectorXd> low_;  // of every node
+  std::vector<std::vector<double>> packed_gram_;  // of every leaf, lower triangle row by row, padded
+  std::vector<Eigen::VectorXd> low_;              // of every node
   std::vector<Eigen::VectorXd> high_;
 };
 
@@ -94,17 +133,16 @@ Assembly::Assembly(const TrainingRows& training, Partition& partition, const Eig
       size_(std::ssize(training.regressors) + 1),
       packed_(training.has_missing ? size_ * size_ : size_ * (size_ + 1) / 2),
       evaluator_(partition, training.columns, std::ssize(training.regressors)),
-      leave_out_(leaves_out_ambiguous(training, evaluator_)),
-      leaf_of_node_(partition.nodes.size(), -1) {
+      leaf_of_node_(partition.nodes.size(), -1),
+      by_{training, partition, evaluator_, leaf_of_node_, root, leaves_out_ambiguous(training, evaluator_)} {
   const int nodes = count_of(partition.nodes);
   sums_.size = size_;
   sums_.missing = training.has_missing;
-  for (int i = 0; i < nodes; ++i) {
-    if (partition.nodes[i].is_leaf()) {
-      leaf_of_node_[i] = count_of(sums_.leaves);
-      sums_.leaves.push_back(i);
-      sums_.blocks.emplace_back(sums_.leaves.size());
-    }
+  sums_.leaves = leaves_from_left(partition);
+  for (const int node : sums_.leaves) {
+    leaf_of_node_[node] = count_of(sums_.blocks);
+    sums_.blocks.emplace_back(sums_.blocks.size() + 1);
+    packed_gram_.emplace_back(training.has_missing ? 0 : padded_to_lanes(packed_), 0.0);
   }
   sums_.gram.assign(nodes, Eigen::MatrixXd::Zero(size_, size_));
   sums_.products.assign(nodes, Eigen::MatrixXd::Zero(size_, root.cols()));
@@ -117,17 +155,21 @@ NormalEquations Assembly::run(int max_threads) {
   // Logistic gates take the mean of the input for a missing value, as their local models do.
   const ValidityKind kind = partition_.validity.kind;
   const bool overlap = kind == ValidityKind::blend || kind == ValidityKind::gaussian;
-  if (overlap && sums_.missing) describe_missing_by_validity(training_, evaluator_, leave_out_, partition_);
-  const Eigen::Index at_once = std::clamp<Eigen::Index>(outer_products / packed_, 1, rows_at_once);
-  const std::vector<int> rows = rows_by_leaf(training_, partition_, evaluator_);
-  for (auto begin = rows.begin(); begin != rows.end();) {
-    const auto end = begin + std::min<std::ptrdiff_t>(at_once, rows.end() - begin);
-    const Reached reached = reach({begin, end});
-    begin = end;
+  if (overlap && sums_.missing) {
+    describe_missing_by_validity(training_, evaluator_, by_.leaves_out_ambiguous, partition_);
+  }
+  const Eigen::Index of_lot = std::clamp<Eigen::Index>(outer_products / (lots_at_once * packed_), 1, rows_of_lot);
+  const std::vector<int> rows = rows_by_leaf(training_, partition_, evaluator_, max_threads);
+  for (Eigen::Index begin = 0; begin < std::ssize(rows); begin += lots_at_once * of_lot) {
+    const Eigen::Index left = std::ssize(rows) - begin;
+    std::vector<ReachedRows> lots(std::min(lots_at_once, (left + of_lot - 1) / of_lot));
+    parallel_for(std::ssize(lots), max_threads, [&](Eigen::Index lot) {
+      const auto first = rows.begin() + begin + lot * of_lot;
+      lots[lot] = reach(by_, {first, first + std::min(of_lot, rows.end() - first)});
+    });
     // Leaves are independent: each adds to its own sums and to its blocks with the leaves before it.
-    parallel_for(std::ssize(sums_.leaves), max_threads, [&](Eigen::Index position) {
-      const std::size_t leaf = position;
-      if (!reached.uses[leaf].empty()) {
+    parallel_for(std::ssize(sums_.leaves), max_threads, [&](Eigen::Index leaf) {
+      for (const ReachedRows& reached : lots) {
         widen_range(reached, leaf);
         if (sums_.missing) {
           add_with_missing(reached, leaf);
@@ -137,81 +179,18 @@ NormalEquations Assembly::run(int max_threads) {
       }
     });
   }
+  if (!sums_.missing) unpack_gram();
   add_up_to_parents();
   if (overlap && !sums_.missing) describe_missing_by_sums(sums_, training_.scale, partition_);
   return std::move(sums_);
 }
 
-Reached Assembly::reach(std::vector<int> positions) const {
-  const Eigen::Index rows = std::ssize(positions);
-  Reached reached{.chunk = fetch(training_, positions, partition_.outputs),
-                  .entries = {},
-                  .uses = std::vector<std::vector<Use>>(sums_.leaves.size()),
-                  .regressors = {},
-                  .residuals = {},
-                  .outer = {}};
-  reached.regressors = RowMajor::Zero(rows, size_);
-  reached.residuals = RowMajor::Zero(rows, root_.cols());
-  reached.outer.resize(sums_.missing ? 0 : rows, packed_);
-  std::vector<Activation> active;
-  for (Eigen::Index row = 0; row < rows; ++row) {
-    const double* inputs = reached.chunk.inputs.row(row).data();
-    if (leave_out_ && evaluator_.is_ambiguous(inputs)) continue;
-    evaluator_.activate(inputs, active);
-    std::ranges::sort(active, [](const auto& a, const auto& b) { return a.node < b.node; });
-    const Eigen::Index before = std::ssize(reached.entries);
-    for (const Activation& entry : active) {
-      const int leaf = leaf_of_node_[entry.node];
-      reached.uses[leaf].push_back({row, before, std::ssize(reached.entries)});
-      reached.entries.push_back({leaf, entry.validity});
-    }
-    describe_row(reached, row, active);
-  }
-  return reached;
-}
-
-// Sets regressors, residuals and products of a row.
-void Assembly::describe_row(Reached& reached, Eigen::Index row, const std::vector<Activation>& active) const {
-  reached.regressors(row, 0) = 1.0;
-  for (Eigen::Index k = 1; k < size_; ++k) {
-    reached.regressors(row, k) = reached.chunk.deviations(row, k - 1) / training_.scale(k - 1);
-  }
-  reached.residuals.row(row) = reached.chunk.outputs.row(row);
-  if (sums_.missing) {
-    for (const Activation& entry : active) {
-      reached.residuals.row(row) -= entry.validity * regressors_at(reached, row, entry.node).transpose() * root_;
-    }
-    return;
-  }
-  reached.residuals.row(row) -= reached.regressors.row(row) * root_;
-  double* out = reached.outer.row(row).data();
-  for (Eigen::Index i = 0; i < size_; ++i) {
-    for (Eigen::Index j = 0; j <= i; ++j) {
-      *out++ = reached.regressors(row, i) * reached.regressors(row, j);
-    }
-  }
-}
-
-// The regressors as a node sees them, which replaces missing ones by its means.
-Eigen::VectorXd Assembly::regressors_at(const Reached& reached, Eigen::Index row, int node) const {
-  Eigen::VectorXd result(size_);
-  result(0) = 1.0;
-  for (Eigen::Index k = 1; k < size_; ++k) {
-    result(k) = imputed(partition_.nodes[node], k - 1, reached.chunk.deviations(row, k - 1)) / training_.scale(k - 1);
-  }
-  return result;
-}
-
-void Assembly::widen_range(const Reached& reached, std::size_t leaf) {
+void Assembly::widen_range(const ReachedRows& reached, std::size_t leaf) {
   const std::size_t node = sums_.leaves[leaf];
   const double least = partition_.validity.kind == ValidityKind::logistic ? reach_of_logistic : 0.0;
-  for (const Use& use : reached.uses[leaf]) {
+  for (const ReachedRows::Use& use : uses_of(reached, leaf)) {
     if (!(reached.entries[use.entry].validity > least)) continue;
-    const double* deviations = reached.chunk.deviations.row(use.row).data();
-    for (Eigen::Index k = 0; k < size_ - 1; ++k) {
-      low_[node](k) = deviations[k] < low_[node](k) ? deviations[k] : low_[node](k);
-      high_[node](k) = deviations[k] > high_[node](k) ? deviations[k] : high_[node](k);
-    }
+    widen(reached.chunk.deviations.row(use.row).data(), size_ - 1, low_[node].data(), high_[node].data());
   }
 }
 
@@ -221,76 +200,64 @@ std::vector<double>& Assembly::block_to_add_to(std::size_t leaf, std::size_t oth
   return block;
 }
 
-// Adds to all blocks of a leaf by one matrix product: validities of the leaves before it times weighted outer products.
-void Assembly::add(const Reached& reached, std::size_t leaf) {
-  const std::vector<Use>& uses = reached.uses[leaf];
+// Adds the rows of a leaf to its sums and to its blocks with the leaves before it.
+void Assembly::add(const ReachedRows& reached, std::size_t leaf) {
+  const std::span<const ReachedRows::Use> uses = uses_of(reached, leaf);
+  if (uses.empty()) return;
   const std::size_t node = sums_.leaves[leaf];
-  std::vector<int> column_of(leaf + 1, -1);
-  std::vector<int> others;
-  for (const Use& use : uses) {
-    for (Eigen::Index e = use.before; e <= use.entry; ++e) {
-      const int other = reached.entries[e].leaf;
-      if (column_of[other] < 0) {
-        column_of[other] = count_of(others);
-        others.push_back(other);
-      }
-    }
-  }
-  const Eigen::Index columns = std::ssize(others) + 1;  // last: 1, for G
-  RowMajor validities = RowMajor::Zero(std::ssize(uses), columns);
-  RowMajor products(std::ssize(uses), packed_);
-  for (Eigen::Index row = 0; row < std::ssize(uses); ++row) {
-    const Use& use = uses[row];
+  thread_local std::vector<double> factors;  // these three are kept for their memory
+  thread_local std::vector<double> scaled;
+  thread_local std::vector<double> of_lot;
+  factors.clear();
+  Eigen::Index first = reached.column[leaf];
+  for (const ReachedRows::Use& use : uses) {
     const double weight = reached.chunk.weights(use.row) * reached.entries[use.entry].validity;
-    const double* outer = reached.outer.row(use.row).data();
-    double* product = products.row(row).data();
-    for (Eigen::Index k = 0; k < packed_; ++k) {
-      product[k] = weight * outer[k];
-    }
-    for (Eigen::Index e = use.before; e <= use.entry; ++e) {
-      const Entry& entry = reached.entries[e];
-      validities(row, column_of[entry.leaf]) = entry.validity;
-    }
-    validities(row, columns - 1) = 1.0;
+    factors.push_back(weight);
+    first = std::min(first, reached.column[reached.entries[use.before].leaf]);
     for (Eigen::Index o = 0; o < root_.cols(); ++o) {
-      sums_.squares[node](o) += weight * reached.residuals(use.row, o) * reached.residuals(use.row, o);
-      add_scaled(sums_.products[node].col(o).data(), reached.regressors.row(use.row).data(),
-                 weight * reached.residuals(use.row, o), size_);
+      const double residual = reached.residuals(use.row, o);
+      sums_.squares[node](o) += weight * residual * residual;
+      sums_.products[node].col(o) += weight * residual * reached.regressors.row(use.row).transpose();
     }
   }
-  RowMajor sums = RowMajor::Zero(columns, packed_);
-  add_transposed_product(columns, packed_, validities.rows(), 1.0, validities.data(), columns, products.data(), packed_,
-                         sums.data(), packed_);
-  for (std::size_t k = 0; k < others.size(); ++k) {
-    std::vector<double>& block = block_to_add_to(leaf, others[k]);
-    Eigen::Map<Eigen::VectorXd>(block.data(), packed_) += sums.row(k).transpose();
-  }
-  const double* sum = sums.row(columns - 1).data();
-  for (Eigen::Index i = 0; i < size_; ++i) {
-    for (Eigen::Index j = 0; j <= i; ++j, ++sum) {
-      sums_.gram[node](i, j) += *sum;
-      sums_.gram[node](j, i) += i == j ? 0.0 : *sum;
+  scale_rows(uses, factors, reached, scaled, packed_gram_[leaf].data());
+  const Eigen::Index numbers = padded_to_lanes(packed_);
+  of_lot.resize(tile * numbers);
+  for (Eigen::Index column = first; column <= reached.column[leaf]; column += tile) {
+    sum_tile(uses, reached.validities, column, scaled, of_lot.data());
+    for (Eigen::Index k = column; k < std::min(column + tile, reached.column[leaf] + 1); ++k) {
+      const double* sum = of_lot.data() + (k - column) * numbers;
+      // The sum of the products of validities: 0 where the leaves share no row.
+      if (sum[0] > 0.0) add_numbers(sum, packed_, block_to_add_to(leaf, reached.leaves[k]).data());
     }
   }
 }
 
-void Assembly::add_with_missing(const Reached& reached, std::size_t leaf) {
+void Assembly::add_with_missing(const ReachedRows& reached, std::size_t leaf) {
   const int node = sums_.leaves[leaf];
-  for (const Use& use : reached.uses[leaf]) {
-    const Eigen::VectorXd x = regressors_at(reached, use.row, node);
+  for (const ReachedRows::Use& use : uses_of(reached, leaf)) {
+    const Eigen::VectorXd x = regressors_at(by_, reached.chunk, use.row, node);
     const double weight = reached.chunk.weights(use.row) * reached.entries[use.entry].validity;
     for (Eigen::Index e = use.before; e <= use.entry; ++e) {
-      const Entry& entry = reached.entries[e];
-      const std::size_t other = entry.leaf;
-      const Eigen::VectorXd of_other = regressors_at(reached, use.row, sums_.leaves[other]);
-      std::vector<double>& block = block_to_add_to(leaf, other);
-      for (Eigen::Index i = 0; i < size_; ++i) {
-        add_scaled(block.data() + i * size_, of_other.data(), weight * entry.validity * x(i), size_);
-      }
+      const ReachedRows::Entry& entry = reached.entries[e];
+      const Eigen::VectorXd of_other = regressors_at(by_, reached.chunk, use.row, sums_.leaves[entry.leaf]);
+      Eigen::Map<RowMajor>(block_to_add_to(leaf, entry.leaf).data(), size_, size_) +=
+          (weight * entry.validity * x) * of_other.transpose();
     }
     sums_.gram[node] += weight * x * x.transpose();
     sums_.products[node] += weight * x * reached.residuals.row(use.row);
     sums_.squares[node] += weight * reached.residuals.row(use.row).cwiseAbs2().transpose();
+  }
+}
+
+// Sets the matrices of leaves from their lower triangles.
+void Assembly::unpack_gram() {
+  for (std::size_t leaf = 0; leaf < packed_gram_.size(); ++leaf) {
+    Eigen::MatrixXd& gram = sums_.gram[sums_.leaves[leaf]];
+    const double* value = packed_gram_[leaf].data();
+    for (Eigen::Index i = 0; i < size_; ++i) {
+      for (Eigen::Index j = 0; j <= i; ++j) gram(i, j) = gram(j, i) = *value++;
+    }
   }
 }
 

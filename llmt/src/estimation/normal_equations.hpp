@@ -17,7 +17,7 @@ namespace llmt {
 struct NormalEquations {
   Eigen::Index size = 0;    ///< coefficients of a local model
   bool missing = false;     ///< some value is missing; then blocks are not symmetric and are stored in full
-  std::vector<int> leaves;  ///< nodes, ascending
+  std::vector<int> leaves;  ///< nodes, from left to right in the tree
   /// S_ij of leaf i with the leaves j = 0 ... i, lower triangles row by row. Empty if the two leaves share no row.
   std::vector<std::vector<std::vector<double>>> blocks;
   std::vector<Eigen::MatrixXd> gram;      ///< G of every node, size x size

@@ -4,34 +4,47 @@
 #include <numeric>
 #include <span>
 
+#include "base/parallel.hpp"
+
 namespace llmt {
 namespace {
 
 // Of every leaf, its place from left to right in the tree.
 std::vector<int> places_of(const Partition& partition) {
   std::vector<int> place(partition.nodes.size(), 0);
-  std::vector<int> stack = {0};
-  for (int next = 0; !stack.empty();) {
-    const int node = stack.back();
-    stack.pop_back();
-    if (partition.nodes[node].is_leaf()) {
-      place[node] = next++;
-    } else {
-      stack.push_back(partition.nodes[node].right);
-      stack.push_back(partition.nodes[node].left);
-    }
+  int next = 0;
+  for (const int leaf : leaves_from_left(partition)) {
+    place[leaf] = next++;
   }
   return place;
 }
 
 }  // namespace
 
-std::vector<int> rows_by_leaf(const TrainingRows& rows, const Partition& partition, const Evaluator& evaluator) {
+std::vector<int> leaves_from_left(const Partition& partition) {
+  std::vector<int> leaves;
+  std::vector<int> stack = {0};
+  while (!stack.empty()) {
+    const int node = stack.back();
+    stack.pop_back();
+    if (partition.nodes[node].is_leaf()) {
+      leaves.push_back(node);
+    } else {
+      stack.push_back(partition.nodes[node].right);
+      stack.push_back(partition.nodes[node].left);
+    }
+  }
+  return leaves;
+}
+
+std::vector<int> rows_by_leaf(const TrainingRows& rows, const Partition& partition, const Evaluator& evaluator,
+                              int max_threads) {
   const std::vector<int> place = places_of(partition);
   std::vector<int> place_of_row(rows.count());
   std::vector<int> order(rows.count());
   std::iota(order.begin(), order.end(), 0);
-  for (Eigen::Index begin = 0; begin < rows.count(); begin += chunk_rows) {
+  parallel_for(num_chunks(rows), max_threads, [&](Eigen::Index index) {
+    const Eigen::Index begin = index * chunk_rows;
     const std::size_t count = std::min(chunk_rows, rows.count() - begin);
     const RowMajor inputs = inputs_of(rows, std::span(order).subspan(begin, count));
     for (Eigen::Index row = 0; row < inputs.rows(); ++row) {
@@ -39,7 +52,7 @@ std::vector<int> rows_by_leaf(const TrainingRows& rows, const Partition& partiti
       while (!partition.nodes[node].is_leaf()) node = evaluator.child_of(node, inputs.row(row).data());
       place_of_row[begin + row] = place[node];
     }
-  }
+  });
   std::ranges::stable_sort(order, {}, [&](int row) { return place_of_row[row]; });
   return order;
 }

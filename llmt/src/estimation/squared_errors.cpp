@@ -3,6 +3,35 @@
 #include "model/evaluator.hpp"
 
 namespace llmt {
+namespace {
+
+// `below` under `matrix`.
+void append(Eigen::MatrixXd& matrix, const Eigen::MatrixXd& below) {
+  const Eigen::Index rows = matrix.rows();
+  matrix.conservativeResize(rows + below.rows(), below.cols());
+  matrix.bottomRows(below.rows()) = below;
+}
+
+// The partition whose outputs are those of the first of `partitions`, then those of the second, and so on.
+Partition side_by_side(const std::vector<Partition>& partitions) {
+  Partition result = partitions.front();
+  for (auto other = partitions.begin() + 1; other != partitions.end(); ++other) {
+    result.outputs.insert(result.outputs.end(), other->outputs.begin(), other->outputs.end());
+    for (std::size_t i = 0; i < result.nodes.size(); ++i) {
+      Node& node = result.nodes[i];
+      const Node& more = other->nodes[i];
+      node.value.conservativeResize(node.value.size() + more.value.size());
+      node.value.tail(more.value.size()) = more.value;
+      append(node.slope, more.slope);
+    }
+    append(result.residual_range, other->residual_range);
+    append(result.outer_slope, other->outer_slope);
+    append(result.output_range, other->output_range);
+  }
+  return result;
+}
+
+}  // namespace
 
 Eigen::VectorXd prefix_squared_errors(const Partition& partition, const TrainingRows& rows,
                                       const Eigen::VectorXd& weights, int max_threads) {
@@ -36,25 +65,34 @@ Eigen::VectorXd prefix_squared_errors(const Partition& partition, const Training
   return sums.cwiseMax(0.0);
 }
 
-Eigen::VectorXd squared_errors(const Partition& partition, const TrainingRows& columns, const std::vector<Chunk>& rows,
-                               const Eigen::VectorXd& weights) {
-  const Evaluator evaluator(partition, columns.columns, std::ssize(columns.regressors));
+std::vector<Eigen::VectorXd> squared_errors(const std::vector<Partition>& partitions, const TrainingRows& columns,
+                                            const std::vector<Chunk>& rows, const Eigen::VectorXd& weights) {
+  const Evaluator evaluator(side_by_side(partitions), columns.columns, std::ssize(columns.regressors));
+  const Eigen::Index outputs = std::ssize(partitions.front().outputs);
   std::vector<Activation> active;
-  Eigen::VectorXd values(std::ssize(partition.outputs));
+  Eigen::VectorXd values(std::ssize(partitions) * outputs);
   Eigen::Index count = 0;
   for (const Chunk& chunk : rows) count += chunk.count();
-  Eigen::VectorXd sums = Eigen::VectorXd::Zero(error_blocks);
+  std::vector<Eigen::VectorXd> sums(partitions.size(), Eigen::VectorXd::Zero(error_blocks));
   Eigen::Index before = 0;
   for (const Chunk& chunk : rows) {
     for (Eigen::Index row = 0; row < chunk.count(); ++row) {
       evaluator.activate(chunk.inputs.row(row).data(), active);
       evaluator.combine(active, chunk.deviations.row(row).data(), values.data());
-      sums((before + row) * error_blocks / count) +=
-          chunk.weights(row) * weights.dot((chunk.outputs.row(row).transpose() - values).cwiseAbs2());
+      for (std::size_t k = 0; k < partitions.size(); ++k) {
+        const auto of_partition = values.segment(static_cast<Eigen::Index>(k) * outputs, outputs);
+        sums[k]((before + row) * error_blocks / count) +=
+            chunk.weights(row) * weights.dot((chunk.outputs.row(row).transpose() - of_partition).cwiseAbs2());
+      }
     }
     before += chunk.count();
   }
   return sums;
+}
+
+Eigen::VectorXd squared_errors(const Partition& partition, const TrainingRows& columns, const std::vector<Chunk>& rows,
+                               const Eigen::VectorXd& weights) {
+  return squared_errors(std::vector{partition}, columns, rows, weights).front();
 }
 
 }  // namespace llmt

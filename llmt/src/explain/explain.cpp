@@ -8,6 +8,7 @@
 #include "base/checks.hpp"
 #include "base/parallel.hpp"
 #include "explain/line_attribution.hpp"
+#include "model/codes.hpp"
 #include "model/evaluator.hpp"
 
 namespace llmt {
@@ -26,8 +27,10 @@ Attribution attribute_with(const Model& model, const std::vector<Evaluator>& eva
                            const Eigen::Ref<const Eigen::VectorXd>& reference, const Precision& precision) {
   Attribution result{Eigen::VectorXd(model.num_outputs()), Eigen::VectorXd(model.num_outputs()),
                      Eigen::MatrixXd(model.num_outputs(), model.num_inputs())};
+  const Eigen::VectorXd to = at_positions(model.inputs(), point.transpose()).transpose();
+  const Eigen::VectorXd from = at_positions(model.inputs(), reference.transpose()).transpose();
   for (std::size_t p = 0; p < evaluators.size(); ++p) {
-    attribute_along_line(model, model.partitions()[p], evaluators[p], point, reference, precision, result);
+    attribute_along_line(model, model.partitions()[p], evaluators[p], to, from, precision, result);
   }
   return result;
 }

@@ -6,10 +6,12 @@
 #include <vector>
 
 #include "fit/check_options.hpp"
+#include "fit/code_choice.hpp"
 #include "fit/fit_terms.hpp"
 #include "fit/linear_or_quadratic.hpp"
 #include "fit/robust_weights.hpp"
 #include "llmt/outliers.hpp"
+#include "model/codes.hpp"
 
 namespace llmt {
 namespace {
@@ -37,8 +39,21 @@ void refuse_hidden_outputs(const Eigen::Ref<const Eigen::MatrixXd>& outputs, con
 FitResult fit_by_squares(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
                          const Eigen::Ref<const Eigen::MatrixXd>& outputs, const FitOptions& options) {
   refuse_hidden_outputs(outputs, options.weights);
-  if (options.terms == LocalTerms::automatic) return fit_linear_or_quadratic(inputs, outputs, options);
-  return fit_terms(inputs, outputs, options);
+  const auto fit_inputs = [&](const Eigen::Ref<const Eigen::MatrixXd>& taken, const FitOptions& with) {
+    return with.terms == LocalTerms::automatic ? fit_linear_or_quadratic(taken, outputs, with)
+                                               : fit_terms(taken, outputs, with);
+  };
+  CodeChoice chosen = choose_codes(inputs, outputs, options);
+  if (chosen.taken.empty()) {
+    FitResult result = fit_inputs(inputs, options);
+    result.summary.codes = std::move(chosen);
+    return result;
+  }
+  FitResult result = fit_inputs(at_positions(chosen.codes, inputs), with_categories(chosen.codes, options));
+  result.model = with_codes(result.model, chosen.codes);
+  result.intervals = with_codes(result.intervals, chosen.codes);
+  result.summary.codes = std::move(chosen);
+  return result;
 }
 
 }  // namespace

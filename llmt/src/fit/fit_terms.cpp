@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <mutex>
 #include <numeric>
 #include <optional>
 #include <stdexcept>
@@ -12,12 +11,15 @@
 #include "base/memory.hpp"
 #include "base/parallel.hpp"
 #include "estimation/leaf_statistics.hpp"
+#include "fit/error_weights.hpp"
 #include "fit/grow_tree.hpp"
 #include "fit/input_choice.hpp"
 #include "fit/memory.hpp"
 #include "fit/missing_weights.hpp"
 #include "fit/output_range.hpp"
 #include "fit/same_regressors.hpp"
+#include "fit/stages.hpp"
+#include "selection/expected_work.hpp"
 #include "selection/selection.hpp"
 
 namespace llmt {
@@ -44,52 +46,12 @@ Eigen::Index most_leaves(const std::vector<GrownTree>& trees) {
   return most;
 }
 
-// Calls FitOptions::progress, one call at a time.
-class Report {
- public:
-  Report(const FitOptions& options, Eigen::Index trees) : options_(options), trees_(trees) {}
-
-  void tree_done() {
-    if (!options_.progress) return;
-    const std::lock_guard<std::mutex> lock(mutex_);
-    options_.progress(++done_, trees_);
-  }
-
- private:
-  const FitOptions& options_;
-  Eigen::Index trees_;
-  Eigen::Index done_ = 0;
-  std::mutex mutex_;
-};
-
-// The outputs that each partition serves.
-std::vector<std::vector<int>> output_groups(Eigen::Index outputs, bool shared) {
-  std::vector<int> all(outputs);
-  std::iota(all.begin(), all.end(), 0);
-  if (shared) return {all};
-  std::vector<std::vector<int>> groups;
-  for (const int output : all) groups.push_back({output});
-  return groups;
-}
-
-// Weights of the outputs' squared errors: 1 for a single one; else 1 / variance, so that outputs of any scale count
-// alike.
-Eigen::VectorXd error_weights(const Table& table, const std::vector<int>& served) {
-  Eigen::VectorXd weights = Eigen::VectorXd::Ones(std::ssize(served));
-  for (std::size_t o = 0; o < served.size() && served.size() > 1; ++o) {
-    const auto output = table.outputs.col(served[o]).array();
-    const double variance = (output - output.mean()).square().mean();
-    weights(o) = variance > 0.0 ? 1.0 / variance : 1.0;
-  }
-  return weights;
-}
-
-std::vector<GrownTree> grow_folds(const Setting& setting, const std::vector<int>& served, Report& report) {
+std::vector<GrownTree> grow_folds(const Setting& setting, const std::vector<int>& served, const FitStages& stages) {
   std::vector<GrownTree> trees(setting.folds.size());
   const int threads = setting.options.max_threads;
   parallel_for(std::ssize(trees), threads, [&](Eigen::Index f) {
-    trees[f] = grow_tree(setting.folds[f].training, served, setting.plan, false, threads).tree;
-    report.tree_done();
+    const TrainingRows& rows = setting.folds[f].training;
+    trees[f] = grow_tree(rows, served, setting.plan, false, threads, stages.fold_trees[f]).tree;
   });
   return trees;
 }
@@ -149,15 +111,19 @@ struct FittedPartition {
 };
 
 FittedPartition finish(const Setting& setting, const FinalTree& grown, Selection choice, std::vector<RangeGuard> guards,
-                       std::vector<Partition> of_folds) {
+                       std::vector<Partition> of_folds, Stage stage) {
   const int threads = setting.options.max_threads;
   const Eigen::Index grown_leaves = grown.tree.partition.num_leaves();
   Candidate& candidate = choice.chosen.candidate;
   const bool fewer = candidate.leaves < grown_leaves;
   candidate.leaves = std::min(candidate.leaves, grown_leaves);
+  const Eigen::Index coefficients = std::ssize(setting.all.regressors) + 1;
+  stage.expect(operations_of_finish(setting.all, candidate));
   Partition partition = estimate(setting.all, grown.tree, candidate, threads);
+  stage.did(operations_of_estimate(setting.all.count(), candidate, coefficients));
   partition.output_range = output_range(guards, partition.outputs, setting.all);
   describe_leaves(setting.measured, partition, candidate.sparse, threads);
+  stage.did(stage.to_come());
   PartitionSummary summary = describe(partition, setting.measured, candidate.sparse);
   summary.grown_leaves = grown_leaves;
   summary.stop = fewer ? StopReason::cross_validation : grown.stop;
@@ -176,35 +142,45 @@ FittedPartition finish(const Setting& setting, const FinalTree& grown, Selection
 }
 
 // Grow, choose, finish.
-FittedPartition fit_on_inputs(const Setting& setting, const std::vector<int>& served, Report& report) {
+FittedPartition fit_on_inputs(const Setting& setting, const std::vector<int>& served, const FitStages& stages) {
+  stages.expect(setting.all, setting.folds, setting.plan);
   const int threads = setting.options.max_threads;
   const bool has_folds = !setting.folds.empty();
-  const std::vector<GrownTree> trees = grow_folds(setting, served, report);
-  refuse_beyond_memory(setting, most_leaves(trees));
   const Eigen::VectorXd weights = error_weights(*setting.all.table, served);
+  std::vector<GrownTree> trees;
   Selection choice;
-  if (has_folds) {
-    choice = select(setting.folds, trees, setting.plan.candidates, weights, threads);
-  }
-  const FinalTree grown = grow_tree(setting.all, served, setting.plan, !has_folds, threads);
-  refuse_beyond_memory(setting, grown.tree.partition.num_leaves());
+  FinalTree grown;
+  // The tree of all rows needs nothing of the folds. Beside them it is work for the threads that would idle, because a
+  // tree has ever less to do for several threads the smaller its leaves become.
+  parallel_for(2, threads, [&](Eigen::Index job) {
+    if (job == 1) {
+      grown = grow_tree(setting.all, served, setting.plan, !has_folds, threads, stages.tree);
+      refuse_beyond_memory(setting, grown.tree.partition.num_leaves());
+      return;
+    }
+    trees = grow_folds(setting, served, stages);
+    refuse_beyond_memory(setting, most_leaves(trees));
+    if (!has_folds) return;
+    choice = select(setting.folds, trees, setting.plan.candidates, weights, threads, stages.selection);
+    stages.finish.expect(operations_of_finish(setting.all, choice.chosen.candidate));
+  });
   if (!has_folds) choice = first_candidate(setting.plan.candidates, grown.tree.partition.num_leaves());
   std::vector<Partition> of_folds = finish_folds(setting, trees, choice);
   std::vector<RangeGuard> guards;
   if (has_folds) guards = guard_output_range(setting.folds, weights, threads, of_folds, choice.chosen);
   if (!setting.options.intervals) of_folds.clear();
-  FittedPartition fitted = finish(setting, grown, std::move(choice), std::move(guards), std::move(of_folds));
-  report.tree_done();
-  return fitted;
+  return finish(setting, grown, std::move(choice), std::move(guards), std::move(of_folds), stages.finish);
 }
 
 // With the inputs that are worth it.
-FittedPartition fit_partition(const Setting& setting, const std::vector<int>& served, Report& report) {
+FittedPartition fit_partition(const Setting& setting, const std::vector<int>& served, const FitStages& stages) {
   const Eigen::VectorXd weights = error_weights(*setting.all.table, served);
-  const ChosenInputs chosen = choose_inputs(setting.all, setting.folds, served, weights, setting.plan, setting.options);
+  stages.expect(setting.all, setting.folds, setting.plan);
+  const ChosenInputs chosen =
+      choose_inputs(setting.all, setting.folds, served, weights, setting.plan, setting.options, stages.inputs);
   const std::vector<int>& every = setting.all.split_inputs;
   FittedPartition fitted = [&] {
-    if (chosen.of_all == every) return fit_on_inputs(setting, served, report);
+    if (chosen.of_all == every) return fit_on_inputs(setting, served, stages);
     const TrainingRows all = narrowed(setting.all, chosen.of_all);
     const TrainingRows measured = narrowed(setting.measured, chosen.of_all);
     std::vector<FoldRows> folds;
@@ -213,7 +189,7 @@ FittedPartition fit_partition(const Setting& setting, const std::vector<int>& se
                        narrowed(setting.folds[f].held_out, chosen.of_folds[f])});
     }
     const Plan plan = with_defaults(setting.options, all, std::ssize(folds));
-    return fit_on_inputs({all, measured, folds, plan, setting.options}, served, report);
+    return fit_on_inputs({all, measured, folds, plan, setting.options}, served, stages);
   }();
   std::ranges::set_difference(every, chosen.of_all, std::back_inserter(fitted.summary.left_out));
   fitted.summary.input_steps = chosen.steps;
@@ -263,7 +239,7 @@ std::vector<int> all_rows(Eigen::Index count) {
 }  // namespace
 
 FitResult fit_terms(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<const Eigen::MatrixXd>& outputs,
-                    const FitOptions& options) {
+                    const FitOptions& options, const std::function<void(double, double)>& watch) {
   const FitData data(inputs, outputs, options, rule_of(options.rule).splits_on_monotone_inputs);
   const Table& table = data.table();
   Table weighted = table;
@@ -275,19 +251,25 @@ FitResult fit_terms(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen
   const Setting setting{all, measured, folds, plan, options};
   refuse_beyond_memory(setting, 0);
   const std::vector<std::vector<int>> groups = output_groups(table.outputs.cols(), options.shared_partition);
-  Report report(options, std::ssize(groups) * (std::ssize(folds) + 1));
+  ProgressReport report(options, groups.size());
   std::vector<std::optional<FittedPartition>> fitted(groups.size());
   // With a single hold-out rows are many, and one tree has work for all threads: several at a time would only hold more
   // rows in memory.
   const int groups_at_once = folds.size() == 1 ? 1 : options.max_threads;
-  parallel_for(std::ssize(groups), groups_at_once,
-               [&](Eigen::Index p) { fitted[p] = fit_partition(setting, groups[p], report); });
+  parallel_for(std::ssize(groups), groups_at_once, [&](Eigen::Index p) {
+    Work work([&, p](double share, double operations) {
+      report.partition_at(p, share);
+      if (watch) watch(share, operations);
+    });
+    fitted[p] = fit_partition(setting, groups[p], FitStages(work, folds.size()));
+  });
   std::vector<FittedPartition> finished;
   for (std::optional<FittedPartition>& each : fitted) finished.push_back(std::move(*each));
   FitResult result = assemble(setting, std::move(finished));
   result.summary.samples += data.copies();
   result.summary.copies = data.copies();
   result.summary.repeats = data.has_repeats();
+  report.finish();
   return result;
 }
 

@@ -45,10 +45,14 @@ GrownPartition grow_and_prune(GrowthProblem problem, const Rule& rule) {
 }  // namespace
 
 FinalTree grow_tree(const TrainingRows& rows, const std::vector<int>& served, const Plan& plan, bool keeps_all_leaves,
-                    int max_threads) {
-  const GrowthProblem problem = problem_of(rows, served, plan, keeps_all_leaves, max_threads);
+                    int max_threads, Stage stage) {
+  GrowthProblem problem = problem_of(rows, served, plan, keeps_all_leaves, max_threads);
+  problem.stage = stage;
+  const double expected = stage.to_come();
   GrownPartition grown =
       plan.pruning == Pruning::last_splits ? plan.rule->grow(problem) : grow_and_prune(problem, *plan.rule);
+  if (stage.to_come() == expected) stage.did(expected);  // not every rule counts
+  stage.expect(0.0);
   Partition partition{
       .outputs = served, .validity = {}, .nodes = std::move(grown.nodes), .outer_slope = {}, .residual_range = {}};
   if (!plan.rule->keeps_signs) keep_signs(rows, partition, max_threads);

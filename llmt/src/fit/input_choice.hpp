@@ -5,6 +5,7 @@
 #include <functional>
 #include <vector>
 
+#include "base/work.hpp"
 #include "data/fold_rows.hpp"
 #include "fit/defaults.hpp"
 #include "llmt/options.hpp"
@@ -20,8 +21,9 @@ struct ChosenInputs {
 };
 
 /// All inputs, or fewer where that lowers the error on held-out rows by more than chance. `plan`: for all inputs;
-/// `served`: the outputs; `weights`: of their squared errors.
+/// `served`: the outputs; `weights`: of their squared errors; `stage`: of this choice, over at the end.
 ChosenInputs choose_inputs(const TrainingRows& all, const std::vector<FoldRows>& folds, const std::vector<int>& served,
-                           const Eigen::VectorXd& weights, const Plan& plan, const FitOptions& options);
+                           const Eigen::VectorXd& weights, const Plan& plan, const FitOptions& options,
+                           Stage stage = {});
 
 }  // namespace llmt

@@ -30,18 +30,25 @@ FitResult fit_linear_or_quadratic(const Eigen::Ref<const Eigen::MatrixXd>& input
   const bool both = numbers > 0 && numbers <= most_inputs_of_products && options.folds.count != 0 &&
                     !(inputs.array().abs() > largest_factor).any();
   FitOptions with_terms = options;
-  const auto fit_with = [&](LocalTerms terms, Eigen::Index half) {
+  // Work goes with the coefficients of a local model: n + 1, and (n + 1) (n + 2) / 2.
+  const Eigen::Index of_linear_fit = 2;
+  const Eigen::Index of_quadratic_fit = numbers + 2;
+  const auto fit_with = [&](LocalTerms terms, Eigen::Index before, Eigen::Index share) {
     with_terms.terms = terms;
     if (options.progress && both) {
-      with_terms.progress = [&options, half](Eigen::Index done, Eigen::Index total) {
-        options.progress(half * total + done, 2 * total);
+      with_terms.progress = [&options, before, share, all = of_linear_fit + of_quadratic_fit](Eigen::Index done,
+                                                                                              Eigen::Index total) {
+        options.progress(before * total + share * done, all * total);
       };
     }
     return fit_terms(inputs, outputs, with_terms);
   };
-  FitResult linear = fit_with(LocalTerms::linear, 0);
-  if (!both || linear.summary.partitions.front().cv_folds == 0) return linear;
-  FitResult quadratic = fit_with(LocalTerms::quadratic, 1);
+  FitResult linear = fit_with(LocalTerms::linear, 0, of_linear_fit);
+  if (!both || linear.summary.partitions.front().cv_folds == 0) {
+    if (both && options.progress) options.progress(1, 1);
+    return linear;
+  }
+  FitResult quadratic = fit_with(LocalTerms::quadratic, of_linear_fit, of_quadratic_fit);
   const CandidateError of_linear = mean_error(linear.summary, linear.summary);
   const CandidateError of_quadratic = mean_error(quadratic.summary, linear.summary);
   const std::vector<PartitionSummary>& trees = linear.summary.partitions;

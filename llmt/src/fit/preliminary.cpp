@@ -8,6 +8,7 @@ FitOptions preliminary_options(const FitOptions& options) {
           .split_inputs = options.split_inputs,
           .regression_inputs = options.regression_inputs,
           .choose_inputs = false,
+          .choose_codes = false,
           .shared_partition = options.shared_partition,
           .validity = ValidityChoice::crisp,
           .folds = options.folds,

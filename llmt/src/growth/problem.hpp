@@ -4,6 +4,7 @@
 
 #include <vector>
 
+#include "base/work.hpp"
 #include "data/dataset.hpp"
 #include "llmt/options.hpp"
 #include "llmt/summary.hpp"
@@ -45,7 +46,13 @@ struct GrowthProblem {
   int max_threads = 0;
   SplitCriterion criterion = SplitCriterion::f_test;
   AfterGrowth after = {};
+  Stage stage = {};  ///< that counts the searches
 };
+
+/// Operations (base/work.hpp) of the search for the best split of some rows.
+inline double operations_of_search(Eigen::Index rows, Eigen::Index inputs, Eigen::Index coefficients) {
+  return 0.8 * static_cast<double>(rows * inputs * coefficients) * static_cast<double>(coefficients + 1);
+}
 
 struct GrownPartition {
   std::vector<Node> nodes;  ///< thresholds in the inputs' units; ranges (low, high) as far as they are known

@@ -48,6 +48,7 @@ std::string difference_of_columns(const Model& one, const Model& other) {
   for (Eigen::Index i = 0; i < one.num_inputs(); ++i) {
     const std::size_t first = one.inputs()[i].levels.size();
     const std::size_t second = other.inputs()[i].levels.size();
+    if (one.inputs()[i].codes != other.inputs()[i].codes) return fmt::format("other codes of input {}", i);
     if (first != second) return fmt::format("{} and {} levels of input {}", first, second, i);
   }
   return "";

@@ -153,6 +153,7 @@ Model Model::named(const std::vector<std::string>& inputs, const std::vector<std
     result.inputs_[i].name = inputs[i];
   }
   for (std::size_t i = 0; i < levels.size(); ++i) {
+    if (i < inputs.size() && !inputs_[i].codes.empty() && levels[i].empty()) continue;
     if (i >= inputs.size() || levels[i].size() != inputs_[i].levels.size()) {
       throw std::invalid_argument(fmt::format("llmt::Model::named: {} level names for input {}, which has {} levels",
                                               levels[i].size(), i, i < inputs_.size() ? inputs_[i].levels.size() : 0));

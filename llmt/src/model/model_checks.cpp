@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <set>
 #include <string_view>
@@ -82,6 +83,8 @@ void check_partition(const Partition& partition, Eigen::Index index, const std::
   check_tree(partition, index, inputs, regressors);
 }
 
+bool is_finite(double value) { return std::isfinite(value); }
+
 void check_columns_of_model(const std::vector<InputColumn>& inputs, const std::vector<OutputColumn>& outputs) {
   if (inputs.empty() || outputs.empty()) {
     throw ModelFault(
@@ -93,6 +96,12 @@ void check_columns_of_model(const std::vector<InputColumn>& inputs, const std::v
           input.low <= input.high)) {
       throw ModelFault({"input", i}, fmt::format("\"{}\": low {}, centre {} and high {} must be finite and low <= high",
                                                  input.name, input.low, input.centre, input.high));
+    }
+    const std::vector<double>& codes = input.codes;
+    const bool ascend = std::ranges::is_sorted(codes, std::less_equal<>()) && std::ranges::all_of(codes, is_finite);
+    if (!codes.empty() && (codes.size() != input.levels.size() || !ascend)) {
+      throw ModelFault({"input", i}, fmt::format("\"{}\": {} codes for {} levels; they must be finite, and ascend",
+                                                 input.name, codes.size(), input.levels.size()));
     }
   }
   for (Eigen::Index o = 0; o < std::ssize(outputs); ++o) {

@@ -5,6 +5,7 @@
 
 #include "llmt/files.hpp"
 #include "llmt/model.hpp"
+#include "model/codes.hpp"
 #include "model/model_checks.hpp"
 #include "model/model_json.hpp"
 #include "model/shared_leaves.hpp"
@@ -74,19 +75,30 @@ int check_format(const JsonReader& root) {
     root.fail(fmt::format("not a model file: \"format\" is not \"{}\"", model_format_name));
   }
   const int version = root.member("version").as<int>();
-  if (version != model_format_version && version != model_format_version_with_range) {
-    root.fail(fmt::format("version {} of the model format cannot be read, this program knows versions {} and {}",
-                          version, model_format_version, model_format_version_with_range));
+  if (version < model_format_version || version > model_format_version_with_codes) {
+    root.fail(fmt::format("version {} of the model format cannot be read, this program knows versions {} to {}",
+                          version, model_format_version, model_format_version_with_codes));
   }
   return version;
 }
 
-InputColumn input_from_json(const JsonReader& json) {
-  return {.name = json.member("name").as<std::string>(),
-          .low = json.member("low").as<double>(),
-          .high = json.member("high").as<double>(),
-          .centre = json.member("centre").as<double>(),
-          .levels = json.has("levels") ? json.member("levels").list<std::string>() : std::vector<std::string>{}};
+InputColumn input_from_json(const JsonReader& json, int version) {
+  InputColumn input{.name = json.member("name").as<std::string>(),
+                    .low = json.member("low").as<double>(),
+                    .high = json.member("high").as<double>(),
+                    .centre = json.member("centre").as<double>()};
+  if (json.has("levels")) input.levels = json.member("levels").list<std::string>();
+  if (json.has("codes")) {
+    const JsonReader codes = json.member("codes");
+    if (version < model_format_version_with_codes) {
+      codes.fail(fmt::format("a file of version {} has no such member", version));
+    }
+    if (json.has("levels")) codes.fail("an input has levels or codes, not both");
+    input.codes = codes.list<double>();
+    if (input.codes.empty()) codes.fail("it is empty");
+    input.levels = names_of_codes(input.codes);
+  }
+  return input;
 }
 
 OutputColumn output_from_json(const JsonReader& json) {
@@ -163,7 +175,8 @@ auto all_of(const JsonReader& array, const Read& read) {
 
 Model model_from(const JsonReader& root) {
   const int version = check_format(root);
-  std::vector<InputColumn> inputs = all_of(root.member("inputs"), input_from_json);
+  std::vector<InputColumn> inputs =
+      all_of(root.member("inputs"), [&](const JsonReader& entry) { return input_from_json(entry, version); });
   std::vector<OutputColumn> outputs = all_of(root.member("outputs"), output_from_json);
   std::vector<Regressor> regressors = all_of(root.member("regressors"), regressor_from_json);
   std::vector<Partition> partitions = all_of(root.member("partitions"), [&](const JsonReader& entry) {

@@ -4,6 +4,7 @@
 
 #include "llmt/files.hpp"
 #include "llmt/model.hpp"
+#include "model/codes.hpp"
 #include "model/model_json.hpp"
 
 namespace llmt {
@@ -63,7 +64,11 @@ Json to_json(const Node& node, const Model& model) {
 
 Json to_json(const InputColumn& input) {
   Json json = {{"name", input.name}, {"low", input.low}, {"high", input.high}, {"centre", input.centre}};
-  if (input.is_categorical()) json["levels"] = input.levels;
+  if (!input.codes.empty()) {
+    json["codes"] = input.codes;
+  } else if (input.is_categorical()) {
+    json["levels"] = input.levels;
+  }
   return json;
 }
 
@@ -104,13 +109,18 @@ Json to_json(const Partition& partition, const Model& model) {
   return json;
 }
 
+int version_of(const Model& model) {
+  if (has_codes(model.inputs())) return model_format_version_with_codes;
+  return std::ranges::any_of(model.partitions(), has_output_range) ? model_format_version_with_range
+                                                                   : model_format_version;
+}
+
 }  // namespace
 
 Json json_of(const Model& model) {
   Json json;
   json["format"] = model_format_name;
-  json["version"] = std::ranges::any_of(model.partitions(), has_output_range) ? model_format_version_with_range
-                                                                              : model_format_version;
+  json["version"] = version_of(model);
   json["inputs"] = Json::array();
   for (const InputColumn& input : model.inputs()) {
     json["inputs"].push_back(to_json(input));

@@ -6,6 +6,7 @@
 #include "base/checks.hpp"
 #include "base/parallel.hpp"
 #include "llmt/model.hpp"
+#include "model/codes.hpp"
 #include "model/evaluator.hpp"
 #include "model/leverage.hpp"
 #include "model/through_regressors.hpp"
@@ -39,11 +40,14 @@ template <class Body>
 void for_each_block(const char* function, const Model& model, Eigen::Index depth, const Inputs& inputs, int max_threads,
                     const Body& body) {
   check_columns_of_query(function, model, inputs);
+  const bool codes = has_codes(model.inputs());
   const Eigen::Index size = rows_of_block(model.num_inputs(), std::ssize(model.regressors()), depth);
   parallel_for((inputs.rows() + size - 1) / size, max_threads, [&](Eigen::Index index) {
     const Eigen::Index begin = index * size;
-    const RowBlock block = make_row_block(inputs.middleRows(begin, std::min(size, inputs.rows() - begin)),
-                                          model.inputs(), model.regressors());
+    const auto rows = inputs.middleRows(begin, std::min(size, inputs.rows() - begin));
+    Eigen::MatrixXd coded;
+    if (codes) coded = at_positions(model.inputs(), rows);
+    const RowBlock block = make_row_block(codes ? Inputs(coded) : Inputs(rows), model.inputs(), model.regressors());
     if (block.has_infinite) {
       check_finite_or_missing(function, "inputs", inputs);
     }
@@ -73,8 +77,10 @@ Eigen::MatrixXd Model::predict(const Inputs& inputs, int max_threads) const {
     Eigen::VectorXd values(num_outputs());
     std::vector<Activation> active;
     active.reserve(32);
+    const bool codes = has_codes(inputs_);
     for (Eigen::Index row = 0; row < inputs.rows(); ++row) {
       x = inputs.row(row).transpose();
+      for (Eigen::Index j = 0; codes && j < x.size(); ++j) x(j) = position_of(inputs_[j], x(j));
       deviations_at(inputs_, regressors_, x.data(), deviations.data());
       for (std::size_t p = 0; p < partitions_.size(); ++p) {
         (*evaluators_)[p].activate(x.data(), active);
@@ -103,9 +109,11 @@ Eigen::MatrixXd Model::predict(const Inputs& inputs, int max_threads) const {
   return predicted;
 }
 
-Eigen::MatrixXd Model::jacobian(const Eigen::Ref<const Eigen::VectorXd>& point) const {
-  check_columns_of_query("llmt::Model::jacobian", *this, point.transpose());
-  check_finite("llmt::Model::jacobian", "point", point.transpose());
+Eigen::MatrixXd Model::jacobian(const Eigen::Ref<const Eigen::VectorXd>& at) const {
+  check_columns_of_query("llmt::Model::jacobian", *this, at.transpose());
+  check_finite("llmt::Model::jacobian", "point", at.transpose());
+  Eigen::VectorXd point = at;
+  if (has_codes(inputs_)) point = at_positions(inputs_, at.transpose()).transpose();
   Eigen::VectorXd deviations(std::ssize(regressors_));
   deviations_at(inputs_, regressors_, point.data(), deviations.data());
   Eigen::MatrixXd result(num_outputs(), num_inputs());
@@ -168,7 +176,8 @@ std::vector<Extrapolation> Model::extrapolation(const Inputs& inputs, int max_th
       const InputColumn& input = inputs_[j];
       const double range = input.high - input.low;
       for (Eigen::Index row = 0; row < block.rows(); ++row) {
-        const double excess = std::max(input.low - block.inputs(row, j), block.inputs(row, j) - input.high);
+        const double value = inputs(begin + row, j);
+        const double excess = std::max(input.low - value, value - input.high);
         if (excess > 0.0) {
           const double distance = range > 0.0 ? excess / range : std::numeric_limits<double>::infinity();
           of_row[row].distance = std::max(of_row[row].distance, distance);

@@ -16,9 +16,11 @@
 #include "data/fold_rows.hpp"
 #include "data/regressors.hpp"
 #include "estimation/leaf_statistics.hpp"
+#include "fit/code_choice.hpp"
 #include "fit/missing_weights.hpp"
 #include "growth/rules/rule.hpp"
 #include "llmt/size.hpp"
+#include "model/codes.hpp"
 #include "numerics/paired_difference.hpp"
 #include "readable/input_walk.hpp"
 
@@ -255,12 +257,9 @@ Intervals intervals_of(const Setting& setting, const std::vector<std::unique_ptr
   return {std::move(models), std::move(residuals)};
 }
 
-}  // namespace
-
-ReadableResult fit_readable(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
-                            const Eigen::Ref<const Eigen::MatrixXd>& outputs, const FitOptions& options,
-                            const FitSummary& fitted, double loss) {
-  check(options, fitted, loss);
+ReadableResult fit_inputs(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
+                          const Eigen::Ref<const Eigen::MatrixXd>& outputs, const FitOptions& options,
+                          const FitSummary& fitted, double loss) {
   FitOptions linear = options;
   linear.terms = LocalTerms::linear;
   if (fitted.loss_weights.size() > 0) {
@@ -293,6 +292,21 @@ ReadableResult fit_readable(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
   std::vector<ReadablePartition> partitions;
   for (std::size_t p = 0; p < parts.size(); ++p) partitions.push_back(describe(model, p, parts[p]->choice));
   return {std::move(model), std::move(partitions), intervals_of(setting, parts)};
+}
+
+}  // namespace
+
+ReadableResult fit_readable(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
+                            const Eigen::Ref<const Eigen::MatrixXd>& outputs, const FitOptions& options,
+                            const FitSummary& fitted, double loss) {
+  check(options, fitted, loss);
+  const std::vector<std::vector<double>>& codes = fitted.codes.codes;
+  if (codes.empty()) return fit_inputs(inputs, outputs, options, fitted, loss);
+  ReadableResult result =
+      fit_inputs(at_positions(codes, inputs), outputs, with_categories(codes, options), fitted, loss);
+  result.model = with_codes(result.model, codes);
+  result.intervals = with_codes(result.intervals, codes);
+  return result;
 }
 
 }  // namespace llmt

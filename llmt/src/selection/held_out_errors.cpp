@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 
 #include "base/parallel.hpp"
 #include "estimation/joint_estimate.hpp"
 #include "estimation/local_estimate.hpp"
 #include "estimation/squared_errors.hpp"
 #include "numerics/paired_difference.hpp"
+#include "selection/expected_work.hpp"
 
 namespace llmt {
 namespace {
@@ -40,12 +40,13 @@ Eigen::Index enough_rows(Eigen::Index leaves, Eigen::Index coefficients) {
 }
 
 HeldOutErrors::HeldOutErrors(const std::vector<FoldRows>& folds, const std::vector<GrownTree>& grown,
-                             const Candidates& candidates, const Eigen::VectorXd& weights, int max_threads)
+                             const Candidates& candidates, const Eigen::VectorXd& weights, int max_threads, Stage stage)
     : folds_(folds),
       grown_(grown),
       candidates_(candidates),
       weights_(weights),
       max_threads_(max_threads),
+      stage_(stage),
       of_folds_(folds.size()) {
   std::set<Eigen::Index> seen;
   for (const double jump : candidates.jumps) {
@@ -63,16 +64,14 @@ HeldOutErrors::HeldOutErrors(const std::vector<FoldRows>& folds, const std::vect
   for (const GrownTree& tree : grown) {
     largest = std::max(largest, tree.partition.num_leaves());
   }
-  for (Eigen::Index count = largest; count > 1; count = std::min(count - 1, (count * 2 + 1) / 3)) {
-    leaf_counts_.push_back(count);
-  }
-  std::ranges::reverse(leaf_counts_);
+  leaf_counts_ = compared_leaf_counts(largest);
   for (const FoldRows& fold : folds) {
     std::vector<Chunk>& held_out = held_out_.emplace_back();
     for (Eigen::Index index = 0; index < num_chunks(fold.held_out); ++index) {
       held_out.push_back(fetch(fold.held_out, index, grown.front().partition.outputs));
     }
-    samples_.push_back(thinned(fold.training, enough_rows(largest, std::ssize(fold.training.regressors) + 1)));
+    const Eigen::Index enough = enough_rows(largest, std::ssize(fold.training.regressors) + 1);
+    samples_.push_back(thinned(fold.training, enough, max_threads));
   }
 }
 
@@ -86,45 +85,92 @@ Candidate HeldOutErrors::candidate(const Key& key) const {
           .leaves = leaf_counts_[key.leaves]};
 }
 
+// As many rows as a tree needs, and the sums over them.
+struct HeldOutErrors::Sample {
+  Sample(const TrainingRows& all, Partition tree, int max_threads, bool sparse)
+      : rows(thinned(all, rows_for(all, tree.num_leaves()), max_threads)),
+        sums(sum_leaves(rows, std::move(tree), max_threads, sparse)) {}
+  Sample(const Sample&) = delete;
+  Sample& operator=(const Sample&) = delete;
+
+  static Eigen::Index rows_for(const TrainingRows& all, Eigen::Index leaves) {
+    return std::min(all.count(), enough_rows(leaves, std::ssize(all.regressors) + 1));
+  }
+  /// Whether a sample for this prefix of the tree would consist of the same rows.
+  bool serves(const TrainingRows& all, Eigen::Index leaves) const {
+    const Eigen::Index summed = sums.partition.num_leaves();
+    return leaves <= summed && rows_for(all, leaves) == rows_for(all, summed);
+  }
+
+  const TrainingRows rows;
+  const LeafSums sums;
+};
+
 // One shape; `keys` ascending.
 HeldOutErrors::Evaluated HeldOutErrors::evaluate_shape(std::size_t fold, const std::vector<Key>& keys,
-                                                       bool keeps_models) const {
+                                                       bool keeps_models, std::shared_ptr<Sample>& last) const {
   const Candidate first = candidate(keys.front());
-  const TrainingRows& sample = samples_[fold];
-  const Partition partition = blended(sample, grown_[fold], first.validity, first.jump);
+  const Eigen::Index coefficients = std::ssize(samples_[fold].regressors) + 1;
+  const Partition tree = blended(samples_[fold], grown_[fold], first.validity, first.jump);
+  std::vector<std::vector<Key>> of_counts;  // of each number of leaves, the largest first, which takes longest
+  for (auto key = keys.rbegin(); key != keys.rend(); ++key) {
+    if (of_counts.empty() || of_counts.back().front().leaves != key->leaves) of_counts.emplace_back();
+    of_counts.back().push_back(*key);
+  }
+  const auto sample_for = [&](const std::vector<Key>& same, std::shared_ptr<Sample>& sample) {
+    const Eigen::Index leaves = std::min(leaf_counts_[same.front().leaves], tree.num_leaves());
+    if (sample && sample->serves(samples_[fold], leaves)) return;
+    sample = std::make_shared<Sample>(samples_[fold], prefix(tree, leaves), max_threads_, candidates_.sparse.back());
+    stage_.did(operations_of_sums(sample->rows.count(), leaves, coefficients, first.validity.width));
+  };
+  // The sums of a tree serve all its prefixes. This does not hold for Gaussians, whose prefixes have validities of
+  // their own.
+  const bool shares_sums = candidates_.kind != ValidityKind::gaussian;
+  if (shares_sums) sample_for(of_counts.front(), last);
+  std::vector<Evaluated> evaluated(of_counts.size());
+  parallel_for(std::ssize(of_counts), max_threads_, [&](Eigen::Index index) {
+    const std::vector<Key>& same = of_counts[index];
+    std::shared_ptr<Sample> own;
+    if (!shares_sums) sample_for(same, own);
+    evaluated[index] = evaluate_prefix(fold, own ? *own : *last, same, keeps_models);
+    const Eigen::Index leaves = leaf_counts_[same.front().leaves];
+    stage_.did(operations_of_solutions(leaves, coefficients, std::ssize(same)) +
+               static_cast<double>(same.size()) *
+                   operations_of_pass(folds_[fold].held_out.count(), leaves, first.validity.width));
+  });
   Evaluated result;
-  std::optional<TrainingRows> rows;
-  std::optional<LeafSums> sums;
-  // The sums of a tree serve all its prefixes, so the largest tree comes first. This does not hold for Gaussians, whose
-  // prefixes have validities of their own.
-  for (auto last = keys.rbegin(); last != keys.rend();) {
-    const std::size_t count = last->leaves;
-    const Eigen::Index leaves = std::min(leaf_counts_[count], partition.num_leaves());
-    if (!sums || candidates_.kind == ValidityKind::gaussian) {
-      rows = thinned(sample, enough_rows(leaves, std::ssize(sample.regressors) + 1));
-      sums = sum_leaves(*rows, prefix(partition, leaves), max_threads_, candidates_.sparse.back());
+  for (Evaluated& each : evaluated) {
+    result.errors.merge(each.errors);
+    result.models.merge(each.models);
+  }
+  return result;
+}
+
+// Candidates of one shape and leaf count.
+HeldOutErrors::Evaluated HeldOutErrors::evaluate_prefix(std::size_t fold, const Sample& sample,
+                                                        const std::vector<Key>& keys, bool keeps_models) const {
+  const Eigen::Index leaves = std::min(leaf_counts_[keys.front().leaves], sample.sums.partition.num_leaves());
+  std::vector<Regularisation> regularisations;
+  for (const Key& key : keys) {
+    const Candidate each = candidate(key);
+    regularisations.push_back({each.ridge, each.shrinkage, each.sparse});
+  }
+  std::vector<Partition> models;
+  if (candidates_.estimation == Estimation::joint) {
+    models = joint(sample.sums, leaves, regularisations);
+  } else {
+    for (const Regularisation& each : regularisations) {
+      models.push_back(candidates_.estimation == Estimation::local
+                           ? local(sample.sums, leaves, each.shrinkage, each.sparse)
+                           : as_grown(sample.sums, leaves));
     }
-    std::vector<Key> same;
-    std::vector<Regularisation> regularisations;
-    for (; last != keys.rend() && last->leaves == count; ++last) {
-      const Candidate each = candidate(*last);
-      same.push_back(*last);
-      regularisations.push_back({each.ridge, each.shrinkage, each.sparse});
-    }
-    std::vector<Partition> models;
-    if (candidates_.estimation == Estimation::joint) {
-      models = joint(*sums, leaves, regularisations);
-    } else {
-      for (const Regularisation& each : regularisations) {
-        models.push_back(candidates_.estimation == Estimation::local ? local(*sums, leaves, each.shrinkage, each.sparse)
-                                                                     : as_grown(*sums, leaves));
-      }
-    }
-    for (std::size_t i = 0; i < same.size(); ++i) {
-      result.errors[same[i]] = squared_errors(models[i], folds_[fold].held_out, held_out_[fold], weights_);
-      if (keeps_models && rows->count() == folds_[fold].training.count()) {
-        result.models[same[i]] = std::move(models[i]);
-      }
+  }
+  std::vector<Eigen::VectorXd> errors = squared_errors(models, folds_[fold].held_out, held_out_[fold], weights_);
+  Evaluated result;
+  for (std::size_t i = 0; i < keys.size(); ++i) {
+    result.errors[keys[i]] = std::move(errors[i]);
+    if (keeps_models && sample.rows.count() == folds_[fold].training.count()) {
+      result.models[keys[i]] = std::move(models[i]);
     }
   }
   return result;
@@ -135,8 +181,10 @@ void HeldOutErrors::evaluate(const std::set<Key>& keys, std::size_t folds, bool 
     std::size_t fold;
     std::vector<Key> keys;
     Evaluated evaluated;
+    std::shared_ptr<Sample>* sample = nullptr;
   };
   std::vector<Task> tasks;
+  std::set<std::pair<std::size_t, std::size_t>> used;
   for (std::size_t fold = 0; fold < folds; ++fold) {
     std::map<std::size_t, std::vector<Key>> of_shape;
     for (const Key& key : keys) {
@@ -145,12 +193,15 @@ void HeldOutErrors::evaluate(const std::set<Key>& keys, std::size_t folds, bool 
       }
     }
     for (auto& [shape, missing] : of_shape) {
-      tasks.push_back({fold, std::move(missing), {}});
+      tasks.push_back({fold, std::move(missing), {}, &last_[{fold, shape}]});
+      used.insert({fold, shape});
     }
   }
+  if (tasks.empty()) return;
+  std::erase_if(last_, [&](const auto& entry) { return !used.contains(entry.first); });
   parallel_for(std::ssize(tasks), max_threads_, [&](Eigen::Index index) {
     Task& task = tasks[index];
-    task.evaluated = evaluate_shape(task.fold, task.keys, keeps_models);
+    task.evaluated = evaluate_shape(task.fold, task.keys, keeps_models, *task.sample);
   });
   for (Task& task : tasks) {
     of_folds_[task.fold].errors.merge(task.evaluated.errors);

@@ -4,10 +4,13 @@
 
 #include <Eigen/Core>
 #include <map>
+#include <memory>
 #include <optional>
 #include <set>
+#include <utility>
 #include <vector>
 
+#include "base/work.hpp"
 #include "selection/candidates.hpp"
 
 namespace llmt {
@@ -36,7 +39,7 @@ Eigen::Index enough_rows(Eigen::Index leaves, Eigen::Index coefficients);
 class HeldOutErrors {
  public:
   HeldOutErrors(const std::vector<FoldRows>& folds, const std::vector<GrownTree>& grown, const Candidates& candidates,
-                const Eigen::VectorXd& weights, int max_threads);
+                const Eigen::VectorXd& weights, int max_threads, Stage stage = {});
 
   /// All widths with all jumps, but for those that keep the same splits crisp as one before.
   const std::vector<Shape>& shapes() const { return shapes_; }
@@ -66,18 +69,27 @@ class HeldOutErrors {
     std::map<Key, Partition> models;
   };
 
-  Evaluated evaluate_shape(std::size_t fold, const std::vector<Key>& keys, bool keeps_models) const;
+  struct Sample;  ///< of a fold's rows, with the sums over it
+
+  /// `last`: the shape's last sample, or none; afterwards the one that was used.
+  Evaluated evaluate_shape(std::size_t fold, const std::vector<Key>& keys, bool keeps_models,
+                           std::shared_ptr<Sample>& last) const;
+  Evaluated evaluate_prefix(std::size_t fold, const Sample& sample, const std::vector<Key>& keys,
+                            bool keeps_models) const;
 
   const std::vector<FoldRows>& folds_;
   const std::vector<GrownTree>& grown_;
   const Candidates& candidates_;
   const Eigen::VectorXd& weights_;
   int max_threads_;
+  Stage stage_;
   std::vector<Shape> shapes_;
   std::vector<Eigen::Index> leaf_counts_;
   std::vector<TrainingRows> samples_;         // of the folds' training rows, enough for the largest tree
   std::vector<std::vector<Chunk>> held_out_;  // of the folds
   std::vector<Evaluated> of_folds_;
+  std::map<std::pair<std::size_t, std::size_t>, std::shared_ptr<Sample>>
+      last_;  // of a fold and shape, of the last step
 };
 
 }  // namespace llmt

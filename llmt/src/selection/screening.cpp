@@ -15,19 +15,11 @@ constexpr std::size_t finalists = 2;
 // Candidates of each finalist that are compared on all folds, whatever their leaf count.
 constexpr std::size_t candidates_on_all_folds = 3;
 
-// Unknowns of the first round of screening, in which every ridge is tried; where no candidate has so few, in the first
-// round that has one.
-constexpr Eigen::Index cheap_unknowns = 300;
-
 // Shrinkage in screening, in rows; the nearest of the candidates.
 constexpr double screened_shrinkage = 0.1;
 
 // Leaves are no longer added to a (width, jump) pair after this number of larger leaf counts without improvement.
 constexpr std::size_t steps_without_gain = 2;
-
-// Each round of screening triples the unknowns and keeps the better half of the (width, jump) pairs, at least three.
-constexpr Eigen::Index next_unknowns = 3;
-constexpr std::size_t fewest_shapes = 3;
 
 // Largest leaf count of each shape: where in some fold two steps brought nothing. The best of ever more leaves would
 // often be best by chance.
@@ -53,19 +45,23 @@ std::size_t shape_of(const Key& key) { return key.shape; }
 
 class Steps {
  public:
-  Steps(HeldOutErrors& comparison, const Candidates& candidates, Eigen::Index coefficients, std::size_t screening,
-        std::size_t folds)
+  Steps(HeldOutErrors& comparison, const Candidates& candidates, Eigen::Index coefficients, std::size_t folds,
+        const ExpectedSteps& expected, Stage stage)
       : comparison_(comparison),
         candidates_(candidates),
         counts_(comparison.leaf_counts()),
         coefficients_(coefficients),
-        screening_(screening),
+        screening_(expected.screening()),
         folds_(folds),
+        expected_(expected),
+        stage_(stage),
         ridges_(std::max<std::size_t>(candidates.ridges.size(), 1)) {}
 
   std::set<Key> run() {
+    stage_.expect(expected_.in_all());
     screen();
     refine();
+    stage_.expect(expected_.on_other_folds(best_leaves()));
     return compare_on_all_folds();
   }
 
@@ -107,8 +103,11 @@ class Steps {
         race.insert(same.begin(), same.end());
       }
       race = better_half(race, next);
+      stage_.expect(expected_.from_round(next, race.size(), best_leaves()));
     }
   }
+
+  std::size_t best_leaves() const { return ranked(comparison_, screening_).front().second.leaves; }
 
   // Leaf counts begin ... end - 1 of the shapes in the race, with the best ridges so far or all of them.
   void evaluate_counts(const Race& race, std::size_t begin, std::size_t end, bool all_ridges) {
@@ -294,6 +293,8 @@ class Steps {
   Eigen::Index coefficients_;
   std::size_t screening_;
   std::size_t folds_;
+  const ExpectedSteps& expected_;
+  Stage stage_;
   std::size_t ridges_;
 };
 
@@ -311,8 +312,8 @@ Ranked ranked(const HeldOutErrors& comparison, std::size_t folds) {
 }
 
 std::set<Key> compare_in_steps(HeldOutErrors& comparison, const Candidates& candidates, Eigen::Index coefficients,
-                               std::size_t screening, std::size_t folds) {
-  return Steps(comparison, candidates, coefficients, screening, folds).run();
+                               std::size_t folds, const ExpectedSteps& expected, Stage stage) {
+  return Steps(comparison, candidates, coefficients, folds, expected, stage).run();
 }
 
 }  // namespace llmt

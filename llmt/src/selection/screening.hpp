@@ -6,9 +6,16 @@
 #include <utility>
 #include <vector>
 
+#include "selection/expected_work.hpp"
 #include "selection/held_out_errors.hpp"
 
 namespace llmt {
+
+/// Unknowns of the first round of screening, in which every ridge is tried; where no candidate has so few, in the first
+/// round that has one. Each round triples the unknowns and keeps the better half of the shapes, at least three.
+inline constexpr Eigen::Index cheap_unknowns = 300;
+inline constexpr Eigen::Index next_unknowns = 3;
+inline constexpr std::size_t fewest_shapes = 3;
 
 /// Candidates and the sums of their squared errors, the best first. Ties: the smaller key.
 using Ranked = std::vector<std::pair<double, Key>>;
@@ -27,9 +34,10 @@ Ranked first_of_each(const Ranked& order, const KindOf& kind_of) {
   return firsts;
 }
 
-/// Compares the candidates on the first `screening` folds, and the best of them on all `folds` folds: returns these.
+/// Compares the candidates on the first few folds, and the best of them on all `folds` folds: returns these.
 /// `coefficients`: of a local model.
+/// `stage`: that `comparison` counts in; it is told from step to step what is `expected`.
 std::set<Key> compare_in_steps(HeldOutErrors& comparison, const Candidates& candidates, Eigen::Index coefficients,
-                               std::size_t screening, std::size_t folds);
+                               std::size_t folds, const ExpectedSteps& expected, Stage stage);
 
 }  // namespace llmt

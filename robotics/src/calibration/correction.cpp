@@ -82,7 +82,9 @@ FitResult fit_correction(const Robot& robot, const Measurements& measurements, c
   }
   if (axes.empty()) throw std::invalid_argument("llmt::robotics::fit_correction: all residuals are zero");
   const Eigen::MatrixXd outputs = all(Eigen::all, axes);
-  FitResult result = fit(measurements.poses.joints, outputs, options);
+  FitOptions of_numbers = options;
+  of_numbers.choose_codes = false;  // joint positions that were measured on a grid are no names
+  FitResult result = fit(measurements.poses.joints, outputs, of_numbers);
   result.model = result.model.named(joint_names(robot.chain), names);
   return result;
 }

@@ -64,6 +64,7 @@ FitOptions tree_options(Eigen::Index samples) {
   options.min_leaf_samples = static_cast<int>(std::max<Eigen::Index>(8, samples / 25));
   options.validity = ValidityChoice::crisp;
   options.intervals = false;
+  options.choose_codes = false;
   return options;
 }
 

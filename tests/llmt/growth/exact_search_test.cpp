@@ -19,7 +19,9 @@ struct Problem {
   std::vector<std::vector<int>> orders;
   std::vector<std::vector<double>> values;
 
-  llmt::SearchNode node() const { return {features, weights, rss}; }
+  double weight = 0.0;
+
+  llmt::SearchNode node() const { return {features, weights, rss, weight, static_cast<int>(features.coefficients())}; }
 };
 
 using Wide = Eigen::Matrix<long double, Eigen::Dynamic, Eigen::Dynamic>;
@@ -57,6 +59,7 @@ Problem make_problem(const Eigen::MatrixXd& x, const Eigen::MatrixXd& y, const E
   const Eigen::MatrixXd residuals = orthogonal_part(basis, weighted).cast<double>();
   const Eigen::MatrixXd columns = (basis * std::sqrt(weights.sum())).cast<double>();  // mean square 1 by weight
   problem.weights = Eigen::VectorXd::Constant(y.cols(), 2.0);
+  problem.weight = weights.sum();
   problem.rss = problem.weights.dot(residuals.colwise().squaredNorm());
   problem.features = llmt::Features(x.rows(), columns.cols(), y.cols());
   for (Eigen::Index row = 0; row < x.rows(); ++row) {
@@ -101,7 +104,7 @@ Result search(const Problem& problem, Eigen::Index min_leaf_samples, bool forget
   for (std::size_t j = 0; j < searches.size(); ++j) {
     const llmt::SplitCandidate split = searches[j].best();
     result.evaluations += split.evaluations;
-    if (result.input < 0 && split.input >= 0 && split.rss <= smallest + oracle::tie * problem.rss) {
+    if (result.input < 0 && split.input >= 0 && split.adjusted <= smallest + oracle::tie * problem.rss) {
       result.input = static_cast<int>(j);
       result.split = split;
     }
@@ -119,6 +122,7 @@ void expect_brute_force(const Problem& problem, Eigen::Index min_leaf_samples) {
   if (expected.input >= 0) {
     EXPECT_EQ(found.split.left, expected.left);
     EXPECT_NEAR(found.split.rss, expected.rss, 1e-11 * problem.rss);
+    EXPECT_NEAR(found.split.adjusted, expected.adjusted, 1e-11 * problem.rss);
   }
   // Sums that are formed again are the same sums.
   const Result again = search(problem, min_leaf_samples, true);

@@ -151,6 +151,8 @@ void BestFirstTree::split(std::size_t position) {
   parallel_for(2, data_.threads_for(parent.samples * data_.split_inputs()), [&, &parts = children](Eigen::Index side) {
     open_.examine(parts[side], parent, nodes_[parts[side].node]);
   });
+  const Eigen::Index coefficients = std::ssize(data_.training.regressors) + 1;
+  data_.problem.stage.did(operations_of_search(parent.samples, data_.split_inputs(), coefficients));
   gains_.resize(nodes_.size(), 0.0);
   gains_[leaf.node] = leaf.rss - leaf.best.rss;
   Node& node = nodes_[leaf.node];

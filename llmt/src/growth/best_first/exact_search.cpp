@@ -27,7 +27,7 @@ void consider_missing(const GrowthData& data, const ExactLeaf& leaf, const Searc
   }
   SplitCandidate candidate = search_levels(node, is_missing, 2, data.problem.options.min_leaf_samples);
   const Eigen::Index tested = best.tested + candidate.tested;
-  if (candidate.input >= 0 && (best.input < 0 || candidate.rss < best.rss - tie_tolerance * node.rss)) {
+  if (candidate.input >= 0 && (best.input < 0 || candidate.adjusted < best.adjusted - tie_tolerance * node.rss)) {
     best = std::move(candidate);
     best.level_side.clear();
     best.by_missing = true;
@@ -49,7 +49,7 @@ InputSearch search_blocks(const GrowthData& data, const ExactLeaf& leaf, const S
   return search;
 }
 
-SplitCandidate compare_all_thresholds(const GrowthData& data, const ExactLeaf& leaf, const SearchNode& node, int rank) {
+SplitCandidate compare_all_thresholds(const GrowthData& data, const ExactLeaf& leaf, const SearchNode& node) {
   const Eigen::Index inputs = std::ssize(leaf.orders);
   const int threads = data.threads_for(leaf.inputs.rows() * data.split_inputs());
   std::vector<std::optional<InputSearch>> searches(inputs);
@@ -64,8 +64,8 @@ SplitCandidate compare_all_thresholds(const GrowthData& data, const ExactLeaf& l
       if (forget) searches[j]->forget_sums();
     }
   });
-  // The smallest RSS that any input has found bounds the search of all. It is taken after all edges are known, so that
-  // it does not depend on the order in which threads finish.
+  // The smallest adjusted RSS that any input has found bounds the search of all. It is taken after all edges are known,
+  // so that it does not depend on the order in which threads finish.
   double limit = std::numeric_limits<double>::infinity();
   Eigen::Index tested = 0;
   for (const std::optional<InputSearch>& search : searches) {
@@ -73,7 +73,7 @@ SplitCandidate compare_all_thresholds(const GrowthData& data, const ExactLeaf& l
     limit = std::min(limit, search->smallest());
     tested += search->tested();
   }
-  limit = std::min(limit, data.significant_rss(leaf.weights.sum(), rank, node.rss, tested));
+  limit = std::min(limit, data.significant_rss(node.weight, node.rank, node.rss, tested));
   parallel_for(inputs, threads, [&](Eigen::Index j) {
     if (!searches[j]) return;
     searches[j]->refine(limit);
@@ -84,13 +84,12 @@ SplitCandidate compare_all_thresholds(const GrowthData& data, const ExactLeaf& l
   return first_of_best(found, node.rss);
 }
 
-SplitCandidate compare_residuals(const GrowthData& data, const ExactLeaf& leaf, const SearchNode& node, int rank) {
+SplitCandidate compare_residuals(const GrowthData& data, const ExactLeaf& leaf, const SearchNode& node) {
   std::vector<int> rows(leaf.inputs.rows());
   std::iota(rows.begin(), rows.end(), 0);
   const int threads = data.threads_for(leaf.inputs.rows() * data.split_inputs());
   const Eigen::MatrixXd values = leaf.inputs(Eigen::all, data.problem.options.split_inputs);
-  ResidualSplit numeric =
-      search_by_residuals(data, {node, rank, rows, values, leaf.residuals, leaf.weights, {}, threads});
+  ResidualSplit numeric = search_by_residuals(data, {node, rows, values, leaf.residuals, leaf.weights, {}, threads});
   std::vector<SplitCandidate> found(leaf.orders.size());
   parallel_for(std::ssize(found), threads, [&](Eigen::Index j) {
     if (numeric.best.input == j) found[j] = std::move(numeric.best);
@@ -107,9 +106,9 @@ SplitCandidate compare_residuals(const GrowthData& data, const ExactLeaf& leaf, 
 
 SplitCandidate find_split(const GrowthData& data, const ExactLeaf& leaf, const NodeFit& fit, double rss) {
   if (leaf.inputs.rows() < 2 * data.problem.options.min_leaf_samples) return {};
-  const SearchNode node{fit.features, data.output_weights, rss};
-  if (data.problem.criterion == SplitCriterion::residual_signs) return compare_residuals(data, leaf, node, fit.rank);
-  return compare_all_thresholds(data, leaf, node, fit.rank);
+  const SearchNode node{fit.features, data.output_weights, rss, leaf.weights.sum(), fit.rank};
+  if (data.problem.criterion == SplitCriterion::residual_signs) return compare_residuals(data, leaf, node);
+  return compare_all_thresholds(data, leaf, node);
 }
 
 }  // namespace llmt

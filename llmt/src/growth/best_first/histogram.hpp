@@ -38,8 +38,8 @@ class BinnedRows {
   /// The best split of the rows of a histogram (docs/algorithms/split-search.md, "Search by bins"). Compares the edges
   /// between bins, then searches those bins exactly whose bound (S.1) allows a better split that can pass the F test,
   /// the lowest bound first, while they hold at most half of the rows. `rows`: those of the histogram; `node_rss` and
-  /// `rank`: of the node's model. Sets `excess` to what a split inside one of the other bins could gain on the result,
-  /// at most.
+  /// `rank`: of the node's model. Sets `excess` to what the adjusted RSS of a split inside one of the other bins could
+  /// be below that of the result, at most.
   SplitCandidate search(const Histogram& histogram, const std::vector<int>& rows, double node_rss, int rank,
                         double& excess) const;
 
@@ -59,12 +59,15 @@ class BinnedRows {
     std::vector<double> grams_right;
     std::vector<double> rss_left;
     std::vector<double> rss_right;
-    std::vector<double> bounds;  // of splits inside each bin; infinity if there are none
+    std::vector<int> rank_left;
+    std::vector<int> rank_right;
+    std::vector<double> bounds;  // of the RSS of splits inside each bin; infinity if there are none
+    std::vector<int> ranks;      // and of the sum of their ranks
   };
 
   /// A bin that may hold a better split inside.
   struct PromisingBin {
-    double bound;
+    double bound;  // of the adjusted RSS
     std::size_t input;
     std::size_t position;  // among the bins with rows
   };
@@ -79,19 +82,23 @@ class BinnedRows {
   std::span<const double> grams(const Histogram& histogram, std::size_t input) const;
   std::span<const Eigen::Index> counts(const Histogram& histogram, std::size_t input) const;
   void add_block(std::span<const int> rows, std::size_t input, std::vector<int>& sorted, Histogram& histogram) const;
-  Edges search_edges(const Histogram& histogram, std::size_t input, double node_rss) const;
-  SplitCandidate best_edge(const Edges& edges, std::span<const Eigen::Index> rows, const std::vector<int>& rank_left,
-                           const std::vector<int>& rank_right, std::size_t input, double node_rss) const;
-  std::vector<double> bounds_of_bins(const Edges& edges, std::span<const Eigen::Index> rows, std::size_t input) const;
+  Edges search_edges(const Histogram& histogram, const std::vector<int>& node_rows, std::size_t input,
+                     const AdjustedRss& scale) const;
+  bool rests_on_two_rows(const Edges& edges, std::size_t at, std::size_t input,
+                         const std::vector<int>& node_rows) const;
+  SplitCandidate best_edge(const Edges& edges, std::span<const Eigen::Index> rows, const std::vector<int>& node_rows,
+                           std::size_t input, const AdjustedRss& scale) const;
+  void bound_bins(Edges& edges, std::span<const Eigen::Index> rows, std::size_t input) const;
   std::vector<std::vector<int>> rows_in_bins(const Edges& edges, const std::vector<std::size_t>& chosen,
                                              std::size_t input, const std::vector<int>& rows) const;
-  static std::vector<PromisingBin> promising_bins(const std::vector<Edges>& edges, double largest);
+  static std::vector<PromisingBin> promising_bins(const std::vector<Edges>& edges, const AdjustedRss& scale,
+                                                  double smallest);
   static ChosenBins choose_bins(const std::vector<PromisingBin>& promising, const std::vector<Edges>& edges,
                                 Eigen::Index rows);
   static SplitCandidate best_of(const std::vector<Edges>& edges, const std::vector<SplitCandidate>& inside,
                                 double node_rss);
   SplitCandidate look_into(const Edges& edges, const std::vector<std::size_t>& chosen, std::size_t input,
-                           const std::vector<int>& rows, double node_rss, double limit) const;
+                           const std::vector<int>& rows, const SearchNode& node, double limit) const;
 
   const GrowthData& data_;
   BinnedInputs inputs_;

@@ -49,7 +49,8 @@ Eigen::MatrixXd ResidualLeaves::residuals(const ResidualLeaf& leaf, const Node& 
   return result;
 }
 
-SplitCandidate ResidualLeaves::search_categories(const ResidualLeaf& leaf, Eigen::Index j, double node_rss) const {
+SplitCandidate ResidualLeaves::search_categories(const ResidualLeaf& leaf, Eigen::Index j,
+                                                 const AdjustedRss& scale) const {
   const GramShape shape(rows_.features());
   std::vector<std::vector<int>> of_level(data_.num_levels[j]);
   for (Eigen::Index k = 0; k < std::ssize(leaf.rows); ++k) {
@@ -61,7 +62,7 @@ SplitCandidate ResidualLeaves::search_categories(const ResidualLeaf& leaf, Eigen
     counts.push_back(std::ssize(of_level[level]));
     add_rows(rows_.features(), of_level[level].data(), counts.back(), grams.data() + level * shape.size());
   }
-  return search_level_grams(shape, data_.output_weights, node_rss, 0.0, grams, counts,
+  return search_level_grams(shape, data_.output_weights, scale, 0.0, grams, counts,
                             data_.problem.options.min_leaf_samples);
 }
 
@@ -76,13 +77,13 @@ SplitCandidate ResidualLeaves::examine(ResidualLeaf& leaf, const Node& parent, N
   const double rss = data_.output_weights.dot(node.rss);
   const Eigen::MatrixXd left_over = residuals(leaf, node, threads);
   const Eigen::VectorXd weights = data_.weights(leaf.rows);
-  const SearchNode search{rows_.features(), data_.output_weights, rss};
+  const SearchNode search{rows_.features(), data_.output_weights, rss, weights.sum(), node.rank};
   ResidualSplit numeric =
-      search_by_residuals(data_, {search, node.rank, leaf.rows, leaf.values, left_over, weights, leaf.gram, threads});
+      search_by_residuals(data_, {search, leaf.rows, leaf.values, left_over, weights, leaf.gram, threads});
   std::vector<SplitCandidate> found(data_.num_levels.size());
   parallel_for(std::ssize(found), threads, [&](Eigen::Index j) {
     if (data_.num_levels[j] > 0) {
-      found[j] = search_categories(leaf, j, rss);
+      found[j] = search_categories(leaf, j, search.scale());
     }
   });
   if (numeric.best.input >= 0) {

@@ -36,7 +36,7 @@ class ResidualLeaves {
 
  private:
   Eigen::MatrixXd residuals(const ResidualLeaf& leaf, const Node& node, int threads) const;
-  SplitCandidate search_categories(const ResidualLeaf& leaf, Eigen::Index split_input, double node_rss) const;
+  SplitCandidate search_categories(const ResidualLeaf& leaf, Eigen::Index split_input, const AdjustedRss& scale) const;
 
   const GrowthData& data_;
   WhitenedRows rows_;

@@ -77,6 +77,9 @@ void evaluate(const ResidualNode& node, ResidualSplit& split) {
   split.best.rss = rss[0] + rss[1] + (has_missing ? node.search.rss - rss[2] : 0.0);
   split.best.rank_left = rank[0];
   split.best.rank_right = rank[1];
+  const AdjustedRss scale = node.search.scale();
+  split.best.adjusted = scale.of(split.best.rss, scale.counted(rank[0], std::ssize(split.sides[0])) +
+                                                     scale.counted(rank[1], std::ssize(split.sides[1])));
 }
 
 std::span<const double> values_of(const ResidualNode& node, Eigen::Index split_input) {
@@ -137,7 +140,7 @@ ResidualSplit search_by_residuals(const GrowthData& data, const ResidualNode& no
   const Eigen::Index smallest_leaf = std::max<Eigen::Index>(data.problem.options.min_leaf_samples, 1);
   const double level = std::min(data.problem.options.significance, usual_significance);
   const auto passes = [&](const SplitCandidate& split) {
-    return split.input >= 0 && data.is_significant(level, node.weights.sum(), node.rank, node.search.rss,
+    return split.input >= 0 && data.is_significant(level, node.search.weight, node.search.rank, node.search.rss,
                                                    {split.rank_left, split.rank_right}, split.rss, tested);
   };
   ResidualSplit best;
@@ -149,7 +152,7 @@ ResidualSplit search_by_residuals(const GrowthData& data, const ResidualNode& no
     if (std::min(std::ssize(split.sides[0]), std::ssize(split.sides[1])) < smallest_leaf) continue;
     evaluate(node, split);
     ++evaluations;
-    if (best.best.input < 0 || split.best.rss < best.best.rss - tie_tolerance * node.search.rss) {
+    if (best.best.input < 0 || split.best.adjusted < best.best.adjusted - tie_tolerance * node.search.rss) {
       best = std::move(split);
     }
   }

@@ -37,7 +37,6 @@ ResidualStatistics residual_statistics(std::span<const double> values, std::span
 /// Rows of a node, in features whose residuals are those of a model that need not be the node's own.
 struct ResidualNode {
   SearchNode search;                 ///< features and the node's residual sum of squares
-  int rank;                          ///< of the node's model
   std::span<const int> rows;         ///< of the features
   const Eigen::MatrixXd& values;     ///< of the split inputs in these rows, rows x split inputs; NaN: missing
   const Eigen::MatrixXd& residuals;  ///< of the node's own model, rows x outputs; only their signs count
@@ -55,10 +54,10 @@ struct ResidualSplit {
 
 /// Splits the numeric input whose classes differ most significantly, over all outputs, at (m+ + m-) / 2 (R.2). If that
 /// leaves too few rows on a side or does not pass the F test at 5 %, the next input is tried: a product of two inputs
-/// leaves signs that depend on neither of them alone. If no split passes, the one with the smallest RSS is returned.
-/// Of inputs that are equally significant to nine digits the first one is taken. `best.tested` counts the pairs of
-/// input and output that could be tested. Cost: one pass over the values of each input, and for each split that is
-/// tried one pass over the values and one over the features.
+/// leaves signs that depend on neither of them alone. If no split passes, the one with the smallest adjusted RSS is
+/// returned. Of inputs that are equally significant to nine digits the first one is taken. `best.tested` counts the
+/// pairs of input and output that could be tested. Cost: one pass over the values of each input, and for each split
+/// that is tried one pass over the values and one over the features.
 ResidualSplit search_by_residuals(const GrowthData& data, const ResidualNode& node);
 
 /// Gram matrix of some rows of features. The number of partial sums does not depend on the number of threads.

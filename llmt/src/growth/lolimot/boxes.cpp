@@ -90,8 +90,9 @@ std::optional<double> best_threshold_of(const LolimotData& data, const std::vect
   for (const int k : order) {
     values.push_back(value(k));
   }
-  InputSearch search({crisp.features, data.output_weights, data.output_weights.dot(crisp.rss)}, values, order,
-                     smallest);
+  const SearchNode node{crisp.features, data.output_weights, data.output_weights.dot(crisp.rss),
+                        Eigen::VectorXd(data.weights(rows)).sum(), crisp.rank};
+  InputSearch search(node, values, order, smallest);
   search.search_edges();
   search.refine(std::numeric_limits<double>::infinity());
   const SplitCandidate found = search.best();

@@ -69,10 +69,11 @@ std::vector<int> sides_of_levels(const std::vector<int>& order, std::size_t left
 
 }  // namespace
 
-SplitCandidate search_level_grams(const GramShape& shape, const Eigen::VectorXd& weights, double node_rss,
+SplitCandidate search_level_grams(const GramShape& shape, const Eigen::VectorXd& weights, const AdjustedRss& scale,
                                   double without_value, std::span<const double> grams,
                                   std::span<const Eigen::Index> counts, Eigen::Index min_leaf_samples) {
   const Eigen::Index present = std::accumulate(counts.begin(), counts.end(), Eigen::Index{0});
+  const double tolerance = tie_tolerance * scale.of_node();
   ResidualSums models(shape, weights);
   SplitCandidate best;
   for (const std::vector<int>& order : level_orders(shape, grams, counts)) {
@@ -84,8 +85,11 @@ SplitCandidate search_level_grams(const GramShape& shape, const Eigen::VectorXd&
       if (rows_left < min_leaf_samples || present - rows_left < min_leaf_samples) continue;
       const double rss = left.rss[k] + right.rss[k] + without_value;
       ++best.tested;
-      if (best.input >= 0 && rss >= best.rss - tie_tolerance * node_rss) continue;
+      const int ranks = scale.counted(left.rank[k], rows_left) + scale.counted(right.rank[k], present - rows_left);
+      const double adjusted = scale.of(rss, ranks);
+      if (best.input >= 0 && adjusted >= best.adjusted - tolerance) continue;
       best.input = 0;
+      best.adjusted = std::max(0.0, adjusted);
       best.left = rows_left;
       best.rss = std::max(0.0, rss);
       best.rank_left = left.rank[k];
@@ -122,7 +126,7 @@ SplitCandidate search_levels(const SearchNode& node, std::span<const int> levels
     ResidualSums(shape, node.weights).evaluate(&gram, 1, &rss, &rank);
     without_value = node.rss - rss;
   }
-  return search_level_grams(shape, node.weights, node.rss, without_value, grams, counts, min_leaf_samples);
+  return search_level_grams(shape, node.weights, node.scale(), without_value, grams, counts, min_leaf_samples);
 }
 
 }  // namespace llmt

@@ -1,7 +1,10 @@
 #include "growth/search/split_search.hpp"
 
 #include <algorithm>
+#include <cstdlib>
 #include <limits>
+
+#include "growth/search/rank_without.hpp"
 
 namespace llmt {
 namespace {
@@ -46,12 +49,14 @@ InputSearch::InputSearch(const SearchNode& node, std::vector<double> values, std
       values_(std::move(values)),
       order_(order),
       min_leaf_samples_(min_leaf_samples),
+      rows_at_the_ends_(std::min(std::max(min_leaf_samples, node.scale().enough_rows()), std::ssize(order))),
       shape_(node.features),
       sums_(shape_, node.weights),
+      scale_(node.scale()),
       limit_(no_split),
       smallest_(no_split),
       none_(shape_.size(), 0.0),
-      all_{0, std::ssize(order), none_.data(), none_.data(), 0.0, 0.0} {
+      all_{0, std::ssize(order), none_.data(), none_.data(), 0.0, 0.0, 0, 0} {
   for (Eigen::Index left = 1; left < std::ssize(order); ++left) {
     tested_ += admissible(left) ? 1 : 0;
   }
@@ -62,7 +67,7 @@ InputSearch::InputSearch(const SearchNode& node, std::vector<double> values, std
     : InputSearch(node, std::move(values), order, min_leaf_samples) {
   rows_in_front_ = front.rows;
   rows_behind_ = behind.rows;
-  all_ = {0, std::ssize(order), front.gram, behind.gram, front.rss, behind.rss};
+  all_ = {0, std::ssize(order), front.gram, behind.gram, front.rss, behind.rss, front.rank, behind.rank};
 }
 
 // A split is given by the number of rows of the stretch on its left.
@@ -119,20 +124,55 @@ void InputSearch::take_sides(const std::vector<Eigen::Index>& edges, const doubl
     rss.resize(inner);
     rank.resize(inner);
     sums_.evaluate(grams.data(), inner, rss.data(), rank.data());
+    std::ranges::transform(rank, rank.begin(), [&](int each) { return scale_.of_child(each); });
   };
   evaluate(sides.left, sides.rss_left, sides.rank_left);
   evaluate(sides.right, sides.rss_right, sides.rank_right);
   evaluations_ += inner;
 }
 
-void InputSearch::offer(const std::vector<Eigen::Index>& edges, const Sides& sides) {
+// Whether the two rows next to a split at the inner edge `at` decide a direction of a child's model: without them the
+// child would have a smaller rank, although it has rows enough.
+bool InputSearch::rests_on_two_rows(const Segment& segment, const std::vector<Eigen::Index>& edges, const Sides& sides,
+                                    Eigen::Index at) {
+  constexpr Eigen::Index two = 2;
+  const Eigen::Index left = edges[at + 1];
+  const Eigen::Index right = std::ssize(order_) - left;
+  // The rank of a part of the side without the two rows, if it is known from another edge. If it is that of the side,
+  // nothing has to be computed.
+  const auto known = [&](Eigen::Index step, const std::vector<int>& ranks, Eigen::Index outer, int of_outer) {
+    const auto is_inner = [&](Eigen::Index edge) { return edge >= 0 && edge < std::ssize(ranks); };
+    Eigen::Index edge = at + step;
+    while (is_inner(edge) && std::abs(edges[edge + 1] - left) < two) edge += step;
+    if (is_inner(edge)) return ranks[edge];
+    return std::abs(outer - left) < two ? 0 : of_outer;
+  };
+  const auto rests = [&](int rank_of_part, int rank, Eigen::Index rows, const double* gram,
+                         std::span<const int> next_to) {
+    return rank_of_part < rank && rows >= scale_.enough_rows() &&
+           rank_without(node_.features, gram, next_to, sums_) < rank;
+  };
+  const Eigen::Index first = std::max(segment.begin, rows_in_front_ > 0 ? 0 : rows_at_the_ends_);
+  const Eigen::Index last = std::min(segment.end, std::ssize(order_) - (rows_behind_ > 0 ? 0 : rows_at_the_ends_));
+  const Eigen::Index from_left = std::min(two, left);
+  return rests(known(-1, sides.rank_left, first, segment.rank_left), sides.rank_left[at], rows_in_front_ + left,
+               sides.left.data() + at * shape_.size(), order_.subspan(left - from_left, from_left)) ||
+         rests(known(1, sides.rank_right, last, segment.rank_right), sides.rank_right[at], right + rows_behind_,
+               sides.right.data() + at * shape_.size(), order_.subspan(left, std::min(two, right)));
+}
+
+void InputSearch::offer(const Segment& segment, const std::vector<Eigen::Index>& edges, const Sides& sides) {
   const double tolerance = tie_tolerance * node_.rss;
   for (std::size_t i = 0; i + 2 < edges.size(); ++i) {
+    const Eigen::Index left = rows_in_front_ + edges[i + 1];
+    const Eigen::Index right = std::ssize(order_) + rows_behind_ - edges[i + 1];
+    const int ranks = scale_.counted(sides.rank_left[i], left) + scale_.counted(sides.rank_right[i], right);
     const double rss = sides.rss_left[i] + sides.rss_right[i];
-    if (rss <= smallest_ + tolerance && admissible(edges[i + 1])) {
-      smallest_ = std::min(smallest_, rss);
-      found_.push_back({edges[i + 1], rss, sides.rank_left[i], sides.rank_right[i]});
-    }
+    const double adjusted = scale_.of(rss, ranks);
+    if (!(adjusted <= smallest_ + tolerance && admissible(edges[i + 1]))) continue;
+    if (rests_on_two_rows(segment, edges, sides, static_cast<Eigen::Index>(i))) continue;
+    smallest_ = std::min(smallest_, adjusted);
+    found_.push_back({edges[i + 1], rss, adjusted, sides.rank_left[i], sides.rank_right[i]});
   }
 }
 
@@ -144,10 +184,11 @@ std::vector<InputSearch::Segment> InputSearch::cut(const Segment& segment, const
   };
   std::vector<Segment> result;
   for (std::size_t i = 0; i <= inner; ++i) {
-    result.push_back({edges[i], edges[i + 1], i == 0 ? segment.left : at(sides.left, i - 1),
-                      i == inner ? segment.right : at(sides.right, i),
-                      i == 0 ? segment.rss_left : sides.rss_left[i - 1],
-                      i == inner ? segment.rss_right : sides.rss_right[i]});
+    result.push_back(
+        {edges[i], edges[i + 1], i == 0 ? segment.left : at(sides.left, i - 1),
+         i == inner ? segment.right : at(sides.right, i), i == 0 ? segment.rss_left : sides.rss_left[i - 1],
+         i == inner ? segment.rss_right : sides.rss_right[i], i == 0 ? segment.rank_left : sides.rank_left[i - 1],
+         i == inner ? segment.rank_right : sides.rank_right[i]});
   }
   std::ranges::stable_sort(result, [](const Segment& a, const Segment& b) { return a.bound() < b.bound(); });
   return result;
@@ -161,6 +202,7 @@ void InputSearch::search_edges() {
     edges_.push_back(begin);
   }
   edges_.push_back(rows);
+  take_ranks_at_the_ends();
   take_sides(edges_, none_.data(), none_.data(), sides_);
   if (rows < node_.features.rows()) {
     // The rows without a value add the same RSS to every split: the node's RSS minus the RSS of one model of the
@@ -178,7 +220,7 @@ void InputSearch::search_edges() {
       left += without_value_;
     }
   }
-  offer(edges_, sides_);
+  offer(all_, edges_, sides_);
 }
 
 void InputSearch::forget_sums() {
@@ -189,15 +231,30 @@ void InputSearch::forget_sums() {
   forgotten_ = true;
 }
 
+// At either end of the input, where there are no rows beyond: the rank of the fewest rows of a child whose rank counts.
+void InputSearch::take_ranks_at_the_ends() {
+  const auto rank_of = [&](Eigen::Index begin) {
+    std::vector<double> gram(shape_.size(), 0.0);
+    add_rows(node_.features, order_.data() + begin, rows_at_the_ends_, gram.data());
+    return scale_.of_child(rank_without(node_.features, gram.data(), {}, sums_));
+  };
+  if (rows_in_front_ == 0) all_.rank_left = rank_of(0);
+  if (rows_behind_ == 0) all_.rank_right = rank_of(std::ssize(order_) - rows_at_the_ends_);
+}
+
 // Twice the tolerance: a split within the tolerance of the best one counts as equal to it.
 bool InputSearch::may_hold_the_best(const Segment& segment) const {
-  return segment.bound() <= std::min(limit_, smallest_) + 2.0 * tie_tolerance * node_.rss && holds_candidates(segment);
+  const double bound = scale_.of(segment.bound(), segment.rank_left + segment.rank_right);
+  return bound <= std::min(limit_, smallest_) + 2.0 * tie_tolerance * node_.rss && holds_candidates(segment);
 }
 
 void InputSearch::refine(double limit) {
   limit_ = limit;
   if (edges_.empty()) {
-    if (!forgotten_) look_into(all_, 0);
+    if (!forgotten_) {
+      take_ranks_at_the_ends();
+      look_into(all_, 0);
+    }
     return;
   }
   all_.rss_left = without_value_;
@@ -234,7 +291,7 @@ void InputSearch::look_into(const Segment& segment, std::size_t depth) {
   for (double& left : sides.rss_left) {
     left += without_value_;
   }
-  offer(edges, sides);
+  offer(segment, edges, sides);
   if (!all) {
     for (const Segment& part : cut(segment, edges, sides)) {
       look_into(part, depth + 1);
@@ -249,10 +306,11 @@ SplitCandidate InputSearch::best() const {
   best.evaluations = evaluations_;
   const double largest = smallest_ + tie_tolerance * node_.rss;
   for (const Found& found : found_) {
-    if (found.rss <= largest && (best.input < 0 || found.left < best.left)) {
+    if (found.adjusted <= largest && (best.input < 0 || found.left < best.left)) {
       best.input = 0;
       best.left = found.left;
       best.rss = std::max(0.0, found.rss);
+      best.adjusted = std::max(0.0, found.adjusted);
       best.rank_left = found.rank_left;
       best.rank_right = found.rank_right;
     }
@@ -269,10 +327,10 @@ SplitCandidate first_of_best(std::span<const SplitCandidate> found, double rss) 
   for (const SplitCandidate& candidate : found) {
     tested += candidate.tested;
     evaluations += candidate.evaluations;
-    smallest = candidate.input >= 0 ? std::min(smallest, candidate.rss) : smallest;
+    smallest = candidate.input >= 0 ? std::min(smallest, candidate.adjusted) : smallest;
   }
   for (int j = 0; j < std::ssize(found) && best.input < 0; ++j) {
-    if (found[j].input >= 0 && found[j].rss <= smallest + tie_tolerance * rss) {
+    if (found[j].input >= 0 && found[j].adjusted <= smallest + tie_tolerance * rss) {
       best = found[j];
       best.input = j;
     }

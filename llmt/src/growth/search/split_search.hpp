@@ -1,6 +1,6 @@
 /// \file
-/// The exact search for the split of a node with the smallest sum of the two children's RSS
-/// (docs/algorithms/split-search.md).
+/// The exact search for the split of a node with the smallest adjusted RSS (docs/algorithms/growth.md, G.7;
+/// docs/algorithms/split-search.md).
 #pragma once
 
 #include <Eigen/Core>
@@ -9,6 +9,7 @@
 #include <span>
 #include <vector>
 
+#include "growth/search/adjusted_rss.hpp"
 #include "numerics/gram.hpp"
 
 namespace llmt {
@@ -18,6 +19,7 @@ struct SplitCandidate {
   int input = -1;         ///< column that is split; -1: there is no admissible split
   Eigen::Index left = 0;  ///< rows of the left child: the first `left` in the order of that input
   double rss = 0.0;       ///< weighted residual sum of squares of the two child models
+  double adjusted = 0.0;  ///< adjusted RSS, by which splits are compared
   int rank_left = 0;      ///< ranks of the two children's least-squares problems
   int rank_right = 0;
   Eigen::Index tested = 0;       ///< number of admissible splits among which it is the best
@@ -34,18 +36,23 @@ struct SearchNode {
   const Features& features;        ///< regressors about orthogonal in the node
   const Eigen::VectorXd& weights;  ///< of the outputs' residual sums of squares
   double rss;                      ///< weighted, of the node's own model
+  double weight;                   ///< sum of the rows' weights
+  int rank;                        ///< of the node's own model
+
+  AdjustedRss scale() const { return {weight, rank, rss}; }
 };
 
 /// Exact search along one numeric input. It has two steps, so that the best value that one input has found bounds the
-/// search of all inputs of the node.
+/// search of all inputs of the node. Values are adjusted RSS.
 ///
 /// The first step evaluates the edges between blocks of rows. The second step cuts those blocks into parts whose bound
 /// (S.1) is not above the best value known, evaluates the edges between the parts, and so on. Sums are only added to,
 /// from the left and from the right, and never subtracted from, so that no digits are lost at the ends.
 ///
-/// Compares every split between two distinct values that leaves `min_leaf_samples` rows on either side. Rows without a
-/// value are on neither side; only the RSS of the other rows is compared. Of splits that agree within `tie_tolerance`
-/// times node.rss, the one with the smallest threshold is taken.
+/// Compares every split between two distinct values that leaves `min_leaf_samples` rows on either side and no child
+/// with a direction that the two rows next to the split decide. Rows without a value are on neither side; only the RSS
+/// of the other rows is compared. Of splits that agree within `tie_tolerance` times node.rss, the one with the smallest
+/// threshold is taken.
 class InputSearch {
  public:
   /// `values`: of the input, ascending; `order`: the rows of the features in the same order. `node`'s members and
@@ -53,11 +60,12 @@ class InputSearch {
   InputSearch(const SearchNode& node, std::vector<double> values, std::span<const int> order,
               Eigen::Index min_leaf_samples);
 
-  /// Rows on one side of a stretch, whose Gram matrix and residual sum of squares are known.
+  /// Rows on one side of a stretch, whose Gram matrix is known, and their residual sum of squares and rank.
   struct Beyond {
     Eigen::Index rows;
     const double* gram;
     double rss;
+    int rank;
   };
 
   /// The same for a stretch of an input whose other rows lie in front of the stretch or behind it. search_edges() must
@@ -74,16 +82,16 @@ class InputSearch {
   /// Frees the Gram matrices of the first step. The second step forms them anew if it needs them.
   void forget_sums();
 
-  /// Smallest residual sum of squares found so far; infinity if there is none.
+  /// Smallest adjusted RSS found so far; infinity if there is none.
   double smallest() const { return smallest_; }
 
   /// Number of admissible splits.
   Eigen::Index tested() const { return tested_; }
 
-  /// Second step: searches the blocks that may hold a split with an RSS of at most `limit`.
+  /// Second step: searches the blocks that may hold a split with an adjusted RSS of at most `limit`.
   void refine(double limit);
 
-  /// The best split found, exact if its RSS is not above the limit. `input` is 0, or -1 if no split was found.
+  /// The best split found, exact if its adjusted RSS is not above the limit. `input` is 0, or -1 if no split was found.
   SplitCandidate best() const;
 
  private:
@@ -95,11 +103,14 @@ class InputSearch {
     const double* right;  // and of those behind
     double rss_left;      // their residual sums of squares
     double rss_right;
+    int rank_left;  // and at most their ranks
+    int rank_right;
     double bound() const { return rss_left + rss_right; }
   };
   struct Found {
     Eigen::Index left;
     double rss;
+    double adjusted;
     int rank_left;
     int rank_right;
   };
@@ -117,10 +128,13 @@ class InputSearch {
   bool admissible(Eigen::Index left) const;
   bool holds_candidates(const Segment& segment) const;
   bool may_hold_the_best(const Segment& segment) const;
+  void take_ranks_at_the_ends();
+  bool rests_on_two_rows(const Segment& segment, const std::vector<Eigen::Index>& edges, const Sides& sides,
+                         Eigen::Index at);
   void sum_sides(const std::vector<Eigen::Index>& edges, const double* before, const double* behind,
                  Sides& sides) const;
   void take_sides(const std::vector<Eigen::Index>& edges, const double* before, const double* behind, Sides& sides);
-  void offer(const std::vector<Eigen::Index>& edges, const Sides& sides);
+  void offer(const Segment& segment, const std::vector<Eigen::Index>& edges, const Sides& sides);
   void look_into(const Segment& segment, std::size_t depth);
   std::vector<Segment> cut(const Segment& segment, const std::vector<Eigen::Index>& edges, const Sides& sides) const;
 
@@ -128,10 +142,12 @@ class InputSearch {
   std::vector<double> values_;
   std::span<const int> order_;
   Eigen::Index min_leaf_samples_;
+  Eigen::Index rows_at_the_ends_;  // that decide the ranks of all_
   Eigen::Index rows_in_front_ = 0;
   Eigen::Index rows_behind_ = 0;
   GramShape shape_;
   ResidualSums sums_;
+  AdjustedRss scale_;
   Eigen::Index tested_ = 0;
   Eigen::Index evaluations_ = 0;
   double without_value_ = 0.0;  // part of node.rss that falls on the rows without a value, the same for all splits
@@ -153,9 +169,9 @@ class InputSearch {
 SplitCandidate search_levels(const SearchNode& node, std::span<const int> levels, int num_levels,
                              Eigen::Index min_leaf_samples);
 
-/// As above, from the Gram matrices and row counts of the levels. `without_value`: part of `node_rss` that falls on the
-/// rows without a level.
-SplitCandidate search_level_grams(const GramShape& shape, const Eigen::VectorXd& weights, double node_rss,
+/// As above, from the Gram matrices and row counts of the levels. `scale`: of the node; `without_value`: part of its
+/// RSS that falls on the rows without a level.
+SplitCandidate search_level_grams(const GramShape& shape, const Eigen::VectorXd& weights, const AdjustedRss& scale,
                                   double without_value, std::span<const double> grams,
                                   std::span<const Eigen::Index> counts, Eigen::Index min_leaf_samples);
 
@@ -163,8 +179,8 @@ SplitCandidate search_level_grams(const GramShape& shape, const Eigen::VectorXd&
 /// and `evaluations` are sums over all inputs. `node_rss`: of the node's own model.
 SplitCandidate first_of_best(std::span<const SplitCandidate> found, double node_rss);
 
-/// Splits whose RSS differ by less than this part of the node's RSS count as equally good. Rounding depends on the
-/// order of the rows and on columns that carry no information, and must not decide between them.
+/// Splits whose adjusted RSS differ by less than this part of the node's RSS count as equally good. Rounding depends on
+/// the order of the rows and on columns that carry no information, and must not decide between them.
 inline constexpr double tie_tolerance = 1e-10;
 
 }  // namespace llmt

@@ -1,0 +1,12 @@
+/// \file
+/// The plan by which forms of the inputs are compared: fewer of them, or some as categories.
+#pragma once
+
+#include "fit/defaults.hpp"
+
+namespace llmt {
+
+/// with_defaults() with few candidates, the same for all forms, and small trees.
+Plan cheap_plan(const FitOptions& options, const TrainingRows& rows, Eigen::Index folds);
+
+}  // namespace llmt
