@@ -19,7 +19,7 @@ class Stage {
   /// From now on this many operations of the stage are to come; 0 when it is over. What was done stays done.
   void expect(double operations) const;
 
-  /// So many of them are done.
+  /// Adds `operations` to those that are done.
   void did(double operations) const;
 
   double to_come() const;
@@ -49,7 +49,7 @@ class Work {
   Work(const Work&) = delete;
   Work& operator=(const Work&) = delete;
 
-  /// A stage with so many operations to come.
+  /// A new stage, of which `operations` are to come.
   Stage stage(double operations);
 
  private:

@@ -11,7 +11,7 @@
 
 namespace llmt {
 
-/// Operations (base/work.hpp) of the growth of a tree on some rows, as far as can be told before.
+/// Operations (base/work.hpp) of the growth of a tree on some rows, estimated before it is grown.
 double operations_of_tree(const TrainingRows& rows, const Plan& plan);
 
 /// Leaves that a tree on some rows may have.

@@ -128,7 +128,7 @@ double ExpectedSteps::on_other_folds(std::size_t best) const {
   return finalists(best) * on_folds(screening_, folds_.size(), begin, end, candidates_at_last);
 }
 
-// Position after the last leaf count with at most so many unknowns; all if that is none but the last.
+// Position after the last leaf count with at most `unknowns` unknowns; all if that is none but the last.
 std::size_t ExpectedSteps::end_of_round(Eigen::Index unknowns) const {
   return std::ranges::upper_bound(counts_, unknowns / coefficients_) - counts_.begin();
 }
