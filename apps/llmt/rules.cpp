@@ -19,7 +19,7 @@ namespace {
 constexpr std::size_t line_width = 100;
 constexpr double any_value = std::numeric_limits<double>::max();  // a split into rows with and without a value
 
-// Of a number that was not rounded, so many digits are printed.
+// Significant digits of a number that was not rounded.
 constexpr int usual_digits = 5;
 constexpr int most_digits = 12;
 

@@ -117,8 +117,8 @@ struct InputColumn {
   double centre = 0.0;  ///< mean of the training values; local models are written about it
   /// Categorical input: the names of its values 0, 1, 2, ... Empty for numbers.
   std::vector<std::string> levels = {};
-  /// Categorical input that is told as a number: the numbers of its levels, ascending. Another number counts as the
-  /// nearest of them, of two the smaller. Empty: the input is told as the position of its level.
+  /// Numbers of the levels, ascending, where a row gives this categorical input as a number. Another number counts as
+  /// the nearest of them, of two the smaller. Empty: a row gives the position of the level.
   std::vector<double> codes = {};
 
   bool is_categorical() const { return !levels.empty(); }

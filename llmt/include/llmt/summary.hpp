@@ -101,7 +101,7 @@ struct PartitionSummary {
   std::vector<RangeGuard> range_guards = {};  ///< one an output of the partition; empty without folds
 };
 
-/// Which inputs are codes, that is categories told as numbers (docs/algorithms/codes.md): FitOptions::choose_codes.
+/// Which inputs are codes, that is, categories given as numbers (docs/algorithms/codes.md): FitOptions::choose_codes.
 struct CodeChoice {
   std::vector<int> compared = {};  ///< inputs that were compared in both forms, ascending
   std::vector<int> taken = {};     ///< those that are categories in the model, ascending

@@ -1,5 +1,5 @@
 /// \file
-/// Which numeric inputs are codes, that is categories that are told as numbers: docs/algorithms/codes.md.
+/// Which numeric inputs are codes, that is, categories given as numbers: docs/algorithms/codes.md.
 #pragma once
 
 #include <Eigen/Core>

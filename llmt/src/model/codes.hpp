@@ -1,5 +1,5 @@
 /// \file
-/// Inputs whose numbers are codes: categories that are told as numbers, see InputColumn::codes.
+/// Inputs whose numbers are codes: categories given as numbers, see InputColumn::codes.
 #pragma once
 
 #include <Eigen/Core>

@@ -15,7 +15,7 @@ constexpr Eigen::Index screening_rows = 1000;
 // Probability that screening goes on to a round of larger trees.
 constexpr double goes_on = 0.6;
 
-// Of the thresholds of jumps, so many leave different jumps.
+// Thresholds of jumps that leave different jumps: their usual number.
 constexpr std::size_t usual_jumps = 2;
 
 // Where candidates are costly, hardly more than one shape is left at last: others are clearly worse.

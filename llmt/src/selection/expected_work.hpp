@@ -36,7 +36,7 @@ class ExpectedSteps {
   /// The best candidate on all training rows, if they are held out once.
   double on_all_rows() const;
 
-  /// From the round of screening on that begins with the leaf count at `begin`, with so many shapes in the race.
+  /// From the round of screening on that begins with the leaf count at `begin`, with `shapes` shapes in the race.
   /// `best`: position of the best leaf count so far.
   double from_round(std::size_t begin, std::size_t shapes, std::size_t best) const;
 
@@ -73,7 +73,7 @@ std::size_t screening_folds(const std::vector<FoldRows>& folds);
 /// The comparison of crisp trees.
 double operations_of_crisp(const std::vector<FoldRows>& folds, Eigen::Index coefficients, Eigen::Index leaves);
 
-/// All that select() takes for trees of about so many leaves.
+/// All that select() takes for trees of about `leaves` leaves.
 double operations_of_selection(const std::vector<FoldRows>& folds, Eigen::Index coefficients,
                                const Candidates& candidates, Eigen::Index leaves);
 

@@ -36,7 +36,7 @@ Ranked first_of_each(const Ranked& order, const KindOf& kind_of) {
 
 /// Compares the candidates on the first few folds, and the best of them on all `folds` folds: returns these.
 /// `coefficients`: of a local model.
-/// `stage`: that `comparison` counts in; it is told from step to step what is `expected`.
+/// `stage`: that `comparison` counts in; each step sets what is `expected` of it.
 std::set<Key> compare_in_steps(HeldOutErrors& comparison, const Candidates& candidates, Eigen::Index coefficients,
                                std::size_t folds, const ExpectedSteps& expected, Stage stage);
 
