@@ -60,7 +60,7 @@ void compare_command(CompareArguments arguments) {
     return;
   }
   print(fmt::format("{}: {} rows, {} inputs; {}, {} folds{}, every choice made inside the fold\n\n",
-                    arguments.learning.data, table.inputs.values.rows(), table.names.size(),
+                    table_name(arguments.learning.data), table.inputs.values.rows(), table.names.size(),
                     arguments.learning.targets.front(), result.methods.front().fold_rmse.size(),
                     arguments.learning.contiguous ? " of contiguous rows" : ""));
   Table text(

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <ranges>
 #include <stdexcept>
 
 #include "llmt/commands.hpp"
@@ -24,7 +25,9 @@ struct DiscoverArguments {
   std::vector<std::string> adjusted;
   std::string terms;
   std::string order;
+  std::vector<std::string> outputs_or_files;  // of --output, which once named the columns
   std::string corrected;
+  DecimalMark mark = DecimalMark::point;
   bool own_terms_only = false;
   bool json = false;
   discovery::MissingOptions options;
@@ -73,8 +76,8 @@ void check_names(const DiscoverArguments& arguments) {
 }
 
 Comparison read_comparison(const DiscoverArguments& arguments) {
-  const Csv simulated = Csv::read(arguments.simulated);
-  const Csv measured = Csv::read(arguments.measured);
+  const Csv simulated = Csv::read(arguments.simulated, arguments.mark);
+  const Csv measured = Csv::read(arguments.measured, arguments.mark);
   for (const Csv* csv : {&simulated, &measured}) {
     if (csv->rows() == 0) throw std::runtime_error(fmt::format("{}: no rows", csv->name()));
   }
@@ -163,9 +166,34 @@ DiscoveryReport discovered(const DiscoverArguments& arguments, const Comparison&
   return report;
 }
 
-void discover_command(DiscoverArguments arguments) {
+// Sorts the values of --output into the file to write and, where no target is named, the columns to explain: the option
+// once meant these.
+void sort_outputs(const CLI::App& command, DiscoverArguments& arguments) {
+  std::vector<std::string> files = arguments.outputs_or_files;
+  if (arguments.outputs.empty() && !files.empty()) {
+    const Csv simulated = Csv::read(arguments.simulated, arguments.mark);
+    const auto is_column = [&](const std::string& name) { return simulated.has(name); };
+    for (const std::string& text : arguments.outputs_or_files) {
+      std::vector<std::string> names;
+      for (const auto& part : std::views::split(text, ',')) names.emplace_back(part.begin(), part.end());
+      if (!std::ranges::all_of(names, is_column)) continue;
+      warn(fmt::format("llmt: --output {} is taken for the columns to explain, as in former versions; write --target",
+                       text));
+      arguments.outputs.insert(arguments.outputs.end(), names.begin(), names.end());
+      std::erase(files, text);
+    }
+  }
+  if (arguments.outputs.empty()) throw std::invalid_argument("--target is needed: the columns to explain");
+  if (files.size() > 1) throw std::invalid_argument(fmt::format("--output names {} files", files.size()));
+  if (files.empty()) return;
+  check_output_file(command, files.front());
+  arguments.corrected = files.front();
+}
+
+void discover_command(const CLI::App& command, DiscoverArguments arguments) {
+  sort_outputs(command, arguments);
   if (arguments.inputs.empty()) {
-    const Csv simulated = Csv::read(arguments.simulated);
+    const Csv simulated = Csv::read(arguments.simulated, arguments.mark);
     for (const std::string& name : simulated.columns()) {
       const bool is_output = std::ranges::find(arguments.outputs, name) != arguments.outputs.end();
       if (!is_output && name != arguments.order) arguments.inputs.push_back(name);
@@ -187,36 +215,36 @@ void discover_command(DiscoverArguments arguments) {
 void add_discover(CLI::App& app) {
   CLI::App* command =
       app.add_subcommand("discover", "Find and name what a simulation lacks, from measurements beside it");
-  command->footer("Example: llmt discover simulated.csv measured.csv --inputs a,b,t --output y -o corrected.csv");
+  command->footer("Example: llmt discover simulated.csv measured.csv --inputs a,b,t --target y -o corrected.csv");
   const auto arguments = std::make_shared<DiscoverArguments>();
   add_input_file(*command, "simulated", arguments->simulated, "Inputs and simulated outputs (CSV)")->required();
   add_input_file(*command, "measured", arguments->measured, "The same inputs, row by row, and measured outputs (CSV)")
       ->required();
+  add_names(*command, "-t,--target", arguments->outputs, "COLUMN", "What to explain, in both files (required)");
+  add_names(*command, "--inputs", arguments->inputs, "COLUMN",
+            "What the gap may depend on [all of SIMULATED but the targets]");
   command
-      ->add_option("--inputs", arguments->inputs,
-                   "Columns that the gap may depend on [all of SIMULATED but the outputs]")
-      ->delimiter(',');
-  command->add_option("-t,--output", arguments->outputs, "Columns to explain, in both files")
-      ->delimiter(',')
-      ->required();
-  command->add_option("--order", arguments->order,
-                      "Column that says in which order rows were measured; it is an input too [rows as they stand]");
+      ->add_option("--order", arguments->order,
+                   "What says in which order rows were measured; it is an input too [rows as they stand]")
+      ->type_name("COLUMN");
   add_input_file(*command, "--terms", arguments->terms,
                  "File of your own terms, a line each: name = expression of the inputs");
   command
       ->add_flag("--own-terms-only", arguments->own_terms_only, "Leave the built-in terms out, but for unknown shapes")
       ->needs("--terms");
-  command
-      ->add_option("--allow", arguments->adjusted, "What the simulation may adjust before anything counts as missing")
-      ->delimiter(',')
+  add_names(*command, "--allow", arguments->adjusted, "offset|scale",
+            "What the simulation may adjust before anything counts as missing")
       ->check(CLI::IsMember({"offset", "scale"}));
   add_number(*command, "--held-out", arguments->options.held_out_share, share_set_aside,
              "Share of the rows set aside for verification")
       ->capture_default_str();
   add_seed(*command, arguments->options.seed, "Of the rows set aside");
-  add_output_file(*command, "-o,--corrected", arguments->corrected, "Corrected simulation to write (CSV)");
+  add_decimal_comma(*command, arguments->mark);
+  command->add_option("-o,--output,--corrected", arguments->outputs_or_files, "Corrected simulation to write (CSV)")
+      ->type_name("NEWFILE")
+      ->allow_extra_args(false);
   command->add_flag("--json", arguments->json, "Print one JSON object");
-  command->callback([arguments] { discover_command(*arguments); });
+  command->callback([command, arguments] { discover_command(*command, *arguments); });
 }
 
 }  // namespace llmt::apps

@@ -22,6 +22,7 @@ struct ExplainArguments {
   std::string model;
   std::string data;
   Eigen::Index row = 0;  // counted from 1; 0: the whole table
+  DecimalMark mark = DecimalMark::point;
   bool json = false;
   int threads = 0;
 };
@@ -49,7 +50,7 @@ void explain_table(const ExplainArguments& arguments, const Model& model, const 
   Json json = {{"model", arguments.model}, {"data", arguments.data}, {"rows", inputs.rows()}, {"rows_used", used}};
   json["targets"] = Json::array();
   if (!arguments.json) {
-    print(fmt::format("{}: importance over {} of {} rows\n", arguments.data, used, inputs.rows()));
+    print(fmt::format("{}: importance over {} of {} rows\n", table_name(arguments.data), used, inputs.rows()));
   }
   for (Eigen::Index o = 0; o < model.num_outputs(); ++o) {
     const std::string& target = model.outputs()[o].name;
@@ -75,7 +76,7 @@ void explain_table(const ExplainArguments& arguments, const Model& model, const 
 void explain_row(const ExplainArguments& arguments, const Model& model, const Eigen::MatrixXd& inputs) {
   if (arguments.row > inputs.rows()) {
     throw std::invalid_argument(
-        fmt::format("--row is {}, {} has {} rows", arguments.row, arguments.data, inputs.rows()));
+        fmt::format("--row is {}, {} has {} rows", arguments.row, table_name(arguments.data), inputs.rows()));
   }
   const Eigen::VectorXd point = inputs.row(arguments.row - 1);
   const Attribution attribution = attribute(model, point);
@@ -83,7 +84,7 @@ void explain_row(const ExplainArguments& arguments, const Model& model, const Ei
   Json json = {{"model", arguments.model}, {"data", arguments.data}, {"row", arguments.row}};
   json["targets"] = Json::array();
   if (!arguments.json) {
-    print(fmt::format("{}: row {}\n", arguments.data, arguments.row));
+    print(fmt::format("{}: row {}\n", table_name(arguments.data), arguments.row));
   }
   for (Eigen::Index o = 0; o < model.num_outputs(); ++o) {
     const std::string& target = model.outputs()[o].name;
@@ -123,7 +124,7 @@ void explain_row(const ExplainArguments& arguments, const Model& model, const Ei
 
 void explain_command(const ExplainArguments& arguments) {
   const Model model = load(arguments.model);
-  const Csv csv = Csv::read(arguments.data);
+  const Csv csv = read_table(arguments.data, arguments.mark);
   if (csv.rows() == 0) {
     throw std::runtime_error(fmt::format("{}: there is a header and no rows", arguments.data));
   }
@@ -138,17 +139,18 @@ void explain_command(const ExplainArguments& arguments) {
 }  // namespace
 
 void add_explain(CLI::App& app) {
-  CLI::App* command = app.add_subcommand("explain", "Say which inputs a model's predictions come from");
-  command->description(
-      "Say which inputs a model's predictions come from: over a table, the importance of each input; for one row of "
-      "it, "
-      "how far each\n"
-      "input moves the prediction away from the one at the means of the inputs.");
+  CLI::App* command = app.add_subcommand(
+      "explain",
+      "Say which inputs a model's predictions come from\n"
+      "Over a table: the importance of each input. For one row of it: how far each input moves the prediction away "
+      "from the one at the means of the inputs.");
   command->footer("Example: llmt explain concrete.json concrete.csv --row 3");
   const auto arguments = std::make_shared<ExplainArguments>();
   add_input_file(*command, "model", arguments->model, "Model file of llmt fit")->required();
-  add_input_file(*command, "data", arguments->data, "CSV file with the model's inputs")->required();
+  add_input_file(*command, "data", arguments->data, "CSV file with the model's inputs; - is standard input")
+      ->required();
   add_count(*command, "--row", arguments->row, Eigen::Index{1}, "Row to explain, the first one below the header is 1");
+  add_decimal_comma(*command, arguments->mark);
   add_threads(*command, arguments->threads);
   command->add_flag("--json", arguments->json, "Print JSON");
   command->callback([arguments] { explain_command(*arguments); });

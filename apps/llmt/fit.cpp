@@ -13,6 +13,7 @@
 #include "llmt/readable_summary.hpp"
 #include "llmt/stream_command.hpp"
 #include "shared/cli.hpp"
+#include "shared/help.hpp"
 #include "shared/options.hpp"
 
 namespace llmt::apps {
@@ -53,7 +54,7 @@ std::optional<ReadableResult> make_readable(const FitArguments& arguments, const
   if (fitted.partitions.front().cv_folds == 0) {
     throw std::runtime_error(
         fmt::format("{}: --readable chooses on held-out rows, and the {} row(s) leave none to hold out",
-                    arguments.learning.data, fitted.samples));
+                    table_name(arguments.learning.data), fitted.samples));
   }
   ReadableResult readable = fit_readable(table.inputs.values, table.outputs, table.options, fitted, loss);
   readable.model = readable.model.named(table.names, arguments.learning.targets, table.inputs.levels);
@@ -105,15 +106,17 @@ void add_fit(CLI::App& app) {
   add_learning_options(*command, arguments->learning);
   add_fit_options(*command, arguments->learning.options);
   add_output_file(*command, "-o,--output", arguments->output, "Model file to write", {readable_extension});
-  command->add_flag("--no-intervals", arguments->no_intervals,
-                    "Leave the folds' models out of the file; it is smaller and has no prediction intervals");
   command
-      ->add_flag("--readable{10}", arguments->readable,
+      ->add_flag("--no-intervals", arguments->no_intervals,
+                 "Leave the folds' models out of the file; it is smaller and has no prediction intervals")
+      ->group(expert_options);
+  command
+      ->add_flag("--readable{15}", arguments->readable,
                  "Also the smallest crisp tree with short, rounded equations whose held-out error is at most this many "
-                 "per cent above that of the best crisp tree; written beside the model as NAME.readable.json")
-      ->option_text("[=LOSS] [10]");
+                 "per cent above that of the best crisp tree [15]; written beside the model as NAME.readable.json")
+      ->option_text("[=LOSS]");
   command->add_flag("--json", arguments->json, "Print the summary as JSON");
-  command->add_flag("--stream", arguments->stream, "Learn row by row in constant memory; DATA - is standard input");
+  command->add_flag("--stream", arguments->stream, "Learn row by row in constant memory");
   command->callback([command, arguments] {
     if (arguments->stream) {
       stream_command(*command, {arguments->learning, arguments->output, arguments->json});

@@ -170,8 +170,8 @@ void print_data(const FitRun& run, const FitResult& result) {
       constant.push_back(input.name);
     }
   }
-  print(fmt::format("{}: {} rows, {} inputs: {}\n", run.learning.data, result.summary.samples, inputs.size(),
-                    fmt::join(inputs, ", ")));
+  print(fmt::format("{}: {} rows, {} inputs: {}\n", table_name(run.learning.data), result.summary.samples,
+                    inputs.size(), fmt::join(inputs, ", ")));
   if (result.summary.repeats) {
     print("Rows with equal inputs are taken for repeats of one measurement, and are held out together\n");
   }

@@ -8,9 +8,11 @@
 #include <utility>
 
 #include "llmt/csv.hpp"
+#include "llmt/names.hpp"
 #include "llmt/outliers.hpp"
 #include "llmt/retired_options.hpp"
 #include "shared/cli.hpp"
+#include "shared/help.hpp"
 #include "shared/options.hpp"
 
 namespace llmt::apps {
@@ -26,8 +28,8 @@ std::vector<int> positions(const char* option, const std::vector<std::string>& n
   for (const std::string& name : names) {
     const auto found = std::ranges::find(inputs, name);
     if (found == inputs.end()) {
-      throw std::invalid_argument(
-          fmt::format("{} has \"{}\", which is not among the inputs {}", option, name, fmt::join(inputs, ", ")));
+      throw std::invalid_argument(fmt::format("{} has \"{}\", which is not among the inputs {}{}", option, name,
+                                              fmt::join(inputs, ", "), did_you_mean(name, inputs)));
     }
     result.push_back(static_cast<int>(found - inputs.begin()));
   }
@@ -77,13 +79,46 @@ void look_for_heavy_rows(const Csv& csv, const LearningArguments& arguments, con
       throw std::runtime_error(fmt::format(
           "{}:{}: column \"{}\": {:.6g} is so large that the differences between all other values are below its "
           "rounding error; correct it, leave the row out, or use --loss tukey",
-          arguments.data, csv.line_of(heavy.rows.front()), name, target(heavy.rows.front())));
+          csv.name(), csv.line_of(heavy.rows.front()), name, target(heavy.rows.front())));
     }
     warn(fmt::format(
         "llmt: {} of {} rows {} {:.3g} % of the squares of \"{}\" about its median: {}. If they are mistakes, correct "
         "them or use --loss tukey",
         heavy.rows.size(), target.size(), heavy.rows.size() == 1 ? "carries" : "carry", 100.0 * heavy.share, name,
         places_of(csv, heavy.rows, target)));
+  }
+}
+
+// Whether the values are consecutive whole numbers, row by row.
+bool numbers_the_rows(const Eigen::Ref<const Eigen::VectorXd>& values) {
+  constexpr Eigen::Index fewest = 20;
+  if (values.size() < fewest || (values(0) != 0.0 && values(0) != 1.0)) return false;
+  for (Eigen::Index i = 1; i < values.size(); ++i) {
+    if (values(i) != values(i - 1) + 1.0) return false;
+  }
+  return true;
+}
+
+// Says which columns are inputs although they look like names or numbers of the rows. Nothing is said of inputs that
+// were asked for.
+void look_for_accidental_inputs(const LearningArguments& arguments, const std::vector<std::string>& names,
+                                const InputColumns& inputs) {
+  constexpr std::size_t most_levels = 20;
+  constexpr double most_levels_per_row = 0.1;
+  if (!arguments.inputs.empty()) return;
+  for (const int column : inputs.categorical) {
+    const std::size_t levels = inputs.levels[column].size();
+    const auto rows = static_cast<double>(inputs.values.rows());
+    if (levels <= most_levels || static_cast<double>(levels) <= most_levels_per_row * rows) continue;
+    if (contains(arguments.categorical, names[column])) continue;
+    warn(fmt::format(
+        "llmt: column \"{}\" has words, {} different ones in {} rows, and is taken for categories; --ignore leaves it "
+        "out, --categorical says that it is meant",
+        names[column], levels, inputs.values.rows()));
+  }
+  for (Eigen::Index column = 0; column < inputs.values.cols(); ++column) {
+    if (!inputs.levels[column].empty() || !numbers_the_rows(inputs.values.col(column))) continue;
+    warn(fmt::format("llmt: column \"{}\" numbers the rows and is an input; --ignore leaves it out", names[column]));
   }
 }
 
@@ -111,9 +146,9 @@ std::vector<std::string> choose_inputs(const Csv& csv, const LearningArguments& 
 }
 
 LearningTable read_learning_table(const LearningArguments& arguments) {
-  const Csv csv = Csv::read(arguments.data);
+  const Csv csv = read_table(arguments.data, arguments.mark);
   if (csv.rows() == 0) {
-    throw std::runtime_error(fmt::format("{}: there is a header and no rows", arguments.data));
+    throw std::runtime_error(fmt::format("{}: there is a header and no rows", csv.name()));
   }
   const std::vector<std::string> inputs = choose_inputs(csv, arguments);
   const std::string hint = arguments.inputs.empty() ? " (--ignore COLUMN leaves a column out)" : "";
@@ -122,6 +157,7 @@ LearningTable read_learning_table(const LearningArguments& arguments) {
       read_learning_columns(csv, {inputs, arguments.categorical, arguments.targets, arguments.weight}, hint,
                             largest_input, arguments.options.max_threads);
   look_for_heavy_rows(csv, arguments, columns);
+  look_for_accidental_inputs(arguments, inputs, columns.inputs);
   LearningTable table{inputs, std::move(columns.inputs), std::move(columns.targets), arguments.options};
   FitOptions& options = table.options;
   options.split_inputs = positions("--split-inputs", arguments.split_inputs, table.names);
@@ -149,50 +185,46 @@ LearningTable read_learning_table(const LearningArguments& arguments) {
 
 void add_learning_options(CLI::App& command, LearningArguments& arguments) {
   FitOptions& options = arguments.options;
-  add_input_file(command, "data", arguments.data, "CSV file with a header row")->required();
-  command.add_option("-t,--target", arguments.targets, "Column to predict; repeat for several")
-      ->required()
-      ->delimiter(',');
-  command.add_option("--inputs", arguments.inputs, "Columns to learn from (default: all but targets and ignored)")
-      ->delimiter(',');
-  command.add_option("--ignore", arguments.ignored, "Columns to leave out")->delimiter(',');
-  command
-      .add_option("--categorical", arguments.categorical,
-                  "Inputs that are categories although they are written as numbers; columns of words are anyway")
-      ->delimiter(',');
-  command.add_option("--weight", arguments.weight, "Column with the weights of the rows");
-  command.add_option("--split-inputs", arguments.split_inputs, "Inputs that may be split (default: all)")
-      ->delimiter(',');
-  command.add_option("--regression-inputs", arguments.regression_inputs, "Inputs of the local models (default: all)")
-      ->delimiter(',');
-  command.add_flag_callback(
-      "--all-inputs", [&options] { options.choose_inputs = false; },
-      "Keep inputs that do not lower the held-out error");
-  command.add_flag_callback(
-      "--no-codes", [&options] { options.choose_codes = false; },
-      "Do not take inputs of few whole numbers for categories where that lowers the held-out error");
-  command
-      .add_option("--monotone", arguments.monotone,
-                  "Inputs with which the prediction never falls, or with a leading minus never rises (--monotone=-x)")
-      ->delimiter(',');
-  command
-      .add_option("--slope-sign", arguments.slope_signs,
-                  "Inputs with slopes >= 0, or with a leading minus <= 0, in every local model; not across leaves")
-      ->delimiter(',');
-  add_count(command, "--max-leaves", options.max_leaves, Eigen::Index{0}, "Most leaves of a tree; 0: the default")
-      ->option_text(fmt::format("COUNT [{}]", default_text("max_leaves")));
-  add_count(command, "--min-leaf", options.min_leaf_samples, Eigen::Index{0}, "Fewest rows in a leaf; 0: the default")
-      ->option_text(fmt::format("COUNT [{}]", default_text("min_leaf_samples")));
-  command.add_flag_callback(
-      "--prune", [&options] { options.pruning = Pruning::weakest_link; },
-      "Undo the splits of the weakest branches first, not the last ones, where fewer leaves predict better");
+  const auto expert = [](CLI::Option* option) { option->group(expert_options); };
+  const auto by_default = [](const char* help, std::string_view option) {
+    return fmt::format("{} [{}]", help, default_text(option));
+  };
+  add_input_file(command, "data", arguments.data, "CSV file with a header row; - is standard input")->required();
+  add_names(command, "-t,--target", arguments.targets, "COLUMN", "What to predict")->required();
+  add_names(command, "--inputs", arguments.inputs, "COLUMN", "What to learn from [all but targets and ignored]");
+  add_names(command, "--ignore", arguments.ignored, "COLUMN", "What to leave out");
+  add_names(command, "--categorical", arguments.categorical, "COLUMN",
+            "Inputs that are categories although they are written as numbers; columns of words are anyway");
+  command.add_option("--weight", arguments.weight, "The weights of the rows [1 for each]")->type_name("COLUMN");
+  add_decimal_comma(command, arguments.mark);
   add_count(command, "--cv", options.folds.count, 0,
             "Folds of the held-out error by which everything is chosen, 0: keep the tree as grown")
       ->capture_default_str();
   command.add_flag("--contiguous", arguments.contiguous,
                    "Folds are blocks of consecutive rows (measured paths, grids, time series)");
-  add_seed(command, options.folds.seed, "Of the random folds");
+  add_count(command, "--max-leaves", options.max_leaves, Eigen::Index{0},
+            by_default("Most leaves of a tree; 0: the default", "max_leaves"));
   add_threads(command, options.max_threads);
+  expert(add_names(command, "--split-inputs", arguments.split_inputs, "COLUMN", "Inputs that may be split [all]"));
+  expert(add_names(command, "--regression-inputs", arguments.regression_inputs, "COLUMN",
+                   "Inputs of the local models [all]"));
+  expert(command.add_flag_callback(
+      "--all-inputs", [&options] { options.choose_inputs = false; },
+      "Keep inputs that do not lower the held-out error"));
+  expert(command.add_flag_callback(
+      "--no-codes", [&options] { options.choose_codes = false; },
+      "Do not take inputs of few whole numbers for categories where that lowers the held-out error"));
+  expert(add_names(command, "--monotone", arguments.monotone, "COLUMN",
+                   "Inputs with which the prediction never falls, or with a leading minus never rises "
+                   "(--monotone=-x)"));
+  expert(add_names(command, "--slope-sign", arguments.slope_signs, "COLUMN",
+                   "Inputs with slopes >= 0, or with a leading minus <= 0, in every local model; not across leaves"));
+  expert(add_count(command, "--min-leaf", options.min_leaf_samples, Eigen::Index{0},
+                   by_default("Fewest rows in a leaf; 0: the default", "min_leaf_samples")));
+  expert(command.add_flag_callback(
+      "--prune", [&options] { options.pruning = Pruning::weakest_link; },
+      "Undo the splits of the weakest branches first, not the last ones, where fewer leaves predict better"));
+  expert(add_seed(command, options.folds.seed, "Of the random folds"));
   refuse_retired_options(command);
 }
 

@@ -23,6 +23,7 @@ struct LearningArguments {
   std::vector<std::string> slope_signs;
   std::string weight;
   bool contiguous = false;
+  DecimalMark mark = DecimalMark::point;
   FitOptions options;
 };
 

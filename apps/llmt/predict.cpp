@@ -25,6 +25,7 @@ struct PredictArguments {
   std::string output;
   bool json = false;
   double interval = 0.0;  // level; 0: none
+  DecimalMark mark = DecimalMark::point;
   int threads = 0;
 };
 
@@ -43,9 +44,10 @@ struct Predicted {
 };
 
 // Shortest text that reads back as the same number.
-void append_number(std::string& text, double value) {
+void append_number(std::string& text, DecimalMark mark, double value) {
   char buffer[32];
   const std::to_chars_result end = std::to_chars(std::begin(buffer), std::end(buffer), value);
+  std::replace(std::begin(buffer), end.ptr, '.', static_cast<char>(mark));
   text.append(buffer, end.ptr);
 }
 
@@ -121,21 +123,21 @@ void write_csv(const Csv& csv, const Predicted& predicted, const TextSink& sink)
     text += csv.row_text(row);
     for (Eigen::Index o = 0; o < predicted.values.cols(); ++o) {
       text += csv.separator();
-      append_number(text, predicted.values(row, o));
+      append_number(text, csv.decimal_mark(), predicted.values(row, o));
       if (predicted.bounds) {
         text += csv.separator();
-        append_number(text, predicted.bounds->lower(row, o));
+        append_number(text, csv.decimal_mark(), predicted.bounds->lower(row, o));
         text += csv.separator();
-        append_number(text, predicted.bounds->upper(row, o));
+        append_number(text, csv.decimal_mark(), predicted.bounds->upper(row, o));
       }
     }
     const Extrapolation& extrapolation = predicted.extrapolation[row];
     text += csv.separator();
     text += extrapolation.distance > 0.0 ? '1' : '0';
     text += csv.separator();
-    append_number(text, extrapolation.distance);
+    append_number(text, csv.decimal_mark(), extrapolation.distance);
     text += csv.separator();
-    append_number(text, extrapolation.leverage);
+    append_number(text, csv.decimal_mark(), extrapolation.leverage);
     text += '\n';
     if (constexpr std::size_t piece = 1 << 16; text.size() >= piece) {
       sink(text);
@@ -185,7 +187,7 @@ Json summary_json(const Predicted& predicted, bool with_values) {
 
 void summarise(const PredictArguments& arguments, const Predicted& predicted) {
   const Eigen::Index outside = count_outside(predicted);
-  std::string text = fmt::format("{}: {} rows predicted", arguments.data, predicted.values.rows());
+  std::string text = fmt::format("{}: {} rows predicted", table_name(arguments.data), predicted.values.rows());
   for (std::size_t o = 0; o < predicted.targets.size(); ++o) {
     const double error = predicted.rmse(o);
     text += std::isnan(error) ? "" : fmt::format("; RMSE of {} {}", predicted.targets[o], number(error));
@@ -217,7 +219,7 @@ void summarise(const PredictArguments& arguments, const Predicted& predicted) {
 void predict_command(const PredictArguments& arguments) {
   const ModelWithIntervals file =
       arguments.interval > 0.0 ? load_with_intervals(arguments.model) : ModelWithIntervals{load(arguments.model), {}};
-  const Csv csv = Csv::read(arguments.data);
+  const Csv csv = read_table(arguments.data, arguments.mark);
   const Predicted predicted = predict_table(arguments, file, csv);
   if (const Eigen::Index count = predicted.count_not_finite(); count > 0) {
     warn(fmt::format("llmt: warning: {} of {} predictions are not finite: numbers of {} are too large for these rows",
@@ -239,22 +241,23 @@ void predict_command(const PredictArguments& arguments) {
 }  // namespace
 
 void add_predict(CLI::App& app) {
-  CLI::App* command = app.add_subcommand("predict", "Apply a model to a table");
-  command->description(
-      "Apply a model to a table: the table's rows, in order, with a column TARGET_pred for every target; outside: 1 "
-      "where an input lies\n"
-      "outside its range in training; outside_by: how far, as a multiple of that range. If the table holds a target, "
-      "its RMSE is reported. leverage: of the row on its local models; 1 and more is extrapolation.");
+  CLI::App* command = app.add_subcommand(
+      "predict",
+      "Apply a model to a table\n"
+      "Writes the table's rows, in order, with more columns. TARGET_pred: the prediction. outside: 1 where an input "
+      "lies outside its range in training. outside_by: how far, as a multiple of that range. leverage: of the row on "
+      "its local models; 1 and more is extrapolation. If the table holds a target, its RMSE is reported.");
   command->footer("Example: llmt predict concrete.json new.csv -o predicted.csv");
   const auto arguments = std::make_shared<PredictArguments>();
   add_input_file(*command, "model", arguments->model, "Model file of llmt fit")->required();
   add_input_file(*command, "data", arguments->data,
-                 "CSV file with the model's inputs; other columns are passed through")
+                 "CSV file with the model's inputs; other columns are passed through; - is standard input")
       ->required();
-  add_output_file(*command, "-o,--output", arguments->output, "CSV file to write (default: standard output)");
+  add_output_file(*command, "-o,--output", arguments->output, "CSV file to write [standard output]");
   constexpr NumberRange level = {0.01, 0.9999, "a number from 0.01 to 0.9999"};
   add_number(*command, "--interval", arguments->interval, level,
              "Level of prediction intervals, such as 0.9: adds TARGET_low and TARGET_high");
+  add_decimal_comma(*command, arguments->mark);
   add_threads(*command, arguments->threads);
   command->add_flag("--json", arguments->json, "Print JSON; it holds the predictions unless -o is given");
   command->callback([arguments] { predict_command(*arguments); });

@@ -30,10 +30,12 @@ struct Learned {
   std::vector<LargestMagnitude> largest_targets;
 };
 
+constexpr std::size_t piece_bytes = 1 << 20;
+
 void refuse_other_options(const CLI::App& command) {
-  constexpr std::array<std::string_view, 13> taken = {"data",         "target",     "inputs", "ignore",   "weight",
-                                                      "min-leaf",     "max-leaves", "stream", "validity", "shrinkage",
-                                                      "significance", "output",     "json"};
+  constexpr std::array<std::string_view, 14> taken = {
+      "data",   "target",   "inputs",    "ignore",       "weight", "min-leaf", "max-leaves",
+      "stream", "validity", "shrinkage", "significance", "output", "json",     "decimal-comma"};
   for (const CLI::Option* option : command.get_options()) {
     const std::string name = option->get_single_name();
     if (option->count() > 0 && std::ranges::find(taken, name) == taken.end()) {
@@ -94,6 +96,8 @@ void add(const Csv& piece, const StreamArguments& arguments, Learned& learned) {
   Eigen::MatrixXd inputs;
   try {
     inputs = piece.numbers_or_missing(learned.inputs, 1);
+  } catch (const DecimalCommaError&) {
+    throw;
   } catch (const std::runtime_error& error) {
     throw std::runtime_error(std::string(error.what()) +
                              " (--stream takes no categories; --ignore COLUMN leaves a column out)");
@@ -110,7 +114,7 @@ Learned learn(const CLI::App& command, const StreamArguments& arguments) {
   const StreamOptions options = options_of(command, arguments);
   const LearningArguments& learning = arguments.learning;
   const bool standard_input = learning.data == "-";
-  Learned learned{standard_input ? "standard input" : learning.data, {}, nullptr, {}, {}};
+  Learned learned{table_name(learning.data), {}, nullptr, {}, {}};
   std::ifstream file;
   if (!standard_input) {
     file.open(learning.data, std::ios::binary);
@@ -120,7 +124,7 @@ Learned learn(const CLI::App& command, const StreamArguments& arguments) {
   } else {
     std::ios::sync_with_stdio(false);
   }
-  CsvPieces pieces(standard_input ? std::cin : file, learned.name);
+  CsvPieces pieces(standard_input ? std::cin : file, learned.name, piece_bytes, learning.mark);
   while (const std::optional<Csv> piece = pieces.next()) {
     if (!learned.stream) {
       learned.inputs = choose_inputs(*piece, learning);

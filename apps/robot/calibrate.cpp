@@ -248,14 +248,13 @@ void calibrate_command(CalibrateArguments arguments) {
 }  // namespace
 
 void add_calibrate(CLI::App& app) {
-  CLI::App* command = app.add_subcommand("calibrate", "Identify a robot's parameters from measured positions");
-  command->description(
-      "Identify base, tool and geometry of a robot from measured tool positions; with --correct, learn what is left\n"
-      "as a function of the joint values. Held-out figures: everything, the size of the correction included, is\n"
-      "fitted without the poses it is judged on.\n"
-      "The correction is kept if it lowers the held-out mean error by more than two standard errors of the "
-      "difference;\n"
-      "with --folds 0 it is kept without a test.");
+  CLI::App* command = app.add_subcommand(
+      "calibrate",
+      "Identify a robot's parameters from measured positions\n"
+      "Identifies base, tool and geometry; with --correct, learns what is left as a function of the joint "
+      "values. Held-out figures: everything, the size of the correction included, is fitted without the "
+      "poses it is judged on. The correction is kept if it lowers the held-out mean error by more than two "
+      "standard errors of the difference; with --folds 0 it is kept without a test.");
   command->footer("Example: llmt-robot calibrate robotics/robots/ur10.yaml measured.csv --correct -o calibrated.yaml");
   const auto arguments = std::make_shared<CalibrateArguments>();
   robotics::ReportOptions& options = arguments->options;
@@ -265,10 +264,10 @@ void add_calibrate(CLI::App& app) {
   add_count(*command, "--folds", options.folds, 0, "Folds of the held-out figures, 0: none")->capture_default_str();
   command->add_flag("--contiguous", arguments->contiguous, "Folds are blocks of consecutive rows: for paths and grids");
   add_input_file(*command, "--test", arguments->test, "Further measurements that take no part, judged at the end");
-  command->add_option("--fix", options.calibration.fixed, "Parameters to keep as given: joint2.a, joint3, base, tool")
-      ->delimiter(',');
-  command->add_option("--only", options.calibration.only, "Free these parameters and no others, base and tool included")
-      ->delimiter(',');
+  add_names(*command, "--fix", options.calibration.fixed, "PARAMETER",
+            "What to keep as given: joint2.a, joint3, base, tool");
+  add_names(*command, "--only", options.calibration.only, "PARAMETER",
+            "Free these and no others, base and tool included");
   add_count(*command, "--max-leaves", options.correction.max_leaves, Eigen::Index{0},
             "Most leaves of a tree of the correction, 0: no limit")
       ->capture_default_str();

@@ -148,11 +148,12 @@ void discover_command(DiscoverArguments arguments) {
 }  // namespace
 
 void add_discover(CLI::App& app) {
-  CLI::App* command = app.add_subcommand("discover", "Find, name and add the physical effect that a model lacks");
-  command->description(
-      "Find where a robot description and measurements disagree, name the physical effect that is missing, add it,\n"
-      "and show the error on poses that took no part. Or say that nothing is missing, that causes cannot be told\n"
-      "apart, or that the catalogue does not know what is there.");
+  CLI::App* command = app.add_subcommand(
+      "discover",
+      "Find, name and add the physical effect that a model lacks\n"
+      "Finds where a robot description and measurements disagree, names the physical effect that is "
+      "missing, adds it, and shows the error on poses that took no part. Or says that nothing is missing, "
+      "that causes cannot be told apart, or that the catalogue does not know what is there.");
   command->footer("Example: llmt-robot discover robot.yaml measured.csv -o improved.yaml");
   const auto arguments = std::make_shared<DiscoverArguments>();
   add_input_file(*command, "robot", arguments->robot, "Robot description (YAML)")->required();

@@ -11,7 +11,7 @@ void llmt::apps::check_positions(const std::string& file, const robotics::Robot&
 int main(int argc, char** argv) {
   CLI::App app{"Calibrate a robot from measured positions, learn what its model misses, and remove it.", "llmt-robot"};
   app.require_subcommand(1);
-  app.set_help_all_flag("--help-all", "Help of all commands");
+  app.set_help_all_flag("--help-all", "Help with all options, also those for experts");
   llmt::apps::add_paper(app);
   llmt::apps::add_simulate(app);
   llmt::apps::add_calibrate(app);

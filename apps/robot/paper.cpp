@@ -234,11 +234,11 @@ void paper_command(const PaperArguments& arguments) {
 }  // namespace
 
 void add_paper(CLI::App& app) {
-  CLI::App* command = app.add_subcommand("paper", "Make the comparison of Benes et al. 2022 anew");
-  command->description(
-      "Make the comparison of Benes et al. 2022 anew. planar: table 1, the flexible two-link arm. tx200: what five "
-      "linear models fitted to\n"
-      "45 poses are worth on poses they have not seen.");
+  CLI::App* command = app.add_subcommand(
+      "paper",
+      "Make the comparison of Benes et al. 2022 anew\n"
+      "planar: table 1, the flexible two-link arm. tx200: what five linear models fitted to 45 poses are "
+      "worth on poses they have not seen.");
   command->footer("Example: llmt-robot paper --study tx200 --seeds 10");
   const auto arguments = std::make_shared<PaperArguments>();
   command->add_option("--study", arguments->study, "planar or tx200")

@@ -67,12 +67,12 @@ void simulate_command(const SimulateArguments& arguments) {
 }  // namespace
 
 void add_simulate(CLI::App& app) {
-  CLI::App* command = app.add_subcommand("simulate", "Make measurements of a robot that is not there");
-  command->description(
-      "Make measurements of a robot that is not there: poses uniform within the joint limits, tool positions with the "
-      "effects of the\n"
-      "description and normal noise. Columns that effects need are made up: order, temp_C at the reference, directions "
-      "at random.");
+  CLI::App* command = app.add_subcommand(
+      "simulate",
+      "Make measurements of a robot that is not there\n"
+      "Poses are uniform within the joint limits; tool positions have the effects of the description and "
+      "normal noise. Columns that effects need are made up: order, temp_C at the reference, directions at "
+      "random.");
   command->footer(
       "Example: llmt-robot simulate robotics/robots/tx200_like.yaml --poses 200 --noise-um 10 -o measured.csv");
   const auto arguments = std::make_shared<SimulateArguments>();

@@ -4,27 +4,20 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cmath>
+#include <cctype>
 #include <csignal>
 #include <cstdio>
 #include <new>
 #include <sstream>
 #include <stdexcept>
 
+#include "llmt/csv.hpp"
 #include "llmt/files.hpp"
+#include "shared/help.hpp"
 #include "shared/options.hpp"
 
 namespace llmt::apps {
 namespace {
-
-// Columns on a terminal: bytes of UTF-8 that begin a character.
-std::size_t width(const std::string& text) {
-  return std::ranges::count_if(text, [](char c) { return (c & 0xC0) != 0x80; });
-}
-
-bool looks_like_number(const std::string& text) {
-  return text.find_first_not_of("0123456789.+-e%") == std::string::npos;
-}
 
 // Ends the program as the signal would have, but for temporary files.
 extern "C" void end_by_signal(int signal) {
@@ -49,12 +42,17 @@ int parse(CLI::App& app, int argc, char** argv) {
     app.parse(argc, argv);
     return exit_done;
   } catch (const CLI::ParseError& error) {  // --help and --version come this way too
+    if (error.get_exit_code() != 0) {
+      const bool is_extra = dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr;
+      warn(fmt::format("{}: {}{}", app.get_name(), error.what(),
+                       is_extra ? hint_on_extra_argument(app, argc, argv) : std::string()));
+      return exit_usage;
+    }
     std::ostringstream out;
     std::ostringstream err;
-    const int code = app.exit(error, out, err);
+    app.exit(error, out, err);
     print(out.str());
-    if (!err.str().empty()) warn(err.str().substr(0, err.str().find_last_not_of('\n') + 1));
-    return code == 0 ? exit_done : exit_usage;
+    return exit_done;
   }
 }
 
@@ -85,57 +83,51 @@ void write_stdout(std::string_view text) {
 
 }  // namespace
 
-int run(CLI::App& app, int argc, char** argv) {
+std::string in_words_of_user(std::string_view message, std::span<const SettingName> names) {
+  const auto is_part = [](char c) { return c == '_' || c == ':' || std::isalnum(static_cast<unsigned char>(c)) != 0; };
+  std::string text(message);
+  for (std::size_t at = text.find("llmt::"); at != std::string::npos; at = text.find("llmt::", at + 1)) {
+    const std::size_t end = std::find_if_not(text.begin() + at, text.end(), is_part) - text.begin();
+    const bool begins = at == 0 || text[at - 1] == ' ';
+    if (begins && text[end - 1] == ':' && end < text.size() && text[end] == ' ') text.erase(at, end + 1 - at);
+  }
+  if (text.size() == message.size()) return text;
+  for (const SettingName& name : names) {
+    for (std::size_t at = text.find(name.setting); at != std::string::npos; at = text.find(name.setting, at)) {
+      const std::size_t end = at + name.setting.size();
+      const bool is_whole = (at == 0 || (!is_part(text[at - 1]) && text[at - 1] != '.' && text[at - 1] != '-')) &&
+                            (end == text.size() || !is_part(text[end]));
+      if (is_whole) text.replace(at, name.setting.size(), name.option);
+      at += is_whole ? name.option.size() : 1;
+    }
+  }
+  return text;
+}
+
+int run(CLI::App& app, int argc, char** argv, std::span<const SettingName> names) {
   app.set_version_flag("--version", fmt::format("{} {}", app.get_name(), LLMT_VERSION));
   handle_signals();
-  const auto fail = [&](const char* reason, int code) {
-    warn(fmt::format("{}: {}", app.get_name(), reason));
+  set_up_help(app);
+  const auto fail = [&](std::string_view reason, int code) {
+    warn(fmt::format("{}: {}", app.get_name(), in_words_of_user(reason, names)));
     return code;
   };
   try {
     require_ranges(app);
+    refuse_unknown_names(app, argc, argv);
     return parse(app, argc, argv);
   } catch (const std::invalid_argument& error) {
     return fail(error.what(), exit_usage);
+  } catch (const DecimalCommaError& error) {
+    const CLI::App* const command = app.get_subcommands().front();
+    const bool can_read = command->get_option_no_throw(decimal_comma_option) != nullptr;
+    return fail(error.what() + (can_read ? fmt::format("; {} reads such files", decimal_comma_option) : ""),
+                exit_refused);
   } catch (const std::bad_alloc&) {
     return fail("there is not enough memory for this", exit_refused);
   } catch (const std::exception& error) {
     return fail(error.what(), exit_refused);
   }
-}
-
-std::string Table::text() const {
-  const std::size_t columns = rows_.front().size();
-  std::vector<std::size_t> widths(columns, 0);
-  std::vector<bool> numeric(columns, rows_.size() > 1);
-  for (std::size_t r = 0; r < rows_.size(); ++r) {
-    for (std::size_t c = 0; c < columns; ++c) {
-      widths[c] = std::max(widths[c], width(rows_[r][c]));
-      numeric[c] = numeric[c] && (r == 0 || looks_like_number(rows_[r][c]));
-    }
-  }
-  std::string text;
-  for (const std::vector<std::string>& row : rows_) {
-    std::string line;
-    for (std::size_t c = 0; c < columns; ++c) {
-      const std::string padding(widths[c] - width(row[c]), ' ');
-      line += (c > 0 ? "  " : "") + (numeric[c] ? padding + row[c] : row[c] + padding);
-    }
-    line.erase(line.find_last_not_of(' ') + 1);
-    text += line + "\n";
-  }
-  return text;
-}
-
-std::string number(double value, int digits) {
-  if (std::isnan(value)) return "-";
-  const double magnitude = std::abs(value);
-  if (magnitude == 0.0) return "0";
-  if (magnitude < 1e-4 || magnitude >= 1e7 || !std::isfinite(value)) {
-    return fmt::format("{:.{}g}", value, digits);
-  }
-  const int before_point = 1 + static_cast<int>(std::floor(std::log10(magnitude)));
-  return fmt::format("{:.{}f}", value, std::max(0, digits - before_point));
 }
 
 std::string without_controls(std::string_view text) {
@@ -150,7 +142,10 @@ std::string without_controls(std::string_view text) {
   return result;
 }
 
-void print(std::string_view text) { write_stdout(without_controls(text)); }
+void print(std::string_view text) {
+  constexpr std::size_t indent = 2;
+  write_stdout(wrapped(without_controls(text), output_width(), indent));
+}
 
 void print_bytes(std::string_view text) { ::isatty(STDOUT_FILENO) != 0 ? print(text) : write_stdout(text); }
 
@@ -160,21 +155,5 @@ void print_json(const Json& json) {
 }
 
 void warn(const std::string& text) { fmt::print(stderr, "{}\n", without_controls(shortened(text))); }
-
-void Progress::show(Eigen::Index done, Eigen::Index total) {
-  if (::isatty(STDERR_FILENO) == 0) return;
-  constexpr Eigen::Index bar = 30;
-  const Eigen::Index filled = total > 0 ? bar * done / total : bar;
-  fmt::print(stderr, "\r{} [{}{}] {}/{}", what_, std::string(filled, '#'), std::string(bar - filled, '.'), done, total);
-  std::fflush(stderr);
-  shown_ = true;
-}
-
-void Progress::clear() {
-  if (shown_) {
-    fmt::print(stderr, "\r\033[K");
-    shown_ = false;
-  }
-}
 
 }  // namespace llmt::apps

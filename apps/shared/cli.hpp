@@ -3,11 +3,13 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
-#include <Eigen/Core>
 #include <nlohmann/json.hpp>
+#include <span>
 #include <string>
 #include <string_view>
-#include <vector>
+
+#include "shared/progress.hpp"
+#include "shared/text.hpp"
 
 namespace llmt::apps {
 
@@ -18,32 +20,28 @@ inline constexpr int exit_done = 0;
 inline constexpr int exit_refused = 1;
 inline constexpr int exit_usage = 2;
 
-/// Adds --version, parses the command line, runs the callbacks of the subcommands and turns what they throw into a
-/// message on stderr and an exit code: std::invalid_argument (an option that the library cannot accept) is wrong usage,
-/// every other exception a refusal. SIGINT, SIGTERM and SIGHUP end the program without leaving a temporary file; a file
-/// that may not grow further (SIGXFSZ) is a failed write.
-int run(CLI::App& app, int argc, char** argv);
-
-/// Rows of text under a header, columns aligned: words to the left, numbers to the right.
-class Table {
- public:
-  explicit Table(std::vector<std::string> header) : rows_{std::move(header)} {}
-  void add(std::vector<std::string> row) { rows_.push_back(std::move(row)); }
-  std::string text() const;
-
- private:
-  std::vector<std::vector<std::string>> rows_;
+/// How the library's name of a setting is written on the command line: "folds.count", "--cv".
+struct SettingName {
+  std::string_view setting;
+  std::string_view option;
 };
 
-/// A number for people: `digits` significant digits, without an exponent where that is short.
-std::string number(double value, int digits = 4);
+/// The message of an error as a user of the program knows the words: without the C++ function that it begins with, and
+/// with options in place of the settings that it names.
+std::string in_words_of_user(std::string_view message, std::span<const SettingName> names);
+
+/// Adds --version, parses the command line, runs the callbacks of the subcommands and turns what they throw into a
+/// message on stderr and an exit code: std::invalid_argument (an option that the library cannot accept) is wrong usage,
+/// every other exception a refusal. `names`: for in_words_of_user(). SIGINT, SIGTERM and SIGHUP end the program without
+/// leaving a temporary file; a file that may not grow further (SIGXFSZ) is a failed write.
+int run(CLI::App& app, int argc, char** argv, std::span<const SettingName> names = {});
 
 /// The text with control characters but tabs and line breaks written as \x1b: names that come from files cannot give
 /// orders to a terminal.
 std::string without_controls(std::string_view text);
 
-/// Prints text for people to stdout, without_controls(), and reports a stdout that cannot take it (a full disk, a
-/// closed pipe) as std::runtime_error.
+/// Prints text for people to stdout, without_controls() and wrapped() to the terminal's width, and reports a stdout
+/// that cannot take it (a full disk, a closed pipe) as std::runtime_error.
 void print(std::string_view text);
 /// Prints data for programs: as it is, but on a terminal as print().
 void print_bytes(std::string_view text);
@@ -52,20 +50,5 @@ void print_json(const Json& json);
 
 /// A line on stderr, without_controls(). Of a long text (a message may quote what it refuses) the middle is left out.
 void warn(const std::string& text);
-
-/// How far a long job is: "fold 3 of 5" on one line of stderr, rewritten in place, only where stderr is a terminal.
-class Progress {
- public:
-  explicit Progress(std::string what) : what_(std::move(what)) {}
-  ~Progress() { clear(); }
-  Progress(const Progress&) = delete;
-  Progress& operator=(const Progress&) = delete;
-  void show(Eigen::Index done, Eigen::Index total);
-  void clear();
-
- private:
-  std::string what_;
-  bool shown_ = false;
-};
 
 }  // namespace llmt::apps

@@ -9,6 +9,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "llmt/files.hpp"
 #include "llmt/options.hpp"
 
 namespace llmt::apps {
@@ -70,6 +71,13 @@ bool contains(const std::vector<std::string>& names, const std::string& name) {
 }
 
 }  // namespace
+
+std::string table_name(const std::string& path) { return path == "-" ? "standard input" : path; }
+
+Csv read_table(const std::string& path, DecimalMark mark) {
+  if (path != "-") return Csv::read(path, mark);
+  return Csv::parse(read_file("/dev/stdin"), table_name(path), mark);
+}
 
 void refuse_large(const Csv& csv, std::span<const std::string> columns, const Eigen::MatrixXd& values,
                   std::span<const double> most) {
@@ -136,7 +144,8 @@ LearningColumns read_learning_columns(const Csv& csv, const ColumnRoles& roles, 
   std::vector<Eigen::Index> bad(columns.size(), ColumnCells::no_row);
   for (std::size_t i = 0; i < columns.size(); ++i) {
     const bool is_input = i < num_inputs;
-    const bool only_words = cells[i].other > cells[i].infinite && cells[i].other + cells[i].missing == csv.rows();
+    const bool only_words =
+        cells[i].other > cells[i].infinite + cells[i].other_mark && cells[i].other + cells[i].missing == csv.rows();
     if (is_input && (only_words || contains(roles.categorical, columns[i]))) {
       result.inputs.categorical.push_back(static_cast<int>(i));
     } else {
@@ -148,6 +157,8 @@ LearningColumns read_learning_columns(const Csv& csv, const ColumnRoles& roles, 
   csv.refuse_first(names.subspan(num_inputs), bad_rows.subspan(num_inputs));
   try {
     csv.refuse_first(names.first(num_inputs), bad_rows.first(num_inputs));
+  } catch (const DecimalCommaError&) {
+    throw;
   } catch (const std::runtime_error& error) {
     throw std::runtime_error(error.what() + input_hint);
   }

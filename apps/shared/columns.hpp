@@ -12,6 +12,12 @@
 
 namespace llmt::apps {
 
+/// The name of a table in messages: its path, or "standard input" for a dash.
+std::string table_name(const std::string& path);
+
+/// A table from a file, or from standard input if `path` is a dash. Throws as Csv::read().
+Csv read_table(const std::string& path, DecimalMark mark);
+
 /// Which column of a table is what.
 struct ColumnRoles {
   std::vector<std::string> inputs;
@@ -51,7 +57,8 @@ struct LargestMagnitude {
 /// As refuse_large() for the first weight below 0.
 void refuse_negative_weight(const Csv& csv, const std::string& column, const Eigen::VectorXd& weights);
 
-/// Reads the columns. An input is categorical if it is listed as such, or if none of its cells is a number. A cell that
+/// Reads the columns. An input is categorical if it is listed as such, or if none of its cells is a number, with a
+/// decimal comma either. A cell that
 /// is needed as a number and is none, a word among numbers, is an error, `path:line: column "c": ...`; for an input it
 /// ends in `input_hint`. The same holds for what the learner cannot take: numbers above `largest_input` (targets and
 /// weights: largest_magnitude), columns too small to be squared, negative weights, weights that are all 0, too many

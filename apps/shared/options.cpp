@@ -71,9 +71,26 @@ CLI::Option* add_numbers(CLI::App& command, const std::string& name, std::vector
     }
     return true;
   };
-  return add_text(command, name, "NUMBER", take, help, [&values] { return fmt::format("{}", fmt::join(values, ",")); })
+  return add_text(command, name, "NUMBER,...", take, help,
+                  [&values] { return fmt::format("{}", fmt::join(values, ",")); })
       ->expected(CLI::detail::expected_max_vector_size)
+      ->allow_extra_args(false)
       ->delimiter(',');
+}
+
+CLI::Option* add_names(CLI::App& command, const std::string& name, std::vector<std::string>& values, const char* type,
+                       const std::string& help) {
+  return command.add_option(name, values, help)
+      ->type_name(fmt::format("{},...", type))
+      ->allow_extra_args(false)
+      ->delimiter(',');
+}
+
+CLI::Option* add_decimal_comma(CLI::App& command, DecimalMark& mark) {
+  const auto take = [&mark] { mark = DecimalMark::comma; };
+  return command.add_flag_callback(
+      decimal_comma_option, take,
+      "Numbers of the table have a decimal comma; fields are separated by semicolons or tabs");
 }
 
 std::int64_t read_count(const std::string& option, const std::string& text, std::int64_t low, std::int64_t high) {
@@ -111,24 +128,28 @@ CLI::Option* add_output_file(CLI::App& command, const std::string& name, std::st
   // The texts of all options are there before the first of them is taken.
   const auto take = [&command, &path, extensions](const CLI::results_t& texts) {
     path = texts.back();
-    std::vector<std::string> written = {path};
-    for (const std::string& extension : extensions) {
-      written.push_back(beside(path, extension).string());
-    }
-    const auto is_input = [](const CLI::Option* option) { return option->get_type_name() == input_type; };
-    for (const CLI::Option* option : std::as_const(command).get_options(is_input)) {
-      for (const std::string& input : option->results()) {
-        for (const std::string& output : written) {
-          refuse_lost_input(output, input == "-" ? "/dev/stdin" : input);
-        }
-      }
-    }
-    for (const std::string& output : written) {
-      refuse_impossible_place(output);
-    }
+    check_output_file(command, path, extensions);
     return true;
   };
   return add_text(command, name, output_type, take, help, {});
+}
+
+void check_output_file(const CLI::App& command, const std::string& path, const std::vector<std::string>& extensions) {
+  std::vector<std::string> written = {path};
+  for (const std::string& extension : extensions) {
+    written.push_back(beside(path, extension).string());
+  }
+  const auto is_input = [](const CLI::Option* option) { return option->get_type_name() == input_type; };
+  for (const CLI::Option* option : command.get_options(is_input)) {
+    for (const std::string& input : option->results()) {
+      for (const std::string& output : written) {
+        refuse_lost_input(output, input == "-" ? "/dev/stdin" : input);
+      }
+    }
+  }
+  for (const std::string& output : written) {
+    refuse_impossible_place(output);
+  }
 }
 
 void refuse_lost_input(const std::string& output, const std::string& input) {

@@ -11,6 +11,8 @@
 #include <string>
 #include <vector>
 
+#include "llmt/csv.hpp"
+
 namespace llmt::apps {
 
 /// Numbers from `low` to `high`, both included. NaN is in no range.
@@ -57,11 +59,19 @@ CLI::Option* add_count(CLI::App& command, const std::string& name, Whole& value,
   return add_text(command, name, "COUNT", take, help, [&value] { return std::to_string(value); });
 }
 
+/// An option with names of columns or the like, separated by commas or given one by one; `type` is shown as "TYPE,...".
+CLI::Option* add_names(CLI::App& command, const std::string& name, std::vector<std::string>& values, const char* type,
+                       const std::string& help);
+
 /// The seed of random numbers, from 0 to 2^64 - 1.
 CLI::Option* add_seed(CLI::App& command, std::uint64_t& seed, const std::string& help);
 
 /// --threads; the default is shown.
 CLI::Option* add_threads(CLI::App& command, int& threads);
+
+/// --decimal-comma: the numbers of the command's tables have a decimal comma.
+inline constexpr const char* decimal_comma_option = "--decimal-comma";
+CLI::Option* add_decimal_comma(CLI::App& command, DecimalMark& mark);
 
 /// A file that the command reads, shown as FILE. A dash is standard input where the command says so.
 CLI::Option* add_input_file(CLI::App& command, const std::string& name, std::string& path, const std::string& help);
@@ -71,6 +81,10 @@ CLI::Option* add_input_file(CLI::App& command, const std::string& name, std::str
 /// lies in none. `extensions`: of further files that are written beside it under its name.
 CLI::Option* add_output_file(CLI::App& command, const std::string& name, std::string& path, const std::string& help,
                              const std::vector<std::string>& extensions = {});
+
+/// The checks of add_output_file() for a path that is known later.
+void check_output_file(const CLI::App& command, const std::string& path,
+                       const std::vector<std::string>& extensions = {});
 
 /// The check above for an input that is known only when another one has been read.
 void refuse_lost_input(const std::string& output, const std::string& input);

@@ -113,7 +113,7 @@ TEST(BadData, EndlessInputsAreRefused) {
   refused("fit /dev/zero -t y", "/dev/zero: cannot be read: no line ends within 16 MiB");
   refused("fit /dev/zero -t y --stream", "/dev/zero:1: no row ends within 16 MiB (is a quote left open?)");
   folder.write("d.csv", table("1,1,1,1"));
-  refused("discover d.csv d.csv --output y --terms /dev/zero",
+  refused("discover d.csv d.csv --target y --terms /dev/zero",
           "/dev/zero: cannot be read: it holds more than 16 MiB, the most that is read");
 }
 

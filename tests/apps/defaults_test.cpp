@@ -1,15 +1,25 @@
 // The defaults of the library, of the help text and of docs/commands.md are the same.
 #include <fmt/format.h>
 
+#include <sstream>
+
 #include "apps/program.hpp"
 #include "llmt/files.hpp"
 #include "llmt/options.hpp"
 
 namespace {
 
+// Every blank and line break becomes one blank.
+std::string on_one_line(const std::string& text) {
+  std::string line;
+  std::istringstream words(text);
+  for (std::string word; words >> word;) line += (line.empty() ? "" : " ") + word;
+  return line;
+}
+
 TEST(Defaults, HelpAndCommandsPageStateThoseOfTheLibrary) {
   const program::Folder folder;
-  const std::string help = folder.run(LLMT_PROGRAM " fit --help").out;
+  const std::string help = on_one_line(folder.run(LLMT_PROGRAM " fit --help-all").out);
   const std::string page = llmt::read_file(LLMT_DOCS "/commands.md");
   for (const char* option :
        {"max_leaves", "min_leaf_samples", "significance", "widths", "jumps", "ridges", "shrinkages"}) {

@@ -51,7 +51,7 @@ double parameter(const json& effect, const std::string& name, const std::string&
 TEST(LlmtDiscover, NamesWhatIsMissingAndCorrectsIt) {
   const Folder folder;
   write_tables(folder, 200, step_and_settling);
-  const std::string command = discover + "s.csv m.csv --inputs a,b,t --output y";
+  const std::string command = discover + "s.csv m.csv --inputs a,b,t --target y";
   const Outcome outcome = folder.run(command + " -o c.csv --json");
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_EQ(outcome.err, "");
@@ -96,11 +96,11 @@ TEST(LlmtDiscover, NamesWhatIsMissingAndCorrectsIt) {
 TEST(LlmtDiscover, NothingMissingSaysWhatWouldHaveBeenSeen) {
   const Folder folder;
   write_tables(folder, 100, [](const Row&) { return 0.0; });
-  const Outcome text = folder.run(discover + "s.csv m.csv --output y");
+  const Outcome text = folder.run(discover + "s.csv m.csv --target y");
   EXPECT_EQ(text.exit_code, 0);
   EXPECT_NE(text.out.find("nothing is missing that these rows could show"), std::string::npos) << text.out;
   EXPECT_NE(text.out.find("Smallest terms that would have been found"), std::string::npos);
-  const json report = json::parse(folder.run(discover + "s.csv m.csv --output y --json").out);
+  const json report = json::parse(folder.run(discover + "s.csv m.csv --target y --json").out);
   EXPECT_EQ(report["verdict"], "nothing missing");
   EXPECT_EQ(report["effects"], json::array());
   EXPECT_GT(report["smallest_visible"].size(), 10U);
@@ -112,13 +112,13 @@ TEST(LlmtDiscover, OwnTermsAreTriedUnderTheirNames) {
   write_tables(folder, 200, [](const Row& row) { return 0.4 * std::sqrt(row.b) * std::sin(row.a); });
   folder.write("terms.txt",
                "# what we suspect\nslip = sqrt(b) * sin(a)   # per load\nheat = b^2 * t\nlinear_b = 2 * b\n");
-  const json report = json::parse(folder.run(discover + "s.csv m.csv --output y --terms terms.txt --json").out);
+  const json report = json::parse(folder.run(discover + "s.csv m.csv --target y --terms terms.txt --json").out);
   ASSERT_EQ(report["effects"].size(), 1U);
   EXPECT_EQ(report["effects"][0]["name"], "slip");
   EXPECT_EQ(report["effects"][0]["formula"], "sqrt(b) * sin(a)");
   EXPECT_NEAR(parameter(report["effects"][0], "coefficient"), 0.4, 0.05);
   const json own =
-      json::parse(folder.run(discover + "s.csv m.csv --output y --terms terms.txt --own-terms-only --json").out);
+      json::parse(folder.run(discover + "s.csv m.csv --target y --terms terms.txt --own-terms-only --json").out);
   EXPECT_EQ(own["effects"][0]["name"], "slip");
   EXPECT_LT(own["hypotheses"], report["hypotheses"]);
 }
@@ -126,7 +126,7 @@ TEST(LlmtDiscover, OwnTermsAreTriedUnderTheirNames) {
 TEST(LlmtDiscover, WhatNoTermExplainsIsUnknown) {
   const Folder folder;
   write_tables(folder, 200, [](const Row& row) { return 0.4 * std::tanh(1.5 * (row.a - 1.3)); });
-  const json report = json::parse(folder.run(discover + "s.csv m.csv --output y --json").out);
+  const json report = json::parse(folder.run(discover + "s.csv m.csv --target y --json").out);
   EXPECT_EQ(report["verdict"], "unknown effect");
   EXPECT_EQ(report["unknown"]["acts_on"], "y");
   EXPECT_EQ(report["unknown"]["depends_on"], (json{"a"}));
@@ -137,7 +137,7 @@ TEST(LlmtDiscover, WhatNoTermExplainsIsUnknown) {
 TEST(LlmtDiscover, TheSimulationMayAdjustItself) {
   const Folder folder;
   write_tables(folder, 150, [](const Row& row) { return 0.7 + 0.02 * (3.0 + 2.0 * row.a - 4.0 * row.b); });
-  const std::string command = discover + "s.csv m.csv --output y --json";
+  const std::string command = discover + "s.csv m.csv --target y --json";
   EXPECT_EQ(json::parse(folder.run(command).out)["effects"].size(), 2U);
   const json adjusted = json::parse(folder.run(command + " --allow offset,scale").out);
   EXPECT_EQ(adjusted["verdict"], "nothing missing");
@@ -165,7 +165,7 @@ TEST(LlmtDiscover, TheOrderOfMeasurementIsAnInput) {
   }
   folder.write("s.csv", simulated);
   folder.write("m.csv", measured);
-  const json report = json::parse(folder.run(discover + "s.csv m.csv --inputs x --output y --order when --json").out);
+  const json report = json::parse(folder.run(discover + "s.csv m.csv --inputs x --target y --order when --json").out);
   ASSERT_EQ(report["effects"].size(), 1U);
   EXPECT_EQ(report["effects"][0]["name"], "direction");
   EXPECT_EQ(report["effects"][0]["location"], "x");
@@ -186,7 +186,7 @@ TEST(LlmtDiscover, SeveralOutputsInDifferentUnits) {
   }
   folder.write("s.csv", simulated);
   folder.write("m.csv", measured);
-  const json report = json::parse(folder.run(discover + "s.csv m.csv --output y,z --json").out);
+  const json report = json::parse(folder.run(discover + "s.csv m.csv --target y,z --json").out);
   ASSERT_EQ(report["effects"].size(), 2U);
   for (const json& effect : report["effects"]) {
     EXPECT_EQ(effect["name"], effect["output"] == "y" ? "product" : "square");
@@ -198,7 +198,7 @@ TEST(LlmtDiscover, SeveralOutputsInDifferentUnits) {
 TEST(LlmtDiscover, OddDataHaveASaneVerdict) {
   const Folder folder;
   write_tables(folder, 100, [](const Row&) { return 0.0; });
-  const json same = json::parse(folder.run(discover + "s.csv s.csv --output y --json").out);
+  const json same = json::parse(folder.run(discover + "s.csv s.csv --target y --json").out);
   EXPECT_EQ(same["verdict"], "nothing missing");
   EXPECT_EQ(same["gap"]["before"], 0.0);
 
@@ -213,7 +213,7 @@ TEST(LlmtDiscover, OddDataHaveASaneVerdict) {
   }
   folder.write("s.csv", simulated);
   folder.write("m.csv", measured);
-  const json report = json::parse(folder.run(discover + "s.csv m.csv --output y --held-out 0 --json").out);
+  const json report = json::parse(folder.run(discover + "s.csv m.csv --target y --held-out 0 --json").out);
   EXPECT_EQ(report["verdict"], "named, indistinguishable");
   ASSERT_EQ(report["effects"].size(), 1U);
   EXPECT_EQ(report["effects"][0]["exact_alias"], true);
@@ -269,39 +269,39 @@ TEST(LlmtDiscover, MistakesHaveTheirExitCodeAndMessage) {
     std::string message;
   };
   const std::vector<Case> cases = {
-      {"s.csv --output y", 2, "measured"},
-      {"s.csv m.csv", 2, "--output"},
-      {"s.csv m.csv --output y --held-out 1.5", 2, "--held-out"},
-      {"s.csv m.csv --output y --allow slope", 2, "--allow"},
-      {"s.csv m.csv --output y --inputs a,a", 2, "\"a\" is given twice"},
-      {"s.csv m.csv --output y --inputs a,y", 2, "\"y\" is an output and cannot be an input"},
-      {"s.csv m.csv --output y --own-terms-only", 2, "--terms"},
-      {"no.csv m.csv --output y", 1, "no.csv: cannot be read"},
-      {"empty.csv m.csv --output y", 1, "empty.csv: "},
-      {"header.csv m.csv --output y", 1, "header.csv: no rows"},
-      {"one.csv one.csv --output y", 1, "one.csv: "},
-      {"two.csv one.csv --output y", 1, "two.csv has 2 rows, one.csv has 1"},
-      {"two.csv nan.csv --output y", 1, "nan.csv:3: column \"a\""},
-      {"two.csv word.csv --output y", 1, "word.csv:3: column \"y\""},
-      {"two.csv other.csv --output y", 1, "other.csv:3: column \"a\" is 1.5, but 1 at two.csv:3"},
-      {"one.csv short.csv --output y", 1, "short.csv"},
-      {"s.csv m.csv --output z", 1, "\"z\""},
-      {"s.csv m.csv --output y --inputs a,q", 1, "\"q\""},
-      {"s.csv m.csv --output y --order when", 1, "\"when\""},
-      {"same.csv same.csv --output y --order a", 1, "the order \"a\" has the value 1 twice"},
-      {"s.csv m.csv --output y --terms no.txt", 1, "no.txt: cannot be read"},
-      {"s.csv m.csv --output y --terms bad1.txt", 1, "bad1.txt:3: not of the form name = expression"},
-      {"s.csv m.csv --output y --terms bad2.txt", 1, "bad2.txt:1: slip: column"},
-      {"s.csv m.csv --output y --terms bad3.txt", 1, "bad3.txt:2: slip: \"q\" is not an input; there are t, a, b, y"},
-      {"s.csv m.csv --output y --terms bad4.txt", 1,
+      {"s.csv --target y", 2, "measured"},
+      {"s.csv m.csv", 2, "--target"},
+      {"s.csv m.csv --target y --held-out 1.5", 2, "--held-out"},
+      {"s.csv m.csv --target y --allow slope", 2, "--allow"},
+      {"s.csv m.csv --target y --inputs a,a", 2, "\"a\" is given twice"},
+      {"s.csv m.csv --target y --inputs a,y", 2, "\"y\" is an output and cannot be an input"},
+      {"s.csv m.csv --target y --own-terms-only", 2, "--terms"},
+      {"no.csv m.csv --target y", 1, "no.csv: cannot be read"},
+      {"empty.csv m.csv --target y", 1, "empty.csv: "},
+      {"header.csv m.csv --target y", 1, "header.csv: no rows"},
+      {"one.csv one.csv --target y", 1, "one.csv: "},
+      {"two.csv one.csv --target y", 1, "two.csv has 2 rows, one.csv has 1"},
+      {"two.csv nan.csv --target y", 1, "nan.csv:3: column \"a\""},
+      {"two.csv word.csv --target y", 1, "word.csv:3: column \"y\""},
+      {"two.csv other.csv --target y", 1, "other.csv:3: column \"a\" is 1.5, but 1 at two.csv:3"},
+      {"one.csv short.csv --target y", 1, "short.csv"},
+      {"s.csv m.csv --target z", 1, "\"z\""},
+      {"s.csv m.csv --target y --inputs a,q", 1, "\"q\""},
+      {"s.csv m.csv --target y --order when", 1, "\"when\""},
+      {"same.csv same.csv --target y --order a", 1, "the order \"a\" has the value 1 twice"},
+      {"s.csv m.csv --target y --terms no.txt", 1, "no.txt: cannot be read"},
+      {"s.csv m.csv --target y --terms bad1.txt", 1, "bad1.txt:3: not of the form name = expression"},
+      {"s.csv m.csv --target y --terms bad2.txt", 1, "bad2.txt:1: slip: column"},
+      {"s.csv m.csv --target y --terms bad3.txt", 1, "bad3.txt:2: slip: \"q\" is not an input; there are t, a, b, y"},
+      {"s.csv m.csv --target y --terms bad4.txt", 1,
        "bad4.txt:1: slip: \"log(b - 10)\" is not a finite number at data row 1"},
-      {"s.csv m.csv --output y --terms bad5.txt", 1, "bad5.txt:2: the name \"slip\" is there twice"},
-      {"s.csv m.csv --output y --terms bad6.txt", 1, "bad6.txt:1: \"square\" is the name of a built-in term"},
-      {"s.csv m.csv --output y --terms bad7.txt", 1, "bad7.txt:1: the name \"2x\" is not a word"},
-      {"s.csv m.csv --output y --terms bad8.txt", 1,
+      {"s.csv m.csv --target y --terms bad5.txt", 1, "bad5.txt:2: the name \"slip\" is there twice"},
+      {"s.csv m.csv --target y --terms bad6.txt", 1, "bad6.txt:1: \"square\" is the name of a built-in term"},
+      {"s.csv m.csv --target y --terms bad7.txt", 1, "bad7.txt:1: the name \"2x\" is not a word"},
+      {"s.csv m.csv --target y --terms bad8.txt", 1,
        "bad8.txt:2: slip: column 4 of \"(a = 7)\": == compares; = is not allowed"},
-      {"s.csv m.csv --output y --terms bad9.txt", 1, "bad9.txt:2: the name \"slip\" is there twice"},
-      {"s.csv m.csv --output y -o no/c.csv", 1, "no/c.csv: cannot be written"},
+      {"s.csv m.csv --target y --terms bad9.txt", 1, "bad9.txt:2: the name \"slip\" is there twice"},
+      {"s.csv m.csv --target y -o no/c.csv", 1, "no/c.csv: cannot be written"},
   };
   for (const Case& entry : cases) {
     const Outcome outcome = folder.run(discover + entry.arguments);

@@ -199,15 +199,15 @@ TEST(LlmtProgram, MistakesHaveTheirExitCodeAndMessage) {
     EXPECT_EQ(outcome.out, "") << arguments;
     EXPECT_NE(outcome.err.find(message), std::string::npos) << arguments << ": " << outcome.err;
   };
-  expect("", 2, "subcommand");
+  expect("", 2, "a command is needed");
   expect("fit d.csv", 2, "--target is required");
   expect("fit d.csv -t y --rule cart", 2, "cart");
-  expect("fit d.csv -t y --ignore label --rule m5 --validity blend", 2, "with rule m5 it must be auto or crisp");
+  expect("fit d.csv -t y --ignore label --rule m5 --validity blend", 2, "with --rule m5 it must be auto or crisp");
   expect("fit d.csv -t y --monotone label", 2, "--monotone names \"label\", which is categorical");
   expect("fit d.csv -t y --ignore label --monotone a,-a", 2, "--monotone names \"a\" with both signs");
   expect("fit d.csv -t y --ignore label --monotone a --slope-sign=-a", 2,
          "--monotone and --slope-sign name \"a\" with opposite signs");
-  expect("fit d.csv -t y --ignore label --cv 1", 2, "folds.count is 1");
+  expect("fit d.csv -t y --ignore label --cv 1", 2, "--cv is 1");
   expect("fit d.csv -t y --ignore label --width -1", 2, "--width is \"-1\", it must be a finite number above 0");
   expect("fit d.csv -t y --ignore label --categorical nope", 1, "\"nope\" is categorical, but not an input");
   expect("fit d.csv -t y --ignore label --split-inputs nope", 2, "\"nope\", which is not among the inputs a, b, z");

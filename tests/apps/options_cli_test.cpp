@@ -58,7 +58,7 @@ TEST(Options, NumbersOutsideTheirRangeAreRefusedWithIt) {
   refused("fit d.csv -t y", "--shrinkage", "-1", "a finite number, 0 or more");
   refused("fit d.csv -t y", "--jump", "nan", "a number of 0 or more, or inf");
   refused("explain m.json d.csv", "--row", "0", "a whole number from 1 to 9223372036854775807");
-  refused("discover d.csv d.csv --output y", "--held-out", "nan", "a number from 0 to 0.9");
+  refused("discover d.csv d.csv --target y", "--held-out", "nan", "a number from 0 to 0.9");
   refused("compare d.csv -t y", "--seed", "-1", "a whole number from 0 to 18446744073709551615");
   expect_usage(folder, "fit d.csv -t y --width 1,two", "--width is \"two\", it must be a finite number above 0");
 }
@@ -95,9 +95,9 @@ TEST(Options, AnOutputThatIsAnInputIsRefusedBeforeTheWork) {
   lost("predict m.json d.csv -o ../" + std::filesystem::path(folder.file(".")).parent_path().filename().string() +
            "/d.csv",
        "../" + std::filesystem::path(folder.file(".")).parent_path().filename().string() + "/d.csv", "d.csv");
-  lost("discover d.csv hard.csv --output y -o d.csv", "d.csv", "d.csv");
+  lost("discover d.csv hard.csv --target y -o d.csv", "d.csv", "d.csv");
   folder.write("t.txt", "twice = 2 * x\n");
-  lost("discover d.csv hard.csv --output y --terms t.txt -o t.txt", "t.txt", "t.txt");
+  lost("discover d.csv hard.csv --target y --terms t.txt -o t.txt", "t.txt", "t.txt");
   EXPECT_EQ(llmt::read_file(folder.file("d.csv")), data);
   EXPECT_EQ(llmt::read_file(folder.file("m.json")), model);
   EXPECT_EQ(folder.run(llmt_program + " predict m.json d.csv -o /dev/null").exit_code, 0);

@@ -87,15 +87,24 @@ inline bool is_missing(const std::string& field) {
 }
 
 // The number, or why there is none.
-inline std::string read_number(const std::string& field, double& value) {
+inline std::string read_number(const std::string& field, char mark, double& value) {
   static const std::regex number("[+-]?([0-9]+\\.?[0-9]*|\\.[0-9]+)([eE][+-]?[0-9]+)?");
   static const std::regex word("[+-]?(nan|inf|infinity)", std::regex::icase);
   const std::string text = bare(field);
   if (text.empty()) return "the cell is empty, a number is needed";
-  const bool is_number = std::regex_match(text, number);
-  value = is_number ? std::strtod(text.c_str(), nullptr) : std::nan("");
+  // With exchanged marks the text is a number by the expression above if it is one with a decimal comma.
+  std::string exchanged = text;
+  for (char& c : exchanged) c = c == ',' ? '.' : c == '.' ? ',' : c;
+  const std::string& with_point = mark == '.' ? text : exchanged;
+  const std::string& with_comma = mark == '.' ? exchanged : text;
+  const bool is_number = std::regex_match(with_point, number);
+  value = is_number ? std::strtod(with_point.c_str(), nullptr) : std::nan("");
   if (is_number && std::isfinite(value)) return "";
   const std::string shown = text.size() > 60 ? text.substr(0, 60) + "..." : text;  // all is ASCII here
+  if (!is_number && std::regex_match(with_comma, number)) {
+    return fmt::format("'{}' has a decimal {}, and a decimal {} is expected", shown, mark == '.' ? "comma" : "point",
+                       mark == '.' ? "point" : "comma");
+  }
   return fmt::format("'{}' is not {}", shown, is_number || std::regex_match(text, word) ? "finite" : "a number");
 }
 
@@ -112,7 +121,7 @@ struct Table {
   std::string error;                            // of finding the rows
 };
 
-inline Table naive(const std::string& text) {
+inline Table naive(const std::string& text, char mark = '.') {
   Table table;
   table.records = records_of(text.starts_with("\xEF\xBB\xBF") ? text.substr(3) : text);
   if (table.records.empty()) {
@@ -123,7 +132,7 @@ inline Table naive(const std::string& text) {
   table.records.erase(table.records.begin());
   char separator = ',';
   for (const char candidate : {'\t', ';', ','}) {
-    if (header.text.find(candidate) != std::string::npos) separator = candidate;
+    if (header.text.find(candidate) != std::string::npos && (candidate != ',' || mark != ',')) separator = candidate;
   }
   // The carriage return of a line end is no part of the header.
   const std::string header_text =
@@ -160,7 +169,7 @@ inline Table naive(const std::string& text) {
 
 // The named columns, or the first error in the order of the file.
 std::string naive_numbers(const Table& table, const std::vector<std::size_t>& wanted, bool allow_missing,
-                          Eigen::MatrixXd& values) {
+                          Eigen::MatrixXd& values, char mark = '.') {
   values.resize(std::ssize(table.cells), std::ssize(wanted));
   for (std::size_t row = 0; row < table.cells.size(); ++row) {
     for (std::size_t field = 0; field < table.columns.size(); ++field) {
@@ -169,7 +178,7 @@ std::string naive_numbers(const Table& table, const std::vector<std::size_t>& wa
         double value = std::nan("");
         const std::string& cell = table.cells[row][field];
         const bool is_left_out = allow_missing && is_missing(cell);
-        const std::string problem = is_left_out ? "" : read_number(cell, value);
+        const std::string problem = is_left_out ? "" : read_number(cell, mark, value);
         if (!problem.empty()) {
           return fmt::format("t:{}: column \"{}\": {}", table.records[row].line, table.columns[field], problem);
         }

@@ -10,6 +10,7 @@
 #include <map>
 #include <optional>
 #include <span>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -26,6 +27,7 @@ struct ColumnCells {
   Eigen::Index missing = 0;             ///< cells that are empty or say NA, N/A, NaN, null or ? (in any case)
   Eigen::Index other = 0;               ///< cells that are neither missing nor a finite number
   Eigen::Index infinite = 0;            ///< those of the others that are numbers, as inf or 1e400
+  Eigen::Index other_mark = 0;          ///< those of the others that are numbers with the other decimal mark
   Eigen::Index first_missing = no_row;  ///< row
   Eigen::Index first_other = no_row;    ///< row
 };
@@ -36,13 +38,22 @@ struct CsvNumbers {
   std::vector<ColumnCells> cells;  ///< per column
 };
 
+/// What stands between the whole and the fraction of a number.
+enum class DecimalMark : char { point = '.', comma = ',' };
+
+/// A cell is no number only because it has a decimal comma where a point is expected.
+class DecimalCommaError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
 /// A CSV text with a header row, kept as text. A column is turned into numbers when it is requested, so a column of
 /// words does no harm unless it is requested as numbers. A request for several columns passes over the text once.
 ///
 /// Accepted: fields separated by commas (or by semicolons or tabs, if the header has no comma); fields in double
 /// quotes, which may hold separators, line breaks and doubled quotes (RFC 4180); LF or CRLF; a UTF-8 byte-order mark;
-/// blank lines, which are skipped. Numbers are written with a decimal point. Every row must have as many fields as the
-/// header.
+/// blank lines, which are skipped. Every row must have as many fields as the header. Numbers have the decimal mark that
+/// is named; with a decimal comma the fields are separated by semicolons or tabs if the header has any.
 ///
 /// `max_threads` is 0 for all that the machine has; results and errors do not depend on it.
 class Csv {
@@ -50,10 +61,10 @@ class Csv {
   /// Reads a file. Throws std::runtime_error, starting with `path` or `path:line`, if it cannot be read, takes more
   /// than half of the machine's memory, has a line of more than 16 MiB, is empty or not UTF-8, has an unnamed or
   /// repeated column, or a row with too few or too many fields.
-  static Csv read(const std::string& path);
+  static Csv read(const std::string& path, DecimalMark mark = DecimalMark::point);
 
   /// As read(), from memory; `name` stands for the path in errors.
-  static Csv parse(std::string text, std::string name);
+  static Csv parse(std::string text, std::string name, DecimalMark mark = DecimalMark::point);
 
   const std::string& name() const { return name_; }
   const std::vector<std::string>& columns() const { return columns_; }
@@ -66,8 +77,8 @@ class Csv {
   std::size_t index_of(std::string_view column) const;
 
   /// The named columns as numbers, rows x columns, rows in file order. Throws std::runtime_error `path:line: column
-  /// "c": ...` at the first cell, in file order, that is empty, not a number, not finite or out of range; and as
-  /// index_of().
+  /// "c": ...` at the first cell, in file order, that is empty, not a number, not finite or out of range
+  /// (DecimalCommaError if it has a decimal comma); and as index_of().
   Eigen::MatrixXd numbers(std::span<const std::string> columns, int max_threads = 0) const;
 
   /// One column as numbers; errors as above.
@@ -110,6 +121,7 @@ class Csv {
   std::vector<Eigen::Index> lines_of(std::span<const Eigen::Index> rows) const;
 
   char separator() const { return separator_; }
+  DecimalMark decimal_mark() const { return mark_; }
 
  private:
   Csv() = default;
@@ -117,6 +129,7 @@ class Csv {
   std::string name_;
   std::string text_;
   char separator_ = ',';
+  DecimalMark mark_ = DecimalMark::point;
   std::size_t header_begin_ = 0;
   std::vector<std::string> columns_;
   std::map<std::string, std::size_t, std::less<>> fields_;  // position of a column
@@ -136,7 +149,7 @@ class Csv {
 class CsvPieces {
  public:
   /// `name` stands for the path in errors. A piece is about `bytes` long, longer if a row is.
-  CsvPieces(std::istream& input, std::string name, std::size_t bytes = 1 << 20);
+  CsvPieces(std::istream& input, std::string name, std::size_t bytes = 1 << 20, DecimalMark mark = DecimalMark::point);
 
   /// The next rows, at least one; nothing at the end. Throws as Csv::read(), and if there is no header, if the stream
   /// cannot be read, or if a quoted field does not end within 16 MiB.
@@ -146,6 +159,7 @@ class CsvPieces {
   std::istream& input_;
   std::string name_;
   std::size_t bytes_;
+  DecimalMark mark_;
   std::string pending_;     // what has been read and not yet handed out
   std::string header_;      // once it is known, with a line break
   Eigen::Index lines_ = 0;  // handed out, those of the header included

@@ -1,5 +1,5 @@
 /// \file
-/// The names of choices, as model files, the command line and messages have them.
+/// The names of choices, as model files, the command line and messages have them; and what a misspelt name means.
 #pragma once
 
 #include <span>
@@ -50,5 +50,14 @@ Enum parse(std::string_view name) {
   }
   throw std::invalid_argument("llmt::parse: \"" + std::string(name) + "\" is none of " + list_names<Enum>());
 }
+
+/// The name that a misspelt word most likely means: the one with the fewest letters put in, left out, replaced or
+/// exchanged with their neighbour (Damerau 1964, optimal string alignment), if that is at most a third of the word's
+/// letters; one is always allowed, but for a word of one letter. Upper and lower case are the same. Empty: there is
+/// none. Of names that are equally near the first one is taken.
+std::string_view closest_name(std::string_view word, std::span<const std::string> names);
+
+/// " (did you mean "NAME"?)" of closest_name(), or nothing.
+std::string did_you_mean(std::string_view word, std::span<const std::string> names);
 
 }  // namespace llmt

@@ -44,12 +44,12 @@ struct ReadableResult {
 ///
 /// `options`, `inputs`, `outputs`: those of fit(); `fitted`: its summary. Of the options the tree uses columns,
 /// weights, folds, shared_partition, max_leaves, min_leaf_samples, expert.search and max_threads; with
-/// LocalTerms::quadratic or automatic equations may have products of two inputs. `loss`: 0.1 for ten per cent.
+/// LocalTerms::quadratic or automatic equations may have products of two inputs. `loss`: 0.15 for 15 per cent.
 ///
 /// Throws std::invalid_argument as fit(), and if `loss` is negative or not finite, if nothing was held out in the fit,
 /// if no crisp tree was a candidate in it, or if slope_signs or monotone are set.
 ReadableResult fit_readable(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
                             const Eigen::Ref<const Eigen::MatrixXd>& outputs, const FitOptions& options,
-                            const FitSummary& fitted, double loss = 0.1);
+                            const FitSummary& fitted, double loss = 0.15);
 
 }  // namespace llmt

@@ -41,12 +41,25 @@ bool is_missing(std::string_view text) {
 // End of the number at `begin`, null if there is none. A leading plus is accepted, leading white space is not. A number
 // out of range is no error: too large reads as infinity, too small as zero. All three are handled here because versions
 // and options of fast_float differ in them.
-const char* number_end(const char* begin, const char* end, double& value) {
+const char* number_end(const char* begin, const char* end, DecimalMark mark, double& value) {
   const bool has_sign = begin != end && (*begin == '+' || *begin == '-');
   const char* const first = begin + (has_sign ? 1 : 0);
   if (first == end || *first <= ' ' || *first == '-') return nullptr;
-  const fast_float::from_chars_result result = fast_float::from_chars(*begin == '+' ? first : begin, end, value);
+  const fast_float::parse_options options(fast_float::chars_format::general, static_cast<char>(mark));
+  const fast_float::from_chars_result result =
+      fast_float::from_chars_advanced(*begin == '+' ? first : begin, end, value, options);
   return result.ec == std::errc() || result.ec == std::errc::result_out_of_range ? result.ptr : nullptr;
+}
+
+// Whether the whole bare field is a number.
+bool is_number(std::string_view text, DecimalMark mark, double& value) {
+  const char* const end = text.data() + text.size();
+  return number_end(text.data(), end, mark, value) == end;
+}
+
+bool is_number_with_other_mark(std::string_view text, DecimalMark mark) {
+  double value = 0.0;
+  return is_number(text, mark == DecimalMark::point ? DecimalMark::comma : DecimalMark::point, value);
 }
 
 // One past the blanks at `begin`. Where tabs separate they are not blank.
@@ -169,12 +182,14 @@ std::string_view cell_text(std::string_view field, std::string& buffer) {
   return trimmed(buffer);
 }
 
-Cell read_cell(const char*& cursor, const char* end, char separator, double& value) {
+Cell read_cell(const char*& cursor, const char* end, char separator, DecimalMark mark, double& value) {
   // Most cells hold a number and nothing else. The field then ends where the number ends, and no search for the
   // separator is needed.
   const char* const begin = after_blanks(cursor, end, separator);
   const bool quoted = begin != end && *begin == '"';
-  const char* after = number_end(begin + (quoted ? 1 : 0), end, value);
+  // A number may hold its mark, so the field does not end with it where fields are separated by the same character.
+  const bool may_hold_separator = separator == static_cast<char>(mark);
+  const char* after = may_hold_separator ? nullptr : number_end(begin + (quoted ? 1 : 0), end, mark, value);
   if (after != nullptr && std::isfinite(value) && (!quoted || (after != end && *after == '"'))) {
     after = after_blanks(after + (quoted ? 1 : 0), end, separator);
     if (after == end || *after == separator || *after == '\n') {
@@ -185,18 +200,25 @@ Cell read_cell(const char*& cursor, const char* end, char separator, double& val
   const char* const field = std::exchange(cursor, field_end(begin, end, separator));
   const std::string_view text = bare(std::string_view(field, cursor - field));
   if (is_missing(text)) return Cell::missing;
-  const char* const text_end = text.data() + text.size();
-  if (number_end(text.data(), text_end, value) != text_end) return Cell::word;
+  if (!is_number(text, mark, value)) return is_number_with_other_mark(text, mark) ? Cell::other_mark : Cell::word;
   return std::isfinite(value) ? Cell::number : Cell::infinite;
 }
 
-std::string problem_of(std::string_view field) {
+bool has_other_mark(std::string_view field, DecimalMark mark) {
+  double value = 0.0;
+  return !is_number(bare(field), mark, value) && is_number_with_other_mark(bare(field), mark);
+}
+
+std::string problem_of(std::string_view field, DecimalMark mark) {
   const std::string_view text = bare(field);
   if (text.empty()) return "the cell is empty, a number is needed";
   double value = 0.0;
-  const bool is_infinite_or_nan =
-      number_end(text.data(), text.data() + text.size(), value) == text.data() + text.size();
-  return fmt::format("'{}' is not {}", shortened(text), is_infinite_or_nan ? "finite" : "a number");
+  if (is_number(text, mark, value)) return fmt::format("'{}' is not finite", shortened(text));
+  if (is_number_with_other_mark(text, mark)) {
+    return fmt::format("'{}' has a decimal {}, and a decimal {} is expected", shortened(text),
+                       mark == DecimalMark::point ? "comma" : "point", mark == DecimalMark::point ? "point" : "comma");
+  }
+  return fmt::format("'{}' is not a number", shortened(text));
 }
 
 }  // namespace llmt::csv

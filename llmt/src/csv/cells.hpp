@@ -7,6 +7,8 @@
 #include <string>
 #include <string_view>
 
+#include "llmt/csv.hpp"
+
 namespace llmt::csv {
 
 /// A record that is longer is refused, in files and in pieces: an input without a line break must end before memory.
@@ -49,12 +51,16 @@ std::string unquoted(std::string_view field);
 /// there is no value. The result refers to `field`, or to `buffer` if doubled quotes were halved.
 std::string_view cell_text(std::string_view field, std::string& buffer);
 
-enum class Cell { number, missing, infinite, word };
+/// `other_mark`: a number with the other decimal mark.
+enum class Cell { number, missing, infinite, other_mark, word };
 
 /// What the cell at `cursor` holds; a number is written to `value`. Moves `cursor` to the end of the field.
-Cell read_cell(const char*& cursor, const char* end, char separator, double& value);
+Cell read_cell(const char*& cursor, const char* end, char separator, DecimalMark mark, double& value);
+
+/// Whether a cell is a number with the other decimal mark and none with `mark`.
+bool has_other_mark(std::string_view field, DecimalMark mark);
 
 /// Why a cell is not a number.
-std::string problem_of(std::string_view field);
+std::string problem_of(std::string_view field, DecimalMark mark);
 
 }  // namespace llmt::csv

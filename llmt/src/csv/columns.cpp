@@ -54,12 +54,14 @@ void count_cell(ColumnCells& cells, csv::Cell cell, Eigen::Index row) {
   first = std::min(first, row);
   ++(missing ? cells.missing : cells.other);
   if (cell == csv::Cell::infinite) ++cells.infinite;
+  if (cell == csv::Cell::other_mark) ++cells.other_mark;
 }
 
 void add(ColumnCells& sum, const ColumnCells& part) {
   sum.missing += part.missing;
   sum.other += part.other;
   sum.infinite += part.infinite;
+  sum.other_mark += part.other_mark;
   sum.first_missing = std::min(sum.first_missing, part.first_missing);
   sum.first_other = std::min(sum.first_other, part.first_other);
 }
@@ -87,7 +89,7 @@ CsvNumbers Csv::read_numbers(std::span<const std::string> columns, int max_threa
   const auto read_row = [&](Eigen::Index row, double* values, std::vector<ColumnCells>& cells) {
     const char* const begin = text_.data() + row_begins_[row];
     for_each_requested(request, begin, end, separator_, [&](std::size_t column, const char*& cursor) {
-      const csv::Cell cell = csv::read_cell(cursor, end, separator_, values[column]);
+      const csv::Cell cell = csv::read_cell(cursor, end, separator_, mark_, values[column]);
       if (cell != csv::Cell::number) {
         values[column] = std::numeric_limits<double>::quiet_NaN();
         count_cell(cells[column], cell, row);
@@ -136,7 +138,11 @@ void Csv::refuse_first(std::span<const std::string> columns, std::span<const Eig
   const char* const end = record.data() + record.size();
   for_each_requested(request, record.data(), end, separator_, [&](std::size_t, const char*& cursor) {
     const std::string_view field(cursor, csv::field_end(cursor, end, separator_));
-    refuse(row, columns_[wanted], csv::problem_of(field));
+    const std::string problem = csv::problem_of(field, mark_);
+    if (mark_ == DecimalMark::point && csv::has_other_mark(field, mark_)) {
+      throw DecimalCommaError(fmt::format("{}:{}: column \"{}\": {}", name_, line_of(row), columns_[wanted], problem));
+    }
+    refuse(row, columns_[wanted], problem);
   });
 }
 

@@ -10,6 +10,7 @@
 #include "base/memory.hpp"
 #include "csv/cells.hpp"
 #include "llmt/files.hpp"
+#include "llmt/names.hpp"
 
 namespace llmt {
 namespace {
@@ -20,8 +21,8 @@ std::string_view between(const char* begin, const char* end) { return {begin, st
 std::uintmax_t half_of_memory() { return machine_memory() / 2; }
 
 // The first of these that the header has, outside quotes or inside.
-char separator_of(std::string_view header) {
-  for (const char candidate : {',', ';', '\t'}) {
+char separator_of(std::string_view header, DecimalMark mark) {
+  for (const char candidate : mark == DecimalMark::comma ? std::string_view(";\t") : std::string_view(",;\t")) {
     if (header.find(candidate) != std::string_view::npos) return candidate;
   }
   return ',';
@@ -29,12 +30,13 @@ char separator_of(std::string_view header) {
 
 }  // namespace
 
-Csv Csv::read(const std::string& path) {
-  return parse(read_file(path, {.bytes = half_of_memory(), .line_bytes = csv::longest_record}), path);
+Csv Csv::read(const std::string& path, DecimalMark mark) {
+  return parse(read_file(path, {.bytes = half_of_memory(), .line_bytes = csv::longest_record}), path, mark);
 }
 
-Csv Csv::parse(std::string text, std::string name) {
+Csv Csv::parse(std::string text, std::string name, DecimalMark mark) {
   Csv csv;
+  csv.mark_ = mark;
   csv.name_ = std::move(name);
   csv.text_ = std::move(text);
   csv.read_header();
@@ -52,7 +54,7 @@ void Csv::read_header() {
   if (header.starts_with("\xFF\xFE") || header.starts_with("\xFE\xFF") || header.find('\0') != std::string_view::npos) {
     throw std::runtime_error(fmt::format("{}: this is UTF-16 or no text at all, UTF-8 is needed", name_));
   }
-  separator_ = separator_of(header);
+  separator_ = separator_of(header, mark_);
   for (const char* begin = header.data();;) {
     const char* const field_end = csv::field_end(begin, end, separator_);
     std::string column = csv::unquoted(between(begin, field_end));
@@ -98,8 +100,8 @@ void Csv::find_rows() {
 std::size_t Csv::index_of(std::string_view column) const {
   const auto found = fields_.find(column);
   if (found == fields_.end()) {
-    throw std::runtime_error(
-        fmt::format("{}: there is no column \"{}\"; the columns are {}", name_, column, fmt::join(columns_, ", ")));
+    throw std::runtime_error(fmt::format("{}: there is no column \"{}\"{}; the columns are {}", name_, column,
+                                         did_you_mean(column, columns_), fmt::join(columns_, ", ")));
   }
   return found->second;
 }

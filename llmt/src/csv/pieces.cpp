@@ -26,8 +26,8 @@ std::size_t whole_records(const std::string& text) {
 
 }  // namespace
 
-CsvPieces::CsvPieces(std::istream& input, std::string name, std::size_t bytes)
-    : input_(input), name_(std::move(name)), bytes_(std::max<std::size_t>(bytes, 1)) {}
+CsvPieces::CsvPieces(std::istream& input, std::string name, std::size_t bytes, DecimalMark mark)
+    : input_(input), name_(std::move(name)), bytes_(std::max<std::size_t>(bytes, 1)), mark_(mark) {}
 
 std::optional<Csv> CsvPieces::next() {
   for (;;) {
@@ -59,6 +59,7 @@ std::optional<Csv> CsvPieces::next() {
     }
     Csv csv;
     csv.name_ = name_;
+    csv.mark_ = mark_;
     csv.more_follows_ = !last;
     csv.text_ = header_ + rows;
     csv.lines_left_out_ = lines_ - std::ranges::count(header_, '\n');

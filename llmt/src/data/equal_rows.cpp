@@ -174,14 +174,23 @@ EqualRows find_equal_rows(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
   const int cells = different(by_inputs);
   if (cells == count_of(rows) || cells < fewest_different) return {};
   const std::vector<int> by_all = pairs_of(by_inputs, number_different_rows(outputs, rows, all_columns(outputs)));
+  const int times = times_written(by_all);
+  std::vector<int> copy_of = copies(by_all, times);
+  std::vector<Eigen::Index> left;  // rows of the table written once
+  std::vector<int> left_by_inputs;
+  for (int i = 0; i < count_of(rows); ++i) {
+    if (copy_of[i] != i) continue;
+    left.push_back(rows[i]);
+    left_by_inputs.push_back(by_inputs[i]);
+  }
   EqualRows result;
-  result.are_repeats = are_repeats(inputs, rows, by_inputs);
+  result.are_repeats = cells < count_of(left) && are_repeats(inputs, left, left_by_inputs);
   if (result.are_repeats) {
     result.copy_of = copies(by_all, std::numeric_limits<int>::max());
     result.group = std::move(by_inputs);
-  } else if (const int times = times_written(by_all); times > 1) {
-    result.copy_of = copies(by_all, times);
-    result.group = result.copy_of;
+  } else if (times > 1) {
+    result.group = copy_of;
+    result.copy_of = std::move(copy_of);
   }
   return result;
 }

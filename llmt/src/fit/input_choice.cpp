@@ -23,7 +23,7 @@ namespace {
 constexpr double largest_ratio = 1.2;
 
 // Fewer inputs have to be better by more than this many standard errors of the gain.
-constexpr double standard_errors_of_a_gain = 1.5;
+constexpr double standard_errors_of_a_gain = 2.0;
 
 // With more rows for each input than this, coefficients of useless inputs cost too little to look for them.
 constexpr Eigen::Index most_rows_per_input = 300;

@@ -17,7 +17,7 @@ using namespace oracle::csv;
 
 class Writer {
  public:
-  explicit Writer(std::uint64_t seed) : random_(seed) {}
+  Writer(std::uint64_t seed, bool commas) : random_(seed), commas_(commas) {}
 
   std::string text() {
     separator_ = pick({",", ",", ";", "\t"})[0];
@@ -88,17 +88,20 @@ class Writer {
                    "\"\"\"said\"\"\"",
                    "\"" + line_end_ + "\""});
     }
-    const std::string number =
-        chance(0.3) ? pick({"0", "-0", "+4", "5.", ".5", "-.5e1", "1E5", "00012", "1e-999", "9007199254740993",
-                            "0.000000000000000000000000000000123456789012345678901234567890"})
-                    : fmt::format("{:.{}g}", value, 1 + random_.below(25));
-    return chance(0.2) ? fmt::format("\"{}\"", number) : number;
+    std::string number = chance(0.3)
+                             ? pick({"0", "-0", "+4", "5.", ".5", "-.5e1", "1E5", "00012", "1e-999", "9007199254740993",
+                                     "0.000000000000000000000000000000123456789012345678901234567890"})
+                             : fmt::format("{:.{}g}", value, 1 + random_.below(25));
+    const bool is_quoted = chance(0.2);
+    if ((separator_ != ',' || is_quoted) && commas_ != chance(faults_)) std::ranges::replace(number, '.', ',');
+    return is_quoted ? fmt::format("\"{}\"", number) : number;
   }
 
   llmt::Random random_;
   char separator_ = ',';
   std::string line_end_;
   double faults_ = 0.0;
+  bool commas_ = false;
 };
 
 template <class Call>
@@ -126,11 +129,13 @@ TEST(CsvOracle, RandomTablesReadAsByTheNaiveParser) {
   int read = 0;
   int refused = 0;
   for (std::uint64_t seed = 0; seed < 6000; ++seed) {
-    const std::string text = Writer(seed).text();
+    const bool commas = seed % 4 == 3;
+    const std::string text = Writer(seed, commas).text();
     SCOPED_TRACE(fmt::format("seed {}:\n{}", seed, text));
-    const Table expected = naive(text);
+    const llmt::DecimalMark mark = commas ? llmt::DecimalMark::comma : llmt::DecimalMark::point;
+    const Table expected = naive(text, static_cast<char>(mark));
     std::optional<llmt::Csv> csv;
-    ASSERT_EQ(error_of([&] { csv.emplace(llmt::Csv::parse(text, "t")); }), expected.error);
+    ASSERT_EQ(error_of([&] { csv.emplace(llmt::Csv::parse(text, "t", mark)); }), expected.error);
     if (!csv) {
       ++refused;
       continue;
@@ -144,7 +149,8 @@ TEST(CsvOracle, RandomTablesReadAsByTheNaiveParser) {
       for (const bool allow_missing : {false, true}) {
         Eigen::MatrixXd values;
         Eigen::MatrixXd expected_values;
-        const std::string error = naive_numbers(expected, wanted, allow_missing, expected_values);
+        const std::string error =
+            naive_numbers(expected, wanted, allow_missing, expected_values, static_cast<char>(mark));
         ASSERT_EQ(error_of([&] { values = allow_missing ? csv->numbers_or_missing(names) : csv->numbers(names); }),
                   error);
         if (error.empty()) {

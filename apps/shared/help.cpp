@@ -1,0 +1,176 @@
+#include "shared/help.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <memory>
+#include <stdexcept>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "llmt/names.hpp"
+#include "shared/text.hpp"
+
+namespace llmt::apps {
+namespace {
+
+constexpr std::size_t widest_help = 100;
+constexpr std::size_t text_column = 28;
+
+// A name to the left, its text in a column to the right.
+std::string entry(const std::string& name, const std::string& text) {
+  const std::size_t width = std::min(output_width(), widest_help);
+  std::string line = "  " + name;
+  if (text.empty()) return line + "\n";
+  line += line.size() + 2 > text_column ? "\n" + std::string(text_column, ' ')
+                                        : std::string(text_column - line.size(), ' ');
+  const std::string right = wrapped(text, width - std::min(text_column, width / 2));
+  for (const char c : right) {
+    line += c;
+    if (c == '\n') line += std::string(text_column, ' ');
+  }
+  return line + "\n";
+}
+
+class HelpFormatter : public CLI::Formatter {
+ public:
+  std::string make_option(const CLI::Option* option, bool is_positional) const override {
+    std::string name = make_option_name(option, is_positional);
+    name.erase(std::min(name.find('{'), name.size()));  // the value of a flag that is given without one
+    const std::string type = option->get_option_text().empty() ? option->get_type_name() : option->get_option_text();
+    if (!is_positional && option->get_type_size() != 0 && !type.empty()) name += " " + type;
+    if (!is_positional && option->get_type_size() == 0) name += option->get_option_text();
+    std::string text = option->get_description();
+    if (!option->get_default_str().empty()) text += fmt::format(" [{}]", option->get_default_str());
+    if (option->get_required() && !is_positional) text += " (required)";
+    return entry(name, text);
+  }
+
+  std::string make_help(const CLI::App* app, std::string name, CLI::AppFormatMode mode) const override {
+    const bool with_experts = mode != CLI::AppFormatMode::Normal;
+    return make_description(app) + make_usage(app, std::move(name)) + make_positionals(app) +
+           groups(*app, with_experts) + make_subcommands(app, mode) + "\n" + make_footer(app);
+  }
+
+  std::string make_subcommand(const CLI::App* command) const override {
+    const std::string text = command->get_description();
+    return entry(command->get_name(), text.substr(0, text.find('\n')));
+  }
+
+  std::string make_description(const CLI::App* app) const override { return paragraph(app->get_description()); }
+  std::string make_footer(const CLI::App* app) const override { return paragraph(app->get_footer()); }
+
+ private:
+  // The groups of options, one below the other.
+  std::string groups(const CLI::App& app, bool with_experts) const {
+    std::string text;
+    std::size_t hidden = 0;
+    for (const std::string& group : app.get_groups()) {
+      const auto in_group = [&](const CLI::Option* option) {
+        return option->get_group() == group && option->nonpositional();
+      };
+      const std::vector<const CLI::Option*> options = app.get_options(in_group);
+      if (group.empty() || options.empty()) continue;
+      if (group == expert_options && !with_experts) {
+        hidden += options.size();
+      } else {
+        text += make_group(group, false, options);
+      }
+    }
+    return hidden == 0 ? text : text + fmt::format("\n{} more options for experts: --help-all\n", hidden);
+  }
+
+  static std::string paragraph(const std::string& text) {
+    return text.empty() ? text : wrapped(text, std::min(output_width(), widest_help)) + "\n";
+  }
+};
+
+std::vector<std::string> command_names(const CLI::App& app) {
+  std::vector<std::string> names;
+  for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; })) {
+    names.push_back(command->get_name());
+  }
+  return names;
+}
+
+// "--target", "--inputs", ...
+std::vector<std::string> option_names(const CLI::App& app) {
+  std::vector<std::string> names;
+  for (const CLI::Option* option : app.get_options()) {
+    for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+  }
+  return names;
+}
+
+bool contains(const std::vector<std::string>& names, std::string_view name) {
+  return std::ranges::find(names, name) != names.end();
+}
+
+}  // namespace
+
+void set_up_help(CLI::App& program) {
+  const auto formatter = std::make_shared<HelpFormatter>();
+  formatter->label("SUBCOMMAND", "COMMAND");
+  formatter->label("Positionals", "Arguments");
+  program.formatter(formatter);
+  for (CLI::App* command : program.get_subcommands({})) {
+    command->formatter(formatter);
+    command->group("Commands");
+  }
+}
+
+void refuse_unknown_names(const CLI::App& program, int argc, const char* const* argv) {
+  const CLI::App* app = &program;
+  const std::vector<std::string> commands = command_names(program);
+  for (int i = 1; i < argc; ++i) {
+    const std::string_view word(argv[i]);
+    if (word == "--") return;
+    if (word.starts_with("--")) {
+      const std::string_view name = word.substr(0, word.find('='));
+      const std::vector<std::string> names = option_names(*app);
+      if (contains(names, name)) {
+        if (name == "--help" || name == "--help-all" || name == "--version") return;
+        continue;
+      }
+      throw std::invalid_argument(
+          fmt::format("there is no option {}{}; {} --help lists them", name, did_you_mean(name, names),
+                      app == &program ? app->get_name() : program.get_name() + " " + app->get_name()));
+    }
+    if (word.starts_with("-")) {
+      if (word == "-h") return;
+      continue;
+    }
+    if (app != &program || commands.empty()) continue;
+    if (!contains(commands, word)) {
+      throw std::invalid_argument(fmt::format("there is no command \"{}\"{}; the commands are {}", word,
+                                              did_you_mean(word, commands), fmt::join(commands, ", ")));
+    }
+    app = program.get_subcommand(std::string(word));
+  }
+  if (app == &program && program.get_require_subcommand_min() > 0) {
+    throw std::invalid_argument(fmt::format("a command is needed: {}; {} --help says what they do",
+                                            fmt::join(commands, ", "), program.get_name()));
+  }
+}
+
+std::string hint_on_extra_argument(const CLI::App& program, int argc, const char* const* argv) {
+  const std::vector<CLI::App*> chosen = const_cast<CLI::App&>(program).get_subcommands();
+  if (chosen.empty()) return {};
+  const std::vector<std::string> extra = chosen.back()->remaining();
+  const auto* const end = argv + argc;
+  for (const auto* word = argv + 1; word != end; ++word) {
+    if (extra.empty() || extra.front() != *word) continue;
+    const auto* before = word;
+    while (before != argv && !std::string_view(*before).starts_with("-")) --before;
+    const CLI::Option* const option = chosen.back()->get_option_no_throw(*before);
+    const bool has_list = option != nullptr && option->get_type_name().ends_with("...");
+    if (before != argv && has_list && word - before >= 2) {
+      return fmt::format("; several names are separated by commas: {} {},{}", *before, *(before + 1), *(before + 2));
+    }
+  }
+  return {};
+}
+
+}  // namespace llmt::apps

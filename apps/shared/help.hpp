@@ -1,0 +1,25 @@
+/// \file
+/// How the programs print their help, and what they say about names that they do not know.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <string>
+
+namespace llmt::apps {
+
+/// Group of options that only `--help-all` prints.
+inline constexpr const char* expert_options = "Options for experts";
+
+/// Gives a program and its commands their help: lines no longer than the terminal or 100 columns, the type of an option
+/// beside its name, its default at the end of its text. Call it once, when all commands are there.
+void set_up_help(CLI::App& program);
+
+/// Throws std::invalid_argument, with the name that was most likely meant, if the command line has a command or a long
+/// option that the program does not know, or no command. CLI11 would first ask for options that are missing.
+void refuse_unknown_names(const CLI::App& program, int argc, const char* const* argv);
+
+/// What to add to the message about arguments that were not expected: that lists are separated by commas, if the first
+/// of them follows an option with a list. Else empty.
+std::string hint_on_extra_argument(const CLI::App& program, int argc, const char* const* argv);
+
+}  // namespace llmt::apps
