@@ -228,7 +228,8 @@ void calibrate_command(CalibrateArguments arguments) {
   const std::vector<std::string> suspicions = robotics::suspicions(nominal, measurements, report);
   const std::vector<Row> rows = rows_of(report, test);
   std::vector<std::string> written;
-  if (!arguments.output.empty()) {
+  const bool is_implausible = robotics::is_implausible(nominal, report);
+  if (!arguments.output.empty() && !is_implausible) {
     written = save_corrected(report.best(), arguments.output);
   }
   if (arguments.json) {
@@ -239,6 +240,12 @@ void calibrate_command(CalibrateArguments arguments) {
     if (!written.empty()) {
       print(fmt::format("Written: {}\n", fmt::join(written, ", ")));
     }
+  }
+  if (is_implausible) {
+    throw std::runtime_error(fmt::format(
+        "{}: the calibrated robot misses half of the points by more than a fiftieth of its length: nothing is "
+        "written; check units, order, signs and zeros of the joints, and the description",
+        arguments.data));
   }
   if (!report.calibration.result.converged()) {
     throw std::runtime_error(fmt::format("the calibration did not converge: {}", report.calibration.result.reason));

@@ -26,17 +26,19 @@ Json effects_json(const robotics::Discovery& found) {
                        {"confirmed", effect.confirmed},
                        {"parameters", parameters},
                        {"constants", constants},
+                       {"constant_std_error", effect.constant_error ? Json(*effect.constant_error) : Json(nullptr)},
                        {"rivals", effect.rivals},
                        {"exact_alias", effect.exact_alias},
+                       {"smaller", effect.smaller},
                        {"share", effect.share},
                        {"rms_mm", effect.rms_mm}});
   }
   return effects;
 }
 
-Json shapes_json(const robotics::Discovery& found) {
+Json shapes_json(const std::vector<robotics::FoundShape>& list) {
   Json shapes = Json::array();
-  for (const robotics::FoundShape& shape : found.unknown) {
+  for (const robotics::FoundShape& shape : list) {
     shapes.push_back({{"acts_on", shape.shape.acts_on},
                       {"depends_on", shape.shape.depends_on},
                       {"per_turn", shape.shape.per_turn ? Json(*shape.shape.per_turn) : Json(nullptr)},
@@ -44,6 +46,19 @@ Json shapes_json(const robotics::Discovery& found) {
                       {"share", shape.share}});
   }
   return shapes;
+}
+
+Json beyond_json(const robotics::Discovery& found) {
+  Json beyond = Json::array();
+  for (const robotics::BeyondPlausible& one : found.beyond_plausible) {
+    beyond.push_back({{"name", one.effect.type},
+                      {"location", one.effect.at},
+                      {"parameter", one.parameter.name},
+                      {"value", finite(one.parameter.value)},
+                      {"limit", finite(one.limit)},
+                      {"unit", one.parameter.unit}});
+  }
+  return beyond;
 }
 
 Json gap_json(const robotics::Discovery& found) {
@@ -77,11 +92,13 @@ Json discovery_json(const robotics::Discovery& found) {
   for (const robotics::Visible& entry : found.visible) {
     visible.push_back({{"effect", entry.what}, {"amplitude", finite(entry.value)}, {"unit", entry.unit}});
   }
-  const Json shapes = shapes_json(found);
+  const Json shapes = shapes_json(found.unknown);
   return {{"verdict", discovery::to_string(found.answer)},
           {"effects", effects_json(found)},
           {"unknown", shapes.empty() ? Json(nullptr) : shapes[0]},
           {"unknown_all", shapes},
+          {"more", shapes_json(found.more)},
+          {"beyond_plausible", beyond_json(found)},
           {"maps", found.maps.size()},
           {"gap", gap_json(found)},
           {"outliers", found.outliers},

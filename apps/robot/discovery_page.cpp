@@ -6,14 +6,15 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <regex>
-#include <set>
 
 namespace llmt::apps {
 namespace {
 
 using robotics::Discovery;
 using robotics::FoundEffect;
+
+constexpr std::size_t most_columns = 100;
+constexpr std::size_t most_lines = 24;
 
 // A value with its error in the unit that needs no exponent: 1.1e-6 rad/(N m) is 1.10 +- 0.05 urad/(N m).
 std::string with_unit(double value, double error, const std::string& unit) {
@@ -31,164 +32,248 @@ std::string with_unit(double value, double error, const std::string& unit) {
   const std::string name =
       unit.starts_with("1/") ? (best.factor == 1.0 ? unit : fmt::format("1e-{:.0f} {}", std::log10(best.factor), unit))
                              : best.name + unit;
-  if (!std::isfinite(error)) return fmt::format("{} {} (not determined)", number(value * best.factor, 3), name);
   if (unit == "1") return fmt::format("{} +- {}", number(value, 3), number(error, 2));
   return fmt::format("{} +- {} {}", number(value * best.factor, 3), number(error * best.factor, 2), name);
 }
 
-std::string place_of(const FoundEffect& effect) {
-  return effect.effect.at.empty() ? "the whole arm" : effect.effect.at;
+std::string plain_value(double value, const std::string& unit) {
+  const std::string text = number(value, 3);
+  return unit == "1" ? text : text + " " + unit;
 }
 
-std::string constants_of(const FoundEffect& effect) {
-  const robotics::EffectType& type = robotics::effect_type(effect.effect.type);
-  std::vector<std::string> parts;
-  for (std::size_t k = 0; k < type.constants.size() && k < effect.effect.constants.size(); ++k) {
-    parts.push_back(fmt::format("{} {}", type.constants[k].key, number(effect.effect.constants[k], 5)));
+// Words of a paragraph in lines of at most a hundred columns; further lines are indented by four more.
+std::vector<std::string> wrapped(const std::string& text) {
+  std::vector<std::string> lines;
+  const std::size_t indent = text.find_first_not_of(' ');
+  std::string line;
+  std::size_t begin = indent == std::string::npos ? text.size() : indent;
+  std::string lead(begin, ' ');
+  while (begin < text.size()) {
+    const std::size_t end = std::min(text.find(' ', begin), text.size());
+    const std::string word = text.substr(begin, end - begin);
+    begin = end + 1;
+    if (!line.empty() && line.size() + 1 + word.size() > most_columns) {
+      lines.push_back(line);
+      lead = std::string(indent + 4, ' ');
+      line.clear();
+    }
+    line += line.empty() ? lead + word : " " + word;
   }
-  return parts.empty() ? "" : fmt::format(" ({})", fmt::join(parts, ", "));
+  if (!line.empty()) lines.push_back(line);
+  return lines;
 }
 
 std::string headline(const Discovery& found) {
+  const auto refused = [&](const char* kind) { return !found.unknown.empty() && found.unknown[0].shape.kind == kind; };
   switch (found.answer) {
     case discovery::Answer::nothing_missing:
       return "NOTHING MISSING. What the calibrated model leaves is noise as far as these poses can tell.";
     case discovery::Answer::named:
       return "NAMED. The model lacks:";
     case discovery::Answer::indistinguishable:
-      return "NAMED, BUT NOT ALONE. The model lacks one of these:";
+      return "NAMED, BUT NOT ALONE. The model lacks the following; what stands behind \"or\" would do as well:";
     case discovery::Answer::unknown:
+      if (refused("outliers"))
+        return "TOO MANY OUTLIERS. Neither an effect nor its absence can be told from these data.";
+      if (refused("noise"))
+        return "UNKNOWN EFFECT. No candidate explains what is left, but it is not an instrument's noise.";
+      if (std::ranges::any_of(found.effects, &FoundEffect::confirmed)) {
+        return "NAMED IN PART. Beside what has a name, something is missing that the catalogue does not explain:";
+      }
       return "UNKNOWN EFFECT. Something real is missing that the catalogue does not explain. It looks like this:";
   }
   return "";
 }
 
-std::string effect_lines(const Discovery& found) {
-  std::string text;
-  for (const FoundEffect& effect : found.effects) {
-    std::vector<std::string> values;
-    for (const robotics::FoundParameter& parameter : effect.parameters) {
-      values.push_back(
-          fmt::format("{} {}", parameter.name, with_unit(parameter.value, parameter.standard_error, parameter.unit)));
+// "joint1, joint3 and joint4"
+std::string list_of(const std::vector<std::string>& names) {
+  if (names.size() < 2) return names.empty() ? "" : names[0];
+  return fmt::format("{} and {}", fmt::join(names.begin(), names.end() - 1, ", "), names.back());
+}
+
+// What an effect is, without its place: for gears, what turns so often.
+std::string kind_of(const Discovery& found, const FoundEffect& effect) {
+  if (effect.effect.type != "transmission_error") return effect.title;
+  const double order = effect.effect.constants[0];
+  const std::string what = fmt::format("an angle error that repeats {} times a turn", number(order, 5));
+  for (const robotics::Joint& joint : found.before.chain.joints) {
+    if (joint.name != effect.effect.at || !joint.gear_ratio) continue;
+    if (std::abs(order - 2.0 * *joint.gear_ratio) < 0.02 * order) {
+      return fmt::format("{}: the wave generator of a gear of {}", what, number(*joint.gear_ratio, 4));
     }
-    text += fmt::format("  {}{}, {}{}\n    {}\n    moves the tool by {:.4f} mm (rms) in ways that geometry cannot\n",
-                        effect.confirmed ? "" : "perhaps ", effect.title, place_of(effect), constants_of(effect),
-                        fmt::join(values, ", "), effect.rms_mm);
-    for (const std::string& rival : effect.rivals) text += fmt::format("    or as well: {}\n", rival);
-    if (effect.exact_alias) text += "    One of these does the same at every pose: no pose can tell them apart.\n";
   }
-  return text;
+  return what;
 }
 
-std::string shape_lines(const Discovery& found) {
-  std::string text;
-  for (const robotics::FoundShape& shape : found.unknown) {
-    text += fmt::format("  acts on {}, depends on {}: {} ({:.0f} % of what was explained)\n", shape.shape.acts_on,
-                        fmt::join(shape.shape.depends_on, ", "), shape.shape.kind, 100.0 * shape.share);
-  }
-  if (!found.maps.empty()) {
-    std::vector<std::string> joints;
-    for (const robotics::Effect& map : found.maps) joints.push_back(map.at);
-    text += fmt::format("  added to the model: free maps of the angle error of {}\n", fmt::join(joints, ", "));
-  }
-  return text;
-}
-
-std::string error_line(const Discovery& found) {
-  const robotics::HeldOut& held = found.held_out;
-  const std::string floor =
-      fmt::format("noise alone makes {:.4f} mm ({})", held.floor_mm,
-                  held.floor_from_repeats ? "from the repeats" : "from what is left, so no lower bound of its own");
-  if (held.poses == 0) {
-    return fmt::format("Error on the poses that were searched, none set aside: {:.4f} -> {:.4f} mm mean; {}.\n",
-                       found.fitted_before.mean, found.fitted_after.mean, floor);
-  }
-  return fmt::format(
-      "Error on {} poses that took no part: {:.4f} -> {:.4f} mm mean, 95 % {:.4f} -> {:.4f}, largest {:.4f} -> {:.4f}; "
-      "{}.\n",
-      held.poses, held.before.mean, held.after.mean, held.before.p95, held.after.p95, held.before.max, held.after.max,
-      floor);
-}
-
-std::string gap_lines(const Discovery& found) {
-  const bool nothing = found.answer == discovery::Answer::nothing_missing;
-  std::string text = nothing ? "What is left, by region:\n" : "Where the gap was, before:\n";
-  if (found.gap.regions.empty()) text += "  about alike everywhere\n";
-  for (const robotics::GapMap::Region& region : found.gap.regions) {
-    text += fmt::format("  {:.4f} mm mean in {} poses: {}\n", region.mean_mm, region.poses, region.conditions);
-  }
-  const auto list = [](const std::vector<robotics::GapMap::Share>& shares) {
-    std::vector<std::string> parts;
-    for (const robotics::GapMap::Share& share : shares) {
-      if (parts.size() < 4) parts.push_back(fmt::format("{} {:.0f} %", share.name, 100.0 * share.share));
-    }
-    return fmt::format("{}", fmt::join(parts, ", "));
+// One line for all places of one kind of effect.
+std::vector<std::string> effect_sentences(const Discovery& found) {
+  struct Group {
+    std::string kind;
+    std::vector<const FoundEffect*> members;
   };
-  if (!found.gap.acts_like.empty()) {
-    text += fmt::format("  share of its square along the motion by each joint: {}\n", list(found.gap.acts_like));
-  }
-  if (!found.gap.depends_on.empty()) text += fmt::format("  a tree of it uses: {}\n", list(found.gap.depends_on));
-  return text;
-}
-
-std::string untestable_lines(const Discovery& found) {
-  std::map<std::string, std::vector<std::string>> by_reason;
-  for (const discovery::UntestableCause& entry : found.not_testable) {
-    // Columns of the single joints are one matter: dir1, dir2, ... are dirN.
-    static const std::regex numbered("([a-z])[0-9]+(_|$|\\|)");
-    by_reason[std::regex_replace(entry.why, numbered, "$1N$2")].push_back(entry.what);
-  }
-  std::string text;
-  for (auto& [why, what] : by_reason) {
-    std::map<std::string, int> types;
-    for (const std::string& label : what) ++types[label.substr(0, label.find('@'))];
-    std::vector<std::string> parts;
-    for (const auto& [type, count] : types) parts.push_back(count > 1 ? fmt::format("{} ({})", type, count) : type);
-    text += fmt::format("  {}: {}\n", why, fmt::join(parts, ", "));
-  }
-  return text.empty() ? "" : "Not testable:\n" + text;
-}
-
-std::string visible_lines(const Discovery& found) {
-  std::map<std::string, std::pair<double, double>> ranges;
-  std::map<std::string, std::string> units;
-  std::set<std::string> beyond;
-  for (const robotics::Visible& entry : found.visible) {
-    const std::string type = entry.what.substr(0, entry.what.find_first_of("@["));
-    if (!std::isfinite(entry.value) || entry.value > robotics::effect_type(type).parameters.front().upper) {
-      beyond.insert(type);
-      continue;
+  std::vector<Group> groups;
+  for (const FoundEffect& effect : found.effects) {
+    const std::string kind = (effect.confirmed ? "" : "perhaps ") +
+                             std::string(effect.smaller ? "also, smaller: " : "") + kind_of(found, effect);
+    const auto same = std::ranges::find(groups, kind, &Group::kind);
+    if (same == groups.end()) {
+      groups.push_back({kind, {&effect}});
+    } else {
+      same->members.push_back(&effect);
     }
-    const auto [range, is_new] = ranges.try_emplace(type, entry.value, entry.value);
-    range->second = {std::min(range->second.first, entry.value), std::max(range->second.second, entry.value)};
-    units[type] = entry.unit;
   }
-  std::string text = "Would have been seen, nine times in ten, from (best to worst place):\n";
-  for (const auto& [type, range] : ranges) {
-    beyond.erase(type);
-    text += fmt::format("  {}: {} to {} {}\n", type, number(range.first, 2), number(range.second, 2),
-                        units[type] == "1" ? "" : units[type]);
+  std::vector<std::string> sentences;
+  for (const Group& group : groups) {
+    std::vector<std::string> places;
+    std::vector<std::string> rivals;
+    double squares = 0.0;
+    for (const FoundEffect* effect : group.members) {
+      places.push_back(effect->effect.at.empty() ? "the whole arm" : effect->effect.at);
+      squares += effect->rms_mm * effect->rms_mm;
+      for (const std::string& rival : effect->rivals) {
+        if (std::ranges::find(rivals, rival) == rivals.end()) rivals.push_back(rival);
+      }
+    }
+    std::string text = fmt::format("  {}, {}", group.kind, list_of(places));
+    if (group.members.size() == 1) {
+      const std::string values = effect_values(found, *group.members[0]);
+      if (!values.empty() && values.size() < most_columns) text += ": " + values;
+    }
+    text += fmt::format("; moves the tool {:.4f} mm", std::sqrt(squares));
+    for (std::size_t k = 0; k < std::min<std::size_t>(2, rivals.size()); ++k) text += "; or " + rivals[k];
+    if (rivals.size() > 2) text += fmt::format("; or {} more", rivals.size() - 2);
+    sentences.push_back(text);
   }
-  if (!beyond.empty()) text += fmt::format("  not at any plausible size: {}\n", fmt::join(beyond, ", "));
-  return text;
+  return sentences;
+}
+
+// One line for all shapes that act on one thing.
+std::vector<std::string> shape_sentences(const std::vector<robotics::FoundShape>& shapes, const std::string& lead) {
+  std::vector<std::string> order;
+  std::map<std::string, std::vector<std::string>> by_place;
+  for (const robotics::FoundShape& one : shapes) {
+    if (one.shape.depends_on.empty()) continue;
+    const std::string& place = one.shape.acts_on;
+    if (!by_place.contains(place)) order.push_back(place);
+    by_place[place].push_back(fmt::format("{} of {}", one.shape.kind, fmt::join(one.shape.depends_on, " and ")));
+  }
+  std::vector<std::string> sentences;
+  for (const std::string& place : order) {
+    sentences.push_back(fmt::format("  {}{}: {}", lead, place, fmt::join(by_place[place], "; ")));
+  }
+  return sentences;
+}
+
+std::string with_article(const std::string& noun) {
+  return (std::string("aeiou").find(noun.front()) == std::string::npos ? "a " : "an ") + noun;
+}
+
+std::vector<std::string> refused_sentences(const Discovery& found) {
+  std::vector<std::string> sentences;
+  for (const robotics::BeyondPlausible& one : found.beyond_plausible) {
+    sentences.push_back(fmt::format("  {}{} would explain it, but at a {} of {}, beyond what is plausible (at {} {})",
+                                    with_article(one.title), one.effect.at.empty() ? "" : ", " + one.effect.at + ",",
+                                    one.parameter.name, plain_value(one.parameter.value, one.parameter.unit),
+                                    one.parameter.value > one.limit ? "most" : "least",
+                                    plain_value(one.limit, one.parameter.unit)));
+  }
+  return sentences;
+}
+
+std::vector<std::string> error_sentences(const Discovery& found) {
+  const robotics::HeldOut& held = found.held_out;
+  std::vector<std::string> lines;
+  if (held.poses == 0) {
+    lines.push_back(fmt::format("Mean error on the poses searched, none set aside: {:.4f} -> {:.4f} mm.",
+                                found.fitted_before.mean, found.fitted_after.mean));
+  } else {
+    lines.push_back(
+        fmt::format("Mean error on {} poses that took no part: {:.4f} -> {:.4f} mm (95 % {:.4f} -> {:.4f}, largest "
+                    "{:.4f} -> {:.4f}).",
+                    held.poses, held.before.mean, held.after.mean, held.before.p95, held.after.p95, held.before.max,
+                    held.after.max));
+  }
+  lines.push_back(
+      held.floor_from_repeats
+          ? fmt::format("A perfect model would leave {:.4f} mm: the noise by the repeats.", held.floor_mm)
+          : fmt::format("There are too few repeats to know the noise: what is left, {:.4f} mm, was taken for it.",
+                        held.floor_mm));
+  return lines;
+}
+
+// What the reader should do now.
+std::string advice(const Discovery& found) {
+  const auto is = [&](const char* kind) { return !found.unknown.empty() && found.unknown[0].shape.kind == kind; };
+  if (found.answer == discovery::Answer::nothing_missing) return "";
+  if (is("outliers")) return "Next: check the outliers, measure them again, and repeat the search without them.";
+  if (is("noise"))
+    return "Next: measure some poses several times, from both sides, and write their number into a column `pose`.";
+  if (found.answer == discovery::Answer::indistinguishable) {
+    return "Next: use the improved description; the poses proposed below would tell the causes apart.";
+  }
+  if (found.answer == discovery::Answer::named)
+    return "Next: use the improved description within the joint ranges that were measured.";
+  return "Next: the improved description holds maps and corrections only where poses were measured; use it there.";
 }
 
 }  // namespace
 
+std::string effect_values(const Discovery& found, const FoundEffect& effect) {
+  std::vector<std::string> values;
+  const std::vector<robotics::Joint>& joints = found.before.chain.joints;
+  const auto first = std::ranges::find(joints, effect.effect.at, &robotics::Joint::name) - joints.begin();
+  const bool by_body = effect.effect.type == "joint_compliance_free_masses";
+  for (std::size_t k = 0; k < effect.parameters.size(); ++k) {
+    const robotics::FoundParameter& parameter = effect.parameters[k];
+    if (!std::isfinite(parameter.standard_error)) continue;
+    const std::size_t body = static_cast<std::size_t>(first) + k / 3;
+    const std::string name = by_body && body < joints.size()
+                                 ? fmt::format("moment of {} along {}", joints[body].name, "xyz"[k % 3])
+                                 : parameter.name;
+    values.push_back(fmt::format("{} {}", name, with_unit(parameter.value, parameter.standard_error, parameter.unit)));
+  }
+  return fmt::format("{}", fmt::join(values, ", "));
+}
+
 std::string discovery_page(const Discovery& found) {
-  std::string text = headline(found) + "\n" + effect_lines(found) + shape_lines(found) + "\n" + error_line(found);
-  for (const std::string& note : found.notes) text += note + "\n";
-  text += "\n" + gap_lines(found);
+  std::vector<std::string> lines;
+  const auto add = [&](const std::string& text) {
+    for (std::string& line : wrapped(text)) lines.push_back(std::move(line));
+  };
+  add(headline(found));
+  for (const std::string& sentence : effect_sentences(found)) add(sentence);
+  for (const std::string& sentence : shape_sentences(found.unknown, "")) add(sentence);
+  for (const std::string& sentence : shape_sentences(found.more, "and something more, on ")) add(sentence);
+  for (const std::string& sentence : refused_sentences(found)) add(sentence);
+  if (!found.maps.empty()) {
+    std::vector<std::string> joints;
+    for (const robotics::Effect& map : found.maps) joints.push_back(map.at);
+    add(fmt::format("  added to the model: free maps of the angle error of {}", list_of(joints)));
+  }
+  std::vector<std::string> body;
+  std::swap(lines, body);
+  for (const std::string& sentence : error_sentences(found)) add(sentence);
   if (!found.outliers.empty()) {
     std::vector<std::string> rows;
     for (const Eigen::Index row : found.outliers) rows.push_back(std::to_string(row + 1));
-    text += fmt::format("Outliers, left out (number of the measurement in the file): {}\n", fmt::join(rows, ", "));
+    constexpr std::size_t shown = 20;
+    const std::size_t more = rows.size() > shown ? rows.size() - shown : 0;
+    rows.resize(rows.size() - more);
+    add(fmt::format("Outliers, left out (number of the measurement in the file): {}{}", fmt::join(rows, ", "),
+                    more > 0 ? fmt::format(" and {} more", more) : ""));
   }
-  text += untestable_lines(found);
-  if (found.answer == discovery::Answer::nothing_missing) text += visible_lines(found);
-  text += fmt::format("{} hypotheses in {} rounds; evidence {:.0f}, chance reaches {:.0f}.\n", found.hypotheses,
-                      found.rounds, found.score_gain, found.threshold);
-  return text;
+  for (const std::string& note : found.notes) add(note);
+  const std::string next = advice(found);
+  if (!next.empty()) add(next);
+  // What was found gives way to how good it is.
+  const std::size_t room = lines.size() + 2 < most_lines ? most_lines - lines.size() - 2 : 1;
+  if (body.size() > room) {
+    const std::size_t left = body.size() - room + 1;
+    body.resize(room - 1);
+    body.push_back(fmt::format("  ... and {} lines more, below", left));
+  }
+  return fmt::format("{}\n\n{}\n\nDetails\n{}", fmt::join(body, "\n"), fmt::join(lines, "\n"),
+                     discovery_details(found));
 }
 
 }  // namespace llmt::apps

@@ -9,8 +9,14 @@
 
 namespace llmt::apps {
 
-/// What was found, in the words of an engineer who has to act on it.
+/// What was found, in the words of an engineer who has to act on it: at most 24 lines of 100 columns, then details.
 std::string discovery_page(const robotics::Discovery& found);
+
+/// Everything else that is known: values, shapes, where the gap is, what could not be tested.
+std::string discovery_details(const robotics::Discovery& found);
+
+/// The values of an effect that the data determine, with their errors.
+std::string effect_values(const robotics::Discovery& found, const robotics::FoundEffect& effect);
 
 Json discovery_json(const robotics::Discovery& found);
 

@@ -141,10 +141,45 @@ TEST(RobotProgram, WrongUnitsAreSuspected) {
   }
   folder.write("wrong.csv", text);
   const std::string calibrate = robot_program + " calibrate " + arm;
-  EXPECT_NE(folder.run(calibrate + " wrong.csv --folds 0").out.find("check units"), std::string::npos);
+  const Outcome wrong = folder.run(calibrate + " wrong.csv --folds 0 -o wrong.yaml");
+  EXPECT_EQ(wrong.exit_code, 1);
+  EXPECT_NE(wrong.out.find("check units"), std::string::npos);
+  EXPECT_NE(wrong.err.find("nothing is written"), std::string::npos) << wrong.err;
+  EXPECT_FALSE(std::filesystem::exists(folder.file("wrong.yaml")));
   const Outcome right = folder.run(calibrate + " d.csv --folds 0 --json");
   ASSERT_EQ(right.exit_code, 0) << right.err;
   EXPECT_TRUE(json::parse(right.out)["warnings"].empty()) << right.out;
+}
+
+// The answer, the error and the advice fit on a screen; everything else follows.
+TEST(RobotProgram, WhatWasDiscoveredFitsOnAScreen) {
+  const Folder folder;
+  const std::string arm = robots + "/tx200_like.yaml";
+  std::string text = llmt::read_file(arm);
+  text = text.substr(0, text.find("\neffects:")) + "\neffects:\n";
+  for (int joint = 1; joint <= 5; ++joint) {
+    text += fmt::format("  - {{type: eccentricity_twice, at: joint{}, cosine_rad: 3e-4, sine_rad: 1e-4}}\n", joint);
+    text += fmt::format(
+        "  - {{type: transmission_error, at: joint{}, order_per_turn: {}, cosine_rad: 2e-4, "
+        "sine_rad: 1e-4}}\n",
+        joint, 40 + joint);
+  }
+  folder.write("truth.yaml", text);
+  ASSERT_EQ(folder.run(robot_program + " simulate truth.yaml --poses 300 --noise-um 20 -o d.csv").exit_code, 0);
+  const Outcome outcome = folder.run(fmt::format("{} discover {} d.csv", robot_program, arm));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const std::string page = outcome.out.substr(0, outcome.out.find("\nDetails\n"));
+  ASSERT_LT(page.size(), outcome.out.size());
+  int lines = 0;
+  for (std::size_t begin = 0; begin < page.size(); ++lines) {
+    const std::size_t end = std::min(page.find('\n', begin), page.size());
+    EXPECT_LE(end - begin, 100U) << page.substr(begin, end - begin);
+    begin = end + 1;
+  }
+  EXPECT_LE(lines, 26) << page;  // the file's name and an empty line come first
+  EXPECT_NE(page.find("twice per turn"), std::string::npos) << page;
+  EXPECT_NE(page.find("Next: "), std::string::npos) << page;
+  EXPECT_EQ(page.find("not determined"), std::string::npos);
 }
 
 TEST(RobotProgram, MistakesHaveTheirExitCodeAndMessage) {

@@ -34,12 +34,11 @@ Json truth(const Case& c) {
                {"outlier_rows", c.outliers},
                {"deflection_mm", c.deflection_mm},
                {"lambda_beyond_first_order", c.lambda_beyond_first_order}};
-  const auto unknown = unknown_kinds();
   json["hidden"] = Json::array();
   for (const HiddenShare& share : c.hidden) {
     Json one = {{"kind", share.effect.kind},
                 {"family", family(share.effect.kind)},
-                {"in_catalogue", std::ranges::find(unknown, share.effect.kind) == unknown.end()},
+                {"in_catalogue", in_catalogue(share.effect.kind)},
                 {"locations", share.effect.locations},
                 {"lambda", share.lambda},
                 {"lambda_beyond_other", share.lambda_beyond_other},

@@ -47,7 +47,13 @@ std::vector<std::string> unknown_kinds() {
   return {"cable", "worn_tooth", "step", "cross", "loose_flange", "friction_load"};
 }
 
+bool in_catalogue(const std::string& kind) {
+  const std::vector<std::string> unknown = unknown_kinds();
+  return std::ranges::find(unknown, kind) == unknown.end() && kind != "saw" && !kind.starts_with("instrument_");
+}
+
 std::string family(const std::string& kind) {
+  if (kind == "backlash_soft") return "backlash_gravity";
   return kind.starts_with("transmission_error_") ? "transmission_error" : kind;
 }
 

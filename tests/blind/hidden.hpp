@@ -50,6 +50,9 @@ Hidden draw(const std::string& kind, const Scene& scene);
 std::vector<std::string> catalogue_kinds(const Arm& arm);
 std::vector<std::string> unknown_kinds();
 
+/// Whether a tool can be asked for its name.
+bool in_catalogue(const std::string& kind);
+
 /// The name that a tool should give: of most kinds the kind itself.
 std::string family(const std::string& kind);
 

@@ -80,6 +80,49 @@ double root_mean_square(const Eigen::VectorXd& residuals, Eigen::Index dof) {
   return residuals.norm() / std::sqrt(static_cast<double>(std::max<Eigen::Index>(1, dof)));
 }
 
+// A backlash jumps where the torque changes its sign: the difference on the other side of the pose is the derivative.
+double without_jump(double forward, double backward) {
+  constexpr double alike = 0.1;
+  const double larger = std::max(std::abs(forward), std::abs(backward));
+  if (std::abs(forward - backward) <= alike * larger) return 0.5 * (forward + backward);
+  return std::abs(forward) < std::abs(backward) ? forward : backward;
+}
+
+// Central differences of a residual in mm, with steps of a thousandth of what is typical: a micrometre, or what moves a
+// tool as much. Shorter steps would show the rounding of positions of metres.
+Eigen::MatrixXd differences(const discovery::LeastSquaresProblem& problem, const Eigen::VectorXd& values) {
+  const Eigen::VectorXd here = problem.residual(values);
+  Eigen::MatrixXd jacobian = Eigen::MatrixXd::Zero(here.size(), values.size());
+  for (Eigen::Index k = 0; k < values.size(); ++k) {
+    const discovery::Parameter& parameter = problem.parameters[static_cast<std::size_t>(k)];
+    if (!parameter.free) continue;
+    constexpr double share = 1e-3;
+    const bool is_geometric = parameter.unit == "mm" || parameter.unit == "deg";
+    const double step = share * (is_geometric ? parameter.scale : std::max(parameter.scale, std::abs(values(k))));
+    Eigen::VectorXd moved = values;
+    moved(k) = values(k) + step;
+    const Eigen::VectorXd forward = (problem.residual(moved) - here) / step;
+    moved(k) = values(k) - step;
+    const Eigen::VectorXd backward = (here - problem.residual(moved)) / step;
+    for (Eigen::Index i = 0; i < here.size(); ++i) {
+      jacobian(i, k) = without_jump(forward(i), backward(i));
+    }
+  }
+  return jacobian;
+}
+
+// The derivatives of position_jacobian() hold deformations constant, which is a thousandth off where the arm bends:
+// near the minimum, where steps of that Jacobian no longer help, differences take the last ones.
+void finish_by_differences(Calibration& calibration, discovery::LeastSquaresProblem& problem,
+                           const std::vector<std::string>& reasons, const discovery::SolverOptions& solver) {
+  for (std::size_t k = 0; k < reasons.size(); ++k) {
+    problem.parameters[k].value = calibration.result.values(k);
+    problem.parameters[k].free = reasons[k].empty();
+  }
+  problem.jacobian = [own = problem](const Eigen::VectorXd& values) { return differences(own, values); };
+  calibration.result = solve_for(calibration.robot, problem, reasons, solver);
+}
+
 // Least squares with priors. The weight of the data against the priors depends on the noise, which the residuals of the
 // registered robot overestimate. So the fit is repeated from its own result, with the noise of the fit before, until
 // the noise settles.
@@ -103,6 +146,10 @@ void identify(Calibration& calibration, const discovery::LeastSquaresProblem& un
     const double before = calibration.noise_mm;
     calibration.noise_mm = root_mean_square(residuals, residuals.size() - calibration.result.rank);
     if (calibration.noise_mm > 0.95 * before) break;
+  }
+  const bool is_finished = calibration.result.converged();
+  if (!is_finished && options.finish && !calibration.robot.effects.empty()) {
+    finish_by_differences(calibration, problem, reasons, options.solver);
   }
   for (std::size_t k = 0; k < reasons.size(); ++k) {
     const discovery::Parameter& parameter = problem.parameters[k];
@@ -200,8 +247,14 @@ Calibration calibrate_without_maps(const Robot& robot, const Measurements& measu
     calibration.registration.residuals = problem.residual(calibration.registration.values);
   }
   std::vector<std::string> reasons = reasons_to_fix(robot, options);
-  const Eigen::MatrixXd jacobian = discovery::evaluate_jacobian(problem, calibration.registration.values);
-  fix_dependent(problem.parameters, jacobian, options.dependence_tolerance, reasons);
+  Eigen::MatrixXd jacobian = discovery::evaluate_jacobian(problem, calibration.registration.values);
+  // Which geometry is of no use shows on the rigid arm: on one that bends, a combination that moves nothing when rigid
+  // moves loads, and would be identified from the thousandth part of an effect.
+  Robot rigid = calibration.registered;
+  rigid.effects.clear();
+  const Eigen::Index geometric = geometric_parameter_count(rigid.chain);
+  jacobian.leftCols(geometric) = position_jacobian(rigid, measurements.poses)(measured_rows(measurements), Eigen::all);
+  fix_dependent(problem.parameters, jacobian, geometric, options.dependence_tolerance, reasons);
   identify(calibration, problem, reasons, options);
   calibration.robot.identified = identified_parameters(calibration.result, reasons);
   for (std::size_t k = 0; k < reasons.size(); ++k) {

@@ -60,6 +60,11 @@ void tell(const ReportOptions& options, Eigen::Index folds_done) {
   if (options.progress) options.progress(folds_done + 1, options.folds + 1);
 }
 
+constexpr double implausible_share = 0.02;
+
+// Without the tool, which may have been fitted to anything.
+double length_of(const Chain& chain) { return reach_of(chain) - chain.tool.xyz_mm.norm(); }
+
 void hold_out(const Robot& robot, const Measurements& measurements, const ReportOptions& options,
               CalibrationReport& report) {
   const Eigen::Index n = measurements.count();
@@ -120,13 +125,18 @@ CorrectedRobot CalibrationReport::best() const {
   return robot;
 }
 
+bool is_implausible(const Robot& nominal, const CalibrationReport& report) {
+  std::vector<double> sorted(report.geometric.in_sample_mm.begin(), report.geometric.in_sample_mm.end());
+  std::ranges::nth_element(sorted, sorted.begin() + std::ssize(sorted) / 2);
+  return sorted[sorted.size() / 2] > implausible_share * length_of(nominal.chain);
+}
+
 std::vector<std::string> suspicions(const Robot& robot, const Measurements& measurements,
                                     const CalibrationReport& report) {
   std::vector<std::string> found;
-  double length_mm = 0.0;
+  const double length_mm = length_of(robot.chain);
   for (std::size_t j = 0; j < robot.chain.joints.size(); ++j) {
     const Joint& joint = robot.chain.joints[j];
-    length_mm += std::abs(joint.a_mm) + std::abs(joint.d_mm);
     if (!joint.limits) continue;
     const double to_file_unit = joint.type == JointType::revolute ? 180.0 / std::numbers::pi : 1.0;
     const Eigen::ArrayXd values = measurements.poses.joints.col(j) * to_file_unit;
@@ -140,7 +150,7 @@ std::vector<std::string> suspicions(const Robot& robot, const Measurements& meas
                       values.minCoeff(), values.maxCoeff()));
     }
   }
-  const double implausible_mm = length_mm / 50.0;
+  const double implausible_mm = implausible_share * length_mm;
   const bool is_held_out = report.geometric.held_out_mm.size() > 0;
   const double nominal = report.nominal.in_sample_mm.mean();
   const double calibrated = (is_held_out ? report.geometric.held_out_mm : report.geometric.in_sample_mm).mean();

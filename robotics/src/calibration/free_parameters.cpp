@@ -72,12 +72,17 @@ std::vector<std::string> reasons_to_fix(const Robot& robot, const CalibrationOpt
 }
 
 void fix_dependent(const std::vector<discovery::Parameter>& parameters, const Eigen::MatrixXd& jacobian,
-                   double tolerance, std::vector<std::string>& reasons) {
+                   Eigen::Index geometric, double geometric_tolerance, std::vector<std::string>& reasons) {
+  // Where the arm bends, directions that geometry imitates are a ten-thousandth off: fitted, they would be millimetres
+  // long. The search takes the same share for imitated.
+  constexpr double effect_tolerance = 1e-3;
   Eigen::MatrixXd basis(jacobian.rows(), jacobian.cols());
   Eigen::Index kept = 0;
   double largest = 0.0;
   for (std::size_t k = 0; k < parameters.size(); ++k) {
     if (!reasons[k].empty()) continue;
+    const bool is_geometric = static_cast<Eigen::Index>(k) < geometric;
+    const double tolerance = is_geometric ? geometric_tolerance : std::max(effect_tolerance, geometric_tolerance);
     Eigen::VectorXd column = jacobian.col(k) * parameters[k].scale;
     const double size = column.norm();
     // Gram-Schmidt twice: once is not orthogonal enough where columns nearly depend on each other.
@@ -86,7 +91,7 @@ void fix_dependent(const std::vector<discovery::Parameter>& parameters, const Ei
       column -= basis.leftCols(kept) * shares;
     }
     largest = std::max(largest, size);
-    if (size <= tolerance * largest) {
+    if (size <= geometric_tolerance * largest) {
       reasons[k] = "does not move the measured point";
     } else if (column.norm() <= tolerance * size) {
       reasons[k] = "not distinguishable from parameters before it";

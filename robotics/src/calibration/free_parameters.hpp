@@ -14,9 +14,10 @@ namespace llmt::robotics {
 std::vector<std::string> reasons_to_fix(const Robot& robot, const CalibrationOptions& options);
 
 /// Adds the reasons the data give: in order, every parameter whose column of `jacobian` depends on the columns of free
-/// parameters before it. Columns are compared in parameter scales.
+/// parameters before it but for a share of its norm: `geometric_tolerance` for the first `geometric` parameters, a
+/// thousandth at least for those of effects. Columns are compared in parameter scales.
 void fix_dependent(const std::vector<discovery::Parameter>& parameters, const Eigen::MatrixXd& jacobian,
-                   double tolerance, std::vector<std::string>& reasons);
+                   Eigen::Index geometric, double geometric_tolerance, std::vector<std::string>& reasons);
 
 /// Whether the joint's beta replaces its d: the axes that its alpha and beta connect are within `limit_deg` of
 /// (anti)parallel.

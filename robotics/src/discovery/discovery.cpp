@@ -7,11 +7,16 @@
 #include <stdexcept>
 
 #include "calibration/joint_map_shift.hpp"
+#include "calibration/paired_gain.hpp"
 #include "discovery/findings.hpp"
 #include "discovery/gap_map.hpp"
 #include "discovery/investigation.hpp"
+#include "discovery/noise_tests.hpp"
 #include "discovery/pose_split.hpp"
+#include "discovery/refined_constants.hpp"
 #include "discovery/rest_correction.hpp"
+#include "discovery/robust_start.hpp"
+#include "discovery/second_look.hpp"
 
 namespace llmt::robotics {
 namespace {
@@ -42,6 +47,26 @@ void report_far_poses(const CorrectedRobot& improved, const Measurements& test, 
   }
 }
 
+// Names that make the poses set aside worse, by more than two standard errors, are not written.
+void withdraw_what_is_worse(const Measurements& searched, const Measurements& test, Discovery& result) {
+  if (test.count() < 3 || result.effects.empty()) return;
+  Measurements common = test;
+  for (std::size_t axis = 0; axis < 3; ++axis) common.measured[axis] = test.measured[axis] && searched.measured[axis];
+  const PairedGain loss = paired_gain(distances(positions(result.improved, common.poses), common),
+                                      distances(positions(result.before, common.poses), common));
+  if (!loss.is_beyond_chance()) return;
+  result.notes.push_back(
+      fmt::format("What was found makes the poses set aside worse, {:.4f} mm instead of {:.4f}: the "
+                  "description is as calibrated, and the names are guesses.",
+                  result.held_out.after.mean, result.held_out.before.mean));
+  result.answer = discovery::Answer::unknown;
+  for (FoundEffect& effect : result.effects) effect.confirmed = false;
+  result.improved = {result.before, {}};
+  result.maps.clear();
+  result.fitted_after = result.fitted_before;
+  result.held_out.after = result.held_out.before;
+}
+
 void verify(const Measurements& searched, const Measurements& test, Eigen::Index components, Discovery& result) {
   result.fitted_before = figures({result.before, {}}, searched);
   result.fitted_after = figures(result.improved, searched);
@@ -57,6 +82,7 @@ void verify(const Measurements& searched, const Measurements& test, Eigen::Index
     result.held_out.poses = test.count();
     report_far_poses(result.improved, common, result);
   }
+  withdraw_what_is_worse(searched, test, result);
   result.held_out.floor_from_repeats = result.lack_of_fit.has_enough_repeats();
   const double noise_mm = result.held_out.floor_from_repeats ? result.lack_of_fit.noise : result.noise_mm;
   result.held_out.floor_mm = mean_distance(noise_mm, components);
@@ -75,11 +101,10 @@ void check_freedom(const Measurements& samples, const Calibration& baseline) {
 }
 
 // Throws if the error is larger than any effect makes it: wrong units, order or signs of joints, another robot, too
-// many lost beams.
-void check_plausible(const Robot& robot, const Measurements& samples) {
-  double reach = robot.chain.tool.xyz_mm.norm();
-  for (const Joint& joint : robot.chain.joints) reach += std::abs(joint.a_mm) + std::abs(joint.d_mm);
-  Eigen::VectorXd errors = distances(positions(robot, samples.poses), samples);
+// many lost beams. The nominal chain is the measure: a tool that was fitted to nonsense may be metres long.
+void check_plausible(const Robot& nominal, const Robot& calibrated, const Measurements& samples) {
+  const double reach = reach_of(nominal.chain);
+  Eigen::VectorXd errors = distances(positions(calibrated, samples.poses), samples);
   std::ranges::nth_element(errors, errors.begin() + errors.size() / 2);
   const double median = errors(errors.size() / 2);
   constexpr double implausible = 0.02;
@@ -98,6 +123,38 @@ bool is_exact(const Robot& robot, const Measurements& samples) {
   return largest < rounding * std::max(1.0, samples.positions_mm.cwiseAbs().maxCoeff());
 }
 
+bool is_named(discovery::Answer answer) {
+  return answer == discovery::Answer::named || answer == discovery::Answer::indistinguishable;
+}
+
+// "Nothing missing" needs residuals that an instrument's noise can be, and few measurements that fit nothing.
+void refuse_all_clear(const Investigation& investigation, const DiscoveryOptions& options, Discovery& result) {
+  if (result.answer != discovery::Answer::nothing_missing) return;
+  const Measurements& searched = investigation.searched;
+  std::vector<std::size_t> skipped = investigation.verdict.outliers;
+  std::ranges::sort(skipped);
+  const Measurements kept = without_rows(searched, skipped);
+  const double tail = tail_of(distances(positions(investigation.fitted.robot, kept.poses), kept),
+                              std::ranges::count(searched.measured, true));
+  constexpr double heaviest = 1.6;  // Student's t with 4 degrees of freedom: 1.2
+  const auto most =
+      static_cast<Eigen::Index>(options.search.largest_outlier_share * static_cast<double>(searched.count()));
+  if (std::ssize(skipped) >= std::max<Eigen::Index>(most, 3) || tail > heaviest) {
+    result.answer = discovery::Answer::unknown;
+    result.unknown.push_back({{"measurements", {}, std::nullopt, "outliers"}, 1.0});
+    result.notes.push_back(fmt::format(
+        "More measurements fit nothing than can be told from an effect ({} were left out, at most {} are): check them "
+        "before anything else.",
+        skipped.size(), most));
+    return;
+  }
+  if (const std::optional<NoNoise> fault = no_noise(investigation.fitted, searched, skipped, options.seed)) {
+    result.answer = discovery::Answer::unknown;
+    result.unknown.push_back({{fault->where, {}, std::nullopt, "noise"}, 1.0});
+    result.notes.push_back(fmt::format("No candidate explains it, but {}.", fault->reason));
+  }
+}
+
 Discovery discover_in(const Robot& robot, const PoseSplit& split, const DiscoveryOptions& options) {
   // Joint maps that the robot has already are applied to the joint values, and the search is made without them.
   const Unmapped plain = unmapped(robot, split.samples);
@@ -105,9 +162,11 @@ Discovery discover_in(const Robot& robot, const PoseSplit& split, const Discover
   say(options, "calibrating");
   Investigation investigation;
   investigation.searched = plain.measurements;
-  investigation.baseline = calibrate(plain.robot, investigation.searched, options.calibration);
+  RobustStart start = robust_start(plain.robot, investigation.searched, options.calibration);
+  investigation.baseline = std::move(start.calibration);
+  investigation.baseline_without = std::move(start.left_out);
   check_freedom(investigation.searched, investigation.baseline);
-  check_plausible(investigation.baseline.robot, investigation.searched);
+  check_plausible(robot, investigation.baseline.robot, investigation.searched);
   if (is_exact(investigation.baseline.robot, investigation.searched)) {
     result.before = calibrate(robot, split.samples, options.calibration).robot;
     result.improved.robot = result.before;
@@ -118,13 +177,25 @@ Discovery discover_in(const Robot& robot, const PoseSplit& split, const Discover
   investigation.search(options);
   const discovery::Verdict& verdict = investigation.verdict;
   result.answer = verdict.answer;
-  describe_shapes(investigation.asked.hypotheses, verdict, result);
+  describe_shapes(investigation.asked.hypotheses, verdict, result.unknown);
   if (options.maps && verdict.answer == discovery::Answer::unknown) add_maps(investigation, options, result);
+  std::optional<SecondLook> look;
+  const std::vector<Hypothesis> large = investigation.found;
+  if (is_named(verdict.answer)) look = look_again(investigation, options);
+  const std::map<std::string, double> constant_errors =
+      refine_constants(investigation, options, look ? &look->asked.hypotheses : nullptr);
   describe_effects(investigation.asked.hypotheses, verdict, investigation.fitted, options.mass_uncertainty, result);
   describe_limits(investigation.asked.hypotheses, investigation.asked.untestable, verdict, robot, result);
+  describe_refused(investigation, robot, result);
+  if (look) describe_smaller(*look, large, verdict, investigation.fitted, options, result);
+  for (FoundEffect& effect : result.effects) {
+    const auto error = constant_errors.find(effect_label(effect.effect));
+    if (error != constant_errors.end()) effect.constant_error = error->second;
+  }
   for (const std::size_t sample : verdict.outliers) {
     for (const Eigen::Index row : split.rows[sample]) result.outliers.push_back(row);
   }
+  refuse_all_clear(investigation, options, result);
   const Measurements kept = without_rows(split.samples, verdict.outliers);
   result.before = calibrate(robot, kept, options.calibration).robot;
   result.rounds = investigation.rounds;
@@ -139,7 +210,7 @@ Discovery discover_in(const Robot& robot, const PoseSplit& split, const Discover
     result.notes.emplace_back(
         "The refit with what was found did not converge to anything better: the model is as calibrated.");
   }
-  if (options.correct && result.answer == discovery::Answer::unknown) {
+  if (options.correct && verdict.answer == discovery::Answer::unknown) {
     say(options, "trying a correction");
     correct_rest(kept, options.seed, result);
   }

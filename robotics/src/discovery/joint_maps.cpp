@@ -8,6 +8,7 @@
 
 #include "calibration/joint_map_shift.hpp"
 #include "calibration/paired_gain.hpp"
+#include "discovery/left_out.hpp"
 
 namespace llmt::robotics {
 namespace {
@@ -132,19 +133,6 @@ class Smoother {
     return 2.0 * Eigen::LLT<Eigen::MatrixXd>(matrix).matrixLLT().diagonal().array().log().sum();
   }
 };
-
-// Distances when each sample is left out: (I - H_ii)^-1 e_i; `used` (k x N) such that H = used' used.
-Eigen::VectorXd left_out(const Eigen::MatrixXd& used, const Eigen::VectorXd& errors, Eigen::Index d) {
-  Eigen::VectorXd lengths(errors.size() / d);
-  for (Eigen::Index i = 0; i < lengths.size(); ++i) {
-    const auto columns = used.middleCols(i * d, d);
-    Eigen::MatrixXd own = Eigen::MatrixXd::Identity(d, d);
-    own.noalias() -= columns.transpose() * columns;
-    own.diagonal().array() += 1e-6;
-    lengths(i) = own.ldlt().solve(errors.segment(i * d, d)).norm();
-  }
-  return lengths;
-}
 
 // The residuals and the hats at the measured coordinates, with what geometry and the robot's effects imitate projected
 // out.

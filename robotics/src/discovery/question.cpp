@@ -1,5 +1,6 @@
 #include "discovery/question.hpp"
 
+#include <Eigen/QR>
 #include <algorithm>
 
 #include "discovery/pose_split.hpp"
@@ -19,6 +20,33 @@ Eigen::VectorXd stacked_residuals(const Robot& robot, const Measurements& measur
     }
   }
   return residuals;
+}
+
+// Geometric parameters that span all that geometry can do to the rigid arm. On an arm that bends, a combination that
+// moves nothing when rigid, such as a shift of a joint along its axis, moves loads and thereby the tool by a
+// thousandth: taken for geometry it would absorb a part of every elastic effect.
+std::vector<Eigen::Index> independent_geometry(const Robot& robot, const Measurements& measurements,
+                                               const std::vector<Eigen::Index>& rows) {
+  Robot rigid = robot;
+  rigid.effects.clear();
+  Eigen::MatrixXd jacobian = position_jacobian(rigid, measurements.poses)(rows, Eigen::all);
+  // What moves nothing next to the others is rounding, often of the same pattern as what does move something: scaled up
+  // it would take its place.
+  constexpr double nothing = 1e-7;
+  const double least = nothing * jacobian.colwise().norm().maxCoeff();
+  for (auto column : jacobian.colwise()) {
+    if (column.norm() > least) {
+      column.normalize();
+    } else {
+      column.setZero();
+    }
+  }
+  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> factors(jacobian);
+  factors.setThreshold(1e-9);
+  const auto& order = factors.colsPermutation().indices();
+  std::vector<Eigen::Index> columns(order.begin(), order.begin() + factors.rank());
+  std::ranges::sort(columns);
+  return columns;
 }
 
 // An effect that an earlier round added, as a hypothesis with its signature at the present estimates.
@@ -68,10 +96,13 @@ EffectQuestion question(const Robot& robot, const std::vector<Hypothesis>& found
     for (Hypothesis& shape : shape_hypotheses(scene)) result.hypotheses.push_back(std::move(shape));
   }
   const std::vector<Eigen::Index> rows = measured_rows(measurements);
-  Eigen::Index baseline = geometric_parameter_count(robot.chain);
-  for (std::size_t e = 0; e < own; ++e) baseline += std::ssize(robot.effects[e].values);
+  std::vector<Eigen::Index> baseline = independent_geometry(robot, measurements, rows);
+  Eigen::Index next = geometric_parameter_count(robot.chain);
+  for (std::size_t e = 0; e < own; ++e) {
+    for (std::size_t k = 0; k < robot.effects[e].values.size(); ++k) baseline.push_back(next++);
+  }
   result.evidence.residuals = explained(rows);
-  result.evidence.jacobian = jacobian(rows, Eigen::seqN(0, baseline));
+  result.evidence.jacobian = jacobian(rows, baseline);
   result.evidence.components = std::ranges::count(measurements.measured, true);
   result.evidence.repeats = repeats_of(measurements.poses);
   // Deflections are at most a hundredth of the levers, and the error of first order is a fraction of that, here
@@ -88,6 +119,11 @@ std::vector<discovery::EffectCandidate> candidates_of(const EffectQuestion& ques
   std::vector<discovery::EffectCandidate> candidates;
   for (const Hypothesis& hypothesis : question.hypotheses) candidates.push_back(hypothesis.candidate);
   return candidates;
+}
+
+void forget_signatures(EffectQuestion& question) {
+  question.evidence = {};
+  for (Hypothesis& hypothesis : question.hypotheses) hypothesis.candidate.signature.resize(0, 0);
 }
 
 std::vector<Hypothesis> effects_of(const EffectQuestion& question, const discovery::Verdict& verdict) {

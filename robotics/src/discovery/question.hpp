@@ -24,6 +24,9 @@ EffectQuestion question(const Robot& robot, const std::vector<Hypothesis>& found
 /// The candidates of the hypotheses, in their order.
 std::vector<discovery::EffectCandidate> candidates_of(const EffectQuestion& question);
 
+/// Frees the memory of what only the search needs.
+void forget_signatures(EffectQuestion& question);
+
 /// The hypotheses of the verdict that are effects, with their values.
 std::vector<Hypothesis> effects_of(const EffectQuestion& question, const discovery::Verdict& verdict);
 

@@ -160,6 +160,7 @@ const std::vector<EffectType>& effect_types() {
     std::vector<EffectType> all = elastic_effects();
     for (EffectType& type : joint_effects()) all.push_back(std::move(type));
     for (EffectType& type : whole_arm_effects()) all.push_back(std::move(type));
+    for (EffectType& type : instrument_effects()) all.push_back(std::move(type));
     all.push_back(formula_effect());
     return read_entries(default_catalogue_yaml, "catalogue.yaml", std::move(all));
   }();

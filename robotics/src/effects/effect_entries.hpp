@@ -15,6 +15,7 @@ inline constexpr double metres = 1e-3;  // m per mm
 std::vector<EffectType> elastic_effects();
 std::vector<EffectType> joint_effects();
 std::vector<EffectType> whole_arm_effects();
+std::vector<EffectType> instrument_effects();
 EffectType formula_effect();
 
 /// The table robotics/catalogue.yaml as text.

@@ -73,13 +73,26 @@ double backlash_gravity(const PoseContext& pose, std::size_t j, Values values, V
   return std::abs(torque) > held * whole ? values[0] * sign(torque) : 0.0;
 }
 
+double backlash_gravity_soft(const PoseContext& pose, std::size_t j, Values values, Values constants) {
+  return values[0] * std::tanh(gravity_load(pose, j) / constants[0]);
+}
+
 double backlash_approach(const PoseContext& pose, std::size_t, Values values, Values) {
   return -values[0] * sign(pose.columns[0]);
 }
 
+// -1 to 1: how far the drive is wound up at the end of a move.
+double wound_up(double move, double presliding) {
+  return sign(move) * (1.0 - 2.0 * std::exp(-std::abs(move) / presliding));
+}
+
 double hysteresis(const PoseContext& pose, std::size_t, Values values, Values constants) {
-  const double move = pose.columns[0];
-  return -values[0] * sign(move) * (1.0 - 2.0 * std::exp(-std::abs(move) / constants[0]));
+  return -values[0] * wound_up(pose.columns[0], constants[0]);
+}
+
+double hysteresis_approach(const PoseContext& pose, std::size_t, Values values, Values constants) {
+  const double wound = wound_up(pose.columns[0], constants[0]);
+  return -values[0] * wound - values[1] * (sign(pose.columns[1]) - wound);
 }
 
 double wrist_coupling(const PoseContext& pose, std::size_t j, Values values, Values) {
@@ -90,11 +103,21 @@ double read_back_lag(const PoseContext& pose, std::size_t j, Values values, Valu
   return values[0] * (pose.columns[0] - joint_value(pose, j));
 }
 
+double not_settled(const PoseContext& pose, std::size_t, Values values, Values) { return -values[0] * pose.columns[0]; }
+
 void apply_axis_wobble(const PoseContext& pose, std::size_t j, Values values, Values, Deformation& deformation) {
   const double q = joint_value(pose, j);
   const Eigen::Matrix3d& frame = pose.skeleton.joint_frame[j];
   twist_before(deformation, j).rotation_rad +=
       harmonic(q, values.first(2)) * frame.col(0) + harmonic(q, values.last(2)) * frame.col(1);
+}
+
+void apply_axis_wobble_at(const PoseContext& pose, std::size_t j, Values values, Values constants,
+                          Deformation& deformation) {
+  Deformation::Twist& twist = twist_before(deformation, j);
+  const Eigen::Vector3d before = twist.rotation_rad;
+  apply_axis_wobble(pose, j, values, constants, deformation);
+  twist.translation_mm -= (twist.rotation_rad - before).cross(constants[0] * pose.skeleton.joint_frame[j].col(2));
 }
 
 std::string must_be_positive(const char* name, double value) {
@@ -165,6 +188,15 @@ std::vector<EffectType> friction_effects() {
        .source = "Caenen & Angue 1990; Slamani & Bonev 2012",
        .parameters = {angle("half_gap")},
        .apply = joint_error(backlash_gravity)},
+      {.name = "backlash_gravity_soft",
+       .family = "backlash_gravity",
+       .formula = "dq_j = h tanh(tau_j / s): the flanks of the teeth take up the load little by little",
+       .source = "soft transition of a dead zone; Slamani & Bonev 2012",
+       .parameters = {angle("half_gap")},
+       .constants = {{.name = "softness", .key = "softness_Nm", .usual = 1.0, .prismatic_key = "softness_N"}},
+       .apply = joint_error(backlash_gravity_soft),
+       .refusal = [](const Chain&, std::size_t,
+                     Values constants) { return must_be_positive("softness", constants[0]); }},
       {.name = "backlash_approach",
        .family = "backlash_approach",
        .formula = "dq_j = -h s_j, s_j = +1 or -1: the direction in which the joint last moved",
@@ -183,7 +215,26 @@ std::vector<EffectType> friction_effects() {
        .apply = joint_error(hysteresis),
        .refusal = [](const Chain&, std::size_t,
                      Values constants) { return must_be_positive("presliding", constants[0]); }},
+      {.name = "hysteresis_approach",
+       .family = "hysteresis",
+       .formula =
+           "dq_j = -h w - g (s_j - w), w = sign(x)(1 - 2 exp(-|x| / delta)) as in hysteresis, s_j = +1 or -1 the "
+           "direction of the approach at the end of the move, which turns the drive back by g of h",
+       .source = "Dahl 1968; the approach is a second, short move",
+       .parameters = {angle("half_width"), angle("turned_back")},
+       .constants = {{.name = "presliding", .key = "presliding_rad", .usual = 0.01, .prismatic_key = "presliding_mm"}},
+       .columns = {"move{}_rad|move{}_mm", "dir{}"},
+       .apply = joint_error(hysteresis_approach),
+       .refusal = [](const Chain&, std::size_t,
+                     Values constants) { return must_be_positive("presliding", constants[0]); }},
   };
+}
+
+std::vector<EffectParameter> two_tilts() {
+  return {{.name = "x_cosine", .unit = "rad", .key = "x_cosine_rad"},
+          {.name = "x_sine", .unit = "rad", .key = "x_sine_rad"},
+          {.name = "y_cosine", .unit = "rad", .key = "y_cosine_rad"},
+          {.name = "y_sine", .unit = "rad", .key = "y_sine_rad"}};
 }
 
 std::vector<EffectType> drive_effects() {
@@ -227,12 +278,24 @@ std::vector<EffectType> drive_effects() {
            "th = (a cos q_j + b sin q_j) x_j + (c cos q_j + d sin q_j) y_j about the joint's origin, x_j, y_j on the "
            "side that stands still; the joint's axis and everything beyond turn",
        .source = "bearing run-out; Judd & Knasinski 1990",
-       .parameters = {{.name = "x_cosine", .unit = "rad", .key = "x_cosine_rad"},
-                      {.name = "x_sine", .unit = "rad", .key = "x_sine_rad"},
-                      {.name = "y_cosine", .unit = "rad", .key = "y_cosine_rad"},
-                      {.name = "y_sine", .unit = "rad", .key = "y_sine_rad"}},
+       .parameters = two_tilts(),
        .apply = apply_axis_wobble,
        .prismatic = false},
+      {.name = "axis_wobble_at",
+       .family = "axis_wobble",
+       .formula = "as axis_wobble, about the point of the axis at a distance from the joint's origin",
+       .source = "bearing run-out; Judd & Knasinski 1990",
+       .parameters = two_tilts(),
+       .constants = {{.name = "pivot", .key = "pivot_mm", .usual = 0.0}},
+       .apply = apply_axis_wobble_at,
+       .prismatic = false},
+      {.name = "not_settled",
+       .family = "not_settled",
+       .formula = "dq_j = -k x, x the joint's last move: the pose was measured while the joint was still on its way",
+       .source = "step response of a servo",
+       .parameters = {{.name = "share", .unit = "1", .key = "share"}},
+       .columns = {"move{}_rad|move{}_mm"},
+       .apply = joint_error(not_settled)},
       {.name = "read_back_lag",
        .family = "read_back_lag",
        .formula = "dq_j = k (qmeas_j - q_j): the joint stands where it was read back, not where it was sent",

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <set>
 #include <span>
 
@@ -32,7 +33,7 @@ std::vector<std::vector<double>> constants_for(const EffectType& type, const Sce
     if (!ratio) return {};
     return {{*ratio}, {2.0 * *ratio}, {4.0 * *ratio}};
   }
-  if (type.name == "hysteresis") return {{0.005}, {0.015}, {0.04}, {0.1}, {0.3}};
+  if (type.family == "hysteresis") return {{0.005}, {0.015}, {0.04}, {0.1}, {0.3}};
   if (type.name == "thermal_growth" || type.name == "link_thermal_growth") return {{mean_of(scene.poses, "temp_C")}};
   if (type.name == "drift" || type.name == "drift_curved") {
     const Eigen::VectorXd& time = *time_column(scene.poses);
@@ -40,14 +41,58 @@ std::vector<std::vector<double>> constants_for(const EffectType& type, const Sce
     return {{time.minCoeff(), time.maxCoeff()}};
   }
   if (type.name == "tracker_knock" || type.name == "joint_map") return {};
+  if (type.name == "axis_wobble_at") {
+    // The bearing is at one end of the offset along the axis or at the other; from round to round the same.
+    constexpr double length_mm = 10.0;
+    const double offset = length_mm * std::round(scene.robot.chain.joints[index].d_mm / length_mm);
+    if (offset == 0.0) return {};
+    return {{offset}};
+  }
+  if (type.name == "backlash_gravity_soft") {
+    // The torque of an axis that stands upright is rounding.
+    constexpr double rounding = 1e-9;
+    const double largest = scene.largest_load(index);
+    if (!(largest > rounding * scene.loads.cwiseAbs().maxCoeff())) return {};
+    // So many digits make the same label from round to round.
+    const auto rounded = [](double value) { return std::stod(fmt::format("{:.1e}", value)); };
+    return {{rounded(0.015 * largest)}, {rounded(0.035 * largest)}};
+  }
   std::vector<double> usual;
   for (const EffectConstant& constant : type.constants) usual.push_back(constant.usual);
   return {usual};
 }
 
 bool masses_known(const Chain& chain, std::size_t index) {
-  return std::ranges::any_of(std::span(chain.joints).subspan(index),
+  return std::ranges::all_of(std::span(chain.joints).subspan(index),
                              [](const Joint& joint) { return joint.mass_kg > 0.0; });
+}
+
+// An instrument stands outside of what it sees: all points lie on one side of it, and not at its foot.
+bool origin_may_be_an_instrument(const Scene& scene) {
+  if (!std::ranges::all_of(scene.measured, [](bool seen) { return seen; })) return false;
+  const Eigen::MatrixXd points = positions(scene.robot, scene.poses);
+  const Eigen::Vector2d middle = points.leftCols(2).colwise().mean();
+  constexpr double widest = 0.5;  // cosine of the angle from the middle
+  for (Eigen::Index i = 0; i < points.rows(); ++i) {
+    const Eigen::Vector2d point = points.row(i).head(2);
+    if (!(point.dot(middle) > widest * point.norm() * middle.norm())) return false;
+  }
+  return true;
+}
+
+// No payload weighs less than nothing, as far as masses and softness are known.
+void keep_payload_positive(const Poses& poses, const Chain& chain, discovery::EffectCandidate& candidate) {
+  double least = std::numeric_limits<double>::infinity();
+  const auto column = poses.covariates.find("payload_kg");
+  if (column == poses.covariates.end()) {
+    if (chain.payload.mass_kg > 0.0) least = chain.payload.mass_kg;
+  } else {
+    for (const double mass : column->second) {
+      if (mass > 0.0) least = std::min(least, mass);
+    }
+  }
+  constexpr double known = 0.1;  // two standard deviations of what masses are known to
+  candidate.lower(0) = std::max(candidate.lower(0), -(1.0 + known) * least);
 }
 
 std::set<std::string> labels_of(const Robot& robot) {
@@ -63,8 +108,13 @@ std::vector<Hypothesis> catalogue_hypotheses(const Scene& scene, const std::vect
   const Chain& chain = scene.robot.chain;
   const std::set<std::string> present = labels_of(scene.robot);
   std::vector<Hypothesis> hypotheses;
+  const bool has_instrument = origin_may_be_an_instrument(scene);
   for (const EffectType& type : catalogue) {
     if (!type.searched) continue;
+    if (type.name.starts_with("instrument_") && !has_instrument) {
+      untestable.push_back({type.name, "the origin of the measurements is not where an instrument stands"});
+      continue;
+    }
     const std::size_t places = type.place == EffectPlace::robot ? 1 : chain.joints.size();
     for (std::size_t index = 0; index < places; ++index) {
       std::string why;
@@ -77,6 +127,11 @@ std::vector<Hypothesis> catalogue_hypotheses(const Scene& scene, const std::vect
         untestable.push_back({place.empty() ? type.name : type.name + "@" + place, "there is no column " + why});
         continue;
       }
+      // Where the approach is known, it belongs to the move: without it the width would be too small.
+      if (type.name == "hysteresis" &&
+          has_columns(effect_type("hysteresis_approach"), chain, index, scene.poses, &why)) {
+        continue;
+      }
       for (const std::vector<double>& constants : constants_for(type, scene, index)) {
         Effect effect = make_effect(type, chain, index, constants);
         if (present.contains(effect_label(effect))) continue;
@@ -85,6 +140,7 @@ std::vector<Hypothesis> catalogue_hypotheses(const Scene& scene, const std::vect
         hypothesis.candidate.location = place;
         if (type.name == "transmission_error") hypothesis.candidate.location += fmt::format("[{}]", constants[0]);
         set_limits(type, std::ssize(effect.values), hypothesis.candidate);
+        if (type.name == "payload_error") keep_payload_positive(scene.poses, chain, hypothesis.candidate);
         hypothesis.effect = std::move(effect);
         hypotheses.push_back(std::move(hypothesis));
       }

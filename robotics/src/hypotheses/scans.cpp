@@ -28,6 +28,15 @@ double order_gain(const JointSignal& signal, double order) {
   return gram.determinant() > 1e-6 * gram.trace() * gram.trace() ? moment.dot(gram.ldlt().solve(moment)) : 0.0;
 }
 
+// Sum of squares of the residuals' parts along the joint's motion.
+double along_square(const JointSignal& signal) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < signal.along.size(); ++i) {
+    if (signal.weight[i] > 0.0) sum += signal.along[i] * signal.along[i] / signal.weight[i];
+  }
+  return sum;
+}
+
 // The gain on a grid of orders, with cosines and sines by rotation from order to order.
 std::vector<Peak> order_spectrum(const JointSignal& signal, double first, double last, double step) {
   std::vector<Peak> spectrum;
@@ -57,6 +66,8 @@ std::vector<Peak> order_spectrum(const JointSignal& signal, double first, double
   return spectrum;
 }
 
+// The order of the largest gain near a peak, or the whole number beside it if that explains the residuals as well but
+// for chance: gears have whole numbers of teeth, or twice their ratio's.
 double refined(const JointSignal& signal, double order, double step) {
   double best = order;
   double gain = order_gain(signal, order);
@@ -70,7 +81,18 @@ double refined(const JointSignal& signal, double order, double step) {
       }
     }
   }
-  return best;
+  constexpr double chance = 6.0;  // of chi-squared with one degree of freedom: one time in seventy
+  const double variance = std::max(0.0, along_square(signal) - gain) / static_cast<double>(signal.along.size());
+  const double whole = std::round(best);
+  return std::abs(whole - best) < step && gain - order_gain(signal, whole) < chance * variance ? whole : best;
+}
+
+// Scatter of one joint is larger along its motion than what the search takes for noise, and the best of many orders
+// would be an effect. It must stand out of that joint's own scatter.
+bool stands_out(const JointSignal& signal, double gain, double orders) {
+  const double variance = std::max(0.0, along_square(signal) - gain) / static_cast<double>(signal.along.size());
+  constexpr double clearly = 12.0;  // the best of the orders of one joint reaches it one time in four hundred
+  return gain > (2.0 * std::log(orders) + clearly) * variance;
 }
 
 const EffectType* type_of(const std::vector<EffectType>& catalogue, const std::string& name) {
@@ -111,8 +133,9 @@ void add_orders(const Scene& scene, const EffectType& type, std::vector<Hypothes
     for (const Peak& peak : spectrum) {
       if (taken.size() >= known + kept) break;
       if (std::ranges::any_of(taken, [&](double order) { return std::abs(order - peak.order) < 3.0 * step; })) continue;
-      const double order = refined(signal, peak.order, step);
       taken.push_back(peak.order);
+      if (!stands_out(signal, peak.gain, static_cast<double>(spectrum.size()))) continue;
+      const double order = refined(signal, peak.order, step);
       hypotheses.push_back(hypothesis_of(type, chain, j, order, choices));
     }
   }

@@ -8,7 +8,7 @@ namespace llmt::robotics {
 
 Scene make_scene(const Robot& robot, const Poses& poses, const Eigen::VectorXd& residuals,
                  const std::array<bool, 3>& measured) {
-  Scene scene{robot, poses, residuals, measured, {}, residuals};
+  Scene scene{robot, poses, residuals, measured, {}, gravity_loads(robot, poses), residuals};
   const Kinematics kinematics(robot.chain);
   scene.lever.assign(robot.chain.joints.size(), Eigen::MatrixXd::Zero(3 * poses.count(), 1));
   Eigen::VectorXd size(poses.count());

@@ -15,7 +15,11 @@ struct Scene {
   const Eigen::VectorXd& residuals;  ///< 3n: measured - model, zero where not measured
   std::array<bool, 3> measured;
   std::vector<Eigen::MatrixXd>
-      lever;                ///< for each joint 3n x 1: motion of the tool by the joint, zero where not measured
+      lever;              ///< for each joint 3n x 1: motion of the tool by the joint, zero where not measured
+  Eigen::MatrixXd loads;  ///< n x J: gravity_loads() of the robot
+  double largest_load(std::size_t joint) const {
+    return loads.col(static_cast<Eigen::Index>(joint)).cwiseAbs().maxCoeff();
+  }
   Eigen::VectorXd clipped;  ///< residuals for scans: no sample is longer than some times the median
 };
 

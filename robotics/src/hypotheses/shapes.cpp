@@ -178,9 +178,8 @@ void add_pairs(const Scene& scene, std::vector<Hypothesis>& shapes) {
 
 // Angle errors that grow with the gravity torque otherwise than in proportion.
 void add_loads(const Scene& scene, std::vector<Hypothesis>& shapes) {
-  const Eigen::MatrixXd loads = gravity_loads(scene.robot, scene.poses);
   for (std::size_t j = 0; j < scene.robot.chain.joints.size(); ++j) {
-    const Eigen::VectorXd load = loads.col(j);
+    const Eigen::VectorXd load = scene.loads.col(j);
     const double largest = load.cwiseAbs().maxCoeff();
     if (!(largest > 0.0)) continue;
     Eigen::MatrixXd functions(load.size(), 3);
@@ -201,6 +200,7 @@ void add_tool(const Scene& scene, std::vector<Hypothesis>& shapes) {
   const Eigen::Index n = scene.poses.count();
   Eigen::MatrixXd linear = Eigen::MatrixXd::Zero(3 * n, 9);
   Eigen::MatrixXd square = Eigen::MatrixXd::Zero(3 * n, 18);
+  Eigen::MatrixXd sided = Eigen::MatrixXd::Zero(3 * n, 15);
   for (Eigen::Index i = 0; i < n; ++i) {
     const Skeleton skeleton = kinematics.skeleton(scene.poses.joints.row(i).transpose());
     const Eigen::Matrix3d& tool = skeleton.tool.rotation;
@@ -209,9 +209,15 @@ void add_tool(const Scene& scene, std::vector<Hypothesis>& shapes) {
     Eigen::Matrix<double, 6, 1> squares;
     squares << down(0) * down(0), down(1) * down(1), down(2) * down(2), down(0) * down(1), down(1) * down(2),
         down(2) * down(0);
+    // What droops until it meets a stop: to the side that is down, whatever the angle.
+    Eigen::Matrix<double, 5, 1> sides;
+    sides << down, Eigen::Vector2d::Zero();
+    const double across = down.head<2>().norm();
+    if (across > 0.0) sides.tail<2>() = down.head<2>() / across;
     for (Eigen::Index axis = 0; axis < 3; ++axis) {
       for (Eigen::Index row = 0; row < 3; ++row) {
         if (!scene.measured[row]) continue;
+        sided.block(3 * i + row, 5 * axis, 1, 5) = tool(row, axis) * sides.transpose();
         linear.block(3 * i + row, 3 * axis, 1, 3) = tool(row, axis) * down.transpose();
         square.block(3 * i + row, 6 * axis, 1, 6) = tool(row, axis) * squares.transpose();
       }
@@ -220,6 +226,7 @@ void add_tool(const Scene& scene, std::vector<Hypothesis>& shapes) {
   const Shape shape{"tool", {"orientation of the tool to gravity"}, std::nullopt, "smooth"};
   shapes.push_back(shape_of("?tool", "linear", linear, shape));
   shapes.push_back(shape_of("?tool", "quadratic", square, shape));
+  shapes.push_back(shape_of("?tool", "sided", sided, shape));
 }
 
 void add_covariates(const Scene& scene, std::vector<Hypothesis>& shapes) {

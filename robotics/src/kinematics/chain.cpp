@@ -105,6 +105,12 @@ std::vector<discovery::Parameter> geometric_parameters(const Chain& chain) {
   return parameters;
 }
 
+double reach_of(const Chain& chain) {
+  double reach = chain.tool.xyz_mm.norm();
+  for (const Joint& joint : chain.joints) reach += std::abs(joint.a_mm) + std::abs(joint.d_mm);
+  return reach;
+}
+
 Eigen::Index geometric_parameter_count(const Chain& chain) {
   return 2 * frame_parameters + joint_parameters * std::ssize(chain.joints);
 }

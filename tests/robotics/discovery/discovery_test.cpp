@@ -122,7 +122,7 @@ TEST(Discovery, TellsAnExactAlias) {
   const Discovery found = discover(arm("tx200_like"), seen(truth, 100, 10 * um, 6), {}, plain());
   EXPECT_EQ(found.answer, Answer::indistinguishable);
   ASSERT_EQ(found.effects.size(), 1U);
-  EXPECT_TRUE(found.effects[0].exact_alias);
+  EXPECT_TRUE(found.effects[0].exact_alias) << effect_label(found.effects[0].effect);
   std::vector<std::string> names = found.effects[0].rivals;
   names.push_back(effect_label(found.effects[0].effect));
   EXPECT_TRUE(has(names, "eccentricity@joint2"));

@@ -157,7 +157,7 @@ TEST(Catalogue, TableAndFormulasHaveTheSameParameters) {
     EXPECT_TRUE(type.apply || type.adjust || type.name == "formula") << type.name;
     for (const EffectParameter& parameter : type.parameters) {
       EXPECT_LT(parameter.lower, parameter.upper) << type.name << parameter.name;
-      EXPECT_LE(parameter.lower, 0.0) << type.name;  // 0 is "not there"
+      EXPECT_LE(parameter.lower, 0.2 * parameter.scale) << type.name;  // 0, or what is as good as not there
       EXPECT_LE(parameter.scale, parameter.upper) << type.name << parameter.name;
       EXPECT_FALSE(parameter.key.empty()) << type.name;
     }

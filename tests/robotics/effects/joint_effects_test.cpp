@@ -157,6 +157,24 @@ TEST(JointEffects, HysteresisFollowsDahlsEquation) {
                      });
 }
 
+// A long move, then a short one in the direction of the approach: exp(-short / delta) of the state stays.
+TEST(JointEffects, TheApproachTurnsHysteresisBack) {
+  const Robot robot = ur_like();
+  Poses poses = random_poses(robot.chain, 4, 8);
+  poses.covariates["move2_rad"] = (Eigen::VectorXd(4) << 1.0, 1.0, -1.0, -0.02).finished();
+  poses.covariates["dir2"] = (Eigen::VectorXd(4) << 1.0, -1.0, 1.0, 1.0).finished();
+  const double delta = 0.01;
+  const double stays = std::exp(-0.001 / delta);
+  expect_joint_error(robot, {"hysteresis_approach", "joint2", {2e-4, 2e-4 * (1.0 - stays)}, {delta}}, 1, poses,
+                     [&](const Eigen::VectorXd&, Eigen::Index i) {
+                       const double move = column_of(poses, "move2_rad", i);
+                       const double way = move > 0.0 ? 1.0 : -1.0;
+                       const double wound = way * (1.0 - 2.0 * std::exp(-std::abs(move) / delta));
+                       const double side = column_of(poses, "dir2", i);
+                       return -2e-4 * (side + (wound - side) * stays);
+                     });
+}
+
 TEST(JointEffects, CoupledAxisFollowsTheOneBefore) {
   const Robot robot = ur_like();
   expect_joint_error(robot, {"wrist_coupling", "joint5", {4e-4}}, 4, random_poses(robot.chain, 4, 9),

@@ -51,7 +51,9 @@ struct SearchOptions {
   /// A family that explains all but this share of what the explanation explains is a rival too, whatever its score,
   /// because masses, lengths and formulas are not known more closely.
   double model_error = 0.008;
-  double shape_margin = 0.0;     ///< score by which causes may be worse than shapes and still be named
+  /// Share of the evidence by which causes may be worse than shapes and still be named: a shape that contains a cause
+  /// explains always a little more.
+  double shape_share = 0.0;
   double materiality = 0.01;     ///< unique share of the explained sum of squares below which a family is left out
   double tentative_share = 0.1;  ///< share of the explained sum of squares in generic candidates that casts doubt
   double largest_outlier_share = 0.15;
@@ -109,6 +111,13 @@ struct LackOfFit {
 
 enum class Answer { nothing_missing, named, indistinguishable, unknown };
 
+/// A cause that would have won, had its values been within their limits.
+struct Refused {
+  std::size_t candidate = 0;
+  Eigen::VectorXd values;
+  double score_gain = 0.0;  ///< of the best set with it over the explanation
+};
+
 /// Outcome of search().
 struct Verdict {
   Answer answer = Answer::nothing_missing;
@@ -123,6 +132,9 @@ struct Verdict {
   LackOfFit lack_of_fit;
   std::vector<Sensitivity> sensitivity;  ///< one for each candidate
   Eigen::VectorXd remaining;             ///< n d: residuals that the explanation leaves, zero at outliers
+  /// Whether causes were preferred to shapes that explain more, by `shape_share`.
+  bool causes_preferred = false;
+  std::vector<Refused> refused;  ///< by falling gain, one for each family
 };
 
 }  // namespace llmt::discovery

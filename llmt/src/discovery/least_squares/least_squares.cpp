@@ -14,8 +14,9 @@ namespace {
 
 constexpr double largest_damping = 1e12;
 constexpr double negligible_damping = 1e-14;
-// A relative decrease of the sum of squares below this is lost in its own rounding.
-constexpr double resolvable_decrease = 1e-12;
+// A relative decrease of the sum of squares below this is lost in its own rounding: residuals are often a millionth of
+// what they are the difference of.
+constexpr double resolvable_decrease = 1e-10;
 
 // The problem as the iteration sees it: free columns, scaled, weighted, priors as extra rows.
 class Solver {

@@ -20,11 +20,13 @@ Explained best_addition(const Scoring& scoring, const Set& set, const std::vecto
   return {};
 }
 
-Explained improve(const Scoring& scoring, const std::vector<bool>& allowed, Explained current, int largest_set) {
+// `seen`: sets from which the search has gone on before; from there it would end where it ended then.
+Explained improve(const Scoring& scoring, const std::vector<bool>& allowed, Explained current, int largest_set,
+                  std::set<Set>& seen) {
   const auto consider = [](Explained& best, const Explained& other) {
     if (other.score < best.score - smallest_improvement) best = other;
   };
-  for (int step = 0; step < 60; ++step) {
+  for (int step = 0; step < 60 && seen.insert(current.set).second; ++step) {
     Explained best = current;
     if (std::ssize(current.set) < largest_set) consider(best, best_addition(scoring, current.set, allowed, best.score));
     std::set<std::string> families;
@@ -83,10 +85,11 @@ Explained best_set(const Scoring& scoring, const std::vector<bool>& allowed, con
     starts.push_back(whole_family(scoring, allowed, family, largest_set));
   }
   Explained best{{}, scoring.score({})};
+  std::set<Set> seen;
   for (const Set& first : starts) {
     const double score = scoring.score(first);
     if (score == impossible) continue;
-    const Explained found = improve(scoring, allowed, {first, score}, largest_set);
+    const Explained found = improve(scoring, allowed, {first, score}, largest_set, seen);
     if (found.score < best.score - smallest_improvement) best = found;
   }
   return best;

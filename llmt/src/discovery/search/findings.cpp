@@ -91,6 +91,30 @@ Finding finding_of(const Scoring& scoring, const Set& set, const Set& whole, con
   return finding;
 }
 
+std::vector<Refused> refused_beyond_limits(const Scoring& scoring, const Set& set, double margin) {
+  const std::vector<EffectCandidate>& candidates = scoring.candidates();
+  std::vector<bool> limited;
+  for (const EffectCandidate& candidate : candidates) {
+    limited.push_back(!candidate.generic && candidate.lower.size() != 0);
+  }
+  const double needed = scoring.score(set) - margin;
+  std::vector<Refused> refused;
+  for (const Set& base : {Set{}, set}) {
+    for (const Scoring::Move& move : scoring.additions(base, limited)) {
+      if (move.score >= needed) break;
+      const Set grown = with(base, move.candidate);
+      const SetFit fit = scoring.fit(grown);
+      if (!fit.solvable || scoring.within_limits(fit, grown)) continue;
+      refused.push_back({move.candidate, scoring.values(fit, grown, move.candidate), needed + margin - move.score});
+    }
+    if (set.empty()) break;
+  }
+  std::ranges::stable_sort(refused, std::greater<>{}, &Refused::score_gain);
+  std::set<std::string> families;
+  std::erase_if(refused, [&](const Refused& one) { return !families.insert(candidates[one.candidate].family).second; });
+  return refused;
+}
+
 LackOfFit lack_of_fit(const Scoring& scoring, const SetFit& fit, const std::vector<Eigen::Index>& repeats,
                       const Eigen::VectorXd& remaining) {
   LackOfFit result;

@@ -21,6 +21,10 @@ double share_of(const Scoring& scoring, const Set& set, const Set& rest);
 Finding finding_of(const Scoring& scoring, const Set& set, const Set& whole, const std::string& family,
                    const SearchOptions& options);
 
+/// Causes that would beat `set` by more than `margin`, alone or added to it, if values beyond their limits were
+/// allowed: the best one of each family, by falling gain.
+std::vector<Refused> refused_beyond_limits(const Scoring& scoring, const Set& set, double margin);
+
 /// Scatter of repeats about their means, of samples that are in use.
 LackOfFit lack_of_fit(const Scoring& scoring, const SetFit& fit, const std::vector<Eigen::Index>& repeats,
                       const Eigen::VectorXd& remaining);

@@ -36,7 +36,7 @@ Set filtered(const Set& set, const std::function<bool(std::size_t)>& keep) {
 }
 
 Scoring::Scoring(const Workspace& workspace, const std::vector<EffectCandidate>& candidates)
-    : workspace_(&workspace), candidates_(&candidates) {
+    : workspace_(&workspace), candidates_(&candidates), log_degrees_(std::log(workspace.degrees())) {
   std::map<std::string, std::size_t> numbers;
   for (std::size_t a = 0; a < candidates.size(); ++a) {
     const std::size_t family = numbers.try_emplace(candidates[a].family, numbers.size()).first->second;
@@ -66,17 +66,19 @@ double Scoring::outlier_cost() const {
          2.0 * std::log(static_cast<double>(workspace_->samples()));
 }
 
+// Of choosing the family and `used` of its members.
+double Scoring::family_cost(std::size_t family, double used) const {
+  return used > 0.0 ? 2.0 * (std::log(std::max(1.0, families_)) + log_binomial(family_choices_[family], used)) : 0.0;
+}
+
 double Scoring::cost(const Set& set) const {
   double sum = static_cast<double>(workspace_->dropped().size()) * outlier_cost();
   std::map<std::size_t, double> used;
   for (const std::size_t a : set) {
-    sum += static_cast<double>(workspace_->blocks()[a].size) * std::log(workspace_->degrees()) +
-           (*candidates_)[a].prior_cost;
+    sum += static_cast<double>(workspace_->blocks()[a].size) * log_degrees_ + (*candidates_)[a].prior_cost;
     used[family_[a]] += 1.0;
   }
-  for (const auto& [family, count] : used) {
-    sum += 2.0 * (std::log(std::max(1.0, families_)) + log_binomial(family_choices_[family], count));
-  }
+  for (const auto& [family, count] : used) sum += family_cost(family, count);
   return sum;
 }
 
@@ -134,6 +136,9 @@ bool Scoring::within_limits(const SetFit& fit, const Set& set) const {
     const EffectCandidate& candidate = (*candidates_)[a];
     if (candidate.lower.size() == 0) continue;
     const Eigen::VectorXd value = values(fit, set, a);
+    const auto is_below = value.array() < candidate.lower.array();
+    const auto is_above = value.array() > candidate.upper.array();
+    if (!is_below.any() && !is_above.any()) continue;
     const Eigen::VectorXd tolerance = tolerated_errors * standard_errors(fit, set, a);
     if (((value + tolerance).array() < candidate.lower.array()).any()) return false;
     if (((value - tolerance).array() > candidate.upper.array()).any()) return false;
@@ -167,21 +172,33 @@ std::vector<Scoring::Move> Scoring::additions(const Set& set, const std::vector<
     moments.noalias() -= inside.transpose() * base.coefficients;
     base.factor.triangularView<Eigen::Lower>().solveInPlace(inside);
   }
+  const double own_cost = cost(set);
+  std::vector<double> used(family_choices_.size(), 0.0);
+  for (const std::size_t a : set) used[family_[a]] += 1.0;
+  std::vector<double> one_more(used.size());
+  for (std::size_t f = 0; f < used.size(); ++f) one_more[f] = family_cost(f, used[f] + 1.0) - family_cost(f, used[f]);
   for (std::size_t a = 0; a < candidates_->size(); ++a) {
     if (!allowed[a] || !usable(a) || contains(set, a)) continue;
     const Block& block = workspace_->blocks()[a];
-    Eigen::MatrixXd own = gram.block(block.begin, block.begin, block.size, block.size);
-    if (!base.columns.empty()) {
-      const auto part = inside.middleCols(block.begin, block.size);
-      own.noalias() -= part.transpose() * part;
+    double gain = 0.0;
+    if (block.size == 1) {
+      double own = gram(block.begin, block.begin);
+      if (!base.columns.empty()) own -= inside.col(block.begin).squaredNorm();
+      if (!(own > smallest_pivot * smallest_pivot)) continue;
+      gain = moments(block.begin) * moments(block.begin) / own;
+    } else {
+      Eigen::MatrixXd own = gram.block(block.begin, block.begin, block.size, block.size);
+      if (!base.columns.empty()) {
+        const auto part = inside.middleCols(block.begin, block.size);
+        own.noalias() -= part.transpose() * part;
+      }
+      const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> factor(own);
+      if (factor.info() != Eigen::Success || own.diagonal().minCoeff() <= smallest_pivot) continue;
+      gain = factor.matrixL().solve(moments.segment(block.begin, block.size)).squaredNorm();
     }
-    const Eigen::LLT<Eigen::MatrixXd> factor(own);
-    if (factor.info() != Eigen::Success) continue;
-    const Eigen::MatrixXd lower = factor.matrixL();
-    if (lower.diagonal().minCoeff() <= smallest_pivot) continue;
-    const double gain = factor.matrixL().solve(moments.segment(block.begin, block.size)).squaredNorm();
-    moves.push_back(
-        {a, misfit(std::max(0.0, base.left - gain), std::ssize(base.columns) + block.size) + cost(with(set, a))});
+    const double taken = static_cast<double>(block.size) * log_degrees_ + (*candidates_)[a].prior_cost;
+    moves.push_back({a, misfit(std::max(0.0, base.left - gain), std::ssize(base.columns) + block.size) + own_cost +
+                            taken + one_more[family_[a]]});
   }
   std::ranges::sort(moves, [](const Move& a, const Move& b) {
     return a.score != b.score ? a.score < b.score : a.candidate < b.candidate;

@@ -35,6 +35,9 @@ class Scoring {
   /// family twice at a location, or has values beyond their limits.
   double score(const Set& set) const;
 
+  /// Whether the values are within their limits, up to two standard errors.
+  bool within_limits(const SetFit& fit, const Set& set) const;
+
   /// The part of the score that does not depend on how much the set explains.
   double cost(const Set& set) const;
   double outlier_cost() const;
@@ -74,8 +77,9 @@ class Scoring {
   std::vector<double> family_choices_;  // n_loc
   std::vector<double> single_costs_;
   double families_ = 0.0;
+  double log_degrees_ = 0.0;
 
-  bool within_limits(const SetFit& fit, const Set& set) const;
+  double family_cost(std::size_t family, double used) const;
 };
 
 bool contains(const Set& set, std::size_t candidate);

@@ -57,7 +57,8 @@ void check(const Evidence& evidence, const std::vector<EffectCandidate>& candida
 }
 
 // Names of causes, shapes where causes do not do (step 5).
-Explained choose(const Scoring& scoring, const Set& start, const SearchOptions& options) {
+Explained choose(const Scoring& scoring, const Set& start, const SearchOptions& options, bool& causes_preferred) {
+  causes_preferred = false;
   const std::vector<EffectCandidate>& candidates = scoring.candidates();
   const std::vector<bool> all(candidates.size(), true);
   std::vector<bool> causes;
@@ -69,7 +70,11 @@ Explained choose(const Scoring& scoring, const Set& start, const SearchOptions& 
   const Explained mixed = best_set(scoring, all, start, options.largest_set);
   if (std::ranges::none_of(mixed.set, [&](std::size_t a) { return candidates[a].generic; })) return mixed;
   const Explained named = best_set(scoring, causes, mixed.set, options.largest_set);
-  if (named.score <= mixed.score + options.shape_margin) return named;
+  const double evidence = scoring.score({}) - mixed.score;
+  if (named.score <= mixed.score + options.shape_share * evidence) {
+    causes_preferred = named.score > mixed.score;
+    return named;
+  }
   const Explained shaped = best_set(scoring, shapes, mixed.set, options.largest_set);
   if (shaped.score <= mixed.score + options.rival_margin) return shaped;
   return mixed;
@@ -106,7 +111,8 @@ Verdict search(const Evidence& evidence, const std::vector<EffectCandidate>& can
   const auto largest = static_cast<std::size_t>(options.largest_outlier_share * static_cast<double>(full.samples()));
   Workspace workspace = full;
   workspace.drop(competing_outliers(full, candidates, options.largest_set, largest));
-  Explained found = choose(Scoring(workspace, candidates), {}, options);
+  Verdict verdict;
+  Explained found = choose(Scoring(workspace, candidates), {}, options, verdict.causes_preferred);
   // Whether a sample fits depends on the explanation, and the other way round.
   for (int round = 0; round < 3; ++round) {
     std::vector<std::size_t> outliers = outliers_given(full, candidates, found.set, largest);
@@ -116,10 +122,9 @@ Verdict search(const Evidence& evidence, const std::vector<EffectCandidate>& can
     }
     workspace = full;
     workspace.drop(outliers);
-    found = choose(Scoring(workspace, candidates), found.set, options);
+    found = choose(Scoring(workspace, candidates), found.set, options, verdict.causes_preferred);
   }
   const Scoring scoring(workspace, candidates);
-  Verdict verdict;
   verdict.outliers = workspace.dropped();
   // Evidence that would not decide between two rivals is none.
   verdict.threshold = std::max(options.rival_margin, chance_gain(scoring, options));
@@ -147,6 +152,7 @@ Verdict search(const Evidence& evidence, const std::vector<EffectCandidate>& can
     verdict.findings.back().confirmed = !shapes_are_material && !verdict.findings.back().generic;
   }
   std::ranges::stable_sort(verdict.findings, std::greater<>{}, &Finding::share);
+  verdict.refused = refused_beyond_limits(scoring, set, verdict.threshold);
   if (set.empty()) {
     verdict.answer = Answer::nothing_missing;
   } else if (shapes_are_material) {

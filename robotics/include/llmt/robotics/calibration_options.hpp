@@ -19,7 +19,7 @@ struct CalibrationOptions {
   /// fixed.
   double parallel_axes_deg = 5.0;
   /// A parameter is fixed if its column of the Jacobian is a combination of earlier columns (base, tool, joints,
-  /// effects) but for this share of its norm.
+  /// effects) but for this share of its norm, or a thousandth if it belongs to an effect.
   double dependence_tolerance = 1e-5;
   /// Prior standard deviations of the lengths and angles of joints around their nominal values. Base and tool have ten
   /// times these, around the registered frames. The priors are weak: they matter only for parameters that the data
@@ -29,6 +29,9 @@ struct CalibrationOptions {
   double prior_angle_deg = 1.0;
   /// True: base and tool start at their values in the description instead of those of register_frames().
   bool start_as_given = false;
+  /// True: where the derivatives, which hold deformations constant, no longer help on an arm that bends, differences of
+  /// positions take the last steps. Slower, and the difference is far below the standard errors.
+  bool finish = true;
   discovery::SolverOptions solver = {};
 };
 

@@ -70,6 +70,10 @@ struct CalibrationReport {
 std::vector<std::string> suspicions(const Robot& robot, const Measurements& measurements,
                                     const CalibrationReport& report);
 
+/// Whether the calibrated robot still misses half of the measured points by more than a fiftieth of the nominal arm's
+/// length: the identified values mean nothing then.
+bool is_implausible(const Robot& nominal, const CalibrationReport& report);
+
 /// Calibrates a robot, with the correction if asked for, on all poses and in every fold. Throws as calibrate() and
 /// make_folds().
 CalibrationReport report_calibration(const Robot& robot, const Measurements& measurements,

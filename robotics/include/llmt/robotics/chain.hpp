@@ -77,6 +77,9 @@ void validate(const Chain& chain);
 /// whoever calibrates decides.
 std::vector<discovery::Parameter> geometric_parameters(const Chain& chain);
 
+/// Sum of the lengths of all links and of the tool: no point of the arm is farther from its base, mm.
+double reach_of(const Chain& chain);
+
 /// Number of geometric parameters: 12 + 6 per joint.
 Eigen::Index geometric_parameter_count(const Chain& chain);
 

@@ -38,11 +38,22 @@ struct FoundEffect {
   bool exact_alias = false;  ///< a rival predicts the same at every pose: no measurement can distinguish them
   double share = 0.0;        ///< of the explained sum of squares
   double rms_mm = 0.0;       ///< of the displacement that it causes beyond what geometry can imitate
+  /// Standard error of the effect's constant, where that was fitted: the order of a wave, a presliding.
+  std::optional<double> constant_error = {};
+  bool smaller = false;  ///< found beside larger ones, in what they leave
 };
 
 struct FoundShape {
   Shape shape;
   double share = 0.0;
+};
+
+/// An effect that would explain what is missing, but only at a size beyond what the catalogue calls plausible.
+struct BeyondPlausible {
+  Effect effect;
+  std::string title;
+  FoundParameter parameter;  ///< the one that is farthest beyond its limit
+  double limit = 0.0;
 };
 
 /// Where the gap is.
@@ -79,11 +90,15 @@ struct HeldOut {
 struct Discovery {
   discovery::Answer answer = discovery::Answer::nothing_missing;
   std::vector<FoundEffect> effects;
+  /// What the catalogue does not explain. A shape of kind "noise": no candidate explains it, but it is not what an
+  /// instrument scatters; "outliers": more measurements fit nothing than can be told from an effect.
   std::vector<FoundShape> unknown;
-  std::vector<Effect> maps;    ///< joint maps that were added for the unknown effect
-  Robot before;                ///< calibrated without what was found
-  CorrectedRobot improved;     ///< with it, and with a correction of the rest where that helps
-  ErrorFigures fitted_before;  ///< of the poses that were searched
+  std::vector<FoundShape> more;                   ///< shapes that are left beside effects that were named
+  std::vector<BeyondPlausible> beyond_plausible;  ///< one for each family
+  std::vector<Effect> maps;                       ///< joint maps that were added for the unknown effect
+  Robot before;                                   ///< calibrated without what was found
+  CorrectedRobot improved;                        ///< with it, and with a correction of the rest where that helps
+  ErrorFigures fitted_before;                     ///< of the poses that were searched
   ErrorFigures fitted_after;
   HeldOut held_out;
   GapMap gap;                          ///< of `before`

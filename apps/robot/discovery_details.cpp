@@ -1,0 +1,130 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <regex>
+#include <set>
+
+#include "robot/discovery_page.hpp"
+
+namespace llmt::apps {
+namespace {
+
+using robotics::Discovery;
+using robotics::FoundEffect;
+
+std::string constants_of(const FoundEffect& effect) {
+  const robotics::EffectType& type = robotics::effect_type(effect.effect.type);
+  std::vector<std::string> parts;
+  for (std::size_t k = 0; k < type.constants.size() && k < effect.effect.constants.size(); ++k) {
+    std::string text = fmt::format("{} {}", type.constants[k].key, number(effect.effect.constants[k], 5));
+    if (k == 0 && effect.constant_error) text += fmt::format(" +- {}", number(*effect.constant_error, 2));
+    parts.push_back(std::move(text));
+  }
+  return parts.empty() ? "" : fmt::format(" ({})", fmt::join(parts, ", "));
+}
+
+// Every effect with all that is known of it.
+std::string effect_lines(const Discovery& found) {
+  std::string text;
+  for (const FoundEffect& effect : found.effects) {
+    text +=
+        fmt::format("  {}{}{}, {}{}\n", effect.confirmed ? "" : "perhaps ", effect.smaller ? "also " : "", effect.title,
+                    effect.effect.at.empty() ? "the whole arm" : effect.effect.at, constants_of(effect));
+    const std::string values = effect_values(found, effect);
+    if (!values.empty()) text += fmt::format("    {}\n", values);
+    text += fmt::format("    moves the tool by {:.4f} mm (rms) in ways that geometry cannot\n", effect.rms_mm);
+    for (const std::string& rival : effect.rivals) text += fmt::format("    or as well: {}\n", rival);
+    if (effect.exact_alias) text += "    One of these does the same at every pose: no pose can tell them apart.\n";
+  }
+  return text.empty() ? "" : "Effects:\n" + text;
+}
+
+std::string shape_lines(const std::vector<robotics::FoundShape>& shapes) {
+  std::string text;
+  for (const robotics::FoundShape& shape : shapes) {
+    text += fmt::format("  acts on {}, depends on {}: {} ({:.0f} % of what was explained)\n", shape.shape.acts_on,
+                        fmt::join(shape.shape.depends_on, ", "), shape.shape.kind, 100.0 * shape.share);
+  }
+  return text.empty() ? "" : "Shapes:\n" + text;
+}
+
+std::string gap_lines(const Discovery& found) {
+  const bool nothing = found.answer == discovery::Answer::nothing_missing;
+  std::string text = nothing ? "What is left, by region:\n" : "Where the gap was, before:\n";
+  if (found.gap.regions.empty()) text += "  about alike everywhere\n";
+  for (const robotics::GapMap::Region& region : found.gap.regions) {
+    text += fmt::format("  {:.4f} mm mean in {} poses: {}\n", region.mean_mm, region.poses, region.conditions);
+  }
+  const auto list = [](const std::vector<robotics::GapMap::Share>& shares) {
+    std::vector<std::string> parts;
+    for (const robotics::GapMap::Share& share : shares) {
+      if (parts.size() < 4) parts.push_back(fmt::format("{} {:.0f} %", share.name, 100.0 * share.share));
+    }
+    return fmt::format("{}", fmt::join(parts, ", "));
+  };
+  if (!found.gap.acts_like.empty()) {
+    text += fmt::format("  share of its square along the motion by each joint: {}\n", list(found.gap.acts_like));
+  }
+  if (!found.gap.depends_on.empty()) text += fmt::format("  a tree of it uses: {}\n", list(found.gap.depends_on));
+  return text;
+}
+
+std::string untestable_lines(const Discovery& found) {
+  std::map<std::string, std::vector<std::string>> by_reason;
+  for (const discovery::UntestableCause& entry : found.not_testable) {
+    // Columns of the single joints are one matter: dir1, dir2, ... are dirN.
+    static const std::regex numbered("([a-z])[0-9]+(_|$|\\|)");
+    by_reason[std::regex_replace(entry.why, numbered, "$1N$2")].push_back(entry.what);
+  }
+  std::string text;
+  for (auto& [why, what] : by_reason) {
+    std::map<std::string, int> types;
+    for (const std::string& label : what) ++types[label.substr(0, label.find('@'))];
+    std::vector<std::string> parts;
+    for (const auto& [type, count] : types) parts.push_back(count > 1 ? fmt::format("{} ({})", type, count) : type);
+    text += fmt::format("  {}: {}\n", why, fmt::join(parts, ", "));
+  }
+  return text.empty() ? "" : "Not testable:\n" + text;
+}
+
+std::string visible_lines(const Discovery& found) {
+  std::map<std::string, std::pair<double, double>> ranges;
+  std::map<std::string, std::string> units;
+  std::set<std::string> beyond;
+  for (const robotics::Visible& entry : found.visible) {
+    const std::string type = entry.what.substr(0, entry.what.find_first_of("@["));
+    if (!std::isfinite(entry.value) || entry.value > robotics::effect_type(type).parameters.front().upper) {
+      beyond.insert(type);
+      continue;
+    }
+    const auto [range, is_new] = ranges.try_emplace(type, entry.value, entry.value);
+    range->second = {std::min(range->second.first, entry.value), std::max(range->second.second, entry.value)};
+    units[type] = entry.unit;
+  }
+  std::string text = "Would have been seen, nine times in ten, from (best to worst place):\n";
+  for (const auto& [type, range] : ranges) {
+    beyond.erase(type);
+    text += fmt::format("  {}: {} to {} {}\n", type, number(range.first, 2), number(range.second, 2),
+                        units[type] == "1" ? "" : units[type]);
+  }
+  if (!beyond.empty()) text += fmt::format("  not at any plausible size: {}\n", fmt::join(beyond, ", "));
+  return text;
+}
+
+}  // namespace
+
+std::string discovery_details(const Discovery& found) {
+  std::vector<robotics::FoundShape> shapes = found.unknown;
+  shapes.insert(shapes.end(), found.more.begin(), found.more.end());
+  std::erase_if(shapes, [](const robotics::FoundShape& one) { return one.shape.depends_on.empty(); });
+  std::string text = effect_lines(found) + shape_lines(shapes) + gap_lines(found) + untestable_lines(found);
+  if (found.answer == discovery::Answer::nothing_missing) text += visible_lines(found);
+  text += fmt::format("{} hypotheses in {} rounds; evidence {:.0f}, chance reaches {:.0f}.\n", found.hypotheses,
+                      found.rounds, found.score_gain, found.threshold);
+  return text;
+}
+
+}  // namespace llmt::apps
