@@ -7,6 +7,8 @@
 #include "llmt/commands.hpp"
 #include "llmt/csv.hpp"
 #include "llmt/learning.hpp"
+#include "report/of_comparison.hpp"
+#include "report/options.hpp"
 #include "shared/cli.hpp"
 
 namespace llmt::apps {
@@ -15,6 +17,7 @@ namespace {
 struct CompareArguments {
   LearningArguments learning;
   bool json = false;
+  ReportFiles reports;
 };
 
 Json comparison_json(const CompareArguments& arguments, const LearningTable& table, const ComparisonResult& result) {
@@ -55,6 +58,12 @@ void compare_command(CompareArguments arguments) {
   const ComparisonResult result =
       compare(table.inputs.values, table.outputs, usual_methods(table.options, table.inputs.values.cols()), options);
   progress.clear();
+  std::string reports;
+  if (arguments.reports.wanted()) {
+    reports = write_reports(
+        arguments.reports, report::comparison_report({arguments.learning.data, arguments.learning.targets.front(),
+                                                      table.inputs.values.rows(), table.inputs.values.cols(), result}));
+  }
   if (arguments.json) {
     print_json(comparison_json(arguments, table, result));
     return;
@@ -71,7 +80,7 @@ void compare_command(CompareArguments arguments) {
               number(method.fit_seconds, 2), number(method.predict_seconds, 2)});
   }
   print(text.text());
-  print("\n" + result.recommendation + "\n");
+  print("\n" + result.recommendation + "\n" + reports);
 }
 
 }  // namespace
@@ -81,6 +90,7 @@ void add_compare(CLI::App& app) {
   command->footer("Example: llmt compare concrete.csv --target strength");
   const auto arguments = std::make_shared<CompareArguments>();
   add_learning_options(*command, arguments->learning);
+  add_report_options(*command, arguments->reports, "the held-out error of every method");
   command->add_flag("--json", arguments->json, "Print JSON");
   command->callback([arguments] { compare_command(*arguments); });
 }

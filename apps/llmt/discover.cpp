@@ -11,6 +11,8 @@
 #include "llmt/discovery_report.hpp"
 #include "llmt/files.hpp"
 #include "llmt/term_file.hpp"
+#include "report/of_terms.hpp"
+#include "report/options.hpp"
 #include "shared/cli.hpp"
 #include "shared/options.hpp"
 
@@ -31,6 +33,7 @@ struct DiscoverArguments {
   bool own_terms_only = false;
   bool json = false;
   discovery::MissingOptions options;
+  ReportFiles reports;
 };
 
 // Both tables, row by row.
@@ -203,10 +206,17 @@ void discover_command(const CLI::App& command, DiscoverArguments arguments) {
   const Comparison comparison = read_comparison(arguments);
   const DiscoveryReport report = discovered(arguments, comparison);
   if (!arguments.corrected.empty()) write_corrected(arguments.corrected, comparison, report.missing);
+  std::string reports;
+  if (arguments.reports.wanted()) {
+    reports = write_reports(arguments.reports,
+                            report::terms_report({arguments.simulated, arguments.measured, comparison.inputs,
+                                                  comparison.measured.values, report.missing}));
+  }
   if (arguments.json) {
     print_json(report_json(report));
   } else {
     print_report(report);
+    print(reports);
   }
 }
 
@@ -243,6 +253,7 @@ void add_discover(CLI::App& app) {
   command->add_option("-o,--output,--corrected", arguments->outputs_or_files, "Corrected simulation to write (CSV)")
       ->type_name("NEWFILE")
       ->allow_extra_args(false);
+  add_report_options(*command, arguments->reports, "the gap before and after");
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->callback([command, arguments] { discover_command(*command, *arguments); });
 }

@@ -7,25 +7,14 @@
 #include <cmath>
 #include <set>
 
+#include "report/term_text.hpp"
+
 namespace llmt::apps {
 namespace {
 
 using discovery::Answer;
 using discovery::FoundTerm;
 using discovery::Missing;
-
-std::string title_of(const FoundTerm& found, bool several_outputs) {
-  std::string text = found.generic ? "unknown: " + found.formula : found.family;
-  if (!found.generic && !found.location.empty()) text += " of " + found.location;
-  if (several_outputs) text += ", on " + found.output;
-  return text;
-}
-
-std::string value_text(const discovery::TermValue& value) {
-  std::string text = fmt::format("{} = {}", value.name, number(value.value));
-  if (std::isfinite(value.standard_error)) text += fmt::format(" +- {}", number(value.standard_error, 2));
-  return text + " " + value.unit;
-}
 
 void print_found(const Missing& missing) {
   int place = 0;
@@ -51,23 +40,6 @@ void print_found(const Missing& missing) {
                         rival.exact ? "the same at every row, these rows cannot tell" : "explains as well"));
     }
   }
-}
-
-std::string headline(const Missing& missing) {
-  const auto causes = std::ranges::count_if(missing.found, [](const FoundTerm& f) { return !f.generic; });
-  const auto sure = std::ranges::count_if(missing.found, &FoundTerm::confirmed);
-  const std::string terms = causes == 1 ? "one term is" : fmt::format("{} terms are", causes);
-  switch (missing.answer) {
-    case Answer::nothing_missing:
-      return "nothing is missing that these rows could show";
-    case Answer::named:
-      return terms + (sure < causes ? " missing, but not all of this is certain" : " missing");
-    case Answer::indistinguishable:
-      return terms + " missing, but other terms explain it as well";
-    case Answer::unknown:
-      return "something is missing that no term tried explains";
-  }
-  return "";
 }
 
 void print_gaps(const DiscoveryReport& report) {

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -12,6 +13,8 @@
 #include "llmt/readable.hpp"
 #include "llmt/readable_summary.hpp"
 #include "llmt/stream_command.hpp"
+#include "report/of_fit.hpp"
+#include "report/options.hpp"
 #include "shared/cli.hpp"
 #include "shared/help.hpp"
 #include "shared/options.hpp"
@@ -26,27 +29,32 @@ struct FitArguments {
   bool no_intervals = false;
   bool stream = false;
   std::string readable;  ///< the loss in per cent; empty: none is asked for
+  ReportFiles reports;
 };
 
 constexpr NumberRange per_cent = {0.0, 1000.0, "a number of per cent from 0 to 1000"};
 constexpr const char* readable_extension = ".readable.json";
 
-// What a readable tree does not go with, before the work.
-void refuse_unreadable(const FitOptions& options, const LearningArguments& learning) {
-  const auto refuse = [](const char* option, const char* why) {
-    throw std::invalid_argument(fmt::format("--readable does not go with {}: {}", option, why));
-  };
-  if (options.folds.count == 0) refuse("--cv 0", "the tree is chosen by its error on held-out rows");
+// What among the options a readable tree does not go with, and why; empty: nothing.
+std::string unreadable(const FitOptions& options) {
+  if (options.folds.count == 0) return "--cv 0: the tree is chosen by its error on held-out rows";
   if (options.validity == ValidityChoice::blend || options.validity == ValidityChoice::gaussian) {
-    refuse("--validity blend or gaussian", "it is measured by the best crisp tree");
+    return "--validity blend or gaussian: it is measured by the best crisp tree";
   }
   if (options.rule == GrowthRule::lolimot || options.rule == GrowthRule::lolimot_data_driven) {
-    refuse("--rule lolimot or lolimot-data", "it is measured by the best crisp tree");
+    return "--rule lolimot or lolimot-data: it is measured by the best crisp tree";
   }
-  if (!learning.monotone.empty() || !learning.slope_signs.empty()) {
-    refuse("--monotone or --slope-sign", "its equations do not keep them");
+  const auto is_set = [](const std::vector<int>& signs) {
+    return std::ranges::any_of(signs, [](int sign) { return sign != 0; });
+  };
+  if (is_set(options.monotone) || is_set(options.slope_signs)) {
+    return "--monotone or --slope-sign: its equations do not keep them";
   }
+  return "";
 }
+
+// Whether the model's file has intervals.
+bool keeps_intervals(const FitArguments& arguments) { return !arguments.no_intervals && !arguments.output.empty(); }
 
 // The readable tree beside the model, written if the model is.
 std::optional<ReadableResult> make_readable(const FitArguments& arguments, const LearningTable& table,
@@ -59,29 +67,47 @@ std::optional<ReadableResult> make_readable(const FitArguments& arguments, const
   ReadableResult readable = fit_readable(table.inputs.values, table.outputs, table.options, fitted, loss);
   readable.model = readable.model.named(table.names, arguments.learning.targets, table.inputs.levels);
   if (!arguments.output.empty()) {
-    save(readable.model, readable.intervals, beside(arguments.output, readable_extension).string());
+    save(readable.model, keeps_intervals(arguments) ? readable.intervals : Intervals(),
+         beside(arguments.output, readable_extension).string());
   }
   return readable;
+}
+
+// A report shows a readable tree beside the model wherever one can be made.
+std::string write_fit_reports(const FitArguments& arguments, const LearningTable& table, const FitResult& result,
+                              const std::optional<ReadableResult>& readable) {
+  if (!arguments.reports.wanted()) return "";
+  std::optional<ReadableResult> shown = readable;
+  const bool has_folds = result.summary.partitions.front().cv_folds > 0;
+  if (!shown && has_folds && unreadable(table.options).empty()) {
+    shown = fit_readable(table.inputs.values, table.outputs, table.options, result.summary);
+    shown->model = shown->model.named(table.names, arguments.learning.targets, table.inputs.levels);
+  }
+  return write_reports(arguments.reports, report::fit_report({arguments.learning.data, table.inputs.values,
+                                                              table.outputs, table.options, result, shown}));
 }
 
 void fit_command(FitArguments arguments) {
   double loss = 0.0;
   if (!arguments.readable.empty()) {
     loss = read_number("--readable", arguments.readable, per_cent) / 100.0;
-    refuse_unreadable(arguments.learning.options, arguments.learning);
   }
   LearningTable table = read_learning_table(arguments.learning);
+  if (const std::string why = unreadable(table.options); !arguments.readable.empty() && !why.empty()) {
+    throw std::invalid_argument("--readable does not go with " + why);
+  }
   Progress progress("fitting");
-  table.options.intervals = !arguments.no_intervals && !arguments.output.empty();
+  table.options.intervals = keeps_intervals(arguments) || arguments.reports.wanted();
   table.options.progress = [&](Eigen::Index done, Eigen::Index total) { progress.show(done, total); };
   FitResult result = fit(table.inputs.values, table.outputs, table.options);
   progress.clear();
   result.model = result.model.named(table.names, arguments.learning.targets, table.inputs.levels);
   if (!arguments.output.empty()) {
-    save(result.model, result.intervals, arguments.output);
+    save(result.model, keeps_intervals(arguments) ? result.intervals : Intervals(), arguments.output);
   }
   std::optional<ReadableResult> readable;
   if (!arguments.readable.empty()) readable = make_readable(arguments, table, result.summary, loss);
+  const std::string reports = write_fit_reports(arguments, table, result, readable);
   const FitRun run{arguments.learning, arguments.output};
   if (arguments.json) {
     Json summary = summary_json(run, result);
@@ -95,6 +121,7 @@ void fit_command(FitArguments arguments) {
     print(fmt::format("Readable tree written to {}; llmt inspect --rules prints it\n",
                       beside(arguments.output, readable_extension).string()));
   }
+  print(reports);
 }
 
 }  // namespace
@@ -115,6 +142,7 @@ void add_fit(CLI::App& app) {
                  "Also the smallest crisp tree with short, rounded equations whose held-out error is at most this many "
                  "per cent above that of the best crisp tree [15]; written beside the model as NAME.readable.json")
       ->option_text("[=LOSS]");
+  add_report_options(*command, arguments->reports, "predicted against observed");
   command->add_flag("--json", arguments->json, "Print the summary as JSON");
   command->add_flag("--stream", arguments->stream, "Learn row by row in constant memory");
   command->callback([command, arguments] {

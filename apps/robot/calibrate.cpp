@@ -8,6 +8,8 @@
 
 #include "llmt/robotics/calibration_report.hpp"
 #include "llmt/robotics/robot_file.hpp"
+#include "report/of_calibration.hpp"
+#include "report/options.hpp"
 #include "robot/commands.hpp"
 #include "robot/corrected_file.hpp"
 #include "shared/cli.hpp"
@@ -28,6 +30,7 @@ struct CalibrateArguments {
   bool contiguous = false;
   bool json = false;
   robotics::ReportOptions options;
+  ReportFiles reports;
 };
 
 struct Row {
@@ -232,6 +235,12 @@ void calibrate_command(CalibrateArguments arguments) {
   if (!arguments.output.empty() && !is_implausible) {
     written = save_corrected(report.best(), arguments.output);
   }
+  std::string reports;
+  if (arguments.reports.wanted()) {
+    reports = write_reports(arguments.reports,
+                            report::calibration_report({arguments.robot, arguments.data, nominal, measurements, report,
+                                                        arguments.options, suspicions}));
+  }
   if (arguments.json) {
     measurements.warnings.insert(measurements.warnings.end(), suspicions.begin(), suspicions.end());
     print_json(report_json(arguments, measurements, report, rows));
@@ -240,6 +249,7 @@ void calibrate_command(CalibrateArguments arguments) {
     if (!written.empty()) {
       print(fmt::format("Written: {}\n", fmt::join(written, ", ")));
     }
+    print(reports);
   }
   if (is_implausible) {
     throw std::runtime_error(fmt::format(
@@ -285,6 +295,7 @@ void add_calibrate(CLI::App& app) {
   add_threads(*command, options.max_threads);
   add_output_file(*command, "-o,--output", arguments->output,
                   "Calibrated description to write (the correction goes beside it)", {correction_extension});
+  add_report_options(*command, arguments->reports, "the share of the poses below every error");
   command->add_flag("--json", arguments->json, "Print the report as JSON");
   command->callback([arguments] { calibrate_command(*arguments); });
 }

@@ -1,5 +1,4 @@
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <memory>
@@ -8,10 +7,12 @@
 #include "llmt/robotics/catalogue.hpp"
 #include "llmt/robotics/discovery.hpp"
 #include "llmt/robotics/robot_file.hpp"
-#include "llmt/robotics/telling_poses.hpp"
+#include "report/of_discovery.hpp"
+#include "report/options.hpp"
 #include "robot/commands.hpp"
 #include "robot/corrected_file.hpp"
 #include "robot/discovery_page.hpp"
+#include "robot/next_poses.hpp"
 #include "shared/cli.hpp"
 #include "shared/options.hpp"
 
@@ -30,6 +31,7 @@ struct DiscoverArguments {
   bool contiguous = false;
   bool json = false;
   robotics::DiscoveryOptions options;
+  ReportFiles reports;
 };
 
 // Columns that the catalogue's effects, a user's own among them, look at.
@@ -50,37 +52,6 @@ std::vector<std::string> columns_of(const std::vector<robotics::EffectType>& cat
     }
   }
   return columns;
-}
-
-std::string telling_line(const robotics::TellingPose& pose) {
-  std::vector<std::string> joints;
-  for (Eigen::Index j = 0; j < pose.joints.size(); ++j) joints.push_back(number(pose.joints(j), 3));
-  return fmt::format("    q = ({}) rad, payload {} kg: the explanations differ by {:.4f} mm\n", fmt::join(joints, ", "),
-                     number(pose.payload_kg, 3), pose.disagreement_mm);
-}
-
-// Poses at which a finding and its first rival predict different positions.
-std::string telling_lines(const Discovery& found, const robotics::Measurements& data) {
-  std::string text;
-  const std::vector<robotics::Effect>& all = found.improved.robot.effects;
-  for (const robotics::FoundEffect& effect : found.effects) {
-    if (!effect.confirmed || effect.exact_alias || effect.rival_effects.empty()) continue;
-    const std::string label = robotics::effect_label(effect.effect);
-    const auto place = std::ranges::find(all, label, robotics::effect_label);
-    if (place == all.end() || effect.rival_effects.front().empty()) continue;
-    constexpr int proposed = 3;
-    const robotics::Telling telling =
-        robotics::telling_poses(found.improved.robot, static_cast<std::size_t>(place - all.begin()),
-                                effect.rival_effects.front(), data.poses, found.noise_mm, proposed, 1, data.measured);
-    text += fmt::format("To tell {} from {}: ", label, effect.rivals.front());
-    if (telling.none_can) {
-      text += "no pose can, they differ by less than the noise everywhere.\n";
-      continue;
-    }
-    text += telling.payload_helps ? "measure these, another payload helps\n" : "measure these\n";
-    for (const robotics::TellingPose& pose : telling.poses) text += telling_line(pose);
-  }
-  return text;
 }
 
 // The whole discovery repeated without each fold and judged on it.
@@ -127,6 +98,12 @@ void discover_command(DiscoverArguments arguments) {
   arguments.options.progress = {};
   const Json folds = arguments.folds > 0 ? folds_json(robot, data, arguments) : Json(nullptr);
   if (!arguments.output.empty()) save_corrected(found.improved, arguments.output);
+  const std::vector<NextPoses> next = next_poses(found, data);
+  std::string reports;
+  if (arguments.reports.wanted()) {
+    reports = write_reports(arguments.reports,
+                            report::discovery_report({arguments.robot, arguments.data, data, found, next}));
+  }
   if (arguments.json) {
     Json json = discovery_json(found);
     json["cross_validation"] = folds;
@@ -136,13 +113,14 @@ void discover_command(DiscoverArguments arguments) {
   print(fmt::format("{}: {} poses of {}, {} of them set aside\n\n", arguments.data, data.count(), robot.chain.name,
                     test ? 0 : found.held_out.poses));
   print(discovery_page(found));
-  print(telling_lines(found, data));
+  print(next_poses_text(next));
   if (!folds.is_null()) {
     print(fmt::format("{} {} folds, everything found anew in each: {:.4f} -> {:.4f} mm mean on the poses left out\n",
                       arguments.folds, arguments.contiguous ? "contiguous" : "random", folds["before_mm"].get<double>(),
                       folds["after_mm"].get<double>()));
   }
   if (!arguments.output.empty()) print(fmt::format("Improved description: {}\n", arguments.output));
+  print(reports);
 }
 
 }  // namespace
@@ -174,6 +152,7 @@ void add_discover(CLI::App& app) {
   add_output_file(*command, "-o,--output", arguments->output, "Improved robot description to write (YAML)",
                   {correction_extension});
   add_seed(*command, arguments->options.seed, "Of the poses set aside");
+  add_report_options(*command, arguments->reports, "the error before and after");
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->callback([arguments] { discover_command(*arguments); });
 }

@@ -7,6 +7,8 @@
 #include <cmath>
 #include <map>
 
+#include "report/effect_text.hpp"
+
 namespace llmt::apps {
 namespace {
 
@@ -15,26 +17,6 @@ using robotics::FoundEffect;
 
 constexpr std::size_t most_columns = 100;
 constexpr std::size_t most_lines = 24;
-
-// A value with its error in the unit that needs no exponent: 1.1e-6 rad/(N m) is 1.10 +- 0.05 urad/(N m).
-std::string with_unit(double value, double error, const std::string& unit) {
-  struct Prefix {
-    double factor;
-    const char* name;
-  };
-  const bool scales = unit.starts_with("rad") || unit.starts_with("1/(N") || unit.starts_with("1/K") || unit == "m/N";
-  Prefix best{1.0, ""};
-  if (scales && value != 0.0) {
-    for (const Prefix& prefix : {Prefix{1e3, "m"}, Prefix{1e6, "u"}, Prefix{1e9, "n"}}) {
-      if (std::abs(value) * best.factor < 0.1) best = prefix;
-    }
-  }
-  const std::string name =
-      unit.starts_with("1/") ? (best.factor == 1.0 ? unit : fmt::format("1e-{:.0f} {}", std::log10(best.factor), unit))
-                             : best.name + unit;
-  if (unit == "1") return fmt::format("{} +- {}", number(value, 3), number(error, 2));
-  return fmt::format("{} +- {} {}", number(value * best.factor, 3), number(error * best.factor, 2), name);
-}
 
 std::string plain_value(double value, const std::string& unit) {
   const std::string text = number(value, 3);

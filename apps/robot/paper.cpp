@@ -5,6 +5,8 @@
 #include <memory>
 #include <stdexcept>
 
+#include "report/of_paper.hpp"
+#include "report/options.hpp"
 #include "robot/commands.hpp"
 #include "robot/planar_study.hpp"
 #include "robot/tx200_study.hpp"
@@ -19,6 +21,7 @@ struct PaperArguments {
   int seeds = 50;
   std::uint64_t seed = 1;
   bool json = false;
+  ReportFiles reports;
 };
 
 std::string leaves_text(const StudyRow& row) {
@@ -185,6 +188,7 @@ const std::vector<Figure>& tx200_figures() {
 
 void tx200(const PaperArguments& arguments) {
   Json json = {{"seeds", arguments.seeds}, {"poses", 45}, {"noise_um", 10}};
+  std::vector<Tx200Trial> with_compliance;
   if (!arguments.json) {
     print(
         fmt::format("A TX200-like arm (table 2 read as modified DH, which is inferred; sixth axis and masses ours), 45 "
@@ -199,6 +203,7 @@ void tx200(const PaperArguments& arguments) {
     const std::vector<Tx200Trial> trials = tx200_study(compliance, arguments.seed, arguments.seeds,
                                                        [&](int done) { progress.show(done, arguments.seeds); });
     progress.clear();
+    if (compliance) with_compliance = trials;
     Table table(
         {compliance ? "compliance of axes 2, 3 hidden in the data" : "noise alone", "mean", "smallest", "largest"});
     Json entry;
@@ -212,8 +217,15 @@ void tx200(const PaperArguments& arguments) {
       print("\n" + table.text());
     }
   }
+  std::string reports;
+  if (arguments.reports.wanted()) {
+    reports = write_reports(arguments.reports,
+                            report::tx200_report(with_compliance, tx200_run(true, arguments.seed), arguments.seed));
+  }
   if (arguments.json) {
     print_json(json);
+  } else {
+    print(reports);
   }
 }
 
@@ -224,10 +236,15 @@ void paper_command(const PaperArguments& arguments) {
   }
   const std::vector<PlanarStudy> studies = {planar_study(true, true, arguments.seed),
                                             planar_study(false, false, arguments.seed)};
+  std::string reports;
+  if (arguments.reports.wanted()) {
+    reports = write_reports(arguments.reports, report::planar_report(studies, tx200_run(true, arguments.seed)));
+  }
   if (arguments.json) {
     print_json(planar_json(studies));
   } else {
     print_planar(studies);
+    print(reports);
   }
 }
 
@@ -246,6 +263,7 @@ void add_paper(CLI::App& app) {
       ->capture_default_str();
   add_count(*command, "--seeds", arguments->seeds, 1, "tx200: number of simulated data sets")->capture_default_str();
   add_seed(*command, arguments->seed, "planar: of the cross-validation's folds; tx200: the first seed");
+  add_report_options(*command, arguments->reports, "the errors of the models");
   command->add_flag("--json", arguments->json, "Print JSON");
   command->callback([arguments] { paper_command(*arguments); });
 }

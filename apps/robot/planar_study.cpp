@@ -18,9 +18,10 @@ Eigen::MatrixXd plane_positions(const Robot& robot, const Poses& poses) {
   return robotics::positions(robot, poses).leftCols(2);
 }
 
-TotalError total_error(const Eigen::MatrixXd& model, const Eigen::MatrixXd& truth) {
+StudyRow study_row(const std::string& name, Eigen::Index poses, const std::vector<Eigen::Index>& leaves,
+                   const Eigen::MatrixXd& model, const Eigen::MatrixXd& truth, std::optional<TotalError> paper) {
   const Eigen::VectorXd distances = (model - truth).rowwise().norm();
-  return {distances.mean(), distances.maxCoeff()};
+  return {name, poses, leaves, {distances.mean(), distances.maxCoeff()}, paper, distances};
 }
 
 // Grown to a given size without a test, from three samples a leaf on: the paper's trees.
@@ -136,16 +137,18 @@ struct CalibratedPlane {
 void study_arm(const PlanarData& data, const CalibratedPlane& calibrated, std::uint64_t seed, PlanarStudy& study) {
   const Eigen::Index poses = data.train.count();
   study.arm.push_back(
-      {"rigid", 0, {}, total_error(plane_positions(data.rigid, data.test), data.test_truth), TotalError{0.643, 1.427}});
-  study.arm.push_back(
-      {"calibrated", poses, {}, total_error(calibrated.test, data.test_truth), TotalError{0.447, 0.716}});
+      study_row("rigid", 0, {}, plane_positions(data.rigid, data.test), data.test_truth, TotalError{0.643, 1.427}));
+  study.arm.push_back(study_row("calibrated", poses, {}, calibrated.test, data.test_truth, TotalError{0.447, 0.716}));
   const auto correct = [&](const std::string& name, const std::vector<FitOptions>& options,
                            std::optional<TotalError> paper = std::nullopt) {
     const AxisTrees trees = fit_axes(data.train.joints, calibrated.residual, options);
-    const Eigen::MatrixXd corrected = calibrated.test + trees.predict(data.test.joints);  // eq. (18), (19)
-    study.arm.push_back({name, poses, trees.leaves, total_error(corrected, data.test_truth), paper});
+    Eigen::MatrixXd correction = trees.predict(data.test.joints);
+    const Eigen::MatrixXd corrected = calibrated.test + correction;  // eq. (18), (19)
+    study.arm.push_back(study_row(name, poses, trees.leaves, corrected, data.test_truth, paper));
+    return correction;
   };
-  correct("corrected, the paper's leaf counts", {grown_to(93), grown_to(75)}, TotalError{0.0157, 0.131});
+  study.figures.correction =
+      correct("corrected, the paper's leaf counts", {grown_to(93), grown_to(75)}, TotalError{0.0157, 0.131});
   FitOptions until_two_percent = grown_to(0);
   until_two_percent.expert.min_improvement = 0.02;
   correct("corrected, stopped at 2 %", {until_two_percent, until_two_percent});
@@ -184,10 +187,12 @@ void study_black_box(const PlanarData& data, bool large, std::uint64_t seed, Pla
   const auto add = [&](const std::string& name, const Poses& poses, const Eigen::MatrixXd& positions,
                        const std::vector<FitOptions>& options, std::optional<TotalError> paper) {
     const AxisTrees trees = fit_axes(poses.joints, positions, options);
-    const TotalError error = total_error(trees.predict(data.test.joints), data.test_truth);
-    study.black_box.push_back({name, poses.count(), trees.leaves, error, paper});
+    Eigen::MatrixXd predicted = trees.predict(data.test.joints);
+    study.black_box.push_back(study_row(name, poses.count(), trees.leaves, predicted, data.test_truth, paper));
+    return predicted;
   };
-  add("black box", data.train, data.train_truth, {grown_to(211), grown_to(209)}, TotalError{7.877, 42.815});
+  study.figures.black_box =
+      add("black box", data.train, data.train_truth, {grown_to(211), grown_to(209)}, TotalError{7.877, 42.815});
   add("black box, blend", data.train, data.train_truth, {blended(211, seed), blended(209, seed)}, std::nullopt);
   if (!large) return;
   const Poses fine = robotics::grid(data.flexible.chain, 0.01);
@@ -205,6 +210,8 @@ PlanarStudy planar_study(bool carry_over, bool large, std::uint64_t seed) {
   const Robot robot = robotics::with_values(data.rigid, study.calibration.values);
   const CalibratedPlane calibrated{data.train_truth - plane_positions(robot, data.train),
                                    plane_positions(robot, data.test)};
+  study.figures.joints = data.test.joints;
+  study.figures.error = data.test_truth - calibrated.test;
   study_arm(data, calibrated, seed, study);
   study_noise(data, calibrated, seed, study);
   study_black_box(data, large, seed, study);

@@ -25,6 +25,15 @@ struct StudyRow {
   std::vector<Eigen::Index> leaves;  ///< of the x and the y tree; empty without trees
   TotalError error;
   std::optional<TotalError> paper;  ///< as printed there
+  Eigen::VectorXd total_mm = {};    ///< e_t at every pose of the test grid: figure 10 of the paper
+};
+
+/// What the paper's figures 4 to 9 show, at the poses of the test grid.
+struct PlanarFigures {
+  Eigen::MatrixXd joints;      ///< n x 2, rad; the second joint fastest
+  Eigen::MatrixXd error;       ///< e_x and e_y of the calibrated arm, eq. (16), (17), n x 2, mm
+  Eigen::MatrixXd correction;  ///< what the trees with the paper's leaf counts make of them, n x 2, mm
+  Eigen::MatrixXd black_box;   ///< positions by the trees without a model, n x 2, mm
 };
 
 /// The paper's comparison on one reading of its flexible arm.
@@ -37,6 +46,7 @@ struct PlanarStudy {
   /// with noise of `noise_mm` (standard deviation) and at most the paper's leaves, in mm.
   double noisy_crisp = 0.0;
   double noisy_blend = 0.0;
+  PlanarFigures figures;
 };
 
 inline constexpr double noise_mm = 0.02;

@@ -7,8 +7,7 @@
 
 namespace llmt::apps {
 
-std::vector<Tx200Trial> tx200_study(bool compliance, std::uint64_t first_seed, int seeds,
-                                    const std::function<void(int done)>& progress) {
+Tx200Run tx200_run(bool compliance, std::uint64_t seed) {
   const robotics::Robot nominal = robotics::parse_robot(tx200_like_yaml, "tx200_like.yaml");
   robotics::Robot truth = nominal;
   if (compliance) {
@@ -21,12 +20,17 @@ std::vector<Tx200Trial> tx200_study(bool compliance, std::uint64_t first_seed, i
   options.correction = {
       .max_leaves = 5, .min_leaf_samples = 8, .significance = 1.0, .expert = {.min_variance_gain = -1.0}};
   options.correction_folds = 0;
+  Tx200Run run{robotics::simulate(truth, {.poses = 45, .noise_um = 10.0, .seed = seed}), {}};
+  run.report = robotics::report_calibration(nominal, run.measurements, options);
+  return run;
+}
 
+std::vector<Tx200Trial> tx200_study(bool compliance, std::uint64_t first_seed, int seeds,
+                                    const std::function<void(int done)>& progress) {
   std::vector<Tx200Trial> trials;
   for (int done = 0; done < seeds; ++done) {
-    const robotics::Measurements measurements = robotics::simulate(
-        truth, {.poses = 45, .noise_um = 10.0, .seed = first_seed + static_cast<std::uint64_t>(done)});
-    const robotics::CalibrationReport report = robotics::report_calibration(nominal, measurements, options);
+    const robotics::CalibrationReport report =
+        tx200_run(compliance, first_seed + static_cast<std::uint64_t>(done)).report;
     trials.push_back({report.geometric.in_sample_mm.mean(), report.corrected->in_sample_mm.mean(),
                       report.geometric.held_out_mm.mean(), report.corrected->held_out_mm.mean()});
     progress(done + 1);

@@ -222,7 +222,8 @@ std::optional<NoNoise> test_neighbours(const Residuals& residuals, const Calibra
     const std::vector<Eigen::Matrix3d> axes = instrument_axes(measurements);
     Eigen::MatrixXd local = vectors;
     for (Eigen::Index i = 0; i < local.rows(); ++i) local.row(i) = (axes[i] * vectors.row(i).transpose()).transpose();
-    const Eigen::MatrixXd& p = measurements.positions_mm;
+    // The model's positions: in an order by the measured ones, neighbours would be alike by their noise.
+    const Eigen::MatrixXd p = positions(fitted.robot, measurements.poses);
     const std::array<std::pair<const char*, Eigen::VectorXd>, 3> inputs = {
         {{"azimuth", p.col(1).binaryExpr(p.col(0), [](double y, double x) { return std::atan2(y, x); })},
          {"elevation", p.col(2).binaryExpr(p.leftCols(2).rowwise().norm().eval(),

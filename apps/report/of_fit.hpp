@@ -1,0 +1,27 @@
+/// \file
+/// The report of `llmt fit`.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "llmt/fit.hpp"
+#include "llmt/readable.hpp"
+#include "report/document.hpp"
+
+namespace llmt::apps::report {
+
+/// What was fitted to what. `result` has the intervals' models (FitOptions::intervals).
+struct Fitted {
+  std::string data;  ///< the file
+  const Eigen::MatrixXd& inputs;
+  const Eigen::MatrixXd& outputs;
+  const FitOptions& options;
+  const FitResult& result;
+  const std::optional<ReadableResult>& readable;
+};
+
+Document fit_report(const Fitted& fitted);
+
+}  // namespace llmt::apps::report

@@ -1,0 +1,42 @@
+#include "report/options.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "llmt/files.hpp"
+#include "report/page.hpp"
+#include "report/plot.hpp"
+#include "shared/options.hpp"
+
+namespace llmt::apps {
+
+void add_report_options(CLI::App& command, ReportFiles& files, const std::string& main_picture) {
+  add_output_file(command, "--report", files.page, "Write a report with pictures: one HTML file that needs no network")
+      ->check([](const std::string&) {
+        report::require_page();
+        return std::string();
+      });
+  add_output_file(command, "--plot", files.plot,
+                  "Write the main picture, " + main_picture + ", as FILE.svg or FILE.png (needs gnuplot)")
+      ->check([](const std::string& path) {
+        report::plot_format(path);
+        report::require_gnuplot();
+        return std::string();
+      });
+}
+
+std::string write_reports(const ReportFiles& files, const report::Document& document) {
+  std::string text;
+  if (!files.page.empty()) {
+    const std::string origin = fmt::format("{}. Made by LLMT {}.", document.title, LLMT_VERSION);
+    write_file(files.page, report::filled_page(report::empty_page(), document, origin));
+    text += fmt::format("Report written to {}\n", files.page);
+  }
+  if (!files.plot.empty()) {
+    report::write_plot(files.plot, document.main.value());
+    text += fmt::format("Picture written to {}\n", files.plot);
+  }
+  return text;
+}
+
+}  // namespace llmt::apps

@@ -1,0 +1,163 @@
+// Reports: what the documents say, that the page takes them whole, and what a program without the page answers.
+#include "report/document.hpp"
+
+#include <cmath>
+#include <optional>
+#include <string>
+
+#include "apps/program.hpp"
+#include "llmt/fit.hpp"
+#include "llmt/random.hpp"
+#include "report/figures.hpp"
+#include "report/of_comparison.hpp"
+#include "report/of_fit.hpp"
+#include "report/page.hpp"
+#include "report/plot.hpp"
+
+namespace {
+
+using namespace llmt::apps::report;
+
+constexpr const char* sample_page = "<title>{{title}}</title><script>{{report}}</script>";
+
+Json data_of(const std::string& page) {
+  const std::size_t begin = page.find("<script>") + 8;
+  return Json::parse(page.substr(begin, page.rfind("</script>") - begin));
+}
+
+struct Table {
+  Eigen::MatrixXd inputs;
+  Eigen::MatrixXd outputs;
+};
+
+// A slope and a jump, with noise.
+Table jumping(Eigen::Index rows) {
+  llmt::Random random(7);
+  Table table{Eigen::MatrixXd(rows, 2), Eigen::MatrixXd(rows, 1)};
+  for (Eigen::Index i = 0; i < rows; ++i) {
+    table.inputs.row(i) << random.uniform(), random.uniform();
+    table.outputs(i, 0) = 2.0 * table.inputs(i, 0) + (table.inputs(i, 1) > 0.5 ? 3.0 : 0.0) + 0.1 * random.normal();
+  }
+  return table;
+}
+
+Document report_of(const Table& table, llmt::FitOptions options = {}) {
+  options.intervals = true;
+  const llmt::FitResult result = llmt::fit(table.inputs, table.outputs, options);
+  const std::optional<llmt::ReadableResult> none;
+  return fit_report({"folder/table.csv", table.inputs, table.outputs, options, result, none});
+}
+
+TEST(Report, HostileNamesStayData) {
+  const Document document{.title = "</title><script>alert(1)</script>", .answer = "</script><b>\x01 & \"x\""};
+  const std::string page = filled_page(sample_page, document, "origin");
+  EXPECT_EQ(page.find("<script>alert"), std::string::npos);
+  EXPECT_EQ(page.find("<b>"), std::string::npos);
+  EXPECT_EQ(data_of(page)["answer"], document.answer);
+  EXPECT_EQ(data_of(page)["origin"], "origin");
+}
+
+TEST(Report, NamesThatAreNotUtf8DoNotStopIt) {
+  const std::string page = filled_page(sample_page, {.title = "\xff", .answer = "a\xfe"}, "");
+  EXPECT_EQ(data_of(page)["answer"], "a\xef\xbf\xbd");
+}
+
+TEST(Report, NumbersHaveSixDigitsAndNoNumberIsNull) {
+  EXPECT_EQ(numbers({1.0 / 3.0, std::nan(""), INFINITY, 1e-9}).dump(), "[0.333333,null,null,1e-09]");
+}
+
+TEST(Report, FitShowsEveryRowByAModelThatHadNotSeenIt) {
+  const Table table = jumping(400);
+  const Document document = report_of(table);
+  ASSERT_TRUE(document.main);
+  EXPECT_EQ(document.main->layers.front().x.size(), 400);
+  EXPECT_NE(document.answer.find("y is predicted to within"), std::string::npos) << document.answer;
+  EXPECT_EQ(document.title, "llmt fit table.csv");
+  const Json json = to_json(document);
+  int trees = 0;
+  int maps = 0;
+  for (const Json& section : json["sections"]) {
+    for (const Json& each : section["blocks"]) {
+      trees += each["kind"] == "tree";
+      maps += each["kind"] == "map";
+    }
+  }
+  EXPECT_EQ(trees, 1);
+  EXPECT_EQ(maps, 1);  // two inputs: the boxes
+}
+
+TEST(Report, FitWithoutFoldsSaysThatNothingWasHeldOut) {
+  llmt::FitOptions options;
+  options.folds.count = 0;
+  const Document document = report_of(jumping(200), options);
+  EXPECT_NE(document.answer.find("none was held out"), std::string::npos) << document.answer;
+}
+
+TEST(Report, ManyRowsAreThinnedAndThePageSaysSo) {
+  const Document document = report_of(jumping(5000));
+  EXPECT_EQ(document.main->layers.front().x.size(), most_points);
+  EXPECT_NE(document.main->caption.find("3000 of 5000 rows are drawn"), std::string::npos) << document.main->caption;
+  EXPECT_LT(to_json(document).dump().size(), 600000);
+}
+
+TEST(Report, ComparisonMarksWhatIsRecommended) {
+  llmt::ComparisonResult result{{{.method = "a", .fold_rmse = Eigen::Vector2d(1.0, 3.0), .cv_rmse = 2.0},
+                                 {.method = "b", .fold_rmse = Eigen::Vector2d(1.0, 1.0), .cv_rmse = 1.0}},
+                                1,
+                                "Take b."};
+  const Document document = comparison_report({"t.csv", "y", 10, 2, result});
+  EXPECT_EQ(document.answer, "Take b.");
+  EXPECT_EQ(document.main->layers.front().roles[1], "model");
+}
+
+TEST(Plot, NamesCannotGiveOrdersToGnuplot) {
+  const Chart chart{
+      .title = "it's\n`touch x`\nset output 'y'", .x = {"x"}, .y = {"y"}, .layers = {{.x = {1.0}, .y = {NAN}}}};
+  const std::string script = gnuplot_script(chart, "svg");
+  EXPECT_NE(script.find("set title 'it''s`touch x`set output ''y'''"), std::string::npos) << script;
+  EXPECT_NE(script.find("\n1 NaN "), std::string::npos) << script;
+}
+
+#define TABLE "x,y\n1,2\n2,4.1\n3,6\n4,8.1\n5,10\n6,12.1\n7,14\n8,16.1\n9,18\n10,20.1\n"
+
+TEST(ReportFiles, AnotherKindOfPictureIsWrongUsage) {
+  const program::Folder folder;
+  folder.write("t.csv", TABLE);
+  const program::Outcome outcome = folder.run(LLMT_PROGRAM " fit t.csv -t y --plot p.pdf");
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_NE(outcome.err.find(".svg or .png"), std::string::npos) << outcome.err;
+}
+
+TEST(ReportFiles, WithoutGnuplotThePackageIsNamedBeforeTheWork) {
+  const program::Folder folder;
+  folder.write("t.csv", TABLE);
+  const program::Outcome outcome = folder.run("PATH=/nowhere " LLMT_PROGRAM " fit t.csv -t y --plot p.svg -o m.json");
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_NE(outcome.err.find("gnuplot-nox"), std::string::npos) << outcome.err;
+  EXPECT_FALSE(std::filesystem::exists(folder.file("m.json")));
+}
+
+TEST(ReportFiles, ThePageIsWholeOrTheProgramSaysHowToGetIt) {
+  const program::Folder folder;
+  folder.write("t.csv", TABLE);
+  const program::Outcome outcome = folder.run(LLMT_PROGRAM " fit t.csv -t y --report r.html");
+  if (empty_page().empty()) {
+    EXPECT_EQ(outcome.exit_code, 1);
+    EXPECT_NE(outcome.err.find("cmake/setup report"), std::string::npos) << outcome.err;
+    EXPECT_FALSE(std::filesystem::exists(folder.file("r.html")));
+    return;
+  }
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const std::string page = llmt::read_file(folder.file("r.html"));
+  EXPECT_TRUE(page.starts_with("<!doctype html>"));
+  EXPECT_TRUE(page.ends_with("</html>\n"));
+  EXPECT_LT(page.size(), 3'000'000);
+  for (const char* part : {"llmt fit t.csv", "Permission is hereby granted", "plotly.js", "default-src 'none'"}) {
+    EXPECT_NE(page.find(part), std::string::npos) << part;
+  }
+  for (const char* mark : {"{{title}}", "{{report}}", "/*style*/", "/*script*/", "<!--licences-->"}) {
+    EXPECT_EQ(page.find(mark), std::string::npos) << mark;
+  }
+}
+
+}  // namespace

@@ -1,0 +1,88 @@
+// Reports of the robot layer: what the documents say of simulated arms, where the truth is known.
+#include <gtest/gtest.h>
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "llmt/robotics/discovery.hpp"
+#include "llmt/robotics/robot_file.hpp"
+#include "llmt/robotics/simulation.hpp"
+#include "report/arms.hpp"
+#include "report/of_calibration.hpp"
+#include "report/of_discovery.hpp"
+
+namespace {
+
+using namespace llmt::apps::report;
+namespace rb = llmt::robotics;
+
+rb::Robot planar(bool flexible) {
+  rb::Robot robot = rb::read_robot(LLMT_ROBOTS "/planar_two_link.yaml");
+  if (!flexible) robot.effects.clear();
+  return robot;
+}
+
+rb::Measurements measured(const rb::Robot& robot, Eigen::Index poses = 200) {
+  return rb::simulate(robot, {.poses = poses, .noise_um = 10.0, .seed = 3});
+}
+
+int blocks_of_kind(const Json& document, const std::string& kind) {
+  int count = 0;
+  for (const Json& section : document["sections"]) {
+    for (const Json& each : section["blocks"]) count += each["kind"] == kind;
+  }
+  return count;
+}
+
+TEST(RobotReport, CalibrationSaysWhatItGainedOnPosesLeftOut) {
+  const rb::Robot nominal = planar(false);
+  rb::Robot truth = nominal;
+  truth.chain.joints[1].a_mm += 2.0;
+  const rb::Measurements data = measured(truth, 60);
+  const rb::ReportOptions options;
+  const rb::CalibrationReport report = rb::report_calibration(nominal, data, options);
+  const std::vector<std::string> none;
+  const Document document = calibration_report({"a/arm.yaml", "b/data.csv", nominal, data, report, options, none});
+  EXPECT_EQ(document.title, "llmt-robot calibrate arm.yaml data.csv");
+  EXPECT_TRUE(document.answer.starts_with("Calibration takes the mean position error from")) << document.answer;
+  EXPECT_NE(document.answer.find("took no part"), std::string::npos) << document.answer;
+  const Json json = to_json(document);
+  EXPECT_EQ(blocks_of_kind(json, "arm"), 2);
+  EXPECT_EQ(blocks_of_kind(json, "map"), 2);  // coverage and correlations
+}
+
+TEST(RobotReport, DiscoveryNamesTheEffectAndShowsItsShape) {
+  const rb::Robot nominal = planar(false);
+  const rb::Measurements data = measured(planar(true));
+  const rb::Discovery found = rb::discover(nominal, data);
+  const Document document = discovery_report({"arm.yaml", "data.csv", data, found, {}});
+  EXPECT_TRUE(document.answer.starts_with("The model lacks: link bending")) << document.answer;
+  ASSERT_EQ(document.beside_main.size(), 1);
+  EXPECT_EQ(document.beside_main.front()["layers"].size(), 2);
+}
+
+TEST(RobotReport, NothingMissingIsSaidWithTheNoise) {
+  const rb::Robot nominal = planar(false);
+  const rb::Measurements data = measured(nominal, 100);
+  const rb::Discovery found = rb::discover(nominal, data);
+  const Document document = discovery_report({"arm.yaml", "data.csv", data, found, {}});
+  EXPECT_TRUE(document.answer.starts_with("Nothing is missing")) << document.answer;
+}
+
+TEST(RobotReport, ErrorsOfCoordinatesThatWereNotMeasuredAreZero) {
+  rb::Measurements data;
+  data.positions_mm = Eigen::MatrixXd::Zero(2, 3);
+  data.measured = {true, false, true};
+  const Eigen::MatrixXd errors = errors_at(Eigen::MatrixXd::Ones(2, 3), data);
+  EXPECT_EQ(errors, (Eigen::MatrixXd(2, 3) << -1, 0, -1, -1, 0, -1).finished());
+}
+
+TEST(RobotReport, CoverageCountsEveryPoseOnce) {
+  const rb::Robot robot = planar(false);
+  const rb::Measurements data = measured(robot, 50);
+  const Map map = coverage(robot.chain, data.poses.joints);
+  for (Eigen::Index j = 0; j < map.z.rows(); ++j) EXPECT_NEAR(map.z.row(j).sum(), 100.0, 1e-9);
+}
+
+}  // namespace

@@ -1,0 +1,56 @@
+// The rows that a fit held out are those of its intervals.
+#include "llmt/held_out.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <vector>
+
+#include "llmt/fit.hpp"
+#include "llmt/random.hpp"
+
+namespace {
+
+// Residuals of the folds' models on the rows that held_out_rows() names are those that the fit kept, copies counted
+// once.
+TEST(HeldOutRows, AreThoseOfTheIntervals) {
+  llmt::Random random(3);
+  constexpr int rows = 120;
+  Eigen::MatrixXd inputs(rows, 2);
+  Eigen::MatrixXd outputs(rows, 1);
+  for (int i = 0; i < rows; ++i) {
+    inputs.row(i) << random.uniform(), random.uniform();
+    outputs(i, 0) = inputs(i, 0) * inputs(i, 1) + 0.01 * random.normal();
+  }
+  for (const int i : {5, 17, 60}) {  // copies, and a repeat
+    inputs.row(i + 1) = inputs.row(i);
+    outputs.row(i + 1) = outputs.row(i);
+  }
+  inputs.row(90) = inputs.row(5);
+  llmt::FitOptions options;
+  options.intervals = true;
+  options.weights = Eigen::VectorXd::Ones(rows);
+  options.weights(40) = 0.0;
+  const llmt::FitResult result = llmt::fit(inputs, outputs, options);
+  const std::vector<std::vector<Eigen::Index>> held_out = llmt::held_out_rows(inputs, outputs, options);
+  ASSERT_EQ(held_out.size(), result.intervals.models().size());
+  std::size_t covered = 0;
+  for (std::size_t f = 0; f < held_out.size(); ++f) {
+    covered += held_out[f].size();
+    const Eigen::MatrixXd predicted = result.intervals.models()[f].predict(inputs(held_out[f], Eigen::all));
+    const Eigen::VectorXd found = (outputs(held_out[f], Eigen::all) - predicted).cwiseAbs().col(0);
+    const auto kept = result.intervals.residuals()[f].col(0);
+    for (const double residual : kept) EXPECT_NE(std::ranges::find(found, residual), found.end());
+    for (const double residual : found) EXPECT_NE(std::ranges::find(kept, residual), kept.end());
+    EXPECT_EQ(std::ranges::count(held_out[f], 40), 0);
+  }
+  EXPECT_EQ(covered, rows - 1);
+}
+
+TEST(HeldOutRows, AreNoneWithoutFolds) {
+  llmt::FitOptions options;
+  options.folds.count = 0;
+  EXPECT_TRUE(llmt::held_out_rows(Eigen::MatrixXd::Random(9, 1), Eigen::MatrixXd::Random(9, 1), options).empty());
+}
+
+}  // namespace
