@@ -114,7 +114,7 @@ TEST(StrangeData, ScatterOfOneJointIsNoInstrumentsNoise) {
   Random random(7);
   const Kinematics kinematics(robot.chain);
   for (Eigen::Index i = 0; i < measured.count(); ++i) {
-    const auto lever = kinematics.joint_jacobian(measured.poses.joints.row(i).transpose()).col(1);
+    const Eigen::Vector3d lever = kinematics.joint_jacobian(measured.poses.joints.row(i).transpose()).col(1).head<3>();
     measured.positions_mm.row(i) += 2e-4 * random.normal() * lever.transpose();
   }
   const Discovery found = discover(robot, measured, {}, quick());
