@@ -104,7 +104,8 @@ std::string left_out_text(const FitResult& result) {
                                    ? ""
                                    : fmt::format(" of {}", result.model.outputs()[partition.outputs[0]].name);
     text += fmt::format(
-        "Inputs left out{}: {} of {} ({}); held-out RMSE of simple candidates {} with all inputs, {} without these.\n",
+        "Inputs left out{}: {} of {} ({}); in a quick comparison held-out RMSE was {} with all inputs, {} without "
+        "these.\n",
         target, partition.left_out.size(), result.model.num_inputs(),
         fmt::join(names_of(result.model, partition.left_out), ", "), number(steps.front().rmse), number(chosen->rmse));
   }
@@ -116,8 +117,9 @@ std::string codes_text(const FitResult& result) {
   const CodeChoice& codes = result.summary.codes;
   if (codes.taken.empty()) return "";
   return fmt::format(
-      "Numbers taken for codes, that is for categories: {}; held-out RMSE of simple candidates {}{} as numbers, {} as "
-      "codes.\n",
+      "Numbers taken for codes, that is for categories: {}; in a quick comparison held-out RMSE was {}{} as numbers, "
+      "{} "
+      "as codes.\n",
       fmt::join(names_of(result.model, codes.taken), ", "), result.summary.partitions.size() > 1 ? "relative, " : "",
       number(codes.rmse_as_numbers), number(codes.rmse_as_codes));
 }
@@ -140,7 +142,7 @@ std::string range_text(const Model& model, const PartitionSummary& summary, cons
 // How the splits of the final tree were searched; nothing if there were none to search.
 std::string search_text(const SearchSummary& search) {
   if (search.binned_nodes == 0) {
-    return search.exact_nodes == 0 || search.evaluations == 0 ? "" : "Splits searched exactly.\n";
+    return search.exact_nodes == 0 || search.evaluations == 0 ? "" : "Every possible split was compared.\n";
   }
   return fmt::format(
       "Splits searched by bins in {} nodes, exactly in {} small ones. {}\n", search.binned_nodes, search.exact_nodes,
@@ -298,6 +300,13 @@ void print_summary(const FitRun& run, const FitResult& result) {
   print(fmt::format("Rule {}, at least {} rows in a leaf; {}\n\n", name_of(run.learning.options.rule),
                     result.summary.min_leaf_samples, selection_text(run, result.summary.partitions.front())));
   print(models_table(result).text());
+  for (const PartitionSummary& partition : result.summary.partitions) {
+    const double chosen = partition.chosen.rmse;
+    const auto is_better = [&](const CandidateError& other) { return other.rmse < chosen; };
+    if (std::ranges::none_of(partition.best_of_kind, is_better)) continue;
+    print("A model with a smaller error is not better by more than chance; the simpler one was taken.\n");
+    break;
+  }
   if (result.summary.partitions.front().outputs.size() > 1) {
     print("Held-out errors of the shared tree are over all targets, each divided by its standard deviation.\n");
   }
@@ -311,10 +320,11 @@ void print_summary(const FitRun& run, const FitResult& result) {
     print(search_text(partition.search));
     // M5' drops inputs on its own; its leaves keep nothing of their parent's but what smoothing gives them.
     if (partition.rank_deficient_leaves > 0 && !has_own_models(run.learning.options.rule)) {
-      print(fmt::format(
-          "Leaves whose rows do not determine all slopes (constant or collinear inputs, few rows) and keep their "
-          "parent's there: {}.\n",
-          partition.rank_deficient_leaves));
+      print(
+          fmt::format("In {} leaves the rows did not determine every slope; such slopes are those of the leaf's "
+                      "parent. That does no "
+                      "harm within the range of the rows.\n",
+                      partition.rank_deficient_leaves));
     }
   }
   if (!run.output.empty()) {

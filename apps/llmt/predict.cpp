@@ -201,8 +201,9 @@ void summarise(const PredictArguments& arguments, const Predicted& predicted) {
                         number(farthest, 2));
   }
   if (const Eigen::Index rows = count_high_leverage(predicted); rows > 0) {
-    text +=
-        fmt::format("; {} rows inside it combine inputs as no training row near them does (leverage above 1)", rows);
+    text += fmt::format(
+        "; {} rows lie within the range of every input but combine them as no training row does (leverage above 1)",
+        rows);
   }
   if (predicted.missing > 0) {
     text += fmt::format("; {} missing values", predicted.missing);

@@ -12,6 +12,7 @@
 #include "llmt/size.hpp"
 #include "report/rule_text.hpp"
 #include "shared/cli.hpp"
+#include "shared/columns.hpp"
 
 namespace llmt::apps {
 namespace {
@@ -83,26 +84,6 @@ std::string partition_text(const Model& model, Eigen::Index p) {
   }
   if (leaves.size() > 1) text += "As a tree:\n" + tree_text(model, partition, leaves) + "\n";
   return text;
-}
-
-std::vector<bool> used_inputs(const Model& model) {
-  std::vector<bool> used(model.num_inputs(), false);
-  for (const Partition& partition : model.partitions()) {
-    for (const Node& node : partition.nodes) {
-      if (!node.is_leaf()) {
-        used[node.split_input] = true;
-        for (Eigen::Index j = 0; j < node.direction.size(); ++j) used[j] = used[j] || node.direction(j) != 0.0;
-        continue;
-      }
-      for (Eigen::Index k = 0; k < node.slope.cols(); ++k) {
-        if (node.slope.col(k).isZero(0.0)) continue;
-        const Regressor& regressor = model.regressors()[k];
-        used[regressor.input] = true;
-        if (regressor.second_input >= 0) used[regressor.second_input] = true;
-      }
-    }
-  }
-  return used;
 }
 
 std::string inputs_text(const Model& model) {

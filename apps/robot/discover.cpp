@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "llmt/folds.hpp"
+#include "llmt/robotics/calibration_report.hpp"
 #include "llmt/robotics/catalogue.hpp"
 #include "llmt/robotics/discovery.hpp"
 #include "llmt/robotics/robot_file.hpp"
@@ -79,6 +80,19 @@ Json folds_json(const robotics::Robot& robot, const robotics::Measurements& data
   return {{"folds", arguments.folds}, {"contiguous", arguments.contiguous}, {"before_mm", before}, {"after_mm", after}};
 }
 
+// Says what `calibrate` would say of measurements that the description cannot mean: wrong units, signs or zeros are
+// easily taken for effects.
+void warn_of_misfit(const robotics::Robot& robot, const robotics::Measurements& data) {
+  const robotics::ReportOptions options{.folds = 0};
+  try {
+    for (const std::string& suspicion :
+         robotics::suspicions(robot, data, robotics::report_calibration(robot, data, options))) {
+      warn("WARNING: " + suspicion);
+    }
+  } catch (const std::exception&) {  // the discovery itself will say it
+  }
+}
+
 void discover_command(DiscoverArguments arguments) {
   const robotics::Robot robot = robotics::read_robot(arguments.robot);
   refuse_lost_correction(robot, arguments.robot, arguments.output);
@@ -90,6 +104,7 @@ void discover_command(DiscoverArguments arguments) {
   check_positions(arguments.robot, robot, data.poses);
   if (test) check_positions(arguments.robot, robot, test->poses);
   for (const std::string& warning : data.warnings) warn(warning);
+  warn_of_misfit(robot, data);
   Progress progress("discover");
   Eigen::Index step = 0;
   arguments.options.progress = [&](const std::string&) { progress.show(step++, 0); };

@@ -190,12 +190,36 @@ LearningColumns read_learning_columns(const Csv& csv, const ColumnRoles& roles, 
   return result;
 }
 
+std::vector<bool> used_inputs(const Model& model) {
+  std::vector<bool> used(model.num_inputs(), false);
+  for (const Partition& partition : model.partitions()) {
+    for (const Node& node : partition.nodes) {
+      if (!node.is_leaf()) {
+        used[node.split_input] = true;
+        for (Eigen::Index j = 0; j < node.direction.size(); ++j) used[j] = used[j] || node.direction(j) != 0.0;
+        continue;
+      }
+      for (Eigen::Index k = 0; k < node.slope.cols(); ++k) {
+        if (node.slope.col(k).isZero(0.0)) continue;
+        const Regressor& regressor = model.regressors()[k];
+        used[regressor.input] = true;
+        if (regressor.second_input >= 0) used[regressor.second_input] = true;
+      }
+    }
+  }
+  return used;
+}
+
 ModelInputs read_inputs(const Csv& csv, const Model& model, int max_threads) {
   std::vector<std::string> columns;
   std::vector<std::string> categorical;
   std::vector<Eigen::Index> column_of;  // per categorical column
   std::vector<Numbering> levels;
-  for (const InputColumn& input : model.inputs()) {
+  const std::vector<bool> used = used_inputs(model);
+  std::vector<Eigen::Index> input_of;  // per column read
+  for (Eigen::Index j = 0; j < model.num_inputs(); ++j) {
+    const InputColumn& input = model.inputs()[j];
+    if (!used[j] && !csv.has(input.name)) continue;
     if (input.is_categorical() && input.codes.empty()) {
       column_of.push_back(std::ssize(columns));
       categorical.push_back(input.name);
@@ -205,13 +229,15 @@ ModelInputs read_inputs(const Csv& csv, const Model& model, int max_threads) {
       }
     }
     columns.push_back(input.name);
+    input_of.push_back(j);
   }
   auto [values, cells] = csv.read_numbers(columns, max_threads);
   ModelInputs inputs{std::move(values)};
   std::vector<Eigen::Index> bad;
   for (std::size_t i = 0; i < columns.size(); ++i) {
-    const std::vector<double>& codes = model.inputs()[i].codes;
-    const bool is_number = !model.inputs()[i].is_categorical() || !codes.empty();
+    const InputColumn& input = model.inputs()[input_of[i]];
+    const std::vector<double>& codes = input.codes;
+    const bool is_number = !input.is_categorical() || !codes.empty();
     for (Eigen::Index row = 0; row < csv.rows() && !codes.empty(); ++row) {
       const double value = inputs.values(row, static_cast<Eigen::Index>(i));
       inputs.unseen_codes += !std::isnan(value) && !std::ranges::binary_search(codes, value) ? 1 : 0;
@@ -225,6 +251,11 @@ ModelInputs read_inputs(const Csv& csv, const Model& model, int max_threads) {
     inputs.values(row, column_of[i]) = found == levels[i].end() ? missing : static_cast<double>(found->second);
     inputs.unknown += !text.empty() && found == levels[i].end() ? 1 : 0;
   });
+  if (std::ssize(columns) < model.num_inputs()) {
+    Eigen::MatrixXd all = Eigen::MatrixXd::Constant(csv.rows(), model.num_inputs(), missing);
+    all(Eigen::all, input_of) = inputs.values;
+    inputs.values = std::move(all);
+  }
   return inputs;
 }
 

@@ -166,6 +166,9 @@ std::string hint_on_extra_argument(const CLI::App& program, int argc, const char
     while (before != argv && !std::string_view(*before).starts_with("-")) --before;
     const CLI::Option* const option = chosen.back()->get_option_no_throw(*before);
     const bool has_list = option != nullptr && option->get_type_name().ends_with("...");
+    if (before != argv && option != nullptr && option->get_type_size() == 0 && !option->get_option_text().empty()) {
+      return fmt::format("; a value of {} is written {}={}", *before, *before, *word);
+    }
     if (before != argv && has_list && word - before >= 2) {
       return fmt::format("; several names are separated by commas: {} {},{}", *before, *(before + 1), *(before + 2));
     }

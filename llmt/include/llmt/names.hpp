@@ -53,8 +53,9 @@ Enum parse(std::string_view name) {
 
 /// The name that a misspelt word most likely means: the one with the fewest letters put in, left out, replaced or
 /// exchanged with their neighbour (Damerau 1964, optimal string alignment), if that is at most a third of the word's
-/// letters; one is always allowed, but for a word of one letter. Upper and lower case are the same. Empty: there is
-/// none. Of names that are equally near the first one is taken.
+/// letters; one is always allowed, but for a word of one letter. Upper and lower case are the same. Of names that are
+/// equally near the first one is taken. Without such a name: the only one that begins with the word, of three letters
+/// or more. Empty: there is none.
 std::string_view closest_name(std::string_view word, std::span<const std::string> names);
 
 /// " (did you mean "NAME"?)" of closest_name(), or nothing.

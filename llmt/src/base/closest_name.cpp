@@ -32,7 +32,8 @@ std::size_t distance(std::string_view a, std::string_view b) {
 }  // namespace
 
 std::string_view closest_name(std::string_view word, std::span<const std::string> names) {
-  constexpr std::size_t longest = 200;  // beyond, nobody misspells
+  constexpr std::size_t longest = 200;           // beyond, nobody misspells
+  constexpr std::size_t shortest_beginning = 3;  // of a name that was not written out
   std::string_view closest;
   if (word.size() < 2 || word.size() > longest) return closest;
   std::size_t most = std::max<std::size_t>(1, word.size() / 3);
@@ -41,6 +42,12 @@ std::string_view closest_name(std::string_view word, std::span<const std::string
     const std::size_t errors = distance(word, name);
     if (errors > most || (errors == most && !closest.empty())) continue;
     most = errors;
+    closest = name;
+  }
+  if (!closest.empty() || word.size() < shortest_beginning) return closest;
+  for (const std::string& name : names) {
+    if (name.size() <= word.size() || distance(word, name.substr(0, word.size())) != 0) continue;
+    if (!closest.empty()) return {};  // several begin so
     closest = name;
   }
   return closest;

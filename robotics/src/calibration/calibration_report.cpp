@@ -152,6 +152,17 @@ std::vector<std::string> suspicions(const Robot& robot, const Measurements& meas
   }
   const double implausible_mm = implausible_share * length_mm;
   const bool is_held_out = report.geometric.held_out_mm.size() > 0;
+  const auto coordinates = std::ssize(measured_rows(measurements));
+  const Eigen::Index parameters = report.calibration.result.rank;
+  constexpr Eigen::Index fewest_per_parameter = 2;
+  if (coordinates < fewest_per_parameter * parameters) {
+    found.push_back(
+        fmt::format("{} parameters were identified from {} measured coordinates: so few poses can be fitted by wrong "
+                    "values; only the error on poses left out says something, and more poses are needed",
+                    parameters, coordinates));
+  } else if (is_held_out && report.geometric.held_out_mm.mean() >= report.nominal.held_out_mm.mean()) {
+    found.push_back("on poses left out the calibrated robot is no better than the described one");
+  }
   const double nominal = report.nominal.in_sample_mm.mean();
   const double calibrated = (is_held_out ? report.geometric.held_out_mm : report.geometric.in_sample_mm).mean();
   if (calibrated > implausible_mm) {

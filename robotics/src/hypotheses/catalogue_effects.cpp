@@ -124,7 +124,8 @@ std::vector<Hypothesis> catalogue_hypotheses(const Scene& scene, const std::vect
       // unknown.
       if (type.name == "joint_compliance_free_masses" && masses_known(chain, index)) continue;
       if (!has_columns(type, chain, index, scene.poses, &why)) {
-        untestable.push_back({place.empty() ? type.name : type.name + "@" + place, "there is no column " + why});
+        untestable.push_back({place.empty() ? type.name : type.name + "@" + place,
+                              "there is no column " + (why.starts_with("move") ? "order|time_s" : why)});
         continue;
       }
       // Where the approach is known, it belongs to the move: without it the width would be too small.
