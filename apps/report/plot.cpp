@@ -220,7 +220,6 @@ std::string gnuplot_script(const Chart& chart, const std::string& format) {
   text += "set border 3 lc rgb '#5b6875'\nset tics nomirror textcolor rgb '#333333'\nset grid lc rgb '#e1e5ea' lt 1\n";
   text += "set key tmargin center horizontal Left reverse samplen 2 width -2\n";
   text += "set style fill solid\nset errorbars small\n";
-  "set key tmargin center horizontal Left reverse samplen 2 width -2\nset style fill solid\nset errorbars small\n";
   if (chart.equal) text += "set size ratio -1\n";
   const double start = start_of_bars(chart);
   for (std::size_t k = 0; k < chart.layers.size(); ++k) text += data_block(chart.layers[k], k, start);

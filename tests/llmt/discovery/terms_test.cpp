@@ -66,6 +66,11 @@ std::vector<Expected> hidden_terms() {
       {"square", "a", [](double, double a, double, double) { return 0.1 * a * a; }, {0.1}},
       {"cube", "a", [](double, double a, double, double) { return 0.02 * a * a * a; }, {0.02}},
       {"product", "a,b", [](double, double a, double b, double) { return 0.2 * a * b; }, {0.2}},
+      {"square_product", "b,a", [](double, double a, double b, double) { return 0.2 * b * b * a; }, {0.2}},
+      {"square_product", "a,b", [](double, double a, double b, double) { return 0.05 * a * a * b; }, {0.05}},
+      {"signed_square", "a", [](double, double a, double, double) { return 0.05 * a * std::abs(a); }, {0.05}},
+      {"root", "t", [](double t, double, double, double) { return 0.1 * std::sqrt(t); }, {0.1}},
+      {"saturation", "t", [](double t, double, double, double) { return t / (8.0 + t); }, {1.0, 8.0}},
       {"absolute", "a", [](double, double a, double, double) { return 0.2 * std::abs(a); }, {0.2}},
       {"sign", "a", [](double, double a, double, double) { return a > 0.0 ? 0.2 : -0.2; }, {0.2}},
       {"wave",
@@ -130,6 +135,8 @@ TEST(StandardTerms, WhatTheyDoNotHoldIsNotConfirmed) {
       },
       [](double, double a, double b, double) { return 0.3 * std::sin(3.0 * a * b); },
       [](double t, double, double, double) { return 0.3 * std::sin(2.0 * std::numbers::pi * t / (8.0 + 0.05 * t)); },
+      [](double, double a, double b, double) { return 2.0 * a * b / (0.3 + b); },
+      [](double, double a, double b, double) { return 20.0 * a * a / (4.0 + a) * (b + 0.1); },
   };
   for (std::size_t k = 0; k < hidden.size(); ++k) {
     int unsure = 0;

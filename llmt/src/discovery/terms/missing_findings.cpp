@@ -1,8 +1,10 @@
 #include "discovery/terms/missing_findings.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <set>
@@ -96,26 +98,39 @@ void describe_limits(const Progress& progress, const FitData& data, Missing& mis
 }
 
 void doubt_approximations(Missing& missing) {
-  constexpr std::size_t too_many = 3;
-  std::map<std::pair<std::string, Eigen::Index>, std::set<std::string>> families;
+  // Of one input by kinds, as there may be several steps. A product and a square times the other input are as much of a
+  // power series in two inputs as the terms have.
+  constexpr std::array<std::size_t, 2> too_many = {3, 2};
+  using Place = std::pair<std::vector<std::string>, Eigen::Index>;
+  const auto place_of = [](const FoundTerm& found) {
+    Place place{found.inputs, found.output_index};
+    std::ranges::sort(place.first);
+    return place;
+  };
+  const auto doubtful = [&](const FoundTerm& found) {
+    return !found.inputs.empty() && found.inputs.size() <= too_many.size();
+  };
+  std::map<Place, std::set<std::string>> kinds;
   for (const FoundTerm& found : missing.found) {
-    if (found.inputs.size() == 1) families[{found.inputs.front(), found.output_index}].insert(found.family);
+    if (!doubtful(found)) continue;
+    kinds[place_of(found)].insert(found.inputs.size() == 1 ? found.family : found.family + " " + found.location);
   }
-  std::set<std::string> doubted;
+  std::set<std::vector<std::string>> doubted;
   for (FoundTerm& found : missing.found) {
-    if (found.inputs.size() != 1) continue;
-    const std::string& input = found.inputs.front();
-    if (families[{input, found.output_index}].size() < too_many) continue;
+    if (!doubtful(found) || kinds[place_of(found)].size() < too_many[found.inputs.size() - 1]) continue;
     found.confirmed = false;
-    if (!doubted.insert(input).second) continue;
-    missing.notes.push_back(
-        fmt::format("so many terms of {} may be an approximation of one that was not tried", input));
+    const std::vector<std::string> inputs = place_of(found).first;
+    if (!doubted.insert(inputs).second) continue;
+    missing.notes.push_back(fmt::format("so many terms of {} may be an approximation of one that was not tried",
+                                        fmt::join(inputs, " and ")));
   }
 }
 
 void look_for_structure(const TermModel& model, const FitData& data, const Inputs& inputs, Missing& missing) {
   constexpr double surprising = 5e-4;
   constexpr double material = 0.05;
+  // More than a quarter of what is left: no noise hides what the terms miss, however little of the gap it is.
+  constexpr double dominant = 0.25;
   const Eigen::MatrixXd rows = inputs.values(data.rows, Eigen::all);
   for (Eigen::Index o = 0; o < data.measured.cols(); ++o) {
     const Eigen::VectorXd left = data.measured.col(o) - missing.corrected.col(o)(data.rows);
@@ -124,7 +139,8 @@ void look_for_structure(const TermModel& model, const FitData& data, const Input
     const double common = found.share * left.squaredNorm();
     const double explained = std::max(0.0, gap.squaredNorm() - left.squaredNorm());
     const double p_value = found.p_value * static_cast<double>(data.measured.cols());
-    if (p_value > surprising || common < material * (common + explained)) continue;
+    if (p_value > surprising) continue;
+    if (common < material * (common + explained) && found.share < dominant) continue;
     Structure structure{model.outputs()[o], {}, p_value, common / (common + explained)};
     for (const Eigen::Index j : found.columns) structure.inputs.push_back(inputs.names[j]);
     missing.structure.push_back(structure);

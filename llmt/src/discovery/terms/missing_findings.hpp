@@ -22,7 +22,8 @@ void describe_findings(const TermModel& model, const Progress& progress, Missing
 /// Missing::visible and not_testable.
 void describe_limits(const Progress& progress, const FitData& data, Missing& missing);
 
-/// Three or more kinds of terms of one input may only approximate another function: they are not confirmed.
+/// Three or more kinds of terms of one input, or two terms of the same two inputs, may only approximate another
+/// function: they are not confirmed.
 void doubt_approximations(Missing& missing);
 
 /// Missing::structure and answer. Deviations that neighbouring rows share are not noise.

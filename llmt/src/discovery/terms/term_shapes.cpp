@@ -199,6 +199,14 @@ std::vector<ModelTerm> searched_terms(const InputView& input) {
       [low = input.low](const Eigen::ArrayXd& values, double tau) -> Eigen::MatrixXd {
         return (-(values - low).max(0.0) / std::max(tau, 1e-300)).exp().matrix();
       }));
+  if (input.low >= 0.0) {
+    terms.push_back(searched(
+        input, "saturation", fmt::format("{0}/(c + {0})", x), {"limit"}, "",
+        {.name = "c", .unit = x, .tried = time_constants(input), .smooth = true, .kept = 1, .most = 1, .beyond = 0},
+        [](const Eigen::ArrayXd& values, double half) -> Eigen::MatrixXd {
+          return (values / (std::max(half, 1e-300) + values)).matrix();
+        }));
+  }
   return terms;
 }
 

@@ -81,6 +81,35 @@ ModelTerm product(const InputView& a, const InputView& b) {
           }};
 }
 
+ModelTerm square_product(const InputView& a, const InputView& b) {
+  const std::string formula = fmt::format("{}^2 {}", a.name, b.name);
+  return {.family = "square_product",
+          .location = a.name + "," + b.name,
+          .formula = formula,
+          .inputs = {a.name, b.name},
+          .coefficients = {"coefficient"},
+          .per = fmt::format("({})", formula),
+          .columns = [i = a.column, j = b.column](const Rows& rows, const Eigen::VectorXd&) -> Eigen::MatrixXd {
+            return rows.inputs.col(i).array().square().matrix().cwiseProduct(rows.inputs.col(j));
+          }};
+}
+
+std::vector<ModelTerm> products_of(const std::vector<InputView>& inputs) {
+  // Of more inputs the choice among their squares by others would cost every term evidence.
+  constexpr std::size_t most = 8;
+  std::vector<ModelTerm> terms;
+  for (std::size_t a = 0; a < inputs.size(); ++a) {
+    for (std::size_t b = a + 1; b < inputs.size(); ++b) terms.push_back(product(inputs[a], inputs[b]));
+  }
+  if (inputs.size() > most) return terms;
+  for (const InputView& a : inputs) {
+    for (const InputView& b : inputs) {
+      if (a.column != b.column && a.distinct.size() > 2) terms.push_back(square_product(a, b));
+    }
+  }
+  return terms;
+}
+
 std::vector<ModelTerm> output_terms() {
   const auto term = [](std::string family, std::string formula, std::string per, auto columns) {
     return ModelTerm{.family = std::move(family),
@@ -114,6 +143,17 @@ void add_functions(const InputView& input, std::vector<ModelTerm>& terms) {
     terms.push_back(function_term(input, "sign", "sign(" + x + ")", "", [](double v) {
       return v > 0.0 ? 1.0 : v < 0.0 ? -1.0 : 0.0;
     }));
+    if (levels > 3) {
+      terms.push_back(function_term(input, "signed_square", fmt::format("{0} |{0}|", x), x + "^2",
+                                    [](double v) { return v * std::abs(v); }));
+    }
+  }
+  if (input.low >= 0.0 && levels > 3) {
+    terms.push_back(
+        function_term(input, "root", fmt::format("sqrt({})", x), x + "^0.5", [](double v) { return std::sqrt(v); }));
+  }
+  if (input.low > 0.0 && levels > 3) {
+    terms.push_back(function_term(input, "log", fmt::format("ln({})", x), "", [](double v) { return std::log(v); }));
   }
   if (is_angle(x) && levels > 4) {
     terms.push_back(harmonic(input, 1));
@@ -170,9 +210,7 @@ std::vector<ModelTerm> standard_terms(const Inputs& inputs, std::vector<Untestab
     add(searched_terms(input));
     if (input.name != inputs.order) add(sequence_terms(input, inputs.order));
   }
-  for (std::size_t a = 0; a < moving.size(); ++a) {
-    for (std::size_t b = a + 1; b < moving.size(); ++b) terms.push_back(product(moving[a], moving[b]));
-  }
+  add(products_of(moving));
   add(shapes_of(moving));
   return terms;
 }
