@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <set>
 
 #include "report/arms.hpp"
 #include "report/effect_text.hpp"
@@ -89,30 +88,17 @@ Json next_table(const robotics::Chain& chain, const NextPoses& next) {
 }
 
 Json visible_table(const Discovery& found) {
-  std::map<std::string, std::pair<double, double>> sizes;
-  std::map<std::string, std::string> units;
-  std::set<std::string> never;
-  for (const robotics::Visible& entry : found.visible) {
-    const std::string type = entry.what.substr(0, entry.what.find_first_of("@["));
-    if (!std::isfinite(entry.value) || entry.value > robotics::effect_type(type).parameters.front().upper) {
-      never.insert(type);
-      continue;
-    }
-    const auto [size, is_new] = sizes.try_emplace(type, entry.value, entry.value);
-    size->second = {std::min(size->second.first, entry.value), std::max(size->second.second, entry.value)};
-    units[type] = entry.unit == "1" ? "" : entry.unit;
-  }
+  const VisibleSizes sizes = visible_sizes(found);
   Grid grid{
       .title = "What would have been seen",
       .caption = "The smallest size that would have been found nine times in ten, at the best and the worst joint.",
       .header = {"effect", "best place", "worst place", "unit"},
       .rows = {},
       .wide = true};
-  for (const auto& [type, size] : sizes) {
-    grid.rows.push_back({type, number(size.first, 2), number(size.second, 2), units[type]});
-    never.erase(type);
+  for (const auto& [type, range] : sizes.ranges) {
+    grid.rows.push_back({type, number(range.best_place, 2), number(range.worst_place, 2), range.unit});
   }
-  for (const std::string& type : never) grid.rows.push_back({type, "not at any plausible size", "", ""});
+  for (const std::string& type : sizes.never) grid.rows.push_back({type, "not at any plausible size", "", ""});
   return block(grid);
 }
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -42,6 +43,23 @@ std::string constants_of(const robotics::FoundEffect& effect) {
     parts.push_back(fmt::format("{} {}", type.constants[k].key, number(effect.effect.constants[k], 5)));
   }
   return parts.empty() ? "" : fmt::format(" ({})", fmt::join(parts, ", "));
+}
+
+VisibleSizes visible_sizes(const robotics::Discovery& found) {
+  VisibleSizes sizes;
+  for (const robotics::Visible& entry : found.visible) {
+    const std::string type = entry.what.substr(0, entry.what.find_first_of("@["));
+    if (!std::isfinite(entry.value) || entry.value > robotics::effect_type(type).parameters.front().upper) {
+      sizes.never.insert(type);
+      continue;
+    }
+    const std::string unit = entry.unit == "1" ? "" : entry.unit;
+    VisibleRange& range = sizes.ranges.try_emplace(type, VisibleRange{entry.value, entry.value, unit}).first->second;
+    range.best_place = std::min(range.best_place, entry.value);
+    range.worst_place = std::max(range.worst_place, entry.value);
+  }
+  for (const auto& [type, range] : sizes.ranges) sizes.never.erase(type);
+  return sizes;
 }
 
 }  // namespace llmt::apps

@@ -2,6 +2,8 @@
 /// Effects that were found, in the words of a person.
 #pragma once
 
+#include <map>
+#include <set>
 #include <string>
 
 #include "llmt/robotics/discovery_result.hpp"
@@ -16,5 +18,18 @@ std::string place_of(const robotics::FoundEffect& effect);
 
 /// " (order 202)", or nothing.
 std::string constants_of(const robotics::FoundEffect& effect);
+
+/// The smallest sizes that would have been found nine times in ten, of one effect over its places.
+struct VisibleRange {
+  double best_place = 0.0;
+  double worst_place = 0.0;
+  std::string unit;  ///< empty: a pure number
+};
+
+struct VisibleSizes {
+  std::map<std::string, VisibleRange> ranges;  ///< by the effect's type
+  std::set<std::string> never;                 ///< types that would not have been found at any plausible size
+};
+VisibleSizes visible_sizes(const robotics::Discovery& found);
 
 }  // namespace llmt::apps

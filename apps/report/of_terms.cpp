@@ -15,24 +15,34 @@ namespace {
 
 using discovery::Missing;
 
-Chart gap_chart(const Missing& missing) {
-  std::vector<std::string> names;
-  Numbers values;
-  std::vector<std::string> labels;
-  std::vector<std::string> roles;
-  const auto add = [&](const std::string& name, double value, const char* role) {
+// Bars with a role each, one below the other.
+struct Bars {
+  std::vector<std::string> names = {};
+  Numbers values = {};
+  std::vector<std::string> labels = {};
+  std::vector<std::string> roles = {};
+
+  void add(const std::string& name, double value, const char* role) {
     names.push_back(name);
     values.push_back(value);
     labels.push_back(number(value, 3));
     roles.emplace_back(role);
-  };
-  for (const discovery::Gap& gap : missing.gaps) {
-    add(gap.output + ": simulation", gap.before, "before");
-    add("with what was found", gap.after, "after");
-    add("noise", gap.noise_floor, "floor");
   }
-  Chart chart = ranking("The gap, before and after", "root mean square of measured - simulated", names, values, labels);
-  chart.layers.front().roles = roles;
+  Chart chart(const std::string& title, const std::string& axis) const {
+    Chart chart = ranking(title, axis, names, values, labels);
+    chart.layers.front().roles = roles;
+    return chart;
+  }
+};
+
+Chart gap_chart(const Missing& missing) {
+  Bars bars;
+  for (const discovery::Gap& gap : missing.gaps) {
+    bars.add(gap.output + ": simulation", gap.before, "before");
+    bars.add("with what was found", gap.after, "after");
+    bars.add("noise", gap.noise_floor, "floor");
+  }
+  Chart chart = bars.chart("The gap, before and after", "root mean square of measured - simulated");
   chart.caption =
       fmt::format("{} The noise {}.",
                   missing.held_out.empty() ? "No rows were set aside: this is not verified."
@@ -63,29 +73,20 @@ Chart gap_over(const Simulated& of, Eigen::Index input, Eigen::Index output, con
 
 // The evidence for each cause that was found and for what could stand in its place.
 Json evidence_chart(const Missing& missing) {
-  std::vector<std::string> names;
-  Numbers values;
-  std::vector<std::string> labels;
-  std::vector<std::string> roles;
-  const auto add = [&](const std::string& name, double value, const char* role) {
-    names.push_back(name);
-    values.push_back(value);
-    labels.push_back(number(value, 3));
-    roles.emplace_back(role);
-  };
+  Bars bars;
   for (const discovery::Finding& finding : missing.verdict.findings) {
     if (finding.terms.empty()) continue;
-    add(missing.candidates[finding.terms.front().candidate], finding.score_gain, finding.generic ? "data" : "after");
+    bars.add(missing.candidates[finding.terms.front().candidate], finding.score_gain,
+             finding.generic ? "data" : "after");
     constexpr std::size_t most_rivals = 4;
     for (std::size_t k = 0; k < std::min(finding.rivals.size(), most_rivals); ++k) {
       std::vector<std::string> parts;
       for (const std::size_t candidate : finding.rivals[k].candidates) parts.push_back(missing.candidates[candidate]);
-      add(fmt::format("or {}", fmt::join(parts, " + ")), finding.score_gain - finding.rivals[k].score_difference,
-          "muted");
+      bars.add(fmt::format("or {}", fmt::join(parts, " + ")), finding.score_gain - finding.rivals[k].score_difference,
+               "muted");
     }
   }
-  Chart chart = ranking("Evidence for each cause, and for its rivals", "evidence", names, values, labels);
-  chart.layers.front().roles = roles;
+  Chart chart = bars.chart("Evidence for each cause, and for its rivals", "evidence");
   chart.references = {{true, missing.verdict.threshold, "chance reaches this", "bad"}};
   chart.caption =
       "How much worse the rows are explained without the cause. Grey: what could stand in its place; bars of one "

@@ -83,14 +83,8 @@ Json folds_json(const robotics::Robot& robot, const robotics::Measurements& data
 // Says what `calibrate` would say of measurements that the description cannot mean: wrong units, signs or zeros are
 // easily taken for effects.
 void warn_of_misfit(const robotics::Robot& robot, const robotics::Measurements& data) {
-  const robotics::ReportOptions options{.folds = 0};
-  try {
-    for (const std::string& suspicion :
-         robotics::suspicions(robot, data, robotics::report_calibration(robot, data, options))) {
-      warn("WARNING: " + suspicion);
-    }
-  } catch (const std::exception&) {  // the discovery itself will say it
-  }
+  const robotics::CalibrationReport calibrated = robotics::report_calibration(robot, data, {.folds = 0});
+  for (const std::string& suspicion : robotics::suspicions(robot, data, calibrated)) warn("WARNING: " + suspicion);
 }
 
 void discover_command(DiscoverArguments arguments) {
@@ -104,13 +98,13 @@ void discover_command(DiscoverArguments arguments) {
   check_positions(arguments.robot, robot, data.poses);
   if (test) check_positions(arguments.robot, robot, test->poses);
   for (const std::string& warning : data.warnings) warn(warning);
-  warn_of_misfit(robot, data);
   Progress progress("discover");
   Eigen::Index step = 0;
   arguments.options.progress = [&](const std::string&) { progress.show(step++, 0); };
   const Discovery found = robotics::discover(robot, data, test, arguments.options);
   progress.clear();
   arguments.options.progress = {};
+  warn_of_misfit(robot, data);  // what cannot be calibrated was refused
   const Json folds = arguments.folds > 0 ? folds_json(robot, data, arguments) : Json(nullptr);
   if (!arguments.output.empty()) save_corrected(found.improved, arguments.output);
   const std::vector<NextPoses> next = next_poses(found, data);

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <map>
 #include <regex>
-#include <set>
 
+#include "report/effect_text.hpp"
 #include "robot/discovery_page.hpp"
 
 namespace llmt::apps {
@@ -15,7 +15,7 @@ namespace {
 using robotics::Discovery;
 using robotics::FoundEffect;
 
-std::string constants_of(const FoundEffect& effect) {
+std::string constants_with_error(const FoundEffect& effect) {
   const robotics::EffectType& type = robotics::effect_type(effect.effect.type);
   std::vector<std::string> parts;
   for (std::size_t k = 0; k < type.constants.size() && k < effect.effect.constants.size(); ++k) {
@@ -32,7 +32,7 @@ std::string effect_lines(const Discovery& found) {
   for (const FoundEffect& effect : found.effects) {
     text +=
         fmt::format("  {}{}{}, {}{}\n", effect.confirmed ? "" : "perhaps ", effect.smaller ? "also " : "", effect.title,
-                    effect.effect.at.empty() ? "the whole arm" : effect.effect.at, constants_of(effect));
+                    effect.effect.at.empty() ? "the whole arm" : effect.effect.at, constants_with_error(effect));
     const std::string values = effect_values(found, effect);
     if (!values.empty()) text += fmt::format("    {}\n", values);
     text += fmt::format("    moves the tool by {:.4f} mm (rms) in ways that geometry cannot\n", effect.rms_mm);
@@ -91,26 +91,13 @@ std::string untestable_lines(const Discovery& found) {
 }
 
 std::string visible_lines(const Discovery& found) {
-  std::map<std::string, std::pair<double, double>> ranges;
-  std::map<std::string, std::string> units;
-  std::set<std::string> beyond;
-  for (const robotics::Visible& entry : found.visible) {
-    const std::string type = entry.what.substr(0, entry.what.find_first_of("@["));
-    if (!std::isfinite(entry.value) || entry.value > robotics::effect_type(type).parameters.front().upper) {
-      beyond.insert(type);
-      continue;
-    }
-    const auto [range, is_new] = ranges.try_emplace(type, entry.value, entry.value);
-    range->second = {std::min(range->second.first, entry.value), std::max(range->second.second, entry.value)};
-    units[type] = entry.unit;
-  }
+  const VisibleSizes sizes = visible_sizes(found);
   std::string text = "Would have been seen, nine times in ten, from (best to worst place):\n";
-  for (const auto& [type, range] : ranges) {
-    beyond.erase(type);
-    text += fmt::format("  {}: {} to {} {}\n", type, number(range.first, 2), number(range.second, 2),
-                        units[type] == "1" ? "" : units[type]);
+  for (const auto& [type, range] : sizes.ranges) {
+    text +=
+        fmt::format("  {}: {} to {} {}\n", type, number(range.best_place, 2), number(range.worst_place, 2), range.unit);
   }
-  if (!beyond.empty()) text += fmt::format("  not at any plausible size: {}\n", fmt::join(beyond, ", "));
+  if (!sizes.never.empty()) text += fmt::format("  not at any plausible size: {}\n", fmt::join(sizes.never, ", "));
   return text;
 }
 

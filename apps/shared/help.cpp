@@ -156,7 +156,7 @@ void refuse_unknown_names(const CLI::App& program, int argc, const char* const* 
 }
 
 std::string hint_on_extra_argument(const CLI::App& program, int argc, const char* const* argv) {
-  const std::vector<CLI::App*> chosen = const_cast<CLI::App&>(program).get_subcommands();
+  const std::vector<CLI::App*> chosen = program.get_subcommands();
   if (chosen.empty()) return {};
   const std::vector<std::string> extra = chosen.back()->remaining();
   const auto* const end = argv + argc;

@@ -68,31 +68,25 @@ ModelTerm harmonic(const InputView& input, int order) {
           }};
 }
 
-ModelTerm product(const InputView& a, const InputView& b) {
-  const std::string formula = a.name + " " + b.name;
-  return {.family = "product",
+// a^power b.
+ModelTerm power_product(const char* family, const InputView& a, int power, const InputView& b) {
+  const std::string formula = fmt::format("{}{} {}", a.name, power == 1 ? "" : fmt::format("^{}", power), b.name);
+  return {.family = family,
           .location = a.name + "," + b.name,
           .formula = formula,
           .inputs = {a.name, b.name},
           .coefficients = {"coefficient"},
           .per = fmt::format("({})", formula),
-          .columns = [i = a.column, j = b.column](const Rows& rows, const Eigen::VectorXd&) -> Eigen::MatrixXd {
-            return rows.inputs.col(i).cwiseProduct(rows.inputs.col(j));
+          .columns = [i = a.column, power, j = b.column](const Rows& rows, const Eigen::VectorXd&) -> Eigen::MatrixXd {
+            Eigen::VectorXd values = rows.inputs.col(j);
+            for (int k = 0; k < power; ++k) values.array() *= rows.inputs.col(i).array();
+            return values;
           }};
 }
 
-ModelTerm square_product(const InputView& a, const InputView& b) {
-  const std::string formula = fmt::format("{}^2 {}", a.name, b.name);
-  return {.family = "square_product",
-          .location = a.name + "," + b.name,
-          .formula = formula,
-          .inputs = {a.name, b.name},
-          .coefficients = {"coefficient"},
-          .per = fmt::format("({})", formula),
-          .columns = [i = a.column, j = b.column](const Rows& rows, const Eigen::VectorXd&) -> Eigen::MatrixXd {
-            return rows.inputs.col(i).array().square().matrix().cwiseProduct(rows.inputs.col(j));
-          }};
-}
+ModelTerm product(const InputView& a, const InputView& b) { return power_product("product", a, 1, b); }
+
+ModelTerm square_product(const InputView& a, const InputView& b) { return power_product("square_product", a, 2, b); }
 
 std::vector<ModelTerm> products_of(const std::vector<InputView>& inputs) {
   // Of more inputs the choice among their squares by others would cost every term evidence.
