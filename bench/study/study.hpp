@@ -20,5 +20,6 @@ void add_pruning(CLI::App& study);
 void add_repeats(CLI::App& study);
 void add_sets(CLI::App& study);
 void add_srbench(CLI::App& study);
+void add_systems(CLI::App& study);
 
 }  // namespace bench

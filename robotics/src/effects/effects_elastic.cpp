@@ -16,6 +16,12 @@ void apply_joint_compliance(const PoseContext& pose, std::size_t j, Values value
   deformation.joint(j) += values[0] * unit * gravity_load(pose, j);
 }
 
+void apply_joint_compliance_stiffening(const PoseContext& pose, std::size_t j, Values values, Values constants,
+                                       Deformation& deformation) {
+  const double unit = is_prismatic(pose.chain, j) ? 1.0 / metres : 1.0;
+  deformation.joint(j) += values[0] * unit * constants[0] * std::asinh(gravity_load(pose, j) / constants[0]);
+}
+
 void apply_joint_compliance_measured(const PoseContext& pose, std::size_t j, Values values, Values,
                                      Deformation& deformation) {
   deformation.joint(j) += values[0] * pose.columns[0];
@@ -205,6 +211,21 @@ std::vector<EffectType> elastic_effects() {
        .apply = apply_joint_compliance,
        .weighted = true,
        .elastic = true},
+      {.name = "joint_compliance_stiffening",
+       .family = "joint_compliance",
+       .formula = "dq_j = c_j s asinh(tau_j / s): compliance c at no load, which falls to half at 1.7 s",
+       .source = "strain-wave gears have a smaller compliance under larger torques: K1 < K2 < K3 of their data sheets",
+       .parameters = {compliance},
+       .constants =
+           {{.name = "stiffens_at", .key = "stiffens_at_Nm", .usual = 100.0, .prismatic_key = "stiffens_at_N"}},
+       .apply = apply_joint_compliance_stiffening,
+       .weighted = true,
+       .elastic = true,
+       .refusal =
+           [](const Chain&, std::size_t, Values constants) {
+             return constants[0] > 0.0 ? std::string()
+                                       : "stiffens_at is " + std::to_string(constants[0]) + ", must be > 0";
+           }},
       {.name = "joint_compliance_measured",
        .family = "joint_compliance",
        .formula = "dq_j = c_j tau_j, tau_j as measured",

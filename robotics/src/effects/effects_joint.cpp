@@ -81,6 +81,11 @@ double backlash_approach(const PoseContext& pose, std::size_t, Values values, Va
   return -values[0] * sign(pose.columns[0]);
 }
 
+double friction_under_load(const PoseContext& pose, std::size_t j, Values values, Values) {
+  const double unit = is_prismatic(pose.chain, j) ? 1.0 / metres : 1.0;
+  return -values[0] * unit * std::abs(gravity_load(pose, j)) * sign(pose.columns[0]);
+}
+
 // -1 to 1: how far the drive is wound up at the end of a move.
 double wound_up(double move, double presliding) {
   return sign(move) * (1.0 - 2.0 * std::exp(-std::abs(move) / presliding));
@@ -204,6 +209,19 @@ std::vector<EffectType> friction_effects() {
        .parameters = {angle("half_gap")},
        .columns = {"dir{}"},
        .apply = joint_error(backlash_approach)},
+      {.name = "friction_under_load",
+       .family = "friction_under_load",
+       .formula =
+           "dq_j = -k |tau_j| s_j, s_j = +1 or -1: the direction in which the joint last moved; Coulomb's friction "
+           "of what carries the torque winds up the drive",
+       .source = "Bittencourt & Gunnarsson 2012, load and temperature effects of static friction",
+       .parameters = {{.name = "compliance",
+                       .unit = "rad/(N m)",
+                       .key = "compliance_rad_per_Nm",
+                       .prismatic_unit = "m/N",
+                       .prismatic_key = "compliance_m_per_N"}},
+       .columns = {"dir{}"},
+       .apply = joint_error(friction_under_load)},
       {.name = "hysteresis",
        .family = "hysteresis",
        .formula = "dq_j = -h sign(x) (1 - 2 exp(-|x| / delta)), x the joint's last move: Dahl's model, exponent 1, one "

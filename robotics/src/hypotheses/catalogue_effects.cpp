@@ -48,13 +48,14 @@ std::vector<std::vector<double>> constants_for(const EffectType& type, const Sce
     if (offset == 0.0) return {};
     return {{offset}};
   }
-  if (type.name == "backlash_gravity_soft") {
+  if (type.name == "backlash_gravity_soft" || type.name == "joint_compliance_stiffening") {
     // The torque of an axis that stands upright is rounding.
     constexpr double rounding = 1e-9;
     const double largest = scene.largest_load(index);
     if (!(largest > rounding * scene.loads.cwiseAbs().maxCoeff())) return {};
     // So many digits make the same label from round to round.
     const auto rounded = [](double value) { return std::stod(fmt::format("{:.1e}", value)); };
+    if (type.name == "joint_compliance_stiffening") return {{rounded(0.15 * largest)}, {rounded(0.4 * largest)}};
     return {{rounded(0.015 * largest)}, {rounded(0.035 * largest)}};
   }
   std::vector<double> usual;
@@ -65,6 +66,16 @@ std::vector<std::vector<double>> constants_for(const EffectType& type, const Sce
 bool masses_known(const Chain& chain, std::size_t index) {
   return std::ranges::all_of(std::span(chain.joints).subspan(index),
                              [](const Joint& joint) { return joint.mass_kg > 0.0; });
+}
+
+// Where masses are unknown but payloads are told, the known torque is that of the payload alone: beside a compliance
+// with free masses it is the other part of one cause, so both may stand at one joint.
+bool is_of_payload_alone(const EffectType& type, const Scene& scene, std::size_t index) {
+  const std::span<const Joint> beyond = std::span(scene.robot.chain.joints).subspan(index);
+  const auto payload = scene.poses.covariates.find("payload_kg");
+  return type.name == "joint_compliance" && payload != scene.poses.covariates.end() &&
+         payload->second.maxCoeff() > payload->second.minCoeff() &&
+         std::ranges::all_of(beyond, [](const Joint& joint) { return joint.mass_kg == 0.0; });
 }
 
 // An instrument stands outside of what it sees: all points lie on one side of it, and not at its foot.
@@ -140,6 +151,7 @@ std::vector<Hypothesis> catalogue_hypotheses(const Scene& scene, const std::vect
         hypothesis.candidate.family = type.family;
         hypothesis.candidate.location = place;
         if (type.name == "transmission_error") hypothesis.candidate.location += fmt::format("[{}]", constants[0]);
+        if (is_of_payload_alone(type, scene, index)) hypothesis.candidate.location += " payload";
         set_limits(type, std::ssize(effect.values), hypothesis.candidate);
         if (type.name == "payload_error") keep_payload_positive(scene.poses, chain, hypothesis.candidate);
         hypothesis.effect = std::move(effect);

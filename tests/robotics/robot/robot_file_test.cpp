@@ -125,7 +125,7 @@ TEST(RobotFile, MistakesNameLineKeyAndWhatWouldBeRight) {
   expect_message(with("prismatic", "linear"), "arm.yaml:7", "must be revolute or prismatic");
   expect_message(with("convention: dh", "convention: DH"), "arm.yaml:2: ", "must be dh or mdh");
   expect_message(with("joint_compliance", "joint_complience"), "arm.yaml:9: effects[0]",
-                 "known: joint_compliance, joint_compliance_measured");
+                 "known: joint_compliance, joint_compliance_stiffening, joint_compliance_measured");
   expect_message(with("at: joint1", "at: joint7"), "arm.yaml:9: effects[0]", "no joint \"joint7\"");
   expect_message(with("name: joint2", "name: joint1"), "arm.yaml:7: joints[1]", "\"joint1\" is taken");
   expect_message(with("[-180, 180]", "[180, -180]"), "arm.yaml:6: joints[0]", "joint1: limits are [180, -180]");

@@ -11,7 +11,8 @@
 namespace llmt::discovery {
 namespace {
 
-// Members of the family are replaced by the best few of another one, or by the same family elsewhere.
+// Members of the family are replaced by the best few of another one, or by the same family elsewhere. Variants of a
+// cause at the same place are no rivals of each other: the cause has one name.
 std::vector<Rival> rivals_of(const Scoring& scoring, const Set& set, const std::string& family,
                              const SearchOptions& options) {
   const std::vector<EffectCandidate>& candidates = scoring.candidates();
@@ -24,11 +25,15 @@ std::vector<Rival> rivals_of(const Scoring& scoring, const Set& set, const std::
   for (std::size_t a = 0; a < candidates.size(); ++a) {
     if (scoring.usable(a) && !candidates[a].generic) others.insert(candidates[a].family);
   }
+  std::set<std::string> taken;
+  for (const std::size_t a : set) {
+    if (candidates[a].family == family) taken.insert(candidates[a].location);
+  }
   std::vector<Rival> rivals;
   for (const std::string& other : others) {
     std::vector<bool> allowed(candidates.size());
     for (std::size_t a = 0; a < candidates.size(); ++a) {
-      allowed[a] = candidates[a].family == other && !(other == family && contains(set, a));
+      allowed[a] = candidates[a].family == other && !(other == family && taken.contains(candidates[a].location));
     }
     Explained current{rest, scoring.score(rest)};
     while (std::ssize(current.set) < options.largest_set) {

@@ -1,6 +1,10 @@
 // How the library's terms are put together.
 #pragma once
 
+#include <functional>
+#include <string>
+#include <vector>
+
 #include "llmt/discovery/model_term.hpp"
 
 namespace llmt::discovery {
@@ -19,6 +23,11 @@ struct InputView {
 /// Coefficient times function(value of one input).
 ModelTerm function_term(const InputView& input, std::string family, std::string formula, std::string per,
                         double (*function)(double));
+
+/// Coefficients times columns that depend on one input and a constant that is searched.
+ModelTerm searched_term(const InputView& input, std::string family, std::string formula,
+                        std::vector<std::string> coefficients, std::string per, TermConstant constant,
+                        std::function<Eigen::MatrixXd(const Eigen::ArrayXd& x, double constant)> columns);
 
 /// Shapes that carry "unknown".
 std::vector<ModelTerm> shapes_of(const std::vector<InputView>& inputs);

@@ -1,4 +1,4 @@
-// Terms with searched constants, terms of the row before, and shapes that no cause need have.
+// Terms of the row before, and shapes that no cause need have.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -10,53 +10,11 @@
 namespace llmt::discovery {
 namespace {
 
-constexpr double pi = std::numbers::pi;
-
-ModelTerm searched(const InputView& input, std::string family, std::string formula,
-                   std::vector<std::string> coefficients, std::string per, TermConstant constant,
-                   std::function<Eigen::MatrixXd(const Eigen::ArrayXd& x, double constant)> columns) {
-  return {.family = std::move(family),
-          .location = input.name,
-          .formula = std::move(formula),
-          .inputs = {input.name},
-          .coefficients = std::move(coefficients),
-          .per = std::move(per),
-          .columns =
-              [column = input.column, own = std::move(columns)](const Rows& rows, const Eigen::VectorXd& constants) {
-                return own(rows.inputs.col(column).array(), constants(0));
-              },
-          .constants = {std::move(constant)}};
-}
-
-// From half a period over the range up to one period in two values, in steps that no peak of the spectrum hides
-// between.
-std::vector<double> periods(const InputView& input) {
-  constexpr int most = 500;
-  const double step = 0.2 / input.range();  // of 1/P
-  const double lowest = 0.5 / input.range();
-  const double highest = 0.5 * static_cast<double>(input.distinct.size() - 1) / input.range();
-  const int count = std::min(most, static_cast<int>((highest - lowest) / step) + 1);
-  std::vector<double> values;
-  for (int k = count - 1; k >= 0; --k) values.push_back(1.0 / (lowest + k * step));
-  return values;
-}
-
-std::vector<double> time_constants(const InputView& input) {
-  constexpr int count = 40;
-  constexpr double longest = 2.0;  // of the range: longer ones are straight lines
-  const double first = std::max(0.005, 3.0 / static_cast<double>(input.distinct.size()));
-  std::vector<double> values;
-  for (int k = 0; k < count; ++k) {
-    values.push_back(input.range() * first * std::pow(longest / first, k / static_cast<double>(count - 1)));
-  }
-  return values;
-}
-
 // cos(m pi u), m = 0 ... count - 1, u = 0 ... 1 over the range; beyond it the value at its end.
 Eigen::MatrixXd cosines(const Eigen::ArrayXd& x, double low, double range, int count) {
   const Eigen::ArrayXd u = ((x - low) / range).max(0.0).min(1.0);
   Eigen::MatrixXd functions(x.size(), count);
-  for (int m = 0; m < count; ++m) functions.col(m) = (pi * m * u).cos();
+  for (int m = 0; m < count; ++m) functions.col(m) = (std::numbers::pi * m * u).cos();
   return functions;
 }
 
@@ -113,12 +71,12 @@ ModelTerm bump_shape(const InputView& input, int parts) {
     if (end - begin >= fewest) centres.push_back(c);
   }
   if (centres.empty()) return {};
-  ModelTerm term = searched(
+  ModelTerm term = searched_term(
       input, "?bump", fmt::format("a bump in {}, {:.3g} wide", input.name, 2.0 * width), {"height"}, "",
       {.name = "centre", .unit = input.name, .tried = centres, .smooth = true, .kept = 1, .most = 1, .beyond = 0},
       [width](const Eigen::ArrayXd& x, double centre) -> Eigen::MatrixXd {
         const Eigen::ArrayXd u = ((x - centre) / width).abs().min(1.0);
-        return (0.5 + 0.5 * (pi * u).cos()).matrix();
+        return (0.5 + 0.5 * (std::numbers::pi * u).cos()).matrix();
       });
   term.location = fmt::format("{}/{}", input.name, parts);
   term.generic = true;
@@ -149,66 +107,6 @@ ModelTerm sequence_term(
 }
 
 }  // namespace
-
-std::vector<double> thresholds(const std::vector<double>& distinct, std::size_t beyond, std::size_t count) {
-  std::vector<double> all;
-  for (std::size_t k = beyond; k + beyond <= distinct.size(); ++k) {
-    if (k > 0 && k < distinct.size()) all.push_back(0.5 * (distinct[k - 1] + distinct[k]));
-  }
-  if (all.size() <= count) return all;
-  std::vector<double> some;
-  for (std::size_t k = 0; k < count; ++k) some.push_back(all[k * (all.size() - 1) / (count - 1)]);
-  return some;
-}
-
-std::vector<ModelTerm> searched_terms(const InputView& input) {
-  constexpr std::size_t fewest = 8;
-  std::vector<ModelTerm> terms;
-  if (input.distinct.size() < fewest) return terms;
-  const std::string& x = input.name;
-  terms.push_back(
-      searched(input, "wave", fmt::format("C cos(2 pi {0}/P) + S sin(2 pi {0}/P)", x), {"C", "S"}, "",
-               {.name = "P", .unit = x, .tried = periods(input), .smooth = true, .kept = 2, .most = 2, .beyond = 1},
-               [](const Eigen::ArrayXd& values, double period) {
-                 Eigen::MatrixXd waves(values.size(), 2);
-                 waves.col(0) = (2.0 * pi / period * values).cos();
-                 waves.col(1) = (2.0 * pi / period * values).sin();
-                 return waves;
-               }));
-  const std::string since = input.low == 0.0 ? x : fmt::format("({} - {:.6g})", x, input.low);
-  constexpr std::size_t most = 200;
-  const std::vector<double> cuts = thresholds(input.distinct, 4, most);
-  terms.push_back(searched(input, "step", fmt::format("[{} > c]", x), {"height"}, "",
-                           {.name = "c", .unit = x, .tried = cuts, .smooth = false, .kept = 1, .most = 3, .beyond = 0},
-                           [](const Eigen::ArrayXd& values, double cut) -> Eigen::MatrixXd {
-                             return (values > cut).cast<double>().matrix();
-                           }));
-  terms.push_back(searched(
-      input, "hinge", fmt::format("max(0, {} - c)", x), {"slope"}, x,
-      {.name = "c",
-       .unit = x,
-       .tried = thresholds(input.distinct, 4, 60),
-       .smooth = true,
-       .kept = 1,
-       .most = 1,
-       .beyond = 1},
-      [](const Eigen::ArrayXd& values, double cut) -> Eigen::MatrixXd { return (values - cut).max(0.0).matrix(); }));
-  terms.push_back(searched(
-      input, "settling", fmt::format("exp(-{}/tau)", since), {"A"}, "",
-      {.name = "tau", .unit = x, .tried = time_constants(input), .smooth = true, .kept = 1, .most = 1, .beyond = 0},
-      [low = input.low](const Eigen::ArrayXd& values, double tau) -> Eigen::MatrixXd {
-        return (-(values - low).max(0.0) / std::max(tau, 1e-300)).exp().matrix();
-      }));
-  if (input.low >= 0.0) {
-    terms.push_back(searched(
-        input, "saturation", fmt::format("{0}/(c + {0})", x), {"limit"}, "",
-        {.name = "c", .unit = x, .tried = time_constants(input), .smooth = true, .kept = 1, .most = 1, .beyond = 0},
-        [](const Eigen::ArrayXd& values, double half) -> Eigen::MatrixXd {
-          return (values / (std::max(half, 1e-300) + values)).matrix();
-        }));
-  }
-  return terms;
-}
 
 std::vector<ModelTerm> sequence_terms(const InputView& input, const std::string& order) {
   std::vector<ModelTerm> terms;

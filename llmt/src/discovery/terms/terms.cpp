@@ -148,6 +148,7 @@ void add_functions(const InputView& input, std::vector<ModelTerm>& terms) {
   }
   if (input.low > 0.0 && levels > 3) {
     terms.push_back(function_term(input, "log", fmt::format("ln({})", x), "", [](double v) { return std::log(v); }));
+    terms.push_back(function_term(input, "reciprocal", "1/" + x, x + "^-1", [](double v) { return 1.0 / v; }));
   }
   if (is_angle(x) && levels > 4) {
     terms.push_back(harmonic(input, 1));
