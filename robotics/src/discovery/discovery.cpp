@@ -8,6 +8,7 @@
 
 #include "calibration/joint_map_shift.hpp"
 #include "calibration/paired_gain.hpp"
+#include "discovery/doubts.hpp"
 #include "discovery/findings.hpp"
 #include "discovery/gap_map.hpp"
 #include "discovery/investigation.hpp"
@@ -127,6 +128,24 @@ bool is_named(discovery::Answer answer) {
   return answer == discovery::Answer::named || answer == discovery::Answer::indistinguishable;
 }
 
+// Beside what has a name, too, the rest should be noise. Where the instrument's errors are left, an effect of the arm
+// may be their image.
+void describe_rest(const Investigation& investigation, const DiscoveryOptions& options, Discovery& result) {
+  if (!is_named(result.answer) || !result.more.empty()) return;
+  std::vector<std::size_t> skipped = investigation.verdict.outliers;
+  std::ranges::sort(skipped);
+  const std::optional<NoNoise> fault = no_noise(investigation.fitted, investigation.searched, skipped, options.seed);
+  if (!fault) return;
+  result.notes.push_back(fmt::format("What was found is not all: {}.", fault->reason));
+  if (fault->where != "instrument") return;
+  for (FoundEffect& effect : result.effects) {
+    effect.confirmed = effect.confirmed && effect.effect.type.starts_with("instrument_");
+  }
+  if (std::ranges::any_of(result.effects, &FoundEffect::confirmed)) return;
+  result.answer = discovery::Answer::unknown;
+  result.unknown.push_back({{fault->where, {}, std::nullopt, "noise"}, 1.0});
+}
+
 // "Nothing missing" needs residuals that an instrument's noise can be, and few measurements that fit nothing.
 void refuse_all_clear(const Investigation& investigation, const DiscoveryOptions& options, Discovery& result) {
   if (result.answer != discovery::Answer::nothing_missing) return;
@@ -196,6 +215,8 @@ Discovery discover_in(const Robot& robot, const PoseSplit& split, const Discover
     for (const Eigen::Index row : split.rows[sample]) result.outliers.push_back(row);
   }
   refuse_all_clear(investigation, options, result);
+  describe_rest(investigation, options, result);
+  add_doubts(plain.robot, investigation, unmapped(robot, split.test).measurements, result);
   const Measurements kept = without_rows(split.samples, verdict.outliers);
   result.before = calibrate(robot, kept, options.calibration).robot;
   result.rounds = investigation.rounds;

@@ -30,6 +30,13 @@ std::vector<FoundParameter> parameters_of(const Effect& effect, const Calibratio
   return found;
 }
 
+// Whether any value is more than two standard errors away from nothing: an effect that the fit of all together puts at
+// nothing is not there.
+bool is_determined(const std::vector<FoundParameter>& found) {
+  return std::ranges::any_of(
+      found, [](const FoundParameter& one) { return !(std::abs(one.value) < 2.0 * one.standard_error); });
+}
+
 // Whether what the effect explains may be a piece of the shape: both depend on the posture, or both on time or load.
 bool may_be_part_of(const Shape& shape, const Effect& effect) {
   bool posture = true;
@@ -84,9 +91,10 @@ void describe_effects(const std::vector<Hypothesis>& hypotheses, const discovery
       const bool is_piece = std::ranges::any_of(
           shapes, [&](const FoundShape& one) { return may_be_part_of(one.shape, *hypothesis.effect); });
       found.confirmed = stands_alone ? finding.confirmed : finding.share > most && in_shapes < 1.0 - most && !is_piece;
+      found.parameters = parameters_of(found.effect, fitted, mass_uncertainty);
+      if (!is_determined(found.parameters)) found.confirmed = false;
       found.share = finding.terms.size() == 1 ? finding.share : term.share;
       found.rms_mm = std::sqrt(std::max(0.0, found.share * explained) / samples);
-      found.parameters = parameters_of(found.effect, fitted, mass_uncertainty);
       for (const discovery::Rival& rival : finding.rivals) {
         std::string labels;
         std::vector<Effect> effects;

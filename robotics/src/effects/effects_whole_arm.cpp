@@ -1,4 +1,6 @@
 // Effects of heat, time and mishaps on the arm or the instrument as a whole.
+#include <cmath>
+
 #include "effects/effect_entries.hpp"
 
 namespace llmt::robotics {
@@ -42,6 +44,11 @@ void apply_drift_curved(const PoseContext& pose, std::size_t, Values values, Val
                         Deformation& deformation) {
   const double time = session_time(pose, constants);
   deformation.world_mm += time * vector_of(values, 0) + time * time * vector_of(values, 3);
+}
+
+void apply_drift_settling(const PoseContext& pose, std::size_t, Values values, Values constants,
+                          Deformation& deformation) {
+  deformation.world_mm += (1.0 - std::exp(-session_time(pose, constants) / constants[2])) * vector_of(values, 0);
 }
 
 void apply_tracker_knock(const PoseContext& pose, std::size_t, Values values, Values constants,
@@ -97,6 +104,8 @@ std::vector<EffectType> session_effects() {
   // In the unit of the column.
   const std::vector<EffectConstant> session = {{.name = "from", .key = "from", .usual = 0.0},
                                                {.name = "to", .key = "to", .usual = 1.0}};
+  std::vector<EffectConstant> settling = session;
+  settling.push_back({.name = "settles_in", .key = "settles_in_share", .usual = 0.2});
   return {
       {.name = "drift",
        .family = "drift",
@@ -118,6 +127,20 @@ std::vector<EffectType> session_effects() {
        .columns = {"time_s|order"},
        .apply = apply_drift_curved,
        .refusal = session_refusal},
+      {.name = "drift_settling",
+       .family = "drift",
+       .formula = "dp = v (1 - exp(-t / s)) in the world frame, t = 0 ... 1 over the session",
+       .source = "an instrument or base that warms up: first-order response",
+       .place = EffectPlace::robot,
+       .parameters = {in_mm("vx"), in_mm("vy"), in_mm("vz")},
+       .constants = settling,
+       .columns = {"time_s|order"},
+       .apply = apply_drift_settling,
+       .refusal =
+           [](const Chain& chain, std::size_t index, Values constants) {
+             if (!(constants[2] > 0.0)) return "settles_in is " + std::to_string(constants[2]) + ", must be > 0";
+             return session_refusal(chain, index, constants);
+           }},
       {.name = "tracker_knock",
        .family = "tracker_knock",
        .formula = "of rows later than `at`: dp = d + th x (p - o_1)",

@@ -35,10 +35,13 @@ std::vector<std::vector<double>> constants_for(const EffectType& type, const Sce
   }
   if (type.family == "hysteresis") return {{0.005}, {0.015}, {0.04}, {0.1}, {0.3}};
   if (type.name == "thermal_growth" || type.name == "link_thermal_growth") return {{mean_of(scene.poses, "temp_C")}};
-  if (type.name == "drift" || type.name == "drift_curved") {
+  if (type.family == "drift") {
     const Eigen::VectorXd& time = *time_column(scene.poses);
-    if (!(time.maxCoeff() > time.minCoeff())) return {};
-    return {{time.minCoeff(), time.maxCoeff()}};
+    const double from = time.minCoeff();
+    const double to = time.maxCoeff();
+    if (!(to > from)) return {};
+    if (type.name != "drift_settling") return {{from, to}};
+    return {{from, to, 0.05}, {from, to, 0.1}, {from, to, 0.2}, {from, to, 0.35}, {from, to, 0.6}};
   }
   if (type.name == "tracker_knock" || type.name == "joint_map") return {};
   if (type.name == "axis_wobble_at") {

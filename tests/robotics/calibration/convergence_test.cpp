@@ -20,8 +20,9 @@ std::vector<Effect> one_of_each(const Chain& chain) {
     for (std::size_t index = std::min<std::size_t>(1, places - 1); index < places; ++index) {
       if (!suits(type, chain, index)) continue;
       // The session lasts an hour, see furnished_poses().
-      const std::vector<double> constants =
-          type.family == "drift" ? std::vector<double>{0.0, 3600.0} : std::vector<double>{};
+      const std::vector<double> constants = type.name == "drift_settling" ? std::vector<double>{0.0, 3600.0, 0.2}
+                                            : type.family == "drift"      ? std::vector<double>{0.0, 3600.0}
+                                                                          : std::vector<double>{};
       Effect effect = make_effect(type, chain, index, constants, 0);
       const std::vector<EffectParameter> own = effect_parameters(chain, effect);
       for (std::size_t k = 0; k < own.size(); ++k) effect.values[k] = 2.0 * own[k].scale;

@@ -79,5 +79,32 @@ TEST(Compliance, HasOneNameThroughGravityPayloadAndTorque) {
   }
 }
 
+TEST(Compliance, ThatStiffensUnderLoadIsNamedAsSuch) {
+  Robot truth = described(true);
+  truth.effects = {{"joint_compliance_stiffening", "joint2", {4e-6}, {500.0}}};
+  const Measurements seen = simulate(truth, {.poses = poses, .noise_um = 15.0, .seed = 4});
+  const Discovery found = discover(described(true), seen, {}, {.correct = false});
+  EXPECT_EQ(found.answer, discovery::Answer::named);
+  ASSERT_EQ(found.effects.size(), 1U);
+  EXPECT_EQ(found.effects[0].effect.type, "joint_compliance_stiffening");
+  EXPECT_EQ(found.effects[0].effect.at, "joint2");
+  EXPECT_LT(found.held_out.after.mean, 1.5 * found.held_out.floor_mm);
+}
+
+TEST(Compliance, FrictionThatGrowsWithTheLoadIsNamedWhereTheApproachIsKnown) {
+  Robot truth = described(true);
+  truth.effects = {{"friction_under_load", "joint3", {2e-7}}};
+  Measurements seen = simulate(truth, {.poses = poses, .noise_um = 15.0, .seed = 5});
+  const Discovery found = discover(described(true), seen, {}, {.correct = false});
+  EXPECT_EQ(found.answer, discovery::Answer::named);
+  ASSERT_EQ(found.effects.size(), 1U);
+  EXPECT_EQ(effect_label(found.effects[0].effect), "friction_under_load@joint3");
+  EXPECT_NEAR(found.effects[0].parameters[0].value, 2e-7, 4.0 * found.effects[0].parameters[0].standard_error);
+  seen.poses.covariates.clear();
+  for (const FoundEffect& one : discover(described(true), seen, {}, {.correct = false}).effects) {
+    EXPECT_FALSE(one.confirmed) << effect_label(one.effect);
+  }
+}
+
 }  // namespace
 }  // namespace llmt::robotics
