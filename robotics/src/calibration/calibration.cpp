@@ -120,7 +120,10 @@ void finish_by_differences(Calibration& calibration, discovery::LeastSquaresProb
     problem.parameters[k].free = reasons[k].empty();
   }
   problem.jacobian = [own = problem](const Eigen::VectorXd& values) { return differences(own, values); };
-  calibration.result = solve_for(calibration.robot, problem, reasons, solver);
+  // Differences have some five digits. What they cannot see is less than a thousandth of a standard error.
+  discovery::SolverOptions coarser = solver;
+  coarser.gradient_tolerance = std::max(solver.gradient_tolerance, 5e-5);
+  calibration.result = solve_for(calibration.robot, problem, reasons, coarser);
 }
 
 // Least squares with priors. The weight of the data against the priors depends on the noise, which the residuals of the

@@ -5,6 +5,7 @@
 #include <set>
 
 #include "llmt/random.hpp"
+#include "llmt/robotics/catalogue.hpp"
 #include "llmt/robotics/discovery.hpp"
 #include "llmt/robotics/robot_file.hpp"
 #include "llmt/robotics/simulation.hpp"
@@ -83,7 +84,10 @@ TEST(Compliance, ThatStiffensUnderLoadIsNamedAsSuch) {
   Robot truth = described(true);
   truth.effects = {{"joint_compliance_stiffening", "joint2", {4e-6}, {500.0}}};
   const Measurements seen = simulate(truth, {.poses = poses, .noise_um = 15.0, .seed = 4});
-  const Discovery found = discover(described(true), seen, {}, {.correct = false});
+  DiscoveryOptions options;
+  options.correct = false;
+  options.catalogue = parse_catalogue("effects:\n  - {type: joint_compliance_stiffening, search: true}\n", "own.yaml");
+  const Discovery found = discover(described(true), seen, {}, options);
   EXPECT_EQ(found.answer, discovery::Answer::named);
   ASSERT_EQ(found.effects.size(), 1U);
   EXPECT_EQ(found.effects[0].effect.type, "joint_compliance_stiffening");
