@@ -87,7 +87,7 @@ void wave(Hidden& h, const StrangerScene& s, int joint) {
   const double a = log_uniform(s.random, s.scale.wave_low, s.scale.wave_high), first = any_phase(s.random);
   const double second = any_phase(s.random), overtone = s.random.uniform(0.0, 0.15);
   const double order = 2.0 * s.arm.joints[joint].gear_ratio;
-  h.parameters = {{"amplitude", joint_name(joint), a, "rad"}};
+  h.parameters = {{"amplitude", joint_name(joint), a, "rad"}, {"per_turn", joint_name(joint), order, "1"}};
   add_angle_of(h, joint, [=](double q) {
     return a * std::sin(order * q + first) + overtone * a * std::sin(2.0 * order * q + second);
   });

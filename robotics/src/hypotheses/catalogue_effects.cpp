@@ -41,7 +41,12 @@ std::vector<std::vector<double>> constants_for(const EffectType& type, const Sce
     const double to = time.maxCoeff();
     if (!(to > from)) return {};
     if (type.name != "drift_settling") return {{from, to}};
-    return {{from, to, 0.05}, {from, to, 0.1}, {from, to, 0.2}, {from, to, 0.35}, {from, to, 0.6}};
+    // In steps so small that what a wrong one leaves is no knock of the instrument.
+    std::vector<std::vector<double>> all;
+    for (const double share : {0.03, 0.04, 0.06, 0.08, 0.11, 0.15, 0.2, 0.27, 0.37, 0.5, 0.7, 0.95}) {
+      all.push_back({from, to, share});
+    }
+    return all;
   }
   if (type.name == "tracker_knock" || type.name == "joint_map") return {};
   if (type.name == "axis_wobble_at") {
