@@ -219,7 +219,9 @@ void summarise(const PredictArguments& arguments, const Predicted& predicted) {
 
 void predict_command(const PredictArguments& arguments) {
   const ModelWithIntervals file =
-      arguments.interval > 0.0 ? load_with_intervals(arguments.model) : ModelWithIntervals{load(arguments.model), {}};
+      read_unless_exchanged(arguments.model, arguments.data, model_comes_first, [&](const std::string& path) {
+        return arguments.interval > 0.0 ? load_with_intervals(path) : ModelWithIntervals{load(path), {}};
+      });
   const Csv csv = read_table(arguments.data, arguments.mark);
   const Predicted predicted = predict_table(arguments, file, csv);
   if (const Eigen::Index count = predicted.count_not_finite(); count > 0) {
