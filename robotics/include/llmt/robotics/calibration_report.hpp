@@ -1,5 +1,9 @@
 /// \file
 /// How good a calibration is, on the poses it was made from and on poses that took no part.
+///
+///     const CalibrationReport report = report_calibration(robot, measured, {.correct = true});
+///     const double held_out_mm = report.geometric.held_out_mm.mean();
+///     const CorrectedRobot best = report.best();
 #pragma once
 
 #include <functional>

@@ -1,5 +1,8 @@
 /// \file
 /// Measured poses of a robot, and the CSV files that hold them.
+///
+///     const Measurements measured = read_measurements("measured.csv", robot);
+///     const Eigen::VectorXd errors_mm = distances(positions(robot, measured.poses), measured);
 #pragma once
 
 #include <Eigen/Core>
