@@ -202,7 +202,8 @@ void summarise(const PredictArguments& arguments, const Predicted& predicted) {
   }
   if (const Eigen::Index rows = count_high_leverage(predicted); rows > 0) {
     text += fmt::format(
-        "; {} rows lie within the range of every input but combine them as no training row does (leverage above 1)",
+        "; {} rows lie within the range of every input but are an unusual combination of them (leverage above 1): take "
+        "these predictions for extrapolation",
         rows);
   }
   if (predicted.missing > 0) {

@@ -86,7 +86,7 @@ def make(name, source, expected, folder):
     if len(codes) != len(rows):
         return f"{name}: {len(rows)} rows, the splits have {len(codes)}"
     header = [f"x{k}_{column}" for k, column in enumerate(names[:-1])] + ["y"]
-    write(os.path.join(folder, name + ".csv"), [header] + [["%.17g" % value for value in row] for row in rows])
+    write(os.path.join(folder, name + ".csv"), [header] + [[repr(value) for value in row] for row in rows])
     splits = [[code >> k & 1 for k in range(SPLITS)] for code in codes]
     write(os.path.join(folder, name + ".splits.csv"), [[f"split{k}" for k in range(SPLITS)]] + splits)
     return f"{name}: {len(rows)} rows, {len(header) - 1} inputs"
