@@ -44,7 +44,9 @@ install(
   DESTINATION "${LLMT_INSTALL_CMAKEDIR}"
   COMPONENT llmt_core)
 
-# llmt_pkg_config(COMPONENT NAME DESCRIPTION REQUIRES REQUIRES_PRIVATE): NAME.pc for those who build without CMake.
+# llmt_pkg_config(COMPONENT NAME DESCRIPTION REQUIRES REQUIRES_PRIVATE): NAME.pc for those who build without CMake. Its paths
+# are relative to itself: the prefix is known only when it is installed.
+file(RELATIVE_PATH pc_to_prefix "/${CMAKE_INSTALL_LIBDIR}/pkgconfig" "/")
 function(llmt_pkg_config component pc_name pc_description pc_requires pc_requires_private)
   configure_file("${PROJECT_SOURCE_DIR}/cmake/llmt.pc.in" "${PROJECT_BINARY_DIR}/${pc_name}.pc" @ONLY)
   install(

@@ -6,6 +6,9 @@
 
 namespace llmt::apps {
 
+/// What predict and explain say of arguments that were exchanged.
+inline constexpr const char* model_comes_first = "the model (JSON) comes first, then the table (CSV)";
+
 void add_fit(CLI::App& app);
 void add_predict(CLI::App& app);
 void add_inspect(CLI::App& app);

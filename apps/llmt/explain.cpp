@@ -123,7 +123,8 @@ void explain_row(const ExplainArguments& arguments, const Model& model, const Ei
 }
 
 void explain_command(const ExplainArguments& arguments) {
-  const Model model = load(arguments.model);
+  const Model model = read_unless_exchanged(arguments.model, arguments.data, model_comes_first,
+                                            [](const std::string& path) { return load(path); });
   const Csv csv = read_table(arguments.data, arguments.mark);
   if (csv.rows() == 0) {
     throw std::runtime_error(fmt::format("{}: there is a header and no rows", arguments.data));

@@ -165,7 +165,8 @@ void print_directions(const Model& model, const Partition& partition) {
 }
 
 void print_model(const Model& model, const std::string& path) {
-  print(fmt::format("{}: {} inputs, {} outputs\n\n", path, model.num_inputs(), model.num_outputs()));
+  print(fmt::format("{}: {} inputs, {} output{}\n\n", path, model.num_inputs(), model.num_outputs(),
+                    model.num_outputs() == 1 ? "" : "s"));
   Table inputs({"input", "smallest", "largest", "mean"});
   for (const InputColumn& input : model.inputs()) {
     if (input.is_categorical()) {

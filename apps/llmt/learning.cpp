@@ -133,6 +133,14 @@ std::vector<std::string> choose_inputs(const Csv& csv, const LearningArguments& 
       }
     }
   }
+  for (const std::string& target : arguments.targets) {
+    if (contains(arguments.ignored, target)) {
+      throw std::invalid_argument(fmt::format("column \"{}\" is a target and ignored", target));
+    }
+    if (target == arguments.weight) {
+      throw std::invalid_argument(fmt::format("column \"{}\" is a target and the weight", target));
+    }
+  }
   std::vector<std::string> inputs;
   for (const std::string& column : arguments.inputs.empty() ? csv.columns() : arguments.inputs) {
     if (!contains(arguments.targets, column) && !contains(arguments.ignored, column) && column != arguments.weight) {

@@ -202,7 +202,8 @@ void summarise(const PredictArguments& arguments, const Predicted& predicted) {
   }
   if (const Eigen::Index rows = count_high_leverage(predicted); rows > 0) {
     text += fmt::format(
-        "; {} rows lie within the range of every input but combine them as no training row does (leverage above 1)",
+        "; {} rows lie within the range of every input but are an unusual combination of them (leverage above 1): take "
+        "these predictions for extrapolation",
         rows);
   }
   if (predicted.missing > 0) {
@@ -219,7 +220,9 @@ void summarise(const PredictArguments& arguments, const Predicted& predicted) {
 
 void predict_command(const PredictArguments& arguments) {
   const ModelWithIntervals file =
-      arguments.interval > 0.0 ? load_with_intervals(arguments.model) : ModelWithIntervals{load(arguments.model), {}};
+      read_unless_exchanged(arguments.model, arguments.data, model_comes_first, [&](const std::string& path) {
+        return arguments.interval > 0.0 ? load_with_intervals(path) : ModelWithIntervals{load(path), {}};
+      });
   const Csv csv = read_table(arguments.data, arguments.mark);
   const Predicted predicted = predict_table(arguments, file, csv);
   if (const Eigen::Index count = predicted.count_not_finite(); count > 0) {

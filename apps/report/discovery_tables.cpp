@@ -28,14 +28,15 @@ Json effects_table(const Discovery& found) {
             .wide = true};
   for (const robotics::FoundShape& shape : found.unknown) {
     grid.rows.push_back({fmt::format("no name: acts on {}", shape.shape.acts_on),
-                         fmt::format("depends on {}: {}", fmt::join(shape.shape.depends_on, ", "), shape.shape.kind),
+                         shape.shape.depends_on.empty() ? shape.shape.kind : shape_words(shape.shape),
                          fmt::format("{:.0f} % of what was explained", 100.0 * shape.share),
                          "that something is there"});
   }
   for (const robotics::Effect& map : found.maps)
     grid.rows.push_back({fmt::format("free map of the angle error of {}", map.at),
                          fmt::format("{} values", map.values.size()), "", "no name"});
-  for (const FoundEffect& effect : found.effects) {
+  for (const FoundEffect* one : by_size(found)) {
+    const FoundEffect& effect = *one;
     std::vector<std::string> values;
     for (const robotics::FoundParameter& parameter : effect.parameters) {
       values.push_back(

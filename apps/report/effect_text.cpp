@@ -5,12 +5,25 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <vector>
 
 #include "llmt/robotics/effects.hpp"
 #include "shared/cli.hpp"
 
 namespace llmt::apps {
+namespace {
+
+std::string constants_text(const robotics::Effect& effect) {
+  const robotics::EffectType& type = robotics::effect_type(effect.type);
+  std::vector<std::string> parts;
+  for (std::size_t k = 0; k < type.constants.size() && k < effect.constants.size(); ++k) {
+    parts.push_back(fmt::format("{} {}", type.constants[k].key, number(effect.constants[k], 5)));
+  }
+  return parts.empty() ? "" : fmt::format(" ({})", fmt::join(parts, ", "));
+}
+
+}  // namespace
 
 std::string with_unit(double value, double error, const std::string& unit) {
   struct Prefix {
@@ -36,13 +49,38 @@ std::string place_of(const robotics::FoundEffect& effect) {
   return effect.effect.at.empty() ? "the whole arm" : effect.effect.at;
 }
 
-std::string constants_of(const robotics::FoundEffect& effect) {
-  const robotics::EffectType& type = robotics::effect_type(effect.effect.type);
+std::string constants_of(const robotics::FoundEffect& effect) { return constants_text(effect.effect); }
+
+std::vector<const robotics::FoundEffect*> by_size(const robotics::Discovery& found) {
+  std::vector<const robotics::FoundEffect*> effects;
+  for (const robotics::FoundEffect& effect : found.effects) effects.push_back(&effect);
+  std::ranges::stable_sort(effects, std::greater<>(), &robotics::FoundEffect::rms_mm);
+  return effects;
+}
+
+std::string effect_words(const robotics::Effect& effect) {
+  const std::string& title =
+      effect.formula.name.empty() ? robotics::effect_type(effect.type).title : effect.formula.name;
+  return fmt::format("{}{}{}", title, effect.at.empty() ? "" : ", " + effect.at, constants_text(effect));
+}
+
+std::string rival_words(const robotics::FoundEffect& effect, std::size_t k) {
+  const std::string& label = effect.rivals[k];
+  const std::vector<robotics::Effect>& effects = effect.rival_effects[k];
+  const auto causes = static_cast<std::size_t>(std::ranges::count(label, '+')) + 1;
+  if (effects.size() != causes) return label;  // a shape among them, which is no effect
   std::vector<std::string> parts;
-  for (std::size_t k = 0; k < type.constants.size() && k < effect.effect.constants.size(); ++k) {
-    parts.push_back(fmt::format("{} {}", type.constants[k].key, number(effect.effect.constants[k], 5)));
-  }
-  return parts.empty() ? "" : fmt::format(" ({})", fmt::join(parts, ", "));
+  for (const robotics::Effect& one : effects) parts.push_back(effect_words(one));
+  return fmt::format("{}", fmt::join(parts, " with "));
+}
+
+std::string shape_words(const robotics::Shape& shape) {
+  const std::string of = fmt::format(" of {}", fmt::join(shape.depends_on, " and "));
+  if (shape.kind == "smooth") return "a smooth function" + of;
+  if (shape.kind == "a map of the joint") return "some function" + of;
+  if (shape.kind == "a function of two joints") return "a function" + of;
+  if (shape.kind == "nonlinear in the torque") return "a nonlinear function" + of;
+  return shape.kind + of;
 }
 
 VisibleSizes visible_sizes(const robotics::Discovery& found) {

@@ -5,6 +5,7 @@
 #include <map>
 #include <set>
 #include <string>
+#include <vector>
 
 #include "llmt/robotics/discovery_result.hpp"
 
@@ -31,5 +32,17 @@ struct VisibleSizes {
   std::set<std::string> never;                 ///< types that would not have been found at any plausible size
 };
 VisibleSizes visible_sizes(const robotics::Discovery& found);
+
+/// What was found, what moves the tool most first.
+std::vector<const robotics::FoundEffect*> by_size(const robotics::Discovery& found);
+
+/// "link bending, joint2", with the effect's constants: what it is, for people.
+std::string effect_words(const robotics::Effect& effect);
+
+/// The k-th rival of an effect in the same words; several causes together are joined by "with".
+std::string rival_words(const robotics::FoundEffect& effect, std::size_t k);
+
+/// "a smooth function of q1": what a shape looks like.
+std::string shape_words(const robotics::Shape& shape);
 
 }  // namespace llmt::apps

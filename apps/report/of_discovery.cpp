@@ -154,7 +154,7 @@ std::optional<Chart> rivals_chart(const Discovered& of, const FoundEffect& named
   robotics::Effect start = named.effect;
   add(robotics::effect_label(named.effect), {start});
   for (std::size_t k = 0; k < std::min(named.rival_effects.size(), most_rivals); ++k)
-    add(named.rivals[k], named.rival_effects[k]);
+    add(rival_words(named, k), named.rival_effects[k]);
   Chart chart = ranking("The name and its rivals", "mean position error, mm", names, errors, labels, "muted");
   chart.layers.front().roles = std::vector<std::string>(names.size(), "muted");
   chart.layers.front().roles[0] = "before";

@@ -29,6 +29,7 @@ struct CalibrateArguments {
   std::string test;
   bool contiguous = false;
   bool json = false;
+  DecimalMark mark = DecimalMark::point;
   robotics::ReportOptions options;
   ReportFiles reports;
 };
@@ -176,19 +177,29 @@ void print_report(const CalibrateArguments& arguments, const robotics::Robot& no
     print("Orientations are in the file; positions alone are fitted.\n");
   }
   print(fmt::format("\n{}\n", parameter_table(nominal, report)));
-  print(fmt::format("{} parameters identified, {} after {} iterations: {}\n", result.rank,
-                    discovery::to_string(result.termination), result.iterations, result.reason));
+  print(result.converged()
+            ? fmt::format("{} parameters identified; the fit converged after {} iterations\n", result.rank,
+                          result.iterations)
+            : fmt::format("{} parameters identified; the fit did NOT converge: {}\n", result.rank, result.reason));
+  std::vector<std::string> kept;
   std::vector<std::string> dependent;
   for (const robotics::FixedParameter& fixed : report.calibration.fixed) {
-    dependent.push_back(fixed.name);
+    (fixed.why == "fixed by the user" ? kept : dependent).push_back(fixed.name);
   }
-  print(fmt::format("Kept as given, most because earlier parameters do the same: {}\n", fmt::join(dependent, ", ")));
+  if (!dependent.empty()) {
+    print(fmt::format(
+        "Left as described, because they move the measured point as parameters above do, or not at all: {}\n",
+        fmt::join(dependent, ", ")));
+  }
+  if (!kept.empty()) print(fmt::format("Left as described by --fix or --only: {}\n", fmt::join(kept, ", ")));
   if (!report.calibration.weak.empty()) {
-    print(fmt::format("Hardly told by these poses, held near nominal by the prior: {}\n",
-                      fmt::join(report.calibration.weak, ", ")));
+    print(
+        fmt::format("These poses hardly determine the following, which stay close to the description; positions near "
+                    "these poses do not suffer: {}\n",
+                    fmt::join(report.calibration.weak, ", ")));
   }
   for (const discovery::Combination& combination : result.unidentifiable) {
-    print(fmt::format("Not told by these poses: {}\n", combination.names()));
+    print(fmt::format("These poses determine only a combination of: {}\n", combination.names()));
   }
   print("\n" + error_table(rows, report, arguments.contiguous));
   print("nominal: base and tool fitted to the poses, everything else as described.\n");
@@ -210,16 +221,16 @@ void print_report(const CalibrateArguments& arguments, const robotics::Robot& no
 }
 
 void calibrate_command(CalibrateArguments arguments) {
-  const robotics::Robot nominal = robotics::read_robot(arguments.robot);
+  const robotics::Robot nominal = read_description(arguments.robot, arguments.data);
   refuse_lost_correction(nominal, arguments.robot, arguments.output);
-  robotics::Measurements measurements = robotics::read_measurements(arguments.data, nominal);
+  robotics::Measurements measurements = robotics::read_measurements(arguments.data, nominal, {}, arguments.mark);
   if (measurements.count() < arguments.options.folds) {
     throw std::runtime_error(fmt::format("{}: {} poses do not make {} folds", arguments.data, measurements.count(),
                                          arguments.options.folds));
   }
   std::optional<robotics::Measurements> test;
   if (!arguments.test.empty()) {
-    test = robotics::read_measurements(arguments.test, nominal);
+    test = robotics::read_measurements(arguments.test, nominal, {}, arguments.mark);
     check_positions(arguments.robot, nominal, test->poses);
   }
   check_positions(arguments.robot, nominal, measurements.poses);
@@ -281,6 +292,7 @@ void add_calibrate(CLI::App& app) {
   add_count(*command, "--folds", options.folds, 0, "Folds of the held-out figures, 0: none")->capture_default_str();
   command->add_flag("--contiguous", arguments->contiguous, "Folds are blocks of consecutive rows: for paths and grids");
   add_input_file(*command, "--test", arguments->test, "Further measurements that take no part, judged at the end");
+  add_decimal_comma(*command, arguments->mark);
   add_names(*command, "--fix", options.calibration.fixed, "PARAMETER",
             "What to keep as given: joint2.a, joint3, base, tool");
   add_names(*command, "--only", options.calibration.only, "PARAMETER",

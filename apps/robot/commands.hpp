@@ -12,6 +12,10 @@ namespace llmt::apps {
 /// Throws std::runtime_error, with the name of the robot's file, if a tool position at these poses makes no sense.
 void check_positions(const std::string& file, const robotics::Robot& robot, const robotics::Poses& poses);
 
+/// The robot's description. Throws as robotics::read_robot(), and std::invalid_argument if the description and the
+/// measurements were exchanged.
+robotics::Robot read_description(const std::string& robot, const std::string& measured);
+
 void add_paper(CLI::App& app);
 void add_simulate(CLI::App& app);
 void add_calibrate(CLI::App& app);

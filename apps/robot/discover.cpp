@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <stdexcept>
 
 #include "llmt/folds.hpp"
 #include "llmt/robotics/calibration_report.hpp"
@@ -31,6 +32,7 @@ struct DiscoverArguments {
   int folds = 0;
   bool contiguous = false;
   bool json = false;
+  DecimalMark mark = DecimalMark::point;
   robotics::DiscoveryOptions options;
   ReportFiles reports;
 };
@@ -87,21 +89,35 @@ void warn_of_misfit(const robotics::Robot& robot, const robotics::Measurements& 
   for (const std::string& suspicion : robotics::suspicions(robot, data, calibrated)) warn("WARNING: " + suspicion);
 }
 
+// discover(); where it refuses the measurements, what looks wrong with them is said first.
+Discovery discovered(const robotics::Robot& robot, const robotics::Measurements& data,
+                     const std::optional<robotics::Measurements>& test, const robotics::DiscoveryOptions& options) {
+  try {
+    return robotics::discover(robot, data, test, options);
+  } catch (const std::runtime_error&) {
+    try {
+      warn_of_misfit(robot, data);
+    } catch (const std::exception&) {  // what discover() says is enough then
+    }
+    throw;
+  }
+}
+
 void discover_command(DiscoverArguments arguments) {
-  const robotics::Robot robot = robotics::read_robot(arguments.robot);
+  const robotics::Robot robot = read_description(arguments.robot, arguments.data);
   refuse_lost_correction(robot, arguments.robot, arguments.output);
   if (!arguments.catalogue.empty()) arguments.options.catalogue = robotics::read_catalogue(arguments.catalogue);
   const std::vector<std::string> also = columns_of(arguments.options.catalogue, robot);
-  const robotics::Measurements data = robotics::read_measurements(arguments.data, robot, also);
+  const robotics::Measurements data = robotics::read_measurements(arguments.data, robot, also, arguments.mark);
   std::optional<robotics::Measurements> test;
-  if (!arguments.test.empty()) test = robotics::read_measurements(arguments.test, robot, also);
+  if (!arguments.test.empty()) test = robotics::read_measurements(arguments.test, robot, also, arguments.mark);
   check_positions(arguments.robot, robot, data.poses);
   if (test) check_positions(arguments.robot, robot, test->poses);
   for (const std::string& warning : data.warnings) warn(warning);
   Progress progress("discover");
   Eigen::Index step = 0;
   arguments.options.progress = [&](const std::string&) { progress.show(step++, 0); };
-  const Discovery found = robotics::discover(robot, data, test, arguments.options);
+  const Discovery found = discovered(robot, data, test, arguments.options);
   progress.clear();
   arguments.options.progress = {};
   warn_of_misfit(robot, data);  // what cannot be calibrated was refused
@@ -153,6 +169,7 @@ void add_discover(CLI::App& app) {
   add_count(*command, "--folds", arguments->folds, 2,
             "Besides, cross-validate the whole discovery with that many folds", 100);
   command->add_flag("--contiguous", arguments->contiguous, "Folds are blocks of consecutive rows");
+  add_decimal_comma(*command, arguments->mark);
   add_input_file(*command, "--catalogue", arguments->catalogue,
                  "Effects to look for, and their plausible sizes (YAML)");
   add_number(*command, "--mass-uncertainty", arguments->options.mass_uncertainty, any_share,

@@ -29,14 +29,17 @@ std::string constants_with_error(const FoundEffect& effect) {
 // Every effect with all that is known of it.
 std::string effect_lines(const Discovery& found) {
   std::string text;
-  for (const FoundEffect& effect : found.effects) {
+  for (const FoundEffect* one : by_size(found)) {
+    const FoundEffect& effect = *one;
     text +=
         fmt::format("  {}{}{}, {}{}\n", effect.confirmed ? "" : "perhaps ", effect.smaller ? "also " : "", effect.title,
                     effect.effect.at.empty() ? "the whole arm" : effect.effect.at, constants_with_error(effect));
     const std::string values = effect_values(found, effect);
     if (!values.empty()) text += fmt::format("    {}\n", values);
     text += fmt::format("    moves the tool by {:.4f} mm (rms) in ways that geometry cannot\n", effect.rms_mm);
-    for (const std::string& rival : effect.rivals) text += fmt::format("    or as well: {}\n", rival);
+    for (std::size_t k = 0; k < effect.rivals.size(); ++k) {
+      text += fmt::format("    or as well: {} [{}]\n", rival_words(effect, k), effect.rivals[k]);
+    }
     if (effect.exact_alias) text += "    One of these does the same at every pose: no pose can tell them apart.\n";
   }
   return text.empty() ? "" : "Effects:\n" + text;
@@ -45,8 +48,8 @@ std::string effect_lines(const Discovery& found) {
 std::string shape_lines(const std::vector<robotics::FoundShape>& shapes) {
   std::string text;
   for (const robotics::FoundShape& shape : shapes) {
-    text += fmt::format("  acts on {}, depends on {}: {} ({:.0f} % of what was explained)\n", shape.shape.acts_on,
-                        fmt::join(shape.shape.depends_on, ", "), shape.shape.kind, 100.0 * shape.share);
+    text += fmt::format("  on {}: {} ({:.0f} % of what was explained)\n", shape.shape.acts_on, shape_words(shape.shape),
+                        100.0 * shape.share);
   }
   return text.empty() ? "" : "Shapes:\n" + text;
 }
@@ -66,9 +69,10 @@ std::string gap_lines(const Discovery& found) {
     return fmt::format("{}", fmt::join(parts, ", "));
   };
   if (!found.gap.acts_like.empty()) {
-    text += fmt::format("  share of its square along the motion by each joint: {}\n", list(found.gap.acts_like));
+    text += fmt::format("  in the direction that the joint alone moves the tool, a third by chance: {}\n",
+                        list(found.gap.acts_like));
   }
-  if (!found.gap.depends_on.empty()) text += fmt::format("  a tree of it uses: {}\n", list(found.gap.depends_on));
+  if (!found.gap.depends_on.empty()) text += fmt::format("  depends on: {}\n", list(found.gap.depends_on));
   return text;
 }
 
@@ -92,7 +96,7 @@ std::string untestable_lines(const Discovery& found) {
 
 std::string visible_lines(const Discovery& found) {
   const VisibleSizes sizes = visible_sizes(found);
-  std::string text = "Would have been seen, nine times in ten, from (best to worst place):\n";
+  std::string text = "An effect would have been found, nine times in ten, from this size on (best to worst place):\n";
   for (const auto& [type, range] : sizes.ranges) {
     text +=
         fmt::format("  {}: {} to {} {}\n", type, number(range.best_place, 2), number(range.worst_place, 2), range.unit);
@@ -109,8 +113,8 @@ std::string discovery_details(const Discovery& found) {
   std::erase_if(shapes, [](const robotics::FoundShape& one) { return one.shape.depends_on.empty(); });
   std::string text = effect_lines(found) + shape_lines(shapes) + gap_lines(found) + untestable_lines(found);
   if (found.answer == discovery::Answer::nothing_missing) text += visible_lines(found);
-  text += fmt::format("{} hypotheses in {} rounds; evidence {:.0f}, chance reaches {:.0f}.\n", found.hypotheses,
-                      found.rounds, found.score_gain, found.threshold);
+  text += fmt::format("{} causes were tried in {} round{}; what was found scores {:.0f}, chance alone up to {:.0f}.\n",
+                      found.hypotheses, found.rounds, found.rounds == 1 ? "" : "s", found.score_gain, found.threshold);
   return text;
 }
 

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <map>
 
 #include "report/effect_text.hpp"
@@ -73,11 +74,18 @@ std::string list_of(const std::vector<std::string>& names) {
   return fmt::format("{} and {}", fmt::join(names.begin(), names.end() - 1, ", "), names.back());
 }
 
+// "155", "27.7".
+std::string order_text(double order) {
+  return order == std::round(order) ? fmt::format("{:.0f}", order) : number(order, 3);
+}
+
+bool is_wave(const FoundEffect& effect) { return effect.effect.type == "transmission_error"; }
+
 // What an effect is, without its place: for gears, what turns so often.
 std::string kind_of(const Discovery& found, const FoundEffect& effect) {
-  if (effect.effect.type != "transmission_error") return effect.title;
+  if (!is_wave(effect)) return effect.title;
   const double order = effect.effect.constants[0];
-  const std::string what = fmt::format("an angle error that repeats {} times a turn", number(order, 5));
+  const std::string what = fmt::format("an angle error that repeats {} times a turn", order_text(order));
   for (const robotics::Joint& joint : found.before.chain.joints) {
     if (joint.name != effect.effect.at || !joint.gear_ratio) continue;
     if (std::abs(order - 2.0 * *joint.gear_ratio) < 0.02 * order) {
@@ -87,41 +95,102 @@ std::string kind_of(const Discovery& found, const FoundEffect& effect) {
   return what;
 }
 
-// One line for all places of one kind of effect.
-std::vector<std::string> effect_sentences(const Discovery& found) {
-  struct Group {
-    std::string kind;
-    std::vector<const FoundEffect*> members;
-  };
-  std::vector<Group> groups;
-  for (const FoundEffect& effect : found.effects) {
-    const std::string kind = (effect.confirmed ? "" : "perhaps ") +
-                             std::string(effect.smaller ? "also, smaller: " : "") + kind_of(found, effect);
-    const auto same = std::ranges::find(groups, kind, &Group::kind);
-    if (same == groups.end()) {
-      groups.push_back({kind, {&effect}});
+// Effects that one line speaks of.
+struct Group {
+  std::string kind;
+  std::vector<const FoundEffect*> members = {};
+  bool small_waves = false;
+
+  double rms_mm() const {
+    double squares = 0.0;
+    for (const FoundEffect* effect : members) squares += effect->rms_mm * effect->rms_mm;
+    return std::sqrt(squares);
+  }
+};
+
+// The waves of gears that hardly move the tool: those below a quarter of the largest wave, and of each certainty those
+// beyond the five largest. Fewer than two are not worth a line of their own.
+std::vector<const FoundEffect*> small_waves(const std::vector<const FoundEffect*>& effects, bool confirmed) {
+  constexpr int most = 5;
+  constexpr double small = 0.25;
+  double largest = 0.0;
+  int shown = 0;
+  std::vector<const FoundEffect*> waves;
+  for (const FoundEffect* effect : effects) {
+    if (!is_wave(*effect) || !effect->rivals.empty()) continue;
+    largest = std::max(largest, effect->rms_mm);
+    if (effect->confirmed != confirmed) continue;
+    if (shown == most || effect->rms_mm < small * largest) {
+      waves.push_back(effect);
     } else {
-      same->members.push_back(&effect);
+      ++shown;
     }
   }
+  return waves.size() < 2 ? std::vector<const FoundEffect*>{} : waves;
+}
+
+// What moves the tool most first.
+std::vector<Group> groups_of(const Discovery& found) {
+  const std::vector<const FoundEffect*> effects = by_size(found);
+  std::vector<Group> groups;
+  std::vector<const FoundEffect*> taken;
+  for (const bool confirmed : {true, false}) {
+    std::vector<const FoundEffect*> small = small_waves(effects, confirmed);
+    if (small.empty()) continue;
+    taken.insert(taken.end(), small.begin(), small.end());
+    groups.push_back({confirmed ? "small waves of the gears" : "perhaps small waves of the gears", small, true});
+  }
+  for (const FoundEffect* effect : effects) {
+    if (std::ranges::find(taken, effect) != taken.end()) continue;
+    const std::string kind = (effect->confirmed ? "" : "perhaps ") +
+                             std::string(effect->smaller ? "also, smaller: " : "") + kind_of(found, *effect);
+    const auto same = std::ranges::find(groups, kind, &Group::kind);
+    if (same == groups.end()) {
+      groups.push_back({kind, {effect}});
+    } else {
+      same->members.push_back(effect);
+    }
+  }
+  std::ranges::stable_sort(groups, std::greater<>(), &Group::rms_mm);
+  return groups;
+}
+
+// "joint1 (21 and 80.5 times a turn), joint2 (20)", joints in the order of the arm.
+std::string wave_places(const Discovery& found, const Group& waves) {
+  std::vector<std::string> places;
+  for (const robotics::Joint& joint : found.before.chain.joints) {
+    std::vector<std::string> orders;
+    for (const FoundEffect* effect : waves.members) {
+      if (effect->effect.at == joint.name) orders.push_back(order_text(effect->effect.constants[0]));
+    }
+    if (!orders.empty()) {
+      places.push_back(
+          fmt::format("{} ({}{})", joint.name, fmt::join(orders, ", "), places.empty() ? " times a turn" : ""));
+    }
+  }
+  return fmt::format("{}", fmt::join(places, ", "));
+}
+
+// One line for all places of one kind of effect.
+std::vector<std::string> effect_sentences(const Discovery& found) {
   std::vector<std::string> sentences;
-  for (const Group& group : groups) {
+  for (const Group& group : groups_of(found)) {
     std::vector<std::string> places;
     std::vector<std::string> rivals;
-    double squares = 0.0;
     for (const FoundEffect* effect : group.members) {
-      places.push_back(effect->effect.at.empty() ? "the whole arm" : effect->effect.at);
-      squares += effect->rms_mm * effect->rms_mm;
-      for (const std::string& rival : effect->rivals) {
+      places.push_back(place_of(*effect));
+      for (std::size_t k = 0; k < effect->rivals.size(); ++k) {
+        const std::string rival = rival_words(*effect, k);
         if (std::ranges::find(rivals, rival) == rivals.end()) rivals.push_back(rival);
       }
     }
-    std::string text = fmt::format("  {}, {}", group.kind, list_of(places));
-    if (group.members.size() == 1) {
+    std::string text =
+        fmt::format("  {}, {}", group.kind, group.small_waves ? wave_places(found, group) : list_of(places));
+    if (group.members.size() == 1 && !is_wave(*group.members[0])) {  // the size of a wave says it all
       const std::string values = effect_values(found, *group.members[0]);
       if (!values.empty() && values.size() < most_columns) text += ": " + values;
     }
-    text += fmt::format("; moves the tool {:.4f} mm", std::sqrt(squares));
+    text += fmt::format("; {} the tool {:.4f} mm", group.small_waves ? "together they move" : "moves", group.rms_mm());
     for (std::size_t k = 0; k < std::min<std::size_t>(2, rivals.size()); ++k) text += "; or " + rivals[k];
     if (rivals.size() > 2) text += fmt::format("; or {} more", rivals.size() - 2);
     sentences.push_back(text);
@@ -137,11 +206,11 @@ std::vector<std::string> shape_sentences(const std::vector<robotics::FoundShape>
     if (one.shape.depends_on.empty()) continue;
     const std::string& place = one.shape.acts_on;
     if (!by_place.contains(place)) order.push_back(place);
-    by_place[place].push_back(fmt::format("{} of {}", one.shape.kind, fmt::join(one.shape.depends_on, " and ")));
+    by_place[place].push_back(shape_words(one.shape));
   }
   std::vector<std::string> sentences;
   for (const std::string& place : order) {
-    sentences.push_back(fmt::format("  {}{}: {}", lead, place, fmt::join(by_place[place], "; ")));
+    sentences.push_back(fmt::format("  {}on {}: {}", lead, place, fmt::join(by_place[place], "; ")));
   }
   return sentences;
 }
@@ -224,8 +293,8 @@ std::string discovery_page(const Discovery& found) {
   };
   add(headline(found));
   for (const std::string& sentence : effect_sentences(found)) add(sentence);
-  for (const std::string& sentence : shape_sentences(found.unknown, "")) add(sentence);
-  for (const std::string& sentence : shape_sentences(found.more, "and something more, on ")) add(sentence);
+  for (const std::string& sentence : shape_sentences(found.unknown, "an error without a name, ")) add(sentence);
+  for (const std::string& sentence : shape_sentences(found.more, "and something more, ")) add(sentence);
   for (const std::string& sentence : refused_sentences(found)) add(sentence);
   if (!found.maps.empty()) {
     std::vector<std::string> joints;

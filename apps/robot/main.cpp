@@ -1,11 +1,18 @@
 #include <stdexcept>
 
+#include "llmt/robotics/robot_file.hpp"
 #include "robot/commands.hpp"
 #include "shared/cli.hpp"
+#include "shared/options.hpp"
 
 void llmt::apps::check_positions(const std::string& file, const robotics::Robot& robot, const robotics::Poses& poses) {
   const std::string reason = robotics::position_refusal(robot, poses);
   if (!reason.empty()) throw std::runtime_error(file + ": " + reason);
+}
+
+llmt::robotics::Robot llmt::apps::read_description(const std::string& robot, const std::string& measured) {
+  return read_unless_exchanged(robot, measured, "the description (YAML) comes first, then the measurements (CSV)",
+                               [](const std::string& path) { return robotics::read_robot(path); });
 }
 
 int main(int argc, char** argv) {

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "report/effect_text.hpp"
 #include "shared/cli.hpp"
 
 namespace llmt::apps {
@@ -28,7 +29,7 @@ std::vector<NextPoses> next_poses(const robotics::Discovery& found, const roboti
     const auto place = std::ranges::find(all, label, robotics::effect_label);
     if (place == all.end() || effect.rival_effects.front().empty()) continue;
     constexpr int proposed = 3;
-    result.push_back({label, effect.rivals.front(),
+    result.push_back({effect_words(effect.effect), rival_words(effect, 0),
                       robotics::telling_poses(found.improved.robot, static_cast<std::size_t>(place - all.begin()),
                                               effect.rival_effects.front(), data.poses, found.noise_mm, proposed, 1,
                                               data.measured)});

@@ -12,8 +12,8 @@ namespace llmt::apps {
 
 /// Poses at which a finding and its first rival predict different positions.
 struct NextPoses {
-  std::string effect;  ///< label
-  std::string rival;   ///< label
+  std::string effect;  ///< in words
+  std::string rival;   ///< in words
   robotics::Telling telling;
 };
 

@@ -23,12 +23,13 @@ struct SimulateArguments {
   std::string output;
   std::string poses_from;
   bool json = false;
+  DecimalMark mark = DecimalMark::point;
   robotics::SimulationOptions options;
 };
 
 robotics::Measurements simulated(const robotics::Robot& robot, const SimulateArguments& arguments) {
   std::optional<robotics::Poses> poses;
-  if (!arguments.poses_from.empty()) poses = robotics::read_poses(arguments.poses_from, robot);
+  if (!arguments.poses_from.empty()) poses = robotics::read_poses(arguments.poses_from, robot, arguments.mark);
   try {
     return poses ? robotics::simulate(robot, *poses, arguments.options) : robotics::simulate(robot, arguments.options);
   } catch (const std::runtime_error& error) {
@@ -83,6 +84,7 @@ void add_simulate(CLI::App& app) {
   add_input_file(*command, "--poses-from", arguments->poses_from,
                  "CSV file whose joint values and covariates to take instead; measured positions in it do not matter")
       ->excludes(poses);
+  add_decimal_comma(*command, arguments->mark);
   add_number(*command, "--noise-um", arguments->options.noise_um, not_negative,
              "Standard deviation of each coordinate, in micrometres")
       ->capture_default_str();

@@ -14,6 +14,7 @@
 #include "llmt/csv.hpp"
 #include "llmt/files.hpp"
 #include "shared/help.hpp"
+#include "shared/manual.hpp"
 #include "shared/options.hpp"
 
 namespace llmt::apps {
@@ -114,6 +115,11 @@ int run(CLI::App& app, int argc, char** argv, std::span<const SettingName> names
   };
   try {
     require_ranges(app);
+    const std::string_view only = argc == 2 ? argv[1] : "";
+    if (only == "--man" || only == "--bash-completion") {
+      write_stdout(only == "--man" ? man_page(app) : bash_completion(app));
+      return exit_done;
+    }
     refuse_unknown_names(app, argc, argv);
     return parse(app, argc, argv);
   } catch (const std::invalid_argument& error) {

@@ -1,8 +1,10 @@
 #include "shared/columns.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -11,6 +13,7 @@
 
 #include "llmt/files.hpp"
 #include "llmt/options.hpp"
+#include "shared/cli.hpp"
 
 namespace llmt::apps {
 namespace {
@@ -70,13 +73,59 @@ bool contains(const std::vector<std::string>& names, const std::string& name) {
   return std::ranges::find(names, name) != names.end();
 }
 
+// Whether the header has only numbers. Those of columns, from 0 or 1 on, are names.
+bool looks_like_a_row(const Csv& csv) {
+  std::vector<double> numbers;
+  for (std::string name : csv.columns()) {
+    std::ranges::replace(name, static_cast<char>(csv.decimal_mark()), '.');
+    double value = 0.0;
+    const char* const end = name.data() + name.size();
+    const auto [stop, error] = std::from_chars(name.data(), end, value);
+    if (error != std::errc() || stop != end) return false;
+    numbers.push_back(value);
+  }
+  const bool counts =
+      std::ranges::adjacent_find(numbers, [](double one, double next) { return next != one + 1.0; }) == numbers.end() &&
+      (numbers.front() == 0.0 || numbers.front() == 1.0);
+  return !counts;
+}
+
+// Csv::refuse_first() for targets and weights, with the number of all rows that lack one.
+void refuse_rows_without_target(const Csv& csv, std::span<const std::string> columns,
+                                std::span<const Eigen::Index> first_bad, const Eigen::MatrixXd& values) {
+  try {
+    csv.refuse_first(columns, first_bad);
+  } catch (const DecimalCommaError&) {
+    throw;
+  } catch (const std::runtime_error& error) {
+    constexpr std::size_t named = 5;
+    std::vector<Eigen::Index> rows;
+    Eigen::Index count = 0;
+    for (Eigen::Index row = 0; row < values.rows(); ++row) {
+      if (!values.row(row).array().isNaN().any()) continue;
+      if (rows.size() < named) rows.push_back(row);
+      ++count;
+    }
+    if (count < 2) throw;
+    throw std::runtime_error(fmt::format("{}; {} rows have no number there, lines {}{}: fill them in or leave them out",
+                                         error.what(), count, fmt::join(csv.lines_of(rows), ", "),
+                                         count > std::ssize(rows) ? ", ..." : ""));
+  }
+}
+
 }  // namespace
 
 std::string table_name(const std::string& path) { return path == "-" ? "standard input" : path; }
 
 Csv read_table(const std::string& path, DecimalMark mark) {
-  if (path != "-") return Csv::read(path, mark);
-  return Csv::parse(read_file("/dev/stdin"), table_name(path), mark);
+  Csv csv = path != "-" ? Csv::read(path, mark) : Csv::parse(read_file("/dev/stdin"), table_name(path), mark);
+  if (looks_like_a_row(csv)) {
+    warn(
+        fmt::format("llmt: {}: the first line holds only numbers and was taken for the names of the columns; if it is "
+                    "a row of data, put a line with names above it",
+                    csv.name()));
+  }
+  return csv;
 }
 
 void refuse_large(const Csv& csv, std::span<const std::string> columns, const Eigen::MatrixXd& values,
@@ -154,7 +203,8 @@ LearningColumns read_learning_columns(const Csv& csv, const ColumnRoles& roles, 
   }
   const std::span<const std::string> names(columns);
   const std::span<const Eigen::Index> bad_rows(bad);
-  csv.refuse_first(names.subspan(num_inputs), bad_rows.subspan(num_inputs));
+  refuse_rows_without_target(csv, names.subspan(num_inputs), bad_rows.subspan(num_inputs),
+                             values.rightCols(std::ssize(columns) - std::ssize(roles.inputs)));
   try {
     csv.refuse_first(names.first(num_inputs), bad_rows.first(num_inputs));
   } catch (const DecimalCommaError&) {

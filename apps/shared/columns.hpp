@@ -15,7 +15,8 @@ namespace llmt::apps {
 /// The name of a table in messages: its path, or "standard input" for a dash.
 std::string table_name(const std::string& path);
 
-/// A table from a file, or from standard input if `path` is a dash. Throws as Csv::read().
+/// A table from a file, or from standard input if `path` is a dash. Warns of a header that holds only numbers. Throws
+/// as Csv::read().
 Csv read_table(const std::string& path, DecimalMark mark);
 
 /// Which column of a table is what.

@@ -37,15 +37,8 @@ std::string entry(const std::string& name, const std::string& text) {
 class HelpFormatter : public CLI::Formatter {
  public:
   std::string make_option(const CLI::Option* option, bool is_positional) const override {
-    std::string name = make_option_name(option, is_positional);
-    name.erase(std::min(name.find('{'), name.size()));  // the value of a flag that is given without one
-    const std::string type = option->get_option_text().empty() ? option->get_type_name() : option->get_option_text();
-    if (!is_positional && option->get_type_size() != 0 && !type.empty()) name += " " + type;
-    if (!is_positional && option->get_type_size() == 0) name += option->get_option_text();
-    std::string text = option->get_description();
-    if (!option->get_default_str().empty()) text += fmt::format(" [{}]", option->get_default_str());
-    if (option->get_required() && !is_positional) text += " (required)";
-    return entry(name, text);
+    const OptionHelp help = help_of(*option, make_option_name(option, is_positional));
+    return entry(help.name, help.text);
   }
 
   std::string make_help(const CLI::App* app, std::string name, CLI::AppFormatMode mode) const override {
@@ -110,6 +103,19 @@ bool contains(const std::vector<std::string>& names, std::string_view name) {
 
 }  // namespace
 
+OptionHelp help_of(const CLI::Option& option, const std::string& shown_name) {
+  OptionHelp help{shown_name, option.get_description()};
+  help.name.erase(std::min(help.name.find('{'), help.name.size()));  // the value of a flag that is given without one
+  const bool is_positional = !option.nonpositional();
+  const std::string type = option.get_option_text().empty() ? option.get_type_name() : option.get_option_text();
+  const bool is_flag = option.get_items_expected_max() == 0;
+  if (!is_positional && !is_flag && !type.empty()) help.name += " " + type;
+  if (!is_positional && is_flag) help.name += option.get_option_text();
+  if (!option.get_default_str().empty()) help.text += fmt::format(" [{}]", option.get_default_str());
+  if (option.get_required() && !is_positional) help.text += " (required)";
+  return help;
+}
+
 void set_up_help(CLI::App& program) {
   const auto formatter = std::make_shared<HelpFormatter>();
   formatter->label("SUBCOMMAND", "COMMAND");
@@ -166,7 +172,8 @@ std::string hint_on_extra_argument(const CLI::App& program, int argc, const char
     while (before != argv && !std::string_view(*before).starts_with("-")) --before;
     const CLI::Option* const option = chosen.back()->get_option_no_throw(*before);
     const bool has_list = option != nullptr && option->get_type_name().ends_with("...");
-    if (before != argv && option != nullptr && option->get_type_size() == 0 && !option->get_option_text().empty()) {
+    if (before != argv && option != nullptr && option->get_items_expected_max() == 0 &&
+        !option->get_option_text().empty()) {
       return fmt::format("; a value of {} is written {}={}", *before, *before, *word);
     }
     if (before != argv && has_list && word - before >= 2) {

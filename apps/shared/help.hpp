@@ -14,6 +14,13 @@ inline constexpr const char* expert_options = "Options for experts";
 /// beside its name, its default at the end of its text. Call it once, when all commands are there.
 void set_up_help(CLI::App& program);
 
+/// An option as its help has it: "-t,--target COLUMN,..." and what it does, with the default at the end.
+struct OptionHelp {
+  std::string name;
+  std::string text;
+};
+OptionHelp help_of(const CLI::Option& option, const std::string& shown_name);
+
 /// Throws std::invalid_argument, with the name that was most likely meant, if the command line has a command or a long
 /// option that the program does not know, or no command. CLI11 would first ask for options that are missing.
 void refuse_unknown_names(const CLI::App& program, int argc, const char* const* argv);

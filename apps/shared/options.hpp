@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <limits>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -91,6 +92,24 @@ void refuse_lost_input(const std::string& output, const std::string& input);
 
 /// FILE of a file written beside `path`: the same name with another extension.
 std::filesystem::path beside(const std::string& path, const std::string& extension);
+
+/// read(first). Where that throws although read(second) does not, the two were exchanged: std::invalid_argument says
+/// so, and the `order` that they come in.
+template <class Read>
+auto read_unless_exchanged(const std::string& first, const std::string& second, const char* order, const Read& read) {
+  try {
+    return read(first);
+  } catch (const std::runtime_error&) {
+    bool exchanged = true;
+    try {
+      read(second);
+    } catch (const std::exception&) {
+      exchanged = false;
+    }
+    if (!exchanged) throw;
+  }
+  throw std::invalid_argument(first + " and " + second + " seem to be exchanged: " + order);
+}
 
 /// Throws std::logic_error if a command has an option with a number that add_number(), add_count() and the like did not
 /// make.

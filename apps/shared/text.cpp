@@ -8,7 +8,6 @@
 #include <charconv>
 #include <cmath>
 #include <cstdlib>
-#include <numeric>
 
 namespace llmt::apps {
 namespace {
@@ -54,6 +53,98 @@ std::vector<std::string> lines_of(const std::string& text) {
   return lines;
 }
 
+struct Column {
+  bool numeric = false;
+  std::size_t width = 0;
+  std::size_t least = 0;  // of numbers, with the words of the header below each other
+};
+
+std::size_t longest_word(const std::string& text) {
+  std::size_t longest = 0;
+  for (std::size_t begin = 0; begin < text.size();) {
+    const std::size_t end = std::min(text.find(' ', begin), text.size());
+    longest = std::max(longest, columns_of(std::string_view(text).substr(begin, end - begin)));
+    begin = end + 1;
+  }
+  return longest;
+}
+
+std::size_t total_width(const std::vector<Column>& shapes) {
+  std::size_t total = (shapes.size() - 1) * between_columns;
+  for (const Column& shape : shapes) total += shape.width;
+  return total;
+}
+
+// Breaks the widest column of words into lines where the table is too wide, then the headers of numbers.
+void narrow(std::vector<Column>& shapes, std::size_t width) {
+  if (total_width(shapes) <= width) return;
+  constexpr std::size_t narrowest = 20;
+  Column* widest = nullptr;
+  for (Column& shape : shapes) {
+    if (!shape.numeric && (widest == nullptr || shape.width > widest->width)) widest = &shape;
+  }
+  if (widest != nullptr && widest->width > narrowest) {
+    const std::size_t others = total_width(shapes) - widest->width;
+    widest->width = std::min(widest->width, std::max(narrowest, width > others ? width - others : 0));
+  }
+  if (total_width(shapes) <= width) return;
+  for (Column& shape : shapes) {
+    if (shape.numeric) shape.width = shape.least;
+  }
+}
+
+// The columns of each block: one, or where they do not fit beside each other several, each with the first columns of
+// words, or the first column alone where these leave too little.
+std::vector<std::vector<std::size_t>> blocks_of(const std::vector<Column>& shapes, std::size_t width) {
+  std::vector<std::size_t> key = {0};
+  std::size_t key_width = shapes[0].width;
+  for (std::size_t c = 1; c < shapes.size() && !shapes[c].numeric; ++c) {
+    const std::size_t with_it = key_width + between_columns + shapes[c].width;
+    if (with_it > width - width / 3) break;
+    key.push_back(c);
+    key_width = with_it;
+  }
+  std::vector<std::vector<std::size_t>> blocks = {key};
+  std::size_t used = key_width;
+  for (std::size_t c = key.size(); c < shapes.size(); ++c) {
+    const std::size_t wanted = between_columns + shapes[c].width;
+    if (blocks.back().size() > key.size() && used + wanted > width) {
+      blocks.push_back(key);
+      used = key_width;
+    }
+    blocks.back().push_back(c);
+    used += wanted;
+  }
+  return blocks;
+}
+
+// A row of a block, over as many lines as its highest cell needs.
+std::string row_text(const std::vector<std::string>& row, const std::vector<Column>& shapes,
+                     const std::vector<std::size_t>& block) {
+  std::vector<std::vector<std::string>> cells;
+  std::size_t height = 1;
+  for (const std::size_t c : block) {
+    cells.push_back(lines_of(wrapped(row[c], shapes[c].width)));
+    height = std::max(height, cells.back().size());
+  }
+  std::string text;
+  for (std::size_t k = 0; k < height; ++k) {
+    std::string line;
+    for (std::size_t b = 0; b < block.size(); ++b) {
+      const Column& shape = shapes[block[b]];
+      const std::string cell = k < cells[b].size() ? cells[b][k] : std::string();
+      const std::string padding(shape.width - std::min(shape.width, columns_of(cell)), ' ');
+      if (b > 0) line.append(between_columns, ' ');
+      if (shape.numeric) line += padding;
+      line += cell;
+      if (!shape.numeric) line += padding;
+    }
+    line.erase(line.find_last_not_of(' ') + 1);
+    text += line + "\n";
+  }
+  return text;
+}
+
 }  // namespace
 
 std::size_t output_width() {
@@ -91,47 +182,22 @@ std::string wrapped(std::string_view text, std::size_t width, std::size_t indent
 
 std::string Table::text(std::size_t width) const {
   const std::size_t columns = rows_.front().size();
-  std::vector<std::size_t> widths(columns, 0);
-  std::vector<bool> numeric(columns, rows_.size() > 1);
-  for (std::size_t r = 0; r < rows_.size(); ++r) {
-    for (std::size_t c = 0; c < columns; ++c) {
-      widths[c] = std::max(widths[c], columns_of(rows_[r][c]));
-      numeric[c] = numeric[c] && (r == 0 || looks_like_number(rows_[r][c]));
+  std::vector<Column> shapes(columns);
+  for (std::size_t c = 0; c < columns; ++c) {
+    Column& shape = shapes[c];
+    shape.numeric = rows_.size() > 1;
+    for (std::size_t r = 0; r < rows_.size(); ++r) {
+      const std::string& cell = rows_[r][c];
+      shape.width = std::max(shape.width, columns_of(cell));
+      shape.least = std::max(shape.least, r == 0 ? longest_word(cell) : columns_of(cell));
+      shape.numeric = shape.numeric && (r == 0 || looks_like_number(cell));
     }
   }
-  const std::size_t total = std::accumulate(widths.begin(), widths.end(), (columns - 1) * between_columns);
-  if (total > width) {
-    std::size_t widest = columns;
-    for (std::size_t c = 0; c < columns; ++c) {
-      if (!numeric[c] && (widest == columns || widths[c] > widths[widest])) widest = c;
-    }
-    constexpr std::size_t narrowest = 20;
-    if (widest < columns && widths[widest] > narrowest) {
-      const std::size_t others = total - widths[widest];
-      widths[widest] = std::max(narrowest, width > others ? width - others : 0);
-    }
-  }
+  narrow(shapes, width);
   std::string text;
-  for (const std::vector<std::string>& row : rows_) {
-    std::vector<std::vector<std::string>> cells;
-    std::size_t height = 1;
-    for (std::size_t c = 0; c < columns; ++c) {
-      cells.push_back(lines_of(numeric[c] ? row[c] : wrapped(row[c], widths[c])));
-      height = std::max(height, cells.back().size());
-    }
-    for (std::size_t k = 0; k < height; ++k) {
-      std::string line;
-      for (std::size_t c = 0; c < columns; ++c) {
-        const std::string cell = k < cells[c].size() ? cells[c][k] : std::string();
-        const std::string padding(widths[c] - std::min(widths[c], columns_of(cell)), ' ');
-        if (c > 0) line.append(between_columns, ' ');
-        if (numeric[c]) line += padding;
-        line += cell;
-        if (!numeric[c]) line += padding;
-      }
-      line.erase(line.find_last_not_of(' ') + 1);
-      text += line + "\n";
-    }
+  for (const std::vector<std::size_t>& block : blocks_of(shapes, width)) {
+    if (!text.empty()) text += "\n";
+    for (const std::vector<std::string>& row : rows_) text += row_text(row, shapes, block);
   }
   return text;
 }

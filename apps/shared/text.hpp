@@ -29,7 +29,8 @@ class Table {
   explicit Table(std::vector<std::string> header) : rows_{std::move(header)} {}
   void add(std::vector<std::string> row) { rows_.push_back(std::move(row)); }
 
-  /// If the table is wider than `width`, its widest column of words is broken into lines.
+  /// If the table is wider than `width`, its widest column of words is broken into lines, then the headers of numbers;
+  /// columns that still do not fit follow below, again with the first words.
   std::string text(std::size_t width = output_width()) const;
 
  private:

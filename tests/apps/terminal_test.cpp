@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <set>
 #include <sstream>
 
 #include "apps/program.hpp"
@@ -171,6 +172,51 @@ TEST(Help, FitsTheTerminalAndHidesOptionsForExperts) {
   EXPECT_EQ(all.find("docs/"), std::string::npos);
 }
 
+// The names of the options that --help-all of a command lists.
+std::set<std::string> options_in_help(const std::string& help) {
+  std::set<std::string> names;
+  std::istringstream lines(help);
+  for (std::string line; std::getline(lines, line);) {
+    const std::size_t begin = line.find("--");
+    if (!line.starts_with("  -") || begin == std::string::npos) continue;
+    names.insert(line.substr(begin, line.find_first_of(" [,", begin) - begin));
+  }
+  return names;
+}
+
+TEST(Manual, HasEveryOptionOfTheHelp) {
+  const Folder folder;
+  std::string page = folder.run(llmt_program + " --man").out;
+  ASSERT_TRUE(page.starts_with(".TH LLMT 1"));
+  for (std::size_t at = page.find("\\-"); at != std::string::npos; at = page.find("\\-")) page.erase(at, 1);
+  for (const std::string command : {"fit", "predict", "inspect", "explain", "compare", "discover"}) {
+    const std::size_t begin = page.find(".SS llmt " + command);
+    ASSERT_NE(begin, std::string::npos) << command;
+    const std::string section = page.substr(begin, page.find("\n.S", begin + 1) - begin);
+    const std::set<std::string> names = options_in_help(folder.run(llmt_program + " " + command + " --help-all").out);
+    EXPECT_GT(names.size(), 3U);
+    for (const std::string& name : names) EXPECT_NE(section.find(name), std::string::npos) << command << " " << name;
+  }
+}
+
+TEST(Manual, TheShellCompletesCommandsAndOptions) {
+  const Folder folder;
+  if (folder.run("bash --version").exit_code != 0) GTEST_SKIP() << "there is no bash";
+  folder.write("llmt.bash", folder.run(llmt_program + " --bash-completion").out);
+  const auto completed = [&](const std::string& words, int position) {
+    folder.write("ask.bash", fmt::format("source llmt.bash\nCOMP_WORDS=({}) COMP_CWORD={}\n_llmt\n"
+                                         "echo \"${{COMPREPLY[*]}}\"\n",
+                                         words, position));
+    const Outcome outcome = folder.run("bash ask.bash");
+    EXPECT_EQ(outcome.err, "");
+    return outcome.out;
+  };
+  EXPECT_EQ(completed("llmt pre", 1), "predict\n");
+  EXPECT_EQ(completed("llmt fit --tar", 2), "--target\n");
+  EXPECT_EQ(completed("llmt predict --int", 2), "--interval\n");
+  EXPECT_EQ(completed("llmt fit d", 2), "\n");  // a file, which bash itself completes
+}
+
 TEST(Text, IsBrokenAtBlanks) {
   EXPECT_EQ(wrapped("one two three", no_width_limit), "one two three");
   EXPECT_EQ(wrapped("one two three", 7), "one two\nthree");
@@ -192,6 +238,28 @@ TEST(Text, ATableBreaksItsWidestWords) {
             "a short one                1.5\n"
             "one that is longer than     20\n"
             "all the others\n");
+}
+
+TEST(Text, ATableOfNumbersBreaksItsHeadersThenItself) {
+  Table table({"method", "RMSE held-out", "largest jump", "fit, s"});
+  table.add({"least squares", "0.2652", "0", "0.01"});
+  table.add({"tree", "0.09", "1.25", "12.5"});
+  EXPECT_EQ(table.text(40),
+            "method             RMSE  largest  fit,\n"
+            "               held-out     jump     s\n"
+            "least squares    0.2652        0  0.01\n"
+            "tree               0.09     1.25  12.5\n");
+  EXPECT_EQ(table.text(30),
+            "method             RMSE\n"
+            "               held-out\n"
+            "least squares    0.2652\n"
+            "tree               0.09\n"
+            "\n"
+            "method         largest  fit,\n"
+            "                  jump     s\n"
+            "least squares        0  0.01\n"
+            "tree              1.25  12.5\n");
+  EXPECT_LE(longest_line(table.text(40)), 40U);
 }
 
 TEST(ProgressLine, NamesTheTimeThatIsLeft) {

@@ -1,6 +1,9 @@
 /// \file
 /// Expressions of named numbers, as users write them into files. Robot descriptions, catalogues and files of terms all
 /// read them here.
+///
+///     llmt::Expression power("0.5 * rho * v^2", {{"rho", 1.2}});   // power.names() is {"v"}
+///     const double value = power.value(std::vector<double>{3.0});  // 5.4
 #pragma once
 
 #include <cstddef>

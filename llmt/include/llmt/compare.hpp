@@ -1,5 +1,8 @@
 /// \file
 /// Smooth against discontinuous trees, on the same folds.
+///
+///     const llmt::ComparisonResult compared = llmt::compare(inputs, outputs, llmt::usual_methods());
+///     const std::string best = compared.methods[compared.recommended].method;
 #pragma once
 
 #include <Eigen/Core>

@@ -1,5 +1,8 @@
 /// \file
 /// Tables of numbers from CSV text, with errors that name file, line and column.
+///
+///     const llmt::Csv table = llmt::Csv::read("heat_pump.csv");
+///     const Eigen::MatrixXd values = table.numbers_or_missing(std::vector<std::string>{"outdoor_C", "flow_C"});
 #pragma once
 
 #include <Eigen/Core>

@@ -1,5 +1,8 @@
 /// \file
 /// What a prediction is made of: exact shares of the inputs at one point, and their weight over a table.
+///
+///     const llmt::Attribution why = llmt::attribute(model, inputs.row(0).transpose());
+///     const double by_first_input = why.contributions(0, 0);  // rows sum to prediction - reference
 #pragma once
 
 #include <Eigen/Core>

@@ -1,5 +1,7 @@
 /// \file
 /// Reading and writing of whole files.
+///
+///     llmt::write_file("result.txt", llmt::read_file("notes.txt"));  // appears whole or not at all
 #pragma once
 
 #include <cstdint>

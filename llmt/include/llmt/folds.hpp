@@ -1,5 +1,9 @@
 /// \file
 /// Which rows are held out: for the choice of the leaf count, for calibration and for discovery.
+///
+///     for (const llmt::Fold& fold : llmt::make_folds(inputs.rows(), {.count = 5})) {
+///       const Eigen::MatrixXd train = inputs(fold.train, Eigen::all);
+///     }
 #pragma once
 
 #include <Eigen/Core>

@@ -1,5 +1,7 @@
 /// \file
 /// Which rows a fit held out, for whoever wants to see its held-out predictions one by one.
+///
+///     const std::vector<std::vector<Eigen::Index>> rows = llmt::held_out_rows(inputs, outputs);  // of each fold
 #pragma once
 
 #include <Eigen/Core>

@@ -1,5 +1,8 @@
 /// \file
 /// Prediction intervals from held-out residuals.
+///
+///     const llmt::Bounds bounds = result.intervals.predict(new_inputs, 0.9);
+///     const double lowest = bounds.lower(0, 0);  // of the first row; bounds.upper likewise
 #pragma once
 
 #include <Eigen/Core>

@@ -1,5 +1,8 @@
 /// \file
 /// All of LLMT but llmt::discovery: fit(), Model, Stream, compare(), explain, CSV.
+///
+///     const llmt::Model learnt = llmt::fit(inputs, outputs, {.validity = llmt::ValidityChoice::crisp}).model;
+///     for (const llmt::Leaf& leaf : learnt.leaves(0)) std::printf("%td rows\n", leaf.samples);
 #pragma once
 
 #include "llmt/compare.hpp"

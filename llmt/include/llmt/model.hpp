@@ -1,6 +1,10 @@
 /// \file
 /// The fitted model: a partition of the input space, an affine local model in every leaf, and validity functions that
 /// say how much each leaf counts at a point. docs/algorithms/model.md has the equations.
+///
+///     llmt::save(model.named({"outdoor_C", "flow_C"}, {"cop"}), "heat_pump.json");
+///     const llmt::Model again = llmt::load("heat_pump.json");
+///     const Eigen::MatrixXd predicted = again.predict(new_inputs);
 #pragma once
 
 #include <Eigen/Core>

@@ -1,5 +1,8 @@
 /// \file
 /// The names of choices, as model files, the command line and messages have them; and what a misspelt name means.
+///
+///     const llmt::ValidityChoice choice = llmt::parse<llmt::ValidityChoice>("crisp");
+///     const std::string_view name = llmt::name_of(choice);  // "crisp"
 #pragma once
 
 #include <span>

@@ -1,5 +1,10 @@
 /// \file
 /// What a caller may ask of fit(). Defaults that depend on the data: default_text().
+///
+///     llmt::FitOptions options;
+///     options.validity = llmt::ValidityChoice::crisp;
+///     options.max_leaves = 8;
+///     options.folds.kind = llmt::FoldKind::contiguous;
 #pragma once
 
 #include <Eigen/Core>

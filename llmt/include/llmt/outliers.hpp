@@ -1,5 +1,7 @@
 /// \file
 /// Outputs that lie far from all others.
+///
+///     const llmt::HeavyRows heavy = llmt::heavy_rows(outputs.col(0));  // heavy.rows carry most of the squares
 #pragma once
 
 #include <Eigen/Core>

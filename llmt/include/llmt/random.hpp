@@ -4,6 +4,9 @@
 /// The C++ standard fixes the engines but not the distributions, so the same seed gives different data with the
 /// standard library of another vendor. Here both are fixed: the engine xoshiro256** (Blackman & Vigna 2018), seeded by
 /// splitmix64, and the distributions below.
+///
+///     llmt::Random random(1);
+///     const double noise = 0.1 * random.normal();
 #pragma once
 
 #include <Eigen/Core>

@@ -1,5 +1,8 @@
 /// \file
 /// The smallest crisp tree with short equations that predicts nearly as well as the best crisp tree.
+///
+///     const llmt::ReadableResult readable = llmt::fit_readable(inputs, outputs, {}, result.summary);
+///     const double error = readable.partitions[0].rmse;  // held-out
 #pragma once
 
 #include <Eigen/Core>

@@ -1,5 +1,7 @@
 /// \file
 /// How long a model is, written down as an expression.
+///
+///     const Eigen::Index length = llmt::expression_size(model);
 #pragma once
 
 #include <Eigen/Core>

@@ -1,5 +1,9 @@
 /// \file
 /// Local linear model trees from a stream of rows, in memory that does not depend on the number of rows.
+///
+///     llmt::Stream stream(inputs.cols(), outputs.cols());
+///     stream.add(inputs, outputs);  // as often as rows come
+///     const Eigen::MatrixXd predicted = stream.snapshot().predict(new_inputs);
 #pragma once
 
 #include <Eigen/Core>

@@ -1,5 +1,9 @@
 /// \file
 /// What fit() reports of its work.
+///
+///     for (const llmt::PartitionSummary& partition : result.summary.partitions) {
+///       std::printf("%td leaves, held-out RMSE %g\n", partition.leaves, partition.chosen.rmse);
+///     }
 #pragma once
 
 #include <Eigen/Core>

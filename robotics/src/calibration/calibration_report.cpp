@@ -7,6 +7,7 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "calibration/likely_units.hpp"
 #include "calibration/paired_gain.hpp"
 
 namespace llmt::robotics {
@@ -176,6 +177,10 @@ std::vector<std::string> suspicions(const Robot& robot, const Measurements& meas
         fmt::format("the described robot misses the measured points by {:.4g} mm on average, whatever its base and "
                     "tool: check units, signs and zeros of the joints, their order, and the description",
                     nominal));
+  }
+  if (nominal > implausible_mm) {
+    const std::string units = likely_units(robot, measurements, nominal, implausible_mm);
+    if (!units.empty()) found.push_back(units);
   }
   return found;
 }

@@ -123,8 +123,10 @@ Eigen::MatrixXd Header::joints() const {
     const std::string name = fmt::format("q{}", j + 1);
     const auto& units = joints[j].type == JointType::revolute ? angles_in_rad : lengths_in_mm;
     if (!quantities_.contains(name)) {
-      refuse(fmt::format("robot \"{}\" has {} joints, there is no column {} for {}; columns: {}", robot_.chain.name,
-                         joints.size(), spellings(name, units), joints[j].name, fmt::join(csv_.columns(), ", ")));
+      const bool is_named = csv_.columns().front().find_first_not_of("0123456789.,+-eE") != std::string::npos;
+      refuse(fmt::format("robot \"{}\" has {} joints, there is no column {} for {}; columns: {}{}", robot_.chain.name,
+                         joints.size(), spellings(name, units), joints[j].name, fmt::join(csv_.columns(), ", "),
+                         is_named ? "" : "; the first line must hold the names of the columns"));
     }
     factors(j) = factor(name, units);
     columns.push_back(quantities_.at(name).column);
@@ -239,17 +241,18 @@ Measurements from_csv(const Csv& csv, const Robot& robot, const std::vector<std:
 
 }  // namespace
 
-Measurements read_measurements(const std::string& path, const Robot& robot, const std::vector<std::string>& also) {
-  return from_csv(Csv::read(path), robot, also);
+Measurements read_measurements(const std::string& path, const Robot& robot, const std::vector<std::string>& also,
+                               DecimalMark mark) {
+  return from_csv(Csv::read(path, mark), robot, also);
 }
 
 Measurements parse_measurements(std::string text, const std::string& name, const Robot& robot,
-                                const std::vector<std::string>& also) {
-  return from_csv(Csv::parse(std::move(text), name), robot, also);
+                                const std::vector<std::string>& also, DecimalMark mark) {
+  return from_csv(Csv::parse(std::move(text), name, mark), robot, also);
 }
 
-Poses read_poses(const std::string& path, const Robot& robot) {
-  const Csv csv = Csv::read(path);
+Poses read_poses(const std::string& path, const Robot& robot, DecimalMark mark) {
+  const Csv csv = Csv::read(path, mark);
   const Header header(csv, robot, {});
   Poses poses{.joints = header.joints(), .covariates = header.covariates()};
   if (poses.count() == 0) throw std::runtime_error(fmt::format("{}: there are no poses", csv.name()));

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <numbers>
 
 #include "llmt/files.hpp"
 #include "llmt/robotics/robot_file.hpp"
@@ -89,6 +90,48 @@ TEST(CalibrationReport, DescriptionOfAnotherRobotIsSaidNotToBelong) {
     EXPECT_NE(wrong.back().find(folds > 0 ? "held-out points" : "measured points"), std::string::npos) << wrong.back();
     EXPECT_TRUE(suspicions_of(own).empty());
   }
+}
+
+TEST(CalibrationReport, SoFewPosesThatAnyValuesFitAreSaid) {
+  const Robot truth = perturbed(ur_like(), 0.5, 0.05, 19);
+  const auto suspicions_of = [&](Eigen::Index poses) {
+    const Measurements seen = measure(truth, random_poses(truth.chain, poses, 20), 0.05, 21);
+    return suspicions(ur_like(), seen, report_calibration(ur_like(), seen));
+  };
+  const std::vector<std::string> few = suspicions_of(11);
+  ASSERT_EQ(few.size(), 1U);
+  EXPECT_NE(few[0].find(" parameters were identified from 33 measured coordinates: so few poses"), std::string::npos)
+      << few[0];
+  EXPECT_TRUE(suspicions_of(40).empty());
+}
+
+TEST(CalibrationReport, ACalibrationWithoutGainOnUnseenPosesIsSaid) {
+  const Robot truth = perturbed(ur_like(), 0.0, 0.0, 22);  // the description is right, there is nothing to gain
+  const Measurements seen = measure(truth, random_poses(truth.chain, 40, 23), 0.05, 24);
+  const CalibrationReport report = report_calibration(ur_like(), seen);
+  ASSERT_GE(report.geometric.held_out_mm.mean(), report.nominal.held_out_mm.mean());
+  EXPECT_EQ(suspicions(ur_like(), seen, report),
+            std::vector<std::string>{"on poses left out the calibrated robot is no better than the described one"});
+}
+
+TEST(CalibrationReport, UnitsThatWouldFitAreNamed) {
+  const Robot truth = perturbed(ur_like(), 0.5, 0.05, 25);
+  const Measurements right = measure(truth, random_poses(truth.chain, 60, 26), 0.05, 27);
+  const auto said_of = [&](double of_angles, double of_positions) {
+    Measurements wrong = right;
+    wrong.poses.joints *= of_angles;
+    wrong.positions_mm *= of_positions;
+    const std::vector<std::string> found =
+        suspicions(ur_like(), wrong, report_calibration(ur_like(), wrong, {.folds = 0}));
+    return found.empty() ? std::string() : found.back();
+  };
+  constexpr double degree = std::numbers::pi / 180.0;
+  EXPECT_EQ(said_of(1.0, 1.0), "");
+  EXPECT_EQ(said_of(degree, 1.0).find("if the angles of the file were radians, not degrees"), 0U);
+  EXPECT_EQ(said_of(1.0 / degree, 1.0).find("if the angles of the file were degrees, not radians"), 0U);
+  EXPECT_EQ(said_of(1.0, 1e-3).find("if the measured positions were a thousand times as large"), 0U);
+  EXPECT_EQ(said_of(1.0, 1e3).find("if the measured positions were a thousandth as large"), 0U);
+  EXPECT_EQ(said_of(1.0, 1.5).find("if "), std::string::npos);  // no unit
 }
 
 TEST(Correction, IsTheSameSeenFromAnotherBase) {

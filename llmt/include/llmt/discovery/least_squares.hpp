@@ -1,5 +1,11 @@
 /// \file
 /// Nonlinear least squares with named parameters, the engine of every calibration.
+///
+///     llmt::discovery::LeastSquaresProblem line;
+///     line.parameters = {{.name = "slope", .unit = "1"}};
+///     line.residual = [&](const Eigen::VectorXd& p) -> Eigen::VectorXd { return p(0) * t - y; };
+///     line.jacobian = [&](const Eigen::VectorXd&) -> Eigen::MatrixXd { return t; };
+///     const double slope = llmt::discovery::solve(line).parameter("slope").value;
 #pragma once
 
 #include <Eigen/Core>

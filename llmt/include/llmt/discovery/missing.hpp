@@ -1,5 +1,9 @@
 /// \file
 /// A simulation, its measurements, and what was found missing from it.
+///
+///     llmt::discovery::Simulation spring;  // of a stiffness that is only roughly known
+///     spring.parameters = {{.name = "k", .unit = "N/mm", .value = 2.0, .scale = 0.1}};
+///     spring.predict = [](const Eigen::MatrixXd& x, const Eigen::VectorXd& k) -> Eigen::MatrixXd { return k(0) * x; };
 #pragma once
 
 #include <Eigen/Core>

@@ -1,5 +1,7 @@
 /// \file
 /// A term that a simulation may lack, and the inputs that it is a function of.
+///
+///     llmt::discovery::Inputs named{{"x", "v"}, inputs};  // a column each
 #pragma once
 
 #include <Eigen/Core>

@@ -1,5 +1,7 @@
 /// \file
 /// A least-squares problem with named parameters, and the outcome of its solution.
+///
+///     const llmt::discovery::Parameter length{.name = "joint2.a", .unit = "mm", .value = 425.0, .prior_sigma = 5.0};
 #pragma once
 
 #include <Eigen/Core>

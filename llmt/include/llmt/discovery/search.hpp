@@ -1,6 +1,10 @@
 /// \file
 /// Which effect is missing from a simulation: residuals, the baseline's Jacobian and the signatures of candidate
 /// effects go in, a verdict comes out. Nothing here knows what the simulation is of.
+///
+///     const llmt::discovery::Evidence evidence{.residuals = residuals, .jacobian = jacobian, .components = 3};
+///     const llmt::discovery::EffectCandidate heat{.family = "heat", .location = "link1", .signature = signature};
+///     const llmt::discovery::Verdict verdict = llmt::discovery::search(evidence, {heat});
 #pragma once
 
 #include <string>

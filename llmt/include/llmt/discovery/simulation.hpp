@@ -1,5 +1,10 @@
 /// \file
 /// Which terms a simulation lacks: any function of named inputs and parameters, measured outputs, and terms to try.
+///
+///     const std::vector<llmt::discovery::ModelTerm> terms = llmt::discovery::standard_terms(named);
+///     const llmt::discovery::MeasuredOutputs force{{"force"}, outputs};
+///     const llmt::discovery::Missing missing = llmt::discovery::find_missing(spring, named, force, terms);
+///     for (const llmt::discovery::FoundTerm& found : missing.found) std::puts(found.formula.c_str());
 #pragma once
 
 #include <Eigen/Core>

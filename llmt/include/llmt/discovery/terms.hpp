@@ -1,5 +1,10 @@
 /// \file
 /// Terms that a simulation may lack, as functions of its named inputs.
+///
+///     std::vector<llmt::discovery::ModelTerm> terms = llmt::discovery::standard_terms(named);
+///     terms.push_back(llmt::discovery::own_term("drag", "v |v|", [](const Eigen::VectorXd& row) {
+///       return row(1) * std::abs(row(1));
+///     }));
 #pragma once
 
 #include <Eigen/Core>

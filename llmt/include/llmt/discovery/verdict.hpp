@@ -1,5 +1,9 @@
 /// \file
 /// What a search for missing effects is given, and what it answers.
+///
+///     for (const llmt::discovery::Finding& finding : verdict.findings) {
+///       std::printf("%s%s\n", finding.confirmed ? "" : "perhaps ", finding.family.c_str());
+///     }
 #pragma once
 
 #include <Eigen/Core>

@@ -1,5 +1,8 @@
 /// \file
 /// Identification of a robot's parameters from measured positions.
+///
+///     const Calibration calibration = calibrate(robot, measured);
+///     save(calibration.robot, "calibrated.yaml");
 #pragma once
 
 #include <Eigen/Core>

@@ -1,5 +1,8 @@
 /// \file
 /// What a calibration may change, and what is known of it beforehand.
+///
+///     CalibrationOptions options;
+///     options.fixed = {"joint2.a", "tool"};
 #pragma once
 
 #include <string>

@@ -1,5 +1,8 @@
 /// \file
 /// Plausible sizes of physical effects, and the user's own effects, read from YAML.
+///
+///     DiscoveryOptions options;
+///     options.catalogue = read_catalogue("effects.yaml");
 #pragma once
 
 #include <string>

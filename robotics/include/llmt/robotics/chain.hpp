@@ -1,5 +1,10 @@
 /// \file
 /// What a serial arm is: joints by Denavit-Hartenberg parameters between a base and a tool frame.
+///
+///     Chain arm;
+///     arm.joints.resize(2);
+///     arm.joints[0].a_mm = 300.0;
+///     arm.joints[1].a_mm = 200.0;
 #pragma once
 
 #include <Eigen/Core>

@@ -1,5 +1,8 @@
 /// \file
 /// What calibration leaves over, learnt as a function of the joint values.
+///
+///     const CorrectedRobot corrected{robot, fit_correction(robot, measured).model};
+///     const Eigen::MatrixXd tool_mm = positions(corrected, measured.poses);
 #pragma once
 
 #include <Eigen/Core>

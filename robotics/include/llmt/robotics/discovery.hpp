@@ -1,5 +1,10 @@
 /// \file
 /// Which physical effect a robot model lacks: find the gap to the measurements, name it, add it, verify.
+///
+///     const Robot robot = read_robot("arm.yaml");
+///     const Discovery found = discover(robot, read_measurements("measured.csv", robot));
+///     for (const FoundEffect& effect : found.effects) std::puts(effect.title.c_str());
+///     save(found.improved.robot, "improved.yaml");
 #pragma once
 
 #include <optional>

@@ -1,5 +1,9 @@
 /// \file
 /// What a discovery looks for, and how.
+///
+///     DiscoveryOptions options;
+///     options.held_out_share = 0.3;
+///     options.progress = [](const std::string& stage) { std::puts(stage.c_str()); };
 #pragma once
 
 #include <cstdint>

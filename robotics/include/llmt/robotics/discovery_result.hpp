@@ -1,5 +1,9 @@
 /// \file
 /// What a discovery found.
+///
+///     const Discovery found = discover(robot, measured);
+///     const bool is_named = found.answer == llmt::discovery::Answer::named;
+///     const double gain_mm = found.held_out.before.mean - found.held_out.after.mean;
 #pragma once
 
 #include <optional>

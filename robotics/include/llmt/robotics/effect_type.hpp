@@ -1,5 +1,8 @@
 /// \file
 /// What an effect and a kind of effect consist of.
+///
+///     const EffectType& type = effect_type("joint_compliance");
+///     const std::string unit = type.parameters[0].unit;  // "rad/(N m)"
 #pragma once
 
 #include <Eigen/Core>

@@ -1,5 +1,7 @@
 /// \file
 /// Physical effects that rigid geometry leaves out, each one an entry of a catalogue.
+///
+///     robot.effects.push_back(make_effect(effect_type("joint_compliance"), robot.chain, 1));  // of the second joint
 #pragma once
 
 #include <string>

@@ -1,5 +1,7 @@
 /// \file
 /// Forward kinematics of a chain as a product of elementary transforms, and all first derivatives.
+///
+///     const Eigen::Vector3d tool_mm = forward(robot.chain, Eigen::VectorXd::Zero(6)).position_mm;
 #pragma once
 
 #include <Eigen/Core>

@@ -1,5 +1,8 @@
 /// \file
 /// Measured poses of a robot, and the CSV files that hold them.
+///
+///     const Measurements measured = read_measurements("measured.csv", robot);
+///     const Eigen::VectorXd errors_mm = distances(positions(robot, measured.poses), measured);
 #pragma once
 
 #include <Eigen/Core>
@@ -9,6 +12,7 @@
 #include <vector>
 
 #include "llmt/abi.hpp"
+#include "llmt/csv.hpp"
 #include "llmt/robotics/robot.hpp"
 
 namespace llmt::robotics {
@@ -57,15 +61,16 @@ Eigen::VectorXd distances(const Eigen::MatrixXd& model_mm, const Measurements& m
 /// robot's effects, are covariates too. With order or time_s, add_moves() is called.
 /// A joint, position or angle column without a unit is an error that says so. Rows whose measured coordinates are all
 /// exactly zero are missing points written as zeros: left out, with a warning naming the lines. Other columns are
-/// listed, not used. Throws std::runtime_error starting with `path` or `path:line`.
-Measurements read_measurements(const std::string& path, const Robot& robot, const std::vector<std::string>& also = {});
+/// listed, not used. `mark`: of the numbers. Throws std::runtime_error starting with `path` or `path:line`.
+Measurements read_measurements(const std::string& path, const Robot& robot, const std::vector<std::string>& also = {},
+                               DecimalMark mark = DecimalMark::point);
 
 /// As read_measurements(), from memory; `name` stands for the path in messages.
 Measurements parse_measurements(std::string text, const std::string& name, const Robot& robot,
-                                const std::vector<std::string>& also = {});
+                                const std::vector<std::string>& also = {}, DecimalMark mark = DecimalMark::point);
 
 /// The joint values and covariates of such a file, which may have no measured positions.
-Poses read_poses(const std::string& path, const Robot& robot);
+Poses read_poses(const std::string& path, const Robot& robot, DecimalMark mark = DecimalMark::point);
 
 /// Adds how far each joint moved to reach a pose: columns move1_rad (_mm if prismatic), ..., differences of joint
 /// values to the row before in the sequence of the column order, or else time_s; 0 in the first row. Nothing without

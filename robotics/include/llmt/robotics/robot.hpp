@@ -1,5 +1,7 @@
 /// \file
 /// A robot model: a chain with its effects, evaluated over many poses.
+///
+///     const Eigen::MatrixXd tool_mm = positions(robot, measured.poses);  // effects included
 #pragma once
 
 #include <Eigen/Core>

@@ -1,5 +1,8 @@
 /// \file
 /// Robot descriptions in YAML.
+///
+///     Robot robot = read_robot("arm.yaml");
+///     save(robot, "copy.yaml");
 #pragma once
 
 #include <string>

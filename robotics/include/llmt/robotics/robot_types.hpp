@@ -1,5 +1,9 @@
 /// \file
 /// What a robot model consists of, and the poses that it is evaluated at.
+///
+///     Poses poses;
+///     poses.joints = Eigen::MatrixXd::Zero(10, 6);  // rad
+///     poses.covariates["payload_kg"] = Eigen::VectorXd::Constant(10, 2.0);
 #pragma once
 
 #include <Eigen/Core>

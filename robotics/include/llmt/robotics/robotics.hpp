@@ -1,5 +1,9 @@
 /// \file
 /// Umbrella header of llmt::robotics.
+///
+///     const Robot arm = read_robot("arm.yaml");
+///     const Measurements seen = read_measurements("measured.csv", arm);
+///     const CalibrationReport report = report_calibration(arm, seen);
 #pragma once
 
 #include "llmt/abi.hpp"

@@ -1,5 +1,7 @@
 /// \file
 /// Simulated measurements.
+///
+///     const Measurements made = simulate(robot, {.poses = 200, .noise_um = 20.0});
 #pragma once
 
 #include <cstdint>

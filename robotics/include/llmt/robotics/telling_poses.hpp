@@ -1,5 +1,8 @@
 /// \file
 /// Which poses to measure next, so that an ambiguous answer becomes a unique one.
+///
+///     const Telling telling = telling_poses(robot, 0, rival, measured.poses, 0.03);
+///     for (const TellingPose& pose : telling.poses) std::printf("%g mm\n", pose.disagreement_mm);
 #pragma once
 
 #include <Eigen/Core>

@@ -1,0 +1,101 @@
+// What the program llmt-robot says of files that are not as they should be.
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <vector>
+
+#include "apps/program.hpp"
+#include "llmt/csv.hpp"
+
+namespace {
+
+using program::Folder;
+using program::Outcome;
+
+const std::string robot_program = LLMT_ROBOT_PROGRAM;
+const std::string arm = LLMT_ROOT "/docs/samples/arm.yaml";
+const std::string measured = LLMT_ROOT "/docs/samples/arm_measured.csv";
+
+// The sample with some columns named and multiplied otherwise.
+std::string sample(double of_angles, const std::string& angle_unit, double of_positions, const std::string& unit) {
+  const llmt::Csv csv = llmt::Csv::read(measured);
+  std::vector<std::string> names;
+  Eigen::MatrixXd values = csv.numbers(csv.columns());
+  for (std::size_t c = 0; c < csv.columns().size(); ++c) {
+    const bool is_angle = csv.columns()[c].starts_with("q");
+    names.push_back(csv.columns()[c].substr(0, csv.columns()[c].find('_') + 1) + (is_angle ? angle_unit : unit));
+    values.col(static_cast<Eigen::Index>(c)) *= is_angle ? of_angles : of_positions;
+  }
+  std::string text = fmt::format("{}\n", fmt::join(names, ","));
+  for (Eigen::Index row = 0; row < values.rows(); ++row) {
+    for (Eigen::Index c = 0; c < values.cols(); ++c) text += fmt::format("{}{}", c == 0 ? "" : ",", values(row, c));
+    text += '\n';
+  }
+  return text;
+}
+
+TEST(RobotWords, DecimalCommasAreReadWhereAsked) {
+  const Folder folder;
+  std::string text = llmt::read_file(measured);
+  std::ranges::replace(text, ',', ';');
+  std::ranges::replace(text, '.', ',');
+  folder.write("d.csv", text);
+  for (const std::string command : {"calibrate", "discover"}) {
+    const Outcome refused = folder.run(fmt::format("{} {} {} d.csv", robot_program, command, arm));
+    EXPECT_EQ(refused.exit_code, 1);
+    EXPECT_NE(refused.err.find("; --decimal-comma reads such files"), std::string::npos) << refused.err;
+    const std::string json = fmt::format("{} {} {} ", robot_program, command, arm);
+    const Outcome with_points = folder.run("cp " + measured + " p.csv; " + json + "p.csv --json | grep -v p.csv");
+    const Outcome with_commas = folder.run(json + "d.csv --decimal-comma --json | grep -v d.csv");
+    EXPECT_EQ(with_commas.exit_code, 0) << with_commas.err;
+    EXPECT_EQ(with_commas.out, with_points.out);
+  }
+}
+
+TEST(RobotWords, DescriptionAndMeasurementsThatWereExchangedAreNamed) {
+  const Folder folder;
+  folder.write("r.yaml", llmt::read_file(arm));
+  folder.write("d.csv", llmt::read_file(measured));
+  for (const std::string command : {"calibrate", "discover"}) {
+    const Outcome outcome = folder.run(fmt::format("{} {} d.csv r.yaml", robot_program, command));
+    EXPECT_EQ(outcome.exit_code, 2);
+    EXPECT_EQ(outcome.err,
+              "llmt-robot: d.csv and r.yaml seem to be exchanged: the description (YAML) comes first, then the "
+              "measurements (CSV)\n");
+  }
+}
+
+TEST(RobotWords, UnitsThatWouldFitAreNamed) {
+  const Folder folder;
+  const auto said = [&](const std::string& command, const std::string& table) {
+    folder.write("d.csv", table);
+    const Outcome outcome = folder.run(fmt::format("{} {} {} d.csv", robot_program, command, arm));
+    return outcome.out + outcome.err;
+  };
+  for (const std::string command : {"calibrate", "discover"}) {
+    const auto expect = [&](const std::string& table, const std::string& words) {
+      const std::string text = said(command, table);
+      EXPECT_NE(text.find("WARNING: " + words), std::string::npos) << command << ": " << words << "\n" << text;
+    };
+    expect(sample(1.0, "deg", 1.0, "mm"), "if the angles of the file were radians, not degrees");
+    expect(sample(57.29577951308232, "rad", 1.0, "mm"), "if the angles of the file were degrees, not radians");
+    expect(sample(1.0, "rad", 0.001, "mm"), "if the measured positions were a thousand times as large");
+    expect(sample(1.0, "rad", 1.0, "m"), "if the measured positions were a thousandth as large");
+    EXPECT_EQ(said(command, sample(1.0, "rad", 0.001, "m")).find("WARNING"), std::string::npos) << command;
+  }
+}
+
+// The points of another arm: discover() would take the difference for effects.
+TEST(RobotWords, DiscoverWarnsOfMeasurementsThatTheDescriptionCannotMean) {
+  const Folder folder;
+  const std::string other = LLMT_ROBOTS "/ur5.yaml";
+  ASSERT_EQ(folder.run(fmt::format("{} simulate {} --poses 60 -o d.csv", robot_program, other)).exit_code, 0);
+  const Outcome outcome = folder.run(fmt::format("{} discover {} d.csv", robot_program, arm));
+  EXPECT_NE(outcome.err.find("this description does not belong to these measurements"), std::string::npos)
+      << outcome.err;
+  const Outcome own = folder.run(fmt::format("{} discover {} {}", robot_program, arm, measured));
+  EXPECT_EQ(own.err, "");
+}
+
+}  // namespace
