@@ -13,6 +13,7 @@
 #include "discovery/gap_map.hpp"
 #include "discovery/investigation.hpp"
 #include "discovery/noise_tests.hpp"
+#include "discovery/overtones.hpp"
 #include "discovery/pose_split.hpp"
 #include "discovery/refined_constants.hpp"
 #include "discovery/rest_correction.hpp"
@@ -214,6 +215,7 @@ Discovery discover_in(const Robot& robot, const PoseSplit& split, const Discover
   for (const std::size_t sample : verdict.outliers) {
     for (const Eigen::Index row : split.rows[sample]) result.outliers.push_back(row);
   }
+  if (is_named(result.answer)) doubt_waves(investigation, result);
   refuse_all_clear(investigation, options, result);
   describe_rest(investigation, options, result);
   add_doubts(plain.robot, investigation, unmapped(robot, split.test).measurements, result);

@@ -32,14 +32,12 @@ void doubt_payload(const Robot& described, const Measurements& measurements, Dis
                                      weight > 0.0 ? fmt::format(", and the links weigh {:.4g} kg", weight) : ""));
 }
 
-Eigen::VectorXd stacked(const Eigen::MatrixXd& points) { return points.transpose().reshaped(); }
-
 // Sum of squares that geometry, and a compliance of each joint under its weight, leave of the errors.
 double left_by_compliance(Robot robot, const Calibration& baseline, const Measurements& measurements,
                           const Eigen::Vector3d& gravity) {
   const std::vector<Eigen::Index> rows = measured_rows(measurements);
   const Eigen::VectorXd errors =
-      stacked(measurements.positions_mm - positions(baseline.robot, measurements.poses))(rows);
+      stacked(measurements.positions_mm - positions(baseline.robot, measurements.poses), rows);
   std::vector<Eigen::Index> free;
   for (std::size_t k = 0; k < baseline.robot.identified.size(); ++k) {
     if (baseline.robot.identified[k].state == "free") free.push_back(static_cast<Eigen::Index>(k));

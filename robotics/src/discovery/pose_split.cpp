@@ -112,4 +112,10 @@ Measurements without_rows(const Measurements& measurements, const std::vector<st
   return select(measurements, rows);
 }
 
+Eigen::VectorXd stacked(const Eigen::MatrixXd& points, const std::vector<Eigen::Index>& coordinates) {
+  const Eigen::MatrixXd by_pose = points.transpose();
+  const Eigen::VectorXd all = by_pose.reshaped();
+  return all(coordinates);
+}
+
 }  // namespace llmt::robotics

@@ -32,4 +32,7 @@ std::vector<Eigen::Index> repeats_of(const Poses& poses);
 /// The measurements without the rows of the given numbers.
 Measurements without_rows(const Measurements& measurements, const std::vector<std::size_t>& left_out);
 
+/// The coordinates of the points, pose by pose, of which the given ones are taken.
+Eigen::VectorXd stacked(const Eigen::MatrixXd& points, const std::vector<Eigen::Index>& coordinates);
+
 }  // namespace llmt::robotics

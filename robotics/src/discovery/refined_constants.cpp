@@ -18,12 +18,6 @@ bool is_open(const Hypothesis& one) {
   return effect.constants[0] != std::round(effect.constants[0]);
 }
 
-Eigen::VectorXd stacked(const Eigen::MatrixXd& points, const std::vector<Eigen::Index>& rows) {
-  const Eigen::MatrixXd by_pose = points.transpose();
-  const Eigen::VectorXd all = by_pose.reshaped();
-  return all(rows);
-}
-
 // The fit at its end: derivatives by the free parameters and by the open constants.
 struct Augmented {
   std::vector<Eigen::Index> free;  // parameters
