@@ -20,5 +20,7 @@ void add_paper(CLI::App& app);
 void add_simulate(CLI::App& app);
 void add_calibrate(CLI::App& app);
 void add_discover(CLI::App& app);
+void add_predict(CLI::App& app);
+void add_compensate(CLI::App& app);
 
 }  // namespace llmt::apps

@@ -23,5 +23,7 @@ int main(int argc, char** argv) {
   llmt::apps::add_simulate(app);
   llmt::apps::add_calibrate(app);
   llmt::apps::add_discover(app);
+  llmt::apps::add_predict(app);
+  llmt::apps::add_compensate(app);
   return llmt::apps::run(app, argc, argv);
 }

@@ -105,6 +105,13 @@ Eigen::MatrixXd positions(const CorrectedRobot& robot, const Poses& poses) {
   return points;
 }
 
+std::vector<Pose> tool_poses(const CorrectedRobot& robot, const Poses& poses) {
+  std::vector<Pose> result = tool_poses(robot.robot, poses);
+  const Eigen::MatrixXd points = positions(robot, poses);
+  for (std::size_t i = 0; i < result.size(); ++i) result[i].position_mm = points.row(i).transpose();
+  return result;
+}
+
 CorrectedRobot read_corrected_robot(const std::string& path) {
   CorrectedRobot robot{.robot = read_robot(path), .correction = {}};
   if (robot.robot.correction_file.empty()) return robot;

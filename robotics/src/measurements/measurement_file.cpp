@@ -2,6 +2,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <map>
 #include <optional>
@@ -34,6 +35,9 @@ class Header {
     for (const std::string& column : csv.columns()) take(column);
   }
 
+  bool has(const std::string& quantity) const { return quantities_.contains(quantity); }
+  bool has_joints() const;
+  bool in_degrees(const std::string& quantity) const { return quantities_.at(quantity).unit == "deg"; }
   Eigen::MatrixXd joints() const;
   void positions(Measurements& measurements) const;
   Orientation orientation() const;
@@ -113,6 +117,12 @@ double Header::factor(const std::string& name, const std::map<std::string, doubl
                        spellings(name, units)));
   }
   return found->second;
+}
+
+bool Header::has_joints() const {
+  return std::ranges::any_of(quantities_, [](const auto& entry) {
+    return entry.first[0] == 'q' && std::isdigit(static_cast<unsigned char>(entry.first[1])) != 0;
+  });
 }
 
 Eigen::MatrixXd Header::joints() const {
@@ -258,6 +268,38 @@ Poses read_poses(const std::string& path, const Robot& robot, DecimalMark mark) 
   if (poses.count() == 0) throw std::runtime_error(fmt::format("{}: there are no poses", csv.name()));
   add_moves(poses, robot.chain);
   return poses;
+}
+
+TargetTable read_targets(const std::string& path, const Robot& robot) {
+  const Csv csv = Csv::read(path);
+  const Header header(csv, robot, {});
+  TargetTable targets;
+  for (Eigen::Index row = 0; row < csv.rows(); ++row) targets.lines.push_back(csv.line_of(row));
+  if (targets.lines.empty()) throw std::runtime_error(fmt::format("{}: there are no targets", csv.name()));
+  if (header.has_joints()) {
+    targets.joints = header.joints();
+    targets.joints_in_degrees = header.in_degrees("q1");
+  }
+  if (header.has("x") || header.has("y") || header.has("z")) {
+    for (const char* axis : {"x", "y", "z"}) {
+      if (!header.has(axis)) {
+        throw std::runtime_error(
+            fmt::format("{}:1: a target needs x, y and z, there is no column {}_mm", csv.name(), axis));
+      }
+    }
+    Measurements measured;
+    header.positions(measured);
+    targets.positions_mm = measured.positions_mm;
+  }
+  if (targets.joints.size() == 0 && targets.positions_mm.size() == 0) {
+    throw std::runtime_error(
+        fmt::format("{}:1: neither joints (q1_deg, ...) nor positions (x_mm, y_mm, z_mm); columns: {}", csv.name(),
+                    fmt::join(csv.columns(), ", ")));
+  }
+  targets.orientation = header.orientation();
+  targets.covariates = header.covariates();
+  targets.unused_columns = header.unused();
+  return targets;
 }
 
 std::string to_csv(const Measurements& measurements, const Robot& robot) {

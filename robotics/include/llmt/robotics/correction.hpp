@@ -8,6 +8,7 @@
 #include <Eigen/Core>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "llmt/abi.hpp"
 #include "llmt/fit.hpp"
@@ -39,6 +40,9 @@ FitResult fit_correction(const Robot& robot, const Measurements& measurements, c
 /// joints in their order, named q1_rad, q2_rad, ... (_mm if prismatic), or an output is none of the three or there
 /// twice.
 Eigen::MatrixXd positions(const CorrectedRobot& robot, const Poses& poses);
+
+/// Tool poses: the positions() above, and the orientations of the robot, which the correction leaves alone.
+std::vector<Pose> tool_poses(const CorrectedRobot& robot, const Poses& poses);
 
 /// Reads the robot and, if it names one, its correction model; a relative path is relative to the robot file. Throws
 /// std::runtime_error, whose message shows nothing of a file that is no model.
