@@ -25,6 +25,7 @@ using robotics::Outcome;
 
 struct CompensateArguments {
   std::string robot;
+  robotics::UrdfLinks links;
   std::string targets;
   std::string nominal;
   std::string output;
@@ -35,6 +36,11 @@ struct CompensateArguments {
   double tolerance_um = 0.001;
 };
 
+// The links are those of whichever file is a URDF.
+robotics::UrdfLinks nominal_links(const CompensateArguments& arguments) {
+  return robotics::is_urdf(arguments.nominal) ? arguments.links : robotics::UrdfLinks{};
+}
+
 // What the nominal description says of the asked-for joints, as the robot stands and with the tool that it carries.
 void take_nominal_poses(const CompensateArguments& arguments, const CorrectedRobot& robot, robotics::Targets& targets) {
   if (arguments.nominal.empty()) {
@@ -42,7 +48,7 @@ void take_nominal_poses(const CompensateArguments& arguments, const CorrectedRob
         fmt::format("{}: there are joints and no positions; --nominal ROBOT says where they are to bring the tool",
                     arguments.targets));
   }
-  robotics::Chain nominal = robotics::read_robot(arguments.nominal).chain;
+  robotics::Chain nominal = robotics::read_robot(arguments.nominal, nominal_links(arguments)).chain;
   if (nominal.joints.size() != robot.robot.chain.joints.size()) {
     throw std::invalid_argument(fmt::format("--nominal: {} has {} joints, {} has {}", arguments.nominal,
                                             nominal.joints.size(), arguments.robot, robot.robot.chain.joints.size()));
@@ -177,7 +183,8 @@ void name_made_up(const robotics::TargetTable& table, const Compensation& found)
 }
 
 void compensate_command(const CompensateArguments& arguments) {
-  const CorrectedRobot robot = robotics::read_corrected_robot(arguments.robot);
+  const CorrectedRobot robot = robotics::read_corrected_robot(
+      arguments.robot, robotics::is_urdf(arguments.robot) ? arguments.links : robotics::UrdfLinks{});
   const robotics::TargetTable table = robotics::read_targets(arguments.targets, robot.robot);
   const robotics::Targets targets = asked(arguments, robot, table);
   check_positions(arguments.robot, robot.robot,
@@ -220,6 +227,7 @@ void add_compensate(CLI::App& app) {
   const auto arguments = std::make_shared<CompensateArguments>();
   add_input_file(*command, "robot", arguments->robot, "Robot description (YAML), as calibrate or discover wrote it")
       ->required();
+  add_urdf_links(*command, arguments->links);
   add_input_file(*command, "targets", arguments->targets, "CSV file of targets, with the covariates of the effects")
       ->required();
   add_input_file(*command, "--nominal", arguments->nominal,

@@ -16,12 +16,13 @@ namespace {
 
 struct PredictArguments {
   std::string robot;
+  robotics::UrdfLinks links;
   std::string poses;
   std::string output;
 };
 
 void predict_command(const PredictArguments& arguments) {
-  const robotics::CorrectedRobot robot = robotics::read_corrected_robot(arguments.robot);
+  const robotics::CorrectedRobot robot = robotics::read_corrected_robot(arguments.robot, arguments.links);
   robotics::Measurements predicted;
   predicted.poses = robotics::read_poses(arguments.poses, robot.robot);
   check_positions(arguments.robot, robot.robot, predicted.poses);
@@ -56,6 +57,7 @@ void add_predict(CLI::App& app) {
   const auto arguments = std::make_shared<PredictArguments>();
   add_input_file(*command, "robot", arguments->robot, "Robot description (YAML), as calibrate or discover wrote it")
       ->required();
+  add_urdf_links(*command, arguments->links);
   add_input_file(*command, "poses", arguments->poses, "CSV file with joint values and the covariates of the effects")
       ->required();
   add_output_file(*command, "-o,--output", arguments->output, "CSV file to write (default: standard output)");

@@ -112,8 +112,8 @@ std::vector<Pose> tool_poses(const CorrectedRobot& robot, const Poses& poses) {
   return result;
 }
 
-CorrectedRobot read_corrected_robot(const std::string& path) {
-  CorrectedRobot robot{.robot = read_robot(path), .correction = {}};
+CorrectedRobot read_corrected_robot(const std::string& path, const UrdfLinks& links) {
+  CorrectedRobot robot{.robot = read_robot(path, links), .correction = {}};
   if (robot.robot.correction_file.empty()) return robot;
   const std::filesystem::path model = std::filesystem::path(path).parent_path() / robot.robot.correction_file;
   const std::string text = read_file(model.string());

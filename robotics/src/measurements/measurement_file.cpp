@@ -2,7 +2,6 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <map>
 #include <optional>
@@ -32,11 +31,13 @@ class Header {
         also_.insert(names.begin(), names.end());
       }
     }
-    for (const std::string& column : csv.columns()) take(column);
+    for (const std::string& column : csv.columns()) {
+      if (!take_named_joint(column)) take(column);
+    }
   }
 
   bool has(const std::string& quantity) const { return quantities_.contains(quantity); }
-  bool has_joints() const;
+  bool has_joints() const { return quantities_.lower_bound("q0") != quantities_.lower_bound("q:"); }  // q1, q2, ...
   bool in_degrees(const std::string& quantity) const { return quantities_.at(quantity).unit == "deg"; }
   Eigen::MatrixXd joints() const;
   void positions(Measurements& measurements) const;
@@ -60,6 +61,7 @@ class Header {
   [[noreturn]] void refuse(const std::string& message) const {
     throw std::runtime_error(fmt::format("{}:1: {}", csv_.name(), message));
   }
+  bool take_named_joint(const std::string& column);
   void take(const std::string& column);
   void take_quantity(const std::string& name, const std::string& column, const std::string& unit);
   void check_reach(const Eigen::VectorXd& coordinate_mm, const std::string& column) const;
@@ -83,6 +85,19 @@ void Header::take(const std::string& column) {
   } else {
     unused_.push_back(column);
   }
+}
+
+// "shoulder_pan_joint_rad": a joint by its name in the description, as logs of controllers have them.
+bool Header::take_named_joint(const std::string& column) {
+  const std::size_t bar = column.rfind('_');
+  if (bar == std::string::npos) return false;
+  const std::string unit = column.substr(bar + 1);
+  if (!lengths_in_mm.contains(unit) && !angles_in_rad.contains(unit)) return false;
+  const std::vector<Joint>& joints = robot_.chain.joints;
+  const auto joint = std::ranges::find(joints, column.substr(0, bar), &Joint::name);
+  if (joint == joints.end()) return false;
+  take_quantity(fmt::format("q{}", joint - joints.begin() + 1), column, unit);
+  return true;
 }
 
 std::string Header::spellings(const std::string& name, const std::map<std::string, double>& units) {
@@ -117,12 +132,6 @@ double Header::factor(const std::string& name, const std::map<std::string, doubl
                        spellings(name, units)));
   }
   return found->second;
-}
-
-bool Header::has_joints() const {
-  return std::ranges::any_of(quantities_, [](const auto& entry) {
-    return entry.first[0] == 'q' && std::isdigit(static_cast<unsigned char>(entry.first[1])) != 0;
-  });
 }
 
 Eigen::MatrixXd Header::joints() const {

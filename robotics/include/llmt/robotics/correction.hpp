@@ -14,6 +14,7 @@
 #include "llmt/fit.hpp"
 #include "llmt/model.hpp"
 #include "llmt/robotics/measurements.hpp"
+#include "llmt/robotics/urdf.hpp"
 
 namespace llmt::robotics {
 
@@ -46,6 +47,6 @@ std::vector<Pose> tool_poses(const CorrectedRobot& robot, const Poses& poses);
 
 /// Reads the robot and, if it names one, its correction model; a relative path is relative to the robot file. Throws
 /// std::runtime_error, whose message shows nothing of a file that is no model.
-CorrectedRobot read_corrected_robot(const std::string& path);
+CorrectedRobot read_corrected_robot(const std::string& path, const UrdfLinks& links = {});
 
 }  // namespace llmt::robotics

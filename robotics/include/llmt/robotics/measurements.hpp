@@ -54,6 +54,7 @@ Eigen::VectorXd distances(const Eigen::MatrixXd& model_mm, const Measurements& m
 /// Reads measurements for a robot. Columns, with the unit as suffix:
 ///
 ///   q1_deg, q1_rad (revolute), q3_mm, q3_m (prismatic)   every joint, all from 1 on
+///   NAME_deg, NAME_rad, NAME_mm, NAME_m                  the same by the joints' names in the description
 ///   x_mm, y_mm, z_mm (also _m, _um)                      at least one
 ///   rx_deg ry_deg rz_deg (also _rad), or qw qx qy qz     orientation, optional
 ///   payload_kg temp_C time_s order pose dirN tauN_Nm qmeasN_deg sigma_x_um ...   covariates, optional
