@@ -24,6 +24,7 @@ using robotics::ErrorFigures;
 
 struct CalibrateArguments {
   std::string robot;
+  robotics::UrdfLinks links;
   std::string data;
   std::string output;
   std::string test;
@@ -221,7 +222,7 @@ void print_report(const CalibrateArguments& arguments, const robotics::Robot& no
 }
 
 void calibrate_command(CalibrateArguments arguments) {
-  const robotics::Robot nominal = read_description(arguments.robot, arguments.data);
+  const robotics::Robot nominal = read_description(arguments.robot, arguments.data, arguments.links);
   refuse_lost_correction(nominal, arguments.robot, arguments.output);
   robotics::Measurements measurements = robotics::read_measurements(arguments.data, nominal, {}, arguments.mark);
   if (measurements.count() < arguments.options.folds) {
@@ -244,7 +245,7 @@ void calibrate_command(CalibrateArguments arguments) {
   std::vector<std::string> written;
   const bool is_implausible = robotics::is_implausible(nominal, report);
   if (!arguments.output.empty() && !is_implausible) {
-    written = save_corrected(report.best(), arguments.output);
+    written = save_corrected(report.best(), arguments.output, {arguments.robot, arguments.links});
   }
   std::string reports;
   if (arguments.reports.wanted()) {
@@ -259,6 +260,7 @@ void calibrate_command(CalibrateArguments arguments) {
     print_report(arguments, nominal, measurements, report, rows, suspicions);
     if (!written.empty()) {
       print(fmt::format("Written: {}\n", fmt::join(written, ", ")));
+      if (robotics::is_urdf(arguments.output)) print(beside_urdf(arguments.output));
     }
     print(reports);
   }
@@ -286,7 +288,8 @@ void add_calibrate(CLI::App& app) {
   command->footer("Example: llmt-robot calibrate robotics/robots/ur10.yaml measured.csv --correct -o calibrated.yaml");
   const auto arguments = std::make_shared<CalibrateArguments>();
   robotics::ReportOptions& options = arguments->options;
-  add_input_file(*command, "robot", arguments->robot, "Robot description (YAML)")->required();
+  add_input_file(*command, "robot", arguments->robot, "Robot description (YAML or URDF)")->required();
+  add_urdf_links(*command, arguments->links);
   add_input_file(*command, "data", arguments->data, "Measurements (CSV with units in the column names)")->required();
   command->add_flag("--correct", options.correct, "Learn the residual as a function of the joint values");
   add_count(*command, "--folds", options.folds, 0, "Folds of the held-out figures, 0: none")->capture_default_str();

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "llmt/robotics/robot.hpp"
+#include "llmt/robotics/urdf.hpp"
 
 namespace llmt::apps {
 
@@ -14,11 +15,18 @@ void check_positions(const std::string& file, const robotics::Robot& robot, cons
 
 /// The robot's description. Throws as robotics::read_robot(), and std::invalid_argument if the description and the
 /// measurements were exchanged.
-robotics::Robot read_description(const std::string& robot, const std::string& measured);
+robotics::Robot read_description(const std::string& robot, const std::string& measured,
+                                 const robotics::UrdfLinks& links = {});
+
+/// --base-link and --tip-link: which part of a URDF is the arm.
+void add_urdf_links(CLI::App& command, robotics::UrdfLinks& links);
 
 void add_paper(CLI::App& app);
 void add_simulate(CLI::App& app);
 void add_calibrate(CLI::App& app);
 void add_discover(CLI::App& app);
+void add_predict(CLI::App& app);
+void add_compensate(CLI::App& app);
+void add_robot_export(CLI::App& app);
 
 }  // namespace llmt::apps

@@ -12,11 +12,23 @@ namespace llmt::apps {
 /// FILE.correction.json stands beside FILE.yaml.
 inline constexpr const char* correction_extension = ".correction.json";
 
-/// Writes the description and, if there is one, the correction. Both files are replaced or none. Returns their names.
-std::vector<std::string> save_corrected(robotics::CorrectedRobot robot, const std::string& path);
+/// Where a description came from.
+struct DescriptionSource {
+  std::string path;
+  robotics::UrdfLinks links;
+};
+
+/// Writes the description and, if there is one, the correction. If `path` is a URDF, that gets the origins of the
+/// joints, and the description, which has everything, stands beside it as YAML. All files are replaced or none. Returns
+/// their names.
+std::vector<std::string> save_corrected(robotics::CorrectedRobot robot, const std::string& path,
+                                        const DescriptionSource& source);
+
+/// What a URDF does not hold and where that is, in a sentence.
+std::string beside_urdf(const std::string& path);
 
 /// Refuses to lose the correction that the description at `input` names: throws std::invalid_argument if it is `output`
-/// or the correction beside that.
+/// or the correction beside that; or if `output` is a URDF and `input` is none.
 void refuse_lost_correction(const robotics::Robot& robot, const std::string& input, const std::string& output);
 
 }  // namespace llmt::apps

@@ -25,6 +25,7 @@ using robotics::Discovery;
 
 struct DiscoverArguments {
   std::string robot;
+  robotics::UrdfLinks links;
   std::string data;
   std::string test;
   std::string catalogue;
@@ -104,7 +105,7 @@ Discovery discovered(const robotics::Robot& robot, const robotics::Measurements&
 }
 
 void discover_command(DiscoverArguments arguments) {
-  const robotics::Robot robot = read_description(arguments.robot, arguments.data);
+  const robotics::Robot robot = read_description(arguments.robot, arguments.data, arguments.links);
   refuse_lost_correction(robot, arguments.robot, arguments.output);
   if (!arguments.catalogue.empty()) arguments.options.catalogue = robotics::read_catalogue(arguments.catalogue);
   const std::vector<std::string> also = columns_of(arguments.options.catalogue, robot);
@@ -122,7 +123,7 @@ void discover_command(DiscoverArguments arguments) {
   arguments.options.progress = {};
   warn_of_misfit(robot, data);  // what cannot be calibrated was refused
   const Json folds = arguments.folds > 0 ? folds_json(robot, data, arguments) : Json(nullptr);
-  if (!arguments.output.empty()) save_corrected(found.improved, arguments.output);
+  if (!arguments.output.empty()) save_corrected(found.improved, arguments.output, {arguments.robot, arguments.links});
   const std::vector<NextPoses> next = next_poses(found, data);
   std::string reports;
   if (arguments.reports.wanted()) {
@@ -159,7 +160,8 @@ void add_discover(CLI::App& app) {
       "that causes cannot be told apart, or that the catalogue does not know what is there.");
   command->footer("Example: llmt-robot discover robot.yaml measured.csv -o improved.yaml");
   const auto arguments = std::make_shared<DiscoverArguments>();
-  add_input_file(*command, "robot", arguments->robot, "Robot description (YAML)")->required();
+  add_input_file(*command, "robot", arguments->robot, "Robot description (YAML or URDF)")->required();
+  add_urdf_links(*command, arguments->links);
   add_input_file(*command, "measured", arguments->data, "Measurements (CSV)")->required();
   add_input_file(*command, "--test", arguments->test,
                  "Measurements that take no part until the end (CSV); without it a share is set aside");

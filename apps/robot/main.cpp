@@ -10,9 +10,15 @@ void llmt::apps::check_positions(const std::string& file, const robotics::Robot&
   if (!reason.empty()) throw std::runtime_error(file + ": " + reason);
 }
 
-llmt::robotics::Robot llmt::apps::read_description(const std::string& robot, const std::string& measured) {
+llmt::robotics::Robot llmt::apps::read_description(const std::string& robot, const std::string& measured,
+                                                   const robotics::UrdfLinks& links) {
   return read_unless_exchanged(robot, measured, "the description (YAML) comes first, then the measurements (CSV)",
-                               [](const std::string& path) { return robotics::read_robot(path); });
+                               [&](const std::string& path) { return robotics::read_robot(path, links); });
+}
+
+void llmt::apps::add_urdf_links(CLI::App& command, robotics::UrdfLinks& links) {
+  command.add_option("--base-link", links.base, "Link of a URDF where the arm begins (default: the root)");
+  command.add_option("--tip-link", links.tip, "Link of a URDF that is the tool (default: the end of the only chain)");
 }
 
 int main(int argc, char** argv) {
@@ -23,5 +29,8 @@ int main(int argc, char** argv) {
   llmt::apps::add_simulate(app);
   llmt::apps::add_calibrate(app);
   llmt::apps::add_discover(app);
+  llmt::apps::add_predict(app);
+  llmt::apps::add_compensate(app);
+  llmt::apps::add_robot_export(app);
   return llmt::apps::run(app, argc, argv);
 }

@@ -20,6 +20,7 @@ constexpr Eigen::Index most_poses = 1'000'000;
 
 struct SimulateArguments {
   std::string robot;
+  robotics::UrdfLinks links;
   std::string output;
   std::string poses_from;
   bool json = false;
@@ -38,7 +39,7 @@ robotics::Measurements simulated(const robotics::Robot& robot, const SimulateArg
 }
 
 void simulate_command(const SimulateArguments& arguments) {
-  const robotics::CorrectedRobot robot = robotics::read_corrected_robot(arguments.robot);
+  const robotics::CorrectedRobot robot = robotics::read_corrected_robot(arguments.robot, arguments.links);
   refuse_lost_correction(robot.robot, arguments.robot, arguments.output);
   robotics::Measurements measurements = simulated(robot.robot, arguments);
   if (robot.correction) {
@@ -77,7 +78,8 @@ void add_simulate(CLI::App& app) {
   command->footer(
       "Example: llmt-robot simulate robotics/robots/tx200_like.yaml --poses 200 --noise-um 10 -o measured.csv");
   const auto arguments = std::make_shared<SimulateArguments>();
-  add_input_file(*command, "robot", arguments->robot, "Robot description (YAML)")->required();
+  add_input_file(*command, "robot", arguments->robot, "Robot description (YAML or URDF)")->required();
+  add_urdf_links(*command, arguments->links);
   CLI::Option* poses =
       add_count(*command, "--poses", arguments->options.poses, Eigen::Index{1}, "Number of poses", most_poses)
           ->capture_default_str();

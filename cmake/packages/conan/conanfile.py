@@ -35,6 +35,8 @@ class LlmtConan(ConanFile):
             self.requires("muparser/2.3.4")
         if self.options.robotics:
             self.requires("yaml-cpp/0.8.0")
+            self.requires("urdfdom/4.0.0")
+            self.requires("tinyxml/2.6.2")
         if self.options.programs:
             self.requires("cli11/2.4.1", visible=False)
 

@@ -26,6 +26,33 @@ struct Activation {
 /// Immutable after construction.
 class LeafValidities {
  public:
+  struct Branch {
+    int left = -1;
+    int right = -1;
+    int input = -1;
+    int first_level = -1;  // of this split's entries in level_share_; -1: a number
+    int levels = 0;
+    int first_term = -1;  // of this split's entries in terms_; -1: axis-orthogonal
+    int terms = 0;
+    double threshold = 0.0;
+    double per_half_width = 0.0;  // 1 / half width; 0: a jump
+    double missing_left = 0.5;
+  };
+  /// A term of the direction of an oblique split; inputs of weight 0 have none.
+  struct Term {
+    int input;
+    double weight;
+    double centre;
+  };
+  /// Gaussians of the leaves, in order of growth; rows of `stride` entries, padded with zeros to whole quads.
+  struct Gaussians {
+    std::vector<int> nodes = {};
+    Eigen::Index inputs = 0;
+    Eigen::Index stride = 0;
+    std::vector<double> centres = {};
+    std::vector<double> per_sigma = {};  // 1 / sigma; 0 for an input without extent, or categorical
+  };
+
   /// `inputs`: columns of the model, whose extents close the boxes.
   LeafValidities(const Partition& partition, const std::vector<InputColumn>& inputs);
 
@@ -59,37 +86,15 @@ class LeafValidities {
   Eigen::Index num_leaves() const { return std::ssize(branches_) / 2 + 1; }
   /// Largest number of splits above a leaf.
   Eigen::Index depth() const { return depth_; }
+  const std::vector<Branch>& branches() const { return branches_; }
+  const std::vector<double>& level_shares() const { return level_share_; }  ///< of the left child
+  const std::vector<Term>& terms() const { return terms_; }
+  const Gaussians& gaussians() const { return gaussians_; }
   bool are_gaussian() const { return kind_ == ValidityKind::gaussian; }
   /// Derivatives of the exponents of Gaussians by the inputs, inputs x `active`, the leaves that reach the row.
   Eigen::MatrixXd exponent_derivatives(const std::vector<Activation>& active, const double* row) const;
 
  private:
-  struct Branch {
-    int left = -1;
-    int right = -1;
-    int input = -1;
-    int first_level = -1;  // of this split's entries in level_share_; -1: a number
-    int levels = 0;
-    int first_term = -1;  // of this split's entries in terms_; -1: axis-orthogonal
-    int terms = 0;
-    double threshold = 0.0;
-    double per_half_width = 0.0;  // 1 / half width; 0: a jump
-    double missing_left = 0.5;
-  };
-  /// A term of the direction of an oblique split; inputs of weight 0 have none.
-  struct Term {
-    int input;
-    double weight;
-    double centre;
-  };
-  /// Gaussians of the leaves, in order of growth; rows of `stride` entries, padded with zeros to whole quads.
-  struct Gaussians {
-    std::vector<int> nodes = {};
-    Eigen::Index inputs = 0;
-    Eigen::Index stride = 0;
-    std::vector<double> centres = {};
-    std::vector<double> per_sigma = {};  // 1 / sigma; 0 for an input without extent, or categorical
-  };
   /// Rows on their way down the tree. The rows of a node stand behind the rows that wait for right children above it.
   struct Waiting {
     std::vector<int> rows;

@@ -105,8 +105,15 @@ Eigen::MatrixXd positions(const CorrectedRobot& robot, const Poses& poses) {
   return points;
 }
 
-CorrectedRobot read_corrected_robot(const std::string& path) {
-  CorrectedRobot robot{.robot = read_robot(path), .correction = {}};
+std::vector<Pose> tool_poses(const CorrectedRobot& robot, const Poses& poses) {
+  std::vector<Pose> result = tool_poses(robot.robot, poses);
+  const Eigen::MatrixXd points = positions(robot, poses);
+  for (std::size_t i = 0; i < result.size(); ++i) result[i].position_mm = points.row(i).transpose();
+  return result;
+}
+
+CorrectedRobot read_corrected_robot(const std::string& path, const UrdfLinks& links) {
+  CorrectedRobot robot{.robot = read_robot(path, links), .correction = {}};
   if (robot.robot.correction_file.empty()) return robot;
   const std::filesystem::path model = std::filesystem::path(path).parent_path() / robot.robot.correction_file;
   const std::string text = read_file(model.string());

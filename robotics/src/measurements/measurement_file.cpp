@@ -31,9 +31,14 @@ class Header {
         also_.insert(names.begin(), names.end());
       }
     }
-    for (const std::string& column : csv.columns()) take(column);
+    for (const std::string& column : csv.columns()) {
+      if (!take_named_joint(column)) take(column);
+    }
   }
 
+  bool has(const std::string& quantity) const { return quantities_.contains(quantity); }
+  bool has_joints() const { return quantities_.lower_bound("q0") != quantities_.lower_bound("q:"); }  // q1, q2, ...
+  bool in_degrees(const std::string& quantity) const { return quantities_.at(quantity).unit == "deg"; }
   Eigen::MatrixXd joints() const;
   void positions(Measurements& measurements) const;
   Orientation orientation() const;
@@ -56,6 +61,7 @@ class Header {
   [[noreturn]] void refuse(const std::string& message) const {
     throw std::runtime_error(fmt::format("{}:1: {}", csv_.name(), message));
   }
+  bool take_named_joint(const std::string& column);
   void take(const std::string& column);
   void take_quantity(const std::string& name, const std::string& column, const std::string& unit);
   void check_reach(const Eigen::VectorXd& coordinate_mm, const std::string& column) const;
@@ -79,6 +85,19 @@ void Header::take(const std::string& column) {
   } else {
     unused_.push_back(column);
   }
+}
+
+// "shoulder_pan_joint_rad": a joint by its name in the description, as logs of controllers have them.
+bool Header::take_named_joint(const std::string& column) {
+  const std::size_t bar = column.rfind('_');
+  if (bar == std::string::npos) return false;
+  const std::string unit = column.substr(bar + 1);
+  if (!lengths_in_mm.contains(unit) && !angles_in_rad.contains(unit)) return false;
+  const std::vector<Joint>& joints = robot_.chain.joints;
+  const auto joint = std::ranges::find(joints, column.substr(0, bar), &Joint::name);
+  if (joint == joints.end()) return false;
+  take_quantity(fmt::format("q{}", joint - joints.begin() + 1), column, unit);
+  return true;
 }
 
 std::string Header::spellings(const std::string& name, const std::map<std::string, double>& units) {
@@ -258,6 +277,38 @@ Poses read_poses(const std::string& path, const Robot& robot, DecimalMark mark) 
   if (poses.count() == 0) throw std::runtime_error(fmt::format("{}: there are no poses", csv.name()));
   add_moves(poses, robot.chain);
   return poses;
+}
+
+TargetTable read_targets(const std::string& path, const Robot& robot) {
+  const Csv csv = Csv::read(path);
+  const Header header(csv, robot, {});
+  TargetTable targets;
+  for (Eigen::Index row = 0; row < csv.rows(); ++row) targets.lines.push_back(csv.line_of(row));
+  if (targets.lines.empty()) throw std::runtime_error(fmt::format("{}: there are no targets", csv.name()));
+  if (header.has_joints()) {
+    targets.joints = header.joints();
+    targets.joints_in_degrees = header.in_degrees("q1");
+  }
+  if (header.has("x") || header.has("y") || header.has("z")) {
+    for (const char* axis : {"x", "y", "z"}) {
+      if (!header.has(axis)) {
+        throw std::runtime_error(
+            fmt::format("{}:1: a target needs x, y and z, there is no column {}_mm", csv.name(), axis));
+      }
+    }
+    Measurements measured;
+    header.positions(measured);
+    targets.positions_mm = measured.positions_mm;
+  }
+  if (targets.joints.size() == 0 && targets.positions_mm.size() == 0) {
+    throw std::runtime_error(
+        fmt::format("{}:1: neither joints (q1_deg, ...) nor positions (x_mm, y_mm, z_mm); columns: {}", csv.name(),
+                    fmt::join(csv.columns(), ", ")));
+  }
+  targets.orientation = header.orientation();
+  targets.covariates = header.covariates();
+  targets.unused_columns = header.unused();
+  return targets;
 }
 
 std::string to_csv(const Measurements& measurements, const Robot& robot) {

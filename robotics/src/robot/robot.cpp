@@ -81,6 +81,13 @@ Eigen::MatrixXd positions(const Robot& robot, const Poses& poses) {
   return result;
 }
 
+std::vector<Pose> tool_poses(const Robot& robot, const Poses& poses) {
+  RobotEvaluator evaluator(robot, poses);
+  std::vector<Pose> result;
+  for (Eigen::Index i = 0; i < poses.count(); ++i) result.push_back(evaluator.pose(i));
+  return result;
+}
+
 std::string position_refusal(const Robot& robot, const Poses& poses) {
   const auto acceptable = [](const auto& points) { return (points.array().abs() <= farthest_mm).all(); };
   const Eigen::MatrixXd all = positions(robot, poses);

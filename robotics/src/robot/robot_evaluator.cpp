@@ -124,17 +124,17 @@ void RobotEvaluator::deform(PoseContext& pose, Eigen::Index row, const PreparedE
 
 // Equilibrium: loads are those of the deformed arm, which the first pass finds to first order. Deflections are some
 // thousandths of the levers, so every pass gains three digits.
-Eigen::Vector3d RobotEvaluator::position(Eigen::Index row) {
+Pose RobotEvaluator::pose(Eigen::Index row) {
   constexpr int passes = 3;
   q_ = poses_.joints.row(row).transpose();
-  if (effects_.empty()) return kinematics_.forward(q_).position_mm;
+  if (effects_.empty()) return kinematics_.forward(q_);
   kinematics_.skeleton_into(rigid_, q_);
   for (int pass = 0; pass < (bears_loads_ ? passes : 1); ++pass) {
     if (pass > 0) kinematics_.skeleton_into(rigid_, q_, &deformation_);
-    PoseContext pose = context(row);
-    deform(pose, row, nullptr, deformation_);
+    PoseContext around = context(row);
+    deform(around, row, nullptr, deformation_);
   }
-  return kinematics_.forward(q_, &deformation_).position_mm;
+  return kinematics_.forward(q_, &deformation_);
 }
 
 Eigen::VectorXd RobotEvaluator::gravity_loads(Eigen::Index row) {

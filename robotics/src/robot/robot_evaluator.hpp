@@ -33,7 +33,10 @@ class RobotEvaluator {
  public:
   RobotEvaluator(const Robot& robot, const Poses& poses);
 
-  Eigen::Vector3d position(Eigen::Index row);
+  Eigen::Vector3d position(Eigen::Index row) { return pose(row).position_mm; }
+
+  /// Of the tool.
+  Pose pose(Eigen::Index row);
 
   /// 3 x parameters(robot).
   Eigen::Matrix3Xd jacobian(Eigen::Index row);

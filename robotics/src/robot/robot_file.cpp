@@ -211,7 +211,18 @@ Robot parse_robot(const std::string& text, const std::string& name) {
   return robot;
 }
 
-Robot read_robot(const std::string& path) { return parse_robot(read_file(path, description_limit), path); }
+Robot read_robot(const std::string& path, const UrdfLinks& links) {
+  if (is_urdf(path)) {
+    Robot robot;
+    robot.chain = read_urdf(path, links);
+    return robot;
+  }
+  if (!links.base.empty() || !links.tip.empty()) {
+    throw std::invalid_argument(
+        fmt::format("llmt::robotics::read_robot: links are given, and {} is no URDF (*.urdf)", path));
+  }
+  return parse_robot(read_file(path, description_limit), path);
+}
 
 void save(const Robot& robot, const std::string& path) { write_file(path, to_yaml(robot)); }
 

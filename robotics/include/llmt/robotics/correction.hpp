@@ -8,11 +8,13 @@
 #include <Eigen/Core>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "llmt/abi.hpp"
 #include "llmt/fit.hpp"
 #include "llmt/model.hpp"
 #include "llmt/robotics/measurements.hpp"
+#include "llmt/robotics/urdf.hpp"
 
 namespace llmt::robotics {
 
@@ -40,8 +42,11 @@ FitResult fit_correction(const Robot& robot, const Measurements& measurements, c
 /// twice.
 Eigen::MatrixXd positions(const CorrectedRobot& robot, const Poses& poses);
 
+/// Tool poses: the positions() above, and the orientations of the robot, which the correction leaves alone.
+std::vector<Pose> tool_poses(const CorrectedRobot& robot, const Poses& poses);
+
 /// Reads the robot and, if it names one, its correction model; a relative path is relative to the robot file. Throws
 /// std::runtime_error, whose message shows nothing of a file that is no model.
-CorrectedRobot read_corrected_robot(const std::string& path);
+CorrectedRobot read_corrected_robot(const std::string& path, const UrdfLinks& links = {});
 
 }  // namespace llmt::robotics

@@ -7,6 +7,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <map>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -53,6 +54,7 @@ Eigen::VectorXd distances(const Eigen::MatrixXd& model_mm, const Measurements& m
 /// Reads measurements for a robot. Columns, with the unit as suffix:
 ///
 ///   q1_deg, q1_rad (revolute), q3_mm, q3_m (prismatic)   every joint, all from 1 on
+///   NAME_deg, NAME_rad, NAME_mm, NAME_m                  the same by the joints' names in the description
 ///   x_mm, y_mm, z_mm (also _m, _um)                      at least one
 ///   rx_deg ry_deg rz_deg (also _rad), or qw qx qy qz     orientation, optional
 ///   payload_kg temp_C time_s order pose dirN tauN_Nm qmeasN_deg sigma_x_um ...   covariates, optional
@@ -71,6 +73,23 @@ Measurements parse_measurements(std::string text, const std::string& name, const
 
 /// The joint values and covariates of such a file, which may have no measured positions.
 Poses read_poses(const std::string& path, const Robot& robot, DecimalMark mark = DecimalMark::point);
+
+/// What a file asks a robot for, row by row.
+struct TargetTable {
+  Eigen::MatrixXd joints;         ///< n x J as in Poses, or empty if the file has no joint columns
+  bool joints_in_degrees = true;  ///< how the file writes revolute joints
+  Eigen::MatrixXd positions_mm;   ///< n x 3, or empty
+  Orientation orientation;        ///< empty values if there is none
+  std::map<std::string, Eigen::VectorXd> covariates;
+  std::vector<std::string> unused_columns;
+  std::vector<Eigen::Index> lines;  ///< of the file, for messages
+
+  Eigen::Index count() const { return std::ssize(lines); }
+};
+
+/// Reads targets: columns as for read_measurements(), but either joints or positions may be absent; positions need all
+/// of x, y and z. Throws as read_measurements().
+TargetTable read_targets(const std::string& path, const Robot& robot);
 
 /// Adds how far each joint moved to reach a pose: columns move1_rad (_mm if prismatic), ..., differences of joint
 /// values to the row before in the sequence of the column order, or else time_s; 0 in the first row. Nothing without

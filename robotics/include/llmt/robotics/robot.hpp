@@ -36,6 +36,10 @@ Robot with_values(Robot robot, const Eigen::VectorXd& values);
 /// Throws std::invalid_argument if the number of joints does not match or a column that an effect needs is missing.
 Eigen::MatrixXd positions(const Robot& robot, const Poses& poses);
 
+/// Tool poses in the world frame, n of them. The positions are those of positions(); links and joints that bend turn
+/// the tool as well. Throws as positions().
+std::vector<Pose> tool_poses(const Robot& robot, const Poses& poses);
+
 /// Why the positions() make no sense, or nothing if they do: the first pose, counted from 1, at which one is not finite
 /// or beyond farthest_mm, and the effect that makes it so. Numbers of a description may be finite and their products
 /// not, and an expression may divide by zero. Throws as positions().

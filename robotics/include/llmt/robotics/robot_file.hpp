@@ -8,6 +8,7 @@
 #include <string>
 
 #include "llmt/robotics/robot.hpp"
+#include "llmt/robotics/urdf.hpp"
 
 namespace llmt::robotics {
 
@@ -35,7 +36,10 @@ namespace llmt::robotics {
 ///
 /// Throws std::runtime_error `path:line: where: what` for a file that cannot be read or is no YAML, for unknown,
 /// repeated or missing keys, wrong types and numbers that are not finite, and for whatever validate(Robot) refuses.
-Robot read_robot(const std::string& path);
+///
+/// A file whose name ends in ".urdf" is read by read_urdf(): a chain without effects. `links` are for such files;
+/// throws std::invalid_argument if there are any for another one.
+Robot read_robot(const std::string& path, const UrdfLinks& links = {});
 
 /// As read_robot(), from memory; `name` stands for the path in messages.
 Robot parse_robot(const std::string& text, const std::string& name);

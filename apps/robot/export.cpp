@@ -1,0 +1,155 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <filesystem>
+#include <memory>
+#include <stdexcept>
+
+#include "llmt/files.hpp"
+#include "llmt/robotics/kinematics.hpp"
+#include "llmt/robotics/robot_c_source.hpp"
+#include "llmt/robotics/robot_file.hpp"
+#include "robot/commands.hpp"
+#include "shared/cli.hpp"
+#include "shared/options.hpp"
+
+namespace llmt::apps {
+namespace {
+
+struct ExportArguments {
+  std::string robot;
+  robotics::UrdfLinks links;
+  std::string deltas_from;
+  std::string output;
+  std::string name = "robot";
+  bool kinematics = false;
+  bool c = false;
+};
+
+// Of the joint's moving frame at zero.
+Eigen::Isometry3d joint_frame(const robotics::Chain& chain, const robotics::Skeleton& zero, std::size_t joint) {
+  constexpr double radians = 0.017453292519943295;
+  const robotics::Joint& of = chain.joints[joint];
+  Eigen::Isometry3d frame = Eigen::Isometry3d::Identity();
+  frame.linear() = zero.joint_frame[joint];
+  frame.translation() = zero.joint_origin[joint];
+  if (of.type == robotics::JointType::revolute) {
+    frame.rotate(Eigen::AngleAxisd(radians * of.theta_deg, Eigen::Vector3d::UnitZ()));
+  }
+  if (of.sign < 0.0) frame.rotate(Eigen::AngleAxisd(3.141592653589793, Eigen::Vector3d::UnitX()));
+  return frame;
+}
+
+std::string origin_text(const std::string& name, const Eigen::Isometry3d& pose) {
+  const Eigen::Matrix3d r = pose.linear();
+  const double pitch = std::atan2(-r(2, 0), std::hypot(r(0, 0), r(1, 0)));
+  const bool upright = std::abs(std::cos(pitch)) < 1e-12;
+  const double roll = upright ? std::atan2(-r(1, 2), r(1, 1)) : std::atan2(r(2, 1), r(2, 2));
+  const double yaw = upright ? 0.0 : std::atan2(r(1, 0), r(0, 0));
+  const Eigen::Vector3d xyz = 0.001 * pose.translation();
+  return fmt::format("  {}: {{x: {}, y: {}, z: {}, roll: {}, pitch: {}, yaw: {}}}\n", name, xyz(0), xyz(1), xyz(2),
+                     roll, pitch, yaw);
+}
+
+std::string kinematics_yaml(const robotics::Chain& described) {
+  robotics::Chain chain = described;
+  chain.base = {};
+  const robotics::Kinematics kinematics(chain);
+  const robotics::Skeleton zero = kinematics.skeleton(Eigen::VectorXd::Zero(std::ssize(chain.joints)));
+  std::string text =
+      "# Pose of each joint in the frame of the one before, the first in the base, at zero; m and rad; fixed-axis "
+      "roll,\n"
+      "# pitch, yaw as in URDF. Every axis is z. tool: in the frame of the last joint.\nkinematics:\n";
+  Eigen::Isometry3d before = Eigen::Isometry3d::Identity();
+  for (std::size_t j = 0; j < chain.joints.size(); ++j) {
+    const Eigen::Isometry3d frame = joint_frame(chain, zero, j);
+    text += origin_text(chain.joints[j].name, before.inverse() * frame);
+    before = frame;
+  }
+  Eigen::Isometry3d tool = Eigen::Isometry3d::Identity();
+  tool.linear() = zero.tool.rotation;
+  tool.translation() = zero.tool.position_mm;
+  return text + origin_text("tool", before.inverse() * tool);
+}
+
+std::string deltas_csv(const robotics::Chain& chain, const robotics::Chain& nominal) {
+  if (chain.convention != nominal.convention || chain.joints.size() != nominal.joints.size()) {
+    throw std::invalid_argument("--deltas: the two descriptions differ in convention or number of joints");
+  }
+  std::string text = "joint,delta_theta_deg,delta_d_mm,delta_a_mm,delta_b_mm,delta_alpha_deg,delta_beta_deg\n";
+  for (std::size_t j = 0; j < chain.joints.size(); ++j) {
+    const robotics::Joint& now = chain.joints[j];
+    const robotics::Joint& was = nominal.joints[j];
+    text += fmt::format("{},{},{},{},{},{},{}\n", now.name, now.theta_deg - was.theta_deg, now.d_mm - was.d_mm,
+                        now.a_mm - was.a_mm, now.b_mm - was.b_mm, now.alpha_deg - was.alpha_deg,
+                        now.beta_deg - was.beta_deg);
+  }
+  return text;
+}
+
+void export_c(const ExportArguments& arguments) {
+  if (arguments.output.empty()) throw std::invalid_argument("--c needs --output: the source and its header are files");
+  const std::string header = beside(arguments.output, ".h").string();
+  if (header == arguments.output) throw std::invalid_argument("--output: the header has this name; write to FILE.c");
+  const robotics::CorrectedRobot robot = robotics::read_corrected_robot(arguments.robot, arguments.links);
+  const CSource c = robotics::to_c(robot, arguments.name, std::filesystem::path(header).filename().string());
+  const std::vector<NewFile> files = {{arguments.output, c.source}, {header, c.header}};
+  write_files(files);
+  print(fmt::format("{}: {} joints, {} effects, {} correction; conditions: {}; written to {} and {}\n",
+                    robot.robot.chain.name, robot.robot.chain.joints.size(), robot.robot.effects.size(),
+                    robot.correction ? "with a" : "no", fmt::join(robotics::c_conditions(robot.robot), ", "),
+                    arguments.output, header));
+}
+
+void export_command(const ExportArguments& arguments) {
+  const int wanted = static_cast<int>(arguments.kinematics) + static_cast<int>(!arguments.deltas_from.empty()) +
+                     static_cast<int>(arguments.c);
+  if (wanted != 1) throw std::invalid_argument("llmt-robot export: give one of --c, --kinematics and --deltas");
+  if (arguments.c) {
+    export_c(arguments);
+    return;
+  }
+  const bool urdf = robotics::is_urdf(arguments.robot);
+  const robotics::Robot robot = robotics::read_robot(arguments.robot, urdf ? arguments.links : robotics::UrdfLinks{});
+  std::string text;
+  if (arguments.kinematics) {
+    text = kinematics_yaml(robot.chain);
+  } else {
+    const bool from_urdf = robotics::is_urdf(arguments.deltas_from);
+    text = deltas_csv(
+        robot.chain,
+        robotics::read_robot(arguments.deltas_from, from_urdf ? arguments.links : robotics::UrdfLinks{}).chain);
+  }
+  if (arguments.output.empty()) {
+    print_bytes(text);
+  } else {
+    write_file(arguments.output, text);
+  }
+  if (!robot.effects.empty() || !robot.correction_file.empty()) {
+    warn("The table holds the geometry alone: effects and correction are left out; llmt-robot compensate has them");
+  }
+}
+
+}  // namespace
+
+void add_robot_export(CLI::App& app) {
+  CLI::App* command = app.add_subcommand(
+      "export",
+      "Write the geometry as controllers load it: poses of the joints, or changes of Denavit-Hartenberg parameters");
+  command->footer("Example: llmt-robot export calibrated.yaml --deltas robotics/robots/ur10.yaml -o deltas.csv");
+  const auto arguments = std::make_shared<ExportArguments>();
+  add_input_file(*command, "robot", arguments->robot, "Robot description (YAML or URDF)")->required();
+  add_urdf_links(*command, arguments->links);
+  command->add_flag("--c", arguments->c,
+                    "C99 source: forward model with effects and correction, and a step of compensate");
+  command->add_option("--name", arguments->name, "Begins all names in the C source")->capture_default_str();
+  command->add_flag("--kinematics", arguments->kinematics, "YAML with x, y, z, roll, pitch, yaw of each joint");
+  add_input_file(*command, "--deltas", arguments->deltas_from,
+                 "CSV with the differences of the parameters from those of this description");
+  add_output_file(*command, "-o,--output", arguments->output, "File to write (default: standard output)");
+  command->callback([arguments] { export_command(*arguments); });
+}
+
+}  // namespace llmt::apps

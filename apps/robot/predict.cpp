@@ -1,0 +1,67 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <memory>
+
+#include "llmt/files.hpp"
+#include "llmt/robotics/correction.hpp"
+#include "llmt/robotics/measurements.hpp"
+#include "llmt/robotics/orientation.hpp"
+#include "robot/commands.hpp"
+#include "shared/cli.hpp"
+#include "shared/options.hpp"
+
+namespace llmt::apps {
+namespace {
+
+struct PredictArguments {
+  std::string robot;
+  robotics::UrdfLinks links;
+  std::string poses;
+  std::string output;
+};
+
+void predict_command(const PredictArguments& arguments) {
+  const robotics::CorrectedRobot robot = robotics::read_corrected_robot(arguments.robot, arguments.links);
+  robotics::Measurements predicted;
+  predicted.poses = robotics::read_poses(arguments.poses, robot.robot);
+  check_positions(arguments.robot, robot.robot, predicted.poses);
+  const std::vector<robotics::Pose> tools = robotics::tool_poses(robot, predicted.poses);
+  predicted.positions_mm.resize(std::ssize(tools), 3);
+  std::vector<Eigen::Matrix3d> rotations;
+  for (std::size_t i = 0; i < tools.size(); ++i) {
+    predicted.positions_mm.row(i) = tools[i].position_mm.transpose();
+    rotations.push_back(tools[i].rotation);
+  }
+  predicted.orientation = robotics::to_orientation(rotations, robot.robot.chain.orientation);
+  const std::string csv = robotics::to_csv(predicted, robot.robot);
+  if (arguments.output.empty()) {
+    print_bytes(csv);
+  } else {
+    write_file(arguments.output, csv);
+  }
+  warn(fmt::format("{}: {} poses, {} effects, {} correction{}", robot.robot.chain.name, predicted.count(),
+                   robot.robot.effects.size(), robot.correction ? "with a" : "no",
+                   arguments.output.empty() ? "" : ", written to " + arguments.output));
+}
+
+}  // namespace
+
+void add_predict(CLI::App& app) {
+  CLI::App* command = app.add_subcommand(
+      "predict",
+      "Say where a robot puts its tool\n"
+      "The whole model: geometry, effects, correction. Orientations are in the description's convention (orientation: "
+      "intrinsic_xyz and the like), or quaternions if it names none; the correction leaves them alone.");
+  command->footer("Example: llmt-robot predict calibrated.yaml poses.csv -o positions.csv");
+  const auto arguments = std::make_shared<PredictArguments>();
+  add_input_file(*command, "robot", arguments->robot, "Robot description (YAML), as calibrate or discover wrote it")
+      ->required();
+  add_urdf_links(*command, arguments->links);
+  add_input_file(*command, "poses", arguments->poses, "CSV file with joint values and the covariates of the effects")
+      ->required();
+  add_output_file(*command, "-o,--output", arguments->output, "CSV file to write (default: standard output)");
+  command->callback([arguments] { predict_command(*arguments); });
+}
+
+}  // namespace llmt::apps

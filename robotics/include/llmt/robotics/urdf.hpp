@@ -1,0 +1,45 @@
+/// \file
+/// Arms as URDF files describe them.
+#pragma once
+
+#include <string>
+
+#include "llmt/abi.hpp"
+#include "llmt/robotics/chain.hpp"
+
+namespace llmt::robotics {
+
+/// Which links of a URDF are base and tip of the arm.
+struct UrdfLinks {
+  std::string base;  ///< empty: the root
+  std::string tip;   ///< empty: the only end of a chain with joints that move
+};
+
+/// Whether the name of a file ends in ".urdf".
+bool is_urdf(const std::string& path);
+
+/// The arm between two links of a URDF as a chain in modified Denavit-Hartenberg convention, exact to rounding: any
+/// origin and any axis becomes alpha, a, b, beta, theta, d of Convention::mdh. Frames lie on the common normals of
+/// consecutive axes (then b and beta are zero), or, where axes are within 5 degrees of parallel, at the height of the
+/// frame before. Joint values keep their zero and direction, joints their names. World is the base link: Chain::base
+/// leads from there to the first frame, Chain::tool from the last one to the tip link.
+///
+/// Fixed joints are folded into origins. Masses are those of the links that a joint carries up to the next one, side
+/// branches such as fingers included, at zero. Limits are kept; a continuous joint has none. Meshes, transmissions,
+/// friction and inertias about the centres of mass do not matter.
+///
+/// Throws std::runtime_error `name:line:column: ...` for text that is no XML, and `name: ...` with what is wrong for
+/// XML that is no URDF, for links that do not exist or are not joined, several candidates for the tip (all are listed),
+/// joints that are planar, floating or mimic another one, and axes of length 0.
+Chain parse_urdf(const std::string& text, const std::string& name, const UrdfLinks& links = {});
+
+/// Reads a file; throws as parse_urdf().
+Chain read_urdf(const std::string& path, const UrdfLinks& links = {});
+
+/// The URDF `text` with the origins of the joints that move as in `identified`, a chain that began as
+/// parse_urdf(text, name, links); everything else in the file stays, comments as well. Base and tool of `identified` do
+/// not matter: a URDF has no place for the frame of an instrument, and what the flange carries is not the arm. Throws
+/// as parse_urdf(), and std::invalid_argument if convention, names, types or directions of the joints are others.
+std::string to_urdf(const std::string& text, const std::string& name, const UrdfLinks& links, const Chain& identified);
+
+}  // namespace llmt::robotics

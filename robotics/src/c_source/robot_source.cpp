@@ -1,0 +1,249 @@
+#include "llmt/robotics/robot_c_source.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <stdexcept>
+
+#include "c_source/effect_source.hpp"
+#include "c_source/runtime.hpp"
+#include "kinematics/units.hpp"
+#include "llmt/robotics/effects.hpp"
+
+namespace llmt::robotics {
+namespace {
+
+constexpr std::size_t longest_name = 26;
+
+const char* const c_effects = R"(
+static double @_sign(double x) {
+  return x > 0.0 ? 1.0 : x < 0.0 ? -1.0 : 0.0;
+}
+
+static double @_map(const double *values, int count, double at) {
+  int knot;
+  at = at < 0.0 ? 0.0 : at > count - 1 ? count - 1 : at;
+  knot = (int)at;
+  at -= knot;
+  return at > 0.0 ? (1.0 - at) * values[knot] + at * values[knot + 1] : values[knot];
+}
+
+static double @_spring(double a, double b, double ratio, double free_length, double q) {
+  const double first = a * cos(q) + b * sin(q);
+  const double amplitude = sqrt(a * a + b * b);
+  double square;
+  if (free_length == 0.0 || amplitude == 0.0) return first;
+  square = 1.0 + ratio * ratio - 2.0 * ratio * (a * sin(q) - b * cos(q)) / amplitude;
+  return first * (1.0 - free_length / sqrt(square > 1e-24 ? square : 1e-24));
+}
+
+static double @_pressed(const struct @_load *load, int slides) {
+  const double *whole = slides ? load->force : load->moment;
+  return fabs(load->about_axis) > 1e-3 * sqrt(@_dot(whole, whole)) ? @_sign(load->about_axis) : 0.0;
+}
+)";
+
+std::string with_name(std::string text, const std::string& name) {
+  for (std::size_t at = text.find('@'); at != std::string::npos; at = text.find('@', at + name.size())) {
+    text.replace(at, 1, name);
+  }
+  return text;
+}
+
+// The elements of a chain, as the class Kinematics has them.
+class Elements {
+ public:
+  explicit Elements(const Chain& chain) {
+    add_frame(chain.base);
+    for (std::size_t j = 0; j < chain.joints.size(); ++j) {
+      add_joint(chain, static_cast<int>(j));
+      body_ = static_cast<int>(j);
+    }
+    add_frame(chain.tool);
+    lines_ += fmt::format("  {{0, 0, -1, {}, 0.0}}\n", body_);
+  }
+  const std::string& lines() const { return lines_; }
+  int count() const { return count_; }
+
+ private:
+  std::string lines_;
+  int count_ = 0;
+  int body_ = -1;  // whose frame has been reached
+
+  void add(int axis, bool rotation, double value, int joint = -1) {
+    lines_ += fmt::format("  {{{}, {}, {}, {}, {}}},\n", axis, rotation ? 1 : 0, joint, body_,
+                          c_number(rotation ? value * radians : value));
+    body_ = -1;
+    ++count_;
+  }
+  void add_frame(const Frame& frame) {
+    for (int axis = 0; axis < 3; ++axis) add(axis, false, frame.xyz_mm(axis));
+    for (int axis = 2; axis >= 0; --axis) add(axis, true, frame.rpy_deg(axis));
+  }
+  void add_joint(const Chain& chain, int index) {
+    const Joint& joint = chain.joints[index];
+    const bool turns = joint.type == JointType::revolute;
+    const auto along_and_about_z = [&] {
+      add(2, true, joint.theta_deg, turns ? index : -1);
+      add(2, false, joint.d_mm, turns ? -1 : index);
+    };
+    if (chain.convention == Convention::dh) along_and_about_z();
+    if (chain.convention == Convention::mdh) add(0, true, joint.alpha_deg);
+    add(0, false, joint.a_mm);
+    add(1, false, joint.b_mm);
+    if (chain.convention == Convention::dh) add(0, true, joint.alpha_deg);
+    add(1, true, joint.beta_deg);
+    if (chain.convention == Convention::mdh) along_and_about_z();
+  }
+};
+
+std::string vector(const Eigen::Vector3d& v) {
+  return fmt::format("{{{}, {}, {}}}", c_number(v(0)), c_number(v(1)), c_number(v(2)));
+}
+
+// One entry a joint.
+template <typename Entry>
+std::string table(const Chain& chain, const char* declaration, Entry entry) {
+  std::string text = fmt::format("static const {} = {{", declaration);
+  for (std::size_t j = 0; j < chain.joints.size(); ++j) text += (j == 0 ? "" : ", ") + entry(chain.joints[j]);
+  return text + "};\n";
+}
+
+double limit(const Joint& joint, std::size_t side) {
+  if (!joint.limits) return (side == 0 ? -1.0 : 1.0) * std::numeric_limits<double>::infinity();
+  return (*joint.limits)[side] * (joint.type == JointType::revolute ? radians : 1.0);
+}
+
+Eigen::Matrix3d base_rotation(const Chain& chain) {
+  return Kinematics(chain).skeleton(Eigen::VectorXd::Zero(std::ssize(chain.joints))).base_rotation;
+}
+
+std::string tables(const Robot& robot) {
+  const Chain& chain = robot.chain;
+  const Elements elements(chain);
+  const auto deforms = [](const Effect& effect) { return effect_type(effect.type).elastic; };
+  const int passes = std::ranges::any_of(robot.effects, deforms) ? 3 : robot.effects.empty() ? 0 : 1;
+  const Eigen::Vector3d gravity = base_rotation(chain) * chain.gravity_m_s2;
+  std::string text =
+      fmt::format("enum {{ @_JOINTS = {0}, @_ELEMENTS = {1}, @_PASSES = {2}, @_MOST = {3} }};\n", chain.joints.size(),
+                  elements.count(), passes, std::max<std::size_t>(6, chain.joints.size()));
+  text += fmt::format("static const double @_reach = {};\nstatic const double @_gravity[3] = {};\n",
+                      c_number(std::max(reach_of(chain), 1.0)), vector(gravity));
+  text += fmt::format("static const double @_payload_centre[3] = {};\n", vector(chain.payload.com_mm));
+  text += table(chain, "double @_signs[@_JOINTS]", [](const Joint& joint) { return c_number(joint.sign); });
+  text += table(chain, "double @_masses[@_JOINTS]", [](const Joint& joint) { return c_number(joint.mass_kg); });
+  text += table(chain, "double @_low[@_JOINTS]", [](const Joint& joint) { return c_number(limit(joint, 0)); });
+  text += table(chain, "double @_high[@_JOINTS]", [](const Joint& joint) { return c_number(limit(joint, 1)); });
+  text += table(chain, "double @_centres[@_JOINTS][3]", [](const Joint& joint) { return vector(joint.com_mm); });
+  text += table(chain, "int @_slides[@_JOINTS]",
+                [](const Joint& joint) { return joint.type == JointType::prismatic ? "1" : std::string("0"); });
+  std::string kinematics = c_kinematics;
+  const std::size_t behind = kinematics.find("struct @_frame");
+  kinematics.insert(behind,
+                    "static const struct @_element @_elements[@_ELEMENTS + 1] = {\n" + elements.lines() + "};\n\n");
+  return text + kinematics;
+}
+
+std::string deform(const Robot& robot, const std::vector<std::string>& conditions) {
+  std::string statements;
+  for (const Effect& effect : robot.effects) statements += effect_statement(robot.chain, effect, conditions);
+  std::string text;
+  const bool presses = statements.find("@_pressed") != std::string::npos;
+  for (const char* helper : {"@_sign", "@_map", "@_spring", "@_pressed"}) {
+    const bool wanted = statements.find(helper) != std::string::npos || (presses && helper == std::string("@_sign"));
+    if (!wanted) continue;
+    const std::string all = c_effects;
+    const std::size_t begin = all.find(std::string("static double ") + helper);
+    text += "\n" + all.substr(begin, all.find("\n}\n", begin) + 3 - begin);
+  }
+  return text +
+         "\n/* What the effects add to the joint values. */\nstatic void @_deform(const double *conditions, const "
+         "double "
+         "*q, const struct @_load *loads, double *more) {\n  int j;\n  (void)conditions;\n  (void)q;\n  (void)loads;\n"
+         "  for (j = 0; j < @_JOINTS; ++j) more[j] = 0.0;\n" +
+         statements + "}\n";
+}
+
+std::string correct(const CorrectedRobot& robot) {
+  std::string text = "\nstatic void @_correct(const double *q, double *point) {\n";
+  if (!robot.correction) return text + "  (void)q;\n  (void)point;\n}\n";
+  const Eigen::Matrix3d base = base_rotation(robot.robot.chain);
+  text += fmt::format("  double error[{}];\n  if (@_tree_predict(q, error) != 0) return;\n",
+                      robot.correction->outputs().size());
+  for (std::size_t k = 0; k < robot.correction->outputs().size(); ++k) {
+    const OutputColumn& seen = robot.correction->outputs()[k];
+    const int axis = seen.name == "dx_mm" ? 0 : seen.name == "dy_mm" ? 1 : 2;
+    text += fmt::format("  error[{0}] = error[{0}] < {1} ? {1} : error[{0}] > {2} ? {2} : error[{0}];\n", k,
+                        c_number(seen.low), c_number(seen.high));
+    for (int row = 0; row < 3; ++row) {
+      text += fmt::format("  point[{}] += {} * error[{}];\n", row, c_number(base(row, axis)), k);
+    }
+  }
+  return text + "}\n";
+}
+
+std::string header(const Robot& robot, const std::string& name) {
+  std::string text = "/* A calibrated robot, written by llmt-robot.\n";
+  std::size_t index = 0;
+  for (const std::string& condition : c_conditions(robot)) {
+    text += fmt::format("   conditions[{}]: {}\n", index++, condition);
+  }
+  for (std::size_t j = 0; j < robot.chain.joints.size(); ++j) {
+    text += fmt::format("   q[{}]: joint {}, {}\n", j, j + 1,
+                        robot.chain.joints[j].type == JointType::revolute ? "rad" : "mm");
+  }
+  return text + with_name(R"(   Positions in mm, rotations as nine numbers, row by row. */
+#ifndef @_ROBOT_H
+#define @_ROBOT_H
+
+void @_forward(const double *conditions, const double *q, double *position, double *rotation);
+
+/* Moves q one step towards a pose (rotation 0: a position), within the limits; returns how far the tool was from it,
+   in mm, angles times the reach. Call it until that is small, at most some ten times. */
+double @_step(const double *conditions, const double *position, const double *rotation, double *q);
+
+#endif
+)",
+                          name);
+}
+
+}  // namespace
+
+std::vector<std::string> c_conditions(const Robot& robot) {
+  std::vector<std::string> names = {"payload_kg"};
+  for (const Effect& effect : robot.effects) {
+    const std::size_t joint = effect_index(robot.chain, effect);
+    for (const std::string& columns : effect_columns(robot.chain, effect)) {
+      const std::string column = condition_of(robot.chain, joint, columns);
+      if (std::ranges::find(names, column) == names.end()) names.push_back(column);
+    }
+  }
+  return names;
+}
+
+CSource to_c(const CorrectedRobot& robot, const std::string& name, const std::string& header_name) {
+  if (!is_c_identifier(name) || name.size() > longest_name) {
+    throw std::invalid_argument(
+        fmt::format("llmt::robotics::to_c: name is \"{}\", must be an identifier of C of at most {} characters", name,
+                    longest_name));
+  }
+  const std::string effects = deform(robot.robot, c_conditions(robot.robot));
+  CSource result;
+  result.header = header(robot.robot, name);
+  if (robot.correction) {
+    positions(robot, {.joints = Eigen::MatrixXd(0, std::ssize(robot.robot.chain.joints)), .covariates = {}});  // checks
+    result.source = llmt::to_c(*robot.correction, name + "_tree", header_name).source;
+    const std::string declared = fmt::format("#include \"{}\"\n", header_name);
+    const std::size_t at = result.source.find(declared) + declared.size();
+    result.source.insert(at, fmt::format("\nint {}_tree_predict(const double *inputs, double *outputs);\n", name));
+  } else {
+    result.source = fmt::format("#include \"{}\"\n\n#include <math.h>\n", header_name);
+  }
+  result.source += with_name("\n" + tables(robot.robot) + effects + correct(robot) + c_solution, name);
+  return result;
+}
+
+}  // namespace llmt::robotics

@@ -1,0 +1,152 @@
+// Exported C, compiled and run, against the library.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <string>
+
+#include "llmt/c_source.hpp"
+#include "llmt/files.hpp"
+#include "llmt/fit.hpp"
+#include "oracles/random_models.hpp"
+
+namespace {
+
+using llmt::ValidityKind;
+using random_models::Kind;
+
+constexpr double missing = std::numeric_limits<double>::quiet_NaN();
+
+// Reads rows of doubles, writes rows of doubles.
+const char* const driver = R"(#include <stdio.h>
+#include "tree.h"
+int main(void) {
+  double x[%INPUTS%], y[%OUTPUTS%];
+  while (fread(x, sizeof(double), %INPUTS%, stdin) == %INPUTS%) {
+    if (tree_predict(x, y) != 0) return 3;
+    fwrite(y, sizeof(double), %OUTPUTS%, stdout);
+  }
+  return 0;
+}
+)";
+
+std::string replaced(std::string text, const std::string& what, const std::string& by) {
+  for (std::size_t at = text.find(what); at != std::string::npos; at = text.find(what))
+    text.replace(at, what.size(), by);
+  return text;
+}
+
+class CSource : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (std::system("command -v cc >/dev/null") != 0) GTEST_SKIP() << "no C compiler";
+    folder_ = std::filesystem::path(testing::TempDir()) /
+              (std::string("c_source_") + testing::UnitTest::GetInstance()->current_test_info()->name());
+    std::filesystem::create_directories(folder_);
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+
+  // What the exported model says of rows.
+  Eigen::MatrixXd run(const llmt::Model& model, const Eigen::MatrixXd& x) {
+    const llmt::CSource c = llmt::to_c(model, "tree", "tree.h");
+    llmt::write_file((folder_ / "tree.c").string(), c.source);
+    llmt::write_file((folder_ / "tree.h").string(), c.header);
+    llmt::write_file((folder_ / "main.c").string(),
+                     replaced(replaced(driver, "%INPUTS%", std::to_string(model.num_inputs())), "%OUTPUTS%",
+                              std::to_string(model.num_outputs())));
+    const std::string in = fmt::format("cd '{}' && ", folder_.string());
+    const std::string compile = in + "cc -std=c99 -O1 -Wall -Wextra -Werror -pedantic tree.c main.c -o tree -lm";
+    EXPECT_EQ(std::system(compile.c_str()), 0);
+    const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> rows = x;
+    std::ofstream(folder_ / "in", std::ios::binary)
+        .write(reinterpret_cast<const char*>(rows.data()), static_cast<std::streamsize>(rows.size() * sizeof(double)));
+    EXPECT_EQ(std::system((in + "./tree <in >out").c_str()), 0);
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> out(x.rows(), model.num_outputs());
+    out.setConstant(missing);
+    std::ifstream(folder_ / "out", std::ios::binary)
+        .read(reinterpret_cast<char*>(out.data()), static_cast<std::streamsize>(out.size() * sizeof(double)));
+    return out;
+  }
+
+  // The bound is 0 units in the last place: both add in the same order. Gaussians rest on the same exp() here.
+  void expect_equal(const llmt::Model& model, const Eigen::MatrixXd& x, const std::string& name) {
+    const Eigen::MatrixXd expected = model.predict(x);
+    const Eigen::MatrixXd found = run(model, x);
+    EXPECT_TRUE((expected.array() == found.array()).all())
+        << name << ": " << (expected - found).cwiseAbs().maxCoeff() << " apart";
+  }
+
+  std::filesystem::path folder_;
+};
+
+Eigen::MatrixXd queries(const Kind& kind, const llmt::Model& model) {
+  llmt::Random random(7);
+  Eigen::MatrixXd x(2000, kind.inputs);
+  for (Eigen::Index i = 0; i < x.rows(); ++i) {
+    const double reach = i % 3 == 0 ? 2.5 : 0.9;
+    for (Eigen::Index j = 0; j < kind.inputs; ++j) {
+      const bool number = j < kind.inputs - kind.categories;
+      x(i, j) = number ? random.uniform(-reach, reach) : std::floor(random.uniform(0.0, 4.2));
+      if (i % 5 == 0 && random.uniform() < 0.3) x(i, j) = missing;
+    }
+    const llmt::Node& node = model.partitions()[0].nodes[i % model.partitions()[0].nodes.size()];
+    if (i % 7 == 0 && !node.is_leaf() && node.level_side.empty()) x(i, node.split_input) = node.threshold;
+  }
+  return x;
+}
+
+TEST_F(CSource, CompiledSourceGivesTheBytesOfTheLibrary) {
+  const std::vector<Kind> kinds = {
+      {.name = "crisp"},
+      {.name = "crisp, six inputs, clamped", .inputs = 6, .outputs = 3, .clamped = true},
+      {.name = "blend", .validity = ValidityKind::blend, .outputs = 2, .shared = true},
+      {.name = "blend of version 1", .validity = ValidityKind::blend, .smoothness = 2, .leaves = 60},
+      {.name = "categories", .validity = ValidityKind::blend, .inputs = 5, .categories = 2, .clamped = true},
+      {.name = "gaussian", .validity = ValidityKind::gaussian, .inputs = 5},
+      {.name = "gaussian, categories", .validity = ValidityKind::gaussian, .inputs = 4, .categories = 1},
+      {.name = "oblique", .validity = ValidityKind::logistic, .inputs = 4, .outputs = 2, .oblique = true},
+      {.name = "one leaf", .leaves = 1}};
+  for (const Kind& kind : kinds) {
+    const llmt::Model model = random_models::random_model(kind, 3);
+    expect_equal(model, queries(kind, model), kind.name);
+  }
+}
+
+TEST_F(CSource, FittedModelsWithProductsAndCodesGiveTheBytesOfTheLibrary) {
+  llmt::Random random(4);
+  Eigen::MatrixXd x(600, 3);
+  Eigen::MatrixXd y(600, 1);
+  for (Eigen::Index i = 0; i < 600; ++i) {
+    x.row(i) << random.uniform(-1.0, 2.0), random.uniform(-3.0, 1.0), std::floor(random.uniform(0.0, 5.0)) * 10.0;
+    y(i, 0) = x(i, 0) * x(i, 1) + std::sin(3.0 * x(i, 0)) + (x(i, 2) == 20.0 ? 2.0 : 0.0) + 0.01 * random.normal();
+  }
+  llmt::FitOptions products;
+  products.terms = llmt::LocalTerms::quadratic;
+  llmt::FitOptions codes;
+  for (const llmt::FitOptions& options : {llmt::FitOptions{}, products, codes}) {
+    const llmt::Model model = llmt::fit(x, y, options).model;
+    Eigen::MatrixXd at = 1.7 * x;
+    at.col(2) = x.col(2).array() + 4.9;
+    expect_equal(model, at, "fitted");
+  }
+}
+
+TEST_F(CSource, InfiniteInputsAreRefusedAndTheNameIsAnIdentifier) {
+  const llmt::Model model = random_models::random_model({.name = "crisp"}, 1);
+  for (const char* name : {"", "2tree", "a-b", "double", "a_name_of_more_than_thirty_one_letters"}) {
+    EXPECT_THROW(llmt::to_c(model, name, "x.h"), std::invalid_argument) << name;
+  }
+  EXPECT_NE(llmt::to_c(model, "tree", "x.h").source.find("#include \"x.h\""), std::string::npos);
+}
+
+TEST_F(CSource, NamesOfColumnsCannotEndTheComment) {
+  const llmt::Model model =
+      random_models::random_model({.name = "crisp"}, 1).named({"*/ #error", "b\n??/", "c"}, {"d"});
+  run(model, Eigen::MatrixXd::Zero(1, 3));
+}
+
+}  // namespace

@@ -1,0 +1,160 @@
+// The exported robot, compiled and run, against the library.
+#include "llmt/robotics/robot_c_source.hpp"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+
+#include "llmt/files.hpp"
+#include "llmt/fit.hpp"
+#include "llmt/robotics/compensation.hpp"
+#include "robotics/robots.hpp"
+
+namespace llmt::robotics {
+namespace {
+
+using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+// A row in: conditions, joints, position, rotation; out: position and rotation at the joints, joints after twelve
+// steps.
+const char* const driver = R"(#include <stdio.h>
+#include "arm.h"
+int main(void) {{
+  double in[{0} + {1} + 12], out[12 + {1}];
+  while (fread(in, sizeof(double), {0} + {1} + 12, stdin) == {0} + {1} + 12) {{
+    int k;
+    arm_forward(in, in + {0}, out, out + 3);
+    for (k = 0; k < 12; ++k) arm_step(in, in + {0} + {1}, in + {0} + {1} + 3, in + {0});
+    for (k = 0; k < {1}; ++k) out[12 + k] = in[{0} + k];
+    fwrite(out, sizeof(double), 12 + {1}, stdout);
+  }}
+  return 0;
+}}
+)";
+
+class RobotCSource : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (std::system("command -v cc >/dev/null") != 0) GTEST_SKIP() << "no C compiler";
+    folder_ = std::filesystem::path(testing::TempDir()) /
+              (std::string("robot_c_") + testing::UnitTest::GetInstance()->current_test_info()->name());
+    std::filesystem::create_directories(folder_);
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+
+  Rows run(const CorrectedRobot& robot, const Rows& in) {
+    const std::size_t conditions = c_conditions(robot.robot).size();
+    const std::size_t joints = robot.robot.chain.joints.size();
+    const CSource c = to_c(robot, "arm", "arm.h");
+    write_file((folder_ / "arm.c").string(), c.source);
+    write_file((folder_ / "arm.h").string(), c.header);
+    write_file((folder_ / "main.c").string(), fmt::format(fmt::runtime(driver), conditions, joints));
+    const std::string at = fmt::format("cd '{}' && ", folder_.string());
+    EXPECT_EQ(std::system((at + "cc -std=c99 -O1 -Wall -Wextra -Werror -pedantic arm.c main.c -o arm -lm").c_str()), 0);
+    std::ofstream(folder_ / "in", std::ios::binary)
+        .write(reinterpret_cast<const char*>(in.data()), static_cast<std::streamsize>(in.size() * sizeof(double)));
+    EXPECT_EQ(std::system((at + "./arm <in >out").c_str()), 0);
+    Rows out = Rows::Constant(in.rows(), 12 + static_cast<Eigen::Index>(joints), 1e300);
+    std::ifstream(folder_ / "out", std::ios::binary)
+        .read(reinterpret_cast<char*>(out.data()), static_cast<std::streamsize>(out.size() * sizeof(double)));
+    return out;
+  }
+
+  // Asks for the poses of the nominal arm. Returns the largest difference in units in the last place of the reach.
+  double compare(const CorrectedRobot& robot, const Robot& nominal, Poses poses, bool same_commands) {
+    poses.covariates["payload_kg"] = Eigen::VectorXd::Constant(poses.count(), 2.5);
+    const std::vector<std::string> columns = c_conditions(robot.robot);
+    Targets targets{.start = poses, .positions_mm = positions(nominal, poses)};
+    for (const Pose& pose : tool_poses(nominal, poses)) targets.rotations.push_back(pose.rotation);
+    const Eigen::Index joints = poses.joints.cols();
+    Rows in(poses.count(), std::ssize(columns) + joints + 12);
+    for (Eigen::Index i = 0; i < poses.count(); ++i) {
+      for (std::size_t k = 0; k < columns.size(); ++k) in(i, k) = poses.covariates.at(columns[k])(i);
+      in.row(i).segment(std::ssize(columns), joints) = poses.joints.row(i);
+      in.row(i).segment(std::ssize(columns) + joints, 3) = targets.positions_mm.row(i);
+      for (int k = 0; k < 9; ++k) in(i, std::ssize(columns) + joints + 3 + k) = targets.rotations[i](k / 3, k % 3);
+    }
+    const Rows out = run(robot, in);
+    const std::vector<Pose> expected = tool_poses(robot, poses);
+    const Compensation found = compensate(robot, targets);
+    double apart = 0.0;
+    for (Eigen::Index i = 0; i < poses.count(); ++i) {
+      apart = std::max(apart, (out.row(i).head(3).transpose() - expected[i].position_mm).cwiseAbs().maxCoeff());
+      for (int k = 0; k < 9; ++k) EXPECT_NEAR(out(i, 3 + k), expected[i].rotation(k / 3, k % 3), 1e-13);
+      if (!same_commands || found.outcomes[i] != Outcome::reached) continue;
+      EXPECT_LT((out.row(i).tail(joints) - found.commands.joints.row(i)).norm(), 1e-9) << i;
+    }
+    return apart / (reach_of(robot.robot.chain) * std::numeric_limits<double>::epsilon());
+  }
+
+  std::filesystem::path folder_;
+};
+
+Robot with_masses(Robot robot) {
+  for (Joint& joint : robot.chain.joints) {
+    joint.mass_kg = 5.0;
+    joint.com_mm = {30.0, 10.0, 20.0};
+  }
+  robot.chain.payload.com_mm = {10.0, 0.0, 50.0};
+  return robot;
+}
+
+constexpr double bound_ulp = 32.0;  // of the arm's reach: some 60 products of rounded matrices
+
+TEST_F(RobotCSource, ForwardModelAndCommandsAreThoseOfTheLibrary) {
+  const Robot nominal = with_masses(ur_like());
+  CorrectedRobot robot{.robot = perturbed(nominal, 0.5, 0.03, 3), .correction = {}};
+  robot.robot.chain.base = nominal.chain.base;
+  robot.robot.effects = {{.type = "joint_compliance", .at = "joint2", .values = {5e-6}},
+                         {.type = "transmission_error", .at = "joint2", .values = {3e-4, 2e-4}, .constants = {2.0}},
+                         {.type = "eccentricity", .at = "joint1", .values = {3e-4, 2e-4}},
+                         {.type = "backlash_approach", .at = "joint1", .values = {2e-4}},
+                         {.type = "joint_map", .at = "joint4", .values = {1e-4, 0.0, -1e-4}, .constants = {-2.0, 1.0}},
+                         {.type = "wrist_coupling", .at = "joint6", .values = {1e-4}},
+                         {.type = "joint_gain", .at = "joint5", .values = {1e-4}}};
+  Poses poses = random_poses(nominal.chain, 300, 5);
+  Random random(6);
+  poses.covariates["dir1"] = Eigen::VectorXd::NullaryExpr(300, [&] { return random.uniform() < 0.5 ? -1.0 : 1.0; });
+  const double apart = compare(robot, nominal, poses, true);
+  EXPECT_LT(apart, bound_ulp);
+  RecordProperty("ulp", fmt::format("{}", apart));
+}
+
+TEST_F(RobotCSource, JumpingEffectsTreesPrismaticAndRedundantArmsAreThoseOfTheLibrary) {
+  for (const Robot& nominal : {with_masses(scara()), with_masses(seven_axes()), with_masses(mdh_like())}) {
+    CorrectedRobot robot{.robot = nominal, .correction = {}};
+    robot.robot.chain.base.rpy_deg = {10.0, 20.0, 30.0};
+    robot.robot.effects = {{.type = "backlash_gravity", .at = "joint2", .values = {1e-4}},
+                           {.type = "joint_compliance", .at = "joint3", .values = {1e-6}}};
+    const Poses poses = random_poses(nominal.chain, 300, 8);
+    Eigen::MatrixXd error(300, 2);
+    for (Eigen::Index i = 0; i < 300; ++i) {
+      error.row(i) << std::sin(poses.joints(i, 0)), std::abs(poses.joints(i, 1));
+    }
+    std::vector<std::string> inputs;
+    for (std::size_t j = 0; j < nominal.chain.joints.size(); ++j) {
+      const bool turns = nominal.chain.joints[j].type == JointType::revolute;
+      inputs.push_back(fmt::format("q{}_{}", j + 1, turns ? "rad" : "mm"));
+    }
+    robot.correction = fit(poses.joints, error).model.named(inputs, {"dz_mm", "dx_mm"});
+    EXPECT_LT(compare(robot, nominal, random_poses(nominal.chain, 100, 9), false), bound_ulp);
+  }
+}
+
+TEST_F(RobotCSource, EffectsThatAreNoChangeOfAJointAreRefusedByName) {
+  CorrectedRobot robot{.robot = with_masses(ur_like()), .correction = {}};
+  robot.robot.effects = {{.type = "axis_wobble", .at = "joint2", .values = {1e-4, 0.0, 0.0, 0.0}}};
+  try {
+    to_c(robot, "arm", "arm.h");
+    FAIL();
+  } catch (const std::invalid_argument& error) {
+    EXPECT_NE(std::string(error.what()).find("axis_wobble@joint2"), std::string::npos);
+  }
+  EXPECT_THROW(to_c({ur_like(), {}}, "a name", "arm.h"), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace llmt::robotics
