@@ -157,7 +157,8 @@ std::string deform(const Robot& robot, const std::vector<std::string>& condition
     if (!wanted) continue;
     const std::string all = c_effects;
     const std::size_t begin = all.find(std::string("static double ") + helper);
-    text += "\n" + all.substr(begin, all.find("\n}\n", begin) + 3 - begin);
+    text += '\n';
+    text.append(all, begin, all.find("\n}\n", begin) + 3 - begin);
   }
   return text +
          "\n/* What the effects add to the joint values. */\nstatic void @_deform(const double *conditions, const "
@@ -242,7 +243,7 @@ CSource to_c(const CorrectedRobot& robot, const std::string& name, const std::st
   } else {
     result.source = fmt::format("#include \"{}\"\n\n#include <math.h>\n", header_name);
   }
-  result.source += with_name("\n" + tables(robot.robot) + effects + correct(robot) + c_solution, name);
+  result.source += with_name(fmt::format("\n{}{}{}{}", tables(robot.robot), effects, correct(robot), c_solution), name);
   return result;
 }
 

@@ -144,8 +144,12 @@ TEST_F(CSource, InfiniteInputsAreRefusedAndTheNameIsAnIdentifier) {
 }
 
 TEST_F(CSource, NamesOfColumnsCannotEndTheComment) {
-  const llmt::Model model =
-      random_models::random_model({.name = "crisp"}, 1).named({"*/ #error", "b\n??/", "c"}, {"d"});
+  const llmt::Model model = random_models::random_model({.name = "crisp"}, 1)
+                                .named({"*/ #error",
+                                        "b\n?"
+                                        "?/",
+                                        "c"},
+                                       {"d"});
   run(model, Eigen::MatrixXd::Zero(1, 3));
 }
 

@@ -7,7 +7,7 @@
 namespace llmt::robotics {
 namespace {
 
-Chain shipped(const std::string& name) { return read_robot(std::string(LLMT_ROBOTS_DIR) + "/" + name).chain; }
+Chain shipped(const std::string& name) { return read_robot(LLMT_ROBOTS_DIR "/" + name).chain; }
 
 TEST(ShippedArms, AllDescriptionsRead) {
   int count = 0;
