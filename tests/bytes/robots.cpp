@@ -51,6 +51,7 @@ void witness_robot(const std::string& folder, const HiddenEffects& hidden, Resul
 const std::vector<std::string>& effects_of_every_type() {
   static const std::vector<std::string> effects = {
       "joint_compliance, at: joint2, compliance_rad_per_Nm: 1e-6",
+      "joint_compliance_stiffening, at: joint2, compliance_rad_per_Nm: 1e-6, stiffens_at_Nm: 30",
       "joint_compliance_measured, at: joint2, compliance_rad_per_Nm: 1e-6",
       "joint_compliance_free_masses, at: joint5, moments_rad: [1e-4, 2e-4, -1e-4, 1e-4, 0, 1e-4]",
       "link_bending, at: joint3, flexibility_per_Nm2: 2e-6",
@@ -70,12 +71,14 @@ const std::vector<std::string>& effects_of_every_type() {
       "joint_map, at: joint2, first_rad: -2, step_rad: 1, values_rad: [1e-4, -2e-4, 0, 3e-4, 1e-4]",
       "backlash_gravity, at: joint2, half_gap_rad: 2e-4",
       "backlash_approach, at: joint2, half_gap_rad: 2e-4",
+      "friction_under_load, at: joint2, compliance_rad_per_Nm: 1e-6",
       "hysteresis, at: joint2, half_width_rad: 2e-4, presliding_rad: 0.1",
       "thermal_growth, reference_C: 15, expansion_per_K: 1.1e-5",
       "link_thermal_growth, at: joint3, reference_C: 15, expansion_per_K: 1.1e-5",
       "base_thermal_drift, reference_C: 15, vx_mm_per_K: 0.01, vy_mm_per_K: 0.02, vz_mm_per_K: 0",
       "drift, from: 1, to: 60, vx_mm: 0.1, vy_mm: 0.2, vz_mm: -0.1",
       "drift_curved, from: 1, to: 60, vx_mm: 0.1, vy_mm: 0.2, vz_mm: -0.1, wx_mm: 0.1, wy_mm: 0, wz_mm: 0.2",
+      "drift_settling, from: 1, to: 60, settles_in_share: 0.2, vx_mm: 0.1, vy_mm: 0.2, vz_mm: -0.1",
       "tracker_knock, after: 30, x_mm: 0.1, y_mm: 0.2, z_mm: 0, rx_rad: 1e-4, ry_rad: 0, rz_rad: 2e-4",
       "formula, at: joint2, name: own, terms: [{joint: \"cos(3 * q2)\", name: cosine}], coefficients: [2e-4]",
   };

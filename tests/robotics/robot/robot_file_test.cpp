@@ -102,7 +102,7 @@ TEST(RobotFile, DescriptionsThatShipAreReadAndSurviveWriting) {
     expect_same(parse_robot(to_yaml(robot), "again"), robot);
     ++count;
   }
-  EXPECT_EQ(count, 5);
+  EXPECT_EQ(count, 10);
 }
 
 TEST(RobotFile, OptionalPartsMayBeAbsent) {
