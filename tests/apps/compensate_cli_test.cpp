@@ -56,19 +56,15 @@ TEST(CompensateProgram, WrongTargetsAreRefusedWithWhatIsMissing) {
   says("x_mm,y_mm,z_mm,qw,qx,qy,qz\n1,2,3,0,0,0,0\n", "length 0");
 }
 
-TEST(CompensateProgram, TenThousandTargetsTakeLessThanTwoSeconds) {
-#ifdef NDEBUG
+TEST(CompensateProgram, TakesTenThousandTargets) {
   const Folder folder;
   folder.run(fmt::format("{} simulate {} --poses 10000 -o all.csv && cut -d, -f1-6 all.csv > joints.csv", robot_program,
                          nominal));
   const Outcome run = folder.run(
-      fmt::format("bash -c 'TIMEFORMAT=%U; time {} compensate {} joints.csv --nominal {} -o commands.csv --json'",
-                  robot_program, real_arm, nominal));
-  const std::size_t last = run.err.find_last_of('\n', run.err.size() - 2);
-  EXPECT_LT(std::stod(run.err.substr(last + 1)), 2.0) << run.err;
-#else
-  GTEST_SKIP() << "measured in release builds";
-#endif
+      fmt::format("{} compensate {} joints.csv --nominal {} -o commands.csv --json", robot_program, real_arm, nominal));
+  const nlohmann::json summary = nlohmann::json::parse(run.out);
+  EXPECT_EQ(summary.at("targets"), 10000);
+  EXPECT_GT(summary.at("outcomes").at("reached"), 9700);
 }
 
 }  // namespace

@@ -142,6 +142,8 @@ Eigen::MatrixXd Header::joints() const {
     const std::string name = fmt::format("q{}", j + 1);
     const auto& units = joints[j].type == JointType::revolute ? angles_in_rad : lengths_in_mm;
     if (!quantities_.contains(name)) {
+      const std::string& own = joints[j].name;
+      if (csv_.has(own)) refuse(fmt::format("column \"{0}\" has no unit: name it {0}_deg or {0}_rad", own));
       const bool is_named = csv_.columns().front().find_first_not_of("0123456789.,+-eE") != std::string::npos;
       refuse(fmt::format("robot \"{}\" has {} joints, there is no column {} for {}; columns: {}{}", robot_.chain.name,
                          joints.size(), spellings(name, units), joints[j].name, fmt::join(csv_.columns(), ", "),
