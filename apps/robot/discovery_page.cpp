@@ -48,6 +48,11 @@ std::vector<std::string> wrapped(const std::string& text) {
 
 std::string headline(const Discovery& found) {
   const auto refused = [&](const char* kind) { return !found.unknown.empty() && found.unknown[0].shape.kind == kind; };
+  const bool is_certain =
+      std::ranges::any_of(found.effects, [](const FoundEffect& one) { return one.confirmed && !one.smaller; });
+  const bool is_named =
+      found.answer == discovery::Answer::named || found.answer == discovery::Answer::indistinguishable;
+  if (is_named && !is_certain) return "LIKELY CAUSES, NONE CERTAIN. Together these explain what the model lacks:";
   switch (found.answer) {
     case discovery::Answer::nothing_missing:
       return "NOTHING MISSING. What the calibrated model leaves is noise as far as these poses can tell.";
