@@ -134,8 +134,8 @@ double least_energy(const Torques& data, const Friction& friction) {
                   viscous.squaredNorm() - shared / coulomb.squaredNorm());
 }
 
-// Visible: from an energy of 200 on, of which four fifths are searched. Of 110 visible draws of 40 seeds and 300 rows, 109
-// were right; here a few seeds show that it stays so.
+// Visible: from an energy of 200 on, of which four fifths are searched. Of 110 visible draws of 40 seeds and 300 rows,
+// 109 were right; here a few seeds show that it stays so.
 TEST(TorquesOfMuJoCo, FrictionThatTheSimulationLacksIsNamedAtItsJoint) {
   constexpr double visible_energy = 200.0;
   constexpr std::uint64_t seeds = 3;
