@@ -12,6 +12,7 @@
 #include "report/options.hpp"
 #include "robot/commands.hpp"
 #include "robot/corrected_file.hpp"
+#include "robot/measured_file.hpp"
 #include "shared/cli.hpp"
 #include "shared/options.hpp"
 
@@ -30,7 +31,7 @@ struct CalibrateArguments {
   std::string test;
   bool contiguous = false;
   bool json = false;
-  DecimalMark mark = DecimalMark::point;
+  MeasuredFileOptions reading;
   robotics::ReportOptions options;
   ReportFiles reports;
 };
@@ -38,25 +39,28 @@ struct CalibrateArguments {
 struct Row {
   std::string name;
   const robotics::Stage* stage;
-  std::optional<ErrorFigures> test;
+  std::optional<ErrorFigures> test = {};
+  std::optional<ErrorFigures> test_mrad = {};
 };
 
 // Figures on measurements that took no part in anything.
-ErrorFigures test_figures(const robotics::CorrectedRobot& robot, const robotics::Measurements& test) {
-  return error_figures(robotics::distances(robotics::positions(robot, test.poses), test));
+void judge(Row& row, const robotics::CorrectedRobot& robot, const robotics::Measurements& test) {
+  const Eigen::VectorXd errors = robotics::distances(robotics::positions(robot, test.poses), test);
+  const std::vector<Eigen::Index> points = robotics::position_rows(test.poses);
+  const std::vector<Eigen::Index> turns = robotics::orientation_rows(test.poses);
+  row.test = error_figures(errors(points));
+  if (!turns.empty()) {
+    row.test_mrad = error_figures(1e3 / test.poses.observations[turns.front()].lever_mm * errors(turns));
+  }
 }
 
 std::vector<Row> rows_of(const CalibrationReport& report, const std::optional<robotics::Measurements>& test) {
-  std::vector<Row> rows = {{"nominal", &report.nominal, std::nullopt}, {"geometric", &report.geometric, std::nullopt}};
-  if (report.corrected) {
-    rows.push_back({"corrected", &*report.corrected, std::nullopt});
-  }
+  std::vector<Row> rows = {{"nominal", &report.nominal}, {"geometric", &report.geometric}};
+  if (report.corrected) rows.push_back({"corrected", &*report.corrected});
   if (test) {
-    rows[0].test = test_figures({report.calibration.registered, std::nullopt}, *test);
-    rows[1].test = test_figures({report.calibration.robot, std::nullopt}, *test);
-    if (report.corrected) {
-      rows[2].test = test_figures({report.calibration.robot, report.correction->model}, *test);
-    }
+    judge(rows[0], {report.calibration.registered, std::nullopt}, *test);
+    judge(rows[1], {report.calibration.robot, std::nullopt}, *test);
+    if (report.corrected) judge(rows[2], {report.calibration.robot, report.correction->model}, *test);
   }
   return rows;
 }
@@ -80,9 +84,14 @@ Json report_json(const CalibrateArguments& arguments, const robotics::Measuremen
     entry["in_sample_mm"] = figures_json(error_figures(row.stage->in_sample_mm));
     entry["held_out_mm"] =
         row.stage->held_out_mm.size() > 0 ? figures_json(error_figures(row.stage->held_out_mm)) : Json(nullptr);
-    if (row.test) {
-      entry["test_mm"] = figures_json(*row.test);
+    if (row.test) entry["test_mm"] = figures_json(*row.test);
+    if (row.stage->in_sample_mrad.size() > 0) {
+      entry["in_sample_mrad"] = figures_json(error_figures(row.stage->in_sample_mrad));
     }
+    if (row.stage->held_out_mrad.size() > 0) {
+      entry["held_out_mrad"] = figures_json(error_figures(row.stage->held_out_mrad));
+    }
+    if (row.test_mrad) entry["test_mrad"] = figures_json(*row.test_mrad);
     json["errors"][row.name] = std::move(entry);
   }
   json["correction_kept"] = report.corrected ? Json(report.correction_kept) : Json(nullptr);
@@ -92,6 +101,9 @@ Json report_json(const CalibrateArguments& arguments, const robotics::Measuremen
   json["identified_parameters"] = result.rank;
   json["condition_number"] = result.condition_number;
   json["coordinate_noise_mm"] = report.calibration.noise_mm;
+  if (report.calibration.orientation_noise_mrad > 0.0) {
+    json["orientation_noise_mrad"] = report.calibration.orientation_noise_mrad;
+  }
   json["parameters"] = Json::array();
   for (Eigen::Index k = 0; k < result.values.size(); ++k) {
     const discovery::Parameter& parameter = result.parameters[k];
@@ -115,35 +127,40 @@ Json report_json(const CalibrateArguments& arguments, const robotics::Measuremen
   return json;
 }
 
-std::string error_table(const std::vector<Row>& rows, const CalibrationReport& report, bool contiguous) {
-  std::vector<std::string> header = {"position error, mm", "mean", "95 %", "max"};
-  std::string above = "in-sample";
-  if (report.folds > 0) {
-    above += fmt::format(", then held-out ({} {} folds)", report.folds, contiguous ? "contiguous" : "random");
-    header.insert(header.end(), {"| mean", "95 %", "max"});
-  }
-  if (rows.front().test) {
-    above += ", then on the test file";
-    header.insert(header.end(), {"| mean", "95 %", "max"});
-  }
+// One kind of error, in-sample, held-out and on the test file.
+std::string error_table(const std::vector<Row>& rows, const std::string& head, bool is_held_out,
+                        const Eigen::VectorXd robotics::Stage::*in_sample,
+                        const Eigen::VectorXd robotics::Stage::*held_out,
+                        const std::optional<ErrorFigures> Row::*on_test) {
+  std::vector<std::string> header = {head, "mean", "95 %", "max"};
+  if (is_held_out) header.insert(header.end(), {"| mean", "95 %", "max"});
+  if (rows.front().*on_test) header.insert(header.end(), {"| mean", "95 %", "max"});
   Table table(header);
   for (const Row& row : rows) {
     std::vector<std::string> cells = {row.name};
     const auto add = [&](const ErrorFigures& figures) {
-      for (const double value : {figures.mean, figures.p95, figures.max}) {
-        cells.push_back(fmt::format("{:.4f}", value));
-      }
+      for (const double value : {figures.mean, figures.p95, figures.max}) cells.push_back(fmt::format("{:.4f}", value));
     };
-    add(error_figures(row.stage->in_sample_mm));
-    if (report.folds > 0) {
-      add(error_figures(row.stage->held_out_mm));
-    }
-    if (row.test) {
-      add(*row.test);
-    }
+    add(error_figures(row.stage->*in_sample));
+    if (is_held_out) add(error_figures(row.stage->*held_out));
+    if (row.*on_test) add(*(row.*on_test));
     table.add(std::move(cells));
   }
-  return above + ":\n" + table.text();
+  return table.text();
+}
+
+std::string error_tables(const std::vector<Row>& rows, const CalibrationReport& report, bool contiguous) {
+  using robotics::Stage;
+  const bool is_held_out = report.folds > 0;
+  std::string text = "in-sample";
+  if (is_held_out)
+    text += fmt::format(", then held-out ({} {} folds)", report.folds, contiguous ? "contiguous" : "random");
+  if (rows.front().test) text += ", then on the test file";
+  text += ":\n" +
+          error_table(rows, "position error, mm", is_held_out, &Stage::in_sample_mm, &Stage::held_out_mm, &Row::test);
+  if (report.geometric.in_sample_mrad.size() == 0) return text;
+  return text + error_table(rows, "orientation error, mrad", is_held_out, &Stage::in_sample_mrad, &Stage::held_out_mrad,
+                            &Row::test_mrad);
 }
 
 std::string parameter_table(const robotics::Robot& nominal, const CalibrationReport& report) {
@@ -167,16 +184,14 @@ void print_report(const CalibrateArguments& arguments, const robotics::Robot& no
                   const robotics::Measurements& measurements, const CalibrationReport& report,
                   const std::vector<Row>& rows, const std::vector<std::string>& suspicions) {
   const discovery::SolverResult& result = report.calibration.result;
-  print(fmt::format("{}: {} poses of {}\n", arguments.data, measurements.count(), nominal.chain.name));
+  print(fmt::format("{}: {} of {}\n", arguments.data, counts_of(measurements), nominal.chain.name));
   for (const std::string& warning : measurements.warnings) {
     print("Note: " + warning + "\n");
   }
   if (!measurements.unused_columns.empty()) {
     print(fmt::format("Columns not used: {}\n", fmt::join(measurements.unused_columns, ", ")));
   }
-  if (measurements.orientation.values.size() > 0) {
-    print("Orientations are in the file; positions alone are fitted.\n");
-  }
+  print(use_of_orientations(measurements));
   print(fmt::format("\n{}\n", parameter_table(nominal, report)));
   print(result.converged()
             ? fmt::format("{} parameters identified; the fit converged after {} iterations\n", result.rank,
@@ -202,7 +217,7 @@ void print_report(const CalibrateArguments& arguments, const robotics::Robot& no
   for (const discovery::Combination& combination : result.unidentifiable) {
     print(fmt::format("These poses determine only a combination of: {}\n", combination.names()));
   }
-  print("\n" + error_table(rows, report, arguments.contiguous));
+  print("\n" + error_tables(rows, report, arguments.contiguous));
   print("nominal: base and tool fitted to the poses, everything else as described.\n");
   if (report.correction) {
     std::vector<std::string> leaves;
@@ -222,16 +237,17 @@ void print_report(const CalibrateArguments& arguments, const robotics::Robot& no
 }
 
 void calibrate_command(CalibrateArguments arguments) {
-  const robotics::Robot nominal = read_description(arguments.robot, arguments.data, arguments.links);
-  refuse_lost_correction(nominal, arguments.robot, arguments.output);
-  robotics::Measurements measurements = robotics::read_measurements(arguments.data, nominal, {}, arguments.mark);
+  const robotics::Robot described = read_description(arguments.robot, arguments.data, arguments.links);
+  refuse_lost_correction(described, arguments.robot, arguments.output);
+  robotics::Measurements measurements = read_measured(arguments.data, described, {}, arguments.reading);
+  const robotics::Robot nominal = robotics::with_frames(described, measurements.poses);
   if (measurements.count() < arguments.options.folds) {
     throw std::runtime_error(fmt::format("{}: {} poses do not make {} folds", arguments.data, measurements.count(),
                                          arguments.options.folds));
   }
   std::optional<robotics::Measurements> test;
   if (!arguments.test.empty()) {
-    test = robotics::read_measurements(arguments.test, nominal, {}, arguments.mark);
+    test = read_measured(arguments.test, described, {}, arguments.reading);
     check_positions(arguments.robot, nominal, test->poses);
   }
   check_positions(arguments.robot, nominal, measurements.poses);
@@ -249,9 +265,12 @@ void calibrate_command(CalibrateArguments arguments) {
   }
   std::string reports;
   if (arguments.reports.wanted()) {
-    reports = write_reports(arguments.reports,
-                            report::calibration_report({arguments.robot, arguments.data, nominal, measurements, report,
-                                                        arguments.options, suspicions}));
+    const robotics::Measurements points = robotics::orientation_rows(measurements.poses).empty()
+                                              ? measurements
+                                              : select(measurements, robotics::position_rows(measurements.poses));
+    reports =
+        write_reports(arguments.reports, report::calibration_report({arguments.robot, arguments.data, nominal, points,
+                                                                     report, arguments.options, suspicions}));
   }
   if (arguments.json) {
     measurements.warnings.insert(measurements.warnings.end(), suspicions.begin(), suspicions.end());
@@ -295,7 +314,7 @@ void add_calibrate(CLI::App& app) {
   add_count(*command, "--folds", options.folds, 0, "Folds of the held-out figures, 0: none")->capture_default_str();
   command->add_flag("--contiguous", arguments->contiguous, "Folds are blocks of consecutive rows: for paths and grids");
   add_input_file(*command, "--test", arguments->test, "Further measurements that take no part, judged at the end");
-  add_decimal_comma(*command, arguments->mark);
+  add_measured_file_options(*command, arguments->reading);
   add_names(*command, "--fix", options.calibration.fixed, "PARAMETER",
             "What to keep as given: joint2.a, joint3, base, tool");
   add_names(*command, "--only", options.calibration.only, "PARAMETER",

@@ -14,6 +14,7 @@
 #include "robot/commands.hpp"
 #include "robot/corrected_file.hpp"
 #include "robot/discovery_page.hpp"
+#include "robot/measured_file.hpp"
 #include "robot/next_poses.hpp"
 #include "shared/cli.hpp"
 #include "shared/options.hpp"
@@ -33,7 +34,7 @@ struct DiscoverArguments {
   int folds = 0;
   bool contiguous = false;
   bool json = false;
-  DecimalMark mark = DecimalMark::point;
+  MeasuredFileOptions reading;
   robotics::DiscoveryOptions options;
   ReportFiles reports;
 };
@@ -64,9 +65,7 @@ Json folds_json(const robotics::Robot& robot, const robotics::Measurements& data
   dealing.count = arguments.folds;
   dealing.kind = arguments.contiguous ? FoldKind::contiguous : FoldKind::random;
   dealing.seed = arguments.options.seed;
-  const auto pose = data.poses.covariates.find("pose");
-  std::vector<double> groups;
-  if (pose != data.poses.covariates.end()) groups.assign(pose->second.begin(), pose->second.end());
+  const std::vector<double> groups = robotics::pose_labels(data.poses);
   dealing.groups = groups;
   double before = 0.0;
   double after = 0.0;
@@ -105,13 +104,14 @@ Discovery discovered(const robotics::Robot& robot, const robotics::Measurements&
 }
 
 void discover_command(DiscoverArguments arguments) {
-  const robotics::Robot robot = read_description(arguments.robot, arguments.data, arguments.links);
-  refuse_lost_correction(robot, arguments.robot, arguments.output);
+  const robotics::Robot described = read_description(arguments.robot, arguments.data, arguments.links);
+  refuse_lost_correction(described, arguments.robot, arguments.output);
   if (!arguments.catalogue.empty()) arguments.options.catalogue = robotics::read_catalogue(arguments.catalogue);
-  const std::vector<std::string> also = columns_of(arguments.options.catalogue, robot);
-  const robotics::Measurements data = robotics::read_measurements(arguments.data, robot, also, arguments.mark);
+  const std::vector<std::string> also = columns_of(arguments.options.catalogue, described);
+  const robotics::Measurements data = read_measured(arguments.data, described, also, arguments.reading);
+  const robotics::Robot robot = robotics::with_frames(described, data.poses);
   std::optional<robotics::Measurements> test;
-  if (!arguments.test.empty()) test = robotics::read_measurements(arguments.test, robot, also, arguments.mark);
+  if (!arguments.test.empty()) test = read_measured(arguments.test, robot, also, arguments.reading);
   check_positions(arguments.robot, robot, data.poses);
   if (test) check_positions(arguments.robot, robot, test->poses);
   for (const std::string& warning : data.warnings) warn(warning);
@@ -136,8 +136,9 @@ void discover_command(DiscoverArguments arguments) {
     print_json(json);
     return;
   }
-  print(fmt::format("{}: {} poses of {}, {} of them set aside\n\n", arguments.data, data.count(), robot.chain.name,
-                    test ? 0 : found.held_out.poses));
+  print(fmt::format("{}: {} of {}, {} {} set aside\n{}\n", arguments.data, counts_of(data), robot.chain.name,
+                    test ? 0 : found.held_out.poses, data.poses.observations.empty() ? "of them" : "poses",
+                    use_of_orientations(data)));
   print(discovery_page(found));
   print(next_poses_text(next));
   if (!folds.is_null()) {
@@ -171,7 +172,7 @@ void add_discover(CLI::App& app) {
   add_count(*command, "--folds", arguments->folds, 2,
             "Besides, cross-validate the whole discovery with that many folds", 100);
   command->add_flag("--contiguous", arguments->contiguous, "Folds are blocks of consecutive rows");
-  add_decimal_comma(*command, arguments->mark);
+  add_measured_file_options(*command, arguments->reading);
   add_input_file(*command, "--catalogue", arguments->catalogue,
                  "Effects to look for, and their plausible sizes (YAML)");
   add_number(*command, "--mass-uncertainty", arguments->options.mass_uncertainty, any_share,

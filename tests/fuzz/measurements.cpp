@@ -34,12 +34,13 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     return 0;
   }
   try {
-    validate(measurements, robot);
+    validate(measurements, with_frames(robot, measurements.poses));
   } catch (const std::invalid_argument&) {
     return 0;  // a negative payload, for example
   }
-  const std::string written = to_csv(measurements, robot);
-  fuzz::require(to_csv(parse_measurements(written, "written", robot), robot) == written,
+  const Robot whole = with_frames(robot, measurements.poses);
+  const std::string written = to_csv(measurements, whole);
+  fuzz::require(to_csv(parse_measurements(written, "written", robot), whole) == written,
                 "measurements survive writing");
   return 0;
 }

@@ -10,6 +10,7 @@
 
 #include "c_source/effect_source.hpp"
 #include "c_source/runtime.hpp"
+#include "calibration/correction_twist.hpp"
 #include "kinematics/units.hpp"
 #include "llmt/robotics/effects.hpp"
 
@@ -117,16 +118,12 @@ double limit(const Joint& joint, std::size_t side) {
   return (*joint.limits)[side] * (joint.type == JointType::revolute ? radians : 1.0);
 }
 
-Eigen::Matrix3d base_rotation(const Chain& chain) {
-  return Kinematics(chain).skeleton(Eigen::VectorXd::Zero(std::ssize(chain.joints))).base_rotation;
-}
-
 std::string tables(const Robot& robot) {
   const Chain& chain = robot.chain;
   const Elements elements(chain);
   const auto deforms = [](const Effect& effect) { return effect_type(effect.type).elastic; };
   const int passes = std::ranges::any_of(robot.effects, deforms) ? 3 : robot.effects.empty() ? 0 : 1;
-  const Eigen::Vector3d gravity = base_rotation(chain) * chain.gravity_m_s2;
+  const Eigen::Vector3d gravity = base_rotation_of(chain) * chain.gravity_m_s2;
   std::string text =
       fmt::format("enum {{ @_JOINTS = {0}, @_ELEMENTS = {1}, @_PASSES = {2}, @_MOST = {3} }};\n", chain.joints.size(),
                   elements.count(), passes, std::max<std::size_t>(6, chain.joints.size()));
@@ -169,18 +166,21 @@ std::string deform(const Robot& robot, const std::vector<std::string>& condition
 }
 
 std::string correct(const CorrectedRobot& robot) {
-  std::string text = "\nstatic void @_correct(const double *q, double *point) {\n";
+  std::string text = "\nstatic void @_correct(const double *q, double *point, double *turn) {\n  (void)turn;\n";
   if (!robot.correction) return text + "  (void)q;\n  (void)point;\n}\n";
-  const Eigen::Matrix3d base = base_rotation(robot.robot.chain);
+  const Eigen::Matrix3d base = base_rotation_of(robot.robot.chain);
+  const CorrectionTwist correction(*robot.correction, robot.robot.chain);
   text += fmt::format("  double error[{}];\n  if (@_tree_predict(q, error) != 0) return;\n",
                       robot.correction->outputs().size());
   for (std::size_t k = 0; k < robot.correction->outputs().size(); ++k) {
     const OutputColumn& seen = robot.correction->outputs()[k];
-    const int axis = seen.name == "dx_mm" ? 0 : seen.name == "dy_mm" ? 1 : 2;
+    const std::size_t place = correction.places()[k];
+    const Eigen::Index axis = place % 3;
     text += fmt::format("  error[{0}] = error[{0}] < {1} ? {1} : error[{0}] > {2} ? {2} : error[{0}];\n", k,
                         c_number(seen.low), c_number(seen.high));
     for (int row = 0; row < 3; ++row) {
-      text += fmt::format("  point[{}] += {} * error[{}];\n", row, c_number(base(row, axis)), k);
+      text +=
+          fmt::format("  {}[{}] += {} * error[{}];\n", place < 3 ? "point" : "turn", row, c_number(base(row, axis)), k);
     }
   }
   return text + "}\n";

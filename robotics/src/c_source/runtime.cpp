@@ -107,8 +107,29 @@ static void @_sum_loads(const struct @_arm *arm, double payload, struct @_load *
 )";
 
 const char* const c_solution = R"(
+/* Turns a rotation by a rotation vector (Rodrigues). */
+static void @_turn(const double *by, double rotation[3][3]) {
+  const double angle = sqrt(by[0] * by[0] + by[1] * by[1] + by[2] * by[2]);
+  int column;
+  if (!(angle > 0.0)) return;
+  for (column = 0; column < 3; ++column) {
+    const double sine = sin(angle), versine = 1.0 - cos(angle);
+    double axis[3], across[3], along = 0.0;
+    int i;
+    for (i = 0; i < 3; ++i) axis[i] = by[i] / angle;
+    for (i = 0; i < 3; ++i) along += axis[i] * rotation[i][column];
+    across[0] = axis[1] * rotation[2][column] - axis[2] * rotation[1][column];
+    across[1] = axis[2] * rotation[0][column] - axis[0] * rotation[2][column];
+    across[2] = axis[0] * rotation[1][column] - axis[1] * rotation[0][column];
+    for (i = 0; i < 3; ++i) {
+      rotation[i][column] += sine * across[i] + versine * (axis[i] * along - rotation[i][column]);
+    }
+  }
+}
+
 static void @_pose(const double *conditions, const double *q, double *position, struct @_frame *tool) {
   double more[@_JOINTS] = {0.0};
+  double turn[3] = {0.0, 0.0, 0.0};
   struct @_arm arm;
   int pass;
   for (pass = 0; pass < @_PASSES; ++pass) {
@@ -119,7 +140,8 @@ static void @_pose(const double *conditions, const double *q, double *position, 
   }
   @_walk(q, more, &arm);
   *tool = arm.tool;
-  @_correct(q, tool->p);
+  @_correct(q, tool->p, turn);
+  @_turn(turn, tool->r);
   position[0] = tool->p[0];
   position[1] = tool->p[1];
   position[2] = tool->p[2];

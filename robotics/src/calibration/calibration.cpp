@@ -5,62 +5,13 @@
 #include <memory>
 #include <span>
 
+#include "calibration/frame_start.hpp"
 #include "calibration/free_parameters.hpp"
 #include "calibration/joint_map_shift.hpp"
-#include "calibration/registration.hpp"
+#include "calibration/noise_model.hpp"
 
 namespace llmt::robotics {
 namespace {
-
-bool is_frame_parameter(const std::string& name) { return name.starts_with("base.") || name.starts_with("tool."); }
-
-discovery::SolverResult solve_for(Robot& robot, discovery::LeastSquaresProblem problem,
-                                  const std::vector<std::string>& reasons, const discovery::SolverOptions& solver) {
-  for (std::size_t k = 0; k < reasons.size(); ++k) problem.parameters[k].free = reasons[k].empty();
-  discovery::SolverResult result = discovery::solve(problem, solver);
-  robot = with_values(std::move(robot), result.values);
-  return result;
-}
-
-bool covers_base(const std::vector<std::string>& reasons) {
-  return std::ranges::all_of(std::span(reasons).first(6), [](const std::string& why) { return why.empty(); });
-}
-
-// About `count` rows at equal steps: enough to compare starts.
-Measurements rows_at_steps(const Measurements& measurements, Eigen::Index count) {
-  std::vector<Eigen::Index> rows;
-  const Eigen::Index step = std::max<Eigen::Index>(1, measurements.count() / count);
-  for (Eigen::Index i = 0; i < measurements.count(); i += step) rows.push_back(i);
-  return select(measurements, rows);
-}
-
-// The guess of the tool matters: with a wrong one, Kabsch's base lies in the basin of another minimum.
-Robot best_start(const Robot& robot, const Measurements& measurements, const std::vector<std::string>& reasons,
-                 const discovery::SolverOptions& solver) {
-  const Measurements few = rows_at_steps(measurements, 200);
-  Eigen::Matrix3Xd guesses = Eigen::Matrix3Xd::Zero(3, 7);
-  constexpr double tool_guess_mm = 150.0;
-  for (int axis = 0; axis < 3; ++axis) {
-    guesses(axis, 1 + axis) = tool_guess_mm;
-    guesses(axis, 4 + axis) = -tool_guess_mm;
-  }
-  const bool tool_is_free = reasons[6].empty() && reasons[7].empty() && reasons[8].empty();
-  Robot best = robot;
-  double smallest = std::numeric_limits<double>::infinity();
-  for (Eigen::Index guess = 0; guess < (tool_is_free ? guesses.cols() : 1); ++guess) {
-    Robot start = robot;
-    start.chain.tool.xyz_mm += guesses.col(guess);
-    start = with_closed_form_base(std::move(start), few);
-    Robot trial = start;
-    const discovery::SolverResult result = solve_for(trial, calibration_problem(trial, few), reasons, solver);
-    // The tool as given comes first and is kept unless another guess is better by more than 0.1 %.
-    if (result.residual_norms.back() < 0.999 * smallest) {
-      smallest = result.residual_norms.back();
-      best = trial;
-    }
-  }
-  return best;
-}
 
 void set_priors(std::vector<discovery::Parameter>& parameters, Eigen::Index geometric,
                 const CalibrationOptions& options) {
@@ -76,8 +27,9 @@ void set_priors(std::vector<discovery::Parameter>& parameters, Eigen::Index geom
   }
 }
 
-double root_mean_square(const Eigen::VectorXd& residuals, Eigen::Index dof) {
-  return residuals.norm() / std::sqrt(static_cast<double>(std::max<Eigen::Index>(1, dof)));
+double lever_of(const Measurements& measurements) {
+  const std::vector<Eigen::Index> turns = orientation_rows(measurements.poses);
+  return turns.empty() ? 1.0 : measurements.poses.observations[turns.front()].lever_mm;
 }
 
 // A backlash jumps where the torque changes its sign: the difference on the other side of the pose is the derivative.
@@ -129,27 +81,31 @@ void finish_by_differences(Calibration& calibration, discovery::LeastSquaresProb
 // Least squares with priors. The weight of the data against the priors depends on the noise, which the residuals of the
 // registered robot overestimate. So the fit is repeated from its own result, with the noise of the fit before, until
 // the noise settles.
-void identify(Calibration& calibration, const discovery::LeastSquaresProblem& unweighted,
-              const std::vector<std::string>& reasons, const CalibrationOptions& options) {
+void identify(Calibration& calibration, const Measurements& measurements,
+              const discovery::LeastSquaresProblem& unweighted, const std::vector<std::string>& reasons,
+              const CalibrationOptions& options) {
   const bool has_priors = options.prior_length_mm > 0.0 || options.prior_angle_deg > 0.0;
-  const int largest_number_of_passes = has_priors ? 10 : 1;
-  constexpr double smallest_noise_mm = 1e-9;
+  const bool is_weighed = has_priors || !orientation_rows(measurements.poses).empty();
+  const int largest_number_of_passes = is_weighed ? 10 : 1;
+  const NoiseModel model(measurements, options);
   discovery::LeastSquaresProblem problem = unweighted;
   set_priors(problem.parameters, geometric_parameter_count(calibration.robot.chain), options);
-  calibration.noise_mm =
-      root_mean_square(calibration.registration.residuals, calibration.registration.residuals.size());
+  CommonNoise noise = model.estimate(calibration.registration.residuals, 0);
   for (int pass = 0; pass < largest_number_of_passes; ++pass) {
-    const double weight = 1.0 / std::max(smallest_noise_mm, calibration.noise_mm);
-    problem.weights = Eigen::VectorXd::Constant(calibration.registration.residuals.size(), weight);
+    problem.weights = model.weights(noise);
     calibration.result = solve_for(calibration.robot, problem, reasons, options.solver);
     for (std::size_t k = 0; k < reasons.size(); ++k) {
       problem.parameters[k].value = calibration.result.values(k);
     }
-    const Eigen::VectorXd& residuals = calibration.result.residuals;
-    const double before = calibration.noise_mm;
-    calibration.noise_mm = root_mean_square(residuals, residuals.size() - calibration.result.rank);
-    if (calibration.noise_mm > 0.95 * before) break;
+    const CommonNoise before = noise;
+    noise = model.estimate(calibration.result.residuals, calibration.result.rank);
+    const auto is_settled = [](double now, double then) { return now > 0.95 * then || then == 0.0; };
+    if (is_settled(noise.position_mm, before.position_mm) && is_settled(noise.orientation_mm, before.orientation_mm)) {
+      break;
+    }
   }
+  calibration.noise_mm = noise.position_mm;
+  calibration.orientation_noise_mrad = 1e3 * noise.orientation_mm / lever_of(measurements);
   const bool is_finished = calibration.result.converged();
   if (!is_finished && options.finish && !calibration.robot.effects.empty()) {
     finish_by_differences(calibration, problem, reasons, options.solver);
@@ -226,8 +182,7 @@ discovery::SolverResult register_frames(Robot& robot, const Measurements& measur
   for (std::size_t k = 0; k < all.size(); ++k) {
     if (!is_frame_parameter(all[k].name)) reasons[k] = "not a frame";
   }
-  const bool all_seen = std::ranges::all_of(measurements.measured, [](bool seen) { return seen; });
-  if (covers_base(reasons) && all_seen) robot = best_start(robot, measurements, reasons, options.solver);
+  robot = with_started_frames(std::move(robot), measurements, reasons, options.solver);
   return solve_for(robot, calibration_problem(robot, measurements), reasons, options.solver);
 }
 
@@ -258,7 +213,7 @@ Calibration calibrate_without_maps(const Robot& robot, const Measurements& measu
   const Eigen::Index geometric = geometric_parameter_count(rigid.chain);
   jacobian.leftCols(geometric) = position_jacobian(rigid, measurements.poses)(measured_rows(measurements), Eigen::all);
   fix_dependent(problem.parameters, jacobian, geometric, options.dependence_tolerance, reasons);
-  identify(calibration, problem, reasons, options);
+  identify(calibration, measurements, problem, reasons, options);
   calibration.robot.identified = identified_parameters(calibration.result, reasons);
   for (std::size_t k = 0; k < reasons.size(); ++k) {
     if (!reasons[k].empty()) calibration.fixed.push_back({problem.parameters[k].name, reasons[k]});
@@ -269,7 +224,7 @@ Calibration calibrate_without_maps(const Robot& robot, const Measurements& measu
 }  // namespace
 
 Calibration calibrate(const Robot& robot, const Measurements& measurements, const CalibrationOptions& options) {
-  const Unmapped plain = unmapped(robot, measurements);
+  const Unmapped plain = unmapped(with_frames(robot, measurements.poses), measurements);
   Calibration calibration = calibrate_without_maps(plain.robot, plain.measurements, options);
   for (Robot* fitted : {&calibration.robot, &calibration.registered}) {
     fitted->effects.insert(fitted->effects.end(), plain.maps.begin(), plain.maps.end());

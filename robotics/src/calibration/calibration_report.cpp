@@ -18,22 +18,13 @@ struct Fitted {
   std::optional<FitResult> correction;
 };
 
-// Repeats of a pose must not sit on both sides of a fold.
-std::span<const double> pose_labels(const Measurements& measurements) {
-  const auto found = measurements.poses.covariates.find("pose");
-  if (found == measurements.poses.covariates.end()) return {};
-  return {found->second.data(), static_cast<std::size_t>(found->second.size())};
-}
-
 Fitted fit_all(const Robot& robot, const Measurements& measurements, const ReportOptions& options) {
   Fitted fitted{.calibration = calibrate(robot, measurements, options.calibration), .correction = {}};
   if (!options.correct) return fitted;
+  const std::vector<double> labels = pose_labels(measurements.poses);
   FitOptions fit = options.correction;
   fit.validity = ValidityChoice::crisp;
-  fit.folds = {.count = options.correction_folds,
-               .kind = options.kind,
-               .seed = options.seed,
-               .groups = pose_labels(measurements)};
+  fit.folds = {.count = options.correction_folds, .kind = options.kind, .seed = options.seed, .groups = labels};
   fit.intervals = false;
   fit.max_threads = options.max_threads;
   fitted.correction = fit_correction(fitted.calibration.robot, measurements, fit);
@@ -69,7 +60,7 @@ double length_of(const Chain& chain) { return reach_of(chain) - chain.tool.xyz_m
 void hold_out(const Robot& robot, const Measurements& measurements, const ReportOptions& options,
               CalibrationReport& report) {
   const Eigen::Index n = measurements.count();
-  const std::span<const double> labels = pose_labels(measurements);
+  const std::vector<double> labels = pose_labels(measurements.poses);
   report.grouped = !labels.empty();
   report.nominal.held_out_mm.resize(n);
   report.geometric.held_out_mm.resize(n);
@@ -85,6 +76,20 @@ void hold_out(const Robot& robot, const Measurements& measurements, const Report
     tell(options, std::ssize(report.fold_terminations));
   }
   report.folds = options.folds;
+}
+
+// What was kept by row becomes distances of points and angles of orientations.
+void part_kinds(const Measurements& measurements, Stage& stage) {
+  const std::vector<Eigen::Index> turns = orientation_rows(measurements.poses);
+  if (turns.empty()) return;
+  const std::vector<Eigen::Index> points = position_rows(measurements.poses);
+  const auto part = [&](Eigen::VectorXd& of_rows, Eigen::VectorXd& angles) {
+    if (of_rows.size() == 0) return;
+    angles = 1e3 / measurements.poses.observations[turns.front()].lever_mm * of_rows(turns);
+    of_rows = Eigen::VectorXd(of_rows(points));
+  };
+  part(stage.in_sample_mm, stage.in_sample_mrad);
+  part(stage.held_out_mm, stage.held_out_mrad);
 }
 
 void decide(CalibrationReport& report) {
@@ -197,6 +202,9 @@ CalibrationReport report_calibration(const Robot& robot, const Measurements& mea
   if (options.correct) report.corrected = Stage{.in_sample_mm = in_sample.corrected, .held_out_mm = {}};
   tell(options, 0);
   if (options.folds != 0) hold_out(robot, measurements, options, report);
+  part_kinds(measurements, report.nominal);
+  part_kinds(measurements, report.geometric);
+  if (report.corrected) part_kinds(measurements, *report.corrected);
   decide(report);
   return report;
 }

@@ -1,63 +1,109 @@
 #include "llmt/robotics/correction.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
+#include <Eigen/QR>
 #include <algorithm>
-#include <array>
 #include <filesystem>
+#include <map>
 #include <stdexcept>
+#include <utility>
 
+#include "calibration/correction_twist.hpp"
 #include "llmt/files.hpp"
 #include "llmt/robotics/robot_file.hpp"
+#include "robot/chart.hpp"
 
 namespace llmt::robotics {
 namespace {
 
-const std::array<std::string, 3> output_names = {"dx_mm", "dy_mm", "dz_mm"};
+// Residuals of readings at one stand of the arm, brought to the point of the chain's own tool.
+struct Stands {
+  Eigen::MatrixXd joints;  // n x J
+  Eigen::MatrixXd twists;  // n x 6 as CorrectionTwist::at()
+};
 
-Eigen::Matrix3d base_rotation(const Chain& chain) {
-  const Eigen::VectorXd any = Eigen::VectorXd::Zero(std::ssize(chain.joints));
-  return Kinematics(chain).skeleton(any).base_rotation;
+// Where the tool point of every row stands from that of the chain's own tool, in the world frame.
+Eigen::MatrixXd arms_of(const Robot& robot, const Poses& poses) {
+  Poses own = poses;
+  for (Observation& seen : own.observations) seen = {.base = seen.base};
+  Poses all = poses;
+  for (Observation& seen : all.observations) seen.reading = Reading::position;
+  return positions(robot, all) - positions(robot, own);
 }
 
-std::vector<std::string> joint_names(const Chain& chain) {
-  std::vector<std::string> names;
-  for (std::size_t j = 0; j < chain.joints.size(); ++j) {
-    names.push_back(fmt::format("q{}_{}", j + 1, chain.joints[j].type == JointType::revolute ? "rad" : "mm"));
-  }
-  return names;
+Eigen::Matrix3d base_rotation_of(const Chain& chain, const std::string& base) {
+  Chain own = chain;
+  const auto found = std::ranges::find(chain.bases, base, &NamedFrame::name);
+  if (found != chain.bases.end()) own.base = found->frame;
+  return base_rotation_of(own);
 }
 
-void check_inputs(const Model& model, const Chain& chain) {
-  std::vector<std::string> inputs;
-  bool numbers = true;
-  for (const InputColumn& input : model.inputs()) {
-    inputs.push_back(input.name);
-    numbers = numbers && !input.is_categorical();
-  }
-  const std::vector<std::string> joints = joint_names(chain);
-  if (inputs == joints && numbers) return;
-  throw std::invalid_argument(
-      fmt::format("llmt::robotics: the correction has the inputs {}, robot \"{}\" needs the numbers {}, in this order",
-                  fmt::join(inputs, ", "), chain.name, fmt::join(joints, ", ")));
+Eigen::Matrix3d cross_of(const Eigen::Vector3d& v) {
+  Eigen::Matrix3d matrix;
+  matrix << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
+  return matrix;
 }
 
-std::vector<Eigen::Index> axes_of(const Model& model) {
-  std::vector<Eigen::Index> axes;
-  for (const OutputColumn& output : model.outputs()) {
-    const auto found = std::ranges::find(output_names, output.name);
-    if (found == output_names.end()) {
-      throw std::invalid_argument(
-          fmt::format("llmt::robotics: output \"{}\" of the correction is none of dx_mm, dy_mm, dz_mm", output.name));
+// The twist of least squares that explains the residuals of the rows of one stand: that of a point is d + r x arm, that
+// of an orientation r.
+Eigen::VectorXd twist_of(const Robot& robot, const Measurements& measurements, const Eigen::MatrixXd& errors,
+                         const Eigen::MatrixXd& arms, const std::vector<Eigen::Index>& rows) {
+  constexpr double lever_mm = 300.0;  // makes lengths of angles
+  Eigen::MatrixXd equations = Eigen::MatrixXd::Zero(3 * std::ssize(rows), 6);
+  Eigen::VectorXd right(equations.rows());
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    const Observation& seen = measurements.poses.observations[rows[k]];
+    const Eigen::Matrix3d base = base_rotation_of(robot.chain, seen.base);
+    auto block = equations.middleRows(3 * k, 3);
+    if (seen.reading == Reading::orientation) {
+      block.rightCols(3).diagonal().setConstant(1.0);
+      right.segment(3 * k, 3) = base.transpose() * errors.row(rows[k]).transpose() * (lever_mm / seen.lever_mm);
+    } else {
+      block.leftCols(3).setIdentity();
+      block.rightCols(3) = -cross_of(base.transpose() * arms.row(rows[k]).transpose()) / lever_mm;
+      right.segment(3 * k, 3) = base.transpose() * errors.row(rows[k]).transpose();
     }
-    axes.push_back(found - output_names.begin());
-    if (std::ranges::count(axes, axes.back()) > 1) {
-      throw std::invalid_argument(
-          fmt::format("llmt::robotics: output \"{}\" of the correction is there twice", output.name));
+  }
+  Eigen::VectorXd twist = equations.completeOrthogonalDecomposition().solve(right);
+  twist.tail<3>() /= lever_mm;
+  return twist;
+}
+
+Stands stands_of(const Robot& robot, const Measurements& measurements) {
+  const std::vector<Observation>& observations = measurements.poses.observations;
+  std::map<std::pair<Eigen::Index, std::string>, std::vector<Eigen::Index>> groups;
+  std::size_t most = 0;
+  for (Eigen::Index i = 0; i < measurements.count(); ++i) {
+    if (observations[i].reading == Reading::distance) {
+      throw std::invalid_argument("llmt::robotics::fit_correction: distances do not tell a correction of positions");
+    }
+    auto& rows = groups[{observations[i].stand, observations[i].base}];
+    rows.push_back(i);
+    most = std::max(most, rows.size());
+  }
+  const Eigen::MatrixXd errors = measurements.positions_mm - positions(robot, measurements.poses);
+  const Eigen::MatrixXd arms = arms_of(robot, measurements.poses);
+  std::vector<Eigen::Index> first;
+  std::vector<Eigen::VectorXd> twists;
+  for (const auto& [stand, rows] : groups) {
+    // A single point does not tell how the tool is turned: where others do, it is left out.
+    if (most > 1 && rows.size() == 1) continue;
+    first.push_back(rows.front());
+    if (most > 1) {
+      twists.push_back(twist_of(robot, measurements, errors, arms, rows));
+    } else {
+      const Eigen::Matrix3d base = base_rotation_of(robot.chain, stand.second);
+      twists.emplace_back(Eigen::VectorXd::Zero(6));
+      twists.back().head<3>() = base.transpose() * errors.row(rows.front()).transpose();
     }
   }
-  return axes;
+  Stands stands{measurements.poses.joints(first, Eigen::all), Eigen::MatrixXd(std::ssize(first), 6)};
+  for (std::size_t k = 0; k < twists.size(); ++k) stands.twists.row(k) = twists[k].transpose();
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    if (!measurements.measured[axis]) stands.twists.col(axis).setZero();
+  }
+  return stands;
 }
 
 }  // namespace
@@ -68,48 +114,58 @@ Eigen::MatrixXd residuals(const Robot& robot, const Measurements& measurements) 
   for (Eigen::Index axis = 0; axis < 3; ++axis) {
     if (!measurements.measured[axis]) world.col(axis).setZero();
   }
-  return world * base_rotation(robot.chain);  // rows: r' R = (R' r)'
+  return world * base_rotation_of(robot.chain);  // rows: r' R = (R' r)'
 }
 
 FitResult fit_correction(const Robot& robot, const Measurements& measurements, const FitOptions& options) {
-  const Eigen::MatrixXd all = residuals(robot, measurements);
+  const bool is_plain = measurements.poses.observations.empty();
+  const Stands stands =
+      is_plain ? Stands{measurements.poses.joints, residuals(robot, measurements)} : stands_of(robot, measurements);
   std::vector<Eigen::Index> axes;
   std::vector<std::string> names;
-  for (Eigen::Index axis = 0; axis < 3; ++axis) {
-    if (all.col(axis).isZero(0.0)) continue;
+  for (Eigen::Index axis = 0; axis < stands.twists.cols(); ++axis) {
+    if (stands.twists.col(axis).isZero(0.0)) continue;
     axes.push_back(axis);
-    names.push_back(output_names[axis]);
+    names.push_back(correction_outputs[axis]);
   }
   if (axes.empty()) throw std::invalid_argument("llmt::robotics::fit_correction: all residuals are zero");
-  const Eigen::MatrixXd outputs = all(Eigen::all, axes);
+  const Eigen::MatrixXd outputs = stands.twists(Eigen::all, axes);
   FitOptions of_numbers = options;
-  of_numbers.choose_codes = false;  // joint positions that were measured on a grid are no names
-  FitResult result = fit(measurements.poses.joints, outputs, of_numbers);
-  result.model = result.model.named(joint_names(robot.chain), names);
+  of_numbers.choose_codes = false;              // joint positions that were measured on a grid are no names
+  if (!is_plain) of_numbers.folds.groups = {};  // every stand is one sample now
+  FitResult result = fit(stands.joints, outputs, of_numbers);
+  result.model = result.model.named(correction_inputs(robot.chain), names);
   return result;
 }
 
 Eigen::MatrixXd positions(const CorrectedRobot& robot, const Poses& poses) {
   Eigen::MatrixXd points = positions(robot.robot, poses);
   if (!robot.correction) return points;
-  const Model& model = *robot.correction;
-  check_inputs(model, robot.robot.chain);
-  const std::vector<Eigen::Index> axes = axes_of(model);
-  Eigen::MatrixXd error = Eigen::MatrixXd::Zero(poses.count(), 3);
-  const Eigen::MatrixXd predicted = model.predict(poses.joints);
-  for (std::size_t k = 0; k < axes.size(); ++k) {
-    const OutputColumn& seen = model.outputs()[k];
-    error.col(axes[k]) = predicted.col(k).cwiseMax(seen.low).cwiseMin(seen.high);
+  const CorrectionTwist correction(*robot.correction, robot.robot.chain);
+  if (poses.observations.empty()) {
+    points += correction.at(poses.joints).leftCols(3) * base_rotation_of(robot.robot.chain).transpose();
+    return points;
   }
-  points += error * base_rotation(robot.robot.chain).transpose();
+  const std::vector<Pose> tools = tool_poses(robot, poses);
+  for (Eigen::Index i = 0; i < points.rows(); ++i) {
+    points.row(i) = reading_of(tools[i], &poses.observations[i]).transpose();
+  }
   return points;
 }
 
 std::vector<Pose> tool_poses(const CorrectedRobot& robot, const Poses& poses) {
-  std::vector<Pose> result = tool_poses(robot.robot, poses);
-  const Eigen::MatrixXd points = positions(robot, poses);
-  for (std::size_t i = 0; i < result.size(); ++i) result[i].position_mm = points.row(i).transpose();
-  return result;
+  std::vector<Pose> tools = tool_poses(robot.robot, poses);
+  if (!robot.correction) return tools;
+  const CorrectionTwist correction(*robot.correction, robot.robot.chain);
+  const Eigen::MatrixXd twists = correction.at(poses.joints);
+  const bool is_plain = poses.observations.empty();
+  const Eigen::MatrixXd arms = is_plain ? Eigen::MatrixXd::Zero(poses.count(), 3) : arms_of(robot.robot, poses);
+  for (Eigen::Index i = 0; i < std::ssize(tools); ++i) {
+    const Eigen::Matrix3d base =
+        base_rotation_of(robot.robot.chain, is_plain ? std::string() : poses.observations[i].base);
+    tools[i] = moved(tools[i], twists.row(i).transpose(), base, arms.row(i).transpose());
+  }
+  return tools;
 }
 
 CorrectedRobot read_corrected_robot(const std::string& path, const UrdfLinks& links) {
@@ -123,8 +179,7 @@ CorrectedRobot read_corrected_robot(const std::string& path, const UrdfLinks& li
   }
   robot.correction = from_json(text, model.string());
   try {
-    check_inputs(*robot.correction, robot.robot.chain);
-    axes_of(*robot.correction);
+    CorrectionTwist(*robot.correction, robot.robot.chain);
   } catch (const std::invalid_argument& error) {
     throw std::runtime_error(fmt::format("{}: {}", model.string(), error.what()));
   }

@@ -2,8 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 #include <stdexcept>
 
 namespace llmt::robotics {
@@ -79,7 +81,11 @@ void fix_dependent(const std::vector<discovery::Parameter>& parameters, const Ei
   Eigen::MatrixXd basis(jacobian.rows(), jacobian.cols());
   Eigen::Index kept = 0;
   double largest = 0.0;
-  for (std::size_t k = 0; k < parameters.size(); ++k) {
+  // Frames first: what a frame can do as well is no error of the arm.
+  std::vector<std::size_t> order(parameters.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::ranges::stable_partition(order, [&](std::size_t k) { return is_frame_parameter(parameters[k].name); });
+  for (const std::size_t k : order) {
     if (!reasons[k].empty()) continue;
     const bool is_geometric = static_cast<Eigen::Index>(k) < geometric;
     const double tolerance = is_geometric ? geometric_tolerance : std::max(effect_tolerance, geometric_tolerance);

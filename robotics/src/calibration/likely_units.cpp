@@ -12,14 +12,14 @@
 namespace llmt::robotics {
 namespace {
 
-struct Reading {
+struct Misread {
   double of_angles;
   double of_positions;
   const char* words;
 };
 
 constexpr double degrees = 180.0 / std::numbers::pi;
-constexpr Reading readings[] = {
+constexpr Misread misreads[] = {
     {degrees, 1.0, "if the angles of the file were radians, not degrees"},
     {1.0 / degrees, 1.0, "if the angles of the file were degrees, not radians"},
     {1.0, 1000.0, "if the measured positions were a thousand times as large (metres, not millimetres)"},
@@ -34,13 +34,13 @@ Measurements some_of(const Measurements& measurements) {
   return select(measurements, rows);
 }
 
-Measurements read_as(Measurements measurements, const Chain& chain, const Reading& reading) {
+Measurements read_as(Measurements measurements, const Chain& chain, const Misread& misread) {
   for (std::size_t j = 0; j < chain.joints.size(); ++j) {
     if (chain.joints[j].type == JointType::revolute) {
-      measurements.poses.joints.col(static_cast<Eigen::Index>(j)) *= reading.of_angles;
+      measurements.poses.joints.col(static_cast<Eigen::Index>(j)) *= misread.of_angles;
     }
   }
-  measurements.positions_mm *= reading.of_positions;
+  measurements.positions_mm *= misread.of_positions;
   return measurements;
 }
 
@@ -49,16 +49,16 @@ Measurements read_as(Measurements measurements, const Chain& chain, const Readin
 std::string likely_units(const Robot& robot, const Measurements& measurements, double misfit_mm, double plausible_mm) {
   constexpr double far_better = 0.1;
   const Measurements some = some_of(measurements);
-  const Reading* best = nullptr;
+  const Misread* best = nullptr;
   double smallest = std::min(far_better * misfit_mm, plausible_mm);
-  for (const Reading& reading : readings) {
-    const Measurements other = read_as(some, robot.chain, reading);
+  for (const Misread& misread : misreads) {
+    const Measurements other = read_as(some, robot.chain, misread);
     try {
       const Robot placed = calibrate(robot, other, {.only = {"base", "tool"}}).robot;
       const double misses = distances(positions(placed, other.poses), other).mean();
       if (misses >= smallest) continue;
       smallest = misses;
-      best = &reading;
+      best = &misread;
     } catch (const std::exception&) {
       continue;  // so it is not that
     }

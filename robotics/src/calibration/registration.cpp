@@ -1,6 +1,7 @@
 #include "calibration/registration.hpp"
 
 #include <Eigen/Geometry>
+#include <Eigen/QR>
 #include <Eigen/SVD>
 #include <cmath>
 #include <numbers>
@@ -35,6 +36,51 @@ Robot with_closed_form_base(Robot robot, const Measurements& measurements) {
   robot.chain.base = Frame{};
   const Pose base = kabsch(positions(robot, measurements.poses), measurements.positions_mm);
   robot.chain.base = {.xyz_mm = base.position_mm, .rpy_deg = roll_pitch_yaw_deg(base.rotation)};
+  return robot;
+}
+
+Robot with_closed_form_tool(Robot robot, const Measurements& measurements) {
+  Robot at_flange = robot;
+  at_flange.chain.tool = Frame{};
+  const std::vector<Pose> flanges = tool_poses(at_flange, measurements.poses);
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (std::size_t i = 0; i < flanges.size(); ++i) {
+    const Eigen::Vector3d point = measurements.positions_mm.row(static_cast<Eigen::Index>(i)).transpose();
+    sum += flanges[i].rotation.transpose() * (point - flanges[i].position_mm);
+  }
+  robot.chain.tool.xyz_mm = sum / static_cast<double>(flanges.size());
+  return robot;
+}
+
+Robot with_closed_form_orientation(Robot robot, const Measurements& measurements) {
+  Robot at_flange = robot;
+  at_flange.chain.tool = Frame{};
+  const std::vector<Pose> flanges = tool_poses(at_flange, measurements.poses);
+  Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+  for (std::size_t i = 0; i < flanges.size(); ++i) {
+    sum += flanges[i].rotation.transpose() * measurements.poses.observations[i].reference;
+  }
+  // The rotation nearest to the sum.
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(sum, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  Eigen::Vector3d handedness = Eigen::Vector3d::Ones();
+  if ((svd.matrixU() * svd.matrixV().transpose()).determinant() < 0.0) handedness(2) = -1.0;
+  robot.chain.tool.rpy_deg = roll_pitch_yaw_deg(svd.matrixU() * handedness.asDiagonal() * svd.matrixV().transpose());
+  return robot;
+}
+
+Robot with_base_by_distances(Robot robot, const Measurements& measurements) {
+  Robot at_origin = robot;
+  at_origin.chain.base.xyz_mm.setZero();
+  const std::vector<Pose> tools = tool_poses(at_origin, measurements.poses);
+  Eigen::MatrixX4d equations(measurements.count(), 4);
+  Eigen::VectorXd right(measurements.count());
+  for (Eigen::Index i = 0; i < measurements.count(); ++i) {
+    const Eigen::Vector3d& p = tools[i].position_mm;
+    equations.row(i) << 2.0 * p.transpose(), 1.0;
+    right(i) = std::pow(measurements.positions_mm(i, 0), 2) - p.squaredNorm();
+  }
+  const Eigen::Vector4d solution = equations.colPivHouseholderQr().solve(right);
+  robot.chain.base.xyz_mm = solution.head<3>();
   return robot;
 }
 

@@ -4,13 +4,14 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <stdexcept>
 #include <tuple>
 #include <utility>
 
+#include "calibration/correction_twist.hpp"
 #include "compensation/inverse.hpp"
 #include "kinematics/units.hpp"
 #include "llmt/robotics/effects.hpp"
@@ -54,28 +55,17 @@ class Arm {
   Arm(const CorrectedRobot& robot, const Poses& conditions, std::vector<std::pair<std::string, Eigen::Index>> read_back)
       : robot_(robot), poses_(conditions), read_back_(std::move(read_back)), evaluator_(robot.robot, poses_) {
     if (!robot.correction) return;
-    static const std::array<std::string, 3> names = {"dx_mm", "dy_mm", "dz_mm"};
-    positions(robot, select(conditions, {0}));  // its checks of the correction
-    const Eigen::VectorXd any = Eigen::VectorXd::Zero(conditions.joints.cols());
-    base_rotation_ = Kinematics(robot.robot.chain).skeleton(any).base_rotation;
-    for (const OutputColumn& output : robot.correction->outputs()) {
-      axes_.push_back(std::ranges::find(names, output.name) - names.begin());
-    }
+    correction_.emplace(*robot.correction, robot.robot.chain);
+    base_rotation_ = base_rotation_of(robot.robot.chain);
   }
 
   Pose at(Eigen::Index row, const Eigen::VectorXd& q) {
     poses_.joints.row(row) = q.transpose();
     for (const auto& [column, joint] : read_back_) poses_.covariates.at(column)(row) = q(joint);
     Pose pose = evaluator_.pose(row);
-    if (!robot_.correction) return pose;
-    const Eigen::MatrixXd predicted = robot_.correction->predict(q.transpose(), 1);
-    Eigen::Vector3d error = Eigen::Vector3d::Zero();
-    for (std::size_t k = 0; k < axes_.size(); ++k) {
-      const OutputColumn& seen = robot_.correction->outputs()[k];
-      error(axes_[k]) = std::clamp(predicted(0, k), seen.low, seen.high);
-    }
-    pose.position_mm += base_rotation_ * error;
-    return pose;
+    if (!correction_) return pose;
+    return moved(std::move(pose), correction_->at(q.transpose(), 1).row(0).transpose(), base_rotation_,
+                 Eigen::Vector3d::Zero());
   }
 
   const Poses& poses() const { return poses_; }
@@ -86,7 +76,7 @@ class Arm {
   std::vector<std::pair<std::string, Eigen::Index>> read_back_;
   RobotEvaluator evaluator_;
   Eigen::Matrix3d base_rotation_ = Eigen::Matrix3d::Identity();
-  std::vector<Eigen::Index> axes_;
+  std::optional<CorrectionTwist> correction_;
 };
 
 struct Found {

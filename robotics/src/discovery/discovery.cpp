@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <stdexcept>
 
 #include "calibration/joint_map_shift.hpp"
@@ -24,7 +25,25 @@ namespace llmt::robotics {
 namespace {
 
 ErrorFigures figures(const CorrectedRobot& robot, const Measurements& measurements) {
-  return error_figures(distances(positions(robot, measurements.poses), measurements));
+  const Eigen::VectorXd errors = distances(positions(robot, measurements.poses), measurements);
+  return error_figures(errors(position_rows(measurements.poses)));
+}
+
+Eigen::Index count_of_stands(const Poses& poses) {
+  if (poses.observations.empty()) return poses.count();
+  std::set<Eigen::Index> stands;
+  for (const Observation& seen : poses.observations) stands.insert(seen.stand);
+  return std::ssize(stands);
+}
+
+// The search takes all readings for equally exact. With this lever orientations are.
+Measurements with_lever(Measurements measurements, double lever_mm) {
+  for (const Eigen::Index row : orientation_rows(measurements.poses)) {
+    Observation& seen = measurements.poses.observations[row];
+    measurements.positions_mm.row(row) *= lever_mm / seen.lever_mm;
+    seen.lever_mm = lever_mm;
+  }
+  return measurements;
 }
 
 // Mean length of a vector of d independent normal components.
@@ -81,7 +100,7 @@ void verify(const Measurements& searched, const Measurements& test, Eigen::Index
     }
     result.held_out.before = figures({result.before, {}}, common);
     result.held_out.after = figures(result.improved, common);
-    result.held_out.poses = test.count();
+    result.held_out.poses = count_of_stands(test.poses);
     report_far_poses(result.improved, common, result);
   }
   withdraw_what_is_worse(searched, test, result);
@@ -241,12 +260,8 @@ Discovery discover_in(const Robot& robot, const PoseSplit& split, const Discover
   return result;
 }
 
-}  // namespace
-
-Discovery discover(const Robot& robot, const Measurements& measurements, const std::optional<Measurements>& test,
-                   const DiscoveryOptions& options) {
-  validate(robot);
-  validate(measurements, robot);
+Discovery discover_readings(const Robot& robot, const Measurements& measurements,
+                            const std::optional<Measurements>& test, const DiscoveryOptions& options) {
   const PoseSplit split = set_aside(measurements, test, options.held_out_share, options.seed, Repeats::as_marked);
   const Eigen::Index components = std::ranges::count(measurements.measured, true);
   if (split.samples.count() * components < 10) {
@@ -268,6 +283,22 @@ Discovery discover(const Robot& robot, const Measurements& measurements, const s
   }
   verify(split.searched, split.test, components, result);
   return result;
+}
+
+}  // namespace
+
+Discovery discover(const Robot& robot, const Measurements& measurements, const std::optional<Measurements>& test,
+                   const DiscoveryOptions& options) {
+  validate(robot);
+  validate(measurements, robot);
+  const Robot whole = with_frames(robot, measurements.poses);
+  if (orientation_rows(measurements.poses).empty()) return discover_readings(whole, measurements, test, options);
+  const Calibration balance = calibrate(whole, measurements, options.calibration);
+  constexpr double longest_mm = 1e5;
+  const double lever_mm = std::min(longest_mm, 1e3 * balance.noise_mm / std::max(1e-9, balance.orientation_noise_mrad));
+  std::optional<Measurements> balanced_test = test;
+  if (test) balanced_test = with_lever(*test, lever_mm);
+  return discover_readings(whole, with_lever(measurements, lever_mm), balanced_test, options);
 }
 
 }  // namespace llmt::robotics

@@ -109,13 +109,12 @@ void add_dependences(const Inputs& inputs, const Eigen::MatrixXd& residuals, Gap
 }
 
 void add_levers(const Robot& robot, const Measurements& measurements, const Eigen::MatrixXd& world, GapMap& map) {
-  const Kinematics kinematics(robot.chain);
+  const Eigen::MatrixXd motions = joint_motions(robot, measurements.poses);
   const Chain& chain = robot.chain;
   Eigen::VectorXd along = Eigen::VectorXd::Zero(std::ssize(chain.joints));
   for (Eigen::Index i = 0; i < measurements.count(); ++i) {
-    const auto levers = kinematics.joint_jacobian(measurements.poses.joints.row(i).transpose());
     for (Eigen::Index j = 0; j < along.size(); ++j) {
-      Eigen::Vector3d lever = levers.col(j).head<3>();
+      Eigen::Vector3d lever = motions.col(j).segment(3 * i, 3);
       for (Eigen::Index axis = 0; axis < 3; ++axis) {
         if (!measurements.measured[axis]) lever(axis) = 0.0;
       }

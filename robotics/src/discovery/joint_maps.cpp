@@ -146,10 +146,10 @@ struct ProjectedMaps {
 Eigen::MatrixXd pushed_hats(const Robot& robot, const Poses& poses, const std::vector<Knots>& knots,
                             const std::vector<Eigen::Index>& rows) {
   Eigen::MatrixXd hats = Eigen::MatrixXd::Zero(std::ssize(rows), knots.back().begin + knots.back().count);
-  const Kinematics kinematics(robot.chain);
+  const Eigen::MatrixXd motions = joint_motions(robot, poses);
   for (Eigen::Index k = 0; k < hats.rows();) {
     const Eigen::Index pose = rows[k] / 3;
-    const auto levers = kinematics.joint_jacobian(poses.joints.row(pose).transpose());
+    const auto levers = motions.middleRows(3 * pose, 3);
     for (; k < hats.rows() && rows[k] / 3 == pose; ++k) {
       const Eigen::Index axis = rows[k] % 3;
       for (const Knots& own : knots) {

@@ -12,7 +12,6 @@
 
 #include "discovery/pose_split.hpp"
 #include "llmt/random.hpp"
-#include "llmt/robotics/kinematics.hpp"
 
 namespace llmt::robotics {
 namespace {
@@ -38,17 +37,17 @@ struct Residuals {
 
 // Poses that were measured several times count once: what they have in common need not be noise.
 Measurements once_each(const Measurements& measurements) {
-  const auto pose = measurements.poses.covariates.find("pose");
-  if (pose == measurements.poses.covariates.end()) return measurements;
-  std::map<double, std::vector<Eigen::Index>> groups;
-  for (Eigen::Index i = 0; i < measurements.count(); ++i) groups[pose->second(i)].push_back(i);
+  const std::vector<Eigen::Index> repeats = repeats_of(measurements.poses);
+  if (repeats.empty()) return measurements;
+  std::map<Eigen::Index, std::vector<Eigen::Index>> groups;
+  for (Eigen::Index i = 0; i < measurements.count(); ++i) groups[repeats[i]].push_back(i);
   std::vector<Eigen::Index> first;
   for (const auto& [number, rows] : groups) first.push_back(rows.front());
   std::ranges::sort(first);
   Measurements single = select(measurements, first);
   for (Eigen::Index k = 0; k < std::ssize(first); ++k) {
-    const std::vector<Eigen::Index>& rows = groups[pose->second(first[k])];
-    single.positions_mm.row(k) = measurements.positions_mm(rows, Eigen::all).colwise().mean();
+    const std::vector<Eigen::Index>& rows = groups[repeats[first[k]]];
+    single.positions_mm.row(k) = mean_reading(measurements, rows);
   }
   return single;
 }
@@ -83,12 +82,11 @@ Residuals residuals_of(const Calibration& fitted, const Measurements& measuremen
 
 // Unit vectors of the motion by a joint at every pose; zero where it moves nothing.
 Eigen::MatrixXd motions(const Robot& robot, const Measurements& measurements, Eigen::Index joint) {
-  const Kinematics kinematics(robot.chain);
+  const Eigen::MatrixXd all = joint_motions(robot, measurements.poses);
   const std::vector<Eigen::Index> axes = axes_of(measurements);
   Eigen::MatrixXd units(measurements.count(), std::ssize(axes));
   for (Eigen::Index i = 0; i < units.rows(); ++i) {
-    const auto jacobian = kinematics.joint_jacobian(measurements.poses.joints.row(i).transpose());
-    const Eigen::VectorXd lever = jacobian(axes, joint);
+    const Eigen::VectorXd lever = all.middleRows(3 * i, 3)(axes, joint);
     units.row(i).setZero();
     if (lever.norm() > 1e-6) units.row(i) = lever.normalized().transpose();
   }
@@ -250,7 +248,10 @@ std::optional<NoNoise> test_neighbours(const Residuals& residuals, const Calibra
 
 std::optional<NoNoise> no_noise(const Calibration& fitted, const Measurements& measurements,
                                 const std::vector<std::size_t>& skipped, std::uint64_t seed) {
-  const Measurements kept = once_each(without_rows(measurements, skipped));
+  const Measurements seen = without_rows(measurements, skipped);
+  // Where orientations were read, the points are tested.
+  const Measurements kept =
+      once_each(orientation_rows(seen.poses).empty() ? seen : select(seen, position_rows(seen.poses)));
   if (kept.count() < fewest) return std::nullopt;
   const Residuals residuals = residuals_of(fitted, kept);
   if (!(residuals.vectors.squaredNorm() > 0.0)) return std::nullopt;

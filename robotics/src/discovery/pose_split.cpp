@@ -7,6 +7,8 @@
 #include <map>
 #include <numeric>
 #include <stdexcept>
+#include <string>
+#include <tuple>
 
 #include "llmt/random.hpp"
 
@@ -29,13 +31,14 @@ Measurements averaged(const Measurements& measurements, Repeats repeats,
   const Eigen::VectorXd* pose = column(measurements.poses, "pose");
   const Eigen::VectorXd* dwelled = column(measurements.poses, "dwelled");
   const Eigen::VectorXd* returned = column(measurements.poses, "returned");
-  std::map<double, std::size_t> groups;
+  const std::vector<Eigen::Index> repeated = repeats_of(measurements.poses);
+  std::map<Eigen::Index, std::size_t> groups;
   samples.clear();
   for (Eigen::Index i = 0; i < measurements.count(); ++i) {
     const bool stood_still =
         (dwelled != nullptr && (*dwelled)(i) != 0.0) || (returned != nullptr && (*returned)(i) == 0.0);
     if (pose != nullptr && (stood_still || repeats == Repeats::averaged)) {
-      const auto [group, is_new] = groups.try_emplace((*pose)(i), samples.size());
+      const auto [group, is_new] = groups.try_emplace(repeated[i], samples.size());
       if (!is_new) {
         samples[group->second].push_back(i);
         continue;
@@ -48,7 +51,7 @@ Measurements averaged(const Measurements& measurements, Repeats repeats,
   for (const auto& sample : samples) first.push_back(sample.front());
   Measurements result = select(measurements, first);
   for (Eigen::Index row = 0; row < std::ssize(samples); ++row) {
-    result.positions_mm.row(row) = measurements.positions_mm(samples[row], Eigen::all).colwise().mean();
+    result.positions_mm.row(row) = mean_reading(measurements, samples[row]);
     result.poses.joints.row(row) = measurements.poses.joints(samples[row], Eigen::all).colwise().mean();
     for (auto& [name, values] : result.poses.covariates) {
       values(row) = measurements.poses.covariates.at(name)(samples[row]).mean();
@@ -66,9 +69,9 @@ PoseSplit set_aside(const Measurements& measurements, const std::optional<Measur
   if (test) {
     split.test = *test;
   } else if (share > 0.0) {
-    const Eigen::VectorXd* pose = column(measurements.poses, "pose");
+    const std::vector<double> labels = pose_labels(measurements.poses);
     std::map<double, std::vector<Eigen::Index>> groups;
-    for (const Eigen::Index i : searched) groups[pose != nullptr ? (*pose)(i) : static_cast<double>(i)].push_back(i);
+    for (const Eigen::Index i : searched) groups[labels.empty() ? static_cast<double>(i) : labels[i]].push_back(i);
     std::vector<std::vector<Eigen::Index>> units;
     for (auto& [number, rows] : groups) units.push_back(rows);
     Random random(seed);
@@ -96,10 +99,13 @@ PoseSplit set_aside(const Measurements& measurements, const std::optional<Measur
 std::vector<Eigen::Index> repeats_of(const Poses& poses) {
   const Eigen::VectorXd* pose = column(poses, "pose");
   if (pose == nullptr) return {};
-  std::map<double, Eigen::Index> numbers;
+  // Only readings of the same kind and target are repeats of each other.
+  std::map<std::tuple<double, std::string, std::string, Reading>, Eigen::Index> numbers;
   std::vector<Eigen::Index> repeats;
-  for (const double number : *pose) {
-    repeats.push_back(numbers.try_emplace(number, std::ssize(numbers)).first->second);
+  for (Eigen::Index i = 0; i < poses.count(); ++i) {
+    const Observation seen = poses.observations.empty() ? Observation{} : poses.observations[i];
+    const auto key = std::make_tuple((*pose)(i), seen.base, seen.tool, seen.reading);
+    repeats.push_back(numbers.try_emplace(key, std::ssize(numbers)).first->second);
   }
   return repeats;
 }

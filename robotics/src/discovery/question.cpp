@@ -3,6 +3,7 @@
 #include <Eigen/QR>
 #include <algorithm>
 
+#include "calibration/noise_model.hpp"
 #include "discovery/pose_split.hpp"
 #include "hypotheses/catalogue_effects.hpp"
 #include "hypotheses/scans.hpp"
@@ -65,6 +66,18 @@ std::vector<double> within_limits(const discovery::EffectCandidate& candidate, c
   return {bounded.begin(), bounded.end()};
 }
 
+// The search takes all readings for equally exact: less exact ones count as much less as they are.
+void weigh(const Measurements& measurements, const Eigen::VectorXd& residuals, const CalibrationOptions& options,
+           EffectQuestion& question) {
+  const Eigen::VectorXd weights = NoiseModel(measurements, options).relative_weights(residuals);
+  if (weights.size() == 0) return;
+  question.evidence.residuals.array() *= weights.array();
+  question.evidence.jacobian.array().colwise() *= weights.array();
+  for (Hypothesis& hypothesis : question.hypotheses) {
+    hypothesis.candidate.signature.array().colwise() *= weights.array();
+  }
+}
+
 }  // namespace
 
 EffectQuestion question(const Robot& robot, const std::vector<Hypothesis>& found, const Measurements& measurements,
@@ -112,6 +125,7 @@ EffectQuestion question(const Robot& robot, const std::vector<Hypothesis>& found
   for (Hypothesis& hypothesis : result.hypotheses) {
     hypothesis.candidate.signature = Eigen::MatrixXd(hypothesis.candidate.signature(rows, Eigen::all));
   }
+  weigh(measurements, residuals(rows), options.calibration, result);
   return result;
 }
 

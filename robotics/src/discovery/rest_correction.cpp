@@ -18,7 +18,9 @@ void correct_rest(const Measurements& searched, std::uint64_t seed, Discovery& r
   const Robot& robot = result.improved.robot;
   const Eigen::VectorXd without = distances(positions(robot, searched.poses), searched);
   Eigen::VectorXd with = without;
+  const std::vector<double> labels = pose_labels(searched.poses);
   FoldOptions dealing;
+  dealing.groups = labels;
   dealing.count = folds;
   dealing.seed = seed;
   for (const Fold& fold : make_folds(searched.count(), dealing)) {

@@ -2,21 +2,18 @@
 
 #include <algorithm>
 
-#include "llmt/robotics/kinematics.hpp"
-
 namespace llmt::robotics {
 
 Scene make_scene(const Robot& robot, const Poses& poses, const Eigen::VectorXd& residuals,
                  const std::array<bool, 3>& measured) {
   Scene scene{robot, poses, residuals, measured, {}, gravity_loads(robot, poses), residuals};
-  const Kinematics kinematics(robot.chain);
+  const Eigen::MatrixXd motions = joint_motions(robot, poses);
   scene.lever.assign(robot.chain.joints.size(), Eigen::MatrixXd::Zero(3 * poses.count(), 1));
   Eigen::VectorXd size(poses.count());
   for (Eigen::Index i = 0; i < poses.count(); ++i) {
-    const auto jacobian = kinematics.joint_jacobian(poses.joints.row(i).transpose());
     for (std::size_t j = 0; j < scene.lever.size(); ++j) {
       for (Eigen::Index axis = 0; axis < 3; ++axis) {
-        if (measured[axis]) scene.lever[j](3 * i + axis, 0) = jacobian(axis, j);
+        if (measured[axis]) scene.lever[j](3 * i + axis, 0) = motions(3 * i + axis, j);
       }
     }
     size(i) = residuals.segment(3 * i, 3).norm();

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <set>
 #include <stdexcept>
@@ -23,10 +24,12 @@ constexpr Eigen::Index joint_parameters = 6;
 // Every geometric value of a chain in the fixed order; one place decides the order for reading and writing.
 template <typename ChainType, typename Visit>
 void visit_values(ChainType& chain, Visit visit) {
-  for (auto* frame : {&chain.base, &chain.tool}) {
-    for (int i = 0; i < 3; ++i) visit(frame->xyz_mm(i));
-    for (int i = 0; i < 3; ++i) visit(frame->rpy_deg(i));
-  }
+  const auto visit_frame = [&](auto& frame) {
+    for (int i = 0; i < 3; ++i) visit(frame.xyz_mm(i));
+    for (int i = 0; i < 3; ++i) visit(frame.rpy_deg(i));
+  };
+  visit_frame(chain.base);
+  visit_frame(chain.tool);
   for (auto& joint : chain.joints) {
     visit(joint.theta_deg);
     visit(joint.d_mm);
@@ -34,6 +37,19 @@ void visit_values(ChainType& chain, Visit visit) {
     visit(joint.b_mm);
     visit(joint.alpha_deg);
     visit(joint.beta_deg);
+  }
+  for (auto* frames : {&chain.bases, &chain.tools}) {
+    for (auto& further : *frames) visit_frame(further.frame);
+  }
+}
+
+void validate_further(const char* field, const std::vector<NamedFrame>& frames) {
+  std::set<std::string> names;
+  for (const NamedFrame& frame : frames) {
+    if (frame.name.empty() || frame.name.find('.') != std::string::npos) {
+      refuse(field, fmt::format("{}: name \"{}\" is empty or has a dot", field, frame.name));
+    }
+    if (!names.insert(frame.name).second) refuse(field, fmt::format("{}: name \"{}\" is taken", field, frame.name));
   }
 }
 
@@ -73,6 +89,8 @@ void validate(const Chain& chain) {
     if (!names.insert(joint.name).second) refuse("name", fmt::format("joint name \"{}\" is taken", joint.name));
     validate_joint(joint);
   }
+  validate_further("bases", chain.bases);
+  validate_further("tools", chain.tools);
   for (const discovery::Parameter& parameter : geometric_parameters(chain)) {
     if (!std::isfinite(parameter.value)) {
       throw std::invalid_argument(
@@ -88,10 +106,12 @@ std::vector<discovery::Parameter> geometric_parameters(const Chain& chain) {
                           .unit = is_angle ? "deg" : "mm",
                           .scale = is_angle ? angle_scale_deg : length_scale_mm});
   };
-  for (const char* frame : {"base", "tool"}) {
-    for (const char* field : {"x", "y", "z"}) add(frame, field, false);
-    for (const char* field : {"rx", "ry", "rz"}) add(frame, field, true);
-  }
+  const auto add_frame = [&](const std::string& owner) {
+    for (const char* field : {"x", "y", "z"}) add(owner, field, false);
+    for (const char* field : {"rx", "ry", "rz"}) add(owner, field, true);
+  };
+  add_frame("base");
+  add_frame("tool");
   for (const Joint& joint : chain.joints) {
     add(joint.name, "theta", true);
     add(joint.name, "d", false);
@@ -100,6 +120,8 @@ std::vector<discovery::Parameter> geometric_parameters(const Chain& chain) {
     add(joint.name, "alpha", true);
     add(joint.name, "beta", true);
   }
+  for (const NamedFrame& base : chain.bases) add_frame("base@" + base.name);
+  for (const NamedFrame& tool : chain.tools) add_frame("tool@" + tool.name);
   std::size_t next = 0;
   visit_values(chain, [&](const double& value) { parameters[next++].value = value; });
   return parameters;
@@ -112,7 +134,8 @@ double reach_of(const Chain& chain) {
 }
 
 Eigen::Index geometric_parameter_count(const Chain& chain) {
-  return 2 * frame_parameters + joint_parameters * std::ssize(chain.joints);
+  return frame_parameters * (2 + std::ssize(chain.bases) + std::ssize(chain.tools)) +
+         joint_parameters * std::ssize(chain.joints);
 }
 
 Eigen::VectorXd geometric_values(const Chain& chain) {
@@ -130,6 +153,11 @@ Chain with_geometric_values(Chain chain, const Eigen::VectorXd& values) {
   Eigen::Index next = 0;
   visit_values(chain, [&](double& value) { value = values(next++); });
   return chain;
+}
+
+bool is_frame_parameter(std::string_view name) {
+  const std::string_view owner = name.substr(0, std::min(name.find('.'), name.find('@')));
+  return owner == "base" || owner == "tool";
 }
 
 std::size_t joint_index(const Chain& chain, std::string_view name) {

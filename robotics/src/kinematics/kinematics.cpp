@@ -82,7 +82,7 @@ Kinematics::Kinematics(const Chain& chain) : payload_centre_mm_(chain.payload.co
     body_centre_mm_.push_back(chain.joints[j].com_mm);
   }
   add_frame(tool_parameter(FrameParameter::x));
-  set_values(geometric_values(chain));
+  set_values(geometric_values(chain).head(std::ssize(elements_)));
 }
 
 void Kinematics::set_values(const Eigen::VectorXd& values) {
@@ -192,6 +192,15 @@ Eigen::Matrix3Xd Kinematics::position_jacobian(const Eigen::VectorXd& q, const D
       jacobian.col(element.parameter) = axis;
     }
   }
+  return jacobian;
+}
+
+Eigen::Matrix3Xd Kinematics::rotation_jacobian(const Eigen::VectorXd& q, const Deformation* deformation) const {
+  Eigen::Matrix3Xd jacobian = Eigen::Matrix3Xd::Zero(3, elements_.size());
+  walk(q, deformation, [&](std::size_t i, const Pose& frame) {
+    const Element& element = elements_[i];
+    if (element.rotation) jacobian.col(element.parameter) = radians * frame.rotation.col(element.axis);
+  });
   return jacobian;
 }
 

@@ -36,6 +36,9 @@ void validate(const Measurements& measurements, const Robot& robot) {
                        measurements.positions_mm.cols(), poses.count()));
   }
   if (std::ranges::none_of(measurements.measured, [](bool seen) { return seen; })) refuse("no coordinate was measured");
+  if (!poses.observations.empty() && std::ssize(poses.observations) != poses.count()) {
+    refuse(fmt::format("there are {} observations of {} rows", poses.observations.size(), poses.count()));
+  }
   if (!poses.joints.allFinite()) refuse("a joint value is not finite");
   if (!measurements.positions_mm.allFinite()) refuse("a position is not finite");
   for (const auto& [name, values] : poses.covariates) {

@@ -9,12 +9,45 @@
 
 #include "robot/checks.hpp"
 #include "robot/robot_evaluator.hpp"
+#include "robot/settings.hpp"
 
 namespace llmt::robotics {
+
+namespace {
+
+// Which rows of the whole the rows of a setting are.
+class Rows {
+ public:
+  Rows(Eigen::Index count, const std::vector<Eigen::Index>* rows) : count_(count), rows_(rows) {}
+  Eigen::Index count() const { return count_; }
+  Eigen::Index operator[](Eigen::Index i) const { return rows_ == nullptr ? i : (*rows_)[i]; }
+
+ private:
+  Eigen::Index count_;
+  const std::vector<Eigen::Index>* rows_;  // null: all
+};
+
+// Calls evaluate(evaluator, rows) once for every base and tool.
+template <typename Evaluate>
+void in_settings(const Robot& robot, const Poses& poses, Evaluate evaluate) {
+  if (is_one_setting(robot, poses)) {
+    RobotEvaluator evaluator(robot, poses);
+    evaluate(evaluator, Rows(poses.count(), nullptr));
+    return;
+  }
+  for (const Setting& setting : settings_of(robot, poses)) {
+    RobotEvaluator evaluator(setting.robot, setting.poses);
+    evaluate(evaluator, Rows(setting.poses.count(), &setting.rows));
+  }
+}
+
+}  // namespace
 
 Poses select(const Poses& poses, const std::vector<Eigen::Index>& rows) {
   Poses chosen{.joints = poses.joints(rows, Eigen::all), .covariates = {}};
   for (const auto& [name, values] : poses.covariates) chosen.covariates[name] = values(rows);
+  if (poses.observations.empty()) return chosen;
+  for (const Eigen::Index row : rows) chosen.observations.push_back(poses.observations[row]);
   return chosen;
 }
 
@@ -75,16 +108,18 @@ Robot with_values(Robot robot, const Eigen::VectorXd& values) {
 }
 
 Eigen::MatrixXd positions(const Robot& robot, const Poses& poses) {
-  RobotEvaluator evaluator(robot, poses);
   Eigen::MatrixXd result(poses.count(), 3);
-  for (Eigen::Index i = 0; i < poses.count(); ++i) result.row(i) = evaluator.position(i).transpose();
+  in_settings(robot, poses, [&](RobotEvaluator& evaluator, const Rows& rows) {
+    for (Eigen::Index i = 0; i < rows.count(); ++i) result.row(rows[i]) = evaluator.reading(i).transpose();
+  });
   return result;
 }
 
 std::vector<Pose> tool_poses(const Robot& robot, const Poses& poses) {
-  RobotEvaluator evaluator(robot, poses);
-  std::vector<Pose> result;
-  for (Eigen::Index i = 0; i < poses.count(); ++i) result.push_back(evaluator.pose(i));
+  std::vector<Pose> result(poses.count());
+  in_settings(robot, poses, [&](RobotEvaluator& evaluator, const Rows& rows) {
+    for (Eigen::Index i = 0; i < rows.count(); ++i) result[rows[i]] = evaluator.pose(i);
+  });
   return result;
 }
 
@@ -107,34 +142,56 @@ std::string position_refusal(const Robot& robot, const Poses& poses) {
       all(row, 0), all(row, 1), all(row, 2), farthest_mm, cause);
 }
 
+Eigen::MatrixXd joint_motions(const Robot& robot, const Poses& poses) {
+  Eigen::MatrixXd result(3 * poses.count(), poses.joints.cols());
+  in_settings(robot, poses, [&](RobotEvaluator& evaluator, const Rows& rows) {
+    for (Eigen::Index i = 0; i < rows.count(); ++i) result.middleRows(3 * rows[i], 3) = evaluator.joint_motion(i);
+  });
+  return result;
+}
+
 Eigen::MatrixXd position_jacobian(const Robot& robot, const Poses& poses) {
-  RobotEvaluator evaluator(robot, poses);
-  Eigen::MatrixXd result(3 * poses.count(), std::ssize(parameters(robot)));
-  for (Eigen::Index i = 0; i < poses.count(); ++i) result.middleRows(3 * i, 3) = evaluator.jacobian(i);
+  const std::size_t count = parameters(robot).size();
+  if (is_one_setting(robot, poses)) {
+    RobotEvaluator evaluator(robot, poses);
+    Eigen::MatrixXd result(3 * poses.count(), count);
+    for (Eigen::Index i = 0; i < poses.count(); ++i) result.middleRows(3 * i, 3) = evaluator.jacobian(i);
+    return result;
+  }
+  Eigen::MatrixXd result = Eigen::MatrixXd::Zero(3 * poses.count(), count);
+  for (const Setting& setting : settings_of(robot, poses)) {
+    RobotEvaluator evaluator(setting.robot, setting.poses);
+    const std::vector<Eigen::Index> columns = columns_of(setting, robot);
+    for (std::size_t i = 0; i < setting.rows.size(); ++i) {
+      result.middleRows(3 * setting.rows[i], 3)(Eigen::all, columns) = evaluator.jacobian(i);
+    }
+  }
   return result;
 }
 
 Eigen::MatrixXd gravity_loads(const Robot& robot, const Poses& poses) {
-  RobotEvaluator evaluator(robot, poses);
   Eigen::MatrixXd result(poses.count(), poses.joints.cols());
-  for (Eigen::Index i = 0; i < poses.count(); ++i) result.row(i) = evaluator.gravity_loads(i).transpose();
+  in_settings(robot, poses, [&](RobotEvaluator& evaluator, const Rows& rows) {
+    for (Eigen::Index i = 0; i < rows.count(); ++i) result.row(rows[i]) = evaluator.gravity_loads(i).transpose();
+  });
   return result;
 }
 
 Eigen::MatrixXd effect_signatures(const Robot& baseline, const std::vector<Effect>& candidates, const Poses& poses) {
-  RobotEvaluator evaluator(baseline, poses);
-  std::vector<PreparedEffect> prepared;
   Eigen::Index columns = 0;
-  for (const Effect& candidate : candidates) {
-    prepared.push_back(prepare(baseline.chain, candidate, poses));
-    columns += std::ssize(candidate.values);
-  }
+  for (const Effect& candidate : candidates) columns += std::ssize(candidate.values);
   Eigen::MatrixXd result(3 * poses.count(), columns);
   Eigen::Matrix3Xd one(3, columns);
-  for (Eigen::Index i = 0; i < poses.count(); ++i) {
-    evaluator.signatures(i, prepared, one);
-    result.middleRows(3 * i, 3) = one;
-  }
+  in_settings(baseline, poses, [&](RobotEvaluator& evaluator, const Rows& rows) {
+    std::vector<PreparedEffect> prepared;
+    for (const Effect& candidate : candidates) {
+      prepared.push_back(prepare(evaluator.robot().chain, candidate, evaluator.poses()));
+    }
+    for (Eigen::Index i = 0; i < rows.count(); ++i) {
+      evaluator.signatures(i, prepared, one);
+      result.middleRows(3 * rows[i], 3) = one;
+    }
+  });
   return result;
 }
 

@@ -150,18 +150,37 @@ Eigen::VectorXd RobotEvaluator::gravity_loads(Eigen::Index row) {
   return loads;
 }
 
-void RobotEvaluator::set_levers() {
+// From motions of the tool to changes of what is read.
+void RobotEvaluator::chart(Eigen::Index row, Eigen::Ref<Eigen::Matrix3Xd> derivatives) const {
+  const Observation* seen = observation(row);
+  if (seen == nullptr || seen->reading == Reading::position) return;
+  derivatives = reading_derivative(deformed_.tool, *seen) * derivatives;
+}
+
+void RobotEvaluator::set_levers(Eigen::Index row) {
   const Eigen::Vector3d& tool = deformed_.tool.position_mm;
+  levers_.turns_only = is_orientation(row);
   levers_.base = tool - deformed_.joint_origin[0];
   for (std::size_t j = 0; j < levers_.joint.size(); ++j) {
     const Eigen::Vector3d& axis = deformed_.joint_axis[j];
     const bool turns = robot_.chain.joints[j].type == JointType::revolute;
+    if (levers_.turns_only) {
+      levers_.joint[j] = turns ? axis : Eigen::Vector3d::Zero();
+      continue;
+    }
     levers_.joint[j] = turns ? axis.cross(tool - deformed_.joint_origin[j]) : axis;
     levers_.link[j] = tool - deformed_.link_end[j];
   }
 }
 
 Eigen::Vector3d RobotEvaluator::displacement(const Deformation& change) const {
+  if (levers_.turns_only) {
+    Eigen::Vector3d turn = change.base.rotation_rad;
+    for (std::size_t j = 0; j < levers_.joint.size(); ++j) {
+      turn += change.joint(j) * levers_.joint[j] + change.link[j].rotation_rad;
+    }
+    return turn;
+  }
   Eigen::Vector3d sum = change.world_mm + change.base.translation_mm + change.base.rotation_rad.cross(levers_.base);
   for (std::size_t j = 0; j < levers_.joint.size(); ++j) {
     sum += change.joint(j) * levers_.joint[j];
@@ -220,15 +239,22 @@ void RobotEvaluator::whole_derivatives(Eigen::Index row, PreparedEffect& effect,
 
 Eigen::Matrix3Xd RobotEvaluator::jacobian(Eigen::Index row) {
   q_ = poses_.joints.row(row).transpose();
-  if (effects_.empty()) return kinematics_.position_jacobian(q_);
+  if (effects_.empty()) {
+    Eigen::Matrix3Xd result =
+        is_orientation(row) ? kinematics_.rotation_jacobian(q_) : kinematics_.position_jacobian(q_);
+    if (observation(row) != nullptr) deformed_.tool = kinematics_.forward(q_);
+    chart(row, result);
+    return result;
+  }
   kinematics_.skeleton_into(rigid_, q_);
   PoseContext pose = context(row);
   deform(pose, row, nullptr, deformation_);
   kinematics_.skeleton_into(deformed_, q_, &deformation_);
-  set_levers();
+  set_levers(row);
   Eigen::Index count = 0;
   for (const PreparedEffect& effect : effects_) count += std::ssize(effect.values);
-  const Eigen::Matrix3Xd geometry = kinematics_.position_jacobian(q_, &deformation_);
+  const Eigen::Matrix3Xd geometry = is_orientation(row) ? kinematics_.rotation_jacobian(q_, &deformation_)
+                                                        : kinematics_.position_jacobian(q_, &deformation_);
   Eigen::Matrix3Xd result(3, geometry.cols() + count);
   result.leftCols(geometry.cols()) = geometry;
   Eigen::Index next = geometry.cols();
@@ -244,6 +270,16 @@ Eigen::Matrix3Xd RobotEvaluator::jacobian(Eigen::Index row) {
     effect.values = robot_.effects[e].values;
     next += own;
   }
+  chart(row, result);
+  return result;
+}
+
+Eigen::Matrix3Xd RobotEvaluator::joint_motion(Eigen::Index row) {
+  q_ = poses_.joints.row(row).transpose();
+  const Eigen::Matrix<double, 6, Eigen::Dynamic> motion = kinematics_.joint_jacobian(q_);
+  Eigen::Matrix3Xd result = is_orientation(row) ? motion.bottomRows(3) : motion.topRows(3);
+  if (observation(row) != nullptr) deformed_.tool = kinematics_.forward(q_);
+  chart(row, result);
   return result;
 }
 
@@ -254,7 +290,7 @@ void RobotEvaluator::signatures(Eigen::Index row, std::vector<PreparedEffect>& c
   PoseContext pose = context(row);
   deform(pose, row, nullptr, deformation_);
   kinematics_.skeleton_into(deformed_, q_, &deformation_);
-  set_levers();
+  set_levers(row);
   Eigen::Index next = 0;
   for (PreparedEffect& candidate : candidates) {
     const Eigen::Index own = std::ssize(candidate.values);
@@ -267,6 +303,7 @@ void RobotEvaluator::signatures(Eigen::Index row, std::vector<PreparedEffect>& c
     }
     next += own;
   }
+  chart(row, out);
 }
 
 }  // namespace llmt::robotics

@@ -36,6 +36,20 @@ Frame read_frame(YamlMap map) {
   return frame;
 }
 
+std::vector<NamedFrame> read_frames(YamlMap& map, const std::string& key) {
+  constexpr std::size_t most = 1000;
+  std::vector<NamedFrame> frames;
+  if (!map.has(key)) return frames;
+  for (YamlMap entry : map.maps(key, most)) {
+    NamedFrame& frame = frames.emplace_back();
+    frame.name = entry.text("name");
+    frame.frame.xyz_mm = entry.vector_or("xyz_mm", Eigen::Vector3d::Zero());
+    frame.frame.rpy_deg = entry.vector_or("rpy_deg", Eigen::Vector3d::Zero());
+    entry.finish({"name", "xyz_mm", "rpy_deg"});
+  }
+  return frames;
+}
+
 Payload read_payload(YamlMap map) {
   Payload payload{.mass_kg = map.number("mass_kg"), .com_mm = map.vector_or("com_mm", Eigen::Vector3d::Zero())};
   map.finish({"mass_kg", "com_mm"});
@@ -188,6 +202,8 @@ Chain read_chain(YamlMap& map) {
   chain.orientation = map.text_or("orientation", "");
   if (map.has("base")) chain.base = read_frame(map.map("base"));
   if (map.has("tool")) chain.tool = read_frame(map.map("tool"));
+  chain.bases = read_frames(map, "bases");
+  chain.tools = read_frames(map, "tools");
   if (map.has("payload")) chain.payload = read_payload(map.map("payload"));
   check_in_file(map, [&] { validate(chain); });
   return chain;
@@ -206,8 +222,8 @@ Robot parse_robot(const std::string& text, const std::string& name) {
     robot.correction_file = correction.text("model");
     correction.finish({"model"});
   }
-  map.finish({"name", "convention", "gravity_m_s2", "orientation", "base", "tool", "payload", "joints", "effects",
-              "identified", "correction"});
+  map.finish({"name", "convention", "gravity_m_s2", "orientation", "base", "tool", "bases", "tools", "payload",
+              "joints", "effects", "identified", "correction"});
   return robot;
 }
 

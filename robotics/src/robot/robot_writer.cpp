@@ -49,6 +49,16 @@ void write_frame(Writer& out, const std::string& name, const Frame& frame) {
   out.key(name).begin_map().numbers("xyz_mm", frame.xyz_mm).numbers("rpy_deg", frame.rpy_deg).end_map();
 }
 
+void write_frames(Writer& out, const std::string& key, const std::vector<NamedFrame>& frames) {
+  if (frames.empty()) return;
+  out.key(key).begin_list(YAML::Block);
+  for (const NamedFrame& named : frames) {
+    out.begin_map().word("name", named.name).numbers("xyz_mm", named.frame.xyz_mm);
+    out.numbers("rpy_deg", named.frame.rpy_deg).end_map();
+  }
+  out.end_list();
+}
+
 void write_joint(Writer& out, const Joint& joint) {
   const bool turns = joint.type == JointType::revolute;
   out.begin_map().word("name", joint.name).word("type", turns ? "revolute" : "prismatic");
@@ -120,6 +130,8 @@ std::string to_yaml(const Robot& robot) {
   if (!chain.orientation.empty()) out.word("orientation", chain.orientation);
   write_frame(out, "base", chain.base);
   write_frame(out, "tool", chain.tool);
+  write_frames(out, "bases", chain.bases);
+  write_frames(out, "tools", chain.tools);
   if (chain.payload.mass_kg != 0.0 || !chain.payload.com_mm.isZero(0.0)) {
     out.key("payload")
         .begin_map()

@@ -88,6 +88,12 @@ YamlMap::YamlMap(const YAML::Node& node, std::string file, std::string where)
   }
 }
 
+std::vector<std::string> YamlMap::keys() const {
+  std::vector<std::string> keys;
+  for (const auto& entry : node_) keys.push_back(entry.first.Scalar());
+  return keys;
+}
+
 void YamlMap::refuse_at(const YAML::Node& node, const std::string& message) const {
   const int line = node.Mark().line;
   const std::string place = line < 0 ? file_ : fmt::format("{}:{}", file_, line + 1);

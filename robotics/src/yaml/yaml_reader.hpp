@@ -17,6 +17,8 @@ class YamlMap {
 
   bool has(const std::string& key) const { return static_cast<bool>(node_[key]); }
 
+  std::vector<std::string> keys() const;  ///< in the order of the file
+
   std::string text(const std::string& key);  ///< at most 10 000 characters
   double number(const std::string& key);
   Eigen::Vector3d vector(const std::string& key);

@@ -130,16 +130,17 @@ TEST_F(RobotCSource, JumpingEffectsTreesPrismaticAndRedundantArmsAreThoseOfTheLi
     robot.robot.effects = {{.type = "backlash_gravity", .at = "joint2", .values = {1e-4}},
                            {.type = "joint_compliance", .at = "joint3", .values = {1e-6}}};
     const Poses poses = random_poses(nominal.chain, 300, 8);
-    Eigen::MatrixXd error(300, 2);
+    Eigen::MatrixXd error(300, 4);
     for (Eigen::Index i = 0; i < 300; ++i) {
-      error.row(i) << std::sin(poses.joints(i, 0)), std::abs(poses.joints(i, 1));
+      const double q = poses.joints(i, 0);
+      error.row(i) << std::sin(q), std::abs(poses.joints(i, 1)), 1e-3 * std::sin(q), 2e-3 * std::cos(q);
     }
     std::vector<std::string> inputs;
     for (std::size_t j = 0; j < nominal.chain.joints.size(); ++j) {
       const bool turns = nominal.chain.joints[j].type == JointType::revolute;
       inputs.push_back(fmt::format("q{}_{}", j + 1, turns ? "rad" : "mm"));
     }
-    robot.correction = fit(poses.joints, error).model.named(inputs, {"dz_mm", "dx_mm"});
+    robot.correction = fit(poses.joints, error).model.named(inputs, {"dz_mm", "dx_mm", "dry_rad", "drx_rad"});
     EXPECT_LT(compare(robot, nominal, random_poses(nominal.chain, 100, 9), false), bound_ulp);
   }
 }

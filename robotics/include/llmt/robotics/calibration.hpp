@@ -29,13 +29,14 @@ struct Calibration {
   discovery::SolverResult registration;  ///< of the fit of base and tool
   discovery::SolverResult result;        ///< of the whole fit; its residual norms are in units of noise_mm
   double noise_mm = 0.0;  ///< standard deviation of one coordinate's residual, as used to weigh data against priors
-  std::vector<std::string> weak;      ///< free parameters that the prior determines more closely than the data
-  std::vector<FixedParameter> fixed;  ///< every parameter that was not free, in the order of parameters()
+  double orientation_noise_mrad = 0.0;  ///< the same of orientations about one axis; 0: none were fitted
+  std::vector<std::string> weak;        ///< free parameters that the prior determines more closely than the data
+  std::vector<FixedParameter> fixed;    ///< every parameter that was not free, in the order of parameters()
 };
 
-/// Fits base and tool together by damped least squares; all other parameters keep their values. The fit starts from the
-/// base in closed form (Kabsch 1976) for several guesses of the tool. Parameters that the options fix are not changed.
-/// Only positions are fitted: the tool's orientation stays as given. Throws as calibrate().
+/// Fits bases and tools together by damped least squares; all other parameters keep their values. The fit starts from
+/// bases in closed form (Kabsch 1976) for several guesses of the tool. Parameters that the options fix are not changed.
+/// The robot must have the frames of the measurements, see with_frames(). Throws as calibrate().
 discovery::SolverResult register_frames(Robot& robot, const Measurements& measurements,
                                         const CalibrationOptions& options = {});
 
@@ -46,10 +47,12 @@ discovery::SolverResult register_frames(Robot& robot, const Measurements& measur
 ///    parallel, and all parameters of effects; a parameter that is exactly or nearly a combination of earlier ones over
 ///    the measured poses is fixed and reported;
 /// 3. damped least squares over the free parameters (llmt::discovery::solve) with the weak priors of the options; the
-///    residuals are divided by their standard deviation, which comes from the pass before.
+///    residuals are divided by their standard deviation sigma, which comes from the pass before: one for positions (or
+///    distances) and one for orientations. Where the file states sigmas of its readings (stated_sigma_mm()), they come
+///    on top: sigma^2 = common^2 + stated^2.
 ///
 /// Joint maps (effect `joint_map`) stay as they are and come last in the result: their values were smoothed, and least
-/// squares would undo that. Only positions are fitted; measured orientations are not used.
+/// squares would undo that. Measured orientations take part where with_orientations() made rows of them.
 /// Throws std::invalid_argument for wrong options, names that match no parameter, and measurements that do not suit the
 /// robot.
 Calibration calibrate(const Robot& robot, const Measurements& measurements, const CalibrationOptions& options = {});

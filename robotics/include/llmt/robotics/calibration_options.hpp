@@ -30,6 +30,10 @@ struct CalibrationOptions {
   /// 0: no prior.
   double prior_length_mm = 5.0;
   double prior_angle_deg = 1.0;
+  /// Standard deviations of what a position (mm, each coordinate) and an orientation (mrad, about each axis) are off
+  /// from the calibrated model: noise and all that is not modelled. 0: from the residuals.
+  double position_noise_mm = 0.0;
+  double orientation_noise_mrad = 0.0;
   /// True: base and tool start at their values in the description instead of those of register_frames().
   bool start_as_given = false;
   /// True: where the derivatives, which hold deformations constant, no longer help on an arm that bends, differences of

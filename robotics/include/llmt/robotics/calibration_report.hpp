@@ -43,11 +43,14 @@ struct ReportOptions {
   std::function<void(Eigen::Index done, Eigen::Index total)> progress = {};
 };
 
-/// Distances between one of the three models and the measurements. For a held-out distance, base, tool, geometry,
-/// effects, the tree and its size are fitted without that pose.
+/// Distances between one of the three models and the measured points (or of measured distances), and the angles between
+/// the model and the measured orientations. For a held-out one, base, tool, geometry, effects, the tree and its size
+/// are fitted without that pose.
 struct Stage {
-  Eigen::VectorXd in_sample_mm;  ///< n distances
-  Eigen::VectorXd held_out_mm;   ///< n distances, or empty
+  Eigen::VectorXd in_sample_mm;         ///< one of each of the position_rows()
+  Eigen::VectorXd held_out_mm;          ///< the same, or empty
+  Eigen::VectorXd in_sample_mrad = {};  ///< one of each of the orientation_rows()
+  Eigen::VectorXd held_out_mrad = {};   ///< the same, or empty
 };
 
 struct CalibrationReport {

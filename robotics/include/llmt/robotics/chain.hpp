@@ -37,6 +37,12 @@ struct Frame {
   Eigen::Vector3d rpy_deg = Eigen::Vector3d::Zero();
 };
 
+/// One more frame of the same kind as the base or the tool of a chain.
+struct NamedFrame {
+  std::string name;
+  Frame frame;
+};
+
 /// One joint and the link it moves. Angles are kept in degrees, as in files, so that reading and writing lose nothing.
 struct Joint {
   std::string name;
@@ -60,7 +66,9 @@ struct Payload {
   Eigen::Vector3d com_mm = Eigen::Vector3d::Zero();  ///< in the tool frame
 };
 
-/// A serial arm. `base` is T_world_base, `tool` is T_flange_tool.
+/// A serial arm. `base` is T_world_base, `tool` is T_flange_tool. Where an instrument was set up several times, or
+/// several targets are mounted, the first has `base` and `tool`, and the others stand by name in `bases` and `tools`;
+/// only observations that name them use them.
 struct Chain {
   std::string name;
   Convention convention = Convention::dh;
@@ -68,24 +76,26 @@ struct Chain {
   std::string orientation;  ///< convention of rx, ry, rz in measurement files, e.g. "intrinsic_xyz"
   Frame base;
   Frame tool;
+  std::vector<NamedFrame> bases = {};  ///< T_world_base of further sessions
+  std::vector<NamedFrame> tools = {};  ///< T_flange_tool of further targets
   std::vector<Joint> joints;
   Payload payload;
 };
 
 /// Throws std::invalid_argument naming joint, field, value and bound: no joints or more than 100, repeated or empty
 /// joint names, names that collide with "base" or "tool", non-finite numbers, sign other than +1 or -1, limits out of
-/// order, negative mass.
+/// order, negative mass, further bases or tools without a name, with a dot in it, or of the same name.
 void validate(const Chain& chain);
 
 /// The geometric parameters in their fixed order: base.{x,y,z,rx,ry,rz}, tool.{...}, then per joint
-/// {theta,d,a,b,alpha,beta}, named "joint2.a" after the joint. Units mm and deg; scales 1 mm and 0.1 deg. All are free;
-/// whoever calibrates decides.
+/// {theta,d,a,b,alpha,beta}, named "joint2.a" after the joint, then base@NAME.{x,...} of further bases and tool@NAME of
+/// further tools. Units mm and deg; scales 1 mm and 0.1 deg. All are free; whoever calibrates decides.
 std::vector<discovery::Parameter> geometric_parameters(const Chain& chain);
 
 /// Sum of the lengths of all links and of the tool: no point of the arm is farther from its base, mm.
 double reach_of(const Chain& chain);
 
-/// Number of geometric parameters: 12 + 6 per joint.
+/// Number of geometric parameters: 12 + 6 per joint and per further base or tool.
 Eigen::Index geometric_parameter_count(const Chain& chain);
 
 /// Their values in that order.
@@ -96,6 +106,9 @@ Chain with_geometric_values(Chain chain, const Eigen::VectorXd& values);
 
 /// Position of a joint by its name. Throws std::invalid_argument if there is none.
 std::size_t joint_index(const Chain& chain, std::string_view name);
+
+/// Whether a parameter of that name belongs to a base or a tool.
+bool is_frame_parameter(std::string_view name);
 
 /// Position of a geometric parameter in the fixed order.
 enum class FrameParameter { x, y, z, rx, ry, rz };

@@ -18,31 +18,34 @@
 
 namespace llmt::robotics {
 
-/// measured - model in the base frame, n x 3, mm: it turns with the robot when base and instrument are set up anew.
-/// Coordinates that were not measured count as exact.
+/// measured - model in the base frame of the chain, n x 3, mm: it turns with the robot when base and instrument are set
+/// up anew. Coordinates that were not measured count as exact.
 Eigen::MatrixXd residuals(const Robot& robot, const Measurements& measurements);
 
 /// A calibrated robot and what is added to it, eq. (18)-(19) of Benes et al. 2022:
 ///   p(q) = p_robot(q) + R_world_base e(q),
 /// e the prediction of a model with inputs q1, q2, ... (rad or mm) and outputs among dx_mm, dy_mm, dz_mm; a missing
-/// output is zero. Every component of e is clamped to the range of the residuals seen in training. Without that, a leaf
-/// fitted to poses that hardly move a joint has a meaningless slope along it, and a pose that does move the joint would
-/// be corrected by metres.
+/// output is zero. Where orientations or several targets were measured, the model has drx_rad, dry_rad, drz_rad as
+/// well: the rotation vector r(q) in the base frame, which turns the tool, R(q) = exp(R_world_base r) R_robot(q). Every
+/// component is clamped to the range of the residuals seen in training. Without that, a leaf fitted to poses that
+/// hardly move a joint has a meaningless slope along it, and a pose that does move the joint would be corrected by
+/// metres.
 struct CorrectedRobot {
   Robot robot;
   std::optional<Model> correction;  ///< empty: no correction
 };
 
-/// Grows one tree per axis on the residuals (or one for all: FitOptions::growth). Axes whose residuals are all zero get
-/// none. Throws std::invalid_argument as llmt::fit().
+/// Grows one tree per output on the residuals (or one for all: FitOptions::growth). Outputs whose residuals are all
+/// zero get none. Where a stand of the arm has several readings, its displacement and rotation are those of least
+/// squares. Throws std::invalid_argument as llmt::fit(), and for distances.
 FitResult fit_correction(const Robot& robot, const Measurements& measurements, const FitOptions& options = {});
 
-/// Tool positions in the world frame, n x 3, mm. Throws std::invalid_argument if the model's inputs are not the robot's
-/// joints in their order, named q1_rad, q2_rad, ... (_mm if prismatic), or an output is none of the three or there
-/// twice.
+/// What an instrument would read, n x 3, mm, as positions() of a robot. Throws std::invalid_argument if the model's
+/// inputs are not the robot's joints in their order, named q1_rad, q2_rad, ... (_mm if prismatic), or an output is none
+/// of the six or there twice.
 Eigen::MatrixXd positions(const CorrectedRobot& robot, const Poses& poses);
 
-/// Tool poses: the positions() above, and the orientations of the robot, which the correction leaves alone.
+/// Tool poses in the world frame. Throws as positions().
 std::vector<Pose> tool_poses(const CorrectedRobot& robot, const Poses& poses);
 
 /// Reads the robot and, if it names one, its correction model; a relative path is relative to the robot file. Throws

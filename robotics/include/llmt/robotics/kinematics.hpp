@@ -50,8 +50,8 @@ struct Skeleton {
   Pose tool;
 };
 
-/// The chain compiled into elementary transforms. Joint values q are in rad, mm for prismatic joints, in the order of
-/// the joints.
+/// The chain with its own base and tool compiled into elementary transforms. Joint values q are in rad, mm for
+/// prismatic joints, in the order of the joints.
 ///
 /// Each elementary transform moves along or about one axis of the moving frame, so the derivative of the tool position
 /// by its value is that axis (translation) or axis x (p - o) (rotation, o a point on the axis).
@@ -72,9 +72,12 @@ class Kinematics {
   /// The same, written into an existing object without allocating memory.
   void skeleton_into(Skeleton& skeleton, const Eigen::VectorXd& q, const Deformation* deformation = nullptr) const;
 
-  /// 3 x P derivatives of the tool position by the geometric parameters in the order of geometric_parameters(): mm per
-  /// mm, mm per deg. A deformation is held constant in the frame it acts in.
+  /// 3 x P derivatives of the tool position by the geometric parameters in the order of geometric_parameters(), without
+  /// those of further bases and tools: mm per mm, mm per deg. A deformation is held constant in the frame it acts in.
   Eigen::Matrix3Xd position_jacobian(const Eigen::VectorXd& q, const Deformation* deformation = nullptr) const;
+
+  /// 3 x P derivatives of the tool's orientation, as rotation vectors in the world frame: rad per mm (0), rad per deg.
+  Eigen::Matrix3Xd rotation_jacobian(const Eigen::VectorXd& q, const Deformation* deformation = nullptr) const;
 
   /// 6 x J derivatives by the joint values: position in mm (upper rows), rotation vector in rad (lower rows), per rad
   /// or mm.

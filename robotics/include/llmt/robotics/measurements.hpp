@@ -8,6 +8,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -18,17 +19,18 @@
 
 namespace llmt::robotics {
 
-/// Orientation of the tool as it stands in the file; kept, not used for calibration yet.
+/// Orientation of the tool as it stands in the file. It takes part in calibration and discovery after
+/// with_orientations().
 struct Orientation {
   enum class Kind { angles_deg, quaternion };
   Kind kind = Kind::angles_deg;
   Eigen::MatrixXd values;  ///< n x 3: rx, ry, rz in degrees; or n x 4: w, x, y, z
 };
 
-/// n poses and the measured tool positions.
+/// n readings of an instrument.
 struct Measurements {
   Poses poses;
-  Eigen::MatrixXd positions_mm;                       ///< n x 3, world frame; columns that were not measured hold zeros
+  Eigen::MatrixXd positions_mm;                       ///< n x 3, see Reading; columns that were not measured hold zeros
   std::array<bool, 3> measured = {true, true, true};  ///< which of x, y, z were measured
   Orientation orientation;                            ///< empty values if there is none
   std::vector<std::string> unused_columns;            ///< columns of the file that are not used
@@ -44,6 +46,31 @@ Measurements select(const Measurements& measurements, const std::vector<Eigen::I
 /// number of joints is not that of the robot.
 void validate(const Measurements& measurements, const Robot& robot);
 
+/// The measurements with their orientations as n further rows, in the order of the positions; each is a reading of what
+/// the tool of its row turns. The convention of angles is that of the chain. Throws std::invalid_argument if there are
+/// none, not all of x, y, z were measured, or readings are not of positions.
+Measurements with_orientations(const Measurements& measurements, const Chain& chain);
+
+/// The robot with a base and a tool of every name among the observations; those that it does not have begin as its own
+/// base and tool.
+Robot with_frames(Robot robot, const Poses& poses);
+
+/// Rows that are readings of an orientation, and all others; ascending.
+std::vector<Eigen::Index> orientation_rows(const Poses& poses);
+std::vector<Eigen::Index> position_rows(const Poses& poses);
+
+/// One number per row, equal where rows belong to one pose and must not be torn apart: the column `pose`, or else
+/// Observation::stand. Empty: every row is a pose of its own.
+std::vector<double> pose_labels(const Poses& poses);
+
+/// The mean of readings of one kind and one tool; of orientations relative to the reference of the first row.
+Eigen::RowVector3d mean_reading(const Measurements& measurements, const std::vector<Eigen::Index>& rows);
+
+/// Stated standard deviations of the measured coordinates, mm, n x 3: from the columns sigma_x_um, sigma_y_um,
+/// sigma_z_um (or _mm), or sigma_um for all three; or half of the expanded uncertainty U95_x_um, ..., U95_um. Zero
+/// where nothing is stated.
+Eigen::MatrixXd stated_sigma_mm(const Measurements& measurements);
+
 /// Which of the 3n stacked coordinates x, y, z of pose 0, x, y, z of pose 1, ... were measured: their numbers,
 /// ascending.
 std::vector<Eigen::Index> measured_rows(const Measurements& measurements);
@@ -51,13 +78,35 @@ std::vector<Eigen::Index> measured_rows(const Measurements& measurements);
 /// Distances between model and measurement over the measured coordinates, n values, mm.
 Eigen::VectorXd distances(const Eigen::MatrixXd& model_mm, const Measurements& measurements);
 
+/// What the columns of a file that was not written for this project mean.
+struct ColumnMap {
+  std::map<std::string, std::string> names = {};  ///< name in the file -> name as for read_measurements(), with unit
+  std::optional<DecimalMark> decimal = {};
+};
+
+/// Reads a column map: YAML with `columns`, a map of names, and optionally `decimal`, comma or point.
+///
+///     decimal: comma
+///     columns: {shoulder: q1_rad, "Measured x": x_mm}
+///
+/// Throws std::runtime_error starting with `path:line`.
+ColumnMap read_column_map(const std::string& path);
+ColumnMap parse_column_map(const std::string& text, const std::string& name);
+
 /// Reads measurements for a robot. Columns, with the unit as suffix:
 ///
 ///   q1_deg, q1_rad (revolute), q3_mm, q3_m (prismatic)   every joint, all from 1 on
 ///   NAME_deg, NAME_rad, NAME_mm, NAME_m                  the same by the joints' names in the description
 ///   x_mm, y_mm, z_mm (also _m, _um)                      at least one
 ///   rx_deg ry_deg rz_deg (also _rad), or qw qx qy qz     orientation, optional
-///   payload_kg temp_C time_s order pose dirN tauN_Nm qmeasN_deg sigma_x_um ...   covariates, optional
+///   t1_x_mm t1_y_mm t1_z_mm t2_x_mm ...                  several targets in one pose; a cell may be empty
+///   target, session                                      names: of what was looked at, of how the instrument stood
+///   distance_mm (also _m, _um)                           instead of positions: distance from a fixed point
+///   payload_kg temp_C time_s order pose dirN tauN_Nm qmeasN_deg sigma_x_um U95_x_um ...   covariates, optional
+///
+/// The fixed point of distances is the origin of the world frame. The first target and the first session have the
+/// chain's own tool and base, the others frames of their names, which with_frames() adds. In another session the tool
+/// is another one, too: "SESSION", or "SESSION/TARGET".
 ///
 /// Covariates keep their names, but qmeasN_deg becomes qmeasN_rad. Columns named in `also`, or in a formula among the
 /// robot's effects, are covariates too. With order or time_s, add_moves() is called.
@@ -65,14 +114,16 @@ Eigen::VectorXd distances(const Eigen::MatrixXd& model_mm, const Measurements& m
 /// exactly zero are missing points written as zeros: left out, with a warning naming the lines. Other columns are
 /// listed, not used. `mark`: of the numbers. Throws std::runtime_error starting with `path` or `path:line`.
 Measurements read_measurements(const std::string& path, const Robot& robot, const std::vector<std::string>& also = {},
-                               DecimalMark mark = DecimalMark::point);
+                               DecimalMark mark = DecimalMark::point, const ColumnMap& map = {});
 
 /// As read_measurements(), from memory; `name` stands for the path in messages.
 Measurements parse_measurements(std::string text, const std::string& name, const Robot& robot,
-                                const std::vector<std::string>& also = {}, DecimalMark mark = DecimalMark::point);
+                                const std::vector<std::string>& also = {}, DecimalMark mark = DecimalMark::point,
+                                const ColumnMap& map = {});
 
 /// The joint values and covariates of such a file, which may have no measured positions.
-Poses read_poses(const std::string& path, const Robot& robot, DecimalMark mark = DecimalMark::point);
+Poses read_poses(const std::string& path, const Robot& robot, DecimalMark mark = DecimalMark::point,
+                 const ColumnMap& map = {});
 
 /// What a file asks a robot for, row by row.
 struct TargetTable {

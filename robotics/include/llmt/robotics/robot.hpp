@@ -32,12 +32,13 @@ std::vector<discovery::Parameter> parameters(const Robot& robot);
 /// The robot with those values, in the order of parameters().
 Robot with_values(Robot robot, const Eigen::VectorXd& values);
 
-/// Tool positions in the world frame, n x 3, mm.
-/// Throws std::invalid_argument if the number of joints does not match or a column that an effect needs is missing.
+/// What an instrument would read, n x 3, mm: tool positions in the world frame, or what Poses::observations say.
+/// Throws std::invalid_argument if the number of joints does not match, a column that an effect needs is missing, or an
+/// observation names a base or tool that the chain does not have.
 Eigen::MatrixXd positions(const Robot& robot, const Poses& poses);
 
-/// Tool poses in the world frame, n of them. The positions are those of positions(); links and joints that bend turn
-/// the tool as well. Throws as positions().
+/// Tool poses in the world frame, n of them, with the base and the tool of each row. The positions are those of
+/// positions(); links and joints that bend turn the tool as well. Throws as positions().
 std::vector<Pose> tool_poses(const Robot& robot, const Poses& poses);
 
 /// Why the positions() make no sense, or nothing if they do: the first pose, counted from 1, at which one is not finite
@@ -45,7 +46,11 @@ std::vector<Pose> tool_poses(const Robot& robot, const Poses& poses);
 /// not, and an expression may divide by zero. Throws as positions().
 std::string position_refusal(const Robot& robot, const Poses& poses);
 
-/// Derivatives of the tool positions by parameters(), 3n x P: rows x, y, z of pose 0, then of pose 1, ...
+/// Derivatives of positions() by the joint values of the rigid arm, 3n x J: rows as in position_jacobian(), per rad or
+/// mm.
+Eigen::MatrixXd joint_motions(const Robot& robot, const Poses& poses);
+
+/// Derivatives of positions() by parameters(), 3n x P: rows x, y, z of pose 0, then of pose 1, ...
 /// Geometry columns are exact for a rigid robot; with effects they hold the deformation constant (a relative error of
 /// the size deflection / length). Effect columns are central differences of the effect through the exact joint and link
 /// derivatives.
@@ -55,7 +60,7 @@ Eigen::MatrixXd position_jacobian(const Robot& robot, const Poses& poses);
 /// force z_j . force in N for a prismatic joint. Effects that change payload or gravity are included.
 Eigen::MatrixXd gravity_loads(const Robot& robot, const Poses& poses);
 
-/// First-order displacements of the tool by candidates that are not in the robot: 3n x (sum of their numbers of
+/// First-order changes of positions() by candidates that are not in the robot: 3n x (sum of their numbers of
 /// values), derivatives by each candidate's values at 0 (whatever its values are), rows as in position_jacobian(). The
 /// robot's own effects act on top of the rigid chain, and feel a candidate that changes payload or gravity. Throws
 /// std::invalid_argument as positions() and effect_index().

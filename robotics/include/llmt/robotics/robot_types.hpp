@@ -32,10 +32,28 @@ struct Robot {
   std::string correction_file;                  ///< model file of the residual correction, or empty
 };
 
-/// Where the arm stood and under which conditions: one row a pose.
+/// Which three coordinates an instrument reads of an arm.
+enum class Reading {
+  position,     ///< x, y, z of the tool point in the world frame, mm
+  orientation,  ///< lever times the rotation vector from `reference` to the tool's orientation, in the world frame, mm
+  distance,     ///< distance of the tool point from the origin of the world frame, mm; then two zeros
+};
+
+/// What one row of poses is a reading of.
+struct Observation {
+  std::string base = {};  ///< name among Chain::bases, or empty: Chain::base
+  std::string tool = {};  ///< name among Chain::tools, or empty: Chain::tool
+  Reading reading = Reading::position;
+  double lever_mm = 1000.0;                                 ///< of an orientation: so many mm are one rad
+  Eigen::Matrix3d reference = Eigen::Matrix3d::Identity();  ///< of an orientation
+  Eigen::Index stand = 0;  ///< rows with equal numbers were read while the arm stood still once
+};
+
+/// Where the arm stood, under which conditions, and what was looked at: one row a reading.
 struct Poses {
   Eigen::MatrixXd joints;                             ///< n x J: rad, mm for prismatic joints
   std::map<std::string, Eigen::VectorXd> covariates;  ///< by column name, e.g. "payload_kg", n values each
+  std::vector<Observation> observations = {};         ///< n, or none: every row is the position of Chain::tool
 
   Eigen::Index count() const { return joints.rows(); }
 };

@@ -1,0 +1,60 @@
+#include "robot/measured_file.hpp"
+
+#include <fmt/format.h>
+
+#include <set>
+#include <stdexcept>
+
+#include "shared/options.hpp"
+
+namespace llmt::apps {
+
+void add_measured_file_options(CLI::App& command, MeasuredFileOptions& options) {
+  add_input_file(command, "--columns", options.columns, "Column map (YAML): what the columns of the file mean");
+  command.add_flag("--orientations", options.orientations, "Use the measured orientations as well as the positions");
+  add_decimal_comma(command, options.mark);
+}
+
+robotics::Measurements read_measured(const std::string& path, const robotics::Robot& robot,
+                                     const std::vector<std::string>& also, const MeasuredFileOptions& options) {
+  const robotics::ColumnMap map =
+      options.columns.empty() ? robotics::ColumnMap{} : robotics::read_column_map(options.columns);
+  robotics::Measurements measurements = robotics::read_measurements(path, robot, also, options.mark, map);
+  if (!options.orientations) return measurements;
+  try {
+    return robotics::with_orientations(measurements, robot.chain);
+  } catch (const std::invalid_argument& error) {
+    throw std::runtime_error(fmt::format("{}: --orientations: {}", path, error.what()));
+  }
+}
+
+std::string counts_of(const robotics::Measurements& measurements) {
+  const robotics::Poses& poses = measurements.poses;
+  if (poses.observations.empty()) return fmt::format("{} poses", measurements.count());
+  std::set<Eigen::Index> stands;
+  std::set<std::string> tools;
+  std::set<std::string> bases;
+  bool distances = false;
+  for (const robotics::Observation& seen : poses.observations) {
+    stands.insert(seen.stand);
+    tools.insert(seen.tool);
+    bases.insert(seen.base);
+    distances = distances || seen.reading == robotics::Reading::distance;
+  }
+  std::string text = fmt::format("{} poses", stands.size());
+  const auto points = std::ssize(robotics::position_rows(poses));
+  if (tools.size() > bases.size())
+    text += fmt::format(", {} points of {} targets", points, tools.size() / bases.size());
+  if (distances) text += fmt::format(", {} distances", points);
+  if (bases.size() > 1) text += fmt::format(", {} sessions", bases.size());
+  const auto turns = std::ssize(robotics::orientation_rows(poses));
+  if (turns > 0) text += fmt::format(", {} orientations", turns);
+  return text;
+}
+
+std::string use_of_orientations(const robotics::Measurements& measurements) {
+  if (measurements.orientation.values.size() == 0 || !robotics::orientation_rows(measurements.poses).empty()) return "";
+  return "The file has orientations. Only the positions are used; --orientations uses both.\n";
+}
+
+}  // namespace llmt::apps

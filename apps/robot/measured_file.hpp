@@ -1,0 +1,32 @@
+/// \file
+/// The options that say how a file of measurements is to be read.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <string>
+#include <vector>
+
+#include "llmt/robotics/measurements.hpp"
+
+namespace llmt::apps {
+
+struct MeasuredFileOptions {
+  std::string columns;        ///< column map, or empty
+  bool orientations = false;  ///< to be fitted, too
+  DecimalMark mark = DecimalMark::point;
+};
+
+/// --columns, --orientations and --decimal-comma.
+void add_measured_file_options(CLI::App& command, MeasuredFileOptions& options);
+
+/// Throws as robotics::read_measurements() and robotics::with_orientations(), with the file's name.
+robotics::Measurements read_measured(const std::string& path, const robotics::Robot& robot,
+                                     const std::vector<std::string>& also, const MeasuredFileOptions& options);
+
+/// "60 poses", or "60 poses, 180 points of 3 targets, 2 sessions".
+std::string counts_of(const robotics::Measurements& measurements);
+
+/// What orientations of the file are used for, as a line; empty if there are none.
+std::string use_of_orientations(const robotics::Measurements& measurements);
+
+}  // namespace llmt::apps

@@ -1,0 +1,130 @@
+#include "calibration/frame_start.hpp"
+
+#include <algorithm>
+#include <limits>
+#include <set>
+#include <span>
+
+#include "calibration/registration.hpp"
+#include "llmt/robotics/calibration.hpp"
+#include "robot/settings.hpp"
+
+namespace llmt::robotics {
+namespace {
+
+constexpr std::size_t coordinates_of_frame = 6;
+
+bool is_free(const std::vector<std::string>& reasons, std::size_t first, std::size_t count) {
+  return std::ranges::all_of(std::span(reasons).subspan(first, count),
+                             [](const std::string& why) { return why.empty(); });
+}
+
+// About `count` rows at equal steps: enough to compare starts.
+Measurements rows_at_steps(const Measurements& measurements, Eigen::Index count) {
+  std::vector<Eigen::Index> rows;
+  const Eigen::Index step = std::max<Eigen::Index>(1, measurements.count() / count);
+  for (Eigen::Index i = 0; i < measurements.count(); i += step) rows.push_back(i);
+  return select(measurements, rows);
+}
+
+// The guess of the tool matters: with a wrong one, Kabsch's base lies in the basin of another minimum.
+Robot best_start(const Robot& robot, const Measurements& measurements, const std::vector<std::string>& reasons,
+                 const discovery::SolverOptions& solver) {
+  const Measurements few = rows_at_steps(measurements, 200);
+  Eigen::Matrix3Xd guesses = Eigen::Matrix3Xd::Zero(3, 7);
+  constexpr double tool_guess_mm = 150.0;
+  for (int axis = 0; axis < 3; ++axis) {
+    guesses(axis, 1 + axis) = tool_guess_mm;
+    guesses(axis, 4 + axis) = -tool_guess_mm;
+  }
+  const bool tool_is_free = is_free(reasons, coordinates_of_frame, 3);
+  Robot best = robot;
+  double smallest = std::numeric_limits<double>::infinity();
+  for (Eigen::Index guess = 0; guess < (tool_is_free ? guesses.cols() : 1); ++guess) {
+    Robot start = robot;
+    start.chain.tool.xyz_mm += guesses.col(guess);
+    start = with_closed_form_base(std::move(start), few);
+    Robot trial = start;
+    const discovery::SolverResult result = solve_for(trial, calibration_problem(trial, few), reasons, solver);
+    // The tool as given comes first and is kept unless another guess is better by more than 0.1 %.
+    if (result.residual_norms.back() < 0.999 * smallest) {
+      smallest = result.residual_norms.back();
+      best = trial;
+    }
+  }
+  return best;
+}
+
+Measurements of_reading(const Measurements& measurements, Reading reading) {
+  const std::vector<Observation>& observations = measurements.poses.observations;
+  if (observations.empty()) return measurements;
+  std::vector<Eigen::Index> rows;
+  for (std::size_t i = 0; i < observations.size(); ++i) {
+    if (observations[i].reading == reading) rows.push_back(static_cast<Eigen::Index>(i));
+  }
+  return select(measurements, rows);
+}
+
+Frame& frame_of(Frame& own, std::vector<NamedFrame>& further, const std::string& name) {
+  if (name.empty()) return own;
+  return std::ranges::find(further, name, &NamedFrame::name)->frame;
+}
+
+// The frames of one setting. Those of its base that an earlier setting began with are known, its tool is not.
+Robot started(Robot robot, const Measurements& measurements, bool base_is_known,
+              const std::vector<std::string>& reasons, const discovery::SolverOptions& solver) {
+  const Measurements points = of_reading(measurements, Reading::position);
+  const bool all_seen = std::ranges::all_of(measurements.measured, [](bool seen) { return seen; });
+  const bool base_is_free = is_free(reasons, 0, coordinates_of_frame) && !base_is_known;
+  if (points.count() > 0 && all_seen) {
+    if (base_is_free) {
+      robot = best_start(robot, points, reasons, solver);
+    } else if (base_is_known && is_free(reasons, coordinates_of_frame, 3)) {
+      robot = with_closed_form_tool(std::move(robot), points);
+    }
+  }
+  if (measurements.poses.observations.empty()) return robot;
+  const Measurements distances = of_reading(measurements, Reading::distance);
+  if (distances.count() > 0 && base_is_free) robot = with_base_by_distances(std::move(robot), distances);
+  const Measurements turns = of_reading(measurements, Reading::orientation);
+  if (turns.count() > 0 && is_free(reasons, coordinates_of_frame + 3, 3)) {
+    robot = with_closed_form_orientation(std::move(robot), turns);
+  }
+  return robot;
+}
+
+}  // namespace
+
+discovery::SolverResult solve_for(Robot& robot, discovery::LeastSquaresProblem problem,
+                                  const std::vector<std::string>& reasons, const discovery::SolverOptions& solver) {
+  for (std::size_t k = 0; k < reasons.size(); ++k) problem.parameters[k].free = reasons[k].empty();
+  discovery::SolverResult result = discovery::solve(problem, solver);
+  robot = with_values(std::move(robot), result.values);
+  return result;
+}
+
+Robot with_started_frames(Robot robot, const Measurements& measurements, const std::vector<std::string>& reasons,
+                          const discovery::SolverOptions& solver) {
+  const Frame given_tool = robot.chain.tool;
+  std::set<std::string> known_bases;
+  for (const Setting& setting : settings_of(robot, measurements.poses)) {
+    Measurements own = select(measurements, setting.rows);
+    own.poses = setting.poses;
+    std::vector<std::string> own_reasons;
+    for (const Eigen::Index column : columns_of(setting, robot)) own_reasons.push_back(reasons[column]);
+    const bool is_plain = measurements.poses.observations.empty();
+    const Observation seen = is_plain ? Observation{} : measurements.poses.observations[setting.rows.front()];
+    Robot part = setting.robot;
+    part.chain.base = frame_of(robot.chain.base, robot.chain.bases, seen.base);
+    // A tool that nothing is known of is most likely where the first one is.
+    const bool is_copy = part.chain.tool.xyz_mm == given_tool.xyz_mm && part.chain.tool.rpy_deg == given_tool.rpy_deg;
+    if (is_copy) part.chain.tool = robot.chain.tool;
+    part = started(std::move(part), own, known_bases.contains(seen.base), own_reasons, solver);
+    frame_of(robot.chain.base, robot.chain.bases, seen.base) = part.chain.base;
+    frame_of(robot.chain.tool, robot.chain.tools, seen.tool) = part.chain.tool;
+    known_bases.insert(seen.base);
+  }
+  return robot;
+}
+
+}  // namespace llmt::robotics

@@ -1,0 +1,22 @@
+// Where the search for bases and tools begins.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "llmt/discovery/least_squares.hpp"
+#include "llmt/robotics/measurements.hpp"
+
+namespace llmt::robotics {
+
+/// Least squares over the parameters without a reason to be fixed; the robot gets the result.
+discovery::SolverResult solve_for(Robot& robot, discovery::LeastSquaresProblem problem,
+                                  const std::vector<std::string>& reasons, const discovery::SolverOptions& solver);
+
+/// The robot with its bases and tools near those of the measurements, setting after setting: a base that is free in
+/// closed form for several guesses of the tool, then a small fit; tools on a base that is known in closed form. Frames
+/// with a reason to be fixed, and those that the measured coordinates do not suffice for, stay as they are.
+Robot with_started_frames(Robot robot, const Measurements& measurements, const std::vector<std::string>& reasons,
+                          const discovery::SolverOptions& solver);
+
+}  // namespace llmt::robotics

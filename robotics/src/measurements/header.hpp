@@ -1,0 +1,69 @@
+// The columns of a table of measurements, sorted into what they mean.
+#pragma once
+
+#include <array>
+#include <map>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "llmt/csv.hpp"
+#include "llmt/robotics/measurements.hpp"
+
+namespace llmt::robotics {
+
+class Header {
+ public:
+  /// `also`: columns that are covariates besides those known by name. Throws std::runtime_error `path:1: ...` if a
+  /// column has no unit or one that does not suit, or two are the same quantity.
+  Header(const Csv& csv, const Robot& robot, const std::vector<std::string>& also, const ColumnMap& map = {});
+
+  bool has(const std::string& quantity) const { return quantities_.contains(quantity); }
+  bool has_joints() const { return quantities_.lower_bound("q0") != quantities_.lower_bound("q:"); }  // q1, q2, ...
+  bool in_degrees(const std::string& quantity) const { return quantities_.at(quantity).unit == "deg"; }
+
+  Eigen::MatrixXd joints() const;
+
+  /// Prefixes of the columns of targets, in the order of the columns: "" for x_mm, "t2_" for t2_x_mm.
+  const std::vector<std::string>& targets() const { return targets_; }
+
+  /// n x 3 in mm, NaN where the cell is empty (allowed for several targets only) and zero where there is no column.
+  Eigen::MatrixXd points_mm(const std::string& target, std::array<bool, 3>& measured) const;
+
+  /// Empty if there is no such column.
+  Eigen::VectorXd distances_mm() const;
+
+  Orientation orientation() const;
+  std::map<std::string, Eigen::VectorXd> covariates() const;
+
+  /// Names in the column `target` or `session`, row by row; empty if there is none.
+  std::vector<std::string> words(const std::string& column) const;
+
+  const std::vector<std::string>& unused() const { return unused_; }
+
+  /// What columns that are not used look like, in sentences.
+  std::vector<std::string> hints() const;
+
+ private:
+  struct Quantity {
+    std::string column;
+    std::string unit;
+  };
+
+  const Csv& csv_;
+  const Robot& robot_;
+  std::set<std::string> also_;
+  std::map<std::string, Quantity> quantities_;     // "q1", "x", "t2_x", "rx", "qw", "distance" -> column and unit
+  std::map<std::string, std::string> covariates_;  // name -> column
+  std::map<std::string, std::string> words_;       // "target", "session" -> column
+  std::vector<std::string> targets_;
+  std::vector<std::string> unused_;
+
+  [[noreturn]] void refuse(const std::string& message) const;
+  bool take_named_joint(const std::string& name, const std::string& column);
+  void take(const std::string& name, const std::string& column);
+  void take_quantity(const std::string& quantity, const std::string& column, const std::string& unit);
+  double factor(const std::string& quantity, const std::map<std::string, double>& units) const;
+};
+
+}  // namespace llmt::robotics

@@ -1,0 +1,89 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+
+#include "llmt/robotics/measurements.hpp"
+
+namespace llmt::robotics {
+
+namespace {
+
+struct Columns {
+  std::vector<std::string> names;
+  std::vector<std::vector<std::string>> cells;  // by column
+
+  void add(const std::string& name, const Eigen::VectorXd& values) {
+    names.push_back(name);
+    cells.emplace_back();
+    for (const double value : values) cells.back().push_back(fmt::format("{}", value));
+  }
+};
+
+// RFC 4180.
+std::string quoted(const std::string& text) {
+  std::string result = "\"";
+  for (const char c : text) result += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return result + '"';
+}
+
+std::string target_of(const Observation& seen) {
+  if (seen.base.empty()) return seen.tool;
+  const std::string prefix = seen.base + "/";
+  return seen.tool.starts_with(prefix) ? seen.tool.substr(prefix.size()) : seen.tool == seen.base ? "" : seen.tool;
+}
+
+// One column of names; the chain's own frame gets a name that no other has. Nothing if there is no other.
+void add_names(const std::string& column, std::string own, const std::vector<std::string>& names, Columns& columns) {
+  if (std::ranges::all_of(names, [](const std::string& name) { return name.empty(); })) return;
+  while (std::ranges::find(names, own) != names.end()) own += '_';
+  columns.names.push_back(column);
+  columns.cells.emplace_back();
+  for (const std::string& name : names) columns.cells.back().push_back(quoted(name.empty() ? own : name));
+}
+
+}  // namespace
+
+std::string to_csv(const Measurements& all, const Robot& robot) {
+  validate(all, robot);
+  // Orientations stand beside their positions.
+  const Measurements measurements = orientation_rows(all.poses).empty() ? all : select(all, position_rows(all.poses));
+  Columns columns;
+  for (std::size_t j = 0; j < robot.chain.joints.size(); ++j) {
+    columns.add(fmt::format("q{}_{}", j + 1, robot.chain.joints[j].type == JointType::revolute ? "rad" : "mm"),
+                measurements.poses.joints.col(j));
+  }
+  const std::vector<Observation>& observations = measurements.poses.observations;
+  const bool distances = !observations.empty() && observations.front().reading == Reading::distance;
+  if (distances) columns.add("distance_mm", measurements.positions_mm.col(0));
+  for (std::size_t axis = 0; axis < 3 && !distances; ++axis) {
+    if (measurements.measured[axis])
+      columns.add(fmt::format("{}_mm", "xyz"[axis]), measurements.positions_mm.col(axis));
+  }
+  const bool angles = measurements.orientation.kind == Orientation::Kind::angles_deg;
+  for (Eigen::Index k = 0; k < measurements.orientation.values.cols(); ++k) {
+    columns.add(angles ? fmt::format("r{}_deg", "xyz"[k]) : fmt::format("q{}", "wxyz"[k]),
+                measurements.orientation.values.col(k));
+  }
+  std::vector<std::string> sessions;
+  std::vector<std::string> targets;
+  for (const Observation& seen : observations) {
+    sessions.push_back(seen.base);
+    targets.push_back(target_of(seen));
+  }
+  add_names("session", "first", sessions, columns);
+  add_names("target", "t1", targets, columns);
+  for (const auto& [name, values] : measurements.poses.covariates) {
+    if (!is_move(name)) columns.add(name, values);
+  }
+  std::string text = fmt::format("{}\n", fmt::join(columns.names, ","));
+  for (Eigen::Index i = 0; i < measurements.count(); ++i) {
+    for (std::size_t c = 0; c < columns.cells.size(); ++c) {
+      text += fmt::format("{}{}", c == 0 ? "" : ",", columns.cells[c][i]);
+    }
+    text += '\n';
+  }
+  return text;
+}
+
+}  // namespace llmt::robotics

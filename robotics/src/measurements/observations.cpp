@@ -1,0 +1,117 @@
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <set>
+#include <stdexcept>
+
+#include "llmt/robotics/measurements.hpp"
+#include "llmt/robotics/orientation.hpp"
+
+namespace llmt::robotics {
+namespace {
+
+std::vector<Eigen::Index> rows_where(const Poses& poses, bool is_orientation) {
+  std::vector<Eigen::Index> rows;
+  for (Eigen::Index i = 0; i < poses.count(); ++i) {
+    const bool is = !poses.observations.empty() && poses.observations[i].reading == Reading::orientation;
+    if (is == is_orientation) rows.push_back(i);
+  }
+  return rows;
+}
+
+void add_missing(std::vector<NamedFrame>& frames, const std::string& name, const Frame& frame) {
+  if (name.empty() || std::ranges::find(frames, name, &NamedFrame::name) != frames.end()) return;
+  frames.push_back({name, frame});
+}
+
+// The column in mm, or null.
+std::optional<Eigen::VectorXd> in_mm(const Poses& poses, const std::string& name) {
+  for (const auto& [unit, factor] : {std::pair{"um", 1e-3}, std::pair{"mm", 1.0}}) {
+    const auto found = poses.covariates.find(fmt::format("{}_{}", name, unit));
+    if (found != poses.covariates.end()) return factor * found->second;
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+std::vector<Eigen::Index> orientation_rows(const Poses& poses) { return rows_where(poses, true); }
+
+std::vector<Eigen::Index> position_rows(const Poses& poses) { return rows_where(poses, false); }
+
+Measurements with_orientations(const Measurements& measurements, const Chain& chain) {
+  const auto refuse = [](const char* message) {
+    throw std::invalid_argument(fmt::format("llmt::robotics::with_orientations: {}", message));
+  };
+  if (measurements.orientation.values.rows() == 0) refuse("no orientation was measured");
+  if (std::ranges::any_of(measurements.measured, [](bool seen) { return !seen; })) {
+    refuse("positions need all of x, y and z where orientations are fitted, too");
+  }
+  const Eigen::Index n = measurements.count();
+  const std::vector<Eigen::Matrix3d> rotations = rotations_of(measurements.orientation, chain.orientation);
+  std::vector<Eigen::Index> twice;
+  for (int part = 0; part < 2; ++part) {
+    for (Eigen::Index row = 0; row < n; ++row) twice.push_back(row);
+  }
+  Measurements both = select(measurements, twice);
+  both.warnings = measurements.warnings;
+  both.unused_columns = measurements.unused_columns;
+  both.positions_mm.bottomRows(n).setZero();
+  std::vector<Observation>& observations = both.poses.observations;
+  if (observations.empty()) {
+    observations.resize(2 * n);
+    for (Eigen::Index row = 0; row < 2 * n; ++row) observations[row].stand = row % n;
+  }
+  for (Eigen::Index row = 0; row < n; ++row) {
+    if (observations[row].reading != Reading::position) refuse("only positions can have orientations");
+    observations[n + row].reading = Reading::orientation;
+    observations[n + row].reference = rotations[row];
+  }
+  return both;
+}
+
+Robot with_frames(Robot robot, const Poses& poses) {
+  for (const Observation& seen : poses.observations) {
+    add_missing(robot.chain.bases, seen.base, robot.chain.base);
+    add_missing(robot.chain.tools, seen.tool, robot.chain.tool);
+  }
+  return robot;
+}
+
+std::vector<double> pose_labels(const Poses& poses) {
+  const auto pose = poses.covariates.find("pose");
+  if (pose != poses.covariates.end()) return {pose->second.begin(), pose->second.end()};
+  std::vector<double> labels;
+  for (const Observation& seen : poses.observations) labels.push_back(static_cast<double>(seen.stand));
+  return labels;
+}
+
+Eigen::RowVector3d mean_reading(const Measurements& measurements, const std::vector<Eigen::Index>& rows) {
+  if (orientation_rows(measurements.poses).empty()) return measurements.positions_mm(rows, Eigen::all).colwise().mean();
+  const Observation& first = measurements.poses.observations[rows.front()];
+  Eigen::RowVector3d sum = Eigen::RowVector3d::Zero();
+  for (const Eigen::Index row : rows) {
+    sum += measurements.positions_mm.row(row);
+    if (first.reading != Reading::orientation) continue;
+    const Observation& seen = measurements.poses.observations[row];
+    const Eigen::AngleAxisd turn(seen.reference * first.reference.transpose());
+    sum += first.lever_mm * turn.angle() * turn.axis().transpose();
+  }
+  return sum / static_cast<double>(rows.size());
+}
+
+Eigen::MatrixXd stated_sigma_mm(const Measurements& measurements) {
+  Eigen::MatrixXd sigma = Eigen::MatrixXd::Zero(measurements.count(), 3);
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    for (const auto& [name, factor] : {std::pair{"U95", 0.5}, std::pair{"sigma", 1.0}}) {
+      for (const std::string& column : {std::string(name), fmt::format("{}_{}", name, "xyz"[axis])}) {
+        if (const auto values = in_mm(measurements.poses, column)) sigma.col(axis) = factor * *values;
+      }
+    }
+  }
+  for (const Eigen::Index row : orientation_rows(measurements.poses)) sigma.row(row).setZero();
+  return sigma;
+}
+
+}  // namespace llmt::robotics

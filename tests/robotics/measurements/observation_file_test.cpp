@@ -1,0 +1,156 @@
+#include <gtest/gtest.h>
+
+#include "llmt/robotics/measurements.hpp"
+#include "robotics/robots.hpp"
+
+namespace llmt::robotics {
+namespace {
+
+// Two joints, the second prismatic.
+Robot two() {
+  Robot robot = make_robot(Convention::dh, {{90, 0, 100, 0}, {0, 0, 0, 0}});
+  robot.chain.joints[1].type = JointType::prismatic;
+  robot.chain.joints[0].name = "waist";
+  return robot;
+}
+
+Measurements read(const std::string& text, const ColumnMap& map = {}, const Robot& robot = two()) {
+  return parse_measurements(text, "m.csv", robot, {}, DecimalMark::point, map);
+}
+
+void expect_refused(const std::string& text, const std::string& place, const std::string& part,
+                    const ColumnMap& map = {}) {
+  try {
+    read(text, map);
+    ADD_FAILURE() << "no error: " << text;
+  } catch (const std::runtime_error& error) {
+    const std::string message = error.what();
+    EXPECT_TRUE(message.starts_with(place)) << message;
+    EXPECT_NE(message.find(part), std::string::npos) << message;
+  }
+}
+
+TEST(ObservationFile, EveryTargetOfAPoseIsAReadingAndSomeMayBeMissing) {
+  const Measurements m = read(
+      "q1_deg,q2_mm,t1_x_mm,t1_y_mm,t1_z_mm,t2_x_mm,t2_y_mm,t2_z_mm,payload_kg\n"
+      "1,2,3,4,5,6,7,8,0.5\n"
+      "2,3,,,,7,8,9,0.6\n"
+      "3,4,5,6,7,0,0,0,0.7\n");
+  ASSERT_EQ(m.count(), 4);
+  EXPECT_EQ(m.positions_mm.row(1), Eigen::RowVector3d(6.0, 7.0, 8.0));
+  EXPECT_EQ(m.positions_mm.row(2), Eigen::RowVector3d(7.0, 8.0, 9.0));
+  EXPECT_EQ(m.poses.observations[0].tool, "");
+  EXPECT_EQ(m.poses.observations[1].tool, "t2");
+  EXPECT_EQ(m.poses.covariates.at("payload_kg")(2), 0.6);
+  EXPECT_EQ(pose_labels(m.poses), (std::vector<double>{0.0, 0.0, 1.0, 2.0}));
+  ASSERT_EQ(m.warnings.size(), 1u);
+  EXPECT_NE(m.warnings[0].find("line 4"), std::string::npos) << m.warnings[0];
+}
+
+TEST(ObservationFile, LongFormatAndSessionsNameTheirFrames) {
+  const Measurements m = read(
+      "q1_deg,q2_mm,x_mm,y_mm,z_mm,target,session\n"
+      "1,2,3,4,5,ball,monday\n"
+      "1,2,6,7,8,nest 2,monday\n"
+      "4,5,6,7,8,ball,tue.am\n"
+      "4,5,6,7,9,nest 2,tue.am\n");
+  const std::vector<Observation>& seen = m.poses.observations;
+  ASSERT_EQ(seen.size(), 4u);
+  EXPECT_EQ(seen[0].base, "");
+  EXPECT_EQ(seen[0].tool, "");
+  EXPECT_EQ(seen[1].tool, "nest 2");
+  EXPECT_EQ(seen[2].base, "tue_am");
+  EXPECT_EQ(seen[2].tool, "tue_am/ball");
+  EXPECT_EQ(seen[3].tool, "tue_am/nest 2");
+  EXPECT_EQ(seen[0].stand, seen[1].stand);
+  EXPECT_NE(seen[1].stand, seen[2].stand);
+  EXPECT_EQ(seen[2].stand, seen[3].stand);
+  const Robot robot = with_frames(two(), m.poses);
+  EXPECT_EQ(robot.chain.bases.size(), 1u);
+  EXPECT_EQ(robot.chain.tools.size(), 3u);
+}
+
+// A robot that was calibrated with such a file knows its frames by their names.
+TEST(ObservationFile, FramesThatTheRobotHasAreFoundAgain) {
+  Robot robot = two();
+  robot.chain.tools = {{"t2", {}}};
+  const Measurements m = read("q1_deg,q2_mm,x_mm,target\n1,2,3,t2\n2,3,4,t1\n", {}, robot);
+  EXPECT_EQ(m.poses.observations[0].tool, "t2");
+  EXPECT_EQ(m.poses.observations[1].tool, "");
+}
+
+TEST(ObservationFile, DistancesAreReadings) {
+  const Measurements m = read("q1_deg,q2_mm,distance_m\n1,2,0.5\n");
+  EXPECT_EQ(m.positions_mm(0, 0), 500.0);
+  EXPECT_EQ(m.poses.observations[0].reading, Reading::distance);
+  EXPECT_FALSE(m.measured[1]);
+  expect_refused("q1_deg,q2_mm,distance_mm\n1,2,-3\n", "m.csv:2:", "above 0");
+  expect_refused("q1_deg,q2_mm,distance_mm,x_mm\n1,2,3,4\n", "m.csv:1:", "one after the other");
+}
+
+TEST(ObservationFile, ColumnMapNamesColumnsAndUnits) {
+  const ColumnMap map = parse_column_map("decimal: comma\ncolumns: {Axis 1: waist_deg, A2: q2_mm, X: x_m}\n", "map");
+  const Measurements m =
+      parse_measurements("Axis 1;A2;X\n180,0;2,5;0,25\n", "m.csv", two(), {}, DecimalMark::point, map);
+  EXPECT_DOUBLE_EQ(m.poses.joints(0, 0), std::numbers::pi);
+  EXPECT_EQ(m.poses.joints(0, 1), 2.5);
+  EXPECT_EQ(m.positions_mm(0, 0), 250.0);
+  EXPECT_TRUE(m.unused_columns.empty());
+  expect_refused("q1_deg,q2_mm,x_mm\n1,2,3\n", "m.csv:1:", "no column \"A2\", which the column map calls q2_mm", map);
+  expect_refused("a,q2_mm,x_mm\n1,2,3\n", "m.csv:1:", "no column that has a meaning",
+                 parse_column_map("columns: {a: quark_deg}\n", "map"));
+  const auto message = [](const std::string& text) {
+    try {
+      parse_column_map(text, "map");
+    } catch (const std::runtime_error& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_TRUE(message("decimal: dot\ncolumns: {}\n").starts_with("map:1:"));
+  EXPECT_TRUE(message("columns: {}\nseparator: x\n").starts_with("map:"));
+}
+
+TEST(ObservationFile, StatedUncertaintiesBecomeStandardDeviations) {
+  const Measurements m = read("q1_deg,q2_mm,x_mm,y_mm,z_mm,U95_um,sigma_z_um\n1,2,3,4,5,30,8\n");
+  EXPECT_TRUE(stated_sigma_mm(m).isApprox(Eigen::RowVector3d(0.015, 0.015, 0.008)));
+  expect_refused("q1_deg,q2_mm,x_mm,sigma_x_um\n1,2,3,4\n2,3,4,0\n", "m.csv:3:", "standard deviation must be above 0");
+  expect_refused("q1_deg,q2_mm,x_mm,sigma_x_um\n1,2,3,nan\n", "m.csv:2:", "sigma_x_um");
+}
+
+TEST(ObservationFile, ColumnsThatLookMeantAreNamedOnce) {
+  const Measurements m = read("q1_deg,q2_mm,x_mm,SMR_ID,torque_1,torque_2,Temperature\n1,2,3,a,1,2,20\n");
+  ASSERT_EQ(m.warnings.size(), 3u);
+  EXPECT_NE(m.warnings[0].find("\"SMR_ID\""), std::string::npos) << m.warnings[0];
+  EXPECT_NE(m.warnings[0].find("name it target"), std::string::npos) << m.warnings[0];
+  EXPECT_EQ(m.unused_columns.size(), 4u);
+}
+
+TEST(ObservationFile, MistakesAreNamedWithTheirPlace) {
+  expect_refused("q1_deg,q2_mm,x_mm,t1_x_mm\n1,2,3,4\n", "m.csv:1:", "name them all");
+  expect_refused("q1_deg,q2_mm,t1_x_mm,t2_x_mm,t2_y_mm\n1,2,3,4,5\n", "m.csv:1:", "same coordinates");
+  expect_refused("q1_deg,q2_mm,t1_x_mm,t1_y_mm\n1,2,3,4\n1,2,3,\n", "m.csv:3:", "is missing");
+  expect_refused("q1_deg,q2_mm,x_mm,target\n1,2,3,a\n1,2,3,\n", "m.csv:3:", "the name is missing");
+  expect_refused("q1_deg,q2_mm,x_mm,session\n1,2,3,\n", "m.csv:2:", "the name is missing");
+  expect_refused("q1_deg,q2_mm,x_mm,y_mm,z_mm,qw,qx,qy,qz\n1,2,3,4,5,0,0,0,0\n", "m.csv:2:", "length 0");
+}
+
+TEST(ObservationFile, WritingAndReadingKeepsTargetsSessionsAndDistances) {
+  for (const std::string text :
+       {"q1_deg,q2_mm,t1_x_mm,t1_y_mm,t1_z_mm,t2_x_mm,t2_y_mm,t2_z_mm\n1,2,3,4,5,6,7,8\n2,3,,,,7,8,9\n",
+        "q1_deg,q2_mm,x_mm,session\n1,2,3,a\n2,3,4,b\n", "q1_deg,q2_mm,distance_mm\n1,2,3\n"}) {
+    const Measurements once = read(text);
+    const Measurements again = read(to_csv(once, with_frames(two(), once.poses)));
+    EXPECT_EQ(again.positions_mm, once.positions_mm);
+    ASSERT_EQ(again.poses.observations.size(), once.poses.observations.size());
+    for (std::size_t i = 0; i < once.poses.observations.size(); ++i) {
+      EXPECT_EQ(again.poses.observations[i].base, once.poses.observations[i].base);
+      EXPECT_EQ(again.poses.observations[i].tool, once.poses.observations[i].tool);
+      EXPECT_EQ(again.poses.observations[i].stand, once.poses.observations[i].stand);
+      EXPECT_EQ(again.poses.observations[i].reading, once.poses.observations[i].reading);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace llmt::robotics
