@@ -12,8 +12,6 @@
 namespace llmt::robotics {
 namespace {
 
-bool is_frame_parameter(const std::string& name) { return name.starts_with("base.") || name.starts_with("tool."); }
-
 discovery::SolverResult solve_for(Robot& robot, discovery::LeastSquaresProblem problem,
                                   const std::vector<std::string>& reasons, const discovery::SolverOptions& solver) {
   for (std::size_t k = 0; k < reasons.size(); ++k) problem.parameters[k].free = reasons[k].empty();
@@ -60,20 +58,6 @@ Robot best_start(const Robot& robot, const Measurements& measurements, const std
     }
   }
   return best;
-}
-
-void set_priors(std::vector<discovery::Parameter>& parameters, Eigen::Index geometric,
-                const CalibrationOptions& options) {
-  constexpr double frame_factor = 10.0;
-  for (discovery::Parameter& parameter : std::span(parameters).first(geometric)) {
-    const double factor = is_frame_parameter(parameter.name) ? frame_factor : 1.0;
-    double sigma = 0.0;
-    if (parameter.unit == "mm") sigma = factor * options.prior_length_mm;
-    if (parameter.unit == "deg") sigma = factor * options.prior_angle_deg;
-    if (!(sigma > 0.0)) continue;
-    parameter.prior_sigma = sigma;
-    parameter.prior_value = parameter.value;
-  }
 }
 
 double root_mean_square(const Eigen::VectorXd& residuals, Eigen::Index dof) {
