@@ -23,6 +23,7 @@ void add_urdf_links(CLI::App& command, robotics::UrdfLinks& links);
 
 void add_paper(CLI::App& app);
 void add_simulate(CLI::App& app);
+void add_poses(CLI::App& app);
 void add_calibrate(CLI::App& app);
 void add_discover(CLI::App& app);
 void add_predict(CLI::App& app);

@@ -27,6 +27,7 @@ int main(int argc, char** argv) {
   app.set_help_all_flag("--help-all", "Help with all options, also those for experts");
   llmt::apps::add_paper(app);
   llmt::apps::add_simulate(app);
+  llmt::apps::add_poses(app);
   llmt::apps::add_calibrate(app);
   llmt::apps::add_discover(app);
   llmt::apps::add_predict(app);

@@ -16,6 +16,7 @@ void add_members(CLI::App& study);
 void add_modes(CLI::App& study);
 void add_monotone(CLI::App& study);
 void add_odes(CLI::App& study);
+void add_poses(CLI::App& study);
 void add_pruning(CLI::App& study);
 void add_repeats(CLI::App& study);
 void add_sets(CLI::App& study);

@@ -13,20 +13,6 @@
 namespace llmt::robotics {
 namespace {
 
-void set_priors(std::vector<discovery::Parameter>& parameters, Eigen::Index geometric,
-                const CalibrationOptions& options) {
-  constexpr double frame_factor = 10.0;
-  for (discovery::Parameter& parameter : std::span(parameters).first(geometric)) {
-    const double factor = is_frame_parameter(parameter.name) ? frame_factor : 1.0;
-    double sigma = 0.0;
-    if (parameter.unit == "mm") sigma = factor * options.prior_length_mm;
-    if (parameter.unit == "deg") sigma = factor * options.prior_angle_deg;
-    if (!(sigma > 0.0)) continue;
-    parameter.prior_sigma = sigma;
-    parameter.prior_value = parameter.value;
-  }
-}
-
 double lever_of(const Measurements& measurements) {
   const std::vector<Eigen::Index> turns = orientation_rows(measurements.poses);
   return turns.empty() ? 1.0 : measurements.poses.observations[turns.front()].lever_mm;

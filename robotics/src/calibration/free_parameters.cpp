@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 #include <numeric>
+#include <span>
 #include <stdexcept>
 
 namespace llmt::robotics {
@@ -43,6 +44,22 @@ std::string excluded_by_convention(const Chain& chain, std::size_t joint, JointP
 }
 
 }  // namespace
+
+bool is_frame_parameter(const std::string& name) { return name.starts_with("base.") || name.starts_with("tool."); }
+
+void set_priors(std::vector<discovery::Parameter>& parameters, Eigen::Index geometric,
+                const CalibrationOptions& options) {
+  constexpr double frame_factor = 10.0;
+  for (discovery::Parameter& parameter : std::span(parameters).first(geometric)) {
+    const double factor = is_frame_parameter(parameter.name) ? frame_factor : 1.0;
+    double sigma = 0.0;
+    if (parameter.unit == "mm") sigma = factor * options.prior_length_mm;
+    if (parameter.unit == "deg") sigma = factor * options.prior_angle_deg;
+    if (!(sigma > 0.0)) continue;
+    parameter.prior_sigma = sigma;
+    parameter.prior_value = parameter.value;
+  }
+}
 
 bool is_nearly_parallel(const Chain& chain, std::size_t joint, double limit_deg) {
   // In both conventions alpha and beta turn one axis into the next; the first (mdh) or last (dh) pair involves base or

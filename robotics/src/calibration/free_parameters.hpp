@@ -19,6 +19,14 @@ std::vector<std::string> reasons_to_fix(const Robot& robot, const CalibrationOpt
 void fix_dependent(const std::vector<discovery::Parameter>& parameters, const Eigen::MatrixXd& jacobian,
                    Eigen::Index geometric, double geometric_tolerance, std::vector<std::string>& reasons);
 
+/// Whether a parameter belongs to base or tool.
+bool is_frame_parameter(const std::string& name);
+
+/// Gives the first `geometric` parameters the weak priors of the options around their values: base and tool have ten
+/// times the standard deviations of joints.
+void set_priors(std::vector<discovery::Parameter>& parameters, Eigen::Index geometric,
+                const CalibrationOptions& options);
+
 /// Whether the joint's beta replaces its d: the axes that its alpha and beta connect are within `limit_deg` of
 /// (anti)parallel.
 bool is_nearly_parallel(const Chain& chain, std::size_t joint, double limit_deg);

@@ -1,0 +1,123 @@
+#include "pose_selection/pose_region.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Cholesky>
+#include <stdexcept>
+
+#include "kinematics/units.hpp"
+
+namespace llmt::robotics {
+namespace {
+
+Chain without_base(Chain chain) {
+  chain.base = {};
+  return chain;
+}
+
+// Joint values in one degree.
+Eigen::VectorXd degree_of(const Chain& chain) {
+  Eigen::VectorXd unit(std::ssize(chain.joints));
+  for (Eigen::Index j = 0; j < unit.size(); ++j) {
+    unit(j) = chain.joints[j].type == JointType::revolute ? radians : radians * reach_of(chain);
+  }
+  return unit;
+}
+
+}  // namespace
+
+Eigen::MatrixXd joint_degrees(const Chain& chain, const Eigen::MatrixXd& joints) {
+  return joints * degree_of(chain).cwiseInverse().asDiagonal();
+}
+
+PoseRegion::PoseRegion(const Chain& chain, const std::optional<ToolBox>& box)
+    : kinematics_(without_base(chain)), box_(box), unit_(degree_of(chain)) {
+  if (box && !(box->lower_mm.array() <= box->upper_mm.array()).all()) {
+    throw std::invalid_argument("llmt::robotics::select_poses: a lower bound of the box is above the upper one");
+  }
+  lower_.resize(unit_.size());
+  upper_.resize(unit_.size());
+  for (Eigen::Index j = 0; j < unit_.size(); ++j) {
+    const Joint& joint = chain.joints[j];
+    const bool turns = joint.type == JointType::revolute;
+    if (!joint.limits && !turns) {
+      throw std::invalid_argument(
+          fmt::format("llmt::robotics::select_poses: {} is prismatic and has no limits_mm", joint.name));
+    }
+    const std::array<double, 2> limits = joint.limits.value_or(std::array<double, 2>{-180.0, 180.0});
+    lower_(j) = limits[0] * (turns ? radians : 1.0);
+    upper_(j) = limits[1] * (turns ? radians : 1.0);
+  }
+}
+
+bool PoseRegion::contains(const Eigen::VectorXd& joints) const {
+  if (!(joints.array() >= lower_.array()).all() || !(joints.array() <= upper_.array()).all()) return false;
+  if (!box_) return true;
+  const Eigen::Array3d tool = kinematics_.forward(joints).position_mm;
+  return (tool >= box_->lower_mm.array()).all() && (tool <= box_->upper_mm.array()).all();
+}
+
+bool PoseRegion::lead_into_box(Eigen::VectorXd& joints, const Eigen::Vector3d& target) const {
+  constexpr int most_steps = 30;
+  for (int step = 0; step < most_steps; ++step) {
+    if (contains(joints)) return true;
+    const Eigen::Vector3d missing = target - kinematics_.forward(joints).position_mm;
+    const Eigen::MatrixXd jacobian = kinematics_.joint_jacobian(joints).topRows(3) * unit_.asDiagonal();
+    Eigen::Matrix3d square = jacobian * jacobian.transpose();
+    square.diagonal().array() += 1e-3 * square.trace() + 1e-12;
+    const Eigen::VectorXd move = jacobian.transpose() * square.llt().solve(missing);
+    constexpr double longest_deg = 20.0;
+    const double shorter = std::min(1.0, longest_deg / std::max(1e-12, move.lpNorm<Eigen::Infinity>()));
+    joints = (joints + shorter * unit_.cwiseProduct(move)).cwiseMax(lower_).cwiseMin(upper_);
+  }
+  return contains(joints);
+}
+
+Eigen::MatrixXd PoseRegion::random(Eigen::Index count, Random& random) const {
+  constexpr int most_failures = 300;
+  Eigen::MatrixXd poses(count, unit_.size());
+  int failures = 0;
+  for (Eigen::Index i = 0; i < count;) {
+    Eigen::VectorXd joints(unit_.size());
+    for (Eigen::Index j = 0; j < joints.size(); ++j) joints(j) = random.uniform(lower_(j), upper_(j));
+    Eigen::Vector3d target = Eigen::Vector3d::Zero();
+    for (int axis = 0; box_ && axis < 3; ++axis) {
+      target(axis) = random.uniform(box_->lower_mm(axis), box_->upper_mm(axis));
+    }
+    if (box_ && !lead_into_box(joints, target)) {
+      if (++failures == most_failures) {
+        throw std::runtime_error(
+            fmt::format("llmt::robotics::select_poses: no pose within the joint limits brings the tool into the box, x "
+                        "{} ... {}, y {} ... {}, z {} ... {} mm in the frame of the robot's base",
+                        box_->lower_mm(0), box_->upper_mm(0), box_->lower_mm(1), box_->upper_mm(1), box_->lower_mm(2),
+                        box_->upper_mm(2)));
+      }
+      continue;
+    }
+    failures = 0;
+    poses.row(i++) = joints.transpose();
+  }
+  return poses;
+}
+
+void PoseRegion::add_neighbours(const Eigen::VectorXd& joints, double step_deg, Random& random,
+                                std::vector<Eigen::VectorXd>& poses) const {
+  const auto add = [&](Eigen::VectorXd moved) {
+    moved = moved.cwiseMax(lower_).cwiseMin(upper_);
+    if (contains(moved)) poses.push_back(std::move(moved));
+  };
+  for (Eigen::Index j = 0; j < joints.size(); ++j) {
+    for (const double side : {-1.0, 1.0}) {
+      Eigen::VectorXd moved = joints;
+      moved(j) += side * step_deg * unit_(j);
+      add(std::move(moved));
+    }
+  }
+  for (Eigen::Index k = 0; k < 2 * joints.size(); ++k) {
+    Eigen::VectorXd moved = joints;
+    for (Eigen::Index j = 0; j < joints.size(); ++j) moved(j) += 0.5 * step_deg * unit_(j) * random.normal();
+    add(std::move(moved));
+  }
+}
+
+}  // namespace llmt::robotics
