@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <set>
 #include <span>
+#include <string>
 
 #include "calibration/frame_start.hpp"
 #include "calibration/free_parameters.hpp"
@@ -216,6 +218,29 @@ Calibration calibrate(const Robot& robot, const Measurements& measurements, cons
     fitted->effects.insert(fitted->effects.end(), plain.maps.begin(), plain.maps.end());
   }
   return calibration;
+}
+
+Robot with_placed_frames(const Robot& robot, const Measurements& measurements, const Poses& known) {
+  std::set<std::string> frames;
+  const auto visit = [](const Poses& poses, const auto& take) {
+    if (poses.observations.empty() && poses.count() > 0) take(Observation{});
+    for (const Observation& seen : poses.observations) take(seen);
+  };
+  const auto base_of = [](const Observation& seen) { return seen.base.empty() ? "base" : "base@" + seen.base; };
+  const auto tool_of = [](const Observation& seen) { return seen.tool.empty() ? "tool" : "tool@" + seen.tool; };
+  visit(measurements.poses, [&](const Observation& seen) { frames.insert({base_of(seen), tool_of(seen)}); });
+  visit(known, [&](const Observation& seen) {
+    frames.erase(base_of(seen));
+    frames.erase(tool_of(seen));
+  });
+  const Unmapped plain = unmapped(with_frames(robot, measurements.poses), measurements);
+  if (frames.empty()) return with_frames(robot, measurements.poses);
+  CalibrationOptions options;
+  options.only.assign(frames.begin(), frames.end());
+  Robot placed = plain.robot;
+  register_frames(placed, plain.measurements, options);
+  placed.effects.insert(placed.effects.end(), plain.maps.begin(), plain.maps.end());
+  return placed;
 }
 
 }  // namespace llmt::robotics

@@ -7,7 +7,7 @@
 #include <numbers>
 #include <stdexcept>
 
-#include "calibration/likely_units.hpp"
+#include "calibration/likely_mistake.hpp"
 #include "calibration/paired_gain.hpp"
 
 namespace llmt::robotics {
@@ -67,8 +67,13 @@ void hold_out(const Robot& robot, const Measurements& measurements, const Report
   if (report.corrected) report.corrected->held_out_mm.resize(n);
   for (const Fold& fold :
        make_folds(n, {.count = options.folds, .kind = options.kind, .seed = options.seed, .groups = labels})) {
-    const Fitted fitted = fit_all(robot, select(measurements, fold.train), options);
-    const Distances held_out = distances_of(fitted, select(measurements, fold.held_out));
+    const Measurements trained = select(measurements, fold.train);
+    const Measurements left_out = select(measurements, fold.held_out);
+    Fitted fitted = fit_all(robot, trained, options);
+    for (Robot* placed : {&fitted.calibration.registered, &fitted.calibration.robot}) {
+      *placed = with_placed_frames(*placed, left_out, trained.poses);
+    }
+    const Distances held_out = distances_of(fitted, left_out);
     report.fold_terminations.push_back(fitted.calibration.result.termination);
     report.nominal.held_out_mm(fold.held_out) = held_out.nominal;
     report.geometric.held_out_mm(fold.held_out) = held_out.geometric;
@@ -184,7 +189,7 @@ std::vector<std::string> suspicions(const Robot& robot, const Measurements& meas
                     nominal));
   }
   if (nominal > implausible_mm) {
-    const std::string units = likely_units(robot, measurements, nominal, implausible_mm);
+    const std::string units = likely_mistake(robot, measurements, nominal, implausible_mm);
     if (!units.empty()) found.push_back(units);
   }
   return found;

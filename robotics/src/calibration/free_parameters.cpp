@@ -45,8 +45,6 @@ std::string excluded_by_convention(const Chain& chain, std::size_t joint, JointP
 
 }  // namespace
 
-bool is_frame_parameter(const std::string& name) { return name.starts_with("base.") || name.starts_with("tool."); }
-
 void set_priors(std::vector<discovery::Parameter>& parameters, Eigen::Index geometric,
                 const CalibrationOptions& options) {
   constexpr double frame_factor = 10.0;
@@ -58,6 +56,18 @@ void set_priors(std::vector<discovery::Parameter>& parameters, Eigen::Index geom
     if (!(sigma > 0.0)) continue;
     parameter.prior_sigma = sigma;
     parameter.prior_value = parameter.value;
+  }
+  for (const auto& [name, sigma] : options.priors) {
+    if (!(sigma > 0.0) || !std::isfinite(sigma)) {
+      throw std::invalid_argument(fmt::format(
+          "llmt::robotics::calibrate: CalibrationOptions::priors of {} is {}, must be above 0", name, sigma));
+    }
+    const std::vector<bool> named = matches(parameters, {name}, "CalibrationOptions::priors");
+    for (std::size_t k = 0; k < parameters.size(); ++k) {
+      if (!named[k]) continue;
+      parameters[k].prior_sigma = sigma;
+      parameters[k].prior_value = parameters[k].value;
+    }
   }
 }
 

@@ -19,11 +19,8 @@ std::vector<std::string> reasons_to_fix(const Robot& robot, const CalibrationOpt
 void fix_dependent(const std::vector<discovery::Parameter>& parameters, const Eigen::MatrixXd& jacobian,
                    Eigen::Index geometric, double geometric_tolerance, std::vector<std::string>& reasons);
 
-/// Whether a parameter belongs to base or tool.
-bool is_frame_parameter(const std::string& name);
-
 /// Gives the first `geometric` parameters the weak priors of the options around their values: base and tool have ten
-/// times the standard deviations of joints.
+/// times the standard deviations of joints; and all parameters those that the options name.
 void set_priors(std::vector<discovery::Parameter>& parameters, Eigen::Index geometric,
                 const CalibrationOptions& options);
 

@@ -18,7 +18,6 @@
 #include "discovery/pose_split.hpp"
 #include "discovery/refined_constants.hpp"
 #include "discovery/rest_correction.hpp"
-#include "discovery/robust_start.hpp"
 #include "discovery/second_look.hpp"
 
 namespace llmt::robotics {
@@ -201,7 +200,7 @@ Discovery discover_in(const Robot& robot, const PoseSplit& split, const Discover
   say(options, "calibrating");
   Investigation investigation;
   investigation.searched = plain.measurements;
-  RobustStart start = robust_start(plain.robot, investigation.searched, options.calibration);
+  RobustCalibration start = calibrate_robustly(plain.robot, investigation.searched, options.calibration);
   investigation.baseline = std::move(start.calibration);
   investigation.baseline_without = std::move(start.left_out);
   check_freedom(investigation.searched, investigation.baseline);

@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "discovery/pose_split.hpp"
+#include "llmt/robotics/calibration_quality.hpp"
 
 namespace llmt::robotics {
 namespace {
@@ -108,54 +109,22 @@ void doubt_described_effects(const Robot& described, const Investigation& invest
   }
 }
 
-// Standard deviation of the model's position at some poses, mm: what its parameters are not known to.
-double own_deviation(const Calibration& fitted, const Poses& poses) {
-  const Eigen::MatrixXd jacobian = position_jacobian(fitted.robot, poses);
-  Eigen::MatrixXd covariance = fitted.result.covariance;
-  // Combinations that no pose determines are NaN; they move nothing.
-  covariance = covariance.unaryExpr([](double value) { return std::isfinite(value) ? value : 0.0; });
-  const double sum = (jacobian * covariance).cwiseProduct(jacobian).sum();
-  return std::sqrt(std::max(0.0, sum) / static_cast<double>(poses.count()));
-}
-
 void doubt_coverage(const Investigation& investigation, const Measurements& test, Discovery& result) {
-  const Eigen::MatrixXd& searched = investigation.searched.poses.joints;
-  if (test.count() == 0) return;
+  const Coverage used = coverage(investigation.fitted, investigation.searched.poses, test.poses);
+  if (used.outside.empty()) return;
   std::vector<std::string> joints;
-  std::vector<bool> is_outside(static_cast<std::size_t>(test.count()));
-  for (Eigen::Index j = 0; j < searched.cols(); ++j) {
-    const double low = searched.col(j).minCoeff();
-    const double high = searched.col(j).maxCoeff();
-    constexpr double slack = 0.1;  // of the range
-    const double margin = slack * (high - low);
-    for (Eigen::Index i = 0; i < test.count(); ++i) {
-      const double value = test.poses.joints(i, j);
-      if (value < low - margin || value > high + margin) is_outside[static_cast<std::size_t>(i)] = true;
-    }
-    const double lowest = test.poses.joints.col(j).minCoeff();
-    const double highest = test.poses.joints.col(j).maxCoeff();
-    if (lowest >= low - margin && highest <= high + margin) continue;
-    const Joint& joint = investigation.baseline.robot.chain.joints[static_cast<std::size_t>(j)];
-    const bool turns = joint.type == JointType::revolute;
-    const double unit = turns ? 180.0 / std::numbers::pi : 1.0;
-    joints.push_back(fmt::format("{} {:.0f} to {:.0f} {} (searched {:.0f} to {:.0f})", joint.name, lowest * unit,
-                                 highest * unit, turns ? "deg" : "mm", low * unit, high * unit));
+  for (const Coverage::JointRange& range : used.beyond) {
+    joints.push_back(fmt::format("{} {:.0f} to {:.0f} {} (searched {:.0f} to {:.0f})", range.joint, range.used_low,
+                                 range.used_high, range.unit, range.measured_low, range.measured_high));
   }
-  std::vector<Eigen::Index> outside;
-  std::vector<Eigen::Index> inside;
-  for (Eigen::Index i = 0; i < test.count(); ++i) {
-    (is_outside[static_cast<std::size_t>(i)] ? outside : inside).push_back(i);
-  }
-  if (outside.empty()) return;
-  std::string deviation = fmt::format("{:.4f} mm", own_deviation(investigation.fitted, select(test.poses, outside)));
-  if (!inside.empty()) {
-    deviation +=
-        fmt::format(" instead of {:.4f} mm inside", own_deviation(investigation.fitted, select(test.poses, inside)));
+  std::string deviation = fmt::format("{:.4f} mm", used.deviation_outside_mm);
+  if (std::ssize(used.outside) < test.count()) {
+    deviation += fmt::format(" instead of {:.4f} mm inside", used.deviation_inside_mm);
   }
   result.notes.push_back(
       fmt::format("{} of {} test poses lie outside of what was searched: {}. There the parameters alone leave the tool "
                   "uncertain by {} (one standard deviation), and effects that show only there are unknown.",
-                  outside.size(), test.count(), fmt::join(joints, ", "), deviation));
+                  used.outside.size(), test.count(), fmt::join(joints, ", "), deviation));
 }
 
 }  // namespace

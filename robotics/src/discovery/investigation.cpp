@@ -7,10 +7,10 @@
 #include <set>
 
 #include "calibration/joint_map_shift.hpp"
+#include "calibration/median.hpp"
 #include "discovery/joint_maps.hpp"
 #include "discovery/left_out.hpp"
 #include "discovery/pose_split.hpp"
-#include "discovery/robust_start.hpp"
 
 namespace llmt::robotics {
 namespace {

@@ -110,14 +110,6 @@ std::vector<Eigen::Index> repeats_of(const Poses& poses) {
   return repeats;
 }
 
-Measurements without_rows(const Measurements& measurements, const std::vector<std::size_t>& left_out) {
-  std::vector<Eigen::Index> rows;
-  for (Eigen::Index i = 0; i < measurements.count(); ++i) {
-    if (std::ranges::find(left_out, static_cast<std::size_t>(i)) == left_out.end()) rows.push_back(i);
-  }
-  return select(measurements, rows);
-}
-
 Eigen::VectorXd stacked(const Eigen::MatrixXd& points, const std::vector<Eigen::Index>& coordinates) {
   const Eigen::MatrixXd by_pose = points.transpose();
   const Eigen::VectorXd all = by_pose.reshaped();

@@ -29,9 +29,6 @@ PoseSplit set_aside(const Measurements& measurements, const std::optional<Measur
 /// Numbers that are equal for repeats of a pose, or nothing.
 std::vector<Eigen::Index> repeats_of(const Poses& poses);
 
-/// The measurements without the rows of the given numbers.
-Measurements without_rows(const Measurements& measurements, const std::vector<std::size_t>& left_out);
-
 /// The coordinates of the points, pose by pose, of which the given ones are taken.
 Eigen::VectorXd stacked(const Eigen::MatrixXd& points, const std::vector<Eigen::Index>& coordinates);
 

@@ -157,6 +157,7 @@ Measurements from_csv(const Csv& csv, const Robot& robot, const std::vector<std:
     measurements.positions_mm.row(std::ssize(kept)) = sighting.value.transpose();
     kept.push_back(sighting.row);
   }
+  measurements.lines = csv.lines_of(kept);
   measurements.poses = select(rows, kept);
   measurements.poses.observations = observations_of(csv, header, robot, rows, seen);
   measurements.orientation = header.orientation();

@@ -18,7 +18,18 @@ Measurements select(const Measurements& measurements, const std::vector<Eigen::I
   if (measurements.orientation.values.size() != 0) {
     chosen.orientation.values = measurements.orientation.values(rows, Eigen::all);
   }
+  for (std::size_t k = 0; k < rows.size() && !measurements.lines.empty(); ++k) {
+    chosen.lines.push_back(measurements.lines[rows[k]]);
+  }
   return chosen;
+}
+
+Measurements without_rows(const Measurements& measurements, const std::vector<std::size_t>& left_out) {
+  std::vector<Eigen::Index> rows;
+  for (Eigen::Index i = 0; i < measurements.count(); ++i) {
+    if (std::ranges::find(left_out, static_cast<std::size_t>(i)) == left_out.end()) rows.push_back(i);
+  }
+  return select(measurements, rows);
 }
 
 void validate(const Measurements& measurements, const Robot& robot) {

@@ -127,11 +127,11 @@ TEST(CalibrationReport, UnitsThatWouldFitAreNamed) {
   };
   constexpr double degree = std::numbers::pi / 180.0;
   EXPECT_EQ(said_of(1.0, 1.0), "");
-  EXPECT_EQ(said_of(degree, 1.0).find("if the angles of the file were radians, not degrees"), 0U);
-  EXPECT_EQ(said_of(1.0 / degree, 1.0).find("if the angles of the file were degrees, not radians"), 0U);
-  EXPECT_EQ(said_of(1.0, 1e-3).find("if the measured positions were a thousand times as large"), 0U);
-  EXPECT_EQ(said_of(1.0, 1e3).find("if the measured positions were a thousandth as large"), 0U);
-  EXPECT_EQ(said_of(1.0, 1.5).find("if "), std::string::npos);  // no unit
+  EXPECT_EQ(said_of(degree, 1.0).find("most likely the angles of the file are radians, not degrees"), 0U);
+  EXPECT_EQ(said_of(1.0 / degree, 1.0).find("most likely the angles of the file are degrees, not radians"), 0U);
+  EXPECT_EQ(said_of(1.0, 1e-3).find("most likely the measured positions are metres, not millimetres"), 0U);
+  EXPECT_EQ(said_of(1.0, 1e3).find("most likely the measured positions are millimetres, not metres"), 0U);
+  EXPECT_EQ(said_of(1.0, 1.5).find("most likely"), std::string::npos);  // no unit
 }
 
 TEST(Correction, IsTheSameSeenFromAnotherBase) {

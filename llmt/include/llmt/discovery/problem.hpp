@@ -89,8 +89,11 @@ struct SolverResult {
   /// cond2(J'J) = (s1/sL)^2 on the identifiable part; J in the parameters' own units, without weights.
   double calibrability = 1.0;
   Eigen::Index rank = 0;                                    ///< number of identifiable directions
-  Eigen::Index dof = 0;                                     ///< n + number of priors - rank
-  double sigma = std::numeric_limits<double>::quiet_NaN();  ///< sqrt(weighted sum of squares / dof)
+  /// n - trace of the hat matrix of the data, rounded: n - rank without priors, and a prior that holds its parameter
+  /// instead of the data gives one back.
+  Eigen::Index dof = 0;
+  /// sqrt(weighted sum of squares of the residuals / dof before rounding); priors are not in it.
+  double sigma = std::numeric_limits<double>::quiet_NaN();
   std::vector<double> residual_norms;  ///< weighted, with priors: at the start and after every accepted step
   int iterations = 0;                  ///< steps tried
   Termination termination = Termination::max_iterations;

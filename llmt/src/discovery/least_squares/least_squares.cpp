@@ -33,6 +33,7 @@ class Solver {
   bool advance(const Linearisation& linear);
   bool try_step(const Eigen::VectorXd& scaled_step);
   void stop(Termination termination, std::string reason);
+  void estimate_sigma(const Eigen::MatrixXd& whitened);
   void describe_uncertainty(const Linearisation& linear);
 
   const LeastSquaresProblem& problem_;
@@ -205,6 +206,21 @@ bool Solver::advance(const Linearisation& linear) {
   return false;
 }
 
+// The data alone tell the noise: a prior far wider than what the data say is no measurement, although it is a row. The
+// parameters that the data determine are the rank less the leverages of the priors, the trace of the hat matrix of the
+// data.
+void Solver::estimate_sigma(const Eigen::MatrixXd& whitened) {
+  const Eigen::Index n = residuals_.size();
+  auto determined = static_cast<double>(whitened.cols());
+  for (const Eigen::Index column : prior_) {
+    const double row = scales_(column) / *problem_.parameters[free_[column]].prior_sigma;
+    determined -= row * row * whitened.row(column).squaredNorm();
+  }
+  const double freedom = static_cast<double>(n) - determined;
+  result_.dof = static_cast<Eigen::Index>(std::lround(freedom));
+  if (result_.dof > 0) result_.sigma = weighted_.head(n).norm() / std::sqrt(freedom);
+}
+
 void Solver::describe_uncertainty(const Linearisation& linear) {
   const Eigen::Index rank = linear.rank;
   std::vector<std::string> names;
@@ -212,8 +228,9 @@ void Solver::describe_uncertainty(const Linearisation& linear) {
   result_.unidentifiable = null_combinations(linear, names, scales_);
   result_.singular_values = linear.singular_values;
   result_.rank = rank;
-  result_.dof = weighted_.size() - rank;
-  if (result_.dof > 0) result_.sigma = weighted_.norm() / std::sqrt(static_cast<double>(result_.dof));
+  const Eigen::MatrixXd whitened =
+      linear.directions.leftCols(rank) * linear.singular_values.head(rank).cwiseInverse().asDiagonal();
+  estimate_sigma(whitened);
   if (rank == 0) return;
   result_.condition_number = linear.singular_values(0) / linear.singular_values(rank - 1);
   const Eigen::VectorXd plain = singular_values_of(jacobian_);
@@ -221,8 +238,7 @@ void Solver::describe_uncertainty(const Linearisation& linear) {
   if (plain_rank > 0) result_.calibrability = std::pow(plain(0) / plain(plain_rank - 1), 2);
 
   const double variance = options_.sigma_is_known ? 1.0 : result_.sigma * result_.sigma;
-  const Eigen::MatrixXd half = scales_.asDiagonal() * linear.directions.leftCols(rank) *
-                               linear.singular_values.head(rank).cwiseInverse().asDiagonal();
+  const Eigen::MatrixXd half = scales_.asDiagonal() * whitened;
   const Eigen::MatrixXd covariance = variance * half * half.transpose();
   const Eigen::VectorXd null_share = linear.directions.rightCols(scales_.size() - rank).rowwise().norm();
   for (std::size_t i = 0; i < free_.size(); ++i) {

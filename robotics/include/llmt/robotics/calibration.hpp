@@ -57,6 +57,21 @@ discovery::SolverResult register_frames(Robot& robot, const Measurements& measur
 /// robot.
 Calibration calibrate(const Robot& robot, const Measurements& measurements, const CalibrationOptions& options = {});
 
+struct RobustCalibration {
+  Calibration calibration;
+  std::vector<std::size_t> left_out;  ///< rows that it was made without, ascending
+};
+
+/// Calibrates; where some readings are off by more than four times the median, again without them, until the same ones
+/// are left out: least squares with weights 0 and 1 and a scale from the data. At most two fifths are left out. Throws
+/// as calibrate().
+RobustCalibration calibrate_robustly(const Robot& robot, const Measurements& measurements,
+                                     const CalibrationOptions& options = {});
+
+/// The robot with bases and tools of these measurements that `known` does not name fitted to them; everything else
+/// stays. For measurements of another session: empty poses know nothing.
+Robot with_placed_frames(const Robot& robot, const Measurements& measurements, const Poses& known);
+
 /// The least-squares problem behind it: residuals model - measured over the measured coordinates, analytic Jacobian,
 /// every parameter of parameters(robot) marked free. Robot and measurements are copied into it.
 discovery::LeastSquaresProblem calibration_problem(const Robot& robot, const Measurements& measurements);

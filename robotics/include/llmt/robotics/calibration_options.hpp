@@ -5,6 +5,7 @@
 ///     options.fixed = {"joint2.a", "tool"};
 #pragma once
 
+#include <map>
 #include <string>
 #include <vector>
 
@@ -30,6 +31,9 @@ struct CalibrationOptions {
   /// 0: no prior.
   double prior_length_mm = 5.0;
   double prior_angle_deg = 1.0;
+  /// Prior standard deviations of single parameters around their described values, in their own units; same spelling of
+  /// names as `fixed`. They replace those above.
+  std::map<std::string, double> priors = {};
   /// Standard deviations of what a position (mm, each coordinate) and an orientation (mrad, about each axis) are off
   /// from the calibrated model: noise and all that is not modelled. 0: from the residuals.
   double position_noise_mm = 0.0;

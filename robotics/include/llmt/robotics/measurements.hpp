@@ -33,6 +33,7 @@ struct Measurements {
   Eigen::MatrixXd positions_mm;                       ///< n x 3, see Reading; columns that were not measured hold zeros
   std::array<bool, 3> measured = {true, true, true};  ///< which of x, y, z were measured
   Orientation orientation;                            ///< empty values if there is none
+  std::vector<Eigen::Index> lines;                    ///< of the file, row by row; empty without a file
   std::vector<std::string> unused_columns;            ///< columns of the file that are not used
   std::vector<std::string> warnings;                  ///< for people, e.g. rows left out because the point is missing
 
@@ -41,6 +42,9 @@ struct Measurements {
 
 /// The given rows; warnings and unused columns are not carried over.
 Measurements select(const Measurements& measurements, const std::vector<Eigen::Index>& rows);
+
+/// All but the given rows.
+Measurements without_rows(const Measurements& measurements, const std::vector<std::size_t>& left_out);
 
 /// Throws std::invalid_argument if shapes differ, a number is not finite, no row or no coordinate was measured, or the
 /// number of joints is not that of the robot.

@@ -9,6 +9,7 @@
 #include "llmt/abi.hpp"
 #include "llmt/robotics/calibration.hpp"
 #include "llmt/robotics/calibration_options.hpp"
+#include "llmt/robotics/calibration_quality.hpp"
 #include "llmt/robotics/calibration_report.hpp"
 #include "llmt/robotics/catalogue.hpp"
 #include "llmt/robotics/chain.hpp"

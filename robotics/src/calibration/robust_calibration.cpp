@@ -1,10 +1,9 @@
-#include "discovery/robust_start.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <set>
 
-#include "discovery/pose_split.hpp"
+#include "calibration/median.hpp"
+#include "llmt/robotics/calibration.hpp"
 
 namespace llmt::robotics {
 namespace {
@@ -30,8 +29,9 @@ double median_of(const Eigen::VectorXd& values) {
   return sorted[sorted.size() / 2];
 }
 
-RobustStart robust_start(const Robot& robot, const Measurements& measurements, const CalibrationOptions& options) {
-  RobustStart start{calibrate(robot, measurements, options), {}};
+RobustCalibration calibrate_robustly(const Robot& robot, const Measurements& measurements,
+                                     const CalibrationOptions& options) {
+  RobustCalibration start{calibrate(robot, measurements, options), {}};
   // More than that many parameters per coordinate, and calibration would explain anything.
   const Eigen::Index least = measurements.count() * 3 / 5;
   std::set<std::vector<std::size_t>> seen = {{}};

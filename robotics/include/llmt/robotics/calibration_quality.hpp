@@ -1,0 +1,72 @@
+/// \file
+/// How well measurements determine a calibration, and where it may be trusted.
+///
+///     const Eigen::VectorXd errors_mm = leave_one_out(calibration, measured);
+///     const Coverage used = coverage(calibration, measured.poses, planned);
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "llmt/abi.hpp"
+#include "llmt/robotics/calibration.hpp"
+#include "llmt/robotics/observability.hpp"
+
+namespace llmt::robotics {
+
+/// Length of each reading's residual if its pose, with all its readings, had taken no part in the calibration; n
+/// values, mm. First order in the parameters, without a refit: with J the Jacobian of the free parameters, each row
+/// divided by its standard deviation, P the information of the priors and H = J (J'J + P)^-1 J', the residuals e of a
+/// pose become (I - H_pose)^-1 e (Cook & Weisberg 1982, section 2.2.1). Exact where the model is linear; choices made
+/// before, such as which parameters are free, keep what they saw of the pose.
+Eigen::VectorXd leave_one_out(const Calibration& calibration, const Measurements& measurements);
+
+/// Indices of the identification Jacobian of the free parameters at the calibrated values: rows over their standard
+/// deviations, columns in parameter scales (1 mm, 0.1 deg).
+Observability observability_of(const Calibration& calibration, const Measurements& measurements);
+
+/// Noise of one coordinate as repeats show it: the pooled standard deviation of readings of the same pose (column
+/// `pose`), target and session.
+struct RepeatNoise {
+  double sigma_mm = 0.0;
+  Eigen::Index freedom = 0;  ///< number of repeats beyond the first of each pose
+};
+std::optional<RepeatNoise> noise_of_repeats(const Measurements& measurements);
+
+/// Standard deviation of the model's position at each pose that comes from the parameters' covariance, mm: the square
+/// root of the trace of J C J'. Combinations that no measurement determines count as known.
+Eigen::VectorXd position_deviations(const Calibration& calibration, const Poses& poses);
+
+/// How poses of use lie to those that a calibration was made from.
+struct Coverage {
+  struct JointRange {
+    std::string joint;
+    std::string unit;  ///< deg or mm
+    double measured_low = 0.0;
+    double measured_high = 0.0;
+    double used_low = 0.0;
+    double used_high = 0.0;
+  };
+  std::vector<JointRange> beyond;     ///< joints that are used a tenth of their measured range or more beyond it
+  std::vector<Eigen::Index> outside;  ///< rows of the poses of use with such a joint value
+  double deviation_inside_mm = 0.0;   ///< root mean square of position_deviations() there; 0 if there are none
+  double deviation_outside_mm = 0.0;
+};
+Coverage coverage(const Calibration& calibration, const Poses& measured, const Poses& used);
+
+/// Mean error of calibrations to ever more poses, on poses that took no part.
+struct LearningPoint {
+  Eigen::Index poses = 0;
+  double fitted_mm = 0.0;    ///< mean error on the poses of the calibrations
+  double held_out_mm = 0.0;  ///< mean error on a fifth of all poses that none of them saw
+};
+
+/// At most eight sizes from 12 poses to four fifths of all, evenly spaced in their logarithm; each is the median of
+/// `draws` random choices. Empty for fewer than 30 poses.
+std::vector<LearningPoint> learning_curve(const Robot& robot, const Measurements& measurements,
+                                          const CalibrationOptions& options = {}, int draws = 3,
+                                          std::uint64_t seed = 1);
+
+}  // namespace llmt::robotics
