@@ -139,8 +139,11 @@ std::optional<RepeatNoise> noise_of_repeats(const Measurements& measurements) {
   return noise;
 }
 
-Eigen::VectorXd position_deviations(const Calibration& calibration, const Poses& poses) {
-  const Eigen::MatrixXd jacobian = position_jacobian(calibration.robot, poses);
+Eigen::VectorXd position_deviations(const Calibration& calibration, const Poses& poses, bool frames_are_known) {
+  Eigen::MatrixXd jacobian = position_jacobian(calibration.robot, poses);
+  for (Eigen::Index k = 0; k < jacobian.cols() && frames_are_known; ++k) {
+    if (is_frame_parameter(calibration.result.parameters[k].name)) jacobian.col(k).setZero();
+  }
   const Eigen::MatrixXd covariance =
       calibration.result.covariance.unaryExpr([](double value) { return std::isfinite(value) ? value : 0.0; });
   const Eigen::VectorXd variances = (jacobian * covariance).cwiseProduct(jacobian).rowwise().sum();
@@ -151,7 +154,7 @@ Eigen::VectorXd position_deviations(const Calibration& calibration, const Poses&
   return deviations;
 }
 
-Coverage coverage(const Calibration& calibration, const Poses& measured, const Poses& used) {
+Coverage coverage(const Calibration& calibration, const Poses& measured, const Poses& used, bool frames_are_known) {
   constexpr double slack = 0.1;  // of the range
   Coverage result;
   if (used.count() == 0) return result;
@@ -175,7 +178,7 @@ Coverage coverage(const Calibration& calibration, const Poses& measured, const P
   }
   std::vector<Eigen::Index> inside;
   for (Eigen::Index i = 0; i < used.count(); ++i) (is_outside[i] ? result.outside : inside).push_back(i);
-  const Eigen::VectorXd deviations = position_deviations(calibration, used);
+  const Eigen::VectorXd deviations = position_deviations(calibration, used, frames_are_known);
   result.deviation_inside_mm = root_mean_square_of(deviations(inside));
   result.deviation_outside_mm = root_mean_square_of(deviations(result.outside));
   return result;

@@ -36,8 +36,9 @@ struct RepeatNoise {
 std::optional<RepeatNoise> noise_of_repeats(const Measurements& measurements);
 
 /// Standard deviation of the model's position at each pose that comes from the parameters' covariance, mm: the square
-/// root of the trace of J C J'. Combinations that no measurement determines count as known.
-Eigen::VectorXd position_deviations(const Calibration& calibration, const Poses& poses);
+/// root of the trace of J C J'. Combinations that no measurement determines count as known, and so do bases and tools
+/// where `frames_are_known`: in another session they are fitted anew.
+Eigen::VectorXd position_deviations(const Calibration& calibration, const Poses& poses, bool frames_are_known = false);
 
 /// How poses of use lie to those that a calibration was made from.
 struct Coverage {
@@ -54,7 +55,8 @@ struct Coverage {
   double deviation_inside_mm = 0.0;   ///< root mean square of position_deviations() there; 0 if there are none
   double deviation_outside_mm = 0.0;
 };
-Coverage coverage(const Calibration& calibration, const Poses& measured, const Poses& used);
+Coverage coverage(const Calibration& calibration, const Poses& measured, const Poses& used,
+                  bool frames_are_known = false);
 
 /// Mean error of calibrations to ever more poses, on poses that took no part.
 struct LearningPoint {

@@ -1,0 +1,202 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "robot/calibration_facts.hpp"
+#include "robot/measured_file.hpp"
+
+namespace llmt::apps {
+namespace {
+
+using robotics::CalibrationReport;
+using robotics::error_figures;
+using robotics::ErrorFigures;
+
+// One kind of error, in-sample, held-out and on the test file.
+std::string error_table(const std::vector<JudgedModel>& rows, const std::string& head, bool is_held_out,
+                        const Eigen::VectorXd robotics::Stage::*in_sample,
+                        const Eigen::VectorXd robotics::Stage::*held_out,
+                        const std::optional<ErrorFigures> JudgedModel::*on_test) {
+  std::vector<std::string> header = {head, "mean", "95 %", "max"};
+  if (is_held_out) header.insert(header.end(), {"| mean", "95 %", "max"});
+  if (rows.front().*on_test) header.insert(header.end(), {"| mean", "95 %", "max"});
+  Table table(header);
+  for (const JudgedModel& row : rows) {
+    std::vector<std::string> cells = {row.name};
+    const auto add = [&](const ErrorFigures& figures) {
+      for (const double value : {figures.mean, figures.p95, figures.max}) cells.push_back(fmt::format("{:.4f}", value));
+    };
+    add(error_figures(row.stage->*in_sample));
+    if (is_held_out) add(error_figures(row.stage->*held_out));
+    if (row.*on_test) add(*(row.*on_test));
+    table.add(std::move(cells));
+  }
+  return table.text();
+}
+
+std::string error_tables(const std::vector<JudgedModel>& rows, const CalibrationReport& report, bool contiguous) {
+  using robotics::Stage;
+  const bool is_held_out = report.folds > 0;
+  std::string text = "in-sample";
+  if (is_held_out)
+    text += fmt::format(", then held-out ({} {} folds)", report.folds, contiguous ? "contiguous" : "random");
+  if (rows.front().test) text += ", then on the test file";
+  text += ":\n" + error_table(rows, "position error, mm", is_held_out, &Stage::in_sample_mm, &Stage::held_out_mm,
+                              &JudgedModel::test);
+  if (report.geometric.in_sample_mrad.size() == 0) return text;
+  return text + error_table(rows, "orientation error, mrad", is_held_out, &Stage::in_sample_mrad, &Stage::held_out_mrad,
+                            &JudgedModel::test_mrad);
+}
+
+std::string parameter_table(const robotics::Robot& nominal, const CalibrationReport& report) {
+  const std::vector<discovery::Parameter> before = robotics::parameters(nominal);
+  const discovery::SolverResult& result = report.calibration.result;
+  Table table({"parameter", "nominal", "identified", "change", "std error", "unit"});
+  for (std::size_t k = 0; k < result.parameters.size(); ++k) {
+    const discovery::Parameter& after = result.parameters[k];
+    const auto nominal_value = std::ranges::find(before, after.name, &discovery::Parameter::name);
+    if (after.free && nominal_value != before.end()) {
+      const double error = result.standard_errors(k);
+      table.add({after.name, number(nominal_value->value, 7), number(after.value, 7),
+                 number(after.value - nominal_value->value, 4), std::isfinite(error) ? number(error, 2) : "-",
+                 after.unit});
+    }
+  }
+  return table.text();
+}
+
+std::string parameters_text(const CalibrationFacts& facts) {
+  const robotics::CalibrationReport& report = facts.report;
+  const discovery::SolverResult& result = report.calibration.result;
+  std::string text;
+  text += fmt::format("\n{}\n", parameter_table(facts.nominal, report));
+  text += result.converged()
+              ? fmt::format("{} parameters identified; the fit converged after {} iterations\n", result.rank,
+                            result.iterations)
+              : fmt::format("{} parameters identified; the fit did NOT converge: {}\n", result.rank, result.reason);
+  std::vector<std::string> kept;
+  std::vector<std::string> dependent;
+  for (const robotics::FixedParameter& fixed : report.calibration.fixed) {
+    (fixed.why == "fixed by the user" ? kept : dependent).push_back(fixed.name);
+  }
+  if (!dependent.empty()) {
+    text += fmt::format(
+        "Left as described, because they move the measured point as parameters above do, or not at all: {}\n",
+        fmt::join(dependent, ", "));
+  }
+  if (!kept.empty()) text += fmt::format("Left as described by --fix or --only: {}\n", fmt::join(kept, ", "));
+  if (!report.calibration.weak.empty()) {
+    text += fmt::format(
+        "These poses hardly determine the following, which stay close to the description; positions near "
+        "these poses do not suffer: {}\n",
+        fmt::join(report.calibration.weak, ", "));
+  }
+  for (const discovery::Combination& combination : result.unidentifiable) {
+    text += fmt::format("These poses determine only a combination of: {}\n", combination.names());
+  }
+  return text;
+}
+
+// The sentence to read if only one is read.
+std::string verdict(const CalibrationFacts& facts) {
+  const CalibrationReport& report = facts.report;
+  const bool is_held_out = report.folds > 0;
+  const auto mean = [&](const robotics::Stage& stage) {
+    return (is_held_out ? stage.held_out_mm : stage.in_sample_mm).mean();
+  };
+  std::string text;
+  if (facts.suspicions.empty()) {
+    text = fmt::format("Calibrated: the mean position error falls from {:.4f} to {:.4f} mm", mean(report.nominal),
+                       mean(report.geometric));
+    if (report.correction_kept) text += fmt::format(", and to {:.4f} mm with the correction", mean(*report.corrected));
+    text += is_held_out ? ", on poses left out of the fit.\n"
+                        : ", on the poses of the fit; none were left out to judge it.\n";
+  }
+  for (const std::string& suspicion : facts.suspicions) text += "WARNING: " + suspicion + "\n";
+  return text;
+}
+
+std::string head(const CalibrationFacts& facts) {
+  const robotics::Measurements& measurements = facts.measurements;
+  std::string text = fmt::format("{}: {} of {}\n", facts.data_file, counts_of(measurements), facts.nominal.chain.name);
+  text += verdict(facts);
+  for (const std::string& warning : measurements.warnings) text += "Note: " + warning + "\n";
+  if (!facts.outlier_lines.empty()) {
+    text += fmt::format("Left out, more than four times as far off as the median: line{} {}\n",
+                        facts.outlier_lines.size() == 1 ? "" : "s", fmt::join(facts.outlier_lines, ", "));
+  }
+  if (!measurements.unused_columns.empty()) {
+    text += fmt::format("Columns not used: {}\n", fmt::join(measurements.unused_columns, ", "));
+  }
+  return text + use_of_orientations(measurements);
+}
+
+std::string coverage_text(const robotics::Coverage& used) {
+  if (used.outside.empty()) return "";
+  std::vector<std::string> joints;
+  for (const robotics::Coverage::JointRange& range : used.beyond) {
+    joints.push_back(fmt::format("{} {:.0f} to {:.0f} {} (measured {:.0f} to {:.0f})", range.joint, range.used_low,
+                                 range.used_high, range.unit, range.measured_low, range.measured_high));
+  }
+  return fmt::format(
+      "{} test poses lie outside of what was measured: {}. There the parameters leave the tool uncertain by {:.4f} mm "
+      "(one standard deviation; inside: {:.4f} mm), and errors of the arm that show only there are unknown.\n",
+      used.outside.size(), fmt::join(joints, ", "), used.deviation_outside_mm, used.deviation_inside_mm);
+}
+
+std::string details_text(const CalibrationDetails& details) {
+  const robotics::Observability& seen = details.seen;
+  std::string text = "\nHow well these poses determine the parameters\n";
+  text += fmt::format("  mean error with each pose left out in turn (to first order): {:.4f} mm\n",
+                      details.leave_one_out_mm);
+  if (details.repeats) {
+    text += fmt::format("  noise of one coordinate by {} repeats: {:.4f} mm\n", details.repeats->freedom,
+                        details.repeats->sigma_mm);
+  }
+  text += fmt::format("  observability: O1 {:.4g}, O2 {:.4g}, O3 {:.4g}, O4 {:.4g}, O5 {:.4g}; condition {:.4g}\n",
+                      seen.o1, seen.o2, seen.o3, seen.o4, seen.o5, seen.condition);
+  for (const CalibrationDetails::Correlation& pair : details.correlations) {
+    text += fmt::format("  {} and {} are told apart badly: correlation {:.3f}\n", pair.first, pair.second, pair.value);
+  }
+  if (!details.learning.empty()) {
+    Table table({"poses", "mean error at them, mm", "at a fifth of all poses, left out"});
+    for (const robotics::LearningPoint& point : details.learning) {
+      table.add({std::to_string(point.poses), fmt::format("{:.4f}", point.fitted_mm),
+                 fmt::format("{:.4f}", point.held_out_mm)});
+    }
+    text += "\nWould more poses help? Errors of calibrations to that many poses\n" + table.text();
+  }
+  if (!details.shares.empty()) {
+    text += "\nOf the mean square error of the described arm\n";
+    for (const CalibrationDetails::Share& share : details.shares) {
+      text += fmt::format("  {:<24}{:6.1f} %\n", share.of, 100.0 * share.share);
+    }
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string calibration_text(const CalibrationFacts& facts) {
+  const CalibrationReport& report = facts.report;
+  std::string text = head(facts) + parameters_text(facts);
+  text += "\n" + error_tables(facts.models, report, facts.contiguous);
+  text += "nominal: base and tool fitted to the poses, everything else as described.\n";
+  if (report.correction) {
+    std::vector<std::string> leaves;
+    for (const PartitionSummary& partition : report.correction->summary.partitions) {
+      for (const int output : partition.outputs) {
+        leaves.push_back(fmt::format("{} {}", report.correction->model.outputs()[output].name, partition.leaves));
+      }
+    }
+    text += fmt::format("Leaves of the correction: {}\n", fmt::join(leaves, ", "));
+  }
+  if (!report.decision.empty()) text += report.decision + "\n";
+  if (facts.used) text += coverage_text(*facts.used);
+  if (facts.details) text += details_text(*facts.details);
+  return text;
+}
+
+}  // namespace llmt::apps
