@@ -49,10 +49,10 @@ void print_check(const CheckArguments& arguments, const robotics::Robot& robot, 
                   check.still_good ? "STILL GOOD." : "NO LONGER GOOD.", check.error.mean, check.error.p95,
                   check.error.max, check.accuracy_mm, check.limit_mm));
   if (check.moved.empty()) {
-    print(
-        fmt::format("Nothing moved, of {} parameters and groups of them that were tested; one test in {} like this one "
-                    "says otherwise by chance.\n",
-                    check.tested, number(1.0 / arguments.level, 3)));
+    print(fmt::format(
+        "Nothing moved, of {} parameters and groups of them that were tested; one test in {:.3g} like this one "
+        "says otherwise by chance.\n",
+        check.tested, 1.0 / arguments.level));
   } else {
     print("\nMoved since the calibration:\n");
     for (const Moved& moved : check.moved) print(moved_words(moved));
