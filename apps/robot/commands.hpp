@@ -22,9 +22,11 @@ robotics::Robot read_description(const std::string& robot, const std::string& me
 void add_urdf_links(CLI::App& command, robotics::UrdfLinks& links);
 
 void add_paper(CLI::App& app);
+void add_demo(CLI::App& app);
 void add_simulate(CLI::App& app);
 void add_poses(CLI::App& app);
 void add_calibrate(CLI::App& app);
+void add_check(CLI::App& app);
 void add_discover(CLI::App& app);
 void add_predict(CLI::App& app);
 void add_compensate(CLI::App& app);

@@ -25,10 +25,12 @@ int main(int argc, char** argv) {
   CLI::App app{"Calibrate a robot from measured positions, learn what its model misses, and remove it.", "llmt-robot"};
   app.require_subcommand(1);
   app.set_help_all_flag("--help-all", "Help with all options, also those for experts");
+  llmt::apps::add_demo(app);
   llmt::apps::add_paper(app);
   llmt::apps::add_simulate(app);
   llmt::apps::add_poses(app);
   llmt::apps::add_calibrate(app);
+  llmt::apps::add_check(app);
   llmt::apps::add_discover(app);
   llmt::apps::add_predict(app);
   llmt::apps::add_compensate(app);

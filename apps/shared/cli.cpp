@@ -20,6 +20,8 @@
 namespace llmt::apps {
 namespace {
 
+bool is_silent = false;
+
 // Ends the program as the signal would have, but for temporary files.
 extern "C" void end_by_signal(int signal) {
   discard_unfinished_files();
@@ -148,18 +150,27 @@ std::string without_controls(std::string_view text) {
   return result;
 }
 
+Silence::Silence() { is_silent = true; }
+Silence::~Silence() { is_silent = false; }
+
 void print(std::string_view text) {
+  if (is_silent) return;
   constexpr std::size_t indent = 2;
   write_stdout(wrapped(without_controls(text), output_width(), indent));
 }
 
-void print_bytes(std::string_view text) { ::isatty(STDOUT_FILENO) != 0 ? print(text) : write_stdout(text); }
+void print_bytes(std::string_view text) {
+  if (is_silent) return;
+  ::isatty(STDOUT_FILENO) != 0 ? print(text) : write_stdout(text);
+}
 
 void print_json(const Json& json) {
   constexpr int indent = 2;
   print_bytes(json.dump(indent, ' ', false, Json::error_handler_t::replace) + "\n");
 }
 
-void warn(const std::string& text) { fmt::print(stderr, "{}\n", without_controls(shortened(text))); }
+void warn(const std::string& text) {
+  if (!is_silent) fmt::print(stderr, "{}\n", without_controls(shortened(text)));
+}
 
 }  // namespace llmt::apps

@@ -45,6 +45,15 @@ std::string without_controls(std::string_view text);
 void print(std::string_view text);
 /// Prints data for programs: as it is, but on a terminal as print().
 void print_bytes(std::string_view text);
+/// While one lives, nothing is printed to stdout and nothing is warned of: for a command that runs others.
+class Silence {
+ public:
+  Silence();
+  ~Silence();
+  Silence(const Silence&) = delete;
+  Silence& operator=(const Silence&) = delete;
+};
+
 /// Bytes that are not UTF-8 become U+FFFD.
 void print_json(const Json& json);
 

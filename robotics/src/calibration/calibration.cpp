@@ -122,6 +122,24 @@ std::vector<IdentifiedParameter> identified_parameters(const discovery::SolverRe
   return identified;
 }
 
+CalibrationRecord record_of(const Calibration& calibration, const Measurements& measurements) {
+  CalibrationRecord record;
+  record.poses = measurements.count();
+  record.noise_mm = calibration.noise_mm;
+  std::vector<Eigen::Index> known;
+  for (std::size_t k = 0; k < calibration.robot.identified.size(); ++k) {
+    if (calibration.robot.identified[k].standard_error) known.push_back(static_cast<Eigen::Index>(k));
+  }
+  const Eigen::VectorXd errors = calibration.result.standard_errors(known);
+  const Eigen::VectorXd inverse = errors.unaryExpr([](double error) { return error > 0.0 ? 1.0 / error : 0.0; });
+  record.correlations = inverse.asDiagonal() * calibration.result.covariance(known, known) * inverse.asDiagonal();
+  record.correlations = record.correlations.cwiseMin(1.0).cwiseMax(-1.0).eval();
+  // Exactly symmetric, as the file has it.
+  record.correlations = Eigen::MatrixXd(record.correlations.selfadjointView<Eigen::Lower>());
+  record.correlations.diagonal().setOnes();
+  return record;
+}
+
 Eigen::VectorXd start_values(const discovery::LeastSquaresProblem& problem) {
   Eigen::VectorXd values(std::ssize(problem.parameters));
   for (std::size_t k = 0; k < problem.parameters.size(); ++k) {
@@ -182,6 +200,7 @@ Calibration calibrate_without_maps(const Robot& robot, const Measurements& measu
   calibration.registered = robot;
   // What an earlier calibration said, and a correction learnt from its residuals, hold no longer.
   calibration.registered.identified.clear();
+  calibration.registered.calibration.reset();
   calibration.registered.correction_file.clear();
   if (!options.start_as_given) {
     calibration.registration = register_frames(calibration.registered, measurements, options);
@@ -203,6 +222,7 @@ Calibration calibrate_without_maps(const Robot& robot, const Measurements& measu
   fix_dependent(problem.parameters, jacobian, geometric, options.dependence_tolerance, reasons);
   identify(calibration, measurements, problem, reasons, options);
   calibration.robot.identified = identified_parameters(calibration.result, reasons);
+  calibration.robot.calibration = record_of(calibration, measurements);
   for (std::size_t k = 0; k < reasons.size(); ++k) {
     if (!reasons[k].empty()) calibration.fixed.push_back({problem.parameters[k].name, reasons[k]});
   }

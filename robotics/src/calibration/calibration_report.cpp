@@ -211,6 +211,13 @@ CalibrationReport report_calibration(const Robot& robot, const Measurements& mea
   part_kinds(measurements, report.geometric);
   if (report.corrected) part_kinds(measurements, *report.corrected);
   decide(report);
+  if (options.folds != 0) {
+    const Eigen::VectorXd& errors = (report.correction_kept ? *report.corrected : report.geometric).held_out_mm;
+    CalibrationRecord& record = *report.calibration.robot.calibration;
+    record.held_out_mm = errors.mean();
+    record.held_out_sd_mm =
+        (errors.array() - errors.mean()).matrix().norm() / std::sqrt(static_cast<double>(errors.size()));
+  }
   return report;
 }
 

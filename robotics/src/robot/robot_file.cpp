@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <set>
 #include <stdexcept>
@@ -182,6 +183,40 @@ std::vector<IdentifiedParameter> read_identified(YamlMap& map, const Robot& robo
   return all;
 }
 
+// The lower triangle by rows makes a matrix of the identified parameters that have a standard error.
+CalibrationRecord read_record(YamlMap map, const Robot& robot) {
+  CalibrationRecord record;
+  const double poses = map.number("poses");
+  constexpr double most_poses = 1e9;
+  if (!(poses >= 1.0 && poses <= most_poses)) map.refuse("poses", fmt::format("\"poses\" is {}, must be >= 1", poses));
+  record.poses = static_cast<Eigen::Index>(poses);
+  const auto not_negative = [&](const char* key) {
+    const double value = map.number(key);
+    if (value < 0.0) map.refuse(key, fmt::format("\"{}\" is {}, must be >= 0", key, value));
+    return value;
+  };
+  record.noise_mm = not_negative("noise_mm");
+  if (map.has("held_out_mm")) record.held_out_mm = not_negative("held_out_mm");
+  if (map.has("held_out_sd_mm")) record.held_out_sd_mm = not_negative("held_out_sd_mm");
+  const auto known =
+      std::ranges::count_if(robot.identified, [](const auto& entry) { return entry.standard_error.has_value(); });
+  if (map.has("correlations")) {
+    const auto count = static_cast<std::size_t>(known * (known - 1) / 2);
+    const std::vector<double> below = map.numbers("correlations", count);
+    record.correlations = Eigen::MatrixXd::Identity(known, known);
+    auto next = below.begin();
+    for (Eigen::Index i = 0; i < known; ++i) {
+      for (Eigen::Index k = 0; k < i; ++k, ++next) {
+        if (std::abs(*next) > 1.0)
+          map.refuse("correlations", fmt::format("a correlation is {}, must be -1 ... 1", *next));
+        record.correlations(i, k) = record.correlations(k, i) = *next;
+      }
+    }
+  }
+  map.finish({"poses", "noise_mm", "held_out_mm", "held_out_sd_mm", "correlations"});
+  return record;
+}
+
 Convention read_convention(YamlMap& map) {
   const std::string convention = map.text("convention");
   if (convention == "dh") return Convention::dh;
@@ -217,13 +252,14 @@ Robot parse_robot(const std::string& text, const std::string& name) {
   robot.chain = read_chain(map);
   if (map.has("effects")) robot.effects = read_effects(map, robot.chain);
   if (map.has("identified")) robot.identified = read_identified(map, robot);
+  if (map.has("calibration")) robot.calibration = read_record(map.map("calibration"), robot);
   if (map.has("correction")) {
     YamlMap correction = map.map("correction");
     robot.correction_file = correction.text("model");
     correction.finish({"model"});
   }
   map.finish({"name", "convention", "gravity_m_s2", "orientation", "base", "tool", "bases", "tools", "payload",
-              "joints", "effects", "identified", "correction"});
+              "joints", "effects", "identified", "calibration", "correction"});
   return robot;
 }
 

@@ -117,6 +117,19 @@ void write_identified(Writer& out, const Robot& robot) {
   out.end_list();
 }
 
+void write_record(Writer& out, const CalibrationRecord& record) {
+  out.key("calibration").begin_map(YAML::Block);
+  out.number("poses", static_cast<double>(record.poses)).number("noise_mm", record.noise_mm);
+  if (record.held_out_mm) out.number("held_out_mm", *record.held_out_mm);
+  if (record.held_out_sd_mm) out.number("held_out_sd_mm", *record.held_out_sd_mm);
+  std::vector<double> below;
+  for (Eigen::Index i = 0; i < record.correlations.rows(); ++i) {
+    for (Eigen::Index k = 0; k < i; ++k) below.push_back(record.correlations(i, k));
+  }
+  if (!below.empty()) out.numbers("correlations", below);
+  out.end_map();
+}
+
 }  // namespace
 
 std::string to_yaml(const Robot& robot) {
@@ -148,6 +161,7 @@ std::string to_yaml(const Robot& robot) {
     out.end_list();
   }
   if (!robot.identified.empty()) write_identified(out, robot);
+  if (robot.calibration) write_record(out, *robot.calibration);
   if (!robot.correction_file.empty()) out.key("correction").begin_map().word("model", robot.correction_file).end_map();
   out.end_map();
   return out.finish();

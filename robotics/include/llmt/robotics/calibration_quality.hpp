@@ -1,8 +1,8 @@
 /// \file
 /// How well measurements determine a calibration, and where it may be trusted.
 ///
+///     const Calibration calibration = calibrate(robot, measured);
 ///     const Eigen::VectorXd errors_mm = leave_one_out(calibration, measured);
-///     const Coverage used = coverage(calibration, measured.poses, planned);
 #pragma once
 
 #include <Eigen/Core>

@@ -1,6 +1,7 @@
 /// \file
 /// How well poses show the parameters of a calibration: the observability indices of the literature.
 ///
+///     const Eigen::VectorXd singular_values = calibrate(robot, measured).result.singular_values;
 ///     const Observability seen = observability(singular_values, measured.count());
 #pragma once
 

@@ -32,6 +32,8 @@ namespace llmt::robotics {
 ///          coefficients: [1e-4]}      # see FormulaTerm
 ///     identified:                    # optional; written by calibration, values stand above
 ///       - {parameter: joint1.a, state: free, standard_error: 0.01, unit: mm}
+///     calibration: {poses: 150, noise_mm: 0.03, held_out_mm: 0.05, held_out_sd_mm: 0.02, correlations: [0.1, ...]}
+///                                    # optional, likewise; correlations: lower triangle by rows
 ///     correction: {model: arm.correction.json}          # optional
 ///
 /// Throws std::runtime_error `path:line: where: what` for a file that cannot be read or is no YAML, for unknown,

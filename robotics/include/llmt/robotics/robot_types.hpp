@@ -24,12 +24,23 @@ struct IdentifiedParameter {
   std::string state;                     ///< "free", or why it was fixed
 };
 
+/// How good a calibration was, for whoever asks later whether it still holds.
+struct CalibrationRecord {
+  Eigen::Index poses = 0;                ///< that it was made from
+  double noise_mm = 0.0;                 ///< standard deviation of one coordinate's residual
+  std::optional<double> held_out_mm;     ///< mean error on poses that took no part
+  std::optional<double> held_out_sd_mm;  ///< standard deviation of these errors
+  /// L x L, of the identified parameters that have a standard error, in their order.
+  Eigen::MatrixXd correlations;
+};
+
 /// A chain, the effects on top of it, and what is known about both.
 struct Robot {
   Chain chain;
   std::vector<Effect> effects;
-  std::vector<IdentifiedParameter> identified;  ///< empty before calibration
-  std::string correction_file;                  ///< model file of the residual correction, or empty
+  std::vector<IdentifiedParameter> identified;        ///< empty before calibration
+  std::optional<CalibrationRecord> calibration = {};  ///< of the values identified
+  std::string correction_file;                        ///< model file of the residual correction, or empty
 };
 
 /// Which three coordinates an instrument reads of an arm.

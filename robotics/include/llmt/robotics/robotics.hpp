@@ -27,6 +27,7 @@
 #include "llmt/robotics/pose_selection.hpp"
 #include "llmt/robotics/robot.hpp"
 #include "llmt/robotics/robot_c_source.hpp"
+#include "llmt/robotics/robot_check.hpp"
 #include "llmt/robotics/robot_file.hpp"
 #include "llmt/robotics/robot_types.hpp"
 #include "llmt/robotics/simulation.hpp"

@@ -1,0 +1,156 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <memory>
+#include <optional>
+#include <stdexcept>
+
+#include "llmt/robotics/robot_check.hpp"
+#include "llmt/robotics/robot_file.hpp"
+#include "robot/commands.hpp"
+#include "shared/cli.hpp"
+#include "shared/options.hpp"
+
+namespace llmt::apps {
+namespace {
+
+using robotics::Moved;
+using robotics::RobotCheck;
+
+struct CheckArguments {
+  std::string robot;
+  std::string data;
+  bool same_session = false;
+  double accuracy_mm = 0.0;
+  double level = 0.05;
+  DecimalMark mark = DecimalMark::point;
+  bool json = false;
+};
+
+std::string moved_words(const Moved& moved) {
+  std::vector<std::string> changes;
+  for (const Moved::Change& change : moved.changes) {
+    const bool is_named = moved.changes.size() > 1;
+    changes.push_back(fmt::format("{}{} +- {} {}", is_named ? change.parameter + " " : "", number(change.by, 4),
+                                  number(change.standard_error, 2), change.unit));
+  }
+  return fmt::format("  {}: {}{}\n", moved.name, fmt::join(changes, ", "),
+                     moved.or_else.empty() ? "" : fmt::format("; or else {}", fmt::join(moved.or_else, ", ")));
+}
+
+void print_check(const CheckArguments& arguments, const robotics::Robot& robot, const RobotCheck& check) {
+  print(fmt::format("{}: {} poses of {}\n", arguments.data, check.errors_mm.size(), robot.chain.name));
+  print(arguments.same_session ? "The same session: base and tool are those of the calibration.\n\n"
+                               : "The instrument was set up anew: base and tool were fitted to these poses "
+                                 "(--same-session keeps them).\n\n");
+  print(
+      fmt::format("{} Mean position error {:.4f} mm (95 % {:.4f}, max {:.4f}); stated {:.4f} mm, good up to {:.4f} "
+                  "mm.\n",
+                  check.still_good ? "STILL GOOD." : "NO LONGER GOOD.", check.error.mean, check.error.p95,
+                  check.error.max, check.accuracy_mm, check.limit_mm));
+  if (check.moved.empty()) {
+    print(fmt::format(
+        "Nothing moved, of {} parameters and groups of them that were tested; one test in {:.3g} like this one "
+        "says otherwise by chance.\n",
+        check.tested, 1.0 / arguments.level));
+  } else {
+    print("\nMoved since the calibration:\n");
+    for (const Moved& moved : check.moved) print(moved_words(moved));
+    if (!arguments.same_session && check.moved.front().name.starts_with("tool")) {
+      print("A target that was mounted anew moves the tool; the error above does not suffer.\n");
+    }
+    print(fmt::format("With base and these identified anew the mean error would be {:.4f} mm.\n", check.refitted_mm));
+  }
+  if (check.unexplained) {
+    print(
+        fmt::format("Something changed that is no parameter of this description: {:.4f} mm per coordinate are left "
+                    "whatever its values, {:.4f} at calibration. llmt-robot discover looks for the cause.\n",
+                    check.noise_mm, check.noise_before_mm));
+  }
+  if (!check.unseen.empty()) {
+    print(fmt::format("Not seen by these poses, or taken up by base and tool: {}\n", fmt::join(check.unseen, ", ")));
+  }
+  if (!check.has_correlations) {
+    print("The description has no correlations of its parameters; small changes may go unnoticed.\n");
+  }
+}
+
+Json check_json(const CheckArguments& arguments, const RobotCheck& check) {
+  Json json = {
+      {"robot", arguments.robot},
+      {"data", arguments.data},
+      {"poses", check.errors_mm.size()},
+      {"same_session", arguments.same_session},
+      {"still_good", check.still_good},
+      {"error_mm",
+       {{"mean", check.error.mean}, {"p95", check.error.p95}, {"max", check.error.max}, {"rms", check.error.rms}}},
+      {"accuracy_mm", check.accuracy_mm},
+      {"limit_mm", check.limit_mm},
+      {"moved", Json::array()}};
+  for (const Moved& moved : check.moved) {
+    Json entry = {{"name", moved.name}, {"probability", moved.probability}, {"or_else", moved.or_else}};
+    for (const Moved::Change& change : moved.changes) {
+      entry["changes"].push_back({{"parameter", change.parameter},
+                                  {"unit", change.unit},
+                                  {"by", change.by},
+                                  {"standard_error", change.standard_error}});
+    }
+    json["moved"].push_back(std::move(entry));
+  }
+  json["refitted_mm"] = check.refitted_mm;
+  json["noise_mm"] = check.noise_mm;
+  json["noise_before_mm"] = check.noise_before_mm > 0.0 ? Json(check.noise_before_mm) : Json(nullptr);
+  json["unexplained"] = check.unexplained;
+  json["tested"] = check.tested;
+  json["unseen"] = check.unseen;
+  return json;
+}
+
+void check_command(const CheckArguments& arguments) {
+  const robotics::CorrectedRobot robot = read_unless_exchanged(
+      arguments.robot, arguments.data, "the calibrated description (YAML) comes first, then the measurements (CSV)",
+      [](const std::string& path) { return robotics::read_corrected_robot(path); });
+  const robotics::Measurements measurements =
+      robotics::read_measurements(arguments.data, robot.robot, {}, arguments.mark);
+  check_positions(arguments.robot, robot.robot, measurements.poses);
+  robotics::CheckOptions options{.same_session = arguments.same_session, .accuracy_mm = {}, .level = arguments.level};
+  if (arguments.accuracy_mm > 0.0) options.accuracy_mm = arguments.accuracy_mm;
+  const RobotCheck check = robotics::check_robot(robot, measurements, options);
+  if (arguments.json) {
+    print_json(check_json(arguments, check));
+  } else {
+    for (const std::string& warning : measurements.warnings) print("Note: " + warning + "\n");
+    print_check(arguments, robot.robot, check);
+  }
+  if (!check.still_good) {
+    throw std::runtime_error(fmt::format("{}: the mean error is {:.4f} mm, more than {:.4f} mm", arguments.data,
+                                         check.error.mean, check.limit_mm));
+  }
+}
+
+}  // namespace
+
+void add_check(CLI::App& app) {
+  CLI::App* command = app.add_subcommand("check",
+                                         "Is a calibrated robot still good? What of it moved?\n"
+                                         "Judges a description that calibrate wrote by new measurements, and names the "
+                                         "parameters and effects that changed. "
+                                         "The exit code is 1 where the mean error is beyond what was stated.");
+  command->footer("Example: llmt-robot check calibrated.yaml measured_today.csv --accuracy-mm 0.1");
+  const auto arguments = std::make_shared<CheckArguments>();
+  add_input_file(*command, "model", arguments->robot, "Calibrated description (YAML)")->required();
+  add_input_file(*command, "data", arguments->data, "New measurements (CSV with units in the column names)")
+      ->required();
+  command->add_flag("--same-session", arguments->same_session,
+                    "Instrument and target stand where they stood at the calibration: base and tool are kept");
+  add_number(*command, "--accuracy-mm", arguments->accuracy_mm, above_zero,
+             "Mean error up to which the robot is good (default: as at calibration, see docs/commands.md)");
+  add_number(*command, "--level", arguments->level, NumberRange{1e-6, 0.5, "a number from 1e-6 to 0.5"},
+             "Probability that something is said to have moved although nothing has")
+      ->capture_default_str();
+  add_decimal_comma(*command, arguments->mark);
+  command->add_flag("--json", arguments->json, "Print the result as JSON");
+  command->callback([arguments] { check_command(*arguments); });
+}
+
+}  // namespace llmt::apps

@@ -1,0 +1,82 @@
+// Is it still good? And the demonstration.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "apps/program.hpp"
+
+namespace {
+
+using program::Folder;
+using program::Outcome;
+
+const std::string robot_program = LLMT_ROBOT_PROGRAM;
+const std::string samples = std::string(LLMT_ROOT) + "/docs/samples/";
+
+void calibrate_sample(const Folder& folder) {
+  std::string text = llmt::read_file(samples + "arm_true.yaml");
+  folder.write("real.yaml", text.substr(0, text.find("\neffects:")) + "\n");
+  folder.run(
+      fmt::format("{0} simulate real.yaml --poses 80 --noise-um 20 -o d.csv && {0} calibrate {1}arm.yaml d.csv -o "
+                  "cal.yaml && {0} simulate real.yaml --poses 40 --noise-um 20 --seed 2 -o new.csv",
+                  robot_program, samples));
+}
+
+TEST(CheckProgram, AnArmThatStayedIsGoodAndOneThatWasKnockedIsNot) {
+  const Folder folder;
+  calibrate_sample(folder);
+  const Outcome good = folder.run(robot_program + " check cal.yaml new.csv");
+  EXPECT_EQ(good.exit_code, 0) << good.err;
+  EXPECT_NE(good.out.find("STILL GOOD."), std::string::npos) << good.out;
+  EXPECT_NE(good.out.find("set up anew"), std::string::npos) << good.out;
+  std::string real = llmt::read_file(folder.file("real.yaml"));
+  const std::string before = "theta_deg: 0.06";
+  ASSERT_NE(real.find(before), std::string::npos);
+  folder.write("knocked.yaml", real.replace(real.find(before), before.size(), "theta_deg: 0.08"));
+  folder.run(robot_program + " simulate knocked.yaml --poses 40 --noise-um 20 --seed 3 -o knocked.csv");
+  const Outcome bad = folder.run(robot_program + " check cal.yaml knocked.csv");
+  EXPECT_EQ(bad.exit_code, 1);
+  EXPECT_NE(bad.out.find("NO LONGER GOOD."), std::string::npos) << bad.out;
+  EXPECT_NE(bad.out.find("joint3.theta: 0.0"), std::string::npos) << bad.out;
+  EXPECT_NE(bad.err.find("the mean error is"), std::string::npos) << bad.err;
+  const Outcome json = folder.run(robot_program + " check cal.yaml knocked.csv --accuracy-mm 5 --json");
+  EXPECT_EQ(json.exit_code, 0);
+  EXPECT_EQ(nlohmann::json::parse(json.out)["moved"][0]["name"], "joint3.theta");
+  EXPECT_EQ(folder.run(robot_program + " check cal.yaml new.csv --same-session").exit_code, 0);
+}
+
+TEST(CheckProgram, RefusesWhatIsNoCalibration) {
+  const Folder folder;
+  calibrate_sample(folder);
+  const Outcome run = folder.run(fmt::format("{} check {}arm.yaml new.csv", robot_program, samples));
+  EXPECT_EQ(run.exit_code, 2);
+  EXPECT_NE(run.err.find("it was not calibrated"), std::string::npos) << run.err;
+  const Outcome exchanged = folder.run(robot_program + " check new.csv cal.yaml");
+  EXPECT_EQ(exchanged.exit_code, 2);
+  EXPECT_NE(exchanged.err.find("exchanged"), std::string::npos) << exchanged.err;
+}
+
+// The commands that the demonstration shows, given by hand, write the same files.
+TEST(DemoProgram, ShowsCommandsThatDoTheSame) {
+  const Folder folder;
+  const Outcome demo = folder.run(robot_program + " demo -o shown");
+  ASSERT_EQ(demo.exit_code, 0) << demo.err;
+  EXPECT_EQ(demo.err, "");
+  folder.run("mkdir again && cp shown/arm.yaml shown/real_arm.yaml shown/program.csv again");
+  std::istringstream lines(demo.out);
+  int commands = 0;
+  for (std::string line; std::getline(lines, line);) {
+    if (!line.starts_with("$ llmt-robot ")) continue;
+    ++commands;
+    const Outcome run = folder.run("cd again && " + robot_program + line.substr(std::string("$ llmt-robot").size()));
+    EXPECT_EQ(run.exit_code, 0) << line << "\n" << run.err;
+  }
+  EXPECT_EQ(commands, 7);
+  const Outcome same = folder.run("diff -r shown again");
+  EXPECT_EQ(same.exit_code, 0) << same.out;
+  EXPECT_EQ(folder.run(robot_program + " demo -o shown").exit_code, 2);  // is there already
+}
+
+}  // namespace
