@@ -109,6 +109,10 @@ Json report_json(const CalibrateArguments& arguments, const robotics::Measuremen
     json["fixed"].push_back({{"name", fixed.name}, {"why", fixed.why}});
   }
   json["weak"] = report.calibration.weak;
+  json["uncertain"] = Json::array();
+  for (const robotics::IdentifiedParameter& parameter : robotics::uncertain_parameters(report.calibration.robot)) {
+    json["uncertain"].push_back(parameter.name);
+  }
   json["warnings"] = measurements.warnings;
   json["unused_columns"] = measurements.unused_columns;
   json["output"] = arguments.output.empty() ? Json(nullptr) : Json(arguments.output);
@@ -155,8 +159,13 @@ std::string parameter_table(const robotics::Robot& nominal, const CalibrationRep
     const auto nominal_value = std::ranges::find(before, after.name, &discovery::Parameter::name);
     if (after.free && nominal_value != before.end()) {
       const double error = result.standard_errors(k);
-      table.add({after.name, number(nominal_value->value, 7), number(after.value, 7),
-                 number(after.value - nominal_value->value, 4), std::isfinite(error) ? number(error, 2) : "-",
+      // Far below what lengths in mm and angles in degrees can be known to, a difference is rounding.
+      const bool is_geometric = after.unit == "mm" || after.unit == "deg";
+      const auto shown = [&](double value, int digits) {
+        return number(is_geometric && std::abs(value) < 1e-9 ? 0.0 : value, digits);
+      };
+      table.add({after.name, shown(nominal_value->value, 7), shown(after.value, 7),
+                 shown(after.value - nominal_value->value, 4), std::isfinite(error) ? number(error, 2) : "-",
                  after.unit});
     }
   }
@@ -175,7 +184,7 @@ void print_report(const CalibrateArguments& arguments, const robotics::Robot& no
     print(fmt::format("Columns not used: {}\n", fmt::join(measurements.unused_columns, ", ")));
   }
   if (measurements.orientation.values.size() > 0) {
-    print("Orientations are in the file; positions alone are fitted.\n");
+    print("The file has orientations. Calibration uses the positions only.\n");
   }
   print(fmt::format("\n{}\n", parameter_table(nominal, report)));
   print(result.converged()
@@ -189,21 +198,27 @@ void print_report(const CalibrateArguments& arguments, const robotics::Robot& no
   }
   if (!dependent.empty()) {
     print(fmt::format(
-        "Left as described, because they move the measured point as parameters above do, or not at all: {}\n",
+        "Not identified but kept as described, because they move the measured point as parameters above do, or not at "
+        "all: {}\n",
         fmt::join(dependent, ", ")));
   }
-  if (!kept.empty()) print(fmt::format("Left as described by --fix or --only: {}\n", fmt::join(kept, ", ")));
-  if (!report.calibration.weak.empty()) {
+  if (!kept.empty()) print(fmt::format("Kept as described by --fix or --only: {}\n", fmt::join(kept, ", ")));
+  if (const std::string uncertain = uncertain_text(report.calibration.robot); !uncertain.empty()) {
     print(
-        fmt::format("These poses hardly determine the following, which stay close to the description; positions near "
-                    "these poses do not suffer: {}\n",
-                    fmt::join(report.calibration.weak, ", ")));
+        fmt::format("Uncertain values: {}. These poses do not determine each of them alone, so do not take them for "
+                    "the true ones. Positions near these poses do not suffer: all values together give them.\n",
+                    uncertain));
   }
   for (const discovery::Combination& combination : result.unidentifiable) {
     print(fmt::format("These poses determine only a combination of: {}\n", combination.names()));
   }
   print("\n" + error_table(rows, report, arguments.contiguous));
   print("nominal: base and tool fitted to the poses, everything else as described.\n");
+  if (report.folds > 0) {
+    print(
+        "held-out: on poses that were left out of the fit; take these for the error at new poses. in-sample: on the "
+        "poses that were fitted.\n");
+  }
   if (report.correction) {
     std::vector<std::string> leaves;
     for (const PartitionSummary& partition : report.correction->summary.partitions) {

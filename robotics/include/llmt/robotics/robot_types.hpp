@@ -14,6 +14,7 @@
 
 #include "llmt/abi.hpp"
 #include "llmt/robotics/effect_type.hpp"
+#include "llmt/robotics/urdf.hpp"
 
 namespace llmt::robotics {
 
@@ -30,6 +31,7 @@ struct Robot {
   std::vector<Effect> effects;
   std::vector<IdentifiedParameter> identified;  ///< empty before calibration
   std::string correction_file;                  ///< model file of the residual correction, or empty
+  UrdfLinks urdf_links = {};                    ///< given when the arm was taken from a URDF
 };
 
 /// Where the arm stood and under which conditions: one row a pose.
