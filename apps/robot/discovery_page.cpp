@@ -278,8 +278,8 @@ std::string advice(const Discovery& found) {
   if (is("noise"))
     return "Next: measure some poses several times, from both sides, and write their number into a column `pose`.";
   if (found.answer == discovery::Answer::indistinguishable) {
-    return "Next: use the improved description near the measured poses. The last lines say which poses would tell the "
-           "causes apart.";
+    return "Next: use the improved description near the measured poses. The last lines say whether further poses "
+           "would tell the causes apart.";
   }
   if (found.answer == discovery::Answer::named)
     return "Next: use the improved description within the measured joint ranges. Nothing beyond was checked.";

@@ -209,7 +209,8 @@ TEST(ReadableProgram, TheFileIsAnOrdinaryModelAndTheSummarySaysWhatEachCosts) {
   folder.write("d.csv", table(rows()));
   const Outcome fitted = folder.run(llmt_program + " fit d.csv -t y -o m.json --readable --cv 3");
   ASSERT_EQ(fitted.exit_code, 0) << fitted.err;
-  for (const char* text : {"readable", "least squares", "at most 15 % above the best of all crisp trees", "m.readable.json"}) {
+  for (const char* text :
+       {"readable", "least squares", "at most 15 % above the best of all crisp trees", "m.readable.json"}) {
     EXPECT_NE(fitted.out.find(text), std::string::npos) << fitted.out;
   }
   EXPECT_EQ(folder.run(llmt_program + " predict m.readable.json d.csv --interval 0.9").exit_code, 0);
