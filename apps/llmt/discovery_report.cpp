@@ -19,7 +19,7 @@ using discovery::Missing;
 void print_found(const Missing& missing) {
   int place = 0;
   for (const FoundTerm& found : missing.found) {
-    print(fmt::format("\n{}. {}: {:.0f} % of what is explained rests on it alone{}\n", ++place,
+    print(fmt::format("\n{}. {}: without it {:.0f} % of what is explained would be lost{}\n", ++place,
                       title_of(found, missing.gaps.size() > 1), 100.0 * found.share,
                       found.generic     ? ""
                       : found.confirmed ? ", confirmed"
@@ -54,8 +54,10 @@ void print_gaps(const DiscoveryReport& report) {
     table.add({gap.output, number(gap.before), number(gap.after), number(gap.noise_floor)});
   }
   print(table.text());
-  print(missing.floor_from_repeats ? "The noise floor comes from rows of equal inputs.\n"
-                                   : "The noise floor is what the terms leave over.\n");
+  print(
+      missing.floor_from_repeats
+          ? "The noise floor comes from rows of equal inputs.\n"
+          : "Too few rows have equal inputs to measure the noise: the error left over was used as the noise floor.\n");
 }
 
 void print_regions(const DiscoveryReport& report) {
@@ -80,24 +82,35 @@ void print_visible(const Missing& missing) {
   print(table.text());
 }
 
+bool is_exact(const Missing& missing) {
+  return std::ranges::all_of(missing.gaps, [](const discovery::Gap& gap) { return gap.before == 0.0; }) &&
+         missing.found.empty();
+}
+
 }  // namespace
 
 void print_report(const DiscoveryReport& report) {
   const Missing& missing = report.missing;
   print(fmt::format("{} against {}: {} rows, inputs {}\n", report.simulated, report.measured, report.rows,
                     fmt::join(report.inputs, ", ")));
-  print(fmt::format("{} rows set aside (seed {}), {} searched, {} candidates, {} {}\n", missing.held_out.size(),
-                    report.seed, missing.searched.size(), missing.candidates.size(), missing.rounds,
-                    missing.rounds == 1 ? "round" : "rounds"));
+  print(fmt::format("{} rows set aside (seed {}), {} searched, {} candidate terms, {} {} of search\n",
+                    missing.held_out.size(), report.seed, missing.searched.size(), missing.candidates.size(),
+                    missing.rounds, missing.rounds == 1 ? "round" : "rounds"));
   print(fmt::format("\nVERDICT: {}\n", headline(missing)));
-  print(fmt::format("Evidence {} where chance reaches {}.\n", number(missing.verdict.score_gain, 3),
+  if (is_exact(missing)) {
+    print("The simulation gives the measured values exactly: there is no gap to explain.\n");
+    return;
+  }
+  print(fmt::format("Evidence: {} raise the score by {}; in noise alone 997 of 1000 searches stay below {}.\n",
+                    missing.found.empty() ? "the best terms" : "the terms", number(missing.verdict.score_gain, 3),
                     number(missing.verdict.threshold, 3)));
   print_found(missing);
   for (const discovery::Structure& left : missing.structure) {
-    print(fmt::format(
-        "\nNot explained: rows that are close in {} deviate alike in {}, {:.0f} % of what can be explained (p = "
-        "{:.1g} in noise).\n",
-        fmt::join(left.inputs, ", "), left.output, 100.0 * left.share, left.p_value));
+    print(
+        fmt::format("\nNot explained: rows of similar {} have similar errors of {}; {:.0f} % of what can be explained "
+                    "(in noise p = "
+                    "{:.1g}).\n",
+                    fmt::join(left.inputs, ", "), left.output, 100.0 * left.share, left.p_value));
   }
   for (const std::string& note : missing.notes) print(fmt::format("\nNote: {}.\n", note));
   for (std::size_t k = 0; k < missing.parameters.size(); ++k) {

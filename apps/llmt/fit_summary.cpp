@@ -297,7 +297,7 @@ Json summary_json(const FitRun& run, const FitResult& result) {
 
 void print_summary(const FitRun& run, const FitResult& result) {
   print_data(run, result);
-  print(fmt::format("Rule {}, at least {} rows in a leaf; {}\n\n", name_of(run.learning.options.rule),
+  print(fmt::format("Tree grown by method {}, at least {} rows in a leaf; {}\n\n", name_of(run.learning.options.rule),
                     result.summary.min_leaf_samples, selection_text(run, result.summary.partitions.front())));
   print(models_table(result).text());
   for (const PartitionSummary& partition : result.summary.partitions) {

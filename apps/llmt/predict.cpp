@@ -197,12 +197,12 @@ void summarise(const PredictArguments& arguments, const Predicted& predicted) {
     for (const Extrapolation& row : predicted.extrapolation) {
       farthest = std::max(farthest, row.distance);
     }
-    text += fmt::format("; {} rows lie outside the training extent, by up to {} of an input's range", outside,
-                        number(farthest, 2));
+    text += fmt::format("; {} outside the range of the training rows, by up to {} % of an input's range", outside,
+                        number(100.0 * farthest, 2));
   }
   if (const Eigen::Index rows = count_high_leverage(predicted); rows > 0) {
     text += fmt::format(
-        "; {} rows lie within the range of every input but are an unusual combination of them (leverage above 1): take "
+        "; {} within the range of every input, but an unusual combination of them (leverage above 1): take "
         "these predictions for extrapolation",
         rows);
   }

@@ -54,14 +54,14 @@ Json readable_json(const ReadableResult& readable) {
 }
 
 void print_readable(const FitResult& fitted, const ReadableResult& readable, double loss) {
-  Table table({"target", "what it costs", "leaves", "terms a leaf", "size", "RMSE held-out", "+-"});
-  std::string missed;
+  Table table({"target", "model", "leaves", "terms a leaf", "size", "RMSE held-out", "+-"});
+  std::string best;
   for (std::size_t p = 0; p < readable.partitions.size(); ++p) {
     const ReadablePartition& simple = readable.partitions[p];
     const PartitionSummary& full = fitted.summary.partitions[p];
     const Model whole = part_of(fitted.model, p);
     const std::string& target = fitted.model.outputs()[simple.outputs.front()].name;
-    table.add({target, "the model", count(full.leaves), count(most_terms(whole.partitions()[0])),
+    table.add({target, "as chosen above", count(full.leaves), count(most_terms(whole.partitions()[0])),
                count(expression_size(whole)), number(full.chosen.rmse), number(full.chosen.spread, 2)});
     table.add({"", "readable", count(simple.leaves), count(simple.most_terms), count(simple.size), number(simple.rmse),
                number(simple.spread, 2)});
@@ -69,13 +69,15 @@ void print_readable(const FitResult& fitted, const ReadableResult& readable, dou
     const Model root = whole.prefix(1);
     table.add({"", "least squares", "1", count(most_terms(root.partitions()[0])), count(expression_size(root)),
                number(linear.rmse), number(linear.spread, 2)});
-    missed += fmt::format("{}{}: {}{}", missed.empty() ? "" : "; ", target, number(simple.best_crisp),
-                          simple.is_within_loss ? "" : ", and no readable tree came near enough");
+    best += fmt::format("{}{}: {}{}", best.empty() ? "" : "; ", target, number(simple.best_crisp),
+                        simple.is_within_loss ? "" : ", and no readable tree came near enough");
   }
   print(fmt::format(
       "\n{}Size: operators, constants and variables of the model as an expression. The readable tree is the "
-      "smallest within {} % of the best crisp tree ({}).\n",
-      table.text(), fmt::format("{:g}", 100.0 * loss), missed));
+      "smallest one whose held-out RMSE is at most {:g} % above the best of all crisp trees that were tried, those "
+      "with "
+      "short equations included ({}).\n",
+      table.text(), 100.0 * loss, best));
 }
 
 }  // namespace llmt::apps

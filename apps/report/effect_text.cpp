@@ -18,7 +18,7 @@ std::string constants_text(const robotics::Effect& effect) {
   const robotics::EffectType& type = robotics::effect_type(effect.type);
   std::vector<std::string> parts;
   for (std::size_t k = 0; k < type.constants.size() && k < effect.constants.size(); ++k) {
-    parts.push_back(fmt::format("{} {}", type.constants[k].key, number(effect.constants[k], 5)));
+    parts.push_back(fmt::format("{} {:.5g}", type.constants[k].key, effect.constants[k]));
   }
   return parts.empty() ? "" : fmt::format(" ({})", fmt::join(parts, ", "));
 }
@@ -58,6 +58,14 @@ std::vector<const robotics::FoundEffect*> by_size(const robotics::Discovery& fou
   return effects;
 }
 
+const robotics::FoundEffect& whole_of(const robotics::Discovery& found, const robotics::FoundEffect& effect) {
+  if (!effect.smaller || effect.effect.type == "transmission_error") return effect;
+  for (const robotics::FoundEffect& one : found.effects) {
+    if (!one.smaller && one.effect.type == effect.effect.type && one.effect.at == effect.effect.at) return one;
+  }
+  return effect;
+}
+
 std::string effect_words(const robotics::Effect& effect) {
   const std::string& title =
       effect.formula.name.empty() ? robotics::effect_type(effect.type).title : effect.formula.name;
@@ -71,7 +79,7 @@ std::string rival_words(const robotics::FoundEffect& effect, std::size_t k) {
   if (effects.size() != causes) return label;  // a shape among them, which is no effect
   std::vector<std::string> parts;
   for (const robotics::Effect& one : effects) parts.push_back(effect_words(one));
-  return fmt::format("{}", fmt::join(parts, " with "));
+  return fmt::format("{}", fmt::join(parts, " together with "));
 }
 
 std::string shape_words(const robotics::Shape& shape) {

@@ -39,7 +39,11 @@ std::vector<const robotics::FoundEffect*> by_size(const robotics::Discovery& fou
 /// "link bending, joint2", with the effect's constants: what it is, for people.
 std::string effect_words(const robotics::Effect& effect);
 
-/// The k-th rival of an effect in the same words; several causes together are joined by "with".
+/// The larger effect that this one, found beside it, is a part of: the same cause at the same place with another
+/// constant, but for waves, whose orders are causes of their own. The effect itself where there is none.
+const robotics::FoundEffect& whole_of(const robotics::Discovery& found, const robotics::FoundEffect& effect);
+
+/// The k-th rival of an effect in the same words; several causes at once are joined by "together with".
 std::string rival_words(const robotics::FoundEffect& effect, std::size_t k);
 
 /// "a smooth function of q1": what a shape looks like.

@@ -82,17 +82,22 @@ std::vector<std::size_t> identified(const discovery::SolverResult& result) {
 Json parameter_table(const Calibrated& of) {
   const std::vector<discovery::Parameter> before = robotics::parameters(of.nominal);
   const discovery::SolverResult& result = of.report.calibration.result;
-  Grid grid{.title = "Parameters",
-            .caption = "Standard errors are of the fit: they say how well these poses tell a parameter.",
-            .header = {"parameter", "described", "identified", "change", "std. error", "unit"},
-            .rows = {},
-            .wide = true};
+  Grid grid{
+      .title = "Parameters",
+      .caption =
+          "Standard errors say how well these poses determine each parameter alone. Do not take uncertain values for "
+          "the true ones; positions near these poses do not suffer.",
+      .header = {"parameter", "described", "identified", "change", "std. error", "unit"},
+      .rows = {},
+      .wide = true};
+  const auto uncertain = robotics::uncertain_parameters(of.report.calibration.robot);
   for (const std::size_t k : identified(result)) {
     const discovery::Parameter& after = result.parameters[k];
     const auto nominal = std::ranges::find(before, after.name, &discovery::Parameter::name);
     if (nominal == before.end()) continue;
-    const bool weak = std::ranges::find(of.report.calibration.weak, after.name) != of.report.calibration.weak.end();
-    grid.rows.push_back({after.name + (weak ? " (poorly told by these poses)" : ""), number(nominal->value, 6),
+    const bool is_uncertain =
+        std::ranges::find(uncertain, after.name, &robotics::IdentifiedParameter::name) != uncertain.end();
+    grid.rows.push_back({after.name + (is_uncertain ? " (uncertain)" : ""), number(nominal->value, 6),
                          number(after.value, 6), number(after.value - nominal->value, 3),
                          number(result.standard_errors(k), 2), after.unit});
   }

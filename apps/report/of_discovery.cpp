@@ -82,7 +82,7 @@ Chart gap_chart(const Discovery& found) {
       fmt::format("On {}. 95 % of them: {} before, {} mm after. Noise: {}.", gap.on, number(gap.before.p95, 3),
                   number(gap.after.p95, 3),
                   found.held_out.floor_from_repeats ? "from repeated poses"
-                                                    : "estimated from what is left, since no pose was repeated");
+                                                    : "the error left over, since too few poses were repeated");
   return chart;
 }
 

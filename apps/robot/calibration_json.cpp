@@ -87,6 +87,10 @@ Json calibration_json(const CalibrationFacts& facts) {
     json["fixed"].push_back({{"name", fixed.name}, {"why", fixed.why}});
   }
   json["weak"] = report.calibration.weak;
+  json["uncertain"] = Json::array();
+  for (const robotics::IdentifiedParameter& parameter : robotics::uncertain_parameters(report.calibration.robot)) {
+    json["uncertain"].push_back(parameter.name);
+  }
   std::vector<std::string> warnings = measurements.warnings;
   warnings.insert(warnings.end(), facts.suspicions.begin(), facts.suspicions.end());
   json["warnings"] = warnings;

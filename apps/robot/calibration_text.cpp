@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "robot/calibration_facts.hpp"
+#include "robot/commands.hpp"
 #include "robot/measured_file.hpp"
 
 namespace llmt::apps {
@@ -59,8 +60,13 @@ std::string parameter_table(const robotics::Robot& nominal, const CalibrationRep
     const auto nominal_value = std::ranges::find(before, after.name, &discovery::Parameter::name);
     if (after.free && nominal_value != before.end()) {
       const double error = result.standard_errors(k);
-      table.add({after.name, number(nominal_value->value, 7), number(after.value, 7),
-                 number(after.value - nominal_value->value, 4), std::isfinite(error) ? number(error, 2) : "-",
+      // Far below what lengths in mm and angles in degrees can be known to, a difference is rounding.
+      const bool is_geometric = after.unit == "mm" || after.unit == "deg";
+      const auto shown = [&](double value, int digits) {
+        return number(is_geometric && std::abs(value) < 1e-9 ? 0.0 : value, digits);
+      };
+      table.add({after.name, shown(nominal_value->value, 7), shown(after.value, 7),
+                 shown(after.value - nominal_value->value, 4), std::isfinite(error) ? number(error, 2) : "-",
                  after.unit});
     }
   }
@@ -83,15 +89,16 @@ std::string parameters_text(const CalibrationFacts& facts) {
   }
   if (!dependent.empty()) {
     text += fmt::format(
-        "Left as described, because they move the measured point as parameters above do, or not at all: {}\n",
+        "Not identified but kept as described, because they move the measured point as parameters above do, or not at "
+        "all: {}\n",
         fmt::join(dependent, ", "));
   }
-  if (!kept.empty()) text += fmt::format("Left as described by --fix or --only: {}\n", fmt::join(kept, ", "));
-  if (!report.calibration.weak.empty()) {
+  if (!kept.empty()) text += fmt::format("Kept as described by --fix or --only: {}\n", fmt::join(kept, ", "));
+  if (const std::string uncertain = uncertain_text(report.calibration.robot); !uncertain.empty()) {
     text += fmt::format(
-        "These poses hardly determine the following, which stay close to the description; positions near "
-        "these poses do not suffer: {}\n",
-        fmt::join(report.calibration.weak, ", "));
+        "Uncertain values: {}. These poses do not determine each of them alone, so do not take them for "
+        "the true ones. Positions near these poses do not suffer: all values together give them.\n",
+        uncertain);
   }
   for (const discovery::Combination& combination : result.unidentifiable) {
     text += fmt::format("These poses determine only a combination of: {}\n", combination.names());
@@ -184,6 +191,11 @@ std::string calibration_text(const CalibrationFacts& facts) {
   std::string text = head(facts) + parameters_text(facts);
   text += "\n" + error_tables(facts.models, report, facts.contiguous);
   text += "nominal: base and tool fitted to the poses, everything else as described.\n";
+  if (report.folds > 0) {
+    text +=
+        "held-out: on poses that were left out of the fit; take these for the error at new poses. in-sample: on the "
+        "poses that were fitted.\n";
+  }
   if (report.correction) {
     std::vector<std::string> leaves;
     for (const PartitionSummary& partition : report.correction->summary.partitions) {

@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <string>
 
+#include "llmt/csv.hpp"
 #include "llmt/robotics/robot.hpp"
 #include "llmt/robotics/urdf.hpp"
 
@@ -20,6 +21,17 @@ robotics::Robot read_description(const std::string& robot, const std::string& me
 
 /// --base-link and --tip-link: which part of a URDF is the arm.
 void add_urdf_links(CLI::App& command, robotics::UrdfLinks& links);
+
+/// A table of ours, whose cells are numbers and words without points and commas, with that mark in its numbers: with a
+/// decimal comma its fields are separated by semicolons.
+std::string with_decimal_mark(std::string csv, DecimalMark mark);
+
+/// "joint5.theta +-0.91 deg, joint5.d +-1.9 mm": robotics::uncertain_parameters(), empty if there are none.
+std::string uncertain_text(const robotics::Robot& robot);
+
+/// The links to read a URDF beside a robot with: those that were given or, without any, those that the robot's
+/// description remembers; none for a file that is no URDF.
+robotics::UrdfLinks links_for(const std::string& path, const robotics::UrdfLinks& given, const robotics::Robot& robot);
 
 void add_paper(CLI::App& app);
 void add_demo(CLI::App& app);

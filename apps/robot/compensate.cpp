@@ -34,12 +34,8 @@ struct CompensateArguments {
   bool position_only = false;
   bool json = false;
   double tolerance_um = 0.001;
+  DecimalMark mark = DecimalMark::point;
 };
-
-// The links are those of whichever file is a URDF.
-robotics::UrdfLinks nominal_links(const CompensateArguments& arguments) {
-  return robotics::is_urdf(arguments.nominal) ? arguments.links : robotics::UrdfLinks{};
-}
 
 // What the nominal description says of the asked-for joints, as the robot stands and with the tool that it carries.
 void take_nominal_poses(const CompensateArguments& arguments, const CorrectedRobot& robot, robotics::Targets& targets) {
@@ -48,7 +44,8 @@ void take_nominal_poses(const CompensateArguments& arguments, const CorrectedRob
         fmt::format("{}: there are joints and no positions; --nominal ROBOT says where they are to bring the tool",
                     arguments.targets));
   }
-  robotics::Chain nominal = robotics::read_robot(arguments.nominal, nominal_links(arguments)).chain;
+  robotics::Chain nominal =
+      robotics::read_robot(arguments.nominal, links_for(arguments.nominal, arguments.links, robot.robot)).chain;
   if (nominal.joints.size() != robot.robot.chain.joints.size()) {
     throw std::invalid_argument(fmt::format("--nominal: {} has {} joints, {} has {}", arguments.nominal,
                                             nominal.joints.size(), arguments.robot, robot.robot.chain.joints.size()));
@@ -146,7 +143,7 @@ void name_rows(const CompensateArguments& arguments, const robotics::TargetTable
 Json summary_json(const CompensateArguments& arguments, const Compensation& found) {
   Json json = {{"robot", arguments.robot}, {"targets", found.outcomes.size()}};
   for (const Outcome outcome :
-       {Outcome::reached, Outcome::jump, Outcome::limit, Outcome::unreachable, Outcome::branch}) {
+       {Outcome::reached, Outcome::jump, Outcome::limit, Outcome::unreachable, Outcome::branch, Outcome::singular}) {
     json["outcomes"][robotics::to_string(outcome)] = std::ranges::count(found.outcomes, outcome);
   }
   json["uncovered"] = std::ranges::count_if(found.uncovered, [](const std::string& text) { return !text.empty(); });
@@ -161,13 +158,16 @@ std::string summary(const CorrectedRobot& robot, const Compensation& found, cons
   const auto of = [&](Outcome outcome) { return std::ranges::count(found.outcomes, outcome); };
   const auto uncovered = std::ranges::count_if(found.uncovered, [](const std::string& text) { return !text.empty(); });
   return fmt::format(
-      "{}: {} targets, {} reached; {} at jumps of the model, {} at limits, {} unreachable, {} on another branch; {} "
-      "not "
-      "covered by the correction's training.\nDistance from the target by the model: {:.4g} mm with the start joints, "
-      "{:.4g} mm with the commands (means){}\n",
+      "{}: {} targets, {} reached; {} at jumps of the model, {} at limits, {} unreachable, {} on another branch, {} "
+      "near "
+      "singular poses{}.\nMean distance from the target, by the model of the arm: {:.4g} mm with the start joints, "
+      "{:.4g} "
+      "mm with the commands.{}",
       robot.robot.chain.name, found.outcomes.size(), of(Outcome::reached), of(Outcome::jump), of(Outcome::limit),
-      of(Outcome::unreachable), of(Outcome::branch), uncovered, found.before_mm.mean(), found.after_mm.mean(),
-      output.empty() ? "" : "; written to " + output);
+      of(Outcome::unreachable), of(Outcome::branch), of(Outcome::singular),
+      uncovered > 0 ? fmt::format("; {} outside of the joint values that the correction was trained on", uncovered)
+                    : "",
+      found.before_mm.mean(), found.after_mm.mean(), output.empty() ? "" : "\nWritten to " + output);
 }
 
 void name_made_up(const robotics::TargetTable& table, const Compensation& found) {
@@ -182,15 +182,42 @@ void name_made_up(const robotics::TargetTable& table, const Compensation& found)
       fmt::join(names, ", ")));
 }
 
+// Joint values that no arm has: most often degrees in a column of radians.
+void warn_of_units(const CompensateArguments& arguments, const robotics::Chain& chain,
+                   const robotics::TargetTable& table) {
+  if (table.joints.size() == 0) return;
+  std::vector<std::string> outside;
+  for (std::size_t j = 0; j < chain.joints.size(); ++j) {
+    const robotics::Joint& joint = chain.joints[j];
+    const bool turns = joint.type == robotics::JointType::revolute;
+    if (!turns && !joint.limits) continue;
+    constexpr double two_turns = 720.0;
+    constexpr double slack = 1.0;  // degree or mm
+    const std::array<double, 2> limits = joint.limits.value_or(std::array{-two_turns, two_turns});
+    const Eigen::ArrayXd values = table.joints.col(j) * (turns ? 180.0 / std::numbers::pi : 1.0);
+    const Eigen::Index count = (values < limits[0] - slack || values > limits[1] + slack).count();
+    if (count > 0) {
+      outside.push_back(fmt::format("{} in {} of {} rows (up to {:.4g} {})", joint.name, count, values.size(),
+                                    values.abs().maxCoeff(), turns ? "deg" : "mm"));
+    }
+  }
+  if (outside.empty()) return;
+  warn(
+      fmt::format("WARNING: {}: joint values outside of the joints' limits: {}; are the units in the column names "
+                  "right (_rad, _deg)?",
+                  arguments.targets, fmt::join(outside, ", ")));
+}
+
 void compensate_command(const CompensateArguments& arguments) {
-  const CorrectedRobot robot = robotics::read_corrected_robot(
-      arguments.robot, robotics::is_urdf(arguments.robot) ? arguments.links : robotics::UrdfLinks{});
-  const robotics::TargetTable table = robotics::read_targets(arguments.targets, robot.robot);
+  const CorrectedRobot robot =
+      robotics::read_corrected_robot(arguments.robot, links_for(arguments.robot, arguments.links, {}));
+  const robotics::TargetTable table = robotics::read_targets(arguments.targets, robot.robot, arguments.mark);
+  warn_of_units(arguments, robot.robot.chain, table);
   const robotics::Targets targets = asked(arguments, robot, table);
   check_positions(arguments.robot, robot.robot,
                   robotics::with_needed_columns(robot.robot, robotics::with_approach(robot.robot, targets.start), 1));
   const Compensation found = robotics::compensate(robot, targets, {.tolerance_mm = 1e-3 * arguments.tolerance_um});
-  const std::string csv = commands_csv(robot, table, found);
+  const std::string csv = with_decimal_mark(commands_csv(robot, table, found), arguments.mark);
   name_made_up(table, found);
   name_rows(arguments, table, found);
   if (!table.unused_columns.empty()) warn(fmt::format("Columns not used: {}", fmt::join(table.unused_columns, ", ")));
@@ -204,7 +231,7 @@ void compensate_command(const CompensateArguments& arguments) {
     print_bytes(csv);
     warn(summary(robot, found, ""));
   } else {
-    print(summary(robot, found, arguments.output));
+    print(summary(robot, found, arguments.output) + "\n");
   }
   const auto missed = std::ranges::count_if(
       found.outcomes, [](Outcome outcome) { return outcome == Outcome::limit || outcome == Outcome::unreachable; });
@@ -234,6 +261,7 @@ void add_compensate(CLI::App& app) {
                  "Description that the controller goes by; it says where joint values are to bring the tool");
   command->add_flag("--nominal-frames", arguments->nominal_frames,
                     "Base and tool are those of --nominal (default: those of the robot, which were registered)");
+  add_decimal_comma(*command, arguments->mark);
   command->add_option("--frame", arguments->frame, "Frame of target poses: world (of the instrument) or base")
       ->check(CLI::IsMember({"world", "base"}))
       ->capture_default_str();

@@ -19,7 +19,7 @@ std::string constants_with_error(const FoundEffect& effect) {
   const robotics::EffectType& type = robotics::effect_type(effect.effect.type);
   std::vector<std::string> parts;
   for (std::size_t k = 0; k < type.constants.size() && k < effect.effect.constants.size(); ++k) {
-    std::string text = fmt::format("{} {}", type.constants[k].key, number(effect.effect.constants[k], 5));
+    std::string text = fmt::format("{} {:.5g}", type.constants[k].key, effect.effect.constants[k]);
     if (k == 0 && effect.constant_error) text += fmt::format(" +- {}", number(*effect.constant_error, 2));
     parts.push_back(std::move(text));
   }
@@ -34,11 +34,14 @@ std::string effect_lines(const Discovery& found) {
     text +=
         fmt::format("  {}{}{}, {}{}\n", effect.confirmed ? "" : "perhaps ", effect.smaller ? "also " : "", effect.title,
                     effect.effect.at.empty() ? "the whole arm" : effect.effect.at, constants_with_error(effect));
+    if (&whole_of(found, effect) != &effect) text += "    a part of the effect of this name above\n";
     const std::string values = effect_values(found, effect);
     if (!values.empty()) text += fmt::format("    {}\n", values);
-    text += fmt::format("    moves the tool by {:.4f} mm (rms) in ways that geometry cannot\n", effect.rms_mm);
+    text += fmt::format(
+        "    moves the tool by {:.4f} mm (root mean square), without what a change of geometry could imitate\n",
+        effect.rms_mm);
     for (std::size_t k = 0; k < effect.rivals.size(); ++k) {
-      text += fmt::format("    or as well: {} [{}]\n", rival_words(effect, k), effect.rivals[k]);
+      text += fmt::format("    instead it may be: {} [{}]\n", rival_words(effect, k), effect.rivals[k]);
     }
     if (effect.exact_alias) text += "    One of these does the same at every pose: no pose can tell them apart.\n";
   }
@@ -56,7 +59,8 @@ std::string shape_lines(const std::vector<robotics::FoundShape>& shapes) {
 
 std::string gap_lines(const Discovery& found) {
   const bool nothing = found.answer == discovery::Answer::nothing_missing;
-  std::string text = nothing ? "What is left, by region:\n" : "Where the gap was, before:\n";
+  std::string text = nothing ? "Where the calibrated model misses the measured points:\n"
+                             : "Where the calibrated model misses the measured points:\n";
   if (found.gap.regions.empty()) text += "  about alike everywhere\n";
   for (const robotics::GapMap::Region& region : found.gap.regions) {
     text += fmt::format("  {:.4f} mm mean in {} poses: {}\n", region.mean_mm, region.poses, region.conditions);
@@ -69,10 +73,10 @@ std::string gap_lines(const Discovery& found) {
     return fmt::format("{}", fmt::join(parts, ", "));
   };
   if (!found.gap.acts_like.empty()) {
-    text += fmt::format("  in the direction that the joint alone moves the tool, a third by chance: {}\n",
+    text += fmt::format("  share of the squared error along the motion by one joint alone (by chance 33 %): {}\n",
                         list(found.gap.acts_like));
   }
-  if (!found.gap.depends_on.empty()) text += fmt::format("  depends on: {}\n", list(found.gap.depends_on));
+  if (!found.gap.depends_on.empty()) text += fmt::format("  the error depends on: {}\n", list(found.gap.depends_on));
   return text;
 }
 
@@ -91,7 +95,7 @@ std::string untestable_lines(const Discovery& found) {
     for (const auto& [type, count] : types) parts.push_back(count > 1 ? fmt::format("{} ({})", type, count) : type);
     text += fmt::format("  {}: {}\n", why, fmt::join(parts, ", "));
   }
-  return text.empty() ? "" : "Not testable:\n" + text;
+  return text.empty() ? "" : "Not testable with these data:\n" + text;
 }
 
 std::string visible_lines(const Discovery& found) {
@@ -113,8 +117,10 @@ std::string discovery_details(const Discovery& found) {
   std::erase_if(shapes, [](const robotics::FoundShape& one) { return one.shape.depends_on.empty(); });
   std::string text = effect_lines(found) + shape_lines(shapes) + gap_lines(found) + untestable_lines(found);
   if (found.answer == discovery::Answer::nothing_missing) text += visible_lines(found);
-  text += fmt::format("{} causes were tried in {} round{}; what was found scores {:.0f}, chance alone up to {:.0f}.\n",
-                      found.hypotheses, found.rounds, found.rounds == 1 ? "" : "s", found.score_gain, found.threshold);
+  text += fmt::format(
+      "{} causes were tried in {} round{}. What was found raises the score by {:.0f}; in noise alone 997 of 1000 "
+      "searches stay below {:.0f}.\n",
+      found.hypotheses, found.rounds, found.rounds == 1 ? "" : "s", found.score_gain, found.threshold);
   return text;
 }
 

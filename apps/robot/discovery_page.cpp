@@ -52,14 +52,16 @@ std::string headline(const Discovery& found) {
       std::ranges::any_of(found.effects, [](const FoundEffect& one) { return one.confirmed && !one.smaller; });
   const bool is_named =
       found.answer == discovery::Answer::named || found.answer == discovery::Answer::indistinguishable;
-  if (is_named && !is_certain) return "LIKELY CAUSES, NONE CERTAIN. Together these explain what the model lacks:";
+  constexpr const char* likely = "LIKELY CAUSES, NONE CERTAIN. Together these explain what the model lacks:";
+  if (is_named && !is_certain) return likely;
   switch (found.answer) {
     case discovery::Answer::nothing_missing:
       return "NOTHING MISSING. What the calibrated model leaves is noise as far as these poses can tell.";
     case discovery::Answer::named:
       return "NAMED. The model lacks:";
     case discovery::Answer::indistinguishable:
-      return "NAMED, BUT NOT ALONE. The model lacks the following; what stands behind \"or\" would do as well:";
+      return "NAMED, BUT NOT ALONE. The model lacks the following. Other causes explain the data equally well; they "
+             "stand behind \"instead it may be\":";
     case discovery::Answer::unknown:
       if (refused("outliers"))
         return "TOO MANY OUTLIERS. Neither an effect nor its absence can be told from these data.";
@@ -67,6 +69,9 @@ std::string headline(const Discovery& found) {
         return "UNKNOWN EFFECT. No candidate explains what is left, but it is not an instrument's noise.";
       if (std::ranges::any_of(found.effects, &FoundEffect::confirmed)) {
         return "NAMED IN PART. Beside what has a name, something is missing that the catalogue does not explain:";
+      }
+      if (!found.effects.empty()) {
+        return "LIKELY CAUSES, NONE CERTAIN. Beside them something is missing that the catalogue does not explain:";
       }
       return "UNKNOWN EFFECT. Something real is missing that the catalogue does not explain. It looks like this:";
   }
@@ -147,8 +152,9 @@ std::vector<Group> groups_of(const Discovery& found) {
   }
   for (const FoundEffect* effect : effects) {
     if (std::ranges::find(taken, effect) != taken.end()) continue;
-    const std::string kind = (effect->confirmed ? "" : "perhaps ") +
-                             std::string(effect->smaller ? "also, smaller: " : "") + kind_of(found, *effect);
+    const FoundEffect& whole = whole_of(found, *effect);
+    const std::string kind = (whole.confirmed ? "" : "perhaps ") + std::string(whole.smaller ? "also, smaller: " : "") +
+                             kind_of(found, whole);
     const auto same = std::ranges::find(groups, kind, &Group::kind);
     if (same == groups.end()) {
       groups.push_back({kind, {effect}});
@@ -183,7 +189,8 @@ std::vector<std::string> effect_sentences(const Discovery& found) {
     std::vector<std::string> places;
     std::vector<std::string> rivals;
     for (const FoundEffect* effect : group.members) {
-      places.push_back(place_of(*effect));
+      if (std::ranges::find(places, place_of(*effect)) == places.end()) places.push_back(place_of(*effect));
+      if (&whole_of(found, *effect) != effect) continue;  // what could replace a part is in the details
       for (std::size_t k = 0; k < effect->rivals.size(); ++k) {
         const std::string rival = rival_words(*effect, k);
         if (std::ranges::find(rivals, rival) == rivals.end()) rivals.push_back(rival);
@@ -196,8 +203,11 @@ std::vector<std::string> effect_sentences(const Discovery& found) {
       if (!values.empty() && values.size() < most_columns) text += ": " + values;
     }
     text += fmt::format("; {} the tool {:.4f} mm", group.small_waves ? "together they move" : "moves", group.rms_mm());
-    for (std::size_t k = 0; k < std::min<std::size_t>(2, rivals.size()); ++k) text += "; or " + rivals[k];
-    if (rivals.size() > 2) text += fmt::format("; or {} more", rivals.size() - 2);
+    constexpr std::size_t shown = 2;
+    for (std::size_t k = 0; k < std::min(shown, rivals.size()); ++k) {
+      text += (k == 0 ? "; instead it may be: " : "; or: ") + rivals[k];
+    }
+    if (rivals.size() > shown) text += fmt::format("; or one of {} more, see below", rivals.size() - shown);
     sentences.push_back(text);
   }
   return sentences;
@@ -251,9 +261,12 @@ std::vector<std::string> error_sentences(const Discovery& found) {
   }
   lines.push_back(
       held.floor_from_repeats
-          ? fmt::format("A perfect model would leave {:.4f} mm: the noise by the repeats.", held.floor_mm)
-          : fmt::format("There are too few repeats to know the noise: what is left, {:.4f} mm, was taken for it.",
-                        held.floor_mm));
+          ? fmt::format("A perfect model would still miss by {:.4f} mm: the noise, measured by repeated poses.",
+                        held.floor_mm)
+          : fmt::format(
+                "Too few poses were repeated to measure the noise. The error left on the fitted poses, {:.4f} mm, "
+                "was used as the noise.",
+                held.floor_mm));
   return lines;
 }
 
@@ -265,11 +278,12 @@ std::string advice(const Discovery& found) {
   if (is("noise"))
     return "Next: measure some poses several times, from both sides, and write their number into a column `pose`.";
   if (found.answer == discovery::Answer::indistinguishable) {
-    return "Next: use the improved description; the poses proposed below would tell the causes apart.";
+    return "Next: use the improved description near the measured poses. The last lines say whether further poses "
+           "would tell the causes apart.";
   }
   if (found.answer == discovery::Answer::named)
-    return "Next: use the improved description within the joint ranges that were measured.";
-  return "Next: the improved description holds maps and corrections only where poses were measured; use it there.";
+    return "Next: use the improved description within the measured joint ranges. Nothing beyond was checked.";
+  return "Next: use the improved description only near the measured poses. Elsewhere it may be no better.";
 }
 
 }  // namespace

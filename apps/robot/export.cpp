@@ -28,6 +28,9 @@ struct ExportArguments {
   bool c = false;
 };
 
+// What is that small is the rounding of sums and products.
+double without_rounding(double value, double smallest) { return std::abs(value) < smallest ? 0.0 : value; }
+
 // Of the joint's moving frame at zero.
 Eigen::Isometry3d joint_frame(const robotics::Chain& chain, const robotics::Skeleton& zero, std::size_t joint) {
   constexpr double radians = 0.017453292519943295;
@@ -49,8 +52,9 @@ std::string origin_text(const std::string& name, const Eigen::Isometry3d& pose) 
   const double roll = upright ? std::atan2(-r(1, 2), r(1, 1)) : std::atan2(r(2, 1), r(2, 2));
   const double yaw = upright ? 0.0 : std::atan2(r(1, 0), r(0, 0));
   const Eigen::Vector3d xyz = 0.001 * pose.translation();
-  return fmt::format("  {}: {{x: {}, y: {}, z: {}, roll: {}, pitch: {}, yaw: {}}}\n", name, xyz(0), xyz(1), xyz(2),
-                     roll, pitch, yaw);
+  const auto shown = [](double value) { return without_rounding(value, 1e-12); };  // m and rad
+  return fmt::format("  {}: {{x: {}, y: {}, z: {}, roll: {}, pitch: {}, yaw: {}}}\n", name, shown(xyz(0)),
+                     shown(xyz(1)), shown(xyz(2)), shown(roll), shown(pitch), shown(yaw));
 }
 
 std::string kinematics_yaml(const robotics::Chain& described) {
@@ -82,9 +86,10 @@ std::string deltas_csv(const robotics::Chain& chain, const robotics::Chain& nomi
   for (std::size_t j = 0; j < chain.joints.size(); ++j) {
     const robotics::Joint& now = chain.joints[j];
     const robotics::Joint& was = nominal.joints[j];
-    text += fmt::format("{},{},{},{},{},{},{}\n", now.name, now.theta_deg - was.theta_deg, now.d_mm - was.d_mm,
-                        now.a_mm - was.a_mm, now.b_mm - was.b_mm, now.alpha_deg - was.alpha_deg,
-                        now.beta_deg - was.beta_deg);
+    const auto delta = [](double here, double there) { return without_rounding(here - there, 1e-9); };
+    text += fmt::format("{},{},{},{},{},{},{}\n", now.name, delta(now.theta_deg, was.theta_deg),
+                        delta(now.d_mm, was.d_mm), delta(now.a_mm, was.a_mm), delta(now.b_mm, was.b_mm),
+                        delta(now.alpha_deg, was.alpha_deg), delta(now.beta_deg, was.beta_deg));
   }
   return text;
 }
@@ -111,16 +116,13 @@ void export_command(const ExportArguments& arguments) {
     export_c(arguments);
     return;
   }
-  const bool urdf = robotics::is_urdf(arguments.robot);
-  const robotics::Robot robot = robotics::read_robot(arguments.robot, urdf ? arguments.links : robotics::UrdfLinks{});
+  const robotics::Robot robot = robotics::read_robot(arguments.robot, links_for(arguments.robot, arguments.links, {}));
   std::string text;
   if (arguments.kinematics) {
     text = kinematics_yaml(robot.chain);
   } else {
-    const bool from_urdf = robotics::is_urdf(arguments.deltas_from);
-    text = deltas_csv(
-        robot.chain,
-        robotics::read_robot(arguments.deltas_from, from_urdf ? arguments.links : robotics::UrdfLinks{}).chain);
+    const robotics::UrdfLinks links = links_for(arguments.deltas_from, arguments.links, robot);
+    text = deltas_csv(robot.chain, robotics::read_robot(arguments.deltas_from, links).chain);
   }
   if (arguments.output.empty()) {
     print_bytes(text);
@@ -130,6 +132,12 @@ void export_command(const ExportArguments& arguments) {
   if (!robot.effects.empty() || !robot.correction_file.empty()) {
     warn("The table holds the geometry alone: effects and correction are left out; llmt-robot compensate has them");
   }
+  if (const std::string uncertain = uncertain_text(robot); !uncertain.empty()) {
+    warn(fmt::format(
+        "Uncertain values: {}. Calibration could not determine each of them alone, so do not take them for the true "
+        "ones. Load all values of the table into the controller, or none",
+        uncertain));
+  }
 }
 
 }  // namespace
@@ -137,7 +145,7 @@ void export_command(const ExportArguments& arguments) {
 void add_robot_export(CLI::App& app) {
   CLI::App* command = app.add_subcommand(
       "export",
-      "Write the geometry as controllers load it: poses of the joints, or changes of Denavit-Hartenberg parameters");
+      "Write the arm for a controller: poses of the joints, changes of Denavit-Hartenberg parameters, or C source");
   command->footer("Example: llmt-robot export calibrated.yaml --deltas robotics/robots/ur10.yaml -o deltas.csv");
   const auto arguments = std::make_shared<ExportArguments>();
   add_input_file(*command, "robot", arguments->robot, "Robot description (YAML or URDF)")->required();

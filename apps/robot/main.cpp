@@ -1,3 +1,6 @@
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <stdexcept>
 
 #include "llmt/robotics/robot_file.hpp"
@@ -19,6 +22,30 @@ llmt::robotics::Robot llmt::apps::read_description(const std::string& robot, con
 void llmt::apps::add_urdf_links(CLI::App& command, robotics::UrdfLinks& links) {
   command.add_option("--base-link", links.base, "Link of a URDF where the arm begins (default: the root)");
   command.add_option("--tip-link", links.tip, "Link of a URDF that is the tool (default: the end of the only chain)");
+}
+
+std::string llmt::apps::with_decimal_mark(std::string csv, DecimalMark mark) {
+  if (mark == DecimalMark::point) return csv;
+  std::ranges::replace(csv, ',', ';');
+  std::replace(csv.begin() + static_cast<std::ptrdiff_t>(csv.find('\n')), csv.end(), '.', ',');
+  return csv;
+}
+
+std::string llmt::apps::uncertain_text(const robotics::Robot& robot) {
+  const std::vector<discovery::Parameter> all = robotics::parameters(robot);
+  std::string text;
+  for (const robotics::IdentifiedParameter& one : robotics::uncertain_parameters(robot)) {
+    const auto known = std::ranges::find(all, one.name, &discovery::Parameter::name);
+    text +=
+        fmt::format("{}{} +-{} {}", text.empty() ? "" : ", ", one.name, number(*one.standard_error, 2), known->unit);
+  }
+  return text;
+}
+
+llmt::robotics::UrdfLinks llmt::apps::links_for(const std::string& path, const robotics::UrdfLinks& given,
+                                                const robotics::Robot& robot) {
+  if (!robotics::is_urdf(path)) return {};
+  return given.base.empty() && given.tip.empty() ? robot.urdf_links : given;
 }
 
 int main(int argc, char** argv) {

@@ -19,12 +19,13 @@ struct PredictArguments {
   robotics::UrdfLinks links;
   std::string poses;
   std::string output;
+  DecimalMark mark = DecimalMark::point;
 };
 
 void predict_command(const PredictArguments& arguments) {
   const robotics::CorrectedRobot robot = robotics::read_corrected_robot(arguments.robot, arguments.links);
   robotics::Measurements predicted;
-  predicted.poses = robotics::read_poses(arguments.poses, robot.robot);
+  predicted.poses = robotics::read_poses(arguments.poses, robot.robot, arguments.mark);
   check_positions(arguments.robot, robot.robot, predicted.poses);
   const std::vector<robotics::Pose> tools = robotics::tool_poses(robot, predicted.poses);
   predicted.positions_mm.resize(std::ssize(tools), 3);
@@ -34,7 +35,7 @@ void predict_command(const PredictArguments& arguments) {
     rotations.push_back(tools[i].rotation);
   }
   predicted.orientation = robotics::to_orientation(rotations, robot.robot.chain.orientation);
-  const std::string csv = robotics::to_csv(predicted, robot.robot);
+  const std::string csv = with_decimal_mark(robotics::to_csv(predicted, robot.robot), arguments.mark);
   if (arguments.output.empty()) {
     print_bytes(csv);
   } else {
@@ -60,6 +61,7 @@ void add_predict(CLI::App& app) {
   add_urdf_links(*command, arguments->links);
   add_input_file(*command, "poses", arguments->poses, "CSV file with joint values and the covariates of the effects")
       ->required();
+  add_decimal_comma(*command, arguments->mark);
   add_output_file(*command, "-o,--output", arguments->output, "CSV file to write (default: standard output)");
   command->callback([arguments] { predict_command(*arguments); });
 }

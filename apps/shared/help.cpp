@@ -176,6 +176,11 @@ std::string hint_on_extra_argument(const CLI::App& program, int argc, const char
         !option->get_option_text().empty()) {
       return fmt::format("; a value of {} is written {}={}", *before, *before, *word);
     }
+    const CLI::Option* const output = chosen.back()->get_option_no_throw("--output");
+    const bool is_flag = option != nullptr && option->get_items_expected_max() == 0;
+    if (before + 1 == word && is_flag && output != nullptr) {
+      return fmt::format("; {} takes no file: -o {} writes to it", *before, *word);
+    }
     if (before != argv && has_list && word - before >= 2) {
       return fmt::format("; several names are separated by commas: {} {},{}", *before, *(before + 1), *(before + 2));
     }

@@ -183,7 +183,7 @@ TEST(LlmtProgram, QueriesOutsideTheTrainingExtentAreFlagged) {
   EXPECT_TRUE(result.row_text(1).starts_with("in,2,2,0,0,"));
   EXPECT_NEAR(result.numbers("leverage")(0), 1.0 / 5.0 + 16.0 / 10.0, 1e-6);  // one leaf: 1/n + (x - mean)^2 / sum
   EXPECT_NEAR(result.numbers("leverage")(1), 1.0 / 5.0, 1e-6);
-  EXPECT_NE(predicted.err.find("1 rows lie outside"), std::string::npos);
+  EXPECT_NE(predicted.err.find("1 outside the range of the training rows"), std::string::npos);
 }
 
 TEST(LlmtProgram, MistakesHaveTheirExitCodeAndMessage) {

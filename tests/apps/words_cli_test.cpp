@@ -111,6 +111,9 @@ TEST(Words, ANameThatIsNotWrittenOutIsCompleted) {
   EXPECT_EQ(llmt::closest_name("out", names), "");  // two begin so
   EXPECT_EQ(llmt::closest_name("hu", names), "");   // too short
   EXPECT_EQ(llmt::closest_name("midity", names), "");
+  const std::vector<std::string> letters = {"x", "y"};
+  EXPECT_EQ(llmt::closest_name("Y", letters), "y");
+  EXPECT_EQ(llmt::closest_name("z", letters), "");
   const Folder folder;
   folder.write("d.csv", "humidity_percent,y\n1,2\n");
   EXPECT_EQ(refusal(folder, "fit d.csv -t y --ignore humid", 1),

@@ -35,7 +35,11 @@ std::string_view closest_name(std::string_view word, std::span<const std::string
   constexpr std::size_t longest = 200;           // beyond, nobody misspells
   constexpr std::size_t shortest_beginning = 3;  // of a name that was not written out
   std::string_view closest;
-  if (word.size() < 2 || word.size() > longest) return closest;
+  if (word.size() > longest) return closest;
+  for (const std::string& name : names) {
+    if (name.size() == word.size() && distance(word, name) == 0) return name;  // but for capitals
+  }
+  if (word.size() < 2) return closest;
   std::size_t most = std::max<std::size_t>(1, word.size() / 3);
   for (const std::string& name : names) {
     if (name.size() > word.size() + most || word.size() > name.size() + most) continue;

@@ -116,15 +116,54 @@ Found judged(const Chain& chain, const Inverse& inverse, const Goal& goal, Inver
   }
   const std::vector<std::size_t> limited = inverse.at_limits(best.q);
   if (!limited.empty()) return {best, Outcome::limit, "at the limit of " + joint_names(chain, limited)};
-  return {best, Outcome::unreachable, "the arm does not get there"};
+  return {best, Outcome::unreachable, "out of the arm's reach, or in a direction in which no joint moves the tool"};
+}
+
+// Distance in mm and angle in degrees.
+std::pair<double, double> distances_of(const Goal& goal, const Pose& pose) {
+  const Eigen::VectorXd error = missing(goal, pose, 1.0);
+  return {error.head(3).norm(), goal.rotation ? error.tail(3).norm() / radians : 0.0};
+}
+
+// Where two axes nearly coincide, as in a stretched wrist, the last hundredths of a degree of an orientation cost turns
+// of tens of degrees, or the search for them ends. If the position can be reached without them, it is, and the joint
+// that would turn most is held.
+std::optional<Found> without_large_turn(const Chain& chain, const Inverse& inverse, const Goal& goal,
+                                        const Eigen::VectorXd& start, const Inverse::Forward& forward,
+                                        const Inverse::Solution& exact) {
+  constexpr double large = 10.0 * radians;
+  constexpr double most_missed = 0.01;  // of the turn
+  constexpr double smaller = 0.25;
+  Eigen::Index joint = 0;
+  const double needed = (exact.q - start).cwiseAbs().maxCoeff(&joint);
+  const bool is_large = needed >= large && chain.joints[joint].type == JointType::revolute;
+  if (!goal.rotation || (exact.converged && !is_large)) return {};
+  const Inverse held = is_large ? inverse.holding(joint, start(joint)) : inverse;
+  const Eigen::VectorXd near = is_large ? held.solve(goal, start, forward).q : exact.q;
+  const Inverse::Solution there = held.solve({goal.position_mm, std::nullopt}, near, forward);
+  const double missed_deg = distances_of(goal, forward(there.q)).second;
+  const double turn = std::max(needed, large);
+  const bool is_still = (there.q - start).cwiseAbs().maxCoeff() < smaller * turn;
+  if (!there.converged || !is_still || missed_deg > most_missed * turn / radians) return {};
+  const std::string kept =
+      is_large ? fmt::format("{} is kept, it would turn by {:.2g} deg", chain.joints[joint].name, turn / radians)
+               : "the joints turn little";
+  return Found{there, Outcome::singular,
+               fmt::format("near a singular pose {}; the orientation misses by {:.2g} deg", kept, missed_deg)};
 }
 
 Found one_target(const Chain& chain, const Inverse& inverse, const Goal& goal, const Eigen::VectorXd& start,
                  const Inverse::Forward& forward) {
   Found found{.solution = inverse.solve(goal, start, forward), .outcome = Outcome::reached, .reason = ""};
-  if (!found.solution.converged) return judged(chain, inverse, goal, found.solution, forward);
+  const Eigen::VectorXd inside = inverse.within_limits(start);
+  const auto still = [&] { return without_large_turn(chain, inverse, goal, inside, forward, found.solution); };
+  if (!found.solution.converged) {
+    Found missed = judged(chain, inverse, goal, found.solution, forward);
+    return missed.outcome == Outcome::unreachable ? still().value_or(std::move(missed)) : missed;
+  }
+  if (std::optional<Found> kept = still()) return *std::move(kept);
   const bool turns = goal.rotation.has_value();
-  if (inverse.branch(found.solution.q, turns) * inverse.branch(inverse.within_limits(start), turns) < 0) {
+  if (inverse.branch(found.solution.q, turns) * inverse.branch(inside, turns) < 0) {
     found.outcome = Outcome::branch;
     found.reason = "a singular pose lies between the start and the command";
   }
@@ -139,7 +178,7 @@ std::string outside_of_training(const CorrectedRobot& robot, const Eigen::Vector
     if (q(j) >= seen.low && q(j) <= seen.high) continue;
     const bool turns = robot.robot.chain.joints[j].type == JointType::revolute;
     const double unit = turns ? radians : 1.0;
-    names.push_back(fmt::format("{} at {:.4g}, trained from {:.4g} to {:.4g} {}", robot.robot.chain.joints[j].name,
+    names.push_back(fmt::format("{} at {:.6g}, trained from {:.6g} to {:.6g} {}", robot.robot.chain.joints[j].name,
                                 q(j) / unit, seen.low / unit, seen.high / unit, turns ? "deg" : "mm"));
   }
   return fmt::format("{}", fmt::join(names, "; "));
@@ -163,16 +202,10 @@ void fill_directions(Eigen::VectorXd& direction, const Eigen::VectorXd& joint) {
   }
 }
 
-// Distance in mm and angle in degrees.
-std::pair<double, double> distances_of(const Goal& goal, const Pose& pose) {
-  const Eigen::VectorXd error = missing(goal, pose, 1.0);
-  return {error.head(3).norm(), goal.rotation ? error.tail(3).norm() / radians : 0.0};
-}
-
 }  // namespace
 
 std::string to_string(Outcome outcome) {
-  static const std::array<const char*, 5> names = {"reached", "jump", "limit", "unreachable", "branch"};
+  static const std::array<const char*, 6> names = {"reached", "jump", "limit", "unreachable", "branch", "singular"};
   return names.at(static_cast<std::size_t>(outcome));
 }
 

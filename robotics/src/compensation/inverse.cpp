@@ -53,6 +53,13 @@ std::vector<std::size_t> Inverse::at_limits(const Eigen::VectorXd& q) const {
   return joints;
 }
 
+Inverse Inverse::holding(std::size_t joint, double value) const {
+  Inverse held = *this;
+  held.low_(static_cast<Eigen::Index>(joint)) = value;
+  held.high_(static_cast<Eigen::Index>(joint)) = value;
+  return held;
+}
+
 Eigen::MatrixXd Inverse::scaled_jacobian(const Eigen::VectorXd& q, bool with_rotation) const {
   Eigen::MatrixXd jacobian = rigid_.joint_jacobian(q);
   jacobian.bottomRows(3) *= lever_mm_;

@@ -38,6 +38,9 @@ class Inverse {
   /// Of the joints that stand at a limit.
   std::vector<std::size_t> at_limits(const Eigen::VectorXd& q) const;
 
+  /// The same with one joint kept at a value.
+  Inverse holding(std::size_t joint, double value) const;
+
   /// Sign of the determinant of the square Jacobian; 0 for other shapes.
   int branch(const Eigen::VectorXd& q, bool with_rotation) const;
 

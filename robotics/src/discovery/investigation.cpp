@@ -243,13 +243,14 @@ void add_maps(Investigation& investigation, const DiscoveryOptions& options, Dis
   const std::optional<JointMaps> maps = fit_joint_maps(investigation.fitted.robot, kept);
   constexpr double convincing = 2.0;
   if (!maps || maps->gain_in_errors < convincing) {
-    result.notes.emplace_back("Free maps of the joints do not lower the error on poses left out.");
+    result.notes.emplace_back(
+        "Free maps of the joints (angle error over angle) would not lower the error on poses left out.");
     return;
   }
   result.maps = maps->effects;
-  result.notes.push_back(fmt::format(
-      "Free maps of {} joints, angle error against angle, lower the leave-one-out error from {:.4f} to {:.4f} mm.",
-      maps->effects.size(), maps->before.mean(), maps->after.mean()));
+  result.notes.push_back(
+      fmt::format("Free maps of {} joints (angle error over angle) were added: they lower the error on poses left out.",
+                  maps->effects.size()));
   investigation.apply(maps->effects);
   CalibrationOptions calibration = options.calibration;
   calibration.start_as_given = true;

@@ -190,8 +190,8 @@ Poses read_poses(const std::string& path, const Robot& robot, DecimalMark mark, 
   return poses;
 }
 
-TargetTable read_targets(const std::string& path, const Robot& robot) {
-  const Csv csv = Csv::read(path);
+TargetTable read_targets(const std::string& path, const Robot& robot, DecimalMark mark) {
+  const Csv csv = Csv::read(path, mark);
   const Header header(csv, robot, {});
   TargetTable targets;
   for (Eigen::Index row = 0; row < csv.rows(); ++row) targets.lines.push_back(csv.line_of(row));

@@ -107,6 +107,19 @@ Robot with_values(Robot robot, const Eigen::VectorXd& values) {
   return robot;
 }
 
+std::vector<IdentifiedParameter> uncertain_parameters(const Robot& robot) {
+  constexpr double most_mm = 0.5;
+  constexpr double most_deg = 0.1;
+  const std::vector<discovery::Parameter> all = geometric_parameters(robot.chain);
+  std::vector<IdentifiedParameter> uncertain;
+  for (const IdentifiedParameter& one : robot.identified) {
+    const auto known = std::ranges::find(all, one.name, &discovery::Parameter::name);
+    if (known == all.end() || !one.standard_error) continue;
+    if (*one.standard_error > (known->unit == "deg" ? most_deg : most_mm)) uncertain.push_back(one);
+  }
+  return uncertain;
+}
+
 Eigen::MatrixXd positions(const Robot& robot, const Poses& poses) {
   Eigen::MatrixXd result(poses.count(), 3);
   in_settings(robot, poses, [&](RobotEvaluator& evaluator, const Rows& rows) {

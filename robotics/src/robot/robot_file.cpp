@@ -258,7 +258,12 @@ Robot parse_robot(const std::string& text, const std::string& name) {
     robot.correction_file = correction.text("model");
     correction.finish({"model"});
   }
-  map.finish({"name", "convention", "gravity_m_s2", "orientation", "base", "tool", "bases", "tools", "payload",
+  if (map.has("urdf")) {
+    YamlMap urdf = map.map("urdf");
+    robot.urdf_links = {.base = urdf.text_or("base_link", ""), .tip = urdf.text_or("tip_link", "")};
+    urdf.finish({"base_link", "tip_link"});
+  }
+  map.finish({"name", "convention", "gravity_m_s2", "orientation", "urdf", "base", "tool", "bases", "tools", "payload",
               "joints", "effects", "identified", "calibration", "correction"});
   return robot;
 }
@@ -267,6 +272,7 @@ Robot read_robot(const std::string& path, const UrdfLinks& links) {
   if (is_urdf(path)) {
     Robot robot;
     robot.chain = read_urdf(path, links);
+    robot.urdf_links = links;
     return robot;
   }
   if (!links.base.empty() || !links.tip.empty()) {

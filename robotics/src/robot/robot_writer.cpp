@@ -141,6 +141,12 @@ std::string to_yaml(const Robot& robot) {
       .word("convention", chain.convention == Convention::dh ? "dh" : "mdh");
   out.numbers("gravity_m_s2", chain.gravity_m_s2);
   if (!chain.orientation.empty()) out.word("orientation", chain.orientation);
+  if (const UrdfLinks& links = robot.urdf_links; !links.base.empty() || !links.tip.empty()) {
+    out.key("urdf").begin_map();
+    if (!links.base.empty()) out.word("base_link", links.base);
+    if (!links.tip.empty()) out.word("tip_link", links.tip);
+    out.end_map();
+  }
   write_frame(out, "base", chain.base);
   write_frame(out, "tool", chain.tool);
   write_frames(out, "bases", chain.bases);

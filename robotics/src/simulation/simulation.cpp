@@ -129,7 +129,7 @@ Measurements simulate(const Robot& robot, const SimulationOptions& options) {
 
 Measurements simulate(const Robot& robot, Poses poses, const SimulationOptions& options) {
   validate(robot);
-  Random random(options.seed);
+  Random random(options.seed + 0xbf58476d1ce4e5b9U);  // not the stream that poses of the same seed were drawn from
   return measured(robot, std::move(poses), options, random);
 }
 

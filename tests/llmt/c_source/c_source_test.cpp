@@ -3,15 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstdlib>
-#include <filesystem>
-#include <fstream>
 #include <limits>
 #include <string>
 
 #include "llmt/c_source.hpp"
-#include "llmt/files.hpp"
 #include "llmt/fit.hpp"
+#include "oracles/compiled_c.hpp"
 #include "oracles/random_models.hpp"
 
 namespace {
@@ -40,36 +37,13 @@ std::string replaced(std::string text, const std::string& what, const std::strin
   return text;
 }
 
-class CSource : public testing::Test {
+class CSource : public oracle::CompiledC {
  protected:
-  void SetUp() override {
-    if (std::system("command -v cc >/dev/null") != 0) GTEST_SKIP() << "no C compiler";
-    folder_ = std::filesystem::path(testing::TempDir()) /
-              (std::string("c_source_") + testing::UnitTest::GetInstance()->current_test_info()->name());
-    std::filesystem::create_directories(folder_);
-  }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
-
   // What the exported model says of rows.
-  Eigen::MatrixXd run(const llmt::Model& model, const Eigen::MatrixXd& x) {
-    const llmt::CSource c = llmt::to_c(model, "tree", "tree.h");
-    llmt::write_file((folder_ / "tree.c").string(), c.source);
-    llmt::write_file((folder_ / "tree.h").string(), c.header);
-    llmt::write_file((folder_ / "main.c").string(),
-                     replaced(replaced(driver, "%INPUTS%", std::to_string(model.num_inputs())), "%OUTPUTS%",
-                              std::to_string(model.num_outputs())));
-    const std::string in = fmt::format("cd '{}' && ", folder_.string());
-    const std::string compile = in + "cc -std=c99 -O1 -Wall -Wextra -Werror -pedantic tree.c main.c -o tree -lm";
-    EXPECT_EQ(std::system(compile.c_str()), 0);
-    const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> rows = x;
-    std::ofstream(folder_ / "in", std::ios::binary)
-        .write(reinterpret_cast<const char*>(rows.data()), static_cast<std::streamsize>(rows.size() * sizeof(double)));
-    EXPECT_EQ(std::system((in + "./tree <in >out").c_str()), 0);
-    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> out(x.rows(), model.num_outputs());
-    out.setConstant(missing);
-    std::ifstream(folder_ / "out", std::ios::binary)
-        .read(reinterpret_cast<char*>(out.data()), static_cast<std::streamsize>(out.size() * sizeof(double)));
-    return out;
+  Eigen::MatrixXd run(const llmt::Model& model, const Eigen::MatrixXd& x) const {
+    const std::string with_inputs = replaced(driver, "%INPUTS%", std::to_string(model.num_inputs()));
+    const std::string main_text = replaced(with_inputs, "%OUTPUTS%", std::to_string(model.num_outputs()));
+    return run_c(llmt::to_c(model, "tree", "tree.h"), "tree", main_text, x, model.num_outputs());
   }
 
   // The bound is 0 units in the last place: both add in the same order. Gaussians rest on the same exp() here.
@@ -79,8 +53,6 @@ class CSource : public testing::Test {
     EXPECT_TRUE((expected.array() == found.array()).all())
         << name << ": " << (expected - found).cwiseAbs().maxCoeff() << " apart";
   }
-
-  std::filesystem::path folder_;
 };
 
 Eigen::MatrixXd queries(const Kind& kind, const llmt::Model& model) {

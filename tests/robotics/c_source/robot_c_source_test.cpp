@@ -4,19 +4,15 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include <cstdlib>
-#include <filesystem>
-#include <fstream>
-
-#include "llmt/files.hpp"
 #include "llmt/fit.hpp"
 #include "llmt/robotics/compensation.hpp"
+#include "oracles/compiled_c.hpp"
 #include "robotics/robots.hpp"
 
 namespace llmt::robotics {
 namespace {
 
-using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+using oracle::Rows;
 
 // A row in: conditions, joints, position, rotation; out: position and rotation at the joints, joints after twelve
 // steps.
@@ -35,32 +31,13 @@ int main(void) {{
 }}
 )";
 
-class RobotCSource : public testing::Test {
+class RobotCSource : public oracle::CompiledC {
  protected:
-  void SetUp() override {
-    if (std::system("command -v cc >/dev/null") != 0) GTEST_SKIP() << "no C compiler";
-    folder_ = std::filesystem::path(testing::TempDir()) /
-              (std::string("robot_c_") + testing::UnitTest::GetInstance()->current_test_info()->name());
-    std::filesystem::create_directories(folder_);
-  }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
-
-  Rows run(const CorrectedRobot& robot, const Rows& in) {
+  Rows run(const CorrectedRobot& robot, const Rows& in) const {
     const std::size_t conditions = c_conditions(robot.robot).size();
     const std::size_t joints = robot.robot.chain.joints.size();
-    const CSource c = to_c(robot, "arm", "arm.h");
-    write_file((folder_ / "arm.c").string(), c.source);
-    write_file((folder_ / "arm.h").string(), c.header);
-    write_file((folder_ / "main.c").string(), fmt::format(fmt::runtime(driver), conditions, joints));
-    const std::string at = fmt::format("cd '{}' && ", folder_.string());
-    EXPECT_EQ(std::system((at + "cc -std=c99 -O1 -Wall -Wextra -Werror -pedantic arm.c main.c -o arm -lm").c_str()), 0);
-    std::ofstream(folder_ / "in", std::ios::binary)
-        .write(reinterpret_cast<const char*>(in.data()), static_cast<std::streamsize>(in.size() * sizeof(double)));
-    EXPECT_EQ(std::system((at + "./arm <in >out").c_str()), 0);
-    Rows out = Rows::Constant(in.rows(), 12 + static_cast<Eigen::Index>(joints), 1e300);
-    std::ifstream(folder_ / "out", std::ios::binary)
-        .read(reinterpret_cast<char*>(out.data()), static_cast<std::streamsize>(out.size() * sizeof(double)));
-    return out;
+    return run_c(to_c(robot, "arm", "arm.h"), "arm", fmt::format(fmt::runtime(driver), conditions, joints), in,
+                 12 + static_cast<Eigen::Index>(joints));
   }
 
   // Asks for the poses of the nominal arm. Returns the largest difference in units in the last place of the reach.
@@ -89,8 +66,6 @@ class RobotCSource : public testing::Test {
     }
     return apart / (reach_of(robot.robot.chain) * std::numeric_limits<double>::epsilon());
   }
-
-  std::filesystem::path folder_;
 };
 
 Robot with_masses(Robot robot) {

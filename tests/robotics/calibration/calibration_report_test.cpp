@@ -203,5 +203,18 @@ TEST(Correction, OfAFileThatIsNoModelShowsNothingOfIt) {
   std::filesystem::remove_all(folder);
 }
 
+TEST(UncertainParameters, AreThoseThatThePosesDoNotDetermineAlone) {
+  Robot robot = ur_like();
+  EXPECT_TRUE(uncertain_parameters(robot).empty());
+  robot.identified = {{.name = "tool.z", .standard_error = 19.0, .state = "free"},
+                      {.name = "tool.x", .standard_error = 0.5, .state = "free"},
+                      {.name = "joint5.theta", .standard_error = 0.2, .state = "free"},
+                      {.name = "joint4.theta", .standard_error = 0.1, .state = "free"},
+                      {.name = "joint1.d", .standard_error = {}, .state = "free, not identifiable"}};
+  std::vector<std::string> names;
+  for (const IdentifiedParameter& one : uncertain_parameters(robot)) names.push_back(one.name);
+  EXPECT_EQ(names, (std::vector<std::string>{"tool.z", "joint5.theta"}));
+}
+
 }  // namespace
 }  // namespace llmt::robotics

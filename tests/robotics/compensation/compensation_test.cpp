@@ -194,6 +194,34 @@ TEST(Compensation, ATargetInTheGapOfAJumpIsSaidToBeOne) {
   EXPECT_GT(jumps, 0);
 }
 
+// Where axes 4 and 6 coincide an exact orientation costs them tens of degrees.
+TEST(Compensation, AStretchedWristKeepsItsJoints) {
+  const Robot nominal = mdh_like();
+  CorrectedRobot real{.robot = nominal, .correction = {}};
+  for (Joint& joint : real.robot.chain.joints) joint.alpha_deg += 0.02;
+  real.robot.chain.joints[1].theta_deg += 0.05;
+  Poses poses = random_poses(nominal.chain, 60, 21);
+  Random random(22);
+  for (Eigen::Index i = 0; i < poses.count(); ++i) {
+    poses.joints(i, 1) = random.uniform(-0.5, 0.5);
+    poses.joints(i, 2) = random.uniform(1.0, 2.0);  // the elbow bent
+    poses.joints(i, 4) = 0.001 * random.uniform(-1.0, 1.0);
+  }
+  const Targets targets = poses_of(nominal, poses);
+  const Compensation found = compensate(real, targets);
+  int kept = 0;
+  for (Eigen::Index i = 0; i < poses.count(); ++i) {
+    const double turned = (found.commands.joints.row(i) - poses.joints.row(i)).cwiseAbs().maxCoeff();
+    EXPECT_LT(turned, 10.5 * degree) << i << " " << to_string(found.outcomes[i]);
+    EXPECT_LT(found.after_deg(i), 0.2);
+    EXPECT_LT(found.after_mm(i), 1e-5);
+    if (found.outcomes[i] != Outcome::singular) continue;
+    ++kept;
+    EXPECT_NE(found.reasons[i].find("singular pose"), std::string::npos) << found.reasons[i];
+  }
+  EXPECT_GT(kept, 20);
+}
+
 TEST(Compensation, CommandsOutsideOfTheTrainingAreNamed) {
   const CorrectedRobot robot = with_jump(ur_like());
   Poses start = random_poses(robot.robot.chain, 2, 9);

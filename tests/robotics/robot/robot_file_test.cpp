@@ -180,5 +180,14 @@ TEST(RobotFile, SizesAreBounded) {
   EXPECT_LT(message.size(), 200U) << message;
 }
 
+TEST(RobotFile, RemembersTheLinksOfTheUrdfThatItCameFrom) {
+  Robot robot = ur_like();
+  EXPECT_EQ(to_yaml(robot).find("urdf"), std::string::npos);
+  robot.urdf_links = {.base = "base_link", .tip = "tool0"};
+  const Robot read = parse_robot(to_yaml(robot), "arm.yaml");
+  EXPECT_EQ(read.urdf_links.base, "base_link");
+  EXPECT_EQ(read.urdf_links.tip, "tool0");
+}
+
 }  // namespace
 }  // namespace llmt::robotics

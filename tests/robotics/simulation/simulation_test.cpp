@@ -41,5 +41,22 @@ TEST(Simulation, IsBoundedBeforeItsWork) {
   }
 }
 
+// Else the noise would be a function of the poses that the same seed had made.
+TEST(Simulation, NoiseAtGivenPosesIsNotDrawnFromTheStreamOfThePoses) {
+  Robot robot = ur_like();
+  for (Joint& joint : robot.chain.joints) joint.limits = {-180.0, 180.0};
+  const Poses poses = simulate(robot, {.poses = 200, .seed = 4}).poses;
+  const Measurements noisy = simulate(robot, poses, {.noise_um = 1000.0, .seed = 4});
+  const Eigen::VectorXd noise = (noisy.positions_mm - positions(robot, poses)).col(0);
+  Random same(4);
+  Eigen::VectorXd drawn(200);
+  for (double& value : drawn) {
+    value = same.normal();
+    same.normal();
+    same.normal();
+  }
+  EXPECT_LT(std::abs((noise.array() * drawn.array()).mean()), 0.3);
+}
+
 }  // namespace
 }  // namespace llmt::robotics

@@ -88,7 +88,7 @@ struct SolverResult {
   double condition_number = 1.0;  ///< of that matrix, on its identifiable part
   /// cond2(J'J) = (s1/sL)^2 on the identifiable part; J in the parameters' own units, without weights.
   double calibrability = 1.0;
-  Eigen::Index rank = 0;                                    ///< number of identifiable directions
+  Eigen::Index rank = 0;  ///< number of identifiable directions
   /// n - trace of the hat matrix of the data, rounded: n - rank without priors, and a prior that holds its parameter
   /// instead of the data gives one back.
   Eigen::Index dof = 0;

@@ -26,10 +26,11 @@ enum class Outcome {
   jump,         ///< the model jumps there, at a cut of the tree or a reversal of a load: the nearest side was taken
   limit,        ///< a joint would have to go beyond its limit
   unreachable,  ///< too far, or in a direction that no joint moves the tool in
-  branch        ///< reached, but on another branch than the start: a singular pose lies between
+  branch,       ///< reached, but on another branch than the start: a singular pose lies between
+  singular      ///< the position is reached; what the orientation misses would cost turns a hundred times as large
 };
 
-/// "reached", "jump", "limit", "unreachable", "branch".
+/// "reached", "jump", "limit", "unreachable", "branch", "singular".
 std::string to_string(Outcome outcome);
 
 struct CompensationOptions {
@@ -54,7 +55,9 @@ struct Compensation {
 /// the start, min |dq| so that J dq = e, damped (Levenberg-Marquardt) where a full step does not lessen |e|. Effects
 /// and correction are in e, and change little with q, so each step gains about three digits. Joints that a target
 /// leaves free (positions only, more joints than needed) stay as near to q0 as they can. Joints at their limits are
-/// left out while they would go beyond; limits hold exactly, of the start as well. Fewer than six joints cannot set an
+/// left out while they would go beyond; limits hold exactly, of the start as well. A joint that would turn by more than
+/// 10 degrees is kept at q0 if the position can be reached so, with a quarter of the turn, and an orientation that
+/// misses by at most a hundredth of it (Outcome::singular). Fewer than six joints cannot set an
 /// orientation: the rotations are then not used.
 ///
 /// The columns that the effects need and the start does not have are made up by with_approach() and

@@ -144,7 +144,7 @@ struct TargetTable {
 
 /// Reads targets: columns as for read_measurements(), but either joints or positions may be absent; positions need all
 /// of x, y and z. Throws as read_measurements().
-TargetTable read_targets(const std::string& path, const Robot& robot);
+TargetTable read_targets(const std::string& path, const Robot& robot, DecimalMark mark = DecimalMark::point);
 
 /// Adds how far each joint moved to reach a pose: columns move1_rad (_mm if prismatic), ..., differences of joint
 /// values to the row before in the sequence of the column order, or else time_s; 0 in the first row. Nothing without

@@ -32,6 +32,11 @@ std::vector<discovery::Parameter> parameters(const Robot& robot);
 /// The robot with those values, in the order of parameters().
 Robot with_values(Robot robot, const Eigen::VectorXd& values);
 
+/// The identified lengths and angles with a standard error above 0.5 mm or 0.1 degrees. The measured poses do not
+/// determine each of these alone: other values, changed together, give the same positions there. Empty before
+/// calibration.
+std::vector<IdentifiedParameter> uncertain_parameters(const Robot& robot);
+
 /// What an instrument would read, n x 3, mm: tool positions in the world frame, or what Poses::observations say.
 /// Throws std::invalid_argument if the number of joints does not match, a column that an effect needs is missing, or an
 /// observation names a base or tool that the chain does not have.

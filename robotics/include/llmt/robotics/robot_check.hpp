@@ -1,7 +1,7 @@
 /// \file
 /// Whether a calibrated robot is still good, and what of it moved.
 ///
-///     const RobotCheck check = check_robot(robot, measured);
+///     const RobotCheck check = check_robot({robot, {}}, measured);
 ///     if (!check.still_good && !check.moved.empty()) std::puts(check.moved[0].name.c_str());
 #pragma once
 

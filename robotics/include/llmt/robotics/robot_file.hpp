@@ -18,6 +18,7 @@ namespace llmt::robotics {
 ///     convention: mdh                # dh | mdh, see llmt::robotics::Convention
 ///     gravity_m_s2: [0, 0, -9.81]    # in the base frame; optional
 ///     orientation: intrinsic_xyz     # of rx, ry, rz in measurement files; optional
+///     urdf: {base_link: base, tip_link: tool0}          # of the URDF that the arm was taken from; optional
 ///     base: {xyz_mm: [0, 0, 0], rpy_deg: [0, 0, 0]}     # T_world_base, optional
 ///     tool: {xyz_mm: [0, 0, 90], rpy_deg: [0, 0, 0]}    # T_flange_tool, optional
 ///     payload: {mass_kg: 10, com_mm: [0, 0, 0]}         # in the tool frame, optional

@@ -14,6 +14,7 @@
 
 #include "llmt/abi.hpp"
 #include "llmt/robotics/effect_type.hpp"
+#include "llmt/robotics/urdf.hpp"
 
 namespace llmt::robotics {
 
@@ -41,6 +42,7 @@ struct Robot {
   std::vector<IdentifiedParameter> identified;        ///< empty before calibration
   std::optional<CalibrationRecord> calibration = {};  ///< of the values identified
   std::string correction_file;                        ///< model file of the residual correction, or empty
+  UrdfLinks urdf_links = {};                          ///< given when the arm was taken from a URDF
 };
 
 /// Which three coordinates an instrument reads of an arm.
