@@ -49,15 +49,21 @@ TEST(Doubts, PayloadsInGramsAreGuessed) {
   EXPECT_TRUE(mentions(discover(arm(), measurements, {}, {.correct = false}), "is it in grams?"));
 }
 
+// Noise puts one effect in twenty beyond two standard errors of nothing: three or more of ten are left unsaid in one
+// test of ninety.
 TEST(Doubts, AnEffectThatTheDataDenyIsNamed) {
   Robot described = soft(arm());
   described.effects.push_back({"backlash_approach", "joint1", {1e-4}});
-  Measurements measurements = simulate(described, {.poses = 120, .noise_um = 15.0, .seed = 3});
-  Robot truth = soft(arm());
-  measurements.positions_mm = simulate(truth, measurements.poses, {.noise_um = 15.0, .seed = 30}).positions_mm;
-  const Discovery found = discover(described, measurements, {}, {.correct = false});
-  EXPECT_TRUE(mentions(found, "The description has backlash_approach@joint1, but these poses put it at nothing"));
-  EXPECT_FALSE(mentions(found, "The description has joint_compliance"));
+  const Robot truth = soft(arm());
+  int said = 0;
+  for (std::uint64_t seed = 30; seed < 40; ++seed) {
+    Measurements measurements = simulate(described, {.poses = 120, .noise_um = 15.0, .seed = 3});
+    measurements.positions_mm = simulate(truth, measurements.poses, {.noise_um = 15.0, .seed = seed}).positions_mm;
+    const Discovery found = discover(described, measurements, {}, {.correct = false});
+    said += mentions(found, "The description has backlash_approach@joint1, but these poses put it at nothing") ? 1 : 0;
+    EXPECT_FALSE(mentions(found, "The description has joint_compliance"));
+  }
+  EXPECT_GE(said, 8);
 }
 
 TEST(Doubts, TestPosesBeyondTheJointRangesSearchedAreCounted) {
