@@ -18,6 +18,7 @@ void add_monotone(CLI::App& study);
 void add_odes(CLI::App& study);
 void add_poses(CLI::App& study);
 void add_pruning(CLI::App& study);
+void add_readings(CLI::App& study);
 void add_repeats(CLI::App& study);
 void add_sets(CLI::App& study);
 void add_srbench(CLI::App& study);
