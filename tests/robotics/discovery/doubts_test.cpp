@@ -54,10 +54,16 @@ TEST(Doubts, AnEffectThatTheDataDenyIsNamed) {
   described.effects.push_back({"backlash_approach", "joint1", {1e-4}});
   Measurements measurements = simulate(described, {.poses = 120, .noise_um = 15.0, .seed = 3});
   Robot truth = soft(arm());
-  measurements.positions_mm = simulate(truth, measurements.poses, {.noise_um = 15.0, .seed = 30}).positions_mm;
-  const Discovery found = discover(described, measurements, {}, {.correct = false});
-  EXPECT_TRUE(mentions(found, "The description has backlash_approach@joint1, but these poses put it at nothing"));
-  EXPECT_FALSE(mentions(found, "The description has joint_compliance"));
+  // Within two standard errors: so it is with 95 of 100 draws of the noise.
+  int named = 0;
+  for (std::uint64_t seed = 30; seed < 38; ++seed) {
+    measurements.positions_mm = simulate(truth, measurements.poses, {.noise_um = 15.0, .seed = seed}).positions_mm;
+    const Discovery found = discover(described, measurements, {}, {.correct = false});
+    const char* const denied = "The description has backlash_approach@joint1, but these poses put it at nothing";
+    named += mentions(found, denied) ? 1 : 0;
+    EXPECT_FALSE(mentions(found, "The description has joint_compliance")) << seed;
+  }
+  EXPECT_GE(named, 6);
 }
 
 TEST(Doubts, TestPosesBeyondTheJointRangesSearchedAreCounted) {
