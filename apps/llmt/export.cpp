@@ -21,7 +21,7 @@ struct ExportArguments {
 };
 
 void export_command(const ExportArguments& arguments) {
-  if (!arguments.c) throw std::invalid_argument("llmt export: --c is the only language there is, and must be given");
+  if (!arguments.c) throw std::invalid_argument("--c is the only language there is, and must be given");
   if (!is_c_identifier(arguments.name)) {
     throw std::invalid_argument(fmt::format("--name: \"{}\" must be an identifier of C of at most 31 characters",
                                             without_controls(arguments.name)));

@@ -111,7 +111,7 @@ void export_c(const ExportArguments& arguments) {
 void export_command(const ExportArguments& arguments) {
   const int wanted = static_cast<int>(arguments.kinematics) + static_cast<int>(!arguments.deltas_from.empty()) +
                      static_cast<int>(arguments.c);
-  if (wanted != 1) throw std::invalid_argument("llmt-robot export: give one of --c, --kinematics and --deltas");
+  if (wanted != 1) throw std::invalid_argument("give one of --c, --kinematics and --deltas");
   if (arguments.c) {
     export_c(arguments);
     return;
