@@ -113,12 +113,9 @@ void calibrate_command(CalibrateArguments arguments) {
   }
   std::string reports;
   if (arguments.reports.wanted()) {
-    const robotics::Measurements points = robotics::orientation_rows(measurements.poses).empty()
-                                              ? measurements
-                                              : select(measurements, robotics::position_rows(measurements.poses));
-    reports =
-        write_reports(arguments.reports, report::calibration_report({arguments.robot, arguments.data, nominal, points,
-                                                                     report, arguments.options, facts.suspicions}));
+    reports = write_reports(arguments.reports, report::calibration_report({arguments.robot, arguments.data, nominal,
+                                                                           points_of(measurements), report,
+                                                                           arguments.options, facts.suspicions}));
   }
   if (arguments.json) {
     print_json(calibration_json(facts));

@@ -128,7 +128,7 @@ void discover_command(DiscoverArguments arguments) {
   std::string reports;
   if (arguments.reports.wanted()) {
     reports = write_reports(arguments.reports,
-                            report::discovery_report({arguments.robot, arguments.data, data, found, next}));
+                            report::discovery_report({arguments.robot, arguments.data, points_of(data), found, next}));
   }
   if (arguments.json) {
     Json json = discovery_json(found);

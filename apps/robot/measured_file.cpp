@@ -52,6 +52,11 @@ std::string counts_of(const robotics::Measurements& measurements) {
   return text;
 }
 
+robotics::Measurements points_of(const robotics::Measurements& measurements) {
+  if (robotics::orientation_rows(measurements.poses).empty()) return measurements;
+  return robotics::select(measurements, robotics::position_rows(measurements.poses));
+}
+
 std::string use_of_orientations(const robotics::Measurements& measurements) {
   if (measurements.orientation.values.size() == 0 || !robotics::orientation_rows(measurements.poses).empty()) return "";
   return "The file has orientations. Only the positions are used; --orientations uses both.\n";

@@ -26,6 +26,9 @@ robotics::Measurements read_measured(const std::string& path, const robotics::Ro
 /// "60 poses", or "60 poses, 180 points of 3 targets, 2 sessions".
 std::string counts_of(const robotics::Measurements& measurements);
 
+/// The readings that are no orientations: what reports show.
+robotics::Measurements points_of(const robotics::Measurements& measurements);
+
 /// What orientations of the file are used for, as a line; empty if there are none.
 std::string use_of_orientations(const robotics::Measurements& measurements);
 
