@@ -44,7 +44,9 @@ TEST(Readings, AColumnMapReadsTheTableOfAnotherProgram) {
       return text.substr(std::min(text.find("\"errors\""), text.size()));
     };
     EXPECT_EQ(figures(mapped.out), figures(plain.out)) << command;
-    if (command == "discover") EXPECT_EQ(mapped.out, plain.out);
+    if (command == "discover") {
+      EXPECT_EQ(mapped.out, plain.out);
+    }
   }
   folder.write("columns.yaml", "columns: {K1: q1_rad}\n");
   const Outcome wrong =
