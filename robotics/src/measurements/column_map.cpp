@@ -1,5 +1,6 @@
 #include "llmt/files.hpp"
 #include "llmt/robotics/measurements.hpp"
+#include "llmt/robotics/orientation.hpp"
 #include "yaml/yaml_reader.hpp"
 
 namespace llmt::robotics {
@@ -12,9 +13,13 @@ ColumnMap parse_column_map(const std::string& text, const std::string& name) {
     if (decimal != "comma" && decimal != "point") map.refuse("decimal", "\"decimal\" must be comma or point");
     columns.decimal = decimal == "comma" ? DecimalMark::comma : DecimalMark::point;
   }
+  columns.orientation = map.text_or("orientation", "");
+  if (!columns.orientation.empty() && !is_orientation(columns.orientation)) {
+    map.refuse("orientation", "\"orientation\" must be intrinsic_ or extrinsic_ and three axes, as intrinsic_xyz");
+  }
   YamlMap names = map.map("columns");
   for (const std::string& column : names.keys()) columns.names[column] = names.text(column);
-  map.finish({"decimal", "columns"});
+  map.finish({"decimal", "orientation", "columns"});
   return columns;
 }
 

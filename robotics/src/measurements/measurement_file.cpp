@@ -161,6 +161,7 @@ Measurements from_csv(const Csv& csv, const Robot& robot, const std::vector<std:
   measurements.poses = select(rows, kept);
   measurements.poses.observations = observations_of(csv, header, robot, rows, seen);
   measurements.orientation = header.orientation();
+  measurements.orientation.convention = map.orientation;
   if (measurements.orientation.values.size() != 0) {
     measurements.orientation.values = Eigen::MatrixXd(measurements.orientation.values(kept, Eigen::all));
   }

@@ -15,6 +15,7 @@ Measurements select(const Measurements& measurements, const std::vector<Eigen::I
   chosen.positions_mm = measurements.positions_mm(rows, Eigen::all);
   chosen.measured = measurements.measured;
   chosen.orientation.kind = measurements.orientation.kind;
+  chosen.orientation.convention = measurements.orientation.convention;
   if (measurements.orientation.values.size() != 0) {
     chosen.orientation.values = measurements.orientation.values(rows, Eigen::all);
   }

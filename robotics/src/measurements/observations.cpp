@@ -49,7 +49,9 @@ Measurements with_orientations(const Measurements& measurements, const Chain& ch
     refuse("positions need all of x, y and z where orientations are fitted, too");
   }
   const Eigen::Index n = measurements.count();
-  const std::vector<Eigen::Matrix3d> rotations = rotations_of(measurements.orientation, chain.orientation);
+  const std::vector<Eigen::Matrix3d> rotations = rotations_of(
+      measurements.orientation,
+      measurements.orientation.convention.empty() ? chain.orientation : measurements.orientation.convention);
   std::vector<Eigen::Index> twice;
   for (int part = 0; part < 2; ++part) {
     for (Eigen::Index row = 0; row < n; ++row) twice.push_back(row);

@@ -52,7 +52,7 @@ std::vector<Eigen::Matrix3d> rotations_of(const Orientation& orientation, const 
   if (angles && !is_orientation(convention)) {
     throw std::invalid_argument(
         fmt::format("llmt::robotics::rotations_of: orientation is \"{}\" in the robot description; rx, ry, rz need "
-                    "intrinsic_xyz, extrinsic_xyz or another order of the axes there",
+                    "intrinsic_xyz, extrinsic_xyz or another order of the axes there or in a column map",
                     convention));
   }
   std::vector<Eigen::Matrix3d> rotations;

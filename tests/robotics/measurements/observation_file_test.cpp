@@ -107,6 +107,7 @@ TEST(ObservationFile, ColumnMapNamesColumnsAndUnits) {
     }
     return std::string();
   };
+  EXPECT_TRUE(message("orientation: xyz\ncolumns: {}\n").starts_with("map:1:"));
   EXPECT_TRUE(message("decimal: dot\ncolumns: {}\n").starts_with("map:1:"));
   EXPECT_TRUE(message("columns: {}\nseparator: x\n").starts_with("map:"));
 }

@@ -24,7 +24,8 @@ namespace llmt::robotics {
 struct Orientation {
   enum class Kind { angles_deg, quaternion };
   Kind kind = Kind::angles_deg;
-  Eigen::MatrixXd values;  ///< n x 3: rx, ry, rz in degrees; or n x 4: w, x, y, z
+  Eigen::MatrixXd values;       ///< n x 3: rx, ry, rz in degrees; or n x 4: w, x, y, z
+  std::string convention = {};  ///< of the angles, e.g. "intrinsic_xyz"; empty: that of the chain
 };
 
 /// n readings of an instrument.
@@ -86,9 +87,11 @@ Eigen::VectorXd distances(const Eigen::MatrixXd& model_mm, const Measurements& m
 struct ColumnMap {
   std::map<std::string, std::string> names = {};  ///< name in the file -> name as for read_measurements(), with unit
   std::optional<DecimalMark> decimal = {};
+  std::string orientation = {};  ///< convention of rx, ry, rz; empty: that of the robot's description
 };
 
-/// Reads a column map: YAML with `columns`, a map of names, and optionally `decimal`, comma or point.
+/// Reads a column map: YAML with `columns`, a map of names, and optionally `decimal`, comma or point, and
+/// `orientation`, see is_orientation().
 ///
 ///     decimal: comma
 ///     columns: {shoulder: q1_rad, "Measured x": x_mm}
