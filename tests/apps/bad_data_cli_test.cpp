@@ -1,18 +1,17 @@
 // Tables that cannot be learned from: each message has file, line and column, and the exit code is that of data.
 #include <fmt/format.h>
 
-#include "apps/program.hpp"
+#include "apps/programs.hpp"
 #include "llmt/random.hpp"
 
 namespace {
 
 using program::Folder;
+using program::llmt_program;
 using program::Outcome;
 
-const std::string llmt_program = LLMT_PROGRAM;
-
 // The message that `llmt ARGUMENTS` refuses d.csv with.
-std::string refusal(const Folder& folder, const std::string& text, const std::string& arguments) {
+std::string refusal_of(const Folder& folder, const std::string& text, const std::string& arguments) {
   folder.write("d.csv", text);
   const Outcome outcome = folder.run(llmt_program + " " + arguments);
   EXPECT_EQ(outcome.exit_code, 1) << arguments << ": " << outcome.err;
@@ -21,7 +20,7 @@ std::string refusal(const Folder& folder, const std::string& text, const std::st
 }
 
 // 30 rows of a, b, w, y, of which row 5 (line 6) is another one.
-std::string table(const std::string& odd_row) {
+std::string table_with(const std::string& odd_row) {
   std::string text = "a,b,w,y\n";
   for (int i = 1; i <= 30; ++i) text += i == 5 ? odd_row + "\n" : fmt::format("{},{},{},{}\n", i, i % 7, 1, 2 * i);
   return text;
@@ -32,7 +31,7 @@ TEST(BadData, MagnitudesBeyondTheLargestAreNamed) {
   const std::string fit = "fit d.csv -t y --weight w";
   for (const std::string stream : {"", " --stream"}) {
     const auto refused = [&](const std::string& row, const std::string& message) {
-      EXPECT_EQ(refusal(folder, table(row), fit + stream), "llmt: d.csv:6: column " + message + "\n") << stream;
+      EXPECT_EQ(refusal_of(folder, table_with(row), fit + stream), "llmt: d.csv:6: column " + message + "\n") << stream;
     };
     refused("1e151,1,1,1", "\"a\": 1e+151 is beyond 1e+150, the largest magnitude to learn from");
     refused("1,-1e308,1,1", "\"b\": -1e+308 is beyond 1e+150, the largest magnitude to learn from");
@@ -40,15 +39,15 @@ TEST(BadData, MagnitudesBeyondTheLargestAreNamed) {
     refused("1,1,1e308,1", "\"w\": 1e+308 is beyond 1e+150, the largest magnitude to learn from");
     refused("1,1,-3,1", "\"w\": a weight must not be negative, it is -3");
   }
-  EXPECT_EQ(refusal(folder, table("1e71,1,1,1"), "fit d.csv -t y --local-models quadratic"),
+  EXPECT_EQ(refusal_of(folder, table_with("1e71,1,1,1"), "fit d.csv -t y --local-models quadratic"),
             "llmt: d.csv:6: column \"a\": 1e+71 is beyond 1e+70, the largest magnitude to learn from\n");
-  EXPECT_EQ(refusal(folder, table("1e151,1,1,1"), "compare d.csv -t y --cv 2"),
+  EXPECT_EQ(refusal_of(folder, table_with("1e151,1,1,1"), "compare d.csv -t y --cv 2"),
             "llmt: d.csv:6: column \"a\": 1e+151 is beyond 1e+150, the largest magnitude to learn from\n");
 }
 
 TEST(BadData, LabelsOfCategoriesMayBeAnyNumber) {
   const Folder folder;
-  folder.write("d.csv", table("1e200,1,1,1"));
+  folder.write("d.csv", table_with("1e200,1,1,1"));
   const Outcome outcome = folder.run(llmt_program + " fit d.csv -t y --categorical a --cv 0");
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
 }
@@ -59,7 +58,7 @@ TEST(BadData, ColumnsWhoseSquaresVanishAreNamed) {
   for (int i = 1; i <= 30; ++i) text += fmt::format("{},{}\n", i * 5e-324, i);
   for (const std::string stream : {"", " --stream"}) {
     EXPECT_EQ(
-        refusal(folder, text, "fit d.csv -t y" + stream),
+        refusal_of(folder, text, "fit d.csv -t y" + stream),
         "llmt: d.csv:31: column \"x\": the largest magnitude of the column is 1.5e-322, so that squares vanish: at "
         "least 1e-140 is needed, by another unit\n")
         << stream;
@@ -70,34 +69,34 @@ TEST(BadData, WeightsThatAreAllZeroAreNamed) {
   const Folder folder;
   std::string text = "x,w,y\n";
   for (int i = 1; i <= 30; ++i) text += fmt::format("{},0,{}\n", i, i);
-  EXPECT_EQ(refusal(folder, text, "fit d.csv -t y --weight w"), "llmt: d.csv: column \"w\": every weight is 0\n");
+  EXPECT_EQ(refusal_of(folder, text, "fit d.csv -t y --weight w"), "llmt: d.csv: column \"w\": every weight is 0\n");
 }
 
 TEST(BadData, TooManyCategoriesAreNamed) {
   const Folder folder;
   std::string text = "word,x,y\n";
   for (int i = 0; i <= 10000; ++i) text += fmt::format("w{},{},{}\n", i, i % 5, i % 3);
-  EXPECT_EQ(refusal(folder, text, "fit d.csv -t y"),
+  EXPECT_EQ(refusal_of(folder, text, "fit d.csv -t y"),
             "llmt: d.csv:10002: column \"word\": more than 10000 categories (--ignore COLUMN leaves a column out)\n");
 }
 
 TEST(BadData, AColumnOfInfinityIsNoColumnOfWords) {
   const Folder folder;
-  EXPECT_EQ(refusal(folder, "a,x,y\ninf,1,2\n,2,3\n1e400,3,4\n", "fit d.csv -t y"),
+  EXPECT_EQ(refusal_of(folder, "a,x,y\ninf,1,2\n,2,3\n1e400,3,4\n", "fit d.csv -t y"),
             "llmt: d.csv:2: column \"a\": 'inf' is not finite (--ignore COLUMN leaves a column out)\n");
 }
 
 TEST(BadData, TextThatIsNotUtf8IsNamedBeforeTheWork) {
   const Folder folder;
-  EXPECT_EQ(refusal(folder, "gr\xF6sse,y\n1,2\n2,3\n", "fit d.csv -t y --json"),
+  EXPECT_EQ(refusal_of(folder, "gr\xF6sse,y\n1,2\n2,3\n", "fit d.csv -t y --json"),
             "llmt: d.csv:1: the name of column 1 of the header is not UTF-8\n");
-  EXPECT_EQ(refusal(folder, "c,y\na,2\n\xF6,3\nb,4\n", "fit d.csv -t y --json"),
+  EXPECT_EQ(refusal_of(folder, "c,y\na,2\n\xF6,3\nb,4\n", "fit d.csv -t y --json"),
             "llmt: d.csv:3: column \"c\": the cell is not UTF-8\n");
-  EXPECT_EQ(refusal(folder, std::string("\xFF\xFE", 2) + std::string("x\0,\0y\0\n\0", 8), "fit d.csv -t y"),
+  EXPECT_EQ(refusal_of(folder, std::string("\xFF\xFE", 2) + std::string("x\0,\0y\0\n\0", 8), "fit d.csv -t y"),
             "llmt: d.csv: this is UTF-16 or no text at all, UTF-8 is needed\n");
-  EXPECT_EQ(refusal(folder, std::string("x,y\n1,2\na\0b,3\n", 14), "fit d.csv -t y"),
+  EXPECT_EQ(refusal_of(folder, std::string("x,y\n1,2\na\0b,3\n", 14), "fit d.csv -t y"),
             "llmt: d.csv:3: column \"x\": 'a\\0b' is not a number (--ignore COLUMN leaves a column out)\n");
-  folder.write("d\xF6.csv", table("1,1,1,1"));
+  folder.write("d\xF6.csv", table_with("1,1,1,1"));
   const Outcome named = folder.run(llmt_program + " fit d\xF6.csv -t y --cv 0 --json");
   EXPECT_EQ(named.exit_code, 0) << named.err;
   EXPECT_NE(named.out.find("d\xEF\xBF\xBD.csv"), std::string::npos) << named.out;
@@ -112,7 +111,7 @@ TEST(BadData, EndlessInputsAreRefused) {
   };
   refused("fit /dev/zero -t y", "/dev/zero: cannot be read: no line ends within 16 MiB");
   refused("fit /dev/zero -t y --stream", "/dev/zero:1: no row ends within 16 MiB (is a quote left open?)");
-  folder.write("d.csv", table("1,1,1,1"));
+  folder.write("d.csv", table_with("1,1,1,1"));
   refused("discover d.csv d.csv --target y --terms /dev/zero",
           "/dev/zero: cannot be read: it holds more than 16 MiB, the most that is read");
 }

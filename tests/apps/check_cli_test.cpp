@@ -5,14 +5,14 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "apps/program.hpp"
+#include "apps/programs.hpp"
 
 namespace {
 
 using program::Folder;
 using program::Outcome;
+using program::robot_program;
 
-const std::string robot_program = LLMT_ROBOT_PROGRAM;
 const std::string samples = std::string(LLMT_ROOT) + "/docs/samples/";
 
 void calibrate_sample(const Folder& folder) {

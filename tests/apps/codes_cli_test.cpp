@@ -4,7 +4,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "apps/program.hpp"
+#include "apps/programs.hpp"
 #include "llmt/csv.hpp"
 #include "llmt/random.hpp"
 
@@ -12,12 +12,11 @@ namespace {
 
 using nlohmann::json;
 using program::Folder;
+using program::llmt_program;
 using program::Outcome;
 
-const std::string llmt_program = LLMT_PROGRAM;
-
 // 240 rows. `side` is 1 ... 8, also written 1.0 or 1e0; its effect has no order.
-std::string table() {
+std::string coded_table() {
   const double of_side[] = {0.0, 2.0, -1.5, 1.0, -2.0, 1.5, -0.5, 0.8};
   const char* endings[] = {"", ".0", "e0"};
   llmt::Random random(1);
@@ -33,7 +32,7 @@ std::string table() {
 
 TEST(Codes, AreFoundToldAndPredictedByNumber) {
   const Folder folder;
-  folder.write("t.csv", table());
+  folder.write("t.csv", coded_table());
   const Outcome fitted = folder.run(llmt_program + " fit t.csv -t y -o m.json --json");
   ASSERT_EQ(fitted.exit_code, 0) << fitted.err;
   const json codes = json::parse(fitted.out)["codes"];
@@ -60,7 +59,7 @@ TEST(Codes, AreFoundToldAndPredictedByNumber) {
 
 TEST(Codes, AreExplainedAndInspected) {
   const Folder folder;
-  folder.write("t.csv", table());
+  folder.write("t.csv", coded_table());
   ASSERT_EQ(folder.run(llmt_program + " fit t.csv -t y -o m.json --readable --json").exit_code, 0);
   const Outcome explained = folder.run(llmt_program + " explain m.json t.csv --row 2 --json");
   ASSERT_EQ(explained.exit_code, 0) << explained.err;

@@ -6,23 +6,24 @@
 #include <chrono>
 #include <nlohmann/json.hpp>
 
-#include "apps/program.hpp"
+#include "apps/programs.hpp"
 
 namespace {
 
 using program::Folder;
 using program::Outcome;
+using program::robot_program;
+using program::sample_arm;
 
-const std::string robot_program = LLMT_ROBOT_PROGRAM;
-const std::string nominal = std::string(LLMT_ROOT) + "/docs/samples/arm.yaml";
 const std::string real_arm = std::string(LLMT_ROOT) + "/docs/samples/arm_true.yaml";
 
 TEST(CompensateProgram, CommandsForANominalProgramReachItAndPredictSaysSo) {
   const Folder folder;
-  ASSERT_EQ(folder.run(fmt::format("{} simulate {} --poses 300 -o program.csv", robot_program, nominal)).exit_code, 0);
+  ASSERT_EQ(folder.run(fmt::format("{} simulate {} --poses 300 -o program.csv", robot_program, sample_arm)).exit_code,
+            0);
   folder.run("cut -d, -f1-6 program.csv > joints.csv");
-  const Outcome run = folder.run(
-      fmt::format("{} compensate {} joints.csv --nominal {} -o commands.csv --json", robot_program, real_arm, nominal));
+  const Outcome run = folder.run(fmt::format("{} compensate {} joints.csv --nominal {} -o commands.csv --json",
+                                             robot_program, real_arm, sample_arm));
   const nlohmann::json summary = nlohmann::json::parse(run.out);
   EXPECT_EQ(summary["targets"], 300);
   EXPECT_GE(summary["outcomes"]["reached"].get<int>() + summary["outcomes"]["singular"].get<int>(), 285) << run.err;
@@ -61,7 +62,7 @@ TEST(CompensateProgram, DegreesInAColumnOfRadiansAreSuspected) {
   const Folder folder;
   folder.write("joints.csv", "q1_rad,q2_rad,q3_rad,q4_rad,q5_rad,q6_rad\n10,-60,70,20,30,40\n");
   const Outcome run =
-      folder.run(fmt::format("{} compensate {} joints.csv --nominal {}", robot_program, real_arm, nominal));
+      folder.run(fmt::format("{} compensate {} joints.csv --nominal {}", robot_program, real_arm, sample_arm));
   EXPECT_NE(run.err.find("are the units in the column names right (_rad, _deg)?"), std::string::npos) << run.err;
 }
 
@@ -70,7 +71,7 @@ TEST(CompensateProgram, DecimalCommasAreReadAndWritten) {
   folder.write("p.csv", "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n10.5,-60,70,20,30,40\n");
   folder.write("c.csv", "q1_deg;q2_deg;q3_deg;q4_deg;q5_deg;q6_deg\n10,5;-60;70;20;30;40\n");
   for (const std::string& command :
-       {"predict " + real_arm + " {}", "compensate " + real_arm + " {} --nominal " + nominal}) {
+       {"predict " + real_arm + " {}", "compensate " + real_arm + " {} --nominal " + sample_arm}) {
     const auto run = [&](const std::string& table) {
       return folder.run(robot_program + " " + fmt::format(fmt::runtime(command), table));
     };
@@ -113,7 +114,7 @@ TEST(CompensateProgram, ACalibratedArmRemembersTheLinksOfItsUrdf) {
 
 TEST(ExportProgram, RoundingIsZeroAndUncertainValuesAreNamed) {
   const Folder folder;
-  std::string text = llmt::read_file(nominal);
+  std::string text = llmt::read_file(sample_arm);
   folder.write("arm.yaml",
                text + "\nidentified:\n  - {parameter: tool.z, state: free, standard_error: 19, unit: mm}\n");
   const Outcome poses = folder.run(robot_program + " export arm.yaml --kinematics");
@@ -128,9 +129,9 @@ TEST(ExportProgram, RoundingIsZeroAndUncertainValuesAreNamed) {
 TEST(CompensateProgram, TakesTenThousandTargets) {
   const Folder folder;
   folder.run(fmt::format("{} simulate {} --poses 10000 -o all.csv && cut -d, -f1-6 all.csv > joints.csv", robot_program,
-                         nominal));
-  const Outcome run = folder.run(
-      fmt::format("{} compensate {} joints.csv --nominal {} -o commands.csv --json", robot_program, real_arm, nominal));
+                         sample_arm));
+  const Outcome run = folder.run(fmt::format("{} compensate {} joints.csv --nominal {} -o commands.csv --json",
+                                             robot_program, real_arm, sample_arm));
   const nlohmann::json summary = nlohmann::json::parse(run.out);
   EXPECT_EQ(summary.at("targets"), 10000);
   EXPECT_GT(summary.at("outcomes").at("reached").get<int>() + summary.at("outcomes").at("singular").get<int>(), 9700);

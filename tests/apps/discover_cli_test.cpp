@@ -16,20 +16,20 @@ using program::Outcome;
 
 const std::string discover = LLMT_PROGRAM " discover ";
 
-struct Row {
+struct Inputs {
   double t;
   double a;
   double b;
 };
 
 // Writes s.csv and m.csv: y = 3 + 2 a - 4 b simulated, `hidden` and normal noise of 0.05 in what was measured.
-void write_tables(const Folder& folder, int rows, const std::function<double(const Row&)>& hidden,
+void write_tables(const Folder& folder, int rows, const std::function<double(const Inputs&)>& hidden,
                   std::uint64_t seed = 1) {
   llmt::Random random(seed);
   std::string simulated = "t,a,b,y\n";
   std::string measured = "note,t,a,b,y\n";
   for (int i = 0; i < rows; ++i) {
-    const Row row{0.5 * i, random.uniform(-2.0, 5.0), random.uniform()};
+    const Inputs row{0.5 * i, random.uniform(-2.0, 5.0), random.uniform()};
     const double y = 3.0 + 2.0 * row.a - 4.0 * row.b;
     simulated += fmt::format("{},{},{},{}\n", row.t, row.a, row.b, y);
     measured += fmt::format("row {},{},{},{},{}\n", i, row.t, row.a, row.b, y + hidden(row) + 0.05 * random.normal());
@@ -38,7 +38,7 @@ void write_tables(const Folder& folder, int rows, const std::function<double(con
   folder.write("m.csv", measured);
 }
 
-double step_and_settling(const Row& row) { return (row.a > 3.2 ? 0.3 : 0.0) + 0.5 * std::exp(-row.t / 12.0); }
+double step_and_settling(const Inputs& row) { return (row.a > 3.2 ? 0.3 : 0.0) + 0.5 * std::exp(-row.t / 12.0); }
 
 double parameter(const json& effect, const std::string& name, const std::string& field = "value") {
   for (const json& entry : effect["parameters"]) {
@@ -95,7 +95,7 @@ TEST(LlmtDiscover, NamesWhatIsMissingAndCorrectsIt) {
 
 TEST(LlmtDiscover, NothingMissingSaysWhatWouldHaveBeenSeen) {
   const Folder folder;
-  write_tables(folder, 100, [](const Row&) { return 0.0; });
+  write_tables(folder, 100, [](const Inputs&) { return 0.0; });
   const Outcome text = folder.run(discover + "s.csv m.csv --target y");
   EXPECT_EQ(text.exit_code, 0);
   EXPECT_NE(text.out.find("nothing is missing that these rows could show"), std::string::npos) << text.out;
@@ -109,7 +109,7 @@ TEST(LlmtDiscover, NothingMissingSaysWhatWouldHaveBeenSeen) {
 
 TEST(LlmtDiscover, OwnTermsAreTriedUnderTheirNames) {
   const Folder folder;
-  write_tables(folder, 200, [](const Row& row) { return 0.4 * std::sqrt(row.b) * std::sin(row.a); });
+  write_tables(folder, 200, [](const Inputs& row) { return 0.4 * std::sqrt(row.b) * std::sin(row.a); });
   folder.write("terms.txt",
                "# what we suspect\nslip = sqrt(b) * sin(a)   # per load\nheat = b^2 * t\nlinear_b = 2 * b\n");
   const json report = json::parse(folder.run(discover + "s.csv m.csv --target y --terms terms.txt --json").out);
@@ -125,7 +125,7 @@ TEST(LlmtDiscover, OwnTermsAreTriedUnderTheirNames) {
 
 TEST(LlmtDiscover, WhatNoTermExplainsIsUnknown) {
   const Folder folder;
-  write_tables(folder, 200, [](const Row& row) { return 0.4 * std::tanh(1.5 * (row.a - 1.3)); });
+  write_tables(folder, 200, [](const Inputs& row) { return 0.4 * std::tanh(1.5 * (row.a - 1.3)); });
   const json report = json::parse(folder.run(discover + "s.csv m.csv --target y --json").out);
   EXPECT_EQ(report["verdict"], "unknown effect");
   EXPECT_EQ(report["unknown"]["acts_on"], "y");
@@ -136,7 +136,7 @@ TEST(LlmtDiscover, WhatNoTermExplainsIsUnknown) {
 
 TEST(LlmtDiscover, TheSimulationMayAdjustItself) {
   const Folder folder;
-  write_tables(folder, 150, [](const Row& row) { return 0.7 + 0.02 * (3.0 + 2.0 * row.a - 4.0 * row.b); });
+  write_tables(folder, 150, [](const Inputs& row) { return 0.7 + 0.02 * (3.0 + 2.0 * row.a - 4.0 * row.b); });
   const std::string command = discover + "s.csv m.csv --target y --json";
   EXPECT_EQ(json::parse(folder.run(command).out)["effects"].size(), 2U);
   const json adjusted = json::parse(folder.run(command + " --allow offset,scale").out);
@@ -197,7 +197,7 @@ TEST(LlmtDiscover, SeveralOutputsInDifferentUnits) {
 
 TEST(LlmtDiscover, OddDataHaveASaneVerdict) {
   const Folder folder;
-  write_tables(folder, 100, [](const Row&) { return 0.0; });
+  write_tables(folder, 100, [](const Inputs&) { return 0.0; });
   const json same = json::parse(folder.run(discover + "s.csv s.csv --target y --json").out);
   EXPECT_EQ(same["verdict"], "nothing missing");
   EXPECT_EQ(same["gap"]["before"], 0.0);

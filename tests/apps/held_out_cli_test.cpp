@@ -4,7 +4,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "apps/program.hpp"
+#include "apps/programs.hpp"
 #include "llmt/csv.hpp"
 #include "llmt/fit.hpp"
 #include "llmt/random.hpp"
@@ -13,9 +13,8 @@ namespace {
 
 using nlohmann::json;
 using program::Folder;
+using program::llmt_program;
 using program::Outcome;
-
-const std::string llmt_program = LLMT_PROGRAM;
 
 // `rows` rows: y = |a| + b / 2 + normal noise of 0.05.
 std::string kinked(int rows, int seed) {

@@ -3,17 +3,16 @@
 
 #include <nlohmann/json.hpp>
 
-#include "apps/program.hpp"
+#include "apps/programs.hpp"
 
 namespace {
 
 using nlohmann::json;
 using program::Folder;
+using program::llmt_program;
 using program::Outcome;
 
-const std::string llmt_program = LLMT_PROGRAM;
-
-std::string table(const std::string& input, const std::string& category, const std::string& target) {
+std::string table_of_words(const std::string& input, const std::string& category, const std::string& target) {
   std::string text = input + ",kind," + target + "\n";
   for (int i = 0; i < 40; ++i) {
     text += fmt::format("{},{},{}\n", i, i % 2 == 0 ? "red" : i > 20 ? category : "green", i * i % 17);
@@ -24,10 +23,10 @@ std::string table(const std::string& input, const std::string& category, const s
 TEST(HostileTables, NamesThatAreNotUtf8AreRefusedBeforeTheFit) {
   const Folder folder;
   const std::string latin = "h\xF6he";
-  folder.write("name.csv", table(latin, "blue", "y"));
-  folder.write("target.csv", table("x", "blue", latin));
-  folder.write("level.csv", table("x", latin, "y"));
-  folder.write("unused.csv", table(latin, "blue", "y"));
+  folder.write("name.csv", table_of_words(latin, "blue", "y"));
+  folder.write("target.csv", table_of_words("x", "blue", latin));
+  folder.write("level.csv", table_of_words("x", latin, "y"));
+  folder.write("unused.csv", table_of_words(latin, "blue", "y"));
   for (const char* options : {"", "--json", "-o m.json", "--stream --ignore kind"}) {
     const Outcome name = folder.run(llmt_program + " fit name.csv -t y " + options);
     EXPECT_EQ(name.exit_code, 1);
@@ -42,7 +41,7 @@ TEST(HostileTables, NamesThatAreNotUtf8AreRefusedBeforeTheFit) {
 
 TEST(HostileTables, TheNameOfAFileMayBeAnything) {
   const Folder folder;
-  folder.write("t\xF6.csv", table("x", "blue", "y"));
+  folder.write("t\xF6.csv", table_of_words("x", "blue", "y"));
   const Outcome fitted = folder.run(llmt_program + " fit t\xF6.csv -t y --cv 0 --json");
   EXPECT_EQ(fitted.exit_code, 0) << fitted.err;
   EXPECT_TRUE(json::accept(fitted.out));

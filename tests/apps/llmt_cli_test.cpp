@@ -4,7 +4,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "apps/program.hpp"
+#include "apps/programs.hpp"
 #include "llmt/csv.hpp"
 #include "llmt/fit.hpp"
 #include "llmt/random.hpp"
@@ -13,12 +13,11 @@ namespace {
 
 using nlohmann::json;
 using program::Folder;
+using program::llmt_program;
 using program::Outcome;
 
-const std::string llmt_program = LLMT_PROGRAM;
-
 // 300 rows: y has a kink in `a`, z is affine, `label` is words.
-std::string table() {
+std::string labelled_table() {
   llmt::Random random(1);
   std::string text = "label,a,b,y,z\n";
   for (int i = 0; i < 300; ++i) {
@@ -58,7 +57,7 @@ std::string bent() {
 
 TEST(LlmtProgram, OutliersAreNamedRefusedAndLeftOut) {
   const Folder folder;
-  std::string text = table();
+  std::string text = labelled_table();
   const std::size_t third_line = text.find("row 1,");
   const std::size_t value = text.rfind(',', text.rfind(',', text.find('\n', third_line)) - 1) + 1;
   const auto with = [&](const char* written) {
@@ -109,7 +108,7 @@ TEST(LlmtProgram, LocalModelsAreQuadraticAndSparseWhereAsked) {
 
 TEST(LlmtProgram, FitPredictInspectAgreeWithTheLibrary) {
   const Folder folder;
-  const llmt::Csv csv = llmt::Csv::read(folder.write("d.csv", table()));
+  const llmt::Csv csv = llmt::Csv::read(folder.write("d.csv", labelled_table()));
   const Outcome fitted = folder.run(llmt_program + " fit d.csv --target y --target z --ignore label -o m.json --json");
   ASSERT_EQ(fitted.exit_code, 0) << fitted.err;
   EXPECT_EQ(fitted.err, "");
@@ -155,7 +154,7 @@ TEST(LlmtProgram, FitPredictInspectAgreeWithTheLibrary) {
 
 TEST(LlmtProgram, RetiredOptionsSayWhyAndWhatToUse) {
   const Folder folder;
-  folder.write("d.csv", table());
+  folder.write("d.csv", labelled_table());
   const auto refusal = [&](const std::string& arguments) {
     const Outcome outcome = folder.run(llmt_program + " " + arguments);
     EXPECT_EQ(outcome.exit_code, 2) << arguments;
@@ -188,7 +187,7 @@ TEST(LlmtProgram, QueriesOutsideTheTrainingExtentAreFlagged) {
 
 TEST(LlmtProgram, MistakesHaveTheirExitCodeAndMessage) {
   const Folder folder;
-  folder.write("d.csv", table());
+  folder.write("d.csv", labelled_table());
   folder.write("h.csv", "a,y\n");
   folder.write("cut.csv", "a,y\n1,2\n3");
   folder.write("word.csv", "a,b,y\n1,2,3\n4,x,6\n7,8,9\n");
@@ -298,7 +297,7 @@ TEST(LlmtProgram, AFailedWriteKeepsTheOldModel) {
 
 TEST(LlmtProgram, SameBytesWhateverTheThreads) {
   const Folder folder;
-  folder.write("d.csv", table());
+  folder.write("d.csv", labelled_table());
   for (const char* threads : {"1", "2", "8"}) {
     ASSERT_EQ(folder
                   .run(fmt::format("{} fit d.csv -t y,z --ignore label --threads {} -o m{}.json", llmt_program, threads,

@@ -4,15 +4,14 @@
 
 #include <filesystem>
 
-#include "apps/program.hpp"
+#include "apps/programs.hpp"
 #include "llmt/random.hpp"
 
 namespace {
 
 using program::Folder;
+using program::llmt_program;
 using program::Outcome;
-
-const std::string llmt_program = LLMT_PROGRAM;
 
 std::string line(int rows) {
   llmt::Random random(1);

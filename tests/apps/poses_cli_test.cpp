@@ -4,18 +4,17 @@
 
 #include <nlohmann/json.hpp>
 
-#include "apps/program.hpp"
+#include "apps/programs.hpp"
 
 namespace {
 
 using program::Folder;
 using program::Outcome;
-
-const std::string robot_program = LLMT_ROBOT_PROGRAM;
-const std::string arm = std::string(LLMT_ROOT) + "/docs/samples/arm.yaml";
+using program::robot_program;
+using program::sample_arm;
 
 Outcome poses(const Folder& folder, const std::string& arguments) {
-  return folder.run(fmt::format("{} poses {} {}", robot_program, arm, arguments));
+  return folder.run(fmt::format("{} poses {} {}", robot_program, sample_arm, arguments));
 }
 
 TEST(PosesProgram, WritesPosesThatSimulateAndCalibrateTake) {
@@ -26,10 +25,10 @@ TEST(PosesProgram, WritesPosesThatSimulateAndCalibrateTake) {
                             "joint6.alpha", "Written: poses.csv"}) {
     EXPECT_NE(run.out.find(words), std::string::npos) << words << "\n" << run.out;
   }
-  EXPECT_EQ(
-      folder.run(fmt::format("{} simulate {} --poses-from poses.csv -o measured.csv", robot_program, arm)).exit_code,
-      0);
-  const Outcome fit = folder.run(fmt::format("{} calibrate {} measured.csv --folds 0", robot_program, arm));
+  EXPECT_EQ(folder.run(fmt::format("{} simulate {} --poses-from poses.csv -o measured.csv", robot_program, sample_arm))
+                .exit_code,
+            0);
+  const Outcome fit = folder.run(fmt::format("{} calibrate {} measured.csv --folds 0", robot_program, sample_arm));
   EXPECT_EQ(fit.exit_code, 0) << fit.err;
   EXPECT_NE(fit.out.find("27 parameters identified"), std::string::npos) << fit.out;
 }
@@ -47,7 +46,7 @@ TEST(PosesProgram, JsonSaysWhatIsExpectedAndNoChoiceBeatsTheBound) {
 TEST(PosesProgram, ChoosesFromCandidatesAndAddsToMeasuredPoses) {
   const Folder folder;
   folder.run(fmt::format("{} simulate {} --poses 60 -o all.csv && {} simulate {} --poses 10 --seed 2 -o some.csv",
-                         robot_program, arm, robot_program, arm));
+                         robot_program, sample_arm, robot_program, sample_arm));
   const Outcome run = poses(folder, "--count 15 --from all.csv --measured some.csv --use all.csv -o poses.csv");
   EXPECT_EQ(run.exit_code, 0) << run.err;
   EXPECT_NE(run.out.find("beside the 10 measured ones"), std::string::npos) << run.out;

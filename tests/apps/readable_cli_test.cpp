@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "apps/program.hpp"
+#include "apps/programs.hpp"
 #include "llmt/csv.hpp"
 #include "llmt/random.hpp"
 
@@ -16,9 +16,8 @@ namespace {
 
 using nlohmann::json;
 using program::Folder;
+using program::llmt_program;
 using program::Outcome;
-
-const std::string llmt_program = LLMT_PROGRAM;
 
 // A row of a table: numbers, and words.
 struct Row {
@@ -42,7 +41,7 @@ std::vector<Row> rows() {
   return result;
 }
 
-std::string table(const std::vector<Row>& rows) {
+std::string text_of(const std::vector<Row>& rows) {
   std::string text = "a,b,colour,e,y\n";
   for (const Row& row : rows) {
     text += fmt::format("{},{},{},{},{}\n", row.numbers.at("a"), row.numbers.at("b"), row.words.at("colour"),
@@ -185,7 +184,7 @@ class PrintedRules {
 TEST(ReadableProgram, WhatIsPrintedIsWhatIsPredicted) {
   const Folder folder;
   const std::vector<Row> data = rows();
-  folder.write("d.csv", table(data));
+  folder.write("d.csv", text_of(data));
   for (const char* terms : {"linear", "quadratic"}) {
     const Outcome fitted = folder.run(fmt::format(
         "{} fit d.csv -t y -o m.json --validity crisp --local-models {} --readable=2 --json", llmt_program, terms));
@@ -206,7 +205,7 @@ TEST(ReadableProgram, WhatIsPrintedIsWhatIsPredicted) {
 
 TEST(ReadableProgram, TheFileIsAnOrdinaryModelAndTheSummarySaysWhatEachCosts) {
   const Folder folder;
-  folder.write("d.csv", table(rows()));
+  folder.write("d.csv", text_of(rows()));
   const Outcome fitted = folder.run(llmt_program + " fit d.csv -t y -o m.json --readable --cv 3");
   ASSERT_EQ(fitted.exit_code, 0) << fitted.err;
   for (const char* text :
@@ -224,7 +223,7 @@ TEST(ReadableProgram, TheFileIsAnOrdinaryModelAndTheSummarySaysWhatEachCosts) {
 
 TEST(ReadableProgram, WrongUseIsRefusedBeforeTheWork) {
   const Folder folder;
-  folder.write("d.csv", table(rows()));
+  folder.write("d.csv", text_of(rows()));
   const auto refused = [&](const std::string& arguments, const std::string& message) {
     const Outcome outcome = folder.run(llmt_program + " fit d.csv -t y " + arguments);
     EXPECT_EQ(outcome.exit_code, 2) << arguments << outcome.err;
@@ -254,7 +253,7 @@ TEST(ReadableProgram, ARowAloneLeavesNoneToHoldOut) {
 
 TEST(ReadableProgram, RulesOfABlendAreRefusedAndOfOtherTreesSayWhatTheyLeaveOut) {
   const Folder folder;
-  folder.write("d.csv", table(rows()));
+  folder.write("d.csv", text_of(rows()));
   ASSERT_EQ(folder.run(llmt_program + " fit d.csv -t y -o blend.json --validity blend --cv 3").exit_code, 0);
   const Outcome blend = folder.run(llmt_program + " inspect blend.json --rules");
   EXPECT_EQ(blend.exit_code, 1);

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "apps/program.hpp"
+#include "apps/programs.hpp"
 #include "llmt/files.hpp"
 
 namespace {
@@ -12,14 +12,13 @@ namespace {
 using llmt::read_file;
 using program::Folder;
 using program::Outcome;
-
-const std::string robot_program = LLMT_ROBOT_PROGRAM;
-const std::string arm = LLMT_ROOT "/docs/samples/arm.yaml";
-const std::string measured = LLMT_ROOT "/docs/samples/arm_measured.csv";
+using program::robot_program;
+using program::sample_arm;
+using program::sample_measured;
 
 // The sample as another program may write it: semicolons, decimal commas, other names, metres.
 std::string exported() {
-  std::string text = read_file(measured);
+  std::string text = read_file(sample_measured);
   const std::size_t end = text.find('\n');
   std::string body = text.substr(end);
   for (char& c : body) c = c == ',' ? ';' : c == '.' ? ',' : c;
@@ -35,9 +34,10 @@ TEST(Readings, AColumnMapReadsTheTableOfAnotherProgram) {
   folder.write("exported.csv", exported());
   folder.write("columns.yaml", columns);
   for (const std::string command : {"calibrate", "discover"}) {
-    const Outcome plain = folder.run(fmt::format("{} {} {} {} --json", robot_program, command, arm, measured));
-    const Outcome mapped =
-        folder.run(fmt::format("{} {} {} exported.csv --columns columns.yaml --json", robot_program, command, arm));
+    const Outcome plain =
+        folder.run(fmt::format("{} {} {} {} --json", robot_program, command, sample_arm, sample_measured));
+    const Outcome mapped = folder.run(
+        fmt::format("{} {} {} exported.csv --columns columns.yaml --json", robot_program, command, sample_arm));
     EXPECT_EQ(mapped.exit_code, 0) << mapped.err;
     // What calibrate prints begins with the names of the files.
     const auto figures = [](const std::string& text) {
@@ -50,25 +50,26 @@ TEST(Readings, AColumnMapReadsTheTableOfAnotherProgram) {
   }
   folder.write("columns.yaml", "columns: {K1: q1_rad}\n");
   const Outcome wrong =
-      folder.run(fmt::format("{} calibrate {} exported.csv --columns columns.yaml", robot_program, arm));
+      folder.run(fmt::format("{} calibrate {} exported.csv --columns columns.yaml", robot_program, sample_arm));
   EXPECT_EQ(wrong.exit_code, 1);
   EXPECT_NE(wrong.err.find("exported.csv:1: there is no column \"K1\""), std::string::npos) << wrong.err;
 }
 
 TEST(Readings, TheVerdictComesFirstAndQualityOnRequest) {
   const Folder folder;
-  const Outcome plain = folder.run(fmt::format("{} calibrate {} {}", robot_program, arm, measured));
+  const Outcome plain = folder.run(fmt::format("{} calibrate {} {}", robot_program, sample_arm, sample_measured));
   EXPECT_NE(plain.out.find("\nCalibrated: the mean position error falls from "), std::string::npos) << plain.out;
   EXPECT_EQ(plain.out.find("observability"), std::string::npos);
-  const Outcome more = folder.run(fmt::format("{} calibrate {} {} --quality", robot_program, arm, measured));
+  const Outcome more =
+      folder.run(fmt::format("{} calibrate {} {} --quality", robot_program, sample_arm, sample_measured));
   for (const char* part : {"each pose left out in turn", "observability: O1", "Would more poses help?", "geometry"}) {
     EXPECT_NE(more.out.find(part), std::string::npos) << part << "\n" << more.out;
   }
-  std::string few = read_file(measured);
+  std::string few = read_file(sample_measured);
   std::size_t end = 0;
   for (int line = 0; line < 10; ++line) end = few.find('\n', end) + 1;
   folder.write("few.csv", few.substr(0, end));
-  const Outcome too_few = folder.run(fmt::format("{} calibrate {} few.csv --folds 3", robot_program, arm));
+  const Outcome too_few = folder.run(fmt::format("{} calibrate {} few.csv --folds 3", robot_program, sample_arm));
   const std::size_t warning = too_few.out.find("\nWARNING: ");
   EXPECT_LT(warning, too_few.out.find("parameter ")) << too_few.out;
   EXPECT_EQ(too_few.out.find("Calibrated:"), std::string::npos) << too_few.out;
@@ -76,25 +77,26 @@ TEST(Readings, TheVerdictComesFirstAndQualityOnRequest) {
 
 TEST(Readings, RobustNamesTheLinesThatItLeavesOut) {
   const Folder folder;
-  std::string text = read_file(measured);
+  std::string text = read_file(sample_measured);
   std::size_t begin = 0;
   for (int line = 1; line < 12; ++line) begin = text.find('\n', begin) + 1;
   const std::size_t end = text.find('\n', begin);
   const std::size_t last = text.rfind(',', end);
   text.replace(last + 1, end - last - 1, "0.5");
   folder.write("lost.csv", text);
-  const Outcome outcome = folder.run(fmt::format("{} calibrate {} lost.csv --robust", robot_program, arm));
+  const Outcome outcome = folder.run(fmt::format("{} calibrate {} lost.csv --robust", robot_program, sample_arm));
   EXPECT_NE(outcome.out.find("more than four times as far off as the median: line 12\n"), std::string::npos)
       << outcome.out;
 }
 
 TEST(Readings, APriorHoldsItsParameter) {
   const Folder folder;
-  const Outcome held =
-      folder.run(fmt::format("{} calibrate {} {} --prior joint2.a=1e-6 --json", robot_program, arm, measured));
+  const Outcome held = folder.run(
+      fmt::format("{} calibrate {} {} --prior joint2.a=1e-6 --json", robot_program, sample_arm, sample_measured));
   EXPECT_EQ(held.exit_code, 0) << held.err;
   for (const std::string prior : {"joint2.a", "joint2.a=x", "joint2.a=-1", "joint9.a=1"}) {
-    const Outcome wrong = folder.run(fmt::format("{} calibrate {} {} --prior {}", robot_program, arm, measured, prior));
+    const Outcome wrong =
+        folder.run(fmt::format("{} calibrate {} {} --prior {}", robot_program, sample_arm, sample_measured, prior));
     EXPECT_EQ(wrong.exit_code, 2) << prior << wrong.err;
     EXPECT_NE(wrong.err.find(prior.substr(0, 8)), std::string::npos) << wrong.err;
   }
@@ -102,7 +104,8 @@ TEST(Readings, APriorHoldsItsParameter) {
 
 TEST(Readings, OrientationsNeedToBeInTheFile) {
   const Folder folder;
-  const Outcome none = folder.run(fmt::format("{} calibrate {} {} --orientations", robot_program, arm, measured));
+  const Outcome none =
+      folder.run(fmt::format("{} calibrate {} {} --orientations", robot_program, sample_arm, sample_measured));
   EXPECT_EQ(none.exit_code, 1);
   EXPECT_NE(none.err.find("no orientation was measured"), std::string::npos) << none.err;
 }

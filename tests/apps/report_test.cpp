@@ -25,15 +25,15 @@ Json data_of(const std::string& page) {
   return Json::parse(page.substr(begin, page.rfind("</script>") - begin));
 }
 
-struct Table {
+struct Sample {
   Eigen::MatrixXd inputs;
   Eigen::MatrixXd outputs;
 };
 
 // A slope and a jump, with noise.
-Table jumping(Eigen::Index rows) {
+Sample jumping(Eigen::Index rows) {
   llmt::Random random(7);
-  Table table{Eigen::MatrixXd(rows, 2), Eigen::MatrixXd(rows, 1)};
+  Sample table{Eigen::MatrixXd(rows, 2), Eigen::MatrixXd(rows, 1)};
   for (Eigen::Index i = 0; i < rows; ++i) {
     table.inputs.row(i) << random.uniform(), random.uniform();
     table.outputs(i, 0) = 2.0 * table.inputs(i, 0) + (table.inputs(i, 1) > 0.5 ? 3.0 : 0.0) + 0.1 * random.normal();
@@ -41,7 +41,7 @@ Table jumping(Eigen::Index rows) {
   return table;
 }
 
-Document report_of(const Table& table, llmt::FitOptions options = {}) {
+Document report_of(const Sample& table, llmt::FitOptions options = {}) {
   options.intervals = true;
   const llmt::FitResult result = llmt::fit(table.inputs, table.outputs, options);
   const std::optional<llmt::ReadableResult> none;
@@ -67,7 +67,7 @@ TEST(Report, NumbersHaveSixDigitsAndNoNumberIsNull) {
 }
 
 TEST(Report, FitShowsEveryRowByAModelThatHadNotSeenIt) {
-  const Table table = jumping(400);
+  const Sample table = jumping(400);
   const Document document = report_of(table);
   ASSERT_TRUE(document.main);
   EXPECT_EQ(document.main->layers.front().x.size(), 400);

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "apps/program.hpp"
+#include "apps/programs.hpp"
 #include "llmt/csv.hpp"
 
 namespace {
@@ -11,8 +11,8 @@ namespace {
 using nlohmann::json;
 using program::Folder;
 using program::Outcome;
+using program::robot_program;
 
-const std::string robot_program = LLMT_ROBOT_PROGRAM;
 const std::string robots = LLMT_ROBOTS;
 
 TEST(RobotProgram, PaperReproducesTheComparableRows) {

@@ -3,17 +3,17 @@
 
 #include <filesystem>
 
-#include "apps/program.hpp"
+#include "apps/programs.hpp"
 
 namespace {
 
 using program::Folder;
 using program::Outcome;
+using program::robot_program;
 
-const std::string robot_program = LLMT_ROBOT_PROGRAM;
 const std::string arm = LLMT_ROBOTS "/tx200_like.yaml";
 
-void expect_usage(const Folder& folder, const std::string& arguments, const std::string& message) {
+void expect_robot_usage(const Folder& folder, const std::string& arguments, const std::string& message) {
   const Outcome outcome = folder.run(robot_program + " " + arguments);
   EXPECT_EQ(outcome.exit_code, 2) << arguments << ": " << outcome.err;
   EXPECT_EQ(outcome.err, "llmt-robot: " + message + "\n") << arguments;
@@ -23,8 +23,8 @@ TEST(RobotOptions, NumbersOutsideTheirRangeAreRefusedWithIt) {
   const Folder folder;
   const auto refused = [&](const std::string& command, const std::string& option, const std::string& value,
                            const std::string& range) {
-    expect_usage(folder, fmt::format("{} {} {}", command, option, value),
-                 fmt::format("{} is \"{}\", it must be {}", option, value, range));
+    expect_robot_usage(folder, fmt::format("{} {} {}", command, option, value),
+                       fmt::format("{} is \"{}\", it must be {}", option, value, range));
   };
   const std::string seed = "a whole number from 0 to 18446744073709551615";
   refused("discover r.yaml d.csv", "--held-out", "nan", "a number from 0 to 0.9");
@@ -48,9 +48,9 @@ TEST(RobotOptions, AnOutputThatIsAnInputIsRefusedBeforeTheWork) {
   ASSERT_EQ(folder.run(robot_program + " simulate r.yaml --poses 150 --noise-um 10 -o d.csv").exit_code, 0);
   std::filesystem::create_symlink("r.yaml", folder.file("link.yaml"));
   const auto lost = [&](const std::string& arguments, const std::string& output, const std::string& input) {
-    expect_usage(folder, arguments,
-                 output + ": would be overwritten, and is an input of this command (" + input +
-                     "); give the output a name of its own");
+    expect_robot_usage(folder, arguments,
+                       output + ": would be overwritten, and is an input of this command (" + input +
+                           "); give the output a name of its own");
   };
   lost("simulate r.yaml -o r.yaml", "r.yaml", "r.yaml");
   lost("simulate r.yaml --poses-from d.csv -o d.csv", "d.csv", "d.csv");

@@ -5,21 +5,20 @@
 #include <algorithm>
 #include <vector>
 
-#include "apps/program.hpp"
+#include "apps/programs.hpp"
 #include "llmt/csv.hpp"
 
 namespace {
 
 using program::Folder;
 using program::Outcome;
-
-const std::string robot_program = LLMT_ROBOT_PROGRAM;
-const std::string arm = LLMT_ROOT "/docs/samples/arm.yaml";
-const std::string measured = LLMT_ROOT "/docs/samples/arm_measured.csv";
+using program::robot_program;
+using program::sample_arm;
+using program::sample_measured;
 
 // The sample with some columns named and multiplied otherwise.
 std::string sample(double of_angles, const std::string& angle_unit, double of_positions, const std::string& unit) {
-  const llmt::Csv csv = llmt::Csv::read(measured);
+  const llmt::Csv csv = llmt::Csv::read(sample_measured);
   std::vector<std::string> names;
   Eigen::MatrixXd values = csv.numbers(csv.columns());
   for (std::size_t c = 0; c < csv.columns().size(); ++c) {
@@ -37,16 +36,17 @@ std::string sample(double of_angles, const std::string& angle_unit, double of_po
 
 TEST(RobotWords, DecimalCommasAreReadWhereAsked) {
   const Folder folder;
-  std::string text = llmt::read_file(measured);
+  std::string text = llmt::read_file(sample_measured);
   std::ranges::replace(text, ',', ';');
   std::ranges::replace(text, '.', ',');
   folder.write("d.csv", text);
   for (const std::string command : {"calibrate", "discover"}) {
-    const Outcome refused = folder.run(fmt::format("{} {} {} d.csv", robot_program, command, arm));
+    const Outcome refused = folder.run(fmt::format("{} {} {} d.csv", robot_program, command, sample_arm));
     EXPECT_EQ(refused.exit_code, 1);
     EXPECT_NE(refused.err.find("; --decimal-comma reads such files"), std::string::npos) << refused.err;
-    const std::string json = fmt::format("{} {} {} ", robot_program, command, arm);
-    const Outcome with_points = folder.run("cp " + measured + " p.csv; " + json + "p.csv --json | grep -v p.csv");
+    const std::string json = fmt::format("{} {} {} ", robot_program, command, sample_arm);
+    const Outcome with_points =
+        folder.run("cp " + sample_measured + " p.csv; " + json + "p.csv --json | grep -v p.csv");
     const Outcome with_commas = folder.run(json + "d.csv --decimal-comma --json | grep -v d.csv");
     EXPECT_EQ(with_commas.exit_code, 0) << with_commas.err;
     EXPECT_EQ(with_commas.out, with_points.out);
@@ -55,8 +55,8 @@ TEST(RobotWords, DecimalCommasAreReadWhereAsked) {
 
 TEST(RobotWords, DescriptionAndMeasurementsThatWereExchangedAreNamed) {
   const Folder folder;
-  folder.write("r.yaml", llmt::read_file(arm));
-  folder.write("d.csv", llmt::read_file(measured));
+  folder.write("r.yaml", llmt::read_file(sample_arm));
+  folder.write("d.csv", llmt::read_file(sample_measured));
   for (const std::string command : {"calibrate", "discover"}) {
     const Outcome outcome = folder.run(fmt::format("{} {} d.csv r.yaml", robot_program, command));
     EXPECT_EQ(outcome.exit_code, 2);
@@ -70,7 +70,7 @@ TEST(RobotWords, UnitsThatWouldFitAreNamed) {
   const Folder folder;
   const auto said = [&](const std::string& command, const std::string& table) {
     folder.write("d.csv", table);
-    const Outcome outcome = folder.run(fmt::format("{} {} {} d.csv", robot_program, command, arm));
+    const Outcome outcome = folder.run(fmt::format("{} {} {} d.csv", robot_program, command, sample_arm));
     return outcome.out + outcome.err;
   };
   for (const std::string command : {"calibrate", "discover"}) {
@@ -91,10 +91,10 @@ TEST(RobotWords, DiscoverWarnsOfMeasurementsThatTheDescriptionCannotMean) {
   const Folder folder;
   const std::string other = LLMT_ROBOTS "/ur5.yaml";
   ASSERT_EQ(folder.run(fmt::format("{} simulate {} --poses 60 -o d.csv", robot_program, other)).exit_code, 0);
-  const Outcome outcome = folder.run(fmt::format("{} discover {} d.csv", robot_program, arm));
+  const Outcome outcome = folder.run(fmt::format("{} discover {} d.csv", robot_program, sample_arm));
   EXPECT_NE(outcome.err.find("this description does not belong to these measurements"), std::string::npos)
       << outcome.err;
-  const Outcome own = folder.run(fmt::format("{} discover {} {}", robot_program, arm, measured));
+  const Outcome own = folder.run(fmt::format("{} discover {} {}", robot_program, sample_arm, sample_measured));
   EXPECT_EQ(own.err, "");
 }
 

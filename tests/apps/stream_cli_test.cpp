@@ -19,7 +19,7 @@ using program::Outcome;
 std::string fit_stream(const std::string& data) { return LLMT_PROGRAM " fit " + data + " --stream -t y "; }
 
 // y has a kink in `a`; a row in ten has no `b`.
-std::string kinked(int rows, const char* line_end = "\n") {
+std::string kinked_with_gaps(int rows, const char* line_end = "\n") {
   llmt::Random random(1);
   std::string text = fmt::format("a,b,y{}", line_end);
   for (int i = 0; i < rows; ++i) {
@@ -33,8 +33,8 @@ std::string kinked(int rows, const char* line_end = "\n") {
 
 TEST(StreamProgram, AFileAPipeAndTheLibraryLearnTheSame) {
   const Folder folder;
-  const llmt::Csv csv = llmt::Csv::read(folder.write("d.csv", kinked(30000)));  // more than a piece
-  folder.write("crlf.csv", kinked(30000, "\r\n"));
+  const llmt::Csv csv = llmt::Csv::read(folder.write("d.csv", kinked_with_gaps(30000)));  // more than a piece
+  folder.write("crlf.csv", kinked_with_gaps(30000, "\r\n"));
   const Outcome file = folder.run(fit_stream("d.csv") + "-o file.json --json");
   ASSERT_EQ(file.exit_code, 0) << file.err;
   EXPECT_EQ(file.err, "");
@@ -62,7 +62,7 @@ TEST(StreamProgram, AFileAPipeAndTheLibraryLearnTheSame) {
 
 TEST(StreamProgram, TheModelPredictsAndIsInspected) {
   const Folder folder;
-  folder.write("d.csv", kinked(5000));
+  folder.write("d.csv", kinked_with_gaps(5000));
   const Outcome fitted = folder.run(fit_stream("d.csv") + "--ignore b -o m.json");
   ASSERT_EQ(fitted.exit_code, 0) << fitted.err;
   EXPECT_NE(fitted.out.find("d.csv: 5000 rows, 1 inputs: a"), std::string::npos) << fitted.out;
@@ -82,7 +82,7 @@ TEST(StreamProgram, RefusesWithFileLineAndColumn) {
     EXPECT_EQ(outcome.out, "");
     return outcome.err;
   };
-  const std::string rows = kinked(20000);
+  const std::string rows = kinked_with_gaps(20000);
   EXPECT_NE(refusal(rows + "0.1,red,2\n0,0,0\n")
                 .find("d.csv:20002: column \"b\": 'red' is not a number (--stream takes no categories"),
             std::string::npos);
@@ -98,7 +98,7 @@ TEST(StreamProgram, RefusesWithFileLineAndColumn) {
 
 TEST(StreamProgram, WrongUsageIsSaid) {
   const Folder folder;
-  folder.write("d.csv", kinked(100));
+  folder.write("d.csv", kinked_with_gaps(100));
   const auto usage = [&](const std::string& command) {
     const Outcome outcome = folder.run(LLMT_PROGRAM " fit " + command);
     EXPECT_EQ(outcome.exit_code, 2) << command << outcome.err;

@@ -5,7 +5,7 @@
 #include <set>
 #include <sstream>
 
-#include "apps/program.hpp"
+#include "apps/programs.hpp"
 #include "shared/cli.hpp"
 #include "shared/text.hpp"
 
@@ -17,11 +17,10 @@ using llmt::apps::progress_line;
 using llmt::apps::Table;
 using llmt::apps::wrapped;
 using program::Folder;
+using program::llmt_program;
 using program::Outcome;
 
-const std::string llmt_program = LLMT_PROGRAM;
-
-std::string table() {
+std::string small_table() {
   std::string text = "x,y\n";
   for (int i = 0; i < 30; ++i) text += fmt::format("{},{}\n", (7 * i) % 31, 2 * i);
   return text;
@@ -43,7 +42,7 @@ std::size_t longest_line(const std::string& text) {
 
 TEST(Names, ThatAreMisspeltAreGuessed) {
   const Folder folder;
-  folder.write("d.csv", table());
+  folder.write("d.csv", small_table());
   EXPECT_EQ(refusal(folder, "fti d.csv"),
             "llmt: there is no command \"fti\" (did you mean \"fit\"?); the commands are fit, predict, inspect, "
             "explain, compare, discover, export\n");
@@ -73,13 +72,13 @@ TEST(Names, OfTheLibraryBecomeThoseOfTheCommandLine) {
   EXPECT_EQ(in_words_of_user("llmt::fit: rules and rule", names), "rules and --rule");
   EXPECT_EQ(in_words_of_user("d.csv: rule", names), "d.csv: rule");
   const Folder folder;
-  folder.write("d.csv", table());
+  folder.write("d.csv", small_table());
   EXPECT_EQ(refusal(folder, "fit d.csv -t y --cv 1"), "llmt: --cv is 1, it must be 0 or at least 2\n");
 }
 
 TEST(Arguments, OptionsMayStandBeforeTheFile) {
   const Folder folder;
-  folder.write("d.csv", table());
+  folder.write("d.csv", small_table());
   EXPECT_EQ(folder.run(llmt_program + " fit --target y --ignore x,x d.csv").exit_code, 2);  // x twice
   EXPECT_EQ(folder.run(llmt_program + " fit --inputs x --target y d.csv").exit_code, 0);
   EXPECT_EQ(refusal(folder, "fit -t y --inputs x z d.csv"),
@@ -89,7 +88,7 @@ TEST(Arguments, OptionsMayStandBeforeTheFile) {
 
 TEST(Arguments, ADashIsStandardInput) {
   const Folder folder;
-  folder.write("d.csv", table());
+  folder.write("d.csv", small_table());
   const Outcome piped = folder.run(llmt_program + " fit - -t y -o m.json <d.csv");
   EXPECT_EQ(piped.exit_code, 0) << piped.err;
   EXPECT_EQ(piped.out.substr(0, 15), "standard input:");

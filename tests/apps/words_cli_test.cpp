@@ -4,7 +4,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "apps/program.hpp"
+#include "apps/programs.hpp"
 #include "llmt/csv.hpp"
 #include "llmt/names.hpp"
 #include "llmt/random.hpp"
@@ -13,11 +13,10 @@ namespace {
 
 using nlohmann::json;
 using program::Folder;
+using program::llmt_program;
 using program::Outcome;
 
-const std::string llmt_program = LLMT_PROGRAM;
-
-std::string refusal(const Folder& folder, const std::string& arguments, int exit_code) {
+std::string refused_text(const Folder& folder, const std::string& arguments, int exit_code) {
   const Outcome outcome = folder.run(llmt_program + " " + arguments);
   EXPECT_EQ(outcome.exit_code, exit_code) << arguments;
   EXPECT_EQ(outcome.out, "") << arguments;
@@ -51,7 +50,7 @@ TEST(Words, AColumnThatAModelDoesNotUseMayBeAbsent) {
   EXPECT_NEAR(with(0), 0.5, 1e-6);
   // One that it uses may not.
   folder.write("other.csv", "b\n0.25\n");
-  EXPECT_EQ(refusal(folder, "predict m.json other.csv", 1),
+  EXPECT_EQ(refused_text(folder, "predict m.json other.csv", 1),
             "llmt: other.csv: there is no column \"a\"; the columns are b\n");
 }
 
@@ -60,10 +59,10 @@ TEST(Words, ModelAndTableThatWereExchangedAreNamed) {
   folder.write("d.csv", line_and_noise(30));
   ASSERT_EQ(folder.run(llmt_program + " fit d.csv -t y -o m.json").exit_code, 0);
   for (const std::string command : {"predict", "explain"}) {
-    EXPECT_EQ(refusal(folder, command + " d.csv m.json", 2),
+    EXPECT_EQ(refused_text(folder, command + " d.csv m.json", 2),
               "llmt: d.csv and m.json seem to be exchanged: the model (JSON) comes first, then the table (CSV)\n");
   }
-  EXPECT_NE(refusal(folder, "predict d.csv d.csv", 1).find("not JSON"), std::string::npos);
+  EXPECT_NE(refused_text(folder, "predict d.csv d.csv", 1).find("not JSON"), std::string::npos);
 }
 
 TEST(Words, AHeaderOfNumbersIsTakenForARowAndSaid) {
@@ -72,26 +71,27 @@ TEST(Words, AHeaderOfNumbersIsTakenForARowAndSaid) {
       "llmt: d.csv: the first line holds only numbers and was taken for the names of the columns; if it is a row of "
       "data, put a line with names above it\n";
   folder.write("d.csv", "1.5,2,3\n2,3,4\n");
-  EXPECT_EQ(refusal(folder, "fit d.csv -t y", 1),
+  EXPECT_EQ(refused_text(folder, "fit d.csv -t y", 1),
             warning + "llmt: d.csv: there is no column \"y\"; the columns are 1.5, 2, 3\n");
   folder.write("d.csv", "1,5;2;3\n2;3;4\n");
-  EXPECT_EQ(refusal(folder, "fit d.csv -t y --decimal-comma", 1).find(warning), 0U);
+  EXPECT_EQ(refused_text(folder, "fit d.csv -t y --decimal-comma", 1).find(warning), 0U);
   // Numbers of columns are names.
   folder.write("d.csv", "0,1,2\n2,3,4\n");
-  EXPECT_EQ(refusal(folder, "fit d.csv -t y", 1), "llmt: d.csv: there is no column \"y\"; the columns are 0, 1, 2\n");
+  EXPECT_EQ(refused_text(folder, "fit d.csv -t y", 1),
+            "llmt: d.csv: there is no column \"y\"; the columns are 0, 1, 2\n");
 }
 
 TEST(Words, ATargetIsNeitherIgnoredNorTheWeight) {
   const Folder folder;
   folder.write("d.csv", line_and_noise(30));
-  EXPECT_EQ(refusal(folder, "fit d.csv -t y --ignore y", 2), "llmt: column \"y\" is a target and ignored\n");
-  EXPECT_EQ(refusal(folder, "fit d.csv -t y --weight y", 2), "llmt: column \"y\" is a target and the weight\n");
+  EXPECT_EQ(refused_text(folder, "fit d.csv -t y --ignore y", 2), "llmt: column \"y\" is a target and ignored\n");
+  EXPECT_EQ(refused_text(folder, "fit d.csv -t y --weight y", 2), "llmt: column \"y\" is a target and the weight\n");
 }
 
 TEST(Words, AllRowsWithoutATargetAreSaidAtOnce) {
   const Folder folder;
   folder.write("d.csv", "x,y\n1,\n2,2\n3,NA\n4,4\n5,?\n");
-  EXPECT_EQ(refusal(folder, "fit d.csv -t y", 1),
+  EXPECT_EQ(refused_text(folder, "fit d.csv -t y", 1),
             "llmt: d.csv:2: column \"y\": the cell is empty, a number is needed; 3 rows have no number there, lines 2, "
             "4, 6: fill them in or "
             "leave them out\n");
@@ -100,7 +100,7 @@ TEST(Words, AllRowsWithoutATargetAreSaidAtOnce) {
 TEST(Words, AValueThatNeedsAnEqualsSignIsShownWithIt) {
   const Folder folder;
   folder.write("d.csv", line_and_noise(30));
-  EXPECT_EQ(refusal(folder, "fit d.csv -t y --readable 5", 2),
+  EXPECT_EQ(refused_text(folder, "fit d.csv -t y --readable 5", 2),
             "llmt: The following argument was not expected: 5; a value of --readable is written --readable=5\n");
 }
 
@@ -116,7 +116,7 @@ TEST(Words, ANameThatIsNotWrittenOutIsCompleted) {
   EXPECT_EQ(llmt::closest_name("z", letters), "");
   const Folder folder;
   folder.write("d.csv", "humidity_percent,y\n1,2\n");
-  EXPECT_EQ(refusal(folder, "fit d.csv -t y --ignore humid", 1),
+  EXPECT_EQ(refused_text(folder, "fit d.csv -t y --ignore humid", 1),
             "llmt: d.csv: there is no column \"humid\" (did you mean \"humidity_percent\"?); the columns are "
             "humidity_percent, y\n");
 }

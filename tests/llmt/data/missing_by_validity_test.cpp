@@ -7,10 +7,9 @@
 #include "fit/missing_weights.hpp"
 #include "llmt/fit.hpp"
 #include "oracles/oracles.hpp"
+#include "oracles/samples.hpp"
 
 namespace {
-
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
 // Mean of the model over the values that an input has in the rows, at a point.
 double mean_over(const llmt::Model& model, const Eigen::MatrixXd& rows, Eigen::RowVectorXd point, Eigen::Index input) {
@@ -35,7 +34,7 @@ TEST(Missing, BlendOfCompleteRowsPredictsItsMeanOverTheMissingValue) {
       Eigen::RowVectorXd point = asked.row(i);
       const double expected = mean_over(model, x, point, input);
       spread += std::pow(model.predict(point)(0, 0) - expected, 2);
-      point(input) = nan;
+      point(input) = oracle::missing;
       squares += std::pow(model.predict(point)(0, 0) - expected, 2);
     }
     EXPECT_LT(std::sqrt(squares / spread), 0.1) << "input " << input;
@@ -46,7 +45,7 @@ TEST(Missing, RowsCountByHowMuchWhatIsMissingScattersTheOutput) {
   Eigen::MatrixXd x = oracle::uniform(1000, 3, 9);
   Eigen::MatrixXd y = 10.0 * x.col(0) + 0.5 * x.col(1);
   y += 0.5 * oracle::uniform(1000, 1, 10);
-  for (Eigen::Index i = 0; i < 300; ++i) x(i, i / 100) = nan;
+  for (Eigen::Index i = 0; i < 300; ++i) x(i, i / 100) = oracle::missing;
   const llmt::FitOptions options;
   const llmt::FitData data(x, y, options, true);
   const Eigen::VectorXd weights = llmt::weights_by_missing(data.table(), options);

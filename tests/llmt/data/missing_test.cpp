@@ -9,12 +9,11 @@
 
 #include "llmt/random.hpp"
 #include "oracles/random_trees.hpp"
+#include "oracles/samples.hpp"
 
 namespace {
 
 using namespace random_trees;
-
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
 TEST(Fit, SameBytesAtAnyNumberOfThreadsWithCategoriesAndMissingValues) {
   llmt::Random random(51);
@@ -23,7 +22,7 @@ TEST(Fit, SameBytesAtAnyNumberOfThreadsWithCategoriesAndMissingValues) {
   for (Eigen::Index i = 0; i < 400; ++i) {
     x(i, 1) = std::floor(2.0 * x(i, 1) + 2.0);
     if (i % 5 == 0) {
-      x(i, random.below(3)) = nan;
+      x(i, random.below(3)) = oracle::missing;
     }
   }
   for (const llmt::ValidityChoice choice : {llmt::ValidityChoice::automatic, llmt::ValidityChoice::gaussian}) {
@@ -45,13 +44,13 @@ TEST(Missing, FitsAndPredictsForEveryValidity) {
   Eigen::MatrixXd x = oracle::uniform(600, 3, 61);
   const Eigen::MatrixXd y = oracle::curved(x, 0.1);
   for (double& value : x.reshaped()) {
-    value = random.uniform() < 0.1 ? nan : value;
+    value = random.uniform() < 0.1 ? oracle::missing : value;
   }
   Eigen::MatrixXd query = 2.0 * oracle::uniform(200, 3, 62);
   for (double& value : query.reshaped()) {
-    value = random.uniform() < 0.3 ? nan : value;
+    value = random.uniform() < 0.3 ? oracle::missing : value;
   }
-  query.row(0).setConstant(nan);
+  query.row(0).setConstant(oracle::missing);
   for (const Kind& kind : kinds) {
     for (const llmt::Estimation estimation :
          {llmt::Estimation::as_grown, llmt::Estimation::local, llmt::Estimation::joint}) {
@@ -73,7 +72,7 @@ TEST(Missing, ColumnWithoutAnyValueChangesNothing) {
   const Eigen::MatrixXd x = oracle::uniform(200, 2, 63);
   const Eigen::MatrixXd y = oracle::curved(x, 0.1);
   Eigen::MatrixXd wider(200, 3);
-  wider << x, Eigen::VectorXd::Constant(200, nan);
+  wider << x, Eigen::VectorXd::Constant(200, oracle::missing);
   llmt::FitOptions options = only(kinds[1], llmt::Estimation::joint, 6);
   options.min_leaf_samples = 8;  // its default depends on the number of inputs
   EXPECT_LT((llmt::fit(wider, y, options).model.predict(wider) - llmt::fit(x, y, options).model.predict(x))
@@ -89,7 +88,7 @@ TEST(Missing, InformativeMissingnessIsLearned) {
     for (Eigen::Index i = 0; i < 1000; ++i) {
       const bool missing = random.uniform() < 0.3;
       d.y(i, 0) = std::sin(3.0 * d.x(i, 1)) + d.x(i, 2) + (missing ? 5.0 : 0.0) + 0.1 * random.normal();
-      d.x(i, 0) = missing ? nan : d.x(i, 0);
+      d.x(i, 0) = missing ? oracle::missing : d.x(i, 0);
     }
     return d;
   };
@@ -106,7 +105,7 @@ TEST(Missing, SplitInputThatIsMissingAtOneEndIsLearned) {
     Data d{oracle::uniform(1000, 2, seed), Eigen::MatrixXd(1000, 1)};
     for (Eigen::Index i = 0; i < 1000; ++i) {
       d.y(i, 0) = (d.x(i, 0) > 0.1 ? 5.0 : 0.0) + d.x(i, 1) + 0.1 * random.normal();
-      d.x(i, 0) = d.x(i, 0) > 0.4 ? nan : d.x(i, 0);
+      d.x(i, 0) = d.x(i, 0) > 0.4 ? oracle::missing : d.x(i, 0);
     }
     return d;
   };
@@ -140,7 +139,7 @@ TEST(Categorical, OffsetsAndSlopesOfLevelsAreRecovered) {
     EXPECT_EQ(model.jacobian(point)(0, 0), 0.0);
   }
   Eigen::MatrixXd query(4, 2);
-  query << 4.0, 0.1, 9999.0, 0.1, -3.0, 0.1, nan, 0.1;
+  query << 4.0, 0.1, 9999.0, 0.1, -3.0, 0.1, oracle::missing, 0.1;
   const Eigen::MatrixXd unknown = model.predict(query);
   EXPECT_TRUE(unknown.allFinite());
   for (int i = 0; i < 3; ++i) {

@@ -12,23 +12,21 @@
 #include "llmt/random.hpp"
 #include "numerics/f_distribution.hpp"
 #include "oracles/oracles.hpp"
+#include "oracles/samples.hpp"
 
 namespace {
 
-struct Data {
-  Eigen::MatrixXd x;
-  Eigen::MatrixXd y;
-};
+using oracle::Sample;
 
 double number(llmt::Random& random, int low, int high) {
   return low + std::floor(random.uniform(0.0, 1.0) * (high - low + 1));
 }
 
 // x_0 in 2 ... 5 is a code, x_1 in 1 ... 6 an amount, x_2 and x_3 in 0 ... 1.
-Data coded(Eigen::Index rows, std::uint64_t seed, double amount = 0.4) {
+Sample coded(Eigen::Index rows, std::uint64_t seed, double amount = 0.4) {
   constexpr std::array of_code = {0.0, 1.5, -1.2, 0.8};
   llmt::Random random(seed);
-  Data data{Eigen::MatrixXd(rows, 4), Eigen::MatrixXd(rows, 1)};
+  Sample data{Eigen::MatrixXd(rows, 4), Eigen::MatrixXd(rows, 1)};
   for (Eigen::Index i = 0; i < rows; ++i) {
     data.x.row(i) << number(random, 2, 5), number(random, 1, 6), random.uniform(0.0, 1.0), random.uniform(0.0, 1.0);
     data.y(i, 0) = of_code[static_cast<std::size_t>(data.x(i, 0)) - 2] * (0.5 + data.x(i, 2)) +
@@ -52,8 +50,8 @@ TEST(CodeChoice, CodesAreFoundAndLowerTheError) {
   double chosen = 0.0;
   double numbers = 0.0;
   for (const std::uint64_t seed : {1, 2, 3}) {
-    const Data train = coded(250, seed);
-    const Data test = coded(2000, seed + 100);
+    const Sample train = coded(250, seed);
+    const Sample test = coded(2000, seed + 100);
     const llmt::FitResult result = llmt::fit(train.x, train.y);
     EXPECT_EQ(result.summary.codes.taken, std::vector<int>{0}) << seed;
     EXPECT_EQ(result.model.inputs()[0].codes, (std::vector<double>{2, 3, 4, 5}));
@@ -65,7 +63,7 @@ TEST(CodeChoice, CodesAreFoundAndLowerTheError) {
 }
 
 TEST(CodeChoice, ModelIsThatOfCategories) {
-  const Data train = coded(250, 4);
+  const Sample train = coded(250, 4);
   const llmt::FitResult result = llmt::fit(train.x, train.y);
   ASSERT_EQ(result.summary.codes.taken, std::vector<int>{0});
   Eigen::MatrixXd positions = train.x;
@@ -77,7 +75,7 @@ TEST(CodeChoice, ModelIsThatOfCategories) {
 
 TEST(CodeChoice, WithoutCodesTheModelIsThatOfNumbers) {
   llmt::Random random(5);
-  Data data = coded(300, 5);
+  Sample data = coded(300, 5);
   for (Eigen::Index i = 0; i < 300; ++i) data.y(i, 0) = 0.5 * data.x(i, 1) + data.x(i, 2) + 0.2 * random.normal();
   const llmt::FitResult result = llmt::fit(data.x, data.y);
   EXPECT_TRUE(result.summary.codes.compared.empty());
@@ -88,7 +86,7 @@ TEST(CodeChoice, WithoutCodesTheModelIsThatOfNumbers) {
 TEST(CodeChoice, BentAmountsStayNumbers) {
   for (const std::uint64_t seed : {1, 2, 3, 4}) {
     llmt::Random random(seed);
-    Data data{Eigen::MatrixXd(400, 2), Eigen::MatrixXd(400, 1)};
+    Sample data{Eigen::MatrixXd(400, 2), Eigen::MatrixXd(400, 1)};
     for (Eigen::Index i = 0; i < 400; ++i) {
       data.x.row(i) << number(random, 1, 10), random.uniform(0.0, 1.0);
       data.y(i, 0) = 2.0 * std::sqrt(data.x(i, 0)) * (0.5 + data.x(i, 1)) + 0.3 * random.normal();
@@ -100,7 +98,7 @@ TEST(CodeChoice, BentAmountsStayNumbers) {
 }
 
 TEST(CodeChoice, OnlyWholeNumbersOfAShortRangeWithEnoughRows) {
-  const Data train = coded(250, 6);
+  const Sample train = coded(250, 6);
   const auto taken = [&](const Eigen::MatrixXd& x, const llmt::FitOptions& options = {}) {
     return llmt::fit(x, train.y, options).summary.codes.taken;
   };
@@ -123,7 +121,7 @@ TEST(CodeChoice, OnlyWholeNumbersOfAShortRangeWithEnoughRows) {
 
 // Rows of weight 0, missing values and a second output.
 TEST(CodeChoice, TakesWhatAFitTakes) {
-  Data train = coded(400, 7);
+  Sample train = coded(400, 7);
   train.y.conservativeResize(Eigen::NoChange, 2);
   train.y.col(1) = 100.0 * train.y.col(0) + 5.0 * train.x.col(2);
   Eigen::VectorXd weights = Eigen::VectorXd::Ones(400);
@@ -141,13 +139,13 @@ TEST(CodeChoice, TakesWhatAFitTakes) {
 }
 
 TEST(CodeChoice, SameBytesAtAnyNumberOfThreads) {
-  const Data train = coded(3000, 8);
+  const Sample train = coded(3000, 8);
   const std::string one = text_of(llmt::fit(train.x, train.y, {.max_threads = 1}));
   EXPECT_EQ(text_of(llmt::fit(train.x, train.y, {.max_threads = 3})), one);
 }
 
 TEST(LackOfFit, IsTheFTestOfTwoLeastSquares) {
-  const Data data = coded(120, 9);
+  const Sample data = coded(120, 9);
   const llmt::LackOfFit lack(data.x, data.y);
   Eigen::MatrixXd with(120, 4 + 2);
   with.leftCols(4) = data.x;
@@ -168,7 +166,7 @@ TEST(LackOfFit, KeepsItsLevel) {
   int found = 0;
   for (std::uint64_t seed = 1; seed <= 400; ++seed) {
     llmt::Random random(seed);
-    Data data{Eigen::MatrixXd(60, 2), Eigen::MatrixXd(60, 1)};
+    Sample data{Eigen::MatrixXd(60, 2), Eigen::MatrixXd(60, 1)};
     for (Eigen::Index i = 0; i < 60; ++i) {
       data.x.row(i) << number(random, 1, 5), random.uniform(0.0, 1.0);
       data.y(i, 0) = data.x(i, 0) + random.normal();

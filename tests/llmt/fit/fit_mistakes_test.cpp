@@ -5,19 +5,16 @@
 
 #include "llmt/fit.hpp"
 #include "oracles/oracles.hpp"
+#include "oracles/samples.hpp"
 #include "oracles/thrown.hpp"
 
 namespace {
 
+using oracle::as_grown;
+
 using oracle::thrown;
 
 // The crisp tree as it was grown.
-llmt::FitOptions as_grown(llmt::FitOptions options = {}) {
-  options.validity = llmt::ValidityChoice::crisp;
-  options.folds.count = 0;
-  return options;
-}
-
 TEST(Fit, CallersMistakesAreNamed) {
   const Eigen::MatrixXd x = oracle::uniform(10, 2, 15);
   const Eigen::MatrixXd y = x.col(0);

@@ -7,16 +7,13 @@
 
 #include "growth/pruning.hpp"
 #include "oracles/oracles.hpp"
+#include "oracles/samples.hpp"
 
 namespace {
 
-// The crisp tree as it was grown.
-llmt::FitOptions as_grown(llmt::FitOptions options = {}) {
-  options.validity = llmt::ValidityChoice::crisp;
-  options.folds.count = 0;
-  return options;
-}
+using oracle::as_grown;
 
+// The crisp tree as it was grown.
 // The crisp tree of plain least-squares leaves with the leaf count that cross-validation chooses.
 llmt::FitOptions crisp() { return {.validity = llmt::ValidityChoice::crisp, .expert = {.shrinkages = {0.0}}}; }
 

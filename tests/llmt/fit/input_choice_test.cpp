@@ -13,17 +13,15 @@
 #include "llmt/model.hpp"
 #include "llmt/random.hpp"
 #include "oracles/oracles.hpp"
+#include "oracles/samples.hpp"
 
 namespace {
 
-struct Data {
-  Eigen::MatrixXd x;
-  Eigen::MatrixXd y;
-};
+using oracle::Sample;
 
 // Friedman (1991) on [0, 1]: five of the inputs matter; noise of standard deviation 1.
-Data friedman(Eigen::Index rows, Eigen::Index inputs, std::uint64_t seed) {
-  Data data{(oracle::uniform(rows, inputs, seed).array() + 1.0) / 2.0, Eigen::MatrixXd(rows, 1)};
+Sample friedman(Eigen::Index rows, Eigen::Index inputs, std::uint64_t seed) {
+  Sample data{(oracle::uniform(rows, inputs, seed).array() + 1.0) / 2.0, Eigen::MatrixXd(rows, 1)};
   llmt::Random random(seed + 1000);
   for (Eigen::Index i = 0; i < rows; ++i) {
     const auto x = data.x.row(i);
@@ -35,14 +33,14 @@ Data friedman(Eigen::Index rows, Eigen::Index inputs, std::uint64_t seed) {
 
 llmt::FitOptions all_inputs() { return {.choose_inputs = false}; }
 
-double test_rmse(const llmt::Model& model, const Data& test) { return llmt::rmse(model.predict(test.x), test.y)(0); }
+double test_rmse(const llmt::Model& model, const Sample& test) { return llmt::rmse(model.predict(test.x), test.y)(0); }
 
 TEST(InputChoice, UsefulInputsStayAndUselessOnesCostLittle) {
   double with = 0.0;
   double without = 0.0;
   for (const std::uint64_t seed : {1, 2, 3}) {
-    const Data train = friedman(250, 20, seed);
-    const Data test = friedman(2000, 20, seed + 100);
+    const Sample train = friedman(250, 20, seed);
+    const Sample test = friedman(2000, 20, seed + 100);
     const llmt::FitResult chosen = llmt::fit(train.x, train.y);
     for (const int input : chosen.summary.partitions[0].left_out) EXPECT_GE(input, 5) << seed;
     EXPECT_GE(chosen.summary.partitions[0].left_out.size(), 10U) << seed;
@@ -74,8 +72,8 @@ TEST(InputChoice, HeldOutErrorOfNoiseIsThatOfNewRows) {
       for (double& value : values.reshaped()) value = random.normal();
       return values;
     };
-    const Data train{oracle::uniform(100, 25, seed), normal(100)};
-    const Data test{oracle::uniform(2000, 25, seed + 50), normal(2000)};
+    const Sample train{oracle::uniform(100, 25, seed), normal(100)};
+    const Sample test{oracle::uniform(2000, 25, seed + 50), normal(2000)};
     const llmt::FitResult result = llmt::fit(train.x, train.y);
     promised += result.summary.partitions[0].chosen.rmse;
     kept += test_rmse(result.model, test);
@@ -88,9 +86,9 @@ TEST(InputChoice, NothingIsLostWhereAllInputsMatter) {
   double without = 0.0;
   for (const std::uint64_t seed : {1, 2, 3}) {
     llmt::Random random(seed);
-    Data train{oracle::uniform(120, 12, seed), Eigen::MatrixXd(120, 1)};
-    Data test{oracle::uniform(1000, 12, seed + 9), Eigen::MatrixXd(1000, 1)};
-    for (Data* data : {&train, &test}) {
+    Sample train{oracle::uniform(120, 12, seed), Eigen::MatrixXd(120, 1)};
+    Sample test{oracle::uniform(1000, 12, seed + 9), Eigen::MatrixXd(1000, 1)};
+    for (Sample* data : {&train, &test}) {
       for (Eigen::Index i = 0; i < data->x.rows(); ++i) data->y(i, 0) = data->x.row(i).sum() + random.normal();
     }
     with += test_rmse(llmt::fit(train.x, train.y).model, test);
@@ -101,7 +99,7 @@ TEST(InputChoice, NothingIsLostWhereAllInputsMatter) {
 
 // Each output has a tree of its own, with inputs of its own: the model of both is the two models side by side.
 TEST(InputChoice, SeveralOutputsHaveTheirOwnInputs) {
-  Data data = friedman(200, 12, 5);
+  Sample data = friedman(200, 12, 5);
   data.y.conservativeResize(200, 2);
   llmt::Random random(3);
   for (Eigen::Index i = 0; i < 200; ++i) {
@@ -128,7 +126,7 @@ TEST(InputChoice, SeveralOutputsHaveTheirOwnInputs) {
 }
 
 TEST(InputChoice, ACategoricalInputIsOneInput) {
-  Data data = friedman(250, 12, 8);
+  Sample data = friedman(250, 12, 8);
   for (Eigen::Index i = 0; i < 250; ++i) {
     data.x(i, 10) = static_cast<double>(i % 4);  // matters
     data.x(i, 11) = static_cast<double>((i / 4) % 3);
@@ -141,13 +139,13 @@ TEST(InputChoice, ACategoricalInputIsOneInput) {
 }
 
 TEST(InputChoice, SameBytesAtAnyNumberOfThreads) {
-  const Data data = friedman(150, 15, 4);
+  const Sample data = friedman(150, 15, 4);
   const std::string one = llmt::to_json(llmt::fit(data.x, data.y, {.max_threads = 1}).model);
   EXPECT_EQ(one, llmt::to_json(llmt::fit(data.x, data.y, {.max_threads = 4}).model));
 }
 
 TEST(InputChoice, NamedInputsAndOneLeafKeepAll) {
-  const Data data = friedman(150, 15, 4);
+  const Sample data = friedman(150, 15, 4);
   std::vector<int> named = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9};
   for (const llmt::FitOptions& options :
        {all_inputs(), llmt::FitOptions{.max_leaves = 1}, llmt::FitOptions{.regression_inputs = named},

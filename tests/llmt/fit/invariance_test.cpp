@@ -3,21 +3,16 @@
 
 #include "llmt/fit.hpp"
 #include "oracles/oracles.hpp"
+#include "oracles/samples.hpp"
 
 namespace {
 
-struct Data {
-  Eigen::MatrixXd x;
-  Eigen::MatrixXd y;
-};
+using oracle::as_grown;
+using oracle::Sample;
 
-Data data() {
+Sample curved_sample() {
   const Eigen::MatrixXd x = oracle::coarse(oracle::uniform(400, 3, 21));
   return {x, oracle::coarse(oracle::curved(x, 0.02))};
-}
-
-llmt::FitOptions as_grown(Eigen::Index min_leaf_samples = 0) {
-  return {.min_leaf_samples = min_leaf_samples, .validity = llmt::ValidityChoice::crisp, .folds = {.count = 0}};
 }
 
 llmt::Partition grow(const Eigen::MatrixXd& x, const Eigen::MatrixXd& y) {
@@ -39,32 +34,32 @@ void expect_same_tree(const llmt::Partition& tree, const llmt::Partition& expect
 }
 
 TEST(Invariance, OrderOfRows) {
-  const Data d = data();
+  const Sample d = curved_sample();
   const std::vector<Eigen::Index> order = llmt::Random(3).permutation(400);
   expect_same_tree(grow(d.x(order, Eigen::all), d.y(order, Eigen::all)), grow(d.x, d.y), 1e-9);
 }
 
 TEST(Invariance, OutputOfScale1e6AndBelow) {
-  const Data d = data();
+  const Sample d = curved_sample();
   for (const double scale : {1e-6, 1e-12, 1e-100, 1e9}) {
     expect_same_tree(grow(d.x, scale * d.y), grow(d.x, d.y), 1e-9);
   }
 }
 
 TEST(Invariance, OutputWithOffset1e8) {
-  const Data d = data();
+  const Sample d = curved_sample();
   expect_same_tree(grow(d.x, d.y.array() + 1e8), grow(d.x, d.y), 1e-6);
   // Scaled by a power of two nothing rounds, so nothing may change at all.
   EXPECT_EQ(llmt::fit(d.x, 0x1p30 * d.y).model.predict(d.x), 0x1p30 * llmt::fit(d.x, d.y).model.predict(d.x));
 }
 
 TEST(Invariance, InputsWithOffset1e6) {
-  const Data d = data();
+  const Sample d = curved_sample();
   expect_same_tree(grow(d.x.array() + 1e6, d.y), grow(d.x, d.y), 1e-9, 1.0, 1e6);
 }
 
 TEST(Invariance, InputsOfAnyScale) {
-  const Data d = data();
+  const Sample d = curved_sample();
   for (const double scale : {1e-8, 1e8, 1e-100}) {
     expect_same_tree(grow(scale * d.x, d.y), grow(d.x, d.y), 1e-9, scale);
   }
@@ -81,22 +76,22 @@ TEST(Invariance, InputsOfAnyScale) {
 }
 
 TEST(Invariance, DuplicatedAndConstantColumns) {
-  const Data d = data();
+  const Sample d = curved_sample();
   Eigen::MatrixXd wider(400, 6);
   wider << d.x, Eigen::VectorXd::Constant(400, 1e6), d.x.col(0), d.x.col(1) * 3.0;
   expect_same_tree(grow(wider, d.y),
                    // The default leaf size depends on the number of inputs: ask for the one that the wider table gets.
-                   llmt::fit(d.x, d.y, as_grown(14)).model.partitions()[0], 1e-9);
+                   llmt::fit(d.x, d.y, as_grown({.min_leaf_samples = 14})).model.partitions()[0], 1e-9);
 }
 
 TEST(Invariance, AffineFunctionAddedToTheOutput) {
-  const Data d = data();
+  const Sample d = curved_sample();
   const Eigen::MatrixXd affine = d.x * Eigen::Vector3d(3.0, -2.0, 10.0);
   expect_same_tree(grow(d.x, d.y + oracle::coarse(affine)), grow(d.x, d.y), 1e-6);
 }
 
 TEST(Invariance, SameBytesAtAnyNumberOfThreads) {
-  const Data d = data();
+  const Sample d = curved_sample();
   Eigen::MatrixXd y(400, 2);
   y << d.y, oracle::curved(d.x, 0.1, 5);
   for (const bool shared : {false, true}) {

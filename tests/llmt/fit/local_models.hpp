@@ -20,8 +20,8 @@ using llmt::SparseChoice;
 using llmt::ValidityChoice;
 
 inline constexpr double missing = std::numeric_limits<double>::quiet_NaN();
-inline const std::vector<ValidityChoice> kinds = {ValidityChoice::crisp, ValidityChoice::blend,
-                                                  ValidityChoice::gaussian};
+inline const std::vector<ValidityChoice> validities = {ValidityChoice::crisp, ValidityChoice::blend,
+                                                       ValidityChoice::gaussian};
 
 // One candidate, no choice.
 inline llmt::FitOptions only(ValidityChoice validity, Eigen::Index max_leaves, LocalTerms terms,

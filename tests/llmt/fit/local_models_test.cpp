@@ -24,7 +24,7 @@ using namespace local_models;
 // The partition is that of a curved output; the others are affine and quadratic. Queries reach into corners without
 // rows, where products lie beyond all those of the training rows.
 TEST(Quadratic, AffineAndQuadraticDataAreReproducedInTheTrainingExtent) {
-  for (const ValidityChoice validity : kinds) {
+  for (const ValidityChoice validity : validities) {
     const Eigen::MatrixXd x = oracle::uniform(400, 3, 1);
     Eigen::MatrixXd y(400, 3);
     y << oracle::curved(x), 1.0 + x.col(0).array() - 3.0 * x.col(2).array(), quadratic_function(x);
@@ -93,7 +93,7 @@ TEST(Quadratic, LeavesAreLeastSquaresOnExpandedColumns) {
 }
 
 TEST(Quadratic, PredictionIsWhatTheEquationsSayAloneAndInBlocksAndFromAFile) {
-  for (const ValidityChoice validity : kinds) {
+  for (const ValidityChoice validity : validities) {
     Eigen::MatrixXd x = oracle::uniform(400, 4, 3);
     const Eigen::VectorXd y = oracle::curved(x, 0.05);
     for (Eigen::Index i = 0; i < 400; ++i) {
@@ -125,7 +125,7 @@ TEST(Quadratic, PredictionIsWhatTheEquationsSayAloneAndInBlocksAndFromAFile) {
 }
 
 TEST(Quadratic, JacobianIsTheDifferenceQuotient) {
-  for (const ValidityChoice validity : kinds) {
+  for (const ValidityChoice validity : validities) {
     const Eigen::MatrixXd x = oracle::uniform(400, 3, 5);
     Eigen::MatrixXd y(400, 2);
     y << oracle::curved(x), quadratic_function(x).cwiseAbs();

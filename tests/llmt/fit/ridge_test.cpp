@@ -8,24 +8,22 @@
 #include "llmt/fit.hpp"
 #include "llmt/random.hpp"
 #include "oracles/oracles.hpp"
+#include "oracles/samples.hpp"
 
 namespace {
 
-struct Data {
-  Eigen::MatrixXd x;
-  Eigen::MatrixXd y;
-};
+using oracle::Sample;
 
 // Many inputs, each of which matters a little.
-Data weak(Eigen::Index rows, Eigen::Index inputs, std::uint64_t seed) {
+Sample weak(Eigen::Index rows, Eigen::Index inputs, std::uint64_t seed) {
   llmt::Random random(seed);
-  Data data{oracle::uniform(rows, inputs, seed + 100), Eigen::MatrixXd(rows, 1)};
+  Sample data{oracle::uniform(rows, inputs, seed + 100), Eigen::MatrixXd(rows, 1)};
   for (Eigen::Index i = 0; i < rows; ++i) data.y(i, 0) = data.x.row(i).sum() + 3.0 * random.normal();
   return data;
 }
 
 TEST(Ridge, EqualsItsNormalEquations) {
-  const Data data = weak(60, 15, 3);
+  const Sample data = weak(60, 15, 3);
   const llmt::FitOptions options{.choose_inputs = false, .validity = llmt::ValidityChoice::crisp};
   const llmt::FitResult result = llmt::fit(data.x, data.y, options);
   const llmt::Candidate& chosen = result.summary.partitions[0].chosen.candidate;
@@ -46,8 +44,8 @@ TEST(Ridge, PredictsBetterThanLeastSquaresWhereRowsAreFew) {
   double with = 0.0;
   double without = 0.0;
   for (const std::uint64_t seed : {1, 2, 3, 4, 5, 6}) {
-    const Data train = weak(40, 20, seed);
-    const Data test = weak(1000, 20, seed + 50);
+    const Sample train = weak(40, 20, seed);
+    const Sample test = weak(1000, 20, seed + 50);
     const auto error = [&](const llmt::FitOptions& options) {
       return llmt::rmse(llmt::fit(train.x, train.y, options).model.predict(test.x), test.y)(0);
     };

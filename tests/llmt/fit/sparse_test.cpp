@@ -97,7 +97,7 @@ TEST(ForwardSelection, TakesNothingOfNoiseNorOfConstantAndDoubledColumns) {
 // Slopes that are not selected are exactly 0; the others are least squares on all leaves at once, drawn to those of
 // each.
 TEST(Sparse, JointEstimateIsLeastSquaresOfTheSelectedColumns) {
-  for (const ValidityChoice validity : kinds) {
+  for (const ValidityChoice validity : validities) {
     const Eigen::MatrixXd x = oracle::uniform(300, 4, 8);
     const Eigen::VectorXd y = oracle::curved(x, 0.1);
     const llmt::FitResult result = llmt::fit(x, y, only(validity, 4, LocalTerms::quadratic, SparseChoice::always));

@@ -2,8 +2,11 @@
 
 #include "llmt/fit.hpp"
 #include "oracles/oracles.hpp"
+#include "oracles/samples.hpp"
 
 namespace {
+
+using oracle::nodes;
 
 llmt::FitResult grow(const Eigen::MatrixXd& x, const Eigen::MatrixXd& y, llmt::SplitSearch search,
                      Eigen::Index max_leaves, llmt::FitOptions options = {}) {
@@ -14,10 +17,6 @@ llmt::FitResult grow(const Eigen::MatrixXd& x, const Eigen::MatrixXd& y, llmt::S
   options.validity = llmt::ValidityChoice::crisp;
   options.folds.count = 0;
   return llmt::fit(x, y, options);
-}
-
-const std::vector<llmt::Node>& nodes(const llmt::FitResult& result, std::size_t partition = 0) {
-  return result.model.partitions()[partition].nodes;
 }
 
 double rss(const std::vector<llmt::Node>& tree) {

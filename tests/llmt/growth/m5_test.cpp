@@ -9,19 +9,20 @@
 #include "llmt/fit.hpp"
 #include "oracles/oracles.hpp"
 #include "oracles/plain_m5.hpp"
+#include "oracles/samples.hpp"
 
 namespace {
+
+using oracle::nodes;
 
 using oracle::PlainM5;
 using Rows = std::vector<Eigen::Index>;
 
-llmt::FitResult grow(const Eigen::MatrixXd& x, const Eigen::MatrixXd& y, llmt::FitOptions options = {}) {
+llmt::FitResult grow_m5(const Eigen::MatrixXd& x, const Eigen::MatrixXd& y, llmt::FitOptions options = {}) {
   options.rule = llmt::GrowthRule::m5;
   options.folds.count = 0;
   return llmt::fit(x, y, options);
 }
-
-const std::vector<llmt::Node>& nodes(const llmt::FitResult& result) { return result.model.partitions()[0].nodes; }
 
 // Number of leaves that were compared.
 int expect_same(const PlainM5::Tree& plain, const llmt::Model& model, int index) {
@@ -51,7 +52,7 @@ TEST(M5, IsThePlainOneNodeByNode) {
     const Eigen::VectorXd y =
         oracle::curved(x, seed % 2 == 0 ? 0.1 : 0.4, seed).col(0) + (x.col(0).array() > 0.3).cast<double>().matrix();
     const PlainM5 plain(x, y);
-    leaves += expect_same(plain.root(), grow(x, y).model, 0);
+    leaves += expect_same(plain.root(), grow_m5(x, y).model, 0);
   }
   EXPECT_GT(leaves, 100);  // there was something to compare
 }
@@ -128,7 +129,7 @@ TEST(M5, SmoothingIsThatOfAComputationByHand) {
     x(i, 0) = std::array<double, 4>{-2.0, -1.0, 1.0, 2.0}[i % 4];
     y(i, 0) = x(i, 0) > 0.0 ? 10.0 : 0.0;
   }
-  const llmt::FitResult result = grow(x, y);
+  const llmt::FitResult result = grow_m5(x, y);
   ASSERT_EQ(nodes(result).size(), 3U);
   EXPECT_EQ(nodes(result)[0].threshold, 0.0);
   EXPECT_NEAR(nodes(result)[0].value(0), 5.0, 1e-12);
@@ -143,7 +144,7 @@ TEST(M5, AffineDataGiveOneLeaf) {
   const Eigen::MatrixXd x = oracle::uniform(500, 3, 5);
   for (const double scale : {1.0, 1e-9}) {
     const Eigen::MatrixXd y = scale * (2.0 * x.col(0) - x.col(2)).array() + 1e3 * scale;
-    const llmt::FitResult result = grow(x, y);
+    const llmt::FitResult result = grow_m5(x, y);
     ASSERT_EQ(nodes(result).size(), 1U);
     EXPECT_EQ(result.summary.partitions[0].stop, llmt::StopReason::pruning);
     EXPECT_LT((nodes(result)[0].slope / scale - Eigen::RowVector3d(2.0, 0.0, -1.0)).norm(), 1e-10);
@@ -163,9 +164,9 @@ TEST(M5, RootThatCannotBeSplitHasAllInputs) {
 }
 
 TEST(M5, ConstantOutputsAndFewRowsAreOneLeaf) {
-  EXPECT_EQ(nodes(grow(oracle::uniform(50, 2, 6), Eigen::MatrixXd::Constant(50, 1, 3.5))).size(), 1U);
-  EXPECT_EQ(nodes(grow(oracle::uniform(3, 2, 7), oracle::uniform(3, 1, 8))).size(), 1U);
-  EXPECT_EQ(nodes(grow(oracle::uniform(1, 2, 7), oracle::uniform(1, 1, 8))).size(), 1U);
+  EXPECT_EQ(nodes(grow_m5(oracle::uniform(50, 2, 6), Eigen::MatrixXd::Constant(50, 1, 3.5))).size(), 1U);
+  EXPECT_EQ(nodes(grow_m5(oracle::uniform(3, 2, 7), oracle::uniform(3, 1, 8))).size(), 1U);
+  EXPECT_EQ(nodes(grow_m5(oracle::uniform(1, 2, 7), oracle::uniform(1, 1, 8))).size(), 1U);
 }
 
 TEST(M5, CategoriesAreCutInTheOrderOfTheirMeans) {
@@ -177,7 +178,7 @@ TEST(M5, CategoriesAreCutInTheOrderOfTheirMeans) {
   }
   llmt::FitOptions options;
   options.categorical_inputs = {1};
-  const llmt::FitResult result = grow(x, y, options);
+  const llmt::FitResult result = grow_m5(x, y, options);
   const std::vector<int>& sides = nodes(result)[0].level_side;
   EXPECT_EQ(nodes(result)[0].split_input, 1);
   EXPECT_EQ(sides, (std::vector<int>{1, -1, -1, -1, 1, 1}));
@@ -197,7 +198,7 @@ TEST(M5, MissingValuesMayTellSomethingAndRowsOfNoWeightDoNot) {
       y(i) = -1e6;
     }
   }
-  const llmt::FitResult result = grow(x, y, options);
+  const llmt::FitResult result = grow_m5(x, y, options);
   EXPECT_EQ(nodes(result)[0].split_input, 1);
   EXPECT_EQ(nodes(result)[0].threshold, std::numeric_limits<double>::max());
   EXPECT_EQ(nodes(result)[0].missing_left, 0.0);
@@ -208,7 +209,7 @@ TEST(M5, MissingValuesMayTellSomethingAndRowsOfNoWeightDoNot) {
   for (Eigen::Index i = 0; i < 900; i += 10) {
     gappy(i, 0) = std::nan("");
   }
-  const llmt::FitResult of_gappy = grow(gappy, z);
+  const llmt::FitResult of_gappy = grow_m5(gappy, z);
   EXPECT_EQ(nodes(of_gappy)[0].split_input, 0);
   EXPECT_NEAR(nodes(of_gappy)[0].threshold, 0.1, 0.02);
   const double error = llmt::rmse(of_gappy.model.predict(gappy), z)(0);
@@ -226,7 +227,7 @@ TEST(M5, RowsWithoutAValueTeachTheChildThatTheyClearlyBelongTo) {
     }
     left += !(x(i, 0) > 0.1) ? 1 : 0;
   }
-  const llmt::FitResult result = grow(x, y);
+  const llmt::FitResult result = grow_m5(x, y);
   ASSERT_EQ(nodes(result)[0].split_input, 0);
   EXPECT_LT(nodes(result)[0].threshold, 0.2);
   EXPECT_GT(nodes(result)[0].missing_left, 0.9);
@@ -249,7 +250,7 @@ TEST(M5, WeightsMultiplySquaredErrors) {
   llmt::FitOptions plain;
   plain.max_leaves = 2;
   // Not the same n, for weights have mean 1; but the root's model drops nothing and is the same.
-  EXPECT_LT((nodes(grow(x, y, options))[0].slope - nodes(grow(twice_x, twice_y, plain))[0].slope).norm(), 1e-10);
+  EXPECT_LT((nodes(grow_m5(x, y, options))[0].slope - nodes(grow_m5(twice_x, twice_y, plain))[0].slope).norm(), 1e-10);
 }
 
 TEST(M5, SharedTreesServeAllOutputs) {
@@ -258,7 +259,7 @@ TEST(M5, SharedTreesServeAllOutputs) {
   y << oracle::curved(x, 0.1, 15), oracle::curved(x.rowwise().reverse(), 0.1, 16);
   llmt::FitOptions options;
   options.shared_partition = true;
-  const llmt::FitResult result = grow(x, y, options);
+  const llmt::FitResult result = grow_m5(x, y, options);
   ASSERT_EQ(result.model.partitions().size(), 1U);
   std::set<int> inputs;
   for (const llmt::Node& node : nodes(result)) {
@@ -267,7 +268,7 @@ TEST(M5, SharedTreesServeAllOutputs) {
   EXPECT_TRUE(inputs.contains(0) && inputs.contains(1) && inputs.contains(2));  // what either output bends in
   // Outputs count alike whatever their scale.
   y.col(1) *= 0x1p-40;
-  const llmt::FitResult scaled = grow(x, y, options);
+  const llmt::FitResult scaled = grow_m5(x, y, options);
   ASSERT_EQ(nodes(scaled).size(), nodes(result).size());
   for (std::size_t i = 0; i < nodes(result).size(); ++i) {
     EXPECT_EQ(nodes(scaled)[i].threshold, nodes(result)[i].threshold);
@@ -280,10 +281,10 @@ TEST(M5, SameBytesAtAnyNumberOfThreadsAndSameTreeInAnyOrderOfRows) {
   const Eigen::MatrixXd y = oracle::curved(x, 0.1, 17);
   llmt::FitOptions options;
   options.max_threads = 1;
-  const llmt::FitResult one = grow(x, y, options);
+  const llmt::FitResult one = grow_m5(x, y, options);
   options.max_threads = 4;
-  EXPECT_EQ(to_json(one.model), to_json(grow(x, y, options).model));
-  const llmt::FitResult reversed = grow(x.colwise().reverse(), y.colwise().reverse());
+  EXPECT_EQ(to_json(one.model), to_json(grow_m5(x, y, options).model));
+  const llmt::FitResult reversed = grow_m5(x.colwise().reverse(), y.colwise().reverse());
   ASSERT_EQ(nodes(one).size(), nodes(reversed).size());
   for (std::size_t i = 0; i < nodes(one).size(); ++i) {
     EXPECT_EQ(nodes(one)[i].threshold, nodes(reversed)[i].threshold);
@@ -297,7 +298,7 @@ TEST(M5, FoldsChooseAmongItsPrefixesWithoutChangingItsModels) {
   llmt::FitOptions options;
   options.rule = llmt::GrowthRule::m5;
   const llmt::FitResult chosen = llmt::fit(x, y, options);
-  const llmt::FitResult all = grow(x, y);
+  const llmt::FitResult all = grow_m5(x, y);
   const llmt::PartitionSummary& summary = chosen.summary.partitions[0];
   EXPECT_EQ(summary.chosen.candidate.validity.kind, llmt::ValidityKind::crisp);
   EXPECT_EQ(summary.grown_leaves, all.summary.partitions[0].leaves);

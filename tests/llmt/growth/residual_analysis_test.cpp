@@ -7,8 +7,11 @@
 #include "growth/best_first/residual_search.hpp"
 #include "llmt/fit.hpp"
 #include "oracles/oracles.hpp"
+#include "oracles/samples.hpp"
 
 namespace {
+
+using oracle::nodes;
 
 using llmt::ResidualStatistics;
 
@@ -41,14 +44,12 @@ long double student(const std::vector<double>& a, const std::vector<double>& b, 
   return (mean_a - mean_b) / std::sqrt(variance * (1.0L / n_a + 1.0L / n_b));
 }
 
-llmt::FitResult grow(const Eigen::MatrixXd& x, const Eigen::MatrixXd& y, llmt::FitOptions options = {}) {
+llmt::FitResult grow_ra(const Eigen::MatrixXd& x, const Eigen::MatrixXd& y, llmt::FitOptions options = {}) {
   options.rule = llmt::GrowthRule::ra;
   options.validity = llmt::ValidityChoice::crisp;
   options.folds.count = 0;
   return llmt::fit(x, y, options);
 }
-
-const std::vector<llmt::Node>& nodes(const llmt::FitResult& result) { return result.model.partitions()[0].nodes; }
 
 TEST(ResidualAnalysis, StatisticsAreThoseOfATextbook) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
@@ -123,7 +124,7 @@ TEST(ResidualAnalysis, ConstantInputsAndEmptyClassesTellNothingAndPureClassesEve
 
 // Input that the root of a tree of y is split on.
 int first_input(const Eigen::MatrixXd& x, const Eigen::VectorXd& y, double* threshold = nullptr) {
-  const llmt::FitResult result = grow(x, y);
+  const llmt::FitResult result = grow_ra(x, y);
   if (threshold != nullptr) {
     *threshold = nodes(result)[0].threshold;
   }
@@ -161,7 +162,7 @@ TEST(ResidualAnalysis, PureNoiseIsRarelySplit) {
     for (double& value : y) {
       value = random.normal();
     }
-    split += nodes(grow(oracle::uniform(120, 3, seed + 1000), y)).size() > 1 ? 1 : 0;
+    split += nodes(grow_ra(oracle::uniform(120, 3, seed + 1000), y)).size() > 1 ? 1 : 0;
   }
   // At most 5 %: Binomial(200, 0.05) is above 22 in less than 1 of 2000 cases.
   EXPECT_LE(split, 22);
@@ -173,7 +174,7 @@ TEST(ResidualAnalysis, CostOfANodeDoesNotDependOnItsRows) {
     llmt::FitOptions options;
     options.max_leaves = 6;
     const Eigen::MatrixXd x = oracle::uniform(rows, 3, 5);
-    const llmt::FitResult result = grow(x, oracle::curved(x, 0.1, 5), options);
+    const llmt::FitResult result = grow_ra(x, oracle::curved(x, 0.1, 5), options);
     ASSERT_EQ(nodes(result).size(), 11U);
     // A sum of squares costs a pass over the rows: at most one for each input.
     EXPECT_LE(result.summary.partitions[0].search.evaluations, 11 * 3);
@@ -189,7 +190,7 @@ TEST(ResidualAnalysis, ThresholdsThatLeaveTooFewRowsGiveWayToTheNextInput) {
     x(i, 0) = 50.0;
     y(i) = 5.0;
   }
-  const llmt::FitResult result = grow(x, y);
+  const llmt::FitResult result = grow_ra(x, y);
   ASSERT_GT(nodes(result).size(), 1U);
   for (const llmt::Node& node : nodes(result)) {
     EXPECT_GE(node.samples, result.summary.min_leaf_samples);
@@ -206,8 +207,8 @@ TEST(ResidualAnalysis, LargeAndSmallNodesSplitAlike) {
   llmt::FitOptions options;
   options.max_leaves = 8;
   options.regression_inputs = {0, 1, 2};
-  const llmt::FitResult large = grow(x, y, options);
-  const llmt::FitResult own = grow(wider, y, options);
+  const llmt::FitResult large = grow_ra(x, y, options);
+  const llmt::FitResult own = grow_ra(wider, y, options);
   ASSERT_EQ(nodes(large).size(), nodes(own).size());
   for (std::size_t i = 0; i < nodes(large).size(); ++i) {
     EXPECT_EQ(nodes(large)[i].split_input, nodes(own)[i].split_input);
@@ -225,10 +226,10 @@ TEST(ResidualAnalysis, SameBytesAtAnyNumberOfThreadsAndSameTreeInAnyOrderOfRows)
     options.shared_partition = shared;
     options.max_leaves = 20;
     options.max_threads = 1;
-    const llmt::FitResult one = grow(x, y, options);
+    const llmt::FitResult one = grow_ra(x, y, options);
     options.max_threads = 4;
-    EXPECT_EQ(to_json(one.model), to_json(grow(x, y, options).model));
-    const llmt::FitResult reversed = grow(x.colwise().reverse(), y.colwise().reverse(), options);
+    EXPECT_EQ(to_json(one.model), to_json(grow_ra(x, y, options).model));
+    const llmt::FitResult reversed = grow_ra(x.colwise().reverse(), y.colwise().reverse(), options);
     ASSERT_EQ(nodes(one).size(), nodes(reversed).size());
     for (std::size_t i = 0; i < nodes(one).size(); ++i) {
       EXPECT_EQ(nodes(one)[i].split_input, nodes(reversed)[i].split_input);
@@ -240,11 +241,11 @@ TEST(ResidualAnalysis, SameBytesAtAnyNumberOfThreadsAndSameTreeInAnyOrderOfRows)
 TEST(ResidualAnalysis, OffsetsAndScalesDoNotChangeTheTree) {
   const Eigen::MatrixXd x = oracle::coarse(oracle::uniform(3000, 3, 15));
   const Eigen::MatrixXd y = oracle::coarse(oracle::curved(x, 0.1, 15));
-  const llmt::FitResult plain = grow(x, y);
+  const llmt::FitResult plain = grow_ra(x, y);
   Eigen::MatrixXd moved = x;
   moved.col(0).array() += 1e6;
   moved.col(1) *= 0x1p-30;
-  const llmt::FitResult other = grow(moved, (y.array() * 0x1p-20).matrix());
+  const llmt::FitResult other = grow_ra(moved, (y.array() * 0x1p-20).matrix());
   ASSERT_EQ(nodes(plain).size(), nodes(other).size());
   for (std::size_t i = 0; i < nodes(plain).size(); ++i) {
     EXPECT_EQ(nodes(plain)[i].split_input, nodes(other)[i].split_input);
@@ -263,7 +264,7 @@ TEST(ResidualAnalysis, CategoriesMissingValuesAndWeightsAreFollowed) {
     }
     llmt::FitOptions options;
     options.categorical_inputs = {2};
-    const llmt::FitResult by_levels = grow(x, y, options);
+    const llmt::FitResult by_levels = grow_ra(x, y, options);
     EXPECT_EQ(nodes(by_levels)[0].split_input, 2);
     EXPECT_EQ(nodes(by_levels)[0].level_side[1], nodes(by_levels)[0].level_side[3]);
     EXPECT_LT(by_levels.summary.partitions[0].train_rmse(0), 1e-9);
@@ -281,7 +282,7 @@ TEST(ResidualAnalysis, CategoriesMissingValuesAndWeightsAreFollowed) {
       options.weights(i) = 0.0;
       z(i) = 1e3;
     }
-    const llmt::FitResult by_missing = grow(gappy, z, options);
+    const llmt::FitResult by_missing = grow_ra(gappy, z, options);
     EXPECT_EQ(nodes(by_missing)[0].split_input, 1);
     EXPECT_EQ(nodes(by_missing)[0].threshold, std::numeric_limits<double>::max());
     EXPECT_LT(by_missing.summary.partitions[0].train_rmse(0), 1e-9);

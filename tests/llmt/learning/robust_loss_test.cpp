@@ -7,13 +7,11 @@
 
 #include "llmt/fit.hpp"
 #include "llmt/random.hpp"
+#include "oracles/samples.hpp"
 
 namespace {
 
-struct Sample {
-  Eigen::MatrixXd x;
-  Eigen::MatrixXd y;
-};
+using oracle::Sample;
 
 // y = |a| + b, with normal noise of 0.1, ten times as large where a > 0.
 Sample sample(Eigen::Index rows, std::uint64_t seed) {

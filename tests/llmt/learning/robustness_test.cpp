@@ -10,8 +10,11 @@
 
 #include "llmt/fit.hpp"
 #include "llmt/random.hpp"
+#include "oracles/samples.hpp"
 
 namespace {
+
+using oracle::Sample;
 
 constexpr Eigen::Index rows = 4000;
 constexpr Eigen::Index columns = 10;
@@ -22,11 +25,6 @@ double regimes(const Eigen::VectorXd& x) {
                                    : 20.0 * (x(4) - 0.5) * (x(4) - 0.5) + 10.0 * x(5) * x(6) - 5.0;
   return regime + 8.0 * std::max(0.0, x(7) - 0.6) + 2.0 * x(8);
 }
-
-struct Sample {
-  Eigen::MatrixXd x;
-  Eigen::MatrixXd y;
-};
 
 Sample sample(std::uint64_t seed) {
   llmt::Random random(seed);

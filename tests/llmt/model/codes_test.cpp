@@ -11,12 +11,14 @@
 #include "llmt/explain.hpp"
 #include "llmt/fit.hpp"
 #include "llmt/random.hpp"
+#include "oracles/edited.hpp"
 #include "oracles/oracles.hpp"
+#include "oracles/samples.hpp"
 #include "oracles/thrown.hpp"
 
 namespace {
 
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+using oracle::replaced;
 
 const std::vector<double> codes = {-2.0, 3.0, 4.0, 7.0};
 
@@ -55,7 +57,7 @@ TEST(Codes, NearestCodeCountsAndOfTwoTheSmaller) {
                                                            {3.5, 1},  {3.501, 2}, {5.5, 2},  {5.6, 3},  {7, 3},
                                                            {8, 3},    {1e300, 3}, {-0.0, 0}, {2.0, 1}};
   for (const auto& [value, position] : expected) EXPECT_EQ(llmt::position_of(input, value), position) << value;
-  EXPECT_TRUE(std::isnan(llmt::position_of(input, nan)));
+  EXPECT_TRUE(std::isnan(llmt::position_of(input, oracle::missing)));
   EXPECT_TRUE(std::isinf(llmt::position_of(input, -std::numeric_limits<double>::infinity())));
   EXPECT_EQ(llmt::position_of({.name = "x"}, 2.3), 2.3);
 }
@@ -65,7 +67,7 @@ TEST(Codes, ModelOfCodesSaysWhatThatOfPositionsSays) {
   const llmt::Model of_codes = coded(of_positions);
   for (const Eigen::Index rows : {5, 300}) {
     Queries made = queries(rows);
-    made.positions(1, 0) = made.numbers(1, 0) = nan;
+    made.positions(1, 0) = made.numbers(1, 0) = oracle::missing;
     EXPECT_EQ(of_codes.predict(made.numbers), of_positions.predict(made.positions));
     EXPECT_EQ(of_codes.leaf_of(made.numbers), of_positions.leaf_of(made.positions));
     EXPECT_EQ(of_codes.validities(made.numbers, 0), of_positions.validities(made.positions, 0));
@@ -101,12 +103,6 @@ TEST(Codes, InfiniteNumbersAreRefused) {
   x(7, 0) = std::numeric_limits<double>::infinity();
   EXPECT_THROW(model.predict(x), std::invalid_argument);
   EXPECT_THROW(model.predict(x.topRows(8)), std::invalid_argument);
-}
-
-std::string replaced(std::string text, const std::string& part, const std::string& by) {
-  const std::size_t at = text.find(part);
-  EXPECT_NE(at, std::string::npos) << part;
-  return at == std::string::npos ? text : text.replace(at, part.size(), by);
 }
 
 TEST(Codes, FilesKeepThem) {

@@ -25,12 +25,12 @@ std::string objects(int depth) {
   return text + "0" + std::string(depth, '}');
 }
 
-std::string error_of(const std::string& json) {
+std::string refusal_of(const std::string& json) {
   return oracle::thrown<std::runtime_error>([&] { llmt::from_json(json, "m.json"); });
 }
 
 // Two inputs, the second with levels, two outputs.
-llmt::FitResult fitted(Eigen::Index outputs = 2) {
+llmt::FitResult fitted_with_levels(Eigen::Index outputs = 2) {
   const Eigen::Index rows = 120;
   Eigen::MatrixXd x = oracle::uniform(rows, 2, 5);
   for (Eigen::Index i = 0; i < rows; ++i) x(i, 1) = static_cast<double>(i % 3);
@@ -47,7 +47,7 @@ llmt::FitResult fitted(Eigen::Index outputs = 2) {
 }
 
 const std::string& file() {
-  static const std::string text = llmt::to_json(fitted().model);
+  static const std::string text = llmt::to_json(fitted_with_levels().model);
   return text;
 }
 
@@ -90,7 +90,7 @@ TEST(HostileFiles, ANumberThatNoFitWritesIsRefusedWithItsPlace) {
                     "m.json: /partitions/0/validity/width: 1e400 is beyond the range of a"},
            Nonsense{"validity", "width", "1, \"width\": 1", "m.json: /partitions/0/validity/width: the member stands"},
        }) {
-    const std::string error = error_of(with(each.after, each.key, each.value));
+    const std::string error = refusal_of(with(each.after, each.key, each.value));
     const std::string expected = each.message;
     EXPECT_EQ(error.substr(0, expected.size()), expected) << error;
   }
@@ -101,16 +101,16 @@ TEST(HostileFiles, GaussiansNeedAWidth) {
   const std::size_t at = text.find("\"width\": ") + 9;
   for (const std::string width : {"0.0", "1e-308"}) {
     const std::string wrong = text.substr(0, at) + width + text.substr(text.find(',', at));
-    EXPECT_EQ(error_of(wrong).find("m.json: /partitions/0: the width "), 0U) << error_of(wrong);
+    EXPECT_EQ(refusal_of(wrong).find("m.json: /partitions/0: the width "), 0U) << refusal_of(wrong);
   }
 }
 
 TEST(HostileFiles, NamesAreUnique) {
-  EXPECT_EQ(error_of(with("centre", "name", "\"a\"")), "m.json: /inputs/1: two inputs have the name \"a\"");
-  EXPECT_EQ(error_of(with("outputs", "name", "\"v\"")), "m.json: /outputs/1: two outputs have the name \"v\"");
-  EXPECT_EQ(error_of(with("inputs", "levels", "[\"red\", \"red\", \"blue\"]")),
+  EXPECT_EQ(refusal_of(with("centre", "name", "\"a\"")), "m.json: /inputs/1: two inputs have the name \"a\"");
+  EXPECT_EQ(refusal_of(with("outputs", "name", "\"v\"")), "m.json: /outputs/1: two outputs have the name \"v\"");
+  EXPECT_EQ(refusal_of(with("inputs", "levels", "[\"red\", \"red\", \"blue\"]")),
             "m.json: /inputs/1: two levels have the name \"red\"");
-  const llmt::Model model = fitted().model;
+  const llmt::Model model = fitted_with_levels().model;
   EXPECT_EQ(oracle::thrown([&] {
               model.named({"a", "a"}, {"u", "v"});
             }),
@@ -120,13 +120,13 @@ TEST(HostileFiles, NamesAreUnique) {
 TEST(HostileFiles, NestingIsBounded) {
   for (const std::string& deep : {brackets(many), objects(many), std::string(many, '['), std::string(many, '{')}) {
     for (const char* key : {"version", "format", "unknown", "inputs"}) {
-      EXPECT_EQ(error_of("{\"" + std::string(key) + "\":" + deep + "}").substr(0, 7), "m.json:");
+      EXPECT_EQ(refusal_of("{\"" + std::string(key) + "\":" + deep + "}").substr(0, 7), "m.json:");
     }
-    EXPECT_EQ(error_of(deep).substr(0, 7), "m.json:");
+    EXPECT_EQ(refusal_of(deep).substr(0, 7), "m.json:");
   }
-  EXPECT_NE(error_of(brackets(33)).find("more than 32 levels"), std::string::npos);
-  EXPECT_EQ(error_of("{\"version\":" + brackets(30) + "}").find("m.json: not a model file"), 0U);
-  EXPECT_NE(error_of(with("inputs", "low", brackets(20))).find("/inputs/0/low: a number is needed, not an array"),
+  EXPECT_NE(refusal_of(brackets(33)).find("more than 32 levels"), std::string::npos);
+  EXPECT_EQ(refusal_of("{\"version\":" + brackets(30) + "}").find("m.json: not a model file"), 0U);
+  EXPECT_NE(refusal_of(with("inputs", "low", brackets(20))).find("/inputs/0/low: a number is needed, not an array"),
             std::string::npos);
 }
 
@@ -135,7 +135,7 @@ TEST(HostileFiles, LongTextsAreNotRepeatedInMessages) {
   for (const std::string& wrong :
        {with("inputs", "low", "\"" + text + "\""), with("validity", "kind", "\"" + text + "\""), text, "{\"" + text,
         with("inputs", "name", text), with("inputs", "low", "1" + std::string(1 << 20, '0'))}) {
-    EXPECT_LT(error_of(wrong).size(), 500U) << error_of(wrong).substr(0, 500);
+    EXPECT_LT(refusal_of(wrong).size(), 500U) << refusal_of(wrong).substr(0, 500);
   }
 }
 
@@ -154,8 +154,8 @@ std::string error_of_file(const std::string& path) {
 }
 
 TEST(HostileFiles, IntervalsOfAnotherModelAreRefused) {
-  const llmt::FitResult one = fitted(1);
-  const llmt::FitResult two = fitted(2);
+  const llmt::FitResult one = fitted_with_levels(1);
+  const llmt::FitResult two = fitted_with_levels(2);
   const std::string own = mixed(two, two);
   EXPECT_EQ(error_of_file(own), "nothing was thrown");
   EXPECT_EQ(to_json(llmt::load_with_intervals(own).model), to_json(two.model));
@@ -188,7 +188,7 @@ TEST(HostileFiles, IntervalsOfAnotherModelAreRefused) {
 
 TEST(HostileFiles, IntervalsOfTheWrongTypeAreRefused) {
   const std::string path = testing::TempDir() + "/llmt_intervals.json";
-  const std::string model = llmt::to_json(fitted().model);
+  const std::string model = llmt::to_json(fitted_with_levels().model);
   for (const std::string& intervals :
        {std::string("7"), std::string("{}"), std::string("[7]"), "[{\"model\":" + brackets(many) + "}]",
         "[{\"model\":" + brackets(20) + "}]", "[{\"model\":" + model + "}]",

@@ -9,10 +9,13 @@
 
 #include "llmt/files.hpp"
 #include "llmt/fit.hpp"
+#include "oracles/edited.hpp"
 #include "oracles/oracles.hpp"
 #include "oracles/thrown.hpp"
 
 namespace {
+
+using oracle::replaced;
 
 llmt::Model example() {
   const Eigen::MatrixXd x = oracle::uniform(200, 2, 31);
@@ -28,12 +31,6 @@ std::string error_of(const std::string& json) {
     return error.what();
   }
   return "accepted";
-}
-
-std::string replaced(std::string text, const std::string& from, const std::string& to) {
-  const std::size_t at = text.find(from);
-  EXPECT_NE(at, std::string::npos) << from;
-  return text.replace(at, from.size(), to);
 }
 
 TEST(Model, TellsHowFarAQueryLiesOutside) {

@@ -9,10 +9,11 @@
 #include "llmt/explain.hpp"
 #include "llmt/fit.hpp"
 #include "oracles/oracles.hpp"
+#include "oracles/samples.hpp"
 
 namespace {
 
-constexpr double missing = std::numeric_limits<double>::quiet_NaN();
+using oracle::missing;
 
 // A model of HILOMOT with the given number of leaves.
 llmt::FitOptions hilomot(Eigen::Index leaves) {

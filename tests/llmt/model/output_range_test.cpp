@@ -8,10 +8,13 @@
 #include "llmt/fit.hpp"
 #include "llmt/model.hpp"
 #include "oracles/clamped.hpp"
+#include "oracles/edited.hpp"
 #include "oracles/random_models.hpp"
 #include "oracles/thrown.hpp"
 
 namespace {
+
+using oracle::replaced;
 
 using llmt::ValidityKind;
 using oracle::clamped;
@@ -94,12 +97,6 @@ TEST(OutputRange, FilesKeepIt) {
     EXPECT_NE(without.find("\"version\": 2"), std::string::npos);
     EXPECT_EQ(without.find("output_range"), std::string::npos);
   }
-}
-
-std::string replaced(std::string text, const std::string& part, const std::string& by) {
-  const std::size_t at = text.find(part);
-  EXPECT_NE(at, std::string::npos) << part;
-  return at == std::string::npos ? text : text.replace(at, part.size(), by);
 }
 
 // The file of a shared partition whose first output is clamped, with another range.

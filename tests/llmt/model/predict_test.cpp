@@ -13,14 +13,15 @@
 #include "oracles/oracles.hpp"
 #include "oracles/predict_oracle.hpp"
 #include "oracles/random_models.hpp"
+#include "oracles/samples.hpp"
 
 namespace {
+
+using oracle::missing;
 
 using llmt::ValidityKind;
 using random_models::Kind;
 using random_models::random_model;
-
-constexpr double missing = std::numeric_limits<double>::quiet_NaN();
 
 // Rows inside, outside and on thresholds; with and without missing values and levels that nobody knows.
 Eigen::MatrixXd queries(const Kind& kind, const llmt::Model& model, Eigen::Index rows, std::uint64_t seed) {

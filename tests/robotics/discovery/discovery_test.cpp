@@ -8,6 +8,7 @@
 #include "llmt/robotics/robot_file.hpp"
 #include "llmt/robotics/simulation.hpp"
 #include "robotics/effects.hpp"
+#include "robotics/found.hpp"
 
 namespace llmt::robotics {
 namespace {
@@ -15,11 +16,6 @@ namespace {
 using discovery::Answer;
 
 constexpr double um = 1e-3;
-
-Effect effect(const std::string& type, const std::string& at, std::vector<double> values,
-              std::vector<double> constants = {}) {
-  return {.type = type, .at = at, .values = std::move(values), .constants = std::move(constants)};
-}
 
 Robot arm(const std::string& name) { return read_robot(LLMT_ROBOTS_DIR "/" + name + ".yaml"); }
 
@@ -47,13 +43,6 @@ Robot built(Robot robot, std::uint64_t seed) {
     joint.theta_deg += 0.02 * random.normal();
   }
   return robot;
-}
-
-std::vector<std::string> labels(const Discovery& found) {
-  std::vector<std::string> all;
-  for (const FoundEffect& one : found.effects) all.push_back(effect_label(one.effect));
-  std::ranges::sort(all);
-  return all;
 }
 
 bool has(const std::vector<std::string>& all, const std::string& one) {

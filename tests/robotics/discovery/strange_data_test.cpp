@@ -8,6 +8,7 @@
 #include "llmt/robotics/discovery.hpp"
 #include "llmt/robotics/simulation.hpp"
 #include "robotics/effects.hpp"
+#include "robotics/found.hpp"
 
 namespace llmt::robotics {
 namespace {
@@ -41,14 +42,8 @@ Poses poses_of(const Chain& chain, Eigen::Index n, std::uint64_t seed) {
   return poses;
 }
 
-Measurements seen(const Robot& truth, Eigen::Index n, double noise_mm, std::uint64_t seed) {
+Measurements measured_on(const Robot& truth, Eigen::Index n, double noise_mm, std::uint64_t seed) {
   return measure(truth, poses_of(truth.chain, n, seed), noise_mm, seed + 100);
-}
-
-std::vector<std::string> labels(const Discovery& found) {
-  std::vector<std::string> all;
-  for (const FoundEffect& one : found.effects) all.push_back(effect_label(one.effect));
-  return all;
 }
 
 bool names(const Discovery& found, const std::string& type, const std::string& at) {
@@ -61,7 +56,7 @@ std::string kind(const Discovery& found) { return found.unknown.empty() ? "" : f
 
 TEST(StrangeData, ASmallStrainWaveGearIsPlausible) {
   const Robot truth = with_effect(light_arm(), {"joint_compliance", "joint5", {9e-4}});
-  const Discovery found = discover(light_arm(), seen(truth, 80, 0.02, 1), {}, quick());
+  const Discovery found = discover(light_arm(), measured_on(truth, 80, 0.02, 1), {}, quick());
   EXPECT_TRUE(names(found, "joint_compliance", "joint5")) << testing::PrintToString(labels(found));
 }
 
@@ -70,7 +65,7 @@ TEST(StrangeData, ASmallEffectBesideALargeOneIsNamedToo) {
   truth = with_effect(truth, {"transmission_error", "joint1", {4e-5, 0.0}, {160.0}});
   Robot described = light_arm();
   described.chain.joints[0].gear_ratio = 80.0;
-  const Discovery found = discover(described, seen(truth, 150, 0.01, 2), {}, quick());
+  const Discovery found = discover(described, measured_on(truth, 150, 0.01, 2), {}, quick());
   EXPECT_TRUE(names(found, "joint_compliance", "joint2")) << testing::PrintToString(labels(found));
   EXPECT_TRUE(names(found, "transmission_error", "joint1")) << testing::PrintToString(labels(found));
   const auto small =
@@ -83,7 +78,7 @@ TEST(StrangeData, ASmallEffectBesideALargeOneIsNamedToo) {
 TEST(StrangeData, GrossOutliersDoNotHideAnEffect) {
   const Robot truth = with_effect(ur_like(), {"joint_gain", "joint2", {4e-4}});
   for (const double size : {20.0, 500.0}) {
-    Measurements measured = seen(truth, 60, 0.02, 3);
+    Measurements measured = measured_on(truth, 60, 0.02, 3);
     for (const Eigen::Index row : {5, 17, 23, 41}) measured.positions_mm(row, row % 3) += size;
     measured.positions_mm.row(30).swap(measured.positions_mm.row(31));
     const Discovery found = discover(ur_like(), measured, {}, quick());
@@ -98,7 +93,7 @@ TEST(StrangeData, GrossOutliersDoNotHideAnEffect) {
 }
 
 TEST(StrangeData, TooManyOutliersAreNoAllClear) {
-  Measurements measured = seen(ur_like(), 80, 0.02, 4);
+  Measurements measured = measured_on(ur_like(), 80, 0.02, 4);
   Random random(5);
   for (Eigen::Index row = 0; row < 80; row += 4) {
     for (int axis = 0; axis < 3; ++axis) measured.positions_mm(row, axis) += 2.0 * random.normal();
@@ -110,7 +105,7 @@ TEST(StrangeData, TooManyOutliersAreNoAllClear) {
 
 TEST(StrangeData, ScatterOfOneJointIsNoInstrumentsNoise) {
   const Robot robot = ur_like();
-  Measurements measured = seen(robot, 120, 0.01, 6);
+  Measurements measured = measured_on(robot, 120, 0.01, 6);
   Random random(7);
   const Kinematics kinematics(robot.chain);
   for (Eigen::Index i = 0; i < measured.count(); ++i) {
@@ -129,7 +124,7 @@ TEST(StrangeData, NoiseThatDiffersBetweenDirectionsIsNoise) {
   for (std::uint64_t seed = 1; seed <= 8; ++seed) {
     Robot robot = ur_like();
     robot.chain.base.xyz_mm = {2500.0, 800.0, -400.0};
-    Measurements measured = seen(robot, 90, 0.0, 10 + seed);
+    Measurements measured = measured_on(robot, 90, 0.0, 10 + seed);
     Random random(seed);
     for (Eigen::Index i = 0; i < measured.count(); ++i) {
       Eigen::RowVector3d noise(random.normal(), random.normal(), random.normal());
@@ -148,19 +143,19 @@ TEST(StrangeData, AnEccentricCircleOfTheInstrumentIsNamed) {
   Robot robot = ur_like();
   robot.chain.base.xyz_mm = {2500.0, 800.0, -400.0};
   const Robot truth = with_effect(robot, {"instrument_azimuth", "", {1.5e-4, -1e-4}});
-  const Discovery found = discover(robot, seen(truth, 100, 0.01, 30), {}, quick());
+  const Discovery found = discover(robot, measured_on(truth, 100, 0.01, 30), {}, quick());
   EXPECT_TRUE(names(found, "instrument_azimuth", "")) << testing::PrintToString(labels(found));
 }
 
 TEST(StrangeData, AJointReadBeforeItStoodStillIsNamed) {
   const Robot truth = with_effect(ur_like(), {"not_settled", "joint2", {2e-4}});
-  const Discovery found = discover(ur_like(), seen(truth, 100, 0.02, 31), {}, quick());
+  const Discovery found = discover(ur_like(), measured_on(truth, 100, 0.02, 31), {}, quick());
   EXPECT_TRUE(names(found, "not_settled", "joint2")) << testing::PrintToString(labels(found));
 }
 
 TEST(StrangeData, BacklashWithASoftTransitionHasItsName) {
   const Robot truth = with_effect(light_arm(), {"backlash_gravity_soft", "joint3", {3e-4}, {0.6}});
-  const Discovery found = discover(light_arm(), seen(truth, 120, 0.01, 32), {}, quick());
+  const Discovery found = discover(light_arm(), measured_on(truth, 120, 0.01, 32), {}, quick());
   ASSERT_FALSE(found.effects.empty());
   for (const FoundEffect& one : found.effects) {
     EXPECT_EQ(effect_type(one.effect.type).family, "backlash_gravity") << effect_label(one.effect);
@@ -170,13 +165,13 @@ TEST(StrangeData, BacklashWithASoftTransitionHasItsName) {
 
 TEST(StrangeData, AWholeOrderIsTakenWhereItExplainsAsWell) {
   const Robot truth = with_effect(ur_like(), {"transmission_error", "joint2", {2e-4, 1e-4}, {5.0}});
-  const Discovery found = discover(ur_like(), seen(truth, 100, 0.02, 33), {}, quick());
+  const Discovery found = discover(ur_like(), measured_on(truth, 100, 0.02, 33), {}, quick());
   EXPECT_EQ(labels(found), std::vector<std::string>{"transmission_error@joint2[5]"});
 }
 
 // 60 degrees called 60 rad, or the other way round, bends the fitted tool to metres.
 TEST(StrangeData, PlausibilityIsMeasuredByTheNominalArm) {
-  Measurements measured = seen(ur_like(), 80, 0.02, 34);
+  Measurements measured = measured_on(ur_like(), 80, 0.02, 34);
   measured.poses.joints *= degree;
   EXPECT_THROW(discover(ur_like(), measured, {}, quick()), std::runtime_error);
 }
@@ -184,7 +179,8 @@ TEST(StrangeData, PlausibilityIsMeasuredByTheNominalArm) {
 TEST(StrangeData, NamesThatMakeThePosesSetAsideWorseAreWithdrawn) {
   const Robot truth = with_effect(ur_like(), {"joint_gain", "joint2", {4e-4}});
   const Robot other = with_effect(ur_like(), {"joint_gain", "joint2", {-4e-4}});
-  const Discovery found = discover(ur_like(), seen(truth, 80, 0.02, 35), seen(other, 40, 0.02, 36), quick());
+  const Discovery found =
+      discover(ur_like(), measured_on(truth, 80, 0.02, 35), measured_on(other, 40, 0.02, 36), quick());
   EXPECT_EQ(found.answer, Answer::unknown);
   EXPECT_TRUE(found.improved.robot.effects.empty());
   for (const FoundEffect& one : found.effects) EXPECT_FALSE(one.confirmed) << effect_label(one.effect);
@@ -198,7 +194,7 @@ TEST(StrangeData, ADescriptionWithSoftJointsCalibratesToTheEnd) {
   }
   truth = with_effect(truth, {"link_bending", "joint2", {2e-5}});
   truth = with_effect(truth, {"elastic_base", "", {3e-5}});
-  const Measurements measured = seen(truth, 80, 0.02, 37);
+  const Measurements measured = measured_on(truth, 80, 0.02, 37);
   const Calibration fitted = calibrate(truth, measured);
   EXPECT_TRUE(fitted.result.converged()) << fitted.result.reason;
   const Calibration again = calibrate(fitted.robot, measured);
@@ -207,7 +203,7 @@ TEST(StrangeData, ADescriptionWithSoftJointsCalibratesToTheEnd) {
 
 TEST(StrangeData, WhatIsRefusedForItsSizeIsMentioned) {
   const Robot truth = with_effect(light_arm(), {"elastic_base", "", {5e-4}});
-  const Discovery found = discover(light_arm(), seen(truth, 80, 0.02, 21), {}, quick());
+  const Discovery found = discover(light_arm(), measured_on(truth, 80, 0.02, 21), {}, quick());
   EXPECT_FALSE(names(found, "elastic_base", ""));
   const auto base = std::ranges::find(found.beyond_plausible, "elastic_base",
                                       [](const BeyondPlausible& one) { return one.effect.type; });
@@ -218,7 +214,7 @@ TEST(StrangeData, WhatIsRefusedForItsSizeIsMentioned) {
 
 TEST(StrangeData, TheWidthOfAHysteresisCountsTheApproach) {
   const Robot truth = with_effect(light_arm(), {"hysteresis_approach", "joint2", {2e-4, 3e-5}, {0.02}});
-  const Discovery found = discover(light_arm(), seen(truth, 150, 0.01, 22), {}, quick());
+  const Discovery found = discover(light_arm(), measured_on(truth, 150, 0.01, 22), {}, quick());
   ASSERT_TRUE(names(found, "hysteresis_approach", "joint2")) << testing::PrintToString(labels(found));
   EXPECT_EQ(found.effects.size(), 1u) << testing::PrintToString(labels(found));
   const FoundParameter& width = found.effects[0].parameters[0];
@@ -229,7 +225,7 @@ TEST(StrangeData, TheWidthOfAHysteresisCountsTheApproach) {
 // Half of what a wobble can do turns the next axis by a constant angle, which geometry does too.
 TEST(StrangeData, WhatGeometryImitatesIsNotFittedBesideIt) {
   Robot robot = with_effect(light_arm(), {"axis_wobble", "joint3", {6e-5, 0.0, 0.0, 2e-5}});
-  const Measurements measured = seen(robot, 200, 0.005, 23);
+  const Measurements measured = measured_on(robot, 200, 0.005, 23);
   robot.effects[0].values = {0.0, 0.0, 0.0, 0.0};
   const Calibration calibration = calibrate(robot, measured);
   for (const double value : calibration.robot.effects[0].values) EXPECT_LT(std::abs(value), 2e-4);

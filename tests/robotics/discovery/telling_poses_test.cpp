@@ -9,14 +9,10 @@
 #include "llmt/robotics/robot_file.hpp"
 #include "llmt/robotics/simulation.hpp"
 #include "robotics/effects.hpp"
+#include "robotics/found.hpp"
 
 namespace llmt::robotics {
 namespace {
-
-Effect effect(const std::string& type, const std::string& at, std::vector<double> values,
-              std::vector<double> constants = {}) {
-  return {.type = type, .at = at, .values = std::move(values), .constants = std::move(constants)};
-}
 
 Robot rigid_planar() {
   Robot robot = read_robot(LLMT_ROBOTS_DIR "/planar_two_link.yaml");

@@ -7,14 +7,14 @@ namespace llmt::robotics {
 namespace {
 
 // Two joints, the second prismatic.
-Robot two() {
+Robot waist_and_slide() {
   Robot robot = make_robot(Convention::dh, {{90, 0, 100, 0}, {0, 0, 0, 0}});
   robot.chain.joints[1].type = JointType::prismatic;
   robot.chain.joints[0].name = "waist";
   return robot;
 }
 
-Measurements read(const std::string& text, const ColumnMap& map = {}, const Robot& robot = two()) {
+Measurements read(const std::string& text, const ColumnMap& map = {}, const Robot& robot = waist_and_slide()) {
   return parse_measurements(text, "m.csv", robot, {}, DecimalMark::point, map);
 }
 
@@ -65,14 +65,14 @@ TEST(ObservationFile, LongFormatAndSessionsNameTheirFrames) {
   EXPECT_EQ(seen[0].stand, seen[1].stand);
   EXPECT_NE(seen[1].stand, seen[2].stand);
   EXPECT_EQ(seen[2].stand, seen[3].stand);
-  const Robot robot = with_frames(two(), m.poses);
+  const Robot robot = with_frames(waist_and_slide(), m.poses);
   EXPECT_EQ(robot.chain.bases.size(), 1u);
   EXPECT_EQ(robot.chain.tools.size(), 3u);
 }
 
 // A robot that was calibrated with such a file knows its frames by their names.
 TEST(ObservationFile, FramesThatTheRobotHasAreFoundAgain) {
-  Robot robot = two();
+  Robot robot = waist_and_slide();
   robot.chain.tools = {{"t2", {}}};
   const Measurements m = read("q1_deg,q2_mm,x_mm,target\n1,2,3,t2\n2,3,4,t1\n", {}, robot);
   EXPECT_EQ(m.poses.observations[0].tool, "t2");
@@ -91,7 +91,7 @@ TEST(ObservationFile, DistancesAreReadings) {
 TEST(ObservationFile, ColumnMapNamesColumnsAndUnits) {
   const ColumnMap map = parse_column_map("decimal: comma\ncolumns: {Axis 1: waist_deg, A2: q2_mm, X: x_m}\n", "map");
   const Measurements m =
-      parse_measurements("Axis 1;A2;X\n180,0;2,5;0,25\n", "m.csv", two(), {}, DecimalMark::point, map);
+      parse_measurements("Axis 1;A2;X\n180,0;2,5;0,25\n", "m.csv", waist_and_slide(), {}, DecimalMark::point, map);
   EXPECT_DOUBLE_EQ(m.poses.joints(0, 0), std::numbers::pi);
   EXPECT_EQ(m.poses.joints(0, 1), 2.5);
   EXPECT_EQ(m.positions_mm(0, 0), 250.0);
@@ -141,7 +141,7 @@ TEST(ObservationFile, WritingAndReadingKeepsTargetsSessionsAndDistances) {
        {"q1_deg,q2_mm,t1_x_mm,t1_y_mm,t1_z_mm,t2_x_mm,t2_y_mm,t2_z_mm\n1,2,3,4,5,6,7,8\n2,3,,,,7,8,9\n",
         "q1_deg,q2_mm,x_mm,session\n1,2,3,a\n2,3,4,b\n", "q1_deg,q2_mm,distance_mm\n1,2,3\n"}) {
     const Measurements once = read(text);
-    const Measurements again = read(to_csv(once, with_frames(two(), once.poses)));
+    const Measurements again = read(to_csv(once, with_frames(waist_and_slide(), once.poses)));
     EXPECT_EQ(again.positions_mm, once.positions_mm);
     ASSERT_EQ(again.poses.observations.size(), once.poses.observations.size());
     for (std::size_t i = 0; i < once.poses.observations.size(); ++i) {

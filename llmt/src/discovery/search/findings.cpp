@@ -20,7 +20,9 @@ std::vector<Rival> rivals_of(const Scoring& scoring, const Set& set, const std::
   const Set rest = without_family(scoring, set, family);
   const double left = scoring.fit(set).left;
   const double explained = scoring.workspace().sum_of_squares() - left;
-  constexpr double same = 1e-8;
+  // Of the squares explained. Columns of candidates are good to about a thousandth of them where candidates are linear
+  // only nearly, so what differs by less than three times that is the same.
+  constexpr double same = 1e-5;
   std::set<std::string> others;
   for (std::size_t a = 0; a < candidates.size(); ++a) {
     if (scoring.usable(a) && !candidates[a].generic) others.insert(candidates[a].family);
