@@ -7,16 +7,24 @@
 #include <numbers>
 
 namespace llmt::robotics {
+namespace {
+
+// The rotation R with the greatest trace of R matrix (Kabsch 1976; a reflection is turned back about the least axis).
+Eigen::Matrix3d rotation_of_greatest_trace(const Eigen::Matrix3d& matrix) {
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(matrix, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  Eigen::Vector3d handedness = Eigen::Vector3d::Ones();
+  if ((svd.matrixV() * svd.matrixU().transpose()).determinant() < 0.0) handedness(2) = -1.0;
+  return svd.matrixV() * handedness.asDiagonal() * svd.matrixU().transpose();
+}
+
+}  // namespace
 
 Pose kabsch(const Eigen::MatrixXd& from, const Eigen::MatrixXd& to) {
   const Eigen::RowVector3d centre_from = from.colwise().mean();
   const Eigen::RowVector3d centre_to = to.colwise().mean();
   const Eigen::Matrix3d covariance = (from.rowwise() - centre_from).transpose() * (to.rowwise() - centre_to);
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::Vector3d handedness = Eigen::Vector3d::Ones();
-  if ((svd.matrixV() * svd.matrixU().transpose()).determinant() < 0.0) handedness(2) = -1.0;
   Pose pose;
-  pose.rotation = svd.matrixV() * handedness.asDiagonal() * svd.matrixU().transpose();
+  pose.rotation = rotation_of_greatest_trace(covariance);
   pose.position_mm = centre_to.transpose() - pose.rotation * centre_from.transpose();
   return pose;
 }
@@ -60,11 +68,7 @@ Robot with_closed_form_orientation(Robot robot, const Measurements& measurements
   for (std::size_t i = 0; i < flanges.size(); ++i) {
     sum += flanges[i].rotation.transpose() * measurements.poses.observations[i].reference;
   }
-  // The rotation nearest to the sum.
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(sum, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::Vector3d handedness = Eigen::Vector3d::Ones();
-  if ((svd.matrixU() * svd.matrixV().transpose()).determinant() < 0.0) handedness(2) = -1.0;
-  robot.chain.tool.rpy_deg = roll_pitch_yaw_deg(svd.matrixU() * handedness.asDiagonal() * svd.matrixV().transpose());
+  robot.chain.tool.rpy_deg = roll_pitch_yaw_deg(rotation_of_greatest_trace(sum.transpose()));
   return robot;
 }
 
