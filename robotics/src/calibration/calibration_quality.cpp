@@ -1,7 +1,6 @@
 #include "llmt/robotics/calibration_quality.hpp"
 
 #include <Eigen/Cholesky>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -12,6 +11,7 @@
 
 #include "calibration/median.hpp"
 #include "calibration/noise_model.hpp"
+#include "calibration/singular_values.hpp"
 #include "llmt/random.hpp"
 
 namespace llmt::robotics {
@@ -112,9 +112,7 @@ Eigen::VectorXd leave_one_out(const Calibration& calibration, const Measurements
 
 Observability observability_of(const Calibration& calibration, const Measurements& measurements) {
   const Weighed fit = weighed(calibration, measurements);
-  const Eigen::MatrixXd information = fit.jacobian.transpose() * fit.jacobian;
-  const Eigen::VectorXd singular = Eigen::JacobiSVD<Eigen::MatrixXd>(information).singularValues().cwiseSqrt();
-  return observability(singular, std::ssize(poses_of(measurements)));
+  return observability(singular_values(fit.jacobian), std::ssize(poses_of(measurements)));
 }
 
 std::optional<RepeatNoise> noise_of_repeats(const Measurements& measurements) {

@@ -3,12 +3,12 @@
 #include <fmt/format.h>
 
 #include <Eigen/Cholesky>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 #include <stdexcept>
 
+#include "calibration/singular_values.hpp"
 #include "pose_selection/design_bound.hpp"
 #include "pose_selection/driving_order.hpp"
 #include "pose_selection/exchange.hpp"
@@ -115,7 +115,7 @@ PredictedCalibration predict(const Task& task, const Eigen::MatrixXd& rows) {
     const auto at = static_cast<Eigen::Index>(k);
     predicted.parameters.push_back({parameter.name, parameter.unit, parameter.scale * std::sqrt(covariance(at, at))});
   }
-  predicted.observability = observability(Eigen::BDCSVD<Eigen::MatrixXd>(all).singularValues(), all.rows() / 3);
+  predicted.observability = observability(singular_values(all), all.rows() / 3);
   return predicted;
 }
 
