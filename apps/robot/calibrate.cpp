@@ -1,8 +1,10 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <map>
 #include <memory>
+#include <set>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -56,32 +58,88 @@ std::map<std::string, double> priors_of(const std::vector<std::string>& texts) {
   return priors;
 }
 
+std::string session_of(const robotics::Observation& seen, const robotics::Chain& chain) {
+  return seen.base.empty() ? chain.session : seen.base;
+}
+
+// A session with fewer coordinates than its base and its tools have values says nothing, and cannot be judged.
+robotics::Measurements without_small_sessions(const robotics::Measurements& measurements,
+                                              const robotics::Chain& chain) {
+  const std::vector<robotics::Observation>& observations = measurements.poses.observations;
+  std::map<std::string, std::size_t> coordinates;
+  std::map<std::string, std::set<std::string>> tools;
+  for (const Eigen::Index coordinate : robotics::measured_rows(measurements)) {
+    if (observations.empty()) return measurements;
+    const robotics::Observation& seen = observations[coordinate / 3];
+    ++coordinates[seen.base];
+    tools[seen.base].insert(seen.tool);
+  }
+  std::vector<Eigen::Index> kept;
+  std::set<std::string> left_out;
+  std::vector<Eigen::Index> lines;
+  for (Eigen::Index row = 0; row < measurements.count(); ++row) {
+    const std::string& base = observations[row].base;
+    const bool says_something = coordinates.size() == 1 || coordinates[base] > 6 + 3 * tools[base].size();
+    if (says_something) {
+      kept.push_back(row);
+    } else {
+      left_out.insert(session_of(observations[row], chain));
+      lines.push_back(measurements.lines[row]);
+    }
+  }
+  if (left_out.empty()) return measurements;
+  robotics::Measurements large = robotics::select(measurements, kept);
+  large.warnings = measurements.warnings;
+  large.unused_columns = measurements.unused_columns;
+  large.warnings.push_back(fmt::format(
+      "{} of {} sessions left out, too few points in each to find where the instrument stood: {} (line{} {})",
+      left_out.size(), coordinates.size(), fmt::join(left_out, ", "), lines.size() == 1 ? "" : "s",
+      fmt::join(lines, ", ")));
+  return large;
+}
+
+// Measurements that take no part, with frames of the calibrated robot or, in a new session, frames of their own.
+robotics::Measurements read_test(const CalibrateArguments& arguments, const robotics::Robot& nominal) {
+  robotics::Measurements test = read_measured(arguments.test, nominal, {}, arguments.reading);
+  if (!arguments.new_session) {
+    check_frames(arguments.test, nominal, test, "; --new-session fits base and tool to the test file");
+  } else if (constexpr std::size_t values_of_frames = 9; robotics::measured_rows(test).size() <= values_of_frames) {
+    throw std::runtime_error(fmt::format("{}: {} points do not tell base and tool ({} values) and the error, too",
+                                         arguments.test, test.count(), values_of_frames));
+  }
+  check_positions(arguments.robot, robotics::with_frames(nominal, test.poses), test.poses);
+  return test;
+}
+
 void calibrate_command(CalibrateArguments arguments) {
+  arguments.options.calibration.priors = priors_of(arguments.priors);
   const robotics::Robot described = read_description(arguments.robot, arguments.data, arguments.links);
   refuse_lost_correction(described, arguments.robot, arguments.output);
-  robotics::Measurements measurements = read_measured(arguments.data, described, {}, arguments.reading);
-  const robotics::Robot nominal = robotics::with_frames(described, measurements.poses);
+  robotics::Measurements measurements =
+      without_small_sessions(read_measured(arguments.data, described, {}, arguments.reading), described.chain);
+  const robotics::Robot nominal = robotics::with_frames(described, measurements);
   std::vector<Eigen::Index> outlier_lines;
   if (arguments.robust) {
     const robotics::RobustCalibration robust =
         robotics::calibrate_robustly(nominal, measurements, arguments.options.calibration);
     for (const std::size_t row : robust.left_out) outlier_lines.push_back(measurements.lines[row]);
+    std::ranges::sort(outlier_lines);
+    outlier_lines.erase(std::ranges::unique(outlier_lines).begin(), outlier_lines.end());
     robotics::Measurements kept = robotics::without_rows(measurements, robust.left_out);
     kept.warnings = measurements.warnings;
     kept.unused_columns = measurements.unused_columns;
     measurements = std::move(kept);
   }
-  if (measurements.count() < arguments.options.folds) {
-    throw std::runtime_error(fmt::format("{}: {} poses do not make {} folds", arguments.data, measurements.count(),
-                                         arguments.options.folds));
+  const std::vector<double> labels = robotics::pose_labels(measurements.poses);
+  const Eigen::Index poses =
+      labels.empty() ? measurements.count() : std::ssize(std::set<double>(labels.begin(), labels.end()));
+  if (poses < arguments.options.folds) {
+    throw std::runtime_error(
+        fmt::format("{}: {} poses do not make {} folds", arguments.data, poses, arguments.options.folds));
   }
   std::optional<robotics::Measurements> test;
-  if (!arguments.test.empty()) {
-    test = read_measured(arguments.test, described, {}, arguments.reading);
-    check_positions(arguments.robot, nominal, test->poses);
-  }
+  if (!arguments.test.empty()) test = read_test(arguments, nominal);
   check_positions(arguments.robot, nominal, measurements.poses);
-  arguments.options.calibration.priors = priors_of(arguments.priors);
   arguments.options.kind = arguments.contiguous ? FoldKind::contiguous : FoldKind::random;
   Progress progress("calibrating");
   arguments.options.progress = [&](Eigen::Index done, Eigen::Index total) { progress.show(done, total); };
@@ -129,8 +187,9 @@ void calibrate_command(CalibrateArguments arguments) {
   }
   if (is_implausible) {
     throw std::runtime_error(fmt::format(
-        "{}: the calibrated robot misses half of the points by more than a fiftieth of its length: nothing is "
-        "written; check units, order, signs and zeros of the joints, and the description",
+        "{}: the calibrated robot misses half of the points by more than a fiftieth of its length, or turns its tool "
+        "otherwise than was measured: nothing is written; check units, order, signs and zeros of the joints, the order "
+        "of quaternions or the convention of angles, and the description",
         arguments.data));
   }
   if (!report.calibration.result.converged()) {
@@ -158,8 +217,10 @@ void add_calibrate(CLI::App& app) {
   add_count(*command, "--folds", options.folds, 0, "Folds of the held-out figures, 0: none")->capture_default_str();
   command->add_flag("--contiguous", arguments->contiguous, "Folds are blocks of consecutive rows: for paths and grids");
   add_input_file(*command, "--test", arguments->test, "Further measurements that take no part, judged at the end");
-  command->add_flag("--new-session", arguments->new_session,
-                    "The test file is of another session: its base and tool are fitted to it first");
+  command
+      ->add_flag("--new-session", arguments->new_session,
+                 "The test file is of another session: its base and tool are fitted to it first")
+      ->needs("--test");
   add_measured_file_options(*command, arguments->reading);
   command->add_flag("--robust", arguments->robust, "Leave out readings that lie far off, and name their lines");
   add_names(*command, "--fix", options.calibration.fixed, "PARAMETER",

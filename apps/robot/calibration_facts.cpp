@@ -39,14 +39,16 @@ std::vector<CalibrationDetails::Correlation> strongest(const discovery::SolverRe
   return all;
 }
 
-// What every part of the model explains of the error of the described robot, on poses left out where there are folds.
+// What every part of the model explains of the error of the described robot: on poses left out where there are folds,
+// but on the poses of the fit where the description has effects.
 std::vector<CalibrationDetails::Share> shares_of(const robotics::Robot& nominal,
                                                  const robotics::Measurements& measurements,
                                                  const CalibrationReport& report,
                                                  const std::optional<robotics::RepeatNoise>& repeats,
                                                  const robotics::CalibrationOptions& options) {
   const auto square = [&](const robotics::Stage& stage) {
-    return mean_square(stage.held_out_mm.size() > 0 ? stage.held_out_mm : stage.in_sample_mm);
+    const bool is_held_out = stage.held_out_mm.size() > 0 && nominal.effects.empty();
+    return mean_square(is_held_out ? stage.held_out_mm : stage.in_sample_mm);
   };
   std::vector<CalibrationDetails::Share> shares;
   double whole = square(report.nominal);
@@ -56,8 +58,9 @@ std::vector<CalibrationDetails::Share> shares_of(const robotics::Robot& nominal,
     robotics::Robot rigid = nominal;
     rigid.effects.clear();
     const robotics::Calibration without = robotics::calibrate(rigid, measurements, options);
+    const std::vector<Eigen::Index> points = robotics::position_rows(measurements.poses);
     const auto error_of = [&](const robotics::Robot& robot) {
-      return mean_square(robotics::distances(robotics::positions(robot, measurements.poses), measurements));
+      return mean_square(robotics::distances(robotics::positions(robot, measurements.poses), measurements)(points));
     };
     whole = error_of(without.registered);
     effects = error_of(without.robot) - error_of(report.calibration.robot);

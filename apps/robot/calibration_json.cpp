@@ -41,7 +41,8 @@ Json calibration_json(const CalibrationFacts& facts) {
   Json json;
   json["robot"] = facts.robot_file;
   json["data"] = facts.data_file;
-  json["poses"] = measurements.count();
+  json["poses"] = report.calibration.robot.calibration->poses;
+  json["readings"] = measurements.count();
   json["folds"] = report.folds;
   json["contiguous"] = facts.contiguous;
   json["grouped_by_pose"] = report.grouped;

@@ -15,6 +15,11 @@ using robotics::CalibrationReport;
 using robotics::error_figures;
 using robotics::ErrorFigures;
 
+std::string kind_of(const robotics::Measurements& measurements) {
+  const std::vector<robotics::Observation>& seen = measurements.poses.observations;
+  return !seen.empty() && seen.front().reading == robotics::Reading::distance ? "distance" : "position";
+}
+
 // One kind of error, in-sample, held-out and on the test file.
 std::string error_table(const std::vector<JudgedModel>& rows, const std::string& head, bool is_held_out,
                         const Eigen::VectorXd robotics::Stage::*in_sample,
@@ -37,14 +42,15 @@ std::string error_table(const std::vector<JudgedModel>& rows, const std::string&
   return table.text();
 }
 
-std::string error_tables(const std::vector<JudgedModel>& rows, const CalibrationReport& report, bool contiguous) {
+std::string error_tables(const std::vector<JudgedModel>& rows, const CalibrationReport& report, bool contiguous,
+                         const std::string& kind) {
   using robotics::Stage;
   const bool is_held_out = report.folds > 0;
   std::string text = "in-sample";
   if (is_held_out)
     text += fmt::format(", then held-out ({} {} folds)", report.folds, contiguous ? "contiguous" : "random");
   if (rows.front().test) text += ", then on the test file";
-  text += ":\n" + error_table(rows, "position error, mm", is_held_out, &Stage::in_sample_mm, &Stage::held_out_mm,
+  text += ":\n" + error_table(rows, kind + " error, mm", is_held_out, &Stage::in_sample_mm, &Stage::held_out_mm,
                               &JudgedModel::test);
   if (report.geometric.in_sample_mrad.size() == 0) return text;
   return text + error_table(rows, "orientation error, mrad", is_held_out, &Stage::in_sample_mrad, &Stage::held_out_mrad,
@@ -115,9 +121,13 @@ std::string verdict(const CalibrationFacts& facts) {
   };
   std::string text;
   if (facts.suspicions.empty()) {
-    text = fmt::format("Calibrated: the mean position error falls from {:.4f} to {:.4f} mm", mean(report.nominal),
-                       mean(report.geometric));
-    if (report.correction_kept) text += fmt::format(", and to {:.4f} mm with the correction", mean(*report.corrected));
+    text = fmt::format("Calibrated: the mean {} error falls from {:.4f} to {:.4f} mm", kind_of(facts.measurements),
+                       mean(report.nominal), mean(report.geometric));
+    if (report.correction_kept) {
+      const double corrected = mean(*report.corrected);
+      text += fmt::format(", and {}to {:.4f} mm with the correction",
+                          corrected <= mean(report.geometric) ? "" : "rises again ", corrected);
+    }
     text += is_held_out ? ", on poses left out of the fit.\n"
                         : ", on the poses of the fit; none were left out to judge it.\n";
   }
@@ -165,7 +175,7 @@ std::string details_text(const CalibrationDetails& details) {
   text += fmt::format("  observability: O1 {:.4g}, O2 {:.4g}, O3 {:.4g}, O4 {:.4g}, O5 {:.4g}; condition {:.4g}\n",
                       seen.o1, seen.o2, seen.o3, seen.o4, seen.o5, seen.condition);
   for (const CalibrationDetails::Correlation& pair : details.correlations) {
-    text += fmt::format("  {} and {} are told apart badly: correlation {:.3f}\n", pair.first, pair.second, pair.value);
+    text += fmt::format("  {} and {} are strongly correlated: {:.3f}\n", pair.first, pair.second, pair.value);
   }
   if (!details.learning.empty()) {
     Table table({"poses", "mean error at them, mm", "at a fifth of all poses, left out"});
@@ -189,7 +199,7 @@ std::string details_text(const CalibrationDetails& details) {
 std::string calibration_text(const CalibrationFacts& facts) {
   const CalibrationReport& report = facts.report;
   std::string text = head(facts) + parameters_text(facts);
-  text += "\n" + error_tables(facts.models, report, facts.contiguous);
+  text += "\n" + error_tables(facts.models, report, facts.contiguous, kind_of(facts.measurements));
   text += "nominal: base and tool fitted to the poses, everything else as described.\n";
   if (report.folds > 0) {
     text +=

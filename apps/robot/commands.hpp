@@ -6,6 +6,7 @@
 #include <string>
 
 #include "llmt/csv.hpp"
+#include "llmt/robotics/measurements.hpp"
 #include "llmt/robotics/robot.hpp"
 #include "llmt/robotics/urdf.hpp"
 
@@ -13,6 +14,11 @@ namespace llmt::apps {
 
 /// Throws std::runtime_error, with the name of the robot's file, if a tool position at these poses makes no sense.
 void check_positions(const std::string& file, const robotics::Robot& robot, const robotics::Poses& poses);
+
+/// Throws std::runtime_error, with file and line, where measurements name a session or a target that the robot does not
+/// have. `advice` ends the message.
+void check_frames(const std::string& file, const robotics::Robot& robot, const robotics::Measurements& measurements,
+                  const std::string& advice);
 
 /// The robot's description. Throws as robotics::read_robot(), and std::invalid_argument if the description and the
 /// measurements were exchanged.

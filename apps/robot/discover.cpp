@@ -109,7 +109,7 @@ void discover_command(DiscoverArguments arguments) {
   if (!arguments.catalogue.empty()) arguments.options.catalogue = robotics::read_catalogue(arguments.catalogue);
   const std::vector<std::string> also = columns_of(arguments.options.catalogue, described);
   const robotics::Measurements data = read_measured(arguments.data, described, also, arguments.reading);
-  const robotics::Robot robot = robotics::with_frames(described, data.poses);
+  const robotics::Robot robot = robotics::with_frames(described, data);
   std::optional<robotics::Measurements> test;
   if (!arguments.test.empty()) test = read_measured(arguments.test, robot, also, arguments.reading);
   check_positions(arguments.robot, robot, data.poses);

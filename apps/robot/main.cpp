@@ -13,6 +13,21 @@ void llmt::apps::check_positions(const std::string& file, const robotics::Robot&
   if (!reason.empty()) throw std::runtime_error(file + ": " + reason);
 }
 
+void llmt::apps::check_frames(const std::string& file, const robotics::Robot& robot,
+                              const robotics::Measurements& measurements, const std::string& advice) {
+  const auto lacks = [](const std::vector<robotics::NamedFrame>& frames, const std::string& name) {
+    return !name.empty() && std::ranges::find(frames, name, &robotics::NamedFrame::name) == frames.end();
+  };
+  const std::vector<robotics::Observation>& observations = measurements.poses.observations;
+  for (std::size_t row = 0; row < observations.size(); ++row) {
+    const bool is_session = lacks(robot.chain.bases, observations[row].base);
+    if (!is_session && !lacks(robot.chain.tools, observations[row].tool)) continue;
+    throw std::runtime_error(fmt::format("{}:{}: {} \"{}\" was not part of the calibration{}", file,
+                                         measurements.lines[row], is_session ? "session" : "target",
+                                         is_session ? observations[row].base : observations[row].tool, advice));
+  }
+}
+
 llmt::robotics::Robot llmt::apps::read_description(const std::string& robot, const std::string& measured,
                                                    const robotics::UrdfLinks& links) {
   return read_unless_exchanged(robot, measured, "the description (YAML) comes first, then the measurements (CSV)",

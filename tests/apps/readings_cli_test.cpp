@@ -3,6 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <string>
 
 #include "apps/programs.hpp"
 #include "llmt/files.hpp"
@@ -94,6 +97,11 @@ TEST(Readings, APriorHoldsItsParameter) {
   const Outcome held = folder.run(
       fmt::format("{} calibrate {} {} --prior joint2.a=1e-6 --json", robot_program, sample_arm, sample_measured));
   EXPECT_EQ(held.exit_code, 0) << held.err;
+  for (const auto& parameter : nlohmann::json::parse(held.out).at("parameters")) {
+    if (parameter.at("name") == "joint2.a") {
+      EXPECT_NEAR(parameter.at("value").get<double>(), 160.0, 1e-4);
+    }
+  }
   for (const std::string prior : {"joint2.a", "joint2.a=x", "joint2.a=-1", "joint9.a=1"}) {
     const Outcome wrong =
         folder.run(fmt::format("{} calibrate {} {} --prior {}", robot_program, sample_arm, sample_measured, prior));
@@ -108,6 +116,33 @@ TEST(Readings, OrientationsNeedToBeInTheFile) {
       folder.run(fmt::format("{} calibrate {} {} --orientations", robot_program, sample_arm, sample_measured));
   EXPECT_EQ(none.exit_code, 1);
   EXPECT_NE(none.err.find("no orientation was measured"), std::string::npos) << none.err;
+}
+
+// Frames of sessions are found again by their names, and a session that the calibration did not see is not taken for
+// one.
+TEST(Readings, SessionsOfATestFileAreFoundByTheirNames) {
+  const Folder folder;
+  const std::string text = read_file(sample_measured);
+  const auto in_session = [&](const std::string& name, std::size_t first, std::size_t count) {
+    std::istringstream lines(text);
+    std::string line;
+    std::getline(lines, line);
+    std::string out = line + ",session\n";
+    for (std::size_t row = 0; std::getline(lines, line); ++row) {
+      if (row >= first && row < first + count) out += line + "," + name + "\n";
+    }
+    return out;
+  };
+  folder.write("mon.csv", in_session("mon", 0, 60));
+  folder.write("more.csv", in_session("mon", 60, 30));
+  folder.write("wed.csv", in_session("wed", 60, 30));
+  const std::string fit = fmt::format("{} calibrate {} mon.csv --folds 0 ", robot_program, sample_arm);
+  EXPECT_EQ(folder.run(fit + "--test more.csv").exit_code, 0);
+  const Outcome unknown = folder.run(fit + "--test wed.csv");
+  EXPECT_EQ(unknown.exit_code, 1);
+  EXPECT_NE(unknown.err.find("wed.csv:2: session \"wed\" was not part of the calibration"), std::string::npos)
+      << unknown.err;
+  EXPECT_EQ(folder.run(fit + "--test wed.csv --new-session").exit_code, 0);
 }
 
 }  // namespace

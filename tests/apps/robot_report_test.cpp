@@ -47,9 +47,9 @@ TEST(RobotReport, CalibrationSaysWhatItGainedOnPosesLeftOut) {
   EXPECT_EQ(document.title, "llmt-robot calibrate arm.yaml data.csv");
   EXPECT_TRUE(document.answer.starts_with("Calibration takes the mean position error from")) << document.answer;
   EXPECT_NE(document.answer.find("took no part"), std::string::npos) << document.answer;
-  const Json json = to_json(document);
-  EXPECT_EQ(blocks_of_kind(json, "arm"), 2);
-  EXPECT_EQ(blocks_of_kind(json, "map"), 2);  // coverage and correlations
+  const Json written = to_json(document);
+  EXPECT_EQ(blocks_of_kind(written, "arm"), 2);
+  EXPECT_EQ(blocks_of_kind(written, "map"), 2);  // coverage and correlations
 }
 
 TEST(RobotReport, DiscoveryNamesTheEffectAndShowsItsShape) {

@@ -44,10 +44,10 @@ TEST(RobotWords, DecimalCommasAreReadWhereAsked) {
     const Outcome refused = folder.run(fmt::format("{} {} {} d.csv", robot_program, command, sample_arm));
     EXPECT_EQ(refused.exit_code, 1);
     EXPECT_NE(refused.err.find("; --decimal-comma reads such files"), std::string::npos) << refused.err;
-    const std::string json = fmt::format("{} {} {} ", robot_program, command, sample_arm);
+    const std::string command_line = fmt::format("{} {} {} ", robot_program, command, sample_arm);
     const Outcome with_points =
-        folder.run("cp " + sample_measured + " p.csv; " + json + "p.csv --json | grep -v p.csv");
-    const Outcome with_commas = folder.run(json + "d.csv --decimal-comma --json | grep -v d.csv");
+        folder.run("cp " + sample_measured + " p.csv; " + command_line + "p.csv --json | grep -v p.csv");
+    const Outcome with_commas = folder.run(command_line + "d.csv --decimal-comma --json | grep -v d.csv");
     EXPECT_EQ(with_commas.exit_code, 0) << with_commas.err;
     EXPECT_EQ(with_commas.out, with_points.out);
   }

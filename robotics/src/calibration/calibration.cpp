@@ -73,7 +73,8 @@ void identify(Calibration& calibration, const Measurements& measurements,
               const discovery::LeastSquaresProblem& unweighted, const std::vector<std::string>& reasons,
               const CalibrationOptions& options) {
   const bool has_priors = options.prior_length_mm > 0.0 || options.prior_angle_deg > 0.0;
-  const bool is_weighed = has_priors || !orientation_rows(measurements.poses).empty();
+  const bool is_weighed = has_priors || !orientation_rows(measurements.poses).empty() ||
+                          (stated_sigma_mm(measurements).array() > 0.0).any();
   const int largest_number_of_passes = is_weighed ? 10 : 1;
   const NoiseModel model(measurements, options);
   discovery::LeastSquaresProblem problem = unweighted;
@@ -122,10 +123,29 @@ std::vector<IdentifiedParameter> identified_parameters(const discovery::SolverRe
   return identified;
 }
 
+// Root mean square of the residuals of points and distances over their degrees of freedom.
+double left_per_coordinate(const discovery::SolverResult& result, const Measurements& measurements) {
+  const std::vector<Eigen::Index> coordinates = measured_rows(measurements);
+  const std::vector<Observation>& observations = measurements.poses.observations;
+  double squares = 0.0;
+  double count = 0.0;
+  for (std::size_t k = 0; k < coordinates.size(); ++k) {
+    const bool turns = !observations.empty() && observations[coordinates[k] / 3].reading == Reading::orientation;
+    if (turns) continue;
+    squares += result.residuals(k) * result.residuals(k);
+    count += 1.0;
+  }
+  const double all = static_cast<double>(coordinates.size());
+  return std::sqrt(squares / std::max(1.0, count * (all - static_cast<double>(result.rank)) / all));
+}
+
 CalibrationRecord record_of(const Calibration& calibration, const Measurements& measurements) {
   CalibrationRecord record;
-  record.poses = measurements.count();
-  record.noise_mm = calibration.noise_mm;
+  std::set<Eigen::Index> stands;
+  for (const Observation& seen : measurements.poses.observations) stands.insert(seen.stand);
+  record.poses = stands.empty() ? measurements.count() : std::ssize(stands);
+  record.coordinates = std::ssize(measured_rows(measurements));
+  record.noise_mm = left_per_coordinate(calibration.result, measurements);
   std::vector<Eigen::Index> known;
   for (std::size_t k = 0; k < calibration.robot.identified.size(); ++k) {
     if (calibration.robot.identified[k].standard_error) known.push_back(static_cast<Eigen::Index>(k));

@@ -6,6 +6,7 @@
 #include <map>
 #include <numbers>
 #include <numeric>
+#include <span>
 #include <string>
 #include <tuple>
 
@@ -138,7 +139,8 @@ std::optional<RepeatNoise> noise_of_repeats(const Measurements& measurements) {
 }
 
 Eigen::VectorXd position_deviations(const Calibration& calibration, const Poses& poses, bool frames_are_known) {
-  Eigen::MatrixXd jacobian = position_jacobian(calibration.robot, poses);
+  // Joint maps come last among the robot's parameters, and calibration has no covariance of them.
+  Eigen::MatrixXd jacobian = position_jacobian(calibration.robot, poses).leftCols(calibration.result.covariance.cols());
   for (Eigen::Index k = 0; k < jacobian.cols() && frames_are_known; ++k) {
     if (is_frame_parameter(calibration.result.parameters[k].name)) jacobian.col(k).setZero();
   }
@@ -153,7 +155,8 @@ Eigen::VectorXd position_deviations(const Calibration& calibration, const Poses&
 }
 
 Coverage coverage(const Calibration& calibration, const Poses& measured, const Poses& used, bool frames_are_known) {
-  constexpr double slack = 0.1;  // of the range
+  constexpr double slack = 0.1;      // of the range
+  constexpr double rounding = 1e-6;  // rad or mm
   Coverage result;
   if (used.count() == 0) return result;
   std::vector<bool> is_outside(used.count());
@@ -161,7 +164,7 @@ Coverage coverage(const Calibration& calibration, const Poses& measured, const P
     const Eigen::VectorXd values = used.joints.col(j);
     const double low = measured.joints.col(j).minCoeff();
     const double high = measured.joints.col(j).maxCoeff();
-    const double margin = slack * (high - low);
+    const double margin = std::max(slack * (high - low), rounding);
     bool beyond = false;
     for (Eigen::Index i = 0; i < values.size(); ++i) {
       if (values(i) >= low - margin && values(i) <= high + margin) continue;
@@ -191,6 +194,8 @@ std::vector<LearningPoint> learning_curve(const Robot& robot, const Measurements
   const std::vector<std::vector<Eigen::Index>> poses = poses_of(measurements);
   const auto count = std::ssize(poses);
   if (count < fewest) return {};
+  // Few poses may miss a session, or hardly tell its frames: then those are fitted to all poses, and the arm is judged.
+  const bool several_sessions = !with_frames(robot, measurements.poses).chain.bases.empty();
   Random random(seed);
   std::vector<Eigen::Index> order = random.permutation(count);
   const Eigen::Index aside = count / 5;
@@ -210,7 +215,9 @@ std::vector<LearningPoint> learning_curve(const Robot& robot, const Measurements
       const Measurements train = of_poses(measurements, poses, chosen);
       const Robot calibrated = calibrate(robot, train, options).robot;
       fitted(draw) = mean_error(calibrated, train);
-      held_out(draw) = mean_error(with_frames(calibrated, test.poses), test);
+      held_out(draw) = mean_error(several_sessions ? with_placed_frames(calibrated, measurements, {})
+                                                   : with_placed_frames(calibrated, test, train.poses),
+                                  test);
     }
     curve.push_back({size, median_of(fitted), median_of(held_out)});
   }

@@ -116,6 +116,13 @@ void decide(CalibrationReport& report) {
   }
 }
 
+// What a calibrated arm turns its tool wrong by is some mrad; what a convention does is of the size of 1 rad.
+bool has_wrong_orientations(const CalibrationReport& report) {
+  constexpr double implausible_mrad = 50.0;
+  const Eigen::VectorXd& errors = report.geometric.in_sample_mrad;
+  return errors.size() > 0 && errors.mean() > implausible_mrad;
+}
+
 }  // namespace
 
 ErrorFigures error_figures(const Eigen::VectorXd& distances_mm) {
@@ -137,6 +144,7 @@ CorrectedRobot CalibrationReport::best() const {
 }
 
 bool is_implausible(const Robot& nominal, const CalibrationReport& report) {
+  if (has_wrong_orientations(report)) return true;
   std::vector<double> sorted(report.geometric.in_sample_mm.begin(), report.geometric.in_sample_mm.end());
   std::ranges::nth_element(sorted, sorted.begin() + std::ssize(sorted) / 2);
   return sorted[sorted.size() / 2] > implausible_share * length_of(nominal.chain);
@@ -172,7 +180,9 @@ std::vector<std::string> suspicions(const Robot& robot, const Measurements& meas
                     "values; only the error on poses left out says something, and more poses are needed",
                     parameters, coordinates));
   } else if (is_held_out && report.geometric.held_out_mm.mean() >= report.nominal.held_out_mm.mean()) {
-    found.push_back("on poses left out the calibrated robot is no better than the described one");
+    found.push_back(
+        "on poses left out the calibrated robot is no better than the described one: keep the description, or measure "
+        "more poses");
   }
   const double nominal = report.nominal.in_sample_mm.mean();
   const double calibrated = (is_held_out ? report.geometric.held_out_mm : report.geometric.in_sample_mm).mean();
@@ -188,8 +198,15 @@ std::vector<std::string> suspicions(const Robot& robot, const Measurements& meas
                     "tool: check units, signs and zeros of the joints, their order, and the description",
                     nominal));
   }
+  if (has_wrong_orientations(report)) {
+    const std::string likely = likely_orientation_mistake(robot, measurements);
+    found.push_back(fmt::format("the calibrated robot turns its tool by {:.3g} mrad otherwise than was measured{}",
+                                report.geometric.in_sample_mrad.mean(),
+                                likely.empty() ? ": is the quaternion w, x, y, z, is the convention of angles right?"
+                                               : "; most likely " + likely));
+  }
   if (nominal > implausible_mm) {
-    const std::string units = likely_mistake(robot, measurements, nominal, implausible_mm);
+    const std::string units = likely_mistake(robot, measurements, implausible_mm);
     if (!units.empty()) found.push_back(units);
   }
   return found;

@@ -19,8 +19,9 @@ namespace {
 
 // Residuals of readings at one stand of the arm, brought to the point of the chain's own tool.
 struct Stands {
-  Eigen::MatrixXd joints;  // n x J
-  Eigen::MatrixXd twists;  // n x 6 as CorrectionTwist::at()
+  Eigen::MatrixXd joints;           // n x J
+  Eigen::MatrixXd twists;           // n x 6 as CorrectionTwist::at()
+  std::vector<double> labels = {};  // pose_labels() of them
 };
 
 // Where the tool point of every row stands from that of the chain's own tool, in the world frame.
@@ -45,8 +46,8 @@ Eigen::Matrix3d cross_of(const Eigen::Vector3d& v) {
   return matrix;
 }
 
-// The twist of least squares that explains the residuals of the rows of one stand: that of a point is d + r x arm, that
-// of an orientation r.
+// The twist (d, r) of least squares that explains the residuals of the rows of one stand: that of a point is
+// d + r x arm, that of an orientation r. Coordinates that were not measured take no part.
 Eigen::VectorXd twist_of(const Robot& robot, const Measurements& measurements, const Eigen::MatrixXd& errors,
                          const Eigen::MatrixXd& arms, const std::vector<Eigen::Index>& rows) {
   constexpr double lever_mm = 300.0;  // makes lengths of angles
@@ -57,12 +58,15 @@ Eigen::VectorXd twist_of(const Robot& robot, const Measurements& measurements, c
     const Eigen::Matrix3d base = base_rotation_of(robot.chain, seen.base);
     auto block = equations.middleRows(3 * k, 3);
     if (seen.reading == Reading::orientation) {
-      block.rightCols(3).diagonal().setConstant(1.0);
-      right.segment(3 * k, 3) = base.transpose() * errors.row(rows[k]).transpose() * (lever_mm / seen.lever_mm);
+      block.rightCols(3) = base;
+      right.segment(3 * k, 3) = errors.row(rows[k]).transpose() * (lever_mm / seen.lever_mm);
     } else {
-      block.leftCols(3).setIdentity();
-      block.rightCols(3) = -cross_of(base.transpose() * arms.row(rows[k]).transpose()) / lever_mm;
-      right.segment(3 * k, 3) = base.transpose() * errors.row(rows[k]).transpose();
+      block.leftCols(3) = base;
+      block.rightCols(3) = -cross_of(arms.row(rows[k]).transpose()) * base / lever_mm;
+      right.segment(3 * k, 3) = errors.row(rows[k]).transpose();
+      for (Eigen::Index axis = 0; axis < 3; ++axis) {
+        if (!measurements.measured[axis]) block.row(axis).setZero();
+      }
     }
   }
   Eigen::VectorXd twist = equations.completeOrthogonalDecomposition().solve(right);
@@ -70,39 +74,52 @@ Eigen::VectorXd twist_of(const Robot& robot, const Measurements& measurements, c
   return twist;
 }
 
+// Model minus measurement in the world frame, zero where nothing was measured.
+Eigen::MatrixXd world_errors_of(const Robot& robot, const Measurements& measurements) {
+  Eigen::MatrixXd errors = measurements.positions_mm - positions(robot, measurements.poses);
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    if (!measurements.measured[axis]) errors.col(axis).setZero();
+  }
+  return errors;
+}
+
 Stands stands_of(const Robot& robot, const Measurements& measurements) {
   const std::vector<Observation>& observations = measurements.poses.observations;
   std::map<std::pair<Eigen::Index, std::string>, std::vector<Eigen::Index>> groups;
-  std::size_t most = 0;
   for (Eigen::Index i = 0; i < measurements.count(); ++i) {
     if (observations[i].reading == Reading::distance) {
       throw std::invalid_argument("llmt::robotics::fit_correction: distances do not tell a correction of positions");
     }
-    auto& rows = groups[{observations[i].stand, observations[i].base}];
-    rows.push_back(i);
-    most = std::max(most, rows.size());
+    groups[{observations[i].stand, observations[i].base}].push_back(i);
   }
-  const Eigen::MatrixXd errors = measurements.positions_mm - positions(robot, measurements.poses);
+  const Eigen::MatrixXd errors = world_errors_of(robot, measurements);
   const Eigen::MatrixXd arms = arms_of(robot, measurements.poses);
   std::vector<Eigen::Index> first;
   std::vector<Eigen::VectorXd> twists;
+  // A single point does not tell how the tool is turned. Where most stands have more, those with one are left out;
+  // where few have, nothing is learnt of turning.
+  const auto with_several = std::ranges::count_if(groups, [](const auto& stand) { return stand.second.size() > 1; });
+  const bool learns_turning = 2 * with_several >= std::ssize(groups);
   for (const auto& [stand, rows] : groups) {
-    // A single point does not tell how the tool is turned: where others do, it is left out.
-    if (most > 1 && rows.size() == 1) continue;
+    if (learns_turning && rows.size() == 1) continue;
+    std::vector<Eigen::Index> points;
+    for (const Eigen::Index row : rows) {
+      if (observations[row].reading == Reading::position) points.push_back(row);
+    }
+    if (!learns_turning && points.empty()) continue;
     first.push_back(rows.front());
-    if (most > 1) {
+    if (learns_turning) {
       twists.push_back(twist_of(robot, measurements, errors, arms, rows));
     } else {
       const Eigen::Matrix3d base = base_rotation_of(robot.chain, stand.second);
       twists.emplace_back(Eigen::VectorXd::Zero(6));
-      twists.back().head<3>() = base.transpose() * errors.row(rows.front()).transpose();
+      twists.back().head<3>() = base.transpose() * errors(points, Eigen::all).colwise().mean().transpose();
     }
   }
   Stands stands{measurements.poses.joints(first, Eigen::all), Eigen::MatrixXd(std::ssize(first), 6)};
   for (std::size_t k = 0; k < twists.size(); ++k) stands.twists.row(k) = twists[k].transpose();
-  for (Eigen::Index axis = 0; axis < 3; ++axis) {
-    if (!measurements.measured[axis]) stands.twists.col(axis).setZero();
-  }
+  const std::vector<double> labels = pose_labels(measurements.poses);
+  for (const Eigen::Index row : first) stands.labels.push_back(labels[row]);
   return stands;
 }
 
@@ -110,11 +127,7 @@ Stands stands_of(const Robot& robot, const Measurements& measurements) {
 
 Eigen::MatrixXd residuals(const Robot& robot, const Measurements& measurements) {
   validate(measurements, robot);
-  Eigen::MatrixXd world = measurements.positions_mm - positions(robot, measurements.poses);
-  for (Eigen::Index axis = 0; axis < 3; ++axis) {
-    if (!measurements.measured[axis]) world.col(axis).setZero();
-  }
-  return world * base_rotation_of(robot.chain);  // rows: r' R = (R' r)'
+  return world_errors_of(robot, measurements) * base_rotation_of(robot.chain);  // rows: r' R = (R' r)'
 }
 
 FitResult fit_correction(const Robot& robot, const Measurements& measurements, const FitOptions& options) {
@@ -131,8 +144,8 @@ FitResult fit_correction(const Robot& robot, const Measurements& measurements, c
   if (axes.empty()) throw std::invalid_argument("llmt::robotics::fit_correction: all residuals are zero");
   const Eigen::MatrixXd outputs = stands.twists(Eigen::all, axes);
   FitOptions of_numbers = options;
-  of_numbers.choose_codes = false;              // joint positions that were measured on a grid are no names
-  if (!is_plain) of_numbers.folds.groups = {};  // every stand is one sample now
+  of_numbers.choose_codes = false;                         // joint positions that were measured on a grid are no names
+  if (!is_plain) of_numbers.folds.groups = stands.labels;  // every stand is one sample now
   FitResult result = fit(stands.joints, outputs, of_numbers);
   result.model = result.model.named(correction_inputs(robot.chain), names);
   return result;

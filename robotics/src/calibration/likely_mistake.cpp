@@ -3,16 +3,19 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <bit>
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <map>
 #include <numbers>
-
+#include <set>
 #include <stdexcept>
 #include <vector>
 
+#include "calibration/registration.hpp"
 #include "llmt/robotics/calibration.hpp"
 
 namespace llmt::robotics {
@@ -68,6 +71,25 @@ std::vector<Change> changes_of(const Chain& chain) {
   return changes;
 }
 
+// One of several targets may be in another unit than the rest.
+void add_units_of_targets(const Poses& poses, std::vector<Change>& changes) {
+  std::set<std::string> tools;
+  for (const Observation& seen : poses.observations) tools.insert(seen.tool);
+  if (tools.size() < 2) return;
+  for (const std::string& tool : tools) {
+    for (const auto& [factor, words] :
+         {std::pair{1000.0, "metres, not millimetres"}, {0.001, "millimetres, not metres"}}) {
+      changes.push_back({[=](Measurements& table) {
+                           for (Eigen::Index row = 0; row < table.count(); ++row) {
+                             if (table.poses.observations[row].tool == tool) table.positions_mm.row(row) *= factor;
+                           }
+                         },
+                         fmt::format("the points of {} are {}",
+                                     tool.empty() ? "the first target" : "target \"" + tool + "\"", words)});
+    }
+  }
+}
+
 // Every choice of two joints or more that count the other way, of an arm that a person may have described.
 void add_sign_patterns(const Chain& chain, std::vector<Change>& changes) {
   constexpr std::size_t most_joints = 7;
@@ -87,12 +109,20 @@ void add_sign_patterns(const Chain& chain, std::vector<Change>& changes) {
   }
 }
 
-// As many poses as tell such mistakes.
+// Points or distances of as many poses as tell such mistakes, at equal steps.
 Measurements some_of(const Measurements& measurements) {
-  constexpr Eigen::Index enough = 25;
+  constexpr std::size_t enough = 25;
+  std::map<Eigen::Index, std::vector<Eigen::Index>> stands;
+  for (const Eigen::Index row : position_rows(measurements.poses)) {
+    stands[measurements.poses.observations.empty() ? row : measurements.poses.observations[row].stand].push_back(row);
+  }
+  const std::size_t step = std::max<std::size_t>(1, stands.size() / enough);
   std::vector<Eigen::Index> rows;
-  const Eigen::Index step = std::max<Eigen::Index>(1, measurements.count() / enough);
-  for (Eigen::Index row = 0; row < measurements.count(); row += step) rows.push_back(row);
+  std::size_t place = 0;
+  for (const auto& [stand, own] : stands) {
+    if (place++ % step == 0) rows.insert(rows.end(), own.begin(), own.end());
+  }
+  std::ranges::sort(rows);
   return select(measurements, rows);
 }
 
@@ -105,6 +135,7 @@ double misfit_of(Robot robot, const Measurements& table) {
     // A table as it was meant takes some ten steps; any other may wander.
     CalibrationOptions options;
     options.solver.max_iterations = 15;
+    robot = with_frames(std::move(robot), table.poses);
     register_frames(robot, table, options);
     return distances(positions(robot, table.poses), table).mean();
   } catch (const std::exception&) {
@@ -114,12 +145,13 @@ double misfit_of(Robot robot, const Measurements& table) {
 
 }  // namespace
 
-std::string likely_mistake(const Robot& robot, const Measurements& measurements, double misfit_mm,
-                           double plausible_mm) {
+std::string likely_mistake(const Robot& robot, const Measurements& measurements, double plausible_mm) {
   constexpr double far_better = 0.1;
   constexpr double of_spread = 0.05;
   const Measurements table = some_of(measurements);
+  const double misfit_mm = misfit_of(robot, table);
   std::vector<Change> changes = changes_of(robot.chain);
+  add_units_of_targets(table.poses, changes);
   const std::size_t single = changes.size();
   add_sign_patterns(robot.chain, changes);
   const Change* best = nullptr;
@@ -135,6 +167,41 @@ std::string likely_mistake(const Robot& robot, const Measurements& measurements,
   if (best == nullptr) return {};
   return fmt::format("most likely {}: the described robot would then miss the points by {:.3g} mm instead of {:.3g} mm",
                      best->words, smallest, misfit_mm);
+}
+
+std::string likely_orientation_mistake(const Robot& robot, const Measurements& measurements) {
+  constexpr double plausible_rad = 0.05;
+  const std::vector<Eigen::Index> turned = orientation_rows(measurements.poses);
+  Robot placed = robot;
+  try {
+    register_frames(placed, select(measurements, position_rows(measurements.poses)));
+  } catch (const std::exception&) {
+    return {};
+  }
+  const std::vector<Pose> tools = tool_poses(placed, select(measurements.poses, turned));
+  const auto mean_angle = [&](const auto& meant) {
+    Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+    std::vector<Eigen::Matrix3d> between;
+    for (std::size_t k = 0; k < turned.size(); ++k) {
+      between.push_back(tools[k].rotation.transpose() * meant(measurements.poses.observations[turned[k]].reference));
+      sum += between.back();
+    }
+    const Eigen::Matrix3d common = rotation_of_greatest_trace(sum.transpose());
+    double angles = 0.0;
+    for (const Eigen::Matrix3d& one : between) angles += Eigen::AngleAxisd(common.transpose() * one).angle();
+    return angles / static_cast<double>(between.size());
+  };
+  const auto inverse = [](const Eigen::Matrix3d& read) -> Eigen::Matrix3d { return read.transpose(); };
+  if (mean_angle(inverse) < plausible_rad) return "the file has the rotation of the world as seen from the tool";
+  // What was read as w, x, y, z are x, y, z, w.
+  const auto reordered = [](const Eigen::Matrix3d& read) -> Eigen::Matrix3d {
+    const Eigen::Quaterniond q(read);
+    return Eigen::Quaterniond(q.z(), q.w(), q.x(), q.y()).toRotationMatrix();
+  };
+  if (measurements.orientation.kind == Orientation::Kind::quaternion && mean_angle(reordered) < plausible_rad) {
+    return "the columns qw, qx, qy, qz hold x, y, z, w";
+  }
+  return {};
 }
 
 }  // namespace llmt::robotics

@@ -7,17 +7,13 @@
 #include <numbers>
 
 namespace llmt::robotics {
-namespace {
 
-// The rotation R with the greatest trace of R matrix (Kabsch 1976; a reflection is turned back about the least axis).
 Eigen::Matrix3d rotation_of_greatest_trace(const Eigen::Matrix3d& matrix) {
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(matrix, Eigen::ComputeFullU | Eigen::ComputeFullV);
   Eigen::Vector3d handedness = Eigen::Vector3d::Ones();
   if ((svd.matrixV() * svd.matrixU().transpose()).determinant() < 0.0) handedness(2) = -1.0;
   return svd.matrixV() * handedness.asDiagonal() * svd.matrixU().transpose();
 }
-
-}  // namespace
 
 Pose kabsch(const Eigen::MatrixXd& from, const Eigen::MatrixXd& to) {
   const Eigen::RowVector3d centre_from = from.colwise().mean();

@@ -86,6 +86,13 @@ std::vector<Eigen::Index> columns_of(const Robot& robot) {
 
 std::string owner_of(const std::string& name) { return name.substr(0, name.rfind('.')); }
 
+// Of any session, and of any target: "base@tuesday.x" belongs to a base.
+bool is_of_base(const std::string& name) { return name.starts_with("base.") || name.starts_with("base@"); }
+
+bool is_turn_of_tool(const std::string& name) {
+  return (name.starts_with("tool.") || name.starts_with("tool@")) && name[name.rfind('.') + 1] == 'r';
+}
+
 // Every parameter, and groups of those of an effect, of the tool's position, of the base.
 std::vector<Suspect> suspects_of(const std::vector<discovery::Parameter>& parameters, Eigen::Index geometric,
                                  bool same_session) {
@@ -93,8 +100,8 @@ std::vector<Suspect> suspects_of(const std::vector<discovery::Parameter>& parame
   std::vector<Suspect> groups;
   for (std::size_t k = 0; k < parameters.size(); ++k) {
     const std::string& name = parameters[k].name;
-    if (!same_session && name.starts_with("base.")) continue;
-    if (name.starts_with("tool.r")) continue;
+    if (!same_session && is_of_base(name)) continue;
+    if (is_turn_of_tool(name)) continue;
     const auto column = static_cast<Eigen::Index>(k);
     all.push_back({name, {column}});
     const std::string owner = owner_of(name);
@@ -156,7 +163,7 @@ void find_moved(const CorrectedRobot& robot, const Measurements& measurements, c
   const Eigen::MatrixXd missing = (measurements.positions_mm - positions(robot, measurements.poses)).transpose();
   problem.residuals = missing.reshaped()(rows);
   for (std::size_t k = 0; k < parameters.size(); ++k) {
-    if (!options.same_session && parameters[k].name.starts_with("base.")) {
+    if (!options.same_session && is_of_base(parameters[k].name)) {
       problem.nuisance.push_back(static_cast<Eigen::Index>(k));
     }
   }
@@ -183,8 +190,7 @@ void find_moved(const CorrectedRobot& robot, const Measurements& measurements, c
   if (!robot.robot.calibration) return;
   const CalibrationRecord& record = *robot.robot.calibration;
   result.noise_before_mm = record.noise_mm;
-  const double known = static_cast<double>(std::ranges::count(measurements.measured, true) * record.poses) -
-                       static_cast<double>(record.correlations.rows());
+  const double known = static_cast<double>(record.coordinates - record.correlations.rows());
   if (!(movements.freedom > 0.0 && known > 0.0 && record.noise_mm > 0.0)) return;
   constexpr double rare = 0.01;
   constexpr double material = 1.33;

@@ -43,8 +43,9 @@ void visit_values(ChainType& chain, Visit visit) {
   }
 }
 
-void validate_further(const char* field, const std::vector<NamedFrame>& frames) {
+void validate_further(const char* field, const std::vector<NamedFrame>& frames, const std::string& own) {
   std::set<std::string> names;
+  if (!own.empty()) names.insert(own);
   for (const NamedFrame& frame : frames) {
     if (frame.name.empty() || frame.name.find('.') != std::string::npos) {
       refuse(field, fmt::format("{}: name \"{}\" is empty or has a dot", field, frame.name));
@@ -89,8 +90,8 @@ void validate(const Chain& chain) {
     if (!names.insert(joint.name).second) refuse("name", fmt::format("joint name \"{}\" is taken", joint.name));
     validate_joint(joint);
   }
-  validate_further("bases", chain.bases);
-  validate_further("tools", chain.tools);
+  validate_further("bases", chain.bases, chain.session);
+  validate_further("tools", chain.tools, chain.target);
   for (const discovery::Parameter& parameter : geometric_parameters(chain)) {
     if (!std::isfinite(parameter.value)) {
       throw std::invalid_argument(

@@ -74,22 +74,25 @@ std::vector<Sighting> sightings_of(const Csv& csv, const Header& header, Measure
   return seen;
 }
 
-// Which of the robot's frames a name of the file stands for: the frame of that name, or else the chain's own for the
-// first such name, or else one that calibration is to add.
+// Which of the robot's frames a name of the file stands for: the frame of that name, or the chain's own where that has
+// this name or none yet, or else one that calibration is to add.
 class FrameNames {
  public:
-  explicit FrameNames(const std::vector<NamedFrame>& known) {
+  FrameNames(const std::vector<NamedFrame>& known, std::string own) : own_(std::move(own)) {
     for (const NamedFrame& frame : known) known_.insert(frame.name);
   }
   std::string operator()(const std::string& name) {
+    if (name.empty()) own_is_unnamed_ = own_.empty();
     if (name.empty() || known_.contains(name)) return name;
-    if (!first_) first_ = name;
-    return name == *first_ ? "" : name;
+    if (own_.empty() && !own_is_unnamed_) own_ = name;
+    return name == own_ ? "" : name;
   }
+  const std::string& own() const { return own_; }
 
  private:
   std::set<std::string> known_;
-  std::optional<std::string> first_;
+  std::string own_;
+  bool own_is_unnamed_ = false;  // another name is then another frame
 };
 
 // Names of frames have no dots: their parameters are called base@NAME.x.
@@ -110,14 +113,29 @@ std::vector<Eigen::Index> stands_of(const Poses& rows, bool several_to_a_stand) 
   return stands;
 }
 
-std::vector<Observation> observations_of(const Csv& csv, const Header& header, const Robot& robot, const Poses& rows,
-                                         const std::vector<Sighting>& seen) {
+// Two names that differ in a dot would be one frame.
+void refuse_same_but_for_dots(const Csv& csv, const std::vector<std::string>& names, const char* column) {
+  std::map<std::string, std::string> meant;
+  for (std::size_t row = 0; row < names.size(); ++row) {
+    const auto [known, is_new] = meant.try_emplace(without_dots(names[row]), names[row]);
+    if (is_new || known->second == names[row]) continue;
+    csv.refuse(static_cast<Eigen::Index>(row), column,
+               fmt::format("\"{}\" and \"{}\" differ only in a dot, which counts as _: write one name otherwise",
+                           known->second, names[row]));
+  }
+}
+
+// Fills in the observations, and what the robot's own frames are called.
+void observe(const Csv& csv, const Header& header, const Robot& robot, const Poses& rows,
+             const std::vector<Sighting>& seen, Measurements& measurements) {
   const std::vector<std::string> sessions = header.words("session");
+  refuse_same_but_for_dots(csv, sessions, "session");
+  refuse_same_but_for_dots(csv, header.words("target"), "target");
   const bool has_targets = !header.words("target").empty();
   const std::vector<Eigen::Index> stands = stands_of(rows, has_targets);
-  FrameNames base_of(robot.chain.bases);
-  FrameNames tool_of(robot.chain.tools);
-  std::vector<Observation> observations;
+  FrameNames base_of(robot.chain.bases, robot.chain.session);
+  FrameNames tool_of(robot.chain.tools, robot.chain.target);
+  std::vector<Observation>& observations = measurements.poses.observations;
   for (const Sighting& sighting : seen) {
     Observation& observation = observations.emplace_back();
     const auto named = [&](const std::vector<std::string>& words, const char* column) {
@@ -140,7 +158,8 @@ std::vector<Observation> observations_of(const Csv& csv, const Header& header, c
     return o.base.empty() && o.tool.empty() && o.reading == Reading::position;
   });
   if (plain) observations.clear();
-  return observations;
+  measurements.session = base_of.own();
+  measurements.target = tool_of.own();
 }
 
 Measurements from_csv(const Csv& csv, const Robot& robot, const std::vector<std::string>& also, const ColumnMap& map) {
@@ -159,7 +178,7 @@ Measurements from_csv(const Csv& csv, const Robot& robot, const std::vector<std:
   }
   measurements.lines = csv.lines_of(kept);
   measurements.poses = select(rows, kept);
-  measurements.poses.observations = observations_of(csv, header, robot, rows, seen);
+  observe(csv, header, robot, rows, seen, measurements);
   measurements.orientation = header.orientation();
   measurements.orientation.convention = map.orientation;
   if (measurements.orientation.values.size() != 0) {

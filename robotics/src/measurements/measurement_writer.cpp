@@ -71,8 +71,8 @@ std::string to_csv(const Measurements& all, const Robot& robot) {
     sessions.push_back(seen.base);
     targets.push_back(target_of(seen));
   }
-  add_names("session", "first", sessions, columns);
-  add_names("target", "t1", targets, columns);
+  add_names("session", all.session.empty() ? "first" : all.session, sessions, columns);
+  add_names("target", all.target.empty() ? "t1" : all.target, targets, columns);
   for (const auto& [name, values] : measurements.poses.covariates) {
     if (!is_move(name)) columns.add(name, values);
   }

@@ -14,6 +14,8 @@ Measurements select(const Measurements& measurements, const std::vector<Eigen::I
   chosen.poses = select(measurements.poses, rows);
   chosen.positions_mm = measurements.positions_mm(rows, Eigen::all);
   chosen.measured = measurements.measured;
+  chosen.session = measurements.session;
+  chosen.target = measurements.target;
   chosen.orientation.kind = measurements.orientation.kind;
   chosen.orientation.convention = measurements.orientation.convention;
   if (measurements.orientation.values.size() != 0) {

@@ -57,20 +57,33 @@ Measurements with_orientations(const Measurements& measurements, const Chain& ch
     for (Eigen::Index row = 0; row < n; ++row) twice.push_back(row);
   }
   Measurements both = select(measurements, twice);
-  both.warnings = measurements.warnings;
-  both.unused_columns = measurements.unused_columns;
   both.positions_mm.bottomRows(n).setZero();
   std::vector<Observation>& observations = both.poses.observations;
   if (observations.empty()) {
     observations.resize(2 * n);
     for (Eigen::Index row = 0; row < 2 * n; ++row) observations[row].stand = row % n;
   }
+  std::vector<Eigen::Index> kept;
+  for (Eigen::Index row = 0; row < n; ++row) kept.push_back(row);
   for (Eigen::Index row = 0; row < n; ++row) {
     if (observations[row].reading != Reading::position) refuse("only positions can have orientations");
     observations[n + row].reading = Reading::orientation;
     observations[n + row].reference = rotations[row];
+    // Several targets of a pose share one orientation: it is one reading.
+    const bool is_same = row > 0 && observations[row].stand == observations[row - 1].stand &&
+                         observations[row].base == observations[row - 1].base && rotations[row] == rotations[row - 1];
+    if (!is_same) kept.push_back(n + row);
   }
+  both = select(both, kept);
+  both.warnings = measurements.warnings;
+  both.unused_columns = measurements.unused_columns;
   return both;
+}
+
+Robot with_frames(Robot robot, const Measurements& measurements) {
+  if (robot.chain.session.empty()) robot.chain.session = measurements.session;
+  if (robot.chain.target.empty()) robot.chain.target = measurements.target;
+  return with_frames(std::move(robot), measurements.poses);
 }
 
 Robot with_frames(Robot robot, const Poses& poses) {

@@ -30,10 +30,11 @@ void check_in_file(const YamlMap& map, Check check) {
   }
 }
 
-Frame read_frame(YamlMap map) {
+Frame read_frame(YamlMap map, std::string& name) {
+  if (map.has("name")) name = map.text("name");
   Frame frame{.xyz_mm = map.vector_or("xyz_mm", Eigen::Vector3d::Zero()),
               .rpy_deg = map.vector_or("rpy_deg", Eigen::Vector3d::Zero())};
-  map.finish({"xyz_mm", "rpy_deg"});
+  map.finish({"name", "xyz_mm", "rpy_deg"});
   return frame;
 }
 
@@ -186,10 +187,14 @@ std::vector<IdentifiedParameter> read_identified(YamlMap& map, const Robot& robo
 // The lower triangle by rows makes a matrix of the identified parameters that have a standard error.
 CalibrationRecord read_record(YamlMap map, const Robot& robot) {
   CalibrationRecord record;
-  const double poses = map.number("poses");
-  constexpr double most_poses = 1e9;
-  if (!(poses >= 1.0 && poses <= most_poses)) map.refuse("poses", fmt::format("\"poses\" is {}, must be >= 1", poses));
-  record.poses = static_cast<Eigen::Index>(poses);
+  const auto count = [&](const char* key) {
+    const double value = map.number(key);
+    constexpr double most = 1e9;
+    if (!(value >= 1.0 && value <= most)) map.refuse(key, fmt::format("\"{}\" is {}, must be >= 1", key, value));
+    return static_cast<Eigen::Index>(value);
+  };
+  record.poses = count("poses");
+  record.coordinates = map.has("coordinates") ? count("coordinates") : 3 * record.poses;
   const auto not_negative = [&](const char* key) {
     const double value = map.number(key);
     if (value < 0.0) map.refuse(key, fmt::format("\"{}\" is {}, must be >= 0", key, value));
@@ -201,8 +206,7 @@ CalibrationRecord read_record(YamlMap map, const Robot& robot) {
   const auto known =
       std::ranges::count_if(robot.identified, [](const auto& entry) { return entry.standard_error.has_value(); });
   if (map.has("correlations")) {
-    const auto count = static_cast<std::size_t>(known * (known - 1) / 2);
-    const std::vector<double> below = map.numbers("correlations", count);
+    const std::vector<double> below = map.numbers("correlations", static_cast<std::size_t>(known * (known - 1) / 2));
     record.correlations = Eigen::MatrixXd::Identity(known, known);
     auto next = below.begin();
     for (Eigen::Index i = 0; i < known; ++i) {
@@ -213,7 +217,7 @@ CalibrationRecord read_record(YamlMap map, const Robot& robot) {
       }
     }
   }
-  map.finish({"poses", "noise_mm", "held_out_mm", "held_out_sd_mm", "correlations"});
+  map.finish({"poses", "coordinates", "noise_mm", "held_out_mm", "held_out_sd_mm", "correlations"});
   return record;
 }
 
@@ -235,8 +239,8 @@ Chain read_chain(YamlMap& map) {
   }
   chain.gravity_m_s2 = map.vector_or("gravity_m_s2", chain.gravity_m_s2);
   chain.orientation = map.text_or("orientation", "");
-  if (map.has("base")) chain.base = read_frame(map.map("base"));
-  if (map.has("tool")) chain.tool = read_frame(map.map("tool"));
+  if (map.has("base")) chain.base = read_frame(map.map("base"), chain.session);
+  if (map.has("tool")) chain.tool = read_frame(map.map("tool"), chain.target);
   chain.bases = read_frames(map, "bases");
   chain.tools = read_frames(map, "tools");
   if (map.has("payload")) chain.payload = read_payload(map.map("payload"));

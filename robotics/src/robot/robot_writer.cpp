@@ -45,8 +45,10 @@ class Writer {
   }
 };
 
-void write_frame(Writer& out, const std::string& name, const Frame& frame) {
-  out.key(name).begin_map().numbers("xyz_mm", frame.xyz_mm).numbers("rpy_deg", frame.rpy_deg).end_map();
+void write_frame(Writer& out, const std::string& key, const std::string& name, const Frame& frame) {
+  out.key(key).begin_map();
+  if (!name.empty()) out.word("name", name);
+  out.numbers("xyz_mm", frame.xyz_mm).numbers("rpy_deg", frame.rpy_deg).end_map();
 }
 
 void write_frames(Writer& out, const std::string& key, const std::vector<NamedFrame>& frames) {
@@ -119,7 +121,9 @@ void write_identified(Writer& out, const Robot& robot) {
 
 void write_record(Writer& out, const CalibrationRecord& record) {
   out.key("calibration").begin_map(YAML::Block);
-  out.number("poses", static_cast<double>(record.poses)).number("noise_mm", record.noise_mm);
+  out.number("poses", static_cast<double>(record.poses))
+      .number("coordinates", static_cast<double>(record.coordinates))
+      .number("noise_mm", record.noise_mm);
   if (record.held_out_mm) out.number("held_out_mm", *record.held_out_mm);
   if (record.held_out_sd_mm) out.number("held_out_sd_mm", *record.held_out_sd_mm);
   std::vector<double> below;
@@ -147,8 +151,8 @@ std::string to_yaml(const Robot& robot) {
     if (!links.tip.empty()) out.word("tip_link", links.tip);
     out.end_map();
   }
-  write_frame(out, "base", chain.base);
-  write_frame(out, "tool", chain.tool);
+  write_frame(out, "base", chain.session, chain.base);
+  write_frame(out, "tool", chain.target, chain.tool);
   write_frames(out, "bases", chain.bases);
   write_frames(out, "tools", chain.tools);
   if (chain.payload.mass_kg != 0.0 || !chain.payload.com_mm.isZero(0.0)) {

@@ -163,5 +163,54 @@ TEST(CalibrationQuality, AnotherSessionIsPlacedBeforeItIsJudged) {
   EXPECT_EQ(placed.chain.joints[2].a_mm, calibration.robot.chain.joints[2].a_mm);
 }
 
+// A joint map is no parameter of the calibration: it must not shift the others.
+TEST(CalibrationQuality, DeviationsDoNotMindAJointMap) {
+  Robot truth = perturbed(ur_like(), 0.5, 0.1, 95);
+  const Measurements seen = measure(truth, random_poses(truth.chain, 80, 96), 0.02, 97);
+  Robot mapped = ur_like();
+  mapped.effects = {{"joint_map", "joint2", {0.0, 0.0, 0.0}, {-1.0, 1.0}}};
+  const Poses use = random_poses(truth.chain, 20, 98);
+  const Eigen::VectorXd plain = position_deviations(calibrate(ur_like(), seen), use);
+  EXPECT_LT((position_deviations(calibrate(mapped, seen), use) - plain).norm(), 1e-6 * plain.norm());
+}
+
+// Sessions that no pose of a draw belongs to are placed before they are judged.
+TEST(CalibrationQuality, TheLearningCurveOfManySessionsFalls) {
+  Robot truth = perturbed(ur_like(), 0.5, 0.1, 105);
+  Measurements all;
+  for (int session = 0; session < 6; ++session) {
+    const std::string name = session == 0 ? "" : "s" + std::to_string(session);
+    if (session > 0) truth.chain.bases.push_back({name, {.xyz_mm = {200.0 * session, -300.0, 50.0 * session}}});
+    const Measurements own =
+        read_off(truth, looked_at(random_poses(truth.chain, 12, 110 + session), {{.base = name}}), 0.05, 120 + session);
+    all = session == 0 ? own : joined(all, own);
+  }
+  const std::vector<LearningPoint> curve = learning_curve(ur_like(), all, {}, 2, 1);
+  for (const LearningPoint& point : curve) EXPECT_LT(point.held_out_mm, 20.0);  // hundreds with a wrong base
+  EXPECT_LT(curve.back().held_out_mm, 0.3);
+}
+
+// Readings that state a large standard deviation are no outliers.
+TEST(CalibrationQuality, StatedNoiseIsNoGrossError) {
+  const Robot truth = perturbed(ur_like(), 0.5, 0.1, 125);
+  Measurements seen = joined(measure(truth, random_poses(truth.chain, 80, 126), 0.02, 127),
+                             measure(truth, random_poses(truth.chain, 20, 128), 0.5, 129));
+  seen.poses.covariates["sigma_um"] = Eigen::VectorXd::Constant(100, 20.0);
+  seen.poses.covariates["sigma_um"].tail(20).setConstant(500.0);
+  seen.positions_mm(3, 0) += 4.0;
+  EXPECT_EQ(calibrate_robustly(ur_like(), seen).left_out, std::vector<std::size_t>{3});
+}
+
+TEST(CalibrationQuality, TheRecordCountsPosesAndCoordinatesAndItsNoiseIsThatOfTheResiduals) {
+  Robot truth = perturbed(ur_like(), 0.5, 0.1, 135);
+  truth.chain.tools = {{"t2", {.xyz_mm = {-70.0, 80.0, 100.0}}}};
+  Measurements seen = read_off(truth, looked_at(random_poses(truth.chain, 60, 136), {{}, {.tool = "t2"}}), 0.05, 137);
+  seen.poses.covariates["sigma_um"] = Eigen::VectorXd::Constant(120, 1000.0);  // far more than it is
+  const CalibrationRecord record = *calibrate(ur_like(), seen).robot.calibration;
+  EXPECT_EQ(record.poses, 60);
+  EXPECT_EQ(record.coordinates, 360);
+  EXPECT_NEAR(record.noise_mm, 0.05, 0.006);
+}
+
 }  // namespace
 }  // namespace llmt::robotics

@@ -1,10 +1,11 @@
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <functional>
 
 #include "llmt/robotics/calibration_report.hpp"
-#include "robotics/robots.hpp"
+#include "robotics/observations.hpp"
 
 namespace llmt::robotics {
 namespace {
@@ -48,6 +49,44 @@ TEST(LikelyMistake, SignsZerosOrderAndAxesAreNamed) {
     EXPECT_NE(said.find(one.said), std::string::npos) << said;
   }
   EXPECT_EQ(said_after([](Measurements&) {}).find("most likely"), std::string::npos);
+}
+
+TEST(LikelyMistake, TheUnitOfOneTargetIsNamed) {
+  Robot truth = perturbed(ur_like(), 0.3, 0.05, 6);
+  truth.chain.tools = {{"t2", {.xyz_mm = {-70.0, 80.0, 100.0}}}, {"t3", {.xyz_mm = {10.0, -90.0, 160.0}}}};
+  Measurements seen =
+      read_off(truth, looked_at(random_poses(truth.chain, 60, 7), {{}, {.tool = "t2"}, {.tool = "t3"}}), 0.05, 8);
+  for (Eigen::Index i = 1; i < seen.count(); i += 3) seen.positions_mm.row(i) *= 0.001;
+  const CalibrationReport report = report_calibration(ur_like(), seen, {.folds = 0});
+  const std::vector<std::string> said = suspicions(ur_like(), seen, report);
+  EXPECT_NE(said.back().find("the points of target \"t2\" are metres"), std::string::npos) << said.back();
+}
+
+TEST(LikelyMistake, TheOrderOfQuaternionsAndTheirDirectionAreNamed) {
+  const Robot truth = perturbed(ur_like(), 0.3, 0.05, 9);
+  const Poses poses = random_poses(truth.chain, 60, 10);
+  const std::vector<Pose> tools = tool_poses(truth, poses);
+  const auto said_of = [&](const std::function<Eigen::Vector4d(const Eigen::Quaterniond&)>& written) {
+    Measurements seen = measure(truth, poses, 0.05, 11);
+    seen.orientation.kind = Orientation::Kind::quaternion;
+    seen.orientation.values.resize(poses.count(), 4);
+    for (Eigen::Index i = 0; i < poses.count(); ++i) {
+      seen.orientation.values.row(i) = written(Eigen::Quaterniond(tools[i].rotation)).transpose();
+    }
+    seen = with_orientations(seen, truth.chain);
+    const CalibrationReport report = report_calibration(ur_like(), seen, {.folds = 0});
+    std::string all;
+    for (const std::string& suspicion : suspicions(ur_like(), seen, report)) all += suspicion + "\n";
+    return std::to_string(static_cast<int>(is_implausible(ur_like(), report))) + all;
+  };
+  using Q = Eigen::Quaterniond;
+  EXPECT_EQ(said_of([](const Q& q) { return Eigen::Vector4d(q.w(), q.x(), q.y(), q.z()); }), "0");
+  const std::string order = said_of([](const Q& q) { return Eigen::Vector4d(q.x(), q.y(), q.z(), q.w()); });
+  EXPECT_TRUE(order.starts_with("1") && order.find("hold x, y, z, w") != std::string::npos) << order;
+  const std::string inverse = said_of([](const Q& q) { return Eigen::Vector4d(q.w(), -q.x(), -q.y(), -q.z()); });
+  EXPECT_NE(inverse.find("world as seen from the tool"), std::string::npos) << inverse;
+  const std::string constant = said_of([](const Q&) { return Eigen::Vector4d(1.0, 0.0, 0.0, 0.0); });
+  EXPECT_TRUE(constant.starts_with("1") && constant.find("convention") != std::string::npos) << constant;
 }
 
 }  // namespace

@@ -176,5 +176,52 @@ TEST(ObservationsCalibration, TheCorrectionLearnsOrientations) {
   EXPECT_LT(missed, 0.5e-3);  // 1.6e-3 without
 }
 
+// What is not measured is not zero: it takes no part.
+TEST(ObservationsCalibration, TheCorrectionOfPlanesInTwoSessionsKeepsToWhatWasMeasured) {
+  Robot robot = ur_like();
+  robot.chain.bases = {{"b", {.xyz_mm = {1500.0, -800.0, 200.0}, .rpy_deg = {5.0, -12.0, 160.0}}}};
+  robot.chain.tools = {{"t2", {.xyz_mm = {-70.0, 80.0, 100.0}}}};
+  for (const std::vector<Observation>& views :
+       {std::vector<Observation>{{}, {.tool = "t2"}}, std::vector<Observation>{{}}}) {
+    std::vector<Observation> others = views;
+    for (Observation& view : others) view.base = "b";
+    Measurements seen = joined(read_off(robot, looked_at(random_poses(robot.chain, 100, 201), views), 0.0, 1),
+                               read_off(robot, looked_at(random_poses(robot.chain, 100, 202), others), 0.0, 2));
+    seen.measured = {true, true, false};
+    for (Eigen::Index i = 0; i < seen.count(); ++i) seen.positions_mm(i, 0) += 0.3 * std::sin(seen.poses.joints(i, 1));
+    seen.positions_mm.col(2).setZero();
+    const CorrectedRobot corrected{robot, fit_correction(robot, seen, {}).model};
+    EXPECT_LT(distances(positions(corrected, seen.poses), seen).mean(),
+              distances(positions(robot, seen.poses), seen).mean())
+        << views.size();
+  }
+}
+
+// A second target at one pose alone must not cost all other poses.
+TEST(ObservationsCalibration, TheCorrectionLearnsFromAllPosesWhereFewHaveSeveralTargets) {
+  Robot robot = with_targets(ur_like());
+  const Poses poses = random_poses(robot.chain, 200, 211);
+  Measurements seen = joined(read_off(robot, looked_at(poses, {{}}), 0.0, 1),
+                             read_off(robot, looked_at(select(poses, {0}), {{}, {.tool = "t2"}}), 0.0, 2));
+  for (Eigen::Index i = 0; i < seen.count(); ++i) seen.positions_mm(i, 0) += 0.3 * std::sin(seen.poses.joints(i, 1));
+  const CorrectedRobot corrected{robot, fit_correction(robot, seen, {}).model};
+  EXPECT_LT(distances(positions(corrected, seen.poses), seen).mean(), 0.05);
+}
+
+TEST(ObservationsCalibration, TargetsOfAPoseShareOneOrientation) {
+  const Robot robot = with_targets(ur_like());
+  Measurements seen = read_off(robot, looked_at(random_poses(robot.chain, 5, 221), {{}, {.tool = "t2"}}), 0.0, 1);
+  seen.orientation.kind = Orientation::Kind::quaternion;
+  seen.orientation.values.resize(10, 4);
+  const std::vector<Pose> tools = tool_poses(robot, seen.poses);
+  for (Eigen::Index i = 0; i < 10; ++i) {
+    const Eigen::Quaterniond q(tools[i - i % 2].rotation);
+    seen.orientation.values.row(i) << q.w(), q.x(), q.y(), q.z();
+  }
+  const Measurements both = with_orientations(seen, robot.chain);
+  EXPECT_EQ(orientation_rows(both.poses).size(), 5u);
+  EXPECT_EQ(position_rows(both.poses).size(), 10u);
+}
+
 }  // namespace
 }  // namespace llmt::robotics

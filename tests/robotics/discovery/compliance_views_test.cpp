@@ -13,7 +13,7 @@
 namespace llmt::robotics {
 namespace {
 
-constexpr Eigen::Index poses = 150;
+constexpr Eigen::Index arm_poses = 150;
 
 Robot soft_arm() {
   Robot robot = read_robot(LLMT_ROBOTS_DIR "/tx200_like.yaml");
@@ -33,10 +33,10 @@ Robot described(bool masses_known) {
 /// `sign`: -1 where the controller prints the torque of the drive, +1 where it prints that of the load, 0: no torques.
 Measurements measured(bool payload_runs, double sign, std::uint64_t seed) {
   const Robot truth = soft_arm();
-  Poses chosen = simulate(truth, {.poses = poses, .noise_um = 0.0, .seed = seed}).poses;
+  Poses chosen = simulate(truth, {.poses = arm_poses, .noise_um = 0.0, .seed = seed}).poses;
   if (payload_runs) {
-    Eigen::VectorXd payload(poses);
-    for (Eigen::Index i = 0; i < poses; ++i) payload(i) = 40.0 * static_cast<double>(i % 3);
+    Eigen::VectorXd payload(arm_poses);
+    for (Eigen::Index i = 0; i < arm_poses; ++i) payload(i) = 40.0 * static_cast<double>(i % 3);
     chosen.covariates["payload_kg"] = payload;
   }
   Measurements measurements = simulate(truth, chosen, {.noise_um = 15.0, .seed = seed});
@@ -45,7 +45,7 @@ Measurements measured(bool payload_runs, double sign, std::uint64_t seed) {
   for (std::size_t j = 0; sign != 0.0 && j < truth.chain.joints.size(); ++j) {
     Eigen::VectorXd torque = sign * loads.col(j);
     // 2 % of what is typical: an instrument's noise.
-    const double noise = 0.02 * torque.norm() / std::sqrt(static_cast<double>(poses));
+    const double noise = 0.02 * torque.norm() / std::sqrt(static_cast<double>(arm_poses));
     for (double& value : torque) value += noise * random.normal();
     measurements.poses.covariates["tau" + std::to_string(j + 1) + "_Nm"] = torque;
   }
@@ -83,7 +83,7 @@ TEST(Compliance, HasOneNameThroughGravityPayloadAndTorque) {
 TEST(Compliance, ThatStiffensUnderLoadIsNamedAsSuch) {
   Robot truth = described(true);
   truth.effects = {{"joint_compliance_stiffening", "joint2", {4e-6}, {500.0}}};
-  const Measurements seen = simulate(truth, {.poses = poses, .noise_um = 15.0, .seed = 4});
+  const Measurements seen = simulate(truth, {.poses = arm_poses, .noise_um = 15.0, .seed = 4});
   DiscoveryOptions options;
   options.correct = false;
   options.catalogue = parse_catalogue("effects:\n  - {type: joint_compliance_stiffening, search: true}\n", "own.yaml");
@@ -98,7 +98,7 @@ TEST(Compliance, ThatStiffensUnderLoadIsNamedAsSuch) {
 TEST(Compliance, FrictionThatGrowsWithTheLoadIsNamedWhereTheApproachIsKnown) {
   Robot truth = described(true);
   truth.effects = {{"friction_under_load", "joint3", {2e-7}}};
-  Measurements seen = simulate(truth, {.poses = poses, .noise_um = 15.0, .seed = 5});
+  Measurements seen = simulate(truth, {.poses = arm_poses, .noise_um = 15.0, .seed = 5});
   const Discovery found = discover(described(true), seen, {}, {.correct = false});
   EXPECT_EQ(found.answer, discovery::Answer::named);
   ASSERT_EQ(found.effects.size(), 1U);

@@ -153,5 +153,30 @@ TEST(ObservationFile, WritingAndReadingKeepsTargetsSessionsAndDistances) {
   }
 }
 
+// The names of the robot's own frames are kept, so that a file of one other session or target is not taken for them.
+TEST(ObservationFile, TheRobotsOwnFramesHaveNames) {
+  const char* header = "q1_deg,q2_mm,x_mm,session,target\n";
+  const Measurements m = read(std::string(header) + "1,2,3,mon,a\n1,2,4,mon,b\n2,3,4,tue,a\n");
+  const Robot robot = with_frames(waist_and_slide(), m);
+  EXPECT_EQ(robot.chain.session, "mon");
+  EXPECT_EQ(robot.chain.target, "a");
+  const Measurements later = read(std::string(header) + "1,2,3,tue,a\n1,2,4,mon,b\n2,3,4,wed,a\n", {}, robot);
+  const std::vector<Observation>& seen = later.poses.observations;
+  EXPECT_EQ(seen[0].base, "tue");
+  EXPECT_EQ(seen[0].tool, "tue/a");
+  EXPECT_EQ(seen[1].base, "");
+  EXPECT_EQ(seen[1].tool, "b");
+  EXPECT_EQ(seen[2].base, "wed");
+  EXPECT_THROW(positions(robot, later.poses), std::invalid_argument);  // there is no wed
+}
+
+TEST(ObservationFile, AnotherSessionHasAnotherTool) {
+  const Measurements m = read("q1_deg,q2_mm,x_mm,session\n1,2,3,mon\n2,3,4,tue\n");
+  EXPECT_EQ(m.poses.observations[0].tool, "");
+  EXPECT_EQ(m.poses.observations[1].tool, "tue");
+  EXPECT_EQ(m.target, "");
+  expect_refused("q1_deg,q2_mm,x_mm,session\n1,2,3,1.0\n2,3,4,1_0\n", "m.csv:3:", "differ only in a dot");
+}
+
 }  // namespace
 }  // namespace llmt::robotics

@@ -66,7 +66,8 @@ struct LearningPoint {
 };
 
 /// At most eight sizes from 12 poses to four fifths of all, evenly spaced in their logarithm; each is the median of
-/// `draws` random choices. Empty for fewer than 30 poses.
+/// `draws` random choices. Of several sessions the bases and tools are fitted to all poses before the error is taken.
+/// Empty for fewer than 30 poses.
 std::vector<LearningPoint> learning_curve(const Robot& robot, const Measurements& measurements,
                                           const CalibrationOptions& options = {}, int draws = 3,
                                           std::uint64_t seed = 1);

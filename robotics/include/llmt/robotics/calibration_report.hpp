@@ -64,7 +64,7 @@ struct CalibrationReport {
   bool correction_kept = false;
   std::string decision;  ///< the same in a sentence with the figures
   int folds = 0;
-  bool grouped = false;  ///< repeats of a pose (column `pose`) were kept together
+  bool grouped = false;  ///< rows of one pose were kept together, see pose_labels()
   std::vector<discovery::Termination> fold_terminations;
 
   /// The robot to use: calibrated, and corrected if the correction is kept.

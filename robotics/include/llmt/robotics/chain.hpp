@@ -76,6 +76,8 @@ struct Chain {
   std::string orientation;  ///< convention of rx, ry, rz in measurement files, e.g. "intrinsic_xyz"
   Frame base;
   Frame tool;
+  std::string session = {};            ///< name in measurement files of the set-up that `base` stands for, or empty
+  std::string target = {};             ///< name in measurement files of what `tool` stands for, or empty
   std::vector<NamedFrame> bases = {};  ///< T_world_base of further sessions
   std::vector<NamedFrame> tools = {};  ///< T_flange_tool of further targets
   std::vector<Joint> joints;

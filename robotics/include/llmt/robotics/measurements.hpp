@@ -34,6 +34,8 @@ struct Measurements {
   Eigen::MatrixXd positions_mm;                       ///< n x 3, see Reading; columns that were not measured hold zeros
   std::array<bool, 3> measured = {true, true, true};  ///< which of x, y, z were measured
   Orientation orientation;                            ///< empty values if there is none
+  std::string session;                                ///< that the chain's own base stands for; empty: none was named
+  std::string target;                                 ///< that the chain's own tool stands for; empty: none was named
   std::vector<Eigen::Index> lines;                    ///< of the file, row by row; empty without a file
   std::vector<std::string> unused_columns;            ///< columns of the file that are not used
   std::vector<std::string> warnings;                  ///< for people, e.g. rows left out because the point is missing
@@ -51,14 +53,16 @@ Measurements without_rows(const Measurements& measurements, const std::vector<st
 /// number of joints is not that of the robot.
 void validate(const Measurements& measurements, const Robot& robot);
 
-/// The measurements with their orientations as n further rows, in the order of the positions; each is a reading of what
-/// the tool of its row turns. The convention of angles is that of the chain. Throws std::invalid_argument if there are
-/// none, not all of x, y, z were measured, or readings are not of positions.
+/// The measurements with their orientations as further rows, in the order of the positions, one for the targets of a
+/// pose that have the same; each is a reading of how the tool of its row is turned. The convention of angles is that of
+/// the chain. Throws std::invalid_argument if there are none, not all of x, y, z were measured, or readings are not of
+/// positions.
 Measurements with_orientations(const Measurements& measurements, const Chain& chain);
 
 /// The robot with a base and a tool of every name among the observations; those that it does not have begin as its own
-/// base and tool.
+/// base and tool. Of measurements it takes also the names of its own base and tool, where it has none yet.
 Robot with_frames(Robot robot, const Poses& poses);
+Robot with_frames(Robot robot, const Measurements& measurements);
 
 /// Rows that are readings of an orientation, and all others; ascending.
 std::vector<Eigen::Index> orientation_rows(const Poses& poses);
@@ -111,9 +115,9 @@ ColumnMap parse_column_map(const std::string& text, const std::string& name);
 ///   distance_mm (also _m, _um)                           instead of positions: distance from a fixed point
 ///   payload_kg temp_C time_s order pose dirN tauN_Nm qmeasN_deg sigma_x_um U95_x_um ...   covariates, optional
 ///
-/// The fixed point of distances is the origin of the world frame. The first target and the first session have the
-/// chain's own tool and base, the others frames of their names, which with_frames() adds. In another session the tool
-/// is another one, too: "SESSION", or "SESSION/TARGET".
+/// The fixed point of distances is the origin of the world frame. The session and the target that the chain names as
+/// its own, or else the first ones, have its own base and tool; the others have frames of their names, which
+/// with_frames() adds. In another session the tool is another one, too: "SESSION", or "SESSION/TARGET".
 ///
 /// Covariates keep their names, but qmeasN_deg becomes qmeasN_rad. Columns named in `also`, or in a formula among the
 /// robot's effects, are covariates too. With order or time_s, add_moves() is called.

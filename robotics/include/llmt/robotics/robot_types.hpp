@@ -28,7 +28,8 @@ struct IdentifiedParameter {
 /// How good a calibration was, for whoever asks later whether it still holds.
 struct CalibrationRecord {
   Eigen::Index poses = 0;                ///< that it was made from
-  double noise_mm = 0.0;                 ///< standard deviation of one coordinate's residual
+  Eigen::Index coordinates = 0;          ///< that were measured at them, of points, orientations and distances
+  double noise_mm = 0.0;                 ///< of the residuals of points: root mean square of a coordinate
   std::optional<double> held_out_mm;     ///< mean error on poses that took no part
   std::optional<double> held_out_sd_mm;  ///< standard deviation of these errors
   /// L x L, of the identified parameters that have a standard error, in their order.
