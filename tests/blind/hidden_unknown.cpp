@@ -9,7 +9,6 @@ namespace blind {
 namespace {
 
 using Eigen::Vector3d;
-constexpr double pi = std::numbers::pi;
 
 double inside(const Scene& s, int joint, double share) {
   const Joint& j = s.arm.joints[joint];
@@ -61,7 +60,7 @@ void cable(Hidden& h, const Scene& s) {
 }
 
 void worn_tooth(Hidden& h, const Scene& s, int joint) {
-  const double half = s.random.uniform(5.0, 15.0) * pi / 360.0;
+  const double half = s.random.uniform(5.0, 15.0) * std::numbers::pi / 360.0;
   double centre = 0.0;
   for (int attempt = 0; attempt < 200; ++attempt) {  // a tooth that hardly any pose meets is an outlier, not an effect
     centre = inside(s, joint, 0.9);
@@ -72,7 +71,7 @@ void worn_tooth(Hidden& h, const Scene& s, int joint) {
   h.change = [=](const Session& session, std::vector<Change>& changes) {
     for (Eigen::Index i = 0; i < session.count(); ++i) {
       const double x = (session.q(i, joint) - centre) / half;
-      if (std::abs(x) < 1.0) changes[i].angle(joint) += 0.5 * height * (1.0 + std::cos(pi * x));
+      if (std::abs(x) < 1.0) changes[i].angle(joint) += 0.5 * height * (1.0 + std::cos(std::numbers::pi * x));
     }
   };
 }

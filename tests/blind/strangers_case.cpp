@@ -119,7 +119,7 @@ void spoil(Case& c, llmt::Random& random) {
   std::ranges::sort(c.outliers);
 }
 
-void measure(Case& c, llmt::Random& random) {
+void measure_strangers(Case& c, llmt::Random& random) {
   std::vector<const Hidden*> all;
   for (const HiddenShare& share : c.hidden) all.push_back(&share.effect);
   c.measured_mm = positions_mm(c.arm, {}, all, c.sessions.measured);
@@ -149,7 +149,7 @@ Case make_stranger(const StrangerOrder& order) {
     c.options.repeats = random.uniform() < 0.25;
     c.sessions = make_sessions(c.described, stranger_scale(order.arm).payloads, c.options, random);
     if (order.set != "none" && order.set != "gross_none" && !hide(c, order, random)) continue;
-    measure(c, random);
+    measure_strangers(c, random);
     if (order.set.starts_with("gross")) spoil(c, random);
     return c;
   }
