@@ -106,16 +106,49 @@ Json check_json(const CheckArguments& arguments, const RobotCheck& check) {
   return json;
 }
 
+// The robot for a file of one session that it need not know, whose frames are fitted anyway.
+robotics::Robot for_any_session(robotics::Robot robot) {
+  robotics::Chain& chain = robot.chain;
+  std::erase_if(chain.tools, [&](const robotics::NamedFrame& tool) {
+    return std::ranges::any_of(chain.bases, [&](const robotics::NamedFrame& base) {
+      return tool.name == base.name || tool.name.starts_with(base.name + "/");
+    });
+  });
+  chain.bases.clear();
+  chain.session.clear();
+  return robot;
+}
+
+// What calibrations refuse of the number of poses or of the description is said with the names of the files.
+RobotCheck checked(const CheckArguments& arguments, const robotics::CorrectedRobot& robot,
+                   const robotics::Measurements& measurements, const robotics::CheckOptions& options) {
+  try {
+    return robotics::check_robot(robot, measurements, options);
+  } catch (const std::invalid_argument& error) {
+    throw std::runtime_error(fmt::format("{}, {}: {}", arguments.robot, arguments.data, error.what()));
+  }
+}
+
 void check_command(const CheckArguments& arguments) {
-  const robotics::CorrectedRobot robot = read_unless_exchanged(
+  robotics::CorrectedRobot robot = read_unless_exchanged(
       arguments.robot, arguments.data, "the calibrated description (YAML) comes first, then the measurements (CSV)",
       [](const std::string& path) { return robotics::read_corrected_robot(path); });
+  if (!arguments.same_session) robot.robot = for_any_session(robot.robot);
   const robotics::Measurements measurements =
       robotics::read_measurements(arguments.data, robot.robot, {}, arguments.mark);
+  check_frames(arguments.data, robot.robot, measurements,
+               arguments.same_session ? "" : "; check judges a file of one session and known targets");
   check_positions(arguments.robot, robot.robot, measurements.poses);
   robotics::CheckOptions options{.same_session = arguments.same_session, .accuracy_mm = {}, .level = arguments.level};
   if (arguments.accuracy_mm > 0.0) options.accuracy_mm = arguments.accuracy_mm;
-  const RobotCheck check = robotics::check_robot(robot, measurements, options);
+  const RobotCheck check = checked(arguments, robot, measurements, options);
+  constexpr double implausible_share = 0.02;
+  if (check.error.mean > implausible_share * robotics::reach_of(robot.robot.chain)) {
+    throw std::runtime_error(fmt::format(
+        "{}: the robot misses the points by {:.0f} mm on average, base and tool {}: these are not measurements of it; "
+        "check units, signs and order of the columns",
+        arguments.data, check.error.mean, arguments.same_session ? "as calibrated" : "fitted to them"));
+  }
   if (arguments.json) {
     print_json(check_json(arguments, check));
   } else {

@@ -37,14 +37,20 @@ std::string counts_of(const robotics::Measurements& measurements) {
   bool distances = false;
   for (const robotics::Observation& seen : poses.observations) {
     stands.insert(seen.stand);
-    tools.insert(seen.tool);
+    // A target of another session is called SESSION/TARGET, and has the name of the session where targets have none.
+    tools.insert(seen.tool == seen.base                                         ? std::string()
+                 : seen.tool.starts_with(seen.base + "/") && !seen.base.empty() ? seen.tool.substr(seen.base.size() + 1)
+                                                                                : seen.tool);
     bases.insert(seen.base);
     distances = distances || seen.reading == robotics::Reading::distance;
   }
   std::string text = fmt::format("{} poses", stands.size());
   const auto points = std::ssize(robotics::position_rows(poses));
-  if (tools.size() > bases.size())
-    text += fmt::format(", {} points of {} targets", points, tools.size() / bases.size());
+  if (!measurements.target.empty()) {
+    tools.erase("");
+    tools.insert(measurements.target);
+  }
+  if (tools.size() > 1) text += fmt::format(", {} points of {} targets", points, tools.size());
   if (distances) text += fmt::format(", {} distances", points);
   if (bases.size() > 1) text += fmt::format(", {} sessions", bases.size());
   const auto turns = std::ssize(robotics::orientation_rows(poses));

@@ -51,6 +51,9 @@ robotics::Robot described(const PosesArguments& arguments) {
   robotics::Robot robot = robotics::read_robot(arguments.robot, arguments.links);
   require_numbers("--tool", arguments.tool, 3, "x,y,z of the measured point on the flange, mm");
   if (!arguments.tool.empty()) robot.chain.tool.xyz_mm = Eigen::Vector3d(arguments.tool.data());
+  // The next poses are of one session and one target.
+  robot.chain.bases.clear();
+  robot.chain.tools.clear();
   return robot;
 }
 

@@ -51,7 +51,8 @@ TEST(CheckProgram, RefusesWhatIsNoCalibration) {
   const Folder folder;
   calibrate_sample(folder);
   const Outcome run = folder.run(fmt::format("{} check {}arm.yaml new.csv", robot_program, samples));
-  EXPECT_EQ(run.exit_code, 2);
+  EXPECT_EQ(run.exit_code, 1);
+  EXPECT_NE(run.err.find("arm.yaml, new.csv: "), std::string::npos) << run.err;
   EXPECT_NE(run.err.find("it was not calibrated"), std::string::npos) << run.err;
   const Outcome exchanged = folder.run(robot_program + " check new.csv cal.yaml");
   EXPECT_EQ(exchanged.exit_code, 2);

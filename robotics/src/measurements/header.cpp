@@ -219,6 +219,20 @@ Orientation Header::orientation() const {
 
 // Angles that the controller read back are kept in rad like the joint values.
 std::map<std::string, Eigen::VectorXd> Header::covariates() const {
+  // One kind may hold for all axes and the other for one of them, but not both for the same.
+  const auto column_of = [&](const std::string& quantity) {
+    const auto found = std::ranges::find_if(covariates_, [&](const auto& entry) {
+      return entry.first == quantity + "_um" || entry.first == quantity + "_mm";
+    });
+    return found == covariates_.end() ? std::string() : found->second;
+  };
+  for (const std::string axis : {"", "_x", "_y", "_z"}) {
+    const std::string sigma = column_of("sigma" + axis);
+    const std::string expanded = column_of("U95" + axis);
+    if (!sigma.empty() && !expanded.empty()) {
+      refuse(fmt::format("columns \"{}\" and \"{}\" both state the noise: keep one of the two", sigma, expanded));
+    }
+  }
   std::map<std::string, Eigen::VectorXd> values;
   for (const auto& [own, column] : covariates_) {
     const bool in_degrees = own.starts_with("qmeas") && own.ends_with("_deg");
@@ -240,6 +254,21 @@ std::vector<std::string> Header::words(const std::string& column) const {
   return found == words_.end() ? std::vector<std::string>{} : csv_.texts(found->second);
 }
 
+std::string Header::lack_of_orientation() const {
+  const auto count = [&](const std::vector<std::string>& names) {
+    return std::ranges::count_if(names, [&](const std::string& name) { return quantities_.contains(name); });
+  };
+  const std::vector<std::string> angles = {"rx", "ry", "rz"};
+  const std::vector<std::string> quaternion = {"qw", "qx", "qy", "qz"};
+  for (const auto& names : {angles, quaternion}) {
+    if (count(names) == 0 || count(names) == std::ssize(names)) continue;
+    const auto lacking = std::ranges::find_if_not(names, [&](const auto& name) { return quantities_.contains(name); });
+    return fmt::format("an orientation needs {}, there is no column {}", fmt::join(names, ", "), *lacking);
+  }
+  if (count(angles) > 0 && count(quaternion) > 0) return "there are angles and a quaternion, the angles are used";
+  return {};
+}
+
 std::vector<std::string> Header::hints() const {
   struct Likeness {
     std::regex looks_like;
@@ -252,7 +281,7 @@ std::vector<std::string> Header::hints() const {
       {std::regex("temp(erature)?([_ -].*)?|.*[_ -]temp(erature)?", std::regex::icase), "temp_C"},
       {std::regex("time([_ -]?stamp)?|timestamp", std::regex::icase), "time_s"},
       {std::regex("payload|load([_ -]?kg)?|mass([_ -]?kg)?", std::regex::icase), "payload_kg"},
-      {std::regex("(std|sigma|u95|uncertainty)([_ -]?[xyz])?([_ -]?(mm|um))?|.*[_ -](std|sigma|unc)([_ -]?[xyz])?",
+      {std::regex("(std|sigma|u95|uncertainty)([_ -]?[xyz])?([_ -]?(mm|um|m))?|.*[_ -](std|sigma|unc)([_ -]?[xyz])?",
                   std::regex::icase),
        "sigma_x_mm, sigma_y_mm, sigma_z_mm"},
   };
@@ -266,6 +295,9 @@ std::vector<std::string> Header::hints() const {
     }
   }
   std::vector<std::string> hints;
+  if (const std::string lack = lack_of_orientation(); !lack.empty()) {
+    hints.push_back(fmt::format("{}: {}", csv_.name(), lack));
+  }
   for (const auto& [name, column] : seen) {
     hints.push_back(fmt::format("{}: column \"{}\" is not used; if it is what it looks like, name it {}", csv_.name(),
                                 column, name));

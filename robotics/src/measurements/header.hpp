@@ -44,6 +44,9 @@ class Header {
   /// What columns that are not used look like, in sentences.
   std::vector<std::string> hints() const;
 
+  /// What keeps the columns of an orientation from being one, in words; empty if nothing does.
+  std::string lack_of_orientation() const;
+
  private:
   struct Quantity {
     std::string column;

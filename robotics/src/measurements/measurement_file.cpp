@@ -2,6 +2,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <set>
 #include <stdexcept>
@@ -43,17 +44,24 @@ std::vector<Sighting> sightings_of(const Csv& csv, const Header& header, Measure
     std::array<bool, 3> measured = {};
     const Eigen::MatrixXd points = header.points_mm(target, measured);
     if (target != header.targets().front() && measured != measurements.measured) {
-      throw std::runtime_error(fmt::format("{}:1: all targets need the same coordinates", csv.name()));
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        if (measured[axis] == measurements.measured[axis]) continue;
+        const std::string& lacking = measured[axis] ? header.targets().front() : target;
+        throw std::runtime_error(fmt::format("{}:1: there is no column {}{}_mm, another target has {}", csv.name(),
+                                             lacking, "xyz"[axis], "xyz"[axis]));
+      }
     }
     measurements.measured = measured;
+    const std::size_t before = seen.size() + zeros.size();
     for (Eigen::Index row = 0; row < csv.rows(); ++row) {
       const Eigen::RowVector3d point = points.row(row);
       if (point.array().isNaN().all() || (point.hasNaN() && (point.array().isNaN() || point.array() == 0.0).all())) {
         continue;
       }
       if (point.hasNaN()) {
-        throw std::runtime_error(fmt::format("{}:{}: a coordinate of target {} is missing and another is there",
-                                             csv.name(), csv.line_of(row), target.substr(0, target.size() - 1)));
+        const char axis = "xyz"[std::isnan(point(0)) ? 0 : std::isnan(point(1)) ? 1 : 2];
+        throw std::runtime_error(fmt::format("{}:{}: {}{} is missing, another coordinate of the target is there",
+                                             csv.name(), csv.line_of(row), target, axis));
       }
       // Instruments that lose the target often write zeros: such rows are no measurements.
       if (point.isZero(0.0)) {
@@ -62,6 +70,10 @@ std::vector<Sighting> sightings_of(const Csv& csv, const Header& header, Measure
         const std::string name = !words.empty() ? words[row] : target.substr(0, target.size() - !target.empty());
         seen.push_back({row, name, point.transpose()});
       }
+    }
+    if (words.empty() && csv.rows() > 0 && seen.size() + zeros.size() == before) {
+      measurements.warnings.push_back(fmt::format("{}: target {} was never seen: its columns are empty", csv.name(),
+                                                  target.substr(0, target.size() - 1)));
     }
   }
   std::ranges::stable_sort(seen, {}, &Sighting::row);
@@ -101,14 +113,33 @@ std::string without_dots(std::string name) {
   return name;
 }
 
-// Rows that follow each other with the same joint values and conditions are one stand of the arm.
-std::vector<Eigen::Index> stands_of(const Poses& rows, bool several_to_a_stand) {
+// Numbers of the stands of the arm. Rows of a column of targets with the same joint values, `pose` and session are one
+// stand; where times or an order are told, only if they follow each other.
+std::vector<Eigen::Index> stands_of(const Poses& rows, const std::vector<std::string>& sessions, bool has_targets) {
   std::vector<Eigen::Index> stands(rows.count());
   const auto pose = rows.covariates.find("pose");
-  for (Eigen::Index i = 1; i < rows.count(); ++i) {
-    const bool same = several_to_a_stand && rows.joints.row(i) == rows.joints.row(i - 1) &&
-                      (pose == rows.covariates.end() || pose->second(i) == pose->second(i - 1));
-    stands[i] = stands[i - 1] + (same ? 0 : 1);
+  const bool has_order = rows.covariates.contains("order") || rows.covariates.contains("time_s");
+  std::map<std::vector<double>, Eigen::Index> known;
+  std::map<std::string, double> session_numbers;
+  Eigen::Index next = 0;
+  std::vector<double> before;
+  for (Eigen::Index i = 0; i < rows.count(); ++i) {
+    std::vector<double> key(rows.joints.row(i).begin(), rows.joints.row(i).end());
+    if (pose != rows.covariates.end()) key.push_back(pose->second(i));
+    if (!sessions.empty()) {
+      key.push_back(
+          session_numbers.try_emplace(sessions[i], static_cast<double>(session_numbers.size())).first->second);
+    }
+    if (!has_targets) {
+      stands[i] = next++;
+    } else if (has_order) {
+      stands[i] = i > 0 && key == before ? stands[i - 1] : next++;
+    } else {
+      const auto [place, is_new] = known.try_emplace(key, next);
+      if (is_new) ++next;
+      stands[i] = place->second;
+    }
+    before = std::move(key);
   }
   return stands;
 }
@@ -130,9 +161,10 @@ void observe(const Csv& csv, const Header& header, const Robot& robot, const Pos
              const std::vector<Sighting>& seen, Measurements& measurements) {
   const std::vector<std::string> sessions = header.words("session");
   refuse_same_but_for_dots(csv, sessions, "session");
-  refuse_same_but_for_dots(csv, header.words("target"), "target");
-  const bool has_targets = !header.words("target").empty();
-  const std::vector<Eigen::Index> stands = stands_of(rows, has_targets);
+  const std::vector<std::string> targets = header.words("target");
+  refuse_same_but_for_dots(csv, targets, "target");
+  const bool has_targets = !targets.empty();
+  const std::vector<Eigen::Index> stands = stands_of(rows, sessions, has_targets);
   FrameNames base_of(robot.chain.bases, robot.chain.session);
   FrameNames tool_of(robot.chain.tools, robot.chain.target);
   std::vector<Observation>& observations = measurements.poses.observations;
@@ -141,11 +173,12 @@ void observe(const Csv& csv, const Header& header, const Robot& robot, const Pos
     const auto named = [&](const std::vector<std::string>& words, const char* column) {
       if (words.empty()) return std::string();
       if (words[sighting.row].empty()) csv.refuse(sighting.row, column, "the name is missing");
+      constexpr std::size_t longest = 200;
+      if (words[sighting.row].size() > longest) csv.refuse(sighting.row, column, "a name has at most 200 characters");
       return without_dots(words[sighting.row]);
     };
     const std::string session = named(sessions, "session");
-    const std::string target = has_targets ? without_dots(sighting.target) : sighting.target;
-    if (has_targets && target.empty()) csv.refuse(sighting.row, "target", "the name is missing");
+    const std::string target = has_targets ? named(targets, "target") : sighting.target;
     observation.base = base_of(session);
     // A target that was mounted anew is another tool.
     std::string tool = observation.base;
@@ -207,7 +240,15 @@ Poses read_poses(const std::string& path, const Robot& robot, DecimalMark mark, 
   Poses poses{.joints = header.joints(), .covariates = header.covariates()};
   if (poses.count() == 0) throw std::runtime_error(fmt::format("{}: there are no poses", csv.name()));
   add_moves(poses, robot.chain);
-  return poses;
+  if (header.words("target").empty()) return poses;
+  // Several targets were looked at from one pose.
+  const std::vector<Eigen::Index> stands = stands_of(poses, header.words("session"), true);
+  std::vector<Eigen::Index> first;
+  std::set<Eigen::Index> known;
+  for (Eigen::Index row = 0; row < poses.count(); ++row) {
+    if (known.insert(stands[row]).second) first.push_back(row);
+  }
+  return select(poses, first);
 }
 
 TargetTable read_targets(const std::string& path, const Robot& robot, DecimalMark mark) {
@@ -235,9 +276,20 @@ TargetTable read_targets(const std::string& path, const Robot& robot, DecimalMar
         fmt::format("{}:1: neither joints (q1_deg, ...) nor positions (x_mm, y_mm, z_mm); columns: {}", csv.name(),
                     fmt::join(csv.columns(), ", ")));
   }
+  if (const std::string lack = header.lack_of_orientation(); !lack.empty()) {
+    throw std::runtime_error(fmt::format("{}:1: {}", csv.name(), lack));
+  }
+  for (const std::string& target : header.targets()) {
+    if (target.empty()) continue;
+    throw std::runtime_error(
+        fmt::format("{}:1: column {}x_mm: a target of the tool itself is x_mm, y_mm, z_mm", csv.name(), target));
+  }
+  for (const char* column : {"target", "session", "distance"}) {
+    if (!header.words(column).empty() || header.has(column)) targets.unused_columns.emplace_back(column);
+  }
   targets.orientation = header.orientation();
   targets.covariates = header.covariates();
-  targets.unused_columns = header.unused();
+  for (const std::string& column : header.unused()) targets.unused_columns.push_back(column);
   return targets;
 }
 

@@ -93,7 +93,8 @@ class Neighbours {
     for (std::size_t i = 0; i < near_.size(); ++i) {
       bool near = true;
       for (Eigen::Index j = 0; near && j < pose.size(); ++j) {
-        near = std::abs(std::remainder(spacing_.candidates(i, j) - pose(j), 360.0)) < spacing_.degrees;
+        const double apart = spacing_.candidates(i, j) - pose(j);
+        near = std::abs(spacing_.turns[j] ? std::remainder(apart, 360.0) : apart) < spacing_.degrees;
       }
       if (near) near_[i] += change;
     }

@@ -34,6 +34,7 @@ Eigen::VectorXd losses_with(const DesignProblem& problem, const Eigen::MatrixXd&
 struct Spacing {
   double degrees = 0.0;
   Eigen::MatrixXd candidates;  ///< N x J
+  std::vector<bool> turns;     ///< J: whether values that differ by 360 are the same
   Eigen::MatrixXd measured;    ///< M x J
 };
 

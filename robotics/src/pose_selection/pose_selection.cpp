@@ -68,7 +68,9 @@ struct Task {
 
   Eigen::MatrixXd rows(const Poses& poses) const { return model.derivatives(poses) / options.noise_mm; }
   Spacing spacing(const Poses& poses) const {
-    return {options.spacing_deg, joint_degrees(robot.chain, poses.joints), measured_deg};
+    std::vector<bool> turns;
+    for (const Joint& joint : robot.chain.joints) turns.push_back(joint.type == JointType::revolute);
+    return {options.spacing_deg, joint_degrees(robot.chain, poses.joints), turns, measured_deg};
   }
 };
 

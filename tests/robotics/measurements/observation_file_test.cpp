@@ -117,6 +117,7 @@ TEST(ObservationFile, StatedUncertaintiesBecomeStandardDeviations) {
   EXPECT_TRUE(stated_sigma_mm(m).isApprox(Eigen::RowVector3d(0.015, 0.015, 0.008)));
   expect_refused("q1_deg,q2_mm,x_mm,sigma_x_um\n1,2,3,4\n2,3,4,0\n", "m.csv:3:", "standard deviation must be above 0");
   expect_refused("q1_deg,q2_mm,x_mm,sigma_x_um\n1,2,3,nan\n", "m.csv:2:", "sigma_x_um");
+  expect_refused("q1_deg,q2_mm,x_mm,sigma_x_um,U95_x_um\n1,2,3,4,5\n", "m.csv:1:", "both state the noise");
 }
 
 TEST(ObservationFile, ColumnsThatLookMeantAreNamedOnce) {
@@ -127,10 +128,31 @@ TEST(ObservationFile, ColumnsThatLookMeantAreNamedOnce) {
   EXPECT_EQ(m.unused_columns.size(), 4u);
 }
 
+TEST(ObservationFile, AnIncompleteOrientationAndATargetThatWasNeverSeenAreSaid) {
+  const Measurements partial = read("q1_deg,q2_mm,x_mm,qw,qx,qy\n1,2,3,1,0,0\n");
+  ASSERT_EQ(partial.warnings.size(), 1u);
+  EXPECT_NE(partial.warnings[0].find("there is no column qz"), std::string::npos) << partial.warnings[0];
+  const Measurements unseen = read("q1_deg,q2_mm,t1_x_mm,t2_x_mm\n1,2,3,\n2,3,4,\n");
+  ASSERT_EQ(unseen.warnings.size(), 1u);
+  EXPECT_NE(unseen.warnings[0].find("target t2 was never seen"), std::string::npos) << unseen.warnings[0];
+}
+
+// A long table may be sorted by target.
+TEST(ObservationFile, RowsOfOnePoseNeedNotFollowEachOther) {
+  const std::string header = "q1_deg,q2_mm,x_mm,target";
+  const Measurements sorted = read(header + "\n1,2,3,a\n2,3,4,a\n1,2,5,b\n2,3,6,b\n");
+  const std::vector<Observation>& seen = sorted.poses.observations;
+  EXPECT_EQ(seen[0].stand, seen[2].stand);
+  EXPECT_EQ(seen[1].stand, seen[3].stand);
+  EXPECT_NE(seen[0].stand, seen[1].stand);
+  const Measurements timed = read(header + ",order\n1,2,3,a,1\n2,3,4,a,2\n1,2,5,b,3\n");
+  EXPECT_NE(timed.poses.observations[0].stand, timed.poses.observations[2].stand);
+}
+
 TEST(ObservationFile, MistakesAreNamedWithTheirPlace) {
   expect_refused("q1_deg,q2_mm,x_mm,t1_x_mm\n1,2,3,4\n", "m.csv:1:", "name them all");
-  expect_refused("q1_deg,q2_mm,t1_x_mm,t2_x_mm,t2_y_mm\n1,2,3,4,5\n", "m.csv:1:", "same coordinates");
-  expect_refused("q1_deg,q2_mm,t1_x_mm,t1_y_mm\n1,2,3,4\n1,2,3,\n", "m.csv:3:", "is missing");
+  expect_refused("q1_deg,q2_mm,t1_x_mm,t2_x_mm,t2_y_mm\n1,2,3,4,5\n", "m.csv:1:", "no column t1_y_mm");
+  expect_refused("q1_deg,q2_mm,t1_x_mm,t1_y_mm\n1,2,3,4\n1,2,3,\n", "m.csv:3:", "t1_y is missing");
   expect_refused("q1_deg,q2_mm,x_mm,target\n1,2,3,a\n1,2,3,\n", "m.csv:3:", "the name is missing");
   expect_refused("q1_deg,q2_mm,x_mm,session\n1,2,3,\n", "m.csv:2:", "the name is missing");
   expect_refused("q1_deg,q2_mm,x_mm,y_mm,z_mm,qw,qx,qy,qz\n1,2,3,4,5,0,0,0,0\n", "m.csv:2:", "length 0");

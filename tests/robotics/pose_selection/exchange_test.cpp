@@ -29,7 +29,9 @@ DesignProblem problem_of(Eigen::Index parameters, Criterion criterion, Random& r
   return {criterion, 0.01 * Eigen::MatrixXd::Identity(parameters, parameters), use.transpose() * use};
 }
 
-Spacing without_spacing(Eigen::Index poses) { return {0.0, Eigen::MatrixXd::Zero(poses, 1), Eigen::MatrixXd(0, 1)}; }
+Spacing without_spacing(Eigen::Index poses) {
+  return {0.0, Eigen::MatrixXd::Zero(poses, 1), {true}, Eigen::MatrixXd(0, 1)};
+}
 
 TEST(Exchange, UpdateByAPoseEqualsTheLossComputedAnew) {
   Random random(1);
@@ -99,7 +101,7 @@ TEST(Exchange, FindsTheBestSubsetMostly) {
 TEST(Exchange, KeepsTheSpacingAlsoToWhatIsMeasured) {
   Random random(3);
   const Eigen::MatrixXd rows = random_matrix(3 * 30, 4, random);
-  Spacing spacing{10.0, Eigen::MatrixXd(30, 1), Eigen::MatrixXd(1, 1)};
+  Spacing spacing{10.0, Eigen::MatrixXd(30, 1), {true}, Eigen::MatrixXd(1, 1)};
   for (Eigen::Index i = 0; i < 30; ++i) spacing.candidates(i, 0) = 4.0 * static_cast<double>(i);
   spacing.measured(0, 0) = 362.0;  // as 2
   const DesignProblem problem = problem_of(4, Criterion::position, random);
@@ -110,6 +112,9 @@ TEST(Exchange, KeepsTheSpacingAlsoToWhatIsMeasured) {
     for (std::size_t k = 0; k < i; ++k) EXPECT_GE(std::abs(chosen[i] - chosen[k]), 3);
   }
   EXPECT_LT(choose_by_exchange(problem, rows, spacing, {}, 20).size(), 20U);  // there is no room for 20
+  spacing.turns = {false};                                                    // 362 mm are far from 2 mm
+  const std::vector<Eigen::Index> sliding = choose_by_exchange(problem, rows, spacing, {}, 8);
+  EXPECT_TRUE(std::ranges::any_of(sliding, [&](Eigen::Index i) { return spacing.candidates(i, 0) < 12.0; }));
 }
 
 TEST(DesignBound, NoSubsetIsBetterAndTheIdealIsNear) {
