@@ -50,9 +50,9 @@ void print_check(const CheckArguments& arguments, const robotics::Robot& robot, 
                   check.error.max, check.accuracy_mm, check.limit_mm));
   if (check.moved.empty()) {
     print(fmt::format(
-        "Nothing moved, of {} parameters and groups of them that were tested; one test in {:.3g} like this one "
-        "says otherwise by chance.\n",
-        check.tested, 1.0 / arguments.level));
+        "Nothing moved, of {} parameters and groups of them that were tested. Where nothing moved, {:.3g} % of such "
+        "checks still name something.\n",
+        check.tested, 100.0 * arguments.level));
   } else {
     print("\nMoved since the calibration:\n");
     for (const Moved& moved : check.moved) print(moved_words(moved));

@@ -58,9 +58,7 @@ std::string shape_lines(const std::vector<robotics::FoundShape>& shapes) {
 }
 
 std::string gap_lines(const Discovery& found) {
-  const bool nothing = found.answer == discovery::Answer::nothing_missing;
-  std::string text = nothing ? "Where the calibrated model misses the measured points:\n"
-                             : "Where the calibrated model misses the measured points:\n";
+  std::string text = "Where the calibrated model misses the measured points:\n";
   if (found.gap.regions.empty()) text += "  about alike everywhere\n";
   for (const robotics::GapMap::Region& region : found.gap.regions) {
     text += fmt::format("  {:.4f} mm mean in {} poses: {}\n", region.mean_mm, region.poses, region.conditions);

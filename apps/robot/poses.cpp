@@ -149,10 +149,13 @@ void print_selection(const PosesArguments& arguments, const robotics::Robot& rob
   print(expectations(selection));
   print(fmt::format(
       "Error of the tool position: root mean square {}, for noise of {} um in each coordinate; the noise "
-      "alone, no error of the model. No {} poses get below {} mm. Random: the median of 25 draws.\n"
+      "alone, no error of the model. {} get below {} mm. Random: the median of 25 draws.\n"
       "O1 to O5: the larger the better; derivatives over the noise, parameters in units of 1 mm and 0.1 deg "
       "(those of effects: their scales), the identifiable ones.\n\n",
-      use_words(arguments), number(arguments.noise_um), selection.poses.count(), number(selection.bound_mm, 4)));
+      use_words(arguments), number(arguments.noise_um),
+      arguments.from.empty() ? fmt::format("As far as the search sees, no {} poses", selection.poses.count())
+                             : fmt::format("No {} of the candidates", selection.poses.count()),
+      number(selection.bound_mm, 4)));
   print(expected_errors(selection));
   std::vector<std::string> dependent;
   for (const robotics::FixedParameter& fixed : selection.fixed) {

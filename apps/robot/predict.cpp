@@ -53,7 +53,7 @@ void add_predict(CLI::App& app) {
       "predict",
       "Say where a robot puts its tool\n"
       "The whole model: geometry, effects, correction. Orientations are in the description's convention (orientation: "
-      "intrinsic_xyz and the like), or quaternions if it names none; the correction leaves them alone.");
+      "intrinsic_xyz and the like), or quaternions if it names none.");
   command->footer("Example: llmt-robot predict calibrated.yaml poses.csv -o positions.csv");
   const auto arguments = std::make_shared<PredictArguments>();
   add_input_file(*command, "robot", arguments->robot, "Robot description (YAML), as calibrate or discover wrote it")

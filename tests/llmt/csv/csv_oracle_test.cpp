@@ -105,7 +105,7 @@ class Writer {
 };
 
 template <class Call>
-std::string error_of(Call call) {
+std::string error_of_call(Call call) {
   try {
     call();
   } catch (const std::runtime_error& error) {
@@ -135,7 +135,7 @@ TEST(CsvOracle, RandomTablesReadAsByTheNaiveParser) {
     const llmt::DecimalMark mark = commas ? llmt::DecimalMark::comma : llmt::DecimalMark::point;
     const Table expected = naive(text, static_cast<char>(mark));
     std::optional<llmt::Csv> csv;
-    ASSERT_EQ(error_of([&] { csv.emplace(llmt::Csv::parse(text, "t", mark)); }), expected.error);
+    ASSERT_EQ(error_of_call([&] { csv.emplace(llmt::Csv::parse(text, "t", mark)); }), expected.error);
     if (!csv) {
       ++refused;
       continue;
@@ -151,7 +151,7 @@ TEST(CsvOracle, RandomTablesReadAsByTheNaiveParser) {
         Eigen::MatrixXd expected_values;
         const std::string error =
             naive_numbers(expected, wanted, allow_missing, expected_values, static_cast<char>(mark));
-        ASSERT_EQ(error_of([&] { values = allow_missing ? csv->numbers_or_missing(names) : csv->numbers(names); }),
+        ASSERT_EQ(error_of_call([&] { values = allow_missing ? csv->numbers_or_missing(names) : csv->numbers(names); }),
                   error);
         if (error.empty()) {
           ASSERT_TRUE(same(values, expected_values));
@@ -209,9 +209,9 @@ TEST(CsvOracle, ErrorsAndNumbersDoNotDependOnThreads) {
       first = std::min(first, row);
     }
     const llmt::Csv bad = llmt::Csv::parse(text, "t");
-    const std::string error = error_of([&] { bad.numbers(names, 1); });
+    const std::string error = error_of_call([&] { bad.numbers(names, 1); });
     EXPECT_TRUE(error.starts_with(fmt::format("t:{}: column \"a\": 'x", first + 2))) << error;
-    EXPECT_EQ(error_of([&] { bad.numbers(names, 2); }), error);
+    EXPECT_EQ(error_of_call([&] { bad.numbers(names, 2); }), error);
     const llmt::CsvNumbers read = bad.read_numbers(names, 2);
     EXPECT_EQ(read.cells[1].first_other, first);
     EXPECT_EQ(read.cells[1].other, read.values.col(1).array().isNaN().count());

@@ -86,9 +86,9 @@ TEST(Missing, InformativeMissingnessIsLearned) {
     llmt::Random random(seed);
     Data d{oracle::uniform(1000, 3, seed), Eigen::MatrixXd(1000, 1)};
     for (Eigen::Index i = 0; i < 1000; ++i) {
-      const bool missing = random.uniform() < 0.3;
-      d.y(i, 0) = std::sin(3.0 * d.x(i, 1)) + d.x(i, 2) + (missing ? 5.0 : 0.0) + 0.1 * random.normal();
-      d.x(i, 0) = missing ? oracle::missing : d.x(i, 0);
+      const bool is_missing = random.uniform() < 0.3;
+      d.y(i, 0) = std::sin(3.0 * d.x(i, 1)) + d.x(i, 2) + (is_missing ? 5.0 : 0.0) + 0.1 * random.normal();
+      d.x(i, 0) = is_missing ? oracle::missing : d.x(i, 0);
     }
     return d;
   };

@@ -15,16 +15,16 @@ using llmt::ValidityKind;
 using oracle::Way;
 
 // More than functions that called themselves for every level could do.
-constexpr int deep = 50'000;
+constexpr int chain_length = 50'000;
 
 TEST(DeepTrees, AChainOfCrispLeavesIsRead) {
   for (const Way way : {Way::left, Way::right}) {
-    const llmt::Model model = oracle::chain(deep, ValidityKind::crisp, 0.0, way);
+    const llmt::Model model = oracle::chain(chain_length, ValidityKind::crisp, 0.0, way);
     const Eigen::MatrixXd x = oracle::uniform(50, 2, 1);
     EXPECT_TRUE(model.predict(x).allFinite());
     EXPECT_EQ(model.predict(x.topRows(3)), model.predict(x).topRows(3));
     EXPECT_EQ(model.validities(x.topRows(1), 0).sum(), 1.0);
-    EXPECT_EQ(std::ssize(model.leaves(0)), deep);
+    EXPECT_EQ(std::ssize(model.leaves(0)), chain_length);
     EXPECT_TRUE(model.jacobian(x.row(0)).allFinite());
     EXPECT_TRUE(llmt::attribute(model, x.row(0)).contributions.allFinite());
     EXPECT_TRUE(llmt::importance(model, x).allFinite());

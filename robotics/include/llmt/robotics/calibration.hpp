@@ -51,10 +51,10 @@ discovery::SolverResult register_frames(Robot& robot, const Measurements& measur
 ///    distances) and one for orientations. Where the file states sigmas of its readings (stated_sigma_mm()), they come
 ///    on top: sigma^2 = common^2 + stated^2.
 ///
-/// Joint maps (effect `joint_map`) stay as they are and come last in the result: their values were smoothed, and least
-/// squares would undo that. Measured orientations take part where with_orientations() made rows of them.
-/// Throws std::invalid_argument for wrong options, names that match no parameter, and measurements that do not suit the
-/// robot.
+/// Joint maps (effect `joint_map`) stay as they are and are not in the result, but last in the robot: their values were
+/// smoothed, and least squares would undo that. Measured orientations take part where with_orientations() made rows of
+/// them. Throws std::invalid_argument for wrong options, names that match no parameter, and measurements that do not
+/// suit the robot.
 Calibration calibrate(const Robot& robot, const Measurements& measurements, const CalibrationOptions& options = {});
 
 struct RobustCalibration {

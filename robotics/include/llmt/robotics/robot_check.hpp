@@ -71,8 +71,8 @@ struct RobotCheck {
 /// chi square, is listed beside it. Joint maps are not tested. A tool of another session counts as moved if it is not
 /// where it was.
 ///
-/// Throws std::invalid_argument for options out of range, fewer than 5 poses or measurements that do not suit the
-/// robot.
+/// Throws std::invalid_argument for options out of range, fewer than 8 poses (5 in the same session), a robot without
+/// identified parameters or without a record of its accuracy, or measurements that do not suit the robot.
 RobotCheck check_robot(const CorrectedRobot& robot, const Measurements& measurements, const CheckOptions& options = {});
 
 }  // namespace llmt::robotics
