@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "llmt/discovery/least_squares.hpp"
 #include "llmt/discovery/simulation.hpp"
 #include "llmt/discovery/terms.hpp"
 #include "llmt/held_out.hpp"
