@@ -123,6 +123,9 @@ class Csv {
   /// Lines of ascending rows, counted in one go.
   std::vector<Eigen::Index> lines_of(std::span<const Eigen::Index> rows) const;
 
+  /// The text with the given rows alone; lines in errors are still those of the whole text.
+  Csv with_rows(std::span<const Eigen::Index> rows) const;
+
   char separator() const { return separator_; }
   DecimalMark decimal_mark() const { return mark_; }
 

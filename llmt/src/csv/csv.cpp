@@ -129,6 +129,13 @@ std::vector<Eigen::Index> Csv::lines_of(std::span<const Eigen::Index> rows) cons
   return lines;
 }
 
+Csv Csv::with_rows(std::span<const Eigen::Index> rows) const {
+  Csv part = *this;
+  part.row_begins_.clear();
+  for (const Eigen::Index row : rows) part.row_begins_.push_back(row_begins_[row]);
+  return part;
+}
+
 Eigen::Index Csv::line_at(std::size_t offset) const {
   return 1 + lines_left_out_ + std::count(text_.begin(), text_.begin() + offset, '\n');
 }

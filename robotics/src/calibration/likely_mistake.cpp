@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "calibration/registration.hpp"
+#include "kinematics/rigid_fit.hpp"
 #include "llmt/robotics/calibration.hpp"
 
 namespace llmt::robotics {

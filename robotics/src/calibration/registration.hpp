@@ -5,13 +5,6 @@
 
 namespace llmt::robotics {
 
-/// The rotation R with the greatest trace of R matrix (Kabsch 1976; a reflection is turned back about the least axis).
-Eigen::Matrix3d rotation_of_greatest_trace(const Eigen::Matrix3d& matrix);
-
-/// The proper rotation and translation that carry `from` to `to` (n x 3) with the smallest squared distances (Kabsch
-/// 1976).
-Pose kabsch(const Eigen::MatrixXd& from, const Eigen::MatrixXd& to);
-
 /// Fixed-axis roll, pitch, yaw in degrees of R = Rz(yaw) Ry(pitch) Rx(roll).
 Eigen::Vector3d roll_pitch_yaw_deg(const Eigen::Matrix3d& rotation);
 

@@ -80,7 +80,7 @@ void Header::take(const std::string& name, const std::string& column) {
     take_quantity(parts[1], column, parts[4]);
   } else if (std::regex_match(name, quaternion)) {
     quantities_[name] = {column, ""};
-  } else if (name == "target" || name == "session") {
+  } else if (name == "target" || name == "session" || name == "reference") {
     words_[name] = column;
   } else if (std::regex_match(name, covariate) || also_.contains(name)) {
     if (!covariates_.try_emplace(name, column).second) refuse(fmt::format("there are two columns {}", name));
@@ -254,6 +254,14 @@ std::vector<std::string> Header::words(const std::string& column) const {
   return found == words_.end() ? std::vector<std::string>{} : csv_.texts(found->second);
 }
 
+std::string Header::sequence_column() const {
+  for (const char* name : {"order", "time_s"}) {
+    const auto found = covariates_.find(name);
+    if (found != covariates_.end()) return found->second;
+  }
+  return {};
+}
+
 std::string Header::lack_of_orientation() const {
   const auto count = [&](const std::vector<std::string>& names) {
     return std::ranges::count_if(names, [&](const std::string& name) { return quantities_.contains(name); });
@@ -276,6 +284,8 @@ std::vector<std::string> Header::hints() const {
   };
   static const std::vector<Likeness> known = {
       {std::regex("(target|smr|reflector|point|marker)([_ -]?(name|id|nr|no))?", std::regex::icase), "target"},
+      {std::regex("(reference|ref|nest|(base|fixed)[_ -]?point)([_ -]?(name|id|nr|no))?", std::regex::icase),
+       "reference"},
       {std::regex("(session|setup|station|series)([_ -]?(name|id|nr|no))?", std::regex::icase), "session"},
       {std::regex("(tau|torque|current|load)[_ -]?[0-9]+.*", std::regex::icase), "tau1_Nm, tau2_Nm, ..."},
       {std::regex("temp(erature)?([_ -].*)?|.*[_ -]temp(erature)?", std::regex::icase), "temp_C"},

@@ -36,7 +36,10 @@ class Header {
   Orientation orientation() const;
   std::map<std::string, Eigen::VectorXd> covariates() const;
 
-  /// Names in the column `target` or `session`, row by row; empty if there is none.
+  /// The column of the file that says in which sequence rows were read: order, or else time_s; empty if there is none.
+  std::string sequence_column() const;
+
+  /// Names in the column `target`, `session` or `reference`, row by row; empty if there is none.
   std::vector<std::string> words(const std::string& column) const;
 
   const std::vector<std::string>& unused() const { return unused_; }
@@ -58,7 +61,7 @@ class Header {
   std::set<std::string> also_;
   std::map<std::string, Quantity> quantities_;     // "q1", "x", "t2_x", "rx", "qw", "distance" -> column and unit
   std::map<std::string, std::string> covariates_;  // name -> column
-  std::map<std::string, std::string> words_;       // "target", "session" -> column
+  std::map<std::string, std::string> words_;       // "target", "session", "reference" -> column
   std::vector<std::string> targets_;
   std::vector<std::string> unused_;
 

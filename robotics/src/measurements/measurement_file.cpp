@@ -10,6 +10,7 @@
 #include "llmt/csv.hpp"
 #include "llmt/robotics/measurements.hpp"
 #include "measurements/header.hpp"
+#include "measurements/reference_rows.hpp"
 
 namespace llmt::robotics {
 namespace {
@@ -195,7 +196,9 @@ void observe(const Csv& csv, const Header& header, const Robot& robot, const Pos
   measurements.target = tool_of.own();
 }
 
-Measurements from_csv(const Csv& csv, const Robot& robot, const std::vector<std::string>& also, const ColumnMap& map) {
+Measurements from_csv(const Csv& all, const Robot& robot, const std::vector<std::string>& also, const ColumnMap& map) {
+  const ReferenceRows split = reference_rows(all, map);
+  const Csv csv = all.with_rows(split.others);
   const Header header(csv, robot, also, map);
   Measurements measurements;
   Poses rows{.joints = header.joints(), .covariates = header.covariates()};
@@ -217,6 +220,8 @@ Measurements from_csv(const Csv& csv, const Robot& robot, const std::vector<std:
   if (measurements.orientation.values.size() != 0) {
     measurements.orientation.values = Eigen::MatrixXd(measurements.orientation.values(kept, Eigen::all));
   }
+  for (Eigen::Index& row : kept) row = split.others[row];
+  take_off_drift(all, split, robot, map, kept, measurements);
   measurements.unused_columns = header.unused();
   for (const std::string& hint : header.hints()) measurements.warnings.push_back(hint);
   return measurements;
@@ -235,7 +240,8 @@ Measurements parse_measurements(std::string text, const std::string& name, const
 }
 
 Poses read_poses(const std::string& path, const Robot& robot, DecimalMark mark, const ColumnMap& map) {
-  const Csv csv = Csv::read(path, map.decimal.value_or(mark));
+  const Csv all = Csv::read(path, map.decimal.value_or(mark));
+  const Csv csv = all.with_rows(reference_rows(all, map).others);
   const Header header(csv, robot, {}, map);
   Poses poses{.joints = header.joints(), .covariates = header.covariates()};
   if (poses.count() == 0) throw std::runtime_error(fmt::format("{}: there are no poses", csv.name()));
@@ -284,7 +290,7 @@ TargetTable read_targets(const std::string& path, const Robot& robot, DecimalMar
     throw std::runtime_error(
         fmt::format("{}:1: column {}x_mm: a target of the tool itself is x_mm, y_mm, z_mm", csv.name(), target));
   }
-  for (const char* column : {"target", "session", "distance"}) {
+  for (const char* column : {"target", "session", "reference", "distance"}) {
     if (!header.words(column).empty() || header.has(column)) targets.unused_columns.emplace_back(column);
   }
   targets.orientation = header.orientation();
