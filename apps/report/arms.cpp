@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "llmt/robotics/kinematics.hpp"
 #include "report/figures.hpp"
@@ -17,10 +16,6 @@ using robotics::JointType;
 using robotics::Measurements;
 
 constexpr Eigen::Index most_arrows = 400;
-
-double unit_of(const robotics::Chain& chain, Eigen::Index joint) {
-  return chain.joints[joint].type == JointType::revolute ? 180.0 / std::numbers::pi : 1.0;
-}
 
 // The lower and the upper end of a joint in degrees or mm: its limits, widened where poses lie beyond.
 std::pair<double, double> range_of(const robotics::Chain& chain, const Numbers& values, Eigen::Index joint) {
@@ -121,12 +116,11 @@ Eigen::VectorXd along_joint(const robotics::Robot& robot, const Measurements& me
 }
 
 Numbers joint_values(const robotics::Chain& chain, const Eigen::MatrixXd& joints, Eigen::Index joint) {
-  return numbers_of(joints.col(joint) * unit_of(chain, joint));
+  return numbers_of(joints.col(joint) * robotics::to_limit_unit(chain.joints[joint]));
 }
 
 std::string joint_axis(const robotics::Chain& chain, Eigen::Index joint) {
-  return fmt::format("{}, {}", chain.joints[joint].name,
-                     chain.joints[joint].type == JointType::revolute ? "deg" : "mm");
+  return fmt::format("{}, {}", chain.joints[joint].name, robotics::limit_unit(chain.joints[joint]));
 }
 
 Map coverage(const robotics::Chain& chain, const Eigen::MatrixXd& joints) {

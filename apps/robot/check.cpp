@@ -2,7 +2,6 @@
 #include <fmt/ranges.h>
 
 #include <memory>
-#include <optional>
 #include <stdexcept>
 
 #include "llmt/robotics/robot_check.hpp"

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <memory>
-#include <numbers>
 #include <stdexcept>
 
 #include "llmt/files.hpp"
@@ -98,10 +97,10 @@ std::string commands_csv(const CorrectedRobot& robot, const robotics::TargetTabl
   std::vector<std::string> names;
   std::vector<Eigen::VectorXd> columns;
   for (std::size_t j = 0; j < robot.robot.chain.joints.size(); ++j) {
-    const bool turns = robot.robot.chain.joints[j].type == robotics::JointType::revolute;
-    const bool degrees = turns && table.joints_in_degrees;
-    names.push_back(fmt::format("q{}_{}", j + 1, degrees ? "deg" : turns ? "rad" : "mm"));
-    columns.emplace_back(found.commands.joints.col(j) * (degrees ? 180.0 / std::numbers::pi : 1.0));
+    const robotics::Joint& joint = robot.robot.chain.joints[j];
+    const bool in_radians = joint.type == robotics::JointType::revolute && !table.joints_in_degrees;
+    names.push_back(fmt::format("q{}_{}", j + 1, in_radians ? "rad" : robotics::limit_unit(joint)));
+    columns.emplace_back(found.commands.joints.col(j) * (in_radians ? 1.0 : robotics::to_limit_unit(joint)));
   }
   for (const auto& [name, values] : found.commands.covariates) {
     if (robotics::is_move(name)) continue;
@@ -194,11 +193,11 @@ void warn_of_units(const CompensateArguments& arguments, const robotics::Chain& 
     constexpr double two_turns = 720.0;
     constexpr double slack = 1.0;  // degree or mm
     const std::array<double, 2> limits = joint.limits.value_or(std::array{-two_turns, two_turns});
-    const Eigen::ArrayXd values = table.joints.col(j) * (turns ? 180.0 / std::numbers::pi : 1.0);
+    const Eigen::ArrayXd values = table.joints.col(j) * robotics::to_limit_unit(joint);
     const Eigen::Index count = (values < limits[0] - slack || values > limits[1] + slack).count();
     if (count > 0) {
       outside.push_back(fmt::format("{} in {} of {} rows (up to {:.4g} {})", joint.name, count, values.size(),
-                                    values.abs().maxCoeff(), turns ? "deg" : "mm"));
+                                    values.abs().maxCoeff(), robotics::limit_unit(joint)));
     }
   }
   if (outside.empty()) return;

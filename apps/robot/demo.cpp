@@ -3,7 +3,6 @@
 
 #include <filesystem>
 #include <memory>
-#include <numbers>
 #include <stdexcept>
 
 #include "llmt/files.hpp"
@@ -45,7 +44,9 @@ std::string program_csv(robotics::Robot robot) {
   std::string text = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n";
   for (const auto pose : poses.joints.rowwise()) {
     std::vector<std::string> cells;
-    for (const double value : pose) cells.push_back(fmt::format("{:.3f}", value * 180.0 / std::numbers::pi));
+    for (Eigen::Index j = 0; j < pose.size(); ++j) {
+      cells.push_back(fmt::format("{:.3f}", pose(j) * robotics::to_limit_unit(robot.chain.joints[j])));
+    }
     text += fmt::format("{}\n", fmt::join(cells, ","));
   }
   return text;

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <iterator>
 #include <memory>
 #include <stdexcept>
 
@@ -48,11 +49,7 @@ std::vector<std::string> columns_of(const std::vector<robotics::EffectType>& cat
       if (type.place == robotics::EffectPlace::robot && j > 0) continue;
       for (const std::string& names :
            robotics::effect_columns(robot.chain, robotics::make_effect(type, robot.chain, j))) {
-        for (std::size_t begin = 0; begin < names.size();) {
-          const std::size_t end = std::min(names.find('|', begin), names.size());
-          columns.push_back(names.substr(begin, end - begin));
-          begin = end + 1;
-        }
+        std::ranges::copy(robotics::alternatives(names), std::back_inserter(columns));
       }
     }
   }

@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <memory>
-#include <numbers>
 #include <stdexcept>
 
 #include "llmt/files.hpp"
@@ -85,8 +84,7 @@ std::string poses_csv(const robotics::Robot& robot, const robotics::Poses& poses
     std::vector<std::string> cells;
     for (std::size_t j = 0; j < robot.chain.joints.size(); ++j) {
       const robotics::Joint& joint = robot.chain.joints[j];
-      const double unit = joint.type == robotics::JointType::revolute ? 180.0 / std::numbers::pi : 1.0;
-      cells.push_back(fmt::format("{:.12g}", rounded(poses.joints(i, j) * unit, joint)));
+      cells.push_back(fmt::format("{:.12g}", rounded(poses.joints(i, j) * robotics::to_limit_unit(joint), joint)));
     }
     for (const auto& [name, values] : poses.covariates) {
       if (!robotics::is_move(name)) cells.push_back(fmt::format("{}", values(i)));

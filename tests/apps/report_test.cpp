@@ -73,10 +73,10 @@ TEST(Report, FitShowsEveryRowByAModelThatHadNotSeenIt) {
   EXPECT_EQ(document.main->layers.front().x.size(), 400);
   EXPECT_NE(document.answer.find("y is predicted to within"), std::string::npos) << document.answer;
   EXPECT_EQ(document.title, "llmt fit table.csv");
-  const Json json = to_json(document);
+  const Json page = to_json(document);
   int trees = 0;
   int maps = 0;
-  for (const Json& section : json["sections"]) {
+  for (const Json& section : page["sections"]) {
     for (const Json& each : section["blocks"]) {
       trees += each["kind"] == "tree";
       maps += each["kind"] == "map";

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <memory>
 #include <set>
-#include <span>
 #include <string>
 
 #include "calibration/frame_start.hpp"
@@ -214,6 +213,21 @@ discovery::SolverResult register_frames(Robot& robot, const Measurements& measur
 
 namespace {
 
+// An arm and its sockets twice as large fit readings of sockets as well.
+void keep_scale_of_sockets(const Chain& chain, const Poses& poses, std::vector<std::string>& reasons) {
+  const auto in_socket = [](const Observation& seen) { return is_socket(seen.base); };
+  if (poses.observations.empty() || !std::ranges::all_of(poses.observations, in_socket)) return;
+  std::vector<std::pair<double, Eigen::Index>> lengths;
+  for (std::size_t j = 0; j < chain.joints.size(); ++j) {
+    const bool slides = chain.joints[j].type == JointType::prismatic;
+    if (slides) return;  // its travel is a length that is known
+    lengths.emplace_back(std::abs(chain.joints[j].a_mm), joint_parameter(j, JointParameter::a));
+    lengths.emplace_back(std::abs(chain.joints[j].d_mm), joint_parameter(j, JointParameter::d));
+  }
+  std::erase_if(lengths, [&](const auto& length) { return !reasons[length.second].empty(); });
+  if (!lengths.empty()) reasons[std::ranges::max(lengths).second] = "sockets alone show no scale";
+}
+
 Calibration calibrate_without_maps(const Robot& robot, const Measurements& measurements,
                                    const CalibrationOptions& options) {
   Calibration calibration;
@@ -232,6 +246,7 @@ Calibration calibrate_without_maps(const Robot& robot, const Measurements& measu
     calibration.registration.residuals = problem.residual(calibration.registration.values);
   }
   std::vector<std::string> reasons = reasons_to_fix(robot, options);
+  keep_scale_of_sockets(robot.chain, measurements.poses, reasons);
   Eigen::MatrixXd jacobian = discovery::evaluate_jacobian(problem, calibration.registration.values);
   // Which geometry is of no use shows on the rigid arm: on one that bends, a combination that moves nothing when rigid
   // moves loads, and would be identified from the thousandth part of an effect.

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numbers>
 #include <numeric>
 #include <span>
 #include <string>
@@ -172,10 +171,9 @@ Coverage coverage(const Calibration& calibration, const Poses& measured, const P
     }
     if (!beyond) continue;
     const Joint& joint = calibration.robot.chain.joints[j];
-    const bool turns = joint.type == JointType::revolute;
-    const double unit = turns ? 180.0 / std::numbers::pi : 1.0;
-    result.beyond.push_back({joint.name, turns ? "deg" : "mm", low * unit, high * unit, values.minCoeff() * unit,
-                             values.maxCoeff() * unit});
+    const double unit = to_limit_unit(joint);
+    result.beyond.push_back(
+        {joint.name, limit_unit(joint), low * unit, high * unit, values.minCoeff() * unit, values.maxCoeff() * unit});
   }
   std::vector<Eigen::Index> inside;
   for (Eigen::Index i = 0; i < used.count(); ++i) (is_outside[i] ? result.outside : inside).push_back(i);

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <stdexcept>
 
 #include "calibration/likely_mistake.hpp"
@@ -157,8 +156,7 @@ std::vector<std::string> suspicions(const Robot& robot, const Measurements& meas
   for (std::size_t j = 0; j < robot.chain.joints.size(); ++j) {
     const Joint& joint = robot.chain.joints[j];
     if (!joint.limits) continue;
-    const double to_file_unit = joint.type == JointType::revolute ? 180.0 / std::numbers::pi : 1.0;
-    const Eigen::ArrayXd values = measurements.poses.joints.col(j) * to_file_unit;
+    const Eigen::ArrayXd values = measurements.poses.joints.col(j) * to_limit_unit(joint);
     constexpr double slack = 1.0;  // degree or mm
     const Eigen::Index outside = (values < joint.limits->at(0) - slack || values > joint.limits->at(1) + slack).count();
     if (outside > 0) {

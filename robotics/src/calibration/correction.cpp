@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "calibration/correction_twist.hpp"
+#include "kinematics/rotations.hpp"
 #include "llmt/files.hpp"
 #include "llmt/robotics/robot_file.hpp"
 #include "robot/chart.hpp"
@@ -40,12 +41,6 @@ Eigen::Matrix3d base_rotation_of(const Chain& chain, const std::string& base) {
   return base_rotation_of(own);
 }
 
-Eigen::Matrix3d cross_of(const Eigen::Vector3d& v) {
-  Eigen::Matrix3d matrix;
-  matrix << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
-  return matrix;
-}
-
 // The twist (d, r) of least squares that explains the residuals of the rows of one stand: that of a point is
 // d + r x arm, that of an orientation r. Coordinates that were not measured take no part.
 Eigen::VectorXd twist_of(const Robot& robot, const Measurements& measurements, const Eigen::MatrixXd& errors,
@@ -62,7 +57,7 @@ Eigen::VectorXd twist_of(const Robot& robot, const Measurements& measurements, c
       right.segment(3 * k, 3) = errors.row(rows[k]).transpose() * (lever_mm / seen.lever_mm);
     } else {
       block.leftCols(3) = base;
-      block.rightCols(3) = -cross_of(arms.row(rows[k]).transpose()) * base / lever_mm;
+      block.rightCols(3) = -cross_matrix(arms.row(rows[k]).transpose()) * base / lever_mm;
       right.segment(3 * k, 3) = errors.row(rows[k]).transpose();
       for (Eigen::Index axis = 0; axis < 3; ++axis) {
         if (!measurements.measured[axis]) block.row(axis).setZero();

@@ -4,10 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <numeric>
 #include <span>
 #include <stdexcept>
+
+#include "kinematics/units.hpp"
 
 namespace llmt::robotics {
 namespace {
@@ -15,7 +16,7 @@ namespace {
 std::string owner_of(const std::string& name) { return name.substr(0, name.rfind('.')); }
 
 std::vector<bool> matches(const std::vector<discovery::Parameter>& parameters, const std::vector<std::string>& names,
-                          const char* field) {
+                          const char* role) {
   std::vector<bool> matched(parameters.size(), false);
   for (const std::string& name : names) {
     bool found = false;
@@ -26,9 +27,9 @@ std::vector<bool> matches(const std::vector<discovery::Parameter>& parameters, c
     }
     if (!found) {
       throw std::invalid_argument(
-          fmt::format("llmt::robotics::calibrate: {} names \"{}\", which is no parameter of the robot; parameters are "
-                      "e.g. \"base.x\", \"{}\"",
-                      field, name, parameters.back().name));
+          fmt::format("llmt::robotics::calibrate: \"{}\", {}, is no parameter of the robot; parameters are e.g. "
+                      "\"base.x\", \"{}\"",
+                      name, role, parameters.back().name));
     }
   }
   return matched;
@@ -60,9 +61,9 @@ void set_priors(std::vector<discovery::Parameter>& parameters, Eigen::Index geom
   for (const auto& [name, sigma] : options.priors) {
     if (!(sigma > 0.0) || !std::isfinite(sigma)) {
       throw std::invalid_argument(fmt::format(
-          "llmt::robotics::calibrate: CalibrationOptions::priors of {} is {}, must be above 0", name, sigma));
+          "llmt::robotics::calibrate: the standard deviation of the prior of {} is {}, must be above 0", name, sigma));
     }
-    const std::vector<bool> named = matches(parameters, {name}, "CalibrationOptions::priors");
+    const std::vector<bool> named = matches(parameters, {name}, "which is given a prior");
     for (std::size_t k = 0; k < parameters.size(); ++k) {
       if (!named[k]) continue;
       parameters[k].prior_sigma = sigma;
@@ -75,17 +76,16 @@ bool is_nearly_parallel(const Chain& chain, std::size_t joint, double limit_deg)
   // In both conventions alpha and beta turn one axis into the next; the first (mdh) or last (dh) pair involves base or
   // tool instead.
   if (chain.convention == Convention::dh ? joint + 1 == chain.joints.size() : joint == 0) return false;
-  const double degrees = std::numbers::pi / 180.0;
   const Joint& j = chain.joints[joint];
-  const double cosine = std::abs(std::cos(j.alpha_deg * degrees) * std::cos(j.beta_deg * degrees));
-  return cosine >= std::cos(limit_deg * degrees);
+  const double cosine = std::abs(std::cos(j.alpha_deg * radians) * std::cos(j.beta_deg * radians));
+  return cosine >= std::cos(limit_deg * radians);
 }
 
 std::vector<std::string> reasons_to_fix(const Robot& robot, const CalibrationOptions& options) {
   const std::vector<discovery::Parameter> all = parameters(robot);
   std::vector<std::string> reasons(all.size());
-  const std::vector<bool> fixed = matches(all, options.fixed, "CalibrationOptions::fixed");
-  const std::vector<bool> only = matches(all, options.only, "CalibrationOptions::only");
+  const std::vector<bool> fixed = matches(all, options.fixed, "which is to stay fixed");
+  const std::vector<bool> only = matches(all, options.only, "which alone is to be fitted");
   if (options.only.empty()) {
     for (std::size_t j = 0; j < robot.chain.joints.size(); ++j) {
       for (const JointParameter which : {JointParameter::theta, JointParameter::d, JointParameter::a, JointParameter::b,
@@ -95,6 +95,9 @@ std::vector<std::string> reasons_to_fix(const Robot& robot, const CalibrationOpt
     }
   }
   for (std::size_t k = 0; k < all.size(); ++k) {
+    const std::string owner = owner_of(all[k].name);
+    const bool is_angle = all[k].name[owner.size() + 1] == 'r';
+    if (is_angle && owner.starts_with("base@") && is_socket(owner.substr(5))) reasons[k] = "a socket has no angles";
     if (fixed[k] || (!options.only.empty() && !only[k])) reasons[k] = "fixed by the user";
   }
   return reasons;

@@ -10,19 +10,17 @@
 #include <functional>
 #include <limits>
 #include <map>
-#include <numbers>
 #include <set>
 #include <stdexcept>
 #include <vector>
 
 #include "calibration/registration.hpp"
-#include "kinematics/rigid_fit.hpp"
+#include "kinematics/rotations.hpp"
+#include "kinematics/units.hpp"
 #include "llmt/robotics/calibration.hpp"
 
 namespace llmt::robotics {
 namespace {
-
-constexpr double degrees = 180.0 / std::numbers::pi;
 
 // A table as it may have been meant.
 struct Change {

@@ -3,9 +3,9 @@
 #include <Eigen/Geometry>
 #include <Eigen/QR>
 #include <cmath>
-#include <numbers>
 
-#include "kinematics/rigid_fit.hpp"
+#include "kinematics/rotations.hpp"
+#include "kinematics/units.hpp"
 
 namespace llmt::robotics {
 
@@ -17,7 +17,7 @@ Eigen::Vector3d roll_pitch_yaw_deg(const Eigen::Matrix3d& rotation) {
   const double roll =
       degenerate ? std::atan2(-rotation(1, 2), rotation(1, 1)) : std::atan2(rotation(2, 1), rotation(2, 2));
   const double yaw = degenerate ? 0.0 : std::atan2(rotation(1, 0), rotation(0, 0));
-  return Eigen::Vector3d(roll, pitch, yaw) * (180.0 / std::numbers::pi);
+  return Eigen::Vector3d(roll, pitch, yaw) * degrees;
 }
 
 Robot with_closed_form_base(Robot robot, const Measurements& measurements) {

@@ -176,10 +176,10 @@ std::string outside_of_training(const CorrectedRobot& robot, const Eigen::Vector
   for (Eigen::Index j = 0; j < q.size(); ++j) {
     const InputColumn& seen = robot.correction->inputs()[j];
     if (q(j) >= seen.low && q(j) <= seen.high) continue;
-    const bool turns = robot.robot.chain.joints[j].type == JointType::revolute;
-    const double unit = turns ? radians : 1.0;
-    names.push_back(fmt::format("{} at {:.6g}, trained from {:.6g} to {:.6g} {}", robot.robot.chain.joints[j].name,
-                                q(j) / unit, seen.low / unit, seen.high / unit, turns ? "deg" : "mm"));
+    const Joint& joint = robot.robot.chain.joints[j];
+    const double unit = to_limit_unit(joint);
+    names.push_back(fmt::format("{} at {:.6g}, trained from {:.6g} to {:.6g} {}", joint.name, q(j) * unit,
+                                seen.low * unit, seen.high * unit, limit_unit(joint)));
   }
   return fmt::format("{}", fmt::join(names, "; "));
 }

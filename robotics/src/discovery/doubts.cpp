@@ -6,7 +6,6 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "discovery/pose_split.hpp"
 #include "llmt/robotics/calibration_quality.hpp"

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "llmt/explain.hpp"
 
@@ -23,10 +22,9 @@ Inputs inputs_of(const Measurements& measurements, const Chain& chain) {
   Inputs inputs;
   std::vector<Eigen::VectorXd> columns;
   for (std::size_t j = 0; j < chain.joints.size(); ++j) {
-    const bool turns = chain.joints[j].type == JointType::revolute;
-    columns.emplace_back((turns ? 180.0 / std::numbers::pi : 1.0) * measurements.poses.joints.col(j));
+    columns.emplace_back(to_limit_unit(chain.joints[j]) * measurements.poses.joints.col(j));
     inputs.names.push_back(fmt::format("q{}", j + 1));
-    inputs.units.emplace_back(turns ? " deg" : " mm");
+    inputs.units.push_back(fmt::format(" {}", limit_unit(chain.joints[j])));
   }
   for (const auto& [name, values] : measurements.poses.covariates) {
     const bool wanted =

@@ -4,11 +4,11 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "calibration/joint_map_shift.hpp"
 #include "calibration/paired_gain.hpp"
 #include "discovery/left_out.hpp"
+#include "kinematics/units.hpp"
 
 namespace llmt::robotics {
 namespace {
@@ -20,7 +20,7 @@ struct Knots : EvenKnots {
 
 std::vector<Knots> choose_knots(const Chain& chain, const Poses& poses) {
   // Knots every two degrees resolve the errors of strain-wave gears. There are four poses or more for every knot.
-  constexpr double finest = 2.0 * std::numbers::pi / 180.0;
+  constexpr double finest = 2.0 * radians;
   std::vector<Knots> all;
   Eigen::Index begin = 0;
   for (std::size_t j = 0; j < chain.joints.size(); ++j) {

@@ -166,10 +166,7 @@ std::map<std::string, double> conditions(const ExplanationPair& question, const 
   std::map<std::string, double> values;
   for (const Effect& effect : effects) {
     for (const std::string& names : effect_columns(question.without.chain, effect)) {
-      for (std::size_t begin = 0; begin < names.size();) {
-        const std::size_t end = std::min(names.find('|', begin), names.size());
-        const std::string name = names.substr(begin, end - begin);
-        begin = end + 1;
+      for (const std::string& name : alternatives(names)) {
         const auto column = poses.covariates.find(name);
         const bool follows = name == "payload_kg" || name.starts_with("tau") || name.starts_with("qmeas");
         if (column != poses.covariates.end() && !follows) values[name] = column->second(row);

@@ -145,6 +145,16 @@ std::vector<std::string> effect_columns(const Chain& chain, const Effect& effect
   return columns;
 }
 
+std::vector<std::string> alternatives(const std::string& columns) {
+  std::vector<std::string> names;
+  for (std::size_t begin = 0; begin <= columns.size();) {
+    const std::size_t end = std::min(columns.find('|', begin), columns.size());
+    names.push_back(columns.substr(begin, end - begin));
+    begin = end + 1;
+  }
+  return names;
+}
+
 std::string effect_label(const Effect& effect) {
   std::string label = effect.type;
   if (!effect.at.empty()) label += "@" + effect.at;

@@ -7,10 +7,10 @@
 #include <cmath>
 #include <numbers>
 
+#include "kinematics/units.hpp"
+
 namespace llmt::robotics {
 namespace {
-
-constexpr double degrees = 180.0 / std::numbers::pi;
 
 // Angle error of a joint: columns of `functions` (n x k) times the joint's lever.
 Eigen::MatrixXd acting_on(const Scene& scene, std::size_t joint, const Eigen::MatrixXd& functions) {

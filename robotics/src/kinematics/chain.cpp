@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "kinematics/checks.hpp"
+#include "kinematics/units.hpp"
 
 namespace llmt::robotics {
 namespace {
@@ -160,6 +161,12 @@ bool is_frame_parameter(std::string_view name) {
   const std::string_view owner = name.substr(0, std::min(name.find('.'), name.find('@')));
   return owner == "base" || owner == "tool";
 }
+
+bool is_socket(std::string_view base) { return base.starts_with("socket "); }
+
+double to_limit_unit(const Joint& joint) { return joint.type == JointType::revolute ? degrees : 1.0; }
+
+std::string limit_unit(const Joint& joint) { return joint.type == JointType::revolute ? "deg" : "mm"; }
 
 std::size_t joint_index(const Chain& chain, std::string_view name) {
   for (std::size_t i = 0; i < chain.joints.size(); ++i) {

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <map>
 
-#include "kinematics/rigid_fit.hpp"
+#include "kinematics/rotations.hpp"
 
 namespace llmt::robotics {
 namespace {
@@ -89,11 +89,6 @@ void in_first_frame(std::vector<Pose>& motions, Points& places) {
     motion.rotation *= first.rotation.transpose();
     motion.position_mm -= motion.rotation * first.position_mm;
   }
-}
-
-Eigen::Vector3d rotation_vector(const Eigen::Matrix3d& rotation) {
-  const Eigen::AngleAxisd turn(rotation);
-  return turn.angle() * turn.axis();
 }
 
 Eigen::Matrix3d rotation_by(const Eigen::Vector3d& vector) {

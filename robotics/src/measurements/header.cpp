@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 #include <regex>
 #include <stdexcept>
 
@@ -66,6 +65,8 @@ Header::Header(const Csv& csv, const Robot& robot, const std::vector<std::string
   if (targets_.size() > 1 && targets_.front().empty() != targets_.back().empty()) {
     refuse("there are positions without a target (x_mm) and with one (t1_x_mm): name them all");
   }
+  if (words_.contains("socket") && has("distance"))
+    refuse("there are sockets and distances: fit them one after the other");
   if (!targets_.empty() && has("distance")) refuse("there are positions and distances: fit them one after the other");
 }
 
@@ -80,7 +81,7 @@ void Header::take(const std::string& name, const std::string& column) {
     take_quantity(parts[1], column, parts[4]);
   } else if (std::regex_match(name, quaternion)) {
     quantities_[name] = {column, ""};
-  } else if (name == "target" || name == "session" || name == "reference") {
+  } else if (name == "target" || name == "session" || name == "socket" || name == "reference") {
     words_[name] = column;
   } else if (std::regex_match(name, covariate) || also_.contains(name)) {
     if (!covariates_.try_emplace(name, column).second) refuse(fmt::format("there are two columns {}", name));
@@ -169,8 +170,9 @@ Eigen::MatrixXd Header::points_mm(const std::string& target, std::array<bool, 3>
     if (!measured[axis]) continue;
     const std::string& column = quantities_.at(name).column;
     const double to_mm = factor(name, lengths_in_mm);
-    const Eigen::VectorXd values =
-        target.empty() ? csv_.numbers(column) : csv_.numbers_or_missing(std::vector<std::string>{column}).col(0).eval();
+    const Eigen::VectorXd values = target.empty() && !words_.contains("socket")
+                                       ? csv_.numbers(column)
+                                       : csv_.numbers_or_missing(std::vector<std::string>{column}).col(0).eval();
     points.col(axis) = to_mm * values;
     for (Eigen::Index row = 0; row < points.rows(); ++row) {
       if (!(std::abs(points(row, axis)) > farthest_mm)) continue;

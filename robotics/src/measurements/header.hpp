@@ -27,7 +27,8 @@ class Header {
   /// Prefixes of the columns of targets, in the order of the columns: "" for x_mm, "t2_" for t2_x_mm.
   const std::vector<std::string>& targets() const { return targets_; }
 
-  /// n x 3 in mm, NaN where the cell is empty (allowed for several targets only) and zero where there is no column.
+  /// n x 3 in mm, NaN where the cell is empty (allowed for several targets, and beside sockets) and zero where there is
+  /// no column.
   Eigen::MatrixXd points_mm(const std::string& target, std::array<bool, 3>& measured) const;
 
   /// Empty if there is no such column.
@@ -39,7 +40,7 @@ class Header {
   /// The column of the file that says in which sequence rows were read: order, or else time_s; empty if there is none.
   std::string sequence_column() const;
 
-  /// Names in the column `target`, `session` or `reference`, row by row; empty if there is none.
+  /// Names in the column `target`, `session`, `socket` or `reference`, row by row; empty if there is none.
   std::vector<std::string> words(const std::string& column) const;
 
   const std::vector<std::string>& unused() const { return unused_; }
@@ -61,7 +62,7 @@ class Header {
   std::set<std::string> also_;
   std::map<std::string, Quantity> quantities_;     // "q1", "x", "t2_x", "rx", "qw", "distance" -> column and unit
   std::map<std::string, std::string> covariates_;  // name -> column
-  std::map<std::string, std::string> words_;       // "target", "session", "reference" -> column
+  std::map<std::string, std::string> words_;       // "target", "session", "socket", "reference" -> column
   std::vector<std::string> targets_;
   std::vector<std::string> unused_;
 

@@ -20,6 +20,7 @@ struct Sighting {
   Eigen::Index row = 0;
   std::string target;
   Eigen::Vector3d value = Eigen::Vector3d::Zero();
+  bool in_socket = false;  // `value` is then the socket's centre
 };
 
 std::vector<Sighting> sightings_of(const Csv& csv, const Header& header, Measurements& measurements) {
@@ -27,16 +28,23 @@ std::vector<Sighting> sightings_of(const Csv& csv, const Header& header, Measure
   if (header.has("distance")) {
     measurements.measured = {true, false, false};
     const Eigen::VectorXd distances = header.distances_mm();
-    for (Eigen::Index row = 0; row < csv.rows(); ++row) seen.push_back({row, "", {distances(row), 0.0, 0.0}});
+    for (Eigen::Index row = 0; row < csv.rows(); ++row) seen.push_back({row, "", {distances(row), 0.0, 0.0}, false});
     return seen;
   }
-  if (header.targets().empty()) {
-    throw std::runtime_error(fmt::format(
-        "{}:1: no measured position: write x_mm, y_mm, z_mm (or _m, _um), t1_x_mm, ... of several targets, or "
-        "distance_mm; columns: {}",
-        csv.name(), fmt::join(csv.columns(), ", ")));
-  }
   const std::vector<std::string> words = header.words("target");
+  const std::vector<std::string> sockets = header.words("socket");
+  for (std::size_t row = 0; row < sockets.size(); ++row) {
+    if (sockets[row].empty()) continue;
+    const std::string target = words.empty() ? "" : words[row];
+    seen.push_back({.row = static_cast<Eigen::Index>(row), .target = target, .in_socket = true});
+  }
+  if (header.targets().empty() && !sockets.empty()) return seen;
+  if (header.targets().empty()) {
+    throw std::runtime_error(
+        fmt::format("{}:1: no measured position: write x_mm, y_mm, z_mm (or _m, _um), t1_x_mm, ... of several targets, "
+                    "distance_mm, or a column socket; columns: {}",
+                    csv.name(), fmt::join(csv.columns(), ", ")));
+  }
   if (!words.empty() && !header.targets().front().empty()) {
     throw std::runtime_error(fmt::format("{}:1: there are a column of targets and columns of each target", csv.name()));
   }
@@ -53,9 +61,22 @@ std::vector<Sighting> sightings_of(const Csv& csv, const Header& header, Measure
       }
     }
     measurements.measured = measured;
+    if (!sockets.empty() && !(measured[0] && measured[1] && measured[2])) {
+      throw std::runtime_error(fmt::format("{}:1: beside sockets, points need all of x, y and z", csv.name()));
+    }
     const std::size_t before = seen.size() + zeros.size();
     for (Eigen::Index row = 0; row < csv.rows(); ++row) {
       const Eigen::RowVector3d point = points.row(row);
+      if (!sockets.empty() && !sockets[row].empty()) {
+        if (point.array().isNaN().all()) continue;
+        throw std::runtime_error(
+            fmt::format("{}:{}: there are a measured point and a socket: leave the cells of one of them empty",
+                        csv.name(), csv.line_of(row)));
+      }
+      if (point.array().isNaN().all() && target.empty()) {
+        throw std::runtime_error(
+            fmt::format("{}:{}: there is neither a measured point nor a socket", csv.name(), csv.line_of(row)));
+      }
       if (point.array().isNaN().all() || (point.hasNaN() && (point.array().isNaN() || point.array() == 0.0).all())) {
         continue;
       }
@@ -69,7 +90,7 @@ std::vector<Sighting> sightings_of(const Csv& csv, const Header& header, Measure
         zeros.push_back(row);
       } else {
         const std::string name = !words.empty() ? words[row] : target.substr(0, target.size() - !target.empty());
-        seen.push_back({row, name, point.transpose()});
+        seen.push_back({.row = row, .target = name, .value = point.transpose()});
       }
     }
     if (words.empty() && csv.rows() > 0 && seen.size() + zeros.size() == before) {
@@ -164,6 +185,8 @@ void observe(const Csv& csv, const Header& header, const Robot& robot, const Pos
   refuse_same_but_for_dots(csv, sessions, "session");
   const std::vector<std::string> targets = header.words("target");
   refuse_same_but_for_dots(csv, targets, "target");
+  const std::vector<std::string> sockets = header.words("socket");
+  refuse_same_but_for_dots(csv, sockets, "socket");
   const bool has_targets = !targets.empty();
   const std::vector<Eigen::Index> stands = stands_of(rows, sessions, has_targets);
   FrameNames base_of(robot.chain.bases, robot.chain.session);
@@ -179,12 +202,17 @@ void observe(const Csv& csv, const Header& header, const Robot& robot, const Pos
       return without_dots(words[sighting.row]);
     };
     const std::string session = named(sessions, "session");
+    if (is_socket(session)) csv.refuse(sighting.row, "session", "a session's name does not begin with \"socket \"");
     const std::string target = has_targets ? named(targets, "target") : sighting.target;
     observation.base = base_of(session);
     // A target that was mounted anew is another tool.
     std::string tool = observation.base;
     if (!target.empty()) tool = tool.empty() ? target : fmt::format("{}/{}", tool, target);
     observation.tool = tool_of(tool);
+    if (sighting.in_socket) {
+      if (!observation.base.empty()) csv.refuse(sighting.row, "session", "sockets are read in the first session only");
+      observation.base = "socket " + named(sockets, "socket");
+    }
     observation.stand = stands[sighting.row];
     if (header.has("distance")) observation.reading = Reading::distance;
   }

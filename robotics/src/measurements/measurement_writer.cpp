@@ -28,9 +28,24 @@ std::string quoted(const std::string& text) {
 }
 
 std::string target_of(const Observation& seen) {
-  if (seen.base.empty()) return seen.tool;
+  if (seen.base.empty() || is_socket(seen.base)) return seen.tool;
   const std::string prefix = seen.base + "/";
   return seen.tool.starts_with(prefix) ? seen.tool.substr(prefix.size()) : seen.tool == seen.base ? "" : seen.tool;
+}
+
+// A row of a socket has its name, and no measured point.
+void add_sockets(const std::vector<Observation>& observations, Columns& columns) {
+  if (std::ranges::none_of(observations, [](const Observation& seen) { return is_socket(seen.base); })) return;
+  columns.names.emplace_back("socket");
+  std::vector<std::string>& names = columns.cells.emplace_back();
+  for (std::size_t i = 0; i < observations.size(); ++i) {
+    const bool in_socket = is_socket(observations[i].base);
+    names.push_back(in_socket ? quoted(observations[i].base.substr(observations[i].base.find(' ') + 1)) : "");
+    for (const char* axis : {"x_mm", "y_mm", "z_mm"}) {
+      const auto column = std::ranges::find(columns.names, axis);
+      if (in_socket) columns.cells[column - columns.names.begin()][i].clear();
+    }
+  }
 }
 
 // One column of names; the chain's own frame gets a name that no other has. Nothing if there is no other.
@@ -68,9 +83,10 @@ std::string to_csv(const Measurements& all, const Robot& robot) {
   std::vector<std::string> sessions;
   std::vector<std::string> targets;
   for (const Observation& seen : observations) {
-    sessions.push_back(seen.base);
+    sessions.push_back(is_socket(seen.base) ? "" : seen.base);
     targets.push_back(target_of(seen));
   }
+  add_sockets(observations, columns);
   add_names("session", all.session.empty() ? "first" : all.session, sessions, columns);
   add_names("target", all.target.empty() ? "t1" : all.target, targets, columns);
   for (const auto& [name, values] : measurements.poses.covariates) {

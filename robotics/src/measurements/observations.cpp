@@ -2,7 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <set>
+#include <optional>
 #include <stdexcept>
 
 #include "llmt/robotics/measurements.hpp"
@@ -67,6 +67,7 @@ Measurements with_orientations(const Measurements& measurements, const Chain& ch
   for (Eigen::Index row = 0; row < n; ++row) kept.push_back(row);
   for (Eigen::Index row = 0; row < n; ++row) {
     if (observations[row].reading != Reading::position) refuse("only positions can have orientations");
+    if (is_socket(observations[row].base)) refuse("a reading of a socket has no orientation");
     observations[n + row].reading = Reading::orientation;
     observations[n + row].reference = rotations[row];
     // Several targets of a pose share one orientation: it is one reading.

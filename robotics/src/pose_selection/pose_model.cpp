@@ -5,6 +5,7 @@
 
 #include "calibration/free_parameters.hpp"
 #include "llmt/robotics/effects.hpp"
+#include "robot/robot_evaluator.hpp"
 
 namespace llmt::robotics {
 
@@ -13,14 +14,8 @@ PoseModel::PoseModel(const Robot& robot, const Poses& basis, const std::vector<c
     : robot_(robot) {
   std::erase_if(robot_.effects, [&](const Effect& effect) {
     const auto lacks = [&](const Poses& poses) {
-      return std::ranges::any_of(effect_columns(robot.chain, effect), [&](const std::string& names) {
-        for (std::size_t begin = 0; begin <= names.size();) {
-          const std::size_t end = std::min(names.find('|', begin), names.size());
-          if (poses.covariates.contains(names.substr(begin, end - begin))) return false;
-          begin = end + 1;
-        }
-        return true;
-      });
+      return std::ranges::any_of(effect_columns(robot.chain, effect),
+                                 [&](const std::string& names) { return find_column(poses, names) == nullptr; });
     };
     const bool is_left_out =
         lacks(basis) || std::ranges::any_of(also, [&](const Poses* poses) { return lacks(*poses); });

@@ -1,24 +1,11 @@
 #include "robot/chart.hpp"
 
-#include <Eigen/Geometry>
 #include <cmath>
+
+#include "kinematics/rotations.hpp"
 
 namespace llmt::robotics {
 namespace {
-
-Eigen::Vector3d rotation_vector(const Eigen::Matrix3d& rotation) {
-  const Eigen::Quaterniond q(rotation);
-  const double sine = q.vec().norm();  // of half the angle
-  if (sine == 0.0) return Eigen::Vector3d::Zero();
-  const double half = std::atan2(sine, std::abs(q.w()));
-  return (q.w() < 0.0 ? -2.0 : 2.0) * half / sine * q.vec();
-}
-
-Eigen::Matrix3d cross_matrix(const Eigen::Vector3d& v) {
-  Eigen::Matrix3d matrix;
-  matrix << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
-  return matrix;
-}
 
 // d log(exp(w) R) / dw at w = 0, the inverse of the left Jacobian of SO(3) at r = log(R):
 // I - [r]/2 + (1 - (t/2) cot(t/2)) / t^2 [r]^2, t = |r| (e.g. Sola et al. 2018, eq. 146).

@@ -22,11 +22,9 @@ double difference_step(double value, double scale) {
 }  // namespace
 
 const Eigen::VectorXd* find_column(const Poses& poses, const std::string& names) {
-  for (std::size_t begin = 0; begin <= names.size();) {
-    const std::size_t end = std::min(names.find('|', begin), names.size());
-    const auto found = poses.covariates.find(names.substr(begin, end - begin));
+  for (const std::string& name : alternatives(names)) {
+    const auto found = poses.covariates.find(name);
     if (found != poses.covariates.end()) return &found->second;
-    begin = end + 1;
   }
   return nullptr;
 }

@@ -3,7 +3,7 @@
 
 #include <Eigen/Geometry>
 
-#include "kinematics/rigid_fit.hpp"
+#include "kinematics/rotations.hpp"
 #include "llmt/random.hpp"
 #include "llmt/robotics/calibration.hpp"
 #include "llmt/robotics/orientation.hpp"

@@ -106,11 +106,19 @@ Eigen::VectorXd geometric_values(const Chain& chain);
 /// The chain with those values. Throws std::invalid_argument on a wrong count.
 Chain with_geometric_values(Chain chain, const Eigen::VectorXd& values);
 
+/// From joint values (rad, mm) to the unit of the limits (degrees, mm): the factor, and "deg" or "mm".
+double to_limit_unit(const Joint& joint);
+std::string limit_unit(const Joint& joint);
+
 /// Position of a joint by its name. Throws std::invalid_argument if there is none.
 std::size_t joint_index(const Chain& chain, std::string_view name);
 
 /// Whether a parameter of that name belongs to a base or a tool.
 bool is_frame_parameter(std::string_view name);
+
+/// Whether a base stands for a ball socket, by its name, "socket NAME": then its origin is the centre of the ball,
+/// which every reading finds there, and its axes are any.
+bool is_socket(std::string_view base);
 
 /// Position of a geometric parameter in the fixed order.
 enum class FrameParameter { x, y, z, rx, ry, rz };

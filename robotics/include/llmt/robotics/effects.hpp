@@ -50,6 +50,9 @@ std::vector<EffectParameter> effect_parameters(const EffectType& type, const Cha
 /// The columns that an effect needs, numbers filled in; "a|b": one of them.
 std::vector<std::string> effect_columns(const Chain& chain, const Effect& effect);
 
+/// The names in "a|b", those of one of its entries, in the order in which they are looked for.
+std::vector<std::string> alternatives(const std::string& columns);
+
 /// "joint_compliance@joint2", "transmission_error@joint2[202]", "formula@joint2[belt]": type, place, constants. Unique
 /// in a robot.
 std::string effect_label(const Effect& effect);

@@ -112,12 +112,18 @@ ColumnMap parse_column_map(const std::string& text, const std::string& name);
 ///   rx_deg ry_deg rz_deg (also _rad), or qw qx qy qz     orientation, optional
 ///   t1_x_mm t1_y_mm t1_z_mm t2_x_mm ...                  several targets in one pose; a cell may be empty
 ///   target, session                                      names: of what was looked at, of how the instrument stood
+///   socket                                               name of what the tool's ball lies in, instead of positions
+///   reference                                            name of a point that stands still and is read in this row
 ///   distance_mm (also _m, _um)                           instead of positions: distance from a fixed point
 ///   payload_kg temp_C time_s order pose dirN tauN_Nm qmeasN_deg sigma_x_um U95_x_um ...   covariates, optional
 ///
 /// The fixed point of distances is the origin of the world frame. The session and the target that the chain names as
 /// its own, or else the first ones, have its own base and tool; the others have frames of their names, which
 /// with_frames() adds. In another session the tool is another one, too: "SESSION", or "SESSION/TARGET".
+///
+/// The centre of a socket is the origin of the base "socket NAME", see is_socket(). Readings of reference points are no
+/// rows of the result: the movement of the instrument that they show is taken off the others, see
+/// docs/file-formats.md.
 ///
 /// Covariates keep their names, but qmeasN_deg becomes qmeasN_rad. Columns named in `also`, or in a formula among the
 /// robot's effects, are covariates too. With order or time_s, add_moves() is called.

@@ -1,8 +1,24 @@
-#include "kinematics/rigid_fit.hpp"
+#include "kinematics/rotations.hpp"
 
+#include <Eigen/Geometry>
 #include <Eigen/SVD>
+#include <cmath>
 
 namespace llmt::robotics {
+
+Eigen::Vector3d rotation_vector(const Eigen::Matrix3d& rotation) {
+  const Eigen::Quaterniond q(rotation);
+  const double sine = q.vec().norm();  // of half the angle
+  if (sine == 0.0) return Eigen::Vector3d::Zero();
+  const double half = std::atan2(sine, std::abs(q.w()));
+  return (q.w() < 0.0 ? -2.0 : 2.0) * half / sine * q.vec();
+}
+
+Eigen::Matrix3d cross_matrix(const Eigen::Vector3d& v) {
+  Eigen::Matrix3d matrix;
+  matrix << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
+  return matrix;
+}
 
 Eigen::Matrix3d rotation_of_greatest_trace(const Eigen::Matrix3d& matrix) {
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(matrix, Eigen::ComputeFullU | Eigen::ComputeFullV);
