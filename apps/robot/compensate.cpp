@@ -98,6 +98,7 @@ std::string commands_csv(const CorrectedRobot& robot, const robotics::TargetTabl
   std::vector<Eigen::VectorXd> columns;
   for (std::size_t j = 0; j < robot.robot.chain.joints.size(); ++j) {
     const robotics::Joint& joint = robot.robot.chain.joints[j];
+    if (joint.mimic) continue;  // it has no drive
     const bool in_radians = joint.type == robotics::JointType::revolute && !table.joints_in_degrees;
     names.push_back(fmt::format("q{}_{}", j + 1, in_radians ? "rad" : robotics::limit_unit(joint)));
     columns.emplace_back(found.commands.joints.col(j) * (in_radians ? 1.0 : robotics::to_limit_unit(joint)));

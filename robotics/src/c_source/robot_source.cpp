@@ -231,6 +231,11 @@ CSource to_c(const CorrectedRobot& robot, const std::string& name, const std::st
         fmt::format("llmt::robotics::to_c: name is \"{}\", must be an identifier of C of at most {} characters", name,
                     longest_name));
   }
+  for (const Joint& joint : robot.robot.chain.joints) {
+    if (!joint.mimic) continue;
+    throw std::invalid_argument(fmt::format("llmt::robotics::to_c: {} mimics {}: such joints cannot be exported",
+                                            joint.name, joint.mimic->joint));
+  }
   const std::string effects = deform(robot.robot, c_conditions(robot.robot));
   CSource result;
   result.header = header(robot.robot, name);

@@ -213,10 +213,10 @@ discovery::SolverResult register_frames(Robot& robot, const Measurements& measur
 
 namespace {
 
-// An arm and its sockets twice as large fit readings of sockets as well.
-void keep_scale_of_sockets(const Chain& chain, const Poses& poses, std::vector<std::string>& reasons) {
-  const auto in_socket = [](const Observation& seen) { return is_socket(seen.base); };
-  if (poses.observations.empty() || !std::ranges::all_of(poses.observations, in_socket)) return;
+// An arm, its sockets and planes twice as large fit as well.
+void keep_scale(const Chain& chain, const Poses& poses, std::vector<std::string>& reasons) {
+  const auto has_no_scale = [](const Observation& seen) { return is_socket(seen.base) || is_plane(seen.base); };
+  if (poses.observations.empty() || !std::ranges::all_of(poses.observations, has_no_scale)) return;
   std::vector<std::pair<double, Eigen::Index>> lengths;
   for (std::size_t j = 0; j < chain.joints.size(); ++j) {
     const bool slides = chain.joints[j].type == JointType::prismatic;
@@ -225,7 +225,7 @@ void keep_scale_of_sockets(const Chain& chain, const Poses& poses, std::vector<s
     lengths.emplace_back(std::abs(chain.joints[j].d_mm), joint_parameter(j, JointParameter::d));
   }
   std::erase_if(lengths, [&](const auto& length) { return !reasons[length.second].empty(); });
-  if (!lengths.empty()) reasons[std::ranges::max(lengths).second] = "sockets alone show no scale";
+  if (!lengths.empty()) reasons[std::ranges::max(lengths).second] = "no reading shows the scale";
 }
 
 Calibration calibrate_without_maps(const Robot& robot, const Measurements& measurements,
@@ -246,7 +246,7 @@ Calibration calibrate_without_maps(const Robot& robot, const Measurements& measu
     calibration.registration.residuals = problem.residual(calibration.registration.values);
   }
   std::vector<std::string> reasons = reasons_to_fix(robot, options);
-  keep_scale_of_sockets(robot.chain, measurements.poses, reasons);
+  keep_scale(robot.chain, measurements.poses, reasons);
   Eigen::MatrixXd jacobian = discovery::evaluate_jacobian(problem, calibration.registration.values);
   // Which geometry is of no use shows on the rigid arm: on one that bends, a combination that moves nothing when rigid
   // moves loads, and would be identified from the thousandth part of an effect.

@@ -76,10 +76,12 @@ Robot started(Robot robot, const Measurements& measurements, bool base_is_known,
   const Measurements points = of_reading(measurements, Reading::position);
   const bool all_seen = std::ranges::all_of(measurements.measured, [](bool seen) { return seen; });
   const bool base_is_free = is_free(reasons, 0, coordinates_of_frame) && !base_is_known;
-  if (points.count() > 0 && all_seen) {
+  const std::vector<Observation>& observations = measurements.poses.observations;
+  const bool on_plane = !observations.empty() && is_plane(observations.front().base);
+  if (points.count() > 0 && (all_seen || on_plane)) {
     if (base_is_free) {
       robot = best_start(robot, points, reasons, solver);
-    } else if (base_is_known && is_free(reasons, coordinates_of_frame, 3)) {
+    } else if (all_seen && base_is_known && is_free(reasons, coordinates_of_frame, 3)) {
       robot = with_closed_form_tool(std::move(robot), points);
     }
   }

@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <Eigen/QR>
+#include <Eigen/SVD>
 #include <cmath>
 
 #include "kinematics/rotations.hpp"
@@ -20,9 +21,28 @@ Eigen::Vector3d roll_pitch_yaw_deg(const Eigen::Matrix3d& rotation) {
   return Eigen::Vector3d(roll, pitch, yaw) * degrees;
 }
 
+namespace {
+
+// The frame in whose plane z = 0 the points lie best, their centroid at its origin.
+Pose plane_through(const Eigen::MatrixXd& points) {
+  const Eigen::RowVector3d centroid = points.colwise().mean();
+  const Eigen::MatrixXd from_centroid = points.rowwise() - centroid;
+  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(from_centroid, Eigen::ComputeThinV);
+  const Eigen::Vector3d normal = svd.matrixV().col(2);
+  Pose frame;
+  frame.rotation = Eigen::Quaterniond::FromTwoVectors(normal, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  frame.position_mm = -frame.rotation * centroid.transpose();
+  return frame;
+}
+
+}  // namespace
+
 Robot with_closed_form_base(Robot robot, const Measurements& measurements) {
   robot.chain.base = Frame{};
-  const Pose base = kabsch(positions(robot, measurements.poses), measurements.positions_mm);
+  const Eigen::MatrixXd points = positions(robot, measurements.poses);
+  const std::vector<Observation>& observations = measurements.poses.observations;
+  const bool on_plane = !observations.empty() && is_plane(observations.front().base);
+  const Pose base = on_plane ? plane_through(points) : kabsch(points, measurements.positions_mm);
   robot.chain.base = {.xyz_mm = base.position_mm, .rpy_deg = roll_pitch_yaw_deg(base.rotation)};
   return robot;
 }

@@ -8,7 +8,8 @@ namespace llmt::robotics {
 /// Fixed-axis roll, pitch, yaw in degrees of R = Rz(yaw) Ry(pitch) Rx(roll).
 Eigen::Vector3d roll_pitch_yaw_deg(const Eigen::Matrix3d& rotation);
 
-/// The robot with the base that Kabsch finds for its present tool. Needs x, y and z measured.
+/// The robot with the base that Kabsch finds for its present tool, or that total least squares finds for points on a
+/// plane. Needs x, y and z measured, or a plane.
 Robot with_closed_form_base(Robot robot, const Measurements& measurements);
 
 /// The robot with the tool point that fits its present base best: the mean of the measured points in the flange frame.

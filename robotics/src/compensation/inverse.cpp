@@ -28,6 +28,7 @@ Eigen::VectorXd missing(const Goal& goal, const Pose& pose, double lever_mm) {
 
 Inverse::Inverse(const Chain& chain, double tolerance_mm, int max_iterations)
     : rigid_(chain),
+      followers_(followers_of(chain)),
       tolerance_mm_(tolerance_mm),
       max_iterations_(max_iterations),
       lever_mm_(std::max(reach_of(chain), 1.0)) {
@@ -37,12 +38,18 @@ Inverse::Inverse(const Chain& chain, double tolerance_mm, int max_iterations)
   high_ = -low_;
   for (Eigen::Index j = 0; j < count; ++j) {
     const Joint& joint = chain.joints[j];
+    if (!joint.mimic) drives_.push_back(j);
     const bool turns = joint.type == JointType::revolute;
     if (!turns) scale_(j) = lever_mm_;
     if (!joint.limits) continue;
     low_(j) = (*joint.limits)[0] * (turns ? radians : 1.0);
     high_(j) = (*joint.limits)[1] * (turns ? radians : 1.0);
   }
+  limit_leaders(followers_, low_, high_);
+}
+
+Eigen::VectorXd Inverse::within_limits(const Eigen::VectorXd& q) const {
+  return followed(followers_, q.cwiseMax(low_).cwiseMin(high_));
 }
 
 std::vector<std::size_t> Inverse::at_limits(const Eigen::VectorXd& q) const {
@@ -53,22 +60,26 @@ std::vector<std::size_t> Inverse::at_limits(const Eigen::VectorXd& q) const {
   return joints;
 }
 
-Inverse Inverse::holding(std::size_t joint, double value) const {
+Inverse Inverse::holding(Eigen::Index joint, double value) const {
+  for (const Follower& f : followers_) {
+    if (f.joint == joint) return holding(f.leader, (value - f.offset) / f.multiplier);
+  }
   Inverse held = *this;
-  held.low_(static_cast<Eigen::Index>(joint)) = value;
-  held.high_(static_cast<Eigen::Index>(joint)) = value;
+  held.low_(joint) = value;
+  held.high_(joint) = value;
   return held;
 }
 
 Eigen::MatrixXd Inverse::scaled_jacobian(const Eigen::VectorXd& q, bool with_rotation) const {
   Eigen::MatrixXd jacobian = rigid_.joint_jacobian(q);
   jacobian.bottomRows(3) *= lever_mm_;
+  lead(followers_, jacobian);
   jacobian = jacobian * scale_.asDiagonal();
   return with_rotation ? jacobian : Eigen::MatrixXd(jacobian.topRows(3));
 }
 
 int Inverse::branch(const Eigen::VectorXd& q, bool with_rotation) const {
-  const Eigen::MatrixXd jacobian = scaled_jacobian(q, with_rotation) / lever_mm_;
+  const Eigen::MatrixXd jacobian = scaled_jacobian(q, with_rotation)(Eigen::all, drives_) / lever_mm_;
   if (jacobian.rows() != jacobian.cols()) return 0;
   return jacobian.determinant() < 0.0 ? -1 : 1;
 }

@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "kinematics/mimics.hpp"
 #include "llmt/robotics/kinematics.hpp"
 
 namespace llmt::robotics {
@@ -33,13 +34,13 @@ class Inverse {
   /// From `start`, which is first brought within the limits.
   Solution solve(const Goal& goal, const Eigen::VectorXd& start, const Forward& forward) const;
 
-  Eigen::VectorXd within_limits(const Eigen::VectorXd& q) const { return q.cwiseMax(low_).cwiseMin(high_); }
+  Eigen::VectorXd within_limits(const Eigen::VectorXd& q) const;
 
   /// Of the joints that stand at a limit.
   std::vector<std::size_t> at_limits(const Eigen::VectorXd& q) const;
 
   /// The same with one joint kept at a value.
-  Inverse holding(std::size_t joint, double value) const;
+  Inverse holding(Eigen::Index joint, double value) const;
 
   /// Sign of the determinant of the square Jacobian; 0 for other shapes.
   int branch(const Eigen::VectorXd& q, bool with_rotation) const;
@@ -51,6 +52,8 @@ class Inverse {
 
  private:
   Kinematics rigid_;
+  std::vector<Follower> followers_;
+  std::vector<Eigen::Index> drives_;  // joints that follow no other
   double tolerance_mm_;
   int max_iterations_;
   double lever_mm_;        // the arm's reach: turns angles into lengths

@@ -146,6 +146,7 @@ Poses candidate_poses(const ExplanationPair& question, const Poses& measured, co
       poses.joints.col(j).segment(p * loads, loads).setConstant(random.uniform(low, high));
     }
   }
+  poses.joints = with_mimics(chain, std::move(poses.joints));
   std::erase_if(poses.covariates, [](const auto& column) { return column.first.starts_with("tau"); });
   for (Eigen::Index j = 0; j < poses.joints.cols(); ++j) {
     for (const char* unit : {"_rad", "_mm"}) {

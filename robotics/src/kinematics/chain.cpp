@@ -72,6 +72,21 @@ void validate_joint(const Joint& joint) {
   }
 }
 
+void validate_mimic(const Chain& chain, const Joint& joint) {
+  const Mimic& mimic = *joint.mimic;
+  const auto leader = std::ranges::find(chain.joints, mimic.joint, &Joint::name);
+  if (leader == chain.joints.end()) {
+    refuse("mimic", fmt::format("{} mimics \"{}\", which is no joint of the chain", joint.name, mimic.joint));
+  }
+  if (leader->mimic) {
+    refuse("mimic", fmt::format("{} mimics {}, which must have a drive of its own", joint.name, mimic.joint));
+  }
+  if (!(std::isfinite(mimic.multiplier) && mimic.multiplier != 0.0)) {
+    refuse("mimic", fmt::format("{}: multiplier is {}, must be finite and not 0", joint.name, mimic.multiplier));
+  }
+  if (!std::isfinite(mimic.offset)) refuse("mimic", fmt::format("{}: the offset is not finite", joint.name));
+}
+
 }  // namespace
 
 void validate(const Chain& chain) {
@@ -90,6 +105,7 @@ void validate(const Chain& chain) {
       refuse("name", fmt::format("joint name \"{}\" has a dot", joint.name));
     if (!names.insert(joint.name).second) refuse("name", fmt::format("joint name \"{}\" is taken", joint.name));
     validate_joint(joint);
+    if (joint.mimic) validate_mimic(chain, joint);
   }
   validate_further("bases", chain.bases, chain.session);
   validate_further("tools", chain.tools, chain.target);
@@ -163,6 +179,8 @@ bool is_frame_parameter(std::string_view name) {
 }
 
 bool is_socket(std::string_view base) { return base.starts_with("socket "); }
+
+bool is_plane(std::string_view base) { return base.starts_with("plane "); }
 
 double to_limit_unit(const Joint& joint) { return joint.type == JointType::revolute ? degrees : 1.0; }
 

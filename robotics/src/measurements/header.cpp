@@ -65,8 +65,12 @@ Header::Header(const Csv& csv, const Robot& robot, const std::vector<std::string
   if (targets_.size() > 1 && targets_.front().empty() != targets_.back().empty()) {
     refuse("there are positions without a target (x_mm) and with one (t1_x_mm): name them all");
   }
-  if (words_.contains("socket") && has("distance"))
+  if (words_.contains("socket") && has("distance")) {
     refuse("there are sockets and distances: fit them one after the other");
+  }
+  if (has_plane() && (words_.contains("socket") || !targets_.empty() || has("distance"))) {
+    refuse("points on planes have no other readings beside them: fit them one after the other");
+  }
   if (!targets_.empty() && has("distance")) refuse("there are positions and distances: fit them one after the other");
 }
 
@@ -81,7 +85,7 @@ void Header::take(const std::string& name, const std::string& column) {
     take_quantity(parts[1], column, parts[4]);
   } else if (std::regex_match(name, quaternion)) {
     quantities_[name] = {column, ""};
-  } else if (name == "target" || name == "session" || name == "socket" || name == "reference") {
+  } else if (name == "target" || name == "session" || name == "socket" || name == "plane" || name == "reference") {
     words_[name] = column;
   } else if (std::regex_match(name, covariate) || also_.contains(name)) {
     if (!covariates_.try_emplace(name, column).second) refuse(fmt::format("there are two columns {}", name));
@@ -134,10 +138,12 @@ double Header::factor(const std::string& name, const Units& units) const {
 Eigen::MatrixXd Header::joints() const {
   const std::vector<Joint>& joints = robot_.chain.joints;
   std::vector<std::string> columns;
-  Eigen::RowVectorXd factors(std::ssize(joints));
+  std::vector<Eigen::Index> read;
+  Eigen::RowVectorXd factors = Eigen::RowVectorXd::Ones(std::ssize(joints));
   for (std::size_t j = 0; j < joints.size(); ++j) {
     const std::string name = fmt::format("q{}", j + 1);
     const Units& units = joints[j].type == JointType::revolute ? angles_in_rad : lengths_in_mm;
+    if (!quantities_.contains(name) && joints[j].mimic) continue;
     if (!quantities_.contains(name)) {
       const std::string& own = joints[j].name;
       if (csv_.has(own)) {
@@ -149,6 +155,7 @@ Eigen::MatrixXd Header::joints() const {
                          is_named ? "" : "; the first line must hold the names of the columns"));
     }
     factors(j) = factor(name, units);
+    read.push_back(static_cast<Eigen::Index>(j));
     columns.push_back(quantities_.at(name).column);
   }
   for (const auto& [name, quantity] : quantities_) {
@@ -157,9 +164,12 @@ Eigen::MatrixXd Header::joints() const {
           fmt::format("column \"{}\": robot \"{}\" has {} joints", quantity.column, robot_.chain.name, joints.size()));
     }
   }
-  Eigen::MatrixXd values = csv_.numbers(columns);
+  Eigen::MatrixXd values = Eigen::MatrixXd::Zero(csv_.rows(), std::ssize(joints));
+  values(Eigen::all, read) = csv_.numbers(columns);
   values.array().rowwise() *= factors.array();
-  return values;
+  Eigen::MatrixXd all = with_mimics(robot_.chain, values);
+  all(Eigen::all, read) = values(Eigen::all, read);
+  return all;
 }
 
 Eigen::MatrixXd Header::points_mm(const std::string& target, std::array<bool, 3>& measured) const {

@@ -19,9 +19,11 @@ class Header {
   Header(const Csv& csv, const Robot& robot, const std::vector<std::string>& also, const ColumnMap& map = {});
 
   bool has(const std::string& quantity) const { return quantities_.contains(quantity); }
+  bool has_plane() const { return words_.contains("plane"); }
   bool has_joints() const { return quantities_.lower_bound("q0") != quantities_.lower_bound("q:"); }  // q1, q2, ...
   bool in_degrees(const std::string& quantity) const { return quantities_.at(quantity).unit == "deg"; }
 
+  /// n x J in rad and mm. Joints that mimic others need no column.
   Eigen::MatrixXd joints() const;
 
   /// Prefixes of the columns of targets, in the order of the columns: "" for x_mm, "t2_" for t2_x_mm.
@@ -40,7 +42,7 @@ class Header {
   /// The column of the file that says in which sequence rows were read: order, or else time_s; empty if there is none.
   std::string sequence_column() const;
 
-  /// Names in the column `target`, `session`, `socket` or `reference`, row by row; empty if there is none.
+  /// Names in the column `target`, `session`, `socket`, `plane` or `reference`, row by row; empty if there is none.
   std::vector<std::string> words(const std::string& column) const;
 
   const std::vector<std::string>& unused() const { return unused_; }
@@ -62,7 +64,7 @@ class Header {
   std::set<std::string> also_;
   std::map<std::string, Quantity> quantities_;     // "q1", "x", "t2_x", "rx", "qw", "distance" -> column and unit
   std::map<std::string, std::string> covariates_;  // name -> column
-  std::map<std::string, std::string> words_;       // "target", "session", "socket", "reference" -> column
+  std::map<std::string, std::string> words_;       // "target", "socket", "plane", ... -> column
   std::vector<std::string> targets_;
   std::vector<std::string> unused_;
 

@@ -20,7 +20,7 @@ struct Sighting {
   Eigen::Index row = 0;
   std::string target;
   Eigen::Vector3d value = Eigen::Vector3d::Zero();
-  bool in_socket = false;  // `value` is then the socket's centre
+  std::string feature = {};  // "socket" or "plane": `value` is then a point of it in its own frame
 };
 
 std::vector<Sighting> sightings_of(const Csv& csv, const Header& header, Measurements& measurements) {
@@ -28,21 +28,28 @@ std::vector<Sighting> sightings_of(const Csv& csv, const Header& header, Measure
   if (header.has("distance")) {
     measurements.measured = {true, false, false};
     const Eigen::VectorXd distances = header.distances_mm();
-    for (Eigen::Index row = 0; row < csv.rows(); ++row) seen.push_back({row, "", {distances(row), 0.0, 0.0}, false});
+    for (Eigen::Index row = 0; row < csv.rows(); ++row) seen.push_back({row, "", {distances(row), 0.0, 0.0}});
     return seen;
   }
   const std::vector<std::string> words = header.words("target");
+  if (header.has_plane()) {
+    measurements.measured = {false, false, true};
+    for (Eigen::Index row = 0; row < csv.rows(); ++row) {
+      seen.push_back({.row = row, .target = words.empty() ? "" : words[row], .feature = "plane"});
+    }
+    return seen;
+  }
   const std::vector<std::string> sockets = header.words("socket");
   for (std::size_t row = 0; row < sockets.size(); ++row) {
     if (sockets[row].empty()) continue;
     const std::string target = words.empty() ? "" : words[row];
-    seen.push_back({.row = static_cast<Eigen::Index>(row), .target = target, .in_socket = true});
+    seen.push_back({.row = static_cast<Eigen::Index>(row), .target = target, .feature = "socket"});
   }
   if (header.targets().empty() && !sockets.empty()) return seen;
   if (header.targets().empty()) {
     throw std::runtime_error(
         fmt::format("{}:1: no measured position: write x_mm, y_mm, z_mm (or _m, _um), t1_x_mm, ... of several targets, "
-                    "distance_mm, or a column socket; columns: {}",
+                    "distance_mm, or a column socket or plane; columns: {}",
                     csv.name(), fmt::join(csv.columns(), ", ")));
   }
   if (!words.empty() && !header.targets().front().empty()) {
@@ -185,16 +192,17 @@ void observe(const Csv& csv, const Header& header, const Robot& robot, const Pos
   refuse_same_but_for_dots(csv, sessions, "session");
   const std::vector<std::string> targets = header.words("target");
   refuse_same_but_for_dots(csv, targets, "target");
-  const std::vector<std::string> sockets = header.words("socket");
-  refuse_same_but_for_dots(csv, sockets, "socket");
+  for (const char* column : {"socket", "plane"}) refuse_same_but_for_dots(csv, header.words(column), column);
   const bool has_targets = !targets.empty();
   const std::vector<Eigen::Index> stands = stands_of(rows, sessions, has_targets);
+  const std::map<std::string, std::vector<std::string>> features = {{"socket", header.words("socket")},
+                                                                    {"plane", header.words("plane")}};
   FrameNames base_of(robot.chain.bases, robot.chain.session);
   FrameNames tool_of(robot.chain.tools, robot.chain.target);
   std::vector<Observation>& observations = measurements.poses.observations;
   for (const Sighting& sighting : seen) {
     Observation& observation = observations.emplace_back();
-    const auto named = [&](const std::vector<std::string>& words, const char* column) {
+    const auto named = [&](const std::vector<std::string>& words, const std::string& column) {
       if (words.empty()) return std::string();
       if (words[sighting.row].empty()) csv.refuse(sighting.row, column, "the name is missing");
       constexpr std::size_t longest = 200;
@@ -202,16 +210,20 @@ void observe(const Csv& csv, const Header& header, const Robot& robot, const Pos
       return without_dots(words[sighting.row]);
     };
     const std::string session = named(sessions, "session");
-    if (is_socket(session)) csv.refuse(sighting.row, "session", "a session's name does not begin with \"socket \"");
+    if (is_socket(session) || is_plane(session)) {
+      csv.refuse(sighting.row, "session", "a session's name does not begin with \"socket \" or \"plane \"");
+    }
     const std::string target = has_targets ? named(targets, "target") : sighting.target;
     observation.base = base_of(session);
     // A target that was mounted anew is another tool.
     std::string tool = observation.base;
     if (!target.empty()) tool = tool.empty() ? target : fmt::format("{}/{}", tool, target);
     observation.tool = tool_of(tool);
-    if (sighting.in_socket) {
-      if (!observation.base.empty()) csv.refuse(sighting.row, "session", "sockets are read in the first session only");
-      observation.base = "socket " + named(sockets, "socket");
+    if (!sighting.feature.empty()) {
+      if (!observation.base.empty()) {
+        csv.refuse(sighting.row, "session", fmt::format("a {} is read in the first session only", sighting.feature));
+      }
+      observation.base = fmt::format("{} {}", sighting.feature, named(features.at(sighting.feature), sighting.feature));
     }
     observation.stand = stands[sighting.row];
     if (header.has("distance")) observation.reading = Reading::distance;

@@ -27,8 +27,10 @@ std::string quoted(const std::string& text) {
   return result + '"';
 }
 
+std::string name_of_feature(const Observation& seen) { return quoted(seen.base.substr(seen.base.find(' ') + 1)); }
+
 std::string target_of(const Observation& seen) {
-  if (seen.base.empty() || is_socket(seen.base)) return seen.tool;
+  if (seen.base.empty() || is_socket(seen.base) || is_plane(seen.base)) return seen.tool;
   const std::string prefix = seen.base + "/";
   return seen.tool.starts_with(prefix) ? seen.tool.substr(prefix.size()) : seen.tool == seen.base ? "" : seen.tool;
 }
@@ -40,7 +42,7 @@ void add_sockets(const std::vector<Observation>& observations, Columns& columns)
   std::vector<std::string>& names = columns.cells.emplace_back();
   for (std::size_t i = 0; i < observations.size(); ++i) {
     const bool in_socket = is_socket(observations[i].base);
-    names.push_back(in_socket ? quoted(observations[i].base.substr(observations[i].base.find(' ') + 1)) : "");
+    names.push_back(in_socket ? name_of_feature(observations[i]) : "");
     for (const char* axis : {"x_mm", "y_mm", "z_mm"}) {
       const auto column = std::ranges::find(columns.names, axis);
       if (in_socket) columns.cells[column - columns.names.begin()][i].clear();
@@ -70,8 +72,14 @@ std::string to_csv(const Measurements& all, const Robot& robot) {
   }
   const std::vector<Observation>& observations = measurements.poses.observations;
   const bool distances = !observations.empty() && observations.front().reading == Reading::distance;
+  const bool planes = !observations.empty() && is_plane(observations.front().base);
   if (distances) columns.add("distance_mm", measurements.positions_mm.col(0));
-  for (std::size_t axis = 0; axis < 3 && !distances; ++axis) {
+  if (planes) {
+    columns.names.emplace_back("plane");
+    columns.cells.emplace_back();
+    for (const Observation& seen : observations) columns.cells.back().push_back(name_of_feature(seen));
+  }
+  for (std::size_t axis = 0; axis < 3 && !distances && !planes; ++axis) {
     if (measurements.measured[axis])
       columns.add(fmt::format("{}_mm", "xyz"[axis]), measurements.positions_mm.col(axis));
   }
@@ -83,7 +91,7 @@ std::string to_csv(const Measurements& all, const Robot& robot) {
   std::vector<std::string> sessions;
   std::vector<std::string> targets;
   for (const Observation& seen : observations) {
-    sessions.push_back(is_socket(seen.base) ? "" : seen.base);
+    sessions.push_back(is_socket(seen.base) || is_plane(seen.base) ? "" : seen.base);
     targets.push_back(target_of(seen));
   }
   add_sockets(observations, columns);

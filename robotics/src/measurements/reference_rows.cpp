@@ -121,6 +121,8 @@ double move_back(const Session& session, const Drift& drift, std::vector<Eigen::
   double greatest = 0.0;
   for (std::size_t k = 0; k < session.measured.size(); ++k) {
     const Eigen::Index row = session.measured[k];
+    const std::vector<Observation>& observations = measurements.poses.observations;
+    if (!observations.empty() && is_socket(observations[row].base)) continue;  // the instrument did not see it
     const Pose back = drift.to_first_round(session.when[k]);
     const Eigen::Vector3d before = measurements.positions_mm.row(row).transpose();
     const Eigen::Vector3d after = back.rotation * before + back.position_mm;

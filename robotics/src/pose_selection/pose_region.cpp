@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <Eigen/Cholesky>
+#include <cmath>
 #include <stdexcept>
 
 #include "kinematics/units.hpp"
@@ -31,23 +32,17 @@ Eigen::MatrixXd joint_degrees(const Chain& chain, const Eigen::MatrixXd& joints)
 }
 
 PoseRegion::PoseRegion(const Chain& chain, const std::optional<ToolBox>& box)
-    : kinematics_(without_base(chain)), box_(box), unit_(degree_of(chain)) {
+    : kinematics_(without_base(chain)), followers_(followers_of(chain)), box_(box), unit_(degree_of(chain)) {
   if (box && !(box->lower_mm.array() <= box->upper_mm.array()).all()) {
     throw std::invalid_argument("llmt::robotics::select_poses: a lower bound of the box is above the upper one");
   }
-  lower_.resize(unit_.size());
-  upper_.resize(unit_.size());
-  for (Eigen::Index j = 0; j < unit_.size(); ++j) {
-    const Joint& joint = chain.joints[j];
-    const bool turns = joint.type == JointType::revolute;
-    if (!joint.limits && !turns) {
-      throw std::invalid_argument(
-          fmt::format("llmt::robotics::select_poses: {} is prismatic and has no limits_mm", joint.name));
-    }
-    const std::array<double, 2> limits = joint.limits.value_or(std::array<double, 2>{-180.0, 180.0});
-    lower_(j) = limits[0] * (turns ? radians : 1.0);
-    upper_(j) = limits[1] * (turns ? radians : 1.0);
-  }
+  const JointRanges ranges = joint_ranges(chain, "llmt::robotics::select_poses");
+  lower_ = ranges.low;
+  upper_ = ranges.high;
+}
+
+Eigen::VectorXd PoseRegion::nearest(const Eigen::VectorXd& joints) const {
+  return followed(followers_, joints.cwiseMax(lower_).cwiseMin(upper_));
 }
 
 bool PoseRegion::contains(const Eigen::VectorXd& joints) const {
@@ -62,13 +57,15 @@ bool PoseRegion::lead_into_box(Eigen::VectorXd& joints, const Eigen::Vector3d& t
   for (int step = 0; step < most_steps; ++step) {
     if (contains(joints)) return true;
     const Eigen::Vector3d missing = target - kinematics_.forward(joints).position_mm;
-    const Eigen::MatrixXd jacobian = kinematics_.joint_jacobian(joints).topRows(3) * unit_.asDiagonal();
+    Eigen::MatrixXd jacobian = kinematics_.joint_jacobian(joints).topRows(3);
+    lead(followers_, jacobian);
+    jacobian = jacobian * unit_.asDiagonal();
     Eigen::Matrix3d square = jacobian * jacobian.transpose();
     square.diagonal().array() += 1e-3 * square.trace() + 1e-12;
     const Eigen::VectorXd move = jacobian.transpose() * square.llt().solve(missing);
     constexpr double longest_deg = 20.0;
     const double shorter = std::min(1.0, longest_deg / std::max(1e-12, move.lpNorm<Eigen::Infinity>()));
-    joints = (joints + shorter * unit_.cwiseProduct(move)).cwiseMax(lower_).cwiseMin(upper_);
+    joints = nearest(joints + shorter * unit_.cwiseProduct(move));
   }
   return contains(joints);
 }
@@ -78,8 +75,11 @@ Eigen::MatrixXd PoseRegion::random(Eigen::Index count, Random& random) const {
   Eigen::MatrixXd poses(count, unit_.size());
   int failures = 0;
   for (Eigen::Index i = 0; i < count;) {
-    Eigen::VectorXd joints(unit_.size());
-    for (Eigen::Index j = 0; j < joints.size(); ++j) joints(j) = random.uniform(lower_(j), upper_(j));
+    Eigen::VectorXd joints = Eigen::VectorXd::Zero(unit_.size());
+    for (Eigen::Index j = 0; j < joints.size(); ++j) {
+      if (std::isfinite(lower_(j))) joints(j) = random.uniform(lower_(j), upper_(j));
+    }
+    joints = followed(followers_, joints);
     Eigen::Vector3d target = Eigen::Vector3d::Zero();
     for (int axis = 0; box_ && axis < 3; ++axis) {
       target(axis) = random.uniform(box_->lower_mm(axis), box_->upper_mm(axis));
@@ -103,10 +103,11 @@ Eigen::MatrixXd PoseRegion::random(Eigen::Index count, Random& random) const {
 void PoseRegion::add_neighbours(const Eigen::VectorXd& joints, double step_deg, Random& random,
                                 std::vector<Eigen::VectorXd>& poses) const {
   const auto add = [&](Eigen::VectorXd moved) {
-    moved = moved.cwiseMax(lower_).cwiseMin(upper_);
+    moved = nearest(moved);
     if (contains(moved)) poses.push_back(std::move(moved));
   };
   for (Eigen::Index j = 0; j < joints.size(); ++j) {
+    if (!std::isfinite(lower_(j))) continue;  // it follows another
     for (const double side : {-1.0, 1.0}) {
       Eigen::VectorXd moved = joints;
       moved(j) += side * step_deg * unit_(j);

@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "kinematics/mimics.hpp"
 #include "llmt/random.hpp"
 #include "llmt/robotics/kinematics.hpp"
 #include "llmt/robotics/pose_selection.hpp"
@@ -32,11 +33,13 @@ class PoseRegion {
 
  private:
   Kinematics kinematics_;  // in the frame of the base
+  std::vector<Follower> followers_;
   std::optional<ToolBox> box_;
-  Eigen::VectorXd lower_;
+  Eigen::VectorXd lower_;  // infinite for joints that follow another
   Eigen::VectorXd upper_;
   Eigen::VectorXd unit_;  // joint values in one degree
 
+  Eigen::VectorXd nearest(const Eigen::VectorXd& joints) const;
   bool lead_into_box(Eigen::VectorXd& joints, const Eigen::Vector3d& target) const;
 };
 

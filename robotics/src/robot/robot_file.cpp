@@ -65,6 +65,14 @@ JointType read_joint_type(YamlMap& map) {
   map.refuse("type", fmt::format("\"type\" is \"{}\", must be revolute or prismatic", type));
 }
 
+Mimic read_mimic(YamlMap map, JointType type) {
+  const std::string offset = type == JointType::revolute ? "offset_deg" : "offset_mm";
+  const Mimic mimic{
+      .joint = map.text("joint"), .multiplier = map.number_or("multiplier", 1.0), .offset = map.number_or(offset, 0.0)};
+  map.finish({"joint", "multiplier", offset});
+  return mimic;
+}
+
 Joint read_joint(YamlMap map) {
   Joint joint;
   joint.name = map.text("name");
@@ -84,8 +92,9 @@ Joint read_joint(YamlMap map) {
     const std::vector<double> values = map.numbers(limits, 2);
     joint.limits = {values[0], values[1]};
   }
+  if (map.has("mimic")) joint.mimic = read_mimic(map.map("mimic"), joint.type);
   map.finish({"name", "type", "alpha_deg", "a_mm", "d_mm", "theta_deg", "beta_deg", "b_mm", "sign", "limits_deg",
-              "limits_mm", "gear_ratio", "mass_kg", "com_mm"});
+              "limits_mm", "gear_ratio", "mass_kg", "com_mm", "mimic"});
   return joint;
 }
 

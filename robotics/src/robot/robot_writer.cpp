@@ -69,6 +69,10 @@ void write_joint(Writer& out, const Joint& joint) {
   out.optional("sign", joint.sign, 1.0);
   if (joint.limits) out.numbers(turns ? "limits_deg" : "limits_mm", *joint.limits);
   if (joint.gear_ratio) out.number("gear_ratio", *joint.gear_ratio);
+  if (joint.mimic) {
+    out.key("mimic").begin_map().word("joint", joint.mimic->joint).number("multiplier", joint.mimic->multiplier);
+    out.optional(turns ? "offset_deg" : "offset_mm", joint.mimic->offset, 0.0).end_map();
+  }
   out.optional("mass_kg", joint.mass_kg, 0.0);
   if (!joint.com_mm.isZero(0.0)) out.numbers("com_mm", joint.com_mm);
   out.end_map();

@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <stdexcept>
 
+#include "kinematics/mimics.hpp"
 #include "kinematics/units.hpp"
 #include "llmt/random.hpp"
 #include "robot/robot_evaluator.hpp"
@@ -16,24 +17,13 @@ namespace {
 constexpr Eigen::Index most_poses = 1000000;
 constexpr double largest_noise_um = 1e12;
 
-std::array<double, 2> limits_of(const Joint& joint) {
-  const bool turns = joint.type == JointType::revolute;
-  if (!joint.limits && !turns) {
-    throw std::invalid_argument(
-        fmt::format("llmt::robotics::simulate: {} is prismatic and has no limits_mm", joint.name));
-  }
-  const std::array<double, 2> limits = joint.limits.value_or(std::array<double, 2>{-180.0, 180.0});
-  const double unit = turns ? radians : 1.0;
-  return {limits[0] * unit, limits[1] * unit};
-}
-
 Eigen::Index steps_within(const Joint& joint, double step_rad) {
   if (joint.type != JointType::revolute || !joint.limits) {
     throw std::invalid_argument(fmt::format("llmt::robotics::grid: {} must be revolute and have limits", joint.name));
   }
-  const std::array<double, 2> limits = limits_of(joint);
+  const double range_rad = radians * ((*joint.limits)[1] - (*joint.limits)[0]);
   // A limit that is a multiple of the step belongs to the grid although rounding may put it a hair beyond.
-  return static_cast<Eigen::Index>(std::floor((limits[1] - limits[0]) / step_rad + 1e-9)) + 1;
+  return static_cast<Eigen::Index>(std::floor(range_rad / step_rad + 1e-9)) + 1;
 }
 
 // The first number in the name of a column: 3 in "tau3_Nm"; 0 if there is none.
@@ -118,12 +108,13 @@ Measurements simulate(const Robot& robot, const SimulationOptions& options) {
   const std::vector<Joint>& joints = robot.chain.joints;
   Poses poses;
   poses.joints.resize(options.poses, std::ssize(joints));
+  const auto [low, high] = joint_ranges(robot.chain, "llmt::robotics::simulate");
   for (Eigen::Index i = 0; i < options.poses; ++i) {
     for (std::size_t j = 0; j < joints.size(); ++j) {
-      const std::array<double, 2> limits = limits_of(joints[j]);
-      poses.joints(i, j) = random.uniform(limits[0], limits[1]);
+      if (!joints[j].mimic) poses.joints(i, j) = random.uniform(low(j), high(j));
     }
   }
+  poses.joints = with_mimics(robot.chain, std::move(poses.joints));
   return measured(robot, std::move(poses), options, random);
 }
 
@@ -165,7 +156,7 @@ Poses grid(const Chain& chain, double step_rad) {
   Eigen::Index repeats = 1;  // how long a joint holds its value: 1 for the last one
   for (std::size_t j = chain.joints.size(); j-- > 0;) {
     const Eigen::Index steps = steps_within(chain.joints[j], step_rad);
-    const double lower = limits_of(chain.joints[j])[0];
+    const double lower = radians * (*chain.joints[j].limits)[0];
     for (Eigen::Index i = 0; i < poses.count(); ++i) {
       poses.joints(i, j) = lower + step_rad * static_cast<double>(i / repeats % steps);
     }

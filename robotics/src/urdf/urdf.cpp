@@ -97,6 +97,7 @@ Chain parse_urdf(const std::string& text, const std::string& name, const UrdfLin
     joint.type = from.type;
     set_parameters(joint, frames[j].inverse() * frames[j + 1]);
     joint.limits = from.limits;
+    joint.mimic = from.mimic;
     joint.mass_kg = from.mass_kg;
     if (from.mass_kg > 0.0) joint.com_mm = frames[j + 1].inverse() * from.com_mm;
   }

@@ -151,10 +151,6 @@ UrdfJoint moving_joint(const urdf::Joint& from, const Eigen::Isometry3d& parent,
       from.type != urdf::Joint::PRISMATIC) {
     refuse("is planar or floating: an arm has revolute, continuous, prismatic and fixed joints");
   }
-  if (from.mimic) {
-    refuse(fmt::format("mimics \"{}\": coupled joints are not supported; end the chain before it (--tip-link)",
-                       from.mimic->joint_name));
-  }
   UrdfJoint joint;
   joint.name = from.name;
   joint.type = from.type == urdf::Joint::PRISMATIC ? JointType::prismatic : JointType::revolute;
@@ -167,7 +163,29 @@ UrdfJoint moving_joint(const urdf::Joint& from, const Eigen::Isometry3d& parent,
     const double unit = joint.type == JointType::prismatic ? mm : 1.0 / radians;
     joint.limits = {unit * from.limits->lower, unit * from.limits->upper};
   }
+  if (from.mimic) {
+    const bool turns = joint.type == JointType::revolute;
+    joint.mimic = Mimic{.joint = from.mimic->joint_name,
+                        .multiplier = from.mimic->multiplier,
+                        .offset = from.mimic->offset * (turns ? degrees : mm)};
+  }
   return joint;
+}
+
+// A URDF counts in rad and m, a chain in rad and mm.
+void set_units_of_mimics(UrdfArm& arm, const std::string& file) {
+  for (UrdfJoint& joint : arm.joints) {
+    if (!joint.mimic) continue;
+    const auto leader = std::ranges::find(arm.joints, joint.mimic->joint, &UrdfJoint::name);
+    if (leader == arm.joints.end()) {
+      throw std::runtime_error(fmt::format(
+          "{}: joint \"{}\" mimics \"{}\", which does not lie between base and tip; choose other links (--base-link, "
+          "--tip-link)",
+          file, joint.name, joint.mimic->joint));
+    }
+    if (joint.type == JointType::prismatic) joint.mimic->multiplier *= mm;
+    if (leader->type == JointType::prismatic) joint.mimic->multiplier /= mm;
+  }
 }
 
 }  // namespace
@@ -189,6 +207,7 @@ UrdfArm urdf_arm(const std::string& text, const std::string& name, const UrdfLin
     add_masses(*model->getLink(joint->child_link_name), next.child, joints, next);
     if (next.mass_kg > 0.0) next.com_mm /= next.mass_kg;
   }
+  set_units_of_mimics(arm, name);
   if (arm.joints.empty()) {
     throw std::runtime_error(fmt::format("{}: no joint between the links \"{}\" and \"{}\" moves", name, base, tip));
   }

@@ -20,6 +20,7 @@ struct UrdfJoint {
   Eigen::Isometry3d child;   ///< of the link that it moves
   Eigen::Vector3d axis;      ///< unit vector
   std::optional<std::array<double, 2>> limits;
+  std::optional<Mimic> mimic;  ///< as in a chain
   double mass_kg = 0.0;
   Eigen::Vector3d com_mm = Eigen::Vector3d::Zero();
 };

@@ -142,8 +142,8 @@ TEST(Urdf, WhatIsNoArmIsRefusedByName) {
   says(message(robot(links + joint("j", "floating", "a", "b") + joint("k", "revolute", "b", "c"))),
        "\"j\" is planar or");
   says(message(robot(links + joint("j", "revolute", "a", "b") +
-                     joint("k", "revolute", "b", "c", "<mimic joint=\"j\" multiplier=\"2\"/>"))),
-       "\"k\" mimics \"j\"");
+                     joint("k", "revolute", "b", "c", "<mimic joint=\"finger\" multiplier=\"2\"/>"))),
+       "\"k\" mimics \"finger\", which does not lie between base and tip");
   says(message(robot(links + joint("j", "fixed", "a", "b") + joint("k", "fixed", "b", "c"))), "no joint beyond");
   std::string deep;
   for (int k = 0; k < 200; ++k) deep += "<a>";

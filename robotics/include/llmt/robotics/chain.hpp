@@ -43,6 +43,13 @@ struct NamedFrame {
   Frame frame;
 };
 
+/// How a joint without a drive of its own follows another: q = multiplier q_joint + offset.
+struct Mimic {
+  std::string joint;        ///< that has a drive
+  double multiplier = 1.0;  ///< rad or mm per rad or mm
+  double offset = 0.0;      ///< degrees, or mm for a prismatic joint
+};
+
 /// One joint and the link it moves. Angles are kept in degrees, as in files, so that reading and writing lose nothing.
 struct Joint {
   std::string name;
@@ -56,6 +63,7 @@ struct Joint {
   double sign = 1.0;                            ///< +1 or -1
   std::optional<std::array<double, 2>> limits;  ///< lower, upper; degrees, or mm for a prismatic joint
   std::optional<double> gear_ratio;             ///< motor turns per joint turn
+  std::optional<Mimic> mimic;                   ///< as in a URDF; empty: the joint has a drive
   double mass_kg = 0.0;                         ///< of the link that the joint moves
   Eigen::Vector3d com_mm = Eigen::Vector3d::Zero();  ///< its centre of mass in the joint's moving frame
 };
@@ -86,7 +94,8 @@ struct Chain {
 
 /// Throws std::invalid_argument naming joint, field, value and bound: no joints or more than 100, repeated or empty
 /// joint names, names that collide with "base" or "tool", non-finite numbers, sign other than +1 or -1, limits out of
-/// order, negative mass, further bases or tools without a name, with a dot in it, or of the same name.
+/// order, a mimic of no joint or of one that mimics another, negative mass, further bases or tools without a name, with
+/// a dot in it, or of the same name.
 void validate(const Chain& chain);
 
 /// The geometric parameters in their fixed order: base.{x,y,z,rx,ry,rz}, tool.{...}, then per joint
@@ -110,6 +119,9 @@ Chain with_geometric_values(Chain chain, const Eigen::VectorXd& values);
 double to_limit_unit(const Joint& joint);
 std::string limit_unit(const Joint& joint);
 
+/// Joint values, n x J in rad and mm, with those of joints that mimic others computed from the others.
+Eigen::MatrixXd with_mimics(const Chain& chain, Eigen::MatrixXd joints);
+
 /// Position of a joint by its name. Throws std::invalid_argument if there is none.
 std::size_t joint_index(const Chain& chain, std::string_view name);
 
@@ -119,6 +131,10 @@ bool is_frame_parameter(std::string_view name);
 /// Whether a base stands for a ball socket, by its name, "socket NAME": then its origin is the centre of the ball,
 /// which every reading finds there, and its axes are any.
 bool is_socket(std::string_view base);
+
+/// Whether a base stands for a flat surface, by its name, "plane NAME": then its x and y axes lie in the plane that
+/// every reading finds the tool point in.
+bool is_plane(std::string_view base);
 
 /// Position of a geometric parameter in the fixed order.
 enum class FrameParameter { x, y, z, rx, ry, rz };

@@ -113,6 +113,7 @@ ColumnMap parse_column_map(const std::string& text, const std::string& name);
 ///   t1_x_mm t1_y_mm t1_z_mm t2_x_mm ...                  several targets in one pose; a cell may be empty
 ///   target, session                                      names: of what was looked at, of how the instrument stood
 ///   socket                                               name of what the tool's ball lies in, instead of positions
+///   plane                                                name of a flat surface that the tool point lies on, likewise
 ///   reference                                            name of a point that stands still and is read in this row
 ///   distance_mm (also _m, _um)                           instead of positions: distance from a fixed point
 ///   payload_kg temp_C time_s order pose dirN tauN_Nm qmeasN_deg sigma_x_um U95_x_um ...   covariates, optional
@@ -121,7 +122,8 @@ ColumnMap parse_column_map(const std::string& text, const std::string& name);
 /// its own, or else the first ones, have its own base and tool; the others have frames of their names, which
 /// with_frames() adds. In another session the tool is another one, too: "SESSION", or "SESSION/TARGET".
 ///
-/// The centre of a socket is the origin of the base "socket NAME", see is_socket(). Readings of reference points are no
+/// The centre of a socket is the origin of the base "socket NAME", see is_socket(); a plane is that of x and y of the
+/// base "plane NAME", and z = 0 is what was measured. Readings of reference points are no
 /// rows of the result: the movement of the instrument that they show is taken off the others, see
 /// docs/file-formats.md.
 ///

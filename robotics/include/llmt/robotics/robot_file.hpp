@@ -25,7 +25,7 @@ namespace llmt::robotics {
 ///     joints:                        # name, type, alpha_deg, a_mm, d_mm, theta_deg are required
 ///       - {name: joint1, type: revolute, alpha_deg: 0, a_mm: 0, b_mm: 0, d_mm: 642, theta_deg: 0, beta_deg: 0,
 ///          sign: 1, limits_deg: [-180, 180], gear_ratio: 100, mass_kg: 250, com_mm: [100, 0, -100]}   # limits_mm if
-///          prismatic
+///          prismatic; a joint that follows another has mimic: {joint: joint2, multiplier: -1, offset_deg: 0}
 ///     effects:                       # optional; parameters and constants of effect_types() under their keys
 ///       - {type: joint_compliance, at: joint1, compliance_rad_per_Nm: 1e-7}
 ///       - {type: joint_map, at: joint2, first_rad: -1, step_rad: 0.5, values_rad: [0, 1e-4, 0]}

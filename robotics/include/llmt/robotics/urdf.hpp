@@ -25,12 +25,12 @@ bool is_urdf(const std::string& path);
 /// leads from there to the first frame, Chain::tool from the last one to the tip link.
 ///
 /// Fixed joints are folded into origins. Masses are those of the links that a joint carries up to the next one, side
-/// branches such as fingers included, at zero. Limits are kept; a continuous joint has none. Meshes, transmissions,
-/// friction and inertias about the centres of mass do not matter.
+/// branches such as fingers included, at zero. Limits and mimics are kept; a continuous joint has no limits. Meshes,
+/// transmissions, friction and inertias about the centres of mass do not matter.
 ///
 /// Throws std::runtime_error `name:line:column: ...` for text that is no XML, and `name: ...` with what is wrong for
 /// XML that is no URDF, for links that do not exist or are not joined, several candidates for the tip (all are listed),
-/// joints that are planar, floating or mimic another one, and axes of length 0.
+/// joints that are planar or floating or mimic one that is not between the links, and axes of length 0.
 Chain parse_urdf(const std::string& text, const std::string& name, const UrdfLinks& links = {});
 
 /// Reads a file; throws as parse_urdf().

@@ -9,6 +9,16 @@
 namespace llmt::robotics {
 namespace {
 
+std::string lines_of(const Compensation& found, const std::string& name) {
+  std::string text;
+  for (Eigen::Index i = 0; i < found.after_mm.size(); ++i) {
+    if (found.after_mm(i) > 1e-7) continue;
+    for (const double q : found.commands.joints.row(i)) text += fmt::format("{},", q);
+    text += name + "\n";
+  }
+  return text;
+}
+
 // The arm holds a ball in each socket in turn, in `count` poses; where the ball really lies scatters by sigma.
 Measurements in_sockets(const Robot& truth, int count, double sigma_mm) {
   const std::vector<Eigen::RowVector3d> centres = {{450, 250, 300}, {-350, 400, 150}, {100, -550, 450}};
@@ -20,13 +30,31 @@ Measurements in_sockets(const Robot& truth, int count, double sigma_mm) {
     targets.positions_mm = centres[k].replicate(count, 1);
     for (double& value : targets.positions_mm.reshaped()) value += sigma_mm * random.normal();
     const Compensation found = compensate(CorrectedRobot{truth, {}}, targets, {.tolerance_mm = 1e-9});
-    for (int i = 0; i < count; ++i) {
-      if (found.after_mm(i) > 1e-7) continue;
-      for (const double q : found.commands.joints.row(i)) text += fmt::format("{},", q);
-      text += fmt::format("s{}\n", k + 1);
-    }
+    text += lines_of(found, fmt::format("s{}", k + 1));
   }
   return parse_measurements(text, "sockets.csv", truth);
+}
+
+// The arm touches three faces of a tilted block at random places, which are flat but for sigma.
+Measurements on_planes(const Robot& truth, int count, double sigma_mm) {
+  const Eigen::Matrix3d block =
+      (Eigen::AngleAxisd(0.4, Eigen::Vector3d::UnitZ()) * Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitX()))
+          .toRotationMatrix();
+  llmt::Random random(8);
+  std::string text = "q1_rad,q2_rad,q3_rad,q4_rad,q5_rad,q6_rad,plane\n";
+  for (int axis = 0; axis < 3; ++axis) {
+    Targets targets;
+    targets.start = random_poses(truth.chain, count, 60 + axis);
+    targets.positions_mm.resize(count, 3);
+    for (int i = 0; i < count; ++i) {
+      Eigen::Vector3d point(random.uniform(-500, 500), random.uniform(-500, 500), random.uniform(-500, 500));
+      point(axis) = 200.0 + sigma_mm * random.normal();
+      targets.positions_mm.row(i) = (block * point).transpose();
+    }
+    const Compensation found = compensate(CorrectedRobot{truth, {}}, targets, {.tolerance_mm = 1e-9});
+    text += lines_of(found, fmt::format("face {}", axis));
+  }
+  return parse_measurements(text, "planes.csv", truth);
 }
 
 // Mean distance on fresh poses between two arms, whatever their bases.
@@ -57,7 +85,7 @@ TEST(Sockets, AloneShowTheArmWithoutAnyInstrument) {
   EXPECT_LT(shape_error_mm(truth, calibration.robot), 1e-3 * before_mm);
   std::map<std::string, std::string> fixed;
   for (const FixedParameter& entry : calibration.fixed) fixed[entry.name] = entry.why;
-  EXPECT_EQ(fixed.at("joint2.a"), "sockets alone show no scale");
+  EXPECT_EQ(fixed.at("joint2.a"), "no reading shows the scale");
   EXPECT_EQ(fixed.at("base@socket s2.rx"), "a socket has no angles");
 }
 
@@ -98,6 +126,47 @@ TEST(Sockets, StandBesideMeasuredPointsInOneFile) {
             "m.csv:3: there is neither a measured point nor a socket");
   EXPECT_EQ(refused("q1_rad,x_mm,y_mm,socket\n1,2,3,\n2,,,a\n"),
             "m.csv:1: beside sockets, points need all of x, y and z");
+}
+
+TEST(Planes, ShowTheArmWithoutAnyInstrument) {
+  const Robot truth = real_arm();
+  const double before_mm = shape_error_mm(truth, ur_like());
+  const Measurements exact = on_planes(truth, 80, 0.0);
+  ASSERT_GT(exact.count(), 150);
+  const Calibration calibration = calibrate(ur_like(), exact);
+  EXPECT_TRUE(calibration.result.converged()) << calibration.result.reason;
+  EXPECT_LT(shape_error_mm(truth, calibration.robot), 1e-3 * before_mm);
+  std::map<std::string, std::string> fixed;
+  for (const FixedParameter& entry : calibration.fixed) fixed[entry.name] = entry.why;
+  EXPECT_EQ(fixed.at("joint2.a"), "no reading shows the scale");
+  EXPECT_TRUE(fixed.contains("base@plane face 1.rz"));
+  EXPECT_FALSE(fixed.contains("base@plane face 1.z"));
+
+  constexpr double sigma_mm = 0.02;
+  const Calibration rough = calibrate(ur_like(), on_planes(truth, 80, sigma_mm));
+  EXPECT_NEAR(rough.robot.calibration->noise_mm, sigma_mm, 0.1 * sigma_mm);
+  EXPECT_LT(shape_error_mm(truth, rough.robot), 0.5 * before_mm);
+}
+
+TEST(Planes, AreReadAndWrittenAndHaveNothingBesideThem) {
+  const Robot robot = make_robot(Convention::dh, {{0, 300, 0, 0}});
+  const Measurements m = parse_measurements("q1_rad,plane\n1,floor\n2,the wall\n", "m.csv", robot);
+  ASSERT_EQ(m.count(), 2);
+  EXPECT_EQ(m.poses.observations[1].base, "plane the wall");
+  EXPECT_EQ(measured_rows(m), (std::vector<Eigen::Index>{2, 5}));
+  const std::string written = to_csv(m, robot);
+  EXPECT_EQ(to_csv(parse_measurements(written, "w.csv", robot), robot), written);
+  const auto refused = [&](const std::string& rows) {
+    try {
+      parse_measurements(rows, "m.csv", robot);
+      return std::string("no error");
+    } catch (const std::runtime_error& error) {
+      return std::string(error.what());
+    }
+  };
+  EXPECT_EQ(refused("q1_rad,x_mm,plane\n1,2,floor\n"),
+            "m.csv:1: points on planes have no other readings beside them: fit them one after the other");
+  EXPECT_EQ(refused("q1_rad,plane\n1,floor\n1,\n"), "m.csv:3: column \"plane\": the name is missing");
 }
 
 }  // namespace
