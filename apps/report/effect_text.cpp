@@ -14,11 +14,28 @@
 namespace llmt::apps {
 namespace {
 
+// "presliding_rad" of 0.04 -> "presliding 0.04 rad".
+std::string constant_words(std::string key, double value) {
+  std::string unit;
+  for (const std::string suffix : {"rad", "mm", "Nm", "N", "C"}) {
+    if (!key.ends_with("_" + suffix)) continue;
+    unit = suffix == "Nm" ? " N m" : suffix == "C" ? " deg C" : " " + suffix;
+    key.resize(key.size() - suffix.size() - 1);
+  }
+  if (key.ends_with("_share")) {
+    key.resize(key.size() - std::string("_share").size());
+    value *= 100.0;
+    unit = " %";
+  }
+  std::ranges::replace(key, '_', ' ');
+  return fmt::format("{} {:.5g}{}", key, value, unit);
+}
+
 std::string constants_text(const robotics::Effect& effect) {
   const robotics::EffectType& type = robotics::effect_type(effect.type);
   std::vector<std::string> parts;
   for (std::size_t k = 0; k < type.constants.size() && k < effect.constants.size(); ++k) {
-    parts.push_back(fmt::format("{} {:.5g}", type.constants[k].key, effect.constants[k]));
+    parts.push_back(constant_words(type.constants[k].key, effect.constants[k]));
   }
   return parts.empty() ? "" : fmt::format(" ({})", fmt::join(parts, ", "));
 }

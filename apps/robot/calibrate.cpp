@@ -145,6 +145,9 @@ void calibrate_command(CalibrateArguments arguments) {
   arguments.options.progress = [&](Eigen::Index done, Eigen::Index total) { progress.show(done, total); };
   const CalibrationReport report = robotics::report_calibration(nominal, measurements, arguments.options);
   progress.clear();
+  if (const std::string far = robotics::far_readings(measurements, report); !far.empty() && !arguments.robust) {
+    measurements.warnings.push_back(far + ": --robust leaves such readings out");
+  }
   CalibrationFacts facts{.robot_file = arguments.robot,
                          .data_file = arguments.data,
                          .output = arguments.output,

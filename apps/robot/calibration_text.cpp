@@ -57,6 +57,16 @@ std::string error_tables(const std::vector<JudgedModel>& rows, const Calibration
                             &JudgedModel::test_mrad);
 }
 
+// As many decimals as show two digits of the standard error, at most six: lengths in mm and angles in degrees are never
+// known better.
+std::string to_error(double value, double error) {
+  constexpr int most = 6;
+  const bool is_known = std::isfinite(error) && error > 0.0;
+  const int decimals = is_known ? std::clamp(1 - static_cast<int>(std::floor(std::log10(error))), 0, most) : most;
+  const std::string text = fmt::format("{:.{}f}", value, decimals);
+  return text.find_first_not_of("-0.") == std::string::npos ? fmt::format("{:.{}f}", 0.0, decimals) : text;
+}
+
 std::string parameter_table(const robotics::Robot& nominal, const CalibrationReport& report) {
   const std::vector<discovery::Parameter> before = robotics::parameters(nominal);
   const discovery::SolverResult& result = report.calibration.result;
@@ -66,13 +76,12 @@ std::string parameter_table(const robotics::Robot& nominal, const CalibrationRep
     const auto nominal_value = std::ranges::find(before, after.name, &discovery::Parameter::name);
     if (after.free && nominal_value != before.end()) {
       const double error = result.standard_errors(k);
-      // Far below what lengths in mm and angles in degrees can be known to, a difference is rounding.
       const bool is_geometric = after.unit == "mm" || after.unit == "deg";
       const auto shown = [&](double value, int digits) {
-        return number(is_geometric && std::abs(value) < 1e-9 ? 0.0 : value, digits);
+        return is_geometric ? to_error(value, error) : number(value, digits);
       };
       table.add({after.name, shown(nominal_value->value, 7), shown(after.value, 7),
-                 shown(after.value - nominal_value->value, 4), std::isfinite(error) ? number(error, 2) : "-",
+                 shown(after.value - nominal_value->value, 4), std::isfinite(error) ? shown(error, 2) : "-",
                  after.unit});
     }
   }
@@ -120,9 +129,10 @@ std::string verdict(const CalibrationFacts& facts) {
     return (is_held_out ? stage.held_out_mm : stage.in_sample_mm).mean();
   };
   std::string text;
+  for (const std::string& suspicion : facts.suspicions) text += "WARNING: " + suspicion + "\n";
   if (facts.suspicions.empty()) {
-    text = fmt::format("Calibrated: the mean {} error falls from {:.4f} to {:.4f} mm", kind_of(facts.measurements),
-                       mean(report.nominal), mean(report.geometric));
+    text += fmt::format("Calibrated: the mean {} error falls from {:.4f} to {:.4f} mm", kind_of(facts.measurements),
+                        mean(report.nominal), mean(report.geometric));
     if (report.correction_kept) {
       const double corrected = mean(*report.corrected);
       text += fmt::format(", and {}to {:.4f} mm with the correction",
@@ -131,14 +141,25 @@ std::string verdict(const CalibrationFacts& facts) {
     text += is_held_out ? ", on poses left out of the fit.\n"
                         : ", on the poses of the fit; none were left out to judge it.\n";
   }
-  for (const std::string& suspicion : facts.suspicions) text += "WARNING: " + suspicion + "\n";
   return text;
+}
+
+// "only x and y were measured", or nothing.
+std::string missing_axes(const robotics::Measurements& measurements) {
+  if (kind_of(measurements) == "distance") return "";
+  std::vector<std::string> seen;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    if (measurements.measured[axis]) seen.emplace_back(1, "xyz"[axis]);
+  }
+  if (seen.size() == 3) return "";
+  return fmt::format("Note: only {} {} measured; all errors are of {}\n", fmt::join(seen, " and "),
+                     seen.size() == 1 ? "was" : "were", seen.size() == 1 ? "it" : "these");
 }
 
 std::string head(const CalibrationFacts& facts) {
   const robotics::Measurements& measurements = facts.measurements;
   std::string text = fmt::format("{}: {} of {}\n", facts.data_file, counts_of(measurements), facts.nominal.chain.name);
-  text += verdict(facts);
+  text += verdict(facts) + missing_axes(measurements);
   for (const std::string& warning : measurements.warnings) text += "Note: " + warning + "\n";
   if (!facts.outlier_lines.empty()) {
     text += fmt::format("Left out, more than four times as far off as the median: line{} {}\n",
@@ -198,6 +219,7 @@ std::string details_text(const CalibrationDetails& details) {
 
 std::string calibration_text(const CalibrationFacts& facts) {
   const CalibrationReport& report = facts.report;
+  if (robotics::is_implausible(facts.nominal, report)) return head(facts);  // no value means anything
   std::string text = head(facts) + parameters_text(facts);
   text += "\n" + error_tables(facts.models, report, facts.contiguous, kind_of(facts.measurements));
   text += "nominal: base and tool fitted to the poses, everything else as described.\n";

@@ -6,6 +6,7 @@
 
 #include "llmt/robotics/robot_check.hpp"
 #include "llmt/robotics/robot_file.hpp"
+#include "llmt/robotics/urdf.hpp"
 #include "robot/commands.hpp"
 #include "shared/cli.hpp"
 #include "shared/options.hpp"
@@ -42,11 +43,16 @@ void print_check(const CheckArguments& arguments, const robotics::Robot& robot, 
   print(arguments.same_session ? "The same session: base and tool are those of the calibration.\n\n"
                                : "The instrument was set up anew: base and tool were fitted to these poses "
                                  "(--same-session keeps them).\n\n");
-  print(
-      fmt::format("{} Mean position error {:.4f} mm (95 % {:.4f}, max {:.4f}); stated {:.4f} mm, good up to {:.4f} "
-                  "mm.\n",
-                  check.still_good ? "STILL GOOD." : "NO LONGER GOOD.", check.error.mean, check.error.p95,
-                  check.error.max, check.accuracy_mm, check.limit_mm));
+  print(fmt::format(
+      "{} Mean position error {:.4f} mm (95 % {:.4f}, max {:.4f}); {} {:.4f} mm, good up to {:.4f} "
+      "mm.\n",
+      check.still_good ? "STILL GOOD." : "NO LONGER GOOD.", check.error.mean, check.error.p95, check.error.max,
+      arguments.accuracy_mm > 0.0 ? "stated" : "at calibration", check.accuracy_mm, check.limit_mm));
+  if (check.accuracy_is_of_noise) {
+    print(
+        "The description has no error on poses left out: that figure comes from the poses it was fitted to, and new "
+        "poses are worse. --accuracy-mm says what is good enough.\n");
+  }
   if (check.moved.empty()) {
     print(fmt::format(
         "Nothing moved, of {} parameters and groups of them that were tested. Where nothing moved, {:.3g} % of such "
@@ -129,6 +135,12 @@ RobotCheck checked(const CheckArguments& arguments, const robotics::CorrectedRob
 }
 
 void check_command(const CheckArguments& arguments) {
+  if (robotics::is_urdf(arguments.robot)) {
+    throw std::runtime_error(
+        fmt::format("{}: a URDF does not say how sure its values are; give the description (YAML) that calibrate or "
+                    "discover wrote beside it",
+                    arguments.robot));
+  }
   robotics::CorrectedRobot robot = read_unless_exchanged(
       arguments.robot, arguments.data, "the calibrated description (YAML) comes first, then the measurements (CSV)",
       [](const std::string& path) { return robotics::read_corrected_robot(path); });

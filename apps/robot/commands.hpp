@@ -6,6 +6,7 @@
 #include <string>
 
 #include "llmt/csv.hpp"
+#include "llmt/robotics/correction.hpp"
 #include "llmt/robotics/measurements.hpp"
 #include "llmt/robotics/robot.hpp"
 #include "llmt/robotics/urdf.hpp"
@@ -24,6 +25,13 @@ void check_frames(const std::string& file, const robotics::Robot& robot, const r
 /// measurements were exchanged.
 robotics::Robot read_description(const std::string& robot, const std::string& measured,
                                  const robotics::UrdfLinks& links = {});
+
+/// The arm as it moves, for those who command it: the description and its correction without errors of the instrument
+/// or its session, which are named on standard error. Throws as robotics::read_corrected_robot().
+robotics::CorrectedRobot read_arm(const std::string& path, const robotics::UrdfLinks& links);
+
+/// Says on standard error which columns effects need that were not given.
+void name_made_up(const robotics::Poses& given, const robotics::Poses& completed);
 
 /// --base-link and --tip-link: which part of a URDF is the arm.
 void add_urdf_links(CLI::App& command, robotics::UrdfLinks& links);

@@ -154,32 +154,39 @@ Json summary_json(const CompensateArguments& arguments, const Compensation& foun
   return json;
 }
 
-std::string summary(const CorrectedRobot& robot, const Compensation& found, const std::string& output) {
+// Nobody positions an arm to a nanometre.
+std::string distance_text(double mm) { return mm < 1e-6 ? "less than 0.001 um" : fmt::format("{:.4g} mm", mm); }
+
+// Over the targets that were reached: one that is far off would say nothing of the others.
+std::string mean_distances(const robotics::TargetTable& table, const Compensation& found) {
+  double before = 0.0;
+  double after = 0.0;
+  double count = 0.0;
+  for (std::size_t row = 0; row < found.outcomes.size(); ++row) {
+    if (found.outcomes[row] == Outcome::limit || found.outcomes[row] == Outcome::unreachable) continue;
+    before += found.before_mm(static_cast<Eigen::Index>(row));
+    after += found.after_mm(static_cast<Eigen::Index>(row));
+    count += 1.0;
+  }
+  if (count == 0.0) return "";
+  const std::string start =
+      table.joints.size() == 0 ? "" : fmt::format("{} with the start joints, ", distance_text(before / count));
+  return fmt::format("\nMean distance from the targets within reach, by the model of the arm: {}{} with the commands.",
+                     start, distance_text(after / count));
+}
+
+std::string summary(const CorrectedRobot& robot, const robotics::TargetTable& table, const Compensation& found,
+                    const std::string& output) {
   const auto of = [&](Outcome outcome) { return std::ranges::count(found.outcomes, outcome); };
   const auto uncovered = std::ranges::count_if(found.uncovered, [](const std::string& text) { return !text.empty(); });
   return fmt::format(
       "{}: {} targets, {} reached; {} at jumps of the model, {} at limits, {} unreachable, {} on another branch, {} "
-      "near "
-      "singular poses{}.\nMean distance from the target, by the model of the arm: {:.4g} mm with the start joints, "
-      "{:.4g} "
-      "mm with the commands.{}",
+      "near singular poses{}.{}{}",
       robot.robot.chain.name, found.outcomes.size(), of(Outcome::reached), of(Outcome::jump), of(Outcome::limit),
       of(Outcome::unreachable), of(Outcome::branch), of(Outcome::singular),
       uncovered > 0 ? fmt::format("; {} outside of the joint values that the correction was trained on", uncovered)
                     : "",
-      found.before_mm.mean(), found.after_mm.mean(), output.empty() ? "" : "\nWritten to " + output);
-}
-
-void name_made_up(const robotics::TargetTable& table, const Compensation& found) {
-  std::vector<std::string> names;
-  for (const auto& [name, values] : found.commands.covariates) {
-    if (!table.covariates.contains(name)) names.push_back(name);
-  }
-  if (names.empty()) return;
-  warn(fmt::format(
-      "Columns that effects need and the targets have not: {}. Directions and moves are those of going from "
-      "row to row, everything else is neutral (docs/commands.md)",
-      fmt::join(names, ", ")));
+      mean_distances(table, found), output.empty() ? "" : "\nWritten to " + output);
 }
 
 // Joint values that no arm has: most often degrees in a column of radians.
@@ -209,8 +216,7 @@ void warn_of_units(const CompensateArguments& arguments, const robotics::Chain& 
 }
 
 void compensate_command(const CompensateArguments& arguments) {
-  const CorrectedRobot robot =
-      robotics::read_corrected_robot(arguments.robot, links_for(arguments.robot, arguments.links, {}));
+  const CorrectedRobot robot = read_arm(arguments.robot, links_for(arguments.robot, arguments.links, {}));
   const robotics::TargetTable table = robotics::read_targets(arguments.targets, robot.robot, arguments.mark);
   warn_of_units(arguments, robot.robot.chain, table);
   const robotics::Targets targets = asked(arguments, robot, table);
@@ -218,7 +224,7 @@ void compensate_command(const CompensateArguments& arguments) {
                   robotics::with_needed_columns(robot.robot, robotics::with_approach(robot.robot, targets.start), 1));
   const Compensation found = robotics::compensate(robot, targets, {.tolerance_mm = 1e-3 * arguments.tolerance_um});
   const std::string csv = with_decimal_mark(commands_csv(robot, table, found), arguments.mark);
-  name_made_up(table, found);
+  name_made_up(targets.start, found.commands);
   name_rows(arguments, table, found);
   if (!table.unused_columns.empty()) warn(fmt::format("Columns not used: {}", fmt::join(table.unused_columns, ", ")));
   if (!targets.rotations.empty() && robot.robot.chain.joints.size() < 6) {
@@ -229,13 +235,15 @@ void compensate_command(const CompensateArguments& arguments) {
     print_json(summary_json(arguments, found));
   } else if (arguments.output.empty()) {
     print_bytes(csv);
-    warn(summary(robot, found, ""));
+    warn(summary(robot, table, found, ""));
   } else {
-    print(summary(robot, found, arguments.output) + "\n");
+    print(summary(robot, table, found, arguments.output) + "\n");
   }
   const auto missed = std::ranges::count_if(
       found.outcomes, [](Outcome outcome) { return outcome == Outcome::limit || outcome == Outcome::unreachable; });
-  if (missed > 0) throw std::runtime_error(fmt::format("{}: {} targets cannot be reached", arguments.targets, missed));
+  if (missed > 0)
+    throw std::runtime_error(
+        fmt::format("{}: {} target{} cannot be reached", arguments.targets, missed, missed == 1 ? "" : "s"));
 }
 
 }  // namespace

@@ -113,7 +113,7 @@ void compensate_and_check() {
 void demo_command(const std::string& folder) {
   const std::filesystem::path place(folder);
   if (std::filesystem::exists(place)) {
-    throw std::invalid_argument(fmt::format("--output: {} is there already; -o names another folder", folder));
+    throw std::invalid_argument(fmt::format("the folder {} is there already; -o names another one", folder));
   }
   if (!std::filesystem::create_directory(place)) throw std::runtime_error(folder + ": the folder cannot be made");
   std::filesystem::current_path(place);

@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <iterator>
@@ -120,7 +121,10 @@ void discover_command(DiscoverArguments arguments) {
   arguments.options.progress = {};
   warn_of_misfit(robot, data);  // what cannot be calibrated was refused
   const Json folds = arguments.folds > 0 ? folds_json(robot, data, arguments) : Json(nullptr);
-  if (!arguments.output.empty()) save_corrected(found.improved, arguments.output, {arguments.robot, arguments.links});
+  std::vector<std::string> written;
+  if (!arguments.output.empty()) {
+    written = save_corrected(found.improved, arguments.output, {arguments.robot, arguments.links});
+  }
   const std::vector<NextPoses> next = next_poses(found, data);
   std::string reports;
   if (arguments.reports.wanted()) {
@@ -143,7 +147,8 @@ void discover_command(DiscoverArguments arguments) {
                       arguments.folds, arguments.contiguous ? "contiguous" : "random", folds["before_mm"].get<double>(),
                       folds["after_mm"].get<double>()));
   }
-  if (!arguments.output.empty()) print(fmt::format("Improved description: {}\n", arguments.output));
+  if (!written.empty()) print(fmt::format("Improved description: {}\n", fmt::join(written, ", ")));
+  if (!written.empty() && robotics::is_urdf(arguments.output)) print(beside_urdf(arguments.output));
   print(reports);
 }
 

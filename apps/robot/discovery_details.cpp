@@ -71,8 +71,9 @@ std::string gap_lines(const Discovery& found) {
     return fmt::format("{}", fmt::join(parts, ", "));
   };
   if (!found.gap.acts_like.empty()) {
-    text += fmt::format("  share of the squared error along the motion by one joint alone (by chance 33 %): {}\n",
-                        list(found.gap.acts_like));
+    text += fmt::format(
+        "  share of the squared error in the direction in which one joint moves the tool (33 % by chance): {}\n",
+        list(found.gap.acts_like));
   }
   if (!found.gap.depends_on.empty()) text += fmt::format("  the error depends on: {}\n", list(found.gap.depends_on));
   return text;
@@ -116,8 +117,8 @@ std::string discovery_details(const Discovery& found) {
   std::string text = effect_lines(found) + shape_lines(shapes) + gap_lines(found) + untestable_lines(found);
   if (found.answer == discovery::Answer::nothing_missing) text += visible_lines(found);
   text += fmt::format(
-      "{} causes were tried in {} round{}. What was found raises the score by {:.0f}; in noise alone 997 of 1000 "
-      "searches stay below {:.0f}.\n",
+      "{} causes were tried in {} round{}. What was found raises the score (log-likelihood) by {:.0f}; where there is "
+      "nothing but noise, 997 of 1000 searches stay below {:.0f}.\n",
       found.hypotheses, found.rounds, found.rounds == 1 ? "" : "s", found.score_gain, found.threshold);
   return text;
 }

@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <stdexcept>
@@ -32,6 +33,33 @@ llmt::robotics::Robot llmt::apps::read_description(const std::string& robot, con
                                                    const robotics::UrdfLinks& links) {
   return read_unless_exchanged(robot, measured, "the description (YAML) comes first, then the measurements (CSV)",
                                [&](const std::string& path) { return robotics::read_robot(path, links); });
+}
+
+llmt::robotics::CorrectedRobot llmt::apps::read_arm(const std::string& path, const robotics::UrdfLinks& links) {
+  robotics::CorrectedRobot robot = robotics::read_corrected_robot(path, links);
+  const std::vector<robotics::Effect> all = robot.robot.effects;
+  robot.robot = robotics::without_errors_of_measuring(std::move(robot.robot));
+  std::vector<std::string> titles;
+  for (const robotics::Effect& effect : all) {
+    if (robotics::effect_type(effect.type).of_measuring) titles.push_back(robotics::effect_type(effect.type).title);
+  }
+  if (!titles.empty()) {
+    warn(fmt::format("{}: left out, because they were errors of the measurement and not of the arm: {}", path,
+                     fmt::join(titles, ", ")));
+  }
+  return robot;
+}
+
+void llmt::apps::name_made_up(const robotics::Poses& given, const robotics::Poses& completed) {
+  std::vector<std::string> names;
+  for (const auto& [name, values] : completed.covariates) {
+    if (!given.covariates.contains(name)) names.push_back(name);
+  }
+  if (names.empty()) return;
+  warn(
+      fmt::format("Columns that effects need and the table does not have: {}. Directions and moves are those of going "
+                  "from row to row, everything else is neutral (docs/commands.md)",
+                  fmt::join(names, ", ")));
 }
 
 void llmt::apps::add_urdf_links(CLI::App& command, robotics::UrdfLinks& links) {

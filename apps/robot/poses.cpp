@@ -73,6 +73,7 @@ double rounded(double value, const robotics::Joint& joint) {
 std::string poses_csv(const robotics::Robot& robot, const robotics::Poses& poses) {
   std::vector<std::string> names;
   for (std::size_t j = 0; j < robot.chain.joints.size(); ++j) {
+    if (robot.chain.joints[j].mimic) continue;  // it has no drive
     const bool turns = robot.chain.joints[j].type == robotics::JointType::revolute;
     names.push_back(fmt::format("q{}_{}", j + 1, turns ? "deg" : "mm"));
   }
@@ -84,6 +85,7 @@ std::string poses_csv(const robotics::Robot& robot, const robotics::Poses& poses
     std::vector<std::string> cells;
     for (std::size_t j = 0; j < robot.chain.joints.size(); ++j) {
       const robotics::Joint& joint = robot.chain.joints[j];
+      if (joint.mimic) continue;
       cells.push_back(fmt::format("{:.12g}", rounded(poses.joints(i, j) * robotics::to_limit_unit(joint), joint)));
     }
     for (const auto& [name, values] : poses.covariates) {
@@ -110,7 +112,7 @@ std::string use_words(const PosesArguments& arguments) {
                                : "over random poses within limits and box";
 }
 
-std::string expectations(const PoseSelection& selection) {
+std::string expectations(const PoseSelection& selection, bool with_indices) {
   const robotics::Observability& chosen = selection.chosen.observability;
   const robotics::Observability& random = selection.random.observability;
   Table table({"expected after calibration", "chosen", "random"});
@@ -118,6 +120,7 @@ std::string expectations(const PoseSelection& selection) {
     table.add({name, number(with_chosen, 4), number(with_random, 4)});
   };
   add("error of the tool position, mm", selection.chosen.position_mm, selection.random.position_mm);
+  if (!with_indices) return table.text();
   add("O1", chosen.o1, random.o1);
   add("O2", chosen.o2, random.o2);
   add("O3", chosen.o3, random.o3);
@@ -144,7 +147,7 @@ void print_selection(const PosesArguments& arguments, const robotics::Robot& rob
   print(fmt::format("{}: {} poses chosen{} to identify {} parameters; criterion: {}\n\n", robot.chain.name,
                     selection.poses.count(), with, selection.chosen.parameters.size(),
                     arguments.criterion == criteria[0] ? "error of the tool position" : arguments.criterion));
-  print(expectations(selection));
+  print(expectations(selection, arguments.criterion != criteria[0]));
   print(fmt::format(
       "Error of the tool position: root mean square {}, for noise of {} um in each coordinate; the noise "
       "alone, no error of the model. {} get below {} mm. Random: the median of 25 draws.\n"

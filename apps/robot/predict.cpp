@@ -4,9 +4,11 @@
 #include <memory>
 
 #include "llmt/files.hpp"
+#include "llmt/robotics/compensation.hpp"
 #include "llmt/robotics/correction.hpp"
 #include "llmt/robotics/measurements.hpp"
 #include "llmt/robotics/orientation.hpp"
+#include "llmt/robotics/simulation.hpp"
 #include "robot/commands.hpp"
 #include "shared/cli.hpp"
 #include "shared/options.hpp"
@@ -19,13 +21,18 @@ struct PredictArguments {
   robotics::UrdfLinks links;
   std::string poses;
   std::string output;
+  bool as_measured = false;
   DecimalMark mark = DecimalMark::point;
 };
 
 void predict_command(const PredictArguments& arguments) {
-  const robotics::CorrectedRobot robot = robotics::read_corrected_robot(arguments.robot, arguments.links);
+  const robotics::CorrectedRobot robot = arguments.as_measured
+                                             ? robotics::read_corrected_robot(arguments.robot, arguments.links)
+                                             : read_arm(arguments.robot, arguments.links);
   robotics::Measurements predicted;
-  predicted.poses = robotics::read_poses(arguments.poses, robot.robot, arguments.mark);
+  const robotics::Poses given = robotics::read_poses(arguments.poses, robot.robot, arguments.mark);
+  predicted.poses = robotics::with_needed_columns(robot.robot, robotics::with_approach(robot.robot, given), 1);
+  name_made_up(given, predicted.poses);
   check_positions(arguments.robot, robot.robot, predicted.poses);
   const std::vector<robotics::Pose> tools = robotics::tool_poses(robot, predicted.poses);
   predicted.positions_mm.resize(std::ssize(tools), 3);
@@ -61,6 +68,9 @@ void add_predict(CLI::App& app) {
   add_urdf_links(*command, arguments->links);
   add_input_file(*command, "poses", arguments->poses, "CSV file with joint values and the covariates of the effects")
       ->required();
+  command->add_flag("--as-measured", arguments->as_measured,
+                    "Keep errors of the instrument and its session, such as a drift: what would be read, not where "
+                    "the tool is");
   add_decimal_comma(*command, arguments->mark);
   add_output_file(*command, "-o,--output", arguments->output, "CSV file to write (default: standard output)");
   command->callback([arguments] { predict_command(*arguments); });

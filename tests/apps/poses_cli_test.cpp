@@ -59,7 +59,7 @@ TEST(PosesProgram, RefusesWhatCannotBe) {
     EXPECT_EQ(run.exit_code, exit_code) << arguments;
     EXPECT_NE(run.err.find(what), std::string::npos) << arguments << "\n" << run.err;
   };
-  says("--count 5", 2, "27 parameters need 9 poses");
+  says("--count 5", 2, "27 parameters need at least 9 poses");
   says("--box 1,2,3", 2, "--box: 3 numbers, must be 6");
   says("--tool 1", 2, "--tool: 1 numbers, must be 3");
   says("--box 5000,5100,0,100,0,100", 1, "no pose within the joint limits brings the tool into the box");

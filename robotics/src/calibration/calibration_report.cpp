@@ -1,12 +1,14 @@
 #include "llmt/robotics/calibration_report.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
 #include "calibration/likely_mistake.hpp"
+#include "calibration/median.hpp"
 #include "calibration/paired_gain.hpp"
 
 namespace llmt::robotics {
@@ -208,6 +210,34 @@ std::vector<std::string> suspicions(const Robot& robot, const Measurements& meas
     if (!units.empty()) found.push_back(units);
   }
   return found;
+}
+
+std::string far_readings(const Measurements& measurements, const CalibrationReport& report) {
+  const bool is_held_out = report.geometric.held_out_mm.size() > 0;
+  const Eigen::VectorXd& errors = is_held_out ? report.geometric.held_out_mm : report.geometric.in_sample_mm;
+  constexpr Eigen::Index fewest = 10;
+  if (errors.size() < fewest) return "";
+  constexpr double far = 8.0;    // times the median
+  constexpr double much = 0.25;  // of the squares
+  constexpr double few = 0.05;   // of the readings
+  constexpr std::size_t most_lines = 10;
+  const double limit = far * median_of(errors);
+  const std::vector<Eigen::Index> rows = position_rows(measurements.poses);
+  std::vector<Eigen::Index> lines;
+  double squares = 0.0;
+  for (Eigen::Index k = 0; k < errors.size(); ++k) {
+    if (errors(k) <= limit) continue;
+    squares += errors(k) * errors(k);
+    lines.push_back(measurements.lines.empty() ? rows[k] + 1 : measurements.lines[rows[k]]);
+  }
+  const bool is_few = static_cast<double>(lines.size()) <= few * static_cast<double>(errors.size());
+  if (lines.empty() || !is_few || squares < much * errors.squaredNorm()) return "";
+  const std::size_t shown = std::min(most_lines, lines.size());
+  return fmt::format("{} of {} readings lie far off and make {:.0f} % of the squared error ({}{} {}{})", lines.size(),
+                     errors.size(), 100.0 * squares / errors.squaredNorm(), measurements.lines.empty() ? "row" : "line",
+                     lines.size() == 1 ? "" : "s",
+                     fmt::join(lines.begin(), lines.begin() + static_cast<std::ptrdiff_t>(shown), ", "),
+                     shown < lines.size() ? ", ..." : "");
 }
 
 CalibrationReport report_calibration(const Robot& robot, const Measurements& measurements,

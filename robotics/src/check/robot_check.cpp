@@ -58,6 +58,7 @@ void set_limit(const Robot& robot, const Measurements& measurements, const Check
       robot.calibration.has_value(),
       "the description does not say how accurate it was: accuracy_mm is needed, or a calibration of today's format");
   const CalibrationRecord& record = *robot.calibration;
+  result.accuracy_is_of_noise = !record.held_out_mm;
   result.accuracy_mm = record.held_out_mm.value_or(mean_distance(record.noise_mm, measurements));
   constexpr double share_of_mean = 0.422;  // standard deviation of a normal vector's length over its mean
   const double spread = record.held_out_sd_mm.value_or(share_of_mean * result.accuracy_mm);

@@ -87,6 +87,17 @@ void withdraw_what_is_worse(const Measurements& searched, const Measurements& te
   result.held_out.after = result.held_out.before;
 }
 
+// For a later check of the robot.
+void remember_error(const Measurements& searched, const Measurements& test, Discovery& result) {
+  std::optional<CalibrationRecord>& record = result.improved.robot.calibration;
+  if (test.count() < 2 || !record || test.measured != searched.measured) return;
+  const Eigen::VectorXd all = distances(positions(result.improved, test.poses), test);
+  const Eigen::VectorXd errors = all(position_rows(test.poses));
+  record->held_out_mm = errors.mean();
+  record->held_out_sd_mm = std::sqrt((errors.array() - errors.mean()).square().sum() /
+                                     static_cast<double>(std::max<Eigen::Index>(1, errors.size() - 1)));
+}
+
 void verify(const Measurements& searched, const Measurements& test, Eigen::Index components, Discovery& result) {
   result.fitted_before = figures({result.before, {}}, searched);
   result.fitted_after = figures(result.improved, searched);
@@ -103,6 +114,7 @@ void verify(const Measurements& searched, const Measurements& test, Eigen::Index
     report_far_poses(result.improved, common, result);
   }
   withdraw_what_is_worse(searched, test, result);
+  remember_error(searched, test, result);
   result.held_out.floor_from_repeats = result.lack_of_fit.has_enough_repeats();
   const double noise_mm = result.held_out.floor_from_repeats ? result.lack_of_fit.noise : result.noise_mm;
   result.held_out.floor_mm = mean_distance(noise_mm, components);
@@ -110,13 +122,14 @@ void verify(const Measurements& searched, const Measurements& test, Eigen::Index
 
 // Throws if calibration leaves too few degrees of freedom for a search.
 void check_freedom(const Measurements& samples, const Calibration& baseline) {
-  const Eigen::Index coordinates = samples.count() * std::ranges::count(samples.measured, true);
+  const Eigen::Index axes = std::ranges::count(samples.measured, true);
+  const Eigen::Index coordinates = samples.count() * axes;
   const Eigen::Index needed = baseline.result.rank + std::max<Eigen::Index>(10, baseline.result.rank / 2);
   if (coordinates < needed) {
-    throw std::runtime_error(
-        fmt::format("{} poses to search give {} coordinates, of which calibration takes {}: at least {} are needed to "
-                    "tell anything",
-                    samples.count(), coordinates, baseline.result.rank, needed));
+    throw std::runtime_error(fmt::format(
+        "{} poses to search give {} coordinates, and calibration takes {} of them: at least {} coordinates, "
+        "{} poses, are needed to tell anything",
+        samples.count(), coordinates, baseline.result.rank, needed, (needed + axes - 1) / axes));
   }
 }
 

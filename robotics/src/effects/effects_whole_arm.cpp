@@ -116,6 +116,7 @@ std::vector<EffectType> session_effects() {
        .constants = session,
        .columns = {"time_s|order"},
        .apply = apply_drift,
+       .of_measuring = true,
        .refusal = session_refusal},
       {.name = "drift_curved",
        .family = "drift",
@@ -126,6 +127,7 @@ std::vector<EffectType> session_effects() {
        .constants = session,
        .columns = {"time_s|order"},
        .apply = apply_drift_curved,
+       .of_measuring = true,
        .refusal = session_refusal},
       {.name = "drift_settling",
        .family = "drift",
@@ -136,6 +138,7 @@ std::vector<EffectType> session_effects() {
        .constants = settling,
        .columns = {"time_s|order"},
        .apply = apply_drift_settling,
+       .of_measuring = true,
        .refusal =
            [](const Chain& chain, std::size_t index, Values constants) {
              if (!(constants[2] > 0.0)) return "settles_in is " + std::to_string(constants[2]) + ", must be > 0";
@@ -154,7 +157,8 @@ std::vector<EffectType> session_effects() {
                       {.name = "rz", .unit = "rad", .key = "rz_rad"}},
        .constants = {{.name = "at", .key = "after", .usual = 0.0}},
        .columns = {"order|time_s"},
-       .apply = apply_tracker_knock},
+       .apply = apply_tracker_knock,
+       .of_measuring = true},
   };
 }
 

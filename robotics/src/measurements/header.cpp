@@ -321,8 +321,12 @@ std::vector<std::string> Header::hints() const {
     hints.push_back(fmt::format("{}: {}", csv_.name(), lack));
   }
   for (const auto& [name, column] : seen) {
+    const char last = column.back();
+    const bool is_sigma = name.starts_with("sigma");
+    const bool has_axis = last == 'x' || last == 'y' || last == 'z';
+    const std::string own = !is_sigma ? name : has_axis ? fmt::format("sigma_{}_mm", last) : "sigma_mm";
     hints.push_back(fmt::format("{}: column \"{}\" is not used; if it is what it looks like, name it {}", csv_.name(),
-                                column, name));
+                                column, own));
   }
   return hints;
 }

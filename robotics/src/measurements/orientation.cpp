@@ -51,9 +51,9 @@ std::vector<Eigen::Matrix3d> rotations_of(const Orientation& orientation, const 
   const bool angles = orientation.kind == Orientation::Kind::angles_deg;
   if (angles && !is_orientation(convention)) {
     throw std::invalid_argument(
-        fmt::format("llmt::robotics::rotations_of: orientation is \"{}\" in the robot description; rx, ry, rz need "
-                    "intrinsic_xyz, extrinsic_xyz or another order of the axes there or in a column map",
-                    convention));
+        fmt::format("llmt::robotics::rotations_of: rx, ry, rz have {}: write orientation: intrinsic_xyz, extrinsic_xyz "
+                    "or another order of the axes into the description of the robot or into a column map",
+                    convention.empty() ? "no convention" : fmt::format("an unknown convention, \"{}\"", convention)));
   }
   std::vector<Eigen::Matrix3d> rotations;
   for (Eigen::Index row = 0; row < orientation.values.rows(); ++row) {

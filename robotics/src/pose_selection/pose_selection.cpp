@@ -100,9 +100,11 @@ Task make_task(const Robot& robot, const PosePlan& plan, const Poses& pool, cons
   const Eigen::Index parameters = used.cols();
   const Eigen::Index needed = (parameters + 2) / 3;
   const Eigen::Index there = options.count + plan.measured.count();
-  require(there >= needed, fmt::format("count is {}: {} parameters need {} poses at least, and {} measured positions "
-                                       "are better than as many as parameters",
-                                       options.count, parameters, needed, 2 * needed));
+  require(
+      there >= needed,
+      fmt::format("count is {}: {} parameters need at least {} poses of three coordinates each; take {} or more, so "
+                  "that there are twice as many coordinates as parameters",
+                  options.count, parameters, needed, 2 * needed));
   return task;
 }
 

@@ -107,6 +107,15 @@ Robot with_values(Robot robot, const Eigen::VectorXd& values) {
   return robot;
 }
 
+Robot without_errors_of_measuring(Robot robot) {
+  const auto is_of_measuring = [](const Effect& effect) { return effect_type(effect.type).of_measuring; };
+  if (std::ranges::none_of(robot.effects, is_of_measuring)) return robot;
+  std::erase_if(robot.effects, is_of_measuring);
+  robot.identified.clear();
+  robot.calibration.reset();
+  return robot;
+}
+
 std::vector<IdentifiedParameter> uncertain_parameters(const Robot& robot) {
   constexpr double most_mm = 0.5;
   constexpr double most_deg = 0.1;

@@ -15,7 +15,8 @@ namespace {
 
 // A palletizer: rods keep the forearm's angle apart from the upper arm's, and the flange level.
 const std::string palletizer = R"(<robot name="palletizer">
-<link name="base"/><link name="l1"/><link name="l2"/><link name="l3"/><link name="l4"/><link name="l5"/><link name="tip"/>
+<link name="base"/><link name="l1"/><link name="l2"/><link name="l3"/><link name="l4"/><link name="l5"/>
+<link name="tip"/>
 <joint name="turn" type="revolute"><parent link="base"/><child link="l1"/><origin xyz="0 0 0.8"/><axis xyz="0 0 1"/>
   <limit lower="-3" upper="3" effort="1" velocity="1"/></joint>
 <joint name="upper" type="revolute"><parent link="l1"/><child link="l2"/><origin xyz="0.3 0 0"/><axis xyz="0 1 0"/>

@@ -78,6 +78,11 @@ struct CalibrationReport {
 std::vector<std::string> suspicions(const Robot& robot, const Measurements& measurements,
                                     const CalibrationReport& report);
 
+/// Names the readings, at most a twentieth of all, that lie more than eight times as far off as the median and make a
+/// quarter of the squared error or more, by their lines; empty if there are none. calibrate_robustly() leaves such
+/// readings out.
+std::string far_readings(const Measurements& measurements, const CalibrationReport& report);
+
 /// Whether the calibrated robot still misses half of the measured points by more than a fiftieth of the nominal arm's
 /// length: the identified values mean nothing then.
 bool is_implausible(const Robot& nominal, const CalibrationReport& report);

@@ -93,12 +93,13 @@ struct EffectType {
       apply = {};
   /// Changes what the effects are evaluated with (payload, gravity) before loads are summed and anything is applied.
   std::function<void(PoseContext&, std::span<const double> values)> adjust = {};
-  bool weighted = false;  ///< values are inversely proportional to the masses and share their relative uncertainty
-  bool elastic = false;   ///< deforms under the arm's weight: the loads are those of the deformed arm
-  bool linear = true;     ///< `apply` is linear in the values; if not, derivatives are taken by differences
-  bool prismatic = true;  ///< may sit at a prismatic joint
-  bool searched = true;   ///< discovery looks for it; false for reductions that are kept for comparison
-  std::string note = {};  ///< where the plausible range is from
+  bool weighted = false;      ///< values are inversely proportional to the masses and share their relative uncertainty
+  bool elastic = false;       ///< deforms under the arm's weight: the loads are those of the deformed arm
+  bool linear = true;         ///< `apply` is linear in the values; if not, derivatives are taken by differences
+  bool prismatic = true;      ///< may sit at a prismatic joint
+  bool of_measuring = false;  ///< an error of the instrument or its session, not of the arm
+  bool searched = true;       ///< discovery looks for it; false for reductions that are kept for comparison
+  std::string note = {};      ///< where the plausible range is from
   /// For a list parameter: number of values of an effect at `index`; empty function or 0: any number.
   std::function<std::size_t(const Chain&, std::size_t index)> count = {};
   /// Why an effect is refused that has the right numbers of values and constants, or nothing.

@@ -32,6 +32,10 @@ std::vector<discovery::Parameter> parameters(const Robot& robot);
 /// The robot with those values, in the order of parameters().
 Robot with_values(Robot robot, const Eigen::VectorXd& values);
 
+/// The robot without effects that are errors of the instrument or its session (EffectType::of_measuring), such as a
+/// drift: what the arm does by itself. What was identified is forgotten with them.
+Robot without_errors_of_measuring(Robot robot);
+
 /// The identified lengths and angles with a standard error above 0.5 mm or 0.1 degrees. The measured poses do not
 /// determine each of these alone: other values, changed together, give the same positions there. Empty before
 /// calibration.

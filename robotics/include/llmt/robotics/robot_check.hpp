@@ -42,8 +42,9 @@ struct Moved {
 struct RobotCheck {
   ErrorFigures error;         ///< mm, over the new poses; base and tool fitted to them unless it is the same session
   Eigen::VectorXd errors_mm;  ///< n distances
-  double accuracy_mm = 0.0;   ///< mean error that was stated, or that calibration had on poses left out
-  double limit_mm = 0.0;      ///< mean error from which on the robot is no longer good
+  bool accuracy_is_of_noise = false;  ///< no error on poses left out was stored: from the noise of the poses fitted
+  double accuracy_mm = 0.0;           ///< mean error that was stated, or that calibration had on poses left out
+  double limit_mm = 0.0;              ///< mean error from which on the robot is no longer good
   bool still_good = false;
   std::vector<Moved> moved;      ///< in the order in which they were found
   double refitted_mm = 0.0;      ///< mean error if what moved were identified anew
