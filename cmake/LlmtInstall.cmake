@@ -48,6 +48,10 @@ install(
 # are relative to itself: the prefix is known only when it is installed.
 file(RELATIVE_PATH pc_to_prefix "/${CMAKE_INSTALL_LIBDIR}/pkgconfig" "/")
 function(llmt_pkg_config component pc_name pc_description pc_requires pc_requires_private)
+  # Shared libraries name what they need themselves; pkg-config would ask for its development files.
+  if(BUILD_SHARED_LIBS)
+    set(pc_requires_private "")
+  endif()
   configure_file("${PROJECT_SOURCE_DIR}/cmake/llmt.pc.in" "${PROJECT_BINARY_DIR}/${pc_name}.pc" @ONLY)
   install(
     FILES "${PROJECT_BINARY_DIR}/${pc_name}.pc"
