@@ -108,6 +108,7 @@ Json report_json(const DiscoveryReport& report) {
           {"gap", gap_json(missing)},
           {"regions", regions},
           {"outliers", missing.outliers},
+          {"outlier_lines", report.outlier_lines},
           {"notes", missing.notes},
           {"not_testable", untestable},
           {"smallest_visible", visible},
