@@ -127,7 +127,7 @@ void warn_of_spoilt_rows(const LearningArguments& arguments, const LearningTable
         "or use --loss tukey, which leaves such rows out",
         spoilt.rows.size(), spoilt.held_out, one ? "carries" : "carry", 100.0 * spoilt.share,
         arguments.targets[static_cast<std::size_t>(o)], one ? "line" : "lines", places,
-        spoilt.rows.size() > most_lines_named ? ", ..." : "",
+        spoilt.rows.size() > most_lines_named ? " and more" : "",
         one ? "this target is a mistake" : "these targets are mistakes", one ? "it" : "them"));
   }
 }
