@@ -85,7 +85,7 @@ std::string write_fit_reports(const FitArguments& arguments, const LearningTable
     shown = fit_readable(table.inputs.values, table.outputs, table.options, result.summary);
     shown->model = shown->model.named(table.names, arguments.learning.targets, table.inputs.levels);
   }
-  const std::vector<Eigen::Index> left_out = rows_left_out(result.summary);
+  const std::vector<Eigen::Index> left_out = rows_left_out(result.summary, table.options.weights);
   const auto report_on = [&](const Eigen::MatrixXd& inputs, const Eigen::MatrixXd& outputs, const FitOptions& options) {
     const auto count = std::ssize(left_out);
     return write_reports(arguments.reports,
@@ -125,7 +125,7 @@ void fit_command(FitArguments arguments) {
   std::optional<ReadableResult> readable;
   if (!arguments.readable.empty()) readable = make_readable(arguments, table, result.summary, loss);
   const std::string reports = write_fit_reports(arguments, table, result, readable);
-  const FitRun run{arguments.learning, table.lines, arguments.output};
+  const FitRun run{arguments.learning, table, arguments.output};
   if (arguments.json) {
     Json summary = summary_json(run, result);
     if (readable) summary["readable"] = readable_json(*readable);

@@ -44,7 +44,7 @@ Json summary_json(const FitRun& run, const FitResult& result) {
   json["rule"] = name_of(run.learning.options.rule);
   json["min_leaf_samples"] = result.summary.min_leaf_samples;
   if (run.learning.options.loss == Loss::tukey) {
-    const std::vector<Eigen::Index> rows = rows_left_out(result.summary);
+    const std::vector<Eigen::Index> rows = rows_left_out(result.summary, run.table.options.weights);
     json["rows_left_out"] = counted_from_one(rows);
     json["lines_left_out"] = lines_of(run, rows);
   }

@@ -150,10 +150,11 @@ void print_data(const FitRun& run, const FitResult& result) {
     print(fmt::format("Missing values in the inputs: {}\n", result.summary.missing_values));
   }
   if (run.learning.options.loss == Loss::tukey) {
-    const std::vector<Eigen::Index> rows = rows_left_out(result.summary);
+    const std::vector<Eigen::Index> rows = rows_left_out(result.summary, run.table.options.weights);
     std::vector<Eigen::Index> lines = lines_of(run, rows);
     lines.resize(std::min<std::size_t>(lines.size(), 10));
-    print(fmt::format("Rows left out by the Tukey loss: {} of {}{}\n", rows.size(), result.summary.loss_weights.size(),
+    print(fmt::format("Rows left out by the Tukey loss: {} of {}{}\n", rows.size(),
+                      result.summary.samples + std::ssize(rows),
                       rows.empty() ? ""
                                    : fmt::format(" ({} {}{}); the errors below are those of the other rows",
                                                  rows.size() == 1 ? "line" : "lines", fmt::join(lines, ", "),
@@ -185,10 +186,10 @@ Table models_table(const FitResult& result) {
 
 }  // namespace
 
-std::vector<Eigen::Index> rows_left_out(const FitSummary& summary) {
+std::vector<Eigen::Index> rows_left_out(const FitSummary& summary, const Eigen::VectorXd& weights) {
   std::vector<Eigen::Index> rows;
   for (Eigen::Index row = 0; row < summary.loss_weights.size(); ++row) {
-    if (summary.loss_weights(row) == 0.0) rows.push_back(row);
+    if (summary.loss_weights(row) == 0.0 && (weights.size() == 0 || weights(row) > 0.0)) rows.push_back(row);
   }
   return rows;
 }
@@ -201,7 +202,7 @@ std::vector<std::string> names_of(const Model& model, const std::vector<int>& in
 
 std::vector<Eigen::Index> lines_of(const FitRun& run, const std::vector<Eigen::Index>& rows) {
   std::vector<Eigen::Index> lines;
-  for (const Eigen::Index row : rows) lines.push_back(run.lines[row]);
+  for (const Eigen::Index row : rows) lines.push_back(run.table.lines[row]);
   return lines;
 }
 

@@ -14,12 +14,12 @@ namespace llmt::apps {
 /// What was fitted: its arguments, the rows, and the file it went to; empty: none.
 struct FitRun {
   const LearningArguments& learning;
-  const std::vector<Eigen::Index>& lines;  ///< of the rows, in the file
+  const LearningTable& table;
   const std::string& output;
 };
 
-/// The rows of weight 0 by Loss::tukey, ascending.
-std::vector<Eigen::Index> rows_left_out(const FitSummary& summary);
+/// The rows that Loss::tukey left out, ascending; none of those whose weight was 0 anyway. `weights`: empty: all 1.
+std::vector<Eigen::Index> rows_left_out(const FitSummary& summary, const Eigen::VectorXd& weights);
 
 /// Names of inputs.
 std::vector<std::string> names_of(const Model& model, const std::vector<int>& inputs);

@@ -79,6 +79,21 @@ TEST(WrongTargets, LinesAreThoseOfTheFile) {
   EXPECT_NE(warning.find("line 54 ("), std::string::npos) << warning;
 }
 
+TEST(WrongTargets, RowsOfWeightZeroAreNotCountedAsLeftOut) {
+  const Folder folder;
+  llmt::Random random(5);
+  std::string text = "x,w,y\n";
+  for (int row = 0; row < 300; ++row) {
+    const double x = random.uniform(-1.0, 1.0);
+    text += fmt::format("{},{},{}\n", x, row % 3, 2.0 * x + normal(random) + (row % 150 == 100 ? 50.0 : 0.0));
+  }
+  folder.write("d.csv", text);
+  const Outcome outcome = folder.run(llmt_program + " fit d.csv -t y --weight w --loss tukey");
+  EXPECT_NE(outcome.out.find("Rows left out by the Tukey loss: 2 of 200 (lines 102, 252); the errors"),
+            std::string::npos)
+      << outcome.out;
+}
+
 TEST(WrongTargets, HonestTailsAreNotAccused) {
   const Folder folder;
   const std::map<std::string, Noise> noises = {{"normal", normal}, {"student", student}, {"lognormal", lognormal}};
