@@ -104,6 +104,25 @@ TEST(WrongTargets, HonestTailsAreNotAccused) {
   }
 }
 
+TEST(WrongTargets, AReadableTreeThatIsNotNearEnoughSaysHowFarItIs) {
+  const Folder folder;
+  int far = 0;
+  for (const std::uint64_t seed : {1, 2, 3, 4, 5, 6}) {
+    folder.write("d.csv", table(150, seed, normal, {{52, 40.0}}));
+    const Outcome fitted = folder.run(llmt_program + " fit d.csv -t y --readable=1 --cv 3");
+    ASSERT_EQ(fitted.exit_code, 0) << fitted.err;
+    const bool is_far = fitted.out.find("\nNo short tree came within 1 % of ") != std::string::npos;
+    const bool is_near =
+        fitted.out.find("\nThe readable tree is the smallest one whose held-out RMSE is at most 1 % ") !=
+        std::string::npos;
+    EXPECT_NE(is_far, is_near) << fitted.out;
+    EXPECT_EQ(is_far, fitted.out.find(" % above.\n") != std::string::npos) << fitted.out;
+    far += is_far ? 1 : 0;
+  }
+  EXPECT_GT(far, 0);
+  EXPECT_LT(far, 6);
+}
+
 // Where there is no noise, the rows beside jumps and bends carry all of the error; the model follows them.
 TEST(WrongTargets, RowsBesideAJumpAreNotAccused) {
   const Folder folder;
