@@ -72,8 +72,8 @@ void compare_command(CompareArguments arguments) {
                     table_name(arguments.learning.data), table.inputs.values.rows(), table.names.size(),
                     arguments.learning.targets.front(), result.methods.front().fold_rmse.size(),
                     arguments.learning.contiguous ? " of contiguous rows" : ""));
-  Table text(
-      {"method", "leaves", "parameters", "RMSE held-out", "+-", "largest jump", "fit, s", "predict 1e6 rows, s"});
+  Table text({"method", "leaves", "parameters", "RMSE held-out", "spread of folds", "largest jump", "fit, s",
+              "predict 1e6 rows, s"});
   for (const Comparison& method : result.methods) {
     text.add({method.method, fmt::format("{}", method.leaves), fmt::format("{}", method.parameters),
               number(method.cv_rmse), number(method.spread, 2), number(method.largest_jump, 3),

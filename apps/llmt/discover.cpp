@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <numeric>
 #include <ranges>
 #include <stdexcept>
 
@@ -41,12 +42,27 @@ struct Comparison {
   discovery::Inputs inputs;  // with the order, if that is a column of its own
   Eigen::MatrixXd simulated;
   discovery::MeasuredOutputs measured;
+  std::vector<Eigen::Index> lines;  // of the rows, in the file measured
 };
 
+// `every_column`: the inputs were not named.
+Eigen::MatrixXd read_named_inputs(const Csv& csv, const std::vector<std::string>& names, bool every_column) {
+  try {
+    return csv.numbers(names);
+  } catch (const DecimalCommaError&) {
+    throw;
+  } catch (const std::runtime_error& error) {
+    if (!every_column) throw;
+    throw std::runtime_error(
+        fmt::format("{} (--inputs COLUMN,... names the columns to use, and leaves out the others)", error.what()));
+  }
+}
+
 // The inputs, which both files must have alike.
-Eigen::MatrixXd read_same_inputs(const Csv& simulated, const Csv& measured, const std::vector<std::string>& names) {
-  const Eigen::MatrixXd one = simulated.numbers(names);
-  Eigen::MatrixXd other = measured.numbers(names);
+Eigen::MatrixXd read_same_inputs(const Csv& simulated, const Csv& measured, const std::vector<std::string>& names,
+                                 bool every_column) {
+  const Eigen::MatrixXd one = read_named_inputs(simulated, names, every_column);
+  Eigen::MatrixXd other = read_named_inputs(measured, names, every_column);
   for (Eigen::Index i = 0; i < one.rows(); ++i) {
     for (Eigen::Index j = 0; j < one.cols(); ++j) {
       // Files are written with a limited number of digits.
@@ -78,7 +94,8 @@ void check_names(const DiscoverArguments& arguments) {
   }
 }
 
-Comparison read_comparison(const DiscoverArguments& arguments) {
+// `every_column`: the inputs were not named.
+Comparison read_comparison(const DiscoverArguments& arguments, bool every_column) {
   const Csv simulated = Csv::read(arguments.simulated, arguments.mark);
   const Csv measured = Csv::read(arguments.measured, arguments.mark);
   for (const Csv* csv : {&simulated, &measured}) {
@@ -92,7 +109,10 @@ Comparison read_comparison(const DiscoverArguments& arguments) {
     throw std::runtime_error(
         fmt::format("{} has {} rows, {} has {}", simulated.name(), simulated.rows(), measured.name(), measured.rows()));
   }
-  comparison.inputs.values = read_same_inputs(simulated, measured, arguments.inputs);
+  comparison.inputs.values = read_same_inputs(simulated, measured, arguments.inputs, every_column);
+  std::vector<Eigen::Index> rows(measured.rows());
+  std::iota(rows.begin(), rows.end(), Eigen::Index{0});
+  comparison.lines = measured.lines_of(rows);
   comparison.inputs.order = arguments.order;
   if (!arguments.order.empty() && std::ranges::find(arguments.inputs, arguments.order) == arguments.inputs.end()) {
     const Csv& holder = measured.has(arguments.order) ? measured : simulated;
@@ -152,6 +172,7 @@ DiscoveryReport discovered(const DiscoverArguments& arguments, const Comparison&
                          .seed = arguments.options.seed,
                          .rows = comparison.simulated.rows(),
                          .missing = {},
+                         .outlier_lines = {},
                          .regions = {}};
   std::vector<discovery::UntestableCause> untestable;
   try {
@@ -165,6 +186,7 @@ DiscoveryReport discovered(const DiscoverArguments& arguments, const Comparison&
     throw std::runtime_error(fmt::format("{}: {}", arguments.measured, error.what()));
   }
   for (discovery::UntestableCause& entry : untestable) report.missing.not_testable.push_back(std::move(entry));
+  for (const Eigen::Index row : report.missing.outliers) report.outlier_lines.push_back(comparison.lines[row]);
   report.regions = gap_regions(comparison.inputs, comparison.measured, report.missing);
   return report;
 }
@@ -195,7 +217,8 @@ void sort_outputs(const CLI::App& command, DiscoverArguments& arguments) {
 
 void discover_command(const CLI::App& command, DiscoverArguments arguments) {
   sort_outputs(command, arguments);
-  if (arguments.inputs.empty()) {
+  const bool named = !arguments.inputs.empty();
+  if (!named) {
     const Csv simulated = Csv::read(arguments.simulated, arguments.mark);
     for (const std::string& name : simulated.columns()) {
       const bool is_output = std::ranges::find(arguments.outputs, name) != arguments.outputs.end();
@@ -203,7 +226,7 @@ void discover_command(const CLI::App& command, DiscoverArguments arguments) {
     }
   }
   check_names(arguments);
-  const Comparison comparison = read_comparison(arguments);
+  const Comparison comparison = read_comparison(arguments, !named);
   const DiscoveryReport report = discovered(arguments, comparison);
   if (!arguments.corrected.empty()) write_corrected(arguments.corrected, comparison, report.missing);
   std::string reports;

@@ -100,21 +100,23 @@ Json report_json(const DiscoveryReport& report) {
     visible.push_back(
         {{"effect", term.what}, {"amplitude", number_or_null(term.coefficient)}, {"rms", number_or_null(term.rms)}});
   }
-  return {{"verdict", discovery::to_string(missing.answer)},
-          {"effects", effects_json(missing)},
-          {"unknown", unknown.empty() ? Json(nullptr) : unknown[0]},
-          {"unknown_all", unknown},
-          {"simulation", parameters_json(missing)},
-          {"gap", gap_json(missing)},
-          {"regions", regions},
-          {"outliers", missing.outliers},
-          {"notes", missing.notes},
-          {"not_testable", untestable},
-          {"smallest_visible", visible},
-          {"score_gain", missing.verdict.score_gain},
-          {"chance_threshold", missing.verdict.threshold},
-          {"hypotheses", missing.candidates.size()},
-          {"rounds", missing.rounds}};
+  Json json = {{"verdict", discovery::to_string(missing.answer)},
+               {"effects", effects_json(missing)},
+               {"unknown", unknown.empty() ? Json(nullptr) : unknown[0]},
+               {"unknown_all", unknown},
+               {"simulation", parameters_json(missing)},
+               {"gap", gap_json(missing)},
+               {"regions", regions},
+               {"outliers", missing.outliers},
+               {"notes", missing.notes},
+               {"not_testable", untestable},
+               {"smallest_visible", visible},
+               {"score_gain", missing.verdict.score_gain},
+               {"chance_threshold", missing.verdict.threshold},
+               {"hypotheses", missing.candidates.size()},
+               {"rounds", missing.rounds}};
+  if (!missing.outliers.empty()) json["outlier_lines"] = report.outlier_lines;
+  return json;
 }
 
 }  // namespace llmt::apps

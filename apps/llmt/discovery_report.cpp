@@ -122,9 +122,9 @@ void print_report(const DiscoveryReport& report) {
   print_gaps(report);
   print_regions(report);
   if (!missing.outliers.empty()) {
-    std::vector<Eigen::Index> rows;
-    for (const Eigen::Index row : missing.outliers) rows.push_back(row + 1);
-    print(fmt::format("\nOutliers, left out of the fit: data rows {}\n", fmt::join(rows, ", ")));
+    const std::vector<Eigen::Index>& lines = report.outlier_lines;
+    print(fmt::format("\nOutliers, left out of the fit: {} {} of {}\n", lines.size() == 1 ? "line" : "lines",
+                      fmt::join(lines, ", "), report.measured));
   }
   const discovery::LackOfFit& lack = missing.verdict.lack_of_fit;
   constexpr double surprising = 0.01;

@@ -26,7 +26,8 @@ struct DiscoveryReport {
   std::uint64_t seed = 1;
   Eigen::Index rows = 0;
   discovery::Missing missing;
-  std::vector<GapRegion> regions;  ///< of each output by falling gap
+  std::vector<Eigen::Index> outlier_lines;  ///< of missing.outliers, in the file `measured`
+  std::vector<GapRegion> regions;           ///< of each output by falling gap
 };
 
 /// Cuts the rows searched where the absolute deviation changes most, by a small tree.

@@ -11,6 +11,7 @@
 #include "llmt/commands.hpp"
 #include "llmt/csv.hpp"
 #include "llmt/model.hpp"
+#include "llmt/model_file.hpp"
 #include "shared/cli.hpp"
 #include "shared/columns.hpp"
 #include "shared/options.hpp"
@@ -73,7 +74,7 @@ void explain_table(const ExplainArguments& arguments, const Model& model, const 
   }
 }
 
-void explain_row(const ExplainArguments& arguments, const Model& model, const Eigen::MatrixXd& inputs) {
+void explain_row(const ExplainArguments& arguments, const Model& model, const Csv& csv, const Eigen::MatrixXd& inputs) {
   if (arguments.row > inputs.rows()) {
     throw std::invalid_argument(
         fmt::format("--row is {}, {} has {} rows", arguments.row, table_name(arguments.data), inputs.rows()));
@@ -84,7 +85,8 @@ void explain_row(const ExplainArguments& arguments, const Model& model, const Ei
   Json json = {{"model", arguments.model}, {"data", arguments.data}, {"row", arguments.row}};
   json["targets"] = Json::array();
   if (!arguments.json) {
-    print(fmt::format("{}: row {}\n", table_name(arguments.data), arguments.row));
+    print(fmt::format("{}: row {}, line {} of the file\n", table_name(arguments.data), arguments.row,
+                      csv.line_of(arguments.row - 1)));
   }
   for (Eigen::Index o = 0; o < model.num_outputs(); ++o) {
     const std::string& target = model.outputs()[o].name;
@@ -124,14 +126,14 @@ void explain_row(const ExplainArguments& arguments, const Model& model, const Ei
 
 void explain_command(const ExplainArguments& arguments) {
   const Model model = read_unless_exchanged(arguments.model, arguments.data, model_comes_first,
-                                            [](const std::string& path) { return load(path); });
+                                            [](const std::string& path) { return load_model(path); });
   const Csv csv = read_table(arguments.data, arguments.mark);
   if (csv.rows() == 0) {
     throw std::runtime_error(fmt::format("{}: there is a header and no rows", arguments.data));
   }
   const Eigen::MatrixXd inputs = read_inputs(csv, model, arguments.threads).values;
   if (arguments.row > 0) {
-    explain_row(arguments, model, inputs);
+    explain_row(arguments, model, csv, inputs);
   } else {
     explain_table(arguments, model, inputs);
   }

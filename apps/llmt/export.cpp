@@ -7,6 +7,7 @@
 #include "llmt/c_source.hpp"
 #include "llmt/commands.hpp"
 #include "llmt/files.hpp"
+#include "llmt/model_file.hpp"
 #include "shared/cli.hpp"
 #include "shared/options.hpp"
 
@@ -26,7 +27,7 @@ void export_command(const ExportArguments& arguments) {
     throw std::invalid_argument(fmt::format("--name: \"{}\" must be an identifier of C of at most 31 characters",
                                             without_controls(arguments.name)));
   }
-  const Model model = load(arguments.model);
+  const Model model = load_model(arguments.model);
   const std::string header = beside(arguments.output, ".h").string();
   if (header == arguments.output) throw std::invalid_argument("--output: the header has this name; write to FILE.c");
   const CSource c = to_c(model, arguments.name, std::filesystem::path(header).filename().string());

@@ -12,6 +12,7 @@
 #include "llmt/learning.hpp"
 #include "llmt/readable.hpp"
 #include "llmt/readable_summary.hpp"
+#include "llmt/spoilt_rows.hpp"
 #include "llmt/stream_command.hpp"
 #include "report/of_fit.hpp"
 #include "report/options.hpp"
@@ -73,7 +74,8 @@ std::optional<ReadableResult> make_readable(const FitArguments& arguments, const
   return readable;
 }
 
-// A report shows a readable tree beside the model wherever one can be made.
+// A report shows a readable tree beside the model wherever one can be made. It does not show rows that the loss leaves
+// out: they would set the axes.
 std::string write_fit_reports(const FitArguments& arguments, const LearningTable& table, const FitResult& result,
                               const std::optional<ReadableResult>& readable) {
   if (!arguments.reports.wanted()) return "";
@@ -83,8 +85,20 @@ std::string write_fit_reports(const FitArguments& arguments, const LearningTable
     shown = fit_readable(table.inputs.values, table.outputs, table.options, result.summary);
     shown->model = shown->model.named(table.names, arguments.learning.targets, table.inputs.levels);
   }
-  return write_reports(arguments.reports, report::fit_report({arguments.learning.data, table.inputs.values,
-                                                              table.outputs, table.options, result, shown}));
+  const std::vector<Eigen::Index> left_out = rows_left_out(result.summary, table.options.weights);
+  const auto report_on = [&](const Eigen::MatrixXd& inputs, const Eigen::MatrixXd& outputs, const FitOptions& options) {
+    const auto count = std::ssize(left_out);
+    return write_reports(arguments.reports,
+                         report::fit_report({arguments.learning.data, inputs, outputs, options, result, shown, count}));
+  };
+  if (left_out.empty()) return report_on(table.inputs.values, table.outputs, table.options);
+  std::vector<Eigen::Index> kept;
+  for (Eigen::Index row = 0; row < table.outputs.rows(); ++row) {
+    if (result.summary.loss_weights(row) > 0.0) kept.push_back(row);
+  }
+  FitOptions options = table.options;
+  if (options.weights.size() > 0) options.weights = Eigen::VectorXd(options.weights(kept));
+  return report_on(table.inputs.values(kept, Eigen::all), table.outputs(kept, Eigen::all), options);
 }
 
 void fit_command(FitArguments arguments) {
@@ -97,10 +111,13 @@ void fit_command(FitArguments arguments) {
     throw std::invalid_argument("--readable does not go with " + why);
   }
   Progress progress("fitting");
-  table.options.intervals = keeps_intervals(arguments) || arguments.reports.wanted();
+  // Folds' models say which rows no model predicts; the report needs them too, and the file unless it is to be small.
+  const bool looks_for_spoilt_rows = table.options.loss == Loss::squared;
+  table.options.intervals = keeps_intervals(arguments) || arguments.reports.wanted() || looks_for_spoilt_rows;
   table.options.progress = [&](Eigen::Index done, Eigen::Index total) { progress.show(done, total); };
   FitResult result = fit(table.inputs.values, table.outputs, table.options);
   progress.clear();
+  warn_of_spoilt_rows(arguments.learning, table, result);
   result.model = result.model.named(table.names, arguments.learning.targets, table.inputs.levels);
   if (!arguments.output.empty()) {
     save(result.model, keeps_intervals(arguments) ? result.intervals : Intervals(), arguments.output);
@@ -108,7 +125,7 @@ void fit_command(FitArguments arguments) {
   std::optional<ReadableResult> readable;
   if (!arguments.readable.empty()) readable = make_readable(arguments, table, result.summary, loss);
   const std::string reports = write_fit_reports(arguments, table, result, readable);
-  const FitRun run{arguments.learning, arguments.output};
+  const FitRun run{arguments.learning, table, arguments.output};
   if (arguments.json) {
     Json summary = summary_json(run, result);
     if (readable) summary["readable"] = readable_json(*readable);
@@ -122,6 +139,7 @@ void fit_command(FitArguments arguments) {
                       beside(arguments.output, readable_extension).string()));
   }
   print(reports);
+  if (arguments.output.empty()) print("Not written: give -o FILE.json\n");
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 
 #include "llmt/commands.hpp"
 #include "llmt/model.hpp"
+#include "llmt/model_file.hpp"
 #include "llmt/rules.hpp"
 #include "shared/cli.hpp"
 #include "shared/options.hpp"
@@ -165,8 +166,8 @@ void print_directions(const Model& model, const Partition& partition) {
 }
 
 void print_model(const Model& model, const std::string& path) {
-  print(fmt::format("{}: {} inputs, {} output{}\n\n", path, model.num_inputs(), model.num_outputs(),
-                    model.num_outputs() == 1 ? "" : "s"));
+  print(fmt::format("{}: {} input{}, {} output{}\n\n", path, model.num_inputs(), model.num_inputs() == 1 ? "" : "s",
+                    model.num_outputs(), model.num_outputs() == 1 ? "" : "s"));
   Table inputs({"input", "smallest", "largest", "mean"});
   for (const InputColumn& input : model.inputs()) {
     if (input.is_categorical()) {
@@ -181,7 +182,10 @@ void print_model(const Model& model, const std::string& path) {
     const Partition& partition = model.partitions()[p];
     for (Eigen::Index output = 0; output < std::ssize(partition.outputs); ++output) {
       const std::string& name = model.outputs()[partition.outputs[output]].name;
-      print(fmt::format("\n{}: {} leaves, {}\n", name, partition.num_leaves(), validity_text(partition.validity)));
+      const bool one = partition.num_leaves() == 1;
+      print(
+          one ? fmt::format("\n{}: 1 leaf\n", name)
+              : fmt::format("\n{}: {} leaves, {}\n", name, partition.num_leaves(), validity_text(partition.validity)));
       Table table({"leaf", "rows", "RMSE", "where", name + " ="});
       const std::vector<Leaf> leaves = model.leaves(p);
       for (std::size_t k = 0; k < leaves.size(); ++k) {
@@ -278,7 +282,7 @@ void add_inspect(CLI::App& app) {
   CLI::Option* const json = command->add_flag("--json", arguments->json, "Print JSON");
   command->add_flag("--rules", arguments->rules, "Print a crisp model as rules and as a tree")->excludes(json);
   command->callback([arguments] {
-    const Model model = load(arguments->model);
+    const Model model = load_model(arguments->model);
     if (arguments->json) {
       print_json(leaf_table(model));
     } else if (arguments->rules) {

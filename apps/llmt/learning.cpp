@@ -4,12 +4,12 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <numeric>
 #include <stdexcept>
 #include <utility>
 
 #include "llmt/csv.hpp"
 #include "llmt/names.hpp"
-#include "llmt/outliers.hpp"
 #include "llmt/retired_options.hpp"
 #include "shared/cli.hpp"
 #include "shared/help.hpp"
@@ -68,11 +68,8 @@ std::string places_of(const Csv& csv, const std::vector<Eigen::Index>& rows, con
 void look_for_heavy_rows(const Csv& csv, const LearningArguments& arguments, const LearningColumns& columns) {
   if (arguments.options.loss != Loss::squared) return;
   for (std::size_t o = 0; o < arguments.targets.size(); ++o) {
-    Eigen::VectorXd target = columns.targets.col(o);
-    if (columns.weights.size() > 0) {
-      target = (columns.weights.array() > 0.0).select(target, bulk_of(target).centre);
-    }
-    const HeavyRows heavy = heavy_rows(target);
+    const Eigen::VectorXd target = columns.targets.col(o);
+    const HeavyRows heavy = heavy_rows_of_target(target, columns.weights);
     if (heavy.rows.empty()) continue;
     const std::string& name = arguments.targets[o];
     if (heavy.hide_the_others) {
@@ -99,6 +96,26 @@ bool numbers_the_rows(const Eigen::Ref<const Eigen::VectorXd>& values) {
   return true;
 }
 
+// "2024-03-31", "31.3.24", "3/31/2024 14:05": three numbers of at most four digits, and perhaps a time of day.
+bool looks_like_a_date(const std::string& text) {
+  std::size_t at = 0;
+  std::size_t longest = 0;
+  char mark = '\0';
+  for (int part = 0; part < 3; ++part) {
+    const std::size_t begin = at;
+    while (at < text.size() && text[at] >= '0' && text[at] <= '9') ++at;
+    if (at == begin || at - begin > 4) return false;
+    if (part < 2 && text.find_first_not_of('0', begin) >= at) return false;  // there is no month 0
+    longest = std::max(longest, at - begin);
+    if (part == 2) break;
+    if (at == text.size() || std::string_view("-/.").find(text[at]) == std::string_view::npos) return false;
+    if (part == 1 && text[at] != mark) return false;
+    mark = text[at++];
+  }
+  const bool ends = at == text.size() || text[at] == 'T' || text[at] == ' ';
+  return ends && (longest == 4 || longest == 2);
+}
+
 // Says which columns are inputs although they look like names or numbers of the rows. Nothing is said of inputs that
 // were asked for.
 void look_for_accidental_inputs(const LearningArguments& arguments, const std::vector<std::string>& names,
@@ -109,12 +126,17 @@ void look_for_accidental_inputs(const LearningArguments& arguments, const std::v
   for (const int column : inputs.categorical) {
     const std::size_t levels = inputs.levels[column].size();
     const auto rows = static_cast<double>(inputs.values.rows());
-    if (levels <= most_levels || static_cast<double>(levels) <= most_levels_per_row * rows) continue;
-    if (contains(arguments.categorical, names[column])) continue;
-    warn(fmt::format(
-        "llmt: column \"{}\" has words, {} different ones in {} rows, and is taken for categories; --ignore leaves it "
-        "out, --categorical says that it is meant",
-        names[column], levels, inputs.values.rows()));
+    const bool few = levels <= most_levels || static_cast<double>(levels) <= most_levels_per_row * rows;
+    const bool dates = std::ranges::all_of(inputs.levels[column], looks_like_a_date);
+    if ((few && !dates) || contains(arguments.categorical, names[column])) continue;
+    const std::string advice =
+        dates ? fmt::format(
+                    "it looks like a date: leave it out (--ignore {}) or give a number, as days; --categorical says "
+                    "that categories are meant",
+                    names[column])
+              : "--ignore leaves it out, --categorical says that it is meant";
+    warn(fmt::format("llmt: column \"{}\" has words, {} different ones in {} rows, and is taken for categories; {}",
+                     names[column], levels, inputs.values.rows(), advice));
   }
   for (Eigen::Index column = 0; column < inputs.values.cols(); ++column) {
     if (!inputs.levels[column].empty() || !numbers_the_rows(inputs.values.col(column))) continue;
@@ -123,6 +145,11 @@ void look_for_accidental_inputs(const LearningArguments& arguments, const std::v
 }
 
 }  // namespace
+
+HeavyRows heavy_rows_of_target(const Eigen::Ref<const Eigen::VectorXd>& target, const Eigen::VectorXd& weights) {
+  if (weights.size() == 0) return heavy_rows(target);
+  return heavy_rows((weights.array() > 0.0).select(target, bulk_of(target).centre));
+}
 
 std::vector<std::string> choose_inputs(const Csv& csv, const LearningArguments& arguments) {
   for (const std::vector<std::string>* names : {&arguments.targets, &arguments.inputs, &arguments.ignored}) {
@@ -153,6 +180,16 @@ std::vector<std::string> choose_inputs(const Csv& csv, const LearningArguments& 
   return inputs;
 }
 
+namespace {
+
+std::vector<Eigen::Index> lines_of_rows(const Csv& csv) {
+  std::vector<Eigen::Index> rows(csv.rows());
+  std::iota(rows.begin(), rows.end(), Eigen::Index{0});
+  return csv.lines_of(rows);
+}
+
+}  // namespace
+
 LearningTable read_learning_table(const LearningArguments& arguments) {
   const Csv csv = read_table(arguments.data, arguments.mark);
   if (csv.rows() == 0) {
@@ -166,7 +203,8 @@ LearningTable read_learning_table(const LearningArguments& arguments) {
                             largest_input, arguments.options.max_threads);
   look_for_heavy_rows(csv, arguments, columns);
   look_for_accidental_inputs(arguments, inputs, columns.inputs);
-  LearningTable table{inputs, std::move(columns.inputs), std::move(columns.targets), arguments.options};
+  LearningTable table{inputs, std::move(columns.inputs), std::move(columns.targets), arguments.options,
+                      lines_of_rows(csv)};
   FitOptions& options = table.options;
   options.split_inputs = positions("--split-inputs", arguments.split_inputs, table.names);
   options.regression_inputs = positions("--regression-inputs", arguments.regression_inputs, table.names);
@@ -210,8 +248,8 @@ void add_learning_options(CLI::App& command, LearningArguments& arguments) {
       ->capture_default_str();
   command.add_flag("--contiguous", arguments.contiguous,
                    "Folds are blocks of consecutive rows (measured paths, grids, time series)");
-  add_count(command, "--max-leaves", options.max_leaves, Eigen::Index{0},
-            by_default("Most leaves of a tree; 0: the default", "max_leaves"));
+  add_count(command, "--max-leaves", options.max_leaves, Eigen::Index{0}, "Most leaves of a tree; 0: the default")
+      ->default_str(default_text("max_leaves"));
   add_threads(command, options.max_threads);
   expert(add_names(command, "--split-inputs", arguments.split_inputs, "COLUMN", "Inputs that may be split [all]"));
   expert(add_names(command, "--regression-inputs", arguments.regression_inputs, "COLUMN",

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "llmt/fit.hpp"
+#include "llmt/outliers.hpp"
 #include "shared/columns.hpp"
 
 namespace llmt::apps {
@@ -39,7 +40,11 @@ struct LearningTable {
   InputColumns inputs;
   Eigen::MatrixXd outputs;
   FitOptions options;
+  std::vector<Eigen::Index> lines;  ///< of the rows, in the file
 };
+
+/// The heavy rows (outliers.hpp) of a target among those of positive weight; `weights`: empty: all 1.
+HeavyRows heavy_rows_of_target(const Eigen::Ref<const Eigen::VectorXd>& target, const Eigen::VectorXd& weights);
 
 /// Throws std::runtime_error and std::invalid_argument that name file, line, column or option.
 LearningTable read_learning_table(const LearningArguments& arguments);

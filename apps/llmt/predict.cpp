@@ -12,6 +12,7 @@
 #include "llmt/files.hpp"
 #include "llmt/fit.hpp"
 #include "llmt/intervals.hpp"
+#include "llmt/model_file.hpp"
 #include "shared/cli.hpp"
 #include "shared/columns.hpp"
 #include "shared/options.hpp"
@@ -220,9 +221,8 @@ void summarise(const PredictArguments& arguments, const Predicted& predicted) {
 
 void predict_command(const PredictArguments& arguments) {
   const ModelWithIntervals file =
-      read_unless_exchanged(arguments.model, arguments.data, model_comes_first, [&](const std::string& path) {
-        return arguments.interval > 0.0 ? load_with_intervals(path) : ModelWithIntervals{load(path), {}};
-      });
+      read_unless_exchanged(arguments.model, arguments.data, model_comes_first,
+                            [&](const std::string& path) { return load_model(path, arguments.interval > 0.0); });
   const Csv csv = read_table(arguments.data, arguments.mark);
   const Predicted predicted = predict_table(arguments, file, csv);
   if (const Eigen::Index count = predicted.count_not_finite(); count > 0) {

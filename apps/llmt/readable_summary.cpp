@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "llmt/size.hpp"
 
@@ -31,6 +32,21 @@ Eigen::Index most_terms(const Partition& partition) {
   return most;
 }
 
+// How the readable tree was chosen. `of`: " of TARGET" where there are several.
+std::string note_on(const ReadablePartition& simple, const std::string& of, double loss) {
+  const std::string best = number(simple.best_crisp);
+  if (simple.is_within_loss) {
+    return fmt::format(
+        "The readable tree{} is the smallest one whose held-out RMSE is at most {:g} % above that of the best crisp "
+        "tree ({}).\n",
+        of, 100.0 * loss, best);
+  }
+  const std::string none = fmt::format("No short tree{} came within {:g} % of {}", of, 100.0 * loss, best);
+  const double above = 100.0 * (simple.rmse / simple.best_crisp - 1.0);
+  return std::isfinite(above) ? fmt::format("{}; this one is {} % above.\n", none, number(above, above < 100.0 ? 2 : 3))
+                              : fmt::format("{}; this one has {}.\n", none, number(simple.rmse));
+}
+
 std::string count(Eigen::Index value) { return fmt::format("{}", value); }
 
 }  // namespace
@@ -54,8 +70,8 @@ Json readable_json(const ReadableResult& readable) {
 }
 
 void print_readable(const FitResult& fitted, const ReadableResult& readable, double loss) {
-  Table table({"target", "model", "leaves", "terms a leaf", "size", "RMSE held-out", "+-"});
-  std::string best;
+  Table table({"target", "model", "leaves", "terms per leaf", "size", "RMSE held-out", "spread of folds"});
+  std::string notes;
   for (std::size_t p = 0; p < readable.partitions.size(); ++p) {
     const ReadablePartition& simple = readable.partitions[p];
     const PartitionSummary& full = fitted.summary.partitions[p];
@@ -69,15 +85,10 @@ void print_readable(const FitResult& fitted, const ReadableResult& readable, dou
     const Model root = whole.prefix(1);
     table.add({"", "least squares", "1", count(most_terms(root.partitions()[0])), count(expression_size(root)),
                number(linear.rmse), number(linear.spread, 2)});
-    best += fmt::format("{}{}: {}{}", best.empty() ? "" : "; ", target, number(simple.best_crisp),
-                        simple.is_within_loss ? "" : ", and no readable tree came near enough");
+    notes += note_on(simple, readable.partitions.size() > 1 ? " of " + target : "", loss);
   }
-  print(fmt::format(
-      "\n{}Size: operators, constants and variables of the model as an expression. The readable tree is the "
-      "smallest one whose held-out RMSE is at most {:g} % above the best of all crisp trees that were tried, those "
-      "with "
-      "short equations included ({}).\n",
-      table.text(), 100.0 * loss, best));
+  print(fmt::format("\n{}Size: operators, constants and variables of the model as an expression.\n{}", table.text(),
+                    notes));
 }
 
 }  // namespace llmt::apps

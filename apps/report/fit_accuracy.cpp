@@ -9,12 +9,14 @@
 
 #include "llmt/held_out.hpp"
 #include "report/figures.hpp"
+#include "report/kinds.hpp"
 #include "shared/cli.hpp"
 
 namespace llmt::apps::report {
 
 HeldOutRows held_out(const Fitted& fitted, Eigen::Index output) {
   HeldOutRows rows;
+  rows.left_out = fitted.left_out;
   const auto add = [&](const Model& model, const std::vector<Eigen::Index>& of_rows) {
     const Eigen::VectorXd predicted =
         model.predict(fitted.inputs(of_rows, Eigen::all), fitted.options.max_threads).col(output);
@@ -45,8 +47,20 @@ HeldOutRows held_out(const Fitted& fitted, Eigen::Index output) {
   return rows;
 }
 
+namespace {
+
+// What the charts of single rows do not show.
+std::string left_out_note(const HeldOutRows& rows) {
+  if (rows.left_out == 0) return "";
+  return rows.left_out == 1 ? " 1 row that the Tukey loss left out is not shown."
+                            : fmt::format(" {} rows that the Tukey loss left out are not shown.", rows.left_out);
+}
+
+}  // namespace
+
 Chart predicted_against_observed(const HeldOutRows& rows, const std::string& name) {
-  Layer points{.name = "rows", .role = "model"};
+  const std::string without = rows.left_out > 0 ? fmt::format(", without {} left out", rows.left_out) : "";
+  Layer points{.name = "rows" + without, .role = "model"};
   const auto count = static_cast<Eigen::Index>(rows.observed.size());
   for (const Eigen::Index row : thinned(count)) {
     points.x.push_back(rows.predicted[row]);
@@ -65,7 +79,7 @@ Chart predicted_against_observed(const HeldOutRows& rows, const std::string& nam
           .caption = fmt::format("{} Between the dashed lines are nine of ten rows: the error there is at most {}.{}",
                                  rows.held_out ? "Every prediction is by a model that had not seen the row."
                                                : "No rows were held out: these rows were fitted.",
-                                 number(rows.p90, 3), thinning_note(count, "rows")),
+                                 number(rows.p90, 3), thinning_note(count, "rows") + left_out_note(rows)),
           .x = {fmt::format("predicted {}", name)},
           .y = {fmt::format("observed {}", name)},
           .layers = {points, line(0.0, "no error", false), line(rows.p90, "nine of ten rows", true),
@@ -79,48 +93,14 @@ Chart residuals(const HeldOutRows& rows, const std::string& name) {
     points.x.push_back(rows.predicted[row]);
     points.y.push_back(rows.errors[row]);
   }
-  return {
-      .title = "Errors over the prediction",
-      .caption = "A curve or a funnel here would be structure that the model missed." + thinning_note(count, "rows"),
-      .x = {fmt::format("predicted {}", name)},
-      .y = {"predicted - observed"},
-      .layers = {points},
-      .references = {{false, 0.0, "", "floor"}}};
+  return {.title = "Errors over the prediction",
+          .caption = "A curve or a funnel here would be structure that the model missed." +
+                     thinning_note(count, "rows") + left_out_note(rows),
+          .x = {fmt::format("predicted {}", name)},
+          .y = {"predicted - observed"},
+          .layers = {points},
+          .references = {{false, 0.0, "", "floor"}}};
 }
-
-std::string kind_of(const Candidate& candidate) {
-  const bool one = candidate.leaves == 1;
-  switch (candidate.validity.kind) {
-    case ValidityKind::crisp:
-      return one ? (candidate.shrinkage > 0.0 ? "ridge regression" : "least squares") : "crisp tree";
-    case ValidityKind::blend:
-      return candidate.jump < no_jump ? "blend that keeps jumps" : "smooth blend";
-    case ValidityKind::gaussian:
-      return "Gaussians";
-    case ValidityKind::logistic:
-      return "smooth gates";
-  }
-  return "";
-}
-
-namespace {
-
-// The best candidate of each kind, the chosen one among them.
-std::vector<CandidateError> best_of_names(const PartitionSummary& partition) {
-  std::vector<CandidateError> shown = {partition.chosen};
-  for (const CandidateError& other : partition.best_of_kind) {
-    const auto same = std::ranges::find(shown, kind_of(other.candidate),
-                                        [](const CandidateError& entry) { return kind_of(entry.candidate); });
-    if (same == shown.end()) {
-      shown.push_back(other);
-    } else if (same != shown.begin() && other.rmse < same->rmse) {
-      *same = other;
-    }
-  }
-  return shown;
-}
-
-}  // namespace
 
 Chart error_over_leaves(const PartitionSummary& partition) {
   Chart chart{.title = "Error over the number of equations",
@@ -142,7 +122,7 @@ Chart error_over_leaves(const PartitionSummary& partition) {
     chart.layers.push_back(
         {.mark = Mark::line, .role = role, .x = {x, x}, .y = {entry.rmse - entry.spread, entry.rmse + entry.spread}});
   };
-  const std::vector<CandidateError> shown = best_of_names(partition);
+  const std::vector<CandidateError> shown = best_of_kinds(partition);
   for (std::size_t k = 1; k < shown.size(); ++k) add(shown[k], kind_of(shown[k].candidate), "before");
   add(partition.chosen, "chosen: " + kind_of(partition.chosen.candidate), "model");
   return chart;
@@ -151,12 +131,12 @@ Chart error_over_leaves(const PartitionSummary& partition) {
 Json kinds_table(const PartitionSummary& partition, const std::optional<ReadableResult>& readable, std::size_t p) {
   Grid grid{.title = "Smooth against discontinuous",
             .caption = "The best of each kind, judged on the same held-out rows.",
-            .header = {"model", "equations", "RMSE held-out", "+-"},
+            .header = {"model", "equations", "RMSE held-out", "spread of folds"},
             .rows = {}};
   const auto add = [&](const std::string& name, Eigen::Index leaves, double rmse, double spread) {
     grid.rows.push_back({name, std::to_string(leaves), number(rmse), number(spread, 2)});
   };
-  std::vector<CandidateError> shown = best_of_names(partition);
+  std::vector<CandidateError> shown = best_of_kinds(partition);
   std::ranges::stable_sort(shown, std::greater{}, &CandidateError::rmse);
   for (const CandidateError& entry : shown) {
     if (entry.candidate == partition.chosen.candidate) grid.marked = static_cast<int>(grid.rows.size());

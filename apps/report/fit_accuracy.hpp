@@ -16,13 +16,11 @@ struct HeldOutRows {
   Numbers errors;  ///< predicted - observed
   double rmse = 0.0;
   double r2 = 0.0;
-  double p90 = 0.0;  ///< nine of ten errors are at most this large
+  Eigen::Index left_out = 0;  ///< rows that the loss left out, which are not here
+  double p90 = 0.0;           ///< nine of ten errors are at most this large
 };
 
 HeldOutRows held_out(const Fitted& fitted, Eigen::Index output);
-
-/// "smooth blend", "crisp tree", ...
-std::string kind_of(const Candidate& candidate);
 
 Chart predicted_against_observed(const HeldOutRows& rows, const std::string& name);
 Chart residuals(const HeldOutRows& rows, const std::string& name);

@@ -6,6 +6,7 @@
 #include "report/figures.hpp"
 #include "report/fit_accuracy.hpp"
 #include "report/fit_shape.hpp"
+#include "report/kinds.hpp"
 #include "report/trees.hpp"
 #include "shared/cli.hpp"
 
@@ -27,6 +28,7 @@ std::string lead(const Fitted& fitted, const HeldOutRows& rows, const PartitionS
       "{} rows, {} inputs. RMSE {} {}, R2 {:.3f}; {}, {} equation{}.", fitted.result.summary.samples,
       fitted.result.model.num_inputs(), number(rows.rmse), rows.held_out ? "on rows held out" : "on the rows fitted",
       rows.r2, kind_of(partition.chosen.candidate), partition.leaves, partition.leaves == 1 ? "" : "s");
+  if (fitted.left_out > 0) text += fmt::format(" The Tukey loss left out {} rows more.", fitted.left_out);
   if (fitted.readable) {
     const ReadablePartition& rules = fitted.readable->partitions[p];
     text += fmt::format(" A tree of {} short rule{} that can be read in full has an RMSE of {}.", rules.leaves,

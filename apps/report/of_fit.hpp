@@ -20,6 +20,7 @@ struct Fitted {
   const FitOptions& options;
   const FitResult& result;
   const std::optional<ReadableResult>& readable;
+  Eigen::Index left_out = 0;  ///< rows that Loss::tukey left out; they are not among the inputs and outputs
 };
 
 Document fit_report(const Fitted& fitted);

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <filesystem>
+#include <fstream>
 #include <limits>
 #include <map>
 #include <stdexcept>
@@ -90,6 +92,15 @@ bool looks_like_a_row(const Csv& csv) {
   return !counts;
 }
 
+// A brace, then a quote or the other brace.
+bool begins_like_json(std::string_view text) {
+  constexpr std::string_view blanks = " \t\r\n";
+  const std::size_t brace = text.find_first_not_of(blanks);
+  if (brace == std::string_view::npos || text[brace] != '{') return false;
+  const std::size_t next = text.find_first_not_of(blanks, brace + 1);
+  return next != std::string_view::npos && (text[next] == '"' || text[next] == '}');
+}
+
 // Csv::refuse_first() for targets and weights, with the number of all rows that lack one.
 void refuse_rows_without_target(const Csv& csv, std::span<const std::string> columns,
                                 std::span<const Eigen::Index> first_bad, const Eigen::MatrixXd& values) {
@@ -107,18 +118,38 @@ void refuse_rows_without_target(const Csv& csv, std::span<const std::string> col
       ++count;
     }
     if (count < 2) throw;
-    throw std::runtime_error(fmt::format("{}; {} rows have no number there, lines {}{}: fill them in or leave them out",
-                                         error.what(), count, fmt::join(csv.lines_of(rows), ", "),
-                                         count > std::ssize(rows) ? ", ..." : ""));
+    throw std::runtime_error(
+        fmt::format("{}; {} rows have no number there, lines {}{}: delete these lines or fill in the cells",
+                    error.what(), count, fmt::join(csv.lines_of(rows), ", "), count > std::ssize(rows) ? ", ..." : ""));
   }
 }
 
 }  // namespace
 
+bool is_json_file(const std::string& path) {
+  std::error_code unknown;
+  if (!std::filesystem::is_regular_file(path, unknown)) return false;
+  std::ifstream file(path, std::ios::binary);
+  std::string begin(256, '\0');
+  file.read(begin.data(), std::ssize(begin));
+  begin.resize(static_cast<std::size_t>(file.gcount()));
+  return begins_like_json(begin);
+}
+
 std::string table_name(const std::string& path) { return path == "-" ? "standard input" : path; }
 
 Csv read_table(const std::string& path, DecimalMark mark) {
-  Csv csv = path != "-" ? Csv::read(path, mark) : Csv::parse(read_file("/dev/stdin"), table_name(path), mark);
+  const auto refuse_json = [&](bool is_json) {
+    if (is_json) throw std::runtime_error(table_name(path) + ": this is a JSON file; a table (CSV) is expected");
+  };
+  std::string from_stdin;
+  if (path == "-") {
+    from_stdin = read_file("/dev/stdin");
+    refuse_json(begins_like_json(from_stdin));
+  } else {
+    refuse_json(is_json_file(path));
+  }
+  Csv csv = path != "-" ? Csv::read(path, mark) : Csv::parse(std::move(from_stdin), table_name(path), mark);
   if (looks_like_a_row(csv)) {
     warn(
         fmt::format("llmt: {}: the first line holds only numbers and was taken for the names of the columns; if it is "
@@ -198,6 +229,10 @@ LearningColumns read_learning_columns(const Csv& csv, const ColumnRoles& roles, 
     if (is_input && (only_words || contains(roles.categorical, columns[i]))) {
       result.inputs.categorical.push_back(static_cast<int>(i));
     } else {
+      if (only_words && cells[i].other_mark == 0) {
+        throw std::runtime_error(fmt::format("{}: column \"{}\" holds words; the {} must be a number", csv.name(),
+                                             columns[i], i < num_inputs + roles.targets.size() ? "target" : "weight"));
+      }
       bad[i] = is_input ? cells[i].first_other : std::min(cells[i].first_other, cells[i].first_missing);
     }
   }

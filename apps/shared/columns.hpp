@@ -16,8 +16,11 @@ namespace llmt::apps {
 std::string table_name(const std::string& path);
 
 /// A table from a file, or from standard input if `path` is a dash. Warns of a header that holds only numbers. Throws
-/// as Csv::read().
+/// as Csv::read(), and for a JSON file.
 Csv read_table(const std::string& path, DecimalMark mark);
+
+/// Whether the file begins as a JSON object does. False for what is no regular file.
+bool is_json_file(const std::string& path);
 
 /// Which column of a table is what.
 struct ColumnRoles {

@@ -37,12 +37,13 @@ std::string entry(const std::string& name, const std::string& text) {
 class HelpFormatter : public CLI::Formatter {
  public:
   std::string make_option(const CLI::Option* option, bool is_positional) const override {
-    const OptionHelp help = help_of(*option, make_option_name(option, is_positional));
+    const OptionHelp help = help_of(*option, make_option_name(option, is_positional), whole_);
     return entry(help.name, help.text);
   }
 
   std::string make_help(const CLI::App* app, std::string name, CLI::AppFormatMode mode) const override {
     const bool with_experts = mode != CLI::AppFormatMode::Normal;
+    whole_ = with_experts;
     return make_description(app) + make_usage(app, std::move(name)) + make_positionals(app) +
            groups(*app, with_experts) + make_subcommands(app, mode) + "\n" + make_footer(app);
   }
@@ -78,6 +79,8 @@ class HelpFormatter : public CLI::Formatter {
   static std::string paragraph(const std::string& text) {
     return text.empty() ? text : wrapped(text, std::min(output_width(), widest_help)) + "\n";
   }
+
+  mutable bool whole_ = true;  // for make_option(), which the base class calls without the mode
 };
 
 std::vector<std::string> command_names(const CLI::App& app) {
@@ -103,7 +106,7 @@ bool contains(const std::vector<std::string>& names, std::string_view name) {
 
 }  // namespace
 
-OptionHelp help_of(const CLI::Option& option, const std::string& shown_name) {
+OptionHelp help_of(const CLI::Option& option, const std::string& shown_name, bool whole) {
   OptionHelp help{shown_name, option.get_description()};
   help.name.erase(std::min(help.name.find('{'), help.name.size()));  // the value of a flag that is given without one
   const bool is_positional = !option.nonpositional();
@@ -111,7 +114,12 @@ OptionHelp help_of(const CLI::Option& option, const std::string& shown_name) {
   const bool is_flag = option.get_items_expected_max() == 0;
   if (!is_positional && !is_flag && !type.empty()) help.name += " " + type;
   if (!is_positional && is_flag) help.name += option.get_option_text();
-  if (!option.get_default_str().empty()) help.text += fmt::format(" [{}]", option.get_default_str());
+  constexpr std::size_t many_words = 80;
+  const std::string value = option.get_default_str();
+  const bool says_value = whole || value.size() < many_words;
+  if (!value.empty()) {
+    help.text += fmt::format(" [{}]", says_value ? value : "chosen from rows and method, see --help-all");
+  }
   if (option.get_required() && !is_positional) help.text += " (required)";
   return help;
 }
@@ -185,7 +193,12 @@ std::string hint_on_extra_argument(const CLI::App& program, int argc, const char
       return fmt::format("; several names are separated by commas: {} {},{}", *before, *(before + 1), *(before + 2));
     }
   }
-  return {};
+  std::string files;
+  for (const CLI::Option* option : chosen.back()->get_options()) {
+    if (!option->nonpositional()) files += " " + option->get_name();
+  }
+  if (files.empty()) return {};
+  return fmt::format("; usage: {} {} [OPTIONS]{}", program.get_name(), chosen.back()->get_name(), files);
 }
 
 }  // namespace llmt::apps

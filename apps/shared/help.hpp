@@ -19,7 +19,8 @@ struct OptionHelp {
   std::string name;
   std::string text;
 };
-OptionHelp help_of(const CLI::Option& option, const std::string& shown_name);
+/// `whole`: a default of many words is stated too, which --help leaves to --help-all.
+OptionHelp help_of(const CLI::Option& option, const std::string& shown_name, bool whole = true);
 
 /// Throws std::invalid_argument, with the name that was most likely meant, if the command line has a command or a long
 /// option that the program does not know, or no command. CLI11 would first ask for options that are missing.

@@ -96,7 +96,11 @@ CLI::Option* add_decimal_comma(CLI::App& command, DecimalMark& mark) {
 std::int64_t read_count(const std::string& option, const std::string& text, std::int64_t low, std::int64_t high) {
   std::int64_t value = 0;
   if (!parse_number(text, value) || value < low || value > high) {
-    refuse(option, text, fmt::format("a whole number from {} to {}", low, high));
+    constexpr std::int64_t largest = std::numeric_limits<std::int64_t>::max();
+    const bool is_large = text.find_first_not_of("+0123456789") == std::string::npos && text.size() > 18;
+    refuse(option, text,
+           high == largest && !is_large ? fmt::format("a whole number, {} or more", low)
+                                        : fmt::format("a whole number from {} to {}", low, high));
   }
   return value;
 }

@@ -218,6 +218,7 @@ TEST(LlmtDiscover, OddDataHaveASaneVerdict) {
   ASSERT_EQ(report["effects"].size(), 1U);
   EXPECT_EQ(report["effects"][0]["exact_alias"], true);
   EXPECT_EQ(report["outliers"], (json{17}));
+  EXPECT_EQ(report["outlier_lines"], (json{19}));
   EXPECT_EQ(report["gap"]["before"], nullptr);
   EXPECT_EQ(report["not_testable"].back()["effect"], "c");
   EXPECT_EQ(report["not_testable"].back()["why"], "the input is constant");

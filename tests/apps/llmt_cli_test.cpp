@@ -217,7 +217,7 @@ TEST(LlmtProgram, MistakesHaveTheirExitCodeAndMessage) {
   expect("fit cut.csv -t y", 1, "cut.csv:3: the row has 1 field, the header has 2 (is the file cut off?)");
   expect("fit missing.csv -t y", 1, "missing.csv: cannot be read: No such file or directory");
   expect("fit d.csv -t y --ignore label -o no/m.json", 1, "no/m.json: cannot be written");
-  expect("predict d.csv d.csv", 1, "d.csv: not JSON");
+  expect("predict d.csv d.csv", 1, "d.csv: this is a table; a model file (JSON) is expected");
   expect("compare d.csv -t y -t z --ignore label", 2, "compare takes one --target");
   EXPECT_EQ(folder.run(llmt_program + " fit --help").exit_code, 0);
 }

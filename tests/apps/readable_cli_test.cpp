@@ -209,7 +209,7 @@ TEST(ReadableProgram, TheFileIsAnOrdinaryModelAndTheSummarySaysWhatEachCosts) {
   const Outcome fitted = folder.run(llmt_program + " fit d.csv -t y -o m.json --readable --cv 3");
   ASSERT_EQ(fitted.exit_code, 0) << fitted.err;
   for (const char* text :
-       {"readable", "least squares", "at most 15 % above the best of all crisp trees", "m.readable.json"}) {
+       {"readable", "least squares", "at most 15 % above that of the best crisp tree", "m.readable.json"}) {
     EXPECT_NE(fitted.out.find(text), std::string::npos) << fitted.out;
   }
   EXPECT_EQ(folder.run(llmt_program + " predict m.readable.json d.csv --interval 0.9").exit_code, 0);
@@ -218,7 +218,7 @@ TEST(ReadableProgram, TheFileIsAnOrdinaryModelAndTheSummarySaysWhatEachCosts) {
   EXPECT_NE(leaves.out.find("each holds in its box alone"), std::string::npos) << leaves.out;
   const Outcome without_file = folder.run(llmt_program + " fit d.csv -t y --readable=50 --validity crisp --cv 3");
   EXPECT_NE(without_file.out.find("at most 50 % above"), std::string::npos) << without_file.out;
-  EXPECT_EQ(without_file.out.find("written"), std::string::npos) << without_file.out;
+  EXPECT_EQ(without_file.out.find("written to"), std::string::npos) << without_file.out;
 }
 
 TEST(ReadableProgram, WrongUseIsRefusedBeforeTheWork) {

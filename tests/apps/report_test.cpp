@@ -86,6 +86,17 @@ TEST(Report, FitShowsEveryRowByAModelThatHadNotSeenIt) {
   EXPECT_EQ(maps, 1);  // two inputs: the boxes
 }
 
+TEST(Report, RowsThatTheLossLeftOutAreSaid) {
+  const Sample table = jumping(400);
+  llmt::FitOptions options;
+  const llmt::FitResult result = llmt::fit(table.inputs, table.outputs, options);
+  const std::optional<llmt::ReadableResult> none;
+  const Document document = fit_report({"t.csv", table.inputs, table.outputs, options, result, none, 3});
+  EXPECT_NE(document.main->caption.find("3 rows that the Tukey loss left out are not shown."), std::string::npos);
+  EXPECT_EQ(document.main->layers.front().name, "rows, without 3 left out");
+  EXPECT_NE(document.lead.find("The Tukey loss left out 3 rows more."), std::string::npos) << document.lead;
+}
+
 TEST(Report, FitWithoutFoldsSaysThatNothingWasHeldOut) {
   llmt::FitOptions options;
   options.folds.count = 0;

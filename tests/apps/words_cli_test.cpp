@@ -62,7 +62,16 @@ TEST(Words, ModelAndTableThatWereExchangedAreNamed) {
     EXPECT_EQ(refused_text(folder, command + " d.csv m.json", 2),
               "llmt: d.csv and m.json seem to be exchanged: the model (JSON) comes first, then the table (CSV)\n");
   }
-  EXPECT_NE(refused_text(folder, "predict d.csv d.csv", 1).find("not JSON"), std::string::npos);
+  folder.write("words.txt", "no table\n");
+  EXPECT_NE(refused_text(folder, "predict words.txt d.csv", 1).find("not JSON"), std::string::npos);
+  for (const std::string command : {"predict d.csv d.csv", "inspect d.csv", "explain d.csv d.csv"}) {
+    EXPECT_EQ(refused_text(folder, command, 1), "llmt: d.csv: this is a table; a model file (JSON) is expected\n");
+  }
+  for (const std::string command : {"fit m.json -t y", "predict m.json m.json", "compare m.json -t y"}) {
+    EXPECT_EQ(refused_text(folder, command, 1), "llmt: m.json: this is a JSON file; a table (CSV) is expected\n");
+  }
+  EXPECT_EQ(refused_text(folder, "predict m.json d.csv d.csv", 2),
+            "llmt: The following argument was not expected: d.csv; usage: llmt predict [OPTIONS] model data\n");
 }
 
 TEST(Words, AHeaderOfNumbersIsTakenForARowAndSaid) {
@@ -93,8 +102,72 @@ TEST(Words, AllRowsWithoutATargetAreSaidAtOnce) {
   folder.write("d.csv", "x,y\n1,\n2,2\n3,NA\n4,4\n5,?\n");
   EXPECT_EQ(refused_text(folder, "fit d.csv -t y", 1),
             "llmt: d.csv:2: column \"y\": the cell is empty, a number is needed; 3 rows have no number there, lines 2, "
-            "4, 6: fill them in or "
-            "leave them out\n");
+            "4, 6: delete these lines or fill in the cells\n");
+}
+
+TEST(Words, AColumnOfWordsIsNoTarget) {
+  const Folder folder;
+  folder.write("d.csv", "material,x,w\nsteel,1,a\n,2,b\nwood,3,c\n");
+  EXPECT_EQ(refused_text(folder, "fit d.csv -t material", 1),
+            "llmt: d.csv: column \"material\" holds words; the target must be a number\n");
+  EXPECT_EQ(refused_text(folder, "fit d.csv -t x --weight w", 1),
+            "llmt: d.csv: column \"w\" holds words; the weight must be a number\n");
+  EXPECT_EQ(
+      refused_text(folder, "discover d.csv d.csv -t x", 1),
+      "llmt: d.csv:2: column \"material\": 'steel' is not a number (--inputs COLUMN,... names the columns to use, "
+      "and leaves out the others)\n");
+}
+
+TEST(Words, AColumnOfDatesIsCalledSo) {
+  const Folder folder;
+  const auto warning_of = [&](const std::vector<std::string>& words) {
+    std::string text = "when,x,y\n";
+    for (int i = 0; i < 60; ++i) text += fmt::format("{},{},{}\n", words[i % words.size()], i % 7, 2 * (i % 7));
+    folder.write("d.csv", text);
+    return folder.run(llmt_program + " fit d.csv -t y --cv 0").err;
+  };
+  const std::vector<std::vector<std::string>> dates = {{"2024-03-31", "2024-04-01", "2024-12-24"},
+                                                       {"31.3.24", "1.4.24"},
+                                                       {"3/31/2024 14:05", "4/1/2024 9:00"},
+                                                       {"2024-03-31T12:00:00Z", "2024-04-01T12:00:00Z"}};
+  for (const std::vector<std::string>& words : dates) {
+    EXPECT_NE(warning_of(words).find("it looks like a date: leave it out (--ignore when) or give a number, as days"),
+              std::string::npos)
+        << words[0];
+  }
+  for (const std::string word : {"red", "2024-03", "1-2-3-4", "10.0.0.1", "v1.2.3", "2024-03-31x"}) {
+    EXPECT_EQ(warning_of({word, "blue"}), "") << word;
+    EXPECT_EQ(warning_of({"2024-03-31", word}), "") << word;
+  }
+}
+
+TEST(Words, AFitThatIsNotWrittenSaysSo) {
+  const Folder folder;
+  folder.write("d.csv", line_and_noise(60));
+  const std::string fit = llmt_program + " fit d.csv -t y";
+  EXPECT_TRUE(folder.run(fit + " --readable").out.ends_with("Not written: give -o FILE.json\n"));
+  EXPECT_EQ(folder.run(fit + " -o m.json").out.find("Not written"), std::string::npos);
+  EXPECT_EQ(folder.run(fit + " --json").out.find("Not written"), std::string::npos);
+}
+
+TEST(Words, OneIsSingular) {
+  const Folder folder;
+  folder.write("d.csv", "x,y\n1,1\n2,2\n3,3\n4,4.1\n5,5\n");
+  const Outcome fitted = folder.run(llmt_program + " fit d.csv -t y --cv 0 -o m.json");
+  EXPECT_NE(fitted.out.find("5 rows, 1 input: x"), std::string::npos) << fitted.out;
+  const std::string text = folder.run(llmt_program + " inspect m.json").out;
+  EXPECT_NE(text.find("1 input, 1 output\n"), std::string::npos) << text;
+  EXPECT_NE(text.find("y: 1 leaf\n"), std::string::npos) << text;
+}
+
+TEST(Words, ADefaultOfManyWordsIsInTheLongHelp) {
+  const Folder folder;
+  const auto help_has = [&](const char* help, const char* text) {
+    return folder.run(llmt_program + " fit " + help).out.find(text) != std::string::npos;
+  };
+  EXPECT_TRUE(help_has("--help", "[chosen from rows and method, see"));
+  EXPECT_FALSE(help_has("--help", "1500 / coefficients"));
+  EXPECT_TRUE(help_has("--help-all", "1500 /"));
 }
 
 TEST(Words, AValueThatNeedsAnEqualsSignIsShownWithIt) {

@@ -128,7 +128,8 @@ struct FitSummary {
   CodeChoice codes = {};
   /// LocalTerms::automatic: the best candidate with the terms that were not taken, one entry a partition. Else empty.
   std::vector<CandidateError> other_terms = {};
-  /// Loss::tukey: the weight in [0, 1] that each row had by its residual, 0 for outliers. Else empty.
+  /// Loss::tukey: the weight in [0, 1] that each row had by its residual, 0 for outliers. Else empty. Errors leave out
+  /// rows of weight 0; all others count in full there, times FitOptions::weights.
   Eigen::VectorXd loss_weights = {};
 };
 

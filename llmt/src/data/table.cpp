@@ -201,6 +201,17 @@ FitData::FitData(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::R
   table_.emplace(make_table(inputs_, outputs_, of_kept, orders_splits));
 }
 
+Table FitData::trained(const Eigen::VectorXd& loss_weights) const {
+  Table result = table();
+  if (loss_weights.size() == 0) return result;
+  Eigen::VectorXd of_table = Eigen::VectorXd::Ones(result.weights.size());
+  for (Eigen::Index row = 0; row < loss_weights.size(); ++row) {
+    if (row_of_[row] >= 0) of_table(row_of_[row]) = loss_weights(row);
+  }
+  result.weights = result.weights.cwiseProduct(of_table);
+  return result;
+}
+
 // Adds the weights of copies to those of the rows that they copy, and leaves them out of `rows`.
 void FitData::leave_out_copies(const std::vector<int>& copy_of, std::vector<Eigen::Index>& rows,
                                Eigen::VectorXd& weights) {

@@ -37,6 +37,9 @@ class FitData {
   FitData& operator=(const FitData&) = delete;
 
   const Table& table() const { return *table_; }
+  /// The table with the weights that its rows have in training: times `loss_weights`, one for each row of the caller
+  /// and equal for copies. Empty: all 1.
+  Table trained(const Eigen::VectorXd& loss_weights) const;
   /// FitOptions::folds with the groups of the table's rows.
   const FoldOptions& folds() const { return folds_; }
   /// Of each row of the caller, the row of the table that it is; -1: it takes no part.

@@ -96,9 +96,11 @@ struct ComparedRows {
   Eigen::MatrixXd outputs;
   std::vector<double> groups;
   FitOptions options;
+  Eigen::VectorXd loss_weights;
 };
 
-ComparedRows some_rows(const Matrix& inputs, const Matrix& outputs, const FitOptions& options, const Codes& codes) {
+ComparedRows some_rows(const Matrix& inputs, const Matrix& outputs, const FitOptions& options,
+                       const Eigen::VectorXd& loss_weights, const Codes& codes) {
   Eigen::Index coefficients = 1 + inputs.cols();
   for (const std::vector<double>& of_input : codes) coefficients += std::max<Eigen::Index>(std::ssize(of_input) - 2, 0);
   const Table table{inputs, outputs, Eigen::VectorXd::Ones(inputs.rows()), {}, {}, {}};
@@ -109,8 +111,9 @@ ComparedRows some_rows(const Matrix& inputs, const Matrix& outputs, const FitOpt
   }
   const Eigen::Index count = std::clamp(most_compared_numbers / coefficients, least_compared_rows, most_compared_rows);
   const std::vector<int> rows = thinned(all, count).rows;
-  ComparedRows some{inputs(rows, Eigen::all), outputs(rows, Eigen::all), {}, options};
+  ComparedRows some{inputs(rows, Eigen::all), outputs(rows, Eigen::all), {}, options, {}};
   if (options.weights.size() > 0) some.options.weights = options.weights(rows);
+  if (loss_weights.size() > 0) some.loss_weights = loss_weights(rows);
   if (!options.folds.groups.empty()) {
     for (const int row : rows) some.groups.push_back(options.folds.groups[row]);
     some.options.folds.groups = some.groups;
@@ -126,8 +129,9 @@ std::vector<HeldOut> errors_of(const ComparedRows& some, const Codes& codes) {
   const FitData data(inputs, some.outputs, options, rule_of(options.rule).splits_on_monotone_inputs);
   std::vector<int> rows(data.table().inputs.rows());
   std::iota(rows.begin(), rows.end(), 0);
-  const TrainingRows all = training_rows(data.table(), std::move(rows), options.max_threads);
-  const std::vector<FoldRows> folds = deal(data.table(), data.table(), data.folds(), options.max_threads);
+  const Table weighted = data.trained(some.loss_weights);
+  const TrainingRows all = training_rows(weighted, std::move(rows), options.max_threads);
+  const std::vector<FoldRows> folds = deal(weighted, data.table(), data.folds(), options.max_threads);
   if (folds.size() < 2) return {};
   const Plan plan = cheap_plan(options, all, std::ssize(folds));
   std::vector<HeldOut> errors;
@@ -183,11 +187,12 @@ bool is_clearly_better(const HeldOut& simple, const HeldOut& other) {
 
 }  // namespace
 
-CodeChoice choose_codes(const Matrix& inputs, const Matrix& outputs, const FitOptions& options) {
+CodeChoice choose_codes(const Matrix& inputs, const Matrix& outputs, const FitOptions& options,
+                        const Eigen::VectorXd& loss_weights) {
   CodeChoice result;
   const Codes possible = possible_codes(inputs, outputs, options);
   if (inputs_with(possible).empty()) return result;
-  const ComparedRows some = some_rows(inputs, outputs, options, possible);
+  const ComparedRows some = some_rows(inputs, outputs, options, loss_weights, possible);
   const std::vector<int> bent = bent_inputs(some, possible);
   if (bent.empty()) return result;
   Codes chosen(inputs.cols());

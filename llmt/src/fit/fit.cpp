@@ -37,13 +37,14 @@ void refuse_hidden_outputs(const Eigen::Ref<const Eigen::MatrixXd>& outputs, con
 }
 
 FitResult fit_by_squares(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
-                         const Eigen::Ref<const Eigen::MatrixXd>& outputs, const FitOptions& options) {
+                         const Eigen::Ref<const Eigen::MatrixXd>& outputs, const FitOptions& options,
+                         const Eigen::VectorXd& loss_weights = {}) {
   refuse_hidden_outputs(outputs, options.weights);
   const auto fit_inputs = [&](const Eigen::Ref<const Eigen::MatrixXd>& taken, const FitOptions& with) {
-    return with.terms == LocalTerms::automatic ? fit_linear_or_quadratic(taken, outputs, with)
-                                               : fit_terms(taken, outputs, with);
+    return with.terms == LocalTerms::automatic ? fit_linear_or_quadratic(taken, outputs, with, loss_weights)
+                                               : fit_terms(taken, outputs, with, loss_weights);
   };
-  CodeChoice chosen = choose_codes(inputs, outputs, options);
+  CodeChoice chosen = choose_codes(inputs, outputs, options, loss_weights);
   if (chosen.taken.empty()) {
     FitResult result = fit_inputs(inputs, options);
     result.summary.codes = std::move(chosen);
@@ -62,10 +63,10 @@ FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<
               const FitOptions& options) {
   check_options(options, inputs.cols());
   if (options.loss == Loss::squared) return fit_by_squares(inputs, outputs, options);
-  FitOptions weighted = options;
   const Eigen::VectorXd weights = robust_weights(inputs, outputs, options);
-  weighted.weights = options.weights.size() == 0 ? weights : options.weights.cwiseProduct(weights);
-  FitResult result = fit_by_squares(inputs, outputs, weighted);
+  FitOptions kept = options;
+  kept.weights = without_outliers(options.weights, weights);
+  FitResult result = fit_by_squares(inputs, outputs, kept, weights);
   result.summary.loss_weights = weights;
   return result;
 }

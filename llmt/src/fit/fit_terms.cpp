@@ -239,11 +239,12 @@ std::vector<int> all_rows(Eigen::Index count) {
 }  // namespace
 
 FitResult fit_terms(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<const Eigen::MatrixXd>& outputs,
-                    const FitOptions& options, const std::function<void(double, double)>& watch) {
+                    const FitOptions& options, const Eigen::VectorXd& loss_weights,
+                    const std::function<void(double, double)>& watch) {
   const FitData data(inputs, outputs, options, rule_of(options.rule).splits_on_monotone_inputs);
   const Table& table = data.table();
-  Table weighted = table;
-  if (table.inputs.hasNaN()) weighted.weights = table.weights.cwiseProduct(weights_by_missing(table, options));
+  Table weighted = data.trained(loss_weights);
+  if (table.inputs.hasNaN()) weighted.weights = weighted.weights.cwiseProduct(weights_by_missing(weighted, options));
   const TrainingRows all = training_rows(weighted, all_rows(table.inputs.rows()), options.max_threads);
   const TrainingRows measured = with_table(all, table);
   const std::vector<FoldRows> folds = deal(weighted, table, data.folds(), options.max_threads);

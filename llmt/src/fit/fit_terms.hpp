@@ -8,9 +8,11 @@
 
 namespace llmt {
 
-/// fit() for LocalTerms::linear or quadratic, of checked options. `watch`: what Work reports of each partition, for
-/// tests.
+/// fit() for LocalTerms::linear or quadratic, of checked options. `loss_weights`: positive, one for each row of
+/// positive weight; in training, not in errors, a row's weight is times this. Empty: all 1. `watch`: what Work reports
+/// of each partition, for tests.
 FitResult fit_terms(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<const Eigen::MatrixXd>& outputs,
-                    const FitOptions& options, const std::function<void(double share, double operations)>& watch = {});
+                    const FitOptions& options, const Eigen::VectorXd& loss_weights = {},
+                    const std::function<void(double share, double operations)>& watch = {});
 
 }  // namespace llmt

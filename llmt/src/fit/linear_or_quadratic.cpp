@@ -25,7 +25,8 @@ CandidateError mean_error(const FitSummary& of, const FitSummary& linear) {
 }  // namespace
 
 FitResult fit_linear_or_quadratic(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
-                                  const Eigen::Ref<const Eigen::MatrixXd>& outputs, const FitOptions& options) {
+                                  const Eigen::Ref<const Eigen::MatrixXd>& outputs, const FitOptions& options,
+                                  const Eigen::VectorXd& loss_weights) {
   const Eigen::Index numbers = count_numeric_inputs(inputs.cols(), options);
   const bool both = numbers > 0 && numbers <= most_inputs_of_products && options.folds.count != 0 &&
                     !(inputs.array().abs() > largest_factor).any();
@@ -41,7 +42,7 @@ FitResult fit_linear_or_quadratic(const Eigen::Ref<const Eigen::MatrixXd>& input
         options.progress(before * total + share * done, all * total);
       };
     }
-    return fit_terms(inputs, outputs, with_terms);
+    return fit_terms(inputs, outputs, with_terms, loss_weights);
   };
   FitResult linear = fit_with(LocalTerms::linear, 0, of_linear_fit);
   if (!both || linear.summary.partitions.front().cv_folds == 0) {

@@ -14,6 +14,7 @@ namespace {
 constexpr double clip_spreads = 5.0;  // the outputs of the first tree lie within this many spreads of their median
 constexpr double biweight_spreads = 4.685;  // 95 % of the efficiency of least squares for normal noise
 constexpr double least_spread = 1e-9;       // of the residuals, by the spread of the output
+constexpr double least_biweight = 1e-12;    // less is 0
 constexpr Eigen::Index least_leaf_rows = 10;
 
 // The outputs, held within `clip_spreads` spreads of their median.
@@ -53,8 +54,8 @@ Eigen::VectorXd biweights(const Model& model, const Eigen::Ref<const Eigen::Matr
       // A spread of 0: more than half of the outputs agree, and are predicted without an error.
       const Eigen::ArrayXd u =
           (spread.array() > 0.0).select(residuals.col(output).array() / (biweight_spreads * spread.array()), 0.0);
-      const Eigen::VectorXd biweight = (1.0 - u.square()).max(0.0).square();
-      weights = weights.cwiseMin(biweight);
+      const Eigen::ArrayXd biweight = (1.0 - u.square()).max(0.0).square();
+      weights = weights.cwiseMin((biweight > least_biweight).select(biweight, 0.0).matrix());
     }
   }
   return weights;
@@ -78,6 +79,11 @@ Eigen::VectorXd robust_weights(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
     if (const int of_row = data.row_of()[row]; of_row >= 0) weights(row) = of_table(of_row);
   }
   return weights;
+}
+
+Eigen::VectorXd without_outliers(const Eigen::VectorXd& given, const Eigen::VectorXd& robust) {
+  const Eigen::VectorXd kept = (robust.array() > 0.0).cast<double>();
+  return given.size() == 0 ? kept : given.cwiseProduct(kept);
 }
 
 }  // namespace llmt

@@ -14,4 +14,7 @@ namespace llmt {
 Eigen::VectorXd robust_weights(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
                                const Eigen::Ref<const Eigen::MatrixXd>& outputs, const FitOptions& options);
 
+/// The weights that rows have in errors: `given` (empty: 1), but 0 for rows whose robust weight is 0.
+Eigen::VectorXd without_outliers(const Eigen::VectorXd& given, const Eigen::VectorXd& robust);
+
 }  // namespace llmt

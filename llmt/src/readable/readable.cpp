@@ -18,6 +18,7 @@
 #include "estimation/leaf_statistics.hpp"
 #include "fit/code_choice.hpp"
 #include "fit/missing_weights.hpp"
+#include "fit/robust_weights.hpp"
 #include "growth/rules/rule.hpp"
 #include "llmt/size.hpp"
 #include "model/codes.hpp"
@@ -263,13 +264,12 @@ ReadableResult fit_inputs(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
   FitOptions linear = options;
   linear.terms = LocalTerms::linear;
   if (fitted.loss_weights.size() > 0) {
-    linear.weights =
-        options.weights.size() == 0 ? fitted.loss_weights : options.weights.cwiseProduct(fitted.loss_weights);
+    linear.weights = without_outliers(options.weights, fitted.loss_weights);
   }
   const FitData data(inputs, outputs, linear, true);
   const Table& table = data.table();
-  Table weighted = table;
-  if (table.inputs.hasNaN()) weighted.weights = table.weights.cwiseProduct(weights_by_missing(table, linear));
+  Table weighted = data.trained(fitted.loss_weights);
+  if (table.inputs.hasNaN()) weighted.weights = weighted.weights.cwiseProduct(weights_by_missing(weighted, linear));
   std::vector<int> rows(table.inputs.rows());
   std::iota(rows.begin(), rows.end(), 0);
   const TrainingRows all = training_rows(weighted, std::move(rows), options.max_threads);

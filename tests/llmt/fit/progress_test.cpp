@@ -19,7 +19,7 @@ struct At {
 std::vector<At> watched_fit(Eigen::Index rows, Eigen::Index inputs, int threads) {
   const Eigen::MatrixXd x = oracle::uniform(rows, inputs, 7);
   std::vector<At> at;
-  llmt::fit_terms(x, oracle::curved(x, 0.1), {.max_threads = threads}, [&](double share, double operations) {
+  llmt::fit_terms(x, oracle::curved(x, 0.1), {.max_threads = threads}, {}, [&](double share, double operations) {
     at.push_back({share, operations});
   });
   return at;

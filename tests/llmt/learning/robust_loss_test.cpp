@@ -4,9 +4,11 @@
 #include <cmath>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "llmt/fit.hpp"
 #include "llmt/random.hpp"
+#include "llmt/readable.hpp"
 #include "oracles/samples.hpp"
 
 namespace {
@@ -58,6 +60,33 @@ TEST(RobustLoss, CostsLittleWhereThereIsNothingWrong) {
   EXPECT_LT(error(robust.model, test), 1.02 * base);
   // Noise that is larger on one side is not taken for outliers.
   EXPECT_LT((robust.summary.loss_weights.array() == 0.0).count(), 20);
+}
+
+// Rows of small weight count in full among the held-out rows, so that the error is that of new rows.
+TEST(RobustLoss, HeldOutErrorIsThatOfNewRows) {
+  const auto with_normal_noise = [](Eigen::Index rows, std::uint64_t seed) {
+    llmt::Random random(seed);
+    Sample s{Eigen::MatrixXd(rows, 2), Eigen::MatrixXd(rows, 1)};
+    for (Eigen::Index i = 0; i < rows; ++i) {
+      s.x.row(i) << random.uniform(-1.0, 1.0), random.uniform(-1.0, 1.0);
+      s.y(i, 0) = 10.0 * std::abs(s.x(i, 0)) + s.x(i, 1) + 0.25 * random.normal();
+    }
+    return s;
+  };
+  const Sample clean = with_normal_noise(2000, 1);
+  Sample wrong = clean;
+  wrong.y(100, 0) += 60.0;
+  wrong.y(700, 0) -= 50.0;
+  wrong.y(1500, 0) += 90.0;
+  const Sample test = with_normal_noise(10000, 2);
+  for (const Sample* each : {&std::as_const(clean), &std::as_const(wrong)}) {
+    const llmt::FitResult robust = llmt::fit(each->x, each->y, tukey);
+    const llmt::PartitionSummary& partition = robust.summary.partitions[0];
+    EXPECT_NEAR(partition.chosen.rmse / error(robust.model, test), 1.0, 0.04);
+    EXPECT_NEAR(partition.train_rmse(0) / error(robust.model, test), 1.0, 0.05);
+    const llmt::ReadableResult readable = llmt::fit_readable(each->x, each->y, tukey, robust.summary);
+    EXPECT_NEAR(readable.partitions[0].rmse / error(readable.model, test), 1.0, 0.04);
+  }
 }
 
 TEST(RobustLoss, OutputBesideWhichAllOthersAreRoundingErrors) {

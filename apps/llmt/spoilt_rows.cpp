@@ -1,0 +1,135 @@
+#include "llmt/spoilt_rows.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "llmt/held_out.hpp"
+#include "llmt/outliers.hpp"
+#include "shared/cli.hpp"
+
+namespace llmt::apps {
+namespace {
+
+constexpr Eigen::Index one_row_in = 100;
+constexpr double most_of_the_error = 0.5;
+constexpr double far_spreads = 15.0;         // of all held-out errors
+constexpr double far_spreads_in_leaf = 8.0;  // of those in the row's leaf
+constexpr Eigen::Index least_leaf_rows = 10;
+constexpr double least_part_in_sample = 0.2;  // of the held-out error
+constexpr std::size_t most_lines_named = 5;
+
+struct HeldOutError {
+  Eigen::Index row = 0;
+  double error = 0.0;
+  int leaf = 0;
+};
+
+// In the order of the folds.
+std::vector<HeldOutError> held_out_errors(const LearningTable& table, const FitResult& result, Eigen::Index output,
+                                          Eigen::Index partition) {
+  const std::vector<Model>& models = result.intervals.models();
+  const Eigen::MatrixXd& inputs = table.inputs.values;
+  const int threads = table.options.max_threads;
+  const std::vector<std::vector<Eigen::Index>> of_folds = held_out_rows(inputs, table.outputs, table.options);
+  std::vector<HeldOutError> errors;
+  for (std::size_t f = 0; f < models.size(); ++f) {
+    const Eigen::MatrixXd taken = inputs(of_folds[f], Eigen::all);
+    const Eigen::VectorXd predicted = models[f].predict(taken, threads).col(output);
+    const Eigen::VectorXi leaves = result.model.leaf_of(taken, threads).col(partition);
+    for (std::size_t k = 0; k < of_folds[f].size(); ++k) {
+      const Eigen::Index row = of_folds[f][k];
+      errors.push_back({row, table.outputs(row, output) - predicted(k), leaves(k)});
+    }
+  }
+  return errors;
+}
+
+double spread_of(const std::vector<double>& values) {
+  return bulk_of(Eigen::Map<const Eigen::VectorXd>(values.data(), std::ssize(values))).spread;
+}
+
+// The spread of the errors in each leaf, or of all errors if that is larger.
+std::map<int, double> spreads_in_leaves(const std::vector<HeldOutError>& errors, double of_all) {
+  std::map<int, std::vector<double>> of_leaves;
+  for (const HeldOutError& each : errors) of_leaves[each.leaf].push_back(each.error);
+  std::map<int, double> spreads;
+  for (const auto& [leaf, values] : of_leaves) {
+    spreads[leaf] = std::ssize(values) < least_leaf_rows ? of_all : std::max(of_all, spread_of(values));
+  }
+  return spreads;
+}
+
+Eigen::Index partition_of(const Model& model, Eigen::Index output) {
+  Eigen::Index partition = 0;
+  while (std::ranges::find(model.partitions()[partition].outputs, output) ==
+         model.partitions()[partition].outputs.end()) {
+    ++partition;
+  }
+  return partition;
+}
+
+}  // namespace
+
+SpoiltRows spoilt_rows(const LearningTable& table, const FitResult& result, Eigen::Index output) {
+  std::vector<HeldOutError> errors = held_out_errors(table, result, output, partition_of(result.model, output));
+  if (errors.empty()) return {};
+  std::vector<double> values;
+  for (const HeldOutError& each : errors) values.push_back(each.error);
+  const double spread = spread_of(values);
+  const std::map<int, double> in_leaves = spreads_in_leaves(errors, spread);
+  const Eigen::VectorXd& weights = table.options.weights;
+  const auto square = [&](const HeldOutError& each) {
+    return (weights.size() > 0 ? weights(each.row) : 1.0) * each.error * each.error;
+  };
+  double all = 0.0;
+  for (const HeldOutError& each : errors) all += square(each);
+  SpoiltRows spoilt{.held_out = std::ssize(errors)};
+  std::ranges::sort(errors, [](const HeldOutError& a, const HeldOutError& b) {
+    const double of_a = std::abs(a.error);
+    const double of_b = std::abs(b.error);
+    return of_a != of_b ? of_a > of_b : a.row < b.row;
+  });
+  errors.resize(std::max<Eigen::Index>(1, std::ssize(errors) / one_row_in));
+  std::erase_if(errors, [&](const HeldOutError& each) {
+    const double error = std::abs(each.error);
+    return !(spread > 0.0 && error > far_spreads * spread && error > far_spreads_in_leaf * in_leaves.at(each.leaf));
+  });
+  for (const HeldOutError& each : errors) {
+    const double predicted = result.model.predict(table.inputs.values.row(each.row))(0, output);
+    if (std::abs(table.outputs(each.row, output) - predicted) < least_part_in_sample * std::abs(each.error)) continue;
+    spoilt.rows.push_back(each.row);
+    spoilt.share += square(each) / all;
+  }
+  if (!(spoilt.share > most_of_the_error)) spoilt.rows.clear();
+  return spoilt;
+}
+
+void warn_of_spoilt_rows(const LearningArguments& arguments, const LearningTable& table, const FitResult& result) {
+  if (table.options.loss != Loss::squared) return;
+  // The user has been told of these.
+  const auto has_heavy_rows = [&](Eigen::Index o) {
+    return !heavy_rows_of_target(table.outputs.col(o), table.options.weights).rows.empty();
+  };
+  for (Eigen::Index o = 0; o < table.outputs.cols(); ++o) {
+    const SpoiltRows spoilt = spoilt_rows(table, result, o);
+    if (spoilt.rows.empty() || has_heavy_rows(o)) continue;
+    const bool one = spoilt.rows.size() == 1;
+    std::string places;
+    for (std::size_t k = 0; k < std::min(spoilt.rows.size(), most_lines_named); ++k) {
+      const Eigen::Index row = spoilt.rows[k];
+      places += fmt::format("{}{} ({:.4g})", k == 0 ? "" : ", ", table.lines[row], table.outputs(row, o));
+    }
+    warn(fmt::format(
+        "llmt: {} of {} held-out rows {} {:.0f} % of the held-out squared error of \"{}\": {} {}{}. If {}, correct {} "
+        "or use --loss tukey, which leaves such rows out",
+        spoilt.rows.size(), spoilt.held_out, one ? "carries" : "carry", 100.0 * spoilt.share,
+        arguments.targets[static_cast<std::size_t>(o)], one ? "line" : "lines", places,
+        spoilt.rows.size() > most_lines_named ? " and more" : "",
+        one ? "this target is a mistake" : "these targets are mistakes", one ? "it" : "them"));
+  }
+}
+
+}  // namespace llmt::apps
