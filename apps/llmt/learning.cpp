@@ -75,12 +75,12 @@ void look_for_heavy_rows(const Csv& csv, const LearningArguments& arguments, con
     if (heavy.hide_the_others) {
       throw std::runtime_error(fmt::format(
           "{}:{}: column \"{}\": {:.6g} is so large that the differences between all other values are below its "
-          "rounding error; correct it, leave the row out, or use --loss tukey",
+          "rounding error; correct it, delete the line, or use --loss tukey of llmt fit",
           csv.name(), csv.line_of(heavy.rows.front()), name, target(heavy.rows.front())));
     }
     warn(fmt::format(
         "llmt: {} of {} rows {} {:.3g} % of the squares of \"{}\" about its median: {}. If they are mistakes, correct "
-        "them or use --loss tukey",
+        "them or use llmt fit --loss tukey",
         heavy.rows.size(), target.size(), heavy.rows.size() == 1 ? "carries" : "carry", 100.0 * heavy.share, name,
         places_of(csv, heavy.rows, target)));
   }

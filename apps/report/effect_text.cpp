@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "llmt/robotics/effects.hpp"
@@ -15,7 +16,7 @@ namespace llmt::apps {
 namespace {
 
 // "presliding_rad" of 0.04 -> "presliding 0.04 rad".
-std::string constant_words(std::string key, double value) {
+std::string constant_words(std::string key, double value, const std::optional<double>& error) {
   std::string unit;
   for (const std::string suffix : {"rad", "mm", "Nm", "N", "C"}) {
     if (!key.ends_with("_" + suffix)) continue;
@@ -28,14 +29,14 @@ std::string constant_words(std::string key, double value) {
     unit = " %";
   }
   std::ranges::replace(key, '_', ' ');
-  return fmt::format("{} {:.5g}{}", key, value, unit);
+  return fmt::format("{} {:.5g}{}{}", key, value, error ? fmt::format(" +- {}", number(*error, 2)) : "", unit);
 }
 
-std::string constants_text(const robotics::Effect& effect) {
+std::string constants_text(const robotics::Effect& effect, const std::optional<double>& error_of_first = {}) {
   const robotics::EffectType& type = robotics::effect_type(effect.type);
   std::vector<std::string> parts;
   for (std::size_t k = 0; k < type.constants.size() && k < effect.constants.size(); ++k) {
-    parts.push_back(constant_words(type.constants[k].key, effect.constants[k]));
+    parts.push_back(constant_words(type.constants[k].key, effect.constants[k], k == 0 ? error_of_first : std::nullopt));
   }
   return parts.empty() ? "" : fmt::format(" ({})", fmt::join(parts, ", "));
 }
@@ -66,7 +67,9 @@ std::string place_of(const robotics::FoundEffect& effect) {
   return effect.effect.at.empty() ? "the whole arm" : effect.effect.at;
 }
 
-std::string constants_of(const robotics::FoundEffect& effect) { return constants_text(effect.effect); }
+std::string constants_of(const robotics::FoundEffect& effect) {
+  return constants_text(effect.effect, effect.constant_error);
+}
 
 std::vector<const robotics::FoundEffect*> by_size(const robotics::Discovery& found) {
   std::vector<const robotics::FoundEffect*> effects;

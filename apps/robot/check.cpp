@@ -8,6 +8,7 @@
 #include "llmt/robotics/robot_file.hpp"
 #include "llmt/robotics/urdf.hpp"
 #include "robot/commands.hpp"
+#include "robot/measured_file.hpp"
 #include "shared/cli.hpp"
 #include "shared/options.hpp"
 
@@ -23,6 +24,7 @@ struct CheckArguments {
   bool same_session = false;
   double accuracy_mm = 0.0;
   double level = 0.05;
+  std::string columns;
   DecimalMark mark = DecimalMark::point;
   bool json = false;
 };
@@ -146,7 +148,7 @@ void check_command(const CheckArguments& arguments) {
       [](const std::string& path) { return robotics::read_corrected_robot(path); });
   if (!arguments.same_session) robot.robot = for_any_session(robot.robot);
   const robotics::Measurements measurements =
-      robotics::read_measurements(arguments.data, robot.robot, {}, arguments.mark);
+      read_measured(arguments.data, robot.robot, {}, {.columns = arguments.columns, .mark = arguments.mark});
   check_frames(arguments.data, robot.robot, measurements,
                arguments.same_session ? "" : "; check judges a file of one session and known targets");
   check_positions(arguments.robot, robot.robot, measurements.poses);
@@ -192,6 +194,7 @@ void add_check(CLI::App& app) {
   add_number(*command, "--level", arguments->level, NumberRange{1e-6, 0.5, "a number from 1e-6 to 0.5"},
              "Probability that something is said to have moved although nothing has")
       ->capture_default_str();
+  add_column_map(*command, arguments->columns);
   add_decimal_comma(*command, arguments->mark);
   command->add_flag("--json", arguments->json, "Print the result as JSON");
   command->callback([arguments] { check_command(*arguments); });

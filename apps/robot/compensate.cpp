@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <map>
 #include <memory>
 #include <stdexcept>
 
@@ -93,15 +94,22 @@ robotics::Targets asked(const CompensateArguments& arguments, const CorrectedRob
   return targets;
 }
 
+// From rad or mm to the unit at the end of a column's name.
+double to_unit_of(const std::string& column, const robotics::Joint& joint) {
+  const std::map<std::string, double> units = {
+      {"rad", 1.0}, {"deg", robotics::to_limit_unit(joint)}, {"mm", 1.0}, {"m", 1e-3}, {"um", 1e3}};
+  return units.at(column.substr(column.rfind('_') + 1));
+}
+
 std::string commands_csv(const CorrectedRobot& robot, const robotics::TargetTable& table, const Compensation& found) {
   std::vector<std::string> names;
   std::vector<Eigen::VectorXd> columns;
   for (std::size_t j = 0; j < robot.robot.chain.joints.size(); ++j) {
     const robotics::Joint& joint = robot.robot.chain.joints[j];
     if (joint.mimic) continue;  // it has no drive
-    const bool in_radians = joint.type == robotics::JointType::revolute && !table.joints_in_degrees;
-    names.push_back(fmt::format("q{}_{}", j + 1, in_radians ? "rad" : robotics::limit_unit(joint)));
-    columns.emplace_back(found.commands.joints.col(j) * (in_radians ? 1.0 : robotics::to_limit_unit(joint)));
+    const bool is_named = !table.joint_columns.empty() && !table.joint_columns[j].empty();
+    names.push_back(is_named ? table.joint_columns[j] : fmt::format("q{}_{}", j + 1, robotics::limit_unit(joint)));
+    columns.emplace_back(found.commands.joints.col(j) * to_unit_of(names.back(), joint));
   }
   for (const auto& [name, values] : found.commands.covariates) {
     if (robotics::is_move(name)) continue;

@@ -140,7 +140,7 @@ void discover_command(DiscoverArguments arguments) {
   print(fmt::format("{}: {} of {}, {} {} set aside\n{}\n", arguments.data, counts_of(data), robot.chain.name,
                     test ? 0 : found.held_out.poses, data.poses.observations.empty() ? "of them" : "poses",
                     use_of_orientations(data)));
-  print(discovery_page(found));
+  print(discovery_page(found, data.lines));
   print(next_poses_text(next));
   if (!folds.is_null()) {
     print(fmt::format("{} {} folds, everything found anew in each: {:.4f} -> {:.4f} mm mean on the poses left out\n",

@@ -15,17 +15,6 @@ namespace {
 using robotics::Discovery;
 using robotics::FoundEffect;
 
-std::string constants_with_error(const FoundEffect& effect) {
-  const robotics::EffectType& type = robotics::effect_type(effect.effect.type);
-  std::vector<std::string> parts;
-  for (std::size_t k = 0; k < type.constants.size() && k < effect.effect.constants.size(); ++k) {
-    std::string text = fmt::format("{} {:.5g}", type.constants[k].key, effect.effect.constants[k]);
-    if (k == 0 && effect.constant_error) text += fmt::format(" +- {}", number(*effect.constant_error, 2));
-    parts.push_back(std::move(text));
-  }
-  return parts.empty() ? "" : fmt::format(" ({})", fmt::join(parts, ", "));
-}
-
 // Every effect with all that is known of it.
 std::string effect_lines(const Discovery& found) {
   std::string text;
@@ -33,7 +22,7 @@ std::string effect_lines(const Discovery& found) {
     const FoundEffect& effect = *one;
     text +=
         fmt::format("  {}{}{}, {}{}\n", effect.confirmed ? "" : "perhaps ", effect.smaller ? "also " : "", effect.title,
-                    effect.effect.at.empty() ? "the whole arm" : effect.effect.at, constants_with_error(effect));
+                    effect.effect.at.empty() ? "the whole arm" : effect.effect.at, constants_of(effect));
     if (&whole_of(found, effect) != &effect) text += "    a part of the effect of this name above\n";
     const std::string values = effect_values(found, effect);
     if (!values.empty()) text += fmt::format("    {}\n", values);

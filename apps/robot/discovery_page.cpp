@@ -305,7 +305,7 @@ std::string effect_values(const Discovery& found, const FoundEffect& effect) {
   return fmt::format("{}", fmt::join(values, ", "));
 }
 
-std::string discovery_page(const Discovery& found) {
+std::string discovery_page(const Discovery& found, const std::vector<Eigen::Index>& lines_of_file) {
   std::vector<std::string> lines;
   const auto add = [&](const std::string& text) {
     for (std::string& line : wrapped(text)) lines.push_back(std::move(line));
@@ -325,11 +325,11 @@ std::string discovery_page(const Discovery& found) {
   for (const std::string& sentence : error_sentences(found)) add(sentence);
   if (!found.outliers.empty()) {
     std::vector<std::string> rows;
-    for (const Eigen::Index row : found.outliers) rows.push_back(std::to_string(row + 1));
+    for (const Eigen::Index row : found.outliers) rows.push_back(std::to_string(lines_of_file[row]));
     constexpr std::size_t shown = 20;
     const std::size_t more = rows.size() > shown ? rows.size() - shown : 0;
     rows.resize(rows.size() - more);
-    add(fmt::format("Outliers, left out (number of the measurement in the file): {}{}", fmt::join(rows, ", "),
+    add(fmt::format("Outliers, left out: line{} {}{}", rows.size() == 1 ? "" : "s", fmt::join(rows, ", "),
                     more > 0 ? fmt::format(" and {} more", more) : ""));
   }
   for (const std::string& note : found.notes) add(note);

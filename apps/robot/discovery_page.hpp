@@ -10,7 +10,8 @@
 namespace llmt::apps {
 
 /// What was found, in the words of an engineer who has to act on it: at most 24 lines of 100 columns, then details.
-std::string discovery_page(const robotics::Discovery& found);
+/// `lines_of_file`: of the measurements, row by row.
+std::string discovery_page(const robotics::Discovery& found, const std::vector<Eigen::Index>& lines_of_file);
 
 /// Everything else that is known: values, shapes, where the gap is, what could not be tested.
 std::string discovery_details(const robotics::Discovery& found);

@@ -9,8 +9,12 @@
 
 namespace llmt::apps {
 
+void add_column_map(CLI::App& command, std::string& path) {
+  add_input_file(command, "--columns", path, "Column map (YAML): what the columns of the file mean");
+}
+
 void add_measured_file_options(CLI::App& command, MeasuredFileOptions& options) {
-  add_input_file(command, "--columns", options.columns, "Column map (YAML): what the columns of the file mean");
+  add_column_map(command, options.columns);
   command.add_flag("--orientations", options.orientations, "Use the measured orientations as well as the positions");
   add_decimal_comma(command, options.mark);
 }

@@ -16,6 +16,9 @@ struct MeasuredFileOptions {
   DecimalMark mark = DecimalMark::point;
 };
 
+/// --columns.
+void add_column_map(CLI::App& command, std::string& path);
+
 /// --columns, --orientations and --decimal-comma.
 void add_measured_file_options(CLI::App& command, MeasuredFileOptions& options);
 

@@ -147,16 +147,18 @@ void print_selection(const PosesArguments& arguments, const robotics::Robot& rob
   print(fmt::format("{}: {} poses chosen{} to identify {} parameters; criterion: {}\n\n", robot.chain.name,
                     selection.poses.count(), with, selection.chosen.parameters.size(),
                     arguments.criterion == criteria[0] ? "error of the tool position" : arguments.criterion));
-  print(expectations(selection, arguments.criterion != criteria[0]));
+  const bool with_indices = arguments.criterion != criteria[0];
+  print(expectations(selection, with_indices));
   print(fmt::format(
       "Error of the tool position: root mean square {}, for noise of {} um in each coordinate; the noise "
-      "alone, no error of the model. {} get below {} mm. Random: the median of 25 draws.\n"
-      "O1 to O5: the larger the better; derivatives over the noise, parameters in units of 1 mm and 0.1 deg "
-      "(those of effects: their scales), the identifiable ones.\n\n",
+      "alone, no error of the model. {} get below {} mm. Random: the median of 25 draws.\n{}\n",
       use_words(arguments), number(arguments.noise_um),
       arguments.from.empty() ? fmt::format("As far as the search sees, no {} poses", selection.poses.count())
                              : fmt::format("No {} of the candidates", selection.poses.count()),
-      number(selection.bound_mm, 4)));
+      number(selection.bound_mm, 4),
+      with_indices ? "O1 to O5: the larger the better; derivatives over the noise, parameters in units of 1 mm and 0.1 "
+                     "deg (those of effects: their scales), the identifiable ones.\n"
+                   : ""));
   print(expected_errors(selection));
   std::vector<std::string> dependent;
   for (const robotics::FixedParameter& fixed : selection.fixed) {

@@ -172,6 +172,15 @@ Eigen::MatrixXd Header::joints() const {
   return all;
 }
 
+std::vector<std::string> Header::joint_columns() const {
+  std::vector<std::string> columns;
+  for (std::size_t j = 0; j < robot_.chain.joints.size(); ++j) {
+    const auto found = quantities_.find(fmt::format("q{}", j + 1));
+    columns.push_back(found == quantities_.end() ? "" : found->second.column);
+  }
+  return columns;
+}
+
 Eigen::MatrixXd Header::points_mm(const std::string& target, std::array<bool, 3>& measured) const {
   Eigen::MatrixXd points = Eigen::MatrixXd::Zero(csv_.rows(), 3);
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -301,7 +310,7 @@ std::vector<std::string> Header::hints() const {
       {std::regex("(session|setup|station|series)([_ -]?(name|id|nr|no))?", std::regex::icase), "session"},
       {std::regex("(tau|torque|current|load)[_ -]?[0-9]+.*", std::regex::icase), "tau1_Nm, tau2_Nm, ..."},
       {std::regex("temp(erature)?([_ -].*)?|.*[_ -]temp(erature)?", std::regex::icase), "temp_C"},
-      {std::regex("time([_ -]?stamp)?|timestamp", std::regex::icase), "time_s"},
+      {std::regex("time([_ -]?stamp)?|timestamp", std::regex::icase), "time_s, in seconds"},
       {std::regex("payload|load([_ -]?kg)?|mass([_ -]?kg)?", std::regex::icase), "payload_kg"},
       {std::regex("(std|sigma|u95|uncertainty)([_ -]?[xyz])?([_ -]?(mm|um|m))?|.*[_ -](std|sigma|unc)([_ -]?[xyz])?",
                   std::regex::icase),

@@ -21,10 +21,12 @@ class Header {
   bool has(const std::string& quantity) const { return quantities_.contains(quantity); }
   bool has_plane() const { return words_.contains("plane"); }
   bool has_joints() const { return quantities_.lower_bound("q0") != quantities_.lower_bound("q:"); }  // q1, q2, ...
-  bool in_degrees(const std::string& quantity) const { return quantities_.at(quantity).unit == "deg"; }
 
   /// n x J in rad and mm. Joints that mimic others need no column.
   Eigen::MatrixXd joints() const;
+
+  /// Of the file, joint by joint; empty where a joint that mimics another has none.
+  std::vector<std::string> joint_columns() const;
 
   /// Prefixes of the columns of targets, in the order of the columns: "" for x_mm, "t2_" for t2_x_mm.
   const std::vector<std::string>& targets() const { return targets_; }

@@ -305,7 +305,7 @@ TargetTable read_targets(const std::string& path, const Robot& robot, DecimalMar
   if (targets.lines.empty()) throw std::runtime_error(fmt::format("{}: there are no targets", csv.name()));
   if (header.has_joints()) {
     targets.joints = header.joints();
-    targets.joints_in_degrees = header.in_degrees("q1");
+    targets.joint_columns = header.joint_columns();
   }
   if (header.has("x") || header.has("y") || header.has("z")) {
     for (const char* axis : {"x", "y", "z"}) {

@@ -146,10 +146,10 @@ Poses read_poses(const std::string& path, const Robot& robot, DecimalMark mark =
 
 /// What a file asks a robot for, row by row.
 struct TargetTable {
-  Eigen::MatrixXd joints;         ///< n x J as in Poses, or empty if the file has no joint columns
-  bool joints_in_degrees = true;  ///< how the file writes revolute joints
-  Eigen::MatrixXd positions_mm;   ///< n x 3, or empty
-  Orientation orientation;        ///< empty values if there is none
+  Eigen::MatrixXd joints;                  ///< n x J as in Poses, or empty if the file has no joint columns
+  std::vector<std::string> joint_columns;  ///< their names in the file, with unit; empty for those that it lacks
+  Eigen::MatrixXd positions_mm;            ///< n x 3, or empty
+  Orientation orientation;                 ///< empty values if there is none
   std::map<std::string, Eigen::VectorXd> covariates;
   std::vector<std::string> unused_columns;
   std::vector<Eigen::Index> lines;  ///< of the file, for messages
