@@ -147,6 +147,10 @@ std::string verdict(const CalibrationFacts& facts) {
 // "only x and y were measured", or nothing.
 std::string missing_axes(const robotics::Measurements& measurements) {
   if (kind_of(measurements) == "distance") return "";
+  const std::vector<robotics::Observation>& observations = measurements.poses.observations;
+  if (!observations.empty() && robotics::is_plane(observations.front().base)) {
+    return "Note: all errors are distances from the planes\n";
+  }
   std::vector<std::string> seen;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     if (measurements.measured[axis]) seen.emplace_back(1, "xyz"[axis]);

@@ -52,7 +52,8 @@ void print_check(const CheckArguments& arguments, const robotics::Robot& robot, 
       arguments.accuracy_mm > 0.0 ? "stated" : "at calibration", check.accuracy_mm, check.limit_mm));
   if (check.accuracy_is_of_noise) {
     print(
-        "The description has no error on poses left out: that figure comes from the poses it was fitted to, and new "
+        "The description has no error of these coordinates on poses left out: that figure comes from the poses it was "
+        "fitted to, and new "
         "poses are worse. --accuracy-mm says what is good enough.\n");
   }
   if (check.moved.empty()) {

@@ -235,8 +235,8 @@ void compensate_command(const CompensateArguments& arguments) {
   name_made_up(targets.start, found.commands);
   name_rows(arguments, table, found);
   if (!table.unused_columns.empty()) warn(fmt::format("Columns not used: {}", fmt::join(table.unused_columns, ", ")));
-  if (!targets.rotations.empty() && robot.robot.chain.joints.size() < 6) {
-    warn(fmt::format("{} has fewer than six joints: orientations are not kept", robot.robot.chain.name));
+  if (!targets.rotations.empty() && robotics::drive_count(robot.robot.chain) < 6) {
+    warn(fmt::format("{} has fewer than six drives: orientations are not kept", robot.robot.chain.name));
   }
   if (!arguments.output.empty()) write_file(arguments.output, csv);
   if (arguments.json) {

@@ -23,9 +23,14 @@ void llmt::apps::check_frames(const std::string& file, const robotics::Robot& ro
   for (std::size_t row = 0; row < observations.size(); ++row) {
     const bool is_session = lacks(robot.chain.bases, observations[row].base);
     if (!is_session && !lacks(robot.chain.tools, observations[row].tool)) continue;
+    const std::string& base = observations[row].base;
+    if (is_session && (robotics::is_socket(base) || robotics::is_plane(base))) {
+      throw std::runtime_error(fmt::format("{}:{}: the {} was not part of the calibration, and shows nothing by itself",
+                                           file, measurements.lines[row], base));
+    }
     throw std::runtime_error(fmt::format("{}:{}: {} \"{}\" was not part of the calibration{}", file,
                                          measurements.lines[row], is_session ? "session" : "target",
-                                         is_session ? observations[row].base : observations[row].tool, advice));
+                                         is_session ? base : observations[row].tool, advice));
   }
 }
 
@@ -58,7 +63,7 @@ void llmt::apps::name_made_up(const robotics::Poses& given, const robotics::Pose
   if (names.empty()) return;
   warn(
       fmt::format("Columns that effects need and the table does not have: {}. Directions and moves are those of going "
-                  "from row to row, everything else is neutral (docs/commands.md)",
+                  "from row to row, order counts the rows, everything else is neutral (docs/commands.md)",
                   fmt::join(names, ", ")));
 }
 

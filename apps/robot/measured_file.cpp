@@ -38,6 +38,8 @@ std::string counts_of(const robotics::Measurements& measurements) {
   std::set<Eigen::Index> stands;
   std::set<std::string> tools;
   std::set<std::string> bases;
+  std::set<std::string> sockets;
+  std::set<std::string> planes;
   bool distances = false;
   for (const robotics::Observation& seen : poses.observations) {
     stands.insert(seen.stand);
@@ -45,7 +47,13 @@ std::string counts_of(const robotics::Measurements& measurements) {
     tools.insert(seen.tool == seen.base                                         ? std::string()
                  : seen.tool.starts_with(seen.base + "/") && !seen.base.empty() ? seen.tool.substr(seen.base.size() + 1)
                                                                                 : seen.tool);
-    bases.insert(seen.base);
+    if (robotics::is_socket(seen.base)) {
+      sockets.insert(seen.base);
+    } else if (robotics::is_plane(seen.base)) {
+      planes.insert(seen.base);
+    } else {
+      bases.insert(seen.base);
+    }
     distances = distances || seen.reading == robotics::Reading::distance;
   }
   std::string text = fmt::format("{} poses", stands.size());
@@ -57,6 +65,11 @@ std::string counts_of(const robotics::Measurements& measurements) {
   if (tools.size() > 1) text += fmt::format(", {} points of {} targets", points, tools.size());
   if (distances) text += fmt::format(", {} distances", points);
   if (bases.size() > 1) text += fmt::format(", {} sessions", bases.size());
+  const auto add = [&](std::size_t count, const char* what) {
+    if (count > 0) text += fmt::format(", {} {}{}", count, what, count == 1 ? "" : "s");
+  };
+  add(sockets.size(), "socket");
+  add(planes.size(), "plane");
   const auto turns = std::ssize(robotics::orientation_rows(poses));
   if (turns > 0) text += fmt::format(", {} orientations", turns);
   return text;

@@ -213,21 +213,6 @@ discovery::SolverResult register_frames(Robot& robot, const Measurements& measur
 
 namespace {
 
-// An arm, its sockets and planes twice as large fit as well.
-void keep_scale(const Chain& chain, const Poses& poses, std::vector<std::string>& reasons) {
-  const auto has_no_scale = [](const Observation& seen) { return is_socket(seen.base) || is_plane(seen.base); };
-  if (poses.observations.empty() || !std::ranges::all_of(poses.observations, has_no_scale)) return;
-  std::vector<std::pair<double, Eigen::Index>> lengths;
-  for (std::size_t j = 0; j < chain.joints.size(); ++j) {
-    const bool slides = chain.joints[j].type == JointType::prismatic;
-    if (slides) return;  // its travel is a length that is known
-    lengths.emplace_back(std::abs(chain.joints[j].a_mm), joint_parameter(j, JointParameter::a));
-    lengths.emplace_back(std::abs(chain.joints[j].d_mm), joint_parameter(j, JointParameter::d));
-  }
-  std::erase_if(lengths, [&](const auto& length) { return !reasons[length.second].empty(); });
-  if (!lengths.empty()) reasons[std::ranges::max(lengths).second] = "no reading shows the scale";
-}
-
 Calibration calibrate_without_maps(const Robot& robot, const Measurements& measurements,
                                    const CalibrationOptions& options) {
   Calibration calibration;
@@ -246,7 +231,7 @@ Calibration calibrate_without_maps(const Robot& robot, const Measurements& measu
     calibration.registration.residuals = problem.residual(calibration.registration.values);
   }
   std::vector<std::string> reasons = reasons_to_fix(robot, options);
-  keep_scale(robot.chain, measurements.poses, reasons);
+  fix_what_sockets_take_up(robot, measurements.poses, reasons);
   Eigen::MatrixXd jacobian = discovery::evaluate_jacobian(problem, calibration.registration.values);
   // Which geometry is of no use shows on the rigid arm: on one that bends, a combination that moves nothing when rigid
   // moves loads, and would be identified from the thousandth part of an effect.
@@ -255,6 +240,7 @@ Calibration calibrate_without_maps(const Robot& robot, const Measurements& measu
   const Eigen::Index geometric = geometric_parameter_count(rigid.chain);
   jacobian.leftCols(geometric) = position_jacobian(rigid, measurements.poses)(measured_rows(measurements), Eigen::all);
   fix_dependent(problem.parameters, jacobian, geometric, options.dependence_tolerance, reasons);
+  keep_scale(calibration.registered, measurements.poses, options, reasons);
   identify(calibration, measurements, problem, reasons, options);
   calibration.robot.identified = identified_parameters(calibration.result, reasons);
   calibration.robot.calibration = record_of(calibration, measurements);

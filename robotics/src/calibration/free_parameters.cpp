@@ -11,9 +11,16 @@
 #include "kinematics/units.hpp"
 
 namespace llmt::robotics {
-namespace {
 
 std::string owner_of(const std::string& name) { return name.substr(0, name.rfind('.')); }
+
+namespace {
+
+// Why parameters stay as they are, as descriptions have it.
+constexpr const char* by_user = "fixed by the user";
+constexpr const char* no_angles = "a socket has no angles";
+constexpr const char* unseen_scale = "no reading shows the scale";
+constexpr const char* unseen_turn = "base and sockets take it up";
 
 std::vector<bool> matches(const std::vector<discovery::Parameter>& parameters, const std::vector<std::string>& names,
                           const char* role) {
@@ -97,10 +104,59 @@ std::vector<std::string> reasons_to_fix(const Robot& robot, const CalibrationOpt
   for (std::size_t k = 0; k < all.size(); ++k) {
     const std::string owner = owner_of(all[k].name);
     const bool is_angle = all[k].name[owner.size() + 1] == 'r';
-    if (is_angle && owner.starts_with("base@") && is_socket(owner.substr(5))) reasons[k] = "a socket has no angles";
-    if (fixed[k] || (!options.only.empty() && !only[k])) reasons[k] = "fixed by the user";
+    if (is_angle && owner.starts_with("base@") && is_socket(owner.substr(5))) reasons[k] = no_angles;
+    if (fixed[k] || (!options.only.empty() && !only[k])) reasons[k] = by_user;
   }
   return reasons;
+}
+
+void fix_what_sockets_take_up(const Robot& robot, const Poses& poses, std::vector<std::string>& reasons) {
+  const auto in_socket = [](const Observation& seen) { return is_socket(seen.base); };
+  if (std::ranges::none_of(poses.observations, in_socket)) return;
+  const bool has_points = std::ranges::any_of(
+      poses.observations, [&](const Observation& seen) { return !is_socket(seen.base) && !is_plane(seen.base); });
+  const bool base_is_known = !reasons[base_parameter(FrameParameter::rx)].empty();
+  if (has_points && base_is_known) return;
+  std::vector<JointParameter> turns = {JointParameter::theta};
+  if (robot.chain.convention == Convention::mdh) {
+    turns.insert(turns.end(), {JointParameter::alpha, JointParameter::beta});
+  }
+  if (robot.chain.joints.front().type == JointType::prismatic) return;
+  for (const JointParameter which : turns) {
+    std::string& reason = reasons[joint_parameter(0, which)];
+    if (reason.empty()) reason = unseen_turn;
+  }
+}
+
+void keep_scale(const Robot& robot, const Poses& poses, const CalibrationOptions& options,
+                std::vector<std::string>& reasons) {
+  const Chain& chain = robot.chain;
+  const auto has_no_scale = [](const Observation& seen) { return is_socket(seen.base) || is_plane(seen.base); };
+  if (poses.observations.empty() || !std::ranges::all_of(poses.observations, has_no_scale)) return;
+  const auto slides = [](const Joint& joint) { return joint.type == JointType::prismatic; };
+  if (std::ranges::any_of(chain.joints, slides)) return;  // its travel is a length that is known
+  const std::vector<discovery::Parameter> all = parameters(robot);
+  constexpr double too_short_mm = 1.0;  // to give the scale
+  Eigen::Index longest = -1;
+  for (Eigen::Index k = 0; k < geometric_parameter_count(chain); ++k) {
+    const discovery::Parameter& parameter = all[k];
+    const bool is_of_base = parameter.name.starts_with("base");
+    if (parameter.unit != "mm" || is_of_base || std::abs(parameter.value) < too_short_mm) continue;
+    const bool has_prior = options.priors.contains(parameter.name) || options.priors.contains(owner_of(parameter.name));
+    if (reasons[k] == by_user || has_prior) return;
+    if (!reasons[k].empty() || is_frame_parameter(parameter.name)) continue;
+    if (longest < 0 || std::abs(parameter.value) > std::abs(all[longest].value)) longest = k;
+  }
+  if (longest >= 0) reasons[longest] = unseen_scale;
+}
+
+std::set<std::string> unseen_by_sockets_and_planes(const Robot& robot) {
+  std::set<std::string> names;
+  for (const IdentifiedParameter& entry : robot.identified) {
+    const bool is_unseen = entry.state == unseen_scale || entry.state == unseen_turn || entry.state == no_angles;
+    if (is_unseen) names.insert(entry.name);
+  }
+  return names;
 }
 
 void fix_dependent(const std::vector<discovery::Parameter>& parameters, const Eigen::MatrixXd& jacobian,

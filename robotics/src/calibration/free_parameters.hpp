@@ -1,6 +1,7 @@
 // Which parameters of a robot a calibration may free.
 #pragma once
 
+#include <set>
 #include <string>
 #include <vector>
 
@@ -9,9 +10,25 @@
 
 namespace llmt::robotics {
 
+/// "joint2" of the parameter "joint2.a".
+std::string owner_of(const std::string& name);
+
 /// Per parameter of parameters(robot): empty if it may be free, else why it is fixed. Options and convention only, no
 /// data.
 std::vector<std::string> reasons_to_fix(const Robot& robot, const CalibrationOptions& options);
+
+/// Adds a reason to rotations of the first joint that turning base and sockets does as well. That residuals keep their
+/// lengths, not their columns, makes it so: fix_dependent() does not see it.
+void fix_what_sockets_take_up(const Robot& robot, const Poses& poses, std::vector<std::string>& reasons);
+
+/// Where all readings are of sockets and planes, an arm, its sockets and planes twice as large fit as well: adds a
+/// reason to the longest length of a joint that is still free, unless a length is known by the options or a joint
+/// slides.
+void keep_scale(const Robot& robot, const Poses& poses, const CalibrationOptions& options,
+                std::vector<std::string>& reasons);
+
+/// Names of the parameters that the robot's calibration kept for one of these reasons.
+std::set<std::string> unseen_by_sockets_and_planes(const Robot& robot);
 
 /// Adds the reasons the data give: in order, every parameter whose column of `jacobian` depends on the columns of free
 /// parameters before it but for a share of its norm: `geometric_tolerance` for the first `geometric` parameters, a

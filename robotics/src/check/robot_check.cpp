@@ -58,10 +58,16 @@ void set_limit(const Robot& robot, const Measurements& measurements, const Check
       robot.calibration.has_value(),
       "the description does not say how accurate it was: accuracy_mm is needed, or a calibration of today's format");
   const CalibrationRecord& record = *robot.calibration;
-  result.accuracy_is_of_noise = !record.held_out_mm;
-  result.accuracy_mm = record.held_out_mm.value_or(mean_distance(record.noise_mm, measurements));
+  // Errors of two coordinates are smaller than those of three.
+  const auto axes = std::ranges::count(measurements.measured, true);
+  const bool had_three = record.coordinates >= 3 * record.poses;
+  const bool is_alike = axes == 3 ? had_three : !had_three && record.coordinates == axes * record.poses;
+  const bool has_error = record.held_out_mm && is_alike;
+  result.accuracy_is_of_noise = !has_error;
+  result.accuracy_mm = has_error ? *record.held_out_mm : mean_distance(record.noise_mm, measurements);
   constexpr double share_of_mean = 0.422;  // standard deviation of a normal vector's length over its mean
-  const double spread = record.held_out_sd_mm.value_or(share_of_mean * result.accuracy_mm);
+  const double of_noise = share_of_mean * result.accuracy_mm;
+  const double spread = has_error ? record.held_out_sd_mm.value_or(of_noise) : of_noise;
   const double error =
       spread * std::sqrt(1.0 / static_cast<double>(measurements.count()) + 1.0 / static_cast<double>(record.poses));
   constexpr double one_in_a_hundred = 2.33;
@@ -72,10 +78,12 @@ void set_limit(const Robot& robot, const Measurements& measurements, const Check
 // Columns of the Jacobian that take part: all but joint maps and what the convention leaves out.
 std::vector<Eigen::Index> columns_of(const Robot& robot) {
   const std::vector<std::string> reasons = reasons_to_fix(robot, {});
+  const std::set<std::string> unseen = unseen_by_sockets_and_planes(robot);
+  const std::vector<discovery::Parameter> all = parameters(robot);
   std::vector<Eigen::Index> columns;
   Eigen::Index next = 0;
   for (; next < geometric_parameter_count(robot.chain); ++next) {
-    if (reasons[next].empty()) columns.push_back(next);
+    if (reasons[next].empty() && !unseen.contains(all[next].name)) columns.push_back(next);
   }
   for (const Effect& effect : robot.effects) {
     for (std::size_t k = 0; k < effect.values.size(); ++k, ++next) {
@@ -84,8 +92,6 @@ std::vector<Eigen::Index> columns_of(const Robot& robot) {
   }
   return columns;
 }
-
-std::string owner_of(const std::string& name) { return name.substr(0, name.rfind('.')); }
 
 // Of any session, and of any target: "base@tuesday.x" belongs to a base.
 bool is_of_base(const std::string& name) { return name.starts_with("base.") || name.starts_with("base@"); }

@@ -44,7 +44,7 @@ void check(const Robot& robot, const Targets& targets) {
 
 Goal goal_of(const Robot& robot, const Targets& targets, Eigen::Index row) {
   Goal goal{.position_mm = targets.positions_mm.row(row).transpose(), .rotation = std::nullopt};
-  const bool can_turn = std::ssize(robot.chain.joints) >= joints_of_a_pose;
+  const bool can_turn = drive_count(robot.chain) >= joints_of_a_pose;
   if (can_turn && !targets.rotations.empty()) goal.rotation = targets.rotations[row];
   return goal;
 }

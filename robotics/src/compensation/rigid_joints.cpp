@@ -65,7 +65,7 @@ Eigen::MatrixXd rigid_joints(const Robot& robot, const Targets& targets) {
   Eigen::MatrixXd result(targets.positions_mm.rows(), joints);
   for (Eigen::Index row = 0; row < result.rows(); ++row) {
     Goal goal{.position_mm = targets.positions_mm.row(row).transpose(), .rotation = std::nullopt};
-    if (joints >= 6 && !targets.rotations.empty()) goal.rotation = targets.rotations[row];
+    if (drive_count(robot.chain) >= 6 && !targets.rotations.empty()) goal.rotation = targets.rotations[row];
     Inverse::Solution solution{.q = last};
     if (row > 0) solution = inverse.solve(goal, last, forward);
     if (!solution.converged) solution = by_many_starts(inverse, goal, last, forward);

@@ -3,6 +3,7 @@
 #include <Eigen/QR>
 #include <algorithm>
 
+#include "calibration/free_parameters.hpp"
 #include "calibration/noise_model.hpp"
 #include "discovery/pose_split.hpp"
 #include "hypotheses/catalogue_effects.hpp"
@@ -23,11 +24,23 @@ Eigen::VectorXd stacked_residuals(const Robot& robot, const Measurements& measur
   return residuals;
 }
 
+std::vector<Eigen::Index> freed_geometry(const Robot& robot) {
+  std::vector<Eigen::Index> columns;
+  const std::vector<discovery::Parameter> all = parameters(robot);
+  for (Eigen::Index k = 0; k < geometric_parameter_count(robot.chain); ++k) {
+    const auto identified = std::ranges::find(robot.identified, all[k].name, &IdentifiedParameter::name);
+    if (identified != robot.identified.end() && identified->state.starts_with("free")) columns.push_back(k);
+  }
+  return columns;
+}
+
 // Geometric parameters that span all that geometry can do to the rigid arm. On an arm that bends, a combination that
 // moves nothing when rigid, such as a shift of a joint along its axis, moves loads and thereby the tool by a
 // thousandth: taken for geometry it would absorb a part of every elastic effect.
 std::vector<Eigen::Index> independent_geometry(const Robot& robot, const Measurements& measurements,
                                                const std::vector<Eigen::Index>& rows) {
+  // Sockets and planes alone fit an arm of no size, too: only what the calibration freed keeps the scale.
+  if (!unseen_by_sockets_and_planes(robot).empty()) return freed_geometry(robot);
   Robot rigid = robot;
   rigid.effects.clear();
   Eigen::MatrixXd jacobian = position_jacobian(rigid, measurements.poses)(rows, Eigen::all);

@@ -4,10 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <set>
 #include <stdexcept>
 
 #include "kinematics/checks.hpp"
+#include "kinematics/mimics.hpp"
 #include "kinematics/units.hpp"
 
 namespace llmt::robotics {
@@ -87,6 +89,26 @@ void validate_mimic(const Chain& chain, const Joint& joint) {
   if (!std::isfinite(mimic.offset)) refuse("mimic", fmt::format("{}: the offset is not finite", joint.name));
 }
 
+void validate_ranges_of_mimics(const Chain& chain) {
+  const std::vector<Follower> followers = followers_of(chain);
+  if (followers.empty()) return;
+  const auto count = std::ssize(chain.joints);
+  Eigen::VectorXd low = Eigen::VectorXd::Constant(count, -std::numeric_limits<double>::infinity());
+  Eigen::VectorXd high = -low;
+  for (Eigen::Index j = 0; j < count; ++j) {
+    const Joint& joint = chain.joints[j];
+    if (!joint.limits) continue;
+    low(j) = (*joint.limits)[0] / to_limit_unit(joint);
+    high(j) = (*joint.limits)[1] / to_limit_unit(joint);
+  }
+  limit_leaders(followers, low, high);
+  for (Eigen::Index j = 0; j < count; ++j) {
+    if (low(j) <= high(j)) continue;
+    refuse("mimic", fmt::format("the limits of {} and of the joints that mimic it have no value in common",
+                                chain.joints[j].name));
+  }
+}
+
 }  // namespace
 
 void validate(const Chain& chain) {
@@ -107,6 +129,7 @@ void validate(const Chain& chain) {
     validate_joint(joint);
     if (joint.mimic) validate_mimic(chain, joint);
   }
+  validate_ranges_of_mimics(chain);
   validate_further("bases", chain.bases, chain.session);
   validate_further("tools", chain.tools, chain.target);
   for (const discovery::Parameter& parameter : geometric_parameters(chain)) {

@@ -29,6 +29,10 @@ Eigen::VectorXd followed(const std::vector<Follower>& followers, Eigen::VectorXd
   return q;
 }
 
+Eigen::Index drive_count(const Chain& chain) {
+  return std::ranges::count_if(chain.joints, [](const Joint& joint) { return !joint.mimic; });
+}
+
 Eigen::MatrixXd with_mimics(const Chain& chain, Eigen::MatrixXd joints) {
   for (const Follower& f : followers_of(chain)) {
     joints.col(f.joint) = (f.multiplier * joints.col(f.leader).array() + f.offset).matrix();

@@ -168,6 +168,17 @@ Eigen::MatrixXd Header::joints() const {
   values(Eigen::all, read) = csv_.numbers(columns);
   values.array().rowwise() *= factors.array();
   Eigen::MatrixXd all = with_mimics(robot_.chain, values);
+  for (const Eigen::Index j : read) {
+    if (!joints[j].mimic) continue;
+    constexpr double most = 1.0;  // degree or mm: what is read back may differ a little
+    const double off = (all.col(j) - values.col(j)).cwiseAbs().maxCoeff() * to_limit_unit(joints[j]);
+    if (!(off > most)) continue;
+    refuse(
+        fmt::format("column \"{}\": {} mimics {}, and the column is up to {:.3g} {} off what it should then be; leave "
+                    "it out, or correct the description",
+                    quantities_.at(fmt::format("q{}", j + 1)).column, joints[j].name, joints[j].mimic->joint, off,
+                    limit_unit(joints[j])));
+  }
   all(Eigen::all, read) = values(Eigen::all, read);
   return all;
 }

@@ -100,7 +100,7 @@ std::vector<Sighting> sightings_of(const Csv& csv, const Header& header, Measure
         seen.push_back({.row = row, .target = name, .value = point.transpose()});
       }
     }
-    if (words.empty() && csv.rows() > 0 && seen.size() + zeros.size() == before) {
+    if (words.empty() && !target.empty() && csv.rows() > 0 && seen.size() + zeros.size() == before) {
       measurements.warnings.push_back(fmt::format("{}: target {} was never seen: its columns are empty", csv.name(),
                                                   target.substr(0, target.size() - 1)));
     }
@@ -221,7 +221,10 @@ void observe(const Csv& csv, const Header& header, const Robot& robot, const Pos
     observation.tool = tool_of(tool);
     if (!sighting.feature.empty()) {
       if (!observation.base.empty()) {
-        csv.refuse(sighting.row, "session", fmt::format("a {} is read in the first session only", sighting.feature));
+        csv.refuse(sighting.row, "session",
+                   fmt::format("a {} belongs to the first session of the file, \"{}\": put that name here, or put the "
+                               "rows of this session first",
+                               sighting.feature, base_of.own()));
       }
       observation.base = fmt::format("{} {}", sighting.feature, named(features.at(sighting.feature), sighting.feature));
     }

@@ -244,7 +244,9 @@ Chain read_chain(YamlMap& map) {
   chain.convention = read_convention(map);
   for (const YamlMap& joint : map.maps("joints", most_joints)) {
     chain.joints.push_back(read_joint(joint));
-    check_in_file(joint, [&] { validate(chain); });
+    Chain so_far = chain;
+    for (Joint& each : so_far.joints) each.mimic.reset();  // it may mimic a joint that comes later
+    check_in_file(joint, [&] { validate(so_far); });
   }
   chain.gravity_m_s2 = map.vector_or("gravity_m_s2", chain.gravity_m_s2);
   chain.orientation = map.text_or("orientation", "");

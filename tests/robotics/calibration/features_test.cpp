@@ -4,6 +4,8 @@
 #include "kinematics/rotations.hpp"
 #include "llmt/robotics/calibration.hpp"
 #include "llmt/robotics/compensation.hpp"
+#include "llmt/robotics/discovery.hpp"
+#include "llmt/robotics/robot_check.hpp"
 #include "robotics/observations.hpp"
 
 namespace llmt::robotics {
@@ -146,6 +148,41 @@ TEST(Planes, ShowTheArmWithoutAnyInstrument) {
   const Calibration rough = calibrate(ur_like(), on_planes(truth, 80, sigma_mm));
   EXPECT_NEAR(rough.robot.calibration->noise_mm, sigma_mm, 0.1 * sigma_mm);
   EXPECT_LT(shape_error_mm(truth, rough.robot), 0.5 * before_mm);
+}
+
+std::map<std::string, std::string> reasons_of(const Calibration& calibration) {
+  std::map<std::string, std::string> reasons;
+  for (const FixedParameter& entry : calibration.fixed) reasons[entry.name] = entry.why;
+  return reasons;
+}
+
+TEST(Sockets, LeaveOutWhatTheyTakeUp) {
+  const Robot truth = real_arm();
+  const Measurements readings = in_sockets(truth, 30, 0.02);
+  EXPECT_EQ(reasons_of(calibrate(ur_like(), readings)).at("joint1.theta"), "base and sockets take it up");
+  // Sockets stand on the column that carries the arm, too: its height is no scale.
+  Robot tall = ur_like();
+  tall.chain.joints[0].d_mm = 1480.0;
+  EXPECT_EQ(reasons_of(calibrate(tall, readings)).at("joint2.a"), "no reading shows the scale");
+  // A length that is known is one.
+  CalibrationOptions known;
+  known.fixed = {"joint3.a"};
+  for (const auto& [name, why] : reasons_of(calibrate(ur_like(), readings, known))) {
+    EXPECT_NE(why, "no reading shows the scale") << name;
+  }
+}
+
+TEST(Planes, LetDiscoverAndCheckKeepTheScale) {
+  const Robot truth = real_arm();
+  constexpr double sigma_mm = 0.02;
+  const Measurements readings = on_planes(truth, 80, sigma_mm);
+  const Discovery found = discover(ur_like(), readings);
+  EXPECT_EQ(found.answer, discovery::Answer::nothing_missing);
+  EXPECT_NEAR(found.noise_mm, sigma_mm, 0.2 * sigma_mm);
+  const Robot calibrated = calibrate(ur_like(), readings).robot;
+  const RobotCheck check = check_robot({.robot = calibrated, .correction = {}}, readings, {.same_session = true});
+  EXPECT_TRUE(check.still_good);
+  EXPECT_TRUE(check.moved.empty());
 }
 
 TEST(Planes, AreReadAndWrittenAndHaveNothingBesideThem) {

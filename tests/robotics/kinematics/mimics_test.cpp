@@ -69,6 +69,36 @@ TEST(Mimics, NeedNoColumns) {
   EXPECT_LT((m.poses.joints.row(0) - expected).norm(), 1e-14);
 }
 
+TEST(Mimics, MayFollowAJointThatComesLater) {
+  Robot robot = arm();
+  robot.chain.joints[0].mimic = Mimic{.joint = "hand", .multiplier = 0.5};
+  EXPECT_EQ(to_yaml(parse_robot(to_yaml(robot), "p.yaml")), to_yaml(robot));
+}
+
+TEST(Mimics, AColumnThatContradictsThemIsRefused) {
+  const Robot robot = arm();
+  const auto read = [&](const std::string& rod) {
+    try {
+      parse_measurements(
+          "turn_rad,upper_rad,rod_rad,fore_rad,hand_deg,x_mm,y_mm,z_mm\n0.5,0.2," + rod + ",0.3,90,1,2,3\n", "m.csv",
+          robot);
+    } catch (const std::runtime_error& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_EQ(read("-0.099"), "");
+  EXPECT_EQ(read("0.4"),
+            "m.csv:1: column \"rod_rad\": rod mimics upper, and the column is up to 28.6 deg off what it should then "
+            "be; leave it out, or correct the description");
+}
+
+TEST(Mimics, NeedLimitsWithACommonValue) {
+  Chain chain = arm().chain;
+  chain.joints[joint_index(chain, "rod")].limits = {100.0, 200.0};
+  EXPECT_THROW(validate(chain), std::invalid_argument);
+}
+
 TEST(Mimics, AreKeptBySearchesOfJointValues) {
   const Robot nominal = arm();
   Robot truth = perturbed(nominal, 0.5, 0.05, 4);
@@ -85,6 +115,10 @@ TEST(Mimics, AreKeptBySearchesOfJointValues) {
   const Compensation found = compensate(CorrectedRobot{.robot = truth, .correction = {}}, targets);
   EXPECT_GT(std::ranges::count(found.outcomes, Outcome::reached), 190);
   EXPECT_EQ(with_mimics(nominal.chain, found.commands.joints), found.commands.joints);
+  // Four drives do not set an orientation.
+  EXPECT_EQ(drive_count(nominal.chain), 4);
+  for (const Pose& pose : tool_poses(nominal, poses)) targets.rotations.push_back(pose.rotation);
+  EXPECT_EQ(compensate(CorrectedRobot{.robot = truth, .correction = {}}, targets).outcomes, found.outcomes);
 }
 
 TEST(Mimics, AreCalibratedWithTheRest) {

@@ -99,8 +99,9 @@ struct Chain {
 void validate(const Chain& chain);
 
 /// The geometric parameters in their fixed order: base.{x,y,z,rx,ry,rz}, tool.{...}, then per joint
-/// {theta,d,a,b,alpha,beta}, named "joint2.a" after the joint, then base@NAME.{x,...} of further bases and tool@NAME of
-/// further tools. Units mm and deg; scales 1 mm and 0.1 deg. All are free; whoever calibrates decides.
+/// {theta,d,a,b,alpha,beta}, named "joint2.a" after the joint, then `base@NAME.x`, ... of further bases and
+/// `tool@NAME.x`, ... of further tools. Units mm and deg; scales 1 mm and 0.1 deg. All are free; whoever calibrates
+/// decides.
 std::vector<discovery::Parameter> geometric_parameters(const Chain& chain);
 
 /// Sum of the lengths of all links and of the tool: no point of the arm is farther from its base, mm.
@@ -121,6 +122,9 @@ std::string limit_unit(const Joint& joint);
 
 /// Joint values, n x J in rad and mm, with those of joints that mimic others computed from the others.
 Eigen::MatrixXd with_mimics(const Chain& chain, Eigen::MatrixXd joints);
+
+/// Number of joints that mimic no other.
+Eigen::Index drive_count(const Chain& chain);
 
 /// Position of a joint by its name. Throws std::invalid_argument if there is none.
 std::size_t joint_index(const Chain& chain, std::string_view name);
