@@ -1,0 +1,51 @@
+#include <fmt/format.h>
+
+#include <regex>
+
+#include "measurements/header.hpp"
+
+namespace llmt::robotics {
+
+std::vector<std::string> Header::hints() const {
+  struct Likeness {
+    std::regex looks_like;
+    const char* name;
+  };
+  static const std::vector<Likeness> known = {
+      {std::regex("(target|smr|reflector|point|marker)([_ -]?(name|id|nr|no))?", std::regex::icase), "target"},
+      {std::regex("(reference|ref|nest|(base|fixed)[_ -]?point)([_ -]?(name|id|nr|no))?", std::regex::icase),
+       "reference"},
+      {std::regex("(session|setup|station|series)([_ -]?(name|id|nr|no))?", std::regex::icase), "session"},
+      {std::regex("(tau|torque|current|load)[_ -]?[0-9]+.*", std::regex::icase), "tau1_Nm, tau2_Nm, ..."},
+      {std::regex("temp(erature)?([_ -].*)?|.*[_ -]temp(erature)?", std::regex::icase), "temp_C"},
+      {std::regex("time([_ -]?stamp)?|timestamp", std::regex::icase), "time_s, in seconds"},
+      {std::regex("payload|load([_ -]?kg)?|mass([_ -]?kg)?", std::regex::icase), "payload_kg"},
+      {std::regex("(std|sigma|u95|uncertainty)([_ -]?[xyz])?([_ -]?(mm|um|m))?|.*[_ -](std|sigma|unc)([_ -]?[xyz])?",
+                  std::regex::icase),
+       "sigma_x_mm, sigma_y_mm, sigma_z_mm"},
+  };
+  std::map<std::string, std::string> seen;
+  for (const std::string& column : unused_) {
+    for (const Likeness& kind : known) {
+      if (std::regex_match(column, kind.looks_like)) {
+        seen.try_emplace(kind.name, column);
+        break;
+      }
+    }
+  }
+  std::vector<std::string> hints;
+  if (const std::string lack = lack_of_orientation(); !lack.empty()) {
+    hints.push_back(fmt::format("{}: {}", csv_.name(), lack));
+  }
+  for (const auto& [name, column] : seen) {
+    const char last = column.back();
+    const bool is_sigma = name.starts_with("sigma");
+    const bool has_axis = last == 'x' || last == 'y' || last == 'z';
+    const std::string own = !is_sigma ? name : has_axis ? fmt::format("sigma_{}_mm", last) : "sigma_mm";
+    hints.push_back(fmt::format("{}: column \"{}\" is not used; if it is what it looks like, name it {}", csv_.name(),
+                                column, own));
+  }
+  return hints;
+}
+
+}  // namespace llmt::robotics
