@@ -153,12 +153,20 @@ void print_data(const FitRun& run, const FitResult& result) {
     const std::vector<Eigen::Index> rows = rows_left_out(result.summary, run.table.options.weights);
     std::vector<Eigen::Index> lines = lines_of(run, rows);
     lines.resize(std::min<std::size_t>(lines.size(), 10));
+    const auto lacks_input = [&](Eigen::Index row) { return run.table.inputs.values.row(row).hasNaN(); };
+    const auto lacking = std::ranges::count_if(rows, lacks_input);
     print(fmt::format("Rows left out by the Tukey loss: {} of {}{}\n", rows.size(),
                       result.summary.samples + std::ssize(rows),
                       rows.empty() ? ""
                                    : fmt::format(" ({} {}{}); the errors below are those of the other rows",
                                                  rows.size() == 1 ? "line" : "lines", fmt::join(lines, ", "),
                                                  rows.size() > lines.size() ? ", ..." : "")));
+    if (2 * lacking > std::ssize(rows)) {
+      print(
+          fmt::format("{} of these have empty cells in inputs: the errors below, and intervals, hold for rows without "
+                      "empty cells\n",
+                      lacking));
+    }
   }
   if (!constant.empty()) {
     print(fmt::format("Constant, so without influence: {}\n", fmt::join(constant, ", ")));

@@ -144,6 +144,14 @@ std::string verdict(const CalibrationFacts& facts) {
   return text;
 }
 
+// The length that stands for the scale where no reading shows it, or nothing.
+std::string kept_length(const CalibrationReport& report) {
+  for (const robotics::FixedParameter& fixed : report.calibration.fixed) {
+    if (fixed.why == robotics::unseen_scale) return fixed.name;
+  }
+  return "";
+}
+
 // "only x and y were measured", or nothing.
 std::string missing_axes(const robotics::Measurements& measurements) {
   if (kind_of(measurements) == "distance") return "";
@@ -164,6 +172,12 @@ std::string head(const CalibrationFacts& facts) {
   const robotics::Measurements& measurements = facts.measurements;
   std::string text = fmt::format("{}: {} of {}\n", facts.data_file, counts_of(measurements), facts.nominal.chain.name);
   text += verdict(facts) + missing_axes(measurements);
+  if (const std::string kept = kept_length(facts.report); !kept.empty()) {
+    text += fmt::format(
+        "Note: no reading shows the scale. All lengths are relative to {}, kept as described: 0.1 % of error there is "
+        "0.1 % of every position. The errors are scatter at sockets and planes, not errors of positions elsewhere\n",
+        kept);
+  }
   for (const std::string& warning : measurements.warnings) text += "Note: " + warning + "\n";
   if (!facts.outlier_lines.empty()) {
     text += fmt::format("Left out, more than four times as far off as the median: line{} {}\n",
@@ -229,8 +243,8 @@ std::string calibration_text(const CalibrationFacts& facts) {
   text += "nominal: base and tool fitted to the poses, everything else as described.\n";
   if (report.folds > 0) {
     text +=
-        "held-out: on poses that were left out of the fit; take these for the error at new poses. in-sample: on the "
-        "poses that were fitted.\n";
+        fmt::format("held-out: on poses that were left out of the fit{}. in-sample: on the poses that were fitted.\n",
+                    kept_length(report).empty() ? "; take these for the error at new poses" : "");
   }
   if (report.correction) {
     std::vector<std::string> leaves;

@@ -150,6 +150,14 @@ void check_command(const CheckArguments& arguments) {
   if (!arguments.same_session) robot.robot = for_any_session(robot.robot);
   const robotics::Measurements measurements =
       read_measured(arguments.data, robot.robot, {}, {.columns = arguments.columns, .mark = arguments.mark});
+  for (std::size_t row = 0; row < measurements.poses.observations.size() && !arguments.same_session; ++row) {
+    const std::string& base = measurements.poses.observations[row].base;
+    if (!robotics::is_socket(base) && !robotics::is_plane(base)) continue;
+    throw std::runtime_error(
+        fmt::format("{}:{}: the place of {} is known only as long as the robot stays where it was: --same-session says "
+                    "that it did",
+                    arguments.data, measurements.lines[row], base));
+  }
   check_frames(arguments.data, robot.robot, measurements,
                arguments.same_session ? "" : "; check judges a file of one session and known targets");
   check_positions(arguments.robot, robot.robot, measurements.poses);

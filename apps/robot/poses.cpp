@@ -36,6 +36,7 @@ struct PosesArguments {
   std::string criterion = criteria[0];
   double noise_um = 50.0;
   robotics::PoseSelectionOptions options;
+  std::string columns;
   DecimalMark mark = DecimalMark::point;
   std::string output;
   bool json = false;
@@ -57,10 +58,12 @@ robotics::Robot described(const PosesArguments& arguments) {
 }
 
 robotics::PosePlan plan_of(const PosesArguments& arguments, const robotics::Robot& robot) {
-  const auto read = [&](const std::string& path) {
-    return path.empty() ? robotics::Poses() : robotics::read_poses(path, robot, arguments.mark);
+  const robotics::ColumnMap map =
+      arguments.columns.empty() ? robotics::ColumnMap{} : robotics::read_column_map(arguments.columns);
+  const auto read = [&](const std::string& path, const robotics::ColumnMap& meant = {}) {
+    return path.empty() ? robotics::Poses() : robotics::read_poses(path, robot, arguments.mark, meant);
   };
-  return {read(arguments.from), read(arguments.measured), read(arguments.use)};
+  return {read(arguments.from), read(arguments.measured, map), read(arguments.use)};
 }
 
 // Thousandths of a degree or micrometres, unless that is beyond a limit.
@@ -281,6 +284,8 @@ void add_poses(CLI::App& app) {
   add_names(*command, "--fix", options.calibration.fixed, "PARAMETER",
             "What the calibration will keep as given: joint2.a, joint3, base, tool");
   add_names(*command, "--only", options.calibration.only, "PARAMETER", "Parameters that alone will be free");
+  add_input_file(*command, "--columns", arguments->columns,
+                 "Column map (YAML): what the columns of the measured file mean");
   add_decimal_comma(*command, arguments->mark);
   add_seed(*command, options.seed, "Of the random poses that the search begins with");
   add_output_file(*command, "-o,--output", arguments->output,

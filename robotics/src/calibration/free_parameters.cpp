@@ -19,7 +19,6 @@ namespace {
 // Why parameters stay as they are, as descriptions have it.
 constexpr const char* by_user = "fixed by the user";
 constexpr const char* no_angles = "a socket has no angles";
-constexpr const char* unseen_scale = "no reading shows the scale";
 constexpr const char* unseen_turn = "base and sockets take it up";
 
 std::vector<bool> matches(const std::vector<discovery::Parameter>& parameters, const std::vector<std::string>& names,

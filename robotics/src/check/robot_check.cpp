@@ -156,8 +156,10 @@ double mean_of_poses(const Eigen::VectorXd& stacked, const std::vector<Eigen::In
   return squares.cwiseSqrt().mean();
 }
 
-void find_moved(const CorrectedRobot& robot, const Measurements& measurements, const CheckOptions& options,
-                RobotCheck& result) {
+// `robot` has base and tool fitted to the measurements, `before` those of the calibration. Derivatives are taken at the
+// fitted ones: a target that was mounted elsewhere is far from the old one.
+void find_moved(const CorrectedRobot& robot, const Robot& before, const Measurements& measurements,
+                const CheckOptions& options, RobotCheck& result) {
   const std::vector<Eigen::Index> rows = measured_rows(measurements);
   const std::vector<Eigen::Index> columns = columns_of(robot.robot);
   const std::vector<discovery::Parameter> all = robotics::parameters(robot.robot);
@@ -169,6 +171,11 @@ void find_moved(const CorrectedRobot& robot, const Measurements& measurements, c
   for (std::size_t k = 0; k < parameters.size(); ++k) problem.jacobian.col(k) *= parameters[k].scale;
   const Eigen::MatrixXd missing = (measurements.positions_mm - positions(robot, measurements.poses)).transpose();
   problem.residuals = missing.reshaped()(rows);
+  const std::vector<discovery::Parameter> calibrated = robotics::parameters(before);
+  for (std::size_t k = 0; k < parameters.size(); ++k) {
+    const double by = (parameters[k].value - calibrated[columns[k]].value) / parameters[k].scale;
+    if (!is_of_base(parameters[k].name)) problem.residuals += by * problem.jacobian.col(k);
+  }
   for (std::size_t k = 0; k < parameters.size(); ++k) {
     if (!options.same_session && is_of_base(parameters[k].name)) {
       problem.nuisance.push_back(static_cast<Eigen::Index>(k));
@@ -214,15 +221,11 @@ RobotCheck check_robot(const CorrectedRobot& robot, const Measurements& measurem
   const CalibrationRecord* record = robot.robot.calibration ? &*robot.robot.calibration : nullptr;
   result.has_correlations = record != nullptr && record->correlations.size() > 0;
   CorrectedRobot judged = robot;
-  CorrectedRobot tested = robot;
-  if (!options.same_session) {
-    judged = registered(robot, measurements, {});
-    tested = registered(robot, measurements, {.fixed = {"tool"}});
-  }
+  if (!options.same_session) judged = registered(robot, measurements, {});
   result.errors_mm = distances(positions(judged, measurements.poses), measurements);
   result.error = error_figures(result.errors_mm);
   result.still_good = result.error.mean <= result.limit_mm;
-  find_moved(tested, measurements, options, result);
+  find_moved(judged, robot.robot, measurements, options, result);
   return result;
 }
 

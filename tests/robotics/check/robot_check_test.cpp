@@ -69,6 +69,22 @@ void expect_change(const Moved* moved, double by) {
   EXPECT_GT(std::abs(by), 4.0 * moved->changes.front().standard_error);
 }
 
+// Far from the old tool its derivatives are others: those of the tool as it is now count.
+TEST(RobotCheck, ATargetMountedElsewhereHidesNothing) {
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    Robot changed = another_day(arm());
+    changed.chain.tool.xyz_mm += Eigen::Vector3d(-50.0, 40.0, -40.0);
+    const RobotCheck mounted = check_robot(calibrated(seed), measured(changed, 40, 300 + seed));
+    EXPECT_TRUE(mounted.still_good);
+    EXPECT_FALSE(mounted.unexplained);
+    EXPECT_LT(mounted.refitted_mm, 1.1 * mounted.error.mean);
+    changed.chain.joints[2].a_mm += 0.3;
+    const RobotCheck grown = check_robot(calibrated(seed), measured(changed, 40, 400 + seed));
+    expect_change(find_moved(grown, "joint3.a"), 0.3);
+    EXPECT_LT(grown.refitted_mm, 1.2 * mounted.error.mean);
+  }
+}
+
 TEST(RobotCheck, NamesAJointOffset) {
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
     Robot knocked = another_day(arm());

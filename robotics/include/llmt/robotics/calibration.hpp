@@ -17,6 +17,9 @@
 
 namespace llmt::robotics {
 
+/// FixedParameter::why of the length that stands for the scale where all readings are of sockets and planes.
+inline constexpr const char* unseen_scale = "no reading shows the scale";
+
 /// Why a parameter was not identified.
 struct FixedParameter {
   std::string name;
