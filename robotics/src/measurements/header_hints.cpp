@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <regex>
+#include <set>
 
 #include "measurements/header.hpp"
 
@@ -28,6 +29,10 @@ std::vector<std::string> Header::hints() const {
   for (const std::string& column : unused_) {
     for (const Likeness& kind : known) {
       if (std::regex_match(column, kind.looks_like)) {
+        // A date with its last digits lost says nothing of when a row was measured.
+        const std::vector<std::string> cells = csv_.texts(column);
+        const bool is_time = std::string(kind.name).starts_with("time_s");
+        if (is_time && 2 * std::set<std::string>(cells.begin(), cells.end()).size() < cells.size()) break;
         seen.try_emplace(kind.name, column);
         break;
       }
