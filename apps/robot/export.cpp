@@ -65,7 +65,13 @@ std::string kinematics_yaml(const robotics::Chain& described) {
   std::string text =
       "# Pose of each joint in the frame of the one before, the first in the base, at zero; m and rad; fixed-axis "
       "roll,\n"
-      "# pitch, yaw as in URDF. Every axis is z. tool: in the frame of the last joint.\nkinematics:\n";
+      "# pitch, yaw as in URDF. Every axis is z. tool: in the frame of the last joint.\n";
+  for (const robotics::Joint& joint : chain.joints) {
+    if (!joint.mimic) continue;
+    text += fmt::format("# {} has no drive: its value is {} times that of {}, plus {} {}.\n", joint.name,
+                        joint.mimic->multiplier, joint.mimic->joint, joint.mimic->offset, robotics::limit_unit(joint));
+  }
+  text += "kinematics:\n";
   Eigen::Isometry3d before = Eigen::Isometry3d::Identity();
   for (std::size_t j = 0; j < chain.joints.size(); ++j) {
     const Eigen::Isometry3d frame = joint_frame(chain, zero, j);
