@@ -53,8 +53,7 @@ void print_check(const CheckArguments& arguments, const robotics::Robot& robot, 
   if (check.accuracy_is_of_noise) {
     print(
         "The description has no error of these coordinates on poses left out: that figure comes from the poses it was "
-        "fitted to, and new "
-        "poses are worse. --accuracy-mm says what is good enough.\n");
+        "fitted to, and new poses are worse. --accuracy-mm says what is good enough.\n");
   }
   if (check.moved.empty()) {
     print(fmt::format(
@@ -154,8 +153,8 @@ void check_command(const CheckArguments& arguments) {
     const std::string& base = measurements.poses.observations[row].base;
     if (!robotics::is_socket(base) && !robotics::is_plane(base)) continue;
     throw std::runtime_error(
-        fmt::format("{}:{}: the place of {} is known only as long as the robot stays where it was: --same-session says "
-                    "that it did",
+        fmt::format("{}:{}: the place of {} is known only while the robot stays where it was; if it did, give "
+                    "--same-session",
                     arguments.data, measurements.lines[row], base));
   }
   check_frames(arguments.data, robot.robot, measurements,

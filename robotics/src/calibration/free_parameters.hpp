@@ -17,8 +17,8 @@ std::string owner_of(const std::string& name);
 /// data.
 std::vector<std::string> reasons_to_fix(const Robot& robot, const CalibrationOptions& options);
 
-/// Adds a reason to rotations of the first joint that turning base and sockets does as well. That residuals keep their
-/// lengths, not their columns, makes it so: fix_dependent() does not see it.
+/// Adds a reason to rotations of the first joint that turning base and sockets does as well. Such a turn keeps the
+/// lengths of the residuals but changes their coordinates, so fix_dependent() does not see it.
 void fix_what_sockets_take_up(const Robot& robot, const Poses& poses, std::vector<std::string>& reasons);
 
 /// Where all readings are of sockets and planes, an arm, its sockets and planes twice as large fit as well: adds a

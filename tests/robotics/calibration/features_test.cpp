@@ -76,6 +76,22 @@ Robot real_arm() {
   return truth;
 }
 
+std::map<std::string, std::string> reasons_of(const Calibration& calibration) {
+  std::map<std::string, std::string> reasons;
+  for (const FixedParameter& entry : calibration.fixed) reasons[entry.name] = entry.why;
+  return reasons;
+}
+
+// What reading the rows throws.
+std::string refused(const Robot& robot, const std::string& rows) {
+  try {
+    parse_measurements(rows, "m.csv", robot);
+    return "no error";
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+}
+
 TEST(Sockets, AloneShowTheArmWithoutAnyInstrument) {
   const Robot truth = real_arm();
   const Measurements readings = in_sockets(truth, 60, 0.0);
@@ -85,8 +101,7 @@ TEST(Sockets, AloneShowTheArmWithoutAnyInstrument) {
   const double before_mm = shape_error_mm(truth, ur_like());
   EXPECT_GT(before_mm, 0.3);
   EXPECT_LT(shape_error_mm(truth, calibration.robot), 1e-3 * before_mm);
-  std::map<std::string, std::string> fixed;
-  for (const FixedParameter& entry : calibration.fixed) fixed[entry.name] = entry.why;
+  const std::map<std::string, std::string> fixed = reasons_of(calibration);
   EXPECT_EQ(fixed.at("joint2.a"), "no reading shows the scale");
   EXPECT_EQ(fixed.at("base@socket s2.rx"), "a socket has no angles");
 }
@@ -114,19 +129,11 @@ TEST(Sockets, StandBesideMeasuredPointsInOneFile) {
   const std::string written = to_csv(m, robot);
   EXPECT_EQ(to_csv(parse_measurements(written, "w.csv", robot), robot), written);
 
-  const auto refused = [&](const std::string& rows) {
-    try {
-      parse_measurements(rows, "m.csv", robot);
-      return std::string("no error");
-    } catch (const std::runtime_error& error) {
-      return std::string(error.what());
-    }
-  };
-  EXPECT_EQ(refused("q1_rad,x_mm,y_mm,z_mm,socket\n1,2,3,4,floor\n"),
+  EXPECT_EQ(refused(robot, "q1_rad,x_mm,y_mm,z_mm,socket\n1,2,3,4,floor\n"),
             "m.csv:2: there are a measured point and a socket: leave the cells of one of them empty");
-  EXPECT_EQ(refused("q1_rad,x_mm,y_mm,z_mm,socket\n1,2,3,4,\n2,,,,\n"),
+  EXPECT_EQ(refused(robot, "q1_rad,x_mm,y_mm,z_mm,socket\n1,2,3,4,\n2,,,,\n"),
             "m.csv:3: there is neither a measured point nor a socket");
-  EXPECT_EQ(refused("q1_rad,x_mm,y_mm,socket\n1,2,3,\n2,,,a\n"),
+  EXPECT_EQ(refused(robot, "q1_rad,x_mm,y_mm,socket\n1,2,3,\n2,,,a\n"),
             "m.csv:1: beside sockets, points need all of x, y and z");
 }
 
@@ -138,8 +145,7 @@ TEST(Planes, ShowTheArmWithoutAnyInstrument) {
   const Calibration calibration = calibrate(ur_like(), exact);
   EXPECT_TRUE(calibration.result.converged()) << calibration.result.reason;
   EXPECT_LT(shape_error_mm(truth, calibration.robot), 1e-3 * before_mm);
-  std::map<std::string, std::string> fixed;
-  for (const FixedParameter& entry : calibration.fixed) fixed[entry.name] = entry.why;
+  const std::map<std::string, std::string> fixed = reasons_of(calibration);
   EXPECT_EQ(fixed.at("joint2.a"), "no reading shows the scale");
   EXPECT_TRUE(fixed.contains("base@plane face 1.rz"));
   EXPECT_FALSE(fixed.contains("base@plane face 1.z"));
@@ -148,12 +154,6 @@ TEST(Planes, ShowTheArmWithoutAnyInstrument) {
   const Calibration rough = calibrate(ur_like(), on_planes(truth, 80, sigma_mm));
   EXPECT_NEAR(rough.robot.calibration->noise_mm, sigma_mm, 0.1 * sigma_mm);
   EXPECT_LT(shape_error_mm(truth, rough.robot), 0.5 * before_mm);
-}
-
-std::map<std::string, std::string> reasons_of(const Calibration& calibration) {
-  std::map<std::string, std::string> reasons;
-  for (const FixedParameter& entry : calibration.fixed) reasons[entry.name] = entry.why;
-  return reasons;
 }
 
 TEST(Sockets, LeaveOutWhatTheyTakeUp) {
@@ -193,17 +193,9 @@ TEST(Planes, AreReadAndWrittenAndHaveNothingBesideThem) {
   EXPECT_EQ(measured_rows(m), (std::vector<Eigen::Index>{2, 5}));
   const std::string written = to_csv(m, robot);
   EXPECT_EQ(to_csv(parse_measurements(written, "w.csv", robot), robot), written);
-  const auto refused = [&](const std::string& rows) {
-    try {
-      parse_measurements(rows, "m.csv", robot);
-      return std::string("no error");
-    } catch (const std::runtime_error& error) {
-      return std::string(error.what());
-    }
-  };
-  EXPECT_EQ(refused("q1_rad,x_mm,plane\n1,2,floor\n"),
+  EXPECT_EQ(refused(robot, "q1_rad,x_mm,plane\n1,2,floor\n"),
             "m.csv:1: points on planes have no other readings beside them: fit them one after the other");
-  EXPECT_EQ(refused("q1_rad,plane\n1,floor\n1,\n"), "m.csv:3: column \"plane\": the name is missing");
+  EXPECT_EQ(refused(robot, "q1_rad,plane\n1,floor\n1,\n"), "m.csv:3: column \"plane\": the name is missing");
 }
 
 }  // namespace
