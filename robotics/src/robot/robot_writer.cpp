@@ -1,57 +1,20 @@
 #include <fmt/format.h>
-#include <yaml-cpp/yaml.h>
 
 #include <algorithm>
 
 #include "llmt/robotics/robot_file.hpp"
+#include "yaml/yaml_writer.hpp"
 
 namespace llmt::robotics {
 namespace {
 
-// The shortest decimal that reads back to the same bits.
-std::string exact(double value) { return fmt::format("{}", value); }
-
-class Writer {
- public:
-  std::string finish() { return std::string(out_.c_str()) + "\n"; }
-
-  Writer& begin_map(YAML::EMITTER_MANIP style = YAML::Flow) { return put(style), put(YAML::BeginMap); }
-  Writer& end_map() { return put(YAML::EndMap); }
-  Writer& begin_list(YAML::EMITTER_MANIP style) { return put(style), put(YAML::BeginSeq); }
-  Writer& end_list() { return put(YAML::EndSeq); }
-  Writer& key(const std::string& name) { return put(YAML::Key), put(name), put(YAML::Value); }
-  Writer& word(const std::string& name, const std::string& value) { return key(name), put(value); }
-  Writer& number(const std::string& name, double value) { return key(name), put(exact(value)); }
-
-  // Where the value is the one that an absent key means, the key is left out.
-  Writer& optional(const std::string& name, double value, double absent) {
-    return value == absent ? *this : number(name, value);
-  }
-
-  template <typename Range>
-  Writer& numbers(const std::string& name, const Range& values) {
-    key(name).begin_list(YAML::Flow);
-    for (const double value : values) put(exact(value));
-    return end_list();
-  }
-
- private:
-  YAML::Emitter out_;
-
-  template <typename Value>
-  Writer& put(const Value& value) {
-    out_ << value;
-    return *this;
-  }
-};
-
-void write_frame(Writer& out, const std::string& key, const std::string& name, const Frame& frame) {
+void write_frame(YamlWriter& out, const std::string& key, const std::string& name, const Frame& frame) {
   out.key(key).begin_map();
   if (!name.empty()) out.word("name", name);
   out.numbers("xyz_mm", frame.xyz_mm).numbers("rpy_deg", frame.rpy_deg).end_map();
 }
 
-void write_frames(Writer& out, const std::string& key, const std::vector<NamedFrame>& frames) {
+void write_frames(YamlWriter& out, const std::string& key, const std::vector<NamedFrame>& frames) {
   if (frames.empty()) return;
   out.key(key).begin_list(YAML::Block);
   for (const NamedFrame& named : frames) {
@@ -61,7 +24,7 @@ void write_frames(Writer& out, const std::string& key, const std::vector<NamedFr
   out.end_list();
 }
 
-void write_joint(Writer& out, const Joint& joint) {
+void write_joint(YamlWriter& out, const Joint& joint) {
   const bool turns = joint.type == JointType::revolute;
   out.begin_map().word("name", joint.name).word("type", turns ? "revolute" : "prismatic");
   out.number("alpha_deg", joint.alpha_deg).number("a_mm", joint.a_mm).optional("b_mm", joint.b_mm, 0.0);
@@ -78,7 +41,7 @@ void write_joint(Writer& out, const Joint& joint) {
   out.end_map();
 }
 
-void write_formula(Writer& out, const Formula& formula) {
+void write_formula(YamlWriter& out, const Formula& formula) {
   out.word("name", formula.name).key("terms").begin_list(YAML::Flow);
   for (const FormulaTerm& term : formula.terms) {
     out.begin_map().word(term.acts_on, term.text);
@@ -89,7 +52,7 @@ void write_formula(Writer& out, const Formula& formula) {
   out.end_list();
 }
 
-void write_effect(Writer& out, const Chain& chain, const Effect& effect) {
+void write_effect(YamlWriter& out, const Chain& chain, const Effect& effect) {
   const EffectType& type = effect_type(effect.type);
   const std::vector<EffectParameter> parameters = effect_parameters(chain, effect);
   out.begin_map().word("type", effect.type);
@@ -109,7 +72,7 @@ void write_effect(Writer& out, const Chain& chain, const Effect& effect) {
   out.end_map();
 }
 
-void write_identified(Writer& out, const Robot& robot) {
+void write_identified(YamlWriter& out, const Robot& robot) {
   const std::vector<discovery::Parameter> all = parameters(robot);
   out.key("identified").begin_list(YAML::Block);
   for (const IdentifiedParameter& entry : robot.identified) {
@@ -123,7 +86,7 @@ void write_identified(Writer& out, const Robot& robot) {
   out.end_list();
 }
 
-void write_record(Writer& out, const CalibrationRecord& record) {
+void write_record(YamlWriter& out, const CalibrationRecord& record) {
   out.key("calibration").begin_map(YAML::Block);
   out.number("poses", static_cast<double>(record.poses))
       .number("coordinates", static_cast<double>(record.coordinates))
@@ -143,7 +106,7 @@ void write_record(Writer& out, const CalibrationRecord& record) {
 std::string to_yaml(const Robot& robot) {
   validate(robot);
   const Chain& chain = robot.chain;
-  Writer out;
+  YamlWriter out;
   out.begin_map(YAML::Block)
       .word("name", chain.name)
       .word("convention", chain.convention == Convention::dh ? "dh" : "mdh");

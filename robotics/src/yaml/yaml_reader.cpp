@@ -156,6 +156,23 @@ std::vector<double> YamlMap::all_numbers(const std::string& key, std::size_t mos
   return result;
 }
 
+std::vector<std::string> YamlMap::texts(const std::string& key, std::size_t most) {
+  const YAML::Node value = at(key);
+  if (!value.IsSequence()) refuse_at(value, fmt::format("\"{}\" must be a list of texts", key));
+  if (value.size() > most) {
+    refuse_at(value, fmt::format("\"{}\" has {} entries, at most {} are read", key, value.size(), most));
+  }
+  std::vector<std::string> result;
+  for (const YAML::Node& entry : value) {
+    if (!entry.IsScalar()) refuse_at(entry, fmt::format("\"{}\" must be a list of texts", key));
+    if (entry.Scalar().size() > longest_text) {
+      refuse_at(entry, fmt::format("{} characters, at most {} are read", entry.Scalar().size(), longest_text));
+    }
+    result.push_back(entry.Scalar());
+  }
+  return result;
+}
+
 Eigen::Vector3d YamlMap::vector(const std::string& key) {
   const std::vector<double> values = numbers(key, 3);
   return {values[0], values[1], values[2]};

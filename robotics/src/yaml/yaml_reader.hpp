@@ -24,6 +24,7 @@ class YamlMap {
   Eigen::Vector3d vector(const std::string& key);
   std::vector<double> numbers(const std::string& key, std::size_t count);
   std::vector<double> all_numbers(const std::string& key, std::size_t most);
+  std::vector<std::string> texts(const std::string& key, std::size_t most);
   YamlMap map(const std::string& key);
   std::vector<YamlMap> maps(const std::string& key, std::size_t most);
 

@@ -1,0 +1,92 @@
+/// \file
+/// Mechanisms of any kind, loops included, given by their constraint equations f(d, s, w) = 0 (eq. 3 of Benes et al.
+/// 2022): d are parameters, s coordinates of joints, w outputs such as the position of a platform.
+///
+///     const Mechanism crank{.name = "crank",
+///                           .parameters = {{.name = "r", .unit = "mm", .value = 50.0}},
+///                           .coordinates = {{.name = "q", .unit = "deg"}, {.name = "x", .unit = "mm", .output =
+///                           true}}, .equations = {"r*cos(q) = x"}};
+///     const Assembly assembly = assemble(crank, Eigen::RowVector2d(60.0, NAN));  // x = 25 mm
+#pragma once
+
+#include <Eigen/Core>
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "llmt/abi.hpp"
+
+namespace llmt::robotics {
+
+/// One of the parameters d: a dimension, a sensor's offset, a place of the measuring instrument.
+struct MechanismParameter {
+  std::string name;
+  std::string unit = "mm";                    ///< "mm", "deg" or "1"; in expressions mm, rad and 1
+  double value = 0.0;                         ///< in `unit`
+  bool fixed = false;                         ///< calibration leaves it alone
+  std::optional<double> prior_sigma = {};     ///< standard deviation about `value` of real ones, in `unit`; > 0
+  std::optional<double> standard_error = {};  ///< written by calibration, in `unit`
+};
+
+/// A coordinate of a joint (s) or of the output (w). A table may have it or not: what is not measured is solved for.
+struct Coordinate {
+  std::string name;
+  std::string unit = "deg";  ///< "mm", "deg" or "1"; in expressions mm, rad and 1
+  double start = 0.0;        ///< in `unit`; all starts together are close to a configuration that can be assembled
+  bool output = false;       ///< one of w
+  std::optional<double> sigma = {};  ///< standard deviation of its readings in `unit`; 0: exact; empty: see noise_of()
+  double lower = -std::numeric_limits<double>::infinity();  ///< limits of a drive, in `unit`
+  double upper = std::numeric_limits<double>::infinity();
+
+  bool has_limits() const { return lower > -std::numeric_limits<double>::infinity(); }
+};
+
+/// An abbreviation that equations and later definitions use.
+struct Definition {
+  std::string name;
+  std::string text;
+};
+
+/// A mechanism. Expressions are those of llmt::Expression (muParser's language) in the names of parameters, coordinates
+/// and earlier definitions, and pi; angles are in rad, lengths in mm.
+struct Mechanism {
+  std::string name;
+  std::vector<MechanismParameter> parameters;
+  std::vector<Coordinate> coordinates;
+  std::vector<Definition> definitions = {};
+  std::vector<std::string> equations;  ///< "left = right", or an expression that is 0
+};
+
+/// Throws std::invalid_argument for names that are no identifiers, are repeated or are functions of the language,
+/// unknown units, numbers that are not finite, sigmas or priors out of range, limits that are no interval, expressions
+/// that cannot be read or use unknown names, and a mechanism without coordinates or equations.
+void validate(const Mechanism& mechanism);
+
+/// The standard deviation of every coordinate's readings, in its unit; 0: exact. Without any sigma among the measured
+/// coordinates, readings of the outputs have all the same, 1, and those of joints are exact, as in the paper; where no
+/// output is measured, readings of all joints have the same, 1. Where some have a sigma, the others are exact.
+///
+/// `known`: poses x coordinates, NaN where not measured. Throws std::invalid_argument if coordinates of different units
+/// would share one sigma.
+Eigen::VectorXd noise_of(const Mechanism& mechanism, const Eigen::MatrixXd& known);
+
+/// Configurations that meet the equations.
+struct Assembly {
+  Eigen::MatrixXd coordinates;        ///< poses x coordinates, in their units; NaN where it failed
+  std::vector<std::string> failures;  ///< per pose: why there is no configuration; empty where there is
+};
+
+/// Completes poses: solves the equations for the coordinates that are not known. Where there are more equations than
+/// unknown coordinates, the known ones that are not exact are corrected: the sum of (correction / sigma)^2 is the
+/// smallest that meets all equations.
+///
+/// A loop has several configurations. The branch is that of the start values: every pose is reached from a solved one
+/// (the first from the start) along the straight line between what is known, in steps small enough that the rest
+/// follows its tangent. A pose behind a singular configuration fails.
+///
+/// `known`: poses x coordinates, NaN where unknown. Throws std::invalid_argument for a wrong shape, infinite values, as
+/// validate(), and if the start values are near no configuration.
+Assembly assemble(const Mechanism& mechanism, const Eigen::MatrixXd& known);
+
+}  // namespace llmt::robotics
