@@ -53,6 +53,7 @@ void add_simulate(CLI::App& app);
 void add_poses(CLI::App& app);
 void add_calibrate(CLI::App& app);
 void add_check(CLI::App& app);
+void add_mechanism(CLI::App& app);
 void add_discover(CLI::App& app);
 void add_predict(CLI::App& app);
 void add_compensate(CLI::App& app);

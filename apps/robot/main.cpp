@@ -110,5 +110,6 @@ int main(int argc, char** argv) {
   llmt::apps::add_predict(app);
   llmt::apps::add_compensate(app);
   llmt::apps::add_robot_export(app);
+  llmt::apps::add_mechanism(app);
   return llmt::apps::run(app, argc, argv);
 }

@@ -2,11 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cctype>
 #include <cmath>
 #include <set>
 #include <stdexcept>
 
+#include "llmt/random.hpp"
 #include "mechanism/equations.hpp"
 #include "mechanism/pose_solver.hpp"
 
@@ -204,6 +206,33 @@ Assembly assemble(const Mechanism& mechanism, const Eigen::MatrixXd& known) {
     assembly.failures.push_back(failure);
   }
   return assembly;
+}
+
+Eigen::MatrixXd random_poses(const Mechanism& mechanism, Eigen::Index count, std::uint64_t seed) {
+  constexpr Eigen::Index most_draws_per_pose = 20;
+  const auto& coordinates = mechanism.coordinates;
+  if (std::ranges::none_of(coordinates, &Coordinate::has_limits)) refuse("no coordinate has limits to draw within");
+  Random random(seed);
+  Eigen::MatrixXd poses(count, std::ssize(coordinates));
+  Eigen::Index found = 0;
+  for (Eigen::Index draws = 0; found < count && draws < most_draws_per_pose * count; draws += count) {
+    Eigen::MatrixXd known = Eigen::MatrixXd::Constant(count, poses.cols(), NAN);
+    for (Eigen::Index row = 0; row < count; ++row) {
+      for (Eigen::Index i = 0; i < known.cols(); ++i) {
+        const Coordinate& coordinate = coordinates[i];
+        if (coordinate.has_limits()) known(row, i) = random.uniform(coordinate.lower, coordinate.upper);
+      }
+    }
+    const Assembly assembly = assemble(mechanism, known);
+    for (Eigen::Index row = 0; row < count && found < count; ++row) {
+      if (assembly.failures[row].empty()) poses.row(found++) = assembly.coordinates.row(row);
+    }
+  }
+  if (found < count) {
+    throw std::runtime_error(fmt::format("{}: only {} of {} random poses within the limits can be assembled",
+                                         mechanism.name, found, most_draws_per_pose * count));
+  }
+  return poses;
 }
 
 }  // namespace llmt::robotics

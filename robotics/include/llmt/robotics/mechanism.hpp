@@ -10,6 +10,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <limits>
 #include <optional>
 #include <string>
@@ -88,5 +89,10 @@ struct Assembly {
 /// `known`: poses x coordinates, NaN where unknown. Throws std::invalid_argument for a wrong shape, infinite values, as
 /// validate(), and if the start values are near no configuration.
 Assembly assemble(const Mechanism& mechanism, const Eigen::MatrixXd& known);
+
+/// Random poses: coordinates with limits are uniform within them, the others are solved for; draws that cannot be
+/// assembled are drawn again. `count` x coordinates, exact. Throws std::invalid_argument as assemble() and if no
+/// coordinate has limits, std::runtime_error if fewer than one draw in twenty can be assembled.
+Eigen::MatrixXd random_poses(const Mechanism& mechanism, Eigen::Index count, std::uint64_t seed);
 
 }  // namespace llmt::robotics

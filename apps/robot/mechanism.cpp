@@ -1,0 +1,206 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+
+#include "llmt/files.hpp"
+#include "llmt/random.hpp"
+#include "llmt/robotics/mechanism_calibration.hpp"
+#include "llmt/robotics/mechanism_file.hpp"
+#include "robot/commands.hpp"
+#include "robot/mechanism_report.hpp"
+#include "shared/cli.hpp"
+#include "shared/options.hpp"
+
+namespace llmt::apps {
+namespace {
+
+struct MechanismArguments {
+  std::string mechanism;
+  std::string data;
+  std::string output;
+  std::string errors;
+  bool solve = false;
+  Eigen::Index simulate = 0;
+  std::vector<std::string> measure;
+  std::vector<std::string> noise;
+  int folds = 5;
+  std::uint64_t seed = 1;
+  DecimalMark mark = DecimalMark::point;
+  bool json = false;
+};
+
+void put(const MechanismArguments& arguments, const std::string& csv) {
+  const std::string text = with_decimal_mark(csv, arguments.mark);
+  if (arguments.output.empty()) {
+    print_bytes(text);
+  } else {
+    write_file(arguments.output, text);
+  }
+}
+
+std::vector<std::string> all_names(const robotics::Mechanism& mechanism) {
+  std::vector<std::string> names;
+  for (const robotics::Coordinate& coordinate : mechanism.coordinates) names.push_back(coordinate.name);
+  return names;
+}
+
+// "x=0.01": the standard deviation of a coordinate's readings in its unit. Without it that of the description.
+Eigen::VectorXd noise_of_readings(const robotics::Mechanism& mechanism, const std::vector<std::string>& texts) {
+  Eigen::VectorXd noise(std::ssize(mechanism.coordinates));
+  for (Eigen::Index i = 0; i < noise.size(); ++i) noise(i) = mechanism.coordinates[i].sigma.value_or(0.0);
+  for (const std::string& text : texts) {
+    const std::size_t sign = std::min(text.find('='), text.size());
+    const auto found = std::ranges::find(mechanism.coordinates, text.substr(0, sign), &robotics::Coordinate::name);
+    if (sign == text.size() || found == mechanism.coordinates.end()) {
+      throw std::invalid_argument(fmt::format("--noise {}: must be NAME=NUMBER, with NAME one of {}", text,
+                                              fmt::join(all_names(mechanism), ", ")));
+    }
+    noise(found - mechanism.coordinates.begin()) = read_number("--noise", text.substr(sign + 1), not_negative);
+  }
+  return noise;
+}
+
+void simulate_mechanism(const MechanismArguments& arguments, const robotics::Mechanism& mechanism) {
+  const Eigen::VectorXd noise = noise_of_readings(mechanism, arguments.noise);
+  Eigen::MatrixXd poses = robotics::random_poses(mechanism, arguments.simulate, arguments.seed);
+  Random random(arguments.seed + 1);
+  for (Eigen::Index row = 0; row < poses.rows(); ++row) {
+    for (Eigen::Index i = 0; i < poses.cols(); ++i) poses(row, i) += noise(i) * random.normal();
+  }
+  put(arguments,
+      robotics::to_csv(mechanism, poses, arguments.measure.empty() ? all_names(mechanism) : arguments.measure));
+  warn(fmt::format("{}: {} poses simulated{}", mechanism.name, poses.rows(),
+                   arguments.output.empty() ? "" : ", written to " + arguments.output));
+}
+
+robotics::MechanismTable read_readings(const MechanismArguments& arguments, const robotics::Mechanism& mechanism) {
+  robotics::MechanismTable table = robotics::read_mechanism_table(arguments.data, mechanism, arguments.mark);
+  if (!table.unused.empty()) {
+    warn(fmt::format("{}: not used, no coordinates of {}: {}", arguments.data, mechanism.name,
+                     fmt::join(table.unused, ", ")));
+  }
+  return table;
+}
+
+// Names at most ten rows, and what is wrong with each.
+void warn_of_rows(const std::string& file, const std::vector<Eigen::Index>& lines,
+                  const std::vector<std::string>& why) {
+  constexpr std::size_t most = 10;
+  for (std::size_t i = 0; i < std::min(most, lines.size()); ++i) {
+    warn(fmt::format("{}:{}: {}", file, lines[i], why[i]));
+  }
+  if (lines.size() > most) warn(fmt::format("{}: {} more rows like these", file, lines.size() - most));
+}
+
+void solve_mechanism(const MechanismArguments& arguments, const robotics::Mechanism& mechanism) {
+  const robotics::MechanismTable table = read_readings(arguments, mechanism);
+  const robotics::Assembly assembly = robotics::assemble(mechanism, table.values);
+  std::vector<Eigen::Index> lines;
+  std::vector<std::string> why;
+  for (std::size_t i = 0; i < assembly.failures.size(); ++i) {
+    if (assembly.failures[i].empty()) continue;
+    lines.push_back(table.lines[i]);
+    why.push_back(assembly.failures[i]);
+  }
+  warn_of_rows(arguments.data, lines, why);
+  put(arguments, robotics::to_csv(mechanism, assembly.coordinates,
+                                  arguments.measure.empty() ? all_names(mechanism) : arguments.measure));
+  warn(fmt::format("{}: {} of {} poses solved{}", mechanism.name, assembly.failures.size() - lines.size(),
+                   assembly.failures.size(), arguments.output.empty() ? "" : ", written to " + arguments.output));
+  if (!lines.empty()) {
+    throw std::runtime_error(fmt::format("{}: {} poses have no solution", arguments.data, lines.size()));
+  }
+}
+
+void calibrate_mechanism(const MechanismArguments& arguments, const robotics::Mechanism& mechanism) {
+  const robotics::MechanismTable table = read_readings(arguments, mechanism);
+  MechanismFacts facts{.file = arguments.mechanism,
+                       .data = arguments.data,
+                       .described = mechanism,
+                       .measured = table.values,
+                       .folds = static_cast<int>(std::min<Eigen::Index>(arguments.folds, table.values.rows()))};
+  try {
+    facts.calibration = robotics::calibrate(mechanism, table.values);
+    facts.before = robotics::errors_of(mechanism, table.values);
+    if (facts.folds > 1 && facts.is_determined()) {
+      facts.held_out =
+          robotics::held_out_errors(mechanism, table.values, {.count = facts.folds, .seed = arguments.seed});
+    }
+  } catch (const std::invalid_argument& error) {
+    throw std::runtime_error(arguments.data + ": " + error.what());
+  }
+  std::vector<Eigen::Index> lines;
+  for (const Eigen::Index row : facts.calibration.left_out) lines.push_back(table.lines[row]);
+  warn_of_rows(arguments.data, lines, facts.calibration.reasons);
+  if (!arguments.errors.empty()) {
+    write_file(arguments.errors, with_decimal_mark(mechanism_errors_csv(facts), arguments.mark));
+  }
+  if (!arguments.output.empty() && facts.is_good()) robotics::save(facts.calibration.mechanism, arguments.output);
+  if (arguments.json) {
+    print_json(mechanism_json(facts));
+  } else {
+    print(mechanism_text(facts));
+    if (!arguments.output.empty() && facts.is_good()) print(fmt::format("\nWritten: {}\n", arguments.output));
+  }
+  if (!facts.is_good()) {
+    throw std::runtime_error(arguments.data + ": the parameters are not determined" +
+                             (arguments.output.empty() ? "" : "; nothing was written to " + arguments.output));
+  }
+}
+
+void mechanism_command(const MechanismArguments& arguments) {
+  if (arguments.simulate > 0) {
+    if (!arguments.data.empty()) throw std::invalid_argument("--simulate makes poses: it takes no file of readings");
+    simulate_mechanism(arguments, robotics::read_mechanism(arguments.mechanism));
+    return;
+  }
+  if (arguments.data.empty()) throw std::invalid_argument("the readings are missing: a CSV file after the mechanism");
+  const robotics::Mechanism mechanism = read_unless_exchanged(
+      arguments.mechanism, arguments.data, "the mechanism (YAML) comes first, then the readings (CSV)",
+      [](const std::string& path) { return robotics::read_mechanism(path); });
+  if (arguments.solve) {
+    solve_mechanism(arguments, mechanism);
+  } else {
+    calibrate_mechanism(arguments, mechanism);
+  }
+}
+
+}  // namespace
+
+void add_mechanism(CLI::App& app) {
+  CLI::App* command = app.add_subcommand(
+      "mechanism",
+      "Calibrate a mechanism that is given by its equations, loops included\n"
+      "The description has parameters, coordinates of joints and outputs, and the equations that they meet "
+      "(docs/mechanisms.md). The table has what is measured; where that is more than the equations need, the "
+      "parameters follow: from an instrument that measures the output, or from redundant sensors alone.");
+  command->footer("Example: llmt-robot mechanism docs/samples/five_bar.yaml measured.csv -o calibrated.yaml");
+  const auto arguments = std::make_shared<MechanismArguments>();
+  add_input_file(*command, "mechanism", arguments->mechanism, "Description of the mechanism (YAML)")->required();
+  add_input_file(*command, "readings", arguments->data,
+                 "CSV file: a row per pose, a column per measured coordinate with its unit (q1_deg, x_mm)");
+  command->add_flag("--solve", arguments->solve,
+                    "Only complete the poses: solve the equations for what the table does not have");
+  add_count(*command, "--simulate", arguments->simulate, Eigen::Index{1},
+            "Make so many random poses within the limits instead of reading them", Eigen::Index{1'000'000});
+  add_names(*command, "--measure", arguments->measure, "NAME",
+            "Coordinates that --simulate and --solve write (default: all)");
+  add_names(*command, "--noise", arguments->noise, "NAME=NUMBER",
+            "Standard deviation of simulated readings in the coordinate's unit (default: sigma of the description)");
+  add_count(*command, "--folds", arguments->folds, 0, "Folds of the held-out errors, 0: none")->capture_default_str();
+  add_seed(*command, arguments->seed, "Of folds and simulated poses");
+  add_decimal_comma(*command, arguments->mark);
+  command->add_flag("--json", arguments->json, "Print the result as JSON");
+  add_output_file(*command, "--errors", arguments->errors,
+                  "CSV file to write: readings and errors per pose, held out; a tree can learn them (llmt fit)");
+  add_output_file(*command, "-o,--output", arguments->output,
+                  "File to write: the calibrated description, or the table of --solve and --simulate");
+  command->callback([arguments] { mechanism_command(*arguments); });
+}
+
+}  // namespace llmt::apps

@@ -1,0 +1,35 @@
+/// \file
+/// What the command `mechanism` says of a calibration.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "llmt/robotics/mechanism_calibration.hpp"
+#include "shared/cli.hpp"
+
+namespace llmt::apps {
+
+struct MechanismFacts {
+  std::string file;
+  std::string data;
+  robotics::Mechanism described;
+  Eigen::MatrixXd measured;
+  int folds = 0;
+  robotics::MechanismCalibration calibration = {};
+  robotics::MechanismErrors before = {};
+  std::optional<robotics::MechanismErrors> held_out = {};
+
+  /// Whether the readings leave degrees of freedom beyond the parameters.
+  bool is_determined() const { return calibration.result.dof > 0; }
+  bool is_good() const { return is_determined() && calibration.result.converged(); }
+};
+
+std::string mechanism_text(const MechanismFacts& facts);
+Json mechanism_json(const MechanismFacts& facts);
+
+/// Readings and errors per pose: held out, or of the calibrated mechanism if there are no folds. The columns of errors
+/// are "x_error_mm", or "contradiction" where no output is predicted.
+std::string mechanism_errors_csv(const MechanismFacts& facts);
+
+}  // namespace llmt::apps
