@@ -74,8 +74,14 @@ void llmt::apps::add_urdf_links(CLI::App& command, robotics::UrdfLinks& links) {
 
 std::string llmt::apps::with_decimal_mark(std::string csv, DecimalMark mark) {
   if (mark == DecimalMark::point) return csv;
-  std::ranges::replace(csv, ',', ';');
-  std::replace(csv.begin() + static_cast<std::ptrdiff_t>(csv.find('\n')), csv.end(), '.', ',');
+  bool is_quoted = false;
+  bool is_header = true;
+  for (char& c : csv) {
+    if (c == '"') is_quoted = !is_quoted;
+    if (is_quoted) continue;
+    if (c == '\n') is_header = false;
+    c = c == ',' ? ';' : c == '.' && !is_header ? ',' : c;
+  }
   return csv;
 }
 
