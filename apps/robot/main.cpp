@@ -24,7 +24,7 @@ void llmt::apps::check_frames(const std::string& file, const robotics::Robot& ro
     const bool is_session = lacks(robot.chain.bases, observations[row].base);
     if (!is_session && !lacks(robot.chain.tools, observations[row].tool)) continue;
     const std::string& base = observations[row].base;
-    if (is_session && (robotics::is_socket(base) || robotics::is_plane(base))) {
+    if (is_session && robotics::is_touched(base)) {
       throw std::runtime_error(fmt::format("{}:{}: the {} was not part of the calibration, and shows nothing by itself",
                                            file, measurements.lines[row], base));
     }

@@ -210,7 +210,7 @@ void observe(const Csv& csv, const Header& header, const Robot& robot, const Pos
       return without_dots(words[sighting.row]);
     };
     const std::string session = named(sessions, "session");
-    if (is_socket(session) || is_plane(session)) {
+    if (is_touched(session)) {
       csv.refuse(sighting.row, "session", "a session's name does not begin with \"socket \" or \"plane \"");
     }
     const std::string target = has_targets ? named(targets, "target") : sighting.target;

@@ -33,7 +33,7 @@ std::string quoted(const std::string& text) {
 std::string name_of_feature(const Observation& seen) { return quoted(seen.base.substr(seen.base.find(' ') + 1)); }
 
 std::string target_of(const Observation& seen) {
-  if (seen.base.empty() || is_socket(seen.base) || is_plane(seen.base)) return seen.tool;
+  if (seen.base.empty() || is_touched(seen.base)) return seen.tool;
   const std::string prefix = seen.base + "/";
   return seen.tool.starts_with(prefix) ? seen.tool.substr(prefix.size()) : seen.tool == seen.base ? "" : seen.tool;
 }
@@ -126,7 +126,7 @@ std::string to_csv(const Measurements& all, const Robot& robot, const std::vecto
   std::vector<std::string> sessions;
   std::vector<std::string> targets;
   for (const Observation& seen : observations) {
-    sessions.push_back(is_socket(seen.base) || is_plane(seen.base) ? "" : seen.base);
+    sessions.push_back(is_touched(seen.base) ? "" : seen.base);
     targets.push_back(target_of(seen));
   }
   add_sockets(observations, columns);

@@ -59,6 +59,11 @@ void validate(const Chain& chain, const Effect& effect) {
   }
 }
 
+bool has_instrument(const Poses& poses) {
+  const auto& seen = poses.observations;
+  return seen.empty() || !std::ranges::all_of(seen, is_touched, &Observation::base);
+}
+
 void validate(const Robot& robot) {
   validate(robot.chain);
   std::set<std::string> seen;
