@@ -49,6 +49,11 @@ Measurements select(const Measurements& measurements, const std::vector<Eigen::I
 /// All but the given rows.
 Measurements without_rows(const Measurements& measurements, const std::vector<std::size_t>& left_out);
 
+/// The measurements without sessions, sockets and planes that have fewer measured coordinates than their base and their
+/// tools have values: they say nothing of the arm, and cannot be judged. A warning names them and their lines. A file
+/// of one session stays as it is.
+Measurements without_small_sessions(const Measurements& measurements);
+
 /// Throws std::invalid_argument if shapes differ, a number is not finite, no row or no coordinate was measured, or the
 /// number of joints is not that of the robot.
 void validate(const Measurements& measurements, const Robot& robot);
