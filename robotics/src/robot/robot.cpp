@@ -80,6 +80,11 @@ void validate(const Robot& robot) {
         fmt::format("llmt::robotics::Robot: {} effects with {} values, at most {} with {} are possible",
                     robot.effects.size(), values, most_effects, most_effect_values));
   }
+  const std::size_t ranges = robot.calibration ? robot.calibration->joint_ranges.size() : 0;
+  if (ranges != 0 && ranges != robot.chain.joints.size()) {
+    throw std::invalid_argument(fmt::format("llmt::robotics::Robot: calibration has {} joint_ranges of {} joints",
+                                            ranges, robot.chain.joints.size()));
+  }
 }
 
 std::vector<discovery::Parameter> parameters(const Robot& robot) {
