@@ -127,7 +127,7 @@ void calibrate_command(CalibrateArguments arguments) {
     facts.used = robotics::coverage(report.calibration, measurements.poses, used, arguments.new_session);
   }
   if (arguments.quality) facts.details = calibration_details(nominal, measurements, report, arguments.options);
-  std::vector<std::string> written;
+  SavedRobot written;
   const bool is_implausible = robotics::is_implausible(nominal, report);
   if (!arguments.output.empty() && !is_implausible) {
     written = save_corrected(report.best(), arguments.output, {arguments.robot, arguments.links});
@@ -142,10 +142,8 @@ void calibrate_command(CalibrateArguments arguments) {
     print_json(calibration_json(facts));
   } else {
     print(calibration_text(facts));
-    if (!written.empty()) {
-      print(fmt::format("Written: {}\n", fmt::join(written, ", ")));
-      if (robotics::is_urdf(arguments.output)) print(beside_urdf(arguments.output));
-    }
+    if (!written.names.empty()) print(fmt::format("Written: {}\n", fmt::join(written.names, ", ")));
+    print(written.beside_urdf);
     print(reports);
   }
   if (is_implausible) {

@@ -177,6 +177,10 @@ TEST(CompensateProgram, ACalibratedArmRemembersTheLinksOfItsUrdf) {
   EXPECT_NE(run("export c.yaml --deltas d.urdf").exit_code, 0);
   const Outcome deltas = run("export c.yaml --deltas arm.urdf");
   EXPECT_EQ(deltas.exit_code, 0) << deltas.err;
+  const Outcome as_urdf = run("calibrate arm.urdf d.csv --tip-link hand -o out.urdf");
+  EXPECT_NE(as_urdf.out.find("its tip is the identified tool"), std::string::npos) << as_urdf.out;
+  const Outcome inside = run("calibrate arm.urdf d.csv --tip-link fore -o inside.urdf");
+  EXPECT_NE(inside.out.find("Its tip is where it was: no fixed joint holds it"), std::string::npos) << inside.out;
   folder.run("cut -d, -f1,2 d.csv > joints.csv");
   const Outcome commands = run("compensate c.yaml joints.csv --nominal arm.urdf -o commands.csv");
   EXPECT_TRUE(std::filesystem::exists(folder.file("commands.csv"))) << commands.err;
