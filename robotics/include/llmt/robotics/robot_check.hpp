@@ -51,14 +51,14 @@ struct RobotCheck {
   /// Joints of new poses beyond those ranges. Where there are any, only the other poses decide on what follows.
   std::vector<JointBeyond> beyond;
   std::vector<Eigen::Index> uncovered;  ///< rows_beyond() of them
-  ErrorFigures covered_error;       ///< mm, over the covered poses, base and tool fitted to them alone
-  bool good_where_covered = false;  ///< still_good of the covered poses
-  bool too_few_covered = false;     ///< to say what moved: `moved` is empty
-  std::vector<Moved> moved_beyond;  ///< what the fit to all poses names, and the covered poses do not
-  std::vector<Moved> moved;         ///< in the order in which they were found
-  double refitted_mm = 0.0;         ///< mean error if what moved were identified anew
-  double noise_mm = 0.0;            ///< standard deviation of a coordinate that no change of the parameters explains
-  double noise_before_mm = 0.0;     ///< the same at calibration; 0: not known
+  ErrorFigures covered_error;           ///< mm, over the covered poses, base and tool fitted to them alone
+  bool good_where_covered = false;      ///< still_good of the covered poses
+  bool too_few_covered = false;         ///< to say what moved: `moved` is empty
+  std::vector<Moved> moved_beyond;      ///< what the fit to all poses names, and the covered poses do not
+  std::vector<Moved> moved;             ///< in the order in which they were found
+  double refitted_mm = 0.0;             ///< mean error if what moved were identified anew
+  double noise_mm = 0.0;         ///< standard deviation of a coordinate that no change of the parameters explains
+  double noise_before_mm = 0.0;  ///< the same at calibration; 0: not known
   bool unexplained =
       false;                ///< noise_mm is larger beyond chance and by a third: something changed that is no parameter
   Eigen::Index tested = 0;  ///< number of parameters and groups
