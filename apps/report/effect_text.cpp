@@ -92,6 +92,18 @@ std::string effect_words(const robotics::Effect& effect) {
   return fmt::format("{}{}{}", title, effect.at.empty() ? "" : ", " + effect.at, constants_text(effect));
 }
 
+std::string parameter_words(const robotics::Robot& robot, const std::string& name) {
+  for (const robotics::Effect& effect : robot.effects) {
+    const std::string label = robotics::effect_label(effect);
+    if (name == label) return effect_words(effect);
+    if (!name.starts_with(label + ".")) continue;
+    std::string parameter = name.substr(label.size() + 1);
+    std::ranges::replace(parameter, '_', ' ');
+    return fmt::format("{}: {}", effect_words(effect), parameter);
+  }
+  return name;
+}
+
 std::string rival_words(const robotics::FoundEffect& effect, std::size_t k) {
   const std::string& label = effect.rivals[k];
   const std::vector<robotics::Effect>& effects = effect.rival_effects[k];

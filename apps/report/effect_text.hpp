@@ -39,6 +39,10 @@ std::vector<const robotics::FoundEffect*> by_size(const robotics::Discovery& fou
 /// "link bending, joint2", with the effect's constants: what it is, for people.
 std::string effect_words(const robotics::Effect& effect);
 
+/// A parameter, or the owner of several, as the robot's calibration calls it, in the same words: "joint2.theta",
+/// "tool", "link bending, joint2: flexibility".
+std::string parameter_words(const robotics::Robot& robot, const std::string& name);
+
 /// The larger effect that this one, found beside it, is a part of: the same cause at the same place with another
 /// constant, but for waves, whose orders are causes of their own. The effect itself where there is none.
 const robotics::FoundEffect& whole_of(const robotics::Discovery& found, const robotics::FoundEffect& effect);

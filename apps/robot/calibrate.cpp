@@ -58,46 +58,6 @@ std::map<std::string, double> priors_of(const std::vector<std::string>& texts) {
   return priors;
 }
 
-std::string session_of(const robotics::Observation& seen, const robotics::Chain& chain) {
-  return seen.base.empty() ? chain.session : seen.base;
-}
-
-// A session with fewer coordinates than its base and its tools have values says nothing, and cannot be judged.
-robotics::Measurements without_small_sessions(const robotics::Measurements& measurements,
-                                              const robotics::Chain& chain) {
-  const std::vector<robotics::Observation>& observations = measurements.poses.observations;
-  std::map<std::string, std::size_t> coordinates;
-  std::map<std::string, std::set<std::string>> tools;
-  for (const Eigen::Index coordinate : robotics::measured_rows(measurements)) {
-    if (observations.empty()) return measurements;
-    const robotics::Observation& seen = observations[coordinate / 3];
-    ++coordinates[seen.base];
-    tools[seen.base].insert(seen.tool);
-  }
-  std::vector<Eigen::Index> kept;
-  std::set<std::string> left_out;
-  std::vector<Eigen::Index> lines;
-  for (Eigen::Index row = 0; row < measurements.count(); ++row) {
-    const std::string& base = observations[row].base;
-    const bool says_something = coordinates.size() == 1 || coordinates[base] > 6 + 3 * tools[base].size();
-    if (says_something) {
-      kept.push_back(row);
-    } else {
-      left_out.insert(session_of(observations[row], chain));
-      lines.push_back(measurements.lines[row]);
-    }
-  }
-  if (left_out.empty()) return measurements;
-  robotics::Measurements large = robotics::select(measurements, kept);
-  large.warnings = measurements.warnings;
-  large.unused_columns = measurements.unused_columns;
-  large.warnings.push_back(fmt::format(
-      "{} of {} sessions left out, too few points in each to find where the instrument stood: {} (line{} {})",
-      left_out.size(), coordinates.size(), fmt::join(left_out, ", "), lines.size() == 1 ? "" : "s",
-      fmt::join(lines, ", ")));
-  return large;
-}
-
 // Measurements that take no part, with frames of the calibrated robot or, in a new session, frames of their own.
 robotics::Measurements read_test(const CalibrateArguments& arguments, const robotics::Robot& nominal) {
   robotics::Measurements test = read_measured(arguments.test, nominal, {}, arguments.reading);
@@ -116,7 +76,7 @@ void calibrate_command(CalibrateArguments arguments) {
   const robotics::Robot described = read_description(arguments.robot, arguments.data, arguments.links);
   refuse_lost_correction(described, arguments.robot, arguments.output);
   robotics::Measurements measurements =
-      without_small_sessions(read_measured(arguments.data, described, {}, arguments.reading), described.chain);
+      robotics::without_small_sessions(read_measured(arguments.data, described, {}, arguments.reading));
   const robotics::Robot nominal = robotics::with_frames(described, measurements);
   std::vector<Eigen::Index> outlier_lines;
   if (arguments.robust) {
@@ -167,7 +127,7 @@ void calibrate_command(CalibrateArguments arguments) {
     facts.used = robotics::coverage(report.calibration, measurements.poses, used, arguments.new_session);
   }
   if (arguments.quality) facts.details = calibration_details(nominal, measurements, report, arguments.options);
-  std::vector<std::string> written;
+  SavedRobot written;
   const bool is_implausible = robotics::is_implausible(nominal, report);
   if (!arguments.output.empty() && !is_implausible) {
     written = save_corrected(report.best(), arguments.output, {arguments.robot, arguments.links});
@@ -182,10 +142,8 @@ void calibrate_command(CalibrateArguments arguments) {
     print_json(calibration_json(facts));
   } else {
     print(calibration_text(facts));
-    if (!written.empty()) {
-      print(fmt::format("Written: {}\n", fmt::join(written, ", ")));
-      if (robotics::is_urdf(arguments.output)) print(beside_urdf(arguments.output));
-    }
+    if (!written.names.empty()) print(fmt::format("Written: {}\n", fmt::join(written.names, ", ")));
+    print(written.beside_urdf);
     print(reports);
   }
   if (is_implausible) {

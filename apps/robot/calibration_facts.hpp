@@ -64,6 +64,9 @@ CalibrationDetails calibration_details(const robotics::Robot& nominal, const rob
                                        const robotics::CalibrationReport& report,
                                        const robotics::ReportOptions& options);
 
+/// mean, p95, max, rms.
+Json figures_json(const robotics::ErrorFigures& figures);
+
 Json calibration_json(const CalibrationFacts& facts);
 std::string calibration_text(const CalibrationFacts& facts);
 

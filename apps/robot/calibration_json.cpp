@@ -6,7 +6,6 @@ namespace llmt::apps {
 namespace {
 
 using robotics::error_figures;
-using robotics::ErrorFigures;
 
 Json details_json(const CalibrationDetails& details) {
   const robotics::Observability& seen = details.seen;
@@ -28,11 +27,11 @@ Json details_json(const CalibrationDetails& details) {
   return json;
 }
 
-Json figures_json(const ErrorFigures& figures) {
+}  // namespace
+
+Json figures_json(const robotics::ErrorFigures& figures) {
   return {{"mean", figures.mean}, {"p95", figures.p95}, {"max", figures.max}, {"rms", figures.rms}};
 }
-
-}  // namespace
 
 Json calibration_json(const CalibrationFacts& facts) {
   const robotics::CalibrationReport& report = facts.report;

@@ -192,7 +192,7 @@ std::string head(const CalibrationFacts& facts) {
 std::string coverage_text(const robotics::Coverage& used) {
   if (used.outside.empty()) return "";
   std::vector<std::string> joints;
-  for (const robotics::Coverage::JointRange& range : used.beyond) {
+  for (const robotics::JointBeyond& range : used.beyond) {
     joints.push_back(fmt::format("{} {:.0f} to {:.0f} {} (measured {:.0f} to {:.0f})", range.joint, range.used_low,
                                  range.used_high, range.unit, range.measured_low, range.measured_high));
   }

@@ -36,8 +36,8 @@ void name_made_up(const robotics::Poses& given, const robotics::Poses& completed
 /// --base-link and --tip-link: which part of a URDF is the arm.
 void add_urdf_links(CLI::App& command, robotics::UrdfLinks& links);
 
-/// A table of ours, whose cells are numbers and words without points and commas, with that mark in its numbers: with a
-/// decimal comma its fields are separated by semicolons.
+/// A table of ours, whose cells are numbers, words without points and commas, and quoted names, with that mark in its
+/// numbers: with a decimal comma its fields are separated by semicolons.
 std::string with_decimal_mark(std::string csv, DecimalMark mark);
 
 /// "joint5.theta +-0.91 deg, joint5.d +-1.9 mm": robotics::uncertain_parameters(), empty if there are none.

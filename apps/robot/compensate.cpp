@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <map>
 #include <memory>
 #include <stdexcept>
 
@@ -13,6 +12,7 @@
 #include "llmt/robotics/robot_file.hpp"
 #include "llmt/robotics/simulation.hpp"
 #include "robot/commands.hpp"
+#include "robot/measured_file.hpp"
 #include "shared/cli.hpp"
 #include "shared/options.hpp"
 
@@ -34,6 +34,7 @@ struct CompensateArguments {
   bool position_only = false;
   bool json = false;
   double tolerance_um = 0.001;
+  std::string columns;
   DecimalMark mark = DecimalMark::point;
 };
 
@@ -79,7 +80,7 @@ robotics::Targets asked(const CompensateArguments& arguments, const CorrectedRob
   targets.start.covariates = table.covariates;
   targets.positions_mm = table.positions_mm;
   try {
-    targets.rotations = robotics::rotations_of(table.orientation, robot.robot.chain.orientation);
+    targets.rotations = robotics::rotations_of(table.orientation, table.orientation.convention);
   } catch (const std::invalid_argument& error) {
     throw std::runtime_error(arguments.targets + ": " + error.what());
   }
@@ -94,22 +95,17 @@ robotics::Targets asked(const CompensateArguments& arguments, const CorrectedRob
   return targets;
 }
 
-// From rad or mm to the unit at the end of a column's name.
-double to_unit_of(const std::string& column, const robotics::Joint& joint) {
-  const std::map<std::string, double> units = {
-      {"rad", 1.0}, {"deg", robotics::to_limit_unit(joint)}, {"mm", 1.0}, {"m", 1e-3}, {"um", 1e3}};
-  return units.at(column.substr(column.rfind('_') + 1));
-}
-
 std::string commands_csv(const CorrectedRobot& robot, const robotics::TargetTable& table, const Compensation& found) {
   std::vector<std::string> names;
   std::vector<Eigen::VectorXd> columns;
   for (std::size_t j = 0; j < robot.robot.chain.joints.size(); ++j) {
     const robotics::Joint& joint = robot.robot.chain.joints[j];
     if (joint.mimic) continue;  // it has no drive
-    const bool is_named = !table.joint_columns.empty() && !table.joint_columns[j].empty();
-    names.push_back(is_named ? table.joint_columns[j] : fmt::format("q{}_{}", j + 1, robotics::limit_unit(joint)));
-    columns.emplace_back(found.commands.joints.col(j) * to_unit_of(names.back(), joint));
+    const std::string unit = robotics::limit_unit(joint);
+    robotics::JointColumn column{fmt::format("q{}_{}", j + 1, unit), unit};
+    if (!table.joint_columns.empty() && !table.joint_columns[j].name.empty()) column = table.joint_columns[j];
+    names.push_back(robotics::csv_field(column.name));
+    columns.push_back(robotics::in_unit_of(column, found.commands.joints.col(j)));
   }
   for (const auto& [name, values] : found.commands.covariates) {
     if (robotics::is_move(name)) continue;
@@ -225,13 +221,15 @@ void warn_of_units(const CompensateArguments& arguments, const robotics::Chain& 
 
 void compensate_command(const CompensateArguments& arguments) {
   const CorrectedRobot robot = read_arm(arguments.robot, links_for(arguments.robot, arguments.links, {}));
-  const robotics::TargetTable table = robotics::read_targets(arguments.targets, robot.robot, arguments.mark);
+  const robotics::ColumnMap map = column_map(arguments.columns);
+  const DecimalMark mark = map.decimal.value_or(arguments.mark);
+  const robotics::TargetTable table = robotics::read_targets(arguments.targets, robot.robot, mark, map);
   warn_of_units(arguments, robot.robot.chain, table);
   const robotics::Targets targets = asked(arguments, robot, table);
   check_positions(arguments.robot, robot.robot,
                   robotics::with_needed_columns(robot.robot, robotics::with_approach(robot.robot, targets.start), 1));
   const Compensation found = robotics::compensate(robot, targets, {.tolerance_mm = 1e-3 * arguments.tolerance_um});
-  const std::string csv = with_decimal_mark(commands_csv(robot, table, found), arguments.mark);
+  const std::string csv = with_decimal_mark(commands_csv(robot, table, found), mark);
   name_made_up(targets.start, found.commands);
   name_rows(arguments, table, found);
   if (!table.unused_columns.empty()) warn(fmt::format("Columns not used: {}", fmt::join(table.unused_columns, ", ")));
@@ -277,6 +275,7 @@ void add_compensate(CLI::App& app) {
                  "Description that the controller goes by; it says where joint values are to bring the tool");
   command->add_flag("--nominal-frames", arguments->nominal_frames,
                     "Base and tool are those of --nominal (default: those of the robot, which were registered)");
+  add_column_map(*command, arguments->columns);
   add_decimal_comma(*command, arguments->mark);
   command->add_option("--frame", arguments->frame, "Frame of target poses: world (of the instrument) or base")
       ->check(CLI::IsMember({"world", "base"}))

@@ -11,10 +11,29 @@
 
 namespace llmt::apps {
 
-std::vector<std::string> save_corrected(robotics::CorrectedRobot robot, const std::string& path,
-                                        const DescriptionSource& source) {
+namespace {
+
+std::string beside_urdf(const std::string& path, bool has_tool) {
+  const std::string yaml = beside(path, ".yaml").string();
+  if (has_tool) {
+    return fmt::format(
+        "The URDF has the identified origins of the joints, and its tip is the identified tool. It cannot hold the "
+        "instrument's frame, effects and the correction: {} has these, and the arm, for llmt-robot.\n",
+        yaml);
+  }
+  return fmt::format(
+      "The URDF has the identified origins of the joints. Its tip is where it was: no fixed joint holds it, or further "
+      "links hang on it. The identified tool, the instrument's frame, effects and the correction are in {}, which has "
+      "the arm, too, for llmt-robot.\n",
+      yaml);
+}
+
+}  // namespace
+
+SavedRobot save_corrected(robotics::CorrectedRobot robot, const std::string& path, const DescriptionSource& source) {
   std::vector<NewFile> files;
-  std::vector<std::string> names;
+  SavedRobot saved;
+  std::vector<std::string>& names = saved.names;
   robot.robot.correction_file.clear();
   if (robot.correction) {
     const std::filesystem::path correction = beside(path, correction_extension);
@@ -27,18 +46,13 @@ std::vector<std::string> save_corrected(robotics::CorrectedRobot robot, const st
   files.push_back({names.back(), robotics::to_yaml(robot.robot)});
   if (urdf) {
     names.push_back(path);
-    files.push_back({path, robotics::to_urdf(read_file(source.path), source.path, source.links, robot.robot.chain)});
+    const robotics::IdentifiedUrdf identified =
+        robotics::to_urdf(read_file(source.path), source.path, source.links, robot.robot.chain);
+    files.push_back({path, identified.text});
+    saved.beside_urdf = beside_urdf(path, identified.has_tool);
   }
   write_files(files);
-  return names;
-}
-
-std::string beside_urdf(const std::string& path) {
-  return fmt::format(
-      "The URDF has the identified origins of the joints. It cannot hold the instrument's frame, the tool point, "
-      "effects "
-      "and the correction: {} has these, and the arm, for llmt-robot.\n",
-      beside(path, ".yaml").string());
+  return saved;
 }
 
 void refuse_lost_correction(const robotics::Robot& robot, const std::string& input, const std::string& output) {

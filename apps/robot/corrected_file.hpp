@@ -18,14 +18,16 @@ struct DescriptionSource {
   robotics::UrdfLinks links;
 };
 
-/// Writes the description and, if there is one, the correction. If `path` is a URDF, that gets the origins of the
-/// joints, and the description, which has everything, stands beside it as YAML. All files are replaced or none. Returns
-/// their names.
-std::vector<std::string> save_corrected(robotics::CorrectedRobot robot, const std::string& path,
-                                        const DescriptionSource& source);
+/// What was written.
+struct SavedRobot {
+  std::vector<std::string> names;  ///< of the files
+  std::string beside_urdf;         ///< what a written URDF does not hold and where that is, in sentences
+};
 
-/// What a URDF does not hold and where that is, in a sentence.
-std::string beside_urdf(const std::string& path);
+/// Writes the description and, if there is one, the correction. If `path` is a URDF, that gets the origins of the
+/// joints and, where the tip hangs on a fixed joint, the tool; the description, which has everything, stands beside it
+/// as YAML. All files are replaced or none.
+SavedRobot save_corrected(robotics::CorrectedRobot robot, const std::string& path, const DescriptionSource& source);
 
 /// Refuses to lose the correction that the description at `input` names: throws std::invalid_argument if it is `output`
 /// or the correction beside that; or if `output` is a URDF and `input` is none.

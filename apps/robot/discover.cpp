@@ -121,7 +121,7 @@ void discover_command(DiscoverArguments arguments) {
   arguments.options.progress = {};
   warn_of_misfit(robot, data);  // what cannot be calibrated was refused
   const Json folds = arguments.folds > 0 ? folds_json(robot, data, arguments) : Json(nullptr);
-  std::vector<std::string> written;
+  SavedRobot written;
   if (!arguments.output.empty()) {
     written = save_corrected(found.improved, arguments.output, {arguments.robot, arguments.links});
   }
@@ -147,8 +147,8 @@ void discover_command(DiscoverArguments arguments) {
                       arguments.folds, arguments.contiguous ? "contiguous" : "random", folds["before_mm"].get<double>(),
                       folds["after_mm"].get<double>()));
   }
-  if (!written.empty()) print(fmt::format("Improved description: {}\n", fmt::join(written, ", ")));
-  if (!written.empty() && robotics::is_urdf(arguments.output)) print(beside_urdf(arguments.output));
+  if (!written.names.empty()) print(fmt::format("Improved description: {}\n", fmt::join(written.names, ", ")));
+  print(written.beside_urdf);
   print(reports);
 }
 

@@ -68,7 +68,7 @@ std::string headline(const Discovery& found) {
       if (refused("noise"))
         return "UNKNOWN EFFECT. No candidate explains what is left, but it is not an instrument's noise.";
       if (std::ranges::any_of(found.effects, &FoundEffect::confirmed)) {
-        return "NAMED IN PART. Beside what has a name, something is missing that the catalogue does not explain:";
+        return "UNKNOWN EFFECT, NAMED IN PART. Beside what has a name, something without a name is missing:";
       }
       if (!found.effects.empty()) {
         return "LIKELY CAUSES, NONE CERTAIN. Beside them something is missing that the catalogue does not explain:";

@@ -24,7 +24,7 @@ void llmt::apps::check_frames(const std::string& file, const robotics::Robot& ro
     const bool is_session = lacks(robot.chain.bases, observations[row].base);
     if (!is_session && !lacks(robot.chain.tools, observations[row].tool)) continue;
     const std::string& base = observations[row].base;
-    if (is_session && (robotics::is_socket(base) || robotics::is_plane(base))) {
+    if (is_session && robotics::is_touched(base)) {
       throw std::runtime_error(fmt::format("{}:{}: the {} was not part of the calibration, and shows nothing by itself",
                                            file, measurements.lines[row], base));
     }
@@ -74,8 +74,14 @@ void llmt::apps::add_urdf_links(CLI::App& command, robotics::UrdfLinks& links) {
 
 std::string llmt::apps::with_decimal_mark(std::string csv, DecimalMark mark) {
   if (mark == DecimalMark::point) return csv;
-  std::ranges::replace(csv, ',', ';');
-  std::replace(csv.begin() + static_cast<std::ptrdiff_t>(csv.find('\n')), csv.end(), '.', ',');
+  bool is_quoted = false;
+  bool is_header = true;
+  for (char& c : csv) {
+    if (c == '"') is_quoted = !is_quoted;
+    if (is_quoted) continue;
+    if (c == '\n') is_header = false;
+    c = c == ',' ? ';' : c == '.' && !is_header ? ',' : c;
+  }
   return csv;
 }
 

@@ -19,6 +19,9 @@ struct MeasuredFileOptions {
 /// --columns.
 void add_column_map(CLI::App& command, std::string& path);
 
+/// The map in a file; an empty one without a file. Throws as robotics::read_column_map().
+robotics::ColumnMap column_map(const std::string& path);
+
 /// --columns, --orientations and --decimal-comma.
 void add_measured_file_options(CLI::App& command, MeasuredFileOptions& options);
 

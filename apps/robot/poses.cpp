@@ -12,6 +12,7 @@
 #include "llmt/robotics/pose_selection.hpp"
 #include "llmt/robotics/robot_file.hpp"
 #include "robot/commands.hpp"
+#include "robot/measured_file.hpp"
 #include "shared/cli.hpp"
 #include "shared/options.hpp"
 
@@ -58,8 +59,7 @@ robotics::Robot described(const PosesArguments& arguments) {
 }
 
 robotics::PosePlan plan_of(const PosesArguments& arguments, const robotics::Robot& robot) {
-  const robotics::ColumnMap map =
-      arguments.columns.empty() ? robotics::ColumnMap{} : robotics::read_column_map(arguments.columns);
+  const robotics::ColumnMap map = column_map(arguments.columns);
   const auto read = [&](const std::string& path, const robotics::ColumnMap& meant = {}) {
     return path.empty() ? robotics::Poses() : robotics::read_poses(path, robot, arguments.mark, meant);
   };

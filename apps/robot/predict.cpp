@@ -10,6 +10,7 @@
 #include "llmt/robotics/orientation.hpp"
 #include "llmt/robotics/simulation.hpp"
 #include "robot/commands.hpp"
+#include "robot/measured_file.hpp"
 #include "shared/cli.hpp"
 #include "shared/options.hpp"
 
@@ -22,6 +23,7 @@ struct PredictArguments {
   std::string poses;
   std::string output;
   bool as_measured = false;
+  std::string columns;
   DecimalMark mark = DecimalMark::point;
 };
 
@@ -30,7 +32,9 @@ void predict_command(const PredictArguments& arguments) {
                                              ? robotics::read_corrected_robot(arguments.robot, arguments.links)
                                              : read_arm(arguments.robot, arguments.links);
   robotics::Measurements predicted;
-  const robotics::Poses given = robotics::read_poses(arguments.poses, robot.robot, arguments.mark);
+  const robotics::ColumnMap map = column_map(arguments.columns);
+  const DecimalMark mark = map.decimal.value_or(arguments.mark);
+  const auto [given, joint_columns] = robotics::read_pose_table(arguments.poses, robot.robot, mark, map);
   predicted.poses = robotics::with_needed_columns(robot.robot, robotics::with_approach(robot.robot, given), 1);
   name_made_up(given, predicted.poses);
   check_positions(arguments.robot, robot.robot, predicted.poses);
@@ -41,8 +45,9 @@ void predict_command(const PredictArguments& arguments) {
     predicted.positions_mm.row(i) = tools[i].position_mm.transpose();
     rotations.push_back(tools[i].rotation);
   }
-  predicted.orientation = robotics::to_orientation(rotations, robot.robot.chain.orientation);
-  const std::string csv = with_decimal_mark(robotics::to_csv(predicted, robot.robot), arguments.mark);
+  predicted.orientation =
+      robotics::to_orientation(rotations, map.orientation.empty() ? robot.robot.chain.orientation : map.orientation);
+  const std::string csv = with_decimal_mark(robotics::to_csv(predicted, robot.robot, joint_columns), mark);
   if (arguments.output.empty()) {
     print_bytes(csv);
   } else {
@@ -59,8 +64,9 @@ void add_predict(CLI::App& app) {
   CLI::App* command = app.add_subcommand(
       "predict",
       "Say where a robot puts its tool\n"
-      "The whole model: geometry, effects, correction. Orientations are in the description's convention (orientation: "
-      "intrinsic_xyz and the like), or quaternions if it names none.");
+      "The whole model: geometry, effects, correction. Joint values stand under the names and in the units of the "
+      "table. Orientations are in the convention of the column map or the description (orientation: intrinsic_xyz and "
+      "the like), or quaternions if these name none.");
   command->footer("Example: llmt-robot predict calibrated.yaml poses.csv -o positions.csv");
   const auto arguments = std::make_shared<PredictArguments>();
   add_input_file(*command, "robot", arguments->robot, "Robot description (YAML), as calibrate or discover wrote it")
@@ -71,6 +77,7 @@ void add_predict(CLI::App& app) {
   command->add_flag("--as-measured", arguments->as_measured,
                     "Keep errors of the instrument and its session, such as a drift: what would be read, not where "
                     "the tool is");
+  add_column_map(*command, arguments->columns);
   add_decimal_comma(*command, arguments->mark);
   add_output_file(*command, "-o,--output", arguments->output, "CSV file to write (default: standard output)");
   command->callback([arguments] { predict_command(*arguments); });

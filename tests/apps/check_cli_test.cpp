@@ -47,6 +47,61 @@ TEST(CheckProgram, AnArmThatStayedIsGoodAndOneThatWasKnockedIsNot) {
   EXPECT_EQ(folder.run(robot_program + " check cal.yaml new.csv --same-session").exit_code, 0);
 }
 
+TEST(CheckProgram, PosesBeyondTheCalibratedRangesAreNamedByLineAndJoint) {
+  const Folder folder;
+  calibrate_sample(folder);
+  std::string cal = llmt::read_file(folder.file("cal.yaml"));
+  const std::size_t range = cal.find("range_deg: [", cal.find("joint: joint3", cal.find("joint_ranges:")));
+  ASSERT_NE(range, std::string::npos);
+  cal.replace(range, cal.find(']', range) - range, "range_deg: [-20, 20");
+  folder.write("narrow.yaml", cal);
+  const Outcome run = folder.run(robot_program + " check narrow.yaml new.csv");
+  EXPECT_NE(run.out.find(" of 40 readings lie beyond the calibrated joint ranges (lines "), std::string::npos)
+      << run.out;
+  EXPECT_NE(run.out.find("  joint3 from -"), std::string::npos) << run.out;
+  EXPECT_NE(run.out.find(", calibrated from -20 to 20 (lines "), std::string::npos) << run.out;
+  const nlohmann::json json =
+      nlohmann::json::parse(folder.run(robot_program + " check narrow.yaml new.csv --json").out)["uncovered"];
+  // By hand: readings with the third joint more than 4 degrees beyond, a tenth of the range.
+  std::vector<int> expected;
+  std::istringstream table(llmt::read_file(folder.file("new.csv")));
+  std::string text;
+  std::getline(table, text);
+  for (int line = 2; std::getline(table, text); ++line) {
+    std::istringstream cells(text);
+    std::string cell;
+    for (int k = 0; k < 3; ++k) std::getline(cells, cell, ',');
+    if (std::abs(std::stod(cell)) > 24.0 * 0.017453292519943295) expected.push_back(line);
+  }
+  EXPECT_EQ(json["lines"].get<std::vector<int>>(), expected);
+  EXPECT_EQ(json["joints"][0]["lines"].get<std::vector<int>>(), expected);
+  EXPECT_EQ(json["readings"], expected.size());
+  EXPECT_TRUE(json["moved_beyond"].is_array());
+}
+
+// Effects have the names that people use.
+TEST(CheckProgram, NamesEffectsInWords) {
+  const Folder folder;
+  std::string text = llmt::read_file(samples + "arm_true.yaml");
+  text = text.substr(0, text.find("\neffects:"));
+  const auto with_wave = [&](const char* size) {
+    return fmt::format(
+        "{}\neffects:\n  - {{type: transmission_error, at: joint2, order_per_turn: 7.7812, cosine_rad: {}, "
+        "sine_rad: 1e-4}}\n",
+        text, size);
+  };
+  folder.write("wave.yaml", with_wave("3e-4"));
+  folder.write("grown.yaml", with_wave("9e-4"));
+  const Outcome made = folder.run(fmt::format(
+      "{0} simulate wave.yaml --poses 80 --noise-um 20 -o d.csv && {0} calibrate wave.yaml d.csv -o cal.yaml "
+      "&& {0} simulate grown.yaml --poses 60 --noise-um 20 --seed 2 -o new.csv",
+      robot_program));
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  const Outcome run = folder.run(robot_program + " check cal.yaml new.csv");
+  EXPECT_EQ(run.out.find("transmission_error@"), std::string::npos) << run.out;
+  EXPECT_NE(run.out.find("joint2 (order per turn 7.7812)"), std::string::npos) << run.out;
+}
+
 TEST(CheckProgram, RefusesWhatIsNoCalibration) {
   const Folder folder;
   calibrate_sample(folder);

@@ -85,6 +85,76 @@ TEST(CompensateProgram, DecimalCommasAreReadAndWritten) {
   }
 }
 
+// The first row of a table, and the one after it.
+std::pair<std::string, std::string> first_rows(const std::string& table) {
+  const std::size_t first = table.find('\n');
+  const std::size_t second = table.find('\n', first + 1);
+  return {table.substr(0, first), table.substr(first + 1, second - first - 1)};
+}
+
+TEST(PredictProgram, JointColumnsKeepTheirNamesUnitsAndValues) {
+  const Folder folder;
+  folder.write("p.csv", "joint1_deg,q2_rad,q3_deg,q4_deg,q5_deg,q6_deg\n10.1,-1.05,70.3,20,0.1,40.7\n");
+  const Outcome run = folder.run(fmt::format("{} predict {} p.csv -o out.csv", robot_program, real_arm));
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const auto [header, row] = first_rows(llmt::read_file(folder.file("out.csv")));
+  EXPECT_TRUE(header.starts_with("joint1_deg,q2_rad,q3_deg,q4_deg,q5_deg,q6_deg,x_mm,")) << header;
+  EXPECT_TRUE(row.starts_with("10.1,-1.05,70.3,20,0.1,40.7,")) << row;
+  // What is written reads back: the same positions, the same text.
+  folder.run(fmt::format("{} predict {} out.csv -o again.csv", robot_program, real_arm));
+  EXPECT_EQ(llmt::read_file(folder.file("out.csv")), llmt::read_file(folder.file("again.csv")));
+}
+
+// Names of another program, one of them with a separator, in degrees, with decimal commas; the map has a column of
+// measurements that tables of poses lack.
+TEST(PredictProgram, TablesOfAnotherProgramAreReadByAColumnMap) {
+  const Folder folder;
+  folder.write("map.yaml",
+               "decimal: comma\norientation: extrinsic_xyz\n"
+               "columns: {\"axis 1; turn\": q1_deg, A2: q2_deg, A3: q3_deg, A4: q4_deg, A5: q5_deg, A6: q6_deg, "
+               "Mx: x_mm}\n");
+  folder.write("own.csv", "\"axis 1; turn\";A2;A3;A4;A5;A6\n10,5;-60;70;20;30;40\n");
+  folder.write("plain.csv", "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n10.5,-60,70,20,30,40\n");
+  const auto run = [&](const std::string& arguments) { return folder.run(robot_program + " " + arguments); };
+  for (const std::string& command :
+       {"predict " + real_arm + " {}", "compensate " + real_arm + " {} --nominal " + sample_arm}) {
+    const Outcome mapped = run(fmt::format(fmt::runtime(command), "own.csv") + " --columns map.yaml");
+    ASSERT_EQ(mapped.exit_code, 0) << mapped.err;
+    auto [header, row] = first_rows(mapped.out);
+    EXPECT_TRUE(header.starts_with("\"axis 1; turn\";A2;A3;A4;A5;A6;")) << header;
+    std::ranges::replace(row, ',', '.');
+    std::ranges::replace(row, ';', ',');
+    const std::string expected = first_rows(run(fmt::format(fmt::runtime(command), "plain.csv")).out).second;
+    if (command.starts_with("compensate")) {
+      EXPECT_EQ(row, expected);
+      continue;
+    }
+    EXPECT_NE(header.find("rx_deg"), std::string::npos) << header;  // in the convention of the map
+    folder.write("back.csv", mapped.out);
+    EXPECT_EQ(run("predict " + real_arm + " back.csv --columns map.yaml").out, mapped.out);
+  }
+  folder.write("lacks.csv", "A2;A3;A4;A5;A6\n-60;70;20;30;40\n");
+  const Outcome lacks = run("predict " + real_arm + " lacks.csv --columns map.yaml");
+  EXPECT_NE(lacks.exit_code, 0);
+  EXPECT_NE(lacks.err.find("there is no column q1_deg or q1_rad"), std::string::npos) << lacks.err;
+}
+
+// Orientations are those of the map's convention: the same pose, written in two of them, gives the same commands.
+TEST(CompensateProgram, OrientationsAreReadInTheConventionOfTheMap) {
+  const Folder folder;
+  folder.write("p.csv", "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n10.5,-60,70,20,30,40\n");
+  std::vector<std::string> commands;
+  for (const std::string convention : {"extrinsic_zyx", "intrinsic_yxz"}) {
+    folder.write("map.yaml", fmt::format("orientation: {}\ncolumns: {{}}\n", convention));
+    folder.run(fmt::format("{} predict {} p.csv --columns map.yaml -o asked.csv", robot_program, real_arm));
+    const Outcome run = folder.run(
+        fmt::format("{} compensate {} asked.csv --columns map.yaml --json -o c.csv", robot_program, real_arm));
+    ASSERT_EQ(run.exit_code, 0) << run.err;
+    commands.push_back(first_rows(llmt::read_file(folder.file("c.csv"))).second);
+    EXPECT_TRUE(commands.back().starts_with("10.5,-60,70,20,30,40,")) << commands.back();
+  }
+}
+
 // A description that came from a URDF knows which of its links base and tip were.
 TEST(CompensateProgram, ACalibratedArmRemembersTheLinksOfItsUrdf) {
   const Folder folder;
@@ -107,6 +177,10 @@ TEST(CompensateProgram, ACalibratedArmRemembersTheLinksOfItsUrdf) {
   EXPECT_NE(run("export c.yaml --deltas d.urdf").exit_code, 0);
   const Outcome deltas = run("export c.yaml --deltas arm.urdf");
   EXPECT_EQ(deltas.exit_code, 0) << deltas.err;
+  const Outcome as_urdf = run("calibrate arm.urdf d.csv --tip-link hand -o out.urdf");
+  EXPECT_NE(as_urdf.out.find("its tip is the identified tool"), std::string::npos) << as_urdf.out;
+  const Outcome inside = run("calibrate arm.urdf d.csv --tip-link fore -o inside.urdf");
+  EXPECT_NE(inside.out.find("Its tip is where it was: no fixed joint holds it"), std::string::npos) << inside.out;
   folder.run("cut -d, -f1,2 d.csv > joints.csv");
   const Outcome commands = run("compensate c.yaml joints.csv --nominal arm.urdf -o commands.csv");
   EXPECT_TRUE(std::filesystem::exists(folder.file("commands.csv"))) << commands.err;

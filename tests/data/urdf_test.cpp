@@ -59,8 +59,8 @@ TEST(UrdfFiles, EveryFileReadsAndReadsBack) {
     EXPECT_GE(chain.joints.size(), 6U) << name;
     chain.joints[1].a_mm += 1.0;
     chain.joints[2].alpha_deg += 0.1;
-    const std::string written = to_urdf(read_file(path), path, links, chain);
-    const Chain read = parse_urdf(written, path, links);
+    const IdentifiedUrdf written = to_urdf(read_file(path), path, links, chain);
+    const Chain read = parse_urdf(written.text, path, links);
     const Eigen::VectorXd q = random_poses(chain, 1, 3).joints.row(0).transpose();
     EXPECT_LT((forward(chain, q).position_mm - forward(read, q).position_mm).norm(), 1e-7) << name;
   }

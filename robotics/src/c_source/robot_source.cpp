@@ -11,6 +11,7 @@
 #include "c_source/effect_source.hpp"
 #include "c_source/runtime.hpp"
 #include "calibration/correction_twist.hpp"
+#include "kinematics/mimics.hpp"
 #include "kinematics/units.hpp"
 #include "llmt/robotics/effects.hpp"
 
@@ -113,9 +114,46 @@ std::string table(const Chain& chain, const char* declaration, Entry entry) {
   return text + "};\n";
 }
 
-double limit(const Joint& joint, std::size_t side) {
-  if (!joint.limits) return (side == 0 ? -1.0 : 1.0) * std::numeric_limits<double>::infinity();
-  return (*joint.limits)[side] * (joint.type == JointType::revolute ? radians : 1.0);
+// Joints with a drive, in their order.
+std::vector<Eigen::Index> drives_of(const Chain& chain) {
+  std::vector<Eigen::Index> drives;
+  for (std::size_t j = 0; j < chain.joints.size(); ++j) {
+    if (!chain.joints[j].mimic) drives.push_back(static_cast<Eigen::Index>(j));
+  }
+  return drives;
+}
+
+// How joints follow the values of the drives, and the limits that this leaves to those.
+std::string drive_tables(const Chain& chain) {
+  const std::vector<Eigen::Index> drives = drives_of(chain);
+  const std::vector<Follower> followers = followers_of(chain);
+  Eigen::VectorXd low = Eigen::VectorXd::Constant(std::ssize(chain.joints), -std::numeric_limits<double>::infinity());
+  Eigen::VectorXd high = -low;
+  std::vector<std::string> all(chain.joints.size());
+  for (std::size_t j = 0; j < chain.joints.size(); ++j) {
+    const Joint& joint = chain.joints[j];
+    const auto own = static_cast<Eigen::Index>(j);
+    const auto follower = std::ranges::find(followers, own, &Follower::joint);
+    const bool follows = follower != followers.end();
+    const Eigen::Index leader = follows ? follower->leader : own;
+    all[j] = fmt::format("{{{}, {}, {}}}", std::ranges::find(drives, leader) - drives.begin(),
+                         c_number(follows ? follower->multiplier : 1.0), c_number(follows ? follower->offset : 0.0));
+    if (!joint.limits) continue;
+    low(own) = (*joint.limits)[0] / to_limit_unit(joint);
+    high(own) = (*joint.limits)[1] / to_limit_unit(joint);
+  }
+  limit_leaders(followers, low, high);
+  std::vector<std::string> lows;
+  std::vector<std::string> highs;
+  for (const Eigen::Index j : drives) {
+    lows.push_back(c_number(low(j)));
+    highs.push_back(c_number(high(j)));
+  }
+  return fmt::format(
+      "static const struct @_following {{ int drive; double multiplier, offset; }} @_following[@_JOINTS] = {{{}}};\n"
+      "static const int @_drives[@_DRIVES] = {{{}}};\n"
+      "static const double @_low[@_DRIVES] = {{{}}};\nstatic const double @_high[@_DRIVES] = {{{}}};\n",
+      fmt::join(all, ", "), fmt::join(drives, ", "), fmt::join(lows, ", "), fmt::join(highs, ", "));
 }
 
 std::string tables(const Robot& robot) {
@@ -124,16 +162,15 @@ std::string tables(const Robot& robot) {
   const auto deforms = [](const Effect& effect) { return effect_type(effect.type).elastic; };
   const int passes = std::ranges::any_of(robot.effects, deforms) ? 3 : robot.effects.empty() ? 0 : 1;
   const Eigen::Vector3d gravity = base_rotation_of(chain) * chain.gravity_m_s2;
-  std::string text =
-      fmt::format("enum {{ @_JOINTS = {0}, @_ELEMENTS = {1}, @_PASSES = {2}, @_MOST = {3} }};\n", chain.joints.size(),
-                  elements.count(), passes, std::max<std::size_t>(6, chain.joints.size()));
+  std::string text = fmt::format(
+      "enum {{ @_JOINTS = {0}, @_DRIVES = {1}, @_ELEMENTS = {2}, @_PASSES = {3}, @_MOST = {4} }};\n",
+      chain.joints.size(), drive_count(chain), elements.count(), passes, std::max<Eigen::Index>(6, drive_count(chain)));
   text += fmt::format("static const double @_reach = {};\nstatic const double @_gravity[3] = {};\n",
                       c_number(std::max(reach_of(chain), 1.0)), vector(gravity));
   text += fmt::format("static const double @_payload_centre[3] = {};\n", vector(chain.payload.com_mm));
   text += table(chain, "double @_signs[@_JOINTS]", [](const Joint& joint) { return c_number(joint.sign); });
   text += table(chain, "double @_masses[@_JOINTS]", [](const Joint& joint) { return c_number(joint.mass_kg); });
-  text += table(chain, "double @_low[@_JOINTS]", [](const Joint& joint) { return c_number(limit(joint, 0)); });
-  text += table(chain, "double @_high[@_JOINTS]", [](const Joint& joint) { return c_number(limit(joint, 1)); });
+  text += drive_tables(chain);
   text += table(chain, "double @_centres[@_JOINTS][3]", [](const Joint& joint) { return vector(joint.com_mm); });
   text += table(chain, "int @_slides[@_JOINTS]",
                 [](const Joint& joint) { return joint.type == JointType::prismatic ? "1" : std::string("0"); });
@@ -192,8 +229,9 @@ std::string header(const Robot& robot, const std::string& name) {
   for (const std::string& condition : c_conditions(robot)) {
     text += fmt::format("   conditions[{}]: {}\n", index++, condition);
   }
-  for (std::size_t j = 0; j < robot.chain.joints.size(); ++j) {
-    text += fmt::format("   q[{}]: joint {}, {}\n", j, j + 1,
+  index = 0;
+  for (const Eigen::Index j : drives_of(robot.chain)) {
+    text += fmt::format("   q[{}]: joint {}, {}\n", index++, j + 1,
                         robot.chain.joints[j].type == JointType::revolute ? "rad" : "mm");
   }
   return text + with_name(R"(   Positions in mm, rotations as nine numbers, row by row. */
@@ -230,11 +268,6 @@ CSource to_c(const CorrectedRobot& robot, const std::string& name, const std::st
     throw std::invalid_argument(
         fmt::format("llmt::robotics::to_c: name is \"{}\", must be an identifier of C of at most {} characters", name,
                     longest_name));
-  }
-  for (const Joint& joint : robot.robot.chain.joints) {
-    if (!joint.mimic) continue;
-    throw std::invalid_argument(fmt::format("llmt::robotics::to_c: {} mimics {}: such joints cannot be exported",
-                                            joint.name, joint.mimic->joint));
   }
   const std::string effects = deform(robot.robot, c_conditions(robot.robot));
   CSource result;

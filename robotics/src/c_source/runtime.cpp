@@ -127,6 +127,15 @@ static void @_turn(const double *by, double rotation[3][3]) {
   }
 }
 
+/* The values of all joints: those with a drive, and those that follow one. */
+static void @_follow(const double *drives, double *q) {
+  int j;
+  for (j = 0; j < @_JOINTS; ++j) {
+    const struct @_following *f = @_following + j;
+    q[j] = f->multiplier * drives[f->drive] + f->offset;
+  }
+}
+
 static void @_pose(const double *conditions, const double *q, double *position, struct @_frame *tool) {
   double more[@_JOINTS] = {0.0};
   double turn[3] = {0.0, 0.0, 0.0};
@@ -147,9 +156,11 @@ static void @_pose(const double *conditions, const double *q, double *position, 
   position[2] = tool->p[2];
 }
 
-void @_forward(const double *conditions, const double *q, double *position, double *rotation) {
+void @_forward(const double *conditions, const double *drives, double *position, double *rotation) {
   struct @_frame tool;
+  double q[@_JOINTS];
   int i;
+  @_follow(drives, q);
   @_pose(conditions, q, position, &tool);
   for (i = 0; i < 9; ++i) rotation[i] = tool.r[i / 3][i % 3];
 }
@@ -159,7 +170,7 @@ static int @_missing(const double *position, const double *rotation, const struc
   int i, j, k;
   double turn[3][3], v[3], sine, angle, factor;
   for (i = 0; i < 3; ++i) error[i] = position[i] - tool->p[i];
-  if (rotation == 0 || @_JOINTS < 6) return 3;
+  if (rotation == 0 || @_DRIVES < 6) return 3;
   for (i = 0; i < 3; ++i) {
     for (j = 0; j < 3; ++j) {
       turn[i][j] = 0.0;
@@ -196,16 +207,16 @@ static void @_solve(int n, double a[@_MOST][@_MOST], double *b) {
   }
 }
 
-static void @_least_squares(int rows, double jacobian[6][@_JOINTS], const double *error, double *change) {
+static void @_least_squares(int rows, double jacobian[6][@_DRIVES], const double *error, double *change) {
   double normal[@_MOST][@_MOST];
   double right[@_MOST];
   double size = 0.0;
-  const int wide = @_JOINTS > rows;
-  const int n = wide ? rows : @_JOINTS;
-  const int m = wide ? @_JOINTS : rows;
+  const int wide = @_DRIVES > rows;
+  const int n = wide ? rows : @_DRIVES;
+  const int m = wide ? @_DRIVES : rows;
   int i, j, k;
   for (i = 0; i < rows; ++i) {
-    for (j = 0; j < @_JOINTS; ++j) size += jacobian[i][j] * jacobian[i][j];
+    for (j = 0; j < @_DRIVES; ++j) size += jacobian[i][j] * jacobian[i][j];
   }
   for (i = 0; i < n; ++i) {
     right[i] = wide ? error[i] : 0.0;
@@ -216,49 +227,52 @@ static void @_least_squares(int rows, double jacobian[6][@_JOINTS], const double
     }
   }
   @_solve(n, normal, right);
-  for (j = 0; j < @_JOINTS; ++j) {
+  for (j = 0; j < @_DRIVES; ++j) {
     change[j] = wide ? 0.0 : right[j];
     for (k = 0; wide && k < rows; ++k) change[j] += jacobian[k][j] * right[k];
   }
 }
 
-double @_step(const double *conditions, const double *position, const double *rotation, double *q) {
+double @_step(const double *conditions, const double *position, const double *rotation, double *drives) {
   static const double nothing[@_JOINTS] = {0.0};
-  double jacobian[6][@_JOINTS] = {{0.0}};
-  double error[6], change[@_JOINTS], at[3];
+  double jacobian[6][@_DRIVES] = {{0.0}};
+  double q[@_JOINTS], error[6], change[@_DRIVES], at[3];
   double square = 0.0;
   double longest = 0.0;
   struct @_frame tool;
   struct @_arm arm;
   int rows, round, i, j, again = 1;
+  @_follow(drives, q);
   @_pose(conditions, q, at, &tool);
   rows = @_missing(position, rotation, &tool, error);
   for (i = 0; i < rows; ++i) square += error[i] * error[i];
   @_walk(q, nothing, &arm);
   for (j = 0; j < @_JOINTS; ++j) {
+    const struct @_following *f = @_following + j;
+    const double unit = f->multiplier * (@_slides[@_drives[f->drive]] ? @_reach : 1.0);
     double lever[3], turned[3];
     for (i = 0; i < 3; ++i) lever[i] = arm.tool.p[i] - arm.origin[j][i];
     @_cross(arm.axis[j], lever, turned);
     for (i = 0; i < 3; ++i) {
-      jacobian[i][j] = @_slides[j] ? @_reach * arm.axis[j][i] : turned[i];
-      jacobian[3 + i][j] = @_slides[j] ? 0.0 : @_reach * arm.axis[j][i];
+      jacobian[i][f->drive] += unit * (@_slides[j] ? arm.axis[j][i] : turned[i]);
+      jacobian[3 + i][f->drive] += @_slides[j] ? 0.0 : unit * @_reach * arm.axis[j][i];
     }
   }
-  for (round = 0; again && round <= @_JOINTS; ++round) {
+  for (round = 0; again && round <= @_DRIVES; ++round) {
     again = 0;
     @_least_squares(rows, jacobian, error, change);
-    for (j = 0; j < @_JOINTS; ++j) {
-      if ((q[j] <= @_low[j] && change[j] < 0.0) || (q[j] >= @_high[j] && change[j] > 0.0)) {
+    for (j = 0; j < @_DRIVES; ++j) {
+      if ((drives[j] <= @_low[j] && change[j] < 0.0) || (drives[j] >= @_high[j] && change[j] > 0.0)) {
         for (i = 0; i < 6; ++i) jacobian[i][j] = 0.0;
         again = 1;
       }
     }
   }
-  for (j = 0; j < @_JOINTS; ++j) longest = longest < fabs(change[j]) ? fabs(change[j]) : longest;
-  for (j = 0; j < @_JOINTS; ++j) {
+  for (j = 0; j < @_DRIVES; ++j) longest = longest < fabs(change[j]) ? fabs(change[j]) : longest;
+  for (j = 0; j < @_DRIVES; ++j) {
     double next = change[j] * (longest > 0.2 ? 0.2 / longest : 1.0);
-    next = q[j] + (@_slides[j] ? @_reach * next : next);
-    q[j] = next < @_low[j] ? @_low[j] : next > @_high[j] ? @_high[j] : next;
+    next = drives[j] + (@_slides[@_drives[j]] ? @_reach * next : next);
+    drives[j] = next < @_low[j] ? @_low[j] : next > @_high[j] ? @_high[j] : next;
   }
   return sqrt(square);
 }

@@ -9,6 +9,7 @@
 #include "calibration/frame_start.hpp"
 #include "calibration/free_parameters.hpp"
 #include "calibration/joint_map_shift.hpp"
+#include "calibration/joint_ranges.hpp"
 #include "calibration/noise_model.hpp"
 
 namespace llmt::robotics {
@@ -255,6 +256,7 @@ Calibration calibrate_without_maps(const Robot& robot, const Measurements& measu
 Calibration calibrate(const Robot& robot, const Measurements& measurements, const CalibrationOptions& options) {
   const Unmapped plain = unmapped(with_frames(robot, measurements.poses), measurements);
   Calibration calibration = calibrate_without_maps(plain.robot, plain.measurements, options);
+  calibration.robot.calibration->joint_ranges = joint_ranges_of(robot.chain, measurements.poses);
   for (Robot* fitted : {&calibration.robot, &calibration.registered}) {
     fitted->effects.insert(fitted->effects.end(), plain.maps.begin(), plain.maps.end());
   }

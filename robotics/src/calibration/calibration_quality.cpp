@@ -9,6 +9,7 @@
 #include <string>
 #include <tuple>
 
+#include "calibration/joint_ranges.hpp"
 #include "calibration/median.hpp"
 #include "calibration/noise_model.hpp"
 #include "calibration/singular_values.hpp"
@@ -154,29 +155,15 @@ Eigen::VectorXd position_deviations(const Calibration& calibration, const Poses&
 }
 
 Coverage coverage(const Calibration& calibration, const Poses& measured, const Poses& used, bool frames_are_known) {
-  constexpr double slack = 0.1;      // of the range
-  constexpr double rounding = 1e-6;  // rad or mm
   Coverage result;
   if (used.count() == 0) return result;
-  std::vector<bool> is_outside(used.count());
-  for (Eigen::Index j = 0; j < measured.joints.cols(); ++j) {
-    const Eigen::VectorXd values = used.joints.col(j);
-    const double low = measured.joints.col(j).minCoeff();
-    const double high = measured.joints.col(j).maxCoeff();
-    const double margin = std::max(slack * (high - low), rounding);
-    bool beyond = false;
-    for (Eigen::Index i = 0; i < values.size(); ++i) {
-      if (values(i) >= low - margin && values(i) <= high + margin) continue;
-      is_outside[i] = beyond = true;
-    }
-    if (!beyond) continue;
-    const Joint& joint = calibration.robot.chain.joints[j];
-    const double unit = to_limit_unit(joint);
-    result.beyond.push_back(
-        {joint.name, limit_unit(joint), low * unit, high * unit, values.minCoeff() * unit, values.maxCoeff() * unit});
-  }
+  const Chain& chain = calibration.robot.chain;
+  result.beyond = joints_beyond(chain, joint_ranges_of(chain, measured), used);
+  result.outside = rows_beyond(result.beyond);
   std::vector<Eigen::Index> inside;
-  for (Eigen::Index i = 0; i < used.count(); ++i) (is_outside[i] ? result.outside : inside).push_back(i);
+  for (Eigen::Index i = 0; i < used.count(); ++i) {
+    if (!std::ranges::binary_search(result.outside, i)) inside.push_back(i);
+  }
   const Eigen::VectorXd deviations = position_deviations(calibration, used, frames_are_known);
   result.deviation_inside_mm = root_mean_square_of(deviations(inside));
   result.deviation_outside_mm = root_mean_square_of(deviations(result.outside));

@@ -138,6 +138,12 @@ ErrorFigures error_figures(const Eigen::VectorXd& distances_mm) {
           .rms = distances_mm.norm() / std::sqrt(count)};
 }
 
+void remember_errors(CalibrationRecord& record, const Eigen::VectorXd& left_out_mm) {
+  const auto freedom = static_cast<double>(std::max<Eigen::Index>(1, left_out_mm.size() - 1));
+  record.held_out_mm = left_out_mm.mean();
+  record.held_out_sd_mm = (left_out_mm.array() - left_out_mm.mean()).matrix().norm() / std::sqrt(freedom);
+}
+
 CorrectedRobot CalibrationReport::best() const {
   CorrectedRobot robot{.robot = calibration.robot, .correction = {}};
   if (correction_kept) robot.correction = correction->model;
@@ -258,10 +264,7 @@ CalibrationReport report_calibration(const Robot& robot, const Measurements& mea
   decide(report);
   if (options.folds != 0) {
     const Eigen::VectorXd& errors = (report.correction_kept ? *report.corrected : report.geometric).held_out_mm;
-    CalibrationRecord& record = *report.calibration.robot.calibration;
-    record.held_out_mm = errors.mean();
-    record.held_out_sd_mm =
-        (errors.array() - errors.mean()).matrix().norm() / std::sqrt(static_cast<double>(errors.size()));
+    remember_errors(*report.calibration.robot.calibration, errors);
   }
   return report;
 }

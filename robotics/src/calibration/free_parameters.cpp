@@ -112,10 +112,8 @@ std::vector<std::string> reasons_to_fix(const Robot& robot, const CalibrationOpt
 void fix_what_sockets_take_up(const Robot& robot, const Poses& poses, std::vector<std::string>& reasons) {
   const auto in_socket = [](const Observation& seen) { return is_socket(seen.base); };
   if (std::ranges::none_of(poses.observations, in_socket)) return;
-  const bool has_points = std::ranges::any_of(
-      poses.observations, [&](const Observation& seen) { return !is_socket(seen.base) && !is_plane(seen.base); });
   const bool base_is_known = !reasons[base_parameter(FrameParameter::rx)].empty();
-  if (has_points && base_is_known) return;
+  if (has_instrument(poses) && base_is_known) return;
   std::vector<JointParameter> turns = {JointParameter::theta};
   if (robot.chain.convention == Convention::mdh) {
     turns.insert(turns.end(), {JointParameter::alpha, JointParameter::beta});
@@ -130,8 +128,7 @@ void fix_what_sockets_take_up(const Robot& robot, const Poses& poses, std::vecto
 void keep_scale(const Robot& robot, const Poses& poses, const CalibrationOptions& options,
                 std::vector<std::string>& reasons) {
   const Chain& chain = robot.chain;
-  const auto has_no_scale = [](const Observation& seen) { return is_socket(seen.base) || is_plane(seen.base); };
-  if (poses.observations.empty() || !std::ranges::all_of(poses.observations, has_no_scale)) return;
+  if (has_instrument(poses)) return;
   const auto slides = [](const Joint& joint) { return joint.type == JointType::prismatic; };
   if (std::ranges::any_of(chain.joints, slides)) return;  // its travel is a length that is known
   const std::vector<discovery::Parameter> all = parameters(robot);

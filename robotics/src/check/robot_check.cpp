@@ -17,6 +17,9 @@ void require(bool holds, const std::string& what) {
   if (!holds) throw std::invalid_argument("llmt::robotics::check_robot: " + what);
 }
 
+// Nine values of base and tool are fitted.
+Eigen::Index fewest_poses(const CheckOptions& options) { return options.same_session ? 5 : 8; }
+
 void check(const CorrectedRobot& robot, const Measurements& measurements, const CheckOptions& options) {
   validate(robot.robot);
   validate(measurements, robot.robot);
@@ -24,9 +27,8 @@ void check(const CorrectedRobot& robot, const Measurements& measurements, const 
           fmt::format("level is {}, must be above 0 and at most 0.5", options.level));
   require(!options.accuracy_mm || (*options.accuracy_mm > 0.0 && std::isfinite(*options.accuracy_mm)),
           "accuracy_mm must be > 0");
-  const Eigen::Index fewest = options.same_session ? 5 : 8;  // nine values of base and tool are fitted
-  require(measurements.count() >= fewest,
-          fmt::format("there are {} poses, at least {} are needed{}", measurements.count(), fewest,
+  require(measurements.count() >= fewest_poses(options),
+          fmt::format("there are {} poses, at least {} are needed{}", measurements.count(), fewest_poses(options),
                       options.same_session ? "" : " where base and tool are fitted"));
   const auto is_identified = [](const IdentifiedParameter& entry) { return entry.standard_error.has_value(); };
   require(std::ranges::any_of(robot.robot.identified, is_identified),
@@ -212,10 +214,7 @@ void find_moved(const CorrectedRobot& robot, const Robot& before, const Measurem
   result.unexplained = ratio > material && f_tail(ratio * ratio, movements.freedom, known) < rare;
 }
 
-}  // namespace
-
-RobotCheck check_robot(const CorrectedRobot& robot, const Measurements& measurements, const CheckOptions& options) {
-  check(robot, measurements, options);
+RobotCheck check_all(const CorrectedRobot& robot, const Measurements& measurements, const CheckOptions& options) {
   RobotCheck result;
   set_limit(robot.robot, measurements, options, result);
   const CalibrationRecord* record = robot.robot.calibration ? &*robot.robot.calibration : nullptr;
@@ -223,9 +222,55 @@ RobotCheck check_robot(const CorrectedRobot& robot, const Measurements& measurem
   CorrectedRobot judged = robot;
   if (!options.same_session) judged = registered(robot, measurements, {});
   result.errors_mm = distances(positions(judged, measurements.poses), measurements);
-  result.error = error_figures(result.errors_mm);
-  result.still_good = result.error.mean <= result.limit_mm;
+  result.error = result.covered_error = error_figures(result.errors_mm);
+  result.still_good = result.good_where_covered = result.error.mean <= result.limit_mm;
   find_moved(judged, robot.robot, measurements, options, result);
+  return result;
+}
+
+// `result` is that of all poses; the covered ones decide what moved.
+RobotCheck decided_by_covered(const CorrectedRobot& robot, const Measurements& measurements,
+                              const CheckOptions& options, RobotCheck result) {
+  const std::vector<std::size_t> rows(result.uncovered.begin(), result.uncovered.end());
+  const Measurements covered = without_rows(measurements, rows);
+  result.too_few_covered = covered.count() < fewest_poses(options);
+  RobotCheck decided = result;
+  if (result.too_few_covered) {
+    decided.moved.clear();
+    decided.covered_error = {};
+    decided.good_where_covered = false;
+    decided.unexplained = false;
+  } else {
+    decided = check_all(robot, covered, options);
+    decided.covered_error = decided.error;
+    decided.good_where_covered = decided.still_good;
+  }
+  for (const Moved& moved : result.moved) {
+    if (std::ranges::find(decided.moved, moved.name, &Moved::name) == decided.moved.end()) {
+      decided.moved_beyond.push_back(moved);
+    }
+  }
+  decided.error = result.error;
+  decided.errors_mm = result.errors_mm;
+  decided.still_good = result.still_good;
+  decided.limit_mm = result.limit_mm;
+  decided.beyond = result.beyond;
+  decided.uncovered = result.uncovered;
+  decided.too_few_covered = result.too_few_covered;
+  return decided;
+}
+
+}  // namespace
+
+RobotCheck check_robot(const CorrectedRobot& robot, const Measurements& measurements, const CheckOptions& options) {
+  check(robot, measurements, options);
+  RobotCheck result = check_all(robot, measurements, options);
+  const CalibrationRecord* record = robot.robot.calibration ? &*robot.robot.calibration : nullptr;
+  if (record == nullptr || record->joint_ranges.empty()) return result;
+  result.beyond = joints_beyond(robot.robot.chain, record->joint_ranges, measurements.poses);
+  result.uncovered = rows_beyond(result.beyond);
+  if (!result.uncovered.empty()) result = decided_by_covered(robot, measurements, options, std::move(result));
+  result.has_ranges = true;
   return result;
 }
 

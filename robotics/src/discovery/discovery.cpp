@@ -92,10 +92,7 @@ void remember_error(const Measurements& searched, const Measurements& test, Disc
   std::optional<CalibrationRecord>& record = result.improved.robot.calibration;
   if (test.count() < 2 || !record || test.measured != searched.measured) return;
   const Eigen::VectorXd all = distances(positions(result.improved, test.poses), test);
-  const Eigen::VectorXd errors = all(position_rows(test.poses));
-  record->held_out_mm = errors.mean();
-  record->held_out_sd_mm = std::sqrt((errors.array() - errors.mean()).square().sum() /
-                                     static_cast<double>(std::max<Eigen::Index>(1, errors.size() - 1)));
+  remember_errors(*record, all(position_rows(test.poses)));
 }
 
 void verify(const Measurements& searched, const Measurements& test, Eigen::Index components, Discovery& result) {

@@ -112,7 +112,7 @@ void doubt_coverage(const Investigation& investigation, const Measurements& test
   const Coverage used = coverage(investigation.fitted, investigation.searched.poses, test.poses);
   if (used.outside.empty()) return;
   std::vector<std::string> joints;
-  for (const Coverage::JointRange& range : used.beyond) {
+  for (const JointBeyond& range : used.beyond) {
     joints.push_back(fmt::format("{} {:.0f} to {:.0f} {} (searched {:.0f} to {:.0f})", range.joint, range.used_low,
                                  range.used_high, range.unit, range.measured_low, range.measured_high));
   }

@@ -109,6 +109,11 @@ std::vector<Eigen::Matrix3d> instrument_axes(const Measurements& measurements) {
   return turned;
 }
 
+// Whether there are distances and directions from an instrument.
+bool has_polar_axes(const Residuals& residuals, const Measurements& measurements) {
+  return residuals.components() == 3 && has_instrument(measurements.poses);
+}
+
 double spread(const std::vector<double>& values, double& mean) {
   const auto n = static_cast<double>(values.size());
   mean = std::accumulate(values.begin(), values.end(), 0.0) / n;
@@ -148,7 +153,7 @@ std::optional<NoNoise> test_directions(const Residuals& residuals, const Calibra
   for (std::size_t j = 0; j < joints.size(); ++j) units.push_back(motions(fitted.robot, measurements, j));
   std::vector<double> smallest(joints.size(), std::numeric_limits<double>::infinity());
   std::vector<std::vector<Eigen::Matrix3d>> kinds = {{}};
-  if (residuals.components() == 3) kinds.push_back(instrument_axes(measurements));
+  if (has_polar_axes(residuals, measurements)) kinds.push_back(instrument_axes(measurements));
   for (const std::vector<Eigen::Matrix3d>& axes : kinds) {
     std::vector<std::vector<double>> shares(joints.size());
     for (int draw = 0; draw < draws; ++draw) {
@@ -216,7 +221,7 @@ std::optional<NoNoise> test_neighbours(const Residuals& residuals, const Calibra
     return NoNoise{"session", fmt::format("what is left is alike in neighbours by {}: something changes slowly",
                                           order != nullptr ? "order of measuring" : "row of the file")};
   }
-  if (residuals.components() == 3) {
+  if (has_polar_axes(residuals, measurements)) {
     const std::vector<Eigen::Matrix3d> axes = instrument_axes(measurements);
     Eigen::MatrixXd local = vectors;
     for (Eigen::Index i = 0; i < local.rows(); ++i) local.row(i) = (axes[i] * vectors.row(i).transpose()).transpose();

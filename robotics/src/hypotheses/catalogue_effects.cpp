@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -99,6 +100,20 @@ bool origin_may_be_an_instrument(const Scene& scene) {
   return true;
 }
 
+// An axis that is upright at all poses has no weight to balance.
+bool is_upright(const Scene& scene, std::size_t joint) {
+  constexpr double level = 1e-3;  // rad: less is the error of a stand
+  const Chain& chain = scene.robot.chain;
+  const Kinematics kinematics(chain);
+  const Eigen::Vector3d gravity = chain.gravity_m_s2.normalized();
+  for (Eigen::Index i = 0; i < scene.poses.count(); ++i) {
+    const Skeleton arm = kinematics.skeleton(scene.poses.joints.row(i).transpose());
+    const Eigen::Vector3d down = arm.base_rotation * gravity;
+    if (arm.joint_axis[joint].cross(down).norm() > level) return false;
+  }
+  return true;
+}
+
 // No payload weighs less than nothing, as far as masses and softness are known.
 void keep_payload_positive(const Poses& poses, const Chain& chain, discovery::EffectCandidate& candidate) {
   double least = std::numeric_limits<double>::infinity();
@@ -127,10 +142,11 @@ std::vector<Hypothesis> catalogue_hypotheses(const Scene& scene, const std::vect
   const Chain& chain = scene.robot.chain;
   const std::set<std::string> present = labels_of(scene.robot);
   std::vector<Hypothesis> hypotheses;
-  const bool has_instrument = origin_may_be_an_instrument(scene);
+  const bool is_measured = has_instrument(scene.poses);
+  const bool is_polar = is_measured && origin_may_be_an_instrument(scene);
   for (const EffectType& type : catalogue) {
-    if (!type.searched) continue;
-    if (type.name.starts_with("instrument_") && !has_instrument) {
+    if (!type.searched || (type.of_measuring && !is_measured)) continue;
+    if (type.name.starts_with("instrument_") && !is_polar) {
       untestable.push_back({type.name, "the origin of the measurements is not where an instrument stands"});
       continue;
     }
@@ -142,6 +158,7 @@ std::vector<Hypothesis> catalogue_hypotheses(const Scene& scene, const std::vect
       // This type has three unknowns per body and imitates many other effects: it is tried only where masses are
       // unknown.
       if (type.name == "joint_compliance_free_masses" && masses_known(chain, index)) continue;
+      if (type.name == "counterbalance_spring" && is_upright(scene, index)) continue;
       if (!has_columns(type, chain, index, scene.poses, &why)) {
         untestable.push_back({place.empty() ? type.name : type.name + "@" + place,
                               "there is no column " + (why.starts_with("move") ? "order|time_s" : why)});

@@ -205,6 +205,8 @@ bool is_socket(std::string_view base) { return base.starts_with("socket "); }
 
 bool is_plane(std::string_view base) { return base.starts_with("plane "); }
 
+bool is_touched(std::string_view base) { return is_socket(base) || is_plane(base); }
+
 double to_limit_unit(const Joint& joint) { return joint.type == JointType::revolute ? degrees : 1.0; }
 
 std::string limit_unit(const Joint& joint) { return joint.type == JointType::revolute ? "deg" : "mm"; }

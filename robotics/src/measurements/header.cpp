@@ -38,6 +38,11 @@ bool is_angle(const std::string& quantity) { return quantity.size() == 2 && quan
 
 }  // namespace
 
+ColumnMap for_columns_of(const Csv& csv, ColumnMap map) {
+  std::erase_if(map.names, [&](const auto& entry) { return !csv.has(entry.first); });
+  return map;
+}
+
 void Header::refuse(const std::string& message) const {
   throw std::runtime_error(fmt::format("{}:1: {}", csv_.name(), message));
 }
@@ -183,11 +188,12 @@ Eigen::MatrixXd Header::joints() const {
   return all;
 }
 
-std::vector<std::string> Header::joint_columns() const {
-  std::vector<std::string> columns;
+std::vector<JointColumn> Header::joint_columns() const {
+  std::vector<JointColumn> columns;
   for (std::size_t j = 0; j < robot_.chain.joints.size(); ++j) {
     const auto found = quantities_.find(fmt::format("q{}", j + 1));
-    columns.push_back(found == quantities_.end() ? "" : found->second.column);
+    columns.push_back(found == quantities_.end() ? JointColumn{}
+                                                 : JointColumn{found->second.column, found->second.unit});
   }
   return columns;
 }

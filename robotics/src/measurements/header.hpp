@@ -12,6 +12,10 @@
 
 namespace llmt::robotics {
 
+/// The map without the columns that a table of poses or targets lacks: it was written for measurements, which have
+/// more. A joint that is missing is refused by Header::joints().
+ColumnMap for_columns_of(const Csv& csv, ColumnMap map);
+
 class Header {
  public:
   /// `also`: columns that are covariates besides those known by name. Throws std::runtime_error `path:1: ...` if a
@@ -25,8 +29,8 @@ class Header {
   /// n x J in rad and mm. Joints that mimic others need no column.
   Eigen::MatrixXd joints() const;
 
-  /// Of the file, joint by joint; empty where a joint that mimics another has none.
-  std::vector<std::string> joint_columns() const;
+  /// Joint by joint.
+  std::vector<JointColumn> joint_columns() const;
 
   /// Prefixes of the columns of targets, in the order of the columns: "" for x_mm, "t2_" for t2_x_mm.
   const std::vector<std::string>& targets() const { return targets_; }

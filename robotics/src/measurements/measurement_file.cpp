@@ -210,7 +210,7 @@ void observe(const Csv& csv, const Header& header, const Robot& robot, const Pos
       return without_dots(words[sighting.row]);
     };
     const std::string session = named(sessions, "session");
-    if (is_socket(session) || is_plane(session)) {
+    if (is_touched(session)) {
       csv.refuse(sighting.row, "session", "a session's name does not begin with \"socket \" or \"plane \"");
     }
     const std::string target = has_targets ? named(targets, "target") : sighting.target;
@@ -282,14 +282,15 @@ Measurements parse_measurements(std::string text, const std::string& name, const
   return from_csv(Csv::parse(std::move(text), name, map.decimal.value_or(mark)), robot, also, map);
 }
 
-Poses read_poses(const std::string& path, const Robot& robot, DecimalMark mark, const ColumnMap& map) {
-  const Csv all = Csv::read(path, map.decimal.value_or(mark));
+PoseTable read_pose_table(const std::string& path, const Robot& robot, DecimalMark mark, const ColumnMap& given) {
+  const Csv all = Csv::read(path, given.decimal.value_or(mark));
+  const ColumnMap map = for_columns_of(all, given);
   const Csv csv = all.with_rows(reference_rows(all, map).others);
   const Header header(csv, robot, {}, map);
   Poses poses{.joints = header.joints(), .covariates = header.covariates()};
   if (poses.count() == 0) throw std::runtime_error(fmt::format("{}: there are no poses", csv.name()));
   add_moves(poses, robot.chain);
-  if (header.words("target").empty()) return poses;
+  if (header.words("target").empty()) return {std::move(poses), header.joint_columns()};
   // Several targets were looked at from one pose.
   const std::vector<Eigen::Index> stands = stands_of(poses, header.words("session"), true);
   std::vector<Eigen::Index> first;
@@ -297,49 +298,11 @@ Poses read_poses(const std::string& path, const Robot& robot, DecimalMark mark, 
   for (Eigen::Index row = 0; row < poses.count(); ++row) {
     if (known.insert(stands[row]).second) first.push_back(row);
   }
-  return select(poses, first);
+  return {select(poses, first), header.joint_columns()};
 }
 
-TargetTable read_targets(const std::string& path, const Robot& robot, DecimalMark mark) {
-  const Csv csv = Csv::read(path, mark);
-  const Header header(csv, robot, {});
-  TargetTable targets;
-  for (Eigen::Index row = 0; row < csv.rows(); ++row) targets.lines.push_back(csv.line_of(row));
-  if (targets.lines.empty()) throw std::runtime_error(fmt::format("{}: there are no targets", csv.name()));
-  if (header.has_joints()) {
-    targets.joints = header.joints();
-    targets.joint_columns = header.joint_columns();
-  }
-  if (header.has("x") || header.has("y") || header.has("z")) {
-    for (const char* axis : {"x", "y", "z"}) {
-      if (!header.has(axis)) {
-        throw std::runtime_error(
-            fmt::format("{}:1: a target needs x, y and z, there is no column {}_mm", csv.name(), axis));
-      }
-    }
-    std::array<bool, 3> measured = {};
-    targets.positions_mm = header.points_mm("", measured);
-  }
-  if (targets.joints.size() == 0 && targets.positions_mm.size() == 0) {
-    throw std::runtime_error(
-        fmt::format("{}:1: neither joints (q1_deg, ...) nor positions (x_mm, y_mm, z_mm); columns: {}", csv.name(),
-                    fmt::join(csv.columns(), ", ")));
-  }
-  if (const std::string lack = header.lack_of_orientation(); !lack.empty()) {
-    throw std::runtime_error(fmt::format("{}:1: {}", csv.name(), lack));
-  }
-  for (const std::string& target : header.targets()) {
-    if (target.empty()) continue;
-    throw std::runtime_error(
-        fmt::format("{}:1: column {}x_mm: a target of the tool itself is x_mm, y_mm, z_mm", csv.name(), target));
-  }
-  for (const char* column : {"target", "session", "reference", "distance"}) {
-    if (!header.words(column).empty() || header.has(column)) targets.unused_columns.emplace_back(column);
-  }
-  targets.orientation = header.orientation();
-  targets.covariates = header.covariates();
-  for (const std::string& column : header.unused()) targets.unused_columns.push_back(column);
-  return targets;
+Poses read_poses(const std::string& path, const Robot& robot, DecimalMark mark, const ColumnMap& map) {
+  return read_pose_table(path, robot, mark, map).poses;
 }
 
 }  // namespace llmt::robotics

@@ -2,7 +2,10 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <map>
+#include <stdexcept>
 
+#include "kinematics/units.hpp"
 #include "llmt/robotics/measurements.hpp"
 
 namespace llmt::robotics {
@@ -30,7 +33,7 @@ std::string quoted(const std::string& text) {
 std::string name_of_feature(const Observation& seen) { return quoted(seen.base.substr(seen.base.find(' ') + 1)); }
 
 std::string target_of(const Observation& seen) {
-  if (seen.base.empty() || is_socket(seen.base) || is_plane(seen.base)) return seen.tool;
+  if (seen.base.empty() || is_touched(seen.base)) return seen.tool;
   const std::string prefix = seen.base + "/";
   return seen.tool.starts_with(prefix) ? seen.tool.substr(prefix.size()) : seen.tool == seen.base ? "" : seen.tool;
 }
@@ -50,6 +53,15 @@ void add_sockets(const std::vector<Observation>& observations, Columns& columns)
   }
 }
 
+std::vector<JointColumn> columns_of(const Chain& chain) {
+  std::vector<JointColumn> columns;
+  for (std::size_t j = 0; j < chain.joints.size(); ++j) {
+    const std::string unit = chain.joints[j].type == JointType::revolute ? "rad" : "mm";
+    columns.push_back({fmt::format("q{}_{}", j + 1, unit), unit});
+  }
+  return columns;
+}
+
 // One column of names; the chain's own frame gets a name that no other has. Nothing if there is no other.
 void add_names(const std::string& column, std::string own, const std::vector<std::string>& names, Columns& columns) {
   if (std::ranges::all_of(names, [](const std::string& name) { return name.empty(); })) return;
@@ -61,14 +73,37 @@ void add_names(const std::string& column, std::string own, const std::vector<std
 
 }  // namespace
 
-std::string to_csv(const Measurements& all, const Robot& robot) {
+Eigen::VectorXd in_unit_of(const JointColumn& column, const Eigen::VectorXd& values) {
+  static const std::map<std::string, double> factors = {
+      {"rad", 1.0}, {"deg", degrees}, {"mm", 1.0}, {"m", 1e-3}, {"um", 1e3}};
+  const auto factor = factors.find(column.unit);
+  if (factor == factors.end()) {
+    throw std::invalid_argument(
+        fmt::format("llmt::robotics::in_unit_of: column \"{}\" has the unit \"{}\"; known: rad, "
+                    "deg, mm, m, um",
+                    column.name, column.unit));
+  }
+  if (factor->second == 1.0) return values;
+  return (factor->second * values).unaryExpr([](double value) { return std::stod(fmt::format("{:.15g}", value)); });
+}
+
+std::string csv_field(const std::string& name) {
+  return name.find_first_of(",;\t\"\r\n") == std::string::npos ? name : quoted(name);
+}
+
+std::string to_csv(const Measurements& all, const Robot& robot, const std::vector<JointColumn>& joint_columns) {
   validate(all, robot);
+  if (!joint_columns.empty() && joint_columns.size() != robot.chain.joints.size()) {
+    throw std::invalid_argument(fmt::format("llmt::robotics::to_csv: there are {} columns of {} joints",
+                                            joint_columns.size(), robot.chain.joints.size()));
+  }
   // Orientations stand beside their positions.
   const Measurements measurements = orientation_rows(all.poses).empty() ? all : select(all, position_rows(all.poses));
   Columns columns;
-  for (std::size_t j = 0; j < robot.chain.joints.size(); ++j) {
-    columns.add(fmt::format("q{}_{}", j + 1, robot.chain.joints[j].type == JointType::revolute ? "rad" : "mm"),
-                measurements.poses.joints.col(j));
+  Eigen::Index joint = 0;
+  for (const JointColumn& column : joint_columns.empty() ? columns_of(robot.chain) : joint_columns) {
+    const Eigen::VectorXd values = measurements.poses.joints.col(joint++);
+    if (!column.name.empty()) columns.add(csv_field(column.name), in_unit_of(column, values));
   }
   const std::vector<Observation>& observations = measurements.poses.observations;
   const bool distances = !observations.empty() && observations.front().reading == Reading::distance;
@@ -91,7 +126,7 @@ std::string to_csv(const Measurements& all, const Robot& robot) {
   std::vector<std::string> sessions;
   std::vector<std::string> targets;
   for (const Observation& seen : observations) {
-    sessions.push_back(is_socket(seen.base) || is_plane(seen.base) ? "" : seen.base);
+    sessions.push_back(is_touched(seen.base) ? "" : seen.base);
     targets.push_back(target_of(seen));
   }
   add_sockets(observations, columns);

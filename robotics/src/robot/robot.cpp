@@ -59,6 +59,11 @@ void validate(const Chain& chain, const Effect& effect) {
   }
 }
 
+bool has_instrument(const Poses& poses) {
+  const auto& seen = poses.observations;
+  return seen.empty() || !std::ranges::all_of(seen, is_touched, &Observation::base);
+}
+
 void validate(const Robot& robot) {
   validate(robot.chain);
   std::set<std::string> seen;
@@ -74,6 +79,11 @@ void validate(const Robot& robot) {
     throw std::invalid_argument(
         fmt::format("llmt::robotics::Robot: {} effects with {} values, at most {} with {} are possible",
                     robot.effects.size(), values, most_effects, most_effect_values));
+  }
+  const std::size_t ranges = robot.calibration ? robot.calibration->joint_ranges.size() : 0;
+  if (ranges != 0 && ranges != robot.chain.joints.size()) {
+    throw std::invalid_argument(fmt::format("llmt::robotics::Robot: calibration has {} joint_ranges of {} joints",
+                                            ranges, robot.chain.joints.size()));
   }
 }
 

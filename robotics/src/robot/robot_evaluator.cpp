@@ -103,7 +103,7 @@ void RobotEvaluator::adjust(PoseContext& pose, Eigen::Index row, const PreparedE
 void RobotEvaluator::apply(PoseContext& pose, Eigen::Index row, const PreparedEffect& effect, Deformation& sum) {
   // No instrument sees a socket or a plane.
   const Observation* seen = observation(row);
-  if (effect.type->of_measuring && seen != nullptr && (is_socket(seen->base) || is_plane(seen->base))) return;
+  if (effect.type->of_measuring && seen != nullptr && is_touched(seen->base)) return;
   columns_.clear();
   for (const Eigen::VectorXd* column : effect.columns) columns_.push_back((*column)(row));
   pose.columns = columns_;

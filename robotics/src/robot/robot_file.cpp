@@ -193,6 +193,21 @@ std::vector<IdentifiedParameter> read_identified(YamlMap& map, const Robot& robo
   return all;
 }
 
+std::vector<std::array<double, 2>> read_ranges(YamlMap& map, const Chain& chain) {
+  std::vector<std::array<double, 2>> ranges;
+  for (YamlMap entry : map.maps("joint_ranges", chain.joints.size())) {
+    const Joint& joint = chain.joints[ranges.size()];
+    if (entry.text("joint") != joint.name) entry.refuse("joint", fmt::format("\"joint\" must be {} here", joint.name));
+    const std::string key = "range_" + limit_unit(joint);
+    const std::vector<double> range = entry.numbers(key, 2);
+    if (range[0] > range[1]) entry.refuse(key, fmt::format("\"{}\" has {} above {}", key, range[0], range[1]));
+    ranges.push_back({range[0], range[1]});
+    entry.finish({"joint", key});
+  }
+  if (ranges.size() == chain.joints.size()) return ranges;
+  map.refuse("joint_ranges", fmt::format("there are {} ranges of {} joints", ranges.size(), chain.joints.size()));
+}
+
 // The lower triangle by rows makes a matrix of the identified parameters that have a standard error.
 CalibrationRecord read_record(YamlMap map, const Robot& robot) {
   CalibrationRecord record;
@@ -212,6 +227,7 @@ CalibrationRecord read_record(YamlMap map, const Robot& robot) {
   record.noise_mm = not_negative("noise_mm");
   if (map.has("held_out_mm")) record.held_out_mm = not_negative("held_out_mm");
   if (map.has("held_out_sd_mm")) record.held_out_sd_mm = not_negative("held_out_sd_mm");
+  if (map.has("joint_ranges")) record.joint_ranges = read_ranges(map, robot.chain);
   const auto known =
       std::ranges::count_if(robot.identified, [](const auto& entry) { return entry.standard_error.has_value(); });
   if (map.has("correlations")) {
@@ -226,7 +242,7 @@ CalibrationRecord read_record(YamlMap map, const Robot& robot) {
       }
     }
   }
-  map.finish({"poses", "coordinates", "noise_mm", "held_out_mm", "held_out_sd_mm", "correlations"});
+  map.finish({"poses", "coordinates", "noise_mm", "held_out_mm", "held_out_sd_mm", "joint_ranges", "correlations"});
   return record;
 }
 

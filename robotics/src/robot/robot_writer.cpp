@@ -86,13 +86,23 @@ void write_identified(YamlWriter& out, const Robot& robot) {
   out.end_list();
 }
 
-void write_record(YamlWriter& out, const CalibrationRecord& record) {
+void write_ranges(YamlWriter& out, const Chain& chain, const CalibrationRecord& record) {
+  out.key("joint_ranges").begin_list(YAML::Block);
+  for (std::size_t j = 0; j < record.joint_ranges.size(); ++j) {
+    const Joint& joint = chain.joints[j];
+    out.begin_map().word("joint", joint.name).numbers("range_" + limit_unit(joint), record.joint_ranges[j]).end_map();
+  }
+  out.end_list();
+}
+
+void write_record(YamlWriter& out, const Chain& chain, const CalibrationRecord& record) {
   out.key("calibration").begin_map(YAML::Block);
   out.number("poses", static_cast<double>(record.poses))
       .number("coordinates", static_cast<double>(record.coordinates))
       .number("noise_mm", record.noise_mm);
   if (record.held_out_mm) out.number("held_out_mm", *record.held_out_mm);
   if (record.held_out_sd_mm) out.number("held_out_sd_mm", *record.held_out_sd_mm);
+  if (!record.joint_ranges.empty()) write_ranges(out, chain, record);
   std::vector<double> below;
   for (Eigen::Index i = 0; i < record.correlations.rows(); ++i) {
     for (Eigen::Index k = 0; k < i; ++k) below.push_back(record.correlations(i, k));
@@ -138,7 +148,7 @@ std::string to_yaml(const Robot& robot) {
     out.end_list();
   }
   if (!robot.identified.empty()) write_identified(out, robot);
-  if (robot.calibration) write_record(out, *robot.calibration);
+  if (robot.calibration) write_record(out, chain, *robot.calibration);
   if (!robot.correction_file.empty()) out.key("correction").begin_map().word("model", robot.correction_file).end_map();
   out.end_map();
   return out.finish();

@@ -18,7 +18,20 @@ double without_rounding(double value) { return std::abs(value) < 1e-10 ? 0.0 : v
 Eigen::Vector3d rpy_of(const Eigen::Matrix3d& r) {
   const double pitch = std::atan2(-r(2, 0), std::hypot(r(0, 0), r(1, 0)));
   if (std::abs(std::cos(pitch)) < 1e-12) return {std::atan2(-r(1, 2), r(1, 1)), pitch, 0.0};
-  return {std::atan2(r(2, 1), r(2, 2)), pitch, std::atan2(r(1, 0), r(0, 0))};
+  // Near upright roll is uncertain. Yaw is that of what is left of the rotation without it, so that both together are
+  // exact.
+  const double roll = std::atan2(r(2, 1), r(2, 2));
+  const Eigen::Vector3d left = std::cos(roll) * r.col(1) - std::sin(roll) * r.col(2);
+  return {roll, pitch, std::atan2(-left(0), left(1))};
+}
+
+Eigen::Isometry3d to_pose(const Frame& frame) {
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  pose.translate(frame.xyz_mm);
+  for (const Eigen::Index axis : {2, 1, 0}) {
+    pose.rotate(Eigen::AngleAxisd(radians * frame.rpy_deg(axis), Eigen::Vector3d::Unit(axis)));
+  }
+  return pose;
 }
 
 Frame to_frame(const Eigen::Isometry3d& pose) {
@@ -114,7 +127,8 @@ Chain read_urdf(const std::string& path, const UrdfLinks& links) {
   return parse_urdf(read_file(path, description_limit), path, links);
 }
 
-std::string to_urdf(const std::string& text, const std::string& name, const UrdfLinks& links, const Chain& identified) {
+IdentifiedUrdf to_urdf(const std::string& text, const std::string& name, const UrdfLinks& links,
+                       const Chain& identified) {
   const UrdfArm arm = urdf_arm(text, name, links);
   check_same_arm(arm, identified);
   const std::vector<Eigen::Isometry3d> nominal = frames_of(arm);
@@ -134,10 +148,14 @@ std::string to_urdf(const std::string& text, const std::string& name, const Urdf
     link_before = link;
     nominal_before = joint.child;
   }
+  if (arm.fixed_tip) {
+    const Eigen::Isometry3d parent = link_before * (nominal_before.inverse() * arm.fixed_tip->parent);
+    set_origin(*robot, arm.fixed_tip->joint, parent.inverse() * (frame * to_pose(identified.tool)));
+  }
   TiXmlPrinter printer;
   printer.SetIndent("  ");
   xml.Accept(&printer);
-  return printer.Str();
+  return {printer.Str(), arm.fixed_tip.has_value()};
 }
 
 }  // namespace llmt::robotics

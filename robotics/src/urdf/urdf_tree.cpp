@@ -196,17 +196,20 @@ UrdfArm urdf_arm(const std::string& text, const std::string& name, const UrdfLin
   link_named(*model, base, name);
   const std::string tip = links.tip.empty() ? the_tip(*model, base, name) : links.tip;
   const std::vector<urdf::JointSharedPtr> joints = joints_between(*model, base, link_named(*model, tip, name));
-  UrdfArm arm{.name = model->getName(), .joints = {}, .tip = Eigen::Isometry3d::Identity()};
+  UrdfArm arm{.name = model->getName(), .joints = {}, .tip = Eigen::Isometry3d::Identity(), .fixed_tip = {}};
   for (const urdf::JointSharedPtr& joint : joints) {
     if (is_fixed(*joint)) {
+      arm.fixed_tip = UrdfTip{joint->name, arm.tip};
       arm.tip = arm.tip * to_isometry(joint->parent_to_joint_origin_transform);
       continue;
     }
     UrdfJoint& next = arm.joints.emplace_back(moving_joint(*joint, arm.tip, name));
     arm.tip = next.child;
+    arm.fixed_tip.reset();
     add_masses(*model->getLink(joint->child_link_name), next.child, joints, next);
     if (next.mass_kg > 0.0) next.com_mm /= next.mass_kg;
   }
+  if (!model->getLink(tip)->child_joints.empty()) arm.fixed_tip.reset();
   set_units_of_mimics(arm, name);
   if (arm.joints.empty()) {
     throw std::runtime_error(fmt::format("{}: no joint between the links \"{}\" and \"{}\" moves", name, base, tip));

@@ -25,10 +25,17 @@ struct UrdfJoint {
   Eigen::Vector3d com_mm = Eigen::Vector3d::Zero();
 };
 
+/// The fixed joint that holds a tip link which carries no further links.
+struct UrdfTip {
+  std::string joint;
+  Eigen::Isometry3d parent;  ///< of the link before it
+};
+
 struct UrdfArm {
   std::string name;
   std::vector<UrdfJoint> joints;
   Eigen::Isometry3d tip;
+  std::optional<UrdfTip> fixed_tip;  ///< empty: there is none
 };
 
 /// Throws as parse_urdf().

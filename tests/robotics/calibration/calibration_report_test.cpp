@@ -13,6 +13,15 @@
 namespace llmt::robotics {
 namespace {
 
+TEST(CalibrationReport, RemembersTheMeanAndTheSpreadOfErrorsLeftOut) {
+  CalibrationRecord record;
+  remember_errors(record, Eigen::Vector4d(1.0, 2.0, 3.0, 6.0));
+  EXPECT_DOUBLE_EQ(*record.held_out_mm, 3.0);
+  EXPECT_DOUBLE_EQ(*record.held_out_sd_mm, std::sqrt(14.0 / 3.0));
+  remember_errors(record, Eigen::VectorXd::Constant(1, 0.5));
+  EXPECT_EQ(*record.held_out_sd_mm, 0.0);
+}
+
 // An arm whose first joint angle errs by a step: nothing that geometry can take up, easy for a tree.
 Measurements with_step(const Robot& truth, Eigen::Index n, double step_rad, std::uint64_t seed) {
   Measurements m = measure(truth, random_poses(truth.chain, n, seed), 0.02, seed + 1);

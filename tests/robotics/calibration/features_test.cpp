@@ -1,6 +1,9 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <map>
+#include <set>
+
 #include "kinematics/rotations.hpp"
 #include "llmt/robotics/calibration.hpp"
 #include "llmt/robotics/compensation.hpp"
@@ -170,6 +173,25 @@ TEST(Sockets, LeaveOutWhatTheyTakeUp) {
   for (const auto& [name, why] : reasons_of(calibrate(ur_like(), readings, known))) {
     EXPECT_NE(why, "no reading shows the scale") << name;
   }
+}
+
+// Types of effects that a discovery speaks of.
+std::set<std::string> types_in(const Discovery& found) {
+  std::set<std::string> types;
+  const auto add = [&](const std::string& label) { types.insert(label.substr(0, label.find_first_of("@["))); };
+  for (const Visible& entry : found.visible) add(entry.what);
+  for (const discovery::UntestableCause& cause : found.not_testable) add(cause.what);
+  for (const FoundEffect& effect : found.effects) types.insert(effect.effect.type);
+  return types;
+}
+
+TEST(Sockets, LetDiscoverSpeakOfNoInstrument) {
+  const Robot truth = real_arm();
+  const Discovery found = discover(ur_like(), in_sockets(truth, 60, 0.02), {}, {.correct = false});
+  EXPECT_EQ(found.answer, discovery::Answer::nothing_missing);
+  const std::set<std::string> types = types_in(found);
+  EXPECT_TRUE(types.contains("eccentricity"));
+  for (const std::string& type : types) EXPECT_FALSE(effect_type(type).of_measuring) << type;
 }
 
 TEST(Planes, LetDiscoverAndCheckKeepTheScale) {

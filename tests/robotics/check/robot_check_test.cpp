@@ -15,6 +15,7 @@ namespace llmt::robotics {
 namespace {
 
 constexpr double noise_mm = 0.02;
+constexpr double radians = 0.017453292519943295;  // in one degree
 
 Robot arm() {
   Robot robot = read_robot(LLMT_ROBOTS_DIR "/tx200_like.yaml");
@@ -165,9 +166,103 @@ TEST(RobotCheck, TheFileRemembersTheCalibration) {
   const Robot read = parse_robot(to_yaml(written), "copy");
   ASSERT_TRUE(read.calibration);
   EXPECT_EQ(read.calibration->poses, 40);
+  EXPECT_EQ(read.calibration->joint_ranges, written.calibration->joint_ranges);
   EXPECT_EQ(read.calibration->correlations, written.calibration->correlations);
   EXPECT_EQ(*read.calibration->held_out_mm, report.geometric.held_out_mm.mean());
   EXPECT_EQ(to_yaml(read), to_yaml(written));
+}
+
+// Poses with the second joint in a range of degrees.
+Measurements measured_within(Robot robot, double low, double high, Eigen::Index poses, std::uint64_t seed) {
+  robot.chain.joints[1].limits = {low, high};
+  return measured(robot, poses, seed);
+}
+
+Measurements one_after_the_other(Measurements first, const Measurements& second) {
+  const auto stack = [](const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
+    Eigen::MatrixXd all(a.rows() + b.rows(), a.cols());
+    all << a, b;
+    return all;
+  };
+  first.poses.joints = stack(first.poses.joints, second.poses.joints);
+  first.positions_mm = stack(first.positions_mm, second.positions_mm);
+  return first;
+}
+
+// The second joint errs beyond 60 degrees, where nobody looked.
+Robot bent_beyond() {
+  Robot real = arm();
+  real.effects.push_back(
+      {.type = "joint_map", .at = "joint2", .values = {0.0, 6e-4}, .constants = {60.0 * radians, 0.35}});
+  return real;
+}
+
+TEST(RobotCheck, WhatOnlyUncoveredPosesSayHasNotMoved) {
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    const CorrectedRobot robot = {calibrate(arm(), measured_within(bent_beyond(), -60.0, 60.0, 60, seed)).robot, {}};
+    Robot today = another_day(bent_beyond());
+    const auto seen_today = [&] {
+      return one_after_the_other(measured_within(today, -60.0, 60.0, 35, 100 + seed),
+                                 measured_within(today, 85.0, 110.0, 10, 200 + seed));
+    };
+    const CheckOptions stated{.accuracy_mm = 4.0 * noise_mm};
+    const RobotCheck same = check_robot(robot, seen_today(), stated);
+    ASSERT_EQ(same.uncovered.size(), 10U);
+    for (std::size_t k = 0; k < 10; ++k) EXPECT_EQ(same.uncovered[k], 35 + static_cast<Eigen::Index>(k));
+    ASSERT_EQ(same.beyond.size(), 1U);
+    EXPECT_EQ(same.beyond[0].joint, "joint2");
+    EXPECT_NEAR(same.beyond[0].measured_high, 60.0, 8.0);
+    EXPECT_TRUE(same.moved.empty()) << seed;
+    EXPECT_FALSE(same.moved_beyond.empty()) << seed;
+    EXPECT_FALSE(same.still_good);
+    EXPECT_TRUE(same.good_where_covered);
+    // What the covered poses show, too, has moved.
+    today.chain.joints[2].theta_deg += 0.02;
+    const RobotCheck knocked = check_robot(robot, seen_today(), stated);
+    expect_change(find_moved(knocked, "joint3.theta"), 0.02);
+    EXPECT_FALSE(knocked.good_where_covered);
+  }
+}
+
+TEST(RobotCheck, TooFewCoveredPosesDecideNothing) {
+  const CorrectedRobot robot = {calibrate(arm(), measured_within(bent_beyond(), -60.0, 60.0, 60, 1)).robot, {}};
+  const RobotCheck check = check_robot(robot, one_after_the_other(measured_within(bent_beyond(), -60.0, 60.0, 7, 2),
+                                                                  measured_within(bent_beyond(), 85.0, 110.0, 30, 3)));
+  EXPECT_TRUE(check.too_few_covered);
+  EXPECT_TRUE(check.moved.empty());
+  EXPECT_FALSE(check.moved_beyond.empty());
+}
+
+TEST(RobotCheck, WithoutRangesAllPosesAreJudged) {
+  CorrectedRobot robot = {calibrate(arm(), measured_within(bent_beyond(), -60.0, 60.0, 60, 1)).robot, {}};
+  ASSERT_EQ(robot.robot.calibration->joint_ranges.size(), 6U);
+  robot.robot.calibration->joint_ranges.clear();
+  const RobotCheck check = check_robot(robot, one_after_the_other(measured_within(bent_beyond(), -60.0, 60.0, 35, 2),
+                                                                  measured_within(bent_beyond(), 85.0, 110.0, 10, 3)));
+  EXPECT_FALSE(check.has_ranges);
+  EXPECT_FALSE(check.moved.empty());
+}
+
+TEST(RobotCheck, WrongRangesInAFileAreRefusedByLine) {
+  const std::string text = to_yaml(calibrated(1).robot);
+  const auto says = [&](const std::string& from, const std::string& to, const std::string& what) {
+    std::string changed = text;
+    const std::size_t at = changed.find(from, changed.find("joint_ranges"));
+    ASSERT_NE(at, std::string::npos);
+    changed.replace(at, from.size(), to);
+    try {
+      parse_robot(changed, "wrong.yaml");
+      FAIL() << what;
+    } catch (const std::runtime_error& error) {
+      EXPECT_TRUE(std::string(error.what()).starts_with("wrong.yaml:")) << error.what();
+      EXPECT_NE(std::string(error.what()).find(what), std::string::npos) << error.what();
+    }
+  };
+  says("joint: joint1", "joint: joint2", "must be joint1 here");
+  says("range_deg: [-", "range_deg: [900, -", "\"range_deg\"");
+  const std::size_t first = text.find("- {joint: joint6", text.find("joint_ranges"));
+  ASSERT_NE(first, std::string::npos);
+  says(text.substr(first, text.find('\n', first) - first), "", "there are 5 ranges of 6 joints");
 }
 
 // Against tables: F(0.95; 3, 10) = 3.708, F(0.99; 1, 30) = 7.562.

@@ -5,7 +5,6 @@
 #include "llmt/robotics/calibration.hpp"
 #include "llmt/robotics/compensation.hpp"
 #include "llmt/robotics/pose_selection.hpp"
-#include "llmt/robotics/robot_c_source.hpp"
 #include "llmt/robotics/robot_file.hpp"
 #include "llmt/robotics/simulation.hpp"
 #include "robotics/robots.hpp"
@@ -44,7 +43,6 @@ TEST(Mimics, OfAUrdfKeepTheFlangeLevel) {
     EXPECT_NEAR(pose.rotation(2, 2), std::cos(0.1), 1e-12);
   }
   EXPECT_EQ(to_yaml(parse_robot(to_yaml(robot), "p.yaml")), to_yaml(robot));
-  EXPECT_THROW(to_c(CorrectedRobot{.robot = robot, .correction = {}}, "p", "p.h"), std::invalid_argument);
 }
 
 TEST(Mimics, CountInTheUnitsOfTheirJoints) {

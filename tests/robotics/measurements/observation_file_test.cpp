@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "llmt/robotics/measurements.hpp"
@@ -198,6 +199,28 @@ TEST(ObservationFile, AnotherSessionHasAnotherTool) {
   EXPECT_EQ(m.poses.observations[1].tool, "tue");
   EXPECT_EQ(m.target, "");
   expect_refused("q1_deg,q2_mm,x_mm,session\n1,2,3,1.0\n2,3,4,1_0\n", "m.csv:3:", "differ only in a dot");
+}
+
+// A base has six values and its tool three: nine coordinates are three points, and say nothing more.
+TEST(SmallSessions, AreLeftOutAndNamedWithTheirLines) {
+  const Robot robot = make_robot(Convention::dh, {{0, 300, 0, 0}});
+  const auto table = [](int of_small) {
+    std::string text = "q1_rad,x_mm,y_mm,z_mm,session\n";
+    for (int k = 0; k < 5; ++k) text += fmt::format("{},1,2,3,monday\n", k);
+    for (int k = 0; k < of_small; ++k) text += fmt::format("{},1,2,3,tuesday\n", k);
+    return text;
+  };
+  Measurements few = parse_measurements(table(3), "m.csv", robot);
+  const Measurements left = without_small_sessions(few);
+  EXPECT_EQ(left.count(), 5);
+  ASSERT_EQ(left.warnings.size(), 1U);
+  EXPECT_NE(left.warnings[0].find("1 of 2 sessions left out"), std::string::npos) << left.warnings[0];
+  EXPECT_NE(left.warnings[0].find("tuesday (lines 7, 8, 9)"), std::string::npos) << left.warnings[0];
+  few.lines.clear();  // made by a program
+  EXPECT_NE(without_small_sessions(few).warnings[0].find("(rows 6, 7, 8)"), std::string::npos);
+  const Measurements enough = parse_measurements(table(4), "m.csv", robot);
+  EXPECT_EQ(without_small_sessions(enough).count(), 9);
+  EXPECT_TRUE(without_small_sessions(enough).warnings.empty());
 }
 
 }  // namespace

@@ -72,14 +72,73 @@ TEST(Urdf, IdentifiedOriginsReadBackAsTheIdentifiedArm) {
       joint.theta_deg += 0.1 * random.normal();
       joint.beta_deg += 0.1 * random.normal();
     }
-    const std::string written = to_urdf(text, "r.urdf", {}, chain);
-    EXPECT_NE(written.find("<!-- kept -->"), std::string::npos);
-    const Chain read = parse_urdf(written, "w.urdf");
+    const IdentifiedUrdf written = to_urdf(text, "r.urdf", {}, chain);
+    EXPECT_FALSE(written.has_tool);  // the last joint moves
+    EXPECT_NE(written.text.find("<!-- kept -->"), std::string::npos);
+    const Chain read = parse_urdf(written.text, "w.urdf");
     const Eigen::VectorXd q = random_values(chain, random);
     const Pose expected = forward(chain, q);
     const Pose found = forward(read, q);
     EXPECT_LT((expected.position_mm - found.position_mm).norm(), 1e-7);
     EXPECT_LT((expected.rotation - found.rotation).norm(), 1e-10);
+  }
+}
+
+// A quarter turn about y that is not quite one: roll and yaw are hardly known, but together.
+TEST(Urdf, OriginsNearAQuarterTurnKeepTheirDigits) {
+  const std::string text =
+      "<robot name='r'><link name='a'/><link name='b'/><link name='c'/>"
+      "<joint name='j' type='continuous'><parent link='a'/><child link='b'/><origin xyz='0.1 0.2 0.3' rpy='0.4 0 0.7'/>"
+      "<axis xyz='1 0 0'/></joint><joint name='k' type='fixed'><parent link='b'/><child link='c'/>"
+      "<origin xyz='1 0 0' rpy='0.3 1.5707963267948966 0.2'/></joint></robot>";
+  const Chain nominal = parse_urdf(text, "r.urdf");
+  const Eigen::VectorXd q = Eigen::VectorXd::Constant(1, 0.5);
+  for (double off_deg = 1e-11; off_deg < 10.0; off_deg *= 10.0) {
+    Chain chain = nominal;
+    chain.tool.rpy_deg += Eigen::Vector3d(0.3, 1.0, -0.4) * off_deg;
+    const Pose expected = forward(chain, q);
+    const Pose found = forward(parse_urdf(to_urdf(text, "r.urdf", {}, chain).text, "w.urdf"), q);
+    // Of the up to six angles of joint and tool, those below 1e-10 degrees are read as zero.
+    EXPECT_LT((expected.rotation - found.rotation).norm(), 6.0 * std::sqrt(2.0) * 1e-10 / 57.29) << off_deg;
+  }
+}
+
+// Two fixed joints hold the tip, and the last of them gets the tool, with its orientation.
+TEST(Urdf, TheIdentifiedToolReadsBackWhereAFixedJointHoldsTheTip) {
+  Random random(5);
+  for (int k = 0; k < 100; ++k) {
+    auto joints = random_joints(random);
+    for (int fixed = 0; fixed < 2; ++fixed) {
+      joints.push_back(joints.front());
+      joints.back().type = "fixed";
+      joints.back().xyz = {random.uniform(-0.3, 0.3), 0.1, random.uniform(-0.3, 0.3)};
+    }
+    const std::string text = text_of(joints);
+    const Chain nominal = parse_urdf(text, "r.urdf");
+    Chain chain = nominal;
+    for (Joint& each : chain.joints) {
+      each.d_mm += random.normal();
+      each.alpha_deg += 0.1 * random.normal();
+    }
+    for (Eigen::Index axis = 0; axis < 3; ++axis) {
+      chain.tool.xyz_mm(axis) += 10.0 * random.normal();
+      chain.tool.rpy_deg(axis) += random.normal();
+    }
+    const IdentifiedUrdf written = to_urdf(text, "r.urdf", {}, chain);
+    EXPECT_TRUE(written.has_tool);
+    const Eigen::VectorXd q = random_values(chain, random);
+    const Pose expected = forward(chain, q);
+    const Pose found = forward(parse_urdf(written.text, "w.urdf"), q);
+    EXPECT_LT((expected.position_mm - found.position_mm).norm(), 1e-7);
+    EXPECT_LT((expected.rotation - found.rotation).norm(), 1e-10);
+    // What does not belong to the tool stays: the link before the tip moves as the arm does, without the new tool.
+    const UrdfLinks before{.base = "", .tip = fmt::format("l{}", joints.size() - 1)};
+    Chain shorter = parse_urdf(text, "r.urdf", before);
+    shorter.joints = chain.joints;
+    const Pose link = forward(parse_urdf(written.text, "w.urdf", before), q);
+    EXPECT_LT((forward(shorter, q).position_mm - link.position_mm).norm(), 1e-7);
+    // Where further links hang on the tip, it is no tool.
+    EXPECT_FALSE(to_urdf(text, "r.urdf", before, shorter).has_tool);
   }
 }
 

@@ -6,6 +6,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <optional>
 #include <string>
 #include <vector>
@@ -40,18 +41,29 @@ std::optional<RepeatNoise> noise_of_repeats(const Measurements& measurements);
 /// where `frames_are_known`: in another session they are fitted anew.
 Eigen::VectorXd position_deviations(const Calibration& calibration, const Poses& poses, bool frames_are_known = false);
 
+/// A joint that is used a tenth of its measured range or more beyond it.
+struct JointBeyond {
+  std::string joint;
+  std::string unit;  ///< deg or mm
+  double measured_low = 0.0;
+  double measured_high = 0.0;
+  double used_low = 0.0;
+  double used_high = 0.0;
+  std::vector<Eigen::Index> rows;  ///< of the poses of use that are beyond
+};
+
+/// `ranges`: of the joints, deg or mm, as in CalibrationRecord::joint_ranges. Throws std::invalid_argument if their
+/// number is not that of the joints.
+std::vector<JointBeyond> joints_beyond(const Chain& chain, const std::vector<std::array<double, 2>>& ranges,
+                                       const Poses& used);
+
+/// Rows in which any of the joints is beyond its range, ascending.
+std::vector<Eigen::Index> rows_beyond(const std::vector<JointBeyond>& joints);
+
 /// How poses of use lie to those that a calibration was made from.
 struct Coverage {
-  struct JointRange {
-    std::string joint;
-    std::string unit;  ///< deg or mm
-    double measured_low = 0.0;
-    double measured_high = 0.0;
-    double used_low = 0.0;
-    double used_high = 0.0;
-  };
-  std::vector<JointRange> beyond;     ///< joints that are used a tenth of their measured range or more beyond it
-  std::vector<Eigen::Index> outside;  ///< rows of the poses of use with such a joint value
+  std::vector<JointBeyond> beyond;
+  std::vector<Eigen::Index> outside;  ///< rows_beyond()
   double deviation_inside_mm = 0.0;   ///< root mean square of position_deviations() there; 0 if there are none
   double deviation_outside_mm = 0.0;
 };

@@ -140,6 +140,10 @@ bool is_socket(std::string_view base);
 /// every reading finds the tool point in.
 bool is_plane(std::string_view base);
 
+/// Whether a base stands for something that the tool touches, a socket or a plane, and not for a set-up of an
+/// instrument.
+bool is_touched(std::string_view base);
+
 /// Position of a geometric parameter in the fixed order.
 enum class FrameParameter { x, y, z, rx, ry, rz };
 enum class JointParameter { theta, d, a, b, alpha, beta };

@@ -49,6 +49,11 @@ Measurements select(const Measurements& measurements, const std::vector<Eigen::I
 /// All but the given rows.
 Measurements without_rows(const Measurements& measurements, const std::vector<std::size_t>& left_out);
 
+/// The measurements without sessions, sockets and planes that have fewer measured coordinates than their base and their
+/// tools have values: they say nothing of the arm, and cannot be judged. A warning names them and their lines. A file
+/// of one session stays as it is.
+Measurements without_small_sessions(const Measurements& measurements);
+
 /// Throws std::invalid_argument if shapes differ, a number is not finite, no row or no coordinate was measured, or the
 /// number of joints is not that of the robot.
 void validate(const Measurements& measurements, const Robot& robot);
@@ -140,16 +145,35 @@ Measurements parse_measurements(std::string text, const std::string& name, const
                                 const std::vector<std::string>& also = {}, DecimalMark mark = DecimalMark::point,
                                 const ColumnMap& map = {});
 
-/// The joint values and covariates of such a file, which may have no measured positions.
+/// The column of a joint in a file, both empty where a joint that mimics another has none.
+struct JointColumn {
+  std::string name;
+  std::string unit;  ///< "rad", "deg", "mm", "m" or "um"
+};
+
+/// Joint values from rad or mm to the unit of a column. Where they change they are rounded to 15 digits, so that 10.5
+/// degrees that were read are 10.5 again. Throws std::invalid_argument if there is no such unit.
+Eigen::VectorXd in_unit_of(const JointColumn& column, const Eigen::VectorXd& values);
+
+/// Poses, and where their joint values stood.
+struct PoseTable {
+  Poses poses;
+  std::vector<JointColumn> joint_columns;
+};
+
+/// The joint values and covariates of such a file, which may have no measured positions. Columns of the map that the
+/// file lacks do not matter.
 Poses read_poses(const std::string& path, const Robot& robot, DecimalMark mark = DecimalMark::point,
                  const ColumnMap& map = {});
+PoseTable read_pose_table(const std::string& path, const Robot& robot, DecimalMark mark = DecimalMark::point,
+                          const ColumnMap& map = {});
 
 /// What a file asks a robot for, row by row.
 struct TargetTable {
   Eigen::MatrixXd joints;                  ///< n x J as in Poses, or empty if the file has no joint columns
-  std::vector<std::string> joint_columns;  ///< their names in the file, with unit; empty for those that it lacks
+  std::vector<JointColumn> joint_columns;  ///< J, or none
   Eigen::MatrixXd positions_mm;            ///< n x 3, or empty
-  Orientation orientation;                 ///< empty values if there is none
+  Orientation orientation;                 ///< with its convention; empty values if there is none
   std::map<std::string, Eigen::VectorXd> covariates;
   std::vector<std::string> unused_columns;
   std::vector<Eigen::Index> lines;  ///< of the file, for messages
@@ -158,8 +182,9 @@ struct TargetTable {
 };
 
 /// Reads targets: columns as for read_measurements(), but either joints or positions may be absent; positions need all
-/// of x, y and z. Throws as read_measurements().
-TargetTable read_targets(const std::string& path, const Robot& robot, DecimalMark mark = DecimalMark::point);
+/// of x, y and z. Columns of the map that the file lacks do not matter. Throws as read_measurements().
+TargetTable read_targets(const std::string& path, const Robot& robot, DecimalMark mark = DecimalMark::point,
+                         const ColumnMap& map = {});
 
 /// Adds how far each joint moved to reach a pose: columns move1_rad (_mm if prismatic), ..., differences of joint
 /// values to the row before in the sequence of the column order, or else time_s; 0 in the first row. Nothing without
@@ -170,7 +195,12 @@ void add_moves(Poses& poses, const Chain& chain);
 bool is_move(std::string_view column);
 
 /// The CSV text that reads back exactly: q in rad or mm, positions in mm, then the covariates, but not what
-/// add_moves() added. Orientation is written if there is one.
-std::string to_csv(const Measurements& measurements, const Robot& robot);
+/// add_moves() added. Orientation is written if there is one. Joint values stand in columns q1_rad, ..., or in those
+/// that are given, one for each joint; a joint whose column has no name is left out.
+std::string to_csv(const Measurements& measurements, const Robot& robot,
+                   const std::vector<JointColumn>& joint_columns = {});
+
+/// A name as the field of a table: quoted (RFC 4180) if it has a separator, a quote or a line break.
+std::string csv_field(const std::string& name);
 
 }  // namespace llmt::robotics

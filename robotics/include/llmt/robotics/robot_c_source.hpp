@@ -21,9 +21,10 @@ std::vector<std::string> c_conditions(const Robot& robot);
 ///     void   NAME_forward(const double *conditions, const double *q, double *position, double *rotation);
 ///     double NAME_step(const double *conditions, const double *position, const double *rotation, double *q);
 ///
-/// Joint values in rad (mm), positions in mm in the world frame, rotations as nine numbers, row by row. NAME_step()
-/// changes q towards the asked-for pose (rotation 0: position alone), within the joints' limits, and returns how far
-/// the pose was from it before, in mm, angles times the arm's reach: call it until that is small, at most some ten
+/// Joint values q in rad (mm): those of the joints with a drive, in their order; joints that mimic others follow.
+/// Positions in mm in the world frame, rotations as nine numbers, row by row. NAME_step() changes q towards the
+/// asked-for pose (rotation 0, or fewer than six drives: position alone), within the joints' limits, and returns how
+/// far the pose was from it before, in mm, angles times the arm's reach: call it until that is small, at most some ten
 /// times. It is the step of compensate() without damping; joints that a target leaves free change as little as possible
 /// in each step. No memory is allocated, and the time is bounded.
 ///

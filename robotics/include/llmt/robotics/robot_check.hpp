@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "llmt/abi.hpp"
+#include "llmt/robotics/calibration_quality.hpp"
 #include "llmt/robotics/calibration_report.hpp"
 #include "llmt/robotics/correction.hpp"
 
@@ -46,8 +47,16 @@ struct RobotCheck {
   double accuracy_mm = 0.0;           ///< mean error that was stated, or that calibration had on poses left out
   double limit_mm = 0.0;              ///< mean error from which on the robot is no longer good
   bool still_good = false;
-  std::vector<Moved> moved;      ///< in the order in which they were found
-  double refitted_mm = 0.0;      ///< mean error if what moved were identified anew
+  bool has_ranges = false;  ///< the description has the joint ranges of the calibration
+  /// Joints of new poses beyond those ranges. Where there are any, only the other poses decide on what follows.
+  std::vector<JointBeyond> beyond;
+  std::vector<Eigen::Index> uncovered;  ///< rows_beyond() of them
+  ErrorFigures covered_error;           ///< mm, over the covered poses, base and tool fitted to them alone
+  bool good_where_covered = false;      ///< still_good of the covered poses
+  bool too_few_covered = false;         ///< to say what moved: `moved` is empty
+  std::vector<Moved> moved_beyond;      ///< what the fit to all poses names, and the covered poses do not
+  std::vector<Moved> moved;             ///< in the order in which they were found
+  double refitted_mm = 0.0;             ///< mean error if what moved were identified anew
   double noise_mm = 0.0;         ///< standard deviation of a coordinate that no change of the parameters explains
   double noise_before_mm = 0.0;  ///< the same at calibration; 0: not known
   bool unexplained =
@@ -71,6 +80,11 @@ struct RobotCheck {
 /// and the rest tested again, until none passes: Holm's order. Whatever explains the residuals as well, up to 3.84 in
 /// chi square, is listed beside it. Joint maps are not tested. A tool of another session counts as moved if it is not
 /// where it was.
+///
+/// Where it was calibrated. A calibration knows nothing of joint values beyond those that it saw: there, what it could
+/// not determine looks like a change. Poses with a joint a tenth of its calibrated range or more beyond it are listed,
+/// and what moved is decided by the other poses, with base and tool fitted to them alone. What only the fit to all
+/// poses names stands apart.
 ///
 /// Throws std::invalid_argument for options out of range, fewer than 8 poses (5 in the same session), a robot without
 /// identified parameters or without a record of its accuracy, or measurements that do not suit the robot.

@@ -7,6 +7,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <map>
 #include <optional>
 #include <string>
@@ -32,6 +33,7 @@ struct CalibrationRecord {
   double noise_mm = 0.0;                 ///< of the residuals of points: root mean square of a coordinate
   std::optional<double> held_out_mm;     ///< mean error on poses that took no part
   std::optional<double> held_out_sd_mm;  ///< standard deviation of these errors
+  std::vector<std::array<double, 2>> joint_ranges;  ///< J, that the poses had; deg or mm as limits; empty: not known
   /// L x L, of the identified parameters that have a standard error, in their order.
   Eigen::MatrixXd correlations;
 };

@@ -36,10 +36,18 @@ Chain parse_urdf(const std::string& text, const std::string& name, const UrdfLin
 /// Reads a file; throws as parse_urdf().
 Chain read_urdf(const std::string& path, const UrdfLinks& links = {});
 
+/// A URDF with identified values.
+struct IdentifiedUrdf {
+  std::string text;
+  bool has_tool = false;  ///< the tip link is where the identified tool is
+};
+
 /// The URDF `text` with the origins of the joints that move as in `identified`, a chain that began as
-/// parse_urdf(text, name, links); everything else in the file stays, comments as well. Base and tool of `identified` do
-/// not matter: a URDF has no place for the frame of an instrument, and what the flange carries is not the arm. Throws
-/// as parse_urdf(), and std::invalid_argument if convention, names, types or directions of the joints are others.
-std::string to_urdf(const std::string& text, const std::string& name, const UrdfLinks& links, const Chain& identified);
+/// parse_urdf(text, name, links). Where a fixed joint holds the tip link, and no further links hang on this, the joint
+/// gets the identified tool. Everything else in the file stays, comments as well. The base of `identified` does not
+/// matter: a URDF has no place for the frame of an instrument. Throws as parse_urdf(), and std::invalid_argument if
+/// convention, names, types or directions of the joints are others.
+IdentifiedUrdf to_urdf(const std::string& text, const std::string& name, const UrdfLinks& links,
+                       const Chain& identified);
 
 }  // namespace llmt::robotics

@@ -1,0 +1,56 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <stdexcept>
+
+#include "llmt/csv.hpp"
+#include "llmt/robotics/measurements.hpp"
+#include "measurements/header.hpp"
+
+namespace llmt::robotics {
+
+TargetTable read_targets(const std::string& path, const Robot& robot, DecimalMark mark, const ColumnMap& given) {
+  const Csv csv = Csv::read(path, given.decimal.value_or(mark));
+  const ColumnMap map = for_columns_of(csv, given);
+  const Header header(csv, robot, {}, map);
+  TargetTable targets;
+  for (Eigen::Index row = 0; row < csv.rows(); ++row) targets.lines.push_back(csv.line_of(row));
+  if (targets.lines.empty()) throw std::runtime_error(fmt::format("{}: there are no targets", csv.name()));
+  if (header.has_joints()) {
+    targets.joints = header.joints();
+    targets.joint_columns = header.joint_columns();
+  }
+  if (header.has("x") || header.has("y") || header.has("z")) {
+    for (const char* axis : {"x", "y", "z"}) {
+      if (!header.has(axis)) {
+        throw std::runtime_error(
+            fmt::format("{}:1: a target needs x, y and z, there is no column {}_mm", csv.name(), axis));
+      }
+    }
+    std::array<bool, 3> measured = {};
+    targets.positions_mm = header.points_mm("", measured);
+  }
+  if (targets.joints.size() == 0 && targets.positions_mm.size() == 0) {
+    throw std::runtime_error(
+        fmt::format("{}:1: neither joints (q1_deg, ...) nor positions (x_mm, y_mm, z_mm); columns: {}", csv.name(),
+                    fmt::join(csv.columns(), ", ")));
+  }
+  if (const std::string lack = header.lack_of_orientation(); !lack.empty()) {
+    throw std::runtime_error(fmt::format("{}:1: {}", csv.name(), lack));
+  }
+  for (const std::string& target : header.targets()) {
+    if (target.empty()) continue;
+    throw std::runtime_error(
+        fmt::format("{}:1: column {}x_mm: a target of the tool itself is x_mm, y_mm, z_mm", csv.name(), target));
+  }
+  for (const char* column : {"target", "session", "reference", "distance"}) {
+    if (!header.words(column).empty() || header.has(column)) targets.unused_columns.emplace_back(column);
+  }
+  targets.orientation = header.orientation();
+  targets.orientation.convention = map.orientation.empty() ? robot.chain.orientation : map.orientation;
+  targets.covariates = header.covariates();
+  for (const std::string& column : header.unused()) targets.unused_columns.push_back(column);
+  return targets;
+}
+
+}  // namespace llmt::robotics
