@@ -275,26 +275,6 @@ LearningColumns read_learning_columns(const Csv& csv, const ColumnRoles& roles, 
   return result;
 }
 
-std::vector<bool> used_inputs(const Model& model) {
-  std::vector<bool> used(model.num_inputs(), false);
-  for (const Partition& partition : model.partitions()) {
-    for (const Node& node : partition.nodes) {
-      if (!node.is_leaf()) {
-        used[node.split_input] = true;
-        for (Eigen::Index j = 0; j < node.direction.size(); ++j) used[j] = used[j] || node.direction(j) != 0.0;
-        continue;
-      }
-      for (Eigen::Index k = 0; k < node.slope.cols(); ++k) {
-        if (node.slope.col(k).isZero(0.0)) continue;
-        const Regressor& regressor = model.regressors()[k];
-        used[regressor.input] = true;
-        if (regressor.second_input >= 0) used[regressor.second_input] = true;
-      }
-    }
-  }
-  return used;
-}
-
 ModelInputs read_inputs(const Csv& csv, const Model& model, int max_threads) {
   std::vector<std::string> columns;
   std::vector<std::string> categorical;
