@@ -51,6 +51,7 @@ Json comparison_json(const CompareArguments& arguments, const LearningTable& tab
 }
 
 void compare_command(CompareArguments arguments) {
+  require_target(arguments.learning);
   if (arguments.learning.targets.size() != 1) {
     throw std::invalid_argument("compare takes one --target");
   }
@@ -58,6 +59,9 @@ void compare_command(CompareArguments arguments) {
     throw std::invalid_argument("compare needs --cv 2 or more");
   }
   const LearningTable table = read_learning_table(arguments.learning);
+  if (table.outputs.rows() < 2) {
+    throw std::runtime_error(fmt::format("{}: one row leaves none to hold out", table_name(arguments.learning.data)));
+  }
   CompareOptions options;
   options.folds = arguments.learning.options.folds;
   Progress progress("fitting");

@@ -164,6 +164,7 @@ void add_fit(CLI::App& app) {
   command->add_flag("--json", arguments->json, "Print the summary as JSON");
   command->add_flag("--stream", arguments->stream, "Learn row by row in constant memory");
   command->callback([command, arguments] {
+    require_target(arguments->learning);
     if (arguments->stream) {
       stream_command(*command, {arguments->learning, arguments->output, arguments->json});
       return;
