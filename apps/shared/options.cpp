@@ -171,6 +171,10 @@ std::filesystem::path beside(const std::string& path, const std::string& extensi
   return std::filesystem::path(path).replace_extension(extension);
 }
 
+void refuse_exchanged(const std::string& first, const std::string& second, const char* order) {
+  throw std::invalid_argument(fmt::format("{} and {} seem to be exchanged: {}", first, second, order));
+}
+
 void require_ranges(const CLI::App& app) {
   for (const CLI::Option* option : app.get_options()) {
     for (const char* type : {"FLOAT", "INT", "UINT"}) {  // what CLI11 calls numbers that it reads itself
