@@ -6,6 +6,8 @@
 
 #include "llmt/commands.hpp"
 #include "llmt/csv.hpp"
+#include "llmt/fit_options.hpp"
+#include "llmt/fit_summary.hpp"
 #include "llmt/learning.hpp"
 #include "report/of_comparison.hpp"
 #include "report/options.hpp"
@@ -38,12 +40,18 @@ Json comparison_json(const CompareArguments& arguments, const LearningTable& tab
                                {"fit_seconds", method.fit_seconds},
                                {"predict_seconds_per_million_rows", method.predict_seconds}});
   }
+  if (arguments.learning.options.loss == Loss::tukey) {
+    const std::vector<Eigen::Index> rows = rows_left_out(result.loss_weights, table.options.weights);
+    json["rows_left_out"] = counted_from_one(rows);
+    json["lines_left_out"] = lines_at(table, rows);
+  }
   json["recommended"] = result.methods[result.recommended].method;
   json["recommendation"] = result.recommendation;
   return json;
 }
 
 void compare_command(CompareArguments arguments) {
+  require_target(arguments.learning);
   if (arguments.learning.targets.size() != 1) {
     throw std::invalid_argument("compare takes one --target");
   }
@@ -51,6 +59,9 @@ void compare_command(CompareArguments arguments) {
     throw std::invalid_argument("compare needs --cv 2 or more");
   }
   const LearningTable table = read_learning_table(arguments.learning);
+  if (table.outputs.rows() < 2) {
+    throw std::runtime_error(fmt::format("{}: one row leaves none to hold out", table_name(arguments.learning.data)));
+  }
   CompareOptions options;
   options.folds = arguments.learning.options.folds;
   Progress progress("fitting");
@@ -72,6 +83,12 @@ void compare_command(CompareArguments arguments) {
                     table_name(arguments.learning.data), table.inputs.values.rows(), table.names.size(),
                     arguments.learning.targets.front(), result.methods.front().fold_rmse.size(),
                     arguments.learning.contiguous ? " of contiguous rows" : ""));
+  if (arguments.learning.options.loss == Loss::tukey) {
+    const std::vector<Eigen::Index> rows = rows_left_out(result.loss_weights, table.options.weights);
+    const Eigen::VectorXd& weights = table.options.weights;
+    const Eigen::Index weighted = weights.size() > 0 ? (weights.array() > 0.0).count() : table.outputs.rows();
+    print(left_out_by_loss(lines_at(table, rows), weighted) + "\n");
+  }
   Table text({"method", "leaves", "parameters", "RMSE held-out", "spread of folds", "largest jump", "fit, s",
               "predict 1e6 rows, s"});
   for (const Comparison& method : result.methods) {
@@ -90,6 +107,7 @@ void add_compare(CLI::App& app) {
   command->footer("Example: llmt compare concrete.csv --target strength");
   const auto arguments = std::make_shared<CompareArguments>();
   add_learning_options(*command, arguments->learning);
+  add_loss(*command, arguments->learning.options.loss);
   add_report_options(*command, arguments->reports, "the held-out error of every method");
   command->add_flag("--json", arguments->json, "Print JSON");
   command->callback([arguments] { compare_command(*arguments); });

@@ -49,7 +49,7 @@ struct Comparison {
 Eigen::MatrixXd read_named_inputs(const Csv& csv, const std::vector<std::string>& names, bool every_column) {
   try {
     return csv.numbers(names);
-  } catch (const DecimalCommaError&) {
+  } catch (const DecimalMarkError&) {
     throw;
   } catch (const std::runtime_error& error) {
     if (!every_column) throw;

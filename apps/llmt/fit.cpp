@@ -85,7 +85,7 @@ std::string write_fit_reports(const FitArguments& arguments, const LearningTable
     shown = fit_readable(table.inputs.values, table.outputs, table.options, result.summary);
     shown->model = shown->model.named(table.names, arguments.learning.targets, table.inputs.levels);
   }
-  const std::vector<Eigen::Index> left_out = rows_left_out(result.summary, table.options.weights);
+  const std::vector<Eigen::Index> left_out = rows_left_out(result.summary.loss_weights, table.options.weights);
   const auto report_on = [&](const Eigen::MatrixXd& inputs, const Eigen::MatrixXd& outputs, const FitOptions& options) {
     const auto count = std::ssize(left_out);
     return write_reports(arguments.reports,
@@ -164,6 +164,7 @@ void add_fit(CLI::App& app) {
   command->add_flag("--json", arguments->json, "Print the summary as JSON");
   command->add_flag("--stream", arguments->stream, "Learn row by row in constant memory");
   command->callback([command, arguments] {
+    require_target(arguments->learning);
     if (arguments->stream) {
       stream_command(*command, {arguments->learning, arguments->output, arguments->json});
       return;

@@ -27,11 +27,6 @@ double least_squares_rmse(const PartitionSummary& partition) {
   return partition.best_of_kind.empty() ? std::nan("") : partition.best_of_kind.front().rmse;
 }
 
-std::vector<Eigen::Index> counted_from_one(std::vector<Eigen::Index> rows) {
-  for (Eigen::Index& row : rows) ++row;
-  return rows;
-}
-
 }  // namespace
 
 Json summary_json(const FitRun& run, const FitResult& result) {
@@ -44,9 +39,9 @@ Json summary_json(const FitRun& run, const FitResult& result) {
   json["rule"] = name_of(run.learning.options.rule);
   json["min_leaf_samples"] = result.summary.min_leaf_samples;
   if (run.learning.options.loss == Loss::tukey) {
-    const std::vector<Eigen::Index> rows = rows_left_out(result.summary, run.table.options.weights);
+    const std::vector<Eigen::Index> rows = rows_left_out(result.summary.loss_weights, run.table.options.weights);
     json["rows_left_out"] = counted_from_one(rows);
-    json["lines_left_out"] = lines_of(run, rows);
+    json["lines_left_out"] = lines_at(run.table, rows);
   }
   json["inputs"] = Json::array();
   for (const InputColumn& input : result.model.inputs()) {

@@ -66,9 +66,7 @@ void add_local_models(CLI::App& command, FitOptions& options) {
              "first two");
   add_choice(command, "--local-models", options.terms,
              "Local models linear, with products and squares of the inputs, or the better of the two");
-  add_choice(command, "--loss", options.loss,
-             "What is made small: squares of the residuals, or squares with rows far from a preliminary tree left "
-             "out (Tukey's biweight)");
+  add_loss(command, options.loss);
   add_choice(command, "--sparse", options.sparse,
              "Local models keep only the slopes that forward selection takes: never, always, or where the held-out "
              "error says so")
@@ -103,6 +101,12 @@ void add_candidates(CLI::App& command, ExpertOptions& expert) {
 }
 
 }  // namespace
+
+void add_loss(CLI::App& command, Loss& loss) {
+  add_choice(command, "--loss", loss,
+             "What is made small: squares of the residuals, or squares with rows far from a preliminary tree left "
+             "out (Tukey's biweight)");
+}
 
 void add_fit_options(CLI::App& command, FitOptions& options) {
   add_growth(command, options);

@@ -150,17 +150,10 @@ void print_data(const FitRun& run, const FitResult& result) {
     print(fmt::format("Missing values in the inputs: {}\n", result.summary.missing_values));
   }
   if (run.learning.options.loss == Loss::tukey) {
-    const std::vector<Eigen::Index> rows = rows_left_out(result.summary, run.table.options.weights);
-    std::vector<Eigen::Index> lines = lines_of(run, rows);
-    lines.resize(std::min<std::size_t>(lines.size(), 10));
+    const std::vector<Eigen::Index> rows = rows_left_out(result.summary.loss_weights, run.table.options.weights);
     const auto lacks_input = [&](Eigen::Index row) { return run.table.inputs.values.row(row).hasNaN(); };
     const auto lacking = std::ranges::count_if(rows, lacks_input);
-    print(fmt::format("Rows left out by the Tukey loss: {} of {}{}\n", rows.size(),
-                      result.summary.samples + std::ssize(rows),
-                      rows.empty() ? ""
-                                   : fmt::format(" ({} {}{}); the errors below are those of the other rows",
-                                                 rows.size() == 1 ? "line" : "lines", fmt::join(lines, ", "),
-                                                 rows.size() > lines.size() ? ", ..." : "")));
+    print(left_out_by_loss(lines_at(run.table, rows), result.summary.samples + std::ssize(rows)));
     if (2 * lacking > std::ssize(rows)) {
       print(
           fmt::format("{} of these have empty cells in inputs: the errors below, and intervals, hold for rows without "
@@ -194,11 +187,26 @@ Table models_table(const FitResult& result) {
 
 }  // namespace
 
-std::vector<Eigen::Index> rows_left_out(const FitSummary& summary, const Eigen::VectorXd& weights) {
+std::vector<Eigen::Index> rows_left_out(const Eigen::VectorXd& loss_weights, const Eigen::VectorXd& weights) {
   std::vector<Eigen::Index> rows;
-  for (Eigen::Index row = 0; row < summary.loss_weights.size(); ++row) {
-    if (summary.loss_weights(row) == 0.0 && (weights.size() == 0 || weights(row) > 0.0)) rows.push_back(row);
+  for (Eigen::Index row = 0; row < loss_weights.size(); ++row) {
+    if (loss_weights(row) == 0.0 && (weights.size() == 0 || weights(row) > 0.0)) rows.push_back(row);
   }
+  return rows;
+}
+
+std::string left_out_by_loss(std::vector<Eigen::Index> lines, Eigen::Index rows) {
+  constexpr std::size_t most_named = 10;
+  const std::size_t count = lines.size();
+  std::string text = fmt::format("Rows left out by the Tukey loss: {} of {}", count, rows);
+  if (count == 0) return text + "\n";
+  lines.resize(std::min(count, most_named));
+  return text + fmt::format(" ({} {}{}); the errors below are those of the other rows\n", count == 1 ? "line" : "lines",
+                            fmt::join(lines, ", "), count > lines.size() ? ", ..." : "");
+}
+
+std::vector<Eigen::Index> counted_from_one(std::vector<Eigen::Index> rows) {
+  for (Eigen::Index& row : rows) ++row;
   return rows;
 }
 
@@ -208,9 +216,9 @@ std::vector<std::string> names_of(const Model& model, const std::vector<int>& in
   return names;
 }
 
-std::vector<Eigen::Index> lines_of(const FitRun& run, const std::vector<Eigen::Index>& rows) {
+std::vector<Eigen::Index> lines_at(const LearningTable& table, const std::vector<Eigen::Index>& rows) {
   std::vector<Eigen::Index> lines;
-  for (const Eigen::Index row : rows) lines.push_back(run.table.lines[row]);
+  for (const Eigen::Index row : rows) lines.push_back(table.lines[row]);
   return lines;
 }
 

@@ -75,14 +75,28 @@ void look_for_heavy_rows(const Csv& csv, const LearningArguments& arguments, con
     if (heavy.hide_the_others) {
       throw std::runtime_error(fmt::format(
           "{}:{}: column \"{}\": {:.6g} is so large that the differences between all other values are below its "
-          "rounding error; correct it, delete the line, or use --loss tukey of llmt fit",
+          "rounding error; correct it, delete the line, or use --loss tukey",
           csv.name(), csv.line_of(heavy.rows.front()), name, target(heavy.rows.front())));
     }
     warn(fmt::format(
         "llmt: {} of {} rows {} {:.3g} % of the squares of \"{}\" about its median: {}. If they are mistakes, correct "
-        "them or use llmt fit --loss tukey",
+        "them or use --loss tukey",
         heavy.rows.size(), target.size(), heavy.rows.size() == 1 ? "carries" : "carry", 100.0 * heavy.share, name,
         places_of(csv, heavy.rows, target)));
+  }
+}
+
+// Says where one row or a constant target leaves nothing to learn.
+void look_for_nothing_to_learn(const Csv& csv, const LearningArguments& arguments, const LearningColumns& columns) {
+  if (csv.rows() == 1) {
+    warn(fmt::format("llmt: {} has one row: the model is the target of that row everywhere", csv.name()));
+    return;
+  }
+  for (std::size_t o = 0; o < arguments.targets.size(); ++o) {
+    const auto target = columns.targets.col(static_cast<Eigen::Index>(o));
+    if (target.minCoeff() < target.maxCoeff()) continue;
+    warn(fmt::format("llmt: target \"{}\" is {} in every row: the model is that constant", arguments.targets[o],
+                     target(0)));
   }
 }
 
@@ -151,6 +165,13 @@ HeavyRows heavy_rows_of_target(const Eigen::Ref<const Eigen::VectorXd>& target, 
   return heavy_rows((weights.array() > 0.0).select(target, bulk_of(target).centre));
 }
 
+void require_target(const LearningArguments& arguments) {
+  if (!arguments.targets.empty()) return;
+  const Csv csv = read_table(arguments.data, arguments.mark);
+  throw std::invalid_argument(fmt::format("--target is required: what to predict; the columns of {} are {}", csv.name(),
+                                          fmt::join(csv.columns(), ", ")));
+}
+
 std::vector<std::string> choose_inputs(const Csv& csv, const LearningArguments& arguments) {
   for (const std::vector<std::string>* names : {&arguments.targets, &arguments.inputs, &arguments.ignored}) {
     for (const std::string& name : *names) {
@@ -203,6 +224,7 @@ LearningTable read_learning_table(const LearningArguments& arguments) {
                             largest_input, arguments.options.max_threads);
   look_for_heavy_rows(csv, arguments, columns);
   look_for_accidental_inputs(arguments, inputs, columns.inputs);
+  look_for_nothing_to_learn(csv, arguments, columns);
   LearningTable table{inputs, std::move(columns.inputs), std::move(columns.targets), arguments.options,
                       lines_of_rows(csv)};
   FitOptions& options = table.options;
@@ -236,7 +258,7 @@ void add_learning_options(CLI::App& command, LearningArguments& arguments) {
     return fmt::format("{} [{}]", help, default_text(option));
   };
   add_input_file(command, "data", arguments.data, "CSV file with a header row; - is standard input")->required();
-  add_names(command, "-t,--target", arguments.targets, "COLUMN", "What to predict")->required();
+  add_names(command, "-t,--target", arguments.targets, "COLUMN", "What to predict (required)");
   add_names(command, "--inputs", arguments.inputs, "COLUMN", "What to learn from [all but targets and ignored]");
   add_names(command, "--ignore", arguments.ignored, "COLUMN", "What to leave out");
   add_names(command, "--categorical", arguments.categorical, "COLUMN",

@@ -30,6 +30,9 @@ struct LearningArguments {
 
 void add_learning_options(CLI::App& command, LearningArguments& arguments);
 
+/// Throws std::invalid_argument that lists the columns of the table if no target is named, and as read_table().
+void require_target(const LearningArguments& arguments);
+
 /// The columns to learn from: those asked for, or all but the targets, the weight and what is ignored. Throws as
 /// read_learning_table().
 std::vector<std::string> choose_inputs(const Csv& csv, const LearningArguments& arguments);

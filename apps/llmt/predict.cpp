@@ -158,6 +158,9 @@ Json summary_json(const Predicted& predicted, bool with_values) {
   if (const Eigen::Index count = predicted.count_not_finite(); count > 0) {
     json["not_finite_predictions"] = count;
   }
+  if (predicted.bounds && !predicted.bounds->uncalibrated.empty()) {
+    json["uncalibrated_intervals"] = predicted.bounds->uncalibrated.size();
+  }
   json["targets"] = Json::array();
   for (std::size_t o = 0; o < predicted.targets.size(); ++o) {
     const Eigen::Index column = o;
@@ -215,6 +218,10 @@ void summarise(const PredictArguments& arguments, const Predicted& predicted) {
   }
   if (predicted.unseen_codes > 0) {
     text += fmt::format("; {} codes that were not in training, taken as the nearest", predicted.unseen_codes);
+  }
+  if (predicted.bounds && !predicted.bounds->uncalibrated.empty()) {
+    text += fmt::format("; likely too narrow, because too few training rows had an empty cell: {} intervals",
+                        predicted.bounds->uncalibrated.size());
   }
   warn(text);
 }

@@ -96,7 +96,7 @@ void add(const Csv& piece, const StreamArguments& arguments, Learned& learned) {
   Eigen::MatrixXd inputs;
   try {
     inputs = piece.numbers_or_missing(learned.inputs, 1);
-  } catch (const DecimalCommaError&) {
+  } catch (const DecimalMarkError&) {
     throw;
   } catch (const std::runtime_error& error) {
     throw std::runtime_error(std::string(error.what()) +

@@ -36,7 +36,10 @@ void llmt::apps::check_frames(const std::string& file, const robotics::Robot& ro
 
 llmt::robotics::Robot llmt::apps::read_description(const std::string& robot, const std::string& measured,
                                                    const robotics::UrdfLinks& links) {
-  return read_unless_exchanged(robot, measured, "the description (YAML) comes first, then the measurements (CSV)",
+  constexpr const char* order = "the description (YAML or URDF) comes first, then the measurements (CSV)";
+  // A URDF is known by its name: to read one may need options.
+  if (robotics::is_urdf(measured) && !robotics::is_urdf(robot)) refuse_exchanged(robot, measured, order);
+  return read_unless_exchanged(robot, measured, order,
                                [&](const std::string& path) { return robotics::read_robot(path, links); });
 }
 

@@ -40,10 +40,23 @@ void handle_signals() {
   ::signal(SIGXFSZ, SIG_IGN);
 }
 
+// "data is required (CSV file with a header row); usage: llmt fit [OPTIONS] data": the first argument that is missing.
+std::string missing_argument(const CLI::App& app, const std::string& reason) {
+  if (app.get_subcommands().empty()) return reason;
+  for (const CLI::Option* option : app.get_subcommands().back()->get_options()) {
+    if (!option->get_required() || option->count() > 0) continue;
+    return fmt::format("{} is required ({}){}", option->get_name(), option->get_description(), usage_of(app));
+  }
+  return reason;
+}
+
 int parse(CLI::App& app, int argc, char** argv) {
   try {
     app.parse(argc, argv);
     return exit_done;
+  } catch (const CLI::RequiredError& error) {
+    warn(fmt::format("{}: {}", app.get_name(), missing_argument(app, error.what())));
+    return exit_usage;
   } catch (const CLI::ParseError& error) {  // --help and --version come this way too
     if (error.get_exit_code() != 0) {
       const bool is_extra = dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr;
@@ -126,10 +139,13 @@ int run(CLI::App& app, int argc, char** argv, std::span<const SettingName> names
     return parse(app, argc, argv);
   } catch (const std::invalid_argument& error) {
     return fail(error.what(), exit_usage);
-  } catch (const DecimalCommaError& error) {
+  } catch (const DecimalMarkError& error) {
     const CLI::App* const command = app.get_subcommands().front();
     const bool can_read = command->get_option_no_throw(decimal_comma_option) != nullptr;
-    return fail(error.what() + (can_read ? fmt::format("; {} reads such files", decimal_comma_option) : ""),
+    const char* const advice = error.found() == DecimalMark::comma ? "; {} reads such files" : "; leave {} out";
+    return fail(error.what() + (can_read ? fmt::format(fmt::runtime(advice), decimal_comma_option) : ""), exit_refused);
+  } catch (const EncodingError& error) {
+    return fail(error.what() + std::string("; a file of Windows is converted by iconv -f CP1252 -t UTF-8"),
                 exit_refused);
   } catch (const std::bad_alloc&) {
     return fail("there is not enough memory for this", exit_refused);

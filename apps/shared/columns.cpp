@@ -101,12 +101,31 @@ bool begins_like_json(std::string_view text) {
   return next != std::string_view::npos && (text[next] == '"' || text[next] == '}');
 }
 
+// What to do about the first of the cells that are no numbers: correct them if most cells of the column are numbers.
+std::string advice_on_odd_cell(const Csv& csv, std::span<const std::string> columns,
+                               const std::vector<ColumnCells>& cells, std::span<const Eigen::Index> first_bad,
+                               const std::string& hint) {
+  const std::size_t column = std::ranges::min_element(first_bad) - first_bad.begin();
+  const ColumnCells& of = cells[column];
+  const Eigen::Index numbers = csv.rows() - of.missing - of.other;
+  if (of.infinite == of.other) return hint;
+  if (numbers <= of.other) {
+    return fmt::format("; {} of {} cells of the column are numbers: --categorical {} takes all for categories{}",
+                       numbers, csv.rows(), columns[column], hint);
+  }
+  if (of.other == 1) {
+    return "; all other cells of the column are numbers or empty: correct this one, or empty it (a missing value)";
+  }
+  return fmt::format("; {} cells of the column are no numbers, {} are: correct those, or empty them (missing values)",
+                     of.other, numbers);
+}
+
 // Csv::refuse_first() for targets and weights, with the number of all rows that lack one.
 void refuse_rows_without_target(const Csv& csv, std::span<const std::string> columns,
                                 std::span<const Eigen::Index> first_bad, const Eigen::MatrixXd& values) {
   try {
     csv.refuse_first(columns, first_bad);
-  } catch (const DecimalCommaError&) {
+  } catch (const DecimalMarkError&) {
     throw;
   } catch (const std::runtime_error& error) {
     constexpr std::size_t named = 5;
@@ -242,10 +261,11 @@ LearningColumns read_learning_columns(const Csv& csv, const ColumnRoles& roles, 
                              values.rightCols(std::ssize(columns) - std::ssize(roles.inputs)));
   try {
     csv.refuse_first(names.first(num_inputs), bad_rows.first(num_inputs));
-  } catch (const DecimalCommaError&) {
+  } catch (const DecimalMarkError&) {
     throw;
   } catch (const std::runtime_error& error) {
-    throw std::runtime_error(error.what() + input_hint);
+    throw std::runtime_error(error.what() +
+                             advice_on_odd_cell(csv, names, cells, bad_rows.first(num_inputs), input_hint));
   }
 
   std::vector<double> most(columns.size(), largest_magnitude);
@@ -273,26 +293,6 @@ LearningColumns read_learning_columns(const Csv& csv, const ColumnRoles& roles, 
   result.inputs.levels.resize(num_inputs);
   read_categories(csv, roles.inputs, input_hint, result.inputs);
   return result;
-}
-
-std::vector<bool> used_inputs(const Model& model) {
-  std::vector<bool> used(model.num_inputs(), false);
-  for (const Partition& partition : model.partitions()) {
-    for (const Node& node : partition.nodes) {
-      if (!node.is_leaf()) {
-        used[node.split_input] = true;
-        for (Eigen::Index j = 0; j < node.direction.size(); ++j) used[j] = used[j] || node.direction(j) != 0.0;
-        continue;
-      }
-      for (Eigen::Index k = 0; k < node.slope.cols(); ++k) {
-        if (node.slope.col(k).isZero(0.0)) continue;
-        const Regressor& regressor = model.regressors()[k];
-        used[regressor.input] = true;
-        if (regressor.second_input >= 0) used[regressor.second_input] = true;
-      }
-    }
-  }
-  return used;
 }
 
 ModelInputs read_inputs(const Csv& csv, const Model& model, int max_threads) {

@@ -70,9 +70,6 @@ void refuse_negative_weight(const Csv& csv, const std::string& column, const Eig
 LearningColumns read_learning_columns(const Csv& csv, const ColumnRoles& roles, const std::string& input_hint,
                                       double largest_input, int max_threads);
 
-/// Of each input of a model, whether a split or a local model uses it.
-std::vector<bool> used_inputs(const Model& model);
-
 /// Inputs of a model. A column of the table that is not there is missing in every row if the model does not use it, and
 /// an error otherwise.
 struct ModelInputs {

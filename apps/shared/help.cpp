@@ -193,12 +193,17 @@ std::string hint_on_extra_argument(const CLI::App& program, int argc, const char
       return fmt::format("; several names are separated by commas: {} {},{}", *before, *(before + 1), *(before + 2));
     }
   }
+  return usage_of(program);
+}
+
+std::string usage_of(const CLI::App& program) {
+  const CLI::App* const command = program.get_subcommands().back();
   std::string files;
-  for (const CLI::Option* option : chosen.back()->get_options()) {
+  for (const CLI::Option* option : command->get_options()) {
     if (!option->nonpositional()) files += " " + option->get_name();
   }
   if (files.empty()) return {};
-  return fmt::format("; usage: {} {} [OPTIONS]{}", program.get_name(), chosen.back()->get_name(), files);
+  return fmt::format("; usage: {} {} [OPTIONS]{}", program.get_name(), command->get_name(), files);
 }
 
 }  // namespace llmt::apps

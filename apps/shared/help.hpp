@@ -30,4 +30,7 @@ void refuse_unknown_names(const CLI::App& program, int argc, const char* const* 
 /// of them follows an option with a list. Else empty.
 std::string hint_on_extra_argument(const CLI::App& program, int argc, const char* const* argv);
 
+/// "; usage: llmt fit [OPTIONS] data" of the command that was chosen; empty if it takes no file.
+std::string usage_of(const CLI::App& program);
+
 }  // namespace llmt::apps

@@ -44,8 +44,12 @@ void refuse_impossible_place(const std::string& path) {
 
 double read_number(const std::string& option, const std::string& text, const NumberRange& range) {
   double value = 0.0;
-  if (!parse_number(text, value) || !(value >= range.low && value <= range.high)) refuse(option, text, range.words);
-  return value;
+  const bool is_number = parse_number(text, value);
+  if (is_number && value >= range.low && value <= range.high) return value;
+  constexpr double per_cent = 100.0;
+  const bool is_per_cent =
+      is_number && range.high <= 1.0 && value > 1.0 && value / per_cent >= range.low && value / per_cent <= range.high;
+  refuse(option, text, is_per_cent ? fmt::format("{}; {} % is {}", range.words, text, value / per_cent) : range.words);
 }
 
 CLI::Option* add_text(CLI::App& command, const std::string& name, const char* type, const CLI::callback_t& take,
@@ -165,6 +169,10 @@ void refuse_lost_input(const std::string& output, const std::string& input) {
 
 std::filesystem::path beside(const std::string& path, const std::string& extension) {
   return std::filesystem::path(path).replace_extension(extension);
+}
+
+void refuse_exchanged(const std::string& first, const std::string& second, const char* order) {
+  throw std::invalid_argument(fmt::format("{} and {} seem to be exchanged: {}", first, second, order));
 }
 
 void require_ranges(const CLI::App& app) {

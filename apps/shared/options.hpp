@@ -93,6 +93,9 @@ void refuse_lost_input(const std::string& output, const std::string& input);
 /// FILE of a file written beside `path`: the same name with another extension.
 std::filesystem::path beside(const std::string& path, const std::string& extension);
 
+/// Throws std::invalid_argument that the two files seem to be exchanged, and the `order` that they come in.
+[[noreturn]] void refuse_exchanged(const std::string& first, const std::string& second, const char* order);
+
 /// read(first). Where that throws although read(second) does not, the two were exchanged: std::invalid_argument says
 /// so, and the `order` that they come in.
 template <class Read>
@@ -108,7 +111,7 @@ auto read_unless_exchanged(const std::string& first, const std::string& second, 
     }
     if (!exchanged) throw;
   }
-  throw std::invalid_argument(first + " and " + second + " seem to be exchanged: " + order);
+  refuse_exchanged(first, second, order);
 }
 
 /// Throws std::logic_error if a command has an option with a number that add_number(), add_count() and the like did not

@@ -13,6 +13,7 @@ void add_task_options(CLI::App& command, TaskChoice& choice);
 
 void add_codes(CLI::App& study);
 void add_members(CLI::App& study);
+void add_missing(CLI::App& study);
 void add_modes(CLI::App& study);
 void add_monotone(CLI::App& study);
 void add_odes(CLI::App& study);

@@ -88,18 +88,55 @@ TEST(BadData, AColumnOfInfinityIsNoColumnOfWords) {
 
 TEST(BadData, TextThatIsNotUtf8IsNamedBeforeTheWork) {
   const Folder folder;
+  const std::string windows = "; a file of Windows is converted by iconv -f CP1252 -t UTF-8\n";
   EXPECT_EQ(refusal_of(folder, "gr\xF6sse,y\n1,2\n2,3\n", "fit d.csv -t y --json"),
-            "llmt: d.csv:1: the name of column 1 of the header is not UTF-8\n");
+            "llmt: d.csv:1: byte 0xf6 of the name of column 1 of the header is not UTF-8" + windows);
   EXPECT_EQ(refusal_of(folder, "c,y\na,2\n\xF6,3\nb,4\n", "fit d.csv -t y --json"),
-            "llmt: d.csv:3: column \"c\": the cell is not UTF-8\n");
+            "llmt: d.csv:3: column \"c\": byte 0xf6 of the cell is not UTF-8" + windows);
   EXPECT_EQ(refusal_of(folder, std::string("\xFF\xFE", 2) + std::string("x\0,\0y\0\n\0", 8), "fit d.csv -t y"),
             "llmt: d.csv: this is UTF-16 or no text at all, UTF-8 is needed\n");
-  EXPECT_EQ(refusal_of(folder, std::string("x,y\n1,2\na\0b,3\n", 14), "fit d.csv -t y"),
-            "llmt: d.csv:3: column \"x\": 'a\\0b' is not a number (--ignore COLUMN leaves a column out)\n");
+  EXPECT_EQ(
+      refusal_of(folder, std::string("x,y\n1,2\na\0b,3\n", 14), "fit d.csv -t y"),
+      "llmt: d.csv:3: column \"x\": 'a\\0b' is not a number; 1 of 2 cells of the column are numbers: --categorical x "
+      "takes all for categories (--ignore COLUMN leaves a column out)\n");
   folder.write("d\xF6.csv", table_with("1,1,1,1"));
   const Outcome named = folder.run(llmt_program + " fit d\xF6.csv -t y --cv 0 --json");
   EXPECT_EQ(named.exit_code, 0) << named.err;
   EXPECT_NE(named.out.find("d\xEF\xBF\xBD.csv"), std::string::npos) << named.out;
+}
+
+TEST(BadData, AnOddCellAmongNumbersIsToBeCorrected) {
+  const Folder folder;
+  const std::string fit = "fit d.csv -t y";
+  EXPECT_EQ(
+      refusal_of(folder, table_with("27.5 C,1,1,1"), fit),
+      "llmt: d.csv:6: column \"a\": '27.5 C' is not a number; all other cells of the column are numbers or empty: "
+      "correct this one, or empty it (a missing value)\n");
+  EXPECT_EQ(refusal_of(folder,
+                       table_with("27.5 \xB0"
+                                  "C,1,1,1"),
+                       fit)
+                .find("llmt: d.csv:6: column \"a\": '27.5 \\xb0C' is not"),
+            0U);
+  EXPECT_EQ(refusal_of(folder, table_with("x,1,1,1") + "y,1,1,1\n", fit),
+            "llmt: d.csv:6: column \"a\": 'x' is not a number; 2 cells of the column are no numbers, 29 are: correct "
+            "those, or empty them (missing values)\n");
+}
+
+TEST(BadData, NothingToLearnIsSaid) {
+  const Folder folder;
+  const auto warning = [&](const std::string& text) {
+    folder.write("d.csv", text);
+    const Outcome outcome = folder.run(llmt_program + " fit d.csv -t y --ignore x");
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    return outcome.err;
+  };
+  EXPECT_EQ(warning("a,x,y\n3,0,7\n"), "llmt: d.csv has one row: the model is the target of that row everywhere\n");
+  EXPECT_EQ(warning("a,x,y\n3,0,7\n5,0,7\n4,1,7\n"),
+            "llmt: target \"y\" is 7 in every row: the model is that constant\n");
+  EXPECT_EQ(refusal_of(folder, "a,y\n3,7\n", "compare d.csv -t y"),
+            "llmt: d.csv has one row: the model is the target of that row everywhere\n"
+            "llmt: d.csv: one row leaves none to hold out\n");
 }
 
 TEST(BadData, EndlessInputsAreRefused) {

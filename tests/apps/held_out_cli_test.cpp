@@ -67,6 +67,39 @@ TEST(LlmtProgram, NoIntervalsWithoutHeldOutResiduals) {
   }
 }
 
+TEST(LlmtProgram, IntervalsOfRowsWithEmptyCellsAreWiderOrSaidToBeTooNarrow) {
+  const Folder folder;
+  const std::string whole = kinked(200, 1);
+  const std::size_t header = whole.find('\n') + 1;
+  const std::size_t row = whole.find('\n', header) + 1;
+  // One row without its first cell, and the row as it is.
+  const std::string first = whole.substr(header, row - header);
+  folder.write("new.csv", whole.substr(0, header) + first.substr(first.find(',')) + first);
+  folder.write("d.csv", whole);
+  ASSERT_EQ(folder.run(llmt_program + " fit d.csv -t y -o m.json").exit_code, 0);
+  const Outcome few = folder.run(llmt_program + " predict m.json new.csv --interval 0.9 --json");
+  ASSERT_EQ(few.exit_code, 0) << few.err;
+  EXPECT_EQ(json::parse(few.out)["uncalibrated_intervals"], 1);
+  EXPECT_NE(folder.run(llmt_program + " predict m.json new.csv --interval 0.9")
+                .err.find("; likely too narrow, because too few training rows had an empty cell: 1 intervals"),
+            std::string::npos);
+  std::string gaps = whole.substr(0, header);
+  int count = 0;
+  for (std::size_t at = header; at < whole.size(); ++count) {
+    const std::size_t end = whole.find('\n', at) + 1;
+    gaps +=
+        whole.substr(count % 10 == 3 ? whole.find(',', at) : at, end - (count % 10 == 3 ? whole.find(',', at) : at));
+    at = end;
+  }
+  folder.write("d.csv", gaps);
+  ASSERT_EQ(folder.run(llmt_program + " fit d.csv -t y -o m.json").exit_code, 0);
+  const json many = json::parse(folder.run(llmt_program + " predict m.json new.csv --interval 0.9 --json").out);
+  EXPECT_FALSE(many.contains("uncalibrated_intervals"));
+  const json& target = many["targets"][0];
+  const auto width = [&](int i) { return target["high"][i].get<double>() - target["low"][i].get<double>(); };
+  EXPECT_GT(width(0), 2.0 * width(1));
+}
+
 TEST(LlmtProgram, CompareListsTheMethodsAndRecommendsOne) {
   const Folder folder;
   folder.write("d.csv", kinked(200, 1));

@@ -30,12 +30,16 @@ TEST(HostileTables, NamesThatAreNotUtf8AreRefusedBeforeTheFit) {
   for (const char* options : {"", "--json", "-o m.json", "--stream --ignore kind"}) {
     const Outcome name = folder.run(llmt_program + " fit name.csv -t y " + options);
     EXPECT_EQ(name.exit_code, 1);
-    EXPECT_EQ(name.err, "llmt: name.csv:1: the name of column 1 of the header is not UTF-8\n");
+    EXPECT_EQ(name.err,
+              "llmt: name.csv:1: byte 0xf6 of the name of column 1 of the header is not UTF-8; a file of Windows is "
+              "converted by iconv -f CP1252 -t UTF-8\n");
   }
   EXPECT_NE(folder.run(llmt_program + " fit target.csv -t '" + latin + "'").err.find("the name of column 3"),
             std::string::npos);
-  EXPECT_EQ(folder.run(llmt_program + " fit level.csv -t y --json").err,
-            "llmt: level.csv:23: column \"kind\": the cell is not UTF-8\n");
+  EXPECT_EQ(
+      folder.run(llmt_program + " fit level.csv -t y --json").err,
+      "llmt: level.csv:23: column \"kind\": byte 0xf6 of the cell is not UTF-8; a file of Windows is converted by "
+      "iconv -f CP1252 -t UTF-8\n");
   EXPECT_EQ(folder.run(llmt_program + " fit unused.csv -t y --ignore '" + latin + "' --cv 0").exit_code, 1);
 }
 

@@ -199,7 +199,11 @@ TEST(LlmtProgram, MistakesHaveTheirExitCodeAndMessage) {
     EXPECT_NE(outcome.err.find(message), std::string::npos) << arguments << ": " << outcome.err;
   };
   expect("", 2, "a command is needed");
-  expect("fit d.csv", 2, "--target is required");
+  expect("fit d.csv", 2, "--target is required: what to predict; the columns of d.csv are label, a, b, y, z");
+  expect("fit", 2,
+         "data is required (CSV file with a header row; - is standard input); usage: llmt fit [OPTIONS] data");
+  expect("predict m.json d.csv --interval 90", 2, "it must be a number from 0.01 to 0.9999; 90 % is 0.9");
+  expect("predict m.json d.csv --interval 900", 2, "it must be a number from 0.01 to 0.9999\n");
   expect("fit d.csv -t y --rule cart", 2, "cart");
   expect("fit d.csv -t y --ignore label --rule m5 --validity blend", 2, "with --rule m5 it must be auto or crisp");
   expect("fit d.csv -t y --monotone label", 2, "--monotone names \"label\", which is categorical");
@@ -210,7 +214,8 @@ TEST(LlmtProgram, MistakesHaveTheirExitCodeAndMessage) {
   expect("fit d.csv -t y --ignore label --width -1", 2, "--width is \"-1\", it must be a finite number above 0");
   expect("fit d.csv -t y --ignore label --categorical nope", 1, "\"nope\" is categorical, but not an input");
   expect("fit d.csv -t y --ignore label --split-inputs nope", 2, "\"nope\", which is not among the inputs a, b, z");
-  expect("fit word.csv -t y", 1, "word.csv:3: column \"b\": 'x' is not a number (--ignore COLUMN leaves a column out)");
+  expect("fit word.csv -t y", 1,
+         "word.csv:3: column \"b\": 'x' is not a number; all other cells of the column are numbers or empty");
   expect("fit gap.csv -t y", 1, "gap.csv:3: column \"y\": the cell is empty, a number is needed");
   expect("fit d.csv -t w", 1, "there is no column \"w\"; the columns are label, a, b, y, z");
   expect("fit h.csv -t y", 1, "h.csv: there is a header and no rows");

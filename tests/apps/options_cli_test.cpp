@@ -36,15 +36,17 @@ TEST(Options, NumbersOutsideTheirRangeAreRefusedWithIt) {
     expect_usage(folder, fmt::format("{} {} {}", command, option, value),
                  fmt::format("{} is \"{}\", it must be {}", option, value, range));
   };
-  for (const char* value : {"nan", "0", "1", "90", "1e400", "0.9x"}) {
+  for (const char* value : {"nan", "0", "1", "900", "1e400", "0.9x"}) {
     refused("predict m.json d.csv", "--interval", value, "a number from 0.01 to 0.9999");
   }
+  refused("predict m.json d.csv", "--interval", "90", "a number from 0.01 to 0.9999; 90 % is 0.9");
   for (const char* value : {"-1", "99999999999999999999", "1.5", "nan", "0x10", "+-1"}) {
     refused("fit d.csv -t y", "--seed", value, "a whole number from 0 to 18446744073709551615");
   }
-  for (const char* value : {"7", "nan", "-0.1"}) {
+  for (const char* value : {"700", "nan", "-0.1"}) {
     refused("fit d.csv -t y", "--significance", value, "a number from 0 to 1");
   }
+  refused("fit d.csv -t y", "--significance", "7", "a number from 0 to 1; 7 % is 0.07");
   refused("fit d.csv -t y", "--min-improvement", "1", "a number from 0 to below 1");
   refused("fit d.csv -t y", "--cv", "-1", "a whole number from 0 to 2147483647");
   refused("fit d.csv -t y", "--cv", "4294967297", "a whole number from 0 to 2147483647");

@@ -57,12 +57,19 @@ TEST(RobotWords, DescriptionAndMeasurementsThatWereExchangedAreNamed) {
   const Folder folder;
   folder.write("r.yaml", llmt::read_file(sample_arm));
   folder.write("d.csv", llmt::read_file(sample_measured));
+  // Two chains: which one is meant would be asked if the files were in order.
+  folder.write("r.urdf", R"(<robot name="r"><link name="a"/><link name="b"/><link name="c"/>
+    <joint name="1" type="revolute"><parent link="a"/><child link="b"/></joint>
+    <joint name="2" type="revolute"><parent link="a"/><child link="c"/></joint></robot>)");
   for (const std::string command : {"calibrate", "discover"}) {
+    const Outcome urdf = folder.run(fmt::format("{} {} d.csv r.urdf", robot_program, command));
+    EXPECT_EQ(urdf.exit_code, 2);
+    EXPECT_TRUE(urdf.err.starts_with("llmt-robot: d.csv and r.urdf seem to be exchanged: ")) << urdf.err;
     const Outcome outcome = folder.run(fmt::format("{} {} d.csv r.yaml", robot_program, command));
     EXPECT_EQ(outcome.exit_code, 2);
     EXPECT_EQ(outcome.err,
-              "llmt-robot: d.csv and r.yaml seem to be exchanged: the description (YAML) comes first, then the "
-              "measurements (CSV)\n");
+              "llmt-robot: d.csv and r.yaml seem to be exchanged: the description (YAML or URDF) comes first, "
+              "then the measurements (CSV)\n");
   }
 }
 

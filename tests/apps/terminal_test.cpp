@@ -116,6 +116,9 @@ TEST(Arguments, DecimalCommasAreRefusedWithTheOptionThatReadsThem) {
   EXPECT_EQ(refusal(folder, "fit x.csv -t y", 1),
             "llmt: x.csv:2: column \"x\": '1,5' has a decimal comma, and a decimal point is expected; --decimal-comma "
             "reads such files\n");
+  EXPECT_EQ(refusal(folder, "fit p.csv -t y --decimal-comma", 1),
+            "llmt: p.csv:2: column \"y\": '0.25' has a decimal point, and a decimal comma is expected; leave "
+            "--decimal-comma out\n");
   ASSERT_EQ(folder.run(llmt_program + " fit c.csv -t y --decimal-comma -o c.json").exit_code, 0);
   ASSERT_EQ(folder.run(llmt_program + " fit p.csv -t y -o p.json").exit_code, 0);
   EXPECT_EQ(llmt::read_file(folder.file("c.json")), llmt::read_file(folder.file("p.json")));

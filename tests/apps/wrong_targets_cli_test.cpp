@@ -5,6 +5,9 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
 
 #include "apps/programs.hpp"
 #include "llmt/random.hpp"
@@ -68,6 +71,34 @@ TEST(WrongTargets, ThreeOfTwoThousandAreNamedByTheirLines) {
                             "those of the other rows\n"),
             std::string::npos)
       << robust.out;
+}
+
+// Three wrong targets make an error of 7 whatever the method: sqrt((60^2 + 50^2 + 90^2) / 300). With the loss they do
+// not count, and least squares, which has few coefficients, is as on the clean table.
+TEST(WrongTargets, CompareTakesTheLoss) {
+  const Folder folder;
+  const std::map<int, double> wrong = {{52, 60.0}, {152, -50.0}, {252, 90.0}};
+  const auto compared = [&](const std::map<int, double>& added, const std::string& options) {
+    folder.write("d.csv", table(300, 4, normal, added));
+    const Outcome outcome = folder.run(llmt_program + " compare d.csv -t y --cv 2 --json " + options);
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    return nlohmann::json::parse(outcome.out);
+  };
+  const nlohmann::json clean = compared({}, "");
+  const nlohmann::json robust = compared(wrong, "--loss tukey");
+  EXPECT_EQ(robust["lines_left_out"], (std::vector<int>{52, 152, 252}));
+  EXPECT_EQ(robust["rows_left_out"], (std::vector<int>{51, 151, 251}));
+  EXPECT_FALSE(clean.contains("rows_left_out"));
+  const double least_squares = clean["methods"][0]["cv_rmse"];
+  EXPECT_NEAR(robust["methods"][0]["cv_rmse"], least_squares, 0.02 * least_squares);
+  for (const nlohmann::json& method : robust["methods"]) {
+    EXPECT_LT(method["cv_rmse"], 1.02 * least_squares) << method["method"];
+  }
+  const Outcome text = folder.run(llmt_program + " compare d.csv -t y --cv 2 --loss tukey");
+  EXPECT_EQ(text.err, "");
+  EXPECT_NE(text.out.find("Rows left out by the Tukey loss: 3 of 300 (lines 52, 152, 252); the errors below"),
+            std::string::npos)
+      << text.out;
 }
 
 TEST(WrongTargets, LinesAreThoseOfTheFile) {

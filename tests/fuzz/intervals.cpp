@@ -2,6 +2,7 @@
 #include <unistd.h>
 
 #include <filesystem>
+#include <limits>
 #include <stdexcept>
 
 #include "fuzz/fitted_models.hpp"
@@ -11,7 +12,8 @@
 
 namespace {
 
-const std::vector<std::string> words = {"", "x1", "y", "model", "residuals", "intervals", "format"};
+const std::vector<std::string> words = {"",          "x1",    "y", "model", "residuals", "residuals_incomplete",
+                                        "intervals", "format"};
 
 // A file of this process, made once and written anew for each input.
 const std::string& scratch() {
@@ -32,16 +34,19 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const fuzz::Json other = bytes.byte() % 4 == 0 ? fuzz::Json::parse(bytes.one_of(fuzz::fitted_models())) : model;
   fuzz::Json residuals = fuzz::Json::array();
   for (std::size_t o = 0; o < model["outputs"].size(); ++o) residuals.push_back({0.5, 0.1, 0.2, 0.4, 0.3, 0.6});
-  json["intervals"] = {{{"residuals", residuals}, {"model", model}}, {{"residuals", residuals}, {"model", other}}};
+  json["intervals"] = {{{"residuals", residuals}, {"model", model}},
+                       {{"residuals", residuals}, {"model", other}, {"residuals_incomplete", residuals}}};
   if (bytes.coin()) fuzz::mutate(json["intervals"], bytes, words);
   if (bytes.byte() % 4 == 0) fuzz::mutate(json, bytes, words);
   llmt::write_file(scratch(), json.dump(-1, ' ', false, fuzz::Json::error_handler_t::replace));
   try {
     const auto [read, intervals] = llmt::load_with_intervals(scratch());
     if (intervals.empty()) return 0;
-    const Eigen::MatrixXd x = Eigen::MatrixXd::Constant(3, read.num_inputs(), 0.25);
+    Eigen::MatrixXd x = Eigen::MatrixXd::Constant(3, read.num_inputs(), 0.25);
+    x.row(1).setConstant(std::numeric_limits<double>::quiet_NaN());
     Eigen::Index rows = 0;
     for (const Eigen::MatrixXd& each : intervals.residuals()) rows += each.rows();
+    for (const Eigen::MatrixXd& each : intervals.incomplete_residuals()) rows += each.rows();
     if (rows < 9) return 0;  // too few for the level
     const llmt::Bounds bounds = intervals.predict(x, 0.9, 1);
     fuzz::require(bounds.lower.cols() == read.num_outputs(), "there are bounds for every output");

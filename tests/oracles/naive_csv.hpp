@@ -109,9 +109,12 @@ inline std::string read_number(const std::string& field, char mark, double& valu
 }
 
 // All is ASCII here but for a byte-order mark, of which a fault may leave a part.
-inline bool is_utf8(const std::string& text) {
-  const std::string rest = std::regex_replace(text, std::regex("\xEF\xBB\xBF"), "");
-  return std::ranges::all_of(rest, [](char c) { return static_cast<unsigned char>(c) < 128; });
+// The first byte that is not UTF-8; 0: there is none.
+inline int byte_not_utf8(const std::string& text) {
+  for (const char c : std::regex_replace(text, std::regex("\xEF\xBB\xBF"), "")) {
+    if (static_cast<unsigned char>(c) >= 128) return static_cast<unsigned char>(c);
+  }
+  return 0;
 }
 
 struct Table {
@@ -143,9 +146,9 @@ inline Table naive(const std::string& text, char mark = '.') {
       table.error = fmt::format("t:{}: column {} of the header has no name", header.line, table.columns.size() + 1);
       return table;
     }
-    if (!is_utf8(name)) {
-      table.error =
-          fmt::format("t:{}: the name of column {} of the header is not UTF-8", header.line, table.columns.size() + 1);
+    if (const int byte = byte_not_utf8(name); byte > 0) {
+      table.error = fmt::format("t:{}: byte 0x{:02x} of the name of column {} of the header is not UTF-8", header.line,
+                                byte, table.columns.size() + 1);
       return table;
     }
     if (std::ranges::find(table.columns, name) != table.columns.end()) {

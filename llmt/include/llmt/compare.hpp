@@ -47,6 +47,9 @@ struct ComparisonResult {
   std::vector<Comparison> methods;  ///< in the order asked for
   std::size_t recommended = 0;      ///< position in `methods`
   std::string recommendation;       ///< a sentence that says which to take and why
+  /// With Loss::tukey: a weight for each row as in FitSummary::loss_weights. Rows of weight 0 count in no error,
+  /// whatever the method. Empty if no method has that loss.
+  Eigen::VectorXd loss_weights = {};
 };
 
 struct CompareOptions {
@@ -57,7 +60,8 @@ struct CompareOptions {
 
 /// Fits every method in every fold and on all rows. One output. The method with the smallest held-out error is
 /// recommended, unless a simpler one is within one standard error of it (of the paired differences over the folds):
-/// least squares before all others, then the crisp tree by RD.
+/// least squares before all others, then the crisp tree by RD. Where a method has Loss::tukey, rows that this loss
+/// leaves out count in no held-out error; they are found once, on all rows, for all methods.
 ///
 /// Throws std::invalid_argument as fit(), and if there is no method, or more than one output.
 ComparisonResult compare(const Eigen::Ref<const Eigen::MatrixXd>& inputs,

@@ -44,8 +44,19 @@ struct CsvNumbers {
 /// What stands between the whole and the fraction of a number.
 enum class DecimalMark : char { point = '.', comma = ',' };
 
-/// A cell is no number only because it has a decimal comma where a point is expected.
-class DecimalCommaError : public std::runtime_error {
+/// A cell is no number only because it has the other decimal mark.
+class DecimalMarkError : public std::runtime_error {
+ public:
+  DecimalMarkError(const std::string& message, DecimalMark found) : std::runtime_error(message), found_(found) {}
+
+  DecimalMark found() const { return found_; }
+
+ private:
+  DecimalMark found_;
+};
+
+/// A name or a cell is not UTF-8, as in files of programs that write an 8-bit encoding.
+class EncodingError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
@@ -62,8 +73,8 @@ class DecimalCommaError : public std::runtime_error {
 class Csv {
  public:
   /// Reads a file. Throws std::runtime_error, starting with `path` or `path:line`, if it cannot be read, takes more
-  /// than half of the machine's memory, has a line of more than 16 MiB, is empty or not UTF-8, has an unnamed or
-  /// repeated column, or a row with too few or too many fields.
+  /// than half of the machine's memory, has a line of more than 16 MiB, is empty or not UTF-8 (EncodingError), has an
+  /// unnamed or repeated column, or a row with too few or too many fields.
   static Csv read(const std::string& path, DecimalMark mark = DecimalMark::point);
 
   /// As read(), from memory; `name` stands for the path in errors.
@@ -81,7 +92,7 @@ class Csv {
 
   /// The named columns as numbers, rows x columns, rows in file order. Throws std::runtime_error `path:line: column
   /// "c": ...` at the first cell, in file order, that is empty, not a number, not finite or out of range
-  /// (DecimalCommaError if it has a decimal comma); and as index_of().
+  /// (DecimalMarkError if it has the other decimal mark); and as index_of().
   Eigen::MatrixXd numbers(std::span<const std::string> columns, int max_threads = 0) const;
 
   /// One column as numbers; errors as above.
@@ -103,8 +114,8 @@ class Csv {
 
   /// Calls visit(row, i, text) for the cell of columns[i] in every row, in file order. The text has neither quotes nor
   /// outer blanks, is empty for cells that numbers_or_missing() takes for missing, and lives as long as the call. A
-  /// column may be named once. Errors as index_of(); throws std::runtime_error `path:line: column "c": ...` at a cell
-  /// that is not UTF-8.
+  /// column may be named once. Errors as index_of(); throws EncodingError `path:line: column "c": ...` at a cell that
+  /// is not UTF-8.
   void visit_texts(std::span<const std::string> columns,
                    const std::function<void(Eigen::Index, std::size_t, std::string_view)>& visit) const;
 

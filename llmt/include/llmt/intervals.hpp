@@ -18,6 +18,9 @@ namespace llmt {
 struct Bounds {
   Eigen::MatrixXd lower;
   Eigen::MatrixXd upper;
+  /// Rows that lack an input for which there were too few held-out rows like them for the level. Their intervals are
+  /// likely too narrow, see Intervals.
+  std::vector<Eigen::Index> uncalibrated = {};
 };
 
 /// CV+ prediction intervals (Barber, Candes, Ramdas & Tibshirani 2021): with R_i the absolute residual of row i under
@@ -27,28 +30,39 @@ struct Bounds {
 /// The guarantee is a coverage of 1 - 2 a for exchangeable rows; in practice it is near 1 - a, the level that is asked
 /// for. With a single fold this is split conformal prediction, whose guarantee is 1 - a. Weights of rows are not used.
 ///
-/// The width depends on the residuals of all rows, not on the residuals near x. Where the noise differs between
-/// regions, the coverage holds on average over all regions, not in each of them.
+/// Rows that lack an input which the models use (an empty cell, an unknown category) err more than complete rows. The
+/// two kinds of rows are therefore calibrated apart: n and R_i are those of the held-out rows of the kind of x. If
+/// there are too few of the kind for the level, the interval is that of all held-out rows, as far as needed widened to
+/// the largest residuals of the kind. If there is none of the kind, it is that of all held-out rows.
+///
+/// Within a kind the width depends on the residuals of all its rows, not on the residuals near x. Where the noise
+/// differs between regions, or the loss between missing inputs, the coverage holds on average, not in each of them.
 class Intervals {
  public:
   /// No folds; predict() throws.
   Intervals() = default;
 
-  /// One model and one matrix of absolute residuals (rows x outputs) for each fold. Throws std::invalid_argument if the
-  /// numbers of folds, inputs, outputs or levels differ, or a residual is negative or not finite.
-  Intervals(std::vector<Model> models, std::vector<Eigen::MatrixXd> residuals);
+  /// One model and one matrix of absolute residuals (rows x outputs) for each fold. `incomplete`: the same of the rows
+  /// that lack an input; empty: there are none. Throws std::invalid_argument if the numbers of folds, inputs, outputs
+  /// or levels differ, or a residual is negative or not finite.
+  Intervals(std::vector<Model> models, std::vector<Eigen::MatrixXd> residuals,
+            std::vector<Eigen::MatrixXd> incomplete = {});
 
   bool empty() const { return models_.empty(); }
   const std::vector<Model>& models() const { return models_; }
   const std::vector<Eigen::MatrixXd>& residuals() const { return residuals_; }  ///< each column ascending
+  /// The same of the rows that lack an input; one matrix for each fold.
+  const std::vector<Eigen::MatrixXd>& incomplete_residuals() const { return incomplete_; }
 
   /// Intervals that contain the fraction `level` (0.9, for example) of the outputs. Throws std::invalid_argument if
-  /// there are no folds, the level is not between 0 and 1, or there are too few rows for it, and as Model::predict().
+  /// there are no folds, the level is not between 0 and 1, or there are too few held-out rows of both kinds together
+  /// for it, and as Model::predict().
   Bounds predict(const Eigen::Ref<const Eigen::MatrixXd>& inputs, double level, int max_threads = 0) const;
 
  private:
   std::vector<Model> models_;
   std::vector<Eigen::MatrixXd> residuals_;
+  std::vector<Eigen::MatrixXd> incomplete_;
 };
 
 /// A model and the intervals that were made with it.

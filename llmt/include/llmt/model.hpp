@@ -276,6 +276,9 @@ class Model {
   std::shared_ptr<const std::vector<Evaluator>> evaluators_;  // one per partition
 };
 
+/// Of each input of a model, whether a split or the local model of a leaf uses it.
+std::vector<bool> used_inputs(const Model& model);
+
 /// Partition `partition` as it was with at most `max_leaves` leaves.
 Partition prefix(const Partition& partition, Eigen::Index max_leaves);
 

@@ -10,6 +10,8 @@
 #include <stdexcept>
 
 #include "data/equal_rows.hpp"
+#include "fit/check_options.hpp"
+#include "fit/robust_weights.hpp"
 #include "growth/rules/rule.hpp"
 #include "numerics/paired_difference.hpp"
 
@@ -104,10 +106,28 @@ void recommend(const std::vector<Method>& methods, ComparisonResult& result) {
   result.recommendation += ".";
 }
 
+// The weights that rows lose by the loss, found once for all methods: their errors are then of the same rows. Empty if
+// no method has that loss.
+Eigen::VectorXd loss_weights_of(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
+                                const Eigen::Ref<const Eigen::MatrixXd>& output, const std::vector<Method>& methods) {
+  const auto robust =
+      std::ranges::find_if(methods, [](const Method& method) { return method.options.loss == Loss::tukey; });
+  if (robust == methods.end()) return {};
+  check_options(robust->options, inputs.cols());
+  return robust_weights(inputs, output, robust->options);
+}
+
+// The weights of rows in the errors of a method.
+Eigen::VectorXd error_weights_of(const Method& method, const Eigen::VectorXd& loss_weights, Eigen::Index rows) {
+  if (loss_weights.size() > 0) return without_outliers(method.options.weights, loss_weights);
+  if (method.options.weights.size() > 0) return method.options.weights;
+  return Eigen::VectorXd::Ones(rows);
+}
+
 // The held-out errors of a method: fills in fold_rmse, cv_rmse and spread. Calls `done` after each fold.
 void judge_on_folds(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<const Eigen::MatrixXd>& output,
-                    const Method& method, const std::vector<Fold>& folds, const std::function<void()>& done,
-                    Comparison& entry) {
+                    const Method& method, const Eigen::VectorXd& error_weights, const std::vector<Fold>& folds,
+                    const std::function<void()>& done, Comparison& entry) {
   double squares = 0.0;
   double weight = 0.0;
   entry.fold_rmse.resize(std::ssize(folds));
@@ -117,10 +137,7 @@ void judge_on_folds(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen
         fit(inputs(fold.train, Eigen::all), output(fold.train, Eigen::all), for_rows(method.options, fold.train));
     const Eigen::VectorXd error =
         fitted.model.predict(inputs(fold.held_out, Eigen::all)) - Eigen::MatrixXd(output(fold.held_out, Eigen::all));
-    Eigen::VectorXd weights = Eigen::VectorXd::Ones(error.size());
-    if (method.options.weights.size() > 0) {
-      weights = method.options.weights(fold.held_out);
-    }
+    const Eigen::VectorXd weights = error_weights(fold.held_out);
     const double of_fold = weights.dot(error.cwiseAbs2());
     squares += of_fold;
     weight += weights.sum();
@@ -167,13 +184,15 @@ ComparisonResult compare(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
   const Eigen::Index total = std::ssize(methods) * (std::ssize(folds) + 1);
   Eigen::Index done = 0;
   ComparisonResult result;
+  result.loss_weights = loss_weights_of(inputs, output, methods);
   for (const Method& method : methods) {
     const auto report = [&] {
       ++done;
       if (options.progress) options.progress(method.name, done, total);
     };
     Comparison entry{.method = method.name};
-    judge_on_folds(inputs, output, method, folds, report, entry);
+    judge_on_folds(inputs, output, method, error_weights_of(method, result.loss_weights, inputs.rows()), folds, report,
+                   entry);
     describe_model(inputs, output, method, entry);
     result.methods.push_back(std::move(entry));
     report();

@@ -70,7 +70,29 @@ const char* after_blanks(const char* begin, const char* end, char separator) {
   return begin;
 }
 
-// A text that fits into a message: cut off after 60 bytes, and a byte of 0, which would end the message, spelled out.
+// Bytes at the beginning of a text that are UTF-8.
+std::size_t utf8_bytes(std::string_view text) {
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const auto lead = static_cast<unsigned char>(text[i]);
+    if (lead < 0x80) continue;
+    const std::size_t more = lead >= 0xF0 ? 3 : lead >= 0xE0 ? 2 : 1;
+    if (lead < 0xC2 || lead > 0xF4 || text.size() - i <= more) return i;
+    const auto next = static_cast<unsigned char>(text[i + 1]);
+    // Neither longer than needed, nor half of a pair of UTF-16, nor beyond U+10FFFF.
+    if ((lead == 0xE0 && next < 0xA0) || (lead == 0xED && next > 0x9F) || (lead == 0xF0 && next < 0x90) ||
+        (lead == 0xF4 && next > 0x8F)) {
+      return i;
+    }
+    for (std::size_t k = 1; k <= more; ++k) {
+      if ((static_cast<unsigned char>(text[i + k]) & 0xC0U) != 0x80U) return i;
+    }
+    i += more;
+  }
+  return text.size();
+}
+
+// A text that fits into a message: cut off after 60 bytes, and spelled out what is a byte of 0, which would end the
+// message, or not UTF-8.
 std::string shortened(std::string_view text) {
   constexpr std::size_t most = 60;
   std::size_t end = std::min(text.size(), most);
@@ -78,8 +100,12 @@ std::string shortened(std::string_view text) {
     --end;  // not within a character of UTF-8
   }
   std::string result;
-  for (const char c : text.substr(0, end)) {
-    result += c == '\0' ? "\\0" : std::string(1, c);
+  for (std::string_view rest = text.substr(0, end); !rest.empty();) {
+    const std::size_t valid = utf8_bytes(rest);
+    for (const char c : rest.substr(0, valid)) result += c == '\0' ? "\\0" : std::string(1, c);
+    if (valid == rest.size()) break;
+    result += fmt::format("\\x{:02x}", static_cast<unsigned char>(rest[valid]));
+    rest.remove_prefix(valid + 1);
   }
   return end < text.size() ? result + "..." : result;
 }
@@ -141,24 +167,9 @@ std::size_t header_begin(std::string_view text) {
   return begin;
 }
 
-bool is_utf8(std::string_view text) {
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    const auto lead = static_cast<unsigned char>(text[i]);
-    if (lead < 0x80) continue;
-    const std::size_t more = lead >= 0xF0 ? 3 : lead >= 0xE0 ? 2 : 1;
-    if (lead < 0xC2 || lead > 0xF4 || text.size() - i <= more) return false;
-    const auto next = static_cast<unsigned char>(text[i + 1]);
-    // Neither longer than needed, nor half of a pair of UTF-16, nor beyond U+10FFFF.
-    if ((lead == 0xE0 && next < 0xA0) || (lead == 0xED && next > 0x9F) || (lead == 0xF0 && next < 0x90) ||
-        (lead == 0xF4 && next > 0x8F)) {
-      return false;
-    }
-    for (std::size_t k = 1; k <= more; ++k) {
-      if ((static_cast<unsigned char>(text[i + k]) & 0xC0U) != 0x80U) return false;
-    }
-    i += more;
-  }
-  return true;
+std::string byte_not_utf8(std::string_view text) {
+  const std::size_t valid = utf8_bytes(text);
+  return valid == text.size() ? "" : fmt::format("byte 0x{:02x}", static_cast<unsigned char>(text[valid]));
 }
 
 bool is_blank(std::string_view text) { return text.find_first_not_of(blanks) == std::string_view::npos; }

@@ -18,8 +18,8 @@ inline constexpr std::size_t longest_record = 16 << 20;
 /// nothing else.
 std::size_t header_begin(std::string_view text);
 
-/// Whether a text is UTF-8 (RFC 3629).
-bool is_utf8(std::string_view text);
+/// "byte 0xf6": the first byte of a text that is not UTF-8 (RFC 3629); empty if all is.
+std::string byte_not_utf8(std::string_view text);
 
 /// End of the field that begins at `begin`: its separator or line break, outside quotes, or `end`.
 inline const char* field_end(const char* begin, const char* end, char separator) {

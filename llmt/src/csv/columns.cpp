@@ -139,8 +139,9 @@ void Csv::refuse_first(std::span<const std::string> columns, std::span<const Eig
   for_each_requested(request, record.data(), end, separator_, [&](std::size_t, const char*& cursor) {
     const std::string_view field(cursor, csv::field_end(cursor, end, separator_));
     const std::string problem = csv::problem_of(field, mark_);
-    if (mark_ == DecimalMark::point && csv::has_other_mark(field, mark_)) {
-      throw DecimalCommaError(fmt::format("{}:{}: column \"{}\": {}", name_, line_of(row), columns_[wanted], problem));
+    if (csv::has_other_mark(field, mark_)) {
+      throw DecimalMarkError(fmt::format("{}:{}: column \"{}\": {}", name_, line_of(row), columns_[wanted], problem),
+                             mark_ == DecimalMark::point ? DecimalMark::comma : DecimalMark::point);
     }
     refuse(row, columns_[wanted], problem);
   });
@@ -180,7 +181,10 @@ void Csv::visit_texts(std::span<const std::string> columns,
     for_each_requested(request, begin, end, separator_, [&](std::size_t column, const char*& cursor) {
       const char* const field = std::exchange(cursor, csv::field_end(cursor, end, separator_));
       const std::string_view cell = csv::cell_text(std::string_view(field, cursor), buffer);
-      if (!csv::is_utf8(cell)) refuse(row, columns[column], "the cell is not UTF-8");
+      if (const std::string byte = csv::byte_not_utf8(cell); !byte.empty()) {
+        throw EncodingError(fmt::format("{}:{}: column \"{}\": {} of the cell is not UTF-8", name_, line_of(row),
+                                        columns[column], byte));
+      }
       visit(row, column, cell);
     });
   }

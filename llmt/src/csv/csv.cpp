@@ -62,9 +62,9 @@ void Csv::read_header() {
       throw std::runtime_error(fmt::format("{}:{}: column {} of the header has no name", name_, line_at(header_begin_),
                                            columns_.size() + 1));
     }
-    if (!csv::is_utf8(column)) {
-      throw std::runtime_error(fmt::format("{}:{}: the name of column {} of the header is not UTF-8", name_,
-                                           line_at(header_begin_), columns_.size() + 1));
+    if (const std::string byte = csv::byte_not_utf8(column); !byte.empty()) {
+      throw EncodingError(fmt::format("{}:{}: {} of the name of column {} of the header is not UTF-8", name_,
+                                      line_at(header_begin_), byte, columns_.size() + 1));
     }
     if (!fields_.emplace(column, columns_.size()).second) {
       throw std::runtime_error(

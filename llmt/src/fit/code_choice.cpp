@@ -230,7 +230,7 @@ FitOptions with_categories(const Codes& codes, FitOptions options) {
 Intervals with_codes(const Intervals& intervals, const Codes& codes) {
   std::vector<Model> models;
   for (const Model& model : intervals.models()) models.push_back(with_codes(model, codes));
-  return {std::move(models), intervals.residuals()};
+  return {std::move(models), intervals.residuals(), intervals.incomplete_residuals()};
 }
 
 }  // namespace llmt

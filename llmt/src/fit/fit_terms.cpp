@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numeric>
 #include <optional>
+#include <span>
 #include <stdexcept>
 
 #include "base/memory.hpp"
@@ -19,6 +20,7 @@
 #include "fit/output_range.hpp"
 #include "fit/same_regressors.hpp"
 #include "fit/stages.hpp"
+#include "model/incomplete.hpp"
 #include "selection/expected_work.hpp"
 #include "selection/selection.hpp"
 
@@ -199,19 +201,16 @@ FittedPartition fit_partition(const Setting& setting, const std::vector<int>& se
 // Model and held-out residuals of every fold.
 Intervals make_intervals(const Setting& setting, std::vector<FittedPartition>& fitted) {
   std::vector<Model> models;
-  std::vector<Eigen::MatrixXd> residuals;
+  std::vector<std::span<const int>> held_out;
   const Table& table = *setting.all.table;
   for (std::size_t f = 0; f < fitted.front().of_folds.size(); ++f) {
     const FoldRows& rows = setting.folds[f];
     std::vector<PartitionOn> partitions;
     for (FittedPartition& each : fitted) partitions.push_back(std::move(each.of_folds[f]));
     models.push_back(make_model(rows.training, std::move(partitions)));
-    const std::vector<int>& held_out = rows.held_out.rows;
-    const Eigen::MatrixXd predicted =
-        models.back().predict(table.inputs(held_out, Eigen::all), setting.options.max_threads);
-    residuals.push_back((table.outputs(held_out, Eigen::all) - predicted).cwiseAbs());
+    held_out.emplace_back(rows.held_out.rows);
   }
-  return Intervals(std::move(models), std::move(residuals));
+  return held_out_intervals(std::move(models), table.inputs, table.outputs, held_out, setting.options.max_threads);
 }
 
 FitResult assemble(const Setting& setting, std::vector<FittedPartition> fitted) {

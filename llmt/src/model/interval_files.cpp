@@ -11,6 +11,8 @@
 namespace llmt {
 namespace {
 
+constexpr const char* of_incomplete = "residuals_incomplete";
+
 // Residuals, one list an output in the file.
 Eigen::MatrixXd residuals_from(const JsonReader& json) {
   const std::vector<JsonReader> of_output = json.elements();
@@ -22,15 +24,24 @@ Eigen::MatrixXd residuals_from(const JsonReader& json) {
   return residuals;
 }
 
+Json lists_of(const Eigen::MatrixXd& residuals) {
+  Json json = Json::array();
+  for (const auto& column : residuals.colwise()) json.push_back(std::vector<double>(column.begin(), column.end()));
+  return json;
+}
+
 Intervals intervals_from(const JsonReader& folds, const Model& model) {
   std::vector<Model> models;
   std::vector<Eigen::MatrixXd> residuals;
+  std::vector<Eigen::MatrixXd> incomplete;
   for (const JsonReader& fold : folds.elements()) {
     models.push_back(model_from(fold.member("model")));
     residuals.push_back(residuals_from(fold.member("residuals")));
+    incomplete.push_back(fold.has(of_incomplete) ? residuals_from(fold.member(of_incomplete))
+                                                 : Eigen::MatrixXd(0, residuals.back().cols()));
   }
   try {
-    Intervals intervals(std::move(models), std::move(residuals));
+    Intervals intervals(std::move(models), std::move(residuals), std::move(incomplete));
     check_belong(intervals, model);
     return intervals;
   } catch (const std::invalid_argument& error) {
@@ -53,12 +64,11 @@ void save(const Model& model, const Intervals& intervals, const std::string& pat
   Json json = json_of(model);
   json["intervals"] = Json::array();
   for (std::size_t k = 0; k < intervals.models().size(); ++k) {
-    Json residuals = Json::array();
-    for (Eigen::Index o = 0; o < intervals.residuals()[k].cols(); ++o) {
-      const Eigen::VectorXd column = intervals.residuals()[k].col(o);
-      residuals.push_back(std::vector<double>(column.begin(), column.end()));
+    Json fold = {{"residuals", lists_of(intervals.residuals()[k])}, {"model", json_of(intervals.models()[k])}};
+    if (const Eigen::MatrixXd& incomplete = intervals.incomplete_residuals()[k]; incomplete.rows() > 0) {
+      fold[of_incomplete] = lists_of(incomplete);
     }
-    json["intervals"].push_back({{"residuals", std::move(residuals)}, {"model", json_of(intervals.models()[k])}});
+    json["intervals"].push_back(std::move(fold));
   }
   write_file(path, model_text(json));
 }

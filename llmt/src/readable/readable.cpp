@@ -9,6 +9,7 @@
 #include <numeric>
 #include <optional>
 #include <set>
+#include <span>
 #include <stdexcept>
 #include <tuple>
 
@@ -22,6 +23,7 @@
 #include "growth/rules/rule.hpp"
 #include "llmt/size.hpp"
 #include "model/codes.hpp"
+#include "model/incomplete.hpp"
 #include "numerics/paired_difference.hpp"
 #include "readable/input_walk.hpp"
 
@@ -247,15 +249,13 @@ ReadablePartition describe(const Model& model, std::size_t p, const Choice& choi
 
 Intervals intervals_of(const Setting& setting, const std::vector<std::unique_ptr<ReadableTrees>>& parts) {
   std::vector<Model> models;
-  std::vector<Eigen::MatrixXd> residuals;
+  std::vector<std::span<const int>> held_out;
   for (std::size_t f = 0; setting.intervals && f < setting.folds.size(); ++f) {
     models.push_back(assemble(parts, f, setting.max_threads));
-    const std::vector<int>& rows = setting.folds[f].held_out.rows;
-    residuals.emplace_back((setting.table.outputs(rows, Eigen::all) -
-                            models.back().predict(setting.table.inputs(rows, Eigen::all), setting.max_threads))
-                               .cwiseAbs());
+    held_out.emplace_back(setting.folds[f].held_out.rows);
   }
-  return {std::move(models), std::move(residuals)};
+  const Table& table = setting.table;
+  return held_out_intervals(std::move(models), table.inputs, table.outputs, held_out, setting.max_threads);
 }
 
 ReadableResult fit_inputs(const Eigen::Ref<const Eigen::MatrixXd>& inputs,

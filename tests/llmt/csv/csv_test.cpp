@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <functional>
+#include <map>
+#include <string>
 
 namespace {
 
@@ -120,14 +122,30 @@ TEST(Csv, TextThatIsNotUtf8IsNamed) {
             utf_16);
   EXPECT_EQ(header(std::string("a\0,\0b\0\n\0", 8)), utf_16);
   // Cut off, longer than needed, half of a pair of UTF-16, beyond U+10FFFF, a byte that begins nothing.
-  for (const char* name :
-       {"b\xC3", "b\xE2\x82", "\xC0\xAF", "\xE0\x80\xAF", "\xED\xA0\x80", "\xF4\x90\x80\x80", "\xFF"}) {
-    EXPECT_EQ(header(std::string("\n\na,") + name + "\n"), "t.csv:3: the name of column 2 of the header is not UTF-8");
+  const std::map<std::string, std::string> first_bytes = {
+      {"b\xC3", "c3"},        {"b\xE2\x82", "e2"},        {"\xC0\xAF", "c0"}, {"\xE0\x80\xAF", "e0"},
+      {"\xED\xA0\x80", "ed"}, {"\xF4\x90\x80\x80", "f4"}, {"\xFF", "ff"},     {"\xC3\xB6\xF6", "f6"}};
+  for (const auto& [name, byte] : first_bytes) {
+    EXPECT_EQ(header("\n\na," + name + "\n"),
+              "t.csv:3: byte 0x" + byte + " of the name of column 2 of the header is not UTF-8");
   }
   EXPECT_EQ(llmt::Csv::parse("\xC3\xB6,\xE2\x82\xAC,\xF0\x9F\x8C\xB2,\xEE\x80\x80\n", "t").columns().size(), 4U);
   const llmt::Csv csv = llmt::Csv::parse("a,b\n1,\xF6\n2,x\n", "t.csv");
   EXPECT_EQ(csv.numbers("a")(1), 2.0);
-  EXPECT_EQ(error_of([&] { csv.texts("b"); }), "t.csv:2: column \"b\": the cell is not UTF-8");
+  EXPECT_EQ(error_of([&] { csv.texts("b"); }), "t.csv:2: column \"b\": byte 0xf6 of the cell is not UTF-8");
+}
+
+TEST(Csv, TheOtherDecimalMarkHasAnErrorOfItsOwn) {
+  for (const auto& [mark, cell] :
+       std::map<llmt::DecimalMark, std::string>{{llmt::DecimalMark::comma, "1.5"}, {llmt::DecimalMark::point, "1,5"}}) {
+    const llmt::Csv csv = llmt::Csv::parse("a;b\n" + cell + ";2\n", "t.csv", mark);
+    try {
+      csv.numbers("a");
+      ADD_FAILURE() << cell;
+    } catch (const llmt::DecimalMarkError& error) {
+      EXPECT_NE(error.found(), mark);
+    }
+  }
 }
 
 TEST(Csv, AByteOfZeroDoesNotEndAMessage) {

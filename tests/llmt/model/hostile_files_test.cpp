@@ -193,7 +193,10 @@ TEST(HostileFiles, IntervalsOfTheWrongTypeAreRefused) {
        {std::string("7"), std::string("{}"), std::string("[7]"), "[{\"model\":" + brackets(many) + "}]",
         "[{\"model\":" + brackets(20) + "}]", "[{\"model\":" + model + "}]",
         "[{\"model\":" + model + ",\"residuals\":[[1],[1,2]]}]", "[{\"model\":" + model + ",\"residuals\":[[1]]}]",
-        "[{\"model\":" + model + ",\"residuals\":[[1],[-1]]}]", "[{\"model\":" + model + ",\"residuals\":[1e400]}]"}) {
+        "[{\"model\":" + model + ",\"residuals\":[[1],[-1]]}]", "[{\"model\":" + model + ",\"residuals\":[1e400]}]",
+        "[{\"model\":" + model + ",\"residuals\":[[1],[1]],\"residuals_incomplete\":7}]",
+        "[{\"model\":" + model + ",\"residuals\":[[1],[1]],\"residuals_incomplete\":[[1]]}]",
+        "[{\"model\":" + model + ",\"residuals\":[[1],[1]],\"residuals_incomplete\":[[1],[-1]]}]"}) {
     llmt::write_file(path, model.substr(0, model.rfind('}')) + ",\"intervals\":" + intervals + "}");
     EXPECT_EQ(error_of_file(path).find(path + ": /intervals"), 0U) << error_of_file(path) << intervals.substr(0, 40);
   }
