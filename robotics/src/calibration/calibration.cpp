@@ -19,52 +19,6 @@ double lever_of(const Measurements& measurements) {
   return turns.empty() ? 1.0 : measurements.poses.observations[turns.front()].lever_mm;
 }
 
-// A backlash jumps where the torque changes its sign: the difference on the other side of the pose is the derivative.
-double without_jump(double forward, double backward) {
-  constexpr double alike = 0.1;
-  const double larger = std::max(std::abs(forward), std::abs(backward));
-  if (std::abs(forward - backward) <= alike * larger) return 0.5 * (forward + backward);
-  return std::abs(forward) < std::abs(backward) ? forward : backward;
-}
-
-// Central differences of a residual in mm, with steps of a thousandth of what is typical: a micrometre, or what moves a
-// tool as much. Shorter steps would show the rounding of positions of metres.
-Eigen::MatrixXd differences(const discovery::LeastSquaresProblem& problem, const Eigen::VectorXd& values) {
-  const Eigen::VectorXd here = problem.residual(values);
-  Eigen::MatrixXd jacobian = Eigen::MatrixXd::Zero(here.size(), values.size());
-  for (Eigen::Index k = 0; k < values.size(); ++k) {
-    const discovery::Parameter& parameter = problem.parameters[static_cast<std::size_t>(k)];
-    if (!parameter.free) continue;
-    constexpr double share = 1e-3;
-    const bool is_geometric = parameter.unit == "mm" || parameter.unit == "deg";
-    const double step = share * (is_geometric ? parameter.scale : std::max(parameter.scale, std::abs(values(k))));
-    Eigen::VectorXd moved = values;
-    moved(k) = values(k) + step;
-    const Eigen::VectorXd forward = (problem.residual(moved) - here) / step;
-    moved(k) = values(k) - step;
-    const Eigen::VectorXd backward = (here - problem.residual(moved)) / step;
-    for (Eigen::Index i = 0; i < here.size(); ++i) {
-      jacobian(i, k) = without_jump(forward(i), backward(i));
-    }
-  }
-  return jacobian;
-}
-
-// The derivatives of position_jacobian() hold deformations constant, which is a thousandth off where the arm bends:
-// near the minimum, where steps of that Jacobian no longer help, differences take the last ones.
-void finish_by_differences(Calibration& calibration, discovery::LeastSquaresProblem& problem,
-                           const std::vector<std::string>& reasons, const discovery::SolverOptions& solver) {
-  for (std::size_t k = 0; k < reasons.size(); ++k) {
-    problem.parameters[k].value = calibration.result.values(k);
-    problem.parameters[k].free = reasons[k].empty();
-  }
-  problem.jacobian = [own = problem](const Eigen::VectorXd& values) { return differences(own, values); };
-  // Differences have some five digits. What they cannot see is less than a thousandth of a standard error.
-  discovery::SolverOptions coarser = solver;
-  coarser.gradient_tolerance = std::max(solver.gradient_tolerance, 5e-5);
-  calibration.result = solve_for(calibration.robot, problem, reasons, coarser);
-}
-
 // Least squares with priors. The weight of the data against the priors depends on the noise, which the residuals of the
 // registered robot overestimate. So the fit is repeated from its own result, with the noise of the fit before, until
 // the noise settles.
@@ -94,10 +48,6 @@ void identify(Calibration& calibration, const Measurements& measurements,
   }
   calibration.noise_mm = noise.position_mm;
   calibration.orientation_noise_mrad = 1e3 * noise.orientation_mm / lever_of(measurements);
-  const bool is_finished = calibration.result.converged();
-  if (!is_finished && options.finish && !calibration.robot.effects.empty()) {
-    finish_by_differences(calibration, problem, reasons, options.solver);
-  }
   for (std::size_t k = 0; k < reasons.size(); ++k) {
     const discovery::Parameter& parameter = problem.parameters[k];
     const double error = calibration.result.standard_errors(k);
@@ -208,7 +158,7 @@ discovery::SolverResult register_frames(Robot& robot, const Measurements& measur
     if (!is_frame_parameter(all[k].name)) reasons[k] = "not a frame";
   }
   robot = with_started_frames(std::move(robot), measurements, reasons, options.solver);
-  return solve_for(robot, calibration_problem(robot, measurements), reasons, options.solver);
+  return fit_frames(robot, measurements, reasons, options.solver);
 }
 
 namespace {
