@@ -19,37 +19,93 @@ double lever_of(const Measurements& measurements) {
   return turns.empty() ? 1.0 : measurements.poses.observations[turns.front()].lever_mm;
 }
 
+// A calibration in the making: what is fitted, from where, and the result so far.
+struct Fit {
+  Robot robot;
+  discovery::LeastSquaresProblem problem;
+  CommonNoise noise;
+  discovery::SolverResult result = {};
+};
+
+void fit_once(Fit& fit, const NoiseModel& model, const std::vector<std::string>& reasons,
+              const discovery::SolverOptions& solver) {
+  fit.problem.weights = model.weights(fit.noise);
+  fit.result = solve_for(fit.robot, fit.problem, reasons, solver);
+  for (std::size_t k = 0; k < reasons.size(); ++k) fit.problem.parameters[k].value = fit.result.values(k);
+  fit.noise = model.estimate(fit.result.residuals, fit.result.rank);
+}
+
 // Least squares with priors. The weight of the data against the priors depends on the noise, which the residuals of the
 // registered robot overestimate. So the fit is repeated from its own result, with the noise of the fit before, until
 // the noise settles.
+void fit_until_noise_settles(Fit& fit, const NoiseModel& model, const std::vector<std::string>& reasons,
+                             const discovery::SolverOptions& solver, int largest_number_of_passes) {
+  const auto is_settled = [](double now, double then) { return now > 0.95 * then || then == 0.0; };
+  for (int pass = 0; pass < largest_number_of_passes; ++pass) {
+    const CommonNoise before = fit.noise;
+    fit_once(fit, model, reasons, solver);
+    if (is_settled(fit.noise.position_mm, before.position_mm) &&
+        is_settled(fit.noise.orientation_mm, before.orientation_mm)) {
+      return;
+    }
+  }
+}
+
+// Where the description is far off, the priors around it keep the fit far from the minimum: what is left there counts
+// as noise, and that gives the priors their weight. A fit without them finds the way, after which they come back.
+Fit begun_without_priors(const Fit& fit, const discovery::LeastSquaresProblem& unweighted, const NoiseModel& model,
+                         const std::vector<std::string>& reasons, const CalibrationOptions& options) {
+  CalibrationOptions data_alone = options;
+  data_alone.prior_length_mm = 0.0;
+  data_alone.prior_angle_deg = 0.0;
+  std::vector<discovery::Parameter> own = unweighted.parameters;
+  set_priors(own, geometric_parameter_count(fit.robot.chain), data_alone);
+  Fit other = fit;
+  for (std::size_t k = 0; k < own.size(); ++k) other.problem.parameters[k].prior_sigma = own[k].prior_sigma;
+  fit_once(other, model, reasons, options.solver);
+  for (std::size_t k = 0; k < own.size(); ++k) {
+    other.problem.parameters[k].prior_sigma = fit.problem.parameters[k].prior_sigma;
+  }
+  constexpr int passes = 10;
+  fit_until_noise_settles(other, model, reasons, options.solver, passes);
+  return other;
+}
+
+// By more than a fiftieth of the arm's length, as suspicions() has it, but not so far that it is another arm, or a
+// table that is not meant as it stands.
+bool is_far_off(const Chain& chain, const CommonNoise& registered) {
+  const double share = std::sqrt(3.0) * registered.position_mm / reach_of(chain);
+  constexpr double far = 0.02;
+  constexpr double too_far = 0.25;
+  return share > far && share < too_far;
+}
+
 void identify(Calibration& calibration, const Measurements& measurements,
               const discovery::LeastSquaresProblem& unweighted, const std::vector<std::string>& reasons,
               const CalibrationOptions& options) {
   const bool has_priors = options.prior_length_mm > 0.0 || options.prior_angle_deg > 0.0;
   const bool is_weighed = has_priors || !orientation_rows(measurements.poses).empty() ||
                           (stated_sigma_mm(measurements).array() > 0.0).any();
-  const int largest_number_of_passes = is_weighed ? 10 : 1;
   const NoiseModel model(measurements, options);
-  discovery::LeastSquaresProblem problem = unweighted;
-  set_priors(problem.parameters, geometric_parameter_count(calibration.robot.chain), options);
-  CommonNoise noise = model.estimate(calibration.registration.residuals, 0);
-  for (int pass = 0; pass < largest_number_of_passes; ++pass) {
-    problem.weights = model.weights(noise);
-    calibration.result = solve_for(calibration.robot, problem, reasons, options.solver);
-    for (std::size_t k = 0; k < reasons.size(); ++k) {
-      problem.parameters[k].value = calibration.result.values(k);
-    }
-    const CommonNoise before = noise;
-    noise = model.estimate(calibration.result.residuals, calibration.result.rank);
-    const auto is_settled = [](double now, double then) { return now > 0.95 * then || then == 0.0; };
-    if (is_settled(noise.position_mm, before.position_mm) && is_settled(noise.orientation_mm, before.orientation_mm)) {
-      break;
-    }
+  Fit start{calibration.robot, unweighted, model.estimate(calibration.registration.residuals, 0)};
+  set_priors(start.problem.parameters, geometric_parameter_count(calibration.robot.chain), options);
+  Fit fit = start;
+  fit_until_noise_settles(fit, model, reasons, options.solver, is_weighed ? 10 : 1);
+  if (has_priors && is_far_off(start.robot.chain, start.noise)) {
+    Fit other = begun_without_priors(fit, unweighted, model, reasons, options);
+    constexpr double better = 0.9;
+    constexpr double plausible = 0.002;  // of the arm's length, mm per coordinate
+    calibration.began_without_priors =
+        other.noise.position_mm <
+        std::min(better * fit.noise.position_mm, plausible * reach_of(calibration.robot.chain));
+    if (calibration.began_without_priors) fit = std::move(other);
   }
-  calibration.noise_mm = noise.position_mm;
-  calibration.orientation_noise_mrad = 1e3 * noise.orientation_mm / lever_of(measurements);
+  calibration.robot = std::move(fit.robot);
+  calibration.result = std::move(fit.result);
+  calibration.noise_mm = fit.noise.position_mm;
+  calibration.orientation_noise_mrad = 1e3 * fit.noise.orientation_mm / lever_of(measurements);
   for (std::size_t k = 0; k < reasons.size(); ++k) {
-    const discovery::Parameter& parameter = problem.parameters[k];
+    const discovery::Parameter& parameter = fit.problem.parameters[k];
     const double error = calibration.result.standard_errors(k);
     if (reasons[k].empty() && parameter.prior_sigma && error > 0.7 * *parameter.prior_sigma) {
       calibration.weak.push_back(parameter.name);
