@@ -64,6 +64,7 @@ Json calibration_json(const CalibrationFacts& facts) {
   json["decision"] = report.decision;
   json["termination"] = discovery::to_string(result.termination);
   json["iterations"] = result.iterations;
+  if (report.calibration.began_without_priors) json["began_without_priors"] = true;
   json["identified_parameters"] = result.rank;
   json["condition_number"] = result.condition_number;
   json["coordinate_noise_mm"] = report.calibration.noise_mm;

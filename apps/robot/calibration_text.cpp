@@ -97,6 +97,12 @@ std::string parameters_text(const CalibrationFacts& facts) {
               ? fmt::format("{} parameters identified; the fit converged after {} iterations\n", result.rank,
                             result.iterations)
               : fmt::format("{} parameters identified; the fit did NOT converge: {}\n", result.rank, result.reason);
+  if (report.calibration.began_without_priors) {
+    text +=
+        "The description is far off. Two starts were tried; the second one won, which began without the priors that "
+        "hold "
+        "parameters near it\n";
+  }
   std::vector<std::string> kept;
   std::vector<std::string> dependent;
   for (const robotics::FixedParameter& fixed : report.calibration.fixed) {

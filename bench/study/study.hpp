@@ -12,6 +12,7 @@ namespace bench {
 void add_task_options(CLI::App& command, TaskChoice& choice);
 
 void add_codes(CLI::App& study);
+void add_far(CLI::App& study);
 void add_members(CLI::App& study);
 void add_missing(CLI::App& study);
 void add_modes(CLI::App& study);

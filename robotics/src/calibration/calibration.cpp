@@ -20,87 +20,93 @@ double lever_of(const Measurements& measurements) {
   return turns.empty() ? 1.0 : measurements.poses.observations[turns.front()].lever_mm;
 }
 
-// A backlash jumps where the torque changes its sign: the difference on the other side of the pose is the derivative.
-double without_jump(double forward, double backward) {
-  constexpr double alike = 0.1;
-  const double larger = std::max(std::abs(forward), std::abs(backward));
-  if (std::abs(forward - backward) <= alike * larger) return 0.5 * (forward + backward);
-  return std::abs(forward) < std::abs(backward) ? forward : backward;
-}
+// A calibration in the making: what is fitted, from where, and the result so far.
+struct Fit {
+  Robot robot;
+  discovery::LeastSquaresProblem problem;
+  CommonNoise noise;
+  discovery::SolverResult result = {};
+};
 
-// Central differences of a residual in mm, with steps of a thousandth of what is typical: a micrometre, or what moves a
-// tool as much. Shorter steps would show the rounding of positions of metres.
-Eigen::MatrixXd differences(const discovery::LeastSquaresProblem& problem, const Eigen::VectorXd& values) {
-  const Eigen::VectorXd here = problem.residual(values);
-  Eigen::MatrixXd jacobian = Eigen::MatrixXd::Zero(here.size(), values.size());
-  for (Eigen::Index k = 0; k < values.size(); ++k) {
-    const discovery::Parameter& parameter = problem.parameters[static_cast<std::size_t>(k)];
-    if (!parameter.free) continue;
-    constexpr double share = 1e-3;
-    const bool is_geometric = parameter.unit == "mm" || parameter.unit == "deg";
-    const double step = share * (is_geometric ? parameter.scale : std::max(parameter.scale, std::abs(values(k))));
-    Eigen::VectorXd moved = values;
-    moved(k) = values(k) + step;
-    const Eigen::VectorXd forward = (problem.residual(moved) - here) / step;
-    moved(k) = values(k) - step;
-    const Eigen::VectorXd backward = (here - problem.residual(moved)) / step;
-    for (Eigen::Index i = 0; i < here.size(); ++i) {
-      jacobian(i, k) = without_jump(forward(i), backward(i));
-    }
-  }
-  return jacobian;
-}
-
-// The derivatives of position_jacobian() hold deformations constant, which is a thousandth off where the arm bends:
-// near the minimum, where steps of that Jacobian no longer help, differences take the last ones.
-void finish_by_differences(Calibration& calibration, discovery::LeastSquaresProblem& problem,
-                           const std::vector<std::string>& reasons, const discovery::SolverOptions& solver) {
-  for (std::size_t k = 0; k < reasons.size(); ++k) {
-    problem.parameters[k].value = calibration.result.values(k);
-    problem.parameters[k].free = reasons[k].empty();
-  }
-  problem.jacobian = [own = problem](const Eigen::VectorXd& values) { return differences(own, values); };
-  // Differences have some five digits. What they cannot see is less than a thousandth of a standard error.
-  discovery::SolverOptions coarser = solver;
-  coarser.gradient_tolerance = std::max(solver.gradient_tolerance, 5e-5);
-  calibration.result = solve_for(calibration.robot, problem, reasons, coarser);
+void fit_once(Fit& fit, const NoiseModel& model, const std::vector<std::string>& reasons,
+              const discovery::SolverOptions& solver) {
+  fit.problem.weights = model.weights(fit.noise);
+  fit.result = solve_for(fit.robot, fit.problem, reasons, solver);
+  for (std::size_t k = 0; k < reasons.size(); ++k) fit.problem.parameters[k].value = fit.result.values(k);
+  fit.noise = model.estimate(fit.result.residuals, fit.result.rank);
 }
 
 // Least squares with priors. The weight of the data against the priors depends on the noise, which the residuals of the
 // registered robot overestimate. So the fit is repeated from its own result, with the noise of the fit before, until
 // the noise settles.
+void fit_until_noise_settles(Fit& fit, const NoiseModel& model, const std::vector<std::string>& reasons,
+                             const discovery::SolverOptions& solver, int largest_number_of_passes) {
+  const auto is_settled = [](double now, double then) { return now > 0.95 * then || then == 0.0; };
+  for (int pass = 0; pass < largest_number_of_passes; ++pass) {
+    const CommonNoise before = fit.noise;
+    fit_once(fit, model, reasons, solver);
+    if (is_settled(fit.noise.position_mm, before.position_mm) &&
+        is_settled(fit.noise.orientation_mm, before.orientation_mm)) {
+      return;
+    }
+  }
+}
+
+// Where the description is far off, the priors around it keep the fit far from the minimum: what is left there counts
+// as noise, and that gives the priors their weight. A fit without them finds the way, after which they come back.
+Fit begun_without_priors(const Fit& fit, const discovery::LeastSquaresProblem& unweighted, const NoiseModel& model,
+                         const std::vector<std::string>& reasons, const CalibrationOptions& options) {
+  CalibrationOptions data_alone = options;
+  data_alone.prior_length_mm = 0.0;
+  data_alone.prior_angle_deg = 0.0;
+  std::vector<discovery::Parameter> own = unweighted.parameters;
+  set_priors(own, geometric_parameter_count(fit.robot.chain), data_alone);
+  Fit other = fit;
+  for (std::size_t k = 0; k < own.size(); ++k) other.problem.parameters[k].prior_sigma = own[k].prior_sigma;
+  fit_once(other, model, reasons, options.solver);
+  for (std::size_t k = 0; k < own.size(); ++k) {
+    other.problem.parameters[k].prior_sigma = fit.problem.parameters[k].prior_sigma;
+  }
+  constexpr int passes = 10;
+  fit_until_noise_settles(other, model, reasons, options.solver, passes);
+  return other;
+}
+
+// By more than a fiftieth of the arm's length, as suspicions() has it, but not so far that it is another arm, or a
+// table that is not meant as it stands.
+bool is_far_off(const Chain& chain, const CommonNoise& registered) {
+  const double share = std::sqrt(3.0) * registered.position_mm / reach_of(chain);
+  constexpr double far = 0.02;
+  constexpr double too_far = 0.25;
+  return share > far && share < too_far;
+}
+
 void identify(Calibration& calibration, const Measurements& measurements,
               const discovery::LeastSquaresProblem& unweighted, const std::vector<std::string>& reasons,
               const CalibrationOptions& options) {
   const bool has_priors = options.prior_length_mm > 0.0 || options.prior_angle_deg > 0.0;
   const bool is_weighed = has_priors || !orientation_rows(measurements.poses).empty() ||
                           (stated_sigma_mm(measurements).array() > 0.0).any();
-  const int largest_number_of_passes = is_weighed ? 10 : 1;
   const NoiseModel model(measurements, options);
-  discovery::LeastSquaresProblem problem = unweighted;
-  set_priors(problem.parameters, geometric_parameter_count(calibration.robot.chain), options);
-  CommonNoise noise = model.estimate(calibration.registration.residuals, 0);
-  for (int pass = 0; pass < largest_number_of_passes; ++pass) {
-    problem.weights = model.weights(noise);
-    calibration.result = solve_for(calibration.robot, problem, reasons, options.solver);
-    for (std::size_t k = 0; k < reasons.size(); ++k) {
-      problem.parameters[k].value = calibration.result.values(k);
-    }
-    const CommonNoise before = noise;
-    noise = model.estimate(calibration.result.residuals, calibration.result.rank);
-    const auto is_settled = [](double now, double then) { return now > 0.95 * then || then == 0.0; };
-    if (is_settled(noise.position_mm, before.position_mm) && is_settled(noise.orientation_mm, before.orientation_mm)) {
-      break;
-    }
+  Fit start{calibration.robot, unweighted, model.estimate(calibration.registration.residuals, 0)};
+  set_priors(start.problem.parameters, geometric_parameter_count(calibration.robot.chain), options);
+  Fit fit = start;
+  fit_until_noise_settles(fit, model, reasons, options.solver, is_weighed ? 10 : 1);
+  if (has_priors && is_far_off(start.robot.chain, start.noise)) {
+    Fit other = begun_without_priors(fit, unweighted, model, reasons, options);
+    constexpr double better = 0.9;
+    constexpr double plausible = 0.002;  // of the arm's length, mm per coordinate
+    calibration.began_without_priors =
+        other.noise.position_mm <
+        std::min(better * fit.noise.position_mm, plausible * reach_of(calibration.robot.chain));
+    if (calibration.began_without_priors) fit = std::move(other);
   }
-  calibration.noise_mm = noise.position_mm;
-  calibration.orientation_noise_mrad = 1e3 * noise.orientation_mm / lever_of(measurements);
-  const bool is_finished = calibration.result.converged();
-  if (!is_finished && options.finish && !calibration.robot.effects.empty()) {
-    finish_by_differences(calibration, problem, reasons, options.solver);
-  }
+  calibration.robot = std::move(fit.robot);
+  calibration.result = std::move(fit.result);
+  calibration.noise_mm = fit.noise.position_mm;
+  calibration.orientation_noise_mrad = 1e3 * fit.noise.orientation_mm / lever_of(measurements);
   for (std::size_t k = 0; k < reasons.size(); ++k) {
-    const discovery::Parameter& parameter = problem.parameters[k];
+    const discovery::Parameter& parameter = fit.problem.parameters[k];
     const double error = calibration.result.standard_errors(k);
     if (reasons[k].empty() && parameter.prior_sigma && error > 0.7 * *parameter.prior_sigma) {
       calibration.weak.push_back(parameter.name);
@@ -209,7 +215,7 @@ discovery::SolverResult register_frames(Robot& robot, const Measurements& measur
     if (!is_frame_parameter(all[k].name)) reasons[k] = "not a frame";
   }
   robot = with_started_frames(std::move(robot), measurements, reasons, options.solver);
-  return solve_for(robot, calibration_problem(robot, measurements), reasons, options.solver);
+  return fit_frames(robot, measurements, reasons, options.solver);
 }
 
 namespace {

@@ -45,7 +45,7 @@ Robot best_start(const Robot& robot, const Measurements& measurements, const std
     start.chain.tool.xyz_mm += guesses.col(guess);
     start = with_closed_form_base(std::move(start), few);
     Robot trial = start;
-    const discovery::SolverResult result = solve_for(trial, calibration_problem(trial, few), reasons, solver);
+    const discovery::SolverResult result = fit_frames(trial, few, reasons, solver);
     // The tool as given comes first and is kept unless another guess is better by more than 0.1 %.
     if (result.residual_norms.back() < 0.999 * smallest) {
       smallest = result.residual_norms.back();
@@ -103,6 +103,21 @@ discovery::SolverResult solve_for(Robot& robot, discovery::LeastSquaresProblem p
   discovery::SolverResult result = discovery::solve(problem, solver);
   robot = with_values(std::move(robot), result.values);
   return result;
+}
+
+discovery::SolverResult fit_frames(Robot& robot, const Measurements& measurements,
+                                   const std::vector<std::string>& reasons, const discovery::SolverOptions& solver) {
+  discovery::LeastSquaresProblem problem = calibration_problem(robot, measurements);
+  const std::vector<Eigen::Index> rows = measured_rows(measurements);
+  problem.jacobian = [&, given = robot](const Eigen::VectorXd& values) -> Eigen::MatrixXd {
+    Robot moved = with_values(given, values);
+    moved.effects.clear();
+    Eigen::MatrixXd jacobian = Eigen::MatrixXd::Zero(std::ssize(rows), values.size());
+    const Eigen::MatrixXd by_geometry = position_jacobian(moved, measurements.poses)(rows, Eigen::all);
+    jacobian.leftCols(by_geometry.cols()) = by_geometry;
+    return jacobian;
+  };
+  return solve_for(robot, problem, reasons, solver);
 }
 
 Robot with_started_frames(Robot robot, const Measurements& measurements, const std::vector<std::string>& reasons,

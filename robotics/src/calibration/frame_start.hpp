@@ -13,6 +13,11 @@ namespace llmt::robotics {
 discovery::SolverResult solve_for(Robot& robot, discovery::LeastSquaresProblem problem,
                                   const std::vector<std::string>& reasons, const discovery::SolverOptions& solver);
 
+/// The same over bases and tools alone, by derivatives of the rigid arm. Those of an arm that bends tell a turn of the
+/// tool from the place of the payload, by a thousandth of what the effects do: a fit would turn it at will.
+discovery::SolverResult fit_frames(Robot& robot, const Measurements& measurements,
+                                   const std::vector<std::string>& reasons, const discovery::SolverOptions& solver);
+
 /// The robot with its bases and tools near those of the measurements, setting after setting: a base that is free in
 /// closed form for several guesses of the tool, then a small fit; tools on a base that is known in closed form. Frames
 /// with a reason to be fixed, and those that the measured coordinates do not suffice for, stay as they are.

@@ -154,7 +154,6 @@ Calibration refit(const Calibration& baseline, const std::vector<Hypothesis>& fo
   const Measurements kept = without_rows(measurements, outliers);
   CalibrationOptions calibration = options.calibration;
   calibration.start_as_given = true;
-  calibration.finish = false;
   const auto from = [&](Robot start) {
     for (const Hypothesis& hypothesis : found) start.effects.push_back(*hypothesis.effect);
     return calibrate(start, kept, calibration);

@@ -134,7 +134,6 @@ std::map<std::string, double> refine_constants(Investigation& investigation, con
   if (is_better) {
     CalibrationOptions calibration = options.calibration;
     calibration.start_as_given = true;
-    calibration.finish = false;
     Calibration next = calibrate(moved.robot, kept, calibration);
     next.registered = investigation.fitted.registered;
     if (total_distance(next.robot, kept) < total_distance(investigation.fitted.robot, kept)) {

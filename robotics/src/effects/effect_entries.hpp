@@ -32,6 +32,9 @@ std::vector<std::string> names_in_formula(const std::string& text);
 /// Names in the expressions that are neither joint values nor torques.
 std::vector<std::string> formula_columns(const std::vector<FormulaTerm>& terms);
 
+/// The joints, counted from 0, whose torques the expressions name, ascending.
+std::vector<std::size_t> formula_torques(const std::vector<FormulaTerm>& terms);
+
 /// The typical size of what a term is multiplied by: as stated, or else that of what it acts on.
 double scale_of(const FormulaTerm& term, bool is_prismatic);
 

@@ -42,6 +42,9 @@ void apply_joint_compliance_free_masses(const PoseContext& pose, std::size_t j, 
   deformation.joint(j) += sum;
 }
 
+// A link of no length has no direction, either: a shorter bar neither bends nor twists.
+constexpr double shortest_bar_mm = 1.0;
+
 // The straight bar that stands for a link, mm. DH parameters only tell where axes are: between (nearly) parallel axes
 // the offset d along them is arbitrary, so the bar runs along the common normal a in the plane of the link's centre of
 // mass; where d is the longer way, as in a forearm, it runs along the axis. The last link runs straight to the tool
@@ -90,7 +93,7 @@ Beam beam_of(const PoseContext& pose, std::size_t link) {
   const Bar bar = bar_of(pose, link);
   const Eigen::Vector3d span = bar.end - bar.start;
   Beam beam{.chord = Eigen::Vector3d::UnitX(),
-            .length = metres * span.norm(),
+            .length = span.norm() < shortest_bar_mm ? 0.0 : metres * span.norm(),
             .end = bar.end,
             .force = {},
             .weight = Eigen::Vector3d::Zero(),
@@ -146,7 +149,7 @@ void apply_link_bending_no_carry_over(const PoseContext& pose, std::size_t link,
 void apply_link_torsion(const PoseContext& pose, std::size_t link, Values values, Values, Deformation& deformation) {
   const Bar bar = bar_of(pose, link);
   const double length = (bar.end - bar.start).norm();
-  if (!(length > 0.0)) return;
+  if (length < shortest_bar_mm) return;
   const Eigen::Vector3d chord = (bar.end - bar.start) / length;
   double torque = chord.dot(load_beyond(pose, link, bar.end).moment_Nm);
   // The link's own weight twists only the part of the bar before it.
@@ -209,6 +212,7 @@ std::vector<EffectType> elastic_effects() {
        .source = masses,
        .parameters = {compliance},
        .apply = apply_joint_compliance,
+       .senses = Senses::torques,
        .weighted = true,
        .elastic = true},
       {.name = "joint_compliance_stiffening",
@@ -219,6 +223,7 @@ std::vector<EffectType> elastic_effects() {
        .constants =
            {{.name = "stiffens_at", .key = "stiffens_at_Nm", .usual = 100.0, .prismatic_key = "stiffens_at_N"}},
        .apply = apply_joint_compliance_stiffening,
+       .senses = Senses::torques,
        .weighted = true,
        .elastic = true,
        .refusal =
@@ -242,6 +247,7 @@ std::vector<EffectType> elastic_effects() {
        .source = masses + "; lumping as in base inertial parameters, Gautier & Khalil 1990",
        .parameters = {{.name = "moment", .unit = "rad", .key = "moments_rad", .list = true}},
        .apply = apply_joint_compliance_free_masses,
+       .senses = Senses::arm,
        .elastic = true,
        .prismatic = false,
        .count = [](const Chain& chain, std::size_t index) { return 3 * (chain.joints.size() - index); }},
@@ -252,6 +258,7 @@ std::vector<EffectType> elastic_effects() {
        .place = EffectPlace::link,
        .parameters = {flexibility},
        .apply = apply_link_bending,
+       .senses = Senses::arm,
        .weighted = true},
       {.name = "link_bending_no_carry_over",
        .family = "link_bending",
@@ -259,7 +266,8 @@ std::vector<EffectType> elastic_effects() {
        .source = "a documented reduction of link_bending",
        .place = EffectPlace::link,
        .parameters = {flexibility},
-       .apply = apply_link_bending_no_carry_over},
+       .apply = apply_link_bending_no_carry_over,
+       .senses = Senses::arm},
       {.name = "link_torsion",
        .family = "link_torsion",
        .formula = "th = e L (M . e) / GJ: the moment of everything beyond the link's end twists it about its chord e",
@@ -267,6 +275,7 @@ std::vector<EffectType> elastic_effects() {
        .place = EffectPlace::link,
        .parameters = {flexibility},
        .apply = apply_link_torsion,
+       .senses = Senses::arm,
        .weighted = true},
       {.name = "elastic_base",
        .family = "elastic_base",
@@ -276,6 +285,7 @@ std::vector<EffectType> elastic_effects() {
        .place = EffectPlace::robot,
        .parameters = {{.name = "compliance", .unit = "rad/(N m)", .key = "compliance_rad_per_Nm"}},
        .apply = apply_elastic_base,
+       .senses = Senses::arm,
        .weighted = true,
        .elastic = true},
       {.name = "elastic_base_two",
@@ -288,6 +298,7 @@ std::vector<EffectType> elastic_effects() {
        .parameters = {{.name = "compliance_first", .unit = "rad/(N m)", .key = "compliance_first_rad_per_Nm"},
                       {.name = "compliance_second", .unit = "rad/(N m)", .key = "compliance_second_rad_per_Nm"}},
        .apply = apply_elastic_base_two,
+       .senses = Senses::arm,
        .weighted = true,
        .elastic = true},
       {.name = "payload_error",

@@ -60,6 +60,16 @@ std::vector<std::string> formula_columns(const std::vector<FormulaTerm>& terms) 
   return {columns.begin(), columns.end()};
 }
 
+std::vector<std::size_t> formula_torques(const std::vector<FormulaTerm>& terms) {
+  std::set<std::size_t> joints;
+  for (const FormulaTerm& term : terms) {
+    for (const std::string& name : names_in_formula(term.text)) {
+      if (joint_number(name, "tau") > 0) joints.insert(joint_number(name, "tau") - 1);
+    }
+  }
+  return {joints.begin(), joints.end()};
+}
+
 std::string term_refusal(const Chain& chain, const Effect& effect, const FormulaTerm& term) {
   static const std::set<std::string> targets = {"joint", "x", "y", "z"};
   if (!targets.contains(term.acts_on)) {
@@ -122,6 +132,7 @@ EffectType formula_effect() {
           .formula = "sum of coefficients times the user's expressions",
           .source = "the user",
           .parameters = {{.name = "coefficient", .key = "coefficients", .list = true}},
+          .senses = Senses::torques,
           .elastic = true};
 }
 

@@ -46,6 +46,7 @@ std::vector<EffectType> instrument_effects() {
        .place = EffectPlace::robot,
        .parameters = {angle_of("cosine"), angle_of("sine")},
        .apply = apply_azimuth<1>,
+       .senses = Senses::arm,
        .of_measuring = true},
       {.name = "instrument_azimuth_twice",
        .family = "instrument_azimuth",
@@ -54,6 +55,7 @@ std::vector<EffectType> instrument_effects() {
        .place = EffectPlace::robot,
        .parameters = {angle_of("cosine"), angle_of("sine")},
        .apply = apply_azimuth<2>,
+       .senses = Senses::arm,
        .of_measuring = true},
       {.name = "instrument_elevation",
        .family = "instrument_elevation",
@@ -62,6 +64,7 @@ std::vector<EffectType> instrument_effects() {
        .place = EffectPlace::robot,
        .parameters = {angle_of("constant"), angle_of("cosine"), angle_of("sine")},
        .apply = apply_elevation,
+       .senses = Senses::arm,
        .of_measuring = true},
       {.name = "instrument_range",
        .family = "instrument_range",
@@ -70,6 +73,7 @@ std::vector<EffectType> instrument_effects() {
        .place = EffectPlace::robot,
        .parameters = {{.name = "offset", .unit = "mm", .key = "offset_mm"}},
        .apply = apply_range,
+       .senses = Senses::arm,
        .of_measuring = true},
   };
 }

@@ -30,6 +30,16 @@ void apply(Pose& frame, const Deformation::Twist& twist) {
 
 }  // namespace
 
+Eigen::Vector3d Motion::of(const Eigen::Vector3d& moving) const {
+  if (!turns) return axis;
+  return axis.cross(moving - point);
+}
+
+Eigen::Vector3d Motion::turn() const {
+  if (!turns) return Eigen::Vector3d::Zero();
+  return axis;
+}
+
 void Deformation::clear() {
   base = {};
   joint.setZero();
@@ -100,9 +110,9 @@ void Kinematics::set_values(const Eigen::VectorXd& values) {
 
 // Calls visit(element number, frame before the element) for every element, then returns the tool pose. The deformation
 // of a link acts just before the axis of the next joint, that of the last link at the tool point, that of the base just
-// before the first axis.
-template <typename Visit>
-Pose Kinematics::walk(const Eigen::VectorXd& q, const Deformation* deformation, Visit visit) const {
+// before the first axis. reach(element number, frame) comes before it acts.
+template <typename Reach, typename Visit>
+Pose Kinematics::walk(const Eigen::VectorXd& q, const Deformation* deformation, Reach reach, Visit visit) const {
   if (q.size() != std::ssize(variable_)) {
     throw std::invalid_argument("llmt::robotics::Kinematics: q has " + std::to_string(q.size()) +
                                 " entries, the chain has " + std::to_string(joints()) + " joints");
@@ -113,6 +123,7 @@ Pose Kinematics::walk(const Eigen::VectorXd& q, const Deformation* deformation, 
     double sine = element.sine;
     double cosine = element.cosine;
     double value = element.value;
+    reach(i, frame);
     if (element.joint >= 0) {
       const std::size_t joint = element.joint;
       if (deformation != nullptr) apply(frame, joint > 0 ? deformation->link[joint - 1] : deformation->base);
@@ -137,7 +148,8 @@ Pose Kinematics::walk(const Eigen::VectorXd& q, const Deformation* deformation, 
 }
 
 Pose Kinematics::forward(const Eigen::VectorXd& q, const Deformation* deformation) const {
-  return walk(q, deformation, [](std::size_t, const Pose&) {});
+  const auto nothing = [](std::size_t, const Pose&) {};
+  return walk(q, deformation, nothing, nothing);
 }
 
 Skeleton Kinematics::skeleton(const Eigen::VectorXd& q, const Deformation* deformation) const {
@@ -153,13 +165,15 @@ void Kinematics::skeleton_into(Skeleton& skeleton, const Eigen::VectorXd& q, con
   skeleton.joint_frame.resize(joints());
   skeleton.body_rotation.resize(joints());
   std::size_t body = 0;
-  const auto visit = [&](std::size_t i, const Pose& frame) {
+  const auto reach = [&](std::size_t i, const Pose& frame) {
     if (i == base_end_) skeleton.base_rotation = frame.rotation;
     if (body < joints() && i == body_frame_[body]) {
       skeleton.body_centre[body] = frame.position_mm + frame.rotation * body_centre_mm_[body];
       skeleton.body_rotation[body] = frame.rotation;
       ++body;
     }
+  };
+  const auto visit = [&](std::size_t i, const Pose& frame) {
     if (elements_[i].joint < 0) return;
     const std::size_t joint = elements_[i].joint;
     if (joint > 0) skeleton.link_end[joint - 1] = frame.position_mm;
@@ -167,40 +181,47 @@ void Kinematics::skeleton_into(Skeleton& skeleton, const Eigen::VectorXd& q, con
     skeleton.joint_frame[joint] = frame.rotation;
     skeleton.joint_axis[joint] = sign_[joint] * frame.rotation.col(2);
   };
-  skeleton.tool = walk(q, deformation, visit);
+  skeleton.tool = walk(q, deformation, reach, visit);
+  if (deformation != nullptr) skeleton.tool.position_mm -= deformation->world_mm;
   skeleton.link_end.back() = skeleton.tool.position_mm;
   skeleton.payload_centre = skeleton.tool.position_mm + skeleton.tool.rotation * payload_centre_mm_;
 }
 
-Eigen::Matrix3Xd Kinematics::position_jacobian(const Eigen::VectorXd& q, const Deformation* deformation) const {
-  Eigen::Matrix3Xd axes(3, elements_.size());
-  Eigen::Matrix3Xd origins(3, elements_.size());
-  const auto visit = [&](std::size_t i, const Pose& frame) {
-    axes.col(i) = frame.rotation.col(elements_[i].axis);
-    origins.col(i) = frame.position_mm;
-  };
-  Eigen::Vector3d tool = walk(q, deformation, visit).position_mm;
-  if (deformation != nullptr) tool -= deformation->world_mm;
-  Eigen::Matrix3Xd jacobian(3, elements_.size());
-  for (std::size_t i = 0; i < elements_.size(); ++i) {
-    const Eigen::Vector3d axis = axes.col(i);
-    const Eigen::Vector3d arm = tool - origins.col(i);
+Pose Kinematics::motions_into(std::vector<Motion>& motions, const Eigen::VectorXd& q,
+                              const Deformation* deformation) const {
+  motions.resize(elements_.size());
+  std::size_t joint = 0;
+  std::size_t body = 0;
+  const auto nothing = [](std::size_t, const Pose&) {};
+  return walk(q, deformation, nothing, [&](std::size_t i, const Pose& frame) {
+    while (joint < joints() && variable_[joint] <= i) ++joint;
+    while (body < joints() && body_frame_[body] <= i) ++body;
     const Element& element = elements_[i];
-    if (element.rotation) {
-      jacobian.col(element.parameter) = radians * axis.cross(arm);
-    } else {
-      jacobian.col(element.parameter) = axis;
-    }
+    motions[element.parameter] = {.axis = frame.rotation.col(element.axis),
+                                  .point = frame.position_mm,
+                                  .turns = element.rotation,
+                                  .turns_base = element.rotation && i < base_end_,
+                                  .first_joint = joint,
+                                  .first_body = body,
+                                  .first_twist = joint};
+  });
+}
+
+Eigen::Matrix3Xd Kinematics::position_jacobian(const Eigen::VectorXd& q) const {
+  std::vector<Motion> motions;
+  const Eigen::Vector3d tool = motions_into(motions, q).position_mm;
+  Eigen::Matrix3Xd jacobian(3, motions.size());
+  for (std::size_t k = 0; k < motions.size(); ++k) {
+    jacobian.col(k) = (motions[k].turns ? radians : 1.0) * motions[k].of(tool);
   }
   return jacobian;
 }
 
-Eigen::Matrix3Xd Kinematics::rotation_jacobian(const Eigen::VectorXd& q, const Deformation* deformation) const {
-  Eigen::Matrix3Xd jacobian = Eigen::Matrix3Xd::Zero(3, elements_.size());
-  walk(q, deformation, [&](std::size_t i, const Pose& frame) {
-    const Element& element = elements_[i];
-    if (element.rotation) jacobian.col(element.parameter) = radians * frame.rotation.col(element.axis);
-  });
+Eigen::Matrix3Xd Kinematics::rotation_jacobian(const Eigen::VectorXd& q) const {
+  std::vector<Motion> motions;
+  motions_into(motions, q);
+  Eigen::Matrix3Xd jacobian(3, motions.size());
+  for (std::size_t k = 0; k < motions.size(); ++k) jacobian.col(k) = radians * motions[k].turn();
   return jacobian;
 }
 

@@ -7,6 +7,7 @@
 #include "effects/effect_entries.hpp"
 #include "llmt/robotics/kinematics.hpp"
 #include "llmt/robotics/robot_types.hpp"
+#include "robot/arm_change.hpp"
 #include "robot/chart.hpp"
 
 namespace llmt::robotics {
@@ -20,6 +21,7 @@ struct PreparedEffect {
   std::vector<double> constants;
   std::vector<double> scales;                   // of each value
   std::vector<const Eigen::VectorXd*> columns;  // of the poses
+  std::vector<std::size_t> inputs;              // of RobotEvaluator's that it depends on
 };
 
 /// Finds what an effect needs. Throws std::invalid_argument if a column is missing.
@@ -33,6 +35,8 @@ const Eigen::VectorXd* find_column(const Poses& poses, const std::string& names)
 class RobotEvaluator {
  public:
   RobotEvaluator(const Robot& robot, const Poses& poses);
+  RobotEvaluator(const RobotEvaluator&) = delete;  // points into itself
+  RobotEvaluator& operator=(const RobotEvaluator&) = delete;
 
   const Robot& robot() const { return robot_; }
   const Poses& poses() const { return poses_; }
@@ -57,30 +61,42 @@ class RobotEvaluator {
   void signatures(Eigen::Index row, std::vector<PreparedEffect>& candidates, Eigen::Ref<Eigen::Matrix3Xd> out);
 
  private:
-  // First-order displacement of the tool by small changes of the deformed arm: levers about which they turn it. Of an
-  // orientation only how they turn it.
-  struct Levers {
-    bool turns_only = false;
-    Eigen::Vector3d base;
-    std::vector<Eigen::Vector3d> joint;  // per unit of the joint value
-    std::vector<Eigen::Vector3d> link;
-  };
-
   const Robot& robot_;
   const Poses& poses_;
   Kinematics kinematics_;
   std::vector<PreparedEffect> effects_;
   const Eigen::VectorXd* payload_ = nullptr;
   bool bears_loads_ = false;
+  std::vector<Input> inputs_;                 // that some effect depends on
+  std::vector<Eigen::Index> own_components_;  // of the deformation, that some effect may change
 
   Eigen::VectorXd q_;
-  Skeleton rigid_;
-  Skeleton deformed_;
+  Skeleton arm_;        // where the loads act
+  Deformation before_;  // of it
+  Deformation deformation_;
   std::vector<Load> loads_;
   std::vector<double> columns_;
-  Deformation deformation_;
+
+  // For derivatives, see robot_derivatives.cpp. A deformation is a vector of components there.
   Deformation trial_;
-  Levers levers_;
+  Pose tool_;
+  Eigen::Vector3d arm_tool_mm_;           // without Deformation::world_mm
+  std::vector<Motion> motions_;           // of arm_, by the geometric parameters
+  std::vector<Motion> deformed_motions_;  // of the deformed arm
+  WeightsBeyond weights_;
+  std::vector<Eigen::Index> components_;         // that rows and columns stand for, own_components_ or all
+  std::vector<const double*> trial_components_;  // these of trial_
+  std::vector<Eigen::Index> place_;              // of each component among them, or -1
+  Eigen::MatrixXd by_value_;                     // components x values: of the deformation, by the values of effects
+  Eigen::MatrixXd by_input_;                     // components x 3 inputs: of the deformation
+  std::vector<std::size_t> live_;                // inputs that do something in this pose
+  Eigen::Matrix3Xd direct_;                      // 3 x components: of the reading, the rest of the deformation held
+  Eigen::Matrix3Xd levers_;                      // 3 x components: of the reading, in equilibrium
+  Eigen::Matrix3Xd input_levers_;                // 3 x 3 inputs: of the reading, in equilibrium
+  Eigen::MatrixXd responses_;                    // components x needed ones: of the deformation, by itself
+  Eigen::MatrixXd sides_;                        // components x 3: for differences
+  std::vector<Eigen::Matrix3d> held_back_;       // of the reading, by a turn of the arm from that twist on that leaves
+                                                 // the twists where they point in the world
 
   const Observation* observation(Eigen::Index row) const {
     return poses_.observations.empty() ? nullptr : &poses_.observations[row];
@@ -90,15 +106,29 @@ class RobotEvaluator {
   }
   void chart(Eigen::Index row, Eigen::Ref<Eigen::Matrix3Xd> derivatives) const;
   PoseContext context(Eigen::Index row);
-  void adjust(PoseContext& pose, Eigen::Index row, const PreparedEffect& effect);
+  void adjust(PoseContext& pose, Eigen::Index row, const PreparedEffect* extra = nullptr);
   void sum_loads(const PoseContext& pose);
   void apply(PoseContext& pose, Eigen::Index row, const PreparedEffect& effect, Deformation& sum);
-  void deform(PoseContext& pose, Eigen::Index row, const PreparedEffect* extra, Deformation& sum);
-  void set_levers(Eigen::Index row);
-  Eigen::Vector3d displacement(const Deformation& change) const;
-  Eigen::Vector3d moved_by(PoseContext& pose, Eigen::Index row, const PreparedEffect& effect);
-  void derivatives(PoseContext& pose, Eigen::Index row, PreparedEffect& effect, Eigen::Ref<Eigen::Matrix3Xd> out);
-  void whole_derivatives(Eigen::Index row, PreparedEffect& effect, bool is_candidate, Eigen::Ref<Eigen::Matrix3Xd> out);
+  PoseContext deform(Eigen::Index row);
+  PoseContext settle(Eigen::Index row);
+
+  void prepare_derivatives(PoseContext& pose, Eigen::Index row);
+  void choose_components(const std::vector<Eigen::Index>& chosen);
+  Motion component_motion(Eigen::Index component, bool of_deformed) const;
+  void set_direct_levers(Eigen::Index row);
+  void flat_deformation(PoseContext& pose, Eigen::Index row, const PreparedEffect& effect,
+                        Eigen::Ref<Eigen::VectorXd> out);
+  void add_input(PoseContext& pose, Eigen::Index row, const PreparedEffect& effect, std::size_t input);
+  void set_inputs(PoseContext& pose, Eigen::Index row);
+  void set_response(const PoseContext& pose, Eigen::Index component, Eigen::Ref<Eigen::VectorXd> response);
+  void set_levers(const PoseContext& pose);
+  Eigen::Vector3d reading_change(const PoseContext& pose, const ArmChange& change) const;
+  Eigen::Vector3d by_motion(const PoseContext& pose, Eigen::Index row, const Motion& motion,
+                            const Motion* of_loads) const;
+  void extend_levers(const PoseContext& pose, Eigen::Index row);
+  void by_values(PoseContext& pose, Eigen::Index row, PreparedEffect& effect, Eigen::Ref<Eigen::MatrixXd> out);
+  void by_adjustments(const PoseContext& pose, Eigen::Index row, PreparedEffect& effect, bool is_candidate,
+                      Eigen::Ref<Eigen::Matrix3Xd> out);
 };
 
 }  // namespace llmt::robotics

@@ -193,5 +193,23 @@ TEST(Calibration, MeasurementsThatDoNotSuitTheRobotAreRefused) {
   EXPECT_THROW(calibrate(six, seven), std::invalid_argument);
 }
 
+// The priors of 5 mm and 1 degree are wrong there: they must not keep the fit from the minimum.
+TEST(Calibration, ReachesTheNoiseFromDescriptionsThatAreFarOff) {
+  for (const Robot& nominal : {ur_like(), mdh_like(), seven_axes()}) {
+    for (const std::uint64_t seed : {1U, 2U, 3U}) {
+      const Robot truth = perturbed(nominal, 30.0, 8.0, seed);
+      const Measurements seen = measure(truth, random_poses(truth.chain, 60, seed), 0.05, seed + 1);
+      const Calibration calibration = calibrate(nominal, seen);
+      EXPECT_TRUE(calibration.result.converged());
+      EXPECT_TRUE(calibration.began_without_priors);
+      // 180 coordinates, 30 parameters: six standard deviations of the mean square; the priors take a little.
+      EXPECT_LT(calibration.noise_mm, 0.05 * (1.0 + 6.0 / std::sqrt(2.0 * 150.0)));
+    }
+  }
+  const Robot near = perturbed(ur_like(), 0.5, 0.1, 4);
+  const Measurements seen = measure(near, random_poses(near.chain, 60, 5), 0.05, 6);
+  EXPECT_FALSE(calibrate(ur_like(), seen).began_without_priors);
+}
+
 }  // namespace
 }  // namespace llmt::robotics

@@ -82,29 +82,92 @@ TEST(EffectDerivatives, SignaturesDoNotDependOnTheCompanyOrOnTheValuesGiven) {
   }
 }
 
-TEST(EffectDerivatives, JacobianIsThatOfPositionsAtValuesOtherThanZero) {
-  Robot robot = baseline(ur_like());
-  robot.effects.push_back({"eccentricity", "joint3", {0.02, -0.03}});
+// The largest error of a column of the Jacobian over the norm of the column. The oracle are central differences of
+// positions(), extrapolated (Richardson): their error is of fourth order in the step, and rounding.
+double largest_error(const Robot& robot, const Poses& poses) {
+  const Eigen::MatrixXd jacobian = position_jacobian(robot, poses);
+  const std::vector<discovery::Parameter> all = parameters(robot);
+  Eigen::VectorXd values(std::ssize(all));
+  for (std::size_t i = 0; i < all.size(); ++i) values(static_cast<Eigen::Index>(i)) = all[i].value;
+  // Coordinates of metres have 2e-13 mm, and some ten operations each of some ten coordinates are rounded.
+  constexpr double rounding_mm = 2e-11;
+  double largest = 0.0;
+  for (Eigen::Index k = 0; k < jacobian.cols(); ++k) {
+    const auto slope = [&](double step) -> Eigen::VectorXd {
+      Eigen::VectorXd above = values;
+      Eigen::VectorXd below = values;
+      above(k) += step;
+      below(k) -= step;
+      const Eigen::MatrixXd moved =
+          positions(with_values(robot, above), poses) - positions(with_values(robot, below), poses);
+      return moved.transpose().reshaped() / (2.0 * step);
+    };
+    // 0.05 mm, 0.005 deg, a twentieth of an effect's value.
+    const bool is_of_effect = k >= geometric_parameter_count(robot.chain) && values(k) != 0.0;
+    const double step = 0.05 * (is_of_effect ? std::abs(values(k)) : all[k].scale);
+    const Eigen::VectorXd expected = (4.0 * slope(0.5 * step) - slope(step)) / 3.0;
+    const double error = (jacobian.col(k) - expected).norm() - rounding_mm / step;
+    if (error > 0.0) largest = std::max(largest, error / expected.norm());
+  }
+  return largest;
+}
+
+// The effect at its typical size, or as much smaller as keeps the tool within 3 mm: these arms are heavy, and columns
+// such as time_s count thousands of seconds.
+Effect typical(const Robot& arm, Effect effect, const Poses& poses, Random& random) {
+  constexpr double most_mm = 3.0;
+  const std::vector<EffectParameter> own = effect_parameters(arm.chain, effect);
+  for (std::size_t k = 0; k < own.size(); ++k) effect.values[k] = own[k].scale * (random.uniform() < 0.5 ? -1.0 : 1.0);
+  const Eigen::MatrixXd moved = positions(with_effect(arm, effect), poses) - positions(arm, poses);
+  const double longest = moved.rowwise().norm().maxCoeff();
+  for (double& value : effect.values) value *= std::min(1.0, most_mm / longest);
+  return effect;
+}
+
+// An arm that bends, and one effect.
+Robot bending(const Robot& arm, const Effect& effect) {
+  Robot robot = arm;
+  for (const Effect& other : {Effect{"joint_compliance", "joint1", {1e-6}},
+                              {"joint_compliance", "joint2", {1e-6}},
+                              {"link_torsion", "joint2", {1e-7}}}) {
+    if (effect_label(effect) != effect_label(other)) robot.effects.push_back(other);
+  }
+  return with_effect(std::move(robot), effect);
+}
+
+TEST(EffectDerivatives, JacobianIsThatOfDifferencesWithEveryEffectAtItsTypicalSize) {
+  Random random(7);
+  for (const Robot& arm :
+       {weighted(ur_like()), weighted(slanted(mdh_like())), weighted(slanted(scara())), weighted(seven_axes())}) {
+    // At none of these poses does a torque change its sign within the steps.
+    const Poses poses = furnished_poses(arm.chain, 5, 5);
+    for (const Effect& any : all_effects(arm.chain)) {
+      const Effect effect = typical(arm, any, poses, random);
+      EXPECT_LT(largest_error(bending(arm, effect), poses), 1e-7) << effect_label(effect) << " and others";
+      EXPECT_LT(largest_error(with_effect(arm, effect), poses), 1e-7) << effect_label(effect) << " alone";
+    }
+  }
+}
+
+TEST(EffectDerivatives, JacobianIsThatOfDifferencesWithManyEffectsTogether) {
+  Robot robot = baseline(slanted(ur_like()));
+  robot.effects.push_back({"eccentricity", "joint3", {1e-3, -2e-3}});
   robot.effects.push_back({"payload_error", "", {1.0, 10.0, 20.0, -30.0}});
   robot.effects.push_back({"counterbalance_spring", "joint2", {1e-3, 5e-4}, {0.4, 0.3}});
   robot.effects.push_back({"gravity_tilt", "", {1e-3, -2e-3}});
   robot.effects.push_back({"axis_wobble", "joint1", {1e-4, 1e-4, -1e-4, 0.0}});
-  const Poses poses = furnished_poses(robot.chain, 6, 3);
-  const Eigen::MatrixXd jacobian = position_jacobian(robot, poses);
-  const std::vector<discovery::Parameter> all = parameters(robot);
-  Eigen::VectorXd values(std::ssize(all));
-  for (std::size_t k = 0; k < all.size(); ++k) values(k) = all[k].value;
-  for (Eigen::Index k = geometric_parameter_count(robot.chain); k < values.size(); ++k) {
-    const double step = 0.1 * all[k].scale;
-    const auto moved = [&](double change) -> Eigen::MatrixXd {
-      Eigen::VectorXd other = values;
-      other(k) += change;
-      return positions(with_values(robot, other), poses).transpose();
-    };
-    const Eigen::VectorXd expected = ((moved(step) - moved(-step)) / (2.0 * step)).reshaped();
-    // Effect columns are of first order at the deformed arm; the eccentricity turns a joint by 0.036 rad.
-    EXPECT_LT((jacobian.col(k) - expected).norm(), 0.04 * expected.norm() + 1e-6) << all[k].name;
+  robot.effects.push_back({"elastic_base", "", {1e-6}});
+  robot.effects.push_back(
+      {"formula", "joint4", {1e-6}, {}, {"load", {{"joint", "tau2 * cos(q4) + tau4", "", "", 1e-6}}}});
+  robot.effects.push_back({"instrument_azimuth", "", {1e-4, -1e-4}});
+  EXPECT_LT(largest_error(robot, furnished_poses(robot.chain, 6, 3)), 1e-7);
+  Poses turned = furnished_poses(robot.chain, 4, 4);
+  turned.observations.assign(4, {.reading = Reading::orientation, .reference = Eigen::Matrix3d::Identity()});
+  for (Eigen::Index i = 0; i < 4; ++i) {
+    const Pose tool = tool_poses(robot, select(turned, {i}))[0];
+    turned.observations[i].reference = Eigen::AngleAxisd(0.01, Eigen::Vector3d::UnitY()) * tool.rotation;
   }
+  EXPECT_LT(largest_error(robot, turned), 1e-7);
 }
 
 TEST(EffectDerivatives, OwnEffectsHaveSignaturesToo) {

@@ -131,10 +131,29 @@ TEST(Chain, DeformationOfALinkMovesEverythingBeyondIt) {
   const Skeleton bent = kinematics.skeleton(q, &deformation);
   EXPECT_EQ(bent.joint_origin[1], rigid.joint_origin[1]);
   EXPECT_LT((bent.joint_origin[2] - rigid.joint_origin[2] - deformation.link[1].translation_mm).norm(), 1e-12);
-  const Vector3d expected = deformation.link[1].translation_mm + deformation.world_mm +
+  const Vector3d expected = deformation.link[1].translation_mm +
                             deformation.link[1].rotation_rad.cross(rigid.tool.position_mm - rigid.link_end[1]) +
                             1e-6 * rigid.joint_axis[4].cross(rigid.tool.position_mm - rigid.joint_origin[4]);
   EXPECT_LT((bent.tool.position_mm - rigid.tool.position_mm - expected).norm(), 1e-5);
+  const Vector3d seen = kinematics.forward(q, &deformation).position_mm;
+  EXPECT_LT((seen - bent.tool.position_mm - deformation.world_mm).norm(), 1e-12);
+}
+
+// Gravity is given in the base frame as described: a pedestal that yields does not turn it. The deformation of a link
+// is that of its far end, beyond its body.
+TEST(Chain, DeformationMovesNeitherTheDirectionOfGravityNorTheBodyOfTheLink) {
+  for (Robot robot : {ur_like(), mdh_like()}) {
+    robot.chain.base.rpy_deg = {10.0, 20.0, 30.0};
+    const Kinematics kinematics(robot.chain);
+    const Eigen::VectorXd q = Eigen::VectorXd::Zero(6);
+    Deformation deformation(6);
+    deformation.base.rotation_rad = {1e-3, 0.0, 0.0};
+    EXPECT_EQ(kinematics.skeleton(q, &deformation).base_rotation, kinematics.skeleton(q).base_rotation);
+    Deformation bent(6);
+    bent.link[2].translation_mm = {0.0, 0.0, 1.0};
+    EXPECT_EQ(kinematics.skeleton(q, &bent).body_centre[2], kinematics.skeleton(q).body_centre[2]);
+    EXPECT_NE(kinematics.skeleton(q, &bent).body_centre[3], kinematics.skeleton(q).body_centre[3]);
+  }
 }
 
 TEST(Chain, ValuesGoInAndComeOutUnchanged) {

@@ -33,8 +33,11 @@ struct Calibration {
   discovery::SolverResult result;        ///< of the whole fit; its residual norms are in units of noise_mm
   double noise_mm = 0.0;  ///< standard deviation of one coordinate's residual, as used to weigh data against priors
   double orientation_noise_mrad = 0.0;  ///< the same of orientations about one axis; 0: none were fitted
-  std::vector<std::string> weak;        ///< free parameters that the prior determines more closely than the data
-  std::vector<FixedParameter> fixed;    ///< every parameter that was not free, in the order of parameters()
+  /// The description is so far off that the priors around it kept the fit from the minimum: it was begun again without
+  /// them.
+  bool began_without_priors = false;
+  std::vector<std::string> weak;      ///< free parameters that the prior determines more closely than the data
+  std::vector<FixedParameter> fixed;  ///< every parameter that was not free, in the order of parameters()
 };
 
 /// Fits bases and tools together by damped least squares; all other parameters keep their values. The fit starts from

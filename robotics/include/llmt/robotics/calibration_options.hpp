@@ -40,9 +40,6 @@ struct CalibrationOptions {
   double orientation_noise_mrad = 0.0;
   /// True: base and tool start at their values in the description instead of those of register_frames().
   bool start_as_given = false;
-  /// True: where the derivatives, which hold deformations constant, no longer help on an arm that bends, differences of
-  /// positions take the last steps. Slower, and the difference is far below the standard errors.
-  bool finish = true;
   discovery::SolverOptions solver = {};
 };
 

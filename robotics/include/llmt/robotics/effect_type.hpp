@@ -26,7 +26,7 @@ struct Load {
 struct PoseContext {
   const Chain& chain;
   const Eigen::VectorXd& q;      ///< joint values: rad, mm for prismatic joints
-  const Skeleton& skeleton;      ///< of the chain in equilibrium, where the loads act; of the rigid one in derivatives
+  const Skeleton& skeleton;      ///< of the chain in equilibrium, where the loads act
   Eigen::Vector3d gravity_m_s2;  ///< in the world frame
   double payload_kg = 0.0;       ///< column payload_kg if measured, else the chain's payload
   Eigen::Vector3d payload_centre_mm = Eigen::Vector3d::Zero();  ///< in the world frame
@@ -71,6 +71,13 @@ struct Formula {
   std::vector<FormulaTerm> terms;
 };
 
+/// What of an arm in a pose `apply` depends on, besides joint values and columns: what derivatives have to follow.
+enum class Senses {
+  nothing,
+  torques,  ///< gravity's torque about its joint (force along it), or about the joints that a formula names
+  arm       ///< points, axes, loads, gravity
+};
+
 /// What an effect is attached to.
 enum class EffectPlace { joint, link, robot };
 
@@ -93,9 +100,10 @@ struct EffectType {
       apply = {};
   /// Changes what the effects are evaluated with (payload, gravity) before loads are summed and anything is applied.
   std::function<void(PoseContext&, std::span<const double> values)> adjust = {};
+  Senses senses = Senses::nothing;
   bool weighted = false;      ///< values are inversely proportional to the masses and share their relative uncertainty
   bool elastic = false;       ///< deforms under the arm's weight: the loads are those of the deformed arm
-  bool linear = true;         ///< `apply` is linear in the values; if not, derivatives are taken by differences
+  bool linear = true;         ///< `apply` is linear in the values
   bool prismatic = true;      ///< may sit at a prismatic joint
   bool of_measuring = false;  ///< an error of the instrument or its session, not of the arm
   bool searched = true;       ///< discovery looks for it; false for reductions that are kept for comparison

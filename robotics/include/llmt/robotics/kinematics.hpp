@@ -37,7 +37,7 @@ struct Deformation {
 };
 
 /// Points and axes of an arm in one pose, in the world frame, mm. Link i runs from the axis of joint i to that of joint
-/// i + 1, the last one to the tool point.
+/// i + 1, the last one to the tool point. Deformation::world_mm is not in it.
 struct Skeleton {
   std::vector<Eigen::Vector3d> joint_origin;   ///< a point on each axis: where link i begins
   std::vector<Eigen::Vector3d> joint_axis;     ///< unit vectors, times the joint's sign
@@ -46,8 +46,24 @@ struct Skeleton {
   std::vector<Eigen::Vector3d> body_centre;    ///< centre of mass of each link
   std::vector<Eigen::Matrix3d> body_rotation;  ///< of each joint's moving frame, in which com_mm is given
   Eigen::Vector3d payload_centre;
-  Eigen::Matrix3d base_rotation;
+  Eigen::Matrix3d base_rotation;  ///< as described: Deformation::base does not turn it, and with it gravity
   Pose tool;
+};
+
+/// How a change of one value moves an arm: everything beyond some place turns about an axis or moves along it.
+struct Motion {
+  Eigen::Vector3d axis = Eigen::Vector3d::Zero();   ///< in the world frame, per rad or mm
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();  ///< on the axis, mm
+  bool turns = false;                               ///< else it moves along the axis
+  bool turns_base = false;                          ///< Skeleton::base_rotation moves, too
+  std::size_t first_joint = 0;                      ///< origins, axes and frames of the joints from this one on move
+  std::size_t first_body = 0;                       ///< centres of mass of the links from this one on move
+  std::size_t first_twist = 0;  ///< of Deformation, base = 0, link i = i + 1: from this one on they lie beyond
+
+  /// mm per rad or mm, of a point that moves.
+  Eigen::Vector3d of(const Eigen::Vector3d& moving) const;
+  /// rad per rad or mm.
+  Eigen::Vector3d turn() const;
 };
 
 /// The chain with its own base and tool compiled into elementary transforms. Joint values q are in rad, mm for
@@ -72,12 +88,17 @@ class Kinematics {
   /// The same, written into an existing object without allocating memory.
   void skeleton_into(Skeleton& skeleton, const Eigen::VectorXd& q, const Deformation* deformation = nullptr) const;
 
+  /// Of each geometric parameter in the order of geometric_parameters(), without those of further bases and tools; per
+  /// rad or mm. Written into an existing object without allocating memory. Returns the tool pose, as forward().
+  Pose motions_into(std::vector<Motion>& motions, const Eigen::VectorXd& q,
+                    const Deformation* deformation = nullptr) const;
+
   /// 3 x P derivatives of the tool position by the geometric parameters in the order of geometric_parameters(), without
-  /// those of further bases and tools: mm per mm, mm per deg. A deformation is held constant in the frame it acts in.
-  Eigen::Matrix3Xd position_jacobian(const Eigen::VectorXd& q, const Deformation* deformation = nullptr) const;
+  /// those of further bases and tools: mm per mm, mm per deg.
+  Eigen::Matrix3Xd position_jacobian(const Eigen::VectorXd& q) const;
 
   /// 3 x P derivatives of the tool's orientation, as rotation vectors in the world frame: rad per mm (0), rad per deg.
-  Eigen::Matrix3Xd rotation_jacobian(const Eigen::VectorXd& q, const Deformation* deformation = nullptr) const;
+  Eigen::Matrix3Xd rotation_jacobian(const Eigen::VectorXd& q) const;
 
   /// 6 x J derivatives by the joint values: position in mm (upper rows), rotation vector in rad (lower rows), per rad
   /// or mm.
@@ -104,8 +125,8 @@ class Kinematics {
   void add(int axis, bool rotation, Eigen::Index parameter);
   void add_frame(Eigen::Index first_parameter);
   void add_joint(const Chain& chain, std::size_t index);
-  template <typename Visit>
-  Pose walk(const Eigen::VectorXd& q, const Deformation* deformation, Visit visit) const;
+  template <typename Reach, typename Visit>
+  Pose walk(const Eigen::VectorXd& q, const Deformation* deformation, Reach reach, Visit visit) const;
 };
 
 /// Tool pose of a chain. For many poses construct a Kinematics once instead.

@@ -64,9 +64,9 @@ std::string position_refusal(const Robot& robot, const Poses& poses);
 Eigen::MatrixXd joint_motions(const Robot& robot, const Poses& poses);
 
 /// Derivatives of positions() by parameters(), 3n x P: rows x, y, z of pose 0, then of pose 1, ...
-/// Geometry columns are exact for a rigid robot; with effects they hold the deformation constant (a relative error of
-/// the size deflection / length). Effect columns are central differences of the effect through the exact joint and link
-/// derivatives.
+/// They are those of the arm in equilibrium: a change of geometry, payload or gravity changes loads, deflections, and
+/// the loads again. The relative error is of the size (deflection / length)^3, what the passes to equilibrium leave.
+/// Where an effect jumps, as a backlash does, the derivative is that beside the jump.
 Eigen::MatrixXd position_jacobian(const Robot& robot, const Poses& poses);
 
 /// Load of each joint by the weight of arm and payload in the rigid pose, n x J: the torque z_j . moment in N m, or the
@@ -74,8 +74,8 @@ Eigen::MatrixXd position_jacobian(const Robot& robot, const Poses& poses);
 Eigen::MatrixXd gravity_loads(const Robot& robot, const Poses& poses);
 
 /// First-order changes of positions() by candidates that are not in the robot: 3n x (sum of their numbers of
-/// values), derivatives by each candidate's values at 0 (whatever its values are), rows as in position_jacobian(). The
-/// robot's own effects act on top of the rigid chain, and feel a candidate that changes payload or gravity. Throws
+/// values), derivatives by each candidate's values at 0 (whatever its values are), rows as in position_jacobian() and
+/// as exact. The robot's own effects answer what a candidate changes of loads, payload and gravity. Throws
 /// std::invalid_argument as positions() and effect_index().
 Eigen::MatrixXd effect_signatures(const Robot& baseline, const std::vector<Effect>& candidates, const Poses& poses);
 
