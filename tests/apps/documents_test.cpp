@@ -119,7 +119,8 @@ TEST(Commands, EveryOptionIsDocumentedWithItsDefault) {
   for (const std::string command :
        {"llmt fit", "llmt predict", "llmt inspect", "llmt explain", "llmt compare", "llmt discover", "llmt export",
         "llmt-robot calibrate", "llmt-robot discover", "llmt-robot simulate", "llmt-robot poses", "llmt-robot check",
-        "llmt-robot demo", "llmt-robot predict", "llmt-robot compensate", "llmt-robot export", "llmt-robot paper"}) {
+        "llmt-robot demo", "llmt-robot predict", "llmt-robot compensate", "llmt-robot export", "llmt-robot mechanism",
+        "llmt-robot paper"}) {
     std::string part = commands_part(command);
     if (command == "llmt compare") part += commands_part("llmt fit");  // whose options it takes
     for (const auto& [name, value] : options_of(folder.run(runnable(command + " --help-all")).out)) {

@@ -1,0 +1,92 @@
+// Mechanisms from the command line.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "apps/programs.hpp"
+#include "llmt/files.hpp"
+
+namespace {
+
+using program::Folder;
+using program::Outcome;
+using program::robot_program;
+
+const std::string five_bar = std::string(LLMT_ROOT) + "/docs/samples/five_bar.yaml";
+
+Outcome mechanism(const Folder& folder, const std::string& arguments) {
+  return folder.run(fmt::format("{} mechanism {}", robot_program, arguments));
+}
+
+// A five-bar with one crank 0.7 mm short, and readings of it.
+void measure(const Folder& folder, const std::string& coordinates) {
+  std::string text = llmt::read_file(five_bar);
+  const std::string nominal = "crank1, value_mm: 200";
+  text.replace(text.find(nominal), nominal.size(), "crank1, value_mm: 199.3");
+  folder.write("real.yaml", text);
+  const Outcome run =
+      mechanism(folder, "real.yaml --simulate 40 --noise x=0.01,y=0.01 -o seen.csv --measure " + coordinates);
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+}
+
+TEST(MechanismProgram, FindsAShortCrankAndWritesIt) {
+  const Folder folder;
+  measure(folder, "q1,q2,x,y");
+  const Outcome run = mechanism(folder, five_bar + " seen.csv --json -o found.yaml --errors errors.csv");
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const nlohmann::json found = nlohmann::json::parse(run.out);
+  EXPECT_EQ(found["parameters"][1]["name"], "crank1");
+  EXPECT_NEAR(found["parameters"][1]["identified"].get<double>(), 199.3, 0.04);
+  EXPECT_LT(found["errors"][0]["held_out_rms"].get<double>(), 0.02);
+  EXPECT_GT(found["errors"][0]["described_rms"].get<double>(), 0.1);
+  EXPECT_EQ(found["not_shown"], (std::vector<std::string>{"offset_p1", "offset_p2"}));
+  EXPECT_NE(llmt::read_file(folder.file("found.yaml")).find("standard_error_mm"), std::string::npos);
+  EXPECT_TRUE(
+      llmt::read_file(folder.file("errors.csv")).starts_with("q1_deg,q2_deg,x_mm,y_mm,x_error_mm,y_error_mm\n"));
+  const Outcome text = mechanism(folder, "found.yaml seen.csv");
+  EXPECT_NE(text.out.find("NO GAIN"), std::string::npos) << text.out;
+}
+
+TEST(MechanismProgram, SolvesForWhatTheTableDoesNotHave) {
+  const Folder folder;
+  folder.write("poses.csv", "q1_deg,q2_deg\n120,60\n179,1\n");
+  const Outcome run = mechanism(folder, five_bar + " poses.csv --solve --measure x,y");
+  EXPECT_EQ(run.exit_code, 1);
+  EXPECT_TRUE(run.out.starts_with("x_mm,y_mm\n150.0") || run.out.starts_with("x_mm,y_mm\n149.9")) << run.out;
+  EXPECT_NE(run.err.find("poses.csv:3: "), std::string::npos) << run.err;
+}
+
+TEST(MechanismProgram, TooFewPosesAreSaidFirstAndNothingIsWritten) {
+  const Folder folder;
+  measure(folder, "q1,q2,x,y");
+  folder.run("head -4 seen.csv > few.csv");
+  const Outcome run = mechanism(folder, five_bar + " few.csv -o found.yaml");
+  EXPECT_EQ(run.exit_code, 1);
+  EXPECT_NE(run.out.find("TOO FEW READINGS"), std::string::npos) << run.out;
+  EXPECT_FALSE(std::filesystem::exists(folder.file("found.yaml")));
+}
+
+TEST(MechanismProgram, MistakesAreRefusedWithTheirPlace) {
+  const Folder folder;
+  const auto says = [&](const std::string& text, const std::string& words) {
+    folder.write("t.csv", text);
+    const Outcome run = mechanism(folder, five_bar + " t.csv");
+    EXPECT_EQ(run.exit_code, 1) << words;
+    EXPECT_NE(run.err.find(words), std::string::npos) << run.err;
+  };
+  says("", "empty");
+  says("q1_deg\n", "there is no pose");
+  says("a,b\n1,2\n", "no column is a coordinate");
+  says("q1,q2_deg\n1,2\n", "column \"q1\" has no unit, name it q1_deg or q1_rad");
+  says("q1_mm,q2_deg\n1,2\n", "column \"q1_mm\" has a wrong unit");
+  says("q1_deg,q1_rad\n1,2\n", "are one coordinate");
+  says("q1_deg,q2_deg\n1,x\n", "t.csv:2: column \"q2_deg\"");
+  says("q1_deg,q2_deg\n120,60\n", "no reading checks another one");
+  folder.write("t.csv", "q1_deg,q2_deg\n120,60\n");
+  EXPECT_EQ(mechanism(folder, "t.csv " + five_bar).exit_code, 2);
+  EXPECT_EQ(mechanism(folder, five_bar).exit_code, 2);
+  EXPECT_EQ(mechanism(folder, five_bar + " --simulate 5 --noise z=1").exit_code, 2);
+}
+
+}  // namespace
