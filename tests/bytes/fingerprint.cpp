@@ -1,7 +1,9 @@
 // Prints what the bytes of results depend on besides compiler and libraries: the C library, whose exp, sin and pow
-// differ in the last bit between versions, and whether the processor has the fused multiply-add that they then use.
+// differ in the last bit between versions, whether the processor has the fused multiply-add that they then use, and its
+// caches, by whose sizes Eigen cuts products of large matrices into sums.
 #include <gnu/libc-version.h>
 
+#include <Eigen/Core>
 #include <cstdio>
 
 int main() {
@@ -10,5 +12,6 @@ int main() {
 #else
   const bool fused = true;
 #endif
-  std::printf("glibc %s %s fma", gnu_get_libc_version(), fused ? "with" : "without");
+  std::printf("glibc %s %s fma, caches of %td, %td and %td KiB", gnu_get_libc_version(), fused ? "with" : "without",
+              Eigen::l1CacheSize() / 1024, Eigen::l2CacheSize() / 1024, Eigen::l3CacheSize() / 1024);
 }
