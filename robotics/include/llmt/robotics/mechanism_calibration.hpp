@@ -1,7 +1,9 @@
 /// \file
 /// Calibration of mechanisms, with an instrument that measures the output or by redundant sensors alone.
 ///
-///     const MechanismCalibration found = calibrate(mechanism, measured);
+///     const Mechanism mechanism = read_mechanism("five_bar.yaml");
+///     const MechanismTable measured = read_mechanism_table("measured.csv", mechanism);
+///     const MechanismCalibration found = calibrate(mechanism, measured.values);
 ///     const double number = found.result.calibrability;  // cond2(J'J)
 #pragma once
 
