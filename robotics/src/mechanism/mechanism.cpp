@@ -195,7 +195,17 @@ Assembly assemble(const Mechanism& mechanism, const Eigen::MatrixXd& known) {
     } else {
       const Eigen::VectorXd& from = nearest(solved, target, equations.typical());
       SolvedPose pose = follow(equations, parameters, from, target, sigma);
-      if (!pose.ok() && solved.size() > 1) pose = follow(equations, parameters, home.coordinates, target, sigma);
+      const bool is_checked = std::ssize(kinds.unknown) < equations.count();
+      // A branch that contradicts the readings more than another one is the wrong branch.
+      const auto take_better = [&](SolvedPose other) {
+        if (!other.ok()) return;
+        if (!pose.ok() || (is_checked && other.residual.norm() < pose.residual.norm())) pose = std::move(other);
+      };
+      if (!pose.ok() || is_checked) take_better(follow(equations, parameters, home.coordinates, target, sigma));
+      if (is_checked) {
+        take_better(solve_pose(equations, parameters, target, sigma, from));
+        take_better(solve_pose(equations, parameters, target, sigma, home.coordinates));
+      }
       failure = pose.failure;
       if (pose.ok()) {
         assembly.coordinates.row(row) = pose.coordinates.transpose();

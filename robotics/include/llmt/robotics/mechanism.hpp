@@ -84,7 +84,8 @@ struct Assembly {
 ///
 /// A loop has several configurations. The branch is that of the start values: every pose is reached from a solved one
 /// (the first from the start) along the straight line between what is known, in steps small enough that the rest
-/// follows its tangent. A pose behind a singular configuration fails.
+/// follows its tangent. A pose behind a singular configuration fails. Where readings check each other, the branch that
+/// contradicts them least is taken.
 ///
 /// `known`: poses x coordinates, NaN where unknown. Throws std::invalid_argument for a wrong shape, infinite values, as
 /// validate(), and if the start values are near no configuration.
