@@ -1,6 +1,7 @@
-# What every target of this project shares. Nothing here reaches a consumer: all of it is PRIVATE.
+# What every target of this project shares.
 
-# llmt_target_defaults(TARGET): C++20, warnings, and arithmetic that does not depend on the machine.
+# llmt_target_defaults(TARGET): C++20, warnings, and arithmetic that does not depend on the machine. Nothing here reaches a
+# consumer: all of it is PRIVATE.
 function(llmt_target_defaults target)
   set_target_properties(${target} PROPERTIES CXX_STANDARD 20 CXX_STANDARD_REQUIRED ON CXX_EXTENSIONS OFF)
   target_compile_options(
@@ -11,17 +12,22 @@ function(llmt_target_defaults target)
       $<$<CXX_COMPILER_ID:GNU,Clang,AppleClang>:-ffp-contract=off>
       $<BUILD_INTERFACE:$<$<CXX_COMPILER_ID:GNU,Clang,AppleClang>:-Wall;-Wextra;-Wpedantic;-Wshadow;-Wconversion;-Wno-sign-conversion>>
   )
+  # Without it Eigen asks the processor for the sizes of its caches and cuts products of matrices by them: the sums of a
+  # product would round differently with a first cache of 48 KiB than with one of 32.
+  target_compile_definitions(${target} PRIVATE EIGEN_NO_CPUID)
 endfunction()
 
 # Eigen's templates are instantiated again in every source; the sources of a room compiled as one take less than half of the time.
 option(LLMT_UNITY_BUILD "Compile the sources of a room of a library as one, for builds from scratch" OFF)
 
 # llmt_library(TARGET NAME): the alias llmt::NAME, and what an exported library needs. The caller adds sources, the header
-# file set and dependencies.
+# file set and dependencies. A consumer compiles with EIGEN_NO_CPUID as well: of two versions of one of Eigen's functions
+# the linker keeps either.
 function(llmt_library target name)
   add_library(llmt::${name} ALIAS ${target})
   llmt_target_defaults(${target})
   target_compile_features(${target} PUBLIC cxx_std_20)
+  target_compile_definitions(${target} INTERFACE EIGEN_NO_CPUID)
   set_target_properties(
     ${target}
     PROPERTIES EXPORT_NAME ${name}

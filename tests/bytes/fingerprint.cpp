@@ -1,9 +1,7 @@
 // Prints what the bytes of results depend on besides compiler and libraries: the C library, whose exp, sin and pow
-// differ in the last bit between versions, whether the processor has the fused multiply-add that they then use, and its
-// caches, by whose sizes Eigen cuts products of large matrices into sums.
+// differ in the last bit between versions, and whether the processor has the fused multiply-add that they then use.
 #include <gnu/libc-version.h>
 
-#include <Eigen/Core>
 #include <cstdio>
 
 int main() {
@@ -12,6 +10,5 @@ int main() {
 #else
   const bool fused = true;
 #endif
-  std::printf("glibc %s %s fma, caches of %td, %td and %td KiB", gnu_get_libc_version(), fused ? "with" : "without",
-              Eigen::l1CacheSize() / 1024, Eigen::l2CacheSize() / 1024, Eigen::l3CacheSize() / 1024);
+  std::printf("glibc %s %s fma", gnu_get_libc_version(), fused ? "with" : "without");
 }
