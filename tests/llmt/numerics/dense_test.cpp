@@ -95,4 +95,7 @@ TEST(Dense, MatrixThatIsNotPositiveDefiniteIsRefused) {
   EXPECT_FALSE(llmt::factor_cholesky(indefinite));
 }
 
+// Eigen cuts its products, and so rounds their sums, by the size of the first cache: not by that of this machine.
+TEST(Dense, EigenCutsProductsAlikeOnEveryMachine) { EXPECT_EQ(Eigen::l1CacheSize(), 32 * 1024); }
+
 }  // namespace
