@@ -60,7 +60,7 @@ struct Observation {
   std::string base = {};  ///< name among Chain::bases, or empty: Chain::base
   std::string tool = {};  ///< name among Chain::tools, or empty: Chain::tool
   Reading reading = Reading::position;
-  double lever_mm = 1000.0;                                 ///< of an orientation: so many mm are one rad
+  double lever_mm = 1000.0;                                 ///< of an orientation: this length stands for one rad
   Eigen::Matrix3d reference = Eigen::Matrix3d::Identity();  ///< of an orientation
   Eigen::Index stand = 0;  ///< rows with equal numbers were read while the arm stood still once
 };
