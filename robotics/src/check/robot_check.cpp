@@ -80,7 +80,7 @@ void set_limit(const Robot& robot, const Measurements& measurements, const Check
 // Columns of the Jacobian that take part: all but joint maps and what the convention leaves out.
 std::vector<Eigen::Index> columns_of(const Robot& robot) {
   const std::vector<std::string> reasons = reasons_to_fix(robot, {});
-  const std::set<std::string> unseen = unseen_by_sockets_and_planes(robot);
+  const std::set<std::string> unseen = unseen_by_touch(robot);
   const std::vector<discovery::Parameter> all = parameters(robot);
   std::vector<Eigen::Index> columns;
   Eigen::Index next = 0;

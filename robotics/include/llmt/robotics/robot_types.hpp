@@ -52,7 +52,9 @@ struct Robot {
 enum class Reading {
   position,     ///< x, y, z of the tool point in the world frame, mm
   orientation,  ///< lever times the rotation vector from `reference` to the tool's orientation, in the world frame, mm
-  distance,     ///< distance of the tool point from the origin of the world frame, mm; then two zeros
+  /// Distance of the tool point from the origin of the world frame, mm, less NamedFrame::radius_mm if the base is a
+  /// sphere of unknown radius; then two zeros.
+  distance,
 };
 
 /// What one row of poses is a reading of.
