@@ -250,13 +250,7 @@ RobotCheck decided_by_covered(const CorrectedRobot& robot, const Measurements& m
       decided.moved_beyond.push_back(moved);
     }
   }
-  decided.error = result.error;
-  decided.errors_mm = result.errors_mm;
-  decided.still_good = result.still_good;
-  decided.limit_mm = result.limit_mm;
-  decided.beyond = result.beyond;
-  decided.uncovered = result.uncovered;
-  decided.too_few_covered = result.too_few_covered;
+  static_cast<CheckedError&>(decided) = result;
   return decided;
 }
 
