@@ -77,6 +77,7 @@ void calibrate_command(CalibrateArguments arguments) {
   refuse_lost_correction(described, arguments.robot, arguments.output);
   robotics::Measurements measurements =
       robotics::without_small_sessions(read_measured(arguments.data, described, {}, arguments.reading));
+  if (measurements.count() == 0) throw std::runtime_error(arguments.data + ": " + measurements.warnings.back());
   const robotics::Robot nominal = robotics::with_frames(described, measurements);
   std::vector<Eigen::Index> outlier_lines;
   if (arguments.robust) {

@@ -160,11 +160,13 @@ std::string kept_length(const CalibrationReport& report) {
 
 // "only x and y were measured", or nothing.
 std::string missing_axes(const robotics::Measurements& measurements) {
-  if (kind_of(measurements) == "distance") return "";
   const std::vector<robotics::Observation>& observations = measurements.poses.observations;
-  if (!observations.empty() && robotics::is_plane(observations.front().base)) {
-    return "Note: all errors are distances from the planes\n";
+  const std::string base = observations.empty() ? "" : observations.front().base;
+  if (robotics::is_plane(base)) return "Note: all errors are distances from the planes\n";
+  if (robotics::is_sphere(base) || robotics::is_known_sphere(base)) {
+    return "Note: all errors are distances from the surfaces of the spheres\n";
   }
+  if (kind_of(measurements) == "distance") return "";
   std::vector<std::string> seen;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     if (measurements.measured[axis]) seen.emplace_back(1, "xyz"[axis]);
@@ -178,10 +180,16 @@ std::string head(const CalibrationFacts& facts) {
   const robotics::Measurements& measurements = facts.measurements;
   std::string text = fmt::format("{}: {} of {}\n", facts.data_file, counts_of(measurements), facts.nominal.chain.name);
   text += verdict(facts) + missing_axes(measurements);
+  const std::vector<robotics::Observation>& seen = measurements.poses.observations;
+  if (std::ranges::any_of(seen, robotics::is_known_sphere, &robotics::Observation::base)) {
+    text +=
+        "Note: the radii in the file give the scale: 0.1 % of error there is 0.1 % of every position. The errors are "
+        "scatter at spheres, not errors of positions elsewhere\n";
+  }
   if (const std::string kept = kept_length(facts.report); !kept.empty()) {
     text += fmt::format(
         "Note: no reading shows the scale. All lengths are relative to {}, kept as described: 0.1 % of error there is "
-        "0.1 % of every position. The errors are scatter at sockets and planes, not errors of positions elsewhere\n",
+        "0.1 % of every position. The errors are scatter at what was touched, not errors of positions elsewhere\n",
         kept);
   }
   for (const std::string& warning : measurements.warnings) text += "Note: " + warning + "\n";

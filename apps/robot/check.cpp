@@ -229,9 +229,11 @@ void check_command(const CheckArguments& arguments) {
                     "discover wrote beside it",
                     arguments.robot));
   }
-  robotics::CorrectedRobot robot = read_unless_exchanged(
-      arguments.robot, arguments.data, "the calibrated description (YAML) comes first, then the measurements (CSV)",
-      [](const std::string& path) { return robotics::read_corrected_robot(path); });
+  constexpr const char* order = "the calibrated description (YAML) comes first, then the measurements (CSV)";
+  if (robotics::is_urdf(arguments.data)) refuse_exchanged(arguments.robot, arguments.data, order);
+  robotics::CorrectedRobot robot =
+      read_unless_exchanged(arguments.robot, arguments.data, order,
+                            [](const std::string& path) { return robotics::read_corrected_robot(path); });
   if (!arguments.same_session) robot.robot = for_any_session(robot.robot);
   const robotics::Measurements measurements =
       read_measured(arguments.data, robot.robot, {}, {.columns = arguments.columns, .mark = arguments.mark});

@@ -46,15 +46,11 @@ Eigen::Isometry3d joint_frame(const robotics::Chain& chain, const robotics::Skel
 }
 
 std::string origin_text(const std::string& name, const Eigen::Isometry3d& pose) {
-  const Eigen::Matrix3d r = pose.linear();
-  const double pitch = std::atan2(-r(2, 0), std::hypot(r(0, 0), r(1, 0)));
-  const bool upright = std::abs(std::cos(pitch)) < 1e-12;
-  const double roll = upright ? std::atan2(-r(1, 2), r(1, 1)) : std::atan2(r(2, 1), r(2, 2));
-  const double yaw = upright ? 0.0 : std::atan2(r(1, 0), r(0, 0));
+  const Eigen::Vector3d rpy = robotics::roll_pitch_yaw(pose.linear());
   const Eigen::Vector3d xyz = 0.001 * pose.translation();
   const auto shown = [](double value) { return without_rounding(value, 1e-12); };  // m and rad
   return fmt::format("  {}: {{x: {}, y: {}, z: {}, roll: {}, pitch: {}, yaw: {}}}\n", name, shown(xyz(0)),
-                     shown(xyz(1)), shown(xyz(2)), shown(roll), shown(pitch), shown(yaw));
+                     shown(xyz(1)), shown(xyz(2)), shown(rpy(0)), shown(rpy(1)), shown(rpy(2)));
 }
 
 std::string kinematics_yaml(const robotics::Chain& described) {

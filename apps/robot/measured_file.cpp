@@ -43,6 +43,7 @@ std::string counts_of(const robotics::Measurements& measurements) {
   std::set<std::string> bases;
   std::set<std::string> sockets;
   std::set<std::string> planes;
+  std::set<std::string> spheres;
   bool distances = false;
   for (const robotics::Observation& seen : poses.observations) {
     stands.insert(seen.stand);
@@ -54,10 +55,12 @@ std::string counts_of(const robotics::Measurements& measurements) {
       sockets.insert(seen.base);
     } else if (robotics::is_plane(seen.base)) {
       planes.insert(seen.base);
+    } else if (robotics::is_touched(seen.base)) {
+      spheres.insert(seen.base);
     } else {
       bases.insert(seen.base);
+      distances = distances || seen.reading == robotics::Reading::distance;
     }
-    distances = distances || seen.reading == robotics::Reading::distance;
   }
   std::string text = fmt::format("{} poses", stands.size());
   const auto points = std::ssize(robotics::position_rows(poses));
@@ -73,6 +76,7 @@ std::string counts_of(const robotics::Measurements& measurements) {
   };
   add(sockets.size(), "socket");
   add(planes.size(), "plane");
+  add(spheres.size(), "sphere");
   const auto turns = std::ssize(robotics::orientation_rows(poses));
   if (turns > 0) text += fmt::format(", {} orientations", turns);
   return text;

@@ -34,7 +34,7 @@ class Progress {
 /// "8 s", "3 min", "2 h".
 std::string duration_text(double seconds);
 
-/// The line itself. `done` of `total` after so many seconds; without a total only the time.
+/// The line itself. `done` of `total` after `seconds`; without a total only the time.
 std::string progress_line(const std::string& what, Eigen::Index done, Eigen::Index total, double seconds);
 
 }  // namespace llmt::apps

@@ -2,9 +2,11 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <chrono>
 #include <nlohmann/json.hpp>
+#include <regex>
 
 #include "apps/programs.hpp"
 
@@ -198,6 +200,26 @@ TEST(ExportProgram, RoundingIsZeroAndUncertainValuesAreNamed) {
   const Outcome file = folder.run(robot_program + " export arm.yaml --kinematics out.yaml");
   EXPECT_EQ(file.exit_code, 2);
   EXPECT_NE(file.err.find("; --kinematics takes no file: -o out.yaml writes to it"), std::string::npos) << file.err;
+}
+
+// The tool of a real arm may look sideways but for a thousandth of a second of arc.
+TEST(ExportProgram, AToolNextToAQuarterTurnOfPitchKeepsItsDigits) {
+  const Folder folder;
+  const std::string arm = llmt::read_file(sample_arm);
+  folder.write("arm.yaml", std::regex_replace(arm, std::regex("\\ntool:[^\\n]*"),
+                                              "\ntool: {xyz_mm: [0, 0, 90], rpy_deg: [35, 89.9999999, -70]}"));
+  const std::string text = folder.run(robot_program + " export arm.yaml --kinematics").out;
+  std::smatch found;
+  ASSERT_TRUE(std::regex_search(text, found, std::regex("tool: .*roll: (.*), pitch: (.*), yaw: (.*)\\}"))) << text;
+  const auto rotation = [](double roll, double pitch, double yaw) {
+    return (Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()) * Eigen::AngleAxisd(pitch, Eigen::Vector3d::UnitY()) *
+            Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitX()))
+        .toRotationMatrix();
+  };
+  constexpr double degree = 0.017453292519943295;
+  const Eigen::Matrix3d written = rotation(std::stod(found[1]), std::stod(found[2]), std::stod(found[3]));
+  const Eigen::Matrix3d meant = rotation(35.0 * degree, 89.9999999 * degree, -70.0 * degree);
+  EXPECT_LT((written - meant).cwiseAbs().maxCoeff(), 1e-14);
 }
 
 TEST(CompensateProgram, TakesTenThousandTargets) {

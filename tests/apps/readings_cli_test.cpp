@@ -145,4 +145,15 @@ TEST(Readings, SessionsOfATestFileAreFoundByTheirNames) {
   EXPECT_EQ(folder.run(fit + "--test wed.csv --new-session").exit_code, 0);
 }
 
+TEST(Readings, TouchesThatTellNothingAreNamed) {
+  const Folder folder;
+  folder.write("few.csv", "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,sphere\n1,2,3,4,5,6,a\n2,3,4,5,6,7,b\n");
+  const Outcome few = folder.run(fmt::format("{} calibrate {} few.csv", robot_program, sample_arm));
+  EXPECT_EQ(few.exit_code, 1);
+  EXPECT_EQ(
+      few.err,
+      "llmt-robot: few.csv: 2 of 2 sessions, sockets, planes and spheres left out, too few points in each to find "
+      "where it is: sphere a, sphere b (lines 2, 3)\n");
+}
+
 }  // namespace

@@ -71,6 +71,11 @@ TEST(RobotWords, DescriptionAndMeasurementsThatWereExchangedAreNamed) {
               "llmt-robot: d.csv and r.yaml seem to be exchanged: the description (YAML or URDF) comes first, "
               "then the measurements (CSV)\n");
   }
+  const Outcome check = folder.run(robot_program + " check r.yaml r.urdf");
+  EXPECT_EQ(check.exit_code, 2);
+  EXPECT_EQ(check.err,
+            "llmt-robot: r.yaml and r.urdf seem to be exchanged: the calibrated description (YAML) comes first, then "
+            "the measurements (CSV)\n");
 }
 
 TEST(RobotWords, UnitsThatWouldFitAreNamed) {

@@ -19,8 +19,8 @@ int main(int argc, char** argv) {
   app.add_option("--plan", plan_name, "dev, frozen (other seeds) or gate (short)")->capture_default_str();
   app.add_option("--arm", arm, "planar, tx200 or small6; all if absent");
   app.add_option("--kind", kind, "this kind alone, as none, none_outliers, pair or drift");
-  app.add_option("--first", first, "skip so many of the chosen cases")->capture_default_str();
-  app.add_option("--count", count, "write at most so many; -1: all")->capture_default_str();
+  app.add_option("--first", first, "skip this number of the chosen cases")->capture_default_str();
+  app.add_option("--count", count, "write at most this number; -1: all")->capture_default_str();
   app.add_option("-o,--output", folder, "folder of the cases")->required();
   CLI11_PARSE(app, argc, argv);
   try {

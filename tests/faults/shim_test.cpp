@@ -15,7 +15,7 @@ struct Fault {
   bool nameless = true;
 };
 
-// The outcome of the job with the fault at a call; `fired`: whether there are so many calls.
+// The outcome of the job with the fault at a call; `fired`: whether the job makes that call at all.
 program::Outcome run_with(const Fault& fault, int call, const JobFolder& at, bool& fired) {
   at.put_old_files();
   const std::string marker = at.folder.file("fired");

@@ -27,10 +27,31 @@ Measurements rows_at_steps(const Measurements& measurements, Eigen::Index count)
   return select(measurements, rows);
 }
 
+// Gives a robot the base that its tool and the readings tell in closed form. A radius that is found stands in the
+// readings afterwards.
+using PlaceBase = Robot (*)(Robot robot, Measurements& measurements);
+
+Robot by_points(Robot robot, Measurements& measurements) {
+  return with_closed_form_base(std::move(robot), measurements);
+}
+
+Robot by_plane(Robot robot, Measurements& measurements) { return with_base_on_plane(std::move(robot), measurements); }
+
+Robot by_distances(Robot robot, Measurements& measurements) {
+  return with_base_by_distances(std::move(robot), measurements);
+}
+
+// The radius is that of the mean distance from the centre.
+Robot by_sphere(Robot robot, Measurements& measurements) {
+  robot = with_base_by_distances(std::move(robot), measurements);
+  measurements.positions_mm.col(0).setConstant(positions(robot, measurements.poses).col(0).mean());
+  return robot;
+}
+
 // The guess of the tool matters: with a wrong one, Kabsch's base lies in the basin of another minimum.
 Robot best_start(const Robot& robot, const Measurements& measurements, const std::vector<std::string>& reasons,
-                 const discovery::SolverOptions& solver) {
-  const Measurements few = rows_at_steps(measurements, 200);
+                 const discovery::SolverOptions& solver, PlaceBase place) {
+  Measurements few = rows_at_steps(measurements, 200);
   Eigen::Matrix3Xd guesses = Eigen::Matrix3Xd::Zero(3, 7);
   constexpr double tool_guess_mm = 150.0;
   for (int axis = 0; axis < 3; ++axis) {
@@ -43,7 +64,7 @@ Robot best_start(const Robot& robot, const Measurements& measurements, const std
   for (Eigen::Index guess = 0; guess < (tool_is_free ? guesses.cols() : 1); ++guess) {
     Robot start = robot;
     start.chain.tool.xyz_mm += guesses.col(guess);
-    start = with_closed_form_base(std::move(start), few);
+    start = place(std::move(start), few);
     Robot trial = start;
     const discovery::SolverResult result = fit_frames(trial, few, reasons, solver);
     // The tool as given comes first and is kept unless another guess is better by more than 0.1 %.
@@ -70,18 +91,31 @@ Frame& frame_of(Frame& own, std::vector<NamedFrame>& further, const std::string&
   return std::ranges::find(further, name, &NamedFrame::name)->frame;
 }
 
+double& radius_of(Chain& chain, const std::string& base) {
+  return std::ranges::find(chain.bases, base, &NamedFrame::name)->radius_mm;
+}
+
+// The frames of a setting that touches a plane or a sphere.
+Robot started_by_touch(const Robot& robot, const Measurements& measurements, const std::string& base,
+                       const std::vector<std::string>& reasons, const discovery::SolverOptions& solver) {
+  const bool is_flat = is_plane(base);
+  if (!is_free(reasons, 0, is_flat ? coordinates_of_frame : 3)) return robot;  // a sphere has no angles
+  return best_start(robot, measurements, reasons, solver,
+                    is_flat           ? by_plane
+                    : is_sphere(base) ? by_sphere
+                                      : by_distances);
+}
+
 // The frames of one setting. Those of its base that an earlier setting began with are known, its tool is not.
 Robot started(Robot robot, const Measurements& measurements, bool base_is_known,
               const std::vector<std::string>& reasons, const discovery::SolverOptions& solver) {
   const Measurements points = of_reading(measurements, Reading::position);
   const bool all_seen = std::ranges::all_of(measurements.measured, [](bool seen) { return seen; });
   const bool base_is_free = is_free(reasons, 0, coordinates_of_frame) && !base_is_known;
-  const std::vector<Observation>& observations = measurements.poses.observations;
-  const bool on_plane = !observations.empty() && is_plane(observations.front().base);
-  if (points.count() > 0 && (all_seen || on_plane)) {
+  if (points.count() > 0 && all_seen) {
     if (base_is_free) {
-      robot = best_start(robot, points, reasons, solver);
-    } else if (all_seen && base_is_known && is_free(reasons, coordinates_of_frame, 3)) {
+      robot = best_start(robot, points, reasons, solver, by_points);
+    } else if (base_is_known && is_free(reasons, coordinates_of_frame, 3)) {
       robot = with_closed_form_tool(std::move(robot), points);
     }
   }
@@ -136,8 +170,17 @@ Robot with_started_frames(Robot robot, const Measurements& measurements, const s
     // A tool that nothing is known of is most likely where the first one is.
     const bool is_copy = part.chain.tool.xyz_mm == given_tool.xyz_mm && part.chain.tool.rpy_deg == given_tool.rpy_deg;
     if (is_copy) part.chain.tool = robot.chain.tool;
-    part = started(std::move(part), own, known_bases.contains(seen.base), own_reasons, solver);
+    const bool is_known = known_bases.contains(seen.base);
+    const bool by_touch = is_touched(seen.base) && !is_socket(seen.base);
+    if (by_touch && !is_known) {
+      part = started_by_touch(part, own, seen.base, own_reasons, solver);
+    } else if (!by_touch) {
+      part = started(std::move(part), own, is_known, own_reasons, solver);
+    }
     frame_of(robot.chain.base, robot.chain.bases, seen.base) = part.chain.base;
+    if (is_sphere(seen.base) && setting.radius >= 0 && !is_known && reasons[setting.radius].empty()) {
+      radius_of(robot.chain, seen.base) = positions(part, own.poses).col(0).mean();
+    }
     frame_of(robot.chain.tool, robot.chain.tools, seen.tool) = part.chain.tool;
     known_bases.insert(seen.base);
   }

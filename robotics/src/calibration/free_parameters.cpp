@@ -18,7 +18,8 @@ namespace {
 
 // Why parameters stay as they are, as descriptions have it.
 constexpr const char* by_user = "fixed by the user";
-constexpr const char* no_angles = "a socket has no angles";
+constexpr const char* no_angles_of_socket = "a socket has no angles";
+constexpr const char* no_angles_of_sphere = "a sphere has no angles";
 constexpr const char* unseen_turn = "base and sockets take it up";
 
 std::vector<bool> matches(const std::vector<discovery::Parameter>& parameters, const std::vector<std::string>& names,
@@ -102,8 +103,10 @@ std::vector<std::string> reasons_to_fix(const Robot& robot, const CalibrationOpt
   }
   for (std::size_t k = 0; k < all.size(); ++k) {
     const std::string owner = owner_of(all[k].name);
-    const bool is_angle = all[k].name[owner.size() + 1] == 'r';
-    if (is_angle && owner.starts_with("base@") && is_socket(owner.substr(5))) reasons[k] = no_angles;
+    const std::string base = owner.starts_with("base@") ? owner.substr(5) : "";
+    const bool is_angle = all[k].unit == "deg";
+    if (is_angle && is_socket(base)) reasons[k] = no_angles_of_socket;
+    if (is_angle && (is_sphere(base) || is_known_sphere(base))) reasons[k] = no_angles_of_sphere;
     if (fixed[k] || (!options.only.empty() && !only[k])) reasons[k] = by_user;
   }
   return reasons;
@@ -125,10 +128,18 @@ void fix_what_sockets_take_up(const Robot& robot, const Poses& poses, std::vecto
   }
 }
 
+namespace {
+
+bool has_known_sphere(const Poses& poses) {
+  return std::ranges::any_of(poses.observations, is_known_sphere, &Observation::base);
+}
+
+}  // namespace
+
 void keep_scale(const Robot& robot, const Poses& poses, const CalibrationOptions& options,
                 std::vector<std::string>& reasons) {
   const Chain& chain = robot.chain;
-  if (has_instrument(poses)) return;
+  if (has_instrument(poses) || has_known_sphere(poses)) return;
   const auto slides = [](const Joint& joint) { return joint.type == JointType::prismatic; };
   if (std::ranges::any_of(chain.joints, slides)) return;  // its travel is a length that is known
   const std::vector<discovery::Parameter> all = parameters(robot);
@@ -146,11 +157,11 @@ void keep_scale(const Robot& robot, const Poses& poses, const CalibrationOptions
   if (longest >= 0) reasons[longest] = unseen_scale;
 }
 
-std::set<std::string> unseen_by_sockets_and_planes(const Robot& robot) {
+std::set<std::string> unseen_by_touch(const Robot& robot) {
+  const std::set<std::string> reasons = {unseen_scale, unseen_turn, no_angles_of_socket, no_angles_of_sphere};
   std::set<std::string> names;
   for (const IdentifiedParameter& entry : robot.identified) {
-    const bool is_unseen = entry.state == unseen_scale || entry.state == unseen_turn || entry.state == no_angles;
-    if (is_unseen) names.insert(entry.name);
+    if (reasons.contains(entry.state)) names.insert(entry.name);
   }
   return names;
 }

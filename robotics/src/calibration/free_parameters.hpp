@@ -21,14 +21,14 @@ std::vector<std::string> reasons_to_fix(const Robot& robot, const CalibrationOpt
 /// lengths of the residuals but changes their coordinates, so fix_dependent() does not see it.
 void fix_what_sockets_take_up(const Robot& robot, const Poses& poses, std::vector<std::string>& reasons);
 
-/// Where all readings are of sockets and planes, an arm, its sockets and planes twice as large fit as well: adds a
-/// reason to the longest length of a joint that is still free, unless a length is known by the options or a joint
-/// slides.
+/// Where all readings are of sockets, planes and spheres, an arm and what it touches twice as large fit as well: adds a
+/// reason to the longest length of a joint that is still free, unless a length is known by the options, the radius of a
+/// sphere is given, or a joint slides.
 void keep_scale(const Robot& robot, const Poses& poses, const CalibrationOptions& options,
                 std::vector<std::string>& reasons);
 
 /// Names of the parameters that the robot's calibration kept for one of these reasons.
-std::set<std::string> unseen_by_sockets_and_planes(const Robot& robot);
+std::set<std::string> unseen_by_touch(const Robot& robot);
 
 /// Adds the reasons the data give: in order, every parameter whose column of `jacobian` depends on the columns of free
 /// parameters before it but for a share of its norm: `geometric_tolerance` for the first `geometric` parameters, a

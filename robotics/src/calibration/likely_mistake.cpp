@@ -49,8 +49,15 @@ std::vector<Change> changes_of(const Chain& chain) {
     const std::string& name = chain.joints[j].name;
     changes.push_back({[j](Measurements& table) { table.poses.joints.col(j) *= -1.0; },
                        fmt::format("{} counts in the other direction", name)});
+    const bool turns = chain.joints[j].type == JointType::revolute;
+    for (const auto& [factor, words] :
+         {std::pair{degrees, "radians, not degrees"}, {1.0 / degrees, "degrees, not radians"}}) {
+      if (!turns) continue;
+      changes.push_back({[=](Measurements& table) { table.poses.joints.col(j) *= factor; },
+                         fmt::format("the values of {} are {}", name, words)});
+    }
     for (const double zero_deg : {90.0, -90.0, 180.0}) {
-      if (chain.joints[j].type != JointType::revolute) continue;
+      if (!turns) continue;
       changes.push_back({[=](Measurements& table) { table.poses.joints.col(j).array() += zero_deg / degrees; },
                          fmt::format("{} has its zero {:g} deg away", name, zero_deg)});
     }

@@ -10,18 +10,11 @@
 
 namespace llmt::robotics {
 
-Eigen::Vector3d roll_pitch_yaw_deg(const Eigen::Matrix3d& rotation) {
-  const double cosine_of_pitch = std::hypot(rotation(0, 0), rotation(1, 0));
-  const double pitch = std::atan2(-rotation(2, 0), cosine_of_pitch);
-  // At pitch +-90 deg only roll -+ yaw is defined: yaw is taken as zero.
-  const bool degenerate = cosine_of_pitch < 1e-12;
-  const double roll =
-      degenerate ? std::atan2(-rotation(1, 2), rotation(1, 1)) : std::atan2(rotation(2, 1), rotation(2, 2));
-  const double yaw = degenerate ? 0.0 : std::atan2(rotation(1, 0), rotation(0, 0));
-  return Eigen::Vector3d(roll, pitch, yaw) * degrees;
-}
-
 namespace {
+
+Frame frame_of(const Pose& pose) {
+  return {.xyz_mm = pose.position_mm, .rpy_deg = degrees * roll_pitch_yaw(pose.rotation)};
+}
 
 // The frame in whose plane z = 0 the points lie best, their centroid at its origin.
 Pose plane_through(const Eigen::MatrixXd& points) {
@@ -39,11 +32,13 @@ Pose plane_through(const Eigen::MatrixXd& points) {
 
 Robot with_closed_form_base(Robot robot, const Measurements& measurements) {
   robot.chain.base = Frame{};
-  const Eigen::MatrixXd points = positions(robot, measurements.poses);
-  const std::vector<Observation>& observations = measurements.poses.observations;
-  const bool on_plane = !observations.empty() && is_plane(observations.front().base);
-  const Pose base = on_plane ? plane_through(points) : kabsch(points, measurements.positions_mm);
-  robot.chain.base = {.xyz_mm = base.position_mm, .rpy_deg = roll_pitch_yaw_deg(base.rotation)};
+  robot.chain.base = frame_of(kabsch(positions(robot, measurements.poses), measurements.positions_mm));
+  return robot;
+}
+
+Robot with_base_on_plane(Robot robot, const Measurements& measurements) {
+  robot.chain.base = Frame{};
+  robot.chain.base = frame_of(plane_through(positions(robot, measurements.poses)));
   return robot;
 }
 
@@ -68,7 +63,7 @@ Robot with_closed_form_orientation(Robot robot, const Measurements& measurements
   for (std::size_t i = 0; i < flanges.size(); ++i) {
     sum += flanges[i].rotation.transpose() * measurements.poses.observations[i].reference;
   }
-  robot.chain.tool.rpy_deg = roll_pitch_yaw_deg(rotation_of_greatest_trace(sum.transpose()));
+  robot.chain.tool.rpy_deg = degrees * roll_pitch_yaw(rotation_of_greatest_trace(sum.transpose()));
   return robot;
 }
 

@@ -5,12 +5,11 @@
 
 namespace llmt::robotics {
 
-/// Fixed-axis roll, pitch, yaw in degrees of R = Rz(yaw) Ry(pitch) Rx(roll).
-Eigen::Vector3d roll_pitch_yaw_deg(const Eigen::Matrix3d& rotation);
-
-/// The robot with the base that Kabsch finds for its present tool, or that total least squares finds for points on a
-/// plane. Needs x, y and z measured, or a plane.
+/// The robot with the base that Kabsch finds for its present tool. Needs x, y and z measured.
 Robot with_closed_form_base(Robot robot, const Measurements& measurements);
+
+/// The robot with the base in whose plane z = 0 its tool points lie best: total least squares.
+Robot with_base_on_plane(Robot robot, const Measurements& measurements);
 
 /// The robot with the tool point that fits its present base best: the mean of the measured points in the flange frame.
 /// The tool's orientation stays. Needs positions x, y and z.
@@ -21,7 +20,7 @@ Robot with_closed_form_orientation(Robot robot, const Measurements& measurements
 
 /// The robot with the base that measured distances from the origin of the world give: with p the tool point of a base
 /// at the origin and t the base's translation, d^2 = |p|^2 + 2 p't + |t|^2 is linear in t and |t|^2. The base's
-/// orientation stays.
+/// orientation stays. Distances that are all zero but for the same unknown length give the same base.
 Robot with_base_by_distances(Robot robot, const Measurements& measurements);
 
 }  // namespace llmt::robotics

@@ -80,7 +80,7 @@ void set_limit(const Robot& robot, const Measurements& measurements, const Check
 // Columns of the Jacobian that take part: all but joint maps and what the convention leaves out.
 std::vector<Eigen::Index> columns_of(const Robot& robot) {
   const std::vector<std::string> reasons = reasons_to_fix(robot, {});
-  const std::set<std::string> unseen = unseen_by_sockets_and_planes(robot);
+  const std::set<std::string> unseen = unseen_by_touch(robot);
   const std::vector<discovery::Parameter> all = parameters(robot);
   std::vector<Eigen::Index> columns;
   Eigen::Index next = 0;
@@ -250,13 +250,7 @@ RobotCheck decided_by_covered(const CorrectedRobot& robot, const Measurements& m
       decided.moved_beyond.push_back(moved);
     }
   }
-  decided.error = result.error;
-  decided.errors_mm = result.errors_mm;
-  decided.still_good = result.still_good;
-  decided.limit_mm = result.limit_mm;
-  decided.beyond = result.beyond;
-  decided.uncovered = result.uncovered;
-  decided.too_few_covered = result.too_few_covered;
+  static_cast<CheckedError&>(decided) = result;
   return decided;
 }
 

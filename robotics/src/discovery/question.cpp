@@ -39,8 +39,8 @@ std::vector<Eigen::Index> freed_geometry(const Robot& robot) {
 // thousandth: taken for geometry it would absorb a part of every elastic effect.
 std::vector<Eigen::Index> independent_geometry(const Robot& robot, const Measurements& measurements,
                                                const std::vector<Eigen::Index>& rows) {
-  // Sockets and planes alone fit an arm of no size, too: only what the calibration freed keeps the scale.
-  if (!unseen_by_sockets_and_planes(robot).empty()) return freed_geometry(robot);
+  // What is touched alone fits an arm of no size, too: only what the calibration freed keeps the scale.
+  if (!unseen_by_touch(robot).empty()) return freed_geometry(robot);
   Robot rigid = robot;
   rigid.effects.clear();
   Eigen::MatrixXd jacobian = position_jacobian(rigid, measurements.poses)(rows, Eigen::all);

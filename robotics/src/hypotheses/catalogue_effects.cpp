@@ -62,7 +62,7 @@ std::vector<std::vector<double>> constants_for(const EffectType& type, const Sce
     constexpr double rounding = 1e-9;
     const double largest = scene.largest_load(index);
     if (!(largest > rounding * scene.loads.cwiseAbs().maxCoeff())) return {};
-    // So many digits make the same label from round to round.
+    // Two digits are kept, so that the label is the same in every round.
     const auto rounded = [](double value) { return std::stod(fmt::format("{:.1e}", value)); };
     if (type.name == "joint_compliance_stiffening") return {{rounded(0.15 * largest)}, {rounded(0.4 * largest)}};
     return {{rounded(0.015 * largest)}, {rounded(0.035 * largest)}};

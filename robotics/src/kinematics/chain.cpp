@@ -44,6 +44,9 @@ void visit_values(ChainType& chain, Visit visit) {
   for (auto* frames : {&chain.bases, &chain.tools}) {
     for (auto& further : *frames) visit_frame(further.frame);
   }
+  for (auto& base : chain.bases) {
+    if (is_sphere(base.name)) visit(base.radius_mm);
+  }
 }
 
 void validate_further(const char* field, const std::vector<NamedFrame>& frames, const std::string& own) {
@@ -163,6 +166,9 @@ std::vector<discovery::Parameter> geometric_parameters(const Chain& chain) {
   }
   for (const NamedFrame& base : chain.bases) add_frame("base@" + base.name);
   for (const NamedFrame& tool : chain.tools) add_frame("tool@" + tool.name);
+  for (const NamedFrame& base : chain.bases) {
+    if (is_sphere(base.name)) add("base@" + base.name, "radius", false);
+  }
   std::size_t next = 0;
   visit_values(chain, [&](const double& value) { parameters[next++].value = value; });
   return parameters;
@@ -176,7 +182,7 @@ double reach_of(const Chain& chain) {
 
 Eigen::Index geometric_parameter_count(const Chain& chain) {
   return frame_parameters * (2 + std::ssize(chain.bases) + std::ssize(chain.tools)) +
-         joint_parameters * std::ssize(chain.joints);
+         joint_parameters * std::ssize(chain.joints) + std::ranges::count_if(chain.bases, is_sphere, &NamedFrame::name);
 }
 
 Eigen::VectorXd geometric_values(const Chain& chain) {
@@ -205,7 +211,13 @@ bool is_socket(std::string_view base) { return base.starts_with("socket "); }
 
 bool is_plane(std::string_view base) { return base.starts_with("plane "); }
 
-bool is_touched(std::string_view base) { return is_socket(base) || is_plane(base); }
+bool is_sphere(std::string_view base) { return base.starts_with("sphere "); }
+
+bool is_known_sphere(std::string_view base) { return base.starts_with("known sphere "); }
+
+bool is_touched(std::string_view base) {
+  return is_socket(base) || is_plane(base) || is_sphere(base) || is_known_sphere(base);
+}
 
 double to_limit_unit(const Joint& joint) { return joint.type == JointType::revolute ? degrees : 1.0; }
 

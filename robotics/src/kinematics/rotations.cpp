@@ -14,6 +14,16 @@ Eigen::Vector3d rotation_vector(const Eigen::Matrix3d& rotation) {
   return (q.w() < 0.0 ? -2.0 : 2.0) * half / sine * q.vec();
 }
 
+Eigen::Vector3d roll_pitch_yaw(const Eigen::Matrix3d& r) {
+  const double pitch = std::atan2(-r(2, 0), std::hypot(r(0, 0), r(1, 0)));
+  if (std::abs(std::cos(pitch)) < 1e-12) return {std::atan2(-r(1, 2), r(1, 1)), pitch, 0.0};
+  // Near upright roll is uncertain. Yaw is that of what is left of the rotation without it, so that both together are
+  // exact.
+  const double roll = std::atan2(r(2, 1), r(2, 2));
+  const Eigen::Vector3d left = std::cos(roll) * r.col(1) - std::sin(roll) * r.col(2);
+  return {roll, pitch, std::atan2(-left(0), left(1))};
+}
+
 Eigen::Matrix3d cross_matrix(const Eigen::Vector3d& v) {
   Eigen::Matrix3d matrix;
   matrix << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;

@@ -58,11 +58,15 @@ Header::Header(const Csv& csv, const Robot& robot, const std::vector<std::string
   for (const auto& [column, name] : map.names) {
     if (!csv.has(column)) refuse(fmt::format("there is no column \"{}\", which the column map calls {}", column, name));
   }
-  for (const std::string& column : csv.columns()) {
+  const auto name_of = [&](const std::string& column) {
     const auto mapped = map.names.find(column);
-    const std::string& name = mapped == map.names.end() ? column : mapped->second;
+    return mapped == map.names.end() ? column : mapped->second;
+  };
+  has_radii_ = std::ranges::find(csv.columns(), "sphere", name_of) != csv.columns().end();
+  for (const std::string& column : csv.columns()) {
+    const std::string name = name_of(column);
     if (!take_named_joint(name, column)) take(name, column);
-    if (mapped != map.names.end() && !unused_.empty() && unused_.back() == column) {
+    if (map.names.contains(column) && !unused_.empty() && unused_.back() == column) {
       refuse(
           fmt::format("the column map calls \"{}\" \"{}\", which is no column that has a meaning here", column, name));
     }
@@ -73,24 +77,27 @@ Header::Header(const Csv& csv, const Robot& robot, const std::vector<std::string
   if (words_.contains("socket") && has("distance")) {
     refuse("there are sockets and distances: fit them one after the other");
   }
-  if (has_plane() && (words_.contains("socket") || !targets_.empty() || has("distance"))) {
-    refuse("points on planes have no other readings beside them: fit them one after the other");
+  const bool has_others = words_.contains("socket") || !targets_.empty() || has("distance");
+  if ((has_plane() || has_sphere()) && (has_others || (has_plane() && has_sphere()))) {
+    refuse(fmt::format("points on {} have no other readings beside them: fit them one after the other",
+                       has_plane() ? "planes" : "spheres"));
   }
   if (!targets_.empty() && has("distance")) refuse("there are positions and distances: fit them one after the other");
 }
 
 void Header::take(const std::string& name, const std::string& column) {
-  static const std::regex quantity("(q[0-9]+|r[xyz]|(t[0-9]+_)?[xyz]|distance)(_([A-Za-z]+))?");
+  static const std::regex quantity("(q[0-9]+|r[xyz]|(t[0-9]+_)?[xyz]|distance|radius)(_([A-Za-z]+))?");
   static const std::regex quaternion("q[wxyz]");
+  static const std::set<std::string> words = {"target", "session", "socket", "plane", "sphere", "reference"};
   static const std::regex covariate(
       "payload_kg|temp[0-9]*_C|time_s|order|pose|returned|dwelled|dir[0-9]+|tau[0-9]+_Nm|qmeas[0-9]+_(deg|rad|mm)|"
       "(sigma|U95)(_[xyz])?_(um|mm)");
   std::smatch parts;
-  if (std::regex_match(name, parts, quantity)) {
+  if (std::regex_match(name, parts, quantity) && (parts[1] != "radius" || has_radii_)) {
     take_quantity(parts[1], column, parts[4]);
   } else if (std::regex_match(name, quaternion)) {
     quantities_[name] = {column, ""};
-  } else if (name == "target" || name == "session" || name == "socket" || name == "plane" || name == "reference") {
+  } else if (words.contains(name)) {
     words_[name] = column;
   } else if (std::regex_match(name, covariate) || also_.contains(name)) {
     if (!covariates_.try_emplace(name, column).second) refuse(fmt::format("there are two columns {}", name));
@@ -125,7 +132,7 @@ void Header::take_quantity(const std::string& quantity, const std::string& colum
     refuse(
         fmt::format("column \"{}\": unit \"{}\" is not known: write {}", column, unit, spellings(quantity, expected)));
   }
-  if (joint || is_angle(quantity) || quantity == "distance") return;
+  if (joint || is_angle(quantity) || quantity == "distance" || quantity == "radius") return;
   const std::string target = target_of(quantity);
   if (std::ranges::find(targets_, target) == targets_.end()) targets_.push_back(target);
 }
@@ -219,12 +226,13 @@ Eigen::MatrixXd Header::points_mm(const std::string& target, std::array<bool, 3>
   return points;
 }
 
-Eigen::VectorXd Header::distances_mm() const {
-  if (!has("distance")) return {};
-  const std::string& column = quantities_.at("distance").column;
-  const Eigen::VectorXd values = factor("distance", lengths_in_mm) * csv_.numbers(column);
+Eigen::VectorXd Header::lengths_mm(const std::string& quantity) const {
+  if (!has(quantity)) return {};
+  const std::string& column = quantities_.at(quantity).column;
+  const Eigen::VectorXd values = factor(quantity, lengths_in_mm) * csv_.numbers(column);
   for (Eigen::Index row = 0; row < values.size(); ++row) {
-    if (!(values(row) > 0.0 && values(row) <= farthest_mm)) csv_.refuse(row, column, "a distance must be above 0");
+    if (values(row) > 0.0 && values(row) <= farthest_mm) continue;
+    csv_.refuse(row, column, fmt::format("a {} must be above 0", quantity));
   }
   return values;
 }

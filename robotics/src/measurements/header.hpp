@@ -24,6 +24,7 @@ class Header {
 
   bool has(const std::string& quantity) const { return quantities_.contains(quantity); }
   bool has_plane() const { return words_.contains("plane"); }
+  bool has_sphere() const { return words_.contains("sphere"); }
   bool has_joints() const { return quantities_.lower_bound("q0") != quantities_.lower_bound("q:"); }  // q1, q2, ...
 
   /// n x J in rad and mm. Joints that mimic others need no column.
@@ -39,8 +40,9 @@ class Header {
   /// no column.
   Eigen::MatrixXd points_mm(const std::string& target, std::array<bool, 3>& measured) const;
 
-  /// Empty if there is no such column.
-  Eigen::VectorXd distances_mm() const;
+  /// The column `distance`, or `radius` beside a column of spheres; above 0. Empty if there is no such column.
+  Eigen::VectorXd distances_mm() const { return lengths_mm("distance"); }
+  Eigen::VectorXd radii_mm() const { return lengths_mm("radius"); }
 
   Orientation orientation() const;
   std::map<std::string, Eigen::VectorXd> covariates() const;
@@ -48,7 +50,8 @@ class Header {
   /// The column of the file that says in which sequence rows were read: order, or else time_s; empty if there is none.
   std::string sequence_column() const;
 
-  /// Names in the column `target`, `session`, `socket`, `plane` or `reference`, row by row; empty if there is none.
+  /// Names in the column `target`, `session`, `socket`, `plane`, `sphere` or `reference`, row by row; empty if there
+  /// is none.
   std::vector<std::string> words(const std::string& column) const;
 
   const std::vector<std::string>& unused() const { return unused_; }
@@ -68,16 +71,18 @@ class Header {
   const Csv& csv_;
   const Robot& robot_;
   std::set<std::string> also_;
-  std::map<std::string, Quantity> quantities_;     // "q1", "x", "t2_x", "rx", "qw", "distance" -> column and unit
+  std::map<std::string, Quantity> quantities_;     // "q1", "x", "t2_x", "rx", "qw", "distance" -> column, unit
   std::map<std::string, std::string> covariates_;  // name -> column
   std::map<std::string, std::string> words_;       // "target", "socket", "plane", ... -> column
   std::vector<std::string> targets_;
   std::vector<std::string> unused_;
+  bool has_radii_ = false;  // whether `radius` has a meaning: beside a column of spheres
 
   [[noreturn]] void refuse(const std::string& message) const;
   bool take_named_joint(const std::string& name, const std::string& column);
   void take(const std::string& name, const std::string& column);
   void take_quantity(const std::string& quantity, const std::string& column, const std::string& unit);
+  Eigen::VectorXd lengths_mm(const std::string& quantity) const;
   double factor(const std::string& quantity, const std::map<std::string, double>& units) const;
 };
 

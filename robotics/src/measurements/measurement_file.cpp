@@ -20,8 +20,11 @@ struct Sighting {
   Eigen::Index row = 0;
   std::string target;
   Eigen::Vector3d value = Eigen::Vector3d::Zero();
-  std::string feature = {};  // "socket" or "plane": `value` is then a point of it in its own frame
+  std::string feature = {};  // "socket", "plane", "sphere" or "known sphere": `value` is then what is read of it
 };
+
+// "sphere" of a known sphere, too.
+std::string column_of_feature(const std::string& feature) { return feature.substr(feature.rfind(' ') + 1); }
 
 std::vector<Sighting> sightings_of(const Csv& csv, const Header& header, Measurements& measurements) {
   std::vector<Sighting> seen;
@@ -39,6 +42,18 @@ std::vector<Sighting> sightings_of(const Csv& csv, const Header& header, Measure
     }
     return seen;
   }
+  if (header.has_sphere()) {
+    measurements.measured = {true, false, false};
+    const bool is_known = header.has("radius");
+    const Eigen::VectorXd radii = is_known ? header.radii_mm() : Eigen::VectorXd::Zero(csv.rows());
+    for (Eigen::Index row = 0; row < csv.rows(); ++row) {
+      seen.push_back({.row = row,
+                      .target = words.empty() ? "" : words[row],
+                      .value = {radii(row), 0.0, 0.0},
+                      .feature = is_known ? "known sphere" : "sphere"});
+    }
+    return seen;
+  }
   const std::vector<std::string> sockets = header.words("socket");
   for (std::size_t row = 0; row < sockets.size(); ++row) {
     if (sockets[row].empty()) continue;
@@ -49,7 +64,7 @@ std::vector<Sighting> sightings_of(const Csv& csv, const Header& header, Measure
   if (header.targets().empty()) {
     throw std::runtime_error(
         fmt::format("{}:1: no measured position: write x_mm, y_mm, z_mm (or _m, _um), t1_x_mm, ... of several targets, "
-                    "distance_mm, or a column socket or plane; columns: {}",
+                    "distance_mm, or a column socket, plane or sphere; columns: {}",
                     csv.name(), fmt::join(csv.columns(), ", ")));
   }
   if (!words.empty() && !header.targets().front().empty()) {
@@ -192,11 +207,11 @@ void observe(const Csv& csv, const Header& header, const Robot& robot, const Pos
   refuse_same_but_for_dots(csv, sessions, "session");
   const std::vector<std::string> targets = header.words("target");
   refuse_same_but_for_dots(csv, targets, "target");
-  for (const char* column : {"socket", "plane"}) refuse_same_but_for_dots(csv, header.words(column), column);
+  for (const char* column : {"socket", "plane", "sphere"}) refuse_same_but_for_dots(csv, header.words(column), column);
   const bool has_targets = !targets.empty();
   const std::vector<Eigen::Index> stands = stands_of(rows, sessions, has_targets);
-  const std::map<std::string, std::vector<std::string>> features = {{"socket", header.words("socket")},
-                                                                    {"plane", header.words("plane")}};
+  const std::map<std::string, std::vector<std::string>> features = {
+      {"socket", header.words("socket")}, {"plane", header.words("plane")}, {"sphere", header.words("sphere")}};
   FrameNames base_of(robot.chain.bases, robot.chain.session);
   FrameNames tool_of(robot.chain.tools, robot.chain.target);
   std::vector<Observation>& observations = measurements.poses.observations;
@@ -211,7 +226,8 @@ void observe(const Csv& csv, const Header& header, const Robot& robot, const Pos
     };
     const std::string session = named(sessions, "session");
     if (is_touched(session)) {
-      csv.refuse(sighting.row, "session", "a session's name does not begin with \"socket \" or \"plane \"");
+      csv.refuse(sighting.row, "session",
+                 "a session's name does not begin with \"socket \", \"plane \", \"sphere \" or \"known sphere \"");
     }
     const std::string target = has_targets ? named(targets, "target") : sighting.target;
     observation.base = base_of(session);
@@ -224,12 +240,13 @@ void observe(const Csv& csv, const Header& header, const Robot& robot, const Pos
         csv.refuse(sighting.row, "session",
                    fmt::format("a {} belongs to the first session of the file, \"{}\": put that name here, or put the "
                                "rows of this session first",
-                               sighting.feature, base_of.own()));
+                               column_of_feature(sighting.feature), base_of.own()));
       }
-      observation.base = fmt::format("{} {}", sighting.feature, named(features.at(sighting.feature), sighting.feature));
+      const std::string column = column_of_feature(sighting.feature);
+      observation.base = fmt::format("{} {}", sighting.feature, named(features.at(column), column));
     }
     observation.stand = stands[sighting.row];
-    if (header.has("distance")) observation.reading = Reading::distance;
+    if (header.has("distance") || header.has_sphere()) observation.reading = Reading::distance;
   }
   const bool plain = std::ranges::all_of(observations, [](const Observation& o) {
     return o.base.empty() && o.tool.empty() && o.reading == Reading::position;

@@ -30,7 +30,11 @@ std::string quoted(const std::string& text) {
   return result + '"';
 }
 
-std::string name_of_feature(const Observation& seen) { return quoted(seen.base.substr(seen.base.find(' ') + 1)); }
+// "one" of the base "known sphere one".
+std::string name_of_feature(const Observation& seen) {
+  const std::size_t first = is_known_sphere(seen.base) ? seen.base.find(' ') + 1 : 0;
+  return quoted(seen.base.substr(seen.base.find(' ', first) + 1));
+}
 
 std::string target_of(const Observation& seen) {
   if (seen.base.empty() || is_touched(seen.base)) return seen.tool;
@@ -107,10 +111,14 @@ std::string to_csv(const Measurements& all, const Robot& robot, const std::vecto
   }
   const std::vector<Observation>& observations = measurements.poses.observations;
   const bool distances = !observations.empty() && observations.front().reading == Reading::distance;
-  const bool planes = !observations.empty() && is_plane(observations.front().base);
-  if (distances) columns.add("distance_mm", measurements.positions_mm.col(0));
-  if (planes) {
-    columns.names.emplace_back("plane");
+  const std::string base = observations.empty() ? "" : observations.front().base;
+  const bool planes = is_plane(base);
+  const bool spheres = is_sphere(base) || is_known_sphere(base);
+  if (distances && !is_sphere(base)) {
+    columns.add(is_known_sphere(base) ? "radius_mm" : "distance_mm", measurements.positions_mm.col(0));
+  }
+  if (planes || spheres) {
+    columns.names.emplace_back(planes ? "plane" : "sphere");
     columns.cells.emplace_back();
     for (const Observation& seen : observations) columns.cells.back().push_back(name_of_feature(seen));
   }

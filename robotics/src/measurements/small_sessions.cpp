@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <map>
 #include <set>
 
@@ -9,19 +10,34 @@
 namespace llmt::robotics {
 namespace {
 
-// Bases with more measured coordinates than they and their tools have values, of all bases.
+// How many numbers are to be found of a base: a sphere has a centre and a radius, a plane a distance and two angles,
+// and the others that are touched have a point.
+std::size_t unknowns_of(const std::string& base) {
+  constexpr std::size_t of_sphere = 4;
+  constexpr std::size_t of_point_or_plane = 3;
+  constexpr std::size_t of_instrument = 6;
+  if (is_sphere(base)) return of_sphere;
+  return is_touched(base) ? of_point_or_plane : of_instrument;
+}
+
+// Bases with more measured coordinates than they have unknowns, with those of the tools that are seen from no other, of
+// all bases.
 std::map<std::string, bool> told_bases(const Measurements& measurements) {
   std::map<std::string, std::size_t> coordinates;
-  std::map<std::string, std::set<std::string>> tools;
+  std::map<std::string, std::set<std::string>> bases_of_tool;
   for (const Eigen::Index coordinate : measured_rows(measurements)) {
     const Observation& seen = measurements.poses.observations[coordinate / 3];
     ++coordinates[seen.base];
-    tools[seen.base].insert(seen.tool);
+    bases_of_tool[seen.tool].insert(seen.base);
   }
-  constexpr std::size_t of_base = 6;
   constexpr std::size_t of_tool = 3;
+  std::map<std::string, std::size_t> unknowns;
+  for (const auto& [base, count] : coordinates) unknowns[base] = unknowns_of(base);
+  for (const auto& [tool, bases] : bases_of_tool) {
+    if (bases.size() == 1) unknowns[*bases.begin()] += of_tool;
+  }
   std::map<std::string, bool> told;
-  for (const auto& [base, count] : coordinates) told[base] = count > of_base + of_tool * tools[base].size();
+  for (const auto& [base, count] : coordinates) told[base] = count > unknowns[base];
   return told;
 }
 
@@ -49,10 +65,12 @@ Measurements without_small_sessions(const Measurements& measurements) {
   Measurements large = select(measurements, kept);
   large.warnings = measurements.warnings;
   large.unused_columns = measurements.unused_columns;
+  const bool are_sessions = std::ranges::none_of(told, [](const auto& entry) { return is_touched(entry.first); });
   large.warnings.push_back(
-      fmt::format("{} of {} sessions left out, too few points in each to find where the instrument stood: {} ({}{} {})",
-                  left_out.size(), told.size(), fmt::join(left_out, ", "), has_lines ? "line" : "row",
-                  lines.size() == 1 ? "" : "s", fmt::join(lines, ", ")));
+      fmt::format("{} of {} {} left out, too few points in each to find where {}: {} ({}{} {})", left_out.size(),
+                  told.size(), are_sessions ? "sessions" : "sessions, sockets, planes and spheres",
+                  are_sessions ? "the instrument stood" : "it is", fmt::join(left_out, ", "),
+                  has_lines ? "line" : "row", lines.size() == 1 ? "" : "s", fmt::join(lines, ", ")));
   return large;
 }
 

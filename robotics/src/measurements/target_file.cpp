@@ -43,7 +43,7 @@ TargetTable read_targets(const std::string& path, const Robot& robot, DecimalMar
     throw std::runtime_error(
         fmt::format("{}:1: column {}x_mm: a target of the tool itself is x_mm, y_mm, z_mm", csv.name(), target));
   }
-  for (const char* column : {"target", "session", "reference", "distance"}) {
+  for (const char* column : {"target", "session", "reference", "distance", "socket", "plane", "sphere", "radius"}) {
     if (!header.words(column).empty() || header.has(column)) targets.unused_columns.emplace_back(column);
   }
   targets.orientation = header.orientation();

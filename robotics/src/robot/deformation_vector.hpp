@@ -11,7 +11,7 @@ namespace llmt::robotics {
 
 inline constexpr Eigen::Index per_twist = 6;
 
-/// Of an arm of so many joints.
+/// Number of components of the deformation of an arm with this number of joints.
 Eigen::Index component_count(Eigen::Index joints);
 
 double& component_of(Deformation& deformation, Eigen::Index component);

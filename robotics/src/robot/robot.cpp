@@ -36,7 +36,7 @@ void in_settings(const Robot& robot, const Poses& poses, Evaluate evaluate) {
     return;
   }
   for (const Setting& setting : settings_of(robot, poses)) {
-    RobotEvaluator evaluator(setting.robot, setting.poses);
+    RobotEvaluator evaluator(setting);
     evaluate(evaluator, Rows(setting.poses.count(), &setting.rows));
   }
 }
@@ -192,10 +192,11 @@ Eigen::MatrixXd position_jacobian(const Robot& robot, const Poses& poses) {
   }
   Eigen::MatrixXd result = Eigen::MatrixXd::Zero(3 * poses.count(), count);
   for (const Setting& setting : settings_of(robot, poses)) {
-    RobotEvaluator evaluator(setting.robot, setting.poses);
+    RobotEvaluator evaluator(setting);
     const std::vector<Eigen::Index> columns = columns_of(setting, robot);
     for (std::size_t i = 0; i < setting.rows.size(); ++i) {
       result.middleRows(3 * setting.rows[i], 3)(Eigen::all, columns) = evaluator.jacobian(i);
+      if (setting.radius >= 0) result(3 * setting.rows[i], setting.radius) = -1.0;
     }
   }
   return result;

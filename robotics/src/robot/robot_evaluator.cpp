@@ -52,6 +52,11 @@ PreparedEffect prepare(const Chain& chain, const Effect& effect, const Poses& po
   return prepared;
 }
 
+RobotEvaluator::RobotEvaluator(const Setting& setting) : RobotEvaluator(setting.robot, setting.poses) {
+  is_touched_ = setting.is_touched;
+  radius_mm_ = setting.radius_mm;
+}
+
 RobotEvaluator::RobotEvaluator(const Robot& robot, const Poses& poses)
     : robot_(robot),
       poses_(poses),
@@ -124,9 +129,7 @@ void RobotEvaluator::adjust(PoseContext& pose, Eigen::Index row, const PreparedE
 }
 
 void RobotEvaluator::apply(PoseContext& pose, Eigen::Index row, const PreparedEffect& effect, Deformation& sum) {
-  // No instrument sees a socket or a plane.
-  const Observation* seen = observation(row);
-  if (effect.type->of_measuring && seen != nullptr && is_touched(seen->base)) return;
+  if (effect.type->of_measuring && is_touched_) return;  // no instrument sees it
   columns_.clear();
   for (const Eigen::VectorXd* column : effect.columns) columns_.push_back((*column)(row));
   pose.columns = columns_;

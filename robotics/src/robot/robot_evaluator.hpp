@@ -9,6 +9,7 @@
 #include "llmt/robotics/robot_types.hpp"
 #include "robot/arm_change.hpp"
 #include "robot/chart.hpp"
+#include "robot/settings.hpp"
 
 namespace llmt::robotics {
 
@@ -31,9 +32,10 @@ PreparedEffect prepare(const Chain& chain, const Effect& effect, const Poses& po
 const Eigen::VectorXd* find_column(const Poses& poses, const std::string& names);
 
 /// Evaluates row after row with the chain's own base and tool; holds the memory it works in, so each thread needs its
-/// own. Robot and poses must outlive it.
+/// own. Robot and poses, or the setting, must outlive it.
 class RobotEvaluator {
  public:
+  explicit RobotEvaluator(const Setting& setting);
   RobotEvaluator(const Robot& robot, const Poses& poses);
   RobotEvaluator(const RobotEvaluator&) = delete;  // points into itself
   RobotEvaluator& operator=(const RobotEvaluator&) = delete;
@@ -42,7 +44,9 @@ class RobotEvaluator {
   const Poses& poses() const { return poses_; }
 
   /// What is read of the tool.
-  Eigen::Vector3d reading(Eigen::Index row) { return reading_of(pose(row), observation(row)); }
+  Eigen::Vector3d reading(Eigen::Index row) {
+    return reading_of(pose(row), observation(row)) - radius_mm_ * Eigen::Vector3d::UnitX();
+  }
 
   /// Of the tool.
   Pose pose(Eigen::Index row);
@@ -66,6 +70,8 @@ class RobotEvaluator {
   Kinematics kinematics_;
   std::vector<PreparedEffect> effects_;
   const Eigen::VectorXd* payload_ = nullptr;
+  bool is_touched_ = false;  // what is read of, see Setting
+  double radius_mm_ = 0.0;   // see Setting
   bool bears_loads_ = false;
   std::vector<Input> inputs_;                 // that some effect depends on
   std::vector<Eigen::Index> own_components_;  // of the deformation, that some effect may change

@@ -47,7 +47,12 @@ std::vector<NamedFrame> read_frames(YamlMap& map, const std::string& key) {
     frame.name = entry.text("name");
     frame.frame.xyz_mm = entry.vector_or("xyz_mm", Eigen::Vector3d::Zero());
     frame.frame.rpy_deg = entry.vector_or("rpy_deg", Eigen::Vector3d::Zero());
-    entry.finish({"name", "xyz_mm", "rpy_deg"});
+    std::vector<std::string> keys = {"name", "xyz_mm", "rpy_deg"};
+    if (key == "bases" && is_sphere(frame.name)) {
+      frame.radius_mm = entry.number("radius_mm");
+      keys.emplace_back("radius_mm");
+    }
+    entry.finish(keys);
   }
   return frames;
 }

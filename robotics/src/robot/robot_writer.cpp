@@ -19,7 +19,9 @@ void write_frames(YamlWriter& out, const std::string& key, const std::vector<Nam
   out.key(key).begin_list(YAML::Block);
   for (const NamedFrame& named : frames) {
     out.begin_map().word("name", named.name).numbers("xyz_mm", named.frame.xyz_mm);
-    out.numbers("rpy_deg", named.frame.rpy_deg).end_map();
+    out.numbers("rpy_deg", named.frame.rpy_deg);
+    if (key == "bases" && is_sphere(named.name)) out.number("radius_mm", named.radius_mm);
+    out.end_map();
   }
   out.end_list();
 }

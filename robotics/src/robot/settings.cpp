@@ -42,6 +42,13 @@ Setting make_setting(const Robot& robot, const std::string& base, const std::str
     const std::size_t place = place_of(robot.chain.bases, base, "base");
     chain.base = robot.chain.bases[place].frame;
     setting.base = first + frame_size * place;
+    setting.is_touched = is_touched(base);
+    if (is_sphere(base)) {
+      const auto spheres_from = std::ranges::count_if(robot.chain.bases.begin() + static_cast<std::ptrdiff_t>(place),
+                                                      robot.chain.bases.end(), is_sphere, &NamedFrame::name);
+      setting.radius_mm = robot.chain.bases[place].radius_mm;
+      setting.radius = geometric_parameter_count(robot.chain) - spheres_from;
+    }
   }
   if (!tool.empty()) {
     const std::size_t place = place_of(robot.chain.tools, tool, "tool");

@@ -12,8 +12,11 @@ struct Setting {
   Robot robot;
   Poses poses;
   std::vector<Eigen::Index> rows;
-  Eigen::Index base = 0;  ///< where the parameters of its base begin among those of the whole robot
-  Eigen::Index tool = 0;  ///< the same of its tool
+  Eigen::Index base = 0;     ///< where the parameters of its base begin among those of the whole robot
+  Eigen::Index tool = 0;     ///< the same of its tool
+  bool is_touched = false;   ///< whether its base is what the tool touches, see is_touched()
+  double radius_mm = 0.0;    ///< that is taken off its distances: of a sphere whose radius is a parameter
+  Eigen::Index radius = -1;  ///< where this parameter stands among those of the whole robot; -1: there is none
 };
 
 /// Whether all rows use the chain's own base and tool, and there are no others. Throws std::invalid_argument if the

@@ -8,22 +8,13 @@
 
 #include "kinematics/units.hpp"
 #include "llmt/files.hpp"
+#include "llmt/robotics/kinematics.hpp"
 #include "urdf/urdf_tree.hpp"
 
 namespace llmt::robotics {
 namespace {
 
 double without_rounding(double value) { return std::abs(value) < 1e-10 ? 0.0 : value; }
-
-Eigen::Vector3d rpy_of(const Eigen::Matrix3d& r) {
-  const double pitch = std::atan2(-r(2, 0), std::hypot(r(0, 0), r(1, 0)));
-  if (std::abs(std::cos(pitch)) < 1e-12) return {std::atan2(-r(1, 2), r(1, 1)), pitch, 0.0};
-  // Near upright roll is uncertain. Yaw is that of what is left of the rotation without it, so that both together are
-  // exact.
-  const double roll = std::atan2(r(2, 1), r(2, 2));
-  const Eigen::Vector3d left = std::cos(roll) * r.col(1) - std::sin(roll) * r.col(2);
-  return {roll, pitch, std::atan2(-left(0), left(1))};
-}
 
 Eigen::Isometry3d to_pose(const Frame& frame) {
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
@@ -37,7 +28,7 @@ Eigen::Isometry3d to_pose(const Frame& frame) {
 Frame to_frame(const Eigen::Isometry3d& pose) {
   Frame frame;
   frame.xyz_mm = pose.translation().unaryExpr(&without_rounding);
-  frame.rpy_deg = (rpy_of(pose.linear()) / radians).unaryExpr(&without_rounding);
+  frame.rpy_deg = (roll_pitch_yaw(pose.linear()) / radians).unaryExpr(&without_rounding);
   return frame;
 }
 
@@ -87,7 +78,7 @@ void set_origin(TiXmlElement& robot, const std::string& joint, const Eigen::Isom
     TiXmlElement* origin = element->FirstChildElement("origin");
     if (origin == nullptr) origin = element->InsertEndChild(TiXmlElement("origin"))->ToElement();
     origin->SetAttribute("xyz", numbers(pose.translation() / mm));
-    origin->SetAttribute("rpy", numbers(rpy_of(pose.linear())));
+    origin->SetAttribute("rpy", numbers(roll_pitch_yaw(pose.linear())));
   }
 }
 

@@ -35,6 +35,8 @@ TEST(LikelyMistake, SignsZerosOrderAndAxesAreNamed) {
          for (int j = 0; j < 6; ++j) m.poses.joints.col(j) = q.col((j + 1) % 6);
        },
        "columns of the joints are shifted"},
+      {[](Measurements& m) { m.poses.joints.col(2) /= degree; }, "the values of joint3 are degrees, not radians"},
+      {[](Measurements& m) { m.poses.joints.col(4) *= degree; }, "the values of joint5 are radians, not degrees"},
       {[](Measurements& m) { m.positions_mm.col(1) *= -1.0; }, "axis of the instrument is reversed"},
       {[](Measurements& m) {
          m.poses.joints.col(1) *= -1.0;

@@ -156,6 +156,24 @@ TEST(Chain, DeformationMovesNeitherTheDirectionOfGravityNorTheBodyOfTheLink) {
   }
 }
 
+// Roll and yaw come from entries of the size of the pitch's cosine: each alone is uncertain there.
+TEST(RollPitchYaw, MakeTheSameRotationNextToAQuarterTurnOfPitch) {
+  Random random(6);
+  for (int digits = 0; digits <= 14; ++digits) {
+    for (const double side : {-1.0, 1.0}) {
+      Frame frame;
+      frame.rpy_deg = {random.uniform(-179.0, 179.0), side * (90.0 - 50.0 * std::pow(10.0, -digits)),
+                       random.uniform(-179.0, 179.0)};
+      const Eigen::Matrix3d rotation = frame_matrix(frame).linear();
+      const Vector3d angles = roll_pitch_yaw(rotation);
+      const Frame again{.rpy_deg = angles / degree};
+      const double most = digits < 12 ? 4e-15 : 2e-12;  // what is nearer counts as a quarter turn
+      EXPECT_LT((frame_matrix(again).linear() - rotation).cwiseAbs().maxCoeff(), most) << frame.rpy_deg(1);
+      if (digits < 3) EXPECT_LT((again.rpy_deg - frame.rpy_deg).cwiseAbs().maxCoeff(), 1e-10);
+    }
+  }
+}
+
 TEST(Chain, ValuesGoInAndComeOutUnchanged) {
   const Robot robot = perturbed(mdh_like(), 1.0, 1.0, 5);
   const Eigen::VectorXd values = geometric_values(robot.chain);

@@ -223,5 +223,30 @@ TEST(SmallSessions, AreLeftOutAndNamedWithTheirLines) {
   EXPECT_TRUE(without_small_sessions(enough).warnings.empty());
 }
 
+// A socket has three values, a plane three, a sphere four, and three of a known radius; all share the tool.
+TEST(SmallSessions, AreJudgedByWhatThereIsToFindOfASocketAPlaneAndASphere) {
+  const Robot robot = make_robot(Convention::dh, {{0, 300, 0, 0}});
+  const struct {
+    const char* column;
+    const char* cell;
+    int too_few;
+  } cases[] = {{"socket", "", 1}, {"plane", "", 3}, {"sphere", "", 4}, {"sphere,radius_mm", ",20", 3}};
+  for (const auto& one : cases) {
+    const auto kept_of = [&](int of_small) {
+      std::string text = fmt::format("q1_rad,{}\n", one.column);
+      for (int k = 0; k < 20; ++k) text += fmt::format("{},large{}\n", k, one.cell);
+      for (int k = 0; k < of_small; ++k) text += fmt::format("{},small{}\n", k, one.cell);
+      return without_small_sessions(parse_measurements(text, "m.csv", robot));
+    };
+    const Measurements left = kept_of(one.too_few);
+    EXPECT_EQ(left.count(), 20) << one.column;
+    ASSERT_EQ(left.warnings.size(), 1U);
+    EXPECT_NE(left.warnings[0].find("1 of 2 sessions, sockets, planes and spheres left out"), std::string::npos)
+        << left.warnings[0];
+    EXPECT_NE(left.warnings[0].find("small (line"), std::string::npos) << left.warnings[0];
+    EXPECT_EQ(kept_of(one.too_few + 1).count(), 20 + one.too_few + 1) << one.column;
+  }
+}
+
 }  // namespace
 }  // namespace llmt::robotics

@@ -121,8 +121,9 @@ void doubt_approximations(Missing& missing) {
     found.confirmed = false;
     const std::vector<std::string> inputs = place_of(found).first;
     if (!doubted.insert(inputs).second) continue;
-    missing.notes.push_back(fmt::format("so many terms of {} may be an approximation of one that was not tried",
-                                        fmt::join(inputs, " and ")));
+    missing.notes.push_back(
+        fmt::format("there are many terms of {}: together they may approximate one that was not tried",
+                    fmt::join(inputs, " and ")));
   }
 }
 

@@ -17,7 +17,7 @@
 
 namespace llmt::robotics {
 
-/// FixedParameter::why of the length that stands for the scale where all readings are of sockets and planes.
+/// FixedParameter::why of the length that stands for the scale where all readings are of what the tool touches.
 inline constexpr const char* unseen_scale = "no reading shows the scale";
 
 /// Why a parameter was not identified.

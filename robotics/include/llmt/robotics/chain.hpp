@@ -41,6 +41,7 @@ struct Frame {
 struct NamedFrame {
   std::string name;
   Frame frame;
+  double radius_mm = 0.0;  ///< of a base that is a sphere, see is_sphere(); else without meaning
 };
 
 /// How a joint without a drive of its own follows another: q = multiplier q_joint + offset.
@@ -99,15 +100,15 @@ struct Chain {
 void validate(const Chain& chain);
 
 /// The geometric parameters in their fixed order: base.{x,y,z,rx,ry,rz}, tool.{...}, then per joint
-/// {theta,d,a,b,alpha,beta}, named "joint2.a" after the joint, then `base@NAME.x`, ... of further bases and
-/// `tool@NAME.x`, ... of further tools. Units mm and deg; scales 1 mm and 0.1 deg. All are free; whoever calibrates
-/// decides.
+/// {theta,d,a,b,alpha,beta}, named "joint2.a" after the joint, then `base@NAME.x`, ... of further bases,
+/// `tool@NAME.x`, ... of further tools, and `base@NAME.radius` of bases that are spheres. Units mm and deg; scales 1 mm
+/// and 0.1 deg. All are free; whoever calibrates decides.
 std::vector<discovery::Parameter> geometric_parameters(const Chain& chain);
 
 /// Sum of the lengths of all links and of the tool: no point of the arm is farther from its base, mm.
 double reach_of(const Chain& chain);
 
-/// Number of geometric parameters: 12 + 6 per joint and per further base or tool.
+/// Number of geometric parameters: 12 + 6 per joint and per further base or tool + 1 per sphere.
 Eigen::Index geometric_parameter_count(const Chain& chain);
 
 /// Their values in that order.
@@ -140,7 +141,15 @@ bool is_socket(std::string_view base);
 /// every reading finds the tool point in.
 bool is_plane(std::string_view base);
 
-/// Whether a base stands for something that the tool touches, a socket or a plane, and not for a set-up of an
+/// Whether a base stands for a sphere of unknown radius, by its name, "sphere NAME": then its origin is the centre, its
+/// axes are any, and every reading finds the tool point at the distance NamedFrame::radius_mm from the centre.
+bool is_sphere(std::string_view base);
+
+/// Whether a base stands for a sphere whose radius is given with the readings, by its name, "known sphere NAME": its
+/// origin is the centre, and its axes are any.
+bool is_known_sphere(std::string_view base);
+
+/// Whether a base stands for something that the tool touches, a socket, a plane or a sphere, and not for a set-up of an
 /// instrument.
 bool is_touched(std::string_view base);
 

@@ -18,6 +18,11 @@ struct Pose {
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
 };
 
+/// Fixed-axis roll, pitch, yaw in rad of R = Rz(yaw) Ry(pitch) Rx(roll), the pitch from -pi/2 to pi/2. Next to a
+/// quarter turn of pitch only roll and yaw together are certain, and together they are exact. At a quarter turn yaw is
+/// 0.
+Eigen::Vector3d roll_pitch_yaw(const Eigen::Matrix3d& rotation);
+
 /// What elasticity, gears or heat do to an arm in one pose: small changes on top of the rigid chain. Vectors are in the
 /// world frame.
 struct Deformation {

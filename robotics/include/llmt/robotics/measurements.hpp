@@ -49,9 +49,10 @@ Measurements select(const Measurements& measurements, const std::vector<Eigen::I
 /// All but the given rows.
 Measurements without_rows(const Measurements& measurements, const std::vector<std::size_t>& left_out);
 
-/// The measurements without sessions, sockets and planes that have fewer measured coordinates than their base and their
-/// tools have values: they say nothing of the arm, and cannot be judged. A warning names them and their lines. A file
-/// of one session stays as it is.
+/// The measurements without sessions, sockets, planes and spheres that have no more measured coordinates than there are
+/// numbers to find of them: they say nothing of the arm, and cannot be judged. These numbers are six of a session, four
+/// of a sphere of unknown radius, three of anything else that is touched, and three of every tool that is seen there
+/// alone. A warning names them and their lines. A file of one session stays as it is.
 Measurements without_small_sessions(const Measurements& measurements);
 
 /// Throws std::invalid_argument if shapes differ, a number is not finite, no row or no coordinate was measured, or the
@@ -119,6 +120,8 @@ ColumnMap parse_column_map(const std::string& text, const std::string& name);
 ///   target, session                                      names: of what was looked at, of how the instrument stood
 ///   socket                                               name of what the tool's ball lies in, instead of positions
 ///   plane                                                name of a flat surface that the tool point lies on, likewise
+///   sphere                                               name of a ball that the tool point lies on, likewise
+///   radius_mm (also _m, _um)                             of that sphere, at the tool point; optional
 ///   reference                                            name of a point that stands still and is read in this row
 ///   distance_mm (also _m, _um)                           instead of positions: distance from a fixed point
 ///   payload_kg temp_C time_s order pose dirN tauN_Nm qmeasN_deg sigma_x_um U95_x_um ...   covariates, optional
@@ -128,9 +131,10 @@ ColumnMap parse_column_map(const std::string& text, const std::string& name);
 /// with_frames() adds. In another session the tool is another one, too: "SESSION", or "SESSION/TARGET".
 ///
 /// The centre of a socket is the origin of the base "socket NAME", see is_socket(); a plane is that of x and y of the
-/// base "plane NAME", and z = 0 is what was measured. Readings of reference points are no
-/// rows of the result: the movement of the instrument that they show is taken off the others, see
-/// docs/file-formats.md.
+/// base "plane NAME", and z = 0 is what was measured. The centre of a sphere is the origin of the base "sphere NAME",
+/// see is_sphere(), or of "known sphere NAME" with its radius: the distance from it is what was measured, less the
+/// radius of the base or equal to the one given. Readings of reference points are no rows of the result: the movement
+/// of the instrument that they show is taken off the others, see docs/file-formats.md.
 ///
 /// Covariates keep their names, but qmeasN_deg becomes qmeasN_rad. Columns named in `also`, or in a formula among the
 /// robot's effects, are covariates too. With order or time_s, add_moves() is called.

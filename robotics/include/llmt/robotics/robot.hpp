@@ -21,7 +21,7 @@ inline constexpr double farthest_mm = 1e15;
 /// The poses of the given rows.
 Poses select(const Poses& poses, const std::vector<Eigen::Index>& rows);
 
-/// Whether any of the poses was read by an instrument: not all are readings of sockets and planes, see is_touched().
+/// Whether any of the poses was read by an instrument: not all are of what the tool touches, see is_touched().
 bool has_instrument(const Poses& poses);
 
 /// Throws std::invalid_argument: see validate(Chain), unknown effects, non-finite effect values, an effect named twice

@@ -40,7 +40,8 @@ struct Moved {
   std::vector<std::string> or_else;  ///< that would explain the measurements equally well
 };
 
-struct RobotCheck {
+/// How good a robot is over all new poses, and which of them the calibration covers.
+struct CheckedError {
   ErrorFigures error;         ///< mm, over the new poses; base and tool fitted to them unless it is the same session
   Eigen::VectorXd errors_mm;  ///< n distances
   bool accuracy_is_of_noise = false;  ///< no error on poses left out was stored: from the noise of the poses fitted
@@ -48,17 +49,20 @@ struct RobotCheck {
   double limit_mm = 0.0;              ///< mean error from which on the robot is no longer good
   bool still_good = false;
   bool has_ranges = false;  ///< the description has the joint ranges of the calibration
-  /// Joints of new poses beyond those ranges. Where there are any, only the other poses decide on what follows.
+  /// Joints of new poses beyond those ranges. Where there are any, only the other poses decide on what moved.
   std::vector<JointBeyond> beyond;
   std::vector<Eigen::Index> uncovered;  ///< rows_beyond() of them
-  ErrorFigures covered_error;           ///< mm, over the covered poses, base and tool fitted to them alone
-  bool good_where_covered = false;      ///< still_good of the covered poses
-  bool too_few_covered = false;         ///< to say what moved: `moved` is empty
-  std::vector<Moved> moved_beyond;      ///< what the fit to all poses names, and the covered poses do not
-  std::vector<Moved> moved;             ///< in the order in which they were found
-  double refitted_mm = 0.0;             ///< mean error if what moved were identified anew
-  double noise_mm = 0.0;         ///< standard deviation of a coordinate that no change of the parameters explains
-  double noise_before_mm = 0.0;  ///< the same at calibration; 0: not known
+  bool too_few_covered = false;         ///< to say what moved: RobotCheck::moved is empty
+};
+
+struct RobotCheck : CheckedError {
+  ErrorFigures covered_error;       ///< mm, over the covered poses, base and tool fitted to them alone
+  bool good_where_covered = false;  ///< still_good of the covered poses
+  std::vector<Moved> moved_beyond;  ///< what the fit to all poses names, and the covered poses do not
+  std::vector<Moved> moved;         ///< in the order in which they were found
+  double refitted_mm = 0.0;         ///< mean error if what moved were identified anew
+  double noise_mm = 0.0;            ///< standard deviation of a coordinate that no change of the parameters explains
+  double noise_before_mm = 0.0;     ///< the same at calibration; 0: not known
   bool unexplained =
       false;                ///< noise_mm is larger beyond chance and by a third: something changed that is no parameter
   Eigen::Index tested = 0;  ///< number of parameters and groups

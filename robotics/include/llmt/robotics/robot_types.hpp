@@ -52,7 +52,9 @@ struct Robot {
 enum class Reading {
   position,     ///< x, y, z of the tool point in the world frame, mm
   orientation,  ///< lever times the rotation vector from `reference` to the tool's orientation, in the world frame, mm
-  distance,     ///< distance of the tool point from the origin of the world frame, mm; then two zeros
+  /// Distance of the tool point from the origin of the world frame, mm, less NamedFrame::radius_mm if the base is a
+  /// sphere of unknown radius; then two zeros.
+  distance,
 };
 
 /// What one row of poses is a reading of.
@@ -60,7 +62,7 @@ struct Observation {
   std::string base = {};  ///< name among Chain::bases, or empty: Chain::base
   std::string tool = {};  ///< name among Chain::tools, or empty: Chain::tool
   Reading reading = Reading::position;
-  double lever_mm = 1000.0;                                 ///< of an orientation: so many mm are one rad
+  double lever_mm = 1000.0;                                 ///< of an orientation: this length stands for one rad
   Eigen::Matrix3d reference = Eigen::Matrix3d::Identity();  ///< of an orientation
   Eigen::Index stand = 0;  ///< rows with equal numbers were read while the arm stood still once
 };
