@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <numeric>
 #include <set>
 #include <string>
 
@@ -232,22 +233,28 @@ Calibration calibrate_without_maps(const Robot& robot, const Measurements& measu
     calibration.registration = register_frames(calibration.registered, measurements, options);
   }
   calibration.robot = calibration.registered;
-  const discovery::LeastSquaresProblem problem = calibration_problem(calibration.robot, measurements);
+  discovery::LeastSquaresProblem problem = calibration_problem(calibration.robot, measurements);
   if (options.start_as_given) {
     calibration.registration.values = start_values(problem);
     calibration.registration.residuals = problem.residual(calibration.registration.values);
   }
   std::vector<std::string> reasons = reasons_to_fix(robot, options);
   fix_what_sockets_take_up(robot, measurements.poses, reasons);
-  Eigen::MatrixXd jacobian = discovery::evaluate_jacobian(problem, calibration.registration.values);
   // Which geometry is of no use shows on the rigid arm: on one that bends, a combination that moves nothing when rigid
   // moves loads, and would be identified from the thousandth part of an effect.
   Robot rigid = calibration.registered;
   rigid.effects.clear();
   const Eigen::Index geometric = geometric_parameter_count(rigid.chain);
-  jacobian.leftCols(geometric) = position_jacobian(rigid, measurements.poses)(measured_rows(measurements), Eigen::all);
+  std::vector<Eigen::Index> of_effects(reasons.size() - static_cast<std::size_t>(geometric));
+  std::iota(of_effects.begin(), of_effects.end(), geometric);
+  Eigen::MatrixXd jacobian(3 * measurements.count(), std::ssize(reasons));
+  jacobian.leftCols(geometric) = position_jacobian(rigid, measurements.poses);
+  jacobian.rightCols(std::ssize(of_effects)) =
+      position_jacobian(calibration.registered, measurements.poses, of_effects);
+  jacobian = jacobian(measured_rows(measurements), Eigen::all).eval();
   fix_dependent(problem.parameters, jacobian, geometric, options.dependence_tolerance, reasons);
   keep_scale(calibration.registered, measurements.poses, options, reasons);
+  problem.jacobian = free_derivatives(calibration.registered, measurements, reasons, false);
   identify(calibration, measurements, problem, reasons, options);
   calibration.robot.identified = identified_parameters(calibration.result, reasons);
   calibration.robot.calibration = record_of(calibration, measurements);

@@ -40,7 +40,7 @@ Weighed weighed(const Calibration& calibration, const Measurements& measurements
                            : measurements.poses.observations[orientation_rows(measurements.poses).front()].lever_mm;
   result.weights =
       NoiseModel(measurements, {}).weights({calibration.noise_mm, 1e-3 * calibration.orientation_noise_mrad * lever});
-  result.jacobian = position_jacobian(calibration.robot, measurements.poses)(rows, free);
+  result.jacobian = position_jacobian(calibration.robot, measurements.poses, free)(rows, Eigen::all);
   const Eigen::MatrixXd errors =
       (measurements.positions_mm - positions(calibration.robot, measurements.poses)).transpose();
   result.residuals = errors.reshaped()(rows).cwiseProduct(result.weights);

@@ -139,18 +139,25 @@ discovery::SolverResult solve_for(Robot& robot, discovery::LeastSquaresProblem p
   return result;
 }
 
+discovery::Jacobian free_derivatives(const Robot& robot, const Measurements& measurements,
+                                     const std::vector<std::string>& reasons, bool of_rigid_arm) {
+  std::vector<Eigen::Index> free;
+  for (std::size_t k = 0; k < reasons.size(); ++k) {
+    if (reasons[k].empty()) free.push_back(static_cast<Eigen::Index>(k));
+  }
+  return [=, poses = measurements.poses, rows = measured_rows(measurements)](const Eigen::VectorXd& values) {
+    Robot moved = with_values(robot, values);
+    if (of_rigid_arm) moved.effects.clear();
+    Eigen::MatrixXd jacobian = Eigen::MatrixXd::Zero(std::ssize(rows), values.size());
+    jacobian(Eigen::all, free) = position_jacobian(moved, poses, free)(rows, Eigen::all);
+    return jacobian;
+  };
+}
+
 discovery::SolverResult fit_frames(Robot& robot, const Measurements& measurements,
                                    const std::vector<std::string>& reasons, const discovery::SolverOptions& solver) {
   discovery::LeastSquaresProblem problem = calibration_problem(robot, measurements);
-  const std::vector<Eigen::Index> rows = measured_rows(measurements);
-  problem.jacobian = [&, given = robot](const Eigen::VectorXd& values) -> Eigen::MatrixXd {
-    Robot moved = with_values(given, values);
-    moved.effects.clear();
-    Eigen::MatrixXd jacobian = Eigen::MatrixXd::Zero(std::ssize(rows), values.size());
-    const Eigen::MatrixXd by_geometry = position_jacobian(moved, measurements.poses)(rows, Eigen::all);
-    jacobian.leftCols(by_geometry.cols()) = by_geometry;
-    return jacobian;
-  };
+  problem.jacobian = free_derivatives(robot, measurements, reasons, true);
   return solve_for(robot, problem, reasons, solver);
 }
 

@@ -13,8 +13,14 @@ namespace llmt::robotics {
 discovery::SolverResult solve_for(Robot& robot, discovery::LeastSquaresProblem problem,
                                   const std::vector<std::string>& reasons, const discovery::SolverOptions& solver);
 
-/// The same over bases and tools alone, by derivatives of the rigid arm. Those of an arm that bends tell a turn of the
-/// tool from the place of the payload, by a thousandth of what the effects do: a fit would turn it at will.
+/// Derivatives of calibration_problem() by the parameters without a reason to be fixed; the other columns, which nobody
+/// reads, are zero. `of_rigid_arm`: as if the robot had no effects; then none of their values may be free. Robot and
+/// poses are copied into it.
+discovery::Jacobian free_derivatives(const Robot& robot, const Measurements& measurements,
+                                     const std::vector<std::string>& reasons, bool of_rigid_arm);
+
+/// As solve_for(), over bases and tools alone, by derivatives of the rigid arm. Those of an arm that bends tell a turn
+/// of the tool from the place of the payload, by a thousandth of what the effects do: a fit would turn it at will.
 discovery::SolverResult fit_frames(Robot& robot, const Measurements& measurements,
                                    const std::vector<std::string>& reasons, const discovery::SolverOptions& solver);
 

@@ -169,7 +169,7 @@ void find_moved(const CorrectedRobot& robot, const Robot& before, const Measurem
   for (const Eigen::Index column : columns) parameters.push_back(all[column]);
   MovementProblem problem;
   problem.level = options.level;
-  problem.jacobian = position_jacobian(robot.robot, measurements.poses)(rows, columns);
+  problem.jacobian = position_jacobian(robot.robot, measurements.poses, columns)(rows, Eigen::all);
   for (std::size_t k = 0; k < parameters.size(); ++k) problem.jacobian.col(k) *= parameters[k].scale;
   const Eigen::MatrixXd missing = (measurements.positions_mm - positions(robot, measurements.poses)).transpose();
   problem.residuals = missing.reshaped()(rows);

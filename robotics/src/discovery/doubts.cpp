@@ -45,7 +45,7 @@ double left_by_compliance(Robot robot, const Calibration& baseline, const Measur
   robot.chain.gravity_m_s2 = gravity;
   std::vector<Effect> soft;
   for (const Joint& joint : robot.chain.joints) soft.push_back({"joint_compliance", joint.name, {0.0}});
-  const Eigen::MatrixXd geometry = position_jacobian(baseline.robot, measurements.poses)(rows, free);
+  const Eigen::MatrixXd geometry = position_jacobian(baseline.robot, measurements.poses, free)(rows, Eigen::all);
   Eigen::MatrixXd columns(errors.size(), geometry.cols() + std::ssize(soft));
   columns << geometry, effect_signatures(robot, soft, measurements.poses)(rows, Eigen::all);
   for (Eigen::Index k = 0; k < columns.cols(); ++k) columns.col(k) /= std::max(columns.col(k).norm(), 1e-300);

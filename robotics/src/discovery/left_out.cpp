@@ -28,7 +28,7 @@ Eigen::VectorXd left_out(const Calibration& fitted, const Measurements& measurem
     if (fitted.robot.identified[k].state.starts_with("free")) free.push_back(static_cast<Eigen::Index>(k));
   }
   const std::vector<Eigen::Index> rows = measured_rows(kept);
-  Eigen::MatrixXd jacobian = position_jacobian(fitted.robot, kept.poses)(rows, free);
+  Eigen::MatrixXd jacobian = position_jacobian(fitted.robot, kept.poses, free)(rows, Eigen::all);
   constexpr double nothing = 1e-7;  // rounding, next to what the others move
   const double least = jacobian.cols() > 0 ? nothing * jacobian.colwise().norm().maxCoeff() : 0.0;
   for (auto column : jacobian.colwise()) {

@@ -66,7 +66,7 @@ Residuals residuals_of(const Calibration& fitted, const Measurements& measuremen
   for (std::size_t k = 0; k < fitted.robot.identified.size(); ++k) {
     if (fitted.robot.identified[k].state.starts_with("free")) free.push_back(static_cast<Eigen::Index>(k));
   }
-  Eigen::MatrixXd jacobian = position_jacobian(fitted.robot, measurements.poses)(rows, free);
+  Eigen::MatrixXd jacobian = position_jacobian(fitted.robot, measurements.poses, free)(rows, Eigen::all);
   for (auto column : jacobian.colwise()) {
     if (column.norm() > 0.0) column.normalize();
   }

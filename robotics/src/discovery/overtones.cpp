@@ -39,7 +39,7 @@ Rest rest_of(const Investigation& investigation) {
   for (std::size_t k = 0; k < fitted.robot.identified.size(); ++k) {
     if (fitted.robot.identified[k].state == "free") free.push_back(static_cast<Eigen::Index>(k));
   }
-  Eigen::MatrixXd columns = position_jacobian(fitted.robot, rest.kept.poses)(rest.rows, free);
+  Eigen::MatrixXd columns = position_jacobian(fitted.robot, rest.kept.poses, free)(rest.rows, Eigen::all);
   for (Eigen::Index k = 0; k < columns.cols(); ++k) columns.col(k) /= std::max(columns.col(k).norm(), 1e-300);
   rest.rank = columns.cols();
   rest.fitted.compute(columns);

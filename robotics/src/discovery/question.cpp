@@ -105,9 +105,17 @@ EffectQuestion question(const Robot& robot, const std::vector<Hypothesis>& found
       result.hypotheses.push_back(std::move(scanned));
   }
   add_signatures(scene, result.hypotheses);
-  const Eigen::MatrixXd jacobian = position_jacobian(robot, measurements.poses);
+  const std::vector<Eigen::Index> rows = measured_rows(measurements);
+  const Eigen::Index geometric = geometric_parameter_count(robot.chain);
+  // Of the fitted geometry, then of all effects.
+  std::vector<Eigen::Index> columns = independent_geometry(robot, measurements, rows);
+  const auto fitted = std::ssize(columns);
+  const auto all = static_cast<Eigen::Index>(parameters(robot).size());
+  for (Eigen::Index k = geometric; k < all; ++k) columns.push_back(k);
+  const Eigen::MatrixXd jacobian = position_jacobian(robot, measurements.poses, columns);
   Eigen::VectorXd explained = residuals;
-  Eigen::Index column = geometric_parameter_count(robot.chain);
+  Eigen::Index column = fitted;
+  Eigen::Index baseline = fitted;
   for (std::size_t e = 0; e < robot.effects.size(); ++e) {
     const Effect& effect = robot.effects[e];
     const Eigen::Index k = std::ssize(effect.values);
@@ -115,20 +123,16 @@ EffectQuestion question(const Robot& robot, const std::vector<Hypothesis>& found
       const Eigen::Map<const Eigen::VectorXd> values(effect.values.data(), k);
       explained += jacobian.middleCols(column, k) * values;
       result.hypotheses.push_back(found_before(found[e - own], effect, jacobian.middleCols(column, k)));
+    } else {
+      baseline += k;
     }
     column += k;
   }
   if (options.shapes) {
     for (Hypothesis& shape : shape_hypotheses(scene)) result.hypotheses.push_back(std::move(shape));
   }
-  const std::vector<Eigen::Index> rows = measured_rows(measurements);
-  std::vector<Eigen::Index> baseline = independent_geometry(robot, measurements, rows);
-  Eigen::Index next = geometric_parameter_count(robot.chain);
-  for (std::size_t e = 0; e < own; ++e) {
-    for (std::size_t k = 0; k < robot.effects[e].values.size(); ++k) baseline.push_back(next++);
-  }
   result.evidence.residuals = explained(rows);
-  result.evidence.jacobian = jacobian(rows, baseline);
+  result.evidence.jacobian = jacobian.leftCols(baseline)(rows, Eigen::all);
   result.evidence.components = std::ranges::count(measurements.measured, true);
   result.evidence.repeats = repeats_of(measurements.poses);
   // Deflections are at most a hundredth of the levers, and the error of first order is a fraction of that, here

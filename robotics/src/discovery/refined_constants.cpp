@@ -34,7 +34,7 @@ Augmented augmented(const Calibration& fitted, const Measurements& kept, const s
   const std::vector<Eigen::Index> rows = measured_rows(kept);
   fit.errors = stacked(kept.positions_mm, rows) - stacked(positions(fitted.robot, kept.poses), rows);
   fit.columns.resize(fit.errors.size(), std::ssize(fit.free) + std::ssize(open));
-  fit.columns.leftCols(std::ssize(fit.free)) = position_jacobian(fitted.robot, kept.poses)(rows, fit.free);
+  fit.columns.leftCols(std::ssize(fit.free)) = position_jacobian(fitted.robot, kept.poses, fit.free)(rows, Eigen::all);
   for (std::size_t e = 0; e < open.size(); ++e) {
     constexpr double share = 1e-4;
     Robot moved = fitted.robot;

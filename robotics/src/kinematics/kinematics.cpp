@@ -197,13 +197,13 @@ Pose Kinematics::motions_into(std::vector<Motion>& motions, const Eigen::VectorX
     while (joint < joints() && variable_[joint] <= i) ++joint;
     while (body < joints() && body_frame_[body] <= i) ++body;
     const Element& element = elements_[i];
-    motions[element.parameter] = {.axis = frame.rotation.col(element.axis),
-                                  .point = frame.position_mm,
-                                  .turns = element.rotation,
-                                  .turns_base = element.rotation && i < base_end_,
-                                  .first_joint = joint,
-                                  .first_body = body,
-                                  .first_twist = joint};
+    Motion& motion = motions[element.parameter];
+    motion.axis = frame.rotation.col(element.axis);
+    motion.point = frame.position_mm;
+    motion.turns = element.rotation;
+    motion.turns_base = element.rotation && i < base_end_;
+    motion.first_joint = motion.first_twist = joint;
+    motion.first_body = body;
   });
 }
 

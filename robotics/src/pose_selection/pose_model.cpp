@@ -54,8 +54,7 @@ Eigen::MatrixXd PoseModel::derivatives(const Poses& poses) const {
   for (Eigen::Index first = 0; first < poses.count(); first += block) {
     std::vector<Eigen::Index> rows(std::min(block, poses.count() - first));
     for (std::size_t i = 0; i < rows.size(); ++i) rows[i] = first + static_cast<Eigen::Index>(i);
-    const Eigen::MatrixXd jacobian = position_jacobian(robot_, select(poses, rows));
-    result.middleRows(3 * first, jacobian.rows()) = jacobian(Eigen::all, columns_);
+    result.middleRows(3 * first, 3 * std::ssize(rows)) = position_jacobian(robot_, select(poses, rows), columns_);
   }
   for (std::size_t k = 0; k < parameters_.size(); ++k) result.col(k) *= parameters_[k].scale;
   return result;

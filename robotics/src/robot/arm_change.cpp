@@ -174,7 +174,8 @@ Eigen::Vector3d input_change(const PoseContext& pose, const WeightsBeyond& weigh
     case Input::Kind::body:
       return body_moves ? turned(motion, arm.body_rotation[j].col(input.column)) : nothing;
     case Input::Kind::force:
-      return load_change(pose, weights, change, j).force_N;
+      // Moved weights weigh what they did.
+      return change.loads ? load_change(pose, weights, change, j).force_N : nothing;
     case Input::Kind::moment:
       return load_change(pose, weights, change, j).moment_Nm;
     case Input::Kind::gravity:

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <set>
 #include <stdexcept>
 
@@ -182,22 +183,50 @@ Eigen::MatrixXd joint_motions(const Robot& robot, const Poses& poses) {
   return result;
 }
 
+namespace {
+
+// Into the rows of a setting, by the parameters(robot) with the numbers `columns`.
+void add_derivatives(const Robot& robot, const Setting& setting, const std::vector<Eigen::Index>& columns,
+                     Eigen::MatrixXd& result) {
+  RobotEvaluator evaluator(setting);
+  const std::vector<Eigen::Index> of_setting = columns_of(setting, robot);
+  std::vector<Eigen::Index> own;     // parameters of the setting's robot
+  std::vector<Eigen::Index> places;  // of these in the result
+  for (std::size_t k = 0; k < columns.size(); ++k) {
+    const auto found = std::ranges::find(of_setting, columns[k]);
+    if (found == of_setting.end()) continue;
+    own.push_back(found - of_setting.begin());
+    places.push_back(static_cast<Eigen::Index>(k));
+  }
+  const auto radius = std::ranges::find(columns, setting.radius) - columns.begin();
+  Eigen::Matrix3Xd part(3, std::ssize(own));
+  for (std::size_t i = 0; i < setting.rows.size(); ++i) {
+    evaluator.jacobian(static_cast<Eigen::Index>(i), own, part);
+    for (std::size_t k = 0; k < places.size(); ++k) {
+      result.col(places[k]).segment<3>(3 * setting.rows[i]) = part.col(static_cast<Eigen::Index>(k));
+    }
+    if (radius < std::ssize(columns)) result(3 * setting.rows[i], radius) = -1.0;
+  }
+}
+
+}  // namespace
+
 Eigen::MatrixXd position_jacobian(const Robot& robot, const Poses& poses) {
-  const std::size_t count = parameters(robot).size();
+  std::vector<Eigen::Index> all(parameters(robot).size());
+  std::iota(all.begin(), all.end(), Eigen::Index{0});
+  return position_jacobian(robot, poses, all);
+}
+
+Eigen::MatrixXd position_jacobian(const Robot& robot, const Poses& poses, const std::vector<Eigen::Index>& columns) {
   if (is_one_setting(robot, poses)) {
     RobotEvaluator evaluator(robot, poses);
-    Eigen::MatrixXd result(3 * poses.count(), count);
-    for (Eigen::Index i = 0; i < poses.count(); ++i) result.middleRows(3 * i, 3) = evaluator.jacobian(i);
+    Eigen::MatrixXd result(3 * poses.count(), std::ssize(columns));
+    for (Eigen::Index i = 0; i < poses.count(); ++i) evaluator.jacobian(i, columns, result.middleRows<3>(3 * i));
     return result;
   }
-  Eigen::MatrixXd result = Eigen::MatrixXd::Zero(3 * poses.count(), count);
+  Eigen::MatrixXd result = Eigen::MatrixXd::Zero(3 * poses.count(), std::ssize(columns));
   for (const Setting& setting : settings_of(robot, poses)) {
-    RobotEvaluator evaluator(setting);
-    const std::vector<Eigen::Index> columns = columns_of(setting, robot);
-    for (std::size_t i = 0; i < setting.rows.size(); ++i) {
-      result.middleRows(3 * setting.rows[i], 3)(Eigen::all, columns) = evaluator.jacobian(i);
-      if (setting.radius >= 0) result(3 * setting.rows[i], setting.radius) = -1.0;
-    }
+    add_derivatives(robot, setting, columns, result);
   }
   return result;
 }

@@ -39,7 +39,9 @@ PreparedEffect prepare(const Chain& chain, const Effect& effect, const Poses& po
                           .constants = effect.constants,
                           .scales = {},
                           .columns = {},
-                          .inputs = {}};
+                          .inputs = {},
+                          .components = {}};
+  prepared.components = components_of(*prepared.type, static_cast<Eigen::Index>(prepared.index), poses.joints.cols());
   prepared.apply = effect.type == "formula" ? compile_formula(chain, effect) : prepared.type->apply;
   for (const EffectParameter& parameter : effect_parameters(chain, effect)) prepared.scales.push_back(parameter.scale);
   for (const std::string& names : effect_columns(chain, effect)) {
@@ -80,12 +82,13 @@ RobotEvaluator::RobotEvaluator(const Robot& robot, const Poses& poses)
     }
   }
   std::set<Eigen::Index> components;
-  for (const PreparedEffect& effect : effects_) {
-    const auto own = components_of(*effect.type, static_cast<Eigen::Index>(effect.index), poses.joints.cols());
-    components.insert(own.begin(), own.end());
-  }
+  for (const PreparedEffect& effect : effects_) components.insert(effect.components.begin(), effect.components.end());
   own_components_.assign(components.begin(), components.end());
   bears_loads_ = std::ranges::any_of(effects_, [](const PreparedEffect& effect) { return effect.type->elastic; });
+  for (Eigen::Index k = 0; k < component_count(poses.joints.cols()); ++k) {
+    trial_components_.push_back(&component_of(trial_, k));
+  }
+  sides_.resize(std::ssize(trial_components_), 3);
 }
 
 PoseContext RobotEvaluator::context(Eigen::Index row) {

@@ -23,6 +23,7 @@ struct PreparedEffect {
   std::vector<double> scales;                   // of each value
   std::vector<const Eigen::VectorXd*> columns;  // of the poses
   std::vector<std::size_t> inputs;              // of RobotEvaluator's that it depends on
+  std::vector<Eigen::Index> components;         // of the deformation that it may change, ascending
 };
 
 /// Finds what an effect needs. Throws std::invalid_argument if a column is missing.
@@ -51,8 +52,8 @@ class RobotEvaluator {
   /// Of the tool.
   Pose pose(Eigen::Index row);
 
-  /// Of the reading, 3 x parameters(robot).
-  Eigen::Matrix3Xd jacobian(Eigen::Index row);
+  /// Of the reading by the parameters(robot) with these numbers: the columns of `out`, in that order.
+  void jacobian(Eigen::Index row, const std::vector<Eigen::Index>& parameters, Eigen::Ref<Eigen::Matrix3Xd> out);
 
   /// J: z_j . load, N m or N.
   Eigen::VectorXd gravity_loads(Eigen::Index row);
@@ -83,26 +84,27 @@ class RobotEvaluator {
   std::vector<Load> loads_;
   std::vector<double> columns_;
 
-  // For derivatives, see robot_derivatives.cpp. A deformation is a vector of components there.
-  Deformation trial_;
-  Pose tool_;
-  Eigen::Vector3d arm_tool_mm_;           // without Deformation::world_mm
-  std::vector<Motion> motions_;           // of arm_, by the geometric parameters
-  std::vector<Motion> deformed_motions_;  // of the deformed arm
+  // For derivatives. A deformation is a vector of components there.
+  Deformation trial_;                      // by one effect; all zero between two of them
+  std::vector<double*> trial_components_;  // all of trial_
+  Pose tool_;                              // of the deformed arm
+  Eigen::Vector3d arm_tool_mm_;            // without Deformation::world_mm
+  std::vector<Motion> motions_;            // of arm_, by the geometric parameters, where they differ from the next
+  std::vector<Motion> deformed_motions_;   // of the deformed arm
   WeightsBeyond weights_;
-  std::vector<Eigen::Index> components_;         // that rows and columns stand for, own_components_ or all
-  std::vector<const double*> trial_components_;  // these of trial_
-  std::vector<Eigen::Index> place_;              // of each component among them, or -1
-  Eigen::MatrixXd by_value_;                     // components x values: of the deformation, by the values of effects
-  Eigen::MatrixXd by_input_;                     // components x 3 inputs: of the deformation
-  std::vector<std::size_t> live_;                // inputs that do something in this pose
-  Eigen::Matrix3Xd direct_;                      // 3 x components: of the reading, the rest of the deformation held
-  Eigen::Matrix3Xd levers_;                      // 3 x components: of the reading, in equilibrium
-  Eigen::Matrix3Xd input_levers_;                // 3 x 3 inputs: of the reading, in equilibrium
-  Eigen::MatrixXd responses_;                    // components x needed ones: of the deformation, by itself
-  Eigen::MatrixXd sides_;                        // components x 3: for differences
-  std::vector<Eigen::Matrix3d> held_back_;       // of the reading, by a turn of the arm from that twist on that leaves
-                                                 // the twists where they point in the world
+  std::vector<Eigen::Index> components_;    // that rows and columns stand for, own_components_ or all
+  std::vector<Eigen::Index> place_;         // of each component among them, or -1
+  Eigen::MatrixXd by_input_;                // components x 3 inputs: of the deformation
+  std::vector<std::size_t> live_;           // inputs that do something in this pose
+  Eigen::Matrix3Xd direct_;                 // 3 x components: of the reading, the rest of the deformation held
+  Eigen::Matrix3Xd levers_;                 // 3 x components: of the reading, in equilibrium
+  Eigen::Matrix3Xd input_levers_;           // 3 x 3 inputs: of the reading, in equilibrium
+  Eigen::MatrixXd responses_;               // components x components: of the deformation, by itself
+  Eigen::MatrixX3d sides_;                  // components x 3: of the deformation by an effect, for differences
+  std::vector<Eigen::Matrix3d> held_back_;  // of the reading, by a turn of the arm from that twist on that leaves
+                                            // the twists where they point in the world; empty without twists
+  std::vector<double> given_;               // values of an effect
+  Eigen::Matrix3Xd by_effects_;             // 3 x values of all effects: of the reading
 
   const Observation* observation(Eigen::Index row) const {
     return poses_.observations.empty() ? nullptr : &poses_.observations[row];
@@ -118,23 +120,29 @@ class RobotEvaluator {
   PoseContext deform(Eigen::Index row);
   PoseContext settle(Eigen::Index row);
 
-  void prepare_derivatives(PoseContext& pose, Eigen::Index row);
-  void choose_components(const std::vector<Eigen::Index>& chosen);
-  Motion component_motion(Eigen::Index component, bool of_deformed) const;
-  void set_direct_levers(Eigen::Index row);
-  void flat_deformation(PoseContext& pose, Eigen::Index row, const PreparedEffect& effect,
-                        Eigen::Ref<Eigen::VectorXd> out);
-  void add_input(PoseContext& pose, Eigen::Index row, const PreparedEffect& effect, std::size_t input);
-  void set_inputs(PoseContext& pose, Eigen::Index row);
-  void set_response(const PoseContext& pose, Eigen::Index component, Eigen::Ref<Eigen::VectorXd> response);
-  void set_levers(const PoseContext& pose);
+  // robot_levers.cpp: how the reading follows the deformation.
+  void set_levers(PoseContext& pose, Eigen::Index row);
+  void extend_levers(const PoseContext& pose, Eigen::Index row);
   Eigen::Vector3d reading_change(const PoseContext& pose, const ArmChange& change) const;
   Eigen::Vector3d by_motion(const PoseContext& pose, Eigen::Index row, const Motion& motion,
                             const Motion* of_loads) const;
-  void extend_levers(const PoseContext& pose, Eigen::Index row);
-  void by_values(PoseContext& pose, Eigen::Index row, PreparedEffect& effect, Eigen::Ref<Eigen::MatrixXd> out);
+  void deformation_by(PoseContext& pose, Eigen::Index row, const PreparedEffect& effect,
+                      Eigen::Ref<Eigen::VectorXd> out);
+  void choose_components(const std::vector<Eigen::Index>& chosen);
+  Motion component_motion(Eigen::Index component, bool of_deformed) const;
+  void set_direct_levers(Eigen::Index row);
+  void add_input(PoseContext& pose, Eigen::Index row, const PreparedEffect& effect, std::size_t input);
+  void set_inputs(PoseContext& pose, Eigen::Index row);
+  void set_response(const PoseContext& pose, Eigen::Index component, Eigen::Ref<Eigen::VectorXd> response);
+  void settle_levers(const PoseContext& pose);
+  void set_held_back();
+
+  // robot_derivatives.cpp: the reading by parameters.
+  void by_values(PoseContext& pose, Eigen::Index row, PreparedEffect& effect, Eigen::Ref<Eigen::Matrix3Xd> out);
   void by_adjustments(const PoseContext& pose, Eigen::Index row, PreparedEffect& effect, bool is_candidate,
                       Eigen::Ref<Eigen::Matrix3Xd> out);
+  void set_effect_columns(PoseContext& pose, Eigen::Index row);
+  void rigid_jacobian(Eigen::Index row, const std::vector<Eigen::Index>& parameters, Eigen::Ref<Eigen::Matrix3Xd> out);
 };
 
 }  // namespace llmt::robotics

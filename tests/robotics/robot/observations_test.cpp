@@ -94,6 +94,26 @@ TEST(Observations, DerivativesAreThoseOfDifferences) {
   }
 }
 
+// In another order, of the first base and tool and of others, of joints and of effects.
+TEST(Observations, DerivativesBySomeParametersAreTheColumnsOfThoseByAll) {
+  for (const bool bends : {false, true}) {
+    Robot robot = cell();
+    if (!bends) robot.effects.clear();
+    const Poses plain = random_poses(robot.chain, 4, 2);
+    Robot one = robot;
+    one.chain.bases.clear();
+    one.chain.tools.clear();
+    const std::vector<std::pair<Robot, Poses>> arms = {{robot, looked_at(plain, views())}, {one, plain}};
+    for (const auto& [arm, poses] : arms) {
+      const Eigen::MatrixXd all = position_jacobian(arm, poses);
+      std::vector<Eigen::Index> columns;
+      for (Eigen::Index k = all.cols() - 1; k >= 0; k -= 3) columns.push_back(k);
+      EXPECT_EQ(position_jacobian(arm, poses, columns), all(Eigen::all, columns)) << bends;
+      EXPECT_EQ(position_jacobian(arm, poses, {}).cols(), 0);
+    }
+  }
+}
+
 TEST(Observations, JointMotionsAndSignaturesAreThoseOfDifferences) {
   Robot robot = cell();
   robot.effects.clear();

@@ -69,6 +69,10 @@ Eigen::MatrixXd joint_motions(const Robot& robot, const Poses& poses);
 /// Where an effect jumps, as a backlash does, the derivative is that beside the jump.
 Eigen::MatrixXd position_jacobian(const Robot& robot, const Poses& poses);
 
+/// The same by some of parameters() only, given by their different numbers: 3n x (number of columns), in their order.
+/// Takes less time the fewer there are.
+Eigen::MatrixXd position_jacobian(const Robot& robot, const Poses& poses, const std::vector<Eigen::Index>& columns);
+
 /// Load of each joint by the weight of arm and payload in the rigid pose, n x J: the torque z_j . moment in N m, or the
 /// force z_j . force in N for a prismatic joint. Effects that change payload or gravity are included.
 Eigen::MatrixXd gravity_loads(const Robot& robot, const Poses& poses);
