@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <numbers>
 #include <optional>
 #include <stdexcept>
 
@@ -78,11 +79,39 @@ void simulate_mechanism(const MechanismArguments& arguments, const robotics::Mec
                    arguments.output.empty() ? "" : ", written to " + arguments.output));
 }
 
+// What the readings of a coordinate look like if most of them are far outside its limits; empty if they are not.
+std::string suspicion(const robotics::Coordinate& coordinate, const Eigen::VectorXd& readings) {
+  const double span = coordinate.upper - coordinate.lower;
+  const auto inside = [&](double factor) {
+    const auto values = factor * readings.array();
+    return (values > coordinate.lower - 0.5 * span && values < coordinate.upper + 0.5 * span).count();
+  };
+  const Eigen::Index count = readings.array().isFinite().count();
+  if (!coordinate.has_limits() || 2 * inside(1.0) >= count) return "";
+  constexpr double degrees = 180.0 / std::numbers::pi;
+  const char* cause = coordinate.unit != "deg"            ? "check its unit and its sign"
+                      : 2 * inside(degrees) > count       ? "they look like radians"
+                      : 2 * inside(1.0 / degrees) > count ? "they look like degrees that are called radians"
+                                                          : "check its unit, its sign and its zero";
+  return fmt::format("column of {}: {} of {} readings are far outside its limits, {} to {} {}: {}", coordinate.name,
+                     count - inside(1.0), count, coordinate.lower, coordinate.upper, coordinate.unit, cause);
+}
+
 robotics::MechanismTable read_readings(const MechanismArguments& arguments, const robotics::Mechanism& mechanism) {
   robotics::MechanismTable table = robotics::read_mechanism_table(arguments.data, mechanism, arguments.mark);
   if (!table.unused.empty()) {
-    warn(fmt::format("{}: not used, no coordinates of {}: {}", arguments.data, mechanism.name,
-                     fmt::join(table.unused, ", ")));
+    std::vector<std::string> missing;
+    for (std::size_t i = 0; i < mechanism.coordinates.size(); ++i) {
+      const auto column = table.values.col(static_cast<Eigen::Index>(i)).array();
+      if (!column.isFinite().any()) missing.push_back(mechanism.coordinates[i].name);
+    }
+    warn(fmt::format("{}: not used, no coordinates of {}: {}; not measured: {}", arguments.data, mechanism.name,
+                     fmt::join(table.unused, ", "),
+                     missing.empty() ? "none" : fmt::format("{}", fmt::join(missing, ", "))));
+  }
+  for (std::size_t i = 0; i < mechanism.coordinates.size(); ++i) {
+    const std::string found = suspicion(mechanism.coordinates[i], table.values.col(static_cast<Eigen::Index>(i)));
+    if (!found.empty()) warn(arguments.data + ": " + found);
   }
   return table;
 }
@@ -137,10 +166,10 @@ void calibrate_mechanism(const MechanismArguments& arguments, const robotics::Me
   std::vector<Eigen::Index> lines;
   for (const Eigen::Index row : facts.calibration.left_out) lines.push_back(table.lines[row]);
   warn_of_rows(arguments.data, lines, facts.calibration.reasons);
+  if (!arguments.output.empty() && facts.is_good()) robotics::save(facts.calibration.mechanism, arguments.output);
   if (!arguments.errors.empty()) {
     write_file(arguments.errors, with_decimal_mark(mechanism_errors_csv(facts), arguments.mark));
   }
-  if (!arguments.output.empty() && facts.is_good()) robotics::save(facts.calibration.mechanism, arguments.output);
   if (arguments.json) {
     print_json(mechanism_json(facts));
   } else {

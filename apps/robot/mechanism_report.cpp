@@ -71,11 +71,21 @@ std::string verdict(const MechanismFacts& facts, const std::vector<MechanismFigu
     return fmt::format("TOO FEW READINGS: {} of them check others, and {} combinations of parameters are free.",
                        result.residuals.size(), result.rank);
   }
-  if (!result.converged()) return fmt::format("NOT CONVERGED: {}.", result.reason);
+  if (!result.converged()) {
+    return fmt::format(
+        "NOT CONVERGED: {}. Check units, signs and order of the columns, and the start values of the description.",
+        result.reason);
+  }
   const bool is_better =
       std::ranges::all_of(figures, [](const MechanismFigures& one) { return one.after_rms < one.before_rms; });
   if (!is_better)
     return "NO GAIN on poses held out: the description is as good as the calibration, or the poses are too few.";
+  const bool is_partial = std::ranges::any_of(
+      result.unidentifiable, [](const discovery::Combination& combination) { return combination.terms.size() > 1; });
+  if (is_partial) {
+    return fmt::format("CALIBRATED IN PART: the readings determine {} of {} combinations of the free parameters.",
+                       result.rank, result.singular_values.size());
+  }
   return "CALIBRATED.";
 }
 

@@ -83,6 +83,11 @@ TEST(MechanismProgram, MistakesAreRefusedWithTheirPlace) {
   says("q1_deg,q1_rad\n1,2\n", "are one coordinate");
   says("q1_deg,q2_deg\n1,x\n", "t.csv:2: column \"q2_deg\"");
   says("q1_deg,q2_deg\n120,60\n", "no reading checks another one");
+  says("q1_rad,q2_deg\n120,60\n",
+       "t.csv: column of q1: 1 of 1 readings are far outside its limits, 80 to 150 deg: they "
+       "look like degrees that are called radians");
+  says("q1_deg,q2_deg\n2.1,60\n", "they look like radians");
+  says("Q1_deg,q2_deg\n120,60\n", "no coordinates of five-bar: Q1_deg; not measured: q1, p1, p2, x, y");
   folder.write("t.csv", "q1_deg,q2_deg\n120,60\n");
   EXPECT_EQ(mechanism(folder, "t.csv " + five_bar).exit_code, 2);
   EXPECT_EQ(mechanism(folder, five_bar).exit_code, 2);

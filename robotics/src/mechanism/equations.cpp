@@ -23,11 +23,29 @@ double largest_length(const Mechanism& mechanism) {
   return largest > 0.0 ? largest : 1.0;
 }
 
+// Whether a turn changes the equations by less than rounding makes of the changes of a part of a turn.
+bool turns(Equations& equations, const Eigen::VectorXd& parameters, const Eigen::VectorXd& at, Eigen::Index which) {
+  constexpr double rounding = 1e-9;
+  const auto change = [&](double angle) -> Eigen::ArrayXd {
+    Eigen::VectorXd turned = at;
+    turned(which) += angle;
+    return (equations.values(parameters, turned) - equations.values(parameters, at)).array().abs();
+  };
+  const Eigen::ArrayXd largest = change(90.0).max(change(180.0)).max(change(270.0));
+  return (change(360.0) <= rounding * largest).all() && (change(-360.0) <= rounding * largest).all();
+}
+
 }  // namespace
 
 const std::map<std::string, double>& expression_constants() {
   static const std::map<std::string, double> constants = {{"pi", std::numbers::pi}};
   return constants;
+}
+
+Eigen::VectorXd start_of(const Mechanism& mechanism) {
+  Eigen::VectorXd start(std::ssize(mechanism.coordinates));
+  for (Eigen::Index i = 0; i < start.size(); ++i) start(i) = mechanism.coordinates[i].start;
+  return start;
 }
 
 Eigen::VectorXd values_of(const Mechanism& mechanism) {
@@ -36,16 +54,21 @@ Eigen::VectorXd values_of(const Mechanism& mechanism) {
   return values;
 }
 
-std::string as_zero(const std::string& equation) {
+std::size_t sign_of(const std::string& equation) {
   const auto compares = [&](std::size_t at) {
     const bool follows = at > 0 && std::string("=!<>").find(equation[at - 1]) != std::string::npos;
     return follows || (at + 1 < equation.size() && equation[at + 1] == '=');
   };
   for (std::size_t at = 0; at < equation.size(); ++at) {
-    if (equation[at] != '=' || compares(at)) continue;
-    return "(" + equation.substr(0, at) + ") - (" + equation.substr(at + 1) + ")";
+    if (equation[at] == '=' && !compares(at)) return at;
   }
-  return equation;
+  return std::string::npos;
+}
+
+std::string as_zero(const std::string& equation) {
+  const std::size_t sign = sign_of(equation);
+  if (sign == std::string::npos) return equation;
+  return "(" + equation.substr(0, sign) + ") - (" + equation.substr(sign + 1) + ")";
 }
 
 Equations::Equations(const Mechanism& mechanism) {
@@ -129,6 +152,23 @@ Eigen::MatrixXd Equations::by_coordinates(const Eigen::VectorXd& parameters, con
 Eigen::MatrixXd Equations::by_parameters(const Eigen::VectorXd& parameters, const Eigen::VectorXd& coordinates) {
   set(parameters, coordinates);
   return differences(0, parameters.size());
+}
+
+std::vector<Eigen::Index> turning_coordinates(const Mechanism& mechanism) {
+  constexpr int places = 3;
+  Equations equations(mechanism);
+  const Eigen::VectorXd parameters = values_of(mechanism);
+  std::vector<Eigen::Index> turning;
+  for (std::size_t i = 0; i < mechanism.coordinates.size(); ++i) {
+    bool is_turning = mechanism.coordinates[i].unit == "deg";
+    for (int place = 0; is_turning && place < places; ++place) {
+      // Away from the start, too, where symmetry may hide what a turn changes.
+      const Eigen::VectorXd at = start_of(mechanism) + 0.1 * place * equations.typical();
+      is_turning = turns(equations, parameters, at, static_cast<Eigen::Index>(i));
+    }
+    if (is_turning) turning.push_back(static_cast<Eigen::Index>(i));
+  }
+  return turning;
 }
 
 }  // namespace llmt::robotics

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cmath>
 #include <map>
 #include <string>
 #include <vector>
@@ -48,8 +49,21 @@ class Equations {
   Eigen::MatrixXd differences(Eigen::Index first, Eigen::Index count);
 };
 
+/// The coordinates in degrees whose whole turns change no equation: tried at some configurations about the start
+/// values. The angle of a leadscrew is none of them.
+std::vector<Eigen::Index> turning_coordinates(const Mechanism& mechanism);
+
+/// The whole turns, in degrees, that are nearest to an angle in degrees.
+inline double whole_turns(double angle) { return 360.0 * std::round(angle / 360.0); }
+
+/// The start values of the coordinates, in their units.
+Eigen::VectorXd start_of(const Mechanism& mechanism);
+
 /// The values of the parameters, in their units.
 Eigen::VectorXd values_of(const Mechanism& mechanism);
+
+/// Where the "=" of an equation stands that is no part of a comparison; npos if there is none.
+std::size_t sign_of(const std::string& equation);
 
 /// "a = b" as an expression that is 0: "(a) - (b)"; other texts as they are. The only "=" is that of the equation.
 std::string as_zero(const std::string& equation);

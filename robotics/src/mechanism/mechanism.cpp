@@ -5,12 +5,13 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <iterator>
+#include <map>
 #include <set>
 #include <stdexcept>
 
 #include "llmt/random.hpp"
-#include "mechanism/equations.hpp"
-#include "mechanism/pose_solver.hpp"
+#include "mechanism/assembler.hpp"
 
 namespace llmt::robotics {
 namespace {
@@ -72,16 +73,34 @@ void check_coordinate(const Coordinate& coordinate) {
   }
 }
 
-void check_expression(const std::set<std::string>& names, const std::string& where, const std::string& text) {
+// The names that an expression uses.
+std::vector<std::string> check_expression(const std::set<std::string>& names, const std::string& where,
+                                          const std::string& text) {
   try {
-    const Expression expression(as_zero(text), expression_constants());
+    const Expression expression(text, expression_constants());
     for (const std::string& name : expression.names()) {
       if (!names.contains(name))
         refuse(fmt::format("{}: {} is no parameter, coordinate or earlier definition", where, name));
     }
+    return expression.names();
   } catch (const ExpressionError& error) {
     refuse(fmt::format("{}: {}", where, error.what()));
   }
+}
+
+// Each side by itself, so that a message has the column in what was written.
+std::vector<std::string> check_equation(const std::set<std::string>& names, const std::string& where,
+                                        const std::string& equation) {
+  const std::size_t sign = sign_of(equation);
+  if (sign == std::string::npos) return check_expression(names, where, equation);
+  std::vector<std::string> used = check_expression(names, where + ", left of =", equation.substr(0, sign));
+  std::ranges::copy(check_expression(names, where + ", right of =", equation.substr(sign + 1)),
+                    std::back_inserter(used));
+  return used;
+}
+
+void check_use(const std::set<std::string>& used, const std::string& name) {
+  if (!used.contains(name)) refuse(fmt::format("{} occurs in no equation: use it or remove it", name));
 }
 
 void check_shape(const Mechanism& mechanism, const Eigen::MatrixXd& known) {
@@ -90,31 +109,6 @@ void check_shape(const Mechanism& mechanism, const Eigen::MatrixXd& known) {
         fmt::format("the poses have {} coordinates, the mechanism has {}", known.cols(), mechanism.coordinates.size()));
   }
   if (known.array().isInf().any()) refuse("a reading is infinite");
-}
-
-Eigen::VectorXd start_of(const Mechanism& mechanism) {
-  Eigen::VectorXd start(std::ssize(mechanism.coordinates));
-  for (Eigen::Index i = 0; i < start.size(); ++i) start(i) = mechanism.coordinates[i].start;
-  return start;
-}
-
-// The solved pose whose coordinates are nearest in what is known.
-const Eigen::VectorXd& nearest(const std::vector<Eigen::VectorXd>& solved, const Eigen::VectorXd& known,
-                               const Eigen::VectorXd& typical) {
-  const Eigen::VectorXd* best = &solved.front();
-  double least = std::numeric_limits<double>::infinity();
-  for (const Eigen::VectorXd& one : solved) {
-    double distance = 0.0;
-    for (Eigen::Index i = 0; i < known.size(); ++i) {
-      const double gap = (known(i) - one(i)) / typical(i);
-      if (!std::isnan(gap)) distance += gap * gap;
-    }
-    if (distance < least) {
-      least = distance;
-      best = &one;
-    }
-  }
-  return *best;
 }
 
 }  // namespace
@@ -131,13 +125,24 @@ void validate(const Mechanism& mechanism) {
     take_name(names, coordinate.name);
     check_coordinate(coordinate);
   }
+  std::map<std::string, std::vector<std::string>> uses;  // of definitions
   for (const Definition& definition : mechanism.definitions) {
-    check_expression(names, "definition of " + definition.name, definition.text);
+    uses[definition.name] = check_expression(names, "definition of " + definition.name, definition.text);
     take_name(names, definition.name);
   }
+  std::vector<std::string> used;
   for (std::size_t i = 0; i < mechanism.equations.size(); ++i) {
-    check_expression(names, fmt::format("equation {}", i + 1), mechanism.equations[i]);
+    std::ranges::copy(check_equation(names, fmt::format("equation {}", i + 1), mechanism.equations[i]),
+                      std::back_inserter(used));
   }
+  std::set<std::string> reached;
+  while (!used.empty()) {
+    const std::string name = used.back();
+    used.pop_back();
+    if (reached.insert(name).second) std::ranges::copy(uses[name], std::back_inserter(used));
+  }
+  for (const MechanismParameter& parameter : mechanism.parameters) check_use(reached, parameter.name);
+  for (const Coordinate& coordinate : mechanism.coordinates) check_use(reached, coordinate.name);
 }
 
 Eigen::VectorXd noise_of(const Mechanism& mechanism, const Eigen::MatrixXd& known) {
@@ -172,50 +177,8 @@ Eigen::VectorXd noise_of(const Mechanism& mechanism, const Eigen::MatrixXd& know
 }
 
 Assembly assemble(const Mechanism& mechanism, const Eigen::MatrixXd& known) {
-  constexpr std::size_t most_neighbours = 200;
   validate(mechanism);
-  const Eigen::VectorXd sigma = noise_of(mechanism, known);
-  Equations equations(mechanism);
-  const Eigen::VectorXd parameters = values_of(mechanism);
-  const SolvedPose home = nearest_configuration(equations, parameters, start_of(mechanism));
-  if (!home.ok()) refuse("no configuration near the start values: " + home.failure);
-  Assembly assembly{.coordinates = Eigen::MatrixXd::Constant(known.rows(), known.cols(), NAN), .failures = {}};
-  std::vector<Eigen::VectorXd> solved = {home.coordinates};
-  for (Eigen::Index row = 0; row < known.rows(); ++row) {
-    const Eigen::VectorXd target = known.row(row);
-    const PoseKinds kinds = kinds_of(target, sigma);
-    std::string failure;
-    if (std::ssize(kinds.unknown) > equations.count()) {
-      failure = fmt::format("{} coordinates are not measured, {} equations cannot tell them", kinds.unknown.size(),
-                            equations.count());
-    } else if (equations.count() > std::ssize(kinds.unknown) + std::ssize(kinds.noisy)) {
-      failure = fmt::format(
-          "{} equations are beyond what is not measured, and {} readings have noise: state the sigma of more",
-          equations.count() - std::ssize(kinds.unknown), kinds.noisy.size());
-    } else {
-      const Eigen::VectorXd& from = nearest(solved, target, equations.typical());
-      SolvedPose pose = follow(equations, parameters, from, target, sigma);
-      const bool is_checked = std::ssize(kinds.unknown) < equations.count();
-      // A branch that contradicts the readings more than another one is the wrong branch.
-      const auto take_better = [&](SolvedPose other) {
-        if (!other.ok()) return;
-        if (!pose.ok() || (is_checked && other.residual.norm() < pose.residual.norm())) pose = std::move(other);
-      };
-      if (!pose.ok() || is_checked) take_better(follow(equations, parameters, home.coordinates, target, sigma));
-      if (is_checked) {
-        take_better(solve_pose(equations, parameters, target, sigma, from));
-        take_better(solve_pose(equations, parameters, target, sigma, home.coordinates));
-      }
-      failure = pose.failure;
-      if (pose.ok()) {
-        assembly.coordinates.row(row) = pose.coordinates.transpose();
-        solved.insert(solved.begin() + 1, pose.coordinates);
-        if (solved.size() > most_neighbours) solved.pop_back();
-      }
-    }
-    assembly.failures.push_back(failure);
-  }
-  return assembly;
+  return assemble_again(mechanism, known, {});
 }
 
 Eigen::MatrixXd random_poses(const Mechanism& mechanism, Eigen::Index count, std::uint64_t seed) {

@@ -3,13 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 #include <memory>
 #include <stdexcept>
 
 #include "llmt/discovery/least_squares.hpp"
-#include "mechanism/equations.hpp"
-#include "mechanism/pose_solver.hpp"
+#include "llmt/outliers.hpp"
+#include "mechanism/assembler.hpp"
 
 namespace llmt::robotics {
 namespace {
@@ -20,16 +21,24 @@ struct Poses {
   Eigen::MatrixXd known;
   Eigen::MatrixXd starts;
   Eigen::VectorXd sigma;
-  Eigen::VectorXd at = {};  // the parameters of `solved`
+  std::vector<Eigen::Index> rows = {};  // of the table
+  Eigen::VectorXd at = {};              // the parameters of `solved`
   std::vector<SolvedPose> solved = {};
 
-  // Solves all poses, each from its start, so that the result depends on the parameters alone.
+  // Solves all poses, each from its start.
   void solve(const Eigen::VectorXd& parameters) {
     if (at.size() == parameters.size() && at == parameters) return;
     at = parameters;
     solved.clear();
     for (Eigen::Index row = 0; row < known.rows(); ++row) {
       solved.push_back(solve_pose(equations, parameters, known.row(row), sigma, starts.row(row)));
+    }
+  }
+
+  // The solver asks for derivatives where it has arrived: further steps begin there, on the same branch.
+  void start_here() {
+    for (Eigen::Index row = 0; row < known.rows(); ++row) {
+      if (solved[row].ok()) starts.row(row) = solved[row].coordinates.transpose();
     }
   }
 
@@ -66,6 +75,7 @@ Eigen::VectorXd stacked_residuals(Poses& poses, const Eigen::VectorXd& parameter
 
 Eigen::MatrixXd stacked_jacobian(Poses& poses, const Eigen::VectorXd& parameters) {
   const Eigen::Index count = stacked_residuals(poses, parameters).size();
+  poses.start_here();
   Eigen::MatrixXd jacobian(count, parameters.size());
   Eigen::Index next = 0;
   for (Eigen::Index row = 0; row < poses.known.rows(); ++row) {
@@ -107,12 +117,15 @@ double scale_of(const MechanismParameter& parameter) {
   return 1e-3 * std::max(1.0, std::abs(parameter.value));
 }
 
-discovery::LeastSquaresProblem problem_of(const Mechanism& mechanism, const std::shared_ptr<Poses>& poses) {
+// Priors are about the values of the description.
+discovery::LeastSquaresProblem problem_of(const Mechanism& described, const Mechanism& start,
+                                          const std::shared_ptr<Poses>& poses) {
   discovery::LeastSquaresProblem problem;
-  for (const MechanismParameter& parameter : mechanism.parameters) {
+  for (std::size_t k = 0; k < described.parameters.size(); ++k) {
+    const MechanismParameter& parameter = described.parameters[k];
     problem.parameters.push_back({.name = parameter.name,
                                   .unit = parameter.unit,
-                                  .value = parameter.value,
+                                  .value = start.parameters[k].value,
                                   .scale = scale_of(parameter),
                                   .free = !parameter.fixed,
                                   .prior_sigma = parameter.prior_sigma,
@@ -167,49 +180,119 @@ bool joints_tell_outputs(const Mechanism& mechanism, const Eigen::MatrixXd& meas
   return unknown <= std::ssize(mechanism.equations);
 }
 
-}  // namespace
-
-MechanismCalibration calibrate(const Mechanism& mechanism, const Eigen::MatrixXd& measured) {
-  const Assembly described = assemble(mechanism, measured);
-  MechanismCalibration calibration;
-  std::vector<Eigen::Index> taken;
-  for (Eigen::Index row = 0; row < measured.rows(); ++row) {
-    if (described.failures[row].empty()) {
-      taken.push_back(row);
-    } else {
-      calibration.left_out.push_back(row);
-      calibration.reasons.push_back(described.failures[row]);
-    }
+// Poses that contradict the others: beyond the quantile of normal noise whose scale is that of the median pose, at
+// which one pose in a hundred thousand would lie far off by chance.
+std::vector<Eigen::Index> far_off(const std::vector<SolvedPose>& poses) {
+  constexpr double by_chance = 1e-5;
+  const auto share = [](const SolvedPose& pose, double probability) {
+    const boost::math::chi_squared normal(static_cast<double>(pose.residual.size()));
+    return pose.residual.squaredNorm() / boost::math::quantile(normal, probability);
+  };
+  const auto is_checked = [](const SolvedPose& pose) { return pose.ok() && pose.residual.size() > 0; };
+  std::vector<double> variances;
+  for (const SolvedPose& pose : poses) {
+    if (is_checked(pose)) variances.push_back(share(pose, 0.5));
   }
-  const auto poses = std::make_shared<Poses>(Poses{.equations = Equations(mechanism),
-                                                   .known = measured(taken, Eigen::all),
-                                                   .starts = described.coordinates(taken, Eigen::all),
-                                                   .sigma = noise_of(mechanism, measured)});
-  const discovery::LeastSquaresProblem problem = problem_of(mechanism, poses);
-  if (stacked_residuals(*poses, values_of(mechanism)).size() == 0) {
-    refuse_calibration(taken.empty() ? "the mechanism can take none of the poses" + first_of(calibration.reasons)
-                                     : "no reading checks another one: measure more than the equations need");
+  std::vector<Eigen::Index> far;
+  if (variances.empty()) return far;
+  const double variance = bulk_of(Eigen::Map<const Eigen::VectorXd>(variances.data(), std::ssize(variances))).centre;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    if (is_checked(poses[i]) && share(poses[i], 1.0 - by_chance) > variance)
+      far.push_back(static_cast<Eigen::Index>(i));
   }
-  calibration.result = solve_with_priors(problem);
-  calibration.corrections = Eigen::MatrixXd::Zero(measured.rows(), measured.cols());
-  poses->solve(calibration.result.values);
-  calibration.corrections(taken, Eigen::all) = poses->corrections();
-  calibration.mechanism = with_result(mechanism, calibration.result);
-  return calibration;
+  return far;
 }
 
-MechanismErrors errors_of(const Mechanism& mechanism, const Eigen::MatrixXd& measured) {
+struct Fit {
+  MechanismCalibration calibration;
+  std::vector<Eigen::Index> far;  // poses that contradict the others
+};
+
+// The poses of an assembly that are solved from there with these parameters; the others fail in the assembly.
+Poses poses_of(const Mechanism& described, const Eigen::VectorXd& parameters, const Eigen::MatrixXd& measured,
+               Assembly& assembly) {
+  Poses poses{.equations = Equations(described),
+              .known = measured,
+              .starts = assembly.coordinates,
+              .sigma = noise_of(described, measured)};
+  std::vector<Eigen::Index> taken;
+  for (Eigen::Index row = 0; row < measured.rows(); ++row) {
+    std::string& failure = assembly.failures[row];
+    if (failure.empty()) {
+      failure = solve_pose(poses.equations, parameters, measured.row(row), poses.sigma, assembly.coordinates.row(row))
+                    .failure;
+    }
+    if (failure.empty()) taken.push_back(row);
+  }
+  poses.rows = taken;
+  poses.known = measured(taken, Eigen::all);
+  poses.starts = assembly.coordinates(taken, Eigen::all);
+  return poses;
+}
+
+// Calibrates with the branch of every pose given; `start` has the parameters to begin with.
+Fit fit_branches(const Mechanism& described, const Mechanism& start, const Eigen::MatrixXd& measured,
+                 Assembly assembly) {
+  MechanismCalibration calibration;
+  const auto poses = std::make_shared<Poses>(poses_of(described, values_of(start), measured, assembly));
+  for (Eigen::Index row = 0; row < measured.rows(); ++row) {
+    if (assembly.failures[row].empty()) continue;
+    calibration.left_out.push_back(row);
+    calibration.reasons.push_back(assembly.failures[row]);
+  }
+  if (stacked_residuals(*poses, values_of(start)).size() == 0) {
+    refuse_calibration(poses->rows.empty() ? "the mechanism can take none of the poses" + first_of(calibration.reasons)
+                                           : "no reading checks another one: measure more than the equations need");
+  }
+  calibration.result = solve_with_priors(problem_of(described, start, poses));
+  poses->solve(calibration.result.values);
+  poses->start_here();
+  calibration.configurations = Eigen::MatrixXd::Constant(measured.rows(), measured.cols(), NAN);
+  calibration.configurations(poses->rows, Eigen::all) = poses->starts;
+  calibration.corrections = Eigen::MatrixXd::Zero(measured.rows(), measured.cols());
+  calibration.corrections(poses->rows, Eigen::all) = poses->corrections();
+  calibration.mechanism = with_result(described, calibration.result);
+  std::vector<Eigen::Index> far = far_off(poses->solved);
+  for (Eigen::Index& row : far) row = poses->rows[row];
+  return {std::move(calibration), std::move(far)};
+}
+
+Assembly without(Assembly assembly, const std::vector<Eigen::Index>& rows) {
+  assembly.coordinates(rows, Eigen::all).setConstant(NAN);
+  for (const Eigen::Index row : rows) assembly.failures[row] = "left out";
+  return assembly;
+}
+
+// The next one takes more poses, or as many that contradict each other less.
+bool is_better(const MechanismCalibration& next, const MechanismCalibration& present) {
+  if (next.left_out.size() != present.left_out.size()) return next.left_out.size() < present.left_out.size();
+  return next.result.residuals.squaredNorm() < (1.0 - 1e-6) * present.result.residuals.squaredNorm();
+}
+
+// Configurations of the same poses, NaN in rows without one.
+bool are_same(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
+  constexpr double rounding = 1e-6;  // mm and degrees
+  const auto differ = (a - b).array().abs() > rounding;
+  return !differ.any() && (a.array().isNaN() == b.array().isNaN()).all();
+}
+
+// `before`: see assemble_again().
+MechanismErrors errors_from(const Mechanism& mechanism, const Eigen::MatrixXd& measured,
+                            const Eigen::MatrixXd& before) {
   const std::vector<Eigen::Index> outputs = measured_outputs(mechanism, measured);
   MechanismErrors errors{.of_outputs = !outputs.empty() && joints_tell_outputs(mechanism, measured), .values = {}};
   if (errors.of_outputs) {
     Eigen::MatrixXd joints = measured;
     joints(Eigen::all, outputs).setConstant(NAN);
-    const Assembly predicted = assemble(mechanism, joints);
+    const Assembly predicted = assemble_again(mechanism, joints, before);
     errors.values = Eigen::MatrixXd::Constant(measured.rows(), measured.cols(), NAN);
     errors.values(Eigen::all, outputs) = (measured - predicted.coordinates)(Eigen::all, outputs);
+    for (const Eigen::Index i : turning_coordinates(mechanism)) {
+      for (double& error : errors.values.col(i)) error -= whole_turns(error);
+    }
     return errors;
   }
-  const Assembly assembly = assemble(mechanism, measured);
+  const Assembly assembly = assemble_again(mechanism, measured, before);
   const Eigen::VectorXd sigma = noise_of(mechanism, measured);
   Equations equations(mechanism);
   const Eigen::VectorXd parameters = values_of(mechanism);
@@ -222,15 +305,45 @@ MechanismErrors errors_of(const Mechanism& mechanism, const Eigen::MatrixXd& mea
   return errors;
 }
 
+}  // namespace
+
+MechanismCalibration calibrate(const Mechanism& mechanism, const Eigen::MatrixXd& measured) {
+  constexpr int most_passes = 10;
+  Assembly assembly = assemble(mechanism, measured);
+  Fit fit = fit_branches(mechanism, mechanism, measured, assembly);
+  for (int pass = 0; pass < most_passes && fit.calibration.result.dof > 0; ++pass) {
+    // The branch of a pose, and whether it can be taken, may show only where the parameters are better known. Poses on
+    // a wrong branch spoil them, so these do without poses that contradict the others.
+    assembly.coordinates = fit.calibration.configurations;
+    const MechanismCalibration start =
+        fit.far.empty()
+            ? fit.calibration
+            : fit_branches(mechanism, fit.calibration.mechanism, measured, without(assembly, fit.far)).calibration;
+    assembly = assemble_again(start.mechanism, measured, start.configurations);
+    if (fit.far.empty() && are_same(assembly.coordinates, fit.calibration.configurations)) break;
+    Fit next = fit_branches(mechanism, start.mechanism, measured, assembly);
+    if (!is_better(next.calibration, fit.calibration)) break;
+    fit = std::move(next);
+  }
+  return std::move(fit.calibration);
+}
+
+MechanismErrors errors_of(const Mechanism& mechanism, const Eigen::MatrixXd& measured) {
+  return errors_from(mechanism, measured, {});
+}
+
 MechanismErrors held_out_errors(const Mechanism& mechanism, const Eigen::MatrixXd& measured,
                                 const FoldOptions& options) {
   MechanismErrors all;
   for (const Fold& fold : make_folds(measured.rows(), options)) {
     const MechanismCalibration calibration = calibrate(mechanism, measured(fold.train, Eigen::all));
-    const MechanismErrors some = errors_of(calibration.mechanism, measured(fold.held_out, Eigen::all));
+    // Poses held out are reached from those that were not.
+    Eigen::MatrixXd before = Eigen::MatrixXd::Constant(measured.rows(), measured.cols(), NAN);
+    before(fold.train, Eigen::all) = calibration.configurations;
+    const MechanismErrors some = errors_from(calibration.mechanism, measured, before);
     if (all.values.size() == 0) all.values = Eigen::MatrixXd::Constant(measured.rows(), some.values.cols(), NAN);
     all.of_outputs = some.of_outputs;
-    all.values(fold.held_out, Eigen::all) = some.values;
+    all.values(fold.held_out, Eigen::all) = some.values(fold.held_out, Eigen::all);
   }
   return all;
 }

@@ -67,8 +67,7 @@ PoseKinds kinds_of(const Eigen::VectorXd& known, const Eigen::VectorXd& sigma) {
 }
 
 SolvedPose solve_pose(Equations& equations, const Eigen::VectorXd& parameters, const Eigen::VectorXd& known,
-                      const Eigen::VectorXd& sigma, const Eigen::VectorXd& start) {
-  constexpr int most_steps = 60;
+                      const Eigen::VectorXd& sigma, const Eigen::VectorXd& start, int most_steps) {
   constexpr double settled = 1e-11;  // of what is typical
   const PoseKinds kinds = kinds_of(known, sigma);
   const Eigen::VectorXd& typical = equations.typical();
@@ -126,6 +125,7 @@ SolvedPose follow(Equations& equations, const Eigen::VectorXd& parameters, const
   constexpr double smallest_step = 1.0 / 4096.0;
   constexpr double most_deviation = 0.3;  // from the tangent, as a share of the step
   constexpr double always_near = 1e-3;    // of what is typical
+  constexpr int most_steps = 20;          // of Newton's method from the tangent: a good prediction needs few
   const PoseKinds kinds = kinds_of(known, sigma);
   const Eigen::VectorXd& typical = equations.typical();
   const auto between = [&](double t) -> Eigen::VectorXd { return t >= 1.0 ? known : from + t * (known - from); };
@@ -139,7 +139,7 @@ SolvedPose follow(Equations& equations, const Eigen::VectorXd& parameters, const
     Eigen::VectorXd driven = target - here.coordinates;
     driven(kinds.unknown).setZero();
     predicted(kinds.unknown) += here.unknown_rate * driven;
-    SolvedPose next = solve_pose(equations, parameters, target, sigma, predicted);
+    SolvedPose next = solve_pose(equations, parameters, target, sigma, predicted, most_steps);
     const auto size = [&](const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
       return ((a - b)(kinds.unknown).array() / typical(kinds.unknown).array()).matrix().norm();
     };

@@ -30,7 +30,7 @@ struct SolvedPose {
 /// Minimises the sum of (v_i / sigma_i)^2 over corrections v of the noisy readings, with f = 0, by Gauss-Newton steps;
 /// the unknown coordinates begin at `start`. The minimum has v = S B' m, B = N' df/dv S, N' df/dz = 0.
 SolvedPose solve_pose(Equations& equations, const Eigen::VectorXd& parameters, const Eigen::VectorXd& known,
-                      const Eigen::VectorXd& sigma, const Eigen::VectorXd& start);
+                      const Eigen::VectorXd& sigma, const Eigen::VectorXd& start, int most_steps = 60);
 
 /// The configuration nearest to `start`, in typical() units, where all coordinates may move.
 SolvedPose nearest_configuration(Equations& equations, const Eigen::VectorXd& parameters, const Eigen::VectorXd& start);

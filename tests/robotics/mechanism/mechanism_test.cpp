@@ -99,6 +99,37 @@ TEST(Mechanism, TheBranchIsThatOfTheStartValues) {
   }
 }
 
+// A slider-crank whose crank goes round: x = r cos q + sqrt(l^2 - r^2 sin^2 q) in closed form.
+TEST(Mechanism, AnglesGoTheShortWayRound) {
+  const Mechanism slider{.name = "slider",
+                         .parameters = {{.name = "r", .value = 50.0}, {.name = "l", .value = 120.0}},
+                         .coordinates = {{.name = "q"}, {.name = "c"}, {.name = "x", .unit = "mm", .start = 170.0}},
+                         .definitions = {},
+                         .equations = {"r*cos(q) + l*cos(c) = x", "r*sin(q) + l*sin(c) = 0"}};
+  const Eigen::Vector4d angles(359.0, -7201.0, 90.0, 36000.0);
+  Eigen::MatrixXd known = Eigen::MatrixXd::Constant(4, 3, NAN);
+  known.col(0) = angles;
+  const Assembly assembly = assemble(slider, known);
+  for (Eigen::Index i = 0; i < 4; ++i) {
+    const double q = angles(i) * to_rad;
+    EXPECT_EQ(assembly.coordinates(i, 0), angles(i));
+    EXPECT_NEAR(assembly.coordinates(i, 1), -std::asin(50.0 / 120.0 * std::sin(q)) / to_rad, 1e-8);
+    EXPECT_NEAR(assembly.coordinates(i, 2), 50.0 * std::cos(q) + std::sqrt(14400.0 - std::pow(50.0 * std::sin(q), 2)),
+                1e-8);
+  }
+}
+
+TEST(Mechanism, TheAngleOfALeadscrewKeepsItsTurns) {
+  const Mechanism screw{.name = "screw",
+                        .parameters = {{.name = "pitch", .value = 5.0}},
+                        .coordinates = {{.name = "q"}, {.name = "x", .unit = "mm"}},
+                        .definitions = {},
+                        .equations = {"x = pitch*q/(2*pi) + 0.1*sin(q)"}};
+  const Assembly assembly = assemble(screw, (Eigen::MatrixXd(2, 2) << 3600.0, NAN, NAN, 10.0).finished());
+  EXPECT_NEAR(assembly.coordinates(0, 1), 50.0, 1e-8);
+  EXPECT_NEAR(assembly.coordinates(1, 0), 720.0, 1e-7);
+}
+
 void expect_refused(Mechanism mechanism, const std::string& words) {
   try {
     validate(mechanism);
@@ -117,9 +148,15 @@ TEST(Mechanism, MistakesAreRefusedByName) {
   expect_refused(changed([](Mechanism& m) { m.parameters[1].name = "base"; }), "\"base\" is there twice");
   expect_refused(changed([](Mechanism& m) { m.parameters[1].name = "sin"; }), "a word of the expressions");
   expect_refused(changed([](Mechanism& m) { m.parameters[1].name = "2x"; }), "is no name");
-  expect_refused(changed([](Mechanism& m) { m.equations[2] = "x1 = x3"; }), "equation 3: x3 is no parameter");
-  expect_refused(changed([](Mechanism& m) { m.equations[0] = "x1 = = x2"; }), "equation 1: ");
-  expect_refused(changed([](Mechanism& m) { m.equations[0] = "x1 = x2 = x"; }), "equation 1: ");
+  expect_refused(changed([](Mechanism& m) { m.equations[2] = "x1 = x3"; }),
+                 "equation 3, right of =: x3 is no parameter");
+  expect_refused(changed([](Mechanism& m) { m.equations[0] = "x1 = = x2"; }), "equation 1, right of =: ");
+  expect_refused(changed([](Mechanism& m) { m.equations[0] = "x1 = x2 = x"; }), "equation 1, right of =: ");
+  expect_refused(changed([](Mechanism& m) { m.equations[0] = "x1 = x2 +* 3"; }),
+                 "equation 1, right of =: column 6 of \" x2 +* 3\"");
+  expect_refused(changed([](Mechanism& m) { m.parameters.push_back({.name = "idle"}); }), "idle occurs in no equation");
+  expect_refused(changed([](Mechanism& m) { m.coordinates.push_back({.name = "idle"}); }),
+                 "idle occurs in no equation");
   expect_refused(changed([](Mechanism& m) { m.definitions[0].text = "x2 + 1"; }),
                  "definition of x1: x2 is no parameter");
   expect_refused(changed([](Mechanism& m) { m.parameters[0].unit = "m"; }), "must be mm, deg or 1");
@@ -148,6 +185,7 @@ TEST(MechanismFile, WhatIsWrittenIsReadToTheLastBit) {
   mechanism.parameters[1].prior_sigma = 0.7;
   mechanism.parameters[2].fixed = true;
   mechanism.parameters.push_back({.name = "gain", .unit = "1", .value = 1.1});
+  mechanism.equations[0] = "gain*(fx + cos(turn)*x1 - sin(turn)*y1) = x";
   mechanism.coordinates[0].sigma = 0.1;
   const Mechanism read = parse_mechanism(to_yaml(mechanism), "copy");
   EXPECT_EQ(to_yaml(read), to_yaml(mechanism));

@@ -61,7 +61,8 @@ struct Mechanism {
 
 /// Throws std::invalid_argument for names that are no identifiers, are repeated or are functions of the language,
 /// unknown units, numbers that are not finite, sigmas or priors out of range, limits that are no interval, expressions
-/// that cannot be read or use unknown names, and a mechanism without coordinates or equations.
+/// that cannot be read or use unknown names, parameters and coordinates that occur in no equation, and a mechanism
+/// without coordinates or equations.
 void validate(const Mechanism& mechanism);
 
 /// The standard deviation of every coordinate's readings, in its unit; 0: exact. Without any sigma among the measured
@@ -84,8 +85,9 @@ struct Assembly {
 ///
 /// A loop has several configurations. The branch is that of the start values: every pose is reached from a solved one
 /// (the first from the start) along the straight line between what is known, in steps small enough that the rest
-/// follows its tangent. A pose behind a singular configuration fails. Where readings check each other, the branch that
-/// contradicts them least is taken.
+/// follows its tangent. Angles whose whole turns change no equation go the short way round, and the long way where the
+/// short one is blocked. A pose behind a singular configuration fails. Where readings check each other, the branch that
+/// contradicts them least is taken, also among those of poses nearby.
 ///
 /// `known`: poses x coordinates, NaN where unknown. Throws std::invalid_argument for a wrong shape, infinite values, as
 /// validate(), and if the start values are near no configuration.

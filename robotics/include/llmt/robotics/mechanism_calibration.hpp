@@ -22,6 +22,7 @@ struct MechanismCalibration {
   Mechanism mechanism;  ///< with identified values and standard errors
   /// Its residuals are r of calibrate(), pose by pose; its sigma is the noise, as a multiple of noise_of().
   discovery::SolverResult result;
+  Eigen::MatrixXd configurations;      ///< poses x coordinates: each adjusted to the equations; NaN if left out
   Eigen::MatrixXd corrections;         ///< poses x coordinates: what adjusts the readings to the equations, in units
   std::vector<Eigen::Index> left_out;  ///< poses that the described mechanism cannot take, ascending
   std::vector<std::string> reasons;    ///< of each
@@ -35,6 +36,9 @@ struct MechanismCalibration {
 /// units of the outputs. With N'df/dz = 0 and B = N' df/dy diag(sigma), the residual of a pose is
 /// r = (B B')^(-1/2) N' f at the readings, to first order; |r|^2 is the sum above.
 ///
+/// The branch of every pose is that of assemble(). It is chosen anew with the identified parameters, and these are
+/// identified anew, as long as more poses can be taken or the sum falls.
+///
 /// `measured`: poses x coordinates, NaN where not measured. Throws std::invalid_argument as assemble(), if no pose has
 /// a reading too many, and if readings that check each other are all exact.
 MechanismCalibration calibrate(const Mechanism& mechanism, const Eigen::MatrixXd& measured);
@@ -42,9 +46,10 @@ MechanismCalibration calibrate(const Mechanism& mechanism, const Eigen::MatrixXd
 /// How far a mechanism is off at poses.
 struct MechanismErrors {
   /// True: `values` are measured minus predicted outputs (poses x coordinates, NaN elsewhere), where the outputs are
-  /// predicted from the joints alone. False: the joints do not determine the outputs, or no output is measured, and
-  /// `values` has one column, the root mean square of r of calibrate() per pose: the noise of the readings, as a
-  /// multiple of noise_of(), that would explain why they contradict each other.
+  /// predicted from the joints alone; of angles without whole turns that change no equation. False: the joints do not
+  /// determine the outputs, or no output is measured, and `values` has one column, the root mean square of r of
+  /// calibrate() per pose: the noise of the readings, as a multiple of noise_of(), that would explain why they
+  /// contradict each other.
   bool of_outputs = false;
   Eigen::MatrixXd values;
 };
