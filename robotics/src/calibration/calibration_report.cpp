@@ -8,7 +8,6 @@
 #include <stdexcept>
 
 #include "calibration/likely_mistake.hpp"
-#include "calibration/median.hpp"
 #include "calibration/paired_gain.hpp"
 
 namespace llmt::robotics {
@@ -218,16 +217,35 @@ std::vector<std::string> suspicions(const Robot& robot, const Measurements& meas
   return found;
 }
 
+namespace {
+
+// How far off honest readings may be, mm.
+double far_limit(const Eigen::VectorXd& errors_mm) {
+  constexpr double far = 8.0;  // times the median
+  constexpr double upper = 0.85;
+  constexpr double deviations_of_upper = 1.036;  // of a normal variable
+  constexpr double most_deviations = 4.0;
+  std::vector<double> sorted(errors_mm.begin(), errors_mm.end());
+  std::ranges::sort(sorted);
+  const double median = sorted[sorted.size() / 2];
+  const double quantile = sorted[static_cast<std::size_t>(upper * static_cast<double>(sorted.size()))];
+  const double deviation = std::log(quantile / median) / deviations_of_upper;
+  return median * std::max(far, std::exp(most_deviations * deviation));
+}
+
+}  // namespace
+
 std::string far_readings(const Measurements& measurements, const CalibrationReport& report) {
   const bool is_held_out = report.geometric.held_out_mm.size() > 0;
   const Eigen::VectorXd& errors = is_held_out ? report.geometric.held_out_mm : report.geometric.in_sample_mm;
   constexpr Eigen::Index fewest = 10;
   if (errors.size() < fewest) return "";
-  constexpr double far = 8.0;    // times the median
-  constexpr double much = 0.25;  // of the squares
-  constexpr double few = 0.05;   // of the readings
+  constexpr double much = 0.25;        // of the squares
+  constexpr double few = 0.05;         // of the readings
+  constexpr double few_all = 3.0;      // of a short file
+  constexpr double short_few = 0.125;  // of its readings
   constexpr std::size_t most_lines = 10;
-  const double limit = far * median_of(errors);
+  const double limit = far_limit(errors);
   const std::vector<Eigen::Index> rows = position_rows(measurements.poses);
   std::vector<Eigen::Index> lines;
   double squares = 0.0;
@@ -236,7 +254,8 @@ std::string far_readings(const Measurements& measurements, const CalibrationRepo
     squares += errors(k) * errors(k);
     lines.push_back(measurements.lines.empty() ? rows[k] + 1 : measurements.lines[rows[k]]);
   }
-  const bool is_few = static_cast<double>(lines.size()) <= few * static_cast<double>(errors.size());
+  const auto count = static_cast<double>(errors.size());
+  const bool is_few = static_cast<double>(lines.size()) <= std::max(few * count, std::min(few_all, short_few * count));
   if (lines.empty() || !is_few || squares < much * errors.squaredNorm()) return "";
   const std::size_t shown = std::min(most_lines, lines.size());
   return fmt::format("{} of {} readings lie far off and make {:.0f} % of the squared error ({}{} {}{})", lines.size(),

@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
 #include <functional>
 
 #include "llmt/robotics/calibration_report.hpp"
@@ -89,6 +90,51 @@ TEST(LikelyMistake, TheOrderOfQuaternionsAndTheirDirectionAreNamed) {
   EXPECT_NE(inverse.find("world as seen from the tool"), std::string::npos) << inverse;
   const std::string constant = said_of([](const Q&) { return Eigen::Vector4d(1.0, 0.0, 0.0, 0.0); });
   EXPECT_TRUE(constant.starts_with("1") && constant.find("convention") != std::string::npos) << constant;
+}
+
+// What is said of errors alone, each the line of its number.
+std::string far_of(const std::vector<double>& errors) {
+  const auto count = static_cast<Eigen::Index>(errors.size());
+  Measurements measurements;
+  measurements.poses.joints.setZero(count, 1);
+  CalibrationReport report;
+  report.geometric.in_sample_mm = Eigen::Map<const Eigen::VectorXd>(errors.data(), count);
+  return far_readings(measurements, report);
+}
+
+std::vector<double> normal_errors(Random& random, int count) {
+  std::vector<double> errors;
+  for (int i = 0; i < count; ++i) {
+    errors.push_back(Eigen::Vector3d(random.normal(), random.normal(), random.normal()).norm());
+  }
+  return errors;
+}
+
+TEST(FarReadings, AreNotTheTailsOfHonestErrors) {
+  Random random(3);
+  for (const double deviation : {1.0, 1.5}) {
+    int accused = 0;
+    for (int set = 0; set < 400; ++set) {
+      std::vector<double> errors;
+      for (int i = 0; i < 50; ++i) errors.push_back(std::exp(deviation * random.normal()));
+      accused += far_of(errors).empty() ? 0 : 1;
+    }
+    EXPECT_LE(accused, 20) << deviation;  // 5 %; eight times the median alone accuses every second and every sixth set
+  }
+  for (int set = 0; set < 400; ++set) EXPECT_EQ(far_of(normal_errors(random, 50)), "");
+}
+
+TEST(FarReadings, AreNamedWhereThreeOfAFewAreBad) {
+  Random random(4);
+  for (const int count : {24, 30, 50}) {
+    int named = 0;
+    for (int set = 0; set < 100; ++set) {
+      std::vector<double> errors = normal_errors(random, count);
+      for (const int bad : {3, 11, 20}) errors[bad] = random.uniform(50.0, 200.0);
+      named += far_of(errors).find("(rows 4, 12, 21)") != std::string::npos ? 1 : 0;
+    }
+    EXPECT_GE(named, 90) << count;
+  }
 }
 
 }  // namespace

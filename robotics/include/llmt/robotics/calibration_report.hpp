@@ -81,9 +81,10 @@ struct CalibrationReport {
 std::vector<std::string> suspicions(const Robot& robot, const Measurements& measurements,
                                     const CalibrationReport& report);
 
-/// Names the readings, at most a twentieth of all, that lie more than eight times as far off as the median and make a
-/// quarter of the squared error or more, by their lines; empty if there are none. calibrate_robustly() leaves such
-/// readings out.
+/// Names the readings, at most a twentieth of all (or three, of 24 or more), that lie more than eight times as far off
+/// as the median and make a quarter of the squared error or more, by their lines; empty if there are none. Where the
+/// errors have a long tail, they are also farther than four standard deviations of lognormal errors with the median and
+/// the 85 % quantile of these. calibrate_robustly() leaves such readings out.
 std::string far_readings(const Measurements& measurements, const CalibrationReport& report);
 
 /// Whether the calibrated robot still misses half of the measured points by more than a fiftieth of the nominal arm's
