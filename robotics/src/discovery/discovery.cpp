@@ -203,6 +203,47 @@ void refuse_all_clear(const Investigation& investigation, const DiscoveryOptions
   }
 }
 
+// Names, sizes and limits of what the search found.
+void describe_search(const Robot& robot, Investigation& investigation, const DiscoveryOptions& options,
+                     Discovery& result) {
+  const discovery::Verdict& verdict = investigation.verdict;
+  std::optional<SecondLook> look;
+  const std::vector<Hypothesis> large = investigation.found;
+  if (is_named(verdict.answer)) look = look_again(investigation, options);
+  const std::map<std::string, double> constant_errors =
+      refine_constants(investigation, options, look ? &look->asked.hypotheses : nullptr);
+  describe_effects(investigation.asked.hypotheses, verdict, investigation.fitted, options.mass_uncertainty, result);
+  describe_limits(investigation.asked.hypotheses, investigation.asked.untestable, verdict, robot, result);
+  describe_refused(investigation, robot, result);
+  if (look) describe_smaller(*look, large, verdict, investigation.fitted, options, result);
+  for (FoundEffect& effect : result.effects) {
+    const auto error = constant_errors.find(effect_label(effect.effect));
+    if (error != constant_errors.end()) effect.constant_error = error->second;
+  }
+}
+
+// A wave that is no sine makes the answer unknown after the search. As for any unknown effect, maps of the joints are
+// tried then. Waves of the doubted joints stay guesses.
+void map_doubted_waves(const Robot& robot, Investigation& investigation, const DiscoveryOptions& options,
+                       Discovery& result) {
+  Discovery mapped;
+  mapped.answer = result.answer;
+  mapped.unknown = result.unknown;
+  mapped.notes = result.notes;
+  add_maps(investigation, options, mapped);
+  if (mapped.maps.empty()) {
+    result.notes = std::move(mapped.notes);
+    return;
+  }
+  describe_search(robot, investigation, options, mapped);
+  for (FoundEffect& effect : mapped.effects) {
+    const bool is_doubted = std::ranges::any_of(
+        mapped.unknown, [&](const FoundShape& found) { return found.shape.acts_on == effect.effect.at; });
+    if (effect.effect.type == "transmission_error" && is_doubted) effect.confirmed = false;
+  }
+  result = std::move(mapped);
+}
+
 Discovery discover_in(const Robot& robot, const PoseSplit& split, const DiscoveryOptions& options) {
   // Joint maps that the robot has already are applied to the joint values, and the search is made without them.
   const Unmapped plain = unmapped(robot, split.samples);
@@ -227,23 +268,14 @@ Discovery discover_in(const Robot& robot, const PoseSplit& split, const Discover
   result.answer = verdict.answer;
   describe_shapes(investigation.asked.hypotheses, verdict, result.unknown);
   if (options.maps && verdict.answer == discovery::Answer::unknown) add_maps(investigation, options, result);
-  std::optional<SecondLook> look;
-  const std::vector<Hypothesis> large = investigation.found;
-  if (is_named(verdict.answer)) look = look_again(investigation, options);
-  const std::map<std::string, double> constant_errors =
-      refine_constants(investigation, options, look ? &look->asked.hypotheses : nullptr);
-  describe_effects(investigation.asked.hypotheses, verdict, investigation.fitted, options.mass_uncertainty, result);
-  describe_limits(investigation.asked.hypotheses, investigation.asked.untestable, verdict, robot, result);
-  describe_refused(investigation, robot, result);
-  if (look) describe_smaller(*look, large, verdict, investigation.fitted, options, result);
-  for (FoundEffect& effect : result.effects) {
-    const auto error = constant_errors.find(effect_label(effect.effect));
-    if (error != constant_errors.end()) effect.constant_error = error->second;
+  describe_search(robot, investigation, options, result);
+  if (is_named(result.answer)) {
+    doubt_waves(investigation, result);
+    if (options.maps && !is_named(result.answer)) map_doubted_waves(robot, investigation, options, result);
   }
   for (const std::size_t sample : verdict.outliers) {
     for (const Eigen::Index row : split.rows[sample]) result.outliers.push_back(row);
   }
-  if (is_named(result.answer)) doubt_waves(investigation, result);
   refuse_all_clear(investigation, options, result);
   describe_rest(investigation, options, result);
   add_doubts(plain.robot, investigation, unmapped(robot, split.test).measurements, result);
