@@ -1,7 +1,6 @@
-# What every target of this project shares.
+# What every target of this project shares. Nothing here reaches a consumer: all of it is PRIVATE.
 
-# llmt_target_defaults(TARGET): C++20, warnings, and arithmetic that does not depend on the machine. Nothing here reaches a
-# consumer: all of it is PRIVATE.
+# llmt_target_defaults(TARGET): C++20, warnings, and arithmetic that does not depend on the machine.
 function(llmt_target_defaults target)
   set_target_properties(${target} PROPERTIES CXX_STANDARD 20 CXX_STANDARD_REQUIRED ON CXX_EXTENSIONS OFF)
   target_compile_options(
@@ -21,13 +20,11 @@ endfunction()
 option(LLMT_UNITY_BUILD "Compile the sources of a room of a library as one, for builds from scratch" OFF)
 
 # llmt_library(TARGET NAME): the alias llmt::NAME, and what an exported library needs. The caller adds sources, the header
-# file set and dependencies. A consumer compiles with EIGEN_NO_CPUID as well: of two versions of one of Eigen's functions
-# the linker keeps either.
+# file set and dependencies.
 function(llmt_library target name)
   add_library(llmt::${name} ALIAS ${target})
   llmt_target_defaults(${target})
   target_compile_features(${target} PUBLIC cxx_std_20)
-  target_compile_definitions(${target} INTERFACE EIGEN_NO_CPUID)
   set_target_properties(
     ${target}
     PROPERTIES EXPORT_NAME ${name}
