@@ -166,6 +166,14 @@ std::set<std::string> unseen_by_touch(const Robot& robot) {
   return names;
 }
 
+std::vector<Eigen::Index> freed_parameters(const Robot& robot) {
+  std::vector<Eigen::Index> freed;
+  for (std::size_t k = 0; k < robot.identified.size(); ++k) {
+    if (robot.identified[k].state.starts_with("free")) freed.push_back(static_cast<Eigen::Index>(k));
+  }
+  return freed;
+}
+
 void fix_dependent(const std::vector<discovery::Parameter>& parameters, const Eigen::MatrixXd& jacobian,
                    Eigen::Index geometric, double geometric_tolerance, std::vector<std::string>& reasons) {
   // Where the arm bends, directions that geometry imitates are a ten-thousandth off: fitted, they would be millimetres

@@ -30,6 +30,9 @@ void keep_scale(const Robot& robot, const Poses& poses, const CalibrationOptions
 /// Names of the parameters that the robot's calibration kept for one of these reasons.
 std::set<std::string> unseen_by_touch(const Robot& robot);
 
+/// Numbers, among parameters(robot), of those that the robot's calibration freed, identifiable or not; ascending.
+std::vector<Eigen::Index> freed_parameters(const Robot& robot);
+
 /// Adds the reasons the data give: in order, every parameter whose column of `jacobian` depends on the columns of free
 /// parameters before it but for a share of its norm: `geometric_tolerance` for the first `geometric` parameters, a
 /// thousandth at least for those of effects. Columns are compared in parameter scales.

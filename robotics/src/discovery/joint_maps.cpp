@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "calibration/free_parameters.hpp"
 #include "calibration/joint_map_shift.hpp"
 #include "calibration/paired_gain.hpp"
 #include "discovery/left_out.hpp"
@@ -135,9 +136,10 @@ class Smoother {
 };
 
 // The residuals and the hats at the measured coordinates, with what geometry and the robot's effects imitate projected
-// out.
+// out. Only what the calibration freed is theirs: on an arm that bends, other parameters move the tool by a thousandth
+// through the loads, and no refit gives what is projected out along that.
 struct ProjectedMaps {
-  Eigen::MatrixXd baseline;   // n x rank, orthonormal: the range of the robot's Jacobian
+  Eigen::MatrixXd baseline;   // n x rank, orthonormal: the range of the Jacobian by these
   Eigen::VectorXd residuals;  // n
   Eigen::MatrixXd hats;       // n x unknowns
 };
@@ -167,7 +169,7 @@ ProjectedMaps project(const Robot& robot, const Measurements& measurements, cons
   const std::vector<Eigen::Index> rows = measured_rows(measurements);
   const auto n = std::ssize(rows);
   ProjectedMaps projected;
-  Eigen::MatrixXd jacobian = position_jacobian(robot, measurements.poses)(rows, Eigen::all);
+  Eigen::MatrixXd jacobian = position_jacobian(robot, measurements.poses, freed_parameters(robot))(rows, Eigen::all);
   const Eigen::MatrixXd model = positions(robot, measurements.poses);
   projected.residuals.resize(n);
   for (Eigen::Index k = 0; k < n; ++k) {

@@ -17,7 +17,7 @@ struct JointMaps {
 };
 
 /// Penalised least squares of the residuals on hat functions of every revolute joint's angle (and of a prismatic
-/// joint's travel), with geometry and the robot's effects refitted to first order:
+/// joint's travel), with what its calibration freed of geometry and effects refitted to first order:
 ///   |r - C v|^2 + sum_j lambda_j |second differences of v_j|^2,
 /// C the hats pushed through the joints' levers with the range of the Jacobian projected out; lambda_j from the
 /// marginal likelihood (Wahba 1985). Leave-one-out distances are exact for the smoothness chosen. Nothing if no joint

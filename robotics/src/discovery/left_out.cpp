@@ -4,6 +4,7 @@
 #include <Eigen/QR>
 #include <algorithm>
 
+#include "calibration/free_parameters.hpp"
 #include "discovery/pose_split.hpp"
 
 namespace llmt::robotics {
@@ -23,10 +24,7 @@ Eigen::VectorXd left_out(const Eigen::MatrixXd& used, const Eigen::VectorXd& err
 Eigen::VectorXd left_out(const Calibration& fitted, const Measurements& measurements,
                          const std::vector<std::size_t>& skipped) {
   const Measurements kept = without_rows(measurements, skipped);
-  std::vector<Eigen::Index> free;
-  for (std::size_t k = 0; k < fitted.robot.identified.size(); ++k) {
-    if (fitted.robot.identified[k].state.starts_with("free")) free.push_back(static_cast<Eigen::Index>(k));
-  }
+  const std::vector<Eigen::Index> free = freed_parameters(fitted.robot);
   const std::vector<Eigen::Index> rows = measured_rows(kept);
   Eigen::MatrixXd jacobian = position_jacobian(fitted.robot, kept.poses, free)(rows, Eigen::all);
   constexpr double nothing = 1e-7;  // rounding, next to what the others move

@@ -10,6 +10,7 @@
 #include <map>
 #include <numeric>
 
+#include "calibration/free_parameters.hpp"
 #include "discovery/pose_split.hpp"
 #include "llmt/random.hpp"
 
@@ -62,10 +63,7 @@ std::vector<Eigen::Index> axes_of(const Measurements& measurements) {
 
 Residuals residuals_of(const Calibration& fitted, const Measurements& measurements) {
   const std::vector<Eigen::Index> rows = measured_rows(measurements);
-  std::vector<Eigen::Index> free;
-  for (std::size_t k = 0; k < fitted.robot.identified.size(); ++k) {
-    if (fitted.robot.identified[k].state.starts_with("free")) free.push_back(static_cast<Eigen::Index>(k));
-  }
+  const std::vector<Eigen::Index> free = freed_parameters(fitted.robot);
   Eigen::MatrixXd jacobian = position_jacobian(fitted.robot, measurements.poses, free)(rows, Eigen::all);
   for (auto column : jacobian.colwise()) {
     if (column.norm() > 0.0) column.normalize();
