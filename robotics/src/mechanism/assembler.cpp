@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 namespace llmt::robotics {
+
 Assembler::Assembler(const Mechanism& mechanism, const Eigen::VectorXd& sigma)
     : equations_(mechanism), parameters_(values_of(mechanism)), sigma_(sigma) {
   const SolvedPose home = nearest_configuration(equations_, parameters_, start_of(mechanism));
