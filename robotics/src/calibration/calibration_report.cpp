@@ -228,6 +228,7 @@ double far_limit(const Eigen::VectorXd& errors_mm) {
   std::vector<double> sorted(errors_mm.begin(), errors_mm.end());
   std::ranges::sort(sorted);
   const double median = sorted[sorted.size() / 2];
+  if (median == 0.0) return 0.0;
   const double quantile = sorted[static_cast<std::size_t>(upper * static_cast<double>(sorted.size()))];
   const double deviation = std::log(quantile / median) / deviations_of_upper;
   return median * std::max(far, std::exp(most_deviations * deviation));

@@ -2,10 +2,10 @@
 /// Mechanisms of any kind, loops included, given by their constraint equations f(d, s, w) = 0 (eq. 3 of Benes et al.
 /// 2022): d are parameters, s coordinates of joints, w outputs such as the position of a platform.
 ///
-///     const Mechanism crank{.name = "crank",
-///                           .parameters = {{.name = "r", .unit = "mm", .value = 50.0}},
-///                           .coordinates = {{.name = "q", .unit = "deg"}, {.name = "x", .unit = "mm", .output =
-///                           true}}, .equations = {"r*cos(q) = x"}};
+///     Mechanism crank{.name = "crank"};
+///     crank.parameters = {{.name = "r", .unit = "mm", .value = 50.0}};
+///     crank.coordinates = {{.name = "q", .unit = "deg"}, {.name = "x", .unit = "mm", .output = true}};
+///     crank.equations = {"r*cos(q) = x"};
 ///     const Assembly assembly = assemble(crank, Eigen::RowVector2d(60.0, NAN));  // x = 25 mm
 #pragma once
 
