@@ -21,5 +21,6 @@
 #include "llmt/random.hpp"
 #include "llmt/readable.hpp"
 #include "llmt/size.hpp"
+#include "llmt/statistics.hpp"
 #include "llmt/stream.hpp"
 #include "llmt/summary.hpp"

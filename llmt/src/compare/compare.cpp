@@ -13,7 +13,7 @@
 #include "fit/check_options.hpp"
 #include "fit/robust_weights.hpp"
 #include "growth/rules/rule.hpp"
-#include "numerics/paired_difference.hpp"
+#include "llmt/statistics.hpp"
 
 namespace llmt {
 namespace {

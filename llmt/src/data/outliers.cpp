@@ -7,6 +7,8 @@
 #include <stdexcept>
 #include <vector>
 
+#include "llmt/statistics.hpp"
+
 namespace llmt {
 namespace {
 
@@ -14,12 +16,6 @@ constexpr double normal_by_median = 1.4826;  // standard deviation of a normal v
 constexpr double heavy_share = 0.9;
 constexpr Eigen::Index one_row_in = 100;
 constexpr double far_spreads = 20.0;
-
-double median(Eigen::VectorXd values) {
-  const auto middle = values.begin() + values.size() / 2;
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 }  // namespace
 

@@ -11,8 +11,8 @@
 #include "fit/error_weights.hpp"
 #include "fit/grow_tree.hpp"
 #include "fit/lack_of_fit.hpp"
+#include "llmt/statistics.hpp"
 #include "model/codes.hpp"
-#include "numerics/paired_difference.hpp"
 #include "selection/selection.hpp"
 
 namespace llmt {

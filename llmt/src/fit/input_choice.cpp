@@ -12,7 +12,7 @@
 #include "fit/grow_tree.hpp"
 #include "fit/stages.hpp"
 #include "llmt/explain.hpp"
-#include "numerics/paired_difference.hpp"
+#include "llmt/statistics.hpp"
 #include "selection/expected_work.hpp"
 #include "selection/selection.hpp"
 

@@ -22,9 +22,9 @@
 #include "fit/robust_weights.hpp"
 #include "growth/rules/rule.hpp"
 #include "llmt/size.hpp"
+#include "llmt/statistics.hpp"
 #include "model/codes.hpp"
 #include "model/incomplete.hpp"
-#include "numerics/paired_difference.hpp"
 #include "readable/input_walk.hpp"
 
 namespace llmt {

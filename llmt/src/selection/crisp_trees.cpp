@@ -6,7 +6,7 @@
 #include "base/parallel.hpp"
 #include "estimation/local_estimate.hpp"
 #include "estimation/squared_errors.hpp"
-#include "numerics/paired_difference.hpp"
+#include "llmt/statistics.hpp"
 
 namespace llmt {
 namespace {

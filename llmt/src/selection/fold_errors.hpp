@@ -7,7 +7,7 @@
 #include <numeric>
 #include <vector>
 
-#include "numerics/paired_difference.hpp"
+#include "llmt/statistics.hpp"
 #include "selection/candidates.hpp"
 
 namespace llmt {

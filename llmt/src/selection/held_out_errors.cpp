@@ -7,7 +7,7 @@
 #include "estimation/joint_estimate.hpp"
 #include "estimation/local_estimate.hpp"
 #include "estimation/squared_errors.hpp"
-#include "numerics/paired_difference.hpp"
+#include "llmt/statistics.hpp"
 #include "selection/expected_work.hpp"
 
 namespace llmt {

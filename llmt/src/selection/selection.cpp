@@ -8,7 +8,7 @@
 
 #include "base/parallel.hpp"
 #include "estimation/squared_errors.hpp"
-#include "numerics/paired_difference.hpp"
+#include "llmt/statistics.hpp"
 #include "selection/crisp_trees.hpp"
 #include "selection/expected_work.hpp"
 #include "selection/held_out_errors.hpp"

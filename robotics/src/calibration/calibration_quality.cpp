@@ -10,10 +10,10 @@
 #include <tuple>
 
 #include "calibration/joint_ranges.hpp"
-#include "calibration/median.hpp"
 #include "calibration/noise_model.hpp"
 #include "calibration/singular_values.hpp"
 #include "llmt/random.hpp"
+#include "llmt/statistics.hpp"
 
 namespace llmt::robotics {
 namespace {
@@ -204,7 +204,7 @@ std::vector<LearningPoint> learning_curve(const Robot& robot, const Measurements
                                                    : with_placed_frames(calibrated, test, train.poses),
                                   test);
     }
-    curve.push_back({size, median_of(fitted), median_of(held_out)});
+    curve.push_back({size, median(fitted), median(held_out)});
   }
   return curve;
 }

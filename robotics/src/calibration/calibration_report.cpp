@@ -8,7 +8,7 @@
 #include <stdexcept>
 
 #include "calibration/likely_mistake.hpp"
-#include "calibration/paired_gain.hpp"
+#include "llmt/statistics.hpp"
 
 namespace llmt::robotics {
 namespace {
@@ -104,7 +104,7 @@ void decide(CalibrationReport& report) {
     report.correction_kept = true;
     report.decision = "the correction is kept without being judged: no poses were held out";
   } else {
-    const PairedGain gain = paired_gain(report.geometric.held_out_mm, report.corrected->held_out_mm);
+    const PairedDifference gain = paired_difference(report.geometric.held_out_mm, report.corrected->held_out_mm);
     report.correction_kept = gain.is_beyond_chance();
     const std::string figures = fmt::format("held-out mean {:.4f} mm with it, {:.4f} mm without",
                                             report.corrected->held_out_mm.mean(), report.geometric.held_out_mm.mean());
@@ -151,9 +151,7 @@ CorrectedRobot CalibrationReport::best() const {
 
 bool is_implausible(const Robot& nominal, const CalibrationReport& report) {
   if (has_wrong_orientations(report)) return true;
-  std::vector<double> sorted(report.geometric.in_sample_mm.begin(), report.geometric.in_sample_mm.end());
-  std::ranges::nth_element(sorted, sorted.begin() + std::ssize(sorted) / 2);
-  return sorted[sorted.size() / 2] > implausible_share * length_of(nominal.chain);
+  return median(report.geometric.in_sample_mm) > implausible_share * length_of(nominal.chain);
 }
 
 std::vector<std::string> suspicions(const Robot& robot, const Measurements& measurements,

@@ -2,8 +2,8 @@
 #include <cmath>
 #include <set>
 
-#include "calibration/median.hpp"
 #include "llmt/robotics/calibration.hpp"
+#include "llmt/statistics.hpp"
 
 namespace llmt::robotics {
 namespace {
@@ -29,7 +29,7 @@ std::vector<std::size_t> far_samples(const Calibration& calibration, const Measu
   std::vector<std::size_t> far;
   for (const auto& rows : {position_rows(measurements.poses), orientation_rows(measurements.poses)}) {
     if (rows.empty()) continue;
-    const double limit = far_off * median_of(errors(rows));
+    const double limit = far_off * median(errors(rows));
     for (const Eigen::Index i : rows) {
       if (errors(i) > limit) far.push_back(static_cast<std::size_t>(i));
     }
@@ -39,12 +39,6 @@ std::vector<std::size_t> far_samples(const Calibration& calibration, const Measu
 }
 
 }  // namespace
-
-double median_of(const Eigen::VectorXd& values) {
-  std::vector<double> sorted(values.begin(), values.end());
-  std::ranges::nth_element(sorted, sorted.begin() + std::ssize(sorted) / 2);
-  return sorted[sorted.size() / 2];
-}
 
 RobustCalibration calibrate_robustly(const Robot& robot, const Measurements& measurements,
                                      const CalibrationOptions& options) {

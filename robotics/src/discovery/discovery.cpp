@@ -8,7 +8,6 @@
 #include <stdexcept>
 
 #include "calibration/joint_map_shift.hpp"
-#include "calibration/paired_gain.hpp"
 #include "discovery/doubts.hpp"
 #include "discovery/findings.hpp"
 #include "discovery/gap_map.hpp"
@@ -19,6 +18,7 @@
 #include "discovery/refined_constants.hpp"
 #include "discovery/rest_correction.hpp"
 #include "discovery/second_look.hpp"
+#include "llmt/statistics.hpp"
 
 namespace llmt::robotics {
 namespace {
@@ -54,16 +54,14 @@ double mean_distance(double sigma, Eigen::Index components) {
 // Reports poses set aside that are far off, such as lost beams. They are not removed: no choice depends on these poses.
 void report_far_poses(const CorrectedRobot& improved, const Measurements& test, Discovery& result) {
   const Eigen::VectorXd errors = distances(positions(improved, test.poses), test);
-  std::vector<double> sorted(errors.begin(), errors.end());
-  std::ranges::nth_element(sorted, sorted.begin() + std::ssize(sorted) / 2);
-  const double median = sorted[sorted.size() / 2];
+  const double typical = median(errors);
   constexpr double far = 10.0;
-  const auto count = (errors.array() > far * median).count();
-  if (count > 0 && median > 0.0) {
+  const auto count = (errors.array() > far * typical).count();
+  if (count > 0 && typical > 0.0) {
     result.notes.push_back(
         fmt::format("{} of the {} poses set aside are more than ten times as far off as the median ({:.4f} mm): lost "
                     "beams, or poses unlike the others.",
-                    count, errors.size(), median));
+                    count, errors.size(), typical));
   }
 }
 
@@ -72,8 +70,8 @@ void withdraw_what_is_worse(const Measurements& searched, const Measurements& te
   if (test.count() < 3 || result.effects.empty()) return;
   Measurements common = test;
   for (std::size_t axis = 0; axis < 3; ++axis) common.measured[axis] = test.measured[axis] && searched.measured[axis];
-  const PairedGain loss = paired_gain(distances(positions(result.improved, common.poses), common),
-                                      distances(positions(result.before, common.poses), common));
+  const PairedDifference loss = paired_difference(distances(positions(result.improved, common.poses), common),
+                                                  distances(positions(result.before, common.poses), common));
   if (!loss.is_beyond_chance()) return;
   result.notes.push_back(
       fmt::format("What was found makes the poses set aside worse, {:.4f} mm instead of {:.4f}: the "
@@ -134,16 +132,14 @@ void check_freedom(const Measurements& samples, const Calibration& baseline) {
 // many lost beams. The nominal chain is the measure: a tool that was fitted to nonsense may be metres long.
 void check_plausible(const Robot& nominal, const Robot& calibrated, const Measurements& samples) {
   const double reach = reach_of(nominal.chain);
-  Eigen::VectorXd errors = distances(positions(calibrated, samples.poses), samples);
-  std::ranges::nth_element(errors, errors.begin() + errors.size() / 2);
-  const double median = errors(errors.size() / 2);
+  const double typical = median(distances(positions(calibrated, samples.poses), samples));
   constexpr double implausible = 0.02;
-  if (reach > 0.0 && median > implausible * reach) {
+  if (reach > 0.0 && typical > implausible * reach) {
     throw std::runtime_error(
         fmt::format("the calibrated model misses the measurements by {:.4g} mm, {:.0f} % of the arm's reach: no effect "
                     "does that. Check "
                     "units, order, signs and zeros of the joints, the axes of the instrument, and the description",
-                    median, 100.0 * median / reach));
+                    typical, 100.0 * typical / reach));
   }
 }
 

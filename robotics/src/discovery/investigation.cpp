@@ -7,10 +7,10 @@
 #include <set>
 
 #include "calibration/joint_map_shift.hpp"
-#include "calibration/median.hpp"
 #include "discovery/joint_maps.hpp"
 #include "discovery/left_out.hpp"
 #include "discovery/pose_split.hpp"
+#include "llmt/statistics.hpp"
 
 namespace llmt::robotics {
 namespace {
@@ -84,7 +84,7 @@ discovery::Verdict search_causes_first(const EffectQuestion& asked, const Discov
 std::vector<std::size_t> to_refuse(const Investigation& now) {
   const Eigen::Index d = std::ranges::count(now.searched.measured, true);
   const Eigen::VectorXd before = distances(positions(now.baseline.robot, now.searched.poses), now.searched);
-  const double median = median_of(before);
+  const double typical = median(before);
   std::vector<std::size_t> far;
   Eigen::Index asked = 0;  // number of the sample in the question
   for (std::size_t i = 0; i < static_cast<std::size_t>(now.searched.count()); ++i) {
@@ -96,7 +96,7 @@ std::vector<std::size_t> to_refuse(const Investigation& now) {
     const bool is_left_out = std::ranges::find(now.verdict.outliers, number) != now.verdict.outliers.end();
     constexpr double hardly = 0.5;
     constexpr double endless = 100.0;  // no effect that acts at few poses is as large as that
-    if (length > endless * median && (is_left_out || left > hardly * length)) far.push_back(i);
+    if (length > endless * typical && (is_left_out || left > hardly * length)) far.push_back(i);
   }
   return far;
 }
@@ -123,15 +123,15 @@ struct Round {
 
 // Sum of squared errors on poses left out, none of them longer than what a few outliers of any round are.
 std::size_t best_of(const std::vector<Round>& rounds) {
-  double median = std::numeric_limits<double>::infinity();
+  double typical = std::numeric_limits<double>::infinity();
   for (const Round& round : rounds) {
-    median = std::min(median, median_of(round.errors));
+    typical = std::min(typical, median(round.errors));
   }
   constexpr double longest = 6.0;
   std::size_t best = 0;
   double least = std::numeric_limits<double>::infinity();
   for (std::size_t k = 0; k < rounds.size(); ++k) {
-    const double sum = rounds[k].errors.cwiseMin(longest * median).squaredNorm();
+    const double sum = rounds[k].errors.cwiseMin(longest * typical).squaredNorm();
     if (sum >= least) continue;
     least = sum;
     best = k;

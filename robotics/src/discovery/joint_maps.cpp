@@ -7,9 +7,9 @@
 
 #include "calibration/free_parameters.hpp"
 #include "calibration/joint_map_shift.hpp"
-#include "calibration/paired_gain.hpp"
 #include "discovery/left_out.hpp"
 #include "kinematics/units.hpp"
+#include "llmt/statistics.hpp"
 
 namespace llmt::robotics {
 namespace {
@@ -221,7 +221,7 @@ std::optional<JointMaps> fit_joint_maps(const Robot& robot, const Measurements& 
   used.topRows(geometry.rows()) = geometry;
   used.bottomRows(unknowns) = factor.matrixL().solve(hats.transpose());
   maps.after = left_out(used, residuals - hats * values, d);
-  const PairedGain gain = paired_gain(maps.before, maps.after);
+  const PairedDifference gain = paired_difference(maps.before, maps.after);
   maps.gain_in_errors = gain.standard_error > 0.0 ? gain.mean / gain.standard_error : 0.0;
   return maps;
 }

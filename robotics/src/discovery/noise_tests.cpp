@@ -13,6 +13,7 @@
 #include "calibration/free_parameters.hpp"
 #include "discovery/pose_split.hpp"
 #include "llmt/random.hpp"
+#include "llmt/statistics.hpp"
 
 namespace llmt::robotics {
 namespace {
@@ -264,13 +265,12 @@ std::optional<NoNoise> no_noise(const Calibration& fitted, const Measurements& m
 }
 
 double tail_of(const Eigen::VectorXd& lengths, Eigen::Index components) {
-  std::vector<double> sorted(lengths.begin(), lengths.end());
-  std::ranges::nth_element(sorted, sorted.begin() + std::ssize(sorted) / 2);
-  const double median = sorted[sorted.size() / 2];
+  const double typical = median(lengths);
   const auto d = static_cast<double>(components);
   // Median of chi-squared with d degrees of freedom, Wilson and Hilferty.
   const double normal = 1.0 / std::sqrt(std::pow(1.0 - 2.0 / (9.0 * d), 3.0));
-  return median > 0.0 ? std::sqrt(lengths.squaredNorm() / static_cast<double>(lengths.size())) / median / normal : 0.0;
+  return typical > 0.0 ? std::sqrt(lengths.squaredNorm() / static_cast<double>(lengths.size())) / typical / normal
+                       : 0.0;
 }
 
 }  // namespace llmt::robotics

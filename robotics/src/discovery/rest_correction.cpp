@@ -2,8 +2,8 @@
 
 #include <fmt/format.h>
 
-#include "calibration/paired_gain.hpp"
 #include "llmt/folds.hpp"
+#include "llmt/statistics.hpp"
 
 namespace llmt::robotics {
 
@@ -28,7 +28,7 @@ void correct_rest(const Measurements& searched, std::uint64_t seed, Discovery& r
     const Measurements held_out = select(searched, fold.held_out);
     with(fold.held_out) = distances(positions(trained, held_out.poses), held_out);
   }
-  if (!paired_gain(without, with).is_beyond_chance()) {
+  if (!paired_difference(without, with).is_beyond_chance()) {
     result.notes.push_back(
         fmt::format("A tree of the rest does not help: {:.4f} mm without, {:.4f} with it on poses left out.",
                     without.mean(), with.mean()));

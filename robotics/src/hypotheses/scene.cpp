@@ -1,6 +1,6 @@
 #include "hypotheses/scene.hpp"
 
-#include <algorithm>
+#include "llmt/statistics.hpp"
 
 namespace llmt::robotics {
 
@@ -19,10 +19,8 @@ Scene make_scene(const Robot& robot, const Poses& poses, const Eigen::VectorXd& 
     size(i) = residuals.segment(3 * i, 3).norm();
   }
   // A lost beam would dominate every scan, so it is shortened. Whether it is an outlier is decided by the search.
-  std::vector<double> sorted(size.begin(), size.end());
-  std::ranges::nth_element(sorted, sorted.begin() + std::ssize(sorted) / 2);
   constexpr double far_beyond = 6.0;
-  const double limit = far_beyond * sorted[sorted.size() / 2];
+  const double limit = far_beyond * median(size);
   for (Eigen::Index i = 0; i < size.size(); ++i) {
     if (size(i) > limit) scene.clipped.segment(3 * i, 3) *= limit / size(i);
   }

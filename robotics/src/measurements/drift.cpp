@@ -8,6 +8,7 @@
 #include <map>
 
 #include "kinematics/rotations.hpp"
+#include "llmt/statistics.hpp"
 
 namespace llmt::robotics {
 namespace {
@@ -140,13 +141,13 @@ Drift::Drift(const std::vector<std::vector<ReferenceReading>>& rounds) {
       misses.emplace_back((place - places.at(reading.point)).norm(), &reading);
     }
   }
-  if (!scatter_mm_) return;
-  std::vector<double> sizes;
-  for (const auto& [miss, reading] : misses) sizes.push_back(miss);
-  std::ranges::nth_element(sizes, sizes.begin() + std::ssize(sizes) / 2);
+  if (!scatter_mm_ || misses.empty()) return;
+  Eigen::VectorXd sizes(std::ssize(misses));
+  std::ranges::transform(misses, sizes.begin(), [](const auto& miss) { return miss.first; });
   constexpr double stray_factor = 8.0;
+  const double limit = stray_factor * median(sizes);
   for (const auto& [miss, reading] : misses) {
-    if (miss > stray_factor * sizes[sizes.size() / 2]) strays_.push_back(*reading);
+    if (miss > limit) strays_.push_back(*reading);
   }
 }
 
