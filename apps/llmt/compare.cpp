@@ -64,11 +64,11 @@ void compare_command(CompareArguments arguments) {
   }
   CompareOptions options;
   options.folds = arguments.learning.options.folds;
-  Progress progress("fitting");
-  options.progress = [&](const std::string&, Eigen::Index done, Eigen::Index total) { progress.show(done, total); };
+  ProgressBar bar("fitting");
+  options.progress = bar.callback();
   const ComparisonResult result =
       compare(table.inputs.values, table.outputs, usual_methods(table.options, table.inputs.values.cols()), options);
-  progress.clear();
+  bar.clear();
   std::string reports;
   if (arguments.reports.wanted()) {
     reports = write_reports(

@@ -179,8 +179,10 @@ DiscoveryReport discovered(const DiscoverArguments& arguments, const Comparison&
     const std::vector<discovery::ModelTerm> terms = terms_to_try(arguments, comparison, untestable);
     const discovery::Simulation simulation =
         discovery::tabulated(comparison.simulated, arguments.outputs, adjusts("offset"), adjusts("scale"));
-    report.missing =
-        discovery::find_missing(simulation, comparison.inputs, comparison.measured, terms, arguments.options);
+    ProgressBar bar("discover");
+    discovery::MissingOptions options = arguments.options;
+    options.progress = bar.callback();
+    report.missing = discovery::find_missing(simulation, comparison.inputs, comparison.measured, terms, options);
   } catch (const std::invalid_argument& error) {
     // What the library refuses after the options were checked is in the data.
     throw std::runtime_error(fmt::format("{}: {}", arguments.measured, error.what()));

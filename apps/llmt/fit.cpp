@@ -57,6 +57,14 @@ std::string unreadable(const FitOptions& options) {
 // Whether the model's file has intervals.
 bool keeps_intervals(const FitArguments& arguments) { return !arguments.no_intervals && !arguments.output.empty(); }
 
+// fit() with a bar of its progress.
+FitResult fit_with_bar(const LearningTable& table) {
+  ProgressBar bar("fitting");
+  FitOptions options = table.options;
+  options.progress = bar.callback();
+  return fit(table.inputs.values, table.outputs, options);
+}
+
 // The readable tree beside the model, written if the model is.
 std::optional<ReadableResult> make_readable(const FitArguments& arguments, const LearningTable& table,
                                             const FitSummary& fitted, double loss) {
@@ -65,7 +73,11 @@ std::optional<ReadableResult> make_readable(const FitArguments& arguments, const
         fmt::format("{}: --readable chooses on held-out rows, and the {} row(s) leave none to hold out",
                     table_name(arguments.learning.data), fitted.samples));
   }
-  ReadableResult readable = fit_readable(table.inputs.values, table.outputs, table.options, fitted, loss);
+  ProgressBar bar("readable tree");
+  FitOptions options = table.options;
+  options.progress = bar.callback();
+  ReadableResult readable = fit_readable(table.inputs.values, table.outputs, options, fitted, loss);
+  bar.clear();
   readable.model = readable.model.named(table.names, arguments.learning.targets, table.inputs.levels);
   if (!arguments.output.empty()) {
     save(readable.model, keeps_intervals(arguments) ? readable.intervals : Intervals(),
@@ -110,13 +122,10 @@ void fit_command(FitArguments arguments) {
   if (const std::string why = unreadable(table.options); !arguments.readable.empty() && !why.empty()) {
     throw std::invalid_argument("--readable does not go with " + why);
   }
-  Progress progress("fitting");
   // Folds' models say which rows no model predicts; the report needs them too, and the file unless it is to be small.
   const bool looks_for_spoilt_rows = table.options.loss == Loss::squared;
   table.options.intervals = keeps_intervals(arguments) || arguments.reports.wanted() || looks_for_spoilt_rows;
-  table.options.progress = [&](Eigen::Index done, Eigen::Index total) { progress.show(done, total); };
-  FitResult result = fit(table.inputs.values, table.outputs, table.options);
-  progress.clear();
+  FitResult result = fit_with_bar(table);
   warn_of_spoilt_rows(arguments.learning, table, result);
   result.model = result.model.named(table.names, arguments.learning.targets, table.inputs.levels);
   if (!arguments.output.empty()) {

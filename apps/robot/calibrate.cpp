@@ -102,10 +102,11 @@ void calibrate_command(CalibrateArguments arguments) {
   if (!arguments.test.empty()) test = read_test(arguments, nominal);
   check_positions(arguments.robot, nominal, measurements.poses);
   arguments.options.kind = arguments.contiguous ? FoldKind::contiguous : FoldKind::random;
-  Progress progress("calibrating");
-  arguments.options.progress = [&](Eigen::Index done, Eigen::Index total) { progress.show(done, total); };
+  ProgressBar bar("calibrating");
+  arguments.options.progress = bar.callback();
   const CalibrationReport report = robotics::report_calibration(nominal, measurements, arguments.options);
-  progress.clear();
+  bar.clear();
+  arguments.options.progress = {};
   if (const std::string far = robotics::far_readings(measurements, report); !far.empty() && !arguments.robust) {
     measurements.warnings.push_back(far + ": --robust leaves such readings out");
   }

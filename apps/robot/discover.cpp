@@ -67,10 +67,10 @@ Json folds_json(const robotics::Robot& robot, const robotics::Measurements& data
   dealing.groups = groups;
   double before = 0.0;
   double after = 0.0;
-  Progress progress("fold");
+  ProgressBar bar("fold");
   Eigen::Index done = 0;
   for (const Fold& fold : make_folds(data.count(), dealing)) {
-    progress.show(done++, arguments.folds);
+    bar.show(done++, arguments.folds);
     const robotics::Measurements held_out = robotics::select(data, fold.held_out);
     const Discovery found = robotics::discover(robot, robotics::select(data, fold.train), held_out, arguments.options);
     const auto n = static_cast<double>(held_out.count());
@@ -113,11 +113,10 @@ void discover_command(DiscoverArguments arguments) {
   check_positions(arguments.robot, robot, data.poses);
   if (test) check_positions(arguments.robot, robot, test->poses);
   for (const std::string& warning : data.warnings) warn(warning);
-  Progress progress("discover");
-  Eigen::Index step = 0;
-  arguments.options.progress = [&](const std::string&) { progress.show(step++, 0); };
+  ProgressBar bar("discover");
+  arguments.options.progress = bar.callback();
   const Discovery found = discovered(robot, data, test, arguments.options);
-  progress.clear();
+  bar.clear();
   arguments.options.progress = {};
   warn_of_misfit(robot, data);  // what cannot be calibrated was refused
   const Json folds = arguments.folds > 0 ? folds_json(robot, data, arguments) : Json(nullptr);

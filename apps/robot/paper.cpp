@@ -199,10 +199,10 @@ void tx200(const PaperArguments& arguments) {
                     arguments.seeds));
   }
   for (const bool compliance : {true, false}) {
-    Progress progress(compliance ? "hidden compliance" : "noise alone");
-    const std::vector<Tx200Trial> trials = tx200_study(compliance, arguments.seed, arguments.seeds,
-                                                       [&](int done) { progress.show(done, arguments.seeds); });
-    progress.clear();
+    ProgressBar bar(compliance ? "hidden compliance" : "noise alone");
+    const std::vector<Tx200Trial> trials =
+        tx200_study(compliance, arguments.seed, arguments.seeds, [&](int done) { bar.show(done, arguments.seeds); });
+    bar.clear();
     if (compliance) with_compliance = trials;
     Table table(
         {compliance ? "compliance of axes 2, 3 hidden in the data" : "noise alone", "mean", "smallest", "largest"});

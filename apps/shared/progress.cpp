@@ -27,8 +27,19 @@ std::string progress_line(const std::string& what, Eigen::Index done, Eigen::Ind
                      duration_text(seconds * (1.0 - share) / share));
 }
 
-void Progress::show(Eigen::Index done, Eigen::Index total) {
-  if (::isatty(STDERR_FILENO) == 0) return;
+ProgressBar::ProgressBar(std::string what)
+    : what_(std::move(what)), is_terminal_(::isatty(STDERR_FILENO) != 0), begin_(Clock::now()), last_(begin_) {}
+
+Progress ProgressBar::callback() {
+  if (!is_terminal_) return {};
+  return [this](const ProgressReport& report) {
+    show(report.done, report.total);
+    return true;
+  };
+}
+
+void ProgressBar::show(Eigen::Index done, Eigen::Index total) {
+  if (!is_terminal_) return;
   constexpr std::chrono::seconds quiet(2);
   constexpr std::chrono::milliseconds between(100);
   const Clock::time_point now = Clock::now();
@@ -40,7 +51,7 @@ void Progress::show(Eigen::Index done, Eigen::Index total) {
   shown_ = true;
 }
 
-void Progress::clear() {
+void ProgressBar::clear() {
   if (shown_) {
     fmt::print(stderr, "\r\033[K");
     std::fflush(stderr);

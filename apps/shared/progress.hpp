@@ -6,16 +6,21 @@
 #include <chrono>
 #include <string>
 
+#include "llmt/progress.hpp"
+
 namespace llmt::apps {
 
 /// "fitting [######........] 43 %, about 12 s left" on one line of stderr, rewritten in place. Nothing is shown in the
 /// first two seconds, and nothing where stderr is no terminal.
-class Progress {
+class ProgressBar {
  public:
-  explicit Progress(std::string what) : what_(std::move(what)), begin_(Clock::now()), last_(begin_) {}
-  ~Progress() { clear(); }
-  Progress(const Progress&) = delete;
-  Progress& operator=(const Progress&) = delete;
+  explicit ProgressBar(std::string what);
+  ~ProgressBar() { clear(); }
+  ProgressBar(const ProgressBar&) = delete;
+  ProgressBar& operator=(const ProgressBar&) = delete;
+
+  /// A callback that shows what the library reports; empty where stderr is no terminal. It must not outlive the bar.
+  Progress callback();
 
   /// `done` of `total` steps of about equal length. What is left is the time so far divided by the share that is done,
   /// times the share that is not.
@@ -26,6 +31,7 @@ class Progress {
   using Clock = std::chrono::steady_clock;
 
   std::string what_;
+  bool is_terminal_;
   Clock::time_point begin_;
   Clock::time_point last_;  // when it was shown
   bool shown_ = false;

@@ -10,6 +10,7 @@
 #include "llmt/held_out.hpp"
 #include "llmt/llmt.hpp"
 #include "llmt/outliers.hpp"
+#include "llmt/progress.hpp"
 #include "llmt/random.hpp"
 #include "llmt/readable.hpp"
 #include "llmt/size.hpp"

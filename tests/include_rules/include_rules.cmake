@@ -25,8 +25,8 @@ rule(libraries_know_no_apps FILES "${library}" BANNED "^[\"<](apps|shared)/")
 rule(llmt_knows_no_expressions FILES "^llmt/" BANNED "^\"expressions/")
 rule(expressions_know_nobody FILES "^expressions/" BANNED "^[\"<](llmt|robotics|apps|shared)/")
 rule(no_parent_folders FILES "^(llmt|expressions|robotics|apps)/" BANNED "[.][.]/") # no way around the other rules
-# abi, folds, random and statistics know no tree; what discovery needs of them is compiled into both libraries.
-rule(discovery_knows_no_trees FILES "${discovery}" BANNED "^\"llmt/" ALLOWED "^\"llmt/(discovery/|abi[.]|folds[.]|random[.]|statistics[.])")
+# abi, folds, progress, random and statistics know no tree; what discovery needs of them is compiled into both libraries.
+rule(discovery_knows_no_trees FILES "${discovery}" BANNED "^\"llmt/" ALLOWED "^\"llmt/(discovery/|abi[.]|folds[.]|progress[.]|random[.]|statistics[.])")
 rule(trees_know_no_discovery FILES "^llmt/(include/llmt|src)/" BANNED "^\"(llmt/)?discovery/" EXCEPT "${discovery}")
 rule(tbb_in_one_source FILES "." BANNED "^<(oneapi/)?tbb[/.]" EXCEPT "^llmt/src/base/parallel[.]cpp$")
 # A standard header has neither folder nor extension.

@@ -6,12 +6,12 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <functional>
 #include <string>
 #include <vector>
 
 #include "llmt/abi.hpp"
 #include "llmt/fit.hpp"
+#include "llmt/progress.hpp"
 
 namespace llmt {
 
@@ -54,8 +54,7 @@ struct ComparisonResult {
 
 struct CompareOptions {
   FoldOptions folds = {};  ///< outer folds: each method makes all its choices within the training part
-  /// Called after each fit with the method, the number of fits done and of all fits.
-  std::function<void(const std::string& method, Eigen::Index done, Eigen::Index total)> progress = {};
+  Progress progress = {};  ///< steps have the names of the methods. The progress of a method's own options is not used
 };
 
 /// Fits every method in every fold and on all rows. One output. The method with the smallest held-out error is

@@ -8,13 +8,13 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <functional>
 #include <limits>
 #include <vector>
 
 #include "llmt/abi.hpp"
 #include "llmt/folds.hpp"
 #include "llmt/names.hpp"
+#include "llmt/progress.hpp"
 
 namespace llmt {
 
@@ -175,10 +175,7 @@ struct FitOptions {
   Eigen::VectorXd weights = {};  ///< one entry a row, not negative; a row of weight 0 takes no part. Empty: all 1
   bool intervals = true;         ///< keep the folds' models and residuals for prediction intervals
   int max_threads = 0;           ///< 0: all that the machine has. The result does not depend on it
-  /// Called as the work goes on with how much of it is done: `done` of `total` equal parts. The work is counted in
-  /// operations, and what is still to come is estimated. `done` rises from call to call and ends at `total`. One call
-  /// at a time, from any thread.
-  std::function<void(Eigen::Index done, Eigen::Index total)> progress = {};
+  Progress progress = {};        ///< is called as the work goes on, and may cancel it
   ExpertOptions expert = {};
 };
 

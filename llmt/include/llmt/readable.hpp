@@ -46,7 +46,7 @@ struct ReadableResult {
 /// docs/algorithms/readable.md has the equations.
 ///
 /// `options`, `inputs`, `outputs`: those of fit(); `fitted`: its summary. Of the options the tree uses columns,
-/// weights, folds, shared_partition, max_leaves, min_leaf_samples, expert.search and max_threads; with
+/// weights, folds, shared_partition, max_leaves, min_leaf_samples, expert.search, max_threads and progress; with
 /// LocalTerms::quadratic or automatic equations may have products of two inputs. `loss`: 0.15 for 15 per cent.
 ///
 /// Throws std::invalid_argument as fit(), and if `loss` is negative or not finite, if nothing was held out in the fit,

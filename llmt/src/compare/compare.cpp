@@ -109,12 +109,15 @@ void recommend(const std::vector<Method>& methods, ComparisonResult& result) {
 // The weights that rows lose by the loss, found once for all methods: their errors are then of the same rows. Empty if
 // no method has that loss.
 Eigen::VectorXd loss_weights_of(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
-                                const Eigen::Ref<const Eigen::MatrixXd>& output, const std::vector<Method>& methods) {
+                                const Eigen::Ref<const Eigen::MatrixXd>& output, const std::vector<Method>& methods,
+                                Work& work) {
   const auto robust =
       std::ranges::find_if(methods, [](const Method& method) { return method.options.loss == Loss::tukey; });
   if (robust == methods.end()) return {};
   check_options(robust->options, inputs.cols());
-  return robust_weights(inputs, output, robust->options);
+  constexpr double share_of_loss = 0.05;
+  Work part(work, share_of_loss);
+  return robust_weights(inputs, output, robust->options, part);
 }
 
 // The weights of rows in the errors of a method.
@@ -124,17 +127,19 @@ Eigen::VectorXd error_weights_of(const Method& method, const Eigen::VectorXd& lo
   return Eigen::VectorXd::Ones(rows);
 }
 
-// The held-out errors of a method: fills in fold_rmse, cv_rmse and spread. Calls `done` after each fold.
+// The held-out errors of a method: fills in fold_rmse, cv_rmse and spread. `share`: of a fit in the work.
 void judge_on_folds(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<const Eigen::MatrixXd>& output,
                     const Method& method, const Eigen::VectorXd& error_weights, const std::vector<Fold>& folds,
-                    const std::function<void()>& done, Comparison& entry) {
+                    double share, Work& work, Comparison& entry) {
   double squares = 0.0;
   double weight = 0.0;
   entry.fold_rmse.resize(std::ssize(folds));
   for (std::size_t f = 0; f < folds.size(); ++f) {
     const Fold& fold = folds[f];
-    const FitResult fitted =
-        fit(inputs(fold.train, Eigen::all), output(fold.train, Eigen::all), for_rows(method.options, fold.train));
+    Work part(work, share);
+    FitOptions options = for_rows(method.options, fold.train);
+    options.progress = part.progress();
+    const FitResult fitted = fit(inputs(fold.train, Eigen::all), output(fold.train, Eigen::all), options);
     const Eigen::VectorXd error =
         fitted.model.predict(inputs(fold.held_out, Eigen::all)) - Eigen::MatrixXd(output(fold.held_out, Eigen::all));
     const Eigen::VectorXd weights = error_weights(fold.held_out);
@@ -142,7 +147,6 @@ void judge_on_folds(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen
     squares += of_fold;
     weight += weights.sum();
     entry.fold_rmse(f) = weights.sum() > 0.0 ? std::sqrt(of_fold / weights.sum()) : 0.0;
-    done();
   }
   entry.cv_rmse = std::sqrt(squares / weight);
   entry.spread = spread_of(entry.fold_rmse);
@@ -150,9 +154,12 @@ void judge_on_folds(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen
 
 // The model of all rows: its size, its largest jump and its times.
 void describe_model(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<const Eigen::MatrixXd>& output,
-                    const Method& method, Comparison& entry) {
+                    const Method& method, double share, Work& work, Comparison& entry) {
+  Work part(work, share);
+  FitOptions options = method.options;
+  options.progress = part.progress();
   std::vector<FitResult> all;
-  entry.fit_seconds = seconds_of([&] { all.push_back(fit(inputs, output, method.options)); });
+  entry.fit_seconds = seconds_of([&] { all.push_back(fit(inputs, output, options)); });
   const Model& model = all.front().model;
   entry.predict_seconds =
       seconds_of([&] { model.predict(inputs, method.options.max_threads); }) * 1e6 / static_cast<double>(inputs.rows());
@@ -181,23 +188,20 @@ ComparisonResult compare(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
     fold_options.count = static_cast<int>(std::min<Eigen::Index>(fold_options.count, groups));
   }
   const std::vector<Fold> folds = make_folds(inputs.rows(), fold_options);
-  const Eigen::Index total = std::ssize(methods) * (std::ssize(folds) + 1);
-  Eigen::Index done = 0;
   ComparisonResult result;
-  result.loss_weights = loss_weights_of(inputs, output, methods);
+  Work work(options.progress);
+  result.loss_weights = loss_weights_of(inputs, output, methods, work);
+  const double share = work.left() / static_cast<double>(methods.size() * (folds.size() + 1));
   for (const Method& method : methods) {
-    const auto report = [&] {
-      ++done;
-      if (options.progress) options.progress(method.name, done, total);
-    };
+    work.begin(method.name);
     Comparison entry{.method = method.name};
-    judge_on_folds(inputs, output, method, error_weights_of(method, result.loss_weights, inputs.rows()), folds, report,
-                   entry);
-    describe_model(inputs, output, method, entry);
+    judge_on_folds(inputs, output, method, error_weights_of(method, result.loss_weights, inputs.rows()), folds, share,
+                   work, entry);
+    describe_model(inputs, output, method, share, work, entry);
     result.methods.push_back(std::move(entry));
-    report();
   }
   recommend(methods, result);
+  work.finish();
   return result;
 }
 

@@ -19,7 +19,6 @@ class Methods {
  public:
   explicit Methods(const FitOptions& base) : plain_(base) {
     plain_.intervals = false;
-    plain_.progress = {};
     plain_.pruning = Pruning::last_splits;
     plain_.validity = ValidityChoice::crisp;
     plain_.terms = LocalTerms::linear;

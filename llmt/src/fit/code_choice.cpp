@@ -40,6 +40,9 @@ constexpr Eigen::Index most_compared_rows = 2000;
 constexpr Eigen::Index least_compared_rows = 500;
 constexpr Eigen::Index most_compared_numbers = 25000;
 
+// Of the work that is left, for the comparison of a form.
+constexpr double share_of_choice = 0.05;
+
 bool may_have_codes(const FitOptions& options) {
   const Rule& rule = rule_of(options.rule);
   const bool is_usual = !rule.has_own_models && rule.overlapping == ValidityKind::blend &&
@@ -123,7 +126,7 @@ ComparedRows some_rows(const Matrix& inputs, const Matrix& outputs, const FitOpt
 }
 
 // The held-out errors with these codes, one entry a partition. Empty: there are no two folds.
-std::vector<HeldOut> errors_of(const ComparedRows& some, const Codes& codes) {
+std::vector<HeldOut> errors_of(const ComparedRows& some, const Codes& codes, Work& work) {
   const Eigen::MatrixXd inputs = at_positions(codes, some.inputs);
   const FitOptions options = with_categories(codes, some.options);
   const FitData data(inputs, some.outputs, options, rule_of(options.rule).splits_on_monotone_inputs);
@@ -136,12 +139,16 @@ std::vector<HeldOut> errors_of(const ComparedRows& some, const Codes& codes) {
   const Plan plan = cheap_plan(options, all, std::ssize(folds));
   std::vector<HeldOut> errors;
   for (const std::vector<int>& served : output_groups(some.outputs.cols(), options.shared_partition)) {
+    Work part(work, share_of_choice * work.left());
+    Work choosing(part, 0.5);
     std::vector<GrownTree> trees(folds.size());
     parallel_for(std::ssize(folds), options.max_threads, [&](Eigen::Index f) {
-      trees[f] = grow_tree(folds[f].training, served, plan, false, options.max_threads).tree;
+      Work tree(part, 0.5 / static_cast<double>(folds.size()));
+      trees[f] = grow_tree(folds[f].training, served, plan, false, options.max_threads, tree).tree;
     });
     const CandidateError chosen =
-        select(folds, trees, plan.candidates, error_weights(data.table(), served), options.max_threads).chosen;
+        select(folds, trees, plan.candidates, error_weights(data.table(), served), options.max_threads, choosing)
+            .chosen;
     errors.push_back({chosen.rmse, chosen.fold_rmse});
   }
   return errors;
@@ -187,7 +194,7 @@ bool is_clearly_better(const HeldOut& simple, const HeldOut& other) {
 
 }  // namespace
 
-CodeChoice choose_codes(const Matrix& inputs, const Matrix& outputs, const FitOptions& options,
+CodeChoice choose_codes(const Matrix& inputs, const Matrix& outputs, const FitOptions& options, Work& work,
                         const Eigen::VectorXd& loss_weights) {
   CodeChoice result;
   const Codes possible = possible_codes(inputs, outputs, options);
@@ -196,14 +203,14 @@ CodeChoice choose_codes(const Matrix& inputs, const Matrix& outputs, const FitOp
   const std::vector<int> bent = bent_inputs(some, possible);
   if (bent.empty()) return result;
   Codes chosen(inputs.cols());
-  const std::vector<HeldOut> of_numbers = errors_of(some, chosen);
+  const std::vector<HeldOut> of_numbers = errors_of(some, chosen, work);
   if (of_numbers.empty()) return result;
   HeldOut least = mean_of(of_numbers, of_numbers);
   result.rmse_as_numbers = least.rmse;
   for (const int input : bent) {
     Codes codes = chosen;
     codes[input] = possible[input];
-    const HeldOut errors = mean_of(errors_of(some, codes), of_numbers);
+    const HeldOut errors = mean_of(errors_of(some, codes, work), of_numbers);
     result.compared.push_back(input);
     if (!is_clearly_better(least, errors)) break;
     least = errors;

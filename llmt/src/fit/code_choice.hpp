@@ -13,9 +13,9 @@ namespace llmt {
 using Codes = std::vector<std::vector<double>>;
 
 /// Takes inputs of few whole numbers for codes where that lowers the error on held-out rows by more than chance.
-/// `options` are checked. `loss_weights`: as fit_terms(). Throws as fit().
+/// `options` are checked. `work`: the choice counts as a part of it. `loss_weights`: as fit_terms(). Throws as fit().
 CodeChoice choose_codes(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
-                        const Eigen::Ref<const Eigen::MatrixXd>& outputs, const FitOptions& options,
+                        const Eigen::Ref<const Eigen::MatrixXd>& outputs, const FitOptions& options, Work& work,
                         const Eigen::VectorXd& loss_weights = {});
 
 /// The inputs with positions in place of codes.

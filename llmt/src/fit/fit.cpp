@@ -37,14 +37,15 @@ void refuse_hidden_outputs(const Eigen::Ref<const Eigen::MatrixXd>& outputs, con
 }
 
 FitResult fit_by_squares(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
-                         const Eigen::Ref<const Eigen::MatrixXd>& outputs, const FitOptions& options,
+                         const Eigen::Ref<const Eigen::MatrixXd>& outputs, const FitOptions& options, Work& work,
                          const Eigen::VectorXd& loss_weights = {}) {
   refuse_hidden_outputs(outputs, options.weights);
   const auto fit_inputs = [&](const Eigen::Ref<const Eigen::MatrixXd>& taken, const FitOptions& with) {
-    return with.terms == LocalTerms::automatic ? fit_linear_or_quadratic(taken, outputs, with, loss_weights)
-                                               : fit_terms(taken, outputs, with, loss_weights);
+    Work rest(work, work.left());
+    return with.terms == LocalTerms::automatic ? fit_linear_or_quadratic(taken, outputs, with, rest, loss_weights)
+                                               : fit_terms(taken, outputs, with, rest, loss_weights);
   };
-  CodeChoice chosen = choose_codes(inputs, outputs, options, loss_weights);
+  CodeChoice chosen = choose_codes(inputs, outputs, options, work, loss_weights);
   if (chosen.taken.empty()) {
     FitResult result = fit_inputs(inputs, options);
     result.summary.codes = std::move(chosen);
@@ -62,12 +63,20 @@ FitResult fit_by_squares(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
 FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<const Eigen::MatrixXd>& outputs,
               const FitOptions& options) {
   check_options(options, inputs.cols());
-  if (options.loss == Loss::squared) return fit_by_squares(inputs, outputs, options);
-  const Eigen::VectorXd weights = robust_weights(inputs, outputs, options);
+  Work work(options.progress);
+  if (options.loss == Loss::squared) {
+    FitResult result = fit_by_squares(inputs, outputs, options, work);
+    work.finish();
+    return result;
+  }
+  constexpr double share_of_loss = 0.2;
+  Work preliminary(work, share_of_loss);
+  const Eigen::VectorXd weights = robust_weights(inputs, outputs, options, preliminary);
   FitOptions kept = options;
   kept.weights = without_outliers(options.weights, weights);
-  FitResult result = fit_by_squares(inputs, outputs, kept, weights);
+  FitResult result = fit_by_squares(inputs, outputs, kept, work, weights);
   result.summary.loss_weights = weights;
+  work.finish();
   return result;
 }
 

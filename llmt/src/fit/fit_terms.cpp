@@ -19,9 +19,7 @@
 #include "fit/missing_weights.hpp"
 #include "fit/output_range.hpp"
 #include "fit/same_regressors.hpp"
-#include "fit/stages.hpp"
 #include "model/incomplete.hpp"
-#include "selection/expected_work.hpp"
 #include "selection/selection.hpp"
 
 namespace llmt {
@@ -36,6 +34,9 @@ struct Setting {
   const FitOptions& options;
 };
 
+// Of the work of finishing: the chosen candidate in the folds, and as much of all rows.
+constexpr double share_of_folds = 0.4;
+
 void refuse_beyond_memory(const Setting& setting, Eigen::Index leaves) {
   const Eigen::Index folds = std::ssize(setting.folds);
   refuse_beyond_memory(size_of(setting.all, setting.plan, leaves, folds, setting.options.max_threads),
@@ -48,12 +49,15 @@ Eigen::Index most_leaves(const std::vector<GrownTree>& trees) {
   return most;
 }
 
-std::vector<GrownTree> grow_folds(const Setting& setting, const std::vector<int>& served, const FitStages& stages) {
+// The share of one tree in the work of growing those of the folds and that of all rows.
+double share_of_tree(const Setting& setting) { return 1.0 / static_cast<double>(setting.folds.size() + 1); }
+
+std::vector<GrownTree> grow_folds(const Setting& setting, const std::vector<int>& served, Work& growing) {
   std::vector<GrownTree> trees(setting.folds.size());
   const int threads = setting.options.max_threads;
   parallel_for(std::ssize(trees), threads, [&](Eigen::Index f) {
-    const TrainingRows& rows = setting.folds[f].training;
-    trees[f] = grow_tree(rows, served, setting.plan, false, threads, stages.fold_trees[f]).tree;
+    Work tree(growing, share_of_tree(setting));
+    trees[f] = grow_tree(setting.folds[f].training, served, setting.plan, false, threads, tree).tree;
   });
   return trees;
 }
@@ -73,7 +77,8 @@ Selection first_candidate(const Candidates& candidates, Eigen::Index leaves) {
 }
 
 // The chosen candidate in every fold, for the guard of the range and the intervals.
-std::vector<Partition> finish_folds(const Setting& setting, const std::vector<GrownTree>& trees, Selection& choice) {
+std::vector<Partition> finish_folds(const Setting& setting, const std::vector<GrownTree>& trees, Selection& choice,
+                                    Work& finishing) {
   const int threads = setting.options.max_threads;
   std::vector<std::optional<Partition>> made = std::move(choice.made);
   made.resize(trees.size());
@@ -82,6 +87,7 @@ std::vector<Partition> finish_folds(const Setting& setting, const std::vector<Gr
     Candidate of_fold = choice.chosen.candidate;
     of_fold.leaves = std::min(of_fold.leaves, trees[f].partition.num_leaves());
     made[f] = estimate(setting.folds[f].training, trees[f], of_fold, threads);
+    finishing.did(share_of_folds / static_cast<double>(made.size()));
   });
   std::vector<Partition> partitions;
   for (std::optional<Partition>& partition : made) partitions.push_back(std::move(*partition));
@@ -113,19 +119,17 @@ struct FittedPartition {
 };
 
 FittedPartition finish(const Setting& setting, const FinalTree& grown, Selection choice, std::vector<RangeGuard> guards,
-                       std::vector<Partition> of_folds, Stage stage) {
+                       std::vector<Partition> of_folds, Work& finishing) {
   const int threads = setting.options.max_threads;
   const Eigen::Index grown_leaves = grown.tree.partition.num_leaves();
   Candidate& candidate = choice.chosen.candidate;
   const bool fewer = candidate.leaves < grown_leaves;
   candidate.leaves = std::min(candidate.leaves, grown_leaves);
-  const Eigen::Index coefficients = std::ssize(setting.all.regressors) + 1;
-  stage.expect(operations_of_finish(setting.all, candidate));
   Partition partition = estimate(setting.all, grown.tree, candidate, threads);
-  stage.did(operations_of_estimate(setting.all.count(), candidate, coefficients));
+  finishing.did(share_of_folds);
   partition.output_range = output_range(guards, partition.outputs, setting.all);
   describe_leaves(setting.measured, partition, candidate.sparse, threads);
-  stage.did(stage.to_come());
+  finishing.finish();
   PartitionSummary summary = describe(partition, setting.measured, candidate.sparse);
   summary.grown_leaves = grown_leaves;
   summary.stop = fewer ? StopReason::cross_validation : grown.stop;
@@ -143,9 +147,13 @@ FittedPartition finish(const Setting& setting, const FinalTree& grown, Selection
   return fitted;
 }
 
-// Grow, choose, finish.
-FittedPartition fit_on_inputs(const Setting& setting, const std::vector<int>& served, const FitStages& stages) {
-  stages.expect(setting.all, setting.folds, setting.plan);
+// Grow, choose, finish. The choice takes about as long as two trees of each fold, and the end as long as a tree.
+FittedPartition fit_on_inputs(const Setting& setting, const std::vector<int>& served, Work& work) {
+  const auto num_folds = static_cast<double>(setting.folds.size());
+  const double trees_at_work = (num_folds + 1.0) + 2.0 * num_folds + 1.0;
+  Work growing(work, (num_folds + 1.0) / trees_at_work);
+  Work choosing(work, 2.0 * num_folds / trees_at_work);
+  Work finishing(work, 1.0 / trees_at_work);
   const int threads = setting.options.max_threads;
   const bool has_folds = !setting.folds.empty();
   const Eigen::VectorXd weights = error_weights(*setting.all.table, served);
@@ -156,33 +164,33 @@ FittedPartition fit_on_inputs(const Setting& setting, const std::vector<int>& se
   // tree has ever less to do for several threads the smaller its leaves become.
   parallel_for(2, threads, [&](Eigen::Index job) {
     if (job == 1) {
-      grown = grow_tree(setting.all, served, setting.plan, !has_folds, threads, stages.tree);
+      Work tree(growing, share_of_tree(setting));
+      grown = grow_tree(setting.all, served, setting.plan, !has_folds, threads, tree);
       refuse_beyond_memory(setting, grown.tree.partition.num_leaves());
       return;
     }
-    trees = grow_folds(setting, served, stages);
+    trees = grow_folds(setting, served, growing);
     refuse_beyond_memory(setting, most_leaves(trees));
     if (!has_folds) return;
-    choice = select(setting.folds, trees, setting.plan.candidates, weights, threads, stages.selection);
-    stages.finish.expect(operations_of_finish(setting.all, choice.chosen.candidate));
+    choice = select(setting.folds, trees, setting.plan.candidates, weights, threads, choosing);
   });
   if (!has_folds) choice = first_candidate(setting.plan.candidates, grown.tree.partition.num_leaves());
-  std::vector<Partition> of_folds = finish_folds(setting, trees, choice);
+  std::vector<Partition> of_folds = finish_folds(setting, trees, choice, finishing);
   std::vector<RangeGuard> guards;
   if (has_folds) guards = guard_output_range(setting.folds, weights, threads, of_folds, choice.chosen);
   if (!setting.options.intervals) of_folds.clear();
-  return finish(setting, grown, std::move(choice), std::move(guards), std::move(of_folds), stages.finish);
+  return finish(setting, grown, std::move(choice), std::move(guards), std::move(of_folds), finishing);
 }
 
 // With the inputs that are worth it.
-FittedPartition fit_partition(const Setting& setting, const std::vector<int>& served, const FitStages& stages) {
+FittedPartition fit_partition(const Setting& setting, const std::vector<int>& served, Work& work) {
   const Eigen::VectorXd weights = error_weights(*setting.all.table, served);
-  stages.expect(setting.all, setting.folds, setting.plan);
   const ChosenInputs chosen =
-      choose_inputs(setting.all, setting.folds, served, weights, setting.plan, setting.options, stages.inputs);
+      choose_inputs(setting.all, setting.folds, served, weights, setting.plan, setting.options, work);
+  Work fitting(work, work.left());
   const std::vector<int>& every = setting.all.split_inputs;
   FittedPartition fitted = [&] {
-    if (chosen.of_all == every) return fit_on_inputs(setting, served, stages);
+    if (chosen.of_all == every) return fit_on_inputs(setting, served, fitting);
     const TrainingRows all = narrowed(setting.all, chosen.of_all);
     const TrainingRows measured = narrowed(setting.measured, chosen.of_all);
     std::vector<FoldRows> folds;
@@ -191,7 +199,7 @@ FittedPartition fit_partition(const Setting& setting, const std::vector<int>& se
                        narrowed(setting.folds[f].held_out, chosen.of_folds[f])});
     }
     const Plan plan = with_defaults(setting.options, all, std::ssize(folds));
-    return fit_on_inputs({all, measured, folds, plan, setting.options}, served, stages);
+    return fit_on_inputs({all, measured, folds, plan, setting.options}, served, fitting);
   }();
   std::ranges::set_difference(every, chosen.of_all, std::back_inserter(fitted.summary.left_out));
   fitted.summary.input_steps = chosen.steps;
@@ -238,12 +246,12 @@ std::vector<int> all_rows(Eigen::Index count) {
 }  // namespace
 
 FitResult fit_terms(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<const Eigen::MatrixXd>& outputs,
-                    const FitOptions& options, const Eigen::VectorXd& loss_weights,
-                    const std::function<void(double, double)>& watch) {
+                    const FitOptions& options, Work& work, const Eigen::VectorXd& loss_weights) {
   const FitData data(inputs, outputs, options, rule_of(options.rule).splits_on_monotone_inputs);
   const Table& table = data.table();
   Table weighted = data.trained(loss_weights);
-  if (table.inputs.hasNaN()) weighted.weights = weighted.weights.cwiseProduct(weights_by_missing(weighted, options));
+  if (table.inputs.hasNaN())
+    weighted.weights = weighted.weights.cwiseProduct(weights_by_missing(weighted, options, work));
   const TrainingRows all = training_rows(weighted, all_rows(table.inputs.rows()), options.max_threads);
   const TrainingRows measured = with_table(all, table);
   const std::vector<FoldRows> folds = deal(weighted, table, data.folds(), options.max_threads);
@@ -251,17 +259,14 @@ FitResult fit_terms(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen
   const Setting setting{all, measured, folds, plan, options};
   refuse_beyond_memory(setting, 0);
   const std::vector<std::vector<int>> groups = output_groups(table.outputs.cols(), options.shared_partition);
-  ProgressReport report(options, groups.size());
   std::vector<std::optional<FittedPartition>> fitted(groups.size());
+  const double share = work.left();
   // With a single hold-out rows are many, and one tree has work for all threads: several at a time would only hold more
   // rows in memory.
   const int groups_at_once = folds.size() == 1 ? 1 : options.max_threads;
   parallel_for(std::ssize(groups), groups_at_once, [&](Eigen::Index p) {
-    Work work([&, p](double share, double operations) {
-      report.partition_at(p, share);
-      if (watch) watch(share, operations);
-    });
-    fitted[p] = fit_partition(setting, groups[p], FitStages(work, folds.size()));
+    Work part(work, share / static_cast<double>(groups.size()));
+    fitted[p] = fit_partition(setting, groups[p], part);
   });
   std::vector<FittedPartition> finished;
   for (std::optional<FittedPartition>& each : fitted) finished.push_back(std::move(*each));
@@ -269,7 +274,7 @@ FitResult fit_terms(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen
   result.summary.samples += data.copies();
   result.summary.copies = data.copies();
   result.summary.repeats = data.has_repeats();
-  report.finish();
+  work.finish();
   return result;
 }
 

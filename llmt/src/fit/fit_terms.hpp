@@ -2,17 +2,14 @@
 /// A fit whose local models have given terms.
 #pragma once
 
-#include <functional>
-
 #include "llmt/fit.hpp"
 
 namespace llmt {
 
-/// fit() for LocalTerms::linear or quadratic, of checked options. `loss_weights`: positive, one for each row of
-/// positive weight; in training, not in errors, a row's weight is times this. Empty: all 1. `watch`: what Work reports
-/// of each partition, for tests.
+/// fit() for LocalTerms::linear or quadratic, of checked options. `work`: of this fit; FitOptions::progress is not
+/// used. `loss_weights`: positive, one for each row of positive weight; in training, not in errors, a row's weight is
+/// times this. Empty: all 1.
 FitResult fit_terms(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<const Eigen::MatrixXd>& outputs,
-                    const FitOptions& options, const Eigen::VectorXd& loss_weights = {},
-                    const std::function<void(double share, double operations)>& watch = {});
+                    const FitOptions& options, Work& work, const Eigen::VectorXd& loss_weights = {});
 
 }  // namespace llmt

@@ -45,14 +45,11 @@ GrownPartition grow_and_prune(GrowthProblem problem, const Rule& rule) {
 }  // namespace
 
 FinalTree grow_tree(const TrainingRows& rows, const std::vector<int>& served, const Plan& plan, bool keeps_all_leaves,
-                    int max_threads, Stage stage) {
+                    int max_threads, Work& work) {
   GrowthProblem problem = problem_of(rows, served, plan, keeps_all_leaves, max_threads);
-  problem.stage = stage;
-  const double expected = stage.to_come();
+  problem.work = &work;
   GrownPartition grown =
       plan.pruning == Pruning::last_splits ? plan.rule->grow(problem) : grow_and_prune(problem, *plan.rule);
-  if (stage.to_come() == expected) stage.did(expected);  // not every rule counts
-  stage.expect(0.0);
   Partition partition{
       .outputs = served, .validity = {}, .nodes = std::move(grown.nodes), .outer_slope = {}, .residual_range = {}};
   if (!plan.rule->keeps_signs) keep_signs(rows, partition, max_threads);
@@ -61,6 +58,7 @@ FinalTree grow_tree(const TrainingRows& rows, const std::vector<int>& served, co
   if (!plan.candidates.widths.empty() && plan.candidates.kind == ValidityKind::blend) {
     jumps = jump_sizes(rows, partition, max_threads);
   }
+  work.finish();
   return {{std::move(partition), std::move(jumps)}, grown.stop, grown.search};
 }
 

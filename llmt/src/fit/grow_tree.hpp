@@ -14,8 +14,8 @@ struct FinalTree {
 };
 
 /// Grows a tree for the outputs `served`. `keeps_all_leaves`: no held-out rows will choose how many leaves stay.
-/// `stage`: of this tree, over at the end.
+/// `work`: of this tree.
 FinalTree grow_tree(const TrainingRows& rows, const std::vector<int>& served, const Plan& plan, bool keeps_all_leaves,
-                    int max_threads, Stage stage = {});
+                    int max_threads, Work& work);
 
 }  // namespace llmt

@@ -10,10 +10,8 @@
 #include "data/fewer_inputs.hpp"
 #include "fit/cheap_plan.hpp"
 #include "fit/grow_tree.hpp"
-#include "fit/stages.hpp"
 #include "llmt/explain.hpp"
 #include "llmt/statistics.hpp"
-#include "selection/expected_work.hpp"
 #include "selection/selection.hpp"
 
 namespace llmt {
@@ -28,8 +26,8 @@ constexpr double standard_errors_of_a_gain = 2.0;
 // With more rows for each input than this, coefficients of useless inputs cost too little to look for them.
 constexpr Eigen::Index most_rows_per_input = 300;
 
-// With this probability a step is followed by another one.
-constexpr double next_step = 0.8;
+// Of the work that is left, for a number of inputs.
+constexpr double share_of_step = 0.1;
 
 // Rows that importance looks at.
 constexpr Eigen::Index ranking_rows = 300;
@@ -75,27 +73,25 @@ struct Step {
 class Walk {
  public:
   Walk(const TrainingRows& all, const std::vector<FoldRows>& folds, const std::vector<int>& served,
-       const Eigen::VectorXd& weights, const FitOptions& options, Stage stage)
-      : all_(all), folds_(folds), served_(served), weights_(weights), options_(options), stage_(stage) {}
+       const Eigen::VectorXd& weights, const FitOptions& options, Work& work)
+      : all_(all), folds_(folds), served_(served), weights_(weights), options_(options), work_(work) {}
 
   // Compares numbers of inputs, largest first, each fold's inputs ranked on its training rows.
   std::vector<Step> compare() const {
     std::vector<Step> steps;
     std::vector<std::vector<int>> of_folds(folds_.size(), all_.split_inputs);
     double least = std::numeric_limits<double>::infinity();
-    double of_last = 0.0;  // operations of the last selection
     for (Eigen::Index size = std::ssize(all_.split_inputs); size >= 1; size = fewer_inputs(size)) {
       const Plan plan = plan_for(of_folds.front());
-      const Stage selecting = stage_.another(steps.empty() ? first_selection(plan, size) : of_last);
-      expect_from(size, plan, selecting.to_come());
+      Work step(work_, share_of_step * work_.left());
+      Work choosing(step, 0.5);
       const std::vector<FoldRows> folds = narrowed_folds(of_folds);
       std::vector<GrownTree> trees(folds.size());
       parallel_for(std::ssize(folds), options_.max_threads, [&](Eigen::Index f) {
-        trees[f] = grow_tree(folds[f].training, served_, plan, false, options_.max_threads).tree;
-        stage_.did(operations_of_tree(folds[f].training, plan));
+        Work tree(step, 0.5 / static_cast<double>(folds.size()));
+        trees[f] = grow_tree(folds[f].training, served_, plan, false, options_.max_threads, tree).tree;
       });
-      Selection selection = select(folds, trees, plan.candidates, weights_, options_.max_threads, selecting);
-      of_last = selecting.done();
+      Selection selection = select(folds, trees, plan.candidates, weights_, options_.max_threads, choosing);
       steps.push_back({size, of_folds, selection.chosen});
       least = std::min(least, selection.chosen.rmse);
       if (size == 1 || selection.chosen.rmse > largest_ratio * least) return steps;
@@ -113,7 +109,8 @@ class Walk {
     std::vector<int> inputs = all_.split_inputs;
     for (const Step& step : steps.first(steps.size() - 1)) {
       const TrainingRows rows = narrowed(all_, inputs);
-      const FinalTree grown = grow_tree(rows, served_, plan_for(inputs), false, options_.max_threads);
+      Work tree(work_, share_of_step * work_.left() / static_cast<double>(folds_.size()));
+      const FinalTree grown = grow_tree(rows, served_, plan_for(inputs), false, options_.max_threads, tree);
       inputs = next_inputs(rows, inputs, grown.tree, {}, step.chosen.candidate, fewer_inputs(step.inputs),
                            options_.max_threads);
     }
@@ -121,19 +118,6 @@ class Walk {
   }
 
  private:
-  double first_selection(const Plan& plan, Eigen::Index size) const {
-    return operations_of_selection(folds_, size + 1, plan.candidates, expected_leaves(folds_.front().training, plan));
-  }
-
-  // Sets what is to come from the comparison of `size` inputs on, beside the present selection: all take about as much.
-  void expect_from(Eigen::Index size, const Plan& plan, double selection) const {
-    double trees = 0.0;
-    for (const FoldRows& fold : folds_) trees += operations_of_tree(fold.training, plan);
-    double steps = 0.0;
-    for (double likely = 1.0; (size = fewer_inputs(size)) > 0;) steps += likely *= next_step;
-    stage_.expect(trees + steps * (trees + selection));
-  }
-
   Plan plan_for(const std::vector<int>& inputs) const {
     return cheap_plan(options_, narrowed(all_, inputs), std::ssize(folds_));
   }
@@ -151,19 +135,18 @@ class Walk {
   const std::vector<int>& served_;
   const Eigen::VectorXd& weights_;
   const FitOptions& options_;
-  Stage stage_;
+  Work& work_;
 };
 
 }  // namespace
 
 ChosenInputs choose_inputs(const TrainingRows& all, const std::vector<FoldRows>& folds, const std::vector<int>& served,
-                           const Eigen::VectorXd& weights, const Plan& plan, const FitOptions& options, Stage stage) {
+                           const Eigen::VectorXd& weights, const Plan& plan, const FitOptions& options, Work& work) {
   const std::vector<int>& every = all.split_inputs;
   ChosenInputs result{every, std::vector<std::vector<int>>(folds.size(), every), {}};
   if (!may_leave_out(all, folds.size(), plan, options)) return result;
-  const Walk walk(all, folds, served, weights, options, stage);
+  const Walk walk(all, folds, served, weights, options, work);
   const std::vector<Step> steps = walk.compare();
-  stage.expect(0.0);
   for (const Step& step : steps) result.steps.push_back({step.inputs, step.chosen.rmse});
   const auto best = std::ranges::min_element(steps, {}, [](const Step& step) { return step.chosen.rmse; });
   const PairedDifference gain = paired_difference(steps.front().chosen.fold_rmse, best->chosen.fold_rmse);

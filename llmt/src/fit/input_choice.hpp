@@ -2,13 +2,12 @@
 /// Which inputs a partition uses: backward elimination, docs/algorithms/input-choice.md.
 #pragma once
 
-#include <functional>
 #include <vector>
 
-#include "base/work.hpp"
 #include "data/fold_rows.hpp"
 #include "fit/defaults.hpp"
 #include "llmt/options.hpp"
+#include "llmt/progress.hpp"
 #include "llmt/summary.hpp"
 
 namespace llmt {
@@ -21,9 +20,9 @@ struct ChosenInputs {
 };
 
 /// All inputs, or fewer where that lowers the error on held-out rows by more than chance. `plan`: for all inputs;
-/// `served`: the outputs; `weights`: of their squared errors; `stage`: of this choice, over at the end.
+/// `served`: the outputs; `weights`: of their squared errors; `work`: the choice
+/// counts as a part of it.
 ChosenInputs choose_inputs(const TrainingRows& all, const std::vector<FoldRows>& folds, const std::vector<int>& served,
-                           const Eigen::VectorXd& weights, const Plan& plan, const FitOptions& options,
-                           Stage stage = {});
+                           const Eigen::VectorXd& weights, const Plan& plan, const FitOptions& options, Work& work);
 
 }  // namespace llmt

@@ -26,30 +26,20 @@ CandidateError mean_error(const FitSummary& of, const FitSummary& linear) {
 
 FitResult fit_linear_or_quadratic(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
                                   const Eigen::Ref<const Eigen::MatrixXd>& outputs, const FitOptions& options,
-                                  const Eigen::VectorXd& loss_weights) {
+                                  Work& work, const Eigen::VectorXd& loss_weights) {
   const Eigen::Index numbers = count_numeric_inputs(inputs.cols(), options);
   const bool both = numbers > 0 && numbers <= most_inputs_of_products && options.folds.count != 0 &&
                     !(inputs.array().abs() > largest_factor).any();
   FitOptions with_terms = options;
-  // Work goes with the coefficients of a local model: n + 1, and (n + 1) (n + 2) / 2.
-  const Eigen::Index of_linear_fit = 2;
-  const Eigen::Index of_quadratic_fit = numbers + 2;
-  const auto fit_with = [&](LocalTerms terms, Eigen::Index before, Eigen::Index share) {
+  const auto fit_with = [&](LocalTerms terms, double share) {
     with_terms.terms = terms;
-    if (options.progress && both) {
-      with_terms.progress = [&options, before, share, all = of_linear_fit + of_quadratic_fit](Eigen::Index done,
-                                                                                              Eigen::Index total) {
-        options.progress(before * total + share * done, all * total);
-      };
-    }
-    return fit_terms(inputs, outputs, with_terms, loss_weights);
+    Work part(work, share);
+    return fit_terms(inputs, outputs, with_terms, part, loss_weights);
   };
-  FitResult linear = fit_with(LocalTerms::linear, 0, of_linear_fit);
-  if (!both || linear.summary.partitions.front().cv_folds == 0) {
-    if (both && options.progress) options.progress(1, 1);
-    return linear;
-  }
-  FitResult quadratic = fit_with(LocalTerms::quadratic, of_linear_fit, of_quadratic_fit);
+  // Work goes with the coefficients of a local model: n + 1, and (n + 1) (n + 2) / 2.
+  FitResult linear = fit_with(LocalTerms::linear, both ? 2.0 / static_cast<double>(numbers + 4) : 1.0);
+  if (!both || linear.summary.partitions.front().cv_folds == 0) return linear;
+  FitResult quadratic = fit_with(LocalTerms::quadratic, 1.0);
   const CandidateError of_linear = mean_error(linear.summary, linear.summary);
   const CandidateError of_quadratic = mean_error(quadratic.summary, linear.summary);
   const std::vector<PartitionSummary>& trees = linear.summary.partitions;

@@ -15,14 +15,15 @@ constexpr double least_weight = 0.01;
 constexpr double prior_rows = 40.0;  // for an input, as if this many rows more had no larger variance without it
 
 // Squared residuals of preliminary trees, of all outputs together, each divided by its variance.
-Eigen::VectorXd squared_residuals(const Table& table, const FitOptions& options) {
+Eigen::VectorXd squared_residuals(const Table& table, const FitOptions& options, Work& work) {
   std::vector<int> rows(table.inputs.rows());
   std::iota(rows.begin(), rows.end(), 0);
   const TrainingRows all = training_rows(table, std::move(rows), options.max_threads);
   const Plan plan = with_defaults(preliminary_options(options), all, 0);
   std::vector<Partition> partitions;
   for (int output = 0; output < table.outputs.cols(); ++output) {
-    partitions.push_back(grow_tree(all, {output}, plan, true, options.max_threads).tree.partition);
+    Work tree(work, 0.1 / static_cast<double>(table.outputs.cols()));
+    partitions.push_back(grow_tree(all, {output}, plan, true, options.max_threads, tree).tree.partition);
   }
   const Model model(all.columns, all.output_columns, all.regressors, std::move(partitions));
   const Eigen::MatrixXd residuals = table.outputs - model.predict(table.inputs, options.max_threads);
@@ -48,8 +49,8 @@ Eigen::MatrixXd indicators(const Table& table) {
 
 }  // namespace
 
-Eigen::VectorXd weights_by_missing(const Table& table, const FitOptions& options) {
-  const Eigen::VectorXd squares = squared_residuals(table, options);
+Eigen::VectorXd weights_by_missing(const Table& table, const FitOptions& options, Work& work) {
+  const Eigen::VectorXd squares = squared_residuals(table, options, work);
   const Eigen::MatrixXd a = indicators(table);
   const auto weighted = table.weights.asDiagonal();
   Eigen::MatrixXd gram = a.transpose() * weighted * a;

@@ -64,15 +64,18 @@ Eigen::VectorXd biweights(const Model& model, const Eigen::Ref<const Eigen::Matr
 }  // namespace
 
 Eigen::VectorXd robust_weights(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
-                               const Eigen::Ref<const Eigen::MatrixXd>& outputs, const FitOptions& options) {
+                               const Eigen::Ref<const Eigen::MatrixXd>& outputs, const FitOptions& options,
+                               Work& work) {
   const FitData data(inputs, outputs, options, true);
   const Table& table = data.table();
   FitOptions first = preliminary_options(options);
   first.folds = data.folds();
   first.weights = table.weights;
-  const Model of_clipped = fit_terms(table.inputs, clipped(table.outputs), first).model;
+  Work half(work, 0.5);
+  const Model of_clipped = fit_terms(table.inputs, clipped(table.outputs), first, half).model;
   first.weights = table.weights.cwiseProduct(biweights(of_clipped, table.inputs, table.outputs, options.max_threads));
-  const Model of_weighted = fit_terms(table.inputs, table.outputs, first).model;
+  Work other_half(work, 0.5);
+  const Model of_weighted = fit_terms(table.inputs, table.outputs, first, other_half).model;
   const Eigen::VectorXd of_table = biweights(of_weighted, table.inputs, table.outputs, options.max_threads);
   Eigen::VectorXd weights = Eigen::VectorXd::Zero(outputs.rows());
   for (Eigen::Index row = 0; row < outputs.rows(); ++row) {

@@ -4,9 +4,9 @@
 
 #include <vector>
 
-#include "base/work.hpp"
 #include "data/dataset.hpp"
 #include "llmt/options.hpp"
+#include "llmt/progress.hpp"
 #include "llmt/summary.hpp"
 
 namespace llmt {
@@ -46,13 +46,14 @@ struct GrowthProblem {
   int max_threads = 0;
   SplitCriterion criterion = SplitCriterion::f_test;
   AfterGrowth after = {};
-  Stage stage = {};  ///< that counts the searches
-};
+  Work* work = nullptr;  ///< that counts the growth of this tree
 
-/// Operations (base/work.hpp) of the search for the best split of some rows.
-inline double operations_of_search(Eigen::Index rows, Eigen::Index inputs, Eigen::Index coefficients) {
-  return 0.8 * static_cast<double>(rows * inputs * coefficients) * static_cast<double>(coefficients + 1);
-}
+  /// Counts the search for the best split of a node with this number of rows.
+  void searched(Eigen::Index rows) const;
+
+  /// Reports within the search of a node, if it takes long, so that a fit can be cancelled there.
+  void check(Eigen::Index rows) const;
+};
 
 struct GrownPartition {
   std::vector<Node> nodes;  ///< thresholds in the inputs' units; ranges (low, high) as far as they are known

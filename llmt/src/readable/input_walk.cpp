@@ -22,6 +22,9 @@ constexpr Eigen::Index growth_rows = 10000;
 // Inputs of the local models with which splits are searched: the time grows with the square of their number.
 constexpr Eigen::Index most_growth_inputs = 13;
 
+// Of the work that is left in a walk, for the trees of one form. Later ones have fewer inputs.
+constexpr double share_of_tree = 0.15;
+
 // Rows in a leaf, where the caller says nothing.
 constexpr Eigen::Index fewest_rows = 5;
 
@@ -96,7 +99,7 @@ EquationTree make_tree(const Sample& sample, const TreePlan& plan, const WalkSte
   return with_terms(sample, grow(sample, plan, step), step.inputs, form);
 }
 
-std::vector<WalkStep> walk_inputs(const Sample& sample, const TreePlan& plan) {
+std::vector<WalkStep> walk_inputs(const Sample& sample, const TreePlan& plan, Work& work) {
   std::vector<WalkStep> steps;
   std::vector<int> inputs = usable_inputs(sample);
   Eigen::VectorXd importance = importance_of(with_terms(sample, std::vector<Node>(1), inputs, forms().front()));
@@ -109,6 +112,7 @@ std::vector<WalkStep> walk_inputs(const Sample& sample, const TreePlan& plan) {
       EquationTree tree = with_terms(sample, grown, inputs, form);
       step.trees.push_back(judge(tree));
       importance = importance_of(tree);
+      work.did(share_of_tree * work.left());
     }
     if (count == 1) return steps;
     inputs = most_important(inputs, importance, fewer_inputs(count));

@@ -53,6 +53,7 @@ double price_of(const EquationTree& tree, std::size_t price);
 
 /// Walks from the tree with all inputs to one with a single input: of D inputs the ceil(0.7 D) that matter most to the
 /// cheapest tree at the Schwarz price go on. The number of inputs of a step depends on the number at the start alone.
-std::vector<WalkStep> walk_inputs(const Sample& sample, const TreePlan& plan);
+/// `work`: of this walk.
+std::vector<WalkStep> walk_inputs(const Sample& sample, const TreePlan& plan, Work& work);
 
 }  // namespace llmt

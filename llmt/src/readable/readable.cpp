@@ -166,13 +166,16 @@ struct ReadableTrees {
 };
 
 std::unique_ptr<ReadableTrees> find_trees(const Setting& setting, const std::vector<int>& served, double best_crisp,
-                                          double loss) {
+                                          double loss, Work& work) {
   auto made = std::make_unique<ReadableTrees>();
   made->samples = samples_of(setting, served);
   const Eigen::Index count = std::ssize(made->samples);
   std::vector<std::vector<WalkStep>> walks(count);
-  parallel_for(count, setting.max_threads,
-               [&](Eigen::Index f) { walks[f] = walk_inputs(made->samples[f], setting.plan); });
+  constexpr double share_of_walks = 0.9;
+  parallel_for(count, setting.max_threads, [&](Eigen::Index f) {
+    Work walk(work, share_of_walks / static_cast<double>(count));
+    walks[f] = walk_inputs(made->samples[f], setting.plan, walk);
+  });
   std::vector<double> weights;
   for (const FoldRows& fold : setting.folds) {
     weights.push_back(total_weight(fold.held_out) * static_cast<double>(served.size()));
@@ -185,6 +188,7 @@ std::unique_ptr<ReadableTrees> find_trees(const Setting& setting, const std::vec
     EquationTree tree = make_tree(made->samples[f], setting.plan, walks[f][key.step], forms()[key.form]);
     std::vector<int> pruned = tree.pruned(price_of(tree, key.price));
     made->trees[f].emplace(ChosenTree{std::move(tree), std::move(pruned)});
+    work.check();
   });
   return made;
 }
@@ -261,6 +265,7 @@ Intervals intervals_of(const Setting& setting, const std::vector<std::unique_ptr
 ReadableResult fit_inputs(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
                           const Eigen::Ref<const Eigen::MatrixXd>& outputs, const FitOptions& options,
                           const FitSummary& fitted, double loss) {
+  Work work(options.progress);
   FitOptions linear = options;
   linear.terms = LocalTerms::linear;
   if (fitted.loss_weights.size() > 0) {
@@ -269,7 +274,8 @@ ReadableResult fit_inputs(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
   const FitData data(inputs, outputs, linear, true);
   const Table& table = data.table();
   Table weighted = data.trained(fitted.loss_weights);
-  if (table.inputs.hasNaN()) weighted.weights = weighted.weights.cwiseProduct(weights_by_missing(weighted, linear));
+  if (table.inputs.hasNaN())
+    weighted.weights = weighted.weights.cwiseProduct(weights_by_missing(weighted, linear, work));
   std::vector<int> rows(table.inputs.rows());
   std::iota(rows.begin(), rows.end(), 0);
   const TrainingRows all = training_rows(weighted, std::move(rows), options.max_threads);
@@ -285,13 +291,17 @@ ReadableResult fit_inputs(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
                         .intervals = options.intervals,
                         .max_threads = options.max_threads};
   std::vector<std::unique_ptr<ReadableTrees>> parts;
+  const double share = work.left();
   for (const PartitionSummary& partition : fitted.partitions) {
-    parts.push_back(find_trees(setting, partition.outputs, best_crisp_of(partition), loss));
+    Work part(work, share / static_cast<double>(fitted.partitions.size()));
+    parts.push_back(find_trees(setting, partition.outputs, best_crisp_of(partition), loss, part));
   }
   Model model = assemble(parts, folds.size(), options.max_threads);
   std::vector<ReadablePartition> partitions;
   for (std::size_t p = 0; p < parts.size(); ++p) partitions.push_back(describe(model, p, parts[p]->choice));
-  return {std::move(model), std::move(partitions), intervals_of(setting, parts)};
+  ReadableResult result{std::move(model), std::move(partitions), intervals_of(setting, parts)};
+  work.finish();
+  return result;
 }
 
 }  // namespace

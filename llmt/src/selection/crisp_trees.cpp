@@ -90,12 +90,13 @@ CandidateError best_linear(const CandidateError& least_squares, const std::vecto
 
 void compare_crisp(const std::vector<FoldRows>& folds, const std::vector<GrownTree>& grown,
                    const Candidates& candidates, const Eigen::VectorXd& weights, int max_threads,
-                   const FoldErrors& error_of_folds, Selection& selection) {
+                   const FoldErrors& error_of_folds, Work& work, Selection& selection) {
   const std::vector<Variant> variants = variants_of(candidates);
   const std::vector<double>& ridges = candidates.linear_shrinkages;
   std::vector<CrispErrors> errors(folds.size());
   parallel_for(std::ssize(folds), max_threads, [&](Eigen::Index f) {
     errors[f] = errors_in_fold(folds[f], grown[f], variants, ridges, weights, max_threads);
+    work.did(1.0 / static_cast<double>(folds.size()));
   });
   Eigen::Index largest = 0;
   for (const CrispErrors& fold : errors) largest = std::max(largest, fold.of_trees.front().size());

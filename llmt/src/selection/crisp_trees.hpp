@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "llmt/progress.hpp"
 #include "selection/fold_errors.hpp"
 
 namespace llmt {
@@ -13,6 +14,6 @@ namespace llmt {
 /// better, and the best crisp tree; `chosen` is the best of these. `weights`: of the outputs' squared errors.
 void compare_crisp(const std::vector<FoldRows>& folds, const std::vector<GrownTree>& grown,
                    const Candidates& candidates, const Eigen::VectorXd& weights, int max_threads,
-                   const FoldErrors& error_of_folds, Selection& selection);
+                   const FoldErrors& error_of_folds, Work& work, Selection& selection);
 
 }  // namespace llmt

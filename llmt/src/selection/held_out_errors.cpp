@@ -8,7 +8,6 @@
 #include "estimation/local_estimate.hpp"
 #include "estimation/squared_errors.hpp"
 #include "llmt/statistics.hpp"
-#include "selection/expected_work.hpp"
 
 namespace llmt {
 namespace {
@@ -31,6 +30,19 @@ double middle_of_gap(const std::vector<GrownTree>& grown, double jump) {
   return kept < no_jump ? std::sqrt(kept * std::max(left_out, kept / 16.0)) : no_jump;
 }
 
+// The leaf counts of a comparison of trees with at most `largest` leaves.
+std::vector<Eigen::Index> compared_leaf_counts(Eigen::Index largest) {
+  std::vector<Eigen::Index> counts;
+  for (Eigen::Index count = largest; count > 1; count = std::min(count - 1, (count * 2 + 1) / 3)) {
+    counts.push_back(count);
+  }
+  std::ranges::reverse(counts);
+  return counts;
+}
+
+// Of what is left of a comparison, about the part that an evaluation takes.
+constexpr double share_of_evaluation = 0.25;
+
 }  // namespace
 
 Eigen::Index enough_rows(Eigen::Index leaves, Eigen::Index coefficients) {
@@ -40,13 +52,13 @@ Eigen::Index enough_rows(Eigen::Index leaves, Eigen::Index coefficients) {
 }
 
 HeldOutErrors::HeldOutErrors(const std::vector<FoldRows>& folds, const std::vector<GrownTree>& grown,
-                             const Candidates& candidates, const Eigen::VectorXd& weights, int max_threads, Stage stage)
+                             const Candidates& candidates, const Eigen::VectorXd& weights, int max_threads, Work& work)
     : folds_(folds),
       grown_(grown),
       candidates_(candidates),
       weights_(weights),
       max_threads_(max_threads),
-      stage_(stage),
+      work_(work),
       of_folds_(folds.size()) {
   std::set<Eigen::Index> seen;
   for (const double jump : candidates.jumps) {
@@ -108,9 +120,9 @@ struct HeldOutErrors::Sample {
 
 // One shape; `keys` ascending.
 HeldOutErrors::Evaluated HeldOutErrors::evaluate_shape(std::size_t fold, const std::vector<Key>& keys,
-                                                       bool keeps_models, std::shared_ptr<Sample>& last) const {
+                                                       bool keeps_models, std::shared_ptr<Sample>& last, Work& work,
+                                                       double share) const {
   const Candidate first = candidate(keys.front());
-  const Eigen::Index coefficients = std::ssize(samples_[fold].regressors) + 1;
   const Partition tree = blended(samples_[fold], grown_[fold], first.validity, first.jump);
   std::vector<std::vector<Key>> of_counts;  // of each number of leaves, the largest first, which takes longest
   for (auto key = keys.rbegin(); key != keys.rend(); ++key) {
@@ -121,7 +133,7 @@ HeldOutErrors::Evaluated HeldOutErrors::evaluate_shape(std::size_t fold, const s
     const Eigen::Index leaves = std::min(leaf_counts_[same.front().leaves], tree.num_leaves());
     if (sample && sample->serves(samples_[fold], leaves)) return;
     sample = std::make_shared<Sample>(samples_[fold], prefix(tree, leaves), max_threads_, candidates_.sparse.back());
-    stage_.did(operations_of_sums(sample->rows.count(), leaves, coefficients, first.validity.width));
+    work.check();
   };
   // The sums of a tree serve all its prefixes. This does not hold for Gaussians, whose prefixes have validities of
   // their own.
@@ -133,10 +145,7 @@ HeldOutErrors::Evaluated HeldOutErrors::evaluate_shape(std::size_t fold, const s
     std::shared_ptr<Sample> own;
     if (!shares_sums) sample_for(same, own);
     evaluated[index] = evaluate_prefix(fold, own ? *own : *last, same, keeps_models);
-    const Eigen::Index leaves = leaf_counts_[same.front().leaves];
-    stage_.did(operations_of_solutions(leaves, coefficients, std::ssize(same)) +
-               static_cast<double>(same.size()) *
-                   operations_of_pass(folds_[fold].held_out.count(), leaves, first.validity.width));
+    work.did(share * static_cast<double>(same.size()));
   });
   Evaluated result;
   for (Evaluated& each : evaluated) {
@@ -185,6 +194,7 @@ void HeldOutErrors::evaluate(const std::set<Key>& keys, std::size_t folds, bool 
   };
   std::vector<Task> tasks;
   std::set<std::pair<std::size_t, std::size_t>> used;
+  double count = 0.0;
   for (std::size_t fold = 0; fold < folds; ++fold) {
     std::map<std::size_t, std::vector<Key>> of_shape;
     for (const Key& key : keys) {
@@ -193,15 +203,17 @@ void HeldOutErrors::evaluate(const std::set<Key>& keys, std::size_t folds, bool 
       }
     }
     for (auto& [shape, missing] : of_shape) {
+      count += static_cast<double>(missing.size());
       tasks.push_back({fold, std::move(missing), {}, &last_[{fold, shape}]});
       used.insert({fold, shape});
     }
   }
   if (tasks.empty()) return;
   std::erase_if(last_, [&](const auto& entry) { return !used.contains(entry.first); });
+  Work work(work_, share_of_evaluation * work_.left());
   parallel_for(std::ssize(tasks), max_threads_, [&](Eigen::Index index) {
     Task& task = tasks[index];
-    task.evaluated = evaluate_shape(task.fold, task.keys, keeps_models, *task.sample);
+    task.evaluated = evaluate_shape(task.fold, task.keys, keeps_models, *task.sample, work, 1.0 / count);
   });
   for (Task& task : tasks) {
     of_folds_[task.fold].errors.merge(task.evaluated.errors);

@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "base/work.hpp"
+#include "llmt/progress.hpp"
 #include "selection/candidates.hpp"
 
 namespace llmt {
@@ -38,8 +38,9 @@ Eigen::Index enough_rows(Eigen::Index leaves, Eigen::Index coefficients);
 
 class HeldOutErrors {
  public:
+  /// `work`: counts the evaluations.
   HeldOutErrors(const std::vector<FoldRows>& folds, const std::vector<GrownTree>& grown, const Candidates& candidates,
-                const Eigen::VectorXd& weights, int max_threads, Stage stage = {});
+                const Eigen::VectorXd& weights, int max_threads, Work& work);
 
   /// All widths with all jumps, but for those that keep the same splits crisp as one before.
   const std::vector<Shape>& shapes() const { return shapes_; }
@@ -71,9 +72,10 @@ class HeldOutErrors {
 
   struct Sample;  ///< of a fold's rows, with the sums over it
 
-  /// `last`: the shape's last sample, or none; afterwards the one that was used.
+  /// `last`: the shape's last sample, or none; afterwards the one that was used. `work`: of this evaluation, and
+  /// `share`: that of a key in it.
   Evaluated evaluate_shape(std::size_t fold, const std::vector<Key>& keys, bool keeps_models,
-                           std::shared_ptr<Sample>& last) const;
+                           std::shared_ptr<Sample>& last, Work& work, double share) const;
   Evaluated evaluate_prefix(std::size_t fold, const Sample& sample, const std::vector<Key>& keys,
                             bool keeps_models) const;
 
@@ -82,7 +84,7 @@ class HeldOutErrors {
   const Candidates& candidates_;
   const Eigen::VectorXd& weights_;
   int max_threads_;
-  Stage stage_;
+  Work& work_;
   std::vector<Shape> shapes_;
   std::vector<Eigen::Index> leaf_counts_;
   std::vector<TrainingRows> samples_;         // of the folds' training rows, enough for the largest tree

@@ -21,6 +21,9 @@ constexpr double screened_shrinkage = 0.1;
 // Leaves are no longer added to a (width, jump) pair after this number of larger leaf counts without improvement.
 constexpr std::size_t steps_without_gain = 2;
 
+// Held-out rows that are enough to tell good candidates from bad ones.
+constexpr Eigen::Index screening_rows = 1000;
+
 // Largest leaf count of each shape: where in some fold two steps brought nothing. The best of ever more leaves would
 // often be best by chance.
 std::map<std::size_t, std::size_t> last_counts(const std::map<Key, std::vector<double>>& all, std::size_t folds) {
@@ -43,25 +46,30 @@ std::map<std::size_t, std::size_t> last_counts(const std::map<Key, std::vector<d
 
 std::size_t shape_of(const Key& key) { return key.shape; }
 
+// Number of folds on which candidates are screened.
+std::size_t screening_folds(const std::vector<FoldRows>& folds) {
+  std::size_t screening = 0;
+  for (Eigen::Index rows = 0; screening < folds.size() && rows < screening_rows; ++screening) {
+    rows += folds[screening].held_out.count();
+  }
+  return screening;
+}
+
 class Steps {
  public:
-  Steps(HeldOutErrors& comparison, const Candidates& candidates, Eigen::Index coefficients, std::size_t folds,
-        const ExpectedSteps& expected, Stage stage)
+  Steps(HeldOutErrors& comparison, const Candidates& candidates, Eigen::Index coefficients,
+        const std::vector<FoldRows>& folds)
       : comparison_(comparison),
         candidates_(candidates),
         counts_(comparison.leaf_counts()),
         coefficients_(coefficients),
-        screening_(expected.screening()),
-        folds_(folds),
-        expected_(expected),
-        stage_(stage),
+        screening_(screening_folds(folds)),
+        folds_(folds.size()),
         ridges_(std::max<std::size_t>(candidates.ridges.size(), 1)) {}
 
   std::set<Key> run() {
-    stage_.expect(expected_.in_all());
     screen();
     refine();
-    stage_.expect(expected_.on_other_folds(best_leaves()));
     return compare_on_all_folds();
   }
 
@@ -103,11 +111,8 @@ class Steps {
         race.insert(same.begin(), same.end());
       }
       race = better_half(race, next);
-      stage_.expect(expected_.from_round(next, race.size(), best_leaves()));
     }
   }
-
-  std::size_t best_leaves() const { return ranked(comparison_, screening_).front().second.leaves; }
 
   // Leaf counts begin ... end - 1 of the shapes in the race, with the best ridges so far or all of them.
   void evaluate_counts(const Race& race, std::size_t begin, std::size_t end, bool all_ridges) {
@@ -293,8 +298,6 @@ class Steps {
   Eigen::Index coefficients_;
   std::size_t screening_;
   std::size_t folds_;
-  const ExpectedSteps& expected_;
-  Stage stage_;
   std::size_t ridges_;
 };
 
@@ -312,8 +315,8 @@ Ranked ranked(const HeldOutErrors& comparison, std::size_t folds) {
 }
 
 std::set<Key> compare_in_steps(HeldOutErrors& comparison, const Candidates& candidates, Eigen::Index coefficients,
-                               std::size_t folds, const ExpectedSteps& expected, Stage stage) {
-  return Steps(comparison, candidates, coefficients, folds, expected, stage).run();
+                               const std::vector<FoldRows>& folds) {
+  return Steps(comparison, candidates, coefficients, folds).run();
 }
 
 }  // namespace llmt

@@ -6,7 +6,6 @@
 #include <utility>
 #include <vector>
 
-#include "selection/expected_work.hpp"
 #include "selection/held_out_errors.hpp"
 
 namespace llmt {
@@ -34,10 +33,9 @@ Ranked first_of_each(const Ranked& order, const KindOf& kind_of) {
   return firsts;
 }
 
-/// Compares the candidates on the first few folds, and the best of them on all `folds` folds: returns these.
+/// Compares the candidates on the first few folds, and the best of them on all folds: returns these.
 /// `coefficients`: of a local model.
-/// `stage`: that `comparison` counts in; each step sets what is `expected` of it.
 std::set<Key> compare_in_steps(HeldOutErrors& comparison, const Candidates& candidates, Eigen::Index coefficients,
-                               std::size_t folds, const ExpectedSteps& expected, Stage stage);
+                               const std::vector<FoldRows>& folds);
 
 }  // namespace llmt

@@ -10,7 +10,6 @@
 #include "estimation/squared_errors.hpp"
 #include "llmt/statistics.hpp"
 #include "selection/crisp_trees.hpp"
-#include "selection/expected_work.hpp"
 #include "selection/held_out_errors.hpp"
 #include "selection/screening.hpp"
 
@@ -19,6 +18,9 @@ namespace {
 
 // What is less simple has to be better by more than this many standard errors of the gain.
 constexpr double standard_errors_of_a_gain = 2.0;
+
+// Of the work of a comparison.
+constexpr double share_of_crisp = 0.1;
 
 // The best of each width: with jumps only if their gain on none is beyond chance.
 std::vector<CandidateError> best_of_widths(const HeldOutErrors& comparison, const std::set<Key>& kept,
@@ -45,17 +47,14 @@ std::vector<CandidateError> best_of_widths(const HeldOutErrors& comparison, cons
 // Candidates are told apart on samples of the training rows. Against a crisp tree, whose models all rows have made,
 // the best blend is at a disadvantage then: it is made from all rows too, where one hold-out says that there are many.
 Partition make_from_all_rows(const FoldRows& fold, const GrownTree& grown, const Eigen::VectorXd& weights,
-                             int max_threads, const FoldErrors& error_of_folds, Stage stage, CandidateError& best) {
+                             int max_threads, const FoldErrors& error_of_folds, CandidateError& best) {
   Candidate candidate = best.candidate;
   candidate.leaves = std::min(candidate.leaves, grown.partition.num_leaves());
-  const Eigen::Index coefficients = std::ssize(fold.training.regressors) + 1;
-  stage.expect(operations_of_estimate(fold.training.count(), candidate, coefficients));
   Partition partition = estimate(fold.training, grown, candidate, max_threads);
   std::vector<int> all(fold.held_out.count());
   std::iota(all.begin(), all.end(), 0);
   const std::vector<Chunk> held_out = {fetch(fold.held_out, all, partition.outputs)};
   best = error_of_folds(best.candidate, {squared_errors(partition, fold.training, held_out, weights).sum()});
-  stage.did(stage.to_come());
   return partition;
 }
 
@@ -68,7 +67,7 @@ bool is_beyond_chance(const CandidateError& simple, const CandidateError& other)
 }
 
 Selection select(const std::vector<FoldRows>& folds, const std::vector<GrownTree>& grown, const Candidates& candidates,
-                 const Eigen::VectorXd& weights, int max_threads, Stage stage) {
+                 const Eigen::VectorXd& weights, int max_threads, Work& work) {
   std::vector<FoldRows> compared;
   Selection selection;
   for (const FoldRows& fold : folds) {
@@ -76,25 +75,17 @@ Selection select(const std::vector<FoldRows>& folds, const std::vector<GrownTree
     selection.held_out_rows += compared.back().held_out.count();
   }
   const FoldErrors error_of_folds(compared, weights.size());
-  const Eigen::Index coefficients = std::ssize(compared.front().training.regressors) + 1;
-  Eigen::Index largest = 0;
-  for (const GrownTree& tree : grown) largest = std::max(largest, tree.partition.num_leaves());
-  stage.expect(operations_of_selection(compared, coefficients, candidates, largest));
-  compare_crisp(compared, grown, candidates, weights, max_threads, error_of_folds, selection);
-  stage.did(operations_of_crisp(compared, coefficients, largest));
+  Work of_crisp(work, share_of_crisp);
+  compare_crisp(compared, grown, candidates, weights, max_threads, error_of_folds, of_crisp, selection);
   if (!candidates.widths.empty() && selection.crisp_rmse.size() > 1) {
-    HeldOutErrors comparison(compared, grown, candidates, weights, max_threads, stage);
-    const ExpectedSteps expected(compared, coefficients, candidates, comparison.leaf_counts(),
-                                 comparison.shapes().size() / candidates.widths.size());
-    const Stage on_all_rows = stage.another(expected.on_all_rows());
-    const std::set<Key> kept = compare_in_steps(comparison, candidates, coefficients, compared.size(), expected, stage);
+    HeldOutErrors comparison(compared, grown, candidates, weights, max_threads, work);
+    const Eigen::Index coefficients = std::ssize(compared.front().training.regressors) + 1;
+    const std::set<Key> kept = compare_in_steps(comparison, candidates, coefficients, compared);
     std::vector<CandidateError> best = best_of_widths(comparison, kept, compared, error_of_folds);
     std::optional<Partition> made;
     if (compared.size() == 1 && !best.empty()) {
-      made = make_from_all_rows(compared.front(), grown.front(), weights, max_threads, error_of_folds, on_all_rows,
-                                best.front());
+      made = make_from_all_rows(compared.front(), grown.front(), weights, max_threads, error_of_folds, best.front());
     }
-    on_all_rows.expect(0.0);
     selection.best_of_kind.insert(selection.best_of_kind.end(), best.begin(), best.end());
     if (!candidates.crisp) {
       selection.chosen.rmse = std::numeric_limits<double>::infinity();  // least squares is no candidate
@@ -117,7 +108,7 @@ Selection select(const std::vector<FoldRows>& folds, const std::vector<GrownTree
       if (chosen != kept.end()) selection.made = comparison.models(*chosen);
     }
   }
-  stage.expect(0.0);
+  work.finish();
   // The best of many candidates gains a little on noise too.
   if (candidates.crisp && compared.size() > 1 && !is_beyond_chance(selection.linear, selection.chosen)) {
     selection.chosen = selection.linear;

@@ -5,7 +5,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "base/work.hpp"
+#include "llmt/progress.hpp"
 #include "selection/candidates.hpp"
 
 namespace llmt {
@@ -18,8 +18,8 @@ inline constexpr Eigen::Index most_held_out_rows = 10000;
 bool is_beyond_chance(const CandidateError& simple, const CandidateError& other);
 
 /// Compares on the held-out rows of all folds, see docs/algorithms.md, section 7. `grown`: of each fold the tree grown
-/// without its held-out rows. `stage`: of this comparison, over at the end.
+/// without its held-out rows. `work`: of this comparison.
 Selection select(const std::vector<FoldRows>& folds, const std::vector<GrownTree>& grown, const Candidates& candidates,
-                 const Eigen::VectorXd& weights, int max_threads, Stage stage = {});
+                 const Eigen::VectorXd& weights, int max_threads, Work& work);
 
 }  // namespace llmt

@@ -46,7 +46,8 @@ Model StreamState::model_of_first_rows() const {
   one_leaf.folds.count = 0;
   one_leaf.weights = first.rightCols(1);
   // Not fit(), which refuses an output that hides the others: the trees of a stream take it too.
-  return fit_terms(first.leftCols(inputs_), first.middleCols(inputs_, outputs_), one_leaf).model;
+  Work uncounted;
+  return fit_terms(first.leftCols(inputs_), first.middleCols(inputs_, outputs_), one_leaf, uncounted).model;
 }
 
 std::vector<Partition> StreamState::crisp_partitions() const {

@@ -18,8 +18,9 @@ struct Fitted {
   std::optional<FitResult> correction;
 };
 
-Fitted fit_all(const Robot& robot, const Measurements& measurements, const ReportOptions& options) {
+Fitted fit_all(const Robot& robot, const Measurements& measurements, const ReportOptions& options, Work& work) {
   Fitted fitted{.calibration = calibrate(robot, measurements, options.calibration), .correction = {}};
+  work.check();
   if (!options.correct) return fitted;
   const std::vector<double> labels = pose_labels(measurements.poses);
   FitOptions fit = options.correction;
@@ -27,6 +28,7 @@ Fitted fit_all(const Robot& robot, const Measurements& measurements, const Repor
   fit.folds = {.count = options.correction_folds, .kind = options.kind, .seed = options.seed, .groups = labels};
   fit.intervals = false;
   fit.max_threads = options.max_threads;
+  fit.progress = work.progress();
   fitted.correction = fit_correction(fitted.calibration.robot, measurements, fit);
   return fitted;
 }
@@ -48,16 +50,12 @@ Distances distances_of(const Fitted& fitted, const Measurements& measurements) {
   return result;
 }
 
-void tell(const ReportOptions& options, Eigen::Index folds_done) {
-  if (options.progress) options.progress(folds_done + 1, options.folds + 1);
-}
-
 constexpr double implausible_share = 0.02;
 
 // Without the tool, which may have been fitted to anything.
 double length_of(const Chain& chain) { return reach_of(chain) - chain.tool.xyz_mm.norm(); }
 
-void hold_out(const Robot& robot, const Measurements& measurements, const ReportOptions& options,
+void hold_out(const Robot& robot, const Measurements& measurements, const ReportOptions& options, Work& work,
               CalibrationReport& report) {
   const Eigen::Index n = measurements.count();
   const std::vector<double> labels = pose_labels(measurements.poses);
@@ -69,7 +67,9 @@ void hold_out(const Robot& robot, const Measurements& measurements, const Report
        make_folds(n, {.count = options.folds, .kind = options.kind, .seed = options.seed, .groups = labels})) {
     const Measurements trained = select(measurements, fold.train);
     const Measurements left_out = select(measurements, fold.held_out);
-    Fitted fitted = fit_all(robot, trained, options);
+    work.begin(fmt::format("fold {}", report.fold_terminations.size() + 1));
+    Work part(work, 1.0 / (options.folds + 1));
+    Fitted fitted = fit_all(robot, trained, options, part);
     for (Robot* placed : {&fitted.calibration.registered, &fitted.calibration.robot}) {
       *placed = with_placed_frames(*placed, left_out, trained.poses);
     }
@@ -78,7 +78,7 @@ void hold_out(const Robot& robot, const Measurements& measurements, const Report
     report.nominal.held_out_mm(fold.held_out) = held_out.nominal;
     report.geometric.held_out_mm(fold.held_out) = held_out.geometric;
     if (report.corrected) report.corrected->held_out_mm(fold.held_out) = held_out.corrected;
-    tell(options, std::ssize(report.fold_terminations));
+    part.finish();
   }
   report.folds = options.folds;
 }
@@ -267,15 +267,18 @@ std::string far_readings(const Measurements& measurements, const CalibrationRepo
 CalibrationReport report_calibration(const Robot& robot, const Measurements& measurements,
                                      const ReportOptions& options) {
   CalibrationReport report;
-  Fitted fitted = fit_all(robot, measurements, options);
+  Work work(options.progress);
+  work.begin("all poses");
+  Work part(work, 1.0 / (options.folds + 1));
+  Fitted fitted = fit_all(robot, measurements, options, part);
   const Distances in_sample = distances_of(fitted, measurements);
   report.calibration = std::move(fitted.calibration);
   report.correction = std::move(fitted.correction);
   report.nominal.in_sample_mm = in_sample.nominal;
   report.geometric.in_sample_mm = in_sample.geometric;
   if (options.correct) report.corrected = Stage{.in_sample_mm = in_sample.corrected, .held_out_mm = {}};
-  tell(options, 0);
-  if (options.folds != 0) hold_out(robot, measurements, options, report);
+  part.finish();
+  if (options.folds != 0) hold_out(robot, measurements, options, work, report);
   part_kinds(measurements, report.nominal);
   part_kinds(measurements, report.geometric);
   if (report.corrected) part_kinds(measurements, *report.corrected);
@@ -284,6 +287,7 @@ CalibrationReport report_calibration(const Robot& robot, const Measurements& mea
     const Eigen::VectorXd& errors = (report.correction_kept ? *report.corrected : report.geometric).held_out_mm;
     remember_errors(*report.calibration.robot.calibration, errors);
   }
+  work.finish();
   return report;
 }
 

@@ -240,12 +240,13 @@ void map_doubted_waves(const Robot& robot, Investigation& investigation, const D
   result = std::move(mapped);
 }
 
-Discovery discover_in(const Robot& robot, const PoseSplit& split, const DiscoveryOptions& options) {
+Discovery discover_in(const Robot& robot, const PoseSplit& split, const DiscoveryOptions& options, Work& work) {
   // Joint maps that the robot has already are applied to the joint values, and the search is made without them.
   const Unmapped plain = unmapped(robot, split.samples);
   Discovery result;
-  say(options, "calibrating");
   Investigation investigation;
+  investigation.work = &work;
+  work.begin("calibrating");
   investigation.searched = plain.measurements;
   RobustCalibration start = calibrate_robustly(plain.robot, investigation.searched, options.calibration);
   investigation.baseline = std::move(start.calibration);
@@ -290,8 +291,8 @@ Discovery discover_in(const Robot& robot, const PoseSplit& split, const Discover
         "The refit with what was found did not converge to anything better: the model is as calibrated.");
   }
   if (options.correct && verdict.answer == discovery::Answer::unknown) {
-    say(options, "trying a correction");
-    correct_rest(kept, options.seed, result);
+    begin(investigation, "trying a correction");
+    correct_rest(kept, options.seed, work, result);
   }
   locate(kept, result);
   return result;
@@ -305,7 +306,8 @@ Discovery discover_readings(const Robot& robot, const Measurements& measurements
     throw std::invalid_argument(
         fmt::format("llmt::robotics::discover: {} poses to search are too few", split.samples.count()));
   }
-  Discovery result = discover_in(robot, split, options);
+  Work work(options.progress);
+  Discovery result = discover_in(robot, split, options, work);
   // Repeats that scatter less than the rest do not show all of the noise, whatever the file says. What was found must
   // then hold without counting them as independent measurements.
   constexpr double surprising = 0.05;
@@ -314,11 +316,12 @@ Discovery discover_readings(const Robot& robot, const Measurements& measurements
   if (doubtful) {
     const discovery::LackOfFit repeats = result.lack_of_fit;
     result = discover_in(robot, set_aside(measurements, test, options.held_out_share, options.seed, Repeats::averaged),
-                         options);
+                         options, work);
     result.lack_of_fit = repeats;
     result.notes.emplace_back("Repeats of a pose scatter less than the rest: each pose was counted once.");
   }
   verify(split.searched, split.test, components, result);
+  work.finish();
   return result;
 }
 

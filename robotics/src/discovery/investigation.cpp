@@ -141,8 +141,10 @@ std::size_t best_of(const std::vector<Round>& rounds) {
 
 }  // namespace
 
-void say(const DiscoveryOptions& options, const std::string& stage) {
-  if (options.progress) options.progress(stage);
+void begin(const Investigation& investigation, const std::string& step) {
+  constexpr double share_of_step = 0.15;
+  investigation.work->did(share_of_step * investigation.work->left());
+  investigation.work->begin(step);
 }
 
 double total_distance(const Robot& robot, const Measurements& measurements) {
@@ -195,11 +197,12 @@ void Investigation::search(const DiscoveryOptions& options) {
   std::vector<Round> tried;
   bool preferred = false;
   for (int round = 0; round < options.rounds && !settled; ++round) {
-    say(options, fmt::format("searching, round {}", ++rounds));
+    begin(*this, fmt::format("searching, round {}", ++rounds));
     asked = question(fitted.robot, found, without_rows(searched, refused), options);
     std::erase_if(asked.hypotheses,
                   [&](const Hypothesis& one) { return one.effect && implausible.contains(effect_label(*one.effect)); });
     verdict = search_causes_first(asked, options, round, preferred);
+    work->check();
     const std::vector<std::size_t> hidden = to_refuse(*this);
     number_among_all(refused, searched.count(), verdict.outliers);
     if (!hidden.empty() && round + 1 < options.rounds) {
@@ -237,7 +240,7 @@ void Investigation::apply(const std::vector<Effect>& maps) {
 }
 
 void add_maps(Investigation& investigation, const DiscoveryOptions& options, Discovery& result) {
-  say(options, "mapping the joints");
+  begin(investigation, "mapping the joints");
   const Measurements kept = without_rows(investigation.searched, investigation.verdict.outliers);
   const std::optional<JointMaps> maps = fit_joint_maps(investigation.fitted.robot, kept);
   constexpr double convincing = 2.0;

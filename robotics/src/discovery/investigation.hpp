@@ -11,6 +11,7 @@
 namespace llmt::robotics {
 
 struct Investigation {
+  Work* work = nullptr;                       ///< of the discovery
   Measurements searched;                      ///< joint values moved by the maps there are
   Calibration baseline;                       ///< without what was found
   std::vector<std::size_t> baseline_without;  ///< samples that the baseline was made without, ascending
@@ -45,8 +46,9 @@ std::vector<Effect> too_large(const Calibration& fitted, const std::vector<Hypot
 /// the maps cannot imitate may show only now.
 void add_maps(Investigation& investigation, const DiscoveryOptions& options, Discovery& result);
 
-/// Calls the progress callback, if there is one.
-void say(const DiscoveryOptions& options, const std::string& stage);
+/// Counts the step that ends as a part of the work that is left, for how many there will be is not known, and names the
+/// one that begins.
+void begin(const Investigation& investigation, const std::string& step);
 
 /// Root of the sum of squared distances between model and measurement, mm.
 double total_distance(const Robot& robot, const Measurements& measurements);

@@ -112,7 +112,7 @@ std::map<std::string, double> refine_constants(Investigation& investigation, con
                                                std::vector<Hypothesis>* also) {
   const std::vector<std::size_t> open = open_effects(investigation);
   if (open.empty()) return {};
-  say(options, "fitting constants");
+  begin(investigation, "fitting constants");
   const Measurements kept = without_rows(investigation.searched, investigation.verdict.outliers);
   const std::vector<Effect> before = investigation.fitted.robot.effects;
   Calibration moved = investigation.fitted;

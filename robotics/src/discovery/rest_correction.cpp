@@ -7,15 +7,21 @@
 
 namespace llmt::robotics {
 
-void correct_rest(const Measurements& searched, std::uint64_t seed, Discovery& result) {
+void correct_rest(const Measurements& searched, std::uint64_t seed, Work& work, Discovery& result) {
   constexpr Eigen::Index fewest = 100;
   constexpr int folds = 5;
+  constexpr double share_of_fits = 0.9;
   if (searched.count() < fewest) return;
   FitOptions fitting;
   fitting.validity = ValidityChoice::crisp;
   fitting.intervals = false;
   fitting.folds.seed = seed;
   const Robot& robot = result.improved.robot;
+  const auto tree_of_rest = [&, share = share_of_fits * work.left() / (folds + 1)](const Measurements& trained) {
+    Work part(work, share);
+    fitting.progress = part.progress();
+    return fit_correction(robot, trained, fitting).model;
+  };
   const Eigen::VectorXd without = distances(positions(robot, searched.poses), searched);
   Eigen::VectorXd with = without;
   const std::vector<double> labels = pose_labels(searched.poses);
@@ -24,7 +30,7 @@ void correct_rest(const Measurements& searched, std::uint64_t seed, Discovery& r
   dealing.count = folds;
   dealing.seed = seed;
   for (const Fold& fold : make_folds(searched.count(), dealing)) {
-    const CorrectedRobot trained{robot, fit_correction(robot, select(searched, fold.train), fitting).model};
+    const CorrectedRobot trained{robot, tree_of_rest(select(searched, fold.train))};
     const Measurements held_out = select(searched, fold.held_out);
     with(fold.held_out) = distances(positions(trained, held_out.poses), held_out);
   }
@@ -34,7 +40,7 @@ void correct_rest(const Measurements& searched, std::uint64_t seed, Discovery& r
                     without.mean(), with.mean()));
     return;
   }
-  result.improved.correction = fit_correction(robot, searched, fitting).model;
+  result.improved.correction = tree_of_rest(searched);
   result.notes.push_back(fmt::format("A tree of the rest lowers the error on poses left out from {:.4f} to {:.4f} mm.",
                                      without.mean(), with.mean()));
 }

@@ -41,7 +41,7 @@ bool may_be_an_error_of(const std::vector<Hypothesis>& large, const Effect& smal
 }
 
 std::optional<SecondLook> look_again(Investigation& investigation, const DiscoveryOptions& options) {
-  say(options, "looking at what is left");
+  begin(investigation, "looking at what is left");
   const std::vector<std::size_t>& outliers = investigation.verdict.outliers;
   const Measurements kept = without_rows(investigation.searched, outliers);
   SecondLook look{question(investigation.fitted.robot, {}, kept, options), {}};

@@ -1,77 +1,156 @@
-// What a fit says of how far it is.
+// Progress and cancellation of the calls that fit trees.
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <utility>
+#include <set>
+#include <string>
 #include <vector>
 
-#include "fit/fit_terms.hpp"
+#include "llmt/compare.hpp"
+#include "llmt/fit.hpp"
+#include "llmt/readable.hpp"
 #include "oracles/oracles.hpp"
+#include "watched.hpp"
 
 namespace {
 
-struct At {
-  double share;
-  double operations;
+using watched::Call;
+
+struct Rows {
+  Eigen::MatrixXd x;
+  Eigen::MatrixXd y;
 };
 
-// A fit with default options.
-std::vector<At> watched_fit(Eigen::Index rows, Eigen::Index inputs, int threads) {
-  const Eigen::MatrixXd x = oracle::uniform(rows, inputs, 7);
-  std::vector<At> at;
-  llmt::fit_terms(x, oracle::curved(x, 0.1), {.max_threads = threads}, {}, [&](double share, double operations) {
-    at.push_back({share, operations});
+Rows rows(Eigen::Index count, Eigen::Index inputs, Eigen::Index outputs) {
+  Rows rows{oracle::uniform(count, inputs, 7), Eigen::MatrixXd(count, outputs)};
+  for (Eigen::Index o = 0; o < outputs; ++o) rows.y.col(o) = oracle::curved(rows.x, 0.1 * static_cast<double>(o + 1));
+  return rows;
+}
+
+// All that the fit made.
+Call fitting(const Rows& rows, const llmt::FitOptions& options) {
+  return [=](const llmt::Progress& progress) {
+    llmt::FitOptions with_progress = options;
+    with_progress.progress = progress;
+    const llmt::FitResult result = llmt::fit(rows.x, rows.y, with_progress);
+    std::string text = to_json(result.model);
+    for (const llmt::Model& model : result.intervals.models()) text += to_json(model);
+    return text;
+  };
+}
+
+struct Case {
+  const char* name;
+  Rows data;
+  llmt::FitOptions options;
+};
+
+// Every way through a fit.
+std::vector<Case> cases() {
+  const llmt::FitOptions small{.max_leaves = 3, .choose_inputs = false, .folds = {.count = 2}, .max_threads = 1};
+  std::vector<Case> cases = {{"plain", rows(60, 2, 1), small}, {"two trees", rows(60, 2, 2), small}};
+  const auto add = [&](const char* name, const auto& change) {
+    cases.push_back({name, rows(60, 2, 1), small});
+    change(cases.back());
+  };
+  add("choice of inputs", [](Case& each) { each.options.choose_inputs = true; });
+  add("no folds", [](Case& each) { each.options.folds.count = 0; });
+  add("lolimot", [](Case& each) { each.options.rule = llmt::GrowthRule::lolimot; });
+  add("hilomot", [](Case& each) { each.options.rule = llmt::GrowthRule::hilomot; });
+  add("m5", [](Case& each) { each.options.rule = llmt::GrowthRule::m5; });
+  add("ra", [](Case& each) { each.options.rule = llmt::GrowthRule::ra; });
+  add("tukey", [](Case& each) { each.options.loss = llmt::Loss::tukey; });
+  add("linear or quadratic", [](Case& each) { each.options.terms = llmt::LocalTerms::automatic; });
+  add("missing", [](Case& each) { each.data.x(3, 0) = std::nan(""); });
+  add("codes", [](Case& each) {
+    each.data.x.col(1) = (4.0 * each.data.x.col(1).array()).floor();
+    each.data.y = (each.data.x.col(1).array() == 1.0).cast<double>().matrix() + 0.1 * each.data.x.col(0);
   });
-  return at;
+  return cases;
 }
 
-// Between two reports no more than a fifth of the operations are done.
-void expect_no_silence(const std::vector<At>& at) {
-  At before{0.0, 0.0};
-  for (const At& each : at) {
-    EXPECT_GE(each.share, before.share);
-    EXPECT_LE((each.operations - before.operations) / at.back().operations, 0.2);
-    before = each;
-  }
-  EXPECT_GE(before.share, 0.95);
-}
-
-// What is still to come is not known before it is known how large the trees are that pay. Where large ones pay, as
-// here, the share is right within a third; where they do not, it rises late.
-TEST(Progress, TheShareOfADefaultFitIsThatOfTheOperationsWithinAThird) {
-  for (const auto& [rows, inputs] :
-       {std::pair(400, 4), std::pair(3000, 3)}) {  // with the choice of inputs, and without
-    const std::vector<At> at = watched_fit(rows, inputs, 1);
-    for (const At& each : at) EXPECT_NEAR(each.share, each.operations / at.back().operations, 1.0 / 3.0) << rows;
-    expect_no_silence(at);
+TEST(Progress, OfAFitRisesToItsTotal) {
+  for (const Case& each : cases()) {
+    SCOPED_TRACE(each.name);
+    const std::vector<llmt::ProgressReport> reports = watched::reports_of(fitting(each.data, each.options));
+    watched::expect_rising(reports);
+    std::set<int> steps;
+    for (const llmt::ProgressReport& report : reports) steps.insert(report.done);
+    EXPECT_GE(steps.size(), 5U);
   }
 }
 
-TEST(Progress, NoStageOfAFitOnManyRowsIsSilent) { expect_no_silence(watched_fit(50000, 3, 1)); }
-
-TEST(Progress, TheOperationsAreTheSameOnAnyNumberOfThreads) {
-  const double of_one = watched_fit(400, 4, 1).back().operations;
-  EXPECT_NEAR(watched_fit(400, 4, 3).back().operations, of_one, 1e-9 * of_one);  // added in another order
+TEST(Progress, AFitStopsAtEveryReport) {
+  for (const Case& each : cases()) {
+    SCOPED_TRACE(each.name);
+    watched::expect_stops_at_every_report(fitting(each.data, each.options), 7);
+  }
+  watched::expect_stops_at_every_report(fitting(cases()[0].data, cases()[0].options));
 }
 
-TEST(Progress, WhatIsReportedRisesAndEndsAtTheTotal) {
-  const Eigen::MatrixXd x = oracle::uniform(300, 2, 8);
-  Eigen::MatrixXd y(300, 2);
-  y << oracle::curved(x, 0.1), oracle::curved(x, 0.2);
-  for (const llmt::LocalTerms terms : {llmt::LocalTerms::linear, llmt::LocalTerms::automatic}) {
-    for (const llmt::GrowthRule rule : {llmt::GrowthRule::rd, llmt::GrowthRule::lolimot}) {
-      std::vector<double> shares = {0.0};
-      llmt::FitOptions options{.rule = rule, .terms = terms};
-      options.progress = [&](Eigen::Index done, Eigen::Index total) {
-        shares.push_back(static_cast<double>(done) / static_cast<double>(total));
-      };
-      llmt::fit(x, y, options);
-      EXPECT_TRUE(std::ranges::is_sorted(shares));
-      EXPECT_EQ(shares.back(), 1.0);
-      EXPECT_EQ(std::ranges::count(shares, 1.0), 1);
-      EXPECT_GE(shares.size(), 20U);
-    }
+TEST(Progress, AsManyReportsOnSeveralThreads) {
+  for (Case& each : cases()) {
+    SCOPED_TRACE(each.name);
+    const std::size_t of_one = watched::reports_of(fitting(each.data, each.options)).size();
+    each.options.max_threads = 4;
+    const Call call = fitting(each.data, each.options);
+    const std::vector<llmt::ProgressReport> of_four = watched::reports_of(call);
+    watched::expect_rising(of_four);
+    EXPECT_EQ(of_four.size(), of_one);
   }
+  Case several = cases()[1];
+  several.options.max_threads = 4;
+  watched::expect_stops_at_every_report(fitting(several.data, several.options), 5);
+}
+
+// A single hold-out and nodes of many rows: reports come within a node's search too.
+TEST(Progress, OfAFitOfManyRows) {
+  llmt::FitOptions options{.max_leaves = 4, .max_threads = 1};
+  const Rows many = rows(60000, 2, 1);
+  for (const llmt::SplitSearch search : {llmt::SplitSearch::exact, llmt::SplitSearch::binned}) {
+    options.expert.search = search;
+    const std::vector<llmt::ProgressReport> reports = watched::reports_of(fitting(many, options));
+    watched::expect_rising(reports);
+    int same = 0;
+    for (std::size_t k = 1; k < reports.size(); ++k) same += reports[k].done == reports[k - 1].done ? 1 : 0;
+    EXPECT_GE(same, 10);
+  }
+}
+
+Call comparing(const Rows& rows) {
+  return [=](const llmt::Progress& progress) {
+    llmt::FitOptions base{.max_leaves = 3, .folds = {.count = 2}, .max_threads = 1};
+    const llmt::ComparisonResult result =
+        llmt::compare(rows.x, rows.y, llmt::usual_methods(base), {.folds = {.count = 2}, .progress = progress});
+    std::string text = result.recommendation;
+    for (const llmt::Comparison& method : result.methods) text += std::to_string(method.cv_rmse);
+    return text;
+  };
+}
+
+TEST(Progress, OfAComparisonNamesTheMethods) {
+  const Call call = comparing(rows(60, 2, 1));
+  const std::vector<llmt::ProgressReport> reports = watched::reports_of(call);
+  watched::expect_rising(reports);
+  std::vector<std::string> steps;
+  for (const llmt::ProgressReport& report : reports) {
+    if (steps.empty() || steps.back() != report.step) steps.push_back(report.step);
+  }
+  std::vector<std::string> methods;
+  for (const llmt::Method& method : llmt::usual_methods()) methods.push_back(method.name);
+  EXPECT_EQ(steps, methods);
+  watched::expect_stops_at_every_report(call, 37);
+}
+
+TEST(Progress, OfAReadableTree) {
+  const Rows data = rows(60, 2, 1);
+  llmt::FitOptions options{.max_leaves = 3, .folds = {.count = 2}, .max_threads = 1};
+  const llmt::FitSummary fitted = llmt::fit(data.x, data.y, options).summary;
+  const Call call = [&](const llmt::Progress& progress) {
+    options.progress = progress;
+    return to_json(llmt::fit_readable(data.x, data.y, options, fitted).model);
+  };
+  watched::expect_rising(watched::reports_of(call));
+  watched::expect_stops_at_every_report(call, 5);
 }
 
 }  // namespace

@@ -40,9 +40,10 @@ TEST(SingleHoldOut, SameChoiceAtAnyNumberOfThreadsAndTheBestBlendIsMadeFromAllRo
     const std::vector<llmt::GrownTree> trees = {{partition, jumps}};
     const llmt::Candidates candidates{
         .kind = kind, .widths = {0.5, 1.0}, .jumps = {llmt::no_jump}, .ridges = {1e-4, 1e-2}, .shrinkages = {0.1}};
+    llmt::Work uncounted;
     std::vector<llmt::Selection> chosen;
     for (const int threads : {1, 8}) {
-      chosen.push_back(llmt::select(folds, trees, candidates, Eigen::VectorXd::Ones(1), threads));
+      chosen.push_back(llmt::select(folds, trees, candidates, Eigen::VectorXd::Ones(1), threads, uncounted));
     }
     ASSERT_EQ(chosen[0].made.size(), 1U);  // a curved function is blended
     EXPECT_EQ(chosen[0].chosen.rmse, chosen[1].chosen.rmse);

@@ -15,6 +15,7 @@
 #include "llmt/abi.hpp"
 #include "llmt/discovery/problem.hpp"
 #include "llmt/discovery/verdict.hpp"
+#include "llmt/progress.hpp"
 
 namespace llmt::discovery {
 
@@ -36,6 +37,7 @@ struct MissingOptions {
   int rounds = 4;               ///< of search and nonlinear refit
   Eigen::Index largest_sample = 4000;           ///< rows that are searched and fitted; of more a random part
   SearchOptions search = {.model_error = 0.0};  ///< formulas of terms are meant as they stand
+  Progress progress = {};                       ///< the steps are "fitting", "searching, round 1", ...
 };
 
 struct TermValue {

@@ -52,11 +52,11 @@ std::string option_label(const TermModel& model, const PlacedTerm& option) {
   return text;
 }
 
-void describe_findings(const TermModel& model, const Progress& progress, Missing& missing) {
+void describe_findings(const TermModel& model, const Settled& settled, Missing& missing) {
   std::size_t next = 0;
-  for (const Finding& finding : progress.verdict.findings) {
+  for (const Finding& finding : settled.verdict.findings) {
     for (const FindingTerm& term : finding.terms) {
-      FoundTerm found = described(model, progress.fit.placed[next], progress.fit.errors[next]);
+      FoundTerm found = described(model, settled.fit.placed[next], settled.fit.errors[next]);
       ++next;
       found.confirmed = finding.confirmed;
       found.share = term.share;
@@ -73,12 +73,12 @@ void describe_findings(const TermModel& model, const Progress& progress, Missing
   });
 }
 
-void describe_limits(const Progress& progress, const FitData& data, Missing& missing) {
+void describe_limits(const Settled& settled, const FitData& data, Missing& missing) {
   const double n = static_cast<double>(data.rows.size());
-  for (std::size_t a = 0; a < progress.question.options.size(); ++a) {
-    const EffectCandidate& candidate = progress.question.candidates[a];
-    const Sensitivity& own = progress.verdict.sensitivity[a];
-    const bool found = std::ranges::any_of(progress.verdict.findings, [&](const Finding& finding) {
+  for (std::size_t a = 0; a < settled.question.options.size(); ++a) {
+    const EffectCandidate& candidate = settled.question.candidates[a];
+    const Sensitivity& own = settled.verdict.sensitivity[a];
+    const bool found = std::ranges::any_of(settled.verdict.findings, [&](const Finding& finding) {
       return std::ranges::any_of(finding.terms, [&](const FindingTerm& term) { return term.candidate == a; });
     });
     if (candidate.generic || found) continue;
@@ -90,7 +90,7 @@ void describe_limits(const Progress& progress, const FitData& data, Missing& mis
     }
     Eigen::Index k = 0;
     const double visible = own.visible.maxCoeff(&k);
-    const double sigma = data.sigma(progress.question.options[a].output);
+    const double sigma = data.sigma(settled.question.options[a].output);
     missing.visible.push_back(
         {missing.candidates[a], visible, visible * candidate.signature.col(k).norm() / std::sqrt(n) * sigma});
   }

@@ -6,7 +6,7 @@
 namespace llmt::discovery {
 
 /// Where the rounds of search and fit ended.
-struct Progress {
+struct Settled {
   TermFit fit;
   Verdict verdict;
   TermQuestion question;
@@ -17,10 +17,10 @@ struct Progress {
 std::string option_label(const TermModel& model, const PlacedTerm& option);
 
 /// Missing::found.
-void describe_findings(const TermModel& model, const Progress& progress, Missing& missing);
+void describe_findings(const TermModel& model, const Settled& settled, Missing& missing);
 
 /// Missing::visible and not_testable.
-void describe_limits(const Progress& progress, const FitData& data, Missing& missing);
+void describe_limits(const Settled& settled, const FitData& data, Missing& missing);
 
 /// Three or more kinds of terms of one input, or two terms of the same two inputs, may only approximate another
 /// function: they are not confirmed.

@@ -14,6 +14,9 @@
 namespace llmt::discovery {
 namespace {
 
+// Of the work that is left, for a search and for the fit after it: how many rounds there will be is not known.
+constexpr double share_of_half_a_round = 0.2;
+
 constexpr double unknown_number = std::numeric_limits<double>::quiet_NaN();
 
 void check(const Simulation& simulation, const Inputs& inputs, const MeasuredOutputs& measured,
@@ -76,25 +79,28 @@ Key key_of(const std::vector<PlacedTerm>& placed, const std::vector<std::size_t>
 }
 
 // One search after the other until nothing changes.
-Progress search_until_settled(const TermModel& model, FitData& data, const std::vector<Eigen::Index>& repeats,
-                              const TermFit& baseline, const MissingOptions& options) {
-  Progress progress;
-  progress.fit = baseline;
-  while (progress.rounds < options.rounds) {
-    const Key before = key_of(progress.fit.placed, progress.verdict.outliers);
-    progress.question = ask(model, data, progress.fit, repeats, progress.verdict.outliers);
-    progress.verdict = search(progress.question.evidence, progress.question.candidates, options.search);
-    ++progress.rounds;
-    const FitData kept = without_samples(data, progress.verdict.outliers);
-    progress.fit = fit_terms(model, kept, progress.fit.parameters, found_terms(progress.question, progress.verdict));
-    if (retry_constants(model, kept, progress.fit)) {
-      progress.fit = fit_terms(model, kept, progress.fit.parameters, progress.fit.placed);
+Settled search_until_settled(const TermModel& model, FitData& data, const std::vector<Eigen::Index>& repeats,
+                             const TermFit& baseline, const MissingOptions& options, Work& work) {
+  Settled settled;
+  settled.fit = baseline;
+  while (settled.rounds < options.rounds) {
+    work.begin(fmt::format("searching, round {}", settled.rounds + 1));
+    const Key before = key_of(settled.fit.placed, settled.verdict.outliers);
+    settled.question = ask(model, data, settled.fit, repeats, settled.verdict.outliers);
+    settled.verdict = search(settled.question.evidence, settled.question.candidates, options.search);
+    work.did(share_of_half_a_round * work.left());
+    ++settled.rounds;
+    const FitData kept = without_samples(data, settled.verdict.outliers);
+    settled.fit = fit_terms(model, kept, settled.fit.parameters, found_terms(settled.question, settled.verdict));
+    if (retry_constants(model, kept, settled.fit)) {
+      settled.fit = fit_terms(model, kept, settled.fit.parameters, settled.fit.placed);
     }
-    if (key_of(progress.fit.placed, progress.verdict.outliers) == before) break;
-    if (data.sigma.size() > 1 && progress.rounds < options.rounds) data.sigma = scatter(model, kept, progress.fit);
+    work.did(share_of_half_a_round * work.left());
+    if (key_of(settled.fit.placed, settled.verdict.outliers) == before) break;
+    if (data.sigma.size() > 1 && settled.rounds < options.rounds) data.sigma = scatter(model, kept, settled.fit);
   }
-  set_trial_errors(model, without_samples(data, progress.verdict.outliers), progress.fit);
-  return progress;
+  set_trial_errors(model, without_samples(data, settled.verdict.outliers), settled.fit);
+  return settled;
 }
 
 double rms_at(const Eigen::VectorXd& errors, const std::vector<Eigen::Index>& rows) {
@@ -152,39 +158,42 @@ Missing find_missing(const Simulation& simulation, const Inputs& inputs, const M
   }
   Eigen::VectorXd start(std::ssize(simulation.parameters));
   for (std::size_t k = 0; k < simulation.parameters.size(); ++k) start(k) = simulation.parameters[k].value;
+  Work work(options.progress);
+  work.begin("fitting");
   TermFit baseline = fit_terms(model, data, start, {});
   data.sigma = scatter(model, data, baseline);
   if (d > 1) baseline = fit_terms(model, data, start, {});
-  const Progress progress = search_until_settled(model, data, split.repeats, baseline, options);
+  const Settled settled = search_until_settled(model, data, split.repeats, baseline, options, work);
 
   Missing missing;
-  missing.verdict = progress.verdict;
-  missing.rounds = progress.rounds;
-  for (const PlacedTerm& option : progress.question.options) missing.candidates.push_back(option_label(model, option));
-  describe_findings(model, progress, missing);
-  describe_limits(progress, data, missing);
+  missing.verdict = settled.verdict;
+  missing.rounds = settled.rounds;
+  for (const PlacedTerm& option : settled.question.options) missing.candidates.push_back(option_label(model, option));
+  describe_findings(model, settled, missing);
+  describe_limits(settled, data, missing);
   doubt_approximations(missing);
   missing.parameters = simulation.parameters;
   for (std::size_t k = 0; k < missing.parameters.size(); ++k) {
-    missing.parameters[k].value = progress.fit.parameters(k);
+    missing.parameters[k].value = settled.fit.parameters(k);
   }
-  missing.standard_errors = progress.fit.parameter_errors;
+  missing.standard_errors = settled.fit.parameter_errors;
   missing.searched = split.searched;
   missing.held_out = split.held_out;
-  for (const std::size_t sample : progress.verdict.outliers) missing.outliers.push_back(split.searched[sample]);
-  if (!progress.verdict.outliers.empty()) {
-    baseline = fit_terms(model, without_samples(data, progress.verdict.outliers), start, {});
+  for (const std::size_t sample : settled.verdict.outliers) missing.outliers.push_back(split.searched[sample]);
+  if (!settled.verdict.outliers.empty()) {
+    baseline = fit_terms(model, without_samples(data, settled.verdict.outliers), start, {});
   }
   missing.before = model.predict(baseline.parameters, {});
-  missing.corrected = model.predict(progress.fit.parameters, progress.fit.placed);
-  look_for_structure(model, without_samples(data, progress.verdict.outliers), inputs, missing);
-  missing.floor_from_repeats = progress.verdict.lack_of_fit.has_enough_repeats();
-  const double noise = missing.floor_from_repeats ? progress.verdict.lack_of_fit.noise : progress.verdict.noise;
+  missing.corrected = model.predict(settled.fit.parameters, settled.fit.placed);
+  look_for_structure(model, without_samples(data, settled.verdict.outliers), inputs, missing);
+  missing.floor_from_repeats = settled.verdict.lack_of_fit.has_enough_repeats();
+  const double noise = missing.floor_from_repeats ? settled.verdict.lack_of_fit.noise : settled.verdict.noise;
   for (Eigen::Index o = 0; o < d; ++o) {
     missing.gaps.push_back({measured.names[o], rms_at(measured.values.col(o) - missing.before.col(o), split.held_out),
                             rms_at(measured.values.col(o) - missing.corrected.col(o), split.held_out),
                             noise * data.sigma(o)});
   }
+  work.finish();
   return missing;
 }
 

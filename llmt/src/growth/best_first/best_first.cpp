@@ -119,6 +119,7 @@ void BestFirstTree::open_root() {
   nodes_.resize(1);
   OpenLeaf root = open_.root(parentless);
   open_.examine(root, parentless, nodes_[0]);
+  data_.problem.searched(data_.training.count());
   tree_rss_ = {root.rss};
   enter(std::move(root));
 }
@@ -151,8 +152,7 @@ void BestFirstTree::split(std::size_t position) {
   parallel_for(2, data_.threads_for(parent.samples * data_.split_inputs()), [&, &parts = children](Eigen::Index side) {
     open_.examine(parts[side], parent, nodes_[parts[side].node]);
   });
-  const Eigen::Index coefficients = std::ssize(data_.training.regressors) + 1;
-  data_.problem.stage.did(operations_of_search(parent.samples, data_.split_inputs(), coefficients));
+  data_.problem.searched(parent.samples);
   gains_.resize(nodes_.size(), 0.0);
   gains_[leaf.node] = leaf.rss - leaf.best.rss;
   Node& node = nodes_[leaf.node];

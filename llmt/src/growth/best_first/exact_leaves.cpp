@@ -93,6 +93,7 @@ ExactLeaf ExactLeaves::open(const Rows& rows, const Node& parent) const {
   leaf.orders.resize(data_.split_inputs());
   if (by_residuals()) return leaf;
   parallel_for(data_.split_inputs(), data_.threads_for(std::ssize(rows)), [&](Eigen::Index j) {
+    data_.problem.check(std::ssize(rows));
     if (data_.num_levels[j] == 0) leaf.orders[j] = sorted_rows(leaf, j);
   });
   return leaf;

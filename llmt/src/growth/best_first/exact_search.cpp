@@ -57,6 +57,7 @@ SplitCandidate compare_all_thresholds(const GrowthData& data, const ExactLeaf& l
   const GramShape shape(node.features);
   const bool forget = InputSearch::size_of_sums(shape, leaf.inputs.rows()) > most_sums / inputs;
   parallel_for(inputs, threads, [&](Eigen::Index j) {
+    data.problem.check(leaf.inputs.rows());
     if (data.num_levels[j] > 0) {
       found[j] = search_categories(data, leaf, node, j);
     } else {
@@ -76,6 +77,7 @@ SplitCandidate compare_all_thresholds(const GrowthData& data, const ExactLeaf& l
   limit = std::min(limit, data.significant_rss(node.weight, node.rank, node.rss, tested));
   parallel_for(inputs, threads, [&](Eigen::Index j) {
     if (!searches[j]) return;
+    data.problem.check(leaf.inputs.rows());
     searches[j]->refine(limit);
     found[j] = searches[j]->best();
     if (std::ssize(leaf.orders[j]) < leaf.inputs.rows()) consider_missing(data, leaf, node, j, found[j]);

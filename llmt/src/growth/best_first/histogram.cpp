@@ -59,6 +59,7 @@ Histogram BinnedRows::accumulate(const std::vector<int>& rows) const {
   parallel_for(groups, threads, [&](Eigen::Index group) {
     std::vector<int> sorted(block_rows);
     for (Eigen::Index begin = 0; begin < std::ssize(rows); begin += block_rows) {
+      data_.problem.check(std::ssize(rows));
       const Eigen::Index end = std::min(std::ssize(rows), begin + block_rows);
       const std::span<const int> block = std::span(rows).subspan(begin, end - begin);
       for (const int row : block) {

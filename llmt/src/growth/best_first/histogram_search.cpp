@@ -284,6 +284,7 @@ SplitCandidate BinnedRows::search(const Histogram& histogram, const std::vector<
   const ChosenBins chosen = choose_bins(promising_bins(edges, scale, smallest), edges, std::ssize(rows));
   std::vector<SplitCandidate> inside(edges.size());
   parallel_for(std::ssize(inside), data_.threads_for(chosen.rows * 8), [&](Eigen::Index j) {
+    data_.problem.check(std::ssize(rows));
     if (!chosen.of_input[j].empty()) inside[j] = look_into(edges[j], chosen.of_input[j], j, rows, node, smallest);
   });
   const SplitCandidate best = best_of(edges, inside, node_rss);

@@ -92,6 +92,7 @@ std::vector<Cut> candidates_of(const GrowthData& data, const ResidualNode& node)
   std::vector<ResidualStatistics> statistics(data.split_inputs() * outputs);
   parallel_for(std::ssize(statistics), node.threads, [&](Eigen::Index k) {
     if (data.num_levels[k / outputs] > 0) return;
+    data.problem.check(std::ssize(node.rows));
     const std::span residuals(node.residuals.col(k % outputs).data(), node.rows.size());
     statistics[k] =
         residual_statistics(values_of(node, k / outputs), residuals, std::span(node.weights.data(), node.rows.size()));

@@ -172,7 +172,9 @@ bool HilomotTree::split_worst() {
       }
     }
     if (worst == nullptr) return false;
-    if (const std::optional<HilomotCut> cut = best_cut(data_, inputs_, *worst, options_.models, evaluations_)) {
+    const std::optional<HilomotCut> cut = best_cut(data_, inputs_, *worst, options_.models, evaluations_);
+    data_.problem.searched(std::ssize(worst->rows));
+    if (cut) {
       split(*worst, *cut);
       return true;
     }

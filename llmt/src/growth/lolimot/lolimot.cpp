@@ -168,6 +168,7 @@ bool LolimotTree::split_worst() {
   while (LocalModel* const worst = worst_model(whole, errors)) {
     Eigen::Index split_input = 0;
     Split best = best_split(*worst, whole, split_input);
+    data_.problem.searched(worst->model.samples);
     if (std::isfinite(best.loss)) {
       const double gain = errors.sum() - best.loss;
       make_split(*worst, std::move(best), split_input, gain);
@@ -190,6 +191,7 @@ std::optional<double> LolimotTree::threshold(const LocalModel& model, Eigen::Ind
 Split LolimotTree::best_split(const LocalModel& model, const WholeModel& whole, Eigen::Index& split_input) const {
   std::vector<Split> splits(data_.split_values.cols());
   parallel_for(std::ssize(splits), data_.problem.max_threads, [&](Eigen::Index j) {
+    data_.problem.check(data_.outputs.rows());
     if (const std::optional<double> at = threshold(model, j)) splits[j] = try_split(model, j, *at, whole);
   });
   if (splits.empty()) return {};

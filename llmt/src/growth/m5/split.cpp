@@ -176,6 +176,7 @@ double relative_deviation(const GrowthData& data, const DeviationNode& node) {
 DeviationSplit largest_decrease(const GrowthData& data, const DeviationNode& node) {
   std::vector<std::array<DeviationSplit, 2>> found(data.split_inputs());
   parallel_for(std::ssize(found), data.threads_for(std::ssize(node.rows) * std::ssize(found)), [&](int j) {
+    data.problem.check(std::ssize(node.rows));
     std::array<DeviationSplit, 2>& of_input = found[j];
     if (data.num_levels[j] > 0) {
       of_input[0] = split_levels(data, node, j);

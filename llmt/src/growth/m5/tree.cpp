@@ -122,6 +122,7 @@ bool Grower::split(std::size_t index, const Orders& orders, std::array<Orders, 2
   const double outputs = static_cast<double>(data_.outputs.cols());
   if (relative_deviation(data_, node) < least_deviation * outputs) return false;
   branch.split = largest_decrease(data_, node);
+  data_.problem.searched(std::ssize(own));
   if (branch.split.input < 0) return false;
   const Division division = divide(branch, own);
   branch.tested[branch.split.input] = true;

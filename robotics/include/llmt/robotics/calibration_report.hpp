@@ -6,13 +6,13 @@
 ///     const CorrectedRobot best = report.best();
 #pragma once
 
-#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "llmt/fit.hpp"
 #include "llmt/folds.hpp"
+#include "llmt/progress.hpp"
 #include "llmt/robotics/calibration.hpp"
 #include "llmt/robotics/correction.hpp"
 
@@ -42,8 +42,7 @@ struct ReportOptions {
   int correction_folds = 5;  ///< for the correction's leaf count, within every fold; 0: as grown
   std::uint64_t seed = 1;
   int max_threads = 0;
-  /// Called with the numbers of finished and of all fits: the fit to all poses first, then one per fold.
-  std::function<void(Eigen::Index done, Eigen::Index total)> progress = {};
+  Progress progress = {};  ///< the steps are "all poses", "fold 1", ...; that of `correction` is not used
 };
 
 /// Distances between one of the three models and the measured points (or of measured distances), and the angles between

@@ -3,15 +3,18 @@
 ///
 ///     DiscoveryOptions options;
 ///     options.held_out_share = 0.3;
-///     options.progress = [](const std::string& stage) { std::puts(stage.c_str()); };
+///     options.progress = [](const llmt::ProgressReport& report) {
+///       std::puts(report.step.c_str());
+///       return true;  // false cancels the discovery
+///     };
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <string>
 #include <vector>
 
 #include "llmt/discovery/search.hpp"
+#include "llmt/progress.hpp"
 #include "llmt/robotics/calibration_options.hpp"
 #include "llmt/robotics/effects.hpp"
 
@@ -32,7 +35,7 @@ struct DiscoveryOptions {
   double mass_uncertainty = 0.05;
   int rounds = 4;  ///< of search and nonlinear refit
   std::uint64_t seed = 1;
-  std::function<void(const std::string& stage)> progress = {};
+  Progress progress = {};  ///< the steps are "calibrating", "searching, round 1", ...
 };
 
 }  // namespace llmt::robotics
