@@ -9,13 +9,13 @@
 
 #include "llmt/commands.hpp"
 #include "llmt/csv.hpp"
-#include "llmt/discovery_report.hpp"
 #include "llmt/files.hpp"
 #include "llmt/term_file.hpp"
-#include "report/of_terms.hpp"
-#include "report/options.hpp"
+#include "report/terms/of_terms.hpp"
+#include "report/terms/terms_summary.hpp"
 #include "shared/cli.hpp"
 #include "shared/options.hpp"
+#include "shared/report_files.hpp"
 
 namespace llmt::apps {
 namespace {
@@ -161,19 +161,19 @@ void write_corrected(const std::string& path, const Comparison& comparison, cons
   write_file(path, text);
 }
 
-DiscoveryReport discovered(const DiscoverArguments& arguments, const Comparison& comparison) {
+report::TermsSummary discovered(const DiscoverArguments& arguments, const Comparison& comparison) {
   const auto adjusts = [&](const char* what) {
     return std::ranges::find(arguments.adjusted, what) != arguments.adjusted.end();
   };
-  DiscoveryReport report{.simulated = arguments.simulated,
-                         .measured = arguments.measured,
-                         .corrected = arguments.corrected,
-                         .inputs = comparison.inputs.names,
-                         .seed = arguments.options.seed,
-                         .rows = comparison.simulated.rows(),
-                         .missing = {},
-                         .outlier_lines = {},
-                         .regions = {}};
+  report::TermsSummary summary{.simulated = arguments.simulated,
+                               .measured = arguments.measured,
+                               .corrected = arguments.corrected,
+                               .inputs = comparison.inputs.names,
+                               .seed = arguments.options.seed,
+                               .rows = comparison.simulated.rows(),
+                               .missing = {},
+                               .outlier_lines = {},
+                               .regions = {}};
   std::vector<discovery::UntestableCause> untestable;
   try {
     const std::vector<discovery::ModelTerm> terms = terms_to_try(arguments, comparison, untestable);
@@ -182,15 +182,15 @@ DiscoveryReport discovered(const DiscoverArguments& arguments, const Comparison&
     ProgressBar bar("discover");
     discovery::MissingOptions options = arguments.options;
     options.progress = bar.callback();
-    report.missing = discovery::find_missing(simulation, comparison.inputs, comparison.measured, terms, options);
+    summary.missing = discovery::find_missing(simulation, comparison.inputs, comparison.measured, terms, options);
   } catch (const std::invalid_argument& error) {
     // What the library refuses after the options were checked is in the data.
     throw std::runtime_error(fmt::format("{}: {}", arguments.measured, error.what()));
   }
-  for (discovery::UntestableCause& entry : untestable) report.missing.not_testable.push_back(std::move(entry));
-  for (const Eigen::Index row : report.missing.outliers) report.outlier_lines.push_back(comparison.lines[row]);
-  report.regions = gap_regions(comparison.inputs, comparison.measured, report.missing);
-  return report;
+  for (discovery::UntestableCause& entry : untestable) summary.missing.not_testable.push_back(std::move(entry));
+  for (const Eigen::Index row : summary.missing.outliers) summary.outlier_lines.push_back(comparison.lines[row]);
+  summary.regions = report::gap_regions(comparison.inputs, comparison.measured, summary.missing);
+  return summary;
 }
 
 // Sorts the values of --output into the file to write and, where no target is named, the columns to explain: the option
@@ -229,19 +229,18 @@ void discover_command(const CLI::App& command, DiscoverArguments arguments) {
   }
   check_names(arguments);
   const Comparison comparison = read_comparison(arguments, !named);
-  const DiscoveryReport report = discovered(arguments, comparison);
-  if (!arguments.corrected.empty()) write_corrected(arguments.corrected, comparison, report.missing);
+  const report::TermsSummary summary = discovered(arguments, comparison);
+  if (!arguments.corrected.empty()) write_corrected(arguments.corrected, comparison, summary.missing);
   std::string reports;
   if (arguments.reports.wanted()) {
     reports = write_reports(arguments.reports,
                             report::terms_report({arguments.simulated, arguments.measured, comparison.inputs,
-                                                  comparison.measured.values, report.missing}));
+                                                  comparison.measured.values, summary.missing}));
   }
   if (arguments.json) {
-    print_json(report_json(report));
+    print_json(report::terms_json(summary));
   } else {
-    print_report(report);
-    print(reports);
+    print(report::terms_text(summary, output_width()) + reports);
   }
 }
 

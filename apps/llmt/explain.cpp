@@ -12,9 +12,10 @@
 #include "llmt/csv.hpp"
 #include "llmt/model.hpp"
 #include "llmt/model_file.hpp"
+#include "report/table/columns.hpp"
 #include "shared/cli.hpp"
-#include "shared/columns.hpp"
 #include "shared/options.hpp"
+#include "shared/table_file.hpp"
 
 namespace llmt::apps {
 namespace {
@@ -64,7 +65,7 @@ void explain_table(const ExplainArguments& arguments, const Model& model, const 
     }
     json["targets"].push_back({{"name", target}, {"importance", std::move(entries)}});
     if (!arguments.json) {
-      print(fmt::format("\n{}\n{}", target, printed.text()));
+      print(fmt::format("\n{}\n{}", target, printed.text(output_width())));
     }
   }
   if (arguments.json) {
@@ -113,7 +114,8 @@ void explain_row(const ExplainArguments& arguments, const Model& model, const Cs
                                {"contributions", std::move(entries)}});
     if (!arguments.json) {
       print(fmt::format("\n{}: {} here, {} at the means of the inputs\n{}", target,
-                        number(attribution.prediction(o), 6), number(attribution.reference(o), 6), printed.text()));
+                        number(attribution.prediction(o), 6), number(attribution.reference(o), 6),
+                        printed.text(output_width())));
       const double sum = attribution.contributions.row(o).sum();
       print(fmt::format("The contributions add up: {} {} {} = {}\n", number(attribution.reference(o), 6),
                         sum < 0.0 ? "-" : "+", number(std::abs(sum), 6), number(attribution.prediction(o), 6)));
@@ -131,7 +133,7 @@ void explain_command(const ExplainArguments& arguments) {
   if (csv.rows() == 0) {
     throw std::runtime_error(fmt::format("{}: there is a header and no rows", arguments.data));
   }
-  const Eigen::MatrixXd inputs = read_inputs(csv, model, arguments.threads).values;
+  const Eigen::MatrixXd inputs = report::read_inputs(csv, model, arguments.threads).values;
   if (arguments.row > 0) {
     explain_row(arguments, model, csv, inputs);
   } else {

@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -8,17 +7,18 @@
 #include "llmt/commands.hpp"
 #include "llmt/fit.hpp"
 #include "llmt/fit_options.hpp"
-#include "llmt/fit_summary.hpp"
 #include "llmt/learning.hpp"
 #include "llmt/readable.hpp"
-#include "llmt/readable_summary.hpp"
 #include "llmt/spoilt_rows.hpp"
 #include "llmt/stream_command.hpp"
-#include "report/of_fit.hpp"
-#include "report/options.hpp"
+#include "report/fit/fit_summary.hpp"
+#include "report/fit/of_fit.hpp"
+#include "report/fit/readable_summary.hpp"
 #include "shared/cli.hpp"
 #include "shared/help.hpp"
 #include "shared/options.hpp"
+#include "shared/report_files.hpp"
+#include "shared/table_file.hpp"
 
 namespace llmt::apps {
 namespace {
@@ -35,24 +35,6 @@ struct FitArguments {
 
 constexpr NumberRange per_cent = {0.0, 1000.0, "a number of per cent from 0 to 1000"};
 constexpr const char* readable_extension = ".readable.json";
-
-// What among the options a readable tree does not go with, and why; empty: nothing.
-std::string unreadable(const FitOptions& options) {
-  if (options.folds.count == 0) return "--cv 0: the tree is chosen by its error on held-out rows";
-  if (options.validity == ValidityChoice::blend || options.validity == ValidityChoice::gaussian) {
-    return "--validity blend or gaussian: it is measured by the best crisp tree";
-  }
-  if (options.rule == GrowthRule::lolimot || options.rule == GrowthRule::lolimot_data_driven) {
-    return "--rule lolimot or lolimot-data: it is measured by the best crisp tree";
-  }
-  const auto is_set = [](const std::vector<int>& signs) {
-    return std::ranges::any_of(signs, [](int sign) { return sign != 0; });
-  };
-  if (is_set(options.monotone) || is_set(options.slope_signs)) {
-    return "--monotone or --slope-sign: its equations do not keep them";
-  }
-  return "";
-}
 
 // Whether the model's file has intervals.
 bool keeps_intervals(const FitArguments& arguments) { return !arguments.no_intervals && !arguments.output.empty(); }
@@ -93,11 +75,11 @@ std::string write_fit_reports(const FitArguments& arguments, const LearningTable
   if (!arguments.reports.wanted()) return "";
   std::optional<ReadableResult> shown = readable;
   const bool has_folds = result.summary.partitions.front().cv_folds > 0;
-  if (!shown && has_folds && unreadable(table.options).empty()) {
+  if (!shown && has_folds && why_not_readable(table.options).empty()) {
     shown = fit_readable(table.inputs.values, table.outputs, table.options, result.summary);
     shown->model = shown->model.named(table.names, arguments.learning.targets, table.inputs.levels);
   }
-  const std::vector<Eigen::Index> left_out = rows_left_out(result.summary.loss_weights, table.options.weights);
+  const std::vector<Eigen::Index> left_out = report::rows_left_out(result.summary.loss_weights, table.options.weights);
   const auto report_on = [&](const Eigen::MatrixXd& inputs, const Eigen::MatrixXd& outputs, const FitOptions& options) {
     const auto count = std::ssize(left_out);
     return write_reports(arguments.reports,
@@ -119,8 +101,8 @@ void fit_command(FitArguments arguments) {
     loss = read_number("--readable", arguments.readable, per_cent) / 100.0;
   }
   LearningTable table = read_learning_table(arguments.learning);
-  if (const std::string why = unreadable(table.options); !arguments.readable.empty() && !why.empty()) {
-    throw std::invalid_argument("--readable does not go with " + why);
+  if (const std::string why = why_not_readable(table.options); !arguments.readable.empty() && !why.empty()) {
+    throw std::invalid_argument("llmt::fit_readable: --readable does not go with " + why);
   }
   // Folds' models say which rows no model predicts; the report needs them too, and the file unless it is to be small.
   const bool looks_for_spoilt_rows = table.options.loss == Loss::squared;
@@ -134,15 +116,16 @@ void fit_command(FitArguments arguments) {
   std::optional<ReadableResult> readable;
   if (!arguments.readable.empty()) readable = make_readable(arguments, table, result.summary, loss);
   const std::string reports = write_fit_reports(arguments, table, result, readable);
-  const FitRun run{arguments.learning, table, arguments.output};
+  report::FitRun run{arguments.learning.data, table.options, table.inputs.values, table.lines, arguments.output};
   if (arguments.json) {
-    Json summary = summary_json(run, result);
-    if (readable) summary["readable"] = readable_json(*readable);
+    Json summary = report::fit_json(run, result);
+    if (readable) summary["readable"] = report::readable_json(*readable);
     print_json(summary);
     return;
   }
-  print_summary(run, result);
-  if (readable) print_readable(result, *readable, loss);
+  run.data = table_name(run.data);
+  print(report::fit_text(run, result, output_width()));
+  if (readable) print(report::readable_text(result, *readable, loss, output_width()));
   if (readable && !arguments.output.empty()) {
     print(fmt::format("Readable tree written to {}; llmt inspect --rules prints it\n",
                       beside(arguments.output, readable_extension).string()));

@@ -14,6 +14,7 @@
 #include "shared/cli.hpp"
 #include "shared/help.hpp"
 #include "shared/options.hpp"
+#include "shared/table_file.hpp"
 
 namespace llmt::apps {
 namespace {
@@ -65,7 +66,7 @@ std::string places_of(const Csv& csv, const std::vector<Eigen::Index>& rows, con
 }
 
 // Says which few rows decide a fit by squares. Refuses a value beside which all others are rounding errors.
-void look_for_heavy_rows(const Csv& csv, const LearningArguments& arguments, const LearningColumns& columns) {
+void look_for_heavy_rows(const Csv& csv, const LearningArguments& arguments, const report::LearningColumns& columns) {
   if (arguments.options.loss != Loss::squared) return;
   for (std::size_t o = 0; o < arguments.targets.size(); ++o) {
     const Eigen::VectorXd target = columns.targets.col(o);
@@ -87,7 +88,8 @@ void look_for_heavy_rows(const Csv& csv, const LearningArguments& arguments, con
 }
 
 // Says where one row or a constant target leaves nothing to learn.
-void look_for_nothing_to_learn(const Csv& csv, const LearningArguments& arguments, const LearningColumns& columns) {
+void look_for_nothing_to_learn(const Csv& csv, const LearningArguments& arguments,
+                               const report::LearningColumns& columns) {
   if (csv.rows() == 1) {
     warn(fmt::format("llmt: {} has one row: the model is the target of that row everywhere", csv.name()));
     return;
@@ -133,7 +135,7 @@ bool looks_like_a_date(const std::string& text) {
 // Says which columns are inputs although they look like names or numbers of the rows. Nothing is said of inputs that
 // were asked for.
 void look_for_accidental_inputs(const LearningArguments& arguments, const std::vector<std::string>& names,
-                                const InputColumns& inputs) {
+                                const report::InputColumns& inputs) {
   constexpr std::size_t most_levels = 20;
   constexpr double most_levels_per_row = 0.1;
   if (!arguments.inputs.empty()) return;
@@ -217,11 +219,13 @@ LearningTable read_learning_table(const LearningArguments& arguments) {
     throw std::runtime_error(fmt::format("{}: there is a header and no rows", csv.name()));
   }
   const std::vector<std::string> inputs = choose_inputs(csv, arguments);
-  const std::string hint = arguments.inputs.empty() ? " (--ignore COLUMN leaves a column out)" : "";
+  const report::ColumnAdvice advice{
+      .leave_out = arguments.inputs.empty() ? " (--ignore COLUMN leaves a column out)" : "",
+      .as_categories = "--categorical"};
   const double largest_input = arguments.options.terms == LocalTerms::quadratic ? largest_factor : largest_magnitude;
-  LearningColumns columns =
-      read_learning_columns(csv, {inputs, arguments.categorical, arguments.targets, arguments.weight}, hint,
-                            largest_input, arguments.options.max_threads);
+  report::LearningColumns columns =
+      report::read_learning_columns(csv, {inputs, arguments.categorical, arguments.targets, arguments.weight}, advice,
+                                    largest_input, arguments.options.max_threads);
   look_for_heavy_rows(csv, arguments, columns);
   look_for_accidental_inputs(arguments, inputs, columns.inputs);
   look_for_nothing_to_learn(csv, arguments, columns);

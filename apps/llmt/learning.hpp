@@ -8,7 +8,7 @@
 
 #include "llmt/fit.hpp"
 #include "llmt/outliers.hpp"
-#include "shared/columns.hpp"
+#include "report/table/columns.hpp"
 
 namespace llmt::apps {
 
@@ -40,7 +40,7 @@ std::vector<std::string> choose_inputs(const Csv& csv, const LearningArguments& 
 /// The table as the learner takes it, and the options with its columns filled in.
 struct LearningTable {
   std::vector<std::string> names;  ///< of the inputs
-  InputColumns inputs;
+  report::InputColumns inputs;
   Eigen::MatrixXd outputs;
   FitOptions options;
   std::vector<Eigen::Index> lines;  ///< of the rows, in the file

@@ -5,7 +5,7 @@
 #include <stdexcept>
 
 #include "llmt/csv.hpp"
-#include "shared/columns.hpp"
+#include "shared/table_file.hpp"
 
 namespace llmt::apps {
 namespace {

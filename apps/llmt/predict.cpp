@@ -13,9 +13,10 @@
 #include "llmt/fit.hpp"
 #include "llmt/intervals.hpp"
 #include "llmt/model_file.hpp"
+#include "report/table/columns.hpp"
 #include "shared/cli.hpp"
-#include "shared/columns.hpp"
 #include "shared/options.hpp"
+#include "shared/table_file.hpp"
 
 namespace llmt::apps {
 namespace {
@@ -65,7 +66,7 @@ Eigen::Index count_high_leverage(const Predicted& predicted) {
 
 Predicted predict_table(const PredictArguments& arguments, const ModelWithIntervals& file, const Csv& csv) {
   const Model& model = file.model;
-  const ModelInputs inputs = read_inputs(csv, model, arguments.threads);
+  const report::ModelInputs inputs = report::read_inputs(csv, model, arguments.threads);
   Predicted predicted;
   for (const OutputColumn& output : model.outputs()) {
     predicted.targets.push_back(output.name);

@@ -17,6 +17,7 @@
 #include "llmt/csv.hpp"
 #include "llmt/stream_command.hpp"
 #include "shared/cli.hpp"
+#include "shared/table_file.hpp"
 
 namespace llmt::apps {
 namespace {
@@ -26,8 +27,8 @@ struct Learned {
   std::string name;
   std::vector<std::string> inputs;
   std::unique_ptr<Stream> stream;
-  std::vector<LargestMagnitude> largest_inputs;
-  std::vector<LargestMagnitude> largest_targets;
+  std::vector<report::LargestMagnitude> largest_inputs;
+  std::vector<report::LargestMagnitude> largest_targets;
 };
 
 constexpr std::size_t piece_bytes = 1 << 20;
@@ -74,7 +75,7 @@ void clear_progress() {
   }
 }
 
-void look_at(const Csv& piece, const Eigen::MatrixXd& values, std::vector<LargestMagnitude>& largest) {
+void look_at(const Csv& piece, const Eigen::MatrixXd& values, std::vector<report::LargestMagnitude>& largest) {
   largest.resize(values.cols());
   for (std::size_t j = 0; j < largest.size(); ++j) {
     largest[j].add(piece, values.col(j));
@@ -82,7 +83,7 @@ void look_at(const Csv& piece, const Eigen::MatrixXd& values, std::vector<Larges
 }
 
 void refuse_small(const std::string& file, const std::vector<std::string>& columns,
-                  const std::vector<LargestMagnitude>& largest) {
+                  const std::vector<report::LargestMagnitude>& largest) {
   for (std::size_t j = 0; j < largest.size(); ++j) {
     largest[j].refuse_small(file, columns[j]);
   }
@@ -92,7 +93,7 @@ void add(const Csv& piece, const StreamArguments& arguments, Learned& learned) {
   const LearningArguments& learning = arguments.learning;
   const Eigen::MatrixXd targets = piece.numbers(learning.targets, 1);
   const Eigen::VectorXd weights = learning.weight.empty() ? Eigen::VectorXd() : piece.numbers(learning.weight, 1);
-  refuse_negative_weight(piece, learning.weight, weights);
+  report::refuse_negative_weight(piece, learning.weight, weights);
   Eigen::MatrixXd inputs;
   try {
     inputs = piece.numbers_or_missing(learned.inputs, 1);
@@ -102,9 +103,10 @@ void add(const Csv& piece, const StreamArguments& arguments, Learned& learned) {
     throw std::runtime_error(std::string(error.what()) +
                              " (--stream takes no categories; --ignore COLUMN leaves a column out)");
   }
-  refuse_large(piece, learned.inputs, inputs, std::vector<double>(learned.inputs.size(), largest_magnitude));
-  refuse_large(piece, learning.targets, targets, std::vector<double>(learning.targets.size(), largest_magnitude));
-  if (weights.size() > 0) refuse_large(piece, {&learning.weight, 1}, weights, {&largest_magnitude, 1});
+  report::refuse_large(piece, learned.inputs, inputs, std::vector<double>(learned.inputs.size(), largest_magnitude));
+  report::refuse_large(piece, learning.targets, targets,
+                       std::vector<double>(learning.targets.size(), largest_magnitude));
+  if (weights.size() > 0) report::refuse_large(piece, {&learning.weight, 1}, weights, {&largest_magnitude, 1});
   learned.stream->add(inputs, targets, weights);
   look_at(piece, inputs, learned.largest_inputs);
   look_at(piece, targets, learned.largest_targets);
@@ -152,8 +154,6 @@ Model snapshot(const Learned& learned, ValidityChoice validity) {
         learned.name));
   }
 }
-
-Json finite_or_null(double value) { return std::isnan(value) ? Json(nullptr) : Json(value); }
 
 Json summary_json(const StreamArguments& arguments, const Learned& learned, const Model& model) {
   const StreamCounts counts = learned.stream->counts();
@@ -208,7 +208,7 @@ void print_summary(const StreamArguments& arguments, const Learned& learned, con
                    : fmt::format("blend, width {}", number(partition.validity.width, 3)),
                fmt::format("{}", partition.num_leaves()), number(all(output)), number(recent(output))});
   }
-  print(table.text());
+  print(table.text(output_width()));
   if (counts.max_leaves == 1 && arguments.learning.options.max_leaves == 0) {
     print(fmt::format(
         "{} inputs: the sums of a leaf would take more than 1 GiB, so nothing was split. --max-leaves 16 splits.\n",

@@ -12,14 +12,15 @@
 
 #include "llmt/robotics/calibration_report.hpp"
 #include "llmt/robotics/robot_file.hpp"
-#include "report/of_calibration.hpp"
-#include "report/options.hpp"
-#include "robot/calibration_facts.hpp"
+#include "report/robot/calibration_facts.hpp"
+#include "report/robot/measurement_text.hpp"
+#include "report/robot/of_calibration.hpp"
 #include "robot/commands.hpp"
 #include "robot/corrected_file.hpp"
 #include "robot/measured_file.hpp"
 #include "shared/cli.hpp"
 #include "shared/options.hpp"
+#include "shared/report_files.hpp"
 
 namespace llmt::apps {
 namespace {
@@ -110,25 +111,26 @@ void calibrate_command(CalibrateArguments arguments) {
   if (const std::string far = robotics::far_readings(measurements, report); !far.empty() && !arguments.robust) {
     measurements.warnings.push_back(far + ": --robust leaves such readings out");
   }
-  CalibrationFacts facts{.robot_file = arguments.robot,
-                         .data_file = arguments.data,
-                         .output = arguments.output,
-                         .contiguous = arguments.contiguous,
-                         .nominal = nominal,
-                         .measurements = measurements,
-                         .report = report,
-                         .models = judged_models(report, measurements, test, arguments.new_session),
-                         .suspicions = robotics::suspicions(nominal, measurements, report),
-                         .outlier_lines = outlier_lines,
-                         .used = {},
-                         .details = {}};
+  report::CalibrationFacts facts{.robot_file = arguments.robot,
+                                 .data_file = arguments.data,
+                                 .output = arguments.output,
+                                 .note = use_of_orientations(measurements),
+                                 .contiguous = arguments.contiguous,
+                                 .nominal = nominal,
+                                 .measurements = measurements,
+                                 .report = report,
+                                 .models = report::judged_models(report, measurements, test, arguments.new_session),
+                                 .suspicions = robotics::suspicions(nominal, measurements, report),
+                                 .outlier_lines = outlier_lines,
+                                 .used = {},
+                                 .details = {}};
   if (test) {
     robotics::Poses used = test->poses;
     used.observations.clear();
     if (!test->poses.observations.empty()) used = select(used, robotics::position_rows(test->poses));
     facts.used = robotics::coverage(report.calibration, measurements.poses, used, arguments.new_session);
   }
-  if (arguments.quality) facts.details = calibration_details(nominal, measurements, report, arguments.options);
+  if (arguments.quality) facts.details = report::calibration_details(nominal, measurements, report, arguments.options);
   SavedRobot written;
   const bool is_implausible = robotics::is_implausible(nominal, report);
   if (!arguments.output.empty() && !is_implausible) {
@@ -137,13 +139,13 @@ void calibrate_command(CalibrateArguments arguments) {
   std::string reports;
   if (arguments.reports.wanted()) {
     reports = write_reports(arguments.reports, report::calibration_report({arguments.robot, arguments.data, nominal,
-                                                                           points_of(measurements), report,
+                                                                           report::points_of(measurements), report,
                                                                            arguments.options, facts.suspicions}));
   }
   if (arguments.json) {
-    print_json(calibration_json(facts));
+    print_json(report::calibration_json(facts));
   } else {
-    print(calibration_text(facts));
+    print(report::calibration_text(facts, output_width()));
     if (!written.names.empty()) print(fmt::format("Written: {}\n", fmt::join(written.names, ", ")));
     print(written.beside_urdf);
     print(reports);

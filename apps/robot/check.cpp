@@ -8,8 +8,7 @@
 #include "llmt/robotics/robot_check.hpp"
 #include "llmt/robotics/robot_file.hpp"
 #include "llmt/robotics/urdf.hpp"
-#include "report/effect_text.hpp"
-#include "robot/calibration_facts.hpp"
+#include "report/robot/check_report.hpp"
 #include "robot/commands.hpp"
 #include "robot/measured_file.hpp"
 #include "shared/cli.hpp"
@@ -18,7 +17,6 @@
 namespace llmt::apps {
 namespace {
 
-using robotics::Moved;
 using robotics::RobotCheck;
 
 struct CheckArguments {
@@ -31,173 +29,6 @@ struct CheckArguments {
   DecimalMark mark = DecimalMark::point;
   bool json = false;
 };
-
-// Of a group, the parameters by their own names: "x 0.3 +- 0.01 mm".
-std::string moved_words(const robotics::Robot& robot, const Moved& moved) {
-  std::vector<std::string> changes;
-  for (const Moved::Change& change : moved.changes) {
-    const bool is_named = moved.changes.size() > 1;
-    std::string own = change.parameter.substr(change.parameter.rfind('.') + 1);
-    std::ranges::replace(own, '_', ' ');
-    changes.push_back(fmt::format("{}{} +- {} {}", is_named ? own + " " : "", number(change.by, 4),
-                                  number(change.standard_error, 2), change.unit));
-  }
-  std::vector<std::string> others;
-  for (const std::string& other : moved.or_else) others.push_back(parameter_words(robot, other));
-  return fmt::format("  {}: {}{}\n", parameter_words(robot, moved.name), fmt::join(changes, ", "),
-                     others.empty() ? "" : fmt::format("; or else {}", fmt::join(others, ", ")));
-}
-
-// Each line once; readings of several targets stand in one.
-std::vector<Eigen::Index> lines_of(const robotics::Measurements& measurements, const std::vector<Eigen::Index>& rows) {
-  std::vector<Eigen::Index> lines;
-  for (const Eigen::Index row : rows) lines.push_back(measurements.lines[row]);
-  std::ranges::sort(lines);
-  lines.erase(std::ranges::unique(lines).begin(), lines.end());
-  return lines;
-}
-
-std::string lines_text(const std::vector<Eigen::Index>& lines) {
-  constexpr std::size_t most = 20;
-  const auto shown = static_cast<std::ptrdiff_t>(std::min(most, lines.size()));
-  return fmt::format("line{} {}{}", lines.size() == 1 ? "" : "s", fmt::join(lines.begin(), lines.begin() + shown, ", "),
-                     lines.size() > most ? ", ..." : "");
-}
-
-void print_coverage(const robotics::Measurements& measurements, const RobotCheck& check) {
-  if (!check.has_ranges) {
-    print(
-        "The description does not say in which joint ranges it was calibrated: poses beyond them are judged as the "
-        "others are. A new calibration writes them.\n");
-  }
-  if (check.uncovered.empty()) return;
-  const std::vector<Eigen::Index> lines = lines_of(measurements, check.uncovered);
-  print(fmt::format("{} of {} readings lie beyond the calibrated joint ranges ({}):\n", check.uncovered.size(),
-                    measurements.count(), lines_text(lines)));
-  for (const robotics::JointBeyond& joint : check.beyond) {
-    print(fmt::format("  {} from {:.4g} to {:.4g} {}, calibrated from {:.4g} to {:.4g} ({})\n", joint.joint,
-                      joint.used_low, joint.used_high, joint.unit, joint.measured_low, joint.measured_high,
-                      lines_text(lines_of(measurements, joint.rows))));
-  }
-  if (check.too_few_covered) {
-    print("The others are too few to say what moved.\n");
-    return;
-  }
-  print(fmt::format("The other {} decide what moved. {} Their mean error is {:.4f} mm (95 % {:.4f}, max {:.4f}).\n",
-                    measurements.count() - std::ssize(check.uncovered),
-                    check.good_where_covered ? "By them the robot is still good." : "By them it is no longer good.",
-                    check.covered_error.mean, check.covered_error.p95, check.covered_error.max));
-}
-
-void print_moved(const CheckArguments& arguments, const robotics::Robot& robot, const RobotCheck& check) {
-  if (check.moved.empty() && !check.too_few_covered) {
-    print(fmt::format(
-        "Nothing moved, of {} parameters and groups of them that were tested. Where nothing moved, {:.3g} % of such "
-        "checks still name something.\n",
-        check.tested, 100.0 * arguments.level));
-  } else if (!check.moved.empty()) {
-    print("\nMoved since the calibration:\n");
-    for (const Moved& moved : check.moved) print(moved_words(robot, moved));
-    if (!arguments.same_session && check.moved.front().name.starts_with("tool")) {
-      print("A target that was mounted anew moves the tool; the error above does not suffer.\n");
-    }
-    print(fmt::format("With base and these identified anew the mean error would be {:.4f} mm.\n", check.refitted_mm));
-  }
-  if (check.moved_beyond.empty()) return;
-  print(
-      "\nOnly with the readings beyond the calibrated ranges would also be named; there the calibration may be wrong "
-      "without anything having moved:\n");
-  for (const Moved& moved : check.moved_beyond) print(moved_words(robot, moved));
-}
-
-void print_check(const CheckArguments& arguments, const robotics::Robot& robot,
-                 const robotics::Measurements& measurements, const RobotCheck& check) {
-  print(fmt::format("{}: {} poses of {}\n", arguments.data, check.errors_mm.size(), robot.chain.name));
-  print(arguments.same_session ? "The same session: base and tool are those of the calibration.\n\n"
-                               : "The instrument was set up anew: base and tool were fitted to these poses "
-                                 "(--same-session keeps them).\n\n");
-  print(fmt::format(
-      "{} Mean position error {:.4f} mm (95 % {:.4f}, max {:.4f}); {} {:.4f} mm, good up to {:.4f} "
-      "mm.\n",
-      check.still_good ? "STILL GOOD." : "NO LONGER GOOD.", check.error.mean, check.error.p95, check.error.max,
-      arguments.accuracy_mm > 0.0 ? "stated" : "at calibration", check.accuracy_mm, check.limit_mm));
-  if (check.accuracy_is_of_noise) {
-    print(
-        "The description has no error of these coordinates on poses left out: that figure comes from the poses it was "
-        "fitted to, and new poses are worse. --accuracy-mm says what is good enough.\n");
-  }
-  print_coverage(measurements, check);
-  print_moved(arguments, robot, check);
-  if (check.unexplained) {
-    print(
-        fmt::format("Something changed that is no parameter of this description: {:.4f} mm per coordinate are left "
-                    "whatever its values, {:.4f} at calibration. llmt-robot discover looks for the cause.\n",
-                    check.noise_mm, check.noise_before_mm));
-  }
-  if (!check.unseen.empty()) {
-    std::vector<std::string> unseen;
-    for (const std::string& name : check.unseen) unseen.push_back(parameter_words(robot, name));
-    print(fmt::format("Not seen by these poses, or taken up by base and tool: {}\n", fmt::join(unseen, "; ")));
-  }
-  if (!check.has_correlations) {
-    print("The description has no correlations of its parameters; small changes may go unnoticed.\n");
-  }
-}
-
-Json moved_json(const std::vector<Moved>& all) {
-  Json list = Json::array();
-  for (const Moved& moved : all) {
-    Json entry = {{"name", moved.name}, {"probability", moved.probability}, {"or_else", moved.or_else}};
-    for (const Moved::Change& change : moved.changes) {
-      entry["changes"].push_back({{"parameter", change.parameter},
-                                  {"unit", change.unit},
-                                  {"by", change.by},
-                                  {"standard_error", change.standard_error}});
-    }
-    list.push_back(std::move(entry));
-  }
-  return list;
-}
-
-// null where the description does not know its ranges.
-Json uncovered_json(const robotics::Measurements& measurements, const RobotCheck& check) {
-  if (!check.has_ranges) return nullptr;
-  Json joints = Json::array();
-  for (const robotics::JointBeyond& joint : check.beyond) {
-    joints.push_back({{"joint", joint.joint},
-                      {"unit", joint.unit},
-                      {"calibrated", {joint.measured_low, joint.measured_high}},
-                      {"used", {joint.used_low, joint.used_high}},
-                      {"lines", lines_of(measurements, joint.rows)}});
-  }
-  const bool is_judged = !check.too_few_covered;
-  return {{"readings", check.uncovered.size()},
-          {"lines", lines_of(measurements, check.uncovered)},
-          {"joints", std::move(joints)},
-          {"covered_error_mm", is_judged ? figures_json(check.covered_error) : Json(nullptr)},
-          {"good_where_covered", is_judged ? Json(check.good_where_covered) : Json(nullptr)},
-          {"moved_beyond", moved_json(check.moved_beyond)}};
-}
-
-Json check_json(const CheckArguments& arguments, const robotics::Measurements& measurements, const RobotCheck& check) {
-  Json json = {{"robot", arguments.robot},
-               {"data", arguments.data},
-               {"poses", check.errors_mm.size()},
-               {"same_session", arguments.same_session},
-               {"still_good", check.still_good},
-               {"error_mm", figures_json(check.error)},
-               {"accuracy_mm", check.accuracy_mm},
-               {"limit_mm", check.limit_mm},
-               {"uncovered", uncovered_json(measurements, check)},
-               {"moved", moved_json(check.moved)}};
-  json["refitted_mm"] = check.refitted_mm;
-  json["noise_mm"] = check.noise_mm;
-  json["noise_before_mm"] = check.noise_before_mm > 0.0 ? Json(check.noise_before_mm) : Json(nullptr);
-  json["unexplained"] = check.unexplained;
-  json["tested"] = check.tested;
-  json["unseen"] = check.unseen;
-  return json;
-}
 
 // The robot for a file of one session that it need not know, whose frames are fitted anyway.
 robotics::Robot for_any_session(robotics::Robot robot) {
@@ -258,11 +89,11 @@ void check_command(const CheckArguments& arguments) {
         "check units, signs and order of the columns",
         arguments.data, check.error.mean, arguments.same_session ? "as calibrated" : "fitted to them"));
   }
+  const report::CheckFacts facts{arguments.robot, arguments.data, robot.robot, measurements, options, check};
   if (arguments.json) {
-    print_json(check_json(arguments, measurements, check));
+    print_json(report::check_json(facts));
   } else {
-    for (const std::string& warning : measurements.warnings) print("Note: " + warning + "\n");
-    print_check(arguments, robot.robot, measurements, check);
+    print(report::check_text(facts));
   }
   if (!check.still_good) {
     throw std::runtime_error(fmt::format("{}: the mean error is {:.4f} mm, more than {:.4f} mm", arguments.data,

@@ -40,9 +40,6 @@ void add_urdf_links(CLI::App& command, robotics::UrdfLinks& links);
 /// numbers: with a decimal comma its fields are separated by semicolons.
 std::string with_decimal_mark(std::string csv, DecimalMark mark);
 
-/// "joint5.theta +-0.91 deg, joint5.d +-1.9 mm": robotics::uncertain_parameters(), empty if there are none.
-std::string uncertain_text(const robotics::Robot& robot);
-
 /// The links to read a URDF beside a robot with: those that were given or, without any, those that the robot's
 /// description remembers; none for a file that is no URDF.
 robotics::UrdfLinks links_for(const std::string& path, const robotics::UrdfLinks& given, const robotics::Robot& robot);

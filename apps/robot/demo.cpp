@@ -10,7 +10,7 @@
 #include "llmt/robotics/robot_check.hpp"
 #include "llmt/robotics/robot_file.hpp"
 #include "llmt/robotics/simulation.hpp"
-#include "report/effect_text.hpp"
+#include "report/robot/discovery/effect_text.hpp"
 #include "robot/commands.hpp"
 #include "robot/shipped_robots.hpp"
 #include "shared/cli.hpp"
@@ -67,7 +67,8 @@ robotics::ErrorFigures missed(const std::string& model, const std::string& comma
 std::string effects_of(const robotics::Robot& robot) {
   std::vector<std::string> words;
   for (const robotics::Effect& effect : robot.effects) {
-    words.push_back(fmt::format("{} ({} urad/(N m))", effect_words(effect), number(1e6 * effect.values.front(), 3)));
+    words.push_back(
+        fmt::format("{} ({} urad/(N m))", report::effect_words(effect), number(1e6 * effect.values.front(), 3)));
   }
   return words.empty() ? "nothing" : fmt::format("{}", fmt::join(words, ", "));
 }
@@ -102,7 +103,7 @@ void compensate_and_check() {
   add("   before: commanded as described", before);
   add("   calibrated", calibrated);
   add("   after: with what was found", after);
-  print(table.text());
+  print(table.text(output_width()));
   print(fmt::format("   {} times less than before\n", number(before.mean / after.mean, 3)));
   print("\n5. Later: is it still good?\n");
   run_command("simulate real_arm.yaml --poses 40 --noise-um 20 --seed 2 -o later.csv");

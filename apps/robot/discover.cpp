@@ -11,15 +11,16 @@
 #include "llmt/robotics/catalogue.hpp"
 #include "llmt/robotics/discovery.hpp"
 #include "llmt/robotics/robot_file.hpp"
-#include "report/of_discovery.hpp"
-#include "report/options.hpp"
+#include "report/robot/discovery/discovery_page.hpp"
+#include "report/robot/discovery/next_poses.hpp"
+#include "report/robot/discovery/of_discovery.hpp"
+#include "report/robot/measurement_text.hpp"
 #include "robot/commands.hpp"
 #include "robot/corrected_file.hpp"
-#include "robot/discovery_page.hpp"
 #include "robot/measured_file.hpp"
-#include "robot/next_poses.hpp"
 #include "shared/cli.hpp"
 #include "shared/options.hpp"
+#include "shared/report_files.hpp"
 
 namespace llmt::apps {
 namespace {
@@ -124,23 +125,23 @@ void discover_command(DiscoverArguments arguments) {
   if (!arguments.output.empty()) {
     written = save_corrected(found.improved, arguments.output, {arguments.robot, arguments.links});
   }
-  const std::vector<NextPoses> next = next_poses(found, data);
+  const std::vector<report::NextPoses> next = report::next_poses(found, data);
   std::string reports;
   if (arguments.reports.wanted()) {
-    reports = write_reports(arguments.reports,
-                            report::discovery_report({arguments.robot, arguments.data, points_of(data), found, next}));
+    reports = write_reports(arguments.reports, report::discovery_report({arguments.robot, arguments.data,
+                                                                         report::points_of(data), found, next}));
   }
   if (arguments.json) {
-    Json json = discovery_json(found);
+    Json json = report::discovery_json(found);
     json["cross_validation"] = folds;
     print_json(json);
     return;
   }
-  print(fmt::format("{}: {} of {}, {} {} set aside\n{}\n", arguments.data, counts_of(data), robot.chain.name,
+  print(fmt::format("{}: {} of {}, {} {} set aside\n{}\n", arguments.data, report::counts_of(data), robot.chain.name,
                     test ? 0 : found.held_out.poses, data.poses.observations.empty() ? "of them" : "poses",
                     use_of_orientations(data)));
-  print(discovery_page(found, data.lines));
-  print(next_poses_text(next));
+  print(report::discovery_page(found, data.lines));
+  print(report::next_poses_text(next));
   if (!folds.is_null()) {
     print(fmt::format("{} {} folds, everything found anew in each: {:.4f} -> {:.4f} mm mean on the poses left out\n",
                       arguments.folds, arguments.contiguous ? "contiguous" : "random", folds["before_mm"].get<double>(),

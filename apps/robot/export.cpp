@@ -11,6 +11,7 @@
 #include "llmt/robotics/kinematics.hpp"
 #include "llmt/robotics/robot_c_source.hpp"
 #include "llmt/robotics/robot_file.hpp"
+#include "report/robot/measurement_text.hpp"
 #include "robot/commands.hpp"
 #include "shared/cli.hpp"
 #include "shared/options.hpp"
@@ -134,7 +135,7 @@ void export_command(const ExportArguments& arguments) {
   if (!robot.effects.empty() || !robot.correction_file.empty()) {
     warn("The table holds the geometry alone: effects and correction are left out; llmt-robot compensate has them");
   }
-  if (const std::string uncertain = uncertain_text(robot); !uncertain.empty()) {
+  if (const std::string uncertain = report::uncertain_text(robot); !uncertain.empty()) {
     warn(fmt::format(
         "Uncertain values: {}. Calibration could not determine each of them alone, so do not take them for the true "
         "ones. Load all values of the table into the controller, or none",

@@ -88,17 +88,6 @@ std::string llmt::apps::with_decimal_mark(std::string csv, DecimalMark mark) {
   return csv;
 }
 
-std::string llmt::apps::uncertain_text(const robotics::Robot& robot) {
-  const std::vector<discovery::Parameter> all = robotics::parameters(robot);
-  std::string text;
-  for (const robotics::IdentifiedParameter& one : robotics::uncertain_parameters(robot)) {
-    const auto known = std::ranges::find(all, one.name, &discovery::Parameter::name);
-    text +=
-        fmt::format("{}{} +-{} {}", text.empty() ? "" : ", ", one.name, number(*one.standard_error, 2), known->unit);
-  }
-  return text;
-}
-
 llmt::robotics::UrdfLinks llmt::apps::links_for(const std::string& path, const robotics::UrdfLinks& given,
                                                 const robotics::Robot& robot) {
   if (!robotics::is_urdf(path)) return {};

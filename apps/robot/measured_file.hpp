@@ -29,12 +29,6 @@ void add_measured_file_options(CLI::App& command, MeasuredFileOptions& options);
 robotics::Measurements read_measured(const std::string& path, const robotics::Robot& robot,
                                      const std::vector<std::string>& also, const MeasuredFileOptions& options);
 
-/// "60 poses", or "60 poses, 180 points of 3 targets, 2 sessions".
-std::string counts_of(const robotics::Measurements& measurements);
-
-/// The readings that are no orientations: what reports show.
-robotics::Measurements points_of(const robotics::Measurements& measurements);
-
 /// What orientations of the file are used for, as a line; empty if there are none.
 std::string use_of_orientations(const robotics::Measurements& measurements);
 

@@ -12,8 +12,8 @@
 #include "llmt/random.hpp"
 #include "llmt/robotics/mechanism_calibration.hpp"
 #include "llmt/robotics/mechanism_file.hpp"
+#include "report/robot/mechanism_report.hpp"
 #include "robot/commands.hpp"
-#include "robot/mechanism_report.hpp"
 #include "shared/cli.hpp"
 #include "shared/options.hpp"
 
@@ -148,11 +148,11 @@ void solve_mechanism(const MechanismArguments& arguments, const robotics::Mechan
 
 void calibrate_mechanism(const MechanismArguments& arguments, const robotics::Mechanism& mechanism) {
   const robotics::MechanismTable table = read_readings(arguments, mechanism);
-  MechanismFacts facts{.file = arguments.mechanism,
-                       .data = arguments.data,
-                       .described = mechanism,
-                       .measured = table.values,
-                       .folds = static_cast<int>(std::min<Eigen::Index>(arguments.folds, table.values.rows()))};
+  report::MechanismFacts facts{.file = arguments.mechanism,
+                               .data = arguments.data,
+                               .described = mechanism,
+                               .measured = table.values,
+                               .folds = static_cast<int>(std::min<Eigen::Index>(arguments.folds, table.values.rows()))};
   try {
     facts.calibration = robotics::calibrate(mechanism, table.values);
     facts.before = robotics::errors_of(mechanism, table.values);
@@ -168,12 +168,12 @@ void calibrate_mechanism(const MechanismArguments& arguments, const robotics::Me
   warn_of_rows(arguments.data, lines, facts.calibration.reasons);
   if (!arguments.output.empty() && facts.is_good()) robotics::save(facts.calibration.mechanism, arguments.output);
   if (!arguments.errors.empty()) {
-    write_file(arguments.errors, with_decimal_mark(mechanism_errors_csv(facts), arguments.mark));
+    write_file(arguments.errors, with_decimal_mark(report::mechanism_errors_csv(facts), arguments.mark));
   }
   if (arguments.json) {
-    print_json(mechanism_json(facts));
+    print_json(report::mechanism_json(facts));
   } else {
-    print(mechanism_text(facts));
+    print(report::mechanism_text(facts, output_width()));
     if (!arguments.output.empty() && facts.is_good()) print(fmt::format("\nWritten: {}\n", arguments.output));
   }
   if (!facts.is_good()) {

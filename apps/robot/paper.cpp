@@ -5,13 +5,13 @@
 #include <memory>
 #include <stdexcept>
 
-#include "report/of_paper.hpp"
-#include "report/options.hpp"
 #include "robot/commands.hpp"
+#include "robot/of_paper.hpp"
 #include "robot/planar_study.hpp"
 #include "robot/tx200_study.hpp"
 #include "shared/cli.hpp"
 #include "shared/options.hpp"
+#include "shared/report_files.hpp"
 
 namespace llmt::apps {
 namespace {
@@ -52,7 +52,7 @@ void print_arm(const PlanarStudy& study) {
     }
     table.add(std::move(cells));
   }
-  print(table.text());
+  print(table.text(output_width()));
 }
 
 void print_calibration(const discovery::SolverResult& result) {
@@ -96,7 +96,7 @@ void print_planar(const std::vector<PlanarStudy>& studies) {
                millimetres(row.error.max), row.paper ? number(row.paper->mean, 4) : "-",
                row.paper ? number(row.paper->max, 5) : "-"});
   }
-  print(table.text());
+  print(table.text(output_width()));
   print(R"(
 What may be compared. The paper does not print its bending model; the physics from its data does not
 give its 0.643 mm for the rigid arm, and neither variant above was tuned to it. So the three rows of
@@ -214,13 +214,13 @@ void tx200(const PaperArguments& arguments) {
     }
     json[compliance ? "hidden_compliance" : "noise_alone"] = std::move(entry);
     if (!arguments.json) {
-      print("\n" + table.text());
+      print("\n" + table.text(output_width()));
     }
   }
   std::string reports;
   if (arguments.reports.wanted()) {
     reports = write_reports(arguments.reports,
-                            report::tx200_report(with_compliance, tx200_run(true, arguments.seed), arguments.seed));
+                            tx200_report(with_compliance, tx200_run(true, arguments.seed), arguments.seed));
   }
   if (arguments.json) {
     print_json(json);
@@ -238,7 +238,7 @@ void paper_command(const PaperArguments& arguments) {
                                             planar_study(false, false, arguments.seed)};
   std::string reports;
   if (arguments.reports.wanted()) {
-    reports = write_reports(arguments.reports, report::planar_report(studies, tx200_run(true, arguments.seed)));
+    reports = write_reports(arguments.reports, planar_report(studies, tx200_run(true, arguments.seed)));
   }
   if (arguments.json) {
     print_json(planar_json(studies));

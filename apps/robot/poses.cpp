@@ -123,14 +123,14 @@ std::string expectations(const PoseSelection& selection, bool with_indices) {
     table.add({name, number(with_chosen, 4), number(with_random, 4)});
   };
   add("error of the tool position, mm", selection.chosen.position_mm, selection.random.position_mm);
-  if (!with_indices) return table.text();
+  if (!with_indices) return table.text(output_width());
   add("O1", chosen.o1, random.o1);
   add("O2", chosen.o2, random.o2);
   add("O3", chosen.o3, random.o3);
   add("O4", chosen.o4, random.o4);
   add("O5", chosen.o5, random.o5);
   add("condition", chosen.condition, random.condition);
-  return table.text();
+  return table.text(output_width());
 }
 
 std::string expected_errors(const PoseSelection& selection) {
@@ -140,7 +140,7 @@ std::string expected_errors(const PoseSelection& selection) {
     table.add({parameter.name, number(parameter.standard_error, 3),
                number(selection.random.parameters[k].standard_error, 3), parameter.unit});
   }
-  return table.text();
+  return table.text(output_width());
 }
 
 void print_selection(const PosesArguments& arguments, const robotics::Robot& robot, const robotics::PosePlan& plan,

@@ -1,12 +1,15 @@
 #include "shared/cli.hpp"
 
 #include <fmt/format.h>
+#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cctype>
+#include <charconv>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <new>
 #include <sstream>
 #include <stdexcept>
@@ -169,10 +172,24 @@ std::string without_controls(std::string_view text) {
 Silence::Silence() { is_silent = true; }
 Silence::~Silence() { is_silent = false; }
 
+std::size_t output_width() {
+  constexpr std::size_t least_width = 40;
+  if (::isatty(STDOUT_FILENO) == 0) return report::no_width_limit;
+  std::size_t width = 0;
+  winsize size = {};
+  if (const char* const columns = std::getenv("COLUMNS"); columns != nullptr) {
+    const std::string_view text(columns);
+    std::from_chars(text.data(), text.data() + text.size(), width);
+  } else if (::ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0) {
+    width = size.ws_col;
+  }
+  return width == 0 ? report::no_width_limit : std::max(width, least_width);
+}
+
 void print(std::string_view text) {
   if (is_silent) return;
   constexpr std::size_t indent = 2;
-  write_stdout(wrapped(without_controls(text), output_width(), indent));
+  write_stdout(report::wrapped(without_controls(text), output_width(), indent));
 }
 
 void print_bytes(std::string_view text) {

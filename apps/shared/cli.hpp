@@ -3,17 +3,20 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
-#include <nlohmann/json.hpp>
 #include <span>
 #include <string>
 #include <string_view>
 
+#include "report/text/json.hpp"
+#include "report/text/text.hpp"
 #include "shared/progress.hpp"
-#include "shared/text.hpp"
 
 namespace llmt::apps {
 
-using Json = nlohmann::ordered_json;
+using report::finite_or_null;
+using report::Json;
+using report::number;
+using report::Table;
 
 /// Exit codes: done; the data or the outcome does not allow it; wrong usage.
 inline constexpr int exit_done = 0;
@@ -39,6 +42,10 @@ int run(CLI::App& app, int argc, char** argv, std::span<const SettingName> names
 /// The text with control characters but tabs and line breaks written as \x1b: names that come from files cannot give
 /// orders to a terminal.
 std::string without_controls(std::string_view text);
+
+/// Columns of the terminal that stdout is: those of the terminal, or COLUMNS if it is set; at least 40. No limit where
+/// stdout is no terminal.
+std::size_t output_width();
 
 /// Prints text for people to stdout, without_controls() and wrapped() to the terminal's width, and reports a stdout
 /// that cannot take it (a full disk, a closed pipe) as std::runtime_error.

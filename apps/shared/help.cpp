@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "llmt/names.hpp"
-#include "shared/text.hpp"
+#include "report/text/text.hpp"
 
 namespace llmt::apps {
 namespace {
@@ -26,7 +26,7 @@ std::string entry(const std::string& name, const std::string& text) {
   if (text.empty()) return line + "\n";
   line += line.size() + 2 > text_column ? "\n" + std::string(text_column, ' ')
                                         : std::string(text_column - line.size(), ' ');
-  const std::string right = wrapped(text, width - std::min(text_column, width / 2));
+  const std::string right = report::wrapped(text, width - std::min(text_column, width / 2));
   for (const char c : right) {
     line += c;
     if (c == '\n') line += std::string(text_column, ' ');
@@ -77,7 +77,7 @@ class HelpFormatter : public CLI::Formatter {
   }
 
   static std::string paragraph(const std::string& text) {
-    return text.empty() ? text : wrapped(text, std::min(output_width(), widest_help)) + "\n";
+    return text.empty() ? text : report::wrapped(text, std::min(output_width(), widest_help)) + "\n";
   }
 
   mutable bool whole_ = true;  // for make_option(), which the base class calls without the mode

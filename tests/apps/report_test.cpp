@@ -1,5 +1,5 @@
 // Reports: what the documents say, that the page takes them whole, and what a program without the page answers.
-#include "report/document.hpp"
+#include "report/document/document.hpp"
 
 #include <cmath>
 #include <optional>
@@ -8,15 +8,16 @@
 #include "apps/program.hpp"
 #include "llmt/fit.hpp"
 #include "llmt/random.hpp"
-#include "report/figures.hpp"
-#include "report/of_comparison.hpp"
-#include "report/of_fit.hpp"
-#include "report/page.hpp"
-#include "report/plot.hpp"
+#include "report/document/figures.hpp"
+#include "report/document/page.hpp"
+#include "report/fit/fit_summary.hpp"
+#include "report/fit/of_comparison.hpp"
+#include "report/fit/of_fit.hpp"
+#include "shared/plot.hpp"
 
 namespace {
 
-using namespace llmt::apps::report;
+using namespace llmt::report;
 
 constexpr const char* sample_page = "<title>{{title}}</title><script>{{report}}</script>";
 
@@ -121,10 +122,21 @@ TEST(Report, ComparisonMarksWhatIsRecommended) {
   EXPECT_EQ(document.main->layers.front().roles[1], "model");
 }
 
+TEST(FitSummary, ARuleWithoutAnEnumeratorHasItsTitle) {
+  const Sample table = jumping(200);
+  llmt::FitOptions options;
+  options.rule = llmt::parse<llmt::GrowthRule>("toy");
+  const llmt::FitResult result = llmt::fit(table.inputs, table.outputs, options);
+  const std::vector<Eigen::Index> lines(200, 2);
+  const FitRun run{"t.csv", options, table.inputs, lines, ""};
+  EXPECT_NE(fit_text(run, result).find("\nTree grown by Toy halves, at least "), std::string::npos);
+  EXPECT_EQ(fit_json(run, result)["rule"], "toy");
+}
+
 TEST(Plot, NamesCannotGiveOrdersToGnuplot) {
   const Chart chart{
       .title = "it's\n`touch x`\nset output 'y'", .x = {"x"}, .y = {"y"}, .layers = {{.x = {1.0}, .y = {NAN}}}};
-  const std::string script = gnuplot_script(chart, "svg");
+  const std::string script = llmt::apps::gnuplot_script(chart, "svg");
   EXPECT_NE(script.find("set title 'it''s`touch x`set output ''y'''"), std::string::npos) << script;
   EXPECT_NE(script.find("\n1 NaN "), std::string::npos) << script;
 }

@@ -8,13 +8,13 @@
 #include "llmt/robotics/discovery.hpp"
 #include "llmt/robotics/robot_file.hpp"
 #include "llmt/robotics/simulation.hpp"
-#include "report/arms.hpp"
-#include "report/of_calibration.hpp"
-#include "report/of_discovery.hpp"
+#include "report/robot/arms.hpp"
+#include "report/robot/discovery/of_discovery.hpp"
+#include "report/robot/of_calibration.hpp"
 
 namespace {
 
-using namespace llmt::apps::report;
+using namespace llmt::report;
 namespace rb = llmt::robotics;
 
 rb::Robot planar(bool flexible) {

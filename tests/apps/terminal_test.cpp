@@ -6,16 +6,16 @@
 #include <sstream>
 
 #include "apps/programs.hpp"
+#include "report/text/text.hpp"
 #include "shared/cli.hpp"
-#include "shared/text.hpp"
 
 namespace {
 
 using llmt::apps::in_words_of_user;
-using llmt::apps::no_width_limit;
 using llmt::apps::progress_line;
-using llmt::apps::Table;
-using llmt::apps::wrapped;
+using llmt::report::no_width_limit;
+using llmt::report::Table;
+using llmt::report::wrapped;
 using program::Folder;
 using program::llmt_program;
 using program::Outcome;

@@ -22,6 +22,7 @@ set(discovery "^llmt/(include/llmt|src)/discovery/")
 
 rule(llmt_knows_no_robotics FILES "^llmt/" BANNED "^[\"<](llmt/)?robotics/")
 rule(libraries_know_no_apps FILES "${library}" BANNED "^[\"<](apps|shared)/")
+rule(reports_know_no_programs FILES "^apps/report/" BANNED "^[\"<](shared/|CLI|robot/)")
 rule(llmt_knows_no_expressions FILES "^llmt/" BANNED "^\"expressions/")
 rule(expressions_know_nobody FILES "^expressions/" BANNED "^[\"<](llmt|robotics|apps|shared)/")
 rule(no_parent_folders FILES "^(llmt|expressions|robotics|apps)/" BANNED "[.][.]/") # no way around the other rules

@@ -184,6 +184,9 @@ struct FitOptions {
 /// "shrinkages"; throws std::invalid_argument for others. docs/commands.md has these texts too.
 std::string default_text(std::string_view option);
 
+/// A rule's name for people: "LOLIMOT with thresholds from the data". Throws as summary_of().
+std::string_view title_of(GrowthRule rule);
+
 /// One phrase for help: "no test, pruned by m-estimates". Throws std::invalid_argument for a number that is no rule.
 std::string_view summary_of(GrowthRule rule);
 

@@ -6,6 +6,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <string>
 #include <vector>
 
 #include "llmt/abi.hpp"
@@ -49,10 +50,14 @@ struct ReadableResult {
 /// weights, folds, shared_partition, max_leaves, min_leaf_samples, expert.search, max_threads and progress; with
 /// LocalTerms::quadratic or automatic equations may have products of two inputs. `loss`: 0.15 for 15 per cent.
 ///
-/// Throws std::invalid_argument as fit(), and if `loss` is negative or not finite, if nothing was held out in the fit,
-/// if no crisp tree was a candidate in it, or if slope_signs or monotone are set.
+/// Throws std::invalid_argument as fit(), if `loss` is negative or not finite, if nothing was held out in the fit, and
+/// with the words of why_not_readable() if there are any.
 ReadableResult fit_readable(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
                             const Eigen::Ref<const Eigen::MatrixXd>& outputs, const FitOptions& options,
                             const FitSummary& fitted, double loss = 0.15);
+
+/// The option that a readable tree does not go with, and why: "folds.count 0: the tree is chosen by its error on
+/// held-out rows". Empty: there is none.
+std::string why_not_readable(const FitOptions& options);
 
 }  // namespace llmt

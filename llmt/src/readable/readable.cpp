@@ -1,6 +1,7 @@
 #include "llmt/readable.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -52,15 +53,10 @@ void check(const FitOptions& options, const FitSummary& fitted, double loss) {
   if (!(loss >= 0.0 && std::isfinite(loss))) {
     refuse(fmt::format("loss is {}, it must be a finite number, 0 or more", loss));
   }
-  if (!options.slope_signs.empty() || !options.monotone.empty()) {
-    refuse("slope_signs and monotone must be empty, for readable trees do not keep them");
-  }
-  if (options.folds.count == 0 || fitted.partitions.empty() || fitted.partitions.front().cv_folds == 0) {
-    refuse("folds.count is 0 or no row was held out, and the tree is chosen on held-out rows");
-  }
-  if (options.validity == ValidityChoice::blend || options.validity == ValidityChoice::gaussian ||
-      rule_of(options.rule).overlapping == ValidityKind::gaussian) {
-    refuse("validity must be auto or crisp, and rule not one of Gaussians: the tree is measured by the best crisp one");
+  if (const std::string why = why_not_readable(options); !why.empty())
+    refuse("a readable tree does not go with " + why);
+  if (fitted.partitions.empty() || fitted.partitions.front().cv_folds == 0) {
+    refuse("no row was held out in the fit, and the tree is chosen by its error on held-out rows");
   }
 }
 
@@ -317,6 +313,26 @@ ReadableResult fit_readable(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
   result.model = with_codes(result.model, codes);
   result.intervals = with_codes(result.intervals, codes);
   return result;
+}
+
+std::string why_not_readable(const FitOptions& options) {
+  constexpr const char* by_crisp = "it is measured by the best crisp tree";
+  if (options.folds.count == 0) return "folds.count 0: the tree is chosen by its error on held-out rows";
+  if (options.validity == ValidityChoice::blend || options.validity == ValidityChoice::gaussian) {
+    return fmt::format("validity blend or gaussian: {}", by_crisp);
+  }
+  if (rule_of(options.rule).overlapping == ValidityKind::gaussian) {
+    std::vector<std::string_view> names;
+    for (const Rule& rule : rule_table()) {
+      if (rule.overlapping == ValidityKind::gaussian) names.push_back(rule.name);
+    }
+    return fmt::format("rule {}: {}", fmt::join(names, " or "), by_crisp);
+  }
+  const auto is_set = [](int sign) { return sign != 0; };
+  if (std::ranges::any_of(options.monotone, is_set) || std::ranges::any_of(options.slope_signs, is_set)) {
+    return "monotone or slope_signs: its equations do not keep them";
+  }
+  return "";
 }
 
 }  // namespace llmt

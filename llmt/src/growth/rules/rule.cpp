@@ -28,6 +28,8 @@ std::span<const Choice<GrowthRule>> choices() {
   return all;
 }
 
+std::string_view title_of(GrowthRule rule) { return rule_of(rule).title; }
+
 std::string_view summary_of(GrowthRule rule) { return rule_of(rule).summary; }
 
 bool has_own_models(GrowthRule rule) { return rule_of(rule).has_own_models; }

@@ -12,6 +12,7 @@ namespace llmt {
 /// One row of the table of growth rules (rows.hpp). A new rule is a folder with its grower and a row.
 struct Rule {
   std::string_view name;     ///< on the command line, in JSON and in messages
+  std::string_view title;    ///< for people
   std::string_view summary;  ///< one phrase for help
   GrownPartition (*grow)(const GrowthProblem& problem) = nullptr;
 

@@ -7,7 +7,11 @@ namespace llmt {
 const std::vector<Rule>& rule_table() {
   static const std::vector<Rule> rules = [] {
     std::vector<Rule> rows = library_rules();
-    rows.push_back({.name = "toy", .summary = "halves the rows", .grow = toy_rule::grow_halves, .usual_method = "toy"});
+    rows.push_back({.name = "toy",
+                    .title = "Toy halves",
+                    .summary = "halves the rows",
+                    .grow = toy_rule::grow_halves,
+                    .usual_method = "toy"});
     return rows;
   }();
   return rules;

@@ -1,0 +1,245 @@
+#include "report/fit/fit_summary.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <ranges>
+#include <vector>
+
+#include "report/fit/kinds.hpp"
+
+namespace llmt::report {
+namespace {
+
+// "RD (the default)".
+std::string title_with_default(GrowthRule rule) {
+  return std::string(title_of(rule)) + (rule == FitOptions().rule ? " (the default)" : "");
+}
+
+// How the held-out rows came to be.
+std::string selection_text(const FitRun& run, const PartitionSummary& partition) {
+  if (partition.cv_folds == 0) return "no held-out rows: the tree stays as grown";
+  if (partition.cv_folds == 1) {
+    return fmt::format("chosen on {} rows held out once", partition.held_out_rows);
+  }
+  return fmt::format("chosen by {}-fold cross-validation{}, the tree grown anew in every fold", partition.cv_folds,
+                     run.options.folds.kind == FoldKind::contiguous ? " over contiguous blocks of rows" : "");
+}
+
+// What the local models are made of, and what spoke for it; nothing for what was not asked.
+std::string local_models_text(const FitRun& run, const FitSummary& summary) {
+  const FitOptions& asked = run.options;
+  std::string text;
+  if (asked.terms != LocalTerms::linear) {
+    text += fmt::format("Local models are {}", summary.quadratic ? "quadratic" : "linear");
+    for (std::size_t p = 0; p < summary.other_terms.size(); ++p) {
+      text += fmt::format("{} RMSE held-out {}",
+                          p == 0 ? fmt::format("; {} ones:", summary.quadratic ? "linear" : "quadratic") : ",",
+                          number(summary.other_terms[p].rmse));
+    }
+    text += asked.terms == LocalTerms::automatic && summary.other_terms.empty()
+                ? ", without a comparison: it needs folds and 1 to 13 numeric regression inputs.\n"
+                : ".\n";
+  }
+  for (const PartitionSummary& partition : summary.partitions) {
+    if (partition.chosen.candidate.sparse) {
+      text +=
+          fmt::format("Sparse local models: {} coefficients in {} leaves.\n", partition.coefficients, partition.leaves);
+    }
+  }
+  return text;
+}
+
+// Which inputs the partitions do not use, and what that gained; nothing for those that use all.
+std::string left_out_text(const FitResult& result) {
+  std::string text;
+  for (const PartitionSummary& partition : result.summary.partitions) {
+    if (partition.left_out.empty()) continue;
+    const std::vector<InputStep>& steps = partition.input_steps;
+    const auto kept = result.model.num_inputs() - std::ssize(partition.left_out);
+    const auto chosen = std::ranges::find(steps, kept, &InputStep::inputs);
+    const std::string target = result.summary.partitions.size() == 1
+                                   ? ""
+                                   : fmt::format(" of {}", result.model.outputs()[partition.outputs[0]].name);
+    text += fmt::format(
+        "Inputs left out{}: {} of {} ({}); in a quick comparison held-out RMSE was {} with all inputs, {} without "
+        "these.\n",
+        target, partition.left_out.size(), result.model.num_inputs(),
+        fmt::join(names_of(result.model, partition.left_out), ", "), number(steps.front().rmse), number(chosen->rmse));
+  }
+  return text;
+}
+
+// Which inputs are codes, and what that gained; nothing if none is.
+std::string codes_text(const FitResult& result) {
+  const CodeChoice& codes = result.summary.codes;
+  if (codes.taken.empty()) return "";
+  return fmt::format(
+      "Numbers taken for codes, that is for categories: {}; in a quick comparison held-out RMSE was {}{} as numbers, "
+      "{} "
+      "as codes.\n",
+      fmt::join(names_of(result.model, codes.taken), ", "), result.summary.partitions.size() > 1 ? "relative, " : "",
+      number(codes.rmse_as_numbers), number(codes.rmse_as_codes));
+}
+
+// Of the outputs that are clamped, between what, and what that gained.
+std::string range_text(const Model& model, const PartitionSummary& summary, const Partition& partition) {
+  std::string text;
+  for (std::size_t o = 0; o < summary.range_guards.size(); ++o) {
+    if (const RangeGuard& guard = summary.range_guards[o]; guard.taken) {
+      text += fmt::format("{} is kept between {} and {}, the range of the training rows: RMSE held-out {} -> {}.\n",
+                          model.outputs()[summary.outputs[o]].name,
+                          number(partition.output_range(static_cast<Eigen::Index>(o), 0)),
+                          number(partition.output_range(static_cast<Eigen::Index>(o), 1)), number(guard.rmse_without),
+                          number(guard.rmse_with));
+    }
+  }
+  return text;
+}
+
+// How the splits of the final tree were searched, if not all were compared.
+std::string search_text(const SearchSummary& search) {
+  if (search.binned_nodes == 0) return "";
+  return fmt::format(
+      "Splits searched by bins in {} nodes, exactly in {} small ones. {}\n", search.binned_nodes, search.exact_nodes,
+      search.largest_excess > 0.0
+          ? fmt::format("A better split may exist by at most {} % of a node's residual sum of squares; --search exact "
+                        "looks for it.",
+                        number(100.0 * search.largest_excess, 2))
+          : "There are no better ones.");
+}
+
+std::string data_text(const FitRun& run, const FitResult& result) {
+  std::vector<std::string> inputs;
+  std::vector<std::string> constant;
+  for (const InputColumn& input : result.model.inputs()) {
+    inputs.push_back(input.is_categorical() ? fmt::format("{} ({} categories)", input.name, input.levels.size())
+                                            : input.name);
+    if (input.low == input.high) {
+      constant.push_back(input.name);
+    }
+  }
+  std::string text = fmt::format("{}: {} rows, {} input{}: {}\n", run.data, result.summary.samples, inputs.size(),
+                                 inputs.size() == 1 ? "" : "s", fmt::join(inputs, ", "));
+  if (result.summary.repeats) {
+    text += "Rows with equal inputs are taken for repeats of one measurement, and are held out together\n";
+  }
+  if (result.summary.copies > 0) {
+    text += fmt::format("Copies of other rows: {}; they only add to the weight of the rows that they copy\n",
+                        result.summary.copies);
+  }
+  if (result.summary.missing_values > 0) {
+    text += fmt::format("Missing values in the inputs: {}\n", result.summary.missing_values);
+  }
+  if (run.options.loss == Loss::tukey) {
+    const std::vector<Eigen::Index> rows = rows_left_out(result.summary.loss_weights, run.options.weights);
+    const auto lacks_input = [&](Eigen::Index row) { return run.inputs.row(row).hasNaN(); };
+    const auto lacking = std::ranges::count_if(rows, lacks_input);
+    text += left_out_by_loss(lines_at(run.lines, rows), result.summary.samples + std::ssize(rows));
+    if (2 * lacking > std::ssize(rows)) {
+      text += fmt::format(
+          "{} of these have empty cells in inputs: the errors below, and intervals, hold for rows without "
+          "empty cells\n",
+          lacking);
+    }
+  }
+  if (!constant.empty()) {
+    text += fmt::format("Constant, so without influence: {}\n", fmt::join(constant, ", "));
+  }
+  return text;
+}
+
+// The chosen model of every target, and below it the best of the other kinds.
+Table models_table(const FitResult& result) {
+  Table table({"target", "model", "leaves", "RMSE held-out", "spread of folds", "RMSE in-sample"});
+  for (const PartitionSummary& partition : result.summary.partitions) {
+    for (std::size_t o = 0; o < partition.outputs.size(); ++o) {
+      const std::string& target = result.model.outputs()[partition.outputs[o]].name;
+      const CandidateError& chosen = partition.chosen;
+      table.add({target, kind_of(chosen.candidate), fmt::format("{}", partition.leaves), number(chosen.rmse),
+                 number(chosen.spread, 2), number(partition.train_rmse(o))});
+      if (o > 0) continue;
+      for (const CandidateError& other : best_of_kinds(partition) | std::views::drop(1)) {
+        table.add({"  against", kind_of(other.candidate), fmt::format("{}", other.candidate.leaves), number(other.rmse),
+                   number(other.spread, 2), ""});
+      }
+    }
+  }
+  return table;
+}
+
+}  // namespace
+
+std::vector<Eigen::Index> rows_left_out(const Eigen::VectorXd& loss_weights, const Eigen::VectorXd& weights) {
+  std::vector<Eigen::Index> rows;
+  for (Eigen::Index row = 0; row < loss_weights.size(); ++row) {
+    if (loss_weights(row) == 0.0 && (weights.size() == 0 || weights(row) > 0.0)) rows.push_back(row);
+  }
+  return rows;
+}
+
+std::string left_out_by_loss(std::vector<Eigen::Index> lines, Eigen::Index rows) {
+  constexpr std::size_t most_named = 10;
+  const std::size_t count = lines.size();
+  std::string text = fmt::format("Rows left out by the Tukey loss: {} of {}", count, rows);
+  if (count == 0) return text + "\n";
+  lines.resize(std::min(count, most_named));
+  return text + fmt::format(" ({} {}{}); the errors below are those of the other rows\n", count == 1 ? "line" : "lines",
+                            fmt::join(lines, ", "), count > lines.size() ? ", ..." : "");
+}
+
+std::vector<Eigen::Index> counted_from_one(std::vector<Eigen::Index> rows) {
+  for (Eigen::Index& row : rows) ++row;
+  return rows;
+}
+
+std::vector<std::string> names_of(const Model& model, const std::vector<int>& inputs) {
+  std::vector<std::string> names;
+  for (const int input : inputs) names.push_back(model.inputs()[input].name);
+  return names;
+}
+
+std::vector<Eigen::Index> lines_at(const std::vector<Eigen::Index>& lines, const std::vector<Eigen::Index>& rows) {
+  std::vector<Eigen::Index> chosen;
+  for (const Eigen::Index row : rows) chosen.push_back(lines[row]);
+  return chosen;
+}
+
+std::string fit_text(const FitRun& run, const FitResult& result, std::size_t width) {
+  const std::vector<PartitionSummary>& partitions = result.summary.partitions;
+  std::string text = data_text(run, result);
+  text += fmt::format("Tree grown by {}, at least {} rows in a leaf; {}\n\n", title_with_default(run.options.rule),
+                      result.summary.min_leaf_samples, selection_text(run, partitions.front()));
+  text += models_table(result).text(width);
+  const auto has_better = [](const PartitionSummary& partition) {
+    return std::ranges::any_of(best_of_kinds(partition),
+                               [&](const CandidateError& other) { return other.rmse < partition.chosen.rmse; });
+  };
+  if (std::ranges::any_of(partitions, has_better)) {
+    text += "A model with a smaller error is not better by more than chance; the simpler one was taken.\n";
+  }
+  if (partitions.front().outputs.size() > 1) {
+    text += "Held-out errors of the shared tree are over all targets, each divided by its standard deviation.\n";
+  }
+  text += codes_text(result) + left_out_text(result);
+  for (std::size_t p = 0; p < partitions.size(); ++p) {
+    text += range_text(result.model, partitions[p], result.model.partitions()[p]);
+  }
+  text += local_models_text(run, result.summary);
+  for (const PartitionSummary& partition : partitions) {
+    text += search_text(partition.search);
+    // M5' drops inputs on its own; its leaves keep nothing of their parent's but what smoothing gives them.
+    if (partition.rank_deficient_leaves > 0 && !has_own_models(run.options.rule)) {
+      text += fmt::format(
+          "In {} leaves the rows did not determine every slope; such slopes are those of the leaf's parent. That does "
+          "no harm within the range of the rows.\n",
+          partition.rank_deficient_leaves);
+    }
+  }
+  if (!run.output.empty()) text += fmt::format("Model written to {}\n", run.output);
+  return text;
+}
+
+}  // namespace llmt::report

@@ -1,0 +1,103 @@
+#include "report/fit/of_comparison.hpp"
+
+#include <fmt/format.h>
+
+#include <functional>
+
+#include "report/document/figures.hpp"
+#include "report/text/text.hpp"
+
+namespace llmt::report {
+namespace {
+
+Chart errors_chart(const Compared& of) {
+  std::vector<std::string> names;
+  Numbers errors;
+  for (const Comparison& method : of.result.methods) {
+    names.push_back(method.method);
+    errors.push_back(method.cv_rmse);
+  }
+  Chart chart = ranking("Error on rows held out", fmt::format("RMSE of {}", of.target), names, errors, {});
+  Layer& bars = chart.layers.front();
+  for (const Comparison& method : of.result.methods) {
+    bars.low.push_back(method.cv_rmse - method.spread);
+    bars.high.push_back(method.cv_rmse + method.spread);
+    bars.roles.push_back("muted");
+  }
+  bars.roles[of.result.recommended] = "model";
+  chart.caption = "Blue: recommended. Whiskers: standard deviation over the folds.";
+  return chart;
+}
+
+// One method's figures over another's, a point with its name for each method.
+Chart trade(const Compared& of, const std::string& title, const std::string& axis,
+            const std::function<double(const Comparison&)>& figure) {
+  Chart chart{.title = title, .x = {axis, true}, .y = {fmt::format("RMSE of {}", of.target)}, .layers = {}};
+  for (const bool recommended : {false, true}) {
+    Layer points{.name = recommended ? "recommended" : "others", .role = recommended ? "model" : "data"};
+    for (std::size_t k = 0; k < of.result.methods.size(); ++k) {
+      const Comparison& method = of.result.methods[k];
+      if ((k == of.result.recommended) != recommended) continue;
+      points.x.push_back(figure(method));
+      points.y.push_back(method.cv_rmse);
+      points.labels.push_back(method.method);
+    }
+    chart.layers.push_back(std::move(points));
+  }
+  return chart;
+}
+
+Chart folds_chart(const Compared& of) {
+  Chart chart{.title = "Every fold",
+              .caption = "Folds differ in how hard they are; a method that is better in each of them is better.",
+              .x = {"fold"},
+              .y = {fmt::format("RMSE of {}", of.target)},
+              .layers = {}};
+  for (std::size_t k = 0; k < of.result.methods.size(); ++k) {
+    const Comparison& method = of.result.methods[k];
+    Layer line{.mark = Mark::line, .role = k == of.result.recommended ? "model" : "muted"};
+    line.name = k == of.result.recommended ? method.method : k == 0 ? "others" : "";
+    for (Eigen::Index fold = 0; fold < method.fold_rmse.size(); ++fold) {
+      line.x.push_back(static_cast<double>(fold + 1));
+      line.y.push_back(method.fold_rmse(fold));
+    }
+    chart.layers.push_back(std::move(line));
+  }
+  return chart;
+}
+
+Json methods_table(const Compared& of) {
+  Grid grid{.title = "All figures",
+            .header = {"method", "equations", "numbers in the model", "RMSE held-out", "+-", "largest jump", "fit, s",
+                       "predict 1e6 rows, s"},
+            .rows = {},
+            .marked = static_cast<int>(of.result.recommended),
+            .wide = true};
+  for (const Comparison& method : of.result.methods) {
+    grid.rows.push_back({method.method, std::to_string(method.leaves), std::to_string(method.parameters),
+                         number(method.cv_rmse), number(method.spread, 2), number(method.largest_jump, 3),
+                         number(method.fit_seconds, 2), number(method.predict_seconds, 2)});
+  }
+  return block(grid);
+}
+
+}  // namespace
+
+Document comparison_report(const Compared& of) {
+  Document document{.title = fmt::format("llmt compare {}", file_name(of.data)), .answer = of.result.recommendation};
+  document.lead = fmt::format("{} rows, {} inputs, target {}; {} folds, every choice made inside the fold.", of.rows,
+                              of.inputs, of.target, of.result.methods.front().fold_rmse.size());
+  document.main = errors_chart(of);
+  document.beside_main = {block(trade(of, "Error over size", "numbers in the model", [](const Comparison& method) {
+    return static_cast<double>(method.parameters);
+  }))};
+  document.sections.push_back({"To check",
+                               "",
+                               {block(folds_chart(of)),
+                                block(trade(of, "Error over time", "time of a fit, s",
+                                            [](const Comparison& method) { return method.fit_seconds; })),
+                                methods_table(of)}});
+  return document;
+}
+
+}  // namespace llmt::report

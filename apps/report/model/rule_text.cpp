@@ -1,0 +1,138 @@
+#include "report/model/rule_text.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <limits>
+
+namespace llmt::report {
+namespace {
+
+constexpr double any_value = std::numeric_limits<double>::max();  // a split into rows with and without a value
+
+// Significant digits of a number that was not rounded.
+constexpr int usual_digits = 5;
+constexpr int most_digits = 12;
+
+// Without an exponent where that is short.
+std::string with_digits(double value, int digits) {
+  const double magnitude = std::abs(value);
+  if (magnitude < 1e-5 || magnitude >= 1e9) return fmt::format("{:.{}g}", value, digits);
+  const int before_point = 1 + static_cast<int>(std::floor(std::log10(magnitude)));
+  std::string text = fmt::format("{:.{}f}", value, std::max(0, digits - before_point));
+  if (text.find('.') != std::string::npos) {
+    text.erase(text.find_last_not_of('0') + 1);
+    if (text.back() == '.') text.pop_back();
+  }
+  return text;
+}
+
+// The number with as few digits as say it to within `tolerance`; `usual_digits` of them if many would be needed.
+std::string decimal_within(double value, double tolerance) {
+  if (std::abs(value) <= tolerance) return "0";
+  for (int digits = 1; digits <= most_digits; ++digits) {
+    const std::string text = with_digits(value, digits);
+    double read = 0.0;
+    std::from_chars(text.data(), text.data() + text.size(), read);
+    if (std::abs(read - value) <= tolerance) return text;
+  }
+  return with_digits(value, usual_digits);
+}
+
+std::string levels_text(const InputColumn& input, const std::vector<int>& levels) {
+  std::vector<std::string> names;
+  for (const int level : levels) names.push_back(input.levels[level]);
+  return fmt::format("{} in {{{}}}", input.name, fmt::join(names, ", "));
+}
+
+// What an oblique split compares: "0.8 x1 - 0.3 x2".
+std::string direction(const Model& model, const Node& node, double& threshold) {
+  std::string text;
+  threshold = node.threshold;
+  for (Eigen::Index j = 0; j < node.direction.size(); ++j) {
+    const double weight = node.direction(j);
+    if (weight == 0.0) continue;
+    threshold += weight * model.inputs()[j].centre;
+    const std::string term = fmt::format("{} {}", decimal(std::abs(weight)), model.inputs()[j].name);
+    text += text.empty() ? (weight < 0.0 ? "-" : "") + term : (weight < 0.0 ? " - " : " + ") + term;
+  }
+  return text;
+}
+
+std::string factor(const InputColumn& input) {
+  if (input.centre == 0.0) return input.name;
+  return fmt::format("({} {} {})", input.name, input.centre < 0.0 ? "+" : "-", decimal(std::abs(input.centre)));
+}
+
+}  // namespace
+
+std::string regressor_name(const Model& model, const Regressor& regressor) {
+  const InputColumn& input = model.inputs()[regressor.input];
+  if (regressor.second_input == regressor.input) return factor(input) + "^2";
+  if (regressor.second_input >= 0) return factor(input) + "*" + factor(model.inputs()[regressor.second_input]);
+  return regressor.level < 0 ? input.name : fmt::format("[{} = {}]", input.name, input.levels[regressor.level]);
+}
+
+std::string decimal(double value) { return decimal_within(value, 1e-13 * std::abs(value)); }
+
+std::string condition(const Model& model, const Node& node, bool left) {
+  const InputColumn& input = model.inputs()[node.split_input];
+  if (!node.level_side.empty()) {
+    std::vector<int> levels;
+    for (int level = 0; level < static_cast<int>(node.level_side.size()); ++level) {
+      if (node.level_side[level] == (left ? -1 : 1)) levels.push_back(level);
+    }
+    return levels_text(input, levels);
+  }
+  if (node.is_oblique()) {
+    double threshold = 0.0;
+    const std::string side = direction(model, node, threshold);
+    return fmt::format("{} {} {}", side, left ? "<=" : ">", decimal(threshold));
+  }
+  if (node.threshold == any_value) return fmt::format("{} is {}", input.name, left ? "known" : "missing");
+  return fmt::format("{} {} {}", input.name, left ? "<=" : ">", decimal(node.threshold));
+}
+
+std::vector<std::string> conditions_of(const Model& model, const Partition& partition, const Leaf& leaf) {
+  std::vector<std::string> parts;
+  for (const ObliqueSide& side : leaf.sides) parts.push_back(condition(model, partition.nodes[side.node], side.left));
+  for (Eigen::Index j = 0; j < model.num_inputs(); ++j) {
+    const InputColumn& input = model.inputs()[j];
+    if (!leaf.levels[j].empty()) parts.push_back(levels_text(input, leaf.levels[j]));
+    if (leaf.low(j) == any_value) {
+      parts.push_back(input.name + " is missing");
+      continue;
+    }
+    if (leaf.high(j) == any_value) parts.push_back(input.name + " is known");
+    const bool below = leaf.high(j) < any_value;
+    const bool above = std::isfinite(leaf.low(j));
+    if (below && above) {
+      parts.push_back(fmt::format("{} < {} <= {}", decimal(leaf.low(j)), input.name, decimal(leaf.high(j))));
+    } else if (below) {
+      parts.push_back(fmt::format("{} <= {}", input.name, decimal(leaf.high(j))));
+    } else if (above) {
+      parts.push_back(fmt::format("{} > {}", input.name, decimal(leaf.low(j))));
+    }
+  }
+  return parts;
+}
+
+std::vector<std::string> equation(const Model& model, const Leaf& leaf, Eigen::Index output) {
+  // The constant was computed from the value at the centres, and has the rounding of that sum.
+  double magnitude = std::abs(leaf.intercept(output));
+  std::vector<std::string> parts(1);
+  for (std::size_t k = 0; k < model.regressors().size(); ++k) {
+    const double slope = leaf.slope(output, k);
+    if (slope == 0.0) continue;
+    magnitude += std::abs(slope * model.regressors()[k].centre);
+    parts.push_back(fmt::format("{} {} {}", slope < 0.0 ? "-" : "+", decimal(std::abs(slope)),
+                                regressor_name(model, model.regressors()[k])));
+  }
+  parts[0] = decimal_within(leaf.intercept(output), 1e-13 * magnitude);
+  return parts;
+}
+
+}  // namespace llmt::report

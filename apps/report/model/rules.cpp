@@ -1,0 +1,160 @@
+#include "report/model/rules.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <vector>
+
+#include "llmt/size.hpp"
+#include "report/model/rule_text.hpp"
+
+namespace llmt::report {
+namespace {
+
+constexpr std::size_t line_width = 100;
+// `parts` with `between` them, in lines that begin with `indent` from the second on.
+std::string wrapped_list(std::string line, const std::vector<std::string>& parts, const std::string& between,
+                         const std::string& indent) {
+  std::string text;
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    const std::string part = (i == 0 ? "" : between) + parts[i];
+    if (i > 0 && line.size() + part.size() > line_width) {
+      text += line + "\n";
+      line = indent + part.substr(part.find_first_not_of(' '));
+    } else {
+      line += part;
+    }
+  }
+  return text + line + "\n";
+}
+
+std::vector<int> positions_of(const Partition& partition, const std::vector<Leaf>& leaves) {
+  std::vector<int> position(partition.nodes.size(), -1);
+  for (int k = 0; k < static_cast<int>(leaves.size()); ++k) position[leaves[k].node] = k;
+  return position;
+}
+
+std::string tree_text(const Model& model, const Partition& partition, const std::vector<Leaf>& leaves) {
+  const std::vector<int> position = positions_of(partition, leaves);
+  struct Open {
+    int node;
+    std::string text;  // its condition
+    std::size_t depth;
+  };
+  std::string text;
+  std::vector<Open> open = {{0, "", 0}};
+  while (!open.empty()) {
+    const Open at = open.back();
+    open.pop_back();
+    const Node& node = partition.nodes[at.node];
+    std::string indent;
+    for (std::size_t d = 1; d < at.depth; ++d) indent += "|  ";
+    if (at.depth > 0) {
+      text += indent + at.text + (node.is_leaf() ? fmt::format(": rule {}", position[at.node] + 1) : "") + "\n";
+    }
+    if (node.is_leaf()) continue;
+    open.push_back({node.right, condition(model, node, false), at.depth + 1});
+    open.push_back({node.left, condition(model, node, true), at.depth + 1});
+  }
+  return text;
+}
+
+std::string partition_text(const Model& model, Eigen::Index p) {
+  const Partition& partition = model.partitions()[p];
+  const std::vector<Leaf> leaves = model.leaves(p);
+  std::string text;
+  for (std::size_t k = 0; k < leaves.size(); ++k) {
+    const Leaf& leaf = leaves[k];
+    std::vector<std::string> errors;
+    for (const double rmse : leaf.rmse) errors.push_back(number(rmse, 3));
+    const std::string head = fmt::format("Rule {} ({} rows, RMSE {})", k + 1, leaf.samples, fmt::join(errors, ", "));
+    const std::vector<std::string> when = conditions_of(model, partition, leaf);
+    text += when.empty() ? head + ": everywhere\n" : wrapped_list(head + ": if ", when, " and ", "    ");
+    for (std::size_t o = 0; o < partition.outputs.size(); ++o) {
+      const std::string left = fmt::format("  {} = ", model.outputs()[partition.outputs[o]].name);
+      text += wrapped_list(left, equation(model, leaf, static_cast<Eigen::Index>(o)), " ", "      ");
+    }
+    text += "\n";
+  }
+  if (leaves.size() > 1) text += "As a tree:\n" + tree_text(model, partition, leaves) + "\n";
+  return text;
+}
+
+std::string inputs_text(const Model& model, std::size_t width) {
+  const std::vector<bool> used = used_inputs(model);
+  Table table({"input", "smallest", "largest", "mean"});
+  std::vector<std::string> unused;
+  for (Eigen::Index j = 0; j < model.num_inputs(); ++j) {
+    const InputColumn& input = model.inputs()[j];
+    if (!used[j]) {
+      unused.push_back(input.name);
+    } else if (input.is_categorical()) {
+      table.add({input.name, fmt::format("{} categories", input.levels.size()), "", ""});
+    } else {
+      table.add({input.name, decimal(input.low), decimal(input.high), decimal(input.centre)});
+    }
+  }
+  std::string text = table.text(width);
+  if (!unused.empty()) text += wrapped_list("Not used: ", unused, ", ", "  ");
+  return text;
+}
+
+// Whether between the smallest and the largest value of each input no guard acts, and a missing value counts as the
+// mean: the model is what the rules say.
+bool says_all(const Model& model) {
+  for (const Partition& partition : model.partitions()) {
+    if (partition.residual_range.size() > 0) return partition.num_leaves() == 1 && partition.outer_slope.size() == 0;
+    for (const Node& node : partition.nodes) {
+      for (std::size_t k = 0; k < model.regressors().size(); ++k) {
+        const Regressor& regressor = model.regressors()[k];
+        if (regressor.level >= 0 || regressor.second_input >= 0) continue;
+        const InputColumn& input = model.inputs()[regressor.input];
+        if (node.low(k) > input.low - regressor.centre || node.high(k) < input.high - regressor.centre) return false;
+      }
+    }
+  }
+  return true;
+}
+
+std::string notes(const Model& model) {
+  const bool one_rule =
+      std::ranges::all_of(model.partitions(), [](const Partition& partition) { return partition.num_leaves() == 1; });
+  if (!says_all(model)) {
+    return "The model follows a rule within the range of the rule's rows. Beyond it the slopes of larger regions take\n"
+           "over, and predictions are held near the root's model; a missing value counts as the mean of the rule's\n"
+           "rows. `llmt fit --readable` writes a tree without such guards.\n";
+  }
+  return std::string(
+             one_rule ? ""
+                      : "Between the smallest and the largest value of each input the model is what the rules say. An "
+                        "input\nbeyond is held near that end. ") +
+         "A missing value counts in an equation as the mean above,\nan unknown category as a missing one; at a split "
+         "it goes the way of most rows.\n";
+}
+
+}  // namespace
+
+std::string rules_text(const Model& model, const std::string& name, std::size_t width) {
+  std::string text = fmt::format("{}: size {} (operators, constants and variables)\n", name, expression_size(model));
+  for (Eigen::Index p = 0; p < std::ssize(model.partitions()); ++p) {
+    const Partition& partition = model.partitions()[p];
+    std::vector<std::string> names;
+    for (const int output : partition.outputs) names.push_back(model.outputs()[output].name);
+    if (partition.validity.kind != ValidityKind::crisp && partition.num_leaves() > 1) {
+      throw std::runtime_error(fmt::format(
+          "{}: the {} leaves of {} are blended: a prediction is a mean of several equations, so rules would not be the "
+          "model. `llmt fit --readable` writes a tree that is its rules; `llmt inspect` lists the leaves",
+          name, partition.num_leaves(), fmt::join(names, ", ")));
+    }
+    text += fmt::format("\n{}: {} rule{}\n\n", fmt::join(names, ", "), partition.num_leaves(),
+                        partition.num_leaves() == 1 ? "" : "s");
+    text += partition_text(model, p);
+  }
+  return text + inputs_text(model, width) + notes(model);
+}
+
+}  // namespace llmt::report

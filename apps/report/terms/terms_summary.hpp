@@ -1,0 +1,44 @@
+/// \file
+/// The terms that a simulation lacks, as text and as JSON.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "llmt/discovery/simulation.hpp"
+#include "report/text/json.hpp"
+#include "report/text/text.hpp"
+
+namespace llmt::report {
+
+/// Where an output's gap is large.
+struct GapRegion {
+  std::string output;
+  std::string conditions;  ///< "a > 3.2 and b <= 1"
+  Eigen::Index rows = 0;
+  double mean_gap = 0.0;  ///< of |measured - simulated|
+};
+
+/// What was compared and what was found.
+struct TermsSummary {
+  std::string simulated;  ///< names of the tables
+  std::string measured;
+  std::string corrected;  ///< the file that the corrected simulation was written to; may be empty
+  std::vector<std::string> inputs;
+  std::uint64_t seed = 1;
+  Eigen::Index rows = 0;
+  discovery::Missing missing;
+  std::vector<Eigen::Index> outlier_lines;  ///< of missing.outliers, in the file `measured`
+  std::vector<GapRegion> regions;           ///< of each output by falling gap
+};
+
+/// Cuts the rows searched where the absolute deviation changes most, by a small tree.
+std::vector<GapRegion> gap_regions(const discovery::Inputs& inputs, const discovery::MeasuredOutputs& measured,
+                                   const discovery::Missing& missing);
+
+/// Verdict, terms, gaps, and what could not be tested. `width`: of tables.
+std::string terms_text(const TermsSummary& summary, std::size_t width = no_width_limit);
+Json terms_json(const TermsSummary& summary);
+
+}  // namespace llmt::report
