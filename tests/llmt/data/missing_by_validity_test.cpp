@@ -48,7 +48,8 @@ TEST(Missing, RowsCountByHowMuchWhatIsMissingScattersTheOutput) {
   for (Eigen::Index i = 0; i < 300; ++i) x(i, i / 100) = oracle::missing;
   const llmt::FitOptions options;
   const llmt::FitData data(x, y, options, true);
-  const Eigen::VectorXd weights = llmt::weights_by_missing(data.table(), options);
+  llmt::Work uncounted;
+  const Eigen::VectorXd weights = llmt::weights_by_missing(data.table(), options, uncounted);
   // The variance that x_0 adds is 33, of which 100 / 140 counts; the rest raises that of complete rows to about 1.
   EXPECT_LT(weights.head(100).maxCoeff(), 0.1);
   EXPECT_GT(weights.segment(100, 100).minCoeff(), 0.3);
