@@ -1,4 +1,4 @@
-// Intervals in the file of their model.
+// Intervals in the text of their model.
 #include <fmt/format.h>
 
 #include <stdexcept>
@@ -51,16 +51,13 @@ Intervals intervals_from(const JsonReader& folds, const Model& model) {
 
 }  // namespace
 
-void save(const Model& model, const Intervals& intervals, const std::string& path) {
+std::string to_json(const Model& model, const Intervals& intervals) {
   try {
     check_belong(intervals, model);
   } catch (const std::invalid_argument& error) {
-    throw std::invalid_argument(fmt::format("llmt::save: {}", error.what()));
+    throw std::invalid_argument(fmt::format("llmt::to_json: {}", error.what()));
   }
-  if (intervals.empty()) {
-    save(model, path);
-    return;
-  }
+  if (intervals.empty()) return to_json(model);
   Json json = json_of(model);
   json["intervals"] = Json::array();
   for (std::size_t k = 0; k < intervals.models().size(); ++k) {
@@ -70,16 +67,24 @@ void save(const Model& model, const Intervals& intervals, const std::string& pat
     }
     json["intervals"].push_back(std::move(fold));
   }
-  write_file(path, model_text(json));
+  return model_text(json);
 }
 
-ModelWithIntervals load_with_intervals(const std::string& path) {
-  const Json json = parse_json(read_file(path), path);
-  const JsonReader root(json, path);
+ModelWithIntervals from_json_with_intervals(const std::string& text, const std::string& name) {
+  const Json json = parse_json(text, name);
+  const JsonReader root(json, name);
   Model model = model_from(root);
   Intervals intervals;
   if (root.has("intervals")) intervals = intervals_from(root.member("intervals"), model);
   return {std::move(model), std::move(intervals)};
+}
+
+void save(const Model& model, const Intervals& intervals, const std::string& path) {
+  write_file(path, to_json(model, intervals));
+}
+
+ModelWithIntervals load_with_intervals(const std::string& path) {
+  return from_json_with_intervals(read_file(path), path);
 }
 
 }  // namespace llmt

@@ -27,6 +27,7 @@ class JsonReader {
 
   JsonReader member(const char* key) const;
   bool has(const char* key) const { return json_.is_object() && json_.contains(key); }
+  bool is_text() const { return json_.is_string(); }
   std::vector<JsonReader> elements() const;
   Eigen::Index size() const { return std::ssize(array()); }
 

@@ -163,8 +163,8 @@ TEST(HostileFiles, IntervalsOfAnotherModelAreRefused) {
             testing::TempDir() +
                 "/llmt_mixed.json: /intervals: the intervals belong to another model: fold 0 and the "
                 "model have 2 inputs and 1 outputs, and 2 inputs and 2 outputs");
-  EXPECT_EQ(oracle::thrown([&] { llmt::save(two.model, one.intervals, own); }).substr(0, 52),
-            "llmt::save: the intervals belong to another model: f");
+  EXPECT_EQ(oracle::thrown([&] { llmt::save(two.model, one.intervals, own); }).substr(0, 55),
+            "llmt::to_json: the intervals belong to another model: f");
   // Other names, and another training extent.
   llmt::FitResult renamed = two;
   std::vector<llmt::Model> models;
