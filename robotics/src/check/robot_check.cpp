@@ -9,6 +9,7 @@
 #include "calibration/free_parameters.hpp"
 #include "check/f_tail.hpp"
 #include "check/movements.hpp"
+#include "llmt/robotics/effects.hpp"
 
 namespace llmt::robotics {
 namespace {
@@ -89,7 +90,7 @@ std::vector<Eigen::Index> columns_of(const Robot& robot) {
   }
   for (const Effect& effect : robot.effects) {
     for (std::size_t k = 0; k < effect.values.size(); ++k, ++next) {
-      if (effect.type != "joint_map") columns.push_back(next);
+      if (nature_of(effect) != Nature::map) columns.push_back(next);
     }
   }
   return columns;

@@ -164,7 +164,7 @@ void describe_rest(const Investigation& investigation, const DiscoveryOptions& o
   result.notes.push_back(fmt::format("What was found is not all: {}.", fault->reason));
   if (fault->where != "instrument") return;
   for (FoundEffect& effect : result.effects) {
-    effect.confirmed = effect.confirmed && effect.effect.type.starts_with("instrument_");
+    effect.confirmed = effect.confirmed && nature_of(effect.effect) == Nature::instrument;
   }
   if (std::ranges::any_of(result.effects, &FoundEffect::confirmed)) return;
   result.answer = discovery::Answer::unknown;
@@ -235,7 +235,7 @@ void map_doubted_waves(const Robot& robot, Investigation& investigation, const D
   for (FoundEffect& effect : mapped.effects) {
     const bool is_doubted = std::ranges::any_of(
         mapped.unknown, [&](const FoundShape& found) { return found.shape.acts_on == effect.effect.at; });
-    if (effect.effect.type == "transmission_error" && is_doubted) effect.confirmed = false;
+    if (nature_of(effect.effect) == Nature::wave && is_doubted) effect.confirmed = false;
   }
   result = std::move(mapped);
 }

@@ -23,7 +23,7 @@ std::vector<FoundParameter> parameters_of(const Effect& effect, const Calibratio
     const double value = all[index].value;
     // Calibration holds what does not move the tool: its value is not determined.
     const double error = fitted.result.standard_errors(index);
-    const double known = effect_type(effect.type).weighted ? mass_uncertainty * value : 0.0;
+    const double known = effect_type(effect.type).scales_with_mass ? mass_uncertainty * value : 0.0;
     found.push_back({parameter.name, value, parameter.unit,
                      error > 0.0 ? std::hypot(error, known) : std::numeric_limits<double>::quiet_NaN()});
   }
@@ -47,11 +47,11 @@ bool may_be_part_of(const Shape& shape, const Effect& effect) {
   }
   // No smooth shape and no map follows a wave of many periods.
   constexpr double finest = 90.0;  // waves a turn that knots every two degrees can follow
-  if (effect.type == "transmission_error" && effect.constants[0] > finest) return false;
+  if (nature_of(effect) == Nature::wave && effect.constants[0] > finest) return false;
   const std::vector<std::string>& columns = effect_type(effect.type).columns;
   const bool is_of_posture = columns.empty() || columns.front().starts_with("tau");
   if (is_of_posture) return posture || load;
-  return !posture && depends_on_time(effect.type);
+  return !posture && depends_on_time(effect);
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include "calibration/free_parameters.hpp"
 #include "calibration/joint_map_shift.hpp"
 #include "discovery/left_out.hpp"
+#include "effects/effect_entries.hpp"
 #include "kinematics/units.hpp"
 #include "llmt/statistics.hpp"
 
@@ -210,10 +211,8 @@ std::optional<JointMaps> fit_joint_maps(const Robot& robot, const Measurements& 
   const Eigen::VectorXd values = factor.solve(moments);
   for (const Knots& own : knots) {
     const Eigen::VectorXd part = values.segment(own.begin, own.count);
-    maps.effects.push_back({.type = "joint_map",
-                            .at = robot.chain.joints[own.joint].name,
-                            .values = {part.begin(), part.end()},
-                            .constants = {own.first, own.step}});
+    maps.effects.push_back(
+        joint_map_effect(robot.chain.joints[own.joint], own.first, own.step, {part.begin(), part.end()}));
   }
   const Eigen::MatrixXd geometry = baseline.transpose();
   maps.before = left_out(geometry, residuals, d);

@@ -97,7 +97,7 @@ int multiple_of(const FoundEffect& wave, const FoundEffect& other) {
 void doubt_waves(const Investigation& investigation, Discovery& result) {
   std::vector<FoundEffect*> waves;
   for (FoundEffect& effect : result.effects) {
-    if (effect.confirmed && effect.effect.type == "transmission_error") waves.push_back(&effect);
+    if (effect.confirmed && nature_of(effect.effect) == Nature::wave) waves.push_back(&effect);
   }
   if (waves.empty()) return;
   const Rest rest = rest_of(investigation);

@@ -9,13 +9,13 @@
 namespace llmt::robotics {
 namespace {
 
-bool is_hysteresis(const Effect& effect) { return effect_type(effect.type).family == "hysteresis"; }
+bool is_wave(const Effect& effect) { return nature_of(effect) == Nature::wave; }
 
+// A wave's number of periods is open if a scan found it, and if it is no whole number.
 bool is_open(const Hypothesis& one) {
   const Effect& effect = *one.effect;
-  if (is_hysteresis(effect)) return true;
-  if (effect.type != "transmission_error" || !(one.candidate.prior_cost > 0.0)) return false;
-  return effect.constants[0] != std::round(effect.constants[0]);
+  if (!is_wave(effect)) return effect_type(effect.type).trial.fits_constant;
+  return one.candidate.prior_cost > 0.0 && effect.constants[0] != std::round(effect.constants[0]);
 }
 
 // The fit at its end: derivatives by the free parameters and by the open constants.
@@ -60,8 +60,8 @@ Robot stepped(const Robot& robot, const Augmented& fit, const std::vector<std::s
   Eigen::VectorXd errors = fit.errors;
   for (std::size_t e = 0; e < open.size(); ++e) {
     double& constant = moved.effects[open[e]].constants[0];
-    // A wave that is off by a period over the range of its joint is another one; presliding stays positive.
-    const double widest = is_hysteresis(moved.effects[open[e]]) ? 0.5 * constant : 0.2;
+    // A wave that is off by a period over the range of its joint is another one; other constants keep their sign.
+    const double widest = is_wave(moved.effects[open[e]]) ? 0.2 : 0.5 * constant;
     const Eigen::Index column = free + static_cast<Eigen::Index>(e);
     const double step = std::clamp(all(column), -widest, widest);
     errors -= step * fit.norms(column) * fit.columns.col(column);

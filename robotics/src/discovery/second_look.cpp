@@ -1,7 +1,6 @@
 #include "discovery/second_look.hpp"
 
 #include <algorithm>
-#include <array>
 
 #include "discovery/left_out.hpp"
 #include "discovery/pose_split.hpp"
@@ -9,34 +8,21 @@
 namespace llmt::robotics {
 namespace {
 
-bool depends_on_weight(const std::string& name) {
-  const EffectType& type = effect_type(name);
-  return type.weighted || type.elastic || type.adjust || type.family == "backlash_gravity";
-}
-
-// Of one joint's angle over its whole range, as the torque of gravity often is.
-bool is_slow_in_a_joint(const std::string& name) {
-  constexpr std::array<const char*, 6> slow = {"eccentricity", "eccentricity_twice", "counterbalance_spring",
-                                               "joint_gain",   "wrist_coupling",     "axis_wobble"};
-  return std::ranges::find(slow, effect_type(name).family) != slow.end();
-}
-
-}  // namespace
-
-// Whatever changes with time is known as closely as the curve that stands for it.
-bool depends_on_time(const std::string& name) {
-  const std::string& family = effect_type(name).family;
-  return family == "drift" || family == "tracker_knock" || family == "thermal_growth";
+// Everything that changes with time is known as closely as the curve that stands for it.
+bool depends_on_time(const Effect& effect) {
+  const Nature nature = nature_of(effect);
+  return nature == Nature::time || nature == Nature::jump;
 }
 
 bool may_be_an_error_of(const std::vector<Hypothesis>& large, const Effect& small) {
+  const Nature nature = nature_of(small);
   return std::ranges::any_of(large, [&](const Hypothesis& one) {
     const Effect& effect = *one.effect;
-    const bool by_weight = depends_on_weight(effect.type);
+    const bool by_weight = nature_of(effect) == Nature::weight;
     return (!effect.at.empty() && effect.at == small.at) ||
            effect_type(effect.type).family == effect_type(small.type).family ||
-           (depends_on_time(effect.type) && depends_on_time(small.type)) ||
-           (by_weight && (depends_on_weight(small.type) || is_slow_in_a_joint(small.type)));
+           (depends_on_time(effect) && depends_on_time(small)) ||
+           (by_weight && (nature == Nature::weight || nature == Nature::slow));
   });
 }
 

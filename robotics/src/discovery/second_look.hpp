@@ -19,7 +19,7 @@ struct SecondLook {
 std::optional<SecondLook> look_again(Investigation& investigation, const DiscoveryOptions& options);
 
 /// Whether the effect changes with time: drift, a knock, thermal growth.
-bool depends_on_time(const std::string& name);
+bool depends_on_time(const Effect& effect);
 
 /// Whether a small effect may be no more than the error of a large one that was found: what depends on weight is known
 /// as closely as masses and levers are, and what a joint does as closely as the formula for it.

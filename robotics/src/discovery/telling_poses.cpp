@@ -36,7 +36,7 @@ std::vector<Eigen::Index> fitted_columns(const Robot& robot) {
   Eigen::Index next = std::ssize(columns);
   for (const Effect& effect : robot.effects) {
     for (std::size_t k = 0; k < effect.values.size(); ++k, ++next) {
-      if (effect.type != "joint_map") columns.push_back(next);
+      if (nature_of(effect) != Nature::map) columns.push_back(next);
     }
   }
   return columns;

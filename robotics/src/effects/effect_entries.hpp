@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -11,15 +12,33 @@ namespace llmt::robotics {
 
 inline constexpr double metres = 1e-3;  // m per mm
 
-/// Formulas, units and places; sizes, titles and notes come from the table robotics/catalogue.yaml.
+using Values = std::span<const double>;
+
+/// Rows of the catalogue without sizes, titles and notes, which come from the table robotics/catalogue.yaml.
+std::vector<EffectType> compliance_effects();
 std::vector<EffectType> elastic_effects();
-std::vector<EffectType> joint_effects();
+std::vector<EffectType> drive_effects();
+std::vector<EffectType> periodic_effects();
+std::vector<EffectType> friction_effects();
 std::vector<EffectType> whole_arm_effects();
 std::vector<EffectType> instrument_effects();
 EffectType formula_effect();
 
+/// All rows of the library, in the order of effect_types().
+std::vector<EffectType> library_effects();
+
 /// The table robotics/catalogue.yaml as text.
 extern const char* const default_catalogue_yaml;
+
+/// The rows and the table of sizes that effect_types() consists of.
+std::vector<EffectType> effect_table();
+std::string size_table();
+
+/// EffectTrial::constants of types whose constants are not known beforehand.
+inline std::vector<std::vector<double>> no_constants(const TrialContext&, std::size_t) { return {}; }
+
+/// A table of errors of a joint: values at `first`, `first + step`, ... in rad (mm).
+Effect joint_map_effect(const Joint& joint, double first, double step, std::vector<double> values);
 
 using ApplyFunction = decltype(EffectType::apply);
 

@@ -133,7 +133,10 @@ EffectType formula_effect() {
           .source = "the user",
           .parameters = {{.name = "coefficient", .key = "coefficients", .list = true}},
           .senses = Senses::torques,
-          .elastic = true};
+          .nature = Nature::weight,  // it may name torques
+          .elastic = true,
+          .has_formula = true,
+          .in_c = {.refusal = "the user's expressions are not translated to C"}};
 }
 
 }  // namespace llmt::robotics

@@ -15,12 +15,12 @@ struct Scene {
   const Eigen::VectorXd& residuals;  ///< 3n: measured - model, zero where not measured
   std::array<bool, 3> measured;
   std::vector<Eigen::MatrixXd>
-      lever;              ///< for each joint 3n x 1: motion of the tool by the joint, zero where not measured
-  Eigen::MatrixXd loads;  ///< n x J: gravity_loads() of the robot
-  double largest_load(std::size_t joint) const {
-    return loads.col(static_cast<Eigen::Index>(joint)).cwiseAbs().maxCoeff();
-  }
+      lever;                ///< for each joint 3n x 1: motion of the tool by the joint, zero where not measured
+  Eigen::MatrixXd loads;    ///< n x J: gravity_loads() of the robot
   Eigen::VectorXd clipped;  ///< residuals for scans: no sample is longer than some times the median
+
+  /// The part that the rows of effects look at.
+  TrialContext trial() const { return {robot.chain, poses.joints, poses.covariates, loads}; }
 };
 
 Scene make_scene(const Robot& robot, const Poses& poses, const Eigen::VectorXd& residuals,

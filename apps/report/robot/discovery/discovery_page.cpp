@@ -89,7 +89,7 @@ std::string order_text(double order) {
   return order == std::round(order) ? fmt::format("{:.0f}", order) : number(order, 3);
 }
 
-bool is_wave(const FoundEffect& effect) { return effect.effect.type == "transmission_error"; }
+bool is_wave(const FoundEffect& effect) { return robotics::nature_of(effect.effect) == robotics::Nature::wave; }
 
 // What an effect is, without its place: for gears, what turns so often.
 std::string kind_of(const Discovery& found, const FoundEffect& effect) {
@@ -292,7 +292,7 @@ std::string effect_values(const Discovery& found, const FoundEffect& effect) {
   std::vector<std::string> values;
   const std::vector<robotics::Joint>& joints = found.before.chain.joints;
   const auto first = std::ranges::find(joints, effect.effect.at, &robotics::Joint::name) - joints.begin();
-  const bool by_body = effect.effect.type == "joint_compliance_free_masses";
+  const bool by_body = robotics::effect_type(effect.effect.type).parameters[0].each_body;
   for (std::size_t k = 0; k < effect.parameters.size(); ++k) {
     const robotics::FoundParameter& parameter = effect.parameters[k];
     if (!std::isfinite(parameter.standard_error)) continue;
