@@ -6,7 +6,6 @@
 #include "discovery/pose_split.hpp"
 
 namespace llmt::robotics {
-namespace {
 
 // Everything that changes with time is known as closely as the curve that stands for it.
 bool depends_on_time(const Effect& effect) {
