@@ -9,6 +9,7 @@
 #include "llmt/robotics/robot_file.hpp"
 #include "robotics/effects.hpp"
 #include "robotics/exported_robot.hpp"
+#include "robotics/found.hpp"
 
 namespace llmt::robotics {
 namespace {
@@ -45,18 +46,28 @@ TEST(ToyEffect, IsCalibrated) {
   EXPECT_NEAR(found.robot.effects[0].values[0], growth, 4.0 * *parameter->standard_error);
 }
 
+// The row has discovery try the mean temperature as reference. The truth refers to another, and the difference is a
+// gain of the joint: k (T - 20) q = k (T - mean) q + k (mean - 20) q.
 TEST(ToyEffect, IsDiscovered) {
   const Robot truth = warm_arm();
   DiscoveryOptions options;
   options.correct = false;
-  const Discovery found =
-      discover(weighted(ur_like()), measure(truth, warm_poses(truth.chain, 120, 3), 0.02, 4), {}, options);
+  const Measurements measured = measure(truth, warm_poses(truth.chain, 120, 3), 0.02, 4);
+  const Discovery found = discover(weighted(ur_like()), measured, {}, options);
   EXPECT_EQ(found.answer, discovery::Answer::named);
-  ASSERT_EQ(found.effects.size(), 1U);
-  EXPECT_EQ(found.effects[0].effect.type, "warm_gain");
-  EXPECT_EQ(found.effects[0].effect.at, "joint2");
-  EXPECT_EQ(found.effects[0].title, "encoder scale that grows with the temperature");
-  EXPECT_NEAR(found.effects[0].effect.values[0], growth, 4.0 * found.effects[0].parameters[0].standard_error);
+  ASSERT_EQ(found.effects.size(), 2U) << testing::PrintToString(labels(found));
+  const auto named = [&](const std::string& type) -> const FoundEffect& {
+    return *std::ranges::find(found.effects, type, [](const FoundEffect& one) { return one.effect.type; });
+  };
+  ASSERT_EQ(labels(found)[0], "joint_gain@joint2");
+  ASSERT_TRUE(labels(found)[1].starts_with("warm_gain@joint2[")) << labels(found)[1];
+  const FoundEffect& warm = named("warm_gain");
+  EXPECT_TRUE(warm.confirmed);
+  EXPECT_EQ(warm.title, "encoder scale that grows with the temperature");
+  EXPECT_NEAR(warm.effect.values[0], growth, 4.0 * warm.parameters[0].standard_error);
+  const FoundEffect& gain = named("joint_gain");
+  EXPECT_NEAR(gain.effect.values[0], growth * (warm.effect.constants[0] - 20.0),
+              4.0 * gain.parameters[0].standard_error);
 }
 
 TEST(ToyEffect, IsSavedAndReadAgain) {
