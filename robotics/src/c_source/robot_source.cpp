@@ -96,7 +96,7 @@ std::vector<Eigen::Index> drives_of(const Chain& chain) {
   return drives;
 }
 
-// How joints follow the values of the drives, and the limits that this leaves to those.
+// Tables in C of the joints that follow drives, and of the limits that this leaves to the drives.
 std::string drive_tables(const Chain& chain) {
   const std::vector<Eigen::Index> drives = drives_of(chain);
   const std::vector<Follower> followers = followers_of(chain);

@@ -1,4 +1,4 @@
-// Which parameters of a robot moved.
+// The search for the parameters of a robot that moved.
 #pragma once
 
 #include <string>

@@ -47,7 +47,7 @@ CorrectedRobot registered(CorrectedRobot robot, const Measurements& measurements
 }
 
 double mean_distance(double noise_mm, const Measurements& measurements) {
-  // Of normal noise in one, two, three coordinates.
+  // Mean lengths of normal noise in one, two, three coordinates.
   constexpr double factors[] = {0.797885, 1.253314, 1.595769};
   return noise_mm * factors[std::ranges::count(measurements.measured, true) - 1];
 }
@@ -96,7 +96,7 @@ std::vector<Eigen::Index> columns_of(const Robot& robot) {
   return columns;
 }
 
-// Of any session, and of any target: "base@tuesday.x" belongs to a base.
+// Bases of any session, and of any target: "base@tuesday.x" belongs to a base.
 bool is_of_base(const std::string& name) { return name.starts_with("base.") || name.starts_with("base@"); }
 
 bool is_turn_of_tool(const std::string& name) {
@@ -128,7 +128,8 @@ std::vector<Suspect> suspects_of(const std::vector<discovery::Parameter>& parame
   return all;
 }
 
-// Of the calibrated values over their scales; columns of `nuisance` count as exact, for they are fitted anew.
+// The covariance of the calibrated values over their scales; columns of `nuisance` count as exact, for they are fitted
+// anew.
 Eigen::MatrixXd covariance_of(const Robot& robot, const std::vector<discovery::Parameter>& parameters,
                               const std::vector<Eigen::Index>& nuisance) {
   std::vector<Eigen::Index> place;

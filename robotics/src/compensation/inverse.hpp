@@ -16,7 +16,7 @@ struct Goal {
   std::optional<Eigen::Matrix3d> rotation;
 };
 
-/// What is missing: position in mm, rotation vector in rad times `lever` mm. 3 or 6 numbers.
+/// The difference of goal and pose: position in mm, rotation vector in rad times `lever` mm. 3 or 6 numbers.
 Eigen::VectorXd missing(const Goal& goal, const Pose& pose, double lever_mm);
 
 class Inverse {
@@ -36,7 +36,7 @@ class Inverse {
 
   Eigen::VectorXd within_limits(const Eigen::VectorXd& q) const;
 
-  /// Of the joints that stand at a limit.
+  /// Numbers of the joints that stand at a limit.
   std::vector<std::size_t> at_limits(const Eigen::VectorXd& q) const;
 
   /// The same with one joint kept at a value.

@@ -84,7 +84,7 @@ void read_own_term(YamlMap map, EffectType& type) {
   type.parameters.push_back(std::move(parameter));
 }
 
-// Of an arm with more joints than any: mistakes in the expressions show here, those in joint numbers at the robot.
+// A chain with more joints than any arm: mistakes in expressions show here, those in joint numbers at the robot.
 Chain longest_arm() {
   Chain any;
   for (int j = 1; j <= 99; ++j) any.joints.emplace_back().name = fmt::format("joint{}", j);

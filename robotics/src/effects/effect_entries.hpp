@@ -73,7 +73,7 @@ inline bool is_prismatic(const Chain& chain, std::size_t joint) {
   return chain.joints[joint].type == JointType::prismatic;
 }
 
-/// What gravity does to a joint: its torque in N m, or its force in N for a prismatic joint.
+/// Gravity's torque about a joint in N m, or its force along a prismatic joint in N.
 inline double gravity_load(const PoseContext& pose, std::size_t joint) {
   const Load& load = pose.load[joint];
   return pose.skeleton.joint_axis[joint].dot(is_prismatic(pose.chain, joint) ? load.force_N : load.moment_Nm);

@@ -39,7 +39,7 @@ std::string place_refusal(const EffectType& type, const Chain& chain, std::size_
   return type.refusal ? type.refusal(chain, index, constants) : "";
 }
 
-// What a term is multiplied with has the unit of what it acts on, as if the expression had none.
+// A coefficient has the unit of what its term acts on, as if the expression had none.
 std::vector<EffectParameter> formula_parameters(const EffectParameter& usual, const Formula& formula, bool slides) {
   std::vector<EffectParameter> all;
   for (const FormulaTerm& term : formula.terms) {

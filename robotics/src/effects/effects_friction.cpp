@@ -93,7 +93,7 @@ std::vector<std::vector<double>> presliding_to_try(const TrialContext&, std::siz
   return {{0.005}, {0.015}, {0.04}, {0.1}, {0.3}};
 }
 
-// Where the approach is known, it belongs to the move: without it the width would be too small.
+// A known approach belongs to the move: without it the width of the hysteresis would be too small.
 bool has_no_approach(const TrialContext& context, std::size_t index) {
   return !context.covariates.contains(with_joint_number("dir{}", index));
 }

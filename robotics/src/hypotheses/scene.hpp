@@ -1,4 +1,4 @@
-// What hypotheses are made for, and the residuals as seen by one joint.
+// The robot, poses and residuals that hypotheses are made for, and the residuals as seen by one joint.
 #pragma once
 
 #include <array>
@@ -8,7 +8,7 @@
 
 namespace llmt::robotics {
 
-/// What hypotheses are made for.
+/// The robot, poses and residuals that hypotheses are made for.
 struct Scene {
   const Robot& robot;  ///< at the current estimates
   const Poses& poses;

@@ -1,4 +1,4 @@
-// What the checks of a description share with its readers.
+// Checks of a description that its readers share.
 #pragma once
 
 #include <cstddef>

@@ -56,10 +56,10 @@ class Header {
 
   const std::vector<std::string>& unused() const { return unused_; }
 
-  /// What columns that are not used look like, in sentences.
+  /// Sentences on what the columns that are not used look like.
   std::vector<std::string> hints() const;
 
-  /// What keeps the columns of an orientation from being one, in words; empty if nothing does.
+  /// The reason why the columns of an orientation are none, in words; empty if they are one.
   std::string lack_of_orientation() const;
 
  private:

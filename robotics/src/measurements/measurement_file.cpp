@@ -17,7 +17,7 @@ namespace {
 // "sphere" of a known sphere, too.
 std::string column_of_feature(const std::string& feature) { return feature.substr(feature.rfind(' ') + 1); }
 
-// Which of the robot's frames a name of the file stands for: the frame of that name, or the chain's own where that has
+// The robot's frame that a name of the file stands for: the frame of that name, or the chain's own where that has
 // this name or none yet, or else one that calibration is to add.
 class FrameNames {
  public:

@@ -1,4 +1,4 @@
-// What the rows of a table of measurements have seen.
+// The sightings in the rows of a table of measurements.
 #pragma once
 
 #include <Eigen/Core>

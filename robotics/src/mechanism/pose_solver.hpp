@@ -9,7 +9,7 @@
 
 namespace llmt::robotics {
 
-/// Which coordinates of a pose are what.
+/// The kinds of a pose's coordinates.
 struct PoseKinds {
   std::vector<Eigen::Index> unknown;  ///< not measured
   std::vector<Eigen::Index> noisy;    ///< measured, with noise

@@ -1,4 +1,4 @@
-// What the poses of an arm say about its parameters.
+// The information that the poses of an arm have about its parameters.
 #pragma once
 
 #include <vector>

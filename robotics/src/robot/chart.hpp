@@ -1,4 +1,4 @@
-// What an instrument reads of a tool pose.
+// The reading that an instrument takes of a tool pose.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,4 +1,4 @@
-// What the checks of a robot share with its reader.
+// Checks of a robot that its reader shares.
 #pragma once
 
 #include <cstddef>
