@@ -85,7 +85,7 @@ Json folds_json(const robotics::Robot& robot, const robotics::Measurements& data
 // easily taken for effects.
 void warn_of_misfit(const robotics::Robot& robot, const robotics::Measurements& data) {
   const robotics::CalibrationReport calibrated = robotics::report_calibration(robot, data, {.folds = 0});
-  for (const std::string& suspicion : robotics::suspicions(robot, data, calibrated)) warn("WARNING: " + suspicion);
+  for (const std::string& mistake : robotics::input_mistakes(robot, data, calibrated)) warn("WARNING: " + mistake);
 }
 
 // discover(); where it refuses the measurements, what looks wrong with them is said first.

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "calibration/likely_mistake.hpp"
+#include "calibration/input_mistakes.hpp"
 #include "llmt/statistics.hpp"
 
 namespace llmt::robotics {
@@ -154,8 +154,8 @@ bool is_implausible(const Robot& nominal, const CalibrationReport& report) {
   return median(report.geometric.in_sample_mm) > implausible_share * length_of(nominal.chain);
 }
 
-std::vector<std::string> suspicions(const Robot& robot, const Measurements& measurements,
-                                    const CalibrationReport& report) {
+std::vector<std::string> input_mistakes(const Robot& robot, const Measurements& measurements,
+                                        const CalibrationReport& report) {
   std::vector<std::string> found;
   const double length_mm = length_of(robot.chain);
   for (std::size_t j = 0; j < robot.chain.joints.size(); ++j) {
@@ -202,14 +202,14 @@ std::vector<std::string> suspicions(const Robot& robot, const Measurements& meas
                     nominal));
   }
   if (has_wrong_orientations(report)) {
-    const std::string likely = likely_orientation_mistake(robot, measurements);
+    const std::string likely = orientation_mistake(robot, measurements);
     found.push_back(fmt::format("the calibrated robot turns its tool by {:.3g} mrad otherwise than was measured{}",
                                 report.geometric.in_sample_mrad.mean(),
                                 likely.empty() ? ": is the quaternion w, x, y, z, is the convention of angles right?"
                                                : "; most likely " + likely));
   }
   if (nominal > implausible_mm) {
-    const std::string units = likely_mistake(robot, measurements, implausible_mm);
+    const std::string units = input_mistake(robot, measurements, implausible_mm);
     if (!units.empty()) found.push_back(units);
   }
   return found;

@@ -7,7 +7,8 @@
 
 namespace llmt::robotics {
 
-void correct_rest(const Measurements& searched, std::uint64_t seed, Work& work, Discovery& result) {
+void add_correction(const Measurements& searched, std::uint64_t seed, Work& work, CorrectedRobot& improved,
+                    std::vector<std::string>& notes) {
   constexpr Eigen::Index fewest = 100;
   constexpr int folds = 5;
   constexpr double share_of_fits = 0.9;
@@ -16,7 +17,7 @@ void correct_rest(const Measurements& searched, std::uint64_t seed, Work& work, 
   fitting.validity = ValidityChoice::crisp;
   fitting.intervals = false;
   fitting.folds.seed = seed;
-  const Robot& robot = result.improved.robot;
+  const Robot& robot = improved.robot;
   const auto tree_of_rest = [&, share = share_of_fits * work.left() / (folds + 1)](const Measurements& trained) {
     Work part(work, share);
     fitting.progress = part.progress();
@@ -35,14 +36,14 @@ void correct_rest(const Measurements& searched, std::uint64_t seed, Work& work, 
     with(fold.held_out) = distances(positions(trained, held_out.poses), held_out);
   }
   if (!paired_difference(without, with).is_beyond_chance()) {
-    result.notes.push_back(
+    notes.push_back(
         fmt::format("A tree of the rest does not help: {:.4f} mm without, {:.4f} with it on poses left out.",
                     without.mean(), with.mean()));
     return;
   }
-  result.improved.correction = tree_of_rest(searched);
-  result.notes.push_back(fmt::format("A tree of the rest lowers the error on poses left out from {:.4f} to {:.4f} mm.",
-                                     without.mean(), with.mean()));
+  improved.correction = tree_of_rest(searched);
+  notes.push_back(fmt::format("A tree of the rest lowers the error on poses left out from {:.4f} to {:.4f} mm.",
+                              without.mean(), with.mean()));
 }
 
 }  // namespace llmt::robotics

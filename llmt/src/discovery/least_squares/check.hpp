@@ -1,4 +1,4 @@
-// What solve() refuses.
+// The problems that solve() refuses.
 #pragma once
 
 #include <string>

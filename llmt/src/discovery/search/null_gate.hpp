@@ -1,4 +1,4 @@
-// What chance alone gains.
+// The score that chance alone gains.
 #pragma once
 
 #include "discovery/search/scoring.hpp"

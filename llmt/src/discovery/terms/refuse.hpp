@@ -1,5 +1,5 @@
 /// \file
-/// How a caller's mistake is reported.
+/// The exception for a caller's mistake.
 #pragma once
 
 #include <stdexcept>

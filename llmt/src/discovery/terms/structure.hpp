@@ -1,4 +1,4 @@
-// Whether residuals that should be noise still depend on something.
+// Tests of residuals that should be noise: do they still depend on inputs?
 #pragma once
 
 #include <Eigen/Core>

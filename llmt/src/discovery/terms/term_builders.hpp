@@ -1,4 +1,4 @@
-// How the library's terms are put together.
+// The parts that the library's terms are made of.
 #pragma once
 
 #include <functional>

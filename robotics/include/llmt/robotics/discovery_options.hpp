@@ -1,5 +1,5 @@
 /// \file
-/// What a discovery looks for, and how.
+/// The options of a discovery.
 ///
 ///     DiscoveryOptions options;
 ///     options.held_out_share = 0.3;

@@ -1,4 +1,4 @@
-#include "discovery/noise_tests.hpp"
+#include "discovery/residual_tests.hpp"
 
 #include <fmt/format.h>
 
@@ -22,10 +22,10 @@ constexpr int draws = 200;
 constexpr double surprising = 4.5;   // standard deviations
 constexpr Eigen::Index fewest = 20;  // samples to test
 
-// Residual vectors, one a row, and what the fit makes of vectors that it is given.
+// Residual vectors, one a row, and the part of other vectors that the same fit would leave.
 struct Residuals {
   Eigen::MatrixXd vectors;  // n x d
-  Eigen::MatrixXd basis;    // n d x rank: what the fit absorbs
+  Eigen::MatrixXd basis;    // n d x rank, orthonormal: the range of the Jacobian
   Eigen::Index count() const { return vectors.rows(); }
   Eigen::Index components() const { return vectors.cols(); }
 
@@ -37,7 +37,7 @@ struct Residuals {
   }
 };
 
-// Poses that were measured several times count once: what they have in common need not be noise.
+// Poses that were measured several times count once: the common part of repeats need not be noise.
 Measurements once_each(const Measurements& measurements) {
   const std::vector<Eigen::Index> repeats = repeats_of(measurements.poses);
   if (repeats.empty()) return measurements;
@@ -108,7 +108,7 @@ std::vector<Eigen::Matrix3d> instrument_axes(const Measurements& measurements) {
   return turned;
 }
 
-// Whether there are distances and directions from an instrument.
+// True if the positions come with distances and directions from an instrument.
 bool has_polar_axes(const Residuals& residuals, const Measurements& measurements) {
   return residuals.components() == 3 && has_instrument(measurements.poses);
 }
@@ -145,8 +145,8 @@ double share_along(const Eigen::MatrixXd& vectors, const Eigen::MatrixXd& units)
   return vectors.cwiseProduct(units).rowwise().sum().squaredNorm() / vectors.squaredNorm();
 }
 
-std::optional<NoNoise> test_directions(const Residuals& residuals, const Calibration& fitted,
-                                       const Measurements& measurements, Random& random) {
+std::optional<ResidualStructure> test_directions(const Residuals& residuals, const Calibration& fitted,
+                                                 const Measurements& measurements, Random& random) {
   const std::vector<Joint>& joints = fitted.robot.chain.joints;
   std::vector<Eigen::MatrixXd> units;
   for (std::size_t j = 0; j < joints.size(); ++j) units.push_back(motions(fitted.robot, measurements, j));
@@ -169,9 +169,10 @@ std::optional<NoNoise> test_directions(const Residuals& residuals, const Calibra
   const auto worst = std::ranges::max_element(smallest);
   if (*worst < surprising) return std::nullopt;
   const std::size_t j = worst - smallest.begin();
-  return NoNoise{joints[j].name, fmt::format("{:.0f} % of the square of what is left lies along the motion of {}: an "
-                                             "instrument scatters in all directions, a joint in one",
-                                             100.0 * share_along(residuals.vectors, units[j]), joints[j].name)};
+  return ResidualStructure{joints[j].name,
+                           fmt::format("{:.0f} % of the square of what is left lies along the motion of {}: an "
+                                       "instrument scatters in all directions, a joint in one",
+                                       100.0 * share_along(residuals.vectors, units[j]), joints[j].name)};
 }
 
 // Sum of products of neighbours in the order given.
@@ -206,8 +207,8 @@ const Eigen::VectorXd* session_order(const Poses& poses) {
   return nullptr;
 }
 
-std::optional<NoNoise> test_neighbours(const Residuals& residuals, const Calibration& fitted,
-                                       const Measurements& measurements, Random& random) {
+std::optional<ResidualStructure> test_neighbours(const Residuals& residuals, const Calibration& fitted,
+                                                 const Measurements& measurements, Random& random) {
   // A single long vector would decide the sum.
   Eigen::MatrixXd vectors = residuals.vectors;
   const double longest = 3.0 * std::sqrt(vectors.squaredNorm() / static_cast<double>(vectors.rows()));
@@ -217,8 +218,9 @@ std::optional<NoNoise> test_neighbours(const Residuals& residuals, const Calibra
   const Eigen::VectorXd* order = session_order(measurements.poses);
   const Eigen::VectorXd rows = Eigen::VectorXd::LinSpaced(vectors.rows(), 0.0, 1.0);
   if (neighbours_are_alike(vectors, order != nullptr ? *order : rows, random)) {
-    return NoNoise{"session", fmt::format("what is left is alike in neighbours by {}: something changes slowly",
-                                          order != nullptr ? "order of measuring" : "row of the file")};
+    return ResidualStructure{"session",
+                             fmt::format("what is left is alike in neighbours by {}: something changes slowly",
+                                         order != nullptr ? "order of measuring" : "row of the file")};
   }
   if (has_polar_axes(residuals, measurements)) {
     const std::vector<Eigen::Matrix3d> axes = instrument_axes(measurements);
@@ -233,16 +235,17 @@ std::optional<NoNoise> test_neighbours(const Residuals& residuals, const Calibra
          {"distance", p.rowwise().norm()}}};
     for (const auto& [name, input] : inputs) {
       if (!neighbours_are_alike(local, input, random)) continue;
-      return NoNoise{"instrument", fmt::format("what is left is alike where the {} from the origin is alike", name)};
+      return ResidualStructure{"instrument",
+                               fmt::format("what is left is alike where the {} from the origin is alike", name)};
     }
   }
   for (std::size_t j = 0; j < fitted.robot.chain.joints.size(); ++j) {
     const Eigen::MatrixXd along = vectors.cwiseProduct(motions(fitted.robot, measurements, j)).rowwise().sum();
     for (Eigen::Index input = 0; input < measurements.poses.joints.cols(); ++input) {
       if (!neighbours_are_alike(along, measurements.poses.joints.col(input), random)) continue;
-      return NoNoise{fitted.robot.chain.joints[j].name,
-                     fmt::format("what is left along the motion of {} is alike where q{} is alike",
-                                 fitted.robot.chain.joints[j].name, input + 1)};
+      return ResidualStructure{fitted.robot.chain.joints[j].name,
+                               fmt::format("what is left along the motion of {} is alike where q{} is alike",
+                                           fitted.robot.chain.joints[j].name, input + 1)};
     }
   }
   return std::nullopt;
@@ -250,21 +253,21 @@ std::optional<NoNoise> test_neighbours(const Residuals& residuals, const Calibra
 
 }  // namespace
 
-std::optional<NoNoise> no_noise(const Calibration& fitted, const Measurements& measurements,
-                                const std::vector<std::size_t>& skipped, std::uint64_t seed) {
+std::optional<ResidualStructure> find_structure(const Calibration& fitted, const Measurements& measurements,
+                                                const std::vector<std::size_t>& skipped, std::uint64_t seed) {
   const Measurements seen = without_rows(measurements, skipped);
-  // Where orientations were read, the points are tested.
+  // Orientations are not tested, only points.
   const Measurements kept =
       once_each(orientation_rows(seen.poses).empty() ? seen : select(seen, position_rows(seen.poses)));
   if (kept.count() < fewest) return std::nullopt;
   const Residuals residuals = residuals_of(fitted, kept);
   if (!(residuals.vectors.squaredNorm() > 0.0)) return std::nullopt;
   Random random(seed);
-  if (std::optional<NoNoise> fault = test_directions(residuals, fitted, kept, random)) return fault;
+  if (std::optional<ResidualStructure> fault = test_directions(residuals, fitted, kept, random)) return fault;
   return test_neighbours(residuals, fitted, kept, random);
 }
 
-double tail_of(const Eigen::VectorXd& lengths, Eigen::Index components) {
+double tail_weight(const Eigen::VectorXd& lengths, Eigen::Index components) {
   const double typical = median(lengths);
   const auto d = static_cast<double>(components);
   // Median of chi-squared with d degrees of freedom, Wilson and Hilferty.

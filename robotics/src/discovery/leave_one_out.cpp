@@ -1,4 +1,4 @@
-#include "discovery/left_out.hpp"
+#include "discovery/leave_one_out.hpp"
 
 #include <Eigen/Cholesky>
 #include <Eigen/QR>
@@ -9,7 +9,7 @@
 
 namespace llmt::robotics {
 
-Eigen::VectorXd left_out(const Eigen::MatrixXd& used, const Eigen::VectorXd& errors, Eigen::Index d) {
+Eigen::VectorXd leave_one_out_distances(const Eigen::MatrixXd& used, const Eigen::VectorXd& errors, Eigen::Index d) {
   Eigen::VectorXd lengths(errors.size() / d);
   for (Eigen::Index i = 0; i < lengths.size(); ++i) {
     const auto columns = used.middleCols(i * d, d);
@@ -21,13 +21,13 @@ Eigen::VectorXd left_out(const Eigen::MatrixXd& used, const Eigen::VectorXd& err
   return lengths;
 }
 
-Eigen::VectorXd left_out(const Calibration& fitted, const Measurements& measurements,
-                         const std::vector<std::size_t>& skipped) {
+Eigen::VectorXd leave_one_out_distances(const Calibration& fitted, const Measurements& measurements,
+                                        const std::vector<std::size_t>& skipped) {
   const Measurements kept = without_rows(measurements, skipped);
   const std::vector<Eigen::Index> free = freed_parameters(fitted.robot);
   const std::vector<Eigen::Index> rows = measured_rows(kept);
   Eigen::MatrixXd jacobian = position_jacobian(fitted.robot, kept.poses, free)(rows, Eigen::all);
-  constexpr double nothing = 1e-7;  // rounding, next to what the others move
+  constexpr double nothing = 1e-7;  // of the longest column: rounding
   const double least = jacobian.cols() > 0 ? nothing * jacobian.colwise().norm().maxCoeff() : 0.0;
   for (auto column : jacobian.colwise()) {
     column *= column.norm() > least ? 1.0 / column.norm() : 0.0;
@@ -41,7 +41,8 @@ Eigen::VectorXd left_out(const Calibration& fitted, const Measurements& measurem
   for (Eigen::Index k = 0; k < errors.size(); ++k) {
     errors(k) = kept.positions_mm(rows[k] / 3, rows[k] % 3) - model(rows[k] / 3, rows[k] % 3);
   }
-  const Eigen::VectorXd seen = left_out(basis.transpose(), errors, std::ranges::count(kept.measured, true));
+  const Eigen::VectorXd seen =
+      leave_one_out_distances(basis.transpose(), errors, std::ranges::count(kept.measured, true));
   Eigen::VectorXd all = distances(positions(fitted.robot, measurements.poses), measurements);
   Eigen::Index next = 0;
   for (Eigen::Index i = 0; i < all.size(); ++i) {

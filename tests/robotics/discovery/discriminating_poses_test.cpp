@@ -1,4 +1,4 @@
-#include "llmt/robotics/telling_poses.hpp"
+#include "llmt/robotics/discriminating_poses.hpp"
 
 #include <gtest/gtest.h>
 
@@ -58,12 +58,12 @@ double missed_mm(const Robot& robot, const std::vector<Effect>& rival, const Pos
   return (truth - columns * decomposition.solve(truth)).norm();
 }
 
-Poses poses_of(const Telling& telling) {
+Poses poses_of(const Discrimination& telling) {
   Poses poses;
   poses.joints.resize(std::ssize(telling.poses), telling.poses.front().joints.size());
   Eigen::VectorXd payload(std::ssize(telling.poses));
   for (Eigen::Index i = 0; i < payload.size(); ++i) {
-    const TellingPose& pose = telling.poses[i];
+    const DiscriminatingPose& pose = telling.poses[i];
     poses.joints.row(i) = pose.joints.transpose();
     payload(i) = pose.payload_kg;
   }
@@ -72,14 +72,14 @@ Poses poses_of(const Telling& telling) {
 }
 
 // With one payload, bending of the last link and a soft joint before it are the same function of the pose.
-TEST(TellingPoses, AnotherPayloadTellsBendingFromASoftJoint) {
+TEST(DiscriminatingPoses, AnotherPayloadTellsBendingFromASoftJoint) {
   const Poses measured = measured_with_payload(10.0);
-  const Telling telling = telling_poses(bent_outer_link(), 0, soft_elbow, measured, 0.005);
+  const Discrimination telling = discriminating_poses(bent_outer_link(), 0, soft_elbow, measured, 0.005);
   EXPECT_FALSE(telling.none_can);
   EXPECT_TRUE(telling.payload_helps);
   EXPECT_DOUBLE_EQ(telling.noise_mm, 0.005);
   ASSERT_FALSE(telling.poses.empty());
-  for (const TellingPose& pose : telling.poses) {
+  for (const DiscriminatingPose& pose : telling.poses) {
     EXPECT_DOUBLE_EQ(pose.payload_kg, 0.0);
     EXPECT_GT(pose.disagreement_mm, 0.005);
     EXPECT_LE(std::abs(pose.joints(0)), 90.0 * degree);
@@ -92,13 +92,13 @@ TEST(TellingPoses, AnotherPayloadTellsBendingFromASoftJoint) {
   EXPECT_NEAR(telling.poses.front().disagreement_mm, rival - 7.5e-3 * weight / 8.0, 0.003);
 }
 
-TEST(TellingPoses, ProposedPosesTellMoreThanRandomOnes) {
+TEST(DiscriminatingPoses, ProposedPosesTellMoreThanRandomOnes) {
   const Poses measured = measured_with_payload(10.0);
-  const Telling telling = telling_poses(bent_outer_link(), 0, soft_elbow, measured, 1e-4);
+  const Discrimination telling = discriminating_poses(bent_outer_link(), 0, soft_elbow, measured, 1e-4);
   ASSERT_EQ(telling.poses.size(), 5U);
   const double proposed = missed_mm(bent_outer_link(), soft_elbow, joined(measured, poses_of(telling)));
   double sum = 0.0;
-  for (const TellingPose& pose : telling.poses) sum += pose.disagreement_mm * pose.disagreement_mm;
+  for (const DiscriminatingPose& pose : telling.poses) sum += pose.disagreement_mm * pose.disagreement_mm;
   EXPECT_NEAR(proposed, std::sqrt(sum), 0.02 * proposed);
   for (std::uint64_t seed = 10; seed < 30; ++seed) {
     for (const double payload : {0.0, 10.0}) {
@@ -109,19 +109,19 @@ TEST(TellingPoses, ProposedPosesTellMoreThanRandomOnes) {
   }
 }
 
-TEST(TellingPoses, MeasuredPayloadsAreNotCalledNew) {
+TEST(DiscriminatingPoses, MeasuredPayloadsAreNotCalledNew) {
   Poses measured = measured_with_payload(10.0);
   measured.covariates["payload_kg"].head(20).setZero();
-  const Telling telling = telling_poses(bent_outer_link(), 0, soft_elbow, measured, 1e-3);
+  const Discrimination telling = discriminating_poses(bent_outer_link(), 0, soft_elbow, measured, 1e-3);
   EXPECT_FALSE(telling.payload_helps);
 }
 
-TEST(TellingPoses, ExactAliasIsTold) {
+TEST(DiscriminatingPoses, ExactAliasIsTold) {
   const Robot robot = with_effect(ur_like(), effect("eccentricity", "joint2", {2e-4, -1e-4}));
   const std::vector<Effect> spring = {effect("counterbalance_spring", "joint2", {0.0, 0.0}, {0.0, 0.0})};
   const Poses measured = random_poses(robot.chain, 60, 5);
   for (const double noise : {0.0, 0.001}) {
-    const Telling telling = telling_poses(robot, 0, spring, measured, noise);
+    const Discrimination telling = discriminating_poses(robot, 0, spring, measured, noise);
     EXPECT_TRUE(telling.none_can);
     EXPECT_FALSE(telling.payload_helps);
     EXPECT_TRUE(telling.poses.empty());
@@ -129,58 +129,60 @@ TEST(TellingPoses, ExactAliasIsTold) {
   // Still one where the measured poses leave the rival undetermined, so that a plain fit would miss elsewhere.
   Poses still = measured;
   still.joints.col(1).setConstant(0.3);
-  EXPECT_TRUE(telling_poses(robot, 0, spring, still, 0.001).none_can);
+  EXPECT_TRUE(discriminating_poses(robot, 0, spring, still, 0.001).none_can);
 }
 
-TEST(TellingPoses, RivalWithoutSignatureDisagreesAndNoEffectDoesNot) {
+TEST(DiscriminatingPoses, RivalWithoutSignatureDisagreesAndNoEffectDoesNot) {
   const Poses measured = measured_with_payload(10.0);
   Robot weightless = bent_outer_link();
   weightless.chain.gravity_m_s2.setZero();
-  EXPECT_TRUE(telling_poses(weightless, 0, soft_elbow, measured, 0.001).none_can);
+  EXPECT_TRUE(discriminating_poses(weightless, 0, soft_elbow, measured, 0.001).none_can);
   const Robot eccentric = with_effect(weightless, effect("eccentricity_twice", "joint2", {1e-3, 0.0}));
-  const Telling telling = telling_poses(eccentric, 1, soft_elbow, measured, 0.001, 3);
+  const Discrimination telling = discriminating_poses(eccentric, 1, soft_elbow, measured, 0.001, 3);
   EXPECT_EQ(telling.poses.size(), 3U);
   EXPECT_FALSE(telling.payload_helps);
 }
 
-TEST(TellingPoses, PrismaticJointWithoutLimitsStaysWhereItWas) {
+TEST(DiscriminatingPoses, PrismaticJointWithoutLimitsStaysWhereItWas) {
   Robot robot = weighted(scara());
   robot.effects = {effect("eccentricity_twice", "joint2", {1e-3, 0.0})};
   const Poses measured = random_poses(robot.chain, 40, 2);
-  const Telling telling = telling_poses(robot, 0, {effect("joint_gain", "joint2", {0.0})}, measured, 0.001);
+  const Discrimination telling =
+      discriminating_poses(robot, 0, {effect("joint_gain", "joint2", {0.0})}, measured, 0.001);
   ASSERT_FALSE(telling.poses.empty());
-  for (const TellingPose& pose : telling.poses) {
+  for (const DiscriminatingPose& pose : telling.poses) {
     EXPECT_GE(pose.joints(2), measured.joints.col(2).minCoeff());
     EXPECT_LE(pose.joints(2), measured.joints.col(2).maxCoeff());
   }
 }
 
-TEST(TellingPoses, ConditionsAreThoseOfTheEffects) {
+TEST(DiscriminatingPoses, ConditionsAreThoseOfTheEffects) {
   const Robot robot = with_effect(weighted(ur_like()), effect("backlash_approach", "joint2", {2e-4}));
   const Poses measured = furnished_poses(robot.chain, 60, 4);
-  const Telling telling = telling_poses(robot, 0, {effect("backlash_gravity", "joint2", {0.0})}, measured, 0.001, 2);
+  const Discrimination telling =
+      discriminating_poses(robot, 0, {effect("backlash_gravity", "joint2", {0.0})}, measured, 0.001, 2);
   ASSERT_FALSE(telling.poses.empty());
   ASSERT_EQ(telling.poses.front().conditions.size(), 1U);
   EXPECT_EQ(std::abs(telling.poses.front().conditions.at("dir2")), 1.0);
 }
 
 // The lost coordinate would have told.
-TEST(TellingPoses, OnlyMeasuredAxesCount) {
+TEST(DiscriminatingPoses, OnlyMeasuredAxesCount) {
   const Robot robot = with_effect(rigid_planar(), effect("eccentricity_twice", "joint2", {1e-3, 0.0}));
   const Poses measured = measured_with_payload(10.0);
-  EXPECT_FALSE(telling_poses(robot, 0, soft_elbow, measured, 0.001, 1, 1, {true, true, false}).none_can);
-  EXPECT_TRUE(telling_poses(robot, 0, soft_elbow, measured, 0.001, 1, 1, {false, false, true}).none_can);
+  EXPECT_FALSE(discriminating_poses(robot, 0, soft_elbow, measured, 0.001, 1, 1, {true, true, false}).none_can);
+  EXPECT_TRUE(discriminating_poses(robot, 0, soft_elbow, measured, 0.001, 1, 1, {false, false, true}).none_can);
 }
 
-TEST(TellingPoses, RefusesNonsense) {
+TEST(DiscriminatingPoses, RefusesNonsense) {
   const Poses measured = measured_with_payload(10.0);
   const Robot robot = bent_outer_link();
-  EXPECT_THROW(telling_poses(robot, 1, soft_elbow, measured, 0.01), std::invalid_argument);
-  EXPECT_THROW(telling_poses(robot, 0, soft_elbow, select(measured, {}), 0.01), std::invalid_argument);
-  EXPECT_THROW(telling_poses(robot, 0, soft_elbow, measured, -1.0), std::invalid_argument);
-  EXPECT_THROW(telling_poses(robot, 0, soft_elbow, measured, std::numeric_limits<double>::quiet_NaN()),
+  EXPECT_THROW(discriminating_poses(robot, 1, soft_elbow, measured, 0.01), std::invalid_argument);
+  EXPECT_THROW(discriminating_poses(robot, 0, soft_elbow, select(measured, {}), 0.01), std::invalid_argument);
+  EXPECT_THROW(discriminating_poses(robot, 0, soft_elbow, measured, -1.0), std::invalid_argument);
+  EXPECT_THROW(discriminating_poses(robot, 0, soft_elbow, measured, std::numeric_limits<double>::quiet_NaN()),
                std::invalid_argument);
-  EXPECT_THROW(telling_poses(robot, 0, soft_elbow, measured, 0.01, 0), std::invalid_argument);
+  EXPECT_THROW(discriminating_poses(robot, 0, soft_elbow, measured, 0.01, 0), std::invalid_argument);
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "calibration/likely_mistake.hpp"
+#include "calibration/input_mistakes.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -151,7 +151,7 @@ double misfit_of(Robot robot, const Measurements& table) {
 
 }  // namespace
 
-std::string likely_mistake(const Robot& robot, const Measurements& measurements, double plausible_mm) {
+std::string input_mistake(const Robot& robot, const Measurements& measurements, double plausible_mm) {
   constexpr double far_better = 0.1;
   constexpr double of_spread = 0.05;
   const Measurements table = some_of(measurements);
@@ -175,7 +175,7 @@ std::string likely_mistake(const Robot& robot, const Measurements& measurements,
                      best->words, smallest, misfit_mm);
 }
 
-std::string likely_orientation_mistake(const Robot& robot, const Measurements& measurements) {
+std::string orientation_mistake(const Robot& robot, const Measurements& measurements) {
   constexpr double plausible_rad = 0.05;
   const std::vector<Eigen::Index> turned = orientation_rows(measurements.poses);
   Robot placed = robot;

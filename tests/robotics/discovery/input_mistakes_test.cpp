@@ -1,9 +1,7 @@
-// What the user got wrong, or did not cover, is said beside what was found.
+// Likely mistakes of the user, and poses that the data do not cover, are noted beside what was found.
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cmath>
-#include <numbers>
 
 #include "llmt/robotics/discovery.hpp"
 #include "llmt/robotics/robot_file.hpp"
@@ -30,7 +28,7 @@ Measurements seen(const Robot& truth, std::uint64_t seed) {
 
 constexpr const char* about_gravity = "is gravity_m_s2 of the description right";
 
-TEST(Doubts, GravityAlongAnotherAxisIsGuessed) {
+TEST(InputMistakes, GravityAlongAnotherAxisIsGuessed) {
   Robot on_a_wall = soft(arm());
   on_a_wall.chain.gravity_m_s2 = {-9.81, 0.0, 0.0};
   const Discovery wrong = discover(arm(), seen(on_a_wall, 1), {}, {.correct = false});
@@ -41,7 +39,7 @@ TEST(Doubts, GravityAlongAnotherAxisIsGuessed) {
   EXPECT_FALSE(mentions(right, about_gravity));
 }
 
-TEST(Doubts, PayloadsInGramsAreGuessed) {
+TEST(InputMistakes, PayloadsInGramsAreGuessed) {
   Measurements measurements = seen(soft(arm()), 2);
   measurements.poses.covariates["payload_kg"] = Eigen::VectorXd::LinSpaced(120, 0.0, 120.0);
   EXPECT_FALSE(mentions(discover(arm(), measurements, {}, {.correct = false}), "in grams"));
@@ -51,7 +49,7 @@ TEST(Doubts, PayloadsInGramsAreGuessed) {
 
 // Noise puts one effect in twenty beyond two standard errors of nothing: three or more of ten are left unsaid in one
 // test of ninety.
-TEST(Doubts, AnEffectThatTheDataDenyIsNamed) {
+TEST(InputMistakes, AnEffectThatTheDataDenyIsNamed) {
   Robot described = soft(arm());
   described.effects.push_back({"backlash_approach", "joint1", {1e-4}});
   const Robot truth = soft(arm());
@@ -66,7 +64,7 @@ TEST(Doubts, AnEffectThatTheDataDenyIsNamed) {
   EXPECT_GE(said, 8);
 }
 
-TEST(Doubts, TestPosesBeyondTheJointRangesSearchedAreCounted) {
+TEST(InputMistakes, TestPosesBeyondTheJointRangesSearchedAreCounted) {
   Robot narrow = soft(arm());
   narrow.chain.joints[1].limits = {{-20.0, 0.0}};
   const Measurements searched = seen(narrow, 4);
@@ -74,28 +72,6 @@ TEST(Doubts, TestPosesBeyondTheJointRangesSearchedAreCounted) {
   EXPECT_TRUE(mentions(beyond, "test poses lie outside of what was searched: joint2"));
   EXPECT_FALSE(
       mentions(discover(arm(), searched, seen(narrow, 6), {.correct = false}), "outside of what was searched"));
-}
-
-// The angle error of joint 3, a function of its angle in rad.
-Measurements with_angle_error(const Robot& robot, double (*error)(double), std::uint64_t seed) {
-  Measurements measurements = seen(robot, seed);
-  Poses moved = measurements.poses;
-  for (double& q : moved.joints.col(2)) q += error(q);
-  measurements.positions_mm += positions(robot, moved) - positions(robot, measurements.poses);
-  return measurements;
-}
-
-TEST(Doubts, ASawToothIsNoWaveOfAGearAndASineIs) {
-  const auto saw = [](double q) { return 3e-4 * (7.3 * q - std::floor(7.3 * q) - 0.5); };
-  const auto sine = [](double q) { return 1.5e-4 * std::sin(2.0 * std::numbers::pi * 7.3 * q); };
-  const Discovery of_saw = discover(arm(), with_angle_error(arm(), saw, 7), {}, {.correct = false});
-  EXPECT_EQ(of_saw.answer, discovery::Answer::unknown);
-  EXPECT_TRUE(std::ranges::none_of(of_saw.effects, &FoundEffect::confirmed));
-  const Discovery of_sine = discover(arm(), with_angle_error(arm(), sine, 7), {}, {.correct = false});
-  EXPECT_EQ(of_sine.answer, discovery::Answer::named);
-  ASSERT_EQ(of_sine.effects.size(), 1U);
-  EXPECT_EQ(of_sine.effects[0].effect.type, "transmission_error");
-  EXPECT_TRUE(of_sine.effects[0].confirmed);
 }
 
 }  // namespace

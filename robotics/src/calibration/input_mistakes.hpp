@@ -1,4 +1,4 @@
-// What a table that cannot be meant as it stands was probably meant as.
+// Likely mistakes in a table that cannot be meant as it stands.
 #pragma once
 
 #include <string>
@@ -12,11 +12,11 @@ namespace llmt::robotics {
 /// change with which the described robot, base and tool fitted, misses the points least, if that is less than
 /// `plausible_mm`, a tenth of what it misses them by as they stand and a twentieth of the spread of the points; else
 /// nothing.
-std::string likely_mistake(const Robot& robot, const Measurements& measurements, double plausible_mm);
+std::string input_mistake(const Robot& robot, const Measurements& measurements, double plausible_mm);
 
 /// The same of measured orientations: quaternions written x, y, z, w, and rotations from the tool to the world. Returns
 /// the change after which the described robot, placed by the positions, turns its tool as measured but for 50 mrad on
 /// average and a constant rotation; else nothing.
-std::string likely_orientation_mistake(const Robot& robot, const Measurements& measurements);
+std::string orientation_mistake(const Robot& robot, const Measurements& measurements);
 
 }  // namespace llmt::robotics

@@ -1,4 +1,4 @@
-#include "discovery/refined_constants.hpp"
+#include "discovery/constant_fit.hpp"
 
 #include <Eigen/QR>
 #include <algorithm>
@@ -18,7 +18,7 @@ bool is_open(const Hypothesis& one) {
   return one.candidate.prior_cost > 0.0 && effect.constants[0] != std::round(effect.constants[0]);
 }
 
-// The fit at its end: derivatives by the free parameters and by the open constants.
+// The final fit: derivatives by the free parameters and by the open constants.
 struct Augmented {
   std::vector<Eigen::Index> free;  // parameters
   Eigen::MatrixXd columns;         // free parameters, then constants; normalised
@@ -52,7 +52,7 @@ Augmented augmented(const Calibration& fitted, const Measurements& kept, const s
   return fit;
 }
 
-// A step of everything that is free, constants included. `largest`: of the constants, relative.
+// A step of all free parameters and of the open constants. `largest` becomes the largest relative step of a constant.
 Robot stepped(const Robot& robot, const Augmented& fit, const std::vector<std::size_t>& open, double& largest) {
   const Eigen::Index free = std::ssize(fit.free);
   const Eigen::VectorXd all = fit.columns.colPivHouseholderQr().solve(fit.errors).cwiseQuotient(fit.norms);
@@ -77,7 +77,7 @@ Robot stepped(const Robot& robot, const Augmented& fit, const std::vector<std::s
   return with_values(std::move(moved), values);
 }
 
-// Numbers among the robot's effects of those whose constant is open.
+// Numbers among the robot's effects: those whose constant is open.
 std::vector<std::size_t> open_effects(const Investigation& investigation) {
   std::vector<std::size_t> open;
   for (const Hypothesis& one : investigation.found) {
@@ -89,7 +89,7 @@ std::vector<std::size_t> open_effects(const Investigation& investigation) {
   return open;
 }
 
-// Everything that knows the effect by its label learns the new constant.
+// Gives all hypotheses that know the effect by its label the new constant.
 void rename(Investigation& investigation, const std::vector<Effect>& before, const std::vector<std::size_t>& open,
             std::vector<Hypothesis>* also) {
   const auto renew = [&](std::vector<Hypothesis>& hypotheses) {
@@ -108,12 +108,12 @@ void rename(Investigation& investigation, const std::vector<Effect>& before, con
 
 }  // namespace
 
-std::map<std::string, double> refine_constants(Investigation& investigation, const DiscoveryOptions& options,
-                                               std::vector<Hypothesis>* also) {
+std::map<std::string, double> fit_constants(Investigation& investigation, const DiscoveryOptions& options,
+                                            std::vector<Hypothesis>* also) {
   const std::vector<std::size_t> open = open_effects(investigation);
   if (open.empty()) return {};
-  begin(investigation, "fitting constants");
-  const Measurements kept = without_rows(investigation.searched, investigation.verdict.outliers);
+  report_progress(*investigation.work, "fitting constants");
+  const Measurements kept = investigation.kept();
   const std::vector<Effect> before = investigation.fitted.robot.effects;
   Calibration moved = investigation.fitted;
   double error = total_distance(moved.robot, kept);

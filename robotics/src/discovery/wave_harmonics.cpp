@@ -1,19 +1,17 @@
-#include "discovery/overtones.hpp"
+#include "discovery/wave_harmonics.hpp"
 
 #include <fmt/format.h>
 
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
-#include <iterator>
-#include <set>
 
 #include "discovery/pose_split.hpp"
 
 namespace llmt::robotics {
 namespace {
 
-// The fit at its end, and what it leaves.
+// The final fit and its residuals.
 struct Rest {
   const Robot& robot;
   Measurements kept;
@@ -25,14 +23,7 @@ struct Rest {
 
 Rest rest_of(const Investigation& investigation) {
   const Calibration& fitted = investigation.fitted;
-  std::vector<std::size_t> skipped = investigation.verdict.outliers;
-  std::ranges::sort(skipped);
-  Rest rest{.robot = fitted.robot,
-            .kept = without_rows(investigation.searched, skipped),
-            .rows = {},
-            .errors = {},
-            .fitted = {},
-            .rank = 0};
+  Rest rest{.robot = fitted.robot, .kept = investigation.kept(), .rows = {}, .errors = {}, .fitted = {}, .rank = 0};
   rest.rows = measured_rows(rest.kept);
   rest.errors = stacked(rest.kept.positions_mm - positions(fitted.robot, rest.kept.poses), rest.rows);
   std::vector<Eigen::Index> free;
@@ -46,21 +37,21 @@ Rest rest_of(const Investigation& investigation) {
   return rest;
 }
 
-// What is orthogonal to the fit.
+// The components orthogonal to the range of the fit.
 Eigen::MatrixXd beyond_fit(const Rest& rest, const Eigen::MatrixXd& columns) {
   const Eigen::MatrixXd turned = rest.fitted.householderQ().transpose() * columns;
   return turned.bottomRows(turned.rows() - rest.rank);
 }
 
-constexpr double by_chance = 4.2;  // what F(6, 100 and more) exceeds once in a thousand
+constexpr double by_chance = 4.2;  // F(6, 100 and more) exceeds this once in a thousand
 constexpr double material = 0.06;  // of the wave's own energy; of a saw tooth 0.21
 
-struct Overtones {
+struct Harmonics {
   double energy = 0.0;          // mm^2
-  double variance_ratio = 0.0;  // to what is left beside them
+  double variance_ratio = 0.0;  // to the residuals beside them
 };
 
-Overtones overtones_of(const Rest& rest, const Effect& wave) {
+Harmonics harmonics_of(const Rest& rest, const Effect& wave) {
   std::vector<Effect> tones;
   for (const double times : {3.0, 4.0, 5.0}) {
     tones.push_back(wave);
@@ -83,46 +74,54 @@ double energy_of(const FoundEffect& wave, const Rest& rest) {
   return wave.rms_mm * wave.rms_mm * static_cast<double>(rest.kept.count());
 }
 
-// 2, 3, ... where the other wave is an overtone of the same joint, else 0.
+// 2, 3, ... if the other wave is a harmonic of the same joint, else 0.
 int multiple_of(const FoundEffect& wave, const FoundEffect& other) {
   constexpr double slack = 0.01;
   const double ratio = other.effect.constants[0] / wave.effect.constants[0];
   const double whole = std::round(ratio);
-  const bool is_overtone = wave.effect.at == other.effect.at && whole > 1.5 && std::abs(ratio - whole) < slack * whole;
-  return is_overtone ? static_cast<int>(whole) : 0;
+  const bool is_harmonic = wave.effect.at == other.effect.at && whole > 1.5 && std::abs(ratio - whole) < slack * whole;
+  return is_harmonic ? static_cast<int>(whole) : 0;
 }
 
 }  // namespace
 
-void doubt_waves(const Investigation& investigation, Discovery& result) {
-  std::vector<FoundEffect*> waves;
-  for (FoundEffect& effect : result.effects) {
-    if (effect.confirmed && nature_of(effect.effect) == Nature::wave) waves.push_back(&effect);
+std::vector<std::size_t> waves_at(const std::vector<FoundShape>& shapes, const std::vector<Name>& names) {
+  std::vector<std::size_t> waves;
+  for (std::size_t k = 0; k < names.size(); ++k) {
+    const Effect& effect = names[k].effect.effect;
+    const auto acts_there = [&](const FoundShape& one) { return one.shape.acts_on == effect.at; };
+    if (nature_of(effect) == Nature::wave && std::ranges::any_of(shapes, acts_there)) waves.push_back(k);
   }
-  if (waves.empty()) return;
-  const Rest rest = rest_of(investigation);
-  std::set<FoundEffect*> doubted;
-  for (FoundEffect* wave : waves) {
-    const Overtones left = overtones_of(rest, wave->effect);
+  return waves;
+}
+
+std::optional<Objection> judge_waves(const Findings& found, const std::vector<bool>& stands) {
+  std::vector<const FoundEffect*> waves;
+  for (std::size_t k = 0; k < found.names.size(); ++k) {
+    if (stands[k] && nature_of(found.names[k].effect.effect) == Nature::wave) waves.push_back(&found.names[k].effect);
+  }
+  if (waves.empty()) return std::nullopt;
+  const Rest rest = rest_of(found.investigation);
+  Objection objection{Reason::harmonics};
+  for (const FoundEffect* wave : waves) {
+    const Harmonics left = harmonics_of(rest, wave->effect);
     double energy = left.variance_ratio < by_chance ? 0.0 : left.energy;
-    for (FoundEffect* other : waves) {
+    for (const FoundEffect* other : waves) {
       if (multiple_of(*wave, *other) > 2) energy += energy_of(*other, rest);
     }
     if (energy < material * energy_of(*wave, rest)) continue;
-    // Other waves of that joint may be pieces of it, too.
-    std::ranges::copy_if(waves, std::inserter(doubted, doubted.end()),
-                         [&](const FoundEffect* other) { return other->effect.at == wave->effect.at; });
     const std::size_t joint = joint_index(rest.robot.chain, wave->effect.at);
-    result.unknown.push_back(
+    objection.unknown.push_back(
         {{wave->effect.at, {fmt::format("q{}", joint + 1)}, wave->effect.constants[0], "periodic, but no sine"},
          wave->share});
   }
-  if (doubted.empty()) return;
-  for (FoundEffect* wave : doubted) wave->confirmed = false;
-  result.answer = discovery::Answer::unknown;
-  result.notes.emplace_back(
+  if (objection.unknown.empty()) return std::nullopt;
+  // Other waves of that joint may be parts of it, too.
+  objection.names = waves_at(objection.unknown, found.names);
+  objection.notes.emplace_back(
       "A wave with overtones of three to five times its order is no sine: a saw tooth, or a step in every turn of a "
       "shaft.");
+  return objection;
 }
 
 }  // namespace llmt::robotics

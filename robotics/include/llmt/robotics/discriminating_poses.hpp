@@ -1,8 +1,8 @@
 /// \file
-/// Which poses to measure next, so that an ambiguous answer becomes a unique one.
+/// Poses to measure next, so that an ambiguous answer becomes a unique one.
 ///
-///     const Telling telling = telling_poses(robot, 0, rival, measured.poses, 0.03);
-///     for (const TellingPose& pose : telling.poses) std::printf("%g mm\n", pose.disagreement_mm);
+///     const Discrimination telling = discriminating_poses(robot, 0, rival, measured.poses, 0.03);
+///     for (const DiscriminatingPose& pose : telling.poses) std::printf("%g mm\n", pose.disagreement_mm);
 #pragma once
 
 #include <Eigen/Core>
@@ -19,7 +19,7 @@
 namespace llmt::robotics {
 
 /// A pose at which two explanations predict different tool positions.
-struct TellingPose {
+struct DiscriminatingPose {
   Eigen::VectorXd joints;   ///< J: rad, mm for prismatic joints
   double payload_kg = 0.0;  ///< to be carried there
   /// Distance between the predictions, mm, after the rival has been fitted to this pose and those before it too.
@@ -28,12 +28,13 @@ struct TellingPose {
   std::map<std::string, double> conditions;
 };
 
-/// Where to measure next.
-struct Telling {
-  std::vector<TellingPose> poses;  ///< by falling criterion; fewer than asked for where further poses add nothing
-  bool payload_helps = false;      ///< some of them carry a payload that was not measured
-  double noise_mm = 0.0;           ///< standard deviation of one coordinate, to compare a disagreement with
-  bool none_can = false;           ///< the predictions differ nowhere by more than the noise; `poses` is empty
+/// Poses to measure next.
+struct Discrimination {
+  std::vector<DiscriminatingPose>
+      poses;                   ///< by falling criterion; fewer than asked for where further poses add nothing
+  bool payload_helps = false;  ///< some of them carry a payload that was not measured
+  double noise_mm = 0.0;       ///< standard deviation of one coordinate, to compare a disagreement with
+  bool none_can = false;       ///< the predictions differ nowhere by more than the noise; `poses` is empty
 };
 
 /// Poses at which the effect that was found and a rival disagree most, found greedily among some hundred random ones
@@ -57,8 +58,8 @@ struct Telling {
 ///
 /// Throws std::invalid_argument if there is no such effect, no measured pose, count < 1, noise that is negative or not
 /// finite, no measured axis, and as effect_signatures().
-Telling telling_poses(const Robot& fitted, std::size_t effect, const std::vector<Effect>& rival, const Poses& measured,
-                      double noise_mm, int count = 5, std::uint64_t seed = 1,
-                      const std::array<bool, 3>& measured_axes = {true, true, true});
+Discrimination discriminating_poses(const Robot& fitted, std::size_t effect, const std::vector<Effect>& rival,
+                                    const Poses& measured, double noise_mm, int count = 5, std::uint64_t seed = 1,
+                                    const std::array<bool, 3>& measured_axes = {true, true, true});
 
 }  // namespace llmt::robotics

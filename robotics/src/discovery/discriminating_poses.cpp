@@ -1,4 +1,4 @@
-#include "llmt/robotics/telling_poses.hpp"
+#include "llmt/robotics/discriminating_poses.hpp"
 
 #include <fmt/format.h>
 
@@ -15,7 +15,7 @@
 namespace llmt::robotics {
 namespace {
 
-// The two explanations: what was found, and all that may be fitted to imitate it.
+// The two explanations: the effect that was found, and all parameters that may be fitted to imitate it.
 struct ExplanationPair {
   Robot without;  // the effect that was found
   Effect found;
@@ -23,7 +23,7 @@ struct ExplanationPair {
   std::array<bool, 3> measured_axes;
 };
 
-// Over some poses: what was found predicts `found`, the rival imitates it with `columns`. 3n rows.
+// Predictions for n poses, 3n rows: `found` of the effect that was found, `columns` of the rival that imitates it.
 struct Predictions {
   Eigen::MatrixXd columns;
   Eigen::VectorXd found;
@@ -160,7 +160,7 @@ Poses candidate_poses(const ExplanationPair& question, const Poses& measured, co
   return with_needed_columns(all, std::move(poses), random.bits());
 }
 
-// What the effects in question look at in that row, apart from what follows from joints and payload.
+// The covariates of that row that the effects in question depend on; joints and payload are given elsewhere.
 std::map<std::string, double> conditions(const ExplanationPair& question, const Poses& poses, Eigen::Index row) {
   std::vector<Effect> effects = question.rival;
   effects.push_back(question.found);
@@ -177,9 +177,10 @@ std::map<std::string, double> conditions(const ExplanationPair& question, const 
   return values;
 }
 
-// Of every candidate: by how much the rival misses it even when it is fitted to it, mm.
+// For every candidate the distance by which the rival misses it even when it is fitted to it, mm.
 Eigen::VectorXd disagreements(const Normal& normal, const Predictions& candidates) {
-  // What the poses do not tell at all stays free for the rival: 1e-5 of a column, as calibration takes for dependent.
+  // Directions that the poses do not determine stay free for the rival. The threshold is 1e-5 of a column, as for
+  // dependent columns in the calibration.
   constexpr double ridge = 1e-10;
   Eigen::MatrixXd matrix = normal.matrix;
   matrix.diagonal().array() += ridge;
@@ -197,13 +198,14 @@ Eigen::VectorXd disagreements(const Normal& normal, const Predictions& candidate
 }
 
 void require(bool holds, const std::string& what) {
-  if (!holds) throw std::invalid_argument("llmt::robotics::telling_poses: " + what);
+  if (!holds) throw std::invalid_argument("llmt::robotics::discriminating_poses: " + what);
 }
 
 }  // namespace
 
-Telling telling_poses(const Robot& fitted, std::size_t effect, const std::vector<Effect>& rival, const Poses& measured,
-                      double noise_mm, int count, std::uint64_t seed, const std::array<bool, 3>& measured_axes) {
+Discrimination discriminating_poses(const Robot& fitted, std::size_t effect, const std::vector<Effect>& rival,
+                                    const Poses& measured, double noise_mm, int count, std::uint64_t seed,
+                                    const std::array<bool, 3>& measured_axes) {
   require(effect < fitted.effects.size(),
           fmt::format("effect is {}, the robot has {} effects", effect, fitted.effects.size()));
   require(measured.count() > 0, "there is no measured pose");
@@ -217,7 +219,7 @@ Telling telling_poses(const Robot& fitted, std::size_t effect, const std::vector
   const Poses poses = candidate_poses(question, measured, payloads.all, random);
   Predictions candidates = predict(question, poses);
   Normal normal = normal_equations(question, measured, candidates.columns.cols());
-  // Columns of unit length over all poses, whatever their units; those of nothing stay nothing.
+  // Columns of unit length over all poses, whatever their units. Zero columns stay zero.
   const Eigen::VectorXd squares = normal.matrix.diagonal() + candidates.columns.colwise().squaredNorm().transpose();
   const Eigen::VectorXd scale =
       squares.unaryExpr([](double square) { return square > 0.0 ? 1.0 / std::sqrt(square) : 0.0; });
@@ -229,7 +231,7 @@ Telling telling_poses(const Robot& fitted, std::size_t effect, const std::vector
   constexpr double first_order = 1e-3;
   const double visible = std::max(noise_mm, first_order * candidates.found.lpNorm<Eigen::Infinity>());
   constexpr double effort = 1.2;  // to mount another payload
-  Telling telling;
+  Discrimination telling;
   telling.noise_mm = noise_mm;
   while (std::ssize(telling.poses) < count) {
     const Eigen::VectorXd disagreement = disagreements(normal, candidates);

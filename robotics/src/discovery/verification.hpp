@@ -1,0 +1,52 @@
+// The robots before and after, and their errors on poses that took no part.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "discovery/findings.hpp"
+#include "discovery/pose_split.hpp"
+#include "llmt/robotics/correction.hpp"
+
+namespace llmt::robotics {
+
+/// The robots that a discovery compares.
+struct Robots {
+  Robot before;              ///< calibrated without what was found
+  CorrectedRobot improved;   ///< with it
+  std::vector<Effect> maps;  ///< joint maps that were added
+  std::vector<std::string> notes;
+};
+
+/// Both robots, fitted to the samples without the outliers of the search. `given` are the joint maps that the
+/// description has. A refit that ended in a worse minimum is discarded. If the last search ended in an unknown effect,
+/// a correction by trees is added where it helps.
+Robots fit_robots(const Robot& robot, const Measurements& samples, const std::vector<Effect>& given,
+                  const Findings& found, const DiscoveryOptions& options);
+
+/// The same with nothing added to the calibrated robot.
+Robots withdrawn(Robots robots);
+
+/// Objection to all names: what was found makes the poses set aside worse, by more than two standard errors.
+std::optional<Objection> judge_held_out_loss(const Robots& robots, const PoseSplit& split, std::size_t names);
+
+/// A sentence on poses set aside that are far off, such as lost beams, if there are any. They are not removed: no
+/// choice depends on them.
+std::optional<std::string> far_poses_note(const Robots& robots, const PoseSplit& split);
+
+/// Errors of both robots on the poses searched, and on those set aside along the axes that were fitted.
+struct Verification {
+  ErrorFigures fitted_before;
+  ErrorFigures fitted_after;
+  HeldOut held_out;
+};
+
+/// `noise_mm` is the standard deviation of one coordinate unless the repeats of `lack_of_fit` are enough to give it.
+Verification verify(const Robots& robots, const PoseSplit& split, const discovery::LackOfFit& lack_of_fit,
+                    double noise_mm);
+
+/// Writes the errors on the poses set aside into the robot's record of its calibration, for a later check.
+void remember_held_out_errors(const PoseSplit& split, CorrectedRobot& improved);
+
+}  // namespace llmt::robotics
