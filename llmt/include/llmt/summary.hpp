@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "llmt/abi.hpp"
-#include "llmt/model.hpp"
 #include "llmt/options.hpp"
+#include "llmt/partition.hpp"
 
 namespace llmt {
 

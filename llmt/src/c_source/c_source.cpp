@@ -11,8 +11,8 @@
 
 #include "base/simd.hpp"
 #include "c_source/runtime.hpp"
-#include "model/leaf_validities.hpp"
-#include "model/tree.hpp"
+#include "partition/leaf_validities.hpp"
+#include "partition/tree.hpp"
 
 namespace llmt {
 namespace {

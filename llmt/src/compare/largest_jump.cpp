@@ -4,7 +4,7 @@
 
 #include "llmt/compare.hpp"
 #include "model/codes.hpp"
-#include "model/evaluator.hpp"
+#include "partition/evaluator.hpp"
 
 namespace llmt {
 namespace {

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <limits>
 
-#include "model/transition.hpp"
-#include "model/tree.hpp"
+#include "partition/transition.hpp"
+#include "partition/tree.hpp"
 
 namespace llmt {
 namespace {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "data/table.hpp"
-#include "llmt/model.hpp"
+#include "llmt/partition.hpp"
 
 namespace llmt {
 

@@ -6,8 +6,8 @@
 #include <numeric>
 
 #include "base/parallel.hpp"
-#include "model/evaluator.hpp"
-#include "model/imputed.hpp"
+#include "partition/evaluator.hpp"
+#include "partition/imputed.hpp"
 
 namespace llmt {
 namespace {

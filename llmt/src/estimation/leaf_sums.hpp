@@ -7,7 +7,7 @@
 
 #include "data/dataset.hpp"
 #include "estimation/normal_equations.hpp"
-#include "llmt/model.hpp"
+#include "llmt/partition.hpp"
 
 namespace llmt {
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "model/tree.hpp"
+#include "partition/tree.hpp"
 
 namespace llmt {
 namespace {

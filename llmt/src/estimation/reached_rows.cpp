@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "base/simd.hpp"
-#include "model/imputed.hpp"
+#include "partition/imputed.hpp"
 
 namespace llmt {
 namespace {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "data/dataset.hpp"
-#include "model/evaluator.hpp"
+#include "partition/evaluator.hpp"
 
 namespace llmt {
 

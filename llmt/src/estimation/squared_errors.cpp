@@ -1,6 +1,6 @@
 #include "estimation/squared_errors.hpp"
 
-#include "model/evaluator.hpp"
+#include "partition/evaluator.hpp"
 
 namespace llmt {
 namespace {

@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "explain/straight_line.hpp"
-#include "model/through_regressors.hpp"
 #include "numerics/chebyshev.hpp"
 #include "numerics/quadrature.hpp"
+#include "partition/through_regressors.hpp"
 
 namespace llmt {
 namespace {

@@ -6,7 +6,7 @@
 #include <Eigen/Core>
 
 #include "llmt/explain.hpp"
-#include "model/evaluator.hpp"
+#include "partition/evaluator.hpp"
 
 namespace llmt {
 

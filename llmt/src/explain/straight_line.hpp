@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "llmt/model.hpp"
-#include "model/evaluator.hpp"
+#include "partition/evaluator.hpp"
 
 namespace llmt {
 

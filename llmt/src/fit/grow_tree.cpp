@@ -5,7 +5,7 @@
 #include "estimation/jumps.hpp"
 #include "estimation/tree_signs.hpp"
 #include "growth/pruning.hpp"
-#include "model/tree.hpp"
+#include "partition/tree.hpp"
 
 namespace llmt {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "llmt/model.hpp"
+#include "llmt/partition.hpp"
 
 namespace llmt {
 

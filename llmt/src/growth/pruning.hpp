@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "llmt/model.hpp"
+#include "llmt/partition.hpp"
 
 namespace llmt {
 

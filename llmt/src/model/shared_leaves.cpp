@@ -6,7 +6,7 @@
 #include <iterator>
 #include <stdexcept>
 
-#include "model/tree.hpp"
+#include "partition/tree.hpp"
 
 namespace llmt {
 namespace {

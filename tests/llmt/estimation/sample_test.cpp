@@ -11,9 +11,9 @@
 #include "estimation/local_estimate.hpp"
 #include "estimation/squared_errors.hpp"
 #include "growth/best_first/best_first.hpp"
-#include "model/evaluator.hpp"
-#include "model/tree.hpp"
 #include "oracles/oracles.hpp"
+#include "partition/evaluator.hpp"
+#include "partition/tree.hpp"
 
 namespace {
 

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "llmt/random.hpp"
-#include "model/tree.hpp"
+#include "partition/tree.hpp"
 
 namespace {
 

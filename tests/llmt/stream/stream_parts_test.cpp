@@ -8,9 +8,9 @@
 #include <optional>
 
 #include "llmt/fit.hpp"
-#include "model/tree.hpp"
 #include "oracles/oracles.hpp"
 #include "oracles/stream_data.hpp"
+#include "partition/tree.hpp"
 #include "stream/blend_correction.hpp"
 #include "stream/detectors.hpp"
 #include "stream/reservoir.hpp"
