@@ -9,7 +9,6 @@
 #include <utility>
 
 #include "llmt/csv.hpp"
-#include "llmt/retired_options.hpp"
 #include "report/table/named_inputs.hpp"
 #include "shared/cli.hpp"
 #include "shared/help.hpp"
@@ -232,7 +231,6 @@ void add_learning_options(CLI::App& command, LearningArguments& arguments) {
       "--prune", [&options] { options.pruning = Pruning::weakest_link; },
       "Undo the splits of the weakest branches first, not the last ones, where fewer leaves predict better"));
   expert(add_seed(command, options.folds.seed, "Of the random folds"));
-  refuse_retired_options(command);
 }
 
 }  // namespace llmt::apps

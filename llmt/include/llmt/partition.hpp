@@ -1,6 +1,6 @@
 /// \file
-/// A partition of the input space as plain data: a tree of splits, an affine local model in every node, and what a model
-/// says of its columns. docs/algorithms/model.md has the equations.
+/// A partition of the input space as plain data: a tree of splits, an affine local model in every node, and what a
+/// model says of its columns. docs/algorithms/model.md has the equations.
 ///
 ///     const llmt::Partition& partition = model.partitions().front();
 ///     for (const llmt::Node& node : partition.nodes) {
@@ -23,8 +23,7 @@ enum class ValidityKind {
   crisp,  ///< 1 in the leaf's own box, 0 elsewhere: the prediction jumps at the splits
   /// The hierarchical blend: at every split a transition g of compact support hands over from the left to the right
   /// child, and a leaf's validity is the product of g or 1 - g along its path. With u = (x_j - threshold) / h and
-  /// v = (clamp(u, -1, 1) + 1) / 2:  g = 1 - v^2 (3 - 2 v), or with two continuous derivatives
-  /// g = 1 - v^3 (10 - 15 v + 6 v^2).
+  /// v = (clamp(u, -1, 1) + 1) / 2:  g = 1 - v^2 (3 - 2 v). The prediction has one continuous derivative.
   blend,
   /// Normalised Gaussians, Phi_i = mu_i / sum mu, mu_i = exp(-1/2 sum_j ((x_j - c_ij) / sigma_ij)^2): c_ij the middle
   /// of the leaf's box, closed by the training extent, sigma_ij = width times its side (Nelles 2001; width = k_sigma).
@@ -43,7 +42,6 @@ struct Validity {
   /// smaller child), for splits on numbers; gaussian: k_sigma; logistic: h as a multiple of that of growth. 0 for
   /// crisp.
   double width = 0.0;
-  int smoothness = 1;  ///< blend: continuous derivatives of the prediction; 2 is in files of earlier versions alone
 
   bool operator==(const Validity&) const = default;
 };
@@ -82,9 +80,6 @@ struct Node {
   Eigen::VectorXd high;
   /// Leaves: inverse of the sum of validity * weight * a a', a = [1, deviations]; for leverages. May be empty.
   Eigen::MatrixXd inverse_gram;
-  /// The node whose slopes take over beyond low ... high; -1: the parent. Another node than the parent occurs only in
-  /// files of earlier versions, in leaves that share one local model: the root of the smallest subtree that holds them.
-  int guard_parent = -1;
 
   bool is_leaf() const { return left < 0; }
   bool is_oblique() const { return direction.size() > 0; }

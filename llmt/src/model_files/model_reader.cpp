@@ -1,13 +1,11 @@
 #include <algorithm>
 #include <limits>
-#include <optional>
 #include <stdexcept>
 
 #include "llmt/files.hpp"
 #include "llmt/model.hpp"
 #include "model/codes.hpp"
 #include "model/model_checks.hpp"
-#include "model/shared_leaves.hpp"
 #include "model_files/model_json.hpp"
 
 namespace llmt {
@@ -49,7 +47,10 @@ Node node_from_json(const JsonReader& json, Eigen::Index inputs, Eigen::Index ou
   node.mean = json.member("mean").vector(regressors);
   node.low = json.member("low").vector(regressors);
   node.high = json.member("high").vector(regressors);
-  if (json.has("guard_parent")) node.guard_parent = json.member("guard_parent").as<int>();
+  for (const char* shared : {"shared_with", "guard_parent"}) {
+    if (json.has(shared))
+      json.member(shared).fail("leaves that share a local model cannot be read; fit the model anew");
+  }
   if (json.has("inverse_gram")) {
     const Eigen::VectorXd lower = json.member("inverse_gram").vector((regressors + 1) * (regressors + 2) / 2);
     node.inverse_gram = symmetric(lower, regressors + 1);
@@ -64,9 +65,10 @@ Validity validity_from_json(const JsonReader& json) {
     json.member("kind").fail(
         fmt::format("\"{}\" is not known: crisp, blend, gaussian and logistic are", quotable(kind)));
   }
-  return {.kind = found->value,
-          .width = json.member("width").as<double>(),
-          .smoothness = json.member("smoothness").as<int>()};
+  if (const int smoothness = json.member("smoothness").as<int>(); smoothness != 1) {
+    json.member("smoothness").fail(fmt::format("{} is not known: blends have 1 continuous derivative", smoothness));
+  }
+  return {.kind = found->value, .width = json.member("width").as<double>()};
 }
 
 // Returns the version.
@@ -148,15 +150,8 @@ Partition partition_from_json(const JsonReader& json, Eigen::Index inputs, Eigen
     }
     partition.output_range = output_range_from_json(range, outputs);
   }
-  std::vector<std::optional<int>> shared_with;
   for (const JsonReader& node : json.member("nodes").elements()) {
     partition.nodes.push_back(node_from_json(node, inputs, outputs, regressors));
-    shared_with.push_back(node.has("shared_with") ? std::optional(node.member("shared_with").as<int>()) : std::nullopt);
-  }
-  try {
-    set_guard_parents(partition, shared_with);
-  } catch (const std::invalid_argument& error) {
-    json.fail(error.what());
   }
   return partition;
 }

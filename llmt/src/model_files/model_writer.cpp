@@ -57,7 +57,6 @@ Json to_json(const Node& node, const Model& model) {
   json["mean"] = to_array(node.mean);
   json["low"] = to_array(node.low);
   json["high"] = to_array(node.high);
-  if (node.guard_parent >= 0) json["guard_parent"] = node.guard_parent;
   if (node.inverse_gram.size() > 0) json["inverse_gram"] = lower_triangle(node.inverse_gram);
   return json;
 }
@@ -101,7 +100,7 @@ Json to_json(const Partition& partition, const Model& model) {
                {"validity",
                 {{"kind", name_of(partition.validity.kind)},
                  {"width", partition.validity.width},
-                 {"smoothness", partition.validity.smoothness}}},
+                 {"smoothness", 1}}},  // continuous derivatives of a blend
                {"outer_slope", rows_to_json(has_outer_slope ? partition.outer_slope : partition.nodes.front().slope)},
                {"residual_range", rows_to_json(partition.residual_range)}};
   if (has_output_range(partition)) json["output_range"] = output_range_to_json(partition.output_range);

@@ -12,7 +12,7 @@ double LeafValidities::left_share_derivative(int node, const double* row) const 
   if (branch.first_level >= 0 || branch.per_half_width == 0.0) return 0.0;
   const double u = (side(branch, row) - branch.threshold) * branch.per_half_width;
   return branch.per_half_width *
-         (kind_ == ValidityKind::logistic ? logistic_derivative(logistic(u)) : transition_derivative(u, smoothness_));
+         (kind_ == ValidityKind::logistic ? logistic_derivative(logistic(u)) : transition_derivative(u));
 }
 
 void LeafValidities::add_side_derivatives(int node, const Eigen::VectorXd& factor, Eigen::MatrixXd& by_input) const {

@@ -19,7 +19,7 @@ constexpr double negligible_log = -40.0;
 }  // namespace
 
 LeafValidities::LeafValidities(const Partition& partition, const std::vector<InputColumn>& inputs)
-    : kind_(partition.validity.kind), smoothness_(partition.validity.smoothness) {
+    : kind_(partition.validity.kind) {
   for (const Node& node : partition.nodes) {
     Branch branch{.left = node.left,
                   .right = node.right,
@@ -98,7 +98,7 @@ double LeafValidities::left_share(const Branch& branch, double x) const {
   if (std::isnan(x)) return branch.missing_left;
   if (branch.per_half_width == 0.0) return x <= branch.threshold ? 1.0 : 0.0;
   const double u = (x - branch.threshold) * branch.per_half_width;
-  return kind_ == ValidityKind::logistic ? logistic(u) : transition(u, smoothness_);
+  return kind_ == ValidityKind::logistic ? logistic(u) : transition(u);
 }
 
 int LeafValidities::child_of(int node, const double* row) const {

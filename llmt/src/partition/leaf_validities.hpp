@@ -128,7 +128,6 @@ class LeafValidities {
   void activate_gaussians(const double* row, std::vector<Activation>& active) const;
 
   ValidityKind kind_;
-  int smoothness_;
   std::vector<Branch> branches_;
   Eigen::Index depth_ = 0;
   std::vector<double> level_share_;  // of the left child

@@ -60,7 +60,7 @@ LLMT_INLINE void hand_over(const Fork& fork, Eigen::Index begin, Eigen::Index en
 
 // A transition on a number that no row lacks.
 LLMT_FOR_EACH_INSTRUCTION_SET
-Counts blend(const Fork& fork, const double* column, double threshold, double per_half_width, int smoothness) {
+Counts blend(const Fork& fork, const double* column, double threshold, double per_half_width) {
   constexpr Eigen::Index at_once = 64;
   double left[at_once] = {};
   Counts counts;
@@ -70,7 +70,7 @@ Counts blend(const Fork& fork, const double* column, double threshold, double pe
       left[i] = column[fork.rows[begin + i]];
     }
     for (Eigen::Index i = 0; i < size; ++i) {
-      left[i] = transition((left[i] - threshold) * per_half_width, smoothness);
+      left[i] = transition((left[i] - threshold) * per_half_width);
     }
     hand_over(
         fork, begin, begin + size, [&](Eigen::Index i) { return left[i - begin]; }, counts);
@@ -177,7 +177,7 @@ LeafValidities::ForkCounts LeafValidities::fork(int node, Eigen::Index begin, Ei
   } else if (branch.per_half_width == 0.0) {
     counts = jump(parts, column, branch.threshold);
   } else {
-    counts = blend(parts, column, branch.threshold, branch.per_half_width, smoothness_);
+    counts = blend(parts, column, branch.threshold, branch.per_half_width);
   }
   return {counts.left, counts.right};
 }

@@ -47,7 +47,7 @@ LocalModels::LocalModels(const Partition& partition, Eigen::Index regressors)
     : outputs_(std::ssize(partition.outputs)),
       regressors_(regressors),
       stride_(padded_to_quads(regressors)),
-      parents_(guard_parents_of(partition)) {
+      parents_(parents_of(partition)) {
   if (partition.residual_range.size() > 0) {
     const Eigen::VectorXd margin = output_margin * (partition.residual_range.col(1) - partition.residual_range.col(0));
     residual_range_ = partition.residual_range;

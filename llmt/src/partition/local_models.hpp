@@ -83,7 +83,7 @@ class LocalModels {
   Eigen::Index outputs_;
   Eigen::Index regressors_;
   Eigen::Index stride_;         // regressors, padded with zeros to whole quads
-  std::vector<int> parents_;    // see guard_parents_of()
+  std::vector<int> parents_;    // see parents_of()
   std::vector<double> data_;    // per node: low, high, mean, slopes of each output
   std::vector<double> values_;  // per node and output
   std::vector<double> outer_slopes_;

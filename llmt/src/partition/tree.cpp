@@ -47,14 +47,6 @@ std::vector<int> parents_of(const Partition& partition) {
   return parents;
 }
 
-std::vector<int> guard_parents_of(const Partition& partition) {
-  std::vector<int> result = parents_of(partition);
-  for (std::size_t i = 0; i < partition.nodes.size(); ++i) {
-    if (const int given = partition.nodes[i].guard_parent; given >= 0) result[i] = given;
-  }
-  return result;
-}
-
 Boxes boxes_of(const Partition& partition, const Eigen::VectorXd& low, const Eigen::VectorXd& high) {
   const Eigen::Index nodes = std::ssize(partition.nodes);
   Boxes boxes{low.replicate(1, nodes), high.replicate(1, nodes)};

@@ -15,9 +15,6 @@ void make_leaf(Node& node);
 /// Parent of every node, -1 for the root.
 std::vector<int> parents_of(const Partition& partition);
 
-/// The node whose slopes take over beyond the range of each node, -1 for the root: see Node::guard_parent.
-std::vector<int> guard_parents_of(const Partition& partition);
-
 /// The guard of a leaf asks this many ancestors, and then the root: a bound on the time that a leaf takes in a tree of
 /// any depth (docs/algorithms/guards.md, B.2).
 inline constexpr int most_ancestors = 64;

@@ -266,7 +266,7 @@ TEST(BlendCorrection, IsTheAnchoredLeastSquaresFit) {
   std::vector<int> all(200);
   std::iota(all.begin(), all.end(), 0);
   const llmt::TrainingRows rows = llmt::training_rows(table, all);
-  partition.validity = {llmt::ValidityKind::blend, 1.0, 1};
+  partition.validity = {llmt::ValidityKind::blend, 1.0};
   llmt::set_half_widths(partition, rows.low(), rows.high());
   const double ridge = 0.1;
   const llmt::BlendCorrection correction(rows, partition);
