@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "model/json_reader.hpp"
+#include "model_files/json_reader.hpp"
 #include "numerics/gram.hpp"
 
 namespace llmt {

@@ -3,7 +3,7 @@
 #include <stdexcept>
 
 #include "llmt/options.hpp"
-#include "model/model_json.hpp"
+#include "model_files/model_json.hpp"
 #include "stream/state.hpp"
 #include "stream/stream_archive.hpp"
 
