@@ -286,7 +286,7 @@ TEST(Readable, RefusesWhatItCannotKeep) {
   refused(crisp(), std::numeric_limits<double>::infinity(), "loss is inf");
   llmt::FitOptions options = crisp();
   options.folds.count = 0;
-  refused(options, 0.1, "folds.count is 0");
+  refused(options, 0.1, "folds.count 0");
   options = {};
   options.validity = llmt::ValidityChoice::blend;
   refused(options, 0.1, "validity");
