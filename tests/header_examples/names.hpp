@@ -5,6 +5,7 @@
 #include <cstdio>
 
 #include "llmt/discovery/least_squares.hpp"
+#include "llmt/discovery/rounds.hpp"
 #include "llmt/discovery/simulation.hpp"
 #include "llmt/discovery/terms.hpp"
 #include "llmt/held_out.hpp"

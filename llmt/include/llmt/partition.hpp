@@ -2,10 +2,8 @@
 /// A partition of the input space as plain data: a tree of splits, an affine local model in every node, and what a
 /// model says of its columns. docs/algorithms/model.md has the equations.
 ///
-///     const llmt::Partition& partition = model.partitions().front();
-///     for (const llmt::Node& node : partition.nodes) {
-///       if (!node.is_leaf()) ++splits_on[node.split_input];
-///     }
+///     const llmt::Partition& tree = model.partitions().front();
+///     const int first_split = tree.nodes.front().split_input;  // -1: the tree is one leaf
 #pragma once
 
 #include <Eigen/Core>
