@@ -222,9 +222,8 @@ Json leaves_json(const Model& model) {
   for (Eigen::Index p = 0; p < std::ssize(model.partitions()); ++p) {
     const Partition& partition = model.partitions()[p];
     Json entry;
-    entry["validity"] = {{"kind", name_of(partition.validity.kind)},
-                         {"width", partition.validity.width},
-                         {"smoothness", 1}};
+    entry["validity"] = {
+        {"kind", name_of(partition.validity.kind)}, {"width", partition.validity.width}, {"smoothness", 1}};
     for (const int output : partition.outputs) {
       const Eigen::Index position = std::ssize(entry["targets"]);
       entry["targets"].push_back(model.outputs()[output].name);
