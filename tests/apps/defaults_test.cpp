@@ -28,6 +28,7 @@ TEST(Defaults, HelpAndCommandsPageStateThoseOfTheLibrary) {
     EXPECT_NE(page.find(": " + text), std::string::npos) << option << ": " << text;
   }
   for (const llmt::Choice<llmt::GrowthRule>& rule : llmt::choices<llmt::GrowthRule>()) {
+    if (rule.name == "toy") continue;  // a rule of these tests, which the program does not have
     EXPECT_NE(help.find(fmt::format("{} ({})", rule.name, llmt::summary_of(rule.value))), std::string::npos);
     EXPECT_NE(page.find(fmt::format("`{}`", rule.name)), std::string::npos);
   }
