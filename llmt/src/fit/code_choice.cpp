@@ -113,7 +113,7 @@ ComparedRows some_rows(const Matrix& inputs, const Matrix& outputs, const FitOpt
     if (options.weights.size() == 0 || options.weights(row) > 0.0) all.rows.push_back(row);
   }
   const Eigen::Index count = std::clamp(most_compared_numbers / coefficients, least_compared_rows, most_compared_rows);
-  const std::vector<int> rows = thinned(all, count).rows;
+  const std::vector<int> rows = subsample(all, count).rows;
   ComparedRows some{inputs(rows, Eigen::all), outputs(rows, Eigen::all), {}, options, {}};
   if (options.weights.size() > 0) some.options.weights = options.weights(rows);
   if (loss_weights.size() > 0) some.loss_weights = loss_weights(rows);

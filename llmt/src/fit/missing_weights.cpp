@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "fit/defaults.hpp"
+#include "fit/error_weights.hpp"
 #include "fit/grow_tree.hpp"
 #include "fit/preliminary.hpp"
 
@@ -29,7 +30,7 @@ Eigen::VectorXd squared_residuals(const Table& table, const FitOptions& options,
   const Eigen::MatrixXd residuals = table.outputs - model.predict(table.inputs, options.max_threads);
   Eigen::VectorXd squares = Eigen::VectorXd::Zero(residuals.rows());
   for (Eigen::Index o = 0; o < residuals.cols(); ++o) {
-    const double variance = (table.outputs.col(o).array() - table.outputs.col(o).mean()).square().mean();
+    const double variance = variance_of(table.outputs.col(o));
     if (variance > 0.0) squares += residuals.col(o).cwiseAbs2() / variance;
   }
   return squares;

@@ -19,6 +19,7 @@
 #include "data/regressors.hpp"
 #include "estimation/leaf_statistics.hpp"
 #include "fit/code_choice.hpp"
+#include "fit/error_weights.hpp"
 #include "fit/missing_weights.hpp"
 #include "fit/robust_weights.hpp"
 #include "growth/rules/rule.hpp"
@@ -71,12 +72,7 @@ struct Setting {
 };
 
 std::vector<Sample> samples_of(const Setting& setting, const std::vector<int>& served) {
-  Eigen::VectorXd weights = Eigen::VectorXd::Ones(std::ssize(served));
-  for (std::size_t o = 0; o < served.size() && served.size() > 1; ++o) {
-    const auto output = setting.table.outputs.col(served[o]).array();
-    const double variance = (output - output.mean()).square().mean();
-    weights(o) = variance > 0.0 ? 1.0 / variance : 1.0;
-  }
+  const Eigen::VectorXd weights = error_weights(setting.table, served);
   // The last one is that of all rows.
   std::vector<Sample> samples(setting.folds.size() + 1);
   parallel_for(std::ssize(samples), setting.max_threads, [&](Eigen::Index f) {
@@ -276,7 +272,7 @@ ReadableResult fit_inputs(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
   std::iota(rows.begin(), rows.end(), 0);
   const TrainingRows all = training_rows(weighted, std::move(rows), options.max_threads);
   std::vector<FoldRows> folds = deal(weighted, table, data.folds(), options.max_threads);
-  for (FoldRows& fold : folds) fold.held_out = thinned(fold.held_out, most_held_out_rows);
+  for (FoldRows& fold : folds) fold.held_out = subsample(fold.held_out, most_held_out_rows);
   const Setting setting{.table = table,
                         .all = all,
                         .folds = folds,
