@@ -7,7 +7,6 @@
 #include "llmt/discovery/least_squares.hpp"
 #include "llmt/discovery/simulation.hpp"
 #include "llmt/discovery/terms.hpp"
-#include "llmt/held_out.hpp"
 #include "llmt/llmt.hpp"
 #include "llmt/outliers.hpp"
 #include "llmt/progress.hpp"
