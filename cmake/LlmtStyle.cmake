@@ -4,7 +4,7 @@
 # clang-format's output differs between major versions, so only the one the tree is kept in takes part.
 set(LLMT_CLANG_FORMAT_VERSION 14)
 
-file(GLOB_RECURSE llmt_sources CONFIGURE_DEPENDS llmt/*.[ch]pp robotics/*.[ch]pp apps/*.[ch]pp
+file(GLOB_RECURSE llmt_sources CONFIGURE_DEPENDS llmt/*.[ch]pp expressions/*.[ch]pp robotics/*.[ch]pp apps/*.[ch]pp
      tests/*.[ch]pp bench/*.[ch]pp)
 
 find_program(LLMT_CLANG_FORMAT NAMES clang-format-${LLMT_CLANG_FORMAT_VERSION} clang-format)
@@ -27,6 +27,6 @@ mark_as_advanced(LLMT_RUN_CLANG_TIDY)
 if(LLMT_RUN_CLANG_TIDY)
   add_custom_target(
     tidy
-    COMMAND "${LLMT_RUN_CLANG_TIDY}" -quiet -p "${PROJECT_BINARY_DIR}" "^${PROJECT_SOURCE_DIR}/(llmt|robotics|apps|tests|bench)/"
+    COMMAND "${LLMT_RUN_CLANG_TIDY}" -quiet -p "${PROJECT_BINARY_DIR}" "^${PROJECT_SOURCE_DIR}/(llmt|expressions|robotics|apps|tests|bench)/"
     VERBATIM USES_TERMINAL)
 endif()

@@ -9,7 +9,8 @@
 #include <utility>
 
 #include "llmt/csv.hpp"
-#include "report/table/named_inputs.hpp"
+#include "llmt/names.hpp"
+#include "llmt/retired_options.hpp"
 #include "shared/cli.hpp"
 #include "shared/help.hpp"
 #include "shared/options.hpp"
@@ -20,6 +21,37 @@ namespace {
 
 bool contains(const std::vector<std::string>& names, const std::string& name) {
   return std::ranges::find(names, name) != names.end();
+}
+
+std::vector<int> positions(const char* option, const std::vector<std::string>& names,
+                           const std::vector<std::string>& inputs) {
+  std::vector<int> result;
+  for (const std::string& name : names) {
+    const auto found = std::ranges::find(inputs, name);
+    if (found == inputs.end()) {
+      throw std::invalid_argument(fmt::format("{} has \"{}\", which is not among the inputs {}{}", option, name,
+                                              fmt::join(inputs, ", "), did_you_mean(name, inputs)));
+    }
+    result.push_back(static_cast<int>(found - inputs.begin()));
+  }
+  return result;
+}
+
+// Of each input 1, or -1 where its name has a leading minus; 0 where it is not named. Empty if none is.
+std::vector<int> signs_of(const char* option, const std::vector<std::string>& names,
+                          const std::vector<std::string>& inputs) {
+  if (names.empty()) return {};
+  std::vector<int> result(inputs.size(), 0);
+  for (const std::string& name : names) {
+    const bool falls = !contains(inputs, name) && name.starts_with('-');
+    const int position = positions(option, {falls ? name.substr(1) : name}, inputs).front();
+    int& sign = result[position];
+    if (sign == (falls ? 1 : -1)) {
+      throw std::invalid_argument(fmt::format("{} names \"{}\" with both signs", option, inputs[position]));
+    }
+    sign = falls ? -1 : 1;
+  }
+  return result;
 }
 
 constexpr std::size_t named_rows = 5;
@@ -70,27 +102,61 @@ void look_for_nothing_to_learn(const Csv& csv, const LearningArguments& argument
   }
 }
 
+// Whether the values are consecutive whole numbers, row by row.
+bool numbers_the_rows(const Eigen::Ref<const Eigen::VectorXd>& values) {
+  constexpr Eigen::Index fewest = 20;
+  if (values.size() < fewest || (values(0) != 0.0 && values(0) != 1.0)) return false;
+  for (Eigen::Index i = 1; i < values.size(); ++i) {
+    if (values(i) != values(i - 1) + 1.0) return false;
+  }
+  return true;
+}
+
+// "2024-03-31", "31.3.24", "3/31/2024 14:05": three numbers of at most four digits, and perhaps a time of day.
+bool looks_like_a_date(const std::string& text) {
+  std::size_t at = 0;
+  std::size_t longest = 0;
+  char mark = '\0';
+  for (int part = 0; part < 3; ++part) {
+    const std::size_t begin = at;
+    while (at < text.size() && text[at] >= '0' && text[at] <= '9') ++at;
+    if (at == begin || at - begin > 4) return false;
+    if (part < 2 && text.find_first_not_of('0', begin) >= at) return false;  // there is no month 0
+    longest = std::max(longest, at - begin);
+    if (part == 2) break;
+    if (at == text.size() || std::string_view("-/.").find(text[at]) == std::string_view::npos) return false;
+    if (part == 1 && text[at] != mark) return false;
+    mark = text[at++];
+  }
+  const bool ends = at == text.size() || text[at] == 'T' || text[at] == ' ';
+  return ends && (longest == 4 || longest == 2);
+}
+
 // Says which columns are inputs although they look like names or numbers of the rows. Nothing is said of inputs that
 // were asked for.
 void look_for_accidental_inputs(const LearningArguments& arguments, const std::vector<std::string>& names,
                                 const report::InputColumns& inputs) {
+  constexpr std::size_t most_levels = 20;
+  constexpr double most_levels_per_row = 0.1;
   if (!arguments.inputs.empty()) return;
-  for (const report::AccidentalInput& found : report::accidental_inputs(inputs)) {
-    const std::string& name = names[found.input];
-    if (found.kind == report::AccidentalInput::Kind::row_numbers) {
-      warn(fmt::format("llmt: column \"{}\" numbers the rows and is an input; --ignore leaves it out", name));
-      continue;
-    }
-    if (contains(arguments.categorical, name)) continue;
+  for (const int column : inputs.categorical) {
+    const std::size_t levels = inputs.levels[column].size();
+    const auto rows = static_cast<double>(inputs.values.rows());
+    const bool few = levels <= most_levels || static_cast<double>(levels) <= most_levels_per_row * rows;
+    const bool dates = std::ranges::all_of(inputs.levels[column], looks_like_a_date);
+    if ((few && !dates) || contains(arguments.categorical, names[column])) continue;
     const std::string advice =
-        found.kind == report::AccidentalInput::Kind::dates
-            ? fmt::format(
-                  "it looks like a date: leave it out (--ignore {}) or give a number, as days; --categorical says that "
-                  "categories are meant",
-                  name)
-            : "--ignore leaves it out, --categorical says that it is meant";
+        dates ? fmt::format(
+                    "it looks like a date: leave it out (--ignore {}) or give a number, as days; --categorical says "
+                    "that categories are meant",
+                    names[column])
+              : "--ignore leaves it out, --categorical says that it is meant";
     warn(fmt::format("llmt: column \"{}\" has words, {} different ones in {} rows, and is taken for categories; {}",
-                     name, inputs.levels[found.input].size(), inputs.values.rows(), advice));
+                     names[column], levels, inputs.values.rows(), advice));
+  }
+  for (Eigen::Index column = 0; column < inputs.values.cols(); ++column) {
+    if (!inputs.levels[column].empty() || !numbers_the_rows(inputs.values.col(column))) continue;
+    warn(fmt::format("llmt: column \"{}\" numbers the rows and is an input; --ignore leaves it out", names[column]));
   }
 }
 
@@ -163,29 +229,32 @@ LearningTable read_learning_table(const LearningArguments& arguments) {
   look_for_heavy_rows(csv, arguments, columns);
   look_for_accidental_inputs(arguments, inputs, columns.inputs);
   look_for_nothing_to_learn(csv, arguments, columns);
-  LearningTable table{inputs, std::move(columns.inputs), std::move(columns.targets), arguments.options,
-                      lines_of_rows(csv)};
+  LearningTable table{nullptr, arguments.options, lines_of_rows(csv)};
   FitOptions& options = table.options;
-  options.split_inputs = report::positions_of("--split-inputs", arguments.split_inputs, table.names);
-  options.regression_inputs = report::positions_of("--regression-inputs", arguments.regression_inputs, table.names);
-  options.monotone = report::signs_of("--monotone", arguments.monotone, table.names);
-  options.slope_signs = report::signs_of("--slope-sign", arguments.slope_signs, table.names);
-  options.categorical_inputs = table.inputs.categorical;
-  for (std::size_t j = 0; j < table.names.size(); ++j) {
+  options.split_inputs = positions("--split-inputs", arguments.split_inputs, inputs);
+  options.regression_inputs = positions("--regression-inputs", arguments.regression_inputs, inputs);
+  options.monotone = signs_of("--monotone", arguments.monotone, inputs);
+  options.slope_signs = signs_of("--slope-sign", arguments.slope_signs, inputs);
+  for (std::size_t j = 0; j < inputs.size(); ++j) {
     const int monotone = options.monotone.empty() ? 0 : options.monotone[j];
     const int sign = options.slope_signs.empty() ? 0 : options.slope_signs[j];
-    const std::vector<int>& categorical = table.inputs.categorical;
+    const std::vector<int>& categorical = columns.inputs.categorical;
     if ((monotone != 0 || sign != 0) && std::ranges::find(categorical, static_cast<int>(j)) != categorical.end()) {
       throw std::invalid_argument(fmt::format("{} names \"{}\", which is categorical",
-                                              monotone != 0 ? "--monotone" : "--slope-sign", table.names[j]));
+                                              monotone != 0 ? "--monotone" : "--slope-sign", inputs[j]));
     }
     if (monotone * sign < 0) {
       throw std::invalid_argument(
-          fmt::format("--monotone and --slope-sign name \"{}\" with opposite signs", table.names[j]));
+          fmt::format("--monotone and --slope-sign name \"{}\" with opposite signs", inputs[j]));
     }
   }
-  options.weights = std::move(columns.weights);
   options.folds.kind = arguments.contiguous ? FoldKind::contiguous : FoldKind::random;
+  TrainingData data{.inputs = std::move(columns.inputs.values), .outputs = std::move(columns.targets)};
+  data.weights = std::move(columns.weights);
+  data.levels = std::move(columns.inputs.levels);
+  data.input_names = inputs;
+  data.output_names = arguments.targets;
+  table.data = std::make_shared<const TrainingData>(std::move(data));
   return table;
 }
 
@@ -231,6 +300,7 @@ void add_learning_options(CLI::App& command, LearningArguments& arguments) {
       "--prune", [&options] { options.pruning = Pruning::weakest_link; },
       "Undo the splits of the weakest branches first, not the last ones, where fewer leaves predict better"));
   expert(add_seed(command, options.folds.seed, "Of the random folds"));
+  refuse_retired_options(command);
 }
 
 }  // namespace llmt::apps

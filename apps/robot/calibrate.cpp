@@ -120,7 +120,7 @@ void calibrate_command(CalibrateArguments arguments) {
                                  .measurements = measurements,
                                  .report = report,
                                  .models = report::judged_models(report, measurements, test, arguments.new_session),
-                                 .input_mistakes = robotics::input_mistakes(nominal, measurements, report),
+                                 .suspicions = robotics::suspicions(nominal, measurements, report),
                                  .outlier_lines = outlier_lines,
                                  .used = {},
                                  .details = {}};
@@ -140,7 +140,7 @@ void calibrate_command(CalibrateArguments arguments) {
   if (arguments.reports.wanted()) {
     reports = write_reports(arguments.reports, report::calibration_report({arguments.robot, arguments.data, nominal,
                                                                            report::points_of(measurements), report,
-                                                                           arguments.options, facts.input_mistakes}));
+                                                                           arguments.options, facts.suspicions}));
   }
   if (arguments.json) {
     print_json(report::calibration_json(facts));

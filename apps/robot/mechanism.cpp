@@ -80,7 +80,7 @@ void simulate_mechanism(const MechanismArguments& arguments, const robotics::Mec
 }
 
 // What the readings of a coordinate look like if most of them are far outside its limits; empty if they are not.
-std::string mistake(const robotics::Coordinate& coordinate, const Eigen::VectorXd& readings) {
+std::string suspicion(const robotics::Coordinate& coordinate, const Eigen::VectorXd& readings) {
   const double span = coordinate.upper - coordinate.lower;
   const auto inside = [&](double factor) {
     const auto values = factor * readings.array();
@@ -110,7 +110,7 @@ robotics::MechanismTable read_readings(const MechanismArguments& arguments, cons
                      missing.empty() ? "none" : fmt::format("{}", fmt::join(missing, ", "))));
   }
   for (std::size_t i = 0; i < mechanism.coordinates.size(); ++i) {
-    const std::string found = mistake(mechanism.coordinates[i], table.values.col(static_cast<Eigen::Index>(i)));
+    const std::string found = suspicion(mechanism.coordinates[i], table.values.col(static_cast<Eigen::Index>(i)));
     if (!found.empty()) warn(arguments.data + ": " + found);
   }
   return table;

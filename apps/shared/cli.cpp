@@ -115,7 +115,7 @@ std::string in_words_of_user(std::string_view message, std::span<const SettingNa
     for (std::size_t at = text.find(name.setting); at != std::string::npos; at = text.find(name.setting, at)) {
       const std::size_t end = at + name.setting.size();
       const bool is_whole = (at == 0 || (!is_part(text[at - 1]) && text[at - 1] != '.' && text[at - 1] != '-')) &&
-                            (end == text.size() || !is_part(text[end]) || text.compare(end, 2, ": ") == 0);
+                            (end == text.size() || !is_part(text[end]));
       if (is_whole) text.replace(at, name.setting.size(), name.option);
       at += is_whole ? name.option.size() : 1;
     }

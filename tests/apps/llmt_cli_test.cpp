@@ -152,6 +152,24 @@ TEST(LlmtProgram, FitPredictInspectAgreeWithTheLibrary) {
   EXPECT_NE(folder.run(llmt_program + " inspect m.json").out.find("everywhere"), std::string::npos);
 }
 
+TEST(LlmtProgram, RetiredOptionsSayWhyAndWhatToUse) {
+  const Folder folder;
+  folder.write("d.csv", labelled_table());
+  const auto refusal = [&](const std::string& arguments) {
+    const Outcome outcome = folder.run(llmt_program + " " + arguments);
+    EXPECT_EQ(outcome.exit_code, 2) << arguments;
+    EXPECT_EQ(outcome.out, "") << arguments;
+    return outcome.err;
+  };
+  const std::string merge = "llmt: --merge was retired in this version: leaves that shared a local model";
+  EXPECT_TRUE(refusal("fit d.csv -t y --merge").starts_with(merge));
+  EXPECT_TRUE(refusal("compare d.csv -t y --merge").starts_with(merge));
+  EXPECT_TRUE(refusal("fit --merge d.csv -t y").starts_with(merge));
+  EXPECT_NE(refusal("fit d.csv -t y --smoothness 2").find("--smoothness was retired"), std::string::npos);
+  EXPECT_NE(refusal("fit d.csv -t y --stream --stream-rule rd").find("--stream-rule was retired"), std::string::npos);
+  EXPECT_EQ(folder.run(llmt_program + " fit --help").out.find("--merge"), std::string::npos);
+}
+
 TEST(LlmtProgram, QueriesOutsideTheTrainingExtentAreFlagged) {
   const Folder folder;
   folder.write("d.csv", "x,y\n0,0\n1,1\n2,2\n3,3\n4,4\n");

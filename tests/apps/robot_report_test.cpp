@@ -1,9 +1,7 @@
 // Reports of the robot layer: what the documents say of simulated arms, where the truth is known.
 #include <gtest/gtest.h>
 
-#include <fstream>
 #include <optional>
-#include <set>
 #include <string>
 #include <vector>
 
@@ -11,7 +9,6 @@
 #include "llmt/robotics/robot_file.hpp"
 #include "llmt/robotics/simulation.hpp"
 #include "report/robot/arms.hpp"
-#include "report/robot/discovery/discovery_page.hpp"
 #include "report/robot/discovery/of_discovery.hpp"
 #include "report/robot/of_calibration.hpp"
 
@@ -86,36 +83,6 @@ TEST(RobotReport, CoverageCountsEveryPoseOnce) {
   const rb::Measurements data = measured(robot, 50);
   const Map map = coverage(robot.chain, data.poses.joints);
   for (Eigen::Index j = 0; j < map.z.rows(); ++j) EXPECT_NEAR(map.z.row(j).sum(), 100.0, 1e-9);
-}
-
-// The last cells of the table of answers in docs/discovery.md, without their backticks.
-std::set<std::string> documented_beginnings() {
-  std::ifstream page(LLMT_ROOT "/docs/discovery.md");
-  std::set<std::string> beginnings;
-  bool is_inside = false;
-  for (std::string line; std::getline(page, line);) {
-    if (line.starts_with("## ")) is_inside = line == "## The answer";
-    const std::size_t begin = line.rfind("| `");
-    if (!is_inside || begin == 0 || begin == std::string::npos || !line.ends_with("` |")) continue;
-    beginnings.insert(line.substr(begin + 3, line.size() - begin - 6));
-  }
-  return beginnings;
-}
-
-TEST(RobotReport, ThePageBeginsAsTheTableOfAnswersSays) {
-  const std::set<std::string> beginnings = documented_beginnings();
-  std::set<std::string> seen;
-  for (int number = 0; number <= static_cast<int>(rb::Headline::unknown); ++number) {
-    rb::Discovery found;
-    found.headline = static_cast<rb::Headline>(number);
-    const std::string page = discovery_page(found, {});
-    for (const std::string& beginning : beginnings) {
-      if (!page.starts_with(beginning)) continue;
-      EXPECT_TRUE(seen.insert(beginning).second) << beginning;
-    }
-    EXPECT_EQ(static_cast<int>(seen.size()), number + 1) << page;
-  }
-  EXPECT_EQ(seen, beginnings);
 }
 
 }  // namespace

@@ -108,6 +108,7 @@ TEST(StreamProgram, WrongUsageIsSaid) {
   EXPECT_NE(usage("d.csv -t y --stream --shared").find("--shared is not for --stream"), std::string::npos);
   EXPECT_NE(usage("d.csv -t y --stream --monotone a").find("--monotone is not for --stream"), std::string::npos);
   EXPECT_NE(usage("d.csv -t y --stream --local-models auto").find("--local-models is not"), std::string::npos);
+  EXPECT_NE(usage("d.csv -t y --stream-rule ra").find("--stream-rule was retired in this version"), std::string::npos);
   EXPECT_NE(usage("-t y --stream").find("data is required"), std::string::npos);
 }
 

@@ -13,14 +13,11 @@ using llmt::ValidityChoice;
 
 constexpr int rows = 240;
 
-// Twenty groups of rows. The options hold a view of it.
-const std::vector<double>& group_labels() {
-  static const std::vector<double> labels = [] {
-    Generator generator(31);
-    std::vector<double> made;
-    for (int row = 0; row < rows; ++row) made.push_back(std::floor(20.0 * generator.uniform()));
-    return made;
-  }();
+// Twenty groups of rows.
+std::vector<double> group_labels() {
+  Generator generator(31);
+  std::vector<double> labels;
+  for (int row = 0; row < rows; ++row) labels.push_back(std::floor(20.0 * generator.uniform()));
   return labels;
 }
 
@@ -110,16 +107,16 @@ const std::vector<OptionSet>& option_sets() {
       {"categorical",
        [](Task& task) {
          make_categorical(task.sample);
-         task.options.categorical_inputs = {2};
+         task.known.categorical_inputs = {2};
        }},
       {"categorical_missing_weighted",
        [](Task& task) {
          make_categorical(task.sample);
          remove_values(task.sample.inputs);
-         task.options.categorical_inputs = {2};
-         task.options.weights = make_weights(task.sample.inputs.rows());
+         task.known.categorical_inputs = {2};
+         task.known.weights = make_weights(task.sample.inputs.rows());
        }},
-      {"weighted", [](Task& task) { task.options.weights = make_weights(task.sample.inputs.rows()); }},
+      {"weighted", [](Task& task) { task.known.weights = make_weights(task.sample.inputs.rows()); }},
       {"two_outputs",
        [](Task& task) {
          add_output(task.sample);
@@ -152,7 +149,7 @@ const std::vector<OptionSet>& option_sets() {
          task.options.max_leaves = 8;
        }},
       {"contiguous_folds", [](Task& task) { task.options.folds.kind = llmt::FoldKind::contiguous; }},
-      {"grouped_folds", [](Task& task) { task.options.folds.groups = group_labels(); }},
+      {"grouped_folds", [](Task& task) { task.known.groups = group_labels(); }},
       {"some_columns",
        [](Task& task) {
          task.options.split_inputs = {1};

@@ -30,7 +30,7 @@ check(libraries_know_no_apps llmt/src/model/model.cpp "#include \"apps/shared/cl
 check(reports_know_no_programs apps/report/fit/fit_text.cpp "#include \"shared/cli.hpp\"")
 check(reports_know_no_programs apps/report/document/page.cpp "#include <CLI/CLI.hpp>")
 check(llmt_knows_no_expressions llmt/src/fit/fit.cpp "#include \"expressions/expression.hpp\"")
-check(expressions_know_nobody llmt/expressions/expression.cpp "#include \"llmt/csv.hpp\"")
+check(expressions_know_nobody expressions/src/expression.cpp "#include \"llmt/csv.hpp\"")
 check(no_parent_folders apps/robot/main.cpp "#include \"../shared/exit_codes.hpp\"")
 check(discovery_knows_no_trees llmt/src/discovery/verdict.cpp "#include \"llmt/model.hpp\"")
 check(discovery_knows_no_trees llmt/include/llmt/discovery/verdict.hpp "#include \"llmt/fit.hpp\"")
@@ -43,8 +43,8 @@ check(public_headers_include_public_headers llmt/include/llmt/model.hpp "#includ
 check(eigen_comes_with_abi llmt/include/llmt/model.hpp "#include <Eigen/Core>" "#include <vector>")
 
 check(rooms llmt/src/base/parallel.cpp "#include \"model/tree.hpp\"")
-check(rooms llmt/src/partition/tree.cpp "#include \"llmt/fit.hpp\"")
-check(rooms llmt/src/partition/tree.cpp "#include \"evaluator.hpp\"")
+check(rooms llmt/src/model/tree.cpp "#include \"llmt/fit.hpp\"")
+check(rooms llmt/src/model/tree.cpp "#include \"evaluator.hpp\"")
 check(rooms llmt/src/attic/tree.cpp "#include <vector>")
 check(none llmt/src/fit/fit.cpp "#include \"model/tree.hpp\"" "#include \"llmt/fit.hpp\"" "#include \"fit/defaults.hpp\"")
 

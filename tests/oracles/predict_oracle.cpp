@@ -33,7 +33,8 @@ double share_of_left(const llmt::Model& model, const llmt::Partition& partition,
   const double u = (x - node.threshold) / node.half_width;
   if (partition.validity.kind == llmt::ValidityKind::logistic) return 1.0 / (1.0 + std::exp(u));
   const double v = (std::clamp(u, -1.0, 1.0) + 1.0) / 2.0;
-  return 1.0 - v * v * (3.0 - 2.0 * v);
+  return partition.validity.smoothness == 1 ? 1.0 - v * v * (3.0 - 2.0 * v)
+                                            : 1.0 - v * v * v * (10.0 - 15.0 * v + 6.0 * v * v);
 }
 
 void share(const llmt::Model& model, const llmt::Partition& partition, int index, double validity,
@@ -102,7 +103,9 @@ Eigen::VectorXd local(const llmt::Partition& partition, int leaf, const Eigen::V
   Eigen::VectorXd value = node.value + node.slope * below;
   int asked = 0;
   for (int index = leaf; index > 0; ++asked) {
-    const int parent = asked >= 64 ? 0 : parent_of(partition, index);
+    const int parent = asked >= 64                               ? 0
+                       : index == leaf && node.guard_parent >= 0 ? node.guard_parent
+                                                                 : parent_of(partition, index);
     const llmt::Node& ancestor = partition.nodes[parent];
     const Eigen::VectorXd reached = deviations.array().isNaN().select(below, held(ancestor, deviations));
     value += ancestor.slope * (reached - below);

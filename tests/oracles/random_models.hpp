@@ -19,6 +19,7 @@ using llmt::ValidityKind;
 struct Kind {
   std::string name;
   ValidityKind validity = ValidityKind::crisp;
+  int smoothness = 1;
   int inputs = 3;
   int categories = 0;  // inputs with levels, behind the numbers
   int outputs = 1;
@@ -63,9 +64,10 @@ inline llmt::Partition random_partition(const Kind& kind, std::vector<int> outpu
                                         const std::vector<llmt::InputColumn>& inputs, Eigen::Index regressors,
                                         llmt::Random& random) {
   const Eigen::Index served = std::ssize(outputs);
-  llmt::Partition partition{.outputs = std::move(outputs),
-                            .validity = {kind.validity, kind.validity == ValidityKind::gaussian ? 0.4 : 1.0},
-                            .nodes = {}};
+  llmt::Partition partition{
+      .outputs = std::move(outputs),
+      .validity = {kind.validity, kind.validity == ValidityKind::gaussian ? 0.4 : 1.0, kind.smoothness},
+      .nodes = {}};
   const Eigen::VectorXd reach = Eigen::VectorXd::Constant(regressors, 1.2);
   partition.nodes = {local_model(served, -reach, reach, random)};
   std::vector<Eigen::VectorXd> low = {Eigen::VectorXd::Constant(kind.inputs, -1.0)};

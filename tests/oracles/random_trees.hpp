@@ -27,6 +27,15 @@ inline const std::vector<Kind> kinds = {{llmt::ValidityChoice::crisp, 1.0},
                                         {llmt::ValidityChoice::blend, 1.0},
                                         {llmt::ValidityChoice::gaussian, 1.0 / 3.0}};
 
+/// The model as a file of an earlier version may hold it: blends with `smoothness` continuous derivatives.
+inline llmt::Model with_smoothness(const llmt::Model& model, int smoothness) {
+  std::vector<llmt::Partition> partitions = model.partitions();
+  for (llmt::Partition& partition : partitions) {
+    partition.validity.smoothness = smoothness;
+  }
+  return {model.inputs(), model.outputs(), model.regressors(), std::move(partitions)};
+}
+
 /// One candidate, no choice.
 inline llmt::FitOptions only(const Kind& kind, llmt::Estimation estimation, Eigen::Index max_leaves,
                              double ridge = 1e-3) {

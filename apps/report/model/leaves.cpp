@@ -224,7 +224,7 @@ Json leaves_json(const Model& model) {
     Json entry;
     entry["validity"] = {{"kind", name_of(partition.validity.kind)},
                          {"width", partition.validity.width},
-                         {"smoothness", 1}};
+                         {"smoothness", partition.validity.smoothness}};
     for (const int output : partition.outputs) {
       const Eigen::Index position = std::ssize(entry["targets"]);
       entry["targets"].push_back(model.outputs()[output].name);

@@ -51,7 +51,7 @@ struct CalibrationFacts {
   const robotics::Measurements& measurements;
   const robotics::CalibrationReport& report;
   std::vector<JudgedModel> models;
-  std::vector<std::string> input_mistakes;
+  std::vector<std::string> suspicions;
   std::vector<Eigen::Index> outlier_lines;  ///< of the file: readings that were left out
   std::optional<robotics::Coverage> used;   ///< of the poses of the test file
   std::optional<CalibrationDetails> details;

@@ -93,7 +93,7 @@ Json calibration_json(const CalibrationFacts& facts) {
     json["uncertain"].push_back(parameter.name);
   }
   std::vector<std::string> warnings = measurements.warnings;
-  warnings.insert(warnings.end(), facts.input_mistakes.begin(), facts.input_mistakes.end());
+  warnings.insert(warnings.end(), facts.suspicions.begin(), facts.suspicions.end());
   json["warnings"] = warnings;
   json["outlier_lines"] = facts.outlier_lines;
   if (facts.used) {

@@ -134,8 +134,8 @@ std::string verdict(const CalibrationFacts& facts) {
     return (is_held_out ? stage.held_out_mm : stage.in_sample_mm).mean();
   };
   std::string text;
-  for (const std::string& mistake : facts.input_mistakes) text += "WARNING: " + mistake + "\n";
-  if (facts.input_mistakes.empty()) {
+  for (const std::string& suspicion : facts.suspicions) text += "WARNING: " + suspicion + "\n";
+  if (facts.suspicions.empty()) {
     text += fmt::format("Calibrated: the mean {} error falls from {:.4f} to {:.4f} mm", kind_of(facts.measurements),
                         mean(report.nominal), mean(report.geometric));
     if (report.correction_kept) {

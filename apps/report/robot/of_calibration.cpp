@@ -195,7 +195,7 @@ Document calibration_report(const Calibrated& of) {
   document.lead = fmt::format("{} poses of {}; {} parameters identified.", of.measurements.count(),
                               of.nominal.chain.name, of.report.calibration.result.rank);
   if (!of.report.calibration.result.converged()) document.lead += " The calibration did not converge: do not use it.";
-  for (const std::string& mistake : of.input_mistakes) document.lead += " WARNING: " + mistake;
+  for (const std::string& suspicion : of.suspicions) document.lead += " WARNING: " + suspicion;
   std::vector<Sample> samples;
   std::vector<std::pair<std::string, Eigen::VectorXd>> per_pose;
   std::vector<std::string> roles;

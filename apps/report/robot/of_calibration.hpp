@@ -17,7 +17,7 @@ struct Calibrated {
   const robotics::Measurements& measurements;
   const robotics::CalibrationReport& report;
   const robotics::ReportOptions& options;
-  const std::vector<std::string>& input_mistakes;  ///< what looks like a mistake
+  const std::vector<std::string>& suspicions;  ///< what looks like a mistake
 };
 
 Document calibration_report(const Calibrated& calibrated);

@@ -22,8 +22,8 @@ struct ColumnRoles {
 
 /// The caller's words for what can be done about an input that cannot be read.
 struct ColumnAdvice {
-  std::string leave_out;      ///< ends the error: " (--ignore COLUMN leaves a column out)", or nothing
-  std::string as_categories;  ///< stands before the column's name: "--categorical"
+  std::string leave_out;                      ///< ends the error: " (--ignore COLUMN leaves a column out)", or nothing
+  std::string as_categories = "categorical";  ///< stands before the column's name: "--categorical"
 };
 
 /// Inputs to learn from.

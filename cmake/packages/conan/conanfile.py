@@ -21,7 +21,7 @@ class LlmtConan(ConanFile):
 
     def export_sources(self):
         root = os.path.join(self.recipe_folder, "..", "..", "..")
-        for pattern in ("CMakeLists.txt", "LICENSE", "cmake/*", "llmt/*", "robotics/*", "apps/*"):
+        for pattern in ("CMakeLists.txt", "LICENSE", "cmake/*", "llmt/*", "expressions/*", "robotics/*", "apps/*"):
             copy(self, pattern, root, self.export_sources_folder)
 
     def requirements(self):

@@ -24,9 +24,10 @@ struct Method {
 /// The methods of `llmt compare`: least squares; the crisp tree of each growth rule that has one (RD, RETIS, RA, M5');
 /// Gaussians over a crisp tree as in Benes et al. (2022), as grown and with joint estimation; the blend with joint
 /// estimation; LOLIMOT; HILOMOT. With `inputs`, the number of input columns, also the crisp tree with quadratic local
-/// models where these can be made. `base` gives columns, weights, folds and threads; with Pruning::weakest_link the
-/// pruned crisp tree and blend are added.
-std::vector<Method> usual_methods(const FitOptions& base = {}, Eigen::Index inputs = 0);
+/// models where these can be made; `categorical`: which of the columns are categorical. `base` gives columns, folds and
+/// threads; with Pruning::weakest_link the pruned crisp tree and blend are added.
+std::vector<Method> usual_methods(const FitOptions& base = {}, Eigen::Index inputs = 0,
+                                  const std::vector<int>& categorical = {});
 
 /// What one method made of the data.
 struct Comparison {
@@ -63,6 +64,10 @@ struct CompareOptions {
 /// leaves out count in no held-out error; they are found once, on all rows, for all methods.
 ///
 /// Throws std::invalid_argument as fit(), and if there is no method, or more than one output.
+ComparisonResult compare(const TrainingData& data, const std::vector<Method>& methods,
+                         const CompareOptions& options = {});
+
+/// The comparison on matrices about whose rows and columns nothing else is known.
 ComparisonResult compare(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
                          const Eigen::Ref<const Eigen::MatrixXd>& output, const std::vector<Method>& methods,
                          const CompareOptions& options = {});

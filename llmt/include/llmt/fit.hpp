@@ -12,6 +12,8 @@
 #include <Eigen/Core>
 
 #include <memory>
+#include <string>
+#include <vector>
 
 #include "llmt/abi.hpp"
 #include "llmt/intervals.hpp"
@@ -28,10 +30,31 @@ struct FitResult {
   Intervals intervals;  ///< from the folds; empty without folds or without FitOptions::intervals
 };
 
+/// What a model is learned from: matrices, and what is known of their rows and columns. What is empty is not known.
+///
+///     llmt::TrainingData data{inputs, output};
+///     data.weights = weights;
+///     data.levels = {{}, {"blue", "red"}};  // the second column has 0 for blue, 1 for red
+///     data.input_names = {"age", "colour"};
+///     data.output_names = {"price"};
+///     const llmt::Model model = llmt::fit(data).model;  // named
+struct TrainingData {
+  Eigen::MatrixXd inputs;                    ///< rows x inputs; NaN: missing
+  Eigen::MatrixXd outputs;                   ///< rows x outputs
+  Eigen::VectorXd weights = {};              ///< one a row, not negative; a row of weight 0 takes no part. Empty: all 1
+  std::vector<double> groups = {};           ///< one a row; rows of one group (repeats of a pose) share a fold
+  std::vector<int> categorical_inputs = {};  ///< columns whose values are categories 0, 1, 2, ...
+  /// Of each input the names of its categories, which its values number from 0 on; no names: a number, or categories
+  /// without names. An input with names is categorical.
+  std::vector<std::vector<std::string>> levels = {};
+  std::vector<std::string> input_names = {};
+  std::vector<std::string> output_names = {};
+};
+
 /// Grows a local linear model tree for every output, or one for all.
 ///
-/// inputs: rows x inputs; outputs: rows x outputs. Columns are named x1, x2, ... and y1, y2, ... (a single output: y);
-/// Model::named() renames them. Inputs may be missing (NaN), see Model; outputs may not.
+/// Inputs may be missing (NaN), see Model; outputs may not. Columns without names are x1, x2, ... and y1, y2, ... (a
+/// single output: y).
 ///
 /// A leaf's local model corrects its parent's by least squares on the leaf's rows, with the smallest norm of the
 /// correction (inputs scaled to unit variance in the leaf). Where the rows do not determine a direction (fewer rows
@@ -43,15 +66,12 @@ struct FitResult {
 ///
 /// Throws std::invalid_argument naming argument, value and bound: no rows or columns, row counts that differ, an
 /// infinite input or an output that is not finite, an option out of range or against another one, a column index out of
-/// range or repeated, a category that is not a whole number from 0 on.
+/// range or repeated, a category that is not a whole number from 0 on, names that are too few, too many or repeated.
+FitResult fit(const TrainingData& data, const FitOptions& options = {});
+
+/// The fit of matrices about whose rows and columns nothing else is known.
 FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<const Eigen::MatrixXd>& outputs,
               const FitOptions& options = {});
-
-/// What a model is learned from.
-struct TrainingData {
-  Eigen::MatrixXd inputs;   ///< rows x inputs; NaN: missing
-  Eigen::MatrixXd outputs;  ///< rows x outputs
-};
 
 struct PreparedRows;
 
@@ -67,6 +87,9 @@ class PreparedFit {
  public:
   /// Throws std::invalid_argument as fit(). `progress`: of the preparation. FitOptions::progress is not used.
   explicit PreparedFit(TrainingData data, const FitOptions& options = {}, const Progress& progress = {});
+  /// Shares the data with the caller.
+  explicit PreparedFit(std::shared_ptr<const TrainingData> data, const FitOptions& options = {},
+                       const Progress& progress = {});
 
   const TrainingData& data() const;
 

@@ -71,21 +71,14 @@ struct ModelWithIntervals {
   Intervals intervals;  ///< may be empty
 };
 
-/// The text of to_json(model) with the intervals as one member more, if there are any. Throws std::invalid_argument if
-/// the intervals belong to another model: if a model of theirs has other numbers of inputs, outputs or levels, names
-/// other than the model's or those that fit() gives (x1, x2, ... and y, or y1, y2, ...), or was trained on rows outside
-/// of the model's training extent. Throws as to_json(model).
-std::string to_json(const Model& model, const Intervals& intervals);
-
-/// Reads what to_json() wrote, with the intervals, which are empty if there are none. `name` stands before the place in
-/// errors. Throws std::runtime_error as from_json(), and if the intervals belong to another model.
-ModelWithIntervals from_json_with_intervals(const std::string& text, const std::string& name = "model");
-
-/// Writes to_json(model, intervals) to a file. Throws as to_json() and write_file().
+/// Writes a model as save() does, with the intervals beside it in the file (nothing if they are empty). Throws
+/// std::invalid_argument if the intervals belong to another model: if a model of theirs has other numbers of inputs,
+/// outputs or levels, names other than the model's or those that fit() gives (x1, x2, ... and y, or y1, y2, ...), or
+/// was trained on rows outside of the model's training extent. Throws as save().
 void save(const Model& model, const Intervals& intervals, const std::string& path);
 
-/// Reads a file that save() wrote. Throws std::runtime_error as from_json_with_intervals(), with the path, and as
-/// read_file().
+/// Reads a file that save() wrote, with its intervals, which are empty if it has none. Throws std::runtime_error as
+/// load(), and if the intervals belong to another model.
 ModelWithIntervals load_with_intervals(const std::string& path);
 
 }  // namespace llmt

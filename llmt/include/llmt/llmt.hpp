@@ -17,7 +17,6 @@
 #include "llmt/names.hpp"
 #include "llmt/options.hpp"
 #include "llmt/outliers.hpp"
-#include "llmt/partition.hpp"
 #include "llmt/progress.hpp"
 #include "llmt/random.hpp"
 #include "llmt/readable.hpp"

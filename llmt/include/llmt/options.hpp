@@ -165,17 +165,15 @@ struct FitOptions {
   /// The tree is grown anew in every fold, and what predicts the held-out rows best is kept. count 0: no choice, the
   /// tree stays as grown. From 50 000 rows on, only the first fold is held out.
   FoldOptions folds = {};
-  std::vector<int> categorical_inputs = {};  ///< columns whose values are categories 0, 1, 2, ...
   /// One entry an input: the sign -1 or 1 that its slope has in every local model, unless the slope is 0. 0: any sign.
   /// Empty: no demand. Does not restrict the jumps between leaves.
   std::vector<int> slope_signs = {};
   /// One entry an input: with 1 no output falls when this input rises, with -1 none rises, anywhere in the input space.
   /// 0: no demand. Empty: no demand on any input. Includes the signs of the slopes.
   std::vector<int> monotone = {};
-  Eigen::VectorXd weights = {};  ///< one entry a row, not negative; a row of weight 0 takes no part. Empty: all 1
-  bool intervals = true;         ///< keep the folds' models and residuals for prediction intervals
-  int max_threads = 0;           ///< 0: all that the machine has. The result does not depend on it
-  Progress progress = {};        ///< is called as the work goes on, and may cancel it
+  bool intervals = true;   ///< keep the folds' models and residuals for prediction intervals
+  int max_threads = 0;     ///< 0: all that the machine has. The result does not depend on it
+  Progress progress = {};  ///< is called as the work goes on, and may cancel it
   ExpertOptions expert = {};
 };
 

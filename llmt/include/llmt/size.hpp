@@ -26,7 +26,8 @@ namespace llmt {
 /// - 3 + n for a categorical input with n levels on the left: if(x in {a, b, ...}, L, R); 3 for a split into rows with
 ///   and without a value: if(x is missing, R, L);
 /// - 51 + 4 s for the transition of a blend: (1 - q) * L + q * R with q = v ^ 2 * (3 - 2 * v) and
-///   v = min(1, max(0, (s - a) / b)), a = threshold - half width, b = 2 * half width;
+///   v = min(1, max(0, (s - a) / b)), a = threshold - half width, b = 2 * half width (for smoothness 2: 73 + 6 s,
+///   q = v ^ 3 * (10 - v * (15 - 6 * v)));
 /// - 23 + 2 s for a logistic gate: g * L + (1 - g) * R with g = 1 / (1 + exp((s - threshold) / half width)).
 /// A blend is therefore counted as the nested form of its sum of validity times local model, which is the shorter one.
 /// Normalised Gaussians, (mu_1 * f_1 + ...) / (mu_1 + ...), have no such form: with d inputs that splits use, each

@@ -4,14 +4,12 @@
 ///     llmt::Stream stream(inputs.cols(), outputs.cols());
 ///     stream.add(inputs, outputs);  // as often as rows come
 ///     const Eigen::MatrixXd predicted = stream.snapshot().predict(new_inputs);
-///     llmt::Stream later = llmt::stream_from_json(to_json(stream));  // goes on as the first one does
 #pragma once
 
 #include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <string>
 
 #include "llmt/abi.hpp"
 #include "llmt/model.hpp"
@@ -98,20 +96,7 @@ class Stream {
   Model snapshot(ValidityChoice validity = ValidityChoice::automatic) const;
 
  private:
-  friend std::string to_json(const Stream& stream);
-  friend Stream stream_from_json(const std::string& text, const std::string& name);
-
   std::unique_ptr<StreamState> state_;
 };
-
-/// Everything that a stream needs to go on, as JSON text (docs/file-formats.md): trees with their sums, rows that are
-/// kept, what is known of changes under way. All digits of numbers are kept. It takes about 20 bytes for each number of
-/// 8 bytes that StreamCounts::bytes counts.
-std::string to_json(const Stream& stream);
-
-/// The stream that to_json() wrote. Given the same rows it goes on to the same bytes as the stream that was written.
-/// `name` stands before the place in errors. Throws std::runtime_error `name: /trees/0/nodes/3/low: ...` if the text is
-/// cut off or no JSON, or if a member is missing or contradicts others.
-Stream stream_from_json(const std::string& text, const std::string& name = "stream");
 
 }  // namespace llmt

@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "llmt/abi.hpp"
+#include "llmt/model.hpp"
 #include "llmt/options.hpp"
-#include "llmt/partition.hpp"
 
 namespace llmt {
 
@@ -129,7 +129,7 @@ struct FitSummary {
   /// LocalTerms::automatic: the best candidate with the terms that were not taken, one entry a partition. Else empty.
   std::vector<CandidateError> other_terms = {};
   /// Loss::tukey: the weight in [0, 1] that each row had by its residual, 0 for outliers. Else empty. Errors leave out
-  /// rows of weight 0; all others count in full there, times FitOptions::weights.
+  /// rows of weight 0; all others count in full there, times TrainingData::weights.
   Eigen::VectorXd loss_weights = {};
   /// The rows that each fold held out, ascending, in the order of Intervals::models(): the model of a fold has not seen
   /// the rows of its list. Copies of a row are in the list of the row that they copy, and repeats of a measurement in

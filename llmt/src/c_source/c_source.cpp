@@ -11,8 +11,8 @@
 
 #include "base/simd.hpp"
 #include "c_source/runtime.hpp"
-#include "partition/leaf_validities.hpp"
-#include "partition/tree.hpp"
+#include "model/leaf_validities.hpp"
+#include "model/tree.hpp"
 
 namespace llmt {
 namespace {
@@ -186,12 +186,13 @@ std::string add_partition(Tables& tables, const Model& model, std::size_t index,
   }
   const ValidityKind kind = partition.validity.kind;
   const int kind_number = kind == ValidityKind::logistic ? 1 : kind == ValidityKind::gaussian ? 2 : 0;
-  std::vector<std::string> parts = {std::to_string(kind_number), std::to_string(partition.outputs.size())};
+  std::vector<std::string> parts = {std::to_string(kind_number), std::to_string(partition.validity.smoothness),
+                                    std::to_string(partition.outputs.size())};
   parts.push_back(tables.add(of("columns"), partition.outputs));
   parts.push_back(tables.add(of("branches"), fmt::format("struct {}_branch", name).c_str(), branches));
   parts.push_back(tables.add(of("level_share"), validities.level_shares()));
   parts.push_back(tables.add(of("terms"), fmt::format("struct {}_term", name).c_str(), terms));
-  parts.push_back(tables.add(of("parents"), parents_of(partition)));
+  parts.push_back(tables.add(of("parents"), guard_parents_of(partition)));
   parts.push_back(tables.add(of("nodes"), node_table(partition, stride)));
   parts.push_back(tables.add(of("values"), values));
   parts.push_back(tables.add(of("outer"), outer_slopes));

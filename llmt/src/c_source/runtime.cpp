@@ -22,7 +22,7 @@ struct @_regressor {
 };
 
 struct @_partition {
-  int kind; /* 0 crisp or blend, 1 logistic, 2 Gaussian */
+  int kind, smoothness; /* 0 crisp or blend, 1 logistic, 2 Gaussian */
   int outputs;
   const int *columns; /* of the model's outputs */
   const struct @_branch *branches;
@@ -75,10 +75,11 @@ static void @_deviations(const double *x, double *d) {
   for (; k < @_STRIDE; ++k) d[k] = 0.0;
 }
 
-static double @_transition(double u) {
+static double @_transition(double u, int smoothness) {
   const double held = u < -1.0 ? -1.0 : u > 1.0 ? 1.0 : u;
   const double v = 0.5 * (held + 1.0);
-  const double share = 1.0 - v * v * (3.0 - 2.0 * v);
+  const double share =
+      smoothness == 1 ? 1.0 - v * v * (3.0 - 2.0 * v) : 1.0 - v * v * v * (10.0 - v * (15.0 - 6.0 * v));
   return share < 0.0 ? 0.0 : share > 1.0 ? 1.0 : share;
 }
 
@@ -128,7 +129,7 @@ static double @_left_share(const struct @_partition *p, const struct @_branch *b
   if (s != s) return b->missing_left;
   if (b->per_half_width == 0.0) return s <= b->threshold ? 1.0 : 0.0;
   s = (s - b->threshold) * b->per_half_width;
-  return p->kind == 1 ? @_logistic(s) : @_transition(s);
+  return p->kind == 1 ? @_logistic(s) : @_transition(s, p->smoothness);
 }
 
 /* The order of the sums is that of the library: four partial sums. */

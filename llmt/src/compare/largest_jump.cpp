@@ -4,7 +4,7 @@
 
 #include "llmt/compare.hpp"
 #include "model/codes.hpp"
-#include "partition/evaluator.hpp"
+#include "model/evaluator.hpp"
 
 namespace llmt {
 namespace {

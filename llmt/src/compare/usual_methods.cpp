@@ -80,7 +80,7 @@ class Methods {
 
 }  // namespace
 
-std::vector<Method> usual_methods(const FitOptions& base, Eigen::Index inputs) {
+std::vector<Method> usual_methods(const FitOptions& base, Eigen::Index inputs, const std::vector<int>& categorical) {
   Methods methods(base);
   methods.add("least squares", [](FitOptions& options) {
     options.max_leaves = 1;
@@ -90,7 +90,7 @@ std::vector<Method> usual_methods(const FitOptions& base, Eigen::Index inputs) {
   methods.add_gaussians();
   methods.add("blend, joint", [](FitOptions& options) { options.validity = ValidityChoice::blend; });
   methods.add_rules(false);
-  const Eigen::Index numbers = count_numeric_inputs(inputs, base);
+  const Eigen::Index numbers = count_numeric_inputs(inputs, categorical, base);
   if (numbers > 0 && numbers <= most_inputs_of_products) {
     methods.add("crisp tree, quadratic leaves", [](FitOptions& options) { options.terms = LocalTerms::quadratic; });
   }

@@ -3,8 +3,8 @@
 #include <algorithm>
 
 #include "constraints/monotone_splits.hpp"
-#include "partition/smooth_clamp.hpp"
-#include "partition/tree.hpp"
+#include "model/hold.hpp"
+#include "model/tree.hpp"
 
 namespace llmt {
 
@@ -90,7 +90,7 @@ double LeafGeometry::slope_share(int leaf, int input, double from, double to) co
 
 ClampedDeviation LeafGeometry::clamped(int leaf, Eigen::Index regressor, double deviation) const {
   const auto clamped_by = [&](int index) {
-    return smooth_clamp(deviation, node(index).low(regressor), node(index).high(regressor));
+    return hold(deviation, node(index).low(regressor), node(index).high(regressor));
   };
   ClampedDeviation result{clamped_by(leaf), 0.0};
   double below = result.deviation;
@@ -109,7 +109,7 @@ void LeafGeometry::add_kinks(int leaf, Eigen::Index regressor, double low, doubl
   for (int at = leaf; at >= 0; at = next_ancestor(parents_, at, left)) {
     const double first = node(at).low(regressor);
     const double last = node(at).high(regressor);
-    const double round = rounding_of_clamp * (last - first);
+    const double round = rounding_of_hold * (last - first);
     for (const double kink : {first - round, first, last, last + round}) {
       if (kink > low && kink < high) to.push_back(kink);
     }

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <limits>
 
-#include "partition/transition.hpp"
-#include "partition/tree.hpp"
+#include "model/transition.hpp"
+#include "model/tree.hpp"
 
 namespace llmt {
 namespace {
@@ -103,14 +103,15 @@ void widen_ranges(Partition& partition, const TrainingRows& training, const Supp
 }
 
 // The validity of the left child where the input has its mean, or its most frequent level `usual_level`.
-double left_at_usual_value(const Node& node, const TrainingRows& training, int usual_level) {
+double left_at_usual_value(const Node& node, const Partition& partition, const TrainingRows& training,
+                           int usual_level) {
   if (!node.level_side.empty()) {
     const int side = node.level_side[usual_level];
     return side < 0 || (side == 0 && node.missing_left >= 0.5) ? 1.0 : 0.0;
   }
   const double centre = training.columns[node.split_input].centre;
   const double h = half_width_of(node);
-  if (h > 0.0) return transition((centre - node.threshold) / h);
+  if (h > 0.0) return transition((centre - node.threshold) / h, partition.validity.smoothness);
   return centre <= node.threshold ? 1.0 : 0.0;
 }
 
@@ -124,7 +125,7 @@ void prepare_ordered_splits(Partition& partition, const TrainingRows& training) 
     Node& node = partition.nodes[i];
     node.mean.setZero();
     if (node.is_leaf()) continue;
-    node.missing_left = left_at_usual_value(node, training, usual[node.split_input]);
+    node.missing_left = left_at_usual_value(node, partition, training, usual[node.split_input]);
   }
 }
 

@@ -9,8 +9,8 @@
 
 #include "base/parallel.hpp"
 #include "data/regressors.hpp"
-#include "partition/evaluator.hpp"
-#include "partition/through_regressors.hpp"
+#include "model/evaluator.hpp"
+#include "model/through_regressors.hpp"
 
 namespace llmt {
 namespace {

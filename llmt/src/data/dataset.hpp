@@ -9,7 +9,7 @@
 
 #include "base/matrix.hpp"
 #include "data/table.hpp"
-#include "llmt/partition.hpp"
+#include "llmt/model.hpp"
 
 namespace llmt {
 

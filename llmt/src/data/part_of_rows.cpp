@@ -8,7 +8,7 @@
 #include "base/parallel.hpp"
 #include "data/dataset.hpp"
 #include "data/regressors.hpp"
-#include "partition/through_regressors.hpp"
+#include "model/through_regressors.hpp"
 
 namespace llmt {
 

@@ -89,9 +89,9 @@ bool is_any_set(const std::vector<int>& signs) {
   return std::ranges::any_of(signs, [](int sign) { return sign != 0; });
 }
 
-void check_signs(const FitOptions& options, Eigen::Index inputs) {
-  check_signs("slope_signs", options.slope_signs, options.categorical_inputs, inputs);
-  check_signs("monotone", options.monotone, options.categorical_inputs, inputs);
+void check_signs(const FitOptions& options, const std::vector<int>& categorical, Eigen::Index inputs) {
+  check_signs("slope_signs", options.slope_signs, categorical, inputs);
+  check_signs("monotone", options.monotone, categorical, inputs);
   for (std::size_t j = 0; is_any_set(options.monotone) && j < options.slope_signs.size(); ++j) {
     require(options.monotone[j] == 0 || options.slope_signs[j] != -options.monotone[j],
             fmt::format("slope_signs[{}]", j).c_str(), options.slope_signs[j], "not the opposite of monotone");
@@ -120,8 +120,9 @@ void check_weights(const Eigen::VectorXd& weights, Eigen::Index rows) {
   require(weights.maxCoeff() > 0.0, "the largest weight", weights.maxCoeff(), "positive");
 }
 
-void check_products(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const FitOptions& options) {
-  const Eigen::Index numbers = count_numeric_inputs(inputs.cols(), options);
+void check_products(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const std::vector<int>& categorical,
+                    const FitOptions& options) {
+  const Eigen::Index numbers = count_numeric_inputs(inputs.cols(), categorical, options);
   require(numbers <= most_inputs_of_products,
           "the number of numeric regression inputs of quadratic local models (terms)", static_cast<double>(numbers),
           "at most 13; regression_inputs chooses them");
@@ -144,24 +145,25 @@ void check_magnitudes(const char* name, const Eigen::Ref<const Eigen::MatrixXd>&
 }
 
 void check_data(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<const Eigen::MatrixXd>& outputs,
-                const Eigen::VectorXd& weights, const FitOptions& options) {
+                const Eigen::VectorXd& weights, const std::vector<int>& categorical, const FitOptions& options) {
   check_size("inputs", inputs);
   check_finite_or_missing("llmt::fit", "inputs", inputs);
   check_magnitudes("inputs", inputs);
   check_outputs(outputs, inputs.rows());
-  check_columns("llmt::fit", "categorical_inputs", options.categorical_inputs, inputs.cols());
-  check_categories(inputs, options.categorical_inputs);
+  check_columns("llmt::fit", "categorical_inputs", categorical, inputs.cols());
+  check_categories(inputs, categorical);
   check_weights(weights, inputs.rows());
-  check_signs(options, inputs.cols());
-  if (options.terms == LocalTerms::quadratic) check_products(inputs, options);
+  check_signs(options, categorical, inputs.cols());
+  if (options.terms == LocalTerms::quadratic) check_products(inputs, categorical, options);
 }
 
 Table make_table(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<const Eigen::MatrixXd>& outputs,
-                 Eigen::VectorXd weights, const FitOptions& options, bool orders_splits) {
+                 Eigen::VectorXd weights, const std::vector<int>& categorical, const FitOptions& options,
+                 bool orders_splits) {
   Table table{inputs,
               outputs,
               std::move(weights),
-              count_levels(inputs, options.categorical_inputs),
+              count_levels(inputs, categorical),
               options.regression_inputs,
               options.split_inputs};
   for (std::vector<int>* columns : {&table.split_inputs, &table.regression_inputs}) {

@@ -5,7 +5,7 @@
 #include "constraints/monotone_splits.hpp"
 #include "estimation/joint_estimate.hpp"
 #include "estimation/local_estimate.hpp"
-#include "partition/tree.hpp"
+#include "model/tree.hpp"
 
 namespace llmt {
 namespace {

@@ -1,8 +1,8 @@
 #include "estimation/joint_equations.hpp"
 
 #include "base/count.hpp"
+#include "model/tree.hpp"
 #include "numerics/dense.hpp"
-#include "partition/tree.hpp"
 
 namespace llmt {
 namespace {

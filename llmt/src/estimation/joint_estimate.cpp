@@ -4,9 +4,9 @@
 #include <utility>
 
 #include "estimation/local_estimate.hpp"
+#include "model/evaluator.hpp"
+#include "model/imputed.hpp"
 #include "numerics/conjugate_gradients.hpp"
-#include "partition/evaluator.hpp"
-#include "partition/imputed.hpp"
 
 namespace llmt {
 namespace {

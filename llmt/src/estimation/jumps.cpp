@@ -7,9 +7,9 @@
 #include <utility>
 
 #include "base/parallel.hpp"
+#include "model/evaluator.hpp"
+#include "model/imputed.hpp"
 #include "numerics/f_distribution.hpp"
-#include "partition/evaluator.hpp"
-#include "partition/imputed.hpp"
 
 namespace llmt {
 namespace {

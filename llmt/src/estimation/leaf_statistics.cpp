@@ -6,8 +6,8 @@
 #include <numeric>
 
 #include "base/parallel.hpp"
-#include "partition/evaluator.hpp"
-#include "partition/imputed.hpp"
+#include "model/evaluator.hpp"
+#include "model/imputed.hpp"
 
 namespace llmt {
 namespace {

@@ -7,8 +7,8 @@
 #include "base/parallel.hpp"
 #include "constraints/monotone_splits.hpp"
 #include "constraints/signs.hpp"
+#include "model/imputed.hpp"
 #include "numerics/forward_selection.hpp"
-#include "partition/imputed.hpp"
 
 namespace llmt {
 namespace {

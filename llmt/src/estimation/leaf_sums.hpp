@@ -7,7 +7,7 @@
 
 #include "data/dataset.hpp"
 #include "estimation/normal_equations.hpp"
-#include "llmt/partition.hpp"
+#include "llmt/model.hpp"
 
 namespace llmt {
 

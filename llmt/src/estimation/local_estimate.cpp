@@ -3,8 +3,8 @@
 #include <Eigen/Cholesky>
 
 #include "estimation/constrained_estimate.hpp"
+#include "model/tree.hpp"
 #include "numerics/bounded_least_squares.hpp"
-#include "partition/tree.hpp"
 
 namespace llmt {
 namespace {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "partition/tree.hpp"
+#include "model/tree.hpp"
 
 namespace llmt {
 namespace {

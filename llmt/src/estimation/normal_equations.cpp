@@ -10,7 +10,7 @@
 #include "estimation/missing_by_validity.hpp"
 #include "estimation/reached_rows.hpp"
 #include "estimation/rows_by_leaf.hpp"
-#include "partition/evaluator.hpp"
+#include "model/evaluator.hpp"
 
 namespace llmt {
 namespace {

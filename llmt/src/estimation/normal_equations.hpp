@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "data/dataset.hpp"
-#include "partition/evaluator.hpp"
+#include "model/evaluator.hpp"
 
 namespace llmt {
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "base/simd.hpp"
-#include "partition/imputed.hpp"
+#include "model/imputed.hpp"
 
 namespace llmt {
 namespace {

@@ -1,6 +1,6 @@
 #include "estimation/squared_errors.hpp"
 
-#include "partition/evaluator.hpp"
+#include "model/evaluator.hpp"
 
 namespace llmt {
 namespace {

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <limits>
 
-#include "partition/logistic.hpp"
-#include "partition/smooth_clamp.hpp"
-#include "partition/through_regressors.hpp"
+#include "model/hold.hpp"
+#include "model/logistic.hpp"
+#include "model/through_regressors.hpp"
 
 namespace llmt {
 namespace {
@@ -161,7 +161,7 @@ void Cutter::cut_at_extent() {
   }
   for (const Eigen::Index j : line_.moving) {
     const InputColumn& input = model_.inputs()[j];
-    const double round = rounding_of_clamp * (input.high - input.low);
+    const double round = rounding_of_hold * (input.high - input.low);
     for (const double bound : {input.low - round, input.low, input.high, input.high + round}) {
       cut_at((bound - line_.reference(j)) / line_.way(j), 0.0, 1.0);
     }
@@ -172,7 +172,7 @@ void Cutter::cut_at_extent() {
 void Cutter::cut_at_ranges(const Node& node, double from, double to) {
   for (Eigen::Index column = 0; at_kinks_ && column < std::ssize(model_.regressors()); ++column) {
     const Regressor& regressor = model_.regressors()[column];
-    const double round = rounding_of_clamp * (node.high(column) - node.low(column));
+    const double round = rounding_of_hold * (node.high(column) - node.low(column));
     for (const double bound :
          {node.low(column) - round, node.low(column), node.high(column), node.high(column) + round}) {
       if (is_product(regressor)) {

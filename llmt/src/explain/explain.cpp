@@ -9,7 +9,7 @@
 #include "base/parallel.hpp"
 #include "explain/line_attribution.hpp"
 #include "model/codes.hpp"
-#include "partition/evaluator.hpp"
+#include "model/evaluator.hpp"
 
 namespace llmt {
 namespace {

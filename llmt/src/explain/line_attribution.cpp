@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "explain/straight_line.hpp"
+#include "model/through_regressors.hpp"
 #include "numerics/chebyshev.hpp"
 #include "numerics/quadrature.hpp"
-#include "partition/through_regressors.hpp"
 
 namespace llmt {
 namespace {
@@ -214,7 +214,7 @@ int Line::degree(const Eigen::VectorXd& row) const {
     const double left = evaluator_.left_share(index, row.data());
     const bool moves = node.is_oblique() || line_.way(node.split_input) != 0.0;
     const bool is_shared = !(left >= 1.0 || left <= 0.0);
-    const int more = is_shared && moves ? 3 : 0;
+    const int more = is_shared && moves ? (partition_.validity.smoothness == 1 ? 3 : 5) : 0;
     if (!(left <= 0.0)) open.push_back({node.left, of_validity + more});
     if (!(left >= 1.0)) open.push_back({node.right, of_validity + more});
   }

@@ -6,7 +6,7 @@
 #include <Eigen/Core>
 
 #include "llmt/explain.hpp"
-#include "partition/evaluator.hpp"
+#include "model/evaluator.hpp"
 
 namespace llmt {
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "llmt/model.hpp"
-#include "partition/evaluator.hpp"
+#include "model/evaluator.hpp"
 
 namespace llmt {
 

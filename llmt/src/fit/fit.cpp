@@ -84,7 +84,15 @@ FitResult fit(const PreparedRows& rows, Work& work) {
 FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<const Eigen::MatrixXd>& outputs,
               const FitOptions& options) {
   Work work(options.progress);
-  FitResult result = fit(prepare(inputs, outputs, options, work), work);
+  FitResult result = fit(prepare({.inputs = {inputs}, .outputs = {outputs}}, options, work), work);
+  work.finish();
+  return result;
+}
+
+FitResult fit(const TrainingData& data, const FitOptions& options) {
+  Work work(options.progress);
+  FitResult result = fit(prepare(given_rows(data), options, work), work);
+  result.model = named(result.model, data);
   work.finish();
   return result;
 }
@@ -92,6 +100,7 @@ FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<
 FitResult fit(const PreparedFit& prepared, const Progress& progress) {
   Work work(progress);
   FitResult result = fit(prepared.rows(), work);
+  result.model = named(result.model, prepared.data());
   work.finish();
   return result;
 }

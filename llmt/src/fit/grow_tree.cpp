@@ -5,7 +5,7 @@
 #include "estimation/jumps.hpp"
 #include "estimation/tree_signs.hpp"
 #include "growth/pruning.hpp"
-#include "partition/tree.hpp"
+#include "model/tree.hpp"
 
 namespace llmt {
 namespace {

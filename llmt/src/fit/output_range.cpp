@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "base/parallel.hpp"
-#include "partition/evaluator.hpp"
+#include "model/evaluator.hpp"
 #include "selection/fold_errors.hpp"
 #include "selection/selection.hpp"
 

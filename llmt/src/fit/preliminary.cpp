@@ -12,7 +12,6 @@ FitOptions preliminary_options(const FitOptions& options) {
           .shared_partition = options.shared_partition,
           .validity = ValidityChoice::crisp,
           .folds = options.folds,
-          .categorical_inputs = options.categorical_inputs,
           .intervals = false,
           .max_threads = options.max_threads};
 }

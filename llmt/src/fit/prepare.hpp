@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "data/training.hpp"
+#include "llmt/fit.hpp"
 #include "llmt/progress.hpp"
 #include "llmt/summary.hpp"
 
@@ -18,10 +19,16 @@ struct PreparedRows {
   Eigen::VectorXd loss_weights = {};         ///< as FitSummary::loss_weights
 };
 
+/// What a caller tells of the rows. It views the matrices. Throws std::invalid_argument for levels that do not fit
+/// them.
+GivenRows given_rows(const TrainingData& data);
+
+/// The model with the names that the caller gives.
+Model named(const Model& model, const TrainingData& data);
+
 /// Checks the options and the rows, finds the equal rows, weights all by the loss, chooses codes, deals folds, and
 /// describes the columns. The matrices must outlive the result. `work`: this counts as a part of it. Throws as fit().
-PreparedRows prepare(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<const Eigen::MatrixXd>& outputs,
-                     const FitOptions& options, Work& work);
+PreparedRows prepare(const GivenRows& all, const FitOptions& options, Work& work);
 
 /// The given rows as they are, with the squared loss, no choice of codes and checked options; terms: linear or
 /// quadratic.

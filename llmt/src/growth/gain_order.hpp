@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "llmt/partition.hpp"
+#include "llmt/model.hpp"
 
 namespace llmt {
 

@@ -1,7 +1,7 @@
 #include "growth/pruning.hpp"
 
 #include "base/count.hpp"
-#include "partition/evaluator.hpp"
+#include "model/evaluator.hpp"
 
 namespace llmt {
 

@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "llmt/partition.hpp"
+#include "llmt/model.hpp"
 
 namespace llmt {
 

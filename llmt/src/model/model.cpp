@@ -7,8 +7,8 @@
 #include <limits>
 #include <stdexcept>
 
+#include "model/evaluator.hpp"
 #include "model/model_checks.hpp"
-#include "partition/evaluator.hpp"
 
 namespace llmt {
 namespace {
@@ -110,6 +110,25 @@ std::vector<Leaf> Model::leaves(Eigen::Index partition) const {
     }
     describe(nodes[box.node], regressors_, box);
     result.push_back(std::move(box));
+  }
+  return result;
+}
+
+Partition prefix(const Partition& partition, Eigen::Index max_leaves) {
+  if (max_leaves < 1) {
+    throw std::invalid_argument(fmt::format("llmt::prefix: max_leaves is {}, it must be at least 1", max_leaves));
+  }
+  const Eigen::Index kept = 2 * std::min(max_leaves, partition.num_leaves()) - 1;
+  Partition result{.outputs = partition.outputs,
+                   .validity = partition.validity,
+                   .nodes = {partition.nodes.begin(), partition.nodes.begin() + kept},
+                   .outer_slope = partition.outer_slope,
+                   .residual_range = partition.residual_range,
+                   .output_range = partition.output_range};
+  for (Node& node : result.nodes) {
+    if (node.left >= kept) {
+      make_leaf(node);
+    }
   }
   return result;
 }

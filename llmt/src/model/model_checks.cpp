@@ -32,8 +32,10 @@ void check_tree(const Partition& partition, Eigen::Index index, const std::vecto
 
 void check_validity(const Partition& partition, const ModelPart& part) {
   const Validity& validity = partition.validity;
-  if (!(validity.width >= 0.0 && std::isfinite(validity.width))) {
-    throw ModelFault(part, fmt::format("the width {} must be finite and not negative", validity.width));
+  if (!(validity.width >= 0.0 && std::isfinite(validity.width)) ||
+      (validity.smoothness != 1 && validity.smoothness != 2)) {
+    throw ModelFault(part, fmt::format("the width {} must be finite and not negative, the smoothness {} 1 or 2",
+                                       validity.width, validity.smoothness));
   }
   if (validity.kind != ValidityKind::gaussian) return;
   if (!std::isnormal(validity.width)) {

@@ -88,6 +88,10 @@ void check_node(const Partition& partition, const ModelPart& part, const std::ve
   const Node& node = partition.nodes[part.node];
   check_shapes(node, std::ssize(partition.outputs), regressors, part);
   check_values(node, regressors, part);
+  if (node.guard_parent < -1 || node.guard_parent >= part.node || (node.guard_parent >= 0 && !node.is_leaf())) {
+    throw ModelFault(
+        part, fmt::format("guard_parent {} must be an earlier node, and only a leaf may have one", node.guard_parent));
+  }
   if (node.is_leaf()) {
     if (node.right >= 0) throw ModelFault(part, "it has a right child and no left one");
     return;

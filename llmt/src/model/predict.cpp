@@ -7,9 +7,9 @@
 #include "base/parallel.hpp"
 #include "llmt/model.hpp"
 #include "model/codes.hpp"
-#include "partition/evaluator.hpp"
-#include "partition/leverage.hpp"
-#include "partition/through_regressors.hpp"
+#include "model/evaluator.hpp"
+#include "model/leverage.hpp"
+#include "model/through_regressors.hpp"
 
 namespace llmt {
 namespace {

@@ -41,7 +41,7 @@ Eigen::Index size_of_split(const Node& node, const Validity& validity) {
     return 5 + 2 * gate;
   }
   const Eigen::Index ramp = 8 + side;
-  const Eigen::Index transition = 7 + 2 * ramp;
+  const Eigen::Index transition = validity.smoothness == 1 ? 7 + 2 * ramp : 10 + 3 * ramp;
   return 5 + 2 * transition;
 }
 

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <limits>
 
-#include "partition/smooth_clamp.hpp"
-#include "partition/tree.hpp"
+#include "model/hold.hpp"
+#include "model/tree.hpp"
 #include "readable/decimal.hpp"
 
 namespace llmt {
@@ -280,7 +280,7 @@ double EquationTree::held_term(const Term& term, const double* row, bool is_root
            std::clamp(row[term.second], second.low - second.centre, second.high - second.centre);
   }
   if (is_root || regressor.level >= 0) return row[term.first];
-  return smooth_clamp(row[term.first], column.low - column.centre, column.high - column.centre);
+  return hold(row[term.first], column.low - column.centre, column.high - column.centre);
 }
 
 double EquationTree::held_out_error(int node, const Equation& equation) const {

@@ -268,6 +268,7 @@ ReadableResult fit_readable(const PreparedFit& prepared, const FitSummary& fitte
     result.model = with_codes(result.model, codes.codes);
     result.intervals = with_codes(result.intervals, codes.codes);
   }
+  result.model = named(result.model, prepared.data());
   work.finish();
   return result;
 }

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "partition/local_models.hpp"
+#include "model/local_models.hpp"
 #include "readable/decimal.hpp"
 
 namespace llmt {

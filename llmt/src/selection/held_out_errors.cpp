@@ -41,7 +41,7 @@ std::vector<Eigen::Index> compared_leaf_counts(Eigen::Index largest) {
 }
 
 // Of what is left of a comparison, about the part that an evaluation takes.
-constexpr double share_of_evaluation = 0.4;
+constexpr double share_of_evaluation = 0.25;
 
 }  // namespace
 

@@ -5,9 +5,9 @@
 #include <cmath>
 
 #include "base/count.hpp"
+#include "model/imputed.hpp"
+#include "model/tree.hpp"
 #include "numerics/conjugate_gradients.hpp"
-#include "partition/imputed.hpp"
-#include "partition/tree.hpp"
 
 namespace llmt {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "llmt/partition.hpp"
+#include "llmt/model.hpp"
 #include "stream/node.hpp"
 #include "stream/setting.hpp"
 

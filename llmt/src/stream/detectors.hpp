@@ -17,7 +17,6 @@ class RiseDetector {
   void reset() { *this = {}; }
 
  private:
-  friend struct StreamJson;
   double usual_ = 0.0;  // mean of the absolute errors over about the last `memory` rows
   double excess_ = 0.0;
   Eigen::Index rows_ = 0;
@@ -32,7 +31,6 @@ class Duel {
   double t() const;
 
  private:
-  friend struct StreamJson;
   double weight_ = 0.0;
   double mean_ = 0.0;
   double square_ = 0.0;
@@ -54,7 +52,6 @@ class ThresholdWatch {
   double add(double x, double squared_left, double squared_right);
 
  private:
-  friend struct StreamJson;
   static constexpr std::size_t half = 16;  // bins on either side
 
   double best_edge() const;

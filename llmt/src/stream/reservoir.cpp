@@ -21,7 +21,7 @@ constexpr std::uint64_t held_out_one_in = 8;
 
 }  // namespace
 
-bool Reservoir::add(const double* values, Eigen::Index times) {
+bool Reservoir::add(const double* values) {
   if (capacity_ == 0) return false;
   std::uint64_t hash = 0;
   for (Eigen::Index k = 0; k < width_; ++k) {
@@ -32,8 +32,8 @@ bool Reservoir::add(const double* values, Eigen::Index times) {
   if (full && hash > std::prev(rows_.end())->first) return false;
   const bool held_out = mixed(hash, 0) % held_out_one_in == 0;
   const auto [at, added] = rows_.try_emplace(hash, Row{{}, held_out, 0});
-  at->second.times += times;
-  times_ += times;
+  ++at->second.times;
+  ++times_;
   if (added) {
     at->second.values.assign(values, values + width_);
     if (full) {

@@ -25,8 +25,8 @@ class Reservoir {
     Eigen::Index times;  ///< how often it has come
   };
 
-  /// Offers a row that comes `times` times. Returns true if it is in the sample now and held out.
-  bool add(const double* values, Eigen::Index times = 1);
+  /// Offers a row. Returns true if it is in the sample now and held out.
+  bool add(const double* values);
 
   /// Number of different rows divided by number of rows, over the rows in the sample and all times that they have come.
   /// 1 if none has come twice.

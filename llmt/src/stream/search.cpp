@@ -8,6 +8,9 @@
 namespace llmt {
 namespace {
 
+// Number of rows whose quantiles become the edges between bins.
+constexpr Eigen::Index first_rows = 64;
+
 // The next test is due when the number of rows has grown by this factor.
 constexpr double test_growth = 1.25;
 
@@ -25,7 +28,7 @@ LeafSearch::LeafSearch(const StreamSetting& setting)
     : setting_(setting),
       residuals_(setting.shape, Eigen::VectorXd::Ones(1)),
       bins_(setting.inputs),
-      next_test_(std::max(rows_before_bins, 2 * setting.min_leaf_samples)) {}
+      next_test_(std::max(first_rows, 2 * setting.min_leaf_samples)) {}
 
 void LeafSearch::set_edges(Bins& bins, std::vector<double> edges) const {
   bins.edges = std::move(edges);
@@ -107,7 +110,7 @@ void LeafSearch::add(const StreamRow& row, const Basis& basis, const RowProducts
   first_rows_.insert(first_rows_.end(), row.x, row.x + setting_.inputs);
   first_rows_.push_back(row.y);
   first_rows_.push_back(row.weight);
-  if (rows_ == rows_before_bins) {
+  if (rows_ == first_rows) {
     lay_out(basis);
   }
 }

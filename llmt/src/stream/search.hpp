@@ -28,9 +28,6 @@ struct StreamSplit {
 /// by a quarter; the k-th test is made at significance / (k (k + 1)), eq. (T.1).
 class LeafSearch {
  public:
-  /// Rows whose quantiles become the edges between bins.
-  static constexpr Eigen::Index rows_before_bins = 64;
-
   explicit LeafSearch(const StreamSetting& setting);
 
   /// `products`: of the row in the leaf's basis.
@@ -56,7 +53,6 @@ class LeafSearch {
   Eigen::Index bytes() const;
 
  private:
-  friend struct StreamJson;
   /// Bins of one input: bin b holds edges[b - 1] < x <= edges[b].
   struct Bins {
     std::vector<double> edges;

@@ -85,7 +85,7 @@ void offer_blends(const TrainingRows& others, const Partition& crisp, Eigen::Ind
   for (const Eigen::Index leaves : leaf_counts(others, best_crisp, crisp.num_leaves())) {
     for (const double jump : jumps) {
       for (const double width : widths) {
-        const Validity validity{ValidityKind::blend, width};
+        const Validity validity{ValidityKind::blend, width, 1};
         BlendCorrection correction(others, prefix(blended(others, grown, validity, jump), leaves));
         if (best.offer(correction.corrected(first_ridge))) {
           best_correction = std::move(correction);

@@ -3,8 +3,8 @@
 #pragma once
 
 #include "data/dataset.hpp"
+#include "llmt/model.hpp"
 #include "llmt/options.hpp"
-#include "llmt/partition.hpp"
 
 namespace llmt {
 

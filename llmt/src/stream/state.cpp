@@ -49,11 +49,7 @@ void StreamState::add(const std::vector<double>& row) {
     return;
   }
   first_rows_.insert(first_rows_.end(), row.begin(), row.end());
-  if (rows_ == rows_before_trees()) start();
-}
-
-Eigen::Index StreamState::rows_before_trees() const {
-  return std::max(unit_rows, unit_rows_per_coefficient * (inputs_ + 1));
+  if (rows_ == std::max(unit_rows, unit_rows_per_coefficient * (inputs_ + 1))) start();
 }
 
 void StreamState::describe_columns(const std::vector<double>& row) {
@@ -95,7 +91,7 @@ void StreamState::start() {
   }
   const Eigen::VectorXd scale = scale_of_inputs(first);
   for (Eigen::Index o = 0; o < outputs_; ++o) {
-    start_tree(first, o, centre, scale);
+    add_tree(first, o, centre, scale);
   }
   for (Eigen::Index i = 0; i < count; ++i) {
     learn(first.row(i).data());
@@ -121,37 +117,24 @@ Eigen::VectorXd StreamState::scale_of_inputs(const RowMajor& first) const {
   return scale;
 }
 
-StreamSetting StreamState::usual_setting() const {
-  return {.significance = options_.significance,
-          .min_variance_gain = options_.min_variance_gain,
-          .min_leaf_samples = options_.min_leaf_samples,
-          .max_leaves = options_.max_leaves,
-          .bins = options_.bins,
-          .shrinkage = options_.shrinkage,
-          .inputs = inputs_,
-          .shape = GramShape(inputs_ + 1, 1),
-          .centre = {},
-          .scale = {}};
-}
-
-StreamTree& StreamState::add_tree(const StreamSetting& setting, const Eigen::VectorXd& first_model) {
-  trees_.push_back(std::make_unique<StreamTree>(setting, first_model));
-  trees_.back()->on_drift = [this](const std::function<bool(const double*)>& concerned) {
-    reservoir_.remove_if(concerned);
-  };
-  return *trees_.back();
-}
-
-void StreamState::start_tree(const RowMajor& first, Eigen::Index output, const Eigen::VectorXd& centre,
-                             const Eigen::VectorXd& scale) {
+void StreamState::add_tree(const RowMajor& first, Eigen::Index output, const Eigen::VectorXd& centre,
+                           const Eigen::VectorXd& scale) {
   const double mean = columns_[inputs_ + output].mean;
   const auto column = first.col(inputs_ + output).array();
-  StreamSetting setting = usual_setting();
-  setting.output_variance = (column - mean).square().mean();
-  setting.rounding =
-      rounding_of_deviation * std::sqrt(setting.output_variance) + rounding_of_magnitude * column.abs().maxCoeff();
-  setting.centre = centre;
-  setting.scale = scale;
+  const double variance = (column - mean).square().mean();
+  const StreamSetting setting{
+      .significance = options_.significance,
+      .min_variance_gain = options_.min_variance_gain,
+      .min_leaf_samples = options_.min_leaf_samples,
+      .max_leaves = options_.max_leaves,
+      .bins = options_.bins,
+      .shrinkage = options_.shrinkage,
+      .inputs = inputs_,
+      .shape = GramShape(inputs_ + 1, 1),
+      .output_variance = variance,
+      .rounding = rounding_of_deviation * std::sqrt(variance) + rounding_of_magnitude * column.abs().maxCoeff(),
+      .centre = centre,
+      .scale = scale};
   Basis basis{Eigen::VectorXd::Zero(inputs_), Eigen::VectorXd::Zero(inputs_ + 1)};
   basis.base(0) = mean;
   Eigen::VectorXd z(inputs_);
@@ -167,7 +150,10 @@ void StreamState::start_tree(const RowMajor& first, Eigen::Index output, const E
     int rank = 0;
     basis.base += solve(setting.shape, sums.gram.data(), setting.shrinkage, rank);
   }
-  add_tree(setting, basis.base);
+  trees_.push_back(std::make_unique<StreamTree>(setting, basis.base));
+  trees_.back()->on_drift = [this](const std::function<bool(const double*)>& concerned) {
+    reservoir_.remove_if(concerned);
+  };
 }
 
 Eigen::MatrixXd StreamState::predict(const Eigen::Ref<const Eigen::MatrixXd>& inputs) const {

@@ -41,19 +41,11 @@ class StreamState {
   /// Numbers of a row: inputs, outputs, weight.
   Eigen::Index width() const { return inputs_ + outputs_ + 1; }
 
-  friend struct StreamJson;
-
-  /// The trees start when there are so many rows.
-  Eigen::Index rows_before_trees() const;
-  /// The setting of a tree but for what comes from the first rows.
-  StreamSetting usual_setting() const;
-  StreamTree& add_tree(const StreamSetting& setting, const Eigen::VectorXd& first_model);
-
   void describe_columns(const std::vector<double>& row);
   void learn(const double* row);
   void start();
-  void start_tree(const RowMajor& first, Eigen::Index output, const Eigen::VectorXd& centre,
-                  const Eigen::VectorXd& scale);
+  void add_tree(const RowMajor& first, Eigen::Index output, const Eigen::VectorXd& centre,
+                const Eigen::VectorXd& scale);
   Eigen::VectorXd scale_of_inputs(const RowMajor& first) const;
   Model model_of_first_rows() const;
   std::vector<Partition> crisp_partitions() const;

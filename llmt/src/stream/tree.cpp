@@ -54,7 +54,7 @@ double StreamTree::learn(std::unique_ptr<StreamNode>& slot, const StreamRow& row
     node.high(k) = row.x[k] > node.high(k) ? row.x[k] : node.high(k);
   }
   const bool watched_here = watched || node.alternate;
-  const Eigen::Index alarms = counts_.drifts;
+  const Eigen::Index alarms = alarms_;
   double error = 0.0;
   if (node.is_leaf()) {
     error = row.y - value_of(node, row.z);
@@ -62,7 +62,7 @@ double StreamTree::learn(std::unique_ptr<StreamNode>& slot, const StreamRow& row
   } else {
     error = learn_inner(node, row, watched_here);
   }
-  if (counts_.drifts != alarms) {
+  if (alarms_ != alarms) {
     node.rise.reset();  // the rise has been found further below
   } else if (node.rise.add(std::abs(error)) && !watched_here) {
     raise_alarm(node);
@@ -96,6 +96,7 @@ double StreamTree::learn_inner(StreamNode& node, const StreamRow& row, bool watc
 
 // The models of the branch restart, and an alternate begins to grow beside it.
 void StreamTree::raise_alarm(StreamNode& node) {
+  ++alarms_;
   ++counts_.drifts;
   if (on_drift) {
     on_drift([&](const double* x) {

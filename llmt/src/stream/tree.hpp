@@ -41,7 +41,6 @@ class StreamTree {
   std::function<void(const std::function<bool(const double* x)>&)> on_drift;
 
  private:
-  friend struct StreamJson;
   double learn(std::unique_ptr<StreamNode>& slot, const StreamRow& row, bool watched);
   double learn_inner(StreamNode& node, const StreamRow& row, bool watched);
   void learn_leaf(StreamNode& leaf, const StreamRow& row);
@@ -61,6 +60,7 @@ class StreamTree {
   RowProducts products_;
   ResidualSums residuals_;
   Counts counts_;
+  Eigen::Index alarms_ = 0;
   std::unique_ptr<StreamNode> root_;
 };
 

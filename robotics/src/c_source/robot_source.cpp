@@ -11,7 +11,6 @@
 #include "c_source/effect_source.hpp"
 #include "c_source/runtime.hpp"
 #include "calibration/correction_twist.hpp"
-#include "effects/joint_error.hpp"
 #include "kinematics/mimics.hpp"
 #include "kinematics/units.hpp"
 #include "llmt/robotics/effects.hpp"
@@ -20,6 +19,34 @@ namespace llmt::robotics {
 namespace {
 
 constexpr std::size_t longest_name = 26;
+
+const char* const c_effects = R"(
+static double @_sign(double x) {
+  return x > 0.0 ? 1.0 : x < 0.0 ? -1.0 : 0.0;
+}
+
+static double @_map(const double *values, int count, double at) {
+  int knot;
+  at = at < 0.0 ? 0.0 : at > count - 1 ? count - 1 : at;
+  knot = (int)at;
+  at -= knot;
+  return at > 0.0 ? (1.0 - at) * values[knot] + at * values[knot + 1] : values[knot];
+}
+
+static double @_spring(double a, double b, double ratio, double free_length, double q) {
+  const double first = a * cos(q) + b * sin(q);
+  const double amplitude = sqrt(a * a + b * b);
+  double square;
+  if (free_length == 0.0 || amplitude == 0.0) return first;
+  square = 1.0 + ratio * ratio - 2.0 * ratio * (a * sin(q) - b * cos(q)) / amplitude;
+  return first * (1.0 - free_length / sqrt(square > 1e-24 ? square : 1e-24));
+}
+
+static double @_pressed(const struct @_load *load, int slides) {
+  const double *whole = slides ? load->force : load->moment;
+  return fabs(load->about_axis) > 1e-3 * sqrt(@_dot(whole, whole)) ? @_sign(load->about_axis) : 0.0;
+}
+)";
 
 std::string with_name(std::string text, const std::string& name) {
   for (std::size_t at = text.find('@'); at != std::string::npos; at = text.find('@', at + name.size())) {
@@ -96,7 +123,7 @@ std::vector<Eigen::Index> drives_of(const Chain& chain) {
   return drives;
 }
 
-// Tables in C of the joints that follow drives, and of the limits that this leaves to the drives.
+// How joints follow the values of the drives, and the limits that this leaves to those.
 std::string drive_tables(const Chain& chain) {
   const std::vector<Eigen::Index> drives = drives_of(chain);
   const std::vector<Follower> followers = followers_of(chain);
@@ -158,10 +185,14 @@ std::string deform(const Robot& robot, const std::vector<std::string>& condition
   std::string statements;
   for (const Effect& effect : robot.effects) statements += effect_statement(robot.chain, effect, conditions);
   std::string text;
-  for (const Effect& effect : robot.effects) {
-    for (const std::string& function : effect_type(effect.type).in_c.functions) {
-      if (text.find(function) == std::string::npos) text += function;
-    }
+  const bool presses = statements.find("@_pressed") != std::string::npos;
+  for (const char* helper : {"@_sign", "@_map", "@_spring", "@_pressed"}) {
+    const bool wanted = statements.find(helper) != std::string::npos || (presses && helper == std::string("@_sign"));
+    if (!wanted) continue;
+    const std::string all = c_effects;
+    const std::size_t begin = all.find(std::string("static double ") + helper);
+    text += '\n';
+    text.append(all, begin, all.find("\n}\n", begin) + 3 - begin);
   }
   return text +
          "\n/* What the effects add to the joint values. */\nstatic void @_deform(const double *conditions, const "

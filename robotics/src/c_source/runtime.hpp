@@ -1,4 +1,4 @@
-// The parts of C that are the same in every exported robot; "@" stands for the name.
+// What is the same in every exported robot; "@" stands for the name.
 #pragma once
 
 namespace llmt::robotics {

@@ -73,7 +73,7 @@ Fit begun_without_priors(const Fit& fit, const discovery::LeastSquaresProblem& u
   return other;
 }
 
-// By more than a fiftieth of the arm's length, as input_mistakes() has it, but not so far that it is another arm, or a
+// By more than a fiftieth of the arm's length, as suspicions() has it, but not so far that it is another arm, or a
 // table that is not meant as it stands.
 bool is_far_off(const Chain& chain, const CommonNoise& registered) {
   const double share = std::sqrt(3.0) * registered.position_mm / reach_of(chain);

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "calibration/input_mistakes.hpp"
+#include "calibration/likely_mistake.hpp"
 #include "llmt/statistics.hpp"
 
 namespace llmt::robotics {
@@ -25,11 +25,11 @@ Fitted fit_all(const Robot& robot, const Measurements& measurements, const Repor
   const std::vector<double> labels = pose_labels(measurements.poses);
   FitOptions fit = options.correction;
   fit.validity = ValidityChoice::crisp;
-  fit.folds = {.count = options.correction_folds, .kind = options.kind, .seed = options.seed, .groups = labels};
+  fit.folds = {.count = options.correction_folds, .kind = options.kind, .seed = options.seed};
   fit.intervals = false;
   fit.max_threads = options.max_threads;
   fit.progress = work.progress();
-  fitted.correction = fit_correction(fitted.calibration.robot, measurements, fit);
+  fitted.correction = fit_correction(fitted.calibration.robot, measurements, fit, labels);
   return fitted;
 }
 
@@ -63,8 +63,7 @@ void hold_out(const Robot& robot, const Measurements& measurements, const Report
   report.nominal.held_out_mm.resize(n);
   report.geometric.held_out_mm.resize(n);
   if (report.corrected) report.corrected->held_out_mm.resize(n);
-  for (const Fold& fold :
-       make_folds(n, {.count = options.folds, .kind = options.kind, .seed = options.seed, .groups = labels})) {
+  for (const Fold& fold : make_folds(n, {.count = options.folds, .kind = options.kind, .seed = options.seed}, labels)) {
     const Measurements trained = select(measurements, fold.train);
     const Measurements left_out = select(measurements, fold.held_out);
     work.begin(fmt::format("fold {}", report.fold_terminations.size() + 1));
@@ -154,8 +153,8 @@ bool is_implausible(const Robot& nominal, const CalibrationReport& report) {
   return median(report.geometric.in_sample_mm) > implausible_share * length_of(nominal.chain);
 }
 
-std::vector<std::string> input_mistakes(const Robot& robot, const Measurements& measurements,
-                                        const CalibrationReport& report) {
+std::vector<std::string> suspicions(const Robot& robot, const Measurements& measurements,
+                                    const CalibrationReport& report) {
   std::vector<std::string> found;
   const double length_mm = length_of(robot.chain);
   for (std::size_t j = 0; j < robot.chain.joints.size(); ++j) {
@@ -202,14 +201,14 @@ std::vector<std::string> input_mistakes(const Robot& robot, const Measurements& 
                     nominal));
   }
   if (has_wrong_orientations(report)) {
-    const std::string likely = orientation_mistake(robot, measurements);
+    const std::string likely = likely_orientation_mistake(robot, measurements);
     found.push_back(fmt::format("the calibrated robot turns its tool by {:.3g} mrad otherwise than was measured{}",
                                 report.geometric.in_sample_mrad.mean(),
                                 likely.empty() ? ": is the quaternion w, x, y, z, is the convention of angles right?"
                                                : "; most likely " + likely));
   }
   if (nominal > implausible_mm) {
-    const std::string units = input_mistake(robot, measurements, implausible_mm);
+    const std::string units = likely_mistake(robot, measurements, implausible_mm);
     if (!units.empty()) found.push_back(units);
   }
   return found;

@@ -2,8 +2,6 @@
 
 #include <algorithm>
 
-#include "llmt/robotics/effects.hpp"
-
 namespace llmt::robotics {
 
 std::pair<Eigen::Index, double> EvenKnots::place(double q) const {
@@ -15,7 +13,7 @@ std::pair<Eigen::Index, double> EvenKnots::place(double q) const {
 Unmapped unmapped(const Robot& robot, const Measurements& measurements) {
   Unmapped plain{robot, measurements, {}};
   std::erase_if(plain.robot.effects, [&](const Effect& effect) {
-    if (nature_of(effect) != Nature::map) return false;
+    if (effect.type != "joint_map") return false;
     plain.maps.push_back(effect);
     return true;
   });

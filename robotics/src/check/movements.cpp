@@ -50,7 +50,7 @@ Normal normal_of(const MovementProblem& problem, double noise) {
           right - gram_root * factor.solve(root.transpose() * right)};
 }
 
-// The chi square that the columns in `tested` take, with those in `fitted` fitted, and their estimates.
+// Of the columns in `tested`, those in `fitted` being fitted: how much chi square they take, and their estimates.
 struct Gain {
   double chi_square = 0.0;
   Eigen::Index freedom = 0;
@@ -73,7 +73,7 @@ Gain gain_of(const Normal& normal, const std::vector<Eigen::Index>& fitted, cons
     own -= cross.transpose() * taken;
     right -= taken.transpose() * normal.right(fitted);
   }
-  // The rest of a column, as a share of it, must be more than rounding.
+  // What is left of a column, as a share of it, must be more than rounding.
   own = (size.asDiagonal() * own * size.asDiagonal()).eval();
   right = size.cwiseProduct(right).eval();
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(own);
@@ -92,7 +92,7 @@ bool contains(const std::vector<Eigen::Index>& all, const std::vector<Eigen::Ind
   return std::ranges::all_of(some, [&](Eigen::Index column) { return std::ranges::count(all, column) > 0; });
 }
 
-// Estimates of all that moved, fitted together.
+// Of all that moved, fitted together.
 void estimate(const MovementProblem& problem, const Normal& normal, Movements& result) {
   std::vector<Eigen::Index> fitted = problem.nuisance;
   for (const Movement& movement : result.found) {

@@ -1,4 +1,4 @@
-// The search for the parameters of a robot that moved.
+// Which parameters of a robot moved.
 #pragma once
 
 #include <string>

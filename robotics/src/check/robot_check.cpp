@@ -9,7 +9,6 @@
 #include "calibration/free_parameters.hpp"
 #include "check/f_tail.hpp"
 #include "check/movements.hpp"
-#include "llmt/robotics/effects.hpp"
 
 namespace llmt::robotics {
 namespace {
@@ -47,7 +46,7 @@ CorrectedRobot registered(CorrectedRobot robot, const Measurements& measurements
 }
 
 double mean_distance(double noise_mm, const Measurements& measurements) {
-  // Mean lengths of normal noise in one, two, three coordinates.
+  // Of normal noise in one, two, three coordinates.
   constexpr double factors[] = {0.797885, 1.253314, 1.595769};
   return noise_mm * factors[std::ranges::count(measurements.measured, true) - 1];
 }
@@ -90,13 +89,13 @@ std::vector<Eigen::Index> columns_of(const Robot& robot) {
   }
   for (const Effect& effect : robot.effects) {
     for (std::size_t k = 0; k < effect.values.size(); ++k, ++next) {
-      if (nature_of(effect) != Nature::map) columns.push_back(next);
+      if (effect.type != "joint_map") columns.push_back(next);
     }
   }
   return columns;
 }
 
-// Bases of any session, and of any target: "base@tuesday.x" belongs to a base.
+// Of any session, and of any target: "base@tuesday.x" belongs to a base.
 bool is_of_base(const std::string& name) { return name.starts_with("base.") || name.starts_with("base@"); }
 
 bool is_turn_of_tool(const std::string& name) {
@@ -128,8 +127,7 @@ std::vector<Suspect> suspects_of(const std::vector<discovery::Parameter>& parame
   return all;
 }
 
-// The covariance of the calibrated values over their scales; columns of `nuisance` count as exact, for they are fitted
-// anew.
+// Of the calibrated values over their scales; columns of `nuisance` count as exact, for they are fitted anew.
 Eigen::MatrixXd covariance_of(const Robot& robot, const std::vector<discovery::Parameter>& parameters,
                               const std::vector<Eigen::Index>& nuisance) {
   std::vector<Eigen::Index> place;

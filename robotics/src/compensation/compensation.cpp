@@ -125,9 +125,9 @@ std::pair<double, double> distances_of(const Goal& goal, const Pose& pose) {
   return {error.head(3).norm(), goal.rotation ? error.tail(3).norm() / radians : 0.0};
 }
 
-// Two axes nearly coincide in a stretched wrist. There the last hundredths of a degree of an orientation cost turns of
-// tens of degrees, or end the search. If the position can be reached without these turns, the joint that would turn
-// most is held.
+// Where two axes nearly coincide, as in a stretched wrist, the last hundredths of a degree of an orientation cost turns
+// of tens of degrees, or the search for them ends. If the position can be reached without them, it is, and the joint
+// that would turn most is held.
 std::optional<Found> without_large_turn(const Chain& chain, const Inverse& inverse, const Goal& goal,
                                         const Eigen::VectorXd& start, const Inverse::Forward& forward,
                                         const Inverse::Solution& exact) {

@@ -16,7 +16,7 @@ struct Goal {
   std::optional<Eigen::Matrix3d> rotation;
 };
 
-/// The difference of goal and pose: position in mm, rotation vector in rad times `lever` mm. 3 or 6 numbers.
+/// What is missing: position in mm, rotation vector in rad times `lever` mm. 3 or 6 numbers.
 Eigen::VectorXd missing(const Goal& goal, const Pose& pose, double lever_mm);
 
 class Inverse {
@@ -36,7 +36,7 @@ class Inverse {
 
   Eigen::VectorXd within_limits(const Eigen::VectorXd& q) const;
 
-  /// Numbers of the joints that stand at a limit.
+  /// Of the joints that stand at a limit.
   std::vector<std::size_t> at_limits(const Eigen::VectorXd& q) const;
 
   /// The same with one joint kept at a value.

@@ -4,30 +4,38 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <stdexcept>
-#include <utility>
 
 #include "calibration/joint_map_shift.hpp"
-#include "discovery/constant_fit.hpp"
-#include "discovery/decision.hpp"
+#include "discovery/doubts.hpp"
 #include "discovery/findings.hpp"
 #include "discovery/gap_map.hpp"
-#include "discovery/input_mistakes.hpp"
 #include "discovery/investigation.hpp"
-#include "discovery/judges.hpp"
+#include "discovery/noise_tests.hpp"
+#include "discovery/overtones.hpp"
 #include "discovery/pose_split.hpp"
-#include "discovery/verification.hpp"
-#include "discovery/wave_harmonics.hpp"
+#include "discovery/refined_constants.hpp"
+#include "discovery/rest_correction.hpp"
+#include "discovery/second_look.hpp"
 #include "llmt/statistics.hpp"
 
 namespace llmt::robotics {
 namespace {
 
-using Notes = std::vector<std::string>;
+ErrorFigures figures(const CorrectedRobot& robot, const Measurements& measurements) {
+  const Eigen::VectorXd errors = distances(positions(robot, measurements.poses), measurements);
+  return error_figures(errors(position_rows(measurements.poses)));
+}
 
-void add(const Notes& more, Notes& notes) { notes.insert(notes.end(), more.begin(), more.end()); }
+Eigen::Index count_of_stands(const Poses& poses) {
+  if (poses.observations.empty()) return poses.count();
+  std::set<Eigen::Index> stands;
+  for (const Observation& seen : poses.observations) stands.insert(seen.stand);
+  return std::ssize(stands);
+}
 
-// Gives all orientations the same lever, because the search takes all readings to be equally exact.
+// The search takes all readings for equally exact. With this lever orientations are.
 Measurements with_lever(Measurements measurements, double lever_mm) {
   for (const Eigen::Index row : orientation_rows(measurements.poses)) {
     Observation& seen = measurements.poses.observations[row];
@@ -35,6 +43,76 @@ Measurements with_lever(Measurements measurements, double lever_mm) {
     seen.lever_mm = lever_mm;
   }
   return measurements;
+}
+
+// Mean length of a vector of d independent normal components.
+double mean_distance(double sigma, Eigen::Index components) {
+  const auto d = static_cast<double>(components);
+  return sigma * std::sqrt(2.0) * std::exp(std::lgamma(0.5 * (d + 1.0)) - std::lgamma(0.5 * d));
+}
+
+// Reports poses set aside that are far off, such as lost beams. They are not removed: no choice depends on these poses.
+void report_far_poses(const CorrectedRobot& improved, const Measurements& test, Discovery& result) {
+  const Eigen::VectorXd errors = distances(positions(improved, test.poses), test);
+  const double typical = median(errors);
+  constexpr double far = 10.0;
+  const auto count = (errors.array() > far * typical).count();
+  if (count > 0 && typical > 0.0) {
+    result.notes.push_back(
+        fmt::format("{} of the {} poses set aside are more than ten times as far off as the median ({:.4f} mm): lost "
+                    "beams, or poses unlike the others.",
+                    count, errors.size(), typical));
+  }
+}
+
+// Names that make the poses set aside worse, by more than two standard errors, are not written.
+void withdraw_what_is_worse(const Measurements& searched, const Measurements& test, Discovery& result) {
+  if (test.count() < 3 || result.effects.empty()) return;
+  Measurements common = test;
+  for (std::size_t axis = 0; axis < 3; ++axis) common.measured[axis] = test.measured[axis] && searched.measured[axis];
+  const PairedDifference loss = paired_difference(distances(positions(result.improved, common.poses), common),
+                                                  distances(positions(result.before, common.poses), common));
+  if (!loss.is_beyond_chance()) return;
+  result.notes.push_back(
+      fmt::format("What was found makes the poses set aside worse, {:.4f} mm instead of {:.4f}: the "
+                  "description is as calibrated, and the names are guesses.",
+                  result.held_out.after.mean, result.held_out.before.mean));
+  result.answer = discovery::Answer::unknown;
+  for (FoundEffect& effect : result.effects) effect.confirmed = false;
+  result.improved = {result.before, {}};
+  result.maps.clear();
+  result.fitted_after = result.fitted_before;
+  result.held_out.after = result.held_out.before;
+}
+
+// For a later check of the robot.
+void remember_error(const Measurements& searched, const Measurements& test, Discovery& result) {
+  std::optional<CalibrationRecord>& record = result.improved.robot.calibration;
+  if (test.count() < 2 || !record || test.measured != searched.measured) return;
+  const Eigen::VectorXd all = distances(positions(result.improved, test.poses), test);
+  remember_errors(*record, all(position_rows(test.poses)));
+}
+
+void verify(const Measurements& searched, const Measurements& test, Eigen::Index components, Discovery& result) {
+  result.fitted_before = figures({result.before, {}}, searched);
+  result.fitted_after = figures(result.improved, searched);
+  if (test.count() > 0) {
+    // Only along axes that were fitted: the others were never measured.
+    Measurements common = test;
+    for (std::size_t axis = 0; axis < 3; ++axis) common.measured[axis] = test.measured[axis] && searched.measured[axis];
+    if (std::ranges::none_of(common.measured, [](bool seen) { return seen; })) {
+      throw std::runtime_error("the test measurements share no coordinate with those that were searched");
+    }
+    result.held_out.before = figures({result.before, {}}, common);
+    result.held_out.after = figures(result.improved, common);
+    result.held_out.poses = count_of_stands(test.poses);
+    report_far_poses(result.improved, common, result);
+  }
+  withdraw_what_is_worse(searched, test, result);
+  remember_error(searched, test, result);
+  result.held_out.floor_from_repeats = result.lack_of_fit.has_enough_repeats();
+  const double noise_mm = result.held_out.floor_from_repeats ? result.lack_of_fit.noise : result.noise_mm;
+  result.held_out.floor_mm = mean_distance(noise_mm, components);
 }
 
 // Throws if calibration leaves too few degrees of freedom for a search.
@@ -71,198 +149,179 @@ bool is_exact(const Robot& robot, const Measurements& samples) {
   return largest < rounding * std::max(1.0, samples.positions_mm.cwiseAbs().maxCoeff());
 }
 
-Investigation calibrated(const Robot& described, const Unmapped& plain, const DiscoveryOptions& options, Work& work) {
-  Investigation start;
-  start.work = &work;
-  work.begin("calibrating");
-  start.searched = plain.measurements;
-  RobustCalibration robust = calibrate_robustly(plain.robot, start.searched, options.calibration);
-  start.baseline = std::move(robust.calibration);
-  start.baseline_without = std::move(robust.left_out);
-  check_freedom(start.searched, start.baseline);
-  check_plausible(described, start.baseline.robot, start.searched);
-  return start;
+bool is_named(discovery::Answer answer) {
+  return answer == discovery::Answer::named || answer == discovery::Answer::indistinguishable;
 }
 
-// The search with joint maps, if maps help.
-void add_maps(const DiscoveryOptions& options, Findings& found) {
-  report_progress(*found.investigation.work, "mapping the joints");
-  const std::optional<std::vector<Effect>> maps = helpful_maps(found.investigation);
-  if (!maps) {
-    found.notes.emplace_back(
-        "Free maps of the joints (angle error over angle) would not lower the error on poses left out.");
+// Beside what has a name, too, the rest should be noise. Where the instrument's errors are left, an effect of the arm
+// may be their image.
+void describe_rest(const Investigation& investigation, const DiscoveryOptions& options, Discovery& result) {
+  if (!is_named(result.answer) || !result.more.empty()) return;
+  std::vector<std::size_t> skipped = investigation.verdict.outliers;
+  std::ranges::sort(skipped);
+  const std::optional<NoNoise> fault = no_noise(investigation.fitted, investigation.searched, skipped, options.seed);
+  if (!fault) return;
+  result.notes.push_back(fmt::format("What was found is not all: {}.", fault->reason));
+  if (fault->where != "instrument") return;
+  for (FoundEffect& effect : result.effects) {
+    effect.confirmed = effect.confirmed && effect.effect.type.starts_with("instrument_");
+  }
+  if (std::ranges::any_of(result.effects, &FoundEffect::confirmed)) return;
+  result.answer = discovery::Answer::unknown;
+  result.unknown.push_back({{fault->where, {}, std::nullopt, "noise"}, 1.0});
+}
+
+// "Nothing missing" needs residuals that an instrument's noise can be, and few measurements that fit nothing.
+void refuse_all_clear(const Investigation& investigation, const DiscoveryOptions& options, Discovery& result) {
+  if (result.answer != discovery::Answer::nothing_missing) return;
+  const Measurements& searched = investigation.searched;
+  std::vector<std::size_t> skipped = investigation.verdict.outliers;
+  std::ranges::sort(skipped);
+  const Measurements kept = without_rows(searched, skipped);
+  const double tail = tail_of(distances(positions(investigation.fitted.robot, kept.poses), kept),
+                              std::ranges::count(searched.measured, true));
+  constexpr double heaviest = 1.6;  // Student's t with 4 degrees of freedom: 1.2
+  const auto most =
+      static_cast<Eigen::Index>(options.search.largest_outlier_share * static_cast<double>(searched.count()));
+  if (std::ssize(skipped) >= std::max<Eigen::Index>(most, 3) || tail > heaviest) {
+    result.answer = discovery::Answer::unknown;
+    result.unknown.push_back({{"measurements", {}, std::nullopt, "outliers"}, 1.0});
+    result.notes.push_back(fmt::format(
+        "More measurements fit nothing than can be told from an effect ({} were left out, at most {} are): check them "
+        "before anything else.",
+        skipped.size(), most));
     return;
   }
-  found.notes.push_back(
-      fmt::format("Free maps of {} joints (angle error over angle) were added: they lower the error on poses left out.",
-                  maps->size()));
-  found.maps = *maps;
-  found.investigation = search_with_maps(std::move(found.investigation), *maps, options);
-}
-
-// The names of the last search and of its residuals, with their fitted constants.
-void add_names(const DiscoveryOptions& options, Findings& found) {
-  Investigation& last = found.investigation;
-  found.larger = last.found;
-  found.residual_search = is_named(last.verdict.answer) ? search_residuals(last, options) : std::nullopt;
-  std::vector<Hypothesis>* also = found.residual_search ? &found.residual_search->asked.hypotheses : nullptr;
-  const std::map<std::string, double> constant_errors = fit_constants(last, options, also);
-  found.names = named_effects(last.asked.hypotheses, last.verdict, last.fitted, options.mass_uncertainty);
-  if (found.residual_search) {
-    const std::vector<Name> smaller =
-        smaller_effects(*found.residual_search, last.verdict, last.fitted, options.mass_uncertainty);
-    found.names.insert(found.names.end(), smaller.begin(), smaller.end());
-  }
-  for (Name& name : found.names) {
-    const auto error = constant_errors.find(effect_label(name.effect.effect));
-    if (error != constant_errors.end()) name.effect.constant_error = error->second;
+  if (const std::optional<NoNoise> fault = no_noise(investigation.fitted, searched, skipped, options.seed)) {
+    result.answer = discovery::Answer::unknown;
+    result.unknown.push_back({{fault->where, {}, std::nullopt, "noise"}, 1.0});
+    result.notes.push_back(fmt::format("No candidate explains it, but {}.", fault->reason));
   }
 }
 
-// Searches for effects. Joint maps are tried where something has no name: after a verdict "unknown", and after waves
-// that are no sines. The names are then those beside the maps.
-Findings search(Investigation start, const DiscoveryOptions& options) {
-  Findings found;
-  found.investigation = search_in_rounds(std::move(start), options);
-  found.verdict = found.investigation.verdict.answer;
-  found.unknown = found_shapes(found.investigation.asked.hypotheses, found.investigation.verdict);
-  if (options.maps && found.verdict == discovery::Answer::unknown) add_maps(options, found);
-  add_names(options, found);
-  if (!is_named(found.verdict)) return found;
-  found.harmonics = judge_waves(found, unopposed(judge_names(found, options), found.names.size()));
-  if (!found.harmonics) return found;
-  add(std::exchange(found.harmonics->notes, {}), found.notes);
-  if (!options.maps) return found;
-  add_maps(options, found);
-  if (found.maps.empty()) return found;
-  add_names(options, found);
-  found.harmonics->names = waves_at(found.harmonics->unknown, found.names);
-  return found;
+// Names, sizes and limits of what the search found.
+void describe_search(const Robot& robot, Investigation& investigation, const DiscoveryOptions& options,
+                     Discovery& result) {
+  const discovery::Verdict& verdict = investigation.verdict;
+  std::optional<SecondLook> look;
+  const std::vector<Hypothesis> large = investigation.found;
+  if (is_named(verdict.answer)) look = look_again(investigation, options);
+  const std::map<std::string, double> constant_errors =
+      refine_constants(investigation, options, look ? &look->asked.hypotheses : nullptr);
+  describe_effects(investigation.asked.hypotheses, verdict, investigation.fitted, options.mass_uncertainty, result);
+  describe_limits(investigation.asked.hypotheses, investigation.asked.untestable, verdict, robot, result);
+  describe_refused(investigation, robot, result);
+  if (look) describe_smaller(*look, large, verdict, investigation.fitted, options, result);
+  for (FoundEffect& effect : result.effects) {
+    const auto error = constant_errors.find(effect_label(effect.effect));
+    if (error != constant_errors.end()) effect.constant_error = error->second;
+  }
 }
 
-bool is_all_clear(const Findings& found, const std::vector<Objection>& objections) {
-  return found.verdict == discovery::Answer::nothing_missing && objections.empty();
+// A wave that is no sine makes the answer unknown after the search. As for any unknown effect, maps of the joints are
+// tried then. Waves of the doubted joints stay guesses.
+void map_doubted_waves(const Robot& robot, Investigation& investigation, const DiscoveryOptions& options,
+                       Discovery& result) {
+  Discovery mapped;
+  mapped.answer = result.answer;
+  mapped.unknown = result.unknown;
+  mapped.notes = result.notes;
+  add_maps(investigation, options, mapped);
+  if (mapped.maps.empty()) {
+    result.notes = std::move(mapped.notes);
+    return;
+  }
+  describe_search(robot, investigation, options, mapped);
+  for (FoundEffect& effect : mapped.effects) {
+    const bool is_doubted = std::ranges::any_of(
+        mapped.unknown, [&](const FoundShape& found) { return found.shape.acts_on == effect.effect.at; });
+    if (effect.effect.type == "transmission_error" && is_doubted) effect.confirmed = false;
+  }
+  result = std::move(mapped);
 }
 
-// Standard deviation of one coordinate that the search of the residuals leaves, or the search before.
-double noise_of(const Findings& found) {
-  const std::optional<ResidualSearch>& residual = found.residual_search;
-  const bool has_names = residual && residual->verdict.answer != discovery::Answer::unknown;
-  return has_names ? residual->verdict.noise : found.investigation.verdict.noise;
-}
-
-// Repeats that scatter less than the rest do not show all of the noise, whatever the file says. Effects must then
-// hold without counting them as independent measurements.
-bool repeats_hide_noise(const Findings& found, const std::vector<Objection>& objections) {
-  constexpr double significant = 0.05;
-  const discovery::LackOfFit& repeats = found.investigation.verdict.lack_of_fit;
-  return !is_all_clear(found, objections) && repeats.has_enough_repeats() && repeats.p_value < significant;
-}
-
-// A discovery of robots and errors alone.
-Discovery of_robots(Robots robots, const PoseSplit& split, const discovery::LackOfFit& lack_of_fit, double noise_mm) {
-  const Verification verified = verify(robots, split, lack_of_fit, noise_mm);
-  remember_held_out_errors(split, robots.improved);
+Discovery discover_in(const Robot& robot, const PoseSplit& split, const DiscoveryOptions& options, Work& work) {
+  // Joint maps that the robot has already are applied to the joint values, and the search is made without them.
+  const Unmapped plain = unmapped(robot, split.samples);
   Discovery result;
-  result.before = std::move(robots.before);
-  result.improved = std::move(robots.improved);
-  result.maps = std::move(robots.maps);
-  result.fitted_before = verified.fitted_before;
-  result.fitted_after = verified.fitted_after;
-  result.held_out = verified.held_out;
+  Investigation investigation;
+  investigation.work = &work;
+  work.begin("calibrating");
+  investigation.searched = plain.measurements;
+  RobustCalibration start = calibrate_robustly(plain.robot, investigation.searched, options.calibration);
+  investigation.baseline = std::move(start.calibration);
+  investigation.baseline_without = std::move(start.left_out);
+  check_freedom(investigation.searched, investigation.baseline);
+  check_plausible(robot, investigation.baseline.robot, investigation.searched);
+  if (is_exact(investigation.baseline.robot, investigation.searched)) {
+    result.before = calibrate(robot, split.samples, options.calibration).robot;
+    result.improved.robot = result.before;
+    result.notes.emplace_back(
+        "The calibrated model reproduces the measurements to rounding: there is no gap to explain.");
+    return result;
+  }
+  investigation.search(options);
+  const discovery::Verdict& verdict = investigation.verdict;
+  result.answer = verdict.answer;
+  describe_shapes(investigation.asked.hypotheses, verdict, result.unknown);
+  if (options.maps && verdict.answer == discovery::Answer::unknown) add_maps(investigation, options, result);
+  describe_search(robot, investigation, options, result);
+  if (is_named(result.answer)) {
+    doubt_waves(investigation, result);
+    if (options.maps && !is_named(result.answer)) map_doubted_waves(robot, investigation, options, result);
+  }
+  for (const std::size_t sample : verdict.outliers) {
+    for (const Eigen::Index row : split.rows[sample]) result.outliers.push_back(row);
+  }
+  refuse_all_clear(investigation, options, result);
+  describe_rest(investigation, options, result);
+  add_doubts(plain.robot, investigation, unmapped(robot, split.test).measurements, result);
+  const Measurements kept = without_rows(split.samples, verdict.outliers);
+  result.before = calibrate(robot, kept, options.calibration).robot;
+  result.rounds = investigation.rounds;
+  result.improved.robot = investigation.fitted.robot;
+  for (const std::vector<Effect>* maps : {&plain.maps, static_cast<const std::vector<Effect>*>(&result.maps)}) {
+    result.improved.robot.effects.insert(result.improved.robot.effects.end(), maps->begin(), maps->end());
+  }
+  // A refit that ended in a worse minimum is discarded.
+  if (total_distance(result.improved.robot, kept) > total_distance(result.before, kept)) {
+    result.improved.robot = result.before;
+    result.maps.clear();
+    result.notes.emplace_back(
+        "The refit with what was found did not converge to anything better: the model is as calibrated.");
+  }
+  if (options.correct && verdict.answer == discovery::Answer::unknown) {
+    begin(investigation, "trying a correction");
+    correct_rest(kept, options.seed, work, result);
+  }
+  locate(kept, result);
   return result;
 }
 
-Discovery without_gap(const Robot& robot, const PoseSplit& split, const DiscoveryOptions& options) {
-  const Robots robots = withdrawn({calibrate(robot, split.samples, options.calibration).robot, {}, {}, {}});
-  Discovery result = of_robots(robots, split, {}, 0.0);
-  result.notes.emplace_back(
-      "The calibrated model reproduces the measurements to rounding: there is no gap to explain.");
-  if (const auto note = far_poses_note(robots, split)) result.notes.push_back(*note);
-  return result;
-}
-
-Discovery described(Discovery result, const Findings& found, const std::vector<Objection>& objections,
-                    const PoseSplit& split) {
-  const Investigation& last = found.investigation;
-  const Decision decision = decide(found.verdict, objections, found.names);
-  result.answer = decision.answer;
-  result.headline = decision.headline;
-  for (std::size_t k = 0; k < found.names.size(); ++k) {
-    result.effects.push_back(found.names[k].effect);
-    result.effects.back().confirmed = decision.confirmed[k];
-  }
-  result.unknown = found.unknown;
-  for (const Objection& one : objections) {
-    result.unknown.insert(result.unknown.end(), one.unknown.begin(), one.unknown.end());
-  }
-  result.more = shapes_left(found);
-  result.beyond_plausible = beyond_plausible(last, result.before);
-  result.gap = gap_map(result.before, without_rows(split.samples, last.verdict.outliers));
-  for (const std::size_t sample : last.verdict.outliers) {
-    result.outliers.insert(result.outliers.end(), split.rows[sample].begin(), split.rows[sample].end());
-  }
-  Limits limits = limits_of(last, result.before);
-  result.not_testable = std::move(limits.not_testable);
-  result.visible = std::move(limits.visible);
-  result.score_gain = last.verdict.score_gain;
-  result.threshold = last.verdict.threshold;
-  result.hypotheses = static_cast<int>(last.asked.hypotheses.size());
-  result.rounds = last.rounds;
-  return result;
-}
-
-// The stages, in the order in which they need each other:
-//
-// - split: poses are set aside for the verification before anything is looked at;
-// - calibrate: an error that rigid geometry can imitate is no evidence for an effect;
-// - search: names, shapes and joint maps. It is repeated with averaged poses if a judge of the repeats asks for it;
-// - judge: all judges see the same findings, and raise objections without changing them;
-// - fit: both robots are fitted to all poses searched, for the last judge and for the user;
-// - verify: the poses set aside are the last judge;
-// - describe: the table of decide() makes an answer of verdict and objections, once.
 Discovery discover_readings(const Robot& robot, const Measurements& measurements,
-                            const std::optional<Measurements>& test, const DiscoveryOptions& options, Work& work) {
-  const auto split_with = [&](Repeats repeats) {
-    return set_aside(measurements, test, options.held_out_share, options.seed, repeats);
-  };
-  PoseSplit split = split_with(Repeats::as_marked);
-  if (split.samples.count() * std::ranges::count(measurements.measured, true) < 10) {
+                            const std::optional<Measurements>& test, const DiscoveryOptions& options) {
+  const PoseSplit split = set_aside(measurements, test, options.held_out_share, options.seed, Repeats::as_marked);
+  const Eigen::Index components = std::ranges::count(measurements.measured, true);
+  if (split.samples.count() * components < 10) {
     throw std::invalid_argument(
         fmt::format("llmt::robotics::discover: {} poses to search are too few", split.samples.count()));
   }
-  Unmapped plain = unmapped(robot, split.samples);
-  Investigation start = calibrated(robot, plain, options, work);
-  if (is_exact(start.baseline.robot, start.searched)) return without_gap(robot, split, options);
-  Findings found = search(std::move(start), options);
-  std::vector<Objection> objections = judge(found, options);
-  const discovery::LackOfFit lack_of_fit = found.investigation.verdict.lack_of_fit;
-  const bool once_each = repeats_hide_noise(found, objections);
-  if (once_each) {
-    split = split_with(Repeats::averaged);
-    plain = unmapped(robot, split.samples);
-    found = search(calibrated(robot, plain, options, work), options);
-    objections = judge(found, options);
+  Work work(options.progress);
+  Discovery result = discover_in(robot, split, options, work);
+  // Repeats that scatter less than the rest do not show all of the noise, whatever the file says. What was found must
+  // then hold without counting them as independent measurements.
+  constexpr double surprising = 0.05;
+  const bool doubtful = result.answer != discovery::Answer::nothing_missing &&
+                        result.lack_of_fit.has_enough_repeats() && result.lack_of_fit.p_value < surprising;
+  if (doubtful) {
+    const discovery::LackOfFit repeats = result.lack_of_fit;
+    result = discover_in(robot, set_aside(measurements, test, options.held_out_share, options.seed, Repeats::averaged),
+                         options, work);
+    result.lack_of_fit = repeats;
+    result.notes.emplace_back("Repeats of a pose scatter less than the rest: each pose was counted once.");
   }
-  Robots robots = fit_robots(robot, split.samples, plain.maps, found, options);
-  Notes notes = found.notes;
-  for (const Objection& one : objections) add(one.notes, notes);
-  add(input_mistakes(plain.robot, found.investigation, unmapped(robot, split.test).measurements,
-                     is_all_clear(found, objections)),
-      notes);
-  add(robots.notes, notes);
-  if (once_each) notes.emplace_back("Repeats of a pose scatter less than the rest: each pose was counted once.");
-  if (const auto note = far_poses_note(robots, split)) notes.push_back(*note);
-  if (const auto loss = judge_held_out_loss(robots, split, found.names.size())) {
-    objections.push_back(*loss);
-    add(loss->notes, notes);
-    robots = withdrawn(std::move(robots));
-  }
-  const double noise_mm = noise_of(found);
-  Discovery result = described(of_robots(std::move(robots), split, lack_of_fit, noise_mm), found, objections, split);
-  result.lack_of_fit = lack_of_fit;
-  result.noise_mm = noise_mm;
-  result.notes = std::move(notes);
+  verify(split.searched, split.test, components, result);
+  work.finish();
   return result;
 }
 
@@ -273,19 +332,13 @@ Discovery discover(const Robot& robot, const Measurements& measurements, const s
   validate(robot);
   validate(measurements, robot);
   const Robot whole = with_frames(robot, measurements.poses);
-  Work work(options.progress);
-  const auto finished = [&](const Measurements& readings, const std::optional<Measurements>& test_readings) {
-    Discovery result = discover_readings(whole, readings, test_readings, options, work);
-    work.finish();
-    return result;
-  };
-  if (orientation_rows(measurements.poses).empty()) return finished(measurements, test);
+  if (orientation_rows(measurements.poses).empty()) return discover_readings(whole, measurements, test, options);
   const Calibration balance = calibrate(whole, measurements, options.calibration);
   constexpr double longest_mm = 1e5;
   const double lever_mm = std::min(longest_mm, 1e3 * balance.noise_mm / std::max(1e-9, balance.orientation_noise_mrad));
   std::optional<Measurements> balanced_test = test;
   if (test) balanced_test = with_lever(*test, lever_mm);
-  return finished(with_lever(measurements, lever_mm), balanced_test);
+  return discover_readings(whole, with_lever(measurements, lever_mm), balanced_test, options);
 }
 
 }  // namespace llmt::robotics

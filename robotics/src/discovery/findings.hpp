@@ -1,61 +1,29 @@
-// The outcome of a search in the words of a robot: effects, shapes and limits.
+// What a search found, as effects, shapes and limits of a robot.
 #pragma once
 
-#include <optional>
 #include <vector>
 
-#include "discovery/decision.hpp"
-#include "discovery/residual_search.hpp"
+#include "discovery/second_look.hpp"
 #include "hypotheses/hypothesis.hpp"
 
 namespace llmt::robotics {
 
-/// Everything that the searches on one set of poses ended with.
-struct Findings {
-  Investigation investigation;     ///< the last one; everything that was found is fitted together
-  discovery::Answer verdict = {};  ///< of the first search, which is without joint maps
-  std::vector<Hypothesis> larger;  ///< what was found before the residuals were searched
-  std::optional<ResidualSearch> residual_search;
-  std::vector<Name> names;
-  std::vector<FoundShape> unknown;     ///< shapes of the first search
-  std::vector<Effect> maps;            ///< joint maps that were added
-  std::optional<Objection> harmonics;  ///< against waves, see judge_waves()
-  std::vector<std::string> notes;
+void describe_effects(const std::vector<Hypothesis>& hypotheses, const discovery::Verdict& verdict,
+                      const Calibration& fitted, double mass_uncertainty, Discovery& result);
+void describe_shapes(const std::vector<Hypothesis>& hypotheses, const discovery::Verdict& verdict,
+                     std::vector<FoundShape>& shapes);
 
-  /// True if something that has no name was known when the last search was made.
-  bool is_beside_unknown() const { return verdict == discovery::Answer::unknown || !maps.empty(); }
-};
+/// What a second look found beside the large effects: names, and shapes that have none.
+void describe_smaller(const SecondLook& look, const std::vector<Hypothesis>& large, const discovery::Verdict& verdict,
+                      const Calibration& fitted, const DiscoveryOptions& options, Discovery& result);
 
-/// True if the answer consists of names.
-inline bool is_named(discovery::Answer answer) {
-  return answer == discovery::Answer::named || answer == discovery::Answer::indistinguishable;
-}
+/// Discovery::not_testable and visible: which effects could not be tested, and from which size on the others would have
+/// been found.
+void describe_limits(const std::vector<Hypothesis>& hypotheses,
+                     const std::vector<discovery::UntestableCause>& untestable, const discovery::Verdict& verdict,
+                     const Robot& robot, Discovery& result);
 
-/// The shapes of a verdict, by falling share.
-std::vector<FoundShape> found_shapes(const std::vector<Hypothesis>& hypotheses, const discovery::Verdict& verdict);
-
-/// Shapes that the search of the residuals found: what is left beside names.
-std::vector<FoundShape> shapes_left(const Findings& found);
-
-/// The effects of a verdict that the fit has.
-std::vector<Name> named_effects(const std::vector<Hypothesis>& hypotheses, const discovery::Verdict& verdict,
-                                const Calibration& fitted, double mass_uncertainty);
-
-/// The effects that a search of the residuals added. Their shares are those of the sum of squares that `verdict`
-/// explains, the verdict of the search before.
-std::vector<Name> smaller_effects(const ResidualSearch& search, const discovery::Verdict& verdict,
-                                  const Calibration& fitted, double mass_uncertainty);
-
-/// Discovery::not_testable and Discovery::visible.
-struct Limits {
-  std::vector<discovery::UntestableCause> not_testable;
-  std::vector<Visible> visible;
-};
-
-Limits limits_of(const Investigation& investigation, const Robot& robot);
-
-/// Effects that the search refused for their size, and effects that ended too large when everything was fitted
-/// together.
-std::vector<BeyondPlausible> beyond_plausible(const Investigation& investigation, const Robot& robot);
+/// Discovery::beyond_plausible: what the search refused, and what ended too large when everything was fitted together.
+void describe_refused(const Investigation& investigation, const Robot& robot, Discovery& result);
 
 }  // namespace llmt::robotics

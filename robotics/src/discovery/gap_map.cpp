@@ -17,7 +17,7 @@ struct Inputs {
   Eigen::MatrixXd values;
 };
 
-// Joints in degrees, and all covariates that vary.
+// Joints in degrees, and whatever else was written down and varies.
 Inputs inputs_of(const Measurements& measurements, const Chain& chain) {
   Inputs inputs;
   std::vector<Eigen::VectorXd> columns;
@@ -129,19 +129,18 @@ void add_levers(const Robot& robot, const Measurements& measurements, const Eige
 
 }  // namespace
 
-GapMap gap_map(const Robot& robot, const Measurements& searched) {
+void locate(const Measurements& searched, Discovery& result) {
   constexpr Eigen::Index fewest = 24;
-  GapMap map;
+  const Robot& robot = result.before;
   Eigen::MatrixXd world = searched.positions_mm - positions(robot, searched.poses);
   for (Eigen::Index axis = 0; axis < 3; ++axis) {
     if (!searched.measured[axis]) world.col(axis).setZero();
   }
-  add_levers(robot, searched, world, map);
-  if (searched.count() < fewest) return map;
+  add_levers(robot, searched, world, result.gap);
+  if (searched.count() < fewest) return;
   const Inputs inputs = inputs_of(searched, robot.chain);
-  add_regions(inputs, world.rowwise().norm(), map);
-  add_dependences(inputs, world, map);
-  return map;
+  add_regions(inputs, world.rowwise().norm(), result.gap);
+  add_dependences(inputs, world, result.gap);
 }
 
 }  // namespace llmt::robotics

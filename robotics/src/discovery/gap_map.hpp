@@ -1,11 +1,11 @@
-// The gap between model and measurement: a tree of the residuals.
+// Where simulation and measurement disagree: a tree of the residual.
 #pragma once
 
 #include "llmt/robotics/discovery_result.hpp"
 
 namespace llmt::robotics {
 
-/// The gap of the robot: its largest regions, the joints whose motion it resembles, and the inputs that it depends on.
-GapMap gap_map(const Robot& robot, const Measurements& measurements);
+/// Where the gap of `before` is (step "locate").
+void locate(const Measurements& searched, Discovery& result);
 
 }  // namespace llmt::robotics

@@ -3,28 +3,43 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <iterator>
 #include <set>
 
 #include "calibration/joint_map_shift.hpp"
 #include "discovery/joint_maps.hpp"
-#include "discovery/leave_one_out.hpp"
+#include "discovery/left_out.hpp"
 #include "discovery/pose_split.hpp"
-#include "llmt/discovery/rounds.hpp"
 #include "llmt/statistics.hpp"
 
 namespace llmt::robotics {
 namespace {
 
-discovery::RoundSummary start_of(const Investigation& investigation) {
+// What a round says: names, and samples that fit nothing.
+struct Saying {
   std::set<std::string> labels;
-  for (const Hypothesis& hypothesis : investigation.found) labels.insert(effect_label(*hypothesis.effect));
-  return {.names = {labels.begin(), labels.end()},
-          .outliers = {investigation.baseline_without.begin(), investigation.baseline_without.end()}};
+  std::set<std::size_t> outliers;
+  bool operator==(const Saying&) const = default;
+  bool operator<(const Saying& other) const {
+    return labels != other.labels ? labels < other.labels : outliers < other.outliers;
+  }
+};
+
+std::set<std::string> labels_of(const std::vector<Hypothesis>& found) {
+  std::set<std::string> labels;
+  for (const Hypothesis& hypothesis : found) labels.insert(effect_label(*hypothesis.effect));
+  return labels;
 }
 
-// Every name once. An exact alias is the same answer under another name, and rounding may choose between the two: the
-// first one in the alphabet stands for both.
-discovery::RoundSummary summary_of(const EffectQuestion& asked, const discovery::Verdict& verdict) {
+// Of a thousand poses some are outliers in one round and not in the next.
+bool is_negligible(const std::set<std::size_t>& one, const std::set<std::size_t>& other, Eigen::Index samples) {
+  std::vector<std::size_t> differing;
+  std::ranges::set_symmetric_difference(one, other, std::back_inserter(differing));
+  return std::ssize(differing) * 100 <= samples;
+}
+
+// Names of what was found. An exact alias is the same answer under another name, which rounding may choose.
+std::set<std::string> names_in(const EffectQuestion& asked, const discovery::Verdict& verdict) {
   std::set<std::string> names;
   for (const discovery::Finding& finding : verdict.findings) {
     for (const discovery::FindingTerm& term : finding.terms) {
@@ -37,12 +52,17 @@ discovery::RoundSummary summary_of(const EffectQuestion& asked, const discovery:
       names.insert(std::move(name));
     }
   }
-  return {.names = {names.begin(), names.end()}, .outliers = {verdict.outliers.begin(), verdict.outliers.end()}};
+  return names;
 }
 
-// Searches, and prefers causes to shapes that explain hardly more: a shape that contains a cause always explains a
-// little more. `preferred` says whether the round before preferred causes. The preference is tried in the first round,
-// and in later ones as long as it held.
+std::vector<std::size_t> ascending(std::vector<std::size_t> samples) {
+  std::ranges::sort(samples);
+  return samples;
+}
+
+// A shape that contains a cause explains always a little more. Where shapes are the answer and causes explain nearly as
+// much, the causes are. `preferred`: whether it was so the round before; asked in the first round and then as long as
+// it is.
 discovery::Verdict search_causes_first(const EffectQuestion& asked, const DiscoveryOptions& options, int round,
                                        bool& preferred) {
   const std::vector<discovery::EffectCandidate> candidates = candidates_of(asked);
@@ -58,14 +78,15 @@ discovery::Verdict search_causes_first(const EffectQuestion& asked, const Discov
   return discovery::search(asked.evidence, candidates, options.search);
 }
 
-// Poses more than 100 medians off that the first calibration left out. They are removed before the next round if the
-// effects found do not halve their error, or if the search called them outliers.
-std::vector<std::size_t> far_poses(const Investigation& now) {
+// Samples that the baseline was made without, endlessly far off, and that are to be left out before the search looks at
+// anything: those that are as far off as before whatever was found, because several of the same size hide each other;
+// and those that were left out, because next to them a gap looks like rounding.
+std::vector<std::size_t> to_refuse(const Investigation& now) {
   const Eigen::Index d = std::ranges::count(now.searched.measured, true);
   const Eigen::VectorXd before = distances(positions(now.baseline.robot, now.searched.poses), now.searched);
   const double typical = median(before);
   std::vector<std::size_t> far;
-  Eigen::Index asked = 0;  // the sample's number in the question
+  Eigen::Index asked = 0;  // number of the sample in the question
   for (std::size_t i = 0; i < static_cast<std::size_t>(now.searched.count()); ++i) {
     if (std::ranges::binary_search(now.refused, i)) continue;
     const auto number = static_cast<std::size_t>(asked);
@@ -74,13 +95,13 @@ std::vector<std::size_t> far_poses(const Investigation& now) {
     const double length = before(static_cast<Eigen::Index>(i));
     const bool is_left_out = std::ranges::find(now.verdict.outliers, number) != now.verdict.outliers.end();
     constexpr double hardly = 0.5;
-    constexpr double gross = 100.0;  // no effect that acts at few poses is as large as that
-    if (length > gross * typical && (is_left_out || left > hardly * length)) far.push_back(i);
+    constexpr double endless = 100.0;  // no effect that acts at few poses is as large as that
+    if (length > endless * typical && (is_left_out || left > hardly * length)) far.push_back(i);
   }
   return far;
 }
 
-// Turns numbers of outliers in the question into numbers among all samples, and adds the refused samples.
+// Outliers by their numbers among all samples, not among those asked for, and the refused ones.
 void number_among_all(const std::vector<std::size_t>& refused, Eigen::Index samples,
                       std::vector<std::size_t>& outliers) {
   if (refused.empty()) return;
@@ -97,27 +118,20 @@ struct Round {
   discovery::Verdict verdict;
   std::vector<Hypothesis> found;
   Calibration fitted;
+  Eigen::VectorXd errors;  // of every pose, left out
 };
 
-std::vector<std::size_t> ascending(std::vector<std::size_t> samples) {
-  std::ranges::sort(samples);
-  return samples;
-}
-
-// The round with the smallest sum of squared leave-one-pose-out errors. No error counts for more than six medians, so
-// that the rounds' outliers do not decide.
-std::size_t best_of(const std::vector<Round>& rounds, const Measurements& searched) {
+// Sum of squared errors on poses left out, none of them longer than what a few outliers of any round are.
+std::size_t best_of(const std::vector<Round>& rounds) {
   double typical = std::numeric_limits<double>::infinity();
-  std::vector<Eigen::VectorXd> errors;
   for (const Round& round : rounds) {
-    errors.push_back(leave_one_out_distances(round.fitted, searched, ascending(round.verdict.outliers)));
-    typical = std::min(typical, median(errors.back()));
+    typical = std::min(typical, median(round.errors));
   }
   constexpr double longest = 6.0;
   std::size_t best = 0;
   double least = std::numeric_limits<double>::infinity();
   for (std::size_t k = 0; k < rounds.size(); ++k) {
-    const double sum = errors[k].cwiseMin(longest * typical).squaredNorm();
+    const double sum = rounds[k].errors.cwiseMin(longest * typical).squaredNorm();
     if (sum >= least) continue;
     least = sum;
     best = k;
@@ -127,14 +141,10 @@ std::size_t best_of(const std::vector<Round>& rounds, const Measurements& search
 
 }  // namespace
 
-std::vector<std::size_t> Investigation::outliers() const { return ascending(verdict.outliers); }
-
-Measurements Investigation::kept() const { return without_rows(searched, outliers()); }
-
-void report_progress(Work& work, const std::string& step) {
+void begin(const Investigation& investigation, const std::string& step) {
   constexpr double share_of_step = 0.15;
-  work.did(share_of_step * work.left());
-  work.begin(step);
+  investigation.work->did(share_of_step * investigation.work->left());
+  investigation.work->begin(step);
 }
 
 double total_distance(const Robot& robot, const Measurements& measurements) {
@@ -179,65 +189,80 @@ std::vector<Effect> too_large(const Calibration& fitted, const std::vector<Hypot
   return beyond;
 }
 
-Investigation search_in_rounds(Investigation now, const DiscoveryOptions& options) {
-  if (now.found.empty()) now.fitted = now.baseline;
+void Investigation::search(const DiscoveryOptions& options) {
+  if (found.empty()) fitted = baseline;
+  settled = false;
+  Saying last{labels_of(found), {baseline_without.begin(), baseline_without.end()}};
+  std::set<Saying> said;
   std::vector<Round> tried;
-  bool causes_preferred = false;
-  const auto round = [&](int number) -> std::optional<discovery::RoundSummary> {
-    report_progress(*now.work, fmt::format("searching, round {}", ++now.rounds));
-    now.asked = question(now.fitted.robot, now.found, without_rows(now.searched, now.refused), options);
-    exclude_effects(now.implausible, now.asked);
-    now.verdict = search_causes_first(now.asked, options, number, causes_preferred);
-    now.work->check();
-    const std::vector<std::size_t> far = far_poses(now);
-    number_among_all(now.refused, now.searched.count(), now.verdict.outliers);
-    if (!far.empty() && number + 1 < options.rounds) {
-      now.refused.insert(now.refused.end(), far.begin(), far.end());
-      std::ranges::sort(now.refused);
-      return std::nullopt;
+  bool preferred = false;
+  for (int round = 0; round < options.rounds && !settled; ++round) {
+    begin(*this, fmt::format("searching, round {}", ++rounds));
+    asked = question(fitted.robot, found, without_rows(searched, refused), options);
+    std::erase_if(asked.hypotheses,
+                  [&](const Hypothesis& one) { return one.effect && implausible.contains(effect_label(*one.effect)); });
+    verdict = search_causes_first(asked, options, round, preferred);
+    work->check();
+    const std::vector<std::size_t> hidden = to_refuse(*this);
+    number_among_all(refused, searched.count(), verdict.outliers);
+    if (!hidden.empty() && round + 1 < options.rounds) {
+      refused.insert(refused.end(), hidden.begin(), hidden.end());
+      std::ranges::sort(refused);
+      continue;
     }
-    now.found = effects_of(now.asked, now.verdict);
-    forget_signatures(now.asked);
-    const bool as_before = now.found.empty() && now.outliers() == now.baseline_without;
-    now.fitted = as_before ? now.baseline : refit(now.baseline, now.found, now.searched, now.verdict.outliers, options);
-    const std::vector<Effect> beyond = too_large(now.fitted, now.found);
-    for (const Effect& effect : beyond) now.implausible.try_emplace(effect_label(effect), effect);
-    if (beyond.empty()) tried.push_back({now.asked, now.verdict, now.found, now.fitted});
-    discovery::RoundSummary summary = summary_of(now.asked, now.verdict);
-    summary.may_be_last = beyond.empty();
-    return summary;
-  };
-  // One in a hundred poses may be an outlier in one round and not in the next.
-  const auto negligible = static_cast<std::size_t>(now.searched.count() / 100);
-  const discovery::RoundLimits limits{
-      .most = options.rounds, .negligible_outliers = negligible, .stop_at_repeat = true};
-  if (discovery::until_settled(limits, start_of(now), round) || tried.empty()) return now;
-  Round& best = tried[best_of(tried, now.searched)];
-  now.asked = std::move(best.asked);
-  now.verdict = std::move(best.verdict);
-  now.found = std::move(best.found);
-  now.fitted = std::move(best.fitted);
-  return now;
+    found = effects_of(asked, verdict);
+    forget_signatures(asked);
+    const bool as_before = found.empty() && ascending(verdict.outliers) == baseline_without;
+    fitted = as_before ? baseline : refit(baseline, found, searched, verdict.outliers, options);
+    const std::vector<Effect> beyond = too_large(fitted, found);
+    for (const Effect& effect : beyond) implausible.try_emplace(effect_label(effect), effect);
+    Saying now{names_in(asked, verdict), {verdict.outliers.begin(), verdict.outliers.end()}};
+    settled =
+        beyond.empty() && now.labels == last.labels && is_negligible(now.outliers, last.outliers, searched.count());
+    if (beyond.empty() && !settled) {
+      tried.push_back({asked, verdict, found, fitted, left_out(fitted, searched, ascending(verdict.outliers))});
+      if (!said.insert(now).second) break;
+    }
+    last = std::move(now);
+  }
+  if (settled || tried.empty()) return;
+  Round& best = tried[best_of(tried)];
+  asked = std::move(best.asked);
+  verdict = std::move(best.verdict);
+  found = std::move(best.found);
+  fitted = std::move(best.fitted);
 }
 
-std::optional<std::vector<Effect>> helpful_maps(const Investigation& investigation) {
-  const std::optional<JointMaps> maps =
-      fit_joint_maps(investigation.fitted.robot, without_rows(investigation.searched, investigation.verdict.outliers));
-  constexpr double convincing = 2.0;
-  if (!maps || maps->gain_in_errors < convincing) return std::nullopt;
-  return maps->effects;
-}
-
-Investigation search_with_maps(Investigation now, const std::vector<Effect>& maps, const DiscoveryOptions& options) {
-  Robot mapped = now.baseline.registered;
+void Investigation::apply(const std::vector<Effect>& maps) {
+  Robot mapped = baseline.registered;
   mapped.effects.insert(mapped.effects.end(), maps.begin(), maps.end());
-  now.searched = unmapped(mapped, now.searched).measurements;
+  searched = unmapped(mapped, searched).measurements;
+}
+
+void add_maps(Investigation& investigation, const DiscoveryOptions& options, Discovery& result) {
+  begin(investigation, "mapping the joints");
+  const Measurements kept = without_rows(investigation.searched, investigation.verdict.outliers);
+  const std::optional<JointMaps> maps = fit_joint_maps(investigation.fitted.robot, kept);
+  constexpr double convincing = 2.0;
+  if (!maps || maps->gain_in_errors < convincing) {
+    result.notes.emplace_back(
+        "Free maps of the joints (angle error over angle) would not lower the error on poses left out.");
+    return;
+  }
+  result.maps = maps->effects;
+  result.notes.push_back(
+      fmt::format("Free maps of {} joints (angle error over angle) were added: they lower the error on poses left out.",
+                  maps->effects.size()));
+  investigation.apply(maps->effects);
   CalibrationOptions calibration = options.calibration;
   calibration.start_as_given = true;
-  now.baseline = calibrate(now.baseline.registered, now.kept(), calibration);
-  now.baseline_without = now.outliers();
-  now.fitted = refit(now.baseline, now.found, now.searched, now.verdict.outliers, options);
-  return search_in_rounds(std::move(now), options);
+  const std::vector<std::size_t> outliers = ascending(investigation.verdict.outliers);
+  investigation.baseline =
+      calibrate(investigation.baseline.registered, without_rows(investigation.searched, outliers), calibration);
+  investigation.baseline_without = outliers;
+  investigation.fitted = refit(investigation.baseline, investigation.found, investigation.searched,
+                               investigation.verdict.outliers, options);
+  investigation.search(options);
 }
 
 }  // namespace llmt::robotics

@@ -1,8 +1,7 @@
-// Rounds of search and refit on one set of poses.
+// Search and refit, round after round, on one set of poses.
 #pragma once
 
 #include <map>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,52 +10,45 @@
 
 namespace llmt::robotics {
 
-/// The state of a search. Samples are rows of `searched`.
 struct Investigation {
   Work* work = nullptr;                       ///< of the discovery
   Measurements searched;                      ///< joint values moved by the maps there are
   Calibration baseline;                       ///< without what was found
   std::vector<std::size_t> baseline_without;  ///< samples that the baseline was made without, ascending
-  /// Samples that the search does not see, ascending. They are outliers. Gross errors of the same size hide each other,
-  /// and next to very large ones a gap looks like rounding.
+  /// Those of them that are left out before the search looks at anything: several of the same size hide each other, and
+  /// next to endless ones a gap looks like rounding. They are outliers.
   std::vector<std::size_t> refused;
   Calibration fitted;  ///< with what was found
   std::vector<Hypothesis> found;
   discovery::Verdict verdict;
   EffectQuestion asked;  ///< its hypotheses without their signatures
   int rounds = 0;
+  bool settled = false;  ///< the last two rounds said the same
   /// Effects that ended beyond their plausible size when everything was fitted together, by label. They are not found
   /// again.
   std::map<std::string, Effect> implausible;
 
-  /// Samples that fit nothing, ascending.
-  std::vector<std::size_t> outliers() const;
-  /// `searched` without the outliers.
-  Measurements kept() const;
+  /// Until names and outliers no longer change. Where they do not settle, the round is kept whose refit has the
+  /// smallest error on poses left out.
+  void search(const DiscoveryOptions& options);
+  void apply(const std::vector<Effect>& maps);
 };
 
-/// Searches and refits until names and outliers no longer change. If they do not settle, the round is kept whose refit
-/// has the smallest leave-one-pose-out error.
-Investigation search_in_rounds(Investigation investigation, const DiscoveryOptions& options);
-
-/// Fits the robot with the found effects, starting from the registered frames. If that is worse than geometry alone, it
-/// is fitted from the calibrated geometry too, and the better fit is kept.
+/// Fits the robot with the found effects, starting from the registered frames; if that is worse than geometry alone,
+/// from the calibrated geometry, and the better one is kept.
 Calibration refit(const Calibration& baseline, const std::vector<Hypothesis>& found, const Measurements& measurements,
                   const std::vector<std::size_t>& outliers, const DiscoveryOptions& options);
 
 /// Effects that were fitted to sizes beyond the plausible ones, by more than two standard errors.
 std::vector<Effect> too_large(const Calibration& fitted, const std::vector<Hypothesis>& found);
 
-/// Joint maps that lower the leave-one-pose-out error by more than two standard errors, or none.
-std::optional<std::vector<Effect>> helpful_maps(const Investigation& investigation);
+/// Adds joint maps to what was found if they lower the error on poses left out, then searches once more: an effect that
+/// the maps cannot imitate may show only now.
+void add_maps(Investigation& investigation, const DiscoveryOptions& options, Discovery& result);
 
-/// Searches with the maps applied to the joint values. An effect that the maps cannot imitate may show only then.
-Investigation search_with_maps(Investigation investigation, const std::vector<Effect>& maps,
-                               const DiscoveryOptions& options);
-
-/// Counts the step that ends as a share of the work that is left, because the number of steps is not known, and names
-/// the step that begins.
-void report_progress(Work& work, const std::string& step);
+/// Counts the step that ends as a part of the work that is left, for how many there will be is not known, and names the
+/// one that begins.
+void begin(const Investigation& investigation, const std::string& step);
 
 /// Root of the sum of squared distances between model and measurement, mm.
 double total_distance(const Robot& robot, const Measurements& measurements);

@@ -7,8 +7,7 @@
 
 #include "calibration/free_parameters.hpp"
 #include "calibration/joint_map_shift.hpp"
-#include "discovery/leave_one_out.hpp"
-#include "effects/effect_entries.hpp"
+#include "discovery/left_out.hpp"
 #include "kinematics/units.hpp"
 #include "llmt/statistics.hpp"
 
@@ -136,9 +135,9 @@ class Smoother {
   }
 };
 
-// The residuals and the hats at the measured coordinates, projected on the orthogonal complement of the range of
-// geometry and effects. Only parameters that the calibration freed count. On an arm that bends, the others move the
-// tool by a thousandth through the loads, and no refit would give back a part that is projected out along them.
+// The residuals and the hats at the measured coordinates, with what geometry and the robot's effects imitate projected
+// out. Only what the calibration freed is theirs: on an arm that bends, other parameters move the tool by a thousandth
+// through the loads, and no refit gives what is projected out along that.
 struct ProjectedMaps {
   Eigen::MatrixXd baseline;   // n x rank, orthonormal: the range of the Jacobian by these
   Eigen::VectorXd residuals;  // n
@@ -211,15 +210,17 @@ std::optional<JointMaps> fit_joint_maps(const Robot& robot, const Measurements& 
   const Eigen::VectorXd values = factor.solve(moments);
   for (const Knots& own : knots) {
     const Eigen::VectorXd part = values.segment(own.begin, own.count);
-    maps.effects.push_back(
-        joint_map_effect(robot.chain.joints[own.joint], own.first, own.step, {part.begin(), part.end()}));
+    maps.effects.push_back({.type = "joint_map",
+                            .at = robot.chain.joints[own.joint].name,
+                            .values = {part.begin(), part.end()},
+                            .constants = {own.first, own.step}});
   }
   const Eigen::MatrixXd geometry = baseline.transpose();
-  maps.before = leave_one_out_distances(geometry, residuals, d);
+  maps.before = left_out(geometry, residuals, d);
   Eigen::MatrixXd used(geometry.rows() + unknowns, n);
   used.topRows(geometry.rows()) = geometry;
   used.bottomRows(unknowns) = factor.matrixL().solve(hats.transpose());
-  maps.after = leave_one_out_distances(used, residuals - hats * values, d);
+  maps.after = left_out(used, residuals - hats * values, d);
   const PairedDifference gain = paired_difference(maps.before, maps.after);
   maps.gain_in_errors = gain.standard_error > 0.0 ? gain.mean / gain.standard_error : 0.0;
   return maps;

@@ -1,4 +1,4 @@
-// The split of poses into those searched and those set aside for verification; repeats of a pose.
+// Which poses are searched, which are set aside for verification, and which are repeats of one pose.
 #pragma once
 
 #include <cstdint>
@@ -9,14 +9,14 @@
 
 namespace llmt::robotics {
 
-/// The weight of repeats of a pose. as_marked: they are independent measurements, unless the file says that the arm
-/// stood still. averaged: every pose is one measurement.
+/// How repeats of a pose count. as_marked: as independent measurements, unless the file says that the arm stood still.
+/// averaged: every pose as one measurement.
 enum class Repeats { as_marked, averaged };
 
 struct PoseSplit {
   Measurements searched;
-  Measurements test;                            ///< no poses: nothing was set aside
-  Measurements samples;                         ///< `searched` with readings of an arm that stood still averaged
+  Measurements test;     ///< no poses: nothing was set aside
+  Measurements samples;  ///< what is searched: `searched` with readings of an arm that stood still averaged
   std::vector<std::vector<Eigen::Index>> rows;  ///< of the file, behind every sample
 };
 
@@ -29,7 +29,7 @@ PoseSplit set_aside(const Measurements& measurements, const std::optional<Measur
 /// Numbers that are equal for repeats of a pose, or nothing.
 std::vector<Eigen::Index> repeats_of(const Poses& poses);
 
-/// The given ones of the coordinates of the points, which are numbered pose by pose.
+/// The coordinates of the points, pose by pose, of which the given ones are taken.
 Eigen::VectorXd stacked(const Eigen::MatrixXd& points, const std::vector<Eigen::Index>& coordinates);
 
 }  // namespace llmt::robotics

@@ -34,18 +34,18 @@ std::vector<Eigen::Index> freed_geometry(const Robot& robot) {
   return columns;
 }
 
-// Geometric parameters that span all that geometry can do to the rigid arm. Some combinations move nothing on a rigid
-// arm, such as a shift of a joint along its axis. On an arm that bends they move loads, and thereby the tool by a
-// thousandth: counted as geometry they would absorb a part of every elastic effect.
+// Geometric parameters that span all that geometry can do to the rigid arm. On an arm that bends, a combination that
+// moves nothing when rigid, such as a shift of a joint along its axis, moves loads and thereby the tool by a
+// thousandth: taken for geometry it would absorb a part of every elastic effect.
 std::vector<Eigen::Index> independent_geometry(const Robot& robot, const Measurements& measurements,
                                                const std::vector<Eigen::Index>& rows) {
-  // Touched points alone also fit an arm of no size. Only the parameters that the calibration freed keep the scale.
+  // What is touched alone fits an arm of no size, too: only what the calibration freed keeps the scale.
   if (!unseen_by_touch(robot).empty()) return freed_geometry(robot);
   Robot rigid = robot;
   rigid.effects.clear();
   Eigen::MatrixXd jacobian = position_jacobian(rigid, measurements.poses)(rows, Eigen::all);
-  // A column that is tiny next to the others is rounding, often with the pattern of a column that moves the tool.
-  // Scaled up it would take that column's place.
+  // What moves nothing next to the others is rounding, often of the same pattern as what does move something: scaled up
+  // it would take its place.
   constexpr double nothing = 1e-7;
   const double least = nothing * jacobian.colwise().norm().maxCoeff();
   for (auto column : jacobian.colwise()) {
@@ -79,7 +79,7 @@ std::vector<double> within_limits(const discovery::EffectCandidate& candidate, c
   return {bounded.begin(), bounded.end()};
 }
 
-// The search takes all readings to be equally exact, so less exact readings are scaled down.
+// The search takes all readings for equally exact: less exact ones count as much less as they are.
 void weigh(const Measurements& measurements, const Eigen::VectorXd& residuals, const CalibrationOptions& options,
            EffectQuestion& question) {
   const Eigen::VectorXd weights = NoiseModel(measurements, options).relative_weights(residuals);
@@ -107,7 +107,7 @@ EffectQuestion question(const Robot& robot, const std::vector<Hypothesis>& found
   add_signatures(scene, result.hypotheses);
   const std::vector<Eigen::Index> rows = measured_rows(measurements);
   const Eigen::Index geometric = geometric_parameter_count(robot.chain);
-  // Columns of the fitted geometry, then of all effects.
+  // Of the fitted geometry, then of all effects.
   std::vector<Eigen::Index> columns = independent_geometry(robot, measurements, rows);
   const auto fitted = std::ssize(columns);
   const auto all = static_cast<Eigen::Index>(parameters(robot).size());
@@ -144,11 +144,6 @@ EffectQuestion question(const Robot& robot, const std::vector<Hypothesis>& found
   }
   weigh(measurements, residuals(rows), options.calibration, result);
   return result;
-}
-
-void exclude_effects(const std::map<std::string, Effect>& effects, EffectQuestion& question) {
-  std::erase_if(question.hypotheses,
-                [&](const Hypothesis& one) { return one.effect && effects.contains(effect_label(*one.effect)); });
 }
 
 std::vector<discovery::EffectCandidate> candidates_of(const EffectQuestion& question) {

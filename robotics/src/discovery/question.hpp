@@ -1,8 +1,6 @@
-// The question to the search at the present estimates: residuals, Jacobian and hypotheses.
+// What the search is asked at the present estimates.
 #pragma once
 
-#include <map>
-#include <string>
 #include <vector>
 
 #include "hypotheses/hypothesis.hpp"
@@ -11,8 +9,8 @@
 
 namespace llmt::robotics {
 
-/// Residuals, Jacobian and hypotheses at the current estimates. The robot's found effects compete anew: the part that
-/// they explain is added back to the residuals.
+/// What the search is to explain at the current estimates: the robot's found effects compete anew, with what they
+/// explain added back to the residuals.
 struct EffectQuestion {
   discovery::Evidence evidence;
   std::vector<Hypothesis> hypotheses;
@@ -23,13 +21,10 @@ struct EffectQuestion {
 EffectQuestion question(const Robot& robot, const std::vector<Hypothesis>& found, const Measurements& measurements,
                         const DiscoveryOptions& options);
 
-/// Removes the hypotheses of these effects, which are given by label.
-void exclude_effects(const std::map<std::string, Effect>& effects, EffectQuestion& question);
-
 /// The candidates of the hypotheses, in their order.
 std::vector<discovery::EffectCandidate> candidates_of(const EffectQuestion& question);
 
-/// Frees the memory of residuals, Jacobian and signatures, which only the search needs.
+/// Frees the memory of what only the search needs.
 void forget_signatures(EffectQuestion& question);
 
 /// The hypotheses of the verdict that are effects, with their values.

@@ -1,19 +1,15 @@
-// A correction by trees of the residuals that the improved robot leaves.
+// A tree of what the improved robot leaves over.
 #pragma once
 
 #include <cstdint>
-#include <string>
-#include <vector>
 
 #include "llmt/progress.hpp"
-#include "llmt/robotics/correction.hpp"
+#include "llmt/robotics/discovery_result.hpp"
 
 namespace llmt::robotics {
 
-/// Adds a correction by trees to the robot if it lowers the error on poses left out by more than two standard errors.
-/// The outcome is noted in a sentence. Fewer than 100 poses: does nothing. `work` is that of the
-/// discovery.
-void add_correction(const Measurements& searched, std::uint64_t seed, Work& work, CorrectedRobot& improved,
-                    std::vector<std::string>& notes);
+/// A tree of what the improved robot leaves, kept if it lowers the error of poses left out by more than two standard
+/// errors. `work`: of the discovery.
+void correct_rest(const Measurements& searched, std::uint64_t seed, Work& work, Discovery& result);
 
 }  // namespace llmt::robotics

@@ -84,7 +84,7 @@ void read_own_term(YamlMap map, EffectType& type) {
   type.parameters.push_back(std::move(parameter));
 }
 
-// A chain with more joints than any arm: mistakes in expressions show here, those in joint numbers at the robot.
+// Of an arm with more joints than any: mistakes in the expressions show here, those in joint numbers at the robot.
 Chain longest_arm() {
   Chain any;
   for (int j = 1; j <= 99; ++j) any.joints.emplace_back().name = fmt::format("joint{}", j);
@@ -155,18 +155,15 @@ std::vector<EffectType> read_entries(const std::string& text, const std::string&
 
 }  // namespace
 
-std::vector<EffectType> library_effects() {
-  std::vector<EffectType> all;
-  for (const auto& part : {compliance_effects, elastic_effects, drive_effects, periodic_effects, friction_effects,
-                           whole_arm_effects, instrument_effects}) {
-    for (EffectType& type : part()) all.push_back(std::move(type));
-  }
-  all.push_back(formula_effect());
-  return all;
-}
-
 const std::vector<EffectType>& effect_types() {
-  static const std::vector<EffectType> types = read_entries(size_table(), "catalogue.yaml", effect_table());
+  static const std::vector<EffectType> types = [] {
+    std::vector<EffectType> all = elastic_effects();
+    for (EffectType& type : joint_effects()) all.push_back(std::move(type));
+    for (EffectType& type : whole_arm_effects()) all.push_back(std::move(type));
+    for (EffectType& type : instrument_effects()) all.push_back(std::move(type));
+    all.push_back(formula_effect());
+    return read_entries(default_catalogue_yaml, "catalogue.yaml", std::move(all));
+  }();
   return types;
 }
 

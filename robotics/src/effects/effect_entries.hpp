@@ -2,7 +2,6 @@
 #pragma once
 
 #include <Eigen/Geometry>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -12,33 +11,15 @@ namespace llmt::robotics {
 
 inline constexpr double metres = 1e-3;  // m per mm
 
-using Values = std::span<const double>;
-
-/// Rows of the catalogue without sizes, titles and notes, which come from the table robotics/catalogue.yaml.
-std::vector<EffectType> compliance_effects();
+/// Formulas, units and places; sizes, titles and notes come from the table robotics/catalogue.yaml.
 std::vector<EffectType> elastic_effects();
-std::vector<EffectType> drive_effects();
-std::vector<EffectType> periodic_effects();
-std::vector<EffectType> friction_effects();
+std::vector<EffectType> joint_effects();
 std::vector<EffectType> whole_arm_effects();
 std::vector<EffectType> instrument_effects();
 EffectType formula_effect();
 
-/// All rows of the library, in the order of effect_types().
-std::vector<EffectType> library_effects();
-
 /// The table robotics/catalogue.yaml as text.
 extern const char* const default_catalogue_yaml;
-
-/// The rows and the table of sizes that effect_types() consists of.
-std::vector<EffectType> effect_table();
-std::string size_table();
-
-/// EffectTrial::constants of types whose constants are not known beforehand.
-inline std::vector<std::vector<double>> no_constants(const TrialContext&, std::size_t) { return {}; }
-
-/// A table of errors of a joint: values at `first`, `first + step`, ... in rad (mm).
-Effect joint_map_effect(const Joint& joint, double first, double step, std::vector<double> values);
 
 using ApplyFunction = decltype(EffectType::apply);
 
@@ -73,7 +54,7 @@ inline bool is_prismatic(const Chain& chain, std::size_t joint) {
   return chain.joints[joint].type == JointType::prismatic;
 }
 
-/// Gravity's torque about a joint in N m, or its force along a prismatic joint in N.
+/// What gravity does to a joint: its torque in N m, or its force in N for a prismatic joint.
 inline double gravity_load(const PoseContext& pose, std::size_t joint) {
   const Load& load = pose.load[joint];
   return pose.skeleton.joint_axis[joint].dot(is_prismatic(pose.chain, joint) ? load.force_N : load.moment_Nm);

@@ -15,17 +15,11 @@ namespace {
 
 [[noreturn]] void refuse(const std::string& message) { throw std::invalid_argument("llmt::robotics: " + message); }
 
-// Number of values of an effect at a joint, 0 if its type leaves it open.
-std::size_t value_count(const EffectType& type, const Chain& chain, std::size_t index) {
-  const bool is_list = type.parameters.size() == 1 && type.parameters[0].list;
-  if (!is_list) return type.parameters.size();
-  return type.parameters[0].each_body ? 3 * (chain.joints.size() - index) : 0;
-}
-
 std::string count_refusal(const EffectType& type, const Chain& chain, const Effect& effect, std::size_t index) {
-  const std::size_t own = value_count(type, chain, index);
-  std::size_t wanted = own > 0 ? own : std::max<std::size_t>(1, effect.values.size());
-  if (type.has_formula) wanted = effect.formula.terms.size();
+  std::size_t wanted = type.parameters.size();
+  const bool is_list = wanted == 1 && type.parameters[0].list;
+  if (is_list) wanted = type.count ? type.count(chain, index) : std::max<std::size_t>(1, effect.values.size());
+  if (type.name == "formula") wanted = effect.formula.terms.size();
   if (effect.values.size() != wanted) return fmt::format("has {} values, must be {}", effect.values.size(), wanted);
   if (effect.constants.size() == type.constants.size()) return "";
   return fmt::format("has {} constants, must be {}", effect.constants.size(), type.constants.size());
@@ -39,7 +33,7 @@ std::string place_refusal(const EffectType& type, const Chain& chain, std::size_
   return type.refusal ? type.refusal(chain, index, constants) : "";
 }
 
-// A coefficient has the unit of what its term acts on, as if the expression had none.
+// What a term is multiplied with has the unit of what it acts on, as if the expression had none.
 std::vector<EffectParameter> formula_parameters(const EffectParameter& usual, const Formula& formula, bool slides) {
   std::vector<EffectParameter> all;
   for (const FormulaTerm& term : formula.terms) {
@@ -62,18 +56,17 @@ std::string with_joint_number(std::string pattern, std::size_t joint) {
 }
 
 bool is_of_whole_robot(const EffectType& type, const Effect& effect) {
-  return type.place == EffectPlace::robot || (type.has_formula && effect.at.empty());
+  return type.place == EffectPlace::robot || (type.name == "formula" && effect.at.empty());
 }
 
 const EffectType& effect_type(std::string_view name) {
-  const auto type = std::ranges::find(effect_types(), name, &EffectType::name);
-  if (type != effect_types().end()) return *type;
-  std::vector<std::string> known;
-  for (const EffectType& other : effect_types()) known.push_back(other.name);
-  refuse(fmt::format("there is no effect \"{}\"; known: {}", name, fmt::join(known, ", ")));
+  std::string known;
+  for (const EffectType& type : effect_types()) {
+    if (type.name == name) return type;
+    known += (known.empty() ? "" : ", ") + type.name;
+  }
+  refuse(fmt::format("there is no effect \"{}\"; known: {}", name, known));
 }
-
-Nature nature_of(const Effect& effect) { return effect_type(effect.type).nature; }
 
 bool suits(const EffectType& type, const Chain& chain, std::size_t index, std::string* why) {
   std::vector<double> usual;
@@ -88,7 +81,7 @@ std::size_t effect_index(const Chain& chain, const Effect& effect) {
   const std::size_t index = is_of_whole_robot(type, effect) ? 0 : joint_index(chain, effect.at);
   std::string reason = count_refusal(type, chain, effect, index);
   if (reason.empty()) reason = place_refusal(type, chain, index, effect.constants);
-  if (reason.empty() && type.has_formula) reason = formula_refusal(chain, effect);
+  if (reason.empty() && type.name == "formula") reason = formula_refusal(chain, effect);
   if (!reason.empty()) refuse(fmt::format("effect {}: {}", effect_label(effect), reason));
   return index;
 }
@@ -104,8 +97,12 @@ Effect make_effect(const EffectType& type, const Chain& chain, std::size_t index
   if (!type.terms.empty()) effect.formula.name = type.name;
   effect.formula.terms = type.terms;
   for (FormulaTerm& term : effect.formula.terms) term.text = with_joint_number(term.text, index);
-  const std::size_t own = value_count(type, chain, index);
-  effect.values.assign(own > 0 ? own : count, 0.0);
+  std::size_t values = type.parameters.size();
+  if (type.parameters.size() == 1 && type.parameters[0].list) {
+    const std::size_t own = type.count ? type.count(chain, index) : 0;
+    values = own > 0 ? own : count;
+  }
+  effect.values.assign(values, 0.0);
   effect_index(chain, effect);
   return effect;
 }
@@ -119,7 +116,7 @@ std::vector<EffectParameter> effect_parameters(const EffectType& type, const Cha
   std::vector<EffectParameter> all;
   const bool slides = type.place == EffectPlace::joint && !is_of_whole_robot(type, effect) &&
                       is_prismatic(chain, joint_index(chain, effect.at));
-  if (type.has_formula) return formula_parameters(type.parameters[0], effect.formula, slides);
+  if (type.name == "formula") return formula_parameters(type.parameters[0], effect.formula, slides);
   for (EffectParameter parameter : type.parameters) {
     if (slides && !parameter.prismatic_key.empty()) {
       parameter.unit = parameter.prismatic_unit;
@@ -141,7 +138,7 @@ std::vector<EffectParameter> effect_parameters(const EffectType& type, const Cha
 
 std::vector<std::string> effect_columns(const Chain& chain, const Effect& effect) {
   const EffectType& type = effect_type(effect.type);
-  if (type.has_formula) return formula_columns(effect.formula.terms);
+  if (type.name == "formula") return formula_columns(effect.formula.terms);
   const std::size_t index = type.place == EffectPlace::robot ? 0 : joint_index(chain, effect.at);
   std::vector<std::string> columns;
   for (const std::string& pattern : type.columns) columns.push_back(with_joint_number(pattern, index));
@@ -164,10 +161,6 @@ std::string effect_label(const Effect& effect) {
   if (!effect.formula.name.empty()) label += "[" + effect.formula.name + "]";
   if (!effect.constants.empty()) label += fmt::format("[{}]", fmt::join(effect.constants, ","));
   return label;
-}
-
-Effect joint_map_effect(const Joint& joint, double first, double step, std::vector<double> values) {
-  return {.type = "joint_map", .at = joint.name, .values = std::move(values), .constants = {first, step}};
 }
 
 std::string effect_parameter_name(const Effect& effect, const EffectParameter& parameter) {

@@ -1,13 +1,46 @@
-// Effects of weight on links and base, and errors of payload and gravity, which load them.
+// Effects of weight: compliance of joints, links and base, and what they are loaded with.
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 
 #include "effects/effect_entries.hpp"
 
 namespace llmt::robotics {
 namespace {
+
+using Values = std::span<const double>;
+
+void apply_joint_compliance(const PoseContext& pose, std::size_t j, Values values, Values, Deformation& deformation) {
+  // A prismatic joint yields along its axis to the force; its compliance is then in m/N.
+  const double unit = is_prismatic(pose.chain, j) ? 1.0 / metres : 1.0;
+  deformation.joint(j) += values[0] * unit * gravity_load(pose, j);
+}
+
+void apply_joint_compliance_stiffening(const PoseContext& pose, std::size_t j, Values values, Values constants,
+                                       Deformation& deformation) {
+  const double unit = is_prismatic(pose.chain, j) ? 1.0 / metres : 1.0;
+  deformation.joint(j) += values[0] * unit * constants[0] * std::asinh(gravity_load(pose, j) / constants[0]);
+}
+
+void apply_joint_compliance_measured(const PoseContext& pose, std::size_t j, Values values, Values,
+                                     Deformation& deformation) {
+  deformation.joint(j) += values[0] * pose.columns[0];
+}
+
+void apply_joint_compliance_free_masses(const PoseContext& pose, std::size_t j, Values values, Values,
+                                        Deformation& deformation) {
+  const double gravity = pose.gravity_m_s2.norm();
+  if (!(gravity > 0.0)) return;
+  // z . (v x g) = v . (g x z), so one cross product serves all bodies.
+  const Eigen::Vector3d lever = pose.gravity_m_s2.cross(pose.skeleton.joint_axis[j]) / gravity;
+  double sum = 0.0;
+  for (std::size_t k = j; k < pose.chain.joints.size(); ++k) {
+    const Eigen::Map<const Eigen::Vector3d> v(values.data() + 3 * (k - j));
+    if (v.isZero(0.0)) continue;
+    sum += lever.dot(pose.skeleton.body_rotation[k] * v);
+  }
+  deformation.joint(j) += sum;
+}
 
 // A link of no length has no direction, either: a shorter bar neither bends nor twists.
 constexpr double shortest_bar_mm = 1.0;
@@ -134,21 +167,6 @@ void adjust_payload(PoseContext& pose, Values values) {
   pose.payload_centre_mm += pose.skeleton.tool.rotation * Eigen::Vector3d(values[1], values[2], values[3]);
 }
 
-// No payload weighs less than nothing, as far as masses and softness are known.
-void keep_payload_positive(const TrialContext& context, std::span<double> lower, std::span<double>) {
-  double least = std::numeric_limits<double>::infinity();
-  const auto column = context.covariates.find("payload_kg");
-  if (column == context.covariates.end()) {
-    if (context.chain.payload.mass_kg > 0.0) least = context.chain.payload.mass_kg;
-  } else {
-    for (const double mass : column->second) {
-      if (mass > 0.0) least = std::min(least, mass);
-    }
-  }
-  constexpr double known = 0.1;  // two standard deviations of what masses are known to
-  lower[0] = std::max(lower[0], -(1.0 + known) * least);
-}
-
 // The two base axes that are most nearly horizontal: x and y as a rule, x and z of an arm whose plane holds gravity.
 std::array<Eigen::Vector3d, 2> horizontal_axes(const PoseContext& pose) {
   Eigen::Index vertical = 0;
@@ -179,9 +197,60 @@ void apply_elastic_base_two(const PoseContext& pose, std::size_t, Values values,
 }  // namespace
 
 std::vector<EffectType> elastic_effects() {
+  const EffectParameter compliance = {.name = "compliance",
+                                      .unit = "rad/(N m)",
+                                      .key = "compliance_rad_per_Nm",
+                                      .prismatic_unit = "m/N",
+                                      .prismatic_key = "compliance_m_per_N"};
   const EffectParameter flexibility = {.name = "flexibility", .unit = "1/(N m^2)", .key = "flexibility_per_Nm2"};
+  const std::string masses = "Khalil & Besnard 2002, geometric calibration of robots with flexible joints and links";
   const std::string beam = "Euler-Bernoulli cantilever, any textbook on strength of materials";
   return {
+      {.name = "joint_compliance",
+       .family = "joint_compliance",
+       .formula = "dq_j = c_j tau_j, tau_j = z_j . sum_{k >= j} (r_k - o_j) x m_k g, payload included",
+       .source = masses,
+       .parameters = {compliance},
+       .apply = apply_joint_compliance,
+       .senses = Senses::torques,
+       .weighted = true,
+       .elastic = true},
+      {.name = "joint_compliance_stiffening",
+       .family = "joint_compliance",
+       .formula = "dq_j = c_j s asinh(tau_j / s): compliance c at no load, which falls to half at 1.7 s",
+       .source = "strain-wave gears have a smaller compliance under larger torques: K1 < K2 < K3 of their data sheets",
+       .parameters = {compliance},
+       .constants =
+           {{.name = "stiffens_at", .key = "stiffens_at_Nm", .usual = 100.0, .prismatic_key = "stiffens_at_N"}},
+       .apply = apply_joint_compliance_stiffening,
+       .senses = Senses::torques,
+       .weighted = true,
+       .elastic = true,
+       .refusal =
+           [](const Chain&, std::size_t, Values constants) {
+             return constants[0] > 0.0 ? std::string()
+                                       : "stiffens_at is " + std::to_string(constants[0]) + ", must be > 0";
+           }},
+      {.name = "joint_compliance_measured",
+       .family = "joint_compliance",
+       .formula = "dq_j = c_j tau_j, tau_j as measured",
+       .source = masses,
+       .parameters = {{.name = "compliance", .unit = "rad/(N m)", .key = "compliance_rad_per_Nm"}},
+       .columns = {"tau{}_Nm"},
+       .apply = apply_joint_compliance_measured,
+       .prismatic = false},
+      {.name = "joint_compliance_free_masses",
+       .family = "joint_compliance",
+       .formula =
+           "dq_j = sum_{k >= j} z_j . (R_k v_k) x g / |g|, v_k = compliance times the lumped mass moment of body "
+           "k in its moving frame; for arms of revolute joints and one payload",
+       .source = masses + "; lumping as in base inertial parameters, Gautier & Khalil 1990",
+       .parameters = {{.name = "moment", .unit = "rad", .key = "moments_rad", .list = true}},
+       .apply = apply_joint_compliance_free_masses,
+       .senses = Senses::arm,
+       .elastic = true,
+       .prismatic = false,
+       .count = [](const Chain& chain, std::size_t index) { return 3 * (chain.joints.size() - index); }},
       {.name = "link_bending",
        .family = "link_bending",
        .formula = "d = (L^3/3 F + L^4/8 w + L^2/2 M x e) / EI, th = (L^2/2 e x F + L^3/6 e x w + L M) / EI",
@@ -190,8 +259,7 @@ std::vector<EffectType> elastic_effects() {
        .parameters = {flexibility},
        .apply = apply_link_bending,
        .senses = Senses::arm,
-       .nature = Nature::weight,
-       .scales_with_mass = true},
+       .weighted = true},
       {.name = "link_bending_no_carry_over",
        .family = "link_bending",
        .formula = "d = (L^3/3 F + L^4/8 w) / EI, no slope, no end moment",
@@ -208,8 +276,7 @@ std::vector<EffectType> elastic_effects() {
        .parameters = {flexibility},
        .apply = apply_link_torsion,
        .senses = Senses::arm,
-       .nature = Nature::weight,
-       .scales_with_mass = true},
+       .weighted = true},
       {.name = "elastic_base",
        .family = "elastic_base",
        .formula = "th = C_b M, M = moment of the arm's and payload's weight about the first joint's origin; everything "
@@ -219,8 +286,7 @@ std::vector<EffectType> elastic_effects() {
        .parameters = {{.name = "compliance", .unit = "rad/(N m)", .key = "compliance_rad_per_Nm"}},
        .apply = apply_elastic_base,
        .senses = Senses::arm,
-       .nature = Nature::weight,
-       .scales_with_mass = true,
+       .weighted = true,
        .elastic = true},
       {.name = "elastic_base_two",
        .family = "elastic_base",
@@ -233,8 +299,7 @@ std::vector<EffectType> elastic_effects() {
                       {.name = "compliance_second", .unit = "rad/(N m)", .key = "compliance_second_rad_per_Nm"}},
        .apply = apply_elastic_base_two,
        .senses = Senses::arm,
-       .nature = Nature::weight,
-       .scales_with_mass = true,
+       .weighted = true,
        .elastic = true},
       {.name = "payload_error",
        .family = "payload_error",
@@ -245,9 +310,7 @@ std::vector<EffectType> elastic_effects() {
                       {.name = "com_x", .unit = "mm", .key = "com_x_mm"},
                       {.name = "com_y", .unit = "mm", .key = "com_y_mm"},
                       {.name = "com_z", .unit = "mm", .key = "com_z_mm"}},
-       .adjust = adjust_payload,
-       .nature = Nature::weight,
-       .trial = {.narrow = keep_payload_positive}},
+       .adjust = adjust_payload},
       {.name = "gravity_tilt",
        .family = "gravity_tilt",
        .formula =
@@ -257,8 +320,7 @@ std::vector<EffectType> elastic_effects() {
        .place = EffectPlace::robot,
        .parameters = {{.name = "first", .unit = "rad", .key = "first_rad"},
                       {.name = "second", .unit = "rad", .key = "second_rad"}},
-       .adjust = adjust_gravity,
-       .nature = Nature::weight},
+       .adjust = adjust_gravity},
   };
 }
 

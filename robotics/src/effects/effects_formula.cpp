@@ -133,10 +133,7 @@ EffectType formula_effect() {
           .source = "the user",
           .parameters = {{.name = "coefficient", .key = "coefficients", .list = true}},
           .senses = Senses::torques,
-          .nature = Nature::weight,  // it may name torques
-          .elastic = true,
-          .has_formula = true,
-          .in_c = {.refusal = "the user's expressions are not translated to C"}};
+          .elastic = true};
 }
 
 }  // namespace llmt::robotics

@@ -6,6 +6,8 @@
 namespace llmt::robotics {
 namespace {
 
+using Values = std::span<const double>;
+
 // Errors of the horizontal angle move the point around the instrument's vertical axis.
 template <int Order>
 void apply_azimuth(const PoseContext& pose, std::size_t, Values values, Values, Deformation& deformation) {
@@ -45,7 +47,6 @@ std::vector<EffectType> instrument_effects() {
        .parameters = {angle_of("cosine"), angle_of("sine")},
        .apply = apply_azimuth<1>,
        .senses = Senses::arm,
-       .nature = Nature::instrument,
        .of_measuring = true},
       {.name = "instrument_azimuth_twice",
        .family = "instrument_azimuth",
@@ -55,7 +56,6 @@ std::vector<EffectType> instrument_effects() {
        .parameters = {angle_of("cosine"), angle_of("sine")},
        .apply = apply_azimuth<2>,
        .senses = Senses::arm,
-       .nature = Nature::instrument,
        .of_measuring = true},
       {.name = "instrument_elevation",
        .family = "instrument_elevation",
@@ -65,7 +65,6 @@ std::vector<EffectType> instrument_effects() {
        .parameters = {angle_of("constant"), angle_of("cosine"), angle_of("sine")},
        .apply = apply_elevation,
        .senses = Senses::arm,
-       .nature = Nature::instrument,
        .of_measuring = true},
       {.name = "instrument_range",
        .family = "instrument_range",
@@ -75,7 +74,6 @@ std::vector<EffectType> instrument_effects() {
        .parameters = {{.name = "offset", .unit = "mm", .key = "offset_mm"}},
        .apply = apply_range,
        .senses = Senses::arm,
-       .nature = Nature::instrument,
        .of_measuring = true},
   };
 }

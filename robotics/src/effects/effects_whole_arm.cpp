@@ -6,6 +6,8 @@
 namespace llmt::robotics {
 namespace {
 
+using Values = std::span<const double>;
+
 double warming(const PoseContext& pose, Values constants) { return pose.columns[0] - constants[0]; }
 
 Eigen::Vector3d vector_of(Values values, std::size_t first) {
@@ -62,31 +64,6 @@ std::string session_refusal(const Chain&, std::size_t, Values constants) {
   return constants[0] == constants[1] ? "from and to must differ" : "";
 }
 
-std::vector<std::vector<double>> mean_temperature(const TrialContext& context, std::size_t) {
-  return {{context.covariates.at("temp_C").mean()}};
-}
-
-// Nothing where all poses were measured at one time.
-std::vector<std::vector<double>> whole_session(const TrialContext& context, std::size_t) {
-  const auto clock = context.covariates.find("time_s");
-  const Eigen::VectorXd& time = clock != context.covariates.end() ? clock->second : context.covariates.at("order");
-  const double from = time.minCoeff();
-  const double to = time.maxCoeff();
-  if (!(to > from)) return {};
-  return {{from, to}};
-}
-
-// A fine grid of settling times: with a coarse one the remainder looks like a knock of the instrument.
-std::vector<std::vector<double>> settling_to_try(const TrialContext& context, std::size_t index) {
-  std::vector<std::vector<double>> all;
-  for (const std::vector<double>& session : whole_session(context, index)) {
-    for (const double share : {0.03, 0.04, 0.06, 0.08, 0.11, 0.15, 0.2, 0.27, 0.37, 0.5, 0.7, 0.95}) {
-      all.push_back({session[0], session[1], share});
-    }
-  }
-  return all;
-}
-
 std::vector<EffectType> thermal_effects() {
   const std::vector<EffectConstant> reference = {{.name = "reference", .key = "reference_C", .usual = 20.0}};
   const EffectParameter expansion = {.name = "expansion", .unit = "1/K", .key = "expansion_per_K"};
@@ -100,9 +77,7 @@ std::vector<EffectType> thermal_effects() {
        .constants = reference,
        .columns = {"temp_C"},
        .apply = apply_thermal_growth,
-       .senses = Senses::arm,
-       .nature = Nature::time,
-       .trial = {.constants = mean_temperature}},
+       .senses = Senses::arm},
       {.name = "link_thermal_growth",
        .family = "thermal_growth",
        .formula = "the end of the link moves by alpha (T - T0)(b - o_j), everything beyond with it",
@@ -112,9 +87,7 @@ std::vector<EffectType> thermal_effects() {
        .constants = reference,
        .columns = {"temp_C"},
        .apply = apply_link_thermal_growth,
-       .senses = Senses::arm,
-       .nature = Nature::time,
-       .trial = {.constants = mean_temperature}},
+       .senses = Senses::arm},
       {.name = "base_thermal_drift",
        .family = "thermal_growth",
        .formula = "dp = v (T - T0) in the world frame: the pedestal or the instrument's stand grows",
@@ -125,8 +98,7 @@ std::vector<EffectType> thermal_effects() {
                       {.name = "vz", .unit = "mm/K", .key = "vz_mm_per_K"}},
        .constants = reference,
        .columns = {"temp_C"},
-       .apply = apply_base_thermal_drift,
-       .nature = Nature::time},
+       .apply = apply_base_thermal_drift},
   };
 }
 
@@ -146,10 +118,8 @@ std::vector<EffectType> session_effects() {
        .constants = session,
        .columns = {"time_s|order"},
        .apply = apply_drift,
-       .nature = Nature::time,
        .of_measuring = true,
-       .refusal = session_refusal,
-       .trial = {.constants = whole_session}},
+       .refusal = session_refusal},
       {.name = "drift_curved",
        .family = "drift",
        .formula = "dp = v t + w t^2 in the world frame, t = 0 ... 1 over the session",
@@ -159,10 +129,8 @@ std::vector<EffectType> session_effects() {
        .constants = session,
        .columns = {"time_s|order"},
        .apply = apply_drift_curved,
-       .nature = Nature::time,
        .of_measuring = true,
-       .refusal = session_refusal,
-       .trial = {.constants = whole_session}},
+       .refusal = session_refusal},
       {.name = "drift_settling",
        .family = "drift",
        .formula = "dp = v (1 - exp(-t / s)) in the world frame, t = 0 ... 1 over the session",
@@ -172,14 +140,12 @@ std::vector<EffectType> session_effects() {
        .constants = settling,
        .columns = {"time_s|order"},
        .apply = apply_drift_settling,
-       .nature = Nature::time,
        .of_measuring = true,
        .refusal =
            [](const Chain& chain, std::size_t index, Values constants) {
              if (!(constants[2] > 0.0)) return "settles_in is " + std::to_string(constants[2]) + ", must be > 0";
              return session_refusal(chain, index, constants);
-           },
-       .trial = {.constants = settling_to_try}},
+           }},
       {.name = "tracker_knock",
        .family = "tracker_knock",
        .formula = "of rows later than `at`: dp = d + th x (p - o_1)",
@@ -194,9 +160,7 @@ std::vector<EffectType> session_effects() {
        .constants = {{.name = "at", .key = "after", .usual = 0.0}},
        .columns = {"order|time_s"},
        .apply = apply_tracker_knock,
-       .nature = Nature::jump,
-       .of_measuring = true,
-       .trial = {.constants = no_constants}},
+       .of_measuring = true},
   };
 }
 

@@ -2,14 +2,6 @@
 
 namespace llmt::robotics {
 
-std::vector<std::vector<double>> constants_to_try(const EffectType& type, const TrialContext& context,
-                                                  std::size_t index) {
-  if (type.trial.constants) return type.trial.constants(context, index);
-  std::vector<double> usual;
-  for (const EffectConstant& constant : type.constants) usual.push_back(constant.usual);
-  return {usual};
-}
-
 void set_limits(const EffectType& type, Eigen::Index values, discovery::EffectCandidate& candidate) {
   // A list holds moments of single bodies, of which poses determine combinations only: limits of each would refuse them
   // all for one that is not determined.

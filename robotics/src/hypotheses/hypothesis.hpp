@@ -16,10 +16,6 @@ struct Hypothesis {
   Shape shape;                           ///< of a generic candidate
 };
 
-/// Constants to try an effect with, as EffectType::trial says.
-std::vector<std::vector<double>> constants_to_try(const EffectType& type, const TrialContext& context,
-                                                  std::size_t index);
-
 /// Plausible limits of an effect's values, by its type.
 void set_limits(const EffectType& type, Eigen::Index values, discovery::EffectCandidate& candidate);
 

@@ -94,6 +94,11 @@ bool stands_out(const JointSignal& signal, double gain, double orders) {
   return gain > (2.0 * std::log(orders) + clearly) * variance;
 }
 
+const EffectType* type_of(const std::vector<EffectType>& catalogue, const std::string& name) {
+  const auto found = std::ranges::find(catalogue, name, &EffectType::name);
+  return found != catalogue.end() && found->searched ? &*found : nullptr;
+}
+
 Hypothesis hypothesis_of(const EffectType& type, const Chain& chain, std::size_t index, double constant,
                          double choices) {
   Hypothesis hypothesis;
@@ -122,7 +127,7 @@ void add_orders(const Scene& scene, const EffectType& type, std::vector<Hypothes
     const double choices = static_cast<double>(spectrum.size() * chain.joints.size());
     std::ranges::sort(spectrum, std::greater<>{}, &Peak::gain);
     std::vector<double> taken;
-    for (const std::vector<double>& constants : constants_to_try(type, scene.trial(), j)) taken.push_back(constants[0]);
+    if (const std::optional<double>& ratio = chain.joints[j].gear_ratio) taken = {*ratio, 2.0 * *ratio, 4.0 * *ratio};
     const std::size_t known = taken.size();
     for (const Peak& peak : spectrum) {
       if (taken.size() >= known + kept) break;
@@ -135,7 +140,7 @@ void add_orders(const Scene& scene, const EffectType& type, std::vector<Hypothes
   }
 }
 
-void add_jumps(const Scene& scene, const EffectType& type, std::vector<Hypothesis>& hypotheses) {
+void add_knocks(const Scene& scene, const EffectType& type, std::vector<Hypothesis>& hypotheses) {
   const auto column = [&](const char* name) {
     const auto found = scene.poses.covariates.find(name);
     return found == scene.poses.covariates.end() ? nullptr : &found->second;
@@ -170,11 +175,8 @@ void add_jumps(const Scene& scene, const EffectType& type, std::vector<Hypothesi
 
 std::vector<Hypothesis> scanned_effects(const Scene& scene, const std::vector<EffectType>& catalogue) {
   std::vector<Hypothesis> hypotheses;
-  for (const EffectType& type : catalogue) {
-    if (!type.searched) continue;
-    if (type.nature == Nature::wave) add_orders(scene, type, hypotheses);
-    if (type.nature == Nature::jump) add_jumps(scene, type, hypotheses);
-  }
+  if (const EffectType* type = type_of(catalogue, "transmission_error")) add_orders(scene, *type, hypotheses);
+  if (const EffectType* type = type_of(catalogue, "tracker_knock")) add_knocks(scene, *type, hypotheses);
   std::vector<Hypothesis> fresh;
   for (Hypothesis& hypothesis : hypotheses) {
     const std::string label = effect_label(*hypothesis.effect);

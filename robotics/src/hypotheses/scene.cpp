@@ -18,7 +18,7 @@ Scene make_scene(const Robot& robot, const Poses& poses, const Eigen::VectorXd& 
     }
     size(i) = residuals.segment(3 * i, 3).norm();
   }
-  // A lost beam would dominate every scan, so it is shortened. The search decides whether it is an outlier.
+  // A lost beam would dominate every scan, so it is shortened. Whether it is an outlier is decided by the search.
   constexpr double far_beyond = 6.0;
   const double limit = far_beyond * median(size);
   for (Eigen::Index i = 0; i < size.size(); ++i) {

@@ -1,4 +1,4 @@
-// The robot, poses and residuals that hypotheses are made for, and the residuals as seen by one joint.
+// What hypotheses are made for, and the residuals as seen by one joint.
 #pragma once
 
 #include <array>
@@ -8,19 +8,19 @@
 
 namespace llmt::robotics {
 
-/// The robot, poses and residuals that hypotheses are made for.
+/// What hypotheses are made for.
 struct Scene {
   const Robot& robot;  ///< at the current estimates
   const Poses& poses;
   const Eigen::VectorXd& residuals;  ///< 3n: measured - model, zero where not measured
   std::array<bool, 3> measured;
   std::vector<Eigen::MatrixXd>
-      lever;                ///< for each joint 3n x 1: motion of the tool by the joint, zero where not measured
-  Eigen::MatrixXd loads;    ///< n x J: gravity_loads() of the robot
+      lever;              ///< for each joint 3n x 1: motion of the tool by the joint, zero where not measured
+  Eigen::MatrixXd loads;  ///< n x J: gravity_loads() of the robot
+  double largest_load(std::size_t joint) const {
+    return loads.col(static_cast<Eigen::Index>(joint)).cwiseAbs().maxCoeff();
+  }
   Eigen::VectorXd clipped;  ///< residuals for scans: no sample is longer than some times the median
-
-  /// The part that the rows of effects look at.
-  TrialContext trial() const { return {robot.chain, poses.joints, poses.covariates, loads}; }
 };
 
 Scene make_scene(const Robot& robot, const Poses& poses, const Eigen::VectorXd& residuals,

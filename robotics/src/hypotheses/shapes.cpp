@@ -209,7 +209,7 @@ void add_tool(const Scene& scene, std::vector<Hypothesis>& shapes) {
     Eigen::Matrix<double, 6, 1> squares;
     squares << down(0) * down(0), down(1) * down(1), down(2) * down(2), down(0) * down(1), down(1) * down(2),
         down(2) * down(0);
-    // A part that droops until it meets a stop moves to the side that is down, whatever the angle.
+    // What droops until it meets a stop: to the side that is down, whatever the angle.
     Eigen::Matrix<double, 5, 1> sides;
     sides << down, Eigen::Vector2d::Zero();
     const double across = down.head<2>().norm();

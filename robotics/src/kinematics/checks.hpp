@@ -1,4 +1,4 @@
-// Checks of a description that its readers share.
+// What the checks of a description share with its readers.
 #pragma once
 
 #include <cstddef>

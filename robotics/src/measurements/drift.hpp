@@ -1,4 +1,4 @@
-// The movement of an instrument's frame while it measured, as points that stand still show it.
+// How the frame of an instrument moved while it measured, as points that stand still show it.
 #pragma once
 
 #include <Eigen/Core>

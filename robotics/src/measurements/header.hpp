@@ -56,10 +56,10 @@ class Header {
 
   const std::vector<std::string>& unused() const { return unused_; }
 
-  /// Sentences on what the columns that are not used look like.
+  /// What columns that are not used look like, in sentences.
   std::vector<std::string> hints() const;
 
-  /// The reason why the columns of an orientation are none, in words; empty if they are one.
+  /// What keeps the columns of an orientation from being one, in words; empty if nothing does.
   std::string lack_of_orientation() const;
 
  private:

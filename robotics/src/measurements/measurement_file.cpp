@@ -1,6 +1,8 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <set>
 #include <stdexcept>
@@ -9,15 +11,126 @@
 #include "llmt/robotics/measurements.hpp"
 #include "measurements/header.hpp"
 #include "measurements/reference_rows.hpp"
-#include "measurements/sightings.hpp"
 
 namespace llmt::robotics {
 namespace {
 
+// One point or distance of a table, before rows of the table and readings are matched.
+struct Sighting {
+  Eigen::Index row = 0;
+  std::string target;
+  Eigen::Vector3d value = Eigen::Vector3d::Zero();
+  std::string feature = {};  // "socket", "plane", "sphere" or "known sphere": `value` is then what is read of it
+};
+
 // "sphere" of a known sphere, too.
 std::string column_of_feature(const std::string& feature) { return feature.substr(feature.rfind(' ') + 1); }
 
-// The robot's frame that a name of the file stands for: the frame of that name, or the chain's own where that has
+std::vector<Sighting> sightings_of(const Csv& csv, const Header& header, Measurements& measurements) {
+  std::vector<Sighting> seen;
+  if (header.has("distance")) {
+    measurements.measured = {true, false, false};
+    const Eigen::VectorXd distances = header.distances_mm();
+    for (Eigen::Index row = 0; row < csv.rows(); ++row) seen.push_back({row, "", {distances(row), 0.0, 0.0}});
+    return seen;
+  }
+  const std::vector<std::string> words = header.words("target");
+  if (header.has_plane()) {
+    measurements.measured = {false, false, true};
+    for (Eigen::Index row = 0; row < csv.rows(); ++row) {
+      seen.push_back({.row = row, .target = words.empty() ? "" : words[row], .feature = "plane"});
+    }
+    return seen;
+  }
+  if (header.has_sphere()) {
+    measurements.measured = {true, false, false};
+    const bool is_known = header.has("radius");
+    const Eigen::VectorXd radii = is_known ? header.radii_mm() : Eigen::VectorXd::Zero(csv.rows());
+    for (Eigen::Index row = 0; row < csv.rows(); ++row) {
+      seen.push_back({.row = row,
+                      .target = words.empty() ? "" : words[row],
+                      .value = {radii(row), 0.0, 0.0},
+                      .feature = is_known ? "known sphere" : "sphere"});
+    }
+    return seen;
+  }
+  const std::vector<std::string> sockets = header.words("socket");
+  for (std::size_t row = 0; row < sockets.size(); ++row) {
+    if (sockets[row].empty()) continue;
+    const std::string target = words.empty() ? "" : words[row];
+    seen.push_back({.row = static_cast<Eigen::Index>(row), .target = target, .feature = "socket"});
+  }
+  if (header.targets().empty() && !sockets.empty()) return seen;
+  if (header.targets().empty()) {
+    throw std::runtime_error(
+        fmt::format("{}:1: no measured position: write x_mm, y_mm, z_mm (or _m, _um), t1_x_mm, ... of several targets, "
+                    "distance_mm, or a column socket, plane or sphere; columns: {}",
+                    csv.name(), fmt::join(csv.columns(), ", ")));
+  }
+  if (!words.empty() && !header.targets().front().empty()) {
+    throw std::runtime_error(fmt::format("{}:1: there are a column of targets and columns of each target", csv.name()));
+  }
+  std::vector<Eigen::Index> zeros;
+  for (const std::string& target : header.targets()) {
+    std::array<bool, 3> measured = {};
+    const Eigen::MatrixXd points = header.points_mm(target, measured);
+    if (target != header.targets().front() && measured != measurements.measured) {
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        if (measured[axis] == measurements.measured[axis]) continue;
+        const std::string& lacking = measured[axis] ? header.targets().front() : target;
+        throw std::runtime_error(fmt::format("{}:1: there is no column {}{}_mm, another target has {}", csv.name(),
+                                             lacking, "xyz"[axis], "xyz"[axis]));
+      }
+    }
+    measurements.measured = measured;
+    if (!sockets.empty() && !(measured[0] && measured[1] && measured[2])) {
+      throw std::runtime_error(fmt::format("{}:1: beside sockets, points need all of x, y and z", csv.name()));
+    }
+    const std::size_t before = seen.size() + zeros.size();
+    for (Eigen::Index row = 0; row < csv.rows(); ++row) {
+      const Eigen::RowVector3d point = points.row(row);
+      if (!sockets.empty() && !sockets[row].empty()) {
+        if (point.array().isNaN().all()) continue;
+        throw std::runtime_error(
+            fmt::format("{}:{}: there are a measured point and a socket: leave the cells of one of them empty",
+                        csv.name(), csv.line_of(row)));
+      }
+      if (point.array().isNaN().all() && target.empty()) {
+        throw std::runtime_error(
+            fmt::format("{}:{}: there is neither a measured point nor a socket", csv.name(), csv.line_of(row)));
+      }
+      if (point.array().isNaN().all() || (point.hasNaN() && (point.array().isNaN() || point.array() == 0.0).all())) {
+        continue;
+      }
+      if (point.hasNaN()) {
+        const char axis = "xyz"[std::isnan(point(0)) ? 0 : std::isnan(point(1)) ? 1 : 2];
+        throw std::runtime_error(fmt::format("{}:{}: {}{} is missing, another coordinate of the target is there",
+                                             csv.name(), csv.line_of(row), target, axis));
+      }
+      // Instruments that lose the target often write zeros: such rows are no measurements.
+      if (point.isZero(0.0)) {
+        zeros.push_back(row);
+      } else {
+        const std::string name = !words.empty() ? words[row] : target.substr(0, target.size() - !target.empty());
+        seen.push_back({.row = row, .target = name, .value = point.transpose()});
+      }
+    }
+    if (words.empty() && !target.empty() && csv.rows() > 0 && seen.size() + zeros.size() == before) {
+      measurements.warnings.push_back(fmt::format("{}: target {} was never seen: its columns are empty", csv.name(),
+                                                  target.substr(0, target.size() - 1)));
+    }
+  }
+  std::ranges::stable_sort(seen, {}, &Sighting::row);
+  std::ranges::sort(zeros);
+  if (!zeros.empty()) {
+    measurements.warnings.push_back(fmt::format(
+        "{}: {} of {} points are exactly zero, taken as missing and left out: line{} {}", csv.name(), zeros.size(),
+        csv.rows() * std::ssize(header.targets()), zeros.size() == 1 ? "" : "s", fmt::join(csv.lines_of(zeros), ", ")));
+  }
+  return seen;
+}
+
+// Which of the robot's frames a name of the file stands for: the frame of that name, or the chain's own where that has
 // this name or none yet, or else one that calibration is to add.
 class FrameNames {
  public:

@@ -10,7 +10,7 @@
 namespace llmt::robotics {
 namespace {
 
-// The count of unknowns of a base: a sphere has a centre and a radius, a plane a distance and two angles,
+// How many numbers are to be found of a base: a sphere has a centre and a radius, a plane a distance and two angles,
 // and the others that are touched have a point.
 std::size_t unknowns_of(const std::string& base) {
   constexpr std::size_t of_sphere = 4;

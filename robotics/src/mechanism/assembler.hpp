@@ -11,8 +11,8 @@ namespace llmt::robotics {
 /// Takes one pose after the other; a pose is reached from those before it.
 class Assembler {
  public:
-  /// The mechanism must be validated. `sigma`: see noise_of(). Throws std::invalid_argument if the start values are
-  /// near no configuration.
+  /// Of a validated mechanism. `sigma`: see noise_of(). Throws std::invalid_argument if the start values are near no
+  /// configuration.
   Assembler(const Mechanism& mechanism, const Eigen::VectorXd& sigma);
 
   /// `before`: the configuration of this pose with other parameters; empty if there is none.

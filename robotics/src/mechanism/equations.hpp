@@ -15,7 +15,7 @@ namespace llmt::robotics {
 /// Evaluates f(d, c): d are all parameters, c all coordinates, in their units. One thread at a time.
 class Equations {
  public:
-  /// The mechanism must be validated.
+  /// Of a validated mechanism.
   explicit Equations(const Mechanism& mechanism);
 
   Eigen::Index count() const { return std::ssize(equations_); }
@@ -26,7 +26,7 @@ class Equations {
   Eigen::MatrixXd by_coordinates(const Eigen::VectorXd& parameters, const Eigen::VectorXd& coordinates);
   Eigen::MatrixXd by_parameters(const Eigen::VectorXd& parameters, const Eigen::VectorXd& coordinates);
 
-  /// The scale of each coordinate where mm and deg meet: the mechanism's largest length, 1 rad.
+  /// What a coordinate of that unit is measured against where mm and deg meet: the mechanism's largest length, 1 rad.
   const Eigen::VectorXd& typical() const { return typical_; }
 
  private:
@@ -62,7 +62,7 @@ Eigen::VectorXd start_of(const Mechanism& mechanism);
 /// The values of the parameters, in their units.
 Eigen::VectorXd values_of(const Mechanism& mechanism);
 
-/// The place of an equation's "=" that is no part of a comparison; npos if there is none.
+/// Where the "=" of an equation stands that is no part of a comparison; npos if there is none.
 std::size_t sign_of(const std::string& equation);
 
 /// "a = b" as an expression that is 0: "(a) - (b)"; other texts as they are. The only "=" is that of the equation.

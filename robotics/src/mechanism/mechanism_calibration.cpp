@@ -42,7 +42,7 @@ struct Poses {
     }
   }
 
-  // The changes that adjust the readings to the equations, in their units.
+  // What adjusts the readings to the equations, in their units.
   Eigen::MatrixXd corrections() const {
     Eigen::MatrixXd corrections = Eigen::MatrixXd::Zero(known.rows(), known.cols());
     for (Eigen::Index row = 0; row < known.rows(); ++row) {
@@ -110,7 +110,7 @@ Mechanism with_result(Mechanism mechanism, const discovery::SolverResult& result
   return mechanism;
 }
 
-// Changes that move a point of a metre-long mechanism by about 1 mm.
+// What moves a point of a metre-long mechanism by about 1 mm.
 double scale_of(const MechanismParameter& parameter) {
   if (parameter.unit == "mm") return 1.0;
   if (parameter.unit == "deg") return 0.1;

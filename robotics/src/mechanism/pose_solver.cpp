@@ -105,7 +105,7 @@ SolvedPose solve_pose(Equations& equations, const Eigen::VectorXd& parameters, c
     solved.coordinates = at;
     solved.projection = white;
     const std::vector<Eigen::Index>& unknown = kinds.unknown;
-    // If c moves, v moves by -S (W G)' W df, and the unknown follow both.
+    // Where c moves, v moves by -S (W G)' W df, and the unknown follow both.
     const Eigen::MatrixXd seen = white * linear.noisy;
     solved.unknown_rate = -linear.solve * (slopes - linear.noisy * (seen.transpose() * (white * slopes)));
     for (const Eigen::Index i : unknown) solved.unknown_rate.col(i).setZero();

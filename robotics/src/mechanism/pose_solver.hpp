@@ -9,7 +9,7 @@
 
 namespace llmt::robotics {
 
-/// The kinds of a pose's coordinates.
+/// Which coordinates of a pose are what.
 struct PoseKinds {
   std::vector<Eigen::Index> unknown;  ///< not measured
   std::vector<Eigen::Index> noisy;    ///< measured, with noise

@@ -1,4 +1,4 @@
-// A bound that no choice of poses can beat.
+// What no choice of poses can beat.
 #pragma once
 
 #include "pose_selection/exchange.hpp"

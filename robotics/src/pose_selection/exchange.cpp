@@ -17,7 +17,7 @@ bool is_spectral(PoseCriterion criterion) {
   return criterion != PoseCriterion::position && criterion != PoseCriterion::o1;
 }
 
-// The loss as a function of the information's eigenvalues, which are squares of singular values, ascending.
+// Of the eigenvalues of the information, which are squares of singular values, ascending.
 double spectral_loss(PoseCriterion criterion, const Eigen::VectorXd& eigenvalues) {
   const double least = eigenvalues(0);
   const double most = eigenvalues(eigenvalues.size() - 1);
@@ -71,7 +71,7 @@ Eigen::VectorXd spectral_losses(const DesignProblem& problem, const Eigen::Matri
   return losses;
 }
 
-// The number of chosen or measured poses that are nearer to each candidate than the spacing.
+// How many chosen or measured poses are nearer to each candidate than the spacing.
 class Neighbours {
  public:
   explicit Neighbours(const Spacing& spacing) : spacing_(spacing), near_(spacing.candidates.rows(), 0) {

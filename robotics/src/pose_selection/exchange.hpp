@@ -7,8 +7,8 @@
 
 namespace llmt::robotics {
 
-/// The criterion that the chosen poses optimise. L parameters, times their scales; every pose is three rows of
-/// derivatives, in units of the noise.
+/// What the chosen poses are to make best. L parameters, times their scales; every pose is three rows of derivatives,
+/// in units of the noise.
 struct DesignProblem {
   PoseCriterion criterion = PoseCriterion::position;
   Eigen::MatrixXd given;  ///< L x L: information of priors and of poses already measured
@@ -21,11 +21,11 @@ Eigen::MatrixXd rows_of(const Eigen::MatrixXd& rows, const std::vector<Eigen::In
 /// The sum of J'J over the poses of those numbers.
 Eigen::MatrixXd information(const Eigen::MatrixXd& rows, const std::vector<Eigen::Index>& poses);
 
-/// The loss to minimise: the variance of the position in mm^2 for `position`, else a falling function of the index.
+/// What is to be made small: the variance of the position in mm^2 for `position`, else a falling function of the index.
 /// Infinite where the matrix is not positive definite.
 double loss(const DesignProblem& problem, const Eigen::MatrixXd& information);
 
-/// The loss with each pose added to the information; infinite where the pose is not allowed. With o2 ... o5 only the
+/// Of every pose: the loss with it added to the information; infinite where it is not allowed. With o2 ... o5 only the
 /// sixteen that the derivative of the index favours are tried, the others are infinite too.
 Eigen::VectorXd losses_with(const DesignProblem& problem, const Eigen::MatrixXd& information,
                             const Eigen::MatrixXd& rows, const std::vector<bool>& allowed);

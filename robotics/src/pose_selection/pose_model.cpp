@@ -28,7 +28,7 @@ PoseModel::PoseModel(const Robot& robot, const Poses& basis, const std::vector<c
   Eigen::Index next = geometric;
   for (const Effect& effect : robot_.effects) {
     for (std::size_t k = 0; k < effect.values.size(); ++k, ++next) {
-      if (nature_of(effect) == Nature::map && reasons[next].empty()) reasons[next] = "joint maps stay as they are";
+      if (effect.type == "joint_map" && reasons[next].empty()) reasons[next] = "joint maps stay as they are";
     }
   }
   Eigen::MatrixXd jacobian = position_jacobian(robot_, basis);

@@ -1,4 +1,4 @@
-// The information that the poses of an arm have about its parameters.
+// What the poses of an arm say about its parameters.
 #pragma once
 
 #include <vector>

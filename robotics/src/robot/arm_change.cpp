@@ -8,7 +8,7 @@
 namespace llmt::robotics {
 namespace {
 
-// The change of an axis, and of a point, that move along.
+// Of an axis, and of a point, that move along.
 Eigen::Vector3d turned(const Motion& motion, const Eigen::Vector3d& axis) {
   if (!motion.turns) return Eigen::Vector3d::Zero();
   return motion.axis.cross(axis);

@@ -1,4 +1,4 @@
-// Changes of the inputs of effects as an arm moves a little, and as its payload or gravity changes.
+// How what effects look at changes as an arm moves a little, and as its payload or gravity changes.
 #pragma once
 
 #include <Eigen/Core>
@@ -29,7 +29,7 @@ struct ArmChange {
 /// Everything moves that the motion moves, gravity and payload included.
 ArmChange change_by(const Motion& motion, const PoseContext& pose);
 
-/// The change of PoseContext::load at joint j.
+/// Of PoseContext::load at joint j.
 Load load_change(const PoseContext& pose, const WeightsBeyond& weights, const ArmChange& change, std::size_t j);
 
 /// One thing in a PoseContext that effects look at: a vector, or a number (torque, mass of the payload).
@@ -57,11 +57,11 @@ struct Input {
   bool operator==(const Input&) const = default;
 };
 
-/// All inputs of an effect, and perhaps more: at a joint, a link, or of the whole arm.
+/// What an effect looks at, and perhaps more: at a joint, a link, or of the whole arm.
 std::vector<Input> inputs_of(const Chain& chain, const EffectType& type, std::size_t index,
                              const std::vector<std::size_t>& torques);
 
-/// The numbers of an input in memory, so that it can be changed.
+/// Where an input stands, so that it can be changed.
 struct Place {
   double* numbers;
   int count;                                       // of numbers, or 1 for their part along `axis`
@@ -72,7 +72,7 @@ struct Place {
 };
 Place place_of(const Input& input, PoseContext& pose, Skeleton& skeleton, std::vector<Load>& loads);
 
-/// The change of an input by a change of the arm; a single number stands first.
+/// Of an input by a change of the arm; a single number stands first.
 Eigen::Vector3d input_change(const PoseContext& pose, const WeightsBeyond& weights, const ArmChange& change,
                              const Input& input);
 

@@ -1,4 +1,4 @@
-// The reading that an instrument takes of a tool pose.
+// What an instrument reads of a tool pose.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,4 +1,4 @@
-// Checks of a robot that its reader shares.
+// What the checks of a robot share with its reader.
 #pragma once
 
 #include <cstddef>

@@ -38,12 +38,13 @@ std::vector<Eigen::Index> components_of(const EffectType& type, Eigen::Index ind
     for (Eigen::Index k = 0; k < count; ++k) components.push_back(first + k);
   };
   const Eigen::Index first_joint = per_twist * (joints + 1);
+  const bool is_formula = type.name == "formula";
   if (type.place == EffectPlace::link) add(per_twist * (index + 1), per_twist);
   if (type.place == EffectPlace::robot) add(0, per_twist);
   // An axis that wobbles turns all from the joint on.
   if (type.place == EffectPlace::joint && type.senses == Senses::arm) add(per_twist * index, per_twist);
   if (type.place == EffectPlace::joint) add(first_joint + index, 1);
-  if (type.place == EffectPlace::robot || type.has_formula) add(first_joint + joints, 3);
+  if (type.place == EffectPlace::robot || is_formula) add(first_joint + joints, 3);
   return components;
 }
 

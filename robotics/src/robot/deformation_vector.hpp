@@ -16,7 +16,7 @@ Eigen::Index component_count(Eigen::Index joints);
 
 double& component_of(Deformation& deformation, Eigen::Index component);
 
-/// The twist of the base (0) or of link i (i + 1).
+/// Of the base (0) or of link i (i + 1).
 const Deformation::Twist& twist_of(const Deformation& deformation, Eigen::Index twist);
 
 /// Whether base or links are moved.

@@ -16,7 +16,7 @@ namespace llmt::robotics {
 
 namespace {
 
-// The numbers in the whole table of a setting's rows.
+// Which rows of the whole the rows of a setting are.
 class Rows {
  public:
   Rows(Eigen::Index count, const std::vector<Eigen::Index>* rows) : count_(count), rows_(rows) {}

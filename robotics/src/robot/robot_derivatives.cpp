@@ -50,7 +50,7 @@ void RobotEvaluator::by_values(PoseContext& pose, Eigen::Index row, PreparedEffe
   effect.values = given_;
 }
 
-// Derivatives of the reading by the values of an effect that changes payload or gravity for all others.
+// Of the reading by the values of an effect that changes payload or gravity for all others.
 void RobotEvaluator::by_adjustments(const PoseContext& pose, Eigen::Index row, PreparedEffect& effect,
                                     bool is_candidate, Eigen::Ref<Eigen::Matrix3Xd> out) {
   out.setZero();

@@ -16,7 +16,7 @@ namespace {
 
 // Joints whose torques an effect depends on.
 std::vector<std::size_t> torques_of(const Effect& effect, const PreparedEffect& prepared) {
-  if (prepared.type->has_formula) return formula_torques(effect.formula.terms);
+  if (effect.type == "formula") return formula_torques(effect.formula.terms);
   if (prepared.type->senses != Senses::torques) return {};
   return {prepared.index};
 }
@@ -42,7 +42,7 @@ PreparedEffect prepare(const Chain& chain, const Effect& effect, const Poses& po
                           .inputs = {},
                           .components = {}};
   prepared.components = components_of(*prepared.type, static_cast<Eigen::Index>(prepared.index), poses.joints.cols());
-  prepared.apply = prepared.type->has_formula ? compile_formula(chain, effect) : prepared.type->apply;
+  prepared.apply = effect.type == "formula" ? compile_formula(chain, effect) : prepared.type->apply;
   for (const EffectParameter& parameter : effect_parameters(chain, effect)) prepared.scales.push_back(parameter.scale);
   for (const std::string& names : effect_columns(chain, effect)) {
     prepared.columns.push_back(find_column(poses, names));

@@ -44,25 +44,25 @@ class RobotEvaluator {
   const Robot& robot() const { return robot_; }
   const Poses& poses() const { return poses_; }
 
-  /// The reading of the tool, see Reading.
+  /// What is read of the tool.
   Eigen::Vector3d reading(Eigen::Index row) {
     return reading_of(pose(row), observation(row)) - radius_mm_ * Eigen::Vector3d::UnitX();
   }
 
-  /// The pose of the tool.
+  /// Of the tool.
   Pose pose(Eigen::Index row);
 
-  /// Derivatives of the reading by the parameters(robot) with these numbers: columns of `out`, in that order.
+  /// Of the reading by the parameters(robot) with these numbers: the columns of `out`, in that order.
   void jacobian(Eigen::Index row, const std::vector<Eigen::Index>& parameters, Eigen::Ref<Eigen::Matrix3Xd> out);
 
   /// J: z_j . load, N m or N.
   Eigen::VectorXd gravity_loads(Eigen::Index row);
 
-  /// Derivatives of the reading by the joint values of the rigid arm, 3 x J.
+  /// Of the reading by the joint values of the rigid arm, 3 x J.
   Eigen::Matrix3Xd joint_motion(Eigen::Index row);
 
-  /// Derivatives of the reading by the values of each candidate in turn, at 0, on top of the robot: the columns of
-  /// `out`, 3 x sum of value counts.
+  /// Of each candidate in turn, derivatives of the reading by its values at 0, on top of the robot: the columns
+  /// of `out`, 3 x sum of value counts.
   void signatures(Eigen::Index row, std::vector<PreparedEffect>& candidates, Eigen::Ref<Eigen::Matrix3Xd> out);
 
  private:

@@ -129,7 +129,7 @@ Effect read_effect(YamlMap map, const Chain& chain) {
   Effect effect{.type = type.name, .at = {}, .values = {}};
   std::vector<std::string> known = {"type"};
   bool slides = false;
-  if (type.has_formula) {
+  if (type.name == "formula") {
     effect.at = map.text_or("at", "");
     read_formula(map, chain, effect);
     known.insert(known.end(), {"name", "terms", "at"});

@@ -1,4 +1,4 @@
-// Derivatives of the reading by the deformation of an arm in equilibrium.
+// How the reading follows the deformation of an arm in equilibrium.
 //
 // Effects look at the arm in its pose: at loads, points and axes, their inputs. What they see deforms the arm. The
 // deformed arm has other inputs, which deform it a little more.
@@ -52,8 +52,7 @@ void RobotEvaluator::choose_components(const std::vector<Eigen::Index>& chosen) 
   for (std::size_t k = 0; k < chosen.size(); ++k) place_[chosen[k]] = static_cast<Eigen::Index>(k);
 }
 
-// The motion of the arm by a component of the deformation other than world_mm: of the arm where the loads act, or of
-// the deformed one.
+// How a component of the deformation, none of world_mm, moves the arm: that where the loads act, or the deformed one.
 Motion RobotEvaluator::component_motion(Eigen::Index component, bool of_deformed) const {
   const std::vector<Motion>& motions = of_deformed || bears_loads_ ? deformed_motions_ : motions_;
   const Eigen::Index joints = q_.size();
@@ -81,7 +80,7 @@ Motion RobotEvaluator::component_motion(Eigen::Index component, bool of_deformed
   return motion;
 }
 
-// Derivatives of the reading alone, the rest of the deformation held as the arm has it.
+// Of what is read, the rest of the deformation held as the arm has it.
 void RobotEvaluator::set_direct_levers(Eigen::Index row) {
   direct_.setZero(3, std::ssize(components_));
   const bool turns_only = is_orientation(row);
@@ -107,7 +106,7 @@ void RobotEvaluator::deformation_by(PoseContext& pose, Eigen::Index row, const P
   }
 }
 
-// Derivatives of an effect's deformation by one of its inputs. sides_ has the deformation as it is in column 1.
+// Of the deformation by an effect, by one of its inputs. sides_ has the deformation as it is in column 1.
 void RobotEvaluator::add_input(PoseContext& pose, Eigen::Index row, const PreparedEffect& effect, std::size_t input) {
   const Place place = place_of(inputs_[input], pose, arm_, loads_);
   const int size = inputs_[input].kind == Input::Kind::payload ? 1 : 3;
@@ -143,7 +142,7 @@ void RobotEvaluator::set_inputs(PoseContext& pose, Eigen::Index row) {
   }
 }
 
-// Derivatives of the deformation by one of its components.
+// Of the deformation by one of its components.
 void RobotEvaluator::set_response(const PoseContext& pose, Eigen::Index component,
                                   Eigen::Ref<Eigen::VectorXd> response) {
   response.setZero();
@@ -192,8 +191,8 @@ void RobotEvaluator::set_held_back() {
   }
 }
 
-// Levers of the arm in equilibrium, by the components that its own effects change. Where loads act on the deformed arm,
-// the last pass to equilibrium hardly moved it.
+// Of the arm in equilibrium, by the components that its own effects change. Where loads act on the deformed arm, the
+// last pass to equilibrium hardly moved it.
 void RobotEvaluator::set_levers(PoseContext& pose, Eigen::Index row) {
   choose_components(own_components_);
   tool_ = kinematics_.motions_into(deformed_motions_, q_, &deformation_);

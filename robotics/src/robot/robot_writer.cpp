@@ -59,7 +59,7 @@ void write_effect(YamlWriter& out, const Chain& chain, const Effect& effect) {
   const std::vector<EffectParameter> parameters = effect_parameters(chain, effect);
   out.begin_map().word("type", effect.type);
   if (!effect.at.empty()) out.word("at", effect.at);
-  if (type.has_formula) write_formula(out, effect.formula);
+  if (type.name == "formula") write_formula(out, effect.formula);
   const bool slides = !effect.at.empty() && type.place == EffectPlace::joint &&
                       chain.joints[joint_index(chain, effect.at)].type == JointType::prismatic;
   for (std::size_t k = 0; k < type.constants.size(); ++k) {

@@ -32,7 +32,7 @@ std::size_t number_in(const std::string& name) {
   return at == std::string::npos ? 0 : static_cast<std::size_t>(std::strtoul(name.c_str() + at, nullptr, 10));
 }
 
-// The column to make of "a|b": order rather than time, and the unit that suits the joint.
+// Of "a|b" the one to make: order rather than time, and the unit that suits the joint.
 std::string chosen_column(const std::string& names, const Chain& chain) {
   const std::size_t bar = names.find('|');
   if (bar == std::string::npos) return names;

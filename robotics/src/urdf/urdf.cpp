@@ -58,7 +58,7 @@ Eigen::Isometry3d transform_of(const Joint& joint) {
   return m;
 }
 
-// Holds the nominal chain against the identified one.
+// Of the nominal chain, held against the identified one.
 void check_same_arm(const UrdfArm& arm, const Chain& chain) {
   bool same = chain.convention == Convention::mdh && chain.joints.size() == arm.joints.size();
   for (std::size_t j = 0; same && j < arm.joints.size(); ++j) {

@@ -17,7 +17,7 @@ namespace {
 
 constexpr std::size_t deepest_nesting = 100;
 
-// The messages that urdfdom would print.
+// What urdfdom would print.
 class Listener final : public console_bridge::OutputHandler {
  public:
   Listener() : before_(console_bridge::getOutputHandler()) { console_bridge::useOutputHandler(this); }

@@ -17,7 +17,7 @@ constexpr std::size_t most_bytes = 16 << 20;
 constexpr int most_nodes = 300000;
 constexpr std::size_t longest_text = 10000;
 
-// The part of a file's text that a message shows.
+// What a message shows of a text that a file holds.
 std::string shown(const std::string& text) {
   constexpr std::size_t most = 60;
   if (text.size() <= most) return text;

@@ -24,7 +24,7 @@ class YamlWriter {
   YamlWriter& word(const std::string& name, const std::string& value) { return key(name), put(value); }
   YamlWriter& number(const std::string& name, double value) { return key(name), put(exact(value)); }
 
-  /// Leaves out a key whose value is the one that an absent key means.
+  /// Where the value is the one that an absent key means, the key is left out.
   YamlWriter& optional(const std::string& name, double value, double absent) {
     return value == absent ? *this : number(name, value);
   }

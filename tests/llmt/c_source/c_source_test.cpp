@@ -76,7 +76,7 @@ TEST_F(CSource, CompiledSourceGivesTheBytesOfTheLibrary) {
       {.name = "crisp"},
       {.name = "crisp, six inputs, clamped", .inputs = 6, .outputs = 3, .clamped = true},
       {.name = "blend", .validity = ValidityKind::blend, .outputs = 2, .shared = true},
-      {.name = "blend of many leaves", .validity = ValidityKind::blend, .leaves = 60},
+      {.name = "blend of version 1", .validity = ValidityKind::blend, .smoothness = 2, .leaves = 60},
       {.name = "categories", .validity = ValidityKind::blend, .inputs = 5, .categories = 2, .clamped = true},
       {.name = "gaussian", .validity = ValidityKind::gaussian, .inputs = 5},
       {.name = "gaussian, categories", .validity = ValidityKind::gaussian, .inputs = 4, .categories = 1},

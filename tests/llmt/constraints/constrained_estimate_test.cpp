@@ -153,9 +153,9 @@ TEST(Monotone, CostsLittleOfWhatNotSplittingTheInputCosts) {
 TEST(Monotone, BadOptionsAreRefusedByName) {
   const MatrixXd x = oracle::uniform(50, 2, 9).cwiseAbs().array().ceil();
   const MatrixXd y = oracle::uniform(50, 1, 10);
-  const auto message = [&](const llmt::FitOptions& options) -> std::string {
+  const auto message = [&](const llmt::FitOptions& options, const std::vector<int>& categorical = {}) -> std::string {
     try {
-      llmt::fit(x, y, options);
+      llmt::fit({.inputs = x, .outputs = y, .categorical_inputs = categorical}, options);
     } catch (const std::invalid_argument& error) {
       return error.what();
     }
@@ -170,8 +170,7 @@ TEST(Monotone, BadOptionsAreRefusedByName) {
   options.slope_signs = {-1, 0};
   EXPECT_EQ(message(options), "llmt::fit: slope_signs[0] is -1, it must be not the opposite of monotone");
   options.slope_signs = {};
-  options.categorical_inputs = {0};
-  EXPECT_EQ(message(options),
+  EXPECT_EQ(message(options, {0}),
             "llmt::fit: monotone[0] is 1, it must be 0: the input is categorical, its values have no order");
 }
 

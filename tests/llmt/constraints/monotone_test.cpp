@@ -131,15 +131,15 @@ TEST(Monotone, HoldsWithCategoriesWeightsMissingValuesAndSharedPartitions) {
     for (std::size_t which : {0U, 1U, 4U}) {
       llmt::FitOptions options = cases()[which].options;
       options.monotone = {1, -1, 0, 0};
-      options.categorical_inputs = {3};
       options.shared_partition = seed == 1;
-      options.weights = oracle::uniform(300, 1, seed).cwiseAbs();
+      const Eigen::VectorXd weights = oracle::uniform(300, 1, seed).cwiseAbs();
       for (const bool lacking : {false, true}) {
         MatrixXd inputs = x;
         for (Eigen::Index i = 0; lacking && i < x.rows(); i += 7) {
           inputs(i, i % 4) = nan;
         }
-        const llmt::Model model = llmt::fit(inputs, y, options).model;
+        const llmt::TrainingData data{.inputs = inputs, .outputs = y, .weights = weights, .categorical_inputs = {3}};
+        const llmt::Model model = llmt::fit(data, options).model;
         for (const bool with_missing : {false, true}) {
           EXPECT_LE(largest_fall(model, 0, 1, seed, with_missing), rounding) << which << " " << lacking;
           EXPECT_LE(largest_fall(model, 1, -1, seed, with_missing), rounding) << which << " " << lacking;

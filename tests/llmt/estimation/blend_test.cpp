@@ -128,4 +128,44 @@ TEST(Blend, JacobianIsContinuousAcrossThresholdsAndTransitionEnds) {
   }
 }
 
+// Largest change of the second derivative between neighbouring points of a grid of that step.
+double largest_jump_of_curvature(const llmt::Model& model, double step) {
+  double largest = 0.0;
+  double slope = 0.0;
+  double curvature = 0.0;
+  const Eigen::Index points = static_cast<Eigen::Index>(1.8 / step);
+  for (Eigen::Index i = 0; i < points; ++i) {
+    const double here = model.jacobian(Eigen::VectorXd::Constant(1, -0.9 + step * static_cast<double>(i)))(0, 0);
+    const double change = (here - slope) / step;
+    if (i > 1) {
+      largest = std::max(largest, std::abs(change - curvature));
+    }
+    slope = here;
+    curvature = change;
+  }
+  return largest;
+}
+
+TEST(Blend, SecondDerivativeIsContinuousInFilesOfSmoothnessTwoOnly) {
+  const Eigen::MatrixXd x = oracle::uniform(400, 1, 41);
+  const Eigen::MatrixXd y = (6.0 * x).array().sin();
+  for (const int smoothness : {1, 2}) {
+    const Kind kind{llmt::ValidityChoice::blend, 1.0};
+    const llmt::Model fitted = llmt::fit(x, y, only(kind, llmt::Estimation::joint, 6)).model;
+    // Without the clamp to the residual range, whose own second derivative jumps: it was chosen for smoothness 1.
+    std::vector<llmt::Partition> partitions = with_smoothness(fitted, smoothness).partitions();
+    partitions[0].residual_range.resize(0, 0);
+    const llmt::Model free(fitted.inputs(), fitted.outputs(), fitted.regressors(), partitions);
+    const llmt::Model model = llmt::from_json(llmt::to_json(free));
+    EXPECT_EQ(model.partitions()[0].validity.smoothness, smoothness);
+    // The change goes to zero with the step where the second derivative is continuous, and stays where it jumps.
+    const double ratio = largest_jump_of_curvature(model, 2e-5) / largest_jump_of_curvature(model, 2e-4);
+    if (smoothness == 1) {
+      EXPECT_GT(ratio, 0.7);
+    } else {
+      EXPECT_LT(ratio, 0.2);
+    }
+  }
+}
+
 }  // namespace

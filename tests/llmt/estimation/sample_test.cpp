@@ -11,9 +11,9 @@
 #include "estimation/local_estimate.hpp"
 #include "estimation/squared_errors.hpp"
 #include "growth/best_first/best_first.hpp"
+#include "model/evaluator.hpp"
+#include "model/tree.hpp"
 #include "oracles/oracles.hpp"
-#include "partition/evaluator.hpp"
-#include "partition/tree.hpp"
 
 namespace {
 
@@ -50,7 +50,7 @@ Partition blended_tree(const llmt::TrainingRows& training) {
   problem.options.max_leaves = 8;
   problem.options.split_inputs = {0, 1, 2};
   Partition partition{
-      .outputs = {0, 1}, .validity = {llmt::ValidityKind::blend, 1.0}, .nodes = llmt::grow(problem).nodes};
+      .outputs = {0, 1}, .validity = {llmt::ValidityKind::blend, 1.0, 1}, .nodes = llmt::grow(problem).nodes};
   llmt::set_half_widths(partition, training.low(), training.high());
   return partition;
 }

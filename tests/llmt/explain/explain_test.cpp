@@ -20,8 +20,12 @@ constexpr double missing = std::numeric_limits<double>::quiet_NaN();
 
 struct Kind {
   llmt::ValidityChoice validity;
+  int smoothness = 1;
 };
-const Kind kinds[] = {{llmt::ValidityChoice::crisp}, {llmt::ValidityChoice::blend}, {llmt::ValidityChoice::gaussian}};
+const Kind kinds[] = {{llmt::ValidityChoice::crisp},
+                      {llmt::ValidityChoice::blend},
+                      {llmt::ValidityChoice::blend, 2},
+                      {llmt::ValidityChoice::gaussian}};
 
 // Three numbers, of which one is often missing, and a category; two outputs.
 struct Data {
@@ -52,8 +56,8 @@ llmt::Model fitted(const Data& data, const Kind& kind, std::vector<int> categori
   options.validity = kind.validity;
   options.expert.widths = {1.5};
   options.folds.count = 0;
-  options.categorical_inputs = std::move(categorical);
-  return llmt::fit(data.x, data.y, options).model;
+  const llmt::TrainingData rows{.inputs = data.x, .outputs = data.y, .categorical_inputs = std::move(categorical)};
+  return random_trees::with_smoothness(llmt::fit(rows, options).model, kind.smoothness);
 }
 
 // Steps along the line, in each of which one input after the other is moved, in both orders: from predictions alone.
@@ -130,7 +134,7 @@ llmt::Model four_fields(double half_width, const Eigen::Vector4d& values) {
   llmt::Partition partition;
   partition.outputs = {0};
   if (half_width > 0.0) {
-    partition.validity = {llmt::ValidityKind::blend, 1.0};
+    partition.validity = {llmt::ValidityKind::blend, 1.0, 1};
   }
   partition.nodes = {node(1, 0, 0.0),         node(3, 1, 0.0),         node(5, 1, 0.0),        node(-1, -1, values(0)),
                      node(-1, -1, values(1)), node(-1, -1, values(2)), node(-1, -1, values(3))};
@@ -174,9 +178,9 @@ TEST(Explain, ContributionsAddUp) {
 
 TEST(Explain, EqualsSmallStepsAlongTheLine) {
   const Data data = mixed(400);
-  for (int k = 0; k < 6; ++k) {
-    const Kind& kind = kinds[k % 3];
-    const llmt::LocalTerms terms = k < 3 ? llmt::LocalTerms::linear : llmt::LocalTerms::quadratic;
+  for (int k = 0; k < 8; ++k) {
+    const Kind& kind = kinds[k % 4];
+    const llmt::LocalTerms terms = k < 4 ? llmt::LocalTerms::linear : llmt::LocalTerms::quadratic;
     const llmt::Model model = fitted(data, kind, {3}, terms);
     const Eigen::VectorXd reference = llmt::reference_point(model);
     for (int row = 0; row < 5; ++row) {
@@ -196,9 +200,9 @@ TEST(Explain, ClampedModelsEqualSmallStepsAlongTheLine) {
   Eigen::MatrixXd range(2, 2);
   range << 0.3, 1.6, -0.1, 0.9;
   int clamped_lines = 0;
-  for (int k = 0; k < 6; ++k) {
-    const Kind& kind = kinds[k % 3];
-    const llmt::LocalTerms terms = k < 3 ? llmt::LocalTerms::linear : llmt::LocalTerms::quadratic;
+  for (int k = 0; k < 8; ++k) {
+    const Kind& kind = kinds[k % 4];
+    const llmt::LocalTerms terms = k < 4 ? llmt::LocalTerms::linear : llmt::LocalTerms::quadratic;
     const llmt::Model free = fitted(data, kind, {3}, terms);
     const llmt::Model model = oracle::clamped(free, range);
     const Eigen::VectorXd reference = llmt::reference_point(model);
@@ -251,8 +255,8 @@ TEST(Explain, AnInputThatIsNotUsedGetsNothing) {
     options.validity = kind.validity;
     options.expert.widths = {1.5};
     options.folds.count = 0;
-    options.categorical_inputs = {3};
-    const llmt::Model model = llmt::fit(data.x, data.y, options).model;
+    const llmt::TrainingData rows{.inputs = data.x, .outputs = data.y, .categorical_inputs = {3}};
+    const llmt::Model model = random_trees::with_smoothness(llmt::fit(rows, options).model, kind.smoothness);
     for (int row = 0; row < 20; ++row) {
       EXPECT_EQ(llmt::attribute(model, data.x.row(row).transpose()).contributions.col(1), Eigen::Vector2d::Zero());
     }

@@ -68,7 +68,8 @@ TEST(CodeChoice, ModelIsThatOfCategories) {
   ASSERT_EQ(result.summary.codes.taken, std::vector<int>{0});
   Eigen::MatrixXd positions = train.x;
   positions.col(0).array() -= 2.0;
-  const llmt::FitResult categories = llmt::fit(positions, train.y, as_numbers({.categorical_inputs = {0}}));
+  const llmt::FitResult categories =
+      llmt::fit({.inputs = positions, .outputs = train.y, .categorical_inputs = {0}}, as_numbers());
   EXPECT_EQ(result.model.predict(train.x), categories.model.predict(positions));
   EXPECT_EQ(result.intervals.predict(train.x, 0.9).upper, categories.intervals.predict(positions, 0.9).upper);
 }
@@ -131,8 +132,8 @@ TEST(CodeChoice, TakesWhatAFitTakes) {
     train.x(i, 0) = 77.5;
   }
   for (const bool shared : {false, true}) {
-    const llmt::FitOptions options{.shared_partition = shared, .weights = weights};
-    const llmt::FitResult result = llmt::fit(train.x, train.y, options);
+    const llmt::FitOptions options{.shared_partition = shared};
+    const llmt::FitResult result = llmt::fit({.inputs = train.x, .outputs = train.y, .weights = weights}, options);
     EXPECT_EQ(result.summary.codes.taken, std::vector<int>{0});
     EXPECT_TRUE(result.model.predict(train.x).allFinite());
   }

@@ -6,8 +6,8 @@
 #include <Eigen/Eigenvalues>
 #include <cmath>
 
+#include "model/logistic.hpp"
 #include "oracles/oracles.hpp"
-#include "partition/logistic.hpp"
 
 namespace {
 

@@ -146,9 +146,7 @@ TEST(Intervals, AnUnknownCategoryIsMissing) {
   Sample train = lacking(300, 0.0, 9);
   train.x.col(0) = (3.0 * train.x.col(0)).array().floor();
   for (Eigen::Index row = 0; row < 40; ++row) train.x(row, 0) = oracle::missing;
-  llmt::FitOptions options;
-  options.categorical_inputs = {0};
-  const llmt::FitResult fit = llmt::fit(train.x, train.y, options);
+  const llmt::FitResult fit = llmt::fit({.inputs = train.x, .outputs = train.y, .categorical_inputs = {0}});
   Eigen::MatrixXd x(2, 3);
   x << 7.0, 0.5, 0.0, oracle::missing, 0.5, 0.0;
   const llmt::Bounds bounds = fit.intervals.predict(x, 0.9);
@@ -175,38 +173,6 @@ TEST(Intervals, ReadBackWithBothKindsOfRows) {
   llmt::save(complete.model, complete.intervals, path);
   EXPECT_EQ(llmt::read_file(path).find("residuals_incomplete"), std::string::npos);
   std::filesystem::remove(path);
-}
-
-TEST(Intervals, ATextWithThemIsTheFileAndGivesTheSameBytesAgain) {
-  const Sample train = lacking(200, 0.2, 11);
-  const llmt::FitResult fit = llmt::fit(train.x, train.y);
-  const std::string text = llmt::to_json(fit.model, fit.intervals);
-  const llmt::ModelWithIntervals read = llmt::from_json_with_intervals(text);
-  EXPECT_EQ(llmt::to_json(read.model, read.intervals), text);
-  const Eigen::MatrixXd x = complete_and_incomplete();
-  EXPECT_EQ(read.intervals.predict(x, 0.9).upper, fit.intervals.predict(x, 0.9).upper);
-  const std::string path = testing::TempDir() + "/llmt_intervals_text_test.json";
-  llmt::save(fit.model, fit.intervals, path);
-  EXPECT_EQ(llmt::read_file(path), text);
-  std::filesystem::remove(path);
-  const std::string alone = llmt::to_json(fit.model);
-  EXPECT_EQ(llmt::to_json(fit.model, llmt::Intervals()), alone);
-  EXPECT_TRUE(llmt::from_json_with_intervals(alone).intervals.empty());
-}
-
-TEST(Intervals, ATextThatIsCutOffOrAlteredIsRefusedWithThePlace) {
-  const Sample train = lacking(100, 0.2, 11);
-  const llmt::FitResult fit = llmt::fit(train.x, train.y);
-  std::string text = llmt::to_json(fit.model, fit.intervals);
-  const auto refusal = [](const std::string& of) {
-    return oracle::thrown<std::runtime_error>([&] { llmt::from_json_with_intervals(of, "m.json"); });
-  };
-  const std::size_t residuals = text.find("\"residuals\"");
-  const std::size_t number = text.find_first_of("0123456789", residuals);
-  EXPECT_EQ(refusal(text.substr(0, number)).find("m.json: not JSON, or cut off: "), 0U);
-  EXPECT_NE(refusal(text.substr(0, number)).find(", in /intervals/0/residuals/0"), std::string::npos);
-  text.insert(number, "-");
-  EXPECT_EQ(refusal(text).find("m.json: /intervals: "), 0U) << refusal(text);
 }
 
 TEST(Intervals, WithoutFoldsAreRefusedWithTheOptionsThatMakeThem) {

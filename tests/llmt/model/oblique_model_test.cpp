@@ -40,7 +40,7 @@ llmt::Model two_leaves(const Eigen::VectorXd& direction, double right, double ha
   };
   llmt::Partition partition{.outputs = {0}, .validity = {}, .nodes = {node(0.0), node(0.0), node(right)}};
   if (half_width > 0.0) {
-    partition.validity = {llmt::ValidityKind::logistic, 1.0};
+    partition.validity = {llmt::ValidityKind::logistic, 1.0, 1};
   }
   if (slope.size() > 0) {
     partition.nodes[2].slope = slope.transpose();

@@ -67,7 +67,7 @@ double blended(const llmt::Partition& partition, int index, double validity, con
   double left = x <= node.threshold ? 1.0 : 0.0;
   if (node.half_width > 0.0) {
     const double v = 0.5 * (std::clamp((x - node.threshold) * (1.0 / node.half_width), -1.0, 1.0) + 1.0);
-    left = std::clamp(1.0 - v * v * (3.0 - 2.0 * v), 0.0, 1.0);
+    left = std::clamp(1.0 - v * v * v * (10.0 - v * (15.0 - 6.0 * v)), 0.0, 1.0);
   }
   sum = left > 0.0 ? blended(partition, node.left, validity * left, row, deviations, sum) : sum;
   return left < 1.0 ? blended(partition, node.right, validity * (1.0 - left), row, deviations, sum) : sum;
@@ -75,7 +75,7 @@ double blended(const llmt::Partition& partition, int index, double validity, con
 
 // Plain code of one number at a time, so the instruction set of the machine is not in the result.
 TEST(PredictionInQuads, IsTheSameBytesAsOneNumberAtATime) {
-  const Kind kind{.name = "", .validity = ValidityKind::blend, .inputs = 13, .leaves = 50};
+  const Kind kind{.name = "", .validity = ValidityKind::blend, .smoothness = 2, .inputs = 13, .leaves = 50};
   const llmt::Model held = random_model(kind, 21);
   llmt::Partition partition = held.partitions()[0];
   for (llmt::Node& node : partition.nodes) {
@@ -190,10 +190,11 @@ INSTANTIATE_TEST_SUITE_P(
                     Kind{.name = "CrispCategories", .inputs = 5, .categories = 2},
                     Kind{.name = "CrispOneInput", .inputs = 1, .leaves = 9}, Kind{.name = "OneLeaf", .leaves = 1},
                     Kind{.name = "CrispManyInputs", .inputs = 70, .leaves = 5},
-                    Kind{.name = "Blend", .validity = ValidityKind::blend},
-                    Kind{.name = "BlendWide", .validity = ValidityKind::blend, .inputs = 8, .leaves = 50},
+                    Kind{.name = "C1", .validity = ValidityKind::blend},
+                    Kind{.name = "C2", .validity = ValidityKind::blend, .smoothness = 2, .inputs = 8, .leaves = 50},
                     Kind{.name = "BlendShared",
                          .validity = ValidityKind::blend,
+                         .smoothness = 2,
                          .inputs = 6,
                          .categories = 2,
                          .outputs = 10,

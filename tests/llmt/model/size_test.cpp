@@ -52,8 +52,9 @@ llmt::Model one_leaf(const std::vector<llmt::Regressor>& regressors, const std::
 }
 
 // Leaves 0.5 and 0.5 + 1 * x0, of sizes 1 and 5, and `like` at the root.
-llmt::Model two_leaves(const llmt::Node& like, ValidityKind kind = ValidityKind::crisp) {
-  llmt::Partition partition{.outputs = {0}, .validity = {kind, 1.0}, .nodes = {node({0.0}), node({0.0}), node({1.0})}};
+llmt::Model two_leaves(const llmt::Node& like, ValidityKind kind = ValidityKind::crisp, int smoothness = 1) {
+  llmt::Partition partition{
+      .outputs = {0}, .validity = {kind, 1.0, smoothness}, .nodes = {node({0.0}), node({0.0}), node({1.0})}};
   split(partition, 0, like);
   return model(partition);
 }
@@ -99,6 +100,8 @@ TEST(ExpressionSize, OfAJumpIsAComparisonMore) {
 TEST(ExpressionSize, OfATransitionIsThatOfItsEquation) {
   // (1 - v^2 * (3 - 2 * v)) * L + v^2 * (3 - 2 * v) * R: 19 and four times v = min(1, max(0, (x1 - a) / b)): 9
   EXPECT_EQ(llmt::expression_size(two_leaves(on_number(1.0), ValidityKind::blend)), 6 + 19 + 4 * 9);
+  // (1 - v^3 * (10 - v * (15 - 6 * v))) * L + v^3 * (10 - v * (15 - 6 * v)) * R: 25 and six times v
+  EXPECT_EQ(llmt::expression_size(two_leaves(on_number(1.0), ValidityKind::blend, 2)), 6 + 25 + 6 * 9);
   EXPECT_EQ(llmt::expression_size(two_leaves(on_number(), ValidityKind::blend)), 6 + 4);  // jumps
   // 1 / (1 + exp((s - c) / h)) * L + (1 - 1 / (1 + exp((s - c) / h))) * R: 23 and twice s, x1 or 1 * x0 + -2 * x1
   EXPECT_EQ(llmt::expression_size(two_leaves(on_number(1.0), ValidityKind::logistic)), 6 + 23 + 2 * 1);
@@ -109,7 +112,7 @@ TEST(ExpressionSize, OfGaussiansIsTheQuotientOfTwoSums) {
   // (m1 * L + m2 * R) / (m1 + m2): 5 and four times m = exp(-0.5 * ((x1 - c) / s) ^ 2): 10
   EXPECT_EQ(llmt::expression_size(two_leaves(on_number(), ValidityKind::gaussian)), 6 + 5 + 4 * 10);
   llmt::Partition partition{.outputs = {0},
-                            .validity = {ValidityKind::gaussian, 1.0},
+                            .validity = {ValidityKind::gaussian, 1.0, 1},
                             .nodes = {node({0.0}), node({0.0}), node({0.0}), node({1.0}), node({1.0})}};
   split(partition, 0, on_number());
   llmt::Node second = on_number();

@@ -8,9 +8,9 @@
 #include <optional>
 
 #include "llmt/fit.hpp"
+#include "model/tree.hpp"
 #include "oracles/oracles.hpp"
 #include "oracles/stream_data.hpp"
-#include "partition/tree.hpp"
 #include "stream/blend_correction.hpp"
 #include "stream/detectors.hpp"
 #include "stream/reservoir.hpp"
@@ -266,7 +266,7 @@ TEST(BlendCorrection, IsTheAnchoredLeastSquaresFit) {
   std::vector<int> all(200);
   std::iota(all.begin(), all.end(), 0);
   const llmt::TrainingRows rows = llmt::training_rows(table, all);
-  partition.validity = {llmt::ValidityKind::blend, 1.0};
+  partition.validity = {llmt::ValidityKind::blend, 1.0, 1};
   llmt::set_half_widths(partition, rows.low(), rows.high());
   const double ridge = 0.1;
   const llmt::BlendCorrection correction(rows, partition);

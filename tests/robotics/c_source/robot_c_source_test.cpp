@@ -4,21 +4,72 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include <map>
-
 #include "llmt/fit.hpp"
 #include "llmt/robotics/compensation.hpp"
-#include "oracles/thrown.hpp"
-#include "robotics/effects.hpp"
-#include "robotics/exported_robot.hpp"
+#include "oracles/compiled_c.hpp"
+#include "robotics/robots.hpp"
 
 namespace llmt::robotics {
 namespace {
 
 using oracle::Rows;
 
-class RobotCSource : public ExportedRobot {
+// A row in: conditions, drives, position, rotation; out: position and rotation at the drives, drives after twelve
+// steps.
+const char* const driver = R"(#include <stdio.h>
+#include "arm.h"
+int main(void) {{
+  double in[{0} + {1} + 12], out[12 + {1}];
+  while (fread(in, sizeof(double), {0} + {1} + 12, stdin) == {0} + {1} + 12) {{
+    int k;
+    arm_forward(in, in + {0}, out, out + 3);
+    for (k = 0; k < 12; ++k) arm_step(in, in + {0} + {1}, in + {0} + {1} + 3, in + {0});
+    for (k = 0; k < {1}; ++k) out[12 + k] = in[{0} + k];
+    fwrite(out, sizeof(double), 12 + {1}, stdout);
+  }}
+  return 0;
+}}
+)";
+
+class RobotCSource : public oracle::CompiledC {
  protected:
+  Rows run(const CorrectedRobot& robot, const Rows& in) const {
+    const std::size_t conditions = c_conditions(robot.robot).size();
+    const Eigen::Index joints = drive_count(robot.robot.chain);
+    return run_c(to_c(robot, "arm", "arm.h"), "arm", fmt::format(fmt::runtime(driver), conditions, joints), in,
+                 12 + joints);
+  }
+
+  static std::vector<Eigen::Index> drives_of(const Chain& chain) {
+    std::vector<Eigen::Index> drives;
+    for (std::size_t j = 0; j < chain.joints.size(); ++j) {
+      if (!chain.joints[j].mimic) drives.push_back(static_cast<Eigen::Index>(j));
+    }
+    return drives;
+  }
+
+  // Rows of what the program reads: the start, and the poses of the nominal arm as what is asked for.
+  static Rows asked(const CorrectedRobot& robot, const Targets& targets) {
+    const std::vector<std::string> columns = c_conditions(robot.robot);
+    const std::vector<Eigen::Index> drives = drives_of(robot.robot.chain);
+    const auto behind = std::ssize(columns) + std::ssize(drives);
+    Rows in(targets.start.count(), behind + 12);
+    for (Eigen::Index i = 0; i < in.rows(); ++i) {
+      for (std::size_t k = 0; k < columns.size(); ++k) in(i, k) = targets.start.covariates.at(columns[k])(i);
+      in.row(i).segment(std::ssize(columns), std::ssize(drives)) = targets.start.joints(i, drives);
+      in.row(i).segment(behind, 3) = targets.positions_mm.row(i);
+      for (int k = 0; k < 9; ++k) in(i, behind + 3 + k) = targets.rotations[i](k / 3, k % 3);
+    }
+    return in;
+  }
+
+  static Targets targets_of(const Robot& nominal, Poses poses) {
+    poses.covariates["payload_kg"] = Eigen::VectorXd::Constant(poses.count(), 2.5);
+    Targets targets{.start = poses, .positions_mm = positions(nominal, poses)};
+    for (const Pose& pose : tool_poses(nominal, poses)) targets.rotations.push_back(pose.rotation);
+    return targets;
+  }
+
   // Where compensate() reaches a target, the steps do, by the same measure.
   void expect_steps_reach(const CorrectedRobot& robot, const Robot& nominal, const Poses& poses) {
     const Targets targets = targets_of(nominal, poses);
@@ -51,12 +102,16 @@ class RobotCSource : public ExportedRobot {
     const auto joints = std::ssize(drives);
     const Rows in = asked(robot, targets);
     const Rows out = run(robot, in);
+    const std::vector<Pose> expected = tool_poses(robot, poses);
     const Compensation found = compensate(robot, targets);
+    double apart = 0.0;
     for (Eigen::Index i = 0; i < poses.count(); ++i) {
+      apart = std::max(apart, (out.row(i).head(3).transpose() - expected[i].position_mm).cwiseAbs().maxCoeff());
+      for (int k = 0; k < 9; ++k) EXPECT_NEAR(out(i, 3 + k), expected[i].rotation(k / 3, k % 3), 1e-13);
       if (!same_commands || found.outcomes[i] != Outcome::reached) continue;
       EXPECT_LT((out.row(i).tail(joints) - found.commands.joints(i, drives)).norm(), 1e-9) << i;
     }
-    return apart(robot, poses, out);
+    return apart / (reach_of(robot.robot.chain) * std::numeric_limits<double>::epsilon());
   }
 };
 
@@ -147,74 +202,15 @@ TEST_F(RobotCSource, SlidesMayMimicTurnsAndTurnsSlides) {
   }
 }
 
-// Types that are not exported, and the reason that is given.
-const std::map<std::string, std::string> not_exported = {
-    {"joint_compliance_free_masses", "it needs the orientation of every body"},
-    {"link_bending", "it displaces a link"},
-    {"link_bending_no_carry_over", "it displaces a link"},
-    {"link_torsion", "it displaces a link"},
-    {"link_thermal_growth", "it displaces a link"},
-    {"elastic_base", "it displaces the whole arm"},
-    {"elastic_base_two", "it displaces the whole arm"},
-    {"thermal_growth", "it displaces the whole arm"},
-    {"base_thermal_drift", "it displaces the whole arm"},
-    {"payload_error", "it changes the payload or the gravity that other effects are evaluated with"},
-    {"gravity_tilt", "it changes the payload or the gravity that other effects are evaluated with"},
-    {"axis_wobble", "it tilts the axis of a joint"},
-    {"axis_wobble_at", "it tilts the axis of a joint"},
-    {"drift", "it is an error of the measurement, not of the arm"},
-    {"drift_curved", "it is an error of the measurement, not of the arm"},
-    {"drift_settling", "it is an error of the measurement, not of the arm"},
-    {"tracker_knock", "it is an error of the measurement, not of the arm"},
-    {"instrument_azimuth", "it is an error of the measurement, not of the arm"},
-    {"instrument_azimuth_twice", "it is an error of the measurement, not of the arm"},
-    {"instrument_elevation", "it is an error of the measurement, not of the arm"},
-    {"instrument_range", "it is an error of the measurement, not of the arm"},
-    {"formula", "the user's expressions are not translated to C"}};
-
-// An effect of the type at every joint that it suits, of some times its usual size.
-Robot with_effects_of(const EffectType& type, Robot robot) {
-  Random random(13);
-  const std::size_t places = type.place == EffectPlace::robot ? 1 : robot.chain.joints.size();
-  for (std::size_t index = 0; index < places; ++index) {
-    if (!suits(type, robot.chain, index)) continue;
-    Effect effect = make_effect(type, robot.chain, index, {}, 5);
-    const std::vector<EffectParameter> parameters = effect_parameters(robot.chain, effect);
-    for (std::size_t k = 0; k < parameters.size(); ++k) effect.values[k] = parameters[k].scale * random.uniform(0.5, 3);
-    robot.effects.push_back(effect);
+TEST_F(RobotCSource, EffectsThatAreNoChangeOfAJointAreRefusedByName) {
+  CorrectedRobot robot{.robot = with_masses(ur_like()), .correction = {}};
+  robot.robot.effects = {{.type = "axis_wobble", .at = "joint2", .values = {1e-4, 0.0, 0.0, 0.0}}};
+  try {
+    to_c(robot, "arm", "arm.h");
+    FAIL();
+  } catch (const std::invalid_argument& error) {
+    EXPECT_NE(std::string(error.what()).find("axis_wobble@joint2"), std::string::npos);
   }
-  return robot;
-}
-
-// An arm that turns and slides, and bears loads about all axes.
-TEST_F(RobotCSource, EveryTypeIsExportedAsTheLibraryHasItOrRefusedWithItsReason) {
-  const Robot arm = slanted(weighted(scara()));
-  const Poses poses = furnished_poses(arm.chain, 200, 17);
-  for (const EffectType& type : effect_types()) {
-    const auto reason = not_exported.find(type.name);
-    if (reason == not_exported.end()) {
-      const CorrectedRobot robot{.robot = with_effects_of(type, arm), .correction = {}};
-      EXPECT_GE(robot.robot.effects.size(), 1U) << type.name;
-      EXPECT_LT(forward_apart(robot, poses), bound_ulp) << type.name;
-      continue;
-    }
-    CorrectedRobot robot{.robot = arm, .correction = {}};
-    if (type.name == "formula") {
-      robot.robot.effects = {{.type = "formula",
-                              .at = "joint1",
-                              .values = {1e-4},
-                              .formula = {"own", {{"joint", "q1", "a", "rad", 1.0}}}}};
-    } else {
-      robot.robot.effects = {with_effects_of(type, arm).effects.at(0)};
-    }
-    EXPECT_EQ(oracle::thrown<std::invalid_argument>([&] { to_c(robot, "arm", "arm.h"); }),
-              fmt::format("llmt::robotics::to_c: effect {} cannot be exported: {}. Effects that change a joint's value "
-                          "can.",
-                          effect_label(robot.robot.effects[0]), reason->second));
-  }
-}
-
-TEST_F(RobotCSource, ANameMustBeAnIdentifierOfC) {
   EXPECT_THROW(to_c({ur_like(), {}}, "a name", "arm.h"), std::invalid_argument);
 }
 

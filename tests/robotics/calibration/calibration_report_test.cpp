@@ -89,29 +89,29 @@ TEST(CalibrationReport, DescriptionOfAnotherRobotIsSaidNotToBelong) {
   const Robot other = mdh_like();
   const Robot own = perturbed(ur_like(), 0.5, 0.05, 16);
   for (const int folds : {0, 5}) {
-    const auto mistakes_of = [&](const Robot& measured) {
+    const auto suspicions_of = [&](const Robot& measured) {
       const Measurements seen = measure(measured, random_poses(measured.chain, 60, 17), 0.05, 18);
-      return input_mistakes(ur_like(), seen, report_calibration(ur_like(), seen, {.folds = folds}));
+      return suspicions(ur_like(), seen, report_calibration(ur_like(), seen, {.folds = folds}));
     };
-    const std::vector<std::string> wrong = mistakes_of(other);
+    const std::vector<std::string> wrong = suspicions_of(other);
     ASSERT_FALSE(wrong.empty());
     EXPECT_NE(wrong.back().find("does not belong to these measurements"), std::string::npos) << wrong.back();
     EXPECT_NE(wrong.back().find(folds > 0 ? "held-out points" : "measured points"), std::string::npos) << wrong.back();
-    EXPECT_TRUE(mistakes_of(own).empty());
+    EXPECT_TRUE(suspicions_of(own).empty());
   }
 }
 
 TEST(CalibrationReport, SoFewPosesThatAnyValuesFitAreSaid) {
   const Robot truth = perturbed(ur_like(), 0.5, 0.05, 19);
-  const auto mistakes_of = [&](Eigen::Index poses) {
+  const auto suspicions_of = [&](Eigen::Index poses) {
     const Measurements seen = measure(truth, random_poses(truth.chain, poses, 20), 0.05, 21);
-    return input_mistakes(ur_like(), seen, report_calibration(ur_like(), seen));
+    return suspicions(ur_like(), seen, report_calibration(ur_like(), seen));
   };
-  const std::vector<std::string> few = mistakes_of(11);
+  const std::vector<std::string> few = suspicions_of(11);
   ASSERT_EQ(few.size(), 1U);
   EXPECT_NE(few[0].find(" parameters were identified from 33 measured coordinates: so few poses"), std::string::npos)
       << few[0];
-  EXPECT_TRUE(mistakes_of(40).empty());
+  EXPECT_TRUE(suspicions_of(40).empty());
 }
 
 TEST(CalibrationReport, ACalibrationWithoutGainOnUnseenPosesIsSaid) {
@@ -120,7 +120,7 @@ TEST(CalibrationReport, ACalibrationWithoutGainOnUnseenPosesIsSaid) {
   const CalibrationReport report = report_calibration(ur_like(), seen);
   ASSERT_GE(report.geometric.held_out_mm.mean(), report.nominal.held_out_mm.mean());
   EXPECT_EQ(
-      input_mistakes(ur_like(), seen, report),
+      suspicions(ur_like(), seen, report),
       std::vector<std::string>{"on poses left out the calibrated robot is no better than the described one: keep the "
                                "description, or measure more poses"});
 }
@@ -133,7 +133,7 @@ TEST(CalibrationReport, UnitsThatWouldFitAreNamed) {
     wrong.poses.joints *= of_angles;
     wrong.positions_mm *= of_positions;
     const std::vector<std::string> found =
-        input_mistakes(ur_like(), wrong, report_calibration(ur_like(), wrong, {.folds = 0}));
+        suspicions(ur_like(), wrong, report_calibration(ur_like(), wrong, {.folds = 0}));
     return found.empty() ? std::string() : found.back();
   };
   constexpr double degree = std::numbers::pi / 180.0;

@@ -46,27 +46,33 @@ std::vector<std::string> wrapped(const std::string& text) {
   return lines;
 }
 
-std::string headline_text(robotics::Headline headline) {
-  using robotics::Headline;
-  switch (headline) {
-    case Headline::nothing_missing:
+std::string headline(const Discovery& found) {
+  const auto refused = [&](const char* kind) { return !found.unknown.empty() && found.unknown[0].shape.kind == kind; };
+  const bool is_certain =
+      std::ranges::any_of(found.effects, [](const FoundEffect& one) { return one.confirmed && !one.smaller; });
+  const bool is_named =
+      found.answer == discovery::Answer::named || found.answer == discovery::Answer::indistinguishable;
+  constexpr const char* likely = "LIKELY CAUSES, NONE CERTAIN. Together these explain what the model lacks:";
+  if (is_named && !is_certain) return likely;
+  switch (found.answer) {
+    case discovery::Answer::nothing_missing:
       return "NOTHING MISSING. What the calibrated model leaves is noise as far as these poses can tell.";
-    case Headline::named:
+    case discovery::Answer::named:
       return "NAMED. The model lacks:";
-    case Headline::named_with_rivals:
+    case discovery::Answer::indistinguishable:
       return "NAMED, BUT NOT ALONE. The model lacks the following. Other causes explain the data equally well; they "
              "stand behind \"instead it may be\":";
-    case Headline::likely_causes:
-      return "LIKELY CAUSES, NONE CERTAIN. Together these explain what the model lacks:";
-    case Headline::gross_errors:
-      return "TOO MANY OUTLIERS. Neither an effect nor its absence can be told from these data.";
-    case Headline::structured_residuals:
-      return "UNKNOWN EFFECT. No candidate explains what is left, but it is not an instrument's noise.";
-    case Headline::named_in_part:
-      return "UNKNOWN EFFECT, NAMED IN PART. Beside what has a name, something without a name is missing:";
-    case Headline::likely_causes_in_part:
-      return "LIKELY CAUSES, NONE CERTAIN. Beside them something is missing that the catalogue does not explain:";
-    case Headline::unknown:
+    case discovery::Answer::unknown:
+      if (refused("outliers"))
+        return "TOO MANY OUTLIERS. Neither an effect nor its absence can be told from these data.";
+      if (refused("noise"))
+        return "UNKNOWN EFFECT. No candidate explains what is left, but it is not an instrument's noise.";
+      if (std::ranges::any_of(found.effects, &FoundEffect::confirmed)) {
+        return "UNKNOWN EFFECT, NAMED IN PART. Beside what has a name, something without a name is missing:";
+      }
+      if (!found.effects.empty()) {
+        return "LIKELY CAUSES, NONE CERTAIN. Beside them something is missing that the catalogue does not explain:";
+      }
       return "UNKNOWN EFFECT. Something real is missing that the catalogue does not explain. It looks like this:";
   }
   return "";
@@ -83,7 +89,7 @@ std::string order_text(double order) {
   return order == std::round(order) ? fmt::format("{:.0f}", order) : number(order, 3);
 }
 
-bool is_wave(const FoundEffect& effect) { return robotics::nature_of(effect.effect) == robotics::Nature::wave; }
+bool is_wave(const FoundEffect& effect) { return effect.effect.type == "transmission_error"; }
 
 // What an effect is, without its place: for gears, what turns so often.
 std::string kind_of(const Discovery& found, const FoundEffect& effect) {
@@ -266,11 +272,10 @@ std::vector<std::string> error_sentences(const Discovery& found) {
 
 // What the reader should do now.
 std::string advice(const Discovery& found) {
-  using robotics::Headline;
+  const auto is = [&](const char* kind) { return !found.unknown.empty() && found.unknown[0].shape.kind == kind; };
   if (found.answer == discovery::Answer::nothing_missing) return "";
-  if (found.headline == Headline::gross_errors)
-    return "Next: check the outliers, measure them again, and repeat the search without them.";
-  if (found.headline == Headline::structured_residuals)
+  if (is("outliers")) return "Next: check the outliers, measure them again, and repeat the search without them.";
+  if (is("noise"))
     return "Next: measure some poses several times, from both sides, and write their number into a column `pose`.";
   if (found.answer == discovery::Answer::indistinguishable) {
     return "Next: use the improved description near the measured poses. The last lines say whether further poses "
@@ -287,7 +292,7 @@ std::string effect_values(const Discovery& found, const FoundEffect& effect) {
   std::vector<std::string> values;
   const std::vector<robotics::Joint>& joints = found.before.chain.joints;
   const auto first = std::ranges::find(joints, effect.effect.at, &robotics::Joint::name) - joints.begin();
-  const bool by_body = robotics::effect_type(effect.effect.type).parameters[0].each_body;
+  const bool by_body = effect.effect.type == "joint_compliance_free_masses";
   for (std::size_t k = 0; k < effect.parameters.size(); ++k) {
     const robotics::FoundParameter& parameter = effect.parameters[k];
     if (!std::isfinite(parameter.standard_error)) continue;
@@ -305,7 +310,7 @@ std::string discovery_page(const Discovery& found, const std::vector<Eigen::Inde
   const auto add = [&](const std::string& text) {
     for (std::string& line : wrapped(text)) lines.push_back(std::move(line));
   };
-  add(headline_text(found.headline));
+  add(headline(found));
   for (const std::string& sentence : effect_sentences(found)) add(sentence);
   for (const std::string& sentence : shape_sentences(found.unknown, "an error without a name, ")) add(sentence);
   for (const std::string& sentence : shape_sentences(found.more, "and something more, ")) add(sentence);

@@ -76,7 +76,7 @@ Json next_table(const robotics::Chain& chain, const NextPoses& next) {
   for (std::size_t j = 0; j < chain.joints.size(); ++j)
     grid.header.push_back(joint_axis(chain, static_cast<Eigen::Index>(j)));
   grid.header.insert(grid.header.end(), {"payload, kg", "they differ by, mm"});
-  for (const robotics::DiscriminatingPose& pose : next.telling.poses) {
+  for (const robotics::TellingPose& pose : next.telling.poses) {
     std::vector<std::string> row = {std::to_string(grid.rows.size() + 1)};
     for (std::size_t j = 0; j < chain.joints.size(); ++j)
       row.push_back(number(joint_values(chain, pose.joints.transpose(), static_cast<Eigen::Index>(j)).front(), 4));

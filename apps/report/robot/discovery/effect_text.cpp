@@ -79,7 +79,7 @@ std::vector<const robotics::FoundEffect*> by_size(const robotics::Discovery& fou
 }
 
 const robotics::FoundEffect& whole_of(const robotics::Discovery& found, const robotics::FoundEffect& effect) {
-  if (!effect.smaller || robotics::nature_of(effect.effect) == robotics::Nature::wave) return effect;
+  if (!effect.smaller || effect.effect.type == "transmission_error") return effect;
   for (const robotics::FoundEffect& one : found.effects) {
     if (!one.smaller && one.effect.type == effect.effect.type && one.effect.at == effect.effect.at) return one;
   }

@@ -11,7 +11,7 @@
 namespace llmt::report {
 namespace {
 
-std::string telling_line(const robotics::DiscriminatingPose& pose) {
+std::string telling_line(const robotics::TellingPose& pose) {
   std::vector<std::string> joints;
   for (Eigen::Index j = 0; j < pose.joints.size(); ++j) joints.push_back(number(pose.joints(j), 3));
   return fmt::format("    q = ({}) rad, payload {} kg: the explanations differ by {:.4f} mm\n", fmt::join(joints, ", "),
@@ -30,9 +30,9 @@ std::vector<NextPoses> next_poses(const robotics::Discovery& found, const roboti
     if (place == all.end() || effect.rival_effects.front().empty()) continue;
     constexpr int proposed = 3;
     result.push_back({effect_words(effect.effect), rival_words(effect, 0),
-                      robotics::discriminating_poses(
-                          found.improved.robot, static_cast<std::size_t>(place - all.begin()),
-                          effect.rival_effects.front(), data.poses, found.noise_mm, proposed, 1, data.measured)});
+                      robotics::telling_poses(found.improved.robot, static_cast<std::size_t>(place - all.begin()),
+                                              effect.rival_effects.front(), data.poses, found.noise_mm, proposed, 1,
+                                              data.measured)});
   }
   return result;
 }
@@ -46,7 +46,7 @@ std::string next_poses_text(const std::vector<NextPoses>& next) {
       continue;
     }
     text += each.telling.payload_helps ? "measure these, another payload helps\n" : "measure these\n";
-    for (const robotics::DiscriminatingPose& pose : each.telling.poses) text += telling_line(pose);
+    for (const robotics::TellingPose& pose : each.telling.poses) text += telling_line(pose);
   }
   return text;
 }

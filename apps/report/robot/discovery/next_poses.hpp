@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "llmt/robotics/discovery_result.hpp"
-#include "llmt/robotics/discriminating_poses.hpp"
+#include "llmt/robotics/telling_poses.hpp"
 
 namespace llmt::report {
 
@@ -14,7 +14,7 @@ namespace llmt::report {
 struct NextPoses {
   std::string effect;  ///< in words
   std::string rival;   ///< in words
-  robotics::Discrimination telling;
+  robotics::Telling telling;
 };
 
 /// For every confirmed effect that has a rival which measurements can tell apart from it.

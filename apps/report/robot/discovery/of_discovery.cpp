@@ -22,10 +22,10 @@ using robotics::FoundEffect;
 constexpr std::size_t most_shapes = 4;
 
 // The confirmed effects, those of one kind together: "link bending (joint1, joint2)".
-std::vector<std::string> names_of(const Discovery& found, bool confirmed) {
+std::vector<std::string> names_of(const Discovery& found) {
   std::vector<std::pair<std::string, std::vector<std::string>>> kinds;
   for (const FoundEffect& effect : found.effects) {
-    if (effect.confirmed != confirmed) continue;
+    if (!effect.confirmed) continue;
     const std::string kind = effect.title + constants_of(effect);
     const auto same = std::ranges::find(kinds, kind, &std::pair<std::string, std::vector<std::string>>::first);
     if (same == kinds.end()) {
@@ -40,9 +40,7 @@ std::vector<std::string> names_of(const Discovery& found, bool confirmed) {
 }
 
 std::string cause(const Discovery& found) {
-  if (found.headline == robotics::Headline::likely_causes)
-    return fmt::format("Likely causes, none certain: {}", fmt::join(names_of(found, false), "; "));
-  const std::vector<std::string> names = names_of(found, true);
+  const std::vector<std::string> names = names_of(found);
   switch (found.answer) {
     case discovery::Answer::nothing_missing:
       return "Nothing is missing that these poses could show";
@@ -227,10 +225,7 @@ Document discovery_report(const Discovered& of) {
                                      number(found.held_out.floor_mm, 3));
       break;
     case discovery::Answer::unknown:
-      document.answer += fmt::format(
-          ". {} {}.",
-          found.headline == robotics::Headline::likely_causes ? "Adding these takes" : "Free maps in its place take",
-          fall);
+      document.answer += fmt::format(". Free maps in its place take {}.", fall);
       break;
     default:
       document.answer += fmt::format(". Adding this takes {}.", fall);

@@ -22,8 +22,7 @@ namespace llmt::discovery {
 /// A simulation with parameters that it may adjust (those that are free) before anything counts as missing.
 struct Simulation {
   std::vector<Parameter> parameters = {};
-  /// inputs (n x p), values of all parameters -> n x d outputs. find_missing() and corrected() call it on the thread
-  /// that called them, one call at a time, and let through what it throws.
+  /// inputs (n x p), values of all parameters -> n x d outputs.
   std::function<Eigen::MatrixXd(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& values)> predict;
 };
 

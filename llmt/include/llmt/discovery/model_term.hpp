@@ -42,10 +42,9 @@ struct ModelTerm {
   std::vector<std::string> inputs;        ///< what it depends on
   std::vector<std::string> coefficients;  ///< k names
   std::string per = {};  ///< a coefficient is in units of the output by this, "a^2"; empty: in those of the output
-  /// n x k. Called as Simulation::predict is.
-  std::function<Eigen::MatrixXd(const Rows& rows, const Eigen::VectorXd& constants)> columns;
-  std::vector<TermConstant> constants = {};  ///< at most one
-  std::string output = {};                   ///< the output it changes; empty: each output is a place of its own
+  std::function<Eigen::MatrixXd(const Rows& rows, const Eigen::VectorXd& constants)> columns;  ///< n x k
+  std::vector<TermConstant> constants = {};                                                    ///< at most one
+  std::string output = {};     ///< the output it changes; empty: each output is a place of its own
   bool generic = false;        ///< not a cause but a shape: what it explains is "unknown, depends on `inputs`"
   Eigen::VectorXd lower = {};  ///< k plausible limits of the coefficients, or empty: none
   Eigen::VectorXd upper = {};

@@ -27,8 +27,7 @@ struct Parameter {
 };
 
 /// All constraint equations stacked, eq. (4) of Benes et al. 2022: values of all parameters (fixed ones included) -> n
-/// residuals. The number of residuals must not depend on the values. solve() calls it on the thread that called
-/// solve(), one call at a time, and lets through what it throws.
+/// residuals. The number of residuals must not depend on the values.
 using Residual = std::function<Eigen::VectorXd(const Eigen::VectorXd& values)>;
 
 /// Derivatives of the residuals, n x (number of parameters), columns of fixed parameters included (they are not read).

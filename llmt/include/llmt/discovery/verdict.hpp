@@ -52,8 +52,8 @@ struct SearchOptions {
   double false_alarm_rate = 0.003;  ///< of the whole search when nothing is missing
   int null_draws = 300;             ///< of each kind, see search()
   double rival_margin = 6.0;        ///< score difference within which an alternative explains as well
-  /// A family is also a rival if the set with it in the place of a finding explains at least 1 - model_error of the
-  /// explained sum of squares: masses and lengths are not known to better than that.
+  /// A family that explains all but this share of what the explanation explains is a rival too, whatever its score,
+  /// because masses, lengths and formulas are not known more closely.
   double model_error = 0.008;
   /// Share of the evidence by which causes may be worse than shapes and still be named: a shape that contains a cause
   /// explains always a little more.

@@ -1,4 +1,4 @@
-// The problems that solve() refuses.
+// What solve() refuses.
 #pragma once
 
 #include <string>

@@ -20,7 +20,7 @@ std::vector<Rival> rivals_of(const Scoring& scoring, const Set& set, const std::
   const Set rest = without_family(scoring, set, family);
   const double left = scoring.fit(set).left;
   const double explained = scoring.workspace().sum_of_squares() - left;
-  // A share of the squares explained. Columns are good to about a thousandth of that where candidates are linear
+  // Of the squares explained. Columns of candidates are good to about a thousandth of them where candidates are linear
   // only nearly, so what differs by less than three times that is the same.
   constexpr double same = 1e-5;
   std::set<std::string> others;

@@ -1,4 +1,4 @@
-// Properties of every family and every candidate under the best explanation: steps 7 and 8 of search().
+// What the best explanation says of every family and every candidate: steps 7 and 8 of search().
 #pragma once
 
 #include <set>
@@ -29,7 +29,7 @@ std::vector<Refused> refused_beyond_limits(const Scoring& scoring, const Set& se
 LackOfFit lack_of_fit(const Scoring& scoring, const SetFit& fit, const std::vector<Eigen::Index>& repeats,
                       const Eigen::VectorXd& remaining);
 
-/// The sizes from which on every candidate would have been found at this threshold and noise.
+/// What every candidate could have shown at this threshold and noise.
 std::vector<Sensitivity> sensitivities(const Scoring& scoring, double threshold, double noise);
 
 }  // namespace llmt::discovery

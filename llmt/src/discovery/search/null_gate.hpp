@@ -1,4 +1,4 @@
-// The score that chance alone gains.
+// What chance alone gains.
 #pragma once
 
 #include "discovery/search/scoring.hpp"

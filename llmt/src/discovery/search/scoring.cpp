@@ -66,7 +66,7 @@ double Scoring::outlier_cost() const {
          2.0 * std::log(static_cast<double>(workspace_->samples()));
 }
 
-// The cost of choosing the family and `used` of its members.
+// Of choosing the family and `used` of its members.
 double Scoring::family_cost(std::size_t family, double used) const {
   return used > 0.0 ? 2.0 * (std::log(std::max(1.0, families_)) + log_binomial(family_choices_[family], used)) : 0.0;
 }

@@ -35,7 +35,7 @@ class Scoring {
   /// family twice at a location, or has values beyond their limits.
   double score(const Set& set) const;
 
-  /// True if the values are within their limits, up to two standard errors.
+  /// Whether the values are within their limits, up to two standard errors.
   bool within_limits(const SetFit& fit, const Set& set) const;
 
   /// The part of the score that does not depend on how much the set explains.

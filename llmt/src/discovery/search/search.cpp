@@ -103,13 +103,6 @@ Set prune(const Scoring& scoring, Set set, const SearchOptions& options) {
   return set;
 }
 
-Answer answer_of(const std::vector<Finding>& findings, bool shapes_are_material) {
-  if (findings.empty()) return Answer::nothing_missing;
-  if (shapes_are_material) return Answer::unknown;
-  const bool has_rivals = std::ranges::any_of(findings, [](const Finding& finding) { return !finding.rivals.empty(); });
-  return has_rivals ? Answer::indistinguishable : Answer::named;
-}
-
 }  // namespace
 
 Verdict search(const Evidence& evidence, const std::vector<EffectCandidate>& candidates, const SearchOptions& options) {
@@ -120,7 +113,7 @@ Verdict search(const Evidence& evidence, const std::vector<EffectCandidate>& can
   workspace.drop(competing_outliers(full, candidates, options.largest_set, largest));
   Verdict verdict;
   Explained found = choose(Scoring(workspace, candidates), {}, options, verdict.causes_preferred);
-  // The outliers depend on the explanation, and the explanation on the outliers.
+  // Whether a sample fits depends on the explanation, and the other way round.
   for (int round = 0; round < 3; ++round) {
     std::vector<std::size_t> outliers = outliers_given(full, candidates, found.set, largest);
     if (std::set(outliers.begin(), outliers.end()) ==
@@ -160,7 +153,15 @@ Verdict search(const Evidence& evidence, const std::vector<EffectCandidate>& can
   }
   std::ranges::stable_sort(verdict.findings, std::greater<>{}, &Finding::share);
   verdict.refused = refused_beyond_limits(scoring, set, verdict.threshold);
-  verdict.answer = answer_of(verdict.findings, shapes_are_material);
+  if (set.empty()) {
+    verdict.answer = Answer::nothing_missing;
+  } else if (shapes_are_material) {
+    verdict.answer = Answer::unknown;
+  } else {
+    const bool ambiguous =
+        std::ranges::any_of(verdict.findings, [](const Finding& finding) { return !finding.rivals.empty(); });
+    verdict.answer = ambiguous ? Answer::indistinguishable : Answer::named;
+  }
   return verdict;
 }
 

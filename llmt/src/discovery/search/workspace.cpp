@@ -9,7 +9,7 @@
 namespace llmt::discovery {
 
 Eigen::MatrixXd range_basis(const Eigen::MatrixXd& matrix, double tolerance) {
-  // A column that is tiny next to the others is rounding. Scaled up it would be a direction of noise.
+  // What hardly moves anything next to the others is rounding, and scaled up it would be a direction of noise.
   constexpr double nothing = 1e-7;
   const double largest = matrix.cols() > 0 ? matrix.colwise().norm().maxCoeff() : 0.0;
   std::vector<Eigen::Index> moving;

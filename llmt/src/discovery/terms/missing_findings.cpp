@@ -43,35 +43,6 @@ FoundTerm described(const TermModel& model, const PlacedTerm& placed, const Eige
   return found;
 }
 
-std::vector<std::string> sorted_inputs(const FoundTerm& found) {
-  std::vector<std::string> inputs = found.inputs;
-  std::ranges::sort(inputs);
-  return inputs;
-}
-
-// Terms that together may only approximate another function: three or more kinds of one input, or two terms of the
-// same two inputs.
-std::vector<bool> approximations(const std::vector<FoundTerm>& all) {
-  // Terms of one input are counted by kinds, as there may be several steps. A product and a square times the other
-  // input are as much of a power series in two inputs as the terms have.
-  constexpr std::array<std::size_t, 2> too_many = {3, 2};
-  using Place = std::pair<std::vector<std::string>, Eigen::Index>;
-  const auto place_of = [](const FoundTerm& found) { return Place{sorted_inputs(found), found.output_index}; };
-  const auto is_counted = [&](const FoundTerm& found) {
-    return !found.inputs.empty() && found.inputs.size() <= too_many.size();
-  };
-  std::map<Place, std::set<std::string>> kinds;
-  for (const FoundTerm& found : all) {
-    if (!is_counted(found)) continue;
-    kinds[place_of(found)].insert(found.inputs.size() == 1 ? found.family : found.family + " " + found.location);
-  }
-  std::vector<bool> approximate;
-  for (const FoundTerm& found : all) {
-    approximate.push_back(is_counted(found) && kinds[place_of(found)].size() >= too_many[found.inputs.size() - 1]);
-  }
-  return approximate;
-}
-
 }  // namespace
 
 std::string option_label(const TermModel& model, const PlacedTerm& option) {
@@ -87,6 +58,7 @@ void describe_findings(const TermModel& model, const Settled& settled, Missing& 
     for (const FindingTerm& term : finding.terms) {
       FoundTerm found = described(model, settled.fit.placed[next], settled.fit.errors[next]);
       ++next;
+      found.confirmed = finding.confirmed;
       found.share = term.share;
       for (const Rival& rival : finding.rivals) {
         std::string what;
@@ -101,7 +73,7 @@ void describe_findings(const TermModel& model, const Settled& settled, Missing& 
   });
 }
 
-void describe_limits(const Settled& settled, const TermData& data, Missing& missing) {
+void describe_limits(const Settled& settled, const FitData& data, Missing& missing) {
   const double n = static_cast<double>(data.rows.size());
   for (std::size_t a = 0; a < settled.question.options.size(); ++a) {
     const EffectCandidate& candidate = settled.question.candidates[a];
@@ -125,14 +97,42 @@ void describe_limits(const Settled& settled, const TermData& data, Missing& miss
   std::ranges::stable_sort(missing.visible, {}, &VisibleTerm::rms);
 }
 
-std::vector<Structure> structure_beside(const TermModel& model, const TermData& data, const Inputs& inputs,
-                                        const Missing& missing) {
+void doubt_approximations(Missing& missing) {
+  // Of one input by kinds, as there may be several steps. A product and a square times the other input are as much of a
+  // power series in two inputs as the terms have.
+  constexpr std::array<std::size_t, 2> too_many = {3, 2};
+  using Place = std::pair<std::vector<std::string>, Eigen::Index>;
+  const auto place_of = [](const FoundTerm& found) {
+    Place place{found.inputs, found.output_index};
+    std::ranges::sort(place.first);
+    return place;
+  };
+  const auto doubtful = [&](const FoundTerm& found) {
+    return !found.inputs.empty() && found.inputs.size() <= too_many.size();
+  };
+  std::map<Place, std::set<std::string>> kinds;
+  for (const FoundTerm& found : missing.found) {
+    if (!doubtful(found)) continue;
+    kinds[place_of(found)].insert(found.inputs.size() == 1 ? found.family : found.family + " " + found.location);
+  }
+  std::set<std::vector<std::string>> doubted;
+  for (FoundTerm& found : missing.found) {
+    if (!doubtful(found) || kinds[place_of(found)].size() < too_many[found.inputs.size() - 1]) continue;
+    found.confirmed = false;
+    const std::vector<std::string> inputs = place_of(found).first;
+    if (!doubted.insert(inputs).second) continue;
+    missing.notes.push_back(
+        fmt::format("there are many terms of {}: together they may approximate one that was not tried",
+                    fmt::join(inputs, " and ")));
+  }
+}
+
+void look_for_structure(const TermModel& model, const FitData& data, const Inputs& inputs, Missing& missing) {
   constexpr double surprising = 5e-4;
   constexpr double material = 0.05;
   // More than a quarter of what is left: no noise hides what the terms miss, however little of the gap it is.
   constexpr double dominant = 0.25;
   const Eigen::MatrixXd rows = inputs.values(data.rows, Eigen::all);
-  std::vector<Structure> all;
   for (Eigen::Index o = 0; o < data.measured.cols(); ++o) {
     const Eigen::VectorXd left = data.measured.col(o) - missing.corrected.col(o)(data.rows);
     const Eigen::VectorXd gap = data.measured.col(o) - missing.before.col(o)(data.rows);
@@ -144,27 +144,11 @@ std::vector<Structure> structure_beside(const TermModel& model, const TermData& 
     if (common < material * (common + explained) && found.share < dominant) continue;
     Structure structure{model.outputs()[o], {}, p_value, common / (common + explained)};
     for (const Eigen::Index j : found.columns) structure.inputs.push_back(inputs.names[j]);
-    all.push_back(std::move(structure));
+    missing.structure.push_back(structure);
+    for (FoundTerm& term : missing.found) term.confirmed = term.confirmed && term.output_index != o;
   }
-  return all;
-}
-
-void decide(Missing& missing) {
-  const bool is_nothing = missing.verdict.answer == Answer::nothing_missing;
-  missing.answer = is_nothing && !missing.structure.empty() ? Answer::unknown : missing.verdict.answer;
-  const std::vector<bool> approximate = approximations(missing.found);
-  std::set<std::vector<std::string>> noted;
-  for (std::size_t k = 0; k < missing.found.size(); ++k) {
-    FoundTerm& found = missing.found[k];
-    const bool is_beside_structure =
-        std::ranges::find(missing.structure, found.output, &Structure::output) != missing.structure.end();
-    found.confirmed =
-        missing.verdict.answer != Answer::unknown && !found.generic && !approximate[k] && !is_beside_structure;
-    if (!approximate[k] || !noted.insert(sorted_inputs(found)).second) continue;
-    missing.notes.push_back(
-        fmt::format("there are many terms of {}: together they may approximate one that was not tried",
-                    fmt::join(sorted_inputs(found), " and ")));
-  }
+  missing.answer = missing.verdict.answer;
+  if (missing.answer == Answer::nothing_missing && !missing.structure.empty()) missing.answer = Answer::unknown;
 }
 
 }  // namespace llmt::discovery

@@ -1,11 +1,11 @@
-// The outcome of a search in the words of find_missing().
+// What a search found, in the words of find_missing().
 #pragma once
 
 #include "discovery/terms/term_question.hpp"
 
 namespace llmt::discovery {
 
-/// The end of the rounds of search and fit.
+/// Where the rounds of search and fit ended.
 struct Settled {
   TermFit fit;
   Verdict verdict;
@@ -16,21 +16,17 @@ struct Settled {
 /// "wave t (P = 2.3)".
 std::string option_label(const TermModel& model, const PlacedTerm& option);
 
-/// Missing::found, not yet confirmed.
+/// Missing::found.
 void describe_findings(const TermModel& model, const Settled& settled, Missing& missing);
 
 /// Missing::visible and not_testable.
-void describe_limits(const Settled& settled, const TermData& data, Missing& missing);
+void describe_limits(const Settled& settled, const FitData& data, Missing& missing);
 
-/// Deviations that neighbouring rows share, so that they are not noise, as far as they are material.
-std::vector<Structure> structure_beside(const TermModel& model, const TermData& data, const Inputs& inputs,
-                                        const Missing& missing);
+/// Three or more kinds of terms of one input, or two terms of the same two inputs, may only approximate another
+/// function: they are not confirmed.
+void doubt_approximations(Missing& missing);
 
-/// Missing::answer, and which terms are confirmed:
-///
-/// - the answer is that of the search; but "unknown" where the search found nothing and structure is left;
-/// - a term is confirmed if it is a cause, the search found no shapes, no structure is left in its output, and it is
-///   not one of many terms of its inputs, which together may only approximate another function.
-void decide(Missing& missing);
+/// Missing::structure and answer. Deviations that neighbouring rows share are not noise.
+void look_for_structure(const TermModel& model, const FitData& data, const Inputs& inputs, Missing& missing);
 
 }  // namespace llmt::discovery

@@ -1,5 +1,5 @@
 /// \file
-/// The exception for a caller's mistake.
+/// How a caller's mistake is reported.
 #pragma once
 
 #include <stdexcept>

@@ -113,7 +113,7 @@ ModelTerm settling(const InputView& input) {
                        });
 }
 
-// Functions of inputs that change sign: those that saturate on both sides, and friction that falls as the speed grows.
+// Of inputs that change sign: what saturates on both sides, and friction that falls as the speed grows.
 std::vector<ModelTerm> odd_functions(const InputView& input) {
   const std::string& x = input.name;
   const TermConstant width = smooth_constant(input, "c", widths(input, 0.01));

@@ -10,12 +10,11 @@
 #include "discovery/terms/missing_findings.hpp"
 #include "discovery/terms/refuse.hpp"
 #include "discovery/terms/term_question.hpp"
-#include "llmt/discovery/rounds.hpp"
 
 namespace llmt::discovery {
 namespace {
 
-// A search, and the fit after it, count as this share of the work that is left: the number of rounds is not known.
+// Of the work that is left, for a search and for the fit after it: how many rounds there will be is not known.
 constexpr double share_of_half_a_round = 0.2;
 
 constexpr double unknown_number = std::numeric_limits<double>::quiet_NaN();
@@ -47,7 +46,7 @@ void check(const Simulation& simulation, const Inputs& inputs, const MeasuredOut
 }
 
 // Root mean square of what is left of each output, in its own unit.
-Eigen::VectorXd scatter(const TermModel& model, const TermData& data, const TermFit& fit) {
+Eigen::VectorXd scatter(const TermModel& model, const FitData& data, const TermFit& fit) {
   const Eigen::MatrixXd predicted = model.predict(fit.parameters, fit.placed);
   Eigen::VectorXd sigma(data.measured.cols());
   for (Eigen::Index o = 0; o < sigma.size(); ++o) {
@@ -69,36 +68,37 @@ std::vector<PlacedTerm> found_terms(const TermQuestion& question, const Verdict&
   return found;
 }
 
-RoundSummary summary_of(const Settled& settled) {
-  RoundSummary summary;
-  for (const PlacedTerm& placed : settled.fit.placed) {
-    summary.names.insert(fmt::format("term {} on output {}", placed.term, placed.output));
-  }
-  summary.outliers.insert(settled.verdict.outliers.begin(), settled.verdict.outliers.end());
-  return summary;
+using Key = std::vector<std::pair<std::size_t, Eigen::Index>>;
+
+Key key_of(const std::vector<PlacedTerm>& placed, const std::vector<std::size_t>& outliers) {
+  Key key;
+  for (const PlacedTerm& term : placed) key.emplace_back(term.term, term.output);
+  for (const std::size_t sample : outliers) key.emplace_back(sample, -1);
+  std::ranges::sort(key);
+  return key;
 }
 
-// The weights of the outputs follow what each round leaves of them.
-Settled search_until_settled(const TermModel& model, TermData& data, const std::vector<Eigen::Index>& repeats,
+// One search after the other until nothing changes.
+Settled search_until_settled(const TermModel& model, FitData& data, const std::vector<Eigen::Index>& repeats,
                              const TermFit& baseline, const MissingOptions& options, Work& work) {
   Settled settled;
   settled.fit = baseline;
-  until_settled({.most = options.rounds}, {}, [&](int round) {
-    if (round > 0 && data.sigma.size() > 1) {
-      data.sigma = scatter(model, without_samples(data, settled.verdict.outliers), settled.fit);
-    }
-    work.begin(fmt::format("searching, round {}", ++settled.rounds));
+  while (settled.rounds < options.rounds) {
+    work.begin(fmt::format("searching, round {}", settled.rounds + 1));
+    const Key before = key_of(settled.fit.placed, settled.verdict.outliers);
     settled.question = ask(model, data, settled.fit, repeats, settled.verdict.outliers);
     settled.verdict = search(settled.question.evidence, settled.question.candidates, options.search);
     work.did(share_of_half_a_round * work.left());
-    const TermData kept = without_samples(data, settled.verdict.outliers);
+    ++settled.rounds;
+    const FitData kept = without_samples(data, settled.verdict.outliers);
     settled.fit = fit_terms(model, kept, settled.fit.parameters, found_terms(settled.question, settled.verdict));
     if (retry_constants(model, kept, settled.fit)) {
       settled.fit = fit_terms(model, kept, settled.fit.parameters, settled.fit.placed);
     }
     work.did(share_of_half_a_round * work.left());
-    return summary_of(settled);
-  });
+    if (key_of(settled.fit.placed, settled.verdict.outliers) == before) break;
+    if (data.sigma.size() > 1 && settled.rounds < options.rounds) data.sigma = scatter(model, kept, settled.fit);
+  }
   set_trial_errors(model, without_samples(data, settled.verdict.outliers), settled.fit);
   return settled;
 }
@@ -148,7 +148,7 @@ Missing find_missing(const Simulation& simulation, const Inputs& inputs, const M
   const TermModel model(simulation, inputs, measured.names, terms);
   const RowSplit split = split_rows(inputs, options);
   const Eigen::Index d = measured.values.cols();
-  TermData data{split.searched, measured.values(split.searched, Eigen::all), Eigen::VectorXd::Ones(d)};
+  FitData data{split.searched, measured.values(split.searched, Eigen::all), Eigen::VectorXd::Ones(d)};
   const auto free = std::ranges::count_if(simulation.parameters, &Parameter::free);
   constexpr Eigen::Index fewest = 10;
   if (std::ssize(data.rows) * d < fewest + 2 * free) {
@@ -171,6 +171,7 @@ Missing find_missing(const Simulation& simulation, const Inputs& inputs, const M
   for (const PlacedTerm& option : settled.question.options) missing.candidates.push_back(option_label(model, option));
   describe_findings(model, settled, missing);
   describe_limits(settled, data, missing);
+  doubt_approximations(missing);
   missing.parameters = simulation.parameters;
   for (std::size_t k = 0; k < missing.parameters.size(); ++k) {
     missing.parameters[k].value = settled.fit.parameters(k);
@@ -184,8 +185,7 @@ Missing find_missing(const Simulation& simulation, const Inputs& inputs, const M
   }
   missing.before = model.predict(baseline.parameters, {});
   missing.corrected = model.predict(settled.fit.parameters, settled.fit.placed);
-  missing.structure = structure_beside(model, without_samples(data, settled.verdict.outliers), inputs, missing);
-  decide(missing);
+  look_for_structure(model, without_samples(data, settled.verdict.outliers), inputs, missing);
   missing.floor_from_repeats = settled.verdict.lack_of_fit.has_enough_repeats();
   const double noise = missing.floor_from_repeats ? settled.verdict.lack_of_fit.noise : settled.verdict.noise;
   for (Eigen::Index o = 0; o < d; ++o) {

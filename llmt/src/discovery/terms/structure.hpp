@@ -1,4 +1,4 @@
-// Tests of residuals that should be noise: do they still depend on inputs?
+// Whether residuals that should be noise still depend on something.
 #pragma once
 
 #include <Eigen/Core>

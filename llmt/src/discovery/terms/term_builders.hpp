@@ -1,4 +1,4 @@
-// The parts that the library's terms are made of.
+// How the library's terms are put together.
 #pragma once
 
 #include <functional>

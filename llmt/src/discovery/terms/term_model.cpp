@@ -20,7 +20,7 @@ Eigen::Index first_bad_row(const Eigen::MatrixXd& values) {
   return row;
 }
 
-// The places of the parameters of the joint fit.
+// Where the parameters of the joint fit belong.
 struct Layout {
   std::vector<Parameter> parameters;
   std::size_t own = 0;
@@ -28,7 +28,7 @@ struct Layout {
 
 bool constant_is_fitted(const ModelTerm& term) { return !term.constants.empty() && term.constants.front().smooth; }
 
-Layout layout_of(const TermModel& model, const TermData& data, const Eigen::VectorXd& start,
+Layout layout_of(const TermModel& model, const FitData& data, const Eigen::VectorXd& start,
                  const std::vector<PlacedTerm>& placed, bool constants_are_free) {
   Layout layout{model.parameters(), model.parameters().size()};
   for (std::size_t k = 0; k < layout.own; ++k) layout.parameters[k].value = start(k);
@@ -147,7 +147,7 @@ std::string TermModel::label(const PlacedTerm& placed) const {
   return text;
 }
 
-Eigen::VectorXd scaled_residuals(const TermModel& model, const TermData& data, const Eigen::VectorXd& parameters,
+Eigen::VectorXd scaled_residuals(const TermModel& model, const FitData& data, const Eigen::VectorXd& parameters,
                                  const std::vector<PlacedTerm>& placed) {
   const Eigen::MatrixXd predicted = model.predict(parameters, placed);
   const Eigen::Index d = data.measured.cols();
@@ -159,7 +159,7 @@ Eigen::VectorXd scaled_residuals(const TermModel& model, const TermData& data, c
   return residuals;
 }
 
-Eigen::MatrixXd baseline_jacobian(const TermModel& model, const TermData& data, const Eigen::VectorXd& parameters,
+Eigen::MatrixXd baseline_jacobian(const TermModel& model, const FitData& data, const Eigen::VectorXd& parameters,
                                   const std::vector<PlacedTerm>& placed) {
   LeastSquaresProblem problem;
   problem.parameters = model.parameters();
@@ -172,7 +172,7 @@ Eigen::MatrixXd baseline_jacobian(const TermModel& model, const TermData& data, 
   return -difference_jacobian(problem, parameters)(Eigen::all, free);
 }
 
-Eigen::MatrixXd stacked_signature(const TermModel& model, const TermData& data, const PlacedTerm& placed,
+Eigen::MatrixXd stacked_signature(const TermModel& model, const FitData& data, const PlacedTerm& placed,
                                   const Eigen::MatrixXd& simulated) {
   const Eigen::MatrixXd columns = model.columns(placed, simulated);
   const Eigen::Index bad = first_bad_row(columns);
@@ -186,7 +186,7 @@ Eigen::MatrixXd stacked_signature(const TermModel& model, const TermData& data, 
   return signature;
 }
 
-TermFit fit_terms(const TermModel& model, const TermData& data, const Eigen::VectorXd& start,
+TermFit fit_terms(const TermModel& model, const FitData& data, const Eigen::VectorXd& start,
                   const std::vector<PlacedTerm>& placed) {
   const Eigen::MatrixXd simulated = model.simulated(start);
   const Eigen::Index bad = first_bad_row(simulated);

@@ -52,7 +52,7 @@ class TermModel {
 };
 
 /// Rows that are fitted, measured outputs there, and how much an output's deviation counts.
-struct TermData {
+struct FitData {
   std::vector<Eigen::Index> rows;
   Eigen::MatrixXd measured;  // rows x d
   Eigen::VectorXd sigma;     // d
@@ -66,22 +66,22 @@ struct TermFit {
   std::vector<Eigen::VectorXd> errors;  // of the coefficients, then the constants, of each placed term
 };
 
-TermFit fit_terms(const TermModel& model, const TermData& data, const Eigen::VectorXd& start,
+TermFit fit_terms(const TermModel& model, const FitData& data, const Eigen::VectorXd& start,
                   const std::vector<PlacedTerm>& placed);
 
 /// (measured - predicted) / sigma, stacked row by row.
-Eigen::VectorXd scaled_residuals(const TermModel& model, const TermData& data, const Eigen::VectorXd& parameters,
+Eigen::VectorXd scaled_residuals(const TermModel& model, const FitData& data, const Eigen::VectorXd& parameters,
                                  const std::vector<PlacedTerm>& placed);
 
 /// Derivatives of -scaled_residuals() by the free parameters.
-Eigen::MatrixXd baseline_jacobian(const TermModel& model, const TermData& data, const Eigen::VectorXd& parameters,
+Eigen::MatrixXd baseline_jacobian(const TermModel& model, const FitData& data, const Eigen::VectorXd& parameters,
                                   const std::vector<PlacedTerm>& placed);
 
 /// Columns of a placed term, stacked like the residuals.
-Eigen::MatrixXd stacked_signature(const TermModel& model, const TermData& data, const PlacedTerm& placed,
+Eigen::MatrixXd stacked_signature(const TermModel& model, const FitData& data, const PlacedTerm& placed,
                                   const Eigen::MatrixXd& simulated);
 
-/// Residuals and nuisance that constants of terms are tried on.
+/// What constants of terms are tried on.
 struct TrialGround {
   Eigen::VectorXd residuals;  // stacked
   Eigen::MatrixXd nuisance;   // stacked; what may explain residuals besides the term
@@ -89,13 +89,13 @@ struct TrialGround {
 
 /// The best constants of a term on one output, each with the prior cost of its choice; constants within two steps of
 /// those in `taken` do not count.
-std::vector<PlacedTerm> best_constants(const TermModel& model, const TermData& data, const TrialGround& ground,
+std::vector<PlacedTerm> best_constants(const TermModel& model, const FitData& data, const TrialGround& ground,
                                        std::size_t term, Eigen::Index output, const Eigen::MatrixXd& simulated,
                                        const std::vector<PlacedTerm>& taken);
 
 /// Distance from a constant to the next value tried at which the sum of squares is larger by more than the variance of
 /// what is left.
-double trial_error(const TermModel& model, const TermData& data, const TrialGround& ground, const PlacedTerm& placed,
+double trial_error(const TermModel& model, const FitData& data, const TrialGround& ground, const PlacedTerm& placed,
                    const Eigen::MatrixXd& simulated);
 
 /// The distance between the values tried around `value`.

@@ -31,7 +31,7 @@ bool placed_already(const std::vector<PlacedTerm>& placed, std::size_t term, Eig
 }
 
 // `slot`: of equal terms with different constants, those in the same slot exclude each other.
-EffectCandidate candidate_of(const TermModel& model, const TermData& data, const PlacedTerm& option,
+EffectCandidate candidate_of(const TermModel& model, const FitData& data, const PlacedTerm& option,
                              const Eigen::MatrixXd& simulated, std::size_t slot) {
   const ModelTerm& term = model.terms()[option.term];
   EffectCandidate candidate;
@@ -65,8 +65,8 @@ Eigen::MatrixXd beside(const Eigen::MatrixXd& left, const Eigen::MatrixXd& right
   return both;
 }
 
-// The residuals without term t of the fit, and everything else that may explain them.
-TrialGround ground_without(const TermModel& model, const TermData& data, const TermFit& fit, std::size_t t) {
+// What is left if term t of the fit is taken away, and everything else that may explain it.
+TrialGround ground_without(const TermModel& model, const FitData& data, const TermFit& fit, std::size_t t) {
   const Eigen::MatrixXd simulated = model.simulated(fit.parameters);
   const PlacedTerm& placed = fit.placed[t];
   TrialGround ground{scaled_residuals(model, data, fit.parameters, fit.placed),
@@ -105,17 +105,17 @@ RowSplit split_rows(const Inputs& inputs, const MissingOptions& options) {
   return split;
 }
 
-TermData without_samples(const TermData& data, const std::vector<std::size_t>& left_out) {
+FitData without_samples(const FitData& data, const std::vector<std::size_t>& left_out) {
   std::vector<Eigen::Index> kept;
   for (std::size_t i = 0; i < data.rows.size(); ++i) {
     if (std::ranges::find(left_out, i) == left_out.end()) kept.push_back(i);
   }
-  TermData result{{}, data.measured(kept, Eigen::all), data.sigma};
+  FitData result{{}, data.measured(kept, Eigen::all), data.sigma};
   for (const Eigen::Index i : kept) result.rows.push_back(data.rows[i]);
   return result;
 }
 
-TermQuestion ask(const TermModel& model, const TermData& data, const TermFit& fit,
+TermQuestion ask(const TermModel& model, const FitData& data, const TermFit& fit,
                  const std::vector<Eigen::Index>& repeats, const std::vector<std::size_t>& outliers) {
   TermQuestion question;
   const Eigen::MatrixXd simulated = model.simulated(fit.parameters);
@@ -153,7 +153,7 @@ TermQuestion ask(const TermModel& model, const TermData& data, const TermFit& fi
   return question;
 }
 
-bool retry_constants(const TermModel& model, const TermData& data, TermFit& fit) {
+bool retry_constants(const TermModel& model, const FitData& data, TermFit& fit) {
   bool changed = false;
   for (std::size_t t = 0; t < fit.placed.size(); ++t) {
     PlacedTerm& placed = fit.placed[t];
@@ -173,7 +173,7 @@ bool retry_constants(const TermModel& model, const TermData& data, TermFit& fit)
   return changed;
 }
 
-void set_trial_errors(const TermModel& model, const TermData& data, TermFit& fit) {
+void set_trial_errors(const TermModel& model, const FitData& data, TermFit& fit) {
   for (std::size_t t = 0; t < fit.placed.size(); ++t) {
     const PlacedTerm& placed = fit.placed[t];
     if (placed.constants.size() == 0 || model.terms()[placed.term].constants.front().smooth) continue;

@@ -9,10 +9,10 @@
 namespace llmt::discovery {
 namespace {
 
-// The sum of squares that a term explains at one constant, beyond the nuisance.
+// What a term explains of residuals at one constant, beyond the nuisance.
 class Trials {
  public:
-  Trials(const TermModel& model, const TermData& data, const TrialGround& ground, PlacedTerm placed,
+  Trials(const TermModel& model, const FitData& data, const TrialGround& ground, PlacedTerm placed,
          const Eigen::MatrixXd& simulated)
       : model_(&model), data_(&data), placed_(std::move(placed)), simulated_(&simulated) {
     const Eigen::Index d = data.measured.cols();
@@ -38,7 +38,7 @@ class Trials {
     if (!(norms.minCoeff() > 0.0)) return 0.0;
     columns *= norms.cwiseInverse().asDiagonal();
     columns -= basis_ * (basis_.transpose() * columns);
-    // A column that hardly differs from the nuisance explains only by chance.
+    // What hardly differs from the nuisance explains only by chance.
     constexpr double outside = 0.02;
     const Eigen::LLT<Eigen::MatrixXd> factor(columns.transpose() * columns);
     const Eigen::MatrixXd lower = factor.matrixL();
@@ -55,7 +55,7 @@ class Trials {
 
  private:
   const TermModel* model_;
-  const TermData* data_;
+  const FitData* data_;
   PlacedTerm placed_;
   const Eigen::MatrixXd* simulated_;
   Eigen::MatrixXd basis_;
@@ -99,7 +99,7 @@ double spacing(const std::vector<double>& tried, double value) {
   return std::max(1e-300, tried[k] - tried[k - 1]);
 }
 
-double trial_error(const TermModel& model, const TermData& data, const TrialGround& ground, const PlacedTerm& placed,
+double trial_error(const TermModel& model, const FitData& data, const TrialGround& ground, const PlacedTerm& placed,
                    const Eigen::MatrixXd& simulated) {
   const std::vector<double>& tried = model.terms()[placed.term].constants.front().tried;
   Trials trials(model, data, ground, placed, simulated);
@@ -118,7 +118,7 @@ double trial_error(const TermModel& model, const TermData& data, const TrialGrou
   return error;
 }
 
-std::vector<PlacedTerm> best_constants(const TermModel& model, const TermData& data, const TrialGround& ground,
+std::vector<PlacedTerm> best_constants(const TermModel& model, const FitData& data, const TrialGround& ground,
                                        std::size_t term, Eigen::Index output, const Eigen::MatrixXd& simulated,
                                        const std::vector<PlacedTerm>& taken) {
   const ModelTerm& own = model.terms()[term];

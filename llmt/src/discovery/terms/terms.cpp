@@ -89,7 +89,7 @@ ModelTerm product(const InputView& a, const InputView& b) { return power_product
 ModelTerm square_product(const InputView& a, const InputView& b) { return power_product("square_product", a, 2, b); }
 
 std::vector<ModelTerm> products_of(const std::vector<InputView>& inputs) {
-  // With more inputs the choice among their squares times others would cost every term evidence.
+  // Of more inputs the choice among their squares by others would cost every term evidence.
   constexpr std::size_t most = 8;
   std::vector<ModelTerm> terms;
   for (std::size_t a = 0; a < inputs.size(); ++a) {

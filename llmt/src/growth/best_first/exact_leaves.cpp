@@ -7,9 +7,9 @@
 #include "base/parallel.hpp"
 #include "growth/best_first/division.hpp"
 #include "growth/best_first/exact_search.hpp"
+#include "model/imputed.hpp"
+#include "model/leaf_validities.hpp"
 #include "numerics/node_fit.hpp"
-#include "partition/imputed.hpp"
-#include "partition/leaf_validities.hpp"
 
 namespace llmt {
 namespace {

@@ -7,8 +7,8 @@
 #include "data/missing.hpp"
 #include "growth/hilomot/category_cut.hpp"
 #include "growth/hilomot/gate_search.hpp"
+#include "model/imputed.hpp"
 #include "numerics/node_fit.hpp"
-#include "partition/imputed.hpp"
 
 namespace llmt {
 namespace {

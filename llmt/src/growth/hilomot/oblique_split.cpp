@@ -7,8 +7,8 @@
 #include <numeric>
 #include <vector>
 
+#include "model/logistic.hpp"
 #include "numerics/dense.hpp"
-#include "partition/logistic.hpp"
 
 namespace llmt {
 namespace {

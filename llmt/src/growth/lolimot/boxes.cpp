@@ -7,8 +7,8 @@
 #include "constraints/signs.hpp"
 #include "data/missing.hpp"
 #include "growth/search/split_search.hpp"
+#include "model/imputed.hpp"
 #include "numerics/node_fit.hpp"
-#include "partition/imputed.hpp"
 
 namespace llmt {
 namespace {

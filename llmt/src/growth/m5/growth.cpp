@@ -8,8 +8,8 @@
 #include "growth/gain_order.hpp"
 #include "growth/m5/pruning.hpp"
 #include "growth/m5/tree.hpp"
+#include "model/imputed.hpp"
 #include "numerics/node_fit.hpp"
-#include "partition/imputed.hpp"
 
 namespace llmt {
 namespace {

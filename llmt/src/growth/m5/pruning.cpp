@@ -5,7 +5,7 @@
 
 #include "data/missing.hpp"
 #include "growth/m5/model.hpp"
-#include "partition/imputed.hpp"
+#include "model/imputed.hpp"
 
 namespace llmt {
 namespace {

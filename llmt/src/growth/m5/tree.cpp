@@ -8,7 +8,7 @@
 
 #include "base/count.hpp"
 #include "growth/missing_left.hpp"
-#include "partition/leaf_validities.hpp"
+#include "model/leaf_validities.hpp"
 
 namespace llmt {
 namespace {

@@ -73,12 +73,12 @@ struct CalibrationReport {
   CorrectedRobot best() const;
 };
 
-/// Likely mistakes in description or measurements, which are no errors of the robot, in sentences: poses beyond the
-/// joint limits of the description; a mean error of more than a fiftieth of the arm's length, as wrong units, signs,
-/// zeros or another robot give, before calibration or even after it, with the units that would fit; too few poses for
-/// the parameters; no gain on poses left out. Empty: nothing looks wrong.
-std::vector<std::string> input_mistakes(const Robot& robot, const Measurements& measurements,
-                                        const CalibrationReport& report);
+/// What looks like a mistake rather than like an error of the robot, in sentences: poses beyond the joint limits of the
+/// description; a mean error of more than a fiftieth of the arm's length, as wrong units, signs, zeros or another robot
+/// give, before calibration or even after it, with the units that would fit; too few poses for the parameters; no gain
+/// on poses left out. Empty: nothing looks wrong.
+std::vector<std::string> suspicions(const Robot& robot, const Measurements& measurements,
+                                    const CalibrationReport& report);
 
 /// Names the readings, at most a twentieth of all (or three, of 24 or more), that lie more than eight times as far off
 /// as the median and make a quarter of the squared error or more, by their lines; empty if there are none. Where the

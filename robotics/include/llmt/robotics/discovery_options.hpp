@@ -1,5 +1,5 @@
 /// \file
-/// The options of a discovery.
+/// What a discovery looks for, and how.
 ///
 ///     DiscoveryOptions options;
 ///     options.held_out_share = 0.3;

@@ -1,5 +1,5 @@
 /// \file
-/// The result of a discovery.
+/// What a discovery found.
 ///
 ///     const Discovery found = discover(robot, measured);
 ///     const bool is_named = found.answer == llmt::discovery::Answer::named;
@@ -16,7 +16,7 @@
 
 namespace llmt::robotics {
 
-/// The appearance of an effect without a name.
+/// What an unknown effect looks like.
 struct Shape {
   std::string acts_on;                  ///< "joint2", "tool", "base"
   std::vector<std::string> depends_on;  ///< "q2", "temp_C"
@@ -60,7 +60,7 @@ struct BeyondPlausible {
   double limit = 0.0;
 };
 
-/// The parts of the workspace in which the calibrated robot is wrong.
+/// Where the gap is.
 struct GapMap {
   struct Region {
     std::string conditions;  ///< "q2 > 35 deg and payload_kg > 5"
@@ -91,26 +91,11 @@ struct HeldOut {
   Eigen::Index poses = 0;
 };
 
-/// The answer in the words of a page for people. Answer, headline and FoundEffect::confirmed come from one table
-/// (docs/discovery.md, "The answer").
-enum class Headline {
-  nothing_missing,
-  named,
-  named_with_rivals,      ///< other causes explain the data as well
-  likely_causes,          ///< names explain what is missing, but none is confirmed
-  gross_errors,           ///< too many measurements fit nothing: neither an effect nor its absence can be told
-  structured_residuals,   ///< no candidate explains the residuals, but they are not an instrument's noise
-  named_in_part,          ///< beside a confirmed name something without a name is missing
-  likely_causes_in_part,  ///< names, none of them confirmed, beside something without a name
-  unknown,                ///< something without a name is missing
-};
-
 struct Discovery {
   discovery::Answer answer = discovery::Answer::nothing_missing;
-  Headline headline = Headline::nothing_missing;
   std::vector<FoundEffect> effects;
-  /// Shapes of the part that the catalogue does not explain. Kind "noise": no candidate explains it, but no instrument
-  /// scatters like that. Kind "outliers": more measurements fit nothing than can be told from an effect.
+  /// What the catalogue does not explain. A shape of kind "noise": no candidate explains it, but it is not what an
+  /// instrument scatters; "outliers": more measurements fit nothing than can be told from an effect.
   std::vector<FoundShape> unknown;
   std::vector<FoundShape> more;                   ///< shapes that are left beside effects that were named
   std::vector<BeyondPlausible> beyond_plausible;  ///< one for each family

@@ -7,7 +7,6 @@
 
 #include <Eigen/Core>
 #include <functional>
-#include <map>
 #include <span>
 #include <string>
 #include <vector>
@@ -44,7 +43,6 @@ struct EffectParameter {
   double lower = 0.0;     ///< plausible range on real arms, sign included
   double upper = 0.0;
   bool list = false;                ///< stands for all values of the effect; then it is the only parameter of its type
-  bool each_body = false;           ///< a list of three values, along x, y and z, for each body from the joint's on
   std::string prismatic_unit = {};  ///< at a prismatic joint, where it differs; sizes in mm are 1000 times larger
   std::string prismatic_key = {};
 };
@@ -73,7 +71,7 @@ struct Formula {
   std::vector<FormulaTerm> terms;
 };
 
-/// Properties of an arm in a pose that `apply` depends on, besides joint values and columns: derivatives follow them.
+/// What of an arm in a pose `apply` depends on, besides joint values and columns: what derivatives have to follow.
 enum class Senses {
   nothing,
   torques,  ///< gravity's torque about its joint (force along it), or about the joints that a formula names
@@ -82,63 +80,6 @@ enum class Senses {
 
 /// What an effect is attached to.
 enum class EffectPlace { joint, link, robot };
-
-/// The quantity that the size of an effect follows. Discovery decides by it which effects may be mistaken for parts of
-/// one another, and how it looks for a constant.
-enum class Nature {
-  other,
-  weight,     ///< the weight of the arm and its payload
-  slow,       ///< one joint's value, with at most two periods a turn: the torque of gravity often does the same
-  wave,       ///< one joint's value, with many periods a turn: their number is the only constant, and is scanned for
-  map,        ///< one joint's value in any way: a table of errors without a cause, which calibration leaves as it is
-  time,       ///< time or temperature, which change slowly over a session
-  jump,       ///< time, by a jump: its moment is the only constant, and is scanned for
-  instrument  ///< angles and distances as the instrument at the origin of the measurements sees them
-};
-
-/// An arm and its measured poses, as discovery looks at them before it tries an effect.
-struct TrialContext {
-  const Chain& chain;
-  const Eigen::MatrixXd& joints;                             ///< n x J: rad, mm for prismatic joints
-  const std::map<std::string, Eigen::VectorXd>& covariates;  ///< by column name, n values each
-  const Eigen::MatrixXd& loads;  ///< n x J: gravity's torque about each joint, N m; force along a prismatic joint, N
-};
-
-/// How discovery tries effects of a type. `index` is the joint or link, 0 for the whole robot. A function that is empty
-/// stands for the usual.
-struct EffectTrial {
-  /// Constants to try, a hypothesis for each set of them. Usual: EffectConstant::usual.
-  std::function<std::vector<std::vector<double>>(const TrialContext&, std::size_t index)> constants = {};
-  /// Whether to try it there. Usual: yes.
-  std::function<bool(const TrialContext&, std::size_t index)> is_worth_it = {};
-  /// The part of its family's cause that it stands for there, e.g. "payload": another effect of the family may then
-  /// stand beside it. Usual: "", the whole cause.
-  std::function<std::string(const TrialContext&, std::size_t index)> part = {};
-  /// Narrows the plausible range of the values to what these poses allow. Usual: EffectParameter::lower and upper.
-  std::function<void(const TrialContext&, std::span<double> lower, std::span<double> upper)> narrow = {};
-  bool fits_constant = false;  ///< the first constant, once it was chosen among those tried, is fitted with the values
-};
-
-/// The joint that an effect is at, as exported C source spells it.
-struct CJoint {
-  std::size_t index = 0;  ///< counted from 0
-  bool is_prismatic = false;
-  std::string q = {};                     ///< its value, rad (mm)
-  std::string torque = {};                ///< gravity's torque about it, N m (force along it, N)
-  std::vector<std::string> columns = {};  ///< values of EffectType::columns, in their order
-};
-
-/// How effects of a type are exported as C source, see robot_c_source.hpp.
-struct EffectInC {
-  /// An expression of C99 for what is added to the joint's value, rad (mm). Empty if the type is not exported.
-  std::function<std::string(const CJoint&, std::span<const double> values, std::span<const double> constants)>
-      expression = {};
-  /// Functions that the expression calls, in an order in which C can read them; "@" stands for the name of the export.
-  /// One of several effects is written once.
-  std::vector<std::string> functions = {};
-  /// Why there is no expression, if the place of the type does not say so: "it tilts the axis of a joint".
-  std::string refusal = {};
-};
 
 /// A kind of effect. Values of 0 mean "not there" for every parameter that is estimated.
 struct EffectType {
@@ -160,19 +101,17 @@ struct EffectType {
   /// Changes what the effects are evaluated with (payload, gravity) before loads are summed and anything is applied.
   std::function<void(PoseContext&, std::span<const double> values)> adjust = {};
   Senses senses = Senses::nothing;
-  Nature nature = Nature::other;
-  bool scales_with_mass = false;  ///< values are inversely proportional to masses and share their relative uncertainty
-  bool elastic = false;           ///< deforms under the arm's weight: the loads are those of the deformed arm
-  bool linear = true;             ///< `apply` is linear in the values
-  bool prismatic = true;          ///< may sit at a prismatic joint
-  bool of_measuring = false;      ///< an error of the instrument or its session, not of the arm
-  bool has_formula = false;       ///< its values are coefficients of the user's expressions, Effect::formula
-  bool searched = true;           ///< discovery looks for it; false for reductions that are kept for comparison
-  std::string note = {};          ///< where the plausible range is from
+  bool weighted = false;      ///< values are inversely proportional to the masses and share their relative uncertainty
+  bool elastic = false;       ///< deforms under the arm's weight: the loads are those of the deformed arm
+  bool linear = true;         ///< `apply` is linear in the values
+  bool prismatic = true;      ///< may sit at a prismatic joint
+  bool of_measuring = false;  ///< an error of the instrument or its session, not of the arm
+  bool searched = true;       ///< discovery looks for it; false for reductions that are kept for comparison
+  std::string note = {};      ///< where the plausible range is from
+  /// For a list parameter: number of values of an effect at `index`; empty function or 0: any number.
+  std::function<std::size_t(const Chain&, std::size_t index)> count = {};
   /// Why an effect is refused that has the right numbers of values and constants, or nothing.
   std::function<std::string(const Chain&, std::size_t index, std::span<const double> constants)> refusal = {};
-  EffectTrial trial = {};
-  EffectInC in_c = {};
   /// Terms of a user's own effect, one for each parameter; "{}" stands for the number of the joint. Such a type has no
   /// `apply`; make_effect() makes an effect of type "formula" from it.
   std::vector<FormulaTerm> terms = {};

@@ -25,9 +25,6 @@ const std::vector<EffectType>& effect_types();
 /// Throws std::invalid_argument listing the known names if there is none of that name.
 const EffectType& effect_type(std::string_view name);
 
-/// EffectType::nature of the effect's type.
-Nature nature_of(const Effect& effect);
-
 /// Index of the joint or link that an effect is at; 0 for the whole robot. Throws std::invalid_argument on an unknown
 /// type, an unknown joint, wrong numbers of values or constants, constants that are out of range, or a place that does
 /// not suit the effect, see suits().

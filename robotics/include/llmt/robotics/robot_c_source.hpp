@@ -28,9 +28,9 @@ std::vector<std::string> c_conditions(const Robot& robot);
 /// times. It is the step of compensate() without damping; joints that a target leaves free change as little as possible
 /// in each step. No memory is allocated, and the time is bounded.
 ///
-/// Effects that change a joint's value are exported: those whose row has an expression, EffectType::in_c. Throws
-/// std::invalid_argument with the first effect that has none and the reason, and if `name` is no identifier of C of at
-/// most 26 characters.
+/// Effects that act on a joint's value are exported: gain, eccentricity, transmission error, joint maps, springs,
+/// coupling, compliance under gravity, backlash, hysteresis. Throws std::invalid_argument naming the first effect that
+/// is none of them, and if `name` is no identifier of C of at most 26 characters.
 CSource to_c(const CorrectedRobot& robot, const std::string& name, const std::string& header_name);
 
 }  // namespace llmt::robotics

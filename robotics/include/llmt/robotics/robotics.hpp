@@ -18,7 +18,6 @@
 #include "llmt/robotics/discovery.hpp"
 #include "llmt/robotics/discovery_options.hpp"
 #include "llmt/robotics/discovery_result.hpp"
-#include "llmt/robotics/discriminating_poses.hpp"
 #include "llmt/robotics/effect_type.hpp"
 #include "llmt/robotics/effects.hpp"
 #include "llmt/robotics/kinematics.hpp"
@@ -35,4 +34,5 @@
 #include "llmt/robotics/robot_file.hpp"
 #include "llmt/robotics/robot_types.hpp"
 #include "llmt/robotics/simulation.hpp"
+#include "llmt/robotics/telling_poses.hpp"
 #include "llmt/robotics/urdf.hpp"

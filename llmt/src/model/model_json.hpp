@@ -1,0 +1,28 @@
+/// \file
+/// A model as a JSON value: docs/file-formats.md.
+#pragma once
+
+#include "llmt/model.hpp"
+#include "model/json_reader.hpp"
+
+namespace llmt {
+
+/// The format of model files, as their members "format" and "version" say.
+inline constexpr const char* model_format_name = "llmt-model";
+inline constexpr int model_format_version = 2;
+/// Of a file with an output_range, which programs that know version 2 alone would ignore.
+inline constexpr int model_format_version_with_range = 3;
+/// Of a file with codes, which earlier programs would take for positions.
+inline constexpr int model_format_version_with_codes = 4;
+
+/// The value that to_json() writes.
+Json json_of(const Model& model);
+
+/// The text of a value, as model files have it. Throws std::runtime_error if a name is not valid UTF-8.
+std::string model_text(const Json& json);
+
+/// The model in a value, whatever other members it has. Throws std::runtime_error with the way to the part that cannot
+/// be accepted.
+Model model_from(const JsonReader& json);
+
+}  // namespace llmt

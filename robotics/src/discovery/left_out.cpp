@@ -1,0 +1,53 @@
+#include "discovery/left_out.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/QR>
+#include <algorithm>
+
+#include "calibration/free_parameters.hpp"
+#include "discovery/pose_split.hpp"
+
+namespace llmt::robotics {
+
+Eigen::VectorXd left_out(const Eigen::MatrixXd& used, const Eigen::VectorXd& errors, Eigen::Index d) {
+  Eigen::VectorXd lengths(errors.size() / d);
+  for (Eigen::Index i = 0; i < lengths.size(); ++i) {
+    const auto columns = used.middleCols(i * d, d);
+    Eigen::MatrixXd own = Eigen::MatrixXd::Identity(d, d);
+    own.noalias() -= columns.transpose() * columns;
+    own.diagonal().array() += 1e-6;
+    lengths(i) = own.ldlt().solve(errors.segment(i * d, d)).norm();
+  }
+  return lengths;
+}
+
+Eigen::VectorXd left_out(const Calibration& fitted, const Measurements& measurements,
+                         const std::vector<std::size_t>& skipped) {
+  const Measurements kept = without_rows(measurements, skipped);
+  const std::vector<Eigen::Index> free = freed_parameters(fitted.robot);
+  const std::vector<Eigen::Index> rows = measured_rows(kept);
+  Eigen::MatrixXd jacobian = position_jacobian(fitted.robot, kept.poses, free)(rows, Eigen::all);
+  constexpr double nothing = 1e-7;  // rounding, next to what the others move
+  const double least = jacobian.cols() > 0 ? nothing * jacobian.colwise().norm().maxCoeff() : 0.0;
+  for (auto column : jacobian.colwise()) {
+    column *= column.norm() > least ? 1.0 / column.norm() : 0.0;
+  }
+  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> factors(jacobian);
+  factors.setThreshold(1e-9);
+  Eigen::MatrixXd basis = Eigen::MatrixXd::Identity(jacobian.rows(), factors.rank());
+  basis.applyOnTheLeft(factors.householderQ());
+  const Eigen::MatrixXd model = positions(fitted.robot, kept.poses);
+  Eigen::VectorXd errors(std::ssize(rows));
+  for (Eigen::Index k = 0; k < errors.size(); ++k) {
+    errors(k) = kept.positions_mm(rows[k] / 3, rows[k] % 3) - model(rows[k] / 3, rows[k] % 3);
+  }
+  const Eigen::VectorXd seen = left_out(basis.transpose(), errors, std::ranges::count(kept.measured, true));
+  Eigen::VectorXd all = distances(positions(fitted.robot, measurements.poses), measurements);
+  Eigen::Index next = 0;
+  for (Eigen::Index i = 0; i < all.size(); ++i) {
+    if (!std::ranges::binary_search(skipped, static_cast<std::size_t>(i))) all(i) = seen(next++);
+  }
+  return all;
+}
+
+}  // namespace llmt::robotics

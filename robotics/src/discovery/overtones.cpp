@@ -1,0 +1,128 @@
+#include "discovery/overtones.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <set>
+
+#include "discovery/pose_split.hpp"
+
+namespace llmt::robotics {
+namespace {
+
+// The fit at its end, and what it leaves.
+struct Rest {
+  const Robot& robot;
+  Measurements kept;
+  std::vector<Eigen::Index> rows;  // coordinates that were measured
+  Eigen::VectorXd errors;
+  Eigen::HouseholderQR<Eigen::MatrixXd> fitted;  // of the derivatives by all free parameters
+  Eigen::Index rank = 0;
+};
+
+Rest rest_of(const Investigation& investigation) {
+  const Calibration& fitted = investigation.fitted;
+  std::vector<std::size_t> skipped = investigation.verdict.outliers;
+  std::ranges::sort(skipped);
+  Rest rest{.robot = fitted.robot,
+            .kept = without_rows(investigation.searched, skipped),
+            .rows = {},
+            .errors = {},
+            .fitted = {},
+            .rank = 0};
+  rest.rows = measured_rows(rest.kept);
+  rest.errors = stacked(rest.kept.positions_mm - positions(fitted.robot, rest.kept.poses), rest.rows);
+  std::vector<Eigen::Index> free;
+  for (std::size_t k = 0; k < fitted.robot.identified.size(); ++k) {
+    if (fitted.robot.identified[k].state == "free") free.push_back(static_cast<Eigen::Index>(k));
+  }
+  Eigen::MatrixXd columns = position_jacobian(fitted.robot, rest.kept.poses, free)(rest.rows, Eigen::all);
+  for (Eigen::Index k = 0; k < columns.cols(); ++k) columns.col(k) /= std::max(columns.col(k).norm(), 1e-300);
+  rest.rank = columns.cols();
+  rest.fitted.compute(columns);
+  return rest;
+}
+
+// What is orthogonal to the fit.
+Eigen::MatrixXd beyond_fit(const Rest& rest, const Eigen::MatrixXd& columns) {
+  const Eigen::MatrixXd turned = rest.fitted.householderQ().transpose() * columns;
+  return turned.bottomRows(turned.rows() - rest.rank);
+}
+
+constexpr double by_chance = 4.2;  // what F(6, 100 and more) exceeds once in a thousand
+constexpr double material = 0.06;  // of the wave's own energy; of a saw tooth 0.21
+
+struct Overtones {
+  double energy = 0.0;          // mm^2
+  double variance_ratio = 0.0;  // to what is left beside them
+};
+
+Overtones overtones_of(const Rest& rest, const Effect& wave) {
+  std::vector<Effect> tones;
+  for (const double times : {3.0, 4.0, 5.0}) {
+    tones.push_back(wave);
+    tones.back().constants[0] *= times;
+  }
+  const Eigen::MatrixXd columns =
+      beyond_fit(rest, effect_signatures(rest.robot, tones, rest.kept.poses)(rest.rows, Eigen::all));
+  const Eigen::VectorXd errors = beyond_fit(rest, rest.errors);
+  const Eigen::Index count = columns.cols();
+  const Eigen::Index left = errors.size() - count;
+  if (left < 2 * count) return {};
+  const Eigen::VectorXd turned = Eigen::HouseholderQR<Eigen::MatrixXd>(columns).householderQ().transpose() * errors;
+  const double energy = turned.head(count).squaredNorm();
+  const double variance = turned.tail(left).squaredNorm() / static_cast<double>(left);
+  return {energy, energy / static_cast<double>(count) / std::max(variance, 1e-300)};
+}
+
+// mm^2
+double energy_of(const FoundEffect& wave, const Rest& rest) {
+  return wave.rms_mm * wave.rms_mm * static_cast<double>(rest.kept.count());
+}
+
+// 2, 3, ... where the other wave is an overtone of the same joint, else 0.
+int multiple_of(const FoundEffect& wave, const FoundEffect& other) {
+  constexpr double slack = 0.01;
+  const double ratio = other.effect.constants[0] / wave.effect.constants[0];
+  const double whole = std::round(ratio);
+  const bool is_overtone = wave.effect.at == other.effect.at && whole > 1.5 && std::abs(ratio - whole) < slack * whole;
+  return is_overtone ? static_cast<int>(whole) : 0;
+}
+
+}  // namespace
+
+void doubt_waves(const Investigation& investigation, Discovery& result) {
+  std::vector<FoundEffect*> waves;
+  for (FoundEffect& effect : result.effects) {
+    if (effect.confirmed && effect.effect.type == "transmission_error") waves.push_back(&effect);
+  }
+  if (waves.empty()) return;
+  const Rest rest = rest_of(investigation);
+  std::set<FoundEffect*> doubted;
+  for (FoundEffect* wave : waves) {
+    const Overtones left = overtones_of(rest, wave->effect);
+    double energy = left.variance_ratio < by_chance ? 0.0 : left.energy;
+    for (FoundEffect* other : waves) {
+      if (multiple_of(*wave, *other) > 2) energy += energy_of(*other, rest);
+    }
+    if (energy < material * energy_of(*wave, rest)) continue;
+    // Other waves of that joint may be pieces of it, too.
+    std::ranges::copy_if(waves, std::inserter(doubted, doubted.end()),
+                         [&](const FoundEffect* other) { return other->effect.at == wave->effect.at; });
+    const std::size_t joint = joint_index(rest.robot.chain, wave->effect.at);
+    result.unknown.push_back(
+        {{wave->effect.at, {fmt::format("q{}", joint + 1)}, wave->effect.constants[0], "periodic, but no sine"},
+         wave->share});
+  }
+  if (doubted.empty()) return;
+  for (FoundEffect* wave : doubted) wave->confirmed = false;
+  result.answer = discovery::Answer::unknown;
+  result.notes.emplace_back(
+      "A wave with overtones of three to five times its order is no sine: a saw tooth, or a step in every turn of a "
+      "shaft.");
+}
+
+}  // namespace llmt::robotics

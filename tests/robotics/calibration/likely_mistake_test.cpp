@@ -1,0 +1,141 @@
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+#include "llmt/robotics/calibration_report.hpp"
+#include "robotics/observations.hpp"
+
+namespace llmt::robotics {
+namespace {
+
+// What is said of a table after something has gone wrong in it.
+std::string said_after(const std::function<void(Measurements&)>& wrong) {
+  const Robot truth = perturbed(ur_like(), 0.3, 0.05, 3);
+  Measurements seen = measure(truth, random_poses(truth.chain, 80, 4), 0.05, 5);
+  wrong(seen);
+  const CalibrationReport report = report_calibration(ur_like(), seen, {.folds = 0});
+  std::string all;
+  for (const std::string& suspicion : suspicions(ur_like(), seen, report)) all += suspicion + "\n";
+  return all;
+}
+
+TEST(LikelyMistake, SignsZerosOrderAndAxesAreNamed) {
+  const struct {
+    std::function<void(Measurements&)> wrong;
+    const char* said;
+  } cases[] = {
+      {[](Measurements& m) { m.poses.joints.col(1) *= -1.0; }, "joint2 counts in the other direction"},
+      {[](Measurements& m) { m.poses.joints.col(3).array() += 90.0 * degree; }, "joint4 has its zero -90 deg away"},
+      {[](Measurements& m) { m.poses.joints.col(1).swap(m.poses.joints.col(2)); },
+       "columns of joint2 and joint3 are exchanged"},
+      {[](Measurements& m) {
+         const Eigen::MatrixXd q = m.poses.joints;
+         for (int j = 0; j < 6; ++j) m.poses.joints.col(j) = q.col((j + 1) % 6);
+       },
+       "columns of the joints are shifted"},
+      {[](Measurements& m) { m.poses.joints.col(2) /= degree; }, "the values of joint3 are degrees, not radians"},
+      {[](Measurements& m) { m.poses.joints.col(4) *= degree; }, "the values of joint5 are radians, not degrees"},
+      {[](Measurements& m) { m.positions_mm.col(1) *= -1.0; }, "axis of the instrument is reversed"},
+      {[](Measurements& m) {
+         m.poses.joints.col(1) *= -1.0;
+         m.poses.joints.col(2) *= -1.0;
+         m.poses.joints.col(5) *= -1.0;
+       },
+       "joint2, joint3, joint6 count in the other direction"},
+  };
+  for (const auto& one : cases) {
+    const std::string said = said_after(one.wrong);
+    EXPECT_NE(said.find("most likely"), std::string::npos) << one.said << "\n" << said;
+    EXPECT_NE(said.find(one.said), std::string::npos) << said;
+  }
+  EXPECT_EQ(said_after([](Measurements&) {}).find("most likely"), std::string::npos);
+}
+
+TEST(LikelyMistake, TheUnitOfOneTargetIsNamed) {
+  Robot truth = perturbed(ur_like(), 0.3, 0.05, 6);
+  truth.chain.tools = {{"t2", {.xyz_mm = {-70.0, 80.0, 100.0}}}, {"t3", {.xyz_mm = {10.0, -90.0, 160.0}}}};
+  Measurements seen =
+      read_off(truth, looked_at(random_poses(truth.chain, 60, 7), {{}, {.tool = "t2"}, {.tool = "t3"}}), 0.05, 8);
+  for (Eigen::Index i = 1; i < seen.count(); i += 3) seen.positions_mm.row(i) *= 0.001;
+  const CalibrationReport report = report_calibration(ur_like(), seen, {.folds = 0});
+  const std::vector<std::string> said = suspicions(ur_like(), seen, report);
+  EXPECT_NE(said.back().find("the points of target \"t2\" are metres"), std::string::npos) << said.back();
+}
+
+TEST(LikelyMistake, TheOrderOfQuaternionsAndTheirDirectionAreNamed) {
+  const Robot truth = perturbed(ur_like(), 0.3, 0.05, 9);
+  const Poses poses = random_poses(truth.chain, 60, 10);
+  const std::vector<Pose> tools = tool_poses(truth, poses);
+  const auto said_of = [&](const std::function<Eigen::Vector4d(const Eigen::Quaterniond&)>& written) {
+    Measurements seen = measure(truth, poses, 0.05, 11);
+    seen.orientation.kind = Orientation::Kind::quaternion;
+    seen.orientation.values.resize(poses.count(), 4);
+    for (Eigen::Index i = 0; i < poses.count(); ++i) {
+      seen.orientation.values.row(i) = written(Eigen::Quaterniond(tools[i].rotation)).transpose();
+    }
+    seen = with_orientations(seen, truth.chain);
+    const CalibrationReport report = report_calibration(ur_like(), seen, {.folds = 0});
+    std::string all;
+    for (const std::string& suspicion : suspicions(ur_like(), seen, report)) all += suspicion + "\n";
+    return std::to_string(static_cast<int>(is_implausible(ur_like(), report))) + all;
+  };
+  using Q = Eigen::Quaterniond;
+  EXPECT_EQ(said_of([](const Q& q) { return Eigen::Vector4d(q.w(), q.x(), q.y(), q.z()); }), "0");
+  const std::string order = said_of([](const Q& q) { return Eigen::Vector4d(q.x(), q.y(), q.z(), q.w()); });
+  EXPECT_TRUE(order.starts_with("1") && order.find("hold x, y, z, w") != std::string::npos) << order;
+  const std::string inverse = said_of([](const Q& q) { return Eigen::Vector4d(q.w(), -q.x(), -q.y(), -q.z()); });
+  EXPECT_NE(inverse.find("world as seen from the tool"), std::string::npos) << inverse;
+  const std::string constant = said_of([](const Q&) { return Eigen::Vector4d(1.0, 0.0, 0.0, 0.0); });
+  EXPECT_TRUE(constant.starts_with("1") && constant.find("convention") != std::string::npos) << constant;
+}
+
+// What is said of errors alone, each the line of its number.
+std::string far_of(const std::vector<double>& errors) {
+  const auto count = static_cast<Eigen::Index>(errors.size());
+  Measurements measurements;
+  measurements.poses.joints.setZero(count, 1);
+  CalibrationReport report;
+  report.geometric.in_sample_mm = Eigen::Map<const Eigen::VectorXd>(errors.data(), count);
+  return far_readings(measurements, report);
+}
+
+std::vector<double> normal_errors(Random& random, int count) {
+  std::vector<double> errors;
+  for (int i = 0; i < count; ++i) {
+    errors.push_back(Eigen::Vector3d(random.normal(), random.normal(), random.normal()).norm());
+  }
+  return errors;
+}
+
+TEST(FarReadings, AreNotTheTailsOfHonestErrors) {
+  Random random(3);
+  for (const double deviation : {1.0, 1.5}) {
+    int accused = 0;
+    for (int set = 0; set < 400; ++set) {
+      std::vector<double> errors;
+      for (int i = 0; i < 50; ++i) errors.push_back(std::exp(deviation * random.normal()));
+      accused += far_of(errors).empty() ? 0 : 1;
+    }
+    EXPECT_LE(accused, 20) << deviation;  // 5 %; eight times the median alone accuses every second and every sixth set
+  }
+  for (int set = 0; set < 400; ++set) EXPECT_EQ(far_of(normal_errors(random, 50)), "");
+}
+
+TEST(FarReadings, AreNamedWhereThreeOfAFewAreBad) {
+  Random random(4);
+  for (const int count : {24, 30, 50}) {
+    int named = 0;
+    for (int set = 0; set < 100; ++set) {
+      std::vector<double> errors = normal_errors(random, count);
+      for (const int bad : {3, 11, 20}) errors[bad] = random.uniform(50.0, 200.0);
+      named += far_of(errors).find("(rows 4, 12, 21)") != std::string::npos ? 1 : 0;
+    }
+    EXPECT_GE(named, 90) << count;
+  }
+}
+
+}  // namespace
+}  // namespace llmt::robotics
