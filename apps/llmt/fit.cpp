@@ -39,26 +39,32 @@ constexpr const char* readable_extension = ".readable.json";
 // Whether the model's file has intervals.
 bool keeps_intervals(const FitArguments& arguments) { return !arguments.no_intervals && !arguments.output.empty(); }
 
-// fit() with a bar of its progress.
-FitResult fit_with_bar(const LearningTable& table) {
+// The rows are made ready once, for the model and the readable tree.
+struct Fitting {
+  PreparedFit prepared;
+  FitResult result;
+};
+
+Fitting fit_with_bar(const LearningTable& table) {
   ProgressBar bar("fitting");
-  FitOptions options = table.options;
-  options.progress = bar.callback();
-  return fit(table.inputs.values, table.outputs, options);
+  Work work(bar.callback());
+  Work preparing(work, table.options.loss == Loss::tukey ? 0.2 : 0.05);
+  const PreparedFit prepared({table.inputs.values, table.outputs}, table.options, preparing.progress());
+  Work fitting(work, work.left());
+  return {prepared, fit(prepared, fitting.progress())};
 }
 
 // The readable tree beside the model, written if the model is.
 std::optional<ReadableResult> make_readable(const FitArguments& arguments, const LearningTable& table,
-                                            const FitSummary& fitted, double loss) {
+                                            const Fitting& fitting, double loss) {
+  const FitSummary& fitted = fitting.result.summary;
   if (fitted.partitions.front().cv_folds == 0) {
     throw std::runtime_error(
         fmt::format("{}: --readable chooses on held-out rows, and the {} row(s) leave none to hold out",
                     table_name(arguments.learning.data), fitted.samples));
   }
   ProgressBar bar("readable tree");
-  FitOptions options = table.options;
-  options.progress = bar.callback();
-  ReadableResult readable = fit_readable(table.inputs.values, table.outputs, options, fitted, loss);
+  ReadableResult readable = fit_readable(fitting.prepared, fitted, loss, bar.callback());
   bar.clear();
   readable.model = readable.model.named(table.names, arguments.learning.targets, table.inputs.levels);
   if (!arguments.output.empty()) {
@@ -70,29 +76,34 @@ std::optional<ReadableResult> make_readable(const FitArguments& arguments, const
 
 // A report shows a readable tree beside the model wherever one can be made. It does not show rows that the loss leaves
 // out: they would set the axes.
-std::string write_fit_reports(const FitArguments& arguments, const LearningTable& table, const FitResult& result,
+std::string write_fit_reports(const FitArguments& arguments, const LearningTable& table, const Fitting& fitting,
                               const std::optional<ReadableResult>& readable) {
   if (!arguments.reports.wanted()) return "";
+  const FitResult& result = fitting.result;
   std::optional<ReadableResult> shown = readable;
   const bool has_folds = result.summary.partitions.front().cv_folds > 0;
   if (!shown && has_folds && why_not_readable(table.options).empty()) {
-    shown = fit_readable(table.inputs.values, table.outputs, table.options, result.summary);
+    shown = fit_readable(fitting.prepared, result.summary);
     shown->model = shown->model.named(table.names, arguments.learning.targets, table.inputs.levels);
   }
   const std::vector<Eigen::Index> left_out = report::rows_left_out(result.summary.loss_weights, table.options.weights);
-  const auto report_on = [&](const Eigen::MatrixXd& inputs, const Eigen::MatrixXd& outputs, const FitOptions& options) {
-    const auto count = std::ssize(left_out);
-    return write_reports(arguments.reports,
-                         report::fit_report({arguments.learning.data, inputs, outputs, options, result, shown, count}));
+  const auto report_on = [&](const Eigen::MatrixXd& inputs, const Eigen::MatrixXd& outputs, const FitResult& of_rows) {
+    return write_reports(arguments.reports, report::fit_report({arguments.learning.data, inputs, outputs, table.options,
+                                                                of_rows, shown, std::ssize(left_out)}));
   };
-  if (left_out.empty()) return report_on(table.inputs.values, table.outputs, table.options);
+  if (left_out.empty()) return report_on(table.inputs.values, table.outputs, result);
   std::vector<Eigen::Index> kept;
+  std::vector<Eigen::Index> place(table.outputs.rows(), -1);  // among the kept rows
   for (Eigen::Index row = 0; row < table.outputs.rows(); ++row) {
-    if (result.summary.loss_weights(row) > 0.0) kept.push_back(row);
+    if (!(result.summary.loss_weights(row) > 0.0)) continue;
+    place[row] = std::ssize(kept);
+    kept.push_back(row);
   }
-  FitOptions options = table.options;
-  if (options.weights.size() > 0) options.weights = Eigen::VectorXd(options.weights(kept));
-  return report_on(table.inputs.values(kept, Eigen::all), table.outputs(kept, Eigen::all), options);
+  FitResult of_kept = result;
+  for (std::vector<Eigen::Index>& of_fold : of_kept.summary.held_out) {
+    for (Eigen::Index& row : of_fold) row = place[row];
+  }
+  return report_on(table.inputs.values(kept, Eigen::all), table.outputs(kept, Eigen::all), of_kept);
 }
 
 void fit_command(FitArguments arguments) {
@@ -107,15 +118,16 @@ void fit_command(FitArguments arguments) {
   // Folds' models say which rows no model predicts; the report needs them too, and the file unless it is to be small.
   const bool looks_for_spoilt_rows = table.options.loss == Loss::squared;
   table.options.intervals = keeps_intervals(arguments) || arguments.reports.wanted() || looks_for_spoilt_rows;
-  FitResult result = fit_with_bar(table);
+  Fitting fitting = fit_with_bar(table);
+  FitResult& result = fitting.result;
   warn_of_spoilt_rows(arguments.learning, table, result);
   result.model = result.model.named(table.names, arguments.learning.targets, table.inputs.levels);
   if (!arguments.output.empty()) {
     save(result.model, keeps_intervals(arguments) ? result.intervals : Intervals(), arguments.output);
   }
   std::optional<ReadableResult> readable;
-  if (!arguments.readable.empty()) readable = make_readable(arguments, table, result.summary, loss);
-  const std::string reports = write_fit_reports(arguments, table, result, readable);
+  if (!arguments.readable.empty()) readable = make_readable(arguments, table, fitting, loss);
+  const std::string reports = write_fit_reports(arguments, table, fitting, readable);
   report::FitRun run{arguments.learning.data, table.options, table.inputs.values, table.lines, arguments.output};
   if (arguments.json) {
     Json summary = report::fit_json(run, result);

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <map>
 
-#include "llmt/held_out.hpp"
 #include "llmt/outliers.hpp"
 #include "shared/cli.hpp"
 
@@ -33,7 +32,7 @@ std::vector<HeldOutError> held_out_errors(const LearningTable& table, const FitR
   const std::vector<Model>& models = result.intervals.models();
   const Eigen::MatrixXd& inputs = table.inputs.values;
   const int threads = table.options.max_threads;
-  const std::vector<std::vector<Eigen::Index>> of_folds = held_out_rows(inputs, table.outputs, table.options);
+  const std::vector<std::vector<Eigen::Index>>& of_folds = result.summary.held_out;
   std::vector<HeldOutError> errors;
   for (std::size_t f = 0; f < models.size(); ++f) {
     const Eigen::MatrixXd taken = inputs(of_folds[f], Eigen::all);

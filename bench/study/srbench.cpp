@@ -127,13 +127,16 @@ Runs run(const Data& data, const Arguments& arguments) {
   Runs runs;
   for (int k = 0; k < arguments.seeds; ++k) {
     const Trial trial = trial_of(data, track_seeds[k]);
+    std::optional<llmt::PreparedFit> prepared;
     std::optional<llmt::FitResult> fit;
-    Cost cost = measure([&] { fit = llmt::fit(trial.train_inputs, trial.train_output, options); });
+    Cost cost = measure([&] {
+      prepared.emplace(llmt::TrainingData{trial.train_inputs, trial.train_output}, options);
+      fit = llmt::fit(*prepared);
+    });
     runs.llmt.add(fit->model, trial, cost.cpu);
     if (arguments.readable) {
       std::optional<llmt::ReadableResult> readable;
-      cost = measure(
-          [&] { readable = llmt::fit_readable(trial.train_inputs, trial.train_output, options, fit->summary); });
+      cost = measure([&] { readable = llmt::fit_readable(*prepared, fit->summary); });
       runs.readable.add(readable->model, trial, cost.cpu);
     }
     fit = llmt::fit(trial.train_inputs, trial.train_output, least_squares(options));

@@ -8,7 +8,6 @@
 #include "llmt/discovery/rounds.hpp"
 #include "llmt/discovery/simulation.hpp"
 #include "llmt/discovery/terms.hpp"
-#include "llmt/held_out.hpp"
 #include "llmt/llmt.hpp"
 #include "llmt/outliers.hpp"
 #include "llmt/progress.hpp"

@@ -7,7 +7,6 @@
 #include <functional>
 #include <numeric>
 
-#include "llmt/held_out.hpp"
 #include "report/document/figures.hpp"
 #include "report/fit/kinds.hpp"
 #include "report/text/text.hpp"
@@ -29,9 +28,7 @@ HeldOutRows held_out(const Fitted& fitted, Eigen::Index output) {
   const std::vector<Model>& models = fitted.result.intervals.models();
   rows.held_out = !models.empty();
   if (rows.held_out) {
-    const std::vector<std::vector<Eigen::Index>> of_folds =
-        held_out_rows(fitted.inputs, fitted.outputs, fitted.options);
-    for (std::size_t f = 0; f < models.size(); ++f) add(models[f], of_folds[f]);
+    for (std::size_t f = 0; f < models.size(); ++f) add(models[f], fitted.result.summary.held_out[f]);
   } else {
     std::vector<Eigen::Index> all(fitted.inputs.rows());
     std::iota(all.begin(), all.end(), 0);

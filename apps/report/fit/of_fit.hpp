@@ -12,7 +12,8 @@
 
 namespace llmt::report {
 
-/// What was fitted to what. `result` has the intervals' models (FitOptions::intervals).
+/// What was fitted to what. `result` has the intervals' models (FitOptions::intervals); its held-out rows are those of
+/// `inputs`.
 struct Fitted {
   std::string data;  ///< the file
   const Eigen::MatrixXd& inputs;

@@ -11,10 +11,13 @@
 
 #include <Eigen/Core>
 
+#include <memory>
+
 #include "llmt/abi.hpp"
 #include "llmt/intervals.hpp"
 #include "llmt/model.hpp"
 #include "llmt/options.hpp"
+#include "llmt/progress.hpp"
 #include "llmt/summary.hpp"
 
 namespace llmt {
@@ -43,6 +46,40 @@ struct FitResult {
 /// range or repeated, a category that is not a whole number from 0 on.
 FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<const Eigen::MatrixXd>& outputs,
               const FitOptions& options = {});
+
+/// What a model is learned from.
+struct TrainingData {
+  Eigen::MatrixXd inputs;   ///< rows x inputs; NaN: missing
+  Eigen::MatrixXd outputs;  ///< rows x outputs
+};
+
+struct PreparedRows;
+
+/// Data and options of a fit with the rows made ready: checked, weighted by the loss, dealt to folds, codes chosen.
+/// Make one where several results come from the same rows, such as a model and a readable tree beside it:
+///
+///     const llmt::PreparedFit prepared({inputs, outputs}, options);
+///     const llmt::FitResult result = llmt::fit(prepared);
+///     const llmt::ReadableResult readable = llmt::fit_readable(prepared, result.summary);
+///
+/// Copies share everything. It may be used by several threads at a time.
+class PreparedFit {
+ public:
+  /// Throws std::invalid_argument as fit(). `progress`: of the preparation. FitOptions::progress is not used.
+  explicit PreparedFit(TrainingData data, const FitOptions& options = {}, const Progress& progress = {});
+
+  const TrainingData& data() const;
+
+  /// For the library.
+  const PreparedRows& rows() const;
+
+ private:
+  struct Parts;
+  std::shared_ptr<const Parts> parts_;
+};
+
+/// The fit of prepared data: as fit() of the same data and options.
+FitResult fit(const PreparedFit& prepared, const Progress& progress = {});
 
 /// Root mean square error of each column, in its unit. Throws std::invalid_argument if the shapes differ or there is no
 /// row.

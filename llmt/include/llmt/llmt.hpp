@@ -12,7 +12,6 @@
 #include "llmt/files.hpp"
 #include "llmt/fit.hpp"
 #include "llmt/folds.hpp"
-#include "llmt/held_out.hpp"
 #include "llmt/intervals.hpp"
 #include "llmt/model.hpp"
 #include "llmt/names.hpp"

@@ -1,7 +1,9 @@
 /// \file
 /// The smallest crisp tree with short equations that predicts nearly as well as the best crisp tree.
 ///
-///     const llmt::ReadableResult readable = llmt::fit_readable(inputs, outputs, {}, result.summary);
+///     const llmt::PreparedFit prepared({inputs, outputs});
+///     const llmt::FitResult fitted = llmt::fit(prepared);
+///     const llmt::ReadableResult readable = llmt::fit_readable(prepared, fitted.summary);
 ///     const double error = readable.partitions[0].rmse;  // held-out
 #pragma once
 
@@ -10,9 +12,10 @@
 #include <vector>
 
 #include "llmt/abi.hpp"
+#include "llmt/fit.hpp"
 #include "llmt/intervals.hpp"
 #include "llmt/model.hpp"
-#include "llmt/options.hpp"
+#include "llmt/progress.hpp"
 #include "llmt/summary.hpp"
 
 namespace llmt {
@@ -46,15 +49,14 @@ struct ReadableResult {
 /// largest training value of each input the model predicts what its printed equations say.
 /// docs/algorithms/readable.md has the equations.
 ///
-/// `options`, `inputs`, `outputs`: those of fit(); `fitted`: its summary. Of the options the tree uses columns,
-/// weights, folds, shared_partition, max_leaves, min_leaf_samples, expert.search, max_threads and progress; with
-/// LocalTerms::quadratic or automatic equations may have products of two inputs. `loss`: 0.15 for 15 per cent.
+/// `prepared`: what the fit was made from; `fitted`: the fit's summary. Of the options the tree uses columns, weights,
+/// folds, shared_partition, max_leaves, min_leaf_samples, expert.search and max_threads; with LocalTerms::quadratic or
+/// automatic equations may have products of two inputs. `loss`: 0.15 for 15 per cent.
 ///
-/// Throws std::invalid_argument as fit(), if `loss` is negative or not finite, if nothing was held out in the fit, and
-/// with the words of why_not_readable() if there are any.
-ReadableResult fit_readable(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
-                            const Eigen::Ref<const Eigen::MatrixXd>& outputs, const FitOptions& options,
-                            const FitSummary& fitted, double loss = 0.15);
+/// Throws std::invalid_argument if `loss` is negative or not finite, if nothing was held out in the fit, and with the
+/// words of why_not_readable() if there are any.
+ReadableResult fit_readable(const PreparedFit& prepared, const FitSummary& fitted, double loss = 0.15,
+                            const Progress& progress = {});
 
 /// The option that a readable tree does not go with, and why: "folds.count 0: the tree is chosen by its error on
 /// held-out rows". Empty: there is none.

@@ -131,6 +131,11 @@ struct FitSummary {
   /// Loss::tukey: the weight in [0, 1] that each row had by its residual, 0 for outliers. Else empty. Errors leave out
   /// rows of weight 0; all others count in full there, times FitOptions::weights.
   Eigen::VectorXd loss_weights = {};
+  /// The rows that each fold held out, ascending, in the order of Intervals::models(): the model of a fold has not seen
+  /// the rows of its list. Copies of a row are in the list of the row that they copy, and repeats of a measurement in
+  /// one list; rows of weight 0, and those that Loss::tukey leaves out, are in none. With one fold held out once (many
+  /// rows) the lists do not cover all rows. Empty without folds.
+  std::vector<std::vector<Eigen::Index>> held_out = {};
 };
 
 /// What ended growth, in a few words: "the significance test".

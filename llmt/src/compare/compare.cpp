@@ -51,7 +51,7 @@ std::vector<double> groups_of_repeats(const Eigen::Ref<const Eigen::MatrixXd>& i
                                       const Eigen::Ref<const Eigen::MatrixXd>& output) {
   std::vector<Eigen::Index> rows(inputs.rows());
   std::iota(rows.begin(), rows.end(), 0);
-  const std::vector<int> group = find_equal_rows(inputs, output, rows).group;
+  const std::vector<int> group = find_equal_rows(inputs, rows, number_rows(inputs, output, rows)).group;
   return {group.begin(), group.end()};
 }
 
@@ -117,7 +117,7 @@ Eigen::VectorXd loss_weights_of(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
   check_options(robust->options, inputs.cols());
   constexpr double share_of_loss = 0.05;
   Work part(work, share_of_loss);
-  return robust_weights(inputs, output, robust->options, part);
+  return robust_weights(given_rows(inputs, output, robust->options), robust->options, part);
 }
 
 // The weights of rows in the errors of a method.

@@ -1,6 +1,7 @@
 #include "data/equal_rows.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <bit>
 #include <cmath>
 #include <cstdint>
@@ -118,6 +119,21 @@ std::vector<int> copies(const std::vector<int>& by_all, int times) {
   return copy_of;
 }
 
+// The numbers at some positions, in order of first appearance there.
+std::vector<int> renumbered(const std::vector<int>& numbers, const std::vector<Eigen::Index>& positions) {
+  std::vector<int> seen(numbers.size(), -1);
+  std::vector<int> result;
+  int different = 0;
+  for (const Eigen::Index position : positions) {
+    int& number = seen[numbers[position]];
+    if (number < 0) number = different++;
+    result.push_back(number);
+  }
+  return result;
+}
+
+std::atomic<long> times_numbered = 0;
+
 }  // namespace
 
 std::vector<int> number_different_rows(const Eigen::Ref<const Eigen::MatrixXd>& table,
@@ -167,27 +183,44 @@ std::vector<int> number_different_rows(const Eigen::Ref<const Eigen::MatrixXd>& 
   return numbers;
 }
 
-EqualRows find_equal_rows(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
-                          const Eigen::Ref<const Eigen::MatrixXd>& outputs, const std::vector<Eigen::Index>& rows,
-                          int max_threads) {
+RowNumbers number_rows(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
+                       const Eigen::Ref<const Eigen::MatrixXd>& outputs, const std::vector<Eigen::Index>& rows,
+                       int max_threads) {
+  ++times_numbered;
+  RowNumbers numbers;
   std::vector<int> by_inputs = number_different_rows(inputs, rows, all_columns(inputs), max_threads);
-  const int cells = different(by_inputs);
+  if (different(by_inputs) == count_of(rows)) return numbers;
+  numbers.by_all = pairs_of(by_inputs, number_different_rows(outputs, rows, all_columns(outputs)));
+  numbers.by_inputs = std::move(by_inputs);
+  return numbers;
+}
+
+long times_rows_were_numbered() { return times_numbered; }
+
+RowNumbers at(const RowNumbers& numbers, const std::vector<Eigen::Index>& positions) {
+  if (numbers.by_inputs.empty()) return {};
+  return {renumbered(numbers.by_inputs, positions), renumbered(numbers.by_all, positions)};
+}
+
+EqualRows find_equal_rows(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const std::vector<Eigen::Index>& rows,
+                          const RowNumbers& numbers) {
+  if (numbers.by_inputs.empty()) return {};
+  const int cells = different(numbers.by_inputs);
   if (cells == count_of(rows) || cells < fewest_different) return {};
-  const std::vector<int> by_all = pairs_of(by_inputs, number_different_rows(outputs, rows, all_columns(outputs)));
-  const int times = times_written(by_all);
-  std::vector<int> copy_of = copies(by_all, times);
+  const int times = times_written(numbers.by_all);
+  std::vector<int> copy_of = copies(numbers.by_all, times);
   std::vector<Eigen::Index> left;  // rows of the table written once
   std::vector<int> left_by_inputs;
   for (int i = 0; i < count_of(rows); ++i) {
     if (copy_of[i] != i) continue;
     left.push_back(rows[i]);
-    left_by_inputs.push_back(by_inputs[i]);
+    left_by_inputs.push_back(numbers.by_inputs[i]);
   }
   EqualRows result;
   result.are_repeats = cells < count_of(left) && are_repeats(inputs, left, left_by_inputs);
   if (result.are_repeats) {
-    result.copy_of = copies(by_all, std::numeric_limits<int>::max());
-    result.group = std::move(by_inputs);
+    result.copy_of = copies(numbers.by_all, std::numeric_limits<int>::max());
+    result.group = numbers.by_inputs;
   } else if (times > 1) {
     result.group = copy_of;
     result.copy_of = std::move(copy_of);

@@ -13,6 +13,23 @@ std::vector<int> number_different_rows(const Eigen::Ref<const Eigen::MatrixXd>& 
                                        const std::vector<Eigen::Index>& rows, const std::vector<int>& columns,
                                        int max_threads = 1);
 
+/// Which rows of a table are equal: rows with equal numbers have equal inputs, or equal inputs and outputs.
+struct RowNumbers {
+  std::vector<int> by_inputs;  ///< empty: no two rows have equal inputs
+  std::vector<int> by_all;
+};
+
+/// The numbers of the given rows. All rows are hashed and sorted, so a fit asks once (times_rows_were_numbered()).
+RowNumbers number_rows(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
+                       const Eigen::Ref<const Eigen::MatrixXd>& outputs, const std::vector<Eigen::Index>& rows,
+                       int max_threads = 1);
+
+/// How often number_rows() was called in this process, for tests.
+long times_rows_were_numbered();
+
+/// The numbers at some positions.
+RowNumbers at(const RowNumbers& numbers, const std::vector<Eigen::Index>& positions);
+
 /// Rows that are no measurements of their own, see "Rows with equal inputs" (C.2) in docs/algorithms/selection.md.
 struct EqualRows {
   bool are_repeats = false;  ///< rows with equal inputs are repeats of one measurement
@@ -21,8 +38,9 @@ struct EqualRows {
   /// Of each row, the position among `rows` of the row that it copies, itself if none. Empty: there are no copies.
   std::vector<int> copy_of;
 };
-EqualRows find_equal_rows(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
-                          const Eigen::Ref<const Eigen::MatrixXd>& outputs, const std::vector<Eigen::Index>& rows,
-                          int max_threads = 1);
+
+/// `numbers`: of `rows`, which are rows of `inputs`.
+EqualRows find_equal_rows(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const std::vector<Eigen::Index>& rows,
+                          const RowNumbers& numbers);
 
 }  // namespace llmt

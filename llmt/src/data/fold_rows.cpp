@@ -25,14 +25,14 @@ std::vector<Fold> selection_folds(Eigen::Index rows, FoldOptions options) {
   return folds;
 }
 
-std::vector<FoldRows> deal(const Table& table, const Table& measured, const FoldOptions& options, int max_threads) {
-  std::vector<FoldRows> folds;
-  for (const Fold& fold : selection_folds(table.inputs.rows(), options)) {
+std::vector<FoldRows> deal(const Table& table, const Table& measured, const std::vector<Fold>& folds, int max_threads) {
+  std::vector<FoldRows> result;
+  for (const Fold& fold : folds) {
     TrainingRows training = training_rows(table, {fold.train.begin(), fold.train.end()}, max_threads);
     TrainingRows held_out = query_rows(measured, {fold.held_out.begin(), fold.held_out.end()}, training);
-    folds.push_back({std::move(training), std::move(held_out)});
+    result.push_back({std::move(training), std::move(held_out)});
   }
-  return folds;
+  return result;
 }
 
 }  // namespace llmt

@@ -23,7 +23,7 @@ inline constexpr Eigen::Index single_hold_out_rows = 50000;
 /// 0.
 std::vector<Fold> selection_folds(Eigen::Index rows, FoldOptions options);
 
-/// selection_folds() of the rows of a table. `measured`: the same rows with the weights that they have in errors.
-std::vector<FoldRows> deal(const Table& table, const Table& measured, const FoldOptions& options, int max_threads);
+/// The rows of a table as each fold has them. `measured`: the same rows with the weights that they have in errors.
+std::vector<FoldRows> deal(const Table& table, const Table& measured, const std::vector<Fold>& folds, int max_threads);
 
 }  // namespace llmt

@@ -22,10 +22,10 @@ Candidates few_candidates(Candidates candidates) {
 
 }  // namespace
 
-Plan cheap_plan(const FitOptions& options, const TrainingRows& rows, Eigen::Index folds) {
-  Plan plan = with_defaults(options, rows, folds);
+Plan cheap_plan(const Training& training) {
+  Plan plan = plan_of(training);
   plan.candidates = few_candidates(std::move(plan.candidates));
-  const Eigen::Index most = std::max(fewest_leaves, most_unknowns / (std::ssize(rows.split_inputs) + 1));
+  const Eigen::Index most = std::max(fewest_leaves, most_unknowns / (std::ssize(training.all.split_inputs) + 1));
   plan.growth.max_leaves = plan.growth.max_leaves > 0 ? std::min(plan.growth.max_leaves, most) : most;
   return plan;
 }

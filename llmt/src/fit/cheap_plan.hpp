@@ -6,7 +6,7 @@
 
 namespace llmt {
 
-/// with_defaults() with few candidates, the same for all forms, and small trees.
-Plan cheap_plan(const FitOptions& options, const TrainingRows& rows, Eigen::Index folds);
+/// plan_of() with few candidates, the same for all forms, and small trees.
+Plan cheap_plan(const Training& training);
 
 }  // namespace llmt

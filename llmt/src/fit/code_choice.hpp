@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "data/training.hpp"
 #include "llmt/fit.hpp"
 
 namespace llmt {
@@ -13,10 +14,8 @@ namespace llmt {
 using Codes = std::vector<std::vector<double>>;
 
 /// Takes inputs of few whole numbers for codes where that lowers the error on held-out rows by more than chance.
-/// `options` are checked. `work`: the choice counts as a part of it. `loss_weights`: as fit_terms(). Throws as fit().
-CodeChoice choose_codes(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
-                        const Eigen::Ref<const Eigen::MatrixXd>& outputs, const FitOptions& options, Work& work,
-                        const Eigen::VectorXd& loss_weights = {});
+/// `options` are checked, their terms linear or quadratic. `work`: the choice counts as a part of it.
+CodeChoice choose_codes(const GivenRows& given, const FitOptions& options, Work& work);
 
 /// The inputs with positions in place of codes.
 Eigen::MatrixXd at_positions(const Codes& codes, const Eigen::Ref<const Eigen::MatrixXd>& inputs);

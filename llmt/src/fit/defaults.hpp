@@ -2,6 +2,7 @@
 /// The options of a fit without blanks.
 #pragma once
 
+#include "data/training.hpp"
 #include "growth/rules/rule.hpp"
 #include "selection/candidates.hpp"
 
@@ -18,5 +19,10 @@ struct Plan {
 
 /// Fills in the defaults, which depend on the rows and on the number of folds. default_text() describes them.
 Plan with_defaults(const FitOptions& options, const TrainingRows& all, Eigen::Index folds);
+
+/// with_defaults() of a training.
+inline Plan plan_of(const Training& training) {
+  return with_defaults(training.options, training.all, std::ssize(training.folds));
+}
 
 }  // namespace llmt

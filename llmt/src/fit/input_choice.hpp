@@ -2,27 +2,25 @@
 /// Which inputs a partition uses: backward elimination, docs/algorithms/input-choice.md.
 #pragma once
 
+#include <memory>
 #include <vector>
 
-#include "data/fold_rows.hpp"
-#include "fit/defaults.hpp"
-#include "llmt/options.hpp"
+#include "data/training.hpp"
 #include "llmt/progress.hpp"
 #include "llmt/summary.hpp"
 
 namespace llmt {
 
-/// The inputs of a partition: of the model of all rows, and of each fold's, which has as many.
+/// The inputs that a partition uses.
 struct ChosenInputs {
-  std::vector<int> of_all;  ///< ascending
-  std::vector<std::vector<int>> of_folds;
-  std::vector<InputStep> steps;  ///< empty: nothing was compared
+  std::shared_ptr<const Training>
+      training;                       ///< with these inputs alone; each fold's model has as many as that of all rows
+  std::vector<int> left_out = {};     ///< ascending
+  std::vector<InputStep> steps = {};  ///< empty: nothing was compared
 };
 
-/// All inputs, or fewer where that lowers the error on held-out rows by more than chance. `plan`: for all inputs;
-/// `served`: the outputs; `weights`: of their squared errors; `work`: the choice
-/// counts as a part of it.
-ChosenInputs choose_inputs(const TrainingRows& all, const std::vector<FoldRows>& folds, const std::vector<int>& served,
-                           const Eigen::VectorXd& weights, const Plan& plan, const FitOptions& options, Work& work);
+/// All inputs, or fewer where that lowers the error on held-out rows by more than chance. `served`: the outputs;
+/// `work`: the choice counts as a part of it.
+ChosenInputs choose_inputs(const std::shared_ptr<const Training>& training, const std::vector<int>& served, Work& work);
 
 }  // namespace llmt

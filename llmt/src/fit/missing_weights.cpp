@@ -1,7 +1,6 @@
 #include "fit/missing_weights.hpp"
 
 #include <Eigen/Cholesky>
-#include <numeric>
 #include <vector>
 
 #include "fit/defaults.hpp"
@@ -15,10 +14,8 @@ constexpr double least_weight = 0.01;
 constexpr double prior_rows = 40.0;  // for an input, as if this many rows more had no larger variance without it
 
 // Squared residuals of preliminary trees, of all outputs together, each divided by its variance.
-Eigen::VectorXd squared_residuals(const Table& table, const FitOptions& options, Work& work) {
-  std::vector<int> rows(table.inputs.rows());
-  std::iota(rows.begin(), rows.end(), 0);
-  const TrainingRows all = training_rows(table, std::move(rows), options.max_threads);
+Eigen::VectorXd squared_residuals(const TrainingRows& all, const FitOptions& options, Work& work) {
+  const Table& table = *all.table;
   const Plan plan = with_defaults(preliminary_options(options), all, 0);
   std::vector<Partition> partitions;
   for (int output = 0; output < table.outputs.cols(); ++output) {
@@ -49,8 +46,9 @@ Eigen::MatrixXd indicators(const Table& table) {
 
 }  // namespace
 
-Eigen::VectorXd weights_by_missing(const Table& table, const FitOptions& options, Work& work) {
-  const Eigen::VectorXd squares = squared_residuals(table, options, work);
+Eigen::VectorXd weights_by_missing(const TrainingRows& all, const FitOptions& options, Work& work) {
+  const Table& table = *all.table;
+  const Eigen::VectorXd squares = squared_residuals(all, options, work);
   const Eigen::MatrixXd a = indicators(table);
   const auto weighted = table.weights.asDiagonal();
   Eigen::MatrixXd gram = a.transpose() * weighted * a;

@@ -13,7 +13,6 @@ FitOptions preliminary_options(const FitOptions& options) {
           .validity = ValidityChoice::crisp,
           .folds = options.folds,
           .categorical_inputs = options.categorical_inputs,
-          .weights = options.weights,
           .intervals = false,
           .max_threads = options.max_threads};
 }

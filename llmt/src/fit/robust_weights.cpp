@@ -3,8 +3,7 @@
 #include <algorithm>
 #include <vector>
 
-#include "data/table.hpp"
-#include "fit/fit_terms.hpp"
+#include "fit/pipeline.hpp"
 #include "fit/preliminary.hpp"
 #include "llmt/outliers.hpp"
 
@@ -63,23 +62,27 @@ Eigen::VectorXd biweights(const Model& model, const Eigen::Ref<const Eigen::Matr
 
 }  // namespace
 
-Eigen::VectorXd robust_weights(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
-                               const Eigen::Ref<const Eigen::MatrixXd>& outputs, const FitOptions& options,
-                               Work& work) {
-  const FitData data(inputs, outputs, options, true);
-  const Table& table = data.table();
-  FitOptions first = preliminary_options(options);
-  first.folds = data.folds();
-  first.weights = table.weights;
-  Work half(work, 0.5);
-  const Model of_clipped = fit_terms(table.inputs, clipped(table.outputs), first, half).model;
-  first.weights = table.weights.cwiseProduct(biweights(of_clipped, table.inputs, table.outputs, options.max_threads));
-  Work other_half(work, 0.5);
-  const Model of_weighted = fit_terms(table.inputs, table.outputs, first, other_half).model;
-  const Eigen::VectorXd of_table = biweights(of_weighted, table.inputs, table.outputs, options.max_threads);
-  Eigen::VectorXd weights = Eigen::VectorXd::Zero(outputs.rows());
-  for (Eigen::Index row = 0; row < outputs.rows(); ++row) {
-    if (const int of_row = data.row_of()[row]; of_row >= 0) weights(row) = of_table(of_row);
+Eigen::VectorXd robust_weights(const GivenRows& given, const FitOptions& options, Work& work) {
+  const KeptRows kept = keep(given, options.folds);
+  const Eigen::Ref<const Eigen::MatrixXd>& inputs = kept.inputs.values;
+  const Eigen::Ref<const Eigen::MatrixXd>& outputs = kept.outputs.values;
+  const FitOptions preliminary = preliminary_options(options);
+  const auto model_of = [&](const SharedMatrix& taught, const Eigen::VectorXd& weights) {
+    Work half(work, 0.5);
+    const GivenRows rows{.inputs = kept.inputs,
+                         .outputs = taught,
+                         .weights = weights,
+                         .groups = kept.groups,
+                         .numbers = at(given.numbers, kept.rows)};
+    return fit(prepare_plain(rows, preliminary, half), half).model;
+  };
+  const Model of_clipped = model_of(shared(clipped(outputs)), kept.weights);
+  const Eigen::VectorXd first = biweights(of_clipped, inputs, outputs, options.max_threads);
+  const Model of_weighted = model_of(kept.outputs, kept.weights.cwiseProduct(first));
+  const Eigen::VectorXd of_kept = biweights(of_weighted, inputs, outputs, options.max_threads);
+  Eigen::VectorXd weights = Eigen::VectorXd::Zero(std::ssize(kept.row_of));
+  for (Eigen::Index row = 0; row < weights.size(); ++row) {
+    if (const int of_row = kept.row_of[row]; of_row >= 0) weights(row) = of_kept(of_row);
   }
   return weights;
 }

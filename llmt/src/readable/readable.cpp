@@ -7,7 +7,6 @@
 #include <cmath>
 #include <limits>
 #include <memory>
-#include <numeric>
 #include <optional>
 #include <set>
 #include <span>
@@ -15,18 +14,18 @@
 #include <tuple>
 
 #include "base/parallel.hpp"
-#include "data/fold_rows.hpp"
-#include "data/regressors.hpp"
 #include "estimation/leaf_statistics.hpp"
 #include "fit/code_choice.hpp"
-#include "fit/missing_weights.hpp"
-#include "fit/robust_weights.hpp"
+#include "fit/error_weights.hpp"
+#include "fit/prepare.hpp"
 #include "growth/rules/rule.hpp"
 #include "llmt/size.hpp"
 #include "llmt/statistics.hpp"
 #include "model/codes.hpp"
 #include "model/incomplete.hpp"
 #include "readable/input_walk.hpp"
+#include "selection/fold_errors.hpp"
+#include "selection/selection.hpp"
 
 namespace llmt {
 namespace {
@@ -35,9 +34,6 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 
 // Held-out errors below this part of that of a constant are rounding.
 constexpr double rounding_error = 1e-8;
-
-// Held-out rows of a fold that are looked at, as in the fit.
-constexpr Eigen::Index most_held_out_rows = 10000;
 
 // The smallest held-out error of a crisp tree of the fit; infinity if there was none.
 double best_crisp_of(const PartitionSummary& partition) {
@@ -62,66 +58,50 @@ void check(const FitOptions& options, const FitSummary& fitted, double loss) {
 
 // Everything but the loss.
 struct Setting {
-  const Table& table;  // as measured
-  const TrainingRows& all;
-  const std::vector<FoldRows>& folds;
+  const Training& training;            // linear local models
+  const std::vector<FoldRows>& folds;  // held-out rows as in the fit: of many a sample
   TreePlan plan;
-  bool intervals;
-  int max_threads;
 };
 
 std::vector<Sample> samples_of(const Setting& setting, const std::vector<int>& served) {
-  Eigen::VectorXd weights = Eigen::VectorXd::Ones(std::ssize(served));
-  for (std::size_t o = 0; o < served.size() && served.size() > 1; ++o) {
-    const auto output = setting.table.outputs.col(served[o]).array();
-    const double variance = (output - output.mean()).square().mean();
-    weights(o) = variance > 0.0 ? 1.0 / variance : 1.0;
-  }
+  const Eigen::VectorXd weights = error_weights(*setting.training.table, served);
   // The last one is that of all rows.
   std::vector<Sample> samples(setting.folds.size() + 1);
-  parallel_for(std::ssize(samples), setting.max_threads, [&](Eigen::Index f) {
+  parallel_for(std::ssize(samples), setting.plan.max_threads, [&](Eigen::Index f) {
     const bool is_fold = f < std::ssize(setting.folds);
     const TrainingRows* held_out = is_fold ? &setting.folds[f].held_out : nullptr;
-    samples[f] = make_sample(is_fold ? setting.folds[f].training : setting.all, held_out, served, weights);
+    samples[f] = make_sample(is_fold ? setting.folds[f].training : setting.training.all, held_out, served, weights);
   });
   return samples;
 }
 
-// The held-out errors of one tree.
-struct HeldOut {
-  double rmse = 0.0;
-  Eigen::VectorXd of_folds;
-};
-
-HeldOut errors_of(const std::vector<std::vector<WalkStep>>& walks, const std::vector<double>& weights,
-                  const TreeKey& key) {
-  HeldOut errors{.rmse = 0.0, .of_folds = Eigen::VectorXd(std::ssize(weights))};
-  for (std::size_t f = 0; f < weights.size(); ++f) {
-    const double sum = walks[f][key.step].trees[key.form][key.price].held_out_error;
-    errors.of_folds(f) = std::sqrt(sum / weights[f]);
-    errors.rmse += sum;
+// The held-out error of one tree.
+CandidateError error_of(const std::vector<std::vector<WalkStep>>& walks, const FoldErrors& error_of_folds,
+                        const TreeKey& key) {
+  std::vector<double> sums;
+  for (std::size_t f = 0; f + 1 < walks.size(); ++f) {
+    sums.push_back(walks[f][key.step].trees[key.form][key.price].held_out_error);
   }
-  errors.rmse = std::sqrt(errors.rmse / std::accumulate(weights.begin(), weights.end(), 0.0));
-  return errors;
+  return error_of_folds({}, sums);
 }
 
 // The smallest tree that is good enough, and how good it is.
 struct Choice {
   TreeKey key;
-  HeldOut errors;
+  CandidateError error;
   double best_crisp = infinity;
   bool is_within_loss = true;
 };
 
-Choice choose(const std::vector<std::vector<WalkStep>>& walks, const std::vector<double>& weights, double best_crisp,
+Choice choose(const std::vector<std::vector<WalkStep>>& walks, const FoldErrors& error_of_folds, double best_crisp,
               double loss) {
   const std::vector<WalkStep>& final_walk = walks.back();
-  std::vector<std::pair<TreeKey, HeldOut>> trees;
-  Choice choice{.key = {}, .errors = {}, .best_crisp = best_crisp, .is_within_loss = true};
+  std::vector<std::pair<TreeKey, CandidateError>> trees;
+  Choice choice{.key = {}, .error = {}, .best_crisp = best_crisp, .is_within_loss = true};
   for (TreeKey key; key.step < final_walk.size(); ++key.step) {
     for (key.form = 0; key.form < final_walk[key.step].trees.size(); ++key.form) {
       for (key.price = 0; key.price < final_walk[key.step].trees[key.form].size(); ++key.price) {
-        trees.emplace_back(key, errors_of(walks, weights, key));
+        trees.emplace_back(key, error_of(walks, error_of_folds, key));
         // Products are there to make trees smaller, not to ask more of them.
         if (!forms()[key.form].products) choice.best_crisp = std::min(choice.best_crisp, trees.back().second.rmse);
       }
@@ -131,10 +111,10 @@ Choice choose(const std::vector<std::vector<WalkStep>>& walks, const std::vector
   const double least = rounding_error * trees.front().second.rmse;
   const double most = (1.0 + loss) * std::max(choice.best_crisp, least);
   const auto size_of = [&](const TreeKey& key) { return final_walk[key.step].trees[key.form][key.price].size; };
-  const std::pair<TreeKey, HeldOut>* best = nullptr;
+  const std::pair<TreeKey, CandidateError>* best = nullptr;
   for (const auto& tree : trees) {
     if (!(tree.second.rmse <= most)) continue;
-    const auto rank = [&](const std::pair<TreeKey, HeldOut>& each) {
+    const auto rank = [&](const std::pair<TreeKey, CandidateError>& each) {
       return std::tuple(size_of(each.first), each.first.form, each.second.rmse);
     };
     if (best == nullptr || rank(tree) < rank(*best)) best = &tree;
@@ -144,7 +124,7 @@ Choice choose(const std::vector<std::vector<WalkStep>>& walks, const std::vector
     best = &*std::ranges::min_element(trees, {}, [](const auto& tree) { return tree.second.rmse; });
   }
   choice.key = best->first;
-  choice.errors = best->second;
+  choice.error = best->second;
   return choice;
 }
 
@@ -168,19 +148,15 @@ std::unique_ptr<ReadableTrees> find_trees(const Setting& setting, const std::vec
   const Eigen::Index count = std::ssize(made->samples);
   std::vector<std::vector<WalkStep>> walks(count);
   constexpr double share_of_walks = 0.9;
-  parallel_for(count, setting.max_threads, [&](Eigen::Index f) {
+  parallel_for(count, setting.plan.max_threads, [&](Eigen::Index f) {
     Work walk(work, share_of_walks / static_cast<double>(count));
     walks[f] = walk_inputs(made->samples[f], setting.plan, walk);
   });
-  std::vector<double> weights;
-  for (const FoldRows& fold : setting.folds) {
-    weights.push_back(total_weight(fold.held_out) * static_cast<double>(served.size()));
-  }
-  made->choice = choose(walks, weights, best_crisp, loss);
+  made->choice = choose(walks, FoldErrors(setting.folds, std::ssize(served)), best_crisp, loss);
   const TreeKey& key = made->choice.key;
   made->trees.resize(count);
-  parallel_for(count, setting.max_threads, [&](Eigen::Index f) {
-    if (!setting.intervals && f + 1 < count) return;
+  parallel_for(count, setting.plan.max_threads, [&](Eigen::Index f) {
+    if (!setting.training.options.intervals && f + 1 < count) return;
     EquationTree tree = make_tree(made->samples[f], setting.plan, walks[f][key.step], forms()[key.form]);
     std::vector<int> pruned = tree.pruned(price_of(tree, key.price));
     made->trees[f].emplace(ChosenTree{std::move(tree), std::move(pruned)});
@@ -239,9 +215,9 @@ ReadablePartition describe(const Model& model, std::size_t p, const Choice& choi
     alone.outputs[o] = static_cast<int>(o);
   }
   result.size = expression_size(Model(model.inputs(), outputs, model.regressors(), {alone}));
-  result.rmse = choice.errors.rmse;
-  result.fold_rmse = choice.errors.of_folds;
-  result.spread = spread_of(choice.errors.of_folds);
+  result.rmse = choice.error.rmse;
+  result.fold_rmse = choice.error.fold_rmse;
+  result.spread = choice.error.spread;
   result.best_crisp = choice.best_crisp;
   result.is_within_loss = choice.is_within_loss;
   return result;
@@ -250,68 +226,49 @@ ReadablePartition describe(const Model& model, std::size_t p, const Choice& choi
 Intervals intervals_of(const Setting& setting, const std::vector<std::unique_ptr<ReadableTrees>>& parts) {
   std::vector<Model> models;
   std::vector<std::span<const int>> held_out;
-  for (std::size_t f = 0; setting.intervals && f < setting.folds.size(); ++f) {
-    models.push_back(assemble(parts, f, setting.max_threads));
+  for (std::size_t f = 0; setting.training.options.intervals && f < setting.folds.size(); ++f) {
+    models.push_back(assemble(parts, f, setting.plan.max_threads));
     held_out.emplace_back(setting.folds[f].held_out.rows);
   }
-  const Table& table = setting.table;
-  return held_out_intervals(std::move(models), table.inputs, table.outputs, held_out, setting.max_threads);
+  const Table& table = *setting.training.table;
+  return held_out_intervals(std::move(models), table.inputs, table.outputs, held_out, setting.plan.max_threads);
 }
 
-ReadableResult fit_inputs(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
-                          const Eigen::Ref<const Eigen::MatrixXd>& outputs, const FitOptions& options,
-                          const FitSummary& fitted, double loss) {
-  Work work(options.progress);
-  FitOptions linear = options;
-  linear.terms = LocalTerms::linear;
-  if (fitted.loss_weights.size() > 0) {
-    linear.weights = without_outliers(options.weights, fitted.loss_weights);
+}  // namespace
+
+ReadableResult fit_readable(const PreparedFit& prepared, const FitSummary& fitted, double loss,
+                            const Progress& progress) {
+  check(prepared.rows().training->options, fitted, loss);
+  Work work(progress);
+  const std::shared_ptr<const Training> training = with_terms(prepared.rows().training, LocalTerms::linear, work);
+  const FitOptions& options = training->options;
+  std::vector<FoldRows> folds;
+  for (const FoldRows& fold : training->folds) {
+    folds.push_back({fold.training, thinned(fold.held_out, most_held_out_rows)});
   }
-  const FitData data(inputs, outputs, linear, true);
-  const Table& table = data.table();
-  Table weighted = data.trained(fitted.loss_weights);
-  if (table.inputs.hasNaN())
-    weighted.weights = weighted.weights.cwiseProduct(weights_by_missing(weighted, linear, work));
-  std::vector<int> rows(table.inputs.rows());
-  std::iota(rows.begin(), rows.end(), 0);
-  const TrainingRows all = training_rows(weighted, std::move(rows), options.max_threads);
-  std::vector<FoldRows> folds = deal(weighted, table, data.folds(), options.max_threads);
-  for (FoldRows& fold : folds) fold.held_out = thinned(fold.held_out, most_held_out_rows);
-  const Setting setting{.table = table,
-                        .all = all,
+  const Setting setting{.training = *training,
                         .folds = folds,
                         .plan = {.growth = {.min_leaf_samples = options.min_leaf_samples,
                                             .max_leaves = options.max_leaves,
                                             .search = options.expert.search},
-                                 .max_threads = options.max_threads},
-                        .intervals = options.intervals,
-                        .max_threads = options.max_threads};
+                                 .max_threads = options.max_threads}};
   std::vector<std::unique_ptr<ReadableTrees>> parts;
   const double share = work.left();
   for (const PartitionSummary& partition : fitted.partitions) {
     Work part(work, share / static_cast<double>(fitted.partitions.size()));
     parts.push_back(find_trees(setting, partition.outputs, best_crisp_of(partition), loss, part));
   }
-  Model model = assemble(parts, folds.size(), options.max_threads);
-  std::vector<ReadablePartition> partitions;
-  for (std::size_t p = 0; p < parts.size(); ++p) partitions.push_back(describe(model, p, parts[p]->choice));
-  ReadableResult result{std::move(model), std::move(partitions), intervals_of(setting, parts)};
+  ReadableResult result{.model = assemble(parts, folds.size(), options.max_threads),
+                        .partitions = {},
+                        .intervals = intervals_of(setting, parts)};
+  for (std::size_t p = 0; p < parts.size(); ++p) {
+    result.partitions.push_back(describe(result.model, p, parts[p]->choice));
+  }
+  if (const CodeChoice& codes = prepared.rows().codes; !codes.taken.empty()) {
+    result.model = with_codes(result.model, codes.codes);
+    result.intervals = with_codes(result.intervals, codes.codes);
+  }
   work.finish();
-  return result;
-}
-
-}  // namespace
-
-ReadableResult fit_readable(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
-                            const Eigen::Ref<const Eigen::MatrixXd>& outputs, const FitOptions& options,
-                            const FitSummary& fitted, double loss) {
-  check(options, fitted, loss);
-  const std::vector<std::vector<double>>& codes = fitted.codes.codes;
-  if (codes.empty()) return fit_inputs(inputs, outputs, options, fitted, loss);
-  ReadableResult result =
-      fit_inputs(at_positions(codes, inputs), outputs, with_categories(codes, options), fitted, loss);
-  result.model = with_codes(result.model, codes);
-  result.intervals = with_codes(result.intervals, codes);
   return result;
 }
 

@@ -6,7 +6,7 @@
 
 #include "base/matrix.hpp"
 #include "data/dataset.hpp"
-#include "fit/fit_terms.hpp"
+#include "fit/pipeline.hpp"
 #include "stream/crisp_partition.hpp"
 #include "stream/snapshot.hpp"
 #include "stream/state.hpp"
@@ -45,9 +45,11 @@ Model StreamState::model_of_first_rows() const {
   one_leaf.max_leaves = 1;
   one_leaf.folds.count = 0;
   one_leaf.weights = first.rightCols(1);
+  const Eigen::MatrixXd inputs = first.leftCols(inputs_);
+  const Eigen::MatrixXd outputs = first.middleCols(inputs_, outputs_);
   // Not fit(), which refuses an output that hides the others: the trees of a stream take it too.
   Work uncounted;
-  return fit_terms(first.leftCols(inputs_), first.middleCols(inputs_, outputs_), one_leaf, uncounted).model;
+  return fit(prepare_plain(given_rows(inputs, outputs, one_leaf), one_leaf, uncounted), uncounted).model;
 }
 
 std::vector<Partition> StreamState::crisp_partitions() const {

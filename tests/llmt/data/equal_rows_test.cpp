@@ -25,7 +25,7 @@ std::vector<Eigen::Index> all_of(Eigen::Index count) {
 }
 
 bool repeats(const Eigen::MatrixXd& x, const std::vector<Eigen::Index>& rows) {
-  return llmt::find_equal_rows(x, oracle::uniform(x.rows(), 1, 99), rows).are_repeats;
+  return llmt::find_equal_rows(x, rows, llmt::number_rows(x, oracle::uniform(x.rows(), 1, 99), rows)).are_repeats;
 }
 
 Eigen::MatrixXd times(const Eigen::MatrixXd& table, Eigen::Index count) { return table.replicate(count, 1); }

@@ -1,6 +1,4 @@
 // The rows that a fit held out are those of its intervals.
-#include "llmt/held_out.hpp"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -11,8 +9,7 @@
 
 namespace {
 
-// Residuals of the folds' models on the rows that held_out_rows() names are those that the fit kept, copies counted
-// once.
+// Residuals of the folds' models on the rows that the summary names are those that the fit kept, copies counted once.
 TEST(HeldOutRows, AreThoseOfTheIntervals) {
   llmt::Random random(3);
   constexpr int rows = 120;
@@ -32,7 +29,7 @@ TEST(HeldOutRows, AreThoseOfTheIntervals) {
   options.weights = Eigen::VectorXd::Ones(rows);
   options.weights(40) = 0.0;
   const llmt::FitResult result = llmt::fit(inputs, outputs, options);
-  const std::vector<std::vector<Eigen::Index>> held_out = llmt::held_out_rows(inputs, outputs, options);
+  const std::vector<std::vector<Eigen::Index>>& held_out = result.summary.held_out;
   ASSERT_EQ(held_out.size(), result.intervals.models().size());
   std::size_t covered = 0;
   for (std::size_t f = 0; f < held_out.size(); ++f) {
@@ -50,7 +47,8 @@ TEST(HeldOutRows, AreThoseOfTheIntervals) {
 TEST(HeldOutRows, AreNoneWithoutFolds) {
   llmt::FitOptions options;
   options.folds.count = 0;
-  EXPECT_TRUE(llmt::held_out_rows(Eigen::MatrixXd::Random(9, 1), Eigen::MatrixXd::Random(9, 1), options).empty());
+  const Eigen::MatrixXd values = Eigen::VectorXd::LinSpaced(9, 0.0, 1.0);
+  EXPECT_TRUE(llmt::fit(values, values, options).summary.held_out.empty());
 }
 
 }  // namespace

@@ -3,6 +3,8 @@
 
 #include <cmath>
 #include <limits>
+#include <numeric>
+#include <vector>
 
 #include "fit/missing_weights.hpp"
 #include "llmt/fit.hpp"
@@ -47,9 +49,12 @@ TEST(Missing, RowsCountByHowMuchWhatIsMissingScattersTheOutput) {
   y += 0.5 * oracle::uniform(1000, 1, 10);
   for (Eigen::Index i = 0; i < 300; ++i) x(i, i / 100) = oracle::missing;
   const llmt::FitOptions options;
-  const llmt::FitData data(x, y, options, true);
+  const std::vector<int> columns = {0, 1, 2};
+  const llmt::Table table{x, y, Eigen::VectorXd::Ones(1000), {0, 0, 0}, columns, columns};
+  std::vector<int> rows(1000);
+  std::iota(rows.begin(), rows.end(), 0);
   llmt::Work uncounted;
-  const Eigen::VectorXd weights = llmt::weights_by_missing(data.table(), options, uncounted);
+  const Eigen::VectorXd weights = llmt::weights_by_missing(llmt::training_rows(table, rows), options, uncounted);
   // The variance that x_0 adds is 33, of which 100 / 140 counts; the rest raises that of complete rows to about 1.
   EXPECT_LT(weights.head(100).maxCoeff(), 0.1);
   EXPECT_GT(weights.segment(100, 100).minCoeff(), 0.3);

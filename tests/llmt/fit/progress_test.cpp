@@ -116,6 +116,20 @@ TEST(Progress, OfAFitOfManyRows) {
   }
 }
 
+TEST(Progress, OfAFitOfPreparedData) {
+  llmt::FitOptions options{.max_leaves = 3, .loss = llmt::Loss::tukey, .folds = {.count = 2}, .max_threads = 1};
+  const Rows data = rows(60, 2, 1);
+  const Call preparing = [&](const llmt::Progress& progress) {
+    return std::to_string(llmt::PreparedFit({data.x, data.y}, options, progress).data().inputs(0, 0));
+  };
+  watched::expect_rising(watched::reports_of(preparing));
+  watched::expect_stops_at_every_report(preparing, 7);
+  const llmt::PreparedFit prepared({data.x, data.y}, options);
+  const Call fitted = [&](const llmt::Progress& progress) { return to_json(llmt::fit(prepared, progress).model); };
+  watched::expect_rising(watched::reports_of(fitted));
+  watched::expect_stops_at_every_report(fitted, 7);
+}
+
 Call comparing(const Rows& rows) {
   return [=](const llmt::Progress& progress) {
     llmt::FitOptions base{.max_leaves = 3, .folds = {.count = 2}, .max_threads = 1};
@@ -143,11 +157,11 @@ TEST(Progress, OfAComparisonNamesTheMethods) {
 
 TEST(Progress, OfAReadableTree) {
   const Rows data = rows(60, 2, 1);
-  llmt::FitOptions options{.max_leaves = 3, .folds = {.count = 2}, .max_threads = 1};
-  const llmt::FitSummary fitted = llmt::fit(data.x, data.y, options).summary;
+  const llmt::FitOptions options{.max_leaves = 3, .folds = {.count = 2}, .max_threads = 1};
+  const llmt::PreparedFit prepared({data.x, data.y}, options);
+  const llmt::FitSummary fitted = llmt::fit(prepared).summary;
   const Call call = [&](const llmt::Progress& progress) {
-    options.progress = progress;
-    return to_json(llmt::fit_readable(data.x, data.y, options, fitted).model);
+    return to_json(llmt::fit_readable(prepared, fitted, 0.15, progress).model);
   };
   watched::expect_rising(watched::reports_of(call));
   watched::expect_stops_at_every_report(call, 5);

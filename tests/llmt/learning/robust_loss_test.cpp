@@ -80,11 +80,12 @@ TEST(RobustLoss, HeldOutErrorIsThatOfNewRows) {
   wrong.y(1500, 0) += 90.0;
   const Sample test = with_normal_noise(10000, 2);
   for (const Sample* each : {&std::as_const(clean), &std::as_const(wrong)}) {
-    const llmt::FitResult robust = llmt::fit(each->x, each->y, tukey);
+    const llmt::PreparedFit prepared({each->x, each->y}, tukey);
+    const llmt::FitResult robust = llmt::fit(prepared);
     const llmt::PartitionSummary& partition = robust.summary.partitions[0];
     EXPECT_NEAR(partition.chosen.rmse / error(robust.model, test), 1.0, 0.04);
     EXPECT_NEAR(partition.train_rmse(0) / error(robust.model, test), 1.0, 0.05);
-    const llmt::ReadableResult readable = llmt::fit_readable(each->x, each->y, tukey, robust.summary);
+    const llmt::ReadableResult readable = llmt::fit_readable(prepared, robust.summary);
     EXPECT_NEAR(readable.partitions[0].rmse / error(readable.model, test), 1.0, 0.04);
   }
 }

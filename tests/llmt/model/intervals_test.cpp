@@ -12,7 +12,6 @@
 
 #include "llmt/files.hpp"
 #include "llmt/fit.hpp"
-#include "llmt/held_out.hpp"
 #include "llmt/random.hpp"
 #include "oracles/samples.hpp"
 #include "oracles/thrown.hpp"
@@ -45,7 +44,7 @@ struct Ends {
 };
 Ends sorted_ends(const llmt::FitResult& fit, const Sample& train, bool complete, bool incomplete,
                  const Eigen::RowVectorXd& x, std::size_t m) {
-  const std::vector<std::vector<Eigen::Index>> held_out = llmt::held_out_rows(train.x, train.y);
+  const std::vector<std::vector<Eigen::Index>>& held_out = fit.summary.held_out;
   std::vector<double> lower;
   std::vector<double> upper;
   for (std::size_t f = 0; f < held_out.size(); ++f) {

@@ -32,8 +32,8 @@ Data two_regimes(Eigen::Index rows, double noise, std::uint64_t seed = 1) {
 }
 
 llmt::ReadableResult readable(const Data& data, const llmt::FitOptions& options = {}, double loss = 0.1) {
-  const llmt::FitResult fitted = llmt::fit(data.inputs, data.outputs, options);
-  return llmt::fit_readable(data.inputs, data.outputs, options, fitted.summary, loss);
+  const llmt::PreparedFit prepared({data.inputs, data.outputs}, options);
+  return llmt::fit_readable(prepared, llmt::fit(prepared).summary, loss);
 }
 
 llmt::FitOptions crisp() {
@@ -171,12 +171,11 @@ TEST(Readable, ErrorIsWithinTheLossOfTheBestCrispTreeAndSizeFallsWithTheLoss) {
     for (Eigen::Index j = 0; j < 3; ++j) data.inputs(i, j) = random.uniform(-2.0, 2.0);
     data.outputs(i, 0) = std::sin(2.0 * data.inputs(i, 0)) + 0.3 * data.inputs(i, 1) + 0.1 * random.normal();
   }
-  const llmt::FitOptions options = crisp();
-  const llmt::FitResult fitted = llmt::fit(data.inputs, data.outputs, options);
+  const llmt::PreparedFit prepared({data.inputs, data.outputs}, crisp());
+  const llmt::FitResult fitted = llmt::fit(prepared);
   Eigen::Index before = std::numeric_limits<Eigen::Index>::max();
   for (const double loss : {0.0, 0.05, 0.1, 0.3, 1.0, 10.0}) {
-    const llmt::ReadablePartition tree =
-        llmt::fit_readable(data.inputs, data.outputs, options, fitted.summary, loss).partitions[0];
+    const llmt::ReadablePartition tree = llmt::fit_readable(prepared, fitted.summary, loss).partitions[0];
     EXPECT_LE(tree.best_crisp, fitted.summary.partitions[0].chosen.rmse);
     EXPECT_LE(tree.rmse, (1.0 + loss) * tree.best_crisp) << loss;
     EXPECT_LE(tree.size, before);
@@ -275,7 +274,7 @@ TEST(Readable, RefusesWhatItCannotKeep) {
   const llmt::FitSummary fitted = llmt::fit(data.inputs, data.outputs, crisp()).summary;
   const auto refused = [&](const llmt::FitOptions& options, double loss, const std::string& word) {
     try {
-      llmt::fit_readable(data.inputs, data.outputs, options, fitted, loss);
+      llmt::fit_readable(llmt::PreparedFit({data.inputs, data.outputs}, options), fitted, loss);
       ADD_FAILURE() << word;
     } catch (const std::invalid_argument& error) {
       EXPECT_NE(std::string(error.what()).find(word), std::string::npos) << error.what();

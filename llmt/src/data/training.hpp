@@ -1,0 +1,97 @@
+/// \file
+/// The rows of a fit, made ready: checked, without copies, weighted, dealt to folds, described.
+///
+/// A fit checks, hashes and sorts a caller's rows once, by given_rows(). All later forms of them (other weights, fewer
+/// rows, other columns) are made from the result.
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "data/equal_rows.hpp"
+#include "data/fold_rows.hpp"
+#include "data/table.hpp"
+#include "llmt/options.hpp"
+
+namespace llmt {
+
+/// A matrix that either views the caller's numbers or shares its own.
+struct SharedMatrix {
+  Eigen::Ref<const Eigen::MatrixXd> values;
+  std::shared_ptr<const Eigen::MatrixXd> owned = nullptr;  ///< what `values` views; null: the caller's
+};
+
+/// Takes over a matrix.
+SharedMatrix shared(Eigen::MatrixXd matrix);
+
+/// Rows to learn from. `weights`, `loss_weights`, `groups` and `numbers` have one entry a row, or none.
+struct GivenRows {
+  SharedMatrix inputs;
+  SharedMatrix outputs;
+  Eigen::VectorXd weights = {};       ///< not negative; a row of weight 0 takes no part. Empty: all 1
+  Eigen::VectorXd loss_weights = {};  ///< in training, not in errors, a row's weight is times this. Empty: all 1
+  std::vector<double> groups = {};    ///< rows of one group share a fold. Empty: each row stands alone
+  RowNumbers numbers = {};  ///< which rows are equal; not looked for where groups are given or nothing is held out
+};
+
+/// The caller's rows, checked and numbered. The matrices must outlive what is made of the result. Throws
+/// std::invalid_argument as fit().
+GivenRows given_rows(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<const Eigen::MatrixXd>& outputs,
+                     const FitOptions& options);
+
+/// Some of the rows.
+GivenRows rows_at(const GivenRows& given, const std::vector<Eigen::Index>& rows);
+
+/// The rows that take part. Rows of weight 0 do not. Where rows are held out, copies of a row (find_equal_rows()) only
+/// add to its weight, and repeats of a measurement share a fold. Nothing is copied where all rows take part.
+struct KeptRows {
+  SharedMatrix inputs;
+  SharedMatrix outputs;
+  Eigen::VectorXd weights = {};         ///< positive, those of copies added, the largest 1
+  Eigen::VectorXd loss_weights = {};    ///< as GivenRows
+  std::vector<double> groups = {};      ///< as GivenRows
+  std::vector<Eigen::Index> rows = {};  ///< their places among the given rows, ascending
+  std::vector<int> row_of = {};         ///< of each given row, the kept row that it is; -1: it takes no part
+  std::vector<Fold> folds = {};         ///< selection_folds()
+  Eigen::Index copies = 0;              ///< the number of given rows that are copies
+  bool has_repeats = false;             ///< whether rows with equal inputs are repeats
+
+  Eigen::Index count() const { return weights.size(); }
+};
+
+/// Throws std::invalid_argument as selection_folds().
+KeptRows keep(const GivenRows& given, const FoldOptions& folds);
+
+/// The given rows that each fold holds out, ascending: those that are copies of a kept row too.
+std::vector<std::vector<Eigen::Index>> held_out_rows(const KeptRows& kept);
+
+/// The rows of a fit in all forms that the stages of the fit read. Its parts share tables, so that it may be copied and
+/// moved.
+struct Training {
+  FitOptions options;  ///< by which the columns are described
+  std::shared_ptr<const KeptRows> kept;
+  SharedMatrix inputs;                    ///< of the kept rows, or positions where some inputs are codes
+  std::shared_ptr<const Table> table;     ///< with the weights that rows have in errors
+  std::shared_ptr<const Table> weighted;  ///< with the weights that rows have in training
+  TrainingRows all;                       ///< of the table `weighted`
+  TrainingRows measured;                  ///< the same rows and columns with the weights of `table`
+  std::vector<FoldRows> folds;            ///< held-out rows are measured
+
+  Eigen::Index outputs() const { return table->outputs.cols(); }
+};
+
+/// Weights by which those of rows with missing values are multiplied, from the rows as they are without.
+using MissingWeights = std::function<Eigen::VectorXd(const TrainingRows& all)>;
+
+/// `inputs`: as Training::inputs. `orders_splits`: see make_table(). `missing_weights`: called where values are
+/// missing, unless it is empty.
+Training make_training(std::shared_ptr<const KeptRows> kept, const SharedMatrix& inputs, const FitOptions& options,
+                       bool orders_splits, const MissingWeights& missing_weights = {});
+
+/// The same training with fewer inputs: `of_all` of the model of all rows, `of_folds` of each fold's, all ascending.
+Training narrowed(const Training& training, const std::vector<int>& of_all,
+                  const std::vector<std::vector<int>>& of_folds);
+
+}  // namespace llmt

@@ -1,0 +1,13 @@
+/// \file
+/// The stages of a fit, one after the other.
+#pragma once
+
+#include "fit/prepare.hpp"
+#include "llmt/fit.hpp"
+
+namespace llmt {
+
+/// Chooses terms and inputs, grows, chooses and finishes. `work`: of this. Throws as fit().
+FitResult fit(const PreparedRows& rows, Work& work);
+
+}  // namespace llmt
