@@ -9,6 +9,7 @@
 #include <set>
 #include <stdexcept>
 
+#include "base/sum_over.hpp"
 #include "data/equal_rows.hpp"
 #include "fit/check_options.hpp"
 #include "fit/robust_weights.hpp"
@@ -131,8 +132,7 @@ Eigen::VectorXd error_weights_of(const Method& method, const Eigen::VectorXd& lo
 void judge_on_folds(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<const Eigen::MatrixXd>& output,
                     const Method& method, const Eigen::VectorXd& error_weights, const std::vector<Fold>& folds,
                     double share, Work& work, Comparison& entry) {
-  double squares = 0.0;
-  double weight = 0.0;
+  WeightedMean all;
   entry.fold_rmse.resize(std::ssize(folds));
   for (std::size_t f = 0; f < folds.size(); ++f) {
     const Fold& fold = folds[f];
@@ -143,12 +143,14 @@ void judge_on_folds(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen
     const Eigen::VectorXd error =
         fitted.model.predict(inputs(fold.held_out, Eigen::all)) - Eigen::MatrixXd(output(fold.held_out, Eigen::all));
     const Eigen::VectorXd weights = error_weights(fold.held_out);
-    const double of_fold = weights.dot(error.cwiseAbs2());
-    squares += of_fold;
-    weight += weights.sum();
-    entry.fold_rmse(f) = weights.sum() > 0.0 ? std::sqrt(of_fold / weights.sum()) : 0.0;
+    const auto add = [&](RowSpan block, WeightedMean& squares) {
+      for (Eigen::Index i = block.begin; i < block.end; ++i) squares.add(error(i) * error(i), weights(i));
+    };
+    const WeightedMean squares = sum_over(RowBlocks{error.size()}, 1, WeightedMean{}, add);
+    all += squares;
+    entry.fold_rmse(f) = std::sqrt(squares.value());
   }
-  entry.cv_rmse = std::sqrt(squares / weight);
+  entry.cv_rmse = std::sqrt(all.value());
   entry.spread = spread_of(entry.fold_rmse);
 }
 

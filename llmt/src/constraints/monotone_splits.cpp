@@ -12,15 +12,20 @@ namespace {
 
 // The training rows' most frequent level of each categorical input; -1 for numbers.
 std::vector<int> usual_levels(const TrainingRows& training) {
-  std::vector<int> result;
-  for (std::size_t input = 0; input < training.columns.size(); ++input) {
-    const int levels = training.table->num_levels[input];
-    std::vector<Eigen::Index> count(levels, 0);
-    for (std::size_t row = 0; levels > 0 && row < training.rows.size(); ++row) {
-      const double value = training.table->inputs(training.rows[row], input);
-      ++count[static_cast<std::size_t>(value)];
+  using Counts = std::vector<std::vector<Eigen::Index>>;  // of each level of each input
+  Counts zero;
+  for (const int levels : training.table->num_levels) zero.emplace_back(levels, 0);
+  const auto add = [&](RowSpan block, Counts& counts) {
+    for (std::size_t input = 0; input < counts.size(); ++input) {
+      if (counts[input].empty()) continue;
+      for (Eigen::Index i = block.begin; i < block.end; ++i) {
+        ++counts[input][static_cast<std::size_t>(training.table->inputs(training.rows[i], input))];
+      }
     }
-    result.push_back(levels > 0 ? static_cast<int>(std::ranges::max_element(count) - count.begin()) : -1);
+  };
+  std::vector<int> result;
+  for (const std::vector<Eigen::Index>& counts : sum_over(RowBlocks{training.count()}, 1, std::move(zero), add)) {
+    result.push_back(counts.empty() ? -1 : static_cast<int>(std::ranges::max_element(counts) - counts.begin()));
   }
   return result;
 }

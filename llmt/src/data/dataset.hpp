@@ -3,11 +3,12 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <functional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "base/matrix.hpp"
+#include "base/sum_over.hpp"
 #include "data/table.hpp"
 #include "llmt/partition.hpp"
 
@@ -44,7 +45,7 @@ TrainingRows narrowed(const TrainingRows& rows, const std::vector<int>& inputs);
 /// The given rows under the columns of `training`.
 TrainingRows query_rows(const Table& table, std::vector<int> rows, const TrainingRows& training);
 
-/// A few rows laid out one after the other, for passes over all of them.
+/// A few rows laid out one after the other, for passes over all of them: usually those of a block.
 struct Chunk {
   RowMajor inputs;      ///< NaN: missing
   RowMajor deviations;  ///< of the regressors from their centres; NaN: missing
@@ -54,15 +55,17 @@ struct Chunk {
   Eigen::Index count() const { return weights.size(); }
 };
 
-inline constexpr Eigen::Index chunk_rows = 2048;
-
-inline Eigen::Index num_chunks(const TrainingRows& rows) { return (rows.count() + chunk_rows - 1) / chunk_rows; }
+/// Number of blocks of block_rows rows.
+inline Eigen::Index num_chunks(const TrainingRows& rows) { return RowBlocks{rows.count()}.count(); }
 
 /// Sum of the rows' weights.
 double total_weight(const TrainingRows& rows);
 
-/// The rows at positions index * chunk_rows ... of `rows`.
-Chunk fetch(const TrainingRows& rows, Eigen::Index index, const std::vector<int>& outputs);
+/// The rows of a block.
+Chunk fetch(const TrainingRows& rows, Eigen::Index block, const std::vector<int>& outputs);
+
+/// The rows of all blocks.
+std::vector<Chunk> fetch_all(const TrainingRows& rows, const std::vector<int>& outputs);
 
 /// Inputs of some rows, given by their positions among `rows`; NaN: missing.
 RowMajor inputs_of(const TrainingRows& rows, std::span<const int> positions);
@@ -70,15 +73,20 @@ RowMajor inputs_of(const TrainingRows& rows, std::span<const int> positions);
 /// The rows at the given positions of `rows`.
 Chunk fetch(const TrainingRows& rows, const std::vector<int>& positions, const std::vector<int>& outputs);
 
-/// Passes over the rows in parallel: the chunks index, index + num_slots, ... of a slot come one after the other. What
-/// is summed up is summed per slot, and the slots in order.
-inline constexpr Eigen::Index num_slots = 16;
-void for_each_chunk(const TrainingRows& rows, const std::vector<int>& outputs, int max_threads,
-                    const std::function<void(std::size_t slot, const Chunk& chunk)>& body);
+/// sum_over() with the rows laid out: add(chunk, sum).
+template <class Sum, class Add>
+Sum sum_over(const TrainingRows& rows, const std::vector<int>& outputs, int max_threads, Sum zero, const Add& add) {
+  return sum_over(RowBlocks{rows.count()}, max_threads, std::move(zero),
+                  [&](RowSpan block, Sum& sum) { add(fetch(rows, block.begin / block_rows, outputs), sum); });
+}
 
-/// About `count` of the rows, or all if they are few more, with weights that make them stand for all. Which ones
-/// depends on the rows' values, not on their order; fewer are among more.
-TrainingRows thinned(const TrainingRows& rows, Eigen::Index count, int max_threads = 1);
+/// Positions of the `count` rows (all, if they are fewer) with the smallest hashes of their inputs and outputs,
+/// ascending; and of the rows that equal one of them. Which rows they are does not depend on the order of the rows, and
+/// fewer are among more.
+std::vector<int> smallest_hashes(const TrainingRows& rows, Eigen::Index count, int max_threads);
+
+/// The `count` rows with the smallest hashes, or all if they are few more, with weights that make them stand for all.
+TrainingRows subsample(const TrainingRows& rows, Eigen::Index count, int max_threads = 1);
 
 /// Levels beyond this many, the rarest, share the reference level's place in the local models.
 inline constexpr Eigen::Index max_level_regressors = 30;

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -12,6 +11,7 @@
 
 #include "base/count.hpp"
 #include "base/parallel.hpp"
+#include "data/row_hash.hpp"
 
 namespace llmt {
 namespace {
@@ -33,19 +33,6 @@ constexpr int fewest_different = 10;
 // Rows that are hashed at a time. Hashes are sorted in parts, by this many of their first bits.
 constexpr Eigen::Index rows_at_once = 16384;
 constexpr int bits_of_part = 4;
-
-// The same for 0 and -0, and for all NaN.
-std::uint64_t bits_of(double value) {
-  if (std::isnan(value)) value = std::numeric_limits<double>::quiet_NaN();
-  return std::bit_cast<std::uint64_t>(value == 0.0 ? 0.0 : value);
-}
-
-// By Steele, Lea & Flood (2014), the output function of SplitMix64.
-std::uint64_t mixed(std::uint64_t bits) {
-  bits = (bits ^ (bits >> 30)) * 0xBF58476D1CE4E5B9U;
-  bits = (bits ^ (bits >> 27)) * 0x94D049BB133111EBU;
-  return bits ^ (bits >> 31);
-}
 
 std::vector<int> sizes_of(const std::vector<int>& numbers) {
   std::vector<int> sizes(numbers.size(), 0);
@@ -144,7 +131,7 @@ std::vector<int> number_different_rows(const Eigen::Ref<const Eigen::MatrixXd>& 
     const Eigen::Index end = std::min(std::ssize(rows), (part + 1) * rows_at_once);
     for (const int j : columns) {
       for (Eigen::Index i = part * rows_at_once; i < end; ++i) {
-        hashes[i] = mixed(hashes[i] + 0x9E3779B97F4A7C15U + bits_of(table(rows[i], j)));
+        hashes[i] = row_hash(hashes[i], table(rows[i], j));
       }
     }
   });
@@ -153,9 +140,10 @@ std::vector<int> number_different_rows(const Eigen::Ref<const Eigen::MatrixXd>& 
   for (int i = 0; i < count_of(rows); ++i) parts[hashes[i] >> (64 - bits_of_part)].emplace_back(hashes[i], i);
   const auto compare = [&](int a, int b) -> int {
     for (const int j : columns) {
-      const std::uint64_t of_a = bits_of(table(rows[a], j));
-      const std::uint64_t of_b = bits_of(table(rows[b], j));
-      if (of_a != of_b) return of_a < of_b ? -1 : 1;
+      const double of_a = table(rows[a], j);
+      const double of_b = table(rows[b], j);
+      if (of_a < of_b || (!std::isnan(of_a) && std::isnan(of_b))) return -1;
+      if (of_b < of_a || (std::isnan(of_a) && !std::isnan(of_b))) return 1;
     }
     return 0;
   };

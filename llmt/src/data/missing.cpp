@@ -6,23 +6,20 @@ namespace llmt {
 
 RowMajor all_deviations(const TrainingRows& rows) {
   RowMajor all(rows.count(), std::ssize(rows.regressors));
-  for (Eigen::Index index = 0; index < num_chunks(rows); ++index) {
-    const Chunk chunk = fetch(rows, index, {});
-    all.middleRows(index * chunk_rows, chunk.count()) = chunk.deviations;
+  for (Eigen::Index block = 0; block < num_chunks(rows); ++block) {
+    const Chunk chunk = fetch(rows, block, {});
+    all.middleRows(block * block_rows, chunk.count()) = chunk.deviations;
   }
   return all;
 }
 
 double mean_of_present(const RowMajor& x, Eigen::Index column, const Eigen::VectorXd& weights) {
-  double sum = 0.0;
-  double present = 0.0;
-  for (Eigen::Index i = 0; i < x.rows(); ++i) {
-    if (!std::isnan(x(i, column))) {
-      sum += weights(i) * x(i, column);
-      present += weights(i);
+  const auto add = [&](RowSpan block, WeightedMean& mean) {
+    for (Eigen::Index i = block.begin; i < block.end; ++i) {
+      if (!std::isnan(x(i, column))) mean.add(x(i, column), weights(i));
     }
-  }
-  return present > 0.0 ? sum / present : 0.0;
+  };
+  return sum_over(RowBlocks{x.rows()}, 1, WeightedMean{}, add).value();
 }
 
 }  // namespace llmt

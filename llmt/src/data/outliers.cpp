@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "base/sum_over.hpp"
 #include "llmt/statistics.hpp"
 
 namespace llmt {
@@ -31,7 +32,7 @@ HeavyRows heavy_rows(const Eigen::Ref<const Eigen::VectorXd>& output) {
   const double farthest = distance.maxCoeff();
   if (!(bulk.spread > 0.0 && farthest > far_spreads * bulk.spread)) return {};
   const Eigen::VectorXd squares = (distance / farthest).array().square();  // so that they stay finite
-  const double all = squares.sum();
+  const double all = sum_of_rows(squares.size(), [&](Eigen::Index row) { return squares(row); });
   std::vector<Eigen::Index> rows(output.size());
   std::iota(rows.begin(), rows.end(), Eigen::Index{0});
   const Eigen::Index most = std::max<Eigen::Index>(1, output.size() / one_row_in);

@@ -1,13 +1,11 @@
 // Fewer inputs or fewer rows of some training rows.
 #include <algorithm>
-#include <bit>
-#include <cmath>
+#include <compare>
 #include <cstdint>
-#include <limits>
+#include <tuple>
 
-#include "base/parallel.hpp"
 #include "data/dataset.hpp"
-#include "data/regressors.hpp"
+#include "data/row_hash.hpp"
 #include "partition/through_regressors.hpp"
 
 namespace llmt {
@@ -36,39 +34,65 @@ TrainingRows narrowed(const TrainingRows& rows, const std::vector<int>& inputs) 
   return result;
 }
 
-TrainingRows thinned(const TrainingRows& rows, Eigen::Index count, int max_threads) {
+namespace {
+
+// The rows with the smallest hashes among some rows. Adding two of these is no sum of numbers, but it may be done in
+// any order as well.
+struct SmallestHashes {
+  struct Row {
+    std::uint64_t hash;
+    Eigen::Index position;
+    auto operator<=>(const Row&) const = default;
+  };
+  Eigen::Index count = 0;
+  std::vector<Row> rows;
+
+  // Leaves out rows until there are `count`, or more whose hashes are equal.
+  void trim() {
+    if (std::ssize(rows) <= count) return;
+    const auto last = rows.begin() + (count - 1);
+    std::nth_element(rows.begin(), last, rows.end());
+    const auto beyond = [largest = last->hash](const Row& row) { return row.hash > largest; };
+    rows.erase(std::remove_if(last, rows.end(), beyond), rows.end());
+  }
+
+  SmallestHashes& operator+=(SmallestHashes other) {
+    rows.insert(rows.end(), other.rows.begin(), other.rows.end());
+    trim();
+    return *this;
+  }
+  static auto fields(auto& self) { return std::tie(self.count, self.rows); }
+};
+
+}  // namespace
+
+std::vector<int> smallest_hashes(const TrainingRows& rows, Eigen::Index count, int max_threads) {
+  const Table& table = *rows.table;
+  const auto add = [&](RowSpan block, SmallestHashes& sum) {
+    std::vector<std::uint64_t> hashes(block.count(), 0);
+    for (const auto* columns : {&table.inputs, &table.outputs}) {
+      for (Eigen::Index j = 0; j < columns->cols(); ++j) {
+        for (Eigen::Index k = 0; k < block.count(); ++k) {
+          hashes[k] = row_hash(hashes[k], (*columns)(rows.rows[block.begin + k], j));
+        }
+      }
+    }
+    for (Eigen::Index k = 0; k < block.count(); ++k) sum.rows.push_back({hashes[k], block.begin + k});
+    sum.trim();
+  };
+  const SmallestHashes smallest =
+      sum_over(RowBlocks{rows.count(), large_block_rows}, max_threads, SmallestHashes{count, {}}, add);
+  std::vector<int> positions;
+  for (const auto& row : smallest.rows) positions.push_back(static_cast<int>(row.position));
+  std::ranges::sort(positions);
+  return positions;
+}
+
+TrainingRows subsample(const TrainingRows& rows, Eigen::Index count, int max_threads) {
   TrainingRows result = rows;
   if (rows.count() <= count + count / 4) return result;
-  // The rows with the smallest hashes of their values. Steps of splitmix64 (Steele, Lea & Flood 2014).
-  const auto mixed = [](std::uint64_t state, double value) {
-    std::uint64_t z = state + std::bit_cast<std::uint64_t>(value + 0.0) + 0x9e3779b97f4a7c15ULL;  // -0 as 0
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ULL;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebULL;
-    return z ^ (z >> 31);
-  };
-  std::vector<std::uint64_t> hashes(rows.rows.size(), 0);
-  parallel_for(num_chunks(rows), max_threads, [&](Eigen::Index index) {
-    const Eigen::Index end = std::min(rows.count(), (index + 1) * chunk_rows);
-    for (Eigen::Index i = index * chunk_rows; i < end; ++i) {
-      const int row = rows.rows[i];
-      for (Eigen::Index j = 0; j < rows.table->inputs.cols(); ++j) {
-        const double value = rows.table->inputs(row, j);
-        hashes[i] = mixed(hashes[i], std::isnan(value) ? std::numeric_limits<double>::infinity() : value);
-      }
-      for (Eigen::Index o = 0; o < rows.table->outputs.cols(); ++o) {
-        hashes[i] = mixed(hashes[i], rows.table->outputs(row, o));
-      }
-    }
-  });
-  std::vector<std::uint64_t> order = hashes;
-  std::nth_element(order.begin(), order.begin() + (count - 1), order.end());
-  const std::uint64_t last = order[count - 1];
   result.rows.clear();
-  for (std::size_t i = 0; i < hashes.size(); ++i) {
-    if (hashes[i] <= last) {
-      result.rows.push_back(rows.rows[i]);
-    }
-  }
+  for (const int position : smallest_hashes(rows, count, max_threads)) result.rows.push_back(rows.rows[position]);
   result.weight_unit *= total_weight(rows) / total_weight(result);
   return result;
 }

@@ -62,20 +62,4 @@ std::vector<std::pair<int, int>> products_of(const Table& table) {
   return result;
 }
 
-Regressor product_regressor(const Table& table, const std::vector<int>& rows, const std::vector<InputColumn>& columns,
-                            const std::pair<int, int>& inputs) {
-  const auto [first, second] = inputs;
-  const double first_centre = columns[first].centre;
-  const double second_centre = columns[second].centre;
-  double sum = 0.0;
-  double present = 0.0;
-  for (const int row : rows) {
-    // No row of these lies beyond their extent.
-    const double product = (table.inputs(row, first) - first_centre) * (table.inputs(row, second) - second_centre);
-    sum += std::isnan(product) ? 0.0 : table.weights(row) * product;
-    present += std::isnan(product) ? 0.0 : table.weights(row);
-  }
-  return {.input = first, .level = -1, .centre = present > 0.0 ? sum / present : 0.0, .second_input = second};
-}
-
 }  // namespace llmt

@@ -25,9 +25,4 @@ Eigen::Index count_numeric_inputs(Eigen::Index inputs, const FitOptions& options
 /// no square of one that takes two values.
 std::vector<std::pair<int, int>> products_of(const Table& table);
 
-/// The product of the deviations of two inputs with its weighted mean over `rows`, where both have a value. `columns`:
-/// of all inputs.
-Regressor product_regressor(const Table& table, const std::vector<int>& rows, const std::vector<InputColumn>& columns,
-                            const std::pair<int, int>& inputs);
-
 }  // namespace llmt

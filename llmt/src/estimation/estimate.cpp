@@ -60,7 +60,7 @@ Partition estimate(const TrainingRows& training, const GrownTree& grown, const C
   if (!is_crisp && candidate.estimation == Estimation::joint) {
     const Regularisation regularisation{candidate.ridge, candidate.shrinkage, candidate.sparse};
     if (training.count() > 2 * enough) {
-      const TrainingRows sample = thinned(training, enough, max_threads);
+      const TrainingRows sample = subsample(training, enough, max_threads);
       const LeafSums sums = sum_leaves(sample, std::move(partition), max_threads, candidate.sparse);
       return joint_from_sample(sums, training, candidate.leaves, regularisation);
     }

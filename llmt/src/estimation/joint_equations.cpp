@@ -75,10 +75,9 @@ JointEquations joint_equations(const LeafSums& sums, Eigen::Index leaves) {
   const Eigen::Index unknowns = std::ssize(result.leaf_nodes) * size;
   result.matrix.setZero(unknowns, unknowns);
   const NormalEquations& equations = sums.equations;
-  for (std::size_t i = 0; i < equations.leaves.size(); ++i) {
+  for (int i = 0; i < std::ssize(equations.leaves); ++i) {
     const Eigen::Index row = result.position[equations.leaves[i]];
-    for (std::size_t j = 0; j <= i; ++j) {
-      if (!equations.has_block(i, j)) continue;
+    for (const auto& [j, packed] : equations.blocks[i]) {
       const Eigen::Index column = result.position[equations.leaves[j]];
       const Eigen::MatrixXd values = equations.block(i, j);
       if (row <= column) {

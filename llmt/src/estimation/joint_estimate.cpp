@@ -20,12 +20,12 @@ constexpr int steps_on_all_rows = 2;
 class GradientSum {
  public:
   GradientSum(const TrainingRows& rows, const Partition& partition, const JointEquations& equations,
-              const Eigen::VectorXd& scale)
+              const Eigen::VectorXd& scale, int max_threads)
       : partition_(partition),
         equations_(equations),
         scale_(scale),
         evaluator_(partition, rows.columns, scale.size()),
-        leaves_out_ambiguous_(leaves_out_ambiguous(rows, evaluator_)),
+        leaves_out_ambiguous_(leaves_out_ambiguous(rows, evaluator_, max_threads)),
         has_missing_(rows.has_missing) {}
 
   // Adds sum_n q_n Phi_i a r over a chunk to `sums`. r is what the coefficients leave of the outputs; or of zero.
@@ -119,15 +119,11 @@ Partition joint_from_sample(const LeafSums& sample, const TrainingRows& all, Eig
             local_models(sample, 2 * equations.leaves - 1, regularisation.shrinkage, regularisation.sparse));
   Eigen::MatrixXd& coefficients = solution.estimate.leaf_coefficients;
   const Partition partition = prefix(sample.partition, leaves);
-  const GradientSum gradient_sum(all, partition, equations, sample.training->scale);
+  const GradientSum gradient_sum(all, partition, equations, sample.training->scale, sample.max_threads);
   const auto gradient = [&](const Eigen::MatrixXd& at, bool of_outputs) -> Eigen::MatrixXd {
-    std::vector<Eigen::MatrixXd> sums(num_slots, Eigen::MatrixXd::Zero(at.rows(), at.cols()));
-    for_each_chunk(all, partition.outputs, sample.max_threads,
-                   [&](std::size_t slot, const Chunk& chunk) { gradient_sum.add(chunk, at, of_outputs, sums[slot]); });
-    for (std::size_t slot = 1; slot < sums.size(); ++slot) {
-      sums[0] += sums[slot];
-    }
-    return std::move(sums[0]);
+    Eigen::MatrixXd zero = Eigen::MatrixXd::Zero(at.rows(), at.cols());
+    const auto add = [&](const Chunk& chunk, Eigen::MatrixXd& sums) { gradient_sum.add(chunk, at, of_outputs, sums); };
+    return sum_over(all, partition.outputs, sample.max_threads, std::move(zero), add);
   };
   const auto times_matrix = [&](const Eigen::MatrixXd& change) -> Eigen::MatrixXd {
     return times_regularisation(sample, equations, regularisation, change) - gradient(change, false);

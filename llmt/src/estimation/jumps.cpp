@@ -221,13 +221,13 @@ TrainingRows rows_to_measure_on(const TrainingRows& all) {
 }  // namespace
 
 Eigen::VectorXd jump_sizes(const TrainingRows& all, const Partition& grown, int max_threads) {
-  const TrainingRows training = thinned(rows_to_measure_on(all), enough_rows, max_threads);
+  const TrainingRows training = subsample(rows_to_measure_on(all), enough_rows, max_threads);
   const Evaluator evaluator(grown, training.columns, std::ssize(training.regressors));
   std::vector<int> leaf_of_row(training.count(), 0);
   parallel_for(num_chunks(training), max_threads, [&](Eigen::Index index) {
     const Chunk chunk = fetch(training, index, {});
     for (Eigen::Index row = 0; row < chunk.count(); ++row) {
-      int& leaf = leaf_of_row[index * chunk_rows + row];
+      int& leaf = leaf_of_row[index * block_rows + row];
       while (!grown.nodes[leaf].is_leaf()) leaf = evaluator.child_of(leaf, chunk.inputs.row(row).data());
     }
   });

@@ -3,7 +3,6 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "base/parallel.hpp"
 #include "partition/evaluator.hpp"
@@ -24,9 +23,8 @@ constexpr double least_relative_eigenvalue = 1e-12;
 Eigen::MatrixXd residual_sums(const TrainingRows& training, const Partition& partition, const Evaluator& evaluator,
                               int max_threads) {
   const Eigen::Index outputs = std::ssize(partition.outputs);
-  const Eigen::MatrixXd zero = Eigen::MatrixXd::Zero(outputs, std::ssize(partition.nodes));
-  std::vector<Eigen::MatrixXd> of_slot(std::min(num_slots, num_chunks(training)), zero);
-  for_each_chunk(training, partition.outputs, max_threads, [&](std::size_t slot, const Chunk& chunk) {
+  Eigen::MatrixXd zero = Eigen::MatrixXd::Zero(outputs, std::ssize(partition.nodes));
+  const auto add = [&](const Chunk& chunk, Eigen::MatrixXd& sums) {
     std::vector<Activation> active;
     Eigen::VectorXd values(outputs);
     for (Eigen::Index row = 0; row < chunk.count(); ++row) {
@@ -36,14 +34,14 @@ Eigen::MatrixXd residual_sums(const TrainingRows& training, const Partition& par
       for (; !partition.nodes[at].is_leaf(); at = evaluator.child_of(at, inputs)) {
         evaluator.local(at, deviations, values.data());
         evaluator.finish(deviations, values.data());
-        of_slot[slot].col(at) += chunk.weights(row) * (chunk.outputs.row(row).transpose() - values).cwiseAbs2();
+        sums.col(at) += chunk.weights(row) * (chunk.outputs.row(row).transpose() - values).cwiseAbs2();
       }
       evaluator.activate(inputs, active);
       evaluator.combine(active, deviations, values.data());
-      of_slot[slot].col(at) += chunk.weights(row) * (chunk.outputs.row(row).transpose() - values).cwiseAbs2();
+      sums.col(at) += chunk.weights(row) * (chunk.outputs.row(row).transpose() - values).cwiseAbs2();
     }
-  });
-  return std::accumulate(of_slot.begin(), of_slot.end(), zero);
+  };
+  return sum_over(training, partition.outputs, max_threads, std::move(zero), add);
 }
 
 // Sum of weight * validity * a a' over the rows for every leaf, lower triangles; empty for inner nodes.
@@ -55,8 +53,7 @@ std::vector<Eigen::MatrixXd> gram_matrices(const TrainingRows& training, const P
     const Eigen::Index size = node.is_leaf() ? regressors + 1 : 0;
     zero.push_back(Eigen::MatrixXd::Zero(size, size));
   }
-  std::vector<std::vector<Eigen::MatrixXd>> of_slot(std::min(num_slots, num_chunks(training)), zero);
-  for_each_chunk(training, {}, max_threads, [&](std::size_t slot, const Chunk& chunk) {
+  const auto add = [&](const Chunk& chunk, std::vector<Eigen::MatrixXd>& grams) {
     std::vector<Activation> active;
     Eigen::VectorXd a(regressors + 1);
     for (Eigen::Index row = 0; row < chunk.count(); ++row) {
@@ -68,7 +65,7 @@ std::vector<Eigen::MatrixXd> gram_matrices(const TrainingRows& training, const P
         for (Eigen::Index k = 0; k < regressors; ++k) {
           a(k + 1) = imputed(leaf, k, deviations[k]);
         }
-        double* gram = of_slot[slot][entry.node].data();
+        double* gram = grams[entry.node].data();
         for (Eigen::Index j = 0; j <= regressors; ++j, gram += regressors + 1) {
           const double factor = chunk.weights(row) * entry.validity * a(j);
           for (Eigen::Index i = j; i <= regressors; ++i) {
@@ -77,13 +74,8 @@ std::vector<Eigen::MatrixXd> gram_matrices(const TrainingRows& training, const P
         }
       }
     }
-  });
-  for (std::size_t slot = 1; slot < of_slot.size(); ++slot) {
-    for (std::size_t node = 0; node < zero.size(); ++node) {
-      of_slot[0][node] += of_slot[slot][node];
-    }
-  }
-  return std::move(of_slot[0]);
+  };
+  return sum_over(training, {}, max_threads, std::move(zero), add);
 }
 
 // The constant and the regressors with a slope for some output.
@@ -114,7 +106,7 @@ void describe_leaves(const TrainingRows& training, Partition& partition, bool sp
   const Evaluator evaluator(partition, training.columns, regressors);
   const Eigen::MatrixXd rss = residual_sums(training, partition, evaluator, max_threads);
   const Eigen::Index enough = sample_rows_per_unknown * partition.num_leaves() * (regressors + 1);
-  const TrainingRows sample = thinned(training, enough, max_threads);
+  const TrainingRows sample = subsample(training, enough, max_threads);
   const std::vector<Eigen::MatrixXd> gram = gram_matrices(sample, partition, evaluator, max_threads);
   Eigen::VectorXd scale = Eigen::VectorXd::Ones(regressors + 1);
   for (Eigen::Index k = 0; k < regressors; ++k) {

@@ -1,7 +1,6 @@
 #include "estimation/leaf_sums.hpp"
 
 #include <algorithm>
-#include <limits>
 
 #include "base/count.hpp"
 #include "base/parallel.hpp"
@@ -39,23 +38,17 @@ std::vector<Eigen::Index> select(const LeafSums& sums, std::size_t node) {
 
 Eigen::MatrixXd residual_range(const TrainingRows& rows, const Node& root, const std::vector<int>& outputs,
                                int max_threads) {
-  constexpr double infinity = std::numeric_limits<double>::infinity();
-  Eigen::MatrixXd range(root.value.size(), 2);
-  range.col(0).setConstant(infinity);
-  range.col(1).setConstant(-infinity);
-  std::vector<Eigen::MatrixXd> of_slot(num_slots, range);
-  for_each_chunk(rows, outputs, max_threads, [&](std::size_t slot, const Chunk& chunk) {
+  using Extents = std::vector<Extent>;
+  const auto add = [&](const Chunk& chunk, Extents& extents) {
     for (Eigen::Index r = 0; r < chunk.count(); ++r) {
       const Eigen::VectorXd residual =
           chunk.outputs.row(r).transpose() - root.value - root.slope * imputed(root, chunk.deviations.row(r));
-      of_slot[slot].col(0) = of_slot[slot].col(0).cwiseMin(residual);
-      of_slot[slot].col(1) = of_slot[slot].col(1).cwiseMax(residual);
+      for (std::size_t o = 0; o < extents.size(); ++o) extents[o].widen(residual(o));
     }
-  });
-  for (const Eigen::MatrixXd& each : of_slot) {
-    range.col(0) = range.col(0).cwiseMin(each.col(0));
-    range.col(1) = range.col(1).cwiseMax(each.col(1));
-  }
+  };
+  const Extents extents = sum_over(rows, outputs, max_threads, Extents(outputs.size()), add);
+  Eigen::MatrixXd range(std::ssize(extents), 2);
+  for (std::size_t o = 0; o < extents.size(); ++o) range.row(o) << extents[o].low, extents[o].high;
   return range;
 }
 

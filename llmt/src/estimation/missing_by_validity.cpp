@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 #include <vector>
 
 #include "partition/tree.hpp"
@@ -20,16 +21,18 @@ struct Present {
   Eigen::MatrixXd weights;   // the same of 1
   Eigen::VectorXd validity;  // of the weighted validities
   Eigen::VectorXd in_box;    // of the weights of the rows in the node's box
+
+  static auto fields(auto& self) { return std::tie(self.sums, self.weights, self.validity, self.in_box); }
 };
 
-Present add_up(const TrainingRows& training, const Evaluator& evaluator, bool leave_out, const Partition& partition) {
+Present add_up(const TrainingRows& training, const Evaluator& evaluator, bool leave_out, const Partition& partition,
+               int max_threads) {
   const Eigen::Index regressors = std::ssize(training.regressors);
   const Eigen::Index nodes = std::ssize(partition.nodes);
-  Present present{Eigen::MatrixXd::Zero(regressors, nodes), Eigen::MatrixXd::Zero(regressors, nodes),
-                  Eigen::VectorXd::Zero(nodes), Eigen::VectorXd::Zero(nodes)};
-  std::vector<Activation> active;
-  for (Eigen::Index index = 0; index < num_chunks(training); ++index) {
-    const Chunk chunk = fetch(training, index, {});
+  Present zero{Eigen::MatrixXd::Zero(regressors, nodes), Eigen::MatrixXd::Zero(regressors, nodes),
+               Eigen::VectorXd::Zero(nodes), Eigen::VectorXd::Zero(nodes)};
+  const auto add = [&](const Chunk& chunk, Present& present) {
+    std::vector<Activation> active;
     for (Eigen::Index row = 0; row < chunk.count(); ++row) {
       const double* inputs = chunk.inputs.row(row).data();
       if (leave_out && evaluator.is_ambiguous(inputs)) continue;
@@ -47,7 +50,8 @@ Present add_up(const TrainingRows& training, const Evaluator& evaluator, bool le
       while (!partition.nodes[node].is_leaf()) node = evaluator.child_of(node, inputs);
       present.in_box(node) += chunk.weights(row);
     }
-  }
+  };
+  Present present = sum_over(training, {}, max_threads, std::move(zero), add);
   const std::vector<int> parents = parents_of(partition);
   for (Eigen::Index node = nodes - 1; node > 0; --node) {
     present.validity(parents[node]) += present.validity(node);
@@ -61,8 +65,8 @@ Present add_up(const TrainingRows& training, const Evaluator& evaluator, bool le
 }  // namespace
 
 void describe_missing_by_validity(const TrainingRows& training, const Evaluator& evaluator, bool leave_out,
-                                  Partition& partition) {
-  const Present present = add_up(training, evaluator, leave_out, partition);
+                                  Partition& partition, int max_threads) {
+  const Present present = add_up(training, evaluator, leave_out, partition, max_threads);
   for (Eigen::Index i = 0; i < std::ssize(partition.nodes); ++i) {
     Node& node = partition.nodes[i];
     if (i > 0) {

@@ -12,7 +12,7 @@ namespace llmt {
 /// Growth has set both from the rows in the boxes. `leave_out`: rows that a missing value sends to several leaves take
 /// no part.
 void describe_missing_by_validity(const TrainingRows& training, const Evaluator& evaluator, bool leave_out,
-                                  Partition& partition);
+                                  Partition& partition, int max_threads);
 
 /// The same for rows without missing values, from their sums. `scale`: of the regressors.
 void describe_missing_by_sums(const NormalEquations& sums, const Eigen::VectorXd& scale, Partition& partition);

@@ -2,9 +2,9 @@
 
 namespace llmt {
 
-Eigen::MatrixXd NormalEquations::block(std::size_t i, std::size_t j) const {
+Eigen::MatrixXd NormalEquations::block(std::size_t i, int j) const {
   Eigen::MatrixXd result(size, size);
-  const double* values = blocks[i][j].data();
+  const double* values = blocks[i].at(j).data();
   for (Eigen::Index r = 0; r < size; ++r) {
     for (Eigen::Index c = 0; c < (missing ? size : r + 1); ++c) {
       result(r, c) = *values++;

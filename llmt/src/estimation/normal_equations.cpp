@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <limits>
+#include <map>
 #include <span>
+#include <tuple>
 
 #include "base/count.hpp"
-#include "base/parallel.hpp"
 #include "base/simd.hpp"
+#include "base/sum_over.hpp"
 #include "estimation/missing_by_validity.hpp"
 #include "estimation/reached_rows.hpp"
 #include "estimation/rows_by_leaf.hpp"
@@ -22,12 +24,11 @@ constexpr double range_margin = 0.25;
 // Logistic gates give every leaf some validity at every row. Only rows with more than this count in a leaf's range.
 constexpr double reach_of_logistic = 1e-3;
 
-// Rows that are laid out together, and how many such lots are taken at once.
+// Rows of a block that are laid out together: few enough that they stay in the cache.
 constexpr Eigen::Index rows_of_lot = 128;
-constexpr Eigen::Index lots_at_once = 32;
 
-// Most numbers that the outer products of the rows taken at once take: 64 MiB.
-constexpr Eigen::Index outer_products = Eigen::Index{1} << 23;
+// Most numbers that their outer products take: 2 MiB.
+constexpr Eigen::Index outer_products = Eigen::Index{1} << 18;
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
@@ -97,20 +98,48 @@ std::span<const ReachedRows::Use> uses_of(const ReachedRows& reached, std::size_
   return {reached.uses.begin() + reached.first_use[leaf], reached.uses.begin() + reached.first_use[leaf + 1]};
 }
 
+// The range of the regressors over some rows.
+struct Range {
+  Eigen::VectorXd low;
+  Eigen::VectorXd high;
+
+  Range& operator+=(const Range& other) {
+    low = low.cwiseMin(other.low);
+    high = high.cwiseMax(other.high);
+    return *this;
+  }
+  static auto fields(auto& self) { return std::tie(self.low, self.high); }
+};
+
+// Sums over the rows that a leaf reaches.
+struct SumsOfLeaf {
+  std::vector<double> gram;  // lower triangle row by row, padded; with missing values in full
+  Eigen::MatrixXd products;
+  Eigen::VectorXd squares;
+  Range range;
+  std::map<int, std::vector<double>> blocks;  // NormalEquations::blocks
+
+  static auto fields(auto& self) { return std::tie(self.gram, self.products, self.squares, self.range, self.blocks); }
+};
+
+// Of the leaves that reach one of the rows.
+using SumsOfLeaves = std::map<int, SumsOfLeaf>;
+
 // One pass over the rows that forms the sums.
 class Assembly {
  public:
-  Assembly(const TrainingRows& training, Partition& partition, const Eigen::MatrixXd& root);
+  Assembly(const TrainingRows& training, Partition& partition, const Eigen::MatrixXd& root, int max_threads);
 
   NormalEquations run(int max_threads);
 
  private:
-  void widen_range(const ReachedRows& reached, std::size_t leaf);
-  std::vector<double>& block_to_add_to(std::size_t leaf, std::size_t other);
-  void add(const ReachedRows& reached, std::size_t leaf);
-  void add_with_missing(const ReachedRows& reached, std::size_t leaf);
-  void unpack_gram();
-  void add_up_to_parents();
+  SumsOfLeaf nothing() const;
+  void widen_range(const ReachedRows& reached, int leaf, SumsOfLeaf& sums) const;
+  void add(const ReachedRows& reached, int leaf, SumsOfLeaf& sums) const;
+  void add_with_missing(const ReachedRows& reached, int leaf, SumsOfLeaf& sums) const;
+  NormalEquations equations_from(SumsOfLeaves sums);
+  Eigen::MatrixXd unpacked(const std::vector<double>& gram) const;
+  void set_range(const Range& range, Node& node) const;
 
   const TrainingRows& training_;
   Partition& partition_;
@@ -118,93 +147,77 @@ class Assembly {
   const Eigen::Index size_;    // coefficients of a local model
   const Eigen::Index packed_;  // numbers that a block is stored in
   const Evaluator evaluator_;
+  const std::vector<int> leaves_;  // from left to right
   std::vector<int> leaf_of_node_;
   const ReachedBy by_;
-  NormalEquations sums_;
-  std::vector<std::vector<double>> packed_gram_;  // of every leaf, lower triangle row by row, padded
-  std::vector<Eigen::VectorXd> low_;              // of every node
-  std::vector<Eigen::VectorXd> high_;
 };
 
-Assembly::Assembly(const TrainingRows& training, Partition& partition, const Eigen::MatrixXd& root)
+Assembly::Assembly(const TrainingRows& training, Partition& partition, const Eigen::MatrixXd& root, int max_threads)
     : training_(training),
       partition_(partition),
       root_(root),
       size_(std::ssize(training.regressors) + 1),
       packed_(training.has_missing ? size_ * size_ : size_ * (size_ + 1) / 2),
       evaluator_(partition, training.columns, std::ssize(training.regressors)),
+      leaves_(leaves_from_left(partition)),
       leaf_of_node_(partition.nodes.size(), -1),
-      by_{training, partition, evaluator_, leaf_of_node_, root, leaves_out_ambiguous(training, evaluator_)} {
-  const int nodes = count_of(partition.nodes);
-  sums_.size = size_;
-  sums_.missing = training.has_missing;
-  sums_.leaves = leaves_from_left(partition);
-  for (const int node : sums_.leaves) {
-    leaf_of_node_[node] = count_of(sums_.blocks);
-    sums_.blocks.emplace_back(sums_.blocks.size() + 1);
-    packed_gram_.emplace_back(training.has_missing ? 0 : padded_to_lanes(packed_), 0.0);
-  }
-  sums_.gram.assign(nodes, Eigen::MatrixXd::Zero(size_, size_));
-  sums_.products.assign(nodes, Eigen::MatrixXd::Zero(size_, root.cols()));
-  sums_.squares.assign(nodes, Eigen::VectorXd::Zero(root.cols()));
-  low_.assign(nodes, Eigen::VectorXd::Constant(size_ - 1, infinity));
-  high_.assign(nodes, Eigen::VectorXd::Constant(size_ - 1, -infinity));
+      by_{training,      partition, evaluator_,
+          leaf_of_node_, root,      leaves_out_ambiguous(training, evaluator_, max_threads)} {
+  for (int leaf = 0; leaf < count_of(leaves_); ++leaf) leaf_of_node_[leaves_[leaf]] = leaf;
 }
 
 NormalEquations Assembly::run(int max_threads) {
   // Logistic gates take the mean of the input for a missing value, as their local models do.
   const ValidityKind kind = partition_.validity.kind;
   const bool overlap = kind == ValidityKind::blend || kind == ValidityKind::gaussian;
-  if (overlap && sums_.missing) {
-    describe_missing_by_validity(training_, evaluator_, by_.leaves_out_ambiguous, partition_);
+  const bool missing = training_.has_missing;
+  if (overlap && missing) {
+    describe_missing_by_validity(training_, evaluator_, by_.leaves_out_ambiguous, partition_, max_threads);
   }
-  const Eigen::Index of_lot = std::clamp<Eigen::Index>(outer_products / (lots_at_once * packed_), 1, rows_of_lot);
+  // In the order of the leaves: few leaves reach the rows of a block, and the others take no part in its sums.
   const std::vector<int> rows = rows_by_leaf(training_, partition_, evaluator_, max_threads);
-  for (Eigen::Index begin = 0; begin < std::ssize(rows); begin += lots_at_once * of_lot) {
-    const Eigen::Index left = std::ssize(rows) - begin;
-    std::vector<ReachedRows> lots(std::min(lots_at_once, (left + of_lot - 1) / of_lot));
-    parallel_for(std::ssize(lots), max_threads, [&](Eigen::Index lot) {
-      const auto first = rows.begin() + begin + lot * of_lot;
-      lots[lot] = reach(by_, {first, first + std::min(of_lot, rows.end() - first)});
-    });
-    // Leaves are independent: each adds to its own sums and to its blocks with the leaves before it.
-    parallel_for(std::ssize(sums_.leaves), max_threads, [&](Eigen::Index leaf) {
-      for (const ReachedRows& reached : lots) {
-        widen_range(reached, leaf);
-        if (sums_.missing) {
-          add_with_missing(reached, leaf);
+  const Eigen::Index of_lot = std::clamp<Eigen::Index>(outer_products / packed_, 1, rows_of_lot);
+  const auto add_block = [&](RowSpan block, SumsOfLeaves& sums) {
+    for (Eigen::Index begin = block.begin; begin < block.end; begin += of_lot) {
+      const auto first = rows.begin() + begin;
+      const ReachedRows reached = reach(by_, {first, first + std::min(of_lot, block.end - begin)});
+      for (const int leaf : reached.leaves) {
+        const auto [at, is_new] = sums.try_emplace(leaf);
+        if (is_new) at->second = nothing();
+        widen_range(reached, leaf, at->second);
+        if (missing) {
+          add_with_missing(reached, leaf, at->second);
         } else {
-          add(reached, leaf);
+          add(reached, leaf, at->second);
         }
       }
-    });
-  }
-  if (!sums_.missing) unpack_gram();
-  add_up_to_parents();
-  if (overlap && !sums_.missing) describe_missing_by_sums(sums_, training_.scale, partition_);
-  return std::move(sums_);
+    }
+  };
+  NormalEquations result =
+      equations_from(sum_over(RowBlocks{std::ssize(rows)}, max_threads, SumsOfLeaves{}, add_block));
+  if (overlap && !missing) describe_missing_by_sums(result, training_.scale, partition_);
+  return result;
 }
 
-void Assembly::widen_range(const ReachedRows& reached, std::size_t leaf) {
-  const std::size_t node = sums_.leaves[leaf];
+SumsOfLeaf Assembly::nothing() const {
+  return {std::vector<double>(padded_to_lanes(packed_), 0.0),
+          Eigen::MatrixXd::Zero(size_, root_.cols()),
+          Eigen::VectorXd::Zero(root_.cols()),
+          {Eigen::VectorXd::Constant(size_ - 1, infinity), Eigen::VectorXd::Constant(size_ - 1, -infinity)},
+          {}};
+}
+
+void Assembly::widen_range(const ReachedRows& reached, int leaf, SumsOfLeaf& sums) const {
   const double least = partition_.validity.kind == ValidityKind::logistic ? reach_of_logistic : 0.0;
   for (const ReachedRows::Use& use : uses_of(reached, leaf)) {
     if (!(reached.entries[use.entry].validity > least)) continue;
-    widen(reached.chunk.deviations.row(use.row).data(), size_ - 1, low_[node].data(), high_[node].data());
+    widen(reached.chunk.deviations.row(use.row).data(), size_ - 1, sums.range.low.data(), sums.range.high.data());
   }
 }
 
-std::vector<double>& Assembly::block_to_add_to(std::size_t leaf, std::size_t other) {
-  std::vector<double>& block = sums_.blocks[leaf][other];
-  block.resize(packed_, 0.0);
-  return block;
-}
-
 // Adds the rows of a leaf to its sums and to its blocks with the leaves before it.
-void Assembly::add(const ReachedRows& reached, std::size_t leaf) {
+void Assembly::add(const ReachedRows& reached, int leaf, SumsOfLeaf& sums) const {
   const std::span<const ReachedRows::Use> uses = uses_of(reached, leaf);
-  if (uses.empty()) return;
-  const std::size_t node = sums_.leaves[leaf];
   thread_local std::vector<double> factors;  // these three are kept for their memory
   thread_local std::vector<double> scaled;
   thread_local std::vector<double> of_lot;
@@ -216,93 +229,115 @@ void Assembly::add(const ReachedRows& reached, std::size_t leaf) {
     first = std::min(first, reached.column[reached.entries[use.before].leaf]);
     for (Eigen::Index o = 0; o < root_.cols(); ++o) {
       const double residual = reached.residuals(use.row, o);
-      sums_.squares[node](o) += weight * residual * residual;
-      sums_.products[node].col(o) += weight * residual * reached.regressors.row(use.row).transpose();
+      sums.squares(o) += weight * residual * residual;
+      sums.products.col(o) += weight * residual * reached.regressors.row(use.row).transpose();
     }
   }
-  scale_rows(uses, factors, reached, scaled, packed_gram_[leaf].data());
+  scale_rows(uses, factors, reached, scaled, sums.gram.data());
   const Eigen::Index numbers = padded_to_lanes(packed_);
   of_lot.resize(tile * numbers);
+  auto next = sums.blocks.lower_bound(reached.leaves[first]);
   for (Eigen::Index column = first; column <= reached.column[leaf]; column += tile) {
     sum_tile(uses, reached.validities, column, scaled, of_lot.data());
     for (Eigen::Index k = column; k < std::min(column + tile, reached.column[leaf] + 1); ++k) {
       const double* sum = of_lot.data() + (k - column) * numbers;
       // The sum of the products of validities: 0 where the leaves share no row.
-      if (sum[0] > 0.0) add_numbers(sum, packed_, block_to_add_to(leaf, reached.leaves[k]).data());
+      if (!(sum[0] > 0.0)) continue;
+      next = sums.blocks.try_emplace(next, reached.leaves[k]);
+      next->second.resize(packed_, 0.0);
+      add_numbers(sum, packed_, next->second.data());
+      ++next;
     }
   }
 }
 
-void Assembly::add_with_missing(const ReachedRows& reached, std::size_t leaf) {
-  const int node = sums_.leaves[leaf];
+void Assembly::add_with_missing(const ReachedRows& reached, int leaf, SumsOfLeaf& sums) const {
+  using Square = Eigen::Map<RowMajor>;
   for (const ReachedRows::Use& use : uses_of(reached, leaf)) {
-    const Eigen::VectorXd x = regressors_at(by_, reached.chunk, use.row, node);
+    const Eigen::VectorXd x = regressors_at(by_, reached.chunk, use.row, leaves_[leaf]);
     const double weight = reached.chunk.weights(use.row) * reached.entries[use.entry].validity;
     for (Eigen::Index e = use.before; e <= use.entry; ++e) {
       const ReachedRows::Entry& entry = reached.entries[e];
-      const Eigen::VectorXd of_other = regressors_at(by_, reached.chunk, use.row, sums_.leaves[entry.leaf]);
-      Eigen::Map<RowMajor>(block_to_add_to(leaf, entry.leaf).data(), size_, size_) +=
-          (weight * entry.validity * x) * of_other.transpose();
+      const Eigen::VectorXd of_other = regressors_at(by_, reached.chunk, use.row, leaves_[entry.leaf]);
+      std::vector<double>& block = sums.blocks[entry.leaf];
+      block.resize(packed_, 0.0);
+      Square(block.data(), size_, size_) += (weight * entry.validity * x) * of_other.transpose();
     }
-    sums_.gram[node] += weight * x * x.transpose();
-    sums_.products[node] += weight * x * reached.residuals.row(use.row);
-    sums_.squares[node] += weight * reached.residuals.row(use.row).cwiseAbs2().transpose();
+    Square(sums.gram.data(), size_, size_) += weight * x * x.transpose();
+    sums.products += weight * x * reached.residuals.row(use.row);
+    sums.squares += weight * reached.residuals.row(use.row).cwiseAbs2().transpose();
   }
 }
 
-// Sets the matrices of leaves from their lower triangles.
-void Assembly::unpack_gram() {
-  for (std::size_t leaf = 0; leaf < packed_gram_.size(); ++leaf) {
-    Eigen::MatrixXd& gram = sums_.gram[sums_.leaves[leaf]];
-    const double* value = packed_gram_[leaf].data();
-    for (Eigen::Index i = 0; i < size_; ++i) {
-      for (Eigen::Index j = 0; j <= i; ++j) gram(i, j) = gram(j, i) = *value++;
-    }
+Eigen::MatrixXd Assembly::unpacked(const std::vector<double>& gram) const {
+  if (training_.has_missing) return Eigen::Map<const RowMajor>(gram.data(), size_, size_);
+  Eigen::MatrixXd result(size_, size_);
+  const double* value = gram.data();
+  for (Eigen::Index i = 0; i < size_; ++i) {
+    for (Eigen::Index j = 0; j <= i; ++j) result(i, j) = result(j, i) = *value++;
   }
+  return result;
 }
 
-// Sums and ranges of inner nodes from those of their children; then all ranges are widened by the margin.
-void Assembly::add_up_to_parents() {
+// The sums and ranges of all nodes: those of inner nodes from those of their children.
+NormalEquations Assembly::equations_from(SumsOfLeaves sums) {
+  const std::size_t nodes = partition_.nodes.size();
+  NormalEquations result{.size = size_,
+                         .missing = training_.has_missing,
+                         .leaves = leaves_,
+                         .blocks = std::vector<std::map<int, std::vector<double>>>(leaves_.size()),
+                         .gram = std::vector(nodes, Eigen::MatrixXd(Eigen::MatrixXd::Zero(size_, size_))),
+                         .products = std::vector(nodes, nothing().products),
+                         .squares = std::vector(nodes, nothing().squares)};
+  std::vector<Range> ranges(nodes, nothing().range);
+  for (auto& [leaf, of_leaf] : sums) {
+    const int node = leaves_[leaf];
+    result.blocks[leaf] = std::move(of_leaf.blocks);
+    result.gram[node] = unpacked(of_leaf.gram);
+    result.products[node] = std::move(of_leaf.products);
+    result.squares[node] = std::move(of_leaf.squares);
+    ranges[node] = std::move(of_leaf.range);
+  }
   const std::vector<int> parents = parents_of(partition_);
-  for (std::size_t i = partition_.nodes.size(); i-- > 0;) {
-    Node& node = partition_.nodes[i];
-    for (Eigen::Index k = 0; k < size_ - 1; ++k) {
-      if (low_[i](k) <= high_[i](k)) {
-        const double margin = range_margin * (high_[i](k) - low_[i](k));
-        node.low(k) = std::clamp(low_[i](k) - margin, training_.spread(0, k), training_.spread(1, k));
-        node.high(k) = std::clamp(high_[i](k) + margin, training_.spread(0, k), training_.spread(1, k));
-      }
-    }
-    if (i > 0) {
-      const std::size_t parent = parents[i];
-      sums_.gram[parent] += sums_.gram[i];
-      sums_.products[parent] += sums_.products[i];
-      sums_.squares[parent] += sums_.squares[i];
-      low_[parent] = low_[parent].cwiseMin(low_[i]);
-      high_[parent] = high_[parent].cwiseMax(high_[i]);
-    }
+  for (std::size_t i = nodes; i-- > 0;) {
+    set_range(ranges[i], partition_.nodes[i]);
+    if (i == 0) break;
+    const std::size_t parent = parents[i];
+    result.gram[parent] += result.gram[i];
+    result.products[parent] += result.products[i];
+    result.squares[parent] += result.squares[i];
+    ranges[parent] += ranges[i];
+  }
+  return result;
+}
+
+// Widens the range by the margin.
+void Assembly::set_range(const Range& range, Node& node) const {
+  for (Eigen::Index k = 0; k < size_ - 1; ++k) {
+    if (!(range.low(k) <= range.high(k))) continue;
+    const double margin = range_margin * (range.high(k) - range.low(k));
+    node.low(k) = std::clamp(range.low(k) - margin, training_.spread(0, k), training_.spread(1, k));
+    node.high(k) = std::clamp(range.high(k) + margin, training_.spread(0, k), training_.spread(1, k));
   }
 }
 
 }  // namespace
 
-bool leaves_out_ambiguous(const TrainingRows& training, const Evaluator& evaluator) {
-  double ambiguous = 0.0;
-  double all = 0.0;
-  for (Eigen::Index index = 0; training.has_missing && index < num_chunks(training); ++index) {
-    const Chunk chunk = fetch(training, index, {});
+bool leaves_out_ambiguous(const TrainingRows& training, const Evaluator& evaluator, int max_threads) {
+  if (!training.has_missing) return false;
+  const auto add = [&](const Chunk& chunk, WeightedMean& sum) {
     for (Eigen::Index r = 0; r < chunk.count(); ++r) {
-      all += chunk.weights(r);
-      ambiguous += evaluator.is_ambiguous(chunk.inputs.row(r).data()) ? chunk.weights(r) : 0.0;
+      sum.add(evaluator.is_ambiguous(chunk.inputs.row(r).data()) ? 1.0 : 0.0, chunk.weights(r));
     }
-  }
+  };
+  const double part = sum_over(training, {}, max_threads, WeightedMean{}, add).value();
   // If they are most of the data, they are better than nothing.
-  return ambiguous > 0.0 && ambiguous <= 0.5 * all;
+  return part > 0.0 && part <= 0.5;
 }
 
 NormalEquations assemble(const TrainingRows& training, Partition& partition, const Eigen::MatrixXd& root,
                          int max_threads) {
-  return Assembly(training, partition, root).run(max_threads);
+  return Assembly(training, partition, root, max_threads).run(max_threads);
 }
 
 }  // namespace llmt

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <map>
 #include <vector>
 
 #include "data/dataset.hpp"
@@ -18,19 +19,19 @@ struct NormalEquations {
   Eigen::Index size = 0;    ///< coefficients of a local model
   bool missing = false;     ///< some value is missing; then blocks are not symmetric and are stored in full
   std::vector<int> leaves;  ///< nodes, from left to right in the tree
-  /// S_ij of leaf i with the leaves j = 0 ... i, lower triangles row by row. Empty if the two leaves share no row.
-  std::vector<std::vector<std::vector<double>>> blocks;
+  /// S_ij of leaf i with those of the leaves j = 0 ... i that share a row with it, lower triangles row by row.
+  std::vector<std::map<int, std::vector<double>>> blocks;
   std::vector<Eigen::MatrixXd> gram;      ///< G of every node, size x size
   std::vector<Eigen::MatrixXd> products;  ///< b of every node, size x outputs
   std::vector<Eigen::VectorXd> squares;   ///< of the residuals, of every node, one per output
 
-  bool has_block(std::size_t i, std::size_t j) const { return !blocks[i][j].empty(); }
-  Eigen::MatrixXd block(std::size_t i, std::size_t j) const;
+  /// S_ij, which is among `blocks`.
+  Eigen::MatrixXd block(std::size_t i, int j) const;
 };
 
 /// Whether rows that a missing value sends to several leaves are left out of the sums, because they would distort the
 /// models of all these leaves. They are not left out if they are more than half of the weight.
-bool leaves_out_ambiguous(const TrainingRows& training, const Evaluator& evaluator);
+bool leaves_out_ambiguous(const TrainingRows& training, const Evaluator& evaluator, int max_threads);
 
 /// Forms the sums over all rows, and sets the ranges of the nodes to those of the rows that their validities reach.
 /// `root`: coefficients of the root's model in scaled columns, size x outputs.

@@ -44,13 +44,12 @@ std::vector<int> rows_by_leaf(const TrainingRows& rows, const Partition& partiti
   std::vector<int> order(rows.count());
   std::iota(order.begin(), order.end(), 0);
   parallel_for(num_chunks(rows), max_threads, [&](Eigen::Index index) {
-    const Eigen::Index begin = index * chunk_rows;
-    const std::size_t count = std::min(chunk_rows, rows.count() - begin);
-    const RowMajor inputs = inputs_of(rows, std::span(order).subspan(begin, count));
+    const RowSpan block = RowBlocks{rows.count()}[index];
+    const RowMajor inputs = inputs_of(rows, std::span(order).subspan(block.begin, block.count()));
     for (Eigen::Index row = 0; row < inputs.rows(); ++row) {
       int node = 0;
       while (!partition.nodes[node].is_leaf()) node = evaluator.child_of(node, inputs.row(row).data());
-      place_of_row[begin + row] = place[node];
+      place_of_row[block.begin + row] = place[node];
     }
   });
   std::ranges::stable_sort(order, {}, [&](int row) { return place_of_row[row]; });

@@ -37,8 +37,8 @@ Eigen::VectorXd prefix_squared_errors(const Partition& partition, const Training
                                       const Eigen::VectorXd& weights, int max_threads) {
   const Evaluator evaluator(partition, rows.columns, std::ssize(rows.regressors));
   // By how much the sum changes from M - 1 to M leaves.
-  std::vector<Eigen::VectorXd> changes(num_slots, Eigen::VectorXd::Zero(partition.num_leaves()));
-  for_each_chunk(rows, partition.outputs, max_threads, [&](std::size_t slot, const Chunk& chunk) {
+  Eigen::VectorXd zero = Eigen::VectorXd::Zero(partition.num_leaves());
+  const auto add = [&](const Chunk& chunk, Eigen::VectorXd& changes) {
     Eigen::VectorXd values(std::ssize(partition.outputs));
     for (Eigen::Index row = 0; row < chunk.count(); ++row) {
       const double* deviations = chunk.deviations.row(row).data();
@@ -49,16 +49,13 @@ Eigen::VectorXd prefix_squared_errors(const Partition& partition, const Training
         const double squared =
             chunk.weights(row) * weights.dot((chunk.outputs.row(row).transpose() - values).cwiseAbs2());
         // Nodes 2k-1 and 2k come with the k-th split, that is with k + 1 leaves.
-        changes[slot]((node + 1) / 2) += squared - previous;
+        changes((node + 1) / 2) += squared - previous;
         previous = squared;
         node = partition.nodes[node].is_leaf() ? -1 : evaluator.child_of(node, chunk.inputs.row(row).data());
       }
     }
-  });
-  Eigen::VectorXd sums = Eigen::VectorXd::Zero(partition.num_leaves());
-  for (const Eigen::VectorXd& change : changes) {
-    sums += change;
-  }
+  };
+  Eigen::VectorXd sums = sum_over(rows, partition.outputs, max_threads, std::move(zero), add);
   for (Eigen::Index leaves = 1; leaves < sums.size(); ++leaves) {
     sums(leaves) += sums(leaves - 1);
   }
@@ -73,21 +70,23 @@ std::vector<Eigen::VectorXd> squared_errors(const std::vector<Partition>& partit
   Eigen::VectorXd values(std::ssize(partitions) * outputs);
   Eigen::Index count = 0;
   for (const Chunk& chunk : rows) count += chunk.count();
-  std::vector<Eigen::VectorXd> sums(partitions.size(), Eigen::VectorXd::Zero(error_blocks));
-  Eigen::Index before = 0;
-  for (const Chunk& chunk : rows) {
+  Eigen::MatrixXd zero = Eigen::MatrixXd::Zero(error_parts, std::ssize(partitions));
+  const auto add = [&](RowSpan block, Eigen::MatrixXd& sums) {
+    const Chunk& chunk = rows[block.begin];
+    const Eigen::Index before = block.begin * rows.front().count();
     for (Eigen::Index row = 0; row < chunk.count(); ++row) {
       evaluator.activate(chunk.inputs.row(row).data(), active);
       evaluator.combine(active, chunk.deviations.row(row).data(), values.data());
       for (std::size_t k = 0; k < partitions.size(); ++k) {
         const auto of_partition = values.segment(static_cast<Eigen::Index>(k) * outputs, outputs);
-        sums[k]((before + row) * error_blocks / count) +=
+        sums((before + row) * error_parts / count, k) +=
             chunk.weights(row) * weights.dot((chunk.outputs.row(row).transpose() - of_partition).cwiseAbs2());
       }
     }
-    before += chunk.count();
-  }
-  return sums;
+  };
+  // Each chunk is a block.
+  const Eigen::MatrixXd sums = sum_over(RowBlocks{std::ssize(rows), 1}, 1, std::move(zero), add);
+  return {sums.colwise().begin(), sums.colwise().end()};
 }
 
 Eigen::VectorXd squared_errors(const Partition& partition, const TrainingRows& columns, const std::vector<Chunk>& rows,

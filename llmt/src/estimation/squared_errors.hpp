@@ -14,11 +14,12 @@ namespace llmt {
 Eigen::VectorXd prefix_squared_errors(const Partition& partition, const TrainingRows& rows,
                                       const Eigen::VectorXd& weights, int max_threads);
 
-/// Parts of the rows of which squared errors are told apart.
-inline constexpr Eigen::Index error_blocks = 16;
+/// Parts of the rows of which squared errors are told apart: their scatter shows how certain a difference is.
+inline constexpr Eigen::Index error_parts = 16;
 
 /// Weighted squared errors over rows that were fetched before, for callers that use the same rows many times, summed
-/// over each of error_blocks parts of the rows, in their order. `columns`: what the rows were fetched from.
+/// over each of error_parts parts of the rows, in their order. `rows`: as from fetch_all(); `columns`: what they were
+/// fetched from.
 /// `partitions`: they differ in the values and slopes of their local models alone.
 std::vector<Eigen::VectorXd> squared_errors(const std::vector<Partition>& partitions, const TrainingRows& columns,
                                             const std::vector<Chunk>& rows, const Eigen::VectorXd& weights);

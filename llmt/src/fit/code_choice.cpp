@@ -99,7 +99,7 @@ GivenRows some_rows(const GivenRows& given, const Codes& codes) {
     if (takes_part(given, row)) all.rows.push_back(row);
   }
   const Eigen::Index count = std::clamp(most_compared_numbers / coefficients, least_compared_rows, most_compared_rows);
-  const std::vector<int> rows = thinned(all, count).rows;
+  const std::vector<int> rows = subsample(all, count).rows;
   return rows_at(given, {rows.begin(), rows.end()});
 }
 

@@ -48,7 +48,7 @@ Eigen::VectorXd importance_of(const TrainingRows& rows, Partition partition, int
   for (const int output : partition.outputs) outputs.push_back(rows.output_columns[output]);
   std::iota(partition.outputs.begin(), partition.outputs.end(), 0);
   const Model model(rows.columns, std::move(outputs), rows.regressors, {std::move(partition)});
-  const TrainingRows some = thinned(rows, ranking_rows);
+  const TrainingRows some = subsample(rows, ranking_rows);
   return importance(model, rows.table->inputs(some.rows, Eigen::all), max_threads).colwise().sum();
 }
 

@@ -1,11 +1,15 @@
 #include "fit/missing_weights.hpp"
 
 #include <Eigen/Cholesky>
+#include <utility>
 #include <vector>
 
+#include "base/sum_over.hpp"
 #include "fit/defaults.hpp"
+#include "fit/error_weights.hpp"
 #include "fit/grow_tree.hpp"
 #include "fit/preliminary.hpp"
+#include "llmt/model.hpp"
 
 namespace llmt {
 namespace {
@@ -26,7 +30,7 @@ Eigen::VectorXd squared_residuals(const TrainingRows& all, const FitOptions& opt
   const Eigen::MatrixXd residuals = table.outputs - model.predict(table.inputs, options.max_threads);
   Eigen::VectorXd squares = Eigen::VectorXd::Zero(residuals.rows());
   for (Eigen::Index o = 0; o < residuals.cols(); ++o) {
-    const double variance = (table.outputs.col(o).array() - table.outputs.col(o).mean()).square().mean();
+    const double variance = variance_of(table.outputs.col(o));
     if (variance > 0.0) squares += residuals.col(o).cwiseAbs2() / variance;
   }
   return squares;
@@ -50,10 +54,18 @@ Eigen::VectorXd weights_by_missing(const TrainingRows& all, const FitOptions& op
   const Table& table = *all.table;
   const Eigen::VectorXd squares = squared_residuals(all, options, work);
   const Eigen::MatrixXd a = indicators(table);
-  const auto weighted = table.weights.asDiagonal();
-  Eigen::MatrixXd gram = a.transpose() * weighted * a;
-  gram.diagonal().tail(gram.rows() - 1).array() += prior_rows;
-  Eigen::VectorXd variances = gram.ldlt().solve(a.transpose() * (weighted * squares));
+  const Eigen::Index size = a.cols();
+  // The normal equations of the regression of the squares on the indicators, right-hand side last.
+  const auto add = [&](RowSpan block, Eigen::MatrixXd& sum) {
+    const auto rows = a.middleRows(block.begin, block.count());
+    const auto weights = table.weights.segment(block.begin, block.count());
+    sum.leftCols(size) += rows.transpose() * weights.asDiagonal() * rows;
+    sum.col(size) += rows.transpose() * weights.cwiseProduct(squares.segment(block.begin, block.count()));
+  };
+  Eigen::MatrixXd zero = Eigen::MatrixXd::Zero(size, size + 1);
+  Eigen::MatrixXd equations = sum_over(RowBlocks{a.rows()}, options.max_threads, std::move(zero), add);
+  equations.diagonal().tail(size - 1).array() += prior_rows;
+  const Eigen::VectorXd variances = equations.leftCols(size).ldlt().solve(equations.col(size));
   const double complete = variances(0);
   if (!(complete > 0.0)) return Eigen::VectorXd::Ones(table.inputs.rows());
   const Eigen::VectorXd added = variances.tail(variances.size() - 1).cwiseMax(0.0) / complete;

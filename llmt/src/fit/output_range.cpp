@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <tuple>
 
 #include "base/parallel.hpp"
 #include "partition/evaluator.hpp"
@@ -20,6 +21,8 @@ constexpr double least_gain = 0.01;
 struct SquaredErrors {
   Eigen::VectorXd without;
   Eigen::VectorXd with;
+
+  static auto fields(auto& self) { return std::tie(self.without, self.with); }
 };
 
 Eigen::MatrixXd range_of(const std::vector<int>& outputs, const TrainingRows& training) {
@@ -35,11 +38,9 @@ SquaredErrors errors_of(const Partition& partition, const FoldRows& fold) {
   const Eigen::Index outputs = std::ssize(partition.outputs);
   const Evaluator evaluator(partition, fold.training.columns, std::ssize(fold.training.regressors));
   const Eigen::ArrayX2d range = range_of(partition.outputs, fold.training).array();
-  SquaredErrors errors{Eigen::VectorXd::Zero(outputs), Eigen::VectorXd::Zero(outputs)};
-  std::vector<Activation> active;
-  Eigen::VectorXd values(outputs);
-  for (Eigen::Index index = 0; index < num_chunks(fold.held_out); ++index) {
-    const Chunk chunk = fetch(fold.held_out, index, partition.outputs);
+  const auto add = [&](const Chunk& chunk, SquaredErrors& errors) {
+    std::vector<Activation> active;
+    Eigen::VectorXd values(outputs);
     for (Eigen::Index row = 0; row < chunk.count(); ++row) {
       evaluator.activate(chunk.inputs.row(row).data(), active);
       evaluator.combine(active, chunk.deviations.row(row).data(), values.data());
@@ -48,8 +49,9 @@ SquaredErrors errors_of(const Partition& partition, const FoldRows& fold) {
       errors.without += chunk.weights(row) * (measured - values).cwiseAbs2();
       errors.with += chunk.weights(row) * (measured - clamped).cwiseAbs2();
     }
-  }
-  return errors;
+  };
+  SquaredErrors zero{Eigen::VectorXd::Zero(outputs), Eigen::VectorXd::Zero(outputs)};
+  return sum_over(fold.held_out, partition.outputs, 1, std::move(zero), add);
 }
 
 // The errors of one output in all folds.
@@ -69,7 +71,7 @@ bool is_worth_it(const CandidateError& without, const CandidateError& with) {
 std::vector<RangeGuard> guard_output_range(const std::vector<FoldRows>& folds, const Eigen::VectorXd& weights,
                                            int max_threads, std::vector<Partition>& of_folds, CandidateError& chosen) {
   std::vector<FoldRows> judging;
-  for (const FoldRows& fold : folds) judging.push_back({fold.training, thinned(fold.held_out, most_held_out_rows)});
+  for (const FoldRows& fold : folds) judging.push_back({fold.training, subsample(fold.held_out, most_held_out_rows)});
   std::vector<SquaredErrors> errors(folds.size());
   parallel_for(std::ssize(folds), max_threads, [&](Eigen::Index f) { errors[f] = errors_of(of_folds[f], judging[f]); });
   const FoldErrors of_one(judging, 1);

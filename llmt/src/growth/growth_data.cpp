@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 
+#include "base/sum_over.hpp"
 #include "numerics/f_distribution.hpp"
 
 namespace llmt {
@@ -13,6 +14,8 @@ GrowthData::GrowthData(const GrowthProblem& growth) : problem(growth), training(
     num_levels.push_back(table.num_levels[input]);
   }
   weights = training.weight_unit * table.weights(training.rows);
+  const auto sum = [&](const auto& term) { return sum_of_rows(training.count(), term, growth.max_threads); };
+  total_weight = sum([&](Eigen::Index i) { return weights(i); });
   const Eigen::Index count = std::ssize(growth.outputs);
   outputs.resize(training.count(), count);
   output_mean.resize(count);
@@ -22,12 +25,12 @@ GrowthData::GrowthData(const GrowthProblem& growth) : problem(growth), training(
   for (Eigen::Index o = 0; o < count; ++o) {
     outputs.col(o) = table.outputs.col(growth.outputs[o])(training.rows);
     const double magnitude = outputs.col(o).cwiseAbs().maxCoeff();
-    output_mean(o) = outputs.col(o).dot(weights) / weights.sum();
+    output_mean(o) = sum([&](Eigen::Index i) { return weights(i) * outputs(i, o); }) / total_weight;
     outputs.col(o).array() -= output_mean(o);
     const double largest = outputs.col(o).cwiseAbs().maxCoeff();
     output_scale(o) = largest > 0.0 ? std::exp2(std::ilogb(largest)) : 1.0;
     outputs.col(o) /= output_scale(o);
-    const double squares = weights.dot(outputs.col(o).cwiseAbs2());
+    const double squares = sum([&](Eigen::Index i) { return weights(i) * outputs(i, o) * outputs(i, o); });
     output_weights(o) = squares > 0.0 ? 1.0 / squares : 1.0;
     rounding(o) = 8.0 * std::numeric_limits<double>::epsilon() * magnitude / output_scale(o);
   }

@@ -23,6 +23,7 @@ struct GrowthData {
   const TrainingRows& training;
   std::vector<int> num_levels;  ///< of each split input; 0: a number
   Eigen::VectorXd weights;      ///< of the rows, with mean 1
+  double total_weight = 0.0;    ///< their sum
   /// Outputs about their mean, divided by a power of two near their largest deviation: a target of scale 1e-6 and one
   /// with offset 1e8 look alike from here on, and dividing by a power of two rounds nothing.
   Eigen::MatrixXd outputs;

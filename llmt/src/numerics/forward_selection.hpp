@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <tuple>
 #include <vector>
 
 namespace llmt {
@@ -12,6 +13,8 @@ struct LocalSums {
   Eigen::MatrixXd gram;      ///< sum of q a a'
   Eigen::MatrixXd products;  ///< sum of q a y, coefficients x outputs
   Eigen::VectorXd squares;   ///< sum of q y^2, one per output
+
+  static auto fields(auto& self) { return std::tie(self.gram, self.products, self.squares); }
 };
 
 /// Forward selection by orthogonal least squares (Chen, Billings & Luo 1989): the next regressor is the one whose part

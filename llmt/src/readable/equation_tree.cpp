@@ -122,7 +122,13 @@ bool EquationTree::settle(std::size_t i, double coarseness) {
 void EquationTree::add_sums() {
   const RowValues& values = sample_.training;
   const Eigen::Index size = std::ssize(terms_) + 1;
-  const Eigen::RowVectorXd mean = values.weights.transpose() * values.outputs / values.weights.sum();
+  Eigen::RowVectorXd mean(values.outputs.cols());
+  for (Eigen::Index o = 0; o < mean.size(); ++o) {
+    const auto add = [&](RowSpan block, WeightedMean& sum) {
+      for (Eigen::Index i = block.begin; i < block.end; ++i) sum.add(values.outputs(i, o), values.weights(i));
+    };
+    mean(o) = sum_over(RowBlocks{values.outputs.rows()}, 1, WeightedMean{}, add).value();
+  }
   sums_.resize(nodes_.size());
   for (std::size_t i = nodes_.size(); i-- > 0;) {
     LocalSums& sums = sums_[i];
@@ -132,15 +138,12 @@ void EquationTree::add_sums() {
       sums = {left.gram + right.gram, left.products + right.products, left.squares + right.squares};
       continue;
     }
-    sums = {Eigen::MatrixXd::Zero(size, size), Eigen::MatrixXd::Zero(size, mean.size()),
-            Eigen::VectorXd::Zero(mean.size())};
     const std::vector<int>& rows = training_[i];
-    for (Eigen::Index begin = 0; begin < std::ssize(rows); begin += chunk_rows) {
-      const Eigen::Index count = std::min<Eigen::Index>(chunk_rows, std::ssize(rows) - begin);
-      Eigen::MatrixXd a(count, size);
-      Eigen::MatrixXd y(count, mean.size());
-      for (Eigen::Index r = 0; r < count; ++r) {
-        const int row = rows[begin + r];
+    const auto add = [&](RowSpan block, LocalSums& to) {
+      Eigen::MatrixXd a(block.count(), size);
+      Eigen::MatrixXd y(block.count(), mean.size());
+      for (Eigen::Index r = 0; r < block.count(); ++r) {
+        const int row = rows[block.begin + r];
         const double root = std::sqrt(values.weights(row));
         const double* deviations = values.deviations.row(row).data();
         a(r, 0) = root;
@@ -150,17 +153,20 @@ void EquationTree::add_sums() {
         }
         y.row(r) = root * (values.outputs.row(row) - mean);
       }
-      sums.gram.selfadjointView<Eigen::Lower>().rankUpdate(a.transpose());
-      sums.products += a.transpose() * y;
-      sums.squares += y.colwise().squaredNorm().transpose();
-    }
+      to.gram.selfadjointView<Eigen::Lower>().rankUpdate(a.transpose());
+      to.products += a.transpose() * y;
+      to.squares += y.colwise().squaredNorm().transpose();
+    };
+    LocalSums zero{Eigen::MatrixXd::Zero(size, size), Eigen::MatrixXd::Zero(size, mean.size()),
+                   Eigen::VectorXd::Zero(mean.size())};
+    sums = sum_over(RowBlocks{std::ssize(rows)}, 1, std::move(zero), add);
     sums.gram.triangularView<Eigen::StrictlyUpper>() = sums.gram.transpose();
   }
   origin_.outputs = mean.transpose();
 }
 
 void EquationTree::price_nodes() {
-  const double total = sample_.training.weights.sum();
+  const double total = sample_.total_weight();
   const Eigen::Index outputs = sample_.output_weights.size();
   for (std::size_t i = 0; i < nodes_.size(); ++i) {
     const Node& node = nodes_[i];
@@ -210,7 +216,7 @@ void EquationTree::choose_grains(double coarseness) {
   for (const int node : nodes_of(priced_, tree)) {
     if (tree[node] != stays_split) noise += paths_[node].rss.col(tree[node]);
   }
-  const double total = sample_.training.weights.sum();
+  const double total = sample_.total_weight();
   noise = (noise / total).cwiseSqrt().cwiseMax(least_noise * (paths_[0].rss.col(0) / total).cwiseSqrt());
   for (Eigen::Index o = 0; o < noise.size(); ++o) {
     // An output that never varies is all the same not to lose its digits.
@@ -285,17 +291,16 @@ double EquationTree::held_term(const Term& term, const double* row, bool is_root
 
 double EquationTree::held_out_error(int node, const Equation& equation) const {
   const RowValues& values = sample_.held_out;
-  double sum = 0.0;
-  for (const int row : held_out_[node]) {
+  return sum_of_rows(std::ssize(held_out_[node]), [&](Eigen::Index i) {
+    const int row = held_out_[node][i];
     const double* deviations = values.deviations.row(row).data();
     Eigen::VectorXd error = values.outputs.row(row).transpose() - equation.intercept;
     for (std::size_t t = 0; t < equation.terms.size(); ++t) {
       const Eigen::Index term = equation.terms[t];
       error -= equation.slope.col(t) * (held_term(terms_[term], deviations, node == 0) + origin_.terms(term));
     }
-    sum += values.weights(row) * sample_.output_weights.dot(error.cwiseAbs2());
-  }
-  return sum;
+    return values.weights(row) * sample_.output_weights.dot(error.cwiseAbs2());
+  });
 }
 
 double EquationTree::held_out_error(const std::vector<int>& tree) {

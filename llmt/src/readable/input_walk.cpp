@@ -43,7 +43,7 @@ std::vector<Node> grow(const Sample& sample, const TreePlan& plan, const WalkSte
   Table table = *sample.described.table;
   table.regression_inputs = common(table.regression_inputs, step.growth_inputs);
   table.products.clear();
-  const TrainingRows rows = thinned(training_rows(table, sample.described.rows, plan.max_threads), growth_rows);
+  const TrainingRows rows = subsample(training_rows(table, sample.described.rows, plan.max_threads), growth_rows);
   GrowthProblem problem{
       .training = &rows, .outputs = sample.outputs, .options = plan.growth, .max_threads = plan.max_threads};
   GrowthOptions& options = problem.options;

@@ -244,7 +244,7 @@ ReadableResult fit_readable(const PreparedFit& prepared, const FitSummary& fitte
   const FitOptions& options = training->options;
   std::vector<FoldRows> folds;
   for (const FoldRows& fold : training->folds) {
-    folds.push_back({fold.training, thinned(fold.held_out, most_held_out_rows)});
+    folds.push_back({fold.training, subsample(fold.held_out, most_held_out_rows)});
   }
   const Setting setting{.training = *training,
                         .folds = folds,

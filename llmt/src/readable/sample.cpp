@@ -40,15 +40,14 @@ Eigen::VectorXd scales_of(const TrainingRows& rows) {
     const InputColumn& column = rows.columns[j];
     const double range = column.high - column.low;
     if (!(range > 0.0) || column.is_categorical()) continue;
-    double squares = 0.0;
-    double weight = 0.0;
-    for (const int row : rows.rows) {
-      const double part = (rows.table->inputs(row, j) - column.centre) / range;
-      if (std::isnan(part)) continue;
-      squares += rows.table->weights(row) * part * part;
-      weight += rows.table->weights(row);
-    }
-    if (squares > 0.0) scale(j) = range * std::sqrt(squares / weight);
+    const auto add = [&](RowSpan block, WeightedMean& squares) {
+      for (Eigen::Index i = block.begin; i < block.end; ++i) {
+        const double part = (rows.table->inputs(rows.rows[i], j) - column.centre) / range;
+        if (!std::isnan(part)) squares.add(part * part, rows.table->weights(rows.rows[i]));
+      }
+    };
+    const double square = sum_over(RowBlocks{rows.count()}, 1, WeightedMean{}, add).value();
+    if (square > 0.0) scale(j) = range * std::sqrt(square);
   }
   return scale;
 }

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "base/matrix.hpp"
+#include "base/sum_over.hpp"
 #include "data/fold_rows.hpp"
 
 namespace llmt {
@@ -31,7 +32,10 @@ struct Sample {
   RowValues training;
   RowValues held_out;  ///< none for all rows
 
-  double total_weight() const { return training.weights.sum(); }
+  /// Of the training rows.
+  double total_weight() const {
+    return sum_of_rows(training.count(), [&](Eigen::Index i) { return training.weights(i); });
+  }
 };
 
 /// `held_out`: null for all rows.

@@ -18,10 +18,7 @@ Eigen::VectorXd ordered_prefix_errors(const LeafSums& sums, Eigen::Index largest
   Eigen::VectorXd errors = Eigen::VectorXd::Constant(largest, std::numeric_limits<double>::infinity());
   for (Eigen::Index leaves = 1;; leaves = std::min(largest, leaves + (leaves + 1) / 2)) {
     const Partition models = shrinkage > 0.0 ? local(sums, leaves, shrinkage) : as_grown(sums, leaves);
-    std::vector<Chunk> held_out;
-    for (Eigen::Index index = 0; index < num_chunks(fold.held_out); ++index) {
-      held_out.push_back(fetch(fold.held_out, index, models.outputs));
-    }
+    const std::vector<Chunk> held_out = fetch_all(fold.held_out, models.outputs);
     errors(leaves - 1) = squared_errors(models, fold.training, held_out, weights).sum();
     if (leaves == largest) return errors;
   }

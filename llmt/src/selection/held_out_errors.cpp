@@ -78,12 +78,9 @@ HeldOutErrors::HeldOutErrors(const std::vector<FoldRows>& folds, const std::vect
   }
   leaf_counts_ = compared_leaf_counts(largest);
   for (const FoldRows& fold : folds) {
-    std::vector<Chunk>& held_out = held_out_.emplace_back();
-    for (Eigen::Index index = 0; index < num_chunks(fold.held_out); ++index) {
-      held_out.push_back(fetch(fold.held_out, index, grown.front().partition.outputs));
-    }
+    held_out_.push_back(fetch_all(fold.held_out, grown.front().partition.outputs));
     const Eigen::Index enough = enough_rows(largest, std::ssize(fold.training.regressors) + 1);
-    samples_.push_back(thinned(fold.training, enough, max_threads));
+    samples_.push_back(subsample(fold.training, enough, max_threads));
   }
 }
 
@@ -100,7 +97,7 @@ Candidate HeldOutErrors::candidate(const Key& key) const {
 // As many rows as a tree needs, and the sums over them.
 struct HeldOutErrors::Sample {
   Sample(const TrainingRows& all, Partition tree, int max_threads, bool sparse)
-      : rows(thinned(all, rows_for(all, tree.num_leaves()), max_threads)),
+      : rows(subsample(all, rows_for(all, tree.num_leaves()), max_threads)),
         sums(sum_leaves(rows, std::move(tree), max_threads, sparse)) {}
   Sample(const Sample&) = delete;
   Sample& operator=(const Sample&) = delete;
@@ -232,12 +229,12 @@ std::vector<std::optional<Partition>> HeldOutErrors::models(const Key& key) cons
 
 bool HeldOutErrors::is_clearly_worse(const Key& key, const Key& best, std::size_t folds) const {
   constexpr double standard_errors = 3.0;
-  Eigen::VectorXd of_key(static_cast<Eigen::Index>(folds) * error_blocks);
+  Eigen::VectorXd of_key(static_cast<Eigen::Index>(folds) * error_parts);
   Eigen::VectorXd of_best(of_key.size());
   for (std::size_t fold = 0; fold < folds; ++fold) {
-    const Eigen::Index begin = static_cast<Eigen::Index>(fold) * error_blocks;
-    of_key.segment(begin, error_blocks) = of_folds_[fold].errors.at(key);
-    of_best.segment(begin, error_blocks) = of_folds_[fold].errors.at(best);
+    const Eigen::Index begin = static_cast<Eigen::Index>(fold) * error_parts;
+    of_key.segment(begin, error_parts) = of_folds_[fold].errors.at(key);
+    of_best.segment(begin, error_parts) = of_folds_[fold].errors.at(best);
   }
   const PairedDifference difference = paired_difference(of_key, of_best);
   return difference.mean > standard_errors * difference.standard_error;

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <optional>
 
 #include "base/parallel.hpp"
@@ -51,9 +50,7 @@ Partition make_from_all_rows(const FoldRows& fold, const GrownTree& grown, const
   Candidate candidate = best.candidate;
   candidate.leaves = std::min(candidate.leaves, grown.partition.num_leaves());
   Partition partition = estimate(fold.training, grown, candidate, max_threads);
-  std::vector<int> all(fold.held_out.count());
-  std::iota(all.begin(), all.end(), 0);
-  const std::vector<Chunk> held_out = {fetch(fold.held_out, all, partition.outputs)};
+  const std::vector<Chunk> held_out = fetch_all(fold.held_out, partition.outputs);
   best = error_of_folds(best.candidate, {squared_errors(partition, fold.training, held_out, weights).sum()});
   return partition;
 }
@@ -71,7 +68,7 @@ Selection select(const std::vector<FoldRows>& folds, const std::vector<GrownTree
   std::vector<FoldRows> compared;
   Selection selection;
   for (const FoldRows& fold : folds) {
-    compared.push_back({fold.training, thinned(fold.held_out, most_held_out_rows)});
+    compared.push_back({fold.training, subsample(fold.held_out, most_held_out_rows)});
     selection.held_out_rows += compared.back().held_out.count();
   }
   const FoldErrors error_of_folds(compared, weights.size());

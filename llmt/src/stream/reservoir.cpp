@@ -1,20 +1,11 @@
 #include "stream/reservoir.hpp"
 
-#include <bit>
-#include <cmath>
 #include <iterator>
-#include <limits>
+
+#include "data/row_hash.hpp"
 
 namespace llmt {
 namespace {
-
-// A step of splitmix64 (Steele, Lea & Flood 2014).
-std::uint64_t mixed(std::uint64_t state, std::uint64_t bits) {
-  std::uint64_t z = state + bits + 0x9e3779b97f4a7c15ULL;
-  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ULL;
-  z = (z ^ (z >> 27)) * 0x94d049bb133111ebULL;
-  return z ^ (z >> 31);
-}
 
 // One row in eight is held out.
 constexpr std::uint64_t held_out_one_in = 8;
@@ -24,13 +15,10 @@ constexpr std::uint64_t held_out_one_in = 8;
 bool Reservoir::add(const double* values, Eigen::Index times) {
   if (capacity_ == 0) return false;
   std::uint64_t hash = 0;
-  for (Eigen::Index k = 0; k < width_; ++k) {
-    const double value = std::isnan(values[k]) ? std::numeric_limits<double>::infinity() : values[k] + 0.0;  // -0 as 0
-    hash = mixed(hash, std::bit_cast<std::uint64_t>(value));
-  }
+  for (Eigen::Index k = 0; k < width_; ++k) hash = row_hash(hash, values[k]);
   const bool full = std::ssize(rows_) >= capacity_;
   if (full && hash > std::prev(rows_.end())->first) return false;
-  const bool held_out = mixed(hash, 0) % held_out_one_in == 0;
+  const bool held_out = row_hash(hash, 0.0) % held_out_one_in == 0;
   const auto [at, added] = rows_.try_emplace(hash, Row{{}, held_out, 0});
   at->second.times += times;
   times_ += times;

@@ -55,11 +55,7 @@ class BestPartition {
  public:
   // A candidate takes the place of `first` if its error is below `error`.
   BestPartition(const TrainingRows& held_out, Partition first, double error)
-      : held_out_(held_out), best_(std::move(first)), smallest_(error) {
-    for (Eigen::Index index = 0; index < num_chunks(held_out); ++index) {
-      rows_.push_back(fetch(held_out, index, best_.outputs));
-    }
-  }
+      : held_out_(held_out), rows_(fetch_all(held_out, first.outputs)), best_(std::move(first)), smallest_(error) {}
 
   // Whether the candidate is the best so far.
   bool offer(Partition candidate) {

@@ -70,7 +70,7 @@ TEST(Sample, JointEstimateOnAllRowsIsReachedFromIt) {
   const Rows data = rows(20000, 1);
   const llmt::TrainingRows training = llmt::training_rows(data.table, all(20000));
   const Partition tree = blended_tree(training);
-  const llmt::TrainingRows sample = llmt::thinned(training, 60 * 4 * 8);
+  const llmt::TrainingRows sample = llmt::subsample(training, 60 * 4 * 8);
   const llmt::Regularisation regularisation{1e-6, 0.0};
   const llmt::LeafSums of_all = llmt::sum_leaves(training, tree, 1);
   const Partition exact = llmt::joint(of_all, 8, {regularisation}).front();
@@ -100,7 +100,7 @@ TEST(Sample, LeafThatItHardlyHoldsDoesNotSpoilTheEstimateOnAllRows) {
     const Rows far{data.inputs, data.outputs};
     const llmt::TrainingRows training = llmt::training_rows(far.table, all(20000));
     const Partition tree = blended_tree(training);
-    const llmt::TrainingRows sample = llmt::thinned(training, 60 * 4 * 8);
+    const llmt::TrainingRows sample = llmt::subsample(training, 60 * 4 * 8);
     const llmt::Regularisation regularisation{1e-6, 0.0};
     const llmt::LeafSums of_all = llmt::sum_leaves(training, tree, 1);
     const llmt::LeafSums of_sample = llmt::sum_leaves(sample, tree, 1);
@@ -141,7 +141,7 @@ std::pair<double, double> best_and_own_error(const Rows& data, const llmt::Train
 TEST(Sample, SparseEstimateOnAllRowsIsReachedFromItWithItsZeros) {
   const Rows data = rows(4000, 3);
   const llmt::TrainingRows training = llmt::training_rows(data.table, all(4000));
-  const llmt::TrainingRows sample = llmt::thinned(training, 30 * 4 * 8);
+  const llmt::TrainingRows sample = llmt::subsample(training, 30 * 4 * 8);
   const llmt::Regularisation regularisation{1e-8, 0.0, true};
   const llmt::LeafSums of_sample = llmt::sum_leaves(sample, blended_tree(training), 1, true);
   const Partition before = llmt::joint(of_sample, 8, {regularisation}).front();
@@ -168,8 +168,8 @@ TEST(Sample, DependsOnTheRowsAndNotOnTheirOrder) {
   const Eigen::MatrixXd outputs = data.outputs(order, Eigen::all);
   const llmt::Table reversed{inputs, outputs, data.table.weights, {0, 0, 0}, {0, 1, 2}, {0, 1, 2}};
   const llmt::TrainingRows training = llmt::training_rows(data.table, all(5000));
-  const llmt::TrainingRows sample = llmt::thinned(training, 1000);
-  llmt::TrainingRows other = llmt::thinned(llmt::training_rows(reversed, all(5000)), 1000);
+  const llmt::TrainingRows sample = llmt::subsample(training, 1000);
+  llmt::TrainingRows other = llmt::subsample(llmt::training_rows(reversed, all(5000)), 1000);
   EXPECT_EQ(sample.count(), 1000);
   EXPECT_NEAR(llmt::total_weight(sample), llmt::total_weight(training), 1e-9 * 5000.0);
   for (int& row : other.rows) {
@@ -178,8 +178,8 @@ TEST(Sample, DependsOnTheRowsAndNotOnTheirOrder) {
   std::ranges::reverse(other.rows);
   EXPECT_EQ(sample.rows, other.rows);
   // Fewer are among more.
-  const llmt::TrainingRows fewer = llmt::thinned(sample, 100);
-  EXPECT_EQ(fewer.rows, llmt::thinned(training, 100).rows);
+  const llmt::TrainingRows fewer = llmt::subsample(sample, 100);
+  EXPECT_EQ(fewer.rows, llmt::subsample(training, 100).rows);
 }
 
 }  // namespace

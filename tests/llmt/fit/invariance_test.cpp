@@ -108,4 +108,23 @@ TEST(Invariance, SameBytesAtAnyNumberOfThreads) {
   }
 }
 
+// More rows than a block of sums over rows has, several times over, in the folds too. Weights are of very different
+// sizes, so that the order in which they are added shows.
+TEST(Invariance, SameBytesAtAnyNumberOfThreadsWithManyBlocksOfRows) {
+  const Eigen::MatrixXd x = oracle::uniform(15000, 3, 7);
+  const Eigen::MatrixXd y = oracle::curved(x, 0.1, 7);
+  const Eigen::VectorXd weights = (5.0 * oracle::uniform(15000, 1, 8)).array().exp();
+  for (const llmt::ValidityChoice validity : {llmt::ValidityChoice::crisp, llmt::ValidityChoice::blend}) {
+    const auto model_on = [&](int threads) {
+      llmt::FitOptions options{.max_leaves = 8, .validity = validity, .max_threads = threads};
+      options.weights = weights;
+      options.folds.count = 2;
+      return llmt::to_json(llmt::fit(x, y, options).model);
+    };
+    const std::string one = model_on(1);
+    EXPECT_EQ(model_on(2), one);
+    EXPECT_EQ(model_on(4), one);
+  }
+}
+
 }  // namespace

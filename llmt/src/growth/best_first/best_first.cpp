@@ -33,7 +33,7 @@ bool lowers_variance(const GrowthData& data, const OpenLeaf& leaf, int rank) {
   if (!(least >= 0.0)) return true;
   // The weights make the outputs' sums of squares 1 each, so that (rows - 1) times a residual variance is a fraction of
   // the variance.
-  const double to_fraction = (data.weights.sum() - 1.0) / static_cast<double>(data.output_weights.size());
+  const double to_fraction = (data.total_weight - 1.0) / static_cast<double>(data.output_weights.size());
   const double freedom = leaf.weight - leaf.best.rank_left - leaf.best.rank_right;
   const double before = leaf.rss / (leaf.weight - rank);
   const double after = leaf.best.rss / freedom;

@@ -16,7 +16,7 @@ constexpr Eigen::Index largest_histogram = Eigen::Index{1} << 24;
 }  // namespace
 
 bool BinnedLeaves::possible(const GrowthData& data) {
-  if (BinnedRows::size_of_histogram(data) > largest_histogram) return false;
+  if (BinnedRows::largest_histogram(data) > largest_histogram) return false;
   const bool few_levels = std::ranges::all_of(data.num_levels, [](int levels) { return levels <= most_bins; });
   return few_levels && is_complete(data);
 }
@@ -25,7 +25,7 @@ BinnedLeaves::BinnedLeaves(const GrowthData& data)
     : data_(data),
       rows_(data),
       memory_left_(std::max(rows_.whitened().features().rows() * rows_.whitened().features().columns() / kept_part,
-                            kept_nodes * rows_.num_bins() * GramShape(rows_.whitened().features()).size())) {}
+                            kept_nodes * rows_.size_of_histogram())) {}
 
 BinnedLeaf BinnedLeaves::root() const {
   BinnedLeaf leaf{whitened_root(data_), {}};
@@ -49,9 +49,8 @@ SplitCandidate BinnedLeaves::examine(BinnedLeaf& leaf, const Node& parent, Node&
 
 void BinnedLeaves::wait(BinnedLeaf& leaf) {
   if (!leaf.histogram) return;
-  const Eigen::Index size = std::ssize(leaf.histogram->grams);
-  if (size <= memory_left_) {
-    memory_left_ -= size;
+  if (rows_.size_of_histogram() <= memory_left_) {
+    memory_left_ -= rows_.size_of_histogram();
   } else {
     leaf.histogram.reset();
   }
@@ -70,16 +69,10 @@ std::array<BinnedLeaf, 2> BinnedLeaves::divide(BinnedLeaf& leaf, const SplitCand
     child.slope = leaf.slope;
   }
   if (leaf.histogram) {
-    memory_left_ += std::ssize(leaf.histogram->grams);
+    memory_left_ += rows_.size_of_histogram();
     const std::size_t small = children[0].rows.size() <= children[1].rows.size() ? 0 : 1;
     children[small].histogram = rows_.accumulate(children[small].rows);
-    const Histogram& less = *children[small].histogram;
-    for (std::size_t k = 0; k < less.grams.size(); ++k) {
-      leaf.histogram->grams[k] -= less.grams[k];
-    }
-    for (std::size_t bin = 0; bin < less.counts.size(); ++bin) {
-      leaf.histogram->counts[bin] -= less.counts[bin];
-    }
+    subtract(*children[small].histogram, *leaf.histogram);
     children[1 - small].histogram = std::move(leaf.histogram);
   }
   return children;

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <limits>
 
@@ -12,41 +11,8 @@
 namespace llmt {
 namespace {
 
-// About this many rows decide where the edges lie. These are 250 rows per bin, which give a bin's share of the rows to
-// 6 %.
+// So many rows decide where the edges lie. These are 250 rows per bin, which give a bin's share of the rows to 6 %.
 constexpr Eigen::Index sample_rows = 65536;
-
-// Rows whose values, taken together, hash to a small number: the same rows in whatever order they come.
-std::vector<int> sample(const GrowthData& data) {
-  const Eigen::Index rows = data.training.count();
-  const std::uint64_t ratio = static_cast<std::uint64_t>(std::max<Eigen::Index>(1, rows / sample_rows));
-  constexpr Eigen::Index block = 4096;
-  const Eigen::Index blocks = (rows + block - 1) / block;
-  std::vector<std::vector<int>> taken(blocks);
-  parallel_for(blocks, data.problem.max_threads, [&](Eigen::Index index) {
-    const int begin = static_cast<int>(index * block);
-    std::vector<std::uint64_t> hashes(std::min(block, rows - begin), 0);
-    for (Eigen::Index j = 0; j < data.split_inputs(); ++j) {
-      for (std::size_t k = 0; k < hashes.size(); ++k) {
-        // Adding zero turns -0 into +0, which is the same value.
-        const double value = data.split_value(begin + static_cast<int>(k), j) + 0.0;
-        std::uint64_t hash = hashes[k] ^ std::bit_cast<std::uint64_t>(value);
-        hash = (hash ^ (hash >> 32)) * 0x9E3779B97F4A7C15U;
-        hashes[k] = hash ^ (hash >> 29);
-      }
-    }
-    for (std::size_t k = 0; k < hashes.size(); ++k) {
-      if (hashes[k] % ratio == 0) {
-        taken[index].push_back(begin + static_cast<int>(k));
-      }
-    }
-  });
-  std::vector<int> all;
-  for (const std::vector<int>& of_block : taken) {
-    all.insert(all.end(), of_block.begin(), of_block.end());
-  }
-  return all;
-}
 
 // At most bins - 1 edges, each between two neighbouring values of the sample.
 std::vector<double> quantile_edges(std::vector<double> values, int bins) {
@@ -76,16 +42,10 @@ std::vector<double> quantile_edges(std::vector<double> values, int bins) {
   return edges;
 }
 
-// Smallest and largest value in each bin.
-struct Extent {
-  std::array<double, most_bins> low;
-  std::array<double, most_bins> high;
-};
-
 // Codes of the rows begin ... end - 1 of a numeric input: the number of edges below the value. It is found by bisection
 // in steps of powers of two, without branches and for several values at a time.
 void encode(const GrowthData& data, Eigen::Index split_input, const std::vector<double>& edges, int begin, int end,
-            std::uint8_t* codes, Extent& extent) {
+            std::uint8_t* codes, std::vector<Extent>& extent) {
   std::array<double, most_bins> padded;
   padded.fill(std::numeric_limits<double>::infinity());
   std::ranges::copy(edges, padded.begin());
@@ -107,8 +67,7 @@ void encode(const GrowthData& data, Eigen::Index split_input, const std::vector<
     for (std::size_t k = 0; k < count; ++k) {
       const std::uint32_t bin = below[k];
       codes[(begin + k) * stride] = static_cast<std::uint8_t>(bin);
-      extent.low[bin] = std::min(extent.low[bin], value[k]);
-      extent.high[bin] = std::max(extent.high[bin], value[k]);
+      extent[bin].widen(value[k]);
     }
   }
 }
@@ -127,9 +86,14 @@ Bins cut_input(const GrowthData& data, const std::vector<int>& sampled, Eigen::I
   return bins;
 }
 
-// Codes of the rows begin ... end - 1 in all split inputs. Widens `extents`, one per input.
-void encode_rows(const GrowthData& data, int begin, int end, BinnedInputs& inputs, std::vector<Extent>& extents) {
+// Smallest and largest value in each bin of each numeric input.
+using Extents = std::vector<std::vector<Extent>>;
+
+// Codes of some rows in all split inputs.
+void encode_rows(const GrowthData& data, RowSpan rows, BinnedInputs& inputs, Extents& extents) {
   const std::size_t count = inputs.bins.size();
+  const int begin = static_cast<int>(rows.begin);
+  const int end = static_cast<int>(rows.end);
   for (std::size_t j = 0; j < count; ++j) {
     if (data.num_levels[j] == 0) {
       encode(data, j, inputs.bins[j].edges, begin, end, inputs.codes.data() + j, extents[j]);
@@ -145,33 +109,17 @@ void encode_rows(const GrowthData& data, int begin, int end, BinnedInputs& input
 
 BinnedInputs make_bins(const GrowthData& data, int bins) {
   const std::size_t inputs = data.split_inputs();
-  const int rows = static_cast<int>(data.training.count());
   const int threads = data.problem.max_threads;
-  BinnedInputs result{std::vector<Bins>(inputs), std::vector<std::uint8_t>(rows * inputs)};
-  const std::vector<int> sampled = sample(data);
+  BinnedInputs result{std::vector<Bins>(inputs), std::vector<std::uint8_t>(data.training.count() * inputs)};
+  const std::vector<int> sampled = smallest_hashes(data.training, sample_rows, threads);
   parallel_for(data.split_inputs(), threads,
                [&](Eigen::Index j) { result.bins[j] = cut_input(data, sampled, j, bins); });
-  constexpr int block = 16384;  // rows
-  constexpr int slots = 16;
-  Extent nothing;
-  nothing.low.fill(std::numeric_limits<double>::infinity());
-  nothing.high.fill(-std::numeric_limits<double>::infinity());
-  std::vector<std::vector<Extent>> extents(slots, std::vector<Extent>(inputs, nothing));
-  parallel_for(slots, threads, [&](Eigen::Index slot) {
-    for (int begin = static_cast<int>(slot) * block; begin < rows; begin += slots * block) {
-      encode_rows(data, begin, std::min(rows, begin + block), result, extents[slot]);
-    }
-  });
+  Extents nothing;
+  for (const Bins& input : result.bins) nothing.emplace_back(input.count);
+  const Extents extents = sum_over(RowBlocks{data.training.count(), large_block_rows}, threads, std::move(nothing),
+                                   [&](RowSpan block, Extents& sum) { encode_rows(data, block, result, sum); });
   for (std::size_t j = 0; j < inputs; ++j) {
-    for (int bin = 0; bin < result.bins[j].count; ++bin) {
-      double low = nothing.low[bin];
-      double high = nothing.high[bin];
-      for (const std::vector<Extent>& extent : extents) {
-        low = std::min(low, extent[j].low[bin]);
-        high = std::max(high, extent[j].high[bin]);
-      }
-      result.bins[j].splittable.push_back(low < high);
-    }
+    for (const Extent& extent : extents[j]) result.bins[j].splittable.push_back(extent.low < extent.high);
   }
   return result;
 }

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "base/parallel.hpp"
+#include "base/sum_over.hpp"
 
 namespace llmt {
 namespace {
@@ -14,7 +15,7 @@ constexpr Eigen::Index histogram_size = Eigen::Index{1} << 21;
 constexpr int fewest_bins = 32;
 
 // Rows that are sorted into bins at a time: few enough that their features stay in the cache.
-constexpr Eigen::Index block_rows = 4096;
+constexpr Eigen::Index cached_rows = 4096;
 
 Eigen::Index bins_of_input(const GramShape& shape, Eigen::Index inputs) {
   return std::clamp<Eigen::Index>(histogram_size / (shape.size() * inputs), fewest_bins, most_bins);
@@ -22,7 +23,14 @@ Eigen::Index bins_of_input(const GramShape& shape, Eigen::Index inputs) {
 
 }  // namespace
 
-Eigen::Index BinnedRows::size_of_histogram(const GrowthData& data) {
+void subtract(const Histogram& less, Histogram& histogram) {
+  for (std::size_t j = 0; j < less.size(); ++j) {
+    for (std::size_t k = 0; k < less[j].grams.size(); ++k) histogram[j].grams[k] -= less[j].grams[k];
+    for (std::size_t bin = 0; bin < less[j].counts.size(); ++bin) histogram[j].counts[bin] -= less[j].counts[bin];
+  }
+}
+
+Eigen::Index BinnedRows::largest_histogram(const GrowthData& data) {
   const GramShape shape(std::ssize(data.training.regressors) + 1, data.outputs.cols());
   Eigen::Index bins = 0;
   for (const int levels : data.num_levels) bins += levels > 0 ? levels : bins_of_input(shape, data.split_inputs());
@@ -31,59 +39,48 @@ Eigen::Index BinnedRows::size_of_histogram(const GrowthData& data) {
 
 BinnedRows::BinnedRows(const GrowthData& data) : data_(data), whitened_(data), shape_(whitened_.features()) {
   inputs_ = make_bins(data, static_cast<int>(bins_of_input(shape_, data.split_inputs())));
-  Eigen::Index sum = 0;
-  for (const Bins& input : inputs_.bins) {
-    first_bin_.push_back(sum);
-    sum += input.count;
-  }
-  first_bin_.push_back(sum);
+  for (const Bins& input : inputs_.bins) num_bins_ += input.count;
 }
 
-std::span<const double> BinnedRows::grams(const Histogram& histogram, std::size_t input) const {
-  const Eigen::Index first = first_bin_[input] * shape_.size();
-  return std::span(histogram.grams).subspan(first, (first_bin_[input + 1] * shape_.size() - first));
-}
-
-std::span<const Eigen::Index> BinnedRows::counts(const Histogram& histogram, std::size_t input) const {
-  return std::span(histogram.counts).subspan(first_bin_[input], inputs_.bins[input].count);
-}
-
-// Rows are taken in blocks that stay in the cache while they are sorted into the bins of one input after the other.
-// Inputs are dealt to threads; each bin's sum is formed in the same order whatever their number.
+// Inputs are dealt to threads. Rows are taken in parts that stay in the cache while they are sorted into the bins of
+// one input after the other.
 Histogram BinnedRows::accumulate(const std::vector<int>& rows) const {
-  Histogram histogram{std::vector<double>(first_bin_.back() * shape_.size(), 0.0),
-                      std::vector<Eigen::Index>(first_bin_.back(), 0)};
   const Eigen::Index inputs = data_.split_inputs();
   const int threads = data_.threads_for(std::ssize(rows) * inputs);
   const Eigen::Index groups = threads == 1 ? 1 : std::min<Eigen::Index>(inputs, std::max(threads, 4));
+  Histogram histogram(inputs);
   parallel_for(groups, threads, [&](Eigen::Index group) {
-    std::vector<int> sorted(block_rows);
-    for (Eigen::Index begin = 0; begin < std::ssize(rows); begin += block_rows) {
-      data_.problem.check(std::ssize(rows));
-      const Eigen::Index end = std::min(std::ssize(rows), begin + block_rows);
-      const std::span<const int> block = std::span(rows).subspan(begin, end - begin);
-      for (const int row : block) {
-        features().prefetch(row);
-      }
-      for (Eigen::Index j = inputs * group / groups; j < inputs * (group + 1) / groups; ++j) {
-        add_block(block, j, sorted, histogram);
-      }
+    const Eigen::Index first = inputs * group / groups;
+    Histogram zero;
+    for (Eigen::Index j = first; j < inputs * (group + 1) / groups; ++j) {
+      const std::size_t bins = inputs_.bins[j].count;
+      zero.push_back({std::vector<double>(bins * shape_.size(), 0.0), std::vector<Eigen::Index>(bins, 0)});
     }
+    std::vector<int> sorted(cached_rows);
+    const auto add_block = [&](RowSpan block, Histogram& sum) {
+      for (Eigen::Index begin = block.begin; begin < block.end; begin += cached_rows) {
+        data_.problem.check(std::ssize(rows));
+        const std::span<const int> part = std::span(rows).subspan(begin, std::min(cached_rows, block.end - begin));
+        for (const int row : part) features().prefetch(row);
+        for (std::size_t j = 0; j < sum.size(); ++j) add(part, first + j, sorted, sum[j]);
+      }
+    };
+    Histogram of_group = sum_over(RowBlocks{std::ssize(rows), large_block_rows}, 1, std::move(zero), add_block);
+    std::ranges::move(of_group, histogram.begin() + first);
   });
   return histogram;
 }
 
 // Adds some rows to the bins of one input. `sorted`: work space for the rows.
-void BinnedRows::add_block(std::span<const int> rows, std::size_t input, std::vector<int>& sorted,
-                           Histogram& histogram) const {
+void BinnedRows::add(std::span<const int> rows, std::size_t input, std::vector<int>& sorted,
+                     InputHistogram& histogram) const {
   const int bins = inputs_.bins[input].count;
-  const Eigen::Index first = first_bin_[input];
   std::array<int, most_bins + 1> place{};  // where the rows of a bin begin among the sorted rows
   for (const int row : rows) {
     ++place[1 + inputs_.code(row, input)];
   }
   for (int bin = 0; bin < bins; ++bin) {
-    histogram.counts[first + bin] += place[bin + 1];
+    histogram.counts[bin] += place[bin + 1];
     place[bin + 1] += place[bin];
   }
   for (const int row : rows) {
@@ -93,7 +90,7 @@ void BinnedRows::add_block(std::span<const int> rows, std::size_t input, std::ve
   for (int bin = 0; bin < bins; ++bin) {
     const int after = place[bin];
     if (after > at) {
-      add_rows(features(), sorted.data() + at, after - at, histogram.grams.data() + (first + bin) * shape_.size());
+      add_rows(features(), sorted.data() + at, after - at, histogram.grams.data() + bin * shape_.size());
     }
     at = after;
   }
@@ -101,11 +98,10 @@ void BinnedRows::add_block(std::span<const int> rows, std::size_t input, std::ve
 
 std::vector<double> BinnedRows::total(const Histogram& histogram) const {
   std::vector<double> sum(shape_.size(), 0.0);
-  const std::span<const double> of_input = grams(histogram, 0);
-  const std::span<const Eigen::Index> rows = counts(histogram, 0);
-  for (std::size_t bin = 0; bin < rows.size(); ++bin) {
-    if (rows[bin] > 0) {
-      add(shape_, of_input.data() + bin * shape_.size(), sum.data());
+  const InputHistogram& of_input = histogram.front();
+  for (std::size_t bin = 0; bin < of_input.counts.size(); ++bin) {
+    if (of_input.counts[bin] > 0) {
+      llmt::add(shape_, of_input.grams.data() + bin * shape_.size(), sum.data());
     }
   }
   return sum;

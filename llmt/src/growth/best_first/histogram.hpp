@@ -3,6 +3,7 @@
 #pragma once
 
 #include <span>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -12,23 +13,32 @@
 
 namespace llmt {
 
-/// Gram matrices and row counts of the bins of all split inputs.
-struct Histogram {
+/// Gram matrices and row counts of the bins of a split input.
+struct InputHistogram {
   std::vector<double> grams;
   std::vector<Eigen::Index> counts;
+
+  static auto fields(auto& self) { return std::tie(self.grams, self.counts); }
 };
+
+/// Those of all split inputs, or of some of them.
+using Histogram = std::vector<InputHistogram>;
+
+/// Takes the rows of `less` out of `histogram`.
+void subtract(const Histogram& less, Histogram& histogram);
 
 /// The features of all training rows and the bins of their inputs.
 class BinnedRows {
  public:
   explicit BinnedRows(const GrowthData& data);
 
-  /// Doubles that the histogram of a node takes, at most.
-  static Eigen::Index size_of_histogram(const GrowthData& data);
+  /// The same before the inputs are cut: at most so many.
+  static Eigen::Index largest_histogram(const GrowthData& data);
 
   WhitenedRows& whitened() { return whitened_; }
   const WhitenedRows& whitened() const { return whitened_; }
-  Eigen::Index num_bins() const { return first_bin_.back(); }  ///< of all inputs
+  /// Doubles that the histogram of a node takes.
+  Eigen::Index size_of_histogram() const { return num_bins_ * shape_.size(); }
 
   Histogram accumulate(const std::vector<int>& rows) const;
 
@@ -79,9 +89,7 @@ class BinnedRows {
   };
 
   const Features& features() const { return whitened_.features(); }
-  std::span<const double> grams(const Histogram& histogram, std::size_t input) const;
-  std::span<const Eigen::Index> counts(const Histogram& histogram, std::size_t input) const;
-  void add_block(std::span<const int> rows, std::size_t input, std::vector<int>& sorted, Histogram& histogram) const;
+  void add(std::span<const int> rows, std::size_t input, std::vector<int>& sorted, InputHistogram& histogram) const;
   Edges search_edges(const Histogram& histogram, const std::vector<int>& node_rows, std::size_t input,
                      const AdjustedRss& scale) const;
   bool rests_on_two_rows(const Edges& edges, std::size_t at, std::size_t input,
@@ -102,9 +110,9 @@ class BinnedRows {
 
   const GrowthData& data_;
   BinnedInputs inputs_;
-  std::vector<Eigen::Index> first_bin_;  // of each input among all bins
   WhitenedRows whitened_;
   GramShape shape_;
+  Eigen::Index num_bins_ = 0;  // of all inputs
 };
 
 }  // namespace llmt

@@ -46,8 +46,8 @@ SideOfEdges sum_side(const GramShape& shape, const Eigen::VectorXd& output_weigh
 
 BinnedRows::Edges BinnedRows::search_edges(const Histogram& histogram, const std::vector<int>& node_rows,
                                            std::size_t input, const AdjustedRss& scale) const {
-  const std::span<const double> of_bin = grams(histogram, input);
-  const std::span<const Eigen::Index> rows = counts(histogram, input);
+  const std::span<const double> of_bin = histogram[input].grams;
+  const std::span<const Eigen::Index> rows = histogram[input].counts;
   const Eigen::Index smallest_leaf = data_.problem.options.min_leaf_samples;
   Edges edges;
   if (data_.num_levels[input] > 0) {
@@ -271,7 +271,7 @@ SplitCandidate BinnedRows::search(const Histogram& histogram, const std::vector<
   const SearchNode node{features(), data_.output_weights, node_rss, total(histogram)[0], rank};
   const AdjustedRss scale = node.scale();
   std::vector<Edges> edges(inputs_.bins.size());
-  parallel_for(std::ssize(edges), data_.threads_for(num_bins() * shape_.size() / 4),
+  parallel_for(std::ssize(edges), data_.threads_for(size_of_histogram() / 4),
                [&](Eigen::Index j) { edges[j] = search_edges(histogram, rows, j, scale); });
   double smallest = none;
   Eigen::Index compared = 0;

@@ -60,7 +60,7 @@ SplitCandidate ResidualLeaves::search_categories(const ResidualLeaf& leaf, Eigen
   std::vector<Eigen::Index> counts;
   for (std::size_t level = 0; level < of_level.size(); ++level) {
     counts.push_back(std::ssize(of_level[level]));
-    add_rows(rows_.features(), of_level[level].data(), counts.back(), grams.data() + level * shape.size());
+    std::ranges::copy(sum_gram(rows_.features(), of_level[level], 1), grams.data() + level * shape.size());
   }
   return search_level_grams(shape, data_.output_weights, scale, 0.0, grams, counts,
                             data_.problem.options.min_leaf_samples);
@@ -77,7 +77,7 @@ SplitCandidate ResidualLeaves::examine(ResidualLeaf& leaf, const Node& parent, N
   const double rss = data_.output_weights.dot(node.rss);
   const Eigen::MatrixXd left_over = residuals(leaf, node, threads);
   const Eigen::VectorXd weights = data_.weights(leaf.rows);
-  const SearchNode search{rows_.features(), data_.output_weights, rss, weights.sum(), node.rank};
+  const SearchNode search{rows_.features(), data_.output_weights, rss, leaf.weight, node.rank};
   ResidualSplit numeric =
       search_by_residuals(data_, {search, leaf.rows, leaf.values, left_over, weights, leaf.gram, threads});
   std::vector<SplitCandidate> found(data_.num_levels.size());

@@ -5,7 +5,7 @@
 #include <functional>
 #include <limits>
 
-#include "base/parallel.hpp"
+#include "base/sum_over.hpp"
 
 namespace llmt {
 namespace {
@@ -20,9 +20,6 @@ constexpr double grid = 0x1p-32;
 // If a split does not pass the F test at this level, or at GrowthOptions::significance if that is lower, the next input
 // is tried.
 constexpr double usual_significance = 0.05;
-
-constexpr Eigen::Index partial_sums = 16;
-constexpr Eigen::Index rows_of_a_sum = 4096;
 
 struct Cut {
   Eigen::Index input;
@@ -121,18 +118,10 @@ ResidualSplit divide(const ResidualNode& node, const Cut& candidate) {
 }  // namespace
 
 std::vector<double> sum_gram(const Features& features, std::span<const int> rows, int threads) {
-  const GramShape shape(features);
-  const Eigen::Index count = std::ssize(rows);
-  const Eigen::Index parts = std::clamp<Eigen::Index>(count / rows_of_a_sum, 1, partial_sums);
-  std::vector<std::vector<double>> sums(parts, std::vector<double>(shape.size(), 0.0));
-  parallel_for(parts, threads, [&](Eigen::Index part) {
-    const Eigen::Index begin = count * part / parts;
-    add_rows(features, rows.data() + begin, count * (part + 1) / parts - begin, sums[part].data());
-  });
-  for (std::size_t part = 1; part < sums.size(); ++part) {
-    add(shape, sums[part].data(), sums[0].data());
-  }
-  return std::move(sums[0]);
+  const auto add = [&](RowSpan block, std::vector<double>& gram) {
+    add_rows(features, rows.data() + block.begin, block.count(), gram.data());
+  };
+  return sum_over(RowBlocks{std::ssize(rows)}, threads, std::vector<double>(GramShape(features).size(), 0.0), add);
 }
 
 ResidualSplit search_by_residuals(const GrowthData& data, const ResidualNode& node) {

@@ -60,7 +60,7 @@ struct ResidualSplit {
 /// that is tried one pass over the values and one over the features.
 ResidualSplit search_by_residuals(const GrowthData& data, const ResidualNode& node);
 
-/// Gram matrix of some rows of features. The number of partial sums does not depend on the number of threads.
+/// Gram matrix of some rows of features.
 std::vector<double> sum_gram(const Features& features, std::span<const int> rows, int threads);
 
 }  // namespace llmt

@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "base/simd.hpp"
+#include "base/sum_over.hpp"
 #include "growth/best_first/residual_search.hpp"
 
 namespace llmt {
@@ -27,6 +28,15 @@ struct ClassSums {
   std::array<double, 2> count{};  // weights
   std::array<double, 2> sum{};    // of the values
   std::array<double, 2> squares{};
+
+  ClassSums& operator+=(const ClassSums& other) {
+    for (std::size_t c = 0; c < 2; ++c) {
+      count[c] += other.count[c];
+      sum[c] += other.sum[c];
+      squares[c] += other.squares[c];
+    }
+    return *this;
+  }
 };
 
 // Weighted sums over the rows of either class, positive and negative, of values about `origin[class]`, or with
@@ -98,15 +108,21 @@ ResidualStatistics residual_statistics(std::span<const double> values, std::span
   if (!(result.low < result.high)) return result;
   // About the middle of the range, so that the rounding depends neither on the input's offset nor on the order of rows.
   const double origin = result.low + 0.5 * (result.high - result.low);
-  const Eigen::Index rows = std::ssize(values);
-  const ClassSums first = about_origin(values.data(), residuals.data(), weights.data(), rows, origin);
+  const RowBlocks blocks{std::ssize(values)};
+  const ClassSums first = sum_over(blocks, 1, ClassSums{}, [&](RowSpan block, ClassSums& sum) {
+    const Eigen::Index at = block.begin;
+    sum += about_origin(values.data() + at, residuals.data() + at, weights.data() + at, block.count(), origin);
+  });
   const std::array<double, 2>& count = first.count;
   result.freedom = count[0] + count[1] - 2.0;
   if (!(count[0] > 0.0 && count[1] > 0.0)) return result;
   result.positive_mean = origin + first.sum[0] / count[0];
   result.negative_mean = origin + first.sum[1] / count[1];
-  const ClassSums second = distances_from(values.data(), residuals.data(), weights.data(), rows,
-                                          {result.positive_mean, result.negative_mean});
+  const std::array<double, 2> means = {result.positive_mean, result.negative_mean};
+  const ClassSums second = sum_over(blocks, 1, ClassSums{}, [&](RowSpan block, ClassSums& sum) {
+    const Eigen::Index at = block.begin;
+    sum += distances_from(values.data() + at, residuals.data() + at, weights.data() + at, block.count(), means);
+  });
   const double within = second.squares[0] + second.squares[1];
   const double of_distances =
       within - second.sum[0] * second.sum[0] / count[0] - second.sum[1] * second.sum[1] / count[1];

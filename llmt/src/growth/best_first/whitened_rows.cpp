@@ -54,46 +54,40 @@ WhitenedRows::WhitenedRows(const GrowthData& data)
   const GramShape shape(features_);
   const TrainingRows& training = data.training;
   const Eigen::Index regressors = std::ssize(training.regressors);
-  const Eigen::Index chunks = num_chunks(training);
   const int threads = data.problem.max_threads;
   const Eigen::RowVectorXd per_scale = training.scale.cwiseInverse().transpose();
-  constexpr Eigen::Index blocks = 64;  // partial sums, added up in order
-  std::vector<std::vector<double>> grams(blocks, std::vector<double>(shape.size(), 0.0));
-  parallel_for(blocks, threads, [&](Eigen::Index block) {
-    std::vector<int> rows;
-    for (Eigen::Index index = chunks * block / blocks; index < chunks * (block + 1) / blocks; ++index) {
-      const Chunk chunk = fetch(training, index, {});
-      for (Eigen::Index i = 0; i < chunk.count(); ++i) {
-        const Eigen::Index at = index * chunk_rows + i;
-        const double root = std::sqrt(chunk.weights(i));
-        double* row = features_.row(at);
-        row[0] = root;
-        Eigen::Map<Eigen::RowVectorXd>(row + 1, regressors) = root * chunk.deviations.row(i).cwiseProduct(per_scale);
-        Eigen::Map<Eigen::RowVectorXd>(row + 1 + regressors, data.outputs.cols()) = root * data.outputs.row(at);
-        rows.push_back(static_cast<int>(at));
-      }
+  const RowBlocks blocks{training.count()};
+  const auto add_block = [&](RowSpan block, std::vector<double>& gram) {
+    const Chunk chunk = fetch(training, block.begin / block_rows, {});
+    std::vector<int> rows(block.count());
+    std::iota(rows.begin(), rows.end(), static_cast<int>(block.begin));
+    for (Eigen::Index i = 0; i < chunk.count(); ++i) {
+      const Eigen::Index at = block.begin + i;
+      const double root = std::sqrt(chunk.weights(i));
+      double* row = features_.row(at);
+      row[0] = root;
+      Eigen::Map<Eigen::RowVectorXd>(row + 1, regressors) = root * chunk.deviations.row(i).cwiseProduct(per_scale);
+      Eigen::Map<Eigen::RowVectorXd>(row + 1 + regressors, data.outputs.cols()) = root * data.outputs.row(at);
     }
-    add_rows(features_, rows.data(), std::ssize(rows), grams[block].data());
-  });
-  for (std::size_t block = 1; block < grams.size(); ++block) {
-    add(shape, grams[block].data(), grams[0].data());
-  }
+    add_rows(features_, rows.data(), block.count(), gram.data());
+  };
+  const std::vector<double> gram = sum_over(blocks, threads, std::vector<double>(shape.size(), 0.0), add_block);
   Eigen::MatrixXd covariance(regressors, regressors);
   for (Eigen::Index i = 0; i < regressors; ++i) {
     for (Eigen::Index j = 0; j <= i; ++j) {
-      covariance(i, j) = covariance(j, i) = grams[0][shape.at(i + 1, j + 1)] / grams[0][0];
+      covariance(i, j) = covariance(j, i) = gram[shape.at(i + 1, j + 1)] / gram[0];
     }
   }
   const Whitening whitening = whiten(covariance);
   const Eigen::MatrixXd& forward = whitening.forward;
   colouring_ = whitening.back;
-  parallel_for(chunks, threads, [&](Eigen::Index index) {
-    const Eigen::Index begin = index * chunk_rows;
-    const Eigen::Index count = std::min(chunk_rows, training.count() - begin);
+  parallel_for(blocks.count(), threads, [&](Eigen::Index index) {
+    const RowSpan block = blocks[index];
     using Stride = Eigen::OuterStride<>;
-    Eigen::Map<RowMajor, 0, Stride> block(features_.row(begin) + 1, count, regressors, Stride(features_.columns()));
-    const RowMajor whitened = block * forward;
-    block = whitened;
+    Eigen::Map<RowMajor, 0, Stride> rows(features_.row(block.begin) + 1, block.count(), regressors,
+                                         Stride(features_.columns()));
+    const RowMajor whitened = rows * forward;
+    rows = whitened;
   });
 }
 

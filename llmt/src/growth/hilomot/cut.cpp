@@ -111,7 +111,7 @@ HilomotCut best_levels(const GrowthData& data, const HilomotLeaf& leaf, int inpu
 HilomotInputs::HilomotInputs(const GrowthData& data) {
   const TrainingRows& training = data.training;
   deviations = imputed(all_deviations(training), Eigen::VectorXd::Zero(std::ssize(training.regressors)));
-  const double total = data.weights.sum();
+  const double total = data.total_weight;
   for (Eigen::Index j = 0; j < data.split_inputs(); ++j) {
     const int input = data.problem.options.split_inputs[j];
     if (data.num_levels[j] > 0) {

@@ -129,7 +129,7 @@ void HilomotTree::open_root() {
 
 bool HilomotTree::is_exact() const {
   const Eigen::RowVectorXd squares = data_.weights.transpose() * (data_.outputs - predicted_).cwiseAbs2();
-  return (squares.transpose().array() <= data_.weights.sum() * data_.rounding.array().square()).all();
+  return (squares.transpose().array() <= data_.total_weight * data_.rounding.array().square()).all();
 }
 
 double HilomotTree::aicc() const {
@@ -143,7 +143,7 @@ double HilomotTree::aicc() const {
     effective += static_cast<double>((node.direction.array() != 0.0).count());
   }
   const double loss = data_.weights.dot((data_.outputs - predicted_).cwiseAbs2() * data_.output_weights);
-  return llmt::aicc(data_.weights.sum() * outputs, std::max(loss, least_loss * outputs), effective);
+  return llmt::aicc(data_.total_weight * outputs, std::max(loss, least_loss * outputs), effective);
 }
 
 // Weighted squared error of the whole model where the leaf is valid, all outputs.

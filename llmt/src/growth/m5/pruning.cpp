@@ -42,7 +42,7 @@ class Pruner {
       : data_(data),
         deviations_(deviations),
         tree_(tree),
-        unit_((data.output_weights * data.weights.sum()).cwiseSqrt()),
+        unit_((data.output_weights * data.total_weight).cwiseSqrt()),
         residuals_(data.training.count(), data.outputs.cols()) {}
 
   bool run();

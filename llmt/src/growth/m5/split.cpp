@@ -48,7 +48,7 @@ Cut best_cut(const GrowthData& data, const DeviationNode& node, const Rows& orde
   const Eigen::Index count = std::ssize(order);
   const Eigen::Index smallest_leaf = std::max(fewest, data.problem.options.min_leaf_samples);
   if (count < 2 * smallest_leaf) return {};
-  const double total = data.weights.sum();
+  const double total = data.total_weight;
   std::vector<double> left_over(count, 0.0);  // with k rows on the left
   double whole = 0.0;
   for (Eigen::Index o = 0; o < data.outputs.cols(); ++o) {
@@ -168,7 +168,7 @@ double relative_deviation(const GrowthData& data, const DeviationNode& node) {
     for (const int row : node.rows) {
       spread.add(node.weights(row), data.outputs(row, o));
     }
-    sum += std::sqrt(data.output_weights(o) * data.weights.sum() * spread.variance());
+    sum += std::sqrt(data.output_weights(o) * data.total_weight * spread.variance());
   }
   return sum;
 }
@@ -191,7 +191,7 @@ DeviationSplit largest_decrease(const GrowthData& data, const DeviationNode& nod
   for (const auto& of_input : found) {
     largest = std::max({largest, of_input[0].decrease, of_input[1].decrease});
   }
-  const double tolerance = tie_tolerance * data.weights.sum();
+  const double tolerance = tie_tolerance * data.total_weight;
   for (const auto& of_input : found) {
     for (const DeviationSplit& split : of_input) {
       if (split.input >= 0 && split.decrease > 0.0 && split.decrease >= largest - tolerance) {
