@@ -7,9 +7,9 @@
 #include "llmt/commands.hpp"
 #include "llmt/fit.hpp"
 #include "llmt/fit_options.hpp"
+#include "llmt/gross_errors.hpp"
 #include "llmt/learning.hpp"
 #include "llmt/readable.hpp"
-#include "llmt/spoilt_rows.hpp"
 #include "llmt/stream_command.hpp"
 #include "report/fit/fit_summary.hpp"
 #include "report/fit/of_fit.hpp"
@@ -116,11 +116,11 @@ void fit_command(FitArguments arguments) {
     throw std::invalid_argument("llmt::fit_readable: --readable does not go with " + why);
   }
   // Folds' models say which rows no model predicts; the report needs them too, and the file unless it is to be small.
-  const bool looks_for_spoilt_rows = table.options.loss == Loss::squared;
-  table.options.intervals = keeps_intervals(arguments) || arguments.reports.wanted() || looks_for_spoilt_rows;
+  const bool looks_for_gross_errors = table.options.loss == Loss::squared;
+  table.options.intervals = keeps_intervals(arguments) || arguments.reports.wanted() || looks_for_gross_errors;
   Fitting fitting = fit_with_bar(table);
   FitResult& result = fitting.result;
-  warn_of_spoilt_rows(arguments.learning, table, result);
+  warn_of_gross_errors(arguments.learning, table, result);
   result.model = result.model.named(table.names, arguments.learning.targets, table.inputs.levels);
   if (!arguments.output.empty()) {
     save(result.model, keeps_intervals(arguments) ? result.intervals : Intervals(), arguments.output);

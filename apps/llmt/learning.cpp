@@ -34,24 +34,25 @@ std::string places_of(const Csv& csv, const std::vector<Eigen::Index>& rows, con
 }
 
 // Says which few rows decide a fit by squares. Refuses a value beside which all others are rounding errors.
-void look_for_heavy_rows(const Csv& csv, const LearningArguments& arguments, const report::LearningColumns& columns) {
+void look_for_dominant_rows(const Csv& csv, const LearningArguments& arguments,
+                            const report::LearningColumns& columns) {
   if (arguments.options.loss != Loss::squared) return;
   for (std::size_t o = 0; o < arguments.targets.size(); ++o) {
     const Eigen::VectorXd target = columns.targets.col(o);
-    const HeavyRows heavy = heavy_rows_of_target(target, columns.weights);
-    if (heavy.rows.empty()) continue;
+    const DominantRows dominant = dominant_rows_of_target(target, columns.weights);
+    if (dominant.rows.empty()) continue;
     const std::string& name = arguments.targets[o];
-    if (heavy.hide_the_others) {
+    if (dominant.hide_the_others) {
       throw std::runtime_error(fmt::format(
           "{}:{}: column \"{}\": {:.6g} is so large that the differences between all other values are below its "
           "rounding error; correct it, delete the line, or use --loss tukey",
-          csv.name(), csv.line_of(heavy.rows.front()), name, target(heavy.rows.front())));
+          csv.name(), csv.line_of(dominant.rows.front()), name, target(dominant.rows.front())));
     }
     warn(fmt::format(
         "llmt: {} of {} rows {} {:.3g} % of the squares of \"{}\" about its median: {}. If they are mistakes, correct "
         "them or use --loss tukey",
-        heavy.rows.size(), target.size(), heavy.rows.size() == 1 ? "carries" : "carry", 100.0 * heavy.share, name,
-        places_of(csv, heavy.rows, target)));
+        dominant.rows.size(), target.size(), dominant.rows.size() == 1 ? "carries" : "carry", 100.0 * dominant.share,
+        name, places_of(csv, dominant.rows, target)));
   }
 }
 
@@ -96,9 +97,9 @@ void look_for_accidental_inputs(const LearningArguments& arguments, const std::v
 
 }  // namespace
 
-HeavyRows heavy_rows_of_target(const Eigen::Ref<const Eigen::VectorXd>& target, const Eigen::VectorXd& weights) {
-  if (weights.size() == 0) return heavy_rows(target);
-  return heavy_rows((weights.array() > 0.0).select(target, bulk_of(target).centre));
+DominantRows dominant_rows_of_target(const Eigen::Ref<const Eigen::VectorXd>& target, const Eigen::VectorXd& weights) {
+  if (weights.size() == 0) return dominant_rows(target);
+  return dominant_rows((weights.array() > 0.0).select(target, robust_scale(target).median));
 }
 
 void require_target(const LearningArguments& arguments) {
@@ -160,7 +161,7 @@ LearningTable read_learning_table(const LearningArguments& arguments) {
   report::LearningColumns columns =
       report::read_learning_columns(csv, {inputs, arguments.categorical, arguments.targets, arguments.weight}, advice,
                                     largest_input, arguments.options.max_threads);
-  look_for_heavy_rows(csv, arguments, columns);
+  look_for_dominant_rows(csv, arguments, columns);
   look_for_accidental_inputs(arguments, inputs, columns.inputs);
   look_for_nothing_to_learn(csv, arguments, columns);
   LearningTable table{inputs, std::move(columns.inputs), std::move(columns.targets), arguments.options,

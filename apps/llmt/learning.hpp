@@ -46,8 +46,8 @@ struct LearningTable {
   std::vector<Eigen::Index> lines;  ///< of the rows, in the file
 };
 
-/// The heavy rows (outliers.hpp) of a target among those of positive weight; `weights`: empty: all 1.
-HeavyRows heavy_rows_of_target(const Eigen::Ref<const Eigen::VectorXd>& target, const Eigen::VectorXd& weights);
+/// The dominant rows (outliers.hpp) of a target among those of positive weight; `weights`: empty: all 1.
+DominantRows dominant_rows_of_target(const Eigen::Ref<const Eigen::VectorXd>& target, const Eigen::VectorXd& weights);
 
 /// Throws std::runtime_error and std::invalid_argument that name file, line, column or option.
 LearningTable read_learning_table(const LearningArguments& arguments);

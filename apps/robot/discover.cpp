@@ -9,7 +9,7 @@
 #include "llmt/folds.hpp"
 #include "llmt/robotics/calibration_report.hpp"
 #include "llmt/robotics/catalogue.hpp"
-#include "llmt/robotics/discovery.hpp"
+#include "llmt/robotics/discovery/discovery.hpp"
 #include "llmt/robotics/robot_file.hpp"
 #include "report/robot/discovery/discovery_page.hpp"
 #include "report/robot/discovery/next_poses.hpp"

@@ -10,8 +10,8 @@
 
 #include "llmt/files.hpp"
 #include "llmt/random.hpp"
-#include "llmt/robotics/mechanism_calibration.hpp"
-#include "llmt/robotics/mechanism_file.hpp"
+#include "llmt/robotics/mechanism/mechanism_calibration.hpp"
+#include "llmt/robotics/mechanism/mechanism_file.hpp"
 #include "report/robot/mechanism_report.hpp"
 #include "robot/commands.hpp"
 #include "shared/cli.hpp"

@@ -3,6 +3,7 @@
 #include "llmt/fit.hpp"
 #include "llmt/random.hpp"
 #include "llmt/robotics/calibration.hpp"
+#include "llmt/robotics/calibration_problem.hpp"
 #include "llmt/robotics/robot_file.hpp"
 #include "llmt/robotics/simulation.hpp"
 #include "robot/shipped_robots.hpp"

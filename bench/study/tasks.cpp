@@ -10,6 +10,7 @@
 
 #include "llmt/random.hpp"
 #include "llmt/robotics/calibration.hpp"
+#include "llmt/robotics/calibration_problem.hpp"
 #include "llmt/robotics/robot_file.hpp"
 #include "llmt/robotics/simulation.hpp"
 #include "study/study.hpp"

@@ -9,7 +9,7 @@
 
 #include "blind/catalogue_candidates.hpp"
 #include "llmt/random.hpp"
-#include "llmt/robotics/discovery.hpp"
+#include "llmt/robotics/discovery/discovery.hpp"
 #include "llmt/robotics/robot_file.hpp"
 #include "llmt/robotics/simulation.hpp"
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "llmt/robotics/discovery.hpp"
+#include "llmt/robotics/discovery/discovery.hpp"
 #include "llmt/robotics/robot_file.hpp"
 #include "llmt/robotics/simulation.hpp"
 #include "report/robot/arms.hpp"

@@ -76,8 +76,8 @@ void not_worse_than_least_squares(fuzz::Bytes& bytes) {
   options.folds.count = 0;
   options.expert.shrinkages = {0.0};
   options.max_threads = 1;
-  const llmt::HeavyRows heavy = llmt::heavy_rows(table.outputs.col(0));
-  if (heavy.hide_the_others) return;  // refused
+  const llmt::DominantRows dominant = llmt::dominant_rows(table.outputs.col(0));
+  if (dominant.hide_the_others) return;  // refused
   const llmt::FitResult result = llmt::fit(table.inputs, table.outputs, options);
   const double rss = rss_of(result.model, table);
   const auto straight = static_cast<double>(oracle::rss(table.inputs, table.outputs));

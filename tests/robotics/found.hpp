@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "llmt/robotics/discovery.hpp"
+#include "llmt/robotics/discovery/discovery.hpp"
 
 namespace llmt::robotics {
 

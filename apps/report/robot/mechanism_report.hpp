@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "llmt/robotics/mechanism_calibration.hpp"
+#include "llmt/robotics/mechanism/mechanism_calibration.hpp"
 #include "report/text/json.hpp"
 #include "report/text/text.hpp"
 

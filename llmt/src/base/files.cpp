@@ -153,4 +153,6 @@ void write_file(const std::string& path, const std::function<void(const TextSink
   file.make_durable();
 }
 
+void discard_unfinished_files() noexcept { TemporaryName::remove_announced(); }
+
 }  // namespace llmt

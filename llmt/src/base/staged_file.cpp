@@ -13,8 +13,6 @@
 #include <random>
 #include <stdexcept>
 
-#include "llmt/files.hpp"
-
 namespace llmt {
 namespace {
 
@@ -95,6 +93,12 @@ TemporaryName::~TemporaryName() {
 
 void TemporaryName::announce() { place_ = announced(path_.string()); }
 
+void TemporaryName::remove_announced() noexcept {
+  for (const Announcement& entry : announcements) {
+    if (entry.readable) ::unlink(entry.path.data());
+  }
+}
+
 StagedFile::StagedFile(std::string name, std::filesystem::path target)
     : name_(std::move(name)),
       target_(std::move(target)),
@@ -160,12 +164,6 @@ void StagedFile::make_durable() const {
     throw std::runtime_error(
         fmt::format("{}: is written, but a power failure may still undo that: its folder cannot be synchronised: {}",
                     name_, std::strerror(errno)));
-  }
-}
-
-void discard_unfinished_files() noexcept {
-  for (const Announcement& entry : announcements) {
-    if (entry.readable) ::unlink(entry.path.data());
   }
 }
 

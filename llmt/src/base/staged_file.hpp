@@ -24,8 +24,10 @@ class TemporaryName {
   TemporaryName& operator=(const TemporaryName&) = delete;
 
   const char* path() const { return path_.c_str(); }
-  /// From now on discard_unfinished_files() removes what stands there. To be called before a file is made.
+  /// From now on remove_announced() removes the file at this name. To be called before a file is made.
   void announce();
+  /// See discard_unfinished_files().
+  static void remove_announced() noexcept;
   void set_made(bool made) { is_made_ = made; }
   bool is_made() const { return is_made_; }
 

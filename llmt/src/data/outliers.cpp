@@ -14,23 +14,23 @@ namespace llmt {
 namespace {
 
 constexpr double normal_by_median = 1.4826;  // standard deviation of a normal variable by its median absolute value
-constexpr double heavy_share = 0.9;
+constexpr double dominant_share = 0.9;
 constexpr Eigen::Index one_row_in = 100;
 constexpr double far_spreads = 20.0;
 
 }  // namespace
 
-Bulk bulk_of(const Eigen::Ref<const Eigen::VectorXd>& values) {
-  if (values.size() == 0) throw std::invalid_argument("llmt::bulk_of: there is no value");
+RobustScale robust_scale(const Eigen::Ref<const Eigen::VectorXd>& values) {
+  if (values.size() == 0) throw std::invalid_argument("llmt::robust_scale: there is no value");
   const double centre = median(values);
   return {centre, normal_by_median * median((values.array() - centre).abs())};
 }
 
-HeavyRows heavy_rows(const Eigen::Ref<const Eigen::VectorXd>& output) {
-  const Bulk bulk = bulk_of(output);
-  const Eigen::VectorXd distance = (output.array() - bulk.centre).abs();
+DominantRows dominant_rows(const Eigen::Ref<const Eigen::VectorXd>& output) {
+  const RobustScale scale = robust_scale(output);
+  const Eigen::VectorXd distance = (output.array() - scale.median).abs();
   const double farthest = distance.maxCoeff();
-  if (!(bulk.spread > 0.0 && farthest > far_spreads * bulk.spread)) return {};
+  if (!(scale.deviation > 0.0 && farthest > far_spreads * scale.deviation)) return {};
   const Eigen::VectorXd squares = (distance / farthest).array().square();  // so that they stay finite
   const double all = sum_of_rows(squares.size(), [&](Eigen::Index row) { return squares(row); });
   std::vector<Eigen::Index> rows(output.size());
@@ -40,15 +40,15 @@ HeavyRows heavy_rows(const Eigen::Ref<const Eigen::VectorXd>& output) {
   std::ranges::partial_sort(rows, end, [&](Eigen::Index a, Eigen::Index b) {
     return distance(a) != distance(b) ? distance(a) > distance(b) : a < b;
   });
-  HeavyRows heavy;
-  for (auto row = rows.begin(); row != end && heavy.share < heavy_share; ++row) {
-    if (distance(*row) <= far_spreads * bulk.spread) break;
-    heavy.rows.push_back(*row);
-    heavy.share += squares(*row) / all;
+  DominantRows dominant;
+  for (auto row = rows.begin(); row != end && dominant.share < dominant_share; ++row) {
+    if (distance(*row) <= far_spreads * scale.deviation) break;
+    dominant.rows.push_back(*row);
+    dominant.share += squares(*row) / all;
   }
-  if (heavy.share < heavy_share) return {};
-  heavy.hide_the_others = farthest * std::numeric_limits<double>::epsilon() > bulk.spread;
-  return heavy;
+  if (dominant.share < dominant_share) return {};
+  dominant.hide_the_others = farthest * std::numeric_limits<double>::epsilon() > scale.deviation;
+  return dominant;
 }
 
 }  // namespace llmt

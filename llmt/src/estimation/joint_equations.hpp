@@ -7,7 +7,7 @@
 
 #include "base/matrix.hpp"
 #include "estimation/constrained_estimate.hpp"
-#include "estimation/leaf_sums.hpp"
+#include "estimation/sums/leaf_sums.hpp"
 
 namespace llmt {
 

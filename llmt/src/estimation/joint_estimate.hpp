@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "estimation/joint_equations.hpp"
-#include "estimation/leaf_sums.hpp"
+#include "estimation/sums/leaf_sums.hpp"
 
 namespace llmt {
 

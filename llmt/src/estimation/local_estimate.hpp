@@ -5,7 +5,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "estimation/leaf_sums.hpp"
+#include "estimation/sums/leaf_sums.hpp"
 
 namespace llmt {
 

@@ -30,7 +30,11 @@ Attribution attribute_with(const Model& model, const std::vector<Evaluator>& eva
   const Eigen::VectorXd to = at_positions(model.inputs(), point.transpose()).transpose();
   const Eigen::VectorXd from = at_positions(model.inputs(), reference.transpose()).transpose();
   for (std::size_t p = 0; p < evaluators.size(); ++p) {
-    attribute_along_line(model, model.partitions()[p], evaluators[p], to, from, precision, result);
+    const Partition& partition = model.partitions()[p];
+    const LineAttribution part = attribute_along_line(model, partition, evaluators[p], to, from, precision);
+    result.prediction(partition.outputs) = part.prediction;
+    result.reference(partition.outputs) = part.reference;
+    result.contributions(partition.outputs, Eigen::all) = part.contributions;
   }
   return result;
 }

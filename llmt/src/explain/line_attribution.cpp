@@ -40,7 +40,7 @@ class Line {
        const Eigen::Ref<const Eigen::VectorXd>& point, const Eigen::Ref<const Eigen::VectorXd>& reference,
        const Precision& precision);
 
-  void run(Attribution& result);
+  LineAttribution run();
 
  private:
   // A position on the line: inputs and prediction of the partition there.
@@ -110,13 +110,13 @@ Line::Line(const Model& model, const Partition& partition, const Evaluator& eval
   shares_.setZero(outputs, point.size());
 }
 
-// Sets the rows of the partition's outputs.
-void Line::run(Attribution& result) {
+LineAttribution Line::run() {
   Pieces pieces = this->pieces();
   const std::vector<double>& cuts = pieces.cuts;
   std::vector<Crossing>& crossings = pieces.crossings;
   Place at{0.0, line_.reference, predict(line_.reference)};
-  result.reference(partition_.outputs) = at.value;
+  LineAttribution result;
+  result.reference = at.value;
   std::size_t next = 0;  // crossing
   for (std::size_t k = 0; k < cuts.size();) {
     const double to = cuts[k];
@@ -126,8 +126,9 @@ void Line::run(Attribution& result) {
     while (next < crossings.size() && crossings[next].position <= to + same_position) ++next;
     at = move_to(at, to, std::span(crossings).subspan(first, next - first));
   }
-  result.prediction(partition_.outputs) = at.value;
-  result.contributions(partition_.outputs, Eigen::all) = shares_;
+  result.prediction = at.value;
+  result.contributions = shares_;
+  return result;
 }
 
 Pieces Line::pieces() {
@@ -335,11 +336,10 @@ void Line::add_shares(double length, const Eigen::VectorXd& change, const Eigen:
 
 }  // namespace
 
-void attribute_along_line(const Model& model, const Partition& partition, const Evaluator& evaluator,
-                          const Eigen::Ref<const Eigen::VectorXd>& point,
-                          const Eigen::Ref<const Eigen::VectorXd>& reference, const Precision& precision,
-                          Attribution& result) {
-  Line(model, partition, evaluator, point, reference, precision).run(result);
+LineAttribution attribute_along_line(const Model& model, const Partition& partition, const Evaluator& evaluator,
+                                     const Eigen::Ref<const Eigen::VectorXd>& point,
+                                     const Eigen::Ref<const Eigen::VectorXd>& reference, const Precision& precision) {
+  return Line(model, partition, evaluator, point, reference, precision).run();
 }
 
 }  // namespace llmt

@@ -5,12 +5,12 @@
 
 #include <Eigen/Core>
 
-#include "llmt/explain.hpp"
+#include "llmt/model.hpp"
 #include "partition/evaluator.hpp"
 
 namespace llmt {
 
-/// How well a line is integrated.
+/// The precision with which a line is integrated.
 struct Precision {
   double tolerance;  ///< of the sum over a piece, as a fraction of the output's range
   bool exact;        ///< cut at all kinks and choose orders by degree; else take equal pieces and one order
@@ -18,10 +18,16 @@ struct Precision {
 inline constexpr Precision fine = {1e-10, true};
 inline constexpr Precision coarse = {1e-4, false};
 
-/// Sets the rows of the partition's outputs in `result`, whose matrices have their sizes. See attribute().
-void attribute_along_line(const Model& model, const Partition& partition, const Evaluator& evaluator,
-                          const Eigen::Ref<const Eigen::VectorXd>& point,
-                          const Eigen::Ref<const Eigen::VectorXd>& reference, const Precision& precision,
-                          Attribution& result);
+/// An Attribution of the partition's outputs alone.
+struct LineAttribution {
+  Eigen::VectorXd prediction;
+  Eigen::VectorXd reference;
+  Eigen::MatrixXd contributions;
+};
+
+/// See attribute().
+LineAttribution attribute_along_line(const Model& model, const Partition& partition, const Evaluator& evaluator,
+                                     const Eigen::Ref<const Eigen::VectorXd>& point,
+                                     const Eigen::Ref<const Eigen::VectorXd>& reference, const Precision& precision);
 
 }  // namespace llmt

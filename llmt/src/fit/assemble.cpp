@@ -11,7 +11,7 @@
 #include "fit/error_weights.hpp"
 #include "fit/output_range.hpp"
 #include "model/codes.hpp"
-#include "model/incomplete.hpp"
+#include "model/held_out_intervals.hpp"
 
 namespace llmt {
 namespace {

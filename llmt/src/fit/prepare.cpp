@@ -30,12 +30,12 @@ void refuse_hidden_outputs(const GivenRows& given) {
   }
   for (Eigen::Index o = 0; o < outputs.cols(); ++o) {
     const Eigen::VectorXd values = outputs.col(o)(rows);
-    const HeavyRows heavy = heavy_rows(values);
-    if (!heavy.hide_the_others) continue;
+    const DominantRows dominant = dominant_rows(values);
+    if (!dominant.hide_the_others) continue;
     throw std::invalid_argument(fmt::format(
         "llmt::fit: outputs({}, {}) is {}, beside which the other values differ by less than its rounding error; "
         "leave that row out, or set loss to tukey",
-        rows[heavy.rows.front()], o, values(heavy.rows.front())));
+        rows[dominant.rows.front()], o, values(dominant.rows.front())));
   }
 }
 

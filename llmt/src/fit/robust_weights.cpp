@@ -20,10 +20,10 @@ constexpr Eigen::Index least_leaf_rows = 10;
 Eigen::MatrixXd clipped(const Eigen::Ref<const Eigen::MatrixXd>& outputs) {
   Eigen::MatrixXd result = outputs;
   for (auto output : result.colwise()) {
-    const Bulk bulk = bulk_of(output);
-    if (bulk.spread == 0.0) continue;
-    const double reach = clip_spreads * bulk.spread;
-    output = output.cwiseMax(bulk.centre - reach).cwiseMin(bulk.centre + reach);
+    const RobustScale scale = robust_scale(output);
+    if (scale.deviation == 0.0) continue;
+    const double reach = clip_spreads * scale.deviation;
+    output = output.cwiseMax(scale.median - reach).cwiseMin(scale.median + reach);
   }
   return result;
 }
@@ -32,11 +32,11 @@ Eigen::MatrixXd clipped(const Eigen::Ref<const Eigen::MatrixXd>& outputs) {
 Eigen::VectorXd spreads_at(const Eigen::VectorXd& residuals, const Eigen::VectorXi& leaf, double least) {
   std::vector<std::vector<Eigen::Index>> rows(leaf.maxCoeff() + 1);
   for (Eigen::Index row = 0; row < leaf.size(); ++row) rows[leaf(row)].push_back(row);
-  const double all = std::max(least, bulk_of(residuals).spread);
+  const double all = std::max(least, robust_scale(residuals).deviation);
   Eigen::VectorXd spread = Eigen::VectorXd::Constant(residuals.size(), all);
   for (const std::vector<Eigen::Index>& of_leaf : rows) {
     if (std::ssize(of_leaf) < least_leaf_rows) continue;
-    spread(of_leaf).setConstant(std::max(all, bulk_of(residuals(of_leaf)).spread));
+    spread(of_leaf).setConstant(std::max(all, robust_scale(residuals(of_leaf)).deviation));
   }
   return spread;
 }
@@ -48,7 +48,7 @@ Eigen::VectorXd biweights(const Model& model, const Eigen::Ref<const Eigen::Matr
   Eigen::VectorXd weights = Eigen::VectorXd::Ones(outputs.rows());
   for (std::size_t p = 0; p < model.partitions().size(); ++p) {
     for (const int output : model.partitions()[p].outputs) {
-      const double least = least_spread * bulk_of(outputs.col(output)).spread;
+      const double least = least_spread * robust_scale(outputs.col(output)).deviation;
       const Eigen::VectorXd spread = spreads_at(residuals.col(output), leaves.col(p), least);
       // A spread of 0: more than half of the outputs agree, and are predicted without an error.
       const Eigen::ArrayXd u =

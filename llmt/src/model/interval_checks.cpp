@@ -54,9 +54,9 @@ std::string difference_of_columns(const Model& one, const Model& other) {
   return "";
 }
 
-void check_belong(const Intervals& intervals, const Model& model) {
-  for (std::size_t k = 0; k < intervals.models().size(); ++k) {
-    const Model& fold = intervals.models()[k];
+void check_belong(const std::vector<Model>& folds, const Model& model) {
+  for (std::size_t k = 0; k < folds.size(); ++k) {
+    const Model& fold = folds[k];
     if (const std::string difference = difference_of_columns(fold, model); !difference.empty()) {
       throw std::invalid_argument(
           fmt::format("the intervals belong to another model: fold {} and the model have {}", k, difference));

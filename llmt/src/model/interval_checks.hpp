@@ -1,10 +1,11 @@
 /// \file
-/// Whether models belong together.
+/// Checks that models belong together.
 #pragma once
 
 #include <string>
+#include <vector>
 
-#include "llmt/intervals.hpp"
+#include "llmt/model.hpp"
 
 namespace llmt {
 
@@ -12,7 +13,7 @@ namespace llmt {
 /// is none.
 std::string difference_of_columns(const Model& one, const Model& other);
 
-/// Throws std::invalid_argument if the intervals belong to another model: see save().
-void check_belong(const Intervals& intervals, const Model& model);
+/// Throws std::invalid_argument if the models of the folds of an Intervals belong to another model: see to_json().
+void check_belong(const std::vector<Model>& folds, const Model& model);
 
 }  // namespace llmt

@@ -1,12 +1,12 @@
 /// \file
-/// Whether the parts of a model fit together, and whether its numbers are such as a fit or a stream makes.
+/// Checks of a model: its parts must fit together, and its numbers must be such as a fit or a stream makes.
 #pragma once
 
 #include <stdexcept>
 #include <string>
 #include <vector>
 
-#include "llmt/model.hpp"
+#include "llmt/partition.hpp"
 
 namespace llmt {
 

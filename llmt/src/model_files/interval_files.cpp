@@ -42,7 +42,7 @@ Intervals intervals_from(const JsonReader& folds, const Model& model) {
   }
   try {
     Intervals intervals(std::move(models), std::move(residuals), std::move(incomplete));
-    check_belong(intervals, model);
+    check_belong(intervals.models(), model);
     return intervals;
   } catch (const std::invalid_argument& error) {
     folds.fail(error.what());
@@ -53,7 +53,7 @@ Intervals intervals_from(const JsonReader& folds, const Model& model) {
 
 std::string to_json(const Model& model, const Intervals& intervals) {
   try {
-    check_belong(intervals, model);
+    check_belong(intervals.models(), model);
   } catch (const std::invalid_argument& error) {
     throw std::invalid_argument(fmt::format("llmt::to_json: {}", error.what()));
   }

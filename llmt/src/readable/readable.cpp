@@ -22,7 +22,7 @@
 #include "llmt/size.hpp"
 #include "llmt/statistics.hpp"
 #include "model/codes.hpp"
-#include "model/incomplete.hpp"
+#include "model/held_out_intervals.hpp"
 #include "readable/input_walk.hpp"
 #include "selection/fold_errors.hpp"
 #include "selection/selection.hpp"

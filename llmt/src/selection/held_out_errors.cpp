@@ -68,7 +68,7 @@ HeldOutErrors::HeldOutErrors(const std::vector<FoldRows>& folds, const std::vect
     }
     if (seen.insert(kept).second) {
       for (const double width : candidates.widths) {
-        shapes_.push_back({width, middle_of_gap(grown, jump)});
+        forms_.push_back({width, middle_of_gap(grown, jump)});
       }
     }
   }
@@ -85,8 +85,8 @@ HeldOutErrors::HeldOutErrors(const std::vector<FoldRows>& folds, const std::vect
 }
 
 Candidate HeldOutErrors::candidate(const Key& key) const {
-  return {.validity = {candidates_.kind, shapes_[key.shape].width},
-          .jump = shapes_[key.shape].jump,
+  return {.validity = {candidates_.kind, forms_[key.form].width},
+          .jump = forms_[key.form].jump,
           .estimation = candidates_.estimation,
           .ridge = candidates_.ridges.empty() ? 0.0 : candidates_.ridges[key.ridge],
           .shrinkage = candidates_.shrinkages[key.shrinkage],
@@ -115,10 +115,9 @@ struct HeldOutErrors::Sample {
   const LeafSums sums;
 };
 
-// One shape; `keys` ascending.
-HeldOutErrors::Evaluated HeldOutErrors::evaluate_shape(std::size_t fold, const std::vector<Key>& keys,
-                                                       bool keeps_models, std::shared_ptr<Sample>& last, Work& work,
-                                                       double share) const {
+// One form; `keys` ascending.
+HeldOutErrors::Evaluated HeldOutErrors::evaluate_form(std::size_t fold, const std::vector<Key>& keys, bool keeps_models,
+                                                      std::shared_ptr<Sample>& last, Work& work, double share) const {
   const Candidate first = candidate(keys.front());
   const Partition tree = blended(samples_[fold], grown_[fold], first.validity, first.jump);
   std::vector<std::vector<Key>> of_counts;  // of each number of leaves, the largest first, which takes longest
@@ -152,7 +151,7 @@ HeldOutErrors::Evaluated HeldOutErrors::evaluate_shape(std::size_t fold, const s
   return result;
 }
 
-// Candidates of one shape and leaf count.
+// Candidates of one form and leaf count.
 HeldOutErrors::Evaluated HeldOutErrors::evaluate_prefix(std::size_t fold, const Sample& sample,
                                                         const std::vector<Key>& keys, bool keeps_models) const {
   const Eigen::Index leaves = std::min(leaf_counts_[keys.front().leaves], sample.sums.partition.num_leaves());
@@ -193,16 +192,16 @@ void HeldOutErrors::evaluate(const std::set<Key>& keys, std::size_t folds, bool 
   std::set<std::pair<std::size_t, std::size_t>> used;
   double count = 0.0;
   for (std::size_t fold = 0; fold < folds; ++fold) {
-    std::map<std::size_t, std::vector<Key>> of_shape;
+    std::map<std::size_t, std::vector<Key>> of_form;
     for (const Key& key : keys) {
       if (!of_folds_[fold].errors.contains(key)) {
-        of_shape[key.shape].push_back(key);
+        of_form[key.form].push_back(key);
       }
     }
-    for (auto& [shape, missing] : of_shape) {
+    for (auto& [form, missing] : of_form) {
       count += static_cast<double>(missing.size());
-      tasks.push_back({fold, std::move(missing), {}, &last_[{fold, shape}]});
-      used.insert({fold, shape});
+      tasks.push_back({fold, std::move(missing), {}, &last_[{fold, form}]});
+      used.insert({fold, form});
     }
   }
   if (tasks.empty()) return;
@@ -210,7 +209,7 @@ void HeldOutErrors::evaluate(const std::set<Key>& keys, std::size_t folds, bool 
   Work work(work_, share_of_evaluation * work_.left());
   parallel_for(std::ssize(tasks), max_threads_, [&](Eigen::Index index) {
     Task& task = tasks[index];
-    task.evaluated = evaluate_shape(task.fold, task.keys, keeps_models, *task.sample, work, 1.0 / count);
+    task.evaluated = evaluate_form(task.fold, task.keys, keeps_models, *task.sample, work, 1.0 / count);
   });
   for (Task& task : tasks) {
     of_folds_[task.fold].errors.merge(task.evaluated.errors);

@@ -15,15 +15,15 @@
 
 namespace llmt {
 
-/// How leaves share the space: what the half widths of the transitions come from.
-struct Shape {
+/// The form of a blend, from which the half widths of the transitions come.
+struct BlendForm {
   double width = 0.0;
   double jump = no_jump;
 };
 
-/// Position of a candidate among shapes, leaf counts, ridges, shrinkages and what is sparse.
+/// Position of a candidate among blend forms, leaf counts, ridges, shrinkages and what is sparse.
 struct Key {
-  std::size_t shape = 0;
+  std::size_t form = 0;
   std::size_t leaves = 0;
   std::size_t ridge = 0;
   std::size_t shrinkage = 0;
@@ -43,7 +43,7 @@ class HeldOutErrors {
                 const Eigen::VectorXd& weights, int max_threads, Work& work);
 
   /// All widths with all jumps, but for those that keep the same splits crisp as one before.
-  const std::vector<Shape>& shapes() const { return shapes_; }
+  const std::vector<BlendForm>& forms() const { return forms_; }
   /// 2, 3, 4, 6, 9, ..., the largest tree's: each half as large again as the one before, counted from the largest down.
   const std::vector<Eigen::Index>& leaf_counts() const { return leaf_counts_; }
 
@@ -72,10 +72,10 @@ class HeldOutErrors {
 
   struct Sample;  ///< of a fold's rows, with the sums over it
 
-  /// `last`: the shape's last sample, or none; afterwards the one that was used. `work`: of this evaluation, and
+  /// `last`: the form's last sample, or none; afterwards the one that was used. `work`: of this evaluation, and
   /// `share`: that of a key in it.
-  Evaluated evaluate_shape(std::size_t fold, const std::vector<Key>& keys, bool keeps_models,
-                           std::shared_ptr<Sample>& last, Work& work, double share) const;
+  Evaluated evaluate_form(std::size_t fold, const std::vector<Key>& keys, bool keeps_models,
+                          std::shared_ptr<Sample>& last, Work& work, double share) const;
   Evaluated evaluate_prefix(std::size_t fold, const Sample& sample, const std::vector<Key>& keys,
                             bool keeps_models) const;
 
@@ -85,13 +85,12 @@ class HeldOutErrors {
   const Eigen::VectorXd& weights_;
   int max_threads_;
   Work& work_;
-  std::vector<Shape> shapes_;
+  std::vector<BlendForm> forms_;
   std::vector<Eigen::Index> leaf_counts_;
   std::vector<TrainingRows> samples_;         // of the folds' training rows, enough for the largest tree
   std::vector<std::vector<Chunk>> held_out_;  // of the folds
   std::vector<Evaluated> of_folds_;
-  std::map<std::pair<std::size_t, std::size_t>, std::shared_ptr<Sample>>
-      last_;  // of a fold and shape, of the last step
+  std::map<std::pair<std::size_t, std::size_t>, std::shared_ptr<Sample>> last_;  // of a fold and form, of the last step
 };
 
 }  // namespace llmt

@@ -24,27 +24,27 @@ constexpr std::size_t steps_without_gain = 2;
 // Held-out rows that are enough to tell good candidates from bad ones.
 constexpr Eigen::Index screening_rows = 1000;
 
-// Largest leaf count of each shape: where in some fold two steps brought nothing. The best of ever more leaves would
+// Largest leaf count of each form: where in some fold two steps brought nothing. The best of ever more leaves would
 // often be best by chance.
 std::map<std::size_t, std::size_t> last_counts(const std::map<Key, std::vector<double>>& all, std::size_t folds) {
   std::map<std::size_t, std::size_t> last;
   for (std::size_t fold = 0; fold < folds; ++fold) {
-    std::map<std::size_t, std::pair<double, std::size_t>> best;  // of each shape: error, leaf count
+    std::map<std::size_t, std::pair<double, std::size_t>> best;  // of each form: error, leaf count
     for (const auto& [key, errors] : all) {
-      const auto [entry, is_new] = best.try_emplace(key.shape, errors[fold], key.leaves);
+      const auto [entry, is_new] = best.try_emplace(key.form, errors[fold], key.leaves);
       if (errors[fold] < entry->second.first && key.leaves <= entry->second.second + steps_without_gain) {
         entry->second = {errors[fold], key.leaves};
       }
     }
-    for (const auto& [shape, entry] : best) {
-      const auto [count, is_new] = last.try_emplace(shape, entry.second + steps_without_gain);
+    for (const auto& [form, entry] : best) {
+      const auto [count, is_new] = last.try_emplace(form, entry.second + steps_without_gain);
       count->second = std::min(count->second, entry.second + steps_without_gain);
     }
   }
   return last;
 }
 
-std::size_t shape_of(const Key& key) { return key.shape; }
+std::size_t form_of(const Key& key) { return key.form; }
 
 // Number of folds on which candidates are screened.
 std::size_t screening_folds(const std::vector<FoldRows>& folds) {
@@ -55,10 +55,10 @@ std::size_t screening_folds(const std::vector<FoldRows>& folds) {
   return screening;
 }
 
-class Steps {
+class Screening {
  public:
-  Steps(HeldOutErrors& comparison, const Candidates& candidates, Eigen::Index coefficients,
-        const std::vector<FoldRows>& folds)
+  Screening(HeldOutErrors& comparison, const Candidates& candidates, Eigen::Index coefficients,
+            const std::vector<FoldRows>& folds)
       : comparison_(comparison),
         candidates_(candidates),
         counts_(comparison.leaf_counts()),
@@ -74,13 +74,11 @@ class Steps {
   }
 
  private:
-  // Ridge and sparseness of the shapes that are still in the race.
+  // Ridge and sparseness of the forms that are still in the race.
   using Race = std::map<std::size_t, std::pair<std::size_t, std::size_t>>;
 
-  bool has_jumps(std::size_t shape) const {
-    return comparison_.shapes()[shape].jump < comparison_.shapes().front().jump;
-  }
-  double width_of(const Key& key) const { return comparison_.shapes()[key.shape].width; }
+  bool has_jumps(std::size_t form) const { return comparison_.forms()[form].jump < comparison_.forms().front().jump; }
+  double width_of(const Key& key) const { return comparison_.forms()[key.form].width; }
   // The shrinkage with which blends are screened: larger ones favour small trees.
   std::size_t usual_shrinkage() const {
     const auto apart = [](double shrinkage) {
@@ -90,12 +88,12 @@ class Steps {
   }
 
   // Compares every width with few leaves, with jumps the best two of them; with the best jump threshold all of them if
-  // it is better than none. Then the better half of these shapes with three times the unknowns, and so on while that
+  // it is better than none. Then the better half of these forms with three times the unknowns, and so on while that
   // helps.
   void screen() {
     Race race;
-    for (std::size_t shape = 0; shape < comparison_.shapes().size(); ++shape) {
-      if (!has_jumps(shape)) race[shape] = {ridges_ / 2, 0};
+    for (std::size_t form = 0; form < comparison_.forms().size(); ++form) {
+      if (!has_jumps(form)) race[form] = {ridges_ / 2, 0};
     }
     std::size_t next = 0;
     for (Eigen::Index unknowns = cheap_unknowns; next < counts_.size() && !race.empty(); unknowns *= next_unknowns) {
@@ -114,15 +112,15 @@ class Steps {
     }
   }
 
-  // Leaf counts begin ... end - 1 of the shapes in the race, with the best ridges so far or all of them.
+  // Leaf counts begin ... end - 1 of the forms in the race, with the best ridges so far or all of them.
   void evaluate_counts(const Race& race, std::size_t begin, std::size_t end, bool all_ridges) {
     std::set<Key> keys;
     for (std::size_t leaves = begin; leaves < end; ++leaves) {
-      for (const auto& [shape, best] : race) {
+      for (const auto& [form, best] : race) {
         for (std::size_t ridge = 0; ridge < ridges_; ++ridge) {
           for (std::size_t sparse = 0; sparse < candidates_.sparse.size(); ++sparse) {
             if (all_ridges || std::pair(ridge, sparse) == best) {
-              keys.insert({shape, leaves, ridge, usual_shrinkage(), sparse});
+              keys.insert({form, leaves, ridge, usual_shrinkage(), sparse});
             }
           }
         }
@@ -133,13 +131,13 @@ class Steps {
 
   // Adds the best widths with jumps.
   Race with_jumps(Race race) const {
-    Ranked best = first_of_each(ranked(comparison_, screening_), shape_of);
-    for (const auto& [error, key] : best) race[key.shape] = {key.ridge, key.sparse};
+    Ranked best = first_of_each(ranked(comparison_, screening_), form_of);
+    for (const auto& [error, key] : best) race[key.form] = {key.ridge, key.sparse};
     best.resize(std::min(best.size(), finalists));
-    for (std::size_t shape = 0; shape < comparison_.shapes().size(); ++shape) {
+    for (std::size_t form = 0; form < comparison_.forms().size(); ++form) {
       for (const auto& [error, key] : best) {
-        if (has_jumps(shape) && comparison_.shapes()[shape].width == width_of(key)) {
-          race[shape] = {key.ridge, key.sparse};
+        if (has_jumps(form) && comparison_.forms()[form].width == width_of(key)) {
+          race[form] = {key.ridge, key.sparse};
         }
       }
     }
@@ -148,24 +146,24 @@ class Steps {
 
   // If jumps predict best: the same threshold with every width, for wider transitions pay where none crosses a jump.
   Race with_best_jump() const {
-    const std::vector<Shape>& shapes = comparison_.shapes();
+    const std::vector<BlendForm>& forms = comparison_.forms();
     const Key best = ranked(comparison_, screening_).front().second;
     Race race;
-    for (std::size_t shape = 0; shape < shapes.size() && has_jumps(best.shape); ++shape) {
-      if (shapes[shape].jump == shapes[best.shape].jump) race[shape] = {best.ridge, best.sparse};
+    for (std::size_t form = 0; form < forms.size() && has_jumps(best.form); ++form) {
+      if (forms[form].jump == forms[best.form].jump) race[form] = {best.ridge, best.sparse};
     }
     return race;
   }
 
-  // Of the shapes in the race, without those that are at their end, or clearly worse than the best.
+  // Of the forms in the race, without those that are at their end, or clearly worse than the best.
   Race better_half(const Race& racing, std::size_t next) const {
-    Ranked best = first_of_each(ranked(comparison_, screening_), shape_of);
-    std::erase_if(best, [&](const auto& entry) { return !racing.contains(entry.second.shape); });
-    best.resize(std::min(best.size(), std::max(fewest_shapes, (best.size() + 1) / 2)));
+    Ranked best = first_of_each(ranked(comparison_, screening_), form_of);
+    std::erase_if(best, [&](const auto& entry) { return !racing.contains(entry.second.form); });
+    best.resize(std::min(best.size(), std::max(fewest_forms, (best.size() + 1) / 2)));
     Race race;
     for (const auto& [error, key] : best) {
       if (key.leaves + steps_without_gain >= next && !is_clearly_worse(key, best.front().second, screening_)) {
-        race[key.shape] = {key.ridge, key.sparse};
+        race[key.form] = {key.ridge, key.sparse};
       }
     }
     return race;
@@ -173,17 +171,17 @@ class Steps {
 
   // The best two widths, each with its best jump and with none, without those that are clearly worse than the best.
   Ranked finalists_of() const {
-    const Ranked of_shape = first_of_each(ranked(comparison_, screening_), shape_of);
-    Ranked result = first_of_each(of_shape, [this](const Key& key) { return width_of(key); });
+    const Ranked of_form = first_of_each(ranked(comparison_, screening_), form_of);
+    Ranked result = first_of_each(of_form, [this](const Key& key) { return width_of(key); });
     result.resize(std::min(result.size(), finalists));
     for (std::size_t k = result.size(); k-- > 0;) {
       const Key best = result[k].second;
-      const auto smooth = std::ranges::find_if(of_shape, [&](const auto& entry) {
-        return width_of(entry.second) == width_of(best) && !has_jumps(entry.second.shape);
+      const auto smooth = std::ranges::find_if(of_form, [&](const auto& entry) {
+        return width_of(entry.second) == width_of(best) && !has_jumps(entry.second.form);
       });
-      if (has_jumps(best.shape) && smooth != of_shape.end()) result.push_back(*smooth);
+      if (has_jumps(best.form) && smooth != of_form.end()) result.push_back(*smooth);
     }
-    const Key best = of_shape.front().second;
+    const Key best = of_form.front().second;
     std::erase_if(result, [&](const auto& entry) { return is_clearly_worse(entry.second, best, screening_); });
     return result;
   }
@@ -202,9 +200,9 @@ class Steps {
     keys.clear();
     for (const auto& [error, best] : last) {
       if (!tries_all_pairs(best)) continue;
-      for (const Key& key : best_of_shape(best.shape, candidates_on_all_folds)) {
+      for (const Key& key : best_of_form(best.form, candidates_on_all_folds)) {
         for (const std::size_t leaves : neighbours(best.leaves, key.leaves == best.leaves ? 1 : 0)) {
-          keys.insert({key.shape, leaves, key.ridge, key.shrinkage, key.sparse});
+          keys.insert({key.form, leaves, key.ridge, key.shrinkage, key.sparse});
         }
       }
     }
@@ -218,7 +216,7 @@ class Steps {
         const bool next_ridge = ridge + 1 >= best.ridge && ridge <= best.ridge + 1;
         if (tries_all_pairs(best) || (next_ridge && shrinkage == best.shrinkage) || ridge == best.ridge) {
           for (std::size_t sparse = 0; sparse < candidates_.sparse.size(); ++sparse) {
-            keys.insert({best.shape, leaves, ridge, shrinkage, sparse});
+            keys.insert({best.form, leaves, ridge, shrinkage, sparse});
           }
         }
       }
@@ -237,11 +235,11 @@ class Steps {
     return result;
   }
 
-  // The first few candidates of a shape.
-  std::vector<Key> best_of_shape(std::size_t shape, std::size_t count) const {
+  // The first few candidates of a form.
+  std::vector<Key> best_of_form(std::size_t form, std::size_t count) const {
     std::vector<Key> best;
     for (const auto& [error, key] : ranked(comparison_, screening_)) {
-      if (key.shape == shape && best.size() < count) best.push_back(key);
+      if (key.form == form && best.size() < count) best.push_back(key);
     }
     return best;
   }
@@ -254,7 +252,7 @@ class Steps {
       const std::size_t reach = counts_[best.leaves] * coefficients_ <= cheap_unknowns ? 2 : 1;
       Ranked order = ranked(comparison_, screening_);
       // clang 14 lets no lambda have a name of a structured binding.
-      std::erase_if(order, [shape = best.shape](const auto& entry) { return entry.second.shape != shape; });
+      std::erase_if(order, [form = best.form](const auto& entry) { return entry.second.form != form; });
       for (const auto& [error, key] : first_of_each(order, [](const Key& each) { return each.leaves; })) {
         if (key.leaves + reach >= best.leaves && key.leaves <= best.leaves + reach) kept.insert(key);
       }
@@ -285,9 +283,9 @@ class Steps {
     }
     for (const Key& key : std::set<Key>(left)) {
       const auto smooth = std::ranges::find_if(order, [&](const auto& entry) {
-        return width_of(entry.second) == width_of(key) && !has_jumps(entry.second.shape);
+        return width_of(entry.second) == width_of(key) && !has_jumps(entry.second.form);
       });
-      if (has_jumps(key.shape) && smooth != order.end()) left.insert(smooth->second);
+      if (has_jumps(key.form) && smooth != order.end()) left.insert(smooth->second);
     }
     return left;
   }
@@ -308,7 +306,7 @@ Ranked ranked(const HeldOutErrors& comparison, std::size_t folds) {
   std::map<std::size_t, std::size_t> last = last_counts(all, folds);
   Ranked order;
   for (const auto& [key, errors] : all) {
-    if (key.leaves <= last[key.shape]) order.emplace_back(sum_of(errors), key);
+    if (key.leaves <= last[key.form]) order.emplace_back(sum_of(errors), key);
   }
   std::ranges::sort(order);
   return order;
@@ -316,7 +314,7 @@ Ranked ranked(const HeldOutErrors& comparison, std::size_t folds) {
 
 std::set<Key> compare_in_steps(HeldOutErrors& comparison, const Candidates& candidates, Eigen::Index coefficients,
                                const std::vector<FoldRows>& folds) {
-  return Steps(comparison, candidates, coefficients, folds).run();
+  return Screening(comparison, candidates, coefficients, folds).run();
 }
 
 }  // namespace llmt

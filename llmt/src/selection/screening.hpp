@@ -11,10 +11,10 @@
 namespace llmt {
 
 /// Unknowns of the first round of screening, in which every ridge is tried; where no candidate has so few, in the first
-/// round that has one. Each round triples the unknowns and keeps the better half of the shapes, at least three.
+/// round that has one. Each round triples the unknowns and keeps the better half of the forms, at least three.
 inline constexpr Eigen::Index cheap_unknowns = 300;
 inline constexpr Eigen::Index next_unknowns = 3;
-inline constexpr std::size_t fewest_shapes = 3;
+inline constexpr std::size_t fewest_forms = 3;
 
 /// Candidates and the sums of their squared errors, the best first. Ties: the smaller key.
 using Ranked = std::vector<std::pair<double, Key>>;

@@ -28,7 +28,7 @@ std::vector<CandidateError> best_of_widths(const HeldOutErrors& comparison, cons
   Ranked order = ranked(comparison, folds.size());
   std::erase_if(order, [&](const auto& entry) { return !kept.contains(entry.second); });
   std::vector<CandidateError> result;
-  for (const auto& [error, key] : first_of_each(order, [](const Key& each) { return each.shape; })) {
+  for (const auto& [error, key] : first_of_each(order, [](const Key& each) { return each.form; })) {
     const CandidateError entry = error_of_folds(comparison.candidate(key), errors.at(key));
     const auto same = std::ranges::find_if(result, [&](const CandidateError& other) {
       return other.candidate.validity.width == entry.candidate.validity.width;

@@ -8,8 +8,8 @@
 
 #include "estimation/estimate.hpp"
 #include "estimation/jumps.hpp"
-#include "estimation/leaf_sums.hpp"
 #include "estimation/squared_errors.hpp"
+#include "estimation/sums/leaf_sums.hpp"
 #include "stream/blend_correction.hpp"
 
 namespace llmt {

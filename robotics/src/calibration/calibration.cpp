@@ -12,6 +12,7 @@
 #include "calibration/joint_map_shift.hpp"
 #include "calibration/joint_ranges.hpp"
 #include "calibration/noise_model.hpp"
+#include "llmt/robotics/calibration_problem.hpp"
 
 namespace llmt::robotics {
 namespace {
@@ -53,8 +54,8 @@ void fit_until_noise_settles(Fit& fit, const NoiseModel& model, const std::vecto
   }
 }
 
-// Where the description is far off, the priors around it keep the fit far from the minimum: what is left there counts
-// as noise, and that gives the priors their weight. A fit without them finds the way, after which they come back.
+// Priors around a description that is far off keep the fit far from the minimum: the rest there counts as noise, and
+// that gives the priors their weight. A fit without them finds the way, after which they come back.
 Fit begun_without_priors(const Fit& fit, const discovery::LeastSquaresProblem& unweighted, const NoiseModel& model,
                          const std::vector<std::string>& reasons, const CalibrationOptions& options) {
   CalibrationOptions data_alone = options;
@@ -177,35 +178,6 @@ Eigen::VectorXd start_values(const discovery::LeastSquaresProblem& problem) {
 
 }  // namespace
 
-discovery::LeastSquaresProblem calibration_problem(const Robot& robot, const Measurements& measurements) {
-  validate(robot);
-  validate(measurements, robot);
-  struct Shared {
-    Robot robot;
-    Measurements measurements;
-    std::vector<Eigen::Index> rows;
-    Eigen::VectorXd measured;
-  };
-  const auto shared = std::make_shared<Shared>(Shared{robot, measurements, measured_rows(measurements), {}});
-  const auto stacked = [](const Eigen::MatrixXd& points) -> Eigen::VectorXd {
-    const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> by_row = points;
-    return Eigen::Map<const Eigen::VectorXd>(by_row.data(), by_row.size());
-  };
-  shared->measured = stacked(measurements.positions_mm)(shared->rows);
-  discovery::LeastSquaresProblem problem;
-  problem.parameters = parameters(robot);
-  problem.residual = [shared, stacked](const Eigen::VectorXd& values) -> Eigen::VectorXd {
-    const Robot moved = with_values(shared->robot, values);
-    return stacked(positions(moved, shared->measurements.poses))(shared->rows) - shared->measured;
-  };
-  problem.jacobian = [shared](const Eigen::VectorXd& values) -> Eigen::MatrixXd {
-    const Robot moved = with_values(shared->robot, values);
-    const Eigen::MatrixXd jacobian = position_jacobian(moved, shared->measurements.poses);
-    return jacobian(shared->rows, Eigen::all);
-  };
-  return problem;
-}
-
 discovery::SolverResult register_frames(Robot& robot, const Measurements& measurements,
                                         const CalibrationOptions& options) {
   validate(robot);
@@ -225,7 +197,7 @@ Calibration calibrate_without_maps(const Robot& robot, const Measurements& measu
                                    const CalibrationOptions& options) {
   Calibration calibration;
   calibration.registered = robot;
-  // What an earlier calibration said, and a correction learnt from its residuals, hold no longer.
+  // The record of an earlier calibration, and a correction learnt from its residuals, hold no longer.
   calibration.registered.identified.clear();
   calibration.registered.calibration.reset();
   calibration.registered.correction_file.clear();
@@ -240,7 +212,7 @@ Calibration calibrate_without_maps(const Robot& robot, const Measurements& measu
   }
   std::vector<std::string> reasons = reasons_to_fix(robot, options);
   fix_what_sockets_take_up(robot, measurements.poses, reasons);
-  // Which geometry is of no use shows on the rigid arm: on one that bends, a combination that moves nothing when rigid
+  // Useless geometry shows on the rigid arm: on one that bends, a combination that moves nothing when rigid
   // moves loads, and would be identified from the thousandth part of an effect.
   Robot rigid = calibration.registered;
   rigid.effects.clear();

@@ -1,11 +1,15 @@
 #include "llmt/robotics/calibration_quality.hpp"
 
+#include <fmt/format.h>
+
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <map>
 #include <numeric>
+#include <set>
 #include <span>
+#include <stdexcept>
 #include <string>
 #include <tuple>
 
@@ -152,6 +156,36 @@ Eigen::VectorXd position_deviations(const Calibration& calibration, const Poses&
     deviations(i) = std::sqrt(std::max(0.0, variances.segment(3 * i, 3).sum()));
   }
   return deviations;
+}
+
+std::vector<JointBeyond> joints_beyond(const Chain& chain, const std::vector<std::array<double, 2>>& ranges,
+                                       const Poses& used) {
+  constexpr double slack = 0.1;      // of the range
+  constexpr double rounding = 1e-4;  // deg or mm
+  if (ranges.size() != chain.joints.size()) {
+    throw std::invalid_argument(fmt::format("llmt::robotics::joints_beyond: there are {} ranges of {} joints",
+                                            ranges.size(), chain.joints.size()));
+  }
+  std::vector<JointBeyond> beyond;
+  for (std::size_t j = 0; j < ranges.size() && used.count() > 0; ++j) {
+    const Joint& joint = chain.joints[j];
+    const auto [low, high] = ranges[j];
+    const Eigen::VectorXd values = used.joints.col(j) * to_limit_unit(joint);
+    const double margin = std::max(slack * (high - low), rounding);
+    std::vector<Eigen::Index> rows;
+    for (Eigen::Index i = 0; i < values.size(); ++i) {
+      if (values(i) < low - margin || values(i) > high + margin) rows.push_back(i);
+    }
+    if (rows.empty()) continue;
+    beyond.push_back({joint.name, limit_unit(joint), low, high, values.minCoeff(), values.maxCoeff(), std::move(rows)});
+  }
+  return beyond;
+}
+
+std::vector<Eigen::Index> rows_beyond(const std::vector<JointBeyond>& joints) {
+  std::set<Eigen::Index> rows;
+  for (const JointBeyond& joint : joints) rows.insert(joint.rows.begin(), joint.rows.end());
+  return {rows.begin(), rows.end()};
 }
 
 Coverage coverage(const Calibration& calibration, const Poses& measured, const Poses& used, bool frames_are_known) {

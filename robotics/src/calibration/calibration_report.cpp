@@ -83,7 +83,7 @@ void hold_out(const Robot& robot, const Measurements& measurements, const Report
   report.folds = options.folds;
 }
 
-// What was kept by row becomes distances of points and angles of orientations.
+// Errors that were kept by row become distances of points and angles of orientations.
 void part_kinds(const Measurements& measurements, Stage& stage) {
   const std::vector<Eigen::Index> turns = orientation_rows(measurements.poses);
   if (turns.empty()) return;
@@ -116,7 +116,7 @@ void decide(CalibrationReport& report) {
   }
 }
 
-// What a calibrated arm turns its tool wrong by is some mrad; what a convention does is of the size of 1 rad.
+// A calibrated arm turns its tool wrong by some mrad, a wrong convention by about 1 rad.
 bool has_wrong_orientations(const CalibrationReport& report) {
   constexpr double implausible_mrad = 50.0;
   const Eigen::VectorXd& errors = report.geometric.in_sample_mrad;
@@ -217,7 +217,7 @@ std::vector<std::string> input_mistakes(const Robot& robot, const Measurements& 
 
 namespace {
 
-// How far off honest readings may be, mm.
+// The largest error of an honest reading, mm.
 double far_limit(const Eigen::VectorXd& errors_mm) {
   constexpr double far = 8.0;  // times the median
   constexpr double upper = 0.85;

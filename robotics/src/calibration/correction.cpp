@@ -25,7 +25,7 @@ struct Stands {
   std::vector<double> labels = {};  // pose_labels() of them
 };
 
-// Where the tool point of every row stands from that of the chain's own tool, in the world frame.
+// The vector from the tool point of the chain's own tool to that of every row, in the world frame, mm.
 Eigen::MatrixXd arms_of(const Robot& robot, const Poses& poses) {
   Poses own = poses;
   for (Observation& seen : own.observations) seen = {.base = seen.base};
@@ -91,8 +91,8 @@ Stands stands_of(const Robot& robot, const Measurements& measurements) {
   const Eigen::MatrixXd arms = arms_of(robot, measurements.poses);
   std::vector<Eigen::Index> first;
   std::vector<Eigen::VectorXd> twists;
-  // A single point does not tell how the tool is turned. Where most stands have more, those with one are left out;
-  // where few have, nothing is learnt of turning.
+  // A single point does not tell how the tool is turned. If most stands have more, those with one are left out;
+  // if few have, nothing is learnt of turning.
   const auto with_several = std::ranges::count_if(groups, [](const auto& stand) { return stand.second.size() > 1; });
   const bool learns_turning = 2 * with_several >= std::ssize(groups);
   for (const auto& [stand, rows] : groups) {
@@ -181,7 +181,7 @@ CorrectedRobot read_corrected_robot(const std::string& path, const UrdfLinks& li
   if (robot.robot.correction_file.empty()) return robot;
   const std::filesystem::path model = std::filesystem::path(path).parent_path() / robot.robot.correction_file;
   const std::string text = read_file(model.string());
-  // A description may name any file. What a message says of a file that is no model must not show what it holds.
+  // A description may name any file. The message about a file that is no model must not show its content.
   if (text.find("\"llmt-model\"") == std::string::npos) {
     throw std::runtime_error(fmt::format("{}: correction: {} is no model file", path, model.string()));
   }

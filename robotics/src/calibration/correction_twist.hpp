@@ -1,4 +1,4 @@
-// What the outputs of a correction mean.
+// The meaning of a correction's outputs.
 #pragma once
 
 #include <Eigen/Core>
@@ -25,7 +25,7 @@ class CorrectionTwist {
   /// Places of the model's outputs in correction_outputs.
   const std::vector<std::size_t>& places() const { return places_; }
 
-  /// What the model adds at each row of joint values, n x 6, every component clamped to the range seen in training.
+  /// The model's outputs at each row of joint values, n x 6, every component clamped to the range seen in training.
   Eigen::MatrixXd at(const Eigen::MatrixXd& joints, int max_threads = 0) const;
 
  private:

@@ -6,7 +6,7 @@
 #include <span>
 
 #include "calibration/registration.hpp"
-#include "llmt/robotics/calibration.hpp"
+#include "llmt/robotics/calibration_problem.hpp"
 #include "robot/settings.hpp"
 
 namespace llmt::robotics {

@@ -1,4 +1,4 @@
-// Where the search for bases and tools begins.
+// The start of the search for bases and tools.
 #pragma once
 
 #include <string>
@@ -19,8 +19,9 @@ discovery::SolverResult solve_for(Robot& robot, discovery::LeastSquaresProblem p
 discovery::Jacobian free_derivatives(const Robot& robot, const Measurements& measurements,
                                      const std::vector<std::string>& reasons, bool of_rigid_arm);
 
-/// As solve_for(), over bases and tools alone, by derivatives of the rigid arm. Those of an arm that bends tell a turn
-/// of the tool from the place of the payload, by a thousandth of what the effects do: a fit would turn it at will.
+/// The same as solve_for() over bases and tools alone, by derivatives of the rigid arm. Those of an arm that bends tell
+/// a turn of the tool from the place of the payload, by a thousandth of what the effects do: a fit would turn it at
+/// will.
 discovery::SolverResult fit_frames(Robot& robot, const Measurements& measurements,
                                    const std::vector<std::string>& reasons, const discovery::SolverOptions& solver);
 

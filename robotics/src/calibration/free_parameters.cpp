@@ -16,7 +16,7 @@ std::string owner_of(const std::string& name) { return name.substr(0, name.rfind
 
 namespace {
 
-// Why parameters stay as they are, as descriptions have it.
+// Reasons for which parameters stay as they are, in the words of descriptions.
 constexpr const char* by_user = "fixed by the user";
 constexpr const char* no_angles_of_socket = "a socket has no angles";
 constexpr const char* no_angles_of_sphere = "a sphere has no angles";
@@ -42,7 +42,7 @@ std::vector<bool> matches(const std::vector<discovery::Parameter>& parameters, c
   return matched;
 }
 
-// What the convention leaves out before any data are seen; empty: nothing.
+// The reason for which the convention leaves a parameter out before any data are seen; empty: there is none.
 std::string excluded_by_convention(const Chain& chain, std::size_t joint, JointParameter which, double limit_deg) {
   if (which == JointParameter::b) return "not part of the convention";
   const bool parallel = is_nearly_parallel(chain, joint, limit_deg);
@@ -176,8 +176,8 @@ std::vector<Eigen::Index> freed_parameters(const Robot& robot) {
 
 void fix_dependent(const std::vector<discovery::Parameter>& parameters, const Eigen::MatrixXd& jacobian,
                    Eigen::Index geometric, double geometric_tolerance, std::vector<std::string>& reasons) {
-  // Where the arm bends, directions that geometry imitates are a ten-thousandth off: fitted, they would be millimetres
-  // long. The search takes the same share for imitated.
+  // On an arm that bends, directions that geometry imitates are a ten-thousandth off: fitted, they would be
+  // millimetres long. The search takes the same share for imitated.
   constexpr double effect_tolerance = 1e-3;
   Eigen::MatrixXd basis(jacobian.rows(), jacobian.cols());
   Eigen::Index kept = 0;

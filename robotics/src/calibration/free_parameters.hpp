@@ -1,4 +1,4 @@
-// Which parameters of a robot a calibration may free.
+// The parameters of a robot that a calibration may free.
 #pragma once
 
 #include <set>
@@ -21,7 +21,7 @@ std::vector<std::string> reasons_to_fix(const Robot& robot, const CalibrationOpt
 /// lengths of the residuals but changes their coordinates, so fix_dependent() does not see it.
 void fix_what_sockets_take_up(const Robot& robot, const Poses& poses, std::vector<std::string>& reasons);
 
-/// Where all readings are of sockets, planes and spheres, an arm and what it touches twice as large fit as well: adds a
+/// If all readings are of sockets, planes and spheres, an arm and touched things twice as large fit as well: adds a
 /// reason to the longest length of a joint that is still free, unless a length is known by the options, the radius of a
 /// sphere is given, or a joint slides.
 void keep_scale(const Robot& robot, const Poses& poses, const CalibrationOptions& options,
@@ -44,7 +44,7 @@ void fix_dependent(const std::vector<discovery::Parameter>& parameters, const Ei
 void set_priors(std::vector<discovery::Parameter>& parameters, Eigen::Index geometric,
                 const CalibrationOptions& options);
 
-/// Whether the joint's beta replaces its d: the axes that its alpha and beta connect are within `limit_deg` of
+/// True if the joint's beta replaces its d: the axes that its alpha and beta connect are within `limit_deg` of
 /// (anti)parallel.
 bool is_nearly_parallel(const Chain& chain, std::size_t joint, double limit_deg);
 

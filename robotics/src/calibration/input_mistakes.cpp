@@ -199,7 +199,7 @@ std::string orientation_mistake(const Robot& robot, const Measurements& measurem
   };
   const auto inverse = [](const Eigen::Matrix3d& read) -> Eigen::Matrix3d { return read.transpose(); };
   if (mean_angle(inverse) < plausible_rad) return "the file has the rotation of the world as seen from the tool";
-  // What was read as w, x, y, z are x, y, z, w.
+  // The numbers that were read as w, x, y, z are x, y, z, w.
   const auto reordered = [](const Eigen::Matrix3d& read) -> Eigen::Matrix3d {
     const Eigen::Quaterniond q(read);
     return Eigen::Quaterniond(q.z(), q.w(), q.x(), q.y()).toRotationMatrix();

@@ -1,4 +1,4 @@
-// What the joint maps of a robot do to its joint values.
+// The changes that the joint maps of a robot make to its joint values.
 #pragma once
 
 #include <utility>

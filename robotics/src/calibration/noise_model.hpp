@@ -21,7 +21,7 @@ class NoiseModel {
   NoiseModel(const Measurements& measurements, const CalibrationOptions& options);
 
   /// From residuals of the measured coordinates, after a fit of `rank` parameters: the common noise at which the sum of
-  /// squares of every kind, divided by sigma^2, is its number of degrees of freedom. What the options state is kept.
+  /// squares of every kind, divided by sigma^2, is its number of degrees of freedom. Stated noise stays.
   CommonNoise estimate(const Eigen::VectorXd& residuals, Eigen::Index rank) const;
 
   /// Smallest sigma / sigma of each measured coordinate, with the common noise that the residuals say; empty if nothing

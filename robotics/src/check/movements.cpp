@@ -112,7 +112,7 @@ void estimate(const MovementProblem& problem, const Normal& normal, Movements& r
       movement.standard_errors.push_back(std::sqrt(std::max(0.0, inverse(at, at))));
     }
   }
-  // As a new calibration would find them: by the new measurements alone.
+  // A new calibration would find them like this: by the new measurements alone.
   const Eigen::MatrixXd columns = problem.jacobian(Eigen::all, fitted);
   result.left -= columns * solved(columns, problem.residuals);
 }

@@ -91,8 +91,8 @@ std::string joint_names(const Chain& chain, const std::vector<std::size_t>& join
   return fmt::format("{}", fmt::join(names, ", "));
 }
 
-// Why it was not reached. With what the model adds to the rigid arm held as it is at the best point, the same target is
-// one of a smooth arm: if that reaches it, the model jumps between.
+// The solution, with the reason if the target was not reached. If the model's change of the rigid arm is held as it is
+// at the best point, the arm is smooth: if that one reaches the target, the model jumps between.
 Found judged(const Chain& chain, const Inverse& inverse, const Goal& goal, Inverse::Solution best,
              const Inverse::Forward& forward) {
   const Pose rigid = inverse.rigid().forward(best.q);

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "llmt/robotics/discovery_result.hpp"
+#include "llmt/robotics/discovery/discovery_result.hpp"
 
 namespace llmt::robotics {
 
@@ -25,9 +25,9 @@ enum class Reason {
 /// The result of a judge.
 struct Objection {
   Reason reason;
-  std::vector<std::size_t> names = {};   ///< numbers of the names that it speaks against
-  std::vector<FoundShape> unknown = {};  ///< what is missing instead
-  std::vector<std::string> notes = {};   ///< for Discovery::notes
+  std::vector<std::size_t> names = {};     ///< numbers of the names that it speaks against
+  std::vector<FoundPattern> unknown = {};  ///< what is missing instead
+  std::vector<std::string> notes = {};     ///< for Discovery::notes
 };
 
 /// An effect that a search named.

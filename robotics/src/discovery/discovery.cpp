@@ -1,4 +1,4 @@
-#include "llmt/robotics/discovery.hpp"
+#include "llmt/robotics/discovery/discovery.hpp"
 
 #include <fmt/format.h>
 
@@ -125,7 +125,7 @@ Findings search(Investigation start, const DiscoveryOptions& options) {
   Findings found;
   found.investigation = search_in_rounds(std::move(start), options);
   found.verdict = found.investigation.verdict.answer;
-  found.unknown = found_shapes(found.investigation.asked.hypotheses, found.investigation.verdict);
+  found.unknown = found_patterns(found.investigation.asked.hypotheses, found.investigation.verdict);
   if (options.maps && found.verdict == discovery::Answer::unknown) add_maps(options, found);
   add_names(options, found);
   if (!is_named(found.verdict)) return found;
@@ -196,7 +196,7 @@ Discovery described(Discovery result, const Findings& found, const std::vector<O
   for (const Objection& one : objections) {
     result.unknown.insert(result.unknown.end(), one.unknown.begin(), one.unknown.end());
   }
-  result.more = shapes_left(found);
+  result.more = patterns_left(found);
   result.beyond_plausible = beyond_plausible(last, result.before);
   result.gap = gap_map(result.before, without_rows(split.samples, last.verdict.outliers));
   for (const std::size_t sample : last.verdict.outliers) {
@@ -216,7 +216,7 @@ Discovery described(Discovery result, const Findings& found, const std::vector<O
 //
 // - split: poses are set aside for the verification before anything is looked at;
 // - calibrate: an error that rigid geometry can imitate is no evidence for an effect;
-// - search: names, shapes and joint maps. It is repeated with averaged poses if a judge of the repeats asks for it;
+// - search: names, patterns and joint maps. It is repeated with averaged poses if a judge of the repeats asks for it;
 // - judge: all judges see the same findings, and raise objections without changing them;
 // - fit: both robots are fitted to all poses searched, for the last judge and for the user;
 // - verify: the poses set aside are the last judge;

@@ -46,20 +46,20 @@ void add_rivals(const discovery::Finding& finding, const std::vector<Hypothesis>
 
 }  // namespace
 
-std::vector<FoundShape> found_shapes(const std::vector<Hypothesis>& hypotheses, const discovery::Verdict& verdict) {
-  std::vector<FoundShape> shapes;
+std::vector<FoundPattern> found_patterns(const std::vector<Hypothesis>& hypotheses, const discovery::Verdict& verdict) {
+  std::vector<FoundPattern> patterns;
   for (const discovery::Finding& finding : verdict.findings) {
     for (const discovery::FindingTerm& term : finding.terms) {
-      if (finding.generic) shapes.push_back({hypotheses[term.candidate].shape, term.share});
+      if (finding.generic) patterns.push_back({hypotheses[term.candidate].pattern, term.share});
     }
   }
-  std::ranges::stable_sort(shapes, std::greater<>{}, &FoundShape::share);
-  return shapes;
+  std::ranges::stable_sort(patterns, std::greater<>{}, &FoundPattern::share);
+  return patterns;
 }
 
-std::vector<FoundShape> shapes_left(const Findings& found) {
+std::vector<FoundPattern> patterns_left(const Findings& found) {
   if (!found.residual_search) return {};
-  return found_shapes(found.residual_search->asked.hypotheses, found.residual_search->verdict);
+  return found_patterns(found.residual_search->asked.hypotheses, found.residual_search->verdict);
 }
 
 std::vector<Name> named_effects(const std::vector<Hypothesis>& hypotheses, const discovery::Verdict& verdict,

@@ -1,4 +1,4 @@
-// The outcome of a search in the words of a robot: effects, shapes and limits.
+// The outcome of a search in the words of a robot: effects, patterns and limits.
 #pragma once
 
 #include <optional>
@@ -17,7 +17,7 @@ struct Findings {
   std::vector<Hypothesis> larger;  ///< what was found before the residuals were searched
   std::optional<ResidualSearch> residual_search;
   std::vector<Name> names;
-  std::vector<FoundShape> unknown;     ///< shapes of the first search
+  std::vector<FoundPattern> unknown;   ///< patterns of the first search
   std::vector<Effect> maps;            ///< joint maps that were added
   std::optional<Objection> harmonics;  ///< against waves, see judge_waves()
   std::vector<std::string> notes;
@@ -31,11 +31,11 @@ inline bool is_named(discovery::Answer answer) {
   return answer == discovery::Answer::named || answer == discovery::Answer::indistinguishable;
 }
 
-/// The shapes of a verdict, by falling share.
-std::vector<FoundShape> found_shapes(const std::vector<Hypothesis>& hypotheses, const discovery::Verdict& verdict);
+/// The patterns of a verdict, by falling share.
+std::vector<FoundPattern> found_patterns(const std::vector<Hypothesis>& hypotheses, const discovery::Verdict& verdict);
 
-/// Shapes that the search of the residuals found: what is left beside names.
-std::vector<FoundShape> shapes_left(const Findings& found);
+/// Patterns that the search of the residuals found: what is left beside names.
+std::vector<FoundPattern> patterns_left(const Findings& found);
 
 /// The effects of a verdict that the fit has.
 std::vector<Name> named_effects(const std::vector<Hypothesis>& hypotheses, const discovery::Verdict& verdict,

@@ -1,7 +1,7 @@
 // The gap between model and measurement: a tree of the residuals.
 #pragma once
 
-#include "llmt/robotics/discovery_result.hpp"
+#include "llmt/robotics/discovery/discovery_result.hpp"
 
 namespace llmt::robotics {
 

@@ -40,7 +40,7 @@ discovery::RoundSummary summary_of(const EffectQuestion& asked, const discovery:
   return {.names = {names.begin(), names.end()}, .outliers = {verdict.outliers.begin(), verdict.outliers.end()}};
 }
 
-// Searches, and prefers causes to shapes that explain hardly more: a shape that contains a cause always explains a
+// Searches, and prefers causes to patterns that explain hardly more: a pattern that contains a cause always explains a
 // little more. `preferred` says whether the round before preferred causes. The preference is tried in the first round,
 // and in later ones as long as it held.
 discovery::Verdict search_causes_first(const EffectQuestion& asked, const DiscoveryOptions& options, int round,

@@ -25,15 +25,15 @@ bool is_undetermined(const Name& name) {
                              [](const FoundParameter& one) { return std::abs(one.value) < 2.0 * one.standard_error; });
 }
 
-// An effect may be a part of a shape if both depend on the posture, or both on time or load.
-bool may_be_part_of(const Shape& shape, const Effect& effect) {
+// An effect may be a part of a pattern if both depend on the posture, or both on time or load.
+bool may_be_part_of(const ErrorPattern& pattern, const Effect& effect) {
   bool posture = true;
   bool load = false;
-  for (const std::string& input : shape.depends_on) {
+  for (const std::string& input : pattern.depends_on) {
     load = load || input == "payload_kg";
     posture = posture && input != "time_s" && input != "order" && input != "temp_C" && input != "payload_kg";
   }
-  // No smooth shape and no map follows a wave of many periods.
+  // No smooth pattern and no map follows a wave of many periods.
   constexpr double finest = 90.0;  // waves a turn that knots every two degrees can follow
   if (nature_of(effect) == Nature::wave && effect.constants[0] > finest) return false;
   const std::vector<std::string>& columns = effect_type(effect.type).columns;
@@ -44,16 +44,17 @@ bool may_be_part_of(const Shape& shape, const Effect& effect) {
 
 Objection judge_parts(const Findings& found) {
   const Investigation& last = found.investigation;
-  std::vector<FoundShape> shapes = found_shapes(last.asked.hypotheses, last.verdict);
-  shapes.insert(shapes.end(), found.unknown.begin(), found.unknown.end());
-  if (found.harmonics) shapes.insert(shapes.end(), found.harmonics->unknown.begin(), found.harmonics->unknown.end());
-  double in_shapes = 0.0;
-  for (const discovery::Finding& finding : last.verdict.findings) in_shapes += finding.generic ? finding.share : 0.0;
+  std::vector<FoundPattern> patterns = found_patterns(last.asked.hypotheses, last.verdict);
+  patterns.insert(patterns.end(), found.unknown.begin(), found.unknown.end());
+  if (found.harmonics)
+    patterns.insert(patterns.end(), found.harmonics->unknown.begin(), found.harmonics->unknown.end());
+  double in_patterns = 0.0;
+  for (const discovery::Finding& finding : last.verdict.findings) in_patterns += finding.generic ? finding.share : 0.0;
   constexpr double most = 0.8;
   return against(Reason::part_of_unknown, found.names, [&](const Name& name) {
-    return !(name.family_share > most && in_shapes < 1.0 - most) ||
-           std::ranges::any_of(shapes,
-                               [&](const FoundShape& one) { return may_be_part_of(one.shape, name.effect.effect); });
+    return !(name.family_share > most && in_patterns < 1.0 - most) ||
+           std::ranges::any_of(
+               patterns, [&](const FoundPattern& one) { return may_be_part_of(one.pattern, name.effect.effect); });
   });
 }
 
@@ -93,13 +94,13 @@ std::optional<Objection> judge_outliers(const Findings& found, const DiscoveryOp
 std::vector<Objection> judge_residuals(const Findings& found, const std::vector<bool>& stands,
                                        const DiscoveryOptions& options) {
   const bool found_nothing = found.verdict == discovery::Answer::nothing_missing;
-  const bool explains_all = is_named(found.verdict) && !found.harmonics && shapes_left(found).empty();
+  const bool explains_all = is_named(found.verdict) && !found.harmonics && patterns_left(found).empty();
   if (!found_nothing && !explains_all) return {};
   const Investigation& last = found.investigation;
   const std::optional<ResidualStructure> structure =
       find_structure(last.fitted, last.searched, last.outliers(), options.seed);
   if (!structure) return {};
-  const std::vector<FoundShape> unexplained = {{{structure->where, {}, std::nullopt, "noise"}, 1.0}};
+  const std::vector<FoundPattern> unexplained = {{{structure->where, {}, std::nullopt, "noise"}, 1.0}};
   if (found_nothing) {
     return {{Reason::structured_residuals,
              {},

@@ -16,7 +16,7 @@ namespace llmt::robotics {
 ///   explain, and may be an error of theirs;
 /// - part_of_unknown, asked beside something that has no name: all but names that more than four fifths of the
 /// explained
-///   sum of squares go with alone, less than one fifth with shapes, and that cannot be a part of the unknown.
+///   sum of squares go with alone, less than one fifth with patterns, and that cannot be a part of the unknown.
 std::vector<Objection> judge_names(const Findings& found, const DiscoveryOptions& options);
 
 /// Gross errors, asked where nothing was found: the outliers reach their largest share, or the residuals have a heavy

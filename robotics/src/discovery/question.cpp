@@ -7,8 +7,8 @@
 #include "calibration/noise_model.hpp"
 #include "discovery/pose_split.hpp"
 #include "hypotheses/catalogue_effects.hpp"
+#include "hypotheses/error_patterns.hpp"
 #include "hypotheses/scans.hpp"
-#include "hypotheses/shapes.hpp"
 
 namespace llmt::robotics {
 namespace {
@@ -128,8 +128,8 @@ EffectQuestion question(const Robot& robot, const std::vector<Hypothesis>& found
     }
     column += k;
   }
-  if (options.shapes) {
-    for (Hypothesis& shape : shape_hypotheses(scene)) result.hypotheses.push_back(std::move(shape));
+  if (options.patterns) {
+    for (Hypothesis& pattern : pattern_hypotheses(scene)) result.hypotheses.push_back(std::move(pattern));
   }
   result.evidence.residuals = explained(rows);
   result.evidence.jacobian = jacobian.leftCols(baseline)(rows, Eigen::all);

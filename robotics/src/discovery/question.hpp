@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "hypotheses/hypothesis.hpp"
-#include "llmt/robotics/discovery_options.hpp"
+#include "llmt/robotics/discovery/discovery_options.hpp"
 #include "llmt/robotics/measurements.hpp"
 
 namespace llmt::robotics {

@@ -32,7 +32,7 @@ std::optional<ResidualSearch> search_residuals(Investigation& investigation, con
   if (search.verdict.answer == discovery::Answer::nothing_missing) return std::nullopt;
   const std::vector<Hypothesis> more = effects_of(search.asked, search.verdict);
   forget_signatures(search.asked);
-  // Beside a shape names are guesses.
+  // Beside a pattern names are guesses.
   if (search.verdict.answer == discovery::Answer::unknown || more.empty()) return search;
   std::vector<Hypothesis> all = investigation.found;
   for (Hypothesis& one : all) {

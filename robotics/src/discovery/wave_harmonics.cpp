@@ -85,12 +85,12 @@ int multiple_of(const FoundEffect& wave, const FoundEffect& other) {
 
 }  // namespace
 
-std::vector<std::size_t> waves_at(const std::vector<FoundShape>& shapes, const std::vector<Name>& names) {
+std::vector<std::size_t> waves_at(const std::vector<FoundPattern>& patterns, const std::vector<Name>& names) {
   std::vector<std::size_t> waves;
   for (std::size_t k = 0; k < names.size(); ++k) {
     const Effect& effect = names[k].effect.effect;
-    const auto acts_there = [&](const FoundShape& one) { return one.shape.acts_on == effect.at; };
-    if (nature_of(effect) == Nature::wave && std::ranges::any_of(shapes, acts_there)) waves.push_back(k);
+    const auto acts_there = [&](const FoundPattern& one) { return one.pattern.acts_on == effect.at; };
+    if (nature_of(effect) == Nature::wave && std::ranges::any_of(patterns, acts_there)) waves.push_back(k);
   }
   return waves;
 }

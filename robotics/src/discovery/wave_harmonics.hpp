@@ -15,7 +15,7 @@ namespace llmt::robotics {
 /// judged.
 std::optional<Objection> judge_waves(const Findings& found, const std::vector<bool>& stands);
 
-/// Numbers of the waves on whose joints one of the shapes acts.
-std::vector<std::size_t> waves_at(const std::vector<FoundShape>& shapes, const std::vector<Name>& names);
+/// Numbers of the waves on whose joints one of the patterns acts.
+std::vector<std::size_t> waves_at(const std::vector<FoundPattern>& patterns, const std::vector<Name>& names);
 
 }  // namespace llmt::robotics

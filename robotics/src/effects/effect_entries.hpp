@@ -57,16 +57,16 @@ std::vector<std::size_t> formula_torques(const std::vector<FormulaTerm>& terms);
 /// The typical size of what a term is multiplied by: as stated, or else that of what it acts on.
 double scale_of(const FormulaTerm& term, bool is_prismatic);
 
-/// Why an effect of type "formula" cannot be evaluated, or nothing.
+/// The reason for which an effect of type "formula" cannot be evaluated, or nothing.
 std::string formula_refusal(const Chain& chain, const Effect& effect);
 
-/// Why one of its terms cannot be evaluated, or nothing. Of `effect` only the place counts.
+/// The reason for which one of its terms cannot be evaluated, or nothing. Only the place of `effect` counts.
 std::string term_refusal(const Chain& chain, const Effect& effect, const FormulaTerm& term);
 
 /// "{}" replaced by the number of the joint.
 std::string with_joint_number(std::string pattern, std::size_t joint);
 
-/// Whether the effect is one of a whole robot: its type is, or it is a formula at no joint.
+/// True if the effect is one of a whole robot: its type is, or it is a formula at no joint.
 bool is_of_whole_robot(const EffectType& type, const Effect& effect);
 
 inline bool is_prismatic(const Chain& chain, std::size_t joint) {

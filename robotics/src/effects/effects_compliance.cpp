@@ -56,8 +56,8 @@ std::string joint_compliance_measured_in_c(const CJoint& joint, Values values, V
 
 std::span<const Joint> from(const Chain& chain, std::size_t joint) { return std::span(chain.joints).subspan(joint); }
 
-// Where masses are unknown but payloads are told, the known torque is that of the payload alone: beside a compliance
-// with free masses it is the other part of one cause, so both may stand at one joint.
+// If masses are unknown but payloads are told, the known torque is that of the payload alone: beside a compliance with
+// free masses it is the other part of one cause, so both may stand at one joint.
 std::string payload_alone(const TrialContext& context, std::size_t joint) {
   const auto payload = context.covariates.find("payload_kg");
   const bool is_alone =

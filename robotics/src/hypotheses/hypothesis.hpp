@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "llmt/discovery/search.hpp"
-#include "llmt/robotics/discovery_result.hpp"
+#include "llmt/robotics/discovery/discovery_result.hpp"
 #include "llmt/robotics/effects.hpp"
 
 namespace llmt::robotics {
@@ -12,8 +12,8 @@ namespace llmt::robotics {
 /// A candidate of the search and what it means.
 struct Hypothesis {
   discovery::EffectCandidate candidate;  ///< signature over all 3n coordinates
-  std::optional<Effect> effect;          ///< what would be added to the robot; a shape may have none
-  Shape shape;                           ///< of a generic candidate
+  std::optional<Effect> effect;          ///< what would be added to the robot; a pattern may have none
+  ErrorPattern pattern;                  ///< of a generic candidate
 };
 
 /// Constants to try an effect with, as EffectType::trial says.

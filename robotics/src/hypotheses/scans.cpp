@@ -107,7 +107,7 @@ Hypothesis hypothesis_of(const EffectType& type, const Chain& chain, std::size_t
 }
 
 void add_orders(const Scene& scene, const EffectType& type, std::vector<Hypothesis>& hypotheses) {
-  // Lower orders are covered by the eccentricities of the catalogue and by the smooth shapes.
+  // Lower orders are covered by the eccentricities of the catalogue and by the smooth patterns.
   constexpr double lowest = 2.6;
   constexpr double highest = 450.0;
   constexpr std::size_t kept = 2;

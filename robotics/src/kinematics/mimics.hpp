@@ -26,8 +26,8 @@ Eigen::VectorXd followed(const std::vector<Follower>& followers, Eigen::VectorXd
 /// Narrows the ranges of leaders to what their followers allow; those of followers become infinite.
 void limit_leaders(const std::vector<Follower>& followers, Eigen::VectorXd& low, Eigen::VectorXd& high);
 
-/// In which poses are drawn, in rad and mm: limits, or else +-180 deg of a revolute joint. Those of followers narrow
-/// the ranges of their leaders, and are infinite.
+/// Ranges from which poses are drawn, in rad and mm: limits, or else +-180 deg of a revolute joint. Those of followers
+/// narrow the ranges of their leaders, and are infinite.
 struct JointRanges {
   Eigen::VectorXd low;
   Eigen::VectorXd high;

@@ -75,7 +75,7 @@ void check_same_axes(const Csv& csv, const Header& header, const std::string& ta
   }
 }
 
-// Whether a row has a point of a target. Throws if a coordinate is missing, or if there is a socket beside the point.
+// True if a row has a point of a target. Throws if a coordinate is missing, or if there is a socket beside the point.
 bool has_point(const Csv& csv, Eigen::Index row, const std::string& target, const Eigen::RowVector3d& point,
                bool has_socket) {
   const bool is_empty = point.array().isNaN().all();

@@ -101,20 +101,4 @@ SolvedPose Assembler::pose(const Eigen::VectorXd& known, const Eigen::VectorXd& 
   return best;
 }
 
-Assembly assemble_again(const Mechanism& mechanism, const Eigen::MatrixXd& known, const Eigen::MatrixXd& before) {
-  Assembler assembler(mechanism, noise_of(mechanism, known));
-  Assembly assembly{.coordinates = Eigen::MatrixXd::Constant(known.rows(), known.cols(), NAN), .failures = {}};
-  const auto has_one = [&](Eigen::Index row) { return before.size() > 0 && before.row(row).allFinite(); };
-  for (Eigen::Index row = 0; row < before.rows(); ++row) {
-    if (has_one(row)) assembler.remember(before.row(row));
-  }
-  for (Eigen::Index row = 0; row < known.rows(); ++row) {
-    const Eigen::VectorXd hint = has_one(row) ? before.row(row).transpose() : Eigen::VectorXd();
-    const SolvedPose pose = assembler.pose(known.row(row), hint);
-    if (pose.ok()) assembly.coordinates.row(row) = pose.coordinates.transpose();
-    assembly.failures.push_back(pose.failure);
-  }
-  return assembly;
-}
-
 }  // namespace llmt::robotics

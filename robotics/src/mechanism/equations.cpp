@@ -23,7 +23,7 @@ double largest_length(const Mechanism& mechanism) {
   return largest > 0.0 ? largest : 1.0;
 }
 
-// Whether a turn changes the equations by less than rounding makes of the changes of a part of a turn.
+// True if a turn changes the equations by no more than the rounding of the changes of a part of a turn.
 bool turns(Equations& equations, const Eigen::VectorXd& parameters, const Eigen::VectorXd& at, Eigen::Index which) {
   constexpr double rounding = 1e-9;
   const auto change = [&](double angle) -> Eigen::ArrayXd {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "expressions/expression.hpp"
-#include "llmt/robotics/mechanism.hpp"
+#include "llmt/robotics/mechanism/mechanism_types.hpp"
 
 namespace llmt::robotics {
 

@@ -1,4 +1,4 @@
-#include "llmt/robotics/mechanism.hpp"
+#include "llmt/robotics/mechanism/mechanism.hpp"
 
 #include <fmt/format.h>
 
@@ -27,7 +27,7 @@ bool is_identifier(const std::string& name) {
   return true;
 }
 
-// Whether expressions take the name for a variable. muParser accepts the name of a function alone.
+// True if expressions take the name for a variable. muParser accepts the name of a function alone.
 bool is_free_word(const std::string& name) {
   const auto reads = [](const std::string& text) {
     try {
@@ -174,6 +174,22 @@ Eigen::VectorXd noise_of(const Mechanism& mechanism, const Eigen::MatrixXd& know
     sigma(i) = 1.0;
   }
   return sigma;
+}
+
+Assembly assemble_again(const Mechanism& mechanism, const Eigen::MatrixXd& known, const Eigen::MatrixXd& before) {
+  Assembler assembler(mechanism, noise_of(mechanism, known));
+  Assembly assembly{.coordinates = Eigen::MatrixXd::Constant(known.rows(), known.cols(), NAN), .failures = {}};
+  const auto has_one = [&](Eigen::Index row) { return before.size() > 0 && before.row(row).allFinite(); };
+  for (Eigen::Index row = 0; row < before.rows(); ++row) {
+    if (has_one(row)) assembler.remember(before.row(row));
+  }
+  for (Eigen::Index row = 0; row < known.rows(); ++row) {
+    const Eigen::VectorXd hint = has_one(row) ? before.row(row).transpose() : Eigen::VectorXd();
+    const SolvedPose pose = assembler.pose(known.row(row), hint);
+    if (pose.ok()) assembly.coordinates.row(row) = pose.coordinates.transpose();
+    assembly.failures.push_back(pose.failure);
+  }
+  return assembly;
 }
 
 Assembly assemble(const Mechanism& mechanism, const Eigen::MatrixXd& known) {

@@ -1,4 +1,4 @@
-#include "llmt/robotics/mechanism_calibration.hpp"
+#include "llmt/robotics/mechanism/mechanism_calibration.hpp"
 
 #include <fmt/format.h>
 
@@ -172,7 +172,8 @@ std::vector<Eigen::Index> far_off(const std::vector<SolvedPose>& poses) {
   }
   std::vector<Eigen::Index> far;
   if (variances.empty()) return far;
-  const double variance = bulk_of(Eigen::Map<const Eigen::VectorXd>(variances.data(), std::ssize(variances))).centre;
+  const double variance =
+      robust_scale(Eigen::Map<const Eigen::VectorXd>(variances.data(), std::ssize(variances))).median;
   for (std::size_t i = 0; i < poses.size(); ++i) {
     if (is_checked(poses[i]) && share(poses[i], 1.0 - by_chance) > variance)
       far.push_back(static_cast<Eigen::Index>(i));

@@ -1,6 +1,6 @@
 #include <cmath>
 
-#include "llmt/robotics/mechanism_calibration.hpp"
+#include "llmt/robotics/mechanism/mechanism_calibration.hpp"
 #include "mechanism/assembler.hpp"
 
 namespace llmt::robotics {
@@ -20,7 +20,7 @@ std::vector<Eigen::Index> measured_outputs(const Mechanism& mechanism, const Eig
   return outputs;
 }
 
-// Whether there are as many equations as coordinates that are not known when the outputs are not.
+// True if there are as many equations as coordinates that are not known when the outputs are not.
 bool joints_tell_outputs(const Mechanism& mechanism, const Eigen::MatrixXd& measured) {
   Eigen::Index unknown = 0;
   for (Eigen::Index i = 0; i < measured.cols(); ++i) {

@@ -1,4 +1,4 @@
-#include "llmt/robotics/mechanism_file.hpp"
+#include "llmt/robotics/mechanism/mechanism_file.hpp"
 
 #include <fmt/format.h>
 

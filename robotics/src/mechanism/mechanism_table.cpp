@@ -7,7 +7,7 @@
 #include <numbers>
 #include <stdexcept>
 
-#include "llmt/robotics/mechanism_file.hpp"
+#include "llmt/robotics/mechanism/mechanism_file.hpp"
 
 namespace llmt::robotics {
 namespace {

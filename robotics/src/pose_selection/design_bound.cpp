@@ -24,7 +24,7 @@ void evaluate(const DesignProblem& problem, const Eigen::MatrixXd& rows, Eigen::
   design.from_given = design.sensitivity.cwiseProduct(problem.given).sum();
 }
 
-// Whether the bound is within `share` of half a per cent of the variance.
+// True if the bound is within `share` of half a per cent of the variance.
 bool is_near(const IdealDesign& design, Eigen::Index count, double largest_sensitivity, double share) {
   return variance_bound(design, count, largest_sensitivity) > (1.0 - 5e-3 * share) * design.variance;
 }

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "llmt/robotics/pose_selection.hpp"
+#include "llmt/robotics/calibration.hpp"
 
 namespace llmt::robotics {
 

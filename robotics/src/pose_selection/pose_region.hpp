@@ -8,7 +8,7 @@
 #include "kinematics/mimics.hpp"
 #include "llmt/random.hpp"
 #include "llmt/robotics/kinematics.hpp"
-#include "llmt/robotics/pose_selection.hpp"
+#include "llmt/robotics/pose_selection_options.hpp"
 
 namespace llmt::robotics {
 

@@ -19,7 +19,7 @@ double& component_of(Deformation& deformation, Eigen::Index component);
 /// The twist of the base (0) or of link i (i + 1).
 const Deformation::Twist& twist_of(const Deformation& deformation, Eigen::Index twist);
 
-/// Whether base or links are moved.
+/// True if base or links are moved.
 bool has_twists(const Deformation& deformation);
 
 /// All that an effect of that type at that joint or link may change, ascending. Twists count whole, because a turn of

@@ -44,25 +44,12 @@ void in_settings(const Robot& robot, const Poses& poses, Evaluate evaluate) {
 
 }  // namespace
 
-Poses select(const Poses& poses, const std::vector<Eigen::Index>& rows) {
-  Poses chosen{.joints = poses.joints(rows, Eigen::all), .covariates = {}};
-  for (const auto& [name, values] : poses.covariates) chosen.covariates[name] = values(rows);
-  if (poses.observations.empty()) return chosen;
-  for (const Eigen::Index row : rows) chosen.observations.push_back(poses.observations[row]);
-  return chosen;
-}
-
 void validate(const Chain& chain, const Effect& effect) {
   effect_index(chain, effect);
   for (const std::vector<double>* numbers : {&effect.values, &effect.constants}) {
     if (!std::ranges::all_of(*numbers, [](double value) { return std::isfinite(value); }))
       throw std::invalid_argument("llmt::robotics::Robot: a number of " + effect_label(effect) + " is not finite");
   }
-}
-
-bool has_instrument(const Poses& poses) {
-  const auto& seen = poses.observations;
-  return seen.empty() || !std::ranges::all_of(seen, is_touched, &Observation::base);
 }
 
 void validate(const Robot& robot) {

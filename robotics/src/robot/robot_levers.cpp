@@ -1,7 +1,7 @@
 // Derivatives of the reading by the deformation of an arm in equilibrium.
 //
-// Effects look at the arm in its pose: at loads, points and axes, their inputs. What they see deforms the arm. The
-// deformed arm has other inputs, which deform it a little more.
+// Effects look at the arm in its pose: at loads, points and axes, their inputs. The inputs set the deformation of
+// the arm. The deformed arm has other inputs, which deform it a little more.
 //
 // So a small extra deformation e moves the reading in several steps. By itself it moves it by D e (direct_). It also
 // changes the inputs, and the effects answer with the deformation R e (responses_). They answer that with R R e, and so
@@ -33,7 +33,7 @@ Eigen::Matrix3d turn_of_vector(const Eigen::Vector3d& r) {
   return Eigen::Matrix3d::Identity() + 0.5 * cross + cross * cross / 6.0;
 }
 
-// Where an effect jumps within the step, as a backlash where the torque changes its sign, the difference on the other
+// If an effect jumps within the step, as a backlash does when the torque changes its sign, the difference on the other
 // side is the derivative. At a kink, as friction has there, it is the mean of both.
 double without_jump(double forward, double backward) {
   constexpr double alike = 0.1;
@@ -192,8 +192,8 @@ void RobotEvaluator::set_held_back() {
   }
 }
 
-// Levers of the arm in equilibrium, by the components that its own effects change. Where loads act on the deformed arm,
-// the last pass to equilibrium hardly moved it.
+// Levers of the arm in equilibrium, by the components that its own effects change. The last pass to equilibrium hardly
+// moved the points at which loads act on the deformed arm.
 void RobotEvaluator::set_levers(PoseContext& pose, Eigen::Index row) {
   choose_components(own_components_);
   tool_ = kinematics_.motions_into(deformed_motions_, q_, &deformation_);

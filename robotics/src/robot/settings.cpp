@@ -10,7 +10,6 @@
 #include <utility>
 
 #include "kinematics/units.hpp"
-#include "llmt/robotics/robot.hpp"
 
 namespace llmt::robotics {
 namespace {

@@ -19,7 +19,7 @@ struct Setting {
   Eigen::Index radius = -1;  ///< where this parameter stands among those of the whole robot; -1: there is none
 };
 
-/// Whether all rows use the chain's own base and tool, and there are no others. Throws std::invalid_argument if the
+/// True if all rows use the chain's own base and tool, and there are no others. Throws std::invalid_argument if the
 /// number of observations is not that of the rows.
 bool is_one_setting(const Robot& robot, const Poses& poses);
 

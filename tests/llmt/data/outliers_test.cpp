@@ -16,55 +16,55 @@ Eigen::VectorXd normal_values(Eigen::Index count, double centre, double deviatio
   return values;
 }
 
-TEST(Outliers, TheBulkOfNormalValuesHasTheirMeanAndDeviation) {
-  const llmt::Bulk bulk = llmt::bulk_of(normal_values(20000, 7.0, 3.0));
-  EXPECT_NEAR(bulk.centre, 7.0, 0.1);
-  EXPECT_NEAR(bulk.spread, 3.0, 0.1);
+TEST(Outliers, TheScaleOfNormalValuesIsTheirStandardDeviation) {
+  const llmt::RobustScale scale = llmt::robust_scale(normal_values(20000, 7.0, 3.0));
+  EXPECT_NEAR(scale.median, 7.0, 0.1);
+  EXPECT_NEAR(scale.deviation, 3.0, 0.1);
 }
 
-TEST(Outliers, AMinorityDoesNotMoveTheBulk) {
+TEST(Outliers, AMinorityDoesNotMoveMedianOrScale) {
   Eigen::VectorXd values = normal_values(1000, 0.0, 1.0);
   values.head(400).setConstant(1e9);
-  const llmt::Bulk bulk = llmt::bulk_of(values);
-  EXPECT_LT(std::abs(bulk.centre), 2.0);
-  EXPECT_LT(bulk.spread, 5.0);
-  EXPECT_THROW(llmt::bulk_of(Eigen::VectorXd()), std::invalid_argument);
+  const llmt::RobustScale scale = llmt::robust_scale(values);
+  EXPECT_LT(std::abs(scale.median), 2.0);
+  EXPECT_LT(scale.deviation, 5.0);
+  EXPECT_THROW(llmt::robust_scale(Eigen::VectorXd()), std::invalid_argument);
 }
 
-TEST(Outliers, HeavyRowsAreTheFarthestFirst) {
+TEST(Outliers, DominantRowsAreTheFarthestFirst) {
   Eigen::VectorXd values = normal_values(1000, 5.0, 1.0);
   values(17) = 1e4;
   values(3) = -2e4;
-  const llmt::HeavyRows heavy = llmt::heavy_rows(values);
-  EXPECT_EQ(heavy.rows, (std::vector<Eigen::Index>{3, 17}));
-  EXPECT_GT(heavy.share, 0.99);
-  EXPECT_FALSE(heavy.hide_the_others);
+  const llmt::DominantRows dominant = llmt::dominant_rows(values);
+  EXPECT_EQ(dominant.rows, (std::vector<Eigen::Index>{3, 17}));
+  EXPECT_GT(dominant.share, 0.99);
+  EXPECT_FALSE(dominant.hide_the_others);
 }
 
-TEST(Outliers, OrdinaryValuesAreNotHeavy) {
-  EXPECT_TRUE(llmt::heavy_rows(normal_values(1000, 5.0, 1.0)).rows.empty());
-  EXPECT_TRUE(llmt::heavy_rows(Eigen::VectorXd::Constant(50, 3.0)).rows.empty());
+TEST(Outliers, OrdinaryValuesAreNotDominant) {
+  EXPECT_TRUE(llmt::dominant_rows(normal_values(1000, 5.0, 1.0)).rows.empty());
+  EXPECT_TRUE(llmt::dominant_rows(Eigen::VectorXd::Constant(50, 3.0)).rows.empty());
   // Prices and sizes: a long tail that belongs to the data.
-  EXPECT_TRUE(llmt::heavy_rows(normal_values(1000, 0.0, 1.0).array().exp().matrix()).rows.empty());
+  EXPECT_TRUE(llmt::dominant_rows(normal_values(1000, 0.0, 1.0).array().exp().matrix()).rows.empty());
   // A rare event: more than half of the values agree.
   Eigen::VectorXd rare = Eigen::VectorXd::Zero(1000);
   rare.head(5).setConstant(1.0);
-  EXPECT_TRUE(llmt::heavy_rows(rare).rows.empty());
+  EXPECT_TRUE(llmt::dominant_rows(rare).rows.empty());
   // Two per cent of the rows are more than a few.
   Eigen::VectorXd two_groups = normal_values(1000, 0.0, 1.0);
   two_groups.head(20).setConstant(1000.0);
-  EXPECT_TRUE(llmt::heavy_rows(two_groups).rows.empty());
+  EXPECT_TRUE(llmt::dominant_rows(two_groups).rows.empty());
 }
 
 TEST(Outliers, AValueThatHidesTheOthersIsSaidToDoSo) {
   Eigen::VectorXd values = normal_values(100, 0.0, 1.0);
   values(42) = 1e15;
-  EXPECT_FALSE(llmt::heavy_rows(values).hide_the_others);
+  EXPECT_FALSE(llmt::dominant_rows(values).hide_the_others);
   values(42) = -1e17;
-  EXPECT_TRUE(llmt::heavy_rows(values).hide_the_others);
+  EXPECT_TRUE(llmt::dominant_rows(values).hide_the_others);
   values(42) = 1e150;  // whose square is not finite beside others
-  EXPECT_TRUE(llmt::heavy_rows(values).hide_the_others);
-  EXPECT_EQ(llmt::heavy_rows(values).share, 1.0);
+  EXPECT_TRUE(llmt::dominant_rows(values).hide_the_others);
+  EXPECT_EQ(llmt::dominant_rows(values).share, 1.0);
 }
 
 }  // namespace

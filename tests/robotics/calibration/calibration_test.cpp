@@ -1,4 +1,5 @@
 #include "llmt/robotics/calibration.hpp"
+#include "llmt/robotics/calibration_problem.hpp"
 
 #include <gtest/gtest.h>
 

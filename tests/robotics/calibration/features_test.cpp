@@ -4,7 +4,7 @@
 #include <set>
 
 #include "llmt/robotics/calibration.hpp"
-#include "llmt/robotics/discovery.hpp"
+#include "llmt/robotics/discovery/discovery.hpp"
 #include "llmt/robotics/robot_check.hpp"
 #include "robotics/touches.hpp"
 

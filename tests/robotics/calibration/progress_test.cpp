@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "llmt/robotics/calibration_report.hpp"
-#include "llmt/robotics/discovery.hpp"
+#include "llmt/robotics/discovery/discovery.hpp"
 #include "llmt/robotics/robot_file.hpp"
 #include "llmt/robotics/simulation.hpp"
 #include "watched.hpp"

@@ -4,7 +4,7 @@
 #include <limits>
 #include <map>
 
-#include "llmt/robotics/discovery.hpp"
+#include "llmt/robotics/discovery/discovery.hpp"
 #include "llmt/robotics/robot_check.hpp"
 #include "llmt/robotics/robot_file.hpp"
 #include "robotics/touches.hpp"

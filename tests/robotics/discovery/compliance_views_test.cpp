@@ -6,7 +6,7 @@
 
 #include "llmt/random.hpp"
 #include "llmt/robotics/catalogue.hpp"
-#include "llmt/robotics/discovery.hpp"
+#include "llmt/robotics/discovery/discovery.hpp"
 #include "llmt/robotics/robot_file.hpp"
 #include "llmt/robotics/simulation.hpp"
 

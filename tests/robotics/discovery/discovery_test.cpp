@@ -1,4 +1,4 @@
-#include "llmt/robotics/discovery.hpp"
+#include "llmt/robotics/discovery/discovery.hpp"
 
 #include <gtest/gtest.h>
 
@@ -135,7 +135,7 @@ TEST(Discovery, CallsABumpUnknownAndMapsIt) {
   const Discovery found = discover(arm("tx200_like"), seen(truth, 200, 10 * um, 7), {}, plain());
   EXPECT_EQ(found.answer, Answer::unknown);
   ASSERT_FALSE(found.unknown.empty());
-  EXPECT_EQ(found.unknown[0].shape.acts_on, "joint3");
+  EXPECT_EQ(found.unknown[0].pattern.acts_on, "joint3");
   for (const FoundEffect& one : found.effects) EXPECT_FALSE(one.confirmed) << effect_label(one.effect);
   ASSERT_FALSE(found.maps.empty());
   EXPECT_LT(found.held_out.after.mean, 0.8 * found.held_out.before.mean);

@@ -1,4 +1,4 @@
-#include "llmt/robotics/discriminating_poses.hpp"
+#include "llmt/robotics/discovery/discriminating_poses.hpp"
 
 #include <gtest/gtest.h>
 

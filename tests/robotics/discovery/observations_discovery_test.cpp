@@ -3,7 +3,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 
-#include "llmt/robotics/discovery.hpp"
+#include "llmt/robotics/discovery/discovery.hpp"
 #include "llmt/robotics/robot_file.hpp"
 #include "llmt/robotics/simulation.hpp"
 #include "robotics/observations.hpp"

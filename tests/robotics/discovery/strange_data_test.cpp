@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "llmt/robotics/calibration_report.hpp"
-#include "llmt/robotics/discovery.hpp"
+#include "llmt/robotics/discovery/discovery.hpp"
 #include "llmt/robotics/simulation.hpp"
 #include "robotics/effects.hpp"
 #include "robotics/found.hpp"
@@ -52,7 +52,7 @@ bool names(const Discovery& found, const std::string& type, const std::string& a
   });
 }
 
-std::string kind(const Discovery& found) { return found.unknown.empty() ? "" : found.unknown[0].shape.kind; }
+std::string kind(const Discovery& found) { return found.unknown.empty() ? "" : found.unknown[0].pattern.kind; }
 
 TEST(StrangeData, ASmallStrainWaveGearIsPlausible) {
   const Robot truth = with_effect(light_arm(), {"joint_compliance", "joint5", {9e-4}});
@@ -116,7 +116,7 @@ TEST(StrangeData, ScatterOfOneJointIsNoInstrumentsNoise) {
   EXPECT_EQ(found.answer, Answer::unknown);
   EXPECT_EQ(kind(found), "noise") << testing::PrintToString(labels(found));
   ASSERT_FALSE(found.unknown.empty());
-  EXPECT_EQ(found.unknown[0].shape.acts_on, "joint2");
+  EXPECT_EQ(found.unknown[0].pattern.acts_on, "joint2");
 }
 
 // Trackers see angles worse than distances, and some see heights worse than the rest.

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "llmt/robotics/discovery.hpp"
+#include "llmt/robotics/discovery/discovery.hpp"
 #include "llmt/robotics/robot_file.hpp"
 #include "llmt/robotics/simulation.hpp"
 

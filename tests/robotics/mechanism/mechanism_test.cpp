@@ -5,7 +5,7 @@
 #include <numbers>
 
 #include "llmt/random.hpp"
-#include "llmt/robotics/mechanism_file.hpp"
+#include "llmt/robotics/mechanism/mechanism_file.hpp"
 
 namespace llmt::robotics {
 namespace {

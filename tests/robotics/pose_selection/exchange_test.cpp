@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "llmt/random.hpp"
+#include "llmt/robotics/observability.hpp"
 #include "pose_selection/design_bound.hpp"
 #include "pose_selection/driving_order.hpp"
 

@@ -5,7 +5,7 @@
 
 #include "llmt/robotics/calibration.hpp"
 #include "llmt/robotics/compensation.hpp"
-#include "llmt/robotics/discovery.hpp"
+#include "llmt/robotics/discovery/discovery.hpp"
 #include "llmt/robotics/robot_file.hpp"
 #include "robotics/effects.hpp"
 #include "robotics/exported_robot.hpp"

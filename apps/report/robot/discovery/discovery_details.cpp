@@ -37,13 +37,13 @@ std::string effect_lines(const Discovery& found) {
   return text.empty() ? "" : "Effects:\n" + text;
 }
 
-std::string shape_lines(const std::vector<robotics::FoundShape>& shapes) {
+std::string pattern_lines(const std::vector<robotics::FoundPattern>& patterns) {
   std::string text;
-  for (const robotics::FoundShape& shape : shapes) {
-    text += fmt::format("  on {}: {} ({:.0f} % of what was explained)\n", shape.shape.acts_on, shape_words(shape.shape),
-                        100.0 * shape.share);
+  for (const robotics::FoundPattern& one : patterns) {
+    text += fmt::format("  on {}: {} ({:.0f} % of what was explained)\n", one.pattern.acts_on,
+                        pattern_words(one.pattern), 100.0 * one.share);
   }
-  return text.empty() ? "" : "Shapes:\n" + text;
+  return text.empty() ? "" : "Error patterns:\n" + text;
 }
 
 std::string gap_lines(const Discovery& found) {
@@ -100,10 +100,10 @@ std::string visible_lines(const Discovery& found) {
 }  // namespace
 
 std::string discovery_details(const Discovery& found) {
-  std::vector<robotics::FoundShape> shapes = found.unknown;
-  shapes.insert(shapes.end(), found.more.begin(), found.more.end());
-  std::erase_if(shapes, [](const robotics::FoundShape& one) { return one.shape.depends_on.empty(); });
-  std::string text = effect_lines(found) + shape_lines(shapes) + gap_lines(found) + untestable_lines(found);
+  std::vector<robotics::FoundPattern> patterns = found.unknown;
+  patterns.insert(patterns.end(), found.more.begin(), found.more.end());
+  std::erase_if(patterns, [](const robotics::FoundPattern& one) { return one.pattern.depends_on.empty(); });
+  std::string text = effect_lines(found) + pattern_lines(patterns) + gap_lines(found) + untestable_lines(found);
   if (found.answer == discovery::Answer::nothing_missing) text += visible_lines(found);
   text += fmt::format(
       "{} causes were tried in {} round{}. What was found raises the score (log-likelihood) by {:.0f}; where there is "

@@ -34,16 +34,16 @@ Json effects_json(const robotics::Discovery& found) {
   return effects;
 }
 
-Json shapes_json(const std::vector<robotics::FoundShape>& list) {
-  Json shapes = Json::array();
-  for (const robotics::FoundShape& shape : list) {
-    shapes.push_back({{"acts_on", shape.shape.acts_on},
-                      {"depends_on", shape.shape.depends_on},
-                      {"per_turn", shape.shape.per_turn ? Json(*shape.shape.per_turn) : Json(nullptr)},
-                      {"kind", shape.shape.kind},
-                      {"share", shape.share}});
+Json patterns_json(const std::vector<robotics::FoundPattern>& list) {
+  Json patterns = Json::array();
+  for (const robotics::FoundPattern& one : list) {
+    patterns.push_back({{"acts_on", one.pattern.acts_on},
+                        {"depends_on", one.pattern.depends_on},
+                        {"per_turn", one.pattern.per_turn ? Json(*one.pattern.per_turn) : Json(nullptr)},
+                        {"kind", one.pattern.kind},
+                        {"share", one.share}});
   }
-  return shapes;
+  return patterns;
 }
 
 Json beyond_json(const robotics::Discovery& found) {
@@ -90,12 +90,12 @@ Json discovery_json(const robotics::Discovery& found) {
   for (const robotics::Visible& entry : found.visible) {
     visible.push_back({{"effect", entry.what}, {"amplitude", finite_or_null(entry.value)}, {"unit", entry.unit}});
   }
-  const Json shapes = shapes_json(found.unknown);
+  const Json patterns = patterns_json(found.unknown);
   return {{"verdict", discovery::to_string(found.answer)},
           {"effects", effects_json(found)},
-          {"unknown", shapes.empty() ? Json(nullptr) : shapes[0]},
-          {"unknown_all", shapes},
-          {"more", shapes_json(found.more)},
+          {"unknown", patterns.empty() ? Json(nullptr) : patterns[0]},
+          {"unknown_all", patterns},
+          {"more", patterns_json(found.more)},
           {"beyond_plausible", beyond_json(found)},
           {"maps", found.maps.size()},
           {"gap", gap_json(found)},

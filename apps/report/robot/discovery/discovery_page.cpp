@@ -207,15 +207,16 @@ std::vector<std::string> effect_sentences(const Discovery& found) {
   return sentences;
 }
 
-// One line for all shapes that act on one thing.
-std::vector<std::string> shape_sentences(const std::vector<robotics::FoundShape>& shapes, const std::string& lead) {
+// One line for all patterns that act on one thing.
+std::vector<std::string> pattern_sentences(const std::vector<robotics::FoundPattern>& patterns,
+                                           const std::string& lead) {
   std::vector<std::string> order;
   std::map<std::string, std::vector<std::string>> by_place;
-  for (const robotics::FoundShape& one : shapes) {
-    if (one.shape.depends_on.empty()) continue;
-    const std::string& place = one.shape.acts_on;
+  for (const robotics::FoundPattern& one : patterns) {
+    if (one.pattern.depends_on.empty()) continue;
+    const std::string& place = one.pattern.acts_on;
     if (!by_place.contains(place)) order.push_back(place);
-    by_place[place].push_back(shape_words(one.shape));
+    by_place[place].push_back(pattern_words(one.pattern));
   }
   std::vector<std::string> sentences;
   for (const std::string& place : order) {
@@ -307,8 +308,8 @@ std::string discovery_page(const Discovery& found, const std::vector<Eigen::Inde
   };
   add(headline_text(found.headline));
   for (const std::string& sentence : effect_sentences(found)) add(sentence);
-  for (const std::string& sentence : shape_sentences(found.unknown, "an error without a name, ")) add(sentence);
-  for (const std::string& sentence : shape_sentences(found.more, "and something more, ")) add(sentence);
+  for (const std::string& sentence : pattern_sentences(found.unknown, "an error without a name, ")) add(sentence);
+  for (const std::string& sentence : pattern_sentences(found.more, "and something more, ")) add(sentence);
   for (const std::string& sentence : refused_sentences(found)) add(sentence);
   if (!found.maps.empty()) {
     std::vector<std::string> joints;

@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "llmt/robotics/discovery.hpp"
+#include "llmt/robotics/discovery/discovery.hpp"
 #include "report/text/json.hpp"
 #include "report/text/text.hpp"
 
@@ -14,7 +14,7 @@ namespace llmt::report {
 /// `lines_of_file`: of the measurements, row by row.
 std::string discovery_page(const robotics::Discovery& found, const std::vector<Eigen::Index>& lines_of_file);
 
-/// Everything else that is known: values, shapes, where the gap is, what could not be tested.
+/// Everything else that is known: values, patterns, where the gap is, what could not be tested.
 std::string discovery_details(const robotics::Discovery& found);
 
 /// The values of an effect that the data determine, with their errors.

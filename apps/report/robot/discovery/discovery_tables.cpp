@@ -25,11 +25,10 @@ Json effects_table(const Discovery& found) {
             .rows = {},
             .words = {1},
             .wide = true};
-  for (const robotics::FoundShape& shape : found.unknown) {
-    grid.rows.push_back({fmt::format("no name: acts on {}", shape.shape.acts_on),
-                         shape.shape.depends_on.empty() ? shape.shape.kind : shape_words(shape.shape),
-                         fmt::format("{:.0f} % of what was explained", 100.0 * shape.share),
-                         "that something is there"});
+  for (const robotics::FoundPattern& one : found.unknown) {
+    grid.rows.push_back({fmt::format("no name: acts on {}", one.pattern.acts_on),
+                         one.pattern.depends_on.empty() ? one.pattern.kind : pattern_words(one.pattern),
+                         fmt::format("{:.0f} % of what was explained", 100.0 * one.share), "that something is there"});
   }
   for (const robotics::Effect& map : found.maps)
     grid.rows.push_back({fmt::format("free map of the angle error of {}", map.at),

@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "llmt/robotics/discovery_result.hpp"
+#include "llmt/robotics/discovery/discovery_result.hpp"
 #include "report/document/document.hpp"
 #include "report/robot/discovery/next_poses.hpp"
 
@@ -13,7 +13,7 @@ namespace llmt::report {
 /// "periodic error of the gear of joint1 (order_per_turn 26)".
 std::string title_of(const robotics::FoundEffect& effect);
 
-/// What was added: shapes without a name and free maps first, then effects with their values.
+/// What was added: patterns without a name and free maps first, then effects with their values.
 Json effects_table(const robotics::Discovery& found);
 
 /// Causes of one kind and reason in one row.

@@ -108,19 +108,19 @@ std::string rival_words(const robotics::FoundEffect& effect, std::size_t k) {
   const std::string& label = effect.rivals[k];
   const std::vector<robotics::Effect>& effects = effect.rival_effects[k];
   const auto causes = static_cast<std::size_t>(std::ranges::count(label, '+')) + 1;
-  if (effects.size() != causes) return label;  // a shape among them, which is no effect
+  if (effects.size() != causes) return label;  // a pattern among them, which is no effect
   std::vector<std::string> parts;
   for (const robotics::Effect& one : effects) parts.push_back(effect_words(one));
   return fmt::format("{}", fmt::join(parts, " together with "));
 }
 
-std::string shape_words(const robotics::Shape& shape) {
-  const std::string of = fmt::format(" of {}", fmt::join(shape.depends_on, " and "));
-  if (shape.kind == "smooth") return "a smooth function" + of;
-  if (shape.kind == "a map of the joint") return "some function" + of;
-  if (shape.kind == "a function of two joints") return "a function" + of;
-  if (shape.kind == "nonlinear in the torque") return "a nonlinear function" + of;
-  return shape.kind + of;
+std::string pattern_words(const robotics::ErrorPattern& pattern) {
+  const std::string of = fmt::format(" of {}", fmt::join(pattern.depends_on, " and "));
+  if (pattern.kind == "smooth") return "a smooth function" + of;
+  if (pattern.kind == "a map of the joint") return "some function" + of;
+  if (pattern.kind == "a function of two joints") return "a function" + of;
+  if (pattern.kind == "nonlinear in the torque") return "a nonlinear function" + of;
+  return pattern.kind + of;
 }
 
 VisibleSizes visible_sizes(const robotics::Discovery& found) {

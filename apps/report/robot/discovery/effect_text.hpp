@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "llmt/robotics/discovery_result.hpp"
+#include "llmt/robotics/discovery/discovery_result.hpp"
 
 namespace llmt::report {
 
@@ -50,7 +50,7 @@ const robotics::FoundEffect& whole_of(const robotics::Discovery& found, const ro
 /// The k-th rival of an effect in the same words; several causes at once are joined by "together with".
 std::string rival_words(const robotics::FoundEffect& effect, std::size_t k);
 
-/// "a smooth function of q1": what a shape looks like.
-std::string shape_words(const robotics::Shape& shape);
+/// "a smooth function of q1": what a pattern looks like.
+std::string pattern_words(const robotics::ErrorPattern& pattern);
 
 }  // namespace llmt::report

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "llmt/robotics/discovery_result.hpp"
-#include "llmt/robotics/discriminating_poses.hpp"
+#include "llmt/robotics/discovery/discovery_result.hpp"
+#include "llmt/robotics/discovery/discriminating_poses.hpp"
 
 namespace llmt::report {
 

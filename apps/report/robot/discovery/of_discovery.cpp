@@ -19,7 +19,7 @@ namespace {
 using robotics::Discovery;
 using robotics::FoundEffect;
 
-constexpr std::size_t most_shapes = 4;
+constexpr std::size_t most_charts = 4;
 
 // The confirmed effects, those of one kind together: "link bending (joint1, joint2)".
 std::vector<std::string> names_of(const Discovery& found, bool confirmed) {
@@ -54,7 +54,7 @@ std::string cause(const Discovery& found) {
       break;
   }
   std::set<std::string> places;
-  for (const robotics::FoundShape& shape : found.unknown) places.insert(shape.shape.acts_on);
+  for (const robotics::FoundPattern& one : found.unknown) places.insert(one.pattern.acts_on);
   return fmt::format("Something is missing that no known effect explains{}{}", places.empty() ? "" : "; it acts on ",
                      fmt::join(places, ", "));
 }
@@ -128,8 +128,8 @@ std::vector<std::pair<Eigen::Index, std::string>> places_of(const Discovery& fou
   for (const FoundEffect& effect : found.effects) {
     if (effect.confirmed) add(effect.effect.at, "The effect: " + title_of(effect));
   }
-  for (const robotics::FoundShape& shape : found.unknown)
-    add(shape.shape.acts_on, fmt::format("The unknown effect on {}", shape.shape.acts_on));
+  for (const robotics::FoundPattern& one : found.unknown)
+    add(one.pattern.acts_on, fmt::format("The unknown effect on {}", one.pattern.acts_on));
   for (const robotics::Effect& map : found.maps) add(map.at, fmt::format("The free map of {}", map.at));
   return places;
 }
@@ -242,19 +242,19 @@ Document discovery_report(const Discovered& of) {
   if (found.answer == discovery::Answer::unknown)
     document.lead += " Effects marked as perhaps are guesses: do not order parts by them.";
   document.main = gap_chart(found);
-  std::vector<Json> shapes;
+  std::vector<Json> patterns;
   for (const auto& [joint, title] : places_of(found)) {
-    if (shapes.size() < most_shapes) shapes.push_back(block(shape_chart(of, joint, title)));
+    if (patterns.size() < most_charts) patterns.push_back(block(shape_chart(of, joint, title)));
   }
-  if (!shapes.empty()) {
-    document.beside_main = {shapes.front()};
-    shapes.erase(shapes.begin());
+  if (!patterns.empty()) {
+    document.beside_main = {patterns.front()};
+    patterns.erase(patterns.begin());
   } else {
     document.beside_main = {block(coverage(found.before.chain, of.measurements.poses.joints))};
   }
   Section what{"What was found"};
   if (!found.effects.empty() || !found.unknown.empty()) what.blocks.push_back(effects_table(found));
-  for (Json& shape : shapes) what.blocks.push_back(std::move(shape));
+  for (Json& pattern : patterns) what.blocks.push_back(std::move(pattern));
   for (const FoundEffect& effect : found.effects) {
     if (!effect.confirmed) continue;
     if (const auto chart = rivals_chart(of, effect)) what.blocks.push_back(block(*chart));

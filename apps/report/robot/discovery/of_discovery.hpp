@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "llmt/robotics/discovery_result.hpp"
+#include "llmt/robotics/discovery/discovery_result.hpp"
 #include "report/document/document.hpp"
 #include "report/robot/discovery/next_poses.hpp"
 

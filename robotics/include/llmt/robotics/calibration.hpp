@@ -78,8 +78,4 @@ RobustCalibration calibrate_robustly(const Robot& robot, const Measurements& mea
 /// stays. For measurements of another session: empty poses know nothing.
 Robot with_placed_frames(const Robot& robot, const Measurements& measurements, const Poses& known);
 
-/// The least-squares problem behind it: residuals model - measured over the measured coordinates, analytic Jacobian,
-/// every parameter of parameters(robot) marked free. Robot and measurements are copied into it.
-discovery::LeastSquaresProblem calibration_problem(const Robot& robot, const Measurements& measurements);
-
 }  // namespace llmt::robotics

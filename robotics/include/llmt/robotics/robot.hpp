@@ -18,12 +18,6 @@ namespace llmt::robotics {
 /// Largest coordinate of a tool position that is taken for a position, mm. Squares of larger ones lose all meaning.
 inline constexpr double farthest_mm = 1e15;
 
-/// The poses of the given rows.
-Poses select(const Poses& poses, const std::vector<Eigen::Index>& rows);
-
-/// Whether any of the poses was read by an instrument: not all are of what the tool touches, see is_touched().
-bool has_instrument(const Poses& poses);
-
 /// Throws std::invalid_argument: see validate(Chain), unknown effects, non-finite effect values, an effect named twice
 /// at one place, more than 1000 effects or 10 000 values of all effects, joint ranges of a calibration that are not one
 /// for each joint.

@@ -76,4 +76,10 @@ struct Poses {
   Eigen::Index count() const { return joints.rows(); }
 };
 
+/// The poses of the given rows.
+Poses select(const Poses& poses, const std::vector<Eigen::Index>& rows);
+
+/// Whether any of the poses was read by an instrument: not all are of what the tool touches, see is_touched().
+bool has_instrument(const Poses& poses);
+
 }  // namespace llmt::robotics

@@ -13,7 +13,7 @@
 #include "llmt/abi.hpp"
 #include "llmt/discovery/problem.hpp"
 #include "llmt/folds.hpp"
-#include "llmt/robotics/mechanism.hpp"
+#include "llmt/robotics/mechanism/mechanism.hpp"
 
 namespace llmt::robotics {
 

@@ -10,8 +10,8 @@
 
 #include <optional>
 
-#include "llmt/robotics/discovery_options.hpp"
-#include "llmt/robotics/discovery_result.hpp"
+#include "llmt/robotics/discovery/discovery_options.hpp"
+#include "llmt/robotics/discovery/discovery_result.hpp"
 #include "llmt/robotics/measurements.hpp"
 
 namespace llmt::robotics {

@@ -26,10 +26,10 @@ struct DiscoveryOptions {
   discovery::SearchOptions search = {};
   /// Share of the poses that is set aside before anything is looked at; not used where test measurements are given.
   double held_out_share = 0.2;
-  bool scans = true;    ///< look for the orders of transmission errors and for the rows of knocks in the residuals
-  bool shapes = true;   ///< try shapes without a physical cause; they carry the answer "unknown effect"
-  bool maps = true;     ///< if the answer is unknown: add joint maps where they lower the error on poses left out
-  bool correct = true;  ///< if the answer is unknown: add a correction by trees where it lowers that error further
+  bool scans = true;     ///< look for the orders of transmission errors and for the rows of knocks in the residuals
+  bool patterns = true;  ///< try patterns without a physical cause; they carry the answer "unknown effect"
+  bool maps = true;      ///< if the answer is unknown: add joint maps where they lower the error on poses left out
+  bool correct = true;   ///< if the answer is unknown: add a correction by trees where it lowers that error further
   /// Relative standard deviation of the masses in the description. It is part of the standard errors of compliances and
   /// flexibilities, because the data determine only their products with the masses.
   double mass_uncertainty = 0.05;

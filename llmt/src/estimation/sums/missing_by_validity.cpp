@@ -1,4 +1,4 @@
-#include "estimation/missing_by_validity.hpp"
+#include "estimation/sums/missing_by_validity.hpp"
 
 #include <algorithm>
 #include <cmath>

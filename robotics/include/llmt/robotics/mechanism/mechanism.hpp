@@ -11,53 +11,11 @@
 
 #include <Eigen/Core>
 #include <cstdint>
-#include <limits>
-#include <optional>
-#include <string>
-#include <vector>
 
 #include "llmt/abi.hpp"
+#include "llmt/robotics/mechanism/mechanism_types.hpp"
 
 namespace llmt::robotics {
-
-/// One of the parameters d: a dimension, a sensor's offset, a place of the measuring instrument.
-struct MechanismParameter {
-  std::string name;
-  std::string unit = "mm";                    ///< "mm", "deg" or "1"; in expressions mm, rad and 1
-  double value = 0.0;                         ///< in `unit`
-  bool fixed = false;                         ///< calibration leaves it alone
-  std::optional<double> prior_sigma = {};     ///< standard deviation about `value` of real ones, in `unit`; > 0
-  std::optional<double> standard_error = {};  ///< written by calibration, in `unit`
-};
-
-/// A coordinate of a joint (s) or of the output (w). A table may have it or not: what is not measured is solved for.
-struct Coordinate {
-  std::string name;
-  std::string unit = "deg";  ///< "mm", "deg" or "1"; in expressions mm, rad and 1
-  double start = 0.0;        ///< in `unit`; all starts together are close to a configuration that can be assembled
-  bool output = false;       ///< one of w
-  std::optional<double> sigma = {};  ///< standard deviation of its readings in `unit`; 0: exact; empty: see noise_of()
-  double lower = -std::numeric_limits<double>::infinity();  ///< limits of a drive, in `unit`
-  double upper = std::numeric_limits<double>::infinity();
-
-  bool has_limits() const { return lower > -std::numeric_limits<double>::infinity(); }
-};
-
-/// An abbreviation that equations and later definitions use.
-struct Definition {
-  std::string name;
-  std::string text;
-};
-
-/// A mechanism. Expressions are those of llmt::Expression (muParser's language) in the names of parameters, coordinates
-/// and earlier definitions, and pi; angles are in rad, lengths in mm.
-struct Mechanism {
-  std::string name;
-  std::vector<MechanismParameter> parameters;
-  std::vector<Coordinate> coordinates;
-  std::vector<Definition> definitions = {};
-  std::vector<std::string> equations;  ///< "left = right", or an expression that is 0
-};
 
 /// Throws std::invalid_argument for names that are no identifiers, are repeated or are functions of the language,
 /// unknown units, numbers that are not finite, sigmas or priors out of range, limits that are no interval, expressions
@@ -72,12 +30,6 @@ void validate(const Mechanism& mechanism);
 /// `known`: poses x coordinates, NaN where not measured. Throws std::invalid_argument if coordinates of different units
 /// would share one sigma.
 Eigen::VectorXd noise_of(const Mechanism& mechanism, const Eigen::MatrixXd& known);
-
-/// Configurations that meet the equations.
-struct Assembly {
-  Eigen::MatrixXd coordinates;        ///< poses x coordinates, in their units; NaN where it failed
-  std::vector<std::string> failures;  ///< per pose: why there is no configuration; empty where there is
-};
 
 /// Completes poses: solves the equations for the coordinates that are not known. Where there are more equations than
 /// unknown coordinates, the known ones that are not exact are corrected: the sum of (correction / sigma)^2 is the

@@ -1,4 +1,4 @@
-#include "estimation/reached_rows.hpp"
+#include "estimation/sums/reached_rows.hpp"
 
 #include <algorithm>
 

@@ -17,7 +17,7 @@
 namespace llmt::robotics {
 
 /// The appearance of an effect without a name.
-struct Shape {
+struct ErrorPattern {
   std::string acts_on;                  ///< "joint2", "tool", "base"
   std::vector<std::string> depends_on;  ///< "q2", "temp_C"
   std::optional<double> per_turn;       ///< periods in a turn of the joint
@@ -47,8 +47,8 @@ struct FoundEffect {
   bool smaller = false;  ///< found beside larger ones, in what they leave
 };
 
-struct FoundShape {
-  Shape shape;
+struct FoundPattern {
+  ErrorPattern pattern;
   double share = 0.0;
 };
 
@@ -109,10 +109,10 @@ struct Discovery {
   discovery::Answer answer = discovery::Answer::nothing_missing;
   Headline headline = Headline::nothing_missing;
   std::vector<FoundEffect> effects;
-  /// Shapes of the part that the catalogue does not explain. Kind "noise": no candidate explains it, but no instrument
-  /// scatters like that. Kind "outliers": more measurements fit nothing than can be told from an effect.
-  std::vector<FoundShape> unknown;
-  std::vector<FoundShape> more;                   ///< shapes that are left beside effects that were named
+  /// Patterns of the part that the catalogue does not explain. Kind "noise": no candidate explains it, but no
+  /// instrument scatters like that. Kind "outliers": more measurements fit nothing than can be told from an effect.
+  std::vector<FoundPattern> unknown;
+  std::vector<FoundPattern> more;                 ///< patterns that are left beside effects that were named
   std::vector<BeyondPlausible> beyond_plausible;  ///< one for each family
   std::vector<Effect> maps;                       ///< joint maps that were added for the unknown effect
   Robot before;                                   ///< calibrated without what was found

@@ -1,4 +1,4 @@
-#include "estimation/normal_equations.hpp"
+#include "estimation/sums/normal_equations.hpp"
 
 namespace llmt {
 

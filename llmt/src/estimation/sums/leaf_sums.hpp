@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "data/dataset.hpp"
-#include "estimation/normal_equations.hpp"
+#include "estimation/sums/normal_equations.hpp"
 #include "llmt/partition.hpp"
 
 namespace llmt {

@@ -1,4 +1,4 @@
-#include "estimation/normal_equations.hpp"
+#include "estimation/sums/normal_equations.hpp"
 
 #include <algorithm>
 #include <limits>
@@ -9,9 +9,9 @@
 #include "base/count.hpp"
 #include "base/simd.hpp"
 #include "base/sum_over.hpp"
-#include "estimation/missing_by_validity.hpp"
-#include "estimation/reached_rows.hpp"
-#include "estimation/rows_by_leaf.hpp"
+#include "estimation/sums/missing_by_validity.hpp"
+#include "estimation/sums/reached_rows.hpp"
+#include "estimation/sums/rows_by_leaf.hpp"
 #include "partition/evaluator.hpp"
 
 namespace llmt {

@@ -2,7 +2,7 @@
 /// What stands for a missing value in a partition whose leaves overlap (docs/algorithms/data.md).
 #pragma once
 
-#include "estimation/normal_equations.hpp"
+#include "estimation/sums/normal_equations.hpp"
 
 namespace llmt {
 

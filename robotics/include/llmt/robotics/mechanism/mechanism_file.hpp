@@ -11,7 +11,7 @@
 
 #include "llmt/abi.hpp"
 #include "llmt/csv.hpp"
-#include "llmt/robotics/mechanism.hpp"
+#include "llmt/robotics/mechanism/mechanism.hpp"
 
 namespace llmt::robotics {
 

@@ -1,4 +1,4 @@
-#include "hypotheses/shapes.hpp"
+#include "hypotheses/error_patterns.hpp"
 
 #include <fmt/format.h>
 
@@ -21,15 +21,15 @@ Eigen::MatrixXd acting_on(const Scene& scene, std::size_t joint, const Eigen::Ma
   return signature;
 }
 
-Hypothesis shape_of(std::string family, std::string location, Eigen::MatrixXd signature, Shape shape,
-                    double choices = 1.0) {
+Hypothesis pattern_of(std::string family, std::string location, Eigen::MatrixXd signature, ErrorPattern pattern,
+                      double choices = 1.0) {
   Hypothesis hypothesis;
   hypothesis.candidate.family = std::move(family);
   hypothesis.candidate.location = std::move(location);
   hypothesis.candidate.signature = std::move(signature);
   hypothesis.candidate.generic = true;
   hypothesis.candidate.prior_cost = 2.0 * std::log(choices);
-  hypothesis.shape = std::move(shape);
+  hypothesis.pattern = std::move(pattern);
   return hypothesis;
 }
 
@@ -46,18 +46,18 @@ Eigen::MatrixXd cosines(const Eigen::VectorXd& x, Eigen::Index count) {
 
 bool moves(const Eigen::VectorXd& x) { return x.maxCoeff() - x.minCoeff() > 0.05; }
 
-void add_smooth(const Scene& scene, std::vector<Hypothesis>& shapes) {
+void add_smooth(const Scene& scene, std::vector<Hypothesis>& patterns) {
   const std::vector<Joint>& joints = scene.robot.chain.joints;
   for (std::size_t input = 0; input < joints.size(); ++input) {
     const Eigen::VectorXd q = scene.poses.joints.col(input);
     if (!moves(q)) continue;
     const std::string name = fmt::format("q{}", input + 1);
     for (std::size_t j = 0; j < joints.size(); ++j) {
-      shapes.push_back(shape_of("?smooth", joints[j].name + "(" + name + ")", acting_on(scene, j, cosines(q, 4)),
-                                {joints[j].name, {name}, std::nullopt, "smooth"}));
+      patterns.push_back(pattern_of("?smooth", joints[j].name + "(" + name + ")", acting_on(scene, j, cosines(q, 4)),
+                                    {joints[j].name, {name}, std::nullopt, "smooth"}));
     }
-    shapes.push_back(shape_of("?fine", joints[input].name, acting_on(scene, input, cosines(q, 12)),
-                              {joints[input].name, {name}, std::nullopt, "a map of the joint"}));
+    patterns.push_back(pattern_of("?fine", joints[input].name, acting_on(scene, input, cosines(q, 12)),
+                                  {joints[input].name, {name}, std::nullopt, "a map of the joint"}));
   }
 }
 
@@ -89,7 +89,7 @@ double local_value(const Local& local, double q) {
   return q > local.centre ? 1.0 : 0.0;
 }
 
-void add_local(const Scene& scene, std::vector<Hypothesis>& shapes) {
+void add_local(const Scene& scene, std::vector<Hypothesis>& patterns) {
   constexpr double step = 3.0 / degrees;
   const std::vector<Joint>& joints = scene.robot.chain.joints;
   for (std::size_t j = 0; j < joints.size(); ++j) {
@@ -121,9 +121,9 @@ void add_local(const Scene& scene, std::vector<Hypothesis>& shapes) {
       const std::string kind =
           is_step ? fmt::format("a step at {:.0f} deg", degrees * best.centre)
                   : fmt::format("a bump at {:.0f} deg, {:.0f} deg wide", degrees * best.centre, degrees * best.width);
-      shapes.push_back(shape_of(is_step ? "?step" : "?bump", joints[j].name, acting_on(scene, j, function),
-                                {joints[j].name, {fmt::format("q{}", j + 1)}, std::nullopt, kind},
-                                tried * static_cast<double>(joints.size())));
+      patterns.push_back(pattern_of(is_step ? "?step" : "?bump", joints[j].name, acting_on(scene, j, function),
+                                    {joints[j].name, {fmt::format("q{}", j + 1)}, std::nullopt, kind},
+                                    tried * static_cast<double>(joints.size())));
     }
   }
 }
@@ -139,7 +139,7 @@ Eigen::MatrixXd pair_waves(const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
   return functions;
 }
 
-void add_pairs(const Scene& scene, std::vector<Hypothesis>& shapes) {
+void add_pairs(const Scene& scene, std::vector<Hypothesis>& patterns) {
   struct Pair {
     std::size_t a, b, joint;
     double gain;
@@ -170,14 +170,14 @@ void add_pairs(const Scene& scene, std::vector<Hypothesis>& shapes) {
     const std::string qa = fmt::format("q{}", pair.a + 1);
     const std::string qb = fmt::format("q{}", pair.b + 1);
     const Eigen::MatrixXd waves = pair_waves(scene.poses.joints.col(pair.a), scene.poses.joints.col(pair.b));
-    shapes.push_back(shape_of("?pair", fmt::format("{}({},{})", joints[pair.joint].name, qa, qb),
-                              acting_on(scene, pair.joint, waves),
-                              {joints[pair.joint].name, {qa, qb}, std::nullopt, "a function of two joints"}, choices));
+    patterns.push_back(pattern_of(
+        "?pair", fmt::format("{}({},{})", joints[pair.joint].name, qa, qb), acting_on(scene, pair.joint, waves),
+        {joints[pair.joint].name, {qa, qb}, std::nullopt, "a function of two joints"}, choices));
   }
 }
 
 // Angle errors that grow with the gravity torque otherwise than in proportion.
-void add_loads(const Scene& scene, std::vector<Hypothesis>& shapes) {
+void add_loads(const Scene& scene, std::vector<Hypothesis>& patterns) {
   for (std::size_t j = 0; j < scene.robot.chain.joints.size(); ++j) {
     const Eigen::VectorXd load = scene.loads.col(j);
     const double largest = load.cwiseAbs().maxCoeff();
@@ -188,14 +188,14 @@ void add_loads(const Scene& scene, std::vector<Hypothesis>& shapes) {
       functions.row(i) << std::copysign(std::sqrt(std::abs(u)), u), u * std::abs(u), u * u;
     }
     const std::string& name = scene.robot.chain.joints[j].name;
-    shapes.push_back(
-        shape_of("?load", name, acting_on(scene, j, functions),
-                 {name, {fmt::format("gravity torque of {}", name)}, std::nullopt, "nonlinear in the torque"}));
+    patterns.push_back(
+        pattern_of("?load", name, acting_on(scene, j, functions),
+                   {name, {fmt::format("gravity torque of {}", name)}, std::nullopt, "nonlinear in the torque"}));
   }
 }
 
 // Displacements of the tool in its own frame that depend on how it hangs.
-void add_tool(const Scene& scene, std::vector<Hypothesis>& shapes) {
+void add_tool(const Scene& scene, std::vector<Hypothesis>& patterns) {
   const Kinematics kinematics(scene.robot.chain);
   const Eigen::Index n = scene.poses.count();
   Eigen::MatrixXd linear = Eigen::MatrixXd::Zero(3 * n, 9);
@@ -223,13 +223,13 @@ void add_tool(const Scene& scene, std::vector<Hypothesis>& shapes) {
       }
     }
   }
-  const Shape shape{"tool", {"orientation of the tool to gravity"}, std::nullopt, "smooth"};
-  shapes.push_back(shape_of("?tool", "linear", linear, shape));
-  shapes.push_back(shape_of("?tool", "quadratic", square, shape));
-  shapes.push_back(shape_of("?tool", "sided", sided, shape));
+  const ErrorPattern pattern{"tool", {"orientation of the tool to gravity"}, std::nullopt, "smooth"};
+  patterns.push_back(pattern_of("?tool", "linear", linear, pattern));
+  patterns.push_back(pattern_of("?tool", "quadratic", square, pattern));
+  patterns.push_back(pattern_of("?tool", "sided", sided, pattern));
 }
 
-void add_covariates(const Scene& scene, std::vector<Hypothesis>& shapes) {
+void add_covariates(const Scene& scene, std::vector<Hypothesis>& patterns) {
   for (const char* name : {"time_s", "order", "temp_C", "payload_kg"}) {
     const auto found = scene.poses.covariates.find(name);
     if (found == scene.poses.covariates.end()) continue;
@@ -244,21 +244,21 @@ void add_covariates(const Scene& scene, std::vector<Hypothesis>& shapes) {
         }
       }
     }
-    shapes.push_back(shape_of("?wander", name, signature, {"base", {name}, std::nullopt, "smooth"}));
+    patterns.push_back(pattern_of("?wander", name, signature, {"base", {name}, std::nullopt, "smooth"}));
   }
 }
 
 }  // namespace
 
-std::vector<Hypothesis> shape_hypotheses(const Scene& scene) {
-  std::vector<Hypothesis> shapes;
-  add_smooth(scene, shapes);
-  add_local(scene, shapes);
-  add_pairs(scene, shapes);
-  add_loads(scene, shapes);
-  add_tool(scene, shapes);
-  add_covariates(scene, shapes);
-  return shapes;
+std::vector<Hypothesis> pattern_hypotheses(const Scene& scene) {
+  std::vector<Hypothesis> patterns;
+  add_smooth(scene, patterns);
+  add_local(scene, patterns);
+  add_pairs(scene, patterns);
+  add_loads(scene, patterns);
+  add_tool(scene, patterns);
+  add_covariates(scene, patterns);
+  return patterns;
 }
 
 }  // namespace llmt::robotics

@@ -1,4 +1,4 @@
-#include "estimation/leaf_sums.hpp"
+#include "estimation/sums/leaf_sums.hpp"
 
 #include <algorithm>
 

@@ -1,4 +1,4 @@
-#include "estimation/rows_by_leaf.hpp"
+#include "estimation/sums/rows_by_leaf.hpp"
 
 #include <algorithm>
 #include <numeric>

@@ -1,4 +1,4 @@
-#include "llmt/spoilt_rows.hpp"
+#include "llmt/gross_errors.hpp"
 
 #include <fmt/format.h>
 
@@ -47,7 +47,7 @@ std::vector<HeldOutError> held_out_errors(const LearningTable& table, const FitR
 }
 
 double spread_of(const std::vector<double>& values) {
-  return bulk_of(Eigen::Map<const Eigen::VectorXd>(values.data(), std::ssize(values))).spread;
+  return robust_scale(Eigen::Map<const Eigen::VectorXd>(values.data(), std::ssize(values))).deviation;
 }
 
 // The spread of the errors in each leaf, or of all errors if that is larger.
@@ -72,7 +72,7 @@ Eigen::Index partition_of(const Model& model, Eigen::Index output) {
 
 }  // namespace
 
-SpoiltRows spoilt_rows(const LearningTable& table, const FitResult& result, Eigen::Index output) {
+GrossErrors gross_errors(const LearningTable& table, const FitResult& result, Eigen::Index output) {
   std::vector<HeldOutError> errors = held_out_errors(table, result, output, partition_of(result.model, output));
   if (errors.empty()) return {};
   std::vector<double> values;
@@ -85,7 +85,7 @@ SpoiltRows spoilt_rows(const LearningTable& table, const FitResult& result, Eige
   };
   double all = 0.0;
   for (const HeldOutError& each : errors) all += square(each);
-  SpoiltRows spoilt{.held_out = std::ssize(errors)};
+  GrossErrors gross{.held_out = std::ssize(errors)};
   std::ranges::sort(errors, [](const HeldOutError& a, const HeldOutError& b) {
     const double of_a = std::abs(a.error);
     const double of_b = std::abs(b.error);
@@ -99,34 +99,34 @@ SpoiltRows spoilt_rows(const LearningTable& table, const FitResult& result, Eige
   for (const HeldOutError& each : errors) {
     const double predicted = result.model.predict(table.inputs.values.row(each.row))(0, output);
     if (std::abs(table.outputs(each.row, output) - predicted) < least_part_in_sample * std::abs(each.error)) continue;
-    spoilt.rows.push_back(each.row);
-    spoilt.share += square(each) / all;
+    gross.rows.push_back(each.row);
+    gross.share += square(each) / all;
   }
-  if (!(spoilt.share > most_of_the_error)) spoilt.rows.clear();
-  return spoilt;
+  if (!(gross.share > most_of_the_error)) gross.rows.clear();
+  return gross;
 }
 
-void warn_of_spoilt_rows(const LearningArguments& arguments, const LearningTable& table, const FitResult& result) {
+void warn_of_gross_errors(const LearningArguments& arguments, const LearningTable& table, const FitResult& result) {
   if (table.options.loss != Loss::squared) return;
   // The user has been told of these.
-  const auto has_heavy_rows = [&](Eigen::Index o) {
-    return !heavy_rows_of_target(table.outputs.col(o), table.options.weights).rows.empty();
+  const auto has_dominant_rows = [&](Eigen::Index o) {
+    return !dominant_rows_of_target(table.outputs.col(o), table.options.weights).rows.empty();
   };
   for (Eigen::Index o = 0; o < table.outputs.cols(); ++o) {
-    const SpoiltRows spoilt = spoilt_rows(table, result, o);
-    if (spoilt.rows.empty() || has_heavy_rows(o)) continue;
-    const bool one = spoilt.rows.size() == 1;
+    const GrossErrors gross = gross_errors(table, result, o);
+    if (gross.rows.empty() || has_dominant_rows(o)) continue;
+    const bool one = gross.rows.size() == 1;
     std::string places;
-    for (std::size_t k = 0; k < std::min(spoilt.rows.size(), most_lines_named); ++k) {
-      const Eigen::Index row = spoilt.rows[k];
+    for (std::size_t k = 0; k < std::min(gross.rows.size(), most_lines_named); ++k) {
+      const Eigen::Index row = gross.rows[k];
       places += fmt::format("{}{} ({:.4g})", k == 0 ? "" : ", ", table.lines[row], table.outputs(row, o));
     }
     warn(fmt::format(
         "llmt: {} of {} held-out rows {} {:.0f} % of the held-out squared error of \"{}\": {} {}{}. If {}, correct {} "
         "or use --loss tukey, which leaves such rows out",
-        spoilt.rows.size(), spoilt.held_out, one ? "carries" : "carry", 100.0 * spoilt.share,
+        gross.rows.size(), gross.held_out, one ? "carries" : "carry", 100.0 * gross.share,
         arguments.targets[static_cast<std::size_t>(o)], one ? "line" : "lines", places,
-        spoilt.rows.size() > most_lines_named ? " and more" : "",
+        gross.rows.size() > most_lines_named ? " and more" : "",
         one ? "this target is a mistake" : "these targets are mistakes", one ? "it" : "them"));
   }
 }
