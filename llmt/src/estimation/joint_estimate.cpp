@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "estimation/local_estimate.hpp"
+#include "estimation/sums/assembly.hpp"
 #include "numerics/conjugate_gradients.hpp"
 #include "partition/evaluator.hpp"
 #include "partition/imputed.hpp"

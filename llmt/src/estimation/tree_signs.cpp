@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "constraints/signs.hpp"
-#include "estimation/sums/normal_equations.hpp"
+#include "estimation/sums/assembly.hpp"
 
 namespace llmt {
 

@@ -6,6 +6,7 @@
 #include "base/parallel.hpp"
 #include "constraints/monotone_splits.hpp"
 #include "constraints/signs.hpp"
+#include "estimation/sums/assembly.hpp"
 #include "numerics/forward_selection.hpp"
 #include "partition/imputed.hpp"
 

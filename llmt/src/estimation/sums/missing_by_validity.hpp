@@ -2,7 +2,9 @@
 /// What stands for a missing value in a partition whose leaves overlap (docs/algorithms/data.md).
 #pragma once
 
+#include "data/dataset.hpp"
 #include "estimation/sums/normal_equations.hpp"
+#include "partition/evaluator.hpp"
 
 namespace llmt {
 

@@ -6,9 +6,6 @@
 #include <map>
 #include <vector>
 
-#include "data/dataset.hpp"
-#include "partition/evaluator.hpp"
-
 namespace llmt {
 
 /// The sums (E.4) of docs/algorithms/estimation.md. With a = [1, x], Phi_i the validity of leaf i, q the weights and r
@@ -28,14 +25,5 @@ struct NormalEquations {
   /// S_ij, which is among `blocks`.
   Eigen::MatrixXd block(std::size_t i, int j) const;
 };
-
-/// Whether rows that a missing value sends to several leaves are left out of the sums, because they would distort the
-/// models of all these leaves. They are not left out if they are more than half of the weight.
-bool leaves_out_ambiguous(const TrainingRows& training, const Evaluator& evaluator, int max_threads);
-
-/// Forms the sums over all rows, and sets the ranges of the nodes to those of the rows that their validities reach.
-/// `root`: coefficients of the root's model in scaled columns, size x outputs.
-NormalEquations assemble(const TrainingRows& training, Partition& partition, const Eigen::MatrixXd& root,
-                         int max_threads);
 
 }  // namespace llmt

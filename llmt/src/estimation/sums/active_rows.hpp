@@ -11,7 +11,7 @@
 namespace llmt {
 
 /// Rows and the leaves of a partition that reach them.
-struct ReachedRows {
+struct ActiveRows {
   /// Columns of zeros behind the validities.
   static constexpr Eigen::Index more_columns = 8;
 
@@ -42,7 +42,7 @@ struct ReachedRows {
 };
 
 /// What the rows are described with.
-struct ReachedBy {
+struct PartitionContext {
   const TrainingRows& training;
   const Partition& partition;
   const Evaluator& evaluator;
@@ -52,9 +52,9 @@ struct ReachedBy {
 };
 
 /// The rows at `positions` among the training rows.
-ReachedRows reach(const ReachedBy& by, const std::vector<int>& positions);
+ActiveRows active_rows(const PartitionContext& by, const std::vector<int>& positions);
 
 /// The regressors of a row as a node sees them, which replaces missing ones by its means.
-Eigen::VectorXd regressors_at(const ReachedBy& by, const Chunk& chunk, Eigen::Index row, int node);
+Eigen::VectorXd regressors_at(const PartitionContext& by, const Chunk& chunk, Eigen::Index row, int node);
 
 }  // namespace llmt
