@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <memory>
 #include <numeric>
-#include <ranges>
+#include <sstream>
 #include <stdexcept>
 
 #include "llmt/commands.hpp"
@@ -202,7 +202,8 @@ void sort_outputs(const CLI::App& command, DiscoverArguments& arguments) {
     const auto is_column = [&](const std::string& name) { return simulated.has(name); };
     for (const std::string& text : arguments.outputs_or_files) {
       std::vector<std::string> names;
-      for (const auto& part : std::views::split(text, ',')) names.emplace_back(part.begin(), part.end());
+      std::istringstream parts(text);
+      for (std::string name; std::getline(parts, name, ',');) names.push_back(name);
       if (!std::ranges::all_of(names, is_column)) continue;
       warn(fmt::format("llmt: --output {} is taken for the columns to explain, as in former versions; write --target",
                        text));

@@ -86,7 +86,7 @@ void calibrate_command(CalibrateArguments arguments) {
         robotics::calibrate_robustly(nominal, measurements, arguments.options.calibration);
     for (const std::size_t row : robust.left_out) outlier_lines.push_back(measurements.lines[row]);
     std::ranges::sort(outlier_lines);
-    outlier_lines.erase(std::ranges::unique(outlier_lines).begin(), outlier_lines.end());
+    outlier_lines.erase(std::unique(outlier_lines.begin(), outlier_lines.end()), outlier_lines.end());
     robotics::Measurements kept = robotics::without_rows(measurements, robust.left_out);
     kept.warnings = measurements.warnings;
     kept.unused_columns = measurements.unused_columns;

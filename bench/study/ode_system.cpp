@@ -5,7 +5,8 @@
 #include <algorithm>
 #include <fstream>
 #include <nlohmann/json.hpp>
-#include <ranges>
+#include <span>
+#include <sstream>
 #include <stdexcept>
 
 namespace bench {
@@ -51,7 +52,7 @@ std::string inside_of(const std::string& text) {
 
 std::string product_of(const std::vector<Part>& factors) {
   std::string text = factors.front().text;
-  for (const Part& factor : factors | std::views::drop(1)) text += factor.sign + factor.text;
+  for (const Part& factor : std::span(factors).subspan(1)) text += factor.sign + factor.text;
   return text;
 }
 
@@ -68,10 +69,11 @@ OdeSystem system_of(const nlohmann::json& entry) {
   std::map<std::string, double> constants;
   const auto values = entry.at("consts").at(0).get<std::vector<double>>();
   for (std::size_t k = 0; k < values.size(); ++k) constants[fmt::format("c_{}", k)] = values[k];
-  for (const auto& part : std::views::split(entry.at("eq").get<std::string>(), '|')) {
+  std::istringstream equations(entry.at("eq").get<std::string>());
+  for (std::string equation; std::getline(equations, equation, '|');) {
     std::vector<OdeTerm> terms;
     // muParser has no cotangent.
-    const std::string text = replaced(std::string(part.begin(), part.end()), "cot(", "1/tan(");
+    const std::string text = replaced(equation, "cot(", "1/tan(");
     for (const std::string& summand : summands(text)) terms.push_back({summand, StateFunction(summand, constants)});
     system.components.push_back(std::move(terms));
   }

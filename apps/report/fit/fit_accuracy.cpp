@@ -64,7 +64,7 @@ Chart predicted_against_observed(const HeldOutRows& rows, const std::string& nam
     points.y.push_back(rows.observed[row]);
   }
   const auto [low, high] = std::ranges::minmax(rows.observed);
-  const auto line = [&](double shift, const std::string& text, bool dashed) {
+  const auto line = [low = low, high = high](double shift, const std::string& text, bool dashed) {
     return Layer{.mark = Mark::line,
                  .name = text,
                  .role = "floor",

@@ -5,7 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ranges>
+#include <span>
 #include <vector>
 
 #include "report/fit/kinds.hpp"
@@ -161,7 +161,8 @@ Table models_table(const FitResult& result) {
       table.add({target, kind_of(chosen.candidate), fmt::format("{}", partition.leaves), number(chosen.rmse),
                  number(chosen.spread, 2), number(partition.train_rmse(o))});
       if (o > 0) continue;
-      for (const CandidateError& other : best_of_kinds(partition) | std::views::drop(1)) {
+      const std::vector<CandidateError> kinds = best_of_kinds(partition);
+      for (const CandidateError& other : std::span(kinds).subspan(1)) {
         table.add({"  against", kind_of(other.candidate), fmt::format("{}", other.candidate.leaves), number(other.rmse),
                    number(other.spread, 2), ""});
       }

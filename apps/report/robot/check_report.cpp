@@ -37,7 +37,7 @@ std::vector<Eigen::Index> lines_of(const robotics::Measurements& measurements, c
   std::vector<Eigen::Index> lines;
   for (const Eigen::Index row : rows) lines.push_back(measurements.lines[row]);
   std::ranges::sort(lines);
-  lines.erase(std::ranges::unique(lines).begin(), lines.end());
+  lines.erase(std::unique(lines.begin(), lines.end()), lines.end());
   return lines;
 }
 

@@ -52,8 +52,7 @@ Eigen::Index size_of_gaussians(const Partition& partition) {
     if (!node.is_leaf() && is_on_number(node)) split.push_back(node.split_input);
   }
   std::ranges::sort(split);
-  const auto repeated = std::ranges::unique(split);
-  const Eigen::Index inputs = std::ssize(split) - std::ssize(repeated);
+  const Eigen::Index inputs = std::unique(split.begin(), split.end()) - split.begin();
   const Eigen::Index leaves = partition.num_leaves();
   if (leaves == 1) return 0;
   const Eigen::Index gaussian = 8 * inputs + 2;

@@ -185,7 +185,8 @@ void fix_dependent(const std::vector<discovery::Parameter>& parameters, const Ei
   // Frames first: what a frame can do as well is no error of the arm.
   std::vector<std::size_t> order(parameters.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
-  std::ranges::stable_partition(order, [&](std::size_t k) { return is_frame_parameter(parameters[k].name); });
+  std::stable_partition(order.begin(), order.end(),
+                        [&](std::size_t k) { return is_frame_parameter(parameters[k].name); });
   for (const std::size_t k : order) {
     if (!reasons[k].empty()) continue;
     const bool is_geometric = static_cast<Eigen::Index>(k) < geometric;

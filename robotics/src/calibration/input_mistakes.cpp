@@ -53,7 +53,7 @@ std::vector<Change> changes_of(const Chain& chain) {
     for (const auto& [factor, words] :
          {std::pair{degrees, "radians, not degrees"}, {1.0 / degrees, "degrees, not radians"}}) {
       if (!turns) continue;
-      changes.push_back({[=](Measurements& table) { table.poses.joints.col(j) *= factor; },
+      changes.push_back({[j, factor = factor](Measurements& table) { table.poses.joints.col(j) *= factor; },
                          fmt::format("the values of {} are {}", name, words)});
     }
     for (const double zero_deg : {90.0, -90.0, 180.0}) {
@@ -85,7 +85,7 @@ void add_units_of_targets(const Poses& poses, std::vector<Change>& changes) {
   for (const std::string& tool : tools) {
     for (const auto& [factor, words] :
          {std::pair{1000.0, "metres, not millimetres"}, {0.001, "millimetres, not metres"}}) {
-      changes.push_back({[=](Measurements& table) {
+      changes.push_back({[tool, factor = factor](Measurements& table) {
                            for (Eigen::Index row = 0; row < table.count(); ++row) {
                              if (table.poses.observations[row].tool == tool) table.positions_mm.row(row) *= factor;
                            }
