@@ -25,7 +25,8 @@ TEST(ClampedExplain, AnAffineModelGivesThePartOfTheWayInside) {
                                  std::pair(Eigen::Vector2d(0.9, -0.9), Eigen::Vector2d(0.85, -0.8)),
                                  std::pair(Eigen::Vector2d(-0.9, 0.3), Eigen::Vector2d(-0.8, 0.9))}) {
     const double rise = slope.dot(to - from);
-    const auto position = [&](double bound) { return (bound - slope.dot(from)) / rise; };
+    const double at_from = slope.dot(from);
+    const auto position = [at_from, rise](double bound) { return (bound - at_from) / rise; };
     const double enters = std::clamp(std::min(position(-1.0), position(1.5)), 0.0, 1.0);
     const double leaves = std::clamp(std::max(position(-1.0), position(1.5)), 0.0, 1.0);
     const Eigen::VectorXd expected = (leaves - enters) * slope.cwiseProduct(to - from);
