@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "kinematics/units.hpp"
+#include "llmt/robotics/calibration.hpp"
 
 namespace llmt::robotics {
 
