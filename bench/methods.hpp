@@ -23,8 +23,7 @@ inline llmt::FitOptions crisp(llmt::FitOptions options = {}) {
 /// error.
 inline llmt::FitOptions with_leaves(Eigen::Index leaves, llmt::FitOptions options = {}) {
   options.max_leaves = leaves;
-  options.significance = 1.0;
-  options.expert.min_variance_gain = -1.0;
+  options.significance = llmt::every_split;
   options.folds.count = 0;
   return options;
 }

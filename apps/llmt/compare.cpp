@@ -32,24 +32,23 @@ void compare_command(CompareArguments arguments) {
     throw std::invalid_argument("compare needs --cv 2 or more");
   }
   const LearningTable table = read_learning_table(arguments.learning);
-  if (table.outputs.rows() < 2) {
+  if (table.data->outputs.rows() < 2) {
     throw std::runtime_error(fmt::format("{}: one row leaves none to hold out", table_name(arguments.learning.data)));
   }
   CompareOptions options;
   options.folds = arguments.learning.options.folds;
   ProgressBar bar("fitting");
   options.progress = bar.callback();
-  const ComparisonResult result =
-      compare(table.inputs.values, table.outputs, usual_methods(table.options, table.inputs.values.cols()), options);
+  const ComparisonResult result = compare(*table.data, usual_methods(table.options, *table.data), options);
   bar.clear();
   std::string reports;
   if (arguments.reports.wanted()) {
-    reports = write_reports(
-        arguments.reports, report::comparison_report({arguments.learning.data, arguments.learning.targets.front(),
-                                                      table.inputs.values.rows(), table.inputs.values.cols(), result}));
+    reports = write_reports(arguments.reports,
+                            report::comparison_report({arguments.learning.data, arguments.learning.targets.front(),
+                                                       table.data->inputs.rows(), table.data->inputs.cols(), result}));
   }
   const std::string& target = arguments.learning.targets.front();
-  report::FitRun run{arguments.learning.data, table.options, table.inputs.values, table.lines, ""};
+  report::FitRun run{arguments.learning.data, table.options, *table.data, table.lines, ""};
   if (arguments.json) {
     print_json(report::comparison_json(run, target, result));
     return;

@@ -49,14 +49,13 @@ Fitting fit_with_bar(const LearningTable& table) {
   ProgressBar bar("fitting");
   Work work(bar.callback());
   Work preparing(work, table.options.loss == Loss::tukey ? 0.2 : 0.05);
-  const PreparedFit prepared({table.inputs.values, table.outputs}, table.options, preparing.progress());
+  const PreparedFit prepared(table.data, table.options, preparing.progress());
   Work fitting(work, work.left());
   return {prepared, fit(prepared, fitting.progress())};
 }
 
 // The readable tree beside the model, written if the model is.
-std::optional<ReadableResult> make_readable(const FitArguments& arguments, const LearningTable& table,
-                                            const Fitting& fitting, double loss) {
+std::optional<ReadableResult> make_readable(const FitArguments& arguments, const Fitting& fitting, double loss) {
   const FitSummary& fitted = fitting.result.summary;
   if (fitted.partitions.front().cv_folds == 0) {
     throw std::runtime_error(
@@ -66,7 +65,6 @@ std::optional<ReadableResult> make_readable(const FitArguments& arguments, const
   ProgressBar bar("readable tree");
   ReadableResult readable = fit_readable(fitting.prepared, fitted, loss, bar.callback());
   bar.clear();
-  readable.model = readable.model.named(table.names, arguments.learning.targets, table.inputs.levels);
   if (!arguments.output.empty()) {
     save(readable.model, keeps_intervals(arguments) ? readable.intervals : Intervals(),
          beside(arguments.output, readable_extension).string());
@@ -84,17 +82,17 @@ std::string write_fit_reports(const FitArguments& arguments, const LearningTable
   const bool has_folds = result.summary.partitions.front().cv_folds > 0;
   if (!shown && has_folds && why_not_readable(table.options).empty()) {
     shown = fit_readable(fitting.prepared, result.summary);
-    shown->model = shown->model.named(table.names, arguments.learning.targets, table.inputs.levels);
   }
-  const std::vector<Eigen::Index> left_out = report::rows_left_out(result.summary.loss_weights, table.options.weights);
+  const TrainingData& data = *table.data;
+  const std::vector<Eigen::Index> left_out = report::rows_left_out(result.summary.loss_weights, data.weights);
   const auto report_on = [&](const Eigen::MatrixXd& inputs, const Eigen::MatrixXd& outputs, const FitResult& of_rows) {
     return write_reports(arguments.reports, report::fit_report({arguments.learning.data, inputs, outputs, table.options,
                                                                 of_rows, shown, std::ssize(left_out)}));
   };
-  if (left_out.empty()) return report_on(table.inputs.values, table.outputs, result);
+  if (left_out.empty()) return report_on(data.inputs, data.outputs, result);
   std::vector<Eigen::Index> kept;
-  std::vector<Eigen::Index> place(table.outputs.rows(), -1);  // among the kept rows
-  for (Eigen::Index row = 0; row < table.outputs.rows(); ++row) {
+  std::vector<Eigen::Index> place(data.outputs.rows(), -1);  // among the kept rows
+  for (Eigen::Index row = 0; row < data.outputs.rows(); ++row) {
     if (!(result.summary.loss_weights(row) > 0.0)) continue;
     place[row] = std::ssize(kept);
     kept.push_back(row);
@@ -103,7 +101,7 @@ std::string write_fit_reports(const FitArguments& arguments, const LearningTable
   for (std::vector<Eigen::Index>& of_fold : of_kept.summary.held_out) {
     for (Eigen::Index& row : of_fold) row = place[row];
   }
-  return report_on(table.inputs.values(kept, Eigen::all), table.outputs(kept, Eigen::all), of_kept);
+  return report_on(data.inputs(kept, Eigen::all), data.outputs(kept, Eigen::all), of_kept);
 }
 
 void fit_command(FitArguments arguments) {
@@ -121,14 +119,13 @@ void fit_command(FitArguments arguments) {
   Fitting fitting = fit_with_bar(table);
   FitResult& result = fitting.result;
   warn_of_gross_errors(arguments.learning, table, result);
-  result.model = result.model.named(table.names, arguments.learning.targets, table.inputs.levels);
   if (!arguments.output.empty()) {
     save(result.model, keeps_intervals(arguments) ? result.intervals : Intervals(), arguments.output);
   }
   std::optional<ReadableResult> readable;
-  if (!arguments.readable.empty()) readable = make_readable(arguments, table, fitting, loss);
+  if (!arguments.readable.empty()) readable = make_readable(arguments, fitting, loss);
   const std::string reports = write_fit_reports(arguments, table, fitting, readable);
-  report::FitRun run{arguments.learning.data, table.options, table.inputs.values, table.lines, arguments.output};
+  report::FitRun run{arguments.learning.data, table.options, *table.data, table.lines, arguments.output};
   if (arguments.json) {
     Json summary = report::fit_json(run, result);
     if (readable) summary["readable"] = report::readable_json(*readable);

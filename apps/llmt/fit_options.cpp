@@ -15,7 +15,6 @@
 namespace llmt::apps {
 namespace {
 
-constexpr NumberRange below_one = {0.0, 1.0 - std::numeric_limits<double>::epsilon(), "a number from 0 to below 1"};
 constexpr NumberRange threshold_or_inf = {0.0, std::numeric_limits<double>::infinity(),
                                           "a number of 0 or more, or inf"};
 
@@ -51,9 +50,6 @@ void add_growth(CLI::App& command, FitOptions& options) {
   expert(add_number(
       command, "--significance", options.significance, any_share,
       fmt::format("rd, ra: of the F test, over all candidate splits; 1: no test [{}]", default_text("significance"))));
-  expert(add_number(command, "--min-improvement", options.expert.min_improvement, below_one,
-                    "Stop when further splits lower the training sum of squares by less than this fraction each")
-             ->capture_default_str());
   expert(add_choice(command, "--search", options.expert.search,
                     "Search for splits: exact; by bins, exact in small nodes and where bins may hold a better split; "
                     "or bins for many rows"));

@@ -30,7 +30,7 @@ struct HeldOutError {
 std::vector<HeldOutError> held_out_errors(const LearningTable& table, const FitResult& result, Eigen::Index output,
                                           Eigen::Index partition) {
   const std::vector<Model>& models = result.intervals.models();
-  const Eigen::MatrixXd& inputs = table.inputs.values;
+  const Eigen::MatrixXd& inputs = table.data->inputs;
   const int threads = table.options.max_threads;
   const std::vector<std::vector<Eigen::Index>>& of_folds = result.summary.held_out;
   std::vector<HeldOutError> errors;
@@ -40,7 +40,7 @@ std::vector<HeldOutError> held_out_errors(const LearningTable& table, const FitR
     const Eigen::VectorXi leaves = result.model.leaf_of(taken, threads).col(partition);
     for (std::size_t k = 0; k < of_folds[f].size(); ++k) {
       const Eigen::Index row = of_folds[f][k];
-      errors.push_back({row, table.outputs(row, output) - predicted(k), leaves(k)});
+      errors.push_back({row, table.data->outputs(row, output) - predicted(k), leaves(k)});
     }
   }
   return errors;
@@ -79,7 +79,7 @@ GrossErrors gross_errors(const LearningTable& table, const FitResult& result, Ei
   for (const HeldOutError& each : errors) values.push_back(each.error);
   const double spread = spread_of(values);
   const std::map<int, double> in_leaves = spreads_in_leaves(errors, spread);
-  const Eigen::VectorXd& weights = table.options.weights;
+  const Eigen::VectorXd& weights = table.data->weights;
   const auto square = [&](const HeldOutError& each) {
     return (weights.size() > 0 ? weights(each.row) : 1.0) * each.error * each.error;
   };
@@ -97,8 +97,9 @@ GrossErrors gross_errors(const LearningTable& table, const FitResult& result, Ei
     return !(spread > 0.0 && error > far_spreads * spread && error > far_spreads_in_leaf * in_leaves.at(each.leaf));
   });
   for (const HeldOutError& each : errors) {
-    const double predicted = result.model.predict(table.inputs.values.row(each.row))(0, output);
-    if (std::abs(table.outputs(each.row, output) - predicted) < least_part_in_sample * std::abs(each.error)) continue;
+    const double predicted = result.model.predict(table.data->inputs.row(each.row))(0, output);
+    if (std::abs(table.data->outputs(each.row, output) - predicted) < least_part_in_sample * std::abs(each.error))
+      continue;
     gross.rows.push_back(each.row);
     gross.share += square(each) / all;
   }
@@ -110,16 +111,16 @@ void warn_of_gross_errors(const LearningArguments& arguments, const LearningTabl
   if (table.options.loss != Loss::squared) return;
   // The user has been told of these.
   const auto has_dominant_rows = [&](Eigen::Index o) {
-    return !dominant_rows_of_target(table.outputs.col(o), table.options.weights).rows.empty();
+    return !dominant_rows_of_target(table.data->outputs.col(o), table.data->weights).rows.empty();
   };
-  for (Eigen::Index o = 0; o < table.outputs.cols(); ++o) {
+  for (Eigen::Index o = 0; o < table.data->outputs.cols(); ++o) {
     const GrossErrors gross = gross_errors(table, result, o);
     if (gross.rows.empty() || has_dominant_rows(o)) continue;
     const bool one = gross.rows.size() == 1;
     std::string places;
     for (std::size_t k = 0; k < std::min(gross.rows.size(), most_lines_named); ++k) {
       const Eigen::Index row = gross.rows[k];
-      places += fmt::format("{}{} ({:.4g})", k == 0 ? "" : ", ", table.lines[row], table.outputs(row, o));
+      places += fmt::format("{}{} ({:.4g})", k == 0 ? "" : ", ", table.lines[row], table.data->outputs(row, o));
     }
     warn(fmt::format(
         "llmt: {} of {} held-out rows {} {:.0f} % of the held-out squared error of \"{}\": {} {}{}. If {}, correct {} "

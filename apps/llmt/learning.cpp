@@ -140,6 +140,30 @@ std::vector<std::string> choose_inputs(const Csv& csv, const LearningArguments& 
 
 namespace {
 
+// What --monotone and --slope-sign ask for, one entry an input; none if they ask for nothing.
+std::vector<Trend> trends_of(const LearningArguments& arguments, const std::vector<std::string>& inputs,
+                             const std::vector<std::vector<std::string>>& levels) {
+  const std::vector<int> monotone = report::signs_of("--monotone", arguments.monotone, inputs);
+  const std::vector<int> slopes = report::signs_of("--slope-sign", arguments.slope_signs, inputs);
+  if (monotone.empty() && slopes.empty()) return {};
+  std::vector<Trend> trends(inputs.size(), Trend::any);
+  for (std::size_t j = 0; j < inputs.size(); ++j) {
+    const int of_prediction = monotone.empty() ? 0 : monotone[j];
+    const int of_slopes = slopes.empty() ? 0 : slopes[j];
+    if ((of_prediction != 0 || of_slopes != 0) && !levels[j].empty()) {
+      throw std::invalid_argument(fmt::format("{} names \"{}\", which is categorical",
+                                              of_prediction != 0 ? "--monotone" : "--slope-sign", inputs[j]));
+    }
+    if (of_prediction * of_slopes < 0) {
+      throw std::invalid_argument(
+          fmt::format("--monotone and --slope-sign name \"{}\" with opposite signs", inputs[j]));
+    }
+    if (of_slopes != 0) trends[j] = of_slopes > 0 ? Trend::rising_slopes : Trend::falling_slopes;
+    if (of_prediction != 0) trends[j] = of_prediction > 0 ? Trend::rising : Trend::falling;
+  }
+  return trends;
+}
+
 std::vector<Eigen::Index> lines_of_rows(const Csv& csv) {
   std::vector<Eigen::Index> rows(csv.rows());
   std::iota(rows.begin(), rows.end(), Eigen::Index{0});
@@ -164,29 +188,19 @@ LearningTable read_learning_table(const LearningArguments& arguments) {
   look_for_dominant_rows(csv, arguments, columns);
   look_for_accidental_inputs(arguments, inputs, columns.inputs);
   look_for_nothing_to_learn(csv, arguments, columns);
-  LearningTable table{inputs, std::move(columns.inputs), std::move(columns.targets), arguments.options,
-                      lines_of_rows(csv)};
+  LearningTable table{nullptr, arguments.options, lines_of_rows(csv)};
   FitOptions& options = table.options;
-  options.split_inputs = report::positions_of("--split-inputs", arguments.split_inputs, table.names);
-  options.regression_inputs = report::positions_of("--regression-inputs", arguments.regression_inputs, table.names);
-  options.monotone = report::signs_of("--monotone", arguments.monotone, table.names);
-  options.slope_signs = report::signs_of("--slope-sign", arguments.slope_signs, table.names);
-  options.categorical_inputs = table.inputs.categorical;
-  for (std::size_t j = 0; j < table.names.size(); ++j) {
-    const int monotone = options.monotone.empty() ? 0 : options.monotone[j];
-    const int sign = options.slope_signs.empty() ? 0 : options.slope_signs[j];
-    const std::vector<int>& categorical = table.inputs.categorical;
-    if ((monotone != 0 || sign != 0) && std::ranges::find(categorical, static_cast<int>(j)) != categorical.end()) {
-      throw std::invalid_argument(fmt::format("{} names \"{}\", which is categorical",
-                                              monotone != 0 ? "--monotone" : "--slope-sign", table.names[j]));
-    }
-    if (monotone * sign < 0) {
-      throw std::invalid_argument(
-          fmt::format("--monotone and --slope-sign name \"{}\" with opposite signs", table.names[j]));
-    }
-  }
-  options.weights = std::move(columns.weights);
+  options.split_inputs = report::positions_of("--split-inputs", arguments.split_inputs, inputs);
+  options.regression_inputs = report::positions_of("--regression-inputs", arguments.regression_inputs, inputs);
+  options.trends = trends_of(arguments, inputs, columns.inputs.levels);
   options.folds.kind = arguments.contiguous ? FoldKind::contiguous : FoldKind::random;
+  TrainingData data{.inputs = std::move(columns.inputs.values), .outputs = std::move(columns.targets)};
+  data.weights = std::move(columns.weights);
+  data.levels = std::move(columns.inputs.levels);
+  data.may_have_codes = arguments.may_have_codes;
+  data.input_names = inputs;
+  data.output_names = arguments.targets;
+  table.data = std::make_shared<const TrainingData>(std::move(data));
   return table;
 }
 
@@ -219,7 +233,7 @@ void add_learning_options(CLI::App& command, LearningArguments& arguments) {
       "--all-inputs", [&options] { options.choose_inputs = false; },
       "Keep inputs that do not lower the held-out error"));
   expert(command.add_flag_callback(
-      "--no-codes", [&options] { options.choose_codes = false; },
+      "--no-codes", [&arguments] { arguments.may_have_codes = false; },
       "Do not take inputs of few whole numbers for categories where that lowers the held-out error"));
   expert(add_names(command, "--monotone", arguments.monotone, "COLUMN",
                    "Inputs with which the prediction never falls, or with a leading minus never rises "

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -24,6 +25,7 @@ struct LearningArguments {
   std::vector<std::string> slope_signs;
   std::string weight;
   bool contiguous = false;
+  bool may_have_codes = true;  ///< see TrainingData
   DecimalMark mark = DecimalMark::point;
   FitOptions options;
 };
@@ -39,9 +41,7 @@ std::vector<std::string> choose_inputs(const Csv& csv, const LearningArguments& 
 
 /// The table as the learner takes it, and the options with its columns filled in.
 struct LearningTable {
-  std::vector<std::string> names;  ///< of the inputs
-  report::InputColumns inputs;
-  Eigen::MatrixXd outputs;
+  std::shared_ptr<const TrainingData> data;
   FitOptions options;
   std::vector<Eigen::Index> lines;  ///< of the rows, in the file
 };

@@ -65,12 +65,11 @@ Json folds_json(const robotics::Robot& robot, const robotics::Measurements& data
   dealing.kind = arguments.contiguous ? FoldKind::contiguous : FoldKind::random;
   dealing.seed = arguments.options.seed;
   const std::vector<double> groups = robotics::pose_labels(data.poses);
-  dealing.groups = groups;
   double before = 0.0;
   double after = 0.0;
   ProgressBar bar("fold");
   Eigen::Index done = 0;
-  for (const Fold& fold : make_folds(data.count(), dealing)) {
+  for (const Fold& fold : make_folds(data.count(), dealing, groups)) {
     bar.show(done++, arguments.folds);
     const robotics::Measurements held_out = robotics::select(data, fold.held_out);
     const Discovery found = robotics::discover(robot, robotics::select(data, fold.train), held_out, arguments.options);

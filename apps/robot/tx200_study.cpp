@@ -17,8 +17,7 @@ Tx200Run tx200_run(bool compliance, std::uint64_t seed) {
   options.correct = true;
   options.folds = 45;
   // 45 poses do not fill five leaves of twice seven: eight a leaf leave each one more pose than coefficients.
-  options.correction = {
-      .max_leaves = 5, .min_leaf_samples = 8, .significance = 1.0, .expert = {.min_variance_gain = -1.0}};
+  options.correction = {.max_leaves = 5, .min_leaf_samples = 8, .significance = every_split};
   options.correction_folds = 0;
   Tx200Run run{robotics::simulate(truth, {.poses = 45, .noise_um = 10.0, .seed = seed}), {}};
   run.report = robotics::report_calibration(nominal, run.measurements, options);

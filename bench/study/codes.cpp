@@ -117,24 +117,22 @@ struct Sum {
   Eigen::Index taken = 0;
 };
 
-void add_fit(const Rows& train, const Rows& test, const llmt::FitOptions& options, Sum& sum) {
+void add_fit(const Rows& train, const Rows& test, bool may_have_codes, Sum& sum) {
+  const llmt::TrainingData data{.inputs = train.x, .outputs = train.y, .may_have_codes = may_have_codes};
   std::optional<llmt::FitResult> fit;
-  sum.seconds += measure([&] { fit = llmt::fit(train.x, train.y, options); }).cpu;
+  sum.seconds += measure([&] { fit = llmt::fit(data, {.max_threads = 1}); }).cpu;
   sum.rmse += llmt::rmse(fit->model.predict(test.x), test.y)(0);
   sum.taken += std::ssize(fit->summary.codes.taken);
 }
 
 void study_kind(const Kind& kind, Eigen::Index count, int samples) {
-  llmt::FitOptions options{.max_threads = 1};
   Sum chosen;
   Sum numbers;
   for (int k = 1; k <= samples; ++k) {
     const Rows train = make_rows(kind, count, static_cast<std::uint64_t>(k));
     const Rows test = make_rows(kind, 4000, static_cast<std::uint64_t>(1000 + k));
-    options.choose_codes = true;
-    add_fit(train, test, options, chosen);
-    options.choose_codes = false;
-    add_fit(train, test, options, numbers);
+    add_fit(train, test, true, chosen);
+    add_fit(train, test, false, numbers);
   }
   fmt::print("{:10} {:6} {:12.4g} {:12.4g} {:8.3f} {:12.2f} {:10.3f} {:8.2f}\n", kind.name, count,
              numbers.rmse / samples, chosen.rmse / samples, chosen.rmse / numbers.rmse,

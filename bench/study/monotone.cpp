@@ -70,8 +70,12 @@ struct Method {
 };
 
 std::vector<Method> methods(const std::vector<int>& signs) {
+  using llmt::Trend;
   llmt::FitOptions slopes, monotone;
-  slopes.slope_signs = monotone.monotone = signs;
+  for (const int sign : signs) {
+    slopes.trends.push_back(sign > 0 ? Trend::rising_slopes : sign < 0 ? Trend::falling_slopes : Trend::any);
+    monotone.trends.push_back(sign > 0 ? Trend::rising : sign < 0 ? Trend::falling : Trend::any);
+  }
   llmt::FitOptions unsplit = monotone;
   for (int j = 0; j < std::ssize(signs); ++j) {
     if (signs[j] == 0) unsplit.split_inputs.push_back(j);

@@ -47,7 +47,6 @@ TEST(Options, NumbersOutsideTheirRangeAreRefusedWithIt) {
     refused("fit d.csv -t y", "--significance", value, "a number from 0 to 1");
   }
   refused("fit d.csv -t y", "--significance", "7", "a number from 0 to 1; 7 % is 0.07");
-  refused("fit d.csv -t y", "--min-improvement", "1", "a number from 0 to below 1");
   refused("fit d.csv -t y", "--cv", "-1", "a whole number from 0 to 2147483647");
   refused("fit d.csv -t y", "--cv", "4294967297", "a whole number from 0 to 2147483647");
   refused("fit d.csv -t y", "--max-leaves", "-1", "a whole number, 0 or more");
@@ -70,7 +69,7 @@ TEST(Options, NumbersAtTheEndsOfTheirRangeAreTaken) {
   folder.write("d.csv", line(30));
   const Outcome outcome = folder.run(llmt_program +
                                      " fit d.csv -t y --seed 18446744073709551615 --significance 1 --cv 2 --jump inf,1 "
-                                     "--ridge 0 --width +0.5 --min-improvement 0");
+                                     "--ridge 0 --width +0.5");
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
 }
 

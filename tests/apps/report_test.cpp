@@ -128,7 +128,8 @@ TEST(FitSummary, ARuleWithoutAnEnumeratorHasItsTitle) {
   options.rule = llmt::parse<llmt::GrowthRule>("toy");
   const llmt::FitResult result = llmt::fit(table.inputs, table.outputs, options);
   const std::vector<Eigen::Index> lines(200, 2);
-  const FitRun run{"t.csv", options, table.inputs, lines, ""};
+  const llmt::TrainingData data{table.inputs, table.outputs};
+  const FitRun run{"t.csv", options, data, lines, ""};
   EXPECT_NE(fit_text(run, result).find("\nTree grown by Toy halves, at least "), std::string::npos);
   EXPECT_EQ(fit_json(run, result)["rule"], "toy");
 }

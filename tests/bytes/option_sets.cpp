@@ -9,18 +9,16 @@ using llmt::Estimation;
 using llmt::GrowthRule;
 using llmt::LocalTerms;
 using llmt::SparseChoice;
+using llmt::Trend;
 using llmt::ValidityChoice;
 
 constexpr int rows = 240;
 
-// Twenty groups of rows. The options hold a view of it.
-const std::vector<double>& group_labels() {
-  static const std::vector<double> labels = [] {
-    Generator generator(31);
-    std::vector<double> made;
-    for (int row = 0; row < rows; ++row) made.push_back(std::floor(20.0 * generator.uniform()));
-    return made;
-  }();
+// Twenty groups of rows.
+std::vector<double> group_labels() {
+  Generator generator(31);
+  std::vector<double> labels;
+  for (int row = 0; row < rows; ++row) labels.push_back(std::floor(20.0 * generator.uniform()));
   return labels;
 }
 
@@ -85,41 +83,41 @@ const std::vector<OptionSet>& option_sets() {
        }},
       {"monotone",
        [](Task& task) {
-         task.options.monotone = {1, 0, 0};
+         task.options.trends = {Trend::rising, Trend::any, Trend::any};
        }},
       {"monotone_falling",
        [](Task& task) {
          task.sample.outputs *= -1.0;
-         task.options.monotone = {-1, 0, 1};
+         task.options.trends = {Trend::falling, Trend::any, Trend::rising};
        }},
       {"monotone_missing",
        [](Task& task) {
          remove_values(task.sample.inputs);
-         task.options.monotone = {1, 0, 0};
+         task.options.trends = {Trend::rising, Trend::any, Trend::any};
        }},
       {"slope_signs",
        [](Task& task) {
-         task.options.slope_signs = {1, 0, -1};
+         task.options.trends = {Trend::rising_slopes, Trend::any, Trend::falling_slopes};
        }},
       {"slope_signs_crisp",
        [](Task& task) {
-         task.options.slope_signs = {1, -1, 0};
+         task.options.trends = {Trend::rising_slopes, Trend::falling_slopes, Trend::any};
          task.options.validity = ValidityChoice::crisp;
        }},
       {"missing", [](Task& task) { remove_values(task.sample.inputs); }},
       {"categorical",
        [](Task& task) {
          make_categorical(task.sample);
-         task.options.categorical_inputs = {2};
+         task.known.categorical_inputs = {2};
        }},
       {"categorical_missing_weighted",
        [](Task& task) {
          make_categorical(task.sample);
          remove_values(task.sample.inputs);
-         task.options.categorical_inputs = {2};
-         task.options.weights = make_weights(task.sample.inputs.rows());
+         task.known.categorical_inputs = {2};
+         task.known.weights = make_weights(task.sample.inputs.rows());
        }},
-      {"weighted", [](Task& task) { task.options.weights = make_weights(task.sample.inputs.rows()); }},
+      {"weighted", [](Task& task) { task.known.weights = make_weights(task.sample.inputs.rows()); }},
       {"two_outputs",
        [](Task& task) {
          add_output(task.sample);
@@ -152,7 +150,7 @@ const std::vector<OptionSet>& option_sets() {
          task.options.max_leaves = 8;
        }},
       {"contiguous_folds", [](Task& task) { task.options.folds.kind = llmt::FoldKind::contiguous; }},
-      {"grouped_folds", [](Task& task) { task.options.folds.groups = group_labels(); }},
+      {"grouped_folds", [](Task& task) { task.known.groups = group_labels(); }},
       {"some_columns",
        [](Task& task) {
          task.options.split_inputs = {1};
@@ -163,12 +161,6 @@ const std::vector<OptionSet>& option_sets() {
          task.options.max_leaves = 6;
          task.options.min_leaf_samples = 15;
          task.options.significance = 0.2;
-         task.options.expert.min_variance_gain = 0.01;
-       }},
-      {"min_improvement",
-       [](Task& task) {
-         task.options.expert.min_improvement = 0.02;
-         task.options.intervals = false;
        }},
   };
   return sets;

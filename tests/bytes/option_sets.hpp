@@ -13,6 +13,7 @@ namespace bytes {
 struct Task {
   Sample sample;
   llmt::FitOptions options;
+  llmt::TrainingData known = {};  // of the rows and columns of the sample
 };
 
 struct GrowthRuleName {

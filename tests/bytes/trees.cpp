@@ -46,9 +46,12 @@ std::string summary_of(const llmt::FitSummary& summary) {
 }
 
 std::string fit_and_hash(const Task& task, int threads) {
-  const llmt::FitResult result = llmt::fit(task.sample.inputs, task.sample.outputs, task.options);
+  llmt::TrainingData data = task.known;
+  data.inputs = task.sample.inputs;
+  data.outputs = task.sample.outputs;
+  const llmt::FitResult result = llmt::fit(data, task.options);
   Eigen::MatrixXd queries = make_queries();
-  if (!task.options.categorical_inputs.empty()) {
+  if (!data.categorical_inputs.empty()) {
     // Levels 0 ... 4, and 5, which no row has.
     for (Eigen::Index row = 0; row < queries.rows(); ++row) queries(row, 2) = static_cast<double>(row % 6);
   }
@@ -114,8 +117,8 @@ void witness_comparison(const std::string&, Results& results) {
     llmt::CompareOptions options;
     options.folds.count = 2;
     const Sample sample = make_sample(120, 3);
-    const llmt::ComparisonResult found =
-        llmt::compare(sample.inputs, sample.outputs, llmt::usual_methods(task.options, sample.inputs.cols()), options);
+    const llmt::TrainingData data{sample.inputs, sample.outputs};
+    const llmt::ComparisonResult found = llmt::compare(data, llmt::usual_methods(task.options, data), options);
     Hash hash;
     hash.add(found.recommended);
     for (const llmt::Comparison& method : found.methods) {

@@ -10,7 +10,7 @@
 
 namespace {
 
-llmt::FitOptions options_of(fuzz::Bytes& bytes, const fuzz::Table& table) {
+llmt::FitOptions options_of(fuzz::Bytes& bytes, const fuzz::Table& table, Eigen::VectorXd& weights) {
   using llmt::GrowthRule;
   using llmt::ValidityChoice;
   static const std::vector<GrowthRule> rules = {GrowthRule::rd, GrowthRule::rd,      GrowthRule::retis,  GrowthRule::ra,
@@ -27,8 +27,8 @@ llmt::FitOptions options_of(fuzz::Bytes& bytes, const fuzz::Table& table) {
   if (bytes.byte() % 4 == 0) options.pruning = llmt::Pruning::weakest_link;
   options.shared_partition = bytes.coin();
   if (bytes.byte() % 4 == 0) {
-    options.weights = Eigen::VectorXd::Ones(table.inputs.rows());
-    for (double& weight : options.weights) weight = bytes.below(4);
+    weights = Eigen::VectorXd::Ones(table.inputs.rows());
+    for (double& weight : weights) weight = bytes.below(4);
   }
   options.max_threads = 1;
   return options;
@@ -37,9 +37,11 @@ llmt::FitOptions options_of(fuzz::Bytes& bytes, const fuzz::Table& table) {
 // Options that the rule does not have, and tables that are too small, are refused; both are said.
 void any_fit(fuzz::Bytes& bytes) {
   const fuzz::Table table = fuzz::table_of(bytes, 40, 3, 1 + bytes.below(2), true);
-  const llmt::FitOptions options = options_of(bytes, table);
+  Eigen::VectorXd weights;
+  const llmt::FitOptions options = options_of(bytes, table, weights);
   try {
-    const llmt::FitResult result = llmt::fit(table.inputs, table.outputs, options);
+    const llmt::FitResult result =
+        llmt::fit({.inputs = table.inputs, .outputs = table.outputs, .weights = weights}, options);
     fuzz::require(result.model.predict(table.inputs, 1).allFinite(), "predictions are finite");
     const std::string json = llmt::to_json(result.model);
     fuzz::require(llmt::to_json(llmt::from_json(json)) == json, "a model survives writing");

@@ -24,12 +24,13 @@ inline std::string fitted_model(llmt::FitOptions options, bool has_categories, E
     if (outputs > 1) y(i, 1) += x(i, 1) > 0.2 ? 1.0 : 0.0;
     if (i % 10 == 3) x(i, 1) = std::numeric_limits<double>::quiet_NaN();
   }
-  if (has_categories) options.categorical_inputs = {2};
   options.max_leaves = options.max_leaves > 0 ? options.max_leaves : 5;
   options.significance = 1.0;
   options.folds.count = 0;
   options.max_threads = 1;
-  return to_json(llmt::fit(x, y, options).model);
+  llmt::TrainingData data{x, y};
+  if (has_categories) data.categorical_inputs = {2};
+  return to_json(llmt::fit(data, options).model);
 }
 
 // Every second output is clamped.

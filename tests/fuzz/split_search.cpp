@@ -12,8 +12,7 @@ namespace {
 
 llmt::FitResult split_once(const fuzz::Table& table, llmt::SplitSearch search, Eigen::Index min_leaf) {
   llmt::FitOptions options;
-  options.significance = 1.0;
-  options.expert.min_variance_gain = -1.0;
+  options.significance = llmt::every_split;
   options.expert.search = search;
   options.expert.shrinkages = {0.0};
   options.max_leaves = 2;

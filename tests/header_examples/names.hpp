@@ -3,6 +3,8 @@
 
 #include <cmath>
 #include <cstdio>
+#include <string>
+#include <vector>
 
 #include "llmt/discovery/least_squares.hpp"
 #include "llmt/discovery/rounds.hpp"
@@ -18,7 +20,8 @@
 namespace core {
 
 extern const Eigen::MatrixXd inputs, outputs, output, new_inputs, queries, jacobian, signature;
-extern const Eigen::VectorXd t, y, residuals;
+extern const Eigen::VectorXd t, y, residuals, weights;
+extern const std::vector<std::string> words, new_words;
 extern const llmt::FitResult result;
 extern const llmt::Model model;
 extern const llmt::discovery::Simulation spring;

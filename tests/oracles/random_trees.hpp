@@ -32,8 +32,7 @@ inline llmt::FitOptions only(const Kind& kind, llmt::Estimation estimation, Eige
                              double ridge = 1e-3) {
   llmt::FitOptions options;
   options.max_leaves = max_leaves;
-  options.significance = 1.0;
-  options.expert.min_variance_gain = -1.0;
+  options.significance = llmt::every_split;
   options.validity = kind.validity;
   options.expert.estimation = estimation;
   options.expert.widths = {kind.width};

@@ -9,7 +9,7 @@ namespace llmt::report {
 Json comparison_json(const FitRun& run, const std::string& target, const ComparisonResult& result) {
   Json json;
   json["data"] = run.data;
-  json["rows"] = run.inputs.rows();
+  json["rows"] = run.rows.inputs.rows();
   json["target"] = target;
   json["folds"] = result.methods.front().fold_rmse.size();
   json["methods"] = Json::array();
@@ -25,7 +25,7 @@ Json comparison_json(const FitRun& run, const std::string& target, const Compari
                                {"predict_seconds_per_million_rows", method.predict_seconds}});
   }
   if (run.options.loss == Loss::tukey) {
-    const std::vector<Eigen::Index> rows = rows_left_out(result.loss_weights, run.options.weights);
+    const std::vector<Eigen::Index> rows = rows_left_out(result.loss_weights, run.rows.weights);
     json["rows_left_out"] = counted_from_one(rows);
     json["lines_left_out"] = lines_at(run.lines, rows);
   }
@@ -38,12 +38,12 @@ std::string comparison_text(const FitRun& run, const std::string& target, const 
                             std::size_t width) {
   std::string text =
       fmt::format("{}: {} rows, {} inputs; {}, {} folds{}, every choice made inside the fold\n\n", run.data,
-                  run.inputs.rows(), run.inputs.cols(), target, result.methods.front().fold_rmse.size(),
+                  run.rows.inputs.rows(), run.rows.inputs.cols(), target, result.methods.front().fold_rmse.size(),
                   run.options.folds.kind == FoldKind::contiguous ? " of contiguous rows" : "");
   if (run.options.loss == Loss::tukey) {
-    const Eigen::VectorXd& weights = run.options.weights;
+    const Eigen::VectorXd& weights = run.rows.weights;
     const std::vector<Eigen::Index> rows = rows_left_out(result.loss_weights, weights);
-    const Eigen::Index weighted = weights.size() > 0 ? (weights.array() > 0.0).count() : run.inputs.rows();
+    const Eigen::Index weighted = weights.size() > 0 ? (weights.array() > 0.0).count() : run.rows.inputs.rows();
     text += left_out_by_loss(lines_at(run.lines, rows), weighted) + "\n";
   }
   Table table({"method", "leaves", "parameters", "RMSE held-out", "spread of folds", "largest jump", "fit, s",

@@ -38,7 +38,7 @@ Json fit_json(const FitRun& run, const FitResult& result) {
   json["rule"] = name_of(run.options.rule);
   json["min_leaf_samples"] = result.summary.min_leaf_samples;
   if (run.options.loss == Loss::tukey) {
-    const std::vector<Eigen::Index> rows = rows_left_out(result.summary.loss_weights, run.options.weights);
+    const std::vector<Eigen::Index> rows = rows_left_out(result.summary.loss_weights, run.rows.weights);
     json["rows_left_out"] = counted_from_one(rows);
     json["lines_left_out"] = lines_at(run.lines, rows);
   }

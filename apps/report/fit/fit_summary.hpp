@@ -15,7 +15,7 @@ namespace llmt::report {
 struct FitRun {
   std::string data;  ///< the name of the table
   const FitOptions& options;
-  const Eigen::MatrixXd& inputs;
+  const TrainingData& rows;
   const std::vector<Eigen::Index>& lines;  ///< of the rows, in the table's file
   std::string output;                      ///< the file of the model; empty: none
 };

@@ -134,8 +134,8 @@ std::string data_text(const FitRun& run, const FitResult& result) {
     text += fmt::format("Missing values in the inputs: {}\n", result.summary.missing_values);
   }
   if (run.options.loss == Loss::tukey) {
-    const std::vector<Eigen::Index> rows = rows_left_out(result.summary.loss_weights, run.options.weights);
-    const auto lacks_input = [&](Eigen::Index row) { return run.inputs.row(row).hasNaN(); };
+    const std::vector<Eigen::Index> rows = rows_left_out(result.summary.loss_weights, run.rows.weights);
+    const auto lacks_input = [&](Eigen::Index row) { return run.rows.inputs.row(row).hasNaN(); };
     const auto lacking = std::ranges::count_if(rows, lacks_input);
     text += left_out_by_loss(lines_at(run.lines, rows), result.summary.samples + std::ssize(rows));
     if (2 * lacking > std::ssize(rows)) {

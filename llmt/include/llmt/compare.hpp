@@ -23,10 +23,13 @@ struct Method {
 
 /// The methods of `llmt compare`: least squares; the crisp tree of each growth rule that has one (RD, RETIS, RA, M5');
 /// Gaussians over a crisp tree as in Benes et al. (2022), as grown and with joint estimation; the blend with joint
-/// estimation; LOLIMOT; HILOMOT. With `inputs`, the number of input columns, also the crisp tree with quadratic local
-/// models where these can be made. `base` gives columns, weights, folds and threads; with Pruning::weakest_link the
-/// pruned crisp tree and blend are added.
-std::vector<Method> usual_methods(const FitOptions& base = {}, Eigen::Index inputs = 0);
+/// estimation; LOLIMOT; HILOMOT. `base` gives columns, folds and threads; with Pruning::weakest_link the pruned crisp
+/// tree and blend are added.
+std::vector<Method> usual_methods(const FitOptions& base = {});
+
+/// Also the crisp tree with quadratic local models, where these can be made of the data. Throws std::invalid_argument
+/// as fit() for names and categories.
+std::vector<Method> usual_methods(const FitOptions& base, const TrainingData& data);
 
 /// What one method made of the data.
 struct Comparison {
@@ -54,7 +57,7 @@ struct ComparisonResult {
 
 struct CompareOptions {
   FoldOptions folds = {};  ///< outer folds: each method makes all its choices within the training part
-  Progress progress = {};  ///< steps have the names of the methods. The progress of a method's own options is not used
+  Progress progress = {};  ///< steps have the names of the methods
 };
 
 /// Fits every method in every fold and on all rows. One output. The method with the smallest held-out error is
@@ -63,6 +66,10 @@ struct CompareOptions {
 /// leaves out count in no held-out error; they are found once, on all rows, for all methods.
 ///
 /// Throws std::invalid_argument as fit(), and if there is no method, or more than one output.
+ComparisonResult compare(const TrainingData& data, const std::vector<Method>& methods,
+                         const CompareOptions& options = {});
+
+/// The comparison on matrices about whose rows and columns nothing else is known.
 ComparisonResult compare(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
                          const Eigen::Ref<const Eigen::MatrixXd>& output, const std::vector<Method>& methods,
                          const CompareOptions& options = {});

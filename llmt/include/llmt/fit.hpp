@@ -2,7 +2,7 @@
 /// Growing local linear model trees from data.
 ///
 ///     llmt::FitOptions options;
-///     options.monotone = {1, 0};                                        // y never falls when x1 rises
+///     options.trends = {llmt::Trend::rising, llmt::Trend::any};         // y never falls when x1 rises
 ///     const llmt::FitResult result = llmt::fit(inputs, output, options);
 ///     const double error = result.summary.partitions[0].chosen.rmse;    // on held-out rows
 ///     const Eigen::MatrixXd y = result.model.predict(queries);
@@ -14,24 +14,20 @@
 #include <memory>
 
 #include "llmt/abi.hpp"
+#include "llmt/fit_result.hpp"
 #include "llmt/intervals.hpp"
 #include "llmt/model.hpp"
 #include "llmt/options.hpp"
 #include "llmt/progress.hpp"
 #include "llmt/summary.hpp"
+#include "llmt/training_data.hpp"
 
 namespace llmt {
 
-struct FitResult {
-  Model model;
-  FitSummary summary;
-  Intervals intervals;  ///< from the folds; empty without folds or without FitOptions::intervals
-};
-
 /// Grows a local linear model tree for every output, or one for all.
 ///
-/// inputs: rows x inputs; outputs: rows x outputs. Columns are named x1, x2, ... and y1, y2, ... (a single output: y);
-/// Model::named() renames them. Inputs may be missing (NaN), see Model; outputs may not.
+/// Inputs may be missing (NaN), see Model; outputs may not. Columns without names are x1, x2, ... and y1, y2, ... (a
+/// single output: y).
 ///
 /// A leaf's local model corrects its parent's by least squares on the leaf's rows, with the smallest norm of the
 /// correction (inputs scaled to unit variance in the leaf). Where the rows do not determine a direction (fewer rows
@@ -43,15 +39,15 @@ struct FitResult {
 ///
 /// Throws std::invalid_argument naming argument, value and bound: no rows or columns, row counts that differ, an
 /// infinite input or an output that is not finite, an option out of range or against another one, a column index out of
-/// range or repeated, a category that is not a whole number from 0 on.
-FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<const Eigen::MatrixXd>& outputs,
-              const FitOptions& options = {});
+/// range or repeated, a category that is not a whole number from 0 on or has no name among its levels, weights or
+/// groups that are not finite or not one a row, names that are too few, too many or repeated.
+///
+/// `progress` is called as the work goes on, and may cancel it.
+FitResult fit(const TrainingData& data, const FitOptions& options = {}, const Progress& progress = {});
 
-/// What a model is learned from.
-struct TrainingData {
-  Eigen::MatrixXd inputs;   ///< rows x inputs; NaN: missing
-  Eigen::MatrixXd outputs;  ///< rows x outputs
-};
+/// The fit of matrices about whose rows and columns nothing else is known.
+FitResult fit(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<const Eigen::MatrixXd>& outputs,
+              const FitOptions& options = {}, const Progress& progress = {});
 
 struct PreparedRows;
 
@@ -65,8 +61,11 @@ struct PreparedRows;
 /// Copies share everything. It may be used by several threads at a time.
 class PreparedFit {
  public:
-  /// Throws std::invalid_argument as fit(). `progress`: of the preparation. FitOptions::progress is not used.
+  /// Throws std::invalid_argument as fit(). `progress`: of the preparation.
   explicit PreparedFit(TrainingData data, const FitOptions& options = {}, const Progress& progress = {});
+  /// Shares the data with the caller.
+  explicit PreparedFit(std::shared_ptr<const TrainingData> data, const FitOptions& options = {},
+                       const Progress& progress = {});
 
   const TrainingData& data() const;
 

@@ -26,8 +26,6 @@ struct FoldOptions {
   int count = 5;                     ///< number of folds K, at least 2; as many as groups gives leave-one-out
   FoldKind kind = FoldKind::random;  ///< how rows are dealt to folds
   std::uint64_t seed = 1;            ///< for FoldKind::random
-  /// One label per row. Rows with equal labels (repeats of a pose) share a fold. Empty: each row is a group of its own.
-  std::span<const double> groups = {};
 };
 
 /// The rows of one fold, ascending.
@@ -38,9 +36,10 @@ struct Fold {
 
 /// Partitions the rows 0 ... rows-1 into K folds whose sizes, counted in groups, differ by at most one.
 ///
-/// Every row is held out exactly once. A group keeps together; groups are taken in order of first appearance.
-/// Throws std::invalid_argument if there are fewer groups than folds, fewer than two folds, or a label count other than
+/// `groups`: one label a row; rows with equal labels (repeats of a pose) share a fold. Empty: each row is a group of
+/// its own. Every row is held out exactly once. Groups are taken in order of first appearance. Throws
+/// std::invalid_argument if there are fewer groups than folds, fewer than two folds, or a label count other than
 /// `rows`.
-std::vector<Fold> make_folds(Eigen::Index rows, const FoldOptions& options);
+std::vector<Fold> make_folds(Eigen::Index rows, const FoldOptions& options, std::span<const double> groups = {});
 
 }  // namespace llmt

@@ -11,6 +11,7 @@
 #include "llmt/explain.hpp"
 #include "llmt/files.hpp"
 #include "llmt/fit.hpp"
+#include "llmt/fit_result.hpp"
 #include "llmt/folds.hpp"
 #include "llmt/intervals.hpp"
 #include "llmt/model.hpp"
@@ -25,3 +26,4 @@
 #include "llmt/statistics.hpp"
 #include "llmt/stream.hpp"
 #include "llmt/summary.hpp"
+#include "llmt/training_data.hpp"

@@ -14,7 +14,6 @@
 #include "llmt/abi.hpp"
 #include "llmt/folds.hpp"
 #include "llmt/names.hpp"
-#include "llmt/progress.hpp"
 
 namespace llmt {
 
@@ -112,19 +111,25 @@ enum class Estimation {
   joint      ///< all leaves at once, with a ridge towards the local estimate
 };
 
+/// What is asked of the outputs as an input rises (docs/algorithms/constraints.md).
+enum class Trend {
+  any,
+  rising_slopes,   ///< no slope in this input is negative, in any local model; says nothing of jumps between leaves
+  falling_slopes,  ///< no slope in this input is positive
+  rising,          ///< no output falls, anywhere in the input space; includes rising_slopes
+  falling          ///< no output rises
+};
+
 /// An entry of ExpertOptions::jumps: every split has a transition.
 inline constexpr double no_jump = std::numeric_limits<double>::infinity();
+
+/// FitOptions::significance at which every split is made that has room for two local models.
+inline constexpr double every_split = std::numeric_limits<double>::infinity();
 
 /// Options that people rarely turn. Lists are candidates: the smallest held-out error decides among them, and without
 /// folds the first entry is taken. An empty list stands for the default, see
 /// default_text().
 struct ExpertOptions {
-  /// rd, ra: smallest decrease of the residual variance by a split, as a fraction of the variance of the output. 0: any
-  /// decrease. Negative: no demand.
-  double min_variance_gain = 0.0;
-  /// Growth ends when ten further splits lower the RSS of the whole tree by less than this fraction each, in their
-  /// geometric mean. In [0, 1); 0: off. Not for m5, which prunes.
-  double min_improvement = 0.0;
   SplitSearch search = SplitSearch::automatic;
   Estimation estimation = Estimation::joint;
   /// Validity::width. Blend: width of a transition by the smaller child's extent. Gaussian: k_sigma. hilomot: factor on
@@ -145,17 +150,15 @@ struct FitOptions {
   Eigen::Index max_leaves = 0;        ///< largest number of leaves of a tree; 0: see default_text()
   Eigen::Index min_leaf_samples = 0;  ///< smallest number of rows in a leaf; 0: see default_text()
   /// rd, ra: a split is made if its p-value times the number of candidate splits (Bonferroni) is below this level.
-  /// 1 or more: no test. Negative: 0.05 for a crisp tree, see default_text().
+  /// 1 or more: no test, but the residual variance must not rise. every_split: not even that. Negative: 0.05 for a
+  /// crisp tree, see default_text().
   double significance = -1.0;
   std::vector<int> split_inputs = {};       ///< columns that may be split; empty: all
   std::vector<int> regression_inputs = {};  ///< columns that local models use; empty: all
   /// Leave out inputs where that lowers the held-out error beyond chance: RD, RETIS and RA, with two folds or more and
-  /// fewer than 300 rows an input, where neither split_inputs nor regression_inputs nor monotone is given.
+  /// fewer than 300 rows an input, where neither split_inputs nor regression_inputs nor a monotone trend is
+  /// given.
   bool choose_inputs = true;
-  /// Take inputs of few whole numbers for categories where that lowers the held-out error beyond chance: RD, RETIS and
-  /// RA with crisp leaves or blends, with two folds or more, where none of split_inputs, regression_inputs, slope_signs
-  /// and monotone is given. See docs/algorithms/codes.md.
-  bool choose_codes = true;
   bool shared_partition = false;  ///< one tree for all outputs, their RSS divided by their variances; else one each
   Pruning pruning = Pruning::last_splits;
   ValidityChoice validity = ValidityChoice::automatic;
@@ -165,17 +168,9 @@ struct FitOptions {
   /// The tree is grown anew in every fold, and what predicts the held-out rows best is kept. count 0: no choice, the
   /// tree stays as grown. From 50 000 rows on, only the first fold is held out.
   FoldOptions folds = {};
-  std::vector<int> categorical_inputs = {};  ///< columns whose values are categories 0, 1, 2, ...
-  /// One entry an input: the sign -1 or 1 that its slope has in every local model, unless the slope is 0. 0: any sign.
-  /// Empty: no demand. Does not restrict the jumps between leaves.
-  std::vector<int> slope_signs = {};
-  /// One entry an input: with 1 no output falls when this input rises, with -1 none rises, anywhere in the input space.
-  /// 0: no demand. Empty: no demand on any input. Includes the signs of the slopes.
-  std::vector<int> monotone = {};
-  Eigen::VectorXd weights = {};  ///< one entry a row, not negative; a row of weight 0 takes no part. Empty: all 1
-  bool intervals = true;         ///< keep the folds' models and residuals for prediction intervals
-  int max_threads = 0;           ///< 0: all that the machine has. The result does not depend on it
-  Progress progress = {};        ///< is called as the work goes on, and may cancel it
+  std::vector<Trend> trends = {};  ///< one an input; empty: any
+  bool intervals = true;           ///< keep the folds' models and residuals for prediction intervals
+  int max_threads = 0;             ///< 0: all that the machine has. The result does not depend on it
   ExpertOptions expert = {};
 };
 

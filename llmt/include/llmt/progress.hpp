@@ -1,11 +1,11 @@
 /// \file
 /// How far a long call is, and a way to stop it.
 ///
-///     llmt::FitOptions options;
-///     options.progress = [](const llmt::ProgressReport& report) {
+///     const llmt::Progress progress = [](const llmt::ProgressReport& report) {
 ///       std::printf("%d of %d\n", report.done, report.total);
 ///       return true;  // false cancels the fit
 ///     };
+///     const llmt::Model fitted = llmt::fit(inputs, outputs, {}, progress).model;
 #pragma once
 
 #include <exception>
@@ -45,9 +45,7 @@ class Cancelled : public std::exception {
 ///       llmt::Work work(progress);
 ///       for (int k = 0; k < 10; ++k) {
 ///         llmt::Work part(work, 0.09);
-///         llmt::FitOptions options;
-///         options.progress = part.progress();  // the fit reports as a part of the work
-///         llmt::fit(inputs, outputs, options);
+///         llmt::fit(inputs, outputs, {}, part.progress());  // the fit reports as a part of the work
 ///       }
 ///       work.finish();
 ///     }

@@ -21,10 +21,9 @@ namespace llmt {
 enum class StopReason {
   max_leaves,       ///< FitOptions::max_leaves reached
   significance,     ///< no leaf has a split that passes the F test
-  variance_gain,    ///< no leaf has a split that lowers the residual variance enough
+  variance_gain,    ///< no leaf has a split that lowers the residual variance
   leaf_samples,     ///< leaves are too small to be split, or their split inputs (M5': or outputs) are constant
   exact_fit,        ///< the leaves reproduce the outputs to rounding
-  improvement,      ///< ExpertOptions::min_improvement: further splits improved the tree too little
   aicc,             ///< LOLIMOT and HILOMOT without folds: the corrected Akaike criterion rose
   pruning,          ///< pruning by RETIS or M5' removed the last splits
   cross_validation  ///< fewer leaves than grown had the smallest held-out error
@@ -105,7 +104,8 @@ struct PartitionSummary {
   std::vector<RangeGuard> range_guards = {};  ///< one an output of the partition; empty without folds
 };
 
-/// Which inputs are codes, that is, categories given as numbers (docs/algorithms/codes.md): FitOptions::choose_codes.
+/// Which inputs are codes, that is, categories given as numbers (docs/algorithms/codes.md):
+/// TrainingData::may_have_codes.
 struct CodeChoice {
   std::vector<int> compared = {};  ///< inputs that were compared in both forms, ascending
   std::vector<int> taken = {};     ///< those that are categories in the model, ascending
@@ -129,7 +129,7 @@ struct FitSummary {
   /// LocalTerms::automatic: the best candidate with the terms that were not taken, one entry a partition. Else empty.
   std::vector<CandidateError> other_terms = {};
   /// Loss::tukey: the weight in [0, 1] that each row had by its residual, 0 for outliers. Else empty. Errors leave out
-  /// rows of weight 0; all others count in full there, times FitOptions::weights.
+  /// rows of weight 0; all others count in full there, times TrainingData::weights.
   Eigen::VectorXd loss_weights = {};
   /// The rows that each fold held out, ascending, in the order of Intervals::models(): the model of a fold has not seen
   /// the rows of its list. Copies of a row are in the list of the row that they copy, and repeats of a measurement in

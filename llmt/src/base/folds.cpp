@@ -22,15 +22,14 @@ std::vector<Eigen::Index> number_groups(Eigen::Index rows, std::span<const doubl
 
 }  // namespace
 
-std::vector<Fold> make_folds(Eigen::Index rows, const FoldOptions& options) {
+std::vector<Fold> make_folds(Eigen::Index rows, const FoldOptions& options, std::span<const double> groups) {
   if (options.count < 2) {
     throw std::invalid_argument(fmt::format("llmt::make_folds: count is {}, it must be at least 2", options.count));
   }
-  if (!options.groups.empty() && std::ssize(options.groups) != rows) {
-    throw std::invalid_argument(
-        fmt::format("llmt::make_folds: groups has {} labels for {} rows", options.groups.size(), rows));
+  if (!groups.empty() && std::ssize(groups) != rows) {
+    throw std::invalid_argument(fmt::format("llmt::make_folds: groups has {} labels for {} rows", groups.size(), rows));
   }
-  const std::vector<Eigen::Index> group_of_row = number_groups(rows, options.groups);
+  const std::vector<Eigen::Index> group_of_row = number_groups(rows, groups);
   Eigen::Index group_count = 0;
   for (const Eigen::Index group : group_of_row) {
     group_count = std::max(group_count, group + 1);

@@ -11,7 +11,10 @@
 
 #include "base/sum_over.hpp"
 #include "data/equal_rows.hpp"
+#include "data/given_rows.hpp"
 #include "fit/check_options.hpp"
+#include "fit/pipeline.hpp"
+#include "fit/prepare.hpp"
 #include "fit/robust_weights.hpp"
 #include "growth/rules/rule.hpp"
 #include "llmt/statistics.hpp"
@@ -23,15 +26,6 @@ double seconds_of(const std::function<void()>& work) {
   const auto start = std::chrono::steady_clock::now();
   work();
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
-
-// Rows of the options that speak of single rows, for a part of them.
-FitOptions for_rows(FitOptions options, const std::vector<Eigen::Index>& rows) {
-  if (options.weights.size() > 0) {
-    options.weights = Eigen::VectorXd(options.weights(rows));
-  }
-  options.folds.groups = {};
-  return options;
 }
 
 Eigen::Index count_parameters(const Model& model) {
@@ -48,11 +42,10 @@ Eigen::Index count_parameters(const Model& model) {
 }
 
 // One label per row where rows are repeats or copies of others; else empty.
-std::vector<double> groups_of_repeats(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
-                                      const Eigen::Ref<const Eigen::MatrixXd>& output) {
-  std::vector<Eigen::Index> rows(inputs.rows());
+std::vector<double> groups_of_repeats(const GivenRows& given) {
+  std::vector<Eigen::Index> rows(given.inputs.values.rows());
   std::iota(rows.begin(), rows.end(), 0);
-  const std::vector<int> group = find_equal_rows(inputs, rows, number_rows(inputs, output, rows)).group;
+  const std::vector<int> group = find_equal_rows(given.inputs.values, rows, *given.numbers).group;
   return {group.begin(), group.end()};
 }
 
@@ -109,39 +102,33 @@ void recommend(const std::vector<Method>& methods, ComparisonResult& result) {
 
 // The weights that rows lose by the loss, found once for all methods: their errors are then of the same rows. Empty if
 // no method has that loss.
-Eigen::VectorXd loss_weights_of(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
-                                const Eigen::Ref<const Eigen::MatrixXd>& output, const std::vector<Method>& methods,
-                                Work& work) {
+Eigen::VectorXd loss_weights_of(const GivenRows& given, const std::vector<Method>& methods, Work& work) {
   const auto robust =
       std::ranges::find_if(methods, [](const Method& method) { return method.options.loss == Loss::tukey; });
   if (robust == methods.end()) return {};
-  check_options(robust->options, inputs.cols());
+  check_options(robust->options, given.inputs.values.cols());
   constexpr double share_of_loss = 0.05;
   Work part(work, share_of_loss);
-  return robust_weights(given_rows(inputs, output, robust->options), robust->options, part);
+  return robust_weights(checked(given, robust->options), robust->options, part);
 }
 
-// The weights of rows in the errors of a method.
-Eigen::VectorXd error_weights_of(const Method& method, const Eigen::VectorXd& loss_weights, Eigen::Index rows) {
-  if (loss_weights.size() > 0) return without_outliers(method.options.weights, loss_weights);
-  if (method.options.weights.size() > 0) return method.options.weights;
-  return Eigen::VectorXd::Ones(rows);
+FitResult fit_part(const GivenRows& rows, const FitOptions& options, double share, Work& work) {
+  Work part(work, share);
+  FitResult result = fit(prepare(rows, options, part), part);
+  part.finish();
+  return result;
 }
 
 // The held-out errors of a method: fills in fold_rmse, cv_rmse and spread. `share`: of a fit in the work.
-void judge_on_folds(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<const Eigen::MatrixXd>& output,
-                    const Method& method, const Eigen::VectorXd& error_weights, const std::vector<Fold>& folds,
-                    double share, Work& work, Comparison& entry) {
+void judge_on_folds(const GivenRows& given, const Method& method, const Eigen::VectorXd& error_weights,
+                    const std::vector<Fold>& folds, double share, Work& work, Comparison& entry) {
   WeightedMean all;
   entry.fold_rmse.resize(std::ssize(folds));
   for (std::size_t f = 0; f < folds.size(); ++f) {
     const Fold& fold = folds[f];
-    Work part(work, share);
-    FitOptions options = for_rows(method.options, fold.train);
-    options.progress = part.progress();
-    const FitResult fitted = fit(inputs(fold.train, Eigen::all), output(fold.train, Eigen::all), options);
-    const Eigen::VectorXd error =
-        fitted.model.predict(inputs(fold.held_out, Eigen::all)) - Eigen::MatrixXd(output(fold.held_out, Eigen::all));
+    const FitResult fitted = fit_part(rows_at(given, fold.train), method.options, share, work);
+    const Eigen::VectorXd error = fitted.model.predict(given.inputs.values(fold.held_out, Eigen::all)) -
+                                  Eigen::MatrixXd(given.outputs.values(fold.held_out, Eigen::all));
     const Eigen::VectorXd weights = error_weights(fold.held_out);
     const auto add = [&](RowSpan block, WeightedMean& squares) {
       for (Eigen::Index i = block.begin; i < block.end; ++i) squares.add(error(i) * error(i), weights(i));
@@ -155,14 +142,11 @@ void judge_on_folds(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen
 }
 
 // The model of all rows: its size, its largest jump and its times.
-void describe_model(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<const Eigen::MatrixXd>& output,
-                    const Method& method, double share, Work& work, Comparison& entry) {
-  Work part(work, share);
-  FitOptions options = method.options;
-  options.progress = part.progress();
+void describe_model(const GivenRows& given, const Method& method, double share, Work& work, Comparison& entry) {
   std::vector<FitResult> all;
-  entry.fit_seconds = seconds_of([&] { all.push_back(fit(inputs, output, options)); });
+  entry.fit_seconds = seconds_of([&] { all.push_back(fit_part(given, method.options, share, work)); });
   const Model& model = all.front().model;
+  const Eigen::Ref<const Eigen::MatrixXd>& inputs = given.inputs.values;
   entry.predict_seconds =
       seconds_of([&] { model.predict(inputs, method.options.max_threads); }) * 1e6 / static_cast<double>(inputs.rows());
   entry.leaves = model.partitions().front().num_leaves();
@@ -170,41 +154,58 @@ void describe_model(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen
   entry.largest_jump = largest_jump(model, inputs);
 }
 
-}  // namespace
-
-ComparisonResult compare(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
-                         const Eigen::Ref<const Eigen::MatrixXd>& output, const std::vector<Method>& methods,
-                         const CompareOptions& options) {
+ComparisonResult compare_rows(GivenRows given, const std::vector<Method>& methods, const CompareOptions& options) {
+  const Eigen::Index rows = given.inputs.values.rows();
+  const Eigen::Ref<const Eigen::MatrixXd>& output = given.outputs.values;
   if (methods.empty()) throw std::invalid_argument("llmt::compare: there is no method");
-  if (output.cols() != 1 || output.rows() != inputs.rows()) {
+  if (output.cols() != 1 || output.rows() != rows) {
     throw std::invalid_argument(fmt::format("llmt::compare: output is {} x {}, one column and {} rows are needed",
-                                            output.rows(), output.cols(), inputs.rows()));
+                                            output.rows(), output.cols(), rows));
   }
   FoldOptions fold_options = options.folds;
-  fold_options.count = static_cast<int>(std::min<Eigen::Index>(fold_options.count, inputs.rows()));
-  const std::vector<double> repeats =
-      fold_options.groups.empty() ? groups_of_repeats(inputs, output) : std::vector<double>{};
-  if (!repeats.empty()) {
-    fold_options.groups = repeats;
-    const Eigen::Index groups = std::ssize(std::set<double>(repeats.begin(), repeats.end()));
-    fold_options.count = static_cast<int>(std::min<Eigen::Index>(fold_options.count, groups));
+  fold_options.count = static_cast<int>(std::min<Eigen::Index>(fold_options.count, rows));
+  std::vector<double> groups = given.groups;
+  if (groups.empty()) {
+    std::vector<Eigen::Index> all(rows);
+    std::iota(all.begin(), all.end(), 0);
+    given.numbers = number_rows(given.inputs.values, output, all);
+    groups = groups_of_repeats(given);
+    if (!groups.empty()) {
+      const Eigen::Index count = std::ssize(std::set<double>(groups.begin(), groups.end()));
+      fold_options.count = static_cast<int>(std::min<Eigen::Index>(fold_options.count, count));
+    }
   }
-  const std::vector<Fold> folds = make_folds(inputs.rows(), fold_options);
+  const std::vector<Fold> folds = make_folds(rows, fold_options, groups);
   ComparisonResult result;
   Work work(options.progress);
-  result.loss_weights = loss_weights_of(inputs, output, methods, work);
+  result.loss_weights = loss_weights_of(given, methods, work);
+  const Eigen::VectorXd error_weights = result.loss_weights.size() > 0
+                                            ? without_outliers(given.weights, result.loss_weights)
+                                        : given.weights.size() > 0 ? given.weights
+                                                                   : Eigen::VectorXd::Ones(rows).eval();
   const double share = work.left() / static_cast<double>(methods.size() * (folds.size() + 1));
   for (const Method& method : methods) {
     work.begin(method.name);
     Comparison entry{.method = method.name};
-    judge_on_folds(inputs, output, method, error_weights_of(method, result.loss_weights, inputs.rows()), folds, share,
-                   work, entry);
-    describe_model(inputs, output, method, share, work, entry);
+    judge_on_folds(given, method, error_weights, folds, share, work, entry);
+    describe_model(given, method, share, work, entry);
     result.methods.push_back(std::move(entry));
   }
   recommend(methods, result);
   work.finish();
   return result;
+}
+
+}  // namespace
+
+ComparisonResult compare(const TrainingData& data, const std::vector<Method>& methods, const CompareOptions& options) {
+  return compare_rows(given_rows(data), methods, options);
+}
+
+ComparisonResult compare(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
+                         const Eigen::Ref<const Eigen::MatrixXd>& output, const std::vector<Method>& methods,
+                         const CompareOptions& options) {
+  return compare_rows({.inputs = {inputs}, .outputs = {output}}, methods, options);
 }
 
 }  // namespace llmt

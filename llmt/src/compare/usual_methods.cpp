@@ -1,5 +1,6 @@
 #include <algorithm>
 
+#include "data/given_rows.hpp"
 #include "data/regressors.hpp"
 #include "growth/rules/rule.hpp"
 #include "llmt/compare.hpp"
@@ -64,7 +65,6 @@ class Methods {
     if (rule.has_own_models) {
       options.folds.count = 0;  // its pruning decides
       options.expert.shrinkages = {};
-      options.expert.min_improvement = 0.0;
     }
     if (is_crisp(rule)) return;
     options.max_leaves = overlapping_leaves_;
@@ -78,9 +78,7 @@ class Methods {
   std::vector<Method> methods_;
 };
 
-}  // namespace
-
-std::vector<Method> usual_methods(const FitOptions& base, Eigen::Index inputs) {
+std::vector<Method> methods_of(const FitOptions& base, Eigen::Index numbers) {
   Methods methods(base);
   methods.add("least squares", [](FitOptions& options) {
     options.max_leaves = 1;
@@ -90,7 +88,6 @@ std::vector<Method> usual_methods(const FitOptions& base, Eigen::Index inputs) {
   methods.add_gaussians();
   methods.add("blend, joint", [](FitOptions& options) { options.validity = ValidityChoice::blend; });
   methods.add_rules(false);
-  const Eigen::Index numbers = count_numeric_inputs(inputs, base);
   if (numbers > 0 && numbers <= most_inputs_of_products) {
     methods.add("crisp tree, quadratic leaves", [](FitOptions& options) { options.terms = LocalTerms::quadratic; });
   }
@@ -102,6 +99,14 @@ std::vector<Method> usual_methods(const FitOptions& base, Eigen::Index inputs) {
     });
   }
   return methods.take();
+}
+
+}  // namespace
+
+std::vector<Method> usual_methods(const FitOptions& base) { return methods_of(base, 0); }
+
+std::vector<Method> usual_methods(const FitOptions& base, const TrainingData& data) {
+  return methods_of(base, count_numeric_inputs(data.inputs.cols(), given_rows(data).categorical, base));
 }
 
 }  // namespace llmt

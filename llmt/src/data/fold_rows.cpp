@@ -7,18 +7,18 @@
 
 namespace llmt {
 
-std::vector<Fold> selection_folds(Eigen::Index rows, FoldOptions options) {
+std::vector<Fold> selection_folds(Eigen::Index rows, FoldOptions options, std::span<const double> labels) {
   if (options.count == 0) return {};
   if (options.count < 2) {
     throw std::invalid_argument(fmt::format("llmt::fit: folds.count is {}, it must be 0 or at least 2", options.count));
   }
-  std::vector<double> distinct(options.groups.begin(), options.groups.end());
+  std::vector<double> distinct(labels.begin(), labels.end());
   std::ranges::sort(distinct);
   distinct.erase(std::unique(distinct.begin(), distinct.end()), distinct.end());
-  const Eigen::Index groups = options.groups.empty() ? rows : std::ssize(distinct);
+  const Eigen::Index groups = labels.empty() ? rows : std::ssize(distinct);
   options.count = static_cast<int>(std::min<Eigen::Index>(options.count, groups));
   if (options.count < 2) return {};
-  std::vector<Fold> folds = make_folds(rows, options);
+  std::vector<Fold> folds = make_folds(rows, options, labels);
   if (rows >= single_hold_out_rows) {
     folds.resize(1);
   }

@@ -32,12 +32,11 @@ std::vector<int> numeric_regression_inputs(const Table& table) {
   return result;
 }
 
-Eigen::Index count_numeric_inputs(Eigen::Index inputs, const FitOptions& options) {
+Eigen::Index count_numeric_inputs(Eigen::Index inputs, const std::vector<int>& categorical, const FitOptions& options) {
   Eigen::Index count = 0;
   const std::vector<int>& chosen = options.regression_inputs;
   for (int input = 0; input < inputs; ++input) {
     const bool used = chosen.empty() || std::ranges::find(chosen, input) != chosen.end();
-    const std::vector<int>& categorical = options.categorical_inputs;
     count += used && std::ranges::find(categorical, input) == categorical.end() ? 1 : 0;
   }
   return count;

@@ -18,8 +18,9 @@ inline constexpr Eigen::Index most_inputs_of_products = 13;
 /// Numeric regression inputs of a table.
 std::vector<int> numeric_regression_inputs(const Table& table);
 
-/// Number of numeric regression inputs that a fit of `inputs` columns with these options has.
-Eigen::Index count_numeric_inputs(Eigen::Index inputs, const FitOptions& options);
+/// Number of numeric regression inputs that a fit of `inputs` columns, some of them categorical, has with these
+/// options.
+Eigen::Index count_numeric_inputs(Eigen::Index inputs, const std::vector<int>& categorical, const FitOptions& options);
 
 /// All pairs of numeric regression inputs, i <= j, that say something of their own: none of an input that never varies,
 /// no square of one that takes two values.

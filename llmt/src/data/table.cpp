@@ -48,14 +48,8 @@ std::vector<int> all_columns(Eigen::Index count) {
   return columns;
 }
 
-void check_categories(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const std::vector<int>& categorical) {
-  for (const int column : categorical) {
-    for (const double value : inputs.col(column)) {
-      if (std::isnan(value)) continue;
-      require(value >= 0.0 && value < most_categories && value == std::floor(value),
-              fmt::format("a category of input {}", column).c_str(), value, "a whole number from 0 to 9999");
-    }
-  }
+bool contains(const std::vector<int>& columns, int column) {
+  return std::ranges::find(columns, column) != columns.end();
 }
 
 // Number of levels of every input, 0 for numbers.
@@ -71,42 +65,30 @@ std::vector<int> count_levels(const Eigen::Ref<const Eigen::MatrixXd>& inputs, c
   return num_levels;
 }
 
-void check_signs(const char* option, const std::vector<int>& signs, const std::vector<int>& categorical,
-                 Eigen::Index inputs) {
-  if (!signs.empty() && std::ssize(signs) != inputs) {
+void check_trends(const std::vector<Trend>& trends, const std::vector<int>& categorical, Eigen::Index inputs) {
+  if (!trends.empty() && std::ssize(trends) != inputs) {
     throw std::invalid_argument(
-        fmt::format("llmt::fit: {} has {} entries, there are {} inputs", option, signs.size(), inputs));
+        fmt::format("llmt::fit: trends has {} entries, there are {} inputs", trends.size(), inputs));
   }
-  for (int j = 0; j < std::ssize(signs); ++j) {
-    require(signs[j] >= -1 && signs[j] <= 1, fmt::format("{}[{}]", option, j).c_str(), signs[j], "-1, 0 or 1");
-    require(signs[j] == 0 || std::ranges::find(categorical, j) == categorical.end(),
-            fmt::format("{}[{}]", option, j).c_str(), signs[j],
-            "0: the input is categorical, its values have no order");
-  }
-}
-
-bool is_any_set(const std::vector<int>& signs) {
-  return std::ranges::any_of(signs, [](int sign) { return sign != 0; });
-}
-
-void check_signs(const FitOptions& options, Eigen::Index inputs) {
-  check_signs("slope_signs", options.slope_signs, options.categorical_inputs, inputs);
-  check_signs("monotone", options.monotone, options.categorical_inputs, inputs);
-  for (std::size_t j = 0; is_any_set(options.monotone) && j < options.slope_signs.size(); ++j) {
-    require(options.monotone[j] == 0 || options.slope_signs[j] != -options.monotone[j],
-            fmt::format("slope_signs[{}]", j).c_str(), options.slope_signs[j], "not the opposite of monotone");
+  for (int j = 0; j < std::ssize(trends); ++j) {
+    if (trends[j] == Trend::any || !contains(categorical, j)) continue;
+    throw std::invalid_argument(
+        fmt::format("llmt::fit: trends[{}] must be any: the input is categorical, its values have no order", j));
   }
 }
 
-// Signs of slopes and of the prediction, which includes the former.
-void set_signs(const FitOptions& options, Table& table) {
-  table.slope_signs = options.slope_signs;
-  if (!is_any_set(options.monotone)) return;
-  table.monotone = options.monotone;
-  table.slope_signs.resize(table.monotone.size(), 0);
-  for (std::size_t j = 0; j < table.monotone.size(); ++j) {
-    table.slope_signs[j] = table.monotone[j] != 0 ? table.monotone[j] : table.slope_signs[j];
-  }
+bool is_monotone(Trend trend) { return trend == Trend::rising || trend == Trend::falling; }
+
+int sign_of(Trend trend) {
+  if (trend == Trend::any) return 0;
+  return trend == Trend::rising || trend == Trend::rising_slopes ? 1 : -1;
+}
+
+// Signs of slopes and of the prediction.
+void set_signs(const std::vector<Trend>& trends, Table& table) {
+  for (const Trend trend : trends) table.slope_signs.push_back(sign_of(trend));
+  if (std::ranges::none_of(trends, is_monotone)) return;
+  for (const Trend trend : trends) table.monotone.push_back(is_monotone(trend) ? sign_of(trend) : 0);
 }
 
 void check_weights(const Eigen::VectorXd& weights, Eigen::Index rows) {
@@ -120,8 +102,9 @@ void check_weights(const Eigen::VectorXd& weights, Eigen::Index rows) {
   require(weights.maxCoeff() > 0.0, "the largest weight", weights.maxCoeff(), "positive");
 }
 
-void check_products(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const FitOptions& options) {
-  const Eigen::Index numbers = count_numeric_inputs(inputs.cols(), options);
+void check_products(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const std::vector<int>& categorical,
+                    const FitOptions& options) {
+  const Eigen::Index numbers = count_numeric_inputs(inputs.cols(), categorical, options);
   require(numbers <= most_inputs_of_products,
           "the number of numeric regression inputs of quadratic local models (terms)", static_cast<double>(numbers),
           "at most 13; regression_inputs chooses them");
@@ -144,24 +127,23 @@ void check_magnitudes(const char* name, const Eigen::Ref<const Eigen::MatrixXd>&
 }
 
 void check_data(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<const Eigen::MatrixXd>& outputs,
-                const Eigen::VectorXd& weights, const FitOptions& options) {
+                const Eigen::VectorXd& weights, const std::vector<int>& categorical, const FitOptions& options) {
   check_size("inputs", inputs);
   check_finite_or_missing("llmt::fit", "inputs", inputs);
   check_magnitudes("inputs", inputs);
   check_outputs(outputs, inputs.rows());
-  check_columns("llmt::fit", "categorical_inputs", options.categorical_inputs, inputs.cols());
-  check_categories(inputs, options.categorical_inputs);
   check_weights(weights, inputs.rows());
-  check_signs(options, inputs.cols());
-  if (options.terms == LocalTerms::quadratic) check_products(inputs, options);
+  check_trends(options.trends, categorical, inputs.cols());
+  if (options.terms == LocalTerms::quadratic) check_products(inputs, categorical, options);
 }
 
 Table make_table(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<const Eigen::MatrixXd>& outputs,
-                 Eigen::VectorXd weights, const FitOptions& options, bool orders_splits) {
+                 Eigen::VectorXd weights, const std::vector<int>& categorical, const FitOptions& options,
+                 bool orders_splits) {
   Table table{inputs,
               outputs,
               std::move(weights),
-              count_levels(inputs, options.categorical_inputs),
+              count_levels(inputs, categorical),
               options.regression_inputs,
               options.split_inputs};
   for (std::vector<int>* columns : {&table.split_inputs, &table.regression_inputs}) {
@@ -170,7 +152,7 @@ Table make_table(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::R
     }
     std::sort(columns->begin(), columns->end());
   }
-  set_signs(options, table);
+  set_signs(options.trends, table);
   if (options.terms == LocalTerms::quadratic) table.products = products_of(table);
   // Where leaves overlap by Gaussians, have products, or a missing value sends rows to both sides, the two sides of a
   // split cannot be kept in order.

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <numeric>
 #include <stdexcept>
 #include <utility>
@@ -62,24 +63,35 @@ void leave_out_copies(const std::vector<int>& copy_of, Eigen::VectorXd& weights,
   places.groups = std::move(groups);
 }
 
+void check_groups(const std::vector<double>& groups, Eigen::Index rows) {
+  if (groups.empty()) return;
+  if (std::ssize(groups) != rows) {
+    throw std::invalid_argument(
+        fmt::format("llmt::fit: groups has {} entries, inputs has {} rows", groups.size(), rows));
+  }
+  for (std::size_t row = 0; row < groups.size(); ++row) {
+    if (std::isfinite(groups[row])) continue;
+    throw std::invalid_argument(fmt::format("llmt::fit: groups[{}] is {}, it must be finite", row, groups[row]));
+  }
+}
+
 }  // namespace
+
+std::optional<RowNumbers> numbers_at(const GivenRows& given, const std::vector<Eigen::Index>& rows) {
+  return given.numbers ? std::optional(at(*given.numbers, rows)) : std::nullopt;
+}
 
 SharedMatrix shared(Eigen::MatrixXd matrix) {
   auto owned = std::make_shared<const Eigen::MatrixXd>(std::move(matrix));
   return {*owned, owned};
 }
 
-GivenRows given_rows(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<const Eigen::MatrixXd>& outputs,
-                     const FitOptions& options) {
-  check_data(inputs, outputs, options.weights, options);
-  const std::span<const double> groups = options.folds.groups;
-  if (!groups.empty() && std::ssize(groups) != inputs.rows()) {
-    throw std::invalid_argument(
-        fmt::format("llmt::fit: folds.groups has {} entries, inputs has {} rows", groups.size(), inputs.rows()));
-  }
-  GivenRows given{.inputs = {inputs}, .outputs = {outputs}, .weights = options.weights};
-  given.groups.assign(groups.begin(), groups.end());
-  if (given.groups.empty() && options.folds.count > 0) {
+GivenRows checked(GivenRows given, const FitOptions& options) {
+  const Eigen::Ref<const Eigen::MatrixXd>& inputs = given.inputs.values;
+  const Eigen::Ref<const Eigen::MatrixXd>& outputs = given.outputs.values;
+  check_data(inputs, outputs, given.weights, given.categorical, options);
+  check_groups(given.groups, inputs.rows());
+  if (!given.numbers && given.groups.empty() && options.folds.count > 0) {
     std::vector<Eigen::Index> all(inputs.rows());
     std::iota(all.begin(), all.end(), 0);
     given.numbers = number_rows(inputs, outputs, all, options.max_threads);
@@ -91,9 +103,11 @@ GivenRows rows_at(const GivenRows& given, const std::vector<Eigen::Index>& rows)
   return {.inputs = shared(given.inputs.values(rows, Eigen::all)),
           .outputs = shared(given.outputs.values(rows, Eigen::all)),
           .weights = values_at(given.weights, rows),
-          .loss_weights = values_at(given.loss_weights, rows),
           .groups = values_at(given.groups, rows),
-          .numbers = at(given.numbers, rows)};
+          .categorical = given.categorical,
+          .may_have_codes = given.may_have_codes,
+          .loss_weights = values_at(given.loss_weights, rows),
+          .numbers = numbers_at(given, rows)};
 }
 
 KeptRows keep(const GivenRows& given, const FoldOptions& folds) {
@@ -106,13 +120,12 @@ KeptRows keep(const GivenRows& given, const FoldOptions& folds) {
     places.rows.push_back(row);
   }
   EqualRows equal;
-  if (given.groups.empty()) {
-    equal = find_equal_rows(given.inputs.values, places.rows, at(given.numbers, places.rows));
+  if (given.groups.empty() && given.numbers && folds.count > 0) {
+    equal = find_equal_rows(given.inputs.values, places.rows, at(*given.numbers, places.rows));
     if (equal.are_repeats) places.groups.assign(equal.group.begin(), equal.group.end());
     if (!equal.copy_of.empty()) leave_out_copies(equal.copy_of, weights, places);
-  } else {
-    places.groups = values_at(given.groups, places.rows);
   }
+  if (!given.groups.empty()) places.groups = values_at(given.groups, places.rows);
   const std::vector<Eigen::Index>& rows = places.rows;
   const bool all = std::ssize(rows) == count;
   KeptRows kept{.inputs = all ? given.inputs : shared(given.inputs.values(rows, Eigen::all)),
@@ -128,9 +141,7 @@ KeptRows keep(const GivenRows& given, const FoldOptions& folds) {
   kept.groups = std::move(places.groups);
   kept.rows = std::move(places.rows);
   kept.row_of = std::move(places.row_of);
-  FoldOptions dealing = folds;
-  dealing.groups = kept.groups;
-  kept.folds = selection_folds(kept.count(), dealing);
+  kept.folds = selection_folds(kept.count(), folds, kept.groups);
   return kept;
 }
 
@@ -147,10 +158,10 @@ std::vector<std::vector<Eigen::Index>> held_out_rows(const KeptRows& kept) {
   return rows;
 }
 
-Training make_training(std::shared_ptr<const KeptRows> kept, const SharedMatrix& inputs, const FitOptions& options,
-                       bool orders_splits, const MissingWeights& missing_weights) {
+Training make_training(std::shared_ptr<const KeptRows> kept, const SharedMatrix& inputs, std::vector<int> categorical,
+                       const FitOptions& options, bool orders_splits, const MissingWeights& missing_weights) {
   const auto table = std::make_shared<const Table>(
-      make_table(inputs.values, kept->outputs.values, kept->weights, options, orders_splits));
+      make_table(inputs.values, kept->outputs.values, kept->weights, categorical, options, orders_splits));
   const auto weighted = std::make_shared<Table>(*table);
   if (kept->loss_weights.size() > 0) weighted->weights = weighted->weights.cwiseProduct(kept->loss_weights);
   std::vector<int> rows(kept->count());
@@ -163,7 +174,8 @@ Training make_training(std::shared_ptr<const KeptRows> kept, const SharedMatrix&
   }
   TrainingRows measured = with_table(all, *table);
   std::vector<FoldRows> folds = deal(*weighted, *table, kept->folds, threads);
-  return {options, std::move(kept), inputs, table, weighted, std::move(all), std::move(measured), std::move(folds)};
+  return {options,  std::move(categorical), std::move(kept),     inputs,          table,
+          weighted, std::move(all),         std::move(measured), std::move(folds)};
 }
 
 Training narrowed(const Training& training, const std::vector<int>& of_all,
@@ -174,6 +186,7 @@ Training narrowed(const Training& training, const std::vector<int>& of_all,
         {narrowed(training.folds[f].training, of_folds[f]), narrowed(training.folds[f].held_out, of_folds[f])});
   }
   return {training.options,
+          training.categorical,
           training.kept,
           training.inputs,
           training.table,

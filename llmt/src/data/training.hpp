@@ -1,13 +1,14 @@
 /// \file
 /// The rows of a fit, made ready: checked, without copies, weighted, dealt to folds, described.
 ///
-/// A fit checks, hashes and sorts a caller's rows once, by given_rows(). All later forms of them (other weights, fewer
+/// A fit checks, hashes and sorts a caller's rows once, by checked(). All later forms of them (other weights, fewer
 /// rows, other columns) are made from the result.
 #pragma once
 
 #include <Eigen/Core>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "data/equal_rows.hpp"
@@ -26,20 +27,24 @@ struct SharedMatrix {
 /// Takes over a matrix.
 SharedMatrix shared(Eigen::MatrixXd matrix);
 
-/// Rows to learn from. `weights`, `loss_weights`, `groups` and `numbers` have one entry a row, or none.
+/// Rows to learn from. `weights`, `groups` and `loss_weights` have one entry a row, or none.
 struct GivenRows {
   SharedMatrix inputs;
   SharedMatrix outputs;
-  Eigen::VectorXd weights = {};       ///< not negative; a row of weight 0 takes no part. Empty: all 1
-  Eigen::VectorXd loss_weights = {};  ///< in training, not in errors, a row's weight is times this. Empty: all 1
-  std::vector<double> groups = {};    ///< rows of one group share a fold. Empty: each row stands alone
-  RowNumbers numbers = {};  ///< which rows are equal; not looked for where groups are given or nothing is held out
+  Eigen::VectorXd weights = {};            ///< not negative; a row of weight 0 takes no part. Empty: all 1
+  std::vector<double> groups = {};         ///< rows of one group share a fold. Empty: each row stands alone
+  std::vector<int> categorical = {};       ///< inputs whose values are categories 0, 1, 2, ...
+  bool may_have_codes = true;              ///< as TrainingData
+  Eigen::VectorXd loss_weights = {};       ///< in training, not in errors, a row's weight is times this. Empty: all 1
+  std::optional<RowNumbers> numbers = {};  ///< which rows are equal; none: nobody has looked
 };
 
-/// The caller's rows, checked and numbered. The matrices must outlive what is made of the result. Throws
-/// std::invalid_argument as fit().
-GivenRows given_rows(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<const Eigen::MatrixXd>& outputs,
-                     const FitOptions& options);
+/// Checks the rows, and looks for equal ones where that is not yet done and makes a difference: where rows are held out
+/// and there are no groups. Throws std::invalid_argument as fit().
+GivenRows checked(GivenRows given, const FitOptions& options);
+
+/// The numbers of some of the rows, if these have any.
+std::optional<RowNumbers> numbers_at(const GivenRows& given, const std::vector<Eigen::Index>& rows);
 
 /// Some of the rows.
 GivenRows rows_at(const GivenRows& given, const std::vector<Eigen::Index>& rows);
@@ -70,7 +75,8 @@ std::vector<std::vector<Eigen::Index>> held_out_rows(const KeptRows& kept);
 /// The rows of a fit in all forms that the stages of the fit read. Its parts share tables, so that it may be copied and
 /// moved.
 struct Training {
-  FitOptions options;  ///< by which the columns are described
+  FitOptions options;            ///< by which the columns are described
+  std::vector<int> categorical;  ///< inputs, those with codes included
   std::shared_ptr<const KeptRows> kept;
   SharedMatrix inputs;                    ///< of the kept rows, or positions where some inputs are codes
   std::shared_ptr<const Table> table;     ///< with the weights that rows have in errors
@@ -85,10 +91,10 @@ struct Training {
 /// Weights by which those of rows with missing values are multiplied, from the rows as they are without.
 using MissingWeights = std::function<Eigen::VectorXd(const TrainingRows& all)>;
 
-/// `inputs`: as Training::inputs. `orders_splits`: see make_table(). `missing_weights`: called where values are
-/// missing, unless it is empty.
-Training make_training(std::shared_ptr<const KeptRows> kept, const SharedMatrix& inputs, const FitOptions& options,
-                       bool orders_splits, const MissingWeights& missing_weights = {});
+/// `inputs` and `categorical`: as in Training. `orders_splits`: see make_table(). `missing_weights`: called where
+/// values are missing, unless it is empty.
+Training make_training(std::shared_ptr<const KeptRows> kept, const SharedMatrix& inputs, std::vector<int> categorical,
+                       const FitOptions& options, bool orders_splits, const MissingWeights& missing_weights = {});
 
 /// The same training with fewer inputs: `of_all` of the model of all rows, `of_folds` of each fold's, all ascending.
 Training narrowed(const Training& training, const std::vector<int>& of_all,

@@ -8,9 +8,9 @@
 #include "fit/grow_tree.hpp"
 #include "fit/held_out_error.hpp"
 #include "fit/input_choice.hpp"
-#include "fit/prepare.hpp"
+#include "fit/prepared_rows.hpp"
 #include "fit/same_regressors.hpp"
-#include "llmt/fit.hpp"
+#include "llmt/fit_result.hpp"
 
 namespace llmt {
 

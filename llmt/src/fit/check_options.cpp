@@ -20,14 +20,10 @@ void require(bool condition, const char* option, double value, const char* bound
 }
 
 void check_growth(const FitOptions& options, Eigen::Index inputs) {
-  const ExpertOptions& expert = options.expert;
-  require(std::isfinite(options.significance), "significance", options.significance, "finite");
-  require(std::isfinite(expert.min_variance_gain), "expert.min_variance_gain", expert.min_variance_gain, "finite");
+  require(!std::isnan(options.significance), "significance", options.significance, "a number");
   require(options.min_leaf_samples >= 0, "min_leaf_samples", static_cast<double>(options.min_leaf_samples),
           "at least 0");
   require(options.max_leaves >= 0, "max_leaves", static_cast<double>(options.max_leaves), "at least 0");
-  require(expert.min_improvement >= 0.0 && expert.min_improvement < 1.0, "expert.min_improvement",
-          expert.min_improvement, "in [0, 1)");
   check_columns("llmt::fit", "split_inputs", options.split_inputs, inputs);
   check_columns("llmt::fit", "regression_inputs", options.regression_inputs, inputs);
 }
@@ -61,8 +57,6 @@ void check_rule(const FitOptions& options) {
   for (const double shrinkage : options.expert.shrinkages) {
     require(shrinkage == 0.0, "expert.shrinkages", shrinkage, none.c_str());
   }
-  require(options.expert.min_improvement == 0.0, "expert.min_improvement", options.expert.min_improvement,
-          none.c_str());
   if (options.pruning != Pruning::last_splits || options.terms != LocalTerms::linear ||
       options.sparse != SparseChoice::never) {
     throw std::invalid_argument(
@@ -82,8 +76,9 @@ void check_sparse(const FitOptions& options) {
                     "are full",
                     name_of(options.sparse)));
   }
-  if (!options.monotone.empty() || !options.slope_signs.empty()) {
-    throw std::invalid_argument("llmt::fit: monotone and slope_signs need sparse never");
+  if (!options.trends.empty()) {
+    throw std::invalid_argument(
+        fmt::format("llmt::fit: sparse is {}, it must be never with trends", name_of(options.sparse)));
   }
 }
 

@@ -43,8 +43,8 @@ bool may_have_codes(const FitOptions& options) {
   const Rule& rule = rule_of(options.rule);
   const bool is_usual = !rule.has_own_models && rule.overlapping == ValidityKind::blend &&
                         options.validity != ValidityChoice::gaussian && options.max_leaves != 1;
-  return options.choose_codes && is_usual && options.folds.count != 0 && options.split_inputs.empty() &&
-         options.regression_inputs.empty() && options.slope_signs.empty() && options.monotone.empty();
+  return is_usual && options.folds.count != 0 && options.split_inputs.empty() && options.regression_inputs.empty() &&
+         options.trends.empty();
 }
 
 // The codes that a column may have; none if it has other numbers.
@@ -71,10 +71,10 @@ bool takes_part(const GivenRows& given, Eigen::Index row) {
 Codes possible_codes(const GivenRows& given, const FitOptions& options) {
   const Matrix& inputs = given.inputs.values;
   Codes codes(inputs.cols());
-  if (!may_have_codes(options)) return codes;
+  if (!given.may_have_codes || !may_have_codes(options)) return codes;
   for (int j = 0; j < inputs.cols(); ++j) {
-    const std::vector<int>& categorical = options.categorical_inputs;
-    if (std::ranges::find(categorical, j) == categorical.end()) codes[j] = codes_in(inputs.col(j), given.weights);
+    const bool is_number = std::ranges::find(given.categorical, j) == given.categorical.end();
+    if (is_number) codes[j] = codes_in(inputs.col(j), given.weights);
   }
   return codes;
 }
@@ -105,12 +105,11 @@ GivenRows some_rows(const GivenRows& given, const Codes& codes) {
 
 // The held-out error of every partition with these codes. Empty: there are no two folds.
 std::vector<CandidateError> errors_of(const std::shared_ptr<const KeptRows>& rows, const Codes& codes,
-                                      const FitOptions& options, Work& work) {
+                                      const std::vector<int>& categorical, const FitOptions& options, Work& work) {
   if (rows->folds.size() < 2) return {};
-  const FitOptions of_codes = with_categories(codes, options);
   const bool orders_splits = rule_of(options.rule).splits_on_monotone_inputs;
   const SharedMatrix inputs = shared(at_positions(codes, rows->inputs.values));
-  const Training training = make_training(rows, inputs, of_codes, orders_splits);
+  const Training training = make_training(rows, inputs, with_codes(categorical, codes), options, orders_splits);
   const Plan plan = cheap_plan(training);
   std::vector<CandidateError> errors;
   for (const std::vector<int>& served : output_groups(training.outputs(), options.shared_partition)) {
@@ -121,12 +120,12 @@ std::vector<CandidateError> errors_of(const std::shared_ptr<const KeptRows>& row
 }
 
 // The inputs in which straight lines lack fit, the clearest first.
-std::vector<int> bent_inputs(const GivenRows& some, const Codes& codes, const std::vector<int>& categorical) {
+std::vector<int> bent_inputs(const GivenRows& some, const Codes& codes) {
   const Matrix& of_some = some.inputs.values;
   const std::vector<int> inputs = inputs_with(codes);
   std::vector<int> numbers;
   for (int j = 0; j < of_some.cols(); ++j) {
-    if (std::ranges::find(categorical, j) == categorical.end()) numbers.push_back(j);
+    if (std::ranges::find(some.categorical, j) == some.categorical.end()) numbers.push_back(j);
   }
   const LackOfFit lack(of_some(Eigen::all, numbers), some.outputs.values);
   std::vector<std::pair<double, int>> found;
@@ -151,18 +150,18 @@ CodeChoice choose_codes(const GivenRows& given, const FitOptions& options, Work&
   const Codes possible = possible_codes(given, options);
   if (inputs_with(possible).empty()) return result;
   const GivenRows some = some_rows(given, possible);
-  const std::vector<int> bent = bent_inputs(some, possible, options.categorical_inputs);
+  const std::vector<int> bent = bent_inputs(some, possible);
   if (bent.empty()) return result;
   const auto rows = std::make_shared<const KeptRows>(keep(some, options.folds));
   Codes chosen(possible.size());
-  const std::vector<CandidateError> of_numbers = errors_of(rows, chosen, options, work);
+  const std::vector<CandidateError> of_numbers = errors_of(rows, chosen, given.categorical, options, work);
   if (of_numbers.empty()) return result;
   CandidateError least = mean_error(of_numbers, of_numbers);
   result.rmse_as_numbers = least.rmse;
   for (const int input : bent) {
     Codes codes = chosen;
     codes[input] = possible[input];
-    const CandidateError errors = mean_error(errors_of(rows, codes, options, work), of_numbers);
+    const CandidateError errors = mean_error(errors_of(rows, codes, given.categorical, options, work), of_numbers);
     result.compared.push_back(input);
     if (!is_clearly_better(least, errors)) break;
     least = errors;
@@ -181,9 +180,9 @@ Eigen::MatrixXd at_positions(const Codes& codes, const Matrix& inputs) {
   return at_positions(columns, inputs);
 }
 
-FitOptions with_categories(const Codes& codes, FitOptions options) {
-  for (const int input : inputs_with(codes)) options.categorical_inputs.push_back(input);
-  return options;
+std::vector<int> with_codes(std::vector<int> categorical, const Codes& codes) {
+  for (const int input : inputs_with(codes)) categorical.push_back(input);
+  return categorical;
 }
 
 Intervals with_codes(const Intervals& intervals, const Codes& codes) {

@@ -6,7 +6,9 @@
 #include <vector>
 
 #include "data/training.hpp"
-#include "llmt/fit.hpp"
+#include "llmt/intervals.hpp"
+#include "llmt/progress.hpp"
+#include "llmt/summary.hpp"
 
 namespace llmt {
 
@@ -20,8 +22,8 @@ CodeChoice choose_codes(const GivenRows& given, const FitOptions& options, Work&
 /// The inputs with positions in place of codes.
 Eigen::MatrixXd at_positions(const Codes& codes, const Eigen::Ref<const Eigen::MatrixXd>& inputs);
 
-/// The options of a fit to positions.
-FitOptions with_categories(const Codes& codes, FitOptions options);
+/// The categorical inputs of a fit to positions.
+std::vector<int> with_codes(std::vector<int> categorical, const Codes& codes);
 
 /// Intervals of models that were fitted to positions.
 Intervals with_codes(const Intervals& intervals, const Codes& codes);

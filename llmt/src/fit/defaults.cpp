@@ -236,10 +236,8 @@ Plan with_defaults(const FitOptions& options, const TrainingRows& all, Eigen::In
       .rule = &rule,
       .growth = {.significance =
                      options.significance >= 0.0 ? options.significance : values_of(significance_rows(), each).front(),
-                 .min_variance_gain = options.expert.min_variance_gain,
                  .min_leaf_samples = or_default(options.min_leaf_samples, default_min_leaf(each, rule, coefficients)),
                  .max_leaves = or_default(options.max_leaves, default_max_leaves(each, rule, coefficients)),
-                 .min_improvement = options.expert.min_improvement,
                  .split_inputs = all.split_inputs,
                  .search = options.expert.search},
       .candidates = candidates_of(options, each, choice, crisp_only, all.count()),

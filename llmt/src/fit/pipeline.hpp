@@ -2,8 +2,8 @@
 /// The stages of a fit, one after the other.
 #pragma once
 
-#include "fit/prepare.hpp"
-#include "llmt/fit.hpp"
+#include "fit/prepared_rows.hpp"
+#include "llmt/fit_result.hpp"
 
 namespace llmt {
 

@@ -8,11 +8,9 @@ FitOptions preliminary_options(const FitOptions& options) {
           .split_inputs = options.split_inputs,
           .regression_inputs = options.regression_inputs,
           .choose_inputs = false,
-          .choose_codes = false,
           .shared_partition = options.shared_partition,
           .validity = ValidityChoice::crisp,
           .folds = options.folds,
-          .categorical_inputs = options.categorical_inputs,
           .intervals = false,
           .max_threads = options.max_threads};
 }

@@ -2,33 +2,12 @@
 /// What a fit learns from, made ready once.
 #pragma once
 
-#include <memory>
-
-#include "data/training.hpp"
-#include "llmt/progress.hpp"
-#include "llmt/summary.hpp"
+#include "fit/prepared_rows.hpp"
 
 namespace llmt {
 
-/// The rows of a fit with the loss, the codes and the columns that they are fitted with.
-struct PreparedRows {
-  std::shared_ptr<const Training> training;  ///< of linear local models where `terms` is automatic
-  LocalTerms terms;                          ///< as asked for
-  CodeChoice codes = {};                     ///< training.inputs has positions in place of these
-  Eigen::VectorXd loss_weights = {};         ///< as FitSummary::loss_weights
-};
-
 /// Checks the options and the rows, finds the equal rows, weights all by the loss, chooses codes, deals folds, and
 /// describes the columns. The matrices must outlive the result. `work`: this counts as a part of it. Throws as fit().
-PreparedRows prepare(const Eigen::Ref<const Eigen::MatrixXd>& inputs, const Eigen::Ref<const Eigen::MatrixXd>& outputs,
-                     const FitOptions& options, Work& work);
-
-/// The given rows as they are, with the squared loss, no choice of codes and checked options; terms: linear or
-/// quadratic.
-PreparedRows prepare_plain(const GivenRows& given, const FitOptions& options, Work& work);
-
-/// The same rows with linear or quadratic local models.
-std::shared_ptr<const Training> with_terms(const std::shared_ptr<const Training>& training, LocalTerms terms,
-                                           Work& work);
+PreparedRows prepare(const GivenRows& all, const FitOptions& options, Work& work);
 
 }  // namespace llmt

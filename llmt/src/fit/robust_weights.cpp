@@ -73,7 +73,8 @@ Eigen::VectorXd robust_weights(const GivenRows& given, const FitOptions& options
                          .outputs = taught,
                          .weights = weights,
                          .groups = kept.groups,
-                         .numbers = at(given.numbers, kept.rows)};
+                         .categorical = given.categorical,
+                         .numbers = numbers_at(given, kept.rows)};
     return fit(prepare_plain(rows, preliminary, half), half).model;
   };
   const Model of_clipped = model_of(shared(clipped(outputs)), kept.weights);

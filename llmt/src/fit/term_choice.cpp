@@ -21,7 +21,7 @@ std::vector<std::pair<LocalTerms, double>> terms_to_compare(const PreparedRows& 
   if (rows.terms != LocalTerms::automatic) return {{rows.terms, 1.0}};
   const Training& training = *rows.training;
   const Eigen::Ref<const Eigen::MatrixXd>& inputs = training.inputs.values;
-  const Eigen::Index numbers = count_numeric_inputs(inputs.cols(), training.options);
+  const Eigen::Index numbers = count_numeric_inputs(inputs.cols(), training.categorical, training.options);
   const bool both = numbers > 0 && numbers <= most_inputs_of_products && !training.folds.empty() &&
                     !(inputs.array().abs() > largest_factor).any();
   if (!both) return {{LocalTerms::linear, 1.0}};

@@ -5,8 +5,8 @@
 #include <utility>
 #include <vector>
 
-#include "fit/prepare.hpp"
-#include "llmt/fit.hpp"
+#include "fit/prepared_rows.hpp"
+#include "llmt/fit_result.hpp"
 
 namespace llmt {
 

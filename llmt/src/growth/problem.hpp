@@ -13,11 +13,9 @@ namespace llmt {
 
 /// The options of FitOptions that growth reads, without blanks.
 struct GrowthOptions {
-  double significance = 1.0;  ///< 1 or more: no test
-  double min_variance_gain = 0.0;
+  double significance = 1.0;  ///< 1 or more: no test; every_split: no demand at all
   Eigen::Index min_leaf_samples = 0;
   Eigen::Index max_leaves = 0;  ///< 0: no limit
-  double min_improvement = 0.0;
   std::vector<int> split_inputs = {};
   SplitSearch search = SplitSearch::automatic;
 };

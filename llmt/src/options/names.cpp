@@ -65,8 +65,6 @@ std::string describe(StopReason reason) {
       return "the smallest leaf size";
     case StopReason::exact_fit:
       return "an exact fit";
-    case StopReason::improvement:
-      return "too little improvement";
     case StopReason::aicc:
       return "AICc";
     case StopReason::pruning:

@@ -17,7 +17,8 @@
 #include "estimation/leaf_statistics.hpp"
 #include "fit/code_choice.hpp"
 #include "fit/error_weights.hpp"
-#include "fit/prepare.hpp"
+#include "fit/named.hpp"
+#include "fit/prepared_rows.hpp"
 #include "growth/rules/rule.hpp"
 #include "llmt/size.hpp"
 #include "llmt/statistics.hpp"
@@ -268,6 +269,7 @@ ReadableResult fit_readable(const PreparedFit& prepared, const FitSummary& fitte
     result.model = with_codes(result.model, codes.codes);
     result.intervals = with_codes(result.intervals, codes.codes);
   }
+  result.model = named(result.model, prepared.data());
   work.finish();
   return result;
 }
@@ -285,9 +287,8 @@ std::string why_not_readable(const FitOptions& options) {
     }
     return fmt::format("rule {}: {}", fmt::join(names, " or "), by_crisp);
   }
-  const auto is_set = [](int sign) { return sign != 0; };
-  if (std::ranges::any_of(options.monotone, is_set) || std::ranges::any_of(options.slope_signs, is_set)) {
-    return "monotone or slope_signs: its equations do not keep them";
+  if (std::ranges::any_of(options.trends, [](Trend trend) { return trend != Trend::any; })) {
+    return "trends: its equations do not keep them";
   }
   return "";
 }

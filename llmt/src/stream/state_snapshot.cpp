@@ -44,12 +44,12 @@ Model StreamState::model_of_first_rows() const {
   FitOptions one_leaf;
   one_leaf.max_leaves = 1;
   one_leaf.folds.count = 0;
-  one_leaf.weights = first.rightCols(1);
   const Eigen::MatrixXd inputs = first.leftCols(inputs_);
   const Eigen::MatrixXd outputs = first.middleCols(inputs_, outputs_);
   // Not fit(), which refuses an output that hides the others: the trees of a stream take it too.
   Work uncounted;
-  return fit(prepare_plain(given_rows(inputs, outputs, one_leaf), one_leaf, uncounted), uncounted).model;
+  const GivenRows rows{.inputs = {inputs}, .outputs = {outputs}, .weights = first.rightCols(1)};
+  return fit(prepare_plain(checked(rows, one_leaf), one_leaf, uncounted), uncounted).model;
 }
 
 std::vector<Partition> StreamState::crisp_partitions() const {

@@ -25,11 +25,10 @@ Fitted fit_all(const Robot& robot, const Measurements& measurements, const Repor
   const std::vector<double> labels = pose_labels(measurements.poses);
   FitOptions fit = options.correction;
   fit.validity = ValidityChoice::crisp;
-  fit.folds = {.count = options.correction_folds, .kind = options.kind, .seed = options.seed, .groups = labels};
+  fit.folds = {.count = options.correction_folds, .kind = options.kind, .seed = options.seed};
   fit.intervals = false;
   fit.max_threads = options.max_threads;
-  fit.progress = work.progress();
-  fitted.correction = fit_correction(fitted.calibration.robot, measurements, fit);
+  fitted.correction = fit_correction(fitted.calibration.robot, measurements, fit, labels, work.progress());
   return fitted;
 }
 
@@ -63,8 +62,7 @@ void hold_out(const Robot& robot, const Measurements& measurements, const Report
   report.nominal.held_out_mm.resize(n);
   report.geometric.held_out_mm.resize(n);
   if (report.corrected) report.corrected->held_out_mm.resize(n);
-  for (const Fold& fold :
-       make_folds(n, {.count = options.folds, .kind = options.kind, .seed = options.seed, .groups = labels})) {
+  for (const Fold& fold : make_folds(n, {.count = options.folds, .kind = options.kind, .seed = options.seed}, labels)) {
     const Measurements trained = select(measurements, fold.train);
     const Measurements left_out = select(measurements, fold.held_out);
     work.begin(fmt::format("fold {}", report.fold_terminations.size() + 1));

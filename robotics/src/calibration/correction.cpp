@@ -125,7 +125,8 @@ Eigen::MatrixXd residuals(const Robot& robot, const Measurements& measurements) 
   return world_errors_of(robot, measurements) * base_rotation_of(robot.chain);  // rows: r' R = (R' r)'
 }
 
-FitResult fit_correction(const Robot& robot, const Measurements& measurements, const FitOptions& options) {
+FitResult fit_correction(const Robot& robot, const Measurements& measurements, const FitOptions& options,
+                         const std::vector<double>& groups, const Progress& progress) {
   const bool is_plain = measurements.poses.observations.empty();
   const Stands stands =
       is_plain ? Stands{measurements.poses.joints, residuals(robot, measurements)} : stands_of(robot, measurements);
@@ -137,13 +138,12 @@ FitResult fit_correction(const Robot& robot, const Measurements& measurements, c
     names.push_back(correction_outputs[axis]);
   }
   if (axes.empty()) throw std::invalid_argument("llmt::robotics::fit_correction: all residuals are zero");
-  const Eigen::MatrixXd outputs = stands.twists(Eigen::all, axes);
-  FitOptions of_numbers = options;
-  of_numbers.choose_codes = false;                         // joint positions that were measured on a grid are no names
-  if (!is_plain) of_numbers.folds.groups = stands.labels;  // every stand is one sample now
-  FitResult result = fit(stands.joints, outputs, of_numbers);
-  result.model = result.model.named(correction_inputs(robot.chain), names);
-  return result;
+  TrainingData data{.inputs = stands.joints, .outputs = stands.twists(Eigen::all, axes)};
+  data.groups = is_plain ? groups : stands.labels;  // every stand is one sample now
+  data.input_names = correction_inputs(robot.chain);
+  data.output_names = names;
+  data.may_have_codes = false;  // joint positions that were measured on a grid are no names
+  return fit(data, options, progress);
 }
 
 Eigen::MatrixXd positions(const CorrectedRobot& robot, const Poses& poses) {

@@ -62,12 +62,13 @@ FitOptions tree_options(Eigen::Index samples) {
   options.min_leaf_samples = static_cast<int>(std::max<Eigen::Index>(8, samples / 25));
   options.validity = ValidityChoice::crisp;
   options.intervals = false;
-  options.choose_codes = false;
   return options;
 }
 
 void add_regions(const Inputs& inputs, const Eigen::VectorXd& size, GapMap& map) {
-  const Model model = fit(inputs.values, size, tree_options(size.size())).model;
+  TrainingData data{inputs.values, size};
+  data.may_have_codes = false;
+  const Model model = fit(data, tree_options(size.size())).model;
   const std::vector<Leaf> leaves = model.leaves(0);
   if (leaves.size() < 2) return;
   std::vector<double> sum(leaves.size(), 0.0);

@@ -20,17 +20,15 @@ void add_correction(const Measurements& searched, std::uint64_t seed, Work& work
   const Robot& robot = improved.robot;
   const auto tree_of_rest = [&, share = share_of_fits * work.left() / (folds + 1)](const Measurements& trained) {
     Work part(work, share);
-    fitting.progress = part.progress();
-    return fit_correction(robot, trained, fitting).model;
+    return fit_correction(robot, trained, fitting, {}, part.progress()).model;
   };
   const Eigen::VectorXd without = distances(positions(robot, searched.poses), searched);
   Eigen::VectorXd with = without;
   const std::vector<double> labels = pose_labels(searched.poses);
   FoldOptions dealing;
-  dealing.groups = labels;
   dealing.count = folds;
   dealing.seed = seed;
-  for (const Fold& fold : make_folds(searched.count(), dealing)) {
+  for (const Fold& fold : make_folds(searched.count(), dealing, labels)) {
     const CorrectedRobot trained{robot, tree_of_rest(select(searched, fold.train))};
     const Measurements held_out = select(searched, fold.held_out);
     with(fold.held_out) = distances(positions(trained, held_out.poses), held_out);

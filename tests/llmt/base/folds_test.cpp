@@ -37,7 +37,7 @@ TEST(Folds, GroupsStayTogether) {
   for (std::size_t i = 0; i < pose.size(); ++i) {
     pose[i] = static_cast<double>(i % 20);
   }
-  for (const llmt::Fold& fold : llmt::make_folds(60, {.count = 5, .groups = pose})) {
+  for (const llmt::Fold& fold : llmt::make_folds(60, {.count = 5}, pose)) {
     EXPECT_EQ(fold.held_out.size(), 12U);
     for (const Eigen::Index row : fold.held_out) {
       EXPECT_TRUE(std::binary_search(fold.held_out.begin(), fold.held_out.end(), (row + 20) % 60));
@@ -57,7 +57,7 @@ TEST(Folds, MistakesAreNamed) {
   EXPECT_EQ(oracle::thrown([] { llmt::make_folds(10, {.count = 1}); }),
             "llmt::make_folds: count is 1, it must be at least 2");
   const std::vector<double> labels(9, 1.0);
-  EXPECT_EQ(oracle::thrown([&] { llmt::make_folds(10, {.groups = labels}); }),
+  EXPECT_EQ(oracle::thrown([&] { llmt::make_folds(10, {}, labels); }),
             "llmt::make_folds: groups has 9 labels for 10 rows");
 }
 

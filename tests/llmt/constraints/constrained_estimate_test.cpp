@@ -17,6 +17,7 @@ namespace {
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+using llmt::Trend;
 using namespace monotone_data;
 
 // A table and the rows of it that a fit would train on.
@@ -89,7 +90,7 @@ TEST(Monotone, ASplitAgainstTheTrendIsTheBestContinuousOrLevelOne) {
   options.max_leaves = 4;
   options.significance = 1.0;
   options.folds.count = 0;
-  options.monotone = {1};
+  options.trends = {Trend::rising};
   const llmt::Model model = llmt::fit(x, y, options).model;
   EXPECT_GT(model.partitions()[0].num_leaves(), 1);
   for (const llmt::Node& node : model.partitions()[0].nodes) {
@@ -103,7 +104,7 @@ TEST(SlopeSigns, AgainstTheTrendAreExactlyZeroInEveryNode) {
   const MatrixXd y = -3.0 * x.col(0) + x.col(1).cwiseAbs();
   for (const Case& each : cases()) {
     llmt::FitOptions options = each.options;
-    options.slope_signs = {1, 0};
+    options.trends = {Trend::rising_slopes, Trend::any};
     const llmt::Model model = llmt::fit(x, y, options).model;
     Eigen::Index zeros = 0;
     for (const llmt::Node& node : model.partitions()[0].nodes) {
@@ -125,7 +126,7 @@ TEST(SlopeSigns, ThatTheFitHasAnywayLeaveItsBytes) {
     const std::vector<llmt::Node>& nodes = free.partitions()[0].nodes;
     if (std::ranges::all_of(nodes, [](const llmt::Node& node) { return node.slope(0, 0) > 0.0; })) {
       ++strict;
-      options.slope_signs = {1, 0};
+      options.trends = {Trend::rising_slopes, Trend::any};
       EXPECT_EQ(llmt::to_json(llmt::fit(x, y, options).model), llmt::to_json(free)) << each.name;
     }
   }
@@ -142,7 +143,7 @@ TEST(Monotone, CostsLittleOfWhatNotSplittingTheInputCosts) {
   options.expert.widths = {0.25};
   const auto error = [&] { return llmt::rmse(llmt::fit(x, truth(x), options).model.predict(query), truth(query))(0); };
   const double free = error();
-  options.monotone = {1, 0};
+  options.trends = {Trend::rising, Trend::any};
   const double constrained = error();
   options.split_inputs = {1};
   const double unsplit = error();
@@ -153,26 +154,22 @@ TEST(Monotone, CostsLittleOfWhatNotSplittingTheInputCosts) {
 TEST(Monotone, BadOptionsAreRefusedByName) {
   const MatrixXd x = oracle::uniform(50, 2, 9).cwiseAbs().array().ceil();
   const MatrixXd y = oracle::uniform(50, 1, 10);
-  const auto message = [&](const llmt::FitOptions& options) -> std::string {
+  const auto message = [&](const llmt::FitOptions& options, const std::vector<int>& categorical = {}) -> std::string {
     try {
-      llmt::fit(x, y, options);
+      llmt::fit({.inputs = x, .outputs = y, .categorical_inputs = categorical}, options);
     } catch (const std::invalid_argument& error) {
       return error.what();
     }
     return "";
   };
   llmt::FitOptions options;
-  options.monotone = {1};
-  EXPECT_EQ(message(options), "llmt::fit: monotone has 1 entries, there are 2 inputs");
-  options.monotone = {2, 0};
-  EXPECT_EQ(message(options), "llmt::fit: monotone[0] is 2, it must be -1, 0 or 1");
-  options.monotone = {1, 0};
-  options.slope_signs = {-1, 0};
-  EXPECT_EQ(message(options), "llmt::fit: slope_signs[0] is -1, it must be not the opposite of monotone");
-  options.slope_signs = {};
-  options.categorical_inputs = {0};
-  EXPECT_EQ(message(options),
-            "llmt::fit: monotone[0] is 1, it must be 0: the input is categorical, its values have no order");
+  options.trends = {Trend::rising};
+  EXPECT_EQ(message(options), "llmt::fit: trends has 1 entries, there are 2 inputs");
+  options.trends = {Trend::falling_slopes, Trend::any};
+  EXPECT_EQ(message(options, {0}),
+            "llmt::fit: trends[0] must be any: the input is categorical, its values have no order");
+  options.sparse = llmt::SparseChoice::always;
+  EXPECT_EQ(message(options), "llmt::fit: sparse is always, it must be never with trends");
 }
 
 }  // namespace

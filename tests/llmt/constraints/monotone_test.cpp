@@ -16,6 +16,7 @@ namespace {
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+using llmt::Trend;
 using namespace monotone_data;
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
@@ -106,7 +107,7 @@ TEST(Monotone, PredictionsNeverFallAnywhere) {
     for (const Case& each : cases()) {
       llmt::FitOptions options = each.options;
       unconstrained = std::max(unconstrained, largest_fall(llmt::fit(x, y, options).model, 0, 1, seed, false));
-      options.monotone = {1, -1, 0, 0};
+      options.trends = {Trend::rising, Trend::falling, Trend::any, Trend::any};
       const llmt::Model model = llmt::fit(x, y, options).model;
       EXPECT_GT(model.partitions()[0].num_leaves(), 2) << each.name;
       for (const bool with_missing : {false, true}) {
@@ -130,16 +131,16 @@ TEST(Monotone, HoldsWithCategoriesWeightsMissingValuesAndSharedPartitions) {
     }
     for (std::size_t which : {0U, 1U, 4U}) {
       llmt::FitOptions options = cases()[which].options;
-      options.monotone = {1, -1, 0, 0};
-      options.categorical_inputs = {3};
+      options.trends = {Trend::rising, Trend::falling, Trend::any, Trend::any};
       options.shared_partition = seed == 1;
-      options.weights = oracle::uniform(300, 1, seed).cwiseAbs();
+      const Eigen::VectorXd weights = oracle::uniform(300, 1, seed).cwiseAbs();
       for (const bool lacking : {false, true}) {
         MatrixXd inputs = x;
         for (Eigen::Index i = 0; lacking && i < x.rows(); i += 7) {
           inputs(i, i % 4) = nan;
         }
-        const llmt::Model model = llmt::fit(inputs, y, options).model;
+        const llmt::TrainingData data{.inputs = inputs, .outputs = y, .weights = weights, .categorical_inputs = {3}};
+        const llmt::Model model = llmt::fit(data, options).model;
         for (const bool with_missing : {false, true}) {
           EXPECT_LE(largest_fall(model, 0, 1, seed, with_missing), rounding) << which << " " << lacking;
           EXPECT_LE(largest_fall(model, 1, -1, seed, with_missing), rounding) << which << " " << lacking;
@@ -155,7 +156,7 @@ TEST(Monotone, HoldsWhenFoldsChooseAndInTheModelsOfTheFolds) {
   llmt::FitOptions options;
   options.max_leaves = 12;
   options.folds.count = 3;
-  options.monotone = {1, -1, 0};
+  options.trends = {Trend::rising, Trend::falling, Trend::any};
   const llmt::FitResult result = llmt::fit(x, y, options);
   EXPECT_GT(result.summary.partitions[0].leaves, 1);
   EXPECT_LE(largest_fall(result.model, 0, 1, 3, true), rounding);
@@ -173,7 +174,7 @@ TEST(Monotone, HoldsForEstimatesThatStartFromASampleAndForBins) {
   llmt::FitOptions options = cases()[3].options;
   options.max_leaves = 6;
   options.expert.search = llmt::SplitSearch::binned;
-  options.monotone = {1, -1, 0};
+  options.trends = {Trend::rising, Trend::falling, Trend::any};
   const llmt::Model model = llmt::fit(x, y, options).model;
   EXPECT_LE(largest_fall(model, 0, 1, 4, true), rounding);
   EXPECT_LE(largest_fall(model, 1, -1, 4, true), rounding);

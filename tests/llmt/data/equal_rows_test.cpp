@@ -113,16 +113,15 @@ TEST(EqualRows, ATableWithSomeCopiesOfItsOwnIsReadAsWrittenOnce) {
 TEST(EqualRows, CopiesCountAsTheSumOfTheirWeights) {
   const Eigen::MatrixXd x = oracle::uniform(250, 3, 5);
   const Eigen::MatrixXd y = oracle::curved(x, 0.1, 5);
-  llmt::FitOptions options;
-  options.weights = Eigen::VectorXd::LinSpaced(250, 1.0, 4.0);
-  const llmt::FitResult once = llmt::fit(x, y, options);
-  options.weights = options.weights.replicate(2, 1).eval();
-  options.weights.head(250) *= 0.25;  // a quarter and three quarters, doubled
-  options.weights.tail(250) *= 0.75;
-  EXPECT_LT((llmt::fit(times(x, 2), times(y, 2), options).model.predict(x) - once.model.predict(x)).norm(), 1e-9);
+  const Eigen::VectorXd weights = Eigen::VectorXd::LinSpaced(250, 1.0, 4.0);
+  const llmt::FitResult once = llmt::fit({.inputs = x, .outputs = y, .weights = weights});
+  llmt::TrainingData twice{.inputs = times(x, 2), .outputs = times(y, 2), .weights = weights.replicate(2, 1)};
+  twice.weights.head(250) *= 0.25;  // a quarter and three quarters, doubled
+  twice.weights.tail(250) *= 0.75;
+  EXPECT_LT((llmt::fit(twice).model.predict(x) - once.model.predict(x)).norm(), 1e-9);
   // A copy of weight 0 takes no part.
-  options.weights.tail(250).setZero();
-  EXPECT_EQ(llmt::fit(times(x, 2), times(y, 2), options).summary.copies, 0);
+  twice.weights.tail(250).setZero();
+  EXPECT_EQ(llmt::fit(twice).summary.copies, 0);
 }
 
 // Every point has a deviation of its own, which all its measurements share.
@@ -156,9 +155,7 @@ TEST(EqualRows, GroupsOfTheCallerAreUsedAsTheyAre) {
   const Eigen::MatrixXd y = oracle::curved(x, 0.1, 5);
   std::vector<double> groups(200);
   std::iota(groups.begin(), groups.end(), 0.0);
-  llmt::FitOptions options;
-  options.folds.groups = groups;
-  const llmt::FitResult result = llmt::fit(times(x, 2), times(y, 2), options);
+  const llmt::FitResult result = llmt::fit({.inputs = times(x, 2), .outputs = times(y, 2), .groups = groups});
   EXPECT_FALSE(result.summary.repeats);
   EXPECT_EQ(result.summary.copies, 0);
 }

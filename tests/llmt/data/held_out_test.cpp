@@ -24,11 +24,9 @@ TEST(HeldOutRows, AreThoseOfTheIntervals) {
     outputs.row(i + 1) = outputs.row(i);
   }
   inputs.row(90) = inputs.row(5);
-  llmt::FitOptions options;
-  options.intervals = true;
-  options.weights = Eigen::VectorXd::Ones(rows);
-  options.weights(40) = 0.0;
-  const llmt::FitResult result = llmt::fit(inputs, outputs, options);
+  Eigen::VectorXd weights = Eigen::VectorXd::Ones(rows);
+  weights(40) = 0.0;
+  const llmt::FitResult result = llmt::fit({.inputs = inputs, .outputs = outputs, .weights = weights});
   const std::vector<std::vector<Eigen::Index>>& held_out = result.summary.held_out;
   ASSERT_EQ(held_out.size(), result.intervals.models().size());
   std::size_t covered = 0;

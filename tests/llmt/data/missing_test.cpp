@@ -30,9 +30,9 @@ TEST(Fit, SameBytesAtAnyNumberOfThreadsWithCategoriesAndMissingValues) {
     for (const int threads : {1, 2, 8}) {
       llmt::FitOptions options;
       options.validity = choice;
-      options.categorical_inputs = {1};
       options.max_threads = threads;
-      models.push_back(llmt::to_json(llmt::fit(x, y, options).model));
+      const llmt::TrainingData data{.inputs = x, .outputs = y, .categorical_inputs = {1}};
+      models.push_back(llmt::to_json(llmt::fit(data, options).model));
     }
     EXPECT_EQ(models[0], models[1]);
     EXPECT_EQ(models[0], models[2]);
@@ -127,9 +127,7 @@ TEST(Categorical, OffsetsAndSlopesOfLevelsAreRecovered) {
     truth(i) = offset[level] + slope[level] * x(i, 1);
     y(i, 0) = truth(i) + 0.1 * random.normal();
   }
-  llmt::FitOptions options;
-  options.categorical_inputs = {0};
-  const llmt::Model model = llmt::fit(x, y, options).model;
+  const llmt::Model model = llmt::fit({.inputs = x, .outputs = y, .categorical_inputs = {0}}).model;
   EXPECT_EQ(model.inputs()[0].levels, (std::vector<std::string>{"0", "1", "2", "3"}));
   // Eight coefficients from 1000 rows leave 0.1 * sqrt(8 / 1000) = 0.009.
   EXPECT_LT(llmt::rmse(model.predict(x), truth)(0), 0.02);

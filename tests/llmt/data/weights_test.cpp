@@ -27,16 +27,16 @@ TEST(Weights, IntegersAreRepeatedRows) {
     llmt::FitOptions options = only(kind, llmt::Estimation::joint, 8);
     options.min_leaf_samples = 1;  // it counts rows, whatever their weight
     const llmt::Model expected = llmt::fit(x(repeated, Eigen::all), y(repeated, Eigen::all), options).model;
-    options.weights = weights;
-    const llmt::Model found = llmt::fit(x, y, options).model;
+    llmt::TrainingData data{.inputs = x, .outputs = y, .weights = weights};
+    const llmt::Model found = llmt::fit(data, options).model;
     ASSERT_EQ(found.partitions()[0].num_leaves(), 8);
     for (std::size_t i = 0; i < found.partitions()[0].nodes.size(); ++i) {
       EXPECT_EQ(found.partitions()[0].nodes[i].split_input, expected.partitions()[0].nodes[i].split_input);
       EXPECT_NEAR(found.partitions()[0].nodes[i].threshold, expected.partitions()[0].nodes[i].threshold, 1e-9);
     }
     EXPECT_LT((found.predict(query) - expected.predict(query)).cwiseAbs().maxCoeff(), 1e-5);
-    options.weights = 1e3 * weights;
-    EXPECT_LT((llmt::fit(x, y, options).model.predict(query) - found.predict(query)).cwiseAbs().maxCoeff(), 1e-9);
+    data.weights *= 1e3;
+    EXPECT_LT((llmt::fit(data, options).model.predict(query) - found.predict(query)).cwiseAbs().maxCoeff(), 1e-9);
   }
 }
 
@@ -57,11 +57,11 @@ TEST(Weights, ZeroIsADeletedRow) {
   }
   const Eigen::MatrixXd query = x(kept, Eigen::all);
   for (const Kind& kind : kinds) {
-    llmt::FitOptions options = only(kind, llmt::Estimation::joint, 8);
-    options.categorical_inputs = {2};
-    const llmt::FitResult expected = llmt::fit(x(kept, Eigen::all), y(kept, Eigen::all), options);
-    options.weights = weights;
-    const llmt::FitResult found = llmt::fit(x, y, options);
+    const llmt::FitOptions options = only(kind, llmt::Estimation::joint, 8);
+    const llmt::FitResult expected =
+        llmt::fit({.inputs = query, .outputs = y(kept, Eigen::all), .categorical_inputs = {2}}, options);
+    const llmt::FitResult found =
+        llmt::fit({.inputs = x, .outputs = y, .weights = weights, .categorical_inputs = {2}}, options);
     EXPECT_EQ(found.summary.samples, 200);
     EXPECT_EQ(found.model.inputs()[0].high, expected.model.inputs()[0].high);
     EXPECT_EQ(found.model.inputs()[2].levels, expected.model.inputs()[2].levels);

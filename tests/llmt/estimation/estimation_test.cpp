@@ -55,12 +55,11 @@ TEST(Blend, JointEstimateIsLeastSquaresOnAllLeavesAtOnce) {
         const Eigen::MatrixXd x = oracle::firm(oracle::uniform(300, 3, seed));
         const Eigen::VectorXd y = oracle::curved(x, 0.1, seed).col(0);
         llmt::Random random(seed);
-        llmt::FitOptions options = only(kinds[k], llmt::Estimation::joint, 5, ridge);
-        options.weights.resize(300);
-        for (double& weight : options.weights) {
-          weight = random.uniform(0.5, 2.0);
-        }
-        const llmt::Model model = llmt::fit(x, y, options).model;
+        Eigen::VectorXd weights(300);
+        for (double& weight : weights) weight = random.uniform(0.5, 2.0);
+        const llmt::Model model = llmt::fit({.inputs = x, .outputs = y, .weights = weights},
+                                            only(kinds[k], llmt::Estimation::joint, 5, ridge))
+                                      .model;
         const Eigen::MatrixXd validities = model.validities(x, 0);
         Eigen::MatrixXd a(300, 4);
         a << Eigen::VectorXd::Ones(300), x;
@@ -68,11 +67,11 @@ TEST(Blend, JointEstimateIsLeastSquaresOnAllLeavesAtOnce) {
         const Eigen::Index leaves = validities.cols();
         Eigen::MatrixXd stacked = Eigen::MatrixXd::Zero(300 * (leaves + 1), 4 * leaves);
         Eigen::VectorXd target = Eigen::VectorXd::Zero(stacked.rows());
-        const Eigen::VectorXd roots = options.weights.cwiseSqrt();
+        const Eigen::VectorXd roots = weights.cwiseSqrt();
         target.head(300) = roots.asDiagonal() * y;
         for (Eigen::Index leaf = 0; leaf < leaves; ++leaf) {
           stacked.block(0, 4 * leaf, 300, 4) = roots.cwiseProduct(validities.col(leaf)).asDiagonal() * a;
-          const Eigen::VectorXd local_roots = options.weights.cwiseProduct(validities.col(leaf)).cwiseSqrt();
+          const Eigen::VectorXd local_roots = weights.cwiseProduct(validities.col(leaf)).cwiseSqrt();
           const Eigen::VectorXd local =
               oracle::least_squares(local_roots.asDiagonal() * a, local_roots.asDiagonal() * y);
           const Eigen::MatrixXd anchor = std::sqrt(ridge) * (local_roots.asDiagonal() * a);

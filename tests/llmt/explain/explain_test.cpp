@@ -52,8 +52,8 @@ llmt::Model fitted(const Data& data, const Kind& kind, std::vector<int> categori
   options.validity = kind.validity;
   options.expert.widths = {1.5};
   options.folds.count = 0;
-  options.categorical_inputs = std::move(categorical);
-  return llmt::fit(data.x, data.y, options).model;
+  const llmt::TrainingData rows{.inputs = data.x, .outputs = data.y, .categorical_inputs = std::move(categorical)};
+  return llmt::fit(rows, options).model;
 }
 
 // Steps along the line, in each of which one input after the other is moved, in both orders: from predictions alone.
@@ -251,8 +251,8 @@ TEST(Explain, AnInputThatIsNotUsedGetsNothing) {
     options.validity = kind.validity;
     options.expert.widths = {1.5};
     options.folds.count = 0;
-    options.categorical_inputs = {3};
-    const llmt::Model model = llmt::fit(data.x, data.y, options).model;
+    const llmt::TrainingData rows{.inputs = data.x, .outputs = data.y, .categorical_inputs = {3}};
+    const llmt::Model model = llmt::fit(rows, options).model;
     for (int row = 0; row < 20; ++row) {
       EXPECT_EQ(llmt::attribute(model, data.x.row(row).transpose()).contributions.col(1), Eigen::Vector2d::Zero());
     }

@@ -16,6 +16,7 @@
 
 namespace {
 
+using llmt::Trend;
 using oracle::Sample;
 
 double number(llmt::Random& random, int low, int high) {
@@ -35,9 +36,9 @@ Sample coded(Eigen::Index rows, std::uint64_t seed, double amount = 0.4) {
   return data;
 }
 
-llmt::FitOptions as_numbers(llmt::FitOptions options = {}) {
-  options.choose_codes = false;
-  return options;
+// The same rows, whose numbers are no codes.
+llmt::TrainingData as_numbers(const Sample& sample) {
+  return {.inputs = sample.x, .outputs = sample.y, .may_have_codes = false};
 }
 
 std::string text_of(const llmt::FitResult& result) {
@@ -57,7 +58,7 @@ TEST(CodeChoice, CodesAreFoundAndLowerTheError) {
     EXPECT_EQ(result.model.inputs()[0].codes, (std::vector<double>{2, 3, 4, 5}));
     EXPECT_LT(result.summary.codes.rmse_as_codes, result.summary.codes.rmse_as_numbers);
     chosen += llmt::rmse(result.model.predict(test.x), test.y)(0);
-    numbers += llmt::rmse(llmt::fit(train.x, train.y, as_numbers()).model.predict(test.x), test.y)(0);
+    numbers += llmt::rmse(llmt::fit(as_numbers(train)).model.predict(test.x), test.y)(0);
   }
   EXPECT_LT(chosen, 0.95 * numbers);
 }
@@ -68,7 +69,8 @@ TEST(CodeChoice, ModelIsThatOfCategories) {
   ASSERT_EQ(result.summary.codes.taken, std::vector<int>{0});
   Eigen::MatrixXd positions = train.x;
   positions.col(0).array() -= 2.0;
-  const llmt::FitResult categories = llmt::fit(positions, train.y, as_numbers({.categorical_inputs = {0}}));
+  const llmt::FitResult categories =
+      llmt::fit({.inputs = positions, .outputs = train.y, .categorical_inputs = {0}, .may_have_codes = false});
   EXPECT_EQ(result.model.predict(train.x), categories.model.predict(positions));
   EXPECT_EQ(result.intervals.predict(train.x, 0.9).upper, categories.intervals.predict(positions, 0.9).upper);
 }
@@ -79,7 +81,7 @@ TEST(CodeChoice, WithoutCodesTheModelIsThatOfNumbers) {
   for (Eigen::Index i = 0; i < 300; ++i) data.y(i, 0) = 0.5 * data.x(i, 1) + data.x(i, 2) + 0.2 * random.normal();
   const llmt::FitResult result = llmt::fit(data.x, data.y);
   EXPECT_TRUE(result.summary.codes.compared.empty());
-  EXPECT_EQ(text_of(result), text_of(llmt::fit(data.x, data.y, as_numbers())));
+  EXPECT_EQ(text_of(result), text_of(llmt::fit(as_numbers(data))));
 }
 
 // A number that is an amount, bent, is compared, and stays a number.
@@ -113,7 +115,7 @@ TEST(CodeChoice, OnlyWholeNumbersOfAShortRangeWithEnoughRows) {
   x = train.x;
   x.col(0).head(9).setConstant(1.0);  // nine rows of one value
   EXPECT_TRUE(taken(x).empty());
-  EXPECT_TRUE(taken(train.x, {.monotone = {0, 0, 1, 0}}).empty());
+  EXPECT_TRUE(taken(train.x, {.trends = {Trend::any, Trend::any, Trend::rising, Trend::any}}).empty());
   EXPECT_TRUE(taken(train.x, {.split_inputs = {0, 1, 2}}).empty());
   EXPECT_TRUE(taken(train.x, {.rule = llmt::GrowthRule::hilomot}).empty());
   EXPECT_TRUE(taken(train.x, {.folds = {.count = 0}}).empty());
@@ -131,8 +133,8 @@ TEST(CodeChoice, TakesWhatAFitTakes) {
     train.x(i, 0) = 77.5;
   }
   for (const bool shared : {false, true}) {
-    const llmt::FitOptions options{.shared_partition = shared, .weights = weights};
-    const llmt::FitResult result = llmt::fit(train.x, train.y, options);
+    const llmt::FitOptions options{.shared_partition = shared};
+    const llmt::FitResult result = llmt::fit({.inputs = train.x, .outputs = train.y, .weights = weights}, options);
     EXPECT_EQ(result.summary.codes.taken, std::vector<int>{0});
     EXPECT_TRUE(result.model.predict(train.x).allFinite());
   }

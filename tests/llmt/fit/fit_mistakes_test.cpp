@@ -35,8 +35,6 @@ TEST(Fit, CallersMistakesAreNamed) {
               llmt::fit(x, y, as_grown({.regression_inputs = {1, 1}}));
             }),
             "llmt::fit: regression_inputs names column 1 twice");
-  EXPECT_EQ(thrown([&] { llmt::fit(x, y, as_grown({.expert = {.min_improvement = 1.5}})); }),
-            "llmt::fit: expert.min_improvement is 1.5, it must be in [0, 1)");
   EXPECT_EQ(thrown([&] { llmt::fit(x, y, {.folds = {.count = 1}}); }),
             "llmt::fit: folds.count is 1, it must be 0 or at least 2");
   EXPECT_EQ(thrown([&] { llmt::fit(Eigen::MatrixXd::Constant(10, 2, 1e-320), y); }),

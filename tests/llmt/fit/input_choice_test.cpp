@@ -133,7 +133,7 @@ TEST(InputChoice, ACategoricalInputIsOneInput) {
     data.y(i, 0) += 4.0 * static_cast<double>(i % 4 == 2);
   }
   const llmt::PartitionSummary summary =
-      llmt::fit(data.x, data.y, {.categorical_inputs = {10, 11}}).summary.partitions[0];
+      llmt::fit({.inputs = data.x, .outputs = data.y, .categorical_inputs = {10, 11}}).summary.partitions[0];
   EXPECT_EQ(std::ranges::count(summary.left_out, 10), 0);
   EXPECT_EQ(std::ranges::count(summary.left_out, 11), 1);
 }

@@ -117,9 +117,8 @@ TEST(Invariance, SameBytesAtAnyNumberOfThreadsWithManyBlocksOfRows) {
   for (const llmt::ValidityChoice validity : {llmt::ValidityChoice::crisp, llmt::ValidityChoice::blend}) {
     const auto model_on = [&](int threads) {
       llmt::FitOptions options{.max_leaves = 8, .validity = validity, .max_threads = threads};
-      options.weights = weights;
       options.folds.count = 2;
-      return llmt::to_json(llmt::fit(x, y, options).model);
+      return llmt::to_json(llmt::fit({.inputs = x, .outputs = y, .weights = weights}, options).model);
     };
     const std::string one = model_on(1);
     EXPECT_EQ(model_on(2), one);

@@ -27,8 +27,7 @@ inline const std::vector<ValidityChoice> validities = {ValidityChoice::crisp, Va
 inline llmt::FitOptions only(ValidityChoice validity, Eigen::Index max_leaves, LocalTerms terms,
                              SparseChoice sparse = SparseChoice::never) {
   llmt::FitOptions options;
-  options.significance = 1.0;
-  options.expert.min_variance_gain = -1.0;
+  options.significance = llmt::every_split;
   options.max_leaves = max_leaves;
   options.terms = terms;
   options.sparse = sparse;

@@ -102,9 +102,8 @@ TEST(Quadratic, PredictionIsWhatTheEquationsSayAloneAndInBlocksAndFromAFile) {
         x(i, 1) = missing;
       }
     }
-    llmt::FitOptions options = only(validity, 5, LocalTerms::quadratic);
-    options.categorical_inputs = {3};
-    const llmt::Model model = llmt::fit(x, y, options).model;
+    const llmt::FitOptions options = only(validity, 5, LocalTerms::quadratic);
+    const llmt::Model model = llmt::fit({.inputs = x, .outputs = y, .categorical_inputs = {3}}, options).model;
     ASSERT_EQ(model.regressors().size(), 3U + 2U + 6U);  // numbers, levels, products of numbers
     Eigen::MatrixXd queries = 1.6 * oracle::uniform(200, 4, 4);
     for (Eigen::Index i = 0; i < 200; ++i) {

@@ -35,8 +35,8 @@ TEST(Fit, MistakesInShapesAndLimitsAreNamed) {
               llmt::fit(x, y, {.regression_inputs = {1, 1}});
             }),
             "llmt::fit: regression_inputs names column 1 twice");
-  EXPECT_EQ(thrown([&] { llmt::fit(x, y, {.expert = {.min_improvement = 1.5}}); }),
-            "llmt::fit: expert.min_improvement is 1.5, it must be in [0, 1)");
+  EXPECT_EQ(thrown([&] { llmt::fit(x, y, {.significance = nan}); }),
+            "llmt::fit: significance is nan, it must be a number");
   EXPECT_EQ(thrown([&] { llmt::fit(x, y, {.folds = {.count = 1}}); }),
             "llmt::fit: folds.count is 1, it must be 0 or at least 2");
 }
@@ -52,21 +52,29 @@ TEST(Fit, MistakesInWeightsCategoriesAndBlendsAreNamed) {
   const auto starts = [](const std::string& text, const std::string& with) {
     return text.rfind(with, 0) == 0 ? with : text;
   };
-  const std::string category = error([](auto& options) { options.categorical_inputs = {1}; });
+  const auto refused = [&](llmt::TrainingData data) {
+    data.inputs = x;
+    data.outputs = y;
+    return thrown([&] { llmt::fit(data); });
+  };
+  const std::string category = refused({.categorical_inputs = {1}});
   EXPECT_EQ(starts(category, "llmt::fit: a category of input 1 is 0."), "llmt::fit: a category of input 1 is 0.");
   EXPECT_NE(category.find("it must be a whole number from 0 to 9999"), std::string::npos) << category;
   Eigen::MatrixXd halves = x;
   halves.col(1).setConstant(1.5);
-  EXPECT_EQ(thrown([&] { llmt::fit(halves, y, {.categorical_inputs = {1}}); }),
+  EXPECT_EQ(thrown([&] { llmt::fit({.inputs = halves, .outputs = y, .categorical_inputs = {1}}); }),
             "llmt::fit: a category of input 1 is 1.5, it must be a whole number from 0 to 9999");
-  EXPECT_EQ(error([](auto& options) { options.categorical_inputs = {2}; }),
-            "llmt::fit: categorical_inputs names column 2, there are 2");
-  EXPECT_EQ(error([](auto& options) { options.weights = Eigen::VectorXd::Constant(20, -1.0); }),
+  EXPECT_EQ(refused({.categorical_inputs = {2}}), "llmt::fit: categorical_inputs names column 2, there are 2");
+  EXPECT_EQ(refused({.weights = Eigen::VectorXd::Constant(20, -1.0)}),
             "llmt::fit: a weight is -1, it must be at least 0");
-  EXPECT_EQ(error([](auto& options) { options.weights = Eigen::VectorXd::Zero(20); }),
-            "llmt::fit: the largest weight is 0, it must be positive");
-  EXPECT_EQ(error([](auto& options) { options.weights = Eigen::VectorXd::Ones(19); }),
-            "llmt::fit: weights has 19 entries, inputs has 20 rows");
+  EXPECT_EQ(refused({.weights = Eigen::VectorXd::Zero(20)}), "llmt::fit: the largest weight is 0, it must be positive");
+  EXPECT_EQ(refused({.weights = Eigen::VectorXd::Ones(19)}), "llmt::fit: weights has 19 entries, inputs has 20 rows");
+  EXPECT_EQ(refused({.groups = {1.0, 2.0}}), "llmt::fit: groups has 2 entries, inputs has 20 rows");
+  EXPECT_EQ(refused({.levels = {{"a", "b"}}}), "llmt::fit: levels has 1 entries, there are 2 inputs");
+  EXPECT_EQ(thrown([&] {
+              llmt::fit({.inputs = x.array().ceil() + 1.0, .outputs = y, .levels = {{"a", "b"}, {}}});
+            }),
+            "llmt::fit: a category of input 0 is 2, it must be a whole number from 0 to 1: it has 2 levels");
   EXPECT_EQ(error([](auto& options) { options.expert.widths = {0.0}; }),
             "llmt::fit: expert.widths is 0, it must be finite and positive");
   EXPECT_EQ(error([](auto& options) {

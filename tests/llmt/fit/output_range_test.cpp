@@ -173,10 +173,9 @@ TEST(RangeGuard, RowsThatTakeNoPartDoNotWidenTheRange) {
   for (const int row : {40, 140, 240, 340}) y(row) = 60.0;
   llmt::FitOptions robust = options();
   robust.loss = llmt::Loss::tukey;
-  llmt::FitOptions weighted = options();
-  weighted.weights = (y.array() > 1.0).select(0.0, Eigen::VectorXd::Ones(600));
-  for (const llmt::FitOptions& each : {robust, weighted}) {
-    const llmt::FitResult result = llmt::fit(x, y, each);
+  const Eigen::VectorXd weights = (y.array() > 1.0).select(0.0, Eigen::VectorXd::Ones(600));
+  for (const llmt::FitResult& result :
+       {llmt::fit(x, y, robust), llmt::fit({.inputs = x, .outputs = y, .weights = weights}, options())}) {
     EXPECT_TRUE(result.summary.partitions[0].range_guards[0].taken);
     EXPECT_EQ(result.model.partitions()[0].output_range, Eigen::RowVector2d(-1.0, 1.0));
   }

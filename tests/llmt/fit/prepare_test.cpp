@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "data/equal_rows.hpp"
+#include "data/given_rows.hpp"
 #include "llmt/fit.hpp"
 #include "llmt/random.hpp"
 #include "llmt/readable.hpp"
@@ -69,19 +70,37 @@ TEST(Prepare, AFitOfPreparedDataIsTheFitOfTheData) {
   }
 }
 
+TEST(Prepare, ResultsHaveTheNamesOfTheData) {
+  llmt::TrainingData data = months(200, 1);
+  data.inputs.col(0).array() -= 1.0;
+  data.categorical_inputs = {0};
+  const llmt::FitOptions options{.max_leaves = 3};
+  const llmt::Model plain = llmt::fit(data, options).model;
+  data.categorical_inputs = {};
+  data.levels = {{"Jan", "Feb", "Mar", "Apr", "May", "Jun"}, {}, {}};
+  data.input_names = {"month", "a", "b"};
+  data.output_names = {"load"};
+  const std::string expected = to_json(plain.named(data.input_names, data.output_names, data.levels));
+  EXPECT_EQ(to_json(llmt::fit(data, options).model), expected);
+  const llmt::PreparedFit prepared(data, options);
+  const llmt::FitResult fitted = llmt::fit(prepared);
+  EXPECT_EQ(to_json(fitted.model), expected);
+  EXPECT_EQ(llmt::fit_readable(prepared, fitted.summary).model.inputs()[0].levels, data.levels[0]);
+}
+
 // Rows that a fold holds out are dealt anew when the loss leaves rows out; which rows are equal is known before.
 TEST(Prepare, FewerRowsAreNumberedAsTheyWouldBeAlone) {
   llmt::TrainingData data = months(60, 1);
   data.inputs = data.inputs.replicate(3, 1).eval();
   data.outputs = data.outputs.replicate(3, 1).eval();
   const llmt::FitOptions options;
-  const llmt::GivenRows given = llmt::given_rows(data.inputs, data.outputs, options);
+  const llmt::GivenRows given = llmt::checked(llmt::given_rows(data), options);
   std::vector<Eigen::Index> rows;
   for (Eigen::Index row = 0; row < 180; row += 1 + row % 4) rows.push_back(row);
   const llmt::GivenRows some = llmt::rows_at(given, rows);
-  const llmt::GivenRows alone = llmt::given_rows(some.inputs.values, some.outputs.values, options);
-  EXPECT_EQ(some.numbers.by_inputs, alone.numbers.by_inputs);
-  EXPECT_EQ(some.numbers.by_all, alone.numbers.by_all);
+  const llmt::GivenRows alone = llmt::checked({.inputs = some.inputs, .outputs = some.outputs}, options);
+  EXPECT_EQ(some.numbers->by_inputs, alone.numbers->by_inputs);
+  EXPECT_EQ(some.numbers->by_all, alone.numbers->by_all);
   const llmt::KeptRows kept = llmt::keep(some, options.folds);
   EXPECT_EQ(kept.copies, llmt::keep(alone, options.folds).copies);
   EXPECT_LT(kept.count(), std::ssize(rows));
@@ -91,7 +110,7 @@ TEST(Prepare, FewerRowsAreNumberedAsTheyWouldBeAlone) {
 TEST(Prepare, ATrainingMayBeMoved) {
   const llmt::TrainingData data = months(40, 1);
   llmt::Work uncounted;
-  const llmt::GivenRows given = llmt::given_rows(data.inputs, data.outputs, {});
+  const llmt::GivenRows given = llmt::checked(llmt::given_rows(data), {});
   const llmt::PreparedRows rows = llmt::prepare_plain(given, {}, uncounted);
   std::vector<llmt::Training> moved;
   moved.push_back(llmt::narrowed(*rows.training, {0, 1}, std::vector<std::vector<int>>(5, {0, 1})));

@@ -29,9 +29,7 @@ Rows rows(Eigen::Index count, Eigen::Index inputs, Eigen::Index outputs) {
 // All that the fit made.
 Call fitting(const Rows& rows, const llmt::FitOptions& options) {
   return [=](const llmt::Progress& progress) {
-    llmt::FitOptions with_progress = options;
-    with_progress.progress = progress;
-    const llmt::FitResult result = llmt::fit(rows.x, rows.y, with_progress);
+    const llmt::FitResult result = llmt::fit(rows.x, rows.y, options, progress);
     std::string text = to_json(result.model);
     for (const llmt::Model& model : result.intervals.models()) text += to_json(model);
     return text;

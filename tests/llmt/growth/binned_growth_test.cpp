@@ -8,15 +8,19 @@ namespace {
 
 using oracle::nodes;
 
-llmt::FitResult grow(const Eigen::MatrixXd& x, const Eigen::MatrixXd& y, llmt::SplitSearch search,
-                     Eigen::Index max_leaves, llmt::FitOptions options = {}) {
-  options.significance = 1.0;
-  options.expert.min_variance_gain = -1.0;
+llmt::FitResult grow(const llmt::TrainingData& data, llmt::SplitSearch search, Eigen::Index max_leaves,
+                     llmt::FitOptions options = {}) {
+  options.significance = llmt::every_split;
   options.max_leaves = max_leaves;
   options.expert.search = search;
   options.validity = llmt::ValidityChoice::crisp;
   options.folds.count = 0;
-  return llmt::fit(x, y, options);
+  return llmt::fit(data, options);
+}
+
+llmt::FitResult grow(const Eigen::MatrixXd& x, const Eigen::MatrixXd& y, llmt::SplitSearch search,
+                     Eigen::Index max_leaves, const llmt::FitOptions& options = {}) {
+  return grow(llmt::TrainingData{x, y}, search, max_leaves, options);
 }
 
 double rss(const std::vector<llmt::Node>& tree) {
@@ -69,11 +73,11 @@ TEST(BinnedGrowth, CategoriesWeightsAndSharedOutputsAreThoseOfTheExactSearch) {
     y.row(i).array() += x(i, 3) == 2.0 || x(i, 3) == 5.0 ? 2.0 * x(i, 0) : 0.0;
   }
   llmt::FitOptions options;
-  options.categorical_inputs = {3};
   options.shared_partition = true;
-  options.weights = oracle::uniform(9000, 1, 9).array().abs() + 0.1;
-  expect_same_tree(nodes(grow(x, y, llmt::SplitSearch::binned, 10, options)),
-                   nodes(grow(x, y, llmt::SplitSearch::exact, 10, options)), 1e-11);
+  llmt::TrainingData data{.inputs = x, .outputs = y, .categorical_inputs = {3}};
+  data.weights = oracle::uniform(9000, 1, 9).array().abs() + 0.1;
+  expect_same_tree(nodes(grow(data, llmt::SplitSearch::binned, 10, options)),
+                   nodes(grow(data, llmt::SplitSearch::exact, 10, options)), 1e-11);
 }
 
 TEST(BinnedGrowth, ConstantAndCollinearColumnsKeepTheRankAndTheModelOfTheExactSearch) {

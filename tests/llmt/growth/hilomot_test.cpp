@@ -195,11 +195,9 @@ TEST(Hilomot, MissingValuesCategoriesWeightsAndSeveralOutputs) {
       x(i, i % 3) = missing;
     }
   }
-  llmt::FitOptions options = hilomot(6);
-  options.categorical_inputs = {3};
-  options.weights = Eigen::VectorXd::Ones(500);
-  options.weights.tail(250).setConstant(2.0);
-  const llmt::Model model = llmt::fit(x, y, options).model;
+  llmt::TrainingData data{.inputs = x, .outputs = y, .weights = Eigen::VectorXd::Ones(500), .categorical_inputs = {3}};
+  data.weights.tail(250).setConstant(2.0);
+  const llmt::Model model = llmt::fit(data, hilomot(6)).model;
   // The slopes of one category are its own: that is worth more than any plane, and stays a split on categories.
   const llmt::Node& root = model.partitions()[0].nodes[0];
   EXPECT_EQ(root.split_input, 3);
@@ -219,8 +217,9 @@ TEST(Hilomot, MissingValuesCategoriesWeightsAndSeveralOutputs) {
   const Eigen::MatrixXd without = numbers.predict(query);
   query.col(1).setConstant(numbers.inputs()[1].centre);
   EXPECT_LT((without - numbers.predict(query)).cwiseAbs().maxCoeff(), 1e-12);
+  llmt::FitOptions options = hilomot(6);
   options.shared_partition = true;
-  EXPECT_TRUE(llmt::fit(x, y, options).model.predict(x).allFinite());
+  EXPECT_TRUE(llmt::fit(data, options).model.predict(x).allFinite());
 }
 
 TEST(Hilomot, RefusesOtherValidities) {

@@ -18,10 +18,14 @@ using oracle::nodes;
 using oracle::PlainM5;
 using Rows = std::vector<Eigen::Index>;
 
-llmt::FitResult grow_m5(const Eigen::MatrixXd& x, const Eigen::MatrixXd& y, llmt::FitOptions options = {}) {
+llmt::FitResult grow_m5(const llmt::TrainingData& data, llmt::FitOptions options = {}) {
   options.rule = llmt::GrowthRule::m5;
   options.folds.count = 0;
-  return llmt::fit(x, y, options);
+  return llmt::fit(data, options);
+}
+
+llmt::FitResult grow_m5(const Eigen::MatrixXd& x, const Eigen::MatrixXd& y, const llmt::FitOptions& options = {}) {
+  return grow_m5(llmt::TrainingData{x, y}, options);
 }
 
 // Number of leaves that were compared.
@@ -176,9 +180,7 @@ TEST(M5, CategoriesAreCutInTheOrderOfTheirMeans) {
   for (Eigen::Index i = 0; i < 600; ++i) {
     y(i) = x(i, 1) == 0.0 || x(i, 1) == 4.0 || x(i, 1) == 5.0 ? 10.0 * x(i, 0) : -20.0;
   }
-  llmt::FitOptions options;
-  options.categorical_inputs = {1};
-  const llmt::FitResult result = grow_m5(x, y, options);
+  const llmt::FitResult result = grow_m5({.inputs = x, .outputs = y, .categorical_inputs = {1}});
   const std::vector<int>& sides = nodes(result)[0].level_side;
   EXPECT_EQ(nodes(result)[0].split_input, 1);
   EXPECT_EQ(sides, (std::vector<int>{1, -1, -1, -1, 1, 1}));
@@ -187,18 +189,17 @@ TEST(M5, CategoriesAreCutInTheOrderOfTheirMeans) {
 TEST(M5, MissingValuesMayTellSomethingAndRowsOfNoWeightDoNot) {
   Eigen::MatrixXd x = oracle::uniform(600, 2, 12);
   Eigen::VectorXd y = x.col(0);
-  llmt::FitOptions options;
-  options.weights = Eigen::VectorXd::Ones(600);
+  Eigen::VectorXd weights = Eigen::VectorXd::Ones(600);
   for (Eigen::Index i = 0; i < 600; ++i) {
     if (i % 3 == 0) {
       x(i, 1) = std::nan("");
       y(i) += 20.0;
     } else if (i % 3 == 1) {
-      options.weights(i) = 0.0;
+      weights(i) = 0.0;
       y(i) = -1e6;
     }
   }
-  const llmt::FitResult result = grow_m5(x, y, options);
+  const llmt::FitResult result = grow_m5({.inputs = x, .outputs = y, .weights = weights});
   EXPECT_EQ(nodes(result)[0].split_input, 1);
   EXPECT_EQ(nodes(result)[0].threshold, std::numeric_limits<double>::max());
   EXPECT_EQ(nodes(result)[0].missing_left, 0.0);
@@ -243,14 +244,12 @@ TEST(M5, WeightsMultiplySquaredErrors) {
   Eigen::MatrixXd twice_y(300, 1);
   twice_x << x, x.topRows(100);
   twice_y << y, y.topRows(100);
-  llmt::FitOptions options;
-  options.weights = Eigen::VectorXd::Ones(200);
-  options.weights.head(100).setConstant(2.0);
-  options.max_leaves = 2;
+  llmt::TrainingData once{.inputs = x, .outputs = y, .weights = Eigen::VectorXd::Ones(200)};
+  once.weights.head(100).setConstant(2.0);
   llmt::FitOptions plain;
   plain.max_leaves = 2;
   // Not the same n, for weights have mean 1; but the root's model drops nothing and is the same.
-  EXPECT_LT((nodes(grow_m5(x, y, options))[0].slope - nodes(grow_m5(twice_x, twice_y, plain))[0].slope).norm(), 1e-10);
+  EXPECT_LT((nodes(grow_m5(once, plain))[0].slope - nodes(grow_m5(twice_x, twice_y, plain))[0].slope).norm(), 1e-10);
 }
 
 TEST(M5, SharedTreesServeAllOutputs) {
@@ -333,9 +332,6 @@ TEST(M5, WhatWouldUndoItsModelsIsRefused) {
             }),
             "llmt::fit: expert.shrinkages is 1, it must be 0 with rule m5, which prunes and smooths its own local "
             "models");
-  EXPECT_EQ(message([](llmt::FitOptions& options) { options.expert.min_improvement = 0.02; }),
-            "llmt::fit: expert.min_improvement is 0.02, it must be 0 with rule m5, which prunes and smooths its own "
-            "local models");
 }
 
 TEST(M5, StandsAmongTheUsualMethods) {

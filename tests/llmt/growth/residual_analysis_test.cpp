@@ -44,11 +44,15 @@ long double student(const std::vector<double>& a, const std::vector<double>& b, 
   return (mean_a - mean_b) / std::sqrt(variance * (1.0L / n_a + 1.0L / n_b));
 }
 
-llmt::FitResult grow_ra(const Eigen::MatrixXd& x, const Eigen::MatrixXd& y, llmt::FitOptions options = {}) {
+llmt::FitResult grow_ra(const llmt::TrainingData& data, llmt::FitOptions options = {}) {
   options.rule = llmt::GrowthRule::ra;
   options.validity = llmt::ValidityChoice::crisp;
   options.folds.count = 0;
-  return llmt::fit(x, y, options);
+  return llmt::fit(data, options);
+}
+
+llmt::FitResult grow_ra(const Eigen::MatrixXd& x, const Eigen::MatrixXd& y, const llmt::FitOptions& options = {}) {
+  return grow_ra(llmt::TrainingData{x, y}, options);
 }
 
 TEST(ResidualAnalysis, StatisticsAreThoseOfATextbook) {
@@ -262,9 +266,7 @@ TEST(ResidualAnalysis, CategoriesMissingValuesAndWeightsAreFollowed) {
     for (Eigen::Index i = 0; i < rows; ++i) {
       y(i) = (x(i, 2) == 1.0 || x(i, 2) == 3.0 ? 4.0 : -4.0) * x(i, 0);
     }
-    llmt::FitOptions options;
-    options.categorical_inputs = {2};
-    const llmt::FitResult by_levels = grow_ra(x, y, options);
+    const llmt::FitResult by_levels = grow_ra({.inputs = x, .outputs = y, .categorical_inputs = {2}});
     EXPECT_EQ(nodes(by_levels)[0].split_input, 2);
     EXPECT_EQ(nodes(by_levels)[0].level_side[1], nodes(by_levels)[0].level_side[3]);
     EXPECT_LT(by_levels.summary.partitions[0].train_rmse(0), 1e-9);
@@ -272,17 +274,16 @@ TEST(ResidualAnalysis, CategoriesMissingValuesAndWeightsAreFollowed) {
     // Rows without a value: a group of their own. Rows of weight 0 take no part.
     Eigen::MatrixXd gappy = x.leftCols(2);
     Eigen::VectorXd z = gappy.col(0);
-    options.categorical_inputs = {};
-    options.weights = Eigen::VectorXd::Ones(rows);
+    Eigen::VectorXd weights = Eigen::VectorXd::Ones(rows);
     for (Eigen::Index i = 0; i < rows; i += 3) {
       gappy(i, 1) = std::nan("");
       z(i) += 7.0;
     }
     for (Eigen::Index i = 1; i < rows; i += 3) {
-      options.weights(i) = 0.0;
+      weights(i) = 0.0;
       z(i) = 1e3;
     }
-    const llmt::FitResult by_missing = grow_ra(gappy, z, options);
+    const llmt::FitResult by_missing = grow_ra({.inputs = gappy, .outputs = z, .weights = weights});
     EXPECT_EQ(nodes(by_missing)[0].split_input, 1);
     EXPECT_EQ(nodes(by_missing)[0].threshold, std::numeric_limits<double>::max());
     EXPECT_LT(by_missing.summary.partitions[0].train_rmse(0), 1e-9);

@@ -19,7 +19,7 @@ std::vector<llmt::Node> one_split(const Eigen::MatrixXd& x, const Eigen::MatrixX
   std::iota(rows.begin(), rows.end(), 0);
   const llmt::TrainingRows training = llmt::training_rows(table, rows);
   llmt::GrowthProblem problem{&training, {0}, {}, 0};
-  problem.options = {.significance = 1.0, .min_variance_gain = -1.0, .min_leaf_samples = min_leaf, .max_leaves = 2};
+  problem.options = {.significance = llmt::every_split, .min_leaf_samples = min_leaf, .max_leaves = 2};
   problem.options.split_inputs = inputs;
   return llmt::grow(problem).nodes;
 }

@@ -105,15 +105,14 @@ TEST(RobustLoss, OutputBesideWhichAllOthersAreRoundingErrors) {
 }
 
 TEST(RobustLoss, WeightsOfTheCallerAreKept) {
-  Sample s = sample(400, 1);
-  llmt::FitOptions options = tukey;
-  options.weights = Eigen::VectorXd::Ones(400);
-  options.weights.head(100).setZero();
-  const llmt::FitResult some = llmt::fit(s.x, s.y, options);
+  const Sample s = sample(400, 1);
+  llmt::TrainingData data{s.x, s.y, Eigen::VectorXd::Ones(400)};
+  data.weights.head(100).setZero();
+  const llmt::FitResult some = llmt::fit(data, tukey);
   EXPECT_EQ(some.summary.samples, (some.summary.loss_weights.tail(300).array() > 0.0).count());
   EXPECT_TRUE((some.summary.loss_weights.head(100).array() == 0.0).all());
-  s.y.topRows(100).setConstant(1e6);  // rows that take no part
-  const llmt::FitResult same = llmt::fit(s.x, s.y, options);
+  data.outputs.topRows(100).setConstant(1e6);  // rows that take no part
+  const llmt::FitResult same = llmt::fit(data, tukey);
   EXPECT_EQ(llmt::to_json(same.model), llmt::to_json(some.model));
 }
 

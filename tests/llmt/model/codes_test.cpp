@@ -30,7 +30,7 @@ llmt::FitResult fitted() {
     x(i, 0) = i % 4;
     y(i, 0) = (i % 4 == 1 ? -1.0 : i % 4 == 3 ? 3.0 : 1.0) * (1.0 + x(i, 1));
   }
-  return llmt::fit(x, y, {.choose_inputs = false, .categorical_inputs = {0}});
+  return llmt::fit({.inputs = x, .outputs = y, .categorical_inputs = {0}}, {.choose_inputs = false});
 }
 
 llmt::Model coded(const llmt::Model& model) { return llmt::with_codes(model, {codes, {}, {}}); }

@@ -38,8 +38,8 @@ llmt::FitResult fitted_with_levels(Eigen::Index outputs = 2) {
   for (Eigen::Index o = 0; o < outputs; ++o) {
     y.col(o) = (x.col(0).array() * (o == 0 ? 1.0 : 2.0)).abs() + x.col(1).array();
   }
-  llmt::FitResult result =
-      llmt::fit(x, y, {.max_leaves = 4, .validity = llmt::ValidityChoice::blend, .categorical_inputs = {1}});
+  llmt::FitResult result = llmt::fit({.inputs = x, .outputs = y, .categorical_inputs = {1}},
+                                     {.max_leaves = 4, .validity = llmt::ValidityChoice::blend});
   result.model = result.model.named({"a", "kind"},
                                     outputs == 2 ? std::vector<std::string>{"u", "v"} : std::vector<std::string>{"u"},
                                     {{}, {"red", "green", "blue"}});

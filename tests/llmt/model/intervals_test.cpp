@@ -146,9 +146,7 @@ TEST(Intervals, AnUnknownCategoryIsMissing) {
   Sample train = lacking(300, 0.0, 9);
   train.x.col(0) = (3.0 * train.x.col(0)).array().floor();
   for (Eigen::Index row = 0; row < 40; ++row) train.x(row, 0) = oracle::missing;
-  llmt::FitOptions options;
-  options.categorical_inputs = {0};
-  const llmt::FitResult fit = llmt::fit(train.x, train.y, options);
+  const llmt::FitResult fit = llmt::fit({.inputs = train.x, .outputs = train.y, .categorical_inputs = {0}});
   Eigen::MatrixXd x(2, 3);
   x << 7.0, 0.5, 0.0, oracle::missing, 0.5, 0.0;
   const llmt::Bounds bounds = fit.intervals.predict(x, 0.9);

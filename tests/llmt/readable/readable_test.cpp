@@ -31,9 +31,13 @@ Data two_regimes(Eigen::Index rows, double noise, std::uint64_t seed = 1) {
   return data;
 }
 
-llmt::ReadableResult readable(const Data& data, const llmt::FitOptions& options = {}, double loss = 0.1) {
-  const llmt::PreparedFit prepared({data.inputs, data.outputs}, options);
+llmt::ReadableResult readable(const llmt::TrainingData& data, const llmt::FitOptions& options = {}, double loss = 0.1) {
+  const llmt::PreparedFit prepared(data, options);
   return llmt::fit_readable(prepared, llmt::fit(prepared).summary, loss);
+}
+
+llmt::ReadableResult readable(const Data& data, const llmt::FitOptions& options = {}, double loss = 0.1) {
+  return readable(llmt::TrainingData{data.inputs, data.outputs}, options, loss);
 }
 
 llmt::FitOptions crisp() {
@@ -109,9 +113,9 @@ TEST(Readable, PredictsWhatItsEquationsSayWithinTheTrainingExtent) {
   const Data data = mixed(400);
   for (const llmt::LocalTerms terms : {llmt::LocalTerms::linear, llmt::LocalTerms::quadratic}) {
     llmt::FitOptions options = crisp();
-    options.categorical_inputs = {2};
     options.terms = terms;
-    const llmt::ReadableResult result = readable(data, options, 0.02);
+    const llmt::TrainingData rows{.inputs = data.inputs, .outputs = data.outputs, .categorical_inputs = {2}};
+    const llmt::ReadableResult result = readable(rows, options, 0.02);
     EXPECT_GT(result.partitions[0].leaves, 1);
     const Eigen::MatrixXd predicted = result.model.predict(data.inputs);
     for (Eigen::Index i = 0; i < data.inputs.rows(); ++i) {
@@ -260,11 +264,10 @@ TEST(Readable, RowsOfNoWeightAndOutliersOfTheTukeyLossTakeNoPart) {
   with_more.outputs.conservativeResize(410, Eigen::NoChange);
   with_more.inputs.bottomRows(10).setConstant(0.9);
   with_more.outputs.bottomRows(10).setConstant(1e4);
+  llmt::TrainingData weighted{with_more.inputs, with_more.outputs, Eigen::VectorXd::Ones(410)};
+  weighted.weights.tail(10).setZero();
+  EXPECT_EQ(llmt::to_json(readable(weighted, crisp()).model), llmt::to_json(clean.model));
   llmt::FitOptions options = crisp();
-  options.weights = Eigen::VectorXd::Ones(410);
-  options.weights.tail(10).setZero();
-  EXPECT_EQ(llmt::to_json(readable(with_more, options).model), llmt::to_json(clean.model));
-  options = crisp();
   options.loss = llmt::Loss::tukey;
   EXPECT_EQ(readable(with_more, options).partitions[0].leaves, 2);
 }
@@ -292,12 +295,12 @@ TEST(Readable, RefusesWhatItCannotKeep) {
   options = {};
   options.rule = llmt::GrowthRule::lolimot;
   refused(options, 0.1, "rule");
-  options = crisp();
-  options.monotone = {1, 0, 0, 0, 0, 0};
-  refused(options, 0.1, "monotone");
-  options = crisp();
-  options.slope_signs = {1, 0, 0, 0, 0, 0};
-  refused(options, 0.1, "slope_signs");
+  for (const llmt::Trend trend : {llmt::Trend::rising, llmt::Trend::falling_slopes}) {
+    options = crisp();
+    options.trends.assign(6, llmt::Trend::any);
+    options.trends[4] = trend;
+    refused(options, 0.1, "trends");
+  }
 }
 
 }  // namespace

@@ -18,26 +18,15 @@ namespace {
 // Weight of the prior in the m-estimates of RETIS, in rows: the error of one model for all data.
 constexpr double prior_rows = 2.0;
 
-// Splits over which ExpertOptions::min_improvement takes the mean. One split alone may help little before the next one
-// helps much.
-constexpr Eigen::Index improvement_lookahead = 10;
-
 // Whether the leaf's local model reproduces the outputs to rounding.
 bool is_exact(const GrowthData& data, const OpenLeaf& leaf, const Node& node) {
   return (node.rss.array() <= leaf.weight * data.rounding.array().square()).all();
 }
 
-// Whether the best split of the leaf lowers the residual variance enough (docs/algorithms/growth.md, G.4).
-bool lowers_variance(const GrowthData& data, const OpenLeaf& leaf, int rank) {
-  const double least = data.problem.options.min_variance_gain;
-  if (!(least >= 0.0)) return true;
-  // The weights make the outputs' sums of squares 1 each, so that (rows - 1) times a residual variance is a fraction of
-  // the variance.
-  const double to_fraction = (data.total_weight - 1.0) / static_cast<double>(data.output_weights.size());
+// Whether the residual variance rises by the best split of the leaf (docs/algorithms/growth.md, G.4).
+bool raises_variance(const OpenLeaf& leaf, int rank) {
   const double freedom = leaf.weight - leaf.best.rank_left - leaf.best.rank_right;
-  const double before = leaf.rss / (leaf.weight - rank);
-  const double after = leaf.best.rss / freedom;
-  return freedom > 0.0 && (before - after) * to_fraction >= least;
+  return !(freedom > 0.0 && leaf.best.rss / freedom <= leaf.rss / (leaf.weight - rank));
 }
 
 // Why the leaf's best split is not to be made, if so.
@@ -51,17 +40,8 @@ std::optional<StopReason> refusal(const GrowthData& data, const OpenLeaf& leaf, 
                            best.rss, best.tested)) {
     return StopReason::significance;
   }
-  if (!lowers_variance(data, leaf, node.rank)) return StopReason::variance_gain;
+  if (options.significance < every_split && raises_variance(leaf, node.rank)) return StopReason::variance_gain;
   return std::nullopt;
-}
-
-// Whether the last splits improved the tree by less than ExpertOptions::min_improvement asks for. `tree_rss`: weighted
-// RSS of the tree with 1, 2, ... leaves.
-bool improves_too_little(const std::vector<double>& tree_rss, double min_improvement) {
-  const Eigen::Index splits = std::ssize(tree_rss) - 1;
-  if (!(min_improvement > 0.0) || splits < improvement_lookahead) return false;
-  const double before = tree_rss[splits - improvement_lookahead];
-  return tree_rss.back() > std::pow(1.0 - min_improvement, static_cast<double>(improvement_lookahead)) * before;
 }
 
 // From the scaled outputs of growth to the outputs' units.
@@ -83,7 +63,6 @@ class BestFirstTree {
   StopReason split_leaves();
   void split(std::size_t position);
   void enter(OpenLeaf leaf);
-  void drop_lookahead();
   StopReason most_frequent_refusal() const;
   bool prune_by_m_estimates();
 
@@ -94,7 +73,6 @@ class BestFirstTree {
   std::vector<std::optional<OpenLeaf>> leaves_;
   std::priority_queue<ByGain<std::size_t>> queue_;  // positions in leaves_
   std::map<StopReason, Eigen::Index> refusals_;     // number of leaves that are not split, by reason
-  std::vector<double> tree_rss_;                    // weighted, with 1, 2, ... leaves
   SearchSummary search_;
 };
 
@@ -120,19 +98,14 @@ void BestFirstTree::open_root() {
   OpenLeaf root = open_.root(parentless);
   open_.examine(root, parentless, nodes_[0]);
   data_.problem.searched(data_.training.count());
-  tree_rss_ = {root.rss};
   enter(std::move(root));
 }
 
 StopReason BestFirstTree::split_leaves() {
-  const GrowthOptions& options = data_.problem.options;
+  const Eigen::Index most = data_.problem.options.max_leaves;
   while (!queue_.empty()) {
     const Eigen::Index leaves = (std::ssize(nodes_) + 1) / 2;
-    if (options.max_leaves > 0 && leaves >= options.max_leaves) return StopReason::max_leaves;
-    if (improves_too_little(tree_rss_, options.min_improvement)) {
-      drop_lookahead();
-      return StopReason::improvement;
-    }
+    if (most > 0 && leaves >= most) return StopReason::max_leaves;
     const std::size_t next = queue_.top().content;
     queue_.pop();
     split(next);
@@ -162,7 +135,6 @@ void BestFirstTree::split(std::size_t position) {
   node.level_side = leaf.best.level_side;
   node.threshold = open_.threshold(leaf, node, nodes_[node.left], nodes_[node.right]);
   node.missing_left = missing_left;
-  tree_rss_.push_back(tree_rss_.back() - (leaf.rss - children[0].rss - children[1].rss));
   for (OpenLeaf& child : children) {
     enter(std::move(child));
   }
@@ -184,13 +156,6 @@ void BestFirstTree::enter(OpenLeaf leaf) {
   }
   queue_.push({static_cast<float>(leaf.rss - leaf.best.rss), leaf.node, leaves_.size()});
   leaves_.emplace_back(std::move(leaf));
-}
-
-// Undoes the last splits, which showed that further growth does not pay.
-void BestFirstTree::drop_lookahead() {
-  const Eigen::Index leaves = std::ssize(tree_rss_) - improvement_lookahead;
-  nodes_ = prefix(Partition{.outputs = {}, .nodes = std::move(nodes_)}, leaves).nodes;
-  gains_ = gains_of_splits(nodes_, std::move(gains_));
 }
 
 // Of equally frequent reasons the first one in StopReason.

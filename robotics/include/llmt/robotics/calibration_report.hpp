@@ -42,7 +42,7 @@ struct ReportOptions {
   int correction_folds = 5;  ///< for the correction's leaf count, within every fold; 0: as grown
   std::uint64_t seed = 1;
   int max_threads = 0;
-  Progress progress = {};  ///< the steps are "all poses", "fold 1", ...; that of `correction` is not used
+  Progress progress = {};  ///< the steps are "all poses", "fold 1", ...
 };
 
 /// Distances between one of the three models and the measured points (or of measured distances), and the angles between

@@ -37,8 +37,10 @@ struct CorrectedRobot {
 
 /// Grows one tree per output on the residuals (or one for all: FitOptions::growth). Outputs whose residuals are all
 /// zero get none. Where a stand of the arm has several readings, its displacement and rotation are those of least
-/// squares. Throws std::invalid_argument as llmt::fit(), and for distances.
-FitResult fit_correction(const Robot& robot, const Measurements& measurements, const FitOptions& options = {});
+/// squares. `groups`: as TrainingData::groups, one a pose; where a stand has several readings, each stand is a group.
+/// Throws std::invalid_argument as llmt::fit(), and for distances.
+FitResult fit_correction(const Robot& robot, const Measurements& measurements, const FitOptions& options = {},
+                         const std::vector<double>& groups = {}, const Progress& progress = {});
 
 /// What an instrument would read, n x 3, mm, as positions() of a robot. Throws std::invalid_argument if the model's
 /// inputs are not the robot's joints in their order, named q1_rad, q2_rad, ... (_mm if prismatic), or an output is none

@@ -1,0 +1,83 @@
+#include "data/given_rows.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "base/checks.hpp"
+#include "llmt/options.hpp"
+
+namespace llmt {
+namespace {
+
+void check_count(const char* what, std::size_t count, Eigen::Index columns, const char* of) {
+  if (std::cmp_equal(count, columns)) return;
+  throw std::invalid_argument(fmt::format("llmt::fit: {} has {} entries, there are {} {}", what, count, columns, of));
+}
+
+void check_different(const std::string& what, const std::vector<std::string>& names) {
+  std::vector<std::string_view> sorted(names.begin(), names.end());
+  std::ranges::sort(sorted);
+  const auto found = std::ranges::adjacent_find(sorted);
+  if (found == sorted.end()) return;
+  throw std::invalid_argument(fmt::format("llmt::fit: two entries of {} are \"{}\"", what, *found));
+}
+
+void check_names(const TrainingData& data) {
+  if (!data.input_names.empty()) check_count("input_names", data.input_names.size(), data.inputs.cols(), "inputs");
+  if (!data.output_names.empty()) check_count("output_names", data.output_names.size(), data.outputs.cols(), "outputs");
+  if (!data.levels.empty()) check_count("levels", data.levels.size(), data.inputs.cols(), "inputs");
+  check_different("input_names", data.input_names);
+  check_different("output_names", data.output_names);
+  for (std::size_t j = 0; j < data.levels.size(); ++j) {
+    const std::size_t count = data.levels[j].size();
+    if (std::cmp_greater(count, most_categories)) {
+      throw std::invalid_argument(
+          fmt::format("llmt::fit: levels[{}] has {} entries, it must have at most {}", j, count, most_categories));
+    }
+    check_different(fmt::format("levels[{}]", j), data.levels[j]);
+  }
+}
+
+void check_categories(const TrainingData& data, int input, std::size_t count, const std::string& why = "") {
+  for (const double value : data.inputs.col(input)) {
+    if (std::isnan(value) || (value >= 0.0 && value < static_cast<double>(count) && value == std::floor(value)))
+      continue;
+    throw std::invalid_argument(
+        fmt::format("llmt::fit: a category of input {} is {}, it must be a whole number from 0 to {}{}", input, value,
+                    count - 1, why));
+  }
+}
+
+std::vector<int> categorical_of(const TrainingData& data) {
+  std::vector<int> categorical = data.categorical_inputs;
+  check_columns("llmt::fit", "categorical_inputs", categorical, data.inputs.cols());
+  for (const int input : categorical) check_categories(data, input, most_categories);
+  for (int input = 0; input < std::ssize(data.levels); ++input) {
+    const std::size_t count = data.levels[input].size();
+    if (count == 0) continue;
+    check_categories(data, input, count, fmt::format(": it has {} levels", count));
+    if (std::ranges::find(categorical, input) == categorical.end()) categorical.push_back(input);
+  }
+  return categorical;
+}
+
+}  // namespace
+
+GivenRows given_rows(const TrainingData& data) {
+  check_names(data);
+  return {.inputs = {data.inputs},
+          .outputs = {data.outputs},
+          .weights = data.weights,
+          .groups = data.groups,
+          .categorical = categorical_of(data),
+          .may_have_codes = data.may_have_codes};
+}
+
+}  // namespace llmt
