@@ -2,16 +2,14 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cmath>
 #include <memory>
-#include <numeric>
 #include <stdexcept>
 
 #include "llmt/commands.hpp"
 #include "llmt/csv.hpp"
 #include "llmt/model.hpp"
 #include "llmt/model_file.hpp"
+#include "report/model/explanation.hpp"
 #include "report/table/columns.hpp"
 #include "shared/cli.hpp"
 #include "shared/options.hpp"
@@ -29,15 +27,6 @@ struct ExplainArguments {
   int threads = 0;
 };
 
-// Inputs, the largest magnitude first; equal ones in the order of the columns.
-std::vector<std::size_t> by_size(const Eigen::VectorXd& values) {
-  std::vector<std::size_t> order(values.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::ranges::stable_sort(order,
-                           [&](std::size_t a, std::size_t b) { return std::abs(values(a)) > std::abs(values(b)); });
-  return order;
-}
-
 void warn_if_not_finite(const ExplainArguments& arguments, const char* what, const Eigen::MatrixXd& values) {
   if (const Eigen::Index count = values.size() - values.array().isFinite().count(); count > 0) {
     warn(fmt::format("llmt: warning: {} of {} {} are not finite: numbers of {} are too large for these rows", count,
@@ -46,33 +35,15 @@ void warn_if_not_finite(const ExplainArguments& arguments, const char* what, con
 }
 
 void explain_table(const ExplainArguments& arguments, const Model& model, const Eigen::MatrixXd& inputs) {
-  const Eigen::MatrixXd shares = importance(model, inputs, arguments.threads);
-  warn_if_not_finite(arguments, "importances", shares);
-  const Eigen::Index used = std::min(inputs.rows(), importance_rows);
-  Json json = {{"model", arguments.model}, {"data", arguments.data}, {"rows", inputs.rows()}, {"rows_used", used}};
-  json["targets"] = Json::array();
-  if (!arguments.json) {
-    print(fmt::format("{}: importance over {} of {} rows\n", table_name(arguments.data), used, inputs.rows()));
-  }
-  for (Eigen::Index o = 0; o < model.num_outputs(); ++o) {
-    const std::string& target = model.outputs()[o].name;
-    Table printed({"input", "importance"});
-    Json entries = Json::array();
-    for (const std::size_t j : by_size(shares.row(o))) {
-      const double share = shares(o, j);
-      printed.add({model.inputs()[j].name, fmt::format("{:.3f}", share)});
-      entries.push_back({{"input", model.inputs()[j].name}, {"importance", share}});
-    }
-    json["targets"].push_back({{"name", target}, {"importance", std::move(entries)}});
-    if (!arguments.json) {
-      print(fmt::format("\n{}\n{}", target, printed.text(output_width())));
-    }
-  }
+  report::TableExplanation explanation{arguments.model, arguments.data, inputs.rows(),
+                                       importance(model, inputs, arguments.threads)};
+  warn_if_not_finite(arguments, "importances", explanation.shares);
   if (arguments.json) {
-    print_json(json);
-  } else {
-    print("\nMean share of each input in how far predictions lie from the one at the means of the inputs.\n");
+    print_json(report::explanation_json(model, explanation));
+    return;
   }
+  explanation.data = table_name(arguments.data);
+  print(report::explanation_text(model, explanation, output_width()));
 }
 
 void explain_row(const ExplainArguments& arguments, const Model& model, const Csv& csv, const Eigen::MatrixXd& inputs) {
@@ -80,50 +51,20 @@ void explain_row(const ExplainArguments& arguments, const Model& model, const Cs
     throw std::invalid_argument(
         fmt::format("--row is {}, {} has {} rows", arguments.row, table_name(arguments.data), inputs.rows()));
   }
-  const Eigen::VectorXd point = inputs.row(arguments.row - 1);
-  const Attribution attribution = attribute(model, point);
-  warn_if_not_finite(arguments, "contributions", attribution.contributions);
-  Json json = {{"model", arguments.model}, {"data", arguments.data}, {"row", arguments.row}};
-  json["targets"] = Json::array();
-  if (!arguments.json) {
-    print(fmt::format("{}: row {}, line {} of the file\n", table_name(arguments.data), arguments.row,
-                      csv.line_of(arguments.row - 1)));
-  }
-  for (Eigen::Index o = 0; o < model.num_outputs(); ++o) {
-    const std::string& target = model.outputs()[o].name;
-    Table printed({"input", "value", "contribution"});
-    Json entries = Json::array();
-    for (const std::size_t j : by_size(attribution.contributions.row(o))) {
-      const double value = point(j);
-      const double contribution = attribution.contributions(o, j);
-      const InputColumn& input = model.inputs()[j];
-      const bool known = !std::isnan(value);
-      const bool is_word = input.is_categorical() && input.codes.empty();
-      const std::string level = known && is_word ? input.levels[static_cast<std::size_t>(value)] : "";
-      const std::string shown = !known ? "missing" : is_word ? level : number(value);
-      printed.add({input.name, shown, number(contribution)});
-      entries.push_back({{"input", input.name},
-                         {"value", !known    ? Json(nullptr)
-                                   : is_word ? Json(level)
-                                             : Json(value)},
-                         {"contribution", contribution}});
-    }
-    json["targets"].push_back({{"name", target},
-                               {"prediction", attribution.prediction(o)},
-                               {"reference", attribution.reference(o)},
-                               {"contributions", std::move(entries)}});
-    if (!arguments.json) {
-      print(fmt::format("\n{}: {} here, {} at the means of the inputs\n{}", target,
-                        number(attribution.prediction(o), 6), number(attribution.reference(o), 6),
-                        printed.text(output_width())));
-      const double sum = attribution.contributions.row(o).sum();
-      print(fmt::format("The contributions add up: {} {} {} = {}\n", number(attribution.reference(o), 6),
-                        sum < 0.0 ? "-" : "+", number(std::abs(sum), 6), number(attribution.prediction(o), 6)));
-    }
-  }
+  report::RowExplanation explanation{arguments.model,
+                                     arguments.data,
+                                     arguments.row,
+                                     csv.line_of(arguments.row - 1),
+                                     inputs.row(arguments.row - 1),
+                                     {}};
+  explanation.attribution = attribute(model, explanation.inputs);
+  warn_if_not_finite(arguments, "contributions", explanation.attribution.contributions);
   if (arguments.json) {
-    print_json(json);
+    print_json(report::explanation_json(model, explanation));
+    return;
   }
+  explanation.data = table_name(arguments.data);
+  print(report::explanation_text(model, explanation, output_width()));
 }
 
 void explain_command(const ExplainArguments& arguments) {

@@ -13,6 +13,7 @@
 #include "llmt/fit.hpp"
 #include "llmt/intervals.hpp"
 #include "llmt/model_file.hpp"
+#include "report/model/prediction.hpp"
 #include "report/table/columns.hpp"
 #include "shared/cli.hpp"
 #include "shared/options.hpp"
@@ -31,20 +32,6 @@ struct PredictArguments {
   int threads = 0;
 };
 
-struct Predicted {
-  std::vector<std::string> targets;
-  Eigen::MatrixXd values;
-  std::vector<Extrapolation> extrapolation;
-  std::optional<Bounds> bounds;
-  Eigen::Index missing = 0;
-  Eigen::Index unknown = 0;
-  Eigen::Index unseen_codes = 0;
-  // RMSE of the targets that the table also holds, in the order of targets; NaN for the others.
-  Eigen::VectorXd rmse;
-
-  Eigen::Index count_not_finite() const { return values.size() - values.array().isFinite().count(); }
-};
-
 // Shortest text that reads back as the same number.
 void append_number(std::string& text, DecimalMark mark, double value) {
   char buffer[32];
@@ -53,21 +40,10 @@ void append_number(std::string& text, DecimalMark mark, double value) {
   text.append(buffer, end.ptr);
 }
 
-Eigen::Index count_outside(const Predicted& predicted) {
-  return std::ranges::count_if(predicted.extrapolation, [](const Extrapolation& row) { return row.distance > 0.0; });
-}
-
-// Local models that are carried beyond their rows although every input lies in its range.
-Eigen::Index count_high_leverage(const Predicted& predicted) {
-  return std::ranges::count_if(predicted.extrapolation, [](const Extrapolation& row) {
-    return row.distance == 0.0 && row.leverage > 1.0 + 1e-9;
-  });
-}
-
-Predicted predict_table(const PredictArguments& arguments, const ModelWithIntervals& file, const Csv& csv) {
+report::Prediction predict_table(const PredictArguments& arguments, const ModelWithIntervals& file, const Csv& csv) {
   const Model& model = file.model;
   const report::ModelInputs inputs = report::read_inputs(csv, model, arguments.threads);
-  Predicted predicted;
+  report::Prediction predicted;
   for (const OutputColumn& output : model.outputs()) {
     predicted.targets.push_back(output.name);
   }
@@ -103,7 +79,7 @@ Predicted predict_table(const PredictArguments& arguments, const ModelWithInterv
 }
 
 // The table as it came, with columns added; piece by piece, because the table is in memory already.
-void write_csv(const Csv& csv, const Predicted& predicted, const TextSink& sink) {
+void write_csv(const Csv& csv, const report::Prediction& predicted, const TextSink& sink) {
   std::vector<std::string> added;
   for (const std::string& target : predicted.targets) {
     added.push_back(target + "_pred");
@@ -149,91 +125,13 @@ void write_csv(const Csv& csv, const Predicted& predicted, const TextSink& sink)
   sink(text);
 }
 
-Json summary_json(const Predicted& predicted, bool with_values) {
-  Json json;
-  json["rows"] = predicted.values.rows();
-  json["outside_rows"] = count_outside(predicted);
-  json["missing_values"] = predicted.missing;
-  json["unknown_categories"] = predicted.unknown;
-  if (predicted.unseen_codes > 0) json["unseen_codes"] = predicted.unseen_codes;
-  if (const Eigen::Index count = predicted.count_not_finite(); count > 0) {
-    json["not_finite_predictions"] = count;
-  }
-  if (predicted.bounds && !predicted.bounds->uncalibrated.empty()) {
-    json["uncalibrated_intervals"] = predicted.bounds->uncalibrated.size();
-  }
-  json["targets"] = Json::array();
-  for (std::size_t o = 0; o < predicted.targets.size(); ++o) {
-    const Eigen::Index column = o;
-    Json target = {{"name", predicted.targets[o]},
-                   {"rmse", std::isfinite(predicted.rmse(column)) ? Json(predicted.rmse(column)) : Json(nullptr)}};
-    if (with_values) {
-      target["predicted"] =
-          std::vector<double>(predicted.values.col(column).begin(), predicted.values.col(column).end());
-      if (predicted.bounds) {
-        const Eigen::VectorXd lower = predicted.bounds->lower.col(column);
-        const Eigen::VectorXd upper = predicted.bounds->upper.col(column);
-        target["low"] = std::vector<double>(lower.begin(), lower.end());
-        target["high"] = std::vector<double>(upper.begin(), upper.end());
-      }
-    }
-    json["targets"].push_back(std::move(target));
-  }
-  if (with_values) {
-    json["outside_by"] = Json::array();
-    json["leverage"] = Json::array();
-    for (const Extrapolation& row : predicted.extrapolation) {
-      json["outside_by"].push_back(std::isfinite(row.distance) ? Json(row.distance) : Json("infinity"));
-      json["leverage"].push_back(row.leverage);
-    }
-  }
-  return json;
-}
-
-void summarise(const PredictArguments& arguments, const Predicted& predicted) {
-  const Eigen::Index outside = count_outside(predicted);
-  std::string text = fmt::format("{}: {} rows predicted", table_name(arguments.data), predicted.values.rows());
-  for (std::size_t o = 0; o < predicted.targets.size(); ++o) {
-    const double error = predicted.rmse(o);
-    text += std::isnan(error) ? "" : fmt::format("; RMSE of {} {}", predicted.targets[o], number(error));
-  }
-  if (outside > 0) {
-    double farthest = 0.0;
-    for (const Extrapolation& row : predicted.extrapolation) {
-      farthest = std::max(farthest, row.distance);
-    }
-    text += fmt::format("; {} outside the range of the training rows, by up to {} % of an input's range", outside,
-                        number(100.0 * farthest, 2));
-  }
-  if (const Eigen::Index rows = count_high_leverage(predicted); rows > 0) {
-    text += fmt::format(
-        "; {} within the range of every input, but an unusual combination of them (leverage above 1): take "
-        "these predictions for extrapolation",
-        rows);
-  }
-  if (predicted.missing > 0) {
-    text += fmt::format("; {} missing values", predicted.missing);
-  }
-  if (predicted.unknown > 0) {
-    text += fmt::format("; {} values of categories that were not in training, taken as missing", predicted.unknown);
-  }
-  if (predicted.unseen_codes > 0) {
-    text += fmt::format("; {} codes that were not in training, taken as the nearest", predicted.unseen_codes);
-  }
-  if (predicted.bounds && !predicted.bounds->uncalibrated.empty()) {
-    text += fmt::format("; likely too narrow, because too few training rows had an empty cell: {} intervals",
-                        predicted.bounds->uncalibrated.size());
-  }
-  warn(text);
-}
-
 void predict_command(const PredictArguments& arguments) {
   const ModelWithIntervals file =
       read_unless_exchanged(arguments.model, arguments.data, model_comes_first,
                             [&](const std::string& path) { return load_model(path, arguments.interval > 0.0); });
   const Csv csv = read_table(arguments.data, arguments.mark);
-  const Predicted predicted = predict_table(arguments, file, csv);
-  if (const Eigen::Index count = predicted.count_not_finite(); count > 0) {
+  const report::Prediction predicted = predict_table(arguments, file, csv);
+  if (const Eigen::Index count = report::count_not_finite(predicted); count > 0) {
     warn(fmt::format("llmt: warning: {} of {} predictions are not finite: numbers of {} are too large for these rows",
                      count, predicted.values.size(), arguments.model));
   }
@@ -241,13 +139,13 @@ void predict_command(const PredictArguments& arguments) {
     write_file(arguments.output, [&](const TextSink& sink) { write_csv(csv, predicted, sink); });
   }
   if (arguments.json) {
-    print_json(summary_json(predicted, arguments.output.empty()));
+    print_json(report::prediction_json(predicted, arguments.output.empty()));
     return;
   }
   if (arguments.output.empty()) {
     write_csv(csv, predicted, print_bytes);
   }
-  summarise(arguments, predicted);
+  warn(report::prediction_text(predicted, table_name(arguments.data)));
 }
 
 }  // namespace

@@ -16,6 +16,7 @@
 
 #include "llmt/csv.hpp"
 #include "llmt/stream_command.hpp"
+#include "report/stream/stream_summary.hpp"
 #include "shared/cli.hpp"
 #include "shared/table_file.hpp"
 
@@ -155,70 +156,6 @@ Model snapshot(const Learned& learned, ValidityChoice validity) {
   }
 }
 
-Json summary_json(const StreamArguments& arguments, const Learned& learned, const Model& model) {
-  const StreamCounts counts = learned.stream->counts();
-  Json json = {{"data", learned.name},
-               {"rows", counts.rows},
-               {"missing_values", counts.missing_values},
-               {"rule", "rd"},
-               {"inputs", learned.inputs},
-               {"held_out", counts.held_out},
-               {"grown_leaves", counts.leaves},
-               {"splits", counts.splits},
-               {"prunes", counts.prunes},
-               {"drifts", counts.drifts},
-               {"replacements", counts.replacements},
-               {"bytes", counts.bytes},
-               {"partitions", Json::array()}};
-  const Eigen::VectorXd all = learned.stream->prequential_rmse();
-  const Eigen::VectorXd recent = learned.stream->recent_rmse();
-  for (const Partition& partition : model.partitions()) {
-    const Eigen::Index output = partition.outputs.front();
-    json["partitions"].push_back({{"targets", {arguments.learning.targets[output]}},
-                                  {"validity", partition.validity.kind == ValidityKind::crisp ? "crisp" : "blend"},
-                                  {"width", partition.validity.width},
-                                  {"leaves", partition.num_leaves()},
-                                  {"prequential_rmse", finite_or_null(all(output))},
-                                  {"recent_rmse", finite_or_null(recent(output))}});
-  }
-  json["model"] = arguments.output.empty() ? Json(nullptr) : Json(arguments.output);
-  return json;
-}
-
-void print_summary(const StreamArguments& arguments, const Learned& learned, const Model& model) {
-  const StreamCounts counts = learned.stream->counts();
-  print(fmt::format("{}: {} rows, {} inputs: {}\n", learned.name, counts.rows, learned.inputs.size(),
-                    fmt::join(learned.inputs, ", ")));
-  if (counts.missing_values > 0) {
-    print(fmt::format("Missing values in the inputs: {}\n", counts.missing_values));
-  }
-  print(
-      fmt::format("Learned row by row, rule rd: {} splits, {} taken back, {} alarms for changes, {} branches replaced; "
-                  "{} MiB\n\n",
-                  counts.splits, counts.prunes, counts.drifts, counts.replacements,
-                  number(static_cast<double>(counts.bytes) / 1048576.0, 3)));
-  Table table({"target", "model", "leaves", "RMSE before learning", "of the last 1000"});
-  const Eigen::VectorXd all = learned.stream->prequential_rmse();
-  const Eigen::VectorXd recent = learned.stream->recent_rmse();
-  for (const Partition& partition : model.partitions()) {
-    const Eigen::Index output = partition.outputs.front();
-    table.add({arguments.learning.targets[output],
-               partition.validity.kind == ValidityKind::crisp
-                   ? "crisp"
-                   : fmt::format("blend, width {}", number(partition.validity.width, 3)),
-               fmt::format("{}", partition.num_leaves()), number(all(output)), number(recent(output))});
-  }
-  print(table.text(output_width()));
-  if (counts.max_leaves == 1 && arguments.learning.options.max_leaves == 0) {
-    print(fmt::format(
-        "{} inputs: the sums of a leaf would take more than 1 GiB, so nothing was split. --max-leaves 16 splits.\n",
-        learned.inputs.size()));
-  }
-  if (!arguments.output.empty()) {
-    print(fmt::format("Model written to {}\n", arguments.output));
-  }
-}
-
 }  // namespace
 
 void stream_command(const CLI::App& command, const StreamArguments& arguments) {
@@ -232,11 +169,19 @@ void stream_command(const CLI::App& command, const StreamArguments& arguments) {
   if (!arguments.output.empty()) {
     save(model, arguments.output);
   }
+  const report::StreamRun run{learned.name,    learned.inputs, arguments.learning.targets,
+                              *learned.stream, model,          arguments.output};
   if (arguments.json) {
-    print_json(summary_json(arguments, learned, model));
-  } else {
-    print_summary(arguments, learned, model);
+    print_json(report::stream_json(run));
+    return;
   }
+  print(report::stream_text(run, output_width()));
+  if (learned.stream->counts().max_leaves == 1 && arguments.learning.options.max_leaves == 0) {
+    print(fmt::format(
+        "{} inputs: the sums of a leaf would take more than 1 GiB, so nothing was split. --max-leaves 16 splits.\n",
+        learned.inputs.size()));
+  }
+  if (!arguments.output.empty()) print(fmt::format("Model written to {}\n", arguments.output));
 }
 
 }  // namespace llmt::apps
