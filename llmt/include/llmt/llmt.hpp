@@ -25,5 +25,6 @@
 #include "llmt/size.hpp"
 #include "llmt/statistics.hpp"
 #include "llmt/stream.hpp"
+#include "llmt/stream_options.hpp"
 #include "llmt/summary.hpp"
 #include "llmt/training_data.hpp"

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "data/table.hpp"
+#include "llmt/options.hpp"
 #include "llmt/partition.hpp"
 
 namespace llmt {

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "base/count.hpp"
+#include "data/make_table.hpp"
 
 namespace llmt {
 namespace {

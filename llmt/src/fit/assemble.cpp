@@ -7,9 +7,9 @@
 
 #include "base/parallel.hpp"
 #include "estimation/leaf_statistics.hpp"
-#include "fit/code_choice.hpp"
-#include "fit/error_weights.hpp"
+#include "fit/choices/code_choice.hpp"
 #include "fit/output_range.hpp"
+#include "fit/trees/error_weights.hpp"
 #include "model/codes.hpp"
 #include "model/held_out_intervals.hpp"
 

@@ -5,11 +5,11 @@
 #include <optional>
 #include <vector>
 
-#include "fit/grow_tree.hpp"
-#include "fit/held_out_error.hpp"
-#include "fit/input_choice.hpp"
+#include "fit/choices/input_choice.hpp"
 #include "fit/prepared_rows.hpp"
 #include "fit/same_regressors.hpp"
+#include "fit/trees/grow_tree.hpp"
+#include "fit/trees/held_out_error.hpp"
 #include "llmt/fit_result.hpp"
 
 namespace llmt {

@@ -5,10 +5,10 @@
 #include <vector>
 
 #include "base/sum_over.hpp"
-#include "fit/defaults.hpp"
-#include "fit/error_weights.hpp"
-#include "fit/grow_tree.hpp"
-#include "fit/preliminary.hpp"
+#include "fit/plan/defaults.hpp"
+#include "fit/plan/preliminary.hpp"
+#include "fit/trees/error_weights.hpp"
+#include "fit/trees/grow_tree.hpp"
 #include "llmt/model.hpp"
 
 namespace llmt {

@@ -7,11 +7,11 @@
 
 #include "base/parallel.hpp"
 #include "fit/assemble.hpp"
-#include "fit/error_weights.hpp"
-#include "fit/grow_tree.hpp"
-#include "fit/held_out_error.hpp"
-#include "fit/input_choice.hpp"
+#include "fit/choices/input_choice.hpp"
 #include "fit/term_choice.hpp"
+#include "fit/trees/error_weights.hpp"
+#include "fit/trees/grow_tree.hpp"
+#include "fit/trees/held_out_error.hpp"
 
 namespace llmt {
 namespace {

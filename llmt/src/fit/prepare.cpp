@@ -7,8 +7,8 @@
 #include <utility>
 #include <vector>
 
-#include "fit/check_options.hpp"
-#include "fit/code_choice.hpp"
+#include "fit/choices/code_choice.hpp"
+#include "fit/plan/check_options.hpp"
 #include "fit/robust_weights.hpp"
 #include "llmt/outliers.hpp"
 

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "fit/pipeline.hpp"
-#include "fit/preliminary.hpp"
+#include "fit/plan/preliminary.hpp"
 #include "llmt/outliers.hpp"
 
 namespace llmt {

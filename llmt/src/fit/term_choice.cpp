@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "data/regressors.hpp"
-#include "fit/held_out_error.hpp"
+#include "fit/trees/held_out_error.hpp"
 
 namespace llmt {
 namespace {

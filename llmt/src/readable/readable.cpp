@@ -15,10 +15,10 @@
 
 #include "base/parallel.hpp"
 #include "estimation/leaf_statistics.hpp"
-#include "fit/code_choice.hpp"
-#include "fit/error_weights.hpp"
+#include "fit/choices/code_choice.hpp"
 #include "fit/named.hpp"
 #include "fit/prepared_rows.hpp"
+#include "fit/trees/error_weights.hpp"
 #include "growth/rules/rule.hpp"
 #include "llmt/size.hpp"
 #include "llmt/statistics.hpp"

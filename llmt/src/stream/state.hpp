@@ -1,5 +1,5 @@
 /// \file
-/// What a Stream consists of.
+/// The parts of a Stream.
 #pragma once
 
 #include <Eigen/Core>
@@ -8,7 +8,8 @@
 
 #include "base/matrix.hpp"
 #include "llmt/model.hpp"
-#include "llmt/stream.hpp"
+#include "llmt/options.hpp"
+#include "llmt/stream_options.hpp"
 #include "stream/reservoir.hpp"
 #include "stream/setting.hpp"
 #include "stream/tree.hpp"

@@ -3,6 +3,7 @@
 #include <stdexcept>
 
 #include "llmt/options.hpp"
+#include "llmt/stream.hpp"
 #include "model_files/model_json.hpp"
 #include "stream/state.hpp"
 #include "stream/stream_archive.hpp"

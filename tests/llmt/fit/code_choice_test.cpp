@@ -1,5 +1,5 @@
 // Numbers that are taken for codes because held-out rows say so.
-#include "fit/code_choice.hpp"
+#include "fit/choices/code_choice.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "fit/lack_of_fit.hpp"
+#include "fit/choices/lack_of_fit.hpp"
 #include "llmt/fit.hpp"
 #include "llmt/random.hpp"
 #include "numerics/f_distribution.hpp"

@@ -1,5 +1,5 @@
 // The memory that a fit will take.
-#include "fit/memory.hpp"
+#include "fit/plan/memory.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "fit/cheap_plan.hpp"
+#include "fit/plan/cheap_plan.hpp"
 
 #include <algorithm>
 

@@ -1,4 +1,4 @@
-#include "fit/defaults.hpp"
+#include "fit/plan/defaults.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>

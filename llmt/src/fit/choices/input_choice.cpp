@@ -1,4 +1,4 @@
-#include "fit/input_choice.hpp"
+#include "fit/choices/input_choice.hpp"
 
 #include <algorithm>
 #include <iterator>
@@ -10,9 +10,9 @@
 
 #include "base/parallel.hpp"
 #include "data/fewer_inputs.hpp"
-#include "fit/cheap_plan.hpp"
-#include "fit/grow_tree.hpp"
-#include "fit/held_out_error.hpp"
+#include "fit/plan/cheap_plan.hpp"
+#include "fit/trees/grow_tree.hpp"
+#include "fit/trees/held_out_error.hpp"
 #include "llmt/explain.hpp"
 
 namespace llmt {

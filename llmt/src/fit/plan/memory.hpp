@@ -4,7 +4,7 @@
 
 #include <cstdint>
 
-#include "fit/defaults.hpp"
+#include "fit/plan/defaults.hpp"
 
 namespace llmt {
 

@@ -1,4 +1,4 @@
-#include "fit/check_options.hpp"
+#include "fit/plan/check_options.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>

@@ -1,4 +1,4 @@
-#include "fit/preliminary.hpp"
+#include "fit/plan/preliminary.hpp"
 
 namespace llmt {
 

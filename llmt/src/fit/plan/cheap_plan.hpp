@@ -2,7 +2,7 @@
 /// The plan by which forms of the inputs are compared: fewer of them, or some as categories.
 #pragma once
 
-#include "fit/defaults.hpp"
+#include "fit/plan/defaults.hpp"
 
 namespace llmt {
 

@@ -1,14 +1,14 @@
-#include "fit/code_choice.hpp"
+#include "fit/choices/code_choice.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <map>
 #include <memory>
 
-#include "fit/cheap_plan.hpp"
-#include "fit/error_weights.hpp"
-#include "fit/held_out_error.hpp"
-#include "fit/lack_of_fit.hpp"
+#include "fit/choices/lack_of_fit.hpp"
+#include "fit/plan/cheap_plan.hpp"
+#include "fit/trees/error_weights.hpp"
+#include "fit/trees/held_out_error.hpp"
 #include "model/codes.hpp"
 
 namespace llmt {

@@ -1,12 +1,12 @@
-#include "fit/held_out_error.hpp"
+#include "fit/trees/held_out_error.hpp"
 
 #include <algorithm>
 
 #include "base/memory.hpp"
 #include "base/parallel.hpp"
-#include "fit/error_weights.hpp"
-#include "fit/grow_tree.hpp"
-#include "fit/memory.hpp"
+#include "fit/plan/memory.hpp"
+#include "fit/trees/error_weights.hpp"
+#include "fit/trees/grow_tree.hpp"
 
 namespace llmt {
 

@@ -1,4 +1,4 @@
-#include "fit/error_weights.hpp"
+#include "fit/trees/error_weights.hpp"
 
 #include <numeric>
 

@@ -1,4 +1,4 @@
-#include "fit/memory.hpp"
+#include "fit/plan/memory.hpp"
 
 #include <fmt/format.h>
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "data/training.hpp"
-#include "fit/defaults.hpp"
+#include "fit/plan/defaults.hpp"
 #include "selection/selection.hpp"
 
 namespace llmt {

@@ -1,4 +1,4 @@
-#include "fit/lack_of_fit.hpp"
+#include "fit/choices/lack_of_fit.hpp"
 
 #include <Eigen/QR>
 #include <algorithm>

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "estimation/estimate.hpp"
-#include "fit/defaults.hpp"
+#include "fit/plan/defaults.hpp"
 
 namespace llmt {
 

@@ -1,4 +1,4 @@
-#include "data/table.hpp"
+#include "data/make_table.hpp"
 
 #include <fmt/format.h>
 

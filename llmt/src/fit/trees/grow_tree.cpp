@@ -1,4 +1,4 @@
-#include "fit/grow_tree.hpp"
+#include "fit/trees/grow_tree.hpp"
 
 #include <algorithm>
 
