@@ -10,7 +10,7 @@
 
 #include "c_source/effect_source.hpp"
 #include "c_source/runtime.hpp"
-#include "calibration/correction_twist.hpp"
+#include "correction/correction_twist.hpp"
 #include "effects/joint_error.hpp"
 #include "kinematics/mimics.hpp"
 #include "kinematics/units.hpp"

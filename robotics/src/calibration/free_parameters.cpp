@@ -9,7 +9,6 @@
 #include <stdexcept>
 
 #include "kinematics/units.hpp"
-#include "llmt/robotics/calibration.hpp"
 
 namespace llmt::robotics {
 

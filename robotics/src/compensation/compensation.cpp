@@ -11,8 +11,8 @@
 #include <tuple>
 #include <utility>
 
-#include "calibration/correction_twist.hpp"
 #include "compensation/inverse.hpp"
+#include "correction/correction_twist.hpp"
 #include "kinematics/units.hpp"
 #include "llmt/robotics/effects.hpp"
 #include "llmt/robotics/simulation.hpp"

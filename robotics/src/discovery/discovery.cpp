@@ -8,16 +8,16 @@
 #include <utility>
 
 #include "calibration/joint_map_shift.hpp"
-#include "discovery/constant_fit.hpp"
-#include "discovery/decision.hpp"
-#include "discovery/findings.hpp"
 #include "discovery/gap_map.hpp"
 #include "discovery/input_mistakes.hpp"
-#include "discovery/investigation.hpp"
-#include "discovery/judges.hpp"
-#include "discovery/pose_split.hpp"
+#include "discovery/investigation/constant_fit.hpp"
+#include "discovery/investigation/investigation.hpp"
+#include "discovery/investigation/pose_split.hpp"
+#include "discovery/judges/decision.hpp"
+#include "discovery/judges/findings.hpp"
+#include "discovery/judges/judges.hpp"
+#include "discovery/judges/wave_harmonics.hpp"
 #include "discovery/verification.hpp"
-#include "discovery/wave_harmonics.hpp"
 #include "llmt/statistics.hpp"
 
 namespace llmt::robotics {

@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "discovery/pose_split.hpp"
+#include "discovery/investigation/pose_split.hpp"
 #include "llmt/robotics/calibration_quality.hpp"
 
 namespace llmt::robotics {

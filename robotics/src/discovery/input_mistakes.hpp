@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "discovery/investigation.hpp"
+#include "discovery/investigation/investigation.hpp"
 
 namespace llmt::robotics {
 

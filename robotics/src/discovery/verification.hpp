@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "discovery/findings.hpp"
-#include "discovery/pose_split.hpp"
+#include "discovery/investigation/pose_split.hpp"
+#include "discovery/judges/findings.hpp"
 #include "llmt/robotics/correction.hpp"
 
 namespace llmt::robotics {

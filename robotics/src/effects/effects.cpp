@@ -4,8 +4,6 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <cmath>
-#include <numbers>
 #include <stdexcept>
 
 #include "effects/effect_entries.hpp"
@@ -172,15 +170,6 @@ Effect joint_map_effect(const Joint& joint, double first, double step, std::vect
 
 std::string effect_parameter_name(const Effect& effect, const EffectParameter& parameter) {
   return effect_label(effect) + "." + parameter.name;
-}
-
-double round_bar_flexibility(double diameter_mm, double youngs_modulus_gpa) {
-  const double inertia_m4 = std::numbers::pi * std::pow(metres * diameter_mm, 4) / 64.0;
-  return 1.0 / (1e9 * youngs_modulus_gpa * inertia_m4);
-}
-
-double round_bar_mass(double diameter_mm, double length_mm, double density_kg_m3) {
-  return density_kg_m3 * std::numbers::pi * std::pow(metres * diameter_mm, 2) / 4.0 * metres * length_mm;
 }
 
 }  // namespace llmt::robotics

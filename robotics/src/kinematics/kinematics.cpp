@@ -217,14 +217,6 @@ Eigen::Matrix3Xd Kinematics::position_jacobian(const Eigen::VectorXd& q) const {
   return jacobian;
 }
 
-Eigen::Matrix3Xd Kinematics::rotation_jacobian(const Eigen::VectorXd& q) const {
-  std::vector<Motion> motions;
-  motions_into(motions, q);
-  Eigen::Matrix3Xd jacobian(3, motions.size());
-  for (std::size_t k = 0; k < motions.size(); ++k) jacobian.col(k) = radians * motions[k].turn();
-  return jacobian;
-}
-
 Eigen::Matrix<double, 6, Eigen::Dynamic> Kinematics::joint_jacobian(const Eigen::VectorXd& q) const {
   const Skeleton skeleton = this->skeleton(q);
   Eigen::Matrix<double, 6, Eigen::Dynamic> jacobian(6, joints());

@@ -3,6 +3,7 @@
 
 #include <Eigen/LU>
 #include <cmath>
+#include <numbers>
 
 #include "llmt/robotics/calibration_problem.hpp"
 #include "llmt/robotics/calibration_report.hpp"
@@ -12,6 +13,17 @@
 
 namespace llmt::robotics {
 namespace {
+
+// Flexibility 1/EI in 1/(N m^2) of a round bar: I = pi d^4 / 64.
+double round_bar_flexibility(double diameter_mm, double youngs_modulus_gpa) {
+  const double inertia_m4 = std::numbers::pi * std::pow(1e-3 * diameter_mm, 4) / 64.0;
+  return 1.0 / (1e9 * youngs_modulus_gpa * inertia_m4);
+}
+
+// Mass in kg of a round bar.
+double round_bar_mass(double diameter_mm, double length_mm, double density_kg_m3) {
+  return density_kg_m3 * std::numbers::pi * std::pow(1e-3 * diameter_mm, 2) / 4.0 * 1e-3 * length_mm;
+}
 
 Robot flexible(const std::string& effect = "link_bending") {
   Robot robot = read_robot(LLMT_ROBOTS_DIR "/planar_two_link.yaml");

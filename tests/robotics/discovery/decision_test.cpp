@@ -1,4 +1,4 @@
-#include "discovery/decision.hpp"
+#include "discovery/judges/decision.hpp"
 
 #include <gtest/gtest.h>
 

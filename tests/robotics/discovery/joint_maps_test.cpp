@@ -1,4 +1,4 @@
-#include "discovery/joint_maps.hpp"
+#include "discovery/investigation/joint_maps.hpp"
 
 #include <gtest/gtest.h>
 

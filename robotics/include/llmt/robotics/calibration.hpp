@@ -17,15 +17,6 @@
 
 namespace llmt::robotics {
 
-/// FixedParameter::why of the length that stands for the scale where all readings are of what the tool touches.
-inline constexpr const char* unseen_scale = "no reading shows the scale";
-
-/// Why a parameter was not identified.
-struct FixedParameter {
-  std::string name;
-  std::string why;
-};
-
 struct Calibration {
   Robot robot;       ///< with the identified values; Robot::identified is filled in
   Robot registered;  ///< the nominal robot in the frame of the measurements: only base and tool are fitted

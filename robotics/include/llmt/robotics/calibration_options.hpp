@@ -13,6 +13,15 @@
 
 namespace llmt::robotics {
 
+/// FixedParameter::why of the length that stands for the scale where all readings are of what the tool touches.
+inline constexpr const char* unseen_scale = "no reading shows the scale";
+
+/// A parameter that was not identified, and why.
+struct FixedParameter {
+  std::string name;
+  std::string why;
+};
+
 struct CalibrationOptions {
   /// Parameters that keep their values: names ("joint2.a"), or owners of parameters ("base", "tool", "joint2",
   /// "joint_compliance@joint2").

@@ -64,10 +64,4 @@ std::string effect_label(const Effect& effect);
 /// calibrated.
 std::string effect_parameter_name(const Effect& effect, const EffectParameter& parameter);
 
-/// Flexibility 1/EI in 1/(N m^2) of a round bar: I = pi d^4 / 64.
-double round_bar_flexibility(double diameter_mm, double youngs_modulus_gpa);
-
-/// Mass in kg of a round bar.
-double round_bar_mass(double diameter_mm, double length_mm, double density_kg_m3);
-
 }  // namespace llmt::robotics

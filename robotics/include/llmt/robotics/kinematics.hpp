@@ -102,9 +102,6 @@ class Kinematics {
   /// those of further bases and tools: mm per mm, mm per deg.
   Eigen::Matrix3Xd position_jacobian(const Eigen::VectorXd& q) const;
 
-  /// 3 x P derivatives of the tool's orientation, as rotation vectors in the world frame: rad per mm (0), rad per deg.
-  Eigen::Matrix3Xd rotation_jacobian(const Eigen::VectorXd& q) const;
-
   /// 6 x J derivatives by the joint values: position in mm (upper rows), rotation vector in rad (lower rows), per rad
   /// or mm.
   Eigen::Matrix<double, 6, Eigen::Dynamic> joint_jacobian(const Eigen::VectorXd& q) const;

@@ -9,7 +9,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "calibration/correction_twist.hpp"
+#include "correction/correction_twist.hpp"
 #include "kinematics/rotations.hpp"
 #include "llmt/files.hpp"
 #include "llmt/robotics/robot_file.hpp"

@@ -1,4 +1,4 @@
-#include "discovery/residual_tests.hpp"
+#include "discovery/judges/residual_tests.hpp"
 
 #include <fmt/format.h>
 
@@ -11,7 +11,7 @@
 #include <numeric>
 
 #include "calibration/free_parameters.hpp"
-#include "discovery/pose_split.hpp"
+#include "discovery/investigation/pose_split.hpp"
 #include "llmt/random.hpp"
 #include "llmt/statistics.hpp"
 

@@ -1,4 +1,4 @@
-#include "discovery/wave_harmonics.hpp"
+#include "discovery/judges/wave_harmonics.hpp"
 
 #include <fmt/format.h>
 
@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "discovery/pose_split.hpp"
+#include "discovery/investigation/pose_split.hpp"
 
 namespace llmt::robotics {
 namespace {

@@ -4,7 +4,7 @@
 #include <map>
 #include <string>
 
-#include "discovery/investigation.hpp"
+#include "discovery/investigation/investigation.hpp"
 
 namespace llmt::robotics {
 

@@ -1,4 +1,4 @@
-#include "discovery/pose_split.hpp"
+#include "discovery/investigation/pose_split.hpp"
 
 #include <fmt/format.h>
 

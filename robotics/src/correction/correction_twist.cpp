@@ -1,4 +1,4 @@
-#include "calibration/correction_twist.hpp"
+#include "correction/correction_twist.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>

@@ -3,7 +3,7 @@
 
 #include <optional>
 
-#include "discovery/investigation.hpp"
+#include "discovery/investigation/investigation.hpp"
 
 namespace llmt::robotics {
 

@@ -1,4 +1,4 @@
-#include "discovery/judges.hpp"
+#include "discovery/judges/judges.hpp"
 
 #include <fmt/format.h>
 
@@ -7,7 +7,7 @@
 #include <functional>
 #include <utility>
 
-#include "discovery/residual_tests.hpp"
+#include "discovery/judges/residual_tests.hpp"
 
 namespace llmt::robotics {
 namespace {

@@ -1,11 +1,11 @@
-#include "discovery/leave_one_out.hpp"
+#include "discovery/investigation/leave_one_out.hpp"
 
 #include <Eigen/Cholesky>
 #include <Eigen/QR>
 #include <algorithm>
 
 #include "calibration/free_parameters.hpp"
-#include "discovery/pose_split.hpp"
+#include "discovery/investigation/pose_split.hpp"
 
 namespace llmt::robotics {
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "discovery/question.hpp"
+#include "discovery/investigation/question.hpp"
 #include "llmt/robotics/calibration.hpp"
 
 namespace llmt::robotics {

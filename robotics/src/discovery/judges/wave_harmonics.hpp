@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "discovery/findings.hpp"
+#include "discovery/judges/findings.hpp"
 
 namespace llmt::robotics {
 

@@ -1,10 +1,10 @@
-#include "discovery/constant_fit.hpp"
+#include "discovery/investigation/constant_fit.hpp"
 
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 
-#include "discovery/pose_split.hpp"
+#include "discovery/investigation/pose_split.hpp"
 
 namespace llmt::robotics {
 namespace {

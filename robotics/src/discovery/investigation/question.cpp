@@ -1,11 +1,11 @@
-#include "discovery/question.hpp"
+#include "discovery/investigation/question.hpp"
 
 #include <Eigen/QR>
 #include <algorithm>
 
 #include "calibration/free_parameters.hpp"
 #include "calibration/noise_model.hpp"
-#include "discovery/pose_split.hpp"
+#include "discovery/investigation/pose_split.hpp"
 #include "hypotheses/catalogue_effects.hpp"
 #include "hypotheses/error_patterns.hpp"
 #include "hypotheses/scans.hpp"

@@ -1,4 +1,4 @@
-#include "discovery/joint_maps.hpp"
+#include "discovery/investigation/joint_maps.hpp"
 
 #include <Eigen/Cholesky>
 #include <Eigen/QR>
@@ -7,7 +7,7 @@
 
 #include "calibration/free_parameters.hpp"
 #include "calibration/joint_map_shift.hpp"
-#include "discovery/leave_one_out.hpp"
+#include "discovery/investigation/leave_one_out.hpp"
 #include "effects/effect_entries.hpp"
 #include "kinematics/units.hpp"
 #include "llmt/statistics.hpp"

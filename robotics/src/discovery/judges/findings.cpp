@@ -1,4 +1,4 @@
-#include "discovery/findings.hpp"
+#include "discovery/judges/findings.hpp"
 
 #include <fmt/format.h>
 

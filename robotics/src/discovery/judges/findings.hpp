@@ -4,8 +4,8 @@
 #include <optional>
 #include <vector>
 
-#include "discovery/decision.hpp"
-#include "discovery/residual_search.hpp"
+#include "discovery/investigation/residual_search.hpp"
+#include "discovery/judges/decision.hpp"
 #include "hypotheses/hypothesis.hpp"
 
 namespace llmt::robotics {

@@ -1,9 +1,9 @@
-#include "discovery/residual_search.hpp"
+#include "discovery/investigation/residual_search.hpp"
 
 #include <algorithm>
 
-#include "discovery/leave_one_out.hpp"
-#include "discovery/pose_split.hpp"
+#include "discovery/investigation/leave_one_out.hpp"
+#include "discovery/investigation/pose_split.hpp"
 
 namespace llmt::robotics {
 

@@ -1,4 +1,4 @@
-#include "discovery/investigation.hpp"
+#include "discovery/investigation/investigation.hpp"
 
 #include <fmt/format.h>
 
@@ -6,9 +6,9 @@
 #include <set>
 
 #include "calibration/joint_map_shift.hpp"
-#include "discovery/joint_maps.hpp"
-#include "discovery/leave_one_out.hpp"
-#include "discovery/pose_split.hpp"
+#include "discovery/investigation/joint_maps.hpp"
+#include "discovery/investigation/leave_one_out.hpp"
+#include "discovery/investigation/pose_split.hpp"
 #include "llmt/discovery/rounds.hpp"
 #include "llmt/statistics.hpp"
 
