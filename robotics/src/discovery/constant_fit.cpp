@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "discovery/pose_split.hpp"
+#include "discovery/unsound_effects.hpp"
 
 namespace llmt::robotics {
 namespace {

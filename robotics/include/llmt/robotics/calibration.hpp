@@ -26,6 +26,16 @@ struct FixedParameter {
   std::string why;
 };
 
+/// FixedParameter::why of what only the motion of joints that hardly moved could tell.
+inline constexpr const char* unseen_motion = "only the motion of joints that hardly moved could tell it";
+
+/// A joint that hardly moved while the arm was measured: by less than 0.1 deg, or 1 mm of a prismatic joint.
+struct StillJoint {
+  std::string joint;
+  std::string unit;    ///< deg or mm
+  double range = 0.0;  ///< from the smallest to the largest value
+};
+
 struct Calibration {
   Robot robot;       ///< with the identified values; Robot::identified is filled in
   Robot registered;  ///< the nominal robot in the frame of the measurements: only base and tool are fitted
@@ -38,6 +48,7 @@ struct Calibration {
   bool began_without_priors = false;
   std::vector<std::string> weak;      ///< free parameters that the prior determines more closely than the data
   std::vector<FixedParameter> fixed;  ///< every parameter that was not free, in the order of parameters()
+  std::vector<StillJoint> still;      ///< what only their motion tells was kept as described
 };
 
 /// Fits bases and tools together by damped least squares; all other parameters keep their values. The fit starts from
@@ -51,7 +62,8 @@ discovery::SolverResult register_frames(Robot& robot, const Measurements& measur
 /// 1. register_frames();
 /// 2. choice of the free parameters: theta, d, a, alpha of every joint, beta instead of d where axes are nearly
 ///    parallel, and all parameters of effects; a parameter that is exactly or nearly a combination of earlier ones over
-///    the measured poses is fixed and reported;
+///    the measured poses is fixed and reported, and so is one that is such a combination while the joints that hardly
+///    moved (Calibration::still) stand still;
 /// 3. damped least squares over the free parameters (llmt::discovery::solve) with the weak priors of the options; the
 ///    residuals are divided by their standard deviation sigma, which comes from the pass before: one for positions (or
 ///    distances) and one for orientations. Where the file states sigmas of its readings (stated_sigma_mm()), they come
