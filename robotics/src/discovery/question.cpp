@@ -73,9 +73,10 @@ Hypothesis found_before(const Hypothesis& earlier, const Effect& effect, const E
 }
 
 // Start values of the fit. The estimate of a value that hardly moves the tool can be arbitrarily large, so estimates
-// are clamped to their plausible limits.
+// are clamped to their plausible limits. Values without limits start at 0, where those stay that the poses do not
+// determine.
 std::vector<double> within_limits(const discovery::EffectCandidate& candidate, const Eigen::VectorXd& values) {
-  Eigen::VectorXd bounded = values;
+  Eigen::VectorXd bounded = Eigen::VectorXd::Zero(values.size());
   if (candidate.lower.size() == values.size()) bounded = values.cwiseMax(candidate.lower).cwiseMin(candidate.upper);
   return {bounded.begin(), bounded.end()};
 }
