@@ -1,6 +1,7 @@
 #include <cmath>
 
 #include "report/robot/calibration_facts.hpp"
+#include "report/robot/measurement_text.hpp"
 
 namespace llmt::report {
 namespace {
@@ -87,6 +88,7 @@ Json calibration_json(const CalibrationFacts& facts) {
   for (const robotics::FixedParameter& fixed : report.calibration.fixed) {
     json["fixed"].push_back({{"name", fixed.name}, {"why", fixed.why}});
   }
+  if (!report.calibration.still.empty()) json["still_joints"] = still_json(report.calibration.still);
   json["weak"] = report.calibration.weak;
   json["uncertain"] = Json::array();
   for (const robotics::IdentifiedParameter& parameter : robotics::uncertain_parameters(report.calibration.robot)) {

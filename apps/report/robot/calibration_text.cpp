@@ -104,14 +104,22 @@ std::string parameters_text(const CalibrationFacts& facts, std::size_t width) {
   }
   std::vector<std::string> kept;
   std::vector<std::string> dependent;
+  std::vector<std::string> unseen;
   for (const robotics::FixedParameter& fixed : report.calibration.fixed) {
-    (fixed.why == "fixed by the user" ? kept : dependent).push_back(fixed.name);
+    (fixed.why == "fixed by the user"       ? kept
+     : fixed.why == robotics::unseen_motion ? unseen
+                                            : dependent)
+        .push_back(fixed.name);
   }
   if (!dependent.empty()) {
     text += fmt::format(
         "Not identified but kept as described, because they move the measured point as parameters above do, or not at "
         "all: {}\n",
         fmt::join(dependent, ", "));
+  }
+  if (!unseen.empty()) {
+    text += fmt::format("Kept as described, because only the motion of joints that hardly moved could tell: {}\n",
+                        fmt::join(unseen, ", "));
   }
   if (!kept.empty()) text += fmt::format("Kept as described by --fix or --only: {}\n", fmt::join(kept, ", "));
   if (const std::string uncertain = uncertain_text(report.calibration.robot); !uncertain.empty()) {
@@ -192,6 +200,7 @@ std::string head(const CalibrationFacts& facts) {
         kept);
   }
   for (const std::string& warning : measurements.warnings) text += "Note: " + warning + "\n";
+  if (!facts.report.calibration.still.empty()) text += "Note: " + still_text(facts.report.calibration.still) + "\n";
   if (!facts.outlier_lines.empty()) {
     text += fmt::format("Left out, more than four times as far off as the median: line{} {}\n",
                         facts.outlier_lines.size() == 1 ? "" : "s", fmt::join(facts.outlier_lines, ", "));

@@ -1,6 +1,7 @@
 #include "report/robot/measurement_text.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <set>
@@ -60,6 +61,26 @@ std::string counts_of(const robotics::Measurements& measurements) {
 robotics::Measurements points_of(const robotics::Measurements& measurements) {
   if (robotics::orientation_rows(measurements.poses).empty()) return measurements;
   return robotics::select(measurements, robotics::position_rows(measurements.poses));
+}
+
+std::string still_text(const std::vector<robotics::StillJoint>& still) {
+  std::vector<std::string> joints;
+  for (const robotics::StillJoint& one : still) {
+    joints.push_back(fmt::format("{} ({} {})", one.joint, number(one.range, 2), one.unit));
+  }
+  return fmt::format(
+      "Joints that hardly moved, with their ranges: {}. What only their motion tells stays as described: their axes "
+      "and "
+      "zeros, and whatever depends on their angles.",
+      fmt::join(joints, ", "));
+}
+
+Json still_json(const std::vector<robotics::StillJoint>& still) {
+  Json joints = Json::array();
+  for (const robotics::StillJoint& one : still) {
+    joints.push_back({{"joint", one.joint}, {"range", one.range}, {"unit", one.unit}});
+  }
+  return joints;
 }
 
 std::string uncertain_text(const robotics::Robot& robot) {

@@ -12,6 +12,7 @@
 #include "calibration/joint_map_shift.hpp"
 #include "calibration/joint_ranges.hpp"
 #include "calibration/noise_model.hpp"
+#include "calibration/still_joints.hpp"
 #include "llmt/robotics/calibration_problem.hpp"
 
 namespace llmt::robotics {
@@ -193,6 +194,22 @@ discovery::SolverResult register_frames(Robot& robot, const Measurements& measur
 
 namespace {
 
+// Adds the reasons that the poses give. Which geometry is of no use shows on the rigid arm: on one that bends, a
+// combination that moves nothing when rigid moves loads, and would be identified from the thousandth part of an effect.
+void fix_what_poses_do_not_tell(const Robot& robot, const Poses& poses, const std::vector<Eigen::Index>& rows,
+                                double tolerance, std::vector<std::string>& reasons) {
+  Robot rigid = robot;
+  rigid.effects.clear();
+  const Eigen::Index geometric = geometric_parameter_count(rigid.chain);
+  std::vector<Eigen::Index> of_effects(reasons.size() - static_cast<std::size_t>(geometric));
+  std::iota(of_effects.begin(), of_effects.end(), geometric);
+  Eigen::MatrixXd jacobian(3 * poses.count(), std::ssize(reasons));
+  jacobian.leftCols(geometric) = position_jacobian(rigid, poses);
+  jacobian.rightCols(std::ssize(of_effects)) = position_jacobian(robot, poses, of_effects);
+  jacobian = jacobian(rows, Eigen::all).eval();
+  fix_dependent(parameters(robot), jacobian, geometric, tolerance, reasons);
+}
+
 Calibration calibrate_without_maps(const Robot& robot, const Measurements& measurements,
                                    const CalibrationOptions& options) {
   Calibration calibration;
@@ -212,19 +229,21 @@ Calibration calibrate_without_maps(const Robot& robot, const Measurements& measu
   }
   std::vector<std::string> reasons = reasons_to_fix(robot, options);
   fix_what_sockets_take_up(robot, measurements.poses, reasons);
-  // Useless geometry shows on the rigid arm: on one that bends, a combination that moves nothing when rigid
-  // moves loads, and would be identified from the thousandth part of an effect.
-  Robot rigid = calibration.registered;
-  rigid.effects.clear();
-  const Eigen::Index geometric = geometric_parameter_count(rigid.chain);
-  std::vector<Eigen::Index> of_effects(reasons.size() - static_cast<std::size_t>(geometric));
-  std::iota(of_effects.begin(), of_effects.end(), geometric);
-  Eigen::MatrixXd jacobian(3 * measurements.count(), std::ssize(reasons));
-  jacobian.leftCols(geometric) = position_jacobian(rigid, measurements.poses);
-  jacobian.rightCols(std::ssize(of_effects)) =
-      position_jacobian(calibration.registered, measurements.poses, of_effects);
-  jacobian = jacobian(measured_rows(measurements), Eigen::all).eval();
-  fix_dependent(problem.parameters, jacobian, geometric, options.dependence_tolerance, reasons);
+  const auto fix_by = [&](const Poses& poses, std::vector<std::string>& all) {
+    fix_what_poses_do_not_tell(calibration.registered, poses, measured_rows(measurements), options.dependence_tolerance,
+                               all);
+  };
+  calibration.still = still_joints(robot.chain, measurements.poses);
+  std::vector<std::string> moving = reasons;
+  fix_by(measurements.poses, moving);
+  if (calibration.still.empty()) {
+    reasons = std::move(moving);
+  } else {
+    fix_by(with_still_joints_held(robot.chain, measurements.poses), reasons);
+    for (std::size_t k = 0; k < reasons.size(); ++k) {
+      if (moving[k].empty() && !reasons[k].empty()) reasons[k] = unseen_motion;
+    }
+  }
   keep_scale(calibration.registered, measurements.poses, options, reasons);
   problem.jacobian = free_derivatives(calibration.registered, measurements, reasons, false);
   identify(calibration, measurements, problem, reasons, options);

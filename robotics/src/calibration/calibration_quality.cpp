@@ -160,8 +160,7 @@ Eigen::VectorXd position_deviations(const Calibration& calibration, const Poses&
 
 std::vector<JointBeyond> joints_beyond(const Chain& chain, const std::vector<std::array<double, 2>>& ranges,
                                        const Poses& used) {
-  constexpr double slack = 0.1;      // of the range
-  constexpr double rounding = 1e-4;  // deg or mm
+  constexpr double slack = 0.1;  // of the range
   if (ranges.size() != chain.joints.size()) {
     throw std::invalid_argument(fmt::format("llmt::robotics::joints_beyond: there are {} ranges of {} joints",
                                             ranges.size(), chain.joints.size()));
@@ -171,7 +170,8 @@ std::vector<JointBeyond> joints_beyond(const Chain& chain, const std::vector<std
     const Joint& joint = chain.joints[j];
     const auto [low, high] = ranges[j];
     const Eigen::VectorXd values = used.joints.col(j) * to_limit_unit(joint);
-    const double margin = std::max(slack * (high - low), rounding);
+    // A joint that stood still is beyond its range where it would no longer be one that stood still.
+    const double margin = std::max(slack * (high - low), still_range(joint));
     std::vector<Eigen::Index> rows;
     for (Eigen::Index i = 0; i < values.size(); ++i) {
       if (values(i) < low - margin || values(i) > high + margin) rows.push_back(i);

@@ -11,4 +11,10 @@ std::vector<std::array<double, 2>> joint_ranges_of(const Chain& chain, const Pos
   return ranges;
 }
 
+double still_range(const Joint& joint) {
+  constexpr double still_deg = 0.1;
+  constexpr double still_mm = 1.0;
+  return joint.type == JointType::revolute ? still_deg : still_mm;
+}
+
 }  // namespace llmt::robotics

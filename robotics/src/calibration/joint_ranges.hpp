@@ -11,4 +11,9 @@ namespace llmt::robotics {
 /// Smallest and largest value of each joint over the poses, deg or mm as limits are.
 std::vector<std::array<double, 2>> joint_ranges_of(const Chain& chain, const Poses& poses);
 
+/// A joint hardly moves if its values stay within this range: 0.1 deg, or 1 mm of a prismatic joint. An axis that is
+/// one degree off then moves a tool at one metre by 0.03 mm, as little as the noise of an instrument: no fit should
+/// rest on such a motion.
+double still_range(const Joint& joint);
+
 }  // namespace llmt::robotics

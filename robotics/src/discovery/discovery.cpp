@@ -4,15 +4,18 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <stdexcept>
 #include <utility>
 
 #include "calibration/joint_map_shift.hpp"
+#include "calibration/still_joints.hpp"
 #include "discovery/gap_map.hpp"
 #include "discovery/input_mistakes.hpp"
 #include "discovery/investigation/constant_fit.hpp"
 #include "discovery/investigation/investigation.hpp"
 #include "discovery/investigation/pose_split.hpp"
+#include "discovery/investigation/unsound_effects.hpp"
 #include "discovery/judges/decision.hpp"
 #include "discovery/judges/findings.hpp"
 #include "discovery/judges/judges.hpp"
@@ -87,7 +90,7 @@ Investigation calibrated(const Robot& described, const Unmapped& plain, const Di
 // The search with joint maps, if maps help.
 void add_maps(const DiscoveryOptions& options, Findings& found) {
   report_progress(*found.investigation.work, "mapping the joints");
-  const std::optional<std::vector<Effect>> maps = helpful_maps(found.investigation);
+  std::optional<JointMaps> maps = helpful_maps(found.investigation);
   if (!maps) {
     found.notes.emplace_back(
         "Free maps of the joints (angle error over angle) would not lower the error on poses left out.");
@@ -95,9 +98,10 @@ void add_maps(const DiscoveryOptions& options, Findings& found) {
   }
   found.notes.push_back(
       fmt::format("Free maps of {} joints (angle error over angle) were added: they lower the error on poses left out.",
-                  maps->size()));
-  found.maps = *maps;
-  found.investigation = search_with_maps(std::move(found.investigation), *maps, options);
+                  maps->effects.size()));
+  found.maps = maps->effects;
+  found.map_fit = std::move(maps);
+  found.investigation = search_with_maps(std::move(found.investigation), found.maps, options);
 }
 
 // The names of the last search and of its residuals, with their fitted constants.
@@ -112,6 +116,11 @@ void add_names(const DiscoveryOptions& options, Findings& found) {
     const std::vector<Name> smaller =
         smaller_effects(*found.residual_search, last.verdict, last.fitted, options.mass_uncertainty);
     found.names.insert(found.names.end(), smaller.begin(), smaller.end());
+  }
+  if (found.map_fit) {
+    // The model keeps them, but what they are beside the maps is nobody's cause.
+    const std::set<std::string> followed = followed_by_maps(last, *found.map_fit);
+    std::erase_if(found.names, [&](const Name& one) { return followed.contains(effect_label(one.effect.effect)); });
   }
   for (Name& name : found.names) {
     const auto error = constant_errors.find(effect_label(name.effect.effect));
@@ -173,6 +182,13 @@ Discovery of_robots(Robots robots, const PoseSplit& split, const discovery::Lack
   return result;
 }
 
+// No name without a model.
+void forget_names(Findings& found, std::vector<Objection>& objections) {
+  found.names.clear();
+  for (Objection& one : objections) one.names.clear();
+  objections.push_back({Reason::worse_fit});
+}
+
 Discovery without_gap(const Robot& robot, const PoseSplit& split, const DiscoveryOptions& options) {
   const Robots robots = withdrawn({calibrate(robot, split.samples, options.calibration).robot, {}, {}, {}});
   Discovery result = of_robots(robots, split, {}, 0.0);
@@ -188,9 +204,14 @@ Discovery described(Discovery result, const Findings& found, const std::vector<O
   const Decision decision = decide(found.verdict, objections, found.names);
   result.answer = decision.answer;
   result.headline = decision.headline;
+  const Measurements kept = without_rows(split.samples, last.verdict.outliers);
+  const double missing_mm = total_distance(result.before, kept) / std::sqrt(static_cast<double>(kept.count()));
   for (std::size_t k = 0; k < found.names.size(); ++k) {
-    result.effects.push_back(found.names[k].effect);
-    result.effects.back().confirmed = decision.confirmed[k];
+    FoundEffect& effect = result.effects.emplace_back(found.names[k].effect);
+    effect.confirmed = decision.confirmed[k];
+    // Shares of the search are of first order, and may exceed all that is missing by a little.
+    effect.rms_mm = std::min(effect.rms_mm, missing_mm);
+    effect.family_rms_mm = std::min(effect.family_rms_mm, missing_mm);
   }
   result.unknown = found.unknown;
   for (const Objection& one : objections) {
@@ -198,10 +219,11 @@ Discovery described(Discovery result, const Findings& found, const std::vector<O
   }
   result.more = patterns_left(found);
   result.beyond_plausible = beyond_plausible(last, result.before);
-  result.gap = gap_map(result.before, without_rows(split.samples, last.verdict.outliers));
+  result.gap = gap_map(result.before, kept);
   for (const std::size_t sample : last.verdict.outliers) {
     result.outliers.insert(result.outliers.end(), split.rows[sample].begin(), split.rows[sample].end());
   }
+  result.still = still_joints(result.before.chain, split.searched.poses);
   Limits limits = limits_of(last, result.before);
   result.not_testable = std::move(limits.not_testable);
   result.visible = std::move(limits.visible);
@@ -253,13 +275,19 @@ Discovery discover_readings(const Robot& robot, const Measurements& measurements
   add(robots.notes, notes);
   if (once_each) notes.emplace_back("Repeats of a pose scatter less than the rest: each pose was counted once.");
   if (const auto note = far_poses_note(robots, split)) notes.push_back(*note);
-  if (const auto loss = judge_held_out_loss(robots, split, found.names.size())) {
+  if (robots.is_worse) forget_names(found, objections);
+  const std::optional<PairedDifference> gain = held_out_gain(robots, split);
+  const std::optional<Objection> loss = judge_held_out_loss(gain, found.names.size());
+  const bool is_withdrawn = robots.is_worse || loss;
+  if (loss) {
     objections.push_back(*loss);
     add(loss->notes, notes);
     robots = withdrawn(std::move(robots));
   }
   const double noise_mm = noise_of(found);
   Discovery result = described(of_robots(std::move(robots), split, lack_of_fit, noise_mm), found, objections, split);
+  result.held_out.gain = gain.value_or(PairedDifference{});
+  result.withdrawn = is_withdrawn;
   result.lack_of_fit = lack_of_fit;
   result.noise_mm = noise_mm;
   result.notes = std::move(notes);

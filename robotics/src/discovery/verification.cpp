@@ -7,6 +7,7 @@
 #include <set>
 #include <stdexcept>
 
+#include "discovery/investigation/unsound_effects.hpp"
 #include "discovery/rest_correction.hpp"
 #include "llmt/statistics.hpp"
 
@@ -53,8 +54,11 @@ Robots fit_robots(const Robot& robot, const Measurements& samples, const std::ve
   std::vector<Effect>& effects = robots.improved.robot.effects;
   for (const std::vector<Effect>* maps : {&given, &found.maps})
     effects.insert(effects.end(), maps->begin(), maps->end());
-  if (total_distance(robots.improved.robot, kept) > total_distance(robots.before, kept)) {
+  if (!(total_distance(robots.improved.robot, kept) <= total_distance(robots.before, kept))) {
+    robots.is_worse = !found.names.empty() || !found.maps.empty();
     robots = withdrawn(std::move(robots));
+  }
+  if (robots.is_worse) {
     robots.notes.emplace_back(
         "The refit with what was found did not converge to anything better: the model is as calibrated.");
   }
@@ -71,18 +75,23 @@ Robots withdrawn(Robots robots) {
   return robots;
 }
 
-std::optional<Objection> judge_held_out_loss(const Robots& robots, const PoseSplit& split, std::size_t names) {
-  if (split.test.count() < 3 || names == 0) return std::nullopt;
+std::optional<PairedDifference> held_out_gain(const Robots& robots, const PoseSplit& split) {
+  const bool is_changed =
+      robots.improved.robot.effects.size() != robots.before.effects.size() || robots.improved.correction.has_value();
+  if (split.test.count() < 3 || !is_changed) return std::nullopt;
   const Measurements common = along_fitted_axes(split);
-  const Eigen::VectorXd after = distances(positions(robots.improved, common.poses), common);
-  const Eigen::VectorXd before = distances(positions(robots.before, common.poses), common);
-  if (!paired_difference(after, before).is_beyond_chance()) return std::nullopt;
+  return paired_difference(distances(positions(robots.before, common.poses), common),
+                           distances(positions(robots.improved, common.poses), common));
+}
+
+std::optional<Objection> judge_held_out_loss(const std::optional<PairedDifference>& gain, std::size_t names) {
+  if (!gain || gain->mean > 0.0) return std::nullopt;
   Objection objection{Reason::held_out_loss};
   for (std::size_t k = 0; k < names; ++k) objection.names.push_back(k);
   objection.notes.push_back(
-      fmt::format("What was found makes the poses set aside worse, {:.4f} mm instead of {:.4f}: the "
-                  "description is as calibrated, and the names are guesses.",
-                  figures(robots.improved, common).mean, figures({robots.before, {}}, common).mean));
+      fmt::format("What was found does not make the poses set aside better: their mean error rises by {:.4f} +- {:.4f} "
+                  "mm. The description is as calibrated{}.",
+                  -gain->mean, gain->standard_error, names > 0 ? ", and the names are guesses" : ""));
   return objection;
 }
 

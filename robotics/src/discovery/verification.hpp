@@ -8,6 +8,7 @@
 #include "discovery/investigation/pose_split.hpp"
 #include "discovery/judges/findings.hpp"
 #include "llmt/robotics/correction.hpp"
+#include "llmt/statistics.hpp"
 
 namespace llmt::robotics {
 
@@ -17,10 +18,11 @@ struct Robots {
   CorrectedRobot improved;   ///< with it
   std::vector<Effect> maps;  ///< joint maps that were added
   std::vector<std::string> notes;
+  bool is_worse = false;  ///< the refit with what was found missed more than `before` and was discarded
 };
 
 /// Both robots, fitted to the samples without the outliers of the search. `given` are the joint maps that the
-/// description has. A refit that ended in a worse minimum is discarded. If the last search ended in an unknown effect,
+/// description has. A refit that misses more is discarded. If the last search ended in an unknown effect,
 /// a correction by trees is added where it helps.
 Robots fit_robots(const Robot& robot, const Measurements& samples, const std::vector<Effect>& given,
                   const Findings& found, const DiscoveryOptions& options);
@@ -28,8 +30,13 @@ Robots fit_robots(const Robot& robot, const Measurements& samples, const std::ve
 /// The same with nothing added to the calibrated robot.
 Robots withdrawn(Robots robots);
 
-/// Objection to all names: what was found makes the poses set aside worse, by more than two standard errors.
-std::optional<Objection> judge_held_out_loss(const Robots& robots, const PoseSplit& split, std::size_t names);
+/// Error of each reading set aside before minus with what was found, mm; nothing if fewer than three were set aside, or
+/// nothing was found that could be written.
+std::optional<PairedDifference> held_out_gain(const Robots& robots, const PoseSplit& split);
+
+/// Objection to all names if the mean of the gain is not above 0. A gain within two standard errors is no objection:
+/// the poses searched speak for the names, and those set aside do not speak against them.
+std::optional<Objection> judge_held_out_loss(const std::optional<PairedDifference>& gain, std::size_t names);
 
 /// A sentence on poses set aside that are far off, such as lost beams, if there are any. They are not removed: no
 /// choice depends on them.

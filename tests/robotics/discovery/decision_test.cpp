@@ -16,6 +16,7 @@ using discovery::Answer;
 const std::map<std::string, Reason> against_verdict = {{"gross errors", Reason::gross_errors},
                                                        {"structured residuals", Reason::structured_residuals},
                                                        {"harmonics", Reason::harmonics},
+                                                       {"worse fit", Reason::worse_fit},
                                                        {"held-out loss", Reason::held_out_loss}};
 const std::map<std::string, Reason> against_names = {{"undetermined", Reason::undetermined},
                                                      {"part of the unknown", Reason::part_of_unknown},
@@ -28,6 +29,7 @@ const std::map<std::string, Headline> headlines = {
     {"NAMED.", Headline::named},
     {"NAMED, BUT NOT ALONE.", Headline::named_with_rivals},
     {"LIKELY CAUSES, NONE CERTAIN. Together", Headline::likely_causes},
+    {"LIKELY CAUSES, NONE WRITTEN.", Headline::likely_causes_unwritten},
     {"UNKNOWN EFFECT, NAMED IN PART.", Headline::named_in_part},
     {"LIKELY CAUSES, NONE CERTAIN. Beside them", Headline::likely_causes_in_part},
     {"UNKNOWN EFFECT. Something real is missing", Headline::unknown}};
@@ -102,7 +104,7 @@ std::vector<Case> cases_of(Answer verdict, const std::vector<Objection>& objecti
 std::vector<Case> all_cases() {
   std::vector<Case> cases;
   for (const Answer verdict : {Answer::nothing_missing, Answer::named, Answer::indistinguishable, Answer::unknown}) {
-    for (unsigned subset = 0; subset < 16; ++subset) {
+    for (unsigned subset = 0; subset < 32; ++subset) {
       std::vector<Objection> objections;
       unsigned bit = 1;
       for (const auto& [key, reason] : against_verdict) {

@@ -1,4 +1,5 @@
 #include "report/robot/discovery/discovery_page.hpp"
+#include "report/robot/measurement_text.hpp"
 
 namespace llmt::report {
 namespace {
@@ -91,23 +92,30 @@ Json discovery_json(const robotics::Discovery& found) {
     visible.push_back({{"effect", entry.what}, {"amplitude", finite_or_null(entry.value)}, {"unit", entry.unit}});
   }
   const Json patterns = patterns_json(found.unknown);
-  return {{"verdict", discovery::to_string(found.answer)},
-          {"effects", effects_json(found)},
-          {"unknown", patterns.empty() ? Json(nullptr) : patterns[0]},
-          {"unknown_all", patterns},
-          {"more", patterns_json(found.more)},
-          {"beyond_plausible", beyond_json(found)},
-          {"maps", found.maps.size()},
-          {"gap", gap_json(found)},
-          {"outliers", found.outliers},
-          {"not_testable", untestable},
-          {"smallest_visible", visible},
-          {"noise_mm", found.noise_mm},
-          {"score_gain", found.score_gain},
-          {"chance_threshold", found.threshold},
-          {"hypotheses", found.hypotheses},
-          {"notes", found.notes},
-          {"rounds", found.rounds}};
+  Json json = {{"verdict", discovery::to_string(found.answer)},
+               {"effects", effects_json(found)},
+               {"unknown", patterns.empty() ? Json(nullptr) : patterns[0]},
+               {"unknown_all", patterns},
+               {"more", patterns_json(found.more)},
+               {"beyond_plausible", beyond_json(found)},
+               {"maps", found.maps.size()},
+               {"gap", gap_json(found)},
+               {"outliers", found.outliers},
+               {"not_testable", untestable},
+               {"smallest_visible", visible},
+               {"noise_mm", found.noise_mm},
+               {"score_gain", found.score_gain},
+               {"chance_threshold", found.threshold},
+               {"hypotheses", found.hypotheses},
+               {"notes", found.notes},
+               {"rounds", found.rounds}};
+  const PairedDifference& gain = found.held_out.gain;
+  if (found.withdrawn) json["withdrawn"] = true;
+  if (gain.mean != 0.0 && !gain.is_beyond_chance()) {
+    json["gain_within_chance"] = {{"mean_mm", gain.mean}, {"standard_error_mm", gain.standard_error}};
+  }
+  if (!found.still.empty()) json["still_joints"] = still_json(found.still);
+  return json;
 }
 
 }  // namespace llmt::report

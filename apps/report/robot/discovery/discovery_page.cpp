@@ -8,7 +8,9 @@
 #include <functional>
 #include <map>
 
+#include "report/robot/discovery/effect_sentences.hpp"
 #include "report/robot/discovery/effect_text.hpp"
+#include "report/robot/measurement_text.hpp"
 
 namespace llmt::report {
 namespace {
@@ -16,7 +18,6 @@ namespace {
 using robotics::Discovery;
 using robotics::FoundEffect;
 
-constexpr std::size_t most_columns = 100;
 constexpr std::size_t most_lines = 24;
 
 std::string plain_value(double value, const std::string& unit) {
@@ -58,6 +59,9 @@ std::string headline_text(robotics::Headline headline) {
              "stand behind \"instead it may be\":";
     case Headline::likely_causes:
       return "LIKELY CAUSES, NONE CERTAIN. Together these explain what the model lacks:";
+    case Headline::likely_causes_unwritten:
+      return "LIKELY CAUSES, NONE WRITTEN. They explain the poses searched, but do not make the poses set aside "
+             "better:";
     case Headline::gross_errors:
       return "TOO MANY OUTLIERS. Neither an effect nor its absence can be told from these data.";
     case Headline::structured_residuals:
@@ -70,141 +74,6 @@ std::string headline_text(robotics::Headline headline) {
       return "UNKNOWN EFFECT. Something real is missing that the catalogue does not explain. It looks like this:";
   }
   return "";
-}
-
-// "joint1, joint3 and joint4"
-std::string list_of(const std::vector<std::string>& names) {
-  if (names.size() < 2) return names.empty() ? "" : names[0];
-  return fmt::format("{} and {}", fmt::join(names.begin(), names.end() - 1, ", "), names.back());
-}
-
-// "155", "27.7".
-std::string order_text(double order) {
-  return order == std::round(order) ? fmt::format("{:.0f}", order) : number(order, 3);
-}
-
-bool is_wave(const FoundEffect& effect) { return robotics::nature_of(effect.effect) == robotics::Nature::wave; }
-
-// What an effect is, without its place: for gears, what turns so often.
-std::string kind_of(const Discovery& found, const FoundEffect& effect) {
-  if (!is_wave(effect)) return effect.title;
-  const double order = effect.effect.constants[0];
-  const std::string what = fmt::format("an angle error that repeats {} times a turn", order_text(order));
-  for (const robotics::Joint& joint : found.before.chain.joints) {
-    if (joint.name != effect.effect.at || !joint.gear_ratio) continue;
-    if (std::abs(order - 2.0 * *joint.gear_ratio) < 0.02 * order) {
-      return fmt::format("{}: the wave generator of a gear of {}", what, number(*joint.gear_ratio, 4));
-    }
-  }
-  return what;
-}
-
-// Effects that one line speaks of.
-struct Group {
-  std::string kind;
-  std::vector<const FoundEffect*> members = {};
-  bool small_waves = false;
-
-  double rms_mm() const {
-    double squares = 0.0;
-    for (const FoundEffect* effect : members) squares += effect->rms_mm * effect->rms_mm;
-    return std::sqrt(squares);
-  }
-};
-
-// The waves of gears that hardly move the tool: those below a quarter of the largest wave, and of each certainty those
-// beyond the five largest. Fewer than two are not worth a line of their own.
-std::vector<const FoundEffect*> small_waves(const std::vector<const FoundEffect*>& effects, bool confirmed) {
-  constexpr int most = 5;
-  constexpr double small = 0.25;
-  double largest = 0.0;
-  int shown = 0;
-  std::vector<const FoundEffect*> waves;
-  for (const FoundEffect* effect : effects) {
-    if (!is_wave(*effect) || !effect->rivals.empty()) continue;
-    largest = std::max(largest, effect->rms_mm);
-    if (effect->confirmed != confirmed) continue;
-    if (shown == most || effect->rms_mm < small * largest) {
-      waves.push_back(effect);
-    } else {
-      ++shown;
-    }
-  }
-  return waves.size() < 2 ? std::vector<const FoundEffect*>{} : waves;
-}
-
-// What moves the tool most first.
-std::vector<Group> groups_of(const Discovery& found) {
-  const std::vector<const FoundEffect*> effects = by_size(found);
-  std::vector<Group> groups;
-  std::vector<const FoundEffect*> taken;
-  for (const bool confirmed : {true, false}) {
-    std::vector<const FoundEffect*> small = small_waves(effects, confirmed);
-    if (small.empty()) continue;
-    taken.insert(taken.end(), small.begin(), small.end());
-    groups.push_back({confirmed ? "small waves of the gears" : "perhaps small waves of the gears", small, true});
-  }
-  for (const FoundEffect* effect : effects) {
-    if (std::ranges::find(taken, effect) != taken.end()) continue;
-    const FoundEffect& whole = whole_of(found, *effect);
-    const std::string kind = (whole.confirmed ? "" : "perhaps ") + std::string(whole.smaller ? "also, smaller: " : "") +
-                             kind_of(found, whole);
-    const auto same = std::ranges::find(groups, kind, &Group::kind);
-    if (same == groups.end()) {
-      groups.push_back({kind, {effect}});
-    } else {
-      same->members.push_back(effect);
-    }
-  }
-  std::ranges::stable_sort(groups, std::greater<>(), &Group::rms_mm);
-  return groups;
-}
-
-// "joint1 (21 and 80.5 times a turn), joint2 (20)", joints in the order of the arm.
-std::string wave_places(const Discovery& found, const Group& waves) {
-  std::vector<std::string> places;
-  for (const robotics::Joint& joint : found.before.chain.joints) {
-    std::vector<std::string> orders;
-    for (const FoundEffect* effect : waves.members) {
-      if (effect->effect.at == joint.name) orders.push_back(order_text(effect->effect.constants[0]));
-    }
-    if (!orders.empty()) {
-      places.push_back(
-          fmt::format("{} ({}{})", joint.name, fmt::join(orders, ", "), places.empty() ? " times a turn" : ""));
-    }
-  }
-  return fmt::format("{}", fmt::join(places, ", "));
-}
-
-// One line for all places of one kind of effect.
-std::vector<std::string> effect_sentences(const Discovery& found) {
-  std::vector<std::string> sentences;
-  for (const Group& group : groups_of(found)) {
-    std::vector<std::string> places;
-    std::vector<std::string> rivals;
-    for (const FoundEffect* effect : group.members) {
-      if (std::ranges::find(places, place_of(*effect)) == places.end()) places.push_back(place_of(*effect));
-      if (&whole_of(found, *effect) != effect) continue;  // what could replace a part is in the details
-      for (std::size_t k = 0; k < effect->rivals.size(); ++k) {
-        const std::string rival = rival_words(*effect, k);
-        if (std::ranges::find(rivals, rival) == rivals.end()) rivals.push_back(rival);
-      }
-    }
-    std::string text =
-        fmt::format("  {}, {}", group.kind, group.small_waves ? wave_places(found, group) : list_of(places));
-    if (group.members.size() == 1 && !is_wave(*group.members[0])) {  // the size of a wave says it all
-      const std::string values = effect_values(found, *group.members[0]);
-      if (!values.empty() && values.size() < most_columns) text += ": " + values;
-    }
-    text += fmt::format("; {} the tool {:.4f} mm", group.small_waves ? "together they move" : "moves", group.rms_mm());
-    constexpr std::size_t shown = 2;
-    for (std::size_t k = 0; k < std::min(shown, rivals.size()); ++k) {
-      text += (k == 0 ? "; instead it may be: " : "; or: ") + rivals[k];
-    }
-    if (rivals.size() > shown) text += fmt::format("; or one of {} more, see below", rivals.size() - shown);
-    sentences.push_back(text);
-  }
-  return sentences;
 }
 
 // One line for all patterns that act on one thing.
@@ -254,6 +123,12 @@ std::vector<std::string> error_sentences(const Discovery& found) {
                     held.poses, held.before.mean, held.after.mean, held.before.p95, held.after.p95, held.before.max,
                     held.after.max));
   }
+  if (held.gain.mean > 0.0 && !held.gain.is_beyond_chance()) {
+    lines.push_back(
+        fmt::format("On these poses the gain is within chance: {:.4f} mm, standard error {:.4f} mm. The names rest on "
+                    "the poses searched.",
+                    held.gain.mean, held.gain.standard_error));
+  }
   lines.push_back(
       held.floor_from_repeats
           ? fmt::format("A perfect model would still miss by {:.4f} mm: the noise, measured by repeated poses.",
@@ -271,6 +146,7 @@ std::string advice(const Discovery& found) {
   if (found.answer == discovery::Answer::nothing_missing) return "";
   if (found.headline == Headline::gross_errors)
     return "Next: check the outliers, measure them again, and repeat the search without them.";
+  if (found.withdrawn) return "Next: measure more poses. The description that is written is the calibrated one.";
   if (found.headline == Headline::structured_residuals)
     return "Next: measure some poses several times, from both sides, and write their number into a column `pose`.";
   if (found.answer == discovery::Answer::indistinguishable) {
@@ -328,6 +204,7 @@ std::string discovery_page(const Discovery& found, const std::vector<Eigen::Inde
     add(fmt::format("Outliers, left out: line{} {}{}", rows.size() == 1 ? "" : "s", fmt::join(rows, ", "),
                     more > 0 ? fmt::format(" and {} more", more) : ""));
   }
+  if (!found.still.empty()) add(still_text(found.still));
   for (const std::string& note : found.notes) add(note);
   const std::string next = advice(found);
   if (!next.empty()) add(next);

@@ -40,7 +40,8 @@ std::vector<std::string> names_of(const Discovery& found, bool confirmed) {
 }
 
 std::string cause(const Discovery& found) {
-  if (found.headline == robotics::Headline::likely_causes)
+  if (found.headline == robotics::Headline::likely_causes ||
+      found.headline == robotics::Headline::likely_causes_unwritten)
     return fmt::format("Likely causes, none certain: {}", fmt::join(names_of(found, false), "; "));
   const std::vector<std::string> names = names_of(found, true);
   switch (found.answer) {
@@ -227,6 +228,10 @@ Document discovery_report(const Discovered& of) {
                                      number(found.held_out.floor_mm, 3));
       break;
     case discovery::Answer::unknown:
+      if (found.withdrawn) {
+        document.answer += ". Nothing was added, because it would not make these poses better.";
+        break;
+      }
       document.answer += fmt::format(
           ". {} {}.",
           found.headline == robotics::Headline::likely_causes ? "Adding these takes" : "Free maps in its place take",

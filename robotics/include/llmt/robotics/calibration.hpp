@@ -29,6 +29,7 @@ struct Calibration {
   bool began_without_priors = false;
   std::vector<std::string> weak;      ///< free parameters that the prior determines more closely than the data
   std::vector<FixedParameter> fixed;  ///< every parameter that was not free, in the order of parameters()
+  std::vector<StillJoint> still;      ///< what only their motion tells was kept as described
 };
 
 /// Fits bases and tools together by damped least squares; all other parameters keep their values. The fit starts from
@@ -42,7 +43,8 @@ discovery::SolverResult register_frames(Robot& robot, const Measurements& measur
 /// 1. register_frames();
 /// 2. choice of the free parameters: theta, d, a, alpha of every joint, beta instead of d where axes are nearly
 ///    parallel, and all parameters of effects; a parameter that is exactly or nearly a combination of earlier ones over
-///    the measured poses is fixed and reported;
+///    the measured poses is fixed and reported, and so is one that is such a combination while the joints that hardly
+///    moved (Calibration::still) stand still;
 /// 3. damped least squares over the free parameters (llmt::discovery::solve) with the weak priors of the options; the
 ///    residuals are divided by their standard deviation sigma, which comes from the pass before: one for positions (or
 ///    distances) and one for orientations. Where the file states sigmas of its readings (stated_sigma_mm()), they come

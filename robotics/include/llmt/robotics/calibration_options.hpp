@@ -22,6 +22,16 @@ struct FixedParameter {
   std::string why;
 };
 
+/// FixedParameter::why of what only the motion of joints that hardly moved could tell.
+inline constexpr const char* unseen_motion = "only the motion of joints that hardly moved could tell it";
+
+/// A joint that hardly moved while the arm was measured: by less than 0.1 deg, or 1 mm of a prismatic joint.
+struct StillJoint {
+  std::string joint;
+  std::string unit;    ///< deg or mm
+  double range = 0.0;  ///< from the smallest to the largest value
+};
+
 struct CalibrationOptions {
   /// Parameters that keep their values: names ("joint2.a"), or owners of parameters ("base", "tool", "joint2",
   /// "joint_compliance@joint2").

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "discovery/investigation/pose_split.hpp"
+#include "discovery/investigation/unsound_effects.hpp"
 
 namespace llmt::robotics {
 namespace {

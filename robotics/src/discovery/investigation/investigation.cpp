@@ -3,12 +3,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <set>
 
 #include "calibration/joint_map_shift.hpp"
 #include "discovery/investigation/joint_maps.hpp"
 #include "discovery/investigation/leave_one_out.hpp"
 #include "discovery/investigation/pose_split.hpp"
+#include "discovery/investigation/unsound_effects.hpp"
 #include "llmt/discovery/rounds.hpp"
 #include "llmt/statistics.hpp"
 
@@ -99,6 +102,25 @@ struct Round {
   Calibration fitted;
 };
 
+// Remembers the effects of the refit that are unsound(). True if there are none.
+bool refuse_unsound(Investigation& now) {
+  const std::vector<Effect> refused = unsound(now.baseline, now.fitted, now.found, now.kept());
+  for (const Effect& effect : refused) now.implausible.try_emplace(effect_label(effect), effect);
+  return refused.empty();
+}
+
+// Something is missing, and every name for it was refused.
+Investigation without_names(Investigation now, const DiscoveryOptions& options) {
+  discovery::Verdict& verdict = now.verdict;
+  std::erase_if(verdict.findings, [](const discovery::Finding& one) { return !one.generic; });
+  verdict.answer = discovery::Answer::unknown;
+  verdict.left = verdict.sum_of_squares;
+  verdict.noise = std::sqrt(verdict.left / static_cast<double>(std::max<Eigen::Index>(1, verdict.dof)));
+  now.found.clear();
+  now.fitted = refit(now.baseline, {}, now.searched, verdict.outliers, options);
+  return now;
+}
+
 std::vector<std::size_t> ascending(std::vector<std::size_t> samples) {
   std::ranges::sort(samples);
   return samples;
@@ -137,10 +159,6 @@ void report_progress(Work& work, const std::string& step) {
   work.begin(step);
 }
 
-double total_distance(const Robot& robot, const Measurements& measurements) {
-  return distances(positions(robot, measurements.poses), measurements).norm();
-}
-
 Calibration refit(const Calibration& baseline, const std::vector<Hypothesis>& found, const Measurements& measurements,
                   const std::vector<std::size_t>& outliers, const DiscoveryOptions& options) {
   const Measurements kept = without_rows(measurements, outliers);
@@ -154,29 +172,6 @@ Calibration refit(const Calibration& baseline, const std::vector<Hypothesis>& fo
   if (total_distance(fitted.robot, kept) <= total_distance(baseline.robot, kept)) return fitted;
   Calibration other = from(baseline.robot);
   return total_distance(other.robot, kept) < total_distance(fitted.robot, kept) ? other : fitted;
-}
-
-std::vector<Effect> too_large(const Calibration& fitted, const std::vector<Hypothesis>& found) {
-  const std::vector<discovery::Parameter> all = parameters(fitted.robot);
-  std::vector<Effect> beyond;
-  for (const Hypothesis& hypothesis : found) {
-    const discovery::EffectCandidate& limits = hypothesis.candidate;
-    const auto effect = std::ranges::find(fitted.robot.effects, effect_label(*hypothesis.effect), effect_label);
-    if (effect == fitted.robot.effects.end() || limits.lower.size() == 0) continue;
-    const std::vector<EffectParameter> own = effect_parameters(fitted.robot.chain, *effect);
-    for (std::size_t k = 0; k < own.size(); ++k) {
-      const std::string name = effect_parameter_name(*effect, own[k]);
-      const auto index = std::ranges::find(all, name, &discovery::Parameter::name) - all.begin();
-      const double error = 2.0 * fitted.result.standard_errors(index);
-      const double value = effect->values[k];
-      const auto i = static_cast<Eigen::Index>(k);
-      // An error that is not finite: the value is not determined.
-      if (!(value + error < limits.lower(i)) && !(value - error > limits.upper(i))) continue;
-      beyond.push_back(*effect);
-      break;
-    }
-  }
-  return beyond;
 }
 
 Investigation search_in_rounds(Investigation now, const DiscoveryOptions& options) {
@@ -200,18 +195,22 @@ Investigation search_in_rounds(Investigation now, const DiscoveryOptions& option
     forget_signatures(now.asked);
     const bool as_before = now.found.empty() && now.outliers() == now.baseline_without;
     now.fitted = as_before ? now.baseline : refit(now.baseline, now.found, now.searched, now.verdict.outliers, options);
-    const std::vector<Effect> beyond = too_large(now.fitted, now.found);
-    for (const Effect& effect : beyond) now.implausible.try_emplace(effect_label(effect), effect);
-    if (beyond.empty()) tried.push_back({now.asked, now.verdict, now.found, now.fitted});
     discovery::RoundSummary summary = summary_of(now.asked, now.verdict);
-    summary.may_be_last = beyond.empty();
+    summary.may_be_last = refuse_unsound(now);
+    if (summary.may_be_last) {
+      tried.push_back({now.asked, now.verdict, now.found, now.fitted});
+    } else {
+      now.found = tried.empty() ? std::vector<Hypothesis>{} : tried.back().found;
+      now.fitted = tried.empty() ? now.baseline : tried.back().fitted;
+    }
     return summary;
   };
   // One in a hundred poses may be an outlier in one round and not in the next.
   const auto negligible = static_cast<std::size_t>(now.searched.count() / 100);
   const discovery::RoundLimits limits{
       .most = options.rounds, .negligible_outliers = negligible, .stop_at_repeat = true};
-  if (discovery::until_settled(limits, start_of(now), round) || tried.empty()) return now;
+  if (discovery::until_settled(limits, start_of(now), round)) return now;
+  if (tried.empty()) return without_names(std::move(now), options);
   Round& best = tried[best_of(tried, now.searched)];
   now.asked = std::move(best.asked);
   now.verdict = std::move(best.verdict);
@@ -220,12 +219,27 @@ Investigation search_in_rounds(Investigation now, const DiscoveryOptions& option
   return now;
 }
 
-std::optional<std::vector<Effect>> helpful_maps(const Investigation& investigation) {
-  const std::optional<JointMaps> maps =
+std::optional<JointMaps> helpful_maps(const Investigation& investigation) {
+  std::optional<JointMaps> maps =
       fit_joint_maps(investigation.fitted.robot, without_rows(investigation.searched, investigation.verdict.outliers));
   constexpr double convincing = 2.0;
   if (!maps || maps->gain_in_errors < convincing) return std::nullopt;
-  return maps->effects;
+  return maps;
+}
+
+std::set<std::string> followed_by_maps(const Investigation& now, const JointMaps& maps) {
+  constexpr double followed = 0.9;
+  const Measurements kept = now.kept();
+  Eigen::MatrixXd moved(std::ssize(measured_rows(kept)), std::ssize(now.found));
+  for (Eigen::Index k = 0; k < moved.cols(); ++k) {
+    moved.col(k) = beyond_geometry(now.fitted.robot, *now.found[k].effect, kept);
+  }
+  const Eigen::VectorXd left = beyond_maps(now.fitted.robot, kept, maps, moved);
+  std::set<std::string> labels;
+  for (Eigen::Index k = 0; k < moved.cols(); ++k) {
+    if (left(k) < 1.0 - followed) labels.insert(effect_label(*now.found[k].effect));
+  }
+  return labels;
 }
 
 Investigation search_with_maps(Investigation now, const std::vector<Effect>& maps, const DiscoveryOptions& options) {
@@ -237,6 +251,10 @@ Investigation search_with_maps(Investigation now, const std::vector<Effect>& map
   now.baseline = calibrate(now.baseline.registered, now.kept(), calibration);
   now.baseline_without = now.outliers();
   now.fitted = refit(now.baseline, now.found, now.searched, now.verdict.outliers, options);
+  if (!refuse_unsound(now)) {
+    now.found.clear();
+    now.fitted = now.baseline;
+  }
   return search_in_rounds(std::move(now), options);
 }
 

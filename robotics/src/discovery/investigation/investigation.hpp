@@ -3,9 +3,11 @@
 
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
+#include "discovery/investigation/joint_maps.hpp"
 #include "discovery/investigation/question.hpp"
 #include "llmt/robotics/calibration.hpp"
 
@@ -25,8 +27,7 @@ struct Investigation {
   discovery::Verdict verdict;
   EffectQuestion asked;  ///< its hypotheses without their signatures
   int rounds = 0;
-  /// Effects that ended beyond their plausible size when everything was fitted together, by label. They are not found
-  /// again.
+  /// Effects that unsound() refused after a refit, by label. They are not found again.
   std::map<std::string, Effect> implausible;
 
   /// Samples that fit nothing, ascending.
@@ -35,8 +36,9 @@ struct Investigation {
   Measurements kept() const;
 };
 
-/// Searches and refits until names and outliers no longer change. If they do not settle, the round is kept whose refit
-/// has the smallest leave-one-pose-out error.
+/// Searches and refits until names and outliers no longer change. A refit with unsound() effects is no round: the
+/// search goes on without them from the last refit that is one. If the rounds do not settle, the one is kept whose
+/// refit has the smallest leave-one-pose-out error; if there is none, nothing is named, and the answer is `unknown`.
 Investigation search_in_rounds(Investigation investigation, const DiscoveryOptions& options);
 
 /// Fits the robot with the found effects, starting from the registered frames. If that is worse than geometry alone, it
@@ -44,11 +46,12 @@ Investigation search_in_rounds(Investigation investigation, const DiscoveryOptio
 Calibration refit(const Calibration& baseline, const std::vector<Hypothesis>& found, const Measurements& measurements,
                   const std::vector<std::size_t>& outliers, const DiscoveryOptions& options);
 
-/// Effects that were fitted to sizes beyond the plausible ones, by more than two standard errors.
-std::vector<Effect> too_large(const Calibration& fitted, const std::vector<Hypothesis>& found);
-
 /// Joint maps that lower the leave-one-pose-out error by more than two standard errors, or none.
-std::optional<std::vector<Effect>> helpful_maps(const Investigation& investigation);
+std::optional<JointMaps> helpful_maps(const Investigation& investigation);
+
+/// Labels of the effects found of which maps as smooth as these follow nine tenths. Beside the maps their values are
+/// arbitrary: effect and map may be large and cancel each other.
+std::set<std::string> followed_by_maps(const Investigation& investigation, const JointMaps& maps);
 
 /// Searches with the maps applied to the joint values. An effect that the maps cannot imitate may show only then.
 Investigation search_with_maps(Investigation investigation, const std::vector<Effect>& maps,
@@ -57,8 +60,5 @@ Investigation search_with_maps(Investigation investigation, const std::vector<Ef
 /// Counts the step that ends as a share of the work that is left, because the number of steps is not known, and names
 /// the step that begins.
 void report_progress(Work& work, const std::string& step);
-
-/// Root of the sum of squared distances between model and measurement, mm.
-double total_distance(const Robot& robot, const Measurements& measurements);
 
 }  // namespace llmt::robotics

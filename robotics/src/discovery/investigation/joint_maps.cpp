@@ -7,6 +7,7 @@
 
 #include "calibration/free_parameters.hpp"
 #include "calibration/joint_map_shift.hpp"
+#include "discovery/investigation/jacobian_range.hpp"
 #include "discovery/investigation/leave_one_out.hpp"
 #include "effects/effect_entries.hpp"
 #include "kinematics/units.hpp"
@@ -192,6 +193,31 @@ ProjectedMaps project(const Robot& robot, const Measurements& measurements, cons
 }
 
 }  // namespace
+
+Eigen::VectorXd beyond_maps(const Robot& robot, const Measurements& measurements, const JointMaps& maps,
+                            const Eigen::MatrixXd& displacements) {
+  Eigen::VectorXd shares = Eigen::VectorXd::Ones(displacements.cols());
+  const std::vector<Knots> knots = choose_knots(robot.chain, measurements.poses);
+  if (knots.size() != maps.smoothness.size() || displacements.cols() == 0) return shares;
+  const std::vector<Eigen::Index> rows = measured_rows(measurements);
+  std::vector<Eigen::Index> geometry = freed_parameters(robot);
+  std::erase_if(geometry, [&](Eigen::Index k) { return k >= geometric_parameter_count(robot.chain); });
+  const Eigen::MatrixXd basis = range_of(position_jacobian(robot, measurements.poses, geometry)(rows, Eigen::all));
+  Eigen::MatrixXd hats = pushed_hats(robot, measurements.poses, knots, rows);
+  const Eigen::MatrixXd inside = basis.transpose() * hats;
+  hats.noalias() -= basis * inside;
+  Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(hats.cols(), hats.cols());
+  gram.selfadjointView<Eigen::Lower>().rankUpdate(hats.transpose());
+  gram.triangularView<Eigen::StrictlyUpper>() = gram.transpose();
+  const Smoother smoother(gram, Eigen::VectorXd::Zero(gram.cols()), 0.0, 0.0, knots);
+  const Eigen::LLT<Eigen::MatrixXd> factor(gram + smoother.penalty(maps.smoothness));
+  const Eigen::MatrixXd left = displacements - hats * factor.solve(hats.transpose() * displacements);
+  for (Eigen::Index k = 0; k < shares.size(); ++k) {
+    const double all = displacements.col(k).squaredNorm();
+    if (all > 0.0) shares(k) = left.col(k).squaredNorm() / all;
+  }
+  return shares;
+}
 
 std::optional<JointMaps> fit_joint_maps(const Robot& robot, const Measurements& measurements) {
   const std::vector<Knots> knots = choose_knots(robot.chain, measurements.poses);

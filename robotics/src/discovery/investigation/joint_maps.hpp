@@ -24,4 +24,10 @@ struct JointMaps {
 /// moves.
 std::optional<JointMaps> fit_joint_maps(const Robot& robot, const Measurements& measurements);
 
+/// Of each column of displacements at the measured coordinates, the share of its sum of squares that maps of the joints
+/// as smooth as these do not follow, beside a change of the geometry that the robot's calibration freed. The robot and
+/// the measurements are those that the maps were fitted to.
+Eigen::VectorXd beyond_maps(const Robot& robot, const Measurements& measurements, const JointMaps& maps,
+                            const Eigen::MatrixXd& displacements);
+
 }  // namespace llmt::robotics

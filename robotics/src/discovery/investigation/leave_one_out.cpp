@@ -1,10 +1,10 @@
 #include "discovery/investigation/leave_one_out.hpp"
 
 #include <Eigen/Cholesky>
-#include <Eigen/QR>
 #include <algorithm>
 
 #include "calibration/free_parameters.hpp"
+#include "discovery/investigation/jacobian_range.hpp"
 #include "discovery/investigation/pose_split.hpp"
 
 namespace llmt::robotics {
@@ -26,16 +26,7 @@ Eigen::VectorXd leave_one_out_distances(const Calibration& fitted, const Measure
   const Measurements kept = without_rows(measurements, skipped);
   const std::vector<Eigen::Index> free = freed_parameters(fitted.robot);
   const std::vector<Eigen::Index> rows = measured_rows(kept);
-  Eigen::MatrixXd jacobian = position_jacobian(fitted.robot, kept.poses, free)(rows, Eigen::all);
-  constexpr double nothing = 1e-7;  // of the longest column: rounding
-  const double least = jacobian.cols() > 0 ? nothing * jacobian.colwise().norm().maxCoeff() : 0.0;
-  for (auto column : jacobian.colwise()) {
-    column *= column.norm() > least ? 1.0 / column.norm() : 0.0;
-  }
-  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> factors(jacobian);
-  factors.setThreshold(1e-9);
-  Eigen::MatrixXd basis = Eigen::MatrixXd::Identity(jacobian.rows(), factors.rank());
-  basis.applyOnTheLeft(factors.householderQ());
+  const Eigen::MatrixXd basis = range_of(position_jacobian(fitted.robot, kept.poses, free)(rows, Eigen::all));
   const Eigen::MatrixXd model = positions(fitted.robot, kept.poses);
   Eigen::VectorXd errors(std::ssize(rows));
   for (Eigen::Index k = 0; k < errors.size(); ++k) {

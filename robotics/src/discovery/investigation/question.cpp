@@ -5,6 +5,7 @@
 
 #include "calibration/free_parameters.hpp"
 #include "calibration/noise_model.hpp"
+#include "calibration/still_joints.hpp"
 #include "discovery/investigation/pose_split.hpp"
 #include "hypotheses/catalogue_effects.hpp"
 #include "hypotheses/error_patterns.hpp"
@@ -37,13 +38,13 @@ std::vector<Eigen::Index> freed_geometry(const Robot& robot) {
 // Geometric parameters that span all that geometry can do to the rigid arm. Some combinations move nothing on a rigid
 // arm, such as a shift of a joint along its axis. On an arm that bends they move loads, and thereby the tool by a
 // thousandth: counted as geometry they would absorb a part of every elastic effect.
-std::vector<Eigen::Index> independent_geometry(const Robot& robot, const Measurements& measurements,
+std::vector<Eigen::Index> independent_geometry(const Robot& robot, const Poses& poses,
                                                const std::vector<Eigen::Index>& rows) {
   // Touched points alone also fit an arm of no size. Only the parameters that the calibration freed keep the scale.
   if (!unseen_by_touch(robot).empty()) return freed_geometry(robot);
   Robot rigid = robot;
   rigid.effects.clear();
-  Eigen::MatrixXd jacobian = position_jacobian(rigid, measurements.poses)(rows, Eigen::all);
+  Eigen::MatrixXd jacobian = position_jacobian(rigid, poses)(rows, Eigen::all);
   // A column that is tiny next to the others is rounding, often with the pattern of a column that moves the tool.
   // Scaled up it would take that column's place.
   constexpr double nothing = 1e-7;
@@ -72,9 +73,10 @@ Hypothesis found_before(const Hypothesis& earlier, const Effect& effect, const E
 }
 
 // Start values of the fit. The estimate of a value that hardly moves the tool can be arbitrarily large, so estimates
-// are clamped to their plausible limits.
+// are clamped to their plausible limits. Values without limits start at 0, where those stay that the poses do not
+// determine.
 std::vector<double> within_limits(const discovery::EffectCandidate& candidate, const Eigen::VectorXd& values) {
-  Eigen::VectorXd bounded = values;
+  Eigen::VectorXd bounded = Eigen::VectorXd::Zero(values.size());
   if (candidate.lower.size() == values.size()) bounded = values.cwiseMax(candidate.lower).cwiseMin(candidate.upper);
   return {bounded.begin(), bounded.end()};
 }
@@ -98,7 +100,9 @@ EffectQuestion question(const Robot& robot, const std::vector<Hypothesis>& found
   const std::size_t own = robot.effects.size() - found.size();
   EffectQuestion result;
   const Eigen::VectorXd residuals = stacked_residuals(robot, measurements);
-  const Scene scene = make_scene(robot, measurements.poses, residuals, measurements.measured);
+  // A signature that only the motion of a joint that hardly moves tells from another one would need a huge value.
+  const Poses poses = with_still_joints_held(robot.chain, measurements.poses);
+  const Scene scene = make_scene(robot, poses, residuals, measurements.measured);
   result.hypotheses = catalogue_hypotheses(scene, options.catalogue, result.untestable);
   if (options.scans) {
     for (Hypothesis& scanned : scanned_effects(scene, options.catalogue))
@@ -108,11 +112,11 @@ EffectQuestion question(const Robot& robot, const std::vector<Hypothesis>& found
   const std::vector<Eigen::Index> rows = measured_rows(measurements);
   const Eigen::Index geometric = geometric_parameter_count(robot.chain);
   // Columns of the fitted geometry, then of all effects.
-  std::vector<Eigen::Index> columns = independent_geometry(robot, measurements, rows);
+  std::vector<Eigen::Index> columns = independent_geometry(robot, poses, rows);
   const auto fitted = std::ssize(columns);
   const auto all = static_cast<Eigen::Index>(parameters(robot).size());
   for (Eigen::Index k = geometric; k < all; ++k) columns.push_back(k);
-  const Eigen::MatrixXd jacobian = position_jacobian(robot, measurements.poses, columns);
+  const Eigen::MatrixXd jacobian = position_jacobian(robot, poses, columns);
   Eigen::VectorXd explained = residuals;
   Eigen::Index column = fitted;
   Eigen::Index baseline = fitted;

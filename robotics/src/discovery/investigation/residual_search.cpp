@@ -4,6 +4,7 @@
 
 #include "discovery/investigation/leave_one_out.hpp"
 #include "discovery/investigation/pose_split.hpp"
+#include "discovery/investigation/unsound_effects.hpp"
 
 namespace llmt::robotics {
 
@@ -46,7 +47,7 @@ std::optional<ResidualSearch> search_residuals(Investigation& investigation, con
       refit(investigation.baseline, all, investigation.searched, investigation.verdict.outliers, options);
   bool is_refused = false;
   bool is_new = false;
-  for (const Effect& effect : too_large(fitted, all)) {
+  for (const Effect& effect : unsound(investigation.baseline, fitted, all, investigation.kept())) {
     is_refused = true;
     is_new = investigation.implausible.try_emplace(effect_label(effect), effect).second || is_new;
   }
@@ -57,7 +58,7 @@ std::optional<ResidualSearch> search_residuals(Investigation& investigation, con
     for (const std::size_t sample : skipped) errors(static_cast<Eigen::Index>(sample)) = 0.0;
     return errors.squaredNorm();
   };
-  if (error(fitted) >= error(investigation.fitted)) return std::nullopt;
+  if (!(error(fitted) < error(investigation.fitted))) return std::nullopt;
   investigation.found = std::move(all);
   investigation.fitted = std::move(fitted);
   return search;

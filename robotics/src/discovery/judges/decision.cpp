@@ -39,6 +39,7 @@ const std::vector<Row>& table() {
       {{}, Reason::gross_errors, anything, {}, Answer::unknown, Headline::gross_errors},
       {{}, Reason::structured_residuals, anything, {}, Answer::unknown, Headline::structured_residuals},
       {{Answer::nothing_missing}, {}, anything, {}, Answer::nothing_missing, Headline::nothing_missing},
+      {{}, Reason::held_out_loss, anything, {none}, Answer::unknown, Headline::likely_causes_unwritten},
       {{Answer::named}, {}, nothing, {larger}, Answer::named, Headline::named},
       {named, {}, nothing, {larger, smaller_rivalled}, Answer::indistinguishable, Headline::named_with_rivals},
       {named, {}, nothing, {none}, Answer::unknown, Headline::likely_causes},

@@ -14,7 +14,8 @@ enum class Reason {
   gross_errors,          ///< too many measurements fit nothing
   structured_residuals,  ///< the residuals are not an instrument's noise, and no name that stands explains that
   harmonics,             ///< a wave has harmonics that a gear's wave has not
-  held_out_loss,         ///< what was found makes the poses set aside worse; speaks against every name
+  worse_fit,             ///< fitted with what was found, the robot misses more than without it
+  held_out_loss,         ///< what was found does not make the poses set aside better; speaks against every name
   // Against single names only.
   undetermined,          ///< all values are within two standard errors of zero
   part_of_unknown,       ///< the name may be a part of what has no name

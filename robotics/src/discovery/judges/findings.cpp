@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 
+#include "calibration/still_joints.hpp"
+
 namespace llmt::robotics {
 namespace {
 
@@ -79,7 +81,9 @@ std::vector<Name> named_effects(const std::vector<Hypothesis>& hypotheses, const
       found.title = effect_type(found.effect.type).title;
       found.parameters = parameters_of(found.effect, fitted, mass_uncertainty);
       found.share = finding.terms.size() == 1 ? finding.share : term.share;
-      found.rms_mm = std::sqrt(std::max(0.0, found.share * explained) / samples);
+      const auto rms = [&](double share) { return std::sqrt(std::max(0.0, share * explained) / samples); };
+      found.rms_mm = rms(found.share);
+      found.family_rms_mm = rms(finding.share);
       add_rivals(finding, hypotheses, found);
       names.push_back({std::move(found), finding.share});
     }
@@ -144,12 +148,16 @@ std::vector<BeyondPlausible> beyond_plausible(const Investigation& investigation
 Limits limits_of(const Investigation& investigation, const Robot& robot) {
   const std::vector<Hypothesis>& hypotheses = investigation.asked.hypotheses;
   Limits limits{investigation.asked.untestable, {}};
+  const std::vector<StillJoint> still = still_joints(robot.chain, investigation.searched.poses);
   for (std::size_t a = 0; a < hypotheses.size(); ++a) {
     if (!hypotheses[a].effect) continue;
     const discovery::Sensitivity& own = investigation.verdict.sensitivity[a];
     if (own.absorbed) {
+      const bool is_still = std::ranges::find(still, hypotheses[a].effect->at, &StillJoint::joint) != still.end();
       limits.not_testable.push_back(
-          {label_of(hypotheses[a]), "geometry, or what is in the model already, imitates it at these poses"});
+          {label_of(hypotheses[a]), is_still
+                                        ? "its joint hardly moves, and geometry imitates it there"
+                                        : "geometry, or what is in the model already, imitates it at these poses"});
       continue;
     }
     limits.visible.push_back({label_of(hypotheses[a]), own.visible.size() != 0 ? own.visible.maxCoeff() : 0.0,

@@ -19,6 +19,7 @@ struct Findings {
   std::vector<Name> names;
   std::vector<FoundPattern> unknown;   ///< patterns of the first search
   std::vector<Effect> maps;            ///< joint maps that were added
+  std::optional<JointMaps> map_fit;    ///< their fit
   std::optional<Objection> harmonics;  ///< against waves, see judge_waves()
   std::vector<std::string> notes;
 

@@ -13,6 +13,7 @@
 #include "llmt/discovery/search.hpp"
 #include "llmt/robotics/calibration_report.hpp"
 #include "llmt/robotics/correction.hpp"
+#include "llmt/statistics.hpp"
 
 namespace llmt::robotics {
 
@@ -41,7 +42,10 @@ struct FoundEffect {
   std::vector<std::vector<Effect>> rival_effects;  ///< the rivals as effects that could stand in the robot
   bool exact_alias = false;  ///< a rival predicts the same at every pose: no measurement can distinguish them
   double share = 0.0;        ///< of the explained sum of squares
-  double rms_mm = 0.0;       ///< of the displacement that it causes beyond what geometry can imitate
+  /// Of the displacement that it causes beyond what geometry and the other effects can imitate. It is never larger than
+  /// the root mean square of what the calibrated robot misses.
+  double rms_mm = 0.0;
+  double family_rms_mm = 0.0;  ///< the same of all places of its family together
   /// Standard error of the effect's constant, where that was fitted: the order of a wave, a presliding.
   std::optional<double> constant_error = {};
   bool smaller = false;  ///< found beside larger ones, in what they leave
@@ -84,8 +88,11 @@ struct Visible {
 };
 
 struct HeldOut {
-  ErrorFigures before;    ///< of the calibrated robot as described
-  ErrorFigures after;     ///< of the robot with what was found
+  ErrorFigures before;  ///< of the calibrated robot as described
+  ErrorFigures after;   ///< of Discovery::improved
+  /// Error before minus error with what was found, reading by reading, mm. What was found is written if the mean is
+  /// above 0.
+  PairedDifference gain;
   double floor_mm = 0.0;  ///< mean distance between a perfect model and measurements with this noise
   bool floor_from_repeats = false;
   Eigen::Index poses = 0;
@@ -96,13 +103,14 @@ struct HeldOut {
 enum class Headline {
   nothing_missing,
   named,
-  named_with_rivals,      ///< other causes explain the data as well
-  likely_causes,          ///< names explain what is missing, but none is confirmed
-  gross_errors,           ///< too many measurements fit nothing: neither an effect nor its absence can be told
-  structured_residuals,   ///< no candidate explains the residuals, but they are not an instrument's noise
-  named_in_part,          ///< beside a confirmed name something without a name is missing
-  likely_causes_in_part,  ///< names, none of them confirmed, beside something without a name
-  unknown,                ///< something without a name is missing
+  named_with_rivals,        ///< other causes explain the data as well
+  likely_causes,            ///< names explain what is missing, but none is confirmed
+  likely_causes_unwritten,  ///< names explain the poses searched, but do not make the poses set aside better
+  gross_errors,             ///< too many measurements fit nothing: neither an effect nor its absence can be told
+  structured_residuals,     ///< no candidate explains the residuals, but they are not an instrument's noise
+  named_in_part,            ///< beside a confirmed name something without a name is missing
+  likely_causes_in_part,    ///< names, none of them confirmed, beside something without a name
+  unknown,                  ///< something without a name is missing
 };
 
 struct Discovery {
@@ -117,11 +125,13 @@ struct Discovery {
   std::vector<Effect> maps;                       ///< joint maps that were added for the unknown effect
   Robot before;                                   ///< calibrated without what was found
   CorrectedRobot improved;                        ///< with it, and with a correction of the rest where that helps
+  bool withdrawn = false;                         ///< something was found, but `improved` is `before`: it was no better
   ErrorFigures fitted_before;                     ///< of the poses that were searched
   ErrorFigures fitted_after;
   HeldOut held_out;
   GapMap gap;                          ///< of `before`
   std::vector<Eigen::Index> outliers;  ///< rows of the measurements, from 0
+  std::vector<StillJoint> still;       ///< joints that hardly moved
   std::vector<discovery::UntestableCause> not_testable;
   std::vector<Visible> visible;
   discovery::LackOfFit lack_of_fit;
