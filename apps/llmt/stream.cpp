@@ -18,6 +18,7 @@
 #include "llmt/stream_command.hpp"
 #include "report/stream/stream_summary.hpp"
 #include "shared/cli.hpp"
+#include "shared/standard_error.hpp"
 #include "shared/table_file.hpp"
 
 namespace llmt::apps {
@@ -64,15 +65,15 @@ StreamOptions options_of(const CLI::App& command, const StreamArguments& argumen
 // Rows so far and the running errors, on one line that is rewritten, where stderr is a terminal.
 void show_progress(const Stream& stream) {
   if (::isatty(STDERR_FILENO) != 0) {
-    fmt::print(stderr, "\r\033[K{} rows, RMSE before learning {:.5g}, of the last 1000 {:.5g}", stream.counts().rows,
-               fmt::join(stream.prequential_rmse(), ", "), fmt::join(stream.recent_rmse(), ", "));
-    std::fflush(stderr);
+    write_stderr(fmt::format("\r\033[K{} rows, RMSE before learning {:.5g}, of the last 1000 {:.5g}",
+                             stream.counts().rows, fmt::join(stream.prequential_rmse(), ", "),
+                             fmt::join(stream.recent_rmse(), ", ")));
   }
 }
 
 void clear_progress() {
   if (::isatty(STDERR_FILENO) != 0) {
-    fmt::print(stderr, "\r\033[K");
+    write_stderr("\r\033[K");
   }
 }
 

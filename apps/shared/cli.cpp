@@ -19,6 +19,7 @@
 #include "shared/help.hpp"
 #include "shared/manual.hpp"
 #include "shared/options.hpp"
+#include "shared/standard_error.hpp"
 
 namespace llmt::apps {
 namespace {
@@ -125,6 +126,7 @@ std::string in_words_of_user(std::string_view message, std::span<const SettingNa
 
 int run(CLI::App& app, int argc, char** argv, std::span<const SettingName> names) {
   app.set_version_flag("--version", fmt::format("{} {}", app.get_name(), LLMT_VERSION));
+  occupy_closed_standard_files();
   handle_signals();
   set_up_help(app);
   const auto fail = [&](std::string_view reason, int code) {
@@ -203,7 +205,7 @@ void print_json(const Json& json) {
 }
 
 void warn(const std::string& text) {
-  if (!is_silent) fmt::print(stderr, "{}\n", without_controls(shortened(text)));
+  if (!is_silent) write_stderr(without_controls(shortened(text)) + "\n");
 }
 
 }  // namespace llmt::apps
