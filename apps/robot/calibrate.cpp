@@ -208,7 +208,10 @@ void add_calibrate(CLI::App& app) {
   command->add_flag("--quality", arguments->quality,
                     "Print also how well the poses determine the parameters, and whether more would help");
   command->add_flag("--json", arguments->json, "Print the report as JSON");
-  command->callback([arguments] { calibrate_command(*arguments); });
+  command->callback([command, arguments] {
+    check_beside_urdf(*command, arguments->output);
+    calibrate_command(*arguments);
+  });
 }
 
 }  // namespace llmt::apps

@@ -101,6 +101,7 @@ void export_c(const ExportArguments& arguments) {
   if (arguments.output.empty()) throw std::invalid_argument("--c needs --output: the source and its header are files");
   const std::string header = beside(arguments.output, ".h").string();
   if (header == arguments.output) throw std::invalid_argument("--output: the header has this name; write to FILE.c");
+  refuse_lost_input(header, arguments.robot);
   const robotics::CorrectedRobot robot = read_arm(arguments.robot, arguments.links);
   const CSource c = robotics::to_c(robot, arguments.name, std::filesystem::path(header).filename().string());
   const std::vector<NewFile> files = {{arguments.output, c.source}, {header, c.header}};

@@ -30,6 +30,23 @@ bool is_same_file(const std::string& one, const std::string& other) {
   return std::filesystem::equivalent(one, other, unknown) && std::filesystem::is_regular_file(one, unknown);
 }
 
+// Where a file lies or will lie: its folder and the links at the end of its path are followed.
+std::filesystem::path place_of(const std::string& path) {
+  constexpr int most_links = 40;
+  std::error_code unknown;
+  std::filesystem::path place = path;
+  for (int links = 0; links < most_links && std::filesystem::is_symlink(place, unknown); ++links) {
+    place = place.parent_path() / std::filesystem::read_symlink(place, unknown);
+  }
+  return std::filesystem::weakly_canonical(std::filesystem::absolute(place, unknown), unknown);
+}
+
+// Devices and pipes take what comes, one output after the other.
+bool is_device(const std::string& path) {
+  std::error_code unknown;
+  return std::filesystem::exists(path, unknown) && !std::filesystem::is_regular_file(path, unknown);
+}
+
 void refuse_impossible_place(const std::string& path) {
   std::error_code unknown;
   const auto fail = [&](const char* reason) {
@@ -134,15 +151,17 @@ CLI::Option* add_input_file(CLI::App& command, const std::string& name, std::str
 CLI::Option* add_output_file(CLI::App& command, const std::string& name, std::string& path, const std::string& help,
                              const std::vector<std::string>& extensions) {
   // The texts of all options are there before the first of them is taken.
-  const auto take = [&command, &path, extensions](const CLI::results_t& texts) {
+  const std::string own_name = name.substr(name.find("--"));
+  const auto take = [&command, own_name, &path, extensions](const CLI::results_t& texts) {
     path = texts.back();
-    check_output_file(command, path, extensions);
+    check_output_file(command, own_name, path, extensions);
     return true;
   };
   return add_text(command, name, output_type, take, help, {});
 }
 
-void check_output_file(const CLI::App& command, const std::string& path, const std::vector<std::string>& extensions) {
+void check_output_file(const CLI::App& command, const std::string& name, const std::string& path,
+                       const std::vector<std::string>& extensions) {
   std::vector<std::string> written = {path};
   for (const std::string& extension : extensions) {
     written.push_back(beside(path, extension).string());
@@ -157,6 +176,19 @@ void check_output_file(const CLI::App& command, const std::string& path, const s
   }
   for (const std::string& output : written) {
     refuse_impossible_place(output);
+  }
+  const auto is_output = [&](const CLI::Option* option) {
+    return option->get_type_name() == output_type && !option->check_name(name);
+  };
+  for (const CLI::Option* option : command.get_options(is_output)) {
+    for (const std::string& other : option->results()) {
+      for (const std::string& output : written) {
+        if (is_device(other) || place_of(other) != place_of(output)) continue;
+        throw std::invalid_argument(
+            fmt::format("{}: would be written twice by this command ({} and --{}); give each output a name of its own",
+                        output, name, option->get_single_name()));
+      }
+    }
   }
 }
 

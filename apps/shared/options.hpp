@@ -78,13 +78,14 @@ CLI::Option* add_decimal_comma(CLI::App& command, DecimalMark& mark);
 CLI::Option* add_input_file(CLI::App& command, const std::string& name, std::string& path, const std::string& help);
 
 /// The file that the command writes, shown as NEWFILE. It is checked before the command runs. Throws
-/// std::invalid_argument if it is one of the input files, by whatever name, and std::runtime_error if it is a folder or
-/// lies in none. `extensions`: of further files that are written beside it under its name.
+/// std::invalid_argument if it is one of the input files or another output, by whatever name or link, and
+/// std::runtime_error if it is a folder or lies in none. Devices and pipes may be named twice. `extensions`: of further
+/// files that are written beside it under its name.
 CLI::Option* add_output_file(CLI::App& command, const std::string& name, std::string& path, const std::string& help,
                              const std::vector<std::string>& extensions = {});
 
-/// The checks of add_output_file() for a path that is known later.
-void check_output_file(const CLI::App& command, const std::string& path,
+/// The checks of add_output_file() for a path that is known later. `name`: of its option, "--output".
+void check_output_file(const CLI::App& command, const std::string& name, const std::string& path,
                        const std::vector<std::string>& extensions = {});
 
 /// The check above for an input that is known only when another one has been read.

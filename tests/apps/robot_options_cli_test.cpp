@@ -67,6 +67,38 @@ TEST(RobotOptions, AnOutputThatIsAnInputIsRefusedBeforeTheWork) {
   lost("calibrate c2.yaml d.csv -o c.yaml", "c.correction.json", "c.correction.json");
 }
 
+TEST(RobotOptions, TwoOutputsOfOneNameAreRefusedBeforeTheWork) {
+  const Folder folder;
+  folder.write("r.yaml", llmt::read_file(arm));
+  folder.write("m.yaml", "{}");
+  folder.write("d.csv", "q1_deg\n0\n");
+  const auto twice = [&](const std::string& arguments, const std::string& output, const std::string& options) {
+    expect_robot_usage(
+        folder, arguments,
+        fmt::format("{}: would be written twice by this command ({}); give each output a name of its own", output,
+                    options));
+  };
+  twice("calibrate r.yaml d.csv -o z.svg --plot z.svg", "z.svg", "--output and --plot");
+  twice("discover r.yaml d.csv -o z.svg --plot ./z.svg", "z.svg", "--output and --plot");
+  twice("mechanism r.yaml d.csv -o s --errors s", "s", "--errors and --output");
+  // The description of an arm stands beside its URDF.
+  expect_robot_usage(folder, "calibrate a.urdf d.csv --columns m.yaml -o m.urdf",
+                     "m.yaml: would be overwritten, and is an input of this command (m.yaml); give the output a name "
+                     "of its own");
+  EXPECT_EQ(llmt::read_file(folder.file("m.yaml")), "{}");
+}
+
+TEST(RobotOptions, AMessageThatCannotBeWrittenChangesNoExitCode) {
+  const Folder folder;
+  folder.write("r.yaml", llmt::read_file(arm));
+  for (const std::string arguments : {"simulate r.yaml --poses 3 -o s.csv", "mechanism r.yaml s.csv", "predict r.yaml",
+                                      "check r.yaml no.csv", "simulate no.urdf"}) {
+    const int expected = folder.run(robot_program + " " + arguments).exit_code;
+    EXPECT_EQ(folder.run(robot_program + " " + arguments + " 2>&-").exit_code, expected) << arguments;
+    EXPECT_EQ(folder.run(robot_program + " " + arguments + " 2>/dev/full").exit_code, expected) << arguments;
+  }
+}
+
 TEST(RobotOptions, EndlessDescriptionsAreRefused) {
   const Folder folder;
   const Outcome outcome = folder.run(robot_program + " simulate /dev/zero");
