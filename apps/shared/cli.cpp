@@ -1,6 +1,7 @@
 #include "shared/cli.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <sys/ioctl.h>
 #include <unistd.h>
 
@@ -153,7 +154,10 @@ int run(CLI::App& app, int argc, char** argv, std::span<const SettingName> names
     return fail(error.what() + std::string("; a file of Windows is converted by iconv -f CP1252 -t UTF-8"),
                 exit_refused);
   } catch (const std::bad_alloc&) {
-    return fail("there is not enough memory for this", exit_refused);
+    const std::vector<std::string> files = input_files(app);
+    return fail(files.empty() ? "there is not enough memory for this"
+                              : fmt::format("{}: there is not enough memory for this", fmt::join(files, ", ")),
+                exit_refused);
   } catch (const std::exception& error) {
     return fail(error.what(), exit_refused);
   }

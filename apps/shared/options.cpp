@@ -192,6 +192,17 @@ void check_output_file(const CLI::App& command, const std::string& name, const s
   }
 }
 
+std::vector<std::string> input_files(const CLI::App& app) {
+  std::vector<std::string> files;
+  for (const CLI::App* command : app.get_subcommands()) {
+    for (const CLI::Option* option : command->get_options()) {
+      if (option->get_type_name() == input_type)
+        files.insert(files.end(), option->results().begin(), option->results().end());
+    }
+  }
+  return files;
+}
+
 void refuse_lost_input(const std::string& output, const std::string& input) {
   if (!is_same_file(output, input)) return;
   throw std::invalid_argument(

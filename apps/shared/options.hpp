@@ -88,6 +88,9 @@ CLI::Option* add_output_file(CLI::App& command, const std::string& name, std::st
 void check_output_file(const CLI::App& command, const std::string& name, const std::string& path,
                        const std::vector<std::string>& extensions = {});
 
+/// The files that the command which was called reads, as they were named.
+std::vector<std::string> input_files(const CLI::App& app);
+
 /// The check above for an input that is known only when another one has been read.
 void refuse_lost_input(const std::string& output, const std::string& input);
 
