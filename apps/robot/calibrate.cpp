@@ -179,7 +179,7 @@ void add_calibrate(CLI::App& app) {
   add_urdf_links(*command, arguments->links);
   add_input_file(*command, "data", arguments->data, "Measurements (CSV with units in the column names)")->required();
   command->add_flag("--correct", options.correct, "Learn the residual as a function of the joint values");
-  add_count(*command, "--folds", options.folds, 0, "Folds of the held-out figures, 0: none")->capture_default_str();
+  add_folds(*command, options.folds, "Folds of the held-out figures, 0: none");
   command->add_flag("--contiguous", arguments->contiguous, "Folds are blocks of consecutive rows: for paths and grids");
   add_input_file(*command, "--test", arguments->test, "Further measurements that take no part, judged at the end");
   command

@@ -83,6 +83,16 @@ CLI::Option* add_number(CLI::App& command, const std::string& name, double& valu
   return add_text(command, name, "NUMBER", take, help, [&value] { return fmt::format("{}", value); });
 }
 
+CLI::Option* add_folds(CLI::App& command, int& folds, const std::string& help) {
+  const auto take = [&folds](const CLI::results_t& texts) {
+    folds = static_cast<int>(read_count("--folds", texts.back(), 0, std::numeric_limits<int>::max()));
+    if (folds == 1) refuse("--folds", texts.back(), "0, or a whole number, 2 or more");
+    return true;
+  };
+  return add_text(command, "--folds", "COUNT", take, help, [&folds] { return std::to_string(folds); })
+      ->capture_default_str();
+}
+
 CLI::Option* add_numbers(CLI::App& command, const std::string& name, std::vector<double>& values,
                          const NumberRange& range, const std::string& help) {
   const auto take = [name, &values, range](const CLI::results_t& texts) {

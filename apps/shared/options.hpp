@@ -60,6 +60,9 @@ CLI::Option* add_count(CLI::App& command, const std::string& name, Whole& value,
   return add_text(command, name, "COUNT", take, help, [&value] { return std::to_string(value); });
 }
 
+/// --folds: 0, or 2 and more.
+CLI::Option* add_folds(CLI::App& command, int& folds, const std::string& help);
+
 /// An option with names of columns or the like, separated by commas or given one by one; `type` is shown as "TYPE,...".
 CLI::Option* add_names(CLI::App& command, const std::string& name, std::vector<std::string>& values, const char* type,
                        const std::string& help);

@@ -31,7 +31,8 @@ namespace llmt::robotics {
 ///       - r*c = x
 ///
 /// Throws std::runtime_error `path:line: where: what` for a file that cannot be read or is no YAML, for unknown,
-/// repeated or missing keys, and for whatever validate(Mechanism) refuses.
+/// repeated or missing keys, for more than 16 MiB, 1000 parameters or definitions, 100 joints or outputs, or 200
+/// equations, and for whatever validate(Mechanism) refuses.
 Mechanism read_mechanism(const std::string& path);
 
 /// As read_mechanism(), from memory; `name` stands for the path in messages.
