@@ -106,7 +106,7 @@ void require_target(const LearningArguments& arguments) {
   if (!arguments.targets.empty()) return;
   const Csv csv = read_table(arguments.data, arguments.mark);
   throw std::invalid_argument(fmt::format("--target is required: what to predict; the columns of {} are {}", csv.name(),
-                                          fmt::join(csv.columns(), ", ")));
+                                          csv_row(csv.columns())));
 }
 
 std::vector<std::string> choose_inputs(const Csv& csv, const LearningArguments& arguments) {

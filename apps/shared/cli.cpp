@@ -77,11 +77,20 @@ int parse(CLI::App& app, int argc, char** argv) {
   }
 }
 
-// A control character of ASCII, or the second byte of one of U+0080 ... U+009F.
-bool is_control(std::string_view text, std::size_t i) {
+// Bytes at `i` that a terminal may take for an order, or that change where the text after them stands: control
+// characters but tabs and line breaks, marks of direction, line separators of Unicode, bytes that UTF-8 never has.
+std::size_t bytes_of_order(std::string_view text, std::size_t i) {
   const auto byte = static_cast<unsigned char>(text[i]);
-  const bool after_c2 = i > 0 && text[i - 1] == '\xC2';
-  return (byte < 0x20 && byte != '\n' && byte != '\t') || byte == 0x7F || (after_c2 && byte >= 0x80 && byte < 0xA0);
+  if ((byte < 0x20 && byte != '\n' && byte != '\t') || byte == 0x7F || byte >= 0xF8) return 1;
+  const auto follows = [&](std::string_view lead, unsigned char first, unsigned char last) {
+    const std::string_view here = text.substr(i);
+    if (here.size() <= lead.size() || !here.starts_with(lead)) return false;
+    const auto next = static_cast<unsigned char>(here[lead.size()]);
+    return next >= first && next <= last;
+  };
+  if (follows("\xC2", 0x80, 0x9F) || follows("\xD8", 0x9C, 0x9C)) return 2;  // U+0080 ... U+009F, U+061C
+  if (follows("\xE2\x80", 0x8E, 0x8F) || follows("\xE2\x80", 0xA8, 0xAE) || follows("\xE2\x81", 0xA6, 0xA9)) return 3;
+  return 0;
 }
 
 // The middle of a long text left out, not within a character of UTF-8.
@@ -165,12 +174,11 @@ int run(CLI::App& app, int argc, char** argv, std::span<const SettingName> names
 
 std::string without_controls(std::string_view text) {
   std::string result;
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    if (is_control(text, i)) {
-      result += fmt::format("\\x{:02x}", static_cast<unsigned char>(text[i]));
-    } else {
-      result += text[i];
-    }
+  for (std::size_t i = 0; i < text.size();) {
+    const std::size_t bytes = bytes_of_order(text, i);
+    for (std::size_t k = 0; k < bytes; ++k) result += fmt::format("\\x{:02x}", static_cast<unsigned char>(text[i + k]));
+    if (bytes == 0) result += text[i];
+    i += std::max<std::size_t>(bytes, 1);
   }
   return result;
 }
@@ -209,7 +217,11 @@ void print_json(const Json& json) {
 }
 
 void warn(const std::string& text) {
-  if (!is_silent) write_stderr(without_controls(shortened(text)) + "\n");
+  if (is_silent) return;
+  std::string line = without_controls(shortened(text));
+  for (std::size_t at = line.find('\n'); at != std::string::npos; at = line.find('\n', at))
+    line.replace(at, 1, "\\x0a");
+  write_stderr(line + "\n");
 }
 
 }  // namespace llmt::apps

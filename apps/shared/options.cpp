@@ -25,6 +25,16 @@ bool parse_number(const std::string& text, Number& value) {
   return error == std::errc() && stop == end && !text.starts_with("+-");
 }
 
+// The quote that ends the one at `begin`, doubled quotes in between left out; npos if there is none.
+std::size_t end_of_quotes(const std::string& text, std::size_t begin) {
+  for (std::size_t at = begin + 1; at < text.size(); ++at) {
+    if (text[at] != '"') continue;
+    if (at + 1 == text.size() || text[at + 1] != '"') return at;
+    ++at;
+  }
+  return std::string::npos;
+}
+
 bool is_same_file(const std::string& one, const std::string& other) {
   std::error_code unknown;
   return std::filesystem::equivalent(one, other, unknown) && std::filesystem::is_regular_file(one, unknown);
@@ -111,10 +121,37 @@ CLI::Option* add_numbers(CLI::App& command, const std::string& name, std::vector
 
 CLI::Option* add_names(CLI::App& command, const std::string& name, std::vector<std::string>& values, const char* type,
                        const std::string& help) {
-  return command.add_option(name, values, help)
+  const auto take = [&values](const CLI::results_t& texts) {
+    values.clear();
+    for (const std::string& text : texts) {
+      const std::vector<std::string> names = names_in(text);
+      values.insert(values.end(), names.begin(), names.end());
+    }
+    return true;
+  };
+  return add_text(command, name, type, take, help, {})
       ->type_name(fmt::format("{},...", type))
-      ->allow_extra_args(false)
-      ->delimiter(',');
+      ->expected(CLI::detail::expected_max_vector_size)
+      ->allow_extra_args(false);
+}
+
+std::vector<std::string> names_in(const std::string& text) {
+  std::vector<std::string> names(1);
+  for (std::size_t at = 0; at < text.size(); ++at) {
+    const std::size_t end = names.back().empty() && text[at] == '"' ? end_of_quotes(text, at) : std::string::npos;
+    if (end != std::string::npos) {
+      names.back() = text.substr(at + 1, end - at - 1);
+      for (std::size_t quote = 0; (quote = names.back().find("\"\"", quote)) != std::string::npos; ++quote) {
+        names.back().erase(quote, 1);
+      }
+      at = end;
+    } else if (text[at] == ',') {
+      names.emplace_back();
+    } else {
+      names.back() += text[at];
+    }
+  }
+  return names;
 }
 
 CLI::Option* add_decimal_comma(CLI::App& command, DecimalMark& mark) {

@@ -63,9 +63,12 @@ CLI::Option* add_count(CLI::App& command, const std::string& name, Whole& value,
 /// --folds: 0, or 2 and more.
 CLI::Option* add_folds(CLI::App& command, int& folds, const std::string& help);
 
-/// An option with names of columns or the like, separated by commas or given one by one; `type` is shown as "TYPE,...".
+/// An option with names of columns or the like, as names_in() or given one by one; `type` is shown as "TYPE,...".
 CLI::Option* add_names(CLI::App& command, const std::string& name, std::vector<std::string>& values, const char* type,
                        const std::string& help);
+
+/// Names separated by commas. One that holds a comma stands in double quotes, inner quotes doubled, as in CSV.
+std::vector<std::string> names_in(const std::string& text);
 
 /// The seed of random numbers, from 0 to 2^64 - 1.
 CLI::Option* add_seed(CLI::App& command, std::uint64_t& seed, const std::string& help);

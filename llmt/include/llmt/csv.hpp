@@ -185,4 +185,7 @@ class CsvPieces {
 /// `text` as one CSV field: in double quotes, inner quotes doubled, if it holds the separator, a quote or a line break.
 std::string csv_field(std::string_view text, char separator = ',');
 
+/// Fields for people, as messages list columns: a comma and a blank between them.
+std::string csv_row(std::span<const std::string> fields);
+
 }  // namespace llmt

@@ -1,7 +1,6 @@
 #include "llmt/csv.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cstdint>
@@ -101,7 +100,7 @@ std::size_t Csv::index_of(std::string_view column) const {
   const auto found = fields_.find(column);
   if (found == fields_.end()) {
     throw std::runtime_error(fmt::format("{}: there is no column \"{}\"{}; the columns are {}", name_, column,
-                                         did_you_mean(column, columns_), fmt::join(columns_, ", ")));
+                                         did_you_mean(column, columns_), csv_row(columns_)));
   }
   return found->second;
 }
@@ -160,6 +159,12 @@ std::string csv_field(std::string_view text, char separator) {
     }
   }
   return quoted + '"';
+}
+
+std::string csv_row(std::span<const std::string> fields) {
+  std::string row;
+  for (const std::string& field : fields) row += (row.empty() ? "" : ", ") + csv_field(field);
+  return row;
 }
 
 }  // namespace llmt
