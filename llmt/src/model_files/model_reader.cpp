@@ -192,8 +192,8 @@ Model model_from(const JsonReader& root) {
 }
 
 Model from_json(const std::string& text, const std::string& name) {
-  const Json json = parse_json(text, name);
-  return model_from({json, name});
+  const JsonDocument json = parse_json(text, name);
+  return model_from({json.value(), name});
 }
 
 Model load(const std::string& path) { return from_json(read_file(path), path); }
