@@ -36,9 +36,9 @@ struct Learned {
 constexpr std::size_t piece_bytes = 1 << 20;
 
 void refuse_other_options(const CLI::App& command) {
-  constexpr std::array<std::string_view, 14> taken = {
-      "data",   "target",   "inputs",    "ignore",       "weight", "min-leaf", "max-leaves",
-      "stream", "validity", "shrinkage", "significance", "output", "json",     "decimal-comma"};
+  constexpr std::array<std::string_view, 15> taken = {
+      "data",     "target",    "inputs",       "ignore", "weight", "min-leaf",      "max-leaves", "stream",
+      "validity", "shrinkage", "significance", "output", "json",   "decimal-comma", "thousands"};
   for (const CLI::Option* option : command.get_options()) {
     const std::string name = option->get_single_name();
     if (option->count() > 0 && std::ranges::find(taken, name) == taken.end()) {
@@ -129,7 +129,8 @@ Learned learn(const CLI::App& command, const StreamArguments& arguments) {
     std::ios::sync_with_stdio(false);
   }
   CsvPieces pieces(standard_input ? std::cin : file, learned.name, piece_bytes, learning.mark);
-  while (const std::optional<Csv> piece = pieces.next()) {
+  while (std::optional<Csv> piece = pieces.next()) {
+    if (learning.thousands) piece->read_thousands();
     if (!learned.stream) {
       learned.inputs = choose_inputs(*piece, learning);
       learned.stream = std::make_unique<Stream>(std::ssize(learned.inputs), std::ssize(learning.targets), options);

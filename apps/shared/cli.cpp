@@ -154,6 +154,16 @@ int run(CLI::App& app, int argc, char** argv, std::span<const SettingName> names
     return parse(app, argc, argv);
   } catch (const std::invalid_argument& error) {
     return fail(error.what(), exit_usage);
+  } catch (const ThousandsError& error) {
+    const auto can = [command = app.get_subcommands().front()](const char* option) {
+      return command->get_option_no_throw(option) != nullptr;
+    };
+    std::vector<std::string> advice;
+    if (can(thousands_option)) advice.push_back(fmt::format("{} reads thousands", thousands_option));
+    if (!error.is_certain() && can(decimal_comma_option) && error.found() == DecimalMark::comma) {
+      advice.push_back(fmt::format("{} reads decimal commas", decimal_comma_option));
+    }
+    return fail(fmt::format("{}{}{}", error.what(), advice.empty() ? "" : "; ", fmt::join(advice, ", ")), exit_refused);
   } catch (const DecimalMarkError& error) {
     const CLI::App* const command = app.get_subcommands().front();
     const bool can_read = command->get_option_no_throw(decimal_comma_option) != nullptr;

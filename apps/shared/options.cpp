@@ -161,6 +161,11 @@ CLI::Option* add_decimal_comma(CLI::App& command, DecimalMark& mark) {
       "Numbers of the table have a decimal comma; fields are separated by semicolons or tabs");
 }
 
+CLI::Option* add_thousands(CLI::App& command, bool& thousands) {
+  return command.add_flag(thousands_option, thousands,
+                          "Numbers of the table may have separators of thousands: 1,234.5");
+}
+
 std::int64_t read_count(const std::string& option, const std::string& text, std::int64_t low, std::int64_t high) {
   std::int64_t value = 0;
   if (!parse_number(text, value) || value < low || value > high) {

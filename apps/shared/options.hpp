@@ -80,6 +80,10 @@ CLI::Option* add_threads(CLI::App& command, int& threads);
 inline constexpr const char* decimal_comma_option = "--decimal-comma";
 CLI::Option* add_decimal_comma(CLI::App& command, DecimalMark& mark);
 
+/// --thousands: numbers of the command's tables may have separators of thousands.
+inline constexpr const char* thousands_option = "--thousands";
+CLI::Option* add_thousands(CLI::App& command, bool& thousands);
+
 /// A file that the command reads, shown as FILE. A dash is standard input where the command says so.
 CLI::Option* add_input_file(CLI::App& command, const std::string& name, std::string& path, const std::string& help);
 

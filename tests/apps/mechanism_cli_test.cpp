@@ -138,6 +138,7 @@ TEST(MechanismProgram, MistakesAreRefusedWithTheirPlace) {
   says("q1_mm,q2_deg\n1,2\n", "column \"q1_mm\" has a wrong unit");
   says("q1_deg,q1_rad\n1,2\n", "are one coordinate");
   says("q1_deg,q2_deg\n1,x\n", "t.csv:2: column \"q2_deg\"");
+  says("q1_deg,q2_deg\n1,2\n1,nan\n", "t.csv:3: column \"q2_deg\": 'nan' is not finite");
   says("q1_deg,q2_deg\n120,60\n", "no reading checks another one");
   says("q1_rad,q2_deg\n120,60\n",
        "t.csv: column of q1: 1 of 1 readings are far outside its limits, 80 to 150 deg: they "
