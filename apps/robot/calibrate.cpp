@@ -49,12 +49,14 @@ std::map<std::string, double> priors_of(const std::vector<std::string>& texts) {
   std::map<std::string, double> priors;
   for (const std::string& text : texts) {
     const std::size_t sign = text.find('=');
-    double sigma = 0.0;
-    if (sign == std::string::npos || !CLI::detail::lexical_cast(text.substr(sign + 1), sigma) || !(sigma > 0.0)) {
+    if (sign == std::string::npos) {
       throw std::invalid_argument(fmt::format(
           "--prior: \"{}\" must be a parameter and its standard deviation in mm or deg, as joint2.a=0.1", text));
     }
-    priors[text.substr(0, sign)] = sigma;
+    // Smaller ones are beyond the rounding of what they hold: --fix says that a parameter is known.
+    constexpr NumberRange sigmas = {1e-9, largest_number,
+                                    "a finite number, 1e-9 or more (mm or deg); --fix holds a parameter"};
+    priors[text.substr(0, sign)] = read_number("--prior " + text.substr(0, sign), text.substr(sign + 1), sigmas);
   }
   return priors;
 }

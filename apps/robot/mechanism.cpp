@@ -78,9 +78,20 @@ Eigen::VectorXd noise_of_readings(const robotics::Mechanism& mechanism, const st
   return noise;
 }
 
+// Errors name the description: there is no other file.
+Eigen::MatrixXd poses_within_limits(const MechanismArguments& arguments, const robotics::Mechanism& mechanism) {
+  try {
+    return robotics::random_poses(mechanism, arguments.simulate, arguments.seed);
+  } catch (const std::invalid_argument& error) {
+    throw std::runtime_error(arguments.mechanism + ": " + error.what());
+  } catch (const std::runtime_error& error) {
+    throw std::runtime_error(arguments.mechanism + ": " + error.what());
+  }
+}
+
 void simulate_mechanism(const MechanismArguments& arguments, const robotics::Mechanism& mechanism) {
   const Eigen::VectorXd noise = noise_of_readings(mechanism, arguments.noise);
-  Eigen::MatrixXd poses = robotics::random_poses(mechanism, arguments.simulate, arguments.seed);
+  Eigen::MatrixXd poses = poses_within_limits(arguments, mechanism);
   Random random(arguments.seed + 1);
   for (Eigen::Index row = 0; row < poses.rows(); ++row) {
     for (Eigen::Index i = 0; i < poses.cols(); ++i) poses(row, i) += noise(i) * random.normal();

@@ -58,6 +58,9 @@ bool is_device(const std::string& path) {
 }
 
 void refuse_impossible_place(const std::string& path) {
+  if (path == "-") {
+    throw std::invalid_argument("-: is no name of an output; /dev/stdout is standard output, ./- a file of that name");
+  }
   std::error_code unknown;
   const auto fail = [&](const char* reason) {
     throw std::runtime_error(fmt::format("{}: cannot be written: {}", path, reason));

@@ -99,6 +99,31 @@ TEST(RobotOptions, AMessageThatCannotBeWrittenChangesNoExitCode) {
   }
 }
 
+TEST(RobotOptions, WhatIsWrongIsSaidWithItsFileOrOption) {
+  const Folder folder;
+  folder.write("r.yaml", llmt::read_file(arm));
+  const auto says = [&](const std::string& arguments, int exit_code, const std::string& message) {
+    const Outcome outcome = folder.run(robot_program + " " + arguments);
+    EXPECT_EQ(outcome.exit_code, exit_code) << arguments;
+    EXPECT_NE(outcome.err.find(message), std::string::npos) << arguments << ": " << outcome.err;
+  };
+  says("demo -o /proc/x", 1, "/proc/x: the folder cannot be made: ");
+  says("simulate r.yaml --poses 3 -o -", 2, "-: is no name of an output; /dev/stdout is standard output");
+  folder.write("m.yaml", "mechanism: m\njoints: []\n");
+  says("simulate m.yaml", 1, "m.yaml:1: this is a mechanism and no arm: llmt-robot mechanism reads it");
+  folder.write("zero.yaml", std::string("name: a\nx: ") + '\0' + "\n");
+  says("simulate zero.yaml", 1, "zero.yaml:2: a byte is 0");
+  folder.write("f.yaml",
+               llmt::read_file(arm) +
+                   "effects:\n  - {type: formula, at: joint1, name: u, terms: [{joint: \"sin(q1)\", name: s}], "
+                   "coefficients: [1e-4]}\n");
+  says("export --c f.yaml -o f.c", 1, "f.yaml: effect ");
+  ASSERT_EQ(folder.run(robot_program + " simulate r.yaml --poses 60 -o d.csv").exit_code, 0);
+  says("calibrate r.yaml d.csv --prior joint2.a=1e-300", 2,
+       "--prior joint2.a is \"1e-300\", it must be a finite number, 1e-9 or more (mm or deg); --fix holds a parameter");
+  says("calibrate r.yaml d.csv --folds 1", 2, "--folds is \"1\", it must be 0, or a whole number, 2 or more");
+}
+
 TEST(RobotOptions, EndlessDescriptionsAreRefused) {
   const Folder folder;
   const Outcome outcome = folder.run(robot_program + " simulate /dev/zero");
