@@ -63,5 +63,5 @@ llmt_pkg_config(llmt_core llmt "Local linear model trees" "eigen3 >= 3.4" "tbb f
 llmt_pkg_config(llmt_core llmt_discovery "Which effect a simulation lacks" "eigen3 >= 3.4" "fmt")
 if(TARGET llmt_robotics)
   llmt_pkg_config(llmt_robotics llmt_robotics "Robot calibration, and what a robot model lacks" "llmt llmt_discovery"
-                  "yaml-cpp muparser urdfdom tinyxml fmt")
+                  "yaml-cpp muparser urdfdom tinyxml expat fmt")
 endif()

@@ -214,7 +214,7 @@ void sort_outputs(const CLI::App& command, DiscoverArguments& arguments) {
   if (arguments.outputs.empty()) throw std::invalid_argument("--target is needed: the columns to explain");
   if (files.size() > 1) throw std::invalid_argument(fmt::format("--output names {} files", files.size()));
   if (files.empty()) return;
-  check_output_file(command, files.front());
+  check_output_file(command, "--output", files.front());
   arguments.corrected = files.front();
 }
 

@@ -23,6 +23,7 @@ struct ExplainArguments {
   std::string data;
   Eigen::Index row = 0;  // counted from 1; 0: the whole table
   DecimalMark mark = DecimalMark::point;
+  bool thousands = false;
   bool json = false;
   int threads = 0;
 };
@@ -70,7 +71,7 @@ void explain_row(const ExplainArguments& arguments, const Model& model, const Cs
 void explain_command(const ExplainArguments& arguments) {
   const Model model = read_unless_exchanged(arguments.model, arguments.data, model_comes_first,
                                             [](const std::string& path) { return load_model(path); });
-  const Csv csv = read_table(arguments.data, arguments.mark);
+  const Csv csv = read_table(arguments.data, arguments.mark, arguments.thousands);
   if (csv.rows() == 0) {
     throw std::runtime_error(fmt::format("{}: there is a header and no rows", arguments.data));
   }
@@ -97,6 +98,7 @@ void add_explain(CLI::App& app) {
       ->required();
   add_count(*command, "--row", arguments->row, Eigen::Index{1}, "Row to explain, the first one below the header is 1");
   add_decimal_comma(*command, arguments->mark);
+  add_thousands(*command, arguments->thousands);
   add_threads(*command, arguments->threads);
   command->add_flag("--json", arguments->json, "Print JSON");
   command->callback([arguments] { explain_command(*arguments); });

@@ -83,6 +83,13 @@ void look_for_accidental_inputs(const LearningArguments& arguments, const std::v
       continue;
     }
     if (contains(arguments.categorical, name)) continue;
+    if (found.kind == report::AccidentalInput::Kind::unit) {
+      warn(fmt::format(
+          "llmt: column \"{}\": every cell is a number and \"{}\", and is taken for categories; leave the unit "
+          "out of the cells to have numbers, --categorical says that categories are meant",
+          name, found.unit));
+      continue;
+    }
     const std::string advice =
         found.kind == report::AccidentalInput::Kind::dates
             ? fmt::format(
@@ -104,9 +111,9 @@ DominantRows dominant_rows_of_target(const Eigen::Ref<const Eigen::VectorXd>& ta
 
 void require_target(const LearningArguments& arguments) {
   if (!arguments.targets.empty()) return;
-  const Csv csv = read_table(arguments.data, arguments.mark);
+  const Csv csv = read_table(arguments.data, arguments.mark, arguments.thousands);
   throw std::invalid_argument(fmt::format("--target is required: what to predict; the columns of {} are {}", csv.name(),
-                                          fmt::join(csv.columns(), ", ")));
+                                          csv_row(csv.columns())));
 }
 
 std::vector<std::string> choose_inputs(const Csv& csv, const LearningArguments& arguments) {
@@ -173,7 +180,7 @@ std::vector<Eigen::Index> lines_of_rows(const Csv& csv) {
 }  // namespace
 
 LearningTable read_learning_table(const LearningArguments& arguments) {
-  const Csv csv = read_table(arguments.data, arguments.mark);
+  const Csv csv = read_table(arguments.data, arguments.mark, arguments.thousands);
   if (csv.rows() == 0) {
     throw std::runtime_error(fmt::format("{}: there is a header and no rows", csv.name()));
   }
@@ -218,6 +225,7 @@ void add_learning_options(CLI::App& command, LearningArguments& arguments) {
             "Inputs that are categories although they are written as numbers; columns of words are anyway");
   command.add_option("--weight", arguments.weight, "The weights of the rows [1 for each]")->type_name("COLUMN");
   add_decimal_comma(command, arguments.mark);
+  add_thousands(command, arguments.thousands);
   add_count(command, "--cv", options.folds.count, 0,
             "Folds of the held-out error by which everything is chosen, 0: keep the tree as grown")
       ->capture_default_str();

@@ -27,6 +27,7 @@ struct LearningArguments {
   bool contiguous = false;
   bool may_have_codes = true;  ///< see TrainingData
   DecimalMark mark = DecimalMark::point;
+  bool thousands = false;
   FitOptions options;
 };
 

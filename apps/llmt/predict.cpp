@@ -29,6 +29,7 @@ struct PredictArguments {
   bool json = false;
   double interval = 0.0;  // level; 0: none
   DecimalMark mark = DecimalMark::point;
+  bool thousands = false;
   int threads = 0;
 };
 
@@ -129,7 +130,8 @@ void predict_command(const PredictArguments& arguments) {
   const ModelWithIntervals file =
       read_unless_exchanged(arguments.model, arguments.data, model_comes_first,
                             [&](const std::string& path) { return load_model(path, arguments.interval > 0.0); });
-  const Csv csv = read_table(arguments.data, arguments.mark);
+  const Csv csv = read_table(arguments.data, arguments.mark, arguments.thousands);
+  if (csv.rows() == 0) throw std::runtime_error(fmt::format("{}: there is a header and no rows", csv.name()));
   const report::Prediction predicted = predict_table(arguments, file, csv);
   if (const Eigen::Index count = report::count_not_finite(predicted); count > 0) {
     warn(fmt::format("llmt: warning: {} of {} predictions are not finite: numbers of {} are too large for these rows",
@@ -168,6 +170,7 @@ void add_predict(CLI::App& app) {
   add_number(*command, "--interval", arguments->interval, level,
              "Level of prediction intervals, such as 0.9: adds TARGET_low and TARGET_high");
   add_decimal_comma(*command, arguments->mark);
+  add_thousands(*command, arguments->thousands);
   add_threads(*command, arguments->threads);
   command->add_flag("--json", arguments->json, "Print JSON; it holds the predictions unless -o is given");
   command->callback([arguments] { predict_command(*arguments); });

@@ -18,6 +18,7 @@
 #include "llmt/stream_command.hpp"
 #include "report/stream/stream_summary.hpp"
 #include "shared/cli.hpp"
+#include "shared/standard_error.hpp"
 #include "shared/table_file.hpp"
 
 namespace llmt::apps {
@@ -35,9 +36,9 @@ struct Learned {
 constexpr std::size_t piece_bytes = 1 << 20;
 
 void refuse_other_options(const CLI::App& command) {
-  constexpr std::array<std::string_view, 14> taken = {
-      "data",   "target",   "inputs",    "ignore",       "weight", "min-leaf", "max-leaves",
-      "stream", "validity", "shrinkage", "significance", "output", "json",     "decimal-comma"};
+  constexpr std::array<std::string_view, 15> taken = {
+      "data",     "target",    "inputs",       "ignore", "weight", "min-leaf",      "max-leaves", "stream",
+      "validity", "shrinkage", "significance", "output", "json",   "decimal-comma", "thousands"};
   for (const CLI::Option* option : command.get_options()) {
     const std::string name = option->get_single_name();
     if (option->count() > 0 && std::ranges::find(taken, name) == taken.end()) {
@@ -64,15 +65,15 @@ StreamOptions options_of(const CLI::App& command, const StreamArguments& argumen
 // Rows so far and the running errors, on one line that is rewritten, where stderr is a terminal.
 void show_progress(const Stream& stream) {
   if (::isatty(STDERR_FILENO) != 0) {
-    fmt::print(stderr, "\r\033[K{} rows, RMSE before learning {:.5g}, of the last 1000 {:.5g}", stream.counts().rows,
-               fmt::join(stream.prequential_rmse(), ", "), fmt::join(stream.recent_rmse(), ", "));
-    std::fflush(stderr);
+    write_stderr(fmt::format("\r\033[K{} rows, RMSE before learning {:.5g}, of the last 1000 {:.5g}",
+                             stream.counts().rows, fmt::join(stream.prequential_rmse(), ", "),
+                             fmt::join(stream.recent_rmse(), ", ")));
   }
 }
 
 void clear_progress() {
   if (::isatty(STDERR_FILENO) != 0) {
-    fmt::print(stderr, "\r\033[K");
+    write_stderr("\r\033[K");
   }
 }
 
@@ -128,7 +129,8 @@ Learned learn(const CLI::App& command, const StreamArguments& arguments) {
     std::ios::sync_with_stdio(false);
   }
   CsvPieces pieces(standard_input ? std::cin : file, learned.name, piece_bytes, learning.mark);
-  while (const std::optional<Csv> piece = pieces.next()) {
+  while (std::optional<Csv> piece = pieces.next()) {
+    if (learning.thousands) piece->read_thousands();
     if (!learned.stream) {
       learned.inputs = choose_inputs(*piece, learning);
       learned.stream = std::make_unique<Stream>(std::ssize(learned.inputs), std::ssize(learning.targets), options);

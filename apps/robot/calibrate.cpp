@@ -49,12 +49,14 @@ std::map<std::string, double> priors_of(const std::vector<std::string>& texts) {
   std::map<std::string, double> priors;
   for (const std::string& text : texts) {
     const std::size_t sign = text.find('=');
-    double sigma = 0.0;
-    if (sign == std::string::npos || !CLI::detail::lexical_cast(text.substr(sign + 1), sigma) || !(sigma > 0.0)) {
+    if (sign == std::string::npos) {
       throw std::invalid_argument(fmt::format(
           "--prior: \"{}\" must be a parameter and its standard deviation in mm or deg, as joint2.a=0.1", text));
     }
-    priors[text.substr(0, sign)] = sigma;
+    // Smaller ones are beyond the rounding of what they hold: --fix says that a parameter is known.
+    constexpr NumberRange sigmas = {1e-9, largest_number,
+                                    "a finite number, 1e-9 or more (mm or deg); --fix holds a parameter"};
+    priors[text.substr(0, sign)] = read_number("--prior " + text.substr(0, sign), text.substr(sign + 1), sigmas);
   }
   return priors;
 }
@@ -179,7 +181,7 @@ void add_calibrate(CLI::App& app) {
   add_urdf_links(*command, arguments->links);
   add_input_file(*command, "data", arguments->data, "Measurements (CSV with units in the column names)")->required();
   command->add_flag("--correct", options.correct, "Learn the residual as a function of the joint values");
-  add_count(*command, "--folds", options.folds, 0, "Folds of the held-out figures, 0: none")->capture_default_str();
+  add_folds(*command, options.folds, "Folds of the held-out figures, 0: none");
   command->add_flag("--contiguous", arguments->contiguous, "Folds are blocks of consecutive rows: for paths and grids");
   add_input_file(*command, "--test", arguments->test, "Further measurements that take no part, judged at the end");
   command
@@ -208,7 +210,10 @@ void add_calibrate(CLI::App& app) {
   command->add_flag("--quality", arguments->quality,
                     "Print also how well the poses determine the parameters, and whether more would help");
   command->add_flag("--json", arguments->json, "Print the report as JSON");
-  command->callback([arguments] { calibrate_command(*arguments); });
+  command->callback([command, arguments] {
+    check_beside_urdf(*command, arguments->output);
+    calibrate_command(*arguments);
+  });
 }
 
 }  // namespace llmt::apps

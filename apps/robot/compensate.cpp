@@ -90,6 +90,9 @@ robotics::Targets asked(const CompensateArguments& arguments, const CorrectedRob
   } else if (arguments.frame == "base") {
     to_world(robot.robot.chain, targets);
   }
+  if (table.positions_mm.size() > 0 && !arguments.nominal.empty()) {
+    warn(fmt::format("{}: the targets are poses: {} is not read", arguments.targets, arguments.nominal));
+  }
   if (arguments.position_only) targets.rotations.clear();
   if (table.joints.size() == 0) targets.start.joints = robotics::rigid_joints(robot.robot, targets);
   return targets;

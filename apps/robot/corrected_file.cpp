@@ -55,6 +55,10 @@ SavedRobot save_corrected(robotics::CorrectedRobot robot, const std::string& pat
   return saved;
 }
 
+void check_beside_urdf(const CLI::App& command, const std::string& output) {
+  if (robotics::is_urdf(output)) check_output_file(command, "--output", output, {".yaml"});
+}
+
 void refuse_lost_correction(const robotics::Robot& robot, const std::string& input, const std::string& output) {
   if (robotics::is_urdf(output) && !robotics::is_urdf(input)) {
     throw std::invalid_argument(

@@ -2,6 +2,7 @@
 /// A robot description on its way to a file, with its correction beside it.
 #pragma once
 
+#include <CLI/CLI.hpp>
 #include <string>
 #include <vector>
 
@@ -28,6 +29,9 @@ struct SavedRobot {
 /// joints and, where the tip hangs on a fixed joint, the tool; the description, which has everything, stands beside it
 /// as YAML. All files are replaced or none.
 SavedRobot save_corrected(robotics::CorrectedRobot robot, const std::string& path, const DescriptionSource& source);
+
+/// The checks of check_output_file() for the YAML that stands beside `output` if that is a URDF.
+void check_beside_urdf(const CLI::App& command, const std::string& output);
 
 /// Refuses to lose the correction that the description at `input` names: throws std::invalid_argument if it is `output`
 /// or the correction beside that; or if `output` is a URDF and `input` is none.

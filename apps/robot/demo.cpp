@@ -116,8 +116,12 @@ void demo_command(const std::string& folder) {
   if (std::filesystem::exists(place)) {
     throw std::invalid_argument(fmt::format("the folder {} is there already; -o names another one", folder));
   }
-  if (!std::filesystem::create_directory(place)) throw std::runtime_error(folder + ": the folder cannot be made");
-  std::filesystem::current_path(place);
+  std::error_code error;
+  std::filesystem::create_directory(place, error);
+  if (!error) std::filesystem::current_path(place, error);
+  if (error) {
+    throw std::runtime_error(fmt::format("{}: the folder cannot be made: {}", folder, error.message()));
+  }
   write_file("arm.yaml", sample_arm_yaml);
   write_file("real_arm.yaml", sample_real_arm_yaml);
   write_file("program.csv", program_csv(robotics::read_robot("arm.yaml")));

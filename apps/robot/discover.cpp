@@ -184,7 +184,10 @@ void add_discover(CLI::App& app) {
   add_seed(*command, arguments->options.seed, "Of the poses set aside");
   add_report_options(*command, arguments->reports, "the error before and after");
   command->add_flag("--json", arguments->json, "Print one JSON object");
-  command->callback([arguments] { discover_command(*arguments); });
+  command->callback([command, arguments] {
+    check_beside_urdf(*command, arguments->output);
+    discover_command(*arguments);
+  });
 }
 
 }  // namespace llmt::apps

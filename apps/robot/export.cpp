@@ -97,12 +97,24 @@ std::string deltas_csv(const robotics::Chain& chain, const robotics::Chain& nomi
   return text;
 }
 
+// An effect that has no C source is a matter of the description, a name that is none of C one of usage.
+CSource source_of(const robotics::CorrectedRobot& robot, const ExportArguments& arguments, const std::string& header) {
+  try {
+    return robotics::to_c(robot, arguments.name, header);
+  } catch (const std::invalid_argument& error) {
+    const std::string message = in_words_of_user(error.what(), {});
+    if (!message.starts_with("effect ")) throw;
+    throw std::runtime_error(arguments.robot + ": " + message);
+  }
+}
+
 void export_c(const ExportArguments& arguments) {
   if (arguments.output.empty()) throw std::invalid_argument("--c needs --output: the source and its header are files");
   const std::string header = beside(arguments.output, ".h").string();
   if (header == arguments.output) throw std::invalid_argument("--output: the header has this name; write to FILE.c");
+  refuse_lost_input(header, arguments.robot);
   const robotics::CorrectedRobot robot = read_arm(arguments.robot, arguments.links);
-  const CSource c = robotics::to_c(robot, arguments.name, std::filesystem::path(header).filename().string());
+  const CSource c = source_of(robot, arguments, std::filesystem::path(header).filename().string());
   const std::vector<NewFile> files = {{arguments.output, c.source}, {header, c.header}};
   write_files(files);
   print(fmt::format("{}: {} joints, {} effects, {} correction; conditions: {}; written to {} and {}\n",

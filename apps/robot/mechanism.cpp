@@ -32,8 +32,20 @@ struct MechanismArguments {
   int folds = 5;
   std::uint64_t seed = 1;
   DecimalMark mark = DecimalMark::point;
+  bool robust = false;
   bool json = false;
 };
+
+// A description whose start values are near no configuration is named itself, before the readings are.
+robotics::Mechanism read_description(const std::string& path) {
+  robotics::Mechanism mechanism = robotics::read_mechanism(path);
+  try {
+    robotics::assemble(mechanism, Eigen::MatrixXd(0, std::ssize(mechanism.coordinates)));
+  } catch (const std::invalid_argument& error) {
+    throw std::runtime_error(path + ": " + error.what());
+  }
+  return mechanism;
+}
 
 void put(const MechanismArguments& arguments, const std::string& csv) {
   const std::string text = with_decimal_mark(csv, arguments.mark);
@@ -66,9 +78,20 @@ Eigen::VectorXd noise_of_readings(const robotics::Mechanism& mechanism, const st
   return noise;
 }
 
+// Errors name the description: there is no other file.
+Eigen::MatrixXd poses_within_limits(const MechanismArguments& arguments, const robotics::Mechanism& mechanism) {
+  try {
+    return robotics::random_poses(mechanism, arguments.simulate, arguments.seed);
+  } catch (const std::invalid_argument& error) {
+    throw std::runtime_error(arguments.mechanism + ": " + error.what());
+  } catch (const std::runtime_error& error) {
+    throw std::runtime_error(arguments.mechanism + ": " + error.what());
+  }
+}
+
 void simulate_mechanism(const MechanismArguments& arguments, const robotics::Mechanism& mechanism) {
   const Eigen::VectorXd noise = noise_of_readings(mechanism, arguments.noise);
-  Eigen::MatrixXd poses = robotics::random_poses(mechanism, arguments.simulate, arguments.seed);
+  Eigen::MatrixXd poses = poses_within_limits(arguments, mechanism);
   Random random(arguments.seed + 1);
   for (Eigen::Index row = 0; row < poses.rows(); ++row) {
     for (Eigen::Index i = 0; i < poses.cols(); ++i) poses(row, i) += noise(i) * random.normal();
@@ -146,22 +169,45 @@ void solve_mechanism(const MechanismArguments& arguments, const robotics::Mechan
   }
 }
 
+void leave_out(robotics::MechanismTable& table, const std::vector<Eigen::Index>& rows) {
+  std::vector<Eigen::Index> kept;
+  std::vector<Eigen::Index> lines;
+  for (Eigen::Index row = 0; row < table.values.rows(); ++row) {
+    if (std::ranges::binary_search(rows, row)) continue;
+    kept.push_back(row);
+    lines.push_back(table.lines[row]);
+  }
+  table.values = Eigen::MatrixXd(table.values(kept, Eigen::all));
+  table.lines = std::move(lines);
+}
+
+// The lines of the poses that contradict the others, which are left out if --robust says so.
+std::vector<Eigen::Index> contradicting_lines(const MechanismArguments& arguments, const robotics::Mechanism& mechanism,
+                                              robotics::MechanismTable& table) {
+  const std::vector<Eigen::Index> rows = robotics::contradicting_poses(mechanism, table.values);
+  std::vector<Eigen::Index> lines;
+  for (const Eigen::Index row : rows) lines.push_back(table.lines[row]);
+  const char* const what = arguments.robust ? "contradicts the other poses: left out"
+                                            : "contradicts the other poses; --robust leaves such poses out";
+  warn_of_rows(arguments.data, lines, std::vector<std::string>(lines.size(), what));
+  if (arguments.robust) leave_out(table, rows);
+  return lines;
+}
+
 void calibrate_mechanism(const MechanismArguments& arguments, const robotics::Mechanism& mechanism) {
-  const robotics::MechanismTable table = read_readings(arguments, mechanism);
+  robotics::MechanismTable table = read_readings(arguments, mechanism);
+  const std::vector<Eigen::Index> contradicting = contradicting_lines(arguments, mechanism, table);
   report::MechanismFacts facts{.file = arguments.mechanism,
                                .data = arguments.data,
                                .described = mechanism,
                                .measured = table.values,
-                               .folds = static_cast<int>(std::min<Eigen::Index>(arguments.folds, table.values.rows()))};
-  try {
-    facts.calibration = robotics::calibrate(mechanism, table.values);
-    facts.before = robotics::errors_of(mechanism, table.values);
-    if (facts.folds > 1 && facts.is_determined()) {
-      facts.held_out =
-          robotics::held_out_errors(mechanism, table.values, {.count = facts.folds, .seed = arguments.seed});
-    }
-  } catch (const std::invalid_argument& error) {
-    throw std::runtime_error(arguments.data + ": " + error.what());
+                               .folds = static_cast<int>(std::min<Eigen::Index>(arguments.folds, table.values.rows())),
+                               .contradicting = contradicting,
+                               .robust = arguments.robust};
+  facts.calibration = robotics::calibrate(mechanism, table.values);
+  facts.before = robotics::errors_of(mechanism, table.values);
+  if (facts.folds > 1 && facts.is_determined()) {
+    facts.held_out = robotics::held_out_errors(mechanism, table.values, {.count = facts.folds, .seed = arguments.seed});
   }
   std::vector<Eigen::Index> lines;
   for (const Eigen::Index row : facts.calibration.left_out) lines.push_back(table.lines[row]);
@@ -185,17 +231,17 @@ void calibrate_mechanism(const MechanismArguments& arguments, const robotics::Me
 void mechanism_command(const MechanismArguments& arguments) {
   if (arguments.simulate > 0) {
     if (!arguments.data.empty()) throw std::invalid_argument("--simulate makes poses: it takes no file of readings");
-    simulate_mechanism(arguments, robotics::read_mechanism(arguments.mechanism));
+    simulate_mechanism(arguments, read_description(arguments.mechanism));
     return;
   }
   if (arguments.data.empty()) throw std::invalid_argument("the readings are missing: a CSV file after the mechanism");
   const robotics::Mechanism mechanism = read_unless_exchanged(
       arguments.mechanism, arguments.data, "the mechanism (YAML) comes first, then the readings (CSV)",
-      [](const std::string& path) { return robotics::read_mechanism(path); });
-  if (arguments.solve) {
-    solve_mechanism(arguments, mechanism);
-  } else {
-    calibrate_mechanism(arguments, mechanism);
+      [](const std::string& path) { return read_description(path); });
+  try {
+    arguments.solve ? solve_mechanism(arguments, mechanism) : calibrate_mechanism(arguments, mechanism);
+  } catch (const std::invalid_argument& error) {
+    throw std::runtime_error(arguments.data + ": " + error.what());
   }
 }
 
@@ -221,7 +267,8 @@ void add_mechanism(CLI::App& app) {
             "Coordinates that --simulate and --solve write (default: all)");
   add_names(*command, "--noise", arguments->noise, "NAME=NUMBER",
             "Standard deviation of simulated readings in the coordinate's unit (default: sigma of the description)");
-  add_count(*command, "--folds", arguments->folds, 0, "Folds of the held-out errors, 0: none")->capture_default_str();
+  command->add_flag("--robust", arguments->robust, "Leave out poses that contradict the others, and name their lines");
+  add_folds(*command, arguments->folds, "Folds of the held-out errors, 0: none");
   add_seed(*command, arguments->seed, "Of folds and simulated poses");
   add_decimal_comma(*command, arguments->mark);
   command->add_flag("--json", arguments->json, "Print the result as JSON");

@@ -1,6 +1,7 @@
 #include "shared/cli.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <sys/ioctl.h>
 #include <unistd.h>
 
@@ -19,6 +20,7 @@
 #include "shared/help.hpp"
 #include "shared/manual.hpp"
 #include "shared/options.hpp"
+#include "shared/standard_error.hpp"
 
 namespace llmt::apps {
 namespace {
@@ -75,11 +77,20 @@ int parse(CLI::App& app, int argc, char** argv) {
   }
 }
 
-// A control character of ASCII, or the second byte of one of U+0080 ... U+009F.
-bool is_control(std::string_view text, std::size_t i) {
+// Bytes at `i` that a terminal may take for an order, or that change where the text after them stands: control
+// characters but tabs and line breaks, marks of direction, line separators of Unicode, bytes that UTF-8 never has.
+std::size_t bytes_of_order(std::string_view text, std::size_t i) {
   const auto byte = static_cast<unsigned char>(text[i]);
-  const bool after_c2 = i > 0 && text[i - 1] == '\xC2';
-  return (byte < 0x20 && byte != '\n' && byte != '\t') || byte == 0x7F || (after_c2 && byte >= 0x80 && byte < 0xA0);
+  if ((byte < 0x20 && byte != '\n' && byte != '\t') || byte == 0x7F || byte >= 0xF8) return 1;
+  const auto follows = [&](std::string_view lead, unsigned char first, unsigned char last) {
+    const std::string_view here = text.substr(i);
+    if (here.size() <= lead.size() || !here.starts_with(lead)) return false;
+    const auto next = static_cast<unsigned char>(here[lead.size()]);
+    return next >= first && next <= last;
+  };
+  if (follows("\xC2", 0x80, 0x9F) || follows("\xD8", 0x9C, 0x9C)) return 2;  // U+0080 ... U+009F, U+061C
+  if (follows("\xE2\x80", 0x8E, 0x8F) || follows("\xE2\x80", 0xA8, 0xAE) || follows("\xE2\x81", 0xA6, 0xA9)) return 3;
+  return 0;
 }
 
 // The middle of a long text left out, not within a character of UTF-8.
@@ -125,6 +136,7 @@ std::string in_words_of_user(std::string_view message, std::span<const SettingNa
 
 int run(CLI::App& app, int argc, char** argv, std::span<const SettingName> names) {
   app.set_version_flag("--version", fmt::format("{} {}", app.get_name(), LLMT_VERSION));
+  occupy_closed_standard_files();
   handle_signals();
   set_up_help(app);
   const auto fail = [&](std::string_view reason, int code) {
@@ -142,6 +154,16 @@ int run(CLI::App& app, int argc, char** argv, std::span<const SettingName> names
     return parse(app, argc, argv);
   } catch (const std::invalid_argument& error) {
     return fail(error.what(), exit_usage);
+  } catch (const ThousandsError& error) {
+    const auto can = [command = app.get_subcommands().front()](const char* option) {
+      return command->get_option_no_throw(option) != nullptr;
+    };
+    std::vector<std::string> advice;
+    if (can(thousands_option)) advice.push_back(fmt::format("{} reads thousands", thousands_option));
+    if (!error.is_certain() && can(decimal_comma_option) && error.found() == DecimalMark::comma) {
+      advice.push_back(fmt::format("{} reads decimal commas", decimal_comma_option));
+    }
+    return fail(fmt::format("{}{}{}", error.what(), advice.empty() ? "" : "; ", fmt::join(advice, ", ")), exit_refused);
   } catch (const DecimalMarkError& error) {
     const CLI::App* const command = app.get_subcommands().front();
     const bool can_read = command->get_option_no_throw(decimal_comma_option) != nullptr;
@@ -151,7 +173,10 @@ int run(CLI::App& app, int argc, char** argv, std::span<const SettingName> names
     return fail(error.what() + std::string("; a file of Windows is converted by iconv -f CP1252 -t UTF-8"),
                 exit_refused);
   } catch (const std::bad_alloc&) {
-    return fail("there is not enough memory for this", exit_refused);
+    const std::vector<std::string> files = input_files(app);
+    return fail(files.empty() ? "there is not enough memory for this"
+                              : fmt::format("{}: there is not enough memory for this", fmt::join(files, ", ")),
+                exit_refused);
   } catch (const std::exception& error) {
     return fail(error.what(), exit_refused);
   }
@@ -159,12 +184,11 @@ int run(CLI::App& app, int argc, char** argv, std::span<const SettingName> names
 
 std::string without_controls(std::string_view text) {
   std::string result;
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    if (is_control(text, i)) {
-      result += fmt::format("\\x{:02x}", static_cast<unsigned char>(text[i]));
-    } else {
-      result += text[i];
-    }
+  for (std::size_t i = 0; i < text.size();) {
+    const std::size_t bytes = bytes_of_order(text, i);
+    for (std::size_t k = 0; k < bytes; ++k) result += fmt::format("\\x{:02x}", static_cast<unsigned char>(text[i + k]));
+    if (bytes == 0) result += text[i];
+    i += std::max<std::size_t>(bytes, 1);
   }
   return result;
 }
@@ -203,7 +227,11 @@ void print_json(const Json& json) {
 }
 
 void warn(const std::string& text) {
-  if (!is_silent) fmt::print(stderr, "{}\n", without_controls(shortened(text)));
+  if (is_silent) return;
+  std::string line = without_controls(shortened(text));
+  for (std::size_t at = line.find('\n'); at != std::string::npos; at = line.find('\n', at))
+    line.replace(at, 1, "\\x0a");
+  write_stderr(line + "\n");
 }
 
 }  // namespace llmt::apps

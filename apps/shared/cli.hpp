@@ -39,8 +39,8 @@ std::string in_words_of_user(std::string_view message, std::span<const SettingNa
 /// leaving a temporary file; a file that may not grow further (SIGXFSZ) is a failed write.
 int run(CLI::App& app, int argc, char** argv, std::span<const SettingName> names = {});
 
-/// The text with control characters but tabs and line breaks written as \x1b: names that come from files cannot give
-/// orders to a terminal.
+/// The text with control characters but tabs and line breaks, marks of direction and bytes that are never UTF-8 written
+/// as \x1b: names that come from files cannot give orders to a terminal, or exchange the order of letters on it.
 std::string without_controls(std::string_view text);
 
 /// Columns of the terminal that stdout is: those of the terminal, or COLUMNS if it is set; at least 40. No limit where
@@ -64,7 +64,8 @@ class Silence {
 /// Bytes that are not UTF-8 become U+FFFD.
 void print_json(const Json& json);
 
-/// A line on stderr, without_controls(). Of a long text (a message may quote what it refuses) the middle is left out.
+/// A line on stderr, without_controls() and with line breaks as \x0a. Of a long text (a message may quote what it
+/// refuses) the middle is left out.
 void warn(const std::string& text);
 
 }  // namespace llmt::apps

@@ -25,12 +25,42 @@ bool parse_number(const std::string& text, Number& value) {
   return error == std::errc() && stop == end && !text.starts_with("+-");
 }
 
+// The quote that ends the one at `begin`, doubled quotes in between left out; npos if there is none.
+std::size_t end_of_quotes(const std::string& text, std::size_t begin) {
+  for (std::size_t at = begin + 1; at < text.size(); ++at) {
+    if (text[at] != '"') continue;
+    if (at + 1 == text.size() || text[at + 1] != '"') return at;
+    ++at;
+  }
+  return std::string::npos;
+}
+
 bool is_same_file(const std::string& one, const std::string& other) {
   std::error_code unknown;
   return std::filesystem::equivalent(one, other, unknown) && std::filesystem::is_regular_file(one, unknown);
 }
 
+// Where a file lies or will lie: its folder and the links at the end of its path are followed.
+std::filesystem::path place_of(const std::string& path) {
+  constexpr int most_links = 40;
+  std::error_code unknown;
+  std::filesystem::path place = path;
+  for (int links = 0; links < most_links && std::filesystem::is_symlink(place, unknown); ++links) {
+    place = place.parent_path() / std::filesystem::read_symlink(place, unknown);
+  }
+  return std::filesystem::weakly_canonical(std::filesystem::absolute(place, unknown), unknown);
+}
+
+// Devices and pipes take what comes, one output after the other.
+bool is_device(const std::string& path) {
+  std::error_code unknown;
+  return std::filesystem::exists(path, unknown) && !std::filesystem::is_regular_file(path, unknown);
+}
+
 void refuse_impossible_place(const std::string& path) {
+  if (path == "-") {
+    throw std::invalid_argument("-: is no name of an output; /dev/stdout is standard output, ./- a file of that name");
+  }
   std::error_code unknown;
   const auto fail = [&](const char* reason) {
     throw std::runtime_error(fmt::format("{}: cannot be written: {}", path, reason));
@@ -66,6 +96,16 @@ CLI::Option* add_number(CLI::App& command, const std::string& name, double& valu
   return add_text(command, name, "NUMBER", take, help, [&value] { return fmt::format("{}", value); });
 }
 
+CLI::Option* add_folds(CLI::App& command, int& folds, const std::string& help) {
+  const auto take = [&folds](const CLI::results_t& texts) {
+    folds = static_cast<int>(read_count("--folds", texts.back(), 0, std::numeric_limits<int>::max()));
+    if (folds == 1) refuse("--folds", texts.back(), "0, or a whole number, 2 or more");
+    return true;
+  };
+  return add_text(command, "--folds", "COUNT", take, help, [&folds] { return std::to_string(folds); })
+      ->capture_default_str();
+}
+
 CLI::Option* add_numbers(CLI::App& command, const std::string& name, std::vector<double>& values,
                          const NumberRange& range, const std::string& help) {
   const auto take = [name, &values, range](const CLI::results_t& texts) {
@@ -84,10 +124,37 @@ CLI::Option* add_numbers(CLI::App& command, const std::string& name, std::vector
 
 CLI::Option* add_names(CLI::App& command, const std::string& name, std::vector<std::string>& values, const char* type,
                        const std::string& help) {
-  return command.add_option(name, values, help)
+  const auto take = [&values](const CLI::results_t& texts) {
+    values.clear();
+    for (const std::string& text : texts) {
+      const std::vector<std::string> names = names_in(text);
+      values.insert(values.end(), names.begin(), names.end());
+    }
+    return true;
+  };
+  return add_text(command, name, type, take, help, {})
       ->type_name(fmt::format("{},...", type))
-      ->allow_extra_args(false)
-      ->delimiter(',');
+      ->expected(CLI::detail::expected_max_vector_size)
+      ->allow_extra_args(false);
+}
+
+std::vector<std::string> names_in(const std::string& text) {
+  std::vector<std::string> names(1);
+  for (std::size_t at = 0; at < text.size(); ++at) {
+    const std::size_t end = names.back().empty() && text[at] == '"' ? end_of_quotes(text, at) : std::string::npos;
+    if (end != std::string::npos) {
+      names.back() = text.substr(at + 1, end - at - 1);
+      for (std::size_t quote = 0; (quote = names.back().find("\"\"", quote)) != std::string::npos; ++quote) {
+        names.back().erase(quote, 1);
+      }
+      at = end;
+    } else if (text[at] == ',') {
+      names.emplace_back();
+    } else {
+      names.back() += text[at];
+    }
+  }
+  return names;
 }
 
 CLI::Option* add_decimal_comma(CLI::App& command, DecimalMark& mark) {
@@ -95,6 +162,11 @@ CLI::Option* add_decimal_comma(CLI::App& command, DecimalMark& mark) {
   return command.add_flag_callback(
       decimal_comma_option, take,
       "Numbers of the table have a decimal comma; fields are separated by semicolons or tabs");
+}
+
+CLI::Option* add_thousands(CLI::App& command, bool& thousands) {
+  return command.add_flag(thousands_option, thousands,
+                          "Numbers of the table may have separators of thousands: 1,234.5");
 }
 
 std::int64_t read_count(const std::string& option, const std::string& text, std::int64_t low, std::int64_t high) {
@@ -134,15 +206,17 @@ CLI::Option* add_input_file(CLI::App& command, const std::string& name, std::str
 CLI::Option* add_output_file(CLI::App& command, const std::string& name, std::string& path, const std::string& help,
                              const std::vector<std::string>& extensions) {
   // The texts of all options are there before the first of them is taken.
-  const auto take = [&command, &path, extensions](const CLI::results_t& texts) {
+  const std::string own_name = name.substr(name.find("--"));
+  const auto take = [&command, own_name, &path, extensions](const CLI::results_t& texts) {
     path = texts.back();
-    check_output_file(command, path, extensions);
+    check_output_file(command, own_name, path, extensions);
     return true;
   };
   return add_text(command, name, output_type, take, help, {});
 }
 
-void check_output_file(const CLI::App& command, const std::string& path, const std::vector<std::string>& extensions) {
+void check_output_file(const CLI::App& command, const std::string& name, const std::string& path,
+                       const std::vector<std::string>& extensions) {
   std::vector<std::string> written = {path};
   for (const std::string& extension : extensions) {
     written.push_back(beside(path, extension).string());
@@ -158,6 +232,30 @@ void check_output_file(const CLI::App& command, const std::string& path, const s
   for (const std::string& output : written) {
     refuse_impossible_place(output);
   }
+  const auto is_output = [&](const CLI::Option* option) {
+    return option->get_type_name() == output_type && !option->check_name(name);
+  };
+  for (const CLI::Option* option : command.get_options(is_output)) {
+    for (const std::string& other : option->results()) {
+      for (const std::string& output : written) {
+        if (is_device(other) || place_of(other) != place_of(output)) continue;
+        throw std::invalid_argument(
+            fmt::format("{}: would be written twice by this command ({} and --{}); give each output a name of its own",
+                        output, name, option->get_single_name()));
+      }
+    }
+  }
+}
+
+std::vector<std::string> input_files(const CLI::App& app) {
+  std::vector<std::string> files;
+  for (const CLI::App* command : app.get_subcommands()) {
+    for (const CLI::Option* option : command->get_options()) {
+      if (option->get_type_name() == input_type)
+        files.insert(files.end(), option->results().begin(), option->results().end());
+    }
+  }
+  return files;
 }
 
 void refuse_lost_input(const std::string& output, const std::string& input) {

@@ -60,9 +60,15 @@ CLI::Option* add_count(CLI::App& command, const std::string& name, Whole& value,
   return add_text(command, name, "COUNT", take, help, [&value] { return std::to_string(value); });
 }
 
-/// An option with names of columns or the like, separated by commas or given one by one; `type` is shown as "TYPE,...".
+/// --folds: 0, or 2 and more.
+CLI::Option* add_folds(CLI::App& command, int& folds, const std::string& help);
+
+/// An option with names of columns or the like, as names_in() or given one by one; `type` is shown as "TYPE,...".
 CLI::Option* add_names(CLI::App& command, const std::string& name, std::vector<std::string>& values, const char* type,
                        const std::string& help);
+
+/// Names separated by commas. One that holds a comma stands in double quotes, inner quotes doubled, as in CSV.
+std::vector<std::string> names_in(const std::string& text);
 
 /// The seed of random numbers, from 0 to 2^64 - 1.
 CLI::Option* add_seed(CLI::App& command, std::uint64_t& seed, const std::string& help);
@@ -74,18 +80,26 @@ CLI::Option* add_threads(CLI::App& command, int& threads);
 inline constexpr const char* decimal_comma_option = "--decimal-comma";
 CLI::Option* add_decimal_comma(CLI::App& command, DecimalMark& mark);
 
+/// --thousands: numbers of the command's tables may have separators of thousands.
+inline constexpr const char* thousands_option = "--thousands";
+CLI::Option* add_thousands(CLI::App& command, bool& thousands);
+
 /// A file that the command reads, shown as FILE. A dash is standard input where the command says so.
 CLI::Option* add_input_file(CLI::App& command, const std::string& name, std::string& path, const std::string& help);
 
 /// The file that the command writes, shown as NEWFILE. It is checked before the command runs. Throws
-/// std::invalid_argument if it is one of the input files, by whatever name, and std::runtime_error if it is a folder or
-/// lies in none. `extensions`: of further files that are written beside it under its name.
+/// std::invalid_argument if it is one of the input files or another output, by whatever name or link, and
+/// std::runtime_error if it is a folder or lies in none. Devices and pipes may be named twice. `extensions`: of further
+/// files that are written beside it under its name.
 CLI::Option* add_output_file(CLI::App& command, const std::string& name, std::string& path, const std::string& help,
                              const std::vector<std::string>& extensions = {});
 
-/// The checks of add_output_file() for a path that is known later.
-void check_output_file(const CLI::App& command, const std::string& path,
+/// The checks of add_output_file() for a path that is known later. `name`: of its option, "--output".
+void check_output_file(const CLI::App& command, const std::string& name, const std::string& path,
                        const std::vector<std::string>& extensions = {});
+
+/// The files that the command which was called reads, as they were named.
+std::vector<std::string> input_files(const CLI::App& app);
 
 /// The check above for an input that is known only when another one has been read.
 void refuse_lost_input(const std::string& output, const std::string& input);

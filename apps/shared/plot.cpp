@@ -37,14 +37,28 @@ const std::string& colour(const std::string& role) {
   return colours.at(role);
 }
 
-// Within single quotes gnuplot substitutes nothing; a quote is doubled.
+// A text of gnuplot. What has a meaning within its double quotes, substitution by backquotes among it, is written as
+// the number of the byte; within single quotes gnuplot 5.4 takes some doubled quotes for the end.
 std::string quoted(const std::string& text) {
-  std::string result = "'";
+  std::string result = "\"";
   for (const char c : text) {
-    if (c == '\'') result += '\'';
-    if (static_cast<unsigned char>(c) >= ' ') result += c;
+    if (static_cast<unsigned char>(c) < ' ') continue;
+    if (std::string_view("\"'\\`@$").find(c) == std::string_view::npos) {
+      result += c;
+    } else {
+      result += fmt::format("\\{:03o}", static_cast<unsigned char>(c));
+    }
   }
-  return result + "'";
+  return result + "\"";
+}
+
+// gnuplot leaves the end of a CDATA section in texts as it is, which XML forbids. Its pictures have no such section.
+std::string as_xml(std::string picture) {
+  constexpr std::string_view end = "]]>";
+  for (std::size_t at = picture.find(end); at != std::string::npos; at = picture.find(end, at)) {
+    picture.replace(at, end.size(), "]]&gt;");
+  }
+  return picture;
 }
 
 std::string value_text(double value) { return std::isfinite(value) ? fmt::format("{:.7g}", value) : "NaN"; }
@@ -269,7 +283,9 @@ void require_gnuplot() {
 }
 
 void write_plot(const std::string& path, const Chart& chart) {
-  write_file(path, run_gnuplot(gnuplot_script(chart, plot_format(path))));
+  const std::string format = plot_format(path);
+  std::string picture = run_gnuplot(gnuplot_script(chart, format));
+  write_file(path, format == "svg" ? as_xml(std::move(picture)) : picture);
 }
 
 }  // namespace llmt::apps

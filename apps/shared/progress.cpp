@@ -5,7 +5,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
+
+#include "shared/standard_error.hpp"
 
 namespace llmt::apps {
 
@@ -46,15 +47,13 @@ void ProgressBar::show(Eigen::Index done, Eigen::Index total) {
   if (now - begin_ < quiet || (shown_ && now - last_ < between)) return;
   last_ = now;
   const double seconds = std::chrono::duration<double>(now - begin_).count();
-  fmt::print(stderr, "\r{}\033[K", progress_line(what_, done, total, seconds));
-  std::fflush(stderr);
+  write_stderr(fmt::format("\r{}\033[K", progress_line(what_, done, total, seconds)));
   shown_ = true;
 }
 
 void ProgressBar::clear() {
   if (shown_) {
-    fmt::print(stderr, "\r\033[K");
-    std::fflush(stderr);
+    write_stderr("\r\033[K");
     shown_ = false;
   }
 }

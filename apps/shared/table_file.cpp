@@ -1,6 +1,7 @@
 #include "shared/table_file.hpp"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <charconv>
@@ -15,6 +16,8 @@
 
 namespace llmt::apps {
 namespace {
+
+constexpr const char* standard_input = "standard input";
 
 // Whether the header has only numbers. Those of columns, from 0 or 1 on, are names.
 bool looks_like_a_row(const Csv& csv) {
@@ -42,6 +45,19 @@ bool begins_like_json(std::string_view text) {
   return next != std::string_view::npos && (text[next] == '"' || text[next] == '}');
 }
 
+// Standard input as far as half of the memory, as a file. Errors of reading name it.
+std::string read_standard_input() {
+  constexpr std::uintmax_t longest_line = 16 << 20;
+  const std::uintmax_t memory = static_cast<std::uintmax_t>(::sysconf(_SC_PHYS_PAGES)) * ::sysconf(_SC_PAGESIZE);
+  const std::string path = "/dev/stdin";
+  try {
+    return read_file(path, {.bytes = memory / 2, .line_bytes = longest_line});
+  } catch (const std::runtime_error& error) {
+    const std::string message = error.what();
+    throw std::runtime_error(message.starts_with(path) ? standard_input + message.substr(path.size()) : message);
+  }
+}
+
 }  // namespace
 
 bool is_json_file(const std::string& path) {
@@ -54,20 +70,21 @@ bool is_json_file(const std::string& path) {
   return begins_like_json(begin);
 }
 
-std::string table_name(const std::string& path) { return path == "-" ? "standard input" : path; }
+std::string table_name(const std::string& path) { return path == "-" ? standard_input : path; }
 
-Csv read_table(const std::string& path, DecimalMark mark) {
+Csv read_table(const std::string& path, DecimalMark mark, bool thousands) {
   const auto refuse_json = [&](bool is_json) {
     if (is_json) throw std::runtime_error(table_name(path) + ": this is a JSON file; a table (CSV) is expected");
   };
   std::string from_stdin;
   if (path == "-") {
-    from_stdin = read_file("/dev/stdin");
+    from_stdin = read_standard_input();
     refuse_json(begins_like_json(from_stdin));
   } else {
     refuse_json(is_json_file(path));
   }
   Csv csv = path != "-" ? Csv::read(path, mark) : Csv::parse(std::move(from_stdin), table_name(path), mark);
+  if (thousands) csv.read_thousands();
   if (looks_like_a_row(csv)) {
     warn(
         fmt::format("llmt: {}: the first line holds only numbers and was taken for the names of the columns; if it is "

@@ -26,6 +26,44 @@ std::string table_with(const std::string& odd_row) {
   return text;
 }
 
+TEST(BadData, SeparatorsOfThousandsAreOfferedAndRead) {
+  const Folder folder;
+  std::string text = "load,y\n";
+  for (int i = 0; i < 40; ++i) text += fmt::format("\"{},{:03}\",{}\n", 1 + i / 10, (137 * i) % 1000, i);
+  EXPECT_EQ(
+      refusal_of(folder, text, "fit d.csv -t y"),
+      "llmt: d.csv:2: column \"load\": '1,000' has a comma, which may be a separator of thousands or a decimal comma; "
+      "--thousands reads thousands, --decimal-comma reads decimal commas\n");
+  EXPECT_EQ(refusal_of(folder, "load,y\n\"1,000.5\",2\n", "fit d.csv -t y --stream"),
+            "llmt: d.csv:2: column \"load\": '1,000.5' has separators of thousands; --thousands reads thousands\n");
+  folder.write("d.csv", text);
+  EXPECT_EQ(folder.run(llmt_program + " fit d.csv -t y --thousands --cv 2 -o m.json").exit_code, 0);
+  EXPECT_NE(llmt::read_file(folder.file("m.json")).find("\"low\": 1000.0"), std::string::npos);
+  EXPECT_EQ(folder.run(llmt_program + " predict m.json d.csv --thousands").exit_code, 0);
+  EXPECT_EQ(folder.run(llmt_program + " explain m.json d.csv --thousands").exit_code, 0);
+  EXPECT_EQ(folder.run(llmt_program + " fit d.csv -t y --thousands --stream").exit_code, 0);
+}
+
+TEST(BadData, AUnitInEveryCellIsSaid) {
+  const Folder folder;
+  std::string text = "power,y\n";
+  for (int i = 0; i < 40; ++i) text += fmt::format("{}.5 kW,{}\n", i % 9, i);
+  folder.write("d.csv", text);
+  EXPECT_NE(folder.run(llmt_program + " fit d.csv -t y --cv 2")
+                .err.find("column \"power\": every cell is a number and \"kW\", and is taken for categories"),
+            std::string::npos);
+  EXPECT_EQ(folder.run(llmt_program + " fit d.csv -t y --cv 2 --categorical power").err.find("kW"), std::string::npos);
+}
+
+TEST(BadData, ATableWithoutRowsIsNoPrediction) {
+  const Folder folder;
+  folder.write("d.csv", table_with("5,5,1,10"));
+  ASSERT_EQ(folder.run(llmt_program + " fit d.csv -t y --cv 0 -o m.json").exit_code, 0);
+  EXPECT_EQ(refusal_of(folder, "a,b,w,y\n", "predict m.json d.csv"), "llmt: d.csv: there is a header and no rows\n");
+  EXPECT_EQ(refusal_of(folder, "a,b,w,y\r1,2,3,4\r", "predict m.json d.csv").find("llmt: d.csv:1: lines end with CR"),
+            0U);
+}
+
 TEST(BadData, MagnitudesBeyondTheLargestAreNamed) {
   const Folder folder;
   const std::string fit = "fit d.csv -t y --weight w";

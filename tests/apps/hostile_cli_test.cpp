@@ -73,6 +73,19 @@ TEST(HostileModels, PredictionsThatAreNotFiniteAreCountedAndSaid) {
   EXPECT_TRUE(json::accept(explained.out));
 }
 
+// Sanitizers reserve more address space than this.
+#if !defined(__SANITIZE_ADDRESS__)
+TEST(HostileModels, AFileThatNeedsMoreMemoryThanThereIsIsNamed) {
+  const Folder folder;
+  std::string text = "{\"format\":[";
+  for (int i = 0; i < 5'000'000; ++i) text += "1,";
+  folder.write("big.json", text + "1]}");
+  const Outcome outcome = folder.run("ulimit -v 200000; " + llmt_program + " inspect big.json");
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_EQ(outcome.err, "llmt: big.json: there is not enough memory for this\n");
+}
+#endif
+
 TEST(HostileModels, IntervalsOfAnotherModelPrintNothing) {
   const Folder folder;
   std::string text = "x,y,z\n";

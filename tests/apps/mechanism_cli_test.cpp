@@ -1,10 +1,12 @@
 // Mechanisms from the command line.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
 
 #include "apps/programs.hpp"
+#include "llmt/csv.hpp"
 #include "llmt/files.hpp"
 
 namespace {
@@ -67,6 +69,60 @@ TEST(MechanismProgram, TooFewPosesAreSaidFirstAndNothingIsWritten) {
   EXPECT_FALSE(std::filesystem::exists(folder.file("found.yaml")));
 }
 
+// The readings with a number added to the cell of one line and column.
+std::string with_reading(const Folder& folder, int line, const std::string& column, double more) {
+  const llmt::Csv csv = llmt::Csv::read(folder.file("seen.csv"));
+  Eigen::MatrixXd values = csv.numbers(csv.columns());
+  values(line - 2, static_cast<Eigen::Index>(csv.index_of(column))) += more;
+  std::string text(csv.header_text());
+  for (const auto row : values.rowwise())
+    text += fmt::format("\n{}", fmt::join(std::vector<double>(row.begin(), row.end()), ","));
+  return text + "\n";
+}
+
+TEST(MechanismProgram, OneBadReadingIsNamedAndLeftOutOnRequest) {
+  const Folder folder;
+  measure(folder, "q1,q2,x,y");
+  for (const double wrong : {300.0, 1e6}) {  // mm; the second one no mechanism can take
+    for (const int line : {2, 41}) {
+      folder.write("bad.csv", with_reading(folder, line, "x_mm", wrong));
+      const Outcome plain = mechanism(folder, five_bar + " bad.csv --folds 0");
+      EXPECT_NE(plain.err.find(fmt::format("bad.csv:{}: contradicts the other poses; --robust", line)),
+                std::string::npos)
+          << plain.err;
+      EXPECT_EQ(plain.out.find("CALIBRATED"), std::string::npos) << plain.out;
+      const Outcome robust = mechanism(folder, five_bar + " bad.csv --robust --json");
+      ASSERT_EQ(robust.exit_code, 0) << robust.err;
+      EXPECT_NE(robust.err.find(fmt::format("bad.csv:{}: contradicts the other poses: left out", line)),
+                std::string::npos);
+      const nlohmann::json found = nlohmann::json::parse(robust.out);
+      EXPECT_NEAR(found["parameters"][1]["identified"].get<double>(), 199.3, 0.04);
+      EXPECT_EQ(found["contradicting_lines"], std::vector<int>{line});
+    }
+  }
+  const Outcome clean = mechanism(folder, five_bar + " seen.csv --robust");
+  EXPECT_NE(clean.out.find("40 poses of five-bar; measured"), std::string::npos) << clean.out;
+  EXPECT_EQ(clean.err.find("contradicts"), std::string::npos) << clean.err;
+}
+
+TEST(MechanismProgram, TheFileAtFaultIsNamed) {
+  const Folder folder;
+  measure(folder, "q1,q2,x,y");
+  std::string text = llmt::read_file(five_bar);
+  const std::string start = "base, value_mm: 300";
+  text.replace(text.find(start), start.size(), "base, value_mm: 3000");
+  folder.write("wide.yaml", text);
+  for (const char* arguments : {"wide.yaml --simulate 5", "wide.yaml seen.csv", "wide.yaml seen.csv --solve"}) {
+    const Outcome run = mechanism(folder, arguments);
+    EXPECT_EQ(run.exit_code, 1) << arguments;
+    EXPECT_NE(run.err.find("wide.yaml: no configuration near the start values"), std::string::npos) << run.err;
+  }
+  EXPECT_EQ(mechanism(folder, five_bar + " seen.csv --folds 1").err,
+            "llmt-robot: --folds is \"1\", it must be 0, or a whole number, 2 or more\n");
+  EXPECT_EQ(mechanism(folder, "/dev/zero seen.csv").err,
+            "llmt-robot: /dev/zero: cannot be read: it holds more than 16 MiB, the most that is read\n");
+}
+
 TEST(MechanismProgram, MistakesAreRefusedWithTheirPlace) {
   const Folder folder;
   const auto says = [&](const std::string& text, const std::string& words) {
@@ -82,6 +138,7 @@ TEST(MechanismProgram, MistakesAreRefusedWithTheirPlace) {
   says("q1_mm,q2_deg\n1,2\n", "column \"q1_mm\" has a wrong unit");
   says("q1_deg,q1_rad\n1,2\n", "are one coordinate");
   says("q1_deg,q2_deg\n1,x\n", "t.csv:2: column \"q2_deg\"");
+  says("q1_deg,q2_deg\n1,2\n1,nan\n", "t.csv:3: column \"q2_deg\": 'nan' is not finite");
   says("q1_deg,q2_deg\n120,60\n", "no reading checks another one");
   says("q1_rad,q2_deg\n120,60\n",
        "t.csv: column of q1: 1 of 1 readings are far outside its limits, 80 to 150 deg: they "

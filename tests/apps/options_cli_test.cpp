@@ -104,6 +104,56 @@ TEST(Options, AnOutputThatIsAnInputIsRefusedBeforeTheWork) {
   EXPECT_EQ(folder.run(llmt_program + " predict m.json d.csv -o /dev/null").exit_code, 0);
 }
 
+TEST(Options, TwoOutputsOfOneNameAreRefusedBeforeTheWork) {
+  const Folder folder;
+  folder.write("d.csv", line(30));
+  std::filesystem::create_symlink("m.svg", folder.file("link.svg"));
+  const auto refused = [&](const std::string& arguments, const std::string& name, const std::string& options) {
+    expect_usage(folder, arguments,
+                 fmt::format("{}: would be written twice by this command ({}); give each output a name of its own",
+                             name, options));
+  };
+  refused("fit d.csv -t y -o m.svg --plot m.svg", "m.svg", "--output and --plot");
+  refused("fit d.csv -t y -o ./m.svg --plot m.svg", "./m.svg", "--output and --plot");
+  refused("fit d.csv -t y -o m.svg --plot link.svg", "m.svg", "--output and --plot");  // of a file that is not there
+  refused("fit d.csv -t y -o m.svg --plot m.readable.json", "m.readable.json", "--output and --plot");
+  EXPECT_FALSE(std::filesystem::exists(folder.file("m.svg")));
+}
+
+TEST(Program, AMessageThatCannotBeWrittenChangesNothing) {
+  const Folder folder;
+  folder.write("d.csv", line(30));
+  ASSERT_EQ(folder.run(llmt_program + " fit d.csv -t y -o m.json").exit_code, 0);
+  folder.write("far.csv", "x,y\n1000,0\n");
+  for (const std::string arguments :
+       {"fit d.csv -t y -o n.json --json", "predict m.json far.csv -o n.json", "fit no.csv -t y", "fit d.csv -t no",
+        "fit d.csv --nonsense", "fit - -t y --stream -o n.json <d.csv", "explain m.json far.csv",
+        "discover d.csv d.csv --target y"}) {
+    const auto run = [&](const char* standard_error) {
+      std::filesystem::remove(folder.file("n.json"));
+      const Outcome outcome = folder.run(fmt::format("({} {}) {}", llmt_program, arguments, standard_error));
+      const bool written = std::filesystem::exists(folder.file("n.json"));
+      return std::tuple(outcome.exit_code, outcome.out, written ? llmt::read_file(folder.file("n.json")) : "");
+    };
+    const auto expected = run("2>/dev/null");
+    EXPECT_EQ(run("2>&-"), expected) << arguments;
+    EXPECT_EQ(run("2>/dev/full"), expected) << arguments;
+  }
+  // A pipe that nobody reads any more: its reader, true, has ended by then.
+  const Outcome piped = folder.run("(sleep 0.2; " + llmt_program + " fit no.csv -t y; echo $? >code) 2>&1 | true");
+  EXPECT_EQ(llmt::read_file(folder.file("code")), "1\n") << piped.err;
+}
+
+// The first file that a program opens gets the number of a standard file that is closed.
+TEST(Program, AnOutputIsNoStandardErrorThatIsClosed) {
+  const Folder folder;
+  folder.write("d.csv", line(30));
+  ASSERT_EQ(folder.run(llmt_program + " fit d.csv -t y -o m.json").exit_code, 0);
+  EXPECT_EQ(folder.run(llmt_program + " predict m.json d.csv >&-").exit_code, 1);
+  EXPECT_EQ(folder.run(llmt_program + " predict m.json d.csv -o /dev/stdout >&-").exit_code, 1);
+  EXPECT_EQ(folder.run(llmt_program + " predict m.json - <&-").exit_code, 1);
+}
+
 TEST(Options, AnOutputWithoutAFolderIsRefusedBeforeTheWork) {
   const Folder folder;
   const auto refusal = [&](const std::string& output) {

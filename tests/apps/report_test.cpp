@@ -138,7 +138,7 @@ TEST(Plot, NamesCannotGiveOrdersToGnuplot) {
   const Chart chart{
       .title = "it's\n`touch x`\nset output 'y'", .x = {"x"}, .y = {"y"}, .layers = {{.x = {1.0}, .y = {NAN}}}};
   const std::string script = llmt::apps::gnuplot_script(chart, "svg");
-  EXPECT_NE(script.find("set title 'it''s`touch x`set output ''y'''"), std::string::npos) << script;
+  EXPECT_NE(script.find(R"(set title "it\047s\140touch x\140set output \047y\047")"), std::string::npos) << script;
   EXPECT_NE(script.find("\n1 NaN "), std::string::npos) << script;
 }
 

@@ -67,6 +67,63 @@ TEST(RobotOptions, AnOutputThatIsAnInputIsRefusedBeforeTheWork) {
   lost("calibrate c2.yaml d.csv -o c.yaml", "c.correction.json", "c.correction.json");
 }
 
+TEST(RobotOptions, TwoOutputsOfOneNameAreRefusedBeforeTheWork) {
+  const Folder folder;
+  folder.write("r.yaml", llmt::read_file(arm));
+  folder.write("m.yaml", "{}");
+  folder.write("d.csv", "q1_deg\n0\n");
+  const auto twice = [&](const std::string& arguments, const std::string& output, const std::string& options) {
+    expect_robot_usage(
+        folder, arguments,
+        fmt::format("{}: would be written twice by this command ({}); give each output a name of its own", output,
+                    options));
+  };
+  twice("calibrate r.yaml d.csv -o z.svg --plot z.svg", "z.svg", "--output and --plot");
+  twice("discover r.yaml d.csv -o z.svg --plot ./z.svg", "z.svg", "--output and --plot");
+  twice("mechanism r.yaml d.csv -o s --errors s", "s", "--errors and --output");
+  // The description of an arm stands beside its URDF.
+  expect_robot_usage(folder, "calibrate a.urdf d.csv --columns m.yaml -o m.urdf",
+                     "m.yaml: would be overwritten, and is an input of this command (m.yaml); give the output a name "
+                     "of its own");
+  EXPECT_EQ(llmt::read_file(folder.file("m.yaml")), "{}");
+}
+
+TEST(RobotOptions, AMessageThatCannotBeWrittenChangesNoExitCode) {
+  const Folder folder;
+  folder.write("r.yaml", llmt::read_file(arm));
+  for (const std::string arguments : {"simulate r.yaml --poses 3 -o s.csv", "mechanism r.yaml s.csv", "predict r.yaml",
+                                      "check r.yaml no.csv", "simulate no.urdf"}) {
+    const int expected = folder.run(robot_program + " " + arguments).exit_code;
+    EXPECT_EQ(folder.run(robot_program + " " + arguments + " 2>&-").exit_code, expected) << arguments;
+    EXPECT_EQ(folder.run(robot_program + " " + arguments + " 2>/dev/full").exit_code, expected) << arguments;
+  }
+}
+
+TEST(RobotOptions, WhatIsWrongIsSaidWithItsFileOrOption) {
+  const Folder folder;
+  folder.write("r.yaml", llmt::read_file(arm));
+  const auto says = [&](const std::string& arguments, int exit_code, const std::string& message) {
+    const Outcome outcome = folder.run(robot_program + " " + arguments);
+    EXPECT_EQ(outcome.exit_code, exit_code) << arguments;
+    EXPECT_NE(outcome.err.find(message), std::string::npos) << arguments << ": " << outcome.err;
+  };
+  says("demo -o /proc/x", 1, "/proc/x: the folder cannot be made: ");
+  says("simulate r.yaml --poses 3 -o -", 2, "-: is no name of an output; /dev/stdout is standard output");
+  folder.write("m.yaml", "mechanism: m\njoints: []\n");
+  says("simulate m.yaml", 1, "m.yaml:1: this is a mechanism and no arm: llmt-robot mechanism reads it");
+  folder.write("zero.yaml", std::string("name: a\nx: ") + '\0' + "\n");
+  says("simulate zero.yaml", 1, "zero.yaml:2: a byte is 0");
+  folder.write("f.yaml",
+               llmt::read_file(arm) +
+                   "effects:\n  - {type: formula, at: joint1, name: u, terms: [{joint: \"sin(q1)\", name: s}], "
+                   "coefficients: [1e-4]}\n");
+  says("export --c f.yaml -o f.c", 1, "f.yaml: effect ");
+  ASSERT_EQ(folder.run(robot_program + " simulate r.yaml --poses 60 -o d.csv").exit_code, 0);
+  says("calibrate r.yaml d.csv --prior joint2.a=1e-300", 2,
+       "--prior joint2.a is \"1e-300\", it must be a finite number, 1e-9 or more (mm or deg); --fix holds a parameter");
+  says("calibrate r.yaml d.csv --folds 1", 2, "--folds is \"1\", it must be 0, or a whole number, 2 or more");
+}
+
 TEST(RobotOptions, EndlessDescriptionsAreRefused) {
   const Folder folder;
   const Outcome outcome = folder.run(robot_program + " simulate /dev/zero");

@@ -18,7 +18,7 @@ inline llmt::Model chain(int leaves, llmt::ValidityKind kind, double half_width,
   const Eigen::Vector2d nothing = Eigen::Vector2d::Zero();
   llmt::Partition partition;
   partition.outputs = {0};
-  partition.validity = {.kind = kind, .width = kind == llmt::ValidityKind::crisp ? 0.0 : 1.0};
+  partition.validity = {.kind = kind, .width = half_width};
   partition.nodes.resize(2 * leaves - 1);
   for (int i = 0; i < 2 * leaves - 1; ++i) {
     llmt::Node& node = partition.nodes[i];

@@ -101,6 +101,14 @@ inline std::string read_number(const std::string& field, char mark, double& valu
   value = is_number ? std::strtod(with_point.c_str(), nullptr) : std::nan("");
   if (is_number && std::isfinite(value)) return "";
   const std::string shown = text.size() > 60 ? text.substr(0, 60) + "..." : text;  // all is ASCII here
+  const char* const separator = mark == '.' ? "comma" : "point";
+  const std::regex thousands(mark == '.' ? "[+-]?[1-9][0-9]{0,2}(,[0-9]{3})+(\\.[0-9]*)?"
+                                         : "[+-]?[1-9][0-9]{0,2}(\\.[0-9]{3})+(,[0-9]*)?");
+  if (!is_number && std::regex_match(text, thousands)) {
+    if (!std::regex_match(with_comma, number)) return fmt::format("'{}' has separators of thousands", shown);
+    return fmt::format("'{}' has a {}, which may be a separator of thousands or a decimal {}", shown, separator,
+                       separator);
+  }
   if (!is_number && std::regex_match(with_comma, number)) {
     return fmt::format("'{}' has a decimal {}, and a decimal {} is expected", shown, mark == '.' ? "comma" : "point",
                        mark == '.' ? "point" : "comma");
@@ -132,6 +140,15 @@ inline Table naive(const std::string& text, char mark = '.') {
     return table;
   }
   const Record header = table.records.front();
+  if (table.records.size() == 1 && std::count(header.text.begin(), header.text.end(), '"') % 2 != 0) {
+    table.error = fmt::format("t:{}: a quote is left open: the rest of the file would be the header", header.line);
+    return table;
+  }
+  if (table.records.size() == 1 && std::regex_search(header.text, std::regex("\r[^\r\n \t,;]"))) {
+    table.error = fmt::format("t:{}: lines end with CR alone, LF or CRLF is needed: tr '\\r' '\\n' converts such files",
+                              header.line);
+    return table;
+  }
   table.records.erase(table.records.begin());
   char separator = ',';
   for (const char candidate : {'\t', ';', ','}) {

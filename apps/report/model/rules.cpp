@@ -51,8 +51,11 @@ std::string tree_text(const Model& model, const Partition& partition, const std:
     const Open at = open.back();
     open.pop_back();
     const Node& node = partition.nodes[at.node];
-    std::string indent;
-    for (std::size_t d = 1; d < at.depth; ++d) indent += "|  ";
+    // Of a deep tree all bars would be more than all the rest.
+    constexpr std::size_t most_bars = 30;
+    const std::size_t bars = at.depth > 0 ? at.depth - 1 : 0;
+    std::string indent = bars > most_bars ? fmt::format("{} x | ", bars) : "";
+    for (std::size_t d = 0; d < bars && bars <= most_bars; ++d) indent += "|  ";
     if (at.depth > 0) {
       text += indent + at.text + (node.is_leaf() ? fmt::format(": rule {}", position[at.node] + 1) : "") + "\n";
     }

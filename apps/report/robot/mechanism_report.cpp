@@ -71,6 +71,12 @@ std::string verdict(const MechanismFacts& facts, const std::vector<MechanismFigu
     return fmt::format("TOO FEW READINGS: {} of them check others, and {} combinations of parameters are free.",
                        result.residuals.size(), result.rank);
   }
+  if (!facts.contradicting.empty() && !facts.robust) {
+    return fmt::format(
+        "CONTRADICTED: {} of {} poses contradict the others, and the parameters are made to fit them, too. --robust "
+        "leaves them out.",
+        facts.contradicting.size(), facts.measured.rows());
+  }
   if (!result.converged()) {
     return fmt::format(
         "NOT CONVERGED: {}. Check units, signs and order of the columns, and the start values of the description.",
@@ -147,9 +153,11 @@ std::string hidden_words(const discovery::SolverResult& result) {
 std::string mechanism_text(const MechanismFacts& facts, std::size_t width) {
   const discovery::SolverResult& result = facts.calibration.result;
   const std::vector<MechanismFigures> figures = figures_of(facts);
-  const std::size_t left_out = facts.calibration.left_out.size();
+  const std::size_t contradicting = facts.robust ? facts.contradicting.size() : 0;
+  const std::size_t left_out = facts.calibration.left_out.size() + contradicting;
   std::string text =
-      fmt::format("{}: {} poses of {}{}; measured: {}\n\n", facts.data, facts.measured.rows(), facts.described.name,
+      fmt::format("{}: {} poses of {}{}; measured: {}\n\n", facts.data,
+                  facts.measured.rows() + static_cast<Eigen::Index>(contradicting), facts.described.name,
                   left_out == 0 ? "" : fmt::format(", {} of them left out", left_out), measured_words(facts));
   text += verdict(facts, figures) + "\n\n";
   text += facts.held_out ? fmt::format("Held out: {} random folds.\n", facts.folds) : "";
@@ -174,6 +182,8 @@ Json mechanism_json(const MechanismFacts& facts) {
   json["data"] = facts.data;
   json["poses"] = facts.measured.rows();
   json["left_out"] = facts.calibration.left_out.size();
+  json["contradicting_lines"] = facts.contradicting;
+  json["robust"] = facts.robust;
   json["converged"] = result.converged();
   json["reason"] = result.reason;
   json["folds"] = facts.held_out ? facts.folds : 0;

@@ -4,6 +4,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "llmt/robotics/mechanism/mechanism_calibration.hpp"
 #include "report/text/json.hpp"
@@ -18,6 +19,8 @@ struct MechanismFacts {
   robotics::Mechanism described;
   Eigen::MatrixXd measured;
   int folds = 0;
+  std::vector<Eigen::Index> contradicting = {};  ///< lines of poses that contradict the others
+  bool robust = false;                           ///< those are left out, and not in `measured`
   robotics::MechanismCalibration calibration = {};
   robotics::MechanismErrors before = {};
   std::optional<robotics::MechanismErrors> held_out = {};

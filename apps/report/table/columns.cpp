@@ -179,8 +179,8 @@ LearningColumns read_learning_columns(const Csv& csv, const ColumnRoles& roles, 
   std::vector<Eigen::Index> bad(columns.size(), ColumnCells::no_row);
   for (std::size_t i = 0; i < columns.size(); ++i) {
     const bool is_input = i < num_inputs;
-    const bool only_words =
-        cells[i].other > cells[i].infinite + cells[i].other_mark && cells[i].other + cells[i].missing == csv.rows();
+    const bool only_words = cells[i].other > cells[i].infinite + cells[i].other_mark + cells[i].thousands &&
+                            cells[i].other + cells[i].missing == csv.rows();
     if (is_input && (only_words || contains(roles.categorical, columns[i]))) {
       result.inputs.categorical.push_back(static_cast<int>(i));
     } else {

@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <charconv>
 #include <stdexcept>
 #include <string_view>
 
@@ -40,6 +41,22 @@ bool looks_like_a_date(const std::string& text) {
   }
   const bool ends = at == text.size() || text[at] == 'T' || text[at] == ' ';
   return ends && (longest == 4 || longest == 2);
+}
+
+// What follows the number that a text begins with; empty if it begins with none, or has nothing behind it.
+std::string unit_behind_number(const std::string& text) {
+  double value = 0.0;
+  const auto [stop, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc()) return "";
+  const std::size_t end = text.find_first_not_of(' ', stop - text.data());
+  return end == std::string::npos ? "" : text.substr(end);
+}
+
+// The unit that all texts have behind a number; empty if there is none.
+std::string common_unit(const std::vector<std::string>& texts) {
+  const std::string unit = texts.empty() ? "" : unit_behind_number(texts.front());
+  const auto has_it = [&](const std::string& text) { return unit_behind_number(text) == unit; };
+  return texts.size() > 1 && std::ranges::all_of(texts, has_it) ? unit : "";
 }
 
 }  // namespace
@@ -83,7 +100,11 @@ std::vector<AccidentalInput> accidental_inputs(const InputColumns& inputs) {
     const auto rows = static_cast<double>(inputs.values.rows());
     const bool few = levels <= most_levels || static_cast<double>(levels) <= most_levels_per_row * rows;
     const bool dates = std::ranges::all_of(inputs.levels[column], looks_like_a_date);
-    if (dates || !few) found.push_back({dates ? AccidentalInput::Kind::dates : AccidentalInput::Kind::words, column});
+    if (const std::string unit = common_unit(inputs.levels[column]); !dates && !unit.empty()) {
+      found.push_back({AccidentalInput::Kind::unit, column, unit});
+    } else if (dates || !few) {
+      found.push_back({dates ? AccidentalInput::Kind::dates : AccidentalInput::Kind::words, column});
+    }
   }
   for (int column = 0; column < inputs.values.cols(); ++column) {
     if (inputs.levels[column].empty() && numbers_the_rows(inputs.values.col(column))) {

@@ -24,10 +24,12 @@ struct AccidentalInput {
   enum class Kind {
     words,       ///< different words in most rows, such as names of the rows
     dates,       ///< words that all look like dates
+    unit,        ///< numbers that all have the same unit behind them
     row_numbers  ///< consecutive whole numbers from 0 or 1 on
   };
   Kind kind = Kind::words;
   int input = 0;
+  std::string unit = {};
 };
 
 /// Such inputs: those of words first.

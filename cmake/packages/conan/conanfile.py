@@ -35,6 +35,7 @@ class LlmtConan(ConanFile):
             self.requires("muparser/2.3.4")
         if self.options.robotics:
             self.requires("yaml-cpp/0.8.0")
+            self.requires("expat/2.5.0")
             self.requires("urdfdom/4.0.0")
             self.requires("tinyxml/2.6.2")
         if self.options.programs:

@@ -31,7 +31,9 @@ struct ColumnCells {
   Eigen::Index other = 0;               ///< cells that are neither missing nor a finite number
   Eigen::Index infinite = 0;            ///< those of the others that are numbers, as inf or 1e400
   Eigen::Index other_mark = 0;          ///< those of the others that are numbers with the other decimal mark
+  Eigen::Index thousands = 0;           ///< those of the others that can only be numbers with separators of thousands
   Eigen::Index first_missing = no_row;  ///< row
+  Eigen::Index first_marked = no_row;   ///< row of the first missing cell that is not empty: NA and the like
   Eigen::Index first_other = no_row;    ///< row
 };
 
@@ -55,6 +57,19 @@ class DecimalMarkError : public std::runtime_error {
   DecimalMark found_;
 };
 
+/// A cell is no number only because it may have separators of thousands: "2,148" where the decimal mark is a point.
+class ThousandsError : public DecimalMarkError {
+ public:
+  ThousandsError(const std::string& message, DecimalMark found, bool is_certain)
+      : DecimalMarkError(message, found), is_certain_(is_certain) {}
+
+  /// Whether the cell is no number with the other decimal mark either: "2,148.5".
+  bool is_certain() const { return is_certain_; }
+
+ private:
+  bool is_certain_;
+};
+
 /// A name or a cell is not UTF-8, as in files of programs that write an 8-bit encoding.
 class EncodingError : public std::runtime_error {
  public:
@@ -69,16 +84,23 @@ class EncodingError : public std::runtime_error {
 /// blank lines, which are skipped. Every row must have as many fields as the header. Numbers have the decimal mark that
 /// is named; with a decimal comma the fields are separated by semicolons or tabs if the header has any.
 ///
+/// Numbers with separators of thousands are refused unless read_thousands() was called.
+///
 /// `max_threads` is 0 for all that the machine has; results and errors do not depend on it.
 class Csv {
  public:
   /// Reads a file. Throws std::runtime_error, starting with `path` or `path:line`, if it cannot be read, takes more
-  /// than half of the machine's memory, has a line of more than 16 MiB, is empty or not UTF-8 (EncodingError), has an
-  /// unnamed or repeated column, or a row with too few or too many fields.
+  /// than half of the machine's memory, has a line of more than 16 MiB, is empty or not UTF-8 (EncodingError), has line
+  /// ends that are not LF or CRLF, a quote in the header that nothing closes, an unnamed or repeated column, or a row
+  /// with too few or too many fields.
   static Csv read(const std::string& path, DecimalMark mark = DecimalMark::point);
 
   /// As read(), from memory; `name` stands for the path in errors.
   static Csv parse(std::string text, std::string name, DecimalMark mark = DecimalMark::point);
+
+  /// Numbers may have separators of thousands from now on, groups of three digits behind the other decimal mark:
+  /// "1,234.5", with a decimal comma "1.234,5".
+  void read_thousands() { thousands_ = true; }
 
   const std::string& name() const { return name_; }
   const std::vector<std::string>& columns() const { return columns_; }
@@ -92,7 +114,8 @@ class Csv {
 
   /// The named columns as numbers, rows x columns, rows in file order. Throws std::runtime_error `path:line: column
   /// "c": ...` at the first cell, in file order, that is empty, not a number, not finite or out of range
-  /// (DecimalMarkError if it has the other decimal mark); and as index_of().
+  /// (DecimalMarkError if it has the other decimal mark, ThousandsError if it may have separators of thousands); and as
+  /// index_of().
   Eigen::MatrixXd numbers(std::span<const std::string> columns, int max_threads = 0) const;
 
   /// One column as numbers; errors as above.
@@ -147,6 +170,7 @@ class Csv {
   std::string text_;
   char separator_ = ',';
   DecimalMark mark_ = DecimalMark::point;
+  bool thousands_ = false;
   std::size_t header_begin_ = 0;
   std::vector<std::string> columns_;
   std::map<std::string, std::size_t, std::less<>> fields_;  // position of a column
@@ -156,6 +180,7 @@ class Csv {
 
   friend class CsvPieces;
   void read_header();
+  void refuse_header_of_other_programs(std::string_view header) const;
   void find_rows();
   std::string_view record_text(std::size_t begin) const;
   Eigen::Index line_at(std::size_t offset) const;
@@ -184,5 +209,8 @@ class CsvPieces {
 
 /// `text` as one CSV field: in double quotes, inner quotes doubled, if it holds the separator, a quote or a line break.
 std::string csv_field(std::string_view text, char separator = ',');
+
+/// Fields for people, as messages list columns: a comma and a blank between them.
+std::string csv_row(std::span<const std::string> fields);
 
 }  // namespace llmt

@@ -110,13 +110,24 @@ std::string with_name(std::string text, const std::string& name) {
   return text;
 }
 
-// Text that stands in a comment: no end of it, no line breaks.
+// Whether a text begins with a mark of direction or a line separator of Unicode: U+061C, U+200E, U+200F, U+2028 to
+// U+202E, U+2066 to U+2069.
+bool begins_with_mark(std::string_view text) {
+  const auto lies = [&](const char* first, const char* last) { return text >= first && text.substr(0, 3) <= last; };
+  return text.starts_with("\xD8\x9C") || lies("\xE2\x80\x8E", "\xE2\x80\x8F") || lies("\xE2\x80\xA8", "\xE2\x80\xAE") ||
+         lies("\xE2\x81\xA6", "\xE2\x81\xA9");
+}
+
+// Text that stands in a comment: no end of it, no line breaks, no marks of direction, with which a comment may look
+// like code and of which compilers warn.
 std::string commented(const std::string& text) {
   std::string safe;
-  for (const char letter : text) {
-    const bool plain =
-        static_cast<unsigned char>(letter) >= 32 && letter != '/' && letter != '*' && letter != '\\' && letter != '?';
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const char letter = text[i];
+    const bool plain = static_cast<unsigned char>(letter) >= 32 && letter != 127 && letter != '/' && letter != '*' &&
+                       letter != '\\' && letter != '?' && !begins_with_mark(std::string_view(text).substr(i));
     safe += plain ? letter : '_';
+    if (!plain && static_cast<unsigned char>(letter) >= 0x80) i += letter == '\xE2' ? 2 : 1;
   }
   return safe;
 }

@@ -57,6 +57,33 @@ bool is_number(std::string_view text, DecimalMark mark, double& value) {
   return number_end(text.data(), end, mark, value) == end;
 }
 
+char separator_of_thousands(DecimalMark mark) { return mark == DecimalMark::point ? ',' : '.'; }
+
+// "-1,234,567.8": one to three digits, then groups of three, perhaps a fraction.
+bool has_thousands(std::string_view text, DecimalMark mark) {
+  const auto digits = [&](std::size_t at) {
+    const std::size_t end = text.find_first_not_of("0123456789", at);
+    return std::min(end, text.size()) - std::min(at, text.size());
+  };
+  std::size_t at = text.starts_with('-') || text.starts_with('+') ? 1 : 0;
+  const std::size_t first = digits(at);
+  if (first < 1 || first > 3 || text[at] == '0') return false;
+  int groups = 0;
+  for (at += first; at < text.size() && text[at] == separator_of_thousands(mark); at += 4, ++groups) {
+    if (digits(at + 1) != 3) return false;
+  }
+  if (at < text.size() && text[at] == static_cast<char>(mark)) at += 1 + digits(at + 1);
+  return groups > 0 && at == text.size();
+}
+
+// The same with the separators left out.
+bool is_number_with_thousands(std::string_view text, DecimalMark mark, double& value) {
+  if (!has_thousands(text, mark)) return false;
+  std::string plain(text);
+  std::erase(plain, separator_of_thousands(mark));
+  return is_number(plain, mark, value);
+}
+
 bool is_number_with_other_mark(std::string_view text, DecimalMark mark) {
   double value = 0.0;
   return is_number(text, mark == DecimalMark::point ? DecimalMark::comma : DecimalMark::point, value);
@@ -193,7 +220,8 @@ std::string_view cell_text(std::string_view field, std::string& buffer) {
   return trimmed(buffer);
 }
 
-Cell read_cell(const char*& cursor, const char* end, char separator, DecimalMark mark, double& value) {
+Cell read_cell(const char*& cursor, const char* end, char separator, const Numbers& numbers, double& value) {
+  const DecimalMark mark = numbers.mark;
   // Most cells hold a number and nothing else. The field then ends where the number ends, and no search for the
   // separator is needed.
   const char* const begin = after_blanks(cursor, end, separator);
@@ -210,8 +238,13 @@ Cell read_cell(const char*& cursor, const char* end, char separator, DecimalMark
   }
   const char* const field = std::exchange(cursor, field_end(begin, end, separator));
   const std::string_view text = bare(std::string_view(field, cursor - field));
-  if (is_missing(text)) return Cell::missing;
-  if (!is_number(text, mark, value)) return is_number_with_other_mark(text, mark) ? Cell::other_mark : Cell::word;
+  if (text.empty()) return Cell::missing;
+  if (is_missing(text)) return Cell::marked;
+  if (numbers.thousands && is_number_with_thousands(text, mark, value)) return Cell::number;
+  if (!is_number(text, mark, value)) {
+    if (is_number_with_other_mark(text, mark)) return Cell::other_mark;
+    return has_thousands(text, mark) ? Cell::thousands : Cell::word;
+  }
   return std::isfinite(value) ? Cell::number : Cell::infinite;
 }
 
@@ -220,11 +253,19 @@ bool has_other_mark(std::string_view field, DecimalMark mark) {
   return !is_number(bare(field), mark, value) && is_number_with_other_mark(bare(field), mark);
 }
 
+bool may_have_thousands(std::string_view field, DecimalMark mark) { return has_thousands(bare(field), mark); }
+
 std::string problem_of(std::string_view field, DecimalMark mark) {
   const std::string_view text = bare(field);
   if (text.empty()) return "the cell is empty, a number is needed";
   double value = 0.0;
   if (is_number(text, mark, value)) return fmt::format("'{}' is not finite", shortened(text));
+  const char* const separator = mark == DecimalMark::point ? "comma" : "point";
+  if (has_thousands(text, mark) && is_number_with_other_mark(text, mark)) {
+    return fmt::format("'{}' has a {}, which may be a separator of thousands or a decimal {}", shortened(text),
+                       separator, separator);
+  }
+  if (has_thousands(text, mark)) return fmt::format("'{}' has separators of thousands", shortened(text));
   if (is_number_with_other_mark(text, mark)) {
     return fmt::format("'{}' has a decimal {}, and a decimal {} is expected", shortened(text),
                        mark == DecimalMark::point ? "comma" : "point", mark == DecimalMark::point ? "point" : "comma");

@@ -51,14 +51,25 @@ std::string unquoted(std::string_view field);
 /// there is no value. The result refers to `field`, or to `buffer` if doubled quotes were halved.
 std::string_view cell_text(std::string_view field, std::string& buffer);
 
-/// `other_mark`: a number with the other decimal mark.
-enum class Cell { number, missing, infinite, other_mark, word };
+/// How a table writes numbers: the decimal mark, and whether they may have separators of thousands.
+struct Numbers {
+  DecimalMark mark = DecimalMark::point;
+  bool thousands = false;
+};
+
+/// `missing`: empty; `marked`: NA and the like; `other_mark`: a number with the other decimal mark; `thousands`: a
+/// number that can only have separators of thousands.
+enum class Cell { number, missing, marked, infinite, other_mark, thousands, word };
 
 /// What the cell at `cursor` holds; a number is written to `value`. Moves `cursor` to the end of the field.
-Cell read_cell(const char*& cursor, const char* end, char separator, DecimalMark mark, double& value);
+Cell read_cell(const char*& cursor, const char* end, char separator, const Numbers& numbers, double& value);
 
 /// Whether a cell is a number with the other decimal mark and none with `mark`.
 bool has_other_mark(std::string_view field, DecimalMark mark);
+
+/// Whether a cell may be a number with separators of thousands: digits in groups of three behind the other decimal
+/// mark.
+bool may_have_thousands(std::string_view field, DecimalMark mark);
 
 /// Why a cell is not a number.
 std::string problem_of(std::string_view field, DecimalMark mark);

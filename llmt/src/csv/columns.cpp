@@ -49,12 +49,14 @@ void for_each_requested(const Request& request, const char* cursor, const char* 
 }
 
 void count_cell(ColumnCells& cells, csv::Cell cell, Eigen::Index row) {
-  const bool missing = cell == csv::Cell::missing;
+  const bool missing = cell == csv::Cell::missing || cell == csv::Cell::marked;
   Eigen::Index& first = missing ? cells.first_missing : cells.first_other;
   first = std::min(first, row);
   ++(missing ? cells.missing : cells.other);
   if (cell == csv::Cell::infinite) ++cells.infinite;
   if (cell == csv::Cell::other_mark) ++cells.other_mark;
+  if (cell == csv::Cell::thousands) ++cells.thousands;
+  if (cell == csv::Cell::marked) cells.first_marked = std::min(cells.first_marked, row);
 }
 
 void add(ColumnCells& sum, const ColumnCells& part) {
@@ -62,6 +64,8 @@ void add(ColumnCells& sum, const ColumnCells& part) {
   sum.other += part.other;
   sum.infinite += part.infinite;
   sum.other_mark += part.other_mark;
+  sum.thousands += part.thousands;
+  sum.first_marked = std::min(sum.first_marked, part.first_marked);
   sum.first_missing = std::min(sum.first_missing, part.first_missing);
   sum.first_other = std::min(sum.first_other, part.first_other);
 }
@@ -89,7 +93,7 @@ CsvNumbers Csv::read_numbers(std::span<const std::string> columns, int max_threa
   const auto read_row = [&](Eigen::Index row, double* values, std::vector<ColumnCells>& cells) {
     const char* const begin = text_.data() + row_begins_[row];
     for_each_requested(request, begin, end, separator_, [&](std::size_t column, const char*& cursor) {
-      const csv::Cell cell = csv::read_cell(cursor, end, separator_, mark_, values[column]);
+      const csv::Cell cell = csv::read_cell(cursor, end, separator_, {mark_, thousands_}, values[column]);
       if (cell != csv::Cell::number) {
         values[column] = std::numeric_limits<double>::quiet_NaN();
         count_cell(cells[column], cell, row);
@@ -139,10 +143,11 @@ void Csv::refuse_first(std::span<const std::string> columns, std::span<const Eig
   for_each_requested(request, record.data(), end, separator_, [&](std::size_t, const char*& cursor) {
     const std::string_view field(cursor, csv::field_end(cursor, end, separator_));
     const std::string problem = csv::problem_of(field, mark_);
-    if (csv::has_other_mark(field, mark_)) {
-      throw DecimalMarkError(fmt::format("{}:{}: column \"{}\": {}", name_, line_of(row), columns_[wanted], problem),
-                             mark_ == DecimalMark::point ? DecimalMark::comma : DecimalMark::point);
-    }
+    const std::string message = fmt::format("{}:{}: column \"{}\": {}", name_, line_of(row), columns_[wanted], problem);
+    const DecimalMark other = mark_ == DecimalMark::point ? DecimalMark::comma : DecimalMark::point;
+    const bool has_other = csv::has_other_mark(field, mark_);
+    if (csv::may_have_thousands(field, mark_)) throw ThousandsError(message, other, !has_other);
+    if (has_other) throw DecimalMarkError(message, other);
     refuse(row, columns_[wanted], problem);
   });
 }

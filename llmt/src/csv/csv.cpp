@@ -1,7 +1,6 @@
 #include "llmt/csv.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cstdint>
@@ -54,6 +53,7 @@ void Csv::read_header() {
   if (header.starts_with("\xFF\xFE") || header.starts_with("\xFE\xFF") || header.find('\0') != std::string_view::npos) {
     throw std::runtime_error(fmt::format("{}: this is UTF-16 or no text at all, UTF-8 is needed", name_));
   }
+  refuse_header_of_other_programs(header);
   separator_ = separator_of(header, mark_);
   for (const char* begin = header.data();;) {
     const char* const field_end = csv::field_end(begin, end, separator_);
@@ -76,6 +76,33 @@ void Csv::read_header() {
   }
 }
 
+// A first line that is none of a table, and line ends that would make one line of the whole table.
+void Csv::refuse_header_of_other_programs(std::string_view header) const {
+  const auto refuse_header = [&](const char* why) {
+    throw std::runtime_error(fmt::format("{}:{}: {}", name_, line_at(header_begin_), why));
+  };
+  if (header.starts_with("sep=") && header.size() <= 5) {
+    refuse_header("a line that names the separator of a spreadsheet is no header: delete it");
+  }
+  const bool is_all =
+      std::string_view(text_).find_first_not_of(" \t\r\n", header_begin_ + header.size()) == std::string_view::npos;
+  if (is_all && !more_follows_ && std::ranges::count(header, '"') % 2 != 0) {
+    refuse_header("a quote is left open: the rest of the file would be the header");
+  }
+  if (!is_all || more_follows_) return;
+  for (std::size_t at = header.find('\r'); at != std::string_view::npos; at = header.find('\r', at + 1)) {
+    // Within quotes a line may end with CRLF, and elsewhere CR is a blank.
+    if (at + 1 == header.size() || std::string_view("\r\n \t,;").find(header[at + 1]) != std::string_view::npos)
+      continue;
+    refuse_header("lines end with CR alone, LF or CRLF is needed: tr '\\r' '\\n' converts such files");
+  }
+  for (const std::string_view end : {"\f", "\v", "\xC2\x85", "\xE2\x80\xA8", "\xE2\x80\xA9"}) {
+    if (header.find(end) != std::string_view::npos) {
+      refuse_header("lines end with a form feed or a separator of Unicode, LF or CRLF is needed");
+    }
+  }
+}
+
 void Csv::find_rows() {
   const char* const text = text_.data();
   const char* const end = text + text_.size();
@@ -87,10 +114,13 @@ void Csv::find_rows() {
       if (record.fields != columns_.size()) {
         const bool is_last =
             !more_follows_ && between(record.end, end).find_first_not_of(" \t\r\n") == std::string_view::npos;
+        const bool is_comment = row_begins_.size() == 1 && header_text().starts_with('#');
         throw std::runtime_error(
             fmt::format("{}:{}: the row has {} field{}, the header has {}{}", name_, line_at(row_begins_.back()),
                         record.fields, record.fields == 1 ? "" : "s", columns_.size(),
-                        is_last && record.fields < columns_.size() ? " (is the file cut off?)" : ""));
+                        is_comment ? "; the first line must be the header, delete comments above it"
+                        : is_last && record.fields < columns_.size() ? " (is the file cut off?)"
+                                                                     : ""));
       }
     }
     begin = after(record);
@@ -101,7 +131,7 @@ std::size_t Csv::index_of(std::string_view column) const {
   const auto found = fields_.find(column);
   if (found == fields_.end()) {
     throw std::runtime_error(fmt::format("{}: there is no column \"{}\"{}; the columns are {}", name_, column,
-                                         did_you_mean(column, columns_), fmt::join(columns_, ", ")));
+                                         did_you_mean(column, columns_), csv_row(columns_)));
   }
   return found->second;
 }
@@ -160,6 +190,12 @@ std::string csv_field(std::string_view text, char separator) {
     }
   }
   return quoted + '"';
+}
+
+std::string csv_row(std::span<const std::string> fields) {
+  std::string row;
+  for (const std::string& field : fields) row += (row.empty() ? "" : ", ") + csv_field(field);
+  return row;
 }
 
 }  // namespace llmt

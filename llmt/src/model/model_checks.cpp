@@ -12,17 +12,29 @@
 namespace llmt {
 namespace {
 
-// Every node, and that each but the root has one parent.
+constexpr int most_levels = 10'000;  // of an input, as of a table: most_categories
+
+// Explaining a prediction and writing rules cost time in proportion to leaves times levels.
+constexpr int most_splits_above = 2000;
+
+// Every node, that each but the root has one parent, and how deep they lie.
 void check_tree(const Partition& partition, Eigen::Index index, const std::vector<InputColumn>& inputs,
                 Eigen::Index regressors) {
   std::vector<bool> has_parent(partition.nodes.size(), false);
+  std::vector<int> splits_above(partition.nodes.size(), 0);
   for (Eigen::Index i = 0; i < std::ssize(partition.nodes); ++i) {
     check_node(partition, {"partition", index, i}, inputs, regressors);
     const Node& node = partition.nodes[i];
     if (!node.is_leaf()) {
       if (has_parent[node.left]) throw ModelFault({"partition", index, node.left}, "it has two parents");
-      has_parent[node.left] = true;
-      has_parent[node.right] = true;
+      for (const int child : {node.left, node.right}) {  // which come after their parent
+        has_parent[child] = true;
+        splits_above[child] = splits_above[i] + 1;
+        if (splits_above[child] > most_splits_above) {
+          throw ModelFault({"partition", index, child},
+                           fmt::format("the tree is deeper than {} splits", most_splits_above));
+        }
+      }
     }
   }
   if (std::find(has_parent.begin() + 1, has_parent.end(), false) != has_parent.end()) {
@@ -94,6 +106,10 @@ void check_columns_of_model(const std::vector<InputColumn>& inputs, const std::v
           input.low <= input.high)) {
       throw ModelFault({"input", i}, fmt::format("\"{}\": low {}, centre {} and high {} must be finite and low <= high",
                                                  input.name, input.low, input.centre, input.high));
+    }
+    if (std::ssize(input.levels) > most_levels) {
+      throw ModelFault({"input", i}, fmt::format("\"{}\": {} levels, at most {} are possible", input.name,
+                                                 input.levels.size(), most_levels));
     }
     const std::vector<double>& codes = input.codes;
     const bool ascend = std::ranges::is_sorted(codes, std::less_equal<>()) && std::ranges::all_of(codes, is_finite);

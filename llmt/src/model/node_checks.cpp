@@ -39,13 +39,39 @@ void check_shapes(const Node& node, Eigen::Index outputs, Eigen::Index regressor
   }
 }
 
+// A transition where there is none, or one that is wider than the model says: a blend has its validity's width times
+// the extent of a part of the input's range.
+void check_half_width(const Node& node, const Validity& validity, const std::vector<InputColumn>& inputs,
+                      const ModelPart& part) {
+  constexpr double rounding = 1.0 + 1e-6;
+  if (!(node.half_width >= 0.0 && std::isfinite(node.half_width))) {
+    throw ModelFault(part, fmt::format("half_width {} must be finite and not negative", node.half_width));
+  }
+  if (node.half_width == 0.0 || node.is_leaf() || validity.kind == ValidityKind::logistic) return;
+  if (validity.kind != ValidityKind::blend) {
+    throw ModelFault(part, fmt::format("half_width is {}, leaves that are {} have no transitions", node.half_width,
+                                       name_of(validity.kind)));
+  }
+  const InputColumn& input = inputs[node.split_input];
+  const double most = validity.width * (input.high - input.low) * rounding;
+  if (!(node.half_width <= most)) {
+    throw ModelFault(part, fmt::format("half_width is {}, with the width {} of the partition at most {} is possible",
+                                       node.half_width, validity.width, most));
+  }
+}
+
+// What every inverse of a sum of squares and products has: a quadratic form below 0 would give a leverage below 0.
+bool may_be_inverse_gram(const Eigen::MatrixXd& matrix) {
+  constexpr double rounding = 1.0 + 1e-6;
+  if (!(matrix(0, 0) > 0.0) || !(matrix.diagonal().array() >= 0.0).all()) return false;
+  const Eigen::ArrayXd root = matrix.diagonal().array().sqrt() * std::sqrt(rounding);
+  return (matrix.array().abs() <= (root.matrix() * root.matrix().transpose()).array()).all();
+}
+
 void check_values(const Node& node, Eigen::Index regressors, const ModelPart& part) {
   if (!(node.low.array() <= node.high.array()).all() || !node.mean.allFinite() || !node.low.allFinite() ||
       !node.high.allFinite()) {
     throw ModelFault(part, "mean, low and high must be finite and low <= high");
-  }
-  if (!(node.half_width >= 0.0 && std::isfinite(node.half_width))) {
-    throw ModelFault(part, fmt::format("half_width {} must be finite and not negative", node.half_width));
   }
   if (!(node.missing_left >= 0.0 && node.missing_left <= 1.0)) {
     throw ModelFault(part, fmt::format("missing_left {} must lie between 0 and 1", node.missing_left));
@@ -53,6 +79,9 @@ void check_values(const Node& node, Eigen::Index regressors, const ModelPart& pa
   if (node.inverse_gram.size() > 0 && (node.inverse_gram.rows() != regressors + 1 ||
                                        node.inverse_gram.cols() != regressors + 1 || !node.inverse_gram.allFinite())) {
     throw ModelFault(part, fmt::format("inverse_gram must be finite, {} x {}", regressors + 1, regressors + 1));
+  }
+  if (node.inverse_gram.size() > 0 && !may_be_inverse_gram(node.inverse_gram)) {
+    throw ModelFault(part, "inverse_gram is no inverse of sums of squares and products: leverages could be negative");
   }
   if (!node.value.allFinite() || !node.slope.allFinite() || !node.rss.allFinite() || !std::isfinite(node.threshold)) {
     throw ModelFault(part, "a number is not finite");
@@ -98,6 +127,7 @@ void check_node(const Partition& partition, const ModelPart& part, const std::ve
     throw ModelFault(part, fmt::format("the children {} and {} are not in order of growth", node.left, node.right));
   }
   check_split(node, inputs, part);
+  check_half_width(node, partition.validity, inputs, part);
 }
 
 }  // namespace llmt

@@ -71,7 +71,8 @@ std::string to_json(const Model& model, const Intervals& intervals) {
 }
 
 ModelWithIntervals from_json_with_intervals(const std::string& text, const std::string& name) {
-  const Json json = parse_json(text, name);
+  const JsonDocument document = parse_json(text, name);
+  const Json& json = document.value();
   const JsonReader root(json, name);
   Model model = model_from(root);
   Intervals intervals;

@@ -23,13 +23,27 @@ std::string without_number(const std::string& message) {
   return end == std::string::npos ? message : message.substr(end + 2);
 }
 
+// Takes the values within a value away, the innermost first, so that none is destroyed that holds others. The parser
+// bounds the depth.
+void empty(Json& json) noexcept {
+  if (json.is_array()) {
+    auto& values = json.get_ref<Json::array_t&>();
+    for (Json& value : values) empty(value);
+    values.clear();
+  } else if (json.is_object()) {
+    auto& members = json.get_ref<Json::object_t&>();
+    for (auto& [key, value] : members) empty(value);
+    members.clear();
+  }
+}
+
 // Puts the value together from the parser's events. The containers that are open are held in a list of their own, so
 // depth costs no stack.
 class Builder final : public nlohmann::json_sax<Json> {
  public:
   explicit Builder(const std::string& name) : name_(name) {}
 
-  Json take() { return std::move(root_); }
+  JsonDocument take() { return std::move(document_); }
 
   bool null() override { return put(nullptr); }
   bool boolean(bool value) override { return put(value); }
@@ -70,7 +84,7 @@ class Builder final : public nlohmann::json_sax<Json> {
 
   // Puts a value where the last events say.
   Json& add(Json value) {
-    if (open_.empty()) return root_ = std::move(value);
+    if (open_.empty()) return document_.value() = std::move(value);
     Json& container = *open_.back().container;
     if (container.is_object()) return container[open_.back().key] = std::move(value);
     container.push_back(std::move(value));
@@ -110,13 +124,15 @@ class Builder final : public nlohmann::json_sax<Json> {
   }
 
   const std::string& name_;
-  Json root_;
+  JsonDocument document_;
   std::vector<Open> open_;
 };
 
 }  // namespace
 
-Json parse_json(const std::string& text, const std::string& name) {
+JsonDocument::~JsonDocument() { empty(value_); }
+
+JsonDocument parse_json(const std::string& text, const std::string& name) {
   Builder builder(name);
   Json::sax_parse(text, &builder);
   return builder.take();

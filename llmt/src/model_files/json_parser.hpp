@@ -4,6 +4,7 @@
 
 #include <nlohmann/json.hpp>
 #include <string>
+#include <utility>
 
 namespace llmt {
 
@@ -13,11 +14,27 @@ using Json = nlohmann::ordered_json;
 inline constexpr std::size_t most_json_levels = 32;
 inline constexpr std::size_t most_json_members = 100;  ///< of one object
 
+/// A value whose end takes no memory. nlohmann's destructor takes as much as the longest array and ends the program
+/// where that is not there, as when a file has just proved too large for the memory.
+class JsonDocument {
+ public:
+  JsonDocument() = default;
+  ~JsonDocument();
+  JsonDocument(JsonDocument&& other) noexcept : value_(std::move(other.value_)) {}
+  JsonDocument& operator=(JsonDocument&&) = delete;
+
+  Json& value() { return value_; }
+  const Json& value() const { return value_; }
+
+ private:
+  Json value_;
+};
+
 /// Parses a text. Throws std::runtime_error that begins with `name` and the JSON pointer to the place, for what is not
 /// JSON, nests deeper than most_json_levels, has an object with more members than most_json_members or one member
 /// twice, or a number beyond the range of a double. No value of the result is nested deeper than most_json_levels, so
 /// that functions that call themselves for every level are safe.
-Json parse_json(const std::string& text, const std::string& name);
+JsonDocument parse_json(const std::string& text, const std::string& name);
 
 /// A text of a file as messages quote it: at most 40 bytes, and a question mark for what is no printable ASCII.
 std::string quotable(const std::string& text);

@@ -11,9 +11,14 @@
 namespace llmt {
 namespace {
 
-void read_split(const JsonReader& split, Eigen::Index inputs, Node& node) {
+void read_split(const JsonReader& split, const std::vector<InputColumn>& inputs, Node& node) {
   node.split_input = split.member("column").as<int>();
-  if (split.has("direction")) node.direction = split.member("direction").vector(inputs);
+  const bool exists = node.split_input >= 0 && node.split_input < std::ssize(inputs);
+  if (exists && split.has("input") && split.member("input").as<std::string>() != inputs[node.split_input].name) {
+    split.member("input").fail(
+        fmt::format("column {} has the name \"{}\"", node.split_input, quotable(inputs[node.split_input].name)));
+  }
+  if (split.has("direction")) node.direction = split.member("direction").vector(std::ssize(inputs));
   if (split.has("level_side")) {
     node.level_side = split.member("level_side").list<int>();
   } else {
@@ -36,7 +41,8 @@ Eigen::MatrixXd symmetric(const Eigen::VectorXd& lower, Eigen::Index size) {
   return matrix;
 }
 
-Node node_from_json(const JsonReader& json, Eigen::Index inputs, Eigen::Index outputs, Eigen::Index regressors) {
+Node node_from_json(const JsonReader& json, const std::vector<InputColumn>& inputs, Eigen::Index outputs,
+                    Eigen::Index regressors) {
   Node node;
   if (json.has("split")) read_split(json.member("split"), inputs, node);
   node.samples = json.member("samples").as<Eigen::Index>();
@@ -131,7 +137,8 @@ Eigen::MatrixXd output_range_from_json(const JsonReader& json, Eigen::Index outp
   return range;
 }
 
-Partition partition_from_json(const JsonReader& json, Eigen::Index inputs, Eigen::Index regressors, int version) {
+Partition partition_from_json(const JsonReader& json, const std::vector<InputColumn>& inputs, Eigen::Index regressors,
+                              int version) {
   Partition partition{.outputs = json.member("outputs").list<int>(),
                       .validity = validity_from_json(json.member("validity")),
                       .nodes = {},
@@ -175,7 +182,7 @@ Model model_from(const JsonReader& root) {
   std::vector<OutputColumn> outputs = all_of(root.member("outputs"), output_from_json);
   std::vector<Regressor> regressors = all_of(root.member("regressors"), regressor_from_json);
   std::vector<Partition> partitions = all_of(root.member("partitions"), [&](const JsonReader& entry) {
-    return partition_from_json(entry, std::ssize(inputs), std::ssize(regressors), version);
+    return partition_from_json(entry, inputs, std::ssize(regressors), version);
   });
   try {
     return {std::move(inputs), std::move(outputs), std::move(regressors), std::move(partitions)};
@@ -185,8 +192,8 @@ Model model_from(const JsonReader& root) {
 }
 
 Model from_json(const std::string& text, const std::string& name) {
-  const Json json = parse_json(text, name);
-  return model_from({json, name});
+  const JsonDocument json = parse_json(text, name);
+  return model_from({json.value(), name});
 }
 
 Model load(const std::string& path) { return from_json(read_file(path), path); }

@@ -316,7 +316,8 @@ struct StreamJson {
 std::string to_json(const Stream& stream) { return StreamJson::text_of(*stream.state_); }
 
 Stream stream_from_json(const std::string& text, const std::string& name) {
-  const Json json = parse_json(text, name);
+  const JsonDocument document = parse_json(text, name);
+  const Json& json = document.value();
   const JsonReader root(json, name);
   if (!root.has("format") || root.member("format").as<std::string>() != stream_format_name) {
     root.fail(fmt::format("not a stream: \"format\" is not \"{}\"", stream_format_name));

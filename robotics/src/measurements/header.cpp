@@ -19,7 +19,7 @@ const Units lengths_in_mm = {{"mm", 1.0}, {"m", 1000.0}, {"um", 0.001}};
 const Units angles_in_rad = {{"rad", 1.0}, {"deg", radians}};
 
 bool is_joint(const std::string& quantity) {
-  return quantity[0] == 'q' && quantity.find_first_not_of("0123456789", 1) == std::string::npos;
+  return quantity.size() > 1 && quantity[0] == 'q' && quantity.find_first_not_of("0123456789", 1) == std::string::npos;
 }
 
 // "t2_x" -> "t2_".
@@ -62,7 +62,10 @@ Header::Header(const Csv& csv, const Robot& robot, const std::vector<std::string
     const auto mapped = map.names.find(column);
     return mapped == map.names.end() ? column : mapped->second;
   };
-  has_radii_ = std::ranges::find(csv.columns(), "sphere", name_of) != csv.columns().end();
+  std::set<std::string> names;
+  for (const std::string& column : csv.columns()) names.insert(name_of(column));
+  look_for_named_joints(names);
+  has_radii_ = names.contains("sphere");
   for (const std::string& column : csv.columns()) {
     const std::string name = name_of(column);
     if (!take_named_joint(name, column)) take(name, column);
@@ -106,6 +109,25 @@ void Header::take(const std::string& name, const std::string& column) {
   }
 }
 
+// Joints may be called q1 like the columns of joints by number. Columns are names where every joint has one.
+void Header::look_for_named_joints(const std::set<std::string>& names) {
+  const auto has_column = [&](const std::string& joint) {
+    const auto has = [&](const auto& unit) { return names.contains(joint + "_" + unit.first); };
+    return std::ranges::any_of(angles_in_rad, has) || std::ranges::any_of(lengths_in_mm, has);
+  };
+  bool by_number = true;
+  bool in_order = has_named_joints_ = true;
+  for (std::size_t j = 0; j < robot_.chain.joints.size(); ++j) {
+    const Joint& joint = robot_.chain.joints[j];
+    const std::string number = fmt::format("q{}", j + 1);
+    in_order = in_order && (!is_joint(joint.name) || joint.name == number);
+    by_number = by_number && (joint.mimic || has_column(number));
+    has_named_joints_ = has_named_joints_ && (joint.mimic || has_column(joint.name));
+  }
+  if (!has_named_joints_ || !by_number || in_order) return;
+  refuse("joints have each other's numbers as names, so that q1 means two of them: rename them in the description");
+}
+
 // "shoulder_pan_joint_rad": a joint by its name in the description, as logs of controllers have them.
 bool Header::take_named_joint(const std::string& name, const std::string& column) {
   const std::size_t bar = name.rfind('_');
@@ -115,7 +137,9 @@ bool Header::take_named_joint(const std::string& name, const std::string& column
   const std::vector<Joint>& joints = robot_.chain.joints;
   const auto joint = std::ranges::find(joints, name.substr(0, bar), &Joint::name);
   if (joint == joints.end()) return false;
-  take_quantity(fmt::format("q{}", joint - joints.begin() + 1), column, unit);
+  const std::string number = fmt::format("q{}", joint - joints.begin() + 1);
+  if (is_joint(joint->name) && joint->name != number && !has_named_joints_) return false;
+  take_quantity(number, column, unit);
   return true;
 }
 
@@ -163,7 +187,7 @@ Eigen::MatrixXd Header::joints() const {
       }
       const bool is_named = csv_.columns().front().find_first_not_of("0123456789.,+-eE") != std::string::npos;
       refuse(fmt::format("robot \"{}\" has {} joints, there is no column {} for {}; columns: {}{}", robot_.chain.name,
-                         joints.size(), spellings(name, units), joints[j].name, fmt::join(csv_.columns(), ", "),
+                         joints.size(), spellings(name, units), joints[j].name, csv_row(csv_.columns()),
                          is_named ? "" : "; the first line must hold the names of the columns"));
     }
     factors(j) = factor(name, units);

@@ -76,9 +76,11 @@ class Header {
   std::map<std::string, std::string> words_;       // "target", "socket", "plane", ... -> column
   std::vector<std::string> targets_;
   std::vector<std::string> unused_;
-  bool has_radii_ = false;  // whether `radius` has a meaning: beside a column of spheres
+  bool has_named_joints_ = false;  // every joint has a column by its name
+  bool has_radii_ = false;         // whether `radius` has a meaning: beside a column of spheres
 
   [[noreturn]] void refuse(const std::string& message) const;
+  void look_for_named_joints(const std::set<std::string>& names);
   bool take_named_joint(const std::string& name, const std::string& column);
   void take(const std::string& name, const std::string& column);
   void take_quantity(const std::string& quantity, const std::string& column, const std::string& unit);

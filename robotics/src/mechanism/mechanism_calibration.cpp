@@ -268,7 +268,11 @@ MechanismCalibration calibrate(const Mechanism& mechanism, const Eigen::MatrixXd
         fit.far.empty()
             ? fit.calibration
             : fit_branches(mechanism, fit.calibration.mechanism, measured, without(assembly, fit.far)).calibration;
-    assembly = assemble_again(start.mechanism, measured, start.configurations);
+    try {
+      assembly = assemble_again(start.mechanism, measured, start.configurations);
+    } catch (const std::invalid_argument&) {
+      break;  // readings that contradict the others have made a mechanism that its start values are far from
+    }
     if (fit.far.empty() && are_same(assembly.coordinates, fit.calibration.configurations)) break;
     Fit next = fit_branches(mechanism, start.mechanism, measured, assembly);
     if (!is_better(next.calibration, fit.calibration)) break;

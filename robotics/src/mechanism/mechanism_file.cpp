@@ -12,7 +12,10 @@
 namespace llmt::robotics {
 namespace {
 
-constexpr std::size_t most_entries = 1000;
+constexpr std::size_t most_parameters = 1000;
+constexpr std::size_t most_coordinates = 100;  // joints, and outputs
+constexpr std::size_t most_definitions = 1000;
+constexpr std::size_t most_equations = 200;
 
 // "value_mm": a quantity with its unit; "value" alone has the unit 1.
 std::string key_of(const std::string& quantity, const std::string& unit) {
@@ -78,21 +81,27 @@ Mechanism read_document(YamlMap& map) {
   Mechanism mechanism;
   mechanism.name = map.text("mechanism");
   if (map.has("parameters")) {
-    for (YamlMap& entry : map.maps("parameters", most_entries)) mechanism.parameters.push_back(read_parameter(entry));
+    for (YamlMap& entry : map.maps("parameters", most_parameters))
+      mechanism.parameters.push_back(read_parameter(entry));
   }
   for (const char* kind : {"joints", "outputs"}) {
     if (!map.has(kind)) continue;
-    for (YamlMap& entry : map.maps(kind, most_entries)) {
+    for (YamlMap& entry : map.maps(kind, most_coordinates)) {
       mechanism.coordinates.push_back(read_coordinate(entry, std::string(kind) == "outputs"));
     }
   }
   if (map.has("definitions")) {
     YamlMap definitions = map.map("definitions");
-    for (const std::string& name : definitions.keys()) {
+    const std::vector<std::string> names = definitions.keys();
+    if (names.size() > most_definitions) {
+      map.refuse("definitions",
+                 fmt::format("there are {} definitions, at most {} are possible", names.size(), most_definitions));
+    }
+    for (const std::string& name : names) {
       mechanism.definitions.push_back({.name = name, .text = definitions.text(name)});
     }
   }
-  mechanism.equations = map.texts("equations", most_entries);
+  mechanism.equations = map.texts("equations", most_equations);
   map.finish({"mechanism", "parameters", "joints", "outputs", "definitions", "equations"});
   return mechanism;
 }
@@ -123,7 +132,7 @@ void write_coordinates(YamlWriter& out, const Mechanism& mechanism, bool outputs
 
 }  // namespace
 
-Mechanism read_mechanism(const std::string& path) { return parse_mechanism(read_file(path), path); }
+Mechanism read_mechanism(const std::string& path) { return parse_mechanism(read_file(path, description_limit), path); }
 
 Mechanism parse_mechanism(const std::string& text, const std::string& name) {
   YamlMap map(parse_yaml(text, name), name, "");

@@ -71,7 +71,12 @@ MechanismTable read_mechanism_table(const std::string& path, const Mechanism& me
   MechanismTable table{.values = Eigen::MatrixXd::Constant(csv.rows(), std::ssize(mechanism.coordinates), NAN),
                        .lines = {},
                        .unused = {}};
-  const Eigen::MatrixXd read = csv.numbers_or_missing(columns);
+  // Only an empty cell is a reading that there is not: NaN is what programs write where something failed.
+  const CsvNumbers cells = csv.read_numbers(columns);
+  std::vector<Eigen::Index> bad;
+  for (const ColumnCells& column : cells.cells) bad.push_back(std::min(column.first_marked, column.first_other));
+  csv.refuse_first(columns, bad);
+  const Eigen::MatrixXd& read = cells.values;
   for (std::size_t k = 0; k < places.size(); ++k) {
     table.values.col(places[k]) = factors(places[k]) * read.col(static_cast<Eigen::Index>(k));
   }

@@ -284,6 +284,7 @@ Chain read_chain(YamlMap& map) {
 
 Robot parse_robot(const std::string& text, const std::string& name) {
   YamlMap map(parse_yaml(text, name), name, "");
+  if (map.has("mechanism")) map.refuse("mechanism", "this is a mechanism and no arm: llmt-robot mechanism reads it");
   Robot robot;
   robot.chain = read_chain(map);
   if (map.has("effects")) robot.effects = read_effects(map, robot.chain);

@@ -67,6 +67,11 @@ YAML::Node parse_yaml(const std::string& text, const std::string& file) {
   if (text.size() > most_bytes) {
     throw std::runtime_error(fmt::format("{}: {} bytes, at most {} are read", file, text.size(), most_bytes));
   }
+  if (const std::size_t zero = text.find('\0'); zero != std::string::npos) {  // yaml-cpp takes it for an escape
+    throw std::runtime_error(
+        fmt::format("{}:{}: a byte is 0", file,
+                    1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(zero), '\n')));
+  }
   try {
     std::istringstream stream(text);
     YAML::Parser parser(stream);

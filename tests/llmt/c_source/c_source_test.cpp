@@ -123,6 +123,17 @@ TEST_F(CSource, NamesOfColumnsCannotEndTheComment) {
                                         "c"},
                                        {"d"});
   run(model, Eigen::MatrixXd::Zero(1, 3));
+  const llmt::Model marked = model.named({"a\xE2\x80\xAE", "b\xE2\x81\xA6z",
+                                          "gr\xC3\xB6\xC3\x9F"
+                                          "e"},
+                                         {"d\xD8\x9Cy"});
+  const std::string source = llmt::to_c(marked, "tree", "x.h").source;
+  EXPECT_EQ(source.find("\xE2"), std::string::npos);
+  EXPECT_EQ(source.find("\xD8"), std::string::npos);
+  EXPECT_NE(source.find("b_z"), std::string::npos);
+  EXPECT_NE(source.find("gr\xC3\xB6\xC3\x9F"
+                        "e"),
+            std::string::npos);
 }
 
 }  // namespace

@@ -37,6 +37,52 @@ TEST(Csv, ReadsNumbersInFileOrder) {
   EXPECT_EQ(csv.line_of(1), 4);
 }
 
+TEST(Csv, SeparatorsOfThousandsAreReadOnRequestAlone) {
+  using llmt::Csv;
+  using llmt::DecimalMark;
+  const std::string text = "a;b\n\"1,234\";-12,345,678.5\n7;0.5\n";
+  const Csv strict = Csv::parse(text, "t.csv");
+  const llmt::CsvNumbers cells = strict.read_numbers(strict.columns());
+  EXPECT_EQ(cells.cells[0].other_mark, 1);  // 1.234 with a decimal comma
+  EXPECT_EQ(cells.cells[0].thousands, 0);
+  EXPECT_EQ(cells.cells[1].thousands, 1);
+  EXPECT_EQ(error_in(text),
+            "t.csv:2: column \"a\": '1,234' has a comma, which may be a separator of thousands or a decimal comma");
+  EXPECT_EQ(error_in("a;b\n1;1,234.5\n"), "t.csv:2: column \"b\": '1,234.5' has separators of thousands");
+  for (const char* decimal : {"0,123", "1,5", "12,34", "1234,567", ",123", "1,234e3"}) {
+    EXPECT_NE(error_in("a;b\n1;" + std::string(decimal) + "\n").find("has a decimal comma, and"), std::string::npos)
+        << decimal;
+  }
+  for (const char* word : {"1,23,456", "1,234,56", "1,234.5.6"}) {
+    EXPECT_NE(error_in("a;b\n1;" + std::string(word) + "\n").find("is not a number"), std::string::npos) << word;
+  }
+  Csv read = Csv::parse(text, "t.csv");
+  read.read_thousands();
+  Eigen::MatrixXd expected(2, 2);
+  expected << 1234.0, -12345678.5, 7.0, 0.5;
+  EXPECT_EQ(read.numbers(read.columns()), expected);
+  Csv comma = Csv::parse("a;b\n1.234,5;2\n", "t.csv", DecimalMark::comma);
+  comma.read_thousands();
+  EXPECT_EQ(comma.numbers("a")(0), 1234.5);
+}
+
+TEST(Csv, AFirstLineThatIsNoHeaderIsSaid) {
+  EXPECT_EQ(error_in("sep=;\na;b\n1;2\n").find("t.csv:1: a line that names the separator"), 0U);
+  EXPECT_EQ(
+      error_in("# hello\na,b\n1,2\n"),
+      "t.csv:2: the row has 2 fields, the header has 1; the first line must be the header, delete comments above it");
+  EXPECT_EQ(error_in("#a,b\n1,2\n"), "no error");
+  EXPECT_EQ(error_in("a,b\r1,2\r3,4\r").find("t.csv:1: lines end with CR alone"), 0U);
+  EXPECT_EQ(error_in("a,b\r\r\n1,2\r\r\n"), "no error");
+  EXPECT_EQ(error_in("a,b\f1,2\f3,4").find("t.csv:1: lines end with a form feed"), 0U);
+  EXPECT_EQ(error_in("a,b\xE2\x80\xA8"
+                     "1,2")
+                .find("t.csv:1: lines end with a form feed or a separator of Unicode"),
+            0U);
+  EXPECT_EQ(error_in("\"a,b\n1,2\n3,4\n").find("t.csv:1: a quote is left open"), 0U);
+  EXPECT_EQ(llmt::Csv::parse("\"a\r\nb\",c\n1,2\n", "t.csv").columns().front(), "a\r\nb");
+}
+
 TEST(Csv, NumbersAreCorrectlyRounded) {
   const llmt::Csv csv = llmt::Csv::parse("a\n0.1\n1.7976931348623157e308\n5e-324\n9007199254740993\n", "t.csv");
   EXPECT_EQ(csv.numbers("a"), Eigen::Vector4d(0.1, 1.7976931348623157e308, 5e-324, 9007199254740992.0));

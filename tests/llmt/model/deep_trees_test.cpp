@@ -1,4 +1,4 @@
-// Trees that are deeper than any that a fit is likely to make, as a file may hold them.
+// Trees as deep as a file may hold them, deeper than any that a fit is likely to make.
 #include <gtest/gtest.h>
 
 #include <Eigen/Core>
@@ -8,14 +8,22 @@
 #include "oracles/chains.hpp"
 #include "oracles/oracles.hpp"
 #include "oracles/predict_oracle.hpp"
+#include "oracles/thrown.hpp"
 
 namespace {
 
 using llmt::ValidityKind;
 using oracle::Way;
 
-// More than functions that called themselves for every level could do.
-constexpr int chain_length = 50'000;
+constexpr int chain_length = 2001;  // leaves below 2000 splits
+
+TEST(DeepTrees, AChainThatIsDeeperIsRefused) {
+  const auto error = [](Way way) {
+    return oracle::thrown([&] { oracle::chain(chain_length + 1, ValidityKind::crisp, 0.0, way); });
+  };
+  EXPECT_EQ(error(Way::left), "llmt::Model: partition 0 node 4001: the tree is deeper than 2000 splits");
+  EXPECT_EQ(error(Way::right), error(Way::left));
+}
 
 TEST(DeepTrees, AChainOfCrispLeavesIsRead) {
   for (const Way way : {Way::left, Way::right}) {
@@ -31,9 +39,9 @@ TEST(DeepTrees, AChainOfCrispLeavesIsRead) {
   }
 }
 
-TEST(DeepTrees, AChainOfLeavesThatAllOverlapTakesTimeInProportionToItsLength) {
+TEST(DeepTrees, AChainOfLeavesThatAllOverlapIsRead) {
   for (const Way way : {Way::left, Way::right}) {
-    const llmt::Model model = oracle::chain(20'000, ValidityKind::blend, 100.0, way);
+    const llmt::Model model = oracle::chain(chain_length, ValidityKind::blend, 100.0, way);
     const Eigen::MatrixXd x = oracle::uniform(30, 2, 2);
     const Eigen::MatrixXd predicted = model.predict(x);
     EXPECT_TRUE(predicted.allFinite());

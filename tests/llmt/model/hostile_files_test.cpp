@@ -105,6 +105,35 @@ TEST(HostileFiles, GaussiansNeedAWidth) {
   }
 }
 
+TEST(HostileFiles, AFileThatContradictsItselfIsRefused) {
+  for (const Nonsense& each : {
+           Nonsense{"split", "input", "\"kind\"",
+                    "m.json: /partitions/0/nodes/0/split/input: column 0 has the name \"a\""},
+           Nonsense{"split", "half_width", "1e300",
+                    "m.json: /partitions/0/nodes/0: half_width is 1e+300, with the width"},
+           Nonsense{"validity", "kind", "\"crisp\"", "m.json: /partitions/0/nodes/0: half_width is "},
+           Nonsense{"inverse_gram", "inverse_gram", "[0, 0, 0, 0, 0, 0, 0, 0, 0, 0]", "inverse_gram is no inverse"},
+           Nonsense{"inverse_gram", "inverse_gram", "[-1, -1, -1, -1, -1, -1, -1, -1, -1, -1]",
+                    "inverse_gram is no inverse"},
+           Nonsense{"inverse_gram", "inverse_gram", "[1, 1.1, 1, 0, 0, 1, 0, 0, 0, 1]", "inverse_gram is no inverse"},
+       }) {
+    const std::string error = refusal_of(with(each.after, each.key, each.value));
+    EXPECT_NE(error.find(each.message), std::string::npos) << each.value << ": " << error;
+  }
+  EXPECT_EQ(refusal_of(with("inverse_gram", "inverse_gram", "[1, 1, 1, 0, 0, 1, 0, 0, 0, 1]")), "nothing was thrown");
+}
+
+TEST(HostileFiles, LevelsAreAsManyAsATableMayHave) {
+  llmt::InputColumn input{.name = "kind", .low = 0.0, .high = 1.0, .centre = 0.5};
+  for (int k = 0; k < llmt::most_categories; ++k) input.levels.push_back(std::to_string(k));
+  const auto error = [&] {
+    return oracle::thrown([&] { llmt::Model({input}, {{.name = "y", .low = 0.0, .high = 1.0}}, {}, {}); });
+  };
+  EXPECT_EQ(error().find("levels"), std::string::npos) << error();
+  input.levels.push_back("one more");
+  EXPECT_EQ(error(), "llmt::Model: input 0: \"kind\": 10001 levels, at most 10000 are possible");
+}
+
 TEST(HostileFiles, NamesAreUnique) {
   EXPECT_EQ(refusal_of(with("centre", "name", "\"a\"")), "m.json: /inputs/1: two inputs have the name \"a\"");
   EXPECT_EQ(refusal_of(with("outputs", "name", "\"v\"")), "m.json: /outputs/1: two outputs have the name \"v\"");

@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "llmt/robotics/measurements.hpp"
@@ -95,6 +96,24 @@ TEST(MeasurementFile, WritingAndReadingKeepsEveryBit) {
   EXPECT_EQ(again.positions_mm, m.positions_mm);
   EXPECT_EQ(again.poses.covariates, m.poses.covariates);
   EXPECT_EQ(again.orientation.values, m.orientation.values);
+}
+
+// Names like those of the columns by number: what is written is read, and what may mean two joints is refused.
+TEST(MeasurementFile, JointsMayBeCalledByNumbersOfOthers) {
+  for (const auto& [first, second] : {std::pair("joint", "q1"), {"q0", "q1"}, {"q2", "q3"}}) {
+    Robot robot = two();
+    robot.chain.joints[0].name = first;
+    robot.chain.joints[1].name = second;
+    const Measurements written = simulate(robot, {.poses = 5, .seed = 3});
+    EXPECT_EQ(parse_measurements(to_csv(written, robot), "m.csv", robot).poses.joints, written.poses.joints) << first;
+    const std::string by_name = fmt::format("{}_deg,{}_mm,x_mm,y_mm,z_mm\n180,7,1,2,3\n", first, second);
+    EXPECT_EQ(parse_measurements(by_name, "m.csv", robot).poses.joints(0, 1), 7.0) << first;
+  }
+  Robot exchanged = two();
+  exchanged.chain.joints[0].name = "q2";
+  exchanged.chain.joints[1].name = "q1";
+  EXPECT_THROW(parse_measurements(to_csv(simulate(exchanged, {.poses = 5}), exchanged), "m.csv", exchanged),
+               std::runtime_error);
 }
 
 TEST(Simulation, PosesKeepTheLimitsAndNoiseHasItsSize) {

@@ -208,6 +208,23 @@ void expect_file_refused(const std::string& text, const std::string& words) {
   }
 }
 
+TEST(MechanismFile, WhatIsLargeIsRefused) {
+  const auto refusal = [](const std::string& more) {
+    try {
+      parse_mechanism("mechanism: m\njoints: [{name: q, start_deg: 60}]\nequations: [q = 1]\n" + more, "m.yaml");
+    } catch (const std::runtime_error& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  std::string definitions = "definitions:\n";
+  std::string outputs = "outputs:\n";
+  for (int i = 0; i < 1001; ++i) definitions += "  d" + std::to_string(i) + ": q\n";
+  for (int i = 0; i < 101; ++i) outputs += "  - {name: x" + std::to_string(i) + ", start_mm: 1}\n";
+  EXPECT_EQ(refusal(definitions), "m.yaml:5: there are 1001 definitions, at most 1000 are possible");
+  EXPECT_NE(refusal(outputs).find("100"), std::string::npos) << refusal(outputs);
+}
+
 TEST(MechanismFile, MistakesAreRefusedWithTheirLine) {
   expect_file_refused("joints: []\n", "m.yaml:1: key \"mechanism\" is missing");
   const std::string begin = "mechanism: m\njoints:\n";

@@ -209,6 +209,92 @@ TEST(Urdf, WhatIsNoArmIsRefusedByName) {
   says(message(deep), "nested deeper");
 }
 
+std::string joined(const std::string& more) {
+  return robot("<link name=\"r\"/><link name=\"s\"/>\n" + joint("j", "revolute", "r", "s") + more);
+}
+
+TEST(Urdf, LinksThatAreNoTreeAreRefused) {
+  const std::string two = "<link name=\"a\"/><link name=\"b\"/>";
+  const std::string loop = joint("k", "revolute", "a", "b") + joint("l", "revolute", "b", "a");
+  EXPECT_EQ(message(joined(two + loop)), "arm.urdf: links \"a\", \"b\" form a loop");
+  EXPECT_EQ(message(joined(two + loop), {.base = "", .tip = "a"}), "arm.urdf: links \"a\", \"b\" form a loop");
+  EXPECT_EQ(message(joined(two + loop + "<link name=\"c\"/>" + joint("m", "fixed", "b", "c"))),
+            "arm.urdf: links \"a\", \"b\" form a loop");
+  EXPECT_EQ(message(joined("<link name=\"a\"/>" + joint("k", "fixed", "a", "a"))),
+            "arm.urdf: joint \"k\" makes link \"a\" its own child");
+  EXPECT_EQ(message(joined(two + joint("k", "fixed", "s", "a") + joint("l", "fixed", "s", "b") +
+                           joint("m", "fixed", "a", "b"))),
+            "arm.urdf: link \"b\" has two parents: joints \"l\" and \"m\"");
+}
+
+// In descending names the last link is destroyed last, and within it all others.
+TEST(Urdf, AsManyLinksAsAreTakenCostNoStackAndMoreAreRefused) {
+  const auto chain = [](int links, const std::string& end) {
+    std::string text = "<link name=\"r\"/>" + joint("j", "revolute", "r", "k99999");
+    for (int k = 0; k < links - 1; ++k) {
+      text += fmt::format("<link name=\"k{}\"/>", 99999 - k);
+      if (k > 0)
+        text += joint(fmt::format("f{}", k), "fixed", fmt::format("k{}", 100000 - k), fmt::format("k{}", 99999 - k));
+    }
+    return robot(text + end);
+  };
+  EXPECT_EQ(message(chain(5000, "")), "");
+  EXPECT_NE(message(chain(5000, joint("bad", "fixed", "r", "nothing"))).find("[nothing]"), std::string::npos);
+  EXPECT_NE(message(chain(5001, "")).find("there are more than 5000 links"), std::string::npos);
+}
+
+TEST(Urdf, DepthThatIsHiddenFromSimpleCountsIsRefused) {
+  const auto deep = [](const std::string& begin, const std::string& end) {
+    std::string text = "<robot name=\"r\">\n";
+    for (int k = 0; k < 60000; ++k) text += begin;
+    for (int k = 0; k < 60000; ++k) text += end;
+    return message(text + "</robot>");
+  };
+  for (const std::string begin :
+       {"<a>", "<a x=\"/>\">", "<!-- </a> --><a>", "<a><!-- </a></b> -->", "<a><![CDATA[ </a></b> ]]>", "<a><?p?>"}) {
+    EXPECT_NE(deep(begin, "</a>").find("nested deeper than 100"), std::string::npos) << begin;
+    EXPECT_NE(deep(begin, "").find("nested deeper than 100"), std::string::npos) << begin;
+  }
+  EXPECT_NE(deep("<?p ><a> ?>", "").find("a processing instruction holds < or >"), std::string::npos);
+  EXPECT_NE(deep("<a/><a/><a/>", "<b/><b/><!---->").find("more than 300000 elements"), std::string::npos);
+  const std::string type = "<!DOCTYPE r [<!ENTITY a \"<a><a><a>\">]>";
+  EXPECT_EQ(message(type + joined("")), "arm.urdf:1:13: a document type and entities are not for a URDF");
+}
+
+TEST(Urdf, BytesThatAreNoUtf8AreRefused) {
+  EXPECT_EQ(message(joined("<link name=\"gr\xF6\xDF"
+                           "e\"/>"))
+                .find("arm.urdf:4:"),
+            0U);
+  EXPECT_EQ(message("\xFF\xFE<\0r\0"), "arm.urdf: this is UTF-16, UTF-8 is needed");
+}
+
+// urdfdom takes such a mass for 0 and says so only to a log.
+TEST(Urdf, MassesThatAreNoNumbersAreRefused) {
+  for (const char* value : {"nan", "inf", "1e400", "", "heavy"}) {
+    std::string text = joined("");
+    const std::string body = fmt::format(
+        "<link name=\"s\"><inertial><mass value=\"{}\"/><inertia ixx=\"1\" ixy=\"0\" ixz=\"0\" iyy=\"1\" "
+        "iyz=\"0\" izz=\"1\"/></inertial></link>",
+        value);
+    text.replace(text.find("<link name=\"s\"/>"), 16, body);
+    EXPECT_EQ(message(text).find("arm.urdf: link \"s\": the mass cannot be read: "), 0U) << message(text);
+  }
+}
+
+TEST(Urdf, LimitsThatAreExchangedOrEqualAreRefused) {
+  const auto limited = [](const std::string& limits) {
+    std::string text = joined("");
+    const std::string usual = "lower=\"-1\" upper=\"2\"";
+    return message(text.replace(text.find(usual), usual.size(), limits));
+  };
+  EXPECT_EQ(
+      limited("lower=\"2\" upper=\"-2\""),
+      "arm.urdf: joint \"j\" has the lower limit 2 and the upper limit -2: the lower one must be below the upper one");
+  EXPECT_NE(limited("lower=\"1\" upper=\"1\""), "");
+  EXPECT_EQ(limited("lower=\"0\" upper=\"0\""), "");
+}
+
 TEST(Urdf, LimitsAreKeptAndContinuousJointsHaveNone) {
   const Chain chain = parse_urdf(
       robot("<link name=\"a\"/><link name=\"b\"/><link name=\"c\"/><link name=\"d\"/>\n" +

@@ -28,9 +28,12 @@ bool is_urdf(const std::string& path);
 /// branches such as fingers included, at zero. Limits and mimics are kept; a continuous joint has no limits. Meshes,
 /// transmissions, friction and inertias about the centres of mass do not matter.
 ///
-/// Throws std::runtime_error `name:line:column: ...` for text that is no XML, and `name: ...` with what is wrong for
-/// XML that is no URDF, for links that do not exist or are not joined, several candidates for the tip (all are listed),
-/// joints that are planar or floating or mimic one that is not between the links, and axes of length 0.
+/// Throws std::runtime_error `name:line:column: ...` for text that is no XML in UTF-8, has a document type, is nested
+/// deeper than 100 elements, or has more than 5000 links or 300 000 elements and comments; and `name: ...` with what is
+/// wrong for XML that is no URDF, for links that do not exist or are not joined, have two parents or form a loop,
+/// several candidates for the tip (all are listed), more than 100 joints that move, joints that are planar or floating
+/// or mimic one that is not between the links, axes of length 0, masses that are no finite number, and a lower limit
+/// that is not below the upper one. Limits of 0 and 0 are none, as programs write them that know no limits.
 Chain parse_urdf(const std::string& text, const std::string& name, const UrdfLinks& links = {});
 
 /// Reads a file; throws as parse_urdf().

@@ -57,6 +57,11 @@ struct MechanismErrors {
 /// Errors of the mechanism as it is described. NaN at a pose that it cannot take. Throws as calibrate().
 MechanismErrors errors_of(const Mechanism& mechanism, const Eigen::MatrixXd& measured);
 
+/// The poses whose readings contradict those of the others, ascending. Their error, see errors_of(), is beyond six
+/// times the scale of its column, median |error| / 0.6745, at the parameters that the other poses tell: calibration
+/// without them and this choice are repeated until the same poses are left out. Throws as errors_of().
+std::vector<Eigen::Index> contradicting_poses(const Mechanism& mechanism, const Eigen::MatrixXd& measured);
+
 /// Errors at poses that took no part in the calibration: each fold is calibrated without its held-out poses. Throws as
 /// calibrate() and make_folds().
 MechanismErrors held_out_errors(const Mechanism& mechanism, const Eigen::MatrixXd& measured, const FoldOptions& folds);

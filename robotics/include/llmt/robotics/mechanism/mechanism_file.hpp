@@ -31,7 +31,8 @@ namespace llmt::robotics {
 ///       - r*c = x
 ///
 /// Throws std::runtime_error `path:line: where: what` for a file that cannot be read or is no YAML, for unknown,
-/// repeated or missing keys, and for whatever validate(Mechanism) refuses.
+/// repeated or missing keys, for more than 16 MiB, 1000 parameters or definitions, 100 joints or outputs, or 200
+/// equations, and for whatever validate(Mechanism) refuses.
 Mechanism read_mechanism(const std::string& path);
 
 /// As read_mechanism(), from memory; `name` stands for the path in messages.
@@ -53,7 +54,8 @@ struct MechanismTable {
 /// Reads a table whose columns are coordinates with their units: q_deg or q_rad, x_mm, x_m or x_um, a plain name for a
 /// coordinate of unit 1. A coordinate without a column and an empty cell are not measured.
 ///
-/// Throws std::runtime_error as Csv::read(), and with path, line and column for cells that are no numbers, for a column
+/// Throws std::runtime_error as Csv::read(), and with path, line and column for cells that are no numbers (nan and NA,
+/// which programs write where something failed, among them), for a column
 /// of a coordinate with a wrong unit or none, for two columns of one coordinate, and if there is no pose or no
 /// coordinate.
 MechanismTable read_mechanism_table(const std::string& path, const Mechanism& mechanism,

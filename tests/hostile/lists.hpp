@@ -1,0 +1,16 @@
+// The lists of inputs of unknown origin, one function each.
+#pragma once
+
+#include "hostile/run.hpp"
+
+namespace hostile {
+
+void ask_urdfs(List& list, const std::string& robot_program);
+void ask_mechanisms(List& list, const std::string& robot_program);
+void ask_models(List& list, const std::string& program);
+void ask_names(List& list, const std::string& program);
+
+/// Measures the largest inputs that are permitted, without limits.
+void ask_largest(List& list, const std::string& program, const std::string& robot_program);
+
+}  // namespace hostile
