@@ -269,7 +269,13 @@ void add_discover(CLI::App& app) {
       ->needs("--terms");
   add_names(*command, "--allow", arguments->adjusted, "offset|scale",
             "What the simulation may adjust before anything counts as missing")
-      ->check(CLI::IsMember({"offset", "scale"}));
+      ->check([](const std::string& text) {
+        const CLI::IsMember adjustable({"offset", "scale"});
+        for (const std::string& name : names_in(text)) {
+          if (std::string refusal = adjustable(name); !refusal.empty()) return refusal;
+        }
+        return std::string();
+      });
   add_number(*command, "--held-out", arguments->options.held_out_share, share_set_aside,
              "Share of the rows set aside for verification")
       ->capture_default_str();
