@@ -124,8 +124,10 @@ std::vector<BeyondPlausible> beyond_plausible(const Investigation& investigation
       beyond.parameter = {own[k].name, value, own[k].unit, 0.0};
       beyond.limit = value > limits.upper(i) ? limits.upper(i) : limits.lower(i);
     }
-    // A limit of 0 is one of the sign: a negative stiffness is not a size.
-    if (farthest == 0.0 || beyond.limit == 0.0) return;
+    // A limit of 0 is one of the sign: a negative stiffness is not a size. A value ten plausible ranges away is no size
+    // either: other effects cancel it, and it explains nothing alone.
+    constexpr double most_ranges = 10.0;
+    if (farthest == 0.0 || farthest > most_ranges || beyond.limit == 0.0) return;
     beyond.title = type.title;
     beyond.effect = std::move(effect);
     all.push_back(std::move(beyond));
