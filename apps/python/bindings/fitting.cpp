@@ -1,0 +1,208 @@
+#include <nanobind/nanobind.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
+#include <nanobind/stl/unique_ptr.h>
+#include <nanobind/stl/vector.h>
+
+#include <memory>
+#include <numeric>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "llmt/fit.hpp"
+#include "llmt/outliers.hpp"
+#include "llmt/readable.hpp"
+#include "llmt/stream.hpp"
+#include "python/bindings/arrays.hpp"
+#include "python/bindings/interruptible.hpp"
+#include "python/bindings/module.hpp"
+#include "python/bindings/options.hpp"
+#include "report/document/page.hpp"
+#include "report/fit/fit_summary.hpp"
+#include "report/fit/of_fit.hpp"
+#include "report/fit/readable_summary.hpp"
+#include "report/table/named_inputs.hpp"
+
+namespace llmt::python {
+namespace {
+
+constexpr double preparing_share = 0.05;
+constexpr double readable_share = 0.4;
+
+// A fit with all that reports need of it.
+class Fit {
+ public:
+  Fit(TrainingData data, const FitOptions& options, std::optional<double> readable_loss, const nb::object& report)
+      : options_(options), loss_(readable_loss.value_or(0.15)) {
+    if (const std::string why = readable_loss ? why_not_readable(options) : ""; !why.empty()) {
+      throw std::invalid_argument("a readable tree does not go with " + why);
+    }
+    const auto shared = std::make_shared<const TrainingData>(std::move(data));
+    interruptible(
+        [&](const Progress& progress) {
+          Work work(progress);
+          Work preparing(work, preparing_share);
+          prepared_.emplace(shared, options_, preparing.progress());
+          Work fitting(work, work.left() - (readable_loss ? readable_share : 0.0));
+          result_.emplace(fit(*prepared_, fitting.progress()));
+          if (!readable_loss) return;
+          Work reading(work, work.left());
+          readable_ = fit_readable(*prepared_, result_->summary, loss_, reading.progress());
+        },
+        report);
+  }
+
+  std::string model() const { return to_json(result_->model, result_->intervals); }
+  std::optional<std::string> readable() const {
+    return readable_ ? std::optional(to_json(readable_->model, readable_->intervals)) : std::nullopt;
+  }
+
+  std::string summary(const std::string& data) const {
+    report::Json summary = report::fit_json(run(data), *result_);
+    if (readable_) summary["readable"] = report::readable_json(*readable_);
+    return summary.dump();
+  }
+
+  std::string text(const std::string& data, std::size_t width) const {
+    std::string text = report::fit_text(run(data), *result_, width);
+    if (readable_) text += report::readable_text(*result_, *readable_, loss_, width);
+    return text;
+  }
+
+  std::vector<std::vector<Eigen::Index>> held_out() const { return result_->summary.held_out; }
+  std::vector<double> loss_weights() const {
+    return {result_->summary.loss_weights.begin(), result_->summary.loss_weights.end()};
+  }
+
+  // The page of `llmt fit --report`; empty where the module was built without it.
+  std::string page(const std::string& data, const std::string& origin) {
+    const bool has_folds = result_->summary.partitions.front().cv_folds > 0;
+    if (report::empty_page().empty()) return "";
+    if (!readable_ && has_folds && why_not_readable(options_).empty()) {
+      const nb::gil_scoped_release unlocked;
+      readable_ = fit_readable(*prepared_, result_->summary);
+    }
+    const TrainingData& rows = prepared_->data();
+    return report::filled_page(report::empty_page(),
+                               report::fit_report({data, rows.inputs, rows.outputs, options_, *result_, readable_, 0}),
+                               origin);
+  }
+
+  std::string document(const std::string& data) const {
+    const TrainingData& rows = prepared_->data();
+    return report::to_json(report::fit_report({data, rows.inputs, rows.outputs, options_, *result_, readable_, 0}))
+        .dump();
+  }
+
+ private:
+  report::FitRun run(const std::string& data) const {
+    if (lines_.empty()) {
+      lines_.resize(prepared_->data().inputs.rows());
+      std::iota(lines_.begin(), lines_.end(), Eigen::Index{0});
+    }
+    return {data, options_, prepared_->data(), lines_, ""};
+  }
+
+  FitOptions options_;
+  double loss_;
+  std::optional<PreparedFit> prepared_;
+  std::optional<FitResult> result_;
+  std::optional<ReadableResult> readable_;
+  mutable std::vector<Eigen::Index> lines_;  // of the rows, counted from 0
+};
+
+std::unique_ptr<Fit> fit_table(const Array& inputs, const Array& outputs, const nb::dict& options,
+                               std::vector<std::string> input_names, std::vector<std::string> output_names,
+                               std::vector<std::vector<std::string>> levels, const std::optional<Vector>& weights,
+                               const std::optional<Vector>& groups, bool may_have_codes,
+                               std::optional<double> readable_loss, const nb::object& report) {
+  TrainingData data{.inputs = rows_of(inputs), .outputs = rows_of(outputs)};
+  if (weights) data.weights = vector_of(*weights);
+  if (groups) {
+    const Eigen::VectorXd labels = vector_of(*groups);
+    data.groups.assign(labels.begin(), labels.end());
+  }
+  data.levels = std::move(levels);
+  data.may_have_codes = may_have_codes;
+  data.input_names = std::move(input_names);
+  data.output_names = std::move(output_names);
+  return std::make_unique<Fit>(std::move(data), options_of(options), readable_loss, report);
+}
+
+// Inputs that look as if nobody meant them: (kind, position, unit).
+std::vector<std::tuple<std::string, int, std::string>> accidental(const Array& inputs,
+                                                                  std::vector<std::vector<std::string>> levels) {
+  using Kind = report::AccidentalInput::Kind;
+  report::InputColumns columns{.values = rows_of(inputs), .levels = std::move(levels), .categorical = {}};
+  for (int j = 0; j < static_cast<int>(columns.levels.size()); ++j) {
+    if (!columns.levels[j].empty()) columns.categorical.push_back(j);
+  }
+  std::vector<std::tuple<std::string, int, std::string>> found;
+  for (const report::AccidentalInput& input : report::accidental_inputs(columns)) {
+    const char* kind = input.kind == Kind::words   ? "words"
+                       : input.kind == Kind::dates ? "dates"
+                       : input.kind == Kind::unit  ? "unit"
+                                                   : "row_numbers";
+    found.emplace_back(kind, input.input, input.unit);
+  }
+  return found;
+}
+
+std::tuple<std::vector<Eigen::Index>, double, bool> dominant(const Vector& output) {
+  const DominantRows found = dominant_rows(vector_of(output));
+  return {found.rows, found.share, found.hide_the_others};
+}
+
+void add_stream(nb::module_& module) {
+  nb::class_<Stream>(module, "Stream", "A tree that learns from rows as they come.")
+      .def(nb::new_([](Eigen::Index inputs, Eigen::Index outputs, const nb::dict& options) {
+        return Stream(inputs, outputs, stream_options_of(options));
+      }))
+      .def_static("from_json", [](const std::string& text) { return stream_from_json(text); })
+      .def("to_json", [](const Stream& self) { return to_json(self); })
+      .def(
+          "add",
+          [](Stream& self, const Array& inputs, const Array& outputs, const std::optional<Vector>& weights) {
+            const Eigen::MatrixXd x = rows_of(inputs);
+            const Eigen::MatrixXd y = rows_of(outputs);
+            const Eigen::VectorXd w = weights ? vector_of(*weights) : Eigen::VectorXd();
+            const nb::gil_scoped_release unlocked;
+            self.add(x, y, w);
+          },
+          nb::arg("inputs"), nb::arg("outputs"), nb::arg("weights") = nb::none())
+      .def("rows", [](const Stream& self) { return self.counts().rows; })
+      .def("prequential_rmse",
+           [](const Stream& self) {
+             const Eigen::VectorXd rmse = self.prequential_rmse();
+             return std::vector<double>(rmse.begin(), rmse.end());
+           })
+      .def("model",
+           [](const Stream& self, const std::vector<std::string>& inputs, const std::vector<std::string>& outputs) {
+             return to_json(self.snapshot().named(inputs, outputs));
+           });
+}
+
+}  // namespace
+
+void add_fitting(nb::module_& module) {
+  nb::class_<Fit>(module, "Fit", "A fit with all that reports need of it.")
+      .def("model", &Fit::model)
+      .def("readable", &Fit::readable)
+      .def("summary", &Fit::summary, nb::arg("data"))
+      .def("text", &Fit::text, nb::arg("data"), nb::arg("width"))
+      .def("held_out", &Fit::held_out)
+      .def("loss_weights", &Fit::loss_weights)
+      .def("page", &Fit::page, nb::arg("data"), nb::arg("origin"))
+      .def("document", &Fit::document, nb::arg("data"));
+  module.def("fit", &fit_table, nb::arg("inputs"), nb::arg("outputs"), nb::arg("options"), nb::kw_only(),
+             nb::arg("input_names"), nb::arg("output_names"), nb::arg("levels"), nb::arg("weights") = nb::none(),
+             nb::arg("groups") = nb::none(), nb::arg("may_have_codes") = true, nb::arg("readable_loss") = nb::none(),
+             nb::arg("report") = nb::none());
+  module.def("accidental_inputs", &accidental, nb::arg("inputs"), nb::arg("levels"));
+  module.def("dominant_rows", &dominant, nb::arg("output"));
+  add_stream(module);
+}
+
+}  // namespace llmt::python

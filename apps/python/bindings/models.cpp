@@ -1,0 +1,193 @@
+#include <nanobind/nanobind.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
+#include <nanobind/stl/vector.h>
+
+#include <algorithm>
+#include <functional>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "llmt/c_source.hpp"
+#include "llmt/explain.hpp"
+#include "llmt/intervals.hpp"
+#include "llmt/model.hpp"
+#include "python/bindings/arrays.hpp"
+#include "python/bindings/interruptible.hpp"
+#include "python/bindings/module.hpp"
+#include "report/model/leaves.hpp"
+#include "report/model/rules.hpp"
+
+namespace llmt::python {
+namespace {
+
+// Rows that are copied and predicted at a time; signals are looked for in between.
+constexpr Eigen::Index block_rows = 100000;
+constexpr Eigen::Index explained_rows = 200;
+
+// Calls `use(first, block)` for blocks of rows, without the interpreter's lock.
+void for_blocks(const Array& inputs, Eigen::Index rows_at_a_time,
+                const std::function<void(Eigen::Index first, const Eigen::MatrixXd& block)>& use) {
+  const Rows rows = rows_of(inputs);
+  Eigen::Index first = 0;
+  do {
+    const Eigen::Index count = std::min(rows_at_a_time, rows.rows() - first);
+    {
+      const nb::gil_scoped_release unlocked;
+      use(first, rows.middleRows(first, count));
+    }
+    check_signals();
+    first += count;
+  } while (first < rows.rows());
+}
+
+template <class Scalar>
+using Matrix = Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic>;
+
+// The blocks' results below each other.
+template <class Scalar>
+nb::ndarray<nb::numpy, Scalar, nb::ndim<2>> stacked(
+    const Array& inputs, Eigen::Index columns, const std::function<Matrix<Scalar>(const Eigen::MatrixXd& block)>& of) {
+  Matrix<Scalar> result(static_cast<Eigen::Index>(inputs.shape(0)), columns);
+  for_blocks(inputs, block_rows, [&](Eigen::Index first, const Eigen::MatrixXd& block) {
+    result.middleRows(first, block.rows()) = of(block);
+  });
+  return array_of<Scalar>(std::move(result));
+}
+
+auto predict(const ModelWithIntervals& self, const Array& inputs, int threads) {
+  return stacked<double>(inputs, self.model.num_outputs(),
+                         [&](const Eigen::MatrixXd& block) { return self.model.predict(block, threads); });
+}
+
+auto standard_errors(const ModelWithIntervals& self, const Array& inputs, int threads) {
+  return stacked<double>(inputs, self.model.num_outputs(),
+                         [&](const Eigen::MatrixXd& block) { return self.model.standard_errors(block, threads); });
+}
+
+auto leaf_of(const ModelWithIntervals& self, const Array& inputs, int threads) {
+  return stacked<int>(inputs, std::ssize(self.model.partitions()),
+                      [&](const Eigen::MatrixXd& block) { return self.model.leaf_of(block, threads); });
+}
+
+auto validities(const ModelWithIntervals& self, const Array& inputs, Eigen::Index partition, int threads) {
+  return stacked<double>(inputs, std::ssize(self.model.leaves(partition)), [&](const Eigen::MatrixXd& block) {
+    return self.model.validities(block, partition, threads);
+  });
+}
+
+// Distance and leverage.
+auto extrapolation(const ModelWithIntervals& self, const Array& inputs, int threads) {
+  return stacked<double>(inputs, 2, [&](const Eigen::MatrixXd& block) {
+    const std::vector<Extrapolation> found = self.model.extrapolation(block, threads);
+    Eigen::MatrixXd result(block.rows(), 2);
+    for (Eigen::Index row = 0; row < block.rows(); ++row) {
+      result(row, 0) = found[row].distance;
+      result(row, 1) = found[row].leverage;
+    }
+    return result;
+  });
+}
+
+auto intervals(const ModelWithIntervals& self, const Array& inputs, double level, int threads) {
+  const Eigen::Index rows = static_cast<Eigen::Index>(inputs.shape(0));
+  Bounds bounds{Eigen::MatrixXd(rows, self.model.num_outputs()), Eigen::MatrixXd(rows, self.model.num_outputs())};
+  for_blocks(inputs, block_rows / 10, [&](Eigen::Index first, const Eigen::MatrixXd& block) {
+    const Bounds part = self.intervals.predict(block, level, threads);
+    bounds.lower.middleRows(first, block.rows()) = part.lower;
+    bounds.upper.middleRows(first, block.rows()) = part.upper;
+    for (const Eigen::Index row : part.uncalibrated) bounds.uncalibrated.push_back(first + row);
+  });
+  return std::make_tuple(array_of<double>(std::move(bounds.lower)), array_of<double>(std::move(bounds.upper)),
+                         bounds.uncalibrated);
+}
+
+// Contributions of all rows, one matrix (rows x inputs) for each output, and the prediction at the reference.
+auto attribute_rows(const ModelWithIntervals& self, const Array& inputs) {
+  const Model& model = self.model;
+  std::vector<Eigen::MatrixXd> contributions(
+      model.num_outputs(), Eigen::MatrixXd(static_cast<Eigen::Index>(inputs.shape(0)), model.num_inputs()));
+  const Eigen::VectorXd reference = reference_point(model);
+  for_blocks(inputs, explained_rows, [&](Eigen::Index first, const Eigen::MatrixXd& block) {
+    for (Eigen::Index row = 0; row < block.rows(); ++row) {
+      const Attribution found = attribute(model, block.row(row).transpose(), reference);
+      for (Eigen::Index o = 0; o < model.num_outputs(); ++o)
+        contributions[o].row(first + row) = found.contributions.row(o);
+    }
+  });
+  std::vector<nb::ndarray<nb::numpy, double, nb::ndim<2>>> arrays;
+  for (Eigen::MatrixXd& matrix : contributions) arrays.push_back(array_of<double>(std::move(matrix)));
+  const Eigen::MatrixXd base = model.predict(reference.transpose());
+  return std::make_tuple(arrays, std::vector<double>(base.reshaped().begin(), base.reshaped().end()));
+}
+
+auto importance_of(const ModelWithIntervals& self, const Array& inputs, int threads) {
+  Eigen::MatrixXd shares;
+  const Eigen::MatrixXd rows = rows_of(inputs);
+  {
+    const nb::gil_scoped_release unlocked;
+    shares = importance(self.model, rows, threads);
+  }
+  return array_of<double>(std::move(shares));
+}
+
+std::tuple<std::string, std::string> c_source(const ModelWithIntervals& self, const std::string& name) {
+  CSource written = to_c(self.model, name, name + ".h");
+  return {std::move(written.source), std::move(written.header)};
+}
+
+nb::list columns_of(const Model& model) {
+  nb::list columns;
+  for (const InputColumn& input : model.inputs()) {
+    nb::dict column;
+    column["name"] = input.name;
+    column["low"] = input.low;
+    column["high"] = input.high;
+    column["centre"] = input.centre;
+    column["levels"] = input.levels;
+    column["codes"] = input.codes;
+    columns.append(column);
+  }
+  return columns;
+}
+
+std::vector<std::string> targets_of(const Model& model) {
+  std::vector<std::string> names;
+  for (const OutputColumn& output : model.outputs()) names.push_back(output.name);
+  return names;
+}
+
+}  // namespace
+
+void add_models(nb::module_& module) {
+  using Self = ModelWithIntervals;
+  nb::class_<Self>(module, "Model", "A model and its prediction intervals.")
+      .def(nb::new_(
+               [](const std::string& text, const std::string& name) { return from_json_with_intervals(text, name); }),
+           nb::arg("text"), nb::arg("name") = "model", "Reads what to_json() wrote.")
+      .def("to_json", [](const Self& self) { return to_json(self.model, self.intervals); })
+      .def("without_intervals", [](const Self& self) { return to_json(self.model); })
+      .def_prop_ro("has_intervals", [](const Self& self) { return !self.intervals.empty(); })
+      .def("inputs", [](const Self& self) { return columns_of(self.model); })
+      .def("outputs", [](const Self& self) { return targets_of(self.model); })
+      .def("used_inputs", [](const Self& self) { return used_inputs(self.model); })
+      .def("predict", &predict, nb::arg("inputs"), nb::arg("threads") = 0)
+      .def("standard_errors", &standard_errors, nb::arg("inputs"), nb::arg("threads") = 0)
+      .def("leaf_of", &leaf_of, nb::arg("inputs"), nb::arg("threads") = 0)
+      .def("validities", &validities, nb::arg("inputs"), nb::arg("partition"), nb::arg("threads") = 0)
+      .def("extrapolation", &extrapolation, nb::arg("inputs"), nb::arg("threads") = 0)
+      .def("intervals", &intervals, nb::arg("inputs"), nb::arg("level"), nb::arg("threads") = 0)
+      .def("attribute", &attribute_rows, nb::arg("inputs"))
+      .def("importance", &importance_of, nb::arg("inputs"), nb::arg("threads") = 0)
+      .def("to_c", &c_source, nb::arg("name"))
+      .def("leaves_json", [](const Self& self) { return report::leaves_json(self.model).dump(); })
+      .def("leaves_text", [](const Self& self, const std::string& name,
+                             std::size_t width) { return report::leaves_text(self.model, name, width); })
+      .def("rules_text", [](const Self& self, const std::string& name, std::size_t width) {
+        return report::rules_text(self.model, name, width);
+      });
+}
+
+}  // namespace llmt::python
