@@ -34,6 +34,26 @@ def warn_of_accidental_inputs(table: Table, meant: set[str], stacklevel: int) ->
         warnings.warn(f'column "{name}" {text}', stacklevel=stacklevel)
 
 
+def warn_of_gross_errors(fitted: "_core.Fit", outputs: np.ndarray, names: list[str], stacklevel: int) -> None:
+    """Warns of few rows that carry most of the held-out squared error."""
+    for column, name in enumerate(names):
+        if _core.dominant_rows(np.ascontiguousarray(outputs[:, column]))[0]:
+            continue  # these were named before the fit
+        rows, share, held_out = fitted.gross_errors(column)
+        if rows:
+            warnings.warn(
+                f'{len(rows)} of {held_out} held-out rows carry {100 * share:.0f} % of the held-out squared error of '
+                f'"{name}": {_places(rows, outputs[:, column])}. If they are mistakes, correct them or use '
+                'loss="tukey", which leaves such rows out',
+                stacklevel=stacklevel,
+            )
+
+
+def _places(rows: list[int], target: np.ndarray) -> str:
+    named = ", ".join(f"{row} ({target[row]:.4g})" for row in rows[:5]) + (", ..." if len(rows) > 5 else "")
+    return f"row{'' if len(rows) == 1 else 's'} {named}"
+
+
 def check_targets(outputs: np.ndarray, names: list[str], robust: bool, stacklevel: int) -> None:
     """Warns of a constant target and of few rows that decide a fit by squares. Raises ValueError for a value beside
     which all others are rounding errors."""
@@ -51,9 +71,8 @@ def check_targets(outputs: np.ndarray, names: list[str], robust: bool, stackleve
                 f'target "{name}", row {rows[0]}: {target[rows[0]]:.6g} is so large that the differences between all '
                 'other values are below its rounding error; correct it, leave the row out, or use loss="tukey"'
             )
-        places = ", ".join(f"{row} ({target[row]:.4g})" for row in rows[:5]) + (", ..." if len(rows) > 5 else "")
         warnings.warn(
             f'{len(rows)} of {len(target)} rows carry {100 * share:.3g} % of the squares of "{name}" about its median: '
-            f'row{"" if len(rows) == 1 else "s"} {places}. If they are mistakes, correct them or use loss="tukey"',
+            f'{_places(rows, target)}. If they are mistakes, correct them or use loss="tukey"',
             stacklevel=stacklevel,
         )

@@ -188,6 +188,8 @@ class LocalLinearTreeRegressor(Views, RegressorMixin, BaseEstimator):
                 readable_loss=self._readable_loss(),
                 report=report,
             )
+        if self.loss == "squared":
+            _advice.warn_of_gross_errors(fitted, outputs, self._outputs, stacklevel=3)
         remember_columns(self, table)
         self.accurate_model_ = Model(fitted.model())
         readable = fitted.readable()
