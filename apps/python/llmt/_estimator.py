@@ -11,7 +11,9 @@ import numpy as np
 from . import _advice, _core
 from ._base import BaseEstimator, NotFittedError, RegressorMixin
 from ._columns import check_columns, remember_columns
+from ._frames import mean_baseline
 from ._model import Model, StreamModel
+from ._progress import Bar
 from ._tables import Table, read_column, read_table, read_targets, row_labels
 from ._views import Views
 
@@ -172,9 +174,7 @@ class LocalLinearTreeRegressor(Views, RegressorMixin, BaseEstimator):
         options = self._options(table)
         if not isinstance(self.cv, (int, np.integer)):
             options["folds"], labels = _given_folds(self.cv, X, y, groups, rows)
-        from ._progress import bar
-
-        with bar("fitting") as report:
+        with Bar() as bar:
             fitted = _core.fit(
                 table.values,
                 outputs,
@@ -186,7 +186,7 @@ class LocalLinearTreeRegressor(Views, RegressorMixin, BaseEstimator):
                 groups=labels,
                 may_have_codes=bool(self.integer_codes),
                 readable_loss=self._readable_loss(),
-                report=report,
+                report=bar,
             )
         if self.loss == "squared":
             _advice.warn_of_gross_errors(fitted, outputs, self._outputs, stacklevel=3)
@@ -195,6 +195,8 @@ class LocalLinearTreeRegressor(Views, RegressorMixin, BaseEstimator):
         readable = fitted.readable()
         self.model_ = self.accurate_model_ if readable is None else Model(readable)
         self.summary_ = json.loads(fitted.summary("table"))
+        self._is_readable = readable is not None
+        self._mean = mean_baseline(outputs, fitted.held_out(), weights)
         self._sample = _spread(table.values, 500)
         self._fit = fitted
         self._stream = None
@@ -232,7 +234,8 @@ class LocalLinearTreeRegressor(Views, RegressorMixin, BaseEstimator):
         self.model_ = Model(self._stream.handle.model(self._inputs, self._outputs))
         self.summary_ = {"rows": self._stream.handle.rows(), "rmse": self._stream.handle.prequential_rmse()}
         self._sample = _spread(table.values, 500)
-        self._fit = None
+        self._fit = self._mean = None
+        self._is_readable = False
         return self
 
     def predict(self, X: Any) -> np.ndarray:
@@ -287,7 +290,8 @@ class LocalLinearTreeRegressor(Views, RegressorMixin, BaseEstimator):
         estimator.feature_names_in_ = np.asarray(estimator._inputs, dtype=object)
         estimator.n_outputs_ = len(estimator._outputs)
         estimator._is_flat = estimator.n_outputs_ == 1
-        estimator._fit = estimator._stream = None
+        estimator._fit = estimator._stream = estimator._mean = None
+        estimator._is_readable = False
         estimator._sample = np.array([[column["centre"] for column in columns]])
         estimator.summary_ = {}
         return estimator

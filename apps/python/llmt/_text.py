@@ -1,0 +1,78 @@
+"""A fitted model on a terminal: what `tree_html` shows, in letters."""
+
+from __future__ import annotations
+
+import textwrap
+from typing import Any
+
+from ._facts import facts_of
+from ._layout import CUT_NOTE, MOST_LEAVES, Item, items_of
+from ._tree import Tree, number, shown, trees
+
+
+def tree_text(
+    model: dict[str, Any],
+    summary: dict[str, Any] | None = None,
+    coverage: Any = None,
+    mean: Any = None,
+    readable: bool = False,
+    width: int = 80,
+    most_leaves: int = MOST_LEAVES,
+) -> str:
+    """The model as text in lines of about `width` letters; the other arguments are those of `tree_html`.
+
+    Coefficients and thresholds have the digits that the pictures have; `rules_frame` has them all.
+    """
+    parts = []
+    for position, tree in enumerate(trees(model, lambda name: shown(name, 40))):
+        facts = facts_of(model, tree, summary, position, coverage, mean, readable)
+        lines = [facts.heading]
+        sentences = [facts.validity, f"{facts.coverage}." if facts.coverage else ""]
+        if facts.how and not facts.errors:
+            sentences.append(f"{facts.how}.")
+        lines += textwrap.wrap(" ".join(filter(None, sentences)), width)
+        if facts.errors:
+            lines.append(f"Held-out RMSE ({facts.how}; +- the spread of the folds):")
+            for name, rmse, spread in facts.errors:
+                lines.append(f"  {number(rmse):>9} +- {number(spread, 2):<8} {name}")
+        items = items_of(tree, most_leaves)
+        lines += ["", *_tree_lines(tree, items, width)]
+        if any(item.is_cut for item in items):
+            note = CUT_NOTE.replace("drawn", "shown").replace("A dashed box", 'What begins with "..."')
+            lines += ["", *textwrap.wrap(note, width)]
+        parts.append("\n".join(lines))
+    return "\n\n".join(parts)
+
+
+def _tree_lines(tree: Tree, items: list[Item], width: int) -> list[str]:
+    lines = []
+    for item in items:
+        indent = "|  " * max(0, item.depth - 1)
+        condition = shown(f"{item.what} {item.how}", max(20, width - len(indent))).replace("\N{LESS-THAN OR EQUAL TO}", "<=")
+        head = indent + condition if item.depth else "everywhere" if item.leaf else ""
+        if item.leaf is None:
+            lines += [head] if head else []
+            continue
+        leaf = item.leaf
+        errors = ", ".join(number(rmse, 3) for rmse in leaf.rmse)
+        note = f"{leaf.rows} rows, RMSE {errors}"
+        note = f"... {tree.leaves_below(item.node)} leaves, {note}" if item.is_cut else f"leaf {leaf.number}, {note}"
+        lines += [f"{head}: {note}"] if len(head) + len(note) + 2 <= width else [f"{head}:", f"{indent}   {note}"]
+        for o, target in enumerate(tree.targets):
+            terms, left_out = tree.short_equation(leaf, o)
+            if left_out:
+                terms.append(f"+ {left_out} smaller term" + ("s" if left_out > 1 else ""))
+            lines += _wrapped(f"{indent}   {target} = ", terms, f"{indent}       ", width)
+    return lines
+
+
+def _wrapped(line: str, terms: list[str], indent: str, width: int) -> list[str]:
+    lines = []
+    line += terms[0]
+    for term in terms[1:]:
+        if len(line) + 1 + len(term) > width:
+            lines.append(line)
+            line = indent + term
+        else:
+            line += " " + term
+    return [*lines, line]
