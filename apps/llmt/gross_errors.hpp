@@ -1,30 +1,14 @@
 /// \file
-/// Few rows that carry most of the held-out squared error: likely wrong targets.
+/// Warnings of few rows that carry most of the held-out squared error: likely wrong targets.
 #pragma once
-
-#include <Eigen/Core>
-#include <vector>
 
 #include "llmt/fit.hpp"
 #include "llmt/learning.hpp"
 
 namespace llmt::apps {
 
-/// Rows of one output that no model predicts.
-struct GrossErrors {
-  std::vector<Eigen::Index> rows = {};  ///< the largest error first
-  double share = 0.0;                   ///< of the held-out squared error that they carry
-  Eigen::Index held_out = 0;            ///< the number of held-out rows
-};
-
-/// At most one held-out row in a hundred (or one row) that carry more than half of the held-out squared error of the
-/// output; else empty. The held-out error of such a row is more than 15 deviations (RobustScale) of all errors and 8
-/// deviations of those in its leaf, and the model that has seen the row is off by a fifth of it at least: errors of
-/// honest rows with heavy tails, and beside jumps, are not like that. `result` has the intervals' models; without them
-/// it is empty.
-GrossErrors gross_errors(const LearningTable& table, const FitResult& result, Eigen::Index output);
-
-/// Warns of such rows of all targets, unless the loss leaves them out anyway, with their lines in the file.
+/// Warns of such rows (report/fit/gross_errors.hpp) of all targets, unless the loss leaves them out anyway, with their
+/// lines in the file.
 void warn_of_gross_errors(const LearningArguments& arguments, const LearningTable& table, const FitResult& result);
 
 }  // namespace llmt::apps

@@ -20,7 +20,9 @@
 #include "python/bindings/module.hpp"
 #include "python/bindings/options.hpp"
 #include "report/document/page.hpp"
+#include "report/fit/fit_accuracy.hpp"
 #include "report/fit/fit_summary.hpp"
+#include "report/fit/gross_errors.hpp"
 #include "report/fit/of_fit.hpp"
 #include "report/fit/readable_summary.hpp"
 #include "report/table/named_inputs.hpp"
@@ -74,6 +76,21 @@ class Fit {
   std::vector<std::vector<Eigen::Index>> held_out() const { return result_->summary.held_out; }
   std::vector<double> loss_weights() const {
     return {result_->summary.loss_weights.begin(), result_->summary.loss_weights.end()};
+  }
+
+  // Observed and predicted values of an output on held-out rows; empty without folds.
+  std::tuple<std::vector<double>, std::vector<double>> held_out_predictions(Eigen::Index output) const {
+    if (result_->intervals.empty()) return {};
+    const TrainingData& rows = prepared_->data();
+    const report::HeldOutRows found =
+        report::held_out({"", rows.inputs, rows.outputs, options_, *result_, readable_, 0}, output);
+    return {found.observed, found.predicted};
+  }
+
+  // Rows of an output that are likely mistakes: positions, share of the squared error, held-out rows.
+  std::tuple<std::vector<Eigen::Index>, double, Eigen::Index> gross_errors(Eigen::Index output) const {
+    const report::GrossErrors found = report::gross_errors(prepared_->data(), *result_, output, options_.max_threads);
+    return {found.rows, found.share, found.held_out};
   }
 
   // The page of `llmt fit --report`; empty where the module was built without it.
@@ -194,6 +211,8 @@ void add_fitting(nb::module_& module) {
       .def("text", &Fit::text, nb::arg("data"), nb::arg("width"))
       .def("held_out", &Fit::held_out)
       .def("loss_weights", &Fit::loss_weights)
+      .def("held_out_predictions", &Fit::held_out_predictions, nb::arg("output"))
+      .def("gross_errors", &Fit::gross_errors, nb::arg("output"))
       .def("page", &Fit::page, nb::arg("data"), nb::arg("origin"))
       .def("document", &Fit::document, nb::arg("data"));
   module.def("fit", &fit_table, nb::arg("inputs"), nb::arg("outputs"), nb::arg("options"), nb::kw_only(),

@@ -1,1 +1,43 @@
-"""LLMT."""
+"""Local linear model trees: regression models that can be read.
+
+>>> import numpy as np
+>>> from llmt import LocalLinearTreeRegressor
+>>> X = np.random.default_rng(0).uniform(-1, 1, (300, 2))
+>>> y = np.where(X[:, 0] > 0, 3 * X[:, 1], 1.0)
+>>> model = LocalLinearTreeRegressor().fit(X, y)
+>>> model.predict([[0.5, 0.5], [-0.5, 0.5]]).round(3)
+array([1.5, 1. ])
+
+NumPy is all that it needs. scikit-learn, pandas, polars, pyarrow, matplotlib, shap and onnx are used where they are
+installed; none of them is imported before something is called that needs it.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from ._core import __version__ as __version__
+    from ._estimator import LocalLinearTreeRegressor as LocalLinearTreeRegressor
+    from ._model import Model as Model
+
+# Where each public name is defined; the module is imported when the name is asked for.
+_homes = {
+    "LocalLinearTreeRegressor": "_estimator",
+    "Model": "_model",
+    "__version__": "_core",
+}
+
+__all__ = ["LocalLinearTreeRegressor", "Model", "__version__"]
+
+
+def __getattr__(name: str) -> object:
+    home = _homes.get(name)
+    if home is None:
+        raise AttributeError(f"module 'llmt' has no attribute {name!r}")
+    value = getattr(import_module(f"llmt.{home}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *_homes])

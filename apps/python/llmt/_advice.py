@@ -1,0 +1,78 @@
+"""Warnings about tables that are probably not what the user thinks, as `llmt fit` prints them."""
+
+import warnings
+
+import numpy as np
+
+from . import _core
+from ._tables import Table
+
+
+def warn_of_accidental_inputs(table: Table, meant: set[str], stacklevel: int) -> None:
+    """Warns of columns that look like names, dates or numbers of the rows. Tables without names are not looked at:
+    their columns were chosen by hand."""
+    if table.names is None:
+        return
+    for kind, position, unit in _core.accidental_inputs(table.values, table.levels):
+        name = table.names[position]
+        if name in meant:
+            continue
+        if kind == "row_numbers":
+            text = "numbers the rows and is an input; leave it out of X if it is not meant"
+        elif kind == "unit":
+            text = (
+                f'has a number and "{unit}" in every cell, and is taken for categories; leave the unit out of the '
+                "cells to have numbers"
+            )
+        elif kind == "dates":
+            text = "looks like a date and is taken for categories; give a number, as days, or leave it out of X"
+        else:
+            text = (
+                f"has words, {len(table.levels[position])} different ones in {len(table.values)} rows, and is taken for "
+                "categories; leave it out of X if they are names of the rows, or name it in categorical_features"
+            )
+        warnings.warn(f'column "{name}" {text}', stacklevel=stacklevel)
+
+
+def warn_of_gross_errors(fitted: "_core.Fit", outputs: np.ndarray, names: list[str], stacklevel: int) -> None:
+    """Warns of few rows that carry most of the held-out squared error."""
+    for column, name in enumerate(names):
+        if _core.dominant_rows(np.ascontiguousarray(outputs[:, column]))[0]:
+            continue  # these were named before the fit
+        rows, share, held_out = fitted.gross_errors(column)
+        if rows:
+            warnings.warn(
+                f'{len(rows)} of {held_out} held-out rows carry {100 * share:.0f} % of the held-out squared error of '
+                f'"{name}": {_places(rows, outputs[:, column])}. If they are mistakes, correct them or use '
+                'loss="tukey", which leaves such rows out',
+                stacklevel=stacklevel,
+            )
+
+
+def _places(rows: list[int], target: np.ndarray) -> str:
+    named = ", ".join(f"{row} ({target[row]:.4g})" for row in rows[:5]) + (", ..." if len(rows) > 5 else "")
+    return f"row{'' if len(rows) == 1 else 's'} {named}"
+
+
+def check_targets(outputs: np.ndarray, names: list[str], robust: bool, stacklevel: int) -> None:
+    """Warns of a constant target and of few rows that decide a fit by squares. Raises ValueError for a value beside
+    which all others are rounding errors."""
+    for column, name in enumerate(names):
+        target = outputs[:, column]
+        if len(target) > 1 and target.min() == target.max():
+            warnings.warn(f'target "{name}" is {target[0]:g} in every row: the model is that constant', stacklevel=stacklevel)
+        if robust:
+            continue
+        rows, share, hide_the_others = _core.dominant_rows(np.ascontiguousarray(target))
+        if not rows:
+            continue
+        if hide_the_others:
+            raise ValueError(
+                f'target "{name}", row {rows[0]}: {target[rows[0]]:.6g} is so large that the differences between all '
+                'other values are below its rounding error; correct it, leave the row out, or use loss="tukey"'
+            )
+        warnings.warn(
+            f'{len(rows)} of {len(target)} rows carry {100 * share:.3g} % of the squares of "{name}" about its median: '
+            f'{_places(rows, target)}. If they are mistakes, correct them or use loss="tukey"',
+            stacklevel=stacklevel,
+        )

@@ -1,0 +1,87 @@
+"""Models and streams as plain objects whose state is JSON text."""
+
+import json
+import os
+from typing import Any
+
+from . import _core
+
+
+class Model:
+    """A fitted model: a tree with a linear equation in every leaf, and the intervals that were made with it.
+
+    Its whole state is the JSON text that `llmt fit -o` writes and `llmt predict` reads, so that it can be pickled,
+    copied and sent to other processes.
+
+    Parameters
+    ----------
+    text : str
+        What `to_json` returned, or the content of a model file.
+
+    Raises
+    ------
+    ValueError
+        If the text is no model; the message names the place in the text.
+    """
+
+    def __init__(self, text: str) -> None:
+        self._text = text
+        self._handle: _core.Model | None = _core.Model(text)
+
+    def __getstate__(self) -> dict[str, str]:
+        return {"text": self._text}
+
+    def __setstate__(self, state: dict[str, str]) -> None:
+        self._text = state["text"]
+        self._handle = None
+
+    @property
+    def handle(self) -> _core.Model:
+        """The C++ object; made from the text when it is asked for."""
+        if self._handle is None:
+            self._handle = _core.Model(self._text)
+        return self._handle
+
+    def to_json(self, intervals: bool = True) -> str:
+        """The model as JSON text; `intervals`: with what prediction intervals need."""
+        return self._text if intervals else self.handle.without_intervals()
+
+    def to_dict(self) -> dict[str, Any]:
+        """The members of the JSON text, without those of the intervals."""
+        parsed: dict[str, Any] = json.loads(self.to_json(intervals=False))
+        return parsed
+
+    def save(self, path: "str | os.PathLike[str]") -> None:
+        """Writes the file that `llmt predict` reads. A failed write leaves an old file as it was."""
+        beside = f"{os.fspath(path)}.partial"
+        try:
+            with open(beside, "w", encoding="utf-8") as file:
+                file.write(self._text)
+            os.replace(beside, path)
+        except OSError:
+            if os.path.exists(beside):
+                os.remove(beside)
+            raise
+
+    @classmethod
+    def load(cls, path: "str | os.PathLike[str]") -> "Model":
+        """Reads a model file."""
+        with open(path, encoding="utf-8") as file:
+            return cls(file.read())
+
+    def __repr__(self) -> str:
+        inputs = [column["name"] for column in self.handle.inputs()]
+        return f"<llmt.Model {', '.join(self.handle.outputs())} from {', '.join(inputs)}>"
+
+
+class StreamModel:
+    """A tree that learns from rows as they come. Its state is JSON text when it is pickled."""
+
+    def __init__(self, inputs: int, outputs: int, options: dict[str, Any]) -> None:
+        self.handle = _core.Stream(inputs, outputs, options)
+
+    def __getstate__(self) -> dict[str, str]:
+        return {"text": self.handle.to_json()}
+
+    def __setstate__(self, state: dict[str, str]) -> None:
+        self.handle = _core.Stream.from_json(state["text"])

@@ -1,0 +1,223 @@
+"""The estimator: scikit-learn's contract, weights, threads, interrupts, and the bytes of the command line."""
+
+import copy
+import hashlib
+import multiprocessing
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+
+from llmt import LocalLinearTreeRegressor, Model
+
+PROGRAM = os.environ.get("LLMT_PROGRAM", "")
+
+
+def stepped(rows, seed=0):
+    """A table with a step, a slope, noise and some missing cells."""
+    rng = np.random.default_rng(seed)
+    X = rng.uniform(-1, 1, (rows, 4))
+    y = np.where(X[:, 0] > 0.2, 2 + X[:, 1], X[:, 2]) + 0.1 * rng.normal(size=rows)
+    X[rng.uniform(size=X.shape) < 0.02] = np.nan
+    return X, y
+
+
+def test_check_estimator():
+    estimator_checks = pytest.importorskip("sklearn.utils.estimator_checks")
+    results = estimator_checks.check_estimator(LocalLinearTreeRegressor(), on_fail=None, on_skip=None)
+    passed = [result for result in results if result["status"] == "passed"]
+    others = {result["check_name"]: result["status"] for result in results if result["status"] != "passed"}
+    print(f"check_estimator: {len(passed)} passed, others: {others}")
+    assert others in ({}, {"check_array_api_input": "skipped"})
+    assert len(passed) >= 50
+
+
+@pytest.mark.parametrize("options", [{}, {"validity": "crisp"}, {"rule": "retis"}, {"local_models": "auto"}, {"loss": "tukey"}])
+def test_a_weight_is_a_number_of_copies(options):
+    X, y = stepped(600)
+    weights = np.random.default_rng(1).integers(0, 4, len(y))
+    repeated = LocalLinearTreeRegressor(**options).fit(np.repeat(X, weights, axis=0), np.repeat(y, weights))
+    weighted = LocalLinearTreeRegressor(**options).fit(X, y, sample_weight=weights)
+    assert weighted.to_json() == repeated.to_json()
+    assert weighted.model_.to_dict()["partitions"][0]["nodes"][1:], "the tree has no split: the test would prove little"
+
+
+def test_same_bytes_for_any_number_of_threads_and_any_order_in_memory():
+    X, y = stepped(500)
+    texts = {
+        LocalLinearTreeRegressor(n_jobs=jobs).fit(rows, y).to_json()
+        for jobs in (1, 2, 5)
+        for rows in (X, np.asfortranarray(X), X[:, ::-1][:, ::-1], X.tolist())
+    }
+    assert len(texts) == 1
+
+
+@pytest.mark.skipif(not PROGRAM, reason="LLMT_PROGRAM does not name the program llmt")
+def test_the_command_line_writes_the_same_bytes(tmp_path):
+    pandas = pytest.importorskip("pandas")
+    table = os.path.join(os.path.dirname(__file__), "../../docs/samples/heat_pump.csv")
+    command = [PROGRAM, "fit", table, "--target", "cop", "-o", tmp_path / "model.json", "--readable"]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    frame = pandas.read_csv(table)
+    fitted = LocalLinearTreeRegressor(readable=True).fit(frame.drop(columns="cop"), frame["cop"])
+    assert fitted.accurate_model_.to_json() == (tmp_path / "model.json").read_text()
+    assert fitted.to_json() == (tmp_path / "model.readable.json").read_text()
+
+
+def test_an_estimator_survives_pickle_copy_and_files(tmp_path):
+    X, y = stepped(300)
+    fitted = LocalLinearTreeRegressor().fit(X, y)
+    expected = fitted.predict(X)
+    fitted.save(tmp_path / "model.json")
+    for again in (
+        pickle.loads(pickle.dumps(fitted)),
+        copy.deepcopy(fitted),
+        LocalLinearTreeRegressor.load(tmp_path / "model.json"),
+    ):
+        again.__dict__.pop("feature_names_in_", None)
+        assert (again.predict(X) == expected).all()
+    assert pickle.loads(pickle.dumps(fitted.model_)).to_json() == fitted.to_json()
+    with pytest.raises(ValueError, match="model"):
+        Model("{}")
+    half_made = Model.__new__(Model)
+    with pytest.raises(AttributeError):
+        half_made.to_json()
+
+
+def test_intervals_hold_what_they_promise():
+    X, y = stepped(1000)
+    fitted = LocalLinearTreeRegressor().fit(X, y)
+    new, observed = stepped(4000, seed=7)
+    ends = fitted.predict_interval(new, coverage=0.9)
+    assert ends.shape == (4000, 2)
+    inside = ((observed >= ends[:, 0]) & (observed <= ends[:, 1])).mean()
+    assert 0.88 < inside < 0.94
+
+
+def test_contributions_add_up_to_the_prediction():
+    X, y = stepped(500)
+    fitted = LocalLinearTreeRegressor().fit(X, y)
+    explanation = fitted.explain(X[:50])
+    total = explanation.values.sum(axis=1) + explanation.base_values
+    np.testing.assert_allclose(total, fitted.predict(X[:50]), rtol=0, atol=1e-9)
+
+
+def test_folds_of_a_splitter_and_of_groups():
+    X, y = stepped(400)
+    folds = [(np.arange(400) % 4 != fold, np.flatnonzero(np.arange(400) % 4 == fold)) for fold in range(4)]
+    by_list = LocalLinearTreeRegressor(cv=folds).fit(X, y)
+    assert by_list.summary_["partitions"][0]["cv_folds"] == 4
+    with pytest.raises(ValueError, match="every row once"):
+        LocalLinearTreeRegressor(cv=folds[:3]).fit(X, y)
+    by_group = LocalLinearTreeRegressor(cv=4).fit(X, y, groups=[f"run {row % 4}" for row in range(400)])
+    assert by_group.summary_["partitions"][0]["cv_folds"] == 4
+
+
+def test_monotonic_by_name_and_position():
+    pandas = pytest.importorskip("pandas")
+    X, y = stepped(400)
+    frame = pandas.DataFrame(X, columns=list("abcd"))
+    fitted = LocalLinearTreeRegressor(monotonic_cst={"b": 1}).fit(frame, y)
+    line = np.repeat(np.nanmedian(X, axis=0)[None], 200, axis=0)
+    line[:, 1] = np.linspace(-1, 1, 200)
+    assert (np.diff(fitted.predict(pandas.DataFrame(line, columns=list("abcd")))) >= 0).all()
+    with pytest.raises(ValueError, match="'z'"):
+        LocalLinearTreeRegressor(monotonic_cst={"z": 1}).fit(frame, y)
+    with pytest.raises(ValueError, match="3 entries for 4 columns"):
+        LocalLinearTreeRegressor(monotonic_cst=[1, 0, 0]).fit(X, y)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"rule": "best"}, "rd, retis"),
+        ({"max_leaves": -1}, "max_leaves"),
+        ({"max_leaves": 2.5}, "max_leaves"),
+        ({"cv": 1}, "fold"),
+        ({"readable": True, "cv": 0}, "readable"),
+        ({"validity": 3}, "validity"),
+    ],
+)
+def test_a_wrong_parameter_is_named(options, words):
+    X, y = stepped(100)
+    with pytest.raises((ValueError, TypeError), match=words):
+        LocalLinearTreeRegressor(**options).fit(X, y)
+
+
+def test_several_targets():
+    X, y = stepped(400)
+    both = np.column_stack([y, -2 * y])
+    fitted = LocalLinearTreeRegressor().fit(X, both)
+    assert fitted.predict(X).shape == (400, 2)
+    assert fitted.predict_interval(X).shape == (400, 2, 2)
+    assert LocalLinearTreeRegressor().fit(X, y.reshape(-1, 1)).predict(X).shape == (400, 1)
+
+
+def test_partial_fit_goes_on_where_it_stopped():
+    X, y = stepped(3000)
+    whole = LocalLinearTreeRegressor().partial_fit(X, y)
+    pieces = LocalLinearTreeRegressor()
+    for first in range(0, 3000, 1000):
+        pieces = pickle.loads(pickle.dumps(pieces.partial_fit(X[first : first + 1000], y[first : first + 1000])))
+    assert pieces.to_json() == whole.to_json()
+    assert np.sqrt(np.mean((whole.predict(X) - y) ** 2)) < 0.5 * y.std()
+
+
+def test_fits_in_threads_give_the_same_bytes():
+    X, y = stepped(400)
+    expected = LocalLinearTreeRegressor(n_jobs=1).fit(X, y).to_json()
+    with ThreadPoolExecutor(4) as pool:
+        texts = list(pool.map(lambda _: LocalLinearTreeRegressor(n_jobs=1).fit(X, y).to_json(), range(8)))
+    assert set(texts) == {expected}
+
+
+def _digest(seed):
+    X, y = stepped(400, seed)
+    return hashlib.sha256(LocalLinearTreeRegressor().fit(X, y).to_json().encode()).hexdigest()
+
+
+@pytest.mark.parametrize("start", ["fork", "spawn"])
+def test_fits_in_processes_give_the_same_bytes(start):
+    expected = _digest(3)  # before the fork, so that the parent has threads
+    with multiprocessing.get_context(start).Pool(2) as pool:
+        assert pool.map_async(_digest, [3, 3, 3]).get(timeout=120) == [expected] * 3
+
+
+INTERRUPTED = """
+import signal, threading, time, numpy as np
+from llmt import LocalLinearTreeRegressor
+X = np.random.default_rng(0).normal(size=(200000, 10)); y = np.sin(X[:, 0] * 3) + X[:, 1] * X[:, 2]
+print("ready", flush=True)
+try:
+    LocalLinearTreeRegressor().fit(X, y)
+except KeyboardInterrupt:
+    print("interrupted", sum(t.name != "MainThread" for t in threading.enumerate()), flush=True)
+"""
+
+
+@pytest.mark.parametrize("after", [0.3, 1.5])
+def test_ctrl_c_ends_a_fit(after):
+    child = subprocess.Popen([sys.executable, "-c", INTERRUPTED], stdout=subprocess.PIPE, text=True)
+    assert child.stdout.readline() == "ready\n"
+    time.sleep(after)
+    sent = time.monotonic()
+    child.send_signal(signal.SIGINT)
+    output, _ = child.communicate(timeout=60)
+    print(f"interrupted after {time.monotonic() - sent:.2f} s")
+    assert output == "interrupted 0\n"
+
+
+def test_nothing_is_printed_and_no_file_is_written(tmp_path, capfd, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    X, y = stepped(200)
+    LocalLinearTreeRegressor().fit(X, y).predict(X)
+    assert capfd.readouterr() == ("", "")
+    assert os.listdir(tmp_path) == []
+    assert threading.active_count() >= 1
