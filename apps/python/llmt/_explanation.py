@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import html
 import sys
-from typing import Any, Sequence
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -50,8 +50,8 @@ class Explanation:
         self.output_names = list(output_names)
         self._codes = data if codes is None else codes
 
-    @property
-    def __class__(self) -> type:  # type: ignore[override]
+    @property  # type: ignore[misc]
+    def __class__(self) -> type:
         # shap.plots ask isinstance(..., shap.Explanation).
         shap = sys.modules.get("shap")
         return getattr(shap, "Explanation", Explanation)
@@ -80,7 +80,7 @@ class Explanation:
             self.values[index],
             np.asarray(self.base_values)[base_index],
             self.data[data_index],
-            feature_names if isinstance(feature_names, str) else feature_names.tolist(),
+            feature_names if isinstance(feature_names, str) else list(feature_names),
             np.atleast_1d(np.asarray(output_names, dtype=object)).tolist(),
             self._codes[data_index],
         )
@@ -110,7 +110,7 @@ class Explanation:
         )
 
     def to_text(self, width: int = 80) -> str:
-        """One row as a waterfall, inputs by the size of what they contribute; of several rows the means of the sizes."""
+        """One row as a waterfall, inputs by the size of what they contribute; of several rows the mean sizes."""
         if self._axes() == (False, True, True):
             return "\n".join(f"{shown(name)}\n{self[:, name].to_text(width)}" for name in self.output_names)
         if not self._is_single():
@@ -140,9 +140,11 @@ class Explanation:
         if self._is_single():
             order = self._by_size(np.abs(self.values))
             prediction = float(self.base_values) + float(self.values.sum())
-            title = f"{shown(self.output_names[0])}: {number(prediction)} = {number(float(self.base_values))} (base) + contributions"
+            base = number(float(self.base_values))
+            title = f"{shown(self.output_names[0])}: {number(prediction)} = {base} (base) + contributions"
             rows = [
-                (f"{shown(self.feature_names[k], 24)} = {shown(_cell(self.data[k]), 24)}", float(self.values[k])) for k in order
+                (f"{shown(self.feature_names[k], 24)} = {shown(_cell(self.data[k]), 24)}", float(self.values[k]))
+                for k in order
             ]
             return bar_rows(title, rows, signed=True)
         parts = []
@@ -195,7 +197,7 @@ class Explanation:
 
 
 def explanation_of(handle: Any, inputs: np.ndarray) -> Explanation:
-    """The contributions for rows (rows x inputs, categories as positions of their levels or codes) of a `_core.Model`."""
+    """The contributions for rows of inputs (categories as positions of their levels, or codes) to a `_core.Model`."""
     columns, names = handle.inputs(), handle.outputs()
     contributions, base = handle.attribute(inputs)
     rows = len(inputs)

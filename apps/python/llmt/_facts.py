@@ -67,7 +67,9 @@ def coverage_of(model: dict[str, Any], level: float = 0.9) -> tuple[float, np.nd
     folds = model.get("intervals") or []
     shares = []
     for o in range(len(model["outputs"])):
-        of_folds = [np.array(fold["residuals"][o] + fold.get("residuals_incomplete", [[]] * (o + 1))[o]) for fold in folds]
+        of_folds = [
+            np.array(fold["residuals"][o] + fold.get("residuals_incomplete", [[]] * (o + 1))[o]) for fold in folds
+        ]
         held = 0
         for k, own in enumerate(of_folds):
             others = np.sort(np.concatenate([[], *of_folds[:k], *of_folds[k + 1 :]]))
@@ -86,7 +88,9 @@ def _errors(facts: Facts, of: dict[str, Any], readable: list[dict[str, Any]], is
     chosen = of["chosen"]
     if of["cv_rmse"] is None:
         errors = ", ".join(number(rmse) for rmse in of["train_rmse"])
-        facts.how = f"No rows were held out, so nothing says how well the tree predicts new ones. RMSE in training: {errors}"
+        facts.how = (
+            f"No rows were held out, so nothing says how well the tree predicts new ones. RMSE in training: {errors}"
+        )
         return
     facts.errors.append((kind_of(chosen), of["cv_rmse"], chosen["spread"] or 0.0))
     for simple in readable:

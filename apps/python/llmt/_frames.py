@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Sequence
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -52,10 +53,10 @@ def leaves_frame(model: dict[str, Any], handle: Any = None) -> Any:
     equation.
 
     Columns: `target`; `leaf`, counted from 1 from left to right, as in `rules_frame` and in the pictures; `where`, the
-    conditions; `rows` and `rmse` of training; `intercept` and `intercept_se`; then `coef(NAME)` and `se(NAME)` of every
-    regressor. Standard errors are those of least squares within the leaf, for a tree that is taken as given: they do not
-    know that the same rows chose the splits, and are too small. In a smooth model they take the other leaves as given
-    as well. NaN: the leaf's rows do not determine the coefficient; it is then that of a larger region.
+    conditions; `rows` and `rmse` of training; `intercept` and `intercept_se`; then `coef(NAME)` and `se(NAME)` of
+    every regressor. Standard errors are those of least squares within the leaf, for a tree that is taken as given:
+    they do not know that the same rows chose the splits, and are too small. In a smooth model they take the other
+    leaves as given as well. NaN: the leaf's rows do not determine the coefficient; it is then that of a larger region.
     """
     rows = []
     names = _merged(tree.regressor_names for tree in trees(model))
@@ -83,24 +84,34 @@ def leaves_frame(model: dict[str, Any], handle: Any = None) -> Any:
 def rules_frame(model: dict[str, Any], handle: Any = None) -> Any:
     """The rules of a model: `rule`, `if`, `then`, `rows`, `rmse`; one row for each leaf and target.
 
-    In a crisp model a prediction is the equation of the one rule whose conditions hold. In a smooth one it is a mean of
-    the equations of several, and near a threshold no rule alone is the model.
+    A prediction is the equation of the one rule whose conditions hold. Raises ValueError for a smooth model: there it
+    is a mean of the equations of several leaves, so that rules would not be the model.
     """
     rows = []
     for tree in trees(model):
+        if tree.is_smooth:
+            raise ValueError(
+                f"the {len(tree.leaves)} leaves of {', '.join(tree.targets)} are blended: a prediction is a mean of "
+                "several equations, so rules would not be the model. readable=True and validity='crisp' fit a tree that is its "
+                "rules; leaves_ lists the leaves of this one"
+            )
         for leaf in tree.leaves:
             for o, target in enumerate(tree.targets):
-                rows.append({
-                    "rule": leaf.number,
-                    "if": " and ".join(leaf.conditions) or "everywhere",
-                    "then": f"{target} = {' '.join(tree.equation(leaf, o))}",
-                    "rows": leaf.rows,
-                    "rmse": leaf.rmse[o],
-                })
+                rows.append(
+                    {
+                        "rule": leaf.number,
+                        "if": " and ".join(leaf.conditions) or "everywhere",
+                        "then": f"{target} = {' '.join(tree.equation(leaf, o))}",
+                        "rows": leaf.rows,
+                        "rmse": leaf.rmse[o],
+                    }
+                )
     return table_of(rows, ["rule", "if", "then", "rows", "rmse"])
 
 
-def mean_baseline(outputs: Any, held_out: Sequence[Sequence[int]], weights: Any = None) -> tuple[np.ndarray, np.ndarray]:
+def mean_baseline(
+    outputs: Any, held_out: Sequence[Sequence[int]], weights: Any = None
+) -> tuple[np.ndarray, np.ndarray]:
     """Held-out RMSE, and its spread over the folds, of predicting the mean of the rows outside of the fold.
 
     `outputs`: rows x targets. `held_out`: the rows of every fold, counted from 0 (`_core.Fit.held_out()`). The error
@@ -139,10 +150,10 @@ def kind_of(candidate: dict[str, Any]) -> str:
 def candidates_frame(summary: dict[str, Any], mean: Any = None) -> Any:
     """What the fit compared on held-out rows, best first, for each target or group of targets that share a tree.
 
-    Columns: `target`; `model`, the kind in words; `validity` and `width` of the transitions; `leaves`; `rmse`, held-out,
-    and `spread`, the standard deviation of the folds' RMSE; `chosen`. The readable tree and the mean of the rows (the
-    error of a model that knows no input; `mean`: what `mean_baseline` returned) are there if they are known. A chosen
-    model may be a little worse than the best: of models that chance does not tell apart the simplest is taken.
+    Columns: `target`; `model`, the kind in words; `validity` and `width` of the transitions; `leaves`; `rmse`, of rows
+    held out, and `spread`, the standard deviation of the folds' RMSE; `chosen`. The readable tree and the mean of the
+    rows (the error of a model that knows no input; `mean`: what `mean_baseline` returned) are there if they are known.
+    A chosen model may be a little worse than the best: of models that chance does not tell apart the simplest is taken.
     """
     rows: list[dict[str, Any]] = []
     position = 0
@@ -151,7 +162,9 @@ def candidates_frame(summary: dict[str, Any], mean: Any = None) -> Any:
         chosen = partition["chosen"]
         compared = [chosen] + [other for other in partition["compared"] if other != chosen]
         of_partition = [
-            _candidate(target, kind_of(c), c["validity"], c["width"], c["leaves"], c["cv_rmse"], c["spread"], c is chosen)
+            _candidate(
+                target, kind_of(c), c["validity"], c["width"], c["leaves"], c["cv_rmse"], c["spread"], c is chosen
+            )
             for c in compared
         ]
         if "other_terms" in partition:
@@ -165,7 +178,14 @@ def candidates_frame(summary: dict[str, Any], mean: Any = None) -> Any:
             if simple["targets"] == partition["targets"]:
                 of_partition.append(
                     _candidate(
-                        target, "readable tree", "crisp", 0.0, simple["leaves"], simple["cv_rmse"], simple["spread"], False
+                        target,
+                        "readable tree",
+                        "crisp",
+                        0.0,
+                        simple["leaves"],
+                        simple["cv_rmse"],
+                        simple["spread"],
+                        False,
                     )
                 )
         size = len(partition["targets"])

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import html
 import unicodedata
-from typing import Any, Sequence
+from collections.abc import Sequence
+from typing import Any
 
 from ._facts import Facts, facts_of
 from ._layout import CUT_NOTE, LINE, MOST_LEAVES, Item, Layout, layout_of
@@ -18,7 +19,7 @@ from ._tree import Tree, number, shown, trees
 WIDTH = 900.0  # px
 _EM = 12.0  # px
 _ACCENT, _OTHER = "#2f86d1", "#9a9a9a"
-_SCALE = ((72, 94, 176), (39, 140, 156), (84, 170, 96), (214, 160, 44))  # from small to large predictions
+COLOURS = ((72, 94, 176), (39, 140, 156), (84, 170, 96), (214, 160, 44))  # from small to large predictions
 _MOST_PARTITIONS = 6
 _FONTS = "system-ui,'Segoe UI',Helvetica,Arial,sans-serif"
 _STYLE = f"max-width:{WIDTH:.0f}px;font:13px/1.5 {_FONTS};text-align:left"
@@ -34,9 +35,9 @@ def tree_html(
     """The model as HTML for `_repr_html_`: below 100 kB for any model.
 
     `model` and `summary`: JSON of the model file and of the fit. `coverage`: (level, share of held-out rows within the
-    intervals; one number, or one for each target); None: as the model's own residuals say. `mean`: what `mean_baseline` returned, a bar beside least squares.
-    `readable`: the model is the readable tree of the summary. Of many targets six are drawn, of a large tree the first
-    sixteen leaves in the order of growth.
+    intervals; one number, or one for each target); None: as the model's own residuals say. `mean`: what
+    `mean_baseline` returned, a bar beside least squares. `readable`: the model is the readable tree of the summary. Of
+    many targets six are drawn, of a large tree the first sixteen leaves in the order of growth.
     """
     of_partitions = trees(model, _isolated)
     drawn = of_partitions[:_MOST_PARTITIONS]
@@ -48,7 +49,9 @@ def tree_html(
         note = f'<div style="opacity:.8">{CUT_NOTE}</div>' if layout.is_cut else ""
         parts.append(_head(tree, facts, summary) + _bars(facts) + _svg(tree, layout) + note)
     if len(of_partitions) > len(drawn):
-        parts.append(f"<div>\N{HORIZONTAL ELLIPSIS} and the trees of {len(of_partitions) - len(drawn)} further targets</div>")
+        parts.append(
+            f"<div>\N{HORIZONTAL ELLIPSIS} and the trees of {len(of_partitions) - len(drawn)} further targets</div>"
+        )
     return f'<div class="llmt-tree" dir="ltr" style="{_STYLE}">' + "".join(parts) + "</div>"
 
 
@@ -113,7 +116,8 @@ def _bars(facts: Facts) -> str:
         colour = _ACCENT if k == 0 else _OTHER
         parts.append(_text(name_width - 8, y + 13, name, anchor="end", weight=600 if k == 0 else 400))
         parts.append(
-            f'<rect x="{name_width:.0f}" y="{y + 3:.0f}" width="{max(1.0, length):.1f}" height="13" rx="2" fill="{colour}"/>'
+            f'<rect x="{name_width:.0f}" y="{y + 3:.0f}" width="{max(1.0, length):.1f}" height="13" rx="2" '
+            f'fill="{colour}"/>'
         )
         begin, end = name_width + max(0.0, length - reach), name_width + length + reach
         parts.append(_line(begin, y + 9.5, end, y + 9.5, 1.5, 0.75))
@@ -219,9 +223,9 @@ def _line(x1: float, y1: float, x2: float, y2: float, width: float, opacity: flo
 
 
 def _colour(level: float) -> str:
-    at = min(max(level, 0.0), 1.0) * (len(_SCALE) - 1)
-    k = min(int(at), len(_SCALE) - 2)
-    return "#" + "".join(f"{round(a + (at - k) * (b - a)):02x}" for a, b in zip(_SCALE[k], _SCALE[k + 1]))
+    at = min(max(level, 0.0), 1.0) * (len(COLOURS) - 1)
+    k = min(int(at), len(COLOURS) - 2)
+    return "#" + "".join(f"{round(a + (at - k) * (b - a)):02x}" for a, b in zip(COLOURS[k], COLOURS[k + 1]))
 
 
 def _safe(text: str) -> str:

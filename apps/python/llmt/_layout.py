@@ -1,7 +1,7 @@
 """Where the parts of a drawn tree stand. Lengths are in em, the size of the letters.
 
-The tree lies on its side: the root on the left, a row for each leaf on the right, with its equation. A branch has what is
-compared above it and the value below.
+The tree lies on its side: the root on the left, a row for each leaf on the right, with its equation. A branch has what
+is compared above it and the value below.
 """
 
 from __future__ import annotations
@@ -15,7 +15,9 @@ MOST_LEAVES = 32
 MOST_DEPTH = 9
 LINE = 1.25  # height of a line of text
 GAP = 1.0  # between leaves
-CUT_NOTE = "Only the first splits are drawn. A dashed box has the equation of all rows that reach it; the tree goes on there."
+CUT_NOTE = (
+    "Only the first splits are drawn. A dashed box has the equation of all rows that reach it; the tree goes on there."
+)
 _ELLIPSIS = "\N{HORIZONTAL ELLIPSIS}"
 _NARROW, _WIDE = frozenset("il.,;:|'!jtfr()[]{} I\"-"), frozenset("mwMW@%_")
 
@@ -81,8 +83,8 @@ def fitted(text: str, width: float) -> str:
 
 
 def layout_of(tree: Tree, width: float, most_leaves: int = MOST_LEAVES, most_depth: int = MOST_DEPTH) -> Layout:
-    """The drawing of a tree. Of one with more than `most_leaves` the first splits are drawn, about half as many; a branch
-    that goes on has the equation of all rows there, and says how many leaves are left out."""
+    """The drawing of a tree. Of one with more than `most_leaves` the first splits are drawn, about half as many; a
+    branch that goes on has the equation of all rows there, and says how many leaves are left out."""
     items = items_of(tree, most_leaves, most_depth)
     columns = _columns(items, width)
     leaf_width = width - columns[-1] - 2.2
@@ -138,7 +140,8 @@ def items_of(tree: Tree, most_leaves: int = MOST_LEAVES, most_depth: int = MOST_
 def _columns(items: list[Item], width: float) -> list[float]:
     depth = max(item.depth for item in items)
     wanted = [
-        max(min(11.0, max(em(item.what), 1.08 * em(item.how))) for item in items if item.depth == d) + 1.6 for d in range(1, depth + 1)
+        max(min(11.0, max(em(item.what), 1.08 * em(item.how))) for item in items if item.depth == d) + 1.6
+        for d in range(1, depth + 1)
     ]
     room = 0.5 * width
     shrink = min(1.0, room / sum(wanted)) if wanted else 1.0
@@ -168,14 +171,19 @@ def _describe(tree: Tree, item: Item, width: float) -> None:
     errors = ", ".join(number(rmse, 3) for rmse in leaf.rmse[:most_targets])
     item.note = f"{leaf.number}: {_count(leaf.rows, 'row')}, RMSE {errors}"
     if item.is_cut:
-        item.note = f"{_ELLIPSIS} {_count(leaf.rows, 'row')}, RMSE {errors}; goes on to {tree.leaves_below(item.node)} leaves"
+        item.note = (
+            f"{_ELLIPSIS} {_count(leaf.rows, 'row')}, RMSE {errors}; goes on to {tree.leaves_below(item.node)} leaves"
+        )
     if left_out:
         item.note += f"; {_count(left_out, 'smaller term')} not shown"
     item.note = fitted(item.note, width / 0.92)  # in smaller letters
     where = f"Leaf {leaf.number}: {' and '.join(leaf.conditions) or 'everywhere'}"
     item.full = "\n".join(
         ["The equation of all rows here" if item.is_cut else fitted(where, 150.0)]
-        + [f"{target} = {' '.join(tree.equation(leaf, o))}"[:500] for o, target in enumerate(tree.targets[:most_targets])]
+        + [
+            f"{target} = {' '.join(tree.equation(leaf, o))}"[:500]
+            for o, target in enumerate(tree.targets[:most_targets])
+        ]
     )
 
 

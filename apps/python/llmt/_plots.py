@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
 from ._explanation import Explanation
 from ._facts import facts_of
 from ._frames import curves
-from ._html import _SCALE
-from ._layout import CUT_NOTE, LINE, MOST_LEAVES, Layout, layout_of
-from ._tree import level_names, number, shown, trees
+from ._layout import CUT_NOTE, MOST_LEAVES, layout_of
+from ._tree import Tree, level_names, number, shown, trees
 
 _BLUE, _ORANGE, _GREY = "#2f86d1", "#d2603a", "#8c8c8c"
 _WIDTH = 9.0  # inches
 _EM = 8.0  # points
+_MINUS = "\N{MINUS SIGN}"
 _MOST_POINTS = 5000
 
 
@@ -42,8 +43,8 @@ def plot_tree(
 ) -> Any:
     """The tree with the conditions on its branches and the equations in its leaves.
 
-    Coefficients have the digits that a prediction to 0.1 % of the target's range needs; `rules_frame` has them all. Of a
-    tree with more than `most_leaves` only the first splits are drawn. `target`: name or position of a target.
+    Coefficients have the digits that a prediction to 0.1 % of the target's range needs; `rules_frame` has them all. Of
+    a tree with more than `most_leaves` only the first splits are drawn. `target`: name or position of a target.
     """
     tree = _tree_of(model, target)
     wide = _WIDTH * 72.0 / _EM
@@ -57,7 +58,9 @@ def plot_tree(
     ax.set_xlim(0.0, layout.width)
     ax.set_ylim(max(layout.height, box.height * 72.0 / size - 0.5), -0.5)
     ax.set_axis_off()
-    _draw(ax, layout, size)
+    from ._draw_tree import draw  # matplotlib is imported by now
+
+    draw(ax, layout, size)
     facts = facts_of(model, tree, summary, _partition_of(model, target), readable=readable)
     title = facts.heading
     if facts.errors:
@@ -71,8 +74,8 @@ def plot_tree(
 def plot_predicted(
     observed: Any, predicted: Any, ax: Any = None, name: str = "y", rows: str = "rows held out", weights: Any = None
 ) -> Any:
-    """Predictions against observations, with the line where they agree; `rows` says which they are of. Of more than 5000
-    rows every k-th is drawn; the errors in the title are those of all."""
+    """Predictions against observations, with the line where they agree; `rows` says which they are of. Of more than
+    5000 rows every k-th is drawn; the errors in the title are those of all."""
     y, f = np.ravel(np.asarray(observed, dtype=float)), np.ravel(np.asarray(predicted, dtype=float))
     w = np.ones(len(y)) if weights is None else np.asarray(weights, dtype=float)
     ax = _axes(ax, (4.6, 4.4))
@@ -124,27 +127,33 @@ def plot_curve(
     predicted = handle.predict(rows)[:, output]
     ax = _axes(ax)
     band = None
-    if coverage is not None and handle.has_intervals:
+    level = 0.0 if coverage is None else coverage
+    if level and handle.has_intervals:
         try:
-            band = [bound[:, output] for bound in handle.intervals(rows, coverage)[:2]]
+            band = [bound[:, output] for bound in handle.intervals(rows, level)[:2]]
         except ValueError:
             band = None  # too few held-out rows for this level
     if levels:
         xs = np.arange(len(levels), dtype=float)
         if band:
-            ax.vlines(xs, band[0], band[1], color=_BLUE, alpha=0.35, lw=6, label=f"{100 * coverage:g} % interval")
+            ax.vlines(xs, band[0], band[1], color=_BLUE, alpha=0.35, lw=6, label=f"{100 * level:g} % interval")
         ax.plot(xs, predicted, "o", color=_BLUE)
+        ax.margins(x=0.08, y=0.2)
         ax.set_xticks(xs, [shown(level, 20) for level in levels], parse_math=False)
         if sum(len(shown(level, 20)) + 2 for level in levels) > 60:
             ax.tick_params("x", rotation=90 if len(levels) > 12 else 30)
     else:
         if band:
-            ax.fill_between(xs, *band, color=_BLUE, alpha=0.18, lw=0, label=f"{100 * coverage:g} % interval")
+            ax.fill_between(xs, *band, color=_BLUE, alpha=0.18, lw=0, label=f"{100 * level:g} % interval")
         ax.plot(xs, predicted, color=_BLUE, lw=1.8)
     if band:
         ax.legend(frameon=False, fontsize="small")
     _label(ax, shown(name), shown(handle.outputs()[output]))
-    others = "others at " + ", ".join(f"{shown(key)} = {value}" for key, value in at.items()) if at else "others at their means"
+    others = (
+        "others at " + ", ".join(f"{shown(key)} = {value}" for key, value in at.items())
+        if at
+        else "others at their means"
+    )
     ax.set_title(f"Prediction along {shown(name)}, {others}", fontsize="medium", parse_math=False)
     return ax
 
@@ -152,8 +161,8 @@ def plot_curve(
 def plot_importance(names: Sequence[str], importance: Any, ax: Any = None, most: int = 20) -> Any:
     """Bars of the inputs' shares of what the model adds up, the largest on top.
 
-    `importance`: what `_core.Model.importance(rows)` returned (the mean size of the contributions as shares of 1) for one
-    target, or several targets x inputs, of which the mean is shown.
+    `importance`: what `_core.Model.importance(rows)` returned (the mean size of the contributions as shares of 1) for
+    one target, or several targets x inputs, of which the mean is shown.
     """
     shares = np.asarray(importance, dtype=float).reshape(-1, len(names)).mean(axis=0)
     order = np.argsort(-shares, kind="stable")
@@ -165,7 +174,14 @@ def plot_importance(names: Sequence[str], importance: Any, ax: Any = None, most:
     ax.set_yticks(at, [shown(names[k], 28) for k in order], parse_math=False)
     ax.invert_yaxis()
     for k, share in zip(at, shares[order]):
-        ax.annotate(f"{100 * share:.1f}", (100.0 * share, k), xytext=(3, 0), textcoords="offset points", va="center", fontsize="small")
+        ax.annotate(
+            f"{100 * share:.1f}",
+            (100.0 * share, k),
+            xytext=(3, 0),
+            textcoords="offset points",
+            va="center",
+            fontsize="small",
+        )
     ax.margins(x=0.12)
     ax.set_xlabel("share of the contributions, %")
     ax.set_title("Importance" + (f", without {len(rest)} smaller ones" if len(rest) else ""), fontsize="medium")
@@ -204,7 +220,9 @@ def plot_error_over_leaves(summary: dict[str, Any], ax: Any = None, target: str 
     return ax
 
 
-def plot_waterfall(explanation: Explanation, ax: Any = None, row: int = 0, target: str | int = 0, most: int = 12) -> Any:
+def plot_waterfall(
+    explanation: Explanation, ax: Any = None, row: int = 0, target: str | int = 0, most: int = 12
+) -> Any:
     """How the contributions of the inputs lead from the base value to the prediction of one row."""
     one = explanation[row] if np.ndim(explanation.data) == 2 else explanation
     if np.ndim(one.values) == 2:
@@ -222,18 +240,25 @@ def plot_waterfall(explanation: Explanation, ax: Any = None, row: int = 0, targe
     for k, step in enumerate(steps):
         ax.barh(k, step, left=ends[k], color=_BLUE if step >= 0.0 else _ORANGE, height=0.62)
         ax.plot([ends[k + 1]] * 2, [k - 0.31, min(k + 1.31, len(steps) - 0.69)], color=_GREY, lw=0.8)
-        outward = 1 if step >= 0.0 else -1
+        text = f"{'+' if step >= 0 else _MINUS}{number(abs(step), 3)}"
         ax.annotate(
-            f"{'+' if step >= 0 else '−'}{number(abs(step), 3)}", (ends[k + 1], k), xytext=(4 * outward, 0),
-            textcoords="offset points", va="center", ha="left" if outward > 0 else "right", fontsize="small",
-        )  # fmt: skip
+            text,
+            (max(ends[k], ends[k + 1]), k),
+            xytext=(5, 0),
+            textcoords="offset points",
+            va="center",
+            fontsize="small",
+        )
     ax.axvline(base, color=_GREY, lw=0.8, ls=":")
     ax.set_yticks(np.arange(len(steps)), labels, parse_math=False)
     ax.invert_yaxis()
     ax.use_sticky_edges = False
     ax.margins(x=0.15)
     output = shown(one.output_names[0])
-    ax.set_xlabel(f"{output}, from the base value {number(base)} (dotted) to the prediction {number(float(ends[-1]))}", parse_math=False)
+    ax.set_xlabel(
+        f"{output}, from the base value {number(base)} (dotted) to the prediction {number(float(ends[-1]))}",
+        parse_math=False,
+    )
     ax.set_title(f"Contributions to {output} = {number(float(ends[-1]))}", fontsize="medium", parse_math=False)
     _clear(ax)
     return ax
@@ -268,46 +293,6 @@ def plot_all(
     return [above, *below]
 
 
-def _draw(ax: Any, layout: Layout, size: float) -> None:
-    from matplotlib.colors import LinearSegmentedColormap
-    from matplotlib.patches import Rectangle
-
-    colour = ax.yaxis.label.get_color()
-    scale = LinearSegmentedColormap.from_list("llmt", [[part / 255.0 for part in rgb] for rgb in _SCALE])
-    right = layout.columns[-1]
-
-    def line(x: Sequence[float], y: Sequence[float], alpha: float = 0.5, style: Any = "-") -> None:
-        ax.plot(x, y, color=colour, alpha=alpha, lw=0.11 * size, ls=style, solid_capstyle="butt")
-
-    def text(x: float, y: float, words: str, share: float = 1.0, alpha: float = 1.0, weight: str = "normal", va: str = "baseline") -> None:
-        ax.text(x, y, words, fontsize=size * share, color=colour, alpha=alpha, fontweight=weight, va=va, parse_math=False)
-
-    for position, item in enumerate(layout.items):
-        here = layout.columns[item.depth]
-        if item.parent is not None:
-            begin = layout.columns[item.depth - 1]
-            line([begin, here], [item.middle] * 2)
-            text(begin + 0.5, item.middle - 0.3, item.what, 0.95)
-            text(begin + 0.5, item.middle + 0.25, item.how, 0.95, weight="bold", va="top")
-        if item.is_split:
-            of = [child.middle for child in layout.items if child.parent == position]
-            line([here, here], [min(of), max(of)])
-            ax.plot([here], [item.middle], "o", color=colour, alpha=0.6, ms=0.45 * size)
-            continue
-        if right > here:
-            line([here, right], [item.middle] * 2, 0.35, (0, (1, 3)))
-        top = item.middle - item.height / 2
-        border = {"edgecolor": colour, "linewidth": 0.8, "linestyle": (0, (3, 2)), "alpha": 0.6} if item.is_cut else {}
-        box = (right, top - 0.15), layout.width - right - 0.2, item.height + 0.3
-        ax.add_patch(Rectangle(*box, facecolor=colour, alpha=0.07, linewidth=0))
-        if border:
-            ax.add_patch(Rectangle(*box, fill=False, **border))
-        ax.add_patch(Rectangle(box[0], 0.5, box[2], facecolor=scale(item.level), linewidth=0))
-        for k, words in enumerate(item.lines):
-            text(right + (2.4 if words.startswith(" ") else 1.0), top + k * LINE + 0.95, words.strip())
-        text(right + 1.0, top + len(item.lines) * LINE + 0.9, item.note, 0.9, 0.7)
-
-
 def _label(ax: Any, x: str, y: str) -> None:
     ax.set_xlabel(x, parse_math=False)
     ax.set_ylabel(y, parse_math=False)
@@ -340,16 +325,16 @@ def _output_of(names: Sequence[str], target: str | int) -> int:
     return names.index(target) if isinstance(target, str) else target
 
 
+def _summary_of(summary: dict[str, Any], target: str | int) -> dict[str, Any]:
+    names = [name for partition in summary["partitions"] for name in partition["targets"]]
+    wanted = names[_output_of(names, target)]
+    return next(partition for partition in summary["partitions"] if wanted in partition["targets"])
+
+
 def _partition_of(model: dict[str, Any], target: str | int) -> int:
     output = _output_of([of["name"] for of in model["outputs"]], target)
     return next(p for p, of in enumerate(model["partitions"]) if output in of["outputs"])
 
 
-def _tree_of(model: dict[str, Any], target: str | int) -> Any:
+def _tree_of(model: dict[str, Any], target: str | int) -> Tree:
     return trees(model, lambda name: shown(name, 24))[_partition_of(model, target)]
-
-
-def _summary_of(summary: dict[str, Any], target: str | int) -> dict[str, Any]:
-    names = [name for partition in summary["partitions"] for name in partition["targets"]]
-    wanted = names[_output_of(names, target)]
-    return next(partition for partition in summary["partitions"] if wanted in partition["targets"])

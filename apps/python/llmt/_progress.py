@@ -6,7 +6,8 @@ import html
 import os
 import sys
 import time
-from typing import Any, Callable
+from collections.abc import Callable
+from typing import Any
 
 _PATIENCE = 2.0  # seconds of silence: most fits are done by then
 _BETWEEN = 0.1  # seconds between two pictures

@@ -48,7 +48,9 @@ def _tree_lines(tree: Tree, items: list[Item], width: int) -> list[str]:
     lines = []
     for item in items:
         indent = "|  " * max(0, item.depth - 1)
-        condition = shown(f"{item.what} {item.how}", max(20, width - len(indent))).replace("\N{LESS-THAN OR EQUAL TO}", "<=")
+        condition = shown(f"{item.what} {item.how}", max(20, width - len(indent))).replace(
+            "\N{LESS-THAN OR EQUAL TO}", "<="
+        )
         head = indent + condition if item.depth else "everywhere" if item.leaf else ""
         if item.leaf is None:
             lines += [head] if head else []

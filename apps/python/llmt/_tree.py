@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import math
 import unicodedata
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, Callable, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -50,14 +51,19 @@ def number(value: float | None, digits: int = 4) -> str:
     if not math.isfinite(value) or value == 0.0:
         return str(value) if value else "0"
     text = f"{value:.{digits}g}"
-    return f"{float(text):.{max(0, digits - 1 - math.floor(math.log10(abs(value))))}f}" if 1e-4 <= abs(value) < 1e6 else text
+    return (
+        f"{float(text):.{max(0, digits - 1 - math.floor(math.log10(abs(value))))}f}"
+        if 1e-4 <= abs(value) < 1e6
+        else text
+    )
 
 
 def shown(name: str, most: int = 60) -> str:
     """A name that can stand inside other text: control characters, among them those that turn the direction of all that
     follows, become "\N{REPLACEMENT CHARACTER}", and what is longer than `most` characters ends in an ellipsis."""
     clean = "".join(
-        "\N{REPLACEMENT CHARACTER}" if unicodedata.category(c) in ("Cc", "Cf", "Cs", "Zl", "Zp") else c for c in name[: most + 1]
+        "\N{REPLACEMENT CHARACTER}" if unicodedata.category(c) in ("Cc", "Cf", "Cs", "Zl", "Zp") else c
+        for c in name[: most + 1]
     )
     return clean if len(clean) <= most else clean[: most - 1] + "\N{HORIZONTAL ELLIPSIS}"
 
@@ -93,12 +99,15 @@ class Tree:
     def __init__(self, model: dict[str, Any], partition: int = 0, show: Callable[[str], str] = str) -> None:
         """`show` makes of a name what stands in the texts."""
         self.inputs: list[dict[str, Any]] = [
-            {**of, "name": show(of["name"]), "levels": [show(name) for name in level_names(of)]} for of in model["inputs"]
+            {**of, "name": show(of["name"]), "levels": [show(name) for name in level_names(of)]}
+            for of in model["inputs"]
         ]
         self.regressors: list[dict[str, Any]] = model["regressors"]
         self.partition: dict[str, Any] = model["partitions"][partition]
         self.nodes: list[dict[str, Any]] = self.partition["nodes"]
-        self.outputs = [{**model["outputs"][o], "name": show(model["outputs"][o]["name"])} for o in self.partition["outputs"]]
+        self.outputs = [
+            {**model["outputs"][o], "name": show(model["outputs"][o]["name"])} for o in self.partition["outputs"]
+        ]
         self.targets: list[str] = [output["name"] for output in self.outputs]
         self.centres = np.array([regressor["centre"] for regressor in self.regressors], dtype=float)
         self.regressor_names = [self._regressor_name(regressor) for regressor in self.regressors]
@@ -110,12 +119,14 @@ class Tree:
         return self.partition["validity"]["kind"] != "crisp" and len(self.leaves) > 1
 
     def condition(self, node: int, left: bool, precision: float | None = None) -> Condition:
-        """The condition of one side of the node's split. `precision`: of the threshold, as a share of the input's range."""
+        """The condition of one side of the node's split. `precision`: of a threshold, as a share of the range."""
         split = self.nodes[node]["split"]
         of = self.inputs[split["column"]]
         if "level_side" in split:
             wanted = -1 if left else 1
-            return Condition(of["name"], _levels(of, [k for k, side in enumerate(split["level_side"]) if side == wanted]))
+            return Condition(
+                of["name"], _levels(of, [k for k, side in enumerate(split["level_side"]) if side == wanted])
+            )
         sign = "<=" if left else ">"
         if "direction" in split:
             threshold = split["threshold"]
@@ -124,7 +135,8 @@ class Tree:
                 if weight:
                     threshold += weight * other["centre"]
                     joint = ("-" if weight < 0 else "") if not text else " - " if weight < 0 else " + "
-                    text += f"{joint}{decimal(abs(weight)) if precision is None else number(abs(weight), 2)} {other['name']}"
+                    size = decimal(abs(weight)) if precision is None else number(abs(weight), 2)
+                    text += f"{joint}{size} {other['name']}"
             return Condition(text, f"{sign} {decimal(threshold) if precision is None else number(threshold, 3)}")
         if split["threshold"] >= _ANY_VALUE:
             return Condition(of["name"], "is known" if left else "is missing")
@@ -155,7 +167,9 @@ class Tree:
         low, high = np.array(root["low"], dtype=float), np.array(root["high"], dtype=float)
         largest = np.maximum(np.abs(self.centres + low), np.abs(self.centres + high))
         node = self.nodes[leaf.node]
-        effects = np.abs(leaf.slope[output]) * (np.array(node["high"], dtype=float) - np.array(node["low"], dtype=float))
+        effects = np.abs(leaf.slope[output]) * (
+            np.array(node["high"], dtype=float) - np.array(node["low"], dtype=float)
+        )
         order = np.argsort(-effects, kind="stable")
         terms, left_out = [decimal(leaf.intercept[output], tolerance)], 0
         for k in order.tolist():
@@ -239,7 +253,9 @@ class Tree:
                 if "direction" in split:
                     waiting.append((child, box, [*sides, str(self.condition(at, left))]))
                 else:
-                    waiting.append((child, {**box, split["column"]: _cut(box.get(split["column"]), split, left)}, sides))
+                    waiting.append(
+                        (child, {**box, split["column"]: _cut(box.get(split["column"]), split, left)}, sides)
+                    )
         return leaves
 
     def as_leaf(self, node: int) -> Leaf:
