@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from ._check import Check
     from ._explanation import Explanation
     from ._model import Model
-    from ._tables import Table
+    from .tables import Table
 
 _no_page = (
     "this build of llmt has no page for reports: it was built without the packages that `cmake/setup report` fetches; "
