@@ -63,6 +63,14 @@ def _codes(rows, seed):
     return {"month": list(month * 1.0), "side": list(side * 1.0), "x": list(x[:, 0]), "z": list(x[:, 1])}, {"y": y}
 
 
+def _machines(rows, seed):
+    """Numbers that are names, as whole numbers and as text."""
+    random = np.random.default_rng(seed)
+    machine, x = random.choice([3.0, 7.0, 12.5, 1e6], rows), random.uniform(-1.0, 1.0, rows)
+    y = np.where(machine > 5.0, x, -x) + 0.1 * machine % 3.0 + 0.05 * random.standard_normal(rows)
+    return {"machine": [f"{number:g}" if number < 1e5 else "1000000" for number in machine], "x": list(x)}, {"y": y}
+
+
 def _two(rows, seed):
     columns, outputs = _table(rows, seed)
     return columns, {"y": outputs["y"], 'z "2"': np.array(columns["a"]) ** 2 + outputs["y"]}
@@ -99,6 +107,7 @@ MODELS = {
     "gaussian": (lambda: _table(300, 13), ["--validity", "gaussian"]),
     "gaussian_missing": (lambda: _table(300, 14, missing=0.1), ["--validity", "gaussian"]),
     "hilomot": (lambda: _planes(400, 15), ["--rule", "hilomot", "--max-leaves", "5"]),
+    "machines": (lambda: _machines(300, 20), ["--categorical", "machine"]),
     "two_outputs": (lambda: _two(300, 16), ["--validity", "blend"]),
     "two_shared": (lambda: _two(300, 17), ["--shared", "--validity", "crisp"]),
     "m5": (lambda: _table(400, 18), ["--rule", "m5"]),
@@ -160,7 +169,7 @@ def _rows(model, columns, seed):
         add("missing", row)
     add("missing", [None] * len(inputs))
     for j in words:
-        for label in ("never seen", "RED", "its", "0"):
+        for label in ("never seen", "RED", "its", "0", " red\t "):
             row = drawn()
             row[j] = label
             add("unknown", row)

@@ -148,6 +148,21 @@ def test_names_cannot_become_code():
     assert predict({model["inputs"][0]["name"]: 3.0}) == 2.5
 
 
+def test_numbers_are_found_among_labels(fitted):
+    model = fitted("machines")
+    predict, _ = function_of(model.model)
+    table = to_sql(model.model, "t", "sqlite", keep=["id"]), to_sql(model.model, "t", "duckdb", keep=["id"])
+    known = [i for i in model.of("training") if model.rows[i][0] is not None]
+    rows = [[float(model.rows[i][0]), model.rows[i][1]] for i in known]
+    np.testing.assert_array_equal([[predict(row)] for row in rows], model.predicted[known])
+    assert predict([3, 0.5]) == predict(["3", 0.5]) == predict([np.float64(3.0), 0.5]) != predict([4.0, 0.5])
+    for connection, statement in zip((sqlite3.connect(":memory:"), pytest.importorskip("duckdb").connect()), table):
+        connection.execute("CREATE TABLE t (id INTEGER, machine DOUBLE PRECISION, x DOUBLE PRECISION)")
+        connection.executemany("INSERT INTO t VALUES (?, ?, ?)", [[i, *row] for i, row in enumerate(rows)])
+        got = [row[1:] for row in connection.execute(statement + " ORDER BY 1").fetchall()]
+        assert_same(np.array(got), model.predicted[known], 1e-12)
+
+
 # SQL
 
 
@@ -266,6 +281,7 @@ def in_onnx(model, rows):
         for j, name in enumerate(names):
             is_text = "levels" in model["inputs"][j]
             cells = [("" if is_text else math.nan) if row[j] is None else row[j] for row in rows]
+            cells = [cell.strip() for cell in cells] if is_text else cells  # labels are compared as they are
             feed[name] = np.array(cells, dtype=object if is_text else np.float64).reshape(-1, 1)
     else:
         assert names == ["X"]

@@ -5,12 +5,18 @@ sides, 1 / half width in place of the half width, the residual range with its ma
 """
 
 import math
+import re
 import sys
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
 Floats = tuple[float, ...]
+
+BLANKS = " \t\r"
+"""What is taken off at both ends of a label before it is compared."""
+
+_NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?", re.ASCII)
 
 PRESENCE = sys.float_info.max
 """Threshold of a split into rows with a value (left) and without one (right)."""
@@ -32,6 +38,15 @@ class Input:
     def count(self) -> int:
         """Number of levels or codes; 0 for a number."""
         return len(self.levels) or len(self.codes)
+
+    @property
+    def numbers(self) -> dict[float, int]:
+        """Levels of the labels that are texts of numbers, by their value; of 3 and 3.0 the shorter."""
+        levels: dict[float, int] = {}
+        for level, label in sorted(enumerate(self.levels), key=lambda entry: -len(entry[1])):
+            if _NUMBER.fullmatch(label):
+                levels[float(label)] = level
+        return levels
 
 
 @dataclass(frozen=True)

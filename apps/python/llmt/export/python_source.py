@@ -4,7 +4,7 @@ import keyword
 from collections.abc import Iterable
 from typing import Any
 
-from .model import MOST_ANCESTORS, Input, Node, Partition, read
+from .model import BLANKS, MOST_ANCESTORS, Input, Node, Partition, read
 
 _RUNTIME = '''
 def @_hold(x, low, high):
@@ -30,7 +30,7 @@ def @_numbers(row):
         if value is None or value != value:
             x.append(math.nan)
         elif levels:
-            x.append(float(levels.get(value if isinstance(value, str) else str(value), math.nan)))
+            x.append(float(levels.get(value.strip(BLANKS) if isinstance(value, str) else value, math.nan)))
         else:
             value = float(value)
             if math.isinf(value):
@@ -164,8 +164,8 @@ def NAME(row):
 
     `row` is a mapping from the names of the inputs to their values, or a sequence of the values in the order
     INPUTS.
-    A category is given by its label. None and NaN are missing values; so is a label that was not in training.
-    Raises ValueError if a value is infinite.
+    A category is given by its label, or by the number that its label is the text of. None and NaN are missing values;
+    so is a label that was not in training. Raises ValueError if a value is infinite.
     """
     x = @_numbers(row)
     d = @_deviations(x)
@@ -257,7 +257,8 @@ def to_python(model: dict[str, Any], name: str = "predict") -> str:
     tree = read(model)
     prefix = f"_{name}"
     columns = [
-        (c.name, c.low, c.high, c.centre, {label: i for i, label in enumerate(c.levels)}, c.codes) for c in tree.inputs
+        (c.name, c.low, c.high, c.centre, {label: i for i, label in enumerate(c.levels)} | c.numbers, c.codes)
+        for c in tree.inputs
     ]
     single = len(tree.outputs) == 1
     returns = f"The prediction of {tree.outputs[0]!a}"
@@ -265,7 +266,8 @@ def to_python(model: dict[str, Any], name: str = "predict") -> str:
         returns = f"The predictions of {list(tree.outputs)!a}, a list,"
     returns = returns.replace("\\", "\\\\").replace('"', '\\"')
     runtime = (
-        _RUNTIME.replace("MOST_ANCESTORS", str(MOST_ANCESTORS))
+        _RUNTIME.replace("BLANKS", repr(BLANKS))
+        .replace("MOST_ANCESTORS", str(MOST_ANCESTORS))
         .replace("OUTPUTS", str(len(tree.outputs)))
         .replace("RESULT", "y[0]" if single else "y")
         .replace("def NAME", f"def {name}")

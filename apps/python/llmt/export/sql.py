@@ -91,8 +91,12 @@ class _Statement:
         for j, column in enumerate(self.model.inputs):
             name = _name(column.name)
             if column.levels:
-                whens = " ".join(f"WHEN {_string(level)} THEN {i}" for i, level in enumerate(column.levels))
-                columns.append(f"CASE CAST({name} AS TEXT) {whens} END AS x{j}")
+                labels = {label: i for i, label in enumerate(column.levels)}
+                for value, i in column.numbers.items():  # the text of a double in DuckDB and SQLite
+                    labels.setdefault(repr(value), i)
+                whens = " ".join(f"WHEN {_string(label)} THEN {i}" for label, i in labels.items())
+                blanks = "' '||CHAR(9,13)" if self.dialect == "sqlite" else "' '||CHR(9)||CHR(13)"
+                columns.append(f"CASE TRIM(CAST({name} AS TEXT),{blanks}) {whens} END AS x{j}")
                 continue
             x = f"CAST({name} AS DOUBLE PRECISION)"
             if self.dialect == "sqlite":  # a NaN is NULL, but an empty text would be 0
@@ -315,7 +319,8 @@ def to_sql(
     """A SELECT statement that gives the predictions of the rows of a table, one column TARGET_pred for each output.
 
     It says what `llmt predict` says, guards and missing values included, but for the rounding of sums. NULL, and NaN
-    where the database has it, is a missing value; a category is compared by its label. An infinite value,
+    where the database has it, is a missing value; a category is compared by its label, without blanks at
+    the ends. An infinite value,
     which `llmt predict` refuses, is taken.
 
     `model` is what `json.loads` makes of the text of a model file. `table` is the name of the table, or a sequence of
