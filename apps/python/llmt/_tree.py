@@ -204,11 +204,11 @@ class Tree:
     def standard_errors(self, leaf: Leaf, output: int = 0) -> tuple[float, np.ndarray]:
         """Standard errors of the intercept and of the slopes of a leaf.
 
-        Those of least squares over the rows of the leaf,
-            se_k^2 = s_i^2 (T G_i^-1 T')_kk,   s_i^2 = RSS_i / (n_i - p_i)
-        with G_i, RSS_i, n_i and p_i as in (I.2) and T the step from deviations to the inputs themselves. They take the
-        tree as given. NaN where the leaf's rows do not determine the coefficient, where it was not selected, where as
-        many coefficients as rows were fitted, and in models without Gram matrices.
+        Those of least squares over the rows of the leaf, (I.3) of docs/algorithms/intervals.md:
+            se_k^2 = RSS_i / (n_i - p_i) (T G_i^-1 T')_kk
+        with T the step from the coefficients of deviations to those of the regressors. They take the tree as given.
+        NaN where the leaf's rows do not determine the coefficient, where it was not selected, where as many coefficients
+        as rows were fitted, and in models without Gram matrices.
         """
         count = len(self.regressors) + 1
         nothing = math.nan, np.full(count - 1, math.nan)
