@@ -221,3 +221,14 @@ def test_nothing_is_printed_and_no_file_is_written(tmp_path, capfd, monkeypatch)
     assert capfd.readouterr() == ("", "")
     assert os.listdir(tmp_path) == []
     assert threading.active_count() >= 1
+
+
+def test_the_model_can_be_taken_elsewhere():
+    X, y = stepped(300)
+    fitted = LocalLinearTreeRegressor(validity="crisp").fit(X, y)
+    names = {}
+    exec(fitted.to_python("predict"), names)
+    np.testing.assert_array_equal(np.ravel([names["predict"](row) for row in X[:50]]), fitted.predict(X[:50]))
+    assert "SELECT" in fitted.to_sql("data").upper()
+    source, header = fitted.to_c("model")
+    assert "model_predict" in source and "model_predict" in header

@@ -41,6 +41,8 @@ class Fit {
     if (const std::string why = readable_loss ? why_not_readable(options) : ""; !why.empty()) {
       throw std::invalid_argument("a readable tree does not go with " + why);
     }
+    lines_.resize(data.inputs.rows());
+    std::iota(lines_.begin(), lines_.end(), Eigen::Index{0});
     const auto shared = std::make_shared<const TrainingData>(std::move(data));
     interruptible(
         [&](const Progress& progress) {
@@ -94,16 +96,17 @@ class Fit {
   }
 
   // The page of `llmt fit --report`; empty where the module was built without it.
-  std::string page(const std::string& data, const std::string& origin) {
-    const bool has_folds = result_->summary.partitions.front().cv_folds > 0;
+  std::string page(const std::string& data, const std::string& origin) const {
     if (report::empty_page().empty()) return "";
-    if (!readable_ && has_folds && why_not_readable(options_).empty()) {
+    const bool has_folds = result_->summary.partitions.front().cv_folds > 0;
+    std::optional<ReadableResult> shown = readable_;
+    if (!shown && has_folds && why_not_readable(options_).empty()) {
       const nb::gil_scoped_release unlocked;
-      readable_ = fit_readable(*prepared_, result_->summary);
+      shown = fit_readable(*prepared_, result_->summary);
     }
     const TrainingData& rows = prepared_->data();
     return report::filled_page(report::empty_page(),
-                               report::fit_report({data, rows.inputs, rows.outputs, options_, *result_, readable_, 0}),
+                               report::fit_report({data, rows.inputs, rows.outputs, options_, *result_, shown, 0}),
                                origin);
   }
 
@@ -114,20 +117,14 @@ class Fit {
   }
 
  private:
-  report::FitRun run(const std::string& data) const {
-    if (lines_.empty()) {
-      lines_.resize(prepared_->data().inputs.rows());
-      std::iota(lines_.begin(), lines_.end(), Eigen::Index{0});
-    }
-    return {data, options_, prepared_->data(), lines_, ""};
-  }
+  report::FitRun run(const std::string& data) const { return {data, options_, prepared_->data(), lines_, ""}; }
 
   FitOptions options_;
   double loss_;
   std::optional<PreparedFit> prepared_;
   std::optional<FitResult> result_;
   std::optional<ReadableResult> readable_;
-  mutable std::vector<Eigen::Index> lines_;  // of the rows, counted from 0
+  std::vector<Eigen::Index> lines_;  // of the rows, counted from 0
 };
 
 std::unique_ptr<Fit> fit_table(const Array& inputs, const Array& outputs, const nb::dict& options,

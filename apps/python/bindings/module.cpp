@@ -3,6 +3,7 @@
 #include <exception>
 #include <stdexcept>
 
+#include "llmt/options.hpp"
 #include "llmt/progress.hpp"
 
 namespace {
@@ -24,7 +25,9 @@ NB_MODULE(_core, module) {
   namespace nb = nanobind;
   module.doc() = "The C++ library, bound. The classes of the package llmt are what people use.";
   module.attr("__version__") = LLMT_VERSION;
+  module.attr("most_categories") = llmt::most_categories;
   nb::register_exception_translator(translate);
+  llmt::python::add_arrow(module);
   llmt::python::add_models(module);
   llmt::python::add_fitting(module);
 }

@@ -6,6 +6,7 @@
 
 namespace llmt::python {
 
+void add_arrow(nanobind::module_& module);
 void add_fitting(nanobind::module_& module);
 void add_models(nanobind::module_& module);
 

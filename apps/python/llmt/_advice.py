@@ -5,7 +5,7 @@ import warnings
 import numpy as np
 
 from . import _core
-from ._tables import Table
+from .tables import Table
 
 
 def warn_of_accidental_inputs(table: Table, meant: set[str], stacklevel: int) -> None:

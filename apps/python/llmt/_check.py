@@ -53,7 +53,7 @@ _words = {
 
 def check(estimator: Any, X: Any, y: Any = None) -> Check:
     """Compares the rows with what the model knows of its inputs."""
-    from ._tables import read_targets
+    from .tables import read_targets
 
     table = estimator._table(X)
     handle = estimator._model().handle

@@ -2,7 +2,6 @@
 
 import json
 import os
-import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
@@ -10,12 +9,11 @@ import numpy as np
 
 from . import _advice, _core
 from ._base import BaseEstimator, NotFittedError, RegressorMixin
-from ._columns import check_columns, remember_columns
 from ._frames import mean_baseline
 from ._model import Model, StreamModel
 from ._progress import Bar
-from ._tables import Table, read_column, read_table, read_targets, row_labels
 from ._views import Views
+from .tables import Table, read_column, read_table, read_targets, row_labels
 
 _most_seeds = 2**31
 
@@ -154,8 +152,6 @@ class LocalLinearTreeRegressor(Views, RegressorMixin, BaseEstimator):
         ValueError, TypeError
             For what cannot be learned from; the message names the column or the parameter.
         """
-        if y is None:
-            raise ValueError(f"{type(self).__name__} requires y to be passed, but the target y is None")
         table = read_table(X, categorical=self.categorical_features)
         outputs, names = read_targets(y)
         _check_rows(len(table.values), len(outputs))
@@ -190,7 +186,7 @@ class LocalLinearTreeRegressor(Views, RegressorMixin, BaseEstimator):
             )
         if self.loss == "squared":
             _advice.warn_of_gross_errors(fitted, outputs, self._outputs, stacklevel=3)
-        remember_columns(self, table)
+        self._remember_columns(table)
         self.accurate_model_ = Model(fitted.model())
         readable = fitted.readable()
         self.model_ = self.accurate_model_ if readable is None else Model(readable)
@@ -208,14 +204,18 @@ class LocalLinearTreeRegressor(Views, RegressorMixin, BaseEstimator):
         The tree is grown by a stream's rules (docs/algorithms), not by `fit`; a call after `fit` starts anew. Inputs
         are numbers. Parameters that are not for streams are not used.
         """
-        table = read_table(X)
+        goes_on = getattr(self, "_stream", None) is not None
+        if goes_on:
+            table = read_table(X, levels=self._levels, fitted_names=self._fitted_names())
+        else:
+            table = read_table(X)
         outputs, names = read_targets(y)
         _check_rows(len(table.values), len(outputs))
         for name, levels in zip(_names_of(table), table.levels, strict=True):
             if levels:
                 raise ValueError(f'column "{name}" has words; partial_fit learns from numbers')
-        if getattr(self, "_stream", None) is None:
-            remember_columns(self, table)
+        if not goes_on:
+            self._remember_columns(table)
             self._is_flat = outputs.ndim == 1
             self.n_outputs_ = 1 if outputs.ndim == 1 else outputs.shape[1]
             self._inputs = _names_of(table)
@@ -226,7 +226,6 @@ class LocalLinearTreeRegressor(Views, RegressorMixin, BaseEstimator):
                 "min_leaf_samples": _count("min_samples_leaf", self.min_samples_leaf),
             }
             self._stream = StreamModel(self.n_features_in_, self.n_outputs_, options)
-        check_columns(self, table)
         outputs = outputs.reshape(len(outputs), -1)
         if outputs.shape[1] != self.n_outputs_:
             raise ValueError(f"y has {outputs.shape[1]} targets, the rows before had {self.n_outputs_}")
@@ -324,9 +323,18 @@ class LocalLinearTreeRegressor(Views, RegressorMixin, BaseEstimator):
 
     def _table(self, X: Any) -> Table:
         self._model()
-        table = read_table(X, levels=self._levels)
-        check_columns(self, table)
-        return table
+        return read_table(X, levels=self._levels, fitted_names=self._fitted_names())
+
+    def _fitted_names(self) -> list[str] | None:
+        names = getattr(self, "feature_names_in_", None)
+        return None if names is None else list(names)
+
+    def _remember_columns(self, table: Table) -> None:
+        self.n_features_in_ = table.values.shape[1]
+        if table.names is not None:
+            self.feature_names_in_ = np.asarray(table.names, dtype=object)
+        elif hasattr(self, "feature_names_in_"):
+            del self.feature_names_in_
 
     def _shaped(self, values: np.ndarray) -> np.ndarray:
         return values[:, 0] if self._is_flat else values

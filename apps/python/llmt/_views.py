@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from ._check import Check
     from ._explanation import Explanation
     from ._model import Model
-    from ._tables import Table
+    from .tables import Table
 
 _no_page = (
     "this build of llmt has no page for reports: it was built without the packages that `cmake/setup report` fetches; "
@@ -166,11 +166,11 @@ class Views:
 
         return to_python(self._model().to_dict(), name)
 
-    def to_sql(self, table: str = "data") -> str:
-        """A SELECT that predicts the rows of a table."""
+    def to_sql(self, table: str = "data", dialect: str = "postgresql") -> str:
+        """A SELECT that predicts the rows of a table; dialects are those of `llmt.export.to_sql`."""
         from .export import to_sql
 
-        return to_sql(self._model().to_dict(), table)
+        return to_sql(self._model().to_dict(), table, dialect)
 
     def to_onnx(self) -> Any:
         """An ONNX model of standard operators."""

@@ -90,6 +90,7 @@ GrossErrors gross_errors(const TrainingData& data, const FitResult& result, Eige
   errors.resize(std::max<Eigen::Index>(1, std::ssize(errors) / one_row_in));
   std::erase_if(errors, [&](const HeldOutError& each) {
     const double error = std::abs(each.error);
+    if (data.inputs.row(each.row).hasNaN()) return true;  // what is missing explains it
     return !(spread > 0.0 && error > far_spreads * spread && error > far_spreads_in_leaf * in_leaves.at(each.leaf));
   });
   for (const HeldOutError& each : errors) {

@@ -17,10 +17,10 @@ struct GrossErrors {
 };
 
 /// At most one held-out row in a hundred (or one row) that carry more than half of the held-out squared error of the
-/// output; else empty. The held-out error of such a row is more than 15 deviations (RobustScale) of all errors and 8
-/// deviations of those in its leaf, and the model that has seen the row is off by a fifth of it at least: errors of
-/// honest rows with heavy tails, and beside jumps, are not like that. `result` is of these data and has the intervals'
-/// models; without them it is empty.
+/// output; else empty. Such a row has a value for every input. Its held-out error is more than 15 deviations
+/// (RobustScale) of all errors and 8 deviations of those in its leaf, and the model that has seen the row is off by a
+/// fifth of it at least: errors of honest rows with heavy tails, and beside jumps, are not like that. `result` is of
+/// these data and has the intervals' models; without them it is empty.
 GrossErrors gross_errors(const TrainingData& data, const FitResult& result, Eigen::Index output, int max_threads);
 
 }  // namespace llmt::report

@@ -12,7 +12,7 @@ X, y = table.drop(columns="cop"), table["cop"]
 
 model = LocalLinearTreeRegressor(readable=True).fit(X, y)  # the weekday is a column of words
 print(model.rules_.to_string(max_colwidth=70))
-print(model.summary_["readable"]["partitions"][0]["cv_rmse"], "RMSE on held-out rows")
+print(f"RMSE on held-out rows {model.summary_['readable'][0]['cv_rmse']:.4f}")
 
 if len(sys.argv) > 1:
     import matplotlib

@@ -176,6 +176,7 @@ class Csv {
   std::map<std::string, std::size_t, std::less<>> fields_;  // position of a column
   std::vector<std::size_t> row_begins_;                     // offsets into text_
   Eigen::Index lines_left_out_ = 0;                         // between the header and the first row, see CsvPieces
+  bool rows_precede_ = false;                               // other pieces' rows, see CsvPieces
   bool more_follows_ = false;
 
   friend class CsvPieces;
@@ -205,6 +206,7 @@ class CsvPieces {
   std::string pending_;     // what has been read and not yet handed out
   std::string header_;      // once it is known, with a line break
   Eigen::Index lines_ = 0;  // handed out, those of the header included
+  bool has_given_rows_ = false;
 };
 
 /// `text` as one CSV field: in double quotes, inner quotes doubled, if it holds the separator, a quote or a line break.

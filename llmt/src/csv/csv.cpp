@@ -114,7 +114,7 @@ void Csv::find_rows() {
       if (record.fields != columns_.size()) {
         const bool is_last =
             !more_follows_ && between(record.end, end).find_first_not_of(" \t\r\n") == std::string_view::npos;
-        const bool is_comment = row_begins_.size() == 1 && header_text().starts_with('#');
+        const bool is_comment = row_begins_.size() == 1 && !rows_precede_ && header_text().starts_with('#');
         throw std::runtime_error(
             fmt::format("{}:{}: the row has {} field{}, the header has {}{}", name_, line_at(row_begins_.back()),
                         record.fields, record.fields == 1 ? "" : "s", columns_.size(),

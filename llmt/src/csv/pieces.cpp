@@ -60,6 +60,7 @@ std::optional<Csv> CsvPieces::next() {
     Csv csv;
     csv.name_ = name_;
     csv.mark_ = mark_;
+    csv.rows_precede_ = has_given_rows_;
     csv.more_follows_ = !last;
     csv.text_ = header_ + rows;
     csv.lines_left_out_ = lines_ - std::ranges::count(header_, '\n');
@@ -69,6 +70,7 @@ std::optional<Csv> CsvPieces::next() {
     if (header_.empty()) {
       header_ = std::string(csv.header_text()) + '\n';
     }
+    has_given_rows_ = has_given_rows_ || csv.rows() > 0;
     if (csv.rows() > 0) return csv;
   }
 }

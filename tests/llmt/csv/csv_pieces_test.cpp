@@ -82,4 +82,16 @@ TEST(CsvPieces, ErrorsHaveTheLinesOfTheWholeText) {
   EXPECT_EQ(all_cells("a,b\n", 10), "");
 }
 
+// Advice about comments above the header is for the first row of the text, not of a piece. Found by the fuzz target
+// csv.
+TEST(CsvPieces, AdviseOnCommentsAsTheWholeTextDoes) {
+  for (const std::string text : {"#a\n1\n2,3\n", "#a\n2,3\n", "#a\n\n1\n\n2,3\n"}) {
+    for (std::size_t bytes = 1; bytes < 12; ++bytes) {
+      EXPECT_TRUE(all_cells(text, bytes).ends_with(whole(text))) << bytes << all_cells(text, bytes) << whole(text);
+    }
+  }
+  EXPECT_TRUE(whole("#a\n2,3\n").ends_with("delete comments above it"));
+  EXPECT_TRUE(whole("#a\n1\n2,3\n").ends_with("the header has 1"));
+}
+
 }  // namespace

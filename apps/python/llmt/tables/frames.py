@@ -1,0 +1,77 @@
+"""Frames and series of pandas 2 and 3, which is imported already where there is one."""
+
+from __future__ import annotations
+
+import sys
+from typing import Any
+
+import numpy as np
+
+from .._core import read_arrow
+from .arrays import read_objects
+from .raw import Column, Raw, place, refuse_type
+
+
+def from_frame(frame: Any) -> Raw:
+    """Reads a frame, column by column into one matrix; one of float64 alone is not copied where pandas has it so."""
+    labels = list(frame.columns)
+    if len(labels) > 0 and all(dtype == np.float64 for dtype in frame.dtypes):
+        values = frame.to_numpy()
+        return Raw(values, [Column() for _ in labels], labels)
+    values = np.empty(frame.shape, order="F")
+    columns = [_read(frame.iloc[:, j], values[:, j], place(label)) for j, label in enumerate(labels)]
+    return Raw(values, columns, labels, owned=True)
+
+
+def from_series(series: Any, name: str) -> Raw:
+    """Reads a series."""
+    values = np.empty((len(series), 1), order="F")
+    column = _read(series, values[:, 0], name)
+    return Raw(values, [column], [series.name], 1, series=True, owned=True)
+
+
+def _read(series: Any, out: np.ndarray, where: str) -> Column:
+    pandas = sys.modules["pandas"]
+    dtype = series.dtype
+    if isinstance(dtype, np.dtype):
+        if dtype.kind in "biuf":
+            out[:] = series.to_numpy()
+            return Column()
+        if dtype.kind == "O":
+            return read_objects(series.to_numpy(), out, where)
+        what = {"M": "dates", "m": "durations", "c": "complex numbers", "S": "bytes"}.get(dtype.kind, "values")
+        refuse_type(where, what, dtype)
+    if isinstance(dtype, pandas.CategoricalDtype):
+        return _read_categories(series.cat, out, where)
+    if isinstance(dtype, pandas.StringDtype):
+        codes, words = series.factorize()
+        out[:] = codes
+        out[codes < 0] = np.nan
+        return Column([str(word) for word in words])
+    if isinstance(dtype, pandas.ArrowDtype):
+        values, columns, is_table = read_arrow(series.array.__arrow_array__().__arrow_c_stream__(), name=where)
+        if is_table:
+            refuse_type(where, "structs", dtype)
+        out[:] = values[:, 0]
+        return Column(columns[0][2], columns[0][1] == "codes")
+    for kind, what in (
+        (pandas.DatetimeTZDtype, "dates"),
+        (pandas.PeriodDtype, "periods"),
+        (pandas.IntervalDtype, "intervals"),
+        (pandas.SparseDtype, "sparse numbers"),
+    ):
+        if isinstance(dtype, kind):
+            refuse_type(where, what, dtype)
+    if pandas.api.types.is_numeric_dtype(dtype):
+        out[:] = series.to_numpy(dtype=np.float64, na_value=np.nan)
+        return Column()
+    return read_objects(series.to_numpy(dtype=object), out, where)
+
+
+def _read_categories(categories: Any, out: np.ndarray, where: str) -> Column:
+    """Labels are read as a column by themselves."""
+    labels = np.empty(len(categories.categories) + 1)
+    labels[-1] = np.nan
+    column = _read(categories.categories.to_series(), labels[:-1], where)
+    out[:] = labels[categories.codes.to_numpy()]  # -1, missing, is the last
+    return Column(column.words, column.words is None)

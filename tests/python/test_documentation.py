@@ -1,0 +1,46 @@
+"""What the documentation shows works: examples in docstrings, and the programs of docs/examples/python."""
+
+import doctest
+import importlib
+import os
+import pkgutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import llmt
+
+EXAMPLES = sorted((Path(__file__).parents[2] / "docs" / "examples" / "python").glob("*.py"))
+
+
+def modules():
+    names = [module.name for module in pkgutil.walk_packages(llmt.__path__, "llmt.")]
+    return ["llmt"] + [name for name in names if not name.rpartition(".")[2] in ("_core", "_robotics")]
+
+
+@pytest.mark.parametrize("name", modules())
+def test_examples_in_docstrings(name):
+    results = doctest.testmod(importlib.import_module(name), optionflags=doctest.ELLIPSIS)
+    assert results.failed == 0
+
+
+def test_docstrings_have_examples():
+    finder = doctest.DocTestFinder()
+    assert any(found.examples for found in finder.find(importlib.import_module("llmt"), "llmt"))
+
+
+@pytest.mark.parametrize("program", EXAMPLES, ids=lambda path: path.stem)
+def test_a_program_of_the_documentation_runs(program, tmp_path):
+    for module in ("sklearn", "pandas"):
+        pytest.importorskip(module)
+    if "mujoco" in program.read_text():
+        pytest.importorskip("mujoco")
+    environment = {**os.environ, "PYTHONPATH": str(Path(llmt.__path__[0]).resolve().parent)}
+    run = subprocess.run(
+        [sys.executable, program], cwd=tmp_path, capture_output=True, text=True, timeout=300, env=environment
+    )
+    print(run.stdout)
+    assert run.returncode == 0, run.stderr
+    assert run.stdout

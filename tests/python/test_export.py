@@ -1,0 +1,614 @@
+"""Every export in its own engine against `llmt predict`.
+
+The models are fitted by the program that LLMT_PROGRAM names. LLMT_POSTGRES, if set, is the connection string of a
+PostgreSQL database in which a table may be made; psql asks it.
+"""
+
+import copy
+import csv
+import io
+import json
+import math
+import os
+import re
+import sqlite3
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import fitted_models
+from fitted_models import MODELS, predictions
+from llmt.export import to_latex, to_onnx, to_python, to_sql, to_sympy
+from llmt.export.model import read
+
+
+@pytest.fixture(scope="session")
+def fitted(tmp_path_factory):
+    """Makes the model of a name once, with its rows and predictions."""
+    made = {}
+
+    def get(name):
+        if name not in made:
+            made[name] = fitted_models.fit(name, tmp_path_factory.mktemp(name))
+        return made[name]
+
+    return get
+
+
+every_model = pytest.mark.parametrize("name", MODELS)
+
+
+def function_of(model, name="predict"):
+    space = {}
+    exec(to_python(model, name), space)
+    return space[name], space
+
+
+def assert_same(predicted, expected, relative):
+    """Equal but for rounding, which near 0 is that of the terms that cancel: relative to the output's magnitude."""
+    scale = np.max(np.abs(expected), axis=0)
+    np.testing.assert_array_less(np.abs(predicted - expected), relative * (np.abs(expected) + scale) + 1e-300)
+
+
+def test_the_models_are_of_every_kind(fitted):
+    """What the other tests say of these models would be empty otherwise."""
+    kinds = set()
+    for name in MODELS:
+        model = fitted(name).model
+        for partition in model["partitions"]:
+            kinds.add(partition["validity"]["kind"])
+            kinds.add("output_range" if any(partition.get("output_range", [])) else "")
+            kinds.add("no residual_range" if not partition["residual_range"] else "")
+            kinds.add(
+                "jump in a blend"
+                if partition["validity"]["kind"] == "blend"
+                and any(node["split"].get("half_width") == 0.0 for node in partition["nodes"] if "split" in node)
+                else ""
+            )
+            for node in partition["nodes"]:
+                split = node.get("split", {})
+                kinds |= {member for member in ("direction", "level_side") if member in split}
+                kinds.add("presence" if split.get("threshold", 0.0) > 1e300 else "")
+        kinds |= {"codes" for column in model["inputs"] if "codes" in column}
+        kinds |= {"products" for regressor in model["regressors"] if "second_column" in regressor}
+        kinds |= {"indicators" for regressor in model["regressors"] if "level" in regressor}
+        kinds |= {"several outputs" for _ in model["outputs"][1:]}
+    assert kinds - {""} == {
+        "crisp",
+        "blend",
+        "gaussian",
+        "logistic",
+        "output_range",
+        "no residual_range",
+        "presence",
+        "jump in a blend",
+        "direction",
+        "level_side",
+        "codes",
+        "products",
+        "indicators",
+        "several outputs",
+    }
+
+
+# Python
+
+
+@every_model
+def test_python_has_the_bits_of_predict(fitted, name):
+    model = fitted(name)
+    predict, _ = function_of(model.model)
+    got = np.array([np.atleast_1d(predict(row)) for row in model.rows])
+    if any(partition["validity"]["kind"] == "gaussian" for partition in model.model["partitions"]):
+        assert_same(got, model.predicted, 1e-14)  # exp() of the C library
+    else:
+        np.testing.assert_array_equal(got, model.predicted)
+
+
+def test_python_takes_rows_by_name_and_nan_as_missing(fitted):
+    model = fitted("missing")
+    predict, _ = function_of(model.model)
+    names = [column["name"] for column in model.model["inputs"]]
+    for row, expected in zip(model.rows, model.predicted):
+        by_name = {name: math.nan if value is None else value for name, value in zip(names, row)}
+        assert predict({"another column": 1, **dict(reversed(by_name.items()))}) == expected[0]
+
+
+def test_python_needs_no_package(fitted, tmp_path):
+    source = to_python(fitted("categories").model, "f")
+    assert re.findall(r"^\s*(?:import|from)\b.*", source, re.M) == ["import math"]
+    (tmp_path / "f.py").write_text(source, encoding="utf-8")
+    call = "from f import f; print(repr(f([None] * 5)))"
+    done = subprocess.run([sys.executable, "-S", "-c", call], cwd=tmp_path, capture_output=True, text=True, check=True)
+    model = fitted("categories")
+    assert float(done.stdout) == model.predicted[model.rows.index([None] * 5)][0]
+
+
+def test_python_refuses_bad_rows_and_names(fitted):
+    predict, _ = function_of(fitted("crisp").model)
+    with pytest.raises(ValueError, match="'a' is infinite"):
+        predict([math.inf, 1.0, 1.0, 1.0])
+    with pytest.raises(ValueError, match="3 values, the model has 4"):
+        predict([1.0, 1.0, 1.0])
+    with pytest.raises(KeyError, match="größe"):
+        predict({"a": 1.0, 'width "w", mm': 1.0, "c_1": 1.0})
+    for name in ("2f", "a b", "def", ""):
+        with pytest.raises(ValueError, match="identifier"):
+            to_python(fitted("crisp").model, name)
+
+
+def test_names_cannot_become_code():
+    model = constants()
+    model["inputs"][0]["name"] = '"""\\"; raise SystemExit #\n@NAME INPUTS. {0}'
+    model["outputs"][0]["name"] = "'''\"\"\"\\"
+    predict, _ = function_of(model)
+    assert predict([1.0]) == 1.5
+    assert predict({model["inputs"][0]["name"]: 3.0}) == 2.5
+
+
+def test_numbers_are_found_among_labels(fitted):
+    model = fitted("machines")
+    predict, _ = function_of(model.model)
+    table = to_sql(model.model, "t", "sqlite", keep=["id"]), to_sql(model.model, "t", "duckdb", keep=["id"])
+    known = [i for i in model.of("training") if model.rows[i][0] is not None]
+    rows = [[float(model.rows[i][0]), model.rows[i][1]] for i in known]
+    np.testing.assert_array_equal([[predict(row)] for row in rows], model.predicted[known])
+    assert predict([3, 0.5]) == predict(["3", 0.5]) == predict([np.float64(3.0), 0.5]) != predict([4.0, 0.5])
+    for connection, statement in zip((sqlite3.connect(":memory:"), pytest.importorskip("duckdb").connect()), table):
+        connection.execute("CREATE TABLE t (id INTEGER, machine DOUBLE PRECISION, x DOUBLE PRECISION)")
+        connection.executemany("INSERT INTO t VALUES (?, ?, ?)", [[i, *row] for i, row in enumerate(rows)])
+        got = [row[1:] for row in connection.execute(statement + " ORDER BY 1").fetchall()]
+        assert_same(np.array(got), model.predicted[known], 1e-12)
+
+
+# SQL
+
+
+def quoted(name):
+    return '"' + name.replace('"', '""') + '"'
+
+
+def columns_of(model, number):
+    return ", ".join(
+        f"{quoted(column['name'])} {'TEXT' if 'levels' in column else number}" for column in model["inputs"]
+    )
+
+
+def in_sqlite(model, rows, statement, table):
+    connection = sqlite3.connect(":memory:")
+    connection.execute(f"CREATE TABLE {quoted(table)} (id INTEGER, {columns_of(model, 'REAL')})")
+    marks = ", ".join("?" * (1 + len(model["inputs"])))
+    connection.executemany(f"INSERT INTO {quoted(table)} VALUES ({marks})", [(i, *row) for i, row in enumerate(rows)])
+    return connection.execute(statement + "\nORDER BY 1").fetchall()
+
+
+def in_duckdb(model, rows, statement, table):
+    connection = pytest.importorskip("duckdb").connect()
+    connection.execute(f"CREATE TABLE {quoted(table)} (id INTEGER, {columns_of(model, 'DOUBLE')})")
+    marks = ", ".join("?" * (1 + len(model["inputs"])))
+    connection.executemany(f"INSERT INTO {quoted(table)} VALUES ({marks})", [[i, *row] for i, row in enumerate(rows)])
+    return connection.execute(statement + "\nORDER BY 1").fetchall()
+
+
+def in_postgresql(model, rows, statement, table):
+    if "LLMT_POSTGRES" not in os.environ:
+        pytest.skip("LLMT_POSTGRES names no database")
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    for i, row in enumerate(rows):
+        writer.writerow([i] + ["" if v is None else v if isinstance(v, str) else repr(float(v)) for v in row])
+    create = f"DROP TABLE IF EXISTS {quoted(table)}; CREATE TABLE {quoted(table)} (id INTEGER, "
+    script = create + columns_of(model, "DOUBLE PRECISION") + f");\nCOPY {quoted(table)} FROM STDIN (FORMAT csv);\n"
+    script += text.getvalue() + "\\.\nCOPY (" + statement.replace("\n", " ") + " ORDER BY 1) TO STDOUT (FORMAT csv);\n"
+    script += f"DROP TABLE {quoted(table)};\n"
+    command = ["psql", os.environ["LLMT_POSTGRES"], "-v", "ON_ERROR_STOP=1", "-q", "-f", "-"]
+    done = subprocess.run(command, input=script, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return [[float(cell) for cell in line.split(",")] for line in done.stdout.splitlines()]
+
+
+ENGINES = {"sqlite": in_sqlite, "duckdb": in_duckdb, "postgresql": in_postgresql}
+TABLE = 'my "table" 表'
+
+
+@every_model
+@pytest.mark.parametrize("dialect", ENGINES)
+def test_sql_predicts(fitted, name, dialect):
+    model = fitted(name)
+    statement = to_sql(model.model, TABLE, dialect, keep=["id"])
+    try:
+        rows = ENGINES[dialect](model.model, model.rows, statement, TABLE)
+    except sqlite3.OperationalError as error:
+        if "no such function: EXP" in str(error):
+            pytest.skip("this SQLite has no EXP")
+        raise
+    assert [row[0] for row in rows] == list(range(len(model.rows)))
+    assert_same(np.array([row[1:] for row in rows], dtype=float), model.predicted, 1e-12)
+
+
+@pytest.mark.parametrize("dialect", ["duckdb", "postgresql"])
+def test_sql_takes_nan_as_missing(fitted, dialect):
+    model = fitted("missing_crisp")
+    rows = [[math.nan if value is None else value for value in row] for row in model.rows]
+    got = ENGINES[dialect](model.model, rows, to_sql(model.model, "t", dialect, keep=["id"]), "t")
+    assert_same(np.array([row[1:] for row in got]), model.predicted, 1e-12)
+
+
+def test_sqlite_takes_empty_text_as_missing(fitted):
+    """So a table is that was imported from CSV."""
+    model = fitted("missing")
+    rows = [["" if value is None else value for value in row] for row in model.rows]
+    got = in_sqlite(model.model, rows, to_sql(model.model, "t", "sqlite", keep=["id"]), "t")
+    assert_same(np.array([row[1:] for row in got]), model.predicted, 1e-12)
+
+
+def test_sql_names_what_it_gives(fitted):
+    model = fitted("two_outputs").model
+    connection = sqlite3.connect(":memory:")
+    connection.execute(f"CREATE TABLE t (id INTEGER, {columns_of(model, 'REAL')})")
+    cursor = connection.execute(to_sql(model, "t", "sqlite", keep=["c_1", "id"]))
+    assert [column[0] for column in cursor.description] == ["c_1", "id", "y_pred", 'z "2"_pred']
+    assert 'FROM "a b"."c""d")' in to_sql(model, ("a b", 'c"d'))
+
+
+@every_model
+def test_sql_is_linear_in_nodes_times_regressors(fitted, name):
+    model = fitted(name).model
+    size = sum(len(p["nodes"]) * (1 + len(model["regressors"])) * len(p["outputs"]) for p in model["partitions"])
+    levels = sum(len(column.get("levels", column.get("codes", []))) for column in model["inputs"])
+    assert len(to_sql(model, "t")) < 450 * size + 200 * levels + 2500
+
+
+def test_sql_refuses(fitted):
+    model = fitted("crisp").model
+    with pytest.raises(ValueError, match="dialect is 'oracle'"):
+        to_sql(model, "t", "oracle")
+    with pytest.raises(ValueError, match="NUL"):
+        to_sql(model, "t\0")
+
+
+# ONNX
+
+
+def in_onnx(model, rows):
+    session = pytest.importorskip("onnxruntime").InferenceSession(to_onnx(model).SerializeToString())
+    names = [entry.name for entry in session.get_inputs()]
+    if any("levels" in column for column in model["inputs"]):
+        assert names == [column["name"] for column in model["inputs"]]
+        feed = {}
+        for j, name in enumerate(names):
+            is_text = "levels" in model["inputs"][j]
+            cells = [("" if is_text else math.nan) if row[j] is None else row[j] for row in rows]
+            cells = [cell.strip() for cell in cells] if is_text else cells  # labels are compared as they are
+            feed[name] = np.array(cells, dtype=object if is_text else np.float64).reshape(-1, 1)
+    else:
+        assert names == ["X"]
+        feed = {"X": np.array([[math.nan if value is None else value for value in row] for row in rows])}
+    (got,) = session.run(None, feed)
+    return got
+
+
+@every_model
+def test_onnx_predicts(fitted, name):
+    model = fitted(name)
+    assert_same(in_onnx(model.model, model.rows), model.predicted, 1e-12)
+    first = in_onnx(model.model, model.rows[:1])
+    assert first.shape == (1, len(model.model["outputs"]))
+    assert_same(first, model.predicted[:1], 1e-12)
+
+
+@every_model
+def test_onnx_has_only_standard_operators(fitted, name):
+    pytest.importorskip("onnx")
+    proto = to_onnx(fitted(name).model)
+    assert {node.domain for node in proto.graph.node} <= {"", "ai.onnx.ml"}
+    assert {(entry.domain, entry.version) for entry in proto.opset_import} == {("", 17), ("ai.onnx.ml", 2)}
+
+
+def test_onnx_names_do_not_clash(fitted):
+    onnx = pytest.importorskip("onnx")
+    model = copy.deepcopy(fitted("categories").model)
+    for column, name in zip(model["inputs"], ["variable", "variable_", "X", "t0", "c0"]):
+        column["name"] = name
+    proto = to_onnx(model)
+    onnx.checker.check_model(proto, full_check=True)
+    assert [entry.name for entry in proto.graph.output] == ["variable__"]
+    assert_same(in_onnx(model, fitted("categories").rows), fitted("categories").predicted, 1e-12)
+
+
+# sympy
+
+
+def symbol_values(model, row):
+    """The values of all symbols of to_sympy() for a row."""
+    values = {}
+    for column, value in zip(model["inputs"], row):
+        if "levels" in column:
+            values.update({f"{column['name']}={label}": float(value == label) for label in column["levels"]})
+        else:
+            values[column["name"]] = value
+    return values
+
+
+def within_the_ranges(space, row):
+    """Whether no guard acts on a row but the range of the outputs: by the parts of the Python export."""
+    x = space["_predict_numbers"](row)
+    d = space["_predict_deviations"](x)
+    for tree in space["_predict_TREES"]:
+        active = space["_predict_gaussians" if tree["kind"] == "gaussian" else "_predict_leaves"](tree, x)
+        for node in [0] + [node for node, _ in active]:
+            _, _, _, _, low, high = tree["nodes"][node]
+            if not all(a <= dk <= b for a, dk, b in zip(low, d, high)):
+                return False
+        for o, (low, high) in enumerate(tree["residual_range"]):
+            value = sum(v * space["_predict_local_model"](tree["nodes"], node, o, d) for node, v in active)
+            if not low <= value - space["_predict_local_model"](tree["nodes"], 0, o, d) <= high:
+                return False
+    return True
+
+
+@every_model
+def test_sympy_evaluates_to_the_prediction(fitted, name):
+    sympy = pytest.importorskip("sympy")
+    model = fitted(name)
+    _, space = function_of(model.model)
+    inside = [
+        i
+        for i in model.of("training", "threshold")
+        if None not in model.rows[i] and within_the_ranges(space, model.rows[i])
+    ]
+    assert len(inside) >= 20
+    expressions = to_sympy(model.model)
+    expressions = expressions if isinstance(expressions, list) else [expressions]
+    names = list(symbol_values(model.model, model.rows[0]))
+    symbols = [sympy.Symbol(symbol, real=True) for symbol in names]
+    for o, expression in enumerate(expressions):
+        assert expression.free_symbols <= set(symbols)
+        function = sympy.lambdify(symbols, expression, "math")
+        got = [float(function(*symbol_values(model.model, model.rows[i]).values())) for i in inside]
+        assert_same(np.array(got), model.predicted[inside, o], 1e-11)
+
+
+def test_sympy_substitutes(fitted):
+    sympy = pytest.importorskip("sympy")
+    model = fitted("readable_words")
+    expression = to_sympy(model.model)
+    for i in model.of("training")[:5]:
+        values = {sympy.Symbol(k, real=True): v for k, v in symbol_values(model.model, model.rows[i]).items()}
+        assert float(expression.subs(values)) == pytest.approx(model.predicted[i, 0], rel=1e-12)
+
+
+# LaTeX
+
+
+def from_latex(text, names):
+    """The rules of a `cases` as (value, condition), Python expressions in v[0], v[1], ...: a reader of its own."""
+    words = {rf"\text{{{name}}}": f"v[{j}]" for j, name in names.items()}
+    words.update({r"\,": "*", r"\ ": " ", r"\le": "<=", r"\text{if }": "", "^2": "**2"})
+    text = re.sub(r" \\times 10\^\{(-?\d+)\}", r"e\1", text)
+    for word in sorted(words, key=len, reverse=True):
+        text = text.replace(word, words[word])
+    text = re.sub(r"(?<![\w\[])a(?![\w])", "v[0]", text)
+    body = re.fullmatch(r".*? = \\begin{cases}\n(.*)\n\\end{cases}", text, re.S).group(1)
+    for line in body.split(" \\\\\n"):
+        value, condition = line.split(" & ")
+        yield value, " and ".join(condition.split(", "))
+
+
+def test_latex_says_the_rules(fitted):
+    model = fitted("readable")
+    names = {1: 'width "w", mm', 2: "größe", 3: r"c\_1"}
+    rules = list(from_latex(to_latex(model.model), names))
+    assert len(rules) == (len(model.model["partitions"][0]["nodes"]) + 1) // 2
+    for i in model.of("training"):
+        values = [
+            eval(value, {"v": model.rows[i]}) for value, condition in rules if eval(condition, {"v": model.rows[i]})
+        ]
+        assert values == [pytest.approx(model.predicted[i, 0], rel=1e-9)]
+
+
+@every_model
+def test_latex_is_balanced(fitted, name):
+    text = to_latex(fitted(name).model)
+    bare = re.sub(r"\\[{}\\]", "", text)
+    depth = 0
+    for letter in bare:
+        depth += {"{": 1, "}": -1}.get(letter, 0)
+        assert depth >= 0
+    assert depth == 0
+    assert not re.search(r"(?<!\\)[%#$~]", text) and text.count("\\begin{cases}") == text.count("\\end{cases}")
+    assert not re.search(r"e[+-]\d\d", text)
+
+
+def test_latex_of_one_leaf_and_digits(fitted):
+    text = to_latex(fitted("one_leaf").model, digits=3)
+    assert text.startswith("y = ") and "cases" not in text
+    assert all(len(number.replace(".", "").lstrip("0")) <= 4 for number in re.findall(r"(?<=[ -])\d+\.\d+", text))
+    with pytest.raises(ValueError, match="digits is 0"):
+        to_latex(fitted("one_leaf").model, digits=0)
+
+
+# Models made by hand
+
+
+def constants():
+    """1.5 up to x = 2, 2.5 above, 0.25 of the first where x is missing: without regressors."""
+    leaf = {"samples": 5, "rank": 1, "rss": [0.0], "slope": [[]], "mean": [], "low": [], "high": []}
+    split = {
+        "input": "x",
+        "column": 0,
+        "threshold": 2.0,
+        "half_width": 0.0,
+        "missing_left": 0.25,
+        "left": 1,
+        "right": 2,
+    }
+    return {
+        "format": "llmt-model",
+        "version": 2,
+        "inputs": [{"name": "x", "low": 0.0, "high": 4.0, "centre": 2.0}],
+        "outputs": [{"name": "y", "low": 1.0, "high": 3.0}],
+        "regressors": [],
+        "partitions": [
+            {
+                "outputs": [0],
+                "validity": {"kind": "crisp", "width": 0.0, "smoothness": 1},
+                "outer_slope": [[]],
+                "residual_range": [[-1.0, 1.0]],
+                "nodes": [
+                    {**leaf, "samples": 10, "value": [2.0], "split": split},
+                    {**leaf, "value": [1.5]},
+                    {**leaf, "value": [2.5]},
+                ],
+            }
+        ],
+    }
+
+
+@pytest.mark.parametrize("leaves", [1, 2])
+def test_a_tree_of_constants(leaves):
+    model, rows = constants(), [[1.0], [2.0], [2.5], [None]]
+    expected = np.array([[1.5], [1.5], [2.5], [0.25 * 1.5 + 0.75 * 2.5]])
+    if leaves == 1:
+        del model["partitions"][0]["nodes"][1:], model["partitions"][0]["nodes"][0]["split"]
+        expected = np.full((4, 1), 2.0)
+    predict, _ = function_of(model)
+    np.testing.assert_array_equal([[predict(row)] for row in rows], expected)
+    got = in_sqlite(model, rows, to_sql(model, "t", "sqlite", keep=["id"]), "t")
+    np.testing.assert_array_equal([row[1:] for row in got], expected)
+    np.testing.assert_array_equal(in_onnx(model, rows), expected)
+    sympy = pytest.importorskip("sympy")
+    assert float(to_sympy(model).subs(sympy.Symbol("x", real=True), 2.5)) == expected[2, 0]
+
+
+def deep(levels):
+    """A chain of splits of x at 0, 1, 2, ...; the range of z narrows at every level."""
+    nodes = []
+    for level in range(levels + 1):
+        node = {
+            "samples": 1000 - level, "rank": 3, "rss": [1.0], "value": [0.01 * level],
+            "slope": [[0.02, 0.01 * (level % 7)]], "mean": [0.0, 0.0], "low": [-50.0, level - 100.0],
+            "high": [50.0, 100.0 - level],
+        }  # fmt: skip
+        if level > 0:
+            nodes.append({**copy.deepcopy(node), "samples": 1})  # the left child is a leaf
+        if level < levels:
+            left = 2 * level + 1
+            node["split"] = {"input": "x", "column": 0, "threshold": float(level), "half_width": 0.0,
+                             "missing_left": 0.5, "left": left, "right": left + 1}  # fmt: skip
+        nodes.append(node)
+    model = constants()
+    model["inputs"] = [{"name": "x", "low": 0.0, "high": 100.0, "centre": 50.0},
+                       {"name": "z", "low": -100.0, "high": 100.0, "centre": 0.0}]  # fmt: skip
+    model["outputs"] = [{"name": "y", "low": -100.0, "high": 100.0}]
+    model["regressors"] = [{"column": 0, "centre": 50.0}, {"column": 1, "centre": 0.0}]
+    model["partitions"][0].update(nodes=nodes, outer_slope=[[0.0, 0.0]], residual_range=[[-20.0, 20.0]])
+    return model
+
+
+@pytest.mark.parametrize("levels", [60, 90])
+def test_deep_trees(tmp_path, levels):
+    """Beyond 64 ancestors the slopes of some are left out: Python does so, SQL and ONNX refuse the tree."""
+    model = deep(levels)
+    (tmp_path / "deep.json").write_text(json.dumps(model))
+    rows = [[x + 0.5, z] for x in (0.0, 30.0, levels - 1.0, 95.0) for z in (-120.0, -99.0, -5.0, 30.0, 99.9, 130.0)]
+    expected = predictions(tmp_path / "deep.json", model, rows, tmp_path)
+    predict, _ = function_of(model)
+    np.testing.assert_array_equal([[predict(row)] for row in rows], expected)
+    if levels > 65:
+        for export in (to_onnx, lambda model: to_sql(model, "t")):
+            with pytest.raises(ValueError, match="more than 65 splits deep"):
+                export(model)
+    else:
+        got = in_sqlite(model, rows, to_sql(model, "t", "sqlite", keep=["id"]), "t")
+        assert_same(np.array([row[1:] for row in got]), expected, 1e-12)
+        assert_same(in_onnx(model, rows), expected, 1e-12)
+
+
+def test_what_is_no_model_is_refused():
+    for export in (to_python, to_onnx, to_sympy, to_latex, lambda model: to_sql(model, "t")):
+        with pytest.raises(ValueError, match="llmt-model"):
+            export({"format": "llmt-stream"})
+        with pytest.raises(ValueError, match="version 7"):
+            export({**constants(), "version": 7})
+
+
+def test_missing_packages_are_named(monkeypatch):
+    for export, package in ((to_onnx, "onnx"), (to_sympy, "sympy")):
+        monkeypatch.setitem(sys.modules, package, None)
+        with pytest.raises(ImportError, match=f"needs the package {package}: pip install {package}"):
+            export(constants())
+
+
+# SRBench
+
+
+class Estimator:
+    """What the module asks of an estimator."""
+
+    def __init__(self, model):
+        self.text = json.dumps(model)
+        self.feature_names_in_ = np.array([column["name"] for column in model["inputs"]] + ["not used"], dtype=object)
+
+    def to_json(self):
+        return self.text
+
+
+class Frame:
+    def __init__(self, columns):
+        self.columns = columns
+
+
+@pytest.mark.parametrize("name", ["readable", "crisp", "one_leaf"])
+def test_srbench_model_evaluates_to_the_prediction(fitted, name):
+    pytest.importorskip("sympy")
+    from sympy import Symbol, lambdify
+    from sympy.parsing.sympy_parser import parse_expr
+
+    from llmt import srbench
+
+    model = fitted(name)
+    _, space = function_of(model.model)
+    inside = [i for i in model.of("training", "threshold") if within_the_ranges(space, model.rows[i])]
+    assert len(inside) > 50
+    for given, names in (
+        (None, ["a", "x1", "größe", "c_1"]),
+        (["p", "E", "x_2", "lambda", "u"], ["p", "E", "x_2", "x3"]),
+    ):
+        text = srbench.model(Estimator(model.model), None if given is None else Frame(given))
+        expression = parse_expr(text, local_dict={name: Symbol(name) for name in names})
+        assert expression.free_symbols <= {Symbol(name) for name in names}
+        function = lambdify([Symbol(name) for name in names], expression, "math")
+        assert_same(np.array([float(function(*model.rows[i])) for i in inside]), model.predicted[inside, 0], 1e-11)
+
+
+def test_srbench_complexity():
+    pytest.importorskip("sympy")
+    from llmt import srbench
+
+    # Piecewise, of two pairs: (1.5, x0 <= 2) and (2.5, true)
+    assert srbench.complexity(Estimator(constants())) == 1 + (1 + 1 + 3) + (1 + 1 + 1)
+    assert srbench.model(Estimator(constants())) == "Piecewise((1.5, x <= 2), (2.5, True))"
+
+
+def test_srbench_refuses(fitted):
+    from llmt import srbench
+
+    with pytest.raises(ValueError, match="category of words"):
+        srbench.model(Estimator(fitted("readable_words").model))
+    with pytest.raises(ValueError, match="2 outputs"):
+        srbench.model(Estimator(fitted("two_outputs").model))
+    with pytest.raises(ValueError, match="X has 2 columns, the estimator was fitted with 5"):
+        srbench.model(Estimator(fitted("crisp").model), Frame(["p", "q"]))
+    with pytest.raises(AttributeError, match="nonsense"):
+        srbench.nonsense
+
+
+def test_the_reader_keeps_all_numbers(fitted):
+    model = fitted("blend")
+    tree = read(model.model)
+    for node, data in zip(tree.partitions[0].nodes, model.model["partitions"][0]["nodes"]):
+        assert list(node.low) == data["low"] and [list(row) for row in node.slope] == data["slope"]
+        assert node.threshold == data.get("split", {}).get("threshold", 0.0)
