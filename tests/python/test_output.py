@@ -210,3 +210,14 @@ def test_text_is_the_twin_of_the_html(name, request):
     assert all(f"{item.leaf.rows} rows" in text for item in items_of(Tree(of.model)) if item.leaf)
     assert max(map(len, text.splitlines())) <= 100
     assert ("smooth" in text) == (name == "smooth")
+
+
+def test_thresholds_that_differ_are_drawn_differently():
+    rng = np.random.default_rng(9)
+    x = np.concatenate([rng.uniform(-1000, 1000, 300), rng.uniform(-1, 1, 300)])
+    y = np.where(np.abs(x) < 1, np.sign(x) * (1 + np.abs(x)), 0.001 * x) + 0.01 * rng.normal(size=len(x))
+    of = Fitted(x[:, None], y, validity="crisp")
+    tree = Tree(of.model)
+    thresholds = {node["split"]["threshold"] for node in tree.nodes if "split" in node}
+    assert len(thresholds) > 2 and min(np.diff(sorted(thresholds))) < 0.002 * 2000
+    assert len({item.how.split()[1] for item in items_of(tree) if item.how}) == len(thresholds)
