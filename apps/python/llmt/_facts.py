@@ -42,7 +42,7 @@ def facts_of(
         heading += " with smooth transitions" if tree.is_smooth else ", crisp"
     facts = Facts(heading, _validity(tree), [], "", "")
     outputs = tree.partition["outputs"]
-    if summary is not None and position < len(summary["partitions"]):
+    if summary and position < len(summary.get("partitions", [])):  # streams and files have no comparison
         of = summary["partitions"][position]
         _errors(facts, of, [r for r in summary.get("readable", []) if r["targets"] == of["targets"]], readable)
         if mean is not None and len(outputs) == 1 and facts.errors:

@@ -92,8 +92,8 @@ def rules_frame(model: dict[str, Any], handle: Any = None) -> Any:
         if tree.is_smooth:
             raise ValueError(
                 f"the {len(tree.leaves)} leaves of {', '.join(tree.targets)} are blended: a prediction is a mean of "
-                "several equations, so rules would not be the model. readable=True and validity='crisp' fit a tree that is its "
-                "rules; leaves_ lists the leaves of this one"
+                "several equations, so rules would not be the model. readable=True and validity='crisp' fit a tree "
+                "that is its rules; leaves_ lists the leaves of this one"
             )
         for leaf in tree.leaves:
             for o, target in enumerate(tree.targets):

@@ -94,7 +94,7 @@ def _head(tree: Tree, facts: Facts, summary: dict[str, Any] | None) -> str:
     text = facts.validity
     if facts.coverage:
         text += f" {facts.coverage}."
-    if summary is not None:
+    if summary and "rows" in summary:
         rows, inputs = summary["rows"], len(tree.inputs)
         text += f" Learnt from {rows} rows with {inputs} input{'' if inputs == 1 else 's'}."
     if facts.how and not facts.errors:

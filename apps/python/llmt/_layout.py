@@ -111,6 +111,7 @@ def items_of(tree: Tree, most_leaves: int = MOST_LEAVES, most_depth: int = MOST_
     if len(tree.leaves) > most_leaves:
         most_leaves = (most_leaves + 1) // 2
     drawn_nodes = 2 * most_leaves - 1  # nodes are in the order of growth: these are the tree with so many leaves
+    tolerances = tree.threshold_tolerances(drawn_nodes)
     leaf_at = {leaf.node: leaf for leaf in tree.leaves}
     items: list[Item] = []
     waiting: list[Item] = [Item(0, None, 0)]
@@ -126,7 +127,7 @@ def items_of(tree: Tree, most_leaves: int = MOST_LEAVES, most_depth: int = MOST_
             item.leaf, item.is_cut = tree.as_leaf(item.node), True
             continue
         for left in (False, True):
-            what, how = tree.condition(item.node, left, precision=2e-3)
+            what, how = tree.condition(item.node, left, tolerances)
             full = str(tree.condition(item.node, left))
             if how.startswith("in {") and "," not in how:
                 how = "= " + how[4:-1]

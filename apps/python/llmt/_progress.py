@@ -84,7 +84,7 @@ def _on_terminal() -> _Show | None:
                 stream.flush()
             is_shown = False
             return
-        width = os.get_terminal_size(stream.fileno()).columns
+        width = os.get_terminal_size(stream.fileno()).columns or 80  # 0: a terminal that nobody told its size
         full = round(share * _BAR)
         text = f"{title} [{'#' * full}{'.' * (_BAR - full)}] {100 * share:3.0f} %  {left}  {step}".rstrip()
         stream.write(f"\r\x1b[K{text[: max(0, width - 1)]}")

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import unicodedata
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -118,8 +118,8 @@ class Tree:
         """Whether a prediction may be a mean of several leaves' equations."""
         return self.partition["validity"]["kind"] != "crisp" and len(self.leaves) > 1
 
-    def condition(self, node: int, left: bool, precision: float | None = None) -> Condition:
-        """The condition of one side of the node's split. `precision`: of a threshold, as a share of the range."""
+    def condition(self, node: int, left: bool, tolerances: Mapping[int, float] | None = None) -> Condition:
+        """The condition of one side of the node's split, in full or as rounded as `threshold_tolerances()` allows."""
         split = self.nodes[node]["split"]
         of = self.inputs[split["column"]]
         if "level_side" in split:
@@ -135,13 +135,27 @@ class Tree:
                 if weight:
                     threshold += weight * other["centre"]
                     joint = ("-" if weight < 0 else "") if not text else " - " if weight < 0 else " + "
-                    size = decimal(abs(weight)) if precision is None else number(abs(weight), 2)
+                    size = decimal(abs(weight)) if tolerances is None else number(abs(weight), 2)
                     text += f"{joint}{size} {other['name']}"
-            return Condition(text, f"{sign} {decimal(threshold) if precision is None else number(threshold, 3)}")
+            return Condition(text, f"{sign} {decimal(threshold) if tolerances is None else number(threshold, 3)}")
         if split["threshold"] >= _ANY_VALUE:
             return Condition(of["name"], "is known" if left else "is missing")
-        tolerance = None if precision is None else precision * (of["high"] - of["low"])
+        tolerance = None if tolerances is None else tolerances[split["column"]]
         return Condition(of["name"], f"{sign} {decimal(split['threshold'], tolerance)}")
+
+    def threshold_tolerances(self, drawn_nodes: int) -> dict[int, float]:
+        """How far the thresholds of each input may be rounded in a picture of the first nodes: 0.2 % of the input's
+        range, and less where two thresholds would look alike."""
+        thresholds: dict[int, set[float]] = {}
+        for node in self.nodes[:drawn_nodes]:
+            split = node.get("split", {})
+            if split.get("threshold", _ANY_VALUE) < _ANY_VALUE:
+                thresholds.setdefault(split["column"], set()).add(split["threshold"])
+        tolerances = {}
+        for column, values in thresholds.items():
+            gap = min(np.diff(sorted(values)), default=math.inf)
+            tolerances[column] = min(2e-3 * (self.inputs[column]["high"] - self.inputs[column]["low"]), 0.2 * gap)
+        return tolerances
 
     def equation(self, leaf: Leaf, output: int = 0) -> list[str]:
         """The terms of the leaf's equation with their signs, in full: "12.3", "+ 0.45 cement", "- 1.2 water"."""
@@ -183,7 +197,7 @@ class Tree:
             term = self.regressor_names[k] if size == "1" else f"{size} {self.regressor_names[k]}"
             terms.append(f"{'-' if slope < 0 else '+'} {term}")
         if terms[0] == "0" and len(terms) > 1:
-            terms[:2] = [terms[1].removeprefix("+ ")]
+            terms[:2] = [terms[1].removeprefix("+ ").replace("- ", "-", 1 if terms[1].startswith("-") else 0)]
         return terms, left_out
 
     def mean_prediction(self, leaf: Leaf, output: int = 0) -> float:
@@ -204,11 +218,11 @@ class Tree:
     def standard_errors(self, leaf: Leaf, output: int = 0) -> tuple[float, np.ndarray]:
         """Standard errors of the intercept and of the slopes of a leaf.
 
-        Those of least squares over the rows of the leaf,
-            se_k^2 = s_i^2 (T G_i^-1 T')_kk,   s_i^2 = RSS_i / (n_i - p_i)
-        with G_i, RSS_i, n_i and p_i as in (I.2) and T the step from deviations to the inputs themselves. They take the
-        tree as given. NaN where the leaf's rows do not determine the coefficient, where it was not selected, where as
-        many coefficients as rows were fitted, and in models without Gram matrices.
+        Those of least squares over the rows of the leaf, (I.3) of docs/algorithms/intervals.md:
+            se_k^2 = RSS_i / (n_i - p_i) (T G_i^-1 T')_kk
+        with T the step from the coefficients of deviations to those of the regressors. They take the tree as given.
+        NaN where the leaf's rows do not determine the coefficient, where it was not selected, where as many
+        coefficients as rows were fitted, and in models without Gram matrices.
         """
         count = len(self.regressors) + 1
         nothing = math.nan, np.full(count - 1, math.nan)
