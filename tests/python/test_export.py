@@ -1,7 +1,7 @@
 """Every export in its own engine against `llmt predict`.
 
-The models are fitted by the program that LLMT_PROGRAM names. LLMT_POSTGRES, if set, is the connection string of a
-PostgreSQL database in which a table may be made; psql asks it.
+The models are fitted by the program that LLMT_PROGRAM names, or by `llmt` of the path. LLMT_POSTGRES, if set, is the
+connection string of a PostgreSQL database in which a table may be made; psql asks it.
 """
 
 import copy
@@ -591,6 +591,19 @@ def test_srbench_complexity():
     # Piecewise, of two pairs: (1.5, x0 <= 2) and (2.5, true)
     assert srbench.complexity(Estimator(constants())) == 1 + (1 + 1 + 3) + (1 + 1 + 1)
     assert srbench.model(Estimator(constants())) == "Piecewise((1.5, x <= 2), (2.5, True))"
+
+
+def test_srbench_writes_as_people_do():
+    from llmt import srbench
+
+    model = constants()
+    model["regressors"] = [{"column": 0, "centre": 2.0}]
+    for node, slope in zip(model["partitions"][0]["nodes"], (0.0, -1.0, 0.25)):
+        node.update(slope=[[slope]], mean=[0.0], low=[-2.0], high=[2.0])
+    model["partitions"][0]["outer_slope"] = [[0.0]]
+    model["partitions"][0]["nodes"][2]["value"] = [-2.0]
+    # 1.5 - (x - 2) and -2 + 0.25 (x - 2)
+    assert srbench.model(Estimator(model)) == "Piecewise((3.5 - x, x <= 2), (-2.5 + 0.25*x, True))"
 
 
 def test_srbench_refuses(fitted):

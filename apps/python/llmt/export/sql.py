@@ -326,7 +326,8 @@ def to_sql(
     `model` is what `json.loads` makes of the text of a model file. `table` is the name of the table, or a sequence of
     names: ("schema", "table"). `dialect` is "postgresql", "duckdb" or "sqlite" (3.35 or later). `keep` names columns of
     the table that the result has too, such as its key: SQL does not promise an order of the rows. Gaussian and logistic
-    validities need the function EXP, which SQLite has if it was built with its mathematical functions.
+    validities need the function EXP, which SQLite has if it was built with its mathematical functions. SQLite
+    takes text that is no number for 0.
 
     Raises ValueError for another dialect, a name with a NUL character, and trees of more than 1500 splits or 65 levels.
     """
