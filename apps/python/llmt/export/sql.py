@@ -319,15 +319,14 @@ def to_sql(
     """A SELECT statement that gives the predictions of the rows of a table, one column TARGET_pred for each output.
 
     It says what `llmt predict` says, guards and missing values included, but for the rounding of sums. NULL, and NaN
-    where the database has it, is a missing value; a category is compared by its label, without blanks at
-    the ends. An infinite value,
-    which `llmt predict` refuses, is taken.
+    where the database has it, is a missing value; a category is compared by its label, without blanks at the ends. An
+    infinite value, which `llmt predict` refuses, is taken.
 
     `model` is what `json.loads` makes of the text of a model file. `table` is the name of the table, or a sequence of
     names: ("schema", "table"). `dialect` is "postgresql", "duckdb" or "sqlite" (3.35 or later). `keep` names columns of
     the table that the result has too, such as its key: SQL does not promise an order of the rows. Gaussian and logistic
-    validities need the function EXP, which SQLite has if it was built with its mathematical functions. SQLite
-    takes text that is no number for 0.
+    validities need the function EXP, which SQLite has if it was built with its mathematical functions. SQLite takes
+    text that is no number for 0, so check the types of the columns there.
 
     Raises ValueError for another dialect, a name with a NUL character, and trees of more than 1500 splits or 65 levels.
     """
