@@ -36,7 +36,7 @@ macro(llmt_enable_language)
     message(
       FATAL_ERROR
         "llmt: there is no C++ compiler. On Debian and Ubuntu: apt-get install g++ libeigen3-dev libtbb-dev libfast-float-dev "
-        "libfmt-dev nlohmann-json3-dev libboost-dev libyaml-cpp-dev libmuparser-dev liburdfdom-dev libexpat1-dev\n"
+        "libfmt-dev nlohmann-json3-dev libboost-dev libyaml-cpp-dev libmuparser-dev liburdfdom-dev libexpat1-dev python3-dev\n"
         "On other systems install their equivalents; README.md, Requirements, names them.")
   endif()
   enable_language(CXX)

@@ -127,7 +127,7 @@ class Fit {
   std::vector<Eigen::Index> lines_;  // of the rows, counted from 0
 };
 
-std::unique_ptr<Fit> fit_table(const Array& inputs, const Array& outputs, const nb::dict& options,
+std::unique_ptr<Fit> fit_table(const Array& inputs, const Array& outputs, const Options& options,
                                std::vector<std::string> input_names, std::vector<std::string> output_names,
                                std::vector<std::vector<std::string>> levels, const std::optional<Vector>& weights,
                                const std::optional<Vector>& groups, bool may_have_codes,
@@ -171,7 +171,7 @@ std::tuple<std::vector<Eigen::Index>, double, bool> dominant(const Vector& outpu
 
 void add_stream(nb::module_& module) {
   nb::class_<Stream>(module, "Stream", "A tree that learns from rows as they come.")
-      .def(nb::new_([](Eigen::Index inputs, Eigen::Index outputs, const nb::dict& options) {
+      .def(nb::new_([](Eigen::Index inputs, Eigen::Index outputs, const Options& options) {
         return Stream(inputs, outputs, stream_options_of(options));
       }))
       .def_static("from_json", [](const std::string& text) { return stream_from_json(text); })

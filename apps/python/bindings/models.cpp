@@ -138,8 +138,8 @@ std::tuple<std::string, std::string> c_source(const ModelWithIntervals& self, co
   return {std::move(written.source), std::move(written.header)};
 }
 
-nb::list columns_of(const Model& model) {
-  nb::list columns;
+nb::typed<nb::list, nb::typed<nb::dict, nb::str, nb::any>> columns_of(const Model& model) {
+  nb::typed<nb::list, nb::typed<nb::dict, nb::str, nb::any>> columns;
   for (const InputColumn& input : model.inputs()) {
     nb::dict column;
     column["name"] = input.name;

@@ -16,9 +16,10 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from ._core import __version__ as __version__
     from ._estimator import LocalLinearTreeRegressor as LocalLinearTreeRegressor
     from ._model import Model as Model
+
+    __version__: str
 
 # Where each public name is defined; the module is imported when the name is asked for.
 _homes = {

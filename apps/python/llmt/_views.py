@@ -1,6 +1,7 @@
 """What a fitted estimator shows: tables, pictures, explanations, and its model in other languages."""
 
 import html
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -166,11 +167,12 @@ class Views:
 
         return to_python(self._model().to_dict(), name)
 
-    def to_sql(self, table: str = "data", dialect: str = "postgresql") -> str:
-        """A SELECT that predicts the rows of a table; dialects are those of `llmt.export.to_sql`."""
+    def to_sql(self, table: str = "data", dialect: str = "postgresql", keep: "Sequence[str]" = ()) -> str:
+        """A SELECT that predicts the rows of a table; `keep`: columns that it also gives. Dialects are those of
+        `llmt.export.to_sql`."""
         from .export import to_sql
 
-        return to_sql(self._model().to_dict(), table, dialect)
+        return to_sql(self._model().to_dict(), table, dialect, keep)
 
     def to_onnx(self) -> Any:
         """An ONNX model of standard operators."""
