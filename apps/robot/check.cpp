@@ -1,14 +1,11 @@
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
-#include <algorithm>
 #include <memory>
 #include <stdexcept>
 
-#include "llmt/robotics/robot_check.hpp"
 #include "llmt/robotics/robot_file.hpp"
 #include "llmt/robotics/urdf.hpp"
-#include "report/robot/check_report.hpp"
+#include "report/robot/check_run.hpp"
 #include "robot/commands.hpp"
 #include "robot/measured_file.hpp"
 #include "shared/cli.hpp"
@@ -16,8 +13,6 @@
 
 namespace llmt::apps {
 namespace {
-
-using robotics::RobotCheck;
 
 struct CheckArguments {
   std::string robot;
@@ -29,29 +24,6 @@ struct CheckArguments {
   DecimalMark mark = DecimalMark::point;
   bool json = false;
 };
-
-// The robot for a file of one session that it need not know, whose frames are fitted anyway.
-robotics::Robot for_any_session(robotics::Robot robot) {
-  robotics::Chain& chain = robot.chain;
-  std::erase_if(chain.tools, [&](const robotics::NamedFrame& tool) {
-    return std::ranges::any_of(chain.bases, [&](const robotics::NamedFrame& base) {
-      return tool.name == base.name || tool.name.starts_with(base.name + "/");
-    });
-  });
-  chain.bases.clear();
-  chain.session.clear();
-  return robot;
-}
-
-// What calibrations refuse of the number of poses or of the description is said with the names of the files.
-RobotCheck checked(const CheckArguments& arguments, const robotics::CorrectedRobot& robot,
-                   const robotics::Measurements& measurements, const robotics::CheckOptions& options) {
-  try {
-    return robotics::check_robot(robot, measurements, options);
-  } catch (const std::invalid_argument& error) {
-    throw std::runtime_error(fmt::format("{}, {}: {}", arguments.robot, arguments.data, error.what()));
-  }
-}
 
 void check_command(const CheckArguments& arguments) {
   if (robotics::is_urdf(arguments.robot)) {
@@ -65,40 +37,19 @@ void check_command(const CheckArguments& arguments) {
   robotics::CorrectedRobot robot =
       read_unless_exchanged(arguments.robot, arguments.data, order,
                             [](const std::string& path) { return robotics::read_corrected_robot(path); });
-  if (!arguments.same_session) robot.robot = for_any_session(robot.robot);
+  if (!arguments.same_session) robot.robot = report::for_any_session(robot.robot);
   const robotics::Measurements measurements =
       read_measured(arguments.data, robot.robot, {}, {.columns = arguments.columns, .mark = arguments.mark});
-  for (std::size_t row = 0; row < measurements.poses.observations.size() && !arguments.same_session; ++row) {
-    const std::string& base = measurements.poses.observations[row].base;
-    if (!robotics::is_touched(base)) continue;
-    throw std::runtime_error(
-        fmt::format("{}:{}: the place of {} is known only while the robot stays where it was; if it did, give "
-                    "--same-session",
-                    arguments.data, measurements.lines[row], base));
-  }
-  check_frames(arguments.data, robot.robot, measurements,
-               arguments.same_session ? "" : "; check judges a file of one session and known targets");
-  check_positions(arguments.robot, robot.robot, measurements.poses);
   robotics::CheckOptions options{.same_session = arguments.same_session, .accuracy_mm = {}, .level = arguments.level};
   if (arguments.accuracy_mm > 0.0) options.accuracy_mm = arguments.accuracy_mm;
-  const RobotCheck check = checked(arguments, robot, measurements, options);
-  constexpr double implausible_share = 0.02;
-  if (check.error.mean > implausible_share * robotics::reach_of(robot.robot.chain)) {
-    throw std::runtime_error(fmt::format(
-        "{}: the robot misses the points by {:.0f} mm on average, base and tool {}: these are not measurements of it; "
-        "check units, signs and order of the columns",
-        arguments.data, check.error.mean, arguments.same_session ? "as calibrated" : "fitted to them"));
-  }
+  const robotics::RobotCheck check = report::run_check(arguments.robot, arguments.data, robot, measurements, options);
   const report::CheckFacts facts{arguments.robot, arguments.data, robot.robot, measurements, options, check};
   if (arguments.json) {
     print_json(report::check_json(facts));
   } else {
     print(report::check_text(facts));
   }
-  if (!check.still_good) {
-    throw std::runtime_error(fmt::format("{}: the mean error is {:.4f} mm, more than {:.4f} mm", arguments.data,
-                                         check.error.mean, check.limit_mm));
-  }
+  if (const std::string refusal = report::check_refusal(facts); !refusal.empty()) throw std::runtime_error(refusal);
 }
 
 }  // namespace

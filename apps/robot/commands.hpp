@@ -13,14 +13,6 @@
 
 namespace llmt::apps {
 
-/// Throws std::runtime_error, with the name of the robot's file, if a tool position at these poses makes no sense.
-void check_positions(const std::string& file, const robotics::Robot& robot, const robotics::Poses& poses);
-
-/// Throws std::runtime_error, with file and line, where measurements name a session or a target that the robot does not
-/// have. `advice` ends the message.
-void check_frames(const std::string& file, const robotics::Robot& robot, const robotics::Measurements& measurements,
-                  const std::string& advice);
-
 /// The robot's description. Throws as robotics::read_robot(), and std::invalid_argument if the description and the
 /// measurements were exchanged.
 robotics::Robot read_description(const std::string& robot, const std::string& measured,
@@ -29,9 +21,6 @@ robotics::Robot read_description(const std::string& robot, const std::string& me
 /// The arm as it moves, for those who command it: the description and its correction without errors of the instrument
 /// or its session, which are named on standard error. Throws as robotics::read_corrected_robot().
 robotics::CorrectedRobot read_arm(const std::string& path, const robotics::UrdfLinks& links);
-
-/// Says on standard error which columns effects need that were not given.
-void name_made_up(const robotics::Poses& given, const robotics::Poses& completed);
 
 /// --base-link and --tip-link: which part of a URDF is the arm.
 void add_urdf_links(CLI::App& command, robotics::UrdfLinks& links);

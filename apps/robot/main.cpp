@@ -1,38 +1,8 @@
-#include <fmt/format.h>
-#include <fmt/ranges.h>
-
-#include <algorithm>
-#include <stdexcept>
-
 #include "llmt/robotics/robot_file.hpp"
+#include "report/robot/input_checks.hpp"
 #include "robot/commands.hpp"
 #include "shared/cli.hpp"
 #include "shared/options.hpp"
-
-void llmt::apps::check_positions(const std::string& file, const robotics::Robot& robot, const robotics::Poses& poses) {
-  const std::string reason = robotics::position_refusal(robot, poses);
-  if (!reason.empty()) throw std::runtime_error(file + ": " + reason);
-}
-
-void llmt::apps::check_frames(const std::string& file, const robotics::Robot& robot,
-                              const robotics::Measurements& measurements, const std::string& advice) {
-  const auto lacks = [](const std::vector<robotics::NamedFrame>& frames, const std::string& name) {
-    return !name.empty() && std::ranges::find(frames, name, &robotics::NamedFrame::name) == frames.end();
-  };
-  const std::vector<robotics::Observation>& observations = measurements.poses.observations;
-  for (std::size_t row = 0; row < observations.size(); ++row) {
-    const bool is_session = lacks(robot.chain.bases, observations[row].base);
-    if (!is_session && !lacks(robot.chain.tools, observations[row].tool)) continue;
-    const std::string& base = observations[row].base;
-    if (is_session && robotics::is_touched(base)) {
-      throw std::runtime_error(fmt::format("{}:{}: the {} was not part of the calibration, and shows nothing by itself",
-                                           file, measurements.lines[row], base));
-    }
-    throw std::runtime_error(fmt::format("{}:{}: {} \"{}\" was not part of the calibration{}", file,
-                                         measurements.lines[row], is_session ? "session" : "target",
-                                         is_session ? base : observations[row].tool, advice));
-  }
-}
 
 llmt::robotics::Robot llmt::apps::read_description(const std::string& robot, const std::string& measured,
                                                    const robotics::UrdfLinks& links) {
@@ -44,30 +14,7 @@ llmt::robotics::Robot llmt::apps::read_description(const std::string& robot, con
 }
 
 llmt::robotics::CorrectedRobot llmt::apps::read_arm(const std::string& path, const robotics::UrdfLinks& links) {
-  robotics::CorrectedRobot robot = robotics::read_corrected_robot(path, links);
-  const std::vector<robotics::Effect> all = robot.robot.effects;
-  robot.robot = robotics::without_errors_of_measuring(std::move(robot.robot));
-  std::vector<std::string> titles;
-  for (const robotics::Effect& effect : all) {
-    if (robotics::effect_type(effect.type).of_measuring) titles.push_back(robotics::effect_type(effect.type).title);
-  }
-  if (!titles.empty()) {
-    warn(fmt::format("{}: left out, because they were errors of the measurement and not of the arm: {}", path,
-                     fmt::join(titles, ", ")));
-  }
-  return robot;
-}
-
-void llmt::apps::name_made_up(const robotics::Poses& given, const robotics::Poses& completed) {
-  std::vector<std::string> names;
-  for (const auto& [name, values] : completed.covariates) {
-    if (!given.covariates.contains(name)) names.push_back(name);
-  }
-  if (names.empty()) return;
-  warn(
-      fmt::format("Columns that effects need and the table does not have: {}. Directions and moves are those of going "
-                  "from row to row, order counts the rows, everything else is neutral (docs/commands.md)",
-                  fmt::join(names, ", ")));
+  return report::arm_alone(path, robotics::read_corrected_robot(path, links), warn);
 }
 
 void llmt::apps::add_urdf_links(CLI::App& command, robotics::UrdfLinks& links) {

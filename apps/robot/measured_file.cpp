@@ -34,9 +34,4 @@ robotics::Measurements read_measured(const std::string& path, const robotics::Ro
   }
 }
 
-std::string use_of_orientations(const robotics::Measurements& measurements) {
-  if (measurements.orientation.values.size() == 0 || !robotics::orientation_rows(measurements.poses).empty()) return "";
-  return "The file has orientations. Only the positions are used; --orientations uses both.\n";
-}
-
 }  // namespace llmt::apps

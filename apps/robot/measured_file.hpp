@@ -29,7 +29,4 @@ void add_measured_file_options(CLI::App& command, MeasuredFileOptions& options);
 robotics::Measurements read_measured(const std::string& path, const robotics::Robot& robot,
                                      const std::vector<std::string>& also, const MeasuredFileOptions& options);
 
-/// What orientations of the file are used for, as a line; empty if there are none.
-std::string use_of_orientations(const robotics::Measurements& measurements);
-
 }  // namespace llmt::apps

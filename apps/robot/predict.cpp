@@ -1,14 +1,11 @@
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <memory>
 
 #include "llmt/files.hpp"
-#include "llmt/robotics/compensation.hpp"
 #include "llmt/robotics/correction.hpp"
 #include "llmt/robotics/measurements.hpp"
-#include "llmt/robotics/orientation.hpp"
-#include "llmt/robotics/simulation.hpp"
+#include "report/robot/arm_tables.hpp"
 #include "robot/commands.hpp"
 #include "robot/measured_file.hpp"
 #include "shared/cli.hpp"
@@ -31,22 +28,11 @@ void predict_command(const PredictArguments& arguments) {
   const robotics::CorrectedRobot robot = arguments.as_measured
                                              ? robotics::read_corrected_robot(arguments.robot, arguments.links)
                                              : read_arm(arguments.robot, arguments.links);
-  robotics::Measurements predicted;
   const robotics::ColumnMap map = column_map(arguments.columns);
   const DecimalMark mark = map.decimal.value_or(arguments.mark);
   const auto [given, joint_columns] = robotics::read_pose_table(arguments.poses, robot.robot, mark, map);
-  predicted.poses = robotics::with_needed_columns(robot.robot, robotics::with_approach(robot.robot, given), 1);
-  name_made_up(given, predicted.poses);
-  check_positions(arguments.robot, robot.robot, predicted.poses);
-  const std::vector<robotics::Pose> tools = robotics::tool_poses(robot, predicted.poses);
-  predicted.positions_mm.resize(std::ssize(tools), 3);
-  std::vector<Eigen::Matrix3d> rotations;
-  for (std::size_t i = 0; i < tools.size(); ++i) {
-    predicted.positions_mm.row(i) = tools[i].position_mm.transpose();
-    rotations.push_back(tools[i].rotation);
-  }
-  predicted.orientation =
-      robotics::to_orientation(rotations, map.orientation.empty() ? robot.robot.chain.orientation : map.orientation);
+  const robotics::Measurements predicted =
+      report::predicted_table(arguments.robot, robot, given, map.orientation, warn);
   const std::string csv = with_decimal_mark(robotics::to_csv(predicted, robot.robot, joint_columns), mark);
   if (arguments.output.empty()) {
     print_bytes(csv);

@@ -2,12 +2,11 @@
 
 #include <memory>
 #include <optional>
-#include <stdexcept>
 
 #include "llmt/files.hpp"
 #include "llmt/robotics/correction.hpp"
 #include "llmt/robotics/robot_file.hpp"
-#include "llmt/robotics/simulation.hpp"
+#include "report/robot/arm_tables.hpp"
 #include "robot/commands.hpp"
 #include "robot/corrected_file.hpp"
 #include "shared/cli.hpp"
@@ -28,25 +27,12 @@ struct SimulateArguments {
   robotics::SimulationOptions options;
 };
 
-robotics::Measurements simulated(const robotics::Robot& robot, const SimulateArguments& arguments) {
-  std::optional<robotics::Poses> poses;
-  if (!arguments.poses_from.empty()) poses = robotics::read_poses(arguments.poses_from, robot, arguments.mark);
-  try {
-    return poses ? robotics::simulate(robot, *poses, arguments.options) : robotics::simulate(robot, arguments.options);
-  } catch (const std::runtime_error& error) {
-    throw std::runtime_error(arguments.robot + ": " + error.what());
-  }
-}
-
 void simulate_command(const SimulateArguments& arguments) {
   const robotics::CorrectedRobot robot = robotics::read_corrected_robot(arguments.robot, arguments.links);
   refuse_lost_correction(robot.robot, arguments.robot, arguments.output);
-  robotics::Measurements measurements = simulated(robot.robot, arguments);
-  if (robot.correction) {
-    // The correction is part of what the description says of the robot.
-    measurements.positions_mm +=
-        robotics::positions(robot, measurements.poses) - robotics::positions(robot.robot, measurements.poses);
-  }
+  std::optional<robotics::Poses> poses;
+  if (!arguments.poses_from.empty()) poses = robotics::read_poses(arguments.poses_from, robot.robot, arguments.mark);
+  const robotics::Measurements measurements = report::simulated_table(arguments.robot, robot, poses, arguments.options);
   const std::string csv = robotics::to_csv(measurements, robot.robot);
   if (!arguments.output.empty()) {
     write_file(arguments.output, csv);

@@ -1,4 +1,4 @@
-"""A program that uses the package, for mypy --strict in test_types.py: it is read, not run."""
+"""A program that uses the package, for mypy --strict in test_typing.py: it is read, not run."""
 
 from typing import Any
 

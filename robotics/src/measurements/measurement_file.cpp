@@ -174,20 +174,7 @@ Measurements from_csv(const Csv& all, const Robot& robot, const std::vector<std:
   return measurements;
 }
 
-}  // namespace
-
-Measurements read_measurements(const std::string& path, const Robot& robot, const std::vector<std::string>& also,
-                               DecimalMark mark, const ColumnMap& map) {
-  return from_csv(Csv::read(path, map.decimal.value_or(mark)), robot, also, map);
-}
-
-Measurements parse_measurements(std::string text, const std::string& name, const Robot& robot,
-                                const std::vector<std::string>& also, DecimalMark mark, const ColumnMap& map) {
-  return from_csv(Csv::parse(std::move(text), name, map.decimal.value_or(mark)), robot, also, map);
-}
-
-PoseTable read_pose_table(const std::string& path, const Robot& robot, DecimalMark mark, const ColumnMap& given) {
-  const Csv all = Csv::read(path, given.decimal.value_or(mark));
+PoseTable pose_table_of(const Csv& all, const Robot& robot, const ColumnMap& given) {
   const ColumnMap map = for_columns_of(all, given);
   const Csv csv = all.with_rows(reference_rows(all, map).others);
   const Header header(csv, robot, {}, map);
@@ -203,6 +190,27 @@ PoseTable read_pose_table(const std::string& path, const Robot& robot, DecimalMa
     if (known.insert(stands[row]).second) first.push_back(row);
   }
   return {select(poses, first), header.joint_columns()};
+}
+
+}  // namespace
+
+Measurements read_measurements(const std::string& path, const Robot& robot, const std::vector<std::string>& also,
+                               DecimalMark mark, const ColumnMap& map) {
+  return from_csv(Csv::read(path, map.decimal.value_or(mark)), robot, also, map);
+}
+
+Measurements parse_measurements(std::string text, const std::string& name, const Robot& robot,
+                                const std::vector<std::string>& also, DecimalMark mark, const ColumnMap& map) {
+  return from_csv(Csv::parse(std::move(text), name, map.decimal.value_or(mark)), robot, also, map);
+}
+
+PoseTable read_pose_table(const std::string& path, const Robot& robot, DecimalMark mark, const ColumnMap& map) {
+  return pose_table_of(Csv::read(path, map.decimal.value_or(mark)), robot, map);
+}
+
+PoseTable parse_pose_table(std::string text, const std::string& name, const Robot& robot, DecimalMark mark,
+                           const ColumnMap& map) {
+  return pose_table_of(Csv::parse(std::move(text), name, map.decimal.value_or(mark)), robot, map);
 }
 
 Poses read_poses(const std::string& path, const Robot& robot, DecimalMark mark, const ColumnMap& map) {

@@ -9,8 +9,9 @@
 
 namespace llmt::robotics {
 
-TargetTable read_targets(const std::string& path, const Robot& robot, DecimalMark mark, const ColumnMap& given) {
-  const Csv csv = Csv::read(path, given.decimal.value_or(mark));
+namespace {
+
+TargetTable targets_of(const Csv& csv, const Robot& robot, const ColumnMap& given) {
   const ColumnMap map = for_columns_of(csv, given);
   const Header header(csv, robot, {}, map);
   TargetTable targets;
@@ -51,6 +52,17 @@ TargetTable read_targets(const std::string& path, const Robot& robot, DecimalMar
   targets.covariates = header.covariates();
   for (const std::string& column : header.unused()) targets.unused_columns.push_back(column);
   return targets;
+}
+
+}  // namespace
+
+TargetTable read_targets(const std::string& path, const Robot& robot, DecimalMark mark, const ColumnMap& map) {
+  return targets_of(Csv::read(path, map.decimal.value_or(mark)), robot, map);
+}
+
+TargetTable parse_targets(std::string text, const std::string& name, const Robot& robot, DecimalMark mark,
+                          const ColumnMap& map) {
+  return targets_of(Csv::parse(std::move(text), name, map.decimal.value_or(mark)), robot, map);
 }
 
 }  // namespace llmt::robotics

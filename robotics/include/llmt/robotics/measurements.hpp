@@ -172,6 +172,10 @@ Poses read_poses(const std::string& path, const Robot& robot, DecimalMark mark =
 PoseTable read_pose_table(const std::string& path, const Robot& robot, DecimalMark mark = DecimalMark::point,
                           const ColumnMap& map = {});
 
+/// As read_pose_table(), from memory; `name` stands for the path in messages.
+PoseTable parse_pose_table(std::string text, const std::string& name, const Robot& robot,
+                           DecimalMark mark = DecimalMark::point, const ColumnMap& map = {});
+
 /// What a file asks a robot for, row by row.
 struct TargetTable {
   Eigen::MatrixXd joints;                  ///< n x J as in Poses, or empty if the file has no joint columns
@@ -189,6 +193,10 @@ struct TargetTable {
 /// of x, y and z. Columns of the map that the file lacks do not matter. Throws as read_measurements().
 TargetTable read_targets(const std::string& path, const Robot& robot, DecimalMark mark = DecimalMark::point,
                          const ColumnMap& map = {});
+
+/// As read_targets(), from memory; `name` stands for the path in messages.
+TargetTable parse_targets(std::string text, const std::string& name, const Robot& robot,
+                          DecimalMark mark = DecimalMark::point, const ColumnMap& map = {});
 
 /// Adds how far each joint moved to reach a pose: columns move1_rad (_mm if prismatic), ..., differences of joint
 /// values to the row before in the sequence of the column order, or else time_s; 0 in the first row. Nothing without

@@ -1,0 +1,126 @@
+#include "report/robot/calibration_run.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <set>
+#include <stdexcept>
+#include <utility>
+
+#include "report/robot/input_checks.hpp"
+
+namespace llmt::report {
+namespace {
+
+// Measurements that take no part, with frames of the calibrated robot or, in a new session, frames of their own.
+robotics::Measurements test_of(const CalibrationTask& task, const robotics::Robot& nominal,
+                               const ReadMeasurements& read_test) {
+  robotics::Measurements test = read_test(nominal);
+  if (!task.new_session) {
+    check_frames(task.test_file, nominal, test, "; --new-session fits base and tool to the test file");
+  } else if (constexpr std::size_t values_of_frames = 9; robotics::measured_rows(test).size() <= values_of_frames) {
+    throw std::runtime_error(fmt::format("{}: {} points do not tell base and tool ({} values) and the error, too",
+                                         task.test_file, test.count(), values_of_frames));
+  }
+  check_positions(task.robot_file, robotics::with_frames(nominal, test.poses), test.poses);
+  return test;
+}
+
+// Takes the readings that lie far off out of the run's measurements.
+void leave_outliers_out(CalibrationRun& run) {
+  robotics::Measurements& measurements = run.measurements;
+  const robotics::RobustCalibration robust =
+      robotics::calibrate_robustly(run.nominal, measurements, run.task.options.calibration);
+  std::vector<Eigen::Index>& lines = run.outlier_lines;
+  for (const std::size_t row : robust.left_out) lines.push_back(measurements.lines[row]);
+  std::ranges::sort(lines);
+  lines.erase(std::unique(lines.begin(), lines.end()), lines.end());
+  robotics::Measurements kept = robotics::without_rows(measurements, robust.left_out);
+  kept.warnings = measurements.warnings;
+  kept.unused_columns = measurements.unused_columns;
+  measurements = std::move(kept);
+}
+
+void require_poses_for_folds(const CalibrationRun& run) {
+  const std::vector<double> labels = robotics::pose_labels(run.measurements.poses);
+  const Eigen::Index poses =
+      labels.empty() ? run.measurements.count() : std::ssize(std::set<double>(labels.begin(), labels.end()));
+  if (poses < run.task.options.folds) {
+    throw std::runtime_error(
+        fmt::format("{}: {} poses do not make {} folds", run.task.data_file, poses, run.task.options.folds));
+  }
+}
+
+std::string refusal_of(const CalibrationRun& run) {
+  if (run.is_implausible) {
+    return fmt::format(
+        "{}: the calibrated robot misses half of the points by more than a fiftieth of its length, or turns its tool "
+        "otherwise than was measured: nothing is written; check units, order, signs and zeros of the joints, the order "
+        "of quaternions or the convention of angles, and the description",
+        run.task.data_file);
+  }
+  const discovery::SolverResult& result = run.report.calibration.result;
+  return result.converged() ? "" : fmt::format("the calibration did not converge: {}", result.reason);
+}
+
+}  // namespace
+
+CalibrationRun run_calibration(const robotics::Robot& described, const robotics::Measurements& measured,
+                               const ReadMeasurements& read_test, CalibrationTask task) {
+  CalibrationRun run{.task = std::move(task),
+                     .nominal = {},
+                     .measurements = robotics::without_small_sessions(measured),
+                     .test = {},
+                     .outlier_lines = {},
+                     .report = {},
+                     .input_mistakes = {},
+                     .used = {},
+                     .details = {},
+                     .is_implausible = false,
+                     .refusal = {}};
+  robotics::Measurements& measurements = run.measurements;
+  if (measurements.count() == 0) {
+    throw std::runtime_error(run.task.data_file + ": " + measurements.warnings.back());
+  }
+  run.nominal = robotics::with_frames(described, measurements);
+  if (run.task.robust) leave_outliers_out(run);
+  require_poses_for_folds(run);
+  if (read_test) run.test = test_of(run.task, run.nominal, read_test);
+  check_positions(run.task.robot_file, run.nominal, measurements.poses);
+  run.report = robotics::report_calibration(run.nominal, measurements, run.task.options);
+  run.task.options.progress = {};
+  if (const std::string far = robotics::far_readings(measurements, run.report); !far.empty() && !run.task.robust) {
+    measurements.warnings.push_back(far + ": --robust leaves such readings out");
+  }
+  run.input_mistakes = robotics::input_mistakes(run.nominal, measurements, run.report);
+  if (run.test) {
+    robotics::Poses used = run.test->poses;
+    used.observations.clear();
+    if (!run.test->poses.observations.empty()) used = select(used, robotics::position_rows(run.test->poses));
+    run.used = robotics::coverage(run.report.calibration, measurements.poses, used, run.task.new_session);
+  }
+  if (run.task.quality) {
+    run.details = calibration_details(run.nominal, measurements, run.report, run.task.options);
+  }
+  run.is_implausible = robotics::is_implausible(run.nominal, run.report);
+  run.refusal = refusal_of(run);
+  return run;
+}
+
+CalibrationFacts CalibrationRun::facts(const std::string& output) const {
+  return {.robot_file = task.robot_file,
+          .data_file = task.data_file,
+          .output = output,
+          .note = use_of_orientations(measurements),
+          .contiguous = task.options.kind == FoldKind::contiguous,
+          .nominal = nominal,
+          .measurements = measurements,
+          .report = report,
+          .models = judged_models(report, measurements, test, task.new_session),
+          .input_mistakes = input_mistakes,
+          .outlier_lines = outlier_lines,
+          .used = used,
+          .details = details};
+}
+
+}  // namespace llmt::report

@@ -1,0 +1,52 @@
+/// \file
+/// A calibration from what was read to what is reported.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "llmt/robotics/calibration_report.hpp"
+#include "report/robot/calibration_facts.hpp"
+
+namespace llmt::report {
+
+/// What is asked of a calibration. The names of files stand in messages.
+struct CalibrationTask {
+  std::string robot_file;
+  std::string data_file;
+  std::string test_file;
+  bool robust = false;       ///< leave out readings that lie far off
+  bool quality = false;      ///< with CalibrationDetails
+  bool new_session = false;  ///< base and tool are fitted to the test measurements
+  robotics::ReportOptions options = {};
+};
+
+/// A calibration with all that its reports show.
+struct CalibrationRun {
+  CalibrationTask task;
+  robotics::Robot nominal;              ///< as described, with frames for all that was measured
+  robotics::Measurements measurements;  ///< that were fitted
+  std::optional<robotics::Measurements> test;
+  std::vector<Eigen::Index> outlier_lines;
+  robotics::CalibrationReport report;
+  std::vector<std::string> input_mistakes;
+  std::optional<robotics::Coverage> used;
+  std::optional<CalibrationDetails> details;
+  bool is_implausible = false;  ///< the calibrated robot must not be used
+  std::string refusal;          ///< why the result is none, in a sentence; empty if it is one
+
+  /// For calibration_text() and calibration_json(): refers to this. `output`: file of the description, or empty.
+  CalibrationFacts facts(const std::string& output) const;
+};
+
+/// Reads measurements of a robot.
+using ReadMeasurements = std::function<robotics::Measurements(const robotics::Robot&)>;
+
+/// Calibrates the described robot. `read_test` gives measurements that take no part; it may be empty. Throws
+/// std::runtime_error with the names of the files, and as robotics::report_calibration().
+CalibrationRun run_calibration(const robotics::Robot& described, const robotics::Measurements& measured,
+                               const ReadMeasurements& read_test, CalibrationTask task);
+
+}  // namespace llmt::report

@@ -1,0 +1,71 @@
+#include "report/robot/input_checks.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+#include "llmt/robotics/effects.hpp"
+
+namespace llmt::report {
+
+void check_positions(const std::string& file, const robotics::Robot& robot, const robotics::Poses& poses) {
+  const std::string reason = robotics::position_refusal(robot, poses);
+  if (!reason.empty()) throw std::runtime_error(file + ": " + reason);
+}
+
+void check_frames(const std::string& file, const robotics::Robot& robot, const robotics::Measurements& measurements,
+                  const std::string& advice) {
+  const auto lacks = [](const std::vector<robotics::NamedFrame>& frames, const std::string& name) {
+    return !name.empty() && std::ranges::find(frames, name, &robotics::NamedFrame::name) == frames.end();
+  };
+  const std::vector<robotics::Observation>& observations = measurements.poses.observations;
+  for (std::size_t row = 0; row < observations.size(); ++row) {
+    const bool is_session = lacks(robot.chain.bases, observations[row].base);
+    if (!is_session && !lacks(robot.chain.tools, observations[row].tool)) continue;
+    const std::string& base = observations[row].base;
+    if (is_session && robotics::is_touched(base)) {
+      throw std::runtime_error(fmt::format("{}:{}: the {} was not part of the calibration, and shows nothing by itself",
+                                           file, measurements.lines[row], base));
+    }
+    throw std::runtime_error(fmt::format("{}:{}: {} \"{}\" was not part of the calibration{}", file,
+                                         measurements.lines[row], is_session ? "session" : "target",
+                                         is_session ? base : observations[row].tool, advice));
+  }
+}
+
+robotics::CorrectedRobot arm_alone(const std::string& file, robotics::CorrectedRobot robot, const Warn& warn) {
+  const std::vector<robotics::Effect> all = robot.robot.effects;
+  robot.robot = robotics::without_errors_of_measuring(std::move(robot.robot));
+  std::vector<std::string> titles;
+  for (const robotics::Effect& effect : all) {
+    if (robotics::effect_type(effect.type).of_measuring) titles.push_back(robotics::effect_type(effect.type).title);
+  }
+  if (!titles.empty()) {
+    warn(fmt::format("{}: left out, because they were errors of the measurement and not of the arm: {}", file,
+                     fmt::join(titles, ", ")));
+  }
+  return robot;
+}
+
+void name_made_up(const robotics::Poses& given, const robotics::Poses& completed, const Warn& warn) {
+  std::vector<std::string> names;
+  for (const auto& [name, values] : completed.covariates) {
+    if (!given.covariates.contains(name)) names.push_back(name);
+  }
+  if (names.empty()) return;
+  warn(
+      fmt::format("Columns that effects need and the table does not have: {}. Directions and moves are those of going "
+                  "from row to row, order counts the rows, everything else is neutral (docs/commands.md)",
+                  fmt::join(names, ", ")));
+}
+
+std::string use_of_orientations(const robotics::Measurements& measurements) {
+  if (measurements.orientation.values.size() == 0 || !robotics::orientation_rows(measurements.poses).empty()) return "";
+  return "The file has orientations. Only the positions are used; --orientations uses both.\n";
+}
+
+}  // namespace llmt::report

@@ -1,0 +1,35 @@
+/// \file
+/// What is said of inputs that do not suit a robot, with the names of their files.
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "llmt/robotics/correction.hpp"
+#include "llmt/robotics/measurements.hpp"
+#include "llmt/robotics/robot.hpp"
+
+namespace llmt::report {
+
+/// Takes a sentence that people should read although the work goes on.
+using Warn = std::function<void(const std::string& sentence)>;
+
+/// Throws std::runtime_error, with the name of the robot's file, if a tool position at these poses makes no sense.
+void check_positions(const std::string& file, const robotics::Robot& robot, const robotics::Poses& poses);
+
+/// Throws std::runtime_error, with file and line, where measurements name a session or a target that the robot does not
+/// have. `advice` ends the message.
+void check_frames(const std::string& file, const robotics::Robot& robot, const robotics::Measurements& measurements,
+                  const std::string& advice);
+
+/// The arm as it moves, for those who command it: without errors of the instrument or its session. `warn` gets their
+/// names. `file`: of the robot.
+robotics::CorrectedRobot arm_alone(const std::string& file, robotics::CorrectedRobot robot, const Warn& warn);
+
+/// Warns of the columns that effects need and that were not given.
+void name_made_up(const robotics::Poses& given, const robotics::Poses& completed, const Warn& warn);
+
+/// What orientations of the file are used for, as a line; empty if there are none.
+std::string use_of_orientations(const robotics::Measurements& measurements);
+
+}  // namespace llmt::report
