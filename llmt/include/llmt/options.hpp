@@ -155,9 +155,9 @@ struct FitOptions {
   double significance = -1.0;
   std::vector<int> split_inputs = {};       ///< columns that may be split; empty: all
   std::vector<int> regression_inputs = {};  ///< columns that local models use; empty: all
-  /// Leave out inputs where that lowers the held-out error beyond chance: RD, RETIS and RA, with two folds or more and
-  /// fewer than 300 rows an input, where neither split_inputs nor regression_inputs nor a monotone trend is
-  /// given.
+  /// Leave out inputs where that lowers the held-out error beyond chance: RD, RETIS and RA, with two folds or more or
+  /// with TrainingData::held_out, and fewer than 300 rows an input, where neither split_inputs nor regression_inputs
+  /// nor a monotone trend is given.
   bool choose_inputs = true;
   bool shared_partition = false;  ///< one tree for all outputs, their RSS divided by their variances; else one each
   Pruning pruning = Pruning::last_splits;
@@ -166,7 +166,8 @@ struct FitOptions {
   Loss loss = Loss::squared;
   SparseChoice sparse = SparseChoice::never;
   /// The tree is grown anew in every fold, and what predicts the held-out rows best is kept. count 0: no choice, the
-  /// tree stays as grown. From 50 000 rows on, only the first fold is held out.
+  /// tree stays as grown. From 50 000 rows on, only the first fold is held out. TrainingData::held_out takes their
+  /// place.
   FoldOptions folds = {};
   std::vector<Trend> trends = {};  ///< one an input; empty: any
   bool intervals = true;           ///< keep the folds' models and residuals for prediction intervals

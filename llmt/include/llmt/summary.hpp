@@ -118,7 +118,7 @@ struct CodeChoice {
 };
 
 struct FitSummary {
-  Eigen::Index samples = 0;           ///< rows of positive weight, copies included
+  Eigen::Index samples = 0;           ///< rows of positive weight that the model is fitted to, copies included
   Eigen::Index copies = 0;            ///< rows that were taken for copies of others and only add to their weight
   bool repeats = false;               ///< rows with equal inputs were taken for repeats, and held out together
   Eigen::Index missing_values = 0;    ///< in the inputs
@@ -133,8 +133,9 @@ struct FitSummary {
   Eigen::VectorXd loss_weights = {};
   /// The rows that each fold held out, ascending, in the order of Intervals::models(): the model of a fold has not seen
   /// the rows of its list. Copies of a row are in the list of the row that they copy, and repeats of a measurement in
-  /// one list; rows of weight 0, and those that Loss::tukey leaves out, are in none. With one fold held out once (many
-  /// rows) the lists do not cover all rows. Empty without folds.
+  /// one list; rows of weight 0, and those that Loss::tukey leaves out, are in none. A row whose weight counts it more
+  /// than once may be in several. With one fold held out once (many rows, or TrainingData::held_out) the lists do not
+  /// cover all rows. Empty without folds.
   std::vector<std::vector<Eigen::Index>> held_out = {};
 };
 

@@ -25,10 +25,18 @@ namespace llmt {
 struct TrainingData {
   Eigen::MatrixXd inputs = {};   ///< rows x inputs; NaN: missing
   Eigen::MatrixXd outputs = {};  ///< rows x outputs
-  Eigen::VectorXd weights = {};  ///< one a row, not negative; a row of weight 0 takes no part. Empty: all 1
+  /// One a row, not negative; a row of weight 0 takes no part. Empty: all 1. If all are whole numbers, at most 10 on
+  /// average over those that are not 0, they are counts: a row of weight k is k equal rows, to the last byte of the
+  /// result. Of other weights only the ratios matter (docs/algorithms/data.md).
+  Eigen::VectorXd weights = {};
   /// One label a row: rows with equal labels, such as repeats of a pose, are held out together. Empty: the fit looks
   /// for repeats.
   std::vector<double> groups = {};
+  /// Rows, counted from 0, on which the fit chooses, in place of folds: leaves, validities, inputs, codes and all that
+  /// held-out rows decide elsewhere. The model is fitted to the other rows alone. FitOptions::folds, whose count must
+  /// not be 0, and groups then deal nothing. Intervals are those of these rows (split conformal prediction). Empty: the
+  /// fit deals folds, and fits to all rows.
+  std::vector<Eigen::Index> held_out = {};
   std::vector<int> categorical_inputs = {};  ///< columns whose values are categories 0, 1, 2, ...
   /// Of each input the names of its categories, which its values number from 0 on. No names: a number, or categories
   /// without names. An input with names is categorical. A category above the largest one that takes part in the fit is
@@ -36,7 +44,8 @@ struct TrainingData {
   std::vector<std::vector<std::string>> levels = {};
   /// Whether inputs of few whole numbers may be codes of categories (docs/algorithms/codes.md). They are taken for
   /// codes where that lowers the held-out error beyond chance: by RD, RETIS and RA with crisp leaves or blends, with
-  /// two folds or more, where none of FitOptions::split_inputs, regression_inputs and trends is given.
+  /// two folds or more or with `held_out`, where none of FitOptions::split_inputs, regression_inputs and trends is
+  /// given.
   bool may_have_codes = true;
   std::vector<std::string> input_names = {};
   std::vector<std::string> output_names = {};

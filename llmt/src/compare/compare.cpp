@@ -157,6 +157,9 @@ void describe_model(const GivenRows& given, const Method& method, double share, 
 ComparisonResult compare_rows(GivenRows given, const std::vector<Method>& methods, const CompareOptions& options) {
   const Eigen::Index rows = given.inputs.values.rows();
   const Eigen::Ref<const Eigen::MatrixXd>& output = given.outputs.values;
+  if (!given.held_out.empty()) {
+    throw std::invalid_argument("llmt::compare: held_out is for fit(); methods are compared on CompareOptions::folds");
+  }
   if (methods.empty()) throw std::invalid_argument("llmt::compare: there is no method");
   if (output.cols() != 1 || output.rows() != rows) {
     throw std::invalid_argument(fmt::format("llmt::compare: output is {} x {}, one column and {} rows are needed",

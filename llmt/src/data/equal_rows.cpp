@@ -186,7 +186,14 @@ RowNumbers number_rows(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
 long times_rows_were_numbered() { return times_numbered; }
 
 RowNumbers at(const RowNumbers& numbers, const std::vector<Eigen::Index>& positions) {
-  if (numbers.by_inputs.empty()) return {};
+  if (numbers.by_inputs.empty()) {
+    if (std::ranges::adjacent_find(positions) == positions.end()) return {};
+    std::vector<int> own;
+    for (std::size_t i = 0; i < positions.size(); ++i) {
+      own.push_back(i == 0 ? 0 : own.back() + (positions[i] != positions[i - 1] ? 1 : 0));
+    }
+    return {own, own};
+  }
   return {renumbered(numbers.by_inputs, positions), renumbered(numbers.by_all, positions)};
 }
 

@@ -27,7 +27,7 @@ RowNumbers number_rows(const Eigen::Ref<const Eigen::MatrixXd>& inputs,
 /// How often number_rows() was called in this process, for tests.
 long times_rows_were_numbered();
 
-/// The numbers at some positions.
+/// The numbers at some positions, ascending. Of a position that is there more than once, all rows are equal.
 RowNumbers at(const RowNumbers& numbers, const std::vector<Eigen::Index>& positions);
 
 /// Rows that are no measurements of their own, see "Rows with equal inputs" (C.2) in docs/algorithms/selection.md.

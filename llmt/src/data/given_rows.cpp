@@ -68,6 +68,22 @@ std::vector<int> categorical_of(const TrainingData& data) {
   return categorical;
 }
 
+// Of each row, whether it is held out; empty: the fit deals folds.
+std::vector<bool> held_out_of(const TrainingData& data) {
+  const Eigen::Index rows = data.inputs.rows();
+  std::vector<bool> held_out(data.held_out.empty() ? 0 : rows, false);
+  for (std::size_t i = 0; i < data.held_out.size(); ++i) {
+    const Eigen::Index row = data.held_out[i];
+    if (row < 0 || row >= rows) {
+      throw std::invalid_argument(
+          fmt::format("llmt::fit: held_out[{}] is {}, it must be a row from 0 to {}", i, row, rows - 1));
+    }
+    if (held_out[row]) throw std::invalid_argument(fmt::format("llmt::fit: held_out has row {} twice", row));
+    held_out[row] = true;
+  }
+  return held_out;
+}
+
 }  // namespace
 
 GivenRows given_rows(const TrainingData& data) {
@@ -76,6 +92,7 @@ GivenRows given_rows(const TrainingData& data) {
           .outputs = {data.outputs},
           .weights = data.weights,
           .groups = data.groups,
+          .held_out = held_out_of(data),
           .categorical = categorical_of(data),
           .may_have_codes = data.may_have_codes};
 }

@@ -2,9 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numeric>
 #include <stdexcept>
+#include <string>
 #include <utility>
 
 #include "base/count.hpp"
@@ -15,6 +17,9 @@ namespace {
 
 // Weights are at most 1. One below this changes nothing but rounding.
 constexpr double smallest_weight = 1e-12;
+
+// Whole weights are counts up to this mean of those that are not 0.
+constexpr double most_counts = 10.0;
 
 // Divided by the largest.
 Eigen::VectorXd scaled_weights(const Eigen::VectorXd& given, Eigen::Index rows) {
@@ -34,34 +39,63 @@ Values values_at(const Values& values, const std::vector<Eigen::Index>& rows) {
   return result;
 }
 
-// Where the rows that take part stand, as in KeptRows.
-struct Places {
-  std::vector<Eigen::Index> rows = {};
-  std::vector<int> row_of = {};
-  std::vector<double> groups = {};
-  Eigen::Index copies = 0;
+// Rows, each as often as it counts, without those that are copies of others.
+struct WithoutCopies {
+  std::vector<Eigen::Index> left;  // positions among the rows
+  std::vector<int> left_as;        // of each row, where it or the row that it copies stands in `left`
 };
 
-// Adds the weights of copies to those of the rows that they copy, and leaves them out. `copy_of`: of each row that
-// takes part, the one that it copies.
-void leave_out_copies(const std::vector<int>& copy_of, Eigen::VectorXd& weights, Places& places) {
-  std::vector<Eigen::Index> left;
-  std::vector<double> groups;
-  for (int i = 0; i < count_of(places.rows); ++i) {
-    const Eigen::Index row = places.rows[i];
-    const Eigen::Index copied = places.rows[copy_of[i]];
-    if (copied != row) {
-      weights(copied) += weights(row);
-      places.row_of[row] = places.row_of[copied];
-      continue;
-    }
-    places.row_of[row] = count_of(left);
-    left.push_back(row);
-    if (!places.groups.empty()) groups.push_back(places.groups[i]);
+// Adds the weights of copies to those of the rows that they copy. `copy_of`: of each row, the one that it copies.
+WithoutCopies leave_out_copies(const std::vector<int>& copy_of, Eigen::VectorXd& weights) {
+  WithoutCopies result;
+  for (int i = 0; i < count_of(copy_of); ++i) {
+    const int copied = copy_of[i];
+    if (copied != i) weights(copied) += weights(i);
+    result.left_as.push_back(copied != i ? result.left_as[copied] : count_of(result.left));
+    if (copied == i) result.left.push_back(i);
   }
-  places.copies = std::ssize(places.rows) - std::ssize(left);
-  places.rows = std::move(left);
-  places.groups = std::move(groups);
+  return result;
+}
+
+// The number of different ones among ascending rows.
+Eigen::Index different(const std::vector<Eigen::Index>& rows) {
+  Eigen::Index count = rows.empty() ? 0 : 1;
+  for (std::size_t i = 1; i < rows.size(); ++i) count += rows[i] != rows[i - 1] ? 1 : 0;
+  return count;
+}
+
+// Rows that the caller holds out copy nothing and are not copied: what is learned must not depend on them.
+EqualRows equal_rows(const GivenRows& given, const std::vector<Eigen::Index>& rows) {
+  const Eigen::Ref<const Eigen::MatrixXd>& inputs = given.inputs.values;
+  if (given.held_out.empty()) return find_equal_rows(inputs, rows, at(*given.numbers, rows));
+  std::vector<int> positions;
+  std::vector<Eigen::Index> learned;
+  for (int i = 0; i < count_of(rows); ++i) {
+    if (given.held_out[rows[i]]) continue;
+    positions.push_back(i);
+    learned.push_back(rows[i]);
+  }
+  EqualRows equal = find_equal_rows(inputs, learned, at(*given.numbers, learned));
+  if (equal.copy_of.empty()) return equal;
+  std::vector<int> copy_of(rows.size());
+  std::iota(copy_of.begin(), copy_of.end(), 0);
+  for (std::size_t i = 0; i < positions.size(); ++i) copy_of[positions[i]] = positions[equal.copy_of[i]];
+  equal.copy_of = std::move(copy_of);
+  return equal;
+}
+
+// The fold of the rows that the caller holds out; none if some rows lack one of its sides.
+std::vector<Fold> given_fold(const std::vector<bool>& held_out, const std::vector<Eigen::Index>& rows) {
+  Fold fold;
+  for (Eigen::Index i = 0; i < std::ssize(rows); ++i) (held_out[rows[i]] ? fold.held_out : fold.train).push_back(i);
+  if (fold.held_out.empty() || fold.train.empty()) return {};
+  return {std::move(fold)};
+}
+
+bool are_counts(const Eigen::VectorXd& weights) {
+  const Eigen::Index positive = (weights.array() > 0.0).count();
+  return positive > 0 && (weights.array() == weights.array().floor()).all() &&
+         weights.sum() <= most_counts * static_cast<double>(positive);
 }
 
 void check_groups(const std::vector<double>& groups, Eigen::Index rows) {
@@ -73,6 +107,22 @@ void check_groups(const std::vector<double>& groups, Eigen::Index rows) {
   for (std::size_t row = 0; row < groups.size(); ++row) {
     if (std::isfinite(groups[row])) continue;
     throw std::invalid_argument(fmt::format("llmt::fit: groups[{}] is {}, it must be finite", row, groups[row]));
+  }
+}
+
+void check_held_out(const GivenRows& given, const FitOptions& options) {
+  if (given.held_out.empty()) return;
+  if (options.folds.count == 0) {
+    throw std::invalid_argument("llmt::fit: held_out has rows to choose on, but folds.count is 0: nothing is chosen");
+  }
+  const std::vector<Eigen::Index> rows = counted_rows(given);
+  const std::string weighted = given.weights.size() > 0 ? " of positive weight" : "";
+  if (std::ranges::none_of(rows, [&](Eigen::Index row) { return given.held_out[row]; })) {
+    throw std::invalid_argument(fmt::format("llmt::fit: held_out has no row{}", weighted));
+  }
+  if (std::ranges::all_of(rows, [&](Eigen::Index row) { return given.held_out[row]; })) {
+    throw std::invalid_argument(
+        fmt::format("llmt::fit: held_out has all rows{}, none is left to learn from", weighted));
   }
 }
 
@@ -92,6 +142,8 @@ GivenRows checked(GivenRows given, const FitOptions& options) {
   const Eigen::Ref<const Eigen::MatrixXd>& outputs = given.outputs.values;
   check_data(inputs, outputs, given.weights, given.categorical, options);
   check_groups(given.groups, inputs.rows());
+  given.are_counts = are_counts(given.weights);
+  check_held_out(given, options);
   if (!given.numbers && given.groups.empty() && options.folds.count > 0) {
     std::vector<Eigen::Index> all(inputs.rows());
     std::iota(all.begin(), all.end(), 0);
@@ -105,45 +157,79 @@ GivenRows rows_at(const GivenRows& given, const std::vector<Eigen::Index>& rows)
           .outputs = shared(given.outputs.values(rows, Eigen::all)),
           .weights = values_at(given.weights, rows),
           .groups = values_at(given.groups, rows),
+          .held_out = values_at(given.held_out, rows),
+          .are_counts = given.are_counts,
           .categorical = given.categorical,
           .may_have_codes = given.may_have_codes,
           .loss_weights = values_at(given.loss_weights, rows),
           .numbers = numbers_at(given, rows)};
 }
 
-KeptRows keep(const GivenRows& given, const FoldOptions& folds) {
-  const Eigen::Index count = given.inputs.values.rows();
-  Eigen::VectorXd weights = scaled_weights(given.weights, count);
-  Places places{.row_of = std::vector<int>(count, -1)};
-  for (Eigen::Index row = 0; row < count; ++row) {
+std::vector<Eigen::Index> counted_rows(const GivenRows& given) {
+  const Eigen::VectorXd weights = scaled_weights(given.weights, given.inputs.values.rows());
+  std::vector<Eigen::Index> rows;
+  for (Eigen::Index row = 0; row < weights.size(); ++row) {
     if (!(weights(row) > smallest_weight)) continue;
-    places.row_of[row] = count_of(places.rows);
-    places.rows.push_back(row);
+    rows.insert(rows.end(), given.are_counts ? static_cast<std::size_t>(given.weights(row)) : 1, row);
   }
+  return rows;
+}
+
+GivenRows counted_rows_at(const GivenRows& given, const std::vector<Eigen::Index>& rows) {
+  GivenRows result = rows_at(given, rows);
+  if (given.are_counts) result.weights.setOnes();
+  return result;
+}
+
+KeptRows keep(const GivenRows& given, const FoldOptions& folds) {
+  const std::vector<Eigen::Index> counted = counted_rows(given);
+  const Eigen::Index count = given.inputs.values.rows();
+  Eigen::VectorXd weights = Eigen::VectorXd::Ones(std::ssize(counted));
+  if (given.weights.size() > 0 && !given.are_counts) weights = scaled_weights(given.weights, count)(counted);
   EqualRows equal;
-  if (given.groups.empty() && given.numbers && folds.count > 0) {
-    equal = find_equal_rows(given.inputs.values, places.rows, at(*given.numbers, places.rows));
-    if (equal.are_repeats) places.groups.assign(equal.group.begin(), equal.group.end());
-    if (!equal.copy_of.empty()) leave_out_copies(equal.copy_of, weights, places);
+  if (given.groups.empty() && given.numbers && folds.count > 0) equal = equal_rows(given, counted);
+  std::vector<int> copy_of = std::move(equal.copy_of);
+  if (copy_of.empty()) {
+    copy_of.resize(counted.size());
+    std::iota(copy_of.begin(), copy_of.end(), 0);
   }
-  if (!given.groups.empty()) places.groups = values_at(given.groups, places.rows);
-  const std::vector<Eigen::Index>& rows = places.rows;
-  const bool all = std::ssize(rows) == count;
+  const WithoutCopies without = leave_out_copies(copy_of, weights);
+  std::vector<Eigen::Index> rows = values_at(counted, without.left);
+  const bool all = std::ssize(rows) == count && std::ranges::adjacent_find(rows) == rows.end();
   KeptRows kept{.inputs = all ? given.inputs : shared(given.inputs.values(rows, Eigen::all)),
                 .outputs = all ? given.outputs : shared(given.outputs.values(rows, Eigen::all)),
-                .weights = all ? weights : scaled_weights(weights(rows), std::ssize(rows)),
+                .weights = all ? weights : scaled_weights(weights(without.left), std::ssize(rows)),
                 .loss_weights = values_at(given.loss_weights, rows),
-                .copies = places.copies,
-                .has_repeats = equal.are_repeats};
+                .has_repeats = equal.are_repeats,
+                .is_fold_given = !given.held_out.empty()};
   if (!all) {
     check_magnitudes("inputs", kept.inputs.values);
     check_magnitudes("outputs", kept.outputs.values);
   }
-  kept.groups = std::move(places.groups);
-  kept.rows = std::move(places.rows);
-  kept.row_of = std::move(places.row_of);
-  kept.folds = selection_folds(kept.count(), folds, kept.groups);
+  if (equal.are_repeats) {
+    for (const Eigen::Index position : without.left) kept.groups.push_back(equal.group[position]);
+  }
+  if (!given.groups.empty()) kept.groups = values_at(given.groups, rows);
+  for (std::size_t i = 0; i < counted.size(); ++i) {
+    kept.places.push_back({static_cast<int>(counted[i]), without.left_as[i]});
+  }
+  kept.copies = different(counted) - different(rows);
+  kept.rows = std::move(rows);
+  kept.folds =
+      kept.is_fold_given ? given_fold(given.held_out, kept.rows) : selection_folds(kept.count(), folds, kept.groups);
   return kept;
+}
+
+Eigen::Index learned_rows(const KeptRows& kept) {
+  std::vector<bool> is_held_out(kept.count(), false);
+  for (std::size_t f = 0; kept.is_fold_given && f < kept.folds.size(); ++f) {
+    for (const Eigen::Index row : kept.folds[f].held_out) is_held_out[row] = true;
+  }
+  std::vector<Eigen::Index> given;
+  for (const RowPlace& place : kept.places) {
+    if (!is_held_out[place.kept]) given.push_back(place.given);
+  }
+  return different(given);
 }
 
 std::vector<std::vector<Eigen::Index>> held_out_rows(const KeptRows& kept) {
@@ -152,9 +238,10 @@ std::vector<std::vector<Eigen::Index>> held_out_rows(const KeptRows& kept) {
     for (const Eigen::Index row : kept.folds[f].held_out) fold_of[row] = f;
   }
   std::vector<std::vector<Eigen::Index>> rows(kept.folds.size());
-  for (Eigen::Index row = 0; row < std::ssize(kept.row_of); ++row) {
-    const int of_kept = kept.row_of[row];
-    if (of_kept >= 0 && fold_of[of_kept] >= 0) rows[fold_of[of_kept]].push_back(row);
+  for (const RowPlace& place : kept.places) {
+    if (fold_of[place.kept] < 0) continue;
+    std::vector<Eigen::Index>& of_fold = rows[fold_of[place.kept]];
+    if (of_fold.empty() || of_fold.back() != place.given) of_fold.push_back(place.given);
   }
   return rows;
 }
@@ -167,10 +254,16 @@ Training make_training(std::shared_ptr<const KeptRows> kept, const SharedMatrix&
   if (kept->loss_weights.size() > 0) weighted->weights = weighted->weights.cwiseProduct(kept->loss_weights);
   std::vector<int> rows(kept->count());
   std::iota(rows.begin(), rows.end(), 0);
+  if (kept->is_fold_given && !kept->folds.empty()) {
+    const std::vector<Eigen::Index>& learned = kept->folds.front().train;
+    rows.assign(learned.begin(), learned.end());
+  }
   const int threads = options.max_threads;
   TrainingRows all = training_rows(*weighted, rows, threads);
   if (missing_weights && inputs.values.hasNaN()) {
-    weighted->weights = weighted->weights.cwiseProduct(missing_weights(all));
+    const Eigen::VectorXd by_missing = missing_weights(all);
+    for (std::size_t i = 0; i < rows.size(); ++i)
+      weighted->weights(rows[i]) *= by_missing(static_cast<Eigen::Index>(i));
     all = training_rows(*weighted, std::move(rows), threads);
   }
   TrainingRows measured = with_table(all, *table);

@@ -31,26 +31,42 @@ SharedMatrix shared(Eigen::MatrixXd matrix);
 struct GivenRows {
   SharedMatrix inputs;
   SharedMatrix outputs;
-  Eigen::VectorXd weights = {};            ///< not negative; a row of weight 0 takes no part. Empty: all 1
-  std::vector<double> groups = {};         ///< rows of one group share a fold. Empty: each row stands alone
+  Eigen::VectorXd weights = {};     ///< not negative; a row of weight 0 takes no part. Empty: all 1
+  std::vector<double> groups = {};  ///< rows of one group share a fold. Empty: each row stands alone
+  std::vector<bool> held_out = {};  ///< of each row, whether it is of the only fold. Empty: the fit deals folds
+  /// Whether a row stands there as often as its weight says (docs/algorithms/data.md, "Row weights"). Set by checked().
+  bool are_counts = false;
   std::vector<int> categorical = {};       ///< inputs whose values are categories 0, 1, 2, ...
   bool may_have_codes = true;              ///< as TrainingData
   Eigen::VectorXd loss_weights = {};       ///< in training, not in errors, a row's weight is times this. Empty: all 1
   std::optional<RowNumbers> numbers = {};  ///< which rows are equal; none: nobody has looked
 };
 
-/// Checks the rows, and looks for equal ones where that is not yet done and makes a difference: where rows are held out
-/// and there are no groups. Throws std::invalid_argument as fit().
+/// Checks the rows, decides whether weights are counts, and looks for equal ones where that is not yet done and makes a
+/// difference: where rows are held out and there are no groups. Throws std::invalid_argument as fit().
 GivenRows checked(GivenRows given, const FitOptions& options);
 
 /// The numbers of some of the rows, if these have any.
 std::optional<RowNumbers> numbers_at(const GivenRows& given, const std::vector<Eigen::Index>& rows);
 
+/// The rows that take part, ascending. Where weights are counts, a row is there as often as its weight says. Throws
+/// std::invalid_argument if no weight is positive.
+std::vector<Eigen::Index> counted_rows(const GivenRows& given);
+
+/// Some of the counted_rows(): where weights are counts, each has the weight 1.
+GivenRows counted_rows_at(const GivenRows& given, const std::vector<Eigen::Index>& rows);
+
 /// Some of the rows.
 GivenRows rows_at(const GivenRows& given, const std::vector<Eigen::Index>& rows);
 
-/// The rows that take part. Rows of weight 0 do not. Where rows are held out, copies of a row (find_equal_rows()) only
-/// add to its weight, and repeats of a measurement share a fold. Nothing is copied where all rows take part.
+/// One of the counted_rows(), and the kept row that it is or copies.
+struct RowPlace {
+  int given = 0;
+  int kept = 0;
+};
+
+/// The rows that take part, counted_rows(). Where rows are held out, copies of a row (find_equal_rows()) only add to
+/// its weight, and repeats of a measurement share a fold. Nothing is copied where each of the given rows is kept once.
 struct KeptRows {
   SharedMatrix inputs;
   SharedMatrix outputs;
@@ -58,10 +74,11 @@ struct KeptRows {
   Eigen::VectorXd loss_weights = {};    ///< as GivenRows
   std::vector<double> groups = {};      ///< as GivenRows
   std::vector<Eigen::Index> rows = {};  ///< their places among the given rows, ascending
-  std::vector<int> row_of = {};         ///< of each given row, the kept row that it is; -1: it takes no part
-  std::vector<Fold> folds = {};         ///< selection_folds()
-  Eigen::Index copies = 0;              ///< the number of given rows that are copies
+  std::vector<RowPlace> places = {};    ///< one a counted row
+  std::vector<Fold> folds = {};         ///< selection_folds(), or that of GivenRows::held_out
+  Eigen::Index copies = 0;              ///< the number of given rows that are copies of others
   bool has_repeats = false;             ///< whether rows with equal inputs are repeats
+  bool is_fold_given = false;           ///< the model is fitted to the rows that the only fold does not hold out
 
   Eigen::Index count() const { return weights.size(); }
 };
@@ -69,7 +86,11 @@ struct KeptRows {
 /// Throws std::invalid_argument as selection_folds().
 KeptRows keep(const GivenRows& given, const FoldOptions& folds);
 
-/// The given rows that each fold holds out, ascending: those that are copies of a kept row too.
+/// The number of given rows that the model is fitted to, copies included.
+Eigen::Index learned_rows(const KeptRows& kept);
+
+/// The given rows that each fold holds out, ascending: those that are copies of a kept row too. A row that counts more
+/// than once may be in several folds.
 std::vector<std::vector<Eigen::Index>> held_out_rows(const KeptRows& kept);
 
 /// The rows of a fit in all forms that the stages of the fit read. Its parts share tables, so that it may be copied and
@@ -81,14 +102,14 @@ struct Training {
   SharedMatrix inputs;                    ///< of the kept rows, or positions where some inputs are codes
   std::shared_ptr<const Table> table;     ///< with the weights that rows have in errors
   std::shared_ptr<const Table> weighted;  ///< with the weights that rows have in training
-  TrainingRows all;                       ///< of the table `weighted`
+  TrainingRows all;                       ///< that the model is fitted to, of the table `weighted`
   TrainingRows measured;                  ///< the same rows and columns with the weights of `table`
   std::vector<FoldRows> folds;            ///< held-out rows are measured
 
   Eigen::Index outputs() const { return table->outputs.cols(); }
 };
 
-/// Weights by which those of rows with missing values are multiplied, from the rows as they are without.
+/// Weights by which those of rows with missing values are multiplied, one a row, from the rows as they are without.
 using MissingWeights = std::function<Eigen::VectorXd(const TrainingRows& all)>;
 
 /// `inputs` and `categorical`: as in Training. `orders_splits`: see make_table(). `missing_weights`: called where

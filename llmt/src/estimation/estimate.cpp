@@ -50,7 +50,8 @@ Partition blended(const TrainingRows& training, const GrownTree& grown, const Va
   return partition;
 }
 
-Partition estimate(const TrainingRows& training, const GrownTree& grown, const Candidate& candidate, int max_threads) {
+Partition estimate(const TrainingRows& training, const GrownTree& grown, const Candidate& candidate, int max_threads,
+                   Work& work) {
   Partition partition = prefix(blended(training, grown, candidate.validity, candidate.jump), candidate.leaves);
   if (candidate.leaves == 1) {
     partition.outer_slope.resize(0, 0);  // one linear model goes on with its own slopes
@@ -61,8 +62,9 @@ Partition estimate(const TrainingRows& training, const GrownTree& grown, const C
     const Regularisation regularisation{candidate.ridge, candidate.shrinkage, candidate.sparse};
     if (training.count() > 2 * enough) {
       const TrainingRows sample = subsample(training, enough, max_threads);
+      work.check();
       const LeafSums sums = sum_leaves(sample, std::move(partition), max_threads, candidate.sparse);
-      return joint_from_sample(sums, training, candidate.leaves, regularisation);
+      return joint_from_sample(sums, training, candidate.leaves, regularisation, work);
     }
     const LeafSums sums = sum_leaves(training, std::move(partition), max_threads, candidate.sparse);
     return std::move(joint(sums, candidate.leaves, {regularisation}).front());

@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 
 #include "data/dataset.hpp"
+#include "llmt/progress.hpp"
 #include "llmt/summary.hpp"
 
 namespace llmt {
@@ -22,7 +23,8 @@ Eigen::MatrixXd agreed_slope(const Partition& grown);
 /// The tree with the half widths (V.3) of a validity. Splits with a jump of at least `jump` stay crisp.
 Partition blended(const TrainingRows& training, const GrownTree& grown, const Validity& validity, double jump);
 
-/// The partition with `candidate`'s leaves, validity and estimates.
-Partition estimate(const TrainingRows& training, const GrownTree& grown, const Candidate& candidate, int max_threads);
+/// The partition with `candidate`'s leaves, validity and estimates. `work`: reports on the way, and may stop it.
+Partition estimate(const TrainingRows& training, const GrownTree& grown, const Candidate& candidate, int max_threads,
+                   Work& work);
 
 }  // namespace llmt

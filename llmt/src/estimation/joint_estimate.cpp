@@ -113,7 +113,7 @@ std::vector<Partition> joint(const LeafSums& sums, Eigen::Index leaves,
 }
 
 Partition joint_from_sample(const LeafSums& sample, const TrainingRows& all, Eigen::Index leaves,
-                            const Regularisation& regularisation) {
+                            const Regularisation& regularisation, Work& work) {
   const JointEquations equations = joint_equations(sample, leaves);
   JointSolution solution =
       solve(sample, equations, regularisation,
@@ -123,7 +123,10 @@ Partition joint_from_sample(const LeafSums& sample, const TrainingRows& all, Eig
   const GradientSum gradient_sum(all, partition, equations, sample.training->scale, sample.max_threads);
   const auto gradient = [&](const Eigen::MatrixXd& at, bool of_outputs) -> Eigen::MatrixXd {
     Eigen::MatrixXd zero = Eigen::MatrixXd::Zero(at.rows(), at.cols());
-    const auto add = [&](const Chunk& chunk, Eigen::MatrixXd& sums) { gradient_sum.add(chunk, at, of_outputs, sums); };
+    const auto add = [&](const Chunk& chunk, Eigen::MatrixXd& sums) {
+      work.check();
+      gradient_sum.add(chunk, at, of_outputs, sums);
+    };
     return sum_over(all, partition.outputs, sample.max_threads, std::move(zero), add);
   };
   const auto times_matrix = [&](const Eigen::MatrixXd& change) -> Eigen::MatrixXd {
@@ -134,6 +137,7 @@ Partition joint_from_sample(const LeafSums& sample, const TrainingRows& all, Eig
       gradient(coefficients + sample.root.replicate(std::ssize(equations.leaf_nodes), 1), true) +
       times_regularisation(sample, equations, regularisation, solution.anchors - coefficients);
   conjugate_gradients(times_matrix, precondition, steps_on_all_rows, 0.0, residual, coefficients);
+  work.check();
   ActiveInequalities none;
   Partition result = constrained(sample, equations.leaf_nodes, solution.estimate, none);
   result.residual_range = residual_range(all, result.nodes.front(), result.outputs, sample.max_threads);

@@ -6,6 +6,7 @@
 
 #include "estimation/joint_equations.hpp"
 #include "estimation/sums/leaf_sums.hpp"
+#include "llmt/progress.hpp"
 
 namespace llmt {
 
@@ -19,8 +20,8 @@ std::vector<Partition> joint(const LeafSums& sums, Eigen::Index leaves,
 
 /// A joint estimate on the rows `all`, of which the rows of `sample` are a sample that stands for them: from the
 /// estimate on the sample by conjugate gradients, preconditioned with the factor of the sample's matrix. Local
-/// estimates and regularisation are those of the sample.
+/// estimates and regularisation are those of the sample. `work`: reports on the way, and may stop it.
 Partition joint_from_sample(const LeafSums& sample, const TrainingRows& all, Eigen::Index leaves,
-                            const Regularisation& regularisation);
+                            const Regularisation& regularisation, Work& work);
 
 }  // namespace llmt

@@ -21,10 +21,11 @@ constexpr double least_relative_eigenvalue = 1e-12;
 // Weighted residual sums of squares of all nodes, outputs x nodes. An inner node has those of its own local model, as
 // if it were a leaf.
 Eigen::MatrixXd residual_sums(const TrainingRows& training, const Partition& partition, const Evaluator& evaluator,
-                              int max_threads) {
+                              int max_threads, Work& work) {
   const Eigen::Index outputs = std::ssize(partition.outputs);
   Eigen::MatrixXd zero = Eigen::MatrixXd::Zero(outputs, std::ssize(partition.nodes));
   const auto add = [&](const Chunk& chunk, Eigen::MatrixXd& sums) {
+    work.check();
     std::vector<Activation> active;
     Eigen::VectorXd values(outputs);
     for (Eigen::Index row = 0; row < chunk.count(); ++row) {
@@ -101,12 +102,13 @@ Eigen::MatrixXd inverse_gram(const Eigen::MatrixXd& gram, const Eigen::VectorXd&
   return scale.cwiseInverse().asDiagonal() * result * scale.cwiseInverse().asDiagonal();
 }
 
-void describe_leaves(const TrainingRows& training, Partition& partition, bool sparse, int max_threads) {
+void describe_leaves(const TrainingRows& training, Partition& partition, bool sparse, int max_threads, Work& work) {
   const Eigen::Index regressors = std::ssize(training.regressors);
   const Evaluator evaluator(partition, training.columns, regressors);
-  const Eigen::MatrixXd rss = residual_sums(training, partition, evaluator, max_threads);
+  const Eigen::MatrixXd rss = residual_sums(training, partition, evaluator, max_threads, work);
   const Eigen::Index enough = sample_rows_per_unknown * partition.num_leaves() * (regressors + 1);
   const TrainingRows sample = subsample(training, enough, max_threads);
+  work.check();
   const std::vector<Eigen::MatrixXd> gram = gram_matrices(sample, partition, evaluator, max_threads);
   Eigen::VectorXd scale = Eigen::VectorXd::Ones(regressors + 1);
   for (Eigen::Index k = 0; k < regressors; ++k) {

@@ -5,12 +5,13 @@
 #include <Eigen/Core>
 
 #include "data/dataset.hpp"
+#include "llmt/progress.hpp"
 
 namespace llmt {
 
 /// Sets what a finished partition says of its nodes: residual sums of squares, and the leaves' inverse Gram matrices.
-/// `sparse`: the matrices are those of the regressors with slopes alone.
-void describe_leaves(const TrainingRows& training, Partition& partition, bool sparse, int max_threads);
+/// `sparse`: the matrices are those of the regressors with slopes alone. `work`: reports on the way, and may stop it.
+void describe_leaves(const TrainingRows& training, Partition& partition, bool sparse, int max_threads, Work& work);
 
 /// Pseudo-inverse of a Gram matrix whose columns are about as large as `scale`. Eigenvalues have a floor, so that a
 /// direction without rows has a large leverage, not an infinite one.

@@ -43,7 +43,7 @@ std::vector<Partition> finish_folds(const Training& training, const std::vector<
     if (made[f]) return;
     Candidate of_fold = choice.chosen.candidate;
     of_fold.leaves = std::min(of_fold.leaves, trees[f].partition.num_leaves());
-    made[f] = estimate(training.folds[f].training, trees[f], of_fold, threads);
+    made[f] = estimate(training.folds[f].training, trees[f], of_fold, threads, work);
     work.did(share_of_folds / static_cast<double>(made.size()));
   });
   std::vector<Partition> partitions;
@@ -104,10 +104,10 @@ FittedPartition finish(const ChosenInputs& inputs, const Plan& plan, const Final
   Candidate& candidate = choice.chosen.candidate;
   const bool fewer = candidate.leaves < grown_leaves;
   candidate.leaves = std::min(candidate.leaves, grown_leaves);
-  Partition partition = estimate(training.all, grown.tree, candidate, threads);
+  Partition partition = estimate(training.all, grown.tree, candidate, threads, finishing);
   finishing.did(share_of_folds);
   partition.output_range = output_range(guards, served, training.all);
-  describe_leaves(training.measured, partition, candidate.sparse, threads);
+  describe_leaves(training.measured, partition, candidate.sparse, threads, finishing);
   finishing.finish();
   PartitionSummary summary = describe(partition, training.measured, candidate.sparse);
   summary.grown_leaves = grown_leaves;
@@ -129,8 +129,7 @@ FittedPartition finish(const ChosenInputs& inputs, const Plan& plan, const Final
 }
 
 FitResult assemble(const Training& training, std::vector<std::optional<FittedPartition>> fitted) {
-  FitSummary summary{.samples = training.all.count(),
-                     .missing_values = training.table->inputs.array().isNaN().count(),
+  FitSummary summary{.missing_values = training.table->inputs.array().isNaN().count(),
                      .min_leaf_samples = plan_of(training).growth.min_leaf_samples,
                      .partitions = {},
                      .quadratic = !training.table->products.empty()};
@@ -149,7 +148,7 @@ FitResult with_choices(FitResult result, const PreparedRows& rows) {
     result.model = with_codes(result.model, rows.codes.codes);
     result.intervals = with_codes(result.intervals, rows.codes.codes);
   }
-  result.summary.samples += kept.copies;
+  result.summary.samples = learned_rows(kept);
   result.summary.copies = kept.copies;
   result.summary.repeats = kept.has_repeats;
   result.summary.codes = rows.codes;

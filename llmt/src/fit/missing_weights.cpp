@@ -27,18 +27,19 @@ Eigen::VectorXd squared_residuals(const TrainingRows& all, const FitOptions& opt
     partitions.push_back(grow_tree(all, {output}, plan, true, options.max_threads, tree).tree.partition);
   }
   const Model model(all.columns, all.output_columns, all.regressors, std::move(partitions));
-  const Eigen::MatrixXd residuals = table.outputs - model.predict(table.inputs, options.max_threads);
+  const Eigen::MatrixXd outputs = table.outputs(all.rows, Eigen::all);
+  const Eigen::MatrixXd residuals = outputs - model.predict(table.inputs(all.rows, Eigen::all), options.max_threads);
   Eigen::VectorXd squares = Eigen::VectorXd::Zero(residuals.rows());
   for (Eigen::Index o = 0; o < residuals.cols(); ++o) {
-    const double variance = variance_of(table.outputs.col(o));
+    const double variance = variance_of(outputs.col(o));
     if (variance > 0.0) squares += residuals.col(o).cwiseAbs2() / variance;
   }
   return squares;
 }
 
 // Columns 1, and for each input with missing values whether it is missing.
-Eigen::MatrixXd indicators(const Table& table) {
-  const Eigen::MatrixXd missing = table.inputs.array().isNaN().cast<double>();
+Eigen::MatrixXd indicators(const TrainingRows& all) {
+  const Eigen::MatrixXd missing = all.table->inputs(all.rows, Eigen::all).array().isNaN().cast<double>();
   std::vector<Eigen::Index> columns;
   for (Eigen::Index j = 0; j < missing.cols(); ++j) {
     if (missing.col(j).maxCoeff() > 0.0) columns.push_back(j);
@@ -51,14 +52,14 @@ Eigen::MatrixXd indicators(const Table& table) {
 }  // namespace
 
 Eigen::VectorXd weights_by_missing(const TrainingRows& all, const FitOptions& options, Work& work) {
-  const Table& table = *all.table;
   const Eigen::VectorXd squares = squared_residuals(all, options, work);
-  const Eigen::MatrixXd a = indicators(table);
+  const Eigen::VectorXd row_weights = all.table->weights(all.rows);
+  const Eigen::MatrixXd a = indicators(all);
   const Eigen::Index size = a.cols();
   // The normal equations of the regression of the squares on the indicators, right-hand side last.
   const auto add = [&](RowSpan block, Eigen::MatrixXd& sum) {
     const auto rows = a.middleRows(block.begin, block.count());
-    const auto weights = table.weights.segment(block.begin, block.count());
+    const auto weights = row_weights.segment(block.begin, block.count());
     sum.leftCols(size) += rows.transpose() * weights.asDiagonal() * rows;
     sum.col(size) += rows.transpose() * weights.cwiseProduct(squares.segment(block.begin, block.count()));
   };
@@ -67,7 +68,7 @@ Eigen::VectorXd weights_by_missing(const TrainingRows& all, const FitOptions& op
   equations.diagonal().tail(size - 1).array() += prior_rows;
   const Eigen::VectorXd variances = equations.leftCols(size).ldlt().solve(equations.col(size));
   const double complete = variances(0);
-  if (!(complete > 0.0)) return Eigen::VectorXd::Ones(table.inputs.rows());
+  if (!(complete > 0.0)) return Eigen::VectorXd::Ones(all.count());
   const Eigen::VectorXd added = variances.tail(variances.size() - 1).cwiseMax(0.0) / complete;
   const Eigen::VectorXd variance = (a.rightCols(added.size()) * added).array() + 1.0;
   return variance.cwiseInverse().cwiseMax(least_weight);

@@ -21,10 +21,7 @@ constexpr double share_of_loss = 0.2;
 // Least squares cannot fit what the rounding of one output's error hides. Rows of weight 0 take no part.
 void refuse_hidden_outputs(const GivenRows& given) {
   const Eigen::Ref<const Eigen::MatrixXd>& outputs = given.outputs.values;
-  std::vector<Eigen::Index> rows;
-  for (Eigen::Index row = 0; row < outputs.rows(); ++row) {
-    if (given.weights.size() == 0 || given.weights(row) > 0.0) rows.push_back(row);
-  }
+  const std::vector<Eigen::Index> rows = counted_rows(given);
   for (Eigen::Index o = 0; o < outputs.cols(); ++o) {
     const Eigen::VectorXd values = outputs.col(o)(rows);
     const DominantRows dominant = dominant_rows(values);
@@ -51,6 +48,9 @@ PreparedRows prepare(const GivenRows& all, const FitOptions& options, Work& work
   if (options.terms == LocalTerms::automatic) of_columns.terms = LocalTerms::linear;
   CodeChoice codes = choose_codes(given, of_columns, work);
   const auto kept = std::make_shared<const KeptRows>(keep(given, options.folds));
+  if (kept->is_fold_given && kept->folds.empty()) {
+    throw std::invalid_argument("llmt::fit: loss tukey leaves out all rows of held_out, or all others");
+  }
   const bool has_codes = !codes.taken.empty();
   const SharedMatrix columns = has_codes ? shared(at_positions(codes.codes, kept->inputs.values)) : kept->inputs;
   std::vector<int> categorical = with_codes(given.categorical, codes.codes);

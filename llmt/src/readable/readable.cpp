@@ -167,7 +167,7 @@ std::unique_ptr<ReadableTrees> find_trees(const Setting& setting, const std::vec
 }
 
 // The model of one fold, or of all rows, with a partition from each of `parts`.
-Model assemble(const std::vector<std::unique_ptr<ReadableTrees>>& parts, std::size_t at, int max_threads) {
+Model assemble(const std::vector<std::unique_ptr<ReadableTrees>>& parts, std::size_t at, int max_threads, Work& work) {
   std::vector<Term> products;
   for (const auto& part : parts) {
     for (const Term& term : part->trees[at]->tree.products_in(part->trees[at]->pruned)) {
@@ -185,7 +185,7 @@ Model assemble(const std::vector<std::unique_ptr<ReadableTrees>>& parts, std::si
   std::vector<Partition> partitions;
   for (const auto& part : parts) {
     Partition& partition = partitions.emplace_back(part->trees[at]->tree.partition(part->trees[at]->pruned, products));
-    describe_leaves(described, partition, true, max_threads);
+    describe_leaves(described, partition, true, max_threads, work);
   }
   return {described.columns, described.output_columns, described.regressors, std::move(partitions)};
 }
@@ -224,11 +224,11 @@ ReadablePartition describe(const Model& model, std::size_t p, const Choice& choi
   return result;
 }
 
-Intervals intervals_of(const Setting& setting, const std::vector<std::unique_ptr<ReadableTrees>>& parts) {
+Intervals intervals_of(const Setting& setting, const std::vector<std::unique_ptr<ReadableTrees>>& parts, Work& work) {
   std::vector<Model> models;
   std::vector<std::span<const int>> held_out;
   for (std::size_t f = 0; setting.training.options.intervals && f < setting.folds.size(); ++f) {
-    models.push_back(assemble(parts, f, setting.plan.max_threads));
+    models.push_back(assemble(parts, f, setting.plan.max_threads, work));
     held_out.emplace_back(setting.folds[f].held_out.rows);
   }
   const Table& table = *setting.training.table;
@@ -259,9 +259,9 @@ ReadableResult fit_readable(const PreparedFit& prepared, const FitSummary& fitte
     Work part(work, share / static_cast<double>(fitted.partitions.size()));
     parts.push_back(find_trees(setting, partition.outputs, best_crisp_of(partition), loss, part));
   }
-  ReadableResult result{.model = assemble(parts, folds.size(), options.max_threads),
+  ReadableResult result{.model = assemble(parts, folds.size(), options.max_threads, work),
                         .partitions = {},
-                        .intervals = intervals_of(setting, parts)};
+                        .intervals = intervals_of(setting, parts, work)};
   for (std::size_t p = 0; p < parts.size(); ++p) {
     result.partitions.push_back(describe(result.model, p, parts[p]->choice));
   }

@@ -46,10 +46,10 @@ std::vector<CandidateError> best_of_widths(const HeldOutErrors& comparison, cons
 // Candidates are told apart on samples of the training rows. Against a crisp tree, whose models all rows have made,
 // the best blend is at a disadvantage then: it is made from all rows too, where one hold-out says that there are many.
 Partition make_from_all_rows(const FoldRows& fold, const GrownTree& grown, const Eigen::VectorXd& weights,
-                             int max_threads, const FoldErrors& error_of_folds, CandidateError& best) {
+                             int max_threads, const FoldErrors& error_of_folds, Work& work, CandidateError& best) {
   Candidate candidate = best.candidate;
   candidate.leaves = std::min(candidate.leaves, grown.partition.num_leaves());
-  Partition partition = estimate(fold.training, grown, candidate, max_threads);
+  Partition partition = estimate(fold.training, grown, candidate, max_threads, work);
   const std::vector<Chunk> held_out = fetch_all(fold.held_out, partition.outputs);
   best = error_of_folds(best.candidate, {squared_errors(partition, fold.training, held_out, weights).sum()});
   return partition;
@@ -81,7 +81,8 @@ Selection select(const std::vector<FoldRows>& folds, const std::vector<GrownTree
     std::vector<CandidateError> best = best_of_widths(comparison, kept, compared, error_of_folds);
     std::optional<Partition> made;
     if (compared.size() == 1 && !best.empty()) {
-      made = make_from_all_rows(compared.front(), grown.front(), weights, max_threads, error_of_folds, best.front());
+      made =
+          make_from_all_rows(compared.front(), grown.front(), weights, max_threads, error_of_folds, work, best.front());
     }
     selection.best_of_kind.insert(selection.best_of_kind.end(), best.begin(), best.end());
     if (!candidates.crisp) {

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <cmath>
+#include <cstdint>
 #include <vector>
 
 #include "llmt/random.hpp"
@@ -12,7 +13,8 @@ namespace {
 
 using namespace random_trees;
 
-TEST(Weights, IntegersAreRepeatedRows) {
+// Counts are repeated rows to the byte: fit/counts_test.cpp. Other weights act like them on errors.
+TEST(Weights, RatiosAreThoseOfRepeatedRows) {
   const Eigen::MatrixXd x = oracle::firm(oracle::uniform(200, 3, 54));
   const Eigen::MatrixXd y = oracle::curved(x, 0.1);
   const Eigen::MatrixXd query = oracle::uniform(300, 3, 55);
@@ -20,8 +22,9 @@ TEST(Weights, IntegersAreRepeatedRows) {
   Eigen::VectorXd weights(200);
   std::vector<Eigen::Index> repeated;
   for (Eigen::Index i = 0; i < 200; ++i) {
-    weights(i) = static_cast<double>(1 + random.below(3));
-    repeated.insert(repeated.end(), static_cast<std::size_t>(weights(i)), i);
+    const std::uint64_t count = 1 + random.below(3);
+    weights(i) = 0.5 * static_cast<double>(count);
+    repeated.insert(repeated.end(), count, i);
   }
   for (const Kind& kind : {kinds[0], kinds[1], kinds[4]}) {
     llmt::FitOptions options = only(kind, llmt::Estimation::joint, 8);

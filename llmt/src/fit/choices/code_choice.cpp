@@ -48,11 +48,11 @@ bool may_have_codes(const FitOptions& options) {
 }
 
 // The codes that a column may have; none if it has other numbers.
-std::vector<double> codes_in(const Eigen::Ref<const Eigen::VectorXd>& column, const Eigen::VectorXd& weights) {
+std::vector<double> codes_in(const Eigen::Ref<const Eigen::VectorXd>& column, const std::vector<Eigen::Index>& rows) {
   std::map<double, Eigen::Index> rows_of;
-  for (Eigen::Index row = 0; row < column.size(); ++row) {
+  for (const Eigen::Index row : rows) {
     const double value = column(row);
-    if (std::isnan(value) || (weights.size() > 0 && !(weights(row) > 0.0))) continue;
+    if (std::isnan(value)) continue;
     if (value != std::floor(value)) return {};
     ++rows_of[value];
     if (rows_of.rbegin()->first - rows_of.begin()->first > longest_range) return {};
@@ -60,21 +60,17 @@ std::vector<double> codes_in(const Eigen::Ref<const Eigen::VectorXd>& column, co
   const bool is_often = std::ranges::all_of(rows_of, [](const auto& entry) { return entry.second >= fewest_rows; });
   if (rows_of.size() < fewest_codes || !is_often) return {};
   std::vector<double> codes;
-  for (const auto& [code, rows] : rows_of) codes.push_back(code + 0.0);  // -0 as 0
+  for (const auto& [code, times] : rows_of) codes.push_back(code + 0.0);  // -0 as 0
   return codes;
 }
 
-bool takes_part(const GivenRows& given, Eigen::Index row) {
-  return given.weights.size() == 0 || given.weights(row) > 0.0;
-}
-
-Codes possible_codes(const GivenRows& given, const FitOptions& options) {
+Codes possible_codes(const GivenRows& given, const std::vector<Eigen::Index>& rows, const FitOptions& options) {
   const Matrix& inputs = given.inputs.values;
   Codes codes(inputs.cols());
   if (!given.may_have_codes || !may_have_codes(options)) return codes;
   for (int j = 0; j < inputs.cols(); ++j) {
     const bool is_number = std::ranges::find(given.categorical, j) == given.categorical.end();
-    if (is_number) codes[j] = codes_in(inputs.col(j), given.weights);
+    if (is_number) codes[j] = codes_in(inputs.col(j), rows);
   }
   return codes;
 }
@@ -87,26 +83,24 @@ std::vector<int> inputs_with(const Codes& codes) {
   return inputs;
 }
 
-// The rows by which forms are compared: all of positive weight, or of many a sample.
-GivenRows some_rows(const GivenRows& given, const Codes& codes) {
+// The rows by which forms are compared: all that take part, or of many a sample.
+GivenRows some_rows(const GivenRows& given, const std::vector<Eigen::Index>& rows, const Codes& codes) {
   const Matrix& inputs = given.inputs.values;
   Eigen::Index coefficients = 1 + inputs.cols();
   for (const std::vector<double>& of_input : codes) coefficients += std::max<Eigen::Index>(std::ssize(of_input) - 2, 0);
   const Table table{inputs, given.outputs.values, Eigen::VectorXd::Ones(inputs.rows()), {}, {}, {}};
   TrainingRows all;
   all.table = &table;
-  for (int row = 0; row < inputs.rows(); ++row) {
-    if (takes_part(given, row)) all.rows.push_back(row);
-  }
+  all.rows.assign(rows.begin(), rows.end());
   const Eigen::Index count = std::clamp(most_compared_numbers / coefficients, least_compared_rows, most_compared_rows);
-  const std::vector<int> rows = subsample(all, count).rows;
-  return rows_at(given, {rows.begin(), rows.end()});
+  const std::vector<int> some = subsample(all, count).rows;
+  return counted_rows_at(given, {some.begin(), some.end()});
 }
 
-// The held-out error of every partition with these codes. Empty: there are no two folds.
+// The held-out error of every partition with these codes. Empty: there are no two folds, nor that of the caller.
 std::vector<CandidateError> errors_of(const std::shared_ptr<const KeptRows>& rows, const Codes& codes,
                                       const std::vector<int>& categorical, const FitOptions& options, Work& work) {
-  if (rows->folds.size() < 2) return {};
+  if (rows->folds.size() < (rows->is_fold_given ? 1 : 2)) return {};
   const bool orders_splits = rule_of(options.rule).splits_on_monotone_inputs;
   const SharedMatrix inputs = shared(at_positions(codes, rows->inputs.values));
   const Training training = make_training(rows, inputs, with_codes(categorical, codes), options, orders_splits);
@@ -147,9 +141,10 @@ bool is_clearly_better(const CandidateError& simple, const CandidateError& other
 
 CodeChoice choose_codes(const GivenRows& given, const FitOptions& options, Work& work) {
   CodeChoice result;
-  const Codes possible = possible_codes(given, options);
+  const std::vector<Eigen::Index> counted = counted_rows(given);
+  const Codes possible = possible_codes(given, counted, options);
   if (inputs_with(possible).empty()) return result;
-  const GivenRows some = some_rows(given, possible);
+  const GivenRows some = some_rows(given, counted, possible);
   const std::vector<int> bent = bent_inputs(some, possible);
   if (bent.empty()) return result;
   const auto rows = std::make_shared<const KeptRows>(keep(some, options.folds));

@@ -37,8 +37,9 @@ bool may_leave_out(const Training& training) {
   const auto inputs = std::ssize(table.split_inputs);
   const bool is_usual = !plan.rule->has_own_models && plan.rule->overlapping == ValidityKind::blend &&
                         (candidates.widths.empty() || candidates.kind == ValidityKind::blend);
-  return training.options.choose_inputs && training.options.max_leaves != 1 && is_usual && training.folds.size() > 1 &&
-         inputs > 1 && table.split_inputs == table.regression_inputs && table.monotone.empty() &&
+  return training.options.choose_inputs && training.options.max_leaves != 1 && is_usual &&
+         (training.folds.size() > 1 || training.kept->is_fold_given) && inputs > 1 &&
+         table.split_inputs == table.regression_inputs && table.monotone.empty() &&
          training.all.count() < most_rows_per_input * inputs;
 }
 
@@ -54,10 +55,11 @@ Eigen::VectorXd importance_of(const TrainingRows& rows, Partition partition, int
 
 // Estimates the candidate of a step on a grown tree, and keeps the next number of inputs.
 std::vector<int> next_inputs(const TrainingRows& rows, const std::vector<int>& inputs, const GrownTree& grown,
-                             std::optional<Partition> made, Candidate candidate, Eigen::Index count, int max_threads) {
+                             std::optional<Partition> made, Candidate candidate, Eigen::Index count, int max_threads,
+                             Work& work) {
   if (!made) {
     candidate.leaves = std::min(candidate.leaves, grown.partition.num_leaves());
-    made = estimate(rows, grown, candidate, max_threads);
+    made = estimate(rows, grown, candidate, max_threads, work);
   }
   return most_important(inputs, importance_of(rows, std::move(*made), max_threads), count);
 }
@@ -92,7 +94,7 @@ class BackwardElimination {
       fits.selection.made.resize(of_folds.size());
       parallel_for(std::ssize(of_folds), threads(), [&](Eigen::Index f) {
         of_folds[f] = next_inputs(training.folds[f].training, of_folds[f], fits.trees[f],
-                                  std::move(fits.selection.made[f]), chosen.candidate, fewer_inputs(size), 1);
+                                  std::move(fits.selection.made[f]), chosen.candidate, fewer_inputs(size), 1, work_);
       });
     }
     return steps;
@@ -107,7 +109,7 @@ class BackwardElimination {
       Work tree(work_, share_of_step * work_.left() / static_cast<double>(of_folds.size()));
       const FinalTree grown = grow_tree(training.all, served_, cheap_plan(training), false, threads(), tree);
       inputs = next_inputs(training.all, inputs, grown.tree, {}, step.chosen.candidate, fewer_inputs(step.inputs()),
-                           threads());
+                           threads(), work_);
     }
     return inputs;
   }

@@ -222,7 +222,7 @@ Plan with_defaults(const FitOptions& options, const TrainingRows& all, Eigen::In
   const bool crisp_only =
       choice == ValidityChoice::crisp || (choice == ValidityChoice::automatic && folds == 0 && !logistic);
   const Case each{.folds = folds > 0,
-                  .one_fold = folds == 1,
+                  .one_fold = folds == 1 && all.table->inputs.rows() >= single_hold_out_rows,
                   .overlapping = !crisp_only && folds > 0,
                   .ordered = may_split_monotone(*all.table),
                   .own_models = rule.has_own_models,
