@@ -1,1 +1,5 @@
 """LLMT."""
+
+from llmt._discover import Missing, Parameter, discover, find_missing
+
+__all__ = ["Missing", "Parameter", "discover", "find_missing"]
