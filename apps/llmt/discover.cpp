@@ -173,7 +173,8 @@ report::TermsSummary discovered(const DiscoverArguments& arguments, const Compar
                                .rows = comparison.simulated.rows(),
                                .missing = {},
                                .outlier_lines = {},
-                               .regions = {}};
+                               .regions = {},
+                               .counted = "line"};
   std::vector<discovery::UntestableCause> untestable;
   try {
     const std::vector<discovery::ModelTerm> terms = terms_to_try(arguments, comparison, untestable);

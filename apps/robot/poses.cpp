@@ -67,7 +67,10 @@ void poses_command(PosesArguments arguments) {
   options.noise_mm = 1e-3 * arguments.noise_um;
   options.criterion = report::pose_criterion(arguments.criterion);
   const robotics::PosePlan plan = plan_of(arguments, robot);
+  ProgressBar bar("choosing poses");
+  options.progress = bar.callback();
   const robotics::PoseSelection selection = robotics::select_poses(robot, plan, options);
+  bar.clear();
   const std::string csv = report::poses_csv(robot, selection.poses);
   if (!arguments.output.empty()) write_file(arguments.output, csv);
   const report::PoseFacts facts{arguments.robot, arguments.from, arguments.use, arguments.noise_um,

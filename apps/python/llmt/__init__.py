@@ -16,6 +16,10 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from ._discover import Missing as Missing
+    from ._discover import Parameter as Parameter
+    from ._discover import discover as discover
+    from ._discover import find_missing as find_missing
     from ._estimator import LocalLinearTreeRegressor as LocalLinearTreeRegressor
     from ._model import Model as Model
 
@@ -24,11 +28,15 @@ if TYPE_CHECKING:
 # Where each public name is defined; the module is imported when the name is asked for.
 _homes = {
     "LocalLinearTreeRegressor": "_estimator",
+    "Missing": "_discover",
     "Model": "_model",
+    "Parameter": "_discover",
     "__version__": "_core",
+    "discover": "_discover",
+    "find_missing": "_discover",
 }
 
-__all__ = ["LocalLinearTreeRegressor", "Model", "__version__"]
+__all__ = ["LocalLinearTreeRegressor", "Missing", "Model", "Parameter", "__version__", "discover", "find_missing"]
 
 
 def __getattr__(name: str) -> object:

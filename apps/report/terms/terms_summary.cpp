@@ -120,8 +120,8 @@ std::string terms_text(const TermsSummary& summary, std::size_t width) {
   text += regions_text(summary.regions, width);
   if (!missing.outliers.empty()) {
     const std::vector<Eigen::Index>& lines = summary.outlier_lines;
-    text += fmt::format("\nOutliers, left out of the fit: {} {} of {}\n", lines.size() == 1 ? "line" : "lines",
-                        fmt::join(lines, ", "), summary.measured);
+    text += fmt::format("\nOutliers, left out of the fit: {}{} {} of {}\n", summary.counted,
+                        lines.size() == 1 ? "" : "s", fmt::join(lines, ", "), summary.measured);
   }
   const discovery::LackOfFit& lack = missing.verdict.lack_of_fit;
   constexpr double surprising = 0.01;

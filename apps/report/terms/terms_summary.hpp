@@ -31,6 +31,7 @@ struct TermsSummary {
   discovery::Missing missing;
   std::vector<Eigen::Index> outlier_lines;  ///< of missing.outliers, in the file `measured`
   std::vector<GapRegion> regions;           ///< of each output by falling gap
+  std::string counted = "line";             ///< what `outlier_lines` are: lines of a file, or rows of a table
 };
 
 /// Cuts the rows searched where the absolute deviation changes most, by a small tree.

@@ -158,7 +158,7 @@ Eigen::VectorXd losses_with(const DesignProblem& problem, const Eigen::MatrixXd&
 
 std::vector<Eigen::Index> choose_by_exchange(const DesignProblem& problem, const Eigen::MatrixXd& rows,
                                              const Spacing& spacing, std::vector<Eigen::Index> start,
-                                             Eigen::Index count) {
+                                             Eigen::Index count, Work* work) {
   constexpr int most_passes = 30;
   constexpr double least_gain = 1e-6;
   constexpr double least_gain_of_pass = 1e-4;
@@ -167,6 +167,7 @@ std::vector<Eigen::Index> choose_by_exchange(const DesignProblem& problem, const
   for (const Eigen::Index pose : chosen) neighbours.add(pose);
   Eigen::MatrixXd sum = problem.given + information(rows, chosen);
   while (std::ssize(chosen) < count) {
+    if (work != nullptr) work->check();
     Eigen::Index best = 0;
     if (!(losses_with(problem, sum, rows, neighbours.allowed()).minCoeff(&best) < infinite)) return chosen;
     chosen.push_back(best);
@@ -177,6 +178,7 @@ std::vector<Eigen::Index> choose_by_exchange(const DesignProblem& problem, const
   for (int pass = 0; pass < most_passes; ++pass) {
     const double before = now;
     for (Eigen::Index& pose : chosen) {
+      if (work != nullptr) work->check();
       neighbours.remove(pose);
       std::vector<Eigen::Index> others = chosen;
       std::erase(others, pose);

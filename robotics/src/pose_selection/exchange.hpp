@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "llmt/progress.hpp"
 #include "llmt/robotics/pose_selection_options.hpp"
 
 namespace llmt::robotics {
@@ -39,9 +40,9 @@ struct Spacing {
 };
 
 /// `count` poses out of those of `rows`: the `start`, filled up greedily, then exchanged until no exchange lowers the
-/// loss. Fewer poses are returned where the spacing leaves no more.
+/// loss. Fewer poses are returned where the spacing leaves no more. `work` may stop the exchange.
 std::vector<Eigen::Index> choose_by_exchange(const DesignProblem& problem, const Eigen::MatrixXd& rows,
                                              const Spacing& spacing, std::vector<Eigen::Index> start,
-                                             Eigen::Index count);
+                                             Eigen::Index count, Work* work = nullptr);
 
 }  // namespace llmt::robotics

@@ -132,12 +132,19 @@ Poses around(const PoseRegion& region, const Eigen::MatrixXd& chosen, double ste
 
 constexpr double steps_deg[] = {40.0, 20.0, 10.0, 5.0, 2.5, 1.25};
 
-Poses refined(const Task& task, const PoseRegion& region, Poses chosen, Random& random) {
+// Of the time of a selection.
+constexpr double share_of_choice = 0.2;
+constexpr double share_of_a_step = 0.1;
+
+Poses refined(const Task& task, const PoseRegion& region, Poses chosen, Random& random, Work& work) {
+  work.begin("moving poses");
   for (const double step : steps_deg) {
     const Poses pool = around(region, chosen.joints, step, random);
     std::vector<Eigen::Index> start(chosen.count());
     std::iota(start.begin(), start.end(), 0);
-    chosen = select(pool, choose_by_exchange(task.problem, task.rows(pool), task.spacing(pool), start, chosen.count()));
+    chosen = select(
+        pool, choose_by_exchange(task.problem, task.rows(pool), task.spacing(pool), start, chosen.count(), &work));
+    work.did(share_of_a_step);
   }
   return chosen;
 }
@@ -164,13 +171,15 @@ Improvers improvers(const Task& task, const IdealDesign& ideal, const PoseRegion
 
 // Each design gives a bound. The poses that it lacks join the next.
 double position_bound(const Task& task, const PoseRegion* region, const Poses& chosen, const Poses& pool,
-                      Random& random) {
+                      Random& random, Work& work) {
+  work.begin("looking for the best possible");
   constexpr int rounds = 4;
   constexpr double near_enough = 0.99;
   Poses support = pool;
   if (region != nullptr) support.joints = stacked(around(*region, chosen.joints, 5.0, random).joints, pool.joints);
   double bound = 0.0;
   for (int round = 0; round < rounds; ++round) {
+    work.check();
     const Eigen::MatrixXd rows = task.rows(support);
     const IdealDesign ideal = ideal_design(task.problem, rows, task.options.count);
     const Improvers missing = improvers(task, ideal, region, support, rows, random);
@@ -204,6 +213,7 @@ Poses random_poses(const Robot& robot, Eigen::Index count, const std::optional<T
 
 PoseSelection select_poses(const Robot& robot, const PosePlan& plan, const PoseSelectionOptions& options) {
   check(robot, plan, options);
+  Work work(options.progress);
   Random random(options.seed);
   const bool is_given = plan.candidates.count() > 0;
   std::optional<PoseRegion> region;
@@ -223,8 +233,10 @@ PoseSelection select_poses(const Robot& robot, const PosePlan& plan, const PoseS
   if (use.count() == 0) use = is_given ? pool : of_joints(region->random(poses_of_use, random));
   const Task task = make_task(robot, plan, pool, use, options);
   const Eigen::MatrixXd rows = task.rows(pool);
+  work.begin("choosing poses");
   const std::vector<Eigen::Index> chosen =
-      choose_by_exchange(task.problem, rows, task.spacing(pool), {}, options.count);
+      choose_by_exchange(task.problem, rows, task.spacing(pool), {}, options.count, &work);
+  work.did(share_of_choice);
   if (std::ssize(chosen) < options.count) {
     throw std::runtime_error(fmt::format(
         "llmt::robotics::select_poses: only {} poses differ by {} degrees in some joint, {} are to be chosen",
@@ -233,8 +245,8 @@ PoseSelection select_poses(const Robot& robot, const PosePlan& plan, const PoseS
   PoseSelection selection;
   selection.poses = select(pool, chosen);
   const PoseRegion* free_region = is_given ? nullptr : &*region;
-  if (free_region != nullptr) selection.poses = refined(task, *free_region, selection.poses, random);
-  selection.bound_mm = position_bound(task, free_region, selection.poses, pool, random);
+  if (free_region != nullptr) selection.poses = refined(task, *free_region, selection.poses, random, work);
+  selection.bound_mm = position_bound(task, free_region, selection.poses, pool, random, work);
   const DrivingOrder order = driving_order(joint_degrees(robot.chain, selection.poses.joints));
   selection.poses = select(selection.poses, order.poses);
   selection.travel_deg = order.travel_deg;
@@ -242,6 +254,7 @@ PoseSelection select_poses(const Robot& robot, const PosePlan& plan, const PoseS
   selection.random = median_of_random(task, rows, random);
   selection.fixed = task.model.fixed();
   selection.left_out = task.model.left_out();
+  work.finish();
   return selection;
 }
 

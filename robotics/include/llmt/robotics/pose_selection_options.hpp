@@ -10,6 +10,7 @@
 #include <optional>
 
 #include "llmt/abi.hpp"
+#include "llmt/progress.hpp"
 #include "llmt/robotics/calibration_options.hpp"
 #include "llmt/robotics/robot_types.hpp"
 
@@ -36,6 +37,7 @@ struct PoseSelectionOptions {
   double noise_mm = 0.05;  ///< standard deviation of a measured coordinate
   CalibrationOptions calibration = {};
   std::uint64_t seed = 1;
+  Progress progress = {};  ///< the steps are "choosing poses", "moving poses", "looking for the best possible"
 };
 
 /// What to choose from and for; each may be empty.

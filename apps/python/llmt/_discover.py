@@ -1,0 +1,469 @@
+"""What a simulation lacks, from measurements beside it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from llmt._results import Result, axes_of, html_table, names, number
+from llmt._tables import columns_of, records
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter that a simulation may adjust before anything counts as missing."""
+
+    value: float
+    """Where the fit starts."""
+    scale: float | None = None
+    """A change that is typical; None: a tenth of the value, or 1 if that is 0."""
+    unit: str = ""
+    free: bool = True
+    """False: the value is kept."""
+    sigma: float | None = None
+    """Standard deviation of what is known beforehand: the value is an observation with this error."""
+
+    def _given(self, name: str) -> dict[str, Any]:
+        value = number(f"parameter {name}", self.value, -1e300, 1e300)
+        scale = self.scale if self.scale is not None else 0.1 * abs(value) or 1.0
+        return {
+            "name": name,
+            "unit": self.unit,
+            "value": value,
+            "scale": number(f"scale of parameter {name}", scale, 5e-324, 1e300),
+            "free": bool(self.free),
+            "prior_sigma": None
+            if self.sigma is None
+            else number(f"sigma of parameter {name}", self.sigma, 5e-324, 1e300),
+            "prior_value": None,
+        }
+
+
+def _is_table(given: Any) -> bool:
+    return not isinstance(given, np.ndarray) or bool(given.dtype.names)
+
+
+def _matrix(given: Any, what: str, prefix: str) -> tuple[np.ndarray, list[str]]:
+    """Numbers, rows x columns, and the names of the columns. A plain array has the names x0, x1, ... of ``prefix``."""
+    if isinstance(given, (list, tuple)) and given and not isinstance(given[0], Mapping):
+        given = np.asarray(given)
+    if hasattr(given, "to_frame") and not hasattr(given, "columns"):  # a Series
+        given = given.to_frame()
+    if _is_table(given):
+        columns = columns_of(given, what)
+        for name, values in columns.items():
+            for row, value in enumerate(values):
+                if isinstance(value, (str, bytes)) or not np.isfinite(_float(value, what, name, row)):
+                    raise ValueError(f"{what}, row {row}: column {name!r} is {value!r}, must be a finite number")
+        return np.array([[float(v) for v in values] for values in columns.values()]).T, list(columns)
+    array = np.asarray(given, dtype=float)
+    if array.ndim == 1:
+        array = array[:, np.newaxis]
+    if array.ndim != 2 or array.shape[0] == 0 or array.shape[1] == 0:
+        raise ValueError(f"{what} has the shape {array.shape}, must have rows and columns")
+    if not np.isfinite(array).all():
+        row, column = (int(k) for k in np.argwhere(~np.isfinite(array))[0])
+        raise ValueError(f"{what}, row {row}: column {column} is {array[row, column]}, must be a finite number")
+    return array, [prefix if array.shape[1] == 1 and prefix == "y" else f"{prefix}{k}" for k in range(array.shape[1])]
+
+
+def _float(value: Any, what: str, name: str, row: int) -> float:
+    try:
+        return float("nan") if value is None else float(value)
+    except (TypeError, ValueError):
+        raise ValueError(f"{what}, row {row}: column {name!r} is {value!r}, must be a finite number") from None
+
+
+def _maker(like: Any) -> Callable[[np.ndarray, list[str]], Any]:
+    """Makes rows into a table of the kind that the caller gave: callables get what their author knows."""
+    if not _is_table(like):
+        return lambda rows, _: rows
+    if hasattr(like, "iloc"):
+        import pandas
+
+        return lambda rows, columns: pandas.DataFrame(rows, columns=columns)
+    if hasattr(like, "get_columns"):
+        import polars
+
+        return lambda rows, columns: polars.DataFrame({name: rows[:, k] for k, name in enumerate(columns)})
+    return lambda rows, columns: {name: rows[:, k] for k, name in enumerate(columns)}
+
+
+def _outputs(given: Any, rows: int, outputs: list[str], what: str) -> np.ndarray:
+    """What a callable returned, rows x outputs. A table has the outputs as columns."""
+    if isinstance(given, Mapping) or hasattr(given, "iloc") and hasattr(given, "columns"):
+        columns = columns_of(given, what)
+        missing = [name for name in outputs if name not in columns]
+        if missing:
+            raise ValueError(f"{what} returned no column {missing[0]!r}; there are {', '.join(columns)}")
+        given = np.array([columns[name] for name in outputs], dtype=float).T
+    array = np.asarray(given, dtype=float)
+    if array.ndim == 1:
+        array = array[:, np.newaxis]
+    if array.shape != (rows, len(outputs)):
+        raise ValueError(f"{what} returned the shape {array.shape}, must be {rows} x {len(outputs)}")
+    if not np.isfinite(array).all():
+        row = int(np.argwhere(~np.isfinite(array))[0][0])
+        raise ValueError(f"{what} returned a number that is not finite, in row {row}")
+    return np.ascontiguousarray(array)
+
+
+class Missing(Result):
+    """The terms that a simulation lacks. ``print`` shows the page of ``llmt discover``."""
+
+    def __init__(self, made: Mapping[str, Any], question: dict[str, Any], kind: Any, callables: dict[str, Any]) -> None:
+        super().__init__(made["text"], json.loads(made["json"]))
+        self._question = question
+        self._kind = kind  # an empty table of the kind that was given
+        self._callables = callables
+        self._found: str = made["state"]
+        self._measured: np.ndarray = question.pop("measured")
+        self.before: np.ndarray = made["before"]
+        """The simulation at the measured rows, its own parameters adjusted; rows x outputs."""
+        self.corrected: np.ndarray = made["corrected"]
+        """The same with the terms found."""
+        self.held_out: np.ndarray = np.array(made["held_out"], dtype=int)
+        """The rows that took no part in the search."""
+
+    @property
+    def verdict(self) -> str:
+        """``nothing missing``, ``named``, ``named, indistinguishable`` or ``unknown effect``."""
+        verdict: str = self._data["verdict"]
+        return verdict
+
+    @property
+    def effects(self) -> Any:
+        """The terms found: a row for each coefficient and constant, with its standard error."""
+        return records(
+            [
+                {
+                    "name": term["name"],
+                    "location": term["location"],
+                    "output": term["output"],
+                    "formula": term["formula"],
+                    "confirmed": term["confirmed"],
+                    "parameter": value["name"],
+                    "value": value["value"],
+                    "standard_error": value["std_error"],
+                    "unit": value["unit"],
+                    "share": term["share"],
+                    "rivals": ", ".join(term["rivals"]),
+                }
+                for term in self._data["effects"]
+                for value in term["parameters"]
+            ]
+        )
+
+    @property
+    def parameters(self) -> Any:
+        """The parameters of the simulation, fitted together with the terms."""
+        return records(
+            [
+                {
+                    "name": value["name"],
+                    "value": value["value"],
+                    "standard_error": value["std_error"],
+                    "unit": value["unit"],
+                }
+                for value in self._data["simulation"]
+            ]
+        )
+
+    @property
+    def gap(self) -> dict[str, Any]:
+        """Root mean square errors before and after on the rows set aside; of each output under ``outputs``."""
+        gap: dict[str, Any] = self._data["gap"]
+        return gap
+
+    def predict(self, inputs: Any, simulated: Any = None) -> Any:
+        """The simulation with the terms found, at other inputs: an array of their rows, or rows x outputs if there are
+        several. ``simulated``: its outputs there, where no callable was given."""
+        from llmt import _core
+
+        rows, columns = _matrix(inputs, "inputs", "x")
+        rows = _in_order(rows, columns, self._question["input_names"], _is_table(inputs))
+        callable_ = self._callables["simulate"]
+        if (simulated is None) == (callable_ is None):
+            raise ValueError(
+                "simulated is needed: the simulation is known by its outputs alone"
+                if callable_ is None
+                else "simulated is not needed: the simulation was given as a callable"
+            )
+        tabulated = None if simulated is None else _matrix(simulated, "simulated", "y")[0]
+        if tabulated is not None and tabulated.shape != (len(rows), len(self._question["output_names"])):
+            raise ValueError(f"simulated has the shape {tabulated.shape}, inputs has {len(rows)} rows")
+        result = _core.corrected(
+            **self._question,
+            predict=_predictor(callable_, self._kind, self._question, self._callables["parameters"]),
+            terms=_own_terms(self._callables["terms"], self._kind, self._question),
+            state=self._found,
+            elsewhere=np.ascontiguousarray(rows),
+            tabulated=tabulated,
+        )
+        return result[:, 0] if result.shape[1] == 1 else result
+
+    def plot(self, ax: Any = None) -> Any:
+        """Draws measured minus simulated on the rows set aside (all rows without any), before and after, of the first
+        output. Returns the axes of matplotlib, ``ax`` if it is given."""
+        ax = axes_of(ax)
+        rows = self.held_out if len(self.held_out) else np.arange(len(self.before))
+        for label, values in (("before", self.before), ("after", self.corrected)):
+            gap = self._measured[rows, 0] - values[rows, 0]
+            ax.plot(rows, gap, ".", label=f"{label}, {np.sqrt(np.mean(gap**2)):.4g} root mean square")
+        ax.axhline(0.0, linewidth=0.5, color="black")
+        ax.set_xlabel("row")
+        ax.set_ylabel(f"measured - simulated {self._question['output_names'][0]}")
+        ax.set_title("Rows set aside" if len(self.held_out) else "All rows")
+        ax.legend()
+        return ax
+
+    @property
+    def summary(self) -> str:
+        """The verdict in a sentence."""
+        line: str = next(line for line in self._text.split("\n") if line.startswith("VERDICT: "))
+        return line
+
+    def _html_tables(self) -> list[str]:
+        effects = [
+            [term["formula"], value["name"], value["value"], value["std_error"], value["unit"]]
+            for term in self._data["effects"]
+            for value in term["parameters"]
+        ]
+        gaps = [[g["output"], g["before"], g["after"], g["noise_floor"]] for g in self._data["gap"]["outputs"]]
+        return [
+            html_table(["term", "parameter", "value", "standard error", "unit"], effects),
+            html_table(["output", "gap before", "after", "noise"], gaps),
+        ]
+
+
+def _in_order(rows: np.ndarray, columns: list[str], wanted: list[str], named: bool) -> np.ndarray:
+    if not named:
+        if rows.shape[1] != len(wanted):
+            raise ValueError(f"inputs has {rows.shape[1]} columns, must have {len(wanted)}: {', '.join(wanted)}")
+        return rows
+    missing = [name for name in wanted if name not in columns]
+    if missing:
+        raise ValueError(f"inputs has no column {missing[0]!r}; there are {', '.join(columns)}")
+    return rows[:, [columns.index(name) for name in wanted]]
+
+
+def _predictor(simulate: Any, kind: Any, question: Mapping[str, Any], as_array: bool) -> Any:
+    if simulate is None:
+        return None
+    make = _maker(kind)
+    inputs, outputs = list(question["input_names"]), list(question["output_names"])
+    parameters = [parameter["name"] for parameter in question["parameters"]]
+
+    def predict(rows: np.ndarray, values: list[float]) -> np.ndarray:
+        given = np.array(values) if as_array else dict(zip(parameters, values, strict=True))
+        return _outputs(simulate(given, make(rows, inputs)), len(rows), outputs, "simulate")
+
+    return predict
+
+
+def _own_terms(terms: Mapping[str, Any], kind: Any, question: Mapping[str, Any]) -> list[tuple[str, str, Any]]:
+    make = _maker(kind)
+    inputs = list(question["input_names"])
+
+    def of_rows(name: str, function: Callable[[Any], Any]) -> Callable[[np.ndarray], np.ndarray]:
+        return lambda rows: _outputs(function(make(rows, inputs)), len(rows), [name], f"term {name}")
+
+    own = []
+    for name, term in terms.items():
+        formula, function = term if isinstance(term, tuple) else (name, term)
+        if not callable(function) or not isinstance(formula, str):
+            raise TypeError(f"term {name!r} is {term!r}, must be a callable of the inputs, or (formula, callable)")
+        own.append((name, formula, of_rows(name, function)))
+    return own
+
+
+def _parameters_of(parameters: Any) -> tuple[list[dict[str, Any]], bool]:
+    """As the extension takes them, and whether the callable gets an array: of parameters without names."""
+    if parameters is None:
+        parameters = {}
+    if isinstance(parameters, Mapping):
+        given = {
+            name: value if isinstance(value, Parameter) else Parameter(value) for name, value in parameters.items()
+        }
+        return [parameter._given(str(name)) for name, parameter in given.items()], False
+    values = [value if isinstance(value, Parameter) else Parameter(value) for value in parameters]
+    return [parameter._given(f"p{k}") for k, parameter in enumerate(values)], True
+
+
+def _search(
+    simulate: Any,
+    parameters: tuple[list[dict[str, Any]], bool],
+    inputs: Any,
+    simulated: Any,
+    measured: Any,
+    *,
+    allow: Any,
+    order: str,
+    terms: Mapping[str, Any] | None,
+    own_terms_only: bool,
+    held_out: float,
+    seed: int,
+    progress: Any,
+) -> Missing:
+    from llmt import _core
+
+    rows, columns = _matrix(inputs, "inputs", "x")
+    values, outputs = _matrix(measured, "measured", "y")
+    if len(values) != len(rows):
+        raise ValueError(f"inputs has {len(rows)} rows, measured has {len(values)}")
+    if order and order not in columns:
+        raise ValueError(f"order is {order!r}, must be a column of inputs: {', '.join(columns)}")
+    if own_terms_only and not terms:
+        raise ValueError("own_terms_only is about terms, which are not given")
+    adjusted = names("allow", allow)
+    if unknown := [word for word in adjusted if word not in ("offset", "scale")]:
+        raise ValueError(f"allow is {unknown[0]!r}, must be 'offset' or 'scale'")
+    kind = _maker(inputs)(rows[:0], columns)
+    question: dict[str, Any] = {
+        "inputs": np.ascontiguousarray(rows),
+        "input_names": columns,
+        "order": order,
+        "output_names": outputs,
+        "parameters": parameters[0],
+        "offset": "offset" in adjusted,
+        "scale": "scale" in adjusted,
+        "own_terms_only": bool(own_terms_only),
+    }
+    predict = _predictor(simulate, kind, question, parameters[1])
+    if predict is not None:
+        start = predict(question["inputs"], [parameter["value"] for parameter in parameters[0]])
+    else:
+        start, found = _matrix(simulated, "simulated", "y")
+        if _is_table(simulated) and _is_table(measured):
+            start = _in_order_of_outputs(start, found, outputs)
+        if start.shape != values.shape:
+            raise ValueError(f"simulated has the shape {start.shape}, measured has {values.shape}")
+    question["simulated"] = np.ascontiguousarray(start)
+    own = dict(terms or {})
+    made = _core.find_missing(
+        **question,
+        measured=np.ascontiguousarray(values),
+        predict=predict,
+        terms=_own_terms(own, kind, question),
+        held_out=number("held_out", held_out, 0.0, 0.9),
+        seed=number("seed", seed, 0, 2**64 - 1, whole=True),
+        simulated_name="simulated" if simulate is None else getattr(simulate, "__name__", "simulate"),
+        measured_name="measured",
+        report=progress,
+    )
+    callables = {"simulate": simulate, "terms": own, "parameters": parameters[1]}
+    return Missing(made, {**question, "measured": values}, kind, callables)
+
+
+def _in_order_of_outputs(rows: np.ndarray, found: list[str], outputs: list[str]) -> np.ndarray:
+    missing = [name for name in outputs if name not in found]
+    if missing:
+        raise ValueError(f"simulated has no column {missing[0]!r}; there are {', '.join(found)}")
+    return rows[:, [found.index(name) for name in outputs]]
+
+
+def discover(
+    simulate: Callable[[Any, Any], Any],
+    parameters: Mapping[str, Any] | Sequence[Any] | None,
+    inputs: Any,
+    measured: Any,
+    *,
+    order: str = "",
+    terms: Mapping[str, Any] | None = None,
+    own_terms_only: bool = False,
+    held_out: float = 0.2,
+    seed: int = 1,
+    progress: Callable[[int, int, str], Any] | None = None,
+) -> Missing:
+    """Finds and names the terms that a simulation lacks, while its own parameters are adjusted.
+
+    Parameters
+    ----------
+    simulate : callable
+        ``simulate(parameters, inputs)`` gives the outputs of all rows of ``inputs`` at once: n values, rows x outputs,
+        or a table. ``parameters`` is a dict of numbers (an array, if a list was given), ``inputs`` a table of the kind
+        that was given. It is called in this thread. Derivatives by parameters are central differences.
+    parameters : dict, list or None
+        Start values, as numbers or :class:`Parameter`.
+    inputs : table or array, n rows
+        What the simulation and the terms may depend on. The columns of an array are called x0, x1, ...
+    measured : table or array, n rows
+        The outputs. The columns of an array are called y, or y0, y1, ...
+    order : str
+        Column that says in which order rows were measured; by default as they stand.
+    terms : dict
+        Terms of your own: a callable of the inputs for each name, or (formula, callable).
+    own_terms_only : bool
+        Leave the built-in terms out, but for unknown shapes.
+    held_out, seed
+        Share of the rows set aside to verify, and seed of their choice.
+
+    Raises
+    ------
+    ValueError
+        Numbers that are not finite, shapes or names that do not fit; what ``simulate`` raises is let through.
+
+    Examples
+    --------
+    >>> import numpy as np, llmt
+    >>> x = np.linspace(-3.0, 3.0, 200)
+    >>> noise = np.random.default_rng(1).normal(0.0, 0.02, 200)
+    >>> spring = lambda p, inputs: p["k"] * inputs["x"]
+    >>> found = llmt.discover(spring, {"k": 1.0}, {"x": x}, {"force": 2.0 * x + 0.3 * x**3 + noise})
+    >>> found.verdict, [term["formula"] for term in found.to_dict()["effects"]]
+    ('named', ['x^3'])
+    """
+    if not callable(simulate):
+        raise TypeError(f"simulate is {simulate!r}, must be a callable; find_missing() takes the outputs themselves")
+    return _search(
+        simulate,
+        _parameters_of(parameters),
+        inputs,
+        None,
+        measured,
+        allow=(),
+        order=order,
+        terms=terms,
+        own_terms_only=own_terms_only,
+        held_out=held_out,
+        seed=seed,
+        progress=progress,
+    )
+
+
+def find_missing(
+    inputs: Any,
+    simulated: Any,
+    measured: Any,
+    *,
+    allow: Any = (),
+    order: str = "",
+    terms: Mapping[str, Any] | None = None,
+    own_terms_only: bool = False,
+    held_out: float = 0.2,
+    seed: int = 1,
+    progress: Callable[[int, int, str], Any] | None = None,
+) -> Missing:
+    """Finds and names the terms that a simulation lacks, from its outputs beside measured ones: ``llmt discover``.
+
+    ``inputs``, ``simulated`` and ``measured`` have the same rows. ``allow`` is what the simulation may adjust before
+    anything counts as missing: ``"offset"``, ``"scale"`` or both. The others are as for :func:`discover`.
+    """
+    return _search(
+        None,
+        ([], False),
+        inputs,
+        simulated,
+        measured,
+        allow=allow,
+        order=order,
+        terms=terms,
+        own_terms_only=own_terms_only,
+        held_out=held_out,
+        seed=seed,
+        progress=progress,
+    )
