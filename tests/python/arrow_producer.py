@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+
+from llmt._core import read_arrow
 
 P = ctypes.POINTER
 
@@ -91,7 +93,9 @@ class Producer:
             array[k] = ctypes.pointer(thing) if thing is not None else P(kind)()
         return ctypes.cast(array, P(P(kind)))
 
-    def schema(self, format: bytes | None, name: bytes | None = b"c", children: Sequence[Any] = (), **other: Any) -> Schema:
+    def schema(
+        self, format: bytes | None, name: bytes | None = b"c", children: Sequence[Any] = (), /, **other: Any
+    ) -> Schema:
         schema = self._keep(Schema(format=format, name=name, n_children=len(children)))
         schema.children = self._pointers(Schema, children)
         schema.release = self._release(Schema, "of a part")
@@ -99,7 +103,7 @@ class Producer:
             setattr(schema, key, self._pointer(value))
         return schema
 
-    def array(self, length: int, buffers: Sequence[Any], children: Sequence[Any] = (), **other: Any) -> Array:
+    def array(self, length: int, buffers: Sequence[Any], children: Sequence[Any] = (), /, **other: Any) -> Array:
         array = self._keep(Array(length=length, n_buffers=len(buffers), n_children=len(children)))
         addresses = self._keep((ctypes.c_void_p * max(len(buffers), 1))())
         for k, buffer in enumerate(buffers):
@@ -156,3 +160,29 @@ class Producer:
         thing.release = self._release(type(thing), what)
         self.made[what] += 1
         return _new_capsule(ctypes.addressof(thing), name, None)
+
+
+def i32(*numbers: int) -> np.ndarray:
+    return np.array(numbers, dtype=np.int32)
+
+
+def i64(*numbers: int) -> np.ndarray:
+    return np.array(numbers, dtype=np.int64)
+
+
+def bits(*flags: int) -> np.ndarray:
+    return np.packbits(np.array(flags, dtype=np.uint8), bitorder="little")
+
+
+def outcome(make: Callable[[Producer], Any]) -> list[Any]:
+    """What comes of it, and what was made and released."""
+    producer = Producer()
+    capsules = make(producer)
+    try:
+        values, columns, _ = read_arrow(*(capsules if isinstance(capsules, tuple) else (capsules,)))
+        _, kind, words = columns[0]
+        cells = [None if np.isnan(value) else float(value) for value in values[:, 0]]
+        found = [kind, [cell if cell is None or words is None else words[int(cell)] for cell in cells], words]
+    except Exception as error:
+        found = [type(error).__name__, str(error)]
+    return [found, producer.made, producer.released]

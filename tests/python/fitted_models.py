@@ -4,12 +4,16 @@ import csv
 import json
 import math
 import os
+import shutil
 import subprocess
 from dataclasses import dataclass
 
 import numpy as np
+import pytest
 
-PROGRAM = os.environ.get("LLMT_PROGRAM", "llmt")
+from llmt.export import to_python
+
+PROGRAM = os.environ.get("LLMT_PROGRAM") or shutil.which("llmt")
 
 LABELS = ["red", "it's", 'say "hi"', "a,b; c", "grün", "back\\slash", "雪 ❄", "x_y%$&#{}~^"]
 NUMBERS = ["a", 'width "w", mm', "größe", "c_1"]  # names of numeric inputs; the names of outputs are below
@@ -190,6 +194,8 @@ def _rows(model, columns, seed):
 
 
 def run(*arguments):
+    if PROGRAM is None:
+        pytest.skip("there is no program llmt, and LLMT_PROGRAM names none")
     done = subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     return done.stdout
@@ -217,3 +223,65 @@ def fit(name, folder):
     model = json.loads(path.read_text(encoding="utf-8"))
     rows, kinds = _rows(model, columns, 1)
     return Fitted(name, model, str(path), rows, predictions(path, model, rows, folder), kinds)
+
+
+@pytest.fixture(scope="session")
+def fitted(tmp_path_factory):
+    """Makes the model of a name once, with its rows and predictions."""
+    made = {}
+
+    def get(name):
+        if name not in made:
+            made[name] = fit(name, tmp_path_factory.mktemp(name))
+        return made[name]
+
+    return get
+
+
+every_model = pytest.mark.parametrize("name", MODELS)
+
+
+def function_of(model, name="predict"):
+    space = {}
+    exec(to_python(model, name), space)
+    return space[name], space
+
+
+def assert_same(predicted, expected, relative):
+    """Equal but for rounding, which near 0 is that of the terms that cancel: relative to the output's magnitude."""
+    scale = np.max(np.abs(expected), axis=0)
+    np.testing.assert_array_less(np.abs(predicted - expected), relative * (np.abs(expected) + scale) + 1e-300)
+
+
+def constants():
+    """1.5 up to x = 2, 2.5 above, 0.25 of the first where x is missing: without regressors."""
+    leaf = {"samples": 5, "rank": 1, "rss": [0.0], "slope": [[]], "mean": [], "low": [], "high": []}
+    split = {
+        "input": "x",
+        "column": 0,
+        "threshold": 2.0,
+        "half_width": 0.0,
+        "missing_left": 0.25,
+        "left": 1,
+        "right": 2,
+    }
+    return {
+        "format": "llmt-model",
+        "version": 2,
+        "inputs": [{"name": "x", "low": 0.0, "high": 4.0, "centre": 2.0}],
+        "outputs": [{"name": "y", "low": 1.0, "high": 3.0}],
+        "regressors": [],
+        "partitions": [
+            {
+                "outputs": [0],
+                "validity": {"kind": "crisp", "width": 0.0, "smoothness": 1},
+                "outer_slope": [[]],
+                "residual_range": [[-1.0, 1.0]],
+                "nodes": [
+                    {**leaf, "samples": 10, "value": [2.0], "split": split},
+                    {**leaf, "value": [1.5]},
+                    {**leaf, "value": [2.5]},
+                ],
+            }
+        ],
+    }

@@ -1,7 +1,7 @@
 """Every export in its own engine against `llmt predict`.
 
-The models are fitted by the program that LLMT_PROGRAM names. LLMT_POSTGRES, if set, is the connection string of a
-PostgreSQL database in which a table may be made; psql asks it.
+The models are fitted by the program that LLMT_PROGRAM names, or by `llmt` of the path. LLMT_POSTGRES, if set, is the
+connection string of a PostgreSQL database in which a table may be made; psql asks it.
 """
 
 import copy
@@ -17,39 +17,10 @@ import sys
 
 import numpy as np
 import pytest
+from fitted_models import MODELS, assert_same, constants, every_model, fitted, function_of, predictions  # noqa: F401
 
-import fitted_models
-from fitted_models import MODELS, predictions
 from llmt.export import to_latex, to_onnx, to_python, to_sql, to_sympy
 from llmt.export.model import read
-
-
-@pytest.fixture(scope="session")
-def fitted(tmp_path_factory):
-    """Makes the model of a name once, with its rows and predictions."""
-    made = {}
-
-    def get(name):
-        if name not in made:
-            made[name] = fitted_models.fit(name, tmp_path_factory.mktemp(name))
-        return made[name]
-
-    return get
-
-
-every_model = pytest.mark.parametrize("name", MODELS)
-
-
-def function_of(model, name="predict"):
-    space = {}
-    exec(to_python(model, name), space)
-    return space[name], space
-
-
-def assert_same(predicted, expected, relative):
-    """Equal but for rounding, which near 0 is that of the terms that cancel: relative to the output's magnitude."""
-    scale = np.max(np.abs(expected), axis=0)
-    np.testing.assert_array_less(np.abs(predicted - expected), relative * (np.abs(expected) + scale) + 1e-300)
 
 
 def test_the_models_are_of_every_kind(fitted):
@@ -318,153 +289,7 @@ def test_onnx_names_do_not_clash(fitted):
     assert_same(in_onnx(model, fitted("categories").rows), fitted("categories").predicted, 1e-12)
 
 
-# sympy
-
-
-def symbol_values(model, row):
-    """The values of all symbols of to_sympy() for a row."""
-    values = {}
-    for column, value in zip(model["inputs"], row):
-        if "levels" in column:
-            values.update({f"{column['name']}={label}": float(value == label) for label in column["levels"]})
-        else:
-            values[column["name"]] = value
-    return values
-
-
-def within_the_ranges(space, row):
-    """Whether no guard acts on a row but the range of the outputs: by the parts of the Python export."""
-    x = space["_predict_numbers"](row)
-    d = space["_predict_deviations"](x)
-    for tree in space["_predict_TREES"]:
-        active = space["_predict_gaussians" if tree["kind"] == "gaussian" else "_predict_leaves"](tree, x)
-        for node in [0] + [node for node, _ in active]:
-            _, _, _, _, low, high = tree["nodes"][node]
-            if not all(a <= dk <= b for a, dk, b in zip(low, d, high)):
-                return False
-        for o, (low, high) in enumerate(tree["residual_range"]):
-            value = sum(v * space["_predict_local_model"](tree["nodes"], node, o, d) for node, v in active)
-            if not low <= value - space["_predict_local_model"](tree["nodes"], 0, o, d) <= high:
-                return False
-    return True
-
-
-@every_model
-def test_sympy_evaluates_to_the_prediction(fitted, name):
-    sympy = pytest.importorskip("sympy")
-    model = fitted(name)
-    _, space = function_of(model.model)
-    inside = [
-        i
-        for i in model.of("training", "threshold")
-        if None not in model.rows[i] and within_the_ranges(space, model.rows[i])
-    ]
-    assert len(inside) >= 20
-    expressions = to_sympy(model.model)
-    expressions = expressions if isinstance(expressions, list) else [expressions]
-    names = list(symbol_values(model.model, model.rows[0]))
-    symbols = [sympy.Symbol(symbol, real=True) for symbol in names]
-    for o, expression in enumerate(expressions):
-        assert expression.free_symbols <= set(symbols)
-        function = sympy.lambdify(symbols, expression, "math")
-        got = [float(function(*symbol_values(model.model, model.rows[i]).values())) for i in inside]
-        assert_same(np.array(got), model.predicted[inside, o], 1e-11)
-
-
-def test_sympy_substitutes(fitted):
-    sympy = pytest.importorskip("sympy")
-    model = fitted("readable_words")
-    expression = to_sympy(model.model)
-    for i in model.of("training")[:5]:
-        values = {sympy.Symbol(k, real=True): v for k, v in symbol_values(model.model, model.rows[i]).items()}
-        assert float(expression.subs(values)) == pytest.approx(model.predicted[i, 0], rel=1e-12)
-
-
-# LaTeX
-
-
-def from_latex(text, names):
-    """The rules of a `cases` as (value, condition), Python expressions in v[0], v[1], ...: a reader of its own."""
-    words = {rf"\text{{{name}}}": f"v[{j}]" for j, name in names.items()}
-    words.update({r"\,": "*", r"\ ": " ", r"\le": "<=", r"\text{if }": "", "^2": "**2"})
-    text = re.sub(r" \\times 10\^\{(-?\d+)\}", r"e\1", text)
-    for word in sorted(words, key=len, reverse=True):
-        text = text.replace(word, words[word])
-    text = re.sub(r"(?<![\w\[])a(?![\w])", "v[0]", text)
-    body = re.fullmatch(r".*? = \\begin{cases}\n(.*)\n\\end{cases}", text, re.S).group(1)
-    for line in body.split(" \\\\\n"):
-        value, condition = line.split(" & ")
-        yield value, " and ".join(condition.split(", "))
-
-
-def test_latex_says_the_rules(fitted):
-    model = fitted("readable")
-    names = {1: 'width "w", mm', 2: "größe", 3: r"c\_1"}
-    rules = list(from_latex(to_latex(model.model), names))
-    assert len(rules) == (len(model.model["partitions"][0]["nodes"]) + 1) // 2
-    for i in model.of("training"):
-        values = [
-            eval(value, {"v": model.rows[i]}) for value, condition in rules if eval(condition, {"v": model.rows[i]})
-        ]
-        assert values == [pytest.approx(model.predicted[i, 0], rel=1e-9)]
-
-
-@every_model
-def test_latex_is_balanced(fitted, name):
-    text = to_latex(fitted(name).model)
-    bare = re.sub(r"\\[{}\\]", "", text)
-    depth = 0
-    for letter in bare:
-        depth += {"{": 1, "}": -1}.get(letter, 0)
-        assert depth >= 0
-    assert depth == 0
-    assert not re.search(r"(?<!\\)[%#$~]", text) and text.count("\\begin{cases}") == text.count("\\end{cases}")
-    assert not re.search(r"e[+-]\d\d", text)
-
-
-def test_latex_of_one_leaf_and_digits(fitted):
-    text = to_latex(fitted("one_leaf").model, digits=3)
-    assert text.startswith("y = ") and "cases" not in text
-    assert all(len(number.replace(".", "").lstrip("0")) <= 4 for number in re.findall(r"(?<=[ -])\d+\.\d+", text))
-    with pytest.raises(ValueError, match="digits is 0"):
-        to_latex(fitted("one_leaf").model, digits=0)
-
-
 # Models made by hand
-
-
-def constants():
-    """1.5 up to x = 2, 2.5 above, 0.25 of the first where x is missing: without regressors."""
-    leaf = {"samples": 5, "rank": 1, "rss": [0.0], "slope": [[]], "mean": [], "low": [], "high": []}
-    split = {
-        "input": "x",
-        "column": 0,
-        "threshold": 2.0,
-        "half_width": 0.0,
-        "missing_left": 0.25,
-        "left": 1,
-        "right": 2,
-    }
-    return {
-        "format": "llmt-model",
-        "version": 2,
-        "inputs": [{"name": "x", "low": 0.0, "high": 4.0, "centre": 2.0}],
-        "outputs": [{"name": "y", "low": 1.0, "high": 3.0}],
-        "regressors": [],
-        "partitions": [
-            {
-                "outputs": [0],
-                "validity": {"kind": "crisp", "width": 0.0, "smoothness": 1},
-                "outer_slope": [[]],
-                "residual_range": [[-1.0, 1.0]],
-                "nodes": [
-                    {**leaf, "samples": 10, "value": [2.0], "split": split},
-                    {**leaf, "value": [1.5]},
-                    {**leaf, "value": [2.5]},
-                ],
-            }
-        ],
-    }
 
 
 @pytest.mark.parametrize("leaves", [1, 2])
@@ -540,70 +365,6 @@ def test_missing_packages_are_named(monkeypatch):
         monkeypatch.setitem(sys.modules, package, None)
         with pytest.raises(ImportError, match=f"needs the package {package}: pip install {package}"):
             export(constants())
-
-
-# SRBench
-
-
-class Estimator:
-    """What the module asks of an estimator."""
-
-    def __init__(self, model):
-        self.text = json.dumps(model)
-        self.feature_names_in_ = np.array([column["name"] for column in model["inputs"]] + ["not used"], dtype=object)
-
-    def to_json(self):
-        return self.text
-
-
-class Frame:
-    def __init__(self, columns):
-        self.columns = columns
-
-
-@pytest.mark.parametrize("name", ["readable", "crisp", "one_leaf"])
-def test_srbench_model_evaluates_to_the_prediction(fitted, name):
-    pytest.importorskip("sympy")
-    from sympy import Symbol, lambdify
-    from sympy.parsing.sympy_parser import parse_expr
-
-    from llmt import srbench
-
-    model = fitted(name)
-    _, space = function_of(model.model)
-    inside = [i for i in model.of("training", "threshold") if within_the_ranges(space, model.rows[i])]
-    assert len(inside) > 50
-    for given, names in (
-        (None, ["a", "x1", "größe", "c_1"]),
-        (["p", "E", "x_2", "lambda", "u"], ["p", "E", "x_2", "x3"]),
-    ):
-        text = srbench.model(Estimator(model.model), None if given is None else Frame(given))
-        expression = parse_expr(text, local_dict={name: Symbol(name) for name in names})
-        assert expression.free_symbols <= {Symbol(name) for name in names}
-        function = lambdify([Symbol(name) for name in names], expression, "math")
-        assert_same(np.array([float(function(*model.rows[i])) for i in inside]), model.predicted[inside, 0], 1e-11)
-
-
-def test_srbench_complexity():
-    pytest.importorskip("sympy")
-    from llmt import srbench
-
-    # Piecewise, of two pairs: (1.5, x0 <= 2) and (2.5, true)
-    assert srbench.complexity(Estimator(constants())) == 1 + (1 + 1 + 3) + (1 + 1 + 1)
-    assert srbench.model(Estimator(constants())) == "Piecewise((1.5, x <= 2), (2.5, True))"
-
-
-def test_srbench_refuses(fitted):
-    from llmt import srbench
-
-    with pytest.raises(ValueError, match="category of words"):
-        srbench.model(Estimator(fitted("readable_words").model))
-    with pytest.raises(ValueError, match="2 outputs"):
-        srbench.model(Estimator(fitted("two_outputs").model))
-    with pytest.raises(ValueError, match="X has 2 columns, the estimator was fitted with 5"):
-        srbench.model(Estimator(fitted("crisp").model), Frame(["p", "q"]))
-    with pytest.raises(AttributeError, match="nonsense"):
-        srbench.nonsense
 
 
 def test_the_reader_keeps_all_numbers(fitted):

@@ -22,7 +22,7 @@ def test_type(found, name):
     assert outcome[0] == "TypeError", outcome
     assert expected in outcome[1]
     where = "column 0" if name.startswith("numpy") else 'column "c"'
-    assert where in outcome[1] or name in ("numpy records", "polars Object"), outcome
+    assert where in outcome[1] or name == "numpy records", outcome
 
 
 @pytest.mark.skipif(pa is None, reason="needs pyarrow")

@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <cstdlib>
 #include <cstring>
-#include <limits>
 #include <optional>
 #include <stdexcept>
 #include <string_view>

@@ -11,61 +11,16 @@ import numpy as np
 from .additive import terms
 from .model import Input, Partition, Regressor, read
 from .needed import needed
+from .onnx_operators import Graph, smooth_clamp
 
 _OPSET, _ML_OPSET, _IR = 17, 2, 8
-
-
-class _Graph:
-    """Operators and constants in the order in which they are added; names are made."""
-
-    def __init__(self, onnx: Any) -> None:
-        self.onnx = onnx
-        self.nodes: list[Any] = []
-        self.constants: list[Any] = []
-        self.values: dict[Any, str] = {}
-
-    def constant(self, value: Any) -> str:
-        value = np.asarray(value)
-        key = (value.dtype.str, value.shape, value.tobytes())
-        if key not in self.values:
-            self.values[key] = f"llmt/c{len(self.values)}"
-            self.constants.append(self.onnx.numpy_helper.from_array(value, self.values[key]))
-        return self.values[key]
-
-    def __call__(self, operator: str, *inputs: Any, domain: str = "", output: str = "", **attributes: Any) -> str:
-        names = [value if isinstance(value, str) else self.constant(value) for value in inputs]
-        output = output or f"llmt/{len(self.nodes)}"
-        self.nodes.append(self.onnx.helper.make_node(operator, names, [output], domain=domain, **attributes))
-        return output
-
-    def columns(self, x: str, which: Any) -> str:
-        return self("Gather", x, np.array(which, dtype=np.int64), axis=1)
-
-    def double(self, x: str) -> str:
-        return self("Cast", x, to=self.onnx.TensorProto.DOUBLE)
-
-    def zero_where(self, condition: str, x: str) -> str:
-        return self("Where", condition, np.float64(0.0), x)
-
-
-def _held(graph: _Graph, x: Any, low: np.ndarray, high: np.ndarray) -> str:
-    """smooth_clamp (B.1) with arrays of ends."""
-    r = 0.1 * (high - low)
-    per_two_r = np.divide(0.5, r, out=np.zeros_like(r), where=r != 0.0)
-    zero = np.float64(0.0)
-    near = graph("Min", graph("Max", x, low - r), high + r)
-    above = graph("Max", graph("Sub", near, high), zero)
-    below = graph("Max", graph("Sub", low, near), zero)
-    squares = graph("Sub", graph("Mul", above, above), graph("Mul", below, below))
-    # Inside the range r may be 0 where low is high; `near` is then already that number.
-    return graph("Sub", near, graph("Mul", squares, per_two_r))
 
 
 class _Inputs:
     """The inputs as a matrix of doubles of the numbers, and for each category a column of positions of its levels, one
     beyond the last where it is missing."""
 
-    def __init__(self, graph: _Graph, inputs: tuple[Input, ...]) -> None:
+    def __init__(self, graph: Graph, inputs: tuple[Input, ...]) -> None:
         self.graph, self.inputs = graph, inputs
         onnx = graph.onnx
         info = onnx.helper.make_tensor_value_info
@@ -133,7 +88,7 @@ class _Inputs:
         return self.graph("Gather", np.asarray(table, dtype=np.float64), self.positions[j], axis=0)
 
 
-def _ordered(graph: _Graph, parts: list[tuple[list[int], str]], count: int) -> str:
+def _ordered(graph: Graph, parts: list[tuple[list[int], str]], count: int) -> str:
     """Puts parts, each (positions, matrix), side by side in the order of the positions."""
     matrices = [matrix for _, matrix in parts]
     order = [position for positions, _ in parts for position in positions]
@@ -143,7 +98,7 @@ def _ordered(graph: _Graph, parts: list[tuple[list[int], str]], count: int) -> s
     return graph.columns(joined, np.argsort(order))
 
 
-def _deviations(graph: _Graph, inputs: _Inputs, regressors: tuple[Regressor, ...]) -> str:
+def _deviations(graph: Graph, inputs: _Inputs, regressors: tuple[Regressor, ...]) -> str:
     parts: list[tuple[list[int], str]] = []
     numbers = [k for k, r in enumerate(regressors) if r.level < 0 and r.second < 0]
     products = [k for k, r in enumerate(regressors) if r.second >= 0]
@@ -159,7 +114,7 @@ def _deviations(graph: _Graph, inputs: _Inputs, regressors: tuple[Regressor, ...
                 np.array([[getattr(inputs.inputs[j], name) for j in columns]]) for name in ("low", "high", "centre")
             )
             x = inputs.of(columns)
-            held = _held(graph, graph("Sub", x, middle), low - middle, high - middle)
+            held = smooth_clamp(graph, graph("Sub", x, middle), low - middle, high - middle)
             factors.append(graph("Where", graph("IsNaN", x), x, held))
         parts.append((products, graph("Sub", graph("Mul", *factors), centre[:, products])))
     for j, column in enumerate(inputs.inputs):
@@ -172,7 +127,7 @@ def _deviations(graph: _Graph, inputs: _Inputs, regressors: tuple[Regressor, ...
     return _ordered(graph, parts, len(regressors))
 
 
-def _gates(graph: _Graph, inputs: _Inputs, partition: Partition) -> str:
+def _gates(graph: Graph, inputs: _Inputs, partition: Partition) -> str:
     """The share of the left child at each split, rows x splits, in the order of the nodes."""
     splits = [node for node in partition.nodes if not node.is_leaf]
     parts: list[tuple[list[int], str]] = []
@@ -216,7 +171,7 @@ def _gates(graph: _Graph, inputs: _Inputs, partition: Partition) -> str:
     return _ordered(graph, parts, len(splits))
 
 
-def _validities(graph: _Graph, inputs: _Inputs, partition: Partition) -> str:
+def _validities(graph: Graph, inputs: _Inputs, partition: Partition) -> str:
     """The validities of all nodes but the root, rows x nodes - 1."""
     nodes = partition.nodes
     gates = _gates(graph, inputs, partition)
@@ -239,7 +194,7 @@ def _validities(graph: _Graph, inputs: _Inputs, partition: Partition) -> str:
     return _ordered(graph, parts, len(nodes) - 1)
 
 
-def _gaussian_validities(graph: _Graph, inputs: _Inputs, partition: Partition) -> str:
+def _gaussian_validities(graph: Graph, inputs: _Inputs, partition: Partition) -> str:
     leaves = [i for i, _ in partition.gaussians]
     columns = [j for j, _, _ in partition.gaussians[0][1]]
     centre = np.array([[c for _, c, _ in of_inputs] for _, of_inputs in partition.gaussians])[None]
@@ -259,7 +214,7 @@ def _gaussian_validities(graph: _Graph, inputs: _Inputs, partition: Partition) -
     return graph("MatMul", share, below[:, 1:])
 
 
-def _predictions(graph: _Graph, inputs: _Inputs, d: str, partition: Partition) -> str:
+def _predictions(graph: Graph, inputs: _Inputs, d: str, partition: Partition) -> str:
     """Rows x outputs of the partition."""
     nodes, outputs = partition.nodes, len(partition.outputs)
     of_outputs = [terms(partition, o) for o in range(outputs)]
@@ -271,7 +226,7 @@ def _predictions(graph: _Graph, inputs: _Inputs, d: str, partition: Partition) -
         slope = np.array([[of_node.slope for of_node in of_output] for of_output in of_outputs]).transpose(1, 2, 0)
         means = np.array([[of_node.missing for of_node in of_output] for of_output in of_outputs]).transpose(1, 2, 0)
         missing = graph("IsNaN", d)
-        held = graph.zero_where(missing, _held(graph, d, low[:1], high[:1]))
+        held = graph.zero_where(missing, smooth_clamp(graph, d, low[:1], high[:1]))
         is_missing = graph.double(missing)
         root = graph("Add", graph("MatMul", held, slope[0]), graph("MatMul", is_missing, means[0]))
         root = graph("Add", root, value[:1])
@@ -285,7 +240,7 @@ def _predictions(graph: _Graph, inputs: _Inputs, d: str, partition: Partition) -
             one, two = np.array([1], dtype=np.int64), np.array([2], dtype=np.int64)
             spread = graph("Unsqueeze", validities, two)
             absent = graph("Unsqueeze", missing, one)
-            all_held = _held(graph, graph("Unsqueeze", d, one), low[None, 1:], high[None, 1:])
+            all_held = smooth_clamp(graph, graph("Unsqueeze", d, one), low[None, 1:], high[None, 1:])
             flat = np.array([-1, (len(nodes) - 1) * low.shape[1]], dtype=np.int64)
             for part, weights in (
                 (graph("Mul", graph.zero_where(absent, all_held), spread), slope[1:]),
@@ -295,11 +250,11 @@ def _predictions(graph: _Graph, inputs: _Inputs, d: str, partition: Partition) -
                 result = graph("Add", result, part)
         if partition.residual_range:
             ends = np.array(partition.residual_range).T
-            result = _held(graph, result, ends[:1], ends[1:])
+            result = smooth_clamp(graph, result, ends[:1], ends[1:])
         result = graph("Add", root, result)
     elif partition.residual_range:  # one leaf: the root's model plus what 0 is held to
         ends = np.array(partition.residual_range).T
-        result = graph("Add", root, _held(graph, np.zeros((1, outputs)), ends[:1], ends[1:]))
+        result = graph("Add", root, smooth_clamp(graph, np.zeros((1, outputs)), ends[:1], ends[1:]))
     else:
         result = root
     if d:
@@ -326,7 +281,7 @@ def to_onnx(model: dict[str, Any]) -> Any:
     """
     onnx = needed("onnx", "to_onnx")
     tree = read(model)
-    graph = _Graph(onnx)
+    graph = Graph(onnx)
     inputs = _Inputs(graph, tree.inputs)
     d = _deviations(graph, inputs, tree.regressors) if tree.regressors else ""
     parts = [(list(partition.outputs), _predictions(graph, inputs, d, partition)) for partition in tree.partitions]

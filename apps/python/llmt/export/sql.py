@@ -9,6 +9,7 @@ from typing import Any
 
 from .additive import Terms, terms
 from .model import Model, Node, Partition, read
+from .sql_text import name_of, number, smooth_clamp, string, sum_of
 
 _DIALECTS = ("duckdb", "postgresql", "sqlite")
 # Every letter is a table of columns that need those of the tables before: factors of products; deviations, gates and
@@ -16,46 +17,6 @@ _DIALECTS = ("duckdb", "postgresql", "sqlite")
 # over the nodes; guards.
 _STEPS = "edmwtvfy"
 _MOST_SPLITS = 1500  # every split is a column of an intermediate table; PostgreSQL holds 1600
-
-
-def _number(value: float) -> str:
-    """A literal that all dialects read as exactly this double."""
-    text = repr(value)
-    if "e" not in text:
-        text += "e0"
-    return f"({text})" if text.startswith("-") else text
-
-
-def _name(text: str) -> str:
-    return '"' + text.replace('"', '""') + '"'
-
-
-def _string(text: str) -> str:
-    return "'" + text.replace("'", "''") + "'"
-
-
-def _sum(parts: list[str]) -> str:
-    """The sum as a balanced tree: databases limit the depth of an expression."""
-    if len(parts) < 16:
-        return "+".join(parts) or "0e0"
-    half = len(parts) // 2
-    return f"({_sum(parts[:half])})+({_sum(parts[half:])})"
-
-
-def _held(x: str, low: float, high: float) -> str:
-    """smooth_clamp (B.1) of an expression that is a column; NULL where it is NULL."""
-    r = 0.1 * (high - low)
-    number = _number
-    if r == 0.0:
-        return f"CASE WHEN {x} IS NOT NULL THEN {number(low)} END"
-    p = number(0.5 / r)
-    above, below = f"({x}-{number(high)})", f"({x}-{number(low)})"
-    return (
-        f"CASE WHEN {x}>={number(low)} THEN CASE WHEN {x}<={number(high)} THEN {x}"
-        f" WHEN {x}<{number(high + r)} THEN {x}-{p}*{above}*{above} ELSE {number(high + 0.5 * r)} END"
-        f" WHEN {x}>{number(low - r)} THEN {x}+{p}*{below}*{below}"
-        f" WHEN {x}<={number(low - r)} THEN {number(low - 0.5 * r)} END"
-    )
 
 
 def _are_rules(partition: Partition) -> bool:
@@ -89,12 +50,12 @@ class _Statement:
         """Numbers as doubles, NULL where they are missing; categories as positions of their levels."""
         columns = []
         for j, column in enumerate(self.model.inputs):
-            name = _name(column.name)
+            name = name_of(column.name)
             if column.levels:
                 labels = {label: i for i, label in enumerate(column.levels)}
                 for value, i in column.numbers.items():  # the text of a double in DuckDB and SQLite
                     labels.setdefault(repr(value), i)
-                whens = " ".join(f"WHEN {_string(label)} THEN {i}" for label, i in labels.items())
+                whens = " ".join(f"WHEN {string(label)} THEN {i}" for label, i in labels.items())
                 blanks = "' '||CHAR(9,13)" if self.dialect == "sqlite" else "' '||CHR(9)||CHR(13)"
                 columns.append(f"CASE TRIM(CAST({name} AS TEXT),{blanks}) {whens} END AS x{j}")
                 continue
@@ -106,7 +67,7 @@ class _Statement:
             if column.codes:
                 codes = column.codes
                 whens = " ".join(
-                    f"WHEN {_number(codes[i + 1])}-{x}>={x}-{_number(codes[i])} THEN {i}" for i in range(len(codes) - 1)
+                    f"WHEN {number(codes[i + 1])}-{x}>={x}-{number(codes[i])} THEN {i}" for i in range(len(codes) - 1)
                 )
                 x = f"CASE WHEN {x} IS NULL THEN NULL {whens} ELSE {len(codes) - 1} END"
             columns.append(f"{x} AS x{j}")
@@ -123,24 +84,26 @@ class _Statement:
         factors = {j for k in used for r in [self.model.regressors[k]] if r.second >= 0 for j in (r.input, r.second)}
         for j in sorted(factors):
             column = self.model.inputs[j]
-            held = _held(f"(x{j}-{_number(column.centre)})", column.low - column.centre, column.high - column.centre)
+            held = smooth_clamp(
+                f"(x{j}-{number(column.centre)})", column.low - column.centre, column.high - column.centre
+            )
             self.add("e", f"e{j}", held)
         for k, r in enumerate(self.model.regressors):
             if k not in used:
                 continue
             x = f"x{r.input}"
             if r.second >= 0:
-                expression = f"e{r.input}*e{r.second}-{_number(r.centre)}"
+                expression = f"e{r.input}*e{r.second}-{number(r.centre)}"
             elif r.level >= 0:
-                here, elsewhere = _number(1.0 - r.centre), _number(0.0 - r.centre)
+                here, elsewhere = number(1.0 - r.centre), number(0.0 - r.centre)
                 expression = f"CASE WHEN {x}={r.level} THEN {here} WHEN {x} IS NOT NULL THEN {elsewhere} END"
             else:
-                expression = f"{x}-{_number(r.centre)}"
+                expression = f"{x}-{number(r.centre)}"
             self.add("d", f"d{k}", expression)
 
     def gate(self, node: Node, kind: str) -> str:
         """The share of the left child."""
-        x, t, missing = f"x{node.input}", _number(node.threshold), _number(node.missing_left)
+        x, t, missing = f"x{node.input}", number(node.threshold), number(node.missing_left)
         if node.shares:
             left = ",".join(str(i) for i, share in enumerate(node.shares) if share == 1.0)
             right = ",".join(str(i) for i, share in enumerate(node.shares) if share == 0.0)
@@ -150,11 +113,11 @@ class _Statement:
         if node.is_presence:
             return f"CASE WHEN {x} IS NOT NULL THEN 1e0 ELSE {missing} END"
         if node.direction:
-            parts = [f"COALESCE({_number(w)}*(x{j}-{_number(c)}),0e0)" for j, w, c in node.direction]
-            x = "(" + _sum(parts) + ")"
+            parts = [f"COALESCE({number(w)}*(x{j}-{number(c)}),0e0)" for j, w, c in node.direction]
+            x = "(" + sum_of(parts) + ")"
         if node.per_half_width == 0.0:
             return f"CASE WHEN {x}<={t} THEN 1e0 WHEN {x}>{t} THEN 0e0 ELSE {missing} END"
-        per, u = _number(node.per_half_width), f"({x}-{t})*{_number(node.per_half_width)}"
+        per, u = number(node.per_half_width), f"({x}-{t})*{number(node.per_half_width)}"
         if kind == "logistic":
             return (
                 f"CASE WHEN {u}<=-37e0 THEN 1e0 WHEN {u}>=37e0 THEN 0e0"
@@ -181,11 +144,11 @@ class _Statement:
         weights: list[str] = []
         for i, of_inputs in partition.gaussians:
             squares = [
-                f"COALESCE((x{j}-{_number(c)})*{_number(s)}*(x{j}-{_number(c)})*{_number(s)},0e0)"
+                f"COALESCE((x{j}-{number(c)})*{number(s)}*(x{j}-{number(c)})*{number(s)},0e0)"
                 for j, c, s in of_inputs
                 if s != 0.0
             ]
-            exponents.append(self.add("d", f"z{p}_{i}", f"-0.5e0*({_sum(squares)})"))
+            exponents.append(self.add("d", f"z{p}_{i}", f"-0.5e0*({sum_of(squares)})"))
         largest = exponents
         while len(largest) > 1:  # a function of SQLite takes at most 100 arguments
             largest = [
@@ -195,34 +158,34 @@ class _Statement:
         self.add("m", f"m{p}", largest[0])
         for (i, _), e in zip(partition.gaussians, exponents):
             weights.append(self.add("w", f"w{p}_{i}", f"CASE WHEN {e}-m{p}>=-40e0 THEN EXP({e}-m{p}) ELSE 0e0 END"))
-        self.add("t", f"t{p}", _sum(weights))
+        self.add("t", f"t{p}", sum_of(weights))
         below: dict[int, list[str]] = {i: [] for i in range(len(partition.nodes))}
         for i, _ in partition.gaussians:
             below[i].append(f"w{p}_{i}")
             for a, _ in partition.path(i):
                 below[a].append(f"w{p}_{i}")
         for i in range(1, len(partition.nodes)):
-            self.add("v", f"v{p}_{i}", f"({_sum(below[i])})/t{p}")
+            self.add("v", f"v{p}_{i}", f"({sum_of(below[i])})/t{p}")
 
     def held(self, k: int, low: float, high: float) -> str:
         """The column of a deviation that is held to a range, for ranges that occur more than once."""
         key = (k, low, high)
         if self.uses[key] == 1:
-            return "(" + _held(f"d{k}", low, high) + ")"
+            return "(" + smooth_clamp(f"d{k}", low, high) + ")"
         if key not in self.names:
-            self.names[key] = self.add("v", f"c{len(self.names)}", _held(f"d{k}", low, high))
+            self.names[key] = self.add("v", f"c{len(self.names)}", smooth_clamp(f"d{k}", low, high))
         return self.names[key]
 
     def local(self, node: Node, of_node: Terms) -> str:
         """What a node adds: its local model beside that of its parent."""
-        parts = [_number(of_node.value)] if of_node.value != 0.0 else []
+        parts = [number(of_node.value)] if of_node.value != 0.0 else []
         for k, (slope, missing) in enumerate(zip(of_node.slope, of_node.missing)):
             if slope == 0.0 and missing == 0.0:
                 continue
             held = self.held(k, node.low[k], node.high[k]) if slope != 0.0 else f"0e0*d{k}"
-            term = f"{_number(slope)}*{held}" if slope != 0.0 else held
-            parts.append(f"COALESCE({term},{_number(missing)})")
-        return _sum(parts)
+            term = f"{number(slope)}*{held}" if slope != 0.0 else held
+            parts.append(f"COALESCE({term},{number(missing)})")
+        return sum_of(parts)
 
     def count_uses(self) -> dict[tuple[int, float, float], int]:
         """How often each deviation is held to each range."""
@@ -243,14 +206,14 @@ class _Statement:
             whens = []
             for leaf in partition.leaves():
                 node = partition.nodes[leaf]
-                parts = [_number(node.value[o])]
+                parts = [number(node.value[o])]
                 for k, slope in enumerate(node.slope[o]):
                     if slope != 0.0:
                         parts.append(
-                            f"{_number(slope)}*COALESCE({self.range_column(partition, k)},{_number(node.mean[k])})"
+                            f"{number(slope)}*COALESCE({self.range_column(partition, k)},{number(node.mean[k])})"
                         )
                 rule = [self.side(partition.nodes[a], is_left) for a, is_left in partition.path(leaf)]
-                whens.append((" AND ".join(rule), _sum(parts)))
+                whens.append((" AND ".join(rule), sum_of(parts)))
             *first, (_, last) = whens
             rules = "".join(f"\n  WHEN {rule} THEN {equation}" for rule, equation in first)
             self.add("f", f"s{column}", f"CASE{rules}\n  ELSE {last} END" if first else last)
@@ -271,18 +234,18 @@ class _Statement:
         elif node.is_presence:
             known = f"{x} IS NOT NULL" if is_left else "1=0"
         else:
-            known = f"{x}{'<=' if is_left else '>'}{_number(node.threshold)}"
+            known = f"{x}{'<=' if is_left else '>'}{number(node.threshold)}"
         return f"({known} OR {x} IS NULL)" if node.missing_left == is_left else known
 
     def outer(self, partition: Partition, o: int) -> str:
         """The slopes beyond the training extent (B.4)."""
         root = partition.nodes[0]
         parts = [
-            f"COALESCE({_number(slope)}*(d{k}-{self.held(k, root.low[k], root.high[k])}),0e0)"
+            f"COALESCE({number(slope)}*(d{k}-{self.held(k, root.low[k], root.high[k])}),0e0)"
             for k, slope in enumerate(partition.outer[o])
             if slope != 0.0
         ]
-        return _sum(parts)
+        return sum_of(parts)
 
     def partition(self, p: int, partition: Partition) -> None:
         for o, column in enumerate(partition.outputs):
@@ -294,11 +257,11 @@ class _Statement:
                 if local != "0e0":
                     parts.append(f"CASE WHEN v{p}_{i}<>0e0 THEN v{p}_{i}*({local}) ELSE 0e0 END")
             self.add("f", f"r{column}", self.local(root, of_nodes[0]))
-            self.add("f", f"s{column}", _sum(parts))
+            self.add("f", f"s{column}", sum_of(parts))
             self.add("f", f"o{column}", self.outer(partition, o))
             leaves = f"s{column}"
             if partition.residual_range:
-                leaves = _held(leaves, *partition.residual_range[o])
+                leaves = smooth_clamp(leaves, *partition.residual_range[o])
             self.add("y", f"y{column}", f"r{column}+({leaves})+o{column}")
 
     def results(self) -> list[str]:
@@ -307,9 +270,9 @@ class _Statement:
             for o, column in enumerate(partition.outputs):
                 y = f"y{column}"
                 if ends := partition.output_range and partition.output_range[o]:
-                    low, high = (_number(end) for end in ends)
+                    low, high = (number(end) for end in ends)
                     y = f"CASE WHEN {y}<{low} THEN {low} WHEN {y}>{high} THEN {high} ELSE {y} END"
-                results[column] = f"{y} AS {_name(self.model.outputs[column] + '_pred')}"
+                results[column] = f"{y} AS {name_of(self.model.outputs[column] + '_pred')}"
         return results
 
 
@@ -319,14 +282,14 @@ def to_sql(
     """A SELECT statement that gives the predictions of the rows of a table, one column TARGET_pred for each output.
 
     It says what `llmt predict` says, guards and missing values included, but for the rounding of sums. NULL, and NaN
-    where the database has it, is a missing value; a category is compared by its label, without blanks at
-    the ends. An infinite value,
-    which `llmt predict` refuses, is taken.
+    where the database has it, is a missing value; a category is compared by its label, without blanks at the ends. An
+    infinite value, which `llmt predict` refuses, is taken.
 
     `model` is what `json.loads` makes of the text of a model file. `table` is the name of the table, or a sequence of
     names: ("schema", "table"). `dialect` is "postgresql", "duckdb" or "sqlite" (3.35 or later). `keep` names columns of
     the table that the result has too, such as its key: SQL does not promise an order of the rows. Gaussian and logistic
-    validities need the function EXP, which SQLite has if it was built with its mathematical functions.
+    validities need the function EXP, which SQLite has if it was built with its mathematical functions. SQLite takes
+    text that is no number for 0, so check the types of the columns there.
 
     Raises ValueError for another dialect, a name with a NUL character, and trees of more than 1500 splits or 65 levels.
     """
@@ -351,16 +314,16 @@ def to_sql(
             statement.gates(p, partition)
         statement.partition(p, partition)
     names = [table] if isinstance(table, str) else list(table)
-    kept = [f"{_name(column)} AS k{i}" for i, column in enumerate(keep)]
+    kept = [f"{name_of(column)} AS k{i}" for i, column in enumerate(keep)]
     text = "WITH llmt_x AS (SELECT\n " + ",\n ".join(kept + statement.inputs())
-    text += "\n FROM " + ".".join(_name(part) for part in names) + ")"
+    text += "\n FROM " + ".".join(name_of(part) for part in names) + ")"
     fence = "" if dialect == "duckdb" else "MATERIALIZED "
     last = "llmt_x"
     for step, columns in statement.columns.items():
         if columns:
             text += f",\nllmt_{step} AS {fence}(SELECT {last}.*,\n " + ",\n ".join(columns) + f"\n FROM {last})"
             last = f"llmt_{step}"
-    results = [f"k{i} AS {_name(column)}" for i, column in enumerate(keep)] + statement.results()
+    results = [f"k{i} AS {name_of(column)}" for i, column in enumerate(keep)] + statement.results()
     text += "\nSELECT\n " + ",\n ".join(results) + f"\nFROM {last}"
     if "\0" in text:
         raise ValueError("a name or label of the model has a NUL character, which SQL cannot hold")

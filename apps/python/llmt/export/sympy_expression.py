@@ -50,10 +50,12 @@ class _Writer:
 
     def local_model(self, node: Node, o: int) -> str:
         constant, slopes = equation(self.model, node, o)
-        parts = [f"{number(t.slope)}*{self.regressor(t.regressor)}" for t in slopes]
-        if constant != 0.0 or not parts:
-            parts.insert(0, number(constant))
-        return " + ".join(parts)
+        text = number(constant).strip("()") if constant != 0.0 or not slopes else ""
+        for t in slopes:
+            sign = " - " if t.slope < 0.0 else " + "
+            size = "" if abs(t.slope) == 1.0 else f"{number(abs(t.slope))}*"
+            text += (sign if text else sign.strip(" +")) + size + self.regressor(t.regressor)
+        return text
 
     def compared(self, node: Node) -> str:
         if not node.direction:

@@ -64,7 +64,7 @@ def by_own_levels(raw: Raw, column: int, declared: bool, most: int | None = most
     if words is not None:
         index = np.where(here, len(words), cells).astype(np.intp)
         occurs = np.bincount(index, minlength=len(words) + 1)[: len(words)] > 0
-        labels = [bare(word) if used else "" for word, used in zip(words, occurs)]
+        labels = [bare(word) if used else "" for word, used in zip(words, occurs, strict=True)]
     else:
         _refuse_merged(raw, column, cells)
         numbers, found = np.unique(cells[~here], return_inverse=True)

@@ -41,15 +41,10 @@ def read_raw(table: Any, name: str) -> Raw:
 
 def from_arrow(table: Any, name: str) -> Raw:
     """Reads what speaks the Arrow C data interface: polars, pyarrow, DuckDB and others."""
-    try:
-        if hasattr(table, "__arrow_c_stream__"):
-            capsules = (table.__arrow_c_stream__(),)
-        else:
-            capsules = table.__arrow_c_array__()
-    except (Exception, KeyboardInterrupt, SystemExit, GeneratorExit):
-        raise
-    except BaseException as error:  # a panic of polars, as for columns of objects
-        raise TypeError(f"{name} cannot be read: its library ended with {error}") from None
+    if hasattr(table, "__arrow_c_stream__"):
+        capsules = (table.__arrow_c_stream__(),)
+    else:
+        capsules = table.__arrow_c_array__()
     values, columns, is_table = read_arrow(*capsules, name=name)
     found = [Column(words, kind == "codes") for _, kind, words in columns]
     labels = [label for label, _, _ in columns]
