@@ -175,7 +175,7 @@ def test_html_shows_tree_error_and_coverage(name, request):
     elements = elements_of(html)
     words = " ".join(filter(None, (text for element in elements for text in (element.text, element.tail))))
     assert len(html.encode()) < 100_000
-    assert {element.tag for element in elements} <= {"div", "svg", "text", "title", "rect", "line", "circle"}
+    assert {element.tag for element in elements} <= {"div", "svg", "g", "text", "title", "rect", "line", "circle"}
     assert "http" not in html and "url(" not in html
     assert "least squares" in words and "prediction intervals hold" in words
     if name == "smooth":

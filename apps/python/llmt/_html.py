@@ -14,7 +14,7 @@ from typing import Any
 
 from ._facts import Facts, facts_of
 from ._layout import CUT_NOTE, LINE, MOST_LEAVES, Item, Layout, layout_of
-from ._tree import Tree, number, shown, trees
+from ._tree import Tree, decimal, number, shown, trees
 
 WIDTH = 900.0  # px
 _EM = 12.0  # px
@@ -138,13 +138,13 @@ def _svg(tree: Tree, layout: Layout) -> str:
 
 
 def _legend(tree: Tree, layout: Layout) -> list[str]:
-    low, high = layout.levels
+    low, high = (decimal(level, 0.01 * (layout.levels[1] - layout.levels[0])) for level in layout.levels)
     right = WIDTH - 4
-    parts = [_text(right, 11, number(high, 3), anchor="end", size=11, opacity=0.8)]
-    right -= 8 + 7 * len(number(high, 3))
+    parts = [_text(right, 11, high, anchor="end", size=11, opacity=0.8)]
+    right -= 8 + 7 * len(high)
     for k in range(24):
         parts.append(f'<rect x="{right - 96 + 4 * k:.0f}" y="3" width="4.3" height="9" fill="{_colour(k / 23)}"/>')
-    text = f"mean prediction of {tree.targets[0]} in a leaf: {number(low, 3)}"
+    text = f"mean prediction of {tree.targets[0]} in a leaf: {low}"
     parts.append(_text(right - 104, 11, text, anchor="end", size=11, opacity=0.8))
     return parts
 
@@ -158,9 +158,9 @@ def _branch(layout: Layout, item: Item, top: float) -> list[str]:
     if not item.is_split and layout.columns[-1] * _EM > here:
         parts.append(_line(here, y, layout.columns[-1] * _EM, y, 1.2, 0.3, "2 4"))
     if item.parent is not None:
-        title = f"<title>{_safe(item.full_condition[:300])}</title>"
-        parts.append(_text(begin + 6, y - 4, item.what, size=11.5, title=title))
-        parts.append(_text(begin + 6, y + 13, item.how, size=11.5, title=title, weight=600))
+        parts.append(f"<g><title>{_safe(item.full_condition[:300])}</title>")
+        parts.append(_text(begin + 6, y - 4, item.what, size=11.5))
+        parts.append(_text(begin + 6, y + 13, item.how, size=11.5, weight=600) + "</g>")
     return parts
 
 
@@ -176,18 +176,17 @@ def _leaf(layout: Layout, item: Item, top: float) -> list[str]:
     x = layout.columns[-1] * _EM
     y = (item.middle + top) * _EM - item.height * _EM / 2
     width, height = WIDTH - x - 2, item.height * _EM + 4
-    title = f"<title>{_safe(item.full)}</title>"
     border = 'stroke-opacity=".5" stroke-dasharray="3 3"' if item.is_cut else 'stroke-opacity=".15"'
     parts = [
         f'<rect x="{x:.1f}" y="{y - 2:.1f}" width="{width:.1f}" height="{height:.1f}" rx="4" fill="currentColor" '
-        f'fill-opacity=".06" stroke="currentColor" {border}>{title}</rect>',
+        f'fill-opacity=".06" stroke="currentColor" {border}/>',
         f'<rect x="{x:.1f}" y="{y - 2:.1f}" width="6" height="{height:.1f}" rx="2" fill="{_colour(item.level)}"/>',
     ]
     for k, line in enumerate(item.lines):
         indent = 1.4 * _EM if line.startswith(" ") else 0.0
-        parts.append(_text(x + 13 + indent, y + (k * LINE + 0.95) * _EM, line.strip(), title=title))
+        parts.append(_text(x + 13 + indent, y + (k * LINE + 0.95) * _EM, line.strip()))
     parts.append(_text(x + 13, y + (len(item.lines) * LINE + 0.9) * _EM, item.note, size=11, opacity=0.7))
-    return parts
+    return [f"<g><title>{_safe(item.full)}</title>", *parts, "</g>"]
 
 
 def _picture(parts: list[str], width: float, height: float, label: str) -> str:
@@ -206,12 +205,11 @@ def _text(
     size: float = _EM,
     opacity: float = 1.0,
     weight: int = 400,
-    title: str = "",
 ) -> str:
     more = "" if anchor == "start" else f' text-anchor="{anchor}"'
     more += "" if opacity == 1.0 else f' fill-opacity="{opacity}"'
     more += "" if weight == 400 else f' font-weight="{weight}"'
-    return f'<text x="{x:.1f}" y="{y:.1f}" font-size="{size:g}" fill="currentColor"{more}>{title}{_safe(text)}</text>'
+    return f'<text x="{x:.1f}" y="{y:.1f}" font-size="{size:g}" fill="currentColor"{more}>{_safe(text)}</text>'
 
 
 def _line(x1: float, y1: float, x2: float, y2: float, width: float, opacity: float, dashes: str = "") -> str:

@@ -144,16 +144,26 @@ def _columns(items: list[Item], width: float) -> list[float]:
         max(min(11.0, max(em(item.what), 1.08 * em(item.how))) for item in items if item.depth == d) + 1.6
         for d in range(1, depth + 1)
     ]
-    room = 0.5 * width
-    shrink = min(1.0, room / sum(wanted)) if wanted else 1.0
+    widest = _widest(wanted, 0.5 * width)
     columns = [0.6]
     for column in wanted:
-        columns.append(columns[-1] + column * shrink)
+        columns.append(columns[-1] + min(column, widest))
     for item in items:
         if item.parent is not None:
             space = columns[item.depth] - columns[item.depth - 1] - 0.9
             item.what, item.how = fitted(item.what, space), fitted(item.how, space / 1.08)  # how it compares is bold
     return columns
+
+
+def _widest(wanted: list[float], room: float) -> float:
+    """The width that columns are cut to, so that they fit into the room and narrow ones keep theirs."""
+    left = room
+    for k, column in enumerate(sorted(wanted)):
+        share = left / (len(wanted) - k)
+        if column > share:
+            return share
+        left -= column
+    return max(wanted, default=0.0)
 
 
 def _describe(tree: Tree, item: Item, width: float) -> None:
