@@ -1,204 +1,293 @@
-#!/usr/bin/python3
-"""llmt beside the regressors that a Debian machine can install, in one run, on the same data, under the same limits.
+#!/usr/bin/env python3
+"""llmt beside the regressors that Python users install with pip: one thread each, defaults, the same rows.
 
-On the benchmarks' synthetic function (error: RMSE to the noise-free truth on 100000 fresh rows; noise of the data: 1), or
-with --sets FOLDER on every NAME.csv with a NAME.splits.csv (format: bench/data_sets.hpp; error: mean test RMSE).
+    python3 bench/rivals/run.py --install           # their environment, build/rivals_env, from requirements.txt
+    python3 bench/rivals/run.py --sets FOLDER       # every NAME.csv with a NAME.splits.csv; error: test RMSE
+    python3 bench/rivals/run.py --rows 1e4,1e5      # a synthetic function; error: RMSE to it without noise
+    python3 bench/rivals/run.py --table             # the tables of README.md and docs/benchmarks.md
 
-Every fit is a process of its own, `RUNNER METHOD TRAIN TEST COLUMNS THREADS`, that reads two files of doubles (column
-after column, the output last) and prints one line of JSON: fit_wall and fit_cpu, the seconds from data in memory to a
-model; predict_wall and predict_cpu, seconds per million rows; memory, the bytes by which fitting raised the peak;
-rmse; leaves (for earth terms). Exit 77: not installed.
+A line of the results file, build/rivals.jsonl, is one fit. What is in there is not measured again, so a run that was
+cut goes on where it stopped. To measure anew, delete the file, or the lines of a regressor.
+
+A fit is a process of its own, forked when the packages are imported and ChimeraBoost is compiled. Its CPU seconds go
+from arrays in memory to the model. Those of the programs llmt and M5P include reading the table and writing the model.
 """
 import argparse
-import collections
+import importlib.metadata
 import json
 import math
+import multiprocessing
 import os
+import pathlib
 import resource
 import statistics
 import subprocess
 import sys
-import tempfile
+import warnings
 
-HERE = os.path.dirname(os.path.abspath(__file__))
-ROOT = os.path.dirname(os.path.dirname(HERE))
-PYTHON = "/usr/bin/python3"  # the one that Debian's packages belong to
-WEKA = "/usr/share/java/weka.jar"
-PACKAGES = {
-    "llmt": None, "llmt-crisp": None, "HistGB": "python3-sklearn", "XGBoost": "python3-xgboost",
-    "M5P": "weka default-jdk-headless", "earth": "r-cran-earth", "lmtree": "r-cran-partykit", "tree": "python3-sklearn",
-    "least-squares": "python3-sklearn"}
+HERE = pathlib.Path(__file__).resolve().parent
+ROOT = HERE.parents[1]
+ENVIRONMENT = ROOT / "build/rivals_env"
+ONE_THREAD = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "MKL", "NUMBA")}
+IN_README = ["llmt", "ChimeraBoost", "CatBoost", "LightGBM", "XGBoost", "HistGradientBoosting", "Cubist",
+             "least squares"]
+SYNTHETIC = "synthetic "  # followed by the number of rows: the name of these data
 
 
 def arguments():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--bin", default=os.path.join(ROOT, "build/bench/bin"), help="where llmt's benchmarks are")
-    parser.add_argument("--methods", default=",".join(PACKAGES), help="comma-separated; default: %(default)s")
-    parser.add_argument("--rows", default="1e4,1e5", help="numbers of training rows; default: %(default)s")
-    parser.add_argument("--inputs", type=int, default=10)
-    parser.add_argument("--seeds", type=int, default=1, help="samples: mean errors, median times; default: %(default)s")
-    parser.add_argument("--sets", metavar="FOLDER", help="data sets instead of the synthetic function")
-    parser.add_argument("--names", help="comma-separated data sets; default: all")
-    parser.add_argument("--threads", type=int, default=1)
-    parser.add_argument("--seconds", type=int, default=300, help="CPU time a process may take; default: %(default)s")
-    parser.add_argument("--gigabytes", type=int, default=8, help="memory a process may take; default: %(default)s")
-    parser.add_argument("--json", default="rivals.json", help="file for all results; default: %(default)s")
+    parser.add_argument("--install", action="store_true", help="make the environment and exit")
+    parser.add_argument("--sets", metavar="FOLDER", type=pathlib.Path)
+    parser.add_argument("--names", metavar="NAME,...", help="data sets of the folder; default: all")
+    parser.add_argument("--splits", type=int, default=5, help="of each data set, from the first; default: %(default)s")
+    parser.add_argument("--rows", metavar="COUNT,...", help="training rows of the synthetic function")
+    parser.add_argument("--only", metavar="NAME", action="append",
+                        help="a regressor; may be repeated; default: those of regressors.py that take seconds")
+    parser.add_argument("--seconds", type=int, default=300, help="CPU time that a fit may take; default: %(default)s")
+    parser.add_argument("--llmt", default=ROOT / "build/release/bin/llmt", help="the program; default: %(default)s")
+    parser.add_argument("--results", default=ROOT / "build/rivals.jsonl", type=pathlib.Path,
+                        help="file of all fits; default: %(default)s")
+    parser.add_argument("--table", action="store_true", help="print the tables of all results")
     return parser.parse_args()
 
 
-class Bench:
-    def __init__(self, options, folder):
-        self.options, self.folder = options, folder
-        self.train, self.test = os.path.join(folder, "train"), os.path.join(folder, "test")
-        self.left_out = {}  # method -> why
-        self.records = []
-
-    def rivals(self, *arguments):
-        """What bench/rivals/rivals.cpp prints."""
-        command = [os.path.join(self.options.bin, "rivals"), *map(str, arguments)]
-        return subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout
-
-    def command(self, method):
-        if method.startswith("llmt"):
-            return [os.path.join(self.options.bin, "rivals"), "fit"]
-        if method == "M5P":
-            classes = os.path.join(self.folder, "java")
-            if not os.path.isdir(classes):
-                subprocess.run(["javac", "-cp", WEKA, "-d", classes, os.path.join(HERE, "WekaRival.java")], check=True,
-                               capture_output=True)
-            return ["java", f"-Xmx{self.options.gigabytes}g", "-XX:+UseSerialGC",
-                    f"-XX:ActiveProcessorCount={self.options.threads}", "-cp", f"{WEKA}:{classes}", "WekaRival"]
-        if method in ("earth", "lmtree"):
-            return ["Rscript", "--vanilla", os.path.join(HERE, "r_rival.R")]
-        return [PYTHON, os.path.join(HERE, "python_rival.py")]
-
-    def limit(self):
-        resource.setrlimit(resource.RLIMIT_CPU, (self.options.seconds, self.options.seconds + 5))
-        resource.setrlimit(resource.RLIMIT_DATA, (self.options.gigabytes << 30,) * 2)
-        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-
-    def run(self, method, columns):
-        """One fit: what the runner printed, or None and an entry in left_out."""
-        threads = str(self.options.threads)
-        names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS")
-        try:
-            done = subprocess.run(self.command(method) + [method, self.train, self.test, str(columns), threads],
-                                  env=os.environ | {name: threads for name in names}, preexec_fn=self.limit,
-                                  capture_output=True, text=True)
-        except (OSError, subprocess.CalledProcessError):
-            self.left_out[method] = "not installed"
-            return None
-        if done.returncode == 0:
-            return json.loads(done.stdout.splitlines()[-1])
-        if done.returncode == 77:
-            self.left_out[method] = "not installed"
-        elif done.returncode in (-24, -9, 152, 137):
-            self.left_out[method] = f"not finished within {self.options.seconds} CPU s"
-        else:
-            self.left_out[method] = f"failed: {(done.stderr.strip().splitlines() or [f'exit {done.returncode}'])[-1]}"
-        return None
-
-    def run_all(self, data, samples):
-        """All methods on each of `samples`, which write the files and return the number of columns. Sample by sample,
-        so that the machine's moods hit all methods alike."""
-        results = collections.defaultdict(list)
-        for sample in samples:
-            columns = sample()
-            for method in self.options.methods.split(","):
-                if method not in self.left_out:
-                    print(f"{data}: {method} ...", file=sys.stderr, end="\r")
-                    result = self.run(method, columns)
-                    print(" " * 60, file=sys.stderr, end="\r")
-                    if result:
-                        results[method].append(result)
-                    self.records.append({"data": data, "method": method} | (result or {"left_out": self.left_out[method]}))
-        summary = {method: summarise(runs) for method, runs in results.items()}
-        print_table(data, summary, self.left_out)
-        return summary
+def install():
+    subprocess.run([sys.executable, "-m", "venv", ENVIRONMENT], check=True)
+    subprocess.run([ENVIRONMENT / "bin/pip", "install", "--quiet", "-r", HERE / "requirements.txt"], check=True)
 
 
-def summarise(runs):
-    middle = lambda key: statistics.median(run[key] for run in runs)
-    return {key: middle(key) for key in ("fit_wall", "fit_cpu", "predict_cpu", "memory", "leaves")} | {
-        "rmse": statistics.mean(run["rmse"] for run in runs), "runs": len(runs)}
+def data_of_sets(options):
+    """(name, split, function that reads the rows), the first splits of all sets first."""
+    import numpy as np
+
+    def read(path):
+        return np.loadtxt(path, delimiter=",", skiprows=1)
+
+    def rows(name, split):
+        table, is_test = read(options.sets / f"{name}.csv"), read(options.sets / f"{name}.splits.csv")[:, split] == 1
+        return table[~is_test, :-1], table[~is_test, -1], table[is_test, :-1], table[is_test, -1]
+
+    found = sorted(path.name.removesuffix(".splits.csv") for path in options.sets.glob("*.splits.csv"))
+    names = options.names.split(",") if options.names else found
+    return [(name, split, lambda name=name, split=split: rows(name, split))
+            for split in range(options.splits) for name in names]
 
 
-def print_table(data, summary, left_out):
-    print(f"\n{data}")
-    own = summary.get("llmt")
-    head = ("fit wall s", "x llmt", "fit CPU s", "x llmt", "CPU s/1e6", "x llmt", "error", "x llmt", "leaves",
-            "extra MiB", "runs")
-    print(f"{'':14}" + "".join(f"{word:>11}" for word in head))
-    for method, row in summary.items():
-        line = f"{method:14}"
-        for key in ("fit_wall", "fit_cpu", "predict_cpu", "rmse"):
-            ratio = f"{row[key] / own[key]:.3g}" if own and own[key] > 0 else "-"
-            line += f"{row[key]:11.4g}{ratio:>11}"
-        print(line + f"{row['leaves']:11.0f}{row['memory'] / 2**20:11.1f}{row['runs']:11}")
-    for method, why in left_out.items():
-        packages = f" ({PACKAGES[method]})" if why == "not installed" and PACKAGES[method] else ""
-        print(f"{method:14} left out: {why}{packages}")
-    sys.stdout.flush()
+def data_of_function(options):
+    """The function of bench/synthetic.hpp in ten inputs: training rows with noise, 100000 test rows without."""
+    import numpy as np
+
+    def rows(count):
+        random = np.random.default_rng(1)
+        x = random.random((count + 100000, 10))
+        y = np.where(x[:, 0] < 0.4, 10 * np.sin(np.pi * x[:, 1] * x[:, 2]) + 5 * x[:, 3],
+                     20 * (x[:, 4] - 0.5)**2 + 10 * x[:, 5] * x[:, 6] - 5)
+        y += 8 * np.maximum(0, x[:, 7] - 0.6) + 2 * x[:, 8]
+        return x[:count], y[:count] + random.standard_normal(count), x[count:], y[count:]
+
+    return [(SYNTHETIC + count, 0, lambda count=count: rows(int(float(count)))) for count in options.rows.split(",")]
 
 
-def synthetic(bench):
-    options = bench.options
-    for rows in options.rows.split(","):
-        rows = int(float(rows))
+def work(make, data, seconds, sender):
+    """In the process of a fit: sends its result."""
+    import numpy as np
 
-        def sample(seed):
-            bench.rivals("sample", rows, options.inputs, seed, bench.train, bench.test)
-            return options.inputs + 1
+    resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 5))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    warnings.simplefilter("ignore")
+    train_x, train_y, test_x, test_y = data
+    model = make()
+    clock = getattr(model, "clock", resource.RUSAGE_SELF)
 
-        bench.run_all(f"synthetic function, {rows} rows x {options.inputs} inputs, {options.threads} thread(s)",
-                      [lambda seed=seed: sample(seed) for seed in range(1, options.seeds + 1)])
+    def spent():
+        usage = resource.getrusage(clock)
+        return usage.ru_utime + usage.ru_stime
 
-
-def sets(bench):
-    folder = bench.options.sets
-    names = bench.options.names.split(",") if bench.options.names else []
-    ratios = collections.defaultdict(list)
-    for line in bench.rivals("sets", folder, *names).splitlines():
-        name, rows, columns, splits = line.split("\t")
-
-        def sample(split):
-            bench.rivals("split", folder, name, split, bench.train, bench.test)
-            return int(columns)
-
-        data = f"{name}, {rows} rows x {int(columns) - 1} inputs, {bench.options.threads} thread(s)"
-        summary = bench.run_all(data, [lambda split=split: sample(split) for split in range(int(splits))])
-        # A method that was too slow gets another chance with the next data set.
-        bench.left_out = {method: why for method, why in bench.left_out.items() if why == "not installed"}
-        for method, row in summary.items():
-            if "llmt" in summary and row["runs"] == summary["llmt"]["runs"]:
-                own = summary["llmt"]
-                ratios[method].append([row["rmse"] / own["rmse"]] + [
-                    max(row[key], 1e-4) / max(own[key], 1e-4) for key in ("fit_cpu", "predict_cpu")])  # as clocks tell
-    print("\nGeometric means of the ratios to llmt, over the sets where all splits were done")
-    print(f"{'':14}{'error':>11}{'fit CPU s':>11}{'CPU s/1e6':>11}{'sets':>11}")
-    for method, values in ratios.items():
-        means = [math.exp(statistics.mean(map(math.log, column))) for column in zip(*values)]
-        print(f"{method:14}" + "".join(f"{mean:11.3g}" for mean in means) + f"{len(values):11}")
+    try:
+        before = spent()
+        model.fit(train_x, train_y)
+        result = {"fit_cpu": spent() - before}
+        predicted = np.asarray(model.predict(test_x)).ravel()
+        result["rmse"] = float(np.sqrt(np.mean((predicted - test_y)**2)))
+        if not math.isfinite(result["rmse"]):
+            result = {"failed": "predictions are not finite"}
+        elif hasattr(model, "leaves"):
+            result["leaves"] = model.leaves
+        sender.send(result)
+    except Exception as error:
+        sender.send({"failed": f"{type(error).__name__}: {error}"})
 
 
-def machine():
-    with open("/proc/cpuinfo") as file:
-        model = next((line.split(":")[1].strip() for line in file if line.startswith("model name")), "unknown")
-    return {"processor": model, "cores": os.cpu_count()}
+def fit(make, data, seconds):
+    receiver, sender = multiprocessing.Pipe(duplex=False)
+    process = multiprocessing.get_context("fork").Process(target=work, args=(make, data, seconds, sender))
+    process.start()
+    sender.close()
+    try:
+        result = receiver.recv()
+    except EOFError:
+        result = None
+    process.join()
+    return result or {"failed": f"the process ended with {process.exitcode}; its limit was {seconds} CPU s"}
+
+
+def read_results(path):
+    """(data, split, regressor) -> the last line of it."""
+    lines = path.read_text().splitlines() if path.exists() else []
+    return {(line["data"], line["split"], line["regressor"]): line for line in map(json.loads, lines)}
+
+
+def measure(options):
+    from regressors import ONLY_WHEN_NAMED, REGRESSORS, WEKA, Llmt
+
+    Llmt.program = options.llmt
+    names = options.only or [name for name in REGRESSORS if name not in ONLY_WHEN_NAMED]
+    if unknown := set(names) - set(REGRESSORS):
+        sys.exit(f"run.py: no regressor {', '.join(sorted(unknown))}; there are: {'; '.join(REGRESSORS)}")
+    # What the machine lacks is not a failed fit, which would be kept.
+    for name, path in {"llmt": options.llmt, "llmt (crisp)": options.llmt, "M5P": WEKA}.items():
+        if name in names and not os.path.exists(path):
+            sys.exit(f"run.py: {name} needs {path}, which is not there")
+    if "ChimeraBoost" in names:
+        import chimeraboost
+
+        chimeraboost.warmup()
+    packages = {name: REGRESSORS[name][0] for name in names}
+    versions = {name: importlib.metadata.version(package) if package else "" for name, package in packages.items()}
+    done = read_results(options.results)
+    options.results.parent.mkdir(exist_ok=True)
+    data = (data_of_sets(options) if options.sets else []) + (data_of_function(options) if options.rows else [])
+    for name, split, read in data:
+        missing = [one for one in names if done.get((name, split, one), {}).get("version") != versions[one]]
+        rows = read() if missing else None
+        for one in missing:
+            result = {"data": name, "split": split, "regressor": one, "version": versions[one], "rows": len(rows[1]),
+                      "inputs": rows[0].shape[1]} | fit(REGRESSORS[one][1], rows, options.seconds)
+            print(f"{name} {split} {one}: {result.get('failed') or '{rmse:.5g}, {fit_cpu:.3g} CPU s'.format(**result)}",
+                  file=sys.stderr)
+            with open(options.results, "a") as file:
+                file.write(json.dumps(result) + "\n")
+
+
+def number(value):
+    return f"{value:.0f}" if value >= 1000 else f"{value:#.4g}"
+
+
+def summarise(results):
+    """data -> regressor -> splits, means over them, and the ratios to llmt on the same splits."""
+    summary = {}
+    for (data, split, regressor), line in results.items():
+        if "rmse" in line:
+            summary.setdefault(data, {}).setdefault(regressor, {})[split] = line
+    for rows in summary.values():
+        own = rows.get("llmt", {})
+        for regressor, lines in rows.items():
+            rows[regressor] = {"splits": sorted(lines)} | {
+                key: next(iter(lines.values()))[key] for key in ("version", "rows", "inputs")}
+            for key in ("rmse", "fit_cpu", "leaves"):
+                if all(key in line for line in lines.values()):
+                    rows[regressor][key] = statistics.mean(line[key] for line in lines.values())
+                if key != "leaves" and all(split in own for split in lines):
+                    rows[regressor][key + " ratio"] = rows[regressor][key] / statistics.mean(
+                        own[split][key] for split in lines)
+    return summary
+
+
+def print_markdown(title, head, rows):
+    print(f"\n{title}\n")
+    for row in [head, ["---"] * len(head), *rows]:
+        print(f"| {' | '.join(row)} |")
+
+
+def print_readme(summary, sets):
+    shown = [name for name in IN_README if all(name in summary[data] for data in sets)]
+    rows = []
+    for data in sets:
+        cells = [number(summary[data][name]["rmse"]) for name in shown]
+        best = number(min(summary[data][name]["rmse"] for name in shown))
+        bold = [f"**{cell}**" if cell == best else cell for cell in cells]
+        own = summary[data]["llmt"]
+        rows.append([data, f"{own['rows']} x {own['inputs']}", bold[0], f"{own['leaves']:.0f}", *bold[1:]])
+    print_markdown("README: mean test RMSE", ["data", "training rows x inputs", shown[0], "leaves", *shown[1:]], rows)
+
+
+def print_sets(summary, sets, names):
+    all_splits = max(len(row["splits"]) for data in sets for row in summary[data].values())
+
+    def cell(row):
+        if not row:
+            return "–"
+        return number(row["rmse"]) + (f" ({len(row['splits'])})" if len(row["splits"]) < all_splits else "")
+
+    print_markdown(f"Mean test RMSE over {all_splits} splits; in brackets: over fewer", ["", *sets],
+                   [[name, *(cell(summary[data].get(name)) for data in sets)] for name in names])
+
+
+def print_means(summary, sets, names):
+    ranked = [name for name in names if all(name in summary[data] for data in sets)]
+
+    def rank(data, name):
+        own = summary[data][name]["rmse ratio"]
+        others = [summary[data][other]["rmse ratio"] for other in ranked]
+        return sum(other < own for other in others) + (1 + others.count(own)) / 2
+
+    def mean(rows, key):
+        return math.exp(statistics.mean(math.log(row[key]) for row in rows))
+
+    rows = []
+    for name in names:
+        own = [summary[data][name] for data in sets if name in summary[data]]
+        ranks = f"{statistics.mean(rank(data, name) for data in sets):.1f}" if name in ranked else "–"
+        median = statistics.median(row["rmse ratio"] for row in own)
+        rows.append([name, own[0]["version"], f"{len(own)} x {len(own[0]['splits'])}", ranks, f"{median:.3f}",
+                     f"{mean(own, 'rmse ratio'):.3f}", f"{mean(own, 'fit_cpu ratio'):.2g}"])
+    print_markdown(f"Over the sets: mean rank among {len(ranked)}; median and geometric mean of the ratios to llmt",
+                   ["", "version", "sets x splits", "mean rank", "RMSE, median", "RMSE, mean", "CPU, mean"], rows)
+
+
+def print_functions(summary, functions, names):
+    def cell(row):
+        return "{fit_cpu:.2f}; {rmse:.4f}".format(**row) if row else "–"
+
+    print_markdown("Synthetic function: CPU seconds of the fit; error", ["", *functions],
+                   [[name, *(cell(summary[data].get(name)) for data in functions)] for name in names])
+
+
+def print_tables(results):
+    from regressors import REGRESSORS
+
+    summary = {data: rows for data, rows in summarise(results).items() if "llmt" in rows}
+    sets = sorted((data for data in summary if not data.startswith(SYNTHETIC)), key=str.lower)
+    functions = sorted(set(summary) - set(sets), key=lambda data: float(data.removeprefix(SYNTHETIC)))
+
+    def measured(data):
+        return [name for name in REGRESSORS if any(name in summary[one] for one in data)]
+
+    if sets:
+        print_readme(summary, sets)
+        print_sets(summary, sets, measured(sets))
+        print_means(summary, sets, measured(sets))
+    if functions:
+        print_functions(summary, functions, measured(functions))
+    for (data, split, regressor), line in results.items():
+        if "failed" in line:
+            print(f"\n{data}, split {split}, {regressor}: {line['failed']}")
 
 
 def main():
     options = arguments()
-    if not os.access(os.path.join(options.bin, "rivals"), os.X_OK):
-        sys.exit(f"run.py: no program rivals in {options.bin}; build the preset bench, or say where with --bin")
-    if unknown := set(options.methods.split(",")) - set(PACKAGES):
-        sys.exit(f"run.py: no method {', '.join(sorted(unknown))}; there are {', '.join(PACKAGES)}")
-    with tempfile.TemporaryDirectory() as folder:
-        bench = Bench(options, folder)
-        (sets if options.sets else synthetic)(bench)
-    with open(options.json, "w") as file:
-        content = {"machine": machine(), "options": vars(options), "runs": bench.records}
-        json.dump(content, file, indent=1)
+    if options.install:
+        return install()
+    if not options.table and not options.sets and not options.rows:
+        sys.exit("run.py: say on which data, with --sets or --rows, or --table; --help explains")
+    python = ENVIRONMENT / "bin/python"
+    if not python.exists():
+        sys.exit("run.py: the packages are not there; run with --install first")
+    if pathlib.Path(sys.prefix) != ENVIRONMENT:
+        os.execve(python, [python, *sys.argv], os.environ | ONE_THREAD)
+    if options.table:
+        return print_tables(read_results(options.results))
+    return measure(options)
 
 
-main()
+sys.exit(main())

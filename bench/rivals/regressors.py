@@ -1,0 +1,117 @@
+"""The regressors that run.py compares: name -> (package, function that makes one).
+
+All have the defaults of their package, except for one thread, seed 0 where there is a seed, and silence; what else a
+row sets is in its name. requirements.txt has the packages. M5P is a program of Weka, which Debian packages.
+"""
+import json
+import os
+import resource
+import subprocess
+import tempfile
+
+import numpy as np
+from aplr import APLRRegressor
+from catboost import CatBoostRegressor
+from chimeraboost import ChimeraBoostRegressor
+from cubist import Cubist
+from interpret.glassbox import ExplainableBoostingRegressor
+from lightgbm import LGBMRegressor
+from pyoperon.sklearn import SymbolicRegressor
+from sklearn.ensemble import HistGradientBoostingRegressor
+from sklearn.linear_model import LinearRegression
+from xgboost import XGBRegressor
+
+WEKA = "/usr/share/java/weka.jar"
+
+
+class Program:
+    """A regressor that is a program of its own: its time includes reading the table and writing the model."""
+
+    clock = resource.RUSAGE_CHILDREN
+
+    def __init__(self):
+        self.folder = tempfile.TemporaryDirectory()
+
+    def path(self, name):
+        return os.path.join(self.folder.name, name)
+
+    def run(self, *command):
+        done = subprocess.run(command, capture_output=True, text=True)
+        if done.returncode:
+            raise RuntimeError((done.stderr.strip().splitlines() or [f"exit {done.returncode}"])[-1])
+        return done.stdout
+
+
+class Llmt(Program):
+    program = "llmt"
+
+    def __init__(self, *options):
+        super().__init__()
+        self.options = options
+
+    def write(self, name, x, y=None):
+        columns = [f"x{j}" for j in range(x.shape[1])] + ([] if y is None else ["y"])
+        np.savetxt(self.path(name), x if y is None else np.column_stack([x, y]), "%.17g", ",",
+                   header=",".join(columns), comments="")
+        return self.path(name)
+
+    def fit(self, x, y):
+        summary = json.loads(self.run(self.program, "fit", self.write("train.csv", x, y), "--target", "y", "--threads",
+                                      "1", "--json", "-o", self.path("model.json"), *self.options))
+        self.leaves = summary["partitions"][0]["leaves"]
+
+    def predict(self, x):
+        answer = self.run(self.program, "predict", self.path("model.json"), self.write("test.csv", x))
+        column = answer[:answer.index("\n")].split(",").index("y_pred")
+        return np.loadtxt(answer.splitlines(), delimiter=",", skiprows=1, usecols=column)
+
+
+class M5P(Program):
+    def write(self, name, x, y):
+        columns = [f"x{j}" for j in range(x.shape[1])] + ["y"]
+        header = "\n".join(["@relation table", *(f"@attribute {column} numeric" for column in columns), "@data"])
+        np.savetxt(self.path(name), np.column_stack([x, y]), "%.17g", ",", header=header, comments="")
+        return self.path(name)
+
+    def run(self, *arguments):
+        return super().run("java", "-Xmx4g", "-XX:+UseSerialGC", "-XX:ActiveProcessorCount=1", "-cp", WEKA,
+                           "weka.classifiers.trees.M5P", *arguments)
+
+    def fit(self, x, y):
+        self.run("-t", self.write("train.arff", x, y), "-d", self.path("model"), "-no-cv", "-v")
+
+    def predict(self, x):
+        # Lines "row actual predicted error", the actual value unknown; three decimals.
+        self.write("test.arff", x, np.zeros(len(x)))
+        lines = self.run("-T", self.path("test.arff"), "-l", self.path("model"), "-p", "0").splitlines()
+        rows = [line.split() for line in lines]
+        return np.array([float(row[2]) for row in rows if len(row) == 4 and row[0].isdigit()])
+
+
+REGRESSORS = {
+    "llmt": (None, Llmt),
+    "llmt (crisp)": (None, lambda: Llmt("--validity", "crisp")),
+    "ChimeraBoost": ("chimeraboost", lambda: ChimeraBoostRegressor(thread_count=1, random_state=0)),
+    "CatBoost": ("catboost", lambda: CatBoostRegressor(
+        thread_count=1, random_seed=0, verbose=0, allow_writing_files=False)),
+    "LightGBM": ("lightgbm", lambda: LGBMRegressor(n_jobs=1, random_state=0, verbose=-1)),
+    "LightGBM (300 rounds)": ("lightgbm", lambda: LGBMRegressor(
+        n_jobs=1, random_state=0, verbose=-1, n_estimators=300)),
+    "LightGBM linear_tree": ("lightgbm", lambda: LGBMRegressor(
+        n_jobs=1, random_state=0, verbose=-1, linear_tree=True)),
+    "XGBoost": ("xgboost", lambda: XGBRegressor(n_jobs=1, random_state=0)),
+    "XGBoost (300 rounds, rate 0.1)": ("xgboost", lambda: XGBRegressor(
+        n_jobs=1, random_state=0, n_estimators=300, learning_rate=0.1)),
+    "HistGradientBoosting": ("scikit-learn", lambda: HistGradientBoostingRegressor(random_state=0)),
+    "HistGradientBoosting (300 rounds)": ("scikit-learn", lambda: HistGradientBoostingRegressor(
+        random_state=0, max_iter=300, early_stopping=False)),
+    "EBM": ("interpret-core", lambda: ExplainableBoostingRegressor(n_jobs=1, random_state=0)),
+    "APLR": ("aplr", lambda: APLRRegressor(n_jobs=1, random_state=0)),
+    "Cubist": ("cubist", lambda: Cubist(random_state=0)),
+    "Cubist (20 committees, 5 neighbours)": ("cubist", lambda: Cubist(random_state=0, n_committees=20, neighbors=5)),
+    "pyoperon": ("pyoperon", lambda: SymbolicRegressor(n_threads=1, random_state=0)),
+    "least squares": ("scikit-learn", LinearRegression),
+    "M5P": (None, M5P),
+}
+# Fits or predictions that can take minutes, and the program that pip does not install.
+ONLY_WHEN_NAMED = ["EBM", "APLR", "Cubist (20 committees, 5 neighbours)", "pyoperon", "M5P"]
