@@ -232,3 +232,20 @@ def test_the_model_can_be_taken_elsewhere():
     assert "SELECT" in fitted.to_sql("data").upper()
     source, header = fitted.to_c("model")
     assert "model_predict" in source and "model_predict" in header
+
+
+def test_rows_of_eval_set_choose_and_do_not_enter():
+    X, y = stepped(600)
+    judges, observed = stepped(300, seed=5)
+    fitted = LocalLinearTreeRegressor(validity="crisp").fit(X, y, eval_set=(judges, observed))
+    predicted = fitted.predict(judges)
+    rmse = np.sqrt(np.mean((predicted - observed) ** 2))
+    assert fitted.summary_["partitions"][0]["cv_rmse"] == pytest.approx(rmse, rel=1e-9)
+    again = LocalLinearTreeRegressor(validity="crisp").fit(X, y, eval_set=[(judges, observed + 1e-9)])
+    nodes = [model.model_.to_dict()["partitions"][0]["nodes"] for model in (fitted, again)]
+    assert nodes[0] == nodes[1]
+    assert 0.85 < np.mean((lambda ends: (ends[:, 0] <= observed) & (observed <= ends[:, 1]))(fitted.predict_interval(judges))) < 0.95
+    with pytest.raises(ValueError, match="groups"):
+        LocalLinearTreeRegressor().fit(X, y, groups=np.arange(600) // 10, eval_set=(judges, observed))
+    with pytest.raises(ValueError, match="3 features"):
+        LocalLinearTreeRegressor().fit(X, y, eval_set=(judges[:, :3], observed))

@@ -130,14 +130,15 @@ class Fit {
 std::unique_ptr<Fit> fit_table(const Array& inputs, const Array& outputs, const Options& options,
                                std::vector<std::string> input_names, std::vector<std::string> output_names,
                                std::vector<std::vector<std::string>> levels, const std::optional<Vector>& weights,
-                               const std::optional<Vector>& groups, bool may_have_codes,
-                               std::optional<double> readable_loss, const nb::object& report) {
+                               const std::optional<Vector>& groups, std::vector<Eigen::Index> held_out,
+                               bool may_have_codes, std::optional<double> readable_loss, const nb::object& report) {
   TrainingData data{.inputs = rows_of(inputs), .outputs = rows_of(outputs)};
   if (weights) data.weights = vector_of(*weights);
   if (groups) {
     const Eigen::VectorXd labels = vector_of(*groups);
     data.groups.assign(labels.begin(), labels.end());
   }
+  data.held_out = std::move(held_out);
   data.levels = std::move(levels);
   data.may_have_codes = may_have_codes;
   data.input_names = std::move(input_names);
@@ -214,8 +215,8 @@ void add_fitting(nb::module_& module) {
       .def("document", &Fit::document, nb::arg("data"));
   module.def("fit", &fit_table, nb::arg("inputs"), nb::arg("outputs"), nb::arg("options"), nb::kw_only(),
              nb::arg("input_names"), nb::arg("output_names"), nb::arg("levels"), nb::arg("weights") = nb::none(),
-             nb::arg("groups") = nb::none(), nb::arg("may_have_codes") = true, nb::arg("readable_loss") = nb::none(),
-             nb::arg("report") = nb::none());
+             nb::arg("groups") = nb::none(), nb::arg("held_out") = std::vector<Eigen::Index>(),
+             nb::arg("may_have_codes") = true, nb::arg("readable_loss") = nb::none(), nb::arg("report") = nb::none());
   module.def("accidental_inputs", &accidental, nb::arg("inputs"), nb::arg("levels"));
   module.def("dominant_rows", &dominant, nb::arg("output"));
   add_stream(module);

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from llmt._results import Result, axes_of, html_table, names, number
-from llmt._tables import columns_of, records
+from llmt._columns import columns_of, records
 
 
 @dataclass(frozen=True)

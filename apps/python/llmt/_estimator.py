@@ -164,11 +164,20 @@ class LocalLinearTreeRegressor(Views, RegressorMixin, BaseEstimator):
         self._inputs = _names_of(table)
         self._outputs = names or _target_names(self.n_outputs_)
         self._levels = table.levels
+        held_out: list[int] = []
+        if eval_set is not None:
+            if groups is not None:
+                raise ValueError("groups deal folds, and eval_set takes their place: give one of them")
+            values, judged = self._evaluation(eval_set, table, outputs)
+            held_out = list(range(rows, rows + len(judged)))
+            table = Table(np.vstack([table.values, values]), table.names, table.levels, table.unknown)
+            outputs = np.vstack([outputs, judged])
+            weights = None if weights is None else np.concatenate([weights, np.ones(len(judged))])
         meant = {str(name) for name in self.categorical_features}
         _advice.warn_of_accidental_inputs(table, meant, stacklevel=3)
         _advice.check_targets(outputs, self._outputs, self.loss != "squared", stacklevel=4)
         options = self._options(table)
-        if not isinstance(self.cv, (int, np.integer)):
+        if not isinstance(self.cv, (int, np.integer)) and not held_out:
             options["folds"], labels = _given_folds(self.cv, X, y, groups, rows)
         with Bar() as bar:
             fitted = _core.fit(
@@ -180,6 +189,7 @@ class LocalLinearTreeRegressor(Views, RegressorMixin, BaseEstimator):
                 levels=table.levels,
                 weights=weights,
                 groups=labels,
+                held_out=held_out,
                 may_have_codes=bool(self.integer_codes),
                 readable_loss=self._readable_loss(),
                 report=bar,
@@ -193,9 +203,9 @@ class LocalLinearTreeRegressor(Views, RegressorMixin, BaseEstimator):
         self.summary_ = json.loads(fitted.summary("table"))
         self._is_readable = readable is not None
         self._mean = mean_baseline(outputs, fitted.held_out(), weights)
-        self._sample = _spread(table.values, 500)
+        self._sample = _spread(table.values[:rows], 500)
         self._fit = fitted
-        self._stream = None
+        self._stream: StreamModel | None = None
         return self
 
     def partial_fit(self, X: Any, y: Any, sample_weight: Any = None) -> "LocalLinearTreeRegressor":
@@ -204,8 +214,8 @@ class LocalLinearTreeRegressor(Views, RegressorMixin, BaseEstimator):
         The tree is grown by a stream's rules (docs/algorithms), not by `fit`; a call after `fit` starts anew. Inputs
         are numbers. Parameters that are not for streams are not used.
         """
-        goes_on = getattr(self, "_stream", None) is not None
-        if goes_on:
+        stream: StreamModel | None = getattr(self, "_stream", None)
+        if stream is not None:
             table = read_table(X, levels=self._levels, fitted_names=self._fitted_names())
         else:
             table = read_table(X)
@@ -214,7 +224,7 @@ class LocalLinearTreeRegressor(Views, RegressorMixin, BaseEstimator):
         for name, levels in zip(_names_of(table), table.levels, strict=True):
             if levels:
                 raise ValueError(f'column "{name}" has words; partial_fit learns from numbers')
-        if not goes_on:
+        if stream is None:
             self._remember_columns(table)
             self._is_flat = outputs.ndim == 1
             self.n_outputs_ = 1 if outputs.ndim == 1 else outputs.shape[1]
@@ -225,13 +235,13 @@ class LocalLinearTreeRegressor(Views, RegressorMixin, BaseEstimator):
                 "max_leaves": _count("max_leaves", self.max_leaves),
                 "min_leaf_samples": _count("min_samples_leaf", self.min_samples_leaf),
             }
-            self._stream = StreamModel(self.n_features_in_, self.n_outputs_, options)
+            stream = self._stream = StreamModel(self.n_features_in_, self.n_outputs_, options)
         outputs = outputs.reshape(len(outputs), -1)
         if outputs.shape[1] != self.n_outputs_:
             raise ValueError(f"y has {outputs.shape[1]} targets, the rows before had {self.n_outputs_}")
-        self._stream.handle.add(table.values, outputs, _weights_of(sample_weight, len(outputs)))
-        self.model_ = Model(self._stream.handle.model(self._inputs, self._outputs))
-        self.summary_ = {"rows": self._stream.handle.rows(), "rmse": self._stream.handle.prequential_rmse()}
+        stream.handle.add(table.values, outputs, _weights_of(sample_weight, len(outputs)))
+        self.model_ = Model(stream.handle.model(self._inputs, self._outputs))
+        self.summary_ = {"rows": stream.handle.rows(), "rmse": stream.handle.prequential_rmse()}
         self._sample = _spread(table.values, 500)
         self._fit = self._mean = None
         self._is_readable = False
@@ -289,7 +299,8 @@ class LocalLinearTreeRegressor(Views, RegressorMixin, BaseEstimator):
         estimator.feature_names_in_ = np.asarray(estimator._inputs, dtype=object)
         estimator.n_outputs_ = len(estimator._outputs)
         estimator._is_flat = estimator.n_outputs_ == 1
-        estimator._fit = estimator._stream = estimator._mean = None
+        estimator._fit = estimator._mean = None
+        estimator._stream = None
         estimator._is_readable = False
         estimator._sample = np.array([[column["centre"] for column in columns]])
         estimator.summary_ = {}
@@ -311,6 +322,21 @@ class LocalLinearTreeRegressor(Views, RegressorMixin, BaseEstimator):
         tags.input_tags.string = True
         tags.target_tags.multi_output = True
         return tags
+
+    def _evaluation(self, given: Any, table: Table, outputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Inputs and targets of an eval_set, read as the training rows were."""
+        if len(given) == 1 and len(given[0]) == 2:  # a list of one pair, as boosters take it
+            given = given[0]
+        if len(given) != 2:
+            raise ValueError("eval_set must be a pair (X, y)")
+        X, y = given
+        rows = read_table(X, levels=table.levels, fitted_names=table.names, name="eval_set[0]").values
+        judged, _ = read_targets(y)
+        _check_rows(len(rows), len(judged))
+        judged = judged.reshape(len(judged), -1)
+        if judged.shape[1] != outputs.shape[1]:
+            raise ValueError(f"eval_set has {judged.shape[1]} targets, y has {outputs.shape[1]}")
+        return rows, judged
 
     def _model(self) -> Model:
         if not hasattr(self, "model_"):
@@ -365,7 +391,7 @@ class LocalLinearTreeRegressor(Views, RegressorMixin, BaseEstimator):
             "terms": self.local_models,
             "sparse": self.sparse,
             "loss": self.loss,
-            "folds": _count("cv", self.cv) if isinstance(self.cv, (int, np.integer)) else 0,
+            "folds": _count("cv", self.cv) if isinstance(self.cv, (int, np.integer)) else 5,
             "contiguous": bool(self.contiguous),
             "seed": self._seed(),
             "choose_inputs": bool(self.select_features),

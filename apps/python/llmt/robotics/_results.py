@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from llmt._results import Result, axes_of, html_table
-from llmt._tables import frame_of, records
+from llmt._columns import frame_of, records
 from llmt.robotics._robot import Robot
 
 
