@@ -179,6 +179,13 @@ TEST(Counts, AreRepeatedRowsOfGroups) {
   expect_same_bytes(data, Counts(rows, 2), {.max_leaves = 6});
 }
 
+TEST(Counts, AreRepeatedRowsWhereTheCallerHoldsRowsOut) {
+  llmt::TrainingData data = of_one_output(table(rows, 16));
+  for (Eigen::Index i = 2; i < rows; i += 4) data.held_out.push_back(i);
+  expect_same_bytes(data, random_counts(rows, 17), {.max_leaves = 6});
+  expect_same_bytes(data, mostly_one(rows), {.max_leaves = 6});
+}
+
 // The rows that a fold holds out, and the importance that leaves inputs out, are of the rows as they count.
 TEST(Counts, AreRepeatedRowsWithUselessInputsAndCodes) {
   llmt::TrainingData data = of_one_output(table(rows, 8));
