@@ -198,7 +198,9 @@ KeptRows keep(const GivenRows& given, const FoldOptions& folds) {
   const bool all = std::ssize(rows) == count && std::ranges::adjacent_find(rows) == rows.end();
   KeptRows kept{.inputs = all ? given.inputs : shared(given.inputs.values(rows, Eigen::all)),
                 .outputs = all ? given.outputs : shared(given.outputs.values(rows, Eigen::all)),
-                .weights = all ? weights : scaled_weights(weights(without.left), std::ssize(rows)),
+                .weights = all && std::ssize(counted) == count
+                               ? weights
+                               : scaled_weights(weights(without.left), std::ssize(rows)),
                 .loss_weights = values_at(given.loss_weights, rows),
                 .has_repeats = equal.are_repeats,
                 .is_fold_given = !given.held_out.empty()};

@@ -158,7 +158,9 @@ TEST(Counts, AreRepeatedRowsForEveryOption) {
     expect_same_bytes(is_shared ? data : of_one_output(data), random_counts(rows, 2), each.options);
     expect_same_bytes(is_shared ? data : of_one_output(data), mostly_one(rows), each.options);
   }
-  expect_same_bytes(data, random_counts(rows, 3), {.max_leaves = 6});
+  Counts of_all_rows = random_counts(rows, 3);
+  for (int& count : of_all_rows) ++count;
+  expect_same_bytes(data, of_all_rows, {.max_leaves = 6});
 }
 
 TEST(Counts, AreRepeatedRowsInTablesOfFewValues) {
@@ -175,6 +177,13 @@ TEST(Counts, AreRepeatedRowsOfGroups) {
   for (Eigen::Index i = 0; i < rows; ++i) data.groups.push_back(static_cast<double>(i % 50));
   expect_same_bytes(data, random_counts(rows, 7), {.max_leaves = 6});
   expect_same_bytes(data, Counts(rows, 2), {.max_leaves = 6});
+}
+
+TEST(Counts, AreRepeatedRowsWhereTheCallerHoldsRowsOut) {
+  llmt::TrainingData data = of_one_output(table(rows, 16));
+  for (Eigen::Index i = 2; i < rows; i += 4) data.held_out.push_back(i);
+  expect_same_bytes(data, random_counts(rows, 17), {.max_leaves = 6});
+  expect_same_bytes(data, mostly_one(rows), {.max_leaves = 6});
 }
 
 // The rows that a fold holds out, and the importance that leaves inputs out, are of the rows as they count.
