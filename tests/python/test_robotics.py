@@ -289,6 +289,12 @@ def test_what_is_wrong_with_a_description_is_named(arm):
         robotics.robot(1.0)
 
 
+def test_messages_name_no_function_of_cpp(arm, measured):
+    with pytest.raises(ValueError, match="was not calibrated") as refused:
+        robotics.check(arm, measured)
+    assert "::" not in str(refused.value) and "<" not in str(refused.value)
+
+
 def test_joints_in_degrees_are_joints(arm, measured):
     degrees = measured.rename(columns={name: name.replace("_rad", "_deg") for name in JOINTS})
     for name in JOINTS:

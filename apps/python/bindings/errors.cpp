@@ -57,9 +57,8 @@ void translate(const std::exception_ptr& thrown, void* /*payload*/) {
 }  // namespace
 
 std::string in_words_of_python(std::string_view message) {
-  const std::size_t end = message.find(": ");
-  if (message.starts_with("llmt::") && end != std::string_view::npos) message.remove_prefix(end + 2);
-  return with_arguments(with_rows(std::string(message)));
+  static const std::regex function("llmt::[A-Za-z_:]+: ");
+  return with_arguments(with_rows(std::regex_replace(std::string(message), function, "")));
 }
 
 void register_errors() { nanobind::register_exception_translator(translate); }

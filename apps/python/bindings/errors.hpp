@@ -7,7 +7,7 @@
 
 namespace llmt::python {
 
-/// Without the C++ function that a message begins with; `same_session` in place of the option --same-session; and of a
+/// Without the C++ functions that messages name; `same_session` in place of the option --same-session; and of a
 /// table that was given in memory, whose name is "<measured>", `measured, row 5` in place of the line 7. Rows are
 /// counted from 0.
 std::string in_words_of_python(std::string_view message);

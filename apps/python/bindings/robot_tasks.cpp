@@ -51,12 +51,14 @@ class Outcome {
 
 std::vector<double> numbers_of(const Eigen::VectorXd& values) { return {values.begin(), values.end()}; }
 
+void require_page(bool wanted) {
+  if (!wanted || !report::empty_page().empty()) return;
+  throw std::runtime_error("report: this package was built without the page of the reports");
+}
+
 // The HTML file of a document, or nothing where none is wanted.
 nb::object page_of(bool wanted, const std::function<report::Document()>& document) {
   if (!wanted) return nb::none();
-  if (report::empty_page().empty()) {
-    throw std::runtime_error("report: this package was built without the page of the reports");
-  }
   const report::Document made = document();
   const std::string origin = fmt::format("{}. Made by LLMT {}.", made.title, LLMT_VERSION);
   return nb::cast(report::filled_page(report::empty_page(), made, origin));
@@ -79,6 +81,7 @@ nb::dict calibrate(const Arm& arm, const Source& measured, const std::optional<S
                    const std::vector<std::string>& fixed, const std::vector<std::string>& only,
                    const std::map<std::string, double>& priors, int max_leaves, Eigen::Index min_leaf,
                    std::uint64_t seed, int threads, bool quality, bool page, const nb::object& report) {
+  require_page(page);
   report::CalibrationTask task{.robot_file = arm.name,
                                .data_file = measured.first,
                                .test_file = test ? test->first : "",
@@ -132,6 +135,7 @@ std::vector<robotics::EffectType> catalogue_of(const std::optional<Source>& sour
 nb::dict discover(const Arm& arm, const Source& measured, const std::optional<Source>& test, const Reading& reading,
                   double held_out, int folds, bool contiguous, const std::optional<Source>& catalogue,
                   double mass_uncertainty, std::uint64_t seed, bool page, const nb::object& report) {
+  require_page(page);
   report::DiscoveryTask task{.robot_file = arm.name, .folds = folds, .contiguous = contiguous};
   task.options.catalogue = catalogue_of(catalogue);
   task.options.held_out_share = held_out;
