@@ -97,7 +97,7 @@ REGRESSORS = {
     "LightGBM": ("lightgbm", lambda: LGBMRegressor(n_jobs=1, random_state=0, verbose=-1)),
     "LightGBM (300 rounds)": ("lightgbm", lambda: LGBMRegressor(
         n_jobs=1, random_state=0, verbose=-1, n_estimators=300)),
-    "LightGBM linear_tree": ("lightgbm", lambda: LGBMRegressor(
+    "LightGBM (linear_tree)": ("lightgbm", lambda: LGBMRegressor(
         n_jobs=1, random_state=0, verbose=-1, linear_tree=True)),
     "XGBoost": ("xgboost", lambda: XGBRegressor(n_jobs=1, random_state=0)),
     "XGBoost (300 rounds, rate 0.1)": ("xgboost", lambda: XGBRegressor(

@@ -275,6 +275,7 @@ def print_tables(results):
 
 
 def main():
+    sys.dont_write_bytecode = True  # no __pycache__ among the sources
     options = arguments()
     if options.install:
         return install()
