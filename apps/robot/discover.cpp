@@ -139,7 +139,7 @@ void discover_command(DiscoverArguments arguments) {
   print(fmt::format("{}: {} of {}, {} {} set aside\n{}\n", arguments.data, report::counts_of(data), robot.chain.name,
                     test ? 0 : found.held_out.poses, data.poses.observations.empty() ? "of them" : "poses",
                     use_of_orientations(data)));
-  print(report::discovery_page(found, data.lines));
+  print(report::discovery_page(found, data.lines, output_width()));
   print(report::next_poses_text(next));
   if (!folds.is_null()) {
     print(fmt::format("{} {} folds, everything found anew in each: {:.4f} -> {:.4f} mm mean on the poses left out\n",
