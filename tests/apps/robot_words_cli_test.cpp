@@ -121,7 +121,7 @@ TEST(RobotWords, LimitsHaveAUnitAndFewDigits) {
   text.replace(row, text.find(',', row) - row, "9.5");
   folder.write("d.csv", text);
   const Outcome run = folder.run(robot_program + " calibrate arm.yaml d.csv --folds 0");
-  EXPECT_NE(run.out.find("1 of 150 values of joint1 lies outside its limits, -166.2 to 166.2 deg (-166.3 to 544.3 deg "
+  EXPECT_NE(run.out.find("3 of 150 values of joint1 lie outside its limits, -166.2 to 166.2 deg (-166.3 to 544.3 deg "
                          "measured)"),
             std::string::npos)
       << run.out;
