@@ -96,6 +96,9 @@ std::vector<discovery::ModelTerm> parse_terms(const std::string& text, const std
                                               const discovery::Inputs& inputs, const std::string& output,
                                               const discovery::Rows& rows, const std::vector<std::string>& taken) {
   constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
+  if (text.starts_with("\xFF\xFE") || text.starts_with("\xFE\xFF")) {
+    throw std::runtime_error(fmt::format("{}: this is UTF-16, UTF-8 is needed", file));
+  }
   std::vector<discovery::ModelTerm> terms;
   std::istringstream lines(text.substr(text.starts_with(byte_order_mark) ? byte_order_mark.size() : 0));
   std::string line;

@@ -68,7 +68,7 @@ void discover_command(DiscoverArguments arguments) {
     print_json(report::discovery_run_json(run));
     return;
   }
-  print(report::discovery_text(run, arguments.data));
+  print(report::discovery_text(run, arguments.data, output_width()));
   if (!written.names.empty()) print(fmt::format("Improved description: {}\n", fmt::join(written.names, ", ")));
   print(written.beside_urdf);
   print(reports);

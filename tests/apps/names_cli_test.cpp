@@ -36,6 +36,11 @@ TEST(Names, WithACommaAreGivenInQuotes) {
   EXPECT_EQ(folder.run(llmt_program + " fit d.csv --cv 2 -t b --weight " + word("load, kg")).exit_code, 0);
   const Outcome split = folder.run(llmt_program + " fit d.csv -t " + word("consumption, kWh/h"));
   EXPECT_EQ(split.exit_code, 1);
+  EXPECT_NE(
+      split.err.find("there is no column \"consumption\" (a name with a comma is given in its quotes: '\"consumption, "
+                     "kWh/h\"')"),
+      std::string::npos)
+      << split.err;
   EXPECT_NE(split.err.find("the columns are \"load, kg\", b, \"consumption, kWh/h\""), std::string::npos) << split.err;
   EXPECT_EQ(llmt::apps::names_in("\"a, \"\"b\"\"\",c,\"d\"x,e\"f,\"g"),
             (std::vector<std::string>{"a, \"b\"", "c", "dx", "e\"f", "\"g"}));
@@ -69,6 +74,16 @@ TEST(Names, MarksOfDirectionAndLineBreaksAreShownAsBytes) {
   folder.write("d.csv", table("a\nllmt: all is well", "y"));
   const Outcome outcome = folder.run(llmt_program + " fit d.csv -t z");
   EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
+}
+
+TEST(Names, OfTermsInUtf16AreRefusedAsThat) {
+  const Folder folder;
+  folder.write("d.csv", table("a", "y"));
+  for (const std::string mark : {"\xFF\xFE", "\xFE\xFF"}) {
+    folder.write("t.txt", mark + std::string("u\0=\0a\0", 6));
+    EXPECT_EQ(folder.run(llmt_program + " discover d.csv d.csv -t y --terms t.txt").err,
+              "llmt: t.txt: this is UTF-16, UTF-8 is needed\n");
+  }
 }
 
 }  // namespace

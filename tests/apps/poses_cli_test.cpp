@@ -72,4 +72,17 @@ TEST(PosesProgram, RefusesWhatCannotBe) {
   says("--from one.csv", 2, "there are 1 candidates");
 }
 
+TEST(PosesProgram, ColumnsHaveTheNamesOfTheJoints) {
+  const Folder folder;
+  ASSERT_EQ(poses(folder, "--count 9 -o poses.csv").exit_code, 0);
+  EXPECT_TRUE(llmt::read_file(folder.file("poses.csv"))
+                  .starts_with("joint1_deg,joint2_deg,joint3_deg,joint4_deg,joint5_deg,joint6_deg\n"));
+  // A name that means something else in such a table.
+  std::string text = llmt::read_file(sample_arm);
+  for (std::size_t at = 0; (at = text.find("joint2", at)) != std::string::npos;) text.replace(at, 6, "x");
+  folder.write("x.yaml", text);
+  const Outcome run = folder.run(robot_program + " poses x.yaml --count 9");
+  EXPECT_TRUE(run.out.starts_with("q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n")) << run.out << run.err;
+}
+
 }  // namespace

@@ -13,6 +13,8 @@
 #include "report/fit/fit_summary.hpp"
 #include "report/fit/of_comparison.hpp"
 #include "report/fit/of_fit.hpp"
+#include "report/model/leaves.hpp"
+#include "report/model/rule_text.hpp"
 #include "shared/plot.hpp"
 
 namespace {
@@ -181,6 +183,51 @@ TEST(ReportFiles, ThePageIsWholeOrTheProgramSaysHowToGetIt) {
   }
   for (const char* mark : {"{{title}}", "{{report}}", "/*style*/", "/*script*/", "<!--licences-->"}) {
     EXPECT_EQ(page.find(mark), std::string::npos) << mark;
+  }
+}
+
+TEST(Report, ListsOfNamesEnd) {
+  std::vector<std::string> names;
+  for (int k = 0; k < 20; ++k) names.push_back("x" + std::to_string(k));
+  EXPECT_TRUE(first_names(names).ends_with("x18, x19"));
+  names.insert(names.end(), 480, "more");
+  EXPECT_TRUE(first_names(names).ends_with("x18, x19 and 480 more")) << first_names(names);
+}
+
+TEST(Report, OneFoldHasNoSpread) {
+  EXPECT_EQ(spread_text(0.0, 1), "-");
+  EXPECT_EQ(spread_text(0.0123, 5), "0.012");
+}
+
+TEST(Report, CategoriesAreQuotedAndTheShorterListIsNamed) {
+  const llmt::InputColumn input{.name = "maker",
+                                .low = 0.0,
+                                .high = 4.0,
+                                .centre = 0.0,
+                                .levels = {"Miller, Ltd", "the \"North\"", "c", "d", "e"}};
+  EXPECT_EQ(levels_text(input, {0, 1, 2}), "maker in {\"Miller, Ltd\", \"the \"\"North\"\"\", c}");
+  EXPECT_EQ(levels_text(input, {1, 2, 3, 4}), "maker not in {\"Miller, Ltd\"}");
+  EXPECT_EQ(levels_text(input, {0, 1, 2, 3, 4}).substr(0, 10), "maker in {");
+}
+
+// Categories stand below the table, in lines: a column of them would push the numbers far to the right.
+TEST(Report, LongListsOfCategoriesDoNotWidenTheTable) {
+  llmt::TrainingData data;
+  llmt::Random random(3);
+  data.inputs = Eigen::MatrixXd(400, 2);
+  data.outputs = Eigen::MatrixXd(400, 1);
+  std::vector<std::string> levels;
+  for (int k = 0; k < 40; ++k) levels.push_back("maker number " + std::to_string(k));
+  for (Eigen::Index i = 0; i < 400; ++i) {
+    data.inputs.row(i) << random.uniform(), static_cast<double>(i % 40);
+    data.outputs(i, 0) = data.inputs(i, 0);
+  }
+  data.categorical_inputs = {1};
+  const llmt::Model model = llmt::fit(data, {.max_leaves = 1}).model.named({"a", "maker"}, {"y"}, {{}, levels});
+  const std::string text = leaves_text(model, "m.json");
+  EXPECT_NE(text.find("\nmaker: 40 categories: maker number 0, maker number 1, "), std::string::npos) << text;
+  for (std::size_t begin = 0; begin < text.find("y: 1 leaf"); begin = text.find('\n', begin) + 1) {
+    EXPECT_LE(text.find('\n', begin) - begin, 100U) << text;
   }
 }
 

@@ -1,9 +1,11 @@
 // Reports of the robot layer: what the documents say of simulated arms, where the truth is known.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <fstream>
 #include <optional>
 #include <set>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -86,6 +88,24 @@ TEST(RobotReport, CoverageCountsEveryPoseOnce) {
   const rb::Measurements data = measured(robot, 50);
   const Map map = coverage(robot.chain, data.poses.joints);
   for (Eigen::Index j = 0; j < map.z.rows(); ++j) EXPECT_NEAR(map.z.row(j).sum(), 100.0, 1e-9);
+}
+
+// On a terminal of 80 columns lines are full, and none is broken a second time.
+TEST(RobotReport, ThePageIsWrappedOnceToItsWidth) {
+  const rb::Discovery found = rb::discover(planar(false), measured(planar(true)));
+  for (const std::size_t width : {60U, 80U, 100U, 300U}) {
+    const std::string page = discovery_page(found, {}, width);
+    const std::size_t most = std::min<std::size_t>(width, 100);
+    std::vector<std::string> lines;
+    std::istringstream text(page.substr(0, page.find("\nDetails")));
+    for (std::string line; std::getline(text, line);) lines.push_back(line);
+    for (std::size_t k = 0; k < lines.size(); ++k) {
+      EXPECT_LE(columns_of(lines[k]), most) << page;
+      if (k + 1 == lines.size() || !lines[k + 1].starts_with("    ")) continue;
+      const std::string next = lines[k + 1].substr(lines[k + 1].find_first_not_of(' '));
+      EXPECT_GT(columns_of(lines[k]) + 1 + next.find(' '), most) << page;
+    }
+  }
 }
 
 // The last cells of the table of answers in docs/discovery.md, without their backticks.

@@ -110,4 +110,28 @@ TEST(RobotWords, DiscoverWarnsOfMeasurementsThatTheDescriptionCannotMean) {
   EXPECT_EQ(own.err, "");
 }
 
+TEST(RobotWords, LimitsHaveAUnitAndFewDigits) {
+  const Folder folder;
+  std::string robot = llmt::read_file(sample_arm);
+  const std::string limits = "limits_deg: [-170, 170]";
+  robot.replace(robot.find(limits), limits.size(), "limits_deg: [-166.15776058793872, 166.15776058793872]");
+  folder.write("arm.yaml", robot);
+  std::string text = llmt::read_file(sample_measured);
+  const std::size_t row = text.find('\n') + 1;
+  text.replace(row, text.find(',', row) - row, "9.5");
+  folder.write("d.csv", text);
+  const Outcome run = folder.run(robot_program + " calibrate arm.yaml d.csv --folds 0");
+  EXPECT_NE(run.out.find("3 of 150 values of joint1 lie outside its limits, -166.2 to 166.2 deg (-166.3 to 544.3 deg "
+                         "measured)"),
+            std::string::npos)
+      << run.out;
+}
+
+TEST(RobotWords, DescriptionsInUtf16AreRefusedAsThat) {
+  const Folder folder;
+  folder.write("arm.yaml", std::string("\xFF\xFEn\0a\0", 6));
+  EXPECT_EQ(folder.run(robot_program + " simulate arm.yaml").err,
+            "llmt-robot: arm.yaml: this is UTF-16, UTF-8 is needed\n");
+}
+
 }  // namespace

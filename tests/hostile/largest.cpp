@@ -53,7 +53,6 @@ void ask_largest(List& list, const std::string& program, const std::string& robo
   measure(list, "mechanism of 1000 parameters and 200 coordinates",
           {robot_program, "mechanism", "large_mechanism.yaml", "--simulate", "1", "-o", "large.csv"});
 
-  // A model of 100 MB, a tenth of what is permitted; time and memory grow with its bytes.
   std::string table = "a,b,kind,y\n";
   for (int i = 0; i < 40000; ++i)
     table += fmt::format("{},{},c{},{}\n", (i * 7919) % 40009, (i * 104729) % 39989, i % 10000, i % 97);
@@ -61,10 +60,18 @@ void ask_largest(List& list, const std::string& program, const std::string& robo
   measure(list, "table of 40 000 rows, 10 000 categories: fit",
           {program, "fit", "large.csv", "-t", "y", "--cv", "0", "--max-leaves", "20", "-o", "large.json"});
   measure(list, "its model: predict", {program, "predict", "large.json", "large.csv", "-o", "out.csv"});
-  std::string numbers = "{\"format\":[";
-  for (int k = 0; k < 50000000; ++k) numbers += "1,";
-  write("large.json", numbers + "1]}");
-  measure(list, "JSON of 100 MB of numbers, no model", {program, "inspect", "large.json"});
+  // As many bytes as a model may have, in numbers as models have them; and as many values, each an empty text.
+  constexpr std::size_t model_bytes = std::size_t{1} << 28;
+  constexpr std::size_t model_values = std::size_t{1} << 24;
+  const auto list_of = [](const std::string& value, std::size_t count) {
+    std::string text = "{\"format\":[";
+    for (std::size_t k = 0; k < count; ++k) text += value + ",";
+    return text + value + "]}";
+  };
+  write("large.json", padded(list_of("\n 0.12345678901234567", model_bytes / 22 - 2), model_bytes, ' '));
+  measure(list, "JSON of 256 MiB of numbers, no model", {program, "inspect", "large.json"});
+  write("large.json", list_of("\"\"", model_values - 3));
+  measure(list, "JSON of 16 777 216 empty texts, no model", {program, "inspect", "large.json"});
 }
 
 }  // namespace hostile

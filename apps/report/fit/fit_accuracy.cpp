@@ -131,7 +131,7 @@ Json kinds_table(const PartitionSummary& partition, const std::optional<Readable
             .header = {"model", "equations", "RMSE held-out", "spread of folds"},
             .rows = {}};
   const auto add = [&](const std::string& name, Eigen::Index leaves, double rmse, double spread) {
-    grid.rows.push_back({name, std::to_string(leaves), number(rmse), number(spread, 2)});
+    grid.rows.push_back({name, std::to_string(leaves), number(rmse), spread_text(spread, partition.cv_folds)});
   };
   std::vector<CandidateError> shown = best_of_kinds(partition);
   std::ranges::stable_sort(shown, std::greater{}, &CandidateError::rmse);

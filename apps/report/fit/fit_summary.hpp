@@ -27,6 +27,9 @@ std::vector<Eigen::Index> rows_left_out(const Eigen::VectorXd& loss_weights, con
 /// the rows left out; `rows`: of the table.
 std::string left_out_by_loss(std::vector<Eigen::Index> lines, Eigen::Index rows);
 
+/// The standard deviation of an error over the folds; "-" where only one was held out.
+std::string spread_text(double spread, Eigen::Index folds);
+
 /// The given rows, the first one below the header being 1.
 std::vector<Eigen::Index> counted_from_one(std::vector<Eigen::Index> rows);
 

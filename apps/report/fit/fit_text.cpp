@@ -67,7 +67,7 @@ std::string left_out_text(const FitResult& result) {
         "Inputs left out{}: {} of {} ({}); in a quick comparison held-out RMSE was {} with all inputs, {} without "
         "these.\n",
         target, partition.left_out.size(), result.model.num_inputs(),
-        fmt::join(names_of(result.model, partition.left_out), ", "), number(steps.front().rmse), number(chosen->rmse));
+        first_names(names_of(result.model, partition.left_out)), number(steps.front().rmse), number(chosen->rmse));
   }
   return text;
 }
@@ -103,12 +103,14 @@ std::string range_text(const Model& model, const PartitionSummary& summary, cons
 std::string search_text(const SearchSummary& search) {
   if (search.binned_nodes == 0) return "";
   return fmt::format(
-      "Splits searched by bins in {} nodes, exactly in {} small ones. {}\n", search.binned_nodes, search.exact_nodes,
+      "Thresholds of splits: in {} node{} of many rows the best one between groups of neighbouring values, in {} small "
+      "one{} the best of all. {}\n",
+      search.binned_nodes, search.binned_nodes == 1 ? "" : "s", search.exact_nodes, search.exact_nodes == 1 ? "" : "s",
       search.largest_excess > 0.0
-          ? fmt::format("A better split may exist by at most {} % of a node's residual sum of squares; --search exact "
-                        "looks for it.",
+          ? fmt::format("A threshold within a group would lower a node's sum of squared errors by at most {} % more; "
+                        "--search exact looks for it.",
                         number(100.0 * search.largest_excess, 2))
-          : "There are no better ones.");
+          : "No threshold within a group is better.");
 }
 
 std::string data_text(const FitRun& run, const FitResult& result) {
@@ -122,7 +124,7 @@ std::string data_text(const FitRun& run, const FitResult& result) {
     }
   }
   std::string text = fmt::format("{}: {} rows, {} input{}: {}\n", run.data, result.summary.samples, inputs.size(),
-                                 inputs.size() == 1 ? "" : "s", fmt::join(inputs, ", "));
+                                 inputs.size() == 1 ? "" : "s", first_names(inputs));
   if (result.summary.repeats) {
     text += "Rows with equal inputs are taken for repeats of one measurement, and are held out together\n";
   }
@@ -146,7 +148,7 @@ std::string data_text(const FitRun& run, const FitResult& result) {
     }
   }
   if (!constant.empty()) {
-    text += fmt::format("Constant, so without influence: {}\n", fmt::join(constant, ", "));
+    text += fmt::format("Constant, so without influence: {}\n", first_names(constant));
   }
   return text;
 }
@@ -159,12 +161,12 @@ Table models_table(const FitResult& result) {
       const std::string& target = result.model.outputs()[partition.outputs[o]].name;
       const CandidateError& chosen = partition.chosen;
       table.add({target, kind_of(chosen.candidate), fmt::format("{}", partition.leaves), number(chosen.rmse),
-                 number(chosen.spread, 2), number(partition.train_rmse(o))});
+                 spread_text(chosen.spread, partition.cv_folds), number(partition.train_rmse(o))});
       if (o > 0) continue;
       const std::vector<CandidateError> kinds = best_of_kinds(partition);
       for (const CandidateError& other : std::span(kinds).subspan(1)) {
         table.add({"  against", kind_of(other.candidate), fmt::format("{}", other.candidate.leaves), number(other.rmse),
-                   number(other.spread, 2), ""});
+                   spread_text(other.spread, partition.cv_folds), ""});
       }
     }
   }
@@ -190,6 +192,8 @@ std::string left_out_by_loss(std::vector<Eigen::Index> lines, Eigen::Index rows)
   return text + fmt::format(" ({} {}{}); the errors below are those of the other rows\n", count == 1 ? "line" : "lines",
                             fmt::join(lines, ", "), count > lines.size() ? ", ..." : "");
 }
+
+std::string spread_text(double spread, Eigen::Index folds) { return folds > 1 ? number(spread, 2) : "-"; }
 
 std::vector<Eigen::Index> counted_from_one(std::vector<Eigen::Index> rows) {
   for (Eigen::Index& row : rows) ++row;
@@ -231,13 +235,6 @@ std::string fit_text(const FitRun& run, const FitResult& result, std::size_t wid
   text += local_models_text(run, result.summary);
   for (const PartitionSummary& partition : partitions) {
     text += search_text(partition.search);
-    // M5' drops inputs on its own; its leaves keep nothing of their parent's but what smoothing gives them.
-    if (partition.rank_deficient_leaves > 0 && !has_own_models(run.options.rule)) {
-      text += fmt::format(
-          "In {} leaves the rows did not determine every slope; such slopes are those of the leaf's parent. That does "
-          "no harm within the range of the rows.\n",
-          partition.rank_deficient_leaves);
-    }
   }
   if (!run.output.empty()) text += fmt::format("Model written to {}\n", run.output);
   return text;

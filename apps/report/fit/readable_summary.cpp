@@ -78,13 +78,14 @@ std::string readable_text(const FitResult& fitted, const ReadableResult& readabl
     const Model whole = part_of(fitted.model, p);
     const std::string& target = fitted.model.outputs()[simple.outputs.front()].name;
     table.add({target, "as chosen above", count(full.leaves), count(most_terms(whole.partitions()[0])),
-               count(expression_size(whole)), number(full.chosen.rmse), number(full.chosen.spread, 2)});
+               count(expression_size(whole)), number(full.chosen.rmse),
+               spread_text(full.chosen.spread, full.cv_folds)});
     table.add({"", "readable", count(simple.leaves), count(simple.most_terms), count(simple.size), number(simple.rmse),
-               number(simple.spread, 2)});
+               spread_text(simple.spread, full.cv_folds)});
     const CandidateError& linear = full.best_of_kind.front();
     const Model root = whole.prefix(1);
     table.add({"", "least squares", "1", count(most_terms(root.partitions()[0])), count(expression_size(root)),
-               number(linear.rmse), number(linear.spread, 2)});
+               number(linear.rmse), spread_text(linear.spread, full.cv_folds)});
     notes += note_on(simple, readable.partitions.size() > 1 ? " of " + target : "", loss);
   }
   return fmt::format("\n{}Size: operators, constants and variables of the model as an expression.\n{}",

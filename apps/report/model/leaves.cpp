@@ -6,7 +6,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <vector>
+
+#include "report/model/rule_text.hpp"
 
 namespace llmt::report {
 namespace {
@@ -44,11 +47,7 @@ std::string conditions(const Model& model, const Partition& partition, const Lea
     const InputColumn& input = model.inputs()[j];
     const std::string& name = input.name;
     if (const std::vector<int>& levels = leaf.levels[j]; !levels.empty()) {
-      std::vector<std::string> names;
-      for (const int level : levels) {
-        names.push_back(input.levels[level]);
-      }
-      parts.push_back(fmt::format("{} in {{{}}}", name, fmt::join(names, ", ")));
+      parts.push_back(levels_text(input, levels));
     }
     constexpr double any_value = std::numeric_limits<double>::max();  // a split into rows with and without a value
     if (leaf.low(j) == any_value) {
@@ -158,16 +157,21 @@ std::string leaves_text(const Model& model, const std::string& name, std::size_t
   std::string text =
       fmt::format("{}: {} input{}, {} output{}\n\n", name, model.num_inputs(), model.num_inputs() == 1 ? "" : "s",
                   model.num_outputs(), model.num_outputs() == 1 ? "" : "s");
+  constexpr std::size_t most_columns = 100;
+  constexpr std::size_t indent = 2;
+  std::string categories;
   Table inputs({"input", "smallest", "largest", "mean"});
   for (const InputColumn& input : model.inputs()) {
     if (input.is_categorical()) {
-      inputs.add(
-          {input.name, fmt::format("{} categories: {}", input.levels.size(), fmt::join(input.levels, ", ")), "", ""});
+      std::vector<int> all(input.levels.size());
+      std::iota(all.begin(), all.end(), 0);
+      categories += wrapped(fmt::format("{}: {} categories: {}\n", input.name, all.size(), quoted_levels(input, all)),
+                            std::min(width, most_columns), indent);
       continue;
     }
     inputs.add({input.name, number(input.low), number(input.high), number(input.centre)});
   }
-  text += inputs.text(width);
+  text += inputs.text(width) + categories;
   for (Eigen::Index p = 0; p < std::ssize(model.partitions()); ++p) {
     const Partition& partition = model.partitions()[p];
     for (Eigen::Index output = 0; output < std::ssize(partition.outputs); ++output) {

@@ -82,8 +82,8 @@ std::string prediction_text(const Prediction& prediction, const std::string& dat
   }
   if (const Eigen::Index rows = count_high_leverage(prediction); rows > 0) {
     text += fmt::format(
-        "; {} within the range of every input, but an unusual combination of them (leverage above 1): take "
-        "these predictions for extrapolation",
+        "; {} within the range of every input, but far from the rows that their leaf learned from (leverage above 1): "
+        "their errors may be larger",
         rows);
   }
   if (prediction.missing > 0) text += fmt::format("; {} missing values", prediction.missing);

@@ -7,6 +7,9 @@
 #include <charconv>
 #include <cmath>
 #include <limits>
+#include <numeric>
+
+#include "llmt/csv.hpp"
 
 namespace llmt::report {
 namespace {
@@ -42,12 +45,6 @@ std::string decimal_within(double value, double tolerance) {
   return with_digits(value, usual_digits);
 }
 
-std::string levels_text(const InputColumn& input, const std::vector<int>& levels) {
-  std::vector<std::string> names;
-  for (const int level : levels) names.push_back(input.levels[level]);
-  return fmt::format("{} in {{{}}}", input.name, fmt::join(names, ", "));
-}
-
 // What an oblique split compares: "0.8 x1 - 0.3 x2".
 std::string direction(const Model& model, const Node& node, double& threshold) {
   std::string text;
@@ -68,6 +65,22 @@ std::string factor(const InputColumn& input) {
 }
 
 }  // namespace
+
+std::string quoted_levels(const InputColumn& input, const std::vector<int>& levels) {
+  std::vector<std::string> names;
+  for (const int level : levels) names.push_back(csv_field(input.levels[level]));
+  return fmt::format("{}", fmt::join(names, ", "));
+}
+
+std::string levels_text(const InputColumn& input, const std::vector<int>& levels) {
+  std::vector<int> others(input.levels.size());
+  std::iota(others.begin(), others.end(), 0);
+  std::erase_if(others, [&](int level) { return std::ranges::find(levels, level) != levels.end(); });
+  constexpr std::size_t much_shorter = 4;
+  const bool by_others = !others.empty() && much_shorter * others.size() <= levels.size();
+  return fmt::format("{} {} {{{}}}", input.name, by_others ? "not in" : "in",
+                     quoted_levels(input, by_others ? others : levels));
+}
 
 std::string regressor_name(const Model& model, const Regressor& regressor) {
   const InputColumn& input = model.inputs()[regressor.input];

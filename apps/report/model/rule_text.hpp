@@ -12,6 +12,12 @@ namespace llmt::report {
 /// The number as it is in the file, up to rounding, with as few digits as say it.
 std::string decimal(double value);
 
+/// Categories, separated by commas; one with a comma or a quote stands in quotes, as in a CSV file.
+std::string quoted_levels(const InputColumn& input, const std::vector<int>& levels);
+
+/// "colour in {blue, red}"; "colour not in {green}" where at least four times as many categories are in as not.
+std::string levels_text(const InputColumn& input, const std::vector<int>& levels);
+
 /// The condition of the left or the right side of a split.
 std::string condition(const Model& model, const Node& node, bool left);
 

@@ -172,13 +172,13 @@ std::string commands_csv(const CompensationRun& run) {
   const CorrectedRobot& robot = run.robot;
   const robotics::TargetTable& table = run.table;
   const Compensation& found = run.found;
+  const std::vector<robotics::JointColumn> by_name = robotics::joint_columns(robot.robot.chain);
   std::vector<std::string> names;
   std::vector<Eigen::VectorXd> columns;
   for (std::size_t j = 0; j < robot.robot.chain.joints.size(); ++j) {
     const robotics::Joint& joint = robot.robot.chain.joints[j];
     if (joint.mimic) continue;  // it has no drive
-    const std::string unit = robotics::limit_unit(joint);
-    robotics::JointColumn column{fmt::format("q{}_{}", j + 1, unit), unit};
+    robotics::JointColumn column = by_name[j];
     if (!table.joint_columns.empty() && !table.joint_columns[j].name.empty()) column = table.joint_columns[j];
     names.push_back(robotics::csv_field(column.name));
     columns.push_back(robotics::in_unit_of(column, found.commands.joints.col(j)));

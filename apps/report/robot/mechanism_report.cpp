@@ -72,10 +72,12 @@ std::string verdict(const MechanismFacts& facts, const std::vector<MechanismFigu
                        result.residuals.size(), result.rank);
   }
   if (!facts.contradicting.empty() && !facts.robust) {
+    const bool one = facts.contradicting.size() == 1;
     return fmt::format(
-        "CONTRADICTED: {} of {} poses contradict the others, and the parameters are made to fit them, too. --robust "
-        "leaves them out.",
-        facts.contradicting.size(), facts.measured.rows());
+        "CONTRADICTED: {} of {} poses {} the others, and the parameters are made to fit {}, too. --robust leaves {} "
+        "out.",
+        facts.contradicting.size(), facts.measured.rows(), one ? "contradicts" : "contradict", one ? "it" : "them",
+        one ? "it" : "them");
   }
   if (!result.converged()) {
     return fmt::format(

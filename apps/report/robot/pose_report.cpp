@@ -103,11 +103,10 @@ robotics::Robot robot_to_measure(robotics::Robot robot, const std::vector<double
 }
 
 std::string poses_csv(const robotics::Robot& robot, const robotics::Poses& poses) {
+  const std::vector<robotics::JointColumn> columns = robotics::joint_columns(robot.chain);
   std::vector<std::string> names;
-  for (std::size_t j = 0; j < robot.chain.joints.size(); ++j) {
-    if (robot.chain.joints[j].mimic) continue;  // it has no drive
-    const bool turns = robot.chain.joints[j].type == robotics::JointType::revolute;
-    names.push_back(fmt::format("q{}_{}", j + 1, turns ? "deg" : "mm"));
+  for (std::size_t j = 0; j < columns.size(); ++j) {
+    if (!robot.chain.joints[j].mimic) names.push_back(robotics::csv_field(columns[j].name));  // a mimic has no drive
   }
   for (const auto& [name, values] : poses.covariates) {
     if (!robotics::is_move(name)) names.push_back(name);

@@ -37,14 +37,14 @@ Json stream_json(const StreamRun& run) {
 
 std::string stream_text(const StreamRun& run, std::size_t width) {
   const StreamCounts counts = run.stream.counts();
-  std::string text = fmt::format("{}: {} rows, {} inputs: {}\n", run.data, counts.rows, run.inputs.size(),
-                                 fmt::join(run.inputs, ", "));
+  std::string text =
+      fmt::format("{}: {} rows, {} inputs: {}\n", run.data, counts.rows, run.inputs.size(), first_names(run.inputs));
   if (counts.missing_values > 0) text += fmt::format("Missing values in the inputs: {}\n", counts.missing_values);
-  text += fmt::format(
-      "Learned row by row, rule rd: {} splits, {} taken back, {} alarms for changes, {} branches replaced; "
-      "{} MiB\n\n",
-      counts.splits, counts.prunes, counts.drifts, counts.replacements,
-      number(static_cast<double>(counts.bytes) / 1048576.0, 3));
+  text += fmt::format("Learned row by row, rule rd: {} splits, {} taken back; {}, {} branches replaced; {} MiB\n\n",
+                      counts.splits, counts.prunes,
+                      counts.drifts == 0 ? "no change of the data was noticed"
+                                         : fmt::format("changes of the data noticed: {}", counts.drifts),
+                      counts.replacements, number(static_cast<double>(counts.bytes) / 1048576.0, 3));
   Table table({"target", "model", "leaves", "RMSE before learning", "of the last 1000"});
   const Eigen::VectorXd all = run.stream.prequential_rmse();
   const Eigen::VectorXd recent = run.stream.recent_rmse();

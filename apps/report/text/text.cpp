@@ -1,6 +1,7 @@
 #include "report/text/text.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -182,6 +183,13 @@ std::string Table::text(std::size_t width) const {
     for (const std::vector<std::string>& row : rows_) text += row_text(row, shapes, block);
   }
   return text;
+}
+
+std::string first_names(const std::vector<std::string>& names) {
+  constexpr std::size_t most = 20;
+  const auto end = names.begin() + static_cast<std::ptrdiff_t>(std::min(most, names.size()));
+  const std::string more = names.size() > most ? fmt::format(" and {} more", names.size() - most) : "";
+  return fmt::format("{}{}", fmt::join(names.begin(), end, ", "), more);
 }
 
 std::string number(double value, int digits) {

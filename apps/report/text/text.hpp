@@ -33,6 +33,9 @@ class Table {
   std::vector<std::vector<std::string>> rows_;
 };
 
+/// A list of names for people: "a, b, c", or the first twenty "and 480 more".
+std::string first_names(const std::vector<std::string>& names);
+
 /// A number for people: `digits` significant digits, without an exponent where that is short.
 std::string number(double value, int digits = 4);
 

@@ -22,6 +22,9 @@ struct FileLimit {
 /// Of a file that people write: a robot description, a catalogue, terms. 16 MiB.
 inline constexpr FileLimit description_limit{.bytes = std::uintmax_t{1} << 24};
 
+/// Of a model: 256 MiB. A leaf of 1000 inputs takes 13 MB.
+inline constexpr FileLimit model_limit{.bytes = std::uintmax_t{1} << 28};
+
 /// The bytes of a file. Throws std::runtime_error `path: cannot be read: reason`, also beyond the limit.
 std::string read_file(const std::string& path, const FileLimit& limit = {});
 

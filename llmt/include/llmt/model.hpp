@@ -152,13 +152,14 @@ std::vector<bool> used_inputs(const Model& model);
 
 /// The model as JSON text; docs/file-formats.md describes it. Format version 2, or 3 if there is an output_range, which
 /// readers of version 2 do not know, or 4 if an input has codes, which those of version 3 do not. Numbers are written
-/// so that they read back exactly.
+/// so that they read back exactly. Throws std::runtime_error for a model that from_json() or load() would refuse
+/// because of its size: more than 16 777 216 values, containers counted, or 256 MiB.
 std::string to_json(const Model& model);
 
 /// Reads what to_json() wrote. The text may be of any origin. Throws std::runtime_error, starting with `name` and the
 /// JSON pointer to the place, that says which member is missing, has the wrong type or shape, or holds a number that
-/// Model does not accept; for another format or version; and for JSON that is nested deeper than 32 levels or has a
-/// number beyond the range of a double.
+/// Model does not accept; for another format or version; and for JSON that is nested deeper than 32 levels, has a
+/// number beyond the range of a double or more than 16 777 216 values.
 Model from_json(const std::string& text, const std::string& name = "model");
 
 /// Writes to_json() to a file, through a temporary file beside it that is renamed at the end: a failed write leaves the
@@ -166,7 +167,7 @@ Model from_json(const std::string& text, const std::string& name = "model");
 void save(const Model& model, const std::string& path);
 
 /// Reads a file that save() wrote, without the intervals that it may hold. Throws std::runtime_error as from_json(),
-/// starting with the path.
+/// starting with the path, and for more than 256 MiB.
 Model load(const std::string& path);
 
 }  // namespace llmt

@@ -38,7 +38,8 @@ class StreamState;
 class Stream {
  public:
   /// Throws std::invalid_argument naming field, value and bound if there is no input or output, or an option is out of
-  /// range.
+  /// range, and std::runtime_error if the sums of one leaf, which grow with the square of the inputs, need more memory
+  /// than the machine has.
   Stream(Eigen::Index num_inputs, Eigen::Index num_outputs, const StreamOptions& options = {});
   ~Stream();
   Stream(Stream&&) noexcept;

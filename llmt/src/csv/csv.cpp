@@ -130,8 +130,14 @@ void Csv::find_rows() {
 std::size_t Csv::index_of(std::string_view column) const {
   const auto found = fields_.find(column);
   if (found == fields_.end()) {
-    throw std::runtime_error(fmt::format("{}: there is no column \"{}\"{}; the columns are {}", name_, column,
-                                         did_you_mean(column, columns_), csv_row(columns_)));
+    const auto whole = std::ranges::find_if(columns_, [&](const std::string& name) {
+      return !column.empty() && name.find(',') != std::string::npos && name.find(column) != std::string::npos;
+    });
+    const std::string hint =
+        whole == columns_.end() ? did_you_mean(column, columns_)
+                                : fmt::format(" (a name with a comma is given in its quotes: '{}')", csv_field(*whole));
+    throw std::runtime_error(
+        fmt::format("{}: there is no column \"{}\"{}; the columns are {}", name_, column, hint, csv_row(columns_)));
   }
   return found->second;
 }

@@ -71,7 +71,7 @@ std::string to_json(const Model& model, const Intervals& intervals) {
 }
 
 ModelWithIntervals from_json_with_intervals(const std::string& text, const std::string& name) {
-  const JsonDocument document = parse_json(text, name);
+  const JsonDocument document = parse_json(text, name, most_model_values);
   const Json& json = document.value();
   const JsonReader root(json, name);
   Model model = model_from(root);
@@ -85,7 +85,7 @@ void save(const Model& model, const Intervals& intervals, const std::string& pat
 }
 
 ModelWithIntervals load_with_intervals(const std::string& path) {
-  return from_json_with_intervals(read_file(path), path);
+  return from_json_with_intervals(read_file(path, model_limit), path);
 }
 
 }  // namespace llmt

@@ -41,7 +41,7 @@ void empty(Json& json) noexcept {
 // depth costs no stack.
 class Builder final : public nlohmann::json_sax<Json> {
  public:
-  explicit Builder(const std::string& name) : name_(name) {}
+  Builder(const std::string& name, std::size_t most_values) : name_(name), most_values_(most_values) {}
 
   JsonDocument take() { return std::move(document_); }
 
@@ -84,6 +84,7 @@ class Builder final : public nlohmann::json_sax<Json> {
 
   // Puts a value where the last events say.
   Json& add(Json value) {
+    if (++values_ > most_values_) fail(fmt::format("more than {} values", most_values_));
     if (open_.empty()) return document_.value() = std::move(value);
     Json& container = *open_.back().container;
     if (container.is_object()) return container[open_.back().key] = std::move(value);
@@ -124,6 +125,8 @@ class Builder final : public nlohmann::json_sax<Json> {
   }
 
   const std::string& name_;
+  std::size_t most_values_;
+  std::size_t values_ = 0;
   JsonDocument document_;
   std::vector<Open> open_;
 };
@@ -132,8 +135,8 @@ class Builder final : public nlohmann::json_sax<Json> {
 
 JsonDocument::~JsonDocument() { empty(value_); }
 
-JsonDocument parse_json(const std::string& text, const std::string& name) {
-  Builder builder(name);
+JsonDocument parse_json(const std::string& text, const std::string& name, std::size_t most_values) {
+  Builder builder(name, most_values);
   Json::sax_parse(text, &builder);
   return builder.take();
 }

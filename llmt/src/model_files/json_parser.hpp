@@ -2,6 +2,7 @@
 /// JSON from text of any origin.
 #pragma once
 
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <utility>
@@ -13,6 +14,10 @@ using Json = nlohmann::ordered_json;
 /// What a JSON text may have. Model files have less than 12 levels and less than 15 members.
 inline constexpr std::size_t most_json_levels = 32;
 inline constexpr std::size_t most_json_members = 100;  ///< of one object
+
+/// The values in a model file, containers counted. A value takes up to 64 bytes, as an empty text does, however short
+/// it is in the file.
+inline constexpr std::size_t most_model_values = std::size_t{1} << 24;
 
 /// A value whose end takes no memory. nlohmann's destructor takes as much as the longest array and ends the program
 /// where that is not there, as when a file has just proved too large for the memory.
@@ -32,9 +37,10 @@ class JsonDocument {
 
 /// Parses a text. Throws std::runtime_error that begins with `name` and the JSON pointer to the place, for what is not
 /// JSON, nests deeper than most_json_levels, has an object with more members than most_json_members or one member
-/// twice, or a number beyond the range of a double. No value of the result is nested deeper than most_json_levels, so
-/// that functions that call themselves for every level are safe.
-JsonDocument parse_json(const std::string& text, const std::string& name);
+/// twice, a number beyond the range of a double, or more than `most_values` values. No value of the result is nested
+/// deeper than most_json_levels, so that functions that call themselves for every level are safe.
+JsonDocument parse_json(const std::string& text, const std::string& name,
+                        std::size_t most_values = std::numeric_limits<std::size_t>::max());
 
 /// A text of a file as messages quote it: at most 40 bytes, and a question mark for what is no printable ASCII.
 std::string quotable(const std::string& text);

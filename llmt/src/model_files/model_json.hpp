@@ -18,7 +18,8 @@ inline constexpr int model_format_version_with_codes = 4;
 /// The value that to_json() writes.
 Json json_of(const Model& model);
 
-/// The text of a value, as model files have it. Throws std::runtime_error if a name is not valid UTF-8.
+/// The text of a value, as model files have it. Throws std::runtime_error if a name is not valid UTF-8, and if it would
+/// be refused where it is read: beyond most_model_values or model_limit.
 std::string model_text(const Json& json);
 
 /// The model in a value, whatever other members it has. Throws std::runtime_error with the way to the part that cannot

@@ -192,10 +192,10 @@ Model model_from(const JsonReader& root) {
 }
 
 Model from_json(const std::string& text, const std::string& name) {
-  const JsonDocument json = parse_json(text, name);
+  const JsonDocument json = parse_json(text, name, most_model_values);
   return model_from({json.value(), name});
 }
 
-Model load(const std::string& path) { return from_json(read_file(path), path); }
+Model load(const std::string& path) { return from_json(read_file(path, model_limit), path); }
 
 }  // namespace llmt

@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <stdexcept>
 #include <vector>
@@ -114,6 +116,20 @@ int version_of(const Model& model) {
                                                                    : model_format_version;
 }
 
+// Containers counted, as parse_json() does. No model is deep.
+std::size_t values_in(const Json& json) {
+  std::size_t count = 1;
+  for (const Json& value : json) count += json.is_structured() ? values_in(value) : 0;
+  return count;
+}
+
+[[noreturn]] void refuse_size(std::size_t size, const char* what) {
+  throw std::runtime_error(fmt::format(
+      "llmt::to_json: the model has {} {}; at most {} MiB and {} values are read. Fewer leaves or inputs, or a model "
+      "without intervals, take less",
+      size, what, model_limit.bytes >> 20, most_model_values));
+}
+
 }  // namespace
 
 Json json_of(const Model& model) {
@@ -140,11 +156,15 @@ Json json_of(const Model& model) {
 }
 
 std::string model_text(const Json& json) {
+  if (const std::size_t values = values_in(json); values > most_model_values) refuse_size(values, "values");
+  std::string text;
   try {
-    return json.dump(1) + "\n";
+    text = json.dump(1) + "\n";
   } catch (const Json::type_error&) {
     throw std::runtime_error("llmt::to_json: a column name is not valid UTF-8");
   }
+  if (text.size() > model_limit.bytes) refuse_size(text.size(), "bytes");
+  return text;
 }
 
 std::string to_json(const Model& model) { return model_text(json_of(model)); }

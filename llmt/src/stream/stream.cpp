@@ -7,7 +7,9 @@
 #include <stdexcept>
 
 #include "base/checks.hpp"
+#include "base/memory.hpp"
 #include "data/table.hpp"
+#include "fit/plan/memory.hpp"
 #include "stream/state.hpp"
 
 namespace llmt {
@@ -92,6 +94,10 @@ void check_rows(const StreamState& state, const Eigen::Ref<const Eigen::MatrixXd
 
 std::unique_ptr<StreamState> make_state(Eigen::Index inputs, Eigen::Index outputs, const StreamOptions& options) {
   check(inputs, outputs, options);
+  // What a snapshot needs at least: the sums of one leaf.
+  refuse_beyond_memory(
+      {.rows = 0, .inputs = inputs, .outputs = outputs, .coefficients = inputs + 1, .unknowns = 0, .threads = 1},
+      machine_memory());
   return std::make_unique<StreamState>(inputs, outputs, with_defaults(inputs, options));
 }
 

@@ -163,11 +163,11 @@ std::vector<std::string> input_mistakes(const Robot& robot, const Measurements& 
     constexpr double slack = 1.0;  // degree or mm
     const Eigen::Index outside = (values < joint.limits->at(0) - slack || values > joint.limits->at(1) + slack).count();
     if (outside > 0) {
-      found.push_back(
-          fmt::format("{} of {} values of {} lie outside its limits {} to {} ({:.4g} to {:.4g} measured): are the "
-                      "units right, is it this robot?",
-                      outside, measurements.count(), joint.name, joint.limits->at(0), joint.limits->at(1),
-                      values.minCoeff(), values.maxCoeff()));
+      found.push_back(fmt::format(
+          "{} of {} values of {} {} outside its limits, {:.4g} to {:.4g} {} ({:.4g} to {:.4g} {} measured): "
+          "are the units right, is it this robot?",
+          outside, measurements.count(), joint.name, outside == 1 ? "lies" : "lie", joint.limits->at(0),
+          joint.limits->at(1), limit_unit(joint), values.minCoeff(), values.maxCoeff(), limit_unit(joint)));
     }
   }
   const double implausible_mm = implausible_share * length_mm;

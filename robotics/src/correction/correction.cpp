@@ -180,7 +180,7 @@ CorrectedRobot read_corrected_robot(const std::string& path, const UrdfLinks& li
   CorrectedRobot robot{.robot = read_robot(path, links), .correction = {}};
   if (robot.robot.correction_file.empty()) return robot;
   const std::filesystem::path model = std::filesystem::path(path).parent_path() / robot.robot.correction_file;
-  const std::string text = read_file(model.string());
+  const std::string text = read_file(model.string(), model_limit);
   // A description may name any file. The message about a file that is no model must not show its content.
   if (text.find("\"llmt-model\"") == std::string::npos) {
     throw std::runtime_error(fmt::format("{}: correction: {} is no model file", path, model.string()));

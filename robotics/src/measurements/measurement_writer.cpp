@@ -3,9 +3,11 @@
 
 #include <algorithm>
 #include <map>
+#include <regex>
 #include <stdexcept>
 
 #include "kinematics/units.hpp"
+#include "llmt/robotics/chain.hpp"
 #include "llmt/robotics/measurements.hpp"
 
 namespace llmt::robotics {
@@ -76,6 +78,21 @@ void add_names(const std::string& column, std::string own, const std::vector<std
 }
 
 }  // namespace
+
+std::vector<JointColumn> joint_columns(const Chain& chain) {
+  static const std::regex other("q[0-9]+|r?[xyz]|t[0-9]+_[xyz]|distance|radius|(sigma|U95)(_[xyz])?|qmeas[0-9]+");
+  std::vector<JointColumn> by_name;
+  std::vector<JointColumn> by_number;
+  bool has_names = true;
+  for (const Joint& joint : chain.joints) {
+    const std::string number = fmt::format("q{}", by_number.size() + 1);
+    has_names = has_names && (joint.name == number || !std::regex_match(joint.name, other));
+    const std::string unit = limit_unit(joint);
+    by_name.push_back({fmt::format("{}_{}", joint.name, unit), unit});
+    by_number.push_back({fmt::format("{}_{}", number, unit), unit});
+  }
+  return has_names ? by_name : by_number;
+}
 
 Eigen::VectorXd in_unit_of(const JointColumn& column, const Eigen::VectorXd& values) {
   static const std::map<std::string, double> factors = {

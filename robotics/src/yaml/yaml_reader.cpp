@@ -67,6 +67,9 @@ YAML::Node parse_yaml(const std::string& text, const std::string& file) {
   if (text.size() > most_bytes) {
     throw std::runtime_error(fmt::format("{}: {} bytes, at most {} are read", file, text.size(), most_bytes));
   }
+  if (text.starts_with("\xFF\xFE") || text.starts_with("\xFE\xFF")) {
+    throw std::runtime_error(fmt::format("{}: this is UTF-16, UTF-8 is needed", file));
+  }
   if (const std::size_t zero = text.find('\0'); zero != std::string::npos) {  // yaml-cpp takes it for an escape
     throw std::runtime_error(
         fmt::format("{}:{}: a byte is 0", file,

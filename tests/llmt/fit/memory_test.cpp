@@ -5,6 +5,7 @@
 
 #include <stdexcept>
 
+#include "llmt/stream.hpp"
 #include "oracles/thrown.hpp"
 
 namespace {
@@ -20,6 +21,19 @@ TEST(FitMemory, WhatIsBeyondTheMachineIsRefusedWithTheNumbers) {
   EXPECT_NE(message.find("500 rows with 2000 inputs need about 0.6 GB of memory, this machine has 0.5 GB"),
             std::string::npos)
       << message;
+}
+
+// What cannot be had by a stream or fewer leaves is not advised, and a stream says so before its first row.
+TEST(FitMemory, TooManyInputsAreTooManyForAStream) {
+  const llmt::FitSize wide{
+      .rows = 500, .inputs = 2000, .outputs = 1, .coefficients = 2001, .unknowns = 0, .threads = 1};
+  const auto message = [&](std::uintmax_t memory) {
+    return oracle::thrown<std::runtime_error>([&] { llmt::refuse_beyond_memory(wide, memory); });
+  };
+  EXPECT_TRUE(message(550'000'000).ends_with("take fewer inputs or a lower limit of leaves, or fit a stream"));
+  EXPECT_TRUE(message(500'000'000).ends_with("this machine has 0.5 GB; take fewer inputs")) << message(500'000'000);
+  const std::string of_stream = oracle::thrown<std::runtime_error>([] { llmt::Stream(1'000'000, 1); });
+  EXPECT_TRUE(of_stream.starts_with("1000000 inputs need about 128000.3 GB of memory")) << of_stream;
 }
 
 TEST(FitMemory, JointSystemsCountForEveryThread) {

@@ -10,6 +10,7 @@
 #include "llmt/files.hpp"
 #include "llmt/fit.hpp"
 #include "llmt/intervals.hpp"
+#include "model_files/json_parser.hpp"
 #include "oracles/oracles.hpp"
 #include "oracles/thrown.hpp"
 
@@ -157,6 +158,33 @@ TEST(HostileFiles, NestingIsBounded) {
   EXPECT_EQ(refusal_of("{\"version\":" + brackets(30) + "}").find("m.json: not a model file"), 0U);
   EXPECT_NE(refusal_of(with("inputs", "low", brackets(20))).find("/inputs/0/low: a number is needed, not an array"),
             std::string::npos);
+}
+
+// 256 MiB of text and 16 777 216 values, containers counted, so that no file takes more than 2 GiB.
+TEST(HostileFiles, SizeIsBounded) {
+  const std::string five = "{\"a\":[1,2,3]}";
+  EXPECT_NO_THROW(llmt::parse_json(five, "m.json", 5));
+  EXPECT_EQ(oracle::thrown<std::runtime_error>([&] { llmt::parse_json(five, "m.json", 4); }),
+            "m.json: /a/2: more than 4 values");
+  std::string many_values = "{\"format\":[";
+  for (std::size_t k = 0; k < std::size_t{1} << 24; ++k) many_values += "0,";
+  EXPECT_EQ(refusal_of(many_values + "0]}"), "m.json: /format/16777214: more than 16777216 values");
+  const std::string path = testing::TempDir() + "/large_model.json";
+  llmt::write_file(path, "{");
+  std::filesystem::resize_file(path, (std::uintmax_t{1} << 28) + 1);
+  const std::string too_large = path + ": cannot be read: it holds more than 256 MiB, the most that is read";
+  EXPECT_EQ(oracle::thrown<std::runtime_error>([&] { llmt::load(path); }), too_large);
+  EXPECT_EQ(oracle::thrown<std::runtime_error>([&] { llmt::load_with_intervals(path); }), too_large);
+  std::filesystem::remove(path);
+}
+
+TEST(HostileFiles, WhatCouldNotBeReadIsNotWritten) {
+  const llmt::Model model = fitted_with_levels(1).model;
+  constexpr Eigen::Index rows = Eigen::Index{1} << 24;
+  const llmt::Intervals intervals({model}, {Eigen::MatrixXd::Zero(rows, 1)});
+  const std::string error = oracle::thrown<std::runtime_error>([&] { llmt::to_json(model, intervals); });
+  EXPECT_TRUE(error.starts_with("llmt::to_json: the model has 1677")) << error;
+  EXPECT_NE(error.find("values; at most 256 MiB and 16777216 values are read"), std::string::npos) << error;
 }
 
 TEST(HostileFiles, LongTextsAreNotRepeatedInMessages) {

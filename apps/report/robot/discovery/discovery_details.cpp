@@ -26,15 +26,16 @@ std::string effect_lines(const Discovery& found) {
     if (&whole_of(found, effect) != &effect) text += "    a part of the effect of this name above\n";
     const std::string values = effect_values(found, effect);
     if (!values.empty()) text += fmt::format("    {}\n", values);
-    text += fmt::format(
-        "    moves the tool by {:.4f} mm (root mean square), without what a change of geometry could imitate\n",
-        effect.rms_mm);
+    text += fmt::format("    moves the tool by {:.4f} mm\n", effect.rms_mm);
     for (std::size_t k = 0; k < effect.rivals.size(); ++k) {
       text += fmt::format("    instead it may be: {} [{}]\n", rival_words(effect, k), effect.rivals[k]);
     }
     if (effect.exact_alias) text += "    One of these does the same at every pose: no pose can tell them apart.\n";
   }
-  return text.empty() ? "" : "Effects:\n" + text;
+  return text.empty() ? ""
+                      : "Effects, and how far they move the tool (root mean square, without what a change of geometry "
+                        "could imitate):\n" +
+                            text;
 }
 
 std::string pattern_lines(const std::vector<robotics::FoundPattern>& patterns) {

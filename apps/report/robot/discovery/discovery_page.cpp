@@ -7,6 +7,7 @@
 #include <cmath>
 #include <functional>
 #include <map>
+#include <sstream>
 
 #include "report/robot/discovery/effect_sentences.hpp"
 #include "report/robot/discovery/effect_text.hpp"
@@ -23,28 +24,6 @@ constexpr std::size_t most_lines = 24;
 std::string plain_value(double value, const std::string& unit) {
   const std::string text = number(value, 3);
   return unit == "1" ? text : text + " " + unit;
-}
-
-// Words of a paragraph in lines of at most a hundred columns; further lines are indented by four more.
-std::vector<std::string> wrapped(const std::string& text) {
-  std::vector<std::string> lines;
-  const std::size_t indent = text.find_first_not_of(' ');
-  std::string line;
-  std::size_t begin = indent == std::string::npos ? text.size() : indent;
-  std::string lead(begin, ' ');
-  while (begin < text.size()) {
-    const std::size_t end = std::min(text.find(' ', begin), text.size());
-    const std::string word = text.substr(begin, end - begin);
-    begin = end + 1;
-    if (!line.empty() && line.size() + 1 + word.size() > most_columns) {
-      lines.push_back(line);
-      lead = std::string(indent + 4, ' ');
-      line.clear();
-    }
-    line += line.empty() ? lead + word : " " + word;
-  }
-  if (!line.empty()) lines.push_back(line);
-  return lines;
 }
 
 std::string headline_text(robotics::Headline headline) {
@@ -131,11 +110,12 @@ std::vector<std::string> error_sentences(const Discovery& found) {
   }
   lines.push_back(
       held.floor_from_repeats
-          ? fmt::format("A perfect model would still miss by {:.4f} mm: the noise, measured by repeated poses.",
-                        held.floor_mm)
+          ? fmt::format(
+                "A perfect model would still miss by {:.4f} mm on average: the noise, measured by repeated poses.",
+                held.floor_mm)
           : fmt::format(
-                "Too few poses were repeated to measure the noise. The error left on the fitted poses, {:.4f} mm, "
-                "was used as the noise.",
+                "Too few poses were repeated to measure the noise. The mean distance left at the fitted poses, {:.4f} "
+                "mm, was used as the noise.",
                 held.floor_mm));
   return lines;
 }
@@ -177,10 +157,12 @@ std::string effect_values(const Discovery& found, const FoundEffect& effect) {
   return fmt::format("{}", fmt::join(values, ", "));
 }
 
-std::string discovery_page(const Discovery& found, const std::vector<Eigen::Index>& lines_of_file) {
+std::string discovery_page(const Discovery& found, const std::vector<Eigen::Index>& lines_of_file, std::size_t width) {
+  constexpr std::size_t indent = 4;
   std::vector<std::string> lines;
   const auto add = [&](const std::string& text) {
-    for (std::string& line : wrapped(text)) lines.push_back(std::move(line));
+    std::istringstream paragraph(wrapped(text, std::min(width, most_columns), indent));
+    for (std::string line; std::getline(paragraph, line);) lines.push_back(line);
   };
   add(headline_text(found.headline));
   for (const std::string& sentence : effect_sentences(found)) add(sentence);

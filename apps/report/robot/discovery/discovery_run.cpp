@@ -99,12 +99,12 @@ DiscoveryRun run_discovery(const robotics::Robot& described, const robotics::Mea
   return run;
 }
 
-std::string discovery_text(const DiscoveryRun& run, const std::string& data) {
+std::string discovery_text(const DiscoveryRun& run, const std::string& data, std::size_t width) {
   std::string text = fmt::format("{}: {} of {}, {} {} set aside\n{}\n", data, counts_of(run.measurements),
                                  run.robot.chain.name, run.has_test ? 0 : run.found.held_out.poses,
                                  run.measurements.poses.observations.empty() ? "of them" : "poses",
                                  use_of_orientations(run.measurements));
-  text += discovery_page(run.found, run.measurements.lines);
+  text += discovery_page(run.found, run.measurements.lines, width);
   text += next_poses_text(run.next);
   if (run.folds) {
     text += fmt::format("{} {} folds, everything found anew in each: {:.4f} -> {:.4f} mm mean on the poses left out\n",

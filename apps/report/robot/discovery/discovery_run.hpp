@@ -11,6 +11,7 @@
 #include "report/robot/discovery/next_poses.hpp"
 #include "report/robot/input_checks.hpp"
 #include "report/text/json.hpp"
+#include "report/text/text.hpp"
 
 namespace llmt::report {
 
@@ -52,7 +53,7 @@ DiscoveryRun run_discovery(const robotics::Robot& described, const robotics::Mea
                            DiscoveryTask task, const Warn& warn);
 
 /// For people. `data`: the name of the table of measurements.
-std::string discovery_text(const DiscoveryRun& run, const std::string& data);
+std::string discovery_text(const DiscoveryRun& run, const std::string& data, std::size_t width = no_width_limit);
 
 /// discovery_json() with the cross-validation.
 Json discovery_run_json(const DiscoveryRun& run);

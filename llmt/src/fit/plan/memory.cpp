@@ -42,12 +42,14 @@ double estimated_memory(const FitSize& size) {
 void refuse_beyond_memory(const FitSize& size, std::uintmax_t available) {
   const double estimate = estimated_memory(size);
   if (estimate <= static_cast<double>(available)) return;
+  const std::string rows = size.rows == 0 ? "" : fmt::format("{} rows with ", size.rows);
   const std::string leaves = size.unknowns == 0 ? "" : fmt::format(" and {} leaves", size.unknowns / size.coefficients);
+  // The Gram matrices of one node are needed whatever the rows and leaves are.
+  const bool too_wide = bytes * copies_of_gram * square(size.coefficients) > static_cast<double>(available);
   throw std::runtime_error(
-      fmt::format("{} rows with {} inputs{} need about {:.1f} GB of memory, this machine has {:.1f} GB; "
-                  "take fewer inputs "
-                  "or a lower limit of leaves, or fit a stream",
-                  size.rows, size.inputs, leaves, estimate / 1e9, static_cast<double>(available) / 1e9));
+      fmt::format("{}{} inputs{} need about {:.1f} GB of memory, this machine has {:.1f} GB; take fewer inputs{}", rows,
+                  size.inputs, leaves, estimate / 1e9, static_cast<double>(available) / 1e9,
+                  too_wide ? "" : " or a lower limit of leaves, or fit a stream"));
 }
 
 }  // namespace llmt

@@ -155,6 +155,10 @@ struct JointColumn {
   std::string unit;  ///< "rad", "deg", "mm", "m" or "um"
 };
 
+/// The columns of joint values in a table for people and controllers, in degrees or mm: "shoulder_pan_joint_deg", by
+/// the names of the joints; "q1_deg", by their numbers, where a name means something else in such a table ("x", "q3").
+std::vector<JointColumn> joint_columns(const Chain& chain);
+
 /// Joint values from rad or mm to the unit of a column. Where they change they are rounded to 15 digits, so that 10.5
 /// degrees that were read are 10.5 again. Throws std::invalid_argument if there is no such unit.
 Eigen::VectorXd in_unit_of(const JointColumn& column, const Eigen::VectorXd& values);
