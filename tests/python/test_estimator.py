@@ -249,3 +249,10 @@ def test_rows_of_eval_set_choose_and_do_not_enter():
         LocalLinearTreeRegressor().fit(X, y, groups=np.arange(600) // 10, eval_set=(judges, observed))
     with pytest.raises(ValueError, match="3 features"):
         LocalLinearTreeRegressor().fit(X, y, eval_set=(judges[:, :3], observed))
+
+
+def test_the_tree_is_drawn_with_its_error_and_its_coverage():
+    X, y = stepped(400)
+    fitted = LocalLinearTreeRegressor(validity="crisp").fit(X, y)
+    for shown in (str(fitted), fitted._repr_html_()):
+        assert "ntervals hold" in shown and "least squares" in shown and "x0" in shown

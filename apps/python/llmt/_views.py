@@ -1,6 +1,7 @@
 """What a fitted estimator shows: tables, pictures, explanations, and its model in other languages."""
 
 import html
+import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -197,14 +198,14 @@ class Views:
             return repr(self)
         from ._text import tree_text
 
-        return tree_text(self.model_.to_dict(), self.summary_ or None, mean=self._mean, readable=self._is_readable)
+        return tree_text(json.loads(self.model_.to_json()), self.summary_ or None, mean=self._mean, readable=self._is_readable)
 
     def _repr_html_(self) -> str:
         if not hasattr(self, "model_"):
             return f"<pre>{html.escape(repr(self))}</pre>"
         from ._html import tree_html
 
-        return tree_html(self.model_.to_dict(), self.summary_ or None, mean=self._mean, readable=self._is_readable)
+        return tree_html(json.loads(self.model_.to_json()), self.summary_ or None, mean=self._mean, readable=self._is_readable)
 
     def _importances(self) -> np.ndarray:
         return np.asarray(self._model().handle.importance(self._sample, self._threads()))
