@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+_MUCH_SHORTER = 4  # a list of the levels that are not meant is shown where it is this many times shorter
 _ANY_VALUE = float(np.finfo(float).max)  # threshold of a split into rows with and without a value
 _USUAL_DIGITS = 5
 _MOST_DIGITS = 12
@@ -335,7 +336,15 @@ def _box_conditions(of: dict[str, Any], side: Any) -> list[str]:
 
 
 def _levels(of: dict[str, Any], levels: list[int]) -> str:
-    return "in {" + ", ".join(of["levels"][level] for level in levels) + "}"
+    others = [level for level in range(len(of["levels"])) if level not in levels]
+    by_others = bool(others) and _MUCH_SHORTER * len(others) <= len(levels)
+    names = ", ".join(_quoted(of["levels"][level]) for level in (others if by_others else levels))
+    return f"{'not in' if by_others else 'in'} {{{names}}}"
+
+
+def _quoted(name: str) -> str:
+    """The name as a field of CSV."""
+    return '"' + name.replace('"', '""') + '"' if any(c in name for c in '",\r\n') else name
 
 
 def _factor(of: dict[str, Any]) -> str:
