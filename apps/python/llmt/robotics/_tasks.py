@@ -2,8 +2,8 @@
 
 Tables are a path or a table of any kind, see :mod:`llmt.robotics`. ``columns`` is a column map, a path or a dict of the
 table's names to those here: ``{"elbow_joint": "q3_rad"}``. ``decimal_comma`` says it of files. ``progress`` is called
-with (done, total, step); Ctrl-C ends any of these calls. All raise ValueError for inputs that make no sense, naming
-table, row and column or the field of a description.
+with (done, total, step). Ctrl-C ends ``calibrate``, ``discover`` and ``poses`` at once, the others when they are done.
+All raise ValueError for inputs that make no sense, naming table, row and column or the field of a description.
 """
 
 from __future__ import annotations
