@@ -76,11 +76,19 @@ EqualRows equal_rows(const GivenRows& given, const std::vector<Eigen::Index>& ro
     learned.push_back(rows[i]);
   }
   EqualRows equal = find_equal_rows(inputs, learned, at(*given.numbers, learned));
-  if (equal.copy_of.empty()) return equal;
-  std::vector<int> copy_of(rows.size());
-  std::iota(copy_of.begin(), copy_of.end(), 0);
-  for (std::size_t i = 0; i < positions.size(); ++i) copy_of[positions[i]] = positions[equal.copy_of[i]];
-  equal.copy_of = std::move(copy_of);
+  // From positions among the learned rows to positions among all of them; the others stand for themselves.
+  if (!equal.copy_of.empty()) {
+    std::vector<int> copy_of(rows.size());
+    std::iota(copy_of.begin(), copy_of.end(), 0);
+    for (std::size_t i = 0; i < positions.size(); ++i) copy_of[positions[i]] = positions[equal.copy_of[i]];
+    equal.copy_of = std::move(copy_of);
+  }
+  if (!equal.group.empty()) {
+    std::vector<int> group(rows.size());
+    std::iota(group.begin(), group.end(), 1 + std::ranges::max(equal.group));
+    for (std::size_t i = 0; i < positions.size(); ++i) group[positions[i]] = equal.group[i];
+    equal.group = std::move(group);
+  }
   return equal;
 }
 
