@@ -84,12 +84,12 @@ void Csv::refuse_header_of_other_programs(std::string_view header) const {
   if (header.starts_with("sep=") && header.size() <= 5) {
     refuse_header("a line that names the separator of a spreadsheet is no header: delete it");
   }
-  const bool is_all =
-      std::string_view(text_).find_first_not_of(" \t\r\n", header_begin_ + header.size()) == std::string_view::npos;
+  const bool is_all = !rows_precede_ && std::string_view(text_).find_first_not_of(
+                                            " \t\r\n", header_begin_ + header.size()) == std::string_view::npos;
   if (is_all && !more_follows_ && std::ranges::count(header, '"') % 2 != 0) {
     refuse_header("a quote is left open: the rest of the file would be the header");
   }
-  if (!is_all || more_follows_ || rows_precede_) return;
+  if (!is_all || more_follows_) return;
   for (std::size_t at = header.find('\r'); at != std::string_view::npos; at = header.find('\r', at + 1)) {
     // Within quotes a line may end with CRLF, and elsewhere CR is a blank.
     if (at + 1 == header.size() || std::string_view("\r\n \t,;").find(header[at + 1]) != std::string_view::npos)

@@ -1,6 +1,7 @@
 #include "discovery/terms/held_out.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 
 namespace llmt::discovery {
@@ -43,8 +44,14 @@ void judge_held_out(const TermModel& model, const TermData& kept, const TermData
   const Eigen::VectorXd before = squared_errors(model, held_out, baseline);
   const Eigen::VectorXd after = squared_errors(model, held_out, settled.fit);
   if (after.sum() > before.sum()) missing.failing_rows = rows_of_growth(held_out.samples, after - before);
+  const Eigen::MatrixXd simulated = model.simulated(settled.fit.parameters);
   for (std::size_t t = 0; t < settled.fit.placed.size(); ++t) {
     const PlacedTerm& placed = settled.fit.placed[t];
+    // What a term changes there, in units of the noise, is by how much the sum of squares should shrink; its standard
+    // deviation is twice the root of that. Samples that a term hardly reaches cannot judge it.
+    constexpr double judged = 4.0;
+    const double change = (stacked_signature(model, held_out, placed, simulated) * placed.coefficients).squaredNorm();
+    if (change < judged * std::pow(settled.verdict.noise, 2.0)) continue;
     const double without = squared_errors(model, held_out, fit_without(model, kept, settled.fit, t)).sum();
     for (FoundTerm& found : missing.found) {
       const bool is_this = found.term == placed.term && found.output_index == placed.output &&

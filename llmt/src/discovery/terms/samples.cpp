@@ -15,4 +15,18 @@ Eigen::MatrixXd means(const Eigen::MatrixXd& of_rows, const Samples& samples) {
   return result;
 }
 
+double share_kept(const Eigen::VectorXd& of_rows, const Samples& samples) {
+  if (std::ssize(samples.rows()) == samples.size()) return 1.0;
+  const Eigen::VectorXd rows = of_rows(samples.rows());
+  const Eigen::VectorXd kept = means(of_rows, samples);
+  const double all = (rows.array() - rows.mean()).square().mean();
+  return all > 0.0 ? (kept.array() - kept.mean()).square().mean() / all : 1.0;
+}
+
+double carriers(const Eigen::VectorXd& of_samples) {
+  const Eigen::ArrayXd squares = (of_samples.array() - of_samples.mean()).square();
+  const double sum = squares.sum();
+  return sum > 0.0 ? sum * sum / squares.square().sum() : 0.0;
+}
+
 }  // namespace llmt::discovery

@@ -33,6 +33,13 @@ class Samples {
   std::vector<Eigen::Index> ends_;
 };
 
+/// The share of the variance of a column that its means keep, 1 where samples are single rows. A column that varies
+/// much faster than the samples keeps little: what is left of it is chance.
+double share_kept(const Eigen::VectorXd& of_rows, const Samples& samples);
+
+/// The number of samples that carry a column, (sum u^2)^2 / sum u^4 of its deviations u from their mean.
+double carriers(const Eigen::VectorXd& of_samples);
+
 /// The mean of every sample; samples x columns. `of_rows`: a row for each row of the data.
 Eigen::MatrixXd means(const Eigen::MatrixXd& of_rows, const Samples& samples);
 

@@ -30,6 +30,12 @@ EffectCandidate candidate_of(const TermModel& model, const TermData& data, const
   return candidate;
 }
 
+// In time the value of the row before and the change since then hold the noise of neighbouring rows, and are otherwise
+// the terms of the row itself.
+bool tells_in_time(const ModelTerm& history, const TermData& data) {
+  return data.stretches.empty() || (history.family != "previous" && history.family != "rate");
+}
+
 // Samples in time whose noise may be alike keep their signs together.
 std::vector<Eigen::Index> clusters_of(const TermData& data) {
   std::vector<Eigen::Index> clusters;
@@ -114,7 +120,7 @@ TermQuestion ask(const TermModel& model, const TermData& data, const TermFit& fi
   for (const std::size_t sample : outliers) ground.residuals.segment(sample * d, d).setZero();
   for (std::size_t t = 0; t < model.terms().size(); ++t) {
     const ModelTerm& term = model.terms()[t];
-    if (term.history && !with_history) continue;
+    if (term.history && !(with_history && tells_in_time(term, data))) continue;
     for (Eigen::Index o = 0; o < d; ++o) {
       if (!term.output.empty() && term.output != model.outputs()[o]) continue;
       std::vector<PlacedTerm> options;

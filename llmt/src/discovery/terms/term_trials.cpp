@@ -9,6 +9,11 @@
 namespace llmt::discovery {
 namespace {
 
+// Fast columns are judged by rows that stand nearer in time.
+constexpr double smallest_share_kept = 0.3;
+// A term that a handful of samples carry, at the end of a range, says more of these samples than of a cause.
+constexpr double fewest_carriers = 5.0;
+
 // The sum of squares that a term explains at one constant, beyond the nuisance.
 class Trials {
  public:
@@ -32,8 +37,13 @@ class Trials {
 
   double gain(double constant) {
     placed_.constants = Eigen::VectorXd::Constant(1, constant);
-    Eigen::MatrixXd columns = means(model_->columns(placed_, *simulated_), data_->samples);
+    const Eigen::MatrixXd of_rows = model_->columns(placed_, *simulated_);
+    Eigen::MatrixXd columns = means(of_rows, data_->samples);
     if (!columns.allFinite()) return 0.0;
+    for (Eigen::Index k = 0; k < columns.cols(); ++k) {
+      if (share_kept(of_rows.col(k), data_->samples) < smallest_share_kept) return 0.0;
+      if (carriers(columns.col(k)) < fewest_carriers) return 0.0;
+    }
     const Eigen::VectorXd norms = columns.colwise().norm();
     if (!(norms.minCoeff() > 0.0)) return 0.0;
     columns *= norms.cwiseInverse().asDiagonal();
