@@ -43,15 +43,19 @@ void judge_held_out(const TermModel& model, const TermData& kept, const TermData
   if (held_out.samples.size() == 0 || settled.fit.placed.empty()) return;
   const Eigen::VectorXd before = squared_errors(model, held_out, baseline);
   const Eigen::VectorXd after = squared_errors(model, held_out, settled.fit);
-  if (after.sum() > before.sum()) missing.failing_rows = rows_of_growth(held_out.samples, after - before);
+  // What terms change there, in units of the noise, is by how much the sum of squares should shrink; its standard
+  // deviation is twice the root of that. Samples that terms hardly reach cannot judge them.
+  const double judged = 4.0 * std::pow(settled.verdict.noise, 2.0);
+  const Eigen::VectorXd change = scaled_residuals(model, held_out, baseline.parameters, baseline.placed) -
+                                 scaled_residuals(model, held_out, settled.fit.parameters, settled.fit.placed);
+  if (after.sum() > before.sum() && change.squaredNorm() > judged) {
+    missing.failing_rows = rows_of_growth(held_out.samples, after - before);
+  }
   const Eigen::MatrixXd simulated = model.simulated(settled.fit.parameters);
   for (std::size_t t = 0; t < settled.fit.placed.size(); ++t) {
     const PlacedTerm& placed = settled.fit.placed[t];
-    // What a term changes there, in units of the noise, is by how much the sum of squares should shrink; its standard
-    // deviation is twice the root of that. Samples that a term hardly reaches cannot judge it.
-    constexpr double judged = 4.0;
-    const double change = (stacked_signature(model, held_out, placed, simulated) * placed.coefficients).squaredNorm();
-    if (change < judged * std::pow(settled.verdict.noise, 2.0)) continue;
+    const Eigen::VectorXd own = stacked_signature(model, held_out, placed, simulated) * placed.coefficients;
+    if (own.squaredNorm() < judged) continue;
     const double without = squared_errors(model, held_out, fit_without(model, kept, settled.fit, t)).sum();
     for (FoundTerm& found : missing.found) {
       const bool is_this = found.term == placed.term && found.output_index == placed.output &&
