@@ -74,6 +74,7 @@ struct FoundTerm {
   double share = 0.0;  ///< of the explained sum of squares that goes with it alone
   /// The error on the samples set aside is smaller with it than without; true if there are none.
   bool shrinks_gap = true;
+  bool is_refuted = false;  ///< it makes that error larger, by more than chance allows for a term of its size
 };
 
 /// How rows in time were used, see find_missing().
