@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from llmt._columns import columns_of
 from llmt._results import Findings, draw_points, html_table, names, number, values_table
+from llmt.tables.named import columns_of
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from llmt._columns import records
+from llmt._frames import table_of
 
 
 class Result:
@@ -57,16 +57,15 @@ class Findings(Result):
     @property
     def effects(self) -> Any:
         """What was found: a row for each value (coefficient, constant) of an effect, with its standard error."""
-        return records(
-            [
-                {key: effect[key] for key in self._of_effect}
-                | _value(value, "parameter")
-                | {key: effect[key] for key in self._sizes}
-                | {"rivals": ", ".join(effect["rivals"])}
-                for effect in self._data["effects"]
-                for value in effect["parameters"]
-            ]
-        )
+        rows = [
+            {key: effect[key] for key in self._of_effect}
+            | _value(value, "parameter")
+            | {key: effect[key] for key in self._sizes}
+            | {"rivals": ", ".join(effect["rivals"])}
+            for effect in self._data["effects"]
+            for value in effect["parameters"]
+        ]
+        return table_of(rows, [*self._of_effect, "parameter", *_of_value, *self._sizes, "rivals"])
 
     @property
     def gap(self) -> dict[str, Any]:
@@ -83,13 +82,16 @@ class Findings(Result):
         return html_table([*self._titles.values(), "parameter", "value", "standard error", "unit"], rows)
 
 
+_of_value = ("value", "standard_error", "unit")
+
+
 def _value(of: Mapping[str, Any], name: str) -> dict[str, Any]:
     return {name: of["name"], "value": of["value"], "standard_error": of["std_error"], "unit": of["unit"]}
 
 
 def values_table(values: Sequence[Mapping[str, Any]]) -> Any:
     """``name``, ``value``, ``standard_error`` and ``unit`` of fitted parameters."""
-    return records([_value(value, "name") for value in values])
+    return table_of([_value(value, "name") for value in values], ["name", *_of_value])
 
 
 def shown(value: Any) -> str:

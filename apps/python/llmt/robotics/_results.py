@@ -7,8 +7,9 @@ import os
 from collections.abc import Mapping
 from typing import Any
 
-from llmt._columns import frame_of, records
+from llmt._frames import table_of
 from llmt._results import Findings, Result, draw_points, html_table
+from llmt.robotics._csv import frame_of
 from llmt.robotics._robot import Robot
 
 
@@ -18,9 +19,7 @@ class RobotWarning(UserWarning):
 
 def _draw_errors(ax: Any, errors: Mapping[str, Any], title: str, lines: Mapping[str, float] = {}) -> Any:
     count = len(next(iter(errors.values())))
-    ax = draw_points(
-        ax, range(count), errors, x="measured point", y="position error, mm", title=title, lines=lines
-    )
+    ax = draw_points(ax, range(count), errors, x="measured point", y="position error, mm", title=title, lines=lines)
     ax.set_ylim(bottom=0.0)
     return ax
 
@@ -49,7 +48,7 @@ class _WithRobot(_RobotResult):
     def poses(self) -> Any:
         """Distance in mm between model and measurement, a row for each measured point."""
         count = len(next(iter(self._errors.values())))
-        return records([{f"{name}_mm": errors[k] for name, errors in self._errors.items()} for k in range(count)])
+        return table_of([{f"{name}_mm": errors[k] for name, errors in self._errors.items()} for k in range(count)])
 
     def _where(self) -> str:
         raise NotImplementedError
@@ -73,7 +72,7 @@ class Calibration(_WithRobot):
     @property
     def parameters(self) -> Any:
         """``name``, ``unit``, ``value`` and ``standard_error`` of the identified parameters."""
-        return records(self._data["parameters"])
+        return table_of(self._data["parameters"])
 
     @property
     def errors(self) -> Any:
@@ -83,7 +82,7 @@ class Calibration(_WithRobot):
             for poses, figures in entry.items():
                 if figures is not None:
                     rows.append({"model": model, "poses": poses, **figures})
-        return records(rows)
+        return table_of(rows)
 
     def _where(self) -> str:
         return "on poses left out of the fit" if self._data["folds"] else "on the poses fitted"
@@ -162,12 +161,12 @@ class Check(_RobotResult):
             for moved in self._data["moved"]
             for change in moved["changes"]
         ]
-        return records(rows)
+        return table_of(rows, ["name", "parameter", "by", "standard_error", "unit", "probability"])
 
     @property
     def poses(self) -> Any:
         """Distance in mm between model and measurement, a row for each measured point."""
-        return records([{"error_mm": error} for error in self._errors])
+        return table_of([{"error_mm": error} for error in self._errors])
 
     def plot(self, ax: Any = None) -> Any:
         """Draws the error of every point and the limit of their mean. Returns the axes of matplotlib."""
@@ -207,7 +206,7 @@ class PoseChoice(_RobotResult):
         """The standard error that a calibration is expected to leave of every parameter, with these poses and with
         random ones."""
         random = {entry["name"]: entry["standard_error"] for entry in self._data["random"]["parameters"]}
-        return records(
+        return table_of(
             [{**entry, "random_standard_error": random[entry["name"]]} for entry in self._data["chosen"]["parameters"]]
         )
 
