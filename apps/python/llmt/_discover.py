@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from llmt._results import Result, axes_of, html_table, names, number
-from llmt._columns import columns_of, records
+from llmt._results import Findings, draw_points, html_table, names, number, values_table
+from llmt.tables.named import columns_of
 
 
 @dataclass(frozen=True)
@@ -112,8 +112,12 @@ def _outputs(given: Any, rows: int, outputs: list[str], what: str) -> np.ndarray
     return np.ascontiguousarray(array)
 
 
-class Missing(Result):
+class Missing(Findings):
     """The terms that a simulation lacks. ``print`` shows the page of ``llmt discover``."""
+
+    _of_effect = ("name", "location", "output", "formula", "confirmed")
+    _sizes = ("share",)
+    _titles = {"formula": "term"}
 
     def __init__(self, made: Mapping[str, Any], question: dict[str, Any], kind: Any, callables: dict[str, Any]) -> None:
         super().__init__(made["text"], json.loads(made["json"]))
@@ -130,54 +134,9 @@ class Missing(Result):
         """The rows that took no part in the search."""
 
     @property
-    def verdict(self) -> str:
-        """``nothing missing``, ``named``, ``named, indistinguishable`` or ``unknown effect``."""
-        verdict: str = self._data["verdict"]
-        return verdict
-
-    @property
-    def effects(self) -> Any:
-        """The terms found: a row for each coefficient and constant, with its standard error."""
-        return records(
-            [
-                {
-                    "name": term["name"],
-                    "location": term["location"],
-                    "output": term["output"],
-                    "formula": term["formula"],
-                    "confirmed": term["confirmed"],
-                    "parameter": value["name"],
-                    "value": value["value"],
-                    "standard_error": value["std_error"],
-                    "unit": value["unit"],
-                    "share": term["share"],
-                    "rivals": ", ".join(term["rivals"]),
-                }
-                for term in self._data["effects"]
-                for value in term["parameters"]
-            ]
-        )
-
-    @property
     def parameters(self) -> Any:
         """The parameters of the simulation, fitted together with the terms."""
-        return records(
-            [
-                {
-                    "name": value["name"],
-                    "value": value["value"],
-                    "standard_error": value["std_error"],
-                    "unit": value["unit"],
-                }
-                for value in self._data["simulation"]
-            ]
-        )
-
-    @property
-    def gap(self) -> dict[str, Any]:
-        """Root mean square errors before and after on the rows set aside; of each output under ``outputs``."""
-        gap: dict[str, Any] = self._data["gap"]
-        return gap
+        return values_table(self._data["simulation"])
 
     def predict(self, inputs: Any, simulated: Any = None) -> Any:
         """The simulation with the terms found, at other inputs: an array of their rows, or rows x outputs if there are
@@ -209,16 +168,15 @@ class Missing(Result):
     def plot(self, ax: Any = None) -> Any:
         """Draws measured minus simulated on the rows set aside (all rows without any), before and after, of the first
         output. Returns the axes of matplotlib, ``ax`` if it is given."""
-        ax = axes_of(ax)
         rows = self.held_out if len(self.held_out) else np.arange(len(self.before))
+        gaps = {}
         for label, values in (("before", self.before), ("after", self.corrected)):
             gap = self._measured[rows, 0] - values[rows, 0]
-            ax.plot(rows, gap, ".", label=f"{label}, {np.sqrt(np.mean(gap**2)):.4g} root mean square")
+            gaps[f"{label}, {np.sqrt(np.mean(gap**2)):.4g} root mean square"] = gap
+        y = f"measured - simulated {self._question['output_names'][0]}"
+        title = "Rows set aside" if len(self.held_out) else "All rows"
+        ax = draw_points(ax, rows, gaps, x="row", y=y, title=title)
         ax.axhline(0.0, linewidth=0.5, color="black")
-        ax.set_xlabel("row")
-        ax.set_ylabel(f"measured - simulated {self._question['output_names'][0]}")
-        ax.set_title("Rows set aside" if len(self.held_out) else "All rows")
-        ax.legend()
         return ax
 
     @property
@@ -228,14 +186,9 @@ class Missing(Result):
         return line
 
     def _html_tables(self) -> list[str]:
-        effects = [
-            [term["formula"], value["name"], value["value"], value["std_error"], value["unit"]]
-            for term in self._data["effects"]
-            for value in term["parameters"]
-        ]
         gaps = [[g["output"], g["before"], g["after"], g["noise_floor"]] for g in self._data["gap"]["outputs"]]
         return [
-            html_table(["term", "parameter", "value", "standard error", "unit"], effects),
+            self._effects_html(),
             html_table(["output", "gap before", "after", "noise"], gaps),
         ]
 
