@@ -256,6 +256,10 @@ def _search(
     *,
     allow: Any,
     order: str,
+    time: Any,
+    groups: Any,
+    only: Any,
+    without: Any,
     terms: Mapping[str, Any] | None,
     own_terms_only: bool,
     held_out: float,
@@ -280,6 +284,8 @@ def _search(
         "inputs": np.ascontiguousarray(rows),
         "input_names": columns,
         "order": order,
+        "only": names("only", only),
+        "without": names("without", without),
         "output_names": outputs,
         "parameters": parameters[0],
         "offset": "offset" in adjusted,
@@ -297,8 +303,11 @@ def _search(
             raise ValueError(f"simulated has the shape {start.shape}, measured has {values.shape}")
     question["simulated"] = np.ascontiguousarray(start)
     own = dict(terms or {})
+    instants, runs = _in_time(time, groups, len(rows), bool(order))
     made = _core.find_missing(
         **question,
+        instants=instants,
+        runs=runs,
         measured=np.ascontiguousarray(values),
         predict=predict,
         terms=_own_terms(own, kind, question),
@@ -310,6 +319,22 @@ def _search(
     )
     callables = {"simulate": simulate, "terms": own, "parameters": parameters[1]}
     return Missing(made, {**question, "measured": values}, kind, callables)
+
+
+def _in_time(time: Any, groups: Any, n: int, has_order: bool) -> tuple[list[float], list[int]]:
+    """The instant of every row, and the number of its recording."""
+    if time is None:
+        if groups is not None:
+            raise ValueError("groups needs time: the rows of a group follow each other in time")
+        return [], []
+    if has_order:
+        raise ValueError("time says the order of the rows: order is not needed beside it")
+    instants = np.asarray(time, dtype=float)
+    labels = np.zeros(n) if groups is None else np.asarray(groups)
+    for name, values in (("time", instants), ("groups", labels)):
+        if values.shape != (n,):
+            raise ValueError(f"{name} has the shape {values.shape}, must be ({n},)")
+    return instants.tolist(), np.unique(labels, return_inverse=True)[1].tolist()
 
 
 def _in_order_of_outputs(rows: np.ndarray, found: list[str], outputs: list[str]) -> np.ndarray:
@@ -326,6 +351,10 @@ def discover(
     measured: Any,
     *,
     order: str = "",
+    time: Any = None,
+    groups: Any = None,
+    only: Any = (),
+    without: Any = (),
     terms: Mapping[str, Any] | None = None,
     own_terms_only: bool = False,
     held_out: float = 0.2,
@@ -348,6 +377,13 @@ def discover(
         The outputs. The columns of an array are called y, or y0, y1, ...
     order : str
         Column that says in which order rows were measured; by default as they stand.
+    time : n numbers
+        When each row was taken, for rows of a log: they are averaged over blocks, whole stretches are set aside, and
+        noise that is alike in neighbouring rows is no evidence. Smooth inputs are taken for a log without it.
+    groups : n labels
+        The recording that each row is of; with ``time``.
+    only, without : str or list of str
+        Families of built-in terms to try alone, or to leave out.
     terms : dict
         Terms of your own: a callable of the inputs for each name, or (formula, callable).
     own_terms_only : bool
@@ -380,6 +416,10 @@ def discover(
         measured,
         allow=(),
         order=order,
+        time=time,
+        groups=groups,
+        only=only,
+        without=without,
         terms=terms,
         own_terms_only=own_terms_only,
         held_out=held_out,
@@ -395,6 +435,10 @@ def find_missing(
     *,
     allow: Any = (),
     order: str = "",
+    time: Any = None,
+    groups: Any = None,
+    only: Any = (),
+    without: Any = (),
     terms: Mapping[str, Any] | None = None,
     own_terms_only: bool = False,
     held_out: float = 0.2,
@@ -414,6 +458,10 @@ def find_missing(
         measured,
         allow=allow,
         order=order,
+        time=time,
+        groups=groups,
+        only=only,
+        without=without,
         terms=terms,
         own_terms_only=own_terms_only,
         held_out=held_out,
