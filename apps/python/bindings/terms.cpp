@@ -86,8 +86,8 @@ discovery::Parameter parameter_of(const nb::dict& given) {
 // The library's terms, and one's own in their place where they are the same.
 std::vector<discovery::ModelTerm> terms_of(const Question& question, const std::vector<OwnTerm>& own_terms,
                                            bool own_terms_only, std::vector<discovery::UntestableCause>& untestable) {
-  std::vector<discovery::ModelTerm> library = discovery::of_families(
-      discovery::standard_terms(question.inputs, &untestable), question.only, question.without);
+  std::vector<discovery::ModelTerm> library =
+      discovery::of_families(discovery::standard_terms(question.inputs, &untestable), question.only, question.without);
   if (own_terms.empty()) return library;
   std::vector<discovery::ModelTerm> terms;
   for (const OwnTerm& own : own_terms) {
@@ -228,10 +228,10 @@ nb::dict find_missing(const Array& inputs, const std::vector<std::string>& input
 
 // The corrected simulation at other inputs; `tabulated`: its outputs there, if they alone are known.
 auto corrected(const Array& inputs, const std::vector<std::string>& input_names, const std::string& order,
-               const std::vector<std::string>& only, const std::vector<std::string>& without, const Array& simulated, const std::vector<std::string>& output_names, const nb::object& predict,
-               const nb::list& parameters, bool offset, bool scale, const std::vector<OwnTerm>& own_terms,
-               bool own_terms_only, const std::string& state, const Array& elsewhere,
-               const std::optional<Array>& tabulated) {
+               const std::vector<std::string>& only, const std::vector<std::string>& without, const Array& simulated,
+               const std::vector<std::string>& output_names, const nb::object& predict, const nb::list& parameters,
+               bool offset, bool scale, const std::vector<OwnTerm>& own_terms, bool own_terms_only,
+               const std::string& state, const Array& elsewhere, const std::optional<Array>& tabulated) {
   Question question = question_of(inputs, input_names, order, simulated, output_names, only, without);
   const Eigen::MatrixXd there = tabulated ? Eigen::MatrixXd(rows_of(*tabulated)) : Eigen::MatrixXd();
   set_simulation(question, predict, parameters, offset, scale, there);
@@ -247,13 +247,14 @@ auto corrected(const Array& inputs, const std::vector<std::string>& input_names,
 
 void add_terms(nb::module_& module) {
   using nb::arg;
-  module.def("find_missing", &find_missing, nb::kw_only(), arg("inputs"), arg("input_names"), arg("order"),
-             arg("only"), arg("without"), arg("instants"), arg("runs"), arg("simulated"), arg("measured"), arg("output_names"), arg("predict").none(), arg("parameters"),
-             arg("offset"), arg("scale"), arg("terms"), arg("own_terms_only"), arg("held_out"), arg("seed"),
-             arg("simulated_name"), arg("measured_name"), arg("report").none());
+  module.def("find_missing", &find_missing, nb::kw_only(), arg("inputs"), arg("input_names"), arg("order"), arg("only"),
+             arg("without"), arg("instants"), arg("runs"), arg("simulated"), arg("measured"), arg("output_names"),
+             arg("predict").none(), arg("parameters"), arg("offset"), arg("scale"), arg("terms"), arg("own_terms_only"),
+             arg("held_out"), arg("seed"), arg("simulated_name"), arg("measured_name"), arg("report").none());
   module.def("corrected", &corrected, nb::kw_only(), arg("inputs"), arg("input_names"), arg("order"), arg("only"),
-             arg("without"), arg("simulated"), arg("output_names"), arg("predict").none(), arg("parameters"), arg("offset"), arg("scale"), arg("terms"),
-             arg("own_terms_only"), arg("state"), arg("elsewhere"), arg("tabulated").none());
+             arg("without"), arg("simulated"), arg("output_names"), arg("predict").none(), arg("parameters"),
+             arg("offset"), arg("scale"), arg("terms"), arg("own_terms_only"), arg("state"), arg("elsewhere"),
+             arg("tabulated").none());
 }
 
 }  // namespace llmt::python
