@@ -109,7 +109,13 @@ urdf::ModelInterfaceSharedPtr parsed(const std::string& text, const std::string&
     throw std::runtime_error(fmt::format("{}: no URDF: {}", name, error.what()));
   }
   if (!model) throw std::runtime_error(fmt::format("{}: no URDF: {}", name, listener.said()));
-  check_tree(*model, name);
+  try {
+    check_tree(*model, name);
+  } catch (...) {
+    // Links of a loop own each other.
+    for (const auto& [link, body] : model->links_) body->child_links.clear();
+    throw;
+  }
   check_masses(*model, listener, name);
   return model;
 }
