@@ -157,10 +157,20 @@ Comparison read_comparison(const DiscoverArguments& arguments, bool every_column
   return comparison;
 }
 
+// Families that nothing has are wrong usage, whatever the data.
+std::vector<discovery::ModelTerm> of_families_to_try(const DiscoverArguments& arguments,
+                                                     std::vector<discovery::ModelTerm> library) {
+  try {
+    return discovery::of_families(std::move(library), arguments.only, arguments.without);
+  } catch (const std::invalid_argument& error) {
+    throw CLI::ValidationError("--only, --without", error.what());
+  }
+}
+
 std::vector<discovery::ModelTerm> terms_to_try(const DiscoverArguments& arguments, const Comparison& comparison,
                                                std::vector<discovery::UntestableCause>& untestable) {
-  std::vector<discovery::ModelTerm> library = discovery::of_families(
-      discovery::standard_terms(comparison.inputs, &untestable), arguments.only, arguments.without);
+  std::vector<discovery::ModelTerm> library =
+      of_families_to_try(arguments, discovery::standard_terms(comparison.inputs, &untestable));
   if (arguments.terms.empty()) return library;
   std::vector<std::string> taken;
   for (const discovery::ModelTerm& term : library) taken.push_back(term.family);

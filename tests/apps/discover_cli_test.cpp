@@ -241,6 +241,35 @@ TEST(LlmtDiscover, PrintsWhatThePageSays) {
   EXPECT_EQ(folder.run(command).out, block(page, "text", 1));
 }
 
+TEST(LlmtDiscover, RowsOfALogAreMeansOverBlocks) {
+  const Folder folder;
+  // Three sines, noise that is alike in neighbours, and nothing missing.
+  llmt::Random random(3);
+  std::string simulated = "time,run,x,v,y\n";
+  std::string measured = simulated;
+  double noise = 0.0;
+  for (int i = 0; i < 1000; ++i) {
+    const double t = 0.02 * i;
+    const double x = std::sin(t) + 0.5 * std::sin(2.3 * t + 1.0) + 0.3 * std::sin(3.1 * t);
+    const double v = std::cos(t) + 1.15 * std::cos(2.3 * t + 1.0) + 0.93 * std::cos(3.1 * t);
+    noise = 0.9 * noise + 0.1 * random.normal();
+    simulated += fmt::format("{},run {},{},{},{}\n", t, i / 200, x, v, x + v);
+    measured += fmt::format("{},run {},{},{},{}\n", t, i / 200, x, v, x + v + noise);
+  }
+  folder.write("s.csv", simulated);
+  folder.write("m.csv", measured);
+  const std::string command = discover + "s.csv m.csv --target y --time time --group run";
+  const Outcome text = folder.run(command);
+  EXPECT_NE(text.out.find("1000 rows, inputs x, v\n"), std::string::npos) << text.out << text.err;
+  EXPECT_NE(text.out.find("Rows in time, 0.0200 in time apart: "), std::string::npos) << text.out;
+  EXPECT_NE(text.out.find("VERDICT: nothing is missing beyond noise"), std::string::npos) << text.out;
+  const json report = json::parse(folder.run(command + " --json").out);
+  EXPECT_EQ(report["gap"]["heldout_samples"], 200);  // one run of five
+  EXPECT_GT(report["time"]["rows_per_sample"], 1);
+  EXPECT_LT(report["time"]["independent_share"], 0.9);
+  EXPECT_FALSE(report["time"]["found_out"]);
+}
+
 TEST(LlmtDiscover, MistakesHaveTheirExitCodeAndMessage) {
   const Folder folder;
   write_tables(folder, 60, step_and_settling);
@@ -277,6 +306,12 @@ TEST(LlmtDiscover, MistakesHaveTheirExitCodeAndMessage) {
       {"s.csv m.csv --target y --inputs a,a", 2, "\"a\" is given twice"},
       {"s.csv m.csv --target y --inputs a,y", 2, "\"y\" is an output and cannot be an input"},
       {"s.csv m.csv --target y --own-terms-only", 2, "--terms"},
+      {"s.csv m.csv --target y --time y", 2, "\"y\" is an output and cannot be the time or the group"},
+      {"s.csv m.csv --target y --time t --order t", 2, "--order is not needed beside it"},
+      {"s.csv m.csv --target y --group t", 2, "--group needs --time"},
+      {"s.csv m.csv --target y --time q", 1, "\"q\""},
+      {"s.csv m.csv --target y --only lineal", 2, "there is no family \"lineal\" among the terms to try: absolute, "},
+      {"s.csv m.csv --target y --without lineal", 2, "there is no family \"lineal\""},
       {"no.csv m.csv --target y", 1, "no.csv: cannot be read"},
       {"empty.csv m.csv --target y", 1, "empty.csv: "},
       {"header.csv m.csv --target y", 1, "header.csv: no rows"},

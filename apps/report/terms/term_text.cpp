@@ -22,17 +22,19 @@ std::string value_text(const discovery::TermValue& value) {
   return text + " " + value.unit;
 }
 
-std::string time_text(const discovery::TimeUse& time, const std::string& unit) {
+std::string time_text(const discovery::TimeUse& time, const std::string& column) {
+  const std::string unit = column.empty() ? " rows" : fmt::format(" in {}", column);
   std::string text = fmt::format(
-      "Rows in time, {} {} apart{}: ", number(time.step, 3), unit,
+      "Rows in time, {}{} apart{}: ", number(time.step, 3), unit,
       time.found_out ? " (found out: the inputs are smooth along the rows; --time COLUMN names their time)" : "");
   text += time.rows_per_sample == 1
               ? fmt::format("{} are searched as they are.", time.samples)
               : fmt::format("{} means over {} rows each are searched.", time.samples, time.rows_per_sample);
   constexpr double hardly = 0.9;
   if (time.independent_share < hardly) {
-    text += fmt::format(" What is left is correlated over {} {}: {:.0f} % of the means count as independent.",
-                        number(time.correlation_time, 2), unit, 100.0 * time.independent_share);
+    text += fmt::format("\nWhat is left is correlated over {}{}: {:.0f} % of the {} count as independent.",
+                        number(time.correlation_time, 2), unit, 100.0 * time.independent_share,
+                        time.rows_per_sample == 1 ? "rows" : "means");
   }
   return text + "\n";
 }

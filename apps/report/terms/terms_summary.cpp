@@ -96,7 +96,7 @@ std::string terms_text(const TermsSummary& summary, std::size_t width) {
   text += fmt::format("{} rows set aside (seed {}), {} searched, {} candidate terms, {} {} of search\n",
                       missing.held_out.size(), summary.seed, missing.searched.size(), missing.candidates.size(),
                       missing.rounds, missing.rounds == 1 ? "round" : "rounds");
-  if (missing.time.in_time) text += time_text(missing.time, summary.time.empty() ? "rows" : "of " + summary.time);
+  if (missing.time.in_time) text += time_text(missing.time, summary.time);
   text += fmt::format("\nVERDICT: {}\n", headline(missing));
   if (is_exact(missing)) {
     text += "The simulation gives the measured values exactly: there is no gap to explain.\n";
