@@ -179,3 +179,36 @@ def test_progress_may_stop_the_work(table):
 
     with pytest.raises(KeyboardInterrupt):
         llmt.discover(plate, {"R": 1.0, "tau": 100.0}, *table, progress=stop)
+
+
+def log_of_a_mass(n=1000, rho=0.9):
+    """Three sines, drag that the simulation lacks, and noise that is alike in neighbouring rows."""
+    t = 0.02 * np.arange(n)
+    dq = np.cos(t) + 1.15 * np.cos(2.3 * t + 1.0) + 0.93 * np.cos(3.1 * t)
+    ddq = np.gradient(dq, t)
+    random = np.random.default_rng(1)
+    noise = np.zeros(n)
+    for i in range(1, n):
+        noise[i] = rho * noise[i - 1] + 0.1 * random.normal()
+    inputs = {"dq": dq, "ddq": ddq}
+    return t, inputs, {"force": 3.0 * ddq}, {"force": 3.0 * ddq + 1.5 * dq * np.abs(dq) + noise}
+
+
+def test_rows_of_a_log_are_told_by_their_time():
+    t, inputs, simulated, measured = log_of_a_mass()
+    groups = ["a"] * 200 + ["b"] * 200 + ["c"] * 200 + ["d"] * 200 + ["e"] * 200
+    found = llmt.find_missing(inputs, simulated, measured, time=t, groups=groups)
+    assert [effect["name"] for effect in found.to_dict()["effects"]] == ["signed_square"]
+    assert found.to_dict()["time"]["independent_share"] < 0.9
+    assert len(found.held_out) == 200 and len({groups[row] for row in found.held_out}) == 1
+    only = llmt.find_missing(inputs, simulated, measured, time=t, only="cube")
+    assert {effect["name"] for effect in only.to_dict()["effects"]} <= {"cube"}
+    for wrong, word in (
+        ({"groups": groups}, "groups needs time"),
+        ({"time": t[:3]}, "time has the shape"),
+        ({"time": t, "groups": groups[:2]}, "groups has the shape"),
+        ({"time": t, "order": "dq"}, "order is not needed"),
+        ({"without": "cubes"}, 'no family "cubes"'),
+    ):
+        with pytest.raises(ValueError, match=word):
+            llmt.find_missing(inputs, simulated, measured, **wrong)
