@@ -1,6 +1,8 @@
 // The largest inputs that are permitted, measured for docs/threat-model.md.
 #include <fmt/format.h>
 
+#include <cstdint>
+
 #include "hostile/lists.hpp"
 
 namespace hostile {
@@ -54,7 +56,7 @@ void ask_largest(List& list, const std::string& program, const std::string& robo
           {robot_program, "mechanism", "large_mechanism.yaml", "--simulate", "1", "-o", "large.csv"});
 
   std::string table = "a,b,kind,y\n";
-  for (int i = 0; i < 40000; ++i)
+  for (std::int64_t i = 0; i < 40000; ++i)
     table += fmt::format("{},{},c{},{}\n", (i * 7919) % 40009, (i * 104729) % 39989, i % 10000, i % 97);
   write("large.csv", table);
   measure(list, "table of 40 000 rows, 10 000 categories: fit",
