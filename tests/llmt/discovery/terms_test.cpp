@@ -174,6 +174,24 @@ TEST(StandardTerms, SeveralAreFoundTogether) {
   EXPECT_LT(missing.gaps[0].after, 0.1);
 }
 
+// 0.5 a + 0.3 (a - a of the row before) is also 0.8 a - 0.3 (a of the row before), and 0.5 (a of the row before) + 0.8
+// (a - a of the row before).
+TEST(StandardTerms, TheRowItselfIsNamedBeforeTheRowBefore) {
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+    Bench data = bench(seed, 300, 0.05, [](double, double a, double, double) { return 0.5 * a; });
+    for (Eigen::Index i = 1; i < 300; ++i) {
+      data.measured.values(i, 0) += 0.3 * (data.inputs.values(i, 1) - data.inputs.values(i - 1, 1));
+    }
+    const Missing missing = missing_from(data);
+    EXPECT_EQ(missing.answer, Answer::named) << seed;
+    ASSERT_EQ(missing.found.size(), 2U) << seed;
+    EXPECT_EQ(missing.found[0].family, "linear") << seed;
+    EXPECT_EQ(missing.found[1].family, "rate") << seed;
+    EXPECT_NEAR(missing.found[0].coefficients(0), 0.5, 0.02) << seed;
+    EXPECT_NEAR(missing.found[1].coefficients(0), 0.3, 0.02) << seed;
+  }
+}
+
 TEST(StandardTerms, OutliersAreRowsAndNotTerms) {
   Bench data = bench(6, 200, 0.05, [](double, double a, double, double) { return 0.1 * a * a; });
   MissingOptions options;

@@ -49,6 +49,9 @@ struct ModelTerm {
   bool generic = false;        ///< not a cause but a shape: what it explains is "unknown, depends on `inputs`"
   Eigen::VectorXd lower = {};  ///< k plausible limits of the coefficients, or empty: none
   Eigen::VectorXd upper = {};
+  /// Where terms predict the same at every row, the less complex one gets the name. The library's have 1 (a constant)
+  /// to 11 (the value of the row before).
+  int complexity = 0;
 };
 
 /// Inputs that terms are made of.

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
 #include <numeric>
 #include <set>
@@ -156,6 +157,18 @@ void add_functions(const InputView& input, std::vector<ModelTerm>& terms) {
   }
 }
 
+// A constant, one input, functions of it, several inputs, a constant that is searched, the row before.
+int complexity_of(const ModelTerm& term) {
+  static const std::map<std::string, int> of_family = {
+      {"offset", 1},         {"linear", 2},         {"gain", 2},       {"square", 3},    {"sign", 3},
+      {"absolute", 3},       {"cube", 4},           {"root", 4},       {"log", 4},       {"reciprocal", 4},
+      {"signed_square", 4},  {"gain_curvature", 4}, {"harmonic1", 5},  {"harmonic2", 5}, {"product", 6},
+      {"square_product", 7}, {"rate", 10},          {"direction", 10}, {"previous", 11}};
+  constexpr int with_constant = 8;
+  const auto found = of_family.find(term.family);
+  return found != of_family.end() ? found->second : with_constant;
+}
+
 }  // namespace
 
 ModelTerm function_term(const InputView& input, std::string family, std::string formula, std::string per,
@@ -206,6 +219,7 @@ std::vector<ModelTerm> standard_terms(const Inputs& inputs, std::vector<Untestab
     if (input.name != inputs.order) add(sequence_terms(input, inputs.order));
   }
   add(products_of(moving));
+  for (ModelTerm& term : terms) term.complexity = complexity_of(term);
   add(shapes_of(moving));
   return terms;
 }
