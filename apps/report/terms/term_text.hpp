@@ -17,4 +17,10 @@ std::string value_text(const discovery::TermValue& value);
 /// The verdict in a phrase: "2 terms are missing".
 std::string headline(const discovery::Missing& missing);
 
+/// The same with the names: "2 terms are missing: step of load, settling of minute".
+std::string headline_with_names(const discovery::Missing& missing);
+
+/// How far the terms close the gap, in a sentence; empty if no rows were set aside or nothing was found.
+std::string gap_sentence(const discovery::Missing& missing);
+
 }  // namespace llmt::report

@@ -129,7 +129,7 @@ TEST(StandardTerms, NoiseHasNone) {
 TEST(StandardTerms, WhatTheyDoNotHoldIsNotConfirmed) {
   const std::vector<Hidden> hidden = {
       [](double, double a, double, double) { return 0.5 * std::exp(-std::pow((a - 1.0) / 0.7, 2)); },
-      [](double, double a, double, double) { return 0.4 * std::tanh(1.5 * (a - 1.3)); },
+      [](double, double a, double, double) { return (a - 1.3) * std::exp(-std::pow(a - 1.3, 2)); },
       [](double, double a, double b, double) {
         return 0.4 * std::exp(-std::pow(a - 1.0, 2)) * std::tanh(6.0 * b - 3.0);
       },
@@ -143,9 +143,9 @@ TEST(StandardTerms, WhatTheyDoNotHoldIsNotConfirmed) {
     constexpr int seeds = 3;
     for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
       const Missing missing = missing_from(bench(seed, 200, 0.05, hidden[k]));
-      EXPECT_NE(missing.answer, Answer::nothing_missing) << k;
       unsure += std::ranges::none_of(missing.found, &FoundTerm::confirmed) ? 1 : 0;
-      EXPECT_TRUE(missing.answer == Answer::unknown || !missing.structure.empty()) << k;
+      // "Named" would say that the names are sure.
+      EXPECT_EQ(missing.answer, Answer::unknown) << k;
     }
     EXPECT_EQ(unsure, seeds) << k;
   }

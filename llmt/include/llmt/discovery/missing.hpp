@@ -73,12 +73,14 @@ struct FoundTerm {
   double share = 0.0;  ///< of the explained sum of squares that goes with it alone
 };
 
-/// Root mean square errors of one output on the rows that were set aside (NaN if there are none).
+/// Root mean square errors of one output on the rows that were set aside (NaN if there are none), without outliers as
+/// in the noise floor.
 struct Gap {
   std::string output;
-  double before = 0.0;       ///< the simulation, its own parameters adjusted
-  double after = 0.0;        ///< with the terms found
-  double noise_floor = 0.0;  ///< of the noise, from repeats where there are enough, else from what is left
+  double before = 0.0;        ///< the simulation, its own parameters adjusted
+  double after = 0.0;         ///< with the terms found
+  double noise_floor = 0.0;   ///< of the noise, from repeats where there are enough, else from what is left
+  Eigen::Index outliers = 0;  ///< rows set aside that deviate by more than 5 noise floors both before and after
 };
 
 /// A part of the gap that is not noise and that no term explains: rows that are neighbours in some inputs deviate
@@ -99,7 +101,8 @@ struct VisibleTerm {
 
 /// Outcome of find_missing().
 struct Missing {
-  /// As Verdict::answer; but unknown if material structure is left although nothing was found.
+  /// As Verdict::answer; but unknown if material structure is left although nothing was found, and if not every term
+  /// found is confirmed: what those stand for has no name yet.
   Answer answer = Answer::nothing_missing;
   Verdict verdict;  ///< of the last search; candidates in it are numbers of `candidates`, samples those of `searched`
   std::vector<std::string> candidates;

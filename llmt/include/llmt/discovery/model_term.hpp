@@ -44,7 +44,7 @@ struct ModelTerm {
   std::string per = {};  ///< a coefficient is in units of the output by this, "a^2"; empty: in those of the output
   /// n x k. Called as Simulation::predict is.
   std::function<Eigen::MatrixXd(const Rows& rows, const Eigen::VectorXd& constants)> columns;
-  std::vector<TermConstant> constants = {};  ///< at most one
+  std::vector<TermConstant> constants = {};  ///< at most two; of two, both smooth
   std::string output = {};                   ///< the output it changes; empty: each output is a place of its own
   bool generic = false;        ///< not a cause but a shape: what it explains is "unknown, depends on `inputs`"
   Eigen::VectorXd lower = {};  ///< k plausible limits of the coefficients, or empty: none
@@ -52,6 +52,8 @@ struct ModelTerm {
   /// Where terms predict the same at every row, the less complex one gets the name. The library's have 1 (a constant)
   /// to 11 (the value of the row before).
   int complexity = 0;
+  /// Added to the score: how much better a term must explain that contains simpler ones or comes close to them.
+  double prior_cost = 0.0;
 };
 
 /// Inputs that terms are made of.

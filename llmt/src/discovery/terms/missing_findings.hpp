@@ -28,9 +28,13 @@ std::vector<Structure> structure_beside(const TermModel& model, const TermData& 
 
 /// Missing::answer, and which terms are confirmed:
 ///
-/// - the answer is that of the search; but "unknown" where the search found nothing and structure is left;
+/// - the answer is that of the search; but "unknown" where the search found nothing and structure is left, and where a
+///   term is not confirmed;
 /// - a term is confirmed if it is a cause, the search found no shapes, no structure is left in its output, and it is
 ///   not one of many terms of its inputs, which together may only approximate another function.
 void decide(Missing& missing);
+
+/// Of the errors of an output on the rows set aside, before and after.
+Gap gap_of(std::string output, const Eigen::VectorXd& before, const Eigen::VectorXd& after, double noise_floor);
 
 }  // namespace llmt::discovery

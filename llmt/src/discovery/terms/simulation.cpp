@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 
 #include "discovery/terms/missing_findings.hpp"
@@ -17,8 +16,6 @@ namespace {
 
 // A search, and the fit after it, count as this share of the work that is left: the number of rounds is not known.
 constexpr double share_of_half_a_round = 0.2;
-
-constexpr double unknown_number = std::numeric_limits<double>::quiet_NaN();
 
 void check(const Simulation& simulation, const Inputs& inputs, const MeasuredOutputs& measured,
            const MissingOptions& options) {
@@ -103,11 +100,6 @@ Settled search_until_settled(const TermModel& model, TermData& data, const std::
   return settled;
 }
 
-double rms_at(const Eigen::VectorXd& errors, const std::vector<Eigen::Index>& rows) {
-  if (rows.empty()) return unknown_number;
-  return std::sqrt(errors(rows).squaredNorm() / static_cast<double>(rows.size()));
-}
-
 }  // namespace
 
 Simulation tabulated(const Eigen::MatrixXd& simulated, const std::vector<std::string>& outputs, bool offset,
@@ -189,9 +181,10 @@ Missing find_missing(const Simulation& simulation, const Inputs& inputs, const M
   missing.floor_from_repeats = settled.verdict.lack_of_fit.has_enough_repeats();
   const double noise = missing.floor_from_repeats ? settled.verdict.lack_of_fit.noise : settled.verdict.noise;
   for (Eigen::Index o = 0; o < d; ++o) {
-    missing.gaps.push_back({measured.names[o], rms_at(measured.values.col(o) - missing.before.col(o), split.held_out),
-                            rms_at(measured.values.col(o) - missing.corrected.col(o), split.held_out),
-                            noise * data.sigma(o)});
+    const Eigen::VectorXd before = measured.values.col(o) - missing.before.col(o);
+    const Eigen::VectorXd after = measured.values.col(o) - missing.corrected.col(o);
+    missing.gaps.push_back(
+        gap_of(measured.names[o], before(split.held_out), after(split.held_out), noise * data.sigma(o)));
   }
   work.finish();
   return missing;
