@@ -104,7 +104,7 @@ double left_over(const Eigen::MatrixXd& columns, const Eigen::VectorXd& hidden) 
 Outcome judged(const Missing& missing, const std::vector<ModelTerm>& terms, const Rows& rows,
                const Eigen::VectorXd& hidden, double sigma) {
   if (missing.answer == Answer::nothing_missing) return nothing;
-  if (missing.answer == Answer::unknown || !std::ranges::any_of(missing.found, &FoundTerm::confirmed)) return unknown;
+  if (!std::ranges::any_of(missing.found, &FoundTerm::confirmed)) return unknown;
   Eigen::MatrixXd all(hidden.size(), 0);
   for (const FoundTerm& found : missing.found) {
     const Eigen::MatrixXd columns = terms[found.term].columns(rows, found.constants);

@@ -86,7 +86,7 @@ TEST(LlmtDiscover, NamesWhatIsMissingAndCorrectsIt) {
 
   const Outcome text = folder.run(command);
   for (const std::string expected :
-       {"VERDICT: 2 terms are missing", "step of a", "settling of t", "Gap on the 40 rows set aside", "t <= "}) {
+       {"VERDICT: 2 terms are missing: ", "step of a", "settling of t", "Gap on the 40 rows set aside", "t <= "}) {
     EXPECT_NE(text.out.find(expected), std::string::npos) << expected << "\n" << text.out;
   }
   EXPECT_EQ(folder.run(command).out, text.out);
@@ -125,7 +125,7 @@ TEST(LlmtDiscover, OwnTermsAreTriedUnderTheirNames) {
 
 TEST(LlmtDiscover, WhatNoTermExplainsIsUnknown) {
   const Folder folder;
-  write_tables(folder, 200, [](const Inputs& row) { return 0.4 * std::tanh(1.5 * (row.a - 1.3)); });
+  write_tables(folder, 200, [](const Inputs& row) { return 0.5 * std::exp(-std::pow((row.a - 1.0) / 0.7, 2)); });
   const json report = json::parse(folder.run(discover + "s.csv m.csv --target y --json").out);
   EXPECT_EQ(report["verdict"], "unknown effect");
   EXPECT_EQ(report["unknown"]["acts_on"], "y");

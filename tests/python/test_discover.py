@@ -47,7 +47,7 @@ def test_the_term_and_the_parameters_are_found(found):
     for parameter, truth in zip(found.to_dict()["simulation"], (0.82, 140.0), strict=True):
         assert abs(parameter["value"] - truth) < 3.0 * parameter["std_error"]
     assert found.gap["after"] < 0.5 * found.gap["before"]
-    assert found.summary == "VERDICT: one term is missing" and "plate against measured" in str(found)
+    assert found.summary == "VERDICT: one term is missing: cooling" and "plate against measured" in str(found)
 
 
 def test_prediction_is_simulation_and_terms(found, table):

@@ -117,15 +117,15 @@ Json terms_table(const Missing& missing) {
 
 Document terms_report(const Simulated& of) {
   const Missing& missing = of.missing;
-  std::vector<std::string> names;
-  for (const discovery::FoundTerm& found : missing.found) names.push_back(title_of(found, missing.gaps.size() > 1));
-  std::string answer = headline(missing);
+  std::string answer = headline_with_names(missing);
   answer.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(answer.front())));
   Document document{.title = fmt::format("llmt discover {} {}", file_name(of.simulated), file_name(of.measured)),
-                    .answer = answer + (names.empty() ? "." : fmt::format(": {}.", fmt::join(names, "; ")))};
-  document.lead = fmt::format("{} rows, inputs {}. {} candidates; evidence {}, where chance reaches {}.",
-                              of.values.rows(), fmt::join(of.inputs.names, ", "), missing.candidates.size(),
-                              number(missing.verdict.score_gain, 3), number(missing.verdict.threshold, 3));
+                    .answer = answer + "."};
+  const std::string sentence = gap_sentence(missing);
+  document.lead = fmt::format("{}{}{} rows, inputs {}. {} candidates; evidence {}, where chance reaches {}.", sentence,
+                              sentence.empty() ? "" : " ", of.values.rows(), fmt::join(of.inputs.names, ", "),
+                              missing.candidates.size(), number(missing.verdict.score_gain, 3),
+                              number(missing.verdict.threshold, 3));
   document.main = gap_chart(missing);
   Section shapes{"The shape of the gap"};
   const auto position = [&](const std::string& name) {

@@ -1,6 +1,7 @@
 #include "report/terms/term_text.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -50,15 +51,50 @@ std::string headline(const discovery::Missing& missing) {
       return is_correlated ? "nothing is missing beyond noise that is alike in neighbouring rows"
                            : "nothing is missing that these rows could show";
     case discovery::Answer::named:
-      return terms + (sure < causes ? " missing, but not all of this is certain" : " missing");
+      return terms + " missing";
     case discovery::Answer::indistinguishable:
       return terms + " missing, but other terms explain it as well";
     case discovery::Answer::unknown:
-      return "something is missing that no term tried explains";
+      return sure == 0 ? "something is missing that no term tried explains"
+                       : fmt::format("{} missing, and something more that no term tried explains",
+                                     sure == 1 ? "one term is" : fmt::format("{} terms are", sure));
     case discovery::Answer::failed_held_out:
       return "failed on held-out rows: with the terms found the error on the rows set aside is larger";
   }
   return "";
+}
+
+std::string headline_with_names(const discovery::Missing& missing) {
+  constexpr std::size_t most = 4;  // names
+  const auto joined = [&](bool confirmed) {
+    std::vector<std::string> names;
+    std::size_t more = 0;
+    for (const discovery::FoundTerm& found : missing.found) {
+      if (found.generic || found.confirmed != confirmed) continue;
+      if (names.size() < most) {
+        names.push_back(title_of(found, missing.gaps.size() > 1));
+      } else {
+        ++more;
+      }
+    }
+    return fmt::format("{}{}", fmt::join(names, ", "), more > 0 ? fmt::format(" and {} more", more) : "");
+  };
+  const std::string sure = joined(true);
+  const std::string alike = joined(false);
+  std::string text = headline(missing);
+  if (!sure.empty()) text += ": " + sure;
+  if (!alike.empty()) text += fmt::format("{} looks like {}", sure.empty() ? "; it" : "; the rest", alike);
+  return text;
+}
+
+std::string gap_sentence(const discovery::Missing& missing) {
+  if (missing.found.empty() || missing.held_out.empty()) return "";
+  std::vector<std::string> parts;
+  for (const discovery::Gap& gap : missing.gaps) {
+    parts.push_back(fmt::format("{} from {} to {}", gap.output, number(gap.before, 3), number(gap.after, 3)));
+  }
+  return fmt::format("On rows set aside {} the error of {}.", missing.found.size() == 1 ? "it takes" : "they take",
+                     fmt::join(parts, ", "));
 }
 
 }  // namespace llmt::report

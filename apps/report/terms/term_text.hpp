@@ -20,4 +20,10 @@ std::string time_text(const discovery::TimeUse& time, const std::string& column)
 
 std::string headline(const discovery::Missing& missing);
 
+/// The same with the names: "2 terms are missing: step of load, settling of minute".
+std::string headline_with_names(const discovery::Missing& missing);
+
+/// How far the terms close the gap, in a sentence; empty if no rows were set aside or nothing was found.
+std::string gap_sentence(const discovery::Missing& missing);
+
 }  // namespace llmt::report

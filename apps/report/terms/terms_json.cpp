@@ -62,7 +62,8 @@ Json gap_json(const discovery::Missing& missing) {
     gaps.push_back({{"output", gap.output},
                     {"before", finite_or_null(gap.before)},
                     {"after", finite_or_null(gap.after)},
-                    {"noise_floor", finite_or_null(gap.noise_floor)}});
+                    {"noise_floor", finite_or_null(gap.noise_floor)},
+                    {"outliers", gap.outliers}});
   }
   // Errors of outputs in different units do not add up.
   const auto only = [&](const char* field) { return gaps.size() == 1 ? gaps[0][field] : Json(nullptr); };

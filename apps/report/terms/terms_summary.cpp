@@ -20,11 +20,12 @@ std::string found_text(const Missing& missing) {
   std::string text;
   int place = 0;
   for (const FoundTerm& found : missing.found) {
-    text += fmt::format("\n{}. {}: without it {:.0f} % of what is explained would be lost{}\n", ++place,
-                        title_of(found, missing.gaps.size() > 1), 100.0 * found.share,
+    text += fmt::format("\n{}. {}{}: without it the other terms would explain {:.0f} % less\n", ++place,
+                        title_of(found, missing.gaps.size() > 1),
                         found.generic     ? ""
                         : found.confirmed ? ", confirmed"
-                                          : ", tentative");
+                                          : ", tentative",
+                        100.0 * found.share);
     if (found.generic) {
       text += "   no term that was tried has this shape; the corrected simulation follows it as measured\n";
       continue;
@@ -33,14 +34,26 @@ std::string found_text(const Missing& missing) {
     const std::string factor = found.coefficients.size() == 1 ? found.values.front().name + " * " : "";
     text += fmt::format("   add to {}: {}{}\n", found.output, factor, found.formula);
     for (const discovery::TermValue& value : found.values) text += "   " + value_text(value) + "\n";
-    if (found.coefficients.size() == 2) {
+    if (found.coefficients.size() == 2 && found.values.front().name == "C") {
       text += fmt::format("   amplitude sqrt(C^2 + S^2) = {} {}\n", number(found.coefficients.norm()), found.output);
     }
     if (!found.shrinks_gap) text += "   on the rows set aside it does not help\n";
     for (const discovery::RivalTerms& rival : found.rivals) {
-      text += fmt::format("   or instead {}: {}\n", rival.what,
-                          rival.exact ? "the same at every row, these rows cannot tell" : "explains as well");
+      text += fmt::format(
+          "   or instead {}: {}\n", rival.what,
+          rival.exact ? "beside the other terms it gives the same values at every row" : "explains as well");
     }
+  }
+  return text;
+}
+
+// The noise floor is without outliers; so are the errors beside it.
+std::string outliers_aside(const Missing& missing) {
+  std::string text;
+  for (const discovery::Gap& gap : missing.gaps) {
+    if (gap.outliers == 0) continue;
+    text += fmt::format("Left out of these figures of {}: {} set aside, far from both simulation and correction.\n",
+                        gap.output, gap.outliers == 1 ? "one row" : fmt::format("{} rows", gap.outliers));
   }
   return text;
 }
@@ -56,9 +69,11 @@ std::string gaps_text(const Missing& missing, std::size_t width) {
     table.add({gap.output, number(gap.before), number(gap.after), number(gap.noise_floor)});
   }
   return head + table.text(width) +
-         (missing.floor_from_repeats ? "The noise floor comes from rows of equal inputs.\n"
-                                     : "Too few rows have equal inputs to measure the noise: the error left over was "
-                                       "used as the noise floor.\n");
+         (missing.floor_from_repeats
+              ? "The noise floor comes from rows of equal inputs.\n"
+              : "Too few rows have equal inputs to measure the noise: the noise floor is what is "
+                "left on the rows searched.\n") +
+         outliers_aside(missing);
 }
 
 std::string regions_text(const std::vector<GapRegion>& regions, std::size_t width) {
@@ -90,14 +105,14 @@ bool is_exact(const Missing& missing) {
 
 std::string terms_text(const TermsSummary& summary, std::size_t width) {
   const Missing& missing = summary.missing;
-  std::string text;
-  text += fmt::format("{} against {}: {} rows, inputs {}\n", summary.simulated, summary.measured, summary.rows,
+  std::string text = fmt::format("VERDICT: {}\n", headline_with_names(missing));
+  if (const std::string sentence = gap_sentence(missing); !sentence.empty()) text += sentence + "\n";
+  text += fmt::format("\n{} against {}: {} rows, inputs {}\n", summary.simulated, summary.measured, summary.rows,
                       fmt::join(summary.inputs, ", "));
   text += fmt::format("{} rows set aside (seed {}), {} searched, {} candidate terms, {} {} of search\n",
                       missing.held_out.size(), summary.seed, missing.searched.size(), missing.candidates.size(),
                       missing.rounds, missing.rounds == 1 ? "round" : "rounds");
   if (missing.time.in_time) text += time_text(missing.time, summary.time);
-  text += fmt::format("\nVERDICT: {}\n", headline(missing));
   if (is_exact(missing)) {
     text += "The simulation gives the measured values exactly: there is no gap to explain.\n";
     return text;

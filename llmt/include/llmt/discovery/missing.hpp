@@ -90,12 +90,13 @@ struct TimeUse {
 };
 
 /// Root mean square errors of one output on the samples that were set aside (NaN if there are none): rows, or in time
-/// the means over blocks of rows.
+/// the means over blocks of rows. Without outliers, as in the noise floor.
 struct Gap {
   std::string output;
-  double before = 0.0;       ///< the simulation, its own parameters adjusted
-  double after = 0.0;        ///< with the terms found
-  double noise_floor = 0.0;  ///< of the noise, from repeats where there are enough, else from what is left
+  double before = 0.0;        ///< the simulation, its own parameters adjusted
+  double after = 0.0;         ///< with the terms found
+  double noise_floor = 0.0;   ///< of the noise, from repeats where there are enough, else from what is left
+  Eigen::Index outliers = 0;  ///< rows set aside that deviate by more than 5 noise floors both before and after
 };
 
 /// A part of the gap that is not noise and that no term explains: rows that are neighbours in some inputs deviate
@@ -116,8 +117,9 @@ struct VisibleTerm {
 
 /// Outcome of find_missing().
 struct Missing {
-  /// As Verdict::answer; but unknown if material structure is left although nothing was found, and failed_held_out if
-  /// what was found makes the error on the samples set aside larger.
+  /// As Verdict::answer; but unknown if material structure is left although nothing was found, and if not every term
+  /// found is confirmed: what those stand for has no name yet. Failed_held_out if what was found makes the error on the
+  /// samples set aside larger.
   Answer answer = Answer::nothing_missing;
   Verdict verdict;  ///< of the last search; candidates in it are numbers of `candidates`, samples those of `searched`
   std::vector<std::string> candidates;

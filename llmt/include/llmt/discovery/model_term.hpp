@@ -44,12 +44,17 @@ struct ModelTerm {
   std::string per = {};  ///< a coefficient is in units of the output by this, "a^2"; empty: in those of the output
   /// n x k. Called as Simulation::predict is.
   std::function<Eigen::MatrixXd(const Rows& rows, const Eigen::VectorXd& constants)> columns;
-  std::vector<TermConstant> constants = {};  ///< at most one
+  std::vector<TermConstant> constants = {};  ///< at most two; of two, both smooth
   std::string output = {};                   ///< the output it changes; empty: each output is a place of its own
   bool generic = false;        ///< not a cause but a shape: what it explains is "unknown, depends on `inputs`"
   bool history = false;        ///< depends on earlier rows: tried only beside what rows explain by themselves
   Eigen::VectorXd lower = {};  ///< k plausible limits of the coefficients, or empty: none
   Eigen::VectorXd upper = {};
+  /// Where terms predict the same at every row, the less complex one gets the name. The library's have 1 (a constant)
+  /// to 11 (the value of the row before).
+  int complexity = 0;
+  /// Added to the score: how much better a term must explain that contains simpler ones or comes close to them.
+  double prior_cost = 0.0;
 };
 
 /// Inputs that terms are made of.

@@ -26,7 +26,8 @@ namespace llmt::discovery {
 /// 3. A sample is an outlier if leaving it out lowers the score by more than a free shift of its mean costs.
 /// 4. The gain over no explanation must exceed what the best single candidate gains by chance (max-T): in normally
 ///    distributed noise, and in the residuals with random signs, both projected in the same way.
-/// 5. Generic candidates stay only where no set of causes comes within `rival_margin`.
+/// 5. Where another family in the place of one predicts the same at every sample, the less complex one gets the name.
+///    Generic candidates stay only where no set of causes comes within `rival_margin`.
 /// 6. A family is dropped if the exact leave-one-sample-out error is smaller without it, or its share is immaterial.
 /// 7. For each family, the other families that explain as well in its place are listed.
 /// 8. Findings are confirmed unless generic candidates explain a material share, or more is left than repeats scatter.

@@ -31,11 +31,15 @@ ModelTerm own_term(std::string name, std::string formula, std::function<double(c
 ///   linear x; square x^2; cube x^3; product x x'; square_product x^2 x' (up to 8 inputs); root sqrt(x); log ln(x);
 ///   reciprocal 1/x;
 ///   absolute |x|; sign sgn(x); signed_square x |x|;
-///   harmonic1, harmonic2: cos(h x), sin(h x) for inputs named *_deg or *_rad;
+///   harmonic1, harmonic2: cos(h x), sin(h x) for inputs named *_deg or *_rad, or as joint angles are (q, theta, phi,
+///   psi, angle, joint, with or without a number, *_angle) with a range of 1 to 4 pi;
 ///   wave cos(2 pi x / P), sin(2 pi x / P), the period P searched;
 ///   step [x > c], hinge max(0, x - c), hinge_below max(0, c - x), the threshold c searched;
 ///   settling exp(-(x - smallest x) / tau), tau searched; saturation x / (c + x), c searched;
 ///   tanh tanh(x/c), asinh asinh(x/c), stribeck sgn(x) exp(-(x/c)^2), c searched, of inputs that change sign;
+///   coulomb_stribeck sgn(x) (F_c + F_x exp(-(x/c)^2)), load_friction sgn(x) |s|, sign_product sgn(x) |x'|, of inputs x
+///   that change sign; power x^p, hill x^n / (c^n + x^n) or c^n / (c^n + x^n), of inputs that
+///   are never negative; sigmoid 1 / (1 + exp(-(x - c) / w)) or 1 / (1 + exp((x - c) / w)); c, p, n, w searched;
 ///   previous x_before; rate (x - x_before) / (step of order); direction: the sign of the last change of x;
 /// and shapes that carry "unknown": ?smooth (5 cosines over the range of x), ?fine (12), ?bump (a place searched, three
 /// widths), ?pair (10 products of cosines in x and x').

@@ -45,6 +45,8 @@ struct EffectCandidate {
   bool generic = false;  ///< not a cause but a shape: what it explains is "unknown, looks like this"
   /// Added to the score; 2 ln m for one that was picked as the best of m by looking at the residuals.
   double prior_cost = 0.0;
+  /// Of explanations that predict the same at every sample, the one with the less complex candidate gets the name.
+  int complexity = 0;
 };
 
 /// A cause that these samples cannot test.

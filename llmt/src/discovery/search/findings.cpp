@@ -6,63 +6,9 @@
 #include <cmath>
 #include <map>
 
-#include "discovery/search/explore.hpp"
+#include "discovery/search/replacements.hpp"
 
 namespace llmt::discovery {
-namespace {
-
-// Members of the family are replaced by the best few of another one, or by the same family elsewhere. Variants of a
-// cause at the same place are no rivals of each other: the cause has one name.
-std::vector<Rival> rivals_of(const Scoring& scoring, const Set& set, const std::string& family,
-                             const SearchOptions& options) {
-  const std::vector<EffectCandidate>& candidates = scoring.candidates();
-  const double score = scoring.score(set);
-  const Set rest = without_family(scoring, set, family);
-  const double left = scoring.fit(set).left;
-  const double explained = scoring.workspace().sum_of_squares() - left;
-  // A share of the squares explained. Columns are good to about a thousandth of that where candidates are linear
-  // only nearly, so what differs by less than three times that is the same.
-  constexpr double same = 1e-5;
-  std::set<std::string> others;
-  for (std::size_t a = 0; a < candidates.size(); ++a) {
-    if (scoring.usable(a) && !candidates[a].generic) others.insert(candidates[a].family);
-  }
-  std::set<std::string> taken;
-  for (const std::size_t a : set) {
-    if (candidates[a].family == family) taken.insert(candidates[a].location);
-  }
-  std::vector<Rival> rivals;
-  for (const std::string& other : others) {
-    std::vector<bool> allowed(candidates.size());
-    for (std::size_t a = 0; a < candidates.size(); ++a) {
-      allowed[a] = candidates[a].family == other && !(other == family && taken.contains(candidates[a].location));
-    }
-    Explained current{rest, scoring.score(rest)};
-    while (std::ssize(current.set) < options.largest_set) {
-      Explained next;
-      for (const Scoring::Move& move : scoring.additions(current.set, allowed)) {
-        if (move.score >= current.score) break;
-        const Set grown = with(current.set, move.candidate);
-        const double grown_score = scoring.score(grown);
-        if (grown_score >= current.score) continue;
-        next = {grown, grown_score};
-        break;
-      }
-      if (next.score >= current.score) break;
-      current = next;
-    }
-    if (current.set.size() == rest.size()) continue;
-    const double difference = scoring.fit(current.set).left - left;
-    const bool as_good = current.score <= score + options.rival_margin || difference < options.model_error * explained;
-    if (!as_good) continue;
-    rivals.push_back({other, filtered(current.set, [&](std::size_t a) { return !contains(rest, a); }),
-                      current.score - score, std::abs(difference) < same * explained});
-  }
-  std::ranges::stable_sort(rivals, {}, &Rival::score_difference);
-  return rivals;
-}
-
-}  // namespace
 
 std::set<std::string> families_of(const Scoring& scoring, const Set& set) {
   std::set<std::string> families;

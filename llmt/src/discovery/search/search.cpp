@@ -11,6 +11,7 @@
 #include "discovery/search/explore.hpp"
 #include "discovery/search/findings.hpp"
 #include "discovery/search/null_gate.hpp"
+#include "discovery/search/replacements.hpp"
 
 namespace llmt::discovery {
 namespace {
@@ -144,6 +145,7 @@ Verdict search(const Evidence& evidence, const std::vector<EffectCandidate>& can
   }
   const Scoring scoring(workspace, candidates);
   verdict.outliers = workspace.dropped();
+  found.set = least_complex(scoring, found.set, options);
   // Evidence that would not decide between two rivals is none.
   verdict.threshold = std::max(options.rival_margin, chance_gain(scoring, options));
   verdict.score_gain = scoring.score({}) - scoring.score(found.set);

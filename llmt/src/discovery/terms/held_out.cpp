@@ -14,6 +14,22 @@ Eigen::VectorXd squared_errors(const TermModel& model, const TermData& data, con
   return errors.reshaped(d, data.samples.size()).colwise().squaredNorm();
 }
 
+// Samples that are far off with the terms and without them say nothing of either. Where they are many, the noise is no
+// measure of what is left.
+TermData without_outliers(const TermData& data, const Eigen::VectorXd& before, const Eigen::VectorXd& after,
+                          double noise) {
+  constexpr double far = 5.0;
+  constexpr double largest_share = 0.15;
+  const double limit = far * far * noise * static_cast<double>(data.measured.cols());
+  std::vector<std::size_t> outliers;
+  for (Eigen::Index i = 0; i < before.size(); ++i) {
+    if (std::min(before(i), after(i)) > limit) outliers.push_back(static_cast<std::size_t>(i));
+  }
+  return static_cast<double>(outliers.size()) > largest_share * static_cast<double>(before.size())
+             ? data
+             : without_samples(data, outliers);
+}
+
 TermFit fit_without(const TermModel& model, const TermData& kept, const TermFit& fit, std::size_t term) {
   std::vector<PlacedTerm> rest = fit.placed;
   rest.erase(rest.begin() + static_cast<Eigen::Index>(term));
@@ -50,14 +66,16 @@ std::vector<Eigen::Index> rows_of_growth(const Samples& samples, const Eigen::Ve
 
 }  // namespace
 
-void judge_held_out(const TermModel& model, const TermData& kept, const TermData& held_out, const TermFit& baseline,
+void judge_held_out(const TermModel& model, const TermData& kept, const TermData& aside, const TermFit& baseline,
                     const Settled& settled, Missing& missing) {
-  if (held_out.samples.size() == 0 || settled.fit.placed.empty()) return;
+  if (aside.samples.size() == 0 || settled.fit.placed.empty()) return;
+  const double noise = std::pow(settled.verdict.noise, 2.0);
+  const TermData held_out =
+      without_outliers(aside, squared_errors(model, aside, baseline), squared_errors(model, aside, settled.fit), noise);
   const Eigen::VectorXd before = squared_errors(model, held_out, baseline);
   const Eigen::VectorXd after = squared_errors(model, held_out, settled.fit);
   const Eigen::VectorXd change = scaled_residuals(model, held_out, baseline.parameters, baseline.placed) -
                                  scaled_residuals(model, held_out, settled.fit.parameters, settled.fit.placed);
-  const double noise = std::pow(settled.verdict.noise, 2.0);
   const Judgement all{change.squaredNorm() / noise, (before.sum() - after.sum()) / noise};
   if (all.is_possible() && !all.shrinks()) missing.failing_rows = rows_of_growth(held_out.samples, after - before);
   const Eigen::MatrixXd simulated = model.simulated(settled.fit.parameters);

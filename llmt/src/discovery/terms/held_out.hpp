@@ -9,7 +9,7 @@ namespace llmt::discovery {
 /// units of the scatter of each output. A term is judged against a fit without it, to the samples searched, if it
 /// changes the samples set aside by more than their noise hides. `baseline`: the fit without terms; `kept`: samples
 /// searched, without outliers.
-void judge_held_out(const TermModel& model, const TermData& kept, const TermData& held_out, const TermFit& baseline,
+void judge_held_out(const TermModel& model, const TermData& kept, const TermData& aside, const TermFit& baseline,
                     const Settled& settled, Missing& missing);
 
 }  // namespace llmt::discovery

@@ -166,6 +166,35 @@ void decide(Missing& missing) {
         fmt::format("there are many terms of {}: together they may approximate one that was not tried",
                     fmt::join(sorted_inputs(found), " and ")));
   }
+  const bool is_named = missing.answer == Answer::named || missing.answer == Answer::indistinguishable;
+  if (is_named && !std::ranges::all_of(missing.found, &FoundTerm::confirmed)) missing.answer = Answer::unknown;
+}
+
+Gap gap_of(std::string output, const Eigen::VectorXd& before, const Eigen::VectorXd& after, double noise_floor) {
+  // About what makes a row searched an outlier. A row that only the terms found throw off is none.
+  constexpr double far = 5.0;
+  Gap gap{.output = std::move(output), .before = 0.0, .after = 0.0, .noise_floor = noise_floor, .outliers = 0};
+  Eigen::Index used = 0;
+  for (Eigen::Index i = 0; i < before.size(); ++i) {
+    if (std::min(std::abs(before(i)), std::abs(after(i))) > far * noise_floor) {
+      ++gap.outliers;
+      continue;
+    }
+    gap.before += before(i) * before(i);
+    gap.after += after(i) * after(i);
+    ++used;
+  }
+  // Where the noise floor is no measure of what is left, nothing is an outlier.
+  constexpr double largest_share = 0.15;
+  if (static_cast<double>(gap.outliers) > largest_share * static_cast<double>(before.size())) {
+    gap.before = before.squaredNorm();
+    gap.after = after.squaredNorm();
+    gap.outliers = 0;
+    used = before.size();
+  }
+  gap.before = std::sqrt(gap.before / static_cast<double>(used));
+  gap.after = std::sqrt(gap.after / static_cast<double>(used));
+  return gap;
 }
 
 }  // namespace llmt::discovery

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 
 #include "discovery/terms/correlation.hpp"
@@ -17,8 +16,6 @@
 
 namespace llmt::discovery {
 namespace {
-
-constexpr double unknown_number = std::numeric_limits<double>::quiet_NaN();
 
 void check(const Simulation& simulation, const Inputs& inputs, const MeasuredOutputs& measured,
            const MissingOptions& options) {
@@ -44,11 +41,6 @@ void check(const Simulation& simulation, const Inputs& inputs, const MeasuredOut
   if (options.largest_sample < fewest) {
     refuse("find_missing", fmt::format("largest_sample is {}, must be at least {}", options.largest_sample, fewest));
   }
-}
-
-double rms_at(const Eigen::VectorXd& errors, const Samples& samples) {
-  if (samples.size() == 0) return unknown_number;
-  return std::sqrt(means(errors, samples).squaredNorm() / static_cast<double>(samples.size()));
 }
 
 }  // namespace
@@ -162,9 +154,10 @@ Missing search_once(const Simulation& simulation, const Inputs& inputs, const Me
   missing.floor_from_repeats = settled.verdict.lack_of_fit.has_enough_repeats();
   const double noise = missing.floor_from_repeats ? settled.verdict.lack_of_fit.noise : settled.verdict.noise;
   for (Eigen::Index o = 0; o < d; ++o) {
-    missing.gaps.push_back({measured.names[o], rms_at(measured.values.col(o) - missing.before.col(o), split.held_out),
-                            rms_at(measured.values.col(o) - missing.corrected.col(o), split.held_out),
-                            noise * data.sigma(o)});
+    const Eigen::VectorXd before = measured.values.col(o) - missing.before.col(o);
+    const Eigen::VectorXd after = measured.values.col(o) - missing.corrected.col(o);
+    missing.gaps.push_back(
+        gap_of(measured.names[o], means(before, split.held_out), means(after, split.held_out), noise * data.sigma(o)));
   }
   if (in_time) {
     missing.time = {.in_time = true,

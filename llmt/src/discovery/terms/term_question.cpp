@@ -27,6 +27,7 @@ EffectCandidate candidate_of(const TermModel& model, const TermData& data, const
   candidate.upper = term.upper;
   candidate.generic = term.generic;
   candidate.prior_cost = option.prior_cost;
+  candidate.complexity = term.complexity;
   return candidate;
 }
 

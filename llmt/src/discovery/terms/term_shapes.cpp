@@ -116,12 +116,13 @@ std::vector<ModelTerm> sequence_terms(const InputView& input, const std::string&
   const std::string& x = input.name;
   const Eigen::Index column = input.column;
   const std::string step = order.empty() ? "row" : order;
-  terms.push_back(sequence_term(input, "previous", x + " of the row before", x,
+  const std::string sampling = order.empty() ? ", a step of the sampling" : "";
+  terms.push_back(sequence_term(input, "previous", x + " of the row before, a step of the sampling earlier", x,
                                 [column](const Rows& rows, const std::vector<Eigen::Index>& before) -> Eigen::MatrixXd {
                                   return rows.inputs.col(column)(before);
                                 }));
   terms.push_back(sequence_term(
-      input, "rate", fmt::format("change of {} per {}", x, step), fmt::format("({}/{})", x, step),
+      input, "rate", fmt::format("change of {} per {}{}", x, step, sampling), fmt::format("({}/{})", x, step),
       [column](const Rows& rows, const std::vector<Eigen::Index>& before) {
         Eigen::MatrixXd rate = Eigen::MatrixXd::Zero(rows.inputs.rows(), 1);
         for (Eigen::Index i = 0; i < rate.rows(); ++i) {

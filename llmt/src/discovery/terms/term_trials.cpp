@@ -35,8 +35,8 @@ class Trials {
     residuals_ -= basis_ * (basis_.transpose() * residuals_);
   }
 
-  double gain(double constant) {
-    placed_.constants = Eigen::VectorXd::Constant(1, constant);
+  double gain(const Eigen::VectorXd& constants) {
+    placed_.constants = constants;
     const Eigen::MatrixXd of_rows = model_->columns(placed_, *simulated_);
     Eigen::MatrixXd columns = means(of_rows, data_->samples);
     if (!columns.allFinite()) return 0.0;
@@ -58,8 +58,8 @@ class Trials {
 
   double sum_of_squares() const { return residuals_.squaredNorm(); }
 
-  const PlacedTerm& at(double constant) {
-    placed_.constants = Eigen::VectorXd::Constant(1, constant);
+  const PlacedTerm& at(const Eigen::VectorXd& constants) {
+    placed_.constants = constants;
     return placed_;
   }
 
@@ -82,22 +82,42 @@ class Trials {
   }
 };
 
-// Halving steps between the neighbours of a value tried.
-double refined(Trials& trials, const TermConstant& constant, double value, double gain) {
-  if (!constant.smooth) return value;
-  const double step = spacing(constant.tried, value);
-  for (double width = 0.5 * step; width > 0.01 * step; width *= 0.5) {
-    const double centre = value;
-    for (const double trial : {centre - width, centre + width}) {
-      if (trial < constant.tried.front() || trial > constant.tried.back()) continue;
-      const double own = trials.gain(trial);
-      if (own > gain) {
-        gain = own;
-        value = trial;
+// Every value of the first constant with every value of the second.
+std::vector<Eigen::VectorXd> combinations(const std::vector<TermConstant>& constants) {
+  std::vector<Eigen::VectorXd> all;
+  for (const double first : constants.front().tried) {
+    if (constants.size() == 1) all.push_back(Eigen::VectorXd::Constant(1, first));
+    if (constants.size() == 1) continue;
+    for (const double second : constants[1].tried) all.push_back(Eigen::Vector2d(first, second));
+  }
+  return all;
+}
+
+// Halving steps between the neighbours of the values tried; of two constants in turn.
+Eigen::VectorXd refined(Trials& trials, const std::vector<TermConstant>& constants, Eigen::VectorXd values,
+                        double gain) {
+  if (!constants.front().smooth) return values;
+  const int sweeps = constants.size() > 1 ? 3 : 1;
+  for (int sweep = 0; sweep < sweeps; ++sweep) {
+    for (Eigen::Index c = 0; c < values.size(); ++c) {
+      const std::vector<double>& tried = constants[c].tried;
+      const double step = spacing(tried, values(c));
+      for (double width = 0.5 * step; width > 0.01 * step; width *= 0.5) {
+        const double centre = values(c);
+        for (const double trial : {centre - width, centre + width}) {
+          if (trial < tried.front() || trial > tried.back()) continue;
+          Eigen::VectorXd moved = values;
+          moved(c) = trial;
+          const double own = trials.gain(moved);
+          if (own > gain) {
+            gain = own;
+            values = moved;
+          }
+        }
       }
     }
   }
-  return value;
+  return values;
 }
 
 }  // namespace
@@ -114,7 +134,8 @@ double trial_error(const TermModel& model, const TermData& data, const TrialGrou
   const std::vector<double>& tried = model.terms()[placed.term].constants.front().tried;
   Trials trials(model, data, ground, placed, simulated);
   const double value = placed.constants(0);
-  const double best = trials.gain(value);
+  const auto gain = [&](double constant) { return trials.gain(Eigen::VectorXd::Constant(1, constant)); };
+  const double best = gain(value);
   const double variance = std::max(0.0, trials.sum_of_squares() - best) / static_cast<double>(data.samples.size());
   const auto place = static_cast<Eigen::Index>(std::ranges::lower_bound(tried, value) - tried.begin());
   double error = spacing(tried, value);
@@ -122,7 +143,7 @@ double trial_error(const TermModel& model, const TermData& data, const TrialGrou
     for (Eigen::Index k = place; k >= 0 && k < std::ssize(tried); k += direction) {
       const double other = tried[k];
       error = std::max(error, std::abs(other - value));
-      if (best - trials.gain(other) > variance) break;
+      if (best - gain(other) > variance) break;
     }
   }
   return error;
@@ -133,14 +154,15 @@ std::vector<PlacedTerm> best_constants(const TermModel& model, const TermData& d
                                        const std::vector<PlacedTerm>& taken) {
   const ModelTerm& own = model.terms()[term];
   const TermConstant& constant = own.constants.front();
+  const std::vector<Eigen::VectorXd> tried = combinations(own.constants);
   PlacedTerm placed{.term = term,
                     .output = output,
                     .constants = {},
                     .coefficients = Eigen::VectorXd::Zero(std::ssize(own.coefficients)),
-                    .prior_cost = 2.0 * std::log(static_cast<double>(constant.tried.size()))};
+                    .prior_cost = own.prior_cost + 2.0 * std::log(static_cast<double>(tried.size()))};
   Trials trials(model, data, ground, placed, simulated);
   std::vector<double> gains;
-  for (const double value : constant.tried) gains.push_back(trials.gain(value));
+  for (const Eigen::VectorXd& values : tried) gains.push_back(trials.gain(values));
   std::vector<std::size_t> order(gains.size());
   for (std::size_t k = 0; k < order.size(); ++k) order[k] = k;
   std::ranges::stable_sort(order, std::greater<>{}, [&](std::size_t k) { return gains[k]; });
@@ -155,10 +177,10 @@ std::vector<PlacedTerm> best_constants(const TermModel& model, const TermData& d
   };
   for (const std::size_t k : order) {
     if (std::ssize(best) >= constant.kept || !(gains[k] > 0.0)) break;
-    const double value = constant.tried[k];
+    const double value = tried[k](0);
     if (std::ranges::any_of(places, [&](double place) { return near(value, place); })) continue;
     places.push_back(value);
-    best.push_back(trials.at(refined(trials, constant, value, gains[k])));
+    best.push_back(trials.at(refined(trials, own.constants, tried[k], gains[k])));
   }
   return best;
 }

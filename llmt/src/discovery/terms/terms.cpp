@@ -4,11 +4,14 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <map>
 #include <numbers>
 #include <numeric>
 #include <set>
 #include <stdexcept>
+#include <string_view>
 
 #include "discovery/terms/refuse.hpp"
 #include "discovery/terms/term_builders.hpp"
@@ -39,7 +42,17 @@ void check(const Inputs& inputs) {
   }
 }
 
-bool is_angle(const std::string& name) { return name.ends_with("_deg") || name.ends_with("_rad"); }
+// By the ending of the name; or by a usual name of a joint's angle, and values that radians may have.
+bool is_angle(const InputView& input) {
+  const std::string& name = input.name;
+  if (name.ends_with("_deg") || name.ends_with("_rad")) return true;
+  constexpr std::array<std::string_view, 6> usual = {"q", "theta", "phi", "psi", "angle", "joint"};
+  const std::string_view letters = std::string_view(name).substr(0, name.find_last_not_of("_0123456789") + 1);
+  const bool is_named = std::ranges::find(usual, letters) != usual.end() || letters.ends_with("_angle");
+  constexpr double shortest = 1.0;  // a shorter piece of a sine is a parabola
+  constexpr double longest = 4.0 * std::numbers::pi;
+  return is_named && input.range() >= shortest && input.range() <= longest;
+}
 
 InputView view(const Inputs& inputs, Eigen::Index column) {
   InputView own{.column = column, .name = inputs.names[column], .low = 0.0, .high = 0.0, .distinct = {}};
@@ -151,10 +164,25 @@ void add_functions(const InputView& input, std::vector<ModelTerm>& terms) {
     terms.push_back(function_term(input, "log", fmt::format("ln({})", x), "", [](double v) { return std::log(v); }));
     terms.push_back(function_term(input, "reciprocal", "1/" + x, x + "^-1", [](double v) { return 1.0 / v; }));
   }
-  if (is_angle(x) && levels > 4) {
+  if (is_angle(input) && levels > 4) {
     terms.push_back(harmonic(input, 1));
     terms.push_back(harmonic(input, 2));
   }
+}
+
+// A constant, one input, functions of it, several inputs, a constant that is searched, the row before.
+int complexity_of(const ModelTerm& term) {
+  static const std::map<std::string, int> of_family = {
+      {"offset", 1},       {"linear", 2},           {"gain", 2},          {"square", 3},
+      {"sign", 3},         {"absolute", 3},         {"cube", 4},          {"root", 4},
+      {"log", 4},          {"reciprocal", 4},       {"signed_square", 4}, {"gain_curvature", 4},
+      {"harmonic1", 5},    {"harmonic2", 5},        {"product", 6},       {"square_product", 7},
+      {"sign_product", 6}, {"load_friction", 5},    {"power", 9},         {"hill", 9},
+      {"sigmoid", 9},      {"coulomb_stribeck", 9}, {"rate", 10},         {"direction", 10},
+      {"previous", 11}};
+  constexpr int with_constant = 8;
+  const auto found = of_family.find(term.family);
+  return found != of_family.end() ? found->second : with_constant;
 }
 
 }  // namespace
@@ -226,9 +254,12 @@ std::vector<ModelTerm> standard_terms(const Inputs& inputs, std::vector<Untestab
   for (const InputView& input : moving) {
     add_functions(input, terms);
     add(searched_terms(input));
+    add(law_terms(input));
     if (input.name != inputs.order) add(sequence_terms(input, inputs.order));
   }
   add(products_of(moving));
+  add(load_frictions(moving));
+  for (ModelTerm& term : terms) term.complexity = complexity_of(term);
   add(shapes_of(moving));
   return terms;
 }
