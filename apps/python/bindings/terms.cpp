@@ -119,6 +119,25 @@ void set_simulation(Question& question, const nb::object& predict, const nb::lis
   };
 }
 
+// `jacobian` is a callable or None. It gives n rows, the derivatives by all parameters of each output beside each
+// other: output 0 by parameter 0, 1, ..., then output 1.
+discovery::OutputDerivatives derivatives_of(const nb::object& jacobian, const Question& question) {
+  if (jacobian.is_none()) return {};
+  const Eigen::Index d = std::ssize(question.outputs);
+  const Eigen::Index p = std::ssize(question.simulation.parameters);
+  return [function = Callable(std::make_shared<nb::callable>(nb::cast<nb::callable>(jacobian))), d, p](
+             const Eigen::MatrixXd& inputs, const Eigen::VectorXd& values) {
+    const nb::gil_scoped_acquire locked;
+    const Eigen::MatrixXd all =
+        called(*function, inputs, nb::cast(std::vector<double>(values.begin(), values.end())), "jacobian");
+    std::vector<Eigen::MatrixXd> by(static_cast<std::size_t>(p), Eigen::MatrixXd(all.rows(), d));
+    for (Eigen::Index o = 0; o < d; ++o) {
+      for (Eigen::Index k = 0; k < p; ++k) by[static_cast<std::size_t>(k)].col(o) = all.col(o * p + k);
+    }
+    return by;
+  };
+}
+
 Question question_of(const Array& inputs, std::vector<std::string> names, std::string order, const Array& simulated,
                      std::vector<std::string> outputs) {
   return {.inputs = {std::move(names), rows_of(inputs), std::move(order)},
@@ -172,9 +191,10 @@ void unlocked(const Work& work) {
 
 nb::dict find_missing(const Array& inputs, const std::vector<std::string>& input_names, const std::string& order,
                       const Array& simulated, const Array& measured, const std::vector<std::string>& output_names,
-                      const nb::object& predict, const nb::list& parameters, bool offset, bool scale,
-                      const std::vector<OwnTerm>& own_terms, bool own_terms_only, double held_out, std::uint64_t seed,
-                      const std::string& simulated_name, const std::string& measured_name, const nb::object& report) {
+                      const nb::object& predict, const nb::object& jacobian, const nb::list& parameters, bool offset,
+                      bool scale, const std::vector<OwnTerm>& own_terms, bool own_terms_only, double held_out,
+                      std::uint64_t seed, const std::string& simulated_name, const std::string& measured_name,
+                      const nb::object& report) {
   Question question = question_of(inputs, input_names, order, simulated, output_names);
   set_simulation(question, predict, parameters, offset, scale, question.simulated);
   const discovery::MeasuredOutputs outputs{output_names, rows_of(measured)};
@@ -187,6 +207,8 @@ nb::dict find_missing(const Array& inputs, const std::vector<std::string>& input
                                .missing = {},
                                .outlier_lines = {},
                                .regions = {},
+                               .ranges = report::ranges_of(question.inputs),
+                               .order = order,
                                .counted = "row"};
   discovery::MissingOptions options{.held_out_share = held_out, .seed = seed};
   options.progress = [&report](const ProgressReport& said) {
@@ -196,8 +218,12 @@ nb::dict find_missing(const Array& inputs, const std::vector<std::string>& input
     return true;
   };
   question.terms = terms_of(question, own_terms, own_terms_only, question.untestable);
+  const discovery::OutputDerivatives derivatives = derivatives_of(jacobian, question);
   unlocked([&] {
-    summary.missing = discovery::find_missing(question.simulation, question.inputs, outputs, question.terms, options);
+    summary.missing =
+        derivatives ? discovery::find_missing_in_steps(question.simulation, derivatives, question.inputs, outputs,
+                                                       question.terms, options)
+                    : discovery::find_missing(question.simulation, question.inputs, outputs, question.terms, options);
     summary.regions = report::gap_regions(question.inputs, outputs, summary.missing);
   });
   discovery::Missing& missing = summary.missing;
@@ -235,9 +261,9 @@ auto corrected(const Array& inputs, const std::vector<std::string>& input_names,
 void add_terms(nb::module_& module) {
   using nb::arg;
   module.def("find_missing", &find_missing, nb::kw_only(), arg("inputs"), arg("input_names"), arg("order"),
-             arg("simulated"), arg("measured"), arg("output_names"), arg("predict").none(), arg("parameters"),
-             arg("offset"), arg("scale"), arg("terms"), arg("own_terms_only"), arg("held_out"), arg("seed"),
-             arg("simulated_name"), arg("measured_name"), arg("report").none());
+             arg("simulated"), arg("measured"), arg("output_names"), arg("predict").none(), arg("jacobian").none(),
+             arg("parameters"), arg("offset"), arg("scale"), arg("terms"), arg("own_terms_only"), arg("held_out"),
+             arg("seed"), arg("simulated_name"), arg("measured_name"), arg("report").none());
   module.def("corrected", &corrected, nb::kw_only(), arg("inputs"), arg("input_names"), arg("order"), arg("simulated"),
              arg("output_names"), arg("predict").none(), arg("parameters"), arg("offset"), arg("scale"), arg("terms"),
              arg("own_terms_only"), arg("state"), arg("elsewhere"), arg("tabulated").none());

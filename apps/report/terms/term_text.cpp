@@ -1,6 +1,7 @@
 #include "report/terms/term_text.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -8,6 +9,24 @@
 #include "report/text/text.hpp"
 
 namespace llmt::report {
+
+namespace {
+
+// "mass and damping are off their nominal values".
+std::string changed_parameters(const discovery::Missing& missing) {
+  std::vector<std::string> names;
+  for (const discovery::FittedParameter& fitted : missing.fitted_parameters) {
+    if (fitted.changed) names.push_back(fitted.name);
+  }
+  // Together they may be beyond chance although none is by itself.
+  if (names.empty()) return "parameters of the simulation are off their nominal values";
+  if (names.size() == 1) return names.front() + " is off its nominal value";
+  const std::string last = names.back();
+  names.pop_back();
+  return fmt::format("{} and {} are off their nominal values", fmt::join(names, ", "), last);
+}
+
+}  // namespace
 
 std::string title_of(const discovery::FoundTerm& found, bool several_outputs) {
   std::string text = found.generic ? "unknown: " + found.formula : found.family;
@@ -20,6 +39,12 @@ std::string value_text(const discovery::TermValue& value) {
   std::string text = fmt::format("{} = {}", value.name, number(value.value));
   if (std::isfinite(value.standard_error)) text += fmt::format(" +- {}", number(value.standard_error, 2));
   return text + " " + value.unit;
+}
+
+bool has_nominal(const discovery::FittedParameter& fitted, const std::vector<std::string>& without_nominal) {
+  return std::ranges::none_of(fitted.parts, [&](const std::string& part) {
+    return std::ranges::find(without_nominal, part) != without_nominal.end();
+  });
 }
 
 std::string headline(const discovery::Missing& missing) {
@@ -35,6 +60,8 @@ std::string headline(const discovery::Missing& missing) {
       return terms + " missing, but other terms explain it as well";
     case discovery::Answer::unknown:
       return "something is missing that no term tried explains";
+    case discovery::Answer::parameters_only:
+      return "nothing is missing, but " + changed_parameters(missing);
   }
   return "";
 }

@@ -52,6 +52,7 @@ std::string cause(const Discovery& found) {
     case discovery::Answer::indistinguishable:
       return fmt::format("The model lacks: {}; or something that looks alike at these poses", fmt::join(names, "; "));
     case discovery::Answer::unknown:
+    case discovery::Answer::parameters_only:  // of no robot
       break;
   }
   std::set<std::string> places;

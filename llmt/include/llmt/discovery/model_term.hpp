@@ -49,6 +49,9 @@ struct ModelTerm {
   bool generic = false;        ///< not a cause but a shape: what it explains is "unknown, depends on `inputs`"
   Eigen::VectorXd lower = {};  ///< k plausible limits of the coefficients, or empty: none
   Eigen::VectorXd upper = {};
+  /// k expressions, one for each column, in the language of muParser: $1 and $2 stand for `inputs`, $c for the
+  /// constant, $s for the simulated output. Empty: there are none, as for terms of the row before.
+  std::vector<std::string> code = {};
 };
 
 /// Inputs that terms are made of.

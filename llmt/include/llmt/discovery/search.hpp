@@ -35,7 +35,7 @@ namespace llmt::discovery {
 Verdict search(const Evidence& evidence, const std::vector<EffectCandidate>& candidates,
                const SearchOptions& options = {});
 
-/// "nothing missing", "named", "named, indistinguishable", "unknown effect".
+/// "nothing missing", "named", "named, indistinguishable", "unknown effect", "parameters only".
 std::string to_string(Answer answer);
 
 }  // namespace llmt::discovery

@@ -113,7 +113,13 @@ struct LackOfFit {
   bool has_enough_repeats() const { return dof >= 12; }
 };
 
-enum class Answer { nothing_missing, named, indistinguishable, unknown };
+enum class Answer {
+  nothing_missing,
+  named,
+  indistinguishable,
+  unknown,
+  parameters_only  ///< of find_missing(): nothing is missing, but parameters are off their nominal values
+};
 
 /// A cause that would have won, had its values been within their limits.
 struct Refused {

@@ -174,6 +174,8 @@ std::string to_string(Answer answer) {
       return "named, indistinguishable";
     case Answer::unknown:
       return "unknown effect";
+    case Answer::parameters_only:
+      return "parameters only";
   }
   return "";
 }

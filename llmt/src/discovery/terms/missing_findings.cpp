@@ -31,6 +31,7 @@ FoundTerm described(const TermModel& model, const PlacedTerm& placed, const Eige
   found.formula = term.formula;
   found.inputs = term.inputs;
   found.generic = term.generic;
+  found.code = term.code;
   found.coefficients = placed.coefficients;
   found.constants = placed.constants;
   for (Eigen::Index k = 0; k < std::ssize(term.coefficients); ++k) {

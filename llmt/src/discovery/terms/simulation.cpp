@@ -7,10 +7,12 @@
 #include <limits>
 #include <stdexcept>
 
+#include "discovery/terms/fitted_parameters.hpp"
 #include "discovery/terms/missing_findings.hpp"
 #include "discovery/terms/refuse.hpp"
 #include "discovery/terms/term_question.hpp"
 #include "llmt/discovery/rounds.hpp"
+#include "llmt/statistics.hpp"
 
 namespace llmt::discovery {
 namespace {
@@ -103,6 +105,17 @@ Settled search_until_settled(const TermModel& model, TermData& data, const std::
   return settled;
 }
 
+// Outputs count by their spread, because what the noise is of each is not known yet.
+DistinctParameters determined(const TermModel& model, const TermData& data, const Eigen::VectorXd& start,
+                              std::vector<Parameter>& parameters) {
+  TermData by_spread = data;
+  for (Eigen::Index o = 0; o < data.measured.cols(); ++o) {
+    const double spread = spread_of(data.measured.col(o));
+    if (spread > 0.0) by_spread.sigma(o) = spread;
+  }
+  return distinct_parameters(baseline_jacobian(model, by_spread, start, {}), parameters);
+}
+
 double rms_at(const Eigen::VectorXd& errors, const std::vector<Eigen::Index>& rows) {
   if (rows.empty()) return unknown_number;
   return std::sqrt(errors(rows).squaredNorm() / static_cast<double>(rows.size()));
@@ -145,7 +158,8 @@ Simulation tabulated(const Eigen::MatrixXd& simulated, const std::vector<std::st
 Missing find_missing(const Simulation& simulation, const Inputs& inputs, const MeasuredOutputs& measured,
                      const std::vector<ModelTerm>& terms, const MissingOptions& options) {
   check(simulation, inputs, measured, options);
-  const TermModel model(simulation, inputs, measured.names, terms);
+  Simulation distinct = simulation;
+  const TermModel model(distinct, inputs, measured.names, terms);
   const RowSplit split = split_rows(inputs, options);
   const Eigen::Index d = measured.values.cols();
   TermData data{split.searched, measured.values(split.searched, Eigen::all), Eigen::VectorXd::Ones(d)};
@@ -160,6 +174,7 @@ Missing find_missing(const Simulation& simulation, const Inputs& inputs, const M
   for (std::size_t k = 0; k < simulation.parameters.size(); ++k) start(k) = simulation.parameters[k].value;
   Work work(options.progress);
   work.begin("fitting");
+  const DistinctParameters sums = determined(model, data, start, distinct.parameters);
   TermFit baseline = fit_terms(model, data, start, {});
   data.sigma = scatter(model, data, baseline);
   if (d > 1) baseline = fit_terms(model, data, start, {});
@@ -171,7 +186,7 @@ Missing find_missing(const Simulation& simulation, const Inputs& inputs, const M
   for (const PlacedTerm& option : settled.question.options) missing.candidates.push_back(option_label(model, option));
   describe_findings(model, settled, missing);
   describe_limits(settled, data, missing);
-  missing.parameters = simulation.parameters;
+  missing.parameters = distinct.parameters;
   for (std::size_t k = 0; k < missing.parameters.size(); ++k) {
     missing.parameters[k].value = settled.fit.parameters(k);
   }
@@ -182,16 +197,19 @@ Missing find_missing(const Simulation& simulation, const Inputs& inputs, const M
   if (!settled.verdict.outliers.empty()) {
     baseline = fit_terms(model, without_samples(data, settled.verdict.outliers), start, {});
   }
+  const Eigen::MatrixXd nominal = model.predict(start, {});
   missing.before = model.predict(baseline.parameters, {});
   missing.corrected = model.predict(settled.fit.parameters, settled.fit.placed);
   missing.structure = structure_beside(model, without_samples(data, settled.verdict.outliers), inputs, missing);
   decide(missing);
+  describe_parameters({model, without_samples(data, settled.verdict.outliers), start, baseline, settled.fit}, sums,
+                      options.search.false_alarm_rate, missing);
   missing.floor_from_repeats = settled.verdict.lack_of_fit.has_enough_repeats();
   const double noise = missing.floor_from_repeats ? settled.verdict.lack_of_fit.noise : settled.verdict.noise;
   for (Eigen::Index o = 0; o < d; ++o) {
     missing.gaps.push_back({measured.names[o], rms_at(measured.values.col(o) - missing.before.col(o), split.held_out),
                             rms_at(measured.values.col(o) - missing.corrected.col(o), split.held_out),
-                            noise * data.sigma(o)});
+                            noise * data.sigma(o), rms_at(measured.values.col(o) - nominal.col(o), split.held_out)});
   }
   work.finish();
   return missing;
