@@ -95,8 +95,8 @@ TEST(FoundTerms, EveryTermOfTheLibraryIsAnExpressionThatTheTermFileReads) {
   for (const discovery::ModelTerm& term : discovery::standard_terms(own.inputs)) {
     if (is_history(term)) continue;
     const discovery::FoundTerm found = found_of(term, random);
-    const Json json = json_of(own, {found});
-    const Json& text = term.generic ? json["unknown_all"][0]["expression"] : json["effects"][0]["expression"];
+    const Json report = json_of(own, {found});
+    const Json& text = term.generic ? report["unknown_all"][0]["expression"] : report["effects"][0]["expression"];
     ASSERT_TRUE(text.is_string()) << term.family << " has no code";
     const std::vector<discovery::ModelTerm> read =
         llmt::apps::parse_terms("own = " + text.get<std::string>(), "terms", words, "y", rows, {});
