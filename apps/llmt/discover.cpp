@@ -3,15 +3,18 @@
 
 #include <algorithm>
 #include <array>
+#include <functional>
 #include <map>
 #include <memory>
 #include <numeric>
 #include <sstream>
 #include <stdexcept>
 
+#include "llmt/apply_found.hpp"
 #include "llmt/commands.hpp"
+#include "llmt/corrected_table.hpp"
 #include "llmt/csv.hpp"
-#include "llmt/files.hpp"
+#include "llmt/simulation_options.hpp"
 #include "llmt/term_file.hpp"
 #include "report/terms/of_terms.hpp"
 #include "report/terms/terms_summary.hpp"
@@ -36,6 +39,7 @@ struct DiscoverArguments {
   std::vector<std::string> without;
   std::vector<std::string> outputs_or_files;  // of --output, which once named the columns
   std::string corrected;
+  SimulationArguments simulation;
   DecimalMark mark = DecimalMark::point;
   bool own_terms_only = false;
   bool json = false;
@@ -49,6 +53,12 @@ struct Comparison {
   Eigen::MatrixXd simulated;
   discovery::MeasuredOutputs measured;
   std::vector<Eigen::Index> lines;  // of the rows, in the file measured
+};
+
+// Where simulated outputs at other values of parameters come from.
+struct Source {
+  ParameterTable table;       // without parameters: none
+  CommandSimulation command;  // without a command: none
 };
 
 // `every_column`: the inputs were not named.
@@ -184,27 +194,8 @@ std::vector<discovery::ModelTerm> terms_to_try(const DiscoverArguments& argument
   return terms;
 }
 
-void write_corrected(const std::string& path, const Comparison& comparison, const discovery::Missing& missing) {
-  std::vector<std::string> header;
-  for (const std::string& name : comparison.inputs.names) header.push_back(csv_field(name));
-  for (const std::string& name : comparison.measured.names) {
-    for (const char* kind : {"_simulated", "_corrected", "_measured"}) header.push_back(csv_field(name + kind));
-  }
-  std::string text = fmt::format("{}\n", fmt::join(header, ","));
-  for (Eigen::Index i = 0; i < comparison.inputs.values.rows(); ++i) {
-    std::vector<double> cells(comparison.inputs.values.row(i).begin(), comparison.inputs.values.row(i).end());
-    for (Eigen::Index o = 0; o < comparison.simulated.cols(); ++o) {
-      for (const double cell :
-           {comparison.simulated(i, o), missing.corrected(i, o), comparison.measured.values(i, o)}) {
-        cells.push_back(cell);
-      }
-    }
-    text += fmt::format("{}\n", fmt::join(cells, ","));
-  }
-  write_file(path, text);
-}
-
-report::TermsSummary discovered(const DiscoverArguments& arguments, const Comparison& comparison) {
+report::TermsSummary discovered(const DiscoverArguments& arguments, const Comparison& comparison,
+                                const Source& source) {
   const auto adjusts = [&](const char* what) {
     return std::ranges::find(arguments.adjusted, what) != arguments.adjusted.end();
   };
@@ -217,18 +208,33 @@ report::TermsSummary discovered(const DiscoverArguments& arguments, const Compar
                                .missing = {},
                                .outlier_lines = {},
                                .regions = {},
+                               .ranges = report::ranges_of(comparison.inputs),
+                               .order = comparison.inputs.order,
+                               .without_nominal = source.table.without_nominal,
                                .counted = "line",
                                .failing_lines = {},
                                .time = arguments.time};
   std::vector<discovery::UntestableCause> untestable;
   try {
     const std::vector<discovery::ModelTerm> terms = terms_to_try(arguments, comparison, untestable);
-    const discovery::Simulation simulation =
-        discovery::tabulated(comparison.simulated, arguments.outputs, adjusts("offset"), adjusts("scale"));
     ProgressBar bar("discover");
     discovery::MissingOptions options = arguments.options;
     options.progress = bar.callback();
-    summary.missing = discovery::find_missing(simulation, comparison.inputs, comparison.measured, terms, options);
+    if (!source.command.command.empty()) {
+      const discovery::Simulation simulation{source.command.parameters,
+                                             std::bind_front(&CommandSimulation::run, source.command)};
+      summary.missing =
+          discovery::find_missing_in_steps(simulation, std::bind_front(&CommandSimulation::derivatives, source.command),
+                                           comparison.inputs, comparison.measured, terms, options);
+    } else {
+      discovery::Simulation simulation =
+          discovery::tabulated(comparison.simulated, arguments.outputs, adjusts("offset"), adjusts("scale"));
+      if (!source.table.parameters.empty()) {
+        simulation = discovery::linearised(std::move(simulation), comparison.simulated, source.table.parameters,
+                                           source.table.derivatives);
+      }
+      summary.missing = discovery::find_missing(simulation, comparison.inputs, comparison.measured, terms, options);
+    }
   } catch (const std::invalid_argument& error) {
     // What the library refuses after the options were checked is in the data.
     throw std::runtime_error(fmt::format("{}: {}", arguments.measured, error.what()));
@@ -266,6 +272,31 @@ void sort_outputs(const CLI::App& command, DiscoverArguments& arguments) {
 }
 
 void discover_command(const CLI::App& command, DiscoverArguments arguments) {
+  check(arguments.simulation);
+  if (!arguments.simulation.apply.empty()) {
+    if (arguments.reports.wanted()) throw std::invalid_argument("--apply makes no report");
+    apply_command(command,
+                  {.found = arguments.simulation.apply,
+                   .simulated = arguments.simulated,
+                   .measured = arguments.measured,
+                   .parameters = arguments.simulation.parameters,
+                   .parameters_are_set = arguments.simulation.parameters_are_set,
+                   .corrected = "",
+                   .code = arguments.simulation.code,
+                   .mark = arguments.mark,
+                   .json = arguments.json},
+                  arguments.outputs_or_files);
+    return;
+  }
+  const bool simulates = !arguments.simulation.command.empty();
+  if (arguments.simulated.empty()) throw CLI::RequiredError("simulated");
+  if (simulates) {
+    if (!arguments.measured.empty()) throw std::invalid_argument("--simulate takes the place of the file SIMULATED");
+    if (!arguments.adjusted.empty()) throw std::invalid_argument("--simulate and --allow exclude each other");
+    // Its inputs are those of the measured rows.
+    arguments.measured = arguments.simulated;
+  }
+  if (arguments.measured.empty()) throw CLI::RequiredError("measured");
   sort_outputs(command, arguments);
   const bool named = !arguments.inputs.empty();
   if (!named) {
@@ -277,10 +308,27 @@ void discover_command(const CLI::App& command, DiscoverArguments arguments) {
     }
   }
   check_names(arguments);
-  const Comparison comparison = read_comparison(arguments, !named);
-  const report::TermsSummary summary = discovered(arguments, comparison);
+  Comparison comparison = read_comparison(arguments, !named);
+  Source source;
+  if (!arguments.simulation.parameters.empty()) {
+    source.table = read_parameter_table(arguments.simulation.parameters, arguments.mark,
+                                        parse_parameters(arguments.simulation.nominal_values), comparison.inputs,
+                                        arguments.outputs);
+  }
+  if (simulates) {
+    source.command = command_simulation(arguments.simulation, comparison.inputs.names, arguments.outputs);
+    comparison.simulated = source.command.run(comparison.inputs.values, source.command.nominal());
+    arguments.simulated = "--simulate";
+  }
+  const report::TermsSummary summary = discovered(arguments, comparison, source);
   const bool is_worse = summary.missing.answer == discovery::Answer::failed_held_out;
-  if (!arguments.corrected.empty() && !is_worse) write_corrected(arguments.corrected, comparison, summary.missing);
+  if (!arguments.corrected.empty() && !is_worse) {
+    write_corrected(arguments.corrected, {comparison.inputs.names, arguments.outputs, comparison.inputs.values,
+                                          comparison.simulated, summary.missing.corrected, comparison.measured.values});
+  }
+  if (!arguments.simulation.code.empty() && !is_worse) {
+    write_code(arguments.simulation.code, report::found_terms(report::terms_json(summary), arguments.measured));
+  }
   std::string reports;
   if (arguments.reports.wanted()) {
     reports = write_reports(arguments.reports,
@@ -301,9 +349,8 @@ void add_discover(CLI::App& app) {
       app.add_subcommand("discover", "Find and name what a simulation lacks, from measurements beside it");
   command->footer("Example: llmt discover simulated.csv measured.csv --inputs a,b,t --target y -o corrected.csv");
   const auto arguments = std::make_shared<DiscoverArguments>();
-  add_input_file(*command, "simulated", arguments->simulated, "Inputs and simulated outputs (CSV)")->required();
-  add_input_file(*command, "measured", arguments->measured, "The same inputs, row by row, and measured outputs (CSV)")
-      ->required();
+  add_input_file(*command, "simulated", arguments->simulated, "Inputs and simulated outputs (CSV)");
+  add_input_file(*command, "measured", arguments->measured, "The same inputs, row by row, and measured outputs (CSV)");
   add_names(*command, "-t,--target", arguments->outputs, "COLUMN", "What to explain, in both files (required)");
   add_names(*command, "--inputs", arguments->inputs, "COLUMN",
             "What the gap may depend on [all of SIMULATED but the targets]");
@@ -332,6 +379,7 @@ void add_discover(CLI::App& app) {
         }
         return std::string();
       });
+  add_simulation_options(*command, arguments->simulation);
   add_number(*command, "--held-out", arguments->options.held_out_share, share_set_aside,
              "Share of the rows set aside for verification")
       ->capture_default_str();

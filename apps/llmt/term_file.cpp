@@ -71,6 +71,7 @@ discovery::ModelTerm term_of(const std::string& name, const std::string& text, c
   }
   term.coefficients = {"coefficient"};
   term.per = "(" + text + ")";
+  term.code = {text};
   term.columns = [term_code](const discovery::Rows& rows, const Eigen::VectorXd&) {
     Eigen::MatrixXd column(rows.inputs.rows(), 1);
     for (Eigen::Index i = 0; i < column.rows(); ++i) {

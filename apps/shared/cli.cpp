@@ -17,6 +17,7 @@
 
 #include "llmt/csv.hpp"
 #include "llmt/files.hpp"
+#include "shared/child_process.hpp"
 #include "shared/help.hpp"
 #include "shared/manual.hpp"
 #include "shared/options.hpp"
@@ -30,6 +31,7 @@ bool is_silent = false;
 // Ends the program as the signal would have, but for temporary files.
 extern "C" void end_by_signal(int signal) {
   discard_unfinished_files();
+  kill_running_child();
   ::raise(signal);  // comes when the handler has returned, and ends the program: the handler is for once
 }
 

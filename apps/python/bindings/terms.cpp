@@ -122,6 +122,25 @@ void set_simulation(Question& question, const nb::object& predict, const nb::lis
   };
 }
 
+// `jacobian` is a callable or None. It gives n rows, the derivatives by all parameters of each output beside each
+// other: output 0 by parameter 0, 1, ..., then output 1.
+discovery::OutputDerivatives derivatives_of(const nb::object& jacobian, const Question& question) {
+  if (jacobian.is_none()) return {};
+  const Eigen::Index d = std::ssize(question.outputs);
+  const Eigen::Index p = std::ssize(question.simulation.parameters);
+  return [function = Callable(std::make_shared<nb::callable>(nb::cast<nb::callable>(jacobian))), d, p](
+             const Eigen::MatrixXd& inputs, const Eigen::VectorXd& values) {
+    const nb::gil_scoped_acquire locked;
+    const Eigen::MatrixXd all =
+        called(*function, inputs, nb::cast(std::vector<double>(values.begin(), values.end())), "jacobian");
+    std::vector<Eigen::MatrixXd> by(static_cast<std::size_t>(p), Eigen::MatrixXd(all.rows(), d));
+    for (Eigen::Index o = 0; o < d; ++o) {
+      for (Eigen::Index k = 0; k < p; ++k) by[static_cast<std::size_t>(k)].col(o) = all.col(o * p + k);
+    }
+    return by;
+  };
+}
+
 Question question_of(const Array& inputs, std::vector<std::string> names, std::string order, const Array& simulated,
                      std::vector<std::string> outputs, std::vector<std::string> only,
                      std::vector<std::string> without) {
@@ -180,9 +199,10 @@ nb::dict find_missing(const Array& inputs, const std::vector<std::string>& input
                       const std::vector<std::string>& only, const std::vector<std::string>& without,
                       const std::vector<double>& instants, const std::vector<Eigen::Index>& runs,
                       const Array& simulated, const Array& measured, const std::vector<std::string>& output_names,
-                      const nb::object& predict, const nb::list& parameters, bool offset, bool scale,
-                      const std::vector<OwnTerm>& own_terms, bool own_terms_only, double held_out, std::uint64_t seed,
-                      const std::string& simulated_name, const std::string& measured_name, const nb::object& report) {
+                      const nb::object& predict, const nb::object& jacobian, const nb::list& parameters, bool offset,
+                      bool scale, const std::vector<OwnTerm>& own_terms, bool own_terms_only, double held_out,
+                      std::uint64_t seed, const std::string& simulated_name, const std::string& measured_name,
+                      const nb::object& report) {
   Question question = question_of(inputs, input_names, order, simulated, output_names, only, without);
   question.inputs.instants = Eigen::Map<const Eigen::VectorXd>(instants.data(), std::ssize(instants));
   question.inputs.runs = runs;
@@ -197,6 +217,8 @@ nb::dict find_missing(const Array& inputs, const std::vector<std::string>& input
                                .missing = {},
                                .outlier_lines = {},
                                .regions = {},
+                               .ranges = report::ranges_of(question.inputs),
+                               .order = order,
                                .counted = "row",
                                .failing_lines = {},
                                .time = instants.empty() ? "" : "time"};
@@ -208,8 +230,12 @@ nb::dict find_missing(const Array& inputs, const std::vector<std::string>& input
     return true;
   };
   question.terms = terms_of(question, own_terms, own_terms_only, question.untestable);
+  const discovery::OutputDerivatives derivatives = derivatives_of(jacobian, question);
   unlocked([&] {
-    summary.missing = discovery::find_missing(question.simulation, question.inputs, outputs, question.terms, options);
+    summary.missing =
+        derivatives ? discovery::find_missing_in_steps(question.simulation, derivatives, question.inputs, outputs,
+                                                       question.terms, options)
+                    : discovery::find_missing(question.simulation, question.inputs, outputs, question.terms, options);
     summary.regions = report::gap_regions(question.inputs, outputs, summary.missing);
   });
   discovery::Missing& missing = summary.missing;
@@ -249,8 +275,9 @@ void add_terms(nb::module_& module) {
   using nb::arg;
   module.def("find_missing", &find_missing, nb::kw_only(), arg("inputs"), arg("input_names"), arg("order"), arg("only"),
              arg("without"), arg("instants"), arg("runs"), arg("simulated"), arg("measured"), arg("output_names"),
-             arg("predict").none(), arg("parameters"), arg("offset"), arg("scale"), arg("terms"), arg("own_terms_only"),
-             arg("held_out"), arg("seed"), arg("simulated_name"), arg("measured_name"), arg("report").none());
+             arg("predict").none(), arg("jacobian").none(), arg("parameters"), arg("offset"), arg("scale"),
+             arg("terms"), arg("own_terms_only"), arg("held_out"), arg("seed"), arg("simulated_name"),
+             arg("measured_name"), arg("report").none());
   module.def("corrected", &corrected, nb::kw_only(), arg("inputs"), arg("input_names"), arg("order"), arg("only"),
              arg("without"), arg("simulated"), arg("output_names"), arg("predict").none(), arg("parameters"),
              arg("offset"), arg("scale"), arg("terms"), arg("own_terms_only"), arg("state"), arg("elsewhere"),

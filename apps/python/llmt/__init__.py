@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from ._discover import Parameter as Parameter
     from ._discover import discover as discover
     from ._discover import find_missing as find_missing
+    from ._found import Found as Found
+    from ._found import load_found as load_found
     from ._estimator import LocalLinearTreeRegressor as LocalLinearTreeRegressor
     from ._model import Model as Model
 
@@ -27,6 +29,7 @@ if TYPE_CHECKING:
 
 # Where each public name is defined; the module is imported when the name is asked for.
 _homes = {
+    "Found": "_found",
     "LocalLinearTreeRegressor": "_estimator",
     "Missing": "_discover",
     "Model": "_model",
@@ -34,9 +37,20 @@ _homes = {
     "__version__": "_core",
     "discover": "_discover",
     "find_missing": "_discover",
+    "load_found": "_found",
 }
 
-__all__ = ["LocalLinearTreeRegressor", "Missing", "Model", "Parameter", "__version__", "discover", "find_missing"]
+__all__ = [
+    "Found",
+    "LocalLinearTreeRegressor",
+    "Missing",
+    "Model",
+    "Parameter",
+    "__version__",
+    "discover",
+    "find_missing",
+    "load_found",
+]
 
 
 def __getattr__(name: str) -> object:

@@ -135,8 +135,22 @@ class Missing(Findings):
 
     @property
     def parameters(self) -> Any:
-        """The parameters of the simulation, fitted together with the terms."""
-        return values_table(self._data["simulation"])
+        """The parameters of the simulation, fitted together with the terms. Those that the rows cannot tell apart are
+        one row, "mass + armature". ``changed``: by more than chance."""
+        return records(
+            [
+                {
+                    "name": value["name"],
+                    "nominal": value["nominal"],
+                    "value": value["value"],
+                    "change": value["change"],
+                    "standard_error": value["std_error"],
+                    "unit": value["unit"],
+                    "changed": value["changed"],
+                }
+                for value in self._data["parameters"]
+            ]
+        )
 
     def predict(self, inputs: Any, simulated: Any = None) -> Any:
         """The simulation with the terms found, at other inputs: an array of their rows, or rows x outputs if there are
@@ -164,6 +178,19 @@ class Missing(Findings):
             tabulated=tabulated,
         )
         return result[:, 0] if result.shape[1] == 1 else result
+
+    def correct(self, inputs: Any, simulated: Any, **options: Any) -> Any:
+        """``simulated`` with what was found, at other inputs: :meth:`Found.correct`. It needs no callable, and serves
+        after :func:`load_found` as well."""
+        from llmt._found import Found
+
+        return Found(self._data).correct(inputs, simulated, **options)
+
+    def code(self, language: str = "python") -> str:
+        """What was found as a function: :meth:`Found.code`."""
+        from llmt._found import Found
+
+        return Found(self._data).code(language)
 
     def plot(self, ax: Any = None) -> Any:
         """Draws measured minus simulated on the rows set aside (all rows without any), before and after, of the first
@@ -218,6 +245,41 @@ def _predictor(simulate: Any, kind: Any, question: Mapping[str, Any], as_array: 
     return predict
 
 
+def _derivatives(jacobian: Any, kind: Any, question: Mapping[str, Any], as_array: bool) -> Any:
+    """As the extension takes them: rows x (outputs * parameters), all parameters of output 0 first."""
+    if jacobian is None:
+        return None
+    if not callable(jacobian):
+        raise TypeError(f"jacobian is {jacobian!r}, must be a callable of parameters and inputs")
+    make = _maker(kind)
+    inputs, outputs = list(question["input_names"]), list(question["output_names"])
+    parameters = [parameter["name"] for parameter in question["parameters"]]
+
+    def derivatives(rows: np.ndarray, values: list[float]) -> np.ndarray:
+        given = np.array(values) if as_array else dict(zip(parameters, values, strict=True))
+        made = jacobian(given, make(rows, inputs))
+        if isinstance(made, Mapping):
+            if missing := [name for name in parameters if name not in made]:
+                raise ValueError(f"jacobian returned no {missing[0]!r}; there are {', '.join(made)}")
+            by = [_outputs(made[name], len(rows), outputs, f"jacobian by {name}") for name in parameters]
+            array = np.stack(by, axis=2)
+        else:
+            array = np.asarray(made, dtype=float)
+            if array.ndim == 2 and len(outputs) == 1:
+                array = array[:, np.newaxis, :]
+            if array.shape != (len(rows), len(outputs), len(parameters)):
+                raise ValueError(
+                    f"jacobian returned the shape {array.shape}, must be rows x outputs x parameters: "
+                    f"{len(rows)} x {len(outputs)} x {len(parameters)}"
+                )
+            if not np.isfinite(array).all():
+                row = int(np.argwhere(~np.isfinite(array))[0][0])
+                raise ValueError(f"jacobian returned a number that is not finite, in row {row}")
+        return np.ascontiguousarray(array.reshape(len(rows), -1))
+
+    return derivatives
+
+
 def _own_terms(terms: Mapping[str, Any], kind: Any, question: Mapping[str, Any]) -> list[tuple[str, str, Any]]:
     make = _maker(kind)
     inputs = list(question["input_names"])
@@ -254,6 +316,7 @@ def _search(
     simulated: Any,
     measured: Any,
     *,
+    jacobian: Any = None,
     allow: Any,
     order: str,
     time: Any,
@@ -310,6 +373,7 @@ def _search(
         runs=runs,
         measured=np.ascontiguousarray(values),
         predict=predict,
+        jacobian=_derivatives(jacobian, kind, question, parameters[1]),
         terms=_own_terms(own, kind, question),
         held_out=number("held_out", held_out, 0.0, 0.9),
         seed=number("seed", seed, 0, 2**64 - 1, whole=True),
@@ -350,6 +414,7 @@ def discover(
     inputs: Any,
     measured: Any,
     *,
+    jacobian: Callable[[Any, Any], Any] | None = None,
     order: str = "",
     time: Any = None,
     groups: Any = None,
@@ -375,6 +440,11 @@ def discover(
         What the simulation and the terms may depend on. The columns of an array are called x0, x1, ...
     measured : table or array, n rows
         The outputs. The columns of an array are called y, or y0, y1, ...
+    jacobian : callable
+        ``jacobian(parameters, inputs)`` gives the derivatives of the outputs by the parameters: rows x outputs x
+        parameters, or rows x parameters of one output, or a dict with those by each parameter. The simulation is then
+        linearised at the parameters, and again at the new ones, until they settle (Gauss-Newton); it is called once a
+        step.
     order : str
         Column that says in which order rows were measured; by default as they stand.
     time : n numbers
@@ -414,6 +484,7 @@ def discover(
         inputs,
         None,
         measured,
+        jacobian=jacobian,
         allow=(),
         order=order,
         time=time,

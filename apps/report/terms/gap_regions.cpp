@@ -24,6 +24,12 @@ std::string region_conditions(const std::vector<std::string>& names, const Leaf&
 
 }  // namespace
 
+std::vector<InputRange> ranges_of(const discovery::Inputs& inputs) {
+  std::vector<InputRange> ranges;
+  for (const auto& column : inputs.values.colwise()) ranges.push_back({column.minCoeff(), column.maxCoeff()});
+  return ranges;
+}
+
 std::vector<GapRegion> gap_regions(const discovery::Inputs& inputs, const discovery::MeasuredOutputs& measured,
                                    const discovery::Missing& missing) {
   const Eigen::Index p = inputs.values.cols();

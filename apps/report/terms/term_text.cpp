@@ -10,6 +10,24 @@
 
 namespace llmt::report {
 
+namespace {
+
+// "mass and damping are off their nominal values".
+std::string changed_parameters(const discovery::Missing& missing) {
+  std::vector<std::string> names;
+  for (const discovery::FittedParameter& fitted : missing.fitted_parameters) {
+    if (fitted.changed) names.push_back(fitted.name);
+  }
+  // Together they may be beyond chance although none is by itself.
+  if (names.empty()) return "parameters of the simulation are off their nominal values";
+  if (names.size() == 1) return names.front() + " is off its nominal value";
+  const std::string last = names.back();
+  names.pop_back();
+  return fmt::format("{} and {} are off their nominal values", fmt::join(names, ", "), last);
+}
+
+}  // namespace
+
 std::string title_of(const discovery::FoundTerm& found, bool several_outputs) {
   std::string text = found.generic ? "unknown: " + found.formula : found.family;
   if (!found.generic && !found.location.empty()) text += " of " + found.location;
@@ -40,6 +58,12 @@ std::string time_text(const discovery::TimeUse& time, const std::string& column)
   return text + "\n";
 }
 
+bool has_nominal(const discovery::FittedParameter& fitted, const std::vector<std::string>& without_nominal) {
+  return std::ranges::none_of(fitted.parts, [&](const std::string& part) {
+    return std::ranges::find(without_nominal, part) != without_nominal.end();
+  });
+}
+
 std::string headline(const discovery::Missing& missing) {
   const auto causes = std::ranges::count_if(missing.found, [](const auto& f) { return !f.generic; });
   const auto sure = std::ranges::count_if(missing.found, &discovery::FoundTerm::confirmed);
@@ -60,6 +84,8 @@ std::string headline(const discovery::Missing& missing) {
                                      sure == 1 ? "one term is" : fmt::format("{} terms are", sure));
     case discovery::Answer::failed_held_out:
       return "failed on held-out rows: with the terms found the error on the rows set aside is larger";
+    case discovery::Answer::parameters_only:
+      return "nothing is missing, but " + changed_parameters(missing);
   }
   return "";
 }

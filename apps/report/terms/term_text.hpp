@@ -3,6 +3,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "llmt/discovery/missing.hpp"
 
@@ -13,6 +14,9 @@ std::string title_of(const discovery::FoundTerm& found, bool several_outputs);
 
 /// "tau = 24.62 +- 0.98 minute".
 std::string value_text(const discovery::TermValue& value);
+
+/// Whether the nominal value of a parameter is known: those of all its parts are.
+bool has_nominal(const discovery::FittedParameter& fitted, const std::vector<std::string>& without_nominal);
 
 /// The verdict in a phrase: "2 terms are missing".
 /// How rows in time were used. `column`: of their instants; empty: they are numbered.

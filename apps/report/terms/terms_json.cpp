@@ -1,9 +1,59 @@
+#include "report/terms/expression_code.hpp"
+#include "report/terms/term_text.hpp"
 #include "report/terms/terms_summary.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
 
 namespace llmt::report {
 namespace {
 
-Json found_json(const discovery::FoundTerm& found) {
+// What expressions call inputs and simulated outputs.
+struct Words {
+  std::vector<std::string> inputs;
+  std::vector<std::string> outputs;
+};
+
+Words words_of(const TermsSummary& summary) {
+  std::vector<std::string> names = summary.inputs;
+  for (const discovery::Gap& gap : summary.missing.gaps) names.push_back(gap.output);
+  const std::vector<std::string> words = words_for(names);
+  const auto first_output = words.begin() + std::ssize(summary.inputs);
+  return {{words.begin(), first_output}, {first_output, words.end()}};
+}
+
+std::string number_code(double value) { return value < 0.0 ? fmt::format("({})", value) : fmt::format("{}", value); }
+
+// "0.3*($1 > $c)" with words and numbers in the places of $1, $2, $s, $c, $d; null if there is no expression.
+Json expression_json(const discovery::FoundTerm& found, const TermsSummary& summary, const Words& words) {
+  if (found.code.empty()) return nullptr;
+  std::string text;
+  for (std::size_t k = 0; k < found.code.size(); ++k) {
+    const std::string& code = found.code[k];
+    // A term of the user's own is a sum or a comparison as it stands.
+    text += (k > 0 ? " + " : "") + number_code(found.coefficients(static_cast<Eigen::Index>(k))) + "*(";
+    for (std::size_t at = 0; at < code.size(); ++at) {
+      if (code[at] != '$' || at + 1 == code.size()) {
+        text += code[at];
+        continue;
+      }
+      const char what = code[++at];
+      if (what == 's') {
+        text += words.outputs[static_cast<std::size_t>(found.output_index)];
+      } else if (what == 'c' || what == 'd') {
+        text += number_code(found.constants(what - 'c'));
+      } else {
+        const std::string& name = found.inputs.at(static_cast<std::size_t>(what - '1'));
+        text += words.inputs.at(std::ranges::find(summary.inputs, name) - summary.inputs.begin());
+      }
+    }
+    text += ")";
+  }
+  return text;
+}
+
+Json found_json(const discovery::FoundTerm& found, const TermsSummary& summary, const Words& words) {
   Json parameters = Json::array();
   for (const discovery::TermValue& value : found.values) {
     parameters.push_back({{"name", value.name},
@@ -17,9 +67,16 @@ Json found_json(const discovery::FoundTerm& found) {
     rivals.push_back(rival.what);
     exact = exact || rival.exact;
   }
-  Json json = {{"name", found.family},     {"location", found.location}, {"output", found.output},
-               {"formula", found.formula}, {"parameters", parameters},   {"rivals", rivals},
-               {"exact_alias", exact},     {"share", found.share},       {"confirmed", found.confirmed}};
+  Json json = {{"name", found.family},
+               {"location", found.location},
+               {"output", found.output},
+               {"formula", found.formula},
+               {"expression", expression_json(found, summary, words)},
+               {"parameters", parameters},
+               {"rivals", rivals},
+               {"exact_alias", exact},
+               {"share", found.share},
+               {"confirmed", found.confirmed}};
   if (!found.shrinks_gap) json["shrinks_gap"] = false;
   return json;
 }
@@ -33,16 +90,17 @@ Json time_json(const discovery::TimeUse& time) {
           {"correlation_time", time.correlation_time}};
 }
 
-Json effects_json(const discovery::Missing& missing) {
+Json effects_json(const TermsSummary& summary, const Words& words) {
   Json effects = Json::array();
-  for (const discovery::FoundTerm& found : missing.found) {
-    if (!found.generic) effects.push_back(found_json(found));
+  for (const discovery::FoundTerm& found : summary.missing.found) {
+    if (!found.generic) effects.push_back(found_json(found, summary, words));
   }
   return effects;
 }
 
 // Shapes without a name, and structure that nothing explains.
-Json unknown_json(const discovery::Missing& missing) {
+Json unknown_json(const TermsSummary& summary, const Words& words) {
+  const discovery::Missing& missing = summary.missing;
   Json shapes = Json::array();
   const auto add = [&](const std::string& output, const std::vector<std::string>& inputs, const std::string& kind,
                        double share) {
@@ -50,10 +108,31 @@ Json unknown_json(const discovery::Missing& missing) {
         {{"acts_on", output}, {"depends_on", inputs}, {"per_turn", nullptr}, {"kind", kind}, {"share", share}});
   };
   for (const discovery::FoundTerm& found : missing.found) {
-    if (found.generic) add(found.output, found.inputs, found.formula, found.share);
+    if (!found.generic) continue;
+    add(found.output, found.inputs, found.formula, found.share);
+    shapes.back()["expression"] = expression_json(found, summary, words);
   }
   for (const discovery::Structure& left : missing.structure) add(left.output, left.inputs, "not explained", left.share);
   return shapes;
+}
+
+Json inputs_json(const TermsSummary& summary, const Words& words) {
+  Json inputs = Json::array();
+  for (std::size_t j = 0; j < summary.ranges.size(); ++j) {
+    inputs.push_back({{"name", summary.inputs[j]},
+                      {"word", words.inputs[j]},
+                      {"low", summary.ranges[j].low},
+                      {"high", summary.ranges[j].high}});
+  }
+  return inputs;
+}
+
+Json outputs_json(const TermsSummary& summary, const Words& words) {
+  Json outputs = Json::array();
+  for (std::size_t o = 0; o < words.outputs.size(); ++o) {
+    outputs.push_back({{"name", summary.missing.gaps[o].output}, {"word", words.outputs[o]}});
+  }
+  return outputs;
 }
 
 Json gap_json(const discovery::Missing& missing) {
@@ -63,18 +142,38 @@ Json gap_json(const discovery::Missing& missing) {
                     {"before", finite_or_null(gap.before)},
                     {"after", finite_or_null(gap.after)},
                     {"noise_floor", finite_or_null(gap.noise_floor)},
-                    {"outliers", gap.outliers}});
+                    {"outliers", gap.outliers},
+                    {"nominal", finite_or_null(gap.nominal)}});
   }
   // Errors of outputs in different units do not add up.
   const auto only = [&](const char* field) { return gaps.size() == 1 ? gaps[0][field] : Json(nullptr); };
   return {{"before", only("before")},
           {"after", only("after")},
           {"noise_floor", only("noise_floor")},
+          {"nominal", only("nominal")},
           {"heldout_samples", missing.held_out.size()},
           {"outputs", gaps}};
 }
 
-Json parameters_json(const discovery::Missing& missing) {
+Json parameters_json(const TermsSummary& summary) {
+  Json parameters = Json::array();
+  for (const discovery::FittedParameter& fitted : summary.missing.fitted_parameters) {
+    const bool known = has_nominal(fitted, summary.without_nominal);
+    const auto if_known = [&](double value) { return known ? Json(value) : Json(nullptr); };
+    parameters.push_back({{"name", fitted.name},
+                          {"parts", fitted.parts},
+                          {"unit", fitted.unit},
+                          {"nominal", if_known(fitted.nominal)},
+                          {"value", if_known(fitted.nominal + fitted.change)},
+                          {"change", fitted.change},
+                          {"std_error", finite_or_null(fitted.standard_error)},
+                          {"changed", fitted.changed},
+                          {"change_alone", fitted.alone}});
+  }
+  return parameters;
+}
+
+Json simulation_json(const discovery::Missing& missing) {
   Json adjusted = Json::array();
   for (std::size_t k = 0; k < missing.parameters.size(); ++k) {
     const discovery::Parameter& parameter = missing.parameters[k];
@@ -91,7 +190,8 @@ Json parameters_json(const discovery::Missing& missing) {
 
 Json terms_json(const TermsSummary& summary) {
   const discovery::Missing& missing = summary.missing;
-  const Json unknown = unknown_json(missing);
+  const Words words = words_of(summary);
+  const Json unknown = unknown_json(summary, words);
   Json regions = Json::array();
   for (const GapRegion& region : summary.regions) {
     regions.push_back({{"output", region.output},
@@ -109,10 +209,11 @@ Json terms_json(const TermsSummary& summary) {
         {{"effect", term.what}, {"amplitude", finite_or_null(term.coefficient)}, {"rms", finite_or_null(term.rms)}});
   }
   Json json = {{"verdict", discovery::to_string(missing.answer)},
-               {"effects", effects_json(missing)},
+               {"effects", effects_json(summary, words)},
                {"unknown", unknown.empty() ? Json(nullptr) : unknown[0]},
                {"unknown_all", unknown},
-               {"simulation", parameters_json(missing)},
+               {"parameters", parameters_json(summary)},
+               {"simulation", simulation_json(missing)},
                {"gap", gap_json(missing)},
                {"regions", regions},
                {"outliers", missing.outliers},
@@ -122,7 +223,10 @@ Json terms_json(const TermsSummary& summary) {
                {"score_gain", missing.verdict.score_gain},
                {"chance_threshold", missing.verdict.threshold},
                {"hypotheses", missing.candidates.size()},
-               {"rounds", missing.rounds}};
+               {"rounds", missing.rounds},
+               {"inputs", inputs_json(summary, words)},
+               {"outputs", outputs_json(summary, words)},
+               {"order", summary.order}};
   if (!missing.outliers.empty()) json["outlier_lines"] = summary.outlier_lines;
   if (!missing.failing_rows.empty()) json["failing_lines"] = summary.failing_lines;
   if (missing.time.in_time) json["time"] = time_json(missing.time);

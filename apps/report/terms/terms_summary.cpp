@@ -58,15 +58,46 @@ std::string outliers_aside(const Missing& missing) {
   return text;
 }
 
+std::string parameters_text(const TermsSummary& summary, std::size_t width) {
+  const Missing& missing = summary.missing;
+  if (missing.fitted_parameters.empty()) return "";
+  // What a fit without the terms would have said shows how much it hides of them.
+  const bool beside_terms = !missing.found.empty();
+  std::vector<std::string> header = {"parameter", "nominal", "fitted", "change", "+-", "unit", "beyond chance"};
+  if (beside_terms) header.emplace_back("without terms");
+  Table table(header);
+  for (const discovery::FittedParameter& fitted : missing.fitted_parameters) {
+    const bool known = has_nominal(fitted, summary.without_nominal);
+    const auto value = [&](double change) { return known ? number(fitted.nominal + change) : number(change); };
+    std::vector<std::string> row = {fitted.name,
+                                    known ? number(fitted.nominal) : "unknown",
+                                    known ? value(fitted.change) : "unknown",
+                                    number(fitted.change),
+                                    number(fitted.standard_error, 2),
+                                    fitted.unit,
+                                    fitted.changed ? "yes" : "no"};
+    if (beside_terms) row.push_back(value(fitted.alone));
+    table.add(row);
+  }
+  return fmt::format("\nParameters of the simulation{}:\n{}", beside_terms ? ", fitted together with the terms" : "",
+                     table.text(width));
+}
+
 std::string gaps_text(const Missing& missing, std::size_t width) {
   const std::string head =
       missing.held_out.empty()
           ? "\nNo rows were set aside: the gap cannot be verified.\n"
           : fmt::format("\nGap on the {} rows set aside, root mean square{}:\n", missing.held_out.size(),
                         missing.time.rows_per_sample > 1 ? " of the means" : "");
-  Table table({"output", "before", "after", "noise floor"});
+  const bool adjusted = !missing.fitted_parameters.empty();
+  Table table(adjusted ? std::vector<std::string>{"output", "before", "parameters alone", "with terms", "noise floor"}
+                       : std::vector<std::string>{"output", "before", "after", "noise floor"});
   for (const discovery::Gap& gap : missing.gaps) {
-    table.add({gap.output, number(gap.before), number(gap.after), number(gap.noise_floor)});
+    if (adjusted) {
+      table.add({gap.output, number(gap.nominal), number(gap.before), number(gap.after), number(gap.noise_floor)});
+    } else {
+      table.add({gap.output, number(gap.before), number(gap.after), number(gap.noise_floor)});
+    }
   }
   return head + table.text(width) +
          (missing.floor_from_repeats
@@ -117,9 +148,16 @@ std::string terms_text(const TermsSummary& summary, std::size_t width) {
     text += "The simulation gives the measured values exactly: there is no gap to explain.\n";
     return text;
   }
-  text += fmt::format("Evidence: {} raise the score by {}; in noise alone 997 of 1000 searches stay below {}.\n",
-                      missing.found.empty() ? "the best terms" : "the terms", number(missing.verdict.score_gain, 3),
-                      number(missing.verdict.threshold, 3));
+  const bool only_parameters = missing.answer == Answer::parameters_only;
+  if (only_parameters) {
+    text += fmt::format("Evidence: the parameters raise the score by {}, their number counted.\n",
+                        number(missing.parameter_gain, 3));
+  }
+  text += fmt::format("{} raise the score by {}; in noise alone 997 of 1000 searches stay below {}.\n",
+                      only_parameters         ? "Beside them the best terms"
+                      : missing.found.empty() ? "Evidence: the best terms"
+                                              : "Evidence: the terms",
+                      number(missing.verdict.score_gain, 3), number(missing.verdict.threshold, 3));
   text += found_text(missing);
   for (const discovery::Structure& left : missing.structure) {
     text += fmt::format(
@@ -129,12 +167,7 @@ std::string terms_text(const TermsSummary& summary, std::size_t width) {
         fmt::join(left.inputs, ", "), left.output, 100.0 * left.share, left.p_value);
   }
   for (const std::string& note : missing.notes) text += fmt::format("\nNote: {}.\n", note);
-  for (std::size_t k = 0; k < missing.parameters.size(); ++k) {
-    const discovery::Parameter& parameter = missing.parameters[k];
-    if (!parameter.free) continue;
-    text += fmt::format("\n{} of the simulation adjusted to {} +- {}\n", parameter.name, number(parameter.value),
-                        number(missing.standard_errors(k), 2));
-  }
+  text += parameters_text(summary, width);
   text += gaps_text(missing, width);
   text += regions_text(summary.regions, width);
   if (!missing.outliers.empty()) {
@@ -148,7 +181,7 @@ std::string terms_text(const TermsSummary& summary, std::size_t width) {
     text +=
         fmt::format("\nThe scatter that is left exceeds that of rows of equal inputs (p = {:.2g}).\n", lack.p_value);
   }
-  if (missing.answer == Answer::nothing_missing) text += visible_text(missing, width);
+  if (missing.answer == Answer::nothing_missing || only_parameters) text += visible_text(missing, width);
   if (!missing.not_testable.empty()) {
     text += "\nNot testable with these rows:\n";
     for (const discovery::UntestableCause& entry : missing.not_testable)

@@ -20,6 +20,15 @@ struct GapRegion {
   double mean_gap = 0.0;  ///< of |measured - simulated|
 };
 
+/// The values of an input.
+struct InputRange {
+  double low = 0.0;
+  double high = 0.0;
+};
+
+/// One for each input.
+std::vector<InputRange> ranges_of(const discovery::Inputs& inputs);
+
 /// What was compared and what was found.
 struct TermsSummary {
   std::string simulated;  ///< names of the tables
@@ -29,11 +38,14 @@ struct TermsSummary {
   std::uint64_t seed = 1;
   Eigen::Index rows = 0;
   discovery::Missing missing;
-  std::vector<Eigen::Index> outlier_lines;       ///< of missing.outliers, in the file `measured`
-  std::vector<GapRegion> regions;                ///< of each output by falling gap
-  std::string counted = "line";                  ///< what `outlier_lines` are: lines of a file, or rows of a table
-  std::vector<Eigen::Index> failing_lines = {};  ///< of missing.failing_rows, as `outlier_lines`
-  std::string time = {};                         ///< column with the instants; may be empty
+  std::vector<Eigen::Index> outlier_lines;        ///< of missing.outliers, in the file `measured`
+  std::vector<GapRegion> regions;                 ///< of each output by falling gap
+  std::vector<InputRange> ranges = {};            ///< of the inputs, in their order
+  std::string order = "";                         ///< discovery::Inputs::order
+  std::vector<std::string> without_nominal = {};  ///< parameters of which only the change is known
+  std::string counted = "line";                   ///< what `outlier_lines` are: lines of a file, or rows of a table
+  std::vector<Eigen::Index> failing_lines = {};   ///< of missing.failing_rows, as `outlier_lines`
+  std::string time = {};                          ///< column with the instants; may be empty
 };
 
 /// Cuts the rows searched where the absolute deviation changes most, by a small tree.

@@ -158,16 +158,16 @@ TEST(Gap, LeavesOutliersOutOfBothErrors) {
   Eigen::VectorXd after = Eigen::VectorXd::Constant(20, 0.1);
   before(4) = 5.0;
   after(4) = 4.8;
-  const Gap gap = gap_of("y", before, after, 0.1);
+  const Gap gap = gap_of("y", before, before, after, 0.1);
   EXPECT_EQ(gap.outliers, 1);
   EXPECT_NEAR(gap.before, 0.3, 1e-12);
   EXPECT_NEAR(gap.after, 0.1, 1e-12);
   // What only the terms throw off counts.
   before(4) = 0.3;
   after(4) = 100.0;
-  EXPECT_EQ(gap_of("y", before, after, 0.1).outliers, 0);
-  EXPECT_GT(gap_of("y", before, after, 0.1).after, 20.0);
-  EXPECT_TRUE(std::isnan(gap_of("y", {}, {}, 0.1).after));
+  EXPECT_EQ(gap_of("y", before, before, after, 0.1).outliers, 0);
+  EXPECT_GT(gap_of("y", before, before, after, 0.1).after, 20.0);
+  EXPECT_TRUE(std::isnan(gap_of("y", {}, {}, {}, 0.1).after));
 }
 
 }  // namespace

@@ -52,7 +52,8 @@ std::string cause(const Discovery& found) {
     case discovery::Answer::indistinguishable:
       return fmt::format("The model lacks: {}; or something that looks alike at these poses", fmt::join(names, "; "));
     case discovery::Answer::unknown:
-    case discovery::Answer::failed_held_out:  // robots have judge_held_out_loss()
+    case discovery::Answer::failed_held_out:  // of no robot
+    case discovery::Answer::parameters_only:
       break;
   }
   std::set<std::string> places;

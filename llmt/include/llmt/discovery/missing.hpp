@@ -70,6 +70,7 @@ struct FoundTerm {
   Eigen::VectorXd coefficients;
   Eigen::VectorXd constants;
   std::vector<TermValue> values;  ///< coefficients, then constants
+  std::vector<std::string> code;  ///< ModelTerm::code
   std::vector<RivalTerms> rivals;
   double share = 0.0;  ///< of the explained sum of squares that goes with it alone
   /// The error on the samples set aside is smaller with it than without; true if there are none.
@@ -97,6 +98,19 @@ struct Gap {
   double after = 0.0;         ///< with the terms found
   double noise_floor = 0.0;   ///< of the noise, from repeats where there are enough, else from what is left
   Eigen::Index outliers = 0;  ///< rows set aside that deviate by more than 5 noise floors both before and after
+  double nominal = 0.0;       ///< the simulation as it was given, at the nominal values of its parameters
+};
+
+/// What the rows say about a free parameter of the simulation, or about a sum of several that they cannot tell apart.
+struct FittedParameter {
+  std::string name;                ///< "mass", "mass + 0.25 armature"
+  std::string unit;                ///< of the first
+  std::vector<std::string> parts;  ///< names of the parameters in it
+  double nominal = 0.0;            ///< at the values that were given
+  double change = 0.0;             ///< fitted together with the terms found, minus `nominal`
+  double standard_error = 0.0;     ///< of the change; NaN where the rows do not determine it
+  double alone = 0.0;              ///< the change if no term is added
+  bool changed = false;            ///< by more than chance
 };
 
 /// A part of the gap that is not noise and that no term explains: rows that are neighbours in some inputs deviate
@@ -119,13 +133,16 @@ struct VisibleTerm {
 struct Missing {
   /// As Verdict::answer; but unknown if material structure is left although nothing was found, and if not every term
   /// found is confirmed: what those stand for has no name yet. Failed_held_out if what was found makes the error on the
-  /// samples set aside larger.
+  /// samples set aside larger, and parameters_only if nothing was found and the parameters improve the score, see
+  /// find_missing().
   Answer answer = Answer::nothing_missing;
   Verdict verdict;  ///< of the last search; candidates in it are numbers of `candidates`, samples those of `searched`
   std::vector<std::string> candidates;
-  std::vector<FoundTerm> found;        ///< by falling share; shapes last
-  std::vector<Parameter> parameters;   ///< of the simulation, fitted together with the terms
-  Eigen::VectorXd standard_errors;     ///< of those
+  std::vector<FoundTerm> found;       ///< by falling share; shapes last
+  std::vector<Parameter> parameters;  ///< of the simulation, fitted together with the terms
+  Eigen::VectorXd standard_errors;    ///< of those
+  std::vector<FittedParameter> fitted_parameters;
+  double parameter_gain = 0.0;         ///< of the score, by the free parameters, terms or none beside them
   std::vector<Gap> gaps;               ///< d
   Eigen::MatrixXd before;              ///< n x d: the simulation, its own parameters adjusted
   Eigen::MatrixXd corrected;           ///< n x d: with the terms found

@@ -55,6 +55,9 @@ struct ModelTerm {
   int complexity = 0;
   /// Added to the score: how much better a term must explain that contains simpler ones or comes close to them.
   double prior_cost = 0.0;
+  /// k expressions, one for each column, in the language of muParser: $1 and $2 stand for `inputs`, $c and $d
+  /// for the constants, $s for the simulated output. Empty: there are none, as for terms of the row before.
+  std::vector<std::string> code = {};
 };
 
 /// Inputs that terms are made of.

@@ -36,8 +36,8 @@ namespace llmt::discovery {
 Verdict search(const Evidence& evidence, const std::vector<EffectCandidate>& candidates,
                const SearchOptions& options = {});
 
-/// "nothing missing", "named", "named, indistinguishable", "unknown effect",
-/// "failed on held-out rows".
+/// "nothing missing", "named", "named, indistinguishable", "unknown effect", "failed on held-out rows",
+/// "parameters only".
 std::string to_string(Answer answer);
 
 }  // namespace llmt::discovery

@@ -8,6 +8,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -23,10 +24,19 @@ namespace llmt::discovery {
 Simulation tabulated(const Eigen::MatrixXd& simulated, const std::vector<std::string>& outputs, bool offset = false,
                      bool scale = false);
 
+/// A simulation that also moves along given derivatives: its outputs at its own parameters, plus the sum over
+/// `parameters` of (value - nominal value) * derivatives (n x d each), at the rows that the derivatives were taken at.
+/// The scale of each parameter is set to what changes an output by a hundredth of its spread. Throws
+/// std::invalid_argument for a parameter whose name is empty or there twice, and for derivatives of another shape or
+/// that are not finite.
+Simulation linearised(Simulation simulation, const Eigen::MatrixXd& simulated, std::vector<Parameter> parameters,
+                      std::vector<Eigen::MatrixXd> derivatives);
+
 /// Finds which of the terms the simulation lacks, and how large they are.
 ///
 /// 1. A share of the rows is set aside. Steps 2 to 5 use the other rows.
-/// 2. The free parameters of the simulation are fitted.
+/// 2. The free parameters of the simulation are fitted. Of those whose derivatives depend on each other linearly, the
+///    later ones are kept at their values, and the first ones stand for the sums (FittedParameter::name).
 /// 3. search() explains the residuals; constants of terms are tried at the present estimates.
 /// 4. Parameters, coefficients and smooth constants of what was found are fitted together (solve()).
 /// 5. Steps 3 and 4 are repeated at the new estimates, where what was found competes again, until the found set stays
@@ -47,10 +57,28 @@ Simulation tabulated(const Eigen::MatrixXd& simulated, const std::vector<std::st
 /// rows in time (TimeUse::found_out) where the inputs are noisy, where there are more than `largest_sample`, or where
 /// what is left is alike in neighbours.
 ///
+/// The answer is parameters_only where nothing is missing and k free parameters gain, with n values of each output o,
+///   sum_o n ln(RSS_o at the nominal values / RSS_o fitted) - k ln(n d) > 0,
+/// and a likelihood ratio as large as theirs has a probability below SearchOptions::false_alarm_rate in noise.
+///
 /// Throws std::invalid_argument for wrong shapes, names or options, values that are not finite, too few rows, and a
 /// prediction or a term that has the wrong shape or is not finite, naming it.
 Missing find_missing(const Simulation& simulation, const Inputs& inputs, const MeasuredOutputs& measured,
                      const std::vector<ModelTerm>& terms, const MissingOptions& options = {});
+
+/// Derivatives of the outputs by all parameters, one n x d matrix each, at inputs and values of the parameters.
+using OutputDerivatives =
+    std::function<std::vector<Eigen::MatrixXd>(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& values)>;
+
+/// find_missing() for a simulation that knows its derivatives, or that is worth few calls. It is linearised at the
+/// parameters, find_missing() searches and fits, and the simulation is linearised again at the new values
+/// (Gauss-Newton), until they move by less than a twentieth of their standard errors. A step that makes the sum of
+/// squares of what is left grow is halved. The errors before and after are those of the simulation itself.
+///
+/// Throws as find_missing(), and for derivatives of another number or shape, or that are not finite.
+Missing find_missing_in_steps(const Simulation& simulation, const OutputDerivatives& derivatives, const Inputs& inputs,
+                              const MeasuredOutputs& measured, const std::vector<ModelTerm>& terms,
+                              const MissingOptions& options = {});
 
 /// The simulation with what was found, at other inputs; m x d. `terms` as given to find_missing().
 Eigen::MatrixXd corrected(const Simulation& simulation, const Missing& missing, const std::vector<ModelTerm>& terms,

@@ -49,6 +49,10 @@ ModelTerm own_term(std::string name, std::string formula, std::function<double(c
 /// repeated names, values that are not finite, and an order that is not an input or holds equal values.
 std::vector<ModelTerm> standard_terms(const Inputs& inputs, std::vector<UntestableCause>* untestable = nullptr);
 
+/// The terms of the row before of one input: previous, rate, direction. Throws as standard_terms(), and for an input
+/// that there is not.
+std::vector<ModelTerm> row_before_terms(const Inputs& inputs, const std::string& input);
+
 /// `library` without the terms of one column that are proportional to one of `own`, so that the user's name is used.
 std::vector<ModelTerm> without_duplicates(std::vector<ModelTerm> library, const std::vector<ModelTerm>& own,
                                           const Rows& rows);

@@ -127,7 +127,8 @@ enum class Answer {
   named,
   indistinguishable,
   unknown,
-  failed_held_out  ///< of find_missing(): with what was found the error on rows set aside is larger
+  failed_held_out,  ///< of find_missing(): with what was found the error on rows set aside is larger
+  parameters_only   ///< of find_missing(): nothing is missing, but parameters are off their nominal values
 };
 
 /// A cause that would have won, had its values been within their limits.

@@ -189,6 +189,8 @@ std::string to_string(Answer answer) {
       return "unknown effect";
     case Answer::failed_held_out:
       return "failed on held-out rows";
+    case Answer::parameters_only:
+      return "parameters only";
   }
   return "";
 }

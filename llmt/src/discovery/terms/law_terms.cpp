@@ -33,7 +33,7 @@ TermConstant smooth(std::string name, std::string unit, std::vector<double> trie
 using OfConstants = Eigen::ArrayXd (*)(const Eigen::ArrayXd& x, const Eigen::VectorXd& constants);
 
 ModelTerm law(const InputView& input, std::string family, std::string formula, std::string coefficient, std::string per,
-              std::vector<TermConstant> constants, OfConstants function) {
+              std::vector<TermConstant> constants, std::string code, OfConstants function) {
   return {
       .family = std::move(family),
       .location = input.name,
@@ -45,7 +45,8 @@ ModelTerm law(const InputView& input, std::string family, std::string formula, s
         return function(rows.inputs.col(column).array(), values).matrix();
       },
       .constants = std::move(constants),
-      .prior_cost = cost_of_generality};
+      .prior_cost = cost_of_generality,
+      .code = {std::move(code)}};
 }
 
 // Rising and falling ones are variants: a falling one is a rising one and an offset.
@@ -58,11 +59,12 @@ std::vector<ModelTerm> sigmoids(const InputView& input) {
       smooth("c", input.name, std::move(tried)),
       smooth("w", input.name, geometric(0.03 * input.range(), 0.25 * input.range(), 6))};
   return {law(input, "sigmoid", fmt::format("1/(1 + exp(-({} - c)/w))", input.name), "height", "", constants,
+              "1/(1+exp(-($1-$c)/$d))",
               [](const Eigen::ArrayXd& x, const Eigen::VectorXd& c) -> Eigen::ArrayXd {
                 return (1.0 + ((c(0) - x) / std::max(c(1), 1e-300)).min(largest_exponent).exp()).inverse();
               }),
           law(input, "sigmoid", fmt::format("1/(1 + exp(({} - c)/w))", input.name), "height", "", constants,
-              [](const Eigen::ArrayXd& x, const Eigen::VectorXd& c) -> Eigen::ArrayXd {
+              "1/(1+exp(($1-$c)/$d))", [](const Eigen::ArrayXd& x, const Eigen::VectorXd& c) -> Eigen::ArrayXd {
                 return (1.0 + ((x - c(0)) / std::max(c(1), 1e-300)).min(largest_exponent).exp()).inverse();
               })};
 }
@@ -75,19 +77,19 @@ std::vector<ModelTerm> hills(const InputView& input) {
   const TermConstant half = smooth("c", input.name, geometric(0.05 * input.high, input.high, 20));
   // The rising one with n = 1 is a saturation.
   return {law(input, "hill", fmt::format("{0}^n/(c^n + {0}^n)", input.name), "limit", "",
-              {half, smooth("n", "1", {1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0})},
+              {half, smooth("n", "1", {1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0})}, "$1^$d/($c^$d+$1^$d)",
               [](const Eigen::ArrayXd& x, const Eigen::VectorXd& constants) -> Eigen::ArrayXd {
                 return 1.0 - falling_hill(x, constants);
               }),
           law(input, "hill", fmt::format("c^n/(c^n + {0}^n)", input.name), "limit", "",
-              {half, smooth("n", "1", {1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0})}, falling_hill)};
+              {half, smooth("n", "1", {1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0})}, "$c^$d/($c^$d+$1^$d)", falling_hill)};
 }
 
 ModelTerm power(const InputView& input) {
   std::vector<double> tried;
   for (double p = 0.2; p < 4.55; p += 0.15) tried.push_back(p);
   return law(input, "power", fmt::format("{}^p", input.name), "coefficient", fmt::format("{}^p", input.name),
-             {smooth("p", "1", std::move(tried))},
+             {smooth("p", "1", std::move(tried))}, "$1^$c",
              [](const Eigen::ArrayXd& x, const Eigen::VectorXd& constants) -> Eigen::ArrayXd {
                return x.max(0.0).pow(constants(0));
              });
@@ -104,13 +106,15 @@ ModelTerm coulomb_stribeck(const InputView& input) {
                       parts.col(0) = v.sign();
                       parts.col(1) = v.sign() * (-(v / c).square()).exp();
                       return parts;
-                    });
+                    },
+                    {"sign($1)", "sign($1)*exp(-(($1/$c)^2))"});
   term.prior_cost = cost_of_generality;
   return term;
 }
 
 ModelTerm friction(std::string family, std::string location, std::string formula, std::vector<std::string> inputs,
-                   std::string per, std::function<Eigen::ArrayXd(const Rows& rows)> load, Eigen::Index speed) {
+                   std::string per, std::function<Eigen::ArrayXd(const Rows& rows)> load, Eigen::Index speed,
+                   std::string code) {
   return {.family = std::move(family),
           .location = std::move(location),
           .formula = std::move(formula),
@@ -119,7 +123,8 @@ ModelTerm friction(std::string family, std::string location, std::string formula
           .per = std::move(per),
           .columns = [own = std::move(load), speed](const Rows& rows, const Eigen::VectorXd&) -> Eigen::MatrixXd {
             return (rows.inputs.col(speed).array().sign() * own(rows).abs()).matrix();
-          }};
+          },
+          .code = {std::move(code)}};
 }
 
 bool changes_sign(const InputView& input) { return input.low < 0.0 && input.high > 0.0; }
@@ -147,7 +152,7 @@ std::vector<ModelTerm> load_frictions(const std::vector<InputView>& inputs) {
     const std::string& v = speed.name;
     terms.push_back(friction(
         "load_friction", v, fmt::format("sign({}) |simulated output|", v), {v}, "simulated",
-        [](const Rows& rows) -> Eigen::ArrayXd { return rows.simulated.array(); }, speed.column));
+        [](const Rows& rows) -> Eigen::ArrayXd { return rows.simulated.array(); }, speed.column, "sign($1)*abs($s)"));
     if (inputs.size() > most) continue;
     for (const InputView& load : inputs) {
       if (load.column == speed.column || load.distinct.size() < 3) continue;
@@ -155,7 +160,7 @@ std::vector<ModelTerm> load_frictions(const std::vector<InputView>& inputs) {
       terms.push_back(friction(
           "sign_product", v + "," + x, fmt::format("sign({}) |{}|", v, x), {v, x}, x,
           [column = load.column](const Rows& rows) -> Eigen::ArrayXd { return rows.inputs.col(column).array(); },
-          speed.column));
+          speed.column, "sign($1)*abs($2)"));
     }
   }
   return terms;

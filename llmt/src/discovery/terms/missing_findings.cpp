@@ -31,6 +31,7 @@ FoundTerm described(const TermModel& model, const PlacedTerm& placed, const Eige
   found.formula = term.formula;
   found.inputs = term.inputs;
   found.generic = term.generic;
+  found.code = term.code;
   found.coefficients = placed.coefficients;
   found.constants = placed.constants;
   for (Eigen::Index k = 0; k < std::ssize(term.coefficients); ++k) {
@@ -170,16 +171,23 @@ void decide(Missing& missing) {
   if (is_named && !std::ranges::all_of(missing.found, &FoundTerm::confirmed)) missing.answer = Answer::unknown;
 }
 
-Gap gap_of(std::string output, const Eigen::VectorXd& before, const Eigen::VectorXd& after, double noise_floor) {
+Gap gap_of(std::string output, const Eigen::VectorXd& nominal, const Eigen::VectorXd& before,
+           const Eigen::VectorXd& after, double noise_floor) {
   // About what makes a row searched an outlier. A row that only the terms found throw off is none.
   constexpr double far = 5.0;
-  Gap gap{.output = std::move(output), .before = 0.0, .after = 0.0, .noise_floor = noise_floor, .outliers = 0};
+  Gap gap{.output = std::move(output),
+          .before = 0.0,
+          .after = 0.0,
+          .noise_floor = noise_floor,
+          .outliers = 0,
+          .nominal = 0.0};
   Eigen::Index used = 0;
   for (Eigen::Index i = 0; i < before.size(); ++i) {
     if (std::min(std::abs(before(i)), std::abs(after(i))) > far * noise_floor) {
       ++gap.outliers;
       continue;
     }
+    gap.nominal += nominal(i) * nominal(i);
     gap.before += before(i) * before(i);
     gap.after += after(i) * after(i);
     ++used;
@@ -187,11 +195,13 @@ Gap gap_of(std::string output, const Eigen::VectorXd& before, const Eigen::Vecto
   // Where the noise floor is no measure of what is left, nothing is an outlier.
   constexpr double largest_share = 0.15;
   if (static_cast<double>(gap.outliers) > largest_share * static_cast<double>(before.size())) {
+    gap.nominal = nominal.squaredNorm();
     gap.before = before.squaredNorm();
     gap.after = after.squaredNorm();
     gap.outliers = 0;
     used = before.size();
   }
+  gap.nominal = std::sqrt(gap.nominal / static_cast<double>(used));
   gap.before = std::sqrt(gap.before / static_cast<double>(used));
   gap.after = std::sqrt(gap.after / static_cast<double>(used));
   return gap;

@@ -35,7 +35,8 @@ std::vector<Structure> structure_beside(const TermModel& model, const TermData& 
 ///   error on the samples set aside.
 void decide(Missing& missing);
 
-/// Of the errors of an output on the rows set aside, before and after.
-Gap gap_of(std::string output, const Eigen::VectorXd& before, const Eigen::VectorXd& after, double noise_floor);
+/// Of the errors of an output on the samples set aside: at the nominal parameters, with parameters alone, with terms.
+Gap gap_of(std::string output, const Eigen::VectorXd& nominal, const Eigen::VectorXd& before,
+           const Eigen::VectorXd& after, double noise_floor);
 
 }  // namespace llmt::discovery

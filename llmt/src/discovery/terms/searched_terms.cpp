@@ -38,11 +38,12 @@ using OfInput = Eigen::ArrayXd (*)(const Eigen::ArrayXd& x, double constant);
 
 // Coefficient times one function of the input and a smooth constant.
 ModelTerm one_function(const InputView& input, std::string family, std::string formula, std::string coefficient,
-                       TermConstant constant, OfInput function) {
+                       TermConstant constant, OfInput function, std::string code) {
   const std::string per = family.starts_with("hinge") ? input.name : "";
   return searched_term(
       input, std::move(family), std::move(formula), {std::move(coefficient)}, per, std::move(constant),
-      [function](const Eigen::ArrayXd& x, double value) -> Eigen::MatrixXd { return function(x, value).matrix(); });
+      [function](const Eigen::ArrayXd& x, double value) -> Eigen::MatrixXd { return function(x, value).matrix(); },
+      {std::move(code)});
 }
 
 TermConstant smooth_constant(const InputView& input, std::string name, std::vector<double> tried, int beyond = 0) {
@@ -75,20 +76,22 @@ ModelTerm wave(const InputView& input) {
         waves.col(0) = (2.0 * std::numbers::pi / period * values).cos();
         waves.col(1) = (2.0 * std::numbers::pi / period * values).sin();
         return waves;
-      });
+      },
+      {fmt::format("cos({}*$1/$c)", 2.0 * std::numbers::pi), fmt::format("sin({}*$1/$c)", 2.0 * std::numbers::pi)});
 }
 
 ModelTerm step(const InputView& input) {
   constexpr std::size_t most = 200;
-  return one_function(input, "step", fmt::format("[{} > c]", input.name), "height",
-                      {.name = "c",
-                       .unit = input.name,
-                       .tried = thresholds(input.distinct, 4, most),
-                       .smooth = false,
-                       .kept = 1,
-                       .most = 3,
-                       .beyond = 0},
-                      [](const Eigen::ArrayXd& x, double cut) -> Eigen::ArrayXd { return (x > cut).cast<double>(); });
+  return one_function(
+      input, "step", fmt::format("[{} > c]", input.name), "height",
+      {.name = "c",
+       .unit = input.name,
+       .tried = thresholds(input.distinct, 4, most),
+       .smooth = false,
+       .kept = 1,
+       .most = 3,
+       .beyond = 0},
+      [](const Eigen::ArrayXd& x, double cut) -> Eigen::ArrayXd { return (x > cut).cast<double>(); }, "($1 > $c)");
 }
 
 std::vector<ModelTerm> hinges(const InputView& input) {
@@ -97,10 +100,12 @@ std::vector<ModelTerm> hinges(const InputView& input) {
   // Downwards it is another line and offset away from upwards: only one that ends at zero tells them apart.
   TermConstant downwards = cut;
   downwards.beyond = 0;
-  return {one_function(input, "hinge", fmt::format("max(0, {} - c)", input.name), "slope", cut,
-                       [](const Eigen::ArrayXd& x, double c) -> Eigen::ArrayXd { return (x - c).max(0.0); }),
-          one_function(input, "hinge_below", fmt::format("max(0, c - {})", input.name), "slope", downwards,
-                       [](const Eigen::ArrayXd& x, double c) -> Eigen::ArrayXd { return (c - x).max(0.0); })};
+  return {one_function(
+              input, "hinge", fmt::format("max(0, {} - c)", input.name), "slope", cut,
+              [](const Eigen::ArrayXd& x, double c) -> Eigen::ArrayXd { return (x - c).max(0.0); }, "max(0, $1 - $c)"),
+          one_function(
+              input, "hinge_below", fmt::format("max(0, c - {})", input.name), "slope", downwards,
+              [](const Eigen::ArrayXd& x, double c) -> Eigen::ArrayXd { return (c - x).max(0.0); }, "max(0, $c - $1)")};
 }
 
 ModelTerm settling(const InputView& input) {
@@ -110,7 +115,8 @@ ModelTerm settling(const InputView& input) {
                        smooth_constant(input, "tau", time_constants(input)),
                        [low = input.low](const Eigen::ArrayXd& values, double tau) -> Eigen::MatrixXd {
                          return (-(values - low).max(0.0) / std::max(tau, 1e-300)).exp().matrix();
-                       });
+                       },
+                       {fmt::format("exp(-max(0, $1 - ({}))/$c)", input.low)});
 }
 
 // Functions of inputs that change sign: those that saturate on both sides, and friction that falls as the speed grows.
@@ -119,21 +125,24 @@ std::vector<ModelTerm> odd_functions(const InputView& input) {
   const TermConstant width = smooth_constant(input, "c", widths(input, 0.01));
   // A narrower one is a sign and a line: Coulomb's and viscous friction.
   const TermConstant wide = smooth_constant(input, "c", widths(input, 0.15));
-  return {one_function(input, "tanh", fmt::format("tanh({}/c)", x), "limit", width,
-                       [](const Eigen::ArrayXd& v, double c) -> Eigen::ArrayXd { return (v / c).tanh(); }),
-          one_function(input, "asinh", fmt::format("asinh({}/c)", x), "coefficient", wide,
-                       [](const Eigen::ArrayXd& v, double c) -> Eigen::ArrayXd { return (v / c).asinh(); }),
-          one_function(input, "stribeck", fmt::format("sign({0}) exp(-({0}/c)^2)", x), "height", width,
-                       [](const Eigen::ArrayXd& v, double c) -> Eigen::ArrayXd {
-                         return v.sign() * (-(v / c).square()).exp();
-                       })};
+  return {one_function(
+              input, "tanh", fmt::format("tanh({}/c)", x), "limit", width,
+              [](const Eigen::ArrayXd& v, double c) -> Eigen::ArrayXd { return (v / c).tanh(); }, "tanh($1/$c)"),
+          one_function(
+              input, "asinh", fmt::format("asinh({}/c)", x), "coefficient", wide,
+              [](const Eigen::ArrayXd& v, double c) -> Eigen::ArrayXd { return (v / c).asinh(); }, "asinh($1/$c)"),
+          one_function(
+              input, "stribeck", fmt::format("sign({0}) exp(-({0}/c)^2)", x), "height", width,
+              [](const Eigen::ArrayXd& v, double c) -> Eigen::ArrayXd { return v.sign() * (-(v / c).square()).exp(); },
+              "sign($1)*exp(-(($1/$c)^2))")};
 }
 
 }  // namespace
 
 ModelTerm searched_term(const InputView& input, std::string family, std::string formula,
                         std::vector<std::string> coefficients, std::string per, TermConstant constant,
-                        std::function<Eigen::MatrixXd(const Eigen::ArrayXd& x, double constant)> columns) {
+                        std::function<Eigen::MatrixXd(const Eigen::ArrayXd& x, double constant)> columns,
+                        std::vector<std::string> code) {
   return {.family = std::move(family),
           .location = input.name,
           .formula = std::move(formula),
@@ -144,7 +153,8 @@ ModelTerm searched_term(const InputView& input, std::string family, std::string 
               [column = input.column, own = std::move(columns)](const Rows& rows, const Eigen::VectorXd& constants) {
                 return own(rows.inputs.col(column).array(), constants(0));
               },
-          .constants = {std::move(constant)}};
+          .constants = {std::move(constant)},
+          .code = std::move(code)};
 }
 
 std::vector<double> thresholds(const std::vector<double>& distinct, std::size_t beyond, std::size_t count) {
@@ -169,7 +179,8 @@ std::vector<ModelTerm> searched_terms(const InputView& input) {
     terms.push_back(one_function(
         input, "saturation", fmt::format("{0}/(c + {0})", input.name), "limit",
         smooth_constant(input, "c", time_constants(input)),
-        [](const Eigen::ArrayXd& x, double half) -> Eigen::ArrayXd { return x / (std::max(half, 1e-300) + x); }));
+        [](const Eigen::ArrayXd& x, double half) -> Eigen::ArrayXd { return x / (std::max(half, 1e-300) + x); },
+        "$1/($c + $1)"));
   }
   if (input.low < 0.0 && input.high > 0.0) {
     for (ModelTerm& term : odd_functions(input)) terms.push_back(std::move(term));

@@ -7,12 +7,14 @@
 #include <stdexcept>
 
 #include "discovery/terms/correlation.hpp"
+#include "discovery/terms/fitted_parameters.hpp"
 #include "discovery/terms/held_out.hpp"
 #include "discovery/terms/missing_findings.hpp"
 #include "discovery/terms/refuse.hpp"
 #include "discovery/terms/row_split.hpp"
 #include "discovery/terms/term_question.hpp"
 #include "discovery/terms/term_rounds.hpp"
+#include "llmt/statistics.hpp"
 
 namespace llmt::discovery {
 namespace {
@@ -41,6 +43,17 @@ void check(const Simulation& simulation, const Inputs& inputs, const MeasuredOut
   if (options.largest_sample < fewest) {
     refuse("find_missing", fmt::format("largest_sample is {}, must be at least {}", options.largest_sample, fewest));
   }
+}
+
+// Outputs count by their spread, because what the noise is of each is not known yet.
+DistinctParameters determined(const TermModel& model, const TermData& data, const Eigen::VectorXd& start,
+                              std::vector<Parameter>& parameters) {
+  TermData by_spread = data;
+  for (Eigen::Index o = 0; o < data.measured.cols(); ++o) {
+    const double spread = spread_of(data.measured.col(o));
+    if (spread > 0.0) by_spread.sigma(o) = spread;
+  }
+  return distinct_parameters(baseline_jacobian(model, by_spread, start, {}), parameters);
 }
 
 }  // namespace
@@ -105,7 +118,8 @@ Missing search_once(const Simulation& simulation, const Inputs& inputs, const Me
                     const std::vector<ModelTerm>& terms, const MissingOptions& options,
                     const std::set<std::size_t>& refuted) {
   const bool in_time = inputs.instants.size() > 0;
-  const TermModel model(simulation, inputs, measured.names, terms, refuted);
+  Simulation distinct = simulation;
+  const TermModel model(distinct, inputs, measured.names, terms, refuted);
   const RowSplit split = in_time ? split_in_time(inputs, options) : split_independent(inputs, options);
   const Eigen::Index d = measured.values.cols();
   TermData data = data_of(split.searched, measured);
@@ -121,6 +135,7 @@ Missing search_once(const Simulation& simulation, const Inputs& inputs, const Me
   for (std::size_t k = 0; k < simulation.parameters.size(); ++k) start(k) = simulation.parameters[k].value;
   Work work(options.progress);
   work.begin("fitting");
+  const DistinctParameters sums = determined(model, data, start, distinct.parameters);
   TermFit baseline = fit_terms(model, data, start, {});
   data.sigma = scatter(model, data, baseline);
   if (d > 1) baseline = fit_terms(model, data, start, {});
@@ -132,7 +147,7 @@ Missing search_once(const Simulation& simulation, const Inputs& inputs, const Me
   for (const PlacedTerm& option : settled.question.options) missing.candidates.push_back(option_label(model, option));
   describe_findings(model, settled, missing);
   describe_limits(settled, data, missing);
-  missing.parameters = simulation.parameters;
+  missing.parameters = distinct.parameters;
   for (std::size_t k = 0; k < missing.parameters.size(); ++k) {
     missing.parameters[k].value = settled.fit.parameters(k);
   }
@@ -144,6 +159,7 @@ Missing search_once(const Simulation& simulation, const Inputs& inputs, const Me
   }
   const TermData kept = without_samples(data, settled.verdict.outliers);
   if (!settled.verdict.outliers.empty()) baseline = fit_terms(model, kept, start, {});
+  const Eigen::MatrixXd nominal = model.predict(start, {});
   missing.before = model.predict(baseline.parameters, {});
   missing.corrected = model.predict(settled.fit.parameters, settled.fit.placed);
   missing.structure = structure_beside(model, kept, inputs, missing);
@@ -151,13 +167,14 @@ Missing search_once(const Simulation& simulation, const Inputs& inputs, const Me
   aside.sigma = data.sigma;
   judge_held_out(model, kept, aside, baseline, settled, missing);
   decide(missing);
+  describe_parameters({model, kept, start, baseline, settled.fit}, sums, options.search.false_alarm_rate, missing);
   missing.floor_from_repeats = settled.verdict.lack_of_fit.has_enough_repeats();
   const double noise = missing.floor_from_repeats ? settled.verdict.lack_of_fit.noise : settled.verdict.noise;
   for (Eigen::Index o = 0; o < d; ++o) {
     const Eigen::VectorXd before = measured.values.col(o) - missing.before.col(o);
     const Eigen::VectorXd after = measured.values.col(o) - missing.corrected.col(o);
-    missing.gaps.push_back(
-        gap_of(measured.names[o], means(before, split.held_out), means(after, split.held_out), noise * data.sigma(o)));
+    missing.gaps.push_back(gap_of(measured.names[o], means(measured.values.col(o) - nominal.col(o), split.held_out),
+                                  means(before, split.held_out), means(after, split.held_out), noise * data.sigma(o)));
   }
   if (in_time) {
     missing.time = {.in_time = true,

@@ -20,14 +20,16 @@ struct InputView {
   double range() const { return high - low; }
 };
 
-/// Coefficient times function(value of one input).
+/// Coefficient times function(value of one input). `code` is its ModelTerm::code.
 ModelTerm function_term(const InputView& input, std::string family, std::string formula, std::string per,
-                        double (*function)(double));
+                        double (*function)(double), std::string code);
 
-/// Coefficients times columns that depend on one input and a constant that is searched.
+/// Coefficients times columns that depend on one input and a constant that is searched; `code` is their
+/// ModelTerm::code.
 ModelTerm searched_term(const InputView& input, std::string family, std::string formula,
                         std::vector<std::string> coefficients, std::string per, TermConstant constant,
-                        std::function<Eigen::MatrixXd(const Eigen::ArrayXd& x, double constant)> columns);
+                        std::function<Eigen::MatrixXd(const Eigen::ArrayXd& x, double constant)> columns,
+                        std::vector<std::string> code);
 
 /// Shapes that carry "unknown".
 std::vector<ModelTerm> shapes_of(const std::vector<InputView>& inputs);
@@ -41,7 +43,7 @@ std::vector<ModelTerm> law_terms(const InputView& input);
 /// Friction that grows with the simulated output or with another input.
 std::vector<ModelTerm> load_frictions(const std::vector<InputView>& inputs);
 
-/// Terms of the row before.
+/// Terms of the row before, of inputs of at least three values.
 std::vector<ModelTerm> sequence_terms(const InputView& input, const std::string& order);
 
 /// Midpoints between neighbouring values with at least `beyond` values on both sides, at most `count`.

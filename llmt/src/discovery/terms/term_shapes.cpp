@@ -18,6 +18,16 @@ Eigen::MatrixXd cosines(const Eigen::ArrayXd& x, double low, double range, int c
   return functions;
 }
 
+// The same as text, of input number `place`.
+std::vector<std::string> cosine_code(int place, double low, double range, int count) {
+  std::vector<std::string> code;
+  for (int m = 0; m < count; ++m) {
+    code.push_back(
+        m == 0 ? "1" : fmt::format("cos({}*min(1, max(0, (${} - ({}))/{})))", std::numbers::pi * m, place, low, range));
+  }
+  return code;
+}
+
 std::vector<std::string> numbered(int count) {
   std::vector<std::string> names;
   for (int k = 0; k < count; ++k) names.push_back(fmt::format("c{}", k));
@@ -34,10 +44,17 @@ ModelTerm smooth_shape(const InputView& input, std::string family, int count) {
               [input, count](const Rows& rows, const Eigen::VectorXd&) {
                 return cosines(rows.inputs.col(input.column).array(), input.low, input.range(), count);
               },
-          .generic = true};
+          .generic = true,
+          .code = cosine_code(1, input.low, input.range(), count)};
 }
 
 ModelTerm pair_shape(const InputView& a, const InputView& b) {
+  const std::vector<std::string> code_of_a = cosine_code(1, a.low, a.range(), 4);
+  const std::vector<std::string> code_of_b = cosine_code(2, b.low, b.range(), 4);
+  std::vector<std::string> code;
+  for (std::size_t i = 0; i < 4; ++i) {
+    for (std::size_t j = 0; i + j < 4; ++j) code.push_back(code_of_a[i] + "*" + code_of_b[j]);
+  }
   return {.family = "?pair",
           .location = a.name + "," + b.name,
           .formula = fmt::format("smooth function of {} and {}", a.name, b.name),
@@ -56,7 +73,8 @@ ModelTerm pair_shape(const InputView& a, const InputView& b) {
                 }
                 return functions;
               },
-          .generic = true};
+          .generic = true,
+          .code = std::move(code)};
 }
 
 // 0.5 + 0.5 cos(pi (x - c) / w) for |x - c| < w.
@@ -77,7 +95,8 @@ ModelTerm bump_shape(const InputView& input, int parts) {
       [width](const Eigen::ArrayXd& x, double centre) -> Eigen::MatrixXd {
         const Eigen::ArrayXd u = ((x - centre) / width).abs().min(1.0);
         return (0.5 + 0.5 * (std::numbers::pi * u).cos()).matrix();
-      });
+      },
+      {fmt::format("(0.5 + 0.5*cos({}*min(1, abs(($1 - $c)/{}))))", std::numbers::pi, width)});
   term.location = fmt::format("{}/{}", input.name, parts);
   term.generic = true;
   return term;
@@ -112,7 +131,6 @@ ModelTerm sequence_term(
 
 std::vector<ModelTerm> sequence_terms(const InputView& input, const std::string& order) {
   std::vector<ModelTerm> terms;
-  if (input.distinct.size() < 3) return terms;
   const std::string& x = input.name;
   const Eigen::Index column = input.column;
   const std::string step = order.empty() ? "row" : order;

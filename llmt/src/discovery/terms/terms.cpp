@@ -74,12 +74,14 @@ ModelTerm harmonic(const InputView& input, int order) {
           .formula = fmt::format("C cos({0}{1}) + S sin({0}{1})", h, input.name),
           .inputs = {input.name},
           .coefficients = {"C", "S"},
-          .columns = [column = input.column, factor = radians * order](const Rows& rows, const Eigen::VectorXd&) {
-            Eigen::MatrixXd waves(rows.inputs.rows(), 2);
-            waves.col(0) = (factor * rows.inputs.col(column).array()).cos();
-            waves.col(1) = (factor * rows.inputs.col(column).array()).sin();
-            return waves;
-          }};
+          .columns =
+              [column = input.column, factor = radians * order](const Rows& rows, const Eigen::VectorXd&) {
+                Eigen::MatrixXd waves(rows.inputs.rows(), 2);
+                waves.col(0) = (factor * rows.inputs.col(column).array()).cos();
+                waves.col(1) = (factor * rows.inputs.col(column).array()).sin();
+                return waves;
+              },
+          .code = {fmt::format("cos({}*$1)", radians * order), fmt::format("sin({}*$1)", radians * order)}};
 }
 
 // a^power b.
@@ -95,7 +97,8 @@ ModelTerm power_product(const char* family, const InputView& a, int power, const
             Eigen::VectorXd values = rows.inputs.col(j);
             for (int k = 0; k < power; ++k) values.array() *= rows.inputs.col(i).array();
             return values;
-          }};
+          },
+          .code = {power == 1 ? "$1*$2" : fmt::format("$1^{}*$2", power)}};
 }
 
 ModelTerm product(const InputView& a, const InputView& b) { return power_product("product", a, 1, b); }
@@ -119,22 +122,23 @@ std::vector<ModelTerm> products_of(const std::vector<InputView>& inputs) {
 }
 
 std::vector<ModelTerm> output_terms() {
-  const auto term = [](std::string family, std::string formula, std::string per, auto columns) {
+  const auto term = [](std::string family, std::string formula, std::string per, std::string code, auto columns) {
     return ModelTerm{.family = std::move(family),
                      .location = "",
                      .formula = std::move(formula),
                      .inputs = {},
                      .coefficients = {"coefficient"},
                      .per = std::move(per),
-                     .columns = columns};
+                     .columns = columns,
+                     .code = {std::move(code)}};
   };
-  return {term("offset", "1", "",
+  return {term("offset", "1", "", "1",
                [](const Rows& rows, const Eigen::VectorXd&) -> Eigen::MatrixXd {
                  return Eigen::VectorXd::Ones(rows.inputs.rows());
                }),
-          term("gain", "simulated output", "simulated",
+          term("gain", "simulated output", "simulated", "$s",
                [](const Rows& rows, const Eigen::VectorXd&) -> Eigen::MatrixXd { return rows.simulated; }),
-          term("gain_curvature", "simulated output^2", "simulated^2",
+          term("gain_curvature", "simulated output^2", "simulated^2", "$s^2",
                [](const Rows& rows, const Eigen::VectorXd&) -> Eigen::MatrixXd {
                  return rows.simulated.array().square().matrix();
                })};
@@ -143,26 +147,37 @@ std::vector<ModelTerm> output_terms() {
 void add_functions(const InputView& input, std::vector<ModelTerm>& terms) {
   const std::string& x = input.name;
   const std::size_t levels = input.distinct.size();
-  terms.push_back(function_term(input, "linear", x, x, [](double v) { return v; }));
-  if (levels > 2) terms.push_back(function_term(input, "square", x + "^2", x + "^2", [](double v) { return v * v; }));
-  if (levels > 3) terms.push_back(function_term(input, "cube", x + "^3", x + "^3", [](double v) { return v * v * v; }));
+  terms.push_back(function_term(
+      input, "linear", x, x, [](double v) { return v; }, "$1"));
+  if (levels > 2)
+    terms.push_back(function_term(
+        input, "square", x + "^2", x + "^2", [](double v) { return v * v; }, "$1^2"));
+  if (levels > 3)
+    terms.push_back(function_term(
+        input, "cube", x + "^3", x + "^3", [](double v) { return v * v * v; }, "$1^3"));
   if (input.low < 0.0 && input.high > 0.0 && levels > 2) {
-    terms.push_back(function_term(input, "absolute", "|" + x + "|", x, [](double v) { return std::abs(v); }));
-    terms.push_back(function_term(input, "sign", "sign(" + x + ")", "", [](double v) {
-      return v > 0.0 ? 1.0 : v < 0.0 ? -1.0 : 0.0;
-    }));
+    terms.push_back(function_term(
+        input, "absolute", "|" + x + "|", x, [](double v) { return std::abs(v); }, "abs($1)"));
+    terms.push_back(function_term(
+        input, "sign", "sign(" + x + ")", "", [](double v) { return v > 0.0   ? 1.0
+                                                                    : v < 0.0 ? -1.0
+                                                                              : 0.0; },
+        "sign($1)"));
     if (levels > 3) {
-      terms.push_back(function_term(input, "signed_square", fmt::format("{0} |{0}|", x), x + "^2",
-                                    [](double v) { return v * std::abs(v); }));
+      terms.push_back(function_term(
+          input, "signed_square", fmt::format("{0} |{0}|", x), x + "^2", [](double v) { return v * std::abs(v); },
+          "$1*abs($1)"));
     }
   }
   if (input.low >= 0.0 && levels > 3) {
-    terms.push_back(
-        function_term(input, "root", fmt::format("sqrt({})", x), x + "^0.5", [](double v) { return std::sqrt(v); }));
+    terms.push_back(function_term(
+        input, "root", fmt::format("sqrt({})", x), x + "^0.5", [](double v) { return std::sqrt(v); }, "sqrt($1)"));
   }
   if (input.low > 0.0 && levels > 3) {
-    terms.push_back(function_term(input, "log", fmt::format("ln({})", x), "", [](double v) { return std::log(v); }));
-    terms.push_back(function_term(input, "reciprocal", "1/" + x, x + "^-1", [](double v) { return 1.0 / v; }));
+    terms.push_back(function_term(
+        input, "log", fmt::format("ln({})", x), "", [](double v) { return std::log(v); }, "ln($1)"));
+    terms.push_back(function_term(
+        input, "reciprocal", "1/" + x, x + "^-1", [](double v) { return 1.0 / v; }, "1/$1"));
   }
   if (is_angle(input) && levels > 4) {
     terms.push_back(harmonic(input, 1));
@@ -188,7 +203,7 @@ int complexity_of(const ModelTerm& term) {
 }  // namespace
 
 ModelTerm function_term(const InputView& input, std::string family, std::string formula, std::string per,
-                        double (*function)(double)) {
+                        double (*function)(double), std::string code) {
   return {.family = std::move(family),
           .location = input.name,
           .formula = std::move(formula),
@@ -197,7 +212,8 @@ ModelTerm function_term(const InputView& input, std::string family, std::string 
           .per = std::move(per),
           .columns = [column = input.column, function](const Rows& rows, const Eigen::VectorXd&) -> Eigen::MatrixXd {
             return rows.inputs.col(column).unaryExpr(function);
-          }};
+          },
+          .code = {std::move(code)}};
 }
 
 std::vector<ModelTerm> of_families(std::vector<ModelTerm> terms, const std::vector<std::string>& only,
@@ -255,13 +271,20 @@ std::vector<ModelTerm> standard_terms(const Inputs& inputs, std::vector<Untestab
     add_functions(input, terms);
     add(searched_terms(input));
     add(law_terms(input));
-    if (input.name != inputs.order) add(sequence_terms(input, inputs.order));
+    if (input.name != inputs.order && input.distinct.size() > 2) add(sequence_terms(input, inputs.order));
   }
   add(products_of(moving));
   add(load_frictions(moving));
   for (ModelTerm& term : terms) term.complexity = complexity_of(term);
   add(shapes_of(moving));
   return terms;
+}
+
+std::vector<ModelTerm> row_before_terms(const Inputs& inputs, const std::string& input) {
+  check(inputs);
+  const auto place = std::ranges::find(inputs.names, input);
+  if (place == inputs.names.end()) refuse("row_before_terms", fmt::format("\"{}\" is not an input", input));
+  return sequence_terms(view(inputs, place - inputs.names.begin()), inputs.order);
 }
 
 std::vector<ModelTerm> without_duplicates(std::vector<ModelTerm> library, const std::vector<ModelTerm>& own,

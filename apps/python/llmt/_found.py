@@ -1,0 +1,100 @@
+"""What was found missing, applied to other rows."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+
+class Found:
+    """Terms and changes of parameters that a simulation lacks, as :func:`load_found` reads them."""
+
+    def __init__(self, data: Mapping[str, Any]) -> None:
+        from llmt import _core
+
+        self._data = dict(data)
+        self._json = json.dumps(self._data)
+        made = _core.names_of_found(self._json)
+        self.inputs: list[str] = made["inputs"]
+        """Names of the columns that the terms depend on."""
+        self.outputs: list[str] = made["outputs"]
+        """Names of the simulated outputs."""
+        self.parameters: list[str] = made["parameters"]
+        """Names of the parameters of the simulation that change."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """What was read."""
+        copy: dict[str, Any] = json.loads(self._json)
+        return copy
+
+    def correct(
+        self,
+        inputs: Any,
+        simulated: Any,
+        *,
+        derivatives: Mapping[str, Any] | None = None,
+        parameters_are_set: bool = False,
+    ) -> np.ndarray:
+        """The simulated outputs with what was found, at other rows: n values, or n x outputs if there are several.
+
+        ``inputs`` is a table or array with the columns :attr:`inputs`, ``simulated`` the outputs there. Where parameters
+        of the simulation change, either ``derivatives`` has the derivatives of the outputs by each of them at these
+        rows, or ``parameters_are_set`` says that ``simulated`` was computed with their new values.
+        """
+        from llmt import _core
+        from llmt._discover import _in_order, _in_order_of_outputs, _is_table, _matrix
+
+        rows, columns = _matrix(inputs, "inputs", "x")
+        rows = _in_order(rows, columns, self.inputs, _is_table(inputs))
+        values, found = _matrix(simulated, "simulated", "y")
+        if _is_table(simulated):
+            values = _in_order_of_outputs(values, found, self.outputs)
+        shape = (len(rows), len(self.outputs))
+        if values.shape != shape:
+            raise ValueError(f"simulated has the shape {values.shape}, must be {shape[0]} x {shape[1]}")
+        given = {} if derivatives is None else {name: _matrix(by, name, "y")[0] for name, by in derivatives.items()}
+        for name, by in given.items():
+            if by.shape != shape:
+                raise ValueError(f"derivatives by {name} have the shape {by.shape}, must be {shape[0]} x {shape[1]}")
+        missing = [name for name in self.parameters if name not in given]
+        if missing and not parameters_are_set:
+            raise ValueError(
+                f"the parameter {missing[0]!r} changes: derivatives by it are needed, or parameters_are_set=True "
+                "where simulated was computed with its new value"
+            )
+        made = _core.apply_found(
+            self._json,
+            np.ascontiguousarray(rows),
+            np.ascontiguousarray(values),
+            {} if parameters_are_set else {name: np.ascontiguousarray(by) for name, by in given.items()},
+        )
+        return made[:, 0] if made.shape[1] == 1 else made
+
+    def code(self, language: str = "python") -> str:
+        """A function ``correction`` of the inputs, in ``"python"`` (with NumPy) or ``"c"``: what is to be added to the
+        simulated output; ``correction_OUTPUT`` for each of several."""
+        from llmt import _core
+
+        if language not in ("python", "c"):
+            raise ValueError(f"language is {language!r}, must be 'python' or 'c'")
+        code: str = _core.code_of_found(self._json, language == "python")
+        return code
+
+
+def load_found(source: str | os.PathLike[str] | Mapping[str, Any]) -> Found:
+    """Reads what ``llmt discover --json`` wrote: a path, the JSON text itself, or the dict of ``to_dict()``."""
+    if isinstance(source, Mapping):
+        return Found(source)
+    text = source if isinstance(source, str) and source.lstrip().startswith("{") else Path(source).read_text("utf-8")
+    try:
+        data = json.loads(text)
+    except json.JSONDecodeError as error:
+        raise ValueError(f"this is no JSON: {error}") from None
+    if not isinstance(data, dict):
+        raise ValueError("this is no JSON object of llmt discover")
+    return Found(data)

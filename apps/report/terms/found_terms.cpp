@@ -1,0 +1,215 @@
+#include "report/terms/found_terms.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <stdexcept>
+
+#include "expressions/expression.hpp"
+#include "llmt/discovery/terms.hpp"
+#include "report/text/text.hpp"
+
+namespace llmt::report {
+namespace {
+
+constexpr const char* history[] = {"previous", "rate", "direction"};
+
+bool is_history(const FoundTerms::Term& term) {
+  return std::ranges::find(history, term.family) != std::end(history) && !term.location.empty();
+}
+
+std::size_t output_place(const FoundTerms& found, const std::string& name) {
+  const auto place = std::ranges::find(found.outputs, name, &FoundTerms::Output::name);
+  if (place == found.outputs.end()) {
+    throw std::runtime_error(fmt::format("{}: \"{}\" is none of its outputs", found.file, name));
+  }
+  return static_cast<std::size_t>(place - found.outputs.begin());
+}
+
+void read_parameter(const Json& json, FoundTerms& found) {
+  const std::string name = json.at("parts").at(0).get<std::string>();
+  const double change = json.at("change").get<double>();
+  for (FoundTerms::Output& output : found.outputs) {
+    if (name == output.name + ".offset") {
+      output.offset += change;
+      return;
+    }
+    if (name == output.name + ".scale") {
+      output.scale += change;
+      return;
+    }
+  }
+  found.changes.push_back({name, json.at("unit").get<std::string>(), change,
+                           json.at("parts").size() == 1 ? json.at("value") : Json(nullptr)});
+}
+
+void read_terms(const Json& json, FoundTerms& found) {
+  const auto text_of = [](const Json& value) { return value.is_null() ? std::string() : value.get<std::string>(); };
+  for (const Json& effect : json.at("effects")) {
+    FoundTerms::Term term;
+    term.family = effect.at("name").get<std::string>();
+    term.location = effect.at("location").get<std::string>();
+    term.title = term.location.empty() ? term.family : term.family + " of " + term.location;
+    term.output = output_place(found, effect.at("output").get<std::string>());
+    term.expression = text_of(effect.at("expression"));
+    term.coefficient = effect.at("parameters").at(0).at("value").get<double>();
+    found.terms.push_back(std::move(term));
+  }
+  for (const Json& shape : json.at("unknown_all")) {
+    if (!shape.contains("expression")) continue;  // what nothing explains
+    FoundTerms::Term term;
+    term.title = shape.at("kind").get<std::string>();
+    term.output = output_place(found, shape.at("acts_on").get<std::string>());
+    term.expression = text_of(shape.at("expression"));
+    found.terms.push_back(std::move(term));
+  }
+}
+
+// Words become part of code: only those that this program makes are taken.
+void check_words(const FoundTerms& found) {
+  std::vector<std::string> names = found.input_names();
+  std::vector<std::string> words;
+  for (const FoundTerms::Input& input : found.inputs) words.push_back(input.word);
+  for (const FoundTerms::Output& output : found.outputs) {
+    names.push_back(output.name);
+    words.push_back(output.word);
+  }
+  const std::vector<std::string> expected = words_for(names);
+  for (std::size_t k = 0; k < words.size(); ++k) {
+    if (words[k] != expected[k]) {
+      throw std::runtime_error(
+          fmt::format("{}: the word of \"{}\" is \"{}\", must be \"{}\"", found.file, names[k], words[k], expected[k]));
+    }
+  }
+}
+
+// Values of a term at all rows. `base`: the output without terms.
+Eigen::VectorXd values_of(const FoundTerms& found, const FoundTerms::Term& term, const discovery::Inputs& inputs,
+                          const Eigen::VectorXd& base) {
+  if (term.expression.empty()) {
+    if (!is_history(term)) {
+      throw std::runtime_error(fmt::format("{}: the term {} has no expression", found.file, term.title));
+    }
+    for (const discovery::ModelTerm& known : discovery::row_before_terms(inputs, term.location)) {
+      if (known.family == term.family) {
+        return term.coefficient * known.columns(discovery::rows_of(inputs, base), {}).col(0);
+      }
+    }
+  }
+  Expression expression(term.expression, {{"pi", std::numbers::pi}});
+  const FoundTerms::Output& output = found.outputs[term.output];
+  std::vector<Eigen::Index> places;
+  for (const std::string& name : expression.names()) {
+    const auto input = std::ranges::find_if(
+        found.inputs, [&](const FoundTerms::Input& i) { return i.word == name || i.name == name; });
+    if (input == found.inputs.end() && name != output.word && name != output.name) {
+      throw std::runtime_error(
+          fmt::format("{}: the term {} depends on \"{}\", which is no input", found.file, term.title, name));
+    }
+    places.push_back(input - found.inputs.begin());
+  }
+  Eigen::VectorXd values(base.size());
+  std::vector<double> variables(places.size());
+  for (Eigen::Index i = 0; i < values.size(); ++i) {
+    for (std::size_t k = 0; k < places.size(); ++k) {
+      variables[k] = places[k] < inputs.values.cols() ? inputs.values(i, places[k]) : base(i);
+    }
+    values(i) = expression.value(variables);
+  }
+  return values;
+}
+
+}  // namespace
+
+std::vector<std::string> FoundTerms::input_names() const {
+  std::vector<std::string> names;
+  for (const Input& input : inputs) names.push_back(input.name);
+  return names;
+}
+
+std::vector<std::string> FoundTerms::output_names() const {
+  std::vector<std::string> names;
+  for (const Output& output : outputs) names.push_back(output.name);
+  return names;
+}
+
+FoundTerms found_terms(const std::string& json, const std::string& file) {
+  Json parsed;
+  try {
+    parsed = Json::parse(json);
+  } catch (const Json::exception& error) {
+    throw std::runtime_error(fmt::format("{}: {}", file, error.what()));
+  }
+  return found_terms(parsed, file);
+}
+
+FoundTerms found_terms(const Json& json, const std::string& file) {
+  FoundTerms found;
+  found.file = file;
+  try {
+    for (const Json& input : json.at("inputs")) {
+      found.inputs.push_back({input.at("name").get<std::string>(), input.at("word").get<std::string>(),
+                              input.at("low").get<double>(), input.at("high").get<double>()});
+    }
+    for (const Json& output : json.at("outputs")) {
+      found.outputs.push_back({output.at("name").get<std::string>(), output.at("word").get<std::string>()});
+    }
+    check_words(found);
+    if (found.outputs.empty()) throw std::runtime_error(fmt::format("{}: there are no outputs", file));
+    found.order = json.at("order").get<std::string>();
+    for (const Json& parameter : json.at("parameters")) read_parameter(parameter, found);
+    read_terms(json, found);
+  } catch (const Json::exception& error) {
+    throw std::runtime_error(fmt::format("{} is not what llmt discover --json prints: {}", file, error.what()));
+  }
+  return found;
+}
+
+Eigen::MatrixXd apply(const FoundTerms& found, const Eigen::MatrixXd& inputs, const Eigen::MatrixXd& simulated,
+                      const std::map<std::string, Eigen::MatrixXd>& derivatives) {
+  const discovery::Inputs named{found.input_names(), inputs, found.order};
+  Eigen::MatrixXd base = simulated;
+  for (std::size_t o = 0; o < found.outputs.size(); ++o) {
+    const auto column = static_cast<Eigen::Index>(o);
+    base.col(column) = (found.outputs[o].offset + found.outputs[o].scale * simulated.col(column).array()).matrix();
+  }
+  for (const FoundTerms::Change& change : found.changes) {
+    const auto by = derivatives.find(change.parameter);
+    if (by != derivatives.end()) base += change.change * by->second;
+  }
+  Eigen::MatrixXd corrected = base;
+  for (const FoundTerms::Term& term : found.terms) {
+    const auto column = static_cast<Eigen::Index>(term.output);
+    Eigen::VectorXd values;
+    try {
+      values = values_of(found, term, named, base.col(column));
+    } catch (const ExpressionError& error) {
+      throw std::runtime_error(fmt::format("{}: the term {}: {}", found.file, term.title, error.what()));
+    }
+    for (Eigen::Index i = 0; i < values.size(); ++i) {
+      if (!std::isfinite(values(i))) {
+        throw std::runtime_error(
+            fmt::format("{}: the term {} is not finite at data row {}", found.file, term.title, i + 1));
+      }
+    }
+    corrected.col(column) += values;
+  }
+  return corrected;
+}
+
+std::vector<std::string> outside_sentences(const FoundTerms& found, const Eigen::MatrixXd& inputs) {
+  std::vector<std::string> sentences;
+  for (std::size_t j = 0; j < found.inputs.size(); ++j) {
+    const FoundTerms::Input& input = found.inputs[j];
+    const auto column = inputs.col(static_cast<Eigen::Index>(j)).array();
+    const Eigen::Index outside = (column < input.low || column > input.high).count();
+    if (outside == 0) continue;
+    sentences.push_back(fmt::format("{} of {} values of {} lie outside of {} ... {}, where the terms were found",
+                                    outside, column.size(), input.name, number(input.low), number(input.high)));
+  }
+  return sentences;
+}
+
+}  // namespace llmt::report

@@ -1,0 +1,72 @@
+/// \file
+/// What was found missing, as `llmt discover --json` writes it, read back: applied to other rows, and written as code.
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "llmt/discovery/model_term.hpp"
+#include "report/terms/expression_code.hpp"
+#include "report/text/json.hpp"
+
+namespace llmt::report {
+
+/// The terms and changes of parameters in such an object.
+struct FoundTerms {
+  struct Input {
+    std::string name;
+    std::string word;  ///< what expressions call it
+    double low = 0.0;  ///< of the rows that were searched
+    double high = 0.0;
+  };
+  struct Output {
+    std::string name;
+    std::string word;     ///< what expressions call its simulated value
+    double offset = 0.0;  ///< what the simulation was allowed to adjust: offset + scale * simulated
+    double scale = 1.0;
+  };
+  struct Term {
+    std::string title;
+    std::string family;
+    std::string location;
+    std::size_t output = 0;
+    std::string expression;    ///< of the whole term; empty: there is none, as for terms of the row before
+    double coefficient = 0.0;  ///< the first
+  };
+  struct Change {
+    std::string parameter;
+    std::string unit;
+    double change = 0.0;
+    Json value;  ///< where the nominal value is known, else null
+  };
+  std::string file;
+  std::vector<Input> inputs;
+  std::vector<Output> outputs;
+  std::string order;  ///< as discovery::Inputs::order
+  std::vector<Term> terms;
+  std::vector<Change> changes;  ///< of parameters of the simulation
+
+  std::vector<std::string> input_names() const;
+  std::vector<std::string> output_names() const;
+};
+
+/// Throws std::runtime_error that names `file` and what is wrong in it.
+FoundTerms found_terms(const std::string& json, const std::string& file);
+FoundTerms found_terms(const Json& json, const std::string& file);
+
+/// The simulated outputs (n x d) with what was found, at the rows of inputs (columns as in FoundTerms::inputs).
+/// `derivatives`: n x d by each parameter, as far as its change is to be added. Throws std::runtime_error that names a
+/// term without an expression, or one that is not finite at a row.
+Eigen::MatrixXd apply(const FoundTerms& found, const Eigen::MatrixXd& inputs, const Eigen::MatrixXd& simulated,
+                      const std::map<std::string, Eigen::MatrixXd>& derivatives = {});
+
+/// The numbers of values of each input that lie outside of what was searched, in a sentence each.
+std::vector<std::string> outside_sentences(const FoundTerms& found, const Eigen::MatrixXd& inputs);
+
+/// A function `correction` of the inputs in the language, whose value is what is to be added to the simulated output;
+/// `correction_OUTPUT` for each of several. Changes of parameters stand in a comment. Throws std::runtime_error that
+/// names a term that no function of one row can be.
+std::string correction_code(const FoundTerms& found, CodeLanguage language);
+
+}  // namespace llmt::report

@@ -1,0 +1,163 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "discovery/terms/refuse.hpp"
+#include "llmt/discovery/simulation.hpp"
+#include "llmt/statistics.hpp"
+
+namespace llmt::discovery {
+namespace {
+
+constexpr int most_steps = 10;
+
+// The simulation as the steps see it.
+class Linearisation {
+ public:
+  Linearisation(const Simulation& simulation, const OutputDerivatives& derivatives, const Inputs& inputs,
+                const MeasuredOutputs& measured)
+      : simulation_(simulation), derivatives_(derivatives), inputs_(inputs), measured_(measured) {}
+
+  Eigen::MatrixXd outputs(const Eigen::VectorXd& values) const {
+    Eigen::MatrixXd outputs = simulation_.predict(inputs_.values, values);
+    if (outputs.rows() != measured_.values.rows() || outputs.cols() != measured_.values.cols()) {
+      refuse("find_missing", fmt::format("the simulation gave {} x {} outputs, must be {} x {}", outputs.rows(),
+                                         outputs.cols(), measured_.values.rows(), measured_.values.cols()));
+    }
+    for (Eigen::Index i = 0; i < outputs.rows(); ++i) {
+      if (!outputs.row(i).allFinite()) {
+        refuse("find_missing", fmt::format("the simulation is not finite at row {}", i + 1));
+      }
+    }
+    return outputs;
+  }
+
+  // Where `outputs` are those at `values`. Its nominal values are those of the simulation.
+  Simulation at(const Eigen::VectorXd& values, const Eigen::MatrixXd& outputs) const {
+    std::vector<Eigen::MatrixXd> by = derivatives_(inputs_.values, values);
+    if (by.size() != simulation_.parameters.size()) {
+      refuse("find_missing",
+             fmt::format("derivatives by {} parameters, must be {}", by.size(), simulation_.parameters.size()));
+    }
+    Eigen::MatrixXd at_nominal = outputs;
+    for (std::size_t k = 0; k < by.size(); ++k) {
+      const Parameter& parameter = simulation_.parameters[k];
+      if (by[k].rows() != outputs.rows() || by[k].cols() != outputs.cols()) {
+        refuse("find_missing", fmt::format("the derivatives by {} are {} x {}, must be {} x {}", parameter.name,
+                                           by[k].rows(), by[k].cols(), outputs.rows(), outputs.cols()));
+      }
+      at_nominal -= (values(static_cast<Eigen::Index>(k)) - parameter.value) * by[k];
+    }
+    // The outputs' own offsets and scales are no parameters here.
+    Simulation table;
+    table.predict = [at_nominal](const Eigen::MatrixXd&, const Eigen::VectorXd&) { return at_nominal; };
+    return linearised(std::move(table), at_nominal, simulation_.parameters, std::move(by));
+  }
+
+ private:
+  const Simulation& simulation_;
+  const OutputDerivatives& derivatives_;
+  const Inputs& inputs_;
+  const MeasuredOutputs& measured_;
+};
+
+Eigen::VectorXd values_of(const std::vector<Parameter>& parameters) {
+  Eigen::VectorXd values(std::ssize(parameters));
+  for (std::size_t k = 0; k < parameters.size(); ++k) values(static_cast<Eigen::Index>(k)) = parameters[k].value;
+  return values;
+}
+
+// What the terms add, n x d.
+Eigen::MatrixXd added(const Simulation& linear, const Missing& missing, const Inputs& inputs) {
+  return missing.corrected - linear.predict(inputs.values, values_of(missing.parameters));
+}
+
+// Sum of squares at the rows searched that are no outliers, outputs by their spread.
+double left(const Missing& missing, const MeasuredOutputs& measured, const Eigen::MatrixXd& predicted) {
+  double sum = 0.0;
+  for (Eigen::Index o = 0; o < predicted.cols(); ++o) {
+    const double spread = spread_of(measured.values.col(o));
+    for (const Eigen::Index row : missing.searched) {
+      if (std::ranges::find(missing.outliers, row) != missing.outliers.end()) continue;
+      sum += std::pow((measured.values(row, o) - predicted(row, o)) / (spread > 0.0 ? spread : 1.0), 2.0);
+    }
+  }
+  return sum;
+}
+
+bool has_settled(const Missing& missing, const Eigen::VectorXd& before) {
+  constexpr double share_of_error = 0.05;
+  constexpr double share_of_scale = 1e-9;
+  const Eigen::VectorXd after = values_of(missing.parameters);
+  for (Eigen::Index k = 0; k < after.size(); ++k) {
+    const double error = missing.standard_errors(k);
+    const double enough =
+        std::max(std::isfinite(error) ? share_of_error * error : 0.0, share_of_scale * missing.parameters[k].scale);
+    if (std::abs(after(k) - before(k)) > enough) return false;
+  }
+  return true;
+}
+
+double rms_of_rows(const Eigen::VectorXd& errors, const std::vector<Eigen::Index>& rows) {
+  if (rows.empty()) return std::numeric_limits<double>::quiet_NaN();
+  return std::sqrt(errors(rows).squaredNorm() / static_cast<double>(rows.size()));
+}
+
+}  // namespace
+
+Missing find_missing_in_steps(const Simulation& simulation, const OutputDerivatives& derivatives, const Inputs& inputs,
+                              const MeasuredOutputs& measured, const std::vector<ModelTerm>& terms,
+                              const MissingOptions& options) {
+  const Linearisation linearisation(simulation, derivatives, inputs, measured);
+  const Eigen::VectorXd start = values_of(simulation.parameters);
+  const Eigen::MatrixXd nominal = linearisation.outputs(start);
+  Eigen::VectorXd values = start;
+  Eigen::MatrixXd outputs = nominal;
+  Eigen::MatrixXd terms_added = Eigen::MatrixXd::Zero(outputs.rows(), outputs.cols());
+  Missing missing;
+  bool settled = false;
+  for (int step = 0; step < most_steps && !settled; ++step) {
+    const Simulation linear = linearisation.at(values, outputs);
+    missing = find_missing(linear, inputs, measured, terms, options);
+    settled = has_settled(missing, values);
+    terms_added = added(linear, missing, inputs);
+    const double before = left(missing, measured, outputs + terms_added);
+    Eigen::VectorXd next = values_of(missing.parameters);
+    Eigen::MatrixXd at_next = linearisation.outputs(next);
+    constexpr int most_halvings = 6;
+    constexpr double rounding = 1e-9;
+    for (int k = 0;
+         k < most_halvings && left(missing, measured, at_next + terms_added) > (1.0 + rounding) * before && !settled;
+         ++k) {
+      next = 0.5 * (next + values);
+      at_next = linearisation.outputs(next);
+    }
+    values = next;
+    outputs = at_next;
+  }
+  if (!settled) {
+    missing.notes.push_back(
+        fmt::format("the parameters still moved after {} linearisations of the simulation", most_steps));
+  }
+  for (std::size_t k = 0; k < missing.parameters.size(); ++k) {
+    missing.parameters[k].value = values(static_cast<Eigen::Index>(k));
+  }
+  missing.corrected = outputs + terms_added;
+  Eigen::VectorXd alone = start;
+  for (const FittedParameter& fitted : missing.fitted_parameters) {
+    const auto first = std::ranges::find(missing.parameters, fitted.parts.front(), &Parameter::name);
+    alone(first - missing.parameters.begin()) += fitted.alone;
+  }
+  missing.before = missing.found.empty() ? missing.corrected : linearisation.outputs(alone);
+  for (Eigen::Index o = 0; o < outputs.cols(); ++o) {
+    Gap& gap = missing.gaps[static_cast<std::size_t>(o)];
+    gap.nominal = rms_of_rows(measured.values.col(o) - nominal.col(o), missing.held_out);
+    gap.before = rms_of_rows(measured.values.col(o) - missing.before.col(o), missing.held_out);
+    gap.after = rms_of_rows(measured.values.col(o) - missing.corrected.col(o), missing.held_out);
+  }
+  return missing;
+}
+
+}  // namespace llmt::discovery
