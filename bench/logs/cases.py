@@ -31,6 +31,7 @@ class Case:
     inputs: tuple = ("q", "dq", "ddq")
     target: str = "tau"
     truth: tuple = ()
+    tolerated: tuple = ()  # names of small parts of the same physics, neither right nor wrong
     parameters: tuple = ()  # parameters whose derivatives are given, with the change that is true
     inner: bool = False  # the right answer: an inner state
     refused: bool = False  # the right answer: an error
@@ -76,8 +77,11 @@ def elastic_cases():
     yield from variants("b", ["all1", "all5"], **b)
     yield from variants("b_lowpass", ["all1"], preparation="lowpass8", **b)
     yield from variants("b_allrows", ["all1"], rows="all", **b)
+    second = dict(b, preparation="second_derivatives", inputs=("d2ddq", "d2u", "q", "dq", "ddq"))
+    yield from variants("b_second_derivatives", ["all1"], **second)
     spring = Term(("linear tau_gear",), (-1 / 150,))
     two = dict(preparation="two_encoders", inputs=("q", "dq", "ddq", "tau_gear"), target="q_link", truth=(spring,))
+    two |= dict(tolerated=("linear dq", "rate tau_gear"))  # the damping of the spring
     yield from variants("b_two", ["all1", "all5"], machine="elastic", **two)
 
 
@@ -101,6 +105,8 @@ def cart_cases():
     yield from variants("c1_allrows", ["all5"], rows="all", **c1)
     yield from variants("d_exact", ["tau1", "tau5", "all1", "all5"], **c)
     yield from variants("d_exact_allrows", ["all5"], rows="all", **c)
+    yield from variants("c1_long", ["tau5"], rows="all", seconds=100.0, **c1)
+    yield from variants("d_exact_long", ["tau5"], rows="all", seconds=100.0, **c)
     yield from variants("d_exact_runs", ["all5"], runs=3, seconds=8.0, **c)
     yield from variants("d_exact_correlated", ["tau5"], preparation="correlated", rows="fifth", **c)
     yield from variants("d_exact_encoder", ["tau1"], preparation="encoder", **c)
@@ -145,6 +151,7 @@ def belt_cases():
     with_stretch = dict(b, inputs=("q", "dq", "ddq", "stretch", "dstretch"))
     tension = Term(("linear tension",), (-1 / 20000,))
     two = dict(b, preparation="two_encoders", inputs=("q", "dq", "ddq", "tension"), target="q_b", truth=(tension,))
+    two |= dict(tolerated=("linear dq", "rate tension"))
     yield from variants("belt_two", ["all1"], **two)
     yield from variants("belt_rigid", ["all1"], preparation="rigid_belt", inner=True, **b)
     hardening = Term(("cube stretch",), (4e9,))

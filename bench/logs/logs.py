@@ -116,6 +116,12 @@ def differentiate(rows, rate, smooth):
             rows["ddq" + end] = np.gradient(rows["dq" + end], 1 / rate)
 
 
+def with_second_derivatives(rows, rate):
+    """Of acceleration and torque, by local polynomials, with the ends of the filter as they come."""
+    of = {f"d2{name}": signal.savgol_filter(rows[name], 51, 4, deriv=2, delta=1 / rate) for name in ("ddq", "u")}
+    return rows | of
+
+
 def at_ten_kilohertz(rows):
     """The bandwidth of the signals lies far below 2 kHz, so that a spline is exact."""
     fine = np.arange(0, rows["t"][-1], 1e-4)
@@ -137,6 +143,8 @@ def one_run(case, seed, run):
         needed = p["m"] * true["ddq"] + p["b"] * true["dq"] + p["f"] * np.sign(true["dq"])
         true = dict(true, tension=true["u"] - needed)
     logged = add_noise(case, true, generator(case.name, seed, run, "noise"), rate)
+    if case.preparation == "second_derivatives":
+        logged, true = (with_second_derivatives(rows, rate) for rows in (logged, true))
     keep = slice(None)
     if "lowpass" in case.preparation:
         logged = filtered(logged, rate, 10 if case.preparation == "encoder_lowpass" else 8)

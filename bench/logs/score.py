@@ -8,8 +8,8 @@ quarter of the true one. What the program adds to the simulation is also compare
 true signals. A line is a case, over its seeds:
 
     alone    every missing term is named rightly, and nothing else is named
-    listed   every missing term is named rightly, among others
-    wrong    runs with at least one other effect that is called confirmed
+    listed   every missing term is named rightly, among others, or stands among the rivals of a named one
+    wrong    runs with at least one other effect that is called confirmed, and whose rivals are not right either
     tent.    runs that name only other effects, none of them confirmed
     nothing  the answer is that nothing is missing (or that parameters alone differ)
     alarm    another answer, where nothing is missing
@@ -78,6 +78,15 @@ def label(effect):
     return f"{effect['name']} {place(effect)}".strip()
 
 
+def rivals(effect):
+    """Labels of the terms that the answer says explain it as well."""
+    labels = []
+    for text in effect.get("rivals", []):
+        family, _, location = text.partition(" ")
+        labels.append(label({"name": family, "location": location}))
+    return labels
+
+
 def values_of(effect):
     return [p["value"] for p in effect["parameters"]]
 
@@ -109,6 +118,13 @@ def parameter_effects(document, case):
     return found
 
 
+def described(effect):
+    """For people who look into the results file: + confirmed, ? tentative, coefficients, (rivals)."""
+    numbers = " ".join(f"{v:.4g}" for v in values_of(effect))
+    others = f" ({', '.join(rivals(effect))})" if rivals(effect) else ""
+    return f"{label(effect)} {'+' if effect['confirmed'] else '?'} {numbers}{others}"
+
+
 def is_complete(case):
     return not (case.truth or case.inner or case.refused or any(change for _, change in case.parameters))
 
@@ -121,18 +137,22 @@ def judge(document, case):
     parameters = parameter_effects(document, case)
     good = {name for name, change, effect in parameters if near_change(values_of(effect)[0], change)}
     allowed = [id(e) for found in right for e in found] + [id(effect) for _, _, effect in parameters]
-    others = [e for e in effects if id(e) not in allowed]
-    listed = bool(right) and all(right)
+    others = [e for e in effects if id(e) not in allowed and label(e) not in case.tolerated]
+    accepted = {name for term in case.truth for name in term.accepted}
+    undecided = [e for e in others if accepted & set(rivals(e))]
+    beside = {name for e in undecided for name in rivals(e)}
+    listed = bool(right) and all(found or beside & set(term.accepted) for term, found in zip(case.truth, right))
+    wrong = [e for e in others if e["confirmed"] and e not in undecided]
     nothing = verdict.startswith("nothing") or verdict.startswith("parameters only")
     complete = is_complete(case)
     cover = [inside for term, found in named for e in found for inside in covered(e, term.values)]
     cover += [inside for _, change, e in parameters for inside in covered(e, (change,))]
     return {
         "verdict": verdict,
-        "names": [f"{label(e)} {'+' if e['confirmed'] else '?'} {' '.join(f'{v:.4g}' for v in values_of(e))}" for e in effects],
-        "alone": listed and not others and not document.get("unknown") and not said_inner(document),
+        "names": [described(e) for e in effects],
+        "alone": bool(right) and all(right) and not others and not document.get("unknown") and not said_inner(document),
         "listed": listed,
-        "wrong": any(e["confirmed"] for e in others),
+        "wrong": bool(wrong),
         "tentative": bool(others) and not any(right) and not any(e["confirmed"] for e in others),
         "nothing": nothing and not others,
         "alarm": complete and not (nothing and not effects),

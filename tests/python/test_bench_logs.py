@@ -93,6 +93,14 @@ def test_judge_knows_the_right_term_alone_and_among_others():
     assert not score.judge(document(DRAG, unknown={"kind": "smooth"}), case)["alone"]
 
 
+def test_judge_takes_a_right_rival_for_listed():
+    case = CASES["c1_all5"]
+    cube = effect("cube", "dq", [1.3]) | {"rivals": ["signed_square dq"]}
+    verdict = score.judge(document(cube), case)
+    assert verdict["listed"] and not verdict["alone"] and not verdict["wrong"]
+    assert score.judge(document(cube | {"rivals": ["tanh dq"]}), case)["wrong"]
+
+
 def test_judge_takes_a_wrong_coefficient_or_place_for_wrong():
     case = CASES["c1_all5"]
     for wrong in (effect("signed_square", "dq", [-1.5]), effect("signed_square", "q", [1.5]), effect("cube", "dq", [1.5])):
