@@ -135,7 +135,8 @@ def judge(document, case):
     named = [(term, [e for e in effects if label(e) in term.accepted]) for term in case.truth]
     right = [[e for e in found if near(values_of(e), term.values)] for term, found in named]
     parameters = parameter_effects(document, case)
-    good = {name for name, change, effect in parameters if near_change(values_of(effect)[0], change)}
+    estimates = {name: values_of(effect)[0] for name, _, effect in parameters}  # what is not named is as it should be
+    off = [name for name, change in case.parameters if not near_change(estimates.get(name, 0.0), change)]
     allowed = [id(e) for found in right for e in found] + [id(effect) for _, _, effect in parameters]
     others = [e for e in effects if id(e) not in allowed and label(e) not in case.tolerated]
     accepted = {name for term in case.truth for name in term.accepted}
@@ -157,7 +158,7 @@ def judge(document, case):
         "nothing": nothing and not others,
         "alarm": complete and not (nothing and not effects),
         "inner": said_inner(document),
-        "parameters": len(good) == len(case.parameters) if case.parameters else None,
+        "parameters": not off if case.parameters else None,
         "cover": [sum(cover), len(cover)],
         "gap": [document["gap"]["before"], document["gap"]["after"]],
     }
