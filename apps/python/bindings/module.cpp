@@ -11,5 +11,6 @@ NB_MODULE(_core, module) {
   llmt::python::add_arrow(module);
   llmt::python::add_models(module);
   llmt::python::add_fitting(module);
+  llmt::python::add_signals(module);
   llmt::python::add_terms(module);
 }

@@ -9,6 +9,7 @@ namespace llmt::python {
 void add_arrow(nanobind::module_& module);
 void add_fitting(nanobind::module_& module);
 void add_models(nanobind::module_& module);
+void add_signals(nanobind::module_& module);
 void add_terms(nanobind::module_& module);
 
 /// Of the module _robotics.

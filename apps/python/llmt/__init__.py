@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from ._discover import find_missing as find_missing
     from ._estimator import LocalLinearTreeRegressor as LocalLinearTreeRegressor
     from ._model import Model as Model
+    from ._signals import Signals as Signals
+    from ._signals import signals as signals
 
     __version__: str
 
@@ -31,12 +33,24 @@ _homes = {
     "Missing": "_discover",
     "Model": "_model",
     "Parameter": "_discover",
+    "Signals": "_signals",
     "__version__": "_core",
     "discover": "_discover",
     "find_missing": "_discover",
+    "signals": "_signals",
 }
 
-__all__ = ["LocalLinearTreeRegressor", "Missing", "Model", "Parameter", "__version__", "discover", "find_missing"]
+__all__ = [
+    "LocalLinearTreeRegressor",
+    "Missing",
+    "Model",
+    "Parameter",
+    "Signals",
+    "__version__",
+    "discover",
+    "find_missing",
+    "signals",
+]
 
 
 def __getattr__(name: str) -> object:
