@@ -2,6 +2,8 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
+#include <map>
 #include <memory>
 #include <numeric>
 #include <sstream>
@@ -28,6 +30,10 @@ struct DiscoverArguments {
   std::vector<std::string> adjusted;
   std::string terms;
   std::string order;
+  std::string time;
+  std::string group;
+  std::vector<std::string> only;
+  std::vector<std::string> without;
   std::vector<std::string> outputs_or_files;  // of --output, which once named the columns
   std::string corrected;
   DecimalMark mark = DecimalMark::point;
@@ -91,7 +97,26 @@ void check_names(const DiscoverArguments& arguments) {
     if (std::ranges::find(arguments.inputs, output) != arguments.inputs.end() || output == arguments.order) {
       throw std::invalid_argument(fmt::format("\"{}\" is an output and cannot be an input or the order", output));
     }
+    if (output == arguments.time || output == arguments.group) {
+      throw std::invalid_argument(fmt::format("\"{}\" is an output and cannot be the time or the group", output));
+    }
   }
+  if (!arguments.time.empty() && !arguments.order.empty()) {
+    throw std::invalid_argument("--time says the order of the rows: --order is not needed beside it");
+  }
+  if (!arguments.group.empty() && arguments.time.empty()) {
+    throw std::invalid_argument("--group needs --time: the rows of a group follow each other in time");
+  }
+}
+
+// The recording that each row is of.
+std::vector<Eigen::Index> runs_of(const Csv& csv, const std::string& column) {
+  std::map<std::string, Eigen::Index, std::less<>> numbers;
+  std::vector<Eigen::Index> runs(csv.rows());
+  csv.visit_texts(std::array{column}, [&](Eigen::Index row, std::size_t, std::string_view label) {
+    runs[row] = numbers.try_emplace(std::string(label), std::ssize(numbers)).first->second;
+  });
+  return runs;
 }
 
 // `every_column`: the inputs were not named.
@@ -113,6 +138,13 @@ Comparison read_comparison(const DiscoverArguments& arguments, bool every_column
   std::vector<Eigen::Index> rows(measured.rows());
   std::iota(rows.begin(), rows.end(), Eigen::Index{0});
   comparison.lines = measured.lines_of(rows);
+  if (!arguments.time.empty()) {
+    const Csv& holder = measured.has(arguments.time) ? measured : simulated;
+    comparison.inputs.instants = holder.numbers({arguments.time}).col(0);
+  }
+  if (!arguments.group.empty()) {
+    comparison.inputs.runs = runs_of(measured.has(arguments.group) ? measured : simulated, arguments.group);
+  }
   comparison.inputs.order = arguments.order;
   if (!arguments.order.empty() && std::ranges::find(arguments.inputs, arguments.order) == arguments.inputs.end()) {
     const Csv& holder = measured.has(arguments.order) ? measured : simulated;
@@ -127,7 +159,8 @@ Comparison read_comparison(const DiscoverArguments& arguments, bool every_column
 
 std::vector<discovery::ModelTerm> terms_to_try(const DiscoverArguments& arguments, const Comparison& comparison,
                                                std::vector<discovery::UntestableCause>& untestable) {
-  std::vector<discovery::ModelTerm> library = discovery::standard_terms(comparison.inputs, &untestable);
+  std::vector<discovery::ModelTerm> library = discovery::of_families(
+      discovery::standard_terms(comparison.inputs, &untestable), arguments.only, arguments.without);
   if (arguments.terms.empty()) return library;
   std::vector<std::string> taken;
   for (const discovery::ModelTerm& term : library) taken.push_back(term.family);
@@ -174,7 +207,9 @@ report::TermsSummary discovered(const DiscoverArguments& arguments, const Compar
                                .missing = {},
                                .outlier_lines = {},
                                .regions = {},
-                               .counted = "line"};
+                               .counted = "line",
+                               .failing_lines = {},
+                               .time = arguments.time};
   std::vector<discovery::UntestableCause> untestable;
   try {
     const std::vector<discovery::ModelTerm> terms = terms_to_try(arguments, comparison, untestable);
@@ -190,6 +225,7 @@ report::TermsSummary discovered(const DiscoverArguments& arguments, const Compar
   }
   for (discovery::UntestableCause& entry : untestable) summary.missing.not_testable.push_back(std::move(entry));
   for (const Eigen::Index row : summary.missing.outliers) summary.outlier_lines.push_back(comparison.lines[row]);
+  for (const Eigen::Index row : summary.missing.failing_rows) summary.failing_lines.push_back(comparison.lines[row]);
   summary.regions = report::gap_regions(comparison.inputs, comparison.measured, summary.missing);
   return summary;
 }
@@ -226,13 +262,15 @@ void discover_command(const CLI::App& command, DiscoverArguments arguments) {
     const Csv simulated = Csv::read(arguments.simulated, arguments.mark);
     for (const std::string& name : simulated.columns()) {
       const bool is_output = std::ranges::find(arguments.outputs, name) != arguments.outputs.end();
-      if (!is_output && name != arguments.order) arguments.inputs.push_back(name);
+      const bool is_label = name == arguments.order || name == arguments.time || name == arguments.group;
+      if (!is_output && !is_label) arguments.inputs.push_back(name);
     }
   }
   check_names(arguments);
   const Comparison comparison = read_comparison(arguments, !named);
   const report::TermsSummary summary = discovered(arguments, comparison);
-  if (!arguments.corrected.empty()) write_corrected(arguments.corrected, comparison, summary.missing);
+  const bool is_worse = summary.missing.answer == discovery::Answer::failed_held_out;
+  if (!arguments.corrected.empty() && !is_worse) write_corrected(arguments.corrected, comparison, summary.missing);
   std::string reports;
   if (arguments.reports.wanted()) {
     reports = write_reports(arguments.reports,
@@ -263,6 +301,13 @@ void add_discover(CLI::App& app) {
       ->add_option("--order", arguments->order,
                    "What says in which order rows were measured; it is an input too [rows as they stand]")
       ->type_name("COLUMN");
+  command
+      ->add_option("--time", arguments->time,
+                   "When each row was taken, for rows that follow each other in time; no input by itself")
+      ->type_name("COLUMN");
+  command->add_option("--group", arguments->group, "Recording that each row is of; with --time")->type_name("COLUMN");
+  add_names(*command, "--only", arguments->only, "FAMILY", "Try the built-in terms of these families alone");
+  add_names(*command, "--without", arguments->without, "FAMILY", "Do not try the built-in terms of these families");
   add_input_file(*command, "--terms", arguments->terms,
                  "File of your own terms, a line each: name = expression of the inputs");
   command

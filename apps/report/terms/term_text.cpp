@@ -22,19 +22,38 @@ std::string value_text(const discovery::TermValue& value) {
   return text + " " + value.unit;
 }
 
+std::string time_text(const discovery::TimeUse& time, const std::string& unit) {
+  std::string text = fmt::format("Rows in time, {} {} apart{}: ", number(time.step, 3), unit,
+                                 time.found_out ? " (found out: neighbouring rows deviate alike; --time COLUMN)" : "");
+  text += time.rows_per_sample == 1
+              ? fmt::format("{} are searched as they are.", time.samples)
+              : fmt::format("{} means over {} rows each are searched.", time.samples, time.rows_per_sample);
+  constexpr double hardly = 0.9;
+  if (time.independent_share < hardly) {
+    text += fmt::format(" What is left is correlated over {} {}: {:.0f} % of the means count as independent.",
+                        number(time.correlation_time, 2), unit, 100.0 * time.independent_share);
+  }
+  return text + "\n";
+}
+
 std::string headline(const discovery::Missing& missing) {
   const auto causes = std::ranges::count_if(missing.found, [](const auto& f) { return !f.generic; });
   const auto sure = std::ranges::count_if(missing.found, &discovery::FoundTerm::confirmed);
   const std::string terms = causes == 1 ? "one term is" : fmt::format("{} terms are", causes);
+  constexpr double hardly = 0.9;
+  const bool is_correlated = missing.time.in_time && missing.time.independent_share < hardly;
   switch (missing.answer) {
     case discovery::Answer::nothing_missing:
-      return "nothing is missing that these rows could show";
+      return is_correlated ? "nothing is missing beyond noise that is alike in neighbouring rows"
+                           : "nothing is missing that these rows could show";
     case discovery::Answer::named:
       return terms + (sure < causes ? " missing, but not all of this is certain" : " missing");
     case discovery::Answer::indistinguishable:
       return terms + " missing, but other terms explain it as well";
     case discovery::Answer::unknown:
       return "something is missing that no term tried explains";
+    case discovery::Answer::failed_held_out:
+      return "failed on held-out rows: with the terms found the error on the rows set aside is larger";
   }
   return "";
 }

@@ -15,6 +15,9 @@ std::string title_of(const discovery::FoundTerm& found, bool several_outputs);
 std::string value_text(const discovery::TermValue& value);
 
 /// The verdict in a phrase: "2 terms are missing".
+/// How rows in time were used. `unit`: of their instants.
+std::string time_text(const discovery::TimeUse& time, const std::string& unit);
+
 std::string headline(const discovery::Missing& missing);
 
 }  // namespace llmt::report

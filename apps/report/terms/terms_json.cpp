@@ -17,9 +17,20 @@ Json found_json(const discovery::FoundTerm& found) {
     rivals.push_back(rival.what);
     exact = exact || rival.exact;
   }
-  return {{"name", found.family},     {"location", found.location}, {"output", found.output},
-          {"formula", found.formula}, {"parameters", parameters},   {"rivals", rivals},
-          {"exact_alias", exact},     {"share", found.share},       {"confirmed", found.confirmed}};
+  Json json = {{"name", found.family},     {"location", found.location}, {"output", found.output},
+               {"formula", found.formula}, {"parameters", parameters},   {"rivals", rivals},
+               {"exact_alias", exact},     {"share", found.share},       {"confirmed", found.confirmed}};
+  if (!found.shrinks_gap) json["shrinks_gap"] = false;
+  return json;
+}
+
+Json time_json(const discovery::TimeUse& time) {
+  return {{"found_out", time.found_out},
+          {"step", time.step},
+          {"rows_per_sample", time.rows_per_sample},
+          {"samples", time.samples},
+          {"independent_share", time.independent_share},
+          {"correlation_time", time.correlation_time}};
 }
 
 Json effects_json(const discovery::Missing& missing) {
@@ -112,6 +123,8 @@ Json terms_json(const TermsSummary& summary) {
                {"hypotheses", missing.candidates.size()},
                {"rounds", missing.rounds}};
   if (!missing.outliers.empty()) json["outlier_lines"] = summary.outlier_lines;
+  if (!missing.failing_rows.empty()) json["failing_lines"] = summary.failing_lines;
+  if (missing.time.in_time) json["time"] = time_json(missing.time);
   return json;
 }
 

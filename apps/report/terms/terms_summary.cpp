@@ -36,6 +36,7 @@ std::string found_text(const Missing& missing) {
     if (found.coefficients.size() == 2) {
       text += fmt::format("   amplitude sqrt(C^2 + S^2) = {} {}\n", number(found.coefficients.norm()), found.output);
     }
+    if (!found.shrinks_gap) text += "   on the rows set aside it does not help\n";
     for (const discovery::RivalTerms& rival : found.rivals) {
       text += fmt::format("   or instead {}: {}\n", rival.what,
                           rival.exact ? "the same at every row, these rows cannot tell" : "explains as well");
@@ -45,9 +46,11 @@ std::string found_text(const Missing& missing) {
 }
 
 std::string gaps_text(const Missing& missing, std::size_t width) {
-  const std::string head = missing.held_out.empty() ? "\nNo rows were set aside: the gap cannot be verified.\n"
-                                                    : fmt::format("\nGap on the {} rows set aside, root mean square:\n",
-                                                                  missing.held_out.size());
+  const std::string head =
+      missing.held_out.empty()
+          ? "\nNo rows were set aside: the gap cannot be verified.\n"
+          : fmt::format("\nGap on the {} rows set aside, root mean square{}:\n", missing.held_out.size(),
+                        missing.time.rows_per_sample > 1 ? " of the means" : "");
   Table table({"output", "before", "after", "noise floor"});
   for (const discovery::Gap& gap : missing.gaps) {
     table.add({gap.output, number(gap.before), number(gap.after), number(gap.noise_floor)});
@@ -93,6 +96,7 @@ std::string terms_text(const TermsSummary& summary, std::size_t width) {
   text += fmt::format("{} rows set aside (seed {}), {} searched, {} candidate terms, {} {} of search\n",
                       missing.held_out.size(), summary.seed, missing.searched.size(), missing.candidates.size(),
                       missing.rounds, missing.rounds == 1 ? "round" : "rounds");
+  if (missing.time.in_time) text += time_text(missing.time, summary.time.empty() ? "rows" : "of " + summary.time);
   text += fmt::format("\nVERDICT: {}\n", headline(missing));
   if (is_exact(missing)) {
     text += "The simulation gives the measured values exactly: there is no gap to explain.\n";
@@ -134,6 +138,13 @@ std::string terms_text(const TermsSummary& summary, std::size_t width) {
     text += "\nNot testable with these rows:\n";
     for (const discovery::UntestableCause& entry : missing.not_testable)
       text += fmt::format("  {}: {}\n", entry.what, entry.why);
+  }
+  if (!missing.failing_rows.empty()) {
+    text += fmt::format("\nThe error on the rows set aside grows most at {} {} of {}.\n",
+                        summary.failing_lines.size() == 1 ? summary.counted : summary.counted + "s",
+                        fmt::join(summary.failing_lines, ", "), summary.measured);
+    if (!summary.corrected.empty()) text += fmt::format("{} was not written: it would be worse.\n", summary.corrected);
+    return text;
   }
   if (!summary.corrected.empty()) text += fmt::format("\nCorrected simulation written to {}\n", summary.corrected);
   return text;

@@ -29,9 +29,11 @@ struct TermsSummary {
   std::uint64_t seed = 1;
   Eigen::Index rows = 0;
   discovery::Missing missing;
-  std::vector<Eigen::Index> outlier_lines;  ///< of missing.outliers, in the file `measured`
-  std::vector<GapRegion> regions;           ///< of each output by falling gap
-  std::string counted = "line";             ///< what `outlier_lines` are: lines of a file, or rows of a table
+  std::vector<Eigen::Index> outlier_lines;       ///< of missing.outliers, in the file `measured`
+  std::vector<GapRegion> regions;                ///< of each output by falling gap
+  std::string counted = "line";                  ///< what `outlier_lines` are: lines of a file, or rows of a table
+  std::vector<Eigen::Index> failing_lines = {};  ///< of missing.failing_rows, as `outlier_lines`
+  std::string time = {};                         ///< column with the instants; may be empty
 };
 
 /// Cuts the rows searched where the absolute deviation changes most, by a small tree.

@@ -84,8 +84,8 @@ void Csv::refuse_header_of_other_programs(std::string_view header) const {
   if (header.starts_with("sep=") && header.size() <= 5) {
     refuse_header("a line that names the separator of a spreadsheet is no header: delete it");
   }
-  const bool is_all =
-      std::string_view(text_).find_first_not_of(" \t\r\n", header_begin_ + header.size()) == std::string_view::npos;
+  const bool is_all = !rows_precede_ && std::string_view(text_).find_first_not_of(
+                                            " \t\r\n", header_begin_ + header.size()) == std::string_view::npos;
   if (is_all && !more_follows_ && std::ranges::count(header, '"') % 2 != 0) {
     refuse_header("a quote is left open: the rest of the file would be the header");
   }

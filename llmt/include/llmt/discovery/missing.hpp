@@ -71,9 +71,24 @@ struct FoundTerm {
   std::vector<TermValue> values;  ///< coefficients, then constants
   std::vector<RivalTerms> rivals;
   double share = 0.0;  ///< of the explained sum of squares that goes with it alone
+  /// The error on the samples set aside is smaller with it than without; true if there are none.
+  bool shrinks_gap = true;
 };
 
-/// Root mean square errors of one output on the rows that were set aside (NaN if there are none).
+/// How rows in time were used, see find_missing().
+struct TimeUse {
+  bool in_time = false;
+  bool found_out = false;            ///< not told: neighbouring rows deviated alike
+  Eigen::Index rows_per_sample = 1;  ///< a sample is the mean over a block of them
+  Eigen::Index samples = 0;          ///< searched
+  double step = 0.0;                 ///< median time between rows, in the unit of Inputs::instants
+  double independent_share = 1.0;    ///< of the samples
+  /// Time that counts as one independent value of what is left: step (1 + 2 sum_k rho_k), rho_k of neighbouring rows.
+  double correlation_time = 0.0;
+};
+
+/// Root mean square errors of one output on the samples that were set aside (NaN if there are none): rows, or in time
+/// the means over blocks of rows.
 struct Gap {
   std::string output;
   double before = 0.0;       ///< the simulation, its own parameters adjusted
@@ -99,7 +114,8 @@ struct VisibleTerm {
 
 /// Outcome of find_missing().
 struct Missing {
-  /// As Verdict::answer; but unknown if material structure is left although nothing was found.
+  /// As Verdict::answer; but unknown if material structure is left although nothing was found, and failed_held_out if
+  /// what was found makes the error on the samples set aside larger.
   Answer answer = Answer::nothing_missing;
   Verdict verdict;  ///< of the last search; candidates in it are numbers of `candidates`, samples those of `searched`
   std::vector<std::string> candidates;
@@ -117,6 +133,8 @@ struct Missing {
   bool floor_from_repeats = false;
   std::vector<Structure> structure;  ///< material; terms found beside it are not confirmed
   std::vector<std::string> notes;    ///< in sentences
+  TimeUse time;
+  std::vector<Eigen::Index> failing_rows;  ///< set aside, where the terms make the error grow most; if that failed
   int rounds = 0;
 };
 

@@ -18,7 +18,7 @@ struct Rows {
   Eigen::MatrixXd inputs;              ///< n x p
   Eigen::VectorXd simulated;           ///< n: the output that the term is to change, without any term
   std::vector<Eigen::Index> sequence;  ///< n: the rows in the order in which they were taken
-  Eigen::VectorXd instants;            ///< n: when each row was taken, or its number
+  Eigen::VectorXd instants;            ///< n: when each row was taken, or its number; falls where a new run begins
 };
 
 /// An unknown inside a term, such as a time constant: tried at all these values, the best of which competes.
@@ -47,6 +47,7 @@ struct ModelTerm {
   std::vector<TermConstant> constants = {};  ///< at most one
   std::string output = {};                   ///< the output it changes; empty: each output is a place of its own
   bool generic = false;        ///< not a cause but a shape: what it explains is "unknown, depends on `inputs`"
+  bool history = false;        ///< depends on earlier rows: tried only beside what rows explain by themselves
   Eigen::VectorXd lower = {};  ///< k plausible limits of the coefficients, or empty: none
   Eigen::VectorXd upper = {};
 };
@@ -56,6 +57,10 @@ struct Inputs {
   std::vector<std::string> names;  ///< p
   Eigen::MatrixXd values;          ///< n x p
   std::string order = {};          ///< the input that says in which order rows were taken; empty: as they stand
+  /// n: when each row was taken, where rows are values of signals in time, whose noise may be alike in neighbours.
+  /// Empty: rows are independent.
+  Eigen::VectorXd instants = {};
+  std::vector<Eigen::Index> runs = {};  ///< n labels of the recording that a row is of; empty: one recording
 };
 
 }  // namespace llmt::discovery

@@ -35,7 +35,8 @@ namespace llmt::discovery {
 Verdict search(const Evidence& evidence, const std::vector<EffectCandidate>& candidates,
                const SearchOptions& options = {});
 
-/// "nothing missing", "named", "named, indistinguishable", "unknown effect".
+/// "nothing missing", "named", "named, indistinguishable", "unknown effect",
+/// "failed on held-out rows".
 std::string to_string(Answer answer);
 
 }  // namespace llmt::discovery

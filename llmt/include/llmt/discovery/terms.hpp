@@ -18,6 +18,11 @@
 
 namespace llmt::discovery {
 
+/// The terms of the families `only` (empty: of all), without those of the families `without`. Shapes stay.
+/// Throws std::invalid_argument for a family that none of the terms has, naming those that there are.
+std::vector<ModelTerm> of_families(std::vector<ModelTerm> terms, const std::vector<std::string>& only,
+                                   const std::vector<std::string>& without);
+
 /// A term of the user's own: coefficient * function(inputs of a row).
 ModelTerm own_term(std::string name, std::string formula, std::function<double(const Eigen::VectorXd& row)> function);
 

@@ -26,6 +26,11 @@ struct Evidence {
   /// explanation counts as better than that; else data without noise would call for more and more candidates. 0: exact
   /// signatures.
   double resolution = 0.0;
+  /// Share of the samples that count as independent, in (0, 1]: where the noise of samples that follow each other is
+  /// alike, n samples say as much as this share of n independent ones.
+  double independent_share = 1.0;
+  /// n numbers, or empty: samples of equal number keep their signs together in the simulated null of random signs.
+  std::vector<Eigen::Index> clusters = {};
 
   Eigen::Index samples() const { return components > 0 ? residuals.size() / components : 0; }
 };
@@ -113,7 +118,13 @@ struct LackOfFit {
   bool has_enough_repeats() const { return dof >= 12; }
 };
 
-enum class Answer { nothing_missing, named, indistinguishable, unknown };
+enum class Answer {
+  nothing_missing,
+  named,
+  indistinguishable,
+  unknown,
+  failed_held_out  ///< of find_missing(): with what was found the error on rows set aside is larger
+};
 
 /// A cause that would have won, had its values been within their limits.
 struct Refused {

@@ -165,7 +165,8 @@ std::vector<Sensitivity> sensitivities(const Scoring& scoring, double threshold,
       // The gain of an energy E, in units of the noise: n ln(1 + E / (n - k)) - n ln(n / (n - k)).
       const double n = scoring.workspace().degrees();
       const double left = std::max(1.0, n - static_cast<double>(block.size));
-      const double least = left * std::expm1(std::max(0.0, needed) / n + std::log(std::max(1.0, n / left)));
+      const double least = left * std::expm1(std::max(0.0, needed) / (n * scoring.workspace().independent_share()) +
+                                             std::log(std::max(1.0, n / left)));
       const double energy = std::pow(std::sqrt(least) + power_quantile, 2.0);
       // |U' S_i v|: how much a unit of value i alone contributes outside the baseline.
       const Eigen::MatrixXd to_coefficients = block.to_values.completeOrthogonalDecomposition().pseudoInverse();

@@ -36,7 +36,9 @@ Set filtered(const Set& set, const std::function<bool(std::size_t)>& keep) {
 }
 
 Scoring::Scoring(const Workspace& workspace, const std::vector<EffectCandidate>& candidates)
-    : workspace_(&workspace), candidates_(&candidates), log_degrees_(std::log(workspace.degrees())) {
+    : workspace_(&workspace),
+      candidates_(&candidates),
+      log_degrees_(std::log(workspace.independent_share() * workspace.degrees())) {
   std::map<std::string, std::size_t> numbers;
   for (std::size_t a = 0; a < candidates.size(); ++a) {
     const std::size_t family = numbers.try_emplace(candidates[a].family, numbers.size()).first->second;
@@ -50,19 +52,19 @@ Scoring::Scoring(const Workspace& workspace, const std::vector<EffectCandidate>&
 
 double Scoring::misfit(double left, Eigen::Index directions) const {
   const double n = workspace_->degrees();
+  const double share = workspace_->independent_share();
   const double used = static_cast<double>(directions) + workspace_->dropped_degrees();
   // Schwarz's approximation is for few directions and many data.
   constexpr double largest_share = 0.4;
-  if (used > largest_share * n) return impossible;
+  if (used > largest_share * share * n) return impossible;
   // Exact data: below rounding nothing can be told apart.
   const double least =
       std::max(workspace_->resolution() * workspace_->given_sum_of_squares(), std::numeric_limits<double>::min());
-  return n * std::log(std::max(left, least) / (n - used));
+  return share * n * std::log(std::max(left, least) / (n - used));
 }
 
 double Scoring::outlier_cost() const {
-  const double n = workspace_->degrees();
-  return static_cast<double>(workspace_->components()) * std::log(n) + 2.0 * std::log(std::max(1.0, families_)) +
+  return static_cast<double>(workspace_->components()) * log_degrees_ + 2.0 * std::log(std::max(1.0, families_)) +
          2.0 * std::log(static_cast<double>(workspace_->samples()));
 }
 

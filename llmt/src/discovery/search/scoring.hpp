@@ -41,7 +41,8 @@ class Scoring {
   /// The part of the score that does not depend on how much the set explains.
   double cost(const Set& set) const;
   double outlier_cost() const;
-  /// N ln(left / (N - k)) of an explanation with k directions; impossible where k leaves too little freedom to judge.
+  /// s N ln(left / (N - k)), s the independent share, of an explanation with k directions; impossible where k leaves
+  /// too little freedom to judge.
   double misfit(double left, Eigen::Index directions) const;
 
   bool usable(std::size_t candidate) const { return workspace_->blocks()[candidate].size > 0; }

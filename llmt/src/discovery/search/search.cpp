@@ -34,6 +34,12 @@ void check(const Evidence& evidence, const std::vector<EffectCandidate>& candida
   if (!(evidence.resolution >= 0.0 && evidence.resolution < 1.0)) {
     refuse(fmt::format("resolution is {}, must be in [0, 1)", evidence.resolution));
   }
+  if (!(evidence.independent_share > 0.0 && evidence.independent_share <= 1.0)) {
+    refuse(fmt::format("independent_share is {}, must be in (0, 1]", evidence.independent_share));
+  }
+  if (!evidence.clusters.empty() && std::ssize(evidence.clusters) != evidence.samples()) {
+    refuse(fmt::format("clusters has {} entries, must be {}", evidence.clusters.size(), evidence.samples()));
+  }
   if (!evidence.residuals.allFinite()) refuse("a residual is not finite");
   if (!evidence.jacobian.allFinite()) refuse("an entry of the jacobian is not finite");
   if (!(options.false_alarm_rate > 0.0 && options.false_alarm_rate < 0.1)) {
@@ -174,6 +180,8 @@ std::string to_string(Answer answer) {
       return "named, indistinguishable";
     case Answer::unknown:
       return "unknown effect";
+    case Answer::failed_held_out:
+      return "failed on held-out rows";
   }
   return "";
 }

@@ -5,6 +5,7 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 namespace llmt::discovery {
 
@@ -29,10 +30,16 @@ Eigen::MatrixXd range_basis(const Eigen::MatrixXd& matrix, double tolerance) {
 Workspace::Workspace(const Evidence& evidence, const std::vector<EffectCandidate>& candidates,
                      double absorbed_tolerance)
     : components_(evidence.components),
+      independent_share_(evidence.independent_share),
+      clusters_(evidence.clusters),
       given_sum_of_squares_(evidence.residuals.squaredNorm()),
       residuals_(evidence.residuals) {
   constexpr double rounding = 1e-20;
   resolution_ = std::max(rounding, evidence.resolution);
+  if (clusters_.empty()) {
+    clusters_.resize(evidence.samples());
+    std::iota(clusters_.begin(), clusters_.end(), Eigen::Index{0});
+  }
   constexpr double rank_tolerance = 1e-9;
   baseline_ = range_basis(evidence.jacobian, rank_tolerance);
   degrees_ = static_cast<double>(residuals_.size() - baseline_.cols());

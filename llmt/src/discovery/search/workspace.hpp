@@ -40,6 +40,10 @@ class Workspace {
   double sum_of_squares() const { return residuals_.squaredNorm(); }
   /// Evidence::resolution, or the share that rounding errors reach if that is larger.
   double resolution() const { return resolution_; }
+  /// Evidence::independent_share.
+  double independent_share() const { return independent_share_; }
+  /// Evidence::clusters, or a number of its own for each sample.
+  const std::vector<Eigen::Index>& clusters() const { return clusters_; }
   /// Sum of squares of the residuals as given, before the baseline is adjusted: rounding errors are relative to it.
   double given_sum_of_squares() const { return given_sum_of_squares_; }
   /// Subtracts from every column its part in the range of the baseline.
@@ -49,6 +53,8 @@ class Workspace {
   Eigen::Index components_;
   double degrees_ = 0.0;
   double resolution_ = 0.0;
+  double independent_share_ = 1.0;
+  std::vector<Eigen::Index> clusters_;
   double given_sum_of_squares_ = 0.0;
   Eigen::MatrixXd baseline_;  // N x m, orthonormal; dropped samples included
   Eigen::VectorXd residuals_;

@@ -102,7 +102,7 @@ void describe_findings(const TermModel& model, const Settled& settled, Missing& 
 }
 
 void describe_limits(const Settled& settled, const TermData& data, Missing& missing) {
-  const double n = static_cast<double>(data.rows.size());
+  const auto n = static_cast<double>(data.samples.size());
   for (std::size_t a = 0; a < settled.question.options.size(); ++a) {
     const EffectCandidate& candidate = settled.question.candidates[a];
     const Sensitivity& own = settled.verdict.sensitivity[a];
@@ -131,12 +131,12 @@ std::vector<Structure> structure_beside(const TermModel& model, const TermData& 
   constexpr double material = 0.05;
   // More than a quarter of what is left: no noise hides what the terms miss, however little of the gap it is.
   constexpr double dominant = 0.25;
-  const Eigen::MatrixXd rows = inputs.values(data.rows, Eigen::all);
+  const Eigen::MatrixXd samples = means(inputs.values, data.samples);
   std::vector<Structure> all;
   for (Eigen::Index o = 0; o < data.measured.cols(); ++o) {
-    const Eigen::VectorXd left = data.measured.col(o) - missing.corrected.col(o)(data.rows);
-    const Eigen::VectorXd gap = data.measured.col(o) - missing.before.col(o)(data.rows);
-    const StructureLeft found = structure_left(rows, left);
+    const Eigen::VectorXd left = data.measured.col(o) - means(missing.corrected.col(o), data.samples);
+    const Eigen::VectorXd gap = data.measured.col(o) - means(missing.before.col(o), data.samples);
+    const StructureLeft found = structure_left(samples, left, data.stretches, data.independent_share);
     const double common = found.share * left.squaredNorm();
     const double explained = std::max(0.0, gap.squaredNorm() - left.squaredNorm());
     const double p_value = found.p_value * static_cast<double>(data.measured.cols());
@@ -152,14 +152,15 @@ std::vector<Structure> structure_beside(const TermModel& model, const TermData& 
 void decide(Missing& missing) {
   const bool is_nothing = missing.verdict.answer == Answer::nothing_missing;
   missing.answer = is_nothing && !missing.structure.empty() ? Answer::unknown : missing.verdict.answer;
+  if (!missing.failing_rows.empty()) missing.answer = Answer::failed_held_out;
   const std::vector<bool> approximate = approximations(missing.found);
   std::set<std::vector<std::string>> noted;
   for (std::size_t k = 0; k < missing.found.size(); ++k) {
     FoundTerm& found = missing.found[k];
     const bool is_beside_structure =
         std::ranges::find(missing.structure, found.output, &Structure::output) != missing.structure.end();
-    found.confirmed =
-        missing.verdict.answer != Answer::unknown && !found.generic && !approximate[k] && !is_beside_structure;
+    found.confirmed = missing.answer != Answer::failed_held_out && missing.verdict.answer != Answer::unknown &&
+                      !found.generic && !approximate[k] && !is_beside_structure && found.shrinks_gap;
     if (!approximate[k] || !noted.insert(sorted_inputs(found)).second) continue;
     missing.notes.push_back(
         fmt::format("there are many terms of {}: together they may approximate one that was not tried",

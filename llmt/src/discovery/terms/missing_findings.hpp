@@ -28,9 +28,11 @@ std::vector<Structure> structure_beside(const TermModel& model, const TermData& 
 
 /// Missing::answer, and which terms are confirmed:
 ///
-/// - the answer is that of the search; but "unknown" where the search found nothing and structure is left;
+/// - the answer is that of the search; but "unknown" where the search found nothing and structure is left, and
+///   "failed on held-out rows" where the terms make the error on samples set aside larger;
 /// - a term is confirmed if it is a cause, the search found no shapes, no structure is left in its output, and it is
-///   not one of many terms of its inputs, which together may only approximate another function.
+///   not one of many terms of its inputs, which together may only approximate another function, and it shrinks the
+///   error on the samples set aside.
 void decide(Missing& missing);
 
 }  // namespace llmt::discovery

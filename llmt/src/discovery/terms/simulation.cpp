@@ -7,8 +7,11 @@
 #include <limits>
 #include <stdexcept>
 
+#include "discovery/terms/correlation.hpp"
+#include "discovery/terms/held_out.hpp"
 #include "discovery/terms/missing_findings.hpp"
 #include "discovery/terms/refuse.hpp"
+#include "discovery/terms/row_split.hpp"
 #include "discovery/terms/term_question.hpp"
 #include "llmt/discovery/rounds.hpp"
 
@@ -48,10 +51,10 @@ void check(const Simulation& simulation, const Inputs& inputs, const MeasuredOut
 
 // Root mean square of what is left of each output, in its own unit.
 Eigen::VectorXd scatter(const TermModel& model, const TermData& data, const TermFit& fit) {
-  const Eigen::MatrixXd predicted = model.predict(fit.parameters, fit.placed);
+  const Eigen::MatrixXd predicted = means(model.predict(fit.parameters, fit.placed), data.samples);
   Eigen::VectorXd sigma(data.measured.cols());
   for (Eigen::Index o = 0; o < sigma.size(); ++o) {
-    const Eigen::VectorXd left = data.measured.col(o) - predicted.col(o)(data.rows);
+    const Eigen::VectorXd left = data.measured.col(o) - predicted.col(o);
     sigma(o) = std::sqrt(left.squaredNorm() / static_cast<double>(left.size()));
     if (!(sigma(o) > 0.0)) sigma(o) = 1.0;
   }
@@ -78,17 +81,28 @@ RoundSummary summary_of(const Settled& settled) {
   return summary;
 }
 
-// The weights of the outputs follow what each round leaves of them.
+// The share of the samples that is independent, of the outputs together.
+double share_of_independent(const TermModel& model, const TermData& data, const TermFit& fit) {
+  double shares = 0.0;
+  const std::vector<std::vector<double>> correlations =
+      correlations_of(data, scaled_residuals(model, data, fit.parameters, fit.placed));
+  for (const std::vector<double>& own : correlations) shares += independent_share(own);
+  return shares / static_cast<double>(correlations.size());
+}
+
+// The weights of the outputs, and the share of the samples that is independent, follow what each round leaves.
 Settled search_until_settled(const TermModel& model, TermData& data, const std::vector<Eigen::Index>& repeats,
-                             const TermFit& baseline, const MissingOptions& options, Work& work) {
-  Settled settled;
-  settled.fit = baseline;
-  until_settled({.most = options.rounds}, {}, [&](int round) {
-    if (round > 0 && data.sigma.size() > 1) {
+                             Settled settled, bool with_history, const MissingOptions& options, Work& work) {
+  const bool in_time = !data.stretches.empty();
+  constexpr int fewest_in_time = 8;
+  const RoundLimits limits{.most = in_time ? std::max(options.rounds, fewest_in_time) : options.rounds,
+                           .stop_at_repeat = in_time};
+  until_settled(limits, settled.rounds > 0 ? summary_of(settled) : RoundSummary{}, [&](int) {
+    if (settled.rounds > 0 && data.sigma.size() > 1) {
       data.sigma = scatter(model, without_samples(data, settled.verdict.outliers), settled.fit);
     }
     work.begin(fmt::format("searching, round {}", ++settled.rounds));
-    settled.question = ask(model, data, settled.fit, repeats, settled.verdict.outliers);
+    settled.question = ask(model, data, settled.fit, repeats, settled.verdict.outliers, with_history);
     settled.verdict = search(settled.question.evidence, settled.question.candidates, options.search);
     work.did(share_of_half_a_round * work.left());
     const TermData kept = without_samples(data, settled.verdict.outliers);
@@ -97,15 +111,48 @@ Settled search_until_settled(const TermModel& model, TermData& data, const std::
       settled.fit = fit_terms(model, kept, settled.fit.parameters, settled.fit.placed);
     }
     work.did(share_of_half_a_round * work.left());
-    return summary_of(settled);
+    RoundSummary summary = summary_of(settled);
+    if (in_time) {
+      const double share = share_of_independent(model, kept, settled.fit);
+      constexpr double same = 0.1;
+      summary.may_be_last = std::abs(share - data.independent_share) <= same * data.independent_share;
+      data.independent_share = share;
+    }
+    return summary;
   });
+  return settled;
+}
+
+// Whether terms that depend on earlier rows explain better than what rows explain by themselves.
+bool needs_history(const TermModel& model, const Settled& plain, const Settled& with_history, double margin) {
+  const bool has_history = std::ranges::any_of(
+      with_history.fit.placed, [&](const PlacedTerm& placed) { return model.terms()[placed.term].history; });
+  if (!has_history) return false;
+  const bool names_more = plain.verdict.answer == Answer::unknown && with_history.verdict.answer != Answer::unknown;
+  return names_more || with_history.verdict.score_gain > plain.verdict.score_gain + margin;
+}
+
+// The terms of rows by themselves first, then those that depend on earlier rows beside them.
+Settled search_terms(const TermModel& model, TermData& data, const std::vector<Eigen::Index>& repeats,
+                     const TermFit& baseline, const MissingOptions& options, Work& work) {
+  Settled settled;
+  settled.fit = baseline;
+  settled = search_until_settled(model, data, repeats, std::move(settled), false, options, work);
+  if (std::ranges::any_of(model.terms(), &ModelTerm::history)) {
+    TermData again = data;
+    const Settled other = search_until_settled(model, again, repeats, settled, true, options, work);
+    if (needs_history(model, settled, other, options.search.rival_margin)) {
+      data = again;
+      settled = other;
+    }
+  }
   set_trial_errors(model, without_samples(data, settled.verdict.outliers), settled.fit);
   return settled;
 }
 
-double rms_at(const Eigen::VectorXd& errors, const std::vector<Eigen::Index>& rows) {
-  if (rows.empty()) return unknown_number;
-  return std::sqrt(errors(rows).squaredNorm() / static_cast<double>(rows.size()));
+double rms_at(const Eigen::VectorXd& errors, const Samples& samples) {
+  if (samples.size() == 0) return unknown_number;
+  return std::sqrt(means(errors, samples).squaredNorm() / static_cast<double>(samples.size()));
 }
 
 }  // namespace
@@ -142,19 +189,44 @@ Simulation tabulated(const Eigen::MatrixXd& simulated, const std::vector<std::st
   return simulation;
 }
 
-Missing find_missing(const Simulation& simulation, const Inputs& inputs, const MeasuredOutputs& measured,
-                     const std::vector<ModelTerm>& terms, const MissingOptions& options) {
-  check(simulation, inputs, measured, options);
+namespace {
+
+TermData data_of(const Samples& samples, const MeasuredOutputs& measured) {
+  return {.samples = samples,
+          .measured = means(measured.values, samples),
+          .sigma = Eigen::VectorXd::Ones(measured.values.cols()),
+          .stretches = {}};
+}
+
+// Time that counts as one independent value, from the deviations of the rows searched, the outputs together.
+double correlation_time(const RowSplit& split, const Eigen::MatrixXd& deviations) {
+  std::vector<Eigen::Index> stretches;
+  for (Eigen::Index i = 0; i < split.searched.size(); ++i) {
+    stretches.insert(stretches.end(), split.searched.rows_of(i).size(), split.stretches[i]);
+  }
+  double longest = 0.0;
+  for (Eigen::Index o = 0; o < deviations.cols(); ++o) {
+    const Eigen::VectorXd own = deviations.col(o)(split.searched.rows());
+    longest = std::max(longest,
+                       1.0 / independent_share(autocorrelation(own, stretches, std::vector<bool>(own.size(), true))));
+  }
+  return split.step * longest;
+}
+
+Missing find(const Simulation& simulation, const Inputs& inputs, const MeasuredOutputs& measured,
+             const std::vector<ModelTerm>& terms, const MissingOptions& options) {
+  const bool in_time = inputs.instants.size() > 0;
   const TermModel model(simulation, inputs, measured.names, terms);
-  const RowSplit split = split_rows(inputs, options);
+  const RowSplit split = in_time ? split_in_time(inputs, options) : split_independent(inputs, options);
   const Eigen::Index d = measured.values.cols();
-  TermData data{split.searched, measured.values(split.searched, Eigen::all), Eigen::VectorXd::Ones(d)};
+  TermData data = data_of(split.searched, measured);
+  data.stretches = split.stretches;
   const auto free = std::ranges::count_if(simulation.parameters, &Parameter::free);
   constexpr Eigen::Index fewest = 10;
-  if (std::ssize(data.rows) * d < fewest + 2 * free) {
+  if (data.samples.size() * d < fewest + 2 * free) {
     refuse("find_missing",
            fmt::format("{} rows to search beside {} set aside are too few: {} free parameters need {} measured values",
-                       data.rows.size(), split.held_out.size(), free, fewest + 2 * free));
+                       split.searched.size(), split.held_out.size(), free, fewest + 2 * free));
   }
   Eigen::VectorXd start(std::ssize(simulation.parameters));
   for (std::size_t k = 0; k < simulation.parameters.size(); ++k) start(k) = simulation.parameters[k].value;
@@ -163,7 +235,7 @@ Missing find_missing(const Simulation& simulation, const Inputs& inputs, const M
   TermFit baseline = fit_terms(model, data, start, {});
   data.sigma = scatter(model, data, baseline);
   if (d > 1) baseline = fit_terms(model, data, start, {});
-  const Settled settled = search_until_settled(model, data, split.repeats, baseline, options, work);
+  const Settled settled = search_terms(model, data, split.repeats, baseline, options, work);
 
   Missing missing;
   missing.verdict = settled.verdict;
@@ -176,15 +248,19 @@ Missing find_missing(const Simulation& simulation, const Inputs& inputs, const M
     missing.parameters[k].value = settled.fit.parameters(k);
   }
   missing.standard_errors = settled.fit.parameter_errors;
-  missing.searched = split.searched;
-  missing.held_out = split.held_out;
-  for (const std::size_t sample : settled.verdict.outliers) missing.outliers.push_back(split.searched[sample]);
-  if (!settled.verdict.outliers.empty()) {
-    baseline = fit_terms(model, without_samples(data, settled.verdict.outliers), start, {});
+  missing.searched = split.searched.rows();
+  missing.held_out = split.held_out.rows();
+  for (const std::size_t sample : settled.verdict.outliers) {
+    for (const Eigen::Index row : split.searched.rows_of(sample)) missing.outliers.push_back(row);
   }
+  const TermData kept = without_samples(data, settled.verdict.outliers);
+  if (!settled.verdict.outliers.empty()) baseline = fit_terms(model, kept, start, {});
   missing.before = model.predict(baseline.parameters, {});
   missing.corrected = model.predict(settled.fit.parameters, settled.fit.placed);
-  missing.structure = structure_beside(model, without_samples(data, settled.verdict.outliers), inputs, missing);
+  missing.structure = structure_beside(model, kept, inputs, missing);
+  TermData aside = data_of(split.held_out, measured);
+  aside.sigma = data.sigma;
+  judge_held_out(model, kept, aside, baseline, settled, missing);
   decide(missing);
   missing.floor_from_repeats = settled.verdict.lack_of_fit.has_enough_repeats();
   const double noise = missing.floor_from_repeats ? settled.verdict.lack_of_fit.noise : settled.verdict.noise;
@@ -193,7 +269,48 @@ Missing find_missing(const Simulation& simulation, const Inputs& inputs, const M
                             rms_at(measured.values.col(o) - missing.corrected.col(o), split.held_out),
                             noise * data.sigma(o)});
   }
+  if (in_time) {
+    missing.time = {.in_time = true,
+                    .found_out = false,
+                    .rows_per_sample = split.rows_per_sample,
+                    .samples = split.searched.size(),
+                    .step = split.step,
+                    .independent_share = data.independent_share,
+                    .correlation_time = correlation_time(split, measured.values - missing.corrected)};
+  }
   work.finish();
+  return missing;
+}
+
+// Whether rows follow each other in time although nobody said so: the inputs are smooth along them, and what is left
+// is alike in neighbours.
+bool follow_in_time(const Inputs& inputs, const MeasuredOutputs& measured, const Missing& missing) {
+  constexpr Eigen::Index fewest = 100;
+  constexpr double alike = 0.6;  // independent share
+  const Eigen::Index n = inputs.values.rows();
+  if (!inputs.order.empty() || n < fewest || !is_smooth_along_rows(inputs)) return false;
+  const std::vector<Eigen::Index> one_stretch(n, 0);
+  std::vector<bool> used(n, true);
+  for (const Eigen::Index row : missing.outliers) used[row] = false;
+  for (Eigen::Index o = 0; o < measured.values.cols(); ++o) {
+    const Eigen::VectorXd left = measured.values.col(o) - missing.corrected.col(o);
+    if (independent_share(autocorrelation(left, one_stretch, used)) < alike) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+Missing find_missing(const Simulation& simulation, const Inputs& inputs, const MeasuredOutputs& measured,
+                     const std::vector<ModelTerm>& terms, const MissingOptions& options) {
+  check(simulation, inputs, measured, options);
+  Missing missing = find(simulation, inputs, measured, terms, options);
+  if (inputs.instants.size() > 0 || !follow_in_time(inputs, measured, missing)) return missing;
+  Inputs in_time = inputs;
+  in_time.instants =
+      Eigen::VectorXd::LinSpaced(inputs.values.rows(), 0.0, static_cast<double>(inputs.values.rows() - 1));
+  missing = find(simulation, in_time, measured, terms, options);
+  missing.time.found_out = true;
   return missing;
 }
 

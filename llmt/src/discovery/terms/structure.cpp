@@ -18,28 +18,52 @@ struct Pairing {
     variance += weight * weight * a * a * b * b;
     pairs += weight;
   }
-  double p_value() const { return variance > 0.0 ? 0.5 * std::erfc(sum / std::sqrt(2.0 * variance)) : 1.0; }
+  double p_value(double independent_share) const {
+    return variance > 0.0 ? 0.5 * std::erfc(sum / std::sqrt(2.0 * variance / independent_share)) : 1.0;
+  }
 };
 
-Pairing along(const Eigen::VectorXd& input, const Eigen::VectorXd& errors) {
+// Samples whose noise may be alike are no pair.
+class Apart {
+ public:
+  Apart(const std::vector<Eigen::Index>& stretches, double independent_share)
+      : stretches_(&stretches), apart_(static_cast<Eigen::Index>(std::ceil(2.0 / independent_share))) {}
+
+  bool operator()(Eigen::Index i, Eigen::Index k) const {
+    return stretches_->empty() || (*stretches_)[i] != (*stretches_)[k] || std::abs(i - k) > apart_;
+  }
+
+ private:
+  const std::vector<Eigen::Index>* stretches_;
+  Eigen::Index apart_;
+};
+
+Pairing along(const Eigen::VectorXd& input, const Eigen::VectorXd& errors, const Apart& apart) {
   std::vector<Eigen::Index> order(input.size());
   std::iota(order.begin(), order.end(), 0);
   std::ranges::stable_sort(order, {}, [&](Eigen::Index i) { return input(i); });
   Pairing pairing;
-  for (std::size_t k = 1; k < order.size(); ++k) pairing.add(errors(order[k - 1]), errors(order[k]), 1.0);
+  constexpr std::size_t farthest = 5;  // places
+  for (std::size_t k = 0; k + 1 < order.size(); ++k) {
+    for (std::size_t m = k + 1; m < std::min(order.size(), k + 1 + farthest); ++m) {
+      if (!apart(order[k], order[m])) continue;
+      pairing.add(errors(order[k]), errors(order[m]), 1.0);
+      break;
+    }
+  }
   return pairing;
 }
 
 // Nearest neighbours; `inputs` scaled to equal spread.
-Pairing nearest(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& errors) {
+Pairing nearest(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& errors, const Apart& apart) {
   const Eigen::Index n = inputs.rows();
-  std::vector<Eigen::Index> neighbour(n, 0);
+  std::vector<Eigen::Index> neighbour(n, -1);
   const Eigen::MatrixXd points = inputs.transpose();
   for (Eigen::Index i = 0; i < n; ++i) {
     double least = std::numeric_limits<double>::infinity();
     for (Eigen::Index k = 0; k < n; ++k) {
       const double distance = (points.col(i) - points.col(k)).squaredNorm();
-      if (k == i || distance >= least) continue;
+      if (k == i || distance >= least || !apart(i, k)) continue;
       least = distance;
       neighbour[i] = k;
     }
@@ -47,6 +71,7 @@ Pairing nearest(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& errors) {
   Pairing pairing;
   for (Eigen::Index i = 0; i < n; ++i) {
     const Eigen::Index k = neighbour[i];
+    if (k < 0) continue;
     const bool mutual = neighbour[k] == i;
     if (!mutual || i < k) pairing.add(errors(i), errors(k), 1.0);
   }
@@ -55,7 +80,9 @@ Pairing nearest(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& errors) {
 
 }  // namespace
 
-StructureLeft structure_left(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& errors) {
+StructureLeft structure_left(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& errors,
+                             const std::vector<Eigen::Index>& stretches, double independent_share) {
+  const Apart apart(stretches, independent_share);
   constexpr Eigen::Index fewest = 20;
   constexpr double most_work = 2e8;  // distances
   StructureLeft best;
@@ -71,22 +98,22 @@ StructureLeft structure_left(const Eigen::MatrixXd& inputs, const Eigen::VectorX
   double tests = 0.0;
   const auto consider = [&](const std::vector<Eigen::Index>& columns, const Pairing& pairing) {
     tests += 1.0;
-    const double p = pairing.p_value();
+    const double p = pairing.p_value(independent_share);
     if (p >= best.p_value) return;
     const double common = pairing.sum / std::max(1.0, pairing.pairs);
     best = {columns, p, std::clamp(common * static_cast<double>(errors.size()) / errors.squaredNorm(), 0.0, 1.0)};
   };
-  for (const Eigen::Index j : moving) consider({j}, along(scaled.col(j), errors));
+  for (const Eigen::Index j : moving) consider({j}, along(scaled.col(j), errors, apart));
   const double work = static_cast<double>(errors.size()) * static_cast<double>(errors.size());
   const double pairs = 0.5 * static_cast<double>(moving.size()) * static_cast<double>(moving.size() - 1);
   if (moving.size() > 1 && work * pairs <= most_work) {
     for (std::size_t a = 0; a < moving.size(); ++a) {
       for (std::size_t b = a + 1; b < moving.size(); ++b) {
-        consider({moving[a], moving[b]}, nearest(scaled(Eigen::all, std::vector{moving[a], moving[b]}), errors));
+        consider({moving[a], moving[b]}, nearest(scaled(Eigen::all, std::vector{moving[a], moving[b]}), errors, apart));
       }
     }
   }
-  if (moving.size() > 2) consider(moving, nearest(scaled(Eigen::all, moving), errors));
+  if (moving.size() > 2) consider(moving, nearest(scaled(Eigen::all, moving), errors, apart));
   best.p_value = std::min(1.0, best.p_value * tests);
   return best;
 }

@@ -14,6 +14,11 @@ struct StructureLeft {
 
 /// Neighbours in one input, in two, and in all: T = sum over neighbours of e_i e_j, against random signs of e, under
 /// which T has mean 0 and variance sum w_ij^2 e_i^2 e_j^2. The most significant of all tests.
-StructureLeft structure_left(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& errors);
+///
+/// In time (`stretches` not empty: labels, samples of one label follow each other) neighbours are samples of different
+/// times, 2 / independent_share apart, because noise is alike in samples that follow each other; and the variance is
+/// larger by 1 / independent_share, because so are the products of pairs.
+StructureLeft structure_left(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& errors,
+                             const std::vector<Eigen::Index>& stretches = {}, double independent_share = 1.0);
 
 }  // namespace llmt::discovery

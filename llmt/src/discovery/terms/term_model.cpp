@@ -2,11 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
 
+#include "discovery/terms/correlation.hpp"
 #include "discovery/terms/refuse.hpp"
 #include "llmt/discovery/least_squares.hpp"
 #include "llmt/discovery/terms.hpp"
@@ -86,7 +88,45 @@ bool within_tried(const TermModel& model, const std::vector<PlacedTerm>& before,
   return true;
 }
 
+// The factors on standard errors that correlated noise makes. The estimate of parameter j is sum_i z_ij e_i, Z the
+// transposed pseudo-inverse of the Jacobian; its variance is inflated output by output.
+Eigen::VectorXd error_factors(const TermData& data, const LeastSquaresProblem& problem, const SolverResult& result) {
+  Eigen::VectorXd factors = Eigen::VectorXd::Ones(std::ssize(problem.parameters));
+  const std::vector<std::vector<double>> correlations = correlations_of(data, result.residuals);
+  if (std::ranges::all_of(correlations, &std::vector<double>::empty)) return factors;
+  std::vector<Eigen::Index> free;
+  for (Eigen::Index k = 0; k < std::ssize(problem.parameters); ++k) {
+    if (problem.parameters[k].free) free.push_back(k);
+  }
+  if (free.empty()) return factors;
+  Eigen::MatrixXd jacobian = difference_jacobian(problem, result.values)(Eigen::all, free);
+  for (std::size_t j = 0; j < free.size(); ++j) jacobian.col(j) *= problem.parameters[free[j]].scale;
+  const Eigen::MatrixXd influences = jacobian.completeOrthogonalDecomposition().pseudoInverse().transpose();
+  const Eigen::Index d = data.measured.cols();
+  for (std::size_t j = 0; j < free.size(); ++j) {
+    double inflated = 0.0;
+    for (Eigen::Index o = 0; o < d; ++o) {
+      const Eigen::VectorXd own = influences.col(j)(Eigen::seqN(o, data.samples.size(), d));
+      inflated += own.squaredNorm() * variance_inflation(correlations[o], own, data.stretches);
+    }
+    const double plain = influences.col(j).squaredNorm();
+    if (plain > 0.0) factors(free[j]) = std::sqrt(inflated / plain);
+  }
+  return factors;
+}
+
 }  // namespace
+
+std::vector<std::vector<double>> correlations_of(const TermData& data, const Eigen::VectorXd& residuals) {
+  const Eigen::Index d = data.measured.cols();
+  std::vector<std::vector<double>> correlations(d);
+  if (data.stretches.empty()) return correlations;
+  for (Eigen::Index o = 0; o < d; ++o) {
+    const Eigen::VectorXd own = residuals(Eigen::seqN(o, data.samples.size(), d));
+    correlations[o] = autocorrelation(own, data.stretches, std::vector<bool>(own.size(), true));
+  }
+  return correlations;
+}
 
 TermModel::TermModel(const Simulation& simulation, const Inputs& inputs, std::vector<std::string> outputs,
                      const std::vector<ModelTerm>& terms)
@@ -149,12 +189,11 @@ std::string TermModel::label(const PlacedTerm& placed) const {
 
 Eigen::VectorXd scaled_residuals(const TermModel& model, const TermData& data, const Eigen::VectorXd& parameters,
                                  const std::vector<PlacedTerm>& placed) {
-  const Eigen::MatrixXd predicted = model.predict(parameters, placed);
+  const Eigen::MatrixXd predicted = means(model.predict(parameters, placed), data.samples);
   const Eigen::Index d = data.measured.cols();
   Eigen::VectorXd residuals(data.measured.size());
   for (Eigen::Index i = 0; i < data.measured.rows(); ++i) {
-    const Eigen::Index row = data.rows[i];
-    residuals.segment(i * d, d) = (data.measured.row(i) - predicted.row(row)).transpose().cwiseQuotient(data.sigma);
+    residuals.segment(i * d, d) = (data.measured.row(i) - predicted.row(i)).transpose().cwiseQuotient(data.sigma);
   }
   return residuals;
 }
@@ -178,10 +217,11 @@ Eigen::MatrixXd stacked_signature(const TermModel& model, const TermData& data, 
   const Eigen::Index bad = first_bad_row(columns);
   if (bad < columns.rows())
     refuse("find_missing", fmt::format("the term {} is not finite at row {}", model.label(placed), bad + 1));
+  const Eigen::MatrixXd of_samples = means(columns, data.samples);
   const Eigen::Index d = data.measured.cols();
   Eigen::MatrixXd signature = Eigen::MatrixXd::Zero(data.measured.size(), columns.cols());
   for (Eigen::Index i = 0; i < data.measured.rows(); ++i) {
-    signature.row(i * d + placed.output) = columns.row(data.rows[i]) / data.sigma(placed.output);
+    signature.row(i * d + placed.output) = of_samples.row(i) / data.sigma(placed.output);
   }
   return signature;
 }
@@ -199,7 +239,10 @@ TermFit fit_terms(const TermModel& model, const TermData& data, const Eigen::Vec
     problem.residual = [&](const Eigen::VectorXd& values) {
       return scaled_residuals(model, data, values.head(own), unpack(placed, values, layout.own));
     };
-    const SolverResult result = solve(problem);
+    SolverResult result = solve(problem);
+    if (!data.stretches.empty()) {
+      result.standard_errors.array() *= error_factors(data, problem, result).array();
+    }
     TermFit fit{
         result.values.head(own), result.standard_errors.head(own), unpack(placed, result.values, layout.own), {}};
     if (constants_are_free && !within_tried(model, placed, fit.placed)) continue;

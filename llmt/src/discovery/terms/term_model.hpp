@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "discovery/terms/samples.hpp"
 #include "llmt/discovery/missing.hpp"
 #include "llmt/discovery/model_term.hpp"
 
@@ -51,11 +52,13 @@ class TermModel {
   Eigen::MatrixXd evaluate(const Eigen::VectorXd& values) const;
 };
 
-/// Rows that are fitted, measured outputs there, and how much an output's deviation counts.
+/// Samples that are fitted, measured outputs there, and how much an output's deviation counts.
 struct TermData {
-  std::vector<Eigen::Index> rows;
-  Eigen::MatrixXd measured;  // rows x d
-  Eigen::VectorXd sigma;     // d
+  Samples samples;
+  Eigen::MatrixXd measured;             // samples x d
+  Eigen::VectorXd sigma;                // d
+  std::vector<Eigen::Index> stretches;  // RowSplit::stretches; empty: samples are not in time
+  double independent_share = 1.0;       // of the samples, see search()
 };
 
 /// Parameters and placed terms fitted together.
@@ -69,7 +72,11 @@ struct TermFit {
 TermFit fit_terms(const TermModel& model, const TermData& data, const Eigen::VectorXd& start,
                   const std::vector<PlacedTerm>& placed);
 
-/// (measured - predicted) / sigma, stacked row by row.
+/// Autocorrelation of stacked residuals of samples in time, for each output, see autocorrelation(); d empty lists for
+/// samples that are not in time.
+std::vector<std::vector<double>> correlations_of(const TermData& data, const Eigen::VectorXd& residuals);
+
+/// (measured - predicted) / sigma, stacked sample by sample.
 Eigen::VectorXd scaled_residuals(const TermModel& model, const TermData& data, const Eigen::VectorXd& parameters,
                                  const std::vector<PlacedTerm>& placed);
 

@@ -5,25 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "llmt/random.hpp"
-
 namespace llmt::discovery {
 namespace {
-
-std::vector<Eigen::Index> repeat_numbers(const Inputs& inputs) {
-  std::map<std::vector<double>, Eigen::Index> numbers;
-  std::vector<Eigen::Index> repeats;
-  for (Eigen::Index i = 0; i < inputs.values.rows(); ++i) {
-    std::vector<double> setting;
-    for (Eigen::Index j = 0; j < inputs.values.cols(); ++j) {
-      if (inputs.names[j] != inputs.order) setting.push_back(inputs.values(i, j));
-    }
-    // Without inputs beside the order nothing is a repeat.
-    if (setting.empty()) setting.push_back(static_cast<double>(i));
-    repeats.push_back(numbers.try_emplace(std::move(setting), std::ssize(numbers)).first->second);
-  }
-  return repeats;
-}
 
 // Terms of the library that need not be tried because they stand among the found ones.
 bool placed_already(const std::vector<PlacedTerm>& placed, std::size_t term, Eigen::Index output) {
@@ -45,6 +28,26 @@ EffectCandidate candidate_of(const TermModel& model, const TermData& data, const
   candidate.generic = term.generic;
   candidate.prior_cost = option.prior_cost;
   return candidate;
+}
+
+// In time the value of the row before and the change since then hold the noise of neighbouring rows, and are otherwise
+// the terms of the row itself.
+bool tells_in_time(const ModelTerm& history, const TermData& data) {
+  return data.stretches.empty() || (history.family != "previous" && history.family != "rate");
+}
+
+// Samples in time whose noise may be alike keep their signs together.
+std::vector<Eigen::Index> clusters_of(const TermData& data) {
+  std::vector<Eigen::Index> clusters;
+  const auto length = static_cast<Eigen::Index>(std::ceil(2.0 / data.independent_share));
+  if (data.stretches.empty() || data.independent_share >= 1.0) return clusters;
+  Eigen::Index members = 0;
+  for (std::size_t i = 0; i < data.stretches.size(); ++i) {
+    const bool begins = i == 0 || data.stretches[i] != data.stretches[i - 1] || members == length;
+    clusters.push_back(i == 0 ? 0 : clusters.back() + (begins ? 1 : 0));
+    members = begins ? 1 : members + 1;
+  }
+  return clusters;
 }
 
 class Slots {
@@ -80,43 +83,22 @@ TrialGround ground_without(const TermModel& model, const TermData& data, const T
 
 }  // namespace
 
-RowSplit split_rows(const Inputs& inputs, const MissingOptions& options) {
-  const std::vector<Eigen::Index> numbers = repeat_numbers(inputs);
-  const Eigen::Index groups = numbers.empty() ? 0 : *std::ranges::max_element(numbers) + 1;
-  Random random(options.seed);
-  const std::vector<Eigen::Index> order = random.permutation(groups);
-  std::vector<Eigen::Index> place(order.size());
-  for (std::size_t k = 0; k < order.size(); ++k) place[order[k]] = k;
-  const auto aside = static_cast<Eigen::Index>(std::lround(options.held_out_share * static_cast<double>(groups)));
-  // At most about `largest_sample` rows are searched, in whole groups of repeats.
-  const double rows_of_a_group =
-      static_cast<double>(numbers.size()) / static_cast<double>(std::max<Eigen::Index>(1, groups));
-  const auto last = aside + static_cast<Eigen::Index>(static_cast<double>(options.largest_sample) / rows_of_a_group);
-  RowSplit split;
-  for (std::size_t i = 0; i < numbers.size(); ++i) {
-    const Eigen::Index p = place[numbers[i]];
-    if (p < aside) {
-      split.held_out.push_back(i);
-    } else if (p < last) {
-      split.searched.push_back(i);
-      split.repeats.push_back(numbers[i]);
-    }
-  }
-  return split;
-}
-
 TermData without_samples(const TermData& data, const std::vector<std::size_t>& left_out) {
   std::vector<Eigen::Index> kept;
-  for (std::size_t i = 0; i < data.rows.size(); ++i) {
-    if (std::ranges::find(left_out, i) == left_out.end()) kept.push_back(i);
+  for (Eigen::Index i = 0; i < data.samples.size(); ++i) {
+    if (std::ranges::find(left_out, static_cast<std::size_t>(i)) == left_out.end()) kept.push_back(i);
   }
-  TermData result{{}, data.measured(kept, Eigen::all), data.sigma};
-  for (const Eigen::Index i : kept) result.rows.push_back(data.rows[i]);
+  TermData result{{}, data.measured(kept, Eigen::all), data.sigma, {}, data.independent_share};
+  for (const Eigen::Index i : kept) {
+    result.samples.add(data.samples.rows_of(i));
+    if (!data.stretches.empty()) result.stretches.push_back(data.stretches[i]);
+  }
   return result;
 }
 
 TermQuestion ask(const TermModel& model, const TermData& data, const TermFit& fit,
-                 const std::vector<Eigen::Index>& repeats, const std::vector<std::size_t>& outliers) {
+                 const std::vector<Eigen::Index>& repeats, const std::vector<std::size_t>& outliers,
+                 bool with_history) {
   TermQuestion question;
   const Eigen::MatrixXd simulated = model.simulated(fit.parameters);
   const auto d = data.measured.cols();
@@ -126,6 +108,8 @@ TermQuestion ask(const TermModel& model, const TermData& data, const TermFit& fi
   question.evidence.residuals = ground.residuals;
   question.evidence.components = d;
   question.evidence.repeats = repeats;
+  question.evidence.independent_share = data.independent_share;
+  question.evidence.clusters = clusters_of(data);
   Slots slots;
   for (const PlacedTerm& placed : fit.placed) {
     question.options.push_back(placed);
@@ -136,6 +120,7 @@ TermQuestion ask(const TermModel& model, const TermData& data, const TermFit& fi
   for (const std::size_t sample : outliers) ground.residuals.segment(sample * d, d).setZero();
   for (std::size_t t = 0; t < model.terms().size(); ++t) {
     const ModelTerm& term = model.terms()[t];
+    if (term.history && !(with_history && tells_in_time(term, data))) continue;
     for (Eigen::Index o = 0; o < d; ++o) {
       if (!term.output.empty() && term.output != model.outputs()[o]) continue;
       std::vector<PlacedTerm> options;

@@ -8,16 +8,6 @@
 
 namespace llmt::discovery {
 
-/// Rows that take part, and rows set aside.
-struct RowSplit {
-  std::vector<Eigen::Index> searched;
-  std::vector<Eigen::Index> held_out;
-  std::vector<Eigen::Index> repeats;  // of the searched rows: equal numbers for equal inputs
-};
-
-/// Rows of equal inputs, the order aside, keep together.
-RowSplit split_rows(const Inputs& inputs, const MissingOptions& options);
-
 TermData without_samples(const TermData& data, const std::vector<std::size_t>& left_out);
 
 struct TermQuestion {
@@ -27,9 +17,10 @@ struct TermQuestion {
 };
 
 /// The question at the present estimates. The found terms compete again, with what they explain added back to the
-/// residuals. Constants of the other terms are tried on the residuals without the samples in `outliers`.
+/// residuals. Constants of the other terms are tried on the residuals without the samples in `outliers`. Terms that
+/// depend on earlier rows are candidates only `with_history`.
 TermQuestion ask(const TermModel& model, const TermData& data, const TermFit& fit,
-                 const std::vector<Eigen::Index>& repeats, const std::vector<std::size_t>& outliers);
+                 const std::vector<Eigen::Index>& repeats, const std::vector<std::size_t>& outliers, bool with_history);
 
 /// Moves constants of terms to a better value, if there is one now that everything else is fitted. Returns whether any
 /// was moved.

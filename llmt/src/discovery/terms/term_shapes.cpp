@@ -87,7 +87,9 @@ ModelTerm bump_shape(const InputView& input, int parts) {
 std::vector<Eigen::Index> rows_before(const Rows& rows) {
   std::vector<Eigen::Index> before(rows.sequence.size());
   for (std::size_t k = 0; k < rows.sequence.size(); ++k) {
-    before[rows.sequence[k]] = rows.sequence[k > 0 ? k - 1 : 0];
+    // A run begins where time goes back.
+    const bool begins = k == 0 || !(rows.instants(rows.sequence[k]) > rows.instants(rows.sequence[k - 1]));
+    before[rows.sequence[k]] = rows.sequence[begins ? k : k - 1];
   }
   return before;
 }
@@ -101,9 +103,9 @@ ModelTerm sequence_term(
           .inputs = {input.name},
           .coefficients = {"coefficient"},
           .per = std::move(per),
-          .columns = [own = std::move(columns)](const Rows& rows, const Eigen::VectorXd&) {
-            return own(rows, rows_before(rows));
-          }};
+          .columns = [own = std::move(columns)](const Rows& rows,
+                                                const Eigen::VectorXd&) { return own(rows, rows_before(rows)); },
+          .history = true};
 }
 
 }  // namespace

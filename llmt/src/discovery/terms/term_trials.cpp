@@ -9,6 +9,11 @@
 namespace llmt::discovery {
 namespace {
 
+// Fast columns are judged by rows that stand nearer in time.
+constexpr double smallest_share_kept = 0.3;
+// A term that a handful of samples carry, at the end of a range, says more of these samples than of a cause.
+constexpr double fewest_carriers = 5.0;
+
 // The sum of squares that a term explains at one constant, beyond the nuisance.
 class Trials {
  public:
@@ -32,8 +37,13 @@ class Trials {
 
   double gain(double constant) {
     placed_.constants = Eigen::VectorXd::Constant(1, constant);
-    Eigen::MatrixXd columns = model_->columns(placed_, *simulated_)(data_->rows, Eigen::all);
+    const Eigen::MatrixXd of_rows = model_->columns(placed_, *simulated_);
+    Eigen::MatrixXd columns = means(of_rows, data_->samples);
     if (!columns.allFinite()) return 0.0;
+    for (Eigen::Index k = 0; k < columns.cols(); ++k) {
+      if (share_kept(of_rows.col(k), data_->samples) < smallest_share_kept) return 0.0;
+      if (carriers(columns.col(k)) < fewest_carriers) return 0.0;
+    }
     const Eigen::VectorXd norms = columns.colwise().norm();
     if (!(norms.minCoeff() > 0.0)) return 0.0;
     columns *= norms.cwiseInverse().asDiagonal();
@@ -65,7 +75,7 @@ class Trials {
   Eigen::VectorXd power(const ModelTerm& term, Eigen::Index p) const {
     const Eigen::Index n = data_->measured.rows();
     if (p == 0 || term.inputs.empty()) return Eigen::VectorXd::Ones(n);
-    const Eigen::VectorXd x = model_->input(term.inputs.front())(data_->rows);
+    const Eigen::VectorXd x = means(model_->input(term.inputs.front()), data_->samples);
     const double middle = 0.5 * (x.minCoeff() + x.maxCoeff());
     const double half = std::max(1e-300, 0.5 * (x.maxCoeff() - x.minCoeff()));
     return ((x.array() - middle) / half).pow(static_cast<double>(p)).matrix();
@@ -105,7 +115,7 @@ double trial_error(const TermModel& model, const TermData& data, const TrialGrou
   Trials trials(model, data, ground, placed, simulated);
   const double value = placed.constants(0);
   const double best = trials.gain(value);
-  const double variance = std::max(0.0, trials.sum_of_squares() - best) / static_cast<double>(data.rows.size());
+  const double variance = std::max(0.0, trials.sum_of_squares() - best) / static_cast<double>(data.samples.size());
   const auto place = static_cast<Eigen::Index>(std::ranges::lower_bound(tried, value) - tried.begin());
   double error = spacing(tried, value);
   for (const Eigen::Index direction : {-1, 1}) {

@@ -1,6 +1,7 @@
 #include "llmt/discovery/terms.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -171,6 +172,28 @@ ModelTerm function_term(const InputView& input, std::string family, std::string 
           }};
 }
 
+std::vector<ModelTerm> of_families(std::vector<ModelTerm> terms, const std::vector<std::string>& only,
+                                   const std::vector<std::string>& without) {
+  std::set<std::string> families;
+  for (const ModelTerm& term : terms) {
+    if (!term.generic) families.insert(term.family);
+  }
+  for (const std::vector<std::string>* names : {&only, &without}) {
+    for (const std::string& name : *names) {
+      if (families.contains(name)) continue;
+      throw std::invalid_argument(
+          fmt::format("there is no family \"{}\" among the terms to try: {}", name, fmt::join(families, ", ")));
+    }
+  }
+  const auto among = [](const std::vector<std::string>& names, const std::string& family) {
+    return std::ranges::find(names, family) != names.end();
+  };
+  std::erase_if(terms, [&](const ModelTerm& term) {
+    return !term.generic && ((!only.empty() && !among(only, term.family)) || among(without, term.family));
+  });
+  return terms;
+}
+
 ModelTerm own_term(std::string name, std::string formula, std::function<double(const Eigen::VectorXd& row)> function) {
   return {.family = std::move(name),
           .location = "",
@@ -238,6 +261,13 @@ Rows rows_of(const Inputs& inputs, const Eigen::VectorXd& simulated) {
             .instants = Eigen::VectorXd::LinSpaced(n, 0.0, static_cast<double>(n - 1))};
   rows.sequence.resize(n);
   std::iota(rows.sequence.begin(), rows.sequence.end(), 0);
+  if (inputs.instants.size() == n && n > 0) {
+    rows.instants = inputs.instants;
+    std::ranges::stable_sort(rows.sequence, {}, [&](Eigen::Index i) {
+      return std::pair(inputs.runs.empty() ? Eigen::Index{0} : inputs.runs[i], rows.instants(i));
+    });
+    return rows;
+  }
   if (inputs.order.empty()) return rows;
   rows.instants = inputs.values.col(order_column(inputs));
   std::ranges::stable_sort(rows.sequence, {}, [&](Eigen::Index i) { return rows.instants(i); });

@@ -1,0 +1,36 @@
+// Which rows are searched, which are set aside, and what counts as one observation.
+#pragma once
+
+#include <vector>
+
+#include "discovery/terms/samples.hpp"
+#include "llmt/discovery/missing.hpp"
+#include "llmt/discovery/model_term.hpp"
+
+namespace llmt::discovery {
+
+struct RowSplit {
+  Samples searched;
+  Samples held_out;
+  std::vector<Eigen::Index> repeats;    ///< of the searched samples: equal numbers for equal inputs; empty in time
+  std::vector<Eigen::Index> stretches;  ///< of the searched samples in time: neighbours in a stretch follow each other
+  Eigen::Index rows_per_sample = 1;
+  double step = 0.0;  ///< median time between rows
+};
+
+/// A row is a sample. Rows of equal inputs, the order aside, keep together.
+RowSplit split_independent(const Inputs& inputs, const MissingOptions& options);
+
+/// For rows in time (Inputs::instants). Set aside are whole runs where there are at least four; else stretches of
+/// consecutive rows. A sample is the mean over a block of consecutive rows, as long as the inputs bear: the longest
+/// block within which every smooth input varies by at most 3 % of its variance, its noise not counted.
+RowSplit split_in_time(const Inputs& inputs, const MissingOptions& options);
+
+/// Variance of the noise of equally spaced values of a smooth signal, from third differences: var(D^3 e) = 20 var(e).
+/// NaN for fewer than 4 values.
+double noise_variance(const Eigen::VectorXd& values);
+
+/// Whether rows follow each other as the inputs of a motion do: most inputs that vary are smooth along the rows.
+bool is_smooth_along_rows(const Inputs& inputs);
+
+}  // namespace llmt::discovery

@@ -1,0 +1,32 @@
+#include "discovery/terms/samples.hpp"
+
+namespace llmt::discovery {
+
+Eigen::MatrixXd means(const Eigen::MatrixXd& of_rows, const Samples& samples) {
+  Eigen::MatrixXd result(samples.size(), of_rows.cols());
+  for (Eigen::Index c = 0; c < of_rows.cols(); ++c) {
+    for (Eigen::Index i = 0; i < samples.size(); ++i) {
+      const std::span<const Eigen::Index> rows = samples.rows_of(i);
+      double sum = 0.0;
+      for (const Eigen::Index row : rows) sum += of_rows(row, c);
+      result(i, c) = rows.size() == 1 ? sum : sum / static_cast<double>(rows.size());
+    }
+  }
+  return result;
+}
+
+double share_kept(const Eigen::VectorXd& of_rows, const Samples& samples) {
+  if (std::ssize(samples.rows()) == samples.size()) return 1.0;
+  const Eigen::VectorXd rows = of_rows(samples.rows());
+  const Eigen::VectorXd kept = means(of_rows, samples);
+  const double all = (rows.array() - rows.mean()).square().mean();
+  return all > 0.0 ? (kept.array() - kept.mean()).square().mean() / all : 1.0;
+}
+
+double carriers(const Eigen::VectorXd& of_samples) {
+  const Eigen::ArrayXd squares = (of_samples.array() - of_samples.mean()).square();
+  const double sum = squares.sum();
+  return sum > 0.0 ? sum * sum / squares.square().sum() : 0.0;
+}
+
+}  // namespace llmt::discovery

@@ -1,0 +1,46 @@
+// What a fit counts as one observation.
+#pragma once
+
+#include <Eigen/Core>
+#include <span>
+#include <vector>
+
+namespace llmt::discovery {
+
+/// Observations, each the mean over some rows: one row where rows are independent, a block of consecutive rows where
+/// they were taken in time.
+///
+/// An equation y = s(x) + sum_j b_j T_j(x) + noise that is linear in the columns y, s and T_j holds for their means
+/// over any rows too. The terms are computed at the rows, so the mean rounds nothing off, as a filter on x would
+/// (parallel filtering and decimation, Gautier 1997).
+class Samples {
+ public:
+  void add(std::span<const Eigen::Index> rows) {
+    rows_.insert(rows_.end(), rows.begin(), rows.end());
+    ends_.push_back(std::ssize(rows_));
+  }
+
+  Eigen::Index size() const { return std::ssize(ends_); }
+  /// Of all samples, one after the other.
+  const std::vector<Eigen::Index>& rows() const { return rows_; }
+  std::span<const Eigen::Index> rows_of(Eigen::Index sample) const {
+    const Eigen::Index begin = sample == 0 ? 0 : ends_[sample - 1];
+    return std::span(rows_).subspan(begin, ends_[sample] - begin);
+  }
+
+ private:
+  std::vector<Eigen::Index> rows_;
+  std::vector<Eigen::Index> ends_;
+};
+
+/// The share of the variance of a column that its means keep, 1 where samples are single rows. A column that varies
+/// much faster than the samples keeps little: what is left of it is chance.
+double share_kept(const Eigen::VectorXd& of_rows, const Samples& samples);
+
+/// The number of samples that carry a column, (sum u^2)^2 / sum u^4 of its deviations u from their mean.
+double carriers(const Eigen::VectorXd& of_samples);
+
+/// The mean of every sample; samples x columns. `of_rows`: a row for each row of the data.
+Eigen::MatrixXd means(const Eigen::MatrixXd& of_rows, const Samples& samples);
+
+}  // namespace llmt::discovery
