@@ -184,7 +184,7 @@ class Missing(Result):
         several. ``simulated``: its outputs there, where no callable was given."""
         from llmt import _core
 
-        rows, columns = _matrix(inputs, "inputs", "x")
+        rows, columns = _matrix(_without_labels(inputs, self._question["input_names"]), "inputs", "x")
         rows = _in_order(rows, columns, self._question["input_names"], _is_table(inputs))
         callable_ = self._callables["simulate"]
         if (simulated is None) == (callable_ is None):
@@ -205,6 +205,12 @@ class Missing(Result):
             tabulated=tabulated,
         )
         return result[:, 0] if result.shape[1] == 1 else result
+
+    def mujoco(self, spec: Any) -> tuple[Any, Callable[[Any, Any], None] | None]:
+        """A copy of a specification of MuJoCo with what was found, and a callback: :func:`llmt.mujoco.apply`."""
+        from llmt.mujoco import apply
+
+        return apply(self, spec)
 
     def plot(self, ax: Any = None) -> Any:
         """Draws measured minus simulated on the rows set aside (all rows without any), before and after, of the first
@@ -238,6 +244,14 @@ class Missing(Result):
             html_table(["term", "parameter", "value", "standard error", "unit"], effects),
             html_table(["output", "gap before", "after", "noise"], gaps),
         ]
+
+
+def _without_labels(inputs: Any, wanted: Sequence[str]) -> Any:
+    """A table with the columns that are wanted alone: others may hold words."""
+    if not _is_table(inputs) or not (isinstance(inputs, Mapping) or hasattr(inputs, "columns")):
+        return inputs
+    columns = columns_of(inputs, "inputs")
+    return {name: values for name, values in columns.items() if name in wanted} or columns
 
 
 def _in_order(rows: np.ndarray, columns: list[str], wanted: list[str], named: bool) -> np.ndarray:
@@ -294,6 +308,24 @@ def _parameters_of(parameters: Any) -> tuple[list[dict[str, Any]], bool]:
     return [parameter._given(f"p{k}") for k, parameter in enumerate(values)], True
 
 
+def _in_time(inputs: Any, time: str, group: str) -> tuple[np.ndarray, list[int], Any]:
+    """When rows were taken and the numbers of their runs, both empty where nothing is said, and the other columns."""
+    if group and not time:
+        raise ValueError("group needs time: the rows of a group follow each other in time")
+    if not time:
+        return np.empty(0), [], inputs
+    if not _is_table(inputs):
+        raise TypeError("time and group are columns of inputs, which must be a table then")
+    columns = dict(columns_of(inputs, "inputs"))
+    for name in [time, *([group] if group else [])]:
+        if name not in columns:
+            raise ValueError(f"inputs has no column {name!r}; there are {', '.join(columns)}")
+    instants = _matrix({time: columns.pop(time)}, "inputs", "x")[0][:, 0]
+    numbers: dict[Any, int] = {}
+    runs = [numbers.setdefault(value, len(numbers)) for value in columns.pop(group)] if group else []
+    return np.ascontiguousarray(instants), runs, columns
+
+
 def _search(
     simulate: Any,
     parameters: tuple[list[dict[str, Any]], bool],
@@ -303,6 +335,10 @@ def _search(
     *,
     allow: Any,
     order: str,
+    time: str,
+    group: str,
+    only: Any,
+    without: Any,
     terms: Mapping[str, Any] | None,
     own_terms_only: bool,
     held_out: float,
@@ -311,7 +347,10 @@ def _search(
 ) -> Missing:
     from llmt import _core
 
-    rows, columns = _matrix(inputs, "inputs", "x")
+    instants, runs, others = _in_time(inputs, time, group)
+    if time and order:
+        raise ValueError("time says the order of the rows: order is not needed beside it")
+    rows, columns = _matrix(others, "inputs", "x")
     values, outputs = _matrix(measured, "measured", "y")
     if len(values) != len(rows):
         raise ValueError(f"inputs has {len(rows)} rows, measured has {len(values)}")
@@ -327,6 +366,10 @@ def _search(
         "inputs": np.ascontiguousarray(rows),
         "input_names": columns,
         "order": order,
+        "instants": instants,
+        "runs": runs,
+        "only": names("only", only),
+        "without": names("without", without),
         "output_names": outputs,
         "parameters": parameters[0],
         "offset": "offset" in adjusted,
@@ -346,6 +389,7 @@ def _search(
     own = dict(terms or {})
     made = _core.find_missing(
         **question,
+        time=time,
         measured=np.ascontiguousarray(values),
         predict=predict,
         terms=_own_terms(own, kind, question),
@@ -373,6 +417,10 @@ def discover(
     measured: Any,
     *,
     order: str = "",
+    time: str = "",
+    group: str = "",
+    only: Any = (),
+    without: Any = (),
     terms: Mapping[str, Any] | None = None,
     own_terms_only: bool = False,
     held_out: float = 0.2,
@@ -395,6 +443,11 @@ def discover(
         The outputs. The columns of an array are called y, or y0, y1, ...
     order : str
         Column that says in which order rows were measured; by default as they stand.
+    time, group : str
+        Columns of ``inputs`` that are no inputs: when each row was taken, for rows that follow each other in time, and
+        which recording it is of.
+    only, without : str or list of str
+        Families of built-in terms to try alone, or not to try.
     terms : dict
         Terms of your own: a callable of the inputs for each name, or (formula, callable).
     own_terms_only : bool
@@ -427,6 +480,10 @@ def discover(
         measured,
         allow=(),
         order=order,
+        time=time,
+        group=group,
+        only=only,
+        without=without,
         terms=terms,
         own_terms_only=own_terms_only,
         held_out=held_out,
@@ -442,6 +499,10 @@ def find_missing(
     *,
     allow: Any = (),
     order: str = "",
+    time: str = "",
+    group: str = "",
+    only: Any = (),
+    without: Any = (),
     terms: Mapping[str, Any] | None = None,
     own_terms_only: bool = False,
     held_out: float = 0.2,
@@ -461,6 +522,10 @@ def find_missing(
         measured,
         allow=allow,
         order=order,
+        time=time,
+        group=group,
+        only=only,
+        without=without,
         terms=terms,
         own_terms_only=own_terms_only,
         held_out=held_out,

@@ -171,7 +171,7 @@ def inverse_dynamics(
     ``simulate(values, inputs)`` computes ``mj_inverse`` of each row, without contacts and limits; ``inputs`` has the
     positions with their velocities and accelerations, in the order of the joints (``position`` names them where it has
     other columns like that). ``simulate.jacobian(values, inputs)`` is rows x joints x parameters; the torques are
-    linear in each parameter, so that a difference is exact but for rounding. Raises ValueError for parameters, columns
+    linear in each parameter (quadratic in a centre of mass), so that a difference is exact but for rounding. Raises ValueError for parameters, columns
     or joints that do not fit.
     """
     import mujoco
@@ -205,8 +205,9 @@ def inverse_dynamics(
         columns = []
         for name, value in values.items():
             step = 0.1 * abs(_value(nominal, places[name])) or _SMALL[places[name][0]]
-            above, below = ({**values, name: value + sign * step} for sign in (1.0, -1.0))
-            columns.append((torques(above, motion) - torques(below, motion)) / (2.0 * step))
+            back = step if places[name][0] == "com" else 0.0  # the others are linear, and may not fall below 0
+            above, below = {**values, name: value + step}, {**values, name: value - back}
+            columns.append((torques(above, motion) - torques(below, motion)) / (step + back))
         return np.stack(columns, axis=-1) if columns else np.empty((*motion[0].shape, 0))
 
     simulate.jacobian = jacobian  # type: ignore[attr-defined]
@@ -289,7 +290,7 @@ def apply(found: Missing, spec: Any) -> tuple[Any, Callable[[Any, Any], None] | 
     fixed = spec.copy()
     joints = {joint.name: joint for joint in fixed.joints}
     spec_joints = [joints[nominal.joint(k).name] if nominal.joint(k).name in joints else fixed.joints[k] for k in range(nominal.nv)]
-    _set_spec(fixed, spec_joints, nominal, {p["name"]: p["value"] for p in found.to_dict()["simulation"]})
+    _set_spec(fixed, spec_joints, nominal, _fitted(found, nominal))
     correction = _Correction()
     left_out = []
     for term in found.to_dict()["effects"]:
@@ -301,6 +302,21 @@ def apply(found: Missing, spec: Any) -> tuple[Any, Callable[[Any, Any], None] | 
     for joint, _ in correction.frictions:
         correction.friction_base[joint] = _first(spec_joints[joint], "frictionloss")
     return fixed, correction if correction else None
+
+
+def _fitted(found: Missing, nominal: Any) -> dict[str, float]:
+    """Values by parameter. Of parameters that the rows do not tell apart, "a + b", the first one takes the change."""
+    data = found.to_dict()
+    values: dict[str, float] = {}
+    places = _places(nominal)
+    for parameter in data.get("parameters", data.get("simulation", [])):
+        name = parameter["name"]
+        first = name if name in places else name.split(" + ")[0].split(" - ")[0]
+        if first not in places:
+            raise ValueError(f"{name!r} is no parameter of the model; there are {', '.join(places)}")
+        change = parameter.get("change")
+        values[first] = parameter["value"] if change is None else _value(nominal, places[first]) + change
+    return values
 
 
 def _set_spec(fixed: Any, joints: Sequence[Any], nominal: Any, values: Mapping[str, float]) -> None:

@@ -45,7 +45,8 @@ Simulation tabulated(const Eigen::MatrixXd& simulated, const std::vector<std::st
 /// 1 + 2 sum_k rho_k r_k (Bartlett 1935). Without instants, rows whose inputs are smooth along the table and whose
 /// deviations are alike in neighbours are taken for rows in time (TimeUse::found_out).
 ///
-/// Throws std::invalid_argument for wrong shapes, names or options, values that are not finite, too few rows, and a
+/// Throws std::invalid_argument for wrong shapes, names or options, values that are not finite, too few rows, inputs
+/// that determine a measured output exactly while they do not determine the simulation (it names them), and a
 /// prediction or a term that has the wrong shape or is not finite, naming it.
 Missing find_missing(const Simulation& simulation, const Inputs& inputs, const MeasuredOutputs& measured,
                      const std::vector<ModelTerm>& terms, const MissingOptions& options = {});

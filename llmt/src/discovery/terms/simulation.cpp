@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "discovery/terms/correlation.hpp"
+#include "discovery/terms/determined.hpp"
 #include "discovery/terms/held_out.hpp"
 #include "discovery/terms/missing_findings.hpp"
 #include "discovery/terms/refuse.hpp"
@@ -304,6 +305,7 @@ bool follow_in_time(const Inputs& inputs, const MeasuredOutputs& measured, const
 Missing find_missing(const Simulation& simulation, const Inputs& inputs, const MeasuredOutputs& measured,
                      const std::vector<ModelTerm>& terms, const MissingOptions& options) {
   check(simulation, inputs, measured, options);
+  refuse_determined(simulation, inputs, measured);
   Missing missing = find(simulation, inputs, measured, terms, options);
   if (inputs.instants.size() > 0 || !follow_in_time(inputs, measured, missing)) return missing;
   Inputs in_time = inputs;
