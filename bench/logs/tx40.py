@@ -23,8 +23,6 @@ import llmt
 import llmt.mujoco
 
 RATIOS = np.diag([32.0, 32.0, 45.0, -48.0, 45.0, 32.0])
-FAMILIES = ["linear", "sign", "stribeck", "tanh", "asinh", "signed_square", "square", "cube", "absolute", "step", "hinge",
-            "offset", "gain"]
 
 
 def read(folder):
@@ -34,7 +32,8 @@ def read(folder):
     gears[5, 4] = drives[4, 5] = 32.0
     q = np.linalg.solve(gears, positions.T).T + np.radians([0, -90, 90, 0, 0, 0])
     u = torques @ drives.T
-    return {**{f"q{j + 1}": q[:, j] for j in range(6)}, **{f"u{j + 1}": u[:, j] for j in range(6)}}
+    turns = {"m6": q[:, 4] + q[:, 5]}  # motor 6
+    return {**{f"q{j + 1}": q[:, j] for j in range(6)}, **turns, **{f"u{j + 1}": u[:, j] for j in range(6)}}
 
 
 def arm(folder):
@@ -45,21 +44,13 @@ def arm(folder):
     return spec
 
 
-def independent(columns):
-    """The columns of a basis, by Gram-Schmidt with pivoting, scaled to a root mean square of 1."""
+def principal(columns, share):
+    """Combinations of the columns (of root mean square 1) that the motion excites: those of the singular values above a
+    share of the largest. The others cannot be told from noise."""
     scales = np.sqrt(np.mean(columns**2, axis=0))
-    rest = columns[:, scales > 1e-9] / scales[scales > 1e-9]
-    kept, basis = [], np.empty((len(columns), 0))
-    numbers = np.flatnonzero(scales > 1e-9)
-    while rest.shape[1]:
-        left = rest - basis @ (basis.T @ rest)
-        sizes = np.sqrt(np.mean(left**2, axis=0))
-        best = int(np.argmax(sizes))
-        if sizes[best] < 0.02:
-            break
-        kept.append(int(numbers[best]))
-        basis = np.column_stack([basis, left[:, best] / np.linalg.norm(left[:, best])])
-    return kept, scales
+    there = scales > 1e-9
+    left, sizes, _ = np.linalg.svd(columns[:, there] / scales[there], full_matrices=False)
+    return left[:, sizes > share * sizes[0]] * np.sqrt(len(columns))
 
 
 def main():
@@ -67,17 +58,19 @@ def main():
     parser.add_argument("folder", type=pathlib.Path)
     parser.add_argument("--cutoff", type=float, default=40.0, help="Hz")
     parser.add_argument("--every", type=int, default=None, help="samples from row to row")
+    parser.add_argument("--standstill", type=float, default=0.02, help="rad/s")
+    parser.add_argument("--share", type=float, default=0.3, help="smallest singular value of a combination of parameters")
     parser.add_argument("--joints", default="1,2,3,4,5,6")
     arguments = parser.parse_args()
 
     log = read(arguments.folder)
     names = [f"q{j}" for j in range(1, 7)]
-    rows = llmt.signals(log, rate=5000.0, position=names, torque=[f"u{j}" for j in range(1, 7)],
-                        cutoff=arguments.cutoff, every=arguments.every, standstill=0.0)
+    rows = llmt.signals(log, rate=5000.0, position=[*names, "m6"], torque=[f"u{j}" for j in range(1, 7)],
+                        cutoff=arguments.cutoff, every=arguments.every, standstill=arguments.standstill)
     print(rows)
     spec = arm(arguments.folder)
     parameters = llmt.mujoco.parameters(spec, ["mass", "com", "inertia", "armature"])
-    simulation = llmt.mujoco.inverse_dynamics(spec, parameters)
+    simulation = llmt.mujoco.inverse_dynamics(spec, parameters, position=names)
     nominal = {name: parameter.value for name, parameter in parameters.items()}
     table = {name: np.asarray(column) for name, column in rows.inputs.items()}
     torques = simulation(nominal, table)
@@ -87,16 +80,14 @@ def main():
     for joint in (int(text) - 1 for text in arguments.joints.split(",")):
         begin = clock.process_time()
         columns = derivatives[:, joint, :]
-        labels = list(parameters)
         # The rotor of motor 6 turns with q5 + q6: its inertia couples both joints, and so does its friction.
         speeds = {name: table[f"d{name}"] for name in [names[joint]]}
         if joint >= 4:
             other = names[9 - joint]
             columns = np.column_stack([columns, table[f"dd{other}"]])
-            labels.append(f"coupling with dd{other}")
-            speeds["motor6"] = table["dq5"] + table["dq6"]
-        kept, scales = independent(columns)
-        rigid = columns[:, kept] / scales[kept]
+            speeds["m6"] = table["dm6"]
+        # Amplifiers have an offset, which is no friction either.
+        rigid = np.column_stack([principal(columns, arguments.share), np.ones(len(columns))])
         measured = np.asarray(rows.torques[f"u{joint + 1}"])
 
         def simulate(values, inputs, rigid=rigid, joint=joint):
@@ -110,19 +101,19 @@ def main():
         by_hand = np.linalg.lstsq(np.column_stack([rigid, friction]), gap, rcond=None)[0]
         rest = gap - np.column_stack([rigid, friction]) @ by_hand
         alone = gap - rigid @ np.linalg.lstsq(rigid, gap, rcond=None)[0]
-        inputs = {"t": table["t"], names[joint]: table[names[joint]], f"d{names[joint]}": table[f"d{names[joint]}"]}
+        inputs = {"t": table["t"], f"d{names[joint]}": table[f"d{names[joint]}"]}
         if joint >= 4:
-            inputs["dmotor6"] = speeds["motor6"]
-        found = llmt.discover(simulate, {f"p{k}": llmt.Parameter(0.0, scale=1.0) for k in range(len(kept))},
-                              inputs, {f"u{joint + 1}": measured}, time="t")
-        hand = "  ".join(f"{value:8.3f}" for value in by_hand[len(kept):])
+            inputs["dm6"] = table["dm6"]
+        found = llmt.discover(simulate, {f"p{k}": llmt.Parameter(0.0, scale=1.0) for k in range(rigid.shape[1])},
+                              inputs, {f"u{joint + 1}": measured}, time="t", without=["previous", "rate", "direction"])
+        hand = "  ".join(f"{value:8.3f}" for value in by_hand[rigid.shape[1]:])
         print(f"{joint + 1}      {hand}  {alone.std():8.3f} {rest.std():8.3f}  {found.summary}")
         for term in found.to_dict()["effects"]:
             values = ", ".join(f"{p['name']} {p['value']:.3f} +- {p['std_error'] or float('nan'):.3f}" for p in term["parameters"])
             print(f"       {'confirmed' if term['confirmed'] else 'tentative'}  {term['formula']}: {values}; {term['rivals']}")
         left = measured - found.corrected[:, 0]
         print(f"       gap {found.gap['before']:.3f} -> {found.gap['after']:.3f}, rest of all rows {left.std():.3f}, "
-              f"{len(kept)} rigid parameters, {len(measured)} rows, {clock.process_time() - begin:.0f} s CPU")
+              f"{rigid.shape[1]} rigid parameters, {len(measured)} rows, {clock.process_time() - begin:.0f} s CPU")
 
 
 if __name__ == "__main__":

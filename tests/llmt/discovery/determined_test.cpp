@@ -70,7 +70,8 @@ TEST(DeterminedOutputs, OtherInputsAreNotRefused) {
   const auto noise = [](double, double other) { return other; };
   EXPECT_EQ(refusal(table(noise, noise)), "");
   // A second sensor of the force has noise of its own.
-  EXPECT_EQ(refusal(table([](double force, double other) { return force + 1e-3 * other; }, noise)), "");
+  llmt::Random random(8);
+  EXPECT_EQ(refusal(table([&](double force, double) { return force + 1e-3 * random.normal(); }, noise)), "");
   // Without noise, a linear simulation of a linear machine: the difference is a term.
   Table linear = table(noise, noise, 0.0);
   linear.measured.values = linear.simulated + 0.2 * linear.inputs.values.col(0);

@@ -139,7 +139,7 @@ TEST(Signals, NoiseIsToldFromTheMotion) {
     const auto torque = [&](double t) { return 5.0 * (std::sin(pi * t) > 0.0) + 0.2 * random.normal(); };
     const Signals table = signals(log_of(10000, 500.0, position, torque), {.cutoff = 10.0});
     EXPECT_NEAR(table.position_noise[0].in_log, 1e-4, 5e-6);
-    EXPECT_NEAR(table.torque_noise[0].in_log, 0.2, 0.01);  // jumps are in few parts of the log
+    EXPECT_NEAR(table.torque_noise[0].in_log, 0.2, 0.02);  // of the parts of the log a third has jumps
   }
 }
 
