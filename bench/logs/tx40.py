@@ -59,14 +59,23 @@ def main():
     parser.add_argument("--cutoff", type=float, default=40.0, help="Hz")
     parser.add_argument("--every", type=int, default=None, help="samples from row to row")
     parser.add_argument("--standstill", type=float, default=0.02, help="rad/s")
-    parser.add_argument("--share", type=float, default=0.3, help="smallest singular value of a combination of parameters")
+    parser.add_argument(
+        "--share", type=float, default=0.3, help="smallest singular value of a combination of parameters"
+    )
     parser.add_argument("--joints", default="1,2,3,4,5,6")
     arguments = parser.parse_args()
 
     log = read(arguments.folder)
     names = [f"q{j}" for j in range(1, 7)]
-    rows = llmt.signals(log, rate=5000.0, position=[*names, "m6"], torque=[f"u{j}" for j in range(1, 7)],
-                        cutoff=arguments.cutoff, every=arguments.every, standstill=arguments.standstill)
+    rows = llmt.signals(
+        log,
+        rate=5000.0,
+        position=[*names, "m6"],
+        torque=[f"u{j}" for j in range(1, 7)],
+        cutoff=arguments.cutoff,
+        every=arguments.every,
+        standstill=arguments.standstill,
+    )
     print(rows)
     spec = arm(arguments.folder)
     parameters = llmt.mujoco.parameters(spec, ["mass", "com", "inertia", "armature"])
@@ -101,19 +110,31 @@ def main():
         by_hand = np.linalg.lstsq(np.column_stack([rigid, friction]), gap, rcond=None)[0]
         rest = gap - np.column_stack([rigid, friction]) @ by_hand
         alone = gap - rigid @ np.linalg.lstsq(rigid, gap, rcond=None)[0]
-        inputs = {"t": table["t"], f"d{names[joint]}": table[f"d{names[joint]}"]}
+        inputs = {f"d{names[joint]}": table[f"d{names[joint]}"]}
         if joint >= 4:
             inputs["dm6"] = table["dm6"]
-        found = llmt.discover(simulate, {f"p{k}": llmt.Parameter(0.0, scale=1.0) for k in range(rigid.shape[1])},
-                              inputs, {f"u{joint + 1}": measured}, time="t", without=["previous", "rate", "direction"])
-        hand = "  ".join(f"{value:8.3f}" for value in by_hand[rigid.shape[1]:])
+        found = llmt.discover(
+            simulate,
+            {f"p{k}": llmt.Parameter(0.0, scale=1.0) for k in range(rigid.shape[1])},
+            inputs,
+            {f"u{joint + 1}": measured},
+            time=rows.time,
+            without=["previous", "rate", "direction"],
+        )
+        hand = "  ".join(f"{value:8.3f}" for value in by_hand[rigid.shape[1] :])
         print(f"{joint + 1}      {hand}  {alone.std():8.3f} {rest.std():8.3f}  {found.summary}")
         for term in found.to_dict()["effects"]:
-            values = ", ".join(f"{p['name']} {p['value']:.3f} +- {p['std_error'] or float('nan'):.3f}" for p in term["parameters"])
-            print(f"       {'confirmed' if term['confirmed'] else 'tentative'}  {term['formula']}: {values}; {term['rivals']}")
+            values = ", ".join(
+                f"{p['name']} {p['value']:.3f} +- {p['std_error'] or float('nan'):.3f}" for p in term["parameters"]
+            )
+            print(
+                f"       {'confirmed' if term['confirmed'] else 'tentative'}  {term['formula']}: {values}; {term['rivals']}"
+            )
         left = measured - found.corrected[:, 0]
-        print(f"       gap {found.gap['before']:.3f} -> {found.gap['after']:.3f}, rest of all rows {left.std():.3f}, "
-              f"{rigid.shape[1]} rigid parameters, {len(measured)} rows, {clock.process_time() - begin:.0f} s CPU")
+        print(
+            f"       gap {found.gap['before']:.3f} -> {found.gap['after']:.3f}, rest of all rows {left.std():.3f}, "
+            f"{rigid.shape[1]} rigid parameters, {len(measured)} rows, {clock.process_time() - begin:.0f} s CPU"
+        )
 
 
 if __name__ == "__main__":

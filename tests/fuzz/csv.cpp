@@ -72,10 +72,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     // is said first.
     const bool is_cell = outcome.error.ends_with("not UTF-8") && !expected.error.empty();
     // That nothing follows the header, and why, is known to a reader of the whole text alone.
-    const bool is_header_alone =
-        (!outcome.error.empty() || outcome.rows.empty()) &&
-        (expected.error.find("lines end with") != std::string::npos ||
-         expected.error.find("a quote is left open") != std::string::npos);
+    const bool is_header_alone = (!outcome.error.empty() || outcome.rows.empty()) &&
+                                 (expected.error.find("lines end with") != std::string::npos ||
+                                  expected.error.find("a quote is left open") != std::string::npos);
     fuzz::require(is_cell || is_header_alone || outcome.error == expected.error,
                   fmt::format("pieces of {} bytes say '{}', the whole '{}'", bytes, outcome.error, expected.error));
     // Rows before an error have been handed out.

@@ -334,3 +334,16 @@ def test_every_result_is_shown_in_a_notebook(arm, calibrated):
     done = robotics.compensate(calibrated.robot, chosen.poses[:2] * 0.5, nominal=arm)
     assert done._repr_html_().count("reached</td>") == 2
     assert "<table>" in arm._repr_html_() and "falls from" in calibrated._repr_html_()
+
+
+def test_columns_that_nobody_needs_may_hold_anything(arm, measured):
+    import datetime
+
+    plain = robotics.calibrate(arm, measured, folds=0)
+    logged = measured.assign(
+        when=[datetime.datetime(2024, 1, 1, 12, 0, k % 60) for k in range(len(measured))],
+        mixed=["text" if k % 2 else k for k in range(len(measured))],
+        good=True,
+    )
+    for table in (logged, as_arrow(logged.drop(columns="mixed")), as_polars(logged.drop(columns="mixed"))):
+        assert robotics.calibrate(arm, table, folds=0).robot.to_yaml() == plain.robot.to_yaml()

@@ -50,7 +50,8 @@ def test_velocities_are_those_of_the_motion(log):
     assert list(table) == ["run", "t", "q", "dq", "ddq", "u", "load"]
     assert np.abs(table["dq"] - 3.0 * np.cos(3.0 * table["t"])).max() < 5.0 * made.noise["dq"]
     assert np.std(table["dq"] - 3.0 * np.cos(3.0 * table["t"])) == pytest.approx(made.noise["dq"], rel=0.2)
-    assert list(made.inputs) == ["run", "t", "q", "dq", "ddq", "load"] and list(made.torques) == ["u"]
+    assert list(made.inputs) == ["q", "dq", "ddq", "load"] and list(made.torques) == ["u"]
+    assert (made.time == table["t"]).all() and (made.groups == table["run"]).all()
     assert "low pass of 10" in str(made) and "noise in the log" in str(made)
     assert (np.asarray(log["run"])[made.rows] == table["run"]).all()
 
@@ -89,22 +90,3 @@ def test_a_target_among_the_inputs_is_named():
     v, u = rng.normal(size=(2, 200))
     with pytest.raises(ValueError, match='the measured "tau" is u at every row'):
         llmt.find_missing({"v": v, "u": u}, np.sign(v), {"tau": u})
-
-
-def test_time_and_group_are_no_inputs():
-    rng = np.random.default_rng(0)
-    t = np.arange(0.0, 40.0, 0.1)
-    v = np.sin(0.7 * t) + np.sin(1.9 * t)
-    noise = np.convolve(rng.normal(size=420), np.ones(21), "valid") * 0.02  # alike over two seconds
-    inputs = {"run": ["a"] * 200 + ["b"] * 200, "t": np.r_[t[:200], t[:200]], "v": v}
-    found = llmt.find_missing(inputs, np.zeros(400), {"tau": 1.5 * v * np.abs(v) + noise}, time="t", group="run")
-    assert [term["formula"] for term in found.to_dict()["effects"]] == ["v |v|"]
-    assert found.to_dict()["time"]["step"] == pytest.approx(0.1)
-    assert found.predict(inputs, np.zeros(400)) == pytest.approx(found.corrected[:, 0])
-    names = {"only": "linear", "time": "t", "group": "run"}
-    only = llmt.find_missing(inputs, np.zeros(400), {"tau": 1.5 * v + noise}, **names)
-    assert {term["name"] for term in only.to_dict()["effects"]} == {"linear"}
-    with pytest.raises(ValueError, match="group needs time"):
-        llmt.find_missing(inputs, np.zeros(400), {"tau": v}, group="run")
-    with pytest.raises(ValueError, match="no column 'x'"):
-        llmt.find_missing(inputs, np.zeros(400), {"tau": v}, time="x")

@@ -27,22 +27,17 @@ using report::Json;
 // (name, formula, function of rows of inputs).
 using OwnTerm = std::tuple<std::string, std::string, nb::callable>;
 
-// Families of built-in terms, as of_families() takes them.
-struct Families {
-  std::vector<std::string> only;
-  std::vector<std::string> without;
-};
-
 // What both a search and a later prediction are made of. Callables of Python are called with the interpreter's lock on
 // the thread that called; between them the lock is free.
 struct Question {
   discovery::Inputs inputs;   ///< at which the terms are made
   Eigen::MatrixXd simulated;  ///< there, n x d, at the start of the parameters
   std::vector<std::string> outputs;
-  Families families;
   discovery::Simulation simulation;
   std::vector<discovery::ModelTerm> terms;
   std::vector<discovery::UntestableCause> untestable;
+  std::vector<std::string> only;  ///< families of the library, see of_families()
+  std::vector<std::string> without;
 };
 
 // What a callable gave for rows of inputs, as a matrix; `what` names it.
@@ -91,8 +86,8 @@ discovery::Parameter parameter_of(const nb::dict& given) {
 // The library's terms, and one's own in their place where they are the same.
 std::vector<discovery::ModelTerm> terms_of(const Question& question, const std::vector<OwnTerm>& own_terms,
                                            bool own_terms_only, std::vector<discovery::UntestableCause>& untestable) {
-  std::vector<discovery::ModelTerm> library = discovery::of_families(
-      discovery::standard_terms(question.inputs, &untestable), question.families.only, question.families.without);
+  std::vector<discovery::ModelTerm> library =
+      discovery::of_families(discovery::standard_terms(question.inputs, &untestable), question.only, question.without);
   if (own_terms.empty()) return library;
   std::vector<discovery::ModelTerm> terms;
   for (const OwnTerm& own : own_terms) {
@@ -127,17 +122,17 @@ void set_simulation(Question& question, const nb::object& predict, const nb::lis
   };
 }
 
-// `instants` and `runs` as those of discovery::Inputs; empty: rows are independent.
-Question question_of(const Array& inputs, std::vector<std::string> names, std::string order, const Vector& instants,
-                     std::vector<Eigen::Index> runs, const Array& simulated, std::vector<std::string> outputs,
-                     Families families) {
-  return {.inputs = {std::move(names), rows_of(inputs), std::move(order), vector_of(instants), std::move(runs)},
+Question question_of(const Array& inputs, std::vector<std::string> names, std::string order, const Array& simulated,
+                     std::vector<std::string> outputs, std::vector<std::string> only,
+                     std::vector<std::string> without) {
+  return {.inputs = {std::move(names), rows_of(inputs), std::move(order)},
           .simulated = rows_of(simulated),
           .outputs = std::move(outputs),
-          .families = std::move(families),
           .simulation = {},
           .terms = {},
-          .untestable = {}};
+          .untestable = {},
+          .only = std::move(only),
+          .without = std::move(without)};
 }
 
 // What corrected() needs of a result.
@@ -182,13 +177,15 @@ void unlocked(const Work& work) {
 }
 
 nb::dict find_missing(const Array& inputs, const std::vector<std::string>& input_names, const std::string& order,
-                      const Vector& instants, const std::vector<Eigen::Index>& runs, const std::string& time,
                       const std::vector<std::string>& only, const std::vector<std::string>& without,
+                      const std::vector<double>& instants, const std::vector<Eigen::Index>& runs,
                       const Array& simulated, const Array& measured, const std::vector<std::string>& output_names,
                       const nb::object& predict, const nb::list& parameters, bool offset, bool scale,
                       const std::vector<OwnTerm>& own_terms, bool own_terms_only, double held_out, std::uint64_t seed,
                       const std::string& simulated_name, const std::string& measured_name, const nb::object& report) {
-  Question question = question_of(inputs, input_names, order, instants, runs, simulated, output_names, {only, without});
+  Question question = question_of(inputs, input_names, order, simulated, output_names, only, without);
+  question.inputs.instants = Eigen::Map<const Eigen::VectorXd>(instants.data(), std::ssize(instants));
+  question.inputs.runs = runs;
   set_simulation(question, predict, parameters, offset, scale, question.simulated);
   const discovery::MeasuredOutputs outputs{output_names, rows_of(measured)};
   report::TermsSummary summary{.simulated = simulated_name,
@@ -202,7 +199,7 @@ nb::dict find_missing(const Array& inputs, const std::vector<std::string>& input
                                .regions = {},
                                .counted = "row",
                                .failing_lines = {},
-                               .time = time};
+                               .time = instants.empty() ? "" : "time"};
   discovery::MissingOptions options{.held_out_share = held_out, .seed = seed};
   options.progress = [&report](const ProgressReport& said) {
     const nb::gil_scoped_acquire locked;
@@ -231,12 +228,11 @@ nb::dict find_missing(const Array& inputs, const std::vector<std::string>& input
 
 // The corrected simulation at other inputs; `tabulated`: its outputs there, if they alone are known.
 auto corrected(const Array& inputs, const std::vector<std::string>& input_names, const std::string& order,
-               const Vector& instants, const std::vector<Eigen::Index>& runs, const std::vector<std::string>& only,
-               const std::vector<std::string>& without, const Array& simulated,
+               const std::vector<std::string>& only, const std::vector<std::string>& without, const Array& simulated,
                const std::vector<std::string>& output_names, const nb::object& predict, const nb::list& parameters,
                bool offset, bool scale, const std::vector<OwnTerm>& own_terms, bool own_terms_only,
                const std::string& state, const Array& elsewhere, const std::optional<Array>& tabulated) {
-  Question question = question_of(inputs, input_names, order, instants, runs, simulated, output_names, {only, without});
+  Question question = question_of(inputs, input_names, order, simulated, output_names, only, without);
   const Eigen::MatrixXd there = tabulated ? Eigen::MatrixXd(rows_of(*tabulated)) : Eigen::MatrixXd();
   set_simulation(question, predict, parameters, offset, scale, there);
   const discovery::Inputs places{input_names, rows_of(elsewhere), order};
@@ -251,15 +247,14 @@ auto corrected(const Array& inputs, const std::vector<std::string>& input_names,
 
 void add_terms(nb::module_& module) {
   using nb::arg;
-  module.def("find_missing", &find_missing, nb::kw_only(), arg("inputs"), arg("input_names"), arg("order"),
-             arg("instants"), arg("runs"), arg("time"), arg("only"), arg("without"), arg("simulated"), arg("measured"),
-             arg("output_names"), arg("predict").none(), arg("parameters"), arg("offset"), arg("scale"), arg("terms"),
-             arg("own_terms_only"), arg("held_out"), arg("seed"), arg("simulated_name"), arg("measured_name"),
-             arg("report").none());
-  module.def("corrected", &corrected, nb::kw_only(), arg("inputs"), arg("input_names"), arg("order"), arg("instants"),
-             arg("runs"), arg("only"), arg("without"), arg("simulated"), arg("output_names"), arg("predict").none(),
-             arg("parameters"), arg("offset"), arg("scale"), arg("terms"), arg("own_terms_only"), arg("state"),
-             arg("elsewhere"), arg("tabulated").none());
+  module.def("find_missing", &find_missing, nb::kw_only(), arg("inputs"), arg("input_names"), arg("order"), arg("only"),
+             arg("without"), arg("instants"), arg("runs"), arg("simulated"), arg("measured"), arg("output_names"),
+             arg("predict").none(), arg("parameters"), arg("offset"), arg("scale"), arg("terms"), arg("own_terms_only"),
+             arg("held_out"), arg("seed"), arg("simulated_name"), arg("measured_name"), arg("report").none());
+  module.def("corrected", &corrected, nb::kw_only(), arg("inputs"), arg("input_names"), arg("order"), arg("only"),
+             arg("without"), arg("simulated"), arg("output_names"), arg("predict").none(), arg("parameters"),
+             arg("offset"), arg("scale"), arg("terms"), arg("own_terms_only"), arg("state"), arg("elsewhere"),
+             arg("tabulated").none());
 }
 
 }  // namespace llmt::python

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from llmt._results import Result, axes_of, html_table, names, number
-from llmt._columns import columns_of, records
+from llmt._results import Findings, draw_points, html_table, names, number, values_table
+from llmt.tables.named import columns_of
 
 
 @dataclass(frozen=True)
@@ -112,8 +112,12 @@ def _outputs(given: Any, rows: int, outputs: list[str], what: str) -> np.ndarray
     return np.ascontiguousarray(array)
 
 
-class Missing(Result):
+class Missing(Findings):
     """The terms that a simulation lacks. ``print`` shows the page of ``llmt discover``."""
+
+    _of_effect = ("name", "location", "output", "formula", "confirmed")
+    _sizes = ("share",)
+    _titles = {"formula": "term"}
 
     def __init__(self, made: Mapping[str, Any], question: dict[str, Any], kind: Any, callables: dict[str, Any]) -> None:
         super().__init__(made["text"], json.loads(made["json"]))
@@ -130,61 +134,16 @@ class Missing(Result):
         """The rows that took no part in the search."""
 
     @property
-    def verdict(self) -> str:
-        """``nothing missing``, ``named``, ``named, indistinguishable`` or ``unknown effect``."""
-        verdict: str = self._data["verdict"]
-        return verdict
-
-    @property
-    def effects(self) -> Any:
-        """The terms found: a row for each coefficient and constant, with its standard error."""
-        return records(
-            [
-                {
-                    "name": term["name"],
-                    "location": term["location"],
-                    "output": term["output"],
-                    "formula": term["formula"],
-                    "confirmed": term["confirmed"],
-                    "parameter": value["name"],
-                    "value": value["value"],
-                    "standard_error": value["std_error"],
-                    "unit": value["unit"],
-                    "share": term["share"],
-                    "rivals": ", ".join(term["rivals"]),
-                }
-                for term in self._data["effects"]
-                for value in term["parameters"]
-            ]
-        )
-
-    @property
     def parameters(self) -> Any:
         """The parameters of the simulation, fitted together with the terms."""
-        return records(
-            [
-                {
-                    "name": value["name"],
-                    "value": value["value"],
-                    "standard_error": value["std_error"],
-                    "unit": value["unit"],
-                }
-                for value in self._data["simulation"]
-            ]
-        )
-
-    @property
-    def gap(self) -> dict[str, Any]:
-        """Root mean square errors before and after on the rows set aside; of each output under ``outputs``."""
-        gap: dict[str, Any] = self._data["gap"]
-        return gap
+        return values_table(self._data["simulation"])
 
     def predict(self, inputs: Any, simulated: Any = None) -> Any:
         """The simulation with the terms found, at other inputs: an array of their rows, or rows x outputs if there are
         several. ``simulated``: its outputs there, where no callable was given."""
         from llmt import _core
 
-        rows, columns = _matrix(_without_labels(inputs, self._question["input_names"]), "inputs", "x")
+        rows, columns = _matrix(inputs, "inputs", "x")
         rows = _in_order(rows, columns, self._question["input_names"], _is_table(inputs))
         callable_ = self._callables["simulate"]
         if (simulated is None) == (callable_ is None):
@@ -215,16 +174,15 @@ class Missing(Result):
     def plot(self, ax: Any = None) -> Any:
         """Draws measured minus simulated on the rows set aside (all rows without any), before and after, of the first
         output. Returns the axes of matplotlib, ``ax`` if it is given."""
-        ax = axes_of(ax)
         rows = self.held_out if len(self.held_out) else np.arange(len(self.before))
+        gaps = {}
         for label, values in (("before", self.before), ("after", self.corrected)):
             gap = self._measured[rows, 0] - values[rows, 0]
-            ax.plot(rows, gap, ".", label=f"{label}, {np.sqrt(np.mean(gap**2)):.4g} root mean square")
+            gaps[f"{label}, {np.sqrt(np.mean(gap**2)):.4g} root mean square"] = gap
+        y = f"measured - simulated {self._question['output_names'][0]}"
+        title = "Rows set aside" if len(self.held_out) else "All rows"
+        ax = draw_points(ax, rows, gaps, x="row", y=y, title=title)
         ax.axhline(0.0, linewidth=0.5, color="black")
-        ax.set_xlabel("row")
-        ax.set_ylabel(f"measured - simulated {self._question['output_names'][0]}")
-        ax.set_title("Rows set aside" if len(self.held_out) else "All rows")
-        ax.legend()
         return ax
 
     @property
@@ -234,24 +192,11 @@ class Missing(Result):
         return line
 
     def _html_tables(self) -> list[str]:
-        effects = [
-            [term["formula"], value["name"], value["value"], value["std_error"], value["unit"]]
-            for term in self._data["effects"]
-            for value in term["parameters"]
-        ]
         gaps = [[g["output"], g["before"], g["after"], g["noise_floor"]] for g in self._data["gap"]["outputs"]]
         return [
-            html_table(["term", "parameter", "value", "standard error", "unit"], effects),
+            self._effects_html(),
             html_table(["output", "gap before", "after", "noise"], gaps),
         ]
-
-
-def _without_labels(inputs: Any, wanted: Sequence[str]) -> Any:
-    """A table with the columns that are wanted alone: others may hold words."""
-    if not _is_table(inputs) or not (isinstance(inputs, Mapping) or hasattr(inputs, "columns")):
-        return inputs
-    columns = columns_of(inputs, "inputs")
-    return {name: values for name, values in columns.items() if name in wanted} or columns
 
 
 def _in_order(rows: np.ndarray, columns: list[str], wanted: list[str], named: bool) -> np.ndarray:
@@ -308,24 +253,6 @@ def _parameters_of(parameters: Any) -> tuple[list[dict[str, Any]], bool]:
     return [parameter._given(f"p{k}") for k, parameter in enumerate(values)], True
 
 
-def _in_time(inputs: Any, time: str, group: str) -> tuple[np.ndarray, list[int], Any]:
-    """When rows were taken and the numbers of their runs, both empty where nothing is said, and the other columns."""
-    if group and not time:
-        raise ValueError("group needs time: the rows of a group follow each other in time")
-    if not time:
-        return np.empty(0), [], inputs
-    if not _is_table(inputs):
-        raise TypeError("time and group are columns of inputs, which must be a table then")
-    columns = dict(columns_of(inputs, "inputs"))
-    for name in [time, *([group] if group else [])]:
-        if name not in columns:
-            raise ValueError(f"inputs has no column {name!r}; there are {', '.join(columns)}")
-    instants = _matrix({time: columns.pop(time)}, "inputs", "x")[0][:, 0]
-    numbers: dict[Any, int] = {}
-    runs = [numbers.setdefault(value, len(numbers)) for value in columns.pop(group)] if group else []
-    return np.ascontiguousarray(instants), runs, columns
-
-
 def _search(
     simulate: Any,
     parameters: tuple[list[dict[str, Any]], bool],
@@ -335,8 +262,8 @@ def _search(
     *,
     allow: Any,
     order: str,
-    time: str,
-    group: str,
+    time: Any,
+    groups: Any,
     only: Any,
     without: Any,
     terms: Mapping[str, Any] | None,
@@ -347,10 +274,7 @@ def _search(
 ) -> Missing:
     from llmt import _core
 
-    instants, runs, others = _in_time(inputs, time, group)
-    if time and order:
-        raise ValueError("time says the order of the rows: order is not needed beside it")
-    rows, columns = _matrix(others, "inputs", "x")
+    rows, columns = _matrix(inputs, "inputs", "x")
     values, outputs = _matrix(measured, "measured", "y")
     if len(values) != len(rows):
         raise ValueError(f"inputs has {len(rows)} rows, measured has {len(values)}")
@@ -366,8 +290,6 @@ def _search(
         "inputs": np.ascontiguousarray(rows),
         "input_names": columns,
         "order": order,
-        "instants": instants,
-        "runs": runs,
         "only": names("only", only),
         "without": names("without", without),
         "output_names": outputs,
@@ -387,9 +309,11 @@ def _search(
             raise ValueError(f"simulated has the shape {start.shape}, measured has {values.shape}")
     question["simulated"] = np.ascontiguousarray(start)
     own = dict(terms or {})
+    instants, runs = _in_time(time, groups, len(rows), bool(order))
     made = _core.find_missing(
         **question,
-        time=time,
+        instants=instants,
+        runs=runs,
         measured=np.ascontiguousarray(values),
         predict=predict,
         terms=_own_terms(own, kind, question),
@@ -401,6 +325,22 @@ def _search(
     )
     callables = {"simulate": simulate, "terms": own, "parameters": parameters[1]}
     return Missing(made, {**question, "measured": values}, kind, callables)
+
+
+def _in_time(time: Any, groups: Any, n: int, has_order: bool) -> tuple[list[float], list[int]]:
+    """The instant of every row, and the number of its recording."""
+    if time is None:
+        if groups is not None:
+            raise ValueError("groups needs time: the rows of a group follow each other in time")
+        return [], []
+    if has_order:
+        raise ValueError("time says the order of the rows: order is not needed beside it")
+    instants = np.asarray(time, dtype=float)
+    labels = np.zeros(n) if groups is None else np.asarray(groups)
+    for name, values in (("time", instants), ("groups", labels)):
+        if values.shape != (n,):
+            raise ValueError(f"{name} has the shape {values.shape}, must be ({n},)")
+    return instants.tolist(), np.unique(labels, return_inverse=True)[1].tolist()
 
 
 def _in_order_of_outputs(rows: np.ndarray, found: list[str], outputs: list[str]) -> np.ndarray:
@@ -417,8 +357,8 @@ def discover(
     measured: Any,
     *,
     order: str = "",
-    time: str = "",
-    group: str = "",
+    time: Any = None,
+    groups: Any = None,
     only: Any = (),
     without: Any = (),
     terms: Mapping[str, Any] | None = None,
@@ -443,11 +383,13 @@ def discover(
         The outputs. The columns of an array are called y, or y0, y1, ...
     order : str
         Column that says in which order rows were measured; by default as they stand.
-    time, group : str
-        Columns of ``inputs`` that are no inputs: when each row was taken, for rows that follow each other in time, and
-        which recording it is of.
+    time : n numbers
+        When each row was taken, for rows of a log: they are averaged over blocks, whole stretches are set aside, and
+        noise that is alike in neighbouring rows is no evidence. Smooth inputs are taken for a log without it.
+    groups : n labels
+        The recording that each row is of; with ``time``.
     only, without : str or list of str
-        Families of built-in terms to try alone, or not to try.
+        Families of built-in terms to try alone, or to leave out.
     terms : dict
         Terms of your own: a callable of the inputs for each name, or (formula, callable).
     own_terms_only : bool
@@ -481,7 +423,7 @@ def discover(
         allow=(),
         order=order,
         time=time,
-        group=group,
+        groups=groups,
         only=only,
         without=without,
         terms=terms,
@@ -499,8 +441,8 @@ def find_missing(
     *,
     allow: Any = (),
     order: str = "",
-    time: str = "",
-    group: str = "",
+    time: Any = None,
+    groups: Any = None,
     only: Any = (),
     without: Any = (),
     terms: Mapping[str, Any] | None = None,
@@ -523,7 +465,7 @@ def find_missing(
         allow=allow,
         order=order,
         time=time,
-        group=group,
+        groups=groups,
         only=only,
         without=without,
         terms=terms,

@@ -39,8 +39,9 @@ def _padded(cell: str, width: int, column: int, is_header: bool) -> str:
     return cell.ljust(width) if column == 0 or is_header else cell.rjust(width)
 
 
-def table_of(rows: Sequence[dict[str, Any]], columns: Sequence[str]) -> Any:
-    """The rows as a pandas DataFrame, or as a Table without pandas."""
+def table_of(rows: Sequence[dict[str, Any]], columns: Sequence[str] = ()) -> Any:
+    """The rows as a pandas DataFrame, or as a Table without pandas. By default the columns are those of the first row."""
+    columns = columns or list(rows[0])
     try:
         import pandas
     except ImportError:

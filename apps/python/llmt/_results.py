@@ -7,6 +7,8 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from llmt._frames import table_of
+
 
 class Result:
     """The text of a task's page, and all that is known as a dict. Its state is plain: it can be copied and pickled."""
@@ -39,6 +41,59 @@ class Result:
         return "<div>" + paragraphs + "".join(self._html_tables()) + "</div>"
 
 
+class Findings(Result):
+    """What a search for missing effects found: the verdict, effects with their values, the error before and after."""
+
+    _of_effect: tuple[str, ...]  # keys of an effect that stand before those of its values in the table ``effects``
+    _sizes: tuple[str, ...]  # those that stand after them
+    _titles: Mapping[str, str]  # of the columns of the table in a notebook that say which effect it is, by their keys
+
+    @property
+    def verdict(self) -> str:
+        """``nothing missing``, ``named``, ``named, indistinguishable`` or ``unknown effect``."""
+        verdict: str = self._data["verdict"]
+        return verdict
+
+    @property
+    def effects(self) -> Any:
+        """What was found: a row for each value (coefficient, constant) of an effect, with its standard error."""
+        rows = [
+            {key: effect[key] for key in self._of_effect}
+            | _value(value, "parameter")
+            | {key: effect[key] for key in self._sizes}
+            | {"rivals": ", ".join(effect["rivals"])}
+            for effect in self._data["effects"]
+            for value in effect["parameters"]
+        ]
+        return table_of(rows, [*self._of_effect, "parameter", *_of_value, *self._sizes, "rivals"])
+
+    @property
+    def gap(self) -> dict[str, Any]:
+        """The error before and after on rows that took no part, and where it was."""
+        gap: dict[str, Any] = self._data["gap"]
+        return gap
+
+    def _effects_html(self) -> str:
+        rows = [
+            [*(effect[key] for key in self._titles), *_value(value, "parameter").values()]
+            for effect in self._data["effects"]
+            for value in effect["parameters"]
+        ]
+        return html_table([*self._titles.values(), "parameter", "value", "standard error", "unit"], rows)
+
+
+_of_value = ("value", "standard_error", "unit")
+
+
+def _value(of: Mapping[str, Any], name: str) -> dict[str, Any]:
+    return {name: of["name"], "value": of["value"], "standard_error": of["std_error"], "unit": of["unit"]}
+
+
+def values_table(values: Sequence[Mapping[str, Any]]) -> Any:
+    """``name``, ``value``, ``standard_error`` and ``unit`` of fitted parameters."""
+    return table_of([_value(value, "name") for value in values], ["name", *_of_value])
+
+
 def shown(value: Any) -> str:
     """A cell for people."""
     if value is None:
@@ -62,6 +117,22 @@ def axes_of(ax: Any) -> Any:
     from matplotlib import pyplot
 
     return pyplot.subplots()[1]
+
+
+def draw_points(
+    ax: Any, places: Any, values: Mapping[str, Any], *, x: str, y: str, title: str = "", lines: Mapping[str, float] = {}
+) -> Any:
+    """Draws the values of every label as points and ``lines`` as horizontal lines. Returns the axes of matplotlib."""
+    ax = axes_of(ax)
+    for label, of in values.items():
+        ax.plot(places, of, ".", label=label)
+    for label, level in lines.items():
+        ax.axhline(level, linestyle="--", label=label)
+    ax.set_xlabel(x)
+    ax.set_ylabel(y)
+    ax.set_title(title)
+    ax.legend()
+    return ax
 
 
 def number(name: str, value: Any, low: float, high: float, *, whole: bool = False) -> Any:

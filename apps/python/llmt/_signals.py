@@ -8,22 +8,34 @@ from typing import Any
 
 import numpy as np
 
-from llmt._columns import columns_of
 from llmt._results import Result, html_table, names, number
+from llmt.tables.named import columns_of
 
 
 class Signals(Result):
     """Rows of filtered signals and their derivatives. ``print()`` says what was done."""
 
-    def __init__(self, made: Mapping[str, Any], table: Any, inputs: Any, torques: Any) -> None:
+    def __init__(
+        self,
+        made: Mapping[str, Any],
+        table: Any,
+        inputs: Any,
+        torques: Any,
+        time: np.ndarray,
+        groups: np.ndarray | None,
+    ) -> None:
         super().__init__(made["text"], json.loads(made["json"]))
         self.table = table
         """The rows: group, time, positions, velocities, accelerations, torques, columns kept. A table of the kind that
         was given."""
         self.inputs = inputs
-        """The same without the torques."""
+        """Positions, velocities, accelerations and columns kept alone."""
         self.torques = torques
         """The torques alone."""
+        self.time = time
+        """In s, of each row: ``time`` of :func:`llmt.discover`."""
+        self.groups = groups
+        """The run of each row, or None: ``groups`` of :func:`llmt.discover`."""
         self.rows: np.ndarray = np.array(made["rows"], dtype=int)
         """The row of the log at the time of each row."""
 
@@ -36,7 +48,9 @@ class Signals(Result):
 
     def _html_tables(self) -> list[str]:
         in_log = self._data["noise_in_log"]
-        return [html_table(["column", "noise"], [[name, in_log.get(name, value)] for name, value in self.noise.items()])]
+        return [
+            html_table(["column", "noise"], [[name, in_log.get(name, value)] for name, value in self.noise.items()])
+        ]
 
 
 def _like(given: Any, columns: Mapping[str, Any]) -> Any:
@@ -62,14 +76,20 @@ def _number(value: Any, name: str, row: int) -> float:
     except (TypeError, ValueError):
         result = float("nan")
     if not np.isfinite(result):
-        raise ValueError(f"log, row {row}: column {name!r} is {value!r}, must be a finite number")
+        shown = repr(value) if isinstance(value, str) else str(value)
+        raise ValueError(f"log, row {row}: column {name!r} is {shown}, must be a finite number")
     return result
 
 
-def _numbers(columns: Mapping[str, list[Any]], wanted: list[str], rows: int) -> np.ndarray:
-    return np.array(
-        [[_number(value, name, row) for row, value in enumerate(columns[name])] for name in wanted], dtype=float
-    ).reshape(len(wanted), rows)
+def _numbers(columns: Mapping[str, Any], wanted: list[str], rows: int) -> np.ndarray:
+    made = np.empty((len(wanted), rows))
+    for k, name in enumerate(wanted):
+        cells = columns[name]
+        if isinstance(cells, np.ndarray) and cells.dtype.kind == "f" and np.isfinite(cells).all():
+            made[k] = cells
+        else:
+            made[k] = [_number(value, name, row) for row, value in enumerate(cells)]
+    return made
 
 
 def signals(
@@ -171,7 +191,7 @@ def signals(
             whole[name] = np.array([columns[name][row] for row in taken])
         else:
             whole[name] = np.ascontiguousarray(next(values))
-    inputs = {name: column for name, column in whole.items() if name not in torques}
-    return Signals(
-        made, _like(log, whole), _like(log, inputs), _like(log, {name: whole[name] for name in torques})
-    )
+    instant = time or "t"
+    inputs = {name: column for name, column in whole.items() if name not in (*torques, instant, group)}
+    forces = {name: whole[name] for name in torques}
+    return Signals(made, _like(log, whole), _like(log, inputs), _like(log, forces), whole[instant], whole.get(group))

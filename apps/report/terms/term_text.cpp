@@ -23,8 +23,9 @@ std::string value_text(const discovery::TermValue& value) {
 }
 
 std::string time_text(const discovery::TimeUse& time, const std::string& unit) {
-  std::string text = fmt::format("Rows in time, {} {} apart{}: ", number(time.step, 3), unit,
-                                 time.found_out ? " (found out: neighbouring rows deviate alike; --time COLUMN)" : "");
+  std::string text = fmt::format(
+      "Rows in time, {} {} apart{}: ", number(time.step, 3), unit,
+      time.found_out ? " (found out: the inputs are smooth along the rows; --time COLUMN names their time)" : "");
   text += time.rows_per_sample == 1
               ? fmt::format("{} are searched as they are.", time.samples)
               : fmt::format("{} means over {} rows each are searched.", time.samples, time.rows_per_sample);

@@ -81,7 +81,8 @@ void Csv::refuse_header_of_other_programs(std::string_view header) const {
   const auto refuse_header = [&](const char* why) {
     throw std::runtime_error(fmt::format("{}:{}: {}", name_, line_at(header_begin_), why));
   };
-  if (header.starts_with("sep=") && header.size() <= 5) {
+  const std::string_view bare = header.substr(0, header.find_last_not_of(" \t\r") + 1);
+  if (bare.starts_with("sep=") && bare.size() <= 5) {
     refuse_header("a line that names the separator of a spreadsheet is no header: delete it");
   }
   const bool is_all = !rows_precede_ && std::string_view(text_).find_first_not_of(

@@ -94,6 +94,10 @@ TEST(CsvPieces, AdviseOnCommentsAsTheWholeTextDoes) {
   EXPECT_TRUE(whole("#,a,b\n0,1,x\n2,3\n1,2,x\n").ends_with("the header has 3"));
 }
 
+TEST(CsvPieces, RefuseALineThatNamesTheSeparatorAsTheWholeTextDoes) {
+  EXPECT_TRUE(whole("sep=;\r\r\n1;2\n").ends_with("delete it"));
+}
+
 TEST(CsvPieces, LastPieceOfBlanksIsNoHeaderAlone) {
   const std::string text = "a\rb;c\n1;2\n\r";
   for (std::size_t bytes = 1; bytes < 20; ++bytes) EXPECT_EQ(all_cells(text, bytes), whole(text)) << bytes;

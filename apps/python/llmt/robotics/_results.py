@@ -7,13 +7,21 @@ import os
 from collections.abc import Mapping
 from typing import Any
 
-from llmt._results import Result, axes_of, html_table
-from llmt._columns import frame_of, records
+from llmt._frames import table_of
+from llmt._results import Findings, Result, draw_points, html_table
+from llmt.robotics._csv import frame_of
 from llmt.robotics._robot import Robot
 
 
 class RobotWarning(UserWarning):
     """What looks wrong with a robot's measurements, or was made up."""
+
+
+def _draw_errors(ax: Any, errors: Mapping[str, Any], title: str, lines: Mapping[str, float] = {}) -> Any:
+    count = len(next(iter(errors.values())))
+    ax = draw_points(ax, range(count), errors, x="measured point", y="position error, mm", title=title, lines=lines)
+    ax.set_ylim(bottom=0.0)
+    return ax
 
 
 class _RobotResult(Result):
@@ -40,7 +48,7 @@ class _WithRobot(_RobotResult):
     def poses(self) -> Any:
         """Distance in mm between model and measurement, a row for each measured point."""
         count = len(next(iter(self._errors.values())))
-        return records([{f"{name}_mm": errors[k] for name, errors in self._errors.items()} for k in range(count)])
+        return table_of([{f"{name}_mm": errors[k] for name, errors in self._errors.items()} for k in range(count)])
 
     def _where(self) -> str:
         raise NotImplementedError
@@ -48,16 +56,9 @@ class _WithRobot(_RobotResult):
     def plot(self, ax: Any = None) -> Any:
         """Draws the error of every point under each model, the points in the order of the table. Returns the axes of
         matplotlib, ``ax`` if it is given."""
-        ax = axes_of(ax)
-        for name, errors in self._errors.items():
-            mean = sum(errors) / len(errors)
-            ax.plot(range(len(errors)), errors, ".", label=f"{name}, mean {mean:.4f} mm")
-        ax.set_xlabel("measured point")
-        ax.set_ylabel("position error, mm")
-        ax.set_title(f"Error {self._where()}")
-        ax.set_ylim(bottom=0.0)
-        ax.legend()
-        return ax
+        count = len(next(iter(self._errors.values())))
+        errors = {f"{name}, mean {sum(of) / count:.4f} mm": of for name, of in self._errors.items()}
+        return _draw_errors(ax, errors, f"Error {self._where()}")
 
 
 class Calibration(_WithRobot):
@@ -71,7 +72,7 @@ class Calibration(_WithRobot):
     @property
     def parameters(self) -> Any:
         """``name``, ``unit``, ``value`` and ``standard_error`` of the identified parameters."""
-        return records(self._data["parameters"])
+        return table_of(self._data["parameters"])
 
     @property
     def errors(self) -> Any:
@@ -81,7 +82,7 @@ class Calibration(_WithRobot):
             for poses, figures in entry.items():
                 if figures is not None:
                     rows.append({"model": model, "poses": poses, **figures})
-        return records(rows)
+        return table_of(rows)
 
     def _where(self) -> str:
         return "on poses left out of the fit" if self._data["folds"] else "on the poses fitted"
@@ -95,46 +96,16 @@ class Calibration(_WithRobot):
         return [html_table(["model", "error on", "mean", "95 %", "largest"], rows)]
 
 
-class Discovery(_WithRobot):
+class Discovery(_WithRobot, Findings):
     """What a robot's description lacks. ``print`` shows the page of ``llmt-robot discover``."""
+
+    _of_effect = ("name", "location", "confirmed")
+    _sizes = ("rms_mm", "share")
+    _titles = {"name": "effect", "location": "at"}
 
     def __init__(self, made: Mapping[str, Any], has_test: bool) -> None:
         super().__init__(made)
         self._has_test = has_test
-
-    @property
-    def verdict(self) -> str:
-        """``nothing missing``, ``named``, ``named, indistinguishable`` or ``unknown effect``."""
-        verdict: str = self._data["verdict"]
-        return verdict
-
-    @property
-    def effects(self) -> Any:
-        """What was found: a row for each value of an effect, with its standard error."""
-        rows = []
-        for effect in self._data["effects"]:
-            for value in effect["parameters"]:
-                rows.append(
-                    {
-                        "name": effect["name"],
-                        "location": effect["location"],
-                        "confirmed": effect["confirmed"],
-                        "parameter": value["name"],
-                        "value": value["value"],
-                        "standard_error": value["std_error"],
-                        "unit": value["unit"],
-                        "rms_mm": effect["rms_mm"],
-                        "share": effect["share"],
-                        "rivals": ", ".join(effect["rivals"]),
-                    }
-                )
-        return records(rows)
-
-    @property
-    def gap(self) -> dict[str, Any]:
-        """Mean position errors before and after on poses that took no part, and where the error was."""
-        gap: dict[str, Any] = self._data["gap"]
-        return gap
 
     def _where(self) -> str:
         return "on the test poses" if self._has_test else "on all poses, those searched and those set aside"
@@ -146,15 +117,10 @@ class Discovery(_WithRobot):
         return blocks[1] if len(blocks) > 1 else blocks[0]
 
     def _html_tables(self) -> list[str]:
-        effects = [
-            [effect["name"], effect["location"], value["name"], value["value"], value["std_error"], value["unit"]]
-            for effect in self._data["effects"]
-            for value in effect["parameters"]
-        ]
         gap = self._data["gap"]
         errors = [[gap["before_mm"], gap["after_mm"], gap["noise_floor_mm"], gap["heldout_poses"]]]
         return [
-            html_table(["effect", "at", "parameter", "value", "standard error", "unit"], effects),
+            self._effects_html(),
             html_table(["mean error before, mm", "after, mm", "noise, mm", "poses set aside"], errors),
         ]
 
@@ -195,24 +161,19 @@ class Check(_RobotResult):
             for moved in self._data["moved"]
             for change in moved["changes"]
         ]
-        return records(rows)
+        return table_of(rows, ["name", "parameter", "by", "standard_error", "unit", "probability"])
 
     @property
     def poses(self) -> Any:
         """Distance in mm between model and measurement, a row for each measured point."""
-        return records([{"error_mm": error} for error in self._errors])
+        return table_of([{"error_mm": error} for error in self._errors])
 
     def plot(self, ax: Any = None) -> Any:
         """Draws the error of every point and the limit of their mean. Returns the axes of matplotlib."""
-        ax = axes_of(ax)
-        ax.plot(range(len(self._errors)), self._errors, ".", label=f"mean {self._data['error_mm']['mean']:.4f} mm")
-        ax.axhline(self._data["limit_mm"], linestyle="--", label=f"limit of the mean {self._data['limit_mm']:.4f} mm")
-        ax.set_xlabel("measured point")
-        ax.set_ylabel("position error, mm")
-        ax.set_title("Still good" if self.still_good else "No longer good")
-        ax.set_ylim(bottom=0.0)
-        ax.legend()
-        return ax
+        errors = {f"mean {self._data['error_mm']['mean']:.4f} mm": self._errors}
+        limit = self._data["limit_mm"]
+        title = "Still good" if self.still_good else "No longer good"
+        return _draw_errors(ax, errors, title, {f"limit of the mean {limit:.4f} mm": limit})
 
 
 def _html_of_csv(text: str, most: int = 20) -> str:
@@ -245,7 +206,7 @@ class PoseChoice(_RobotResult):
         """The standard error that a calibration is expected to leave of every parameter, with these poses and with
         random ones."""
         random = {entry["name"]: entry["standard_error"] for entry in self._data["random"]["parameters"]}
-        return records(
+        return table_of(
             [{**entry, "random_standard_error": random[entry["name"]]} for entry in self._data["chosen"]["parameters"]]
         )
 
@@ -286,10 +247,9 @@ class Commands(_RobotResult):
     def plot(self, ax: Any = None) -> Any:
         """Draws the distance of every target from the tool, with the start joints and with the commands, as the model
         has it. Returns the axes of matplotlib."""
-        ax = axes_of(ax)
-        ax.semilogy(self._before, ".", label="with the start joints")
-        ax.semilogy(self.commands["error_mm"], ".", label="with the commands")
-        ax.set_xlabel("target")
-        ax.set_ylabel("distance by the model, mm")
-        ax.legend()
+        distances = {"with the start joints": self._before, "with the commands": self.commands["error_mm"]}
+        ax = draw_points(
+            ax, range(len(self._before)), distances, x="target", y="distance by the model, mm", title="By the model"
+        )
+        ax.set_yscale("log")
         return ax

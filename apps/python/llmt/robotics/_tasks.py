@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from llmt._results import names, number
-from llmt._columns import Source, frame_of, source_of
+from llmt.robotics._csv import Source, frame_of, source_of
 from llmt.robotics._results import Calibration, Check, Commands, Discovery, PoseChoice, RobotWarning
 from llmt.robotics._robot import _extension
 from llmt.robotics._robot import robot as _robot_of

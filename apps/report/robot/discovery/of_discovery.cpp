@@ -52,6 +52,7 @@ std::string cause(const Discovery& found) {
     case discovery::Answer::indistinguishable:
       return fmt::format("The model lacks: {}; or something that looks alike at these poses", fmt::join(names, "; "));
     case discovery::Answer::unknown:
+    case discovery::Answer::failed_held_out:  // robots have judge_held_out_loss()
       break;
   }
   std::set<std::string> places;
@@ -227,6 +228,7 @@ Document discovery_report(const Discovered& of) {
       document.answer += fmt::format(": the error is {} mm, noise alone makes {} mm.", number(gap.before.mean, 3),
                                      number(found.held_out.floor_mm, 3));
       break;
+    case discovery::Answer::failed_held_out:
     case discovery::Answer::unknown:
       if (found.withdrawn) {
         document.answer += ". Nothing was added, because it would not make these poses better.";

@@ -36,9 +36,10 @@ struct MissingOptions {
   double held_out_share = 0.2;  ///< of the rows, set aside before anything is looked at; equal inputs keep together
   std::uint64_t seed = 1;       ///< of the rows set aside
   int rounds = 4;               ///< of search and nonlinear refit
-  Eigen::Index largest_sample = 4000;           ///< rows that are searched and fitted; of more a random part
-  SearchOptions search = {.model_error = 0.0};  ///< formulas of terms are meant as they stand
-  Progress progress = {};                       ///< the steps are "fitting", "searching, round 1", ...
+  Eigen::Index largest_sample = 4000;  ///< rows that are searched and fitted; of more a random part
+  /// Formulas of terms are meant as they stand, and each is a cause of its own.
+  SearchOptions search = {.model_error = 0.0, .member_materiality = 1e-3};
+  Progress progress = {};  ///< the steps are "fitting", "searching, round 1", ...
 };
 
 struct TermValue {
@@ -73,6 +74,7 @@ struct FoundTerm {
   double share = 0.0;  ///< of the explained sum of squares that goes with it alone
   /// The error on the samples set aside is smaller with it than without; true if there are none.
   bool shrinks_gap = true;
+  bool is_refuted = false;  ///< it makes that error larger, by more than chance allows for a term of its size
 };
 
 /// How rows in time were used, see find_missing().

@@ -32,7 +32,8 @@ Simulation tabulated(const Eigen::MatrixXd& simulated, const std::vector<std::st
 /// 5. Steps 3 and 4 are repeated at the new estimates, where what was found competes again, until the found set stays
 ///    the same. Of several outputs, each is weighted by the inverse of the scatter that is left of it.
 /// 6. The errors on the rows set aside are computed, once. A term that does not shrink them is not confirmed. If all
-///    terms together make them larger, the answer is failed_held_out.
+///    terms together make them larger, the terms that do it are refuted, and the steps are repeated without them and
+///    with other rows set aside; after the third failure the answer is failed_held_out.
 ///
 /// Terms that depend on earlier rows (ModelTerm::history) are tried after the others have been found, and stay where
 /// they explain better by SearchOptions::rival_margin.
@@ -42,8 +43,9 @@ Simulation tabulated(const Eigen::MatrixXd& simulated, const std::vector<std::st
 /// decimation, Gautier 1997). Blocks are as long as the inputs bear. Whole runs, or stretches of consecutive rows, are
 /// set aside. The correlation of what is left is measured after each round; scores count the share of samples that is
 /// independent, the null of random signs flips clusters of samples, and standard errors are inflated by
-/// 1 + 2 sum_k rho_k r_k (Bartlett 1935). Without instants, rows whose inputs are smooth along the table and whose
-/// deviations are alike in neighbours are taken for rows in time (TimeUse::found_out).
+/// 1 + 2 sum_k rho_k r_k (Bartlett 1935). Without instants, rows whose inputs are smooth along the table are taken for
+/// rows in time (TimeUse::found_out) where the inputs are noisy, where there are more than `largest_sample`, or where
+/// what is left is alike in neighbours.
 ///
 /// Throws std::invalid_argument for wrong shapes, names or options, values that are not finite, too few rows, inputs
 /// that determine a measured output exactly while they do not determine the simulation (it names them), and a

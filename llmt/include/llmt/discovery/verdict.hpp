@@ -63,7 +63,9 @@ struct SearchOptions {
   /// Share of the evidence by which causes may be worse than shapes and still be named: a shape that contains a cause
   /// explains always a little more.
   double shape_share = 0.0;
-  double materiality = 0.01;     ///< unique share of the explained sum of squares below which a family is left out
+  double materiality = 0.01;  ///< unique share of the explained sum of squares below which a family is left out
+  /// As `materiality`, of a single member of a family. 0: members are one cause together.
+  double member_materiality = 0.0;
   double tentative_share = 0.1;  ///< share of the explained sum of squares in generic candidates that casts doubt
   double largest_outlier_share = 0.15;
   int largest_set = 16;              ///< candidates at once

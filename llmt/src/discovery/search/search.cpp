@@ -93,15 +93,20 @@ Set prune(const Scoring& scoring, Set set, const SearchOptions& options) {
     const double error = press(set);
     double smallest = impossible;
     Set best;
-    for (const std::string& family : families_of(scoring, set)) {
-      const Set rest = without_family(scoring, set, family);
+    const auto consider = [&](const Set& rest, double materiality) {
       const double share = share_of(scoring, set, rest);
       const bool useless = press(rest) <= error;
       // A family that only helps together with others has a small share of its own, but none of them may go alone.
-      if ((useless || share < options.materiality) && share < smallest) {
+      if ((useless || share < materiality) && share < smallest) {
         smallest = share;
         best = rest;
       }
+    };
+    for (const std::string& family : families_of(scoring, set)) {
+      consider(without_family(scoring, set, family), options.materiality);
+    }
+    for (const std::size_t member : set) {
+      if (options.member_materiality > 0.0) consider(without(set, member), options.member_materiality);
     }
     if (smallest == impossible) break;
     set = best;

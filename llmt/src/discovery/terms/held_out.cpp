@@ -20,6 +20,18 @@ TermFit fit_without(const TermModel& model, const TermData& kept, const TermFit&
   return fit_terms(model, kept, fit.parameters, rest);
 }
 
+// Terms that change samples by C, a sum of squares in units of the variance of the noise, should shrink the sum of
+// squares there by C, with a standard deviation of 2 sqrt(C).
+struct Judgement {
+  double change = 0.0;
+  double shrunk = 0.0;
+
+  // Samples that terms hardly reach cannot judge them.
+  bool is_possible() const { return change > 4.0; }
+  bool shrinks() const { return shrunk > 0.0; }
+  bool refutes() const { return !shrinks() && shrunk < change - 6.0 * std::sqrt(change); }
+};
+
 // Rows of the samples that make up most of the growth of the error.
 std::vector<Eigen::Index> rows_of_growth(const Samples& samples, const Eigen::VectorXd& growth) {
   constexpr std::size_t most = 10;
@@ -43,20 +55,25 @@ void judge_held_out(const TermModel& model, const TermData& kept, const TermData
   if (held_out.samples.size() == 0 || settled.fit.placed.empty()) return;
   const Eigen::VectorXd before = squared_errors(model, held_out, baseline);
   const Eigen::VectorXd after = squared_errors(model, held_out, settled.fit);
-  if (after.sum() > before.sum()) missing.failing_rows = rows_of_growth(held_out.samples, after - before);
+  const Eigen::VectorXd change = scaled_residuals(model, held_out, baseline.parameters, baseline.placed) -
+                                 scaled_residuals(model, held_out, settled.fit.parameters, settled.fit.placed);
+  const double noise = std::pow(settled.verdict.noise, 2.0);
+  const Judgement all{change.squaredNorm() / noise, (before.sum() - after.sum()) / noise};
+  if (all.is_possible() && !all.shrinks()) missing.failing_rows = rows_of_growth(held_out.samples, after - before);
   const Eigen::MatrixXd simulated = model.simulated(settled.fit.parameters);
   for (std::size_t t = 0; t < settled.fit.placed.size(); ++t) {
     const PlacedTerm& placed = settled.fit.placed[t];
-    // What a term changes there, in units of the noise, is by how much the sum of squares should shrink; its standard
-    // deviation is twice the root of that. Samples that a term hardly reaches cannot judge it.
-    constexpr double judged = 4.0;
-    const double change = (stacked_signature(model, held_out, placed, simulated) * placed.coefficients).squaredNorm();
-    if (change < judged * std::pow(settled.verdict.noise, 2.0)) continue;
+    const Eigen::VectorXd own = stacked_signature(model, held_out, placed, simulated) * placed.coefficients;
+    Judgement judgement{own.squaredNorm() / noise, 0.0};
+    if (!judgement.is_possible()) continue;
     const double without = squared_errors(model, held_out, fit_without(model, kept, settled.fit, t)).sum();
+    judgement.shrunk = (without - after.sum()) / noise;
     for (FoundTerm& found : missing.found) {
       const bool is_this = found.term == placed.term && found.output_index == placed.output &&
                            found.constants.size() == placed.constants.size() && found.constants == placed.constants;
-      if (is_this) found.shrinks_gap = after.sum() < without;
+      if (!is_this) continue;
+      found.shrinks_gap = judgement.shrinks();
+      found.is_refuted = judgement.refutes();
     }
   }
 }

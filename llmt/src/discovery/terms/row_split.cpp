@@ -213,11 +213,19 @@ double noise_variance(const Eigen::VectorXd& values) {
   return third.square().mean() / 20.0;
 }
 
-bool is_smooth_along_rows(const Inputs& inputs) {
+AlongRows along_rows(const Inputs& inputs, const MissingOptions& options) {
   Piece all(inputs.values.rows());
   std::iota(all.begin(), all.end(), Eigen::Index{0});
   const std::vector<Smoothness> signals = smoothness_of({all}, inputs);
-  return !signals.empty() && 2 * std::ranges::count_if(signals, &Smoothness::is_smooth) >= std::ssize(signals);
+  const auto smooth = std::ranges::count_if(signals, &Smoothness::is_smooth);
+  if (signals.empty() || 2 * smooth < std::ssize(signals)) return AlongRows::independent;
+  // Settings that somebody chose have no noise; third differences of a signal of 30 rows a period are 1e-5 of it.
+  constexpr double visible = 1e-5;
+  const auto is_noisy = [](const Smoothness& signal) {
+    return signal.is_smooth() && signal.noise > visible * signal.variance;
+  };
+  const bool is_log = std::ranges::any_of(signals, is_noisy) || std::ssize(all) > options.largest_sample;
+  return is_log ? AlongRows::measured_signal : AlongRows::smooth;
 }
 
 RowSplit split_independent(const Inputs& inputs, const MissingOptions& options) {

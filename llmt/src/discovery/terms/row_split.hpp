@@ -30,7 +30,12 @@ RowSplit split_in_time(const Inputs& inputs, const MissingOptions& options);
 /// NaN for fewer than 4 values.
 double noise_variance(const Eigen::VectorXd& values);
 
-/// Whether rows follow each other as the inputs of a motion do: most inputs that vary are smooth along the rows.
-bool is_smooth_along_rows(const Inputs& inputs);
+/// Whether rows follow each other as those of a log do.
+enum class AlongRows {
+  independent,     ///< most inputs that vary jump from row to row
+  smooth,          ///< most inputs are smooth along the rows
+  measured_signal  ///< smooth, and with noise, or with more rows than a search takes: a log
+};
+AlongRows along_rows(const Inputs& inputs, const MissingOptions& options);
 
 }  // namespace llmt::discovery

@@ -14,13 +14,10 @@
 #include "discovery/terms/refuse.hpp"
 #include "discovery/terms/row_split.hpp"
 #include "discovery/terms/term_question.hpp"
-#include "llmt/discovery/rounds.hpp"
+#include "discovery/terms/term_rounds.hpp"
 
 namespace llmt::discovery {
 namespace {
-
-// A search, and the fit after it, count as this share of the work that is left: the number of rounds is not known.
-constexpr double share_of_half_a_round = 0.2;
 
 constexpr double unknown_number = std::numeric_limits<double>::quiet_NaN();
 
@@ -48,107 +45,6 @@ void check(const Simulation& simulation, const Inputs& inputs, const MeasuredOut
   if (options.largest_sample < fewest) {
     refuse("find_missing", fmt::format("largest_sample is {}, must be at least {}", options.largest_sample, fewest));
   }
-}
-
-// Root mean square of what is left of each output, in its own unit.
-Eigen::VectorXd scatter(const TermModel& model, const TermData& data, const TermFit& fit) {
-  const Eigen::MatrixXd predicted = means(model.predict(fit.parameters, fit.placed), data.samples);
-  Eigen::VectorXd sigma(data.measured.cols());
-  for (Eigen::Index o = 0; o < sigma.size(); ++o) {
-    const Eigen::VectorXd left = data.measured.col(o) - predicted.col(o);
-    sigma(o) = std::sqrt(left.squaredNorm() / static_cast<double>(left.size()));
-    if (!(sigma(o) > 0.0)) sigma(o) = 1.0;
-  }
-  return sigma;
-}
-
-std::vector<PlacedTerm> found_terms(const TermQuestion& question, const Verdict& verdict) {
-  std::vector<PlacedTerm> found;
-  for (const Finding& finding : verdict.findings) {
-    for (const FindingTerm& term : finding.terms) {
-      found.push_back(question.options[term.candidate]);
-      found.back().coefficients = term.values;
-    }
-  }
-  return found;
-}
-
-RoundSummary summary_of(const Settled& settled) {
-  RoundSummary summary;
-  for (const PlacedTerm& placed : settled.fit.placed) {
-    summary.names.insert(fmt::format("term {} on output {}", placed.term, placed.output));
-  }
-  summary.outliers.insert(settled.verdict.outliers.begin(), settled.verdict.outliers.end());
-  return summary;
-}
-
-// The share of the samples that is independent, of the outputs together.
-double share_of_independent(const TermModel& model, const TermData& data, const TermFit& fit) {
-  double shares = 0.0;
-  const std::vector<std::vector<double>> correlations =
-      correlations_of(data, scaled_residuals(model, data, fit.parameters, fit.placed));
-  for (const std::vector<double>& own : correlations) shares += independent_share(own);
-  return shares / static_cast<double>(correlations.size());
-}
-
-// The weights of the outputs, and the share of the samples that is independent, follow what each round leaves.
-Settled search_until_settled(const TermModel& model, TermData& data, const std::vector<Eigen::Index>& repeats,
-                             Settled settled, bool with_history, const MissingOptions& options, Work& work) {
-  const bool in_time = !data.stretches.empty();
-  constexpr int fewest_in_time = 8;
-  const RoundLimits limits{.most = in_time ? std::max(options.rounds, fewest_in_time) : options.rounds,
-                           .stop_at_repeat = in_time};
-  until_settled(limits, settled.rounds > 0 ? summary_of(settled) : RoundSummary{}, [&](int) {
-    if (settled.rounds > 0 && data.sigma.size() > 1) {
-      data.sigma = scatter(model, without_samples(data, settled.verdict.outliers), settled.fit);
-    }
-    work.begin(fmt::format("searching, round {}", ++settled.rounds));
-    settled.question = ask(model, data, settled.fit, repeats, settled.verdict.outliers, with_history);
-    settled.verdict = search(settled.question.evidence, settled.question.candidates, options.search);
-    work.did(share_of_half_a_round * work.left());
-    const TermData kept = without_samples(data, settled.verdict.outliers);
-    settled.fit = fit_terms(model, kept, settled.fit.parameters, found_terms(settled.question, settled.verdict));
-    if (retry_constants(model, kept, settled.fit)) {
-      settled.fit = fit_terms(model, kept, settled.fit.parameters, settled.fit.placed);
-    }
-    work.did(share_of_half_a_round * work.left());
-    RoundSummary summary = summary_of(settled);
-    if (in_time) {
-      const double share = share_of_independent(model, kept, settled.fit);
-      constexpr double same = 0.1;
-      summary.may_be_last = std::abs(share - data.independent_share) <= same * data.independent_share;
-      data.independent_share = share;
-    }
-    return summary;
-  });
-  return settled;
-}
-
-// Whether terms that depend on earlier rows explain better than what rows explain by themselves.
-bool needs_history(const TermModel& model, const Settled& plain, const Settled& with_history, double margin) {
-  const bool has_history = std::ranges::any_of(
-      with_history.fit.placed, [&](const PlacedTerm& placed) { return model.terms()[placed.term].history; });
-  if (!has_history) return false;
-  const bool names_more = plain.verdict.answer == Answer::unknown && with_history.verdict.answer != Answer::unknown;
-  return names_more || with_history.verdict.score_gain > plain.verdict.score_gain + margin;
-}
-
-// The terms of rows by themselves first, then those that depend on earlier rows beside them.
-Settled search_terms(const TermModel& model, TermData& data, const std::vector<Eigen::Index>& repeats,
-                     const TermFit& baseline, const MissingOptions& options, Work& work) {
-  Settled settled;
-  settled.fit = baseline;
-  settled = search_until_settled(model, data, repeats, std::move(settled), false, options, work);
-  if (std::ranges::any_of(model.terms(), &ModelTerm::history)) {
-    TermData again = data;
-    const Settled other = search_until_settled(model, again, repeats, settled, true, options, work);
-    if (needs_history(model, settled, other, options.search.rival_margin)) {
-      data = again;
-      settled = other;
-    }
-  }
-  set_trial_errors(model, without_samples(data, settled.verdict.outliers), settled.fit);
-  return settled;
 }
 
 double rms_at(const Eigen::VectorXd& errors, const Samples& samples) {
@@ -214,10 +110,11 @@ double correlation_time(const RowSplit& split, const Eigen::MatrixXd& deviations
   return split.step * longest;
 }
 
-Missing find(const Simulation& simulation, const Inputs& inputs, const MeasuredOutputs& measured,
-             const std::vector<ModelTerm>& terms, const MissingOptions& options) {
+Missing search_once(const Simulation& simulation, const Inputs& inputs, const MeasuredOutputs& measured,
+                    const std::vector<ModelTerm>& terms, const MissingOptions& options,
+                    const std::set<std::size_t>& refuted) {
   const bool in_time = inputs.instants.size() > 0;
-  const TermModel model(simulation, inputs, measured.names, terms);
+  const TermModel model(simulation, inputs, measured.names, terms, refuted);
   const RowSplit split = in_time ? split_in_time(inputs, options) : split_independent(inputs, options);
   const Eigen::Index d = measured.values.cols();
   TermData data = data_of(split.searched, measured);
@@ -283,13 +180,34 @@ Missing find(const Simulation& simulation, const Inputs& inputs, const MeasuredO
   return missing;
 }
 
-// Whether rows follow each other in time although nobody said so: the inputs are smooth along them, and what is left
-// is alike in neighbours.
-bool follow_in_time(const Inputs& inputs, const MeasuredOutputs& measured, const Missing& missing) {
-  constexpr Eigen::Index fewest = 100;
+// Searches until what is found holds on the rows set aside. Terms that are refuted there are no candidates of the next
+// search, which sets other rows aside.
+Missing find(const Simulation& simulation, const Inputs& inputs, const MeasuredOutputs& measured,
+             const std::vector<ModelTerm>& terms, MissingOptions options) {
+  constexpr int most = 3;
+  std::set<std::size_t> refuted;
+  std::vector<std::string> notes;
+  for (int trial = 1;; ++trial) {
+    Missing missing = search_once(simulation, inputs, measured, terms, options, refuted);
+    if (missing.answer != Answer::failed_held_out || trial == most) {
+      missing.notes.insert(missing.notes.begin(), notes.begin(), notes.end());
+      return missing;
+    }
+    for (const FoundTerm& found : missing.found) {
+      if (!found.is_refuted) continue;
+      refuted.insert(found.term);
+      notes.push_back(fmt::format("{} was found and taken back: it makes the error on rows set aside larger",
+                                  found.generic ? "an error pattern of " + found.location
+                                                : fmt::format("{} {}", found.family, found.location)));
+    }
+    ++options.seed;
+  }
+}
+
+// Whether what is left is alike in neighbouring rows.
+bool is_alike_in_neighbours(const MeasuredOutputs& measured, const Missing& missing) {
   constexpr double alike = 0.6;  // independent share
-  const Eigen::Index n = inputs.values.rows();
-  if (!inputs.order.empty() || n < fewest || !is_smooth_along_rows(inputs)) return false;
+  const Eigen::Index n = measured.values.rows();
   const std::vector<Eigen::Index> one_stretch(n, 0);
   std::vector<bool> used(n, true);
   for (const Eigen::Index row : missing.outliers) used[row] = false;
@@ -306,8 +224,14 @@ Missing find_missing(const Simulation& simulation, const Inputs& inputs, const M
                      const std::vector<ModelTerm>& terms, const MissingOptions& options) {
   check(simulation, inputs, measured, options);
   refuse_determined(simulation, inputs, measured);
-  Missing missing = find(simulation, inputs, measured, terms, options);
-  if (inputs.instants.size() > 0 || !follow_in_time(inputs, measured, missing)) return missing;
+  constexpr Eigen::Index fewest = 100;  // rows that are taken for a log although nobody said so
+  const bool is_told = inputs.instants.size() > 0 || !inputs.order.empty() || inputs.values.rows() < fewest;
+  const AlongRows rows = is_told ? AlongRows::independent : along_rows(inputs, options);
+  Missing missing;
+  if (rows != AlongRows::measured_signal) {
+    missing = find(simulation, inputs, measured, terms, options);
+    if (rows == AlongRows::independent || !is_alike_in_neighbours(measured, missing)) return missing;
+  }
   Inputs in_time = inputs;
   in_time.instants =
       Eigen::VectorXd::LinSpaced(inputs.values.rows(), 0.0, static_cast<double>(inputs.values.rows() - 1));

@@ -129,11 +129,12 @@ std::vector<std::vector<double>> correlations_of(const TermData& data, const Eig
 }
 
 TermModel::TermModel(const Simulation& simulation, const Inputs& inputs, std::vector<std::string> outputs,
-                     const std::vector<ModelTerm>& terms)
+                     const std::vector<ModelTerm>& terms, std::set<std::size_t> refuted)
     : simulation_(&simulation),
       inputs_(&inputs),
       outputs_(std::move(outputs)),
       terms_(&terms),
+      refuted_(std::move(refuted)),
       rows_(rows_of(inputs, Eigen::VectorXd::Zero(inputs.values.rows()))) {}
 
 Eigen::MatrixXd TermModel::evaluate(const Eigen::VectorXd& values) const {

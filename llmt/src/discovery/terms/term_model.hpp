@@ -1,6 +1,7 @@
 // A simulation with terms added: prediction, refit, trial of constants.
 #pragma once
 
+#include <set>
 #include <vector>
 
 #include "discovery/terms/samples.hpp"
@@ -22,9 +23,11 @@ struct PlacedTerm {
 class TermModel {
  public:
   TermModel(const Simulation& simulation, const Inputs& inputs, std::vector<std::string> outputs,
-            const std::vector<ModelTerm>& terms);
+            const std::vector<ModelTerm>& terms, std::set<std::size_t> refuted = {});
 
   const std::vector<ModelTerm>& terms() const { return *terms_; }
+  /// Terms that were refuted are no candidates.
+  bool is_refuted(std::size_t term) const { return refuted_.contains(term); }
   const std::vector<Parameter>& parameters() const { return simulation_->parameters; }
   const std::vector<std::string>& outputs() const { return outputs_; }
 
@@ -46,6 +49,7 @@ class TermModel {
   const Inputs* inputs_;
   std::vector<std::string> outputs_;
   const std::vector<ModelTerm>* terms_;
+  std::set<std::size_t> refuted_;
   mutable Rows rows_;
   mutable Eigen::VectorXd last_values_;
   mutable Eigen::MatrixXd last_;

@@ -120,6 +120,7 @@ TermQuestion ask(const TermModel& model, const TermData& data, const TermFit& fi
   for (const std::size_t sample : outliers) ground.residuals.segment(sample * d, d).setZero();
   for (std::size_t t = 0; t < model.terms().size(); ++t) {
     const ModelTerm& term = model.terms()[t];
+    if (model.is_refuted(t)) continue;
     if (term.history && !(with_history && tells_in_time(term, data))) continue;
     for (Eigen::Index o = 0; o < d; ++o) {
       if (!term.output.empty() && term.output != model.outputs()[o]) continue;

@@ -12,7 +12,7 @@ namespace {
 // Fast columns are judged by rows that stand nearer in time.
 constexpr double smallest_share_kept = 0.3;
 // A term that a handful of samples carry, at the end of a range, says more of these samples than of a cause.
-constexpr double fewest_carriers = 5.0;
+constexpr double fewest_carriers = 3.0;
 
 // The sum of squares that a term explains at one constant, beyond the nuisance.
 class Trials {
