@@ -15,6 +15,7 @@ void add_inspect(CLI::App& app);
 void add_explain(CLI::App& app);
 void add_compare(CLI::App& app);
 void add_discover(CLI::App& app);
+void add_signals(CLI::App& app);
 void add_export(CLI::App& app);
 
 }  // namespace llmt::apps

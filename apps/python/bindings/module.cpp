@@ -12,5 +12,6 @@ NB_MODULE(_core, module) {
   llmt::python::add_models(module);
   llmt::python::add_fitting(module);
   llmt::python::add_found(module);
+  llmt::python::add_signals(module);
   llmt::python::add_terms(module);
 }

@@ -10,6 +10,7 @@ void add_arrow(nanobind::module_& module);
 void add_fitting(nanobind::module_& module);
 void add_found(nanobind::module_& module);
 void add_models(nanobind::module_& module);
+void add_signals(nanobind::module_& module);
 void add_terms(nanobind::module_& module);
 
 /// Of the module _robotics.

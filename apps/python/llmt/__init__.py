@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from ._found import load_found as load_found
     from ._estimator import LocalLinearTreeRegressor as LocalLinearTreeRegressor
     from ._model import Model as Model
+    from ._signals import Signals as Signals
+    from ._signals import signals as signals
 
     __version__: str
 
@@ -34,10 +36,12 @@ _homes = {
     "Missing": "_discover",
     "Model": "_model",
     "Parameter": "_discover",
+    "Signals": "_signals",
     "__version__": "_core",
     "discover": "_discover",
     "find_missing": "_discover",
     "load_found": "_found",
+    "signals": "_signals",
 }
 
 __all__ = [
@@ -46,10 +50,12 @@ __all__ = [
     "Missing",
     "Model",
     "Parameter",
+    "Signals",
     "__version__",
     "discover",
     "find_missing",
     "load_found",
+    "signals",
 ]
 
 

@@ -192,6 +192,12 @@ class Missing(Findings):
 
         return Found(self._data).code(language)
 
+    def mujoco(self, spec: Any) -> tuple[Any, Callable[[Any, Any], None] | None]:
+        """A copy of a specification of MuJoCo with what was found, and a callback: :func:`llmt.mujoco.apply`."""
+        from llmt.mujoco import apply
+
+        return apply(self, spec)
+
     def plot(self, ax: Any = None) -> Any:
         """Draws measured minus simulated on the rows set aside (all rows without any), before and after, of the first
         output. Returns the axes of matplotlib, ``ax`` if it is given."""

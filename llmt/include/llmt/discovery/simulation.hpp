@@ -61,7 +61,8 @@ Simulation linearised(Simulation simulation, const Eigen::MatrixXd& simulated, s
 ///   sum_o n ln(RSS_o at the nominal values / RSS_o fitted) - k ln(n d) > 0,
 /// and a likelihood ratio as large as theirs has a probability below SearchOptions::false_alarm_rate in noise.
 ///
-/// Throws std::invalid_argument for wrong shapes, names or options, values that are not finite, too few rows, and a
+/// Throws std::invalid_argument for wrong shapes, names or options, values that are not finite, too few rows, inputs
+/// that determine a measured output exactly while they do not determine the simulation (it names them), and a
 /// prediction or a term that has the wrong shape or is not finite, naming it.
 Missing find_missing(const Simulation& simulation, const Inputs& inputs, const MeasuredOutputs& measured,
                      const std::vector<ModelTerm>& terms, const MissingOptions& options = {});

@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "discovery/terms/correlation.hpp"
+#include "discovery/terms/determined.hpp"
 #include "discovery/terms/fitted_parameters.hpp"
 #include "discovery/terms/held_out.hpp"
 #include "discovery/terms/missing_findings.hpp"
@@ -232,6 +233,7 @@ bool is_alike_in_neighbours(const MeasuredOutputs& measured, const Missing& miss
 Missing find_missing(const Simulation& simulation, const Inputs& inputs, const MeasuredOutputs& measured,
                      const std::vector<ModelTerm>& terms, const MissingOptions& options) {
   check(simulation, inputs, measured, options);
+  refuse_determined(simulation, inputs, measured);
   constexpr Eigen::Index fewest = 100;  // rows that are taken for a log although nobody said so
   const bool is_told = inputs.instants.size() > 0 || !inputs.order.empty() || inputs.values.rows() < fewest;
   const AlongRows rows = is_told ? AlongRows::independent : along_rows(inputs, options);

@@ -1,0 +1,189 @@
+"""What was found, put into a model."""
+
+from __future__ import annotations
+
+import copy
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from llmt._discover import Missing
+
+from ._models import _BODY_KINDS, _compiled, _places, _positions, _set, _value
+
+Force = Callable[[float], float]
+
+
+def _functions() -> dict[str, Callable[..., Any]]:
+    """Terms of one input x, and of a constant c, without their coefficient."""
+    return {
+        "linear": lambda x: x,
+        "square": lambda x: x * x,
+        "cube": lambda x: x**3,
+        "absolute": abs,
+        "sign": np.sign,
+        "signed_square": lambda x: x * abs(x),
+        "step": lambda x, c: float(x > c),
+        "hinge": lambda x, c: max(0.0, x - c),
+        "hinge_below": lambda x, c: max(0.0, c - x),
+        "tanh": lambda x, c: np.tanh(x / c),
+        "asinh": lambda x, c: np.arcsinh(x / c),
+        "stribeck": lambda x, c: np.sign(x) * np.exp(-((x / c) ** 2)),
+    }
+
+
+class _Correction:
+    """What is added to a model while it runs: forces, and friction that depends on the velocity."""
+
+    def __init__(self) -> None:
+        self.forces: list[tuple[int, str, int, Force]] = []  # joint it acts on, "q" or "dq", joint it depends on
+        self.frictions: list[tuple[int, Force]] = []
+        self.friction_base: dict[int, float] = {}
+
+    def __bool__(self) -> bool:
+        return bool(self.forces or self.frictions)
+
+    def __call__(self, model: Any, data: Any) -> None:
+        """To be called before each step, after ``qfrc_applied`` has been set."""
+        for joint, what, other, force in self.forces:
+            state = data.qpos if what == "q" else data.qvel
+            data.qfrc_applied[joint] -= force(float(state[other]))
+        friction = dict(self.friction_base)
+        for joint, function in self.frictions:
+            friction[joint] += function(float(data.qvel[joint]))
+        for joint, value in friction.items():
+            model.dof_frictionloss[joint] = max(0.0, value)
+
+
+def _first(joint: Any, field: str) -> float:
+    return float(np.ravel(getattr(joint, field))[0])
+
+
+def _add(joint: Any, field: str, change: float) -> None:
+    """Fields that are polynomials in newer versions of MuJoCo have the linear coefficient first."""
+    value = np.array(getattr(joint, field), dtype=float)
+    if value.ndim == 0:
+        setattr(joint, field, float(value) + change)
+    else:
+        value[0] += change
+        setattr(joint, field, value)
+
+
+def apply(found: Missing, spec: Any) -> tuple[Any, Callable[[Any, Any], None] | None]:
+    """A copy of the specification with what was found by :func:`llmt.discover` with :func:`inverse_dynamics`, and a
+    callback for what has no field in it (None: nothing).
+
+    Parameters are set. A term of the needed torque is a force that the model lacks, with the other sign. Of the joint's
+    own motion: ``dq`` goes to ``damping``, ``sign(dq)`` to ``frictionloss``, ``ddq`` to ``armature``, ``q`` to
+    ``stiffness``; friction that falls with speed becomes a ``frictionloss`` that the callback sets; other functions of a
+    position or velocity become forces. ``callback(model, data)`` is to be called before each ``mj_step``, after
+    ``qfrc_applied`` has been set. What MuJoCo cannot take (gains, shapes without a name, other terms of accelerations
+    or of several inputs) is left out with a warning that names it.
+    """
+    question = found._question
+    positions = _positions(question["input_names"])
+    outputs = list(question["output_names"])
+    nominal = _compiled(spec)
+    if len(positions) != nominal.nv or len(outputs) != nominal.nv:
+        raise ValueError(
+            f"the model has {nominal.nv} joints, the result has {len(positions)} positions, {len(outputs)} outputs"
+        )
+    fixed = spec.copy()
+    joints = {joint.name: joint for joint in fixed.joints}
+    spec_joints = [
+        joints[nominal.joint(k).name] if nominal.joint(k).name in joints else fixed.joints[k] for k in range(nominal.nv)
+    ]
+    _set_spec(fixed, spec_joints, nominal, _fitted(found, nominal))
+    correction = _Correction()
+    left_out = []
+    for term in found.to_dict()["effects"]:
+        values = [parameter["value"] for parameter in term["parameters"]]
+        if not _add_term(term, values, positions, outputs.index(term["output"]), spec_joints, correction):
+            left_out.append(
+                f"{term['name']} of {term['location'] or 'the output'} ({term['formula']}) on {term['output']}"
+            )
+    if left_out:
+        warnings.warn(f"MuJoCo cannot take, left out: {'; '.join(left_out)}", stacklevel=2)
+    for joint, _ in correction.frictions:
+        correction.friction_base[joint] = _first(spec_joints[joint], "frictionloss")
+    return fixed, correction if correction else None
+
+
+def _fitted(found: Missing, nominal: Any) -> dict[str, float]:
+    """Values by parameter. Of parameters that the rows do not tell apart, "a + b", the first one takes the change."""
+    data = found.to_dict()
+    values: dict[str, float] = {}
+    places = _places(nominal)
+    for parameter in data.get("parameters", data.get("simulation", [])):
+        name = parameter["name"]
+        first = name if name in places else name.split(" + ")[0].split(" - ")[0]
+        if first not in places:
+            raise ValueError(f"{name!r} is no parameter of the model; there are {', '.join(places)}")
+        change = parameter.get("change")
+        values[first] = parameter["value"] if change is None else _value(nominal, places[first]) + change
+    return values
+
+
+def _set_spec(fixed: Any, joints: Sequence[Any], nominal: Any, values: Mapping[str, float]) -> None:
+    model = copy.copy(nominal)
+    _set(model, nominal, values)
+    places = _places(nominal)
+    bodies = set()
+    for name, value in values.items():
+        kind, number, _ = places[name]
+        if kind in _BODY_KINDS:
+            bodies.add(number)
+        else:
+            _add(joints[number], kind, value - _first(joints[number], kind))
+    for number in bodies:
+        body = fixed.body(nominal.body(number).name) if nominal.body(number).name else fixed.bodies[number]
+        body.explicitinertial = True
+        body.mass = float(model.body_mass[number])
+        body.ipos = model.body_ipos[number]
+        body.iquat = model.body_iquat[number]
+        body.inertia = model.body_inertia[number]
+        body.fullinertia = np.full(6, np.nan)
+
+
+def _add_term(
+    term: Mapping[str, Any],
+    values: list[float],
+    positions: list[str],
+    joint: int,
+    joints: Sequence[Any],
+    correction: _Correction,
+) -> bool:
+    """Whether MuJoCo can take the term."""
+    family, place = term["name"], term["location"]
+    if family == "offset":
+        correction.forces.append((joint, "q", joint, lambda _: values[0]))
+        return True
+    function = _functions().get(family)
+    own = positions[joint]
+    if function is None:
+        return False
+    field = {
+        ("linear", f"d{own}"): "damping",
+        ("linear", f"dd{own}"): "armature",
+        ("sign", f"d{own}"): "frictionloss",
+        ("linear", own): "stiffness",
+    }.get((family, place))
+    if field is not None:
+        is_possible = _first(joints[joint], field) + values[0] >= 0.0
+        if field == "stiffness":
+            is_possible = is_possible and float(joints[joint].springref) == 0.0
+        if is_possible:
+            _add(joints[joint], field, values[0])
+            return True
+    if family == "stribeck" and place == f"d{own}":
+        coefficient, speed = values
+        correction.frictions.append((joint, lambda v: coefficient * float(np.exp(-((v / speed) ** 2)))))
+        return True
+    for what, prefix in (("q", ""), ("dq", "d")):
+        for other, name in enumerate(positions):
+            if place == prefix + name:
+                correction.forces.append((joint, what, other, lambda x: float(values[0] * function(x, *values[1:]))))
+                return True
+    return False
