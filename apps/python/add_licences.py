@@ -35,8 +35,10 @@ def main(wheel: Path, files: list[Path]) -> None:
         bundled.mkdir(parents=True)
         owned = [of_system(path.name) for path in (root / "llmt.libs").iterdir()]
         for file in owned + files:
-            if "LICENSE" in file.name:
+            if file.name == "LICENSE":
                 name, text = file.parents[1].name.split("-")[0], file
+            elif file.name == "copyright":
+                name, text = file.parent.name, file
             else:
                 name = package_of(file)
                 text = Path(f"/usr/share/doc/{name}/copyright")

@@ -39,7 +39,7 @@ for python in "$@"; do
     # The headers are of libraries that are compiled in.
     include=/usr/include
     "$work/tools/bin/python" apps/python/add_licences.py "$work"/repaired/llmt-*.whl $include/eigen3/Eigen/Core \
-      $include/fast_float/fast_float.h $include/nlohmann/json.hpp $include/boost/math/special_functions.hpp \
+      $include/fast_float/fast_float.h $include/nlohmann/json.hpp /usr/share/doc/libboost-dev/copyright \
       "$builders"/nanobind-*.dist-info/licenses/LICENSE >&2
     mkdir -p build/wheels
     mv "$work"/repaired/llmt-*.whl build/wheels
