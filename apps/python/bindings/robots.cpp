@@ -11,6 +11,7 @@
 
 #include "llmt/files.hpp"
 #include "llmt/robotics/robot_file.hpp"
+#include "python/bindings/errors.hpp"
 #include "python/bindings/module.hpp"
 #include "report/text/json.hpp"
 
@@ -100,7 +101,7 @@ std::vector<std::string> save(const Arm& arm, const std::string& path, const std
   }
   files.push_back({yaml, robotics::to_yaml(robot)});
   if (yaml != path) files.push_back({path, urdf_of(arm)});
-  write_files(files);
+  write_or_raise(files);
   std::vector<std::string> names;
   for (const NewFile& file : files) names.push_back(file.path);
   return names;

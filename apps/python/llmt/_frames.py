@@ -60,8 +60,9 @@ def leaves_frame(model: dict[str, Any], handle: Any = None) -> Any:
     leaves as given as well. NaN: the leaf's rows do not determine the coefficient; it is then that of a larger region.
     """
     rows = []
-    names = _merged(tree.regressor_names for tree in trees(model))
-    for tree in trees(model):
+    all_trees = trees(model, handle=handle)
+    names = _merged(tree.regressor_names for tree in all_trees)
+    for tree in all_trees:
         for leaf in tree.leaves:
             for o, target in enumerate(tree.targets):
                 intercept_se, errors = tree.standard_errors(leaf, o)
@@ -89,7 +90,7 @@ def rules_frame(model: dict[str, Any], handle: Any = None) -> Any:
     is a mean of the equations of several leaves, so that rules would not be the model.
     """
     rows = []
-    for tree in trees(model):
+    for tree in trees(model, handle=handle):
         if tree.is_smooth:
             raise ValueError(
                 f"the {len(tree.leaves)} leaves of {', '.join(tree.targets)} are blended: a prediction is a mean of "

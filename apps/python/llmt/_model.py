@@ -5,6 +5,7 @@ import os
 from typing import Any
 
 from . import _core
+from ._files import write_text
 
 
 class Model:
@@ -53,15 +54,7 @@ class Model:
 
     def save(self, path: "str | os.PathLike[str]") -> None:
         """Writes the file that `llmt predict` reads. A failed write leaves an old file as it was."""
-        beside = f"{os.fspath(path)}.partial"
-        try:
-            with open(beside, "w", encoding="utf-8") as file:
-                file.write(self._text)
-            os.replace(beside, path)
-        except OSError:
-            if os.path.exists(beside):
-                os.remove(beside)
-            raise
+        write_text(path, self._text)
 
     @classmethod
     def load(cls, path: "str | os.PathLike[str]") -> "Model":

@@ -1,10 +1,8 @@
-"""The tree of a model file in the words of a person: conditions, equations, numbers with the digits that they need.
-
-The texts are those of `llmt rules`, made from the JSON of a model (docs/file-formats.md).
-"""
+"""The tree of a model file for people: conditions and equations in the words of `llmt rules`, and what is drawn of it."""
 
 from __future__ import annotations
 
+import json
 import math
 import unicodedata
 from collections.abc import Callable, Mapping
@@ -13,50 +11,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-_MUCH_SHORTER = 4  # a list of the levels that are not meant is shown where it is this many times shorter
+from . import _core
+from ._core import decimal as decimal
+
 _ANY_VALUE = float(np.finfo(float).max)  # threshold of a split into rows with and without a value
-_USUAL_DIGITS = 5
-_MOST_DIGITS = 12
-
-
-def decimal(value: float, tolerance: float | None = None) -> str:
-    """The number with as few digits as say it to within `tolerance`; without one, up to rounding.
-
-    Numbers that would need more than 12 digits get 5.
-    """
-    tolerance = 1e-13 * abs(value) if tolerance is None else tolerance
-    if not math.isfinite(value):
-        return str(value)
-    if abs(value) <= tolerance:
-        return "0"
-    for digits in range(1, _MOST_DIGITS + 1):
-        text = _with_digits(value, digits)
-        if abs(float(text) - value) <= tolerance:
-            return text
-    return _with_digits(value, _USUAL_DIGITS)
-
-
-def _with_digits(value: float, digits: int) -> str:
-    magnitude = abs(value)
-    if magnitude < 1e-5 or magnitude >= 1e9:
-        return f"{value:.{digits}g}"
-    before_point = 1 + math.floor(math.log10(magnitude))
-    text = f"{value:.{max(0, digits - before_point)}f}"
-    return text.rstrip("0").rstrip(".") if "." in text else text
 
 
 def number(value: float | None, digits: int = 4) -> str:
     """The number rounded to significant digits; "-" for None and NaN."""
-    if value is None or math.isnan(value):
-        return "-"
-    if not math.isfinite(value) or value == 0.0:
-        return str(value) if value else "0"
-    text = f"{value:.{digits}g}"
-    return (
-        f"{float(text):.{max(0, digits - 1 - math.floor(math.log10(abs(value))))}f}"
-        if 1e-4 <= abs(value) < 1e6
-        else text
-    )
+    return "-" if value is None else _core.number(value, digits)
 
 
 def shown(name: str, most: int = 60) -> str:
@@ -97,8 +60,10 @@ class Leaf:
 class Tree:
     """One partition of a model. Several targets may share it."""
 
-    def __init__(self, model: dict[str, Any], partition: int = 0, show: Callable[[str], str] = str) -> None:
-        """`show` makes of a name what stands in the texts."""
+    def __init__(
+        self, model: dict[str, Any], partition: int = 0, show: Callable[[str], str] = str, handle: Any = None
+    ) -> None:
+        """`show` makes of a name what stands in the texts. `handle`: the `_core.Model` of the model, if there is one."""
         self.inputs: list[dict[str, Any]] = [
             {**of, "name": show(of["name"]), "levels": [show(name) for name in level_names(of)]}
             for of in model["inputs"]
@@ -111,8 +76,17 @@ class Tree:
         ]
         self.targets: list[str] = [output["name"] for output in self.outputs]
         self.centres = np.array([regressor["centre"] for regressor in self.regressors], dtype=float)
-        self.regressor_names = [self._regressor_name(regressor) for regressor in self.regressors]
-        self.leaves = self._leaves()
+        self._words = _core.Words(
+            handle or _handle_of(model),
+            partition,
+            [of["name"] for of in self.inputs],
+            [of["levels"] for of in self.inputs],
+        )
+        self.regressor_names = self._words.regressors()
+        self.leaves = [
+            self._leaf(node, number, conditions)
+            for number, (node, conditions) in enumerate(self._words.leaves(), start=1)
+        ]
 
     @property
     def is_smooth(self) -> bool:
@@ -121,28 +95,8 @@ class Tree:
 
     def condition(self, node: int, left: bool, tolerances: Mapping[int, float] | None = None) -> Condition:
         """The condition of one side of the node's split, in full or as rounded as `threshold_tolerances()` allows."""
-        split = self.nodes[node]["split"]
-        of = self.inputs[split["column"]]
-        if "level_side" in split:
-            wanted = -1 if left else 1
-            return Condition(
-                of["name"], _levels(of, [k for k, side in enumerate(split["level_side"]) if side == wanted])
-            )
-        sign = "<=" if left else ">"
-        if "direction" in split:
-            threshold = split["threshold"]
-            text = ""
-            for weight, other in zip(split["direction"], self.inputs):
-                if weight:
-                    threshold += weight * other["centre"]
-                    joint = ("-" if weight < 0 else "") if not text else " - " if weight < 0 else " + "
-                    size = decimal(abs(weight)) if tolerances is None else number(abs(weight), 2)
-                    text += f"{joint}{size} {other['name']}"
-            return Condition(text, f"{sign} {decimal(threshold) if tolerances is None else number(threshold, 3)}")
-        if split["threshold"] >= _ANY_VALUE:
-            return Condition(of["name"], "is known" if left else "is missing")
-        tolerance = None if tolerances is None else tolerances[split["column"]]
-        return Condition(of["name"], f"{sign} {decimal(split['threshold'], tolerance)}")
+        tolerance = None if tolerances is None else tolerances.get(self.nodes[node]["split"]["column"], 0.0)
+        return Condition(*self._words.condition(node, left, tolerance))
 
     def threshold_tolerances(self, drawn_nodes: int) -> dict[int, float]:
         """How far the thresholds of each input may be rounded in a picture of the first nodes: 0.2 % of the input's
@@ -160,15 +114,7 @@ class Tree:
 
     def equation(self, leaf: Leaf, output: int = 0) -> list[str]:
         """The terms of the leaf's equation with their signs, in full: "12.3", "+ 0.45 cement", "- 1.2 water"."""
-        slopes = leaf.slope[output]
-        # The constant was computed from the value at the centres, and has the rounding of that sum.
-        magnitude = abs(leaf.intercept[output]) + float(np.abs(slopes * self.centres).sum())
-        terms = [decimal(leaf.intercept[output], 1e-13 * magnitude)]
-        return terms + [
-            f"{'-' if slope < 0 else '+'} {decimal(abs(slope))} {name}"
-            for slope, name in zip(slopes.tolist(), self.regressor_names)
-            if slope != 0.0
-        ]
+        return self._words.equation(leaf.intercept[output], leaf.slope[output].tolist())
 
     def short_equation(self, leaf: Leaf, output: int = 0) -> tuple[list[str], int]:
         """The equation for a picture, and how many terms it leaves out.
@@ -246,43 +192,13 @@ class Tree:
         errors[undetermined] = math.nan
         return float(errors[0]), errors[1:]
 
-    def _regressor_name(self, regressor: dict[str, Any]) -> str:
-        of = self.inputs[regressor["column"]]
-        if "second_column" in regressor:
-            second = self.inputs[regressor["second_column"]]
-            same = regressor["second_column"] == regressor["column"]
-            return _factor(of) + "^2" if same else f"{_factor(of)}*{_factor(second)}"
-        return f"[{of['name']} = {of['levels'][regressor['level']]}]" if "level" in regressor else of["name"]
-
-    def _leaves(self) -> list[Leaf]:
-        leaves: list[Leaf] = []
-        waiting: list[tuple[int, dict[int, Any], list[str]]] = [(0, {}, [])]  # node, box, sides of oblique splits
-        while waiting:
-            at, box, sides = waiting.pop()
-            split = self.nodes[at].get("split")
-            if split is None:
-                leaves.append(self._leaf(at, len(leaves) + 1, box, sides))
-                continue
-            for left in (False, True):
-                child = split["left"] if left else split["right"]
-                if "direction" in split:
-                    waiting.append((child, box, [*sides, str(self.condition(at, left))]))
-                else:
-                    waiting.append(
-                        (child, {**box, split["column"]: _cut(box.get(split["column"]), split, left)}, sides)
-                    )
-        return leaves
-
     def as_leaf(self, node: int) -> Leaf:
         """An inner node as the leaf that it was before it was split. It has no number."""
-        return self._leaf(node, 0, {}, [])
+        return self._leaf(node, 0, [])
 
-    def _leaf(self, at: int, count: int, box: dict[int, Any], sides: list[str]) -> Leaf:
+    def _leaf(self, at: int, count: int, conditions: list[str]) -> Leaf:
         node = self.nodes[at]
         slope = np.array(node["slope"], dtype=float).reshape(len(self.targets), len(self.regressors))
-        conditions = list(sides)
-        for column in sorted(box):
-            conditions += _box_conditions(self.inputs[column], box[column])
         rows = int(node["samples"])
         return Leaf(
             node=at,
@@ -297,60 +213,20 @@ class Tree:
         )
 
 
-def trees(model: dict[str, Any], show: Callable[[str], str] = str) -> list[Tree]:
+def trees(model: dict[str, Any], show: Callable[[str], str] = str, handle: Any = None) -> list[Tree]:
     """All partitions of a model."""
-    return [Tree(model, p, show) for p in range(len(model["partitions"]))]
+    handle = handle or _handle_of(model)
+    return [Tree(model, p, show, handle) for p in range(len(model["partitions"]))]
+
+
+def _handle_of(model: dict[str, Any]) -> _core.Model:
+    return _core.Model(json.dumps(model))
 
 
 def level_names(of: dict[str, Any]) -> list[str]:
     """The names of the levels of an input; empty for numbers."""
     codes = of.get("codes") or []
     return [repr(float(code)).removesuffix(".0") for code in codes] if len(codes) else list(of.get("levels") or [])
-
-
-def _cut(side: Any, split: dict[str, Any], left: bool) -> Any:
-    """The part of a node's box along the split input that a child has: (low, high), or the list of levels."""
-    if "level_side" in split:
-        kept = range(len(split["level_side"])) if side is None else side
-        return [level for level in kept if split["level_side"][level] == (-1 if left else 1)]
-    low, high = side or (-math.inf, math.inf)
-    return (low, min(high, split["threshold"])) if left else (max(low, split["threshold"]), high)
-
-
-def _box_conditions(of: dict[str, Any], side: Any) -> list[str]:
-    name = of["name"]
-    if isinstance(side, list):
-        return [f"{name} {_levels(of, side)}"]
-    low, high = side
-    if low >= _ANY_VALUE:
-        return [f"{name} is missing"]
-    parts = [f"{name} is known"] if high == _ANY_VALUE else []
-    below, above = high < _ANY_VALUE, math.isfinite(low)
-    if below and above:
-        parts.append(f"{decimal(low)} < {name} <= {decimal(high)}")
-    elif below:
-        parts.append(f"{name} <= {decimal(high)}")
-    elif above:
-        parts.append(f"{name} > {decimal(low)}")
-    return parts
-
-
-def _levels(of: dict[str, Any], levels: list[int]) -> str:
-    others = [level for level in range(len(of["levels"])) if level not in levels]
-    by_others = bool(others) and _MUCH_SHORTER * len(others) <= len(levels)
-    names = ", ".join(_quoted(of["levels"][level]) for level in (others if by_others else levels))
-    return f"{'not in' if by_others else 'in'} {{{names}}}"
-
-
-def _quoted(name: str) -> str:
-    """The name as a field of CSV."""
-    return '"' + name.replace('"', '""') + '"' if any(c in name for c in '",\r\n') else name
-
-
-def _factor(of: dict[str, Any]) -> str:
-    if of["centre"] == 0.0:
-        return str(of["name"])
-    return f"({of['name']} {'+' if of['centre'] < 0 else '-'} {decimal(abs(of['centre']))})"
 
 
 def _undetermined(scaled: np.ndarray, rank: int) -> np.ndarray:

@@ -101,13 +101,15 @@ class Views:
 
     def report(self, path: "str | Path") -> None:
         """Writes the page of `llmt fit --report`: one HTML file that needs no network."""
+        from ._files import write_text
+
         self._model()
         if self._fit is None:
             raise ValueError(f"report() {_no_fit}")
         page = self._fit.page(Path(path).stem, "made with llmt from Python")
         if not page:
             raise ImportError(_no_page)
-        Path(path).write_text(page, encoding="utf-8")
+        write_text(path, page)
 
     def plot(self, ax: Any = None, target: "str | int" = 0) -> Any:
         """The tree with its equations (matplotlib). Returns the axes."""

@@ -10,6 +10,7 @@
 #include <numeric>
 
 #include "llmt/csv.hpp"
+#include "report/text/text.hpp"
 
 namespace llmt::report {
 namespace {
@@ -35,6 +36,7 @@ std::string with_digits(double value, int digits) {
 
 // The number with as few digits as say it to within `tolerance`; `usual_digits` of them if many would be needed.
 std::string decimal_within(double value, double tolerance) {
+  if (!std::isfinite(value)) return fmt::format("{}", value);
   if (std::abs(value) <= tolerance) return "0";
   for (int digits = 1; digits <= most_digits; ++digits) {
     const std::string text = with_digits(value, digits);
@@ -45,23 +47,34 @@ std::string decimal_within(double value, double tolerance) {
   return with_digits(value, usual_digits);
 }
 
-// What an oblique split compares: "0.8 x1 - 0.3 x2".
-std::string direction(const Model& model, const Node& node, double& threshold) {
+// An oblique split: "0.8 x1 - 0.3 x2", "<= 1.5".
+Condition oblique(const std::vector<InputColumn>& inputs, const Node& node, const std::string& sign, bool rounded) {
   std::string text;
-  threshold = node.threshold;
+  double threshold = node.threshold;
   for (Eigen::Index j = 0; j < node.direction.size(); ++j) {
     const double weight = node.direction(j);
     if (weight == 0.0) continue;
-    threshold += weight * model.inputs()[j].centre;
-    const std::string term = fmt::format("{} {}", decimal(std::abs(weight)), model.inputs()[j].name);
+    threshold += weight * inputs[j].centre;
+    const double size = std::abs(weight);
+    const std::string term = fmt::format("{} {}", rounded ? number(size, 2) : decimal(size), inputs[j].name);
     text += text.empty() ? (weight < 0.0 ? "-" : "") + term : (weight < 0.0 ? " - " : " + ") + term;
   }
-  return text;
+  return {text, sign + (rounded ? number(threshold, 3) : decimal(threshold))};
 }
 
 std::string factor(const InputColumn& input) {
   if (input.centre == 0.0) return input.name;
   return fmt::format("({} {} {})", input.name, input.centre < 0.0 ? "+" : "-", decimal(std::abs(input.centre)));
+}
+
+// "in {blue, red}"
+std::string among(const InputColumn& input, const std::vector<int>& levels) {
+  std::vector<int> others(input.levels.size());
+  std::iota(others.begin(), others.end(), 0);
+  std::erase_if(others, [&](int level) { return std::ranges::find(levels, level) != levels.end(); });
+  constexpr std::size_t much_shorter = 4;
+  const bool by_others = !others.empty() && much_shorter * others.size() <= levels.size();
+  return fmt::format("{} {{{}}}", by_others ? "not in" : "in", quoted_levels(input, by_others ? others : levels));
 }
 
 }  // namespace
@@ -73,47 +86,44 @@ std::string quoted_levels(const InputColumn& input, const std::vector<int>& leve
 }
 
 std::string levels_text(const InputColumn& input, const std::vector<int>& levels) {
-  std::vector<int> others(input.levels.size());
-  std::iota(others.begin(), others.end(), 0);
-  std::erase_if(others, [&](int level) { return std::ranges::find(levels, level) != levels.end(); });
-  constexpr std::size_t much_shorter = 4;
-  const bool by_others = !others.empty() && much_shorter * others.size() <= levels.size();
-  return fmt::format("{} {} {{{}}}", input.name, by_others ? "not in" : "in",
-                     quoted_levels(input, by_others ? others : levels));
+  return input.name + " " + among(input, levels);
 }
 
-std::string regressor_name(const Model& model, const Regressor& regressor) {
-  const InputColumn& input = model.inputs()[regressor.input];
+std::string regressor_name(const std::vector<InputColumn>& inputs, const Regressor& regressor) {
+  const InputColumn& input = inputs[regressor.input];
   if (regressor.second_input == regressor.input) return factor(input) + "^2";
-  if (regressor.second_input >= 0) return factor(input) + "*" + factor(model.inputs()[regressor.second_input]);
+  if (regressor.second_input >= 0) return factor(input) + "*" + factor(inputs[regressor.second_input]);
   return regressor.level < 0 ? input.name : fmt::format("[{} = {}]", input.name, input.levels[regressor.level]);
 }
 
-std::string decimal(double value) { return decimal_within(value, 1e-13 * std::abs(value)); }
+std::string decimal(double value, std::optional<double> tolerance) {
+  return decimal_within(value, tolerance.value_or(1e-13 * std::abs(value)));
+}
 
-std::string condition(const Model& model, const Node& node, bool left) {
-  const InputColumn& input = model.inputs()[node.split_input];
+Condition condition(const std::vector<InputColumn>& inputs, const Node& node, bool left,
+                    std::optional<double> tolerance) {
+  const InputColumn& input = inputs[node.split_input];
+  const std::string sign = left ? "<= " : "> ";
   if (!node.level_side.empty()) {
     std::vector<int> levels;
     for (int level = 0; level < static_cast<int>(node.level_side.size()); ++level) {
       if (node.level_side[level] == (left ? -1 : 1)) levels.push_back(level);
     }
-    return levels_text(input, levels);
+    return {input.name, among(input, levels)};
   }
-  if (node.is_oblique()) {
-    double threshold = 0.0;
-    const std::string side = direction(model, node, threshold);
-    return fmt::format("{} {} {}", side, left ? "<=" : ">", decimal(threshold));
-  }
-  if (node.threshold == any_value) return fmt::format("{} is {}", input.name, left ? "known" : "missing");
-  return fmt::format("{} {} {}", input.name, left ? "<=" : ">", decimal(node.threshold));
+  if (node.is_oblique()) return oblique(inputs, node, sign, tolerance.has_value());
+  if (node.threshold == any_value) return {input.name, left ? "is known" : "is missing"};
+  return {input.name, sign + decimal(node.threshold, tolerance)};
 }
 
-std::vector<std::string> conditions_of(const Model& model, const Partition& partition, const Leaf& leaf) {
+std::vector<std::string> conditions_of(const std::vector<InputColumn>& inputs, const Partition& partition,
+                                       const Leaf& leaf) {
   std::vector<std::string> parts;
-  for (const ObliqueSide& side : leaf.sides) parts.push_back(condition(model, partition.nodes[side.node], side.left));
-  for (Eigen::Index j = 0; j < model.num_inputs(); ++j) {
-    const InputColumn& input = model.inputs()[j];
+  for (const ObliqueSide& side : leaf.sides) {
+    parts.push_back(condition(inputs, partition.nodes[side.node], side.left).text());
+  }
+  for (Eigen::Index j = 0; j < std::ssize(inputs); ++j) {
+    const InputColumn& input = inputs[j];
     if (!leaf.levels[j].empty()) parts.push_back(levels_text(input, leaf.levels[j]));
     if (leaf.low(j) == any_value) {
       parts.push_back(input.name + " is missing");
@@ -133,19 +143,23 @@ std::vector<std::string> conditions_of(const Model& model, const Partition& part
   return parts;
 }
 
-std::vector<std::string> equation(const Model& model, const Leaf& leaf, Eigen::Index output) {
+std::vector<std::string> equation(const std::vector<InputColumn>& inputs, const std::vector<Regressor>& regressors,
+                                  double intercept, const Eigen::RowVectorXd& slope) {
   // The constant was computed from the value at the centres, and has the rounding of that sum.
-  double magnitude = std::abs(leaf.intercept(output));
+  double magnitude = std::abs(intercept);
   std::vector<std::string> parts(1);
-  for (std::size_t k = 0; k < model.regressors().size(); ++k) {
-    const double slope = leaf.slope(output, k);
-    if (slope == 0.0) continue;
-    magnitude += std::abs(slope * model.regressors()[k].centre);
-    parts.push_back(fmt::format("{} {} {}", slope < 0.0 ? "-" : "+", decimal(std::abs(slope)),
-                                regressor_name(model, model.regressors()[k])));
+  for (std::size_t k = 0; k < regressors.size(); ++k) {
+    if (slope(k) == 0.0) continue;
+    magnitude += std::abs(slope(k) * regressors[k].centre);
+    parts.push_back(fmt::format("{} {} {}", slope(k) < 0.0 ? "-" : "+", decimal(std::abs(slope(k))),
+                                regressor_name(inputs, regressors[k])));
   }
-  parts[0] = decimal_within(leaf.intercept(output), 1e-13 * magnitude);
+  parts[0] = decimal_within(intercept, 1e-13 * magnitude);
   return parts;
+}
+
+std::vector<std::string> equation(const Model& model, const Leaf& leaf, Eigen::Index output) {
+  return equation(model.inputs(), model.regressors(), leaf.intercept(output), leaf.slope.row(output));
 }
 
 }  // namespace llmt::report

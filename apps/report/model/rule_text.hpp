@@ -2,6 +2,7 @@
 /// The parts of a tree in the words of a person: conditions and equations.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -9,8 +10,9 @@
 
 namespace llmt::report {
 
-/// The number as it is in the file, up to rounding, with as few digits as say it.
-std::string decimal(double value);
+/// The number with as few digits as say it to within `tolerance`; without one as it is in the file, up to rounding.
+/// Five digits where more than twelve would be needed.
+std::string decimal(double value, std::optional<double> tolerance = {});
 
 /// Categories, separated by commas; one with a comma or a quote stands in quotes, as in a CSV file.
 std::string quoted_levels(const InputColumn& input, const std::vector<int>& levels);
@@ -18,17 +20,32 @@ std::string quoted_levels(const InputColumn& input, const std::vector<int>& leve
 /// "colour in {blue, red}"; "colour not in {green}" where at least four times as many categories are in as not.
 std::string levels_text(const InputColumn& input, const std::vector<int>& levels);
 
-/// The condition of the left or the right side of a split.
-std::string condition(const Model& model, const Node& node, bool left);
+/// What is compared, and how: "age", "<= 21".
+struct Condition {
+  std::string what;
+  std::string how;
+
+  std::string text() const { return what + " " + how; }
+};
+
+/// The condition of the left or the right side of a split. `tolerance`: how far the threshold may be rounded, for a
+/// picture; of an oblique split weights then have two digits and the threshold three.
+Condition condition(const std::vector<InputColumn>& inputs, const Node& node, bool left,
+                    std::optional<double> tolerance = {});
 
 /// The conditions of a leaf, those on one input joined: "3 < age <= 21".
-std::vector<std::string> conditions_of(const Model& model, const Partition& partition, const Leaf& leaf);
+std::vector<std::string> conditions_of(const std::vector<InputColumn>& inputs, const Partition& partition,
+                                       const Leaf& leaf);
 
-/// The terms of an equation, with their signs: "12.3", "+ 0.45 cement", "- 1.2 water". A product's factors stand about
-/// their means: "- 0.3 (x - 2)*(y + 1)".
+/// The terms of the equation intercept + slope . regressors with their signs: "12.3", "+ 0.45 cement", "- 1.2 water". A
+/// product's factors stand about their means: "- 0.3 (x - 2)*(y + 1)".
+std::vector<std::string> equation(const std::vector<InputColumn>& inputs, const std::vector<Regressor>& regressors,
+                                  double intercept, const Eigen::RowVectorXd& slope);
+
+/// The same of a leaf for an output of its partition.
 std::vector<std::string> equation(const Model& model, const Leaf& leaf, Eigen::Index output);
 
 /// The name of a column of the local models, as it stands in an equation.
-std::string regressor_name(const Model& model, const Regressor& regressor);
+std::string regressor_name(const std::vector<InputColumn>& inputs, const Regressor& regressor);
 
 }  // namespace llmt::report

@@ -60,8 +60,8 @@ std::string tree_text(const Model& model, const Partition& partition, const std:
       text += indent + at.text + (node.is_leaf() ? fmt::format(": rule {}", position[at.node] + 1) : "") + "\n";
     }
     if (node.is_leaf()) continue;
-    open.push_back({node.right, condition(model, node, false), at.depth + 1});
-    open.push_back({node.left, condition(model, node, true), at.depth + 1});
+    open.push_back({node.right, condition(model.inputs(), node, false).text(), at.depth + 1});
+    open.push_back({node.left, condition(model.inputs(), node, true).text(), at.depth + 1});
   }
   return text;
 }
@@ -75,7 +75,7 @@ std::string partition_text(const Model& model, Eigen::Index p) {
     std::vector<std::string> errors;
     for (const double rmse : leaf.rmse) errors.push_back(number(rmse, 3));
     const std::string head = fmt::format("Rule {} ({} rows, RMSE {})", k + 1, leaf.samples, fmt::join(errors, ", "));
-    const std::vector<std::string> when = conditions_of(model, partition, leaf);
+    const std::vector<std::string> when = conditions_of(model.inputs(), partition, leaf);
     text += when.empty() ? head + ": everywhere\n" : wrapped_list(head + ": if ", when, " and ", "    ");
     for (std::size_t o = 0; o < partition.outputs.size(); ++o) {
       const std::string left = fmt::format("  {} = ", model.outputs()[partition.outputs[o]].name);

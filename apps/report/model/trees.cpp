@@ -56,7 +56,7 @@ Json leaf_json(const Model& model, const Partition& partition, const Leaf& leaf,
   std::ranges::stable_sort(effects, std::greater{}, [](const auto& effect) { return std::abs(effect.first); });
   if (effects.size() > most_slopes) effects.resize(most_slopes);
   for (const auto& [effect, k] : effects) {
-    json["slopes"].push_back({{"name", regressor_name(model, model.regressors()[k])}, {"effect", effect}});
+    json["slopes"].push_back({{"name", regressor_name(model.inputs(), model.regressors()[k])}, {"effect", effect}});
   }
   return json;
 }
@@ -77,7 +77,7 @@ Json tree_block(const Model& model, Eigen::Index p, const Eigen::MatrixXd& input
     if (node.is_leaf()) continue;
     for (const bool left : {true, false}) {
       Json& child = made[left ? node.left : node.right];
-      child["condition"] = condition(model, node, left);
+      child["condition"] = condition(model.inputs(), node, left).text();
       made[n]["children"].push_back(std::move(child));
     }
   }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "llmt/fit.hpp"
+#include "llmt/fit/fit_cases.hpp"
 #include "llmt/random.hpp"
 #include "llmt/readable.hpp"
 #include "oracles/samples.hpp"
@@ -114,26 +115,13 @@ void expect_same_bytes(const llmt::TrainingData& data, const Counts& counts, con
   expect_same(llmt::fit(weighted(data, counts), options), llmt::fit(repeated(data, counts), options));
 }
 
-struct Case {
-  const char* name;
-  llmt::FitOptions options = {};
-};
+using fit_cases::Case;
 
 std::vector<Case> cases() {
-  std::vector<Case> cases = {{"default"}};
-  const auto add = [&](const char* name, const auto& change) {
-    cases.push_back({name, {.max_leaves = 6}});
-    change(cases.back().options);
-  };
-  for (const llmt::Choice<llmt::GrowthRule>& rule : llmt::choices<llmt::GrowthRule>()) {
-    add(rule.name.data(), [&](llmt::FitOptions& options) { options.rule = rule.value; });
-  }
-  add("crisp", [](llmt::FitOptions& options) { options.validity = llmt::ValidityChoice::crisp; });
+  std::vector<Case> cases = fit_cases::usual();
+  const auto add = [&](const char* name, const auto& change) { fit_cases::add(cases, name, change); };
   add("gaussian", [](llmt::FitOptions& options) { options.validity = llmt::ValidityChoice::gaussian; });
   add("weakest link", [](llmt::FitOptions& options) { options.pruning = llmt::Pruning::weakest_link; });
-  add("sparse", [](llmt::FitOptions& options) { options.sparse = llmt::SparseChoice::automatic; });
-  add("linear or quadratic", [](llmt::FitOptions& options) { options.terms = llmt::LocalTerms::automatic; });
-  add("tukey", [](llmt::FitOptions& options) { options.loss = llmt::Loss::tukey; });
   add("shared", [](llmt::FitOptions& options) { options.shared_partition = true; });
   add("blocks", [](llmt::FitOptions& options) { options.folds.kind = llmt::FoldKind::contiguous; });
   add("monotone", [](llmt::FitOptions& options) {

@@ -11,6 +11,7 @@
 
 #include "llmt/compare.hpp"
 #include "llmt/fit.hpp"
+#include "llmt/fit/fit_cases.hpp"
 #include "llmt/random.hpp"
 #include "llmt/readable.hpp"
 #include "oracles/oracles.hpp"
@@ -50,32 +51,11 @@ llmt::TrainingData with_gaps_and_words(llmt::TrainingData data) {
   return data;
 }
 
-struct Case {
-  const char* name;
-  llmt::FitOptions options = {};
-};
-
-std::vector<Case> cases() {
-  std::vector<Case> cases = {{"default"}};
-  const auto add = [&](const char* name, const auto& change) {
-    cases.push_back({name, {.max_leaves = 6}});
-    change(cases.back().options);
-  };
-  for (const llmt::Choice<llmt::GrowthRule>& rule : llmt::choices<llmt::GrowthRule>()) {
-    add(rule.name.data(), [&](llmt::FitOptions& options) { options.rule = rule.value; });
-  }
-  add("crisp", [](llmt::FitOptions& options) { options.validity = llmt::ValidityChoice::crisp; });
-  add("tukey", [](llmt::FitOptions& options) { options.loss = llmt::Loss::tukey; });
-  add("sparse", [](llmt::FitOptions& options) { options.sparse = llmt::SparseChoice::automatic; });
-  add("linear or quadratic", [](llmt::FitOptions& options) { options.terms = llmt::LocalTerms::automatic; });
-  return cases;
-}
-
 TEST(GivenHoldOut, ChangesTheChoiceButNoCoefficient) {
   const llmt::TrainingData data = with_gaps_and_words(table(600, 1));
   llmt::TrainingData other = data;
   for (const Eigen::Index row : data.held_out) other.outputs(row, 0) *= 1.0 + 1e-9;
-  for (const Case& each : cases()) {
+  for (const fit_cases::Case& each : fit_cases::usual()) {
     SCOPED_TRACE(each.name);
     const llmt::FitResult first = llmt::fit(data, each.options);
     const llmt::FitResult second = llmt::fit(other, each.options);

@@ -7,6 +7,7 @@ import os
 from collections.abc import Mapping
 from typing import Any
 
+from llmt._files import write_text
 from llmt._frames import table_of
 from llmt._results import Findings, Result, draw_points, html_table
 from llmt.robotics._csv import frame_of
@@ -46,7 +47,8 @@ class _WithRobot(_RobotResult):
 
     @property
     def poses(self) -> Any:
-        """Distance in mm between model and measurement, a row for each measured point."""
+        """Distance in mm between model and measurement under each model, a row for each measured point: of a discovery
+        with test poses, those."""
         count = len(next(iter(self._errors.values())))
         return table_of([{f"{name}_mm": errors[k] for name, errors in self._errors.items()} for k in range(count)])
 
@@ -54,8 +56,8 @@ class _WithRobot(_RobotResult):
         raise NotImplementedError
 
     def plot(self, ax: Any = None) -> Any:
-        """Draws the error of every point under each model, the points in the order of the table. Returns the axes of
-        matplotlib, ``ax`` if it is given."""
+        """Draws the errors of ``poses`` in the order of the table. Returns the axes of matplotlib, ``ax`` if it is
+        given."""
         count = len(next(iter(self._errors.values())))
         errors = {f"{name}, mean {sum(of) / count:.4f} mm": of for name, of in self._errors.items()}
         return _draw_errors(ax, errors, f"Error {self._where()}")
@@ -218,8 +220,7 @@ class PoseChoice(_RobotResult):
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes the poses as CSV."""
-        with open(path, "w", encoding="utf-8", newline="") as file:
-            file.write(self._csv)
+        write_text(path, self._csv)
 
 
 class Commands(_RobotResult):
@@ -241,8 +242,7 @@ class Commands(_RobotResult):
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes the commands as CSV."""
-        with open(path, "w", encoding="utf-8", newline="") as file:
-            file.write(self._csv)
+        write_text(path, self._csv)
 
     def plot(self, ax: Any = None) -> Any:
         """Draws the distance of every target from the tool, with the start joints and with the commands, as the model

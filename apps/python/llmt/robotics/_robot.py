@@ -14,11 +14,11 @@ from llmt._results import html_table
 
 
 def _extension() -> Any:
-    try:
-        from llmt import _robotics
-    except ImportError as error:
-        raise ImportError("llmt.robotics: this package was built without the robot layer") from error
-    return _robotics
+    from llmt import _core
+
+    if not hasattr(_core, "Robot"):
+        raise ImportError("llmt.robotics: this package was built without the robot layer")
+    return _core
 
 
 def _plain(value: Any) -> Any:

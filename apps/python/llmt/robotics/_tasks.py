@@ -14,6 +14,7 @@ import warnings as _warnings
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
+from llmt._files import write_text
 from llmt._results import names, number
 from llmt.robotics._csv import Source, frame_of, source_of
 from llmt.robotics._results import Calibration, Check, Commands, Discovery, PoseChoice, RobotWarning
@@ -56,8 +57,7 @@ def _folds(folds: Any) -> int:
 
 def _write_page(report: str | os.PathLike[str] | None, made: dict[str, Any]) -> None:
     if report is not None:
-        with open(report, "w", encoding="utf-8", newline="") as file:
-            file.write(made["page"])
+        write_text(report, made["page"])
 
 
 def calibrate(

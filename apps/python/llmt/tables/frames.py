@@ -49,7 +49,8 @@ def _read(series: Any, out: np.ndarray, where: str) -> Column:
         out[codes < 0] = np.nan
         return Column([str(word) for word in words])
     if isinstance(dtype, pandas.ArrowDtype):
-        values, columns, is_table = read_arrow(series.array.__arrow_array__().__arrow_c_stream__(), name=where)
+        read: Any = read_arrow(series.array.__arrow_array__().__arrow_c_stream__(), name=where)
+        values, columns, is_table = read
         if is_table:
             refuse_type(where, "structs", dtype)
         out[:] = values[:, 0]

@@ -45,7 +45,8 @@ def from_arrow(table: Any, name: str) -> Raw:
         capsules = (table.__arrow_c_stream__(),)
     else:
         capsules = table.__arrow_c_array__()
-    values, columns, is_table = read_arrow(*capsules, name=name)
+    read: Any = read_arrow(*capsules, name=name)
+    values, columns, is_table = read
     found = [Column(words, kind == "codes") for _, kind, words in columns]
     labels = [label for label, _, _ in columns]
     return Raw(values, found, labels, 2 if is_table else 1, series=not is_table, owned=True)

@@ -1,0 +1,73 @@
+"""A file that the package writes is the old one or the new one, whole, and a failure is an OSError."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import llmt
+
+X = np.random.default_rng(0).uniform(-1, 1, (300, 2))
+ROOT = Path(__file__).parents[2]
+
+# A limit of the size of files is a disk that is full after so many bytes.
+CHILD = """
+import resource, signal, sys
+import numpy as np
+import llmt
+
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+X = np.random.default_rng(0).uniform(-1, 1, (300, 2))
+model = llmt.LocalLinearTreeRegressor().fit(X, np.abs(X[:, 0]))
+size = len(model.model_.to_json().encode())
+for most in (0, 1, 4096, size - 1):
+    resource.setrlimit(resource.RLIMIT_FSIZE, (most, resource.RLIM_INFINITY))
+    try:
+        model.save(sys.argv[1])
+        print("written")
+    except OSError as error:
+        print("refused" if sys.argv[1] in str(error) else error)
+resource.setrlimit(resource.RLIMIT_FSIZE, (size, resource.RLIM_INFINITY))
+model.save(sys.argv[1])
+"""
+
+
+@pytest.mark.parametrize("old", [None, "old"])
+def test_a_full_disk_leaves_the_old_file(tmp_path, old):
+    path = tmp_path / "model.json"
+    if old is not None:
+        path.write_text(old)
+    without_success = CHILD.rpartition("resource.setrlimit")[0]
+    done = subprocess.run([sys.executable, "-c", without_success, str(path)], capture_output=True, text=True)
+    assert done.stdout.split() == ["refused"] * 4, done.stdout + done.stderr
+    assert [file.name for file in tmp_path.iterdir()] == ([] if old is None else ["model.json"])
+    assert old is None or path.read_text() == old
+    subprocess.run([sys.executable, "-c", CHILD, str(path)], capture_output=True, check=True)
+    assert llmt.Model.load(path).handle.predict(X).shape == (300, 1)
+    assert [file.name for file in tmp_path.iterdir()] == ["model.json"]
+
+
+def test_what_cannot_be_written_is_an_os_error(tmp_path):
+    model = llmt.LocalLinearTreeRegressor().fit(X, X[:, 0])
+    with pytest.raises(OSError, match="no_such_folder"):
+        model.save(tmp_path / "no_such_folder" / "model.json")
+    with pytest.raises(OSError):
+        model.save(tmp_path)
+    robotics = pytest.importorskip("llmt.robotics")
+    arm = robotics.robot(ROOT / "docs" / "samples" / "arm.yaml")
+    with pytest.raises(OSError, match="no_such_folder"):
+        arm.save(tmp_path / "no_such_folder" / "arm.yaml")
+    with pytest.raises(OSError, match="no_such_folder"):
+        robotics.poses(arm, count=20).save(tmp_path / "no_such_folder" / "poses.csv")
+
+
+def test_a_link_stays_a_link_and_names_may_be_any_bytes(tmp_path):
+    model = llmt.LocalLinearTreeRegressor().fit(X, X[:, 0])
+    target = tmp_path / os.fsdecode(b"m\xff\xc3\xa4.json")
+    link = tmp_path / "link.json"
+    link.symlink_to(target)
+    model.save(link)
+    assert link.is_symlink() and target.read_text() == model.model_.to_json()
