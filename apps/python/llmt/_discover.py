@@ -137,7 +137,7 @@ class Missing(Findings):
     def parameters(self) -> Any:
         """The parameters of the simulation, fitted together with the terms. Those that the rows cannot tell apart are
         one row, "mass + armature". ``changed``: by more than chance."""
-        return records(
+        return table_of(
             [
                 {
                     "name": value["name"],
@@ -149,7 +149,8 @@ class Missing(Findings):
                     "changed": value["changed"],
                 }
                 for value in self._data["parameters"]
-            ]
+            ],
+            ("name", "nominal", "value", "change", "standard_error", "unit", "changed"),
         )
 
     def predict(self, inputs: Any, simulated: Any = None) -> Any:
