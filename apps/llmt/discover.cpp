@@ -12,6 +12,7 @@
 #include "llmt/commands.hpp"
 #include "llmt/csv.hpp"
 #include "llmt/files.hpp"
+#include "llmt/input_errors.hpp"
 #include "llmt/term_file.hpp"
 #include "report/terms/of_terms.hpp"
 #include "report/terms/terms_summary.hpp"
@@ -34,6 +35,7 @@ struct DiscoverArguments {
   std::string group;
   std::vector<std::string> only;
   std::vector<std::string> without;
+  std::vector<std::string> input_noise;
   std::vector<std::string> outputs_or_files;  // of --output, which once named the columns
   std::string corrected;
   DecimalMark mark = DecimalMark::point;
@@ -159,8 +161,12 @@ Comparison read_comparison(const DiscoverArguments& arguments, bool every_column
 
 std::vector<discovery::ModelTerm> terms_to_try(const DiscoverArguments& arguments, const Comparison& comparison,
                                                std::vector<discovery::UntestableCause>& untestable) {
-  std::vector<discovery::ModelTerm> library = discovery::of_families(
-      discovery::standard_terms(comparison.inputs, &untestable), arguments.only, arguments.without);
+  std::vector<discovery::ModelTerm> library = discovery::standard_terms(comparison.inputs, &untestable);
+  for (discovery::ModelTerm& term : discovery::inner_state_terms(comparison.inputs, comparison.simulated,
+                                                                 comparison.measured.values, arguments.outputs)) {
+    library.push_back(std::move(term));
+  }
+  library = discovery::of_families(std::move(library), arguments.only, arguments.without);
   if (arguments.terms.empty()) return library;
   std::vector<std::string> taken;
   for (const discovery::ModelTerm& term : library) taken.push_back(term.family);
@@ -267,7 +273,8 @@ void discover_command(const CLI::App& command, DiscoverArguments arguments) {
     }
   }
   check_names(arguments);
-  const Comparison comparison = read_comparison(arguments, !named);
+  Comparison comparison = read_comparison(arguments, !named);
+  comparison.inputs.noise = errors_of_inputs(arguments.input_noise, comparison.inputs.names);
   const report::TermsSummary summary = discovered(arguments, comparison);
   const bool is_worse = summary.missing.answer == discovery::Answer::failed_held_out;
   if (!arguments.corrected.empty() && !is_worse) write_corrected(arguments.corrected, comparison, summary.missing);
@@ -306,6 +313,9 @@ void add_discover(CLI::App& app) {
                    "When each row was taken, for rows that follow each other in time; no input by itself")
       ->type_name("COLUMN");
   command->add_option("--group", arguments->group, "Recording that each row is of; with --time")->type_name("COLUMN");
+  add_names(
+      *command, "--input-noise", arguments->input_noise, "INPUT=NUMBER",
+      "Standard deviations of the errors of inputs, or auto: from neighbouring rows [auto for rows in time, else 0]");
   add_names(*command, "--only", arguments->only, "FAMILY", "Try the built-in terms of these families alone");
   add_names(*command, "--without", arguments->without, "FAMILY", "Do not try the built-in terms of these families");
   add_input_file(*command, "--terms", arguments->terms,

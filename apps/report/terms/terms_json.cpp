@@ -20,6 +20,10 @@ Json found_json(const discovery::FoundTerm& found) {
   Json json = {{"name", found.family},     {"location", found.location}, {"output", found.output},
                {"formula", found.formula}, {"parameters", parameters},   {"rivals", rivals},
                {"exact_alias", exact},     {"share", found.share},       {"confirmed", found.confirmed}};
+  if (!found.inner_state.empty()) {
+    json["inner_state"] = found.inner_state;
+    json["shown_by"] = found.shown_by;
+  }
   if (!found.shrinks_gap) json["shrinks_gap"] = false;
   return json;
 }

@@ -70,7 +70,9 @@ struct FoundTerm {
   Eigen::VectorXd constants;
   std::vector<TermValue> values;  ///< coefficients, then constants
   std::vector<RivalTerms> rivals;
-  double share = 0.0;  ///< of the explained sum of squares that goes with it alone
+  double share = 0.0;       ///< of the explained sum of squares that goes with it alone
+  std::string inner_state;  ///< ModelTerm::inner_state
+  std::string shown_by;     ///< ModelTerm::shown_by
   /// The error on the samples set aside is smaller with it than without; true if there are none.
   bool shrinks_gap = true;
 };
@@ -115,7 +117,8 @@ struct VisibleTerm {
 /// Outcome of find_missing().
 struct Missing {
   /// As Verdict::answer; but unknown if material structure is left although nothing was found, and failed_held_out if
-  /// what was found makes the error on the samples set aside larger.
+  /// what was found makes the error on the samples set aside larger; and inner_state if one of the named terms stands
+  /// for a state that the inputs do not show.
   Answer answer = Answer::nothing_missing;
   Verdict verdict;  ///< of the last search; candidates in it are numbers of `candidates`, samples those of `searched`
   std::vector<std::string> candidates;

@@ -45,6 +45,8 @@ struct EffectCandidate {
   bool generic = false;  ///< not a cause but a shape: what it explains is "unknown, looks like this"
   /// Added to the score; 2 ln m for one that was picked as the best of m by looking at the residuals.
   double prior_cost = 0.0;
+  /// k, or empty: what signature' residuals lacks because errors of the inputs are in both.
+  Eigen::VectorXd moment_correction = {};
 };
 
 /// A cause that these samples cannot test.
@@ -123,7 +125,8 @@ enum class Answer {
   named,
   indistinguishable,
   unknown,
-  failed_held_out  ///< of find_missing(): with what was found the error on rows set aside is larger
+  failed_held_out,  ///< of find_missing(): with what was found the error on rows set aside is larger
+  inner_state  ///< of find_missing(): a term that stands for a state which the inputs do not show is among the named
 };
 
 /// A cause that would have won, had its values been within their limits.

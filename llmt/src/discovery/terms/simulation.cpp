@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "discovery/terms/correlation.hpp"
+#include "discovery/terms/errors_of_inputs.hpp"
 #include "discovery/terms/held_out.hpp"
 #include "discovery/terms/missing_findings.hpp"
 #include "discovery/terms/refuse.hpp"
@@ -92,7 +93,8 @@ double share_of_independent(const TermModel& model, const TermData& data, const 
 
 // The weights of the outputs, and the share of the samples that is independent, follow what each round leaves.
 Settled search_until_settled(const TermModel& model, TermData& data, const std::vector<Eigen::Index>& repeats,
-                             Settled settled, bool with_history, const MissingOptions& options, Work& work) {
+                             Settled settled, bool with_history, const InputNoise* noise, const MissingOptions& options,
+                             Work& work) {
   const bool in_time = !data.stretches.empty();
   constexpr int fewest_in_time = 8;
   const RoundLimits limits{.most = in_time ? std::max(options.rounds, fewest_in_time) : options.rounds,
@@ -102,7 +104,7 @@ Settled search_until_settled(const TermModel& model, TermData& data, const std::
       data.sigma = scatter(model, without_samples(data, settled.verdict.outliers), settled.fit);
     }
     work.begin(fmt::format("searching, round {}", ++settled.rounds));
-    settled.question = ask(model, data, settled.fit, repeats, settled.verdict.outliers, with_history);
+    settled.question = ask(model, data, settled.fit, repeats, settled.verdict.outliers, with_history, noise);
     settled.verdict = search(settled.question.evidence, settled.question.candidates, options.search);
     work.did(share_of_half_a_round * work.left());
     const TermData kept = without_samples(data, settled.verdict.outliers);
@@ -134,13 +136,13 @@ bool needs_history(const TermModel& model, const Settled& plain, const Settled& 
 
 // The terms of rows by themselves first, then those that depend on earlier rows beside them.
 Settled search_terms(const TermModel& model, TermData& data, const std::vector<Eigen::Index>& repeats,
-                     const TermFit& baseline, const MissingOptions& options, Work& work) {
+                     const TermFit& baseline, const InputNoise* noise, const MissingOptions& options, Work& work) {
   Settled settled;
   settled.fit = baseline;
-  settled = search_until_settled(model, data, repeats, std::move(settled), false, options, work);
+  settled = search_until_settled(model, data, repeats, std::move(settled), false, noise, options, work);
   if (std::ranges::any_of(model.terms(), &ModelTerm::history)) {
     TermData again = data;
-    const Settled other = search_until_settled(model, again, repeats, settled, true, options, work);
+    const Settled other = search_until_settled(model, again, repeats, settled, true, noise, options, work);
     if (needs_history(model, settled, other, options.search.rival_margin)) {
       data = again;
       settled = other;
@@ -217,7 +219,10 @@ Missing find(const Simulation& simulation, const Inputs& inputs, const MeasuredO
              const std::vector<ModelTerm>& terms, const MissingOptions& options) {
   const bool in_time = inputs.instants.size() > 0;
   const TermModel model(simulation, inputs, measured.names, terms);
-  const RowSplit split = in_time ? split_in_time(inputs, options) : split_independent(inputs, options);
+  Eigen::VectorXd start(std::ssize(simulation.parameters));
+  for (std::size_t k = 0; k < simulation.parameters.size(); ++k) start(k) = simulation.parameters[k].value;
+  RowSplit split = in_time ? split_in_time(inputs, options) : split_independent(inputs, options);
+  ErrorsOfInputs errors = errors_of_inputs(model, inputs, measured, start, split);
   const Eigen::Index d = measured.values.cols();
   TermData data = data_of(split.searched, measured);
   data.stretches = split.stretches;
@@ -228,14 +233,13 @@ Missing find(const Simulation& simulation, const Inputs& inputs, const MeasuredO
            fmt::format("{} rows to search beside {} set aside are too few: {} free parameters need {} measured values",
                        split.searched.size(), split.held_out.size(), free, fewest + 2 * free));
   }
-  Eigen::VectorXd start(std::ssize(simulation.parameters));
-  for (std::size_t k = 0; k < simulation.parameters.size(); ++k) start(k) = simulation.parameters[k].value;
   Work work(options.progress);
   work.begin("fitting");
   TermFit baseline = fit_terms(model, data, start, {});
   data.sigma = scatter(model, data, baseline);
   if (d > 1) baseline = fit_terms(model, data, start, {});
-  const Settled settled = search_terms(model, data, split.repeats, baseline, options, work);
+  Settled settled = search_terms(model, data, split.repeats, baseline, errors.noise.get(), options, work);
+  correct_estimates(errors, without_samples(data, settled.verdict.outliers), settled.fit);
 
   Missing missing;
   missing.verdict = settled.verdict;
@@ -261,7 +265,9 @@ Missing find(const Simulation& simulation, const Inputs& inputs, const MeasuredO
   TermData aside = data_of(split.held_out, measured);
   aside.sigma = data.sigma;
   judge_held_out(model, kept, aside, baseline, settled, missing);
+  missing.notes.insert(missing.notes.end(), errors.notes.begin(), errors.notes.end());
   decide(missing);
+  doubt_uncorrected(errors, missing);
   missing.floor_from_repeats = settled.verdict.lack_of_fit.has_enough_repeats();
   const double noise = missing.floor_from_repeats ? settled.verdict.lack_of_fit.noise : settled.verdict.noise;
   for (Eigen::Index o = 0; o < d; ++o) {
