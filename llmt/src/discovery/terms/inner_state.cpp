@@ -10,6 +10,7 @@
 #include "discovery/terms/derivatives.hpp"
 #include "discovery/terms/surrogate.hpp"
 #include "llmt/discovery/terms.hpp"
+#include "llmt/random.hpp"
 
 namespace llmt::discovery {
 namespace {
@@ -155,6 +156,21 @@ ModelTerm drive_spring(const std::shared_ptr<OfRows>& of_rows, const std::shared
   return term;
 }
 
+// Share of the second derivative of a signal that is noise, from fourth differences: var(D^4 e) = 70 var(e).
+double noise_of_second(const Derivatives& derivatives, const Rows& rows, const Eigen::VectorXd& values) {
+  constexpr double factor = 70.0;
+  const Eigen::ArrayXd v = values(rows.sequence).array();
+  const Eigen::Index n = v.size() - 4;
+  const Eigen::ArrayXd fourth =
+      v.tail(n) - 4.0 * v.segment(3, n) + 6.0 * v.segment(2, n) - 4.0 * v.segment(1, n) + v.head(n);
+  Random random(1);
+  Eigen::VectorXd white(values.size());
+  for (double& value : white) value = random.normal();
+  const double gain = derivatives.second(white).squaredNorm() / static_cast<double>(white.size());
+  const double whole = derivatives.second(values).squaredNorm() / static_cast<double>(values.size());
+  return whole > 0.0 ? fourth.square().mean() / factor * gain / whole : 1.0;
+}
+
 }  // namespace
 
 std::vector<ModelTerm> inner_state_terms(const Inputs& inputs, const Eigen::MatrixXd& simulated,
@@ -174,9 +190,14 @@ std::vector<ModelTerm> inner_state_terms(const Inputs& inputs, const Eigen::Matr
   const std::vector<Motion> all = motions(of_rows->at(rows, inputs.values), inputs);
   // Less than this, and the derivatives of the function are not those of the simulation.
   constexpr double described = 0.98;
+  constexpr double largest_noise_share = 0.1;
   for (std::size_t o = 0; o < outputs.size(); ++o) {
     terms.push_back(delay(of_rows, outputs[o]));
     if (table->surrogate.described()(o) < described) continue;
+    // The spring's term holds the second derivative of the measured output: were that noise, it would explain the
+    // noise.
+    const Eigen::VectorXd output = measured.col(static_cast<Eigen::Index>(o));
+    if (noise_of_second(of_rows->at(rows, inputs.values), rows, output) > largest_noise_share) continue;
     for (const Motion& motion : all) {
       terms.push_back(drive_spring(of_rows, table, motion, inputs, outputs[o], static_cast<Eigen::Index>(o)));
     }

@@ -262,6 +262,8 @@ Missing find(const Simulation& simulation, const Inputs& inputs, const MeasuredO
   missing.before = model.predict(baseline.parameters, {});
   missing.corrected = model.predict(settled.fit.parameters, settled.fit.placed);
   missing.structure = structure_beside(model, kept, inputs, missing);
+  // Independent rows with errors of the inputs deviate like their neighbours: the errors alone do that.
+  if (errors.noise && !in_time) missing.structure.clear();
   TermData aside = data_of(split.held_out, measured);
   aside.sigma = data.sigma;
   judge_held_out(model, kept, aside, baseline, settled, missing);
