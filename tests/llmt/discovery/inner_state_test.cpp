@@ -41,7 +41,7 @@ struct Log {
 
 constexpr double inertia = 3.0;
 constexpr double damping = 1.0;
-constexpr double gravity = 4.0;
+constexpr double gravity = 40.0;
 
 /// `torque(t)` is what is measured; the nominal model is inertia ddq + damping dq + gravity q.
 template <class Torque>
@@ -94,7 +94,7 @@ TEST(InnerState, MachineWithoutOneHasNone) {
 // A rotor of 20 % of the inertia drives the load through a spring: at each frequency the load moves by
 // k / (k + gravity - load omega^2) of the rotor (without damping), and u = rotor ddq + damping dq + k (q - q_load).
 TEST(InnerState, SpringInTheDriveIsMeasured) {
-  constexpr double rate = 300.0;
+  constexpr double rate = 1500.0;
   constexpr double rotor = 0.2 * inertia;
   constexpr double load = inertia - rotor;
   const auto twist = [](double omega) { return 1.0 - rate / (rate + gravity - load * omega * omega); };

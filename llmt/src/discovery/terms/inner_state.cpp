@@ -200,6 +200,11 @@ std::vector<ModelTerm> inner_state_terms(const Inputs& inputs, const Eigen::Matr
     if (noise_of_second(of_rows->at(rows, inputs.values), rows, output) > largest_noise_share) continue;
     for (const Motion& motion : all) {
       terms.push_back(drive_spring(of_rows, table, motion, inputs, outputs[o], static_cast<Eigen::Index>(o)));
+      // Compliance, inertia and damping are not negative.
+      constexpr double far = 10.0;  // times the output
+      const Eigen::MatrixXd columns = terms.back().columns(rows, {});
+      terms.back().lower = Eigen::VectorXd::Zero(columns.cols());
+      terms.back().upper = (far * output.norm() / columns.colwise().norm().array().max(1e-300)).matrix().transpose();
     }
   }
   return terms;
