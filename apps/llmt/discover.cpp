@@ -14,6 +14,8 @@
 #include "llmt/commands.hpp"
 #include "llmt/corrected_table.hpp"
 #include "llmt/csv.hpp"
+#include "llmt/files.hpp"
+#include "llmt/input_errors.hpp"
 #include "llmt/simulation_options.hpp"
 #include "llmt/term_file.hpp"
 #include "report/terms/of_terms.hpp"
@@ -37,6 +39,7 @@ struct DiscoverArguments {
   std::string group;
   std::vector<std::string> only;
   std::vector<std::string> without;
+  std::vector<std::string> input_noise;
   std::vector<std::string> outputs_or_files;  // of --output, which once named the columns
   std::string corrected;
   SimulationArguments simulation;
@@ -179,8 +182,12 @@ std::vector<discovery::ModelTerm> of_families_to_try(const DiscoverArguments& ar
 
 std::vector<discovery::ModelTerm> terms_to_try(const DiscoverArguments& arguments, const Comparison& comparison,
                                                std::vector<discovery::UntestableCause>& untestable) {
-  std::vector<discovery::ModelTerm> library =
-      of_families_to_try(arguments, discovery::standard_terms(comparison.inputs, &untestable));
+  std::vector<discovery::ModelTerm> library = discovery::standard_terms(comparison.inputs, &untestable);
+  for (discovery::ModelTerm& term : discovery::inner_state_terms(comparison.inputs, comparison.simulated,
+                                                                 comparison.measured.values, arguments.outputs)) {
+    library.push_back(std::move(term));
+  }
+  library = of_families_to_try(arguments, std::move(library));
   if (arguments.terms.empty()) return library;
   std::vector<std::string> taken;
   for (const discovery::ModelTerm& term : library) taken.push_back(term.family);
@@ -320,6 +327,7 @@ void discover_command(const CLI::App& command, DiscoverArguments arguments) {
     comparison.simulated = source.command.run(comparison.inputs.values, source.command.nominal());
     arguments.simulated = "--simulate";
   }
+  comparison.inputs.noise = errors_of_inputs(arguments.input_noise, comparison.inputs.names);
   const report::TermsSummary summary = discovered(arguments, comparison, source);
   const bool is_worse = summary.missing.answer == discovery::Answer::failed_held_out;
   if (!arguments.corrected.empty() && !is_worse) {
@@ -363,6 +371,9 @@ void add_discover(CLI::App& app) {
                    "When each row was taken, for rows that follow each other in time; no input by itself")
       ->type_name("COLUMN");
   command->add_option("--group", arguments->group, "Recording that each row is of; with --time")->type_name("COLUMN");
+  add_names(
+      *command, "--input-noise", arguments->input_noise, "INPUT=NUMBER",
+      "Standard deviations of the errors of inputs, or auto: from neighbouring rows [auto for rows in time, else 0]");
   add_names(*command, "--only", arguments->only, "FAMILY", "Try the built-in terms of these families alone");
   add_names(*command, "--without", arguments->without, "FAMILY", "Do not try the built-in terms of these families");
   add_input_file(*command, "--terms", arguments->terms,

@@ -64,6 +64,32 @@ bool has_nominal(const discovery::FittedParameter& fitted, const std::vector<std
   });
 }
 
+namespace {
+
+// "this has an inner state: a spring in the drive (q). An encoder behind the spring would show it"
+std::string inner_state_text(const discovery::Missing& missing) {
+  std::string text = "this has an inner state";
+  std::string shown_by;
+  const char* sign = ": ";
+  for (const discovery::FoundTerm& found : missing.found) {
+    if (found.inner_state.empty()) continue;
+    const discovery::TermValue& value = found.values.front();
+    text += fmt::format("{}{}{} ({} {} +- {} {})", sign, found.inner_state,
+                        missing.gaps.size() > 1 ? " of " + found.output : "", value.name, number(value.value),
+                        number(value.standard_error, 2), value.unit);
+    if (shown_by.find(found.shown_by) == std::string::npos) {
+      shown_by += (shown_by.empty() ? "" : "; ") + found.shown_by;
+    }
+    sign = " and ";
+  }
+  const auto others = std::ranges::count_if(
+      missing.found, [](const discovery::FoundTerm& found) { return found.inner_state.empty() && !found.generic; });
+  if (others > 0) text += fmt::format(", and {} more {} missing", others, others == 1 ? "term is" : "terms are");
+  return text + ". It would be seen in " + shown_by;
+}
+
+}  // namespace
+
 std::string headline(const discovery::Missing& missing) {
   const auto causes = std::ranges::count_if(missing.found, [](const auto& f) { return !f.generic; });
   const auto sure = std::ranges::count_if(missing.found, &discovery::FoundTerm::confirmed);
@@ -86,6 +112,8 @@ std::string headline(const discovery::Missing& missing) {
       return "failed on held-out rows: with the terms found the error on the rows set aside is larger";
     case discovery::Answer::parameters_only:
       return "nothing is missing, but " + changed_parameters(missing);
+    case discovery::Answer::inner_state:
+      return inner_state_text(missing);
   }
   return "";
 }

@@ -77,6 +77,10 @@ Json found_json(const discovery::FoundTerm& found, const TermsSummary& summary, 
                {"exact_alias", exact},
                {"share", found.share},
                {"confirmed", found.confirmed}};
+  if (!found.inner_state.empty()) {
+    json["inner_state"] = found.inner_state;
+    json["shown_by"] = found.shown_by;
+  }
   if (!found.shrinks_gap) json["shrinks_gap"] = false;
   return json;
 }

@@ -72,7 +72,9 @@ struct FoundTerm {
   std::vector<TermValue> values;  ///< coefficients, then constants
   std::vector<std::string> code;  ///< ModelTerm::code
   std::vector<RivalTerms> rivals;
-  double share = 0.0;  ///< of the explained sum of squares that goes with it alone
+  double share = 0.0;       ///< of the explained sum of squares that goes with it alone
+  std::string inner_state;  ///< ModelTerm::inner_state
+  std::string shown_by;     ///< ModelTerm::shown_by
   /// The error on the samples set aside is smaller with it than without; true if there are none.
   bool shrinks_gap = true;
   bool is_refuted = false;  ///< it makes that error larger, by more than chance allows for a term of its size
@@ -134,7 +136,8 @@ struct Missing {
   /// As Verdict::answer; but unknown if material structure is left although nothing was found, and if not every term
   /// found is confirmed: what those stand for has no name yet. Failed_held_out if what was found makes the error on the
   /// samples set aside larger, and parameters_only if nothing was found and the parameters improve the score, see
-  /// find_missing().
+  /// find_missing(). Inner_state if one of the named terms stands for a state that the inputs do
+  /// not show.
   Answer answer = Answer::nothing_missing;
   Verdict verdict;  ///< of the last search; candidates in it are numbers of `candidates`, samples those of `searched`
   std::vector<std::string> candidates;

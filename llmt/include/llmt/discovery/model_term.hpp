@@ -46,8 +46,12 @@ struct ModelTerm {
   std::function<Eigen::MatrixXd(const Rows& rows, const Eigen::VectorXd& constants)> columns;
   std::vector<TermConstant> constants = {};  ///< at most two; of two, both smooth
   std::string output = {};                   ///< the output it changes; empty: each output is a place of its own
-  bool generic = false;        ///< not a cause but a shape: what it explains is "unknown, depends on `inputs`"
-  bool history = false;        ///< depends on earlier rows: tried only beside what rows explain by themselves
+  bool generic = false;  ///< not a cause but a shape: what it explains is "unknown, depends on `inputs`"
+  bool history = false;  ///< depends on earlier rows: tried only beside what rows explain by themselves
+  /// "a delay or a first-order lag": the term stands for a state that the inputs do not show. Empty: it does not.
+  std::string inner_state = {};
+  std::string shown_by = {};   ///< the signal that would show that state
+  std::string unit = {};       ///< of the first coefficient; empty: that of the output by `per`, of all
   Eigen::VectorXd lower = {};  ///< k plausible limits of the coefficients, or empty: none
   Eigen::VectorXd upper = {};
   /// Where terms predict the same at every row, the less complex one gets the name. The library's have 1 (a constant)
@@ -69,6 +73,9 @@ struct Inputs {
   /// Empty: rows are independent.
   Eigen::VectorXd instants = {};
   std::vector<Eigen::Index> runs = {};  ///< n labels of the recording that a row is of; empty: one recording
+  /// p standard deviations of the errors of the inputs (0: none; NaN: estimated from rows in time). Empty: NaN for rows
+  /// in time, else 0.
+  Eigen::VectorXd noise = {};
 };
 
 }  // namespace llmt::discovery

@@ -37,7 +37,7 @@ Verdict search(const Evidence& evidence, const std::vector<EffectCandidate>& can
                const SearchOptions& options = {});
 
 /// "nothing missing", "named", "named, indistinguishable", "unknown effect", "failed on held-out rows",
-/// "parameters only".
+/// "parameters only", "an inner state".
 std::string to_string(Answer answer);
 
 }  // namespace llmt::discovery

@@ -47,6 +47,8 @@ struct EffectCandidate {
   double prior_cost = 0.0;
   /// Of explanations that predict the same at every sample, the one with the less complex candidate gets the name.
   int complexity = 0;
+  /// k, or empty: what signature' residuals lacks because errors of the inputs are in both.
+  Eigen::VectorXd moment_correction = {};
 };
 
 /// A cause that these samples cannot test.
@@ -128,7 +130,8 @@ enum class Answer {
   indistinguishable,
   unknown,
   failed_held_out,  ///< of find_missing(): with what was found the error on rows set aside is larger
-  parameters_only   ///< of find_missing(): nothing is missing, but parameters are off their nominal values
+  parameters_only,  ///< of find_missing(): nothing is missing, but parameters are off their nominal values
+  inner_state  ///< of find_missing(): a term that stands for a state which the inputs do not show is among the named
 };
 
 /// A cause that would have won, had its values been within their limits.

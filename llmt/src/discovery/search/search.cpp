@@ -59,6 +59,10 @@ void check(const Evidence& evidence, const std::vector<EffectCandidate>& candida
         (candidate.lower.size() != 0 && candidate.lower.size() != k)) {
       refuse("limits of " + name + " must be empty or as many as its signature has columns");
     }
+    if (candidate.moment_correction.size() != 0 &&
+        (candidate.moment_correction.size() != k || !candidate.moment_correction.allFinite())) {
+      refuse(fmt::format("moment_correction of {} must be empty or {} finite numbers", name, k));
+    }
     if (!std::isfinite(candidate.prior_cost)) refuse("prior_cost of " + name + " is not finite");
   }
 }
@@ -191,6 +195,8 @@ std::string to_string(Answer answer) {
       return "failed on held-out rows";
     case Answer::parameters_only:
       return "parameters only";
+    case Answer::inner_state:
+      return "an inner state";
   }
   return "";
 }

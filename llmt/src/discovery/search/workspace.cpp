@@ -45,7 +45,10 @@ Workspace::Workspace(const Evidence& evidence, const std::vector<EffectCandidate
   degrees_ = static_cast<double>(residuals_.size() - baseline_.cols());
   project(residuals_);
   Eigen::Index columns = 0;
-  for (const EffectCandidate& candidate : candidates) columns += candidate.signature.cols();
+  for (const EffectCandidate& candidate : candidates) {
+    columns += candidate.signature.cols();
+    corrections_.push_back(candidate.moment_correction);
+  }
   Eigen::MatrixXd all(residuals_.size(), columns);
   columns = 0;
   for (const EffectCandidate& candidate : candidates) {
@@ -64,7 +67,7 @@ Workspace::Workspace(const Evidence& evidence, const std::vector<EffectCandidate
   gram_ = Eigen::MatrixXd::Zero(next, next);
   if (next > 0) gram_.selfadjointView<Eigen::Lower>().rankUpdate(basis_.transpose());
   gram_.triangularView<Eigen::StrictlyUpper>() = gram_.transpose();
-  moments_ = basis_.transpose() * residuals_;
+  set_moments();
 }
 
 // Directions of the candidate's values are ordered by how much of them is outside; those with too little are absorbed.
@@ -122,7 +125,16 @@ void Workspace::drop(const std::vector<std::size_t>& samples) {
     dropped_.push_back(sample);
   }
   orthonormalise_blocks();
+  set_moments();
+}
+
+void Workspace::set_moments() {
   moments_ = basis_.transpose() * residuals_;
+  for (std::size_t a = 0; a < blocks_.size(); ++a) {
+    const Block& block = blocks_[a];
+    if (corrections_[a].size() == 0 || block.size == 0) continue;
+    moments_.segment(block.begin, block.size) += block.to_values.transpose() * corrections_[a];
+  }
 }
 
 void Workspace::orthonormalise_blocks() {

@@ -16,7 +16,7 @@ struct Block {
 };
 
 /// r, U: residuals and an orthonormal basis of every candidate's signature, both orthogonal to the baseline's range;
-/// G = U'U and c = U'r, from which any set of candidates is a small solve.
+/// G = U'U and c = U'r (and EffectCandidate::moment_correction), from which any set of candidates is a small solve.
 class Workspace {
  public:
   Workspace(const Evidence& evidence, const std::vector<EffectCandidate>& candidates, double absorbed_tolerance);
@@ -62,10 +62,12 @@ class Workspace {
   Eigen::MatrixXd gram_;
   Eigen::VectorXd moments_;
   std::vector<Block> blocks_;
+  std::vector<Eigen::VectorXd> corrections_;  // EffectCandidate::moment_correction
   std::vector<std::size_t> dropped_;
 
   void add(const EffectCandidate& candidate, Eigen::MatrixXd projected, double absorbed_tolerance, Eigen::Index& next);
   void orthonormalise_blocks();
+  void set_moments();
 };
 
 /// Orthonormal basis of the range of a matrix whose columns may have any scale: columns with less than `tolerance` of

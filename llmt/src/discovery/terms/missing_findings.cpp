@@ -32,10 +32,16 @@ FoundTerm described(const TermModel& model, const PlacedTerm& placed, const Eige
   found.inputs = term.inputs;
   found.generic = term.generic;
   found.code = term.code;
+  found.inner_state = term.inner_state;
+  found.shown_by = term.shown_by;
   found.coefficients = placed.coefficients;
   found.constants = placed.constants;
   for (Eigen::Index k = 0; k < std::ssize(term.coefficients); ++k) {
-    found.values.push_back({term.coefficients[k], unit_of(found.output, term.per), placed.coefficients(k), errors(k)});
+    found.values.push_back({term.coefficients[k],
+                            term.unit.empty() ? unit_of(found.output, term.per)
+                            : k == 0          ? term.unit
+                                              : "",
+                            placed.coefficients(k), errors(k)});
   }
   for (Eigen::Index c = 0; c < std::ssize(term.constants); ++c) {
     found.values.push_back(
@@ -153,6 +159,9 @@ std::vector<Structure> structure_beside(const TermModel& model, const TermData& 
 void decide(Missing& missing) {
   const bool is_nothing = missing.verdict.answer == Answer::nothing_missing;
   missing.answer = is_nothing && !missing.structure.empty() ? Answer::unknown : missing.verdict.answer;
+  const bool has_inner_state =
+      std::ranges::any_of(missing.found, [](const FoundTerm& found) { return !found.inner_state.empty(); });
+  if (has_inner_state) missing.answer = Answer::inner_state;
   if (!missing.failing_rows.empty()) missing.answer = Answer::failed_held_out;
   const std::vector<bool> approximate = approximations(missing.found);
   std::set<std::vector<std::string>> noted;
@@ -162,11 +171,17 @@ void decide(Missing& missing) {
         std::ranges::find(missing.structure, found.output, &Structure::output) != missing.structure.end();
     found.confirmed = missing.answer != Answer::failed_held_out && missing.verdict.answer != Answer::unknown &&
                       !found.generic && !approximate[k] && !is_beside_structure && found.shrinks_gap;
+    // What stands beside a state may be what the state does beyond the first order.
+    constexpr double small_share = 0.1;
+    if (has_inner_state && found.inner_state.empty() && found.share < small_share) found.confirmed = false;
     if (!approximate[k] || !noted.insert(sorted_inputs(found)).second) continue;
     missing.notes.push_back(
         fmt::format("there are many terms of {}: together they may approximate one that was not tried",
                     fmt::join(sorted_inputs(found), " and ")));
   }
+}
+
+void demand_certainty(Missing& missing) {
   const bool is_named = missing.answer == Answer::named || missing.answer == Answer::indistinguishable;
   if (is_named && !std::ranges::all_of(missing.found, &FoundTerm::confirmed)) missing.answer = Answer::unknown;
 }

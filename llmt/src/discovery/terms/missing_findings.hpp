@@ -35,6 +35,9 @@ std::vector<Structure> structure_beside(const TermModel& model, const TermData& 
 ///   error on the samples set aside.
 void decide(Missing& missing);
 
+/// What is named is certain: with a term that is not confirmed the answer is "unknown".
+void demand_certainty(Missing& missing);
+
 /// Of the errors of an output on the samples set aside: at the nominal parameters, with parameters alone, with terms.
 Gap gap_of(std::string output, const Eigen::VectorXd& nominal, const Eigen::VectorXd& before,
            const Eigen::VectorXd& after, double noise_floor);

@@ -8,6 +8,7 @@
 
 #include "discovery/terms/correlation.hpp"
 #include "discovery/terms/determined.hpp"
+#include "discovery/terms/errors_of_inputs.hpp"
 #include "discovery/terms/fitted_parameters.hpp"
 #include "discovery/terms/held_out.hpp"
 #include "discovery/terms/missing_findings.hpp"
@@ -121,7 +122,10 @@ Missing search_once(const Simulation& simulation, const Inputs& inputs, const Me
   const bool in_time = inputs.instants.size() > 0;
   Simulation distinct = simulation;
   const TermModel model(distinct, inputs, measured.names, terms, refuted);
-  const RowSplit split = in_time ? split_in_time(inputs, options) : split_independent(inputs, options);
+  Eigen::VectorXd start(std::ssize(simulation.parameters));
+  for (std::size_t k = 0; k < simulation.parameters.size(); ++k) start(k) = simulation.parameters[k].value;
+  RowSplit split = in_time ? split_in_time(inputs, options) : split_independent(inputs, options);
+  ErrorsOfInputs errors = errors_of_inputs(model, inputs, measured, start, split);
   const Eigen::Index d = measured.values.cols();
   TermData data = data_of(split.searched, measured);
   data.stretches = split.stretches;
@@ -132,15 +136,14 @@ Missing search_once(const Simulation& simulation, const Inputs& inputs, const Me
            fmt::format("{} rows to search beside {} set aside are too few: {} free parameters need {} measured values",
                        split.searched.size(), split.held_out.size(), free, fewest + 2 * free));
   }
-  Eigen::VectorXd start(std::ssize(simulation.parameters));
-  for (std::size_t k = 0; k < simulation.parameters.size(); ++k) start(k) = simulation.parameters[k].value;
   Work work(options.progress);
   work.begin("fitting");
   const DistinctParameters sums = determined(model, data, start, distinct.parameters);
   TermFit baseline = fit_terms(model, data, start, {});
   data.sigma = scatter(model, data, baseline);
   if (d > 1) baseline = fit_terms(model, data, start, {});
-  const Settled settled = search_terms(model, data, split.repeats, baseline, options, work);
+  Settled settled = search_terms(model, data, split.repeats, baseline, errors.noise.get(), options, work);
+  correct_estimates(errors, without_samples(data, settled.verdict.outliers), settled.fit);
 
   Missing missing;
   missing.verdict = settled.verdict;
@@ -164,10 +167,15 @@ Missing search_once(const Simulation& simulation, const Inputs& inputs, const Me
   missing.before = model.predict(baseline.parameters, {});
   missing.corrected = model.predict(settled.fit.parameters, settled.fit.placed);
   missing.structure = structure_beside(model, kept, inputs, missing);
+  // Independent rows with errors of the inputs deviate like their neighbours: the errors alone do that.
+  if (errors.noise && !in_time) missing.structure.clear();
   TermData aside = data_of(split.held_out, measured);
   aside.sigma = data.sigma;
   judge_held_out(model, kept, aside, baseline, settled, missing);
+  missing.notes.insert(missing.notes.end(), errors.notes.begin(), errors.notes.end());
   decide(missing);
+  doubt_uncorrected(errors, missing);
+  demand_certainty(missing);
   describe_parameters({model, kept, start, baseline, settled.fit}, sums, options.search.false_alarm_rate, missing);
   missing.floor_from_repeats = settled.verdict.lack_of_fit.has_enough_repeats();
   const double noise = missing.floor_from_repeats ? settled.verdict.lack_of_fit.noise : settled.verdict.noise;

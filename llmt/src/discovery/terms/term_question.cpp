@@ -15,7 +15,7 @@ bool placed_already(const std::vector<PlacedTerm>& placed, std::size_t term, Eig
 
 // `slot`: of equal terms with different constants, those in the same slot exclude each other.
 EffectCandidate candidate_of(const TermModel& model, const TermData& data, const PlacedTerm& option,
-                             const Eigen::MatrixXd& simulated, std::size_t slot) {
+                             const Eigen::MatrixXd& simulated, std::size_t slot, const InputNoise* noise) {
   const ModelTerm& term = model.terms()[option.term];
   EffectCandidate candidate;
   candidate.family = term.family;
@@ -28,6 +28,7 @@ EffectCandidate candidate_of(const TermModel& model, const TermData& data, const
   candidate.generic = term.generic;
   candidate.prior_cost = option.prior_cost;
   candidate.complexity = term.complexity;
+  if (noise != nullptr) candidate.moment_correction = noise->moment_correction(data, option, simulated);
   return candidate;
 }
 
@@ -98,8 +99,8 @@ TermData without_samples(const TermData& data, const std::vector<std::size_t>& l
 }
 
 TermQuestion ask(const TermModel& model, const TermData& data, const TermFit& fit,
-                 const std::vector<Eigen::Index>& repeats, const std::vector<std::size_t>& outliers,
-                 bool with_history) {
+                 const std::vector<Eigen::Index>& repeats, const std::vector<std::size_t>& outliers, bool with_history,
+                 const InputNoise* noise) {
   TermQuestion question;
   const Eigen::MatrixXd simulated = model.simulated(fit.parameters);
   const auto d = data.measured.cols();
@@ -114,7 +115,7 @@ TermQuestion ask(const TermModel& model, const TermData& data, const TermFit& fi
   Slots slots;
   for (const PlacedTerm& placed : fit.placed) {
     question.options.push_back(placed);
-    question.candidates.push_back(candidate_of(model, data, placed, simulated, slots.next(model, placed)));
+    question.candidates.push_back(candidate_of(model, data, placed, simulated, slots.next(model, placed), noise));
     question.evidence.residuals += question.candidates.back().signature * placed.coefficients;
     ground.nuisance = beside(ground.nuisance, question.candidates.back().signature);
   }
@@ -132,7 +133,7 @@ TermQuestion ask(const TermModel& model, const TermData& data, const TermFit& fi
         options.push_back({t, o, {}, Eigen::VectorXd::Zero(std::ssize(term.coefficients)), 0.0});
       }
       for (PlacedTerm& option : options) {
-        question.candidates.push_back(candidate_of(model, data, option, simulated, slots.next(model, option)));
+        question.candidates.push_back(candidate_of(model, data, option, simulated, slots.next(model, option), noise));
         question.options.push_back(std::move(option));
       }
     }

@@ -4,6 +4,7 @@
 #include <map>
 #include <vector>
 
+#include "discovery/terms/input_noise.hpp"
 #include "discovery/terms/term_model.hpp"
 
 namespace llmt::discovery {
@@ -18,9 +19,10 @@ struct TermQuestion {
 
 /// The question at the present estimates. The found terms compete again, with what they explain added back to the
 /// residuals. Constants of the other terms are tried on the residuals without the samples in `outliers`. Terms that
-/// depend on earlier rows are candidates only `with_history`.
+/// depend on earlier rows are candidates only `with_history`. `noise`: of the inputs, or none.
 TermQuestion ask(const TermModel& model, const TermData& data, const TermFit& fit,
-                 const std::vector<Eigen::Index>& repeats, const std::vector<std::size_t>& outliers, bool with_history);
+                 const std::vector<Eigen::Index>& repeats, const std::vector<std::size_t>& outliers, bool with_history,
+                 const InputNoise* noise = nullptr);
 
 /// Moves constants of terms to a better value, if there is one now that everything else is fitted. Returns whether any
 /// was moved.

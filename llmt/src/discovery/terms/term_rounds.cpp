@@ -46,7 +46,8 @@ double share_of_independent(const TermModel& model, const TermData& data, const 
 
 // The weights of the outputs, and the share of the samples that is independent, follow what each round leaves.
 Settled search_until_settled(const TermModel& model, TermData& data, const std::vector<Eigen::Index>& repeats,
-                             Settled settled, bool with_history, const MissingOptions& options, Work& work) {
+                             Settled settled, bool with_history, const InputNoise* noise, const MissingOptions& options,
+                             Work& work) {
   const bool in_time = !data.stretches.empty();
   constexpr int fewest_in_time = 8;
   const RoundLimits limits{.most = in_time ? std::max(options.rounds, fewest_in_time) : options.rounds,
@@ -56,7 +57,7 @@ Settled search_until_settled(const TermModel& model, TermData& data, const std::
       data.sigma = scatter(model, without_samples(data, settled.verdict.outliers), settled.fit);
     }
     work.begin(fmt::format("searching, round {}", ++settled.rounds));
-    settled.question = ask(model, data, settled.fit, repeats, settled.verdict.outliers, with_history);
+    settled.question = ask(model, data, settled.fit, repeats, settled.verdict.outliers, with_history, noise);
     settled.verdict = search(settled.question.evidence, settled.question.candidates, options.search);
     work.did(share_of_half_a_round * work.left());
     const TermData kept = without_samples(data, settled.verdict.outliers);
@@ -100,13 +101,13 @@ Eigen::VectorXd scatter(const TermModel& model, const TermData& data, const Term
 }
 
 Settled search_terms(const TermModel& model, TermData& data, const std::vector<Eigen::Index>& repeats,
-                     const TermFit& baseline, const MissingOptions& options, Work& work) {
+                     const TermFit& baseline, const InputNoise* noise, const MissingOptions& options, Work& work) {
   Settled settled;
   settled.fit = baseline;
-  settled = search_until_settled(model, data, repeats, std::move(settled), false, options, work);
+  settled = search_until_settled(model, data, repeats, std::move(settled), false, noise, options, work);
   if (std::ranges::any_of(model.terms(), &ModelTerm::history)) {
     TermData again = data;
-    const Settled other = search_until_settled(model, again, repeats, settled, true, options, work);
+    const Settled other = search_until_settled(model, again, repeats, settled, true, noise, options, work);
     if (needs_history(model, settled, other, options.search.rival_margin)) {
       data = again;
       settled = other;

@@ -1,0 +1,97 @@
+#include "discovery/terms/derivatives.hpp"
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+
+namespace llmt::discovery {
+std::vector<Recorded> recordings(const Rows& rows) {
+  const auto n = std::ssize(rows.sequence);
+  std::vector<double> steps;
+  for (Eigen::Index k = 1; k < n; ++k) {
+    const double step = rows.instants(rows.sequence[k]) - rows.instants(rows.sequence[k - 1]);
+    if (step > 0.0) steps.push_back(step);
+  }
+  std::vector<Recorded> all(n);
+  if (steps.empty()) return all;
+  std::ranges::nth_element(steps, steps.begin() + std::ssize(steps) / 2);
+  constexpr double interruption = 3.0;  // steps
+  const double longest = interruption * steps[steps.size() / 2];
+  Eigen::Index begin = 0;
+  for (Eigen::Index k = 1; k <= n; ++k) {
+    const double step = k < n ? rows.instants(rows.sequence[k]) - rows.instants(rows.sequence[k - 1]) : 0.0;
+    if (k < n && step > 0.0 && step <= longest) continue;
+    for (Eigen::Index i = begin; i < k; ++i) all[i] = {begin, k};
+    begin = k;
+  }
+  return all;
+}
+
+Derivatives::Derivatives(const Rows& rows, Eigen::Index half) : sequence_(rows.sequence) {
+  const std::vector<Recorded> extent = recordings(rows);
+  const auto n = std::ssize(sequence_);
+  first_.resize(n);
+  second_.resize(n);
+  Eigen::VectorXd before;
+  Eigen::MatrixXd inverse;
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const Eigen::Index begin = std::max(extent[k].begin, k - half);
+    const Eigen::Index end = std::min(extent[k].end, k + half + 1);
+    // Beyond one end of a window a polynomial of high degree is anything.
+    const Eigen::Index most_powers = end - begin == 2 * half + 1 ? 5 : 3;
+    const Eigen::Index powers = std::min(most_powers, end - begin);
+    first_[k].begin = second_[k].begin = begin;
+    first_[k].weights = second_[k].weights = Eigen::VectorXd::Zero(std::max<Eigen::Index>(0, end - begin));
+    if (powers < 2) continue;
+    Eigen::VectorXd times(end - begin);
+    for (Eigen::Index i = begin; i < end; ++i) {
+      times(i - begin) = rows.instants(sequence_[i]) - rows.instants(sequence_[k]);
+    }
+    const double width = times.cwiseAbs().maxCoeff();
+    times /= width;
+    constexpr double same = 1e-7;
+    if (before.size() != times.size() || (before - times).cwiseAbs().maxCoeff() > same) {
+      Eigen::MatrixXd basis = Eigen::MatrixXd::Ones(times.size(), powers);
+      for (Eigen::Index q = 1; q < powers; ++q) basis.col(q) = basis.col(q - 1).cwiseProduct(times);
+      inverse = basis.completeOrthogonalDecomposition().pseudoInverse();
+      before = times;
+    }
+    first_[k].weights = inverse.row(1).transpose() / width;
+    if (powers > 2) second_[k].weights = 2.0 * inverse.row(2).transpose() / (width * width);
+  }
+}
+
+Eigen::VectorXd Derivatives::apply(const std::vector<Stencil>& stencils, const Eigen::VectorXd& values) const {
+  const Eigen::VectorXd in_time = values(sequence_);
+  Eigen::VectorXd result = Eigen::VectorXd::Zero(values.size());
+  for (std::size_t k = 0; k < stencils.size(); ++k) {
+    const Stencil& own = stencils[k];
+    result(sequence_[k]) = own.weights.dot(in_time.segment(own.begin, own.weights.size()));
+  }
+  return result;
+}
+
+Eigen::Index smooth_lag(const Rows& rows, const Eigen::MatrixXd& signals) {
+  constexpr double largest_noise_share = 0.4;
+  constexpr double largest_change = 0.18;
+  constexpr Eigen::Index least = 2;
+  const auto n = std::ssize(rows.sequence);
+  Eigen::Index lag = n / 20;
+  for (Eigen::Index j = 0; j < signals.cols(); ++j) {
+    if (n < 8) return least;
+    const Eigen::ArrayXd v = Eigen::VectorXd(signals.col(j))(rows.sequence).array();
+    const double variance = (v - v.mean()).square().mean();
+    const Eigen::ArrayXd third = v.tail(n - 3) - 3.0 * v.segment(2, n - 3) + 3.0 * v.segment(1, n - 3) - v.head(n - 3);
+    const double noise = third.square().mean() / 20.0;
+    if (!(variance > 0.0) || noise > largest_noise_share * variance) continue;
+    Eigen::Index own = 1;
+    while (own < lag && 0.5 * (v.tail(n - own - 1) - v.head(n - own - 1)).square().mean() - noise <=
+                            largest_change * (variance - noise)) {
+      ++own;
+    }
+    lag = own;
+  }
+  return std::max(least, lag);
+}
+
+}  // namespace llmt::discovery

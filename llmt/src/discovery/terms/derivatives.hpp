@@ -1,0 +1,49 @@
+// Derivatives of signals by time.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "llmt/discovery/model_term.hpp"
+
+namespace llmt::discovery {
+
+/// Where the recording begins and ends that a place in time is part of: [begin, end) of the sequence.
+struct Recorded {
+  Eigen::Index begin = 0;
+  Eigen::Index end = 0;
+};
+
+/// One for each place of the sequence. A recording ends where time jumps back or by more than 3 median steps.
+std::vector<Recorded> recordings(const Rows& rows);
+
+/// First and second derivatives by time at every row, of any column of values: local least squares of a polynomial of
+/// the fourth degree over the rows within `half` places in time (Savitzky and Golay 1964, for any spacing). A window
+/// ends where a run ends or the recording was interrupted.
+class Derivatives {
+ public:
+  Derivatives(const Rows& rows, Eigen::Index half);
+
+  Eigen::VectorXd first(const Eigen::VectorXd& values) const { return apply(first_, values); }
+  Eigen::VectorXd second(const Eigen::VectorXd& values) const { return apply(second_, values); }
+
+ private:
+  // The weights of the rows in a window.
+  struct Stencil {
+    Eigen::Index begin = 0;  // place in the sequence
+    Eigen::VectorXd weights;
+  };
+  std::vector<Eigen::Index> sequence_;
+  std::vector<Stencil> first_;
+  std::vector<Stencil> second_;
+
+  Eigen::VectorXd apply(const std::vector<Stencil>& stencils, const Eigen::VectorXd& values) const;
+};
+
+/// The places in time by which no smooth signal changes much: the longest lag l at which
+/// mean (v_(i+l) - v_i)^2 / 2, without the noise, is at most 18 % of the variance of every smooth column (for a sine of
+/// period P: l = 0.1 P); at least 2. A column whose noise (third differences) is more than 40 % of its variance is not
+/// smooth.
+Eigen::Index smooth_lag(const Rows& rows, const Eigen::MatrixXd& signals);
+
+}  // namespace llmt::discovery

@@ -1,0 +1,69 @@
+#include "discovery/terms/errors_of_inputs.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "discovery/terms/standstill.hpp"
+#include "llmt/discovery/terms.hpp"
+
+namespace llmt::discovery {
+
+ErrorsOfInputs errors_of_inputs(const TermModel& model, const Inputs& inputs, const MeasuredOutputs& measured,
+                                const Eigen::VectorXd& start, RowSplit& split) {
+  ErrorsOfInputs errors;
+  if (inputs.instants.size() == 0 && inputs.noise.size() == 0) return errors;
+  const Eigen::MatrixXd simulated = model.simulated(start);
+  if (!simulated.allFinite()) return errors;
+  const Rows rows = rows_of(inputs, Eigen::VectorXd::Zero(inputs.values.rows()));
+  const Eigen::MatrixXd covariance = covariance_of_errors(rows, inputs);
+  if (!(covariance.diagonal().array() > 0.0).any()) return errors;
+  if (inputs.instants.size() > 0) {
+    std::vector<bool> apart(inputs.values.rows(), false);
+    for (const UnknownSign& found :
+         rows_of_unknown_sign(rows, inputs, covariance, measured.values - simulated, apart)) {
+      errors.notes.push_back(fmt::format(
+          "{} rows with |{}| < {:.3g} were set apart: the sign of {} is not known there, and values scatter {:.1f} "
+          "times as much as elsewhere",
+          found.rows, found.input, found.limit, found.input, found.roughness));
+    }
+    split = without_rows(split, apart);
+  }
+  auto noise = std::make_unique<InputNoise>(model, inputs, simulated, covariance);
+  std::vector<std::string> deviations;
+  for (std::size_t j = 0; j < inputs.names.size(); ++j) {
+    const double own = std::sqrt(covariance(static_cast<Eigen::Index>(j), static_cast<Eigen::Index>(j)));
+    if (own > 0.0) deviations.push_back(fmt::format("{} {:.2g}", inputs.names[j], own));
+  }
+  const bool is_told = inputs.noise.size() > 0 && !inputs.noise.array().isNaN().any();
+  constexpr double enough = 0.9;
+  const bool is_described = noise->described().minCoeff() >= enough;
+  errors.notes.push_back(fmt::format(
+      "errors of the inputs {} (standard deviations): {}; {}", is_told ? "as told" : "from neighbouring rows",
+      fmt::join(deviations, ", "),
+      is_described ? "what they add to the deviations was taken out"
+                   : "what they add to the deviations is not known, because no function of the inputs describes the "
+                     "simulation"));
+  if (is_described) errors.noise = std::move(noise);
+  return errors;
+}
+
+void correct_estimates(ErrorsOfInputs& errors, const TermData& kept, TermFit& fit) {
+  if (errors.noise) errors.uncorrected = errors.noise->correct(kept, fit);
+}
+
+void doubt_uncorrected(const ErrorsOfInputs& errors, Missing& missing) {
+  for (FoundTerm& found : missing.found) {
+    std::string label = found.family;
+    if (!found.location.empty()) label += " " + found.location;
+    if (missing.gaps.size() > 1) label += " on " + found.output;
+    if (std::ranges::find(errors.uncorrected, label) == errors.uncorrected.end()) continue;
+    found.confirmed = false;
+    missing.notes.push_back(
+        fmt::format("{}: errors of the inputs are more than half of it, so they alone could make this term", label));
+  }
+}
+
+}  // namespace llmt::discovery

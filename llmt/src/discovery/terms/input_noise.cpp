@@ -1,0 +1,248 @@
+#include "discovery/terms/input_noise.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+#include "discovery/terms/derivatives.hpp"
+#include "llmt/random.hpp"
+
+namespace llmt::discovery {
+namespace {
+
+constexpr int pairs_of_draws = 4;
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + std::ssize(values) / 2;
+  std::ranges::nth_element(values, middle);
+  return *middle;
+}
+
+// Fourth differences within recordings; a row each.
+Eigen::MatrixXd fourth_differences(const Rows& rows, const Eigen::MatrixXd& values) {
+  const std::vector<Recorded> recorded = recordings(rows);
+  const auto n = std::ssize(rows.sequence);
+  Eigen::MatrixXd all(n, values.cols());
+  Eigen::Index count = 0;
+  for (Eigen::Index k = 0; k + 4 < n; ++k) {
+    if (recorded[k].begin != recorded[k + 4].begin) continue;
+    const auto at = [&](Eigen::Index i) { return values.row(rows.sequence[k + i]); };
+    all.row(count++) = at(4) - 4.0 * at(3) + 6.0 * at(2) - 4.0 * at(1) + at(0);
+  }
+  all.conservativeResize(count, Eigen::NoChange);
+  return all;
+}
+
+Eigen::VectorXd stacked(const TermData& data, const Eigen::MatrixXd& of_rows) {
+  const Eigen::MatrixXd of_samples = means(of_rows, data.samples);
+  const Eigen::Index d = data.measured.cols();
+  Eigen::VectorXd all(data.measured.size());
+  for (Eigen::Index i = 0; i < of_samples.rows(); ++i) {
+    all.segment(i * d, d) = of_samples.row(i).transpose().cwiseQuotient(data.sigma);
+  }
+  return all;
+}
+
+bool is_fitted(const TermModel& model, const PlacedTerm& placed) {
+  const std::vector<TermConstant>& constants = model.terms()[placed.term].constants;
+  return !constants.empty() && constants.front().smooth;
+}
+
+// Derivatives of the stacked prediction by coefficients and smooth constants of the terms.
+Eigen::MatrixXd term_jacobian(const TermModel& model, const TermData& data, const TermFit& fit) {
+  const Eigen::MatrixXd simulated = model.simulated(fit.parameters);
+  std::vector<Eigen::VectorXd> columns;
+  for (const PlacedTerm& placed : fit.placed) {
+    const Eigen::MatrixXd signature = stacked_signature(model, data, placed, simulated);
+    for (Eigen::Index k = 0; k < signature.cols(); ++k) columns.emplace_back(signature.col(k));
+    if (!is_fitted(model, placed)) continue;
+    const double step = 1e-3 * spacing(model.terms()[placed.term].constants.front().tried, placed.constants(0));
+    PlacedTerm moved = placed;
+    moved.constants(0) += step;
+    Eigen::VectorXd change = stacked_signature(model, data, moved, simulated) * placed.coefficients;
+    moved.constants(0) -= 2.0 * step;
+    change -= stacked_signature(model, data, moved, simulated) * placed.coefficients;
+    columns.emplace_back(change / (2.0 * step));
+  }
+  Eigen::MatrixXd all(data.measured.size(), std::ssize(columns));
+  for (std::size_t k = 0; k < columns.size(); ++k) all.col(k) = columns[k];
+  return all;
+}
+
+Eigen::MatrixXd jacobian(const TermModel& model, const TermData& data, const TermFit& fit) {
+  const Eigen::MatrixXd own = baseline_jacobian(model, data, fit.parameters, fit.placed);
+  const Eigen::MatrixXd terms = term_jacobian(model, data, fit);
+  Eigen::MatrixXd all(own.rows(), own.cols() + terms.cols());
+  all << own, terms;
+  return all;
+}
+
+}  // namespace
+
+// The model at inputs with errors once more.
+struct InputNoise::Draw {
+  Inputs inputs;
+  Simulation simulation;
+  std::unique_ptr<TermModel> model;
+  Eigen::MatrixXd change;  // n x d of the simulation
+};
+
+Eigen::MatrixXd noise_in_time(const Rows& rows, const Inputs& inputs) {
+  constexpr double factor = 70.0;
+  constexpr double jump = 5.0;  // robust standard deviations
+  constexpr double normal_median = 0.6745;
+  constexpr double largest_share = 0.4;
+  const Eigen::Index p = inputs.values.cols();
+  Eigen::MatrixXd differences = fourth_differences(rows, inputs.values);
+  constexpr Eigen::Index fewest = 50;
+  if (differences.rows() < fewest) return Eigen::MatrixXd::Zero(p, p);
+  Eigen::VectorXd limits(p);
+  for (Eigen::Index j = 0; j < p; ++j) {
+    const Eigen::VectorXd own = differences.col(j).cwiseAbs();
+    limits(j) = jump * median({own.begin(), own.end()}) / normal_median;
+    if (!(limits(j) > 0.0)) limits(j) = own.maxCoeff();  // most are equal: an encoder at rest
+  }
+  Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(p, p);
+  double count = 0.0;
+  for (Eigen::Index i = 0; i < differences.rows(); ++i) {
+    if ((differences.row(i).transpose().cwiseAbs().array() > limits.array()).any()) continue;
+    sum += differences.row(i).transpose() * differences.row(i);
+    count += 1.0;
+  }
+  Eigen::MatrixXd covariance = count > 0.0 ? Eigen::MatrixXd(sum / (factor * count)) : Eigen::MatrixXd::Zero(p, p);
+  for (Eigen::Index j = 0; j < p; ++j) {
+    const double variance = (inputs.values.col(j).array() - inputs.values.col(j).mean()).square().mean();
+    if (inputs.names[j] != inputs.order && covariance(j, j) <= largest_share * variance) continue;
+    covariance.row(j).setZero();
+    covariance.col(j).setZero();
+  }
+  return covariance;
+}
+
+Eigen::MatrixXd covariance_of_errors(const Rows& rows, const Inputs& inputs) {
+  const Eigen::Index p = inputs.values.cols();
+  const bool in_time = inputs.instants.size() > 0;
+  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(p, p);
+  if (in_time) covariance = noise_in_time(rows, inputs);
+  for (Eigen::Index j = 0; j < inputs.noise.size(); ++j) {
+    const double given = inputs.noise(j);
+    if (std::isnan(given)) continue;
+    const double own = std::sqrt(covariance(j, j));
+    const double factor = own > 0.0 ? given / own : 0.0;
+    covariance.row(j) *= factor;
+    covariance.col(j) *= factor;
+    covariance(j, j) = given * given;
+  }
+  return covariance;
+}
+
+InputNoise::InputNoise(const TermModel& model, const Inputs& inputs, const Eigen::MatrixXd& simulated,
+                       const Eigen::MatrixXd& covariance)
+    : model_(&model), surrogate_(inputs.values, simulated) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(covariance);
+  const Eigen::MatrixXd root =
+      axes.eigenvectors() * axes.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal() * axes.eigenvectors().transpose();
+  const Eigen::MatrixXd described = surrogate_.predict(inputs.values);
+  Random random(1);
+  for (int pair = 0; pair < pairs_of_draws; ++pair) {
+    Eigen::MatrixXd errors(inputs.values.rows(), inputs.values.cols());
+    for (double& value : errors.reshaped()) value = random.normal();
+    errors = errors * root;
+    for (const double sign : {1.0, -1.0}) {
+      auto draw = std::make_shared<Draw>();
+      draw->inputs = inputs;
+      draw->inputs.values += sign * errors;
+      draw->change = surrogate_.predict(draw->inputs.values) - described;
+      draw->simulation.parameters = model.parameters();
+      draw->simulation.predict = [base = model_, own = draw.get()](const Eigen::MatrixXd&,
+                                                                   const Eigen::VectorXd& values) -> Eigen::MatrixXd {
+        return base->simulated(values) + own->change;
+      };
+      draw->model = std::make_unique<TermModel>(draw->simulation, draw->inputs, model.outputs(), model.terms());
+      draws_.push_back(std::move(draw));
+    }
+  }
+}
+
+Eigen::VectorXd InputNoise::moment_correction(const TermData& data, const PlacedTerm& placed,
+                                              const Eigen::MatrixXd& simulated) const {
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(std::ssize(model_->terms()[placed.term].coefficients));
+  for (const std::shared_ptr<const Draw>& draw : draws_) {
+    const Eigen::MatrixXd moved = stacked_signature(*draw->model, data, placed, simulated + draw->change);
+    sum += moved.transpose() * stacked(data, draw->change);
+  }
+  return sum / static_cast<double>(draws_.size());
+}
+
+std::vector<std::string> InputNoise::correct(const TermData& data, TermFit& fit) const {
+  constexpr int steps = 2;
+  std::vector<std::string> beyond;
+  std::vector<Eigen::Index> free;
+  for (Eigen::Index k = 0; k < std::ssize(model_->parameters()); ++k) {
+    if (model_->parameters()[k].free) free.push_back(k);
+  }
+  TermFit moved = fit;
+  Eigen::VectorXd factors;
+  for (int step = 0; step < steps; ++step) {
+    const Eigen::MatrixXd own = jacobian(*model_, data, moved);
+    if (own.cols() == 0) return beyond;
+    const Eigen::VectorXd predicted = stacked(data, model_->predict(moved.parameters, moved.placed));
+    const Eigen::MatrixXd gram = own.transpose() * own;
+    Eigen::MatrixXd errors = Eigen::MatrixXd::Zero(own.cols(), own.cols());
+    Eigen::VectorXd moments = own.transpose() * scaled_residuals(*model_, data, moved.parameters, moved.placed);
+    for (const std::shared_ptr<const Draw>& draw : draws_) {
+      const Eigen::MatrixXd other = jacobian(*draw->model, data, moved);
+      const Eigen::VectorXd change = stacked(data, draw->model->predict(moved.parameters, moved.placed)) - predicted;
+      errors += (other - own).transpose() * (other - own) / static_cast<double>(draws_.size());
+      moments += other.transpose() * change / static_cast<double>(draws_.size());
+    }
+    constexpr double most = 0.5;
+    const bool is_hopeless = (errors.diagonal().array() > most * gram.diagonal().array()).any();
+    const Eigen::LDLT<Eigen::MatrixXd> inverse(gram - errors);
+    if (is_hopeless || !inverse.isPositive() || inverse.info() != Eigen::Success) {
+      Eigen::Index next = std::ssize(free);
+      for (const PlacedTerm& placed : fit.placed) {
+        const Eigen::Index size = placed.coefficients.size() + (is_fitted(*model_, placed) ? 1 : 0);
+        const bool is_own =
+            (errors.diagonal().segment(next, size).array() > most * gram.diagonal().segment(next, size).array()).any();
+        if (is_own || !is_hopeless) beyond.push_back(model_->label(placed));
+        next += size;
+      }
+      return beyond;
+    }
+    const Eigen::VectorXd change = inverse.solve(moments);
+    const Eigen::MatrixXd spread = inverse.solve(inverse.solve(gram).transpose());
+    factors = (spread.diagonal().array() /
+               gram.ldlt().solve(Eigen::MatrixXd::Identity(gram.rows(), gram.cols())).diagonal().array())
+                  .sqrt();
+    for (std::size_t k = 0; k < free.size(); ++k) moved.parameters(free[k]) += change(static_cast<Eigen::Index>(k));
+    Eigen::Index next = std::ssize(free);
+    for (PlacedTerm& placed : moved.placed) {
+      placed.coefficients += change.segment(next, placed.coefficients.size());
+      next += placed.coefficients.size();
+      if (is_fitted(*model_, placed)) placed.constants(0) += change(next++);
+    }
+  }
+  if (!factors.allFinite()) return beyond;
+  for (std::size_t k = 0; k < free.size(); ++k)
+    moved.parameter_errors(free[k]) *= factors(static_cast<Eigen::Index>(k));
+  Eigen::Index next = std::ssize(free);
+  for (std::size_t t = 0; t < moved.placed.size(); ++t) {
+    const Eigen::Index size = moved.placed[t].coefficients.size() + (is_fitted(*model_, moved.placed[t]) ? 1 : 0);
+    moved.errors[t].head(size).array() *= factors.segment(next, size).array();
+    next += size;
+  }
+  fit = std::move(moved);
+  return beyond;
+}
+
+Eigen::MatrixXd InputNoise::scatter() const {
+  Eigen::MatrixXd sum = draws_.front()->change.cwiseAbs2();
+  for (std::size_t k = 1; k < draws_.size(); ++k) sum += draws_[k]->change.cwiseAbs2();
+  return (sum / static_cast<double>(draws_.size())).cwiseSqrt();
+}
+
+}  // namespace llmt::discovery

@@ -1,0 +1,53 @@
+// What errors of the inputs do to a search, and how it is undone.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "discovery/terms/surrogate.hpp"
+#include "discovery/terms/term_model.hpp"
+
+namespace llmt::discovery {
+
+/// Covariance of the errors of inputs that are smooth in time: fourth differences D^4 of independent errors have 70
+/// times their covariance. Rows where a signal jumps (a difference beyond 5 robust standard deviations of any column)
+/// do not count. Zero for columns that are constant or not smooth.
+Eigen::MatrixXd noise_in_time(const Rows& rows, const Inputs& inputs);
+
+/// The simulation was computed at x + e, e the errors of the inputs, so residuals hold s(x) - s(x + e), and the
+/// signature T(x + e) of a term holds e too: in expectation T'r is off by E[T(x + e)'(s(x) - s(x + e))] even where
+/// nothing is missing. Errors are drawn again, in pairs e, -e: added to the inputs as they are they do the same once
+/// more, to second order, so what they add is subtracted (corrected score of Nakamura 1990; the extrapolation of SIMEX,
+/// Cook and Stefanski 1994, with a straight line). The simulation at other inputs is described by a Surrogate.
+class InputNoise {
+ public:
+  /// `covariance` p x p of the errors. Keeps references to `model` and `inputs`.
+  InputNoise(const TermModel& model, const Inputs& inputs, const Eigen::MatrixXd& simulated,
+             const Eigen::MatrixXd& covariance);
+
+  /// What signature' residuals of a placed term lacks for the errors, k; `simulated` as stacked_signature() takes it.
+  Eigen::VectorXd moment_correction(const TermData& data, const PlacedTerm& placed,
+                                    const Eigen::MatrixXd& simulated) const;
+
+  /// Estimates and standard errors of a fit corrected for the errors: steps (J'J - D)^-1 (J'r + g), D = E[dJ'dJ] and
+  /// g = E[J'dy], where J is the Jacobian of the fit and dJ, dy are the changes of J and of the prediction that drawn
+  /// errors make (Fuller 1987, section 3.1). Returns the names of parameters and terms that cannot be corrected,
+  /// because more than half of what determines them are errors; these keep their values.
+  std::vector<std::string> correct(const TermData& data, TermFit& fit) const;
+
+  /// d: share of the variance of the simulation that the surrogate describes.
+  const Eigen::VectorXd& described() const { return surrogate_.described(); }
+  /// n x d: standard deviation of the simulated outputs that the errors make, row by row.
+  Eigen::MatrixXd scatter() const;
+
+ private:
+  struct Draw;
+  const TermModel* model_;
+  Surrogate surrogate_;
+  std::vector<std::shared_ptr<const Draw>> draws_;
+};
+
+/// Covariance of the errors of the inputs: as Inputs::noise says, estimated by noise_in_time() where it says nothing.
+Eigen::MatrixXd covariance_of_errors(const Rows& rows, const Inputs& inputs);
+
+}  // namespace llmt::discovery

@@ -1,0 +1,95 @@
+#include "discovery/terms/standstill.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "discovery/terms/derivatives.hpp"
+
+namespace llmt::discovery {
+namespace {
+
+// Squares of the fourth differences that are centred at each row; negative where there is none.
+Eigen::VectorXd roughness(const Rows& rows, const Eigen::VectorXd& values) {
+  const std::vector<Recorded> recorded = recordings(rows);
+  const auto n = std::ssize(rows.sequence);
+  Eigen::VectorXd squares = Eigen::VectorXd::Constant(n, -1.0);
+  for (Eigen::Index k = 2; k + 2 < n; ++k) {
+    if (recorded[k - 2].begin != recorded[k + 2].begin) continue;
+    const auto at = [&](Eigen::Index i) { return values(rows.sequence[k + i]); };
+    const double difference = at(-2) - 4.0 * at(-1) + 6.0 * at(0) - 4.0 * at(1) + at(2);
+    squares(rows.sequence[k]) = difference * difference;
+  }
+  return squares;
+}
+
+void keep(const Samples& from, const std::vector<bool>& apart, Samples& to, std::vector<bool>& kept) {
+  for (Eigen::Index i = 0; i < from.size(); ++i) {
+    const std::span<const Eigen::Index> all = from.rows_of(i);
+    std::vector<Eigen::Index> left;
+    std::ranges::copy_if(all, std::back_inserter(left), [&](Eigen::Index row) { return !apart[row]; });
+    kept.push_back(2 * left.size() >= all.size() && !left.empty());
+    if (kept.back()) to.add(left);
+  }
+}
+
+}  // namespace
+
+std::vector<UnknownSign> rows_of_unknown_sign(const Rows& rows, const Inputs& inputs, const Eigen::MatrixXd& covariance,
+                                              const Eigen::MatrixXd& deviations, std::vector<bool>& apart) {
+  constexpr double errors = 3.0;
+  constexpr double rougher = 2.5;
+  constexpr double fewest = 8.0;
+  constexpr double largest_share = 0.3;
+  std::vector<UnknownSign> found;
+  for (Eigen::Index j = 0; j < inputs.values.cols(); ++j) {
+    const Eigen::VectorXd x = inputs.values.col(j);
+    const double limit = errors * std::sqrt(covariance(j, j));
+    if (!(limit > 0.0) || x.minCoeff() >= 0.0 || x.maxCoeff() <= 0.0) continue;
+    UnknownSign own{inputs.names[j], limit, (x.array().abs() < limit).count(), 0.0};
+    if (static_cast<double>(own.rows) > largest_share * static_cast<double>(x.size())) continue;
+    for (Eigen::Index o = 0; o < deviations.cols(); ++o) {
+      const Eigen::VectorXd squares = roughness(rows, deviations.col(o));
+      double below = 0.0;
+      double count = 0.0;
+      std::vector<double> above;
+      for (Eigen::Index i = 0; i < x.size(); ++i) {
+        if (squares(i) < 0.0 || apart[i]) continue;
+        if (std::abs(x(i)) < limit) {
+          below += squares(i);
+          count += 1.0;
+        } else {
+          above.push_back(squares(i));
+        }
+      }
+      if (count < fewest || static_cast<double>(above.size()) < fewest) continue;
+      double sum = 0.0;
+      for (const double value : above) sum += value;
+      const double mean = sum / static_cast<double>(above.size());
+      if (mean > 0.0) own.roughness = std::max(own.roughness, below / count / mean);
+    }
+    if (own.roughness < rougher) continue;
+    for (Eigen::Index i = 0; i < x.size(); ++i) apart[i] = apart[i] || std::abs(x(i)) < limit;
+    own.roughness = std::sqrt(own.roughness);
+    found.push_back(own);
+  }
+  return found;
+}
+
+RowSplit without_rows(const RowSplit& split, const std::vector<bool>& apart) {
+  RowSplit result = split;
+  result.searched = {};
+  result.held_out = {};
+  result.repeats.clear();
+  result.stretches.clear();
+  std::vector<bool> kept;
+  keep(split.searched, apart, result.searched, kept);
+  for (std::size_t i = 0; i < kept.size(); ++i) {
+    if (!kept[i]) continue;
+    if (!split.repeats.empty()) result.repeats.push_back(split.repeats[i]);
+    if (!split.stretches.empty()) result.stretches.push_back(split.stretches[i]);
+  }
+  keep(split.held_out, apart, result.held_out, kept);
+  return result;
+}
+
+}  // namespace llmt::discovery

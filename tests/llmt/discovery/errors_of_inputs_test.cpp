@@ -1,0 +1,76 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "llmt/discovery/simulation.hpp"
+#include "noise.hpp"
+
+namespace {
+
+using namespace llmt::discovery;
+
+constexpr double error = 0.3;  // standard deviation, of an input of standard deviation 1
+
+/// An input x + e of independent rows, and the simulation computed at it.
+struct Table {
+  Inputs inputs{{"x"}, Eigen::MatrixXd(2000, 1)};
+  Eigen::MatrixXd simulated{Eigen::MatrixXd(2000, 1)};
+  MeasuredOutputs measured{{"y"}, Eigen::MatrixXd(2000, 1)};
+};
+
+Table table(std::uint64_t seed, double slope_of_simulation, double missing_slope) {
+  Noise noise(seed);
+  Table table;
+  for (Eigen::Index i = 0; i < 2000; ++i) {
+    const double x = noise.normal();
+    table.inputs.values(i, 0) = x + error * noise.normal();
+    table.simulated(i, 0) = slope_of_simulation * table.inputs.values(i, 0);
+    table.measured.values(i, 0) = (slope_of_simulation + missing_slope) * x + 0.05 * noise.normal();
+  }
+  return table;
+}
+
+// The simulation is proportional to x, so the gain is the same term.
+bool is_linear(const FoundTerm& found) { return found.family == "linear" || found.family == "gain"; }
+
+Missing missing_from(Table table, double told) {
+  if (told > 0.0) table.inputs.noise = Eigen::VectorXd::Constant(1, told);
+  std::vector<ModelTerm> terms = standard_terms(table.inputs);
+  return find_missing(tabulated(table.simulated, {"y"}), table.inputs, table.measured, terms);
+}
+
+// y = x, s = x + e: least squares of y - s = -e on x + e is -sigma^2 / (1 + sigma^2).
+TEST(ErrorsOfInputs, AloneMakeTheTermOfTheClosedForm) {
+  const Missing missing = missing_from(table(1, 1.0, 0.0), 0.0);
+  ASSERT_EQ(missing.found.size(), 1u);
+  EXPECT_TRUE(is_linear(missing.found.front())) << missing.found.front().family;
+  EXPECT_NEAR(missing.found.front().coefficients(0), -error * error / (1.0 + error * error),
+              3.0 * missing.found.front().values.front().standard_error);
+}
+
+TEST(ErrorsOfInputs, MakeNoTermWhereTheyAreTold) {
+  for (const std::uint64_t seed : {1u, 2u, 3u, 4u, 5u}) {
+    const Missing missing = missing_from(table(seed, 1.0, 0.0), error);
+    EXPECT_EQ(missing.answer, Answer::nothing_missing) << seed << " " << missing.found.size();
+  }
+}
+
+TEST(ErrorsOfInputs, DoNotShrinkACoefficientWhereTheyAreTold) {
+  constexpr double hidden = 0.8;
+  const Missing plain = missing_from(table(1, 1.0, hidden), 0.0);
+  ASSERT_FALSE(plain.found.empty());
+  EXPECT_NEAR(plain.found.front().coefficients(0), (1.0 + hidden) / (1.0 + error * error) - 1.0, 0.06);
+  double chi_squared = 0.0;
+  for (const std::uint64_t seed : {1u, 2u, 3u, 4u, 5u, 6u, 7u, 8u}) {
+    const Missing missing = missing_from(table(seed, 1.0, hidden), error);
+    ASSERT_FALSE(missing.found.empty());
+    EXPECT_TRUE(is_linear(missing.found.front())) << missing.found.front().family;
+    const TermValue& value = missing.found.front().values.front();
+    chi_squared += std::pow((value.value - hidden) / value.standard_error, 2.0);
+  }
+  constexpr double quantile = 26.12;  // 0.999 of chi square with 8 degrees of freedom
+  EXPECT_LT(chi_squared, quantile);
+}
+
+}  // namespace

@@ -1,0 +1,130 @@
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "discovery/terms/derivatives.hpp"
+#include "llmt/discovery/simulation.hpp"
+#include "noise.hpp"
+
+namespace {
+
+using namespace llmt::discovery;
+
+constexpr Eigen::Index rows = 1000;
+constexpr double step = 0.02;                                                 // s
+constexpr std::array<double, 5> frequencies = {0.08, 0.17, 0.31, 0.53, 0.8};  // Hz
+constexpr std::array<double, 5> sizes = {0.4, 0.3, 0.25, 0.2, 0.15};
+
+/// Sum over the sines of size * factor(omega) * sin(omega t + phase), differentiated `order` times.
+template <class Factor>
+double motion(double t, int order, const Factor& factor) {
+  double sum = 0.0;
+  for (std::size_t k = 0; k < frequencies.size(); ++k) {
+    const double omega = 2.0 * std::numbers::pi * frequencies[k];
+    const double phase = 0.7 * static_cast<double>(k) + 0.5 * std::numbers::pi * order;
+    sum += sizes[k] * factor(omega) * std::pow(omega, order) * std::sin(omega * t + phase);
+  }
+  return sum;
+}
+
+double one(double) { return 1.0; }
+
+struct Log {
+  Inputs inputs{{"q", "dq", "ddq"}, Eigen::MatrixXd(rows, 3)};
+  Eigen::MatrixXd simulated{Eigen::MatrixXd(rows, 1)};
+  MeasuredOutputs measured{{"u"}, Eigen::MatrixXd(rows, 1)};
+
+  Log() { inputs.instants = Eigen::VectorXd::LinSpaced(rows, 0.0, step * static_cast<double>(rows - 1)); }
+};
+
+constexpr double inertia = 3.0;
+constexpr double damping = 1.0;
+constexpr double gravity = 40.0;
+
+/// `torque(t)` is what is measured; the nominal model is inertia ddq + damping dq + gravity q.
+template <class Torque>
+Log log_of(std::uint64_t seed, double noise, const Torque& torque) {
+  Noise random(seed);
+  Log log;
+  for (Eigen::Index i = 0; i < rows; ++i) {
+    const double t = log.inputs.instants(i);
+    for (int order = 0; order < 3; ++order) log.inputs.values(i, order) = motion(t, order, one);
+    log.simulated(i, 0) = log.inputs.values.row(i).dot(Eigen::RowVector3d(gravity, damping, inertia));
+    log.measured.values(i, 0) = torque(t) + noise * random.normal();
+  }
+  return log;
+}
+
+double nominal(double t) {
+  return inertia * motion(t, 2, one) + damping * motion(t, 1, one) + gravity * motion(t, 0, one);
+}
+
+Missing missing_from(const Log& log) {
+  std::vector<ModelTerm> terms = standard_terms(log.inputs);
+  for (ModelTerm& term : inner_state_terms(log.inputs, log.simulated, log.measured.values, {"u"}))
+    terms.push_back(std::move(term));
+  return find_missing(tabulated(log.simulated, {"u"}), log.inputs, log.measured, terms);
+}
+
+TEST(InnerState, DelayIsMeasured) {
+  constexpr double delay = 0.004;
+  for (const std::uint64_t seed : {1u, 2u, 3u}) {
+    const Missing missing = missing_from(log_of(seed, 0.1, [](double t) { return nominal(t - delay); }));
+    EXPECT_EQ(missing.answer, Answer::inner_state);
+    ASSERT_EQ(missing.found.size(), 1u);
+    EXPECT_EQ(missing.found.front().family, "delay");
+    EXPECT_EQ(missing.found.front().values.front().unit, "s");
+    EXPECT_NEAR(missing.found.front().coefficients(0), delay,
+                4.0 * missing.found.front().values.front().standard_error);
+  }
+}
+
+TEST(InnerState, MachineWithoutOneHasNone) {
+  for (const std::uint64_t seed : {1u, 2u, 3u, 4u, 5u}) {
+    EXPECT_EQ(missing_from(log_of(seed, 0.1, nominal)).answer, Answer::nothing_missing);
+    const auto heavier = [](double t) { return nominal(t) + 0.3 * motion(t, 2, one); };
+    const Missing missing = missing_from(log_of(seed, 0.1, heavier));
+    ASSERT_EQ(missing.found.size(), 1u);
+    EXPECT_TRUE(missing.found.front().inner_state.empty()) << missing.found.front().family;
+  }
+}
+
+// A rotor of 20 % of the inertia drives the load through a spring: at each frequency the load moves by
+// k / (k + gravity - load omega^2) of the rotor (without damping), and u = rotor ddq + damping dq + k (q - q_load).
+TEST(InnerState, SpringInTheDriveIsMeasured) {
+  constexpr double rate = 1500.0;
+  constexpr double rotor = 0.2 * inertia;
+  constexpr double load = inertia - rotor;
+  const auto twist = [](double omega) { return 1.0 - rate / (rate + gravity - load * omega * omega); };
+  const Missing missing = missing_from(log_of(1, 0.02, [&](double t) {
+    return rotor * motion(t, 2, one) + damping * motion(t, 1, one) + rate * motion(t, 0, twist);
+  }));
+  EXPECT_EQ(missing.answer, Answer::inner_state);
+  ASSERT_FALSE(missing.found.empty());
+  EXPECT_EQ(missing.found.front().family, "drive_spring");
+  EXPECT_EQ(missing.found.front().location, "q");
+  constexpr double of_second_order = 0.15;
+  EXPECT_NEAR(missing.found.front().coefficients(0) * rate, 1.0, of_second_order);
+}
+
+TEST(InnerState, DerivativesOfPolynomialsAreExact) {
+  Inputs inputs{{"t"}, Eigen::MatrixXd(50, 1)};
+  Noise random(1);
+  for (Eigen::Index i = 0; i < 50; ++i) {
+    inputs.values(i, 0) = 0.1 * (static_cast<double>(i) + 0.3 * random.uniform());  // not equally spaced
+  }
+  inputs.instants = inputs.values.col(0);
+  const Eigen::ArrayXd t = inputs.values.col(0).array();
+  const Derivatives derivatives(rows_of(inputs, Eigen::VectorXd::Zero(50)), 4);
+  const Eigen::VectorXd values = (t.pow(4.0) - 2.0 * t.cube() + t).matrix();
+  const Eigen::VectorXd first = derivatives.first(values);
+  const Eigen::VectorXd second = derivatives.second(values);
+  for (Eigen::Index i = 4; i < 46; ++i) {  // whole windows
+    EXPECT_NEAR(first(i), 4.0 * std::pow(t(i), 3.0) - 6.0 * t(i) * t(i) + 1.0, 1e-6);
+    EXPECT_NEAR(second(i), 12.0 * t(i) * t(i) - 12.0 * t(i), 1e-4);
+  }
+}
+
+}  // namespace
