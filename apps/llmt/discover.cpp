@@ -2,16 +2,14 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <array>
 #include <functional>
-#include <map>
 #include <memory>
-#include <numeric>
 #include <sstream>
 #include <stdexcept>
 
 #include "llmt/apply_found.hpp"
 #include "llmt/commands.hpp"
+#include "llmt/compared_tables.hpp"
 #include "llmt/corrected_table.hpp"
 #include "llmt/csv.hpp"
 #include "llmt/files.hpp"
@@ -27,35 +25,19 @@
 namespace llmt::apps {
 namespace {
 
-struct DiscoverArguments {
-  std::string simulated;
-  std::string measured;
-  std::vector<std::string> inputs;
-  std::vector<std::string> outputs;
+struct DiscoverArguments : ComparedTables {
   std::vector<std::string> adjusted;
   std::string terms;
-  std::string order;
-  std::string time;
-  std::string group;
   std::vector<std::string> only;
   std::vector<std::string> without;
   std::vector<std::string> input_noise;
   std::vector<std::string> outputs_or_files;  // of --output, which once named the columns
   std::string corrected;
   SimulationArguments simulation;
-  DecimalMark mark = DecimalMark::point;
   bool own_terms_only = false;
   bool json = false;
   discovery::MissingOptions options;
   ReportFiles reports;
-};
-
-// Both tables, row by row.
-struct Comparison {
-  discovery::Inputs inputs;  // with the order, if that is a column of its own
-  Eigen::MatrixXd simulated;
-  discovery::MeasuredOutputs measured;
-  std::vector<Eigen::Index> lines;  // of the rows, in the file measured
 };
 
 // Where simulated outputs at other values of parameters come from.
@@ -63,112 +45,6 @@ struct Source {
   ParameterTable table;       // without parameters: none
   CommandSimulation command;  // without a command: none
 };
-
-// `every_column`: the inputs were not named.
-Eigen::MatrixXd read_named_inputs(const Csv& csv, const std::vector<std::string>& names, bool every_column) {
-  try {
-    return csv.numbers(names);
-  } catch (const DecimalMarkError&) {
-    throw;
-  } catch (const std::runtime_error& error) {
-    if (!every_column) throw;
-    throw std::runtime_error(
-        fmt::format("{} (--inputs COLUMN,... names the columns to use, and leaves out the others)", error.what()));
-  }
-}
-
-// The inputs, which both files must have alike.
-Eigen::MatrixXd read_same_inputs(const Csv& simulated, const Csv& measured, const std::vector<std::string>& names,
-                                 bool every_column) {
-  const Eigen::MatrixXd one = read_named_inputs(simulated, names, every_column);
-  Eigen::MatrixXd other = read_named_inputs(measured, names, every_column);
-  for (Eigen::Index i = 0; i < one.rows(); ++i) {
-    for (Eigen::Index j = 0; j < one.cols(); ++j) {
-      // Files are written with a limited number of digits.
-      constexpr double rounding = 1e-6;
-      const double range = one.col(j).maxCoeff() - one.col(j).minCoeff();
-      if (std::abs(one(i, j) - other(i, j)) <= rounding * std::max(range, 1e-3 * std::abs(one(i, j)))) continue;
-      throw std::runtime_error(
-          fmt::format("{}:{}: column \"{}\" is {}, but {} at {}:{}; rows must stand in the same order in both files",
-                      measured.name(), measured.line_of(i), names[j], other(i, j), one(i, j), simulated.name(),
-                      simulated.line_of(i)));
-    }
-  }
-  return other;
-}
-
-void check_names(const DiscoverArguments& arguments) {
-  for (const std::vector<std::string>* names : {&arguments.inputs, &arguments.outputs}) {
-    for (std::size_t k = 0; k < names->size(); ++k) {
-      const auto rest = names->begin() + k + 1;
-      if (std::find(rest, names->end(), (*names)[k]) != names->end()) {
-        throw std::invalid_argument(fmt::format("\"{}\" is given twice", (*names)[k]));
-      }
-    }
-  }
-  for (const std::string& output : arguments.outputs) {
-    if (std::ranges::find(arguments.inputs, output) != arguments.inputs.end() || output == arguments.order) {
-      throw std::invalid_argument(fmt::format("\"{}\" is an output and cannot be an input or the order", output));
-    }
-    if (output == arguments.time || output == arguments.group) {
-      throw std::invalid_argument(fmt::format("\"{}\" is an output and cannot be the time or the group", output));
-    }
-  }
-  if (!arguments.time.empty() && !arguments.order.empty()) {
-    throw std::invalid_argument("--time says the order of the rows: --order is not needed beside it");
-  }
-  if (!arguments.group.empty() && arguments.time.empty()) {
-    throw std::invalid_argument("--group needs --time: the rows of a group follow each other in time");
-  }
-}
-
-// The recording that each row is of.
-std::vector<Eigen::Index> runs_of(const Csv& csv, const std::string& column) {
-  std::map<std::string, Eigen::Index, std::less<>> numbers;
-  std::vector<Eigen::Index> runs(csv.rows());
-  csv.visit_texts(std::array{column}, [&](Eigen::Index row, std::size_t, std::string_view label) {
-    runs[row] = numbers.try_emplace(std::string(label), std::ssize(numbers)).first->second;
-  });
-  return runs;
-}
-
-// `every_column`: the inputs were not named.
-Comparison read_comparison(const DiscoverArguments& arguments, bool every_column) {
-  const Csv simulated = Csv::read(arguments.simulated, arguments.mark);
-  const Csv measured = Csv::read(arguments.measured, arguments.mark);
-  for (const Csv* csv : {&simulated, &measured}) {
-    if (csv->rows() == 0) throw std::runtime_error(fmt::format("{}: no rows", csv->name()));
-  }
-  Comparison comparison;
-  comparison.simulated = simulated.numbers(arguments.outputs);
-  comparison.measured = {arguments.outputs, measured.numbers(arguments.outputs)};
-  comparison.inputs.names = arguments.inputs;
-  if (simulated.rows() != measured.rows()) {
-    throw std::runtime_error(
-        fmt::format("{} has {} rows, {} has {}", simulated.name(), simulated.rows(), measured.name(), measured.rows()));
-  }
-  comparison.inputs.values = read_same_inputs(simulated, measured, arguments.inputs, every_column);
-  std::vector<Eigen::Index> rows(measured.rows());
-  std::iota(rows.begin(), rows.end(), Eigen::Index{0});
-  comparison.lines = measured.lines_of(rows);
-  if (!arguments.time.empty()) {
-    const Csv& holder = measured.has(arguments.time) ? measured : simulated;
-    comparison.inputs.instants = holder.numbers({arguments.time}).col(0);
-  }
-  if (!arguments.group.empty()) {
-    comparison.inputs.runs = runs_of(measured.has(arguments.group) ? measured : simulated, arguments.group);
-  }
-  comparison.inputs.order = arguments.order;
-  if (!arguments.order.empty() && std::ranges::find(arguments.inputs, arguments.order) == arguments.inputs.end()) {
-    const Csv& holder = measured.has(arguments.order) ? measured : simulated;
-    Eigen::MatrixXd with_order(comparison.inputs.values.rows(), comparison.inputs.values.cols() + 1);
-    with_order.leftCols(comparison.inputs.values.cols()) = comparison.inputs.values;
-    with_order.rightCols(1) = holder.numbers(arguments.order);
-    comparison.inputs.values = with_order;
-    comparison.inputs.names.push_back(arguments.order);
-  }
-  return comparison;
-}
 
 // Families that nothing has are wrong usage, whatever the data.
 std::vector<discovery::ModelTerm> of_families_to_try(const DiscoverArguments& arguments,

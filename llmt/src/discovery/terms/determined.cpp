@@ -17,7 +17,7 @@ namespace {
 // Files have a limited number of digits; noise is larger.
 constexpr double digits = 1e-6;
 // Rows beyond the unknowns, of which none fits by chance.
-constexpr Eigen::Index fewest = 10;
+constexpr Eigen::Index fewest_rows_judged = 10;
 
 using Chosen = std::vector<Eigen::Index>;
 
@@ -72,7 +72,7 @@ std::string formula(const Affine& found, const Inputs& inputs, const Chosen& cho
 
 void refuse_determined(const Simulation& simulation, const Inputs& inputs, const MeasuredOutputs& measured) {
   const Eigen::Index p = inputs.values.cols();
-  if (inputs.values.rows() < p + 1 + fewest) return;
+  if (inputs.values.rows() < p + 1 + fewest_rows_judged) return;
   Chosen all(p);
   std::iota(all.begin(), all.end(), Eigen::Index{0});
   for (Eigen::Index o = 0; o < measured.values.cols(); ++o) {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "discovery/terms/missing_findings.hpp"
 #include "discovery/terms/refuse.hpp"
 #include "llmt/discovery/simulation.hpp"
 #include "llmt/statistics.hpp"
@@ -100,9 +101,13 @@ bool has_settled(const Missing& missing, const Eigen::VectorXd& before) {
   return true;
 }
 
-double rms_of_rows(const Eigen::VectorXd& errors, const std::vector<Eigen::Index>& rows) {
-  if (rows.empty()) return std::numeric_limits<double>::quiet_NaN();
-  return std::sqrt(errors(rows).squaredNorm() / static_cast<double>(rows.size()));
+Samples set_aside(const Missing& missing) {
+  Samples samples;
+  for (std::size_t begin = 0, end = 0; begin < missing.held_out.size(); begin = end) {
+    while (end < missing.held_out.size() && missing.held_out_samples[end] == missing.held_out_samples[begin]) ++end;
+    samples.add(std::span(missing.held_out).subspan(begin, end - begin));
+  }
+  return samples;
 }
 
 }  // namespace
@@ -151,11 +156,13 @@ Missing find_missing_in_steps(const Simulation& simulation, const OutputDerivati
     alone(first - missing.parameters.begin()) += fitted.alone;
   }
   missing.before = missing.found.empty() ? missing.corrected : linearisation.outputs(alone);
+  const Samples aside = set_aside(missing);
   for (Eigen::Index o = 0; o < outputs.cols(); ++o) {
     Gap& gap = missing.gaps[static_cast<std::size_t>(o)];
-    gap.nominal = rms_of_rows(measured.values.col(o) - nominal.col(o), missing.held_out);
-    gap.before = rms_of_rows(measured.values.col(o) - missing.before.col(o), missing.held_out);
-    gap.after = rms_of_rows(measured.values.col(o) - missing.corrected.col(o), missing.held_out);
+    const auto errors = [&](const Eigen::MatrixXd& predicted) -> Eigen::VectorXd {
+      return means(measured.values.col(o) - predicted.col(o), aside);
+    };
+    gap = gap_of(gap.output, errors(nominal), errors(missing.before), errors(missing.corrected), gap.noise_floor);
   }
   return missing;
 }

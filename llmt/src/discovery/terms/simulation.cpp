@@ -158,6 +158,9 @@ Missing search_once(const Simulation& simulation, const Inputs& inputs, const Me
   missing.standard_errors = settled.fit.parameter_errors;
   missing.searched = split.searched.rows();
   missing.held_out = split.held_out.rows();
+  for (Eigen::Index i = 0; i < split.held_out.size(); ++i) {
+    missing.held_out_samples.insert(missing.held_out_samples.end(), split.held_out.rows_of(i).size(), i);
+  }
   for (const std::size_t sample : settled.verdict.outliers) {
     for (const Eigen::Index row : split.searched.rows_of(sample)) missing.outliers.push_back(row);
   }

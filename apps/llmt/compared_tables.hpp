@@ -1,0 +1,40 @@
+// The tables of `llmt discover`: what a simulation says and what was measured, row by row.
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "llmt/csv.hpp"
+#include "llmt/discovery/missing.hpp"
+#include "llmt/discovery/model_term.hpp"
+
+namespace llmt::apps {
+
+/// Files and the names of their columns.
+struct ComparedTables {
+  std::string simulated;
+  std::string measured;
+  std::vector<std::string> inputs;
+  std::vector<std::string> outputs;
+  std::string order;
+  std::string time;
+  std::string group;
+  DecimalMark mark = DecimalMark::point;
+};
+
+/// Both tables, row by row.
+struct Comparison {
+  discovery::Inputs inputs;  ///< with the order, if that is a column of its own
+  Eigen::MatrixXd simulated;
+  discovery::MeasuredOutputs measured;
+  std::vector<Eigen::Index> lines;  ///< of the rows, in the file measured
+};
+
+/// Throws std::invalid_argument for names that are given twice or contradict each other.
+void check_names(const ComparedTables& tables);
+
+/// `every_column`: the inputs were not named. Throws std::runtime_error naming file, line and column.
+Comparison read_comparison(const ComparedTables& tables, bool every_column);
+
+}  // namespace llmt::apps
