@@ -8,6 +8,7 @@
 #include "llmt/discovery/simulation.hpp"
 #include "llmt/random.hpp"
 
+namespace determined_test {
 namespace {
 
 using namespace llmt::discovery;
@@ -79,3 +80,4 @@ TEST(DeterminedOutputs, OtherInputsAreNotRefused) {
 }
 
 }  // namespace
+}  // namespace determined_test

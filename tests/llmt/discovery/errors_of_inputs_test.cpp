@@ -6,6 +6,7 @@
 #include "llmt/discovery/simulation.hpp"
 #include "noise.hpp"
 
+namespace errors_of_inputs_test {
 namespace {
 
 using namespace llmt::discovery;
@@ -74,3 +75,4 @@ TEST(ErrorsOfInputs, DoNotShrinkACoefficientWhereTheyAreTold) {
 }
 
 }  // namespace
+}  // namespace errors_of_inputs_test

@@ -8,6 +8,7 @@
 #include "llmt/discovery/simulation.hpp"
 #include "noise.hpp"
 
+namespace inner_state_test {
 namespace {
 
 using namespace llmt::discovery;
@@ -128,3 +129,4 @@ TEST(InnerState, DerivativesOfPolynomialsAreExact) {
 }
 
 }  // namespace
+}  // namespace inner_state_test

@@ -7,6 +7,7 @@
 #include "llmt/discovery/simulation.hpp"
 #include "llmt/random.hpp"
 
+namespace law_terms_test {
 namespace {
 
 using namespace llmt::discovery;
@@ -171,3 +172,4 @@ TEST(Gap, LeavesOutliersOutOfBothErrors) {
 }
 
 }  // namespace
+}  // namespace law_terms_test

@@ -7,6 +7,7 @@
 #include "llmt/random.hpp"
 
 namespace llmt::discovery {
+namespace parameters_test {
 namespace {
 
 constexpr double coulomb = 0.5;
@@ -199,4 +200,5 @@ TEST(Parameters, MistakesAreNamed) {
 }
 
 }  // namespace
+}  // namespace parameters_test
 }  // namespace llmt::discovery

@@ -9,6 +9,7 @@
 
 #include "llmt/random.hpp"
 
+namespace signals_test {
 namespace {
 
 using namespace llmt::discovery;
@@ -280,3 +281,4 @@ TEST(Signals, WhatCannotBeUsedIsRefusedWithItsRow) {
 }
 
 }  // namespace
+}  // namespace signals_test

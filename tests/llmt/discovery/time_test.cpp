@@ -12,6 +12,7 @@
 #include "llmt/discovery/simulation.hpp"
 #include "noise.hpp"
 
+namespace time_test {
 namespace {
 
 using namespace llmt::discovery;
@@ -31,7 +32,7 @@ Eigen::VectorXd correlated(Noise& noise, Eigen::Index n, double rho) {
 
 // A mass that is driven: position, velocity and acceleration of three sines, and the force of a mass of 3 kg with
 // damping. `hidden` is added to what is measured.
-struct Log {
+struct MassLog {
   Inputs inputs;
   Eigen::MatrixXd simulated;
   MeasuredOutputs measured;
@@ -39,9 +40,9 @@ struct Log {
 
 using Force = double (*)(double q, double dq, double ddq);
 
-Log log_of(std::uint64_t seed, Eigen::Index n, double noise, double rho, Force hidden) {
+MassLog log_of(std::uint64_t seed, Eigen::Index n, double noise, double rho, Force hidden) {
   Noise random(seed);
-  Log log;
+  MassLog log;
   log.inputs.names = {"q", "dq", "ddq"};
   log.inputs.values = Eigen::MatrixXd::Zero(n, 3);
   log.inputs.instants = Eigen::VectorXd::LinSpaced(n, 0.0, step * static_cast<double>(n - 1));
@@ -66,7 +67,7 @@ Log log_of(std::uint64_t seed, Eigen::Index n, double noise, double rho, Force h
 double nothing(double, double, double) { return 0.0; }
 double drag(double, double dq, double) { return 1.5 * dq * std::abs(dq); }
 
-Missing missing_from(const Log& log, const MissingOptions& options = {}) {
+Missing missing_from(const MassLog& log, const MissingOptions& options = {}) {
   return find_missing(tabulated(log.simulated, {"force"}), log.inputs, log.measured, standard_terms(log.inputs),
                       options);
 }
@@ -169,7 +170,7 @@ TEST(InTime, StandardErrorsHoldUnderCorrelatedNoise) {
 }
 
 TEST(InTime, RowsOfSmoothNoisyInputsAreTakenForALog) {
-  Log log = log_of(1, 1000, 0.05, 0.0, drag);
+  MassLog log = log_of(1, 1000, 0.05, 0.0, drag);
   log.inputs.instants = {};
   Noise noise(2);
   for (double& value : log.inputs.values.col(2)) value += 0.02 * noise.normal();
@@ -181,7 +182,7 @@ TEST(InTime, RowsOfSmoothNoisyInputsAreTakenForALog) {
 }
 
 TEST(InTime, ShuffledRowsAreIndependent) {
-  Log log = log_of(1, 600, 0.05, 0.0, drag);
+  MassLog log = log_of(1, 600, 0.05, 0.0, drag);
   log.inputs.instants = {};
   // 257 and 600 have no common divisor.
   std::vector<Eigen::Index> order(600);
@@ -193,7 +194,7 @@ TEST(InTime, ShuffledRowsAreIndependent) {
 }
 
 TEST(InTime, WholeRunsAreSetAside) {
-  Log log = log_of(1, 1000, 0.05, 0.0, drag);
+  MassLog log = log_of(1, 1000, 0.05, 0.0, drag);
   for (Eigen::Index i = 0; i < 1000; ++i) log.inputs.runs.push_back(7 - i / 200);
   const Missing missing = missing_from(log);
   std::set<Eigen::Index> aside;
@@ -206,7 +207,7 @@ TEST(InTime, WholeRunsAreSetAside) {
 // Drag that is there in four runs of five, whichever run is set aside, is not named: it fails in the fifth, or its size
 // contradicts.
 TEST(InTime, RowsSetAsideRefuteATermThatDoesNotHoldThere) {
-  Log log = log_of(1, 1000, 0.02, 0.0, drag);
+  MassLog log = log_of(1, 1000, 0.02, 0.0, drag);
   for (Eigen::Index i = 0; i < 1000; ++i) log.inputs.runs.push_back(i / 200);
   MissingOptions options;
   const Missing first = missing_from(log, options);
@@ -220,7 +221,7 @@ TEST(InTime, RowsSetAsideRefuteATermThatDoesNotHoldThere) {
 }
 
 TEST(InTime, WrongTimesAreRefused) {
-  const auto message = [](const Log& log) {
+  const auto message = [](const MassLog& log) {
     try {
       missing_from(log);
     } catch (const std::invalid_argument& error) {
@@ -228,7 +229,7 @@ TEST(InTime, WrongTimesAreRefused) {
     }
     return std::string();
   };
-  Log log = log_of(1, 200, 0.1, 0.0, nothing);
+  MassLog log = log_of(1, 200, 0.1, 0.0, nothing);
   log.inputs.instants(7) = log.inputs.instants(6);
   EXPECT_NE(message(log).find("rows 7 and 8 were taken at the same time"), std::string::npos) << message(log);
   log.inputs.instants(7) = std::nan("");
@@ -241,7 +242,7 @@ TEST(InTime, WrongTimesAreRefused) {
 }
 
 TEST(InTime, FamiliesAreChosenByName) {
-  const Log log = log_of(1, 200, 0.1, 0.0, nothing);
+  const MassLog log = log_of(1, 200, 0.1, 0.0, nothing);
   for (const ModelTerm& term : of_families(standard_terms(log.inputs), {"linear", "square"}, {"square"})) {
     EXPECT_TRUE(term.generic || term.family == "linear") << term.family;
   }
@@ -249,3 +250,4 @@ TEST(InTime, FamiliesAreChosenByName) {
 }
 
 }  // namespace
+}  // namespace time_test

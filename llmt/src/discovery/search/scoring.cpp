@@ -99,7 +99,13 @@ SetFit Scoring::fit(const Set& set) const {
   if (!fit.solvable) return fit;
   const Eigen::VectorXd moments = workspace_->moments()(fit.columns);
   fit.coefficients = factor.solve(moments);
-  fit.left = std::max(0.0, fit.left - moments.dot(fit.coefficients));
+  const double all = fit.left;
+  fit.left = std::max(0.0, all - moments.dot(fit.coefficients));
+  if (workspace_->uncorrected_moments().size() > 0) {
+    // No values explain more than those of least squares.
+    const Eigen::VectorXd plain = workspace_->uncorrected_moments()(fit.columns);
+    fit.left = std::max(fit.left, all - plain.dot(factor.solve(plain)));
+  }
   return fit;
 }
 

@@ -130,9 +130,11 @@ void Workspace::drop(const std::vector<std::size_t>& samples) {
 
 void Workspace::set_moments() {
   moments_ = basis_.transpose() * residuals_;
+  uncorrected_moments_.resize(0);
   for (std::size_t a = 0; a < blocks_.size(); ++a) {
     const Block& block = blocks_[a];
     if (corrections_[a].size() == 0 || block.size == 0) continue;
+    if (uncorrected_moments_.size() == 0) uncorrected_moments_ = moments_;
     moments_.segment(block.begin, block.size) += block.to_values.transpose() * corrections_[a];
   }
 }

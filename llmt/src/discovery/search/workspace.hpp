@@ -28,6 +28,8 @@ class Workspace {
   const Eigen::MatrixXd& basis() const { return basis_; }
   const Eigen::MatrixXd& gram() const { return gram_; }
   const Eigen::VectorXd& moments() const { return moments_; }
+  /// U'r, where moments() holds corrections; else empty.
+  const Eigen::VectorXd& uncorrected_moments() const { return uncorrected_moments_; }
   const Eigen::VectorXd& residuals() const { return residuals_; }
   const Eigen::MatrixXd& baseline() const { return baseline_; }
   const std::vector<std::size_t>& dropped() const { return dropped_; }
@@ -61,6 +63,7 @@ class Workspace {
   Eigen::MatrixXd basis_;
   Eigen::MatrixXd gram_;
   Eigen::VectorXd moments_;
+  Eigen::VectorXd uncorrected_moments_;
   std::vector<Block> blocks_;
   std::vector<Eigen::VectorXd> corrections_;  // EffectCandidate::moment_correction
   std::vector<std::size_t> dropped_;
