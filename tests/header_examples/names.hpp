@@ -8,6 +8,7 @@
 
 #include "llmt/discovery/least_squares.hpp"
 #include "llmt/discovery/rounds.hpp"
+#include "llmt/discovery/signals.hpp"
 #include "llmt/discovery/simulation.hpp"
 #include "llmt/discovery/terms.hpp"
 #include "llmt/llmt.hpp"
@@ -26,6 +27,7 @@ extern const llmt::FitResult result;
 extern const llmt::Model model;
 extern const llmt::discovery::Simulation spring;
 extern const llmt::discovery::Inputs named;
+extern const llmt::discovery::Log log;
 extern const llmt::discovery::Verdict verdict;
 
 }  // namespace core
