@@ -27,7 +27,7 @@ extern const llmt::FitResult result;
 extern const llmt::Model model;
 extern const llmt::discovery::Simulation spring;
 extern const llmt::discovery::Inputs named;
-extern const llmt::discovery::Log log;
+extern const llmt::discovery::Log recorded;
 extern const llmt::discovery::Verdict verdict;
 
 }  // namespace core

@@ -2,7 +2,7 @@
 /// From a log of positions and torques to rows that a model of the motion can be compared with: one low pass without
 /// delay for all signals, velocities and accelerations through the same filter, rows that are nearly independent.
 ///
-///     const llmt::discovery::Signals table = llmt::discovery::signals(log, {.cutoff = 10.0});
+///     const llmt::discovery::Signals table = llmt::discovery::signals(recorded, {.cutoff = 10.0});
 ///     const Eigen::MatrixXd friction = table.velocities.array().sign();
 #pragma once
 
