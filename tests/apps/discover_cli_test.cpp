@@ -140,7 +140,7 @@ TEST(LlmtDiscover, TheSimulationMayAdjustItself) {
   const std::string command = discover + "s.csv m.csv --target y --json";
   EXPECT_EQ(json::parse(folder.run(command).out)["effects"].size(), 2U);
   const json adjusted = json::parse(folder.run(command + " --allow offset,scale").out);
-  EXPECT_EQ(adjusted["verdict"], "nothing missing");
+  EXPECT_EQ(adjusted["verdict"], "parameters only");
   EXPECT_NEAR(adjusted["simulation"][0]["value"], 0.7, 0.05);
   EXPECT_NEAR(adjusted["simulation"][1]["value"], 1.02, 0.005);
   ASSERT_EQ(adjusted["not_testable"].size(), 2U);

@@ -45,9 +45,9 @@ TEST(Names, ThatAreMisspeltAreGuessed) {
   folder.write("d.csv", small_table());
   EXPECT_EQ(refusal(folder, "fti d.csv"),
             "llmt: there is no command \"fti\" (did you mean \"fit\"?); the commands are fit, predict, inspect, "
-            "explain, compare, discover, export\n");
+            "explain, compare, signals, discover, export\n");
   EXPECT_EQ(refusal(folder, ""),
-            "llmt: a command is needed: fit, predict, inspect, explain, compare, discover, export; llmt --help says "
+            "llmt: a command is needed: fit, predict, inspect, explain, compare, signals, discover, export; llmt --help says "
             "what they "
             "do\n");
   EXPECT_EQ(refusal(folder, "fit d.csv --traget y"),

@@ -85,9 +85,17 @@ discovery::Parameter parameter_of(const nb::dict& given) {
 
 // The library's terms, and one's own in their place where they are the same.
 std::vector<discovery::ModelTerm> terms_of(const Question& question, const std::vector<OwnTerm>& own_terms,
-                                           bool own_terms_only, std::vector<discovery::UntestableCause>& untestable) {
-  std::vector<discovery::ModelTerm> library =
-      discovery::of_families(discovery::standard_terms(question.inputs, &untestable), question.only, question.without);
+                                           bool own_terms_only, const Eigen::MatrixXd& measured,
+                                           std::vector<discovery::UntestableCause>& untestable) {
+  std::vector<discovery::ModelTerm> library = discovery::standard_terms(question.inputs, &untestable);
+  // They depend on what was measured, so that they say nothing of other rows.
+  if (measured.size() > 0) {
+    for (discovery::ModelTerm& term :
+         discovery::inner_state_terms(question.inputs, question.simulated, measured, question.outputs)) {
+      library.push_back(std::move(term));
+    }
+  }
+  library = discovery::of_families(std::move(library), question.only, question.without);
   if (own_terms.empty()) return library;
   std::vector<discovery::ModelTerm> terms;
   for (const OwnTerm& own : own_terms) {
@@ -178,6 +186,9 @@ discovery::Missing missing_of(const std::string& state, const Question& question
     };
     discovery::FoundTerm& term = missing.found.emplace_back();
     term.term = entry["term"].get<std::size_t>();
+    if (term.term >= question.terms.size()) {
+      throw std::invalid_argument("an inner state was found: it depends on what was measured, not on inputs alone");
+    }
     term.output_index = entry["output"].get<Eigen::Index>();
     term.coefficients = vector("coefficients");
     term.constants = vector("constants");
@@ -198,14 +209,15 @@ void unlocked(const Work& work) {
 nb::dict find_missing(const Array& inputs, const std::vector<std::string>& input_names, const std::string& order,
                       const std::vector<std::string>& only, const std::vector<std::string>& without,
                       const std::vector<double>& instants, const std::vector<Eigen::Index>& runs,
-                      const Array& simulated, const Array& measured, const std::vector<std::string>& output_names,
-                      const nb::object& predict, const nb::object& jacobian, const nb::list& parameters, bool offset,
-                      bool scale, const std::vector<OwnTerm>& own_terms, bool own_terms_only, double held_out,
-                      std::uint64_t seed, const std::string& simulated_name, const std::string& measured_name,
-                      const nb::object& report) {
+                      const std::vector<double>& input_noise, const Array& simulated, const Array& measured,
+                      const std::vector<std::string>& output_names, const nb::object& predict,
+                      const nb::object& jacobian, const nb::list& parameters, bool offset, bool scale,
+                      const std::vector<OwnTerm>& own_terms, bool own_terms_only, double held_out, std::uint64_t seed,
+                      const std::string& simulated_name, const std::string& measured_name, const nb::object& report) {
   Question question = question_of(inputs, input_names, order, simulated, output_names, only, without);
   question.inputs.instants = Eigen::Map<const Eigen::VectorXd>(instants.data(), std::ssize(instants));
   question.inputs.runs = runs;
+  question.inputs.noise = Eigen::Map<const Eigen::VectorXd>(input_noise.data(), std::ssize(input_noise));
   set_simulation(question, predict, parameters, offset, scale, question.simulated);
   const discovery::MeasuredOutputs outputs{output_names, rows_of(measured)};
   report::TermsSummary summary{.simulated = simulated_name,
@@ -229,7 +241,7 @@ nb::dict find_missing(const Array& inputs, const std::vector<std::string>& input
     if (!report.is_none()) report(said.done, said.total, said.step);
     return true;
   };
-  question.terms = terms_of(question, own_terms, own_terms_only, question.untestable);
+  question.terms = terms_of(question, own_terms, own_terms_only, outputs.values, question.untestable);
   const discovery::OutputDerivatives derivatives = derivatives_of(jacobian, question);
   unlocked([&] {
     summary.missing =
@@ -263,7 +275,7 @@ auto corrected(const Array& inputs, const std::vector<std::string>& input_names,
   set_simulation(question, predict, parameters, offset, scale, there);
   const discovery::Inputs places{input_names, rows_of(elsewhere), order};
   Eigen::MatrixXd result;
-  question.terms = terms_of(question, own_terms, own_terms_only, question.untestable);
+  question.terms = terms_of(question, own_terms, own_terms_only, {}, question.untestable);
   const discovery::Missing missing = missing_of(state, question);
   unlocked([&] { result = discovery::corrected(question.simulation, missing, question.terms, places); });
   return array_of<double>(std::move(result));
@@ -274,9 +286,9 @@ auto corrected(const Array& inputs, const std::vector<std::string>& input_names,
 void add_terms(nb::module_& module) {
   using nb::arg;
   module.def("find_missing", &find_missing, nb::kw_only(), arg("inputs"), arg("input_names"), arg("order"), arg("only"),
-             arg("without"), arg("instants"), arg("runs"), arg("simulated"), arg("measured"), arg("output_names"),
-             arg("predict").none(), arg("jacobian").none(), arg("parameters"), arg("offset"), arg("scale"),
-             arg("terms"), arg("own_terms_only"), arg("held_out"), arg("seed"), arg("simulated_name"),
+             arg("without"), arg("instants"), arg("runs"), arg("input_noise"), arg("simulated"), arg("measured"),
+             arg("output_names"), arg("predict").none(), arg("jacobian").none(), arg("parameters"), arg("offset"),
+             arg("scale"), arg("terms"), arg("own_terms_only"), arg("held_out"), arg("seed"), arg("simulated_name"),
              arg("measured_name"), arg("report").none());
   module.def("corrected", &corrected, nb::kw_only(), arg("inputs"), arg("input_names"), arg("order"), arg("only"),
              arg("without"), arg("simulated"), arg("output_names"), arg("predict").none(), arg("parameters"),

@@ -328,6 +328,7 @@ def _search(
     order: str,
     time: Any,
     groups: Any,
+    input_noise: Mapping[str, float] | str | None,
     only: Any,
     without: Any,
     terms: Mapping[str, Any] | None,
@@ -378,6 +379,7 @@ def _search(
         **question,
         instants=instants,
         runs=runs,
+        input_noise=_noise_of(input_noise, columns),
         measured=np.ascontiguousarray(values),
         predict=predict,
         jacobian=_derivatives(jacobian, kind, question, parameters[1]),
@@ -390,6 +392,22 @@ def _search(
     )
     callables = {"simulate": simulate, "terms": own, "parameters": parameters[1]}
     return Missing(made, {**question, "measured": values}, kind, callables)
+
+
+def _noise_of(given: Mapping[str, float] | str | None, inputs: list[str]) -> list[float]:
+    """Standard deviations of the errors of the inputs; NaN for those that are estimated."""
+    if given is None:
+        return []
+    if isinstance(given, str):
+        if given != "auto":
+            raise ValueError(f"input_noise is {given!r}, must be 'auto' or numbers by input")
+        return [np.nan] * len(inputs)
+    if unknown := [name for name in given if name not in inputs]:
+        raise ValueError(f"input_noise names {unknown[0]!r}, must be inputs of {', '.join(inputs)}")
+    errors = [float(given.get(name, 0.0)) for name in inputs]
+    if any(not 0.0 <= error < np.inf for error in errors):
+        raise ValueError("input_noise has a number that is not finite or below 0")
+    return errors
 
 
 def _in_time(time: Any, groups: Any, n: int, has_order: bool) -> tuple[list[float], list[int]]:
@@ -425,6 +443,7 @@ def discover(
     order: str = "",
     time: Any = None,
     groups: Any = None,
+    input_noise: Mapping[str, float] | str | None = None,
     only: Any = (),
     without: Any = (),
     terms: Mapping[str, Any] | None = None,
@@ -459,6 +478,9 @@ def discover(
         noise that is alike in neighbouring rows is no evidence. Smooth inputs are taken for a log without it.
     groups : n labels
         The recording that each row is of; with ``time``.
+    input_noise : dict or "auto"
+        Standard deviations of the errors of inputs, or "auto": from neighbouring rows. By default "auto" for rows in
+        time, else none.
     only, without : str or list of str
         Families of built-in terms to try alone, or to leave out.
     terms : dict
@@ -496,6 +518,7 @@ def discover(
         order=order,
         time=time,
         groups=groups,
+        input_noise=input_noise,
         only=only,
         without=without,
         terms=terms,
@@ -515,6 +538,7 @@ def find_missing(
     order: str = "",
     time: Any = None,
     groups: Any = None,
+    input_noise: Mapping[str, float] | str | None = None,
     only: Any = (),
     without: Any = (),
     terms: Mapping[str, Any] | None = None,
@@ -538,6 +562,7 @@ def find_missing(
         order=order,
         time=time,
         groups=groups,
+        input_noise=input_noise,
         only=only,
         without=without,
         terms=terms,

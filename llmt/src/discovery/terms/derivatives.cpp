@@ -1,6 +1,6 @@
 #include "discovery/terms/derivatives.hpp"
 
-#include <Eigen/QR>
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
@@ -53,7 +53,8 @@ Derivatives::Derivatives(const Rows& rows, Eigen::Index half) : sequence_(rows.s
     if (before.size() != times.size() || (before - times).cwiseAbs().maxCoeff() > same) {
       Eigen::MatrixXd basis = Eigen::MatrixXd::Ones(times.size(), powers);
       for (Eigen::Index q = 1; q < powers; ++q) basis.col(q) = basis.col(q - 1).cwiseProduct(times);
-      inverse = basis.completeOrthogonalDecomposition().pseudoInverse();
+      // Times within -1 ... 1 and few powers: the normal equations lose few digits.
+      inverse = (basis.transpose() * basis).ldlt().solve(basis.transpose());
       before = times;
     }
     first_[k].weights = inverse.row(1).transpose() / width;

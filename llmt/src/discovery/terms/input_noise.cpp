@@ -155,6 +155,12 @@ InputNoise::InputNoise(const TermModel& model, const Inputs& inputs, const Eigen
       auto draw = std::make_shared<Draw>();
       draw->inputs = inputs;
       draw->inputs.values += sign * errors;
+      // Terms such as roots are not defined beyond the inputs.
+      for (Eigen::Index j = 0; j < inputs.values.cols(); ++j) {
+        const double low = inputs.values.col(j).minCoeff();
+        const double high = inputs.values.col(j).maxCoeff();
+        draw->inputs.values.col(j) = draw->inputs.values.col(j).cwiseMax(low).cwiseMin(high);
+      }
       draw->change = surrogate_.predict(draw->inputs.values) - described;
       draw->simulation.parameters = model.parameters();
       draw->simulation.predict = [base = model_, own = draw.get()](const Eigen::MatrixXd&,

@@ -210,15 +210,7 @@ double noise_variance(const Eigen::VectorXd& values) {
   if (n < 4) return std::numeric_limits<double>::quiet_NaN();
   const Eigen::ArrayXd third = values.tail(n - 3).array() - 3.0 * values.segment(2, n - 3).array() +
                                3.0 * values.segment(1, n - 3).array() - values.head(n - 3).array();
-  // The median of a chi-squared variable of one degree: a few jumps, such as a start, are no noise.
-  constexpr double median_of_chi_squared = 0.4549;
-  std::vector<double> squares(third.size());
-  for (Eigen::Index i = 0; i < third.size(); ++i) squares[i] = third(i) * third(i);
-  const auto middle = squares.begin() + std::ssize(squares) / 2;
-  std::ranges::nth_element(squares, middle);
-  // Values of few digits may have a median of 0.
-  const double variance = *middle > 0.0 ? *middle / median_of_chi_squared : third.square().mean();
-  return variance / 20.0;
+  return third.square().mean() / 20.0;
 }
 
 AlongRows along_rows(const Inputs& inputs, const MissingOptions& options) {

@@ -26,8 +26,7 @@ RowSplit split_independent(const Inputs& inputs, const MissingOptions& options);
 /// block within which every smooth input varies by at most 3 % of its variance, its noise not counted.
 RowSplit split_in_time(const Inputs& inputs, const MissingOptions& options);
 
-/// Variance of the noise of equally spaced values of a smooth signal, from the median square of third differences:
-/// var(D^3 e) = 20 var(e).
+/// Variance of the noise of equally spaced values of a smooth signal, from third differences: var(D^3 e) = 20 var(e).
 /// NaN for fewer than 4 values.
 double noise_variance(const Eigen::VectorXd& values);
 

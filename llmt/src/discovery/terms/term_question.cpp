@@ -32,12 +32,6 @@ EffectCandidate candidate_of(const TermModel& model, const TermData& data, const
   return candidate;
 }
 
-// In time the value of the row before and the change since then hold the noise of neighbouring rows, and are otherwise
-// the terms of the row itself.
-bool tells_in_time(const ModelTerm& history, const TermData& data) {
-  return data.stretches.empty() || (history.family != "previous" && history.family != "rate");
-}
-
 // Samples in time whose noise may be alike keep their signs together.
 std::vector<Eigen::Index> clusters_of(const TermData& data) {
   std::vector<Eigen::Index> clusters;
@@ -123,7 +117,9 @@ TermQuestion ask(const TermModel& model, const TermData& data, const TermFit& fi
   for (std::size_t t = 0; t < model.terms().size(); ++t) {
     const ModelTerm& term = model.terms()[t];
     if (model.is_refuted(t)) continue;
-    if (term.history && !(with_history && tells_in_time(term, data))) continue;
+    if (!term.inner_state.empty() && data.stretches.empty()) continue;  // a state is of the time
+    // In time the row before holds the noise of a neighbour, and is otherwise what inputs and their rates say.
+    if (term.history && !(with_history && data.stretches.empty())) continue;
     for (Eigen::Index o = 0; o < d; ++o) {
       if (!term.output.empty() && term.output != model.outputs()[o]) continue;
       std::vector<PlacedTerm> options;

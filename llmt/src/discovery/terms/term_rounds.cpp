@@ -105,7 +105,7 @@ Settled search_terms(const TermModel& model, TermData& data, const std::vector<E
   Settled settled;
   settled.fit = baseline;
   settled = search_until_settled(model, data, repeats, std::move(settled), false, noise, options, work);
-  if (std::ranges::any_of(model.terms(), &ModelTerm::history)) {
+  if (data.stretches.empty() && std::ranges::any_of(model.terms(), &ModelTerm::history)) {
     TermData again = data;
     const Settled other = search_until_settled(model, again, repeats, settled, true, noise, options, work);
     if (needs_history(model, settled, other, options.search.rival_margin)) {
