@@ -72,7 +72,7 @@ TEST(DiscoverParameters, AreFittedBesideTermsAndNamedTogetherWhereRowsCannotTell
   EXPECT_GT(report["gap"]["nominal"], report["gap"]["before"]);
   EXPECT_GT(report["gap"]["before"], report["gap"]["after"]);
   const Outcome page = folder.run(command);
-  EXPECT_NE(page.out.find("VERDICT: one term is missing\n"), std::string::npos) << page.out;
+  EXPECT_NE(page.out.find("VERDICT: one term is missing: signed_square of "), std::string::npos) << page.out;
   EXPECT_NE(page.out.find("Parameters of the simulation, fitted together with the terms:"), std::string::npos);
   EXPECT_NE(page.out.find("parameters alone"), std::string::npos);
 }
@@ -286,7 +286,7 @@ TEST(DiscoverApply, PrintsWhatThePageSays) {
   for (std::string line; std::getline(lines, line);) {
     EXPECT_NE(printed.find(line + "\n"), std::string::npos) << line << "\n" << printed;
   }
-  EXPECT_NE(run(example(page, "sh", 3)).out.find("VERDICT: one term is missing\n"), std::string::npos);
+  EXPECT_NE(run(example(page, "sh", 3)).out.find("VERDICT: one term is missing: signed_square of "), std::string::npos);
   EXPECT_EQ(run(example(page, "sh", 4)).out, example(page, "text", 2));
 }
 

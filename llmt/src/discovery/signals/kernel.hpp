@@ -18,8 +18,8 @@ double width_of(double cutoff);
 /// Samples on either side of the middle one.
 Eigen::Index half_length(double cutoff, double step);
 
-/// Samples after which the noise of rows counts as independent: the sum over all lags of the squared correlation of
-/// white noise that was filtered (so that n rows of length T have the degrees of freedom of the filtered record).
+/// Samples after which the noise of rows counts as independent: the sum over all lags of the squared correlation
+/// of white noise that was filtered (so that n rows of length T have the degrees of freedom of the filtered record).
 Eigen::Index independent_step(double cutoff, double step);
 
 Kernel kernel_of(double cutoff, double step);

@@ -167,7 +167,7 @@ Signals signals(const Log& log, const SignalsOptions& options) {
   std::vector<Filtered> rows;
   for (const Part& part : timing.parts) {
     signals.stretches.push_back({log.runs.empty() ? "" : log.runs[part.first], part.first, part.last, 0});
-    const Samples samples = samples_of(log, part, timing.step);
+    const SampledStretch samples = samples_of(log, part, timing.step);
     const Eigen::Index n = samples.values.rows();
     signals.resampled = signals.resampled || samples.interpolated;
     signals.ends_cut += std::min(n, 2 * half);

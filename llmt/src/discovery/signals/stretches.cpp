@@ -128,13 +128,13 @@ Timing timing_of(const Log& log) {
   return timing;
 }
 
-Samples samples_of(const Log& log, const Part& part, double step) {
+SampledStretch samples_of(const Log& log, const Part& part, double step) {
   const Eigen::Index n = part.last - part.first + 1;
   Eigen::MatrixXd values(log.time.size(), log.positions.cols() + log.torques.cols());
   values.leftCols(log.positions.cols()) = log.positions;
   if (log.torques.cols() > 0) values.rightCols(log.torques.cols()) = log.torques;
   const auto time = log.time.segment(part.first, n);
-  Samples samples;
+  SampledStretch samples;
   samples.start = time(0);
   samples.step = n > 1 ? (time(n - 1) - time(0)) / static_cast<double>(n - 1) : step;
   const Eigen::VectorXd even = Eigen::VectorXd::LinSpaced(n, time(0), time(n - 1));

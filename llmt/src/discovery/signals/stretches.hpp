@@ -28,7 +28,7 @@ struct Timing {
 Timing timing_of(const Log& log);
 
 /// Equally spaced samples of a part, positions before torques.
-struct Samples {
+struct SampledStretch {
   double start = 0.0;  ///< in s
   double step = 0.0;   ///< in s
   Eigen::MatrixXd values;
@@ -36,6 +36,6 @@ struct Samples {
   bool interpolated = false;
 };
 
-Samples samples_of(const Log& log, const Part& part, double step);
+SampledStretch samples_of(const Log& log, const Part& part, double step);
 
 }  // namespace llmt::discovery

@@ -115,7 +115,9 @@ Eigen::MatrixXd noise_in_time(const Rows& rows, const Inputs& inputs) {
   Eigen::MatrixXd covariance = count > 0.0 ? Eigen::MatrixXd(sum / (factor * count)) : Eigen::MatrixXd::Zero(p, p);
   for (Eigen::Index j = 0; j < p; ++j) {
     const double variance = (inputs.values.col(j).array() - inputs.values.col(j).mean()).square().mean();
-    if (inputs.names[j] != inputs.order && covariance(j, j) <= largest_share * variance) continue;
+    constexpr double rounding = 1e-12;
+    const bool is_noise = covariance(j, j) > rounding * variance && covariance(j, j) <= largest_share * variance;
+    if (inputs.names[j] != inputs.order && is_noise) continue;
     covariance.row(j).setZero();
     covariance.col(j).setZero();
   }
