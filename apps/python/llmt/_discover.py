@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from llmt._frames import table_of
 from llmt._results import Findings, draw_points, html_table, names, number, values_table
 from llmt.tables.named import columns_of
 
