@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -194,8 +193,6 @@ std::vector<ModelTerm> inner_state_terms(const Inputs& inputs, const Eigen::Matr
   constexpr double largest_noise_share = 0.1;
   for (std::size_t o = 0; o < outputs.size(); ++o) {
     terms.push_back(delay(of_rows, outputs[o]));
-    terms.back().lower = Eigen::VectorXd::Zero(1);  // nothing is measured before it happens
-    terms.back().upper = Eigen::VectorXd::Constant(1, std::numeric_limits<double>::max());
     if (table->surrogate.described()(o) < described) continue;
     // The spring's term holds the second derivative of the measured output: were that noise, it would explain the
     // noise.

@@ -159,8 +159,11 @@ std::vector<Structure> structure_beside(const TermModel& model, const TermData& 
 void decide(Missing& missing) {
   const bool is_nothing = missing.verdict.answer == Answer::nothing_missing;
   missing.answer = is_nothing && !missing.structure.empty() ? Answer::unknown : missing.verdict.answer;
-  const bool has_inner_state =
-      std::ranges::any_of(missing.found, [](const FoundTerm& found) { return !found.inner_state.empty(); });
+  // Nothing is measured before it happens.
+  const auto is_state = [](const FoundTerm& found) {
+    return !found.inner_state.empty() && found.coefficients(0) > 0.0;
+  };
+  const bool has_inner_state = std::ranges::any_of(missing.found, is_state);
   if (has_inner_state) missing.answer = Answer::inner_state;
   if (!missing.failing_rows.empty()) missing.answer = Answer::failed_held_out;
   const std::vector<bool> approximate = approximations(missing.found);
@@ -174,6 +177,7 @@ void decide(Missing& missing) {
     // What stands beside a state may be what the state does beyond the first order.
     constexpr double small_share = 0.1;
     if (has_inner_state && found.inner_state.empty() && found.share < small_share) found.confirmed = false;
+    if (!found.inner_state.empty() && !is_state(found)) found.confirmed = false;
     if (!approximate[k] || !noted.insert(sorted_inputs(found)).second) continue;
     missing.notes.push_back(
         fmt::format("there are many terms of {}: together they may approximate one that was not tried",
