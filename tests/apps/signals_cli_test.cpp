@@ -101,10 +101,11 @@ TEST(LlmtSignals, RefusesWhatItCannotUseWithFileLineAndColumn) {
   };
   write_log(folder);
   refused(on_log, "log.csv:2502: time is 0 after 4.998, must increase");
-  refused(on_log, "--group");
-  refused(on_log + " --group run --cutoff 126", "at most a quarter of the sampling rate: 125 Hz");
-  refused(on_log + " --group run --cutoff 0", "--cutoff");
-  refused(on_log + " --group run --cutoff 0.5", "the filter cuts 5.2");
+  refused(on_log, "within a run");
+  const std::string uncut = signals + "log.csv --time t --position q1,q2 --torque u1,u2 --group run";
+  refused(uncut + " --cutoff 126", "at most a quarter of the sampling rate: 125 Hz");
+  refused(uncut + " --cutoff 0", "--cutoff");
+  refused(uncut + " --cutoff 0.5", "the filter cuts 5.2");
   refused(on_log + " --group run --standstill 0.1,0.2,0.3", "3 speeds for 2 positions");
   refused(on_log + " --group run --keep q1", "\"q1\"");
   refused(signals + "log.csv --position q1 --cutoff 10", "--time");
