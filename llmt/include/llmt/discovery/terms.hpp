@@ -46,7 +46,8 @@ ModelTerm own_term(std::string name, std::string formula, std::function<double(c
 ///
 /// A term that equals a simpler one at these values is left out: x^2 for an input of two values, |x| for one sign.
 /// Constant inputs go to `untestable` if that is given. Throws std::invalid_argument for wrong shapes, empty or
-/// repeated names, values that are not finite, and an order that is not an input or holds equal values.
+/// repeated names, values or instants that are not finite, instants or runs of other than n rows, and an order that is
+/// not an input or holds equal values.
 std::vector<ModelTerm> standard_terms(const Inputs& inputs, std::vector<UntestableCause>* untestable = nullptr);
 
 /// The terms of the row before of one input: previous, rate, direction. Throws as standard_terms(), and for an input

@@ -45,13 +45,6 @@ struct Recording {
 Recording recording_of(const Inputs& inputs) {
   const Eigen::Index n = inputs.values.rows();
   const Eigen::VectorXd& instants = inputs.instants;
-  if (instants.size() != n) {
-    refuse("find_missing", fmt::format("{} instants for {} rows", instants.size(), n));
-  }
-  if (!inputs.runs.empty() && std::ssize(inputs.runs) != n) {
-    refuse("find_missing", fmt::format("{} labels of runs for {} rows", inputs.runs.size(), n));
-  }
-  if (!instants.allFinite()) refuse("find_missing", "an instant is not finite");
   const auto run = [&](Eigen::Index i) { return inputs.runs.empty() ? Eigen::Index{0} : inputs.runs[i]; };
   Piece order(n);
   std::iota(order.begin(), order.end(), Eigen::Index{0});

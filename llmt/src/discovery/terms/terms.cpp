@@ -40,6 +40,14 @@ void check(const Inputs& inputs) {
       refuse("standard_terms", fmt::format("the input \"{}\" has a value that is not finite", inputs.names[j]));
     }
   }
+  const Eigen::Index n = inputs.values.rows();
+  if (inputs.instants.size() > 0 && inputs.instants.size() != n) {
+    refuse("standard_terms", fmt::format("{} instants for {} rows", inputs.instants.size(), n));
+  }
+  if (!inputs.instants.allFinite()) refuse("standard_terms", "an instant is not finite");
+  if (!inputs.runs.empty() && std::ssize(inputs.runs) != n) {
+    refuse("standard_terms", fmt::format("{} labels of runs for {} rows", inputs.runs.size(), n));
+  }
 }
 
 // By the ending of the name; or by a usual name of a joint's angle, and values that radians may have.
@@ -315,7 +323,7 @@ Rows rows_of(const Inputs& inputs, const Eigen::VectorXd& simulated) {
             .instants = Eigen::VectorXd::LinSpaced(n, 0.0, static_cast<double>(n - 1))};
   rows.sequence.resize(n);
   std::iota(rows.sequence.begin(), rows.sequence.end(), 0);
-  if (inputs.instants.size() == n && n > 0) {
+  if (inputs.instants.size() > 0) {
     rows.instants = inputs.instants;
     std::ranges::stable_sort(rows.sequence, {}, [&](Eigen::Index i) {
       return std::pair(inputs.runs.empty() ? Eigen::Index{0} : inputs.runs[i], rows.instants(i));
