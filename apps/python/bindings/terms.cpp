@@ -173,7 +173,9 @@ std::string state_of(const discovery::Missing& missing) {
   }
   Json values = Json::array();
   for (const discovery::Parameter& parameter : missing.parameters) values.push_back(parameter.value);
-  return Json({{"found", found}, {"values", values}}).dump();
+  const Eigen::VectorXd& bands = missing.zero_bands;
+  return Json({{"found", found}, {"values", values}, {"zero_bands", std::vector<double>(bands.begin(), bands.end())}})
+      .dump();
 }
 
 discovery::Missing missing_of(const std::string& state, const Question& question) {
@@ -195,6 +197,8 @@ discovery::Missing missing_of(const std::string& state, const Question& question
   }
   missing.parameters = question.simulation.parameters;
   for (std::size_t k = 0; k < missing.parameters.size(); ++k) missing.parameters[k].value = json["values"][k];
+  const auto bands = json["zero_bands"].get<std::vector<double>>();
+  missing.zero_bands = Eigen::Map<const Eigen::VectorXd>(bands.data(), std::ssize(bands));
   for (const std::string& output : question.outputs) missing.gaps.push_back({.output = output});
   return missing;
 }

@@ -25,7 +25,8 @@ std::string harmless(const std::string& text) {
 struct Body {
   std::string name;
   std::vector<std::string> arguments;
-  std::string adjusted;  // what is done to the simulated value first; empty: nothing
+  std::vector<std::pair<std::string, double>> zero_bands;  // arguments that count as 0 below
+  std::string adjusted;                                    // what is done to the simulated value first; empty: nothing
   std::vector<std::string> summands;
   std::vector<std::string> titles;
 };
@@ -34,7 +35,10 @@ Body body_of(const FoundTerms& found, std::size_t o, CodeLanguage language) {
   const FoundTerms::Output& output = found.outputs[o];
   Body body;
   body.name = found.outputs.size() == 1 ? "correction" : "correction_" + output.word;
-  for (const FoundTerms::Input& input : found.inputs) body.arguments.push_back(input.word);
+  for (const FoundTerms::Input& input : found.inputs) {
+    body.arguments.push_back(input.word);
+    if (input.zero_band > 0.0) body.zero_bands.emplace_back(input.word, input.zero_band);
+  }
   std::vector<std::string> variables = body.arguments;
   variables.push_back(output.word);
   bool uses_output = false;
@@ -94,6 +98,9 @@ std::string c_function(const Body& body) {
   std::vector<std::string> arguments;
   for (const std::string& argument : body.arguments) arguments.push_back("double " + argument);
   std::string text = fmt::format("\ndouble {}({}) {{\n", body.name, fmt::join(arguments, ", "));
+  for (const auto& [word, band] : body.zero_bands) {
+    text += fmt::format("  if (fabs({0}) < {1}) {0} = 0.0; /* at rest */\n", word, band);
+  }
   text += fmt::format("  double change = {};\n", body.adjusted.empty() ? "0.0" : body.adjusted);
   if (!body.adjusted.empty()) text += fmt::format("  {} += change;\n", body.arguments.back());
   for (std::size_t k = 0; k < body.summands.size(); ++k) {
@@ -105,6 +112,9 @@ std::string c_function(const Body& body) {
 
 std::string python_function(const Body& body) {
   std::string text = fmt::format("\n\ndef {}({}):\n", body.name, fmt::join(body.arguments, ", "));
+  for (const auto& [word, band] : body.zero_bands) {
+    text += fmt::format("    {0} = np.where(np.abs({0}) < {1}, 0.0, {0})  # at rest\n", word, band);
+  }
   text += fmt::format("    change = {}\n", body.adjusted.empty() ? "0.0" : body.adjusted);
   if (!body.adjusted.empty()) text += fmt::format("    {0} = {0} + change\n", body.arguments.back());
   for (std::size_t k = 0; k < body.summands.size(); ++k) {

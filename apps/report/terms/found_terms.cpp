@@ -151,7 +151,8 @@ FoundTerms found_terms(const Json& json, const std::string& file) {
   try {
     for (const Json& input : json.at("inputs")) {
       found.inputs.push_back({input.at("name").get<std::string>(), input.at("word").get<std::string>(),
-                              input.at("low").get<double>(), input.at("high").get<double>()});
+                              input.at("low").get<double>(), input.at("high").get<double>(),
+                              input.value("zero_band", 0.0)});
     }
     for (const Json& output : json.at("outputs")) {
       found.outputs.push_back({output.at("name").get<std::string>(), output.at("word").get<std::string>()});
@@ -169,7 +170,12 @@ FoundTerms found_terms(const Json& json, const std::string& file) {
 
 Eigen::MatrixXd apply(const FoundTerms& found, const Eigen::MatrixXd& inputs, const Eigen::MatrixXd& simulated,
                       const std::map<std::string, Eigen::MatrixXd>& derivatives) {
-  const discovery::Inputs named{found.input_names(), inputs, found.order};
+  discovery::Inputs named{found.input_names(), inputs, found.order};
+  for (std::size_t j = 0; j < found.inputs.size(); ++j) {
+    for (double& value : named.values.col(static_cast<Eigen::Index>(j))) {
+      if (std::abs(value) < found.inputs[j].zero_band) value = 0.0;
+    }
+  }
   Eigen::MatrixXd base = simulated;
   for (std::size_t o = 0; o < found.outputs.size(); ++o) {
     const auto column = static_cast<Eigen::Index>(o);

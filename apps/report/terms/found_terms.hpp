@@ -19,6 +19,7 @@ struct FoundTerms {
     std::string word;  ///< what expressions call it
     double low = 0.0;  ///< of the rows that were searched
     double high = 0.0;
+    double zero_band = 0.0;  ///< the input counts as 0 where its absolute value is smaller
   };
   struct Output {
     std::string name;

@@ -127,6 +127,9 @@ Json inputs_json(const TermsSummary& summary, const Words& words) {
                       {"word", words.inputs[j]},
                       {"low", summary.ranges[j].low},
                       {"high", summary.ranges[j].high}});
+    const Eigen::VectorXd& bands = summary.missing.zero_bands;
+    const auto column = static_cast<Eigen::Index>(j);
+    if (column < bands.size() && bands(column) > 0.0) inputs.back()["zero_band"] = bands(column);
   }
   return inputs;
 }

@@ -76,6 +76,9 @@ struct Inputs {
   /// p standard deviations of the errors of the inputs (0: none; NaN: estimated from rows in time). Empty: NaN for rows
   /// in time, else 0.
   Eigen::VectorXd noise = {};
+  /// p zero bands: where |x| is below, the input is at rest and counts as 0 in terms (Karnopp 1985). Empty: none; for
+  /// rows in time find_missing() looks for them.
+  Eigen::VectorXd zero_bands = {};
 };
 
 }  // namespace llmt::discovery

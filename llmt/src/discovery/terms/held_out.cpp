@@ -37,7 +37,8 @@ TermFit fit_without(const TermModel& model, const TermData& kept, const TermFit&
 }
 
 // Terms that change samples by C, a sum of squares in units of the variance of the noise, should shrink the sum of
-// squares there by C, with a standard deviation of 2 sqrt(C).
+// squares there by C, with a standard deviation of 2 sqrt(C). Where only a share of the samples is independent, both
+// sums are of that share.
 struct Judgement {
   double change = 0.0;
   double shrunk = 0.0;
@@ -69,9 +70,10 @@ std::vector<Eigen::Index> rows_of_growth(const Samples& samples, const Eigen::Ve
 void judge_held_out(const TermModel& model, const TermData& kept, const TermData& aside, const TermFit& baseline,
                     const Settled& settled, Missing& missing) {
   if (aside.samples.size() == 0 || settled.fit.placed.empty()) return;
-  const double noise = std::pow(settled.verdict.noise, 2.0);
-  const TermData held_out =
-      without_outliers(aside, squared_errors(model, aside, baseline), squared_errors(model, aside, settled.fit), noise);
+  const double variance = std::pow(settled.verdict.noise, 2.0);
+  const double noise = variance / kept.independent_share;
+  const TermData held_out = without_outliers(aside, squared_errors(model, aside, baseline),
+                                             squared_errors(model, aside, settled.fit), variance);
   const Eigen::VectorXd before = squared_errors(model, held_out, baseline);
   const Eigen::VectorXd after = squared_errors(model, held_out, settled.fit);
   const Eigen::VectorXd change = scaled_residuals(model, held_out, baseline.parameters, baseline.placed) -

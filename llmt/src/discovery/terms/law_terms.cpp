@@ -100,7 +100,7 @@ ModelTerm coulomb_stribeck(const InputView& input) {
   const double far = std::max(-input.low, input.high);
   ModelTerm term =
       searched_term(input, "coulomb_stribeck", fmt::format("sign({0}) (F_c + F_x exp(-({0}/c)^2))", input.name),
-                    {"F_c", "F_x"}, "", smooth("c", input.name, geometric(0.01 * far, 0.5 * far, 20)),
+                    {"F_c", "F_x"}, "", smooth("c", input.name, geometric(0.01 * far, 0.3 * far, 20)),
                     [](const Eigen::ArrayXd& v, double c) -> Eigen::MatrixXd {
                       Eigen::MatrixXd parts(v.size(), 2);
                       parts.col(0) = v.sign();

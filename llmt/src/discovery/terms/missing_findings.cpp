@@ -56,6 +56,11 @@ std::vector<std::string> sorted_inputs(const FoundTerm& found) {
   return inputs;
 }
 
+// Coulomb and viscous friction are one law of a speed.
+std::string kind_of(const FoundTerm& found) {
+  return found.family == "sign" || found.family == "linear" ? "dry and viscous" : found.family;
+}
+
 // Terms that together may only approximate another function: three or more kinds of one input, or two terms of the
 // same two inputs.
 std::vector<bool> approximations(const std::vector<FoundTerm>& all) {
@@ -70,7 +75,7 @@ std::vector<bool> approximations(const std::vector<FoundTerm>& all) {
   std::map<Place, std::set<std::string>> kinds;
   for (const FoundTerm& found : all) {
     if (!is_counted(found)) continue;
-    kinds[place_of(found)].insert(found.inputs.size() == 1 ? found.family : found.family + " " + found.location);
+    kinds[place_of(found)].insert(found.inputs.size() == 1 ? kind_of(found) : found.family + " " + found.location);
   }
   std::vector<bool> approximate;
   for (const FoundTerm& found : all) {
@@ -138,6 +143,8 @@ std::vector<Structure> structure_beside(const TermModel& model, const TermData& 
   constexpr double material = 0.05;
   // More than a quarter of what is left: no noise hides what the terms miss, however little of the gap it is.
   constexpr double dominant = 0.25;
+  // Signals of a machine always hold a little more than what is asked for.
+  constexpr double immaterial = 0.01;
   const Eigen::MatrixXd samples = means(inputs.values, data.samples);
   std::vector<Structure> all;
   for (Eigen::Index o = 0; o < data.measured.cols(); ++o) {
@@ -148,8 +155,10 @@ std::vector<Structure> structure_beside(const TermModel& model, const TermData& 
     const double explained = std::max(0.0, gap.squaredNorm() - left.squaredNorm());
     const double p_value = found.p_value * static_cast<double>(data.measured.cols());
     if (p_value > surprising) continue;
-    if (common < material * (common + explained) && found.share < dominant) continue;
-    Structure structure{model.outputs()[o], {}, p_value, common / (common + explained)};
+    const double share = common / (common + explained);
+    if (share < material && found.share < dominant) continue;
+    if (!data.stretches.empty() && share < immaterial) continue;
+    Structure structure{model.outputs()[o], {}, p_value, share};
     for (const Eigen::Index j : found.columns) structure.inputs.push_back(inputs.names[j]);
     all.push_back(std::move(structure));
   }

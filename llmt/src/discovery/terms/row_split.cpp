@@ -206,6 +206,12 @@ double noise_variance(const Eigen::VectorXd& values) {
   return third.square().mean() / 20.0;
 }
 
+bool is_smooth_in_time(const Inputs& inputs, Eigen::Index column) {
+  const Eigen::VectorXd values = inputs.values.col(column);
+  const Smoothness own{column, variance_of(values), noise_variance_in(recording_of(inputs).pieces, values)};
+  return own.variance > 0.0 && own.is_smooth();
+}
+
 AlongRows along_rows(const Inputs& inputs, const MissingOptions& options) {
   Piece all(inputs.values.rows());
   std::iota(all.begin(), all.end(), Eigen::Index{0});

@@ -30,6 +30,9 @@ RowSplit split_in_time(const Inputs& inputs, const MissingOptions& options);
 /// NaN for fewer than 4 values.
 double noise_variance(const Eigen::VectorXd& values);
 
+/// Whether the noise of an input is at most 40 % of its variance, for rows in time.
+bool is_smooth_in_time(const Inputs& inputs, Eigen::Index column);
+
 /// Whether rows follow each other as those of a log do.
 enum class AlongRows {
   independent,     ///< most inputs that vary jump from row to row

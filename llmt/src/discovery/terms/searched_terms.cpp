@@ -58,11 +58,13 @@ TermConstant smooth_constant(const InputView& input, std::string name, std::vect
 
 // tanh(x/c) and alike turn over within the range, from the share `narrowest` of its farther end on; longer constants
 // are straight lines and cubes.
-std::vector<double> widths(const InputView& input, double narrowest) {
+std::vector<double> widths(const InputView& input, double narrowest, double widest = 1.0) {
   constexpr int count = 24;
   const double far = std::max(-input.low, input.high);
   std::vector<double> values;
-  for (int k = 0; k < count; ++k) values.push_back(far * std::pow(narrowest, 1.0 - k / static_cast<double>(count - 1)));
+  for (int k = 0; k < count; ++k) {
+    values.push_back(far * widest * std::pow(narrowest / widest, 1.0 - k / static_cast<double>(count - 1)));
+  }
   return values;
 }
 
@@ -124,6 +126,8 @@ std::vector<ModelTerm> odd_functions(const InputView& input) {
   const std::string& x = input.name;
   const TermConstant width = smooth_constant(input, "c", widths(input, 0.01));
   // A narrower one is a sign and a line: Coulomb's and viscous friction.
+  // Stribeck's peak has gone before the farther end. A wider one is a sign and a square.
+  const TermConstant peak = smooth_constant(input, "c", widths(input, 0.01, 0.3));
   const TermConstant wide = smooth_constant(input, "c", widths(input, 0.15));
   return {one_function(
               input, "tanh", fmt::format("tanh({}/c)", x), "limit", width,
@@ -132,7 +136,7 @@ std::vector<ModelTerm> odd_functions(const InputView& input) {
               input, "asinh", fmt::format("asinh({}/c)", x), "coefficient", wide,
               [](const Eigen::ArrayXd& v, double c) -> Eigen::ArrayXd { return (v / c).asinh(); }, "asinh($1/$c)"),
           one_function(
-              input, "stribeck", fmt::format("sign({0}) exp(-({0}/c)^2)", x), "height", width,
+              input, "stribeck", fmt::format("sign({0}) exp(-({0}/c)^2)", x), "height", peak,
               [](const Eigen::ArrayXd& v, double c) -> Eigen::ArrayXd { return v.sign() * (-(v / c).square()).exp(); },
               "sign($1)*exp(-(($1/$c)^2))")};
 }

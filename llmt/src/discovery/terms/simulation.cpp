@@ -14,6 +14,7 @@
 #include "discovery/terms/missing_findings.hpp"
 #include "discovery/terms/refuse.hpp"
 #include "discovery/terms/row_split.hpp"
+#include "discovery/terms/standstill.hpp"
 #include "discovery/terms/term_question.hpp"
 #include "discovery/terms/term_rounds.hpp"
 #include "llmt/statistics.hpp"
@@ -125,6 +126,7 @@ Missing search_once(const Simulation& simulation, const Inputs& inputs, const Me
   Eigen::VectorXd start(std::ssize(simulation.parameters));
   for (std::size_t k = 0; k < simulation.parameters.size(); ++k) start(k) = simulation.parameters[k].value;
   RowSplit split = in_time ? split_in_time(inputs, options) : split_independent(inputs, options);
+  if (inputs.zero_bands.size() > 0) split = without_rows(split, rows_at_rest(inputs));
   ErrorsOfInputs errors = errors_of_inputs(model, inputs, measured, start, split);
   const Eigen::Index d = measured.values.cols();
   TermData data = data_of(split.searched, measured);
@@ -201,17 +203,69 @@ Missing search_once(const Simulation& simulation, const Inputs& inputs, const Me
   return missing;
 }
 
+// Rows in time with the bands within which inputs rest.
+Inputs with_zero_bands(const Simulation& simulation, Inputs inputs, const MeasuredOutputs& measured) {
+  if (inputs.instants.size() == 0 || inputs.zero_bands.size() > 0) return inputs;
+  Eigen::VectorXd nominal(std::ssize(simulation.parameters));
+  for (std::size_t k = 0; k < simulation.parameters.size(); ++k) nominal(k) = simulation.parameters[k].value;
+  inputs.zero_bands = zero_bands(inputs, measured.values - simulation.predict(inputs.values, nominal));
+  if (!(inputs.zero_bands.array() > 0.0).any()) inputs.zero_bands.resize(0);
+  return inputs;
+}
+
+std::vector<std::string> notes_on_rest(const Inputs& inputs) {
+  std::vector<std::string> notes;
+  for (Eigen::Index j = 0; j < inputs.zero_bands.size(); ++j) {
+    if (!(inputs.zero_bands(j) > 0.0)) continue;
+    notes.push_back(fmt::format(
+        "{0} rests at {1} rows, with |{0}| < {2:.3g}. They were set apart, because dry friction at rest may be "
+        "anything "
+        "up to that of motion. The terms found take {0} for 0 there",
+        inputs.names[j], (inputs.values.col(j).array().abs() < inputs.zero_bands(j)).count(), inputs.zero_bands(j)));
+  }
+  return notes;
+}
+
+// Sum over the outputs of the squared errors on the samples set aside, in units of those before.
+double left_on_held_out(const Missing& missing) {
+  double left = 0.0;
+  for (const Gap& gap : missing.gaps) left += gap.before > 0.0 ? std::pow(gap.after / gap.before, 2.0) : 0.0;
+  return left;
+}
+
+// Shapes follow noise that is alike in neighbours farther than causes do, and they follow what is small beside the
+// causes. Where causes alone leave as little on the rows set aside, they are the answer.
+Missing causes_for_shapes(const Simulation& simulation, const Inputs& inputs, const MeasuredOutputs& measured,
+                          const std::vector<ModelTerm>& terms, const MissingOptions& options,
+                          std::set<std::size_t> refuted, Missing with_shapes) {
+  const bool has_shapes = std::ranges::any_of(with_shapes.found, &FoundTerm::generic);
+  if (inputs.instants.size() == 0 || !has_shapes || with_shapes.held_out.empty()) return with_shapes;
+  for (std::size_t t = 0; t < terms.size(); ++t) {
+    if (terms[t].generic) refuted.insert(t);
+  }
+  Missing of_causes = search_once(simulation, inputs, measured, terms, options, refuted);
+  constexpr double as_little = 1.1;
+  constexpr double immaterial = 0.01;
+  const double left = left_on_held_out(with_shapes);
+  const bool is_as_good = of_causes.answer != Answer::failed_held_out && !of_causes.found.empty() &&
+                          left_on_held_out(of_causes) <= std::max(as_little * left, left + immaterial);
+  return is_as_good ? of_causes : with_shapes;
+}
+
 // Searches until what is found holds on the rows set aside. Terms that are refuted there are no candidates of the next
 // search, which sets other rows aside.
-Missing find(const Simulation& simulation, const Inputs& inputs, const MeasuredOutputs& measured,
+Missing find(const Simulation& simulation, const Inputs& as_given, const MeasuredOutputs& measured,
              const std::vector<ModelTerm>& terms, MissingOptions options) {
   constexpr int most = 3;
+  const Inputs inputs = with_zero_bands(simulation, as_given, measured);
   std::set<std::size_t> refuted;
-  std::vector<std::string> notes;
+  std::vector<std::string> notes = notes_on_rest(inputs);
   for (int trial = 1;; ++trial) {
     Missing missing = search_once(simulation, inputs, measured, terms, options, refuted);
     if (missing.answer != Answer::failed_held_out || trial == most) {
+      missing = causes_for_shapes(simulation, inputs, measured, terms, options, refuted, std::move(missing));
       missing.notes.insert(missing.notes.begin(), notes.begin(), notes.end());
+      missing.zero_bands = inputs.zero_bands;
       return missing;
     }
     for (const FoundTerm& found : missing.found) {
@@ -262,7 +316,9 @@ Missing find_missing(const Simulation& simulation, const Inputs& inputs, const M
 }
 
 Eigen::MatrixXd corrected(const Simulation& simulation, const Missing& missing, const std::vector<ModelTerm>& terms,
-                          const Inputs& inputs) {
+                          const Inputs& elsewhere) {
+  Inputs inputs = elsewhere;
+  if (inputs.zero_bands.size() == 0) inputs.zero_bands = missing.zero_bands;
   std::vector<std::string> outputs;
   for (const Gap& gap : missing.gaps) outputs.push_back(gap.output);
   const TermModel model(simulation, inputs, outputs, terms);

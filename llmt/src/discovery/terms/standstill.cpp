@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "discovery/terms/derivatives.hpp"
+#include "discovery/terms/row_split.hpp"
 
 namespace llmt::discovery {
 namespace {
@@ -32,7 +33,87 @@ void keep(const Samples& from, const std::vector<bool>& apart, Samples& to, std:
   }
 }
 
+// The widest band in which rows lie clearly denser than where x passes; 0: none. A signal that passes 0 spends as long
+// in any interval there as in another of the same width.
+double band_of(const Eigen::VectorXd& x) {
+  constexpr Eigen::Index fewest = 20;
+  constexpr Eigen::Index fewest_beside = 5;
+  constexpr double denser = 3.0;
+  constexpr double finer = 1.25;
+  std::vector<double> sizes(x.size());
+  Eigen::VectorXd::Map(sizes.data(), x.size()) = x.cwiseAbs();
+  std::ranges::sort(sizes);
+  const auto below = [&](double limit) {
+    return static_cast<double>(std::ranges::lower_bound(sizes, limit) - sizes.begin());
+  };
+  // Root mean squares. Where x passes is looked at from `near` to `far`.
+  const double spread = std::sqrt(x.squaredNorm() / static_cast<double>(x.size()));
+  constexpr double near = 0.2;
+  constexpr double far = 0.5;
+  constexpr double widest = 0.1;
+  constexpr double narrowest = 1e-6;
+  const double passing = (below(far * spread) - below(near * spread)) / ((far - near) * spread);
+  for (double band = widest * spread; band > narrowest * spread; band /= finer) {
+    const double outer = below(band) - below(0.5 * band);
+    if (outer >= fewest_beside && outer >= denser * passing * 0.5 * band && below(band) >= fewest &&
+        below(band) >= denser * passing * band) {
+      return band;
+    }
+  }
+  return 0.0;
+}
+
+// Whether values jump where x passes the band.
+bool jumps(const Eigen::VectorXd& x, const Eigen::VectorXd& values, double band) {
+  constexpr std::size_t next = 30;  // rows on each side
+  constexpr std::size_t fewest = 10;
+  constexpr double surprising = 4.0;
+  double difference = 0.0;
+  double variance = 0.0;
+  for (const double side : {-1.0, 1.0}) {
+    std::vector<std::pair<double, double>> beyond;
+    for (Eigen::Index i = 0; i < x.size(); ++i) {
+      if (side * x(i) >= band) beyond.emplace_back(side * x(i), values(i));
+    }
+    if (beyond.size() < fewest) return false;
+    std::ranges::sort(beyond);
+    beyond.resize(std::min(beyond.size(), next));
+    Eigen::ArrayXd own(std::ssize(beyond));
+    for (std::size_t k = 0; k < beyond.size(); ++k) own(k) = beyond[k].second;
+    const auto n = static_cast<double>(own.size());
+    difference += side * own.mean();
+    variance += (own - own.mean()).square().sum() / (n - 1.0) / n;
+  }
+  return std::abs(difference) > surprising * std::sqrt(variance);
+}
+
 }  // namespace
+
+Eigen::VectorXd zero_bands(const Inputs& inputs, const Eigen::MatrixXd& deviations) {
+  constexpr double largest_share = 0.5;
+  Eigen::VectorXd bands = Eigen::VectorXd::Zero(inputs.values.cols());
+  for (Eigen::Index j = 0; j < inputs.values.cols(); ++j) {
+    const Eigen::VectorXd x = inputs.values.col(j);
+    if (!(x.minCoeff() < 0.0 && x.maxCoeff() > 0.0) || !is_smooth_in_time(inputs, j)) continue;
+    const double band = band_of(x);
+    const auto within = static_cast<double>((x.array().abs() < band).count());
+    if (!(band > 0.0) || within > largest_share * static_cast<double>(x.size())) continue;
+    for (Eigen::Index o = 0; o < deviations.cols(); ++o) {
+      if (jumps(x, deviations.col(o), band)) bands(j) = band;
+    }
+  }
+  return bands;
+}
+
+std::vector<bool> rows_at_rest(const Inputs& inputs) {
+  std::vector<bool> at_rest(inputs.values.rows(), false);
+  for (Eigen::Index j = 0; j < inputs.zero_bands.size(); ++j) {
+    for (Eigen::Index i = 0; i < inputs.values.rows(); ++i) {
+      if (std::abs(inputs.values(i, j)) < inputs.zero_bands(j)) at_rest[i] = true;
+    }
+  }
+  return at_rest;
+}
 
 std::vector<UnknownSign> rows_of_unknown_sign(const Rows& rows, const Inputs& inputs, const Eigen::MatrixXd& covariance,
                                               const Eigen::MatrixXd& deviations, std::vector<bool>& apart) {

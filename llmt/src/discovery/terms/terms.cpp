@@ -48,6 +48,9 @@ void check(const Inputs& inputs) {
   if (!inputs.runs.empty() && std::ssize(inputs.runs) != n) {
     refuse("standard_terms", fmt::format("{} labels of runs for {} rows", inputs.runs.size(), n));
   }
+  if (inputs.zero_bands.size() > 0 && inputs.zero_bands.size() != inputs.values.cols()) {
+    refuse("standard_terms", fmt::format("{} zero bands for {} inputs", inputs.zero_bands.size(), inputs.names.size()));
+  }
 }
 
 // By the ending of the name; or by a usual name of a joint's angle, and values that radians may have.
@@ -321,6 +324,9 @@ Rows rows_of(const Inputs& inputs, const Eigen::VectorXd& simulated) {
             .simulated = simulated,
             .sequence = {},
             .instants = Eigen::VectorXd::LinSpaced(n, 0.0, static_cast<double>(n - 1))};
+  for (Eigen::Index j = 0; j < inputs.zero_bands.size(); ++j) {
+    rows.inputs.col(j) = (rows.inputs.col(j).array().abs() < inputs.zero_bands(j)).select(0.0, rows.inputs.col(j));
+  }
   rows.sequence.resize(n);
   std::iota(rows.sequence.begin(), rows.sequence.end(), 0);
   if (inputs.instants.size() > 0) {
