@@ -59,8 +59,8 @@ std::vector<discovery::ModelTerm> of_families_to_try(const DiscoverArguments& ar
 std::vector<discovery::ModelTerm> terms_to_try(const DiscoverArguments& arguments, const Comparison& comparison,
                                                std::vector<discovery::UntestableCause>& untestable) {
   std::vector<discovery::ModelTerm> library = discovery::standard_terms(comparison.inputs, &untestable);
-  for (discovery::ModelTerm& term : discovery::inner_state_terms(comparison.inputs, comparison.simulated,
-                                                                 comparison.measured.values, arguments.outputs)) {
+  for (discovery::ModelTerm& term :
+       discovery::inner_state_terms(comparison.inputs, comparison.simulated, arguments.outputs)) {
     library.push_back(std::move(term));
   }
   library = of_families_to_try(arguments, std::move(library));

@@ -138,6 +138,8 @@ def judge(document, case):
     estimates = {name: values_of(effect)[0] for name, _, effect in parameters}  # what is not named is as it should be
     off = [name for name, change in case.parameters if not near_change(estimates.get(name, 0.0), change)]
     allowed = [id(e) for found in right for e in found] + [id(effect) for _, _, effect in parameters]
+    if case.inner:
+        allowed += [id(e) for e in effects if e["name"] in INNER]
     others = [e for e in effects if id(e) not in allowed and label(e) not in case.tolerated]
     accepted = {name for term in case.truth for name in term.accepted}
     undecided = [e for e in others if accepted & set(rivals(e))]

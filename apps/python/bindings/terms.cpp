@@ -85,13 +85,13 @@ discovery::Parameter parameter_of(const nb::dict& given) {
 
 // The library's terms, and one's own in their place where they are the same.
 std::vector<discovery::ModelTerm> terms_of(const Question& question, const std::vector<OwnTerm>& own_terms,
-                                           bool own_terms_only, const Eigen::MatrixXd& measured,
+                                           bool own_terms_only, bool in_time,
                                            std::vector<discovery::UntestableCause>& untestable) {
   std::vector<discovery::ModelTerm> library = discovery::standard_terms(question.inputs, &untestable);
-  // They depend on what was measured, so that they say nothing of other rows.
-  if (measured.size() > 0) {
+  // They are of rows that follow each other.
+  if (in_time) {
     for (discovery::ModelTerm& term :
-         discovery::inner_state_terms(question.inputs, question.simulated, measured, question.outputs)) {
+         discovery::inner_state_terms(question.inputs, question.simulated, question.outputs)) {
       library.push_back(std::move(term));
     }
   }
@@ -189,7 +189,8 @@ discovery::Missing missing_of(const std::string& state, const Question& question
     discovery::FoundTerm& term = missing.found.emplace_back();
     term.term = entry["term"].get<std::size_t>();
     if (term.term >= question.terms.size()) {
-      throw std::invalid_argument("an inner state was found: it depends on what was measured, not on inputs alone");
+      throw std::invalid_argument(
+          "an inner state was found: it depends on the rows before and after, not on a row alone");
     }
     term.output_index = entry["output"].get<Eigen::Index>();
     term.coefficients = vector("coefficients");
@@ -245,7 +246,7 @@ nb::dict find_missing(const Array& inputs, const std::vector<std::string>& input
     if (!report.is_none()) report(said.done, said.total, said.step);
     return true;
   };
-  question.terms = terms_of(question, own_terms, own_terms_only, outputs.values, question.untestable);
+  question.terms = terms_of(question, own_terms, own_terms_only, true, question.untestable);
   const discovery::OutputDerivatives derivatives = derivatives_of(jacobian, question);
   unlocked([&] {
     summary.missing =
@@ -279,7 +280,7 @@ auto corrected(const Array& inputs, const std::vector<std::string>& input_names,
   set_simulation(question, predict, parameters, offset, scale, there);
   const discovery::Inputs places{input_names, rows_of(elsewhere), order};
   Eigen::MatrixXd result;
-  question.terms = terms_of(question, own_terms, own_terms_only, {}, question.untestable);
+  question.terms = terms_of(question, own_terms, own_terms_only, false, question.untestable);
   const discovery::Missing missing = missing_of(state, question);
   unlocked([&] { result = discovery::corrected(question.simulation, missing, question.terms, places); });
   return array_of<double>(std::move(result));

@@ -64,8 +64,7 @@ double nominal(double t) {
 
 Missing missing_from(const Log& log) {
   std::vector<ModelTerm> terms = standard_terms(log.inputs);
-  for (ModelTerm& term : inner_state_terms(log.inputs, log.simulated, log.measured.values, {"u"}))
-    terms.push_back(std::move(term));
+  for (ModelTerm& term : inner_state_terms(log.inputs, log.simulated, {"u"})) terms.push_back(std::move(term));
   return find_missing(tabulated(log.simulated, {"u"}), log.inputs, log.measured, terms);
 }
 

@@ -160,6 +160,8 @@ struct Missing {
   std::vector<Structure> structure;  ///< material; terms found beside it are not confirmed
   std::vector<std::string> notes;    ///< in sentences
   TimeUse time;
+  /// n x d, or empty: what the simulated outputs change by where inputs of a motion were smoothed. Gaps include it.
+  Eigen::MatrixXd change_by_smoothing;
   Eigen::VectorXd zero_bands;  ///< p, or empty: within them an input is at rest and counts as 0, Inputs::zero_bands
   std::vector<Eigen::Index> failing_rows;  ///< set aside, where the terms make the error grow most; if that failed
   int rounds = 0;

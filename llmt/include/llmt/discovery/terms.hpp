@@ -58,13 +58,13 @@ std::vector<ModelTerm> row_before_terms(const Inputs& inputs, const std::string&
 ///   s = y + delay dy/dt, which are the same to first order;
 ///   drive_spring, for inputs that are a position q, its speed v and its acceleration a (found out): the inputs are
 ///   measured in front of a spring of rate k, and the load is at q - w/k, where w = y - J a - b v is what the spring
-///   carries, J and b the inertia and damping in front of it, y the measured output (the simulated one at other rows
-///   than these). To first order y - s = -(1/k) (ds/dq w + (ds/da - J) d2w/dt2), with four free coefficients:
-///   compliance 1/k, inertia J/k, damping b/k, and bend, J/k once more.
+///   carries, J and b the inertia and damping in front of it. To first order, for which y is s,
+///   y - s = -(1/k) (ds/dq w + (ds/da - J) d2w/dt2), with three free coefficients: compliance 1/k, inertia J/k, damping
+///   b/k.
 /// Derivatives by time are those of local polynomials; ds/dq and ds/da are those of a function that is fitted to the
-/// table. `simulated` and `measured` n x d. Empty for less than 60 rows. Throws as standard_terms().
+/// table. `simulated` n x d. Empty for less than 60 rows. Throws as standard_terms().
 std::vector<ModelTerm> inner_state_terms(const Inputs& inputs, const Eigen::MatrixXd& simulated,
-                                         const Eigen::MatrixXd& measured, const std::vector<std::string>& outputs);
+                                         const std::vector<std::string>& outputs);
 
 /// `library` without the terms of one column that are proportional to one of `own`, so that the user's name is used.
 std::vector<ModelTerm> without_duplicates(std::vector<ModelTerm> library, const std::vector<ModelTerm>& own,

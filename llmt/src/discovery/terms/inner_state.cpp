@@ -3,11 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <stdexcept>
 
 #include "discovery/terms/derivatives.hpp"
+#include "discovery/terms/motion.hpp"
 #include "discovery/terms/surrogate.hpp"
 #include "llmt/discovery/terms.hpp"
 #include "llmt/random.hpp"
@@ -36,57 +38,6 @@ class OfRows {
   std::vector<Eigen::Index> sequence_;
 };
 
-// Inputs that are a position, its speed and its acceleration.
-struct Motion {
-  Eigen::Index position = 0;
-  Eigen::Index speed = 0;
-  Eigen::Index acceleration = 0;
-  double second = 1.0;  // in units of the instants
-};
-
-// Share of the variance of b that the derivative of a explains, and the time unit of b in that of the instants.
-struct Likeness {
-  double share = 0.0;
-  double unit = 0.0;
-};
-
-Likeness likeness(const Eigen::VectorXd& derivative, const Eigen::VectorXd& b) {
-  const double own = derivative.squaredNorm() * b.squaredNorm();
-  const double common = derivative.dot(b);
-  if (!(own > 0.0) || !(common > 0.0)) return {};
-  return {common * common / own, b.squaredNorm() / common};
-}
-
-std::vector<Motion> motions(const Derivatives& derivatives, const Inputs& inputs) {
-  constexpr double of_speeds = 0.9;
-  constexpr double of_accelerations = 0.7;  // they are noisier
-  constexpr double unlike_units = 1.5;
-  const Eigen::Index p = inputs.values.cols();
-  std::vector<Eigen::VectorXd> first;
-  for (Eigen::Index j = 0; j < p; ++j) first.push_back(derivatives.first(inputs.values.col(j)));
-  const auto successor = [&](Eigen::Index a, double least) -> std::pair<Eigen::Index, Likeness> {
-    std::pair<Eigen::Index, Likeness> best{-1, {}};
-    for (Eigen::Index b = 0; b < p; ++b) {
-      if (b == a || inputs.names[b] == inputs.order) continue;
-      const Likeness own = likeness(first[a], inputs.values.col(b));
-      if (own.share >= least && own.share > best.second.share) best = {b, own};
-    }
-    return best;
-  };
-  std::vector<Motion> all;
-  for (Eigen::Index a = 0; a < p; ++a) {
-    if (inputs.names[a] == inputs.order) continue;
-    const auto [b, speed] = successor(a, of_speeds);
-    if (b < 0) continue;
-    const auto [c, acceleration] = successor(b, of_accelerations);
-    if (c < 0 || c == a) continue;
-    const double ratio = speed.unit / acceleration.unit;
-    if (ratio < 1.0 / unlike_units || ratio > unlike_units) continue;
-    all.push_back({a, b, c, speed.unit});
-  }
-  return all;
-}
-
 ModelTerm delay(const std::shared_ptr<OfRows>& of_rows, const std::string& output) {
   return {.family = "delay",
           .location = "",
@@ -102,19 +53,7 @@ ModelTerm delay(const std::shared_ptr<OfRows>& of_rows, const std::string& outpu
           .unit = "s"};
 }
 
-// The table that terms are made from: beside its rows the measured output is known.
-struct Table {
-  Eigen::VectorXd instants;
-  Eigen::MatrixXd measured;
-  Surrogate surrogate;
-
-  Eigen::ArrayXd output(const Rows& rows, Eigen::Index column) const {
-    const bool is_here = instants.size() == rows.instants.size() && instants == rows.instants;
-    return is_here ? Eigen::ArrayXd(measured.col(column).array()) : Eigen::ArrayXd(rows.simulated.array());
-  }
-};
-
-ModelTerm drive_spring(const std::shared_ptr<OfRows>& of_rows, const std::shared_ptr<const Table>& table,
+ModelTerm drive_spring(const std::shared_ptr<OfRows>& of_rows, const std::shared_ptr<const Surrogate>& surrogate,
                        const Motion& motion, const Inputs& inputs, const std::string& output,
                        Eigen::Index output_index) {
   const std::string& q = inputs.names[motion.position];
@@ -124,29 +63,28 @@ ModelTerm drive_spring(const std::shared_ptr<OfRows>& of_rows, const std::shared
   term.family = "drive_spring";
   term.location = q;
   term.formula = fmt::format(
-      "-(compliance L({0}) - inertia L({3}) - damping L({2}) - bend ds/d{3} d2({0})/dt2), L(w) = ds/d{1} w + ds/d{3} "
-      "d2w/dt2",
+      "-(compliance L({0}) - inertia (L({3}) + d2({0})/dt2) - damping L({2})), L(w) = ds/d{1} w + ds/d{3} d2w/dt2",
       output, q, v, a);
   term.inputs = {q, v, a};
-  term.coefficients = {"compliance", "inertia", "damping", "bend"};
-  term.columns = [of_rows, table, motion, output_index](const Rows& rows, const Eigen::VectorXd&) {
+  term.coefficients = {"compliance", "inertia", "damping"};
+  term.columns = [of_rows, surrogate, motion, output_index](const Rows& rows, const Eigen::VectorXd&) {
     const Derivatives& derivatives = of_rows->at(rows, rows.inputs);
-    const Eigen::ArrayXd by_position =
-        table->surrogate.derivative(rows.inputs, motion.position).col(output_index).array();
+    const Eigen::ArrayXd by_position = surrogate->derivative(rows.inputs, motion.position).col(output_index).array();
     const Eigen::ArrayXd by_acceleration =
-        table->surrogate.derivative(rows.inputs, motion.acceleration).col(output_index).array();
-    const auto bent = [&](const Eigen::ArrayXd& w) -> Eigen::ArrayXd {
-      return by_acceleration * derivatives.second(w.matrix()).array() / (motion.second * motion.second);
+        surrogate->derivative(rows.inputs, motion.acceleration).col(output_index).array();
+    const auto second = [&](const Eigen::ArrayXd& w) -> Eigen::ArrayXd {
+      return derivatives.second(w.matrix()).array() / (motion.second * motion.second);
     };
-    const Eigen::ArrayXd output_here = table->output(rows, output_index);
+    const auto of_load = [&](const Eigen::ArrayXd& w) -> Eigen::ArrayXd {
+      return by_position * w + by_acceleration * second(w);
+    };
+    const Eigen::ArrayXd output_here = rows.simulated.array();
     const Eigen::ArrayXd speed = rows.inputs.col(motion.speed).array();
     const Eigen::ArrayXd acceleration = rows.inputs.col(motion.acceleration).array();
-    const Eigen::ArrayXd bent_output = bent(output_here);
-    Eigen::MatrixXd columns(rows.inputs.rows(), 4);
-    columns.col(0) = -(by_position * output_here + bent_output).matrix();
-    columns.col(1) = (by_position * acceleration + bent(acceleration)).matrix();
-    columns.col(2) = (by_position * speed + bent(speed)).matrix();
-    columns.col(3) = bent_output.matrix();
+    Eigen::MatrixXd columns(rows.inputs.rows(), 3);
+    columns.col(0) = -of_load(output_here).matrix();
+    columns.col(1) = (of_load(acceleration) + second(output_here)).matrix();
+    columns.col(2) = of_load(speed).matrix();
     return columns;
   };
   term.output = output;
@@ -174,10 +112,9 @@ double noise_of_second(const Derivatives& derivatives, const Rows& rows, const E
 }  // namespace
 
 std::vector<ModelTerm> inner_state_terms(const Inputs& inputs, const Eigen::MatrixXd& simulated,
-                                         const Eigen::MatrixXd& measured, const std::vector<std::string>& outputs) {
+                                         const std::vector<std::string>& outputs) {
   const Rows rows = rows_of(inputs, Eigen::VectorXd::Zero(inputs.values.rows()));
-  if (simulated.rows() != inputs.values.rows() || simulated.cols() != std::ssize(outputs) ||
-      measured.rows() != simulated.rows() || measured.cols() != simulated.cols()) {
+  if (simulated.rows() != inputs.values.rows() || simulated.cols() != std::ssize(outputs)) {
     throw std::invalid_argument(
         fmt::format("llmt::discovery::inner_state_terms: {} x {} simulated outputs, must be {} x {}", simulated.rows(),
                     simulated.cols(), inputs.values.rows(), outputs.size()));
@@ -186,20 +123,22 @@ std::vector<ModelTerm> inner_state_terms(const Inputs& inputs, const Eigen::Matr
   constexpr Eigen::Index fewest = 60;
   if (inputs.values.rows() < fewest || !simulated.allFinite()) return terms;
   const auto of_rows = std::make_shared<OfRows>();
-  const auto table = std::make_shared<const Table>(Table{rows.instants, measured, Surrogate(inputs.values, simulated)});
+  const auto surrogate = std::make_shared<const Surrogate>(inputs.values, simulated);
   const std::vector<Motion> all = motions(of_rows->at(rows, inputs.values), inputs);
   // Less than this, and the derivatives of the function are not those of the simulation.
   constexpr double described = 0.98;
-  constexpr double largest_noise_share = 0.1;
+  constexpr double largest_noise_share = 0.3;
   for (std::size_t o = 0; o < outputs.size(); ++o) {
     terms.push_back(delay(of_rows, outputs[o]));
-    if (table->surrogate.described()(o) < described) continue;
-    // The spring's term holds the second derivative of the measured output: were that noise, it would explain the
-    // noise.
-    const Eigen::VectorXd output = measured.col(static_cast<Eigen::Index>(o));
+    // Nothing is measured before it happens.
+    terms.back().lower = Eigen::VectorXd::Zero(1);
+    terms.back().upper = Eigen::VectorXd::Constant(1, std::numeric_limits<double>::infinity());
+    if (surrogate->described()(o) < described) continue;
+    // The spring's term holds the second derivative of the simulated output, which should not be noise.
+    const Eigen::VectorXd output = simulated.col(static_cast<Eigen::Index>(o));
     if (noise_of_second(of_rows->at(rows, inputs.values), rows, output) > largest_noise_share) continue;
     for (const Motion& motion : all) {
-      terms.push_back(drive_spring(of_rows, table, motion, inputs, outputs[o], static_cast<Eigen::Index>(o)));
+      terms.push_back(drive_spring(of_rows, surrogate, motion, inputs, outputs[o], static_cast<Eigen::Index>(o)));
       // Compliance, inertia and damping are not negative.
       constexpr double far = 10.0;  // times the output
       const Eigen::MatrixXd columns = terms.back().columns(rows, {});

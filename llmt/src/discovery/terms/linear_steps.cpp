@@ -160,7 +160,9 @@ Missing find_missing_in_steps(const Simulation& simulation, const OutputDerivati
   for (Eigen::Index o = 0; o < outputs.cols(); ++o) {
     Gap& gap = missing.gaps[static_cast<std::size_t>(o)];
     const auto errors = [&](const Eigen::MatrixXd& predicted) -> Eigen::VectorXd {
-      return means(measured.values.col(o) - predicted.col(o), aside);
+      Eigen::VectorXd left = measured.values.col(o) - predicted.col(o);
+      if (missing.change_by_smoothing.size() > 0) left -= missing.change_by_smoothing.col(o);
+      return means(left, aside);
     };
     gap = gap_of(gap.output, errors(nominal), errors(missing.before), errors(missing.corrected), gap.noise_floor);
   }

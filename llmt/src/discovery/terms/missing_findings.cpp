@@ -168,9 +168,9 @@ std::vector<Structure> structure_beside(const TermModel& model, const TermData& 
 void decide(Missing& missing) {
   const bool is_nothing = missing.verdict.answer == Answer::nothing_missing;
   missing.answer = is_nothing && !missing.structure.empty() ? Answer::unknown : missing.verdict.answer;
-  // Nothing is measured before it happens.
+  constexpr double certain = 2.0;  // standard errors
   const auto is_state = [](const FoundTerm& found) {
-    return !found.inner_state.empty() && found.coefficients(0) > 0.0;
+    return !found.inner_state.empty() && found.coefficients(0) > certain * found.values.front().standard_error;
   };
   const bool has_inner_state = std::ranges::any_of(missing.found, is_state);
   if (has_inner_state) missing.answer = Answer::inner_state;

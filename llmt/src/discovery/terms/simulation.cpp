@@ -12,6 +12,7 @@
 #include "discovery/terms/fitted_parameters.hpp"
 #include "discovery/terms/held_out.hpp"
 #include "discovery/terms/missing_findings.hpp"
+#include "discovery/terms/motion.hpp"
 #include "discovery/terms/refuse.hpp"
 #include "discovery/terms/row_split.hpp"
 #include "discovery/terms/standstill.hpp"
@@ -118,7 +119,7 @@ double correlation_time(const RowSplit& split, const Eigen::MatrixXd& deviations
 }
 
 Missing search_once(const Simulation& simulation, const Inputs& inputs, const MeasuredOutputs& measured,
-                    const std::vector<ModelTerm>& terms, const MissingOptions& options,
+                    const std::vector<ModelTerm>& terms, const std::vector<bool>& apart, const MissingOptions& options,
                     const std::set<std::size_t>& refuted) {
   const bool in_time = inputs.instants.size() > 0;
   Simulation distinct = simulation;
@@ -126,7 +127,7 @@ Missing search_once(const Simulation& simulation, const Inputs& inputs, const Me
   Eigen::VectorXd start(std::ssize(simulation.parameters));
   for (std::size_t k = 0; k < simulation.parameters.size(); ++k) start(k) = simulation.parameters[k].value;
   RowSplit split = in_time ? split_in_time(inputs, options) : split_independent(inputs, options);
-  if (inputs.zero_bands.size() > 0) split = without_rows(split, rows_at_rest(inputs));
+  if (std::ranges::find(apart, true) != apart.end()) split = without_rows(split, apart);
   ErrorsOfInputs errors = errors_of_inputs(model, inputs, measured, start, split);
   const Eigen::Index d = measured.values.cols();
   TermData data = data_of(split.searched, measured);
@@ -203,12 +204,17 @@ Missing search_once(const Simulation& simulation, const Inputs& inputs, const Me
   return missing;
 }
 
+Eigen::VectorXd nominal_values(const Simulation& simulation) {
+  Eigen::VectorXd nominal(std::ssize(simulation.parameters));
+  for (std::size_t k = 0; k < simulation.parameters.size(); ++k) nominal(k) = simulation.parameters[k].value;
+  return nominal;
+}
+
 // Rows in time with the bands within which inputs rest.
 Inputs with_zero_bands(const Simulation& simulation, Inputs inputs, const MeasuredOutputs& measured) {
   if (inputs.instants.size() == 0 || inputs.zero_bands.size() > 0) return inputs;
-  Eigen::VectorXd nominal(std::ssize(simulation.parameters));
-  for (std::size_t k = 0; k < simulation.parameters.size(); ++k) nominal(k) = simulation.parameters[k].value;
-  inputs.zero_bands = zero_bands(inputs, measured.values - simulation.predict(inputs.values, nominal));
+  inputs.zero_bands =
+      zero_bands(inputs, measured.values - simulation.predict(inputs.values, nominal_values(simulation)));
   if (!(inputs.zero_bands.array() > 0.0).any()) inputs.zero_bands.resize(0);
   return inputs;
 }
@@ -236,14 +242,14 @@ double left_on_held_out(const Missing& missing) {
 // Shapes follow noise that is alike in neighbours farther than causes do, and they follow what is small beside the
 // causes. Where causes alone leave as little on the rows set aside, they are the answer.
 Missing causes_for_shapes(const Simulation& simulation, const Inputs& inputs, const MeasuredOutputs& measured,
-                          const std::vector<ModelTerm>& terms, const MissingOptions& options,
-                          std::set<std::size_t> refuted, Missing with_shapes) {
+                          const std::vector<ModelTerm>& terms, const std::vector<bool>& apart,
+                          const MissingOptions& options, std::set<std::size_t> refuted, Missing with_shapes) {
   const bool has_shapes = std::ranges::any_of(with_shapes.found, &FoundTerm::generic);
   if (inputs.instants.size() == 0 || !has_shapes || with_shapes.held_out.empty()) return with_shapes;
   for (std::size_t t = 0; t < terms.size(); ++t) {
     if (terms[t].generic) refuted.insert(t);
   }
-  Missing of_causes = search_once(simulation, inputs, measured, terms, options, refuted);
+  Missing of_causes = search_once(simulation, inputs, measured, terms, apart, options, refuted);
   constexpr double as_little = 1.1;
   constexpr double immaterial = 0.01;
   const double left = left_on_held_out(with_shapes);
@@ -254,18 +260,16 @@ Missing causes_for_shapes(const Simulation& simulation, const Inputs& inputs, co
 
 // Searches until what is found holds on the rows set aside. Terms that are refuted there are no candidates of the next
 // search, which sets other rows aside.
-Missing find(const Simulation& simulation, const Inputs& as_given, const MeasuredOutputs& measured,
-             const std::vector<ModelTerm>& terms, MissingOptions options) {
+Missing find_at(const Simulation& simulation, const Inputs& inputs, const MeasuredOutputs& measured,
+                const std::vector<ModelTerm>& terms, const std::vector<bool>& apart, MissingOptions options) {
   constexpr int most = 3;
-  const Inputs inputs = with_zero_bands(simulation, as_given, measured);
   std::set<std::size_t> refuted;
-  std::vector<std::string> notes = notes_on_rest(inputs);
+  std::vector<std::string> notes;
   for (int trial = 1;; ++trial) {
-    Missing missing = search_once(simulation, inputs, measured, terms, options, refuted);
+    Missing missing = search_once(simulation, inputs, measured, terms, apart, options, refuted);
     if (missing.answer != Answer::failed_held_out || trial == most) {
-      missing = causes_for_shapes(simulation, inputs, measured, terms, options, refuted, std::move(missing));
+      missing = causes_for_shapes(simulation, inputs, measured, terms, apart, options, refuted, std::move(missing));
       missing.notes.insert(missing.notes.begin(), notes.begin(), notes.end());
-      missing.zero_bands = inputs.zero_bands;
       return missing;
     }
     for (const FoundTerm& found : missing.found) {
@@ -277,6 +281,33 @@ Missing find(const Simulation& simulation, const Inputs& as_given, const Measure
     }
     ++options.seed;
   }
+}
+
+// The search sees inputs without most of their errors. The answer is of the rows as they were given.
+Missing find(const Simulation& simulation, const Inputs& as_given, const MeasuredOutputs& measured,
+             const std::vector<ModelTerm>& terms, const MissingOptions& options) {
+  SmoothedInputs smooth = smoothed(as_given, simulation.predict(as_given.values, nominal_values(simulation)));
+  const bool is_smoothed = smooth.change.size() > 0;
+  Simulation there = simulation;
+  if (is_smoothed) {
+    there.predict = [&](const Eigen::MatrixXd&, const Eigen::VectorXd& values) -> Eigen::MatrixXd {
+      return simulation.predict(as_given.values, values) + smooth.change;
+    };
+  }
+  const Inputs inputs = with_zero_bands(there, smooth.inputs, measured);
+  std::vector<bool> apart = rows_at_rest(inputs);
+  for (std::size_t i = 0; i < apart.size(); ++i) apart[i] = apart[i] || smooth.unknown_sign[i];
+  Missing missing = find_at(there, inputs, measured, terms, apart, options);
+  missing.zero_bands = inputs.zero_bands;
+  if (is_smoothed) {
+    missing.before -= smooth.change;
+    missing.corrected = corrected(simulation, missing, terms, as_given);
+    missing.change_by_smoothing = smooth.change;
+  }
+  const std::vector<std::string> at_rest = notes_on_rest(inputs);
+  missing.notes.insert(missing.notes.begin(), at_rest.begin(), at_rest.end());
+  missing.notes.insert(missing.notes.begin(), smooth.notes.begin(), smooth.notes.end());
+  return missing;
 }
 
 // Whether what is left is alike in neighbouring rows.

@@ -1,0 +1,206 @@
+#include "discovery/terms/motion.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+
+#include "discovery/terms/input_noise.hpp"
+#include "discovery/terms/surrogate.hpp"
+#include "llmt/discovery/terms.hpp"
+
+namespace llmt::discovery {
+namespace {
+
+// Share of the variance of b that the derivative of a explains, and the time unit of b in that of the instants.
+struct Likeness {
+  double share = 0.0;
+  double unit = 0.0;
+};
+
+Likeness likeness(const Eigen::VectorXd& derivative, const Eigen::VectorXd& b) {
+  const double own = derivative.squaredNorm() * b.squaredNorm();
+  const double common = derivative.dot(b);
+  if (!(own > 0.0) || !(common > 0.0)) return {};
+  return {common * common / own, b.squaredNorm() / common};
+}
+
+// The linear map from position, speed and acceleration at the rows of a window to the speed at one of them.
+class LocalSpeed {
+ public:
+  // `times` from the row, in the unit of the speed; `errors`: standard deviations of the three.
+  LocalSpeed(Eigen::VectorXd times, const Eigen::Array3d& errors) {
+    constexpr Eigen::Index powers = 6;
+    const Eigen::Index n = times.size();
+    const double width = times.cwiseAbs().maxCoeff();
+    times /= width;
+    Eigen::MatrixXd weighted = Eigen::MatrixXd::Zero(3 * n, powers);
+    for (Eigen::Index i = 0; i < n; ++i) {
+      for (Eigen::Index p = 0; p < powers; ++p) {
+        const auto q = static_cast<double>(p);
+        weighted(i, p) = std::pow(times(i), q) / errors(0);
+        if (p > 0) weighted(n + i, p) = q * std::pow(times(i), q - 1.0) / width / errors(1);
+        if (p > 1) weighted(2 * n + i, p) = q * (q - 1.0) * std::pow(times(i), q - 2.0) / (width * width) / errors(2);
+      }
+    }
+    const Eigen::RowVectorXd scales = weighted.colwise().norm();
+    weighted.array().rowwise() /= scales.array();
+    const Eigen::LDLT<Eigen::MatrixXd> gram(weighted.transpose() * weighted);
+    inverse_ = gram.solve(weighted.transpose());
+    speed_ = scales(1) * width;
+    error_ = inverse_.row(1).norm() / speed_;
+    weighted_ = std::move(weighted);
+  }
+
+  // Of a window n x 3, in units of the errors; none where the three are no polynomial within their errors, as where the
+  // acceleration jumps.
+  std::optional<double> operator()(const Eigen::MatrixXd& window) const {
+    const Eigen::VectorXd values = window.reshaped();
+    const Eigen::VectorXd coefficients = inverse_ * values;
+    const auto dof = static_cast<double>(values.size() - coefficients.size());
+    constexpr double surprising = 3.0;  // standard deviations of chi^2
+    const double chi_squared = (values - weighted_ * coefficients).squaredNorm();
+    if (chi_squared > dof + surprising * std::sqrt(2.0 * dof)) return {};
+    return coefficients(1) / speed_;
+  }
+  double error() const { return error_; }
+
+ private:
+  Eigen::MatrixXd weighted_;
+  Eigen::MatrixXd inverse_;
+  double speed_ = 1.0;
+  double error_ = 0.0;
+};
+
+struct Speed {
+  Eigen::VectorXd values;
+  std::vector<bool> is_smooth;
+  double error = 0.0;  // root mean square of those that are
+};
+
+// Of rows that are not smooth yet, over `half` rows before and after each.
+void smooth_speed(const Rows& rows, const Eigen::MatrixXd& motion, const Eigen::Array3d& errors, double second,
+                  Eigen::Index half, Speed& speed) {
+  const std::vector<Recorded> recorded = recordings(rows);
+  Eigen::VectorXd before;
+  std::optional<LocalSpeed> local;
+  for (Eigen::Index k = 0; k < std::ssize(rows.sequence); ++k) {
+    const Eigen::Index row = rows.sequence[k];
+    const Eigen::Index begin = std::max(recorded[k].begin, k - half);
+    const Eigen::Index end = std::min(recorded[k].end, k + half + 1);
+    if (speed.is_smooth[row] || end - begin < half + 1) continue;
+    Eigen::VectorXd times(end - begin);
+    Eigen::MatrixXd window(end - begin, 3);
+    for (Eigen::Index i = begin; i < end; ++i) {
+      times(i - begin) = (rows.instants(rows.sequence[i]) - rows.instants(row)) / second;
+      window.row(i - begin) = motion.row(rows.sequence[i]).cwiseQuotient(errors.matrix().transpose());
+    }
+    constexpr double same = 1e-7;
+    if (before.size() != times.size() || (before - times).cwiseAbs().maxCoeff() > same * times.cwiseAbs().maxCoeff()) {
+      local.emplace(times, errors);
+      before = times;
+    }
+    const std::optional<double> value = (*local)(window);
+    if (!value) continue;
+    speed.values(row) = *value;
+    speed.is_smooth[row] = true;
+    speed.error += local->error() * local->error();
+  }
+}
+
+// Windows are narrower where an acceleration jumps.
+Speed smooth_speed(const Rows& rows, const Eigen::MatrixXd& motion, const Eigen::Array3d& errors, double second,
+                   Eigen::Index lag) {
+  constexpr Eigen::Index narrowest = 3;
+  Speed speed{motion.col(1), std::vector<bool>(motion.rows(), false), 0.0};
+  for (Eigen::Index half = std::max(lag, narrowest); half >= narrowest; half /= 2) {
+    smooth_speed(rows, motion, errors, second, half, speed);
+  }
+  const auto count = static_cast<double>(std::ranges::count(speed.is_smooth, true));
+  speed.error = count > 0.0 ? std::sqrt(speed.error / count) : errors(1);
+  return speed;
+}
+
+}  // namespace
+
+std::vector<Motion> motions(const Derivatives& derivatives, const Inputs& inputs) {
+  constexpr double of_speeds = 0.9;
+  constexpr double of_accelerations = 0.7;  // they are noisier
+  constexpr double unlike_units = 1.5;
+  const Eigen::Index p = inputs.values.cols();
+  std::vector<Eigen::VectorXd> first;
+  for (Eigen::Index j = 0; j < p; ++j) first.push_back(derivatives.first(inputs.values.col(j)));
+  const auto successor = [&](Eigen::Index a, double least) -> std::pair<Eigen::Index, Likeness> {
+    std::pair<Eigen::Index, Likeness> best{-1, {}};
+    for (Eigen::Index b = 0; b < p; ++b) {
+      if (b == a || inputs.names[b] == inputs.order) continue;
+      const Likeness own = likeness(first[a], inputs.values.col(b));
+      if (own.share >= least && own.share > best.second.share) best = {b, own};
+    }
+    return best;
+  };
+  std::vector<Motion> all;
+  for (Eigen::Index a = 0; a < p; ++a) {
+    if (inputs.names[a] == inputs.order) continue;
+    const auto [b, speed] = successor(a, of_speeds);
+    if (b < 0) continue;
+    const auto [c, acceleration] = successor(b, of_accelerations);
+    if (c < 0 || c == a) continue;
+    const double ratio = speed.unit / acceleration.unit;
+    if (ratio < 1.0 / unlike_units || ratio > unlike_units) continue;
+    all.push_back({a, b, c, speed.unit});
+  }
+  return all;
+}
+
+SmoothedInputs smoothed(const Inputs& inputs, const Eigen::MatrixXd& simulated) {
+  const Eigen::Index n = inputs.values.rows();
+  SmoothedInputs result{.inputs = inputs, .change = {}, .unknown_sign = std::vector<bool>(n, false), .notes = {}};
+  constexpr Eigen::Index fewest = 60;
+  if (inputs.instants.size() == 0 || n < fewest || !simulated.allFinite()) return result;
+  const Surrogate surrogate(inputs.values, simulated);
+  constexpr double described = 0.98;
+  if (surrogate.described().minCoeff() < described) return result;
+  const Rows rows = rows_of(inputs, Eigen::VectorXd::Zero(n));
+  const Eigen::MatrixXd covariance = covariance_of_errors(rows, inputs);
+  const Eigen::Index lag = smooth_lag(rows, inputs.values);
+  constexpr Eigen::Index lags = 2;
+  for (const Motion& motion : motions(Derivatives(rows, lags * lag), inputs)) {
+    const std::array<Eigen::Index, 3> columns = {motion.position, motion.speed, motion.acceleration};
+    Eigen::MatrixXd own(n, 3);
+    Eigen::Array3d errors;
+    for (Eigen::Index k = 0; k < 3; ++k) {
+      own.col(k) = inputs.values.col(columns[k]);
+      // A signal without errors is as good as its digits.
+      constexpr double digits = 1e-6;
+      const double spread = std::sqrt((own.col(k).array() - own.col(k).mean()).square().mean());
+      errors(k) = std::max(std::sqrt(covariance(columns[k], columns[k])), digits * spread);
+    }
+    const Speed better = smooth_speed(rows, own, errors, motion.second, lag);
+    constexpr double a_third = 1.0 / 3.0;
+    constexpr double more = 1.1;
+    const double taken_off = std::sqrt((better.values - own.col(1)).squaredNorm() / static_cast<double>(n));
+    const auto rough = static_cast<double>(std::ranges::count(better.is_smooth, false));
+    constexpr double most_rough = 0.5;
+    if (!(better.error <= a_third * errors(1)) || taken_off > more * errors(1) ||
+        rough > most_rough * static_cast<double>(n)) {
+      continue;
+    }
+    constexpr double unknown = 3.0;
+    for (Eigen::Index i = 0; i < n; ++i) {
+      if (!better.is_smooth[i] && std::abs(own(i, 1)) < unknown * errors(1)) result.unknown_sign[i] = true;
+    }
+    result.inputs.values.col(motion.speed) = better.values;
+    if (result.inputs.noise.size() > 0) result.inputs.noise(motion.speed) = better.error;
+    result.notes.push_back(fmt::format(
+        "{} was smoothed, as the derivative of {} by time: standard deviation of its errors {:.2g} -> {:.2g}",
+        inputs.names[motion.speed], inputs.names[motion.position], errors(1), better.error));
+  }
+  if (!result.notes.empty()) result.change = surrogate.predict(result.inputs.values) - surrogate.predict(inputs.values);
+  return result;
+}
+
+}  // namespace llmt::discovery
