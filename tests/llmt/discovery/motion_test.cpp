@@ -1,0 +1,155 @@
+// Speeds that are taken from positions, and rows at which a machine rests.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "discovery/terms/motion.hpp"
+#include "discovery/terms/standstill.hpp"
+#include "llmt/discovery/simulation.hpp"
+#include "llmt/discovery/terms.hpp"
+#include "noise.hpp"
+
+namespace motion_test {
+namespace {
+
+using namespace llmt::discovery;
+
+constexpr double step = 0.02;  // s
+constexpr Eigen::Index rows = 1000;
+
+// Position, speed and acceleration of two sines.
+Eigen::MatrixXd moving() {
+  Eigen::MatrixXd values = Eigen::MatrixXd::Zero(rows, 3);
+  for (const double frequency : {0.31, 0.73}) {
+    const double omega = 2.0 * std::numbers::pi * frequency;
+    for (Eigen::Index i = 0; i < rows; ++i) {
+      const double angle = omega * step * static_cast<double>(i) + frequency;
+      values.row(i) +=
+          0.4 / omega * Eigen::RowVector3d(std::sin(angle), omega * std::cos(angle), -omega * omega * std::sin(angle));
+    }
+  }
+  return values;
+}
+
+Inputs inputs_of(Eigen::MatrixXd values) {
+  Inputs inputs{{"q", "dq", "ddq"}, std::move(values)};
+  inputs.instants = Eigen::VectorXd::LinSpaced(rows, 0.0, step * static_cast<double>(rows - 1));
+  return inputs;
+}
+
+void add_noise(Eigen::MatrixXd& values, const Eigen::RowVector3d& deviations, std::uint64_t seed) {
+  Noise noise(seed);
+  for (Eigen::Index i = 0; i < values.rows(); ++i) {
+    for (Eigen::Index j = 0; j < 3; ++j) values(i, j) += deviations(j) * noise.normal();
+  }
+}
+
+double rms(const Eigen::VectorXd& values) {
+  return std::sqrt(values.squaredNorm() / static_cast<double>(values.size()));
+}
+
+// 3 ddq + dq.
+Eigen::MatrixXd force(const Eigen::MatrixXd& values) { return 3.0 * values.col(2) + values.col(1); }
+
+TEST(Motion, SpeedIsTakenFromThePositionThatIsBetterKnown) {
+  const Eigen::MatrixXd truth = moving();
+  for (const std::uint64_t seed : {1u, 2u, 3u}) {
+    Eigen::MatrixXd noisy = truth;
+    add_noise(noisy, {1e-4, 0.03, 0.2}, seed);
+    const SmoothedInputs smooth = smoothed(inputs_of(noisy), force(noisy));
+    ASSERT_EQ(smooth.notes.size(), 1u);
+    EXPECT_LT(rms(smooth.inputs.values.col(1) - truth.col(1)), 0.1 * 0.03);
+    EXPECT_EQ(smooth.inputs.values.col(2), noisy.col(2));
+    // The simulation follows: it was computed at the noisy speed.
+    const Eigen::VectorXd expected = smooth.inputs.values.col(1) - noisy.col(1);
+    EXPECT_LT(rms(smooth.change.col(0) - expected), 1e-6);
+  }
+}
+
+TEST(Motion, SpeedThatIsWellKnownStays) {
+  Eigen::MatrixXd noisy = moving();
+  add_noise(noisy, {0.02, 1e-3, 0.2}, 1);
+  EXPECT_EQ(smoothed(inputs_of(noisy), force(noisy)).change.size(), 0);
+  EXPECT_EQ(smoothed(inputs_of(moving()), force(moving())).change.size(), 0);
+  Inputs independent = inputs_of(noisy);
+  independent.instants.resize(0);
+  EXPECT_EQ(smoothed(independent, force(noisy)).change.size(), 0);
+}
+
+// The acceleration jumps at each reversal, as dry friction makes it: no polynomial goes through.
+TEST(Motion, SpeedStaysAsItIsWhereTheAccelerationJumps) {
+  constexpr double period = 4.0;
+  Eigen::MatrixXd truth(rows, 3);
+  for (Eigen::Index i = 0; i < rows; ++i) {
+    const double phase = std::fmod(step * static_cast<double>(i), period) - 0.5 * period;
+    const double side = phase < 0.0 ? -1.0 : 1.0;
+    const double from = std::abs(phase);  // of the reversal, the speed falls from 1 to 0 and rises again
+    const double forward = std::fmod(step * static_cast<double>(i), 2.0 * period) < period ? 1.0 : -1.0;
+    truth.row(i) = forward * Eigen::RowVector3d(0.25 * from * from, side * 0.5 * from, 0.5);
+  }
+  Eigen::MatrixXd noisy = truth;
+  add_noise(noisy, {1e-4, 0.02, 0.02}, 1);
+  const SmoothedInputs smooth = smoothed(inputs_of(noisy), force(noisy));
+  if (smooth.change.size() == 0) return;  // or nothing is smoothed
+  // Beyond the narrowest window around a jump the speed is nowhere worse than it was.
+  EXPECT_LT((smooth.inputs.values.col(1) - truth.col(1)).cwiseAbs().maxCoeff(), 4.5 * 0.02);
+}
+
+// Moves with rests between them, at a constant acceleration and its opposite.
+Inputs with_rests(std::uint64_t seed) {
+  Noise noise(seed);
+  Eigen::MatrixXd values = Eigen::MatrixXd::Zero(rows, 3);
+  for (Eigen::Index i = 1; i < rows; ++i) {
+    const Eigen::Index within = i % 125;
+    const double direction = (i / 125) % 2 == 0 ? 1.0 : -1.0;
+    const double acceleration = within < 50 ? direction : within < 100 ? -direction : 0.0;
+    values(i, 2) = acceleration;
+    values(i, 1) = within < 100 ? values(i - 1, 1) + step * acceleration : 0.0;
+    values(i, 0) = values(i - 1, 0) + step * values(i, 1);
+  }
+  for (Eigen::Index i = 0; i < rows; ++i) values(i, 1) += 1e-3 * noise.normal();
+  return inputs_of(values);
+}
+
+TEST(Rest, RowsAtRestAreNoEvidenceOfFriction) {
+  for (const std::uint64_t seed : {1u, 2u, 3u}) {
+    const Inputs inputs = with_rests(seed);
+    Noise noise(seed + 100);
+    const Eigen::MatrixXd simulated = force(inputs.values);
+    MeasuredOutputs measured{{"u"}, simulated};
+    for (Eigen::Index i = 0; i < rows; ++i) {
+      const double speed = inputs.values(i, 1);
+      const bool rests = i % 125 >= 100;
+      // At rest the brake holds, whatever the friction would be.
+      measured.values(i, 0) += (rests ? 0.0 : 2.0 * (speed > 0.0 ? 1.0 : -1.0) + 0.7 * speed) + 0.05 * noise.normal();
+    }
+    const Missing missing = find_missing(tabulated(simulated, {"u"}), inputs, measured, standard_terms(inputs));
+    EXPECT_EQ(missing.answer, Answer::named) << to_string(missing.answer);
+    ASSERT_EQ(missing.found.size(), 2u);
+    for (const FoundTerm& found : missing.found) {
+      EXPECT_TRUE(found.confirmed);
+      const double truth = found.family == "sign" ? 2.0 : 0.7;
+      EXPECT_TRUE(found.family == "sign" || found.family == "linear") << found.family;
+      EXPECT_NEAR(found.coefficients(0), truth, 0.05 * truth);
+    }
+    ASSERT_EQ(missing.zero_bands.size(), 3);
+    EXPECT_GT(missing.zero_bands(1), 2e-3);
+    EXPECT_LT(missing.zero_bands(1), 0.1);
+    // What was found adds nothing at rest.
+    EXPECT_LT(std::abs(missing.corrected(110, 0) - simulated(110, 0)), 0.05);
+  }
+}
+
+TEST(Rest, SignalThatPassesZeroHasNoBand) {
+  const Inputs inputs = inputs_of(moving());
+  const Eigen::MatrixXd jump = inputs.values.col(1).array().sign().matrix();
+  EXPECT_EQ(zero_bands(inputs, jump).maxCoeff(), 0.0);
+  // And rests do not matter where nothing jumps.
+  const Inputs resting = with_rests(1);
+  EXPECT_EQ(zero_bands(resting, resting.values.col(1)).maxCoeff(), 0.0);
+}
+
+}  // namespace
+}  // namespace motion_test
