@@ -79,12 +79,12 @@ def label(effect):
 
 
 def rivals(effect):
-    """Labels of the terms that the answer says explain it as well."""
-    labels = []
+    """What the answer says explains it as well: labels of the terms, a tuple for each explanation."""
+    explanations = []
     for text in effect.get("rivals", []):
-        family, _, location = text.partition(" ")
-        labels.append(label({"name": family, "location": location}))
-    return labels
+        terms = [part.partition(" ") for part in text.split(" + ")]
+        explanations.append(tuple(label({"name": family, "location": location}) for family, _, location in terms))
+    return explanations
 
 
 def values_of(effect):
@@ -121,7 +121,7 @@ def parameter_effects(document, case):
 def described(effect):
     """For people who look into the results file: + confirmed, ? tentative, coefficients, (rivals)."""
     numbers = " ".join(f"{v:.4g}" for v in values_of(effect))
-    others = f" ({', '.join(rivals(effect))})" if rivals(effect) else ""
+    others = f" ({', '.join(' + '.join(terms) for terms in rivals(effect))})" if rivals(effect) else ""
     return f"{label(effect)} {'+' if effect['confirmed'] else '?'} {numbers}{others}"
 
 
@@ -139,11 +139,11 @@ def judge(document, case):
     off = [name for name, change in case.parameters if not near_change(estimates.get(name, 0.0), change)]
     allowed = [id(e) for found in right for e in found] + [id(effect) for _, _, effect in parameters]
     if case.inner:
-        allowed += [id(e) for e in effects if e["name"] in INNER]
+        allowed += [id(e) for e in effects if e["name"] in INNER or e.get("inner_state")]
     others = [e for e in effects if id(e) not in allowed and label(e) not in case.tolerated]
     accepted = {name for term in case.truth for name in term.accepted}
-    undecided = [e for e in others if accepted & set(rivals(e))]
-    beside = {name for e in undecided for name in rivals(e)}
+    undecided = [e for e in others if any(accepted.issuperset(terms) for terms in rivals(e))]
+    beside = {name for e in undecided for terms in rivals(e) for name in terms}
     listed = bool(right) and all(found or beside & set(term.accepted) for term, found in zip(case.truth, right))
     wrong = [e for e in others if e["confirmed"] and e not in undecided]
     nothing = verdict.startswith("nothing") or verdict.startswith("parameters only")

@@ -4,6 +4,11 @@
 #include <cmath>
 #include <numeric>
 
+#include "discovery/terms/motion.hpp"
+#include "llmt/discovery/terms.hpp"
+
+#include "discovery/terms/term_question.hpp"
+
 namespace llmt::discovery {
 namespace {
 
@@ -65,6 +70,46 @@ std::vector<Eigen::Index> rows_of_growth(const Samples& samples, const Eigen::Ve
   return rows;
 }
 
+// Terms of an input that is a derivative of the output stand for a state, too.
+void find_derivatives_of_outputs(const Derivatives& derivatives, const Inputs& inputs, const MeasuredOutputs& measured,
+                                 Missing& missing) {
+  for (FoundTerm& found : missing.found) {
+    if (found.generic || found.inputs.size() != 1) continue;
+    const auto place = std::ranges::find(inputs.names, found.inputs.front()) - inputs.names.begin();
+    if (!is_derivative_of(derivatives, inputs.values.col(place), measured.values.col(found.output_index))) continue;
+    found.inner_state = "a state behind the output, which depends on its own derivative " + found.inputs.front();
+    found.shown_by = "a signal measured behind the drive";
+  }
+}
+
+// Where a speed is small a machine sticks, filters round its friction, and signs are not known: what is wrong there is
+// easily taken for a function of another input.
+void judge_without_reversals(const TermModel& model, const TermData& kept, const Inputs& inputs,
+                             const std::vector<Eigen::Index>& speeds, const Settled& settled, Missing& missing) {
+  if (settled.fit.placed.empty()) return;
+  for (const Eigen::Index j : speeds) {
+    const Eigen::VectorXd sizes = means(inputs.values.col(j).cwiseAbs(), kept.samples);
+    std::vector<std::size_t> order(sizes.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    std::ranges::stable_sort(order, {}, [&](std::size_t i) { return sizes(static_cast<Eigen::Index>(i)); });
+    constexpr double share = 0.15;
+    order.resize(static_cast<std::size_t>(share * static_cast<double>(order.size())));
+    const TermFit fit = fit_terms(model, without_samples(kept, order), settled.fit.parameters, settled.fit.placed);
+    for (std::size_t t = 0; t < settled.fit.placed.size(); ++t) {
+      const PlacedTerm& placed = settled.fit.placed[t];
+      const ModelTerm& term = model.terms()[placed.term];
+      if (term.generic || (term.inputs.size() == 1 && term.inputs.front() == inputs.names[j])) continue;
+      const double value = placed.coefficients(0);
+      const double without = fit.placed[t].coefficients(0) * (value < 0.0 ? -1.0 : 1.0);
+      constexpr double surprising = 4.0;
+      if (!(without < 0.5 * std::abs(value)) || !(std::abs(value) - without > surprising * fit.errors[t](0))) continue;
+      for (FoundTerm& found : missing.found) {
+        if (found.term == placed.term && found.output_index == placed.output) found.hangs_on = inputs.names[j];
+      }
+    }
+  }
+}
+
 }  // namespace
 
 void judge_held_out(const TermModel& model, const TermData& kept, const TermData& aside, const TermFit& baseline,
@@ -96,6 +141,18 @@ void judge_held_out(const TermModel& model, const TermData& kept, const TermData
       found.is_refuted = judgement.refutes();
     }
   }
+}
+
+void judge_in_time(const TermModel& model, const TermData& kept, const Inputs& inputs, const MeasuredOutputs& measured,
+                   const Settled& settled, Missing& missing) {
+  if (missing.found.empty()) return;
+  const Rows rows = rows_of(inputs, Eigen::VectorXd::Zero(inputs.values.rows()));
+  constexpr Eigen::Index lags = 2;
+  const Derivatives derivatives(rows, lags * smooth_lag(rows, inputs.values));
+  std::vector<Eigen::Index> speeds;
+  for (const Motion& motion : motions(derivatives, inputs)) speeds.push_back(motion.speed);
+  judge_without_reversals(model, kept, inputs, speeds, settled, missing);
+  find_derivatives_of_outputs(derivatives, inputs, measured, missing);
 }
 
 }  // namespace llmt::discovery

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -129,21 +128,24 @@ std::vector<ModelTerm> inner_state_terms(const Inputs& inputs, const Eigen::Matr
   constexpr double described = 0.98;
   constexpr double largest_noise_share = 0.3;
   for (std::size_t o = 0; o < outputs.size(); ++o) {
+    const Eigen::VectorXd output = simulated.col(static_cast<Eigen::Index>(o));
+    // Nothing is measured before it happens. Compliance, inertia and damping are not negative.
+    const auto limit = [&](ModelTerm& term) {
+      constexpr double far = 10.0;  // times the output
+      Rows here = rows;
+      here.simulated = output;
+      const Eigen::MatrixXd columns = term.columns(here, {});
+      term.lower = Eigen::VectorXd::Zero(columns.cols());
+      term.upper = (far * output.norm() / columns.colwise().norm().array().max(1e-300)).matrix().transpose();
+    };
     terms.push_back(delay(of_rows, outputs[o]));
-    // Nothing is measured before it happens.
-    terms.back().lower = Eigen::VectorXd::Zero(1);
-    terms.back().upper = Eigen::VectorXd::Constant(1, std::numeric_limits<double>::infinity());
+    limit(terms.back());
     if (surrogate->described()(o) < described) continue;
     // The spring's term holds the second derivative of the simulated output, which should not be noise.
-    const Eigen::VectorXd output = simulated.col(static_cast<Eigen::Index>(o));
     if (noise_of_second(of_rows->at(rows, inputs.values), rows, output) > largest_noise_share) continue;
     for (const Motion& motion : all) {
       terms.push_back(drive_spring(of_rows, surrogate, motion, inputs, outputs[o], static_cast<Eigen::Index>(o)));
-      // Compliance, inertia and damping are not negative.
-      constexpr double far = 10.0;  // times the output
-      const Eigen::MatrixXd columns = terms.back().columns(rows, {});
-      terms.back().lower = Eigen::VectorXd::Zero(columns.cols());
-      terms.back().upper = (far * output.norm() / columns.colwise().norm().array().max(1e-300)).matrix().transpose();
+      limit(terms.back());
     }
   }
   return terms;

@@ -170,7 +170,8 @@ void decide(Missing& missing) {
   missing.answer = is_nothing && !missing.structure.empty() ? Answer::unknown : missing.verdict.answer;
   constexpr double certain = 2.0;  // standard errors
   const auto is_state = [](const FoundTerm& found) {
-    return !found.inner_state.empty() && found.coefficients(0) > certain * found.values.front().standard_error;
+    return !found.inner_state.empty() &&
+           std::abs(found.coefficients(0)) > certain * found.values.front().standard_error;
   };
   const bool has_inner_state = std::ranges::any_of(missing.found, is_state);
   if (has_inner_state) missing.answer = Answer::inner_state;
@@ -182,7 +183,8 @@ void decide(Missing& missing) {
     const bool is_beside_structure =
         std::ranges::find(missing.structure, found.output, &Structure::output) != missing.structure.end();
     found.confirmed = missing.answer != Answer::failed_held_out && missing.verdict.answer != Answer::unknown &&
-                      !found.generic && !approximate[k] && !is_beside_structure && found.shrinks_gap;
+                      !found.generic && !approximate[k] && !is_beside_structure && found.shrinks_gap &&
+                      found.hangs_on.empty();
     // What stands beside a state may be what the state does beyond the first order.
     constexpr double small_share = 0.1;
     if (has_inner_state && found.inner_state.empty() && found.share < small_share) found.confirmed = false;

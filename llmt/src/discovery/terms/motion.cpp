@@ -111,13 +111,34 @@ void smooth_speed(const Rows& rows, const Eigen::MatrixXd& motion, const Eigen::
   }
 }
 
-// Windows are narrower where an acceleration jumps.
+// The factor that speeds as measured have of those that are smooth.
+double factor_of(const Speed& speed, const Eigen::VectorXd& measured) {
+  double common = 0.0;
+  double own = 0.0;
+  for (Eigen::Index i = 0; i < measured.size(); ++i) {
+    if (!speed.is_smooth[i]) continue;
+    common += speed.values(i) * measured(i);
+    own += speed.values(i) * speed.values(i);
+  }
+  return own > 0.0 ? common / own : 1.0;
+}
+
+// Windows are narrower where an acceleration jumps. `second` is an estimate from noisy signals, so it is refined once.
 Speed smooth_speed(const Rows& rows, const Eigen::MatrixXd& motion, const Eigen::Array3d& errors, double second,
                    Eigen::Index lag) {
   constexpr Eigen::Index narrowest = 3;
-  Speed speed{motion.col(1), std::vector<bool>(motion.rows(), false), 0.0};
-  for (Eigen::Index half = std::max(lag, narrowest); half >= narrowest; half /= 2) {
-    smooth_speed(rows, motion, errors, second, half, speed);
+  Speed speed;
+  for (const bool is_last : {false, true}) {
+    speed = {motion.col(1), std::vector<bool>(motion.rows(), false), 0.0};
+    for (Eigen::Index half = std::max(lag, narrowest); half >= narrowest; half /= 2) {
+      smooth_speed(rows, motion, errors, second, half, speed);
+      if (!is_last) break;
+    }
+    const double factor = factor_of(speed, motion.col(1));
+    second *= factor;
+    for (Eigen::Index i = 0; i < motion.rows(); ++i) {
+      if (speed.is_smooth[i]) speed.values(i) *= factor;
+    }
   }
   const auto count = static_cast<double>(std::ranges::count(speed.is_smooth, true));
   speed.error = count > 0.0 ? std::sqrt(speed.error / count) : errors(1);
@@ -154,6 +175,12 @@ std::vector<Motion> motions(const Derivatives& derivatives, const Inputs& inputs
     all.push_back({a, b, c, speed.unit});
   }
   return all;
+}
+
+bool is_derivative_of(const Derivatives& derivatives, const Eigen::VectorXd& input, const Eigen::VectorXd& output) {
+  constexpr double alike = 0.8;
+  return likeness(derivatives.first(output), input).share >= alike ||
+         likeness(derivatives.second(output), input).share >= alike;
 }
 
 SmoothedInputs smoothed(const Inputs& inputs, const Eigen::MatrixXd& simulated) {

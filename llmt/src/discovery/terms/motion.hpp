@@ -21,6 +21,9 @@ struct Motion {
 /// Found by comparing derivatives of the inputs with the other inputs.
 std::vector<Motion> motions(const Derivatives& derivatives, const Inputs& inputs);
 
+/// Whether an input is the first or second derivative by time of an output (n values).
+bool is_derivative_of(const Derivatives& derivatives, const Eigen::VectorXd& input, const Eigen::VectorXd& output);
+
 /// Inputs whose speeds have less errors, and what that changes.
 struct SmoothedInputs {
   Inputs inputs;

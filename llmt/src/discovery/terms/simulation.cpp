@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "discovery/terms/correlation.hpp"
+#include "discovery/terms/derivatives.hpp"
 #include "discovery/terms/determined.hpp"
 #include "discovery/terms/errors_of_inputs.hpp"
 #include "discovery/terms/fitted_parameters.hpp"
@@ -18,6 +19,7 @@
 #include "discovery/terms/standstill.hpp"
 #include "discovery/terms/term_question.hpp"
 #include "discovery/terms/term_rounds.hpp"
+#include "llmt/discovery/terms.hpp"
 #include "llmt/statistics.hpp"
 
 namespace llmt::discovery {
@@ -178,6 +180,7 @@ Missing search_once(const Simulation& simulation, const Inputs& inputs, const Me
   TermData aside = data_of(split.held_out, measured);
   aside.sigma = data.sigma;
   judge_held_out(model, kept, aside, baseline, settled, missing);
+  if (in_time) judge_in_time(model, kept, inputs, measured, settled, missing);
   missing.notes.insert(missing.notes.end(), errors.notes.begin(), errors.notes.end());
   decide(missing);
   doubt_uncorrected(errors, missing);
@@ -267,14 +270,22 @@ Missing find_at(const Simulation& simulation, const Inputs& inputs, const Measur
   std::vector<std::string> notes;
   for (int trial = 1;; ++trial) {
     Missing missing = search_once(simulation, inputs, measured, terms, apart, options, refuted);
-    if (missing.answer != Answer::failed_held_out || trial == most) {
+    const bool hangs =
+        std::ranges::any_of(missing.found, [](const FoundTerm& found) { return !found.hangs_on.empty(); });
+    if ((missing.answer != Answer::failed_held_out && !hangs) || trial == most) {
       missing = causes_for_shapes(simulation, inputs, measured, terms, apart, options, refuted, std::move(missing));
       missing.notes.insert(missing.notes.begin(), notes.begin(), notes.end());
       return missing;
     }
     for (const FoundTerm& found : missing.found) {
-      if (!found.is_refuted) continue;
+      if (!found.is_refuted && found.hangs_on.empty()) continue;
       refuted.insert(found.term);
+      if (!found.hangs_on.empty()) {
+        notes.push_back(
+            fmt::format("{} {} was found and taken back: without the rows at which {} is small it is not there",
+                        found.family, found.location, found.hangs_on));
+        continue;
+      }
       notes.push_back(fmt::format("{} was found and taken back: it makes the error on rows set aside larger",
                                   found.generic ? "an error pattern of " + found.location
                                                 : fmt::format("{} {}", found.family, found.location)));

@@ -1,5 +1,6 @@
 #include "discovery/terms/standstill.hpp"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
@@ -63,28 +64,31 @@ double band_of(const Eigen::VectorXd& x) {
   return 0.0;
 }
 
-// Whether values jump where x passes the band.
+// Whether values jump where x passes the band: least squares of those at the next rows on both sides on 1, x and sgn x.
 bool jumps(const Eigen::VectorXd& x, const Eigen::VectorXd& values, double band) {
   constexpr std::size_t next = 30;  // rows on each side
   constexpr std::size_t fewest = 10;
   constexpr double surprising = 4.0;
-  double difference = 0.0;
-  double variance = 0.0;
+  std::vector<Eigen::Index> rows;
   for (const double side : {-1.0, 1.0}) {
-    std::vector<std::pair<double, double>> beyond;
+    std::vector<std::pair<double, Eigen::Index>> beyond;
     for (Eigen::Index i = 0; i < x.size(); ++i) {
-      if (side * x(i) >= band) beyond.emplace_back(side * x(i), values(i));
+      if (side * x(i) >= band) beyond.emplace_back(side * x(i), i);
     }
     if (beyond.size() < fewest) return false;
     std::ranges::sort(beyond);
     beyond.resize(std::min(beyond.size(), next));
-    Eigen::ArrayXd own(std::ssize(beyond));
-    for (std::size_t k = 0; k < beyond.size(); ++k) own(k) = beyond[k].second;
-    const auto n = static_cast<double>(own.size());
-    difference += side * own.mean();
-    variance += (own - own.mean()).square().sum() / (n - 1.0) / n;
+    for (const auto& [size, row] : beyond) rows.push_back(row);
   }
-  return std::abs(difference) > surprising * std::sqrt(variance);
+  Eigen::MatrixXd columns(std::ssize(rows), 3);
+  columns << Eigen::VectorXd::Ones(std::ssize(rows)), x(rows), x(rows).cwiseSign();
+  const Eigen::VectorXd here = values(rows);
+  const Eigen::LDLT<Eigen::MatrixXd> gram(columns.transpose() * columns);
+  const Eigen::VectorXd fit = gram.solve(columns.transpose() * here);
+  const double variance = (here - columns * fit).squaredNorm() / static_cast<double>(here.size() - 3);
+  const double inverse = gram.solve(Eigen::Vector3d::Unit(2))(2);
+  constexpr double rounding = 1e-9;
+  return std::abs(fit(2)) > std::max(surprising * std::sqrt(variance * inverse), rounding * here.cwiseAbs().maxCoeff());
 }
 
 }  // namespace
