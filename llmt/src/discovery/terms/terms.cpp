@@ -40,17 +40,13 @@ void check(const Inputs& inputs) {
       refuse("standard_terms", fmt::format("the input \"{}\" has a value that is not finite", inputs.names[j]));
     }
   }
-  const Eigen::Index n = inputs.values.rows();
-  if (inputs.instants.size() > 0 && inputs.instants.size() != n) {
-    refuse("standard_terms", fmt::format("{} instants for {} rows", inputs.instants.size(), n));
-  }
+  const auto refuse_unlike = [](const char* what, Eigen::Index count, Eigen::Index expected) {
+    if (count > 0 && count != expected) refuse("standard_terms", fmt::format(fmt::runtime(what), count, expected));
+  };
+  refuse_unlike("{} instants for {} rows", inputs.instants.size(), inputs.values.rows());
+  refuse_unlike("{} labels of runs for {} rows", std::ssize(inputs.runs), inputs.values.rows());
+  refuse_unlike("{} zero bands for {} inputs", inputs.zero_bands.size(), inputs.values.cols());
   if (!inputs.instants.allFinite()) refuse("standard_terms", "an instant is not finite");
-  if (!inputs.runs.empty() && std::ssize(inputs.runs) != n) {
-    refuse("standard_terms", fmt::format("{} labels of runs for {} rows", inputs.runs.size(), n));
-  }
-  if (inputs.zero_bands.size() > 0 && inputs.zero_bands.size() != inputs.values.cols()) {
-    refuse("standard_terms", fmt::format("{} zero bands for {} inputs", inputs.zero_bands.size(), inputs.names.size()));
-  }
 }
 
 // By the ending of the name; or by a usual name of a joint's angle, and values that radians may have.
