@@ -61,6 +61,8 @@ struct SearchOptions {
   double false_alarm_rate = 0.003;  ///< of the whole search when nothing is missing
   int null_draws = 300;             ///< of each kind, see search()
   double rival_margin = 6.0;        ///< score difference within which an alternative explains as well
+  /// Of rivals at the same place the least complex gets the name, though they are not the same at every sample.
+  bool simplest_of_rivals = false;
   /// A family is also a rival if the set with it in the place of a finding explains at least 1 - model_error of the
   /// explained sum of squares: masses and lengths are not known to better than that.
   double model_error = 0.008;

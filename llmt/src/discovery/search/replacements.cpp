@@ -94,18 +94,23 @@ int complexity_of(const Scoring& scoring, const Set& set) {
   return most;
 }
 
-// The least complex set that predicts the same as `set` with another family in the place of one; empty: there is none.
+// The least complex set that predicts the same as `set` with another family in the place of one, or that is a rival of
+// it at the same place if the simplest of rivals is asked for; empty: there is none.
 Set simpler(const Scoring& scoring, const Set& set, const std::string& family, const SearchOptions& options) {
   Set best;
   int least = complexity_of(scoring, of_family(scoring, set, family));
   if (least == 0) return best;
   const double enough = scoring.score(set) + options.rival_margin;
+  const std::set<std::string> places = locations_of(scoring, set, family);
   for (const std::string& other : causes_of(scoring)) {
     if (other == family) continue;
     const Explained rival = replaced(scoring, set, family, other, options);
     const Set instead = filtered(rival.set, [&](std::size_t a) { return !contains(set, a); });
     if (instead.empty() || rival.set.size() > set.size() || complexity_of(scoring, instead) >= least) continue;
-    if (rival.score > enough || !predict_alike(scoring, set, family, rival.set)) continue;
+    const bool is_in_place =
+        std::ranges::all_of(instead, [&](std::size_t a) { return places.contains(scoring.candidates()[a].location); });
+    if (rival.score > enough) continue;
+    if (!(options.simplest_of_rivals && is_in_place) && !predict_alike(scoring, set, family, rival.set)) continue;
     least = complexity_of(scoring, instead);
     best = rival.set;
   }

@@ -7,20 +7,13 @@
 #include <stdexcept>
 
 #include "discovery/terms/correlation.hpp"
-#include "discovery/terms/derivatives.hpp"
 #include "discovery/terms/determined.hpp"
-#include "discovery/terms/errors_of_inputs.hpp"
-#include "discovery/terms/fitted_parameters.hpp"
-#include "discovery/terms/held_out.hpp"
-#include "discovery/terms/missing_findings.hpp"
 #include "discovery/terms/motion.hpp"
+#include "discovery/terms/one_search.hpp"
 #include "discovery/terms/refuse.hpp"
 #include "discovery/terms/row_split.hpp"
 #include "discovery/terms/standstill.hpp"
-#include "discovery/terms/term_question.hpp"
-#include "discovery/terms/term_rounds.hpp"
-#include "llmt/discovery/terms.hpp"
-#include "llmt/statistics.hpp"
+#include "discovery/terms/term_model.hpp"
 
 namespace llmt::discovery {
 namespace {
@@ -49,17 +42,6 @@ void check(const Simulation& simulation, const Inputs& inputs, const MeasuredOut
   if (options.largest_sample < fewest) {
     refuse("find_missing", fmt::format("largest_sample is {}, must be at least {}", options.largest_sample, fewest));
   }
-}
-
-// Outputs count by their spread, because what the noise is of each is not known yet.
-DistinctParameters determined(const TermModel& model, const TermData& data, const Eigen::VectorXd& start,
-                              std::vector<Parameter>& parameters) {
-  TermData by_spread = data;
-  for (Eigen::Index o = 0; o < data.measured.cols(); ++o) {
-    const double spread = spread_of(data.measured.col(o));
-    if (spread > 0.0) by_spread.sigma(o) = spread;
-  }
-  return distinct_parameters(baseline_jacobian(model, by_spread, start, {}), parameters);
 }
 
 }  // namespace
@@ -97,115 +79,6 @@ Simulation tabulated(const Eigen::MatrixXd& simulated, const std::vector<std::st
 }
 
 namespace {
-
-TermData data_of(const Samples& samples, const MeasuredOutputs& measured) {
-  return {.samples = samples,
-          .measured = means(measured.values, samples),
-          .sigma = Eigen::VectorXd::Ones(measured.values.cols()),
-          .stretches = {}};
-}
-
-// Time that counts as one independent value, from the deviations of the rows searched, the outputs together.
-double correlation_time(const RowSplit& split, const Eigen::MatrixXd& deviations) {
-  std::vector<Eigen::Index> stretches;
-  for (Eigen::Index i = 0; i < split.searched.size(); ++i) {
-    stretches.insert(stretches.end(), split.searched.rows_of(i).size(), split.stretches[i]);
-  }
-  double longest = 0.0;
-  for (Eigen::Index o = 0; o < deviations.cols(); ++o) {
-    const Eigen::VectorXd own = deviations.col(o)(split.searched.rows());
-    longest = std::max(longest,
-                       1.0 / independent_share(autocorrelation(own, stretches, std::vector<bool>(own.size(), true))));
-  }
-  return split.step * longest;
-}
-
-Missing search_once(const Simulation& simulation, const Inputs& inputs, const MeasuredOutputs& measured,
-                    const std::vector<ModelTerm>& terms, const std::vector<bool>& apart, const MissingOptions& options,
-                    const std::set<std::size_t>& refuted) {
-  const bool in_time = inputs.instants.size() > 0;
-  Simulation distinct = simulation;
-  const TermModel model(distinct, inputs, measured.names, terms, refuted);
-  Eigen::VectorXd start(std::ssize(simulation.parameters));
-  for (std::size_t k = 0; k < simulation.parameters.size(); ++k) start(k) = simulation.parameters[k].value;
-  RowSplit split = in_time ? split_in_time(inputs, options) : split_independent(inputs, options);
-  if (std::ranges::find(apart, true) != apart.end()) split = without_rows(split, apart);
-  ErrorsOfInputs errors = errors_of_inputs(model, inputs, measured, start, split);
-  const Eigen::Index d = measured.values.cols();
-  TermData data = data_of(split.searched, measured);
-  data.stretches = split.stretches;
-  const auto free = std::ranges::count_if(simulation.parameters, &Parameter::free);
-  constexpr Eigen::Index fewest = 10;
-  if (data.samples.size() * d < fewest + 2 * free) {
-    refuse("find_missing",
-           fmt::format("{} rows to search beside {} set aside are too few: {} free parameters need {} measured values",
-                       split.searched.size(), split.held_out.size(), free, fewest + 2 * free));
-  }
-  Work work(options.progress);
-  work.begin("fitting");
-  const DistinctParameters sums = determined(model, data, start, distinct.parameters);
-  TermFit baseline = fit_terms(model, data, start, {});
-  data.sigma = scatter(model, data, baseline);
-  if (d > 1) baseline = fit_terms(model, data, start, {});
-  Settled settled = search_terms(model, data, split.repeats, baseline, errors.noise.get(), options, work);
-  correct_estimates(errors, without_samples(data, settled.verdict.outliers), settled.fit);
-
-  Missing missing;
-  missing.verdict = settled.verdict;
-  missing.rounds = settled.rounds;
-  for (const PlacedTerm& option : settled.question.options) missing.candidates.push_back(option_label(model, option));
-  describe_findings(model, settled, missing);
-  describe_limits(settled, data, missing);
-  missing.parameters = distinct.parameters;
-  for (std::size_t k = 0; k < missing.parameters.size(); ++k) {
-    missing.parameters[k].value = settled.fit.parameters(k);
-  }
-  missing.standard_errors = settled.fit.parameter_errors;
-  missing.searched = split.searched.rows();
-  missing.held_out = split.held_out.rows();
-  for (Eigen::Index i = 0; i < split.held_out.size(); ++i) {
-    missing.held_out_samples.insert(missing.held_out_samples.end(), split.held_out.rows_of(i).size(), i);
-  }
-  for (const std::size_t sample : settled.verdict.outliers) {
-    for (const Eigen::Index row : split.searched.rows_of(sample)) missing.outliers.push_back(row);
-  }
-  const TermData kept = without_samples(data, settled.verdict.outliers);
-  if (!settled.verdict.outliers.empty()) baseline = fit_terms(model, kept, start, {});
-  const Eigen::MatrixXd nominal = model.predict(start, {});
-  missing.before = model.predict(baseline.parameters, {});
-  missing.corrected = model.predict(settled.fit.parameters, settled.fit.placed);
-  missing.structure = structure_beside(model, kept, inputs, missing);
-  // Independent rows with errors of the inputs deviate like their neighbours: the errors alone do that.
-  if (errors.noise && !in_time) missing.structure.clear();
-  TermData aside = data_of(split.held_out, measured);
-  aside.sigma = data.sigma;
-  judge_held_out(model, kept, aside, baseline, settled, missing);
-  if (in_time) judge_in_time(model, kept, inputs, measured, settled, missing);
-  missing.notes.insert(missing.notes.end(), errors.notes.begin(), errors.notes.end());
-  decide(missing);
-  doubt_uncorrected(errors, missing);
-  demand_certainty(missing);
-  describe_parameters({model, kept, start, baseline, settled.fit}, sums, options.search.false_alarm_rate, missing);
-  missing.floor_from_repeats = settled.verdict.lack_of_fit.has_enough_repeats();
-  const double noise = missing.floor_from_repeats ? settled.verdict.lack_of_fit.noise : settled.verdict.noise;
-  for (Eigen::Index o = 0; o < d; ++o) {
-    const Eigen::VectorXd before = measured.values.col(o) - missing.before.col(o);
-    const Eigen::VectorXd after = measured.values.col(o) - missing.corrected.col(o);
-    missing.gaps.push_back(gap_of(measured.names[o], means(measured.values.col(o) - nominal.col(o), split.held_out),
-                                  means(before, split.held_out), means(after, split.held_out), noise * data.sigma(o)));
-  }
-  if (in_time) {
-    missing.time = {.in_time = true,
-                    .found_out = false,
-                    .rows_per_sample = split.rows_per_sample,
-                    .samples = split.searched.size(),
-                    .step = split.step,
-                    .independent_share = data.independent_share,
-                    .correlation_time = correlation_time(split, measured.values - missing.corrected)};
-  }
-  work.finish();
-  return missing;
-}
 
 Eigen::VectorXd nominal_values(const Simulation& simulation) {
   Eigen::VectorXd nominal(std::ssize(simulation.parameters));
@@ -296,7 +169,8 @@ Missing find_at(const Simulation& simulation, const Inputs& inputs, const Measur
 
 // The search sees inputs without most of their errors. The answer is of the rows as they were given.
 Missing find(const Simulation& simulation, const Inputs& as_given, const MeasuredOutputs& measured,
-             const std::vector<ModelTerm>& terms, const MissingOptions& options) {
+             const std::vector<ModelTerm>& terms, MissingOptions options) {
+  options.search.simplest_of_rivals = as_given.instants.size() > 0;
   SmoothedInputs smooth = smoothed(as_given, simulation.predict(as_given.values, nominal_values(simulation)));
   const bool is_smoothed = smooth.change.size() > 0;
   Simulation there = simulation;

@@ -66,7 +66,8 @@ double band_of(const Eigen::VectorXd& x) {
 
 // Whether values jump where x passes the band: least squares of those at the next rows on both sides on 1, x and sgn x.
 bool jumps(const Eigen::VectorXd& x, const Eigen::VectorXd& values, double band) {
-  constexpr std::size_t next = 30;  // rows on each side
+  constexpr double share_of_rows = 0.1;  // on each side
+  const auto next = static_cast<std::size_t>(share_of_rows * static_cast<double>(x.size()));
   constexpr std::size_t fewest = 10;
   constexpr double surprising = 4.0;
   std::vector<Eigen::Index> rows;

@@ -23,12 +23,12 @@ struct UnknownSign {
 std::vector<UnknownSign> rows_of_unknown_sign(const Rows& rows, const Inputs& inputs, const Eigen::MatrixXd& covariance,
                                               const Eigen::MatrixXd& deviations, std::vector<bool>& apart);
 
-/// For rows in time: p zero bands, 0 for inputs that do not rest. An input rests if it changes sign, is smooth in time,
-/// and stands at 0 more often than it passes: at least 20 rows lie within the band, and the outer half of the band holds
-/// at least three times as many rows as an interval of that width where the input passes. Dry friction at rest is
-/// whatever holds, so that rows within the band say nothing of it. They matter where the deviations (n x d) jump: least
-/// squares of the next 30 rows on both sides on 1, x and sgn x gives sgn x more than 4 standard errors. Else the band is
-/// 0. Bands of more than half of the rows are not looked at.
+/// For rows in time: p zero bands, 0 for inputs that do not rest. An input rests if it changes sign, is smooth in
+/// time, and stands at 0 more often than it passes: at least 20 rows lie within the band, and the outer half of the
+/// band holds at least three times as many rows as an interval of that width where the input passes. Dry friction at
+/// rest is whatever holds, so that rows within the band say nothing of it. They matter where the deviations (n x d)
+/// jump: least squares of the next tenth of the rows on both sides on 1, x and sgn x gives sgn x more than 4 standard
+/// errors. Else the band is 0. Bands of more than half of the rows are not looked at.
 Eigen::VectorXd zero_bands(const Inputs& inputs, const Eigen::MatrixXd& deviations);
 
 /// Marks the rows at which an input is within its band.

@@ -1,0 +1,16 @@
+// One search with rows set aside.
+#pragma once
+
+#include <set>
+#include <vector>
+
+#include "llmt/discovery/simulation.hpp"
+
+namespace llmt::discovery {
+
+/// Searches all terms but those refuted at all rows but those apart, and judges what it finds on the rows set aside.
+Missing search_once(const Simulation& simulation, const Inputs& inputs, const MeasuredOutputs& measured,
+                    const std::vector<ModelTerm>& terms, const std::vector<bool>& apart, const MissingOptions& options,
+                    const std::set<std::size_t>& refuted);
+
+}  // namespace llmt::discovery
