@@ -28,15 +28,21 @@ function(llmt_require_all)
   endif()
 endfunction()
 
-# llmt_enable_language(): C++. Without a compiler no library can be looked for, so all that may be missing is named.
+# llmt_enable_language(): C++. Without a compiler no library can be looked for, so all that may be missing is named. pip sets
+# CXX to the compiler that Python was built with, whether it is there or not.
 macro(llmt_enable_language)
   include(CheckLanguage)
   check_language(CXX)
-  if(NOT CMAKE_CXX_COMPILER AND NOT DEFINED ENV{CXX})
+  if(NOT CMAKE_CXX_COMPILER)
+    set(llmt_named_compiler "")
+    if(DEFINED ENV{CXX})
+      set(llmt_named_compiler " (CXX names $ENV{CXX})")
+    endif()
     message(
       FATAL_ERROR
-        "llmt: there is no C++ compiler. On Debian and Ubuntu: apt-get install g++ libeigen3-dev libtbb-dev libfast-float-dev "
-        "libfmt-dev nlohmann-json3-dev libboost-dev libyaml-cpp-dev libmuparser-dev liburdfdom-dev libexpat1-dev python3-dev\n"
+        "llmt: there is no C++ compiler${llmt_named_compiler}. On Debian and Ubuntu: apt-get install g++ libeigen3-dev libtbb-dev "
+        "libfast-float-dev libfmt-dev nlohmann-json3-dev libboost-dev libyaml-cpp-dev libmuparser-dev liburdfdom-dev libexpat1-dev "
+        "python3-dev\n"
         "On other systems install their equivalents; README.md, Requirements, names them.")
   endif()
   enable_language(CXX)
