@@ -23,7 +23,8 @@ function(llmt_require_all)
   if(llmt_missing_packages)
     list(JOIN llmt_missing_packages " " packages)
     message(
-      FATAL_ERROR "llmt: libraries that it is built with were not found. On Debian and Ubuntu: apt-get install ${packages}\n"
+      FATAL_ERROR "llmt: libraries that it is built with were not found. On Debian and Ubuntu:\n"
+                  "  apt-get install ${packages}\n" # a line that begins with blanks is not broken
                   "On other systems install their equivalents; README.md, Requirements, names them.")
   endif()
 endfunction()
@@ -40,9 +41,9 @@ macro(llmt_enable_language)
     endif()
     message(
       FATAL_ERROR
-        "llmt: there is no C++ compiler${llmt_named_compiler}. On Debian and Ubuntu: apt-get install g++ libeigen3-dev libtbb-dev "
-        "libfast-float-dev libfmt-dev nlohmann-json3-dev libboost-dev libyaml-cpp-dev libmuparser-dev liburdfdom-dev libexpat1-dev "
-        "python3-dev\n"
+        "llmt: there is no C++ compiler${llmt_named_compiler}. On Debian and Ubuntu:\n"
+        "  apt-get install g++ libeigen3-dev libtbb-dev libfast-float-dev libfmt-dev nlohmann-json3-dev libboost-dev "
+        "libyaml-cpp-dev libmuparser-dev liburdfdom-dev libexpat1-dev python3-dev\n"
         "On other systems install their equivalents; README.md, Requirements, names them.")
   endif()
   enable_language(CXX)
