@@ -5,7 +5,10 @@ import json
 import math
 import os
 import pickle
+import signal
 import subprocess
+import threading
+import time
 from pathlib import Path
 
 import numpy as np
@@ -318,6 +321,51 @@ def test_progress_may_stop_the_work(arm, measured):
         robotics.discover(arm, measured, progress=stop)
     with pytest.raises(KeyboardInterrupt):
         robotics.poses(arm, count=100, progress=stop)
+    with pytest.raises(KeyboardInterrupt):
+        robotics.compensate(arm, measured[POINT], progress=stop)
+
+
+def _threads():
+    return len(os.listdir("/proc/self/task"))
+
+
+@pytest.mark.parametrize("task", ["compensate", "compensate without joints", "predict", "simulate"])
+def test_ctrl_c_ends_long_tables(arm, task, tmp_path):
+    rows = 200_000
+    table = tmp_path / "table.csv"
+    if task != "simulate":
+        simulated = robotics.simulate(arm, rows)
+        (simulated[POINT] if task == "compensate without joints" else simulated).to_csv(table, index=False)
+    long_call = {
+        "compensate": lambda: robotics.compensate(arm, table),
+        "compensate without joints": lambda: robotics.compensate(arm, table),
+        "predict": lambda: [robotics.predict(arm, table) for _ in range(1000)],
+        "simulate": lambda: [robotics.simulate(arm, rows) for _ in range(1000)],
+    }[task]
+    before = _threads()
+    sent = []
+
+    def interrupt():
+        sent.append(time.process_time())
+        os.kill(os.getpid(), signal.SIGINT)
+
+    timer = threading.Timer(1.0, interrupt)
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        long_call()
+    assert time.process_time() - sent[0] < 1.0
+    timer.join()
+    assert _threads() == before
+
+
+def test_time_of_targets_is_proportional_to_their_number(arm):
+    targets = robotics.simulate(arm, 40_000)
+    started = time.process_time()
+    robotics.compensate(arm, targets[:4_000])
+    few = time.process_time() - started
+    robotics.compensate(arm, targets)
+    many = time.process_time() - started - few
+    assert many < 40.0 * few  # it was 100 times
 
 
 def test_targets_out_of_reach_are_warned_of(arm):
