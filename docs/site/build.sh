@@ -36,7 +36,7 @@ done
 doxygen docs/site/Doxyfile
 python=${PYTHON:-build/python_env/bin/python}
 if PYTHONPATH=build/release/python "$python" -c 'import pdoc, llmt._core' 2>/dev/null; then
-  PYTHONPATH=build/release/python "$python" -m pdoc --docformat numpy -o $pages/python-api llmt llmt.robotics llmt.export
+  PYTHONPATH=build/release/python "$python" docs/site/python_api.py $pages/python-api
 else
   echo "docs/site/build.sh: no reference for Python: $python has no pdoc or no llmt" >&2
   sed -i '/python-api/d' build/site/mkdocs.yml
