@@ -9,9 +9,9 @@ macro(llmt_require debian_package name)
   endif()
 endmacro()
 
-# llmt_require_header(DEBIAN_PACKAGE VARIABLE HEADER): VARIABLE becomes the folder of HEADER.
+# llmt_require_header(DEBIAN_PACKAGE VARIABLE HEADER <argument of find_path>...): VARIABLE becomes the folder of HEADER.
 macro(llmt_require_header debian_package variable header)
-  find_path(${variable} ${header})
+  find_path(${variable} ${header} ${ARGN})
   mark_as_advanced(${variable})
   if(NOT ${variable})
     list(APPEND llmt_missing_packages ${debian_package})
