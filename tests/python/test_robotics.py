@@ -318,6 +318,8 @@ def test_progress_may_stop_the_work(arm, measured):
         robotics.discover(arm, measured, progress=stop)
     with pytest.raises(KeyboardInterrupt):
         robotics.poses(arm, count=100, progress=stop)
+    with pytest.raises(KeyboardInterrupt):
+        robotics.compensate(arm, measured[POINT], progress=stop)
 
 
 def test_targets_out_of_reach_are_warned_of(arm):

@@ -175,8 +175,10 @@ nb::dict check(const Arm& arm, const Source& measured, const Reading& reading, b
   robotics::Measurements measurements;
   robotics::RobotCheck found;
   interruptible(
-      [&](const Progress&) {
+      [&](const Progress& progress) {
+        Work work(progress);
         measurements = measurements_of(measured, robot.robot, {}, reading);
+        work.did(0.5);
         found = report::run_check(arm.name, measured.first, robot, measurements, options);
       },
       report);
@@ -231,7 +233,8 @@ nb::dict compensate(const Arm& arm, const Source& targets, const Arm* nominal, c
   Outcome outcome;
   std::optional<report::CompensationRun> run;
   interruptible(
-      [&](const Progress&) {
+      [&](const Progress& progress) {
+        task.progress = progress;
         const robotics::CorrectedRobot alone = report::arm_alone(arm.name, arm.robot, outcome.warn());
         run = report::run_compensation(alone, targets_of(targets, alone.robot, reading), task, outcome.warn());
       },
@@ -247,12 +250,12 @@ nb::dict simulate(const Arm& arm, Eigen::Index count, const std::optional<Source
                   double noise_um, std::uint64_t seed) {
   std::string csv;
   interruptible(
-      [&](const Progress&) {
+      [&](const Progress& progress) {
         std::optional<robotics::Poses> given;
         if (at) given = poses_of(*at, arm.robot.robot, reading).poses;
-        csv = robotics::to_csv(
-            report::simulated_table(arm.name, arm.robot, given, {.poses = count, .noise_um = noise_um, .seed = seed}),
-            arm.robot.robot);
+        const robotics::SimulationOptions options{
+            .poses = count, .noise_um = noise_um, .seed = seed, .progress = progress};
+        csv = robotics::to_csv(report::simulated_table(arm.name, arm.robot, given, options), arm.robot.robot);
       },
       nb::none());
   nb::dict result = Outcome().dict("", nullptr);
@@ -264,13 +267,13 @@ nb::dict predict(const Arm& arm, const Source& at, const Reading& reading, bool 
   Outcome outcome;
   std::string csv;
   interruptible(
-      [&](const Progress&) {
+      [&](const Progress& progress) {
         const robotics::CorrectedRobot robot =
             as_measured ? arm.robot : report::arm_alone(arm.name, arm.robot, outcome.warn());
         const auto [given, columns] = poses_of(at, robot.robot, reading);
-        csv =
-            robotics::to_csv(report::predicted_table(arm.name, robot, given, reading.map().orientation, outcome.warn()),
-                             robot.robot, columns);
+        csv = robotics::to_csv(
+            report::predicted_table(arm.name, robot, given, reading.map().orientation, outcome.warn(), progress),
+            robot.robot, columns);
       },
       nb::none());
   nb::dict result = outcome.dict("", nullptr);

@@ -55,7 +55,7 @@ void to_world(const robotics::Chain& chain, robotics::Targets& targets) {
 }
 
 robotics::Targets asked(const CompensationTask& task, const CorrectedRobot& robot, const robotics::TargetTable& table,
-                        const Warn& warn) {
+                        const Warn& warn, const Progress& progress) {
   robotics::Targets targets;
   targets.start.joints = table.joints;
   targets.start.covariates = table.covariates;
@@ -75,7 +75,7 @@ robotics::Targets asked(const CompensationTask& task, const CorrectedRobot& robo
     warn(fmt::format("{}: the targets are poses: {} is not read", task.targets_file, task.nominal_file));
   }
   if (task.position_only) targets.rotations.clear();
-  if (table.joints.size() == 0) targets.start.joints = robotics::rigid_joints(robot.robot, targets);
+  if (table.joints.size() == 0) targets.start.joints = robotics::rigid_joints(robot.robot, targets, progress);
   return targets;
 }
 
@@ -153,11 +153,16 @@ CompensationRun run_compensation(const CorrectedRobot& robot, robotics::TargetTa
                                  const Warn& warn) {
   CompensationRun run{std::move(task), robot, std::move(table), {}, {}};
   warn_of_units(run.task.targets_file, robot.robot.chain, run.table, warn);
-  run.targets = asked(run.task, robot, run.table, warn);
+  Work work(run.task.progress);
+  Work starting(work, run.table.joints.size() == 0 ? 0.5 : 0.0);
+  run.targets = asked(run.task, robot, run.table, warn, starting.progress());
   const robotics::Poses& start = run.targets.start;
   check_positions(run.task.robot_file, robot.robot,
                   robotics::with_needed_columns(robot.robot, robotics::with_approach(robot.robot, start), 1));
-  run.found = robotics::compensate(robot, run.targets, {.tolerance_mm = run.task.tolerance_mm});
+  work.check();
+  Work solving(work, work.left());
+  run.found =
+      robotics::compensate(robot, run.targets, {.tolerance_mm = run.task.tolerance_mm, .progress = solving.progress()});
   name_made_up(start, run.found.commands, warn);
   name_rows(run, warn);
   const std::vector<std::string>& unused = run.table.unused_columns;
@@ -165,6 +170,7 @@ CompensationRun run_compensation(const CorrectedRobot& robot, robotics::TargetTa
   if (!run.targets.rotations.empty() && robotics::drive_count(robot.robot.chain) < 6) {
     warn(fmt::format("{} has fewer than six drives: orientations are not kept", robot.robot.chain.name));
   }
+  work.finish();
   return run;
 }
 

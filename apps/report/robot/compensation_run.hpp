@@ -22,6 +22,7 @@ struct CompensationTask {
   bool nominal_frames = false;  ///< base and tool are those of the nominal chain
   bool position_only = false;   ///< orientations do not count
   double tolerance_mm = 1e-6;
+  Progress progress = {};
 };
 
 struct CompensationRun {

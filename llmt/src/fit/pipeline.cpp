@@ -31,12 +31,20 @@ GrownTrees grow_and_choose(const Training& training, const Plan& plan, const std
   const double share = work.left() / (of_folds + 2.0);
   Work choosing(work, of_folds * share);
   Work growing(work, share);
+  const auto grow = [&] {
+    trees.of_all = grow_tree(training.all, served, plan, !has_folds, threads, growing);
+    refuse_beyond_memory(training, plan, trees.of_all.tree.partition.num_leaves());
+  };
+  if (has_folds && training.kept->is_fold_given) {  // which trains on the rows of the model: one tree serves both
+    grow();
+    trees.of_folds = held_out_error(training, plan, served, choosing, &trees.of_all.tree);
+    return trees;
+  }
   // The tree of all rows needs nothing of the folds. Beside them it is work for the threads that would idle, because a
   // tree has ever less to do for several threads the smaller its leaves become.
   parallel_for(2, threads, [&](Eigen::Index job) {
     if (job == 1) {
-      trees.of_all = grow_tree(training.all, served, plan, !has_folds, threads, growing);
-      refuse_beyond_memory(training, plan, trees.of_all.tree.partition.num_leaves());
+      grow();
     } else if (has_folds) {
       trees.of_folds = held_out_error(training, plan, served, choosing);
     }

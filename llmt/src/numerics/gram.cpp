@@ -10,8 +10,10 @@ namespace {
 // Number of doubles that stay in the first-level cache while several tiles pass over them.
 constexpr Eigen::Index buffer_size = 2304;
 
-// Up to this many columns the tiles read the rows where they are; with more, rows are first copied into a buffer.
+// Up to this many columns the tiles read the rows where they are; with more, rows are first copied into a buffer. Rows
+// that are longer than the buffer are also read where they are, so many at once.
 constexpr Eigen::Index few_columns = 16;
+constexpr Eigen::Index long_rows = 64;
 
 // Rows are prefetched by this number of rows ahead, because the rows of a node are scattered over the features.
 constexpr Eigen::Index ahead = 12;
@@ -86,7 +88,7 @@ LLMT_INLINE void add_tiles(const Source& source, Eigen::Index columns, Eigen::In
   }
 }
 
-// For few columns: the tiles read the rows where they are.
+// For few columns, or very many: the tiles read the rows where they are.
 LLMT_FOR_EACH_INSTRUCTION_SET
 void add_scattered(const double* features, Eigen::Index columns, const int* rows, Eigen::Index count,
                    Eigen::Index following, double* gram) {
@@ -172,11 +174,12 @@ void add_rows(const Features& features, const int* rows, Eigen::Index count, dou
   const double* data = features.row(0);
   const Eigen::Index columns = features.columns();
   const Eigen::Index stride = (columns + lanes - 1) / lanes * lanes;
-  const Eigen::Index chunk = std::max<Eigen::Index>(1, buffer_size / stride);
+  const bool in_place = columns <= few_columns || stride > buffer_size;
+  const Eigen::Index chunk = stride > buffer_size ? long_rows : buffer_size / stride;
   alignas(64) double buffer[buffer_size];
   for (Eigen::Index k = 0; k < count; k += chunk) {
     const Eigen::Index size = std::min(chunk, count - k);
-    if (columns <= few_columns) {
+    if (in_place) {
       add_scattered(data, columns, rows + k, size, count - 1 - k, gram);
     } else {
       add_packed(data, columns, rows + k, size, count - 1 - k, buffer, gram);

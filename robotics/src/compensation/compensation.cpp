@@ -230,6 +230,7 @@ Poses with_approach(const Robot& robot, Poses poses) {
 
 Compensation compensate(const CorrectedRobot& robot, const Targets& targets, const CompensationOptions& options) {
   check(robot.robot, targets);
+  Work work(options.progress);
   const Chain& chain = robot.robot.chain;
   const Eigen::Index count = targets.start.count();
   Poses conditions = with_needed_columns(robot.robot, with_approach(robot.robot, targets.start), 1);
@@ -257,9 +258,11 @@ Compensation compensate(const CorrectedRobot& robot, const Targets& targets, con
     result.outcomes.push_back(found.outcome);
     result.reasons.push_back(found.reason);
     result.uncovered.push_back(outside_of_training(robot, found.solution.q));
+    work.did(1.0 / static_cast<double>(count));
   }
   for (auto& [name, values] : result.commands.covariates) values = arm.poses().covariates.at(name);
   if (turns) result.after_deg = angles;
+  work.finish();
   return result;
 }
 

@@ -56,7 +56,8 @@ Inverse::Solution by_many_starts(const Inverse& inverse, const Goal& goal, const
 
 }  // namespace
 
-Eigen::MatrixXd rigid_joints(const Robot& robot, const Targets& targets) {
+Eigen::MatrixXd rigid_joints(const Robot& robot, const Targets& targets, const Progress& progress) {
+  Work work(progress);
   const Inverse inverse(robot.chain, tolerance_mm, 100);
   const auto forward = [&](const Eigen::VectorXd& q) { return inverse.rigid().forward(q); };
   const Eigen::Index joints = std::ssize(robot.chain.joints);
@@ -71,7 +72,9 @@ Eigen::MatrixXd rigid_joints(const Robot& robot, const Targets& targets) {
     if (!solution.converged) solution = by_many_starts(inverse, goal, last, forward);
     result.row(row) = solution.q.transpose();
     if (solution.converged) last = solution.q;
+    work.did(1.0 / static_cast<double>(result.rows()));
   }
+  work.finish();
   return result;
 }
 

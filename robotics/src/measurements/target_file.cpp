@@ -1,7 +1,9 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <numeric>
 #include <stdexcept>
+#include <vector>
 
 #include "llmt/csv.hpp"
 #include "llmt/robotics/measurements.hpp"
@@ -15,7 +17,9 @@ TargetTable targets_of(const Csv& csv, const Robot& robot, const ColumnMap& give
   const ColumnMap map = for_columns_of(csv, given);
   const Header header(csv, robot, {}, map);
   TargetTable targets;
-  for (Eigen::Index row = 0; row < csv.rows(); ++row) targets.lines.push_back(csv.line_of(row));
+  std::vector<Eigen::Index> rows(csv.rows());
+  std::iota(rows.begin(), rows.end(), Eigen::Index{0});
+  targets.lines = csv.lines_of(rows);
   if (targets.lines.empty()) throw std::runtime_error(fmt::format("{}: there are no targets", csv.name()));
   if (header.has_joints()) {
     targets.joints = header.joints();

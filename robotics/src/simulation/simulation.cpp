@@ -2,9 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <numeric>
 #include <stdexcept>
+#include <vector>
 
 #include "kinematics/mimics.hpp"
 #include "kinematics/units.hpp"
@@ -85,7 +88,16 @@ Measurements measured(const Robot& robot, Poses poses, const SimulationOptions& 
   }
   Measurements measurements;
   measurements.poses = with_needed_columns(robot, std::move(poses), options.seed);
-  measurements.positions_mm = positions(robot, measurements.poses);
+  const Eigen::Index count = measurements.poses.count();
+  measurements.positions_mm.resize(count, 3);
+  Work work(options.progress);
+  constexpr Eigen::Index block = 20000;  // between blocks the work may be stopped
+  for (Eigen::Index first = 0; first < count; first += block) {
+    std::vector<Eigen::Index> rows(std::min(block, count - first));
+    std::iota(rows.begin(), rows.end(), first);
+    measurements.positions_mm.middleRows(first, std::ssize(rows)) = positions(robot, select(measurements.poses, rows));
+    work.did(static_cast<double>(rows.size()) / static_cast<double>(count));
+  }
   if (!(measurements.positions_mm.array().abs() <= farthest_mm).all()) {
     throw std::runtime_error(position_refusal(robot, measurements.poses));
   }
@@ -93,6 +105,7 @@ Measurements measured(const Robot& robot, Poses poses, const SimulationOptions& 
     for (Eigen::Index axis = 0; axis < 3; ++axis)
       measurements.positions_mm(i, axis) += 1e-3 * options.noise_um * random.normal();
   }
+  work.finish();
   return measurements;
 }
 

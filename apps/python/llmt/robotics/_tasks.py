@@ -2,8 +2,9 @@
 
 Tables are a path or a table of any kind, see :mod:`llmt.robotics`. ``columns`` is a column map, a path or a dict of the
 table's names to those here: ``{"elbow_joint": "q3_rad"}``. ``decimal_comma`` says it of files. ``progress`` is called
-with (done, total, step). Ctrl-C ends ``calibrate``, ``discover`` and ``poses`` at once, the others when they are done.
-All raise ValueError for inputs that make no sense, naming table, row and column or the field of a description.
+with (done, total, step). Ctrl-C ends a call within a second; of a million rows, reading and writing take longer and are
+not interrupted. All raise ValueError for inputs that make no sense, naming table, row and column or the field of a
+description.
 """
 
 from __future__ import annotations
@@ -322,6 +323,7 @@ def compensate(
     tolerance_um: float = 0.001,
     columns: Any = None,
     decimal_comma: bool = False,
+    progress: Progress | None = None,
 ) -> Commands:
     """Joint commands that bring the real arm where it is asked to be: ``llmt-robot compensate``.
 
@@ -356,7 +358,7 @@ def compensate(
         nominal_frames=bool(nominal_frames),
         position_only=bool(position_only),
         tolerance_um=number("tolerance_um", tolerance_um, _SMALLEST, _LARGEST),
-        report=None,
+        report=progress,
     )
     return Commands(_warned(made))
 

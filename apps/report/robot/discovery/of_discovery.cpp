@@ -54,6 +54,7 @@ std::string cause(const Discovery& found) {
     case discovery::Answer::unknown:
     case discovery::Answer::failed_held_out:  // of no robot
     case discovery::Answer::parameters_only:
+    case discovery::Answer::inner_state:
       break;
   }
   std::set<std::string> places;

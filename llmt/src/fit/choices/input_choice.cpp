@@ -133,7 +133,9 @@ ChosenInputs choose_inputs(const std::shared_ptr<const Training>& training, cons
   for (const Step& step : steps) result.steps.push_back({step.inputs(), step.chosen.rmse});
   const auto best = std::ranges::min_element(steps, {}, [](const Step& step) { return step.chosen.rmse; });
   if (!is_beyond_chance(steps.front().chosen, best->chosen)) return result;
-  const std::vector<int> of_all = elimination.repeat({steps.begin(), best + 1});
+  // A fold that the caller holds out trains on the rows of the model.
+  const std::vector<int> of_all =
+      training->kept->is_fold_given ? best->of_folds.front() : elimination.repeat({steps.begin(), best + 1});
   std::ranges::set_difference(training->all.split_inputs, of_all, std::back_inserter(result.left_out));
   result.training = std::make_shared<const Training>(narrowed(*training, of_all, best->of_folds));
   return result;

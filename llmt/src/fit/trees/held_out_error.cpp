@@ -10,7 +10,8 @@
 
 namespace llmt {
 
-HeldOutFits held_out_error(const Training& training, const Plan& plan, const std::vector<int>& served, Work& work) {
+HeldOutFits held_out_error(const Training& training, const Plan& plan, const std::vector<int>& served, Work& work,
+                           const GrownTree* grown) {
   const std::vector<FoldRows>& folds = training.folds;
   const int threads = training.options.max_threads;
   HeldOutFits fits{std::vector<GrownTree>(folds.size()), {}};
@@ -18,7 +19,7 @@ HeldOutFits held_out_error(const Training& training, const Plan& plan, const std
   Work choosing(work, 2.0 / 3.0);
   parallel_for(std::ssize(folds), threads, [&](Eigen::Index f) {
     Work tree(work, 1.0 / (3.0 * static_cast<double>(folds.size())));
-    fits.trees[f] = grow_tree(folds[f].training, served, plan, false, threads, tree).tree;
+    fits.trees[f] = grown != nullptr ? *grown : grow_tree(folds[f].training, served, plan, false, threads, tree).tree;
   });
   Eigen::Index most_leaves = 0;
   for (const GrownTree& tree : fits.trees) most_leaves = std::max(most_leaves, tree.partition.num_leaves());

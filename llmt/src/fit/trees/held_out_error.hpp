@@ -22,8 +22,10 @@ struct HeldOutFits {
 ///
 ///     rmse = sqrt(sum_i w_i e_i^2 / sum_i w_i),    fold_rmse(k): the same sums over the rows of fold k.
 ///
-/// `work`: of this. Throws std::runtime_error if the candidates would take more memory than there is.
-HeldOutFits held_out_error(const Training& training, const Plan& plan, const std::vector<int>& served, Work& work);
+/// `work`: of this. `grown`: the tree of the only fold where it is known, else null. Throws std::runtime_error if the
+/// candidates would take more memory than there is.
+HeldOutFits held_out_error(const Training& training, const Plan& plan, const std::vector<int>& served, Work& work,
+                           const GrownTree* grown = nullptr);
 
 /// The errors of several partitions as one: their mean, each in parts of that of `units`. A single one is its own.
 CandidateError mean_error(const std::vector<CandidateError>& errors, const std::vector<CandidateError>& units);

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "llmt/abi.hpp"
+#include "llmt/progress.hpp"
 #include "llmt/robotics/correction.hpp"
 
 namespace llmt::robotics {
@@ -37,6 +38,7 @@ struct CompensationOptions {
   double tolerance_mm =
       1e-6;  ///< a target counts as reached within this distance, and this over the arm's reach in rad
   int max_iterations = 60;
+  Progress progress = {};
 };
 
 struct Compensation {
@@ -73,6 +75,6 @@ Poses with_approach(const Robot& robot, Poses poses);
 /// Joint values at which the rigid chain of the robot reaches the targets, whose start joints do not matter: the first
 /// row the solution nearest to the middle of the joints' ranges that 60 starts find, then each row from the one before,
 /// or by starts anew. Rows that cannot be reached hold what comes nearest. The seed is fixed.
-Eigen::MatrixXd rigid_joints(const Robot& robot, const Targets& targets);
+Eigen::MatrixXd rigid_joints(const Robot& robot, const Targets& targets, const Progress& progress = {});
 
 }  // namespace llmt::robotics

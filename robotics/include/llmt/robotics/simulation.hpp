@@ -6,6 +6,7 @@
 
 #include <cstdint>
 
+#include "llmt/progress.hpp"
 #include "llmt/robotics/measurements.hpp"
 
 namespace llmt::robotics {
@@ -14,6 +15,7 @@ struct SimulationOptions {
   Eigen::Index poses = 200;  ///< 1 ... 1 000 000
   double noise_um = 0.0;     ///< standard deviation of each measured coordinate, normal; 0 ... 1e12
   std::uint64_t seed = 1;
+  Progress progress = {};
 };
 
 /// Poses uniform within the joint limits (revolute joints without limits: +-180 deg), and where the robot, its effects
