@@ -145,9 +145,12 @@ void leave_poor_terms(const TermModel& model, TermData& data, const std::vector<
     if (!(again.independent_share > data.independent_share)) continue;
     other = search_until_settled(model, again, repeats, std::move(other), false, noise, options, work);
     const double share = again.independent_share;
-    if (!(share > data.independent_share) || other.verdict.outliers != settled.verdict.outliers) continue;
-    if (score_of(model, kept, other.fit, share) + options.search.rival_margin <
-        score_of(model, kept, settled.fit, share)) {
+    if (!(share > data.independent_share)) continue;
+    std::vector<std::size_t> outliers = settled.verdict.outliers;
+    outliers.insert(outliers.end(), other.verdict.outliers.begin(), other.verdict.outliers.end());
+    const TermData of_both = without_samples(data, outliers);
+    if (score_of(model, of_both, other.fit, share) + options.search.rival_margin <
+        score_of(model, of_both, settled.fit, share)) {
       data = again;
       settled = other;
       return;
