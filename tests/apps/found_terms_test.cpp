@@ -72,6 +72,7 @@ Json json_of(const Sample& sample, std::vector<discovery::FoundTerm> found) {
   summary.order = sample.inputs.order;
   summary.missing.found = std::move(found);
   summary.missing.gaps = {{.output = "y"}};
+  summary.missing.zero_bands = sample.inputs.zero_bands;
   return terms_json(summary);
 }
 
@@ -110,6 +111,8 @@ TEST(FoundTerms, EveryTermOfTheLibraryIsAnExpressionThatTheTermFileReads) {
 TEST(FoundTerms, AppliedAreTheSameAsTheLibrarysOwn) {
   Sample own = sample();
   own.inputs.order = "t";
+  own.inputs.zero_bands = Eigen::VectorXd::Zero(6);
+  own.inputs.zero_bands(4) = 0.3;  // a third of the rows
   llmt::Random random(2);
   const discovery::Rows rows = discovery::rows_of(own.inputs, own.simulated);
   std::vector<discovery::FoundTerm> all;
@@ -135,7 +138,9 @@ TEST(FoundTerms, AppliedAreTheSameAsTheLibrarysOwn) {
 TEST(FoundTerms, AsCAreTheSameFunction) {
   if (std::system("command -v cc >/dev/null") != 0) GTEST_SKIP() << "no C compiler";
   const program::Folder folder;
-  const Sample own = sample();
+  Sample own = sample();
+  own.inputs.zero_bands = Eigen::VectorXd::Zero(6);
+  own.inputs.zero_bands(4) = 0.3;
   llmt::Random random(3);
   std::vector<discovery::FoundTerm> all;
   for (const discovery::ModelTerm& term : discovery::standard_terms(own.inputs)) {
