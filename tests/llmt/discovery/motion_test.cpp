@@ -152,5 +152,22 @@ TEST(Rest, SignalThatPassesZeroHasNoBand) {
   EXPECT_EQ(zero_bands(resting, resting.values.col(1)).maxCoeff(), 0.0);
 }
 
+TEST(Rest, SimulationOfTheWrongShapeIsRefused) {
+  const Inputs inputs = with_rests(1);
+  const MeasuredOutputs measured{{"u"}, force(inputs.values) + inputs.values.col(0)};
+  for (const Eigen::Index missing : {1, 500}) {
+    Simulation simulation;
+    simulation.predict = [&](const Eigen::MatrixXd& values, const Eigen::VectorXd&) -> Eigen::MatrixXd {
+      return force(values).topRows(rows - missing);
+    };
+    try {
+      find_missing(simulation, inputs, measured, standard_terms(inputs));
+      FAIL();
+    } catch (const std::invalid_argument& error) {
+      EXPECT_NE(std::string(error.what()).find("must be 1000 x 1"), std::string::npos) << error.what();
+    }
+  }
+}
+
 }  // namespace
 }  // namespace motion_test

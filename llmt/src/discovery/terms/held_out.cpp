@@ -5,9 +5,8 @@
 #include <numeric>
 
 #include "discovery/terms/motion.hpp"
-#include "llmt/discovery/terms.hpp"
-
 #include "discovery/terms/term_question.hpp"
+#include "llmt/discovery/terms.hpp"
 
 namespace llmt::discovery {
 namespace {

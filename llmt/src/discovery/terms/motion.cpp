@@ -187,7 +187,8 @@ SmoothedInputs smoothed(const Inputs& inputs, const Eigen::MatrixXd& simulated) 
   const Eigen::Index n = inputs.values.rows();
   SmoothedInputs result{.inputs = inputs, .change = {}, .unknown_sign = std::vector<bool>(n, false), .notes = {}};
   constexpr Eigen::Index fewest = 60;
-  if (inputs.instants.size() == 0 || n < fewest || !simulated.allFinite()) return result;
+  // What has the wrong shape is refused by the search.
+  if (inputs.instants.size() == 0 || n < fewest || simulated.rows() != n || !simulated.allFinite()) return result;
   const Surrogate surrogate(inputs.values, simulated);
   constexpr double described = 0.98;
   if (surrogate.described().minCoeff() < described) return result;

@@ -89,8 +89,10 @@ Eigen::VectorXd nominal_values(const Simulation& simulation) {
 // Rows in time with the bands within which inputs rest.
 Inputs with_zero_bands(const Simulation& simulation, Inputs inputs, const MeasuredOutputs& measured) {
   if (inputs.instants.size() == 0 || inputs.zero_bands.size() > 0) return inputs;
-  inputs.zero_bands =
-      zero_bands(inputs, measured.values - simulation.predict(inputs.values, nominal_values(simulation)));
+  const Eigen::MatrixXd simulated = simulation.predict(inputs.values, nominal_values(simulation));
+  // What has the wrong shape is refused by the search.
+  if (simulated.rows() != measured.values.rows() || simulated.cols() != measured.values.cols()) return inputs;
+  inputs.zero_bands = zero_bands(inputs, measured.values - simulated);
   if (!(inputs.zero_bands.array() > 0.0).any()) inputs.zero_bands.resize(0);
   return inputs;
 }
