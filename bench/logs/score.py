@@ -47,6 +47,7 @@ def arguments():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--program", required=True)
     parser.add_argument("--seeds", type=int, default=3, metavar="COUNT")
+    parser.add_argument("--first", type=int, default=1, metavar="SEED", help="the first of the seeds; default: %(default)s")
     parser.add_argument("--cases", metavar="NAME,...", help="default: all")
     parser.add_argument("--time", action="store_true", help="name the columns of time and runs to the program")
     parser.add_argument("--parameters", action="store_true", help="give derivatives by --parameters, not as inputs")
@@ -265,7 +266,7 @@ def table(cases, results):
 def main():
     options = arguments()
     cases = logs.chosen(options.cases)
-    seeds = range(1, options.seeds + 1)
+    seeds = range(options.first, options.first + options.seeds)
     kept = []
     if options.results and options.results.exists():
         kept = [json.loads(text) for text in options.results.read_text().splitlines()]

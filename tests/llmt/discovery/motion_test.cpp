@@ -1,4 +1,4 @@
-// Speeds that are taken from positions, and rows at which a machine rests.
+// Speeds that are taken from positions, and rows at which a machine rests or reverses.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -140,6 +140,63 @@ TEST(Rest, RowsAtRestAreNoEvidenceOfFriction) {
     EXPECT_LT(missing.zero_bands(1), 0.1);
     // What was found adds nothing at rest.
     EXPECT_LT(std::abs(missing.corrected(110, 0) - simulated(110, 0)), 0.05);
+  }
+}
+
+// Running means of 2 * half + 1 rows.
+Eigen::VectorXd low_passed(const Eigen::VectorXd& values, Eigen::Index half) {
+  Eigen::VectorXd means(values.size());
+  for (Eigen::Index i = 0; i < values.size(); ++i) {
+    const Eigen::Index begin = std::max<Eigen::Index>(0, i - half);
+    means(i) = values.segment(begin, std::min(values.size(), i + half + 1) - begin).mean();
+  }
+  return means;
+}
+
+// All signals passed a filter, that of the force too: it rounds the jump of the friction, which the simulation has.
+TEST(Reversals, FrictionRoundedByAFilterIsNoMissingTerm) {
+  const Eigen::MatrixXd values = moving();
+  const Inputs inputs = inputs_of(values);
+  const auto friction = [](const Eigen::VectorXd& speed) -> Eigen::VectorXd { return 0.5 * speed.cwiseSign(); };
+  const Eigen::MatrixXd simulated = force(values) + friction(values.col(1));
+  for (const std::uint64_t seed : {1u, 2u}) {
+    Noise noise(seed);
+    MeasuredOutputs measured{{"u"}, force(values) + low_passed(friction(values.col(1)), 2)};
+    for (double& value : measured.values.reshaped()) value += 0.01 * noise.normal();
+    const Missing missing = find_missing(tabulated(simulated, {"u"}), inputs, measured, standard_terms(inputs));
+    EXPECT_EQ(missing.answer, Answer::nothing_missing) << to_string(missing.answer);
+    const auto speaks_of_reversals = [](const std::string& note) {
+      return note.find("near its reversals") != std::string::npos && note.find("|dq|") != std::string::npos;
+    };
+    EXPECT_EQ(std::ranges::count_if(missing.notes, speaks_of_reversals), 1);
+    // Drag beside it has its name.
+    measured.values.col(0).array() += 1.5 * values.col(1).array() * values.col(1).array().abs();
+    const Missing drag = find_missing(tabulated(simulated, {"u"}), inputs, measured, standard_terms(inputs));
+    std::string names;
+    for (const FoundTerm& found : drag.found) names += found.family + " of " + found.location + ", ";
+    ASSERT_EQ(names, "signed_square of dq, ") << seed;
+    EXPECT_EQ(drag.found.front().family, "signed_square");
+    EXPECT_TRUE(drag.found.front().confirmed);
+    EXPECT_NEAR(drag.found.front().coefficients(0), 1.5, 0.03);
+  }
+}
+
+// What is missing near reversals, and has a name, is not set apart; of nested laws the one that suffices is named.
+TEST(Reversals, StribecksFrictionHasItsName) {
+  const Eigen::MatrixXd values = moving();
+  const Inputs inputs = inputs_of(values);
+  for (const std::uint64_t seed : {1u, 2u}) {
+    Noise noise(seed);
+    MeasuredOutputs measured{{"u"}, force(values)};
+    measured.values.col(0).array() += values.col(1).array().sign() * (-(values.col(1).array() / 0.15).square()).exp();
+    for (double& value : measured.values.reshaped()) value += 0.02 * noise.normal();
+    const Missing missing = find_missing(tabulated(force(values), {"u"}), inputs, measured, standard_terms(inputs));
+    EXPECT_EQ(missing.answer, Answer::named) << to_string(missing.answer);
+    ASSERT_EQ(missing.found.size(), 1u);
+    EXPECT_EQ(missing.found.front().family, "stribeck");
+    EXPECT_NEAR(missing.found.front().coefficients(0), 1.0, 0.05);
+    EXPECT_NEAR(missing.found.front().constants(0), 0.15, 0.01);
+    for (const std::string& note : missing.notes) EXPECT_EQ(note.find("reversals"), std::string::npos) << note;
   }
 }
 

@@ -79,6 +79,26 @@ bool predict_alike(const Scoring& scoring, const Set& set, const std::string& fa
   return (scoring.remaining(fit) - scoring.remaining(other_fit)).squaredNorm() < same * own;
 }
 
+// Whether another set has a more general law in the place of the family, which is nearly the same here.
+bool is_generalisation(const Scoring& scoring, const Set& set, const std::string& family, const Set& other,
+                       const Set& instead) {
+  constexpr double nearly = 0.02;  // a share of the squares
+  const Set own = of_family(scoring, set, family);
+  const std::set<std::string> places = locations_of(scoring, set, family);
+  const auto columns = [&](const Set& of) {
+    Eigen::Index sum = 0;
+    for (const std::size_t a : of) sum += scoring.workspace().blocks()[a].size;
+    return sum;
+  };
+  if (instead.size() != own.size() || columns(instead) <= columns(own)) return false;
+  for (const std::size_t a : instead) {
+    if (!places.contains(scoring.candidates()[a].location)) return false;
+  }
+  const SetFit fit = scoring.fit(set);
+  const double size = contribution(scoring, fit, set, family).squaredNorm();
+  return (scoring.remaining(fit) - scoring.remaining(scoring.fit(other))).squaredNorm() < nearly * size;
+}
+
 // The families that could stand for a cause.
 std::set<std::string> causes_of(const Scoring& scoring) {
   std::set<std::string> causes;
@@ -102,13 +122,20 @@ Set simpler(const Scoring& scoring, const Set& set, const std::string& family, c
   if (least == 0) return best;
   const double enough = scoring.score(set) + options.rival_margin;
   const std::set<std::string> places = locations_of(scoring, set, family);
+  const auto is_in_its_place = [&](std::size_t a) { return places.contains(scoring.candidates()[a].location); };
+  const Set rest = without_family(scoring, set, family);
+  // Of several terms of one place the least simple one may not be needed.
+  const Set beside = filtered(rest, is_in_its_place);
+  if (options.simplest_of_rivals && !beside.empty() && complexity_of(scoring, beside) <= least &&
+      scoring.score(rest) <= enough) {
+    return rest;
+  }
   for (const std::string& other : causes_of(scoring)) {
     if (other == family) continue;
     const Explained rival = replaced(scoring, set, family, other, options);
     const Set instead = filtered(rival.set, [&](std::size_t a) { return !contains(set, a); });
     if (instead.empty() || rival.set.size() > set.size() || complexity_of(scoring, instead) >= least) continue;
-    const bool is_in_place =
-        std::ranges::all_of(instead, [&](std::size_t a) { return places.contains(scoring.candidates()[a].location); });
+    const bool is_in_place = std::ranges::all_of(instead, is_in_its_place);
     if (rival.score > enough) continue;
     if (!(options.simplest_of_rivals && is_in_place) && !predict_alike(scoring, set, family, rival.set)) continue;
     least = complexity_of(scoring, instead);
@@ -141,7 +168,9 @@ std::vector<Rival> rivals_of(const Scoring& scoring, const Set& set, const std::
     const bool is_rewritten =
         is_exact && complexity_of(scoring, instead) > complexity_of(scoring, own) &&
         std::ranges::all_of(instead, [&](std::size_t a) { return places.contains(candidates[a].location); });
-    if (!is_rewritten) rivals.push_back({other, instead, rival.score - score, is_exact});
+    if (!is_rewritten && !(options.simplest_of_rivals && is_generalisation(scoring, set, family, rival.set, instead))) {
+      rivals.push_back({other, instead, rival.score - score, is_exact});
+    }
   }
   std::ranges::stable_sort(rivals, {}, &Rival::score_difference);
   return rivals;

@@ -129,14 +129,15 @@ void judge_held_out(const TermModel& model, const TermData& kept, const TermData
     const PlacedTerm& placed = settled.fit.placed[t];
     const Eigen::VectorXd own = stacked_signature(model, held_out, placed, simulated) * placed.coefficients;
     Judgement judgement{own.squaredNorm() / noise, 0.0};
-    if (!judgement.is_possible()) continue;
+    const bool in_time = !kept.stretches.empty();
+    if (!judgement.is_possible() && !in_time) continue;
     const double without = squared_errors(model, held_out, fit_without(model, kept, settled.fit, t)).sum();
     judgement.shrunk = (without - after.sum()) / noise;
     for (FoundTerm& found : missing.found) {
       const bool is_this = found.term == placed.term && found.output_index == placed.output &&
                            found.constants.size() == placed.constants.size() && found.constants == placed.constants;
       if (!is_this) continue;
-      found.shrinks_gap = judgement.shrinks();
+      found.shrinks_gap = judgement.is_possible() && judgement.shrinks();
       found.is_refuted = judgement.refutes();
     }
   }

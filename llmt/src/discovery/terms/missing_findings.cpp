@@ -61,8 +61,15 @@ std::string kind_of(const FoundTerm& found) {
   return found.family == "sign" || found.family == "linear" ? "dry and viscous" : found.family;
 }
 
-// Terms that together may only approximate another function: three or more kinds of one input, or two terms of the
-// same two inputs.
+// Whether another function of the same input explains as well in the place of a term.
+bool has_rival_in_place(const FoundTerm& found) {
+  return std::ranges::any_of(found.rivals, [&](const RivalTerms& rival) {
+    return rival.what.find(" " + found.location) != std::string::npos;
+  });
+}
+
+// Terms that together may only approximate another function: three or more kinds of one input, two of which one has a
+// rival of that input, or two terms of the same two inputs.
 std::vector<bool> approximations(const std::vector<FoundTerm>& all) {
   // Terms of one input are counted by kinds, as there may be several steps. A product and a square times the other
   // input are as much of a power series in two inputs as the terms have.
@@ -73,13 +80,17 @@ std::vector<bool> approximations(const std::vector<FoundTerm>& all) {
     return !found.inputs.empty() && found.inputs.size() <= too_many.size();
   };
   std::map<Place, std::set<std::string>> kinds;
+  std::set<Place> uncertain;
   for (const FoundTerm& found : all) {
     if (!is_counted(found)) continue;
+    if (found.inputs.size() == 1 && has_rival_in_place(found)) uncertain.insert(place_of(found));
     kinds[place_of(found)].insert(found.inputs.size() == 1 ? kind_of(found) : found.family + " " + found.location);
   }
   std::vector<bool> approximate;
   for (const FoundTerm& found : all) {
-    approximate.push_back(is_counted(found) && kinds[place_of(found)].size() >= too_many[found.inputs.size() - 1]);
+    const std::size_t fewer = uncertain.contains(place_of(found)) ? 1 : 0;
+    approximate.push_back(is_counted(found) &&
+                          kinds[place_of(found)].size() + fewer >= too_many[found.inputs.size() - 1]);
   }
   return approximate;
 }

@@ -55,15 +55,16 @@ double correlation_time(const RowSplit& split, const Eigen::MatrixXd& deviations
 }  // namespace
 
 Missing search_once(const Simulation& simulation, const Inputs& inputs, const MeasuredOutputs& measured,
-                    const std::vector<ModelTerm>& terms, const std::vector<bool>& apart, const MissingOptions& options,
+                    const std::vector<ModelTerm>& terms, const SearchedRows& searched, const MissingOptions& options,
                     const std::set<std::size_t>& refuted) {
   const bool in_time = inputs.instants.size() > 0;
   Simulation distinct = simulation;
   const TermModel model(distinct, inputs, measured.names, terms, refuted);
   Eigen::VectorXd start(std::ssize(simulation.parameters));
   for (std::size_t k = 0; k < simulation.parameters.size(); ++k) start(k) = simulation.parameters[k].value;
-  RowSplit split = in_time ? split_in_time(inputs, options) : split_independent(inputs, options);
-  if (std::ranges::find(apart, true) != apart.end()) split = without_rows(split, apart);
+  RowSplit split =
+      in_time ? split_in_time(inputs, options, searched.fewest_samples) : split_independent(inputs, options);
+  if (std::ranges::find(searched.apart, true) != searched.apart.end()) split = without_rows(split, searched.apart);
   ErrorsOfInputs errors = errors_of_inputs(model, inputs, measured, start, split);
   const Eigen::Index d = measured.values.cols();
   TermData data = data_of(split.searched, measured);

@@ -8,9 +8,15 @@
 
 namespace llmt::discovery {
 
+/// The rows of a search.
+struct SearchedRows {
+  std::vector<bool> apart;             ///< not searched, not set aside either
+  Eigen::Index fewest_samples = 1000;  ///< as many are left, at least, where rows in time are averaged
+};
+
 /// Searches all terms but those refuted at all rows but those apart, and judges what it finds on the rows set aside.
 Missing search_once(const Simulation& simulation, const Inputs& inputs, const MeasuredOutputs& measured,
-                    const std::vector<ModelTerm>& terms, const std::vector<bool>& apart, const MissingOptions& options,
+                    const std::vector<ModelTerm>& terms, const SearchedRows& searched, const MissingOptions& options,
                     const std::set<std::size_t>& refuted);
 
 }  // namespace llmt::discovery

@@ -126,9 +126,9 @@ double variance_within(const std::vector<Piece>& pieces, const Eigen::VectorXd& 
   return rows > 0.0 ? sum / rows : std::numeric_limits<double>::infinity();
 }
 
-Eigen::Index block_length(const std::vector<Piece>& pieces, const Inputs& inputs, const MissingOptions& options) {
+Eigen::Index block_length(const std::vector<Piece>& pieces, const Inputs& inputs, const MissingOptions& options,
+                          Eigen::Index fewest_samples) {
   constexpr double largest_loss = 0.03;
-  constexpr Eigen::Index fewest_samples = 80;
   const auto n = static_cast<Eigen::Index>(inputs.values.rows());
   const Eigen::Index needed = (n + options.largest_sample - 1) / options.largest_sample;
   std::vector<Smoothness> signals = smoothness_of(pieces, inputs);
@@ -252,11 +252,11 @@ RowSplit split_independent(const Inputs& inputs, const MissingOptions& options) 
   return split;
 }
 
-RowSplit split_in_time(const Inputs& inputs, const MissingOptions& options) {
+RowSplit split_in_time(const Inputs& inputs, const MissingOptions& options, Eigen::Index fewest_samples) {
   const Recording recording = recording_of(inputs);
   RowSplit split;
   split.step = recording.step;
-  split.rows_per_sample = block_length(recording.pieces, inputs, options);
+  split.rows_per_sample = block_length(recording.pieces, inputs, options, fewest_samples);
   Eigen::Index stretch = -1;
   const Segment* before = nullptr;
   const std::vector<Segment> segments = segments_of(recording, split.rows_per_sample, options);

@@ -24,7 +24,7 @@ RowSplit split_independent(const Inputs& inputs, const MissingOptions& options);
 /// For rows in time (Inputs::instants). Set aside are whole runs where there are at least four; else stretches of
 /// consecutive rows. A sample is the mean over a block of consecutive rows, as long as the inputs bear: the longest
 /// block within which every smooth input varies by at most 3 % of its variance, its noise not counted.
-RowSplit split_in_time(const Inputs& inputs, const MissingOptions& options);
+RowSplit split_in_time(const Inputs& inputs, const MissingOptions& options, Eigen::Index fewest_samples);
 
 /// Variance of the noise of equally spaced values of a smooth signal, from third differences: var(D^3 e) = 20 var(e).
 /// NaN for fewer than 4 values.

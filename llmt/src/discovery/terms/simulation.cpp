@@ -11,6 +11,7 @@
 #include "discovery/terms/motion.hpp"
 #include "discovery/terms/one_search.hpp"
 #include "discovery/terms/refuse.hpp"
+#include "discovery/terms/reversals.hpp"
 #include "discovery/terms/row_split.hpp"
 #include "discovery/terms/standstill.hpp"
 #include "discovery/terms/term_model.hpp"
@@ -110,6 +111,18 @@ std::vector<std::string> notes_on_rest(const Inputs& inputs) {
   return notes;
 }
 
+std::vector<std::string> notes_on_reversals(const std::vector<Reversals>& reversals) {
+  std::vector<std::string> notes;
+  for (const Reversals& own : reversals) {
+    notes.push_back(fmt::format(
+        "near its reversals, with |{0}| < {1:.3g}, deviations are {2:.2g} times as large as elsewhere, and no term "
+        "explains that: friction that a filter has rounded, or a machine that sticks. These {3} rows were set apart; "
+        "the answer is of the others",
+        own.speed, own.limit, own.ratio, own.rows));
+  }
+  return notes;
+}
+
 // Sum over the outputs of the squared errors on the samples set aside, in units of those before.
 double left_on_held_out(const Missing& missing) {
   double left = 0.0;
@@ -120,14 +133,14 @@ double left_on_held_out(const Missing& missing) {
 // Shapes follow noise that is alike in neighbours farther than causes do, and they follow what is small beside the
 // causes. Where causes alone leave as little on the rows set aside, they are the answer.
 Missing causes_for_shapes(const Simulation& simulation, const Inputs& inputs, const MeasuredOutputs& measured,
-                          const std::vector<ModelTerm>& terms, const std::vector<bool>& apart,
-                          const MissingOptions& options, std::set<std::size_t> refuted, Missing with_shapes) {
+                          const std::vector<ModelTerm>& terms, const SearchedRows& rows, const MissingOptions& options,
+                          std::set<std::size_t> refuted, Missing with_shapes) {
   const bool has_shapes = std::ranges::any_of(with_shapes.found, &FoundTerm::generic);
   if (inputs.instants.size() == 0 || !has_shapes || with_shapes.held_out.empty()) return with_shapes;
   for (std::size_t t = 0; t < terms.size(); ++t) {
     if (terms[t].generic) refuted.insert(t);
   }
-  Missing of_causes = search_once(simulation, inputs, measured, terms, apart, options, refuted);
+  Missing of_causes = search_once(simulation, inputs, measured, terms, rows, options, refuted);
   constexpr double as_little = 1.1;
   constexpr double immaterial = 0.01;
   const double left = left_on_held_out(with_shapes);
@@ -137,23 +150,30 @@ Missing causes_for_shapes(const Simulation& simulation, const Inputs& inputs, co
 }
 
 // Searches until what is found holds on the rows set aside. Terms that are refuted there are no candidates of the next
-// search, which sets other rows aside.
+// search, which sets other rows aside. In time, what follows noise that is alike in neighbours lives on few rows: a
+// term must shrink the gap on the rows set aside, of one search or the next.
 Missing find_at(const Simulation& simulation, const Inputs& inputs, const MeasuredOutputs& measured,
-                const std::vector<ModelTerm>& terms, const std::vector<bool>& apart, MissingOptions options) {
-  constexpr int most = 3;
+                const std::vector<ModelTerm>& terms, const SearchedRows& rows, MissingOptions options) {
+  const bool in_time = inputs.instants.size() > 0;
+  const int most = in_time ? 4 : 3;
   std::set<std::size_t> refuted;
+  std::set<std::size_t> unproven;
   std::vector<std::string> notes;
   for (int trial = 1;; ++trial) {
-    Missing missing = search_once(simulation, inputs, measured, terms, apart, options, refuted);
-    const bool hangs =
-        std::ranges::any_of(missing.found, [](const FoundTerm& found) { return !found.hangs_on.empty(); });
-    if ((missing.answer != Answer::failed_held_out && !hangs) || trial == most) {
-      missing = causes_for_shapes(simulation, inputs, measured, terms, apart, options, refuted, std::move(missing));
+    Missing missing = search_once(simulation, inputs, measured, terms, rows, options, refuted);
+    const auto is_unproven = [&](const FoundTerm& found) { return in_time && !found.shrinks_gap; };
+    const bool holds =
+        missing.answer != Answer::failed_held_out && std::ranges::none_of(missing.found, [&](const FoundTerm& found) {
+          return !found.hangs_on.empty() || is_unproven(found);
+        });
+    if (holds || trial == most) {
+      missing = causes_for_shapes(simulation, inputs, measured, terms, rows, options, refuted, std::move(missing));
       missing.notes.insert(missing.notes.begin(), notes.begin(), notes.end());
       return missing;
     }
     for (const FoundTerm& found : missing.found) {
-      if (!found.is_refuted && found.hangs_on.empty()) continue;
+      const bool fails_again = is_unproven(found) && !unproven.insert(found.term).second;
+      if (!found.is_refuted && !fails_again && found.hangs_on.empty()) continue;
       refuted.insert(found.term);
       if (!found.hangs_on.empty()) {
         notes.push_back(
@@ -161,9 +181,11 @@ Missing find_at(const Simulation& simulation, const Inputs& inputs, const Measur
                         found.family, found.location, found.hangs_on));
         continue;
       }
-      notes.push_back(fmt::format("{} was found and taken back: it makes the error on rows set aside larger",
-                                  found.generic ? "an error pattern of " + found.location
-                                                : fmt::format("{} {}", found.family, found.location)));
+      const std::string name =
+          found.generic ? "an error pattern of " + found.location : fmt::format("{} {}", found.family, found.location);
+      notes.push_back(found.is_refuted
+                          ? name + " was found and taken back: it makes the error on rows set aside larger"
+                          : name + " was found and taken back: it does not make the error on rows set aside smaller");
     }
     ++options.seed;
   }
@@ -182,9 +204,24 @@ Missing find(const Simulation& simulation, const Inputs& as_given, const Measure
     };
   }
   const Inputs inputs = with_zero_bands(there, smooth.inputs, measured);
-  std::vector<bool> apart = rows_at_rest(inputs);
-  for (std::size_t i = 0; i < apart.size(); ++i) apart[i] = apart[i] || smooth.unknown_sign[i];
-  Missing missing = find_at(there, inputs, measured, terms, apart, options);
+  SearchedRows rows{rows_at_rest(inputs)};
+  for (std::size_t i = 0; i < rows.apart.size(); ++i) rows.apart[i] = rows.apart[i] || smooth.unknown_sign[i];
+  Missing missing = find_at(there, inputs, measured, terms, rows, options);
+  // What is left is alike in neighbours: single rows say little more than their means, which hold less noise.
+  constexpr double alike = 0.5;  // independent share
+  constexpr Eigen::Index fewest_of_alike = 80;
+  if (missing.time.in_time && missing.time.independent_share < alike) {
+    rows.fewest_samples = fewest_of_alike;
+    missing = find_at(there, inputs, measured, terms, rows, options);
+  }
+  std::vector<std::string> at_reversals;
+  constexpr int most = 3;
+  for (int k = 0; k < most && inputs.instants.size() > 0; ++k) {
+    const std::vector<Reversals> reversals = left_at_reversals(inputs, measured, missing, rows.apart);
+    if (reversals.empty()) break;
+    missing = find_at(there, inputs, measured, terms, rows, options);
+    at_reversals = notes_on_reversals(reversals);
+  }
   missing.zero_bands = inputs.zero_bands;
   if (is_smoothed) {
     missing.before -= smooth.change;
@@ -193,6 +230,7 @@ Missing find(const Simulation& simulation, const Inputs& as_given, const Measure
   }
   const std::vector<std::string> at_rest = notes_on_rest(inputs);
   missing.notes.insert(missing.notes.begin(), at_rest.begin(), at_rest.end());
+  missing.notes.insert(missing.notes.begin(), at_reversals.begin(), at_reversals.end());
   missing.notes.insert(missing.notes.begin(), smooth.notes.begin(), smooth.notes.end());
   return missing;
 }

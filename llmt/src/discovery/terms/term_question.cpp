@@ -77,6 +77,37 @@ TrialGround ground_without(const TermModel& model, const TermData& data, const T
   return ground;
 }
 
+// In time, the constants of a simpler rival are those with which it stands best in the place of a term of the same
+// inputs: beside that term it would only follow the noise. Independent rows find rivals in the first round.
+class Rivals {
+ public:
+  Rivals(const TermModel& model, const TermData& data, const TermFit& fit, const std::vector<std::size_t>& outliers)
+      : model_(&model), fit_(&fit), kept_(without_samples(data, outliers)) {
+    if (data.stretches.empty()) return;
+    for (std::size_t k = 0; k < fit.placed.size(); ++k) grounds_.push_back(ground_without(model, kept_, fit, k));
+  }
+
+  // Term t in the place of each less simple term of its inputs.
+  std::vector<PlacedTerm> options(std::size_t t, Eigen::Index output, const Eigen::MatrixXd& simulated) const {
+    std::vector<PlacedTerm> all;
+    for (std::size_t k = 0; k < grounds_.size(); ++k) {
+      const PlacedTerm& placed = fit_->placed[k];
+      const ModelTerm& term = model_->terms()[placed.term];
+      const bool is_rival = placed.output == output && term.inputs == model_->terms()[t].inputs &&
+                            model_->terms()[t].complexity < term.complexity;
+      if (!is_rival) continue;
+      std::ranges::move(best_constants(*model_, kept_, grounds_[k], t, output, simulated, {}), std::back_inserter(all));
+    }
+    return all;
+  }
+
+ private:
+  const TermModel* model_;
+  const TermFit* fit_;
+  TermData kept_;
+  std::vector<TrialGround> grounds_;
+};
+
 }  // namespace
 
 TermData without_samples(const TermData& data, const std::vector<std::size_t>& left_out) {
@@ -114,6 +145,7 @@ TermQuestion ask(const TermModel& model, const TermData& data, const TermFit& fi
     ground.nuisance = beside(ground.nuisance, question.candidates.back().signature);
   }
   for (const std::size_t sample : outliers) ground.residuals.segment(sample * d, d).setZero();
+  const Rivals rivals(model, data, fit, outliers);
   for (std::size_t t = 0; t < model.terms().size(); ++t) {
     const ModelTerm& term = model.terms()[t];
     if (model.is_refuted(t)) continue;
@@ -125,6 +157,7 @@ TermQuestion ask(const TermModel& model, const TermData& data, const TermFit& fi
       std::vector<PlacedTerm> options;
       if (!term.constants.empty()) {
         options = best_constants(model, data, ground, t, o, simulated, fit.placed);
+        for (PlacedTerm& option : rivals.options(t, o, simulated)) options.push_back(std::move(option));
       } else if (!placed_already(fit.placed, t, o)) {
         options.push_back({t, o, {}, Eigen::VectorXd::Zero(std::ssize(term.coefficients)), 0.0});
       }

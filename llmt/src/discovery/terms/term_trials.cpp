@@ -13,13 +13,19 @@ namespace {
 constexpr double smallest_share_kept = 0.3;
 // A term that a handful of samples carry, at the end of a range, says more of these samples than of a cause.
 constexpr double fewest_carriers = 3.0;
+// Neighbours in time share their errors.
+constexpr double fewest_carriers_in_time = 8.0;
 
 // The sum of squares that a term explains at one constant, beyond the nuisance.
 class Trials {
  public:
   Trials(const TermModel& model, const TermData& data, const TrialGround& ground, PlacedTerm placed,
          const Eigen::MatrixXd& simulated)
-      : model_(&model), data_(&data), placed_(std::move(placed)), simulated_(&simulated) {
+      : model_(&model),
+        data_(&data),
+        placed_(std::move(placed)),
+        simulated_(&simulated),
+        fewest_carriers_(data.stretches.empty() ? fewest_carriers : fewest_carriers_in_time) {
     const Eigen::Index d = data.measured.cols();
     const Eigen::Index n = data.measured.rows();
     const auto own = Eigen::seqN(placed_.output, n, d);
@@ -42,7 +48,7 @@ class Trials {
     if (!columns.allFinite()) return 0.0;
     for (Eigen::Index k = 0; k < columns.cols(); ++k) {
       if (share_kept(of_rows.col(k), data_->samples) < smallest_share_kept) return 0.0;
-      if (carriers(columns.col(k)) < fewest_carriers) return 0.0;
+      if (carriers(columns.col(k)) < fewest_carriers_) return 0.0;
     }
     const Eigen::VectorXd norms = columns.colwise().norm();
     if (!(norms.minCoeff() > 0.0)) return 0.0;
@@ -68,6 +74,7 @@ class Trials {
   const TermData* data_;
   PlacedTerm placed_;
   const Eigen::MatrixXd* simulated_;
+  double fewest_carriers_;
   Eigen::MatrixXd basis_;
   Eigen::VectorXd residuals_;
 
