@@ -156,7 +156,7 @@ TEST(InTime, StandardErrorsHoldUnderCorrelatedNoise) {
   int named = 0;
   int covered = 0;
   for (std::uint64_t seed = 1; seed <= 30; ++seed) {
-    const Missing missing = missing_from(log_of(seed, 1000, 0.1, std::exp(-step / 0.2), drag));
+    const Missing missing = missing_from(log_of(seed, 2000, 0.1, std::exp(-step / 0.2), drag));
     for (const FoundTerm& found : missing.found) {
       if (found.family != "signed_square" || found.location != "dq" || missing.found.size() != 1) continue;
       ++named;
