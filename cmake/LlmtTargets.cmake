@@ -34,16 +34,23 @@ function(llmt_library target name)
                VERIFY_INTERFACE_HEADER_SETS ON)
 endfunction()
 
-# llmt_rooms(TARGET EXCEPT <regex>...): adds every source below this folder but those whose path matches EXCEPT. With
-# LLMT_UNITY_BUILD the sources of a room are compiled as one.
+# llmt_rooms(TARGET EXCEPT <regex>... TOGETHER <regex>...): adds every source below this folder but those whose path matches
+# EXCEPT. With LLMT_UNITY_BUILD the sources of a room are compiled as one, as are all rooms that match the same TOGETHER.
 function(llmt_rooms target)
-  cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "EXCEPT")
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "EXCEPT;TOGETHER")
   file(GLOB_RECURSE sources CONFIGURE_DEPENDS RELATIVE "${CMAKE_CURRENT_SOURCE_DIR}" *.cpp)
   foreach(regex IN LISTS arg_EXCEPT)
     list(FILTER sources EXCLUDE REGEX "${regex}")
   endforeach()
   target_sources(${target} PRIVATE ${sources})
   llmt_unity_by_room(${target} ${sources})
+  foreach(regex IN LISTS arg_TOGETHER)
+    set(together ${sources})
+    list(FILTER together INCLUDE REGEX "${regex}")
+    list(GET together 0 first)
+    string(MAKE_C_IDENTIFIER "${first}" group)
+    set_source_files_properties(${together} PROPERTIES UNITY_GROUP "${group}")
+  endforeach()
 endfunction()
 
 # llmt_unity_by_room(TARGET <source>...): with LLMT_UNITY_BUILD the sources of a folder are compiled as one.

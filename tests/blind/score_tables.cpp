@@ -11,7 +11,7 @@
 namespace blind {
 namespace {
 
-using Json = nlohmann::ordered_json;
+using OrderedJson = nlohmann::ordered_json;
 
 struct Bin {
   const char* name;
@@ -59,7 +59,7 @@ const std::vector<Column> pair_columns = {
 
 class Report {
  public:
-  Report(const std::vector<Judged>& all, Json& json) : all_(all), json_(json) {}
+  Report(const std::vector<Judged>& all, OrderedJson& json) : all_(all), json_(json) {}
 
   void heading(const std::string& text) { text_ += "\n" + text + "\n"; }
   void line(const std::string& text) { text_ += "  " + text + "\n"; }
@@ -69,7 +69,7 @@ class Report {
   void rates(const std::string& table, const std::string& row, const Group& group, const std::vector<Column>& columns) {
     if (group.empty()) return;
     std::vector<std::string> cells;
-    Json& json = json_["tables"][table][row];
+    OrderedJson& json = json_["tables"][table][row];
     for (const Column& column : columns) {
       Rate rate;
       for (const Judged* c : group) rate.add(column.hit(*c));
@@ -112,7 +112,7 @@ class Report {
 
  private:
   const std::vector<Judged>& all_;
-  Json& json_;
+  OrderedJson& json_;
   std::string text_;
 };
 
@@ -185,7 +185,7 @@ void Report::confusion() {
 
 void Report::wrong() {
   heading("confidently wrong, or a name where there is none to give");
-  json_["wrong"] = Json::array();
+  json_["wrong"] = OrderedJson::array();
   for (const Judged& c : all_) {
     const bool named_unknown = unknown(c) && c.confirmed > 0;
     if (!c.confidently_wrong && !named_unknown && !c.false_alarm) continue;
@@ -269,7 +269,7 @@ void Report::time() {
 
 }  // namespace
 
-std::string report(const std::vector<Judged>& all, Json& json) {
+std::string report(const std::vector<Judged>& all, OrderedJson& json) {
   Report r(all, json);
   r.no_effect();
   r.by_lambda("singles", single, single_columns);

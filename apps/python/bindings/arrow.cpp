@@ -25,7 +25,7 @@ namespace {
 
 using Schema = Owned<ArrowSchema>;
 using Chunk = Owned<ArrowArray>;
-using Stream = Owned<ArrowArrayStream>;
+using RowStream = Owned<ArrowArrayStream>;
 
 // What a capsule holds, taken away from it.
 template <class Struct>
@@ -55,7 +55,7 @@ std::string legible(const char* text) {
 }
 
 // Throws what a call into the stream's producer reports by an error number that is not 0.
-void require_success(Stream& stream, int error, const char* call) {
+void require_success(RowStream& stream, int error, const char* call) {
   if (error == 0) return;
   const char* const why = stream->get_last_error == nullptr ? nullptr : stream->get_last_error(stream.get());
   throw std::runtime_error(
@@ -63,7 +63,7 @@ void require_success(Stream& stream, int error, const char* call) {
 }
 
 // The producer may wait for other threads that need the interpreter's lock.
-Schema schema_of(Stream& stream) {
+Schema schema_of(RowStream& stream) {
   if (stream->get_schema == nullptr || stream->get_next == nullptr) {
     throw std::runtime_error("the Arrow stream has no functions");
   }
@@ -77,7 +77,7 @@ Schema schema_of(Stream& stream) {
   return schema;
 }
 
-std::vector<Chunk> chunks_of(Stream& stream) {
+std::vector<Chunk> chunks_of(RowStream& stream) {
   std::vector<Chunk> chunks;
   while (true) {
     check_signals();
@@ -219,7 +219,7 @@ class ArrowTable {
 nb::object read_arrow(const nb::object& capsule, const nb::object& array, const std::string& name) {
   Schema schema;
   std::vector<Chunk> chunks;
-  Stream stream;  // lives as long as its chunks
+  RowStream stream;  // lives as long as its chunks
   if (array.is_none()) {
     stream = taken<ArrowArrayStream>(capsule, "arrow_array_stream");
     schema = schema_of(stream);

@@ -17,7 +17,7 @@
 namespace llmt::robotics {
 namespace {
 
-constexpr Eigen::Index most_poses = 1000000;
+constexpr Eigen::Index most_simulated = 1000000;
 constexpr double largest_noise_um = 1e12;
 
 Eigen::Index steps_within(const Joint& joint, double step_rad) {
@@ -113,9 +113,9 @@ Measurements measured(const Robot& robot, Poses poses, const SimulationOptions& 
 
 Measurements simulate(const Robot& robot, const SimulationOptions& options) {
   validate(robot);
-  if (options.poses < 1 || options.poses > most_poses) {
+  if (options.poses < 1 || options.poses > most_simulated) {
     throw std::invalid_argument(
-        fmt::format("llmt::robotics::simulate: poses is {}, must be between 1 and {}", options.poses, most_poses));
+        fmt::format("llmt::robotics::simulate: poses is {}, must be between 1 and {}", options.poses, most_simulated));
   }
   Random random(options.seed);
   const std::vector<Joint>& joints = robot.chain.joints;
