@@ -145,7 +145,8 @@ def measure(options):
     if unknown := set(names) - set(REGRESSORS):
         sys.exit(f"run.py: no regressor {', '.join(sorted(unknown))}; there are: {'; '.join(REGRESSORS)}")
     # What the machine lacks is not a failed fit, which would be kept.
-    for name, path in {"llmt": options.llmt, "llmt (crisp)": options.llmt, "M5P": WEKA}.items():
+    for name, path in {"llmt": options.llmt, "llmt (boost)": options.llmt, "llmt (crisp)": options.llmt,
+                       "M5P": WEKA}.items():
         if name in names and not os.path.exists(path):
             sys.exit(f"run.py: {name} needs {path}, which is not there")
     if "ChimeraBoost" in names:

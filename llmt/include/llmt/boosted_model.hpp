@@ -90,6 +90,13 @@ class BoostedModel {
   std::vector<BoostedSum> sums_;
 };
 
+/// Of each input of a model, whether a split or a leaf uses it.
+std::vector<bool> used_inputs(const BoostedModel& model);
+
+/// How far each row lies outside of the training rows: the largest excess over the training extent, as a multiple of
+/// that input's training range, see Extrapolation. 0 inside. Throws as BoostedModel::predict().
+std::vector<double> distance_outside(const BoostedModel& model, const Eigen::Ref<const Eigen::MatrixXd>& inputs);
+
 /// The model as JSON text; docs/file-formats.md describes it. Numbers are written so that they read back exactly.
 /// Throws std::runtime_error for a model that load_boosted() would refuse because of its size.
 std::string to_json(const BoostedModel& model);

@@ -56,7 +56,8 @@ DifferentRows different_rows(const GivenRows& given, const RowNumbers& numbers, 
     const Eigen::Index row = rows[k];
     const double group = given.groups.empty() ? 0.0 : given.groups[row];
     const bool held_out = !given.held_out.empty() && given.held_out[row];
-    const auto [found, is_new] = seen.try_emplace({numbers.by_all[k], group, held_out}, result.first.size());
+    const int number = numbers.by_all.empty() ? static_cast<int>(k) : numbers.by_all[k];
+    const auto [found, is_new] = seen.try_emplace({number, group, held_out}, result.first.size());
     if (is_new) {
       result.first.push_back(row);
       result.weights.push_back(0.0);
@@ -97,6 +98,7 @@ std::vector<int> units_of(const GivenRows& given, const std::vector<Eigen::Index
     return units;
   }
   const RowNumbers numbers = number_rows(given.inputs.values, given.outputs.values, rows);
+  if (numbers.by_inputs.empty()) return units;
   const EqualRows equal = find_equal_rows(given.inputs.values, rows, numbers);
   return equal.group.empty() ? units : equal.group;
 }

@@ -44,6 +44,14 @@ double value_below(const BoostedTree& tree, const double* z, int at, double shar
   return sum + share * std::clamp(value, leaf.low, leaf.high);
 }
 
+void check_rows(const char* function, const BoostedModel& model, const Eigen::Ref<const Eigen::MatrixXd>& inputs) {
+  if (inputs.cols() != model.num_inputs()) {
+    throw std::invalid_argument(
+        fmt::format("{}: inputs has {} columns, the model has {} inputs", function, inputs.cols(), model.num_inputs()));
+  }
+  check_finite_or_missing(function, "inputs", inputs);
+}
+
 }  // namespace
 
 double feature_at(const BoostedFeature& feature, std::span<const InputColumn> inputs,
@@ -71,13 +79,39 @@ BoostedModel::BoostedModel(std::vector<InputColumn> inputs, std::vector<OutputCo
   check_boosted(*this);
 }
 
-Eigen::MatrixXd BoostedModel::predict(const Eigen::Ref<const Eigen::MatrixXd>& inputs, int max_threads) const {
-  constexpr const char* function = "llmt::BoostedModel::predict";
-  if (inputs.cols() != num_inputs()) {
-    throw std::invalid_argument(
-        fmt::format("{}: inputs has {} columns, the model has {} inputs", function, inputs.cols(), num_inputs()));
+std::vector<bool> used_inputs(const BoostedModel& model) {
+  std::vector<bool> used(model.num_inputs(), false);
+  for (const BoostedSum& sum : model.sums()) {
+    const auto use = [&](int feature) {
+      used[sum.features[feature].first] = true;
+      if (sum.features[feature].second >= 0) used[sum.features[feature].second] = true;
+    };
+    for (const BoostedTree& tree : sum.trees) {
+      for (const BoostedSplit& split : tree.splits) use(split.feature);
+      for (const BoostedLeaf& leaf : tree.leaves) std::ranges::for_each(leaf.features, use);
+    }
   }
-  check_finite_or_missing(function, "inputs", inputs);
+  return used;
+}
+
+std::vector<double> distance_outside(const BoostedModel& model, const Eigen::Ref<const Eigen::MatrixXd>& inputs) {
+  check_rows("llmt::distance_outside", model, inputs);
+  std::vector<double> distance(inputs.rows(), 0.0);
+  for (Eigen::Index j = 0; j < inputs.cols(); ++j) {
+    const InputColumn& column = model.inputs()[j];
+    if (column.is_categorical()) continue;
+    const double range = column.high - column.low;
+    for (Eigen::Index row = 0; row < inputs.rows(); ++row) {
+      const double excess = std::max(column.low - inputs(row, j), inputs(row, j) - column.high);
+      if (!(excess > 0.0)) continue;  // inside, or missing
+      distance[row] = std::max(distance[row], excess / range);
+    }
+  }
+  return distance;
+}
+
+Eigen::MatrixXd BoostedModel::predict(const Eigen::Ref<const Eigen::MatrixXd>& inputs, int max_threads) const {
+  check_rows("llmt::BoostedModel::predict", *this, inputs);
   Eigen::MatrixXd result(inputs.rows(), num_outputs());
   constexpr Eigen::Index rows_at_once = 64;
   const RowBlocks blocks{inputs.rows(), rows_at_once};
