@@ -12,7 +12,7 @@
 
 namespace {
 
-constexpr double missing = std::numeric_limits<double>::quiet_NaN();
+constexpr double no_value = std::numeric_limits<double>::quiet_NaN();
 
 // Friedman's function of five inputs, an input of noise, noise of deviation 1.
 llmt::TrainingData friedman(Eigen::Index rows, std::uint64_t seed) {
@@ -55,7 +55,7 @@ double sum_at(const llmt::BoostedModel& model, Eigen::Index output, const Eigen:
   for (const llmt::BoostedFeature& feature : sum.features) {
     const auto of = [&](int input) { return (x(input) - model.inputs()[input].centre) / model.deviations()[input]; };
     const bool is_level = feature.level >= 0;
-    z.push_back(is_level              ? (std::isnan(x(feature.first)) ? missing : x(feature.first) == feature.level)
+    z.push_back(is_level              ? (std::isnan(x(feature.first)) ? no_value : x(feature.first) == feature.level)
                 : feature.second >= 0 ? of(feature.first) + feature.sign * of(feature.second)
                                       : of(feature.first));
   }
@@ -72,7 +72,7 @@ llmt::TrainingData mixed(Eigen::Index rows) {
   for (Eigen::Index i = 0; i < rows; ++i) {
     data.inputs(i, 5) = static_cast<double>(random.below(3));
     data.outputs(i, 1) = data.inputs(i, 5) == 1.0 ? 5.0 : data.inputs(i, 0);
-    if (random.uniform() < 0.1) data.inputs(i, 2) = missing;
+    if (random.uniform() < 0.1) data.inputs(i, 2) = no_value;
   }
   data.levels = {{}, {}, {}, {}, {}, {"red", "green", "blue"}};
   data.input_names = {"a", "b", "c", "d", "e", "colour"};
