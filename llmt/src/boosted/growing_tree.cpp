@@ -17,6 +17,9 @@ void TreeGrower::begin(const Eigen::VectorXd& residuals) {
   residuals_.resize(order_.size());
   weights_.resize(order_.size());
   terms_.resize(order_.size());
+  spare_order_.resize(order_.size());
+  spare_residuals_.resize(order_.size());
+  spare_weights_.resize(order_.size());
   double weight = 0.0;
   double sum = 0.0;
   for (std::size_t k = 0; k < order_.size(); ++k) {
@@ -93,26 +96,21 @@ TreeGrower::Choice TreeGrower::best_split(std::span<const int> leaves, const std
 void TreeGrower::split_rows(int index) {
   GrowingNode& node = tree_[index];
   const std::vector<std::uint8_t>& codes = rows_.features[node.feature].codes;
-  std::vector<int> right_rows;
-  std::vector<double> right_residuals;
-  std::vector<double> right_weights;
+  // Rows of the right side wait in the same places of the spare lists: other nodes have other places.
   Eigen::Index left = node.begin;
+  Eigen::Index right = node.begin;
   for (Eigen::Index k = node.begin; k < node.end; ++k) {
     const std::uint8_t code = codes[order_[k]];
-    if (code == missing_code ? node.missing_left : code <= node.bin) {
-      order_[left] = order_[k];
-      residuals_[left] = residuals_[k];
-      weights_[left] = weights_[k];
-      ++left;
-    } else {
-      right_rows.push_back(order_[k]);
-      right_residuals.push_back(residuals_[k]);
-      right_weights.push_back(weights_[k]);
-    }
+    const bool is_left = code == missing_code ? node.missing_left : code <= node.bin;
+    spare_order_[right] = order_[left] = order_[k];
+    spare_residuals_[right] = residuals_[left] = residuals_[k];
+    spare_weights_[right] = weights_[left] = weights_[k];
+    left += is_left ? 1 : 0;
+    right += is_left ? 0 : 1;
   }
-  std::ranges::copy(right_rows, order_.begin() + left);
-  std::ranges::copy(right_residuals, residuals_.begin() + left);
-  std::ranges::copy(right_weights, weights_.begin() + left);
+  std::copy(spare_order_.begin() + node.begin, spare_order_.begin() + right, order_.begin() + left);
+  std::copy(spare_residuals_.begin() + node.begin, spare_residuals_.begin() + right, residuals_.begin() + left);
+  std::copy(spare_weights_.begin() + node.begin, spare_weights_.begin() + right, weights_.begin() + left);
   GrowingNode& l = tree_[node.left];
   GrowingNode& r = tree_[node.right];
   l.begin = node.begin;
@@ -250,6 +248,7 @@ void TreeGrower::grow_free(Random& random) {
     split(std::vector<int>{leaf}, std::vector<Choice>{*best});
     best_of[leaf] = {0.0, -1, 0, false};
     best_of.resize(tree_.size());
+    if (leaves + 1 == options_.leaves) return;
     const GrowingNode& node = tree_[leaf];
     for (Eigen::Index k = node.begin; k < node.end; ++k) {
       terms_[k] = packed(residuals_[k], weights_[k], units_);

@@ -120,6 +120,9 @@ class TreeGrower {
   std::vector<double> residuals_;  // of the node's own model, in that order
   std::vector<double> weights_;    // in that order
   std::vector<PackedSum> terms_;   // in that order
+  std::vector<int> spare_order_;
+  std::vector<double> spare_residuals_;
+  std::vector<double> spare_weights_;
   PackedUnits units_;
   std::vector<SoftRows> soft_rows_;  // of each node that is a leaf; empty: the tree is crisp
 };

@@ -19,13 +19,14 @@ PackedUnits units_of(std::span<const double> residuals, std::span<const double> 
   if (!equal_weights) units.weight = weight / most_weight;
   units.most = 2.0 * most_residual / static_cast<double>(residuals.size());
   if (largest > 0.0) units.residual = 2.0 * largest / units.most;
+  units.per_residual = 1.0 / units.residual;
   return units;
 }
 
 PackedSum packed(double residual, double weight, const PackedUnits& units) {
-  const auto whole_weight = static_cast<std::int64_t>(std::floor(weight / units.weight + 0.5));
-  const auto whole_residual = static_cast<std::int64_t>(
-      std::floor(std::clamp(residual * weight / units.residual, -units.most, units.most) + 0.5));
+  const auto whole_weight = static_cast<std::int64_t>(weight / units.weight + 0.5);
+  const double units_of_residual = std::clamp(residual * weight * units.per_residual, -units.most, units.most);
+  const auto whole_residual = static_cast<std::int64_t>(units_of_residual + std::copysign(0.5, units_of_residual));
   return (whole_weight << residual_bits) + whole_residual;
 }
 

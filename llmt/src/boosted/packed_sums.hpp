@@ -24,7 +24,8 @@ inline constexpr std::int64_t most_boosted_rows = std::int64_t{1} << 24;
 struct PackedUnits {
   double weight = 1.0;
   double residual = 1.0;
-  double most = 0.0;  ///< units of residual that a row may have; more are cut, so that no sum overflows
+  double per_residual = 1.0;  ///< 1 / residual
+  double most = 0.0;          ///< units of residual that a row may have; more are cut, so that no sum overflows
 };
 
 /// Units in which the sums over all rows stay within their bits.
