@@ -4,6 +4,7 @@
 #include <optional>
 #include <stdexcept>
 
+#include "llmt/boost_command.hpp"
 #include "llmt/commands.hpp"
 #include "llmt/fit.hpp"
 #include "llmt/fit_options.hpp"
@@ -29,6 +30,7 @@ struct FitArguments {
   bool json = false;
   bool no_intervals = false;
   bool stream = false;
+  bool boost = false;
   std::string readable;  ///< the loss in per cent; empty: none is asked for
   ReportFiles reports;
 };
@@ -164,10 +166,17 @@ void add_fit(CLI::App& app) {
   add_report_options(*command, arguments->reports, "predicted against observed");
   command->add_flag("--json", arguments->json, "Print the summary as JSON");
   command->add_flag("--stream", arguments->stream, "Learn row by row in constant memory");
+  command->add_flag("--boost", arguments->boost,
+                    "A sum of many small trees, each fitted to what those before it leave: more accurate than one tree "
+                    "as a rule, and nobody reads it");
   command->callback([command, arguments] {
     require_target(arguments->learning);
     if (arguments->stream) {
       stream_command(*command, {arguments->learning, arguments->output, arguments->json});
+      return;
+    }
+    if (arguments->boost) {
+      boost_command(*command, {arguments->learning, arguments->output, arguments->json});
       return;
     }
     fit_command(*arguments);

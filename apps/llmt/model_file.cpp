@@ -2,6 +2,7 @@
 
 #include <exception>
 #include <filesystem>
+#include <fstream>
 #include <stdexcept>
 
 #include "llmt/csv.hpp"
@@ -34,5 +35,14 @@ ModelWithIntervals load_model(const std::string& path, bool with_intervals) {
 }
 
 Model load_model(const std::string& path) { return load_model(path, false).model; }
+
+bool is_boosted_file(const std::string& path) {
+  std::error_code unknown;
+  if (!std::filesystem::is_regular_file(path, unknown) || !is_json_file(path)) return false;
+  std::ifstream file(path, std::ios::binary);
+  std::string begin(200, ' ');
+  file.read(begin.data(), static_cast<std::streamsize>(begin.size()));
+  return begin.find("\"llmt-boosted-model\"") != std::string::npos;
+}
 
 }  // namespace llmt::apps

@@ -7,6 +7,7 @@
 #include <optional>
 #include <stdexcept>
 
+#include "llmt/boosted_model.hpp"
 #include "llmt/commands.hpp"
 #include "llmt/csv.hpp"
 #include "llmt/files.hpp"
@@ -41,30 +42,23 @@ void append_number(std::string& text, DecimalMark mark, double value) {
   text.append(buffer, end.ptr);
 }
 
-report::Prediction predict_table(const PredictArguments& arguments, const ModelWithIntervals& file, const Csv& csv) {
-  const Model& model = file.model;
-  const report::ModelInputs inputs = report::read_inputs(csv, model, arguments.threads);
+// What trees and sums of trees say of the rows alike.
+template <class AnyModel>
+report::Prediction predict_values(const PredictArguments& arguments, const AnyModel& model,
+                                  const report::ModelInputs& inputs) {
   report::Prediction predicted;
   for (const OutputColumn& output : model.outputs()) {
     predicted.targets.push_back(output.name);
   }
   predicted.values = model.predict(inputs.values, arguments.threads);
-  predicted.extrapolation = model.extrapolation(inputs.values, arguments.threads);
   predicted.missing = inputs.missing;
   predicted.unknown = inputs.unknown;
   predicted.unseen_codes = inputs.unseen_codes;
-  if (arguments.interval > 0.0) {
-    if (file.intervals.empty()) {
-      throw std::runtime_error(fmt::format(
-          "{}: the file has no held-out residuals; fit without --no-intervals and with folds", arguments.model));
-    }
-    try {
-      predicted.bounds = file.intervals.predict(inputs.values, arguments.interval, arguments.threads);
-    } catch (const std::invalid_argument& error) {  // too few rows for the level: the model's fault, not the caller's
-      throw std::runtime_error(fmt::format("{}: {}", arguments.model, error.what()));
-    }
-  }
-  predicted.rmse = Eigen::VectorXd::Constant(model.num_outputs(), std::nan(""));
+  return predicted;
+}
+
+void add_errors(const PredictArguments& arguments, const Csv& csv, report::Prediction& predicted) {
+  predicted.rmse = Eigen::VectorXd::Constant(std::ssize(predicted.targets), std::nan(""));
   for (std::size_t o = 0; o < predicted.targets.size(); ++o) {
     if (csv.has(predicted.targets[o]) && csv.rows() > 0) {
       const Eigen::Index column = o;
@@ -76,6 +70,34 @@ report::Prediction predict_table(const PredictArguments& arguments, const ModelW
       }
     }
   }
+}
+
+report::Prediction predict_table(const PredictArguments& arguments, const BoostedModel& model, const Csv& csv) {
+  const report::ModelInputs inputs = report::read_inputs(csv, model, arguments.threads);
+  report::Prediction predicted = predict_values(arguments, model, inputs);
+  predicted.has_leverage = false;
+  for (const double distance : distance_outside(model, inputs.values)) predicted.extrapolation.push_back({distance});
+  add_errors(arguments, csv, predicted);
+  return predicted;
+}
+
+report::Prediction predict_table(const PredictArguments& arguments, const ModelWithIntervals& file, const Csv& csv) {
+  const Model& model = file.model;
+  const report::ModelInputs inputs = report::read_inputs(csv, model, arguments.threads);
+  report::Prediction predicted = predict_values(arguments, model, inputs);
+  predicted.extrapolation = model.extrapolation(inputs.values, arguments.threads);
+  if (arguments.interval > 0.0) {
+    if (file.intervals.empty()) {
+      throw std::runtime_error(fmt::format(
+          "{}: the file has no held-out residuals; fit without --no-intervals and with folds", arguments.model));
+    }
+    try {
+      predicted.bounds = file.intervals.predict(inputs.values, arguments.interval, arguments.threads);
+    } catch (const std::invalid_argument& error) {  // too few rows for the level: the model's fault, not the caller's
+      throw std::runtime_error(fmt::format("{}: {}", arguments.model, error.what()));
+    }
+  }
+  add_errors(arguments, csv, predicted);
   return predicted;
 }
 
@@ -88,7 +110,8 @@ void write_csv(const Csv& csv, const report::Prediction& predicted, const TextSi
       added.insert(added.end(), {target + "_low", target + "_high"});
     }
   }
-  added.insert(added.end(), {"outside", "outside_by", "leverage"});
+  added.insert(added.end(), {"outside", "outside_by"});
+  if (predicted.has_leverage) added.emplace_back("leverage");
   std::string text(csv.header_text());
   for (const std::string& column : added) {
     if (csv.has(column)) {
@@ -115,8 +138,10 @@ void write_csv(const Csv& csv, const report::Prediction& predicted, const TextSi
     text += extrapolation.distance > 0.0 ? '1' : '0';
     text += csv.separator();
     append_number(text, csv.decimal_mark(), extrapolation.distance);
-    text += csv.separator();
-    append_number(text, csv.decimal_mark(), extrapolation.leverage);
+    if (predicted.has_leverage) {
+      text += csv.separator();
+      append_number(text, csv.decimal_mark(), extrapolation.leverage);
+    }
     text += '\n';
     if (constexpr std::size_t piece = 1 << 16; text.size() >= piece) {
       sink(text);
@@ -126,26 +151,43 @@ void write_csv(const Csv& csv, const report::Prediction& predicted, const TextSi
   sink(text);
 }
 
-void predict_command(const PredictArguments& arguments) {
+report::Prediction predict_file(const PredictArguments& arguments, std::optional<Csv>& csv) {
+  const auto read = [&] {
+    csv.emplace(read_table(arguments.data, arguments.mark, arguments.thousands));
+    if (csv->rows() == 0) throw std::runtime_error(fmt::format("{}: there is a header and no rows", csv->name()));
+  };
+  if (is_boosted_file(arguments.model)) {
+    if (arguments.interval > 0.0) {
+      throw std::runtime_error(
+          fmt::format("{}: --interval is not for a boosted model; fit without --boost for intervals", arguments.model));
+    }
+    const BoostedModel model = load_boosted(arguments.model);
+    read();
+    return predict_table(arguments, model, *csv);
+  }
   const ModelWithIntervals file =
       read_unless_exchanged(arguments.model, arguments.data, model_comes_first,
                             [&](const std::string& path) { return load_model(path, arguments.interval > 0.0); });
-  const Csv csv = read_table(arguments.data, arguments.mark, arguments.thousands);
-  if (csv.rows() == 0) throw std::runtime_error(fmt::format("{}: there is a header and no rows", csv.name()));
-  const report::Prediction predicted = predict_table(arguments, file, csv);
+  read();
+  return predict_table(arguments, file, *csv);
+}
+
+void predict_command(const PredictArguments& arguments) {
+  std::optional<Csv> csv;
+  const report::Prediction predicted = predict_file(arguments, csv);
   if (const Eigen::Index count = report::count_not_finite(predicted); count > 0) {
     warn(fmt::format("llmt: warning: {} of {} predictions are not finite: numbers of {} are too large for these rows",
                      count, predicted.values.size(), arguments.model));
   }
   if (!arguments.output.empty()) {
-    write_file(arguments.output, [&](const TextSink& sink) { write_csv(csv, predicted, sink); });
+    write_file(arguments.output, [&](const TextSink& sink) { write_csv(*csv, predicted, sink); });
   }
   if (arguments.json) {
     print_json(report::prediction_json(predicted, arguments.output.empty()));
     return;
   }
   if (arguments.output.empty()) {
-    write_csv(csv, predicted, print_bytes);
+    write_csv(*csv, predicted, print_bytes);
   }
   warn(report::prediction_text(predicted, table_name(arguments.data)));
 }
@@ -158,7 +200,8 @@ void add_predict(CLI::App& app) {
       "Apply a model to a table\n"
       "Writes the table's rows, in order, with more columns. TARGET_pred: the prediction. outside: 1 where an input "
       "lies outside its range in training. outside_by: how far, as a multiple of that range. leverage: of the row on "
-      "its local models; 1 and more is extrapolation. If the table holds a target, its RMSE is reported.");
+      "its local models; 1 and more is extrapolation (not of a boosted model). If the table holds a target, its RMSE "
+      "is reported.");
   command->footer("Example: llmt predict concrete.json new.csv -o predicted.csv");
   const auto arguments = std::make_shared<PredictArguments>();
   add_input_file(*command, "model", arguments->model, "Model file of llmt fit")->required();

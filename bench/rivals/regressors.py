@@ -58,7 +58,8 @@ class Llmt(Program):
     def fit(self, x, y):
         summary = json.loads(self.run(self.program, "fit", self.write("train.csv", x, y), "--target", "y", "--threads",
                                       "1", "--json", "-o", self.path("model.json"), *self.options))
-        self.leaves = summary["partitions"][0]["leaves"]
+        if "partitions" in summary:
+            self.leaves = summary["partitions"][0]["leaves"]
 
     def predict(self, x):
         answer = self.run(self.program, "predict", self.path("model.json"), self.write("test.csv", x))
@@ -90,6 +91,7 @@ class M5P(Program):
 
 REGRESSORS = {
     "llmt": (None, Llmt),
+    "llmt (boost)": (None, lambda: Llmt("--boost")),
     "llmt (crisp)": (None, lambda: Llmt("--validity", "crisp")),
     "ChimeraBoost": ("chimeraboost", lambda: ChimeraBoostRegressor(thread_count=1, random_state=0)),
     "CatBoost": ("catboost", lambda: CatBoostRegressor(

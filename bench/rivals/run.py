@@ -48,6 +48,8 @@ def arguments():
     parser.add_argument("--results", default=ROOT / "build/rivals.jsonl", type=pathlib.Path,
                         help="file of all fits; default: %(default)s")
     parser.add_argument("--table", action="store_true", help="print the tables of all results")
+    parser.add_argument("--base", metavar="NAME", default="llmt",
+                        help="with --table: whose errors and times the others are divided by; default: %(default)s")
     return parser.parse_args()
 
 
@@ -145,7 +147,8 @@ def measure(options):
     if unknown := set(names) - set(REGRESSORS):
         sys.exit(f"run.py: no regressor {', '.join(sorted(unknown))}; there are: {'; '.join(REGRESSORS)}")
     # What the machine lacks is not a failed fit, which would be kept.
-    for name, path in {"llmt": options.llmt, "llmt (crisp)": options.llmt, "M5P": WEKA}.items():
+    for name, path in {"llmt": options.llmt, "llmt (boost)": options.llmt, "llmt (crisp)": options.llmt,
+                       "M5P": WEKA}.items():
         if name in names and not os.path.exists(path):
             sys.exit(f"run.py: {name} needs {path}, which is not there")
     if "ChimeraBoost" in names:
@@ -173,14 +176,14 @@ def number(value):
     return f"{value:.0f}" if value >= 1000 else f"{value:#.4g}"
 
 
-def summarise(results):
-    """data -> regressor -> splits, means over them, and the ratios to llmt on the same splits."""
+def summarise(results, base):
+    """data -> regressor -> splits, means over them, and the ratios to `base` on the same splits."""
     summary = {}
     for (data, split, regressor), line in results.items():
         if "rmse" in line:
             summary.setdefault(data, {}).setdefault(regressor, {})[split] = line
     for rows in summary.values():
-        own = rows.get("llmt", {})
+        own = rows.get(base, {})
         for regressor, lines in rows.items():
             rows[regressor] = {"splits": sorted(lines)} | {
                 key: next(iter(lines.values()))[key] for key in ("version", "rows", "inputs")}
@@ -223,7 +226,7 @@ def print_sets(summary, sets, names):
                    [[name, *(cell(summary[data].get(name)) for data in sets)] for name in names])
 
 
-def print_means(summary, sets, names):
+def print_means(summary, sets, names, base):
     ranked = [name for name in names if all(name in summary[data] for data in sets)]
 
     def rank(data, name):
@@ -241,7 +244,7 @@ def print_means(summary, sets, names):
         median = statistics.median(row["rmse ratio"] for row in own)
         rows.append([name, own[0]["version"], f"{len(own)} x {len(own[0]['splits'])}", ranks, f"{median:.3f}",
                      f"{mean(own, 'rmse ratio'):.3f}", f"{mean(own, 'fit_cpu ratio'):.2g}"])
-    print_markdown(f"Over the sets: mean rank among {len(ranked)}; median and geometric mean of the ratios to llmt",
+    print_markdown(f"Over the sets: mean rank among {len(ranked)}; median and geometric mean of the ratios to {base}",
                    ["", "version", "sets x splits", "mean rank", "RMSE, median", "RMSE, mean", "CPU, mean"], rows)
 
 
@@ -253,10 +256,10 @@ def print_functions(summary, functions, names):
                    [[name, *(cell(summary[data].get(name)) for data in functions)] for name in names])
 
 
-def print_tables(results):
+def print_tables(results, base):
     from regressors import REGRESSORS
 
-    summary = {data: rows for data, rows in summarise(results).items() if "llmt" in rows}
+    summary = {data: rows for data, rows in summarise(results, base).items() if base in rows}
     sets = sorted((data for data in summary if not data.startswith(SYNTHETIC)), key=str.lower)
     functions = sorted(set(summary) - set(sets), key=lambda data: float(data.removeprefix(SYNTHETIC)))
 
@@ -264,9 +267,10 @@ def print_tables(results):
         return [name for name in REGRESSORS if any(name in summary[one] for one in data)]
 
     if sets:
-        print_readme(summary, sets)
+        if base == "llmt":
+            print_readme(summary, sets)
         print_sets(summary, sets, measured(sets))
-        print_means(summary, sets, measured(sets))
+        print_means(summary, sets, measured(sets), base)
     if functions:
         print_functions(summary, functions, measured(functions))
     for (data, split, regressor), line in results.items():
@@ -287,7 +291,7 @@ def main():
     if pathlib.Path(sys.prefix) != ENVIRONMENT:
         os.execve(python, [python, *sys.argv], os.environ | ONE_THREAD)
     if options.table:
-        return print_tables(read_results(options.results))
+        return print_tables(read_results(options.results), options.base)
     return measure(options)
 
 

@@ -60,10 +60,10 @@ Json prediction_json(const Prediction& prediction, bool with_values) {
   }
   if (!with_values) return json;
   json["outside_by"] = Json::array();
-  json["leverage"] = Json::array();
+  if (prediction.has_leverage) json["leverage"] = Json::array();
   for (const Extrapolation& row : prediction.extrapolation) {
     json["outside_by"].push_back(std::isfinite(row.distance) ? Json(row.distance) : Json("infinity"));
-    json["leverage"].push_back(row.leverage);
+    if (prediction.has_leverage) json["leverage"].push_back(row.leverage);
   }
   return json;
 }

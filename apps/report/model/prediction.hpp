@@ -18,6 +18,7 @@ struct Prediction {
   std::vector<std::string> targets;
   Eigen::MatrixXd values;  ///< rows x targets
   std::vector<Extrapolation> extrapolation;
+  bool has_leverage = true;  ///< not of boosted models
   std::optional<Bounds> bounds;
   Eigen::Index missing = 0;       ///< cells, as ModelInputs
   Eigen::Index unknown = 0;       ///< as ModelInputs

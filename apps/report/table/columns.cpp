@@ -230,15 +230,17 @@ LearningColumns read_learning_columns(const Csv& csv, const ColumnRoles& roles, 
   return result;
 }
 
-ModelInputs read_inputs(const Csv& csv, const Model& model, int max_threads) {
+namespace {
+
+ModelInputs read_inputs(const Csv& csv, const std::vector<InputColumn>& model_inputs, const std::vector<bool>& used,
+                        int max_threads) {
   std::vector<std::string> columns;
   std::vector<std::string> categorical;
   std::vector<Eigen::Index> column_of;  // per categorical column
   std::vector<Numbering> levels;
-  const std::vector<bool> used = used_inputs(model);
   std::vector<Eigen::Index> input_of;  // per column read
-  for (Eigen::Index j = 0; j < model.num_inputs(); ++j) {
-    const InputColumn& input = model.inputs()[j];
+  for (Eigen::Index j = 0; j < std::ssize(model_inputs); ++j) {
+    const InputColumn& input = model_inputs[j];
     if (!used[j] && !csv.has(input.name)) continue;
     if (input.is_categorical() && input.codes.empty()) {
       column_of.push_back(std::ssize(columns));
@@ -255,7 +257,7 @@ ModelInputs read_inputs(const Csv& csv, const Model& model, int max_threads) {
   ModelInputs inputs{std::move(values)};
   std::vector<Eigen::Index> bad;
   for (std::size_t i = 0; i < columns.size(); ++i) {
-    const InputColumn& input = model.inputs()[input_of[i]];
+    const InputColumn& input = model_inputs[input_of[i]];
     const std::vector<double>& codes = input.codes;
     const bool is_number = !input.is_categorical() || !codes.empty();
     for (Eigen::Index row = 0; row < csv.rows() && !codes.empty(); ++row) {
@@ -271,12 +273,22 @@ ModelInputs read_inputs(const Csv& csv, const Model& model, int max_threads) {
     inputs.values(row, column_of[i]) = found == levels[i].end() ? no_value : static_cast<double>(found->second);
     inputs.unknown += !text.empty() && found == levels[i].end() ? 1 : 0;
   });
-  if (std::ssize(columns) < model.num_inputs()) {
-    Eigen::MatrixXd all = Eigen::MatrixXd::Constant(csv.rows(), model.num_inputs(), no_value);
+  if (std::ssize(columns) < std::ssize(model_inputs)) {
+    Eigen::MatrixXd all = Eigen::MatrixXd::Constant(csv.rows(), std::ssize(model_inputs), no_value);
     all(Eigen::all, input_of) = inputs.values;
     inputs.values = std::move(all);
   }
   return inputs;
+}
+
+}  // namespace
+
+ModelInputs read_inputs(const Csv& csv, const Model& model, int max_threads) {
+  return read_inputs(csv, model.inputs(), used_inputs(model), max_threads);
+}
+
+ModelInputs read_inputs(const Csv& csv, const BoostedModel& model, int max_threads) {
+  return read_inputs(csv, model.inputs(), used_inputs(model), max_threads);
 }
 
 }  // namespace llmt::report

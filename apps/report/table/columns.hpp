@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "llmt/boosted_model.hpp"
 #include "llmt/csv.hpp"
 #include "llmt/model.hpp"
 
@@ -76,5 +77,6 @@ struct ModelInputs {
   Eigen::Index unseen_codes = 0;  ///< cells with a number that is none of InputColumn::codes
 };
 ModelInputs read_inputs(const Csv& csv, const Model& model, int max_threads);
+ModelInputs read_inputs(const Csv& csv, const BoostedModel& model, int max_threads);
 
 }  // namespace llmt::report

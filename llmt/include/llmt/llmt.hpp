@@ -5,6 +5,8 @@
 ///     for (const llmt::Leaf& leaf : learnt.leaves(0)) std::printf("%td rows\n", leaf.samples);
 #pragma once
 
+#include "llmt/boosted.hpp"
+#include "llmt/boosted_model.hpp"
 #include "llmt/c_source.hpp"
 #include "llmt/compare.hpp"
 #include "llmt/csv.hpp"

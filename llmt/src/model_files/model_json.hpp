@@ -15,12 +15,19 @@ inline constexpr int model_format_version_with_range = 3;
 /// Of a file with codes, which earlier programs would take for positions.
 inline constexpr int model_format_version_with_codes = 4;
 
+/// The format of boosted models, which this is no version of.
+inline constexpr const char* boosted_format_name = "llmt-boosted-model";
+inline constexpr int boosted_format_version = 1;
+
 /// The value that to_json() writes.
 Json json_of(const Model& model);
 
 /// The text of a value, as model files have it. Throws std::runtime_error if a name is not valid UTF-8, and if it would
 /// be refused where it is read: beyond most_model_values or model_limit.
 std::string model_text(const Json& json);
+
+/// The same on one line, for a sum of trees, of which nobody reads the file.
+std::string compact_text(const Json& json);
 
 /// The model in a value, whatever other members it has. Throws std::runtime_error with the way to the part that cannot
 /// be accepted.

@@ -79,6 +79,10 @@ Validity validity_from_json(const JsonReader& json) {
 
 // Returns the version.
 int check_format(const JsonReader& root) {
+  if (root.has("format") && root.member("format").is_text() &&
+      root.member("format").as<std::string>() == boosted_format_name) {
+    root.fail("a boosted model, the sum of many trees; one tree is needed here: fit without --boost");
+  }
   if (!root.has("format") || root.member("format").as<std::string>() != model_format_name) {
     root.fail(fmt::format("not a model file: \"format\" is not \"{}\"", model_format_name));
   }

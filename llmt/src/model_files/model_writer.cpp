@@ -130,6 +130,19 @@ std::size_t values_in(const Json& json) {
       size, what, model_limit.bytes >> 20, most_model_values));
 }
 
+// `indent`: of a line, as nlohmann's dump() takes it; -1: one line.
+std::string text_of(const Json& json, int indent) {
+  if (const std::size_t values = values_in(json); values > most_model_values) refuse_size(values, "values");
+  std::string text;
+  try {
+    text = json.dump(indent) + "\n";
+  } catch (const Json::type_error&) {
+    throw std::runtime_error("llmt::to_json: a column name is not valid UTF-8");
+  }
+  if (text.size() > model_limit.bytes) refuse_size(text.size(), "bytes");
+  return text;
+}
+
 }  // namespace
 
 Json json_of(const Model& model) {
@@ -155,17 +168,9 @@ Json json_of(const Model& model) {
   return json;
 }
 
-std::string model_text(const Json& json) {
-  if (const std::size_t values = values_in(json); values > most_model_values) refuse_size(values, "values");
-  std::string text;
-  try {
-    text = json.dump(1) + "\n";
-  } catch (const Json::type_error&) {
-    throw std::runtime_error("llmt::to_json: a column name is not valid UTF-8");
-  }
-  if (text.size() > model_limit.bytes) refuse_size(text.size(), "bytes");
-  return text;
-}
+std::string model_text(const Json& json) { return text_of(json, 1); }
+
+std::string compact_text(const Json& json) { return text_of(json, -1); }
 
 std::string to_json(const Model& model) { return model_text(json_of(model)); }
 

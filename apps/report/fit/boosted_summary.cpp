@@ -1,0 +1,48 @@
+#include "report/fit/boosted_summary.hpp"
+
+#include <fmt/format.h>
+
+namespace llmt::report {
+
+Json boosted_json(const BoostedRun& run, const BoostResult& result) {
+  Json json = {{"data", run.data}, {"rule", "boost"}, {"inputs", Json::array()}, {"sums", Json::array()}};
+  for (const InputColumn& input : result.model.inputs()) json["inputs"].push_back(input.name);
+  for (std::size_t o = 0; o < result.summaries.size(); ++o) {
+    const BoostSummary& summary = result.summaries[o];
+    Json compared = Json::array();
+    for (const BoostVariant& variant : summary.compared) {
+      compared.push_back({{"name", variant.name}, {"rmse", finite_or_null(variant.rmse)}});
+    }
+    json["sums"].push_back({{"target", result.model.outputs()[o].name},
+                            {"rows", summary.rows},
+                            {"held_out_rows", summary.held_out},
+                            {"held_out_rmse", finite_or_null(summary.rmse)},
+                            {"train_rmse", finite_or_null(summary.train_rmse)},
+                            {"variant", summary.variant},
+                            {"compared", std::move(compared)},
+                            {"trees", summary.trees},
+                            {"rate", result.model.sums()[o].rate}});
+  }
+  json["model"] = run.output.empty() ? Json(nullptr) : Json(run.output);
+  return json;
+}
+
+std::string boosted_text(const BoostedRun& run, const BoostResult& result, std::size_t width) {
+  std::string text = fmt::format("{}: {} rows, {} inputs; a sum of trees for each target\n", run.data,
+                                 result.summaries.front().rows, result.model.num_inputs());
+  Table table({"target", "trees", "number", "rate", "RMSE held out", "RMSE in-sample", "rows held out"});
+  for (std::size_t o = 0; o < result.summaries.size(); ++o) {
+    const BoostSummary& summary = result.summaries[o];
+    table.add({result.model.outputs()[o].name, summary.variant, fmt::format("{}", summary.trees),
+               number(result.model.sums()[o].rate), number(summary.rmse), number(summary.train_rmse),
+               fmt::format("{}", summary.held_out)});
+  }
+  text += table.text(width);
+  return text +
+         wrapped(
+             "The held-out error is of trees fitted without those rows; they also decided when boosting stopped, "
+             "so it is slightly too small.\n",
+             width);
+}
+
+}  // namespace llmt::report

@@ -1,0 +1,66 @@
+/// \file
+/// Boosting: a sum of many small local linear model trees, each fitted to what the trees before it leave. More accurate
+/// than one tree where the truth has many steps; nobody reads it. docs/algorithms/boosting.md has the equations.
+///
+///     const llmt::BoostResult result = llmt::fit_boosted({inputs, outputs});
+///     const double error = result.summaries[0].rmse;   // on held-out rows
+///     llmt::save(result.model, "model.json");
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "llmt/abi.hpp"
+#include "llmt/boosted_model.hpp"
+#include "llmt/progress.hpp"
+#include "llmt/training_data.hpp"
+
+namespace llmt {
+
+struct BoostOptions {
+  /// Factor on every tree. 0: 0.05 below 10 000 rows, else 0.07; 0.3 where the trees are soft.
+  double rate = 0.0;
+  int max_rounds = 2000;   ///< trees of an output at most, before the sum is fitted to all rows
+  std::uint64_t seed = 1;  ///< of the rows that are held out, and of the features that a split looks at
+  int max_threads = 0;     ///< 0: all that the machine has. The result does not depend on it
+};
+
+/// A variant of the trees, and its error on the held-out rows after the same few rounds as the others.
+struct BoostVariant {
+  std::string name;  ///< "symmetric", "free", "symmetric with pairs", ...
+  double rmse = 0.0;
+};
+
+/// How the sum of one output was made.
+struct BoostSummary {
+  Eigen::Index rows = 0;               ///< that the sum is fitted to; equal rows count once
+  Eigen::Index held_out = 0;           ///< rows that decided the variant and the number of trees
+  double rmse = 0.0;                   ///< on these, of the trees fitted without them, in the output's unit
+  std::string variant;                 ///< the one taken
+  std::vector<BoostVariant> compared;  ///< empty below 5000 rows: symmetric trees
+  Eigen::Index trees = 0;
+  double train_rmse = 0.0;
+};
+
+struct BoostResult {
+  BoostedModel model;
+  std::vector<BoostSummary> summaries;  ///< one an output
+};
+
+/// Fits a sum of trees to each output.
+///
+/// A fifth of the rows is held out, whole groups of them. They decide which trees are taken and when boosting stops.
+/// Then the sum is fitted to all rows with a quarter more trees. With TrainingData::held_out these rows decide instead,
+/// and the sum of the other rows is the result.
+///
+/// Inputs may be missing (NaN). A category is taken as the indicators of its levels. Weights are as for fit(); a row of
+/// the weight k is k equal rows, to the byte. Up to the values of the seed, the result does not depend on the scale of
+/// outputs and inputs, nor on the number of threads, for which it is the same to the byte.
+///
+/// Throws std::invalid_argument as fit(), for fewer than 10 different rows, and for a categorical input of more than 50
+/// levels.
+BoostResult fit_boosted(const TrainingData& data, const BoostOptions& options = {}, const Progress& progress = {});
+
+}  // namespace llmt

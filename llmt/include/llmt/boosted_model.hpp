@@ -1,0 +1,113 @@
+/// \file
+/// A boosted model: the sum of many small local linear model trees. docs/algorithms/boosting.md has the equations.
+///
+///     const llmt::BoostedModel model = llmt::fit_boosted({inputs, outputs}).model;
+///     const Eigen::MatrixXd predicted = model.predict(new_inputs);
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "llmt/abi.hpp"
+#include "llmt/partition.hpp"
+
+namespace llmt {
+
+/// A number of a row that trees split on and that leaves take as a regressor: a standardised input
+/// z = (x - centre) / deviation, the sum or difference of two, or the indicator (0 or 1) of a level of a categorical
+/// input.
+struct BoostedFeature {
+  int first = 0;
+  int second = -1;    ///< -1: the input alone
+  double sign = 1.0;  ///< of the second input
+  int level = -1;     ///< -1: a number
+
+  bool operator==(const BoostedFeature&) const = default;
+};
+
+/// A leaf's local model has at most this many slopes.
+inline constexpr int most_boosted_slopes = 8;
+
+/// f = constant + sum of slopes . features, held to [low, high].
+struct BoostedLeaf {
+  double constant = 0.0;
+  double low = 0.0;
+  double high = 0.0;
+  std::vector<int> features = {};  ///< indices into BoostedSum::features
+  std::vector<double> slopes = {};
+};
+
+/// z <= threshold of a feature goes to the left. With a half width h > 0 the rows with |z - threshold| < h go to both
+/// sides, to the right with the weight 1/2 + u (3 - u^2) / 4, u = (z - threshold) / h.
+struct BoostedSplit {
+  int feature = 0;
+  double threshold = 0.0;
+  double half_width = 0.0;
+  bool missing_left = false;
+  int left = 0;  ///< a split below this one; or -1 - k: leaf k
+  int right = 0;
+};
+
+/// One tree; the first split is the root. Without splits there is one leaf.
+struct BoostedTree {
+  std::vector<BoostedSplit> splits;
+  std::vector<BoostedLeaf> leaves;
+};
+
+/// The trees of one output: y = base + rate . sum of trees.
+struct BoostedSum {
+  double base = 0.0;
+  double rate = 1.0;
+  std::vector<BoostedFeature> features;
+  std::vector<BoostedTree> trees;
+};
+
+/// A sum of trees for each output: immutable, safe to use from many threads.
+class BoostedModel {
+ public:
+  /// Throws std::invalid_argument naming the part that does not fit: another number of sums than outputs, an index out
+  /// of range, a tree that is none, a number that is not finite, two columns of one name.
+  BoostedModel(std::vector<InputColumn> inputs, std::vector<OutputColumn> outputs, std::vector<double> deviations,
+               std::vector<BoostedSum> sums);
+
+  Eigen::Index num_inputs() const { return std::ssize(inputs_); }
+  Eigen::Index num_outputs() const { return std::ssize(outputs_); }
+  const std::vector<InputColumn>& inputs() const { return inputs_; }
+  const std::vector<OutputColumn>& outputs() const { return outputs_; }
+  const std::vector<double>& deviations() const { return deviations_; }  ///< by which inputs are divided
+  const std::vector<BoostedSum>& sums() const { return sums_; }          ///< one an output
+
+  /// Predictions, rows x outputs, for `inputs` (rows x inputs; NaN: missing). Throws std::invalid_argument if the
+  /// number of columns differs or a value is infinite. Same bytes at any number of threads (0: all), and for a row
+  /// alone or among others.
+  Eigen::MatrixXd predict(const Eigen::Ref<const Eigen::MatrixXd>& inputs, int max_threads = 0) const;
+
+ private:
+  std::vector<InputColumn> inputs_;
+  std::vector<OutputColumn> outputs_;
+  std::vector<double> deviations_;
+  std::vector<BoostedSum> sums_;
+};
+
+/// Of each input of a model, whether a split or a leaf uses it.
+std::vector<bool> used_inputs(const BoostedModel& model);
+
+/// How far each row lies outside of the training rows: the largest excess over the training extent, as a multiple of
+/// that input's training range, see Extrapolation. 0 inside. Throws as BoostedModel::predict().
+std::vector<double> distance_outside(const BoostedModel& model, const Eigen::Ref<const Eigen::MatrixXd>& inputs);
+
+/// The model as JSON text; docs/file-formats.md describes it. Numbers are written so that they read back exactly.
+/// Throws std::runtime_error for a model that load_boosted() would refuse because of its size.
+std::string to_json(const BoostedModel& model);
+
+/// Reads what to_json() wrote; the text may be of any origin. Throws std::runtime_error as from_json().
+BoostedModel boosted_from_json(const std::string& text, const std::string& name = "model");
+
+/// Writes to_json() to a file as save() of a Model does. Throws std::runtime_error naming the path.
+void save(const BoostedModel& model, const std::string& path);
+
+/// Reads a file that save() wrote. Throws std::runtime_error as boosted_from_json(), and for more than 256 MiB.
+BoostedModel load_boosted(const std::string& path);
+
+}  // namespace llmt

@@ -1,0 +1,36 @@
+/// \file
+/// Rounds of boosting on the rows of a fit.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "boosted/growing_tree.hpp"
+#include "llmt/progress.hpp"
+
+namespace llmt {
+
+struct RoundOptions {
+  TreeOptions tree = {};
+  double rate = 0.1;
+  int most_rounds = 2000;
+  int patience = 50;  ///< rounds without a smaller error on held-out rows after which boosting stops
+  int max_threads = 0;
+};
+
+/// Trees on residuals: F = mean; in every round F += rate . tree(y - F).
+struct Rounds {
+  double base = 0.0;
+  std::vector<GrowingTree> trees;
+  double rmse = 0.0;        ///< on the held-out rows, of these trees; NaN without such rows
+  double train_rmse = 0.0;  ///< on the others; with held-out rows, after the last round that was tried
+};
+
+/// Boosts on the rows `train` until the error on `held_out` has not become smaller for `patience` rounds, and keeps the
+/// trees up to the smallest. Without held-out rows it makes most_rounds trees. `structures`: trees whose splits the
+/// first rounds take.
+Rounds boost(const BinnedRows& rows, const Eigen::VectorXd& output, const std::vector<int>& train,
+             const std::vector<int>& held_out, const std::vector<GrowingTree>& structures, const RoundOptions& options,
+             Random& random, Work& work);
+
+}  // namespace llmt

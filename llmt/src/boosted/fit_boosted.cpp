@@ -1,0 +1,236 @@
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <optional>
+
+#include "boosted/boosting.hpp"
+#include "boosted/boosting_data.hpp"
+#include "llmt/boosted.hpp"
+
+namespace llmt {
+namespace {
+
+// docs/algorithms/boosting.md says on which tables these were chosen.
+constexpr Eigen::Index enough_for_races = 5000;
+constexpr Eigen::Index enough_for_fast = 10000;
+constexpr int race_rounds = 50;
+constexpr double race_rate = 0.3;
+constexpr double soft_rate = 0.3;
+constexpr double softness = 0.6;
+constexpr int most_paired = 4;        // inputs whose sums and differences are tried
+constexpr double more_trees = 1.25;   // on all rows, by those that the held-out rows asked for
+constexpr double free_margin = 0.25;  // of 1 / sqrt(held-out rows): by how much a variant must be better
+constexpr double soft_margin = 1.0;
+
+TreeOptions usual_trees(Eigen::Index rows) {
+  TreeOptions tree;
+  const bool few = rows < enough_for_races;
+  tree.slopes = few ? 3 : 5;
+  tree.ridges = {.constant = few ? 3.0 : 1.0, .slope = 1.0};
+  constexpr double train_share = 0.8;
+  constexpr double rows_of_leaf = 16.0;
+  tree.depth = static_cast<int>(
+      std::clamp(std::floor(std::log2(train_share * static_cast<double>(rows) / rows_of_leaf)), 1.0, 6.0));
+  return tree;
+}
+
+// How often each feature is used, counted once a level of a symmetric tree.
+std::vector<int> uses_of(const std::vector<GrowingTree>& trees, std::size_t features) {
+  std::vector<int> uses(features, 0);
+  for (const GrowingTree& tree : trees) {
+    std::vector<std::pair<int, int>> seen;
+    for (const GrowingNode& node : tree) {
+      const std::pair<int, int> split = {node.feature, node.bin};
+      if (node.feature < 0 || std::ranges::count(seen, split) > 0) continue;
+      seen.push_back(split);
+      ++uses[node.feature];
+    }
+  }
+  return uses;
+}
+
+// The numeric inputs that are used most.
+std::vector<int> most_used(const BoostingData& data, const std::vector<int>& uses) {
+  std::vector<int> features;
+  for (int k = 0; k < std::ssize(uses); ++k) {
+    if (data.rows.features[k].feature.level < 0) features.push_back(k);
+  }
+  std::ranges::stable_sort(features, std::greater{}, [&](int k) { return uses[k]; });
+  if (std::ssize(features) > most_paired) features.resize(most_paired);
+  std::vector<int> inputs;
+  for (const int k : features) inputs.push_back(data.rows.features[k].feature.first);
+  std::ranges::sort(inputs);
+  return inputs;
+}
+
+// The fit of one output.
+class OutputFit {
+ public:
+  OutputFit(BoostingData& data, Eigen::Index output, const BoostOptions& options)
+      : data_(data), options_(options), random_(options.seed) {
+    y_ = data.y.col(output);
+    mean_ = y_.dot(data.rows.weights) / data.rows.weights.sum();
+    const Eigen::VectorXd deviations = y_.array() - mean_;
+    scale_ = std::sqrt(deviations.cwiseAbs2().dot(data.rows.weights) / data.rows.weights.sum());
+    if (!(scale_ > 0.0)) scale_ = 1.0;
+    y_ = deviations / scale_;
+  }
+
+  BoostedSum fit(BoostSummary& summary, Work& work) {
+    const Eigen::Index rows = y_.size();
+    rounds_.tree = usual_trees(rows);
+    rounds_.rate = rows < enough_for_fast ? 0.05 : 0.07;
+    rounds_.max_threads = options_.max_threads;
+    name_ = "symmetric";
+    if (rows >= enough_for_races && data_.hold_outs.size() == 1) {
+      Work racing(work, 0.2);
+      race_all(summary, racing);
+    }
+    if (options_.rate > 0.0) rounds_.rate = options_.rate;
+    rounds_.most_rounds = options_.max_rounds;
+    return finish(summary, work);
+  }
+
+ private:
+  Rounds race(const RoundOptions& variant, const std::string& name, BoostSummary& summary, Work& work) {
+    RoundOptions few = variant;
+    few.rate = race_rate;
+    few.most_rounds = race_rounds;
+    Random random(options_.seed);  // the same for all
+    Work part(work, 0.25);
+    const HoldOut& rows = data_.hold_outs.front();
+    Rounds result = boost(data_.rows, y_, rows.train, rows.held_out, {}, few, random, part);
+    summary.compared.push_back({name, result.rmse * scale_});
+    return result;
+  }
+
+  void race_all(BoostSummary& summary, Work& work) {
+    const double noise = 1.0 / std::sqrt(static_cast<double>(data_.hold_outs.front().held_out.size()));
+    const Rounds symmetric = race(rounds_, name_, summary, work);
+    double best = symmetric.rmse;
+    RoundOptions variant = rounds_;
+    variant.tree.symmetric = false;
+    if (const double error = race(variant, "free", summary, work).rmse; error < best * (1.0 - free_margin * noise)) {
+      best = error;
+      rounds_ = variant;
+      name_ = "free";
+    }
+    best = race_pairs(symmetric, best, summary, work);
+    variant = rounds_;
+    variant.tree.symmetric = true;
+    variant.tree.softness = softness;
+    const bool paired = data_.rows.features.size() > usual_;
+    const std::string name = paired ? "soft with pairs" : "soft";
+    if (race(variant, name, summary, work).rmse < best * (1.0 - soft_margin * noise)) {
+      rounds_ = variant;
+      rounds_.rate = soft_rate;
+      name_ = name;
+    }
+  }
+
+  // Sums and differences of the inputs used most.
+  double race_pairs(const Rounds& symmetric, double best, BoostSummary& summary, Work& work) {
+    usual_ = data_.rows.features.size();
+    const std::vector<int> inputs = most_used(data_, uses_of(symmetric.trees, usual_));
+    if (inputs.size() < 2) return best;
+    for (std::size_t i = 0; i < inputs.size(); ++i) {
+      for (std::size_t j = i + 1; j < inputs.size(); ++j) {
+        add_feature(data_, {.first = inputs[i], .second = inputs[j], .sign = 1.0});
+        add_feature(data_, {.first = inputs[i], .second = inputs[j], .sign = -1.0});
+      }
+    }
+    RoundOptions variant = rounds_;
+    const double looked_at = std::max(8.0, static_cast<double>(usual_) / 4.0);
+    variant.tree.columns = std::min(1.0, looked_at / static_cast<double>(data_.rows.features.size()));
+    const std::string name = name_ + " with pairs";
+    const double error = race(variant, name, summary, work).rmse;
+    if (error >= best) {
+      data_.rows.features.resize(usual_);
+      return best;
+    }
+    rounds_ = variant;
+    name_ = name;
+    return error;
+  }
+
+  BoostedSum finish(BoostSummary& summary, Work& work) {
+    Rounds rounds;
+    double squares = 0.0;
+    double held_out = 0.0;
+    double trees = 0.0;
+    const double share = (data_.is_hold_out_given ? 1.0 : 0.5) / static_cast<double>(data_.hold_outs.size());
+    const double left = work.left();
+    for (const HoldOut& rows : data_.hold_outs) {
+      Work part(work, share * left);
+      rounds = boost(data_.rows, y_, rows.train, rows.held_out, {}, rounds_, random_, part);
+      const double weight = data_.rows.weights(rows.held_out).sum();
+      squares += weight * rounds.rmse * rounds.rmse;
+      held_out += weight;
+      trees += static_cast<double>(rounds.trees.size()) / static_cast<double>(data_.hold_outs.size());
+      summary.held_out += std::ssize(rows.held_out);
+    }
+    std::vector<int> fitted = data_.hold_outs.front().train;
+    if (!data_.is_hold_out_given) {
+      fitted.resize(y_.size());
+      std::iota(fitted.begin(), fitted.end(), 0);
+      RoundOptions all = rounds_;
+      all.most_rounds = static_cast<int>(std::ceil(more_trees * std::round(trees)));
+      const bool keep = rounds_.tree.symmetric && y_.size() >= enough_for_races;
+      Work part(work, work.left());
+      rounds = boost(data_.rows, y_, fitted, {}, keep ? rounds.trees : std::vector<GrowingTree>(), all, random_, part);
+    }
+    summary.rows = std::ssize(fitted);
+    summary.rmse = std::sqrt(squares / held_out) * scale_;
+    summary.variant = name_;
+    summary.trees = std::ssize(rounds.trees);
+    summary.train_rmse = rounds.train_rmse * scale_;
+    return in_units(rounds);
+  }
+
+  // In the unit of the output.
+  BoostedSum in_units(const Rounds& rounds) const {
+    BoostedSum sum{.base = mean_ + scale_ * rounds.base, .rate = rounds_.rate, .features = {}, .trees = {}};
+    for (const BinnedFeature& feature : data_.rows.features) sum.features.push_back(feature.feature);
+    for (const GrowingTree& growing : rounds.trees) {
+      BoostedTree tree = finished(growing, data_.rows);
+      for (BoostedLeaf& leaf : tree.leaves) {
+        leaf.constant *= scale_;
+        leaf.low *= scale_;
+        leaf.high *= scale_;
+        for (double& slope : leaf.slopes) slope *= scale_;
+      }
+      sum.trees.push_back(std::move(tree));
+    }
+    return sum;
+  }
+
+  BoostingData& data_;
+  const BoostOptions& options_;
+  Random random_;
+  Eigen::VectorXd y_;
+  double mean_ = 0.0;
+  double scale_ = 1.0;
+  RoundOptions rounds_;
+  std::string name_;
+  std::size_t usual_ = 0;  // features without pairs
+};
+
+}  // namespace
+
+BoostResult fit_boosted(const TrainingData& data, const BoostOptions& options, const Progress& progress) {
+  Work work(progress);
+  BoostingData rows = boosting_data(data, options);
+  const std::size_t features = rows.rows.features.size();
+  std::vector<BoostedSum> sums;
+  std::vector<BoostSummary> summaries;
+  for (Eigen::Index output = 0; output < rows.y.cols(); ++output) {
+    Work part(work, work.left() / static_cast<double>(rows.y.cols() - output));
+    sums.push_back(OutputFit(rows, output, options).fit(summaries.emplace_back(), part));
+    rows.rows.features.resize(features);
+  }
+  BoostResult result{BoostedModel(rows.inputs, rows.outputs, rows.deviations, std::move(sums)), std::move(summaries)};
+  work.finish();
+  return result;
+}
+
+}  // namespace llmt

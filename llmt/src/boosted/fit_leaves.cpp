@@ -1,0 +1,205 @@
+// The leaves of a tree whose splits are there.
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "base/parallel.hpp"
+#include "boosted/growing_tree.hpp"
+#include "boosted/model/transition.hpp"
+
+namespace llmt {
+namespace {
+
+// Calls to(leaf, share) for the leaves that hold a row.
+template <class To>
+void visit(const GrowingTree& tree, const BinnedRows& rows, Eigen::Index row, int index, double share, const To& to) {
+  while (tree[index].feature >= 0) {
+    const GrowingNode& node = tree[index];
+    const BinnedFeature& column = rows.features[node.feature];
+    const std::uint8_t code = column.codes[row];
+    if (node.half_width > 0.0 && code != missing_code) {
+      const double z = column.values[row];
+      if (std::abs(z - column.edges[node.bin]) < node.half_width) {
+        const double right = share_of_right(z, column.edges[node.bin], node.half_width);
+        if (goes_both_ways(share, right)) {
+          visit(tree, rows, row, node.left, share * (1.0 - right), to);
+          share *= right;
+          index = node.right;
+          continue;
+        }
+      }
+    }
+    index = (code == missing_code ? node.missing_left : code <= node.bin) ? node.left : node.right;
+  }
+  to(index, share);
+}
+
+bool is_soft(const GrowingTree& tree) {
+  return std::ranges::any_of(tree, [](const GrowingNode& node) { return node.half_width > 0.0; });
+}
+
+// Solves the positive definite system a x = b in place of b (Cholesky).
+void solve(double (&a)[most_boosted_slopes][most_boosted_slopes], double (&b)[most_boosted_slopes], int size) {
+  for (int j = 0; j < size; ++j) {
+    for (int k = 0; k < j; ++k) {
+      for (int i = j; i < size; ++i) a[i][j] -= a[i][k] * a[j][k];
+    }
+    const double root = std::sqrt(std::max(a[j][j], 1e-12));
+    for (int i = j; i < size; ++i) a[i][j] /= root;
+  }
+  for (int i = 0; i < size; ++i) {
+    for (int k = 0; k < i; ++k) b[i] -= a[i][k] * b[k];
+    b[i] /= a[i][i];
+  }
+  for (int i = size - 1; i >= 0; --i) {
+    for (int k = i + 1; k < size; ++k) b[i] -= a[k][i] * b[k];
+    b[i] /= a[i][i];
+  }
+}
+
+}  // namespace
+
+// beta += (Z'Z + ridge I)^-1 Z'e about the path's model, all centred in the leaf.
+void TreeGrower::fit_leaf(GrowingNode& leaf, std::span<const int> rows, std::span<const double> shares,
+                          const Eigen::VectorXd& residuals) const {
+  const int size = static_cast<int>(leaf.model.features.size());
+  double n = 0.0;
+  double s = 0.0;
+  double mean[most_boosted_slopes] = {};
+  double zz[most_boosted_slopes][most_boosted_slopes] = {};
+  double ze[most_boosted_slopes] = {};
+  double low = std::numeric_limits<double>::infinity();
+  double high = -low;
+  const float* values[most_boosted_slopes];
+  for (int j = 0; j < size; ++j) values[j] = rows_.features[leaf.model.features[j]].values.data();
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    const Eigen::Index row = rows[k];
+    const double w = shares.empty() ? rows_.weights(row) : shares[k] * rows_.weights(row);
+    const double residual = residuals(row);
+    if (shares.empty() || shares[k] >= 0.5) {
+      low = std::min(low, residual);
+      high = std::max(high, residual);
+    }
+    double z[most_boosted_slopes];
+    double e = residual - leaf.model.constant;
+    for (int j = 0; j < size; ++j) {
+      z[j] = values[j][row];
+      e -= leaf.model.slopes[j] * z[j];
+    }
+    n += w;
+    s += w * e;
+    for (int j = 0; j < size; ++j) {
+      mean[j] += w * z[j];
+      ze[j] += w * z[j] * e;
+      for (int i = j; i < size; ++i) zz[i][j] += w * z[i] * z[j];
+    }
+  }
+  {
+    for (int j = 0; j < size; ++j) mean[j] /= n;
+    for (int j = 0; j < size; ++j) {
+      ze[j] -= mean[j] * s;
+      for (int i = j; i < size; ++i) zz[i][j] -= n * mean[i] * mean[j];
+      zz[j][j] += options_.ridges.slope;
+    }
+    solve(zz, ze, size);
+    const double constant = s / (n + options_.ridges.constant);
+    leaf.model.constant += constant;
+    double middle = leaf.model.constant;
+    for (int j = 0; j < size; ++j) {
+      leaf.model.constant -= ze[j] * mean[j];
+      leaf.model.slopes[j] += ze[j];
+    }
+    for (int j = 0; j < size; ++j) middle += (leaf.model.slopes[j] - ze[j]) * mean[j];
+    if (low > high) low = high = middle;
+    const double margin = 0.1 * (high - low);
+    leaf.low = std::min(low - margin, middle);
+    leaf.high = std::max(high + margin, middle);
+  }
+}
+
+// A leaf without rows keeps its path's model within the range of the rows of the nearest node above.
+void TreeGrower::hold_empty(GrowingNode& leaf, const Eigen::VectorXd& residuals) const {
+  int above = leaf.parent;
+  while (tree_[above].count() == 0) above = tree_[above].parent;
+  leaf.low = std::numeric_limits<double>::infinity();
+  leaf.high = -leaf.low;
+  for (Eigen::Index k = tree_[above].begin; k < tree_[above].end; ++k) {
+    leaf.low = std::min(leaf.low, residuals(order_[k]));
+    leaf.high = std::max(leaf.high, residuals(order_[k]));
+  }
+}
+
+void TreeGrower::fit_leaves(const Eigen::VectorXd& residuals) {
+  soft_rows_.clear();
+  if (is_soft(tree_)) {
+    soft_rows_.resize(tree_.size());
+    for (const int row : of_rows_) {
+      visit(tree_, rows_, row, 0, 1.0, [&](int leaf, double share) {
+        soft_rows_[leaf].rows.push_back(row);
+        soft_rows_[leaf].shares.push_back(share);
+      });
+    }
+  }
+  parallel_for(std::ssize(tree_), max_threads_, [&](Eigen::Index k) {
+    if (tree_[k].feature >= 0) return;
+    const auto [rows, shares] = rows_in(tree_, static_cast<int>(k));
+    if (rows.empty()) {
+      hold_empty(tree_[k], residuals);
+    } else {
+      fit_leaf(tree_[k], rows, shares, residuals);
+    }
+  });
+}
+
+TreeGrower::RowsInLeaf TreeGrower::rows_in(const GrowingTree& tree, int leaf) const {
+  if (!soft_rows_.empty()) return {soft_rows_[leaf].rows, soft_rows_[leaf].shares};
+  return {std::span(order_).subspan(tree[leaf].begin, tree[leaf].count()), {}};
+}
+
+void TreeGrower::subtract_last(const GrowingTree& tree, double rate, Eigen::VectorXd& residuals) const {
+  const auto subtract = [&](Eigen::Index k) {
+    if (tree[k].feature >= 0) return;
+    const GrowingNode& leaf = tree[k];
+    const auto [rows, shares] = rows_in(tree, static_cast<int>(k));
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      const double value = std::clamp(leaf.model.at(rows_, rows[i]), leaf.low, leaf.high);
+      residuals(rows[i]) -= rate * (shares.empty() ? value : shares[i] * value);
+    }
+  };
+  // A row is in one leaf of a crisp tree, and may be in several of a soft one.
+  parallel_for(std::ssize(tree), soft_rows_.empty() ? max_threads_ : 1, subtract);
+}
+
+double value_at(const GrowingTree& tree, const BinnedRows& rows, Eigen::Index row) {
+  double sum = 0.0;
+  visit(tree, rows, row, 0, 1.0, [&](int leaf, double share) {
+    sum += share * std::clamp(tree[leaf].model.at(rows, row), tree[leaf].low, tree[leaf].high);
+  });
+  return sum;
+}
+
+BoostedTree finished(const GrowingTree& tree, const BinnedRows& rows) {
+  BoostedTree result;
+  std::vector<int> number(tree.size(), 0);
+  for (std::size_t k = 0; k < tree.size(); ++k) {
+    const GrowingNode& node = tree[k];
+    if (node.feature >= 0) {
+      number[k] = static_cast<int>(result.splits.size());
+      result.splits.push_back(
+          {node.feature, rows.features[node.feature].edges[node.bin], node.half_width, node.missing_left, 0, 0});
+    } else {
+      number[k] = -1 - static_cast<int>(result.leaves.size());
+      result.leaves.push_back({node.model.constant, node.low, node.high, node.model.features, node.model.slopes});
+    }
+  }
+  for (std::size_t k = 0; k < tree.size(); ++k) {
+    if (tree[k].feature < 0) continue;
+    BoostedSplit& split = result.splits[number[k]];
+    split.left = number[tree[k].left];
+    split.right = number[tree[k].right];
+  }
+  return result;
+}
+
+}  // namespace llmt

@@ -1,0 +1,288 @@
+#include "boosted/growing_tree.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "base/parallel.hpp"
+#include "boosted/model/transition.hpp"
+
+namespace llmt {
+
+TreeGrower::TreeGrower(const BinnedRows& rows, std::vector<int> of_rows, TreeOptions options, int max_threads)
+    : rows_(rows), of_rows_(std::move(of_rows)), options_(options), max_threads_(max_threads) {}
+
+void TreeGrower::begin(const Eigen::VectorXd& residuals) {
+  order_ = of_rows_;
+  residuals_.resize(order_.size());
+  weights_.resize(order_.size());
+  terms_.resize(order_.size());
+  spare_order_.resize(order_.size());
+  spare_residuals_.resize(order_.size());
+  spare_weights_.resize(order_.size());
+  double weight = 0.0;
+  double sum = 0.0;
+  for (std::size_t k = 0; k < order_.size(); ++k) {
+    weights_[k] = rows_.weights(order_[k]);
+    weight += weights_[k];
+    sum += weights_[k] * residuals(order_[k]);
+  }
+  GrowingNode root;
+  root.end = std::ssize(order_);
+  root.model.constant = sum / weight;
+  for (std::size_t k = 0; k < order_.size(); ++k) residuals_[k] = residuals(order_[k]) - root.model.constant;
+  tree_ = {root};
+}
+
+void TreeGrower::pack() {
+  units_ = units_of(residuals_, weights_, rows_.equal_weights);
+  for (std::size_t k = 0; k < order_.size(); ++k) terms_[k] = packed(residuals_[k], weights_[k], units_);
+}
+
+std::vector<int> TreeGrower::some_features(Random& random) const {
+  const Eigen::Index all = std::ssize(rows_.features);
+  const auto some = static_cast<Eigen::Index>(std::ceil(options_.columns * static_cast<double>(all)));
+  std::vector<int> result;
+  for (const Eigen::Index feature : random.permutation(all)) {
+    if (std::ssize(result) < some) result.push_back(static_cast<int>(feature));
+  }
+  std::ranges::sort(result);
+  return result;
+}
+
+bool TreeGrower::may_have_slope(const GrowingNode& node, int feature) const {
+  return std::ssize(node.model.features) < options_.slopes || std::ranges::count(node.model.features, feature) > 0;
+}
+
+TreeGrower::Choice TreeGrower::best_of_feature(std::span<const int> leaves, int feature) const {
+  const BinnedFeature& column = rows_.features[feature];
+  Gains gains{};
+  Gains gains_missing_left{};
+  Histogram histogram;
+  for (const int leaf : leaves) {
+    const GrowingNode& node = tree_[leaf];
+    if (node.count() == 0) continue;
+    histogram.fill(0);
+    add_to(histogram, column, std::span(order_).subspan(node.begin, node.count()),
+           std::span(terms_).subspan(node.begin, node.count()));
+    const bool slopes = may_have_slope(node, feature);
+    add_gains(gains, column, histogram, units_, options_.ridges, slopes, false);
+    if (column.has_missing) {
+      add_gains(gains_missing_left, column, histogram, units_, options_.ridges, slopes, true);
+    }
+  }
+  Choice best{0.0, -1, 0, false};
+  const auto look = [&](const Gains& of_side, bool missing_left) {
+    for (int t = 0; t + 1 < column.bins(); ++t) {
+      if (of_side[t] > best.gain) best = {of_side[t], feature, t, missing_left};
+    }
+  };
+  look(gains, false);
+  if (column.has_missing) look(gains_missing_left, true);
+  return best;
+}
+
+TreeGrower::Choice TreeGrower::best_split(std::span<const int> leaves, const std::vector<int>& features) const {
+  std::vector<Choice> of_feature(features.size());
+  parallel_for(std::ssize(features), max_threads_,
+               [&](Eigen::Index k) { of_feature[k] = best_of_feature(leaves, features[k]); });
+  Choice best{0.0, -1, 0, false};
+  for (const Choice& one : of_feature) {
+    if (one.gain > best.gain) best = one;
+  }
+  return best;
+}
+
+void TreeGrower::split_rows(int index) {
+  GrowingNode& node = tree_[index];
+  const std::vector<std::uint8_t>& codes = rows_.features[node.feature].codes;
+  // Rows of the right side wait in the same places of the spare lists: other nodes have other places.
+  Eigen::Index left = node.begin;
+  Eigen::Index right = node.begin;
+  for (Eigen::Index k = node.begin; k < node.end; ++k) {
+    const std::uint8_t code = codes[order_[k]];
+    const bool is_left = code == missing_code ? node.missing_left : code <= node.bin;
+    spare_order_[right] = order_[left] = order_[k];
+    spare_residuals_[right] = residuals_[left] = residuals_[k];
+    spare_weights_[right] = weights_[left] = weights_[k];
+    left += is_left ? 1 : 0;
+    right += is_left ? 0 : 1;
+  }
+  std::copy(spare_order_.begin() + node.begin, spare_order_.begin() + right, order_.begin() + left);
+  std::copy(spare_residuals_.begin() + node.begin, spare_residuals_.begin() + right, residuals_.begin() + left);
+  std::copy(spare_weights_.begin() + node.begin, spare_weights_.begin() + right, weights_.begin() + left);
+  GrowingNode& l = tree_[node.left];
+  GrowingNode& r = tree_[node.right];
+  l.begin = node.begin;
+  l.end = r.begin = left;
+  r.end = node.end;
+}
+
+// The constant and the slope in the split's feature that the side's residuals ask for.
+void TreeGrower::add_to_path(GrowingNode& side, int feature) {
+  const std::vector<float>& values = rows_.features[feature].values;
+  const bool has_slope = may_have_slope(side, feature);
+  double n = 0.0;
+  double s = 0.0;
+  double z = 0.0;
+  double zz = 0.0;
+  double ze = 0.0;
+  for (Eigen::Index k = side.begin; k < side.end; ++k) {
+    const double w = weights_[k];
+    const double value = values[order_[k]];
+    n += w;
+    s += w * residuals_[k];
+    z += w * value;
+    zz += w * value * value;
+    ze += w * value * residuals_[k];
+  }
+  if (n == 0.0) return;
+  const double slope = has_slope ? (ze - z * s / n) / (std::max(0.0, zz - z * z / n) + options_.ridges.slope) : 0.0;
+  const double constant = s / (n + options_.ridges.constant) - slope * z / n;
+  side.model.constant += constant;
+  if (has_slope) {
+    const auto found = std::ranges::find(side.model.features, feature);
+    if (found == side.model.features.end()) {
+      side.model.features.push_back(feature);
+      side.model.slopes.push_back(slope);
+    } else {
+      side.model.slopes[found - side.model.features.begin()] += slope;
+    }
+  }
+  for (Eigen::Index k = side.begin; k < side.end; ++k) residuals_[k] -= constant + slope * values[order_[k]];
+}
+
+double TreeGrower::half_width_of(int index) const {
+  const GrowingNode& node = tree_[index];
+  const BinnedFeature& column = rows_.features[node.feature];
+  const double threshold = column.edges[node.bin];
+  double low = column.low;
+  double high = column.high;
+  for (int below = index, above = node.parent; above >= 0; below = above, above = tree_[above].parent) {
+    if (tree_[above].feature != node.feature) continue;
+    const double border = column.edges[tree_[above].bin];
+    if (tree_[above].left == below) {
+      high = std::min(high, border);
+    } else {
+      low = std::max(low, border);
+    }
+  }
+  return std::max(0.0, options_.softness * std::min(threshold - low, high - threshold));
+}
+
+// Whether the rows in the transition are predicted about as well by both children's models blended.
+bool TreeGrower::blends_well(int index, double half_width) const {
+  constexpr double allowed = 1.1;
+  const GrowingNode& node = tree_[index];
+  const BinnedFeature& column = rows_.features[node.feature];
+  const double threshold = column.edges[node.bin];
+  double crisp = 0.0;
+  double blended = 0.0;
+  for (Eigen::Index k = node.begin; k < node.end; ++k) {
+    const Eigen::Index row = order_[k];
+    const double z = column.values[row];
+    if (column.codes[row] == missing_code || std::abs(z - threshold) >= half_width) continue;
+    const bool is_left = column.codes[row] <= node.bin;
+    const double right_share = share_of_right(z, threshold, half_width);
+    const GrowingNode& own = tree_[is_left ? node.left : node.right];
+    const GrowingNode& other = tree_[is_left ? node.right : node.left];
+    const double share = is_left ? right_share : 1.0 - right_share;
+    const double residual = residuals_[k] - share * (other.model.at(rows_, row) - own.model.at(rows_, row));
+    crisp += weights_[k] * residuals_[k] * residuals_[k];
+    blended += weights_[k] * residual * residual;
+  }
+  return blended <= allowed * crisp;
+}
+
+void TreeGrower::split(std::span<const int> leaves, std::span<const Choice> choices) {
+  for (std::size_t k = 0; k < leaves.size(); ++k) {
+    GrowingNode child;
+    child.parent = leaves[k];
+    child.model = tree_[leaves[k]].model;
+    GrowingNode& node = tree_[leaves[k]];
+    node.feature = choices[k].feature;
+    node.bin = choices[k].bin;
+    node.missing_left = choices[k].missing_left;
+    node.left = static_cast<int>(tree_.size());
+    node.right = node.left + 1;
+    tree_.push_back(child);
+    tree_.push_back(child);
+  }
+  parallel_for(std::ssize(leaves), max_threads_, [&](Eigen::Index k) {
+    split_rows(leaves[k]);
+    GrowingNode& node = tree_[leaves[k]];
+    add_to_path(tree_[node.left], node.feature);
+    add_to_path(tree_[node.right], node.feature);
+    if (options_.softness > 0.0) {
+      const double half_width = half_width_of(leaves[k]);
+      if (half_width > 0.0 && blends_well(leaves[k], half_width)) node.half_width = half_width;
+    }
+  });
+}
+
+void TreeGrower::grow_symmetric(Random& random) {
+  std::vector<int> leaves = {0};
+  for (int level = 0; level < options_.depth; ++level) {
+    pack();
+    const Choice best = best_split(leaves, some_features(random));
+    if (best.feature < 0) continue;
+    std::vector<int> with_rows;
+    for (const int leaf : leaves) {
+      if (tree_[leaf].count() > 0) with_rows.push_back(leaf);
+    }
+    split(with_rows, std::vector<Choice>(with_rows.size(), best));
+    leaves.clear();
+    for (const int node : with_rows) leaves.insert(leaves.end(), {tree_[node].left, tree_[node].right});
+  }
+}
+
+void TreeGrower::grow_free(Random& random) {
+  std::vector<Choice> best_of(1);
+  pack();
+  const auto look = [&](int leaf) { best_of[leaf] = best_split(std::vector<int>{leaf}, some_features(random)); };
+  look(0);
+  for (int leaves = 1; leaves < options_.leaves; ++leaves) {
+    const auto best = std::ranges::max_element(best_of, {}, &Choice::gain);
+    if (best->feature < 0) return;
+    const int leaf = static_cast<int>(best - best_of.begin());
+    split(std::vector<int>{leaf}, std::vector<Choice>{*best});
+    best_of[leaf] = {0.0, -1, 0, false};
+    best_of.resize(tree_.size());
+    if (leaves + 1 == options_.leaves) return;
+    const GrowingNode& node = tree_[leaf];
+    for (Eigen::Index k = node.begin; k < node.end; ++k) {
+      terms_[k] = packed(residuals_[k], weights_[k], units_);
+    }
+    for (const int child : {node.left, node.right}) {
+      if (static_cast<double>(tree_[child].count()) >= 2.0 * options_.fewest) look(child);
+    }
+  }
+}
+
+GrowingTree TreeGrower::grow(const Eigen::VectorXd& residuals, Random& random) {
+  begin(residuals);
+  if (options_.symmetric) {
+    grow_symmetric(random);
+  } else {
+    grow_free(random);
+  }
+  fit_leaves(residuals);
+  return std::move(tree_);
+}
+
+GrowingTree TreeGrower::estimate(const GrowingTree& tree, const Eigen::VectorXd& residuals) {
+  begin(residuals);
+  // A split comes after the one above it, so the nodes are numbered anew in the same order.
+  std::vector<int> number(tree.size(), 0);
+  for (std::size_t k = 0; k < tree.size(); ++k) {
+    if (tree[k].feature < 0) continue;
+    split(std::vector<int>{number[k]}, std::vector<Choice>{{0.0, tree[k].feature, tree[k].bin, tree[k].missing_left}});
+    const GrowingNode& node = tree_[number[k]];
+    number[tree[k].left] = node.left;
+    number[tree[k].right] = node.right;
+  }
+  fit_leaves(residuals);
+  return std::move(tree_);
+}
+
+}  // namespace llmt

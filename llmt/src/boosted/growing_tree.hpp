@@ -1,0 +1,130 @@
+/// \file
+/// A small tree on residuals while it grows, and its leaves' models.
+#pragma once
+
+#include <Eigen/Core>
+#include <span>
+#include <vector>
+
+#include "boosted/binned_rows.hpp"
+#include "boosted/packed_sums.hpp"
+#include "boosted/split_gain.hpp"
+#include "llmt/random.hpp"
+
+namespace llmt {
+
+struct TreeOptions {
+  bool symmetric = true;  ///< one split for all leaves of a level; else the best leaf is split
+  int depth = 6;          ///< of a symmetric tree
+  int leaves = 64;        ///< of a free tree
+  int slopes = 3;         ///< in a leaf, at most
+  Ridges ridges = {};
+  double softness = 0.0;  ///< half width of a transition by the distance to the node's border; 0: crisp
+  double columns = 0.5;   ///< share of the features that a level, or a leaf of a free tree, looks at
+  double fewest = 1.0;    ///< rows on either side of a split of a free tree
+};
+
+/// The model of a node: what the splits on the way to it added.
+struct PathModel {
+  double constant = 0.0;
+  std::vector<int> features = {};
+  std::vector<double> slopes = {};
+
+  double at(const BinnedRows& rows, Eigen::Index row) const {
+    double value = constant;
+    for (std::size_t k = 0; k < features.size(); ++k) value += slopes[k] * rows.features[features[k]].values[row];
+    return value;
+  }
+};
+
+struct GrowingNode {
+  int feature = -1;  ///< -1: a leaf
+  int bin = 0;       ///< the last one of the left side
+  bool missing_left = false;
+  double half_width = 0.0;
+  int left = -1;
+  int right = -1;
+  int parent = -1;
+  Eigen::Index begin = 0;  ///< of its rows among the grower's
+  Eigen::Index end = 0;
+  PathModel model = {};
+  double low = 0.0;
+  double high = 0.0;
+
+  Eigen::Index count() const { return end - begin; }
+};
+
+using GrowingTree = std::vector<GrowingNode>;
+
+/// A tree's prediction for a row of the fit.
+double value_at(const GrowingTree& tree, const BinnedRows& rows, Eigen::Index row);
+
+BoostedTree finished(const GrowingTree& tree, const BinnedRows& rows);
+
+/// Grows trees on some of the rows, or estimates the leaves of one that is there.
+class TreeGrower {
+ public:
+  TreeGrower(const BinnedRows& rows, std::vector<int> of_rows, TreeOptions options, int max_threads);
+
+  /// `residuals`: one for each row of the fit.
+  GrowingTree grow(const Eigen::VectorXd& residuals, Random& random);
+
+  /// The tree with its splits, and leaves from these rows.
+  GrowingTree estimate(const GrowingTree& tree, const Eigen::VectorXd& residuals);
+
+  /// residuals -= rate . tree in the grower's rows. `tree`: the last one of grow() or estimate().
+  void subtract_last(const GrowingTree& tree, double rate, Eigen::VectorXd& residuals) const;
+
+ private:
+  struct Choice {
+    double gain = 0.0;
+    int feature = -1;
+    int bin = 0;
+    bool missing_left = false;
+  };
+
+  struct RowsInLeaf {
+    std::span<const int> rows;
+    std::span<const double> shares;  // empty: all 1
+  };
+  struct SoftRows {
+    std::vector<int> rows;
+    std::vector<double> shares;
+  };
+
+  void begin(const Eigen::VectorXd& residuals);
+  void pack();
+  std::vector<int> some_features(Random& random) const;
+  Choice best_of_feature(std::span<const int> leaves, int feature) const;
+  Choice best_split(std::span<const int> leaves, const std::vector<int>& features) const;
+  bool may_have_slope(const GrowingNode& node, int feature) const;
+  void split(std::span<const int> leaves, std::span<const Choice> choices);
+  void split_rows(int node);
+  void add_to_path(GrowingNode& side, int feature);
+  double half_width_of(int node) const;
+  bool blends_well(int node, double half_width) const;
+  void grow_symmetric(Random& random);
+  void grow_free(Random& random);
+  void fit_leaves(const Eigen::VectorXd& residuals);
+  void fit_leaf(GrowingNode& leaf, std::span<const int> rows, std::span<const double> shares,
+                const Eigen::VectorXd& residuals) const;
+  RowsInLeaf rows_in(const GrowingTree& tree, int leaf) const;
+  void hold_empty(GrowingNode& leaf, const Eigen::VectorXd& residuals) const;
+
+  const BinnedRows& rows_;
+  const std::vector<int> of_rows_;
+  const TreeOptions options_;
+  const int max_threads_;
+  GrowingTree tree_;
+  std::vector<int> order_;         // the rows, those of a node together
+  std::vector<double> residuals_;  // of the node's own model, in that order
+  std::vector<double> weights_;    // in that order
+  std::vector<PackedSum> terms_;   // in that order
+  std::vector<int> spare_order_;
+  std::vector<double> spare_residuals_;
+  std::vector<double> spare_weights_;
+  PackedUnits units_;
+  std::vector<SoftRows> soft_rows_;  // of each node that is a leaf; empty: the tree is crisp
+};
+
+}  // namespace llmt

@@ -1,0 +1,126 @@
+#include "boosted/model/boosted_checks.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <set>
+#include <utility>
+#include <vector>
+
+namespace llmt {
+namespace {
+
+[[noreturn]] void fail(const std::string& pointer, const std::string& problem) { throw BoostedFault(pointer, problem); }
+
+template <class Column>
+void check_names_of(const char* list, const std::vector<Column>& columns) {
+  std::set<std::string> seen;
+  for (std::size_t k = 0; k < columns.size(); ++k) {
+    if (!seen.insert(columns[k].name).second) fail(fmt::format("/{}/{}", list, k), "its name is there twice");
+    const bool is_range =
+        std::isfinite(columns[k].low) && std::isfinite(columns[k].high) && columns[k].low <= columns[k].high;
+    if (!is_range) fail(fmt::format("/{}/{}", list, k), "low and high are no range");
+  }
+}
+
+void check_inputs(const BoostedModel& model) {
+  if (model.inputs().empty()) fail("/inputs", "there is none");
+  if (model.outputs().empty()) fail("/outputs", "there is none");
+  check_names_of("inputs", model.inputs());
+  check_names_of("outputs", model.outputs());
+  if (model.deviations().size() != model.inputs().size()) fail("", "not one deviation an input");
+  for (std::size_t j = 0; j < model.inputs().size(); ++j) {
+    const std::string pointer = fmt::format("/inputs/{}", j);
+    if (!std::isfinite(model.inputs()[j].centre)) fail(pointer, "centre is not finite");
+    const double deviation = model.deviations()[j];
+    if (!std::isfinite(deviation) || deviation <= 0.0) fail(pointer, "deviation is not a positive number");
+    if (!model.inputs()[j].codes.empty()) fail(pointer, "a boosted model has no codes");
+    const std::vector<std::string>& levels = model.inputs()[j].levels;
+    if (std::set<std::string>(levels.begin(), levels.end()).size() != levels.size()) {
+      fail(pointer, "two levels have one name");
+    }
+  }
+}
+
+void check_feature(const BoostedFeature& feature, const std::vector<InputColumn>& inputs, const std::string& pointer) {
+  const auto is_number = [&](int input) {
+    return input >= 0 && input < std::ssize(inputs) && !inputs[input].is_categorical();
+  };
+  if (feature.level >= 0) {
+    const bool exists = feature.first >= 0 && feature.first < std::ssize(inputs) && feature.second == -1 &&
+                        feature.level < std::ssize(inputs[feature.first].levels);
+    if (!exists) fail(pointer, "there is no such level");
+    return;
+  }
+  if (feature.level != -1 || !is_number(feature.first)) fail(pointer, "the first input is no numeric input");
+  if (feature.second == -1) return;
+  if (!is_number(feature.second) || feature.second == feature.first) {
+    fail(pointer, "the second input is no other numeric input");
+  }
+  if (std::abs(feature.sign) != 1.0) fail(pointer, "sign is neither 1 nor -1");
+}
+
+void check_leaf(const BoostedLeaf& leaf, std::size_t features, const std::string& pointer) {
+  if (!std::isfinite(leaf.constant)) fail(pointer, "constant is not finite");
+  if (!std::isfinite(leaf.low) || !std::isfinite(leaf.high) || leaf.low > leaf.high) {
+    fail(pointer, "low and high are no range");
+  }
+  if (leaf.features.size() != leaf.slopes.size()) fail(pointer, "not one slope a feature");
+  if (std::ssize(leaf.features) > most_boosted_slopes) {
+    fail(pointer, fmt::format("more than {} slopes", most_boosted_slopes));
+  }
+  for (std::size_t k = 0; k < leaf.features.size(); ++k) {
+    if (leaf.features[k] < 0 || std::cmp_greater_equal(leaf.features[k], features)) {
+      fail(pointer, fmt::format("there is no feature {}", leaf.features[k]));
+    }
+    if (!std::isfinite(leaf.slopes[k])) fail(pointer, "a slope is not finite");
+  }
+}
+
+// Every split but the first and every leaf is below one split, which stands before it: so all of them are reached.
+void check_tree(const BoostedTree& tree, std::size_t features, const std::string& pointer) {
+  if (tree.leaves.size() != tree.splits.size() + 1) fail(pointer, "a tree has one leaf more than splits");
+  std::vector<bool> split_seen(tree.splits.size(), false);
+  std::vector<bool> leaf_seen(tree.leaves.size(), false);
+  for (std::size_t k = 0; k < tree.splits.size(); ++k) {
+    const BoostedSplit& split = tree.splits[k];
+    const std::string of_split = fmt::format("{}/splits/{}", pointer, k);
+    if (split.feature < 0 || std::cmp_greater_equal(split.feature, features)) {
+      fail(of_split, fmt::format("there is no feature {}", split.feature));
+    }
+    if (!std::isfinite(split.threshold)) fail(of_split, "threshold is not finite");
+    if (!std::isfinite(split.half_width) || split.half_width < 0.0) fail(of_split, "half_width is negative");
+    for (const int child : {split.left, split.right}) {
+      const bool is_leaf = child < 0;
+      const std::size_t at = is_leaf ? -1 - static_cast<std::ptrdiff_t>(child) : child;
+      std::vector<bool>& seen = is_leaf ? leaf_seen : split_seen;
+      if (at >= seen.size() || (!is_leaf && at <= k)) fail(of_split, fmt::format("{} is no child", child));
+      if (seen[at]) fail(of_split, fmt::format("{} is the child of two", child));
+      seen[at] = true;
+    }
+  }
+  for (std::size_t k = 0; k < tree.leaves.size(); ++k) {
+    check_leaf(tree.leaves[k], features, fmt::format("{}/leaves/{}", pointer, k));
+  }
+}
+
+}  // namespace
+
+void check_boosted(const BoostedModel& model) {
+  check_inputs(model);
+  if (model.sums().size() != model.outputs().size()) fail("/sums", "not one sum an output");
+  for (std::size_t o = 0; o < model.sums().size(); ++o) {
+    const BoostedSum& sum = model.sums()[o];
+    const std::string pointer = fmt::format("/sums/{}", o);
+    if (!std::isfinite(sum.base)) fail(pointer, "base is not finite");
+    if (!std::isfinite(sum.rate) || sum.rate <= 0.0 || sum.rate > 1.0) fail(pointer, "rate is not in (0, 1]");
+    for (std::size_t k = 0; k < sum.features.size(); ++k) {
+      check_feature(sum.features[k], model.inputs(), fmt::format("{}/features/{}", pointer, k));
+    }
+    for (std::size_t k = 0; k < sum.trees.size(); ++k) {
+      check_tree(sum.trees[k], sum.features.size(), fmt::format("{}/trees/{}", pointer, k));
+    }
+  }
+}
+
+}  // namespace llmt

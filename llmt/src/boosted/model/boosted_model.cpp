@@ -1,0 +1,142 @@
+#include "llmt/boosted_model.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "base/checks.hpp"
+#include "base/parallel.hpp"
+#include "base/sum_over.hpp"
+#include "boosted/model/boosted_checks.hpp"
+#include "boosted/model/transition.hpp"
+
+namespace llmt {
+namespace {
+
+double value_below(const BoostedTree& tree, const double* z, int at, double share) {
+  double sum = 0.0;
+  while (at >= 0) {
+    const BoostedSplit& split = tree.splits[at];
+    const double value = z[split.feature];
+    if (std::isnan(value)) {
+      at = split.missing_left ? split.left : split.right;
+      continue;
+    }
+    if (std::abs(value - split.threshold) < split.half_width) {
+      const double right = share_of_right(value, split.threshold, split.half_width);
+      if (goes_both_ways(share, right)) {
+        sum += value_below(tree, z, split.left, share * (1.0 - right));
+        share *= right;
+        at = split.right;
+        continue;
+      }
+    }
+    at = value <= split.threshold ? split.left : split.right;
+  }
+  const BoostedLeaf& leaf = tree.leaves[-1 - at];
+  double value = leaf.constant;
+  for (std::size_t k = 0; k < leaf.features.size(); ++k) {
+    const double of_feature = z[leaf.features[k]];
+    if (!std::isnan(of_feature)) value += leaf.slopes[k] * of_feature;
+  }
+  return sum + share * std::clamp(value, leaf.low, leaf.high);
+}
+
+void check_rows(const char* function, const BoostedModel& model, const Eigen::Ref<const Eigen::MatrixXd>& inputs) {
+  if (inputs.cols() != model.num_inputs()) {
+    throw std::invalid_argument(
+        fmt::format("{}: inputs has {} columns, the model has {} inputs", function, inputs.cols(), model.num_inputs()));
+  }
+  check_finite_or_missing(function, "inputs", inputs);
+}
+
+}  // namespace
+
+double feature_at(const BoostedFeature& feature, std::span<const InputColumn> inputs,
+                  std::span<const double> deviations, const double* x) {
+  if (feature.level >= 0) {
+    const double level = x[feature.first];
+    const bool is_known =
+        level >= 0.0 && level < static_cast<double>(inputs[feature.first].levels.size()) && level == std::floor(level);
+    return is_known ? static_cast<double>(level == feature.level) : std::numeric_limits<double>::quiet_NaN();
+  }
+  const auto z = [&](int input) { return (x[input] - inputs[input].centre) / deviations[input]; };
+  return feature.second < 0 ? z(feature.first) : z(feature.first) + feature.sign * z(feature.second);
+}
+
+double value_of(const BoostedTree& tree, const double* z) {
+  return value_below(tree, z, tree.splits.empty() ? -1 : 0, 1.0);
+}
+
+BoostedModel::BoostedModel(std::vector<InputColumn> inputs, std::vector<OutputColumn> outputs,
+                           std::vector<double> deviations, std::vector<BoostedSum> sums)
+    : inputs_(std::move(inputs)),
+      outputs_(std::move(outputs)),
+      deviations_(std::move(deviations)),
+      sums_(std::move(sums)) {
+  check_boosted(*this);
+}
+
+std::vector<bool> used_inputs(const BoostedModel& model) {
+  std::vector<bool> used(model.num_inputs(), false);
+  for (const BoostedSum& sum : model.sums()) {
+    const auto use = [&](int feature) {
+      used[sum.features[feature].first] = true;
+      if (sum.features[feature].second >= 0) used[sum.features[feature].second] = true;
+    };
+    for (const BoostedTree& tree : sum.trees) {
+      for (const BoostedSplit& split : tree.splits) use(split.feature);
+      for (const BoostedLeaf& leaf : tree.leaves) std::ranges::for_each(leaf.features, use);
+    }
+  }
+  return used;
+}
+
+std::vector<double> distance_outside(const BoostedModel& model, const Eigen::Ref<const Eigen::MatrixXd>& inputs) {
+  check_rows("llmt::distance_outside", model, inputs);
+  std::vector<double> distance(inputs.rows(), 0.0);
+  for (Eigen::Index j = 0; j < inputs.cols(); ++j) {
+    const InputColumn& column = model.inputs()[j];
+    if (column.is_categorical()) continue;
+    const double range = column.high - column.low;
+    for (Eigen::Index row = 0; row < inputs.rows(); ++row) {
+      const double excess = std::max(column.low - inputs(row, j), inputs(row, j) - column.high);
+      if (!(excess > 0.0)) continue;  // inside, or missing
+      distance[row] = std::max(distance[row], excess / range);
+    }
+  }
+  return distance;
+}
+
+Eigen::MatrixXd BoostedModel::predict(const Eigen::Ref<const Eigen::MatrixXd>& inputs, int max_threads) const {
+  check_rows("llmt::BoostedModel::predict", *this, inputs);
+  Eigen::MatrixXd result(inputs.rows(), num_outputs());
+  constexpr Eigen::Index rows_at_once = 64;
+  const RowBlocks blocks{inputs.rows(), rows_at_once};
+  parallel_for(blocks.count(), max_threads, [&](Eigen::Index block) {
+    const auto [begin, end] = blocks[block];
+    std::vector<double> x(num_inputs());
+    for (std::size_t o = 0; o < sums_.size(); ++o) {
+      const BoostedSum& sum = sums_[o];
+      const std::size_t width = sum.features.size();
+      std::vector<double> z(width * (end - begin));
+      std::vector<double> values(end - begin, 0.0);
+      for (Eigen::Index row = begin; row < end; ++row) {
+        Eigen::Map<Eigen::VectorXd>(x.data(), num_inputs()) = inputs.row(row);
+        for (std::size_t k = 0; k < width; ++k) {
+          z[(row - begin) * width + k] = feature_at(sum.features[k], inputs_, deviations_, x.data());
+        }
+      }
+      // Tree by tree, so that a tree stays in the cache for the rows of the block.
+      for (const BoostedTree& tree : sum.trees) {
+        for (std::size_t i = 0; i < values.size(); ++i) values[i] += value_of(tree, &z[i * width]);
+      }
+      for (Eigen::Index row = begin; row < end; ++row) result(row, o) = sum.base + sum.rate * values[row - begin];
+    }
+  });
+  return result;
+}
+
+}  // namespace llmt

@@ -1,0 +1,39 @@
+#include "boosted/packed_sums.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace llmt {
+
+PackedUnits units_of(std::span<const double> residuals, std::span<const double> weights, bool equal_weights) {
+  // Half of the bits that are there: rounding adds at most one half a row.
+  constexpr double most_weight = 0x1p24;
+  constexpr double most_residual = 0x1p36;
+  double largest = 0.0;
+  double weight = 0.0;
+  for (std::size_t i = 0; i < residuals.size(); ++i) {
+    largest = std::max(largest, std::abs(residuals[i]) * weights[i]);
+    weight += weights[i];
+  }
+  PackedUnits units;
+  if (!equal_weights) units.weight = weight / most_weight;
+  units.most = 2.0 * most_residual / static_cast<double>(residuals.size());
+  if (largest > 0.0) units.residual = 2.0 * largest / units.most;
+  units.per_residual = 1.0 / units.residual;
+  return units;
+}
+
+PackedSum packed(double residual, double weight, const PackedUnits& units) {
+  const auto whole_weight = static_cast<std::int64_t>(weight / units.weight + 0.5);
+  const double units_of_residual = std::clamp(residual * weight * units.per_residual, -units.most, units.most);
+  const auto whole_residual = static_cast<std::int64_t>(units_of_residual + std::copysign(0.5, units_of_residual));
+  return (whole_weight << residual_bits) + whole_residual;
+}
+
+void add_to(Histogram& histogram, const BinnedFeature& feature, std::span<const int> rows,
+            std::span<const PackedSum> terms) {
+  const std::uint8_t* const codes = feature.codes.data();
+  for (std::size_t k = 0; k < rows.size(); ++k) histogram[codes[rows[k]]] += terms[k];
+}
+
+}  // namespace llmt

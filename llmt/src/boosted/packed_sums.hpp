@@ -1,0 +1,48 @@
+/// \file
+/// Sums of weights and residuals in bins, as whole numbers: they are exact, so they do not depend on the order of rows,
+/// and the sums of a node minus those of one child are those of the other.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "boosted/binned_rows.hpp"
+
+namespace llmt {
+
+/// A weight in the upper 26 bits and a residual times its weight in the lower 38, both signed.
+using PackedSum = std::int64_t;
+inline constexpr int residual_bits = 38;
+
+/// Rows beyond this number have sums that do not fit.
+inline constexpr std::int64_t most_boosted_rows = std::int64_t{1} << 24;
+
+/// What one unit of a packed sum is.
+struct PackedUnits {
+  double weight = 1.0;
+  double residual = 1.0;
+  double per_residual = 1.0;  ///< 1 / residual
+  double most = 0.0;          ///< units of residual that a row may have; more are cut, so that no sum overflows
+};
+
+/// Units in which the sums over all rows stay within their bits.
+PackedUnits units_of(std::span<const double> residuals, std::span<const double> weights, bool equal_weights);
+
+PackedSum packed(double residual, double weight, const PackedUnits& units);
+
+inline std::int64_t weight_of(PackedSum sum) {
+  return (sum + (std::int64_t{1} << (residual_bits - 1))) >> residual_bits;
+}
+inline std::int64_t residual_of(PackedSum sum) { return sum - (weight_of(sum) << residual_bits); }
+
+/// The sums in the bins of a feature; the last one is that of missing values.
+using Histogram = std::array<PackedSum, 256>;
+
+/// Adds the rows `rows`, whose terms are `terms`, to the bins of a feature.
+void add_to(Histogram& histogram, const BinnedFeature& feature, std::span<const int> rows,
+            std::span<const PackedSum> terms);
+
+}  // namespace llmt

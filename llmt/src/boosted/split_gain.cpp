@@ -1,0 +1,115 @@
+#include "boosted/split_gain.hpp"
+
+#include <algorithm>
+
+#include "base/simd.hpp"
+
+namespace llmt {
+namespace {
+
+struct Totals {
+  double weight = 0.0;
+  double residual = 0.0;
+  double z = 0.0;
+  double zz = 0.0;
+  double ze = 0.0;
+};
+
+// Sums over the bins up to each one that holds rows: no gain changes at others. The bin of missing values comes first
+// if it goes to the left.
+struct RunningSums {
+  int count = 0;
+  std::array<int, 257> bin;
+  std::array<double, 257> weight;
+  std::array<double, 257> residual;
+  std::array<double, 257> z;
+  std::array<double, 257> zz;
+  std::array<double, 257> ze;
+  Totals all = {};
+};
+
+void run(RunningSums& sums, const BinnedFeature& feature, const Histogram& histogram, const PackedUnits& units,
+         bool missing_left) {
+  const double missing_weight = static_cast<double>(weight_of(histogram[missing_code])) * units.weight;
+  const double missing_residual = static_cast<double>(residual_of(histogram[missing_code])) * units.residual;
+  Totals all;
+  if (missing_left && histogram[missing_code] != 0) {
+    all.weight = missing_weight;
+    all.residual = missing_residual;
+    sums.bin[0] = -1;
+    sums.weight[0] = missing_weight;
+    sums.residual[0] = missing_residual;
+    sums.z[0] = sums.zz[0] = sums.ze[0] = 0.0;
+    sums.count = 1;
+  }
+  const int bins = feature.bins();
+  for (int b = 0; b < bins; ++b) {
+    const PackedSum sum = histogram[b];
+    const double weight = static_cast<double>(weight_of(sum)) * units.weight;
+    const double residual = static_cast<double>(residual_of(sum)) * units.residual;
+    const double centre = feature.centres[b];
+    const int k = sums.count;
+    sums.bin[k] = b;
+    sums.weight[k] = all.weight += weight;
+    sums.residual[k] = all.residual += residual;
+    sums.z[k] = all.z += weight * centre;
+    sums.zz[k] = all.zz += weight * centre * centre;
+    sums.ze[k] = all.ze += residual * centre;
+    sums.count += sum != 0 ? 1 : 0;
+  }
+  if (!missing_left) {
+    all.weight += missing_weight;
+    all.residual += missing_residual;
+  }
+  sums.all = all;
+}
+
+// S^2 / (N + c) + C_ze^2 / (C_zz + s) as one fraction; both 0 of no rows.
+struct Fraction {
+  double above = 0.0;
+  double below = 1.0;
+};
+
+LLMT_INLINE Fraction gain_of(double n, double s, double z, double zz, double ze, const Ridges& ridges, double slope) {
+  constexpr double tiny = 1e-100;  // in place of the weight of no rows
+  const double spread = n * zz - z * z;
+  const double common = slope * (n * ze - z * s);
+  const double below_slope = n * ((spread > 0.0 ? spread : 0.0) + ridges.slope * n) + tiny;
+  const double below = n + ridges.constant;
+  return {s * s * below_slope + common * common * below, below * below_slope};
+}
+
+// The gains where the left side ends with each bin that holds rows.
+LLMT_FOR_EACH_INSTRUCTION_SET
+void gains_at(double* __restrict gains, const RunningSums& sums, const Ridges& ridges, double slope) {
+  const Totals& all = sums.all;
+  const double of_node = all.residual * all.residual / (all.weight + ridges.constant);
+  for (int k = 0; k < sums.count; ++k) {
+    const Fraction left = gain_of(sums.weight[k], sums.residual[k], sums.z[k], sums.zz[k], sums.ze[k], ridges, slope);
+    const Fraction right = gain_of(all.weight - sums.weight[k], all.residual - sums.residual[k], all.z - sums.z[k],
+                                   all.zz - sums.zz[k], all.ze - sums.ze[k], ridges, slope);
+    gains[k] = (left.above * right.below + right.above * left.below) / (left.below * right.below) - of_node;
+  }
+}
+
+}  // namespace
+
+void add_gains(Gains& gains, const BinnedFeature& feature, const Histogram& histogram, const PackedUnits& units,
+               const Ridges& ridges, bool slopes, bool missing_left) {
+  RunningSums sums;
+  run(sums, feature, histogram, units, missing_left);
+  std::array<double, 257> of_bin;
+  gains_at(of_bin.data(), sums, ridges, slopes ? 1.0 : 0.0);
+  const Totals& all = sums.all;
+  const Fraction unsplit = gain_of(all.weight, all.residual, all.z, all.zz, all.ze, ridges, slopes ? 1.0 : 0.0);
+  double gain = unsplit.above / unsplit.below - all.residual * all.residual / (all.weight + ridges.constant);
+  int t = 0;
+  const int thresholds = feature.bins() - 1;
+  for (int k = 0; k < sums.count; ++k) {
+    for (; t < std::min(sums.bin[k], thresholds); ++t) gains[t] += gain;
+    gain = of_bin[k];
+  }
+  for (; t < thresholds; ++t) gains[t] += gain;
+}
+
+}  // namespace llmt

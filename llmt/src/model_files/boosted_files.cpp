@@ -1,0 +1,174 @@
+// Boosted models as JSON: docs/file-formats.md.
+#include <stdexcept>
+
+#include "boosted/model/boosted_checks.hpp"
+#include "llmt/boosted_model.hpp"
+#include "llmt/files.hpp"
+#include "model_files/model_json.hpp"
+
+namespace llmt {
+namespace {
+
+Json of_input(const InputColumn& input, double deviation) {
+  Json json = {{"name", input.name}, {"low", input.low}, {"high", input.high}};
+  if (input.is_categorical()) {
+    json["levels"] = input.levels;
+  } else {
+    json["centre"] = input.centre;
+    json["deviation"] = deviation;
+  }
+  return json;
+}
+
+Json of_feature(const BoostedFeature& feature) {
+  Json json = {{"column", feature.first}};
+  if (feature.level >= 0) json["level"] = feature.level;
+  if (feature.second >= 0) json[feature.sign > 0.0 ? "plus_column" : "minus_column"] = feature.second;
+  return json;
+}
+
+// Lists of numbers: a sum has thousands of splits and leaves.
+Json of_tree(const BoostedTree& tree) {
+  Json splits = Json::array();
+  for (const BoostedSplit& split : tree.splits) {
+    splits.push_back(
+        {split.feature, split.threshold, split.half_width, split.missing_left ? 1 : 0, split.left, split.right});
+  }
+  Json leaves = Json::array();
+  for (const BoostedLeaf& leaf : tree.leaves) {
+    Json of_leaf = {leaf.constant, leaf.low, leaf.high};
+    for (std::size_t k = 0; k < leaf.features.size(); ++k) {
+      of_leaf.push_back(leaf.features[k]);
+      of_leaf.push_back(leaf.slopes[k]);
+    }
+    leaves.push_back(std::move(of_leaf));
+  }
+  return {{"splits", std::move(splits)}, {"leaves", std::move(leaves)}};
+}
+
+InputColumn input_from(const JsonReader& json, double& deviation) {
+  InputColumn input{.name = json.member("name").as<std::string>(),
+                    .low = json.member("low").as<double>(),
+                    .high = json.member("high").as<double>()};
+  deviation = 1.0;
+  if (json.has("levels")) {
+    input.levels = json.member("levels").list<std::string>();
+    if (input.levels.empty()) json.member("levels").fail("it is empty");
+    return input;
+  }
+  input.centre = json.member("centre").as<double>();
+  deviation = json.member("deviation").as<double>();
+  return input;
+}
+
+BoostedFeature feature_from(const JsonReader& json) {
+  BoostedFeature feature{.first = json.member("column").as<int>(), .level = json.as("level", -1)};
+  for (const char* key : {"plus_column", "minus_column"}) {
+    if (!json.has(key)) continue;
+    feature.second = json.member(key).as<int>();
+    feature.sign = key[0] == 'p' ? 1.0 : -1.0;
+    if (feature.second < 0) json.member(key).fail("it must not be negative");
+  }
+  return feature;
+}
+
+BoostedSplit split_from(const JsonReader& json) {
+  const std::vector<JsonReader> parts = json.elements();
+  if (parts.size() != 6) json.fail("a split has 6 numbers");
+  const int side = parts[3].as<int>();
+  if (side != 0 && side != 1) parts[3].fail("0 or 1 is needed");
+  return {.feature = parts[0].as<int>(),
+          .threshold = parts[1].as<double>(),
+          .half_width = parts[2].as<double>(),
+          .missing_left = side == 1,
+          .left = parts[4].as<int>(),
+          .right = parts[5].as<int>()};
+}
+
+BoostedLeaf leaf_from(const JsonReader& json) {
+  const std::vector<JsonReader> parts = json.elements();
+  if (parts.size() < 3 || parts.size() % 2 == 0) json.fail("a leaf has 3 numbers, and 2 for each slope");
+  BoostedLeaf leaf{.constant = parts[0].as<double>(), .low = parts[1].as<double>(), .high = parts[2].as<double>()};
+  for (std::size_t k = 3; k < parts.size(); k += 2) {
+    leaf.features.push_back(parts[k].as<int>());
+    leaf.slopes.push_back(parts[k + 1].as<double>());
+  }
+  return leaf;
+}
+
+BoostedSum sum_from(const JsonReader& json) {
+  BoostedSum sum{
+      .base = json.member("base").as<double>(), .rate = json.member("rate").as<double>(), .features = {}, .trees = {}};
+  for (const JsonReader& feature : json.member("features").elements()) sum.features.push_back(feature_from(feature));
+  for (const JsonReader& entry : json.member("trees").elements()) {
+    BoostedTree tree;
+    for (const JsonReader& split : entry.member("splits").elements()) tree.splits.push_back(split_from(split));
+    for (const JsonReader& leaf : entry.member("leaves").elements()) tree.leaves.push_back(leaf_from(leaf));
+    sum.trees.push_back(std::move(tree));
+  }
+  return sum;
+}
+
+void check_boosted_format(const JsonReader& root) {
+  if (!root.has("format") || root.member("format").as<std::string>() != boosted_format_name) {
+    root.fail("not a file of a boosted model, which llmt fit --boost writes");
+  }
+  if (const int version = root.member("version").as<int>(); version != boosted_format_version) {
+    root.fail(fmt::format("version {} of the format of boosted models cannot be read, this program knows version {}",
+                          version, boosted_format_version));
+  }
+}
+
+}  // namespace
+
+std::string to_json(const BoostedModel& model) {
+  Json json = {{"format", boosted_format_name}, {"version", boosted_format_version}};
+  json["inputs"] = Json::array();
+  for (std::size_t j = 0; j < model.inputs().size(); ++j) {
+    json["inputs"].push_back(of_input(model.inputs()[j], model.deviations()[j]));
+  }
+  json["outputs"] = Json::array();
+  for (const OutputColumn& output : model.outputs()) {
+    json["outputs"].push_back({{"name", output.name}, {"low", output.low}, {"high", output.high}});
+  }
+  json["sums"] = Json::array();
+  for (const BoostedSum& sum : model.sums()) {
+    Json features = Json::array();
+    for (const BoostedFeature& feature : sum.features) features.push_back(of_feature(feature));
+    Json trees = Json::array();
+    for (const BoostedTree& tree : sum.trees) trees.push_back(of_tree(tree));
+    json["sums"].push_back(
+        {{"base", sum.base}, {"rate", sum.rate}, {"features", std::move(features)}, {"trees", std::move(trees)}});
+  }
+  return compact_text(json);
+}
+
+BoostedModel boosted_from_json(const std::string& text, const std::string& name) {
+  const JsonDocument document = parse_json(text, name, most_model_values);
+  const JsonReader root(document.value(), name);
+  check_boosted_format(root);
+  std::vector<InputColumn> inputs;
+  std::vector<double> deviations;
+  for (const JsonReader& input : root.member("inputs").elements()) {
+    inputs.push_back(input_from(input, deviations.emplace_back()));
+  }
+  std::vector<OutputColumn> outputs;
+  for (const JsonReader& output : root.member("outputs").elements()) {
+    outputs.push_back({.name = output.member("name").as<std::string>(),
+                       .low = output.member("low").as<double>(),
+                       .high = output.member("high").as<double>()});
+  }
+  std::vector<BoostedSum> sums;
+  for (const JsonReader& sum : root.member("sums").elements()) sums.push_back(sum_from(sum));
+  try {
+    return {std::move(inputs), std::move(outputs), std::move(deviations), std::move(sums)};
+  } catch (const BoostedFault& fault) {
+    root.fail_at(fault.pointer(), fault.problem());
+  }
+}
+
+void save(const BoostedModel& model, const std::string& path) { write_file(path, to_json(model)); }
+
+BoostedModel load_boosted(const std::string& path) { return boosted_from_json(read_file(path, model_limit), path); }
+
+}  // namespace llmt

@@ -1,0 +1,266 @@
+// Sums of trees, from rows to files.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "llmt/boosted.hpp"
+#include "llmt/fit.hpp"
+#include "llmt/random.hpp"
+
+namespace {
+
+constexpr double no_value = std::numeric_limits<double>::quiet_NaN();
+
+// Friedman's function of five inputs, an input of noise, noise of deviation 1.
+llmt::TrainingData friedman(Eigen::Index rows, std::uint64_t seed) {
+  llmt::Random random(seed);
+  llmt::TrainingData data;
+  data.inputs.resize(rows, 6);
+  data.outputs.resize(rows, 1);
+  for (Eigen::Index i = 0; i < rows; ++i) {
+    for (Eigen::Index j = 0; j < 6; ++j) data.inputs(i, j) = random.uniform();
+    const auto x = data.inputs.row(i);
+    data.outputs(i, 0) = 10.0 * std::sin(3.14159265 * x(0) * x(1)) + 20.0 * (x(2) - 0.5) * (x(2) - 0.5) + 10.0 * x(3) +
+                         5.0 * x(4) + random.normal();
+  }
+  return data;
+}
+
+double tree_at(const llmt::BoostedTree& tree, const std::vector<double>& z, int at, double share) {
+  if (at < 0) {
+    const llmt::BoostedLeaf& leaf = tree.leaves[-1 - at];
+    double value = leaf.constant;
+    for (std::size_t k = 0; k < leaf.features.size(); ++k) {
+      if (!std::isnan(z[leaf.features[k]])) value += leaf.slopes[k] * z[leaf.features[k]];
+    }
+    return share * std::min(std::max(value, leaf.low), leaf.high);
+  }
+  const llmt::BoostedSplit& split = tree.splits[at];
+  const double value = z[split.feature];
+  if (std::isnan(value)) return tree_at(tree, z, split.missing_left ? split.left : split.right, share);
+  const double u = (value - split.threshold) / split.half_width;
+  const double right = 0.5 + u * (3.0 - u * u) / 4.0;
+  if (std::abs(value - split.threshold) < split.half_width && share * right >= 0.08 && share * (1.0 - right) >= 0.08) {
+    return tree_at(tree, z, split.left, share * (1.0 - right)) + tree_at(tree, z, split.right, share * right);
+  }
+  return tree_at(tree, z, value <= split.threshold ? split.left : split.right, share);
+}
+
+double sum_at(const llmt::BoostedModel& model, Eigen::Index output, const Eigen::VectorXd& x) {
+  const llmt::BoostedSum& sum = model.sums()[output];
+  std::vector<double> z;
+  for (const llmt::BoostedFeature& feature : sum.features) {
+    const auto of = [&](int input) { return (x(input) - model.inputs()[input].centre) / model.deviations()[input]; };
+    const bool is_level = feature.level >= 0;
+    z.push_back(is_level              ? (std::isnan(x(feature.first)) ? no_value : x(feature.first) == feature.level)
+                : feature.second >= 0 ? of(feature.first) + feature.sign * of(feature.second)
+                                      : of(feature.first));
+  }
+  double value = 0.0;
+  for (const llmt::BoostedTree& tree : sum.trees) value += tree_at(tree, z, tree.splits.empty() ? -1 : 0, 1.0);
+  return sum.base + sum.rate * value;
+}
+
+// Missing values, a categorical input, two outputs.
+llmt::TrainingData mixed(Eigen::Index rows) {
+  llmt::TrainingData data = friedman(rows, 2);
+  llmt::Random random(3);
+  data.outputs.conservativeResize(Eigen::NoChange, 2);
+  for (Eigen::Index i = 0; i < rows; ++i) {
+    data.inputs(i, 5) = static_cast<double>(random.below(3));
+    data.outputs(i, 1) = data.inputs(i, 5) == 1.0 ? 5.0 : data.inputs(i, 0);
+    if (random.uniform() < 0.1) data.inputs(i, 2) = no_value;
+  }
+  data.levels = {{}, {}, {}, {}, {}, {"red", "green", "blue"}};
+  data.input_names = {"a", "b", "c", "d", "e", "colour"};
+  data.output_names = {"p", "q"};
+  return data;
+}
+
+TEST(BoostedModel, PredictsTheSumOfItsTreesToTheBit) {
+  const llmt::TrainingData data = mixed(400);
+  const llmt::BoostedModel model = llmt::fit_boosted(data, {.max_rounds = 30}).model;
+  const Eigen::MatrixXd predicted = model.predict(data.inputs, 2);
+  for (Eigen::Index i = 0; i < data.inputs.rows(); ++i) {
+    for (Eigen::Index o = 0; o < 2; ++o) EXPECT_EQ(predicted(i, o), sum_at(model, o, data.inputs.row(i)));
+    EXPECT_EQ(model.predict(data.inputs.row(i)), predicted.row(i));
+  }
+}
+
+TEST(FitBoosted, IsTheSameBytesAtAnyNumberOfThreads) {
+  const llmt::TrainingData data = friedman(5200, 4);  // enough for the races
+  llmt::BoostOptions options{.max_rounds = 12, .max_threads = 1};
+  const llmt::BoostResult one = llmt::fit_boosted(data, options);
+  EXPECT_GE(one.summaries[0].compared.size(), 4U);
+  for (const int threads : {2, 8}) {
+    options.max_threads = threads;
+    EXPECT_EQ(to_json(llmt::fit_boosted(data, options).model), to_json(one.model)) << threads;
+  }
+}
+
+TEST(FitBoosted, TakesARowOfWeightKForKRowsToTheByte) {
+  llmt::TrainingData weighted = friedman(200, 5);
+  weighted.weights = Eigen::VectorXd::Ones(200);
+  llmt::TrainingData repeated = weighted;
+  repeated.weights.resize(0);
+  Eigen::Index rows = 200;
+  for (Eigen::Index i = 0; i < 200; i += 3) {
+    weighted.weights(i) = 3.0;
+    for (int copy = 0; copy < 2; ++copy) {
+      repeated.inputs.conservativeResize(rows + 1, Eigen::NoChange);
+      repeated.outputs.conservativeResize(rows + 1, Eigen::NoChange);
+      repeated.inputs.row(rows) = weighted.inputs.row(i);
+      repeated.outputs.row(rows++) = weighted.outputs.row(i);
+    }
+  }
+  weighted.weights(1) = 0.0;
+  repeated.weights = Eigen::VectorXd::Ones(rows);
+  repeated.weights(1) = 0.0;
+  const llmt::BoostOptions options{.max_rounds = 20};
+  EXPECT_EQ(to_json(llmt::fit_boosted(weighted, options).model), to_json(llmt::fit_boosted(repeated, options).model));
+}
+
+TEST(FitBoosted, PredictsNewRowsBetterThanOneTreeWithSteps) {
+  // Many steps, which one tree of few rows cannot have.
+  const auto steps = [](Eigen::Index rows, std::uint64_t seed) {
+    llmt::TrainingData data = friedman(rows, seed);
+    for (Eigen::Index i = 0; i < rows; ++i) {
+      const auto x = data.inputs.row(i);
+      data.outputs(i, 0) = std::floor(4.0 * x(0)) * std::floor(3.0 * x(1)) + 2.0 * std::floor(5.0 * x(2)) + x(3);
+    }
+    return data;
+  };
+  const llmt::TrainingData data = steps(800, 6);
+  const llmt::TrainingData fresh = steps(2000, 7);
+  const llmt::BoostResult boosted = llmt::fit_boosted(data);
+  const double error = llmt::rmse(boosted.model.predict(fresh.inputs), fresh.outputs)(0);
+  const llmt::Model tree = llmt::fit(data).model;
+  EXPECT_LT(error, 0.8 * llmt::rmse(tree.predict(fresh.inputs), fresh.outputs)(0));
+  // Of trees of four fifths of the rows, so rather too large.
+  EXPECT_LT(error, 1.15 * boosted.summaries[0].rmse);
+}
+
+TEST(FitBoosted, FitsTheOtherRowsAloneWhereRowsAreHeldOut) {
+  llmt::TrainingData data = friedman(300, 8);
+  for (Eigen::Index row = 0; row < 60; ++row) data.held_out.push_back(row);
+  const llmt::BoostResult result = llmt::fit_boosted(data, {.max_rounds = 40});
+  EXPECT_EQ(result.summaries[0].rows, 240);
+  EXPECT_EQ(result.summaries[0].held_out, 60);
+  const Eigen::MatrixXd predicted = result.model.predict(data.inputs.topRows(60));
+  EXPECT_NEAR(result.summaries[0].rmse, llmt::rmse(predicted, data.outputs.topRows(60))(0), 1e-5);
+}
+
+TEST(FitBoosted, DoesNotDependOnTheUnitOfAnOutput) {
+  llmt::TrainingData data = friedman(300, 9);
+  const llmt::BoostOptions options{.max_rounds = 20};
+  const Eigen::MatrixXd predicted = llmt::fit_boosted(data, options).model.predict(data.inputs);
+  data.outputs *= 1024.0;
+  EXPECT_EQ(llmt::fit_boosted(data, options).model.predict(data.inputs), 1024.0 * predicted);
+}
+
+TEST(FitBoosted, KeepsPredictionsNearTheOutputsFarOutside) {
+  const llmt::TrainingData data = friedman(400, 10);
+  const llmt::BoostedModel model = llmt::fit_boosted(data).model;
+  const double range = data.outputs.maxCoeff() - data.outputs.minCoeff();
+  for (const double far : {-1e6, 1e6}) {
+    const double value = model.predict(Eigen::MatrixXd::Constant(1, 6, far))(0, 0);
+    EXPECT_GT(value, data.outputs.minCoeff() - range);
+    EXPECT_LT(value, data.outputs.maxCoeff() + range);
+  }
+  EXPECT_GT(llmt::distance_outside(model, Eigen::MatrixXd::Constant(1, 6, 1e6))[0], 1e5);
+  EXPECT_EQ(llmt::distance_outside(model, data.inputs.topRows(1))[0], 0.0);
+}
+
+TEST(FitBoosted, EndsWhereTheProgressSaysSo) {
+  EXPECT_THROW(llmt::fit_boosted(friedman(300, 11), {}, [](const llmt::ProgressReport&) { return false; }),
+               llmt::Cancelled);
+}
+
+TEST(FitBoosted, PredictsAnOutputThatNeverVaries) {
+  llmt::TrainingData data = friedman(50, 12);
+  data.outputs.setConstant(3.5);
+  const llmt::BoostedModel model = llmt::fit_boosted(data).model;
+  EXPECT_EQ(model.predict(data.inputs.topRows(1))(0, 0), 3.5);
+}
+
+void expect_refusal(const llmt::TrainingData& data, const llmt::BoostOptions& options, const std::string& words) {
+  try {
+    llmt::fit_boosted(data, options);
+    FAIL() << words;
+  } catch (const std::invalid_argument& error) {
+    EXPECT_NE(std::string(error.what()).find(words), std::string::npos) << error.what();
+  }
+}
+
+TEST(FitBoosted, SaysWhatIsWrong) {
+  expect_refusal(friedman(9, 1), {}, "9 different rows, at least 10 are needed");
+  expect_refusal(friedman(50, 1), {.rate = 1.5}, "rate is 1.5");
+  expect_refusal(friedman(50, 1), {.max_rounds = 0}, "max_rounds is 0");
+  llmt::TrainingData data = friedman(50, 1);
+  data.inputs(3, 2) = std::numeric_limits<double>::infinity();
+  expect_refusal(data, {}, "inputs(3, 2) is inf");
+  data = friedman(80, 1);
+  for (Eigen::Index i = 0; i < 80; ++i) data.inputs(i, 0) = static_cast<double>(i);
+  data.categorical_inputs = {0};
+  expect_refusal(data, {}, "has 80 levels, boosting takes at most 50");
+}
+
+TEST(BoostedFile, ReadsBackExactly) {
+  const llmt::TrainingData data = mixed(200);
+  const llmt::BoostedModel model = llmt::fit_boosted(data, {.max_rounds = 8}).model;
+  const std::string text = to_json(model);
+  const llmt::BoostedModel again = llmt::boosted_from_json(text);
+  EXPECT_EQ(to_json(again), text);
+  EXPECT_EQ(again.predict(data.inputs), model.predict(data.inputs));
+  EXPECT_EQ(again.inputs()[5].levels, data.levels[5]);
+}
+
+void expect_fault(const std::string& text, const std::string& words) {
+  try {
+    llmt::boosted_from_json(text, "file");
+    FAIL() << words;
+  } catch (const std::runtime_error& error) {
+    EXPECT_NE(std::string(error.what()).find(words), std::string::npos) << error.what();
+  }
+}
+
+TEST(BoostedFile, SaysWhereItIsWrong) {
+  using Json = nlohmann::ordered_json;
+  const llmt::TrainingData data = mixed(200);
+  const Json good = Json::parse(to_json(llmt::fit_boosted(data, {.max_rounds = 3}).model));
+  const auto changed = [&](const std::string& pointer, const Json& value) {
+    Json bad = good;
+    bad[Json::json_pointer(pointer)] = value;
+    return bad.dump();
+  };
+  expect_fault(changed("/format", "llmt-model"), "not a file of a boosted model");
+  expect_fault(changed("/version", 2), "version 2 of the format");
+  expect_fault(changed("/inputs/0/deviation", 0.0), "/inputs/0: deviation is not a positive number");
+  expect_fault(changed("/inputs/1/name", "a"), "/inputs/1: its name is there twice");
+  expect_fault(changed("/sums/0/rate", 2.0), "/sums/0: rate is not in (0, 1]");
+  expect_fault(changed("/sums/0/features/0/column", 6), "/sums/0/features/0: the first input is no numeric input");
+  expect_fault(changed("/sums/0/features/0/plus_column", 0), "the second input is no other numeric input");
+  expect_fault(changed("/sums/0/trees/0/splits/0/0", 99), "/sums/0/trees/0/splits/0: there is no feature 99");
+  expect_fault(changed("/sums/0/trees/0/splits/0/4", 0), "/sums/0/trees/0/splits/0: 0 is no child");
+  expect_fault(changed("/sums/0/trees/0/splits/0/4", -2000000000), "is no child");
+  expect_fault(changed("/sums/0/trees/0/leaves/0", {1.0, 2.0}), "/sums/0/trees/0/leaves/0: a leaf has 3 numbers");
+  expect_fault(changed("/sums/0/trees/0/leaves/0", {1.0, 3.0, 2.0}), "low and high are no range");
+  expect_fault(changed("/sums/0/trees/0/leaves/0", {1.0, 1.0, 2.0, -1, 1.0}), "there is no feature -1");
+  expect_fault(changed("/sums/1", Json::object()), "/sums/1");
+  expect_fault("{}", "not a file of a boosted model");
+}
+
+TEST(BoostedFile, IsRefusedByNameWhereOneTreeIsNeeded) {
+  const std::string text = to_json(llmt::fit_boosted(friedman(50, 1), {.max_rounds = 2}).model);
+  try {
+    llmt::from_json(text);
+    FAIL();
+  } catch (const std::runtime_error& error) {
+    EXPECT_NE(std::string(error.what()).find("a boosted model, the sum of many trees"), std::string::npos);
+  }
+}
+
+}  // namespace

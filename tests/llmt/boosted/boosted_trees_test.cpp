@@ -1,0 +1,287 @@
+// The parts of a boosted tree against plain formulas.
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <cmath>
+#include <limits>
+
+#include "boosted/growing_tree.hpp"
+
+namespace {
+
+constexpr double missing = std::numeric_limits<double>::quiet_NaN();
+
+struct Rows {
+  llmt::BinnedRows binned;
+  Eigen::MatrixXd z;
+  Eigen::VectorXd y;
+  std::vector<int> all;
+};
+
+Rows some_rows(Eigen::Index count, Eigen::Index features, bool weighted, double missing_share, std::uint64_t seed) {
+  llmt::Random random(seed);
+  Rows rows;
+  rows.z.resize(count, features);
+  rows.y.resize(count);
+  rows.binned.weights = Eigen::VectorXd::Ones(count);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    for (Eigen::Index j = 0; j < features; ++j) {
+      rows.z(i, j) = static_cast<float>(j == 1 ? std::floor(random.uniform(0.0, 6.0)) : random.normal());
+      if (random.uniform() < missing_share) rows.z(i, j) = missing;
+    }
+    rows.y(i) = random.normal() + (std::isnan(rows.z(i, 0)) ? 1.0 : std::abs(rows.z(i, 0)));
+    if (weighted) rows.binned.weights(i) = 0.5 + random.uniform();
+    rows.all.push_back(static_cast<int>(i));
+  }
+  rows.binned.equal_weights = !weighted;
+  for (int j = 0; j < features; ++j) {
+    rows.binned.features.push_back(llmt::bin_feature({.first = j}, rows.z.col(j), rows.binned.weights));
+  }
+  return rows;
+}
+
+std::vector<llmt::PackedSum> packed_rows(const Rows& rows, llmt::PackedUnits& units) {
+  units = llmt::units_of(std::span(rows.y.data(), rows.y.size()),
+                         std::span(rows.binned.weights.data(), rows.binned.weights.size()), rows.binned.equal_weights);
+  std::vector<llmt::PackedSum> terms;
+  for (const int row : rows.all) terms.push_back(llmt::packed(rows.y(row), rows.binned.weights(row), units));
+  return terms;
+}
+
+llmt::Histogram histogram_of(const llmt::BinnedFeature& feature, const std::vector<int>& rows,
+                             const std::vector<llmt::PackedSum>& all_terms) {
+  std::vector<llmt::PackedSum> terms;
+  for (const int row : rows) terms.push_back(all_terms[row]);
+  llmt::Histogram histogram{};
+  llmt::add_to(histogram, feature, rows, terms);
+  return histogram;
+}
+
+// What a constant and, if asked for, a slope with their ridges explain of the rows of one side.
+double gain_of_side(const Rows& rows, int feature, const std::vector<int>& side, const llmt::Ridges& ridges,
+                    bool slopes) {
+  const llmt::BinnedFeature& column = rows.binned.features[feature];
+  double n = 0.0;
+  double s = 0.0;
+  double mean = 0.0;
+  const auto centre = [&](int row) {
+    return column.codes[row] == llmt::missing_code ? 0.0 : column.centres[column.codes[row]];
+  };
+  for (const int row : side) {
+    n += rows.binned.weights(row);
+    s += rows.binned.weights(row) * rows.y(row);
+    mean += rows.binned.weights(row) * centre(row);
+  }
+  if (n == 0.0) return 0.0;
+  mean /= n;
+  double zz = 0.0;
+  double ze = 0.0;
+  for (const int row : side) {
+    zz += rows.binned.weights(row) * (centre(row) - mean) * (centre(row) - mean);
+    ze += rows.binned.weights(row) * (centre(row) - mean) * rows.y(row);
+  }
+  return s * s / (n + ridges.constant) + (slopes ? ze * ze / (zz + ridges.slope) : 0.0);
+}
+
+TEST(BinnedFeature, HoldsEachRowBetweenItsEdges) {
+  const Rows rows = some_rows(3000, 3, true, 0.1, 1);
+  for (int j = 0; j < 3; ++j) {
+    const llmt::BinnedFeature& feature = rows.binned.features[j];
+    EXPECT_LE(feature.bins(), llmt::most_bins);
+    EXPECT_EQ(feature.bins(), j == 1 ? 6 : llmt::most_bins);
+    for (const int row : rows.all) {
+      const double z = rows.z(row, j);
+      const int code = feature.codes[row];
+      if (std::isnan(z)) {
+        EXPECT_EQ(code, llmt::missing_code);
+        continue;
+      }
+      EXPECT_TRUE(code == 0 || z > feature.edges[code - 1]);
+      EXPECT_TRUE(code + 1 == feature.bins() || z <= feature.edges[code]);
+    }
+  }
+}
+
+TEST(PackedSums, OfOneChildAreThoseOfTheNodeMinusThoseOfTheOther) {
+  for (const bool weighted : {false, true}) {
+    const Rows rows = some_rows(2000, 2, weighted, 0.1, 2);
+    llmt::PackedUnits units;
+    const std::vector<llmt::PackedSum> terms = packed_rows(rows, units);
+    std::vector<int> left;
+    std::vector<int> right;
+    for (const int row : rows.all) (rows.z(row, 1) < 3.0 ? left : right).push_back(row);
+    const llmt::BinnedFeature& feature = rows.binned.features[0];
+    const llmt::Histogram node = histogram_of(feature, rows.all, terms);
+    const llmt::Histogram of_left = histogram_of(feature, left, terms);
+    const llmt::Histogram of_right = histogram_of(feature, right, terms);
+    for (std::size_t b = 0; b < node.size(); ++b) EXPECT_EQ(node[b] - of_left[b], of_right[b]) << b;
+  }
+}
+
+TEST(PackedSums, AreWithinHalfAUnitARow) {
+  const Rows rows = some_rows(2000, 1, true, 0.0, 3);
+  llmt::PackedUnits units;
+  const std::vector<llmt::PackedSum> terms = packed_rows(rows, units);
+  llmt::PackedSum sum = 0;
+  for (const llmt::PackedSum term : terms) sum += term;
+  const double count = static_cast<double>(terms.size());
+  EXPECT_NEAR(static_cast<double>(llmt::weight_of(sum)) * units.weight, rows.binned.weights.sum(),
+              0.5 * count * units.weight);
+  EXPECT_NEAR(static_cast<double>(llmt::residual_of(sum)) * units.residual, rows.binned.weights.dot(rows.y),
+              0.5 * count * units.residual);
+  EXPECT_LT(units.residual, 1e-5);
+}
+
+TEST(SplitGain, EqualsBruteForce) {
+  const llmt::Ridges ridges{.constant = 2.0, .slope = 1.5};
+  for (const bool weighted : {false, true}) {
+    for (const bool slopes : {false, true}) {
+      for (const bool missing_left : {false, true}) {
+        const Rows rows = some_rows(300, 3, weighted, 0.1, 4);
+        llmt::PackedUnits units;
+        const std::vector<llmt::PackedSum> terms = packed_rows(rows, units);
+        const std::vector<int> node(rows.all.begin() + 50, rows.all.begin() + 120);  // many bins are empty
+        for (int j = 0; j < 3; ++j) {
+          const llmt::BinnedFeature& feature = rows.binned.features[j];
+          llmt::Gains gains{};
+          llmt::add_gains(gains, feature, histogram_of(feature, node, terms), units, ridges, slopes, missing_left);
+          const double of_node = gain_of_side(rows, j, node, ridges, false);
+          for (int t = 0; t + 1 < feature.bins(); ++t) {
+            std::vector<int> left;
+            std::vector<int> right;
+            for (const int row : node) {
+              const int code = feature.codes[row];
+              (code == llmt::missing_code ? missing_left : code <= t) ? left.push_back(row) : right.push_back(row);
+            }
+            const double expected =
+                gain_of_side(rows, j, left, ridges, slopes) + gain_of_side(rows, j, right, ridges, slopes) - of_node;
+            EXPECT_NEAR(gains[t], expected, 1e-4) << j << " " << t;
+          }
+        }
+      }
+    }
+  }
+}
+
+// The model of a node that the equations give, from its parent's.
+struct Path {
+  double constant = 0.0;
+  Eigen::VectorXd slope;
+  double at(const Eigen::VectorXd& z) const { return constant + slope.dot(z); }
+};
+
+Path ridge_about(const Path& path, const Rows& rows, const std::vector<int>& side, const std::vector<int>& features,
+                 const llmt::Ridges& ridges) {
+  const Eigen::Index size = std::ssize(features);
+  double n = 0.0;
+  double s = 0.0;
+  Eigen::VectorXd mean = Eigen::VectorXd::Zero(size);
+  for (const int row : side) {
+    const double w = rows.binned.weights(row);
+    n += w;
+    s += w * (rows.y(row) - path.at(rows.z.row(row)));
+    mean += w * rows.z(row, features).transpose();
+  }
+  mean /= n;
+  Eigen::MatrixXd a = ridges.slope * Eigen::MatrixXd::Identity(size, size);
+  Eigen::VectorXd b = Eigen::VectorXd::Zero(size);
+  for (const int row : side) {
+    const Eigen::VectorXd d = rows.z(row, features).transpose() - mean;
+    a += rows.binned.weights(row) * d * d.transpose();
+    b += rows.binned.weights(row) * d * (rows.y(row) - path.at(rows.z.row(row)));
+  }
+  const Eigen::VectorXd slopes = a.ldlt().solve(b);
+  Path result = path;
+  result.constant += s / (n + ridges.constant) - slopes.dot(mean);
+  for (Eigen::Index k = 0; k < size; ++k) result.slope(features[k]) += slopes(k);
+  return result;
+}
+
+void expect_ridges(const llmt::GrowingTree& tree, const Rows& rows, int index, const std::vector<int>& held,
+                   const Path& path, const llmt::Ridges& ridges) {
+  const llmt::GrowingNode& node = tree[index];
+  if (node.feature < 0) {
+    if (held.empty()) return;
+    const Path expected = ridge_about(path, rows, held, node.model.features, ridges);
+    EXPECT_NEAR(node.model.constant, expected.constant, 1e-9);
+    for (std::size_t k = 0; k < node.model.features.size(); ++k) {
+      EXPECT_NEAR(node.model.slopes[k], expected.slope(node.model.features[k]), 1e-9);
+    }
+    return;
+  }
+  for (const bool is_left : {true, false}) {
+    std::vector<int> side;
+    for (const int row : held) {
+      if ((rows.binned.features[node.feature].codes[row] <= node.bin) == is_left) side.push_back(row);
+    }
+    const Path below = side.empty() ? path : ridge_about(path, rows, side, {node.feature}, ridges);
+    expect_ridges(tree, rows, is_left ? node.left : node.right, side, below, ridges);
+  }
+}
+
+TEST(BoostedTree, HasInItsLeavesRidgeAboutTheirPath) {
+  for (const bool symmetric : {true, false}) {
+    const Rows rows = some_rows(400, 3, true, 0.0, 5);
+    llmt::TreeOptions options;
+    options.symmetric = symmetric;
+    options.depth = 3;
+    options.leaves = 7;
+    options.columns = 1.0;
+    llmt::TreeGrower grower(rows.binned, rows.all, options, 1);
+    llmt::Random random(1);
+    const llmt::GrowingTree tree = grower.grow(rows.y, random);
+    EXPECT_GT(tree.size(), 8U);
+    const Path root{rows.binned.weights.dot(rows.y) / rows.binned.weights.sum(), Eigen::VectorXd::Zero(3)};
+    expect_ridges(tree, rows, 0, rows.all, root, options.ridges);
+  }
+}
+
+// One leaf: the weighted mean. Its one leaf has no path, so no slope.
+TEST(BoostedTree, OfOneLeafIsTheMean) {
+  const Rows rows = some_rows(100, 2, true, 0.0, 6);
+  llmt::TreeOptions options;
+  options.depth = 0;
+  llmt::TreeGrower grower(rows.binned, rows.all, options, 1);
+  llmt::Random random(1);
+  const llmt::GrowingTree tree = grower.grow(rows.y, random);
+  ASSERT_EQ(tree.size(), 1U);
+  const double mean = rows.binned.weights.dot(rows.y) / rows.binned.weights.sum();
+  for (const int row : rows.all) EXPECT_NEAR(llmt::value_at(tree, rows.binned, row), mean, 1e-12);
+}
+
+// The same rows, so the same leaves.
+TEST(BoostedTree, IsTheSameWhenItsLeavesAreEstimatedAnew) {
+  for (const double softness : {0.0, 0.6}) {
+    const Rows rows = some_rows(500, 3, false, 0.1, 7);
+    llmt::TreeOptions options;
+    options.depth = 4;
+    options.softness = softness;
+    llmt::TreeGrower grower(rows.binned, rows.all, options, 1);
+    llmt::Random random(3);
+    const llmt::GrowingTree grown = grower.grow(rows.y, random);
+    const llmt::GrowingTree again = grower.estimate(grown, rows.y);
+    double largest = 0.0;
+    Eigen::VectorXd left = rows.y;
+    grower.subtract_last(again, 0.25, left);
+    for (const int row : rows.all) {
+      const double value = llmt::value_at(grown, rows.binned, row);
+      largest = std::max(largest, std::abs(value - llmt::value_at(again, rows.binned, row)));
+      EXPECT_NEAR(left(row), rows.y(row) - 0.25 * value, 1e-9);
+    }
+    EXPECT_LT(largest, 1e-9);
+  }
+}
+
+TEST(BoostedTree, OfSoftSplitsBlendsTheSidesOfARow) {
+  const Rows rows = some_rows(2000, 2, false, 0.0, 8);
+  llmt::TreeOptions options;
+  options.softness = 0.6;
+  options.depth = 3;
+  llmt::TreeGrower grower(rows.binned, rows.all, options, 1);
+  llmt::Random random(1);
+  Eigen::VectorXd smooth = rows.z.col(0).array().square();
+  const llmt::GrowingTree tree = grower.grow(smooth, random);
+  EXPECT_TRUE(std::ranges::any_of(tree, [](const llmt::GrowingNode& node) { return node.half_width > 0.0; }));
+}
+
+}  // namespace
