@@ -124,6 +124,11 @@ def test_a_printed_readable_tree_has_its_equations(readable):
         assert equation in text
 
 
+def test_the_cost_of_reading_is_printed(table, readable):
+    assert "Reading costs 11 % more error; a smaller share, such as readable=0.05, costs less." in " ".join(str(readable).split())
+    assert "Reading costs" not in str(LocalLinearTreeRegressor(validity="crisp").fit(*table))
+
+
 def test_a_fit_judged_by_given_rows_has_no_spread(table):
     X, y = table
     model = LocalLinearTreeRegressor().fit(X[:400], y[:400], eval_set=(X[400:], y[400:]))
