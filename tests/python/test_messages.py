@@ -209,6 +209,13 @@ def test_what_the_page_warns_of_is_a_warning(arm, measured):
     assert any("no better than the described one" in sentence for sentence in far.warnings)
 
 
+def test_a_common_scale_is_warned_of(arm, measured):
+    scaled = measured.assign(**{name: measured[name] * 1.016 for name in ("x_mm", "y_mm", "z_mm")})
+    with pytest.warns(robotics.RobotWarning, match="all identified lengths are 1.01[567][0-9]* times those described"):
+        robotics.calibrate(arm, scaled, folds=0)
+    assert robotics.calibrate(arm, measured, folds=0).warnings == []
+
+
 def test_a_urdf_says_what_it_does_not_hold(measured, tmp_path):
     made = robotics.calibrate(robotics.robot(SAMPLES / "arm.urdf"), measured, folds=0)
     with pytest.warns(robotics.RobotWarning, match="arm.urdf holds the geometry only; .*base: in .*arm.yaml, load that"):

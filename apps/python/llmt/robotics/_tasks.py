@@ -131,6 +131,32 @@ def _on_the_page(made: dict[str, Any], source: Source) -> list[str]:
     return [sentence for sentence in said if sentence not in made["warnings"]]
 
 
+def _common_scale(made: dict[str, Any], arm: Any) -> list[str]:
+    """A remark where all identified lengths of 10 mm or more changed by one factor, of more than 0.3 % and beyond three
+    standard errors: then a scale error of the instrument looks the same."""
+    described = {
+        f"{joint['name']}.{key}": joint[f"{key}_mm"]
+        for joint in json.loads(arm._bound.json())["joints"]
+        for key in ("a", "d")
+        if abs(joint.get(f"{key}_mm", 0.0)) >= 10.0
+    }
+    lengths = [of for of in json.loads(made["json"])["parameters"] if of["name"] in described and of["standard_error"]]
+    if len(lengths) < 3:
+        return []
+    nominal = np.array([described[of["name"]] for of in lengths])
+    value = np.array([of["value"] for of in lengths])
+    error = np.array([of["standard_error"] for of in lengths])
+    factor = float(value @ nominal / (nominal @ nominal))
+    change = np.abs((factor - 1.0) * nominal)
+    is_common = (np.abs(value - factor * nominal) <= np.maximum(3.0 * error, 0.1 * change)).all()
+    if not is_common or abs(factor - 1.0) <= 0.003 or change.max() <= 3.0 * error[change.argmax()]:
+        return []
+    return [
+        f"all identified lengths are {factor:.4f} times those described: if the instrument or the unit of the "
+        "measurements has a scale error, it looks the same; check the scale of x_mm, y_mm and z_mm"
+    ]
+
+
 def _folds(folds: Any) -> int:
     count: int = number("folds", folds, 0, 2**31 - 1, whole=True)
     if count == 1:
@@ -234,7 +260,7 @@ def calibrate(
         if causes:
             raise ValueError(f"{error}. Likely: {'; '.join(causes)}") from None
         raise
-    made["warnings"] = [*made["warnings"], *_on_the_page(made, given)]
+    made["warnings"] = [*made["warnings"], *_on_the_page(made, given), *_common_scale(made, arm)]
     _write_page(report, made)
     return Calibration(_warned(made))
 
