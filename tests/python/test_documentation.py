@@ -4,6 +4,7 @@ import doctest
 import importlib
 import os
 import pkgutil
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -12,6 +13,9 @@ import pytest
 
 import llmt
 
+ROOT = Path(__file__).parents[2]
+PAGES = [ROOT / "README.md", ROOT / "docs" / "python.md", *sorted((ROOT / "docs" / "python").glob("*.md"))]
+PAGES = [page for page in PAGES if "```python\n" in page.read_text(encoding="utf-8")]
 EXAMPLES = sorted((Path(__file__).parents[2] / "docs" / "examples" / "python").glob("*.py"))
 
 
@@ -45,3 +49,21 @@ def test_a_program_of_the_documentation_runs(program, tmp_path):
     print(run.stdout)
     assert run.returncode == 0, run.stderr
     assert run.stdout
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda path: path.stem)
+def test_the_blocks_of_a_page_run_one_after_the_other(page, tmp_path):
+    for module in ("matplotlib", "onnx", "pandas", "sklearn", "sympy"):
+        pytest.importorskip(module)
+    (tmp_path / "docs").symlink_to(ROOT / "docs")  # what blocks write is not left in the repository
+    blocks = re.findall(r"^```python\n(.*?)^```$", page.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
+    environment = {**os.environ, "PYTHONPATH": str(Path(llmt.__path__[0]).resolve().parent), "MPLBACKEND": "agg"}
+    run = subprocess.run(
+        [sys.executable, "-c", "\n".join(blocks)],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=300,
+        env=environment,
+    )
+    assert run.returncode == 0, run.stderr

@@ -244,7 +244,7 @@ def changed(frame, column, row, value):
         (lambda frame: frame.rename(columns={"x_mm": 7}), TypeError, "7"),
         (lambda frame: {**{name: list(frame[name]) for name in frame}, "z_mm": [1.0]}, ValueError, "z_mm"),
         (lambda frame: 3.0, TypeError, "measured: float"),
-        (lambda frame: "no_such_file.csv", ValueError, "no_such_file.csv"),
+        (lambda frame: "no_such_file.csv", FileNotFoundError, "no_such_file.csv"),
     ],
 )
 def test_what_is_wrong_with_a_table_is_named(arm, measured, change, error, words):

@@ -6,6 +6,7 @@ import numpy as np
 
 from . import _core
 from .tables import Table
+from .tables.raw import number_hint
 
 
 def warn_of_accidental_inputs(table: Table, meant: set[str], stacklevel: int) -> None:
@@ -26,12 +27,24 @@ def warn_of_accidental_inputs(table: Table, meant: set[str], stacklevel: int) ->
             )
         elif kind == "dates":
             text = "looks like a date and is taken for categories; give a number, as days, or leave it out of X"
+        elif hint := number_hint(table.levels[position], f'X["{name}"]'):
+            text = f"has words that read as numbers, and is taken for categories; convert it: {hint}"
         else:
             text = (
                 f"has words, {len(table.levels[position])} different ones in {len(table.values)} rows, and is taken for "
                 "categories; leave it out of X if they are names of the rows, or name it in categorical_features"
             )
         warnings.warn(f'column "{name}" {text}', stacklevel=stacklevel)
+
+
+def warn_of_few_rows(rows: int, stacklevel: int) -> None:
+    """Warns where the errors on held-out rows say next to nothing."""
+    if rows < 10:
+        warnings.warn(
+            f"X has {rows} row{'' if rows == 1 else 's'}: below 10, held-out errors cannot tell which model is better, and "
+            "the mean of y may be; give more rows",
+            stacklevel=stacklevel,
+        )
 
 
 def warn_of_gross_errors(fitted: "_core.Fit", outputs: np.ndarray, names: list[str], stacklevel: int) -> None:

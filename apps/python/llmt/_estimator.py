@@ -2,7 +2,8 @@
 
 import json
 import os
-from collections.abc import Mapping, Sequence
+import warnings
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Literal
 
 import numpy as np
@@ -16,6 +17,13 @@ from ._views import Views
 from .tables import Table, read_column, read_table, read_targets, row_labels
 
 _most_seeds = 2**31
+_choices = {
+    "rule": ("rd", "retis", "ra", "m5", "lolimot", "lolimot-data", "hilomot"),
+    "validity": ("auto", "crisp", "blend", "gaussian"),
+    "local_models": ("linear", "quadratic", "auto"),
+    "sparse": ("never", "auto", "always"),
+    "loss": ("squared", "tukey"),
+}
 
 
 class LocalLinearTreeRegressor(Views, RegressorMixin, BaseEstimator):
@@ -31,9 +39,9 @@ class LocalLinearTreeRegressor(Views, RegressorMixin, BaseEstimator):
     Parameters
     ----------
     max_leaves : int or None, default=None
-        Most leaves of a tree. None: 300, fewer for few rows.
+        Most leaves of a tree. None or 0: 300, fewer for few rows.
     min_samples_leaf : int or None, default=None
-        Fewest rows in a leaf. None: depends on the number of inputs.
+        Fewest rows in a leaf. None or 0: depends on the number of inputs.
     rule : {"rd", "retis", "ra", "m5", "lolimot", "lolimot-data", "hilomot"}, default="rd"
         How the tree is grown.
     validity : {"auto", "crisp", "blend", "gaussian"}, default="auto"
@@ -176,6 +184,7 @@ class LocalLinearTreeRegressor(Views, RegressorMixin, BaseEstimator):
         meant = {str(name) for name in self.categorical_features}
         _advice.warn_of_accidental_inputs(table, meant, stacklevel=3)
         _advice.check_targets(outputs, self._outputs, self.loss != "squared", stacklevel=4)
+        _advice.warn_of_few_rows(rows, stacklevel=3)
         options = self._options(table)
         if not isinstance(self.cv, (int, np.integer)) and not held_out:
             options["folds"], labels = _given_folds(self.cv, X, y, groups, rows)
@@ -263,8 +272,28 @@ class LocalLinearTreeRegressor(Views, RegressorMixin, BaseEstimator):
         ------
         ValueError
             If nothing was held out in the fit (cv=0), or too few rows for the coverage.
+
+        Warns
+        -----
+        UserWarning
+            Of rows outside of the training ranges, for which no interval is honest. `check` says where they are.
         """
-        lower, upper, _ = self._model().handle.intervals(self._table(X).values, float(coverage), self._threads())
+        handle = self._model().handle
+        level = _share("coverage", coverage)
+        if not handle.has_intervals:
+            raise ValueError(
+                "predict_interval needs rows that were held out, and this model has none: fit it with cv=5 (cv=0 holds "
+                "nothing out, and partial_fit does not either)"
+            )
+        values = self._table(X).values
+        lower, upper, _ = handle.intervals(values, level, self._threads())
+        outside = np.flatnonzero(handle.extrapolation(values, self._threads())[:, 0] > 0)
+        if len(outside):
+            warnings.warn(
+                f"{len(outside)} of {len(values)} rows lie outside of the training ranges, the first is row {outside[0]}: "
+                "their intervals are not to be believed; check(X) names the columns",
+                stacklevel=2,
+            )
         ends = np.stack([lower, upper], axis=1)
         return ends[:, :, 0] if self._is_flat else ends
 
@@ -383,6 +412,9 @@ class LocalLinearTreeRegressor(Views, RegressorMixin, BaseEstimator):
         return _count("random_state", self.random_state)
 
     def _options(self, table: Table) -> dict[str, Any]:
+        for name, choices in _choices.items():
+            if getattr(self, name) not in choices:
+                raise ValueError(f"{name} is {getattr(self, name)!r}; it must be one of {', '.join(choices)}")
         options = {
             "max_leaves": _count("max_leaves", self.max_leaves),
             "min_leaf_samples": _count("min_samples_leaf", self.min_samples_leaf),
@@ -391,7 +423,7 @@ class LocalLinearTreeRegressor(Views, RegressorMixin, BaseEstimator):
             "terms": self.local_models,
             "sparse": self.sparse,
             "loss": self.loss,
-            "folds": _count("cv", self.cv) if isinstance(self.cv, (int, np.integer)) else 5,
+            "folds": _folds(self.cv),
             "contiguous": bool(self.contiguous),
             "seed": self._seed(),
             "choose_inputs": bool(self.select_features),
@@ -425,6 +457,8 @@ def _weights_of(sample_weight: Any, rows: int) -> np.ndarray | None:
 
 def _given_folds(cv: Any, X: Any, y: Any, groups: Any, rows: int) -> tuple[int, np.ndarray]:
     """Folds that the user dealt, as groups: with as many groups as folds each group is a fold."""
+    if isinstance(cv, str) or not (hasattr(cv, "split") or isinstance(cv, Iterable)):
+        raise ValueError(f"cv is {cv!r}; it must be a whole number, a splitter or a list of (train, test)")
     splits = list(cv.split(X, y, groups) if hasattr(cv, "split") else cv)
     labels = np.full(rows, np.nan)
     for fold, (_, test) in enumerate(splits):
@@ -444,6 +478,24 @@ def _names_of(table: Table) -> list[str]:
 
 def _target_names(outputs: int) -> list[str]:
     return ["y"] if outputs == 1 else [f"y{position}" for position in range(outputs)]
+
+
+def _share(name: str, value: Any) -> float:
+    share = float(value)
+    if not 0.0 < share < 1.0:
+        hint = f": {share / 100.0:g} for {share:g} %" if 1.0 < share < 100.0 else ""
+        raise ValueError(f"{name} is {value!r}; it must lie between 0 and 1{hint}")
+    return share
+
+
+def _folds(cv: Any) -> int:
+    """The number of folds; 5 where `cv` deals them itself."""
+    if not isinstance(cv, (int, np.integer)):
+        return 5
+    count = _count("cv", cv)
+    if count == 1:
+        raise ValueError("cv is 1; it must be 2 folds or more, or 0 to hold nothing out")
+    return count
 
 
 def _count(name: str, value: Any) -> int:

@@ -149,11 +149,12 @@ def kind_of(candidate: dict[str, Any]) -> str:
     return kind + (", sparse" if candidate["sparse"] else "")
 
 
-def candidates_frame(summary: dict[str, Any], mean: Any = None) -> Any:
+def candidates_frame(summary: dict[str, Any], mean: Any = None, readable: bool = False) -> Any:
     """What the fit compared on held-out rows, best first, for each target or group of targets that share a tree.
 
     Columns: `target`; `model`, the kind in words; `validity` and `width` of the transitions; `leaves`; `rmse`, of rows
-    held out, and `spread`, the standard deviation of the folds' RMSE; `chosen`. The readable tree and the mean of the
+    held out, and `spread`, the standard deviation of the folds' RMSE; `chosen`: the model that predicts, with `readable` the
+    readable tree. The readable tree and the mean of the
     rows (the error of a model that knows no input; `mean`: what `mean_baseline` returned) are there if they are known.
     A chosen model may be a little worse than the best: of models that chance does not tell apart the simplest is taken.
     """
@@ -165,7 +166,8 @@ def candidates_frame(summary: dict[str, Any], mean: Any = None) -> Any:
         compared = [chosen] + [other for other in partition["compared"] if other != chosen]
         of_partition = [
             _candidate(
-                target, kind_of(c), c["validity"], c["width"], c["leaves"], c["cv_rmse"], c["spread"], c is chosen
+                target, kind_of(c), c["validity"], c["width"], c["leaves"], c["cv_rmse"], c["spread"],
+                c is chosen and not readable,
             )
             for c in compared
         ]
@@ -187,9 +189,10 @@ def candidates_frame(summary: dict[str, Any], mean: Any = None) -> Any:
                         simple["leaves"],
                         simple["cv_rmse"],
                         simple["spread"],
-                        False,
+                        readable,
                     )
                 )
+        of_partition = [row for k, row in enumerate(of_partition) if row not in of_partition[:k]]
         size = len(partition["targets"])
         if mean is not None and size == 1:
             rmse, spread = (float(np.ravel(values)[position]) for values in mean)

@@ -60,7 +60,11 @@ class Model:
     def load(cls, path: "str | os.PathLike[str]") -> "Model":
         """Reads a model file."""
         with open(path, encoding="utf-8") as file:
-            return cls(file.read())
+            text = file.read()
+        try:
+            return cls(text)
+        except ValueError as error:
+            raise ValueError(f"{os.fspath(path)}: {error}") from None
 
     def __repr__(self) -> str:
         inputs = [column["name"] for column in self.handle.inputs()]

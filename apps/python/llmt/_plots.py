@@ -21,7 +21,7 @@ _MINUS = "\N{MINUS SIGN}"
 _MOST_POINTS = 5000
 
 
-def _pyplot() -> Any:
+def pyplot_of() -> Any:
     try:
         import matplotlib.pyplot as pyplot
     except ImportError as error:
@@ -30,7 +30,7 @@ def _pyplot() -> Any:
 
 
 def _axes(ax: Any, size: tuple[float, float] = (6.0, 4.0)) -> Any:
-    return ax if ax is not None else _pyplot().subplots(figsize=size, layout="constrained")[1]
+    return ax if ax is not None else pyplot_of().subplots(figsize=size, layout="constrained")[1]
 
 
 def plot_tree(
@@ -51,7 +51,7 @@ def plot_tree(
     layout = layout_of(tree, wide, most_leaves)
     if ax is None:
         height = (layout.height + 3.5) * _EM / 72.0
-        ax = _pyplot().subplots(figsize=(_WIDTH, height), layout="constrained")[1]
+        ax = pyplot_of().subplots(figsize=(_WIDTH, height), layout="constrained")[1]
     box = ax.get_window_extent().transformed(ax.figure.dpi_scale_trans.inverted())
     size = min(_EM * 1.25, box.width * 72.0 / wide, box.height * 72.0 / (layout.height + 0.5))
     layout = layout_of(tree, max(wide, box.width * 72.0 / size), most_leaves)
@@ -100,10 +100,12 @@ def plot_curve(
     target: str | int = 0,
     coverage: float | None = 0.9,
     places: int = 200,
+    sample: Any = None,
 ) -> Any:
     """The prediction along one input, from its smallest to its largest value in training, or at each of its categories.
 
-    The other inputs have their means; categories are missing, unless `at` gives a value or a label by name. `coverage`:
+    The other inputs have their means, categories their commonest value in `sample` (rows of training); without rows
+    categories are missing. `at` gives other values or labels by name. `coverage`:
     level of the band of prediction intervals; None: no band. Bands are there if the model has intervals.
     """
     columns = handle.inputs()
@@ -111,6 +113,11 @@ def plot_curve(
     if name not in names:
         raise ValueError(f"there is no input {name!r}; there are {', '.join(names)}")
     point = np.array([math.nan if level_names(column) else column["centre"] for column in columns])
+    common = {} if sample is None or len(sample) < 2 else _commonest(
+        columns, np.asarray(sample), {name, *(at or {})} | {of for of, is_used in zip(names, handle.used_inputs()) if not is_used}
+    )
+    for other, code in common.items():
+        point[names.index(other)] = code
     for other, value in (at or {}).items():
         if other not in names:
             raise ValueError(f"at: there is no input {other!r}; there are {', '.join(names)}")
@@ -149,13 +156,25 @@ def plot_curve(
     if band:
         ax.legend(frameon=False, fontsize="small")
     _label(ax, shown(name), shown(handle.outputs()[output]))
-    others = (
-        "others at " + ", ".join(f"{shown(key)} = {value}" for key, value in at.items())
-        if at
-        else "others at their means"
-    )
+    held = {other: _label_of(columns[names.index(other)], code) for other, code in common.items()} | dict(at or {})
+    others = ", ".join([*(f"{shown(key)} = {value}" for key, value in held.items()), "others at their means"])
     ax.set_title(f"Prediction along {shown(name)}, {others}", fontsize="medium", parse_math=False)
     return ax
+
+
+def _commonest(columns: Any, sample: np.ndarray, without: set[str]) -> dict[str, float]:
+    """Of each category its commonest value in the rows."""
+    result = {}
+    for j, column in enumerate(columns):
+        present = sample[~np.isnan(sample[:, j]), j]
+        if level_names(column) and column["name"] not in without and len(present):
+            values, counts = np.unique(present, return_counts=True)
+            result[column["name"]] = float(values[counts.argmax()])
+    return result
+
+
+def _label_of(column: Mapping[str, Any], code: float) -> str:
+    return number(code) if len(column["codes"]) else str(shown(level_names(dict(column))[int(code)], 20))
 
 
 def plot_importance(names: Sequence[str], importance: Any, ax: Any = None, most: int = 20) -> Any:
@@ -189,8 +208,11 @@ def plot_importance(names: Sequence[str], importance: Any, ax: Any = None, most:
     return ax
 
 
-def plot_error_over_leaves(summary: dict[str, Any], ax: Any = None, target: str | int = 0) -> Any:
-    """Held-out RMSE of crisp trees by their number of leaves, with the chosen model and least squares."""
+def plot_error_over_leaves(
+    summary: dict[str, Any], ax: Any = None, target: str | int = 0, readable: bool = False
+) -> Any:
+    """Held-out RMSE of crisp trees by their number of leaves, with least squares, the most accurate model and, if that
+    is the model (`readable`), the readable tree."""
     partition = _summary_of(summary, target)
     name = ", ".join(partition["targets"])
     curve = curves({"partitions": [partition]})[name]
@@ -210,8 +232,14 @@ def plot_error_over_leaves(summary: dict[str, Any], ax: Any = None, target: str 
         ax.axhline(least_squares, color=_ORANGE, lw=1.0, ls="--", label=f"least squares: {number(least_squares)}")
     ax.errorbar(
         chosen["leaves"], chosen["cv_rmse"], yerr=chosen["spread"] or 0.0, fmt="o", color=_BLUE, capsize=3, zorder=3,
-        label=f"chosen, with the spread of folds: {number(chosen['cv_rmse'])}",
+        label=f"{'most accurate' if readable else 'this model'}, with the spread of folds: {number(chosen['cv_rmse'])}",
     )  # fmt: skip
+    for simple in summary.get("readable", []) if readable else []:
+        if simple["targets"] == partition["targets"]:
+            ax.errorbar(
+                simple["leaves"], simple["cv_rmse"], yerr=simple["spread"] or 0.0, fmt="s", color=_ORANGE, capsize=3,
+                zorder=3, label=f"this model, readable: {number(simple['cv_rmse'])}",
+            )  # fmt: skip
     ax.set_ylim(bottom=0.0)
     ax.set_xscale("log")
     ax.xaxis.set_major_formatter("{x:g}")
@@ -277,7 +305,7 @@ def plot_all(
 ) -> Any:
     """A figure of four: the tree, predicted against observed, the error over the number of leaves, and importances.
     Returns the axes in this order."""
-    pyplot = _pyplot()
+    pyplot = pyplot_of()
     tree = _tree_of(model, target)
     layout = layout_of(tree, 11.0 * 72.0 / _EM, 16)
     tree_height = max(1.5, (layout.height + 4.0) * _EM / 72.0 * 0.95)
@@ -286,7 +314,7 @@ def plot_all(
     above = figure.add_subplot(grid[0, :])
     below = [figure.add_subplot(grid[1, k]) for k in range(3)]
     plot_predicted(observed, predicted, below[0], tree.targets[0], rows)
-    plot_error_over_leaves(summary, below[1], target)
+    plot_error_over_leaves(summary, below[1], target, readable)
     plot_importance(names, importance, below[2], 12)
     figure.draw_without_rendering()  # the tree's letters follow the size of its axes
     plot_tree(model, summary, above, target, 16, readable)

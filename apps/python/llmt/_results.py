@@ -114,9 +114,9 @@ def axes_of(ax: Any) -> Any:
     """The axes that were given, or new ones."""
     if ax is not None:
         return ax
-    from matplotlib import pyplot
+    from llmt._plots import pyplot_of
 
-    return pyplot.subplots()[1]
+    return pyplot_of().subplots()[1]
 
 
 def draw_points(
@@ -131,6 +131,7 @@ def draw_points(
     ax.set_xlabel(x)
     ax.set_ylabel(y)
     ax.set_title(title)
+    ax.xaxis.get_major_locator().set_params(integer=True)
     ax.legend()
     return ax
 

@@ -21,7 +21,8 @@ def tree_text(
 ) -> str:
     """The model as text in lines of about `width` letters; the other arguments are those of `tree_html`.
 
-    Coefficients and thresholds have the digits that the pictures have; `rules_frame` has them all.
+    Coefficients and thresholds have the digits that the pictures have; `rules_frame` has them all. The equations of a
+    readable tree, which are rounded already, stand as they are.
     """
     parts = []
     for position, tree in enumerate(trees(model, lambda name: shown(name, 40))):
@@ -32,11 +33,14 @@ def tree_text(
             sentences.append(f"{facts.how}.")
         lines += textwrap.wrap(" ".join(filter(None, sentences)), width)
         if facts.errors:
-            lines.append(f"Held-out RMSE ({facts.how}; +- the spread of the folds):")
+            has_spread = any(spread > 0.0 for _, _, spread in facts.errors)
+            lines.append(f"Held-out RMSE ({facts.how}{'; +- the spread of the folds' if has_spread else ''}):")
             for name, rmse, spread in facts.errors:
-                lines.append(f"  {number(rmse):>9} +- {number(spread, 2):<8} {name}")
+                beside = f" +- {number(spread, 2):<8}" if has_spread else ""
+                lines.append(f"  {number(rmse):>9}{beside} {name}")
+            lines += textwrap.wrap(_cost_of_reading(facts.errors) if readable else "", width)
         items = items_of(tree, most_leaves)
-        lines += ["", *_tree_lines(tree, items, width)]
+        lines += ["", *_tree_lines(tree, items, width, readable)]
         if any(item.is_cut for item in items):
             note = CUT_NOTE.replace("drawn", "shown").replace("A dashed box", 'What begins with "..."')
             lines += ["", *textwrap.wrap(note, width)]
@@ -44,7 +48,15 @@ def tree_text(
     return "\n\n".join(parts)
 
 
-def _tree_lines(tree: Tree, items: list[Item], width: int) -> list[str]:
+def _cost_of_reading(errors: list[tuple[str, float, float]]) -> str:
+    """The readable tree, which is the first, beside the most accurate model, the second."""
+    cost = errors[0][1] / errors[1][1] - 1.0 if len(errors) > 1 and errors[1][1] > 0.0 else 0.0
+    if cost <= 0.05:
+        return ""
+    return f"Reading costs {100.0 * cost:.0f} % more error; a smaller share, such as readable=0.05, costs less."
+
+
+def _tree_lines(tree: Tree, items: list[Item], width: int, readable: bool) -> list[str]:
     lines = []
     for item in items:
         indent = "|  " * max(0, item.depth - 1)
@@ -61,7 +73,7 @@ def _tree_lines(tree: Tree, items: list[Item], width: int) -> list[str]:
         note = f"... {tree.leaves_below(item.node)} leaves, {note}" if item.is_cut else f"leaf {leaf.number}, {note}"
         lines += [f"{head}: {note}"] if len(head) + len(note) + 2 <= width else [f"{head}:", f"{indent}   {note}"]
         for o, target in enumerate(tree.targets):
-            terms, left_out = tree.short_equation(leaf, o)
+            terms, left_out = (tree.equation(leaf, o), 0) if readable else tree.short_equation(leaf, o)
             if left_out:
                 terms.append(f"+ {left_out} smaller term" + ("s" if left_out > 1 else ""))
             lines += _wrapped(f"{indent}   {target} = ", terms, f"{indent}       ", width)

@@ -65,7 +65,7 @@ class Views:
         """What was tried, with held-out errors and their spread, what was chosen, and the mean as a baseline."""
         from ._frames import candidates_frame
 
-        return candidates_frame(self._summary("candidates_"), self._mean)
+        return candidates_frame(self._summary("candidates_"), self._mean, self._is_readable)
 
     @property
     def curves_(self) -> Any:
@@ -142,10 +142,11 @@ class Views:
         return plot_predicted(observed, predicted, ax=ax, name=self._outputs[self._position(target)])
 
     def plot_curve(self, name: str, ax: Any = None, at: Any = None, target: "str | int" = 0) -> Any:
-        """The prediction along one input with its intervals; the others at their means, or at the values in `at`."""
+        """The prediction along one input with its intervals. The others are at their means, categories at their commonest
+        label in training; `at={"town": "Brno"}` gives other values."""
         from ._plots import plot_curve
 
-        return plot_curve(self._model().handle, name, ax=ax, at=at, target=target)
+        return plot_curve(self._model().handle, name, ax=ax, at=at, target=target, sample=self._sample)
 
     def plot_importance(self, ax: Any = None) -> Any:
         """The inputs by `feature_importances_`."""
@@ -157,7 +158,9 @@ class Views:
         """The held-out error over the number of leaves."""
         from ._plots import plot_error_over_leaves
 
-        return plot_error_over_leaves(self._summary("plot_error()"), ax=ax, target=target)
+        return plot_error_over_leaves(
+            self._summary("plot_error()"), ax=ax, target=target, readable=self._is_readable
+        )
 
     def to_c(self, name: str = "model") -> tuple[str, str]:
         """C99 source and header of a function NAME_predict; the same bytes as predict."""

@@ -7,6 +7,7 @@ written as CSV text, every number with the digits that give the same number agai
 from __future__ import annotations
 
 import csv
+import errno
 import io
 import math
 import os
@@ -43,6 +44,8 @@ def csv_text(table: Any, what: str) -> str:
 def source_of(table: Any, what: str) -> Source:
     """A path by its name, and anything else as text under the name of the argument."""
     if isinstance(table, (str, os.PathLike)):
+        if not os.path.exists(table):
+            raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), os.fspath(table))
         return os.fspath(table), None
     return f"<{what}>", csv_text(table, what)
 

@@ -11,17 +11,17 @@ from llmt._files import write_text
 from llmt._frames import table_of
 from llmt._results import Findings, Result, draw_points, html_table
 from llmt.robotics._csv import frame_of
-from llmt.robotics._robot import Robot
+from llmt.robotics._robot import Robot, RobotWarning
 
-
-class RobotWarning(UserWarning):
-    """What looks wrong with a robot's measurements, or was made up."""
+__all__ = ["Calibration", "Check", "Commands", "Discovery", "PoseChoice", "RobotWarning"]
 
 
 def _draw_errors(ax: Any, errors: Mapping[str, Any], title: str, lines: Mapping[str, float] = {}) -> Any:
     count = len(next(iter(errors.values())))
     ax = draw_points(ax, range(count), errors, x="measured point", y="position error, mm", title=title, lines=lines)
-    ax.set_ylim(bottom=0.0)
+    highest = max([*(error for of in errors.values() for error in of), *lines.values()])
+    ax.set_ylim(0.0, 1.35 * highest or None)  # room for the legend above the points
+    ax.legend(loc="upper right")
     return ax
 
 
@@ -252,4 +252,5 @@ class Commands(_RobotResult):
             ax, range(len(self._before)), distances, x="target", y="distance by the model, mm", title="By the model"
         )
         ax.set_yscale("log")
+        ax.set_ylim(bottom=max(ax.get_ylim()[0], 1e-6))  # 1e-6 mm: below is rounding
         return ax

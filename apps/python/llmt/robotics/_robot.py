@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import errno
 import html
 import json
 import os
+import warnings
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from llmt._results import html_table
+
+
+class RobotWarning(UserWarning):
+    """What looks wrong with a robot's measurements, was made up, or is not in a file."""
 
 
 def _extension() -> Any:
@@ -34,11 +40,16 @@ def _bound_of(source: Any, base_link: str, tip_link: str) -> Any:
     if isinstance(source, os.PathLike):
         source = os.fspath(source)
     if not isinstance(source, str):
-        raise TypeError(f"a robot is a path, a text or a dict, not {type(source).__name__}")
+        raise TypeError(
+            f"a robot is a Robot, a path, a text or a dict, not {type(source).__name__}; the robot is the first argument, "
+            "the table the second"
+        )
     if source.lstrip().startswith("<"):
         return bound.parse_urdf(source, "robot.urdf", base_link, tip_link)
     if "\n" in source or source.lstrip().startswith("{"):
         return bound.parse_yaml(source, "robot")
+    if not os.path.exists(source):
+        raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), source)
     return bound.read(source, base_link, tip_link)
 
 
@@ -115,11 +126,23 @@ class Robot:
     def save(self, path: str | os.PathLike[str]) -> list[str]:
         """Writes the description and, beside it, the correction if there is one. For a path that ends with ``.urdf``
         writes the URDF too; the description, which has everything, stands beside it as YAML. Returns the names of the
-        files, which are all replaced or none."""
+        files, which are all replaced or none; a RobotWarning says what the URDF itself does not hold. Read the YAML to have
+        everything again."""
         target = os.fspath(path)
         stem = os.path.splitext(target)[0]
         yaml = stem + ".yaml" if target.endswith(".urdf") else target
         names: list[str] = self._bound.save(target, yaml, stem + ".correction.json")
+        if target.endswith(".urdf"):
+            description = self.to_dict()
+            left_out = [f"{len(self._effects())} effects"] if self._effects() else []
+            left_out += ["the frame of the base"] if any(np.ravel(list(description["base"].values()))) else []
+            left_out += ["the correction"] if self._state[2] else []
+            if left_out:
+                warnings.warn(
+                    f"{target} holds the geometry only; {', '.join(left_out)}: in {yaml}, load that",
+                    RobotWarning,
+                    stacklevel=2,
+                )
         return names
 
     def forward(self, q: Any) -> Any:

@@ -11,15 +11,18 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import warnings as _warnings
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
+import numpy as np
+
 from llmt._files import write_text
 from llmt._results import names, number
 from llmt.robotics._csv import Source, frame_of, source_of
-from llmt.robotics._results import Calibration, Check, Commands, Discovery, PoseChoice, RobotWarning
-from llmt.robotics._robot import _extension
+from llmt.robotics._results import Calibration, Check, Commands, Discovery, PoseChoice
+from llmt.robotics._robot import RobotWarning, _extension
 from llmt.robotics._robot import robot as _robot_of
 
 Progress = Callable[[int, int, str], Any]
@@ -47,6 +50,111 @@ def _warned(made: dict[str, Any]) -> dict[str, Any]:
     for sentence in made["warnings"]:
         _warnings.warn(sentence, RobotWarning, stacklevel=3)
     return made
+
+
+def _checked(source: Source, columns: Any, arm: Any) -> Source:
+    """Measurements whose columns are probably those that the reader will look for. Raises ValueError for a name that is
+    wrong in its case alone; warns of a coordinate that is not there."""
+    if columns is not None:
+        return source
+    path, text = source
+    if text is None:
+        with open(path, encoding="utf-8-sig", errors="replace") as file:
+            text = file.readline()
+    header = [name.strip().strip('"') for name in re.split(r"[,;\t]", text.split("\n", 1)[0])]
+    joints = {joint["name"] for joint in arm.joints}
+    for name in header:
+        is_ours = re.fullmatch(r"[xyz]_(mm|m|um)|q[0-9]+_(deg|rad|mm|m|um)", name.lower())
+        if is_ours and name != name.lower() and name.lower() not in header and name.rsplit("_", 1)[0] not in joints:
+            raise ValueError(f'{path.strip("<>")}: column "{name}": did you mean "{name.lower()}"? Rename it')
+    there = [axis for axis in "xyz" if any(f"{axis}_{unit}" in header for unit in ("mm", "m", "um"))]
+    if there and len(there) < 3:
+        absent = " and ".join(f"{axis}_mm" for axis in "xyz" if axis not in there)
+        _warnings.warn(
+            f"{path.strip('<>')}: there is no {absent}; only {' and '.join(there)} of each point are used",
+            RobotWarning,
+            stacklevel=3,
+        )
+    return source
+
+
+def _likely_causes(arm: Any, source: Source) -> list[str]:
+    """Units that the numbers of a table in memory do not look like."""
+    if source[1] is None:
+        return []
+    table = frame_of(source[1])
+    angles = {name: np.abs(np.asarray(table[name], dtype=float)) for name in table if re.search("_(deg|rad)$", name)}
+    causes = []
+    radians = {name: np.nanmax(of) for name, of in angles.items() if re.fullmatch("q[0-9]+_rad", name)}
+    large = {name: most for name, most in radians.items() if most > 4 * np.pi}
+    if large:
+        name, most = next(iter(large.items()))
+        others = f"; also {', '.join(list(large)[1:])}" if len(large) > 1 else ""
+        causes.append(f"{name} reaches {most:.4g}: these look like degrees; rename {name} to {name[:-3]}deg{others}")
+    joints = {name: of for name, of in angles.items() if re.fullmatch("q[0-9]+_deg", name)}
+    if len(joints) > 1 and max(np.nanmax(of) for of in joints.values()) <= np.pi:
+        causes.append("no joint is beyond 3.1416 deg: these look like radians; rename q1_deg to q1_rad, and so on")
+    if {"x_mm", "y_mm", "z_mm"} <= set(table) and not causes:
+        described = frame_of(_extension().predict(arm._bound, source, _reading(None), as_measured=False)["csv"])
+        spans = [max(float(np.ptp(np.asarray(of[f"{axis}_mm"]))) for axis in "xyz") for of in (table, described)]
+        if spans[0] > 0.0 and spans[1] > 100.0 * spans[0]:
+            causes.append(
+                f"the measured points span {spans[0]:.3g} mm, those of the description {spans[1]:.3g} mm: x_mm, y_mm and "
+                "z_mm look like metres; rename them to x_m, y_m and z_m"
+            )
+        elif spans[0] > 100.0 * spans[1] > 0.0:
+            causes.append(
+                f"the measured points span {spans[0]:.3g} mm, those of the description {spans[1]:.3g} mm: the lengths of "
+                "the description look like metres; they are in mm"
+            )
+    return causes
+
+
+def _minus_two(lines: str) -> str:
+    """The rows, counted from 0, of lines below a header."""
+    return re.sub("[0-9]+", lambda line: str(int(line[0]) - 2), lines)
+
+
+def _on_the_page(made: dict[str, Any], source: Source) -> list[str]:
+    """What the page of a calibration warns of, in the words of Python: rows of a table in memory count from 0."""
+    said = []
+    for sentence in json.loads(made["json"])["warnings"]:
+        if "--robust" in sentence:
+            sentence = sentence.replace("--robust leaves", "robust=True leaves")
+            if source[1] is not None:
+                sentence = re.sub(r"\(lines?( [^)]*)\)", lambda of: f"(row{_minus_two(of[1])})", sentence)
+        said.append(sentence)
+    for line in made["text"].split("\n"):
+        sentence = line.removeprefix("WARNING: ")
+        if sentence != line and sentence not in said:
+            said.append(sentence)
+    return [sentence for sentence in said if sentence not in made["warnings"]]
+
+
+def _common_scale(made: dict[str, Any], arm: Any) -> list[str]:
+    """A remark where all identified lengths of 10 mm or more changed by one factor, of more than 0.3 % and beyond three
+    standard errors: then a scale error of the instrument looks the same."""
+    described = {
+        f"{joint['name']}.{key}": joint[f"{key}_mm"]
+        for joint in json.loads(arm._bound.json())["joints"]
+        for key in ("a", "d")
+        if abs(joint.get(f"{key}_mm", 0.0)) >= 10.0
+    }
+    lengths = [of for of in json.loads(made["json"])["parameters"] if of["name"] in described and of["standard_error"]]
+    if len(lengths) < 3:
+        return []
+    nominal = np.array([described[of["name"]] for of in lengths])
+    value = np.array([of["value"] for of in lengths])
+    error = np.array([of["standard_error"] for of in lengths])
+    factor = float(value @ nominal / (nominal @ nominal))
+    change = np.abs((factor - 1.0) * nominal)
+    is_common = (np.abs(value - factor * nominal) <= np.maximum(3.0 * error, 0.1 * change)).all()
+    if not is_common or abs(factor - 1.0) <= 0.003 or change.max() <= 3.0 * error[change.argmax()]:
+        return []
+    return [
+        f"all identified lengths are {factor:.4f} times those described: if the instrument or the unit of the "
+        "measurements has a scale error, it looks the same; check the scale of x_mm, y_mm and z_mm"
+    ]
 
 
 def _folds(folds: Any) -> int:
@@ -123,28 +231,36 @@ def calibrate(
     if new_session and test is None:
         raise ValueError("new_session is about test, which is not given")
     arm = _robot_of(robot)
+    given = _checked(source_of(measured, "measured"), columns, arm)
     priors = {name: number(f"prior {name}", sigma, 1e-9, _LARGEST) for name, sigma in (prior or {}).items()}
-    made = _extension().calibrate(
-        arm._bound,
-        source_of(measured, "measured"),
-        _optional(test, "test"),
-        _reading(columns, orientations, decimal_comma),
-        correct=bool(correct),
-        folds=_folds(folds),
-        contiguous=bool(contiguous),
-        new_session=bool(new_session),
-        robust=bool(robust),
-        fixed=names("fix", fix),
-        only=names("only", only),
-        priors=priors,
-        max_leaves=number("max_leaves", max_leaves, 0, 2**31 - 1, whole=True),
-        min_leaf=number("min_leaf", min_leaf, 0, _MOST, whole=True),
-        seed=number("seed", seed, 0, 2**64 - 1, whole=True),
-        threads=number("threads", threads, 0, 2**31 - 1, whole=True),
-        quality=bool(quality),
-        page=report is not None,
-        report=progress,
-    )
+    try:
+        made = _extension().calibrate(
+            arm._bound,
+            given,
+            _optional(test, "test"),
+            _reading(columns, orientations, decimal_comma),
+            correct=bool(correct),
+            folds=_folds(folds),
+            contiguous=bool(contiguous),
+            new_session=bool(new_session),
+            robust=bool(robust),
+            fixed=names("fix", fix),
+            only=names("only", only),
+            priors=priors,
+            max_leaves=number("max_leaves", max_leaves, 0, 2**31 - 1, whole=True),
+            min_leaf=number("min_leaf", min_leaf, 0, _MOST, whole=True),
+            seed=number("seed", seed, 0, 2**64 - 1, whole=True),
+            threads=number("threads", threads, 0, 2**31 - 1, whole=True),
+            quality=bool(quality),
+            page=report is not None,
+            report=progress,
+        )
+    except ValueError as error:
+        causes = _likely_causes(arm, given) if "a fiftieth of its length" in str(error) else []
+        if causes:
+            raise ValueError(f"{error}. Likely: {'; '.join(causes)}") from None
+        raise
+    made["warnings"] = [*made["warnings"], *_on_the_page(made, given), *_common_scale(made, arm)]
     _write_page(report, made)
     return Calibration(_warned(made))
 
@@ -193,7 +309,7 @@ def discover(
         effects = (os.fspath(catalogue), None)
     made = _extension().discover(
         arm._bound,
-        source_of(measured, "measured"),
+        _checked(source_of(measured, "measured"), columns, arm),
         _optional(test, "test"),
         _reading(columns, orientations, decimal_comma),
         held_out=number("held_out", held_out, 0.0, 0.9),
@@ -234,15 +350,20 @@ def check(
         Probability that something is said to have moved although nothing has.
     """
     arm = _robot_of(robot)
-    made = _extension().check(
-        arm._bound,
-        source_of(measured, "measured"),
-        _reading(columns, False, decimal_comma),
-        same_session=bool(same_session),
-        accuracy_mm=None if accuracy_mm is None else number("accuracy_mm", accuracy_mm, _SMALLEST, _LARGEST),
-        level=number("level", level, 1e-6, 0.5),
-        report=None,
-    )
+    try:
+        made = _extension().check(
+            arm._bound,
+            _checked(source_of(measured, "measured"), columns, arm),
+            _reading(columns, False, decimal_comma),
+            same_session=bool(same_session),
+            accuracy_mm=None if accuracy_mm is None else number("accuracy_mm", accuracy_mm, _SMALLEST, _LARGEST),
+            level=number("level", level, 1e-6, 0.5),
+            report=None,
+        )
+    except ValueError as error:
+        if "it was not calibrated" in str(error):
+            raise ValueError(f"{error}; calibrate it first: check(calibrate(arm, measured).robot, new)") from None
+        raise
     return Check(_warned(made))
 
 
@@ -360,6 +481,10 @@ def compensate(
         tolerance_um=number("tolerance_um", tolerance_um, _SMALLEST, _LARGEST),
         report=progress,
     )
+    made["warnings"] = [
+        "targets: they are poses of the tool, so nominal is not needed and not used" if "is not read" in said else said
+        for said in made["warnings"]
+    ]
     return Commands(_warned(made))
 
 
@@ -409,7 +534,11 @@ def export(robot: Any, form: str, *, nominal: Any = None, name: str = "robot") -
     if form not in ("c", "kinematics", "deltas"):
         raise ValueError(f"form is {form!r}, must be 'c', 'kinematics' or 'deltas'")
     if (nominal is None) != (form != "deltas"):
-        raise ValueError("nominal goes with the form 'deltas', which needs it")
+        raise ValueError(
+            "the form 'deltas' needs the described arm: export(robot, 'deltas', nominal=arm)"
+            if form == "deltas"
+            else f"nominal is for the form 'deltas' alone, and form is {form!r}: leave nominal out"
+        )
     if form == "c":
         made = _warned(_extension().export_c(arm._bound, name))
         return made["source"], made["header"]

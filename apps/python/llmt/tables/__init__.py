@@ -7,14 +7,14 @@ Words are categories. What cannot be read is a TypeError or a ValueError that na
 from __future__ import annotations
 
 import warnings
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 
 from .categories import by_given_levels, by_own_levels, positions_of
-from .raw import Raw, feature_names, place_of, refuse_infinite
+from .raw import Raw, feature_names, number_hint, place_of, refuse_infinite
 from .sources import read_raw
 
 __all__ = ["Table", "read_column", "read_table", "read_targets", "row_labels"]
@@ -64,13 +64,14 @@ def read_table(
     Raises TypeError for columns of a type that cannot be read, ValueError for infinite values and for tables that are
     not two-dimensional or have no rows or no columns. Both name the column where there is one.
     """
+    if getattr(X, "ndim", None) == 1 and hasattr(X, "iloc"):  # before its cells, which may be of many types
+        _refuse_series(X)
+    if isinstance(X, (list, tuple)) and X and isinstance(X[0], Mapping):
+        raise TypeError(f"{name} is a list of dicts; make a table of it: pandas.DataFrame({name})")
     raw = read_raw(X, name)
     if raw.dimensions != 2:
         if raw.series:
-            raise ValueError(
-                f"Expected a 2-dimensional container but got {type(X)} instead. Pass a DataFrame containing a single "
-                "row (i.e. single sample) or a single column (i.e. single feature) instead."
-            )
+            _refuse_series(X)
         raise ValueError(f"Expected 2D array, got 1D array instead:\narray={X}.\n{_RESHAPE}")
     names = feature_names(raw.labels)
     if fitted_names is not _UNCHECKED:
@@ -92,6 +93,13 @@ def read_table(
     declared = positions_of(categorical, names, columns)
     found = [by_own_levels(raw, j, j in declared) for j in range(columns)]
     return Table(raw.values, names, found, [0] * columns)
+
+
+def _refuse_series(X: Any) -> NoReturn:
+    raise ValueError(
+        f"Expected a 2-dimensional container but got {type(X)} instead. Pass a DataFrame containing a single row (i.e. "
+        "single sample) or a single column (i.e. single feature) instead: of a frame X the first row is X.iloc[[0]]."
+    )
 
 
 def read_column(y: Any, *, name: str) -> tuple[np.ndarray, str | None]:
@@ -139,7 +147,10 @@ def _read_numbers(y: Any, name: str) -> tuple[np.ndarray, list[str] | None]:
         if column.words is not None and not np.isnan(raw.values[:, j]).all():
             row = int(np.flatnonzero(~np.isnan(raw.values[:, j]))[0])
             word = column.words[int(raw.values[row, j])]
-            raise TypeError(f"{place_of(raw, j, name)} holds words ({word!r} in row {row}); numbers are needed")
+            is_of_frame = raw.dimensions == 2 and raw.labels
+            hint = number_hint(column.words, f"{name}[{raw.labels[j]!r}]" if is_of_frame and raw.labels else name)
+            hint = f"; convert them: {hint}" if hint else ""
+            raise TypeError(f"{place_of(raw, j, name)} holds words ({word!r} in row {row}); numbers are needed{hint}")
     refuse_infinite(raw, name)
     _refuse_nan(raw, name)
     if raw.dimensions == 1:

@@ -39,14 +39,14 @@ def positions_of(categorical: Collection[str | int], names: list[str] | None, co
         if isinstance(column, str):
             if names is None or column not in names:
                 has = "the columns have no names" if names is None else f"the columns are {', '.join(names)}"
-                raise ValueError(f'categorical has "{column}", which is not among the columns: {has}')
+                raise ValueError(f'categorical_features has "{column}", which is not among the columns: {has}')
             positions.add(names.index(column))
         elif isinstance(column, (int, np.integer)) and not isinstance(column, bool):
             if not 0 <= column < columns:
-                raise ValueError(f"categorical has {column}, and the positions of the columns are 0 to {columns - 1}")
+                raise ValueError(f"categorical_features has {column}, and the positions of the columns are 0 to {columns - 1}")
             positions.add(int(column))
         else:
-            raise TypeError(f"categorical takes names or positions of columns, not {column!r}")
+            raise TypeError(f"categorical_features takes names or positions of columns, not {column!r}")
     return positions
 
 

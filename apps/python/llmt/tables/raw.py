@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -112,3 +113,14 @@ def refuse_infinite(raw: Raw, name: str) -> None:
                 f"Input {name} contains infinity or a value too large for dtype('float64').\nThe first is "
                 f"{raw.values[first + row, column]} in row {first + row} of {place_of(raw, int(column), name)}."
             )
+
+
+def number_hint(words: Sequence[str], expression: str) -> str:
+    """How to make numbers of a column (`expression`) of pandas whose words all read as numbers; else ""."""
+    for decimal, text in ((".", expression), (",", f'{expression}.str.replace(",", ".")')):
+        try:
+            if words and all(math.isfinite(float(word.replace(decimal, "."))) for word in words):
+                return f"{text}.astype(float)"
+        except ValueError:
+            continue
+    return ""
