@@ -8,6 +8,7 @@
 #include "llmt/c_source.hpp"
 #include "llmt/compare.hpp"
 #include "llmt/csv.hpp"
+#include "llmt/distributed.hpp"
 #include "llmt/explain.hpp"
 #include "llmt/files.hpp"
 #include "llmt/fit.hpp"
