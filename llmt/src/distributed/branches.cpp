@@ -74,7 +74,8 @@ Node node_of_sums(const StateData& data, const TopNode& from) {
     node.threshold = from.threshold;
   } else {
     const Eigen::MatrixXd gram = matrix_of(shape, from.gram.data()).topLeftCorner(inputs + 1, inputs + 1);
-    const Eigen::VectorXd roots = gram.diagonal().cwiseSqrt();
+    // A regressor that does not vary is 0 in all rows.
+    const Eigen::VectorXd roots = (gram.diagonal().array() > 0.0).select(gram.diagonal(), gram(0, 0)).cwiseSqrt();
     Eigen::VectorXd units(inputs + 1);
     units << 1.0, scale.cwiseInverse();
     node.inverse_gram = units.asDiagonal() * inverse_gram(gram, roots) * units.asDiagonal();
@@ -274,7 +275,9 @@ State advance(const State& state, Sums sums, const Progress& progress, int max_t
   sums = Sums();
   data.blocks = next;
   ++data.passes;
-  data.root_residual += total.root_residual;
+  // Before the root's model is known, its residuals have no range.
+  const bool has_root_model = data.step != Step::describe && data.nodes.front().fate == Fate::inner;
+  if (has_root_model) data.root_residual = total.root_residual;
   if (data.step == Step::describe) take_description(data, std::move(total.description));
   if (data.step == Step::grow) take_nodes(data, std::move(total.nodes));
   if (data.step == Step::gather) take_branches(data, std::move(total.branches), progress, max_threads);
