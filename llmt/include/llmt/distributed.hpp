@@ -81,6 +81,9 @@ class State {
   /// The model as llmt::save() writes it, with intervals if one fit() made all of it. Throws as model().
   std::string model_json() const;
 
+  /// Whether this is a later state of the fit that began with `first`: the same columns and options.
+  bool continues(const State& first) const;
+
   /// For other processes of the same version, and to go on after an end: a header with format, version, length and a
   /// checksum, then the numbers as the machine has them.
   std::string to_bytes() const;

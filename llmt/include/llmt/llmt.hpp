@@ -5,6 +5,7 @@
 ///     for (const llmt::Leaf& leaf : learnt.leaves(0)) std::printf("%td rows\n", leaf.samples);
 #pragma once
 
+#include "llmt/arrow.hpp"
 #include "llmt/c_source.hpp"
 #include "llmt/compare.hpp"
 #include "llmt/csv.hpp"

@@ -257,6 +257,12 @@ std::string State::model_json() const {
   return to_string(data_->model);
 }
 
+bool State::continues(const State& first) const {
+  const StateData& other = first.data();
+  return data_->input_names == other.input_names && data_->output_name == other.output_name &&
+         llmt::to_bytes(data_->options) == llmt::to_bytes(other.options);
+}
+
 std::string State::to_bytes() const { return sealed('s', llmt::to_bytes(*data_)); }
 
 State State::from_bytes(std::string_view bytes, const std::string& name) {

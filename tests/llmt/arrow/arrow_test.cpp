@@ -1,0 +1,121 @@
+// Tables in Arrow files: what is written is read, and what is damaged is refused.
+#include "llmt/arrow.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <optional>
+#include <random>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "llmt/files.hpp"
+
+namespace llmt {
+namespace {
+
+class ArrowTest : public testing::Test {
+ protected:
+  void TearDown() override { std::filesystem::remove(path_); }
+
+  void write(const std::vector<std::string>& columns, const Eigen::MatrixXd& values, Eigen::Index rows_at_once) const {
+    Eigen::Index next = 0;
+    const Eigen::Index written = write_arrow(path_, columns, [&]() -> std::optional<Eigen::MatrixXd> {
+      if (next >= values.rows()) return std::nullopt;
+      const Eigen::Index count = std::min(rows_at_once, values.rows() - next);
+      next += count;
+      return values.middleRows(next - count, count);
+    });
+    EXPECT_EQ(written, values.rows());
+  }
+
+  std::string path_ =
+      (std::filesystem::temp_directory_path() / ("llmt_arrow_" + std::to_string(std::random_device()()) + ".arrow"))
+          .string();
+};
+
+bool same(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
+  if (a.rows() != b.rows() || a.cols() != b.cols()) return false;
+  for (Eigen::Index k = 0; k < a.size(); ++k) {
+    const double x = a.data()[k];
+    const double y = b.data()[k];
+    if (std::isnan(x) != std::isnan(y)) return false;
+    if (!std::isnan(x) && std::memcmp(&x, &y, sizeof x) != 0) return false;
+  }
+  return true;
+}
+
+TEST_F(ArrowTest, EveryRangeOfRowsIsReadAsItWasWritten) {
+  Eigen::MatrixXd values = Eigen::MatrixXd::Random(140000, 2);  // three batches
+  values(3, 0) = -0.0;
+  values(7, 1) = values(65535, 1) = values(65536, 1) = std::numeric_limits<double>::quiet_NaN();
+  write({"x", "caf\xc3\xa9"}, values, 1000);
+  EXPECT_TRUE(is_arrow_file(path_));
+  const ArrowTable table = ArrowTable::open(path_);
+  EXPECT_EQ(table.rows(), values.rows());
+  EXPECT_EQ(table.columns(), (std::vector<std::string>{"x", "caf\xc3\xa9"}));
+  EXPECT_TRUE(same(table.read(0, values.rows(), table.columns()), values));
+  for (const auto& [first, count] : {std::pair<Eigen::Index, Eigen::Index>{0, 0},
+                                     {5, 9},
+                                     {65530, 12},
+                                     {65536, 65536},
+                                     {131000, 9000},
+                                     {139999, 1},
+                                     {140000, 0}}) {
+    const std::vector<std::string> reversed = {"caf\xc3\xa9", "x"};
+    const Eigen::MatrixXd expected = values.middleRows(first, count).rowwise().reverse();
+    EXPECT_TRUE(same(table.read(first, count, reversed), expected)) << first;
+  }
+  EXPECT_THROW(table.read(139999, 2, table.columns()), std::invalid_argument);
+  EXPECT_THROW(table.read(0, 1, std::vector<std::string>{"y"}), std::runtime_error);
+}
+
+TEST_F(ArrowTest, ATableWithoutRowsHasColumns) {
+  write({"x"}, Eigen::MatrixXd(0, 1), 10);
+  EXPECT_EQ(ArrowTable::open(path_).rows(), 0);
+  EXPECT_EQ(ArrowTable::open(path_).columns(), std::vector<std::string>{"x"});
+}
+
+// No changed byte of the file may end in anything but numbers or an error.
+TEST_F(ArrowTest, DamagedFilesAreRefusedOrRead) {
+  write({"x", "y"}, Eigen::MatrixXd::Random(9, 2), 9);
+  const std::string whole = read_file(path_);
+  Eigen::Index refused = 0;
+  const auto try_to_read = [&](const std::string& bytes) {
+    std::ofstream(path_, std::ios::binary) << bytes;  // write_file() would wait for the disk
+    try {
+      const ArrowTable table = ArrowTable::open(path_);
+      if (table.rows() < 1000) table.read(0, table.rows(), table.columns());
+    } catch (const std::runtime_error& error) {
+      EXPECT_TRUE(std::string(error.what()).starts_with(path_)) << error.what();
+      ++refused;
+    }
+  };
+  for (std::size_t length = 0; length < whole.size(); length += 7) {
+    refused = 0;
+    try_to_read(whole.substr(0, length));
+    EXPECT_EQ(refused, 1) << length;
+  }
+  refused = 0;
+  for (std::size_t at = 0; at < whole.size(); at += 3) {
+    for (const int change : {1, 128}) {
+      std::string bytes = whole;
+      bytes[at] = static_cast<char>(bytes[at] ^ change);
+      try_to_read(bytes);
+    }
+  }
+  EXPECT_GT(refused, 50);
+  write_file(path_, "x,y\n1,2\n");
+  EXPECT_FALSE(is_arrow_file(path_));
+  EXPECT_THROW(ArrowTable::open(path_), std::runtime_error);
+  EXPECT_THROW(ArrowTable::open(path_ + "_none"), std::runtime_error);
+}
+
+}  // namespace
+}  // namespace llmt
