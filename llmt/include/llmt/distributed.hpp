@@ -2,16 +2,15 @@
 /// A tree of more rows than one memory holds, by three functions that any engine can call: sums over some rows, sums of
 /// sums, and the next state of the tree. docs/algorithms/distributed.md has the equations.
 ///
-///     using namespace llmt::distributed;
-///     State state = start({"x1", "x2"}, "y", {.branch_rows = 4'000'000});
+///     namespace distributed = llmt::distributed;
+///     distributed::State state = distributed::start({"x1", "x2"}, "y", {.branch_rows = 4'000'000});
 ///     while (!state.finished()) {
-///       Sums all;
-///       for (const Shard& shard : shards) {              // in any order, on any machine
-///         all = merge(std::move(all), sums({shard.inputs, shard.output, shard.first_block}, state));
-///       }
-///       state = advance(state, std::move(all));          // to_bytes() of it is a checkpoint
+///       // Shards are summed on any machine and merged in any order.
+///       distributed::Sums all = distributed::sums({inputs.topRows(65536), output.col(0).head(65536), 0}, state);
+///       all = merge(std::move(all), distributed::sums({inputs.bottomRows(99), output.col(0).tail(99), 1}, state));
+///       state = distributed::advance(state, std::move(all));  // to_bytes() of it is a checkpoint
 ///     }
-///     llmt::save(state.model(), "model.json");
+///     save(state.model(), "model.json");
 #pragma once
 
 #include <Eigen/Core>
